@@ -1,0 +1,56 @@
+// app: what the program needs from an audio backend: a list of functions. jack.cpp, alsa.cpp and
+// dummy.cpp each open one; the process is all that they know of the rest.
+#pragma once
+
+#include <functional>
+#include <string>
+
+#include "app/process.h"
+#include "core/result.h"
+
+namespace ressort {
+
+struct AudioOptions {
+  std::string client_name = "ressort";
+  bool connect = false;        // to the physical outputs and to every MIDI source
+  int outputs = 2;             // ports: out_left and out_right, or out_1...
+  double rate_hz = 48000.0;    // a wish; JACK has its own
+  int period_frames = 256;     // a wish; JACK has its own
+  std::string device = "default";  // ALSA's
+};
+
+// A running backend. Closing it, or letting it go, ends its audio thread; the process may then be
+// used by another. All functions: [control].
+struct AudioDevice {
+  std::string description;  // "JACK, 48000 Hz, 256 frames"
+  double rate_hz = 48000.0;
+  std::function<void()> close;
+  std::function<bool()> is_lost;             // the server or the device is gone
+  std::function<double()> cpu;               // share of a period spent, 0..1
+  std::function<void(int)> set_audio_inputs; // the model wants so many
+  std::function<double()> rate_now;          // as the server runs now
+  bool has_midi = false;                     // brings its own MIDI, with exact frames
+
+  AudioDevice() = default;
+  AudioDevice(AudioDevice&&) = default;
+  AudioDevice& operator=(AudioDevice&&) = default;
+  ~AudioDevice() {
+    if (close) {
+      close();
+    }
+  }
+};
+
+// Errors say what is missing and what to do.
+Result<AudioDevice> open_jack(Process& process, const AudioOptions& options);
+Result<AudioDevice> open_alsa(Process& process, const AudioOptions& options);
+Result<AudioDevice> open_dummy(Process& process, const AudioOptions& options);
+
+// The first that opens of "jack", "alsa" and "dummy", or the one that `wanted` names.
+Result<AudioDevice> open_audio(const std::string& wanted, Process& process,
+                               const AudioOptions& options);
+
+// The monotonic clock, in ns. Reads shared memory, makes no system call. [any thread]
+std::int64_t monotonic_ns();
+
+}  // namespace ressort

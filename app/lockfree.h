@@ -1,0 +1,148 @@
+// app: every atomic of the program, and nothing else. What passes between the audio thread and
+// the others, and the promise that each side makes.
+#pragma once
+
+#include <readerwriterqueue/readerwriterqueue.h>
+
+#include <array>
+#include <atomic>
+#include <cstdint>
+#include <span>
+
+namespace ressort {
+
+// Hands one heap object at a time to the audio thread and takes it back to be destroyed
+// elsewhere. One offering thread, one audio thread.
+template <class T>
+class Slot {
+ public:
+  // Makes `next` the one to take. What was offered before and not yet taken comes back; it is
+  // the caller's to delete. [offering thread] wait-free
+  T* offer(T* next) { return offered_.exchange(next, std::memory_order_acq_rel); }
+
+  // The newest offer, once; null if there is none. [audio] wait-free
+  T* take() {
+    return offered_.load(std::memory_order_relaxed) == nullptr
+               ? nullptr
+               : offered_.exchange(nullptr, std::memory_order_acq_rel);
+  }
+
+  // Gives one back. False when the other side is behind: keep it and try in the next block.
+  // [audio] wait-free
+  bool retire(T* old) {
+    T* empty = nullptr;
+    return retired_.compare_exchange_strong(empty, old, std::memory_order_release,
+                                            std::memory_order_relaxed);
+  }
+
+  // One to delete, or null. [offering thread] wait-free
+  T* collect() { return retired_.exchange(nullptr, std::memory_order_acq_rel); }
+
+ private:
+  std::atomic<T*> offered_{nullptr};
+  std::atomic<T*> retired_{nullptr};
+};
+
+// A ring from one thread to one other. A full ring refuses; nobody waits.
+template <class T>
+class Ring {
+ public:
+  explicit Ring(std::size_t capacity) : queue_(capacity) {}
+  bool push(const T& item) { return queue_.try_enqueue(item); }  // [its one writer] wait-free
+  // All or none.
+  bool push_all(std::span<const T> items) {  // [its one writer] wait-free
+    if (queue_.size_approx() + items.size() > queue_.max_capacity()) {
+      return false;
+    }
+    for (const T& item : items) {
+      queue_.try_enqueue(item);
+    }
+    return true;
+  }
+  bool pop(T& item) { return queue_.try_dequeue(item); }  // [its one reader] wait-free
+  const T* peek() const { return queue_.peek(); }         // [its one reader] wait-free
+  std::size_t size() const { return queue_.size_approx(); }
+
+ private:
+  moodycamel::ReaderWriterQueue<T> queue_;
+};
+
+// A number that one thread writes and any may read. No order is promised between two of them.
+template <class T>
+class Meter {
+ public:
+  void set(T value) { value_.store(value, std::memory_order_relaxed); }
+  T get() const { return value_.load(std::memory_order_relaxed); }
+  void add(T amount) { set(get() + amount); }  // [its one writer]
+  void raise(T value) {                        // [its one writer]
+    if (value > get()) {
+      set(value);
+    }
+  }
+
+ private:
+  std::atomic<T> value_{};
+};
+
+// A flag that any thread may raise and any may look at.
+class Flag {
+ public:
+  void raise() { raised_.store(true, std::memory_order_release); }
+  bool is_raised() const { return raised_.load(std::memory_order_acquire); }
+  bool lower() { return raised_.exchange(false, std::memory_order_acq_rel); }
+
+ private:
+  std::atomic<bool> raised_{false};
+};
+
+// A pointer that one thread publishes and the audio thread reads; what it points to outlives both.
+template <class T>
+class Published {
+ public:
+  void set(T* value) { value_.store(value, std::memory_order_release); }
+  T* get() const { return value_.load(std::memory_order_acquire); }
+
+ private:
+  std::atomic<T*> value_{nullptr};
+};
+
+// Which frame is heard at which moment. The audio thread writes it every block and never waits;
+// a reader tries again while it is being written.
+struct ClockReading {
+  std::int64_t frame = 0;    // first of the newest block
+  std::int64_t time_ns = 0;  // monotonic clock at its start
+  double rate_hz = 0.0;      // 0: no block yet
+  std::int64_t period = 0;   // frames of the block
+};
+
+class ClockBoard {
+ public:
+  void write(const ClockReading& reading) {  // [audio] wait-free
+    version_.fetch_add(1, std::memory_order_acq_rel);
+    frame_.store(reading.frame, std::memory_order_relaxed);
+    time_ns_.store(reading.time_ns, std::memory_order_relaxed);
+    rate_hz_.store(reading.rate_hz, std::memory_order_relaxed);
+    period_.store(reading.period, std::memory_order_relaxed);
+    version_.fetch_add(1, std::memory_order_release);
+  }
+  ClockReading read() const {  // [any other thread] lock-free
+    while (true) {
+      const std::uint32_t before = version_.load(std::memory_order_acquire);
+      const ClockReading reading{
+          frame_.load(std::memory_order_acquire), time_ns_.load(std::memory_order_acquire),
+          rate_hz_.load(std::memory_order_acquire), period_.load(std::memory_order_acquire)};
+      if (before % 2 == 0 && version_.load(std::memory_order_acquire) == before) {
+        return reading;
+      }
+    }
+  }
+
+ private:
+  std::atomic<std::uint32_t> version_{0};
+  std::atomic<std::int64_t> frame_{0};
+  std::atomic<std::int64_t> time_ns_{0};
+  std::atomic<double> rate_hz_{0.0};
+  std::atomic<std::int64_t> period_{0};
+};
+
+}  // namespace ressort

@@ -1,0 +1,236 @@
+#include "app/session.h"
+
+#include <chrono>
+#include <cmath>
+#include <future>
+
+namespace ressort {
+namespace {
+
+double to_db(double factor) { return 20.0 * std::log10(factor); }
+
+}  // namespace
+
+Session::Session(Process& process, SessionOptions options, Tell tell)
+    : process_(process),
+      options_(std::move(options)),
+      tell_(std::move(tell)),
+      rate_hz_(options_.compile.rate_hz),
+      current_(std::make_shared<Loaded>()),
+      worker_([this] { work(); }) {}
+
+Session::~Session() {
+  {
+    const std::lock_guard lock(mutex_);
+    stop_ = true;
+  }
+  wake_.notify_all();
+  worker_.join();
+}
+
+void Session::load(std::string name, Answer answer) {
+  {
+    const std::lock_guard lock(mutex_);
+    jobs_.push_back({std::move(name), std::move(answer)});
+  }
+  wake_.notify_all();
+}
+
+Result<std::shared_ptr<const Loaded>> Session::load_and_wait(const std::string& name) {
+  std::promise<Result<std::shared_ptr<const Loaded>>> promise;
+  load(name, [&](const auto& result) { promise.set_value(result); });
+  return promise.get_future().get();
+}
+
+void Session::set_rate(double rate_hz) {
+  {
+    const std::lock_guard lock(mutex_);
+    if (rate_hz_ == rate_hz) {
+      return;
+    }
+    rate_hz_ = rate_hz;
+    jobs_.push_back({"", {}});
+  }
+  wake_.notify_all();
+}
+
+std::shared_ptr<const Loaded> Session::current() const {
+  const std::lock_guard lock(mutex_);
+  return current_;
+}
+
+std::optional<double> Session::parameter(const std::string& name) const {
+  const std::lock_guard lock(mutex_);
+  const auto& parameters = current_->instrument.parameters;
+  for (std::size_t i = 0; i < parameters.size(); ++i) {
+    if (parameters[i].name == name) {
+      return values_[i];
+    }
+  }
+  return std::nullopt;
+}
+
+Result<std::vector<Event>> Session::events(const Call& call) {
+  const std::lock_guard lock(mutex_);
+  auto events = to_events(call, current_->instrument, current_->serial);
+  if (events) {
+    for (const Event& event : *events) {
+      if (event.kind == EventKind::parameter) {
+        values_[event.index] = event.value;
+      }
+    }
+  }
+  return events;
+}
+
+Status Session::status() {
+  const Meters& meters = process_.meters;
+  const ClockReading clock = process_.clock.read();
+  Status status;
+  {
+    const std::lock_guard lock(mutex_);
+    status.model = current_->name;
+    status.load_ms = current_->load_ms;
+    status.max_voices = current_->instrument.voices;
+    status.backend = backend_;
+    status.cpu = cpu_ ? cpu_() : -1.0;
+    status.rate_hz = rate_hz_;
+  }
+  status.period_frames = clock.period;
+  status.voices = meters.voices.get();
+  status.peak_db = to_db(meters.peak.get());
+  status.limited_db = to_db(meters.limited.get());
+  status.xruns = meters.xruns.get();
+  status.resets = meters.resets.get();
+  status.stolen = meters.stolen.get();
+  status.dropped = meters.dropped.get();
+  status.late = meters.late.get();
+  status.malformed = meters.malformed.get();
+  status.swaps = meters.swaps.get();
+  process_.meters.read.raise();
+  return status;
+}
+
+void Session::set_backend(std::string description, std::function<double()> cpu) {
+  const std::lock_guard lock(mutex_);
+  backend_ = std::move(description);
+  cpu_ = std::move(cpu);
+}
+
+void Session::on_audio_inputs(std::function<void(int)> prepare) {
+  const std::lock_guard lock(mutex_);
+  prepare_inputs_ = std::move(prepare);
+}
+
+void Session::work() {
+  using namespace std::chrono_literals;
+  while (true) {
+    Job job;
+    bool has_job = false;
+    {
+      std::unique_lock lock(mutex_);
+      wake_.wait_for(lock, 20ms, [this] { return stop_ || !jobs_.empty(); });
+      if (stop_) {
+        return;
+      }
+      if (!jobs_.empty()) {
+        job = std::move(jobs_.front());
+        jobs_.pop_front();
+        has_job = true;
+      }
+    }
+    listen();
+    if (has_job) {
+      do_load(job);
+    }
+  }
+}
+
+// What the audio thread has sent: engines to destroy, and news.
+void Session::listen() {
+  delete process_.slot.collect();
+  Report report;
+  while (process_.reports.pop(report)) {
+    std::string news;
+    {
+      const std::lock_guard lock(mutex_);
+      const bool is_current = report.model == current_->serial;
+      if (report.kind == Report::Kind::parameter && is_current) {
+        values_[report.index] = report.value;
+      } else if (report.kind == Report::Kind::reset) {
+        news = (is_current ? current_->name : std::string("the last model")) +
+               ": a voice became unstable and was put back to rest; lower its stiffness or "
+               "damping, or raise its mass";
+      } else if (report.kind == Report::Kind::late && report.value > 0.05) {
+        news = "an event came " + std::to_string(report.value) + " s after its time";
+      }
+    }
+    if (!news.empty() && tell_) {
+      tell_(news);
+    }
+  }
+}
+
+void Session::do_load(const Job& job) {
+  const bool again = job.name.empty();
+  if (again && scene_name_.empty()) {
+    return;
+  }
+  const auto result = build(again ? scene_name_ : job.name);
+  if (result && !again) {
+    scene_name_ = job.name;
+  }
+  if (job.answer) {
+    job.answer(result);
+  } else if (!result && tell_) {
+    tell_(result.error().message);
+  }
+}
+
+Result<std::shared_ptr<const Loaded>> Session::build(const std::string& name) {
+  const auto start = std::chrono::steady_clock::now();
+  auto scene = load_scene(name, options_.compile.bare);
+  if (!scene) {
+    return scene.error();
+  }
+  scene->preset.gain *= options_.gain;
+  CompileOptions options = options_.compile;
+  std::function<void(int)> prepare_inputs;
+  {
+    const std::lock_guard lock(mutex_);
+    options.rate_hz = rate_hz_;
+    prepare_inputs = prepare_inputs_;
+  }
+  auto compiled = compile(scene->network, scene->preset, options);
+  if (!compiled) {
+    const Error& error = compiled.error();
+    return Error{scene->path + ":" + std::to_string(error.line) + ":" +
+                 std::to_string(error.column) + ": error: " + error.message};
+  }
+  const std::chrono::duration<double, std::milli> took = std::chrono::steady_clock::now() - start;
+  auto loaded = std::make_shared<Loaded>();
+  loaded->serial = ++serial_;
+  loaded->name = scene->name;
+  loaded->path = scene->path;
+  loaded->model_path = scene->model_path;
+  loaded->description = scene->preset.description;
+  loaded->instrument = std::move(compiled->instrument);
+  loaded->plan = std::move(compiled->plan);
+  loaded->load_ms = took.count();
+  loaded->warnings = std::move(scene->warnings);
+  if (prepare_inputs) {
+    prepare_inputs(loaded->instrument.audio_inputs);
+  }
+  {
+    const std::lock_guard lock(mutex_);
+    current_ = loaded;
+    values_.clear();
+    for (const ParameterInfo& info : loaded->instrument.parameters) {
+      values_.push_back(info.value);
+    }
+  }
+  delete process_.slot.offer(new Sounding{std::move(compiled->engine), loaded->serial});
+  return std::shared_ptr<const Loaded>(std::move(loaded));
+}
+
+}  // namespace ressort

@@ -1,0 +1,128 @@
+// app: the control side. Owns what is loaded and the worker thread that loads, compiles, offers,
+// and destroys what has sounded.
+#pragma once
+
+#include <condition_variable>
+#include <deque>
+#include <functional>
+#include <memory>
+#include <mutex>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "app/calls.h"
+#include "app/loader.h"
+#include "app/process.h"
+#include "core/compile/compile.h"
+
+namespace ressort {
+
+struct SessionOptions {
+  CompileOptions compile;   // its rate is the backend's
+  double gain = 1.0;        // on top of every preset's
+};
+
+// What sounds now, as people see it. Never changes once published.
+struct Loaded {
+  std::uint32_t serial = 0;
+  std::string name;
+  std::string path;
+  std::string model_path;
+  std::string description;
+  Instrument instrument;
+  Plan plan;
+  double load_ms = 0.0;  // read, parse, compile
+  std::vector<std::string> warnings;
+};
+
+struct Status {
+  std::string model;
+  double rate_hz = 0.0;
+  std::int64_t period_frames = 0;
+  double load_ms = 0.0;
+  int voices = 0;
+  int max_voices = 0;
+  double cpu = 0.0;       // share of the time there is, 0..1; -1: not known
+  double peak_db = 0.0;   // since the last asking; -inf is silence
+  double limited_db = 0.0;  // the limiter's deepest cut since the last asking
+  std::uint64_t xruns = 0;
+  std::uint64_t resets = 0;
+  std::uint64_t stolen = 0;
+  std::uint64_t dropped = 0;
+  std::uint64_t late = 0;
+  std::uint64_t malformed = 0;
+  std::uint64_t swaps = 0;
+  std::string backend;
+};
+
+class Session {
+ public:
+  using Answer = std::function<void(const Result<std::shared_ptr<const Loaded>>&)>;
+  using Tell = std::function<void(const std::string&)>;
+
+  // `tell` gets what happens by itself, such as a voice that became unstable; on the worker's
+  // thread. The process must outlive the session.
+  Session(Process& process, SessionOptions options, Tell tell);
+  ~Session();
+
+  // Loads in the worker; `answer` is called there, with what sounds now or with the error's whole
+  // text. On an error what sounded goes on. [any thread but audio]
+  void load(std::string name, Answer answer);
+
+  // The same, waiting for it.
+  Result<std::shared_ptr<const Loaded>> load_and_wait(const std::string& name);
+
+  // The backend runs at another rate: what sounds is compiled anew.
+  void set_rate(double rate_hz);
+
+  // Never null; before the first load it has no name and no parameters.
+  std::shared_ptr<const Loaded> current() const;
+
+  // A parameter's present value; nothing where the model has none of that name.
+  std::optional<double> parameter(const std::string& name) const;
+
+  // The events of a playing call, for the model that sounds now. Remembers what parameters they
+  // set. [any thread but audio]
+  Result<std::vector<Event>> events(const Call& call);
+
+  Status status();
+
+  // What a backend knows of itself; set by whoever starts one.
+  void set_backend(std::string description, std::function<double()> cpu);
+
+  // Called in the worker before an engine is offered, with the number of its audio inputs.
+  void on_audio_inputs(std::function<void(int)> prepare);
+
+ private:
+  struct Job {
+    std::string name;  // empty: the present scene again, at a new rate
+    Answer answer;
+  };
+
+  void work();
+  void do_load(const Job& job);
+  Result<std::shared_ptr<const Loaded>> build(const std::string& name);
+  void listen();
+
+  Process& process_;
+  SessionOptions options_;
+  Tell tell_;
+
+  mutable std::mutex mutex_;  // everything below; never near the audio thread
+  std::condition_variable wake_;
+  std::deque<Job> jobs_;
+  bool stop_ = false;
+  double rate_hz_;
+  std::shared_ptr<const Loaded> current_;
+  std::vector<double> values_;  // of the current parameters
+  std::string backend_;
+  std::function<double()> cpu_;
+  std::function<void(int)> prepare_inputs_;
+
+  std::uint32_t serial_ = 0;     // [worker]
+  std::string scene_name_;       // [worker] what was loaded last
+  std::thread worker_;           // last, so that it ends first
+};
+
+}  // namespace ressort

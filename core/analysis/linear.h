@@ -1,0 +1,24 @@
+// core/analysis: the linear part of a network, as matrices and modes.
+#pragma once
+
+#include <optional>
+#include <span>
+
+#include "core/model/network.h"
+
+namespace ressort {
+
+// One mode, in the network's own numbers: per sample at 44 100 Hz.
+struct Mode {
+  double stiffness = 0.0;     // k/m
+  double damping = 0.0;       // z/m
+  double frequency_hz = 0.0;  // as the explicit scheme sounds it at 44 100 Hz
+};
+
+// The slowest mode that is no rigid motion, with springs, dampers and oscillators only: plucks,
+// bows and contacts are open, position inputs are held. Its damping is the modal share of Z.
+// Nothing where no mass is sprung. Sparse shift and invert: milliseconds for 1000 masses.
+// [any thread but audio]
+std::optional<Mode> lowest_mode(const Network& network, std::span<const double> parameters);
+
+}  // namespace ressort

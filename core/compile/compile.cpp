@@ -1,0 +1,356 @@
+#include "core/compile/compile.h"
+
+#include <algorithm>
+#include <array>
+#include <charconv>
+#include <cmath>
+#include <map>
+#include <numbers>
+#include <numeric>
+#include <tuple>
+
+#include "core/analysis/stability.h"
+
+namespace ressort {
+namespace {
+
+bool moves(const Mass& mass) {
+  return mass.kind == MassKind::mass || mass.kind == MassKind::oscillator;
+}
+
+struct LawRow {
+  Law law;
+  std::array<Unit, max_link_arguments> units;
+};
+
+// Which law a link follows, and how its arguments scale.
+LawRow law_of(LinkKind kind) {
+  switch (kind) {
+    case LinkKind::spring: return {Law::spring, {Unit::stiffness, Unit::damping, Unit::plain}};
+    case LinkKind::pluck: return {Law::pluck, {Unit::stiffness, Unit::plain, Unit::damping}};
+    case LinkKind::bow: return {Law::bow, {Unit::friction, Unit::speed, Unit::plain}};
+    case LinkKind::smooth_bow: return {Law::smooth_bow, {Unit::friction, Unit::speed, Unit::plain}};
+    case LinkKind::contact: return {Law::contact, {Unit::stiffness, Unit::damping, Unit::plain}};
+  }
+  return {};
+}
+
+class ProgramMaker {
+ public:
+  ProgramMaker(const Network& network, double rate_hz, bool rescale) : network_(network) {
+    program_.rate_hz = rate_hz;
+    program_.rate_ratio = rescale ? Network::reference_rate_hz / rate_hz : 1.0;
+    program_.parameters = parameter_values(network);
+    program_.depending.resize(network.parameters.size());
+  }
+
+  Program make() {
+    place_masses();
+    place_links();
+    for (const Input& input : network_.inputs) {
+      program_.inputs.push_back({input.number, input.is_force, node_[input.mass]});
+    }
+    program_.outputs.assign(static_cast<std::size_t>(output_count(network_)), Program::no_node);
+    for (const Output& output : network_.outputs) {
+      program_.outputs[static_cast<std::size_t>(output.number - 1)] = node_[output.mass];
+    }
+    return std::move(program_);
+  }
+
+ private:
+  // One coefficient for every distinct pair of argument and unit.
+  std::uint32_t coefficient(ArgumentId argument, Unit unit) {
+    const auto next = static_cast<std::uint32_t>(program_.coefficients.size());
+    const auto [entry, is_new] = known_.try_emplace({argument, unit}, next);
+    if (!is_new) {
+      return entry->second;
+    }
+    static const Formula nothing = {{Op::number, 0, 0.0}};
+    const Formula& formula = argument == no_argument ? nothing : network_.arguments[argument];
+    program_.coefficients.push_back({static_cast<std::uint32_t>(program_.steps.size()),
+                                     static_cast<std::uint32_t>(formula.size()), unit});
+    for (const Step& step : formula) {
+      program_.steps.push_back(step);
+      if (step.op == Op::parameter) {
+        auto& depending = program_.depending[step.index];
+        if (depending.empty() || depending.back() != next) {
+          depending.push_back(next);
+        }
+      }
+    }
+    return next;
+  }
+
+  void place_masses() {
+    const auto& masses = network_.masses;
+    std::vector<std::uint32_t> order(masses.size());
+    std::iota(order.begin(), order.end(), 0u);
+    const auto rank = [&](std::uint32_t i) {
+      const Mass& m = masses[i];
+      const int group = moves(m) ? 0 : m.kind == MassKind::ground ? 1 : 2;
+      return std::tuple(group, m.kind, m.mass, m.stiffness, m.damping);
+    };
+    std::stable_sort(order.begin(), order.end(),
+                     [&](std::uint32_t a, std::uint32_t b) { return rank(a) < rank(b); });
+    node_.resize(masses.size());
+    for (std::uint32_t node = 0; node < order.size(); ++node) {
+      const Mass& mass = masses[order[node]];
+      node_[order[node]] = node;
+      program_.position.push_back(mass.position);
+      program_.velocity.push_back(initial_velocity(network_, mass) * program_.rate_ratio);
+      if (!moves(mass)) {
+        continue;
+      }
+      ++program_.moving;
+      if (node > 0 && rank(order[node]) == rank(order[node - 1])) {
+        ++program_.mass_runs.back().count;
+        continue;
+      }
+      program_.mass_runs.push_back({.first = node,
+                                    .count = 1,
+                                    .inverse_mass = coefficient(mass.mass, Unit::inverse_mass),
+                                    .stiffness = coefficient(mass.stiffness, Unit::stiffness),
+                                    .damping = coefficient(mass.damping, Unit::damping),
+                                    .is_oscillator = mass.kind == MassKind::oscillator});
+    }
+  }
+
+  void place_links() {
+    std::vector<std::uint32_t> order(network_.links.size());
+    std::iota(order.begin(), order.end(), 0u);
+    const auto rank = [&](std::uint32_t i) {
+      const Link& link = network_.links[i];
+      return std::tuple(link.kind, link.arguments);
+    };
+    std::stable_sort(order.begin(), order.end(),
+                     [&](std::uint32_t a, std::uint32_t b) { return rank(a) < rank(b); });
+    for (std::uint32_t i = 0; i < order.size(); ++i) {
+      const Link& link = network_.links[order[i]];
+      program_.ends.push_back({node_[link.a], node_[link.b]});
+      if (i > 0 && rank(order[i]) == rank(order[i - 1])) {
+        ++program_.link_runs.back().count;
+        continue;
+      }
+      const LawRow row = law_of(link.kind);
+      LinkRun run{.law = row.law, .first = i, .count = 1};
+      for (std::size_t k = 0; k < max_link_arguments; ++k) {
+        run.coefficients[k] = coefficient(link.arguments[k], row.units[k]);
+      }
+      program_.link_runs.push_back(run);
+    }
+  }
+
+  const Network& network_;
+  Program program_;
+  std::vector<std::uint32_t> node_;  // [mass of the network] node
+  std::map<std::pair<ArgumentId, Unit>, std::uint32_t> known_;
+};
+
+Error preset_error(const Place& place, std::string message) {
+  return {std::move(message), place.line, place.column};
+}
+
+// The input "inN" of the network, as an index; -1 where it has none.
+int find_input(const Network& network, std::string_view target) {
+  int number = 0;
+  if (target.starts_with("in")) {
+    const char* const end = target.data() + target.size();
+    const auto [last, failure] = std::from_chars(target.data() + 2, end, number);
+    if (failure == std::errc{} && last == end) {
+      for (std::size_t i = 0; i < network.inputs.size(); ++i) {
+        if (network.inputs[i].number == number) {
+          return static_cast<int>(i);
+        }
+      }
+    }
+  }
+  return -1;
+}
+
+int find_parameter(const Network& network, std::string_view name) {
+  for (std::size_t i = 0; i < network.parameters.size(); ++i) {
+    if (network.parameters[i].name == name) {
+      return static_cast<int>(i);
+    }
+  }
+  return -1;
+}
+
+std::string names(const Network& network) {
+  std::string text;
+  for (const Parameter& parameter : network.parameters) {
+    text += (text.empty() ? "" : ", ") + parameter.name;
+  }
+  return text.empty() ? "none" : text;
+}
+
+Result<Control> make_control(const Network& network, const ControlSetting& setting) {
+  static constexpr Source sources[] = {Source::note, Source::controller, Source::pressure,
+                                       Source::custom, Source::audio};
+  static constexpr Gesture gestures[] = {Gesture::position, Gesture::pluck, Gesture::bow,
+                                         Gesture::impulse,  Gesture::hold,  Gesture::parameter};
+  Control control;
+  control.source = sources[static_cast<std::size_t>(setting.source)];
+  control.gesture = gestures[static_cast<std::size_t>(setting.gesture)];
+  control.number = static_cast<std::uint16_t>(
+      setting.source == ControlSource::audio ? setting.number - 1 : setting.number);
+  control.lowest_key = static_cast<std::uint8_t>(setting.lowest_key);
+  control.highest_key = static_cast<std::uint8_t>(setting.highest_key);
+  control.low = setting.low;
+  control.high = setting.high;
+  control.exponential = setting.exponential;
+  control.travel = setting.travel;
+  const bool to_parameter = control.gesture == Gesture::parameter;
+  const int target = to_parameter ? find_parameter(network, setting.target)
+                                  : find_input(network, setting.target);
+  if (target < 0) {
+    return preset_error(setting.place,
+                        to_parameter ? "the model has no parameter '" + setting.target +
+                                           "'; it has " + names(network)
+                                     : "the model has no input '" + setting.target + "'; it has " +
+                                           std::to_string(network.inputs.size()));
+  }
+  control.target = static_cast<std::uint16_t>(target);
+  if (!to_parameter) {
+    const bool is_force = network.inputs[static_cast<std::size_t>(target)].is_force;
+    const bool wants_force = control.gesture == Gesture::impulse;
+    const bool wants_position =
+        control.gesture == Gesture::pluck || control.gesture == Gesture::bow;
+    if ((is_force && wants_position) || (!is_force && wants_force)) {
+      return preset_error(setting.place, "'" + setting.target + "' is a " +
+                                             (is_force ? "force" : "position") +
+                                             " input, which this gesture cannot play");
+    }
+  }
+  return control;
+}
+
+// What the parameters may be turned to: the preset's ranges; without one, a generous one.
+Result<std::vector<ParameterInfo>> parameter_infos(const Network& network, const Preset& preset) {
+  std::vector<ParameterInfo> infos;
+  for (const Parameter& parameter : network.parameters) {
+    const double reach = parameter.value == 0.0 ? 1.0 : 4.0 * std::fabs(parameter.value);
+    infos.push_back({parameter.name, parameter.value, parameter.value < 0.0 ? -reach : 0.0, reach});
+  }
+  for (const Mass& mass : network.masses) {
+    if (mass.mass != no_argument && network.arguments[mass.mass].size() == 1 &&
+        network.arguments[mass.mass][0].op == Op::parameter) {
+      ParameterInfo& info = infos[network.arguments[mass.mass][0].index];
+      info.minimum = 0.25 * info.value;  // nothing may become weightless
+    }
+  }
+  for (const ParameterSetting& setting : preset.parameters) {
+    const int index = find_parameter(network, setting.name);
+    if (index < 0) {
+      return preset_error(setting.place, "the model has no parameter '" + setting.name +
+                                             "'; it has " + names(network));
+    }
+    infos[static_cast<std::size_t>(index)] = {setting.name, setting.value, setting.minimum,
+                                              setting.maximum};
+  }
+  return infos;
+}
+
+// The frequency at which a mode's stiffness has grown by `factor`.
+double frequency_of(const Mode& mode, double factor, double rate_ratio, double rate_hz) {
+  const double k = mode.stiffness * rate_ratio * rate_ratio * factor;
+  const double z = std::clamp(mode.damping * rate_ratio, 0.0, 0.999);
+  const double cosine = (2.0 - k - z) / (2.0 * std::sqrt(1.0 - z));
+  return rate_hz / (2.0 * std::numbers::pi) * std::acos(std::clamp(cosine, -1.0, 1.0));
+}
+
+InputInfo input_info(const Network& network, std::size_t index, const Playing& playing) {
+  const Input& input = network.inputs[index];
+  InputInfo info{.number = input.number, .is_force = input.is_force};
+  if (input.is_force) {
+    info.attached_to = network.masses[input.mass].name;
+  }
+  for (const Link& link : network.links) {
+    if (!input.is_force && (link.a == input.mass || link.b == input.mass)) {
+      info.attached_to = network.masses[link.a == input.mass ? link.b : link.a].name;
+      break;
+    }
+  }
+  for (const Control& control : playing.controls) {
+    if (control.target == index) {
+      info.can_pluck |= control.gesture == Gesture::pluck;
+      info.can_bow |= control.gesture == Gesture::bow;
+    }
+  }
+  return info;
+}
+
+}  // namespace
+
+Program make_program(const Network& network, double rate_hz, bool rescale) {
+  return ProgramMaker(network, rate_hz, rescale).make();
+}
+
+Result<Compiled> compile(const Network& network, const Preset& preset,
+                         const CompileOptions& options) {
+  Compiled compiled;
+  Instrument& instrument = compiled.instrument;
+  Program program = make_program(network, options.rate_hz, options.rescale);
+  auto infos = parameter_infos(network, preset);
+  if (!infos) {
+    return infos.error();
+  }
+  instrument.parameters = *std::move(infos);
+  ParameterBox box;
+  for (std::size_t i = 0; i < instrument.parameters.size(); ++i) {
+    program.parameters[i] = instrument.parameters[i].value;
+    const bool given = std::any_of(
+        preset.parameters.begin(), preset.parameters.end(),
+        [&](const ParameterSetting& s) { return s.name == instrument.parameters[i].name; });
+    box.lowest.push_back(given ? instrument.parameters[i].minimum : program.parameters[i]);
+    box.highest.push_back(given ? instrument.parameters[i].maximum : program.parameters[i]);
+  }
+
+  Playing playing;
+  for (const ControlSetting& setting : preset.controls) {
+    auto control = make_control(network, setting);
+    if (!control) {
+      return control.error();
+    }
+    if (setting.source == ControlSource::osc) {
+      instrument.custom.push_back({setting.address, static_cast<int>(playing.controls.size())});
+    }
+    if (setting.source == ControlSource::audio) {
+      instrument.audio_inputs = std::max(instrument.audio_inputs, setting.number);
+    }
+    playing.controls.push_back(*control);
+  }
+  playing.voices = options.voices > 0 ? options.voices : preset.voices;
+  playing.gain = preset.gain;
+  playing.bare = options.bare;
+  playing.release_s = preset.release_s;
+  playing.noise = preset.noise;
+  playing.highest_factor = highest_stiffness_factor(network, box, program.rate_ratio);
+  if (preset.keyboard) {
+    instrument.mode = lowest_mode(network, program.parameters);
+  }
+  if (instrument.mode) {
+    playing.tuning = Tuning::keyboard;
+    playing.mode_stiffness =
+        instrument.mode->stiffness * program.rate_ratio * program.rate_ratio;
+    playing.mode_damping = instrument.mode->damping * program.rate_ratio;
+    instrument.is_tuned = true;
+    instrument.highest_frequency_hz =
+        frequency_of(*instrument.mode, std::max(1.0, playing.highest_factor), program.rate_ratio,
+                     program.rate_hz);
+  }
+  for (std::size_t i = 0; i < network.inputs.size(); ++i) {
+    instrument.inputs.push_back(input_info(network, i, playing));
+  }
+  instrument.outputs = output_count(network);
+  instrument.voices = playing.voices;
+  instrument.masses = program.moving;
+  instrument.links = network.links.size();
+  instrument.stiffness_margin = playing.highest_factor;
+  compiled.plan = make_plan(network);
+  compiled.engine =
+      std::make_unique<Engine>(std::move(program), std::move(playing), options.precision);
+  return compiled;
+}
+
+}  // namespace ressort

@@ -1,0 +1,77 @@
+// core/compile: the only bridge from names to numbers. A Network and a Preset become an Engine.
+#pragma once
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "core/analysis/linear.h"
+#include "core/compile/plan.h"
+#include "core/engine/engine.h"
+#include "core/model/network.h"
+#include "core/model/preset.h"
+#include "core/result.h"
+
+namespace ressort {
+
+struct CompileOptions {
+  double rate_hz = 44100.0;
+  bool rescale = true;  // numbers are meant at 44 100 Hz: keep pitch and decay at other rates
+  bool bare = false;    // no smoothing, no sleep: the network as it is written
+  int voices = 0;       // instead of the preset's; 0: the preset's
+  Precision precision = Precision::float64;
+};
+
+// A parameter as people reach it: by name, in its own unit, within its range.
+struct ParameterInfo {
+  std::string name;
+  double value = 0.0;  // at the start
+  double minimum = 0.0;
+  double maximum = 0.0;
+};
+
+struct InputInfo {
+  int number = 1;
+  bool is_force = false;
+  bool can_pluck = false;  // the preset says how
+  bool can_bow = false;
+  std::string attached_to;  // the mass that it moves or pushes
+};
+
+// An OSC name that the preset gives to one of its controls.
+struct CustomInfo {
+  std::string address;
+  int row = 0;  // Event::index of EventKind::custom
+};
+
+// What a running engine is called from outside; indices are those of Event.
+struct Instrument {
+  std::vector<ParameterInfo> parameters;  // [parameter]
+  std::vector<InputInfo> inputs;
+  std::vector<CustomInfo> custom;
+  int outputs = 0;
+  int audio_inputs = 0;  // the highest audio channel that a control listens to
+  int voices = 1;
+  std::size_t masses = 0;  // that move
+  std::size_t links = 0;
+  bool is_tuned = false;                // keys set the pitch
+  std::optional<Mode> mode;             // the lowest
+  double highest_frequency_hz = 0.0;    // of a key, before it is folded down; 0: not tuned
+  double stiffness_margin = 0.0;        // every stiffness may grow by this factor; below 1: unproved
+};
+
+struct Compiled {
+  std::unique_ptr<Engine> engine;
+  Instrument instrument;
+  Plan plan;
+};
+
+// Fails, with the preset's line, where the preset names what the model does not have.
+// [any thread but audio]
+Result<Compiled> compile(const Network& network, const Preset& preset,
+                         const CompileOptions& options);
+
+// The tables alone, for tests and other ways of playing them.
+Program make_program(const Network& network, double rate_hz, bool rescale);
+
+}  // namespace ressort

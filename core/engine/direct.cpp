@@ -1,0 +1,179 @@
+// The published scheme, stepped as it is written. In (position, velocity) form it is the same
+// maths as 2x[n] - x[n-1], and keeps 10 to 80 dB more in single precision: the velocity is a small
+// number of its own instead of the difference of two large ones.
+#include <cmath>
+
+#include "core/engine/laws.h"
+#include "core/engine/program.h"
+
+namespace ressort {
+namespace {
+
+template <class T>
+void ramp_coefficients(State<T>& state) {
+  if (--state.ramp_frames > 0) {
+    for (const std::uint32_t c : state.ramping) {
+      state.coefficient[c] += state.increment[c];
+    }
+    return;
+  }
+  for (const std::uint32_t c : state.ramping) {
+    state.coefficient[c] = state.target[c];
+    state.is_ramping[c] = false;
+  }
+  state.ramping.clear();
+}
+
+template <class T>
+void step_masses(const Program& program, State<T>& state) {
+  using V = Lanes<T>;
+  V* const x = state.x.data();
+  V* const v = state.v.data();
+  V* const force = state.force.data();
+  for (const MassRun& run : program.mass_runs) {
+    const V inverse_mass = state.coefficient[run.inverse_mass];
+    const std::uint32_t end = run.first + run.count;
+    if (run.is_oscillator) {
+      const V k = state.coefficient[run.stiffness];
+      const V z = state.coefficient[run.damping];
+      for (std::uint32_t i = run.first; i < end; ++i) {
+        v[i] += (force[i] - k * x[i] - z * v[i]) * inverse_mass;
+        x[i] += v[i];
+        force[i] = V{};
+      }
+    } else {
+      for (std::uint32_t i = run.first; i < end; ++i) {
+        v[i] += force[i] * inverse_mass;
+        x[i] += v[i];
+        force[i] = V{};
+      }
+    }
+  }
+  for (std::size_t i = program.moving; i < state.force.size(); ++i) {
+    force[i] = V{};
+  }
+}
+
+// The loop over one run's links, for any law of (d, v).
+template <class T, class ForceLaw>
+void add_forces(const Program& program, const LinkRun& run, State<T>& state, ForceLaw&& law) {
+  using V = Lanes<T>;
+  const V* const x = state.x.data();
+  const V* const v = state.v.data();
+  V* const force = state.force.data();
+  const Ends* const ends = program.ends.data() + run.first;
+  for (std::uint32_t i = 0; i < run.count; ++i) {
+    const auto [a, b] = ends[i];
+    const V f = law(x[a] - x[b], v[a] - v[b]);
+    force[a] -= f;
+    force[b] += f;
+  }
+}
+
+template <class T>
+void step_links(const Program& program, State<T>& state) {
+  using V = Lanes<T>;
+  for (const LinkRun& run : program.link_runs) {
+    const V c0 = state.coefficient[run.coefficients[0]];
+    const V c1 = state.coefficient[run.coefficients[1]];
+    const V c2 = state.coefficient[run.coefficients[2]];
+    switch (run.law) {
+      case Law::spring:
+        add_forces(program, run, state, [=](V d, V v) { return spring_force(d, v, c0, c1); });
+        break;
+      case Law::pluck:
+        add_forces(program, run, state, [=](V d, V v) { return pluck_force(d, v, c0, c1, c2); });
+        break;
+      case Law::bow:
+        add_forces(program, run, state, [=](V, V v) { return bow_force(v, c0, c1); });
+        break;
+      case Law::smooth_bow:
+        add_forces(program, run, state, [=](V, V v) { return smooth_bow_force(v, c0, c1); });
+        break;
+      case Law::contact:
+        add_forces(program, run, state, [=](V d, V v) { return contact_force(d, v, c0, c1, c2); });
+        break;
+    }
+  }
+}
+
+}  // namespace
+
+double coefficient_value(const Program& program, const Coefficient& coefficient,
+                         std::span<const double> parameters, double stiffness_factor) {
+  const double value = evaluate(
+      std::span(program.steps).subspan(coefficient.first, coefficient.count), parameters);
+  const double r = program.rate_ratio;
+  switch (coefficient.unit) {
+    case Unit::plain: return value;
+    case Unit::stiffness: return value * r * r * stiffness_factor;
+    case Unit::damping: return value * r;
+    case Unit::friction:
+    case Unit::speed: return value * r * std::sqrt(stiffness_factor);
+    case Unit::inverse_mass: return 1.0 / value;
+  }
+  return value;
+}
+
+template <class T>
+State<T>::State(const Program& program)
+    : x(program.position.size()),
+      v(program.position.size()),
+      force(program.position.size()),
+      coefficient(program.coefficients.size()),
+      increment(program.coefficients.size()),
+      target(program.coefficients.size()),
+      is_ramping(program.coefficients.size()) {
+  ramping.reserve(program.coefficients.size());
+  for (std::size_t lane = 0; lane < lane_count<T>; ++lane) {
+    reset_lane(program, *this, lane);
+  }
+}
+
+template <class T>
+void reset_lane(const Program& program, State<T>& state, std::size_t lane) {
+  for (std::size_t i = 0; i < state.x.size(); ++i) {
+    state.x[i][lane] = static_cast<T>(program.position[i]);
+    state.v[i][lane] = static_cast<T>(program.velocity[i]);
+    state.force[i][lane] = T(0);
+  }
+}
+
+template <class T>
+void step_direct(const Program& program, State<T>& state, const Drive<T>* drive,
+                 Lanes<T>* outputs, std::size_t frames) {
+  using V = Lanes<T>;
+  for (std::size_t frame = 0; frame < frames; ++frame) {
+    if (state.ramp_frames > 0) {
+      ramp_coefficients(state);
+    }
+    for (std::size_t i = 0; i < program.inputs.size(); ++i) {
+      if (program.inputs[i].is_force) {
+        state.force[program.inputs[i].node] += drive[i].value;
+      }
+    }
+    step_masses(program, state);
+    for (std::size_t i = 0; i < program.inputs.size(); ++i) {
+      if (!program.inputs[i].is_force) {
+        state.x[program.inputs[i].node] = drive[i].value;
+        state.v[program.inputs[i].node] = drive[i].velocity;
+      }
+    }
+    drive += program.inputs.size();
+    step_links(program, state);
+    for (const std::uint32_t node : program.outputs) {
+      *outputs++ = node == Program::no_node ? V{} : state.x[node];
+    }
+  }
+}
+
+template struct State<float>;
+template struct State<double>;
+template void reset_lane(const Program&, State<float>&, std::size_t);
+template void reset_lane(const Program&, State<double>&, std::size_t);
+template void step_direct(const Program&, State<float>&, const Drive<float>*, Lanes<float>*,
+                          std::size_t);
+template void step_direct(const Program&, State<double>&, const Drive<double>*, Lanes<double>*,
+                          std::size_t);
+
+}  // namespace ressort

@@ -1,0 +1,104 @@
+// core/engine: one instrument that sounds. Voices, gestures, parameters, smoothing, the guard.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "core/engine/event.h"
+#include "core/engine/program.h"
+
+namespace ressort {
+
+enum class Source : std::uint8_t { note, controller, pressure, custom, audio };
+
+enum class Gesture : std::uint8_t {
+  position,   // the hand goes where it is told, smoothed
+  pluck,      // the hand sweeps from one side of the string to the other
+  bow,        // the hand moves on and on while the note is held
+  impulse,    // one sample of force
+  hold,       // the hand is at the second end of its range while the note is held
+  parameter,  // not a hand: the parameter `target` follows
+};
+
+// One row of the control map: what drives which input or parameter, and how.
+struct Control {
+  Source source = Source::note;
+  std::uint16_t number = 0;    // controller 0..127 or audio channel from 0
+  std::uint8_t lowest_key = 0;
+  std::uint8_t highest_key = 127;
+  Gesture gesture = Gesture::position;
+  std::uint16_t target = 0;    // index into Program::inputs or Program::parameters
+  double low = 0.0;            // 0..1 becomes low..high: positions, forces, speeds per sample at
+  double high = 1.0;           //   44 100 Hz, parameter values
+  bool exponential = false;    // equal steps are equal ratios
+  double travel = 0.0;         // pluck: how far from its middle the hand rests, on either side
+};
+
+enum class Tuning : std::uint8_t {
+  fixed,     // every key sounds the model as it is written
+  keyboard,  // a key's voice sounds at that key's frequency
+};
+
+// How a Program is played. Plain data, made by the compile room.
+struct Playing {
+  int voices = 1;
+  double gain = 1.0;            // output per position unit
+  bool bare = false;            // the network alone: no ramps, no smoothing, no sleep
+  double release_s = 0.0;       // after its key is released a voice fades this long; 0: rings out
+  bool noise = false;           // the outputs shape white noise instead of being heard themselves
+  Tuning tuning = Tuning::fixed;
+  double mode_stiffness = 0.0;  // k/m of the lowest mode, at Program::rate_hz; 0: none known
+  double mode_damping = 0.0;    // z/m of the same
+  double highest_factor = 1.0;  // the stiffness factor up to which the model is proved stable
+  std::vector<Control> controls;
+};
+
+enum class Precision : std::uint8_t { float32, float64 };
+
+struct EngineMeters {
+  int voices = 0;                 // that sound
+  std::uint64_t resets = 0;       // voices that went out of bounds and were put back to rest
+  std::uint64_t stolen = 0;       // voices that had to give way to a new note
+};
+
+inline constexpr std::size_t max_segment_frames = 64;  // the kernels' block
+inline constexpr double runaway = 1e9;  // a voice whose output passes this has lost its stability
+
+// The heap is used by the constructor and never again.
+class Engine {
+ public:
+  Engine(Program program, Playing playing, Precision precision);
+  ~Engine();
+  Engine(const Engine&) = delete;
+  Engine& operator=(const Engine&) = delete;
+
+  // Plays `frames` samples. `events` are sorted by frame and lie within the block. `inputs`:
+  // audio channels, null where there is none; `outputs`: one for each of the model's channels,
+  // overwritten, always finite. [audio] wait-free, O(frames * elements * awake voices)
+  void process(std::span<const Event> events, std::span<const double* const> inputs,
+               std::span<double* const> outputs, std::size_t frames) noexcept;
+
+  // The parameters that notes and controllers have changed since the last call, at most
+  // `max_changes`; then it starts anew. [audio] wait-free
+  std::span<const std::uint16_t> take_changes();
+  double parameter(std::uint16_t index) const;  // [audio]
+  static constexpr std::size_t max_changes = 64;
+
+  int output_count() const;  // [any thread], as long as the engine lives
+  double rate_hz() const;
+  EngineMeters meters() const;  // [audio]
+
+ private:
+  struct Voices;
+  std::unique_ptr<Voices> voices_;
+};
+
+// The stiffness factor that brings a mode with k/m and z/m (per sample) to frequency_hz in the
+// explicit scheme: cos(theta) = (2 - s k - z) / (2 sqrt(1 - z)). [any thread]
+double stiffness_factor(double mode_stiffness, double mode_damping, double frequency_hz,
+                        double rate_hz);
+
+}  // namespace ressort

@@ -1,0 +1,124 @@
+// core/engine: what moves an input. One hand per input and voice turns targets, strokes and
+// impulses into a position or a force for every sample.
+#pragma once
+
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+
+namespace ressort {
+
+// A position: value and its change per sample. A force: value only.
+struct HandSample {
+  double value = 0.0;
+  double velocity = 0.0;
+};
+
+// Every method is wait-free. [audio]
+class Hand {
+ public:
+  // At rest at `position`; for a force, exerting none.
+  void place(double position) {
+    *this = Hand{};
+    value_ = target_ = position;
+  }
+
+  // Moves towards `target` as a one-pole filter: y += (1 - pole)(target - y). Pole 0 jumps.
+  void follow(double target, double pole) {
+    motion_ = Motion::follow;
+    target_ = target;
+    pole_ = pole;
+  }
+
+  // Moves to `target` at a constant speed in units per sample, and rests there.
+  void sweep(double target, double speed) {
+    motion_ = Motion::sweep;
+    target_ = target;
+    speed_ = std::fabs(speed);
+  }
+
+  // Moves on and on at `speed` units per sample, which is reached as by a one-pole filter.
+  void draw(double speed, double pole) {
+    motion_ = Motion::draw;
+    speed_ = speed;
+    pole_ = pole;
+  }
+
+  // One sample of force, on top of whatever else goes on.
+  void strike(double force) { pulse_ += force; }
+
+  // A constant force for `frames` samples.
+  void push(double force, std::size_t frames) {
+    held_ = force;
+    held_frames_ = frames;
+  }
+
+  bool is_moving() const {
+    return motion_ != Motion::rest || pulse_ != 0.0 || held_frames_ > 0;
+  }
+  double value() const { return value_; }
+  double target() const { return target_; }
+
+  HandSample next_position() {
+    const double before = value_;
+    switch (motion_) {
+      case Motion::rest: return {value_, 0.0};
+      case Motion::follow: approach(); break;
+      case Motion::sweep:
+        if (std::fabs(target_ - value_) <= speed_) {
+          value_ = target_;
+          motion_ = Motion::rest;
+        } else {
+          value_ += target_ > value_ ? speed_ : -speed_;
+        }
+        break;
+      case Motion::draw:
+        velocity_ += (1.0 - pole_) * (speed_ - velocity_);
+        if (speed_ == 0.0 && std::fabs(velocity_) < 1e-12) {
+          velocity_ = 0.0;
+          motion_ = Motion::rest;
+        }
+        // The velocity is given as it is, not as a difference of positions that may have
+        // travelled far.
+        value_ += velocity_;
+        return {value_, velocity_};
+    }
+    return {value_, value_ - before};
+  }
+
+  HandSample next_force() {
+    if (motion_ == Motion::follow) {
+      approach();
+    }
+    double force = value_ + pulse_;
+    pulse_ = 0.0;
+    if (held_frames_ > 0) {
+      force += held_;
+      --held_frames_;
+    }
+    return {force, 0.0};
+  }
+
+ private:
+  enum class Motion : std::uint8_t { rest, follow, sweep, draw };
+
+  void approach() {
+    value_ = pole_ * value_ + (1.0 - pole_) * target_;
+    if (std::fabs(target_ - value_) <= 1e-12 * (1.0 + std::fabs(target_))) {
+      value_ = target_;
+      motion_ = Motion::rest;
+    }
+  }
+
+  double value_ = 0.0;
+  double velocity_ = 0.0;
+  double target_ = 0.0;
+  double speed_ = 0.0;
+  double pole_ = 0.0;
+  double pulse_ = 0.0;
+  double held_ = 0.0;
+  std::size_t held_frames_ = 0;
+  Motion motion_ = Motion::rest;
+};
+
+}  // namespace ressort

@@ -1,0 +1,61 @@
+// core/engine: the force laws, in one place.
+//
+// For a link from a to b: d = x_a - x_b, and v = the same difference of the velocities, both in
+// position units and position units per sample. A law gives f; the step applies F_a -= f and
+// F_b += f, so a positive f for a positive d attracts.
+//
+// The laws are those of mi.lib since 2020 (Leonard, Villeneuve, Michon), in their current form.
+#pragma once
+
+#include "core/engine/lanes.h"
+
+namespace ressort {
+
+// f = K d + Z v
+template <class V>
+inline V spring_force(V d, V v, V k, V z) {
+  return k * d + z * v;
+}
+
+// A repulsive triangle: slope 0.9 K up to |d| = s/10, then falling with K/10 to 0 at |d| = s:
+//   |d| < s/10:        f = -(K - K/10) d + Z v
+//   s/10 <= |d| < s:   f = -sgn(d) (s/10) K + (K/10) d + Z v
+//   else:              f = 0
+template <class V>
+inline V pluck_force(V d, V v, V k, V s, V z) {
+  const V far = absolute(d);
+  const V tenth = k / 10;
+  const V inner = -(k - tenth) * d;
+  const V outer = -sign(d) * (s / 10) * k + tenth * d;
+  return select(far < s, select(far < s / 10, inner, outer) + z * v, V{});
+}
+
+// Friction that rises to 2/9 Z s at |v| = s/3 and falls to 0 at s:
+//   |v| < s/3:        f = (Z - Z/3) v
+//   s/3 <= |v| < s:   f = sgn(v) (s/3) Z - (Z/3) v
+//   else:             f = 0
+template <class V>
+inline V bow_force(V v, V z, V s) {
+  const V fast = absolute(v);
+  const V third = z / 3;
+  const V stick = (z - third) * v;
+  const V slip = sign(v) * (s / 3) * z - third * v;
+  return select(fast < s, select(fast < s / 3, stick, slip), V{});
+}
+
+// The same in one smooth curve: f = 0.63 Z v exp(-4 (v/s)^2 + 1/2)
+template <class V>
+inline V smooth_bow_force(V v, V z, V s) {
+  const V ratio = v / s;
+  using T = std::remove_reference_t<decltype(v[0])>;
+  return z * v * T(0.63) * exponential(V{} - 4 * ratio * ratio + T(0.5));
+}
+
+// a is the lower body, b the upper, t the distance at which they touch:
+//   d > -t: f = K (d + t) + Z v, else 0. It may pull on the way out, as published.
+template <class V>
+inline V contact_force(V d, V v, V k, V z, V t) {
+  return select(d > -t, k * (d + t) + z * v, V{});
+}
+
+}  // namespace ressort

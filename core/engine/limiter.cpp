@@ -1,0 +1,69 @@
+#include "core/engine/limiter.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace ressort {
+namespace {
+constexpr double release_s = 0.08;
+}
+
+Limiter::Limiter(double rate_hz) : release_(1.0 - std::exp(-1.0 / (release_s * rate_hz))) {
+  wanted_.fill(1.0);
+  smoothed_.fill(1.0);
+  sum_ = static_cast<double>(lookahead_frames);
+}
+
+// A sample leaves when it is lookahead_frames old. The gain at that moment is the mean of the last
+// lookahead_frames of `released_`, each of which is at most what the sample needs, because
+// `released_` is at most the least gain wanted by any sample in flight. So the peak is met exactly
+// when it arrives, by a straight ramp and not a step.
+void Limiter::process(std::span<double* const> channels, std::size_t frames) {
+  constexpr double span = static_cast<double>(lookahead_frames);
+  for (std::size_t n = 0; n < frames; ++n) {
+    double peak = 0.0;
+    for (double* const channel : channels) {
+      if (!std::isfinite(channel[n])) {
+        channel[n] = 0.0;
+      }
+      peak = std::max(peak, std::fabs(channel[n]));
+    }
+    const double wanted = peak > ceiling ? ceiling / peak : 1.0;
+    calm_ = peak > ceiling ? 0 : calm_ + 1;
+    double gain = 1.0;
+    if (calm_ <= lookahead_frames || released_ < 1.0) {
+      // The sample that leaves now still counts: wanted_[at_] is its.
+      const double least = std::min(wanted, *std::min_element(wanted_.begin(), wanted_.end()));
+      released_ = std::min(least, released_ + (1.0 - released_) * release_);
+      if (released_ > 0.99999 && least == 1.0) {
+        released_ = 1.0;
+        calm_ = lookahead_frames + 1;
+      }
+    }
+    wanted_[at_] = wanted;
+    if (released_ < 1.0 || sum_ < span) {
+      sum_ += released_ - smoothed_[at_];
+      smoothed_[at_] = released_;
+      gain = sum_ / span;
+      if (std::all_of(smoothed_.begin(), smoothed_.end(), [](double g) { return g == 1.0; })) {
+        sum_ = span;  // sheds what rounding has gathered
+        gain = 1.0;
+      }
+    }
+    for (std::size_t c = 0; c < channels.size(); ++c) {
+      const double late = delayed_[c][at_];
+      delayed_[c][at_] = channels[c][n];
+      channels[c][n] = gain == 1.0 ? late : std::clamp(late * gain, -ceiling, ceiling);
+    }
+    deepest_ = std::min(deepest_, gain);
+    at_ = (at_ + 1) % lookahead_frames;
+  }
+}
+
+double Limiter::take_reduction() {
+  const double deepest = deepest_;
+  deepest_ = 1.0;
+  return deepest;
+}
+
+}  // namespace ressort

@@ -1,0 +1,120 @@
+// core/engine: what runs. Program is constant and shared by all voices; State is everything that
+// changes. Indices and numbers only; the compile room knows the names.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "core/engine/lanes.h"
+#include "core/formula.h"
+
+namespace ressort {
+
+// How a coefficient follows the sample rate and a voice's pitch. With r = 44100 / rate and s the
+// voice's stiffness factor, a coefficient is its formula's value times r^a s^b.
+enum class Unit : std::uint8_t {
+  plain,         // distances and thresholds: a = 0, b = 0
+  stiffness,     // K: a = 2, b = 1
+  damping,       // Z: a = 1, b = 0, so that a decay stays what it is at every pitch
+  friction,      // Z of a bow: a = 1, b = 1/2, as the string's impedance
+  speed,         // a bow's velocity scale: a = 1, b = 1/2
+  inverse_mass,  // 1/M: a = 0, b = 0
+};
+
+struct Coefficient {
+  std::uint32_t first = 0;  // steps [first, first + count) of Program::steps
+  std::uint32_t count = 0;
+  Unit unit = Unit::plain;
+};
+
+enum class Law : std::uint8_t { spring, pluck, bow, smooth_bow, contact };
+
+// Consecutive nodes that share their coefficients.
+struct MassRun {
+  std::uint32_t first = 0;
+  std::uint32_t count = 0;
+  std::uint32_t inverse_mass = 0;  // coefficients
+  std::uint32_t stiffness = 0;     // read only if is_oscillator
+  std::uint32_t damping = 0;
+  bool is_oscillator = false;
+};
+
+// Consecutive links that share law and coefficients.
+struct LinkRun {
+  Law law = Law::spring;
+  std::uint32_t first = 0;
+  std::uint32_t count = 0;
+  std::uint32_t coefficients[3] = {0, 0, 0};  // in the order of laws.h
+};
+
+struct Ends {
+  std::uint32_t a = 0;  // nodes
+  std::uint32_t b = 0;
+};
+
+struct InputSlot {
+  int number = 1;  // from 1, as in the model
+  bool is_force = false;
+  std::uint32_t node = 0;
+};
+
+// Nodes are numbered: masses that move, run by run; then grounds; then position inputs.
+struct Program {
+  double rate_hz = 44100.0;
+  double rate_ratio = 1.0;       // r above; 1 where numbers are taken raw
+  std::uint32_t moving = 0;      // nodes [0, moving) have inertia
+  std::vector<double> position;  // [node] at the start
+  std::vector<double> velocity;  // [node] per sample of rate_hz
+  std::vector<MassRun> mass_runs;
+  std::vector<LinkRun> link_runs;
+  std::vector<Ends> ends;  // [link]
+  std::vector<InputSlot> inputs;
+  std::vector<std::uint32_t> outputs;  // [channel] node, or no_node for a gap
+  std::vector<double> parameters;      // [parameter] at the start
+  std::vector<Step> steps;
+  std::vector<Coefficient> coefficients;
+  std::vector<std::vector<std::uint32_t>> depending;  // [parameter] coefficients
+
+  static constexpr std::uint32_t no_node = 0xffffffffu;
+};
+
+// A coefficient's value for a voice. [any thread] wait-free
+double coefficient_value(const Program& program, const Coefficient& coefficient,
+                         std::span<const double> parameters, double stiffness_factor);
+
+// Everything that changes in `lane_count<T>` voices that are stepped together.
+template <class T>
+struct State {
+  using V = Lanes<T>;
+  explicit State(const Program& program);
+
+  std::vector<V> x;      // [node] position
+  std::vector<V> v;      // [node] change of position per sample
+  std::vector<V> force;  // [node] summed by the links, used by the next tick
+  std::vector<V> coefficient;           // [coefficient]
+  std::vector<V> increment;             // [coefficient] per sample, while ramping
+  std::vector<V> target;                // [coefficient] where the ramp ends
+  std::vector<std::uint32_t> ramping;   // coefficients that move; at most all of them
+  std::vector<bool> is_ramping;         // [coefficient]
+  std::size_t ramp_frames = 0;          // how many samples they still move
+};
+
+// Puts one lane back to where the model starts; its coefficients stay. [audio] wait-free
+template <class T>
+void reset_lane(const Program& program, State<T>& state, std::size_t lane);
+
+// What drives one step of a block: [frame][input].
+template <class T>
+struct Drive {
+  Lanes<T> value;     // position, or force
+  Lanes<T> velocity;  // of a position, per sample
+};
+
+// Steps `frames` samples by the published scheme, v += F/M, x += v: masses, then position inputs,
+// then links; outputs[frame][channel] are the new positions. [audio] wait-free
+template <class T>
+void step_direct(const Program& program, State<T>& state, const Drive<T>* drive,
+                 Lanes<T>* outputs, std::size_t frames);
+
+}  // namespace ressort

@@ -1,0 +1,75 @@
+// core: arithmetic as a flat list of steps for a small stack machine. The model room writes it
+// (expression.h), the engine room runs it; neither has to know the other.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+namespace ressort {
+
+enum class Op : std::uint8_t {
+  number,     // push `value`
+  parameter,  // push the parameter `index`
+  negate, add, subtract, multiply, divide,
+  sqrt, abs, sin, cos, exp, power, minimum, maximum, clamp,
+};
+
+struct Step {
+  Op op = Op::number;
+  std::uint32_t index = 0;  // for Op::parameter
+  double value = 0.0;       // for Op::number
+  bool operator==(const Step&) const = default;
+};
+
+using Formula = std::vector<Step>;
+
+// The deepest stack that a formula may need; the reader refuses a deeper one.
+inline constexpr std::size_t max_formula_depth = 32;
+inline constexpr std::size_t max_formula_steps = 256;
+
+// The formula's value. Wait-free: bounded by its length, which the reader bounds. [any thread]
+inline double evaluate(std::span<const Step> formula, std::span<const double> parameters) {
+  std::array<double, max_formula_depth> stack{};
+  std::size_t top = 0;
+  for (const Step& step : formula) {
+    switch (step.op) {
+      case Op::number: stack[top++] = step.value; continue;
+      case Op::parameter: stack[top++] = parameters[step.index]; continue;
+      case Op::negate: stack[top - 1] = -stack[top - 1]; continue;
+      case Op::sqrt: stack[top - 1] = std::sqrt(stack[top - 1]); continue;
+      case Op::abs: stack[top - 1] = std::fabs(stack[top - 1]); continue;
+      case Op::sin: stack[top - 1] = std::sin(stack[top - 1]); continue;
+      case Op::cos: stack[top - 1] = std::cos(stack[top - 1]); continue;
+      case Op::exp: stack[top - 1] = std::exp(stack[top - 1]); continue;
+      case Op::clamp:
+        top -= 2;
+        stack[top - 1] = std::min(std::max(stack[top - 1], stack[top]), stack[top + 1]);
+        continue;
+      default: break;
+    }
+    const double right = stack[--top];
+    double& left = stack[top - 1];
+    switch (step.op) {
+      case Op::add: left += right; break;
+      case Op::subtract: left -= right; break;
+      case Op::multiply: left *= right; break;
+      case Op::divide: left /= right; break;
+      case Op::power: left = std::pow(left, right); break;
+      case Op::minimum: left = std::min(left, right); break;
+      default: left = std::max(left, right); break;
+    }
+  }
+  return top == 0 ? 0.0 : stack[0];
+}
+
+// How the value depends on the parameters: not at all?
+inline bool is_constant(std::span<const Step> formula) {
+  return std::none_of(formula.begin(), formula.end(),
+                      [](const Step& step) { return step.op == Op::parameter; });
+}
+
+}  // namespace ressort

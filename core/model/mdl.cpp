@@ -1,0 +1,638 @@
+#include "core/model/mdl.h"
+
+#include <algorithm>
+#include <cctype>
+#include <charconv>
+#include <optional>
+#include <unordered_map>
+
+#include "core/model/expression.h"
+
+namespace ressort {
+namespace {
+
+enum class Element { parameter, ground, mass, oscillator, position_input, force_input,
+                     position_output, link };
+
+// Everything that tells one keyword from another. The reader, its messages and its suggestions
+// have no other list.
+struct Keyword {
+  std::string_view word;
+  Element element;
+  LinkKind link = LinkKind::spring;
+  int references = 0;          // of masses, before the arguments
+  int least = 0;               // arguments
+  int most = 0;                // arguments, without a drawing
+  int first = 0;               // links: which of Link::arguments the first argument is
+  bool drawable = false;       // may be followed by GROUP X Y
+  std::string_view arguments;  // as a person writes them
+};
+
+constexpr Keyword keywords[] = {
+    {.word = "param", .element = Element::parameter, .least = 1, .most = 1, .arguments = "VALUE"},
+    {.word = "ground", .element = Element::ground, .least = 1, .most = 1, .drawable = true,
+     .arguments = "POSITION"},
+    {.word = "mass", .element = Element::mass, .least = 3, .most = 3, .drawable = true,
+     .arguments = "M POSITION VELOCITY"},
+    {.word = "osc", .element = Element::oscillator, .least = 5, .most = 5, .drawable = true,
+     .arguments = "M K Z POSITION VELOCITY"},
+    {.word = "cel", .element = Element::oscillator, .least = 5, .most = 5, .drawable = true,
+     .arguments = "M K Z POSITION VELOCITY"},
+    {.word = "posInput", .element = Element::position_input, .least = 1, .most = 1,
+     .drawable = true, .arguments = "POSITION"},
+    {.word = "frcInput", .element = Element::force_input, .references = 1, .arguments = "@MASS"},
+    {.word = "forceInput", .element = Element::force_input, .references = 1,
+     .arguments = "@MASS"},
+    {.word = "posOutput", .element = Element::position_output, .references = 1,
+     .arguments = "@MASS"},
+    {.word = "spring", .element = Element::link, .references = 2, .least = 1, .most = 2,
+     .arguments = "@A @B K [Z]"},
+    {.word = "springDamper", .element = Element::link, .references = 2, .least = 1, .most = 2,
+     .arguments = "@A @B K [Z]"},
+    {.word = "springDamperDamper", .element = Element::link, .references = 2, .least = 1,
+     .most = 2, .arguments = "@A @B K [Z]"},
+    {.word = "damper", .element = Element::link, .references = 2, .least = 1, .most = 1,
+     .first = 1, .arguments = "@A @B Z"},
+    {.word = "nlPluck", .element = Element::link, .link = LinkKind::pluck, .references = 2,
+     .least = 2, .most = 3, .arguments = "@A @B K SCALE [Z]"},
+    {.word = "nlBow", .element = Element::link, .link = LinkKind::bow, .references = 2, .least = 2,
+     .most = 3, .arguments = "@A @B Z SCALE [SMOOTH]"},
+    {.word = "contact", .element = Element::link, .link = LinkKind::contact, .references = 2,
+     .least = 2, .most = 3, .arguments = "@A @B K Z [THRESHOLD]"},
+    {.word = "detent", .element = Element::link, .link = LinkKind::contact, .references = 2,
+     .least = 2, .most = 3, .arguments = "@A @B K Z [THRESHOLD]"},
+};
+
+constexpr std::size_t most_diagnostics = 100;
+
+struct Token {
+  std::string_view text;
+  int column = 0;
+};
+
+struct Line {
+  int number = 0;
+  const Keyword* keyword = nullptr;
+  Token label;  // without its '@'
+  Token word;   // the keyword as written
+  std::vector<Token> rest;
+};
+
+bool is_blank(char c) { return c == ' ' || c == '\t' || c == '\r' || c == '\f' || c == '\v'; }
+
+bool is_identifier(std::string_view text) {
+  return !text.empty() && std::isdigit(static_cast<unsigned char>(text[0])) == 0 &&
+         std::all_of(text.begin(), text.end(), [](char c) {
+           return std::isalnum(static_cast<unsigned char>(c)) != 0 || c == '_';
+         });
+}
+
+// Tokens are divided by blanks; [...] and '...' hold together; '#' starts a comment.
+std::vector<Token> split(std::string_view line) {
+  std::vector<Token> tokens;
+  std::size_t at = 0;
+  while (at < line.size()) {
+    if (is_blank(line[at])) {
+      ++at;
+      continue;
+    }
+    if (line[at] == '#') {
+      break;
+    }
+    const std::size_t start = at;
+    if (line[at] == '[' || line[at] == '\'') {
+      const std::size_t end = line.find(line[at] == '[' ? ']' : '\'', at + 1);
+      at = end == std::string_view::npos ? line.size() : end + 1;
+    } else {
+      while (at < line.size() && !is_blank(line[at]) && line[at] != '#' && line[at] != '[') {
+        ++at;
+      }
+    }
+    tokens.push_back({line.substr(start, at - start), static_cast<int>(start) + 1});
+  }
+  return tokens;
+}
+
+// What stands between [ ] or ' ', or the token itself.
+Token unwrapped(Token token) {
+  const std::string_view text = token.text;
+  if (text.size() >= 2 && ((text.front() == '[' && text.back() == ']') ||
+                           (text.front() == '\'' && text.back() == '\''))) {
+    return {text.substr(1, text.size() - 2), token.column + 1};
+  }
+  return token;
+}
+
+// How many letters have to change to get from one word to the other (Levenshtein).
+std::size_t distance(std::string_view from, std::string_view to) {
+  std::vector<std::size_t> row(to.size() + 1);
+  for (std::size_t j = 0; j <= to.size(); ++j) {
+    row[j] = j;
+  }
+  for (std::size_t i = 1; i <= from.size(); ++i) {
+    std::size_t diagonal = row[0];
+    row[0] = i;
+    for (std::size_t j = 1; j <= to.size(); ++j) {
+      const std::size_t substituted = diagonal + (from[i - 1] == to[j - 1] ? 0 : 1);
+      diagonal = row[j];
+      row[j] = std::min({row[j] + 1, row[j - 1] + 1, substituted});
+    }
+  }
+  return row[to.size()];
+}
+
+// The nearest of `names`, as "; did you mean 'x'?", or nothing when none is near.
+template <class Names>
+std::string suggestion(std::string_view word, const Names& names, std::string_view prefix = "") {
+  std::string_view best;
+  std::size_t least = word.size() / 3 + 2;
+  if (word.size() > 64) {
+    return "";
+  }
+  std::size_t looked_at = 0;
+  for (std::string_view name : names) {
+    if (++looked_at > 2000) {
+      break;  // a suggestion is not worth the wait
+    }
+    const std::size_t far = distance(word, name);
+    if (far < least) {
+      least = far;
+      best = name;
+    }
+  }
+  return best.empty() ? "" : "; did you mean '" + std::string(prefix) + std::string(best) + "'?";
+}
+
+std::string quoted(std::string_view text) {
+  std::string shown = "'";
+  for (const char c : text.substr(0, 40)) {
+    shown += std::isprint(static_cast<unsigned char>(c)) != 0 ? c : '?';
+  }
+  return shown + (text.size() > 40 ? "...'" : "'");
+}
+
+class Reader {
+ public:
+  ParsedNetwork read(std::string_view text);
+
+ private:
+  void read_line(std::string_view line, int number);
+  void declare(const Line& line);
+  void build(const Line& line);
+
+  void add_mass(const Line& line);
+  void add_link(const Line& line);
+  void add_input(const Line& line);
+  void add_output(const Line& line);
+
+  bool check_count(const Line& line);
+  std::uint32_t drawing(const Line& line, std::size_t at);
+  ArgumentId argument(const Line& line, std::size_t at);
+  double state(const Line& line, std::size_t at);
+  std::optional<std::uint32_t> reference(const Line& line, std::size_t at);
+  std::optional<int> channel(const Line& line, std::string_view prefix);
+  void decide_third_argument();
+  void look_over();
+
+  void say(Severity severity, int line, const Token& token, std::string message) {
+    if (out_.diagnostics.size() < most_diagnostics) {
+      out_.diagnostics.push_back({severity, line, token.column,
+                                  std::max(1, static_cast<int>(token.text.size())),
+                                  std::move(message)});
+    }
+  }
+  // After so many problems one more helps nobody.
+  void say_last(const Line& line) {
+    out_.diagnostics.push_back({Severity::error, line.number, 1, 1,
+                                "too many problems; the rest of the file was not looked at"});
+  }
+  void error(const Line& line, const Token& token, std::string message) {
+    say(Severity::error, line.number, token, std::move(message));
+  }
+  void warning(const Line& line, const Token& token, std::string message) {
+    say(Severity::warning, line.number, token, std::move(message));
+  }
+
+  ParsedNetwork out_;
+  std::vector<Line> lines_;
+  std::vector<std::string> parameter_names_;
+  std::unordered_map<std::string_view, std::uint32_t> masses_;   // label -> index
+  std::unordered_map<std::string_view, int> labels_;             // every label -> its line
+  std::unordered_map<std::string_view, ArgumentId> arguments_;   // text -> index
+  bool shows_velocity_ = false;  // the file uses a form that only MIMS4Max has
+  bool shows_delayed_ = false;   // the file uses a form that only MIMS has
+};
+
+ParsedNetwork Reader::read(std::string_view text) {
+  if (text.size() > max_model_bytes) {
+    say(Severity::error, 1, {"", 1},
+        "the model is " + std::to_string(text.size() >> 20) + " MiB long; at most " +
+            std::to_string(max_model_bytes >> 20) + " MiB are read");
+    return std::move(out_);
+  }
+  const std::size_t zero = text.find('\0');
+  if (zero != std::string_view::npos) {
+    const auto before = text.substr(0, zero);
+    const auto line = std::count(before.begin(), before.end(), '\n') + 1;
+    const std::size_t start = before.rfind('\n');
+    say(Severity::error, static_cast<int>(line),
+        {"", static_cast<int>(start == std::string_view::npos ? zero + 1 : zero - start)},
+        "found a zero byte: this is no text, so it is no model");
+    return std::move(out_);
+  }
+  int number = 0;
+  while (!text.empty()) {
+    const std::size_t end = std::min(text.find_first_of("\r\n"), text.size());
+    read_line(text.substr(0, end), ++number);
+    const bool pair = end + 1 < text.size() && text[end] == '\r' && text[end + 1] == '\n';
+    text.remove_prefix(std::min(text.size(), end + (pair ? 2 : 1)));
+  }
+  // Declarations first: a line may refer to one that comes after it.
+  for (const Line& line : lines_) {
+    declare(line);
+  }
+  for (const Line& line : lines_) {
+    if (out_.diagnostics.size() >= most_diagnostics) {
+      say_last(line);
+      break;
+    }
+    build(line);
+  }
+  if (lines_.empty() && out_.ok()) {
+    say(Severity::error, 1, {"", 1},
+        "the model is empty: expected elements such as '@m mass 1. 0. 0.'");
+  }
+  decide_third_argument();
+  look_over();
+  const auto by_number = [](const auto& a, const auto& b) { return a.number < b.number; };
+  std::stable_sort(out_.network.inputs.begin(), out_.network.inputs.end(), by_number);
+  std::stable_sort(out_.network.outputs.begin(), out_.network.outputs.end(), by_number);
+  std::stable_sort(out_.diagnostics.begin(), out_.diagnostics.end(),
+                   [](const Diagnostic& a, const Diagnostic& b) { return a.line < b.line; });
+  return std::move(out_);
+}
+
+void Reader::read_line(std::string_view text, int number) {
+  std::vector<Token> tokens = split(text);
+  if (tokens.empty()) {
+    return;
+  }
+  Line line{.number = number, .keyword = nullptr, .label = tokens[0], .word = {}, .rest = {}};
+  if (line.label.text[0] != '@') {
+    return warning(line, line.label,
+                   "ignored: an element starts with '@', a comment with '#', found " +
+                       quoted(line.label.text));
+  }
+  line.label.text.remove_prefix(1);
+  if (line.label.text.empty()) {
+    return error(line, line.label, "expected a label right after '@'");
+  }
+  if (tokens.size() < 2) {
+    return error(line, {"", line.label.column + static_cast<int>(line.label.text.size()) + 1},
+                 "the line ends where a keyword was expected, such as 'mass' or 'springDamper'");
+  }
+  line.word = tokens[1];
+  const auto* found = std::find_if(std::begin(keywords), std::end(keywords),
+                                   [&](const Keyword& k) { return k.word == line.word.text; });
+  if (found == std::end(keywords)) {
+    std::vector<std::string_view> words;
+    for (const Keyword& keyword : keywords) {
+      words.push_back(keyword.word);
+    }
+    return error(line, line.word,
+                 "unknown keyword " + quoted(line.word.text) + suggestion(line.word.text, words));
+  }
+  line.keyword = found;
+  line.rest.assign(tokens.begin() + 2, tokens.end());
+  lines_.push_back(std::move(line));
+}
+
+// Enters a line's label, and the value of a parameter.
+void Reader::declare(const Line& line) {
+  const auto [entry, is_new] = labels_.try_emplace(line.label.text, line.number);
+  if (!is_new) {
+    const std::string where = "'@" + std::string(line.label.text) + "' is already declared in line " +
+                              std::to_string(entry->second);
+    if (line.keyword->element != Element::link) {
+      return error(line, line.label, where);
+    }
+    warning(line, line.label, where + "; both links are kept");
+  }
+  Network& network = out_.network;
+  switch (line.keyword->element) {
+    case Element::parameter: {
+      if (!is_identifier(line.label.text)) {
+        error(line, line.label, "a parameter's name has letters, digits and '_' only");
+      }
+      Parameter parameter{.name = std::string(line.label.text), .value = 0.0,
+                          .place = {line.number, line.label.column}};
+      if (check_count(line) && !parse_number(line.rest[0].text, parameter.value)) {
+        error(line, line.rest[0], "found " + quoted(line.rest[0].text) +
+                                      " where the parameter's value, a number, was expected");
+      }
+      parameter_names_.push_back(parameter.name);
+      network.parameters.push_back(std::move(parameter));
+      break;
+    }
+    case Element::ground:
+    case Element::mass:
+    case Element::oscillator:
+    case Element::position_input:
+      masses_.emplace(line.label.text, static_cast<std::uint32_t>(network.masses.size()));
+      network.masses.emplace_back();
+      break;
+    default: break;
+  }
+}
+
+void Reader::build(const Line& line) {
+  if (line.keyword->element == Element::parameter || !check_count(line)) {
+    return;
+  }
+  switch (line.keyword->element) {
+    case Element::link: return add_link(line);
+    case Element::position_output: return add_output(line);
+    case Element::force_input: return add_input(line);
+    case Element::position_input: add_input(line); return add_mass(line);
+    default: return add_mass(line);
+  }
+}
+
+void Reader::add_mass(const Line& line) {
+  const auto found = masses_.find(line.label.text);
+  Mass& mass = out_.network.masses[found->second];
+  if (!mass.name.empty()) {
+    return;  // a second declaration; it has been told
+  }
+  mass.name = std::string(line.label.text);
+  mass.place = {line.number, line.label.column};
+  std::size_t at = 0;
+  switch (line.keyword->element) {
+    case Element::ground: mass.kind = MassKind::ground; break;
+    case Element::position_input: mass.kind = MassKind::position; break;
+    case Element::oscillator: mass.kind = MassKind::oscillator; break;
+    default: mass.kind = MassKind::mass; break;
+  }
+  if (line.keyword->most > 1) {
+    mass.mass = argument(line, at++);
+    if (mass.kind == MassKind::oscillator) {
+      mass.stiffness = argument(line, at++);
+      mass.damping = argument(line, at++);
+    }
+    if (mass.mass != no_argument && is_constant(out_.network.arguments[mass.mass]) &&
+        !(argument_value(out_.network, mass.mass, {}) > 0.0)) {
+      error(line, line.rest[0], "a mass must be above 0, found " + quoted(line.rest[0].text));
+    }
+  }
+  mass.position = state(line, at++);
+  if (line.keyword->most > 1) {
+    mass.third = state(line, at++);
+  }
+  mass.drawing = drawing(line, at);
+}
+
+void Reader::add_link(const Line& line) {
+  Link link;
+  link.name = std::string(line.label.text);
+  link.kind = line.keyword->link;
+  link.place = {line.number, line.label.column};
+  const auto a = reference(line, 0);
+  const auto b = reference(line, 1);
+  for (std::size_t i = 2; i < line.rest.size(); ++i) {
+    const ArgumentId id = argument(line, i);
+    const std::size_t slot = static_cast<std::size_t>(line.keyword->first) + i - 2;
+    if (link.kind == LinkKind::bow && slot == 2) {
+      // The profile is a choice, not a quantity that could be turned while playing.
+      double smooth = 0.0;
+      if (!parse_number(unwrapped(line.rest[i]).text, smooth)) {
+        error(line, line.rest[i], "expected 0 (piecewise) or 1 (smooth) for the bow's profile");
+      }
+      link.kind = smooth > 0.0 ? LinkKind::smooth_bow : LinkKind::bow;
+    } else {
+      link.arguments[slot] = id;
+    }
+  }
+  shows_velocity_ |= (link.kind == LinkKind::contact && line.rest.size() == 4) ||
+                     (link.kind == LinkKind::pluck && line.rest.size() == 5) ||
+                     (link.kind == LinkKind::smooth_bow) ||
+                     (link.kind == LinkKind::bow && line.rest.size() == 5);
+  if (!a || !b) {
+    return;
+  }
+  if (*a == *b) {
+    warning(line, line.rest[1], "the link's two ends are the same mass: it has no effect");
+  }
+  link.a = *a;
+  link.b = *b;
+  out_.network.links.push_back(std::move(link));
+}
+
+void Reader::add_input(const Line& line) {
+  const auto number = channel(line, "in");
+  const bool is_force = line.keyword->element == Element::force_input;
+  const auto found = masses_.find(line.label.text);
+  const auto mass = is_force ? reference(line, 0)
+                             : found == masses_.end() ? std::nullopt
+                                                      : std::optional(found->second);
+  if (number && mass) {
+    out_.network.inputs.push_back({.number = *number, .is_force = is_force, .mass = *mass,
+                                   .place = {line.number, line.label.column}});
+  }
+}
+
+void Reader::add_output(const Line& line) {
+  const auto number = channel(line, "out");
+  const auto mass = reference(line, 0);
+  if (number && mass) {
+    out_.network.outputs.push_back(
+        {.number = *number, .mass = *mass, .place = {line.number, line.label.column}});
+  }
+}
+
+bool Reader::check_count(const Line& line) {
+  const Keyword& keyword = *line.keyword;
+  const int found = static_cast<int>(line.rest.size());
+  const int least = keyword.references + keyword.least;
+  const int most = keyword.references + keyword.most;
+  const bool drawn = keyword.drawable && found == most + 3;
+  if ((found >= least && found <= most) || drawn) {
+    return true;
+  }
+  Token place;
+  if (found > most) {
+    place = line.rest[static_cast<std::size_t>(most)];
+  } else {
+    const Token& last = found == 0 ? line.word : line.rest.back();
+    place = {"", last.column + static_cast<int>(last.text.size())};
+  }
+  error(line, place,
+        "'" + std::string(keyword.word) + "' takes " + std::to_string(least) +
+            (most > least ? " to " + std::to_string(most) : "") +
+            (most == 1 ? " argument (" : " arguments (") + std::string(keyword.arguments) +
+            "), found " + std::to_string(found));
+  return false;
+}
+
+std::uint32_t Reader::drawing(const Line& line, std::size_t at) {
+  if (line.rest.size() < at + 3) {
+    return 0;
+  }
+  shows_delayed_ = true;
+  Drawing drawing{.group = std::string(line.rest[at].text), .x = state(line, at + 1),
+                  .y = state(line, at + 2)};
+  out_.network.drawings.push_back(std::move(drawing));
+  return static_cast<std::uint32_t>(out_.network.drawings.size());
+}
+
+ArgumentId Reader::argument(const Line& line, std::size_t at) {
+  const Token token = unwrapped(line.rest[at]);
+  const auto known = arguments_.find(token.text);
+  if (known != arguments_.end()) {
+    return known->second;
+  }
+  Formula formula;
+  double number = 0.0;
+  if (parse_number(token.text, number)) {
+    formula.push_back({Op::number, 0, number});
+  } else {
+    auto parsed = parse_expression(token.text, parameter_names_);
+    if (!parsed) {
+      const Token place{token.text, token.column + parsed.error().column - 1};
+      std::string hint;
+      if (is_identifier(token.text)) {
+        hint = suggestion(token.text, parameter_names_);
+      }
+      error(line, place, parsed.error().message + hint);
+      return no_argument;
+    }
+    formula = *std::move(parsed);
+  }
+  const auto id = static_cast<ArgumentId>(out_.network.arguments.size());
+  out_.network.arguments.push_back(std::move(formula));
+  arguments_.emplace(token.text, id);
+  return id;
+}
+
+double Reader::state(const Line& line, std::size_t at) {
+  double number = 0.0;
+  if (!parse_number(line.rest[at].text, number)) {
+    error(line, line.rest[at],
+          "found " + quoted(line.rest[at].text) + " where a number was expected" +
+              (is_identifier(line.rest[at].text) ? " (a starting state is no parameter)" : ""));
+  }
+  return number;
+}
+
+std::optional<std::uint32_t> Reader::reference(const Line& line, std::size_t at) {
+  const Token& token = line.rest[at];
+  if (token.text[0] != '@') {
+    error(line, token, "found " + quoted(token.text) + " where '@' and the label of a mass were expected");
+    return std::nullopt;
+  }
+  const std::string_view name = token.text.substr(1);
+  const auto found = masses_.find(name);
+  if (found != masses_.end()) {
+    return found->second;
+  }
+  std::vector<std::string_view> names;
+  for (const auto& [label, index] : masses_) {
+    names.push_back(label);
+  }
+  std::sort(names.begin(), names.end());
+  error(line, token,
+        labels_.contains(name)
+            ? quoted(token.text) + " is no mass, so nothing can be attached to it"
+            : "no mass is called " + quoted(token.text) + suggestion(name, names, "@"));
+  return std::nullopt;
+}
+
+std::optional<int> Reader::channel(const Line& line, std::string_view prefix) {
+  const std::string_view label = line.label.text;
+  int number = 0;
+  if (label.starts_with(prefix)) {
+    const char* end = label.data() + label.size();
+    const auto [last, failure] = std::from_chars(label.data() + prefix.size(), end, number);
+    if (failure == std::errc{} && last == end && number >= 1 && number <= max_channels) {
+      return number;
+    }
+  }
+  error(line, line.label,
+        "'" + std::string(line.keyword->word) + "' needs the label '@" + std::string(prefix) +
+            "N' with N from 1 to " + std::to_string(max_channels) + ", found " +
+            quoted("@" + std::string(label)));
+  return std::nullopt;
+}
+
+// The dialects agree when the file shows which one it is in; else the state itself tells: at
+// rest away from 0 is written (x, x) in one meaning and (x, 0) in the other.
+void Reader::decide_third_argument() {
+  Network& network = out_.network;
+  const bool starts_at_zero_speed = std::any_of(
+      network.masses.begin(), network.masses.end(), [](const Mass& mass) {
+        return (mass.kind == MassKind::mass || mass.kind == MassKind::oscillator) &&
+               mass.position != 0.0 && mass.third == 0.0;
+      });
+  const bool velocity = shows_velocity_ || (!shows_delayed_ && starts_at_zero_speed);
+  network.third = velocity ? ThirdArgument::velocity_per_second : ThirdArgument::delayed_position;
+}
+
+// What is legal and yet hardly meant.
+void Reader::look_over() {
+  const Network& network = out_.network;
+  if (!out_.ok()) {
+    return;
+  }
+  if (network.masses.empty()) {
+    return say(Severity::error, 1, {"", 1}, "the model has no masses: nothing can sound");
+  }
+  std::vector<bool> attached(network.masses.size(), false);
+  for (const Link& link : network.links) {
+    attached[link.a] = attached[link.b] = true;
+  }
+  for (const Input& input : network.inputs) {
+    attached[input.mass] = attached[input.mass] || input.is_force;
+  }
+  for (std::size_t i = 0; i < network.masses.size(); ++i) {
+    const Mass& mass = network.masses[i];
+    if (!attached[i] && mass.kind != MassKind::oscillator) {
+      say(Severity::warning, mass.place.line, {mass.name, mass.place.column},
+          "nothing is attached to '@" + mass.name + "'");
+    }
+  }
+  std::vector<bool> used(network.parameters.size(), false);
+  for (const Formula& formula : network.arguments) {
+    for (const Step& step : formula) {
+      if (step.op == Op::parameter) {
+        used[step.index] = true;
+      }
+    }
+  }
+  for (std::size_t i = 0; i < used.size(); ++i) {
+    if (!used[i]) {
+      const Parameter& parameter = network.parameters[i];
+      say(Severity::warning, parameter.place.line, {parameter.name, parameter.place.column},
+          "the parameter '" + parameter.name + "' is used nowhere");
+    }
+  }
+  if (network.outputs.empty()) {
+    say(Severity::warning, 1, {"", 1}, "the model has no output, so it will be silent");
+  }
+}
+
+}  // namespace
+
+bool ParsedNetwork::ok() const {
+  return std::none_of(diagnostics.begin(), diagnostics.end(),
+                      [](const Diagnostic& d) { return d.severity == Severity::error; });
+}
+
+ParsedNetwork parse_network(std::string_view text) { return Reader().read(text); }
+
+std::string to_string(const Diagnostic& diagnostic, std::string_view file) {
+  return std::string(file) + ":" + std::to_string(diagnostic.line) + ":" +
+         std::to_string(diagnostic.column) +
+         (diagnostic.severity == Severity::error ? ": error: " : ": warning: ") +
+         diagnostic.message;
+}
+
+}  // namespace ressort

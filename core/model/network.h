@@ -1,0 +1,136 @@
+// core/model: what a musician describes. Names, numbers as written, double. A value type.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "core/formula.h"
+
+namespace ressort {
+
+// Where an element stands in its text; both count from 1.
+struct Place {
+  int line = 0;
+  int column = 0;
+  bool operator==(const Place&) const { return true; }  // the same network, wherever it is written
+};
+
+// A control-rate scalar that may change while the network sounds. Numbers are per sample at
+// 44 100 Hz (see Network).
+struct Parameter {
+  std::string name;
+  double value = 0.0;
+  Place place;
+  bool operator==(const Parameter&) const = default;
+};
+
+// Index into Network::arguments. Equal texts share one entry, so a string of a thousand masses
+// has three.
+using ArgumentId = std::uint32_t;
+inline constexpr ArgumentId no_argument = 0xffffffffu;
+
+enum class MassKind : std::uint8_t {
+  mass,        // x[n+1] = 2x[n] - x[n-1] + (F - g)/M
+  oscillator,  // the same, with a spring and a damper to a ground at 0
+  ground,      // never moves
+  position,    // follows an input; has no inertia
+};
+
+struct Mass {
+  std::string name;
+  MassKind kind = MassKind::mass;
+  ArgumentId mass = no_argument;       // M
+  ArgumentId stiffness = no_argument;  // K, oscillators only
+  ArgumentId damping = no_argument;    // Z, oscillators only
+  double position = 0.0;               // x0
+  double third = 0.0;                  // the last state argument; Network::third says what it means
+  std::uint32_t drawing = 0;           // 1 + index into Network::drawings; 0 for none
+  Place place;
+  bool operator==(const Mass&) const = default;
+};
+
+// Where an element is drawn; of no consequence to the sound.
+struct Drawing {
+  std::string group;
+  double x = 0.0;
+  double y = 0.0;
+  bool operator==(const Drawing&) const = default;
+};
+
+enum class LinkKind : std::uint8_t {
+  spring,      // K, Z: springs, dampers and both together
+  pluck,       // K, scale, Z
+  bow,         // Z, scale
+  smooth_bow,  // the same arguments, the exponential profile
+  contact,     // K, Z, threshold
+};
+
+inline constexpr std::size_t max_link_arguments = 3;
+
+// Between two masses, first and second as written: a link's force f acts as F_a -= f, F_b += f.
+struct Link {
+  std::string name;
+  LinkKind kind = LinkKind::spring;
+  std::uint32_t a = 0;  // indices into Network::masses
+  std::uint32_t b = 0;
+  std::array<ArgumentId, max_link_arguments> arguments = {no_argument, no_argument, no_argument};
+  Place place;
+  bool operator==(const Link&) const = default;
+};
+
+// Input N of the model: either the position of a mass of kind `position`, or a force on any mass.
+struct Input {
+  int number = 1;  // N of @inN
+  bool is_force = false;
+  std::uint32_t mass = 0;
+  Place place;
+  bool operator==(const Input&) const = default;
+};
+
+// Output N of the model: the position of a mass.
+struct Output {
+  int number = 1;
+  std::uint32_t mass = 0;
+  Place place;
+  bool operator==(const Output&) const = default;
+};
+
+// What the third state argument of `mass` and `osc` says; the dialects disagree.
+enum class ThirdArgument : std::uint8_t {
+  delayed_position,    // x[-1] of the tick before: MIMS and the older FAUST tools
+  velocity_per_second  // in position units per second: MIMS4Max
+};
+
+// Numbers are dimensionless and per sample at `reference_rate_hz`: M = m/dt^2, K = k, Z = z/dt.
+struct Network {
+  std::vector<Parameter> parameters;
+  std::vector<Formula> arguments;  // the distinct arguments of all elements
+  std::vector<Drawing> drawings;
+  std::vector<Mass> masses;        // grounds and position inputs too, as declared
+  std::vector<Link> links;
+  std::vector<Input> inputs;    // sorted by number; several may share one
+  std::vector<Output> outputs;  // sorted by number
+  ThirdArgument third = ThirdArgument::delayed_position;
+  bool operator==(const Network&) const = default;
+
+  static constexpr double reference_rate_hz = 44100.0;
+};
+
+// The argument's value with the parameters as given; 0 for no_argument.
+double argument_value(const Network& network, ArgumentId argument,
+                      std::span<const double> parameters);
+
+// The parameters' values as the text declares them.
+std::vector<double> parameter_values(const Network& network);
+
+// The change of position from one sample to the next that a mass starts with.
+double initial_velocity(const Network& network, const Mass& mass);
+
+// The highest channel number in use; 0 for none.
+int input_count(const Network& network);
+int output_count(const Network& network);
+
+}  // namespace ressort
