@@ -4,6 +4,7 @@
 
 #include <functional>
 #include <string>
+#include <utility>
 
 #include "app/process.h"
 #include "core/result.h"
@@ -25,15 +26,26 @@ struct AudioDevice {
   std::string description;  // "JACK, 48000 Hz, 256 frames"
   double rate_hz = 48000.0;
   std::function<void()> close;
-  std::function<bool()> is_lost;             // the server or the device is gone
+  std::function<bool()> is_lost;             // the server or the device is gone, or runs at
+                                             //   another rate: close it and open it anew
   std::function<double()> cpu;               // share of a period spent, 0..1
   std::function<void(int)> set_audio_inputs; // the model wants so many
-  std::function<double()> rate_now;          // as the server runs now
+  std::function<void()> tick;                // about every second: connects what was plugged in
   bool has_midi = false;                     // brings its own MIDI, with exact frames
 
   AudioDevice() = default;
-  AudioDevice(AudioDevice&&) = default;
-  AudioDevice& operator=(AudioDevice&&) = default;
+  AudioDevice(AudioDevice&& other) noexcept { *this = std::move(other); }
+  AudioDevice& operator=(AudioDevice&& other) noexcept {
+    std::swap(description, other.description);
+    std::swap(rate_hz, other.rate_hz);
+    std::swap(close, other.close);
+    std::swap(is_lost, other.is_lost);
+    std::swap(cpu, other.cpu);
+    std::swap(set_audio_inputs, other.set_audio_inputs);
+    std::swap(tick, other.tick);
+    std::swap(has_midi, other.has_midi);
+    return *this;
+  }
   ~AudioDevice() {
     if (close) {
       close();
@@ -49,6 +61,9 @@ Result<AudioDevice> open_dummy(Process& process, const AudioOptions& options);
 // The first that opens of "jack", "alsa" and "dummy", or the one that `wanted` names.
 Result<AudioDevice> open_audio(const std::string& wanted, Process& process,
                                const AudioOptions& options);
+
+// Asks for real-time priority for the calling thread; without the right to it, it stays as it is.
+void raise_priority();
 
 // The monotonic clock, in ns. Reads shared memory, makes no system call. [any thread]
 std::int64_t monotonic_ns();

@@ -315,7 +315,7 @@ Result<std::vector<ScoreLine>> parse_score(std::string_view text) {
     if (words.empty()) {
       continue;
     }
-    ScoreLine score;
+    ScoreLine score{.line = number};
     if (!parse_number(words[0], score.time_s) || score.time_s < 0.0) {
       return Error{"found '" + words[0] + "' where a time in seconds was expected", number, 1};
     }

@@ -42,6 +42,7 @@ Result<std::vector<Event>> to_events(const Call& call, const Instrument& instrum
 
 // One line of a score: TIME_SECONDS ADDRESS ARG... ; blank lines and # comments have no call.
 struct ScoreLine {
+  int line = 0;  // from 1
   double time_s = 0.0;
   Call call;
 };

@@ -1,8 +1,10 @@
-// app: the small console, on a thread of its own.
+// app: the small console: its commands, and the terminal that they are typed at, which has a
+// thread of its own.
 #pragma once
 
 #include <functional>
 #include <memory>
+#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -19,19 +21,32 @@ struct Command {
   std::vector<std::string> words;
 };
 
+// What the commands work on; the console's own.
+struct Desk;
+
 // One row for every command: the parser, the help and the completion read this table.
 struct CommandRow {
+  std::string_view group;  // its heading in the help
   std::string_view name;
-  std::string_view arguments;
-  std::string_view does;
+  std::string_view arguments;  // [X] may be left out; MODEL, PRESET, PARAMETER, COMMAND and FILE
+                               // say what completes a word
+  std::string_view does;       // one line
+  std::string_view details;    // more lines, for `help NAME`
+  Result<Done> (*act)(Desk& desk, std::span<const std::string> words);
 };
 std::span<const CommandRow> commands();
 
-// Accepts unique beginnings of command names. An empty line or a # comment gives a command
-// without a name. The error names what could have been meant.
+// Accepts unique beginnings of command names, "..." for a word with blanks in it, and # comments.
+// An empty line gives a command without a name. The error names what could have been meant, or
+// which words the command takes.
 Result<Command> parse_command(std::string_view line);
 
-// Carries out commands. What it has to say goes to `print`, a line or more at a time.
+// A keyboard without lines: calls `on_key` for each key, and with 0 when none has come for a
+// second, until `on_key` answers false or the input ends.
+using Keyboard = std::function<void(const std::function<bool(char key)>& on_key)>;
+
+// Carries out commands. What it has to say goes to `print`, a line or more at a time, without the
+// last line end. Errors go there too. Process and session must outlive it.
 class Console {
  public:
   using Print = std::function<void(const std::string&)>;
@@ -42,26 +57,35 @@ class Console {
   bool run(const Command& command);
   bool run_line(std::string_view line);
 
-  // Runs a file of commands; stops at the first that fails.
+  // Runs a file of commands; stops at `quit` and at the first that fails, whose error has the
+  // file, the line and the column. [console thread]
   Result<Done> run_script(const std::string& path);
 
-  // Words that could stand where the last one of `line` does: commands, parameters, files.
+  // Whether there was a command to quit. [console thread]
+  bool has_quit() const;
+
+  // The command `keys` plays from this keyboard; without one it fails.
+  void lend_keyboard(Keyboard keyboard);
+
+  // Words that could stand where the last one of `line` does: commands, parameters, presets,
+  // models, files. A folder ends in '/'. [console thread]
   std::vector<std::string> completions(std::string_view line) const;
 
  private:
-  struct State;
-  std::unique_ptr<State> state_;
+  std::unique_ptr<Desk> desk_;
 };
 
 // Reads lines from the terminal with editing and history until the end of input or `quit`; then
-// calls `on_quit` only if it was `quit`. Without a terminal it reads plain lines and shows no
-// prompt. The destructor interrupts it.
+// calls `on_quit`, on its own thread, only if it was `quit`. Without a terminal it reads plain
+// lines and shows no prompt. Installs no signal handler. The destructor interrupts it, waiting for
+// a command that is at work, and leaves the terminal as it was; it must come before the console's
+// and the session's.
 class Terminal {
  public:
   Terminal(Console& console, std::function<void()> on_quit);
   ~Terminal();
 
-  // Prints a line from another thread without harm to what is being typed.
+  // Prints a line without harm to what is being typed. [any thread but audio]
   void say(const std::string& text);
 
  private:

@@ -4,6 +4,7 @@
 #include <array>
 #include <charconv>
 #include <cmath>
+#include <limits>
 #include <map>
 #include <numbers>
 #include <numeric>
@@ -225,12 +226,20 @@ Result<Control> make_control(const Network& network, const ControlSetting& setti
   return control;
 }
 
-// What the parameters may be turned to: the preset's ranges; without one, a generous one.
-Result<std::vector<ParameterInfo>> parameter_infos(const Network& network, const Preset& preset) {
+// What the parameters may be turned to: the preset's ranges; without one, a generous one. The bare
+// network is research: there anything goes.
+Result<std::vector<ParameterInfo>> parameter_infos(const Network& network, const Preset& preset,
+                                                   bool bare) {
   std::vector<ParameterInfo> infos;
   for (const Parameter& parameter : network.parameters) {
-    const double reach = parameter.value == 0.0 ? 1.0 : 4.0 * std::fabs(parameter.value);
-    infos.push_back({parameter.name, parameter.value, parameter.value < 0.0 ? -reach : 0.0, reach});
+    const double reach = bare                     ? std::numeric_limits<double>::max()
+                         : parameter.value == 0.0 ? 1.0
+                                                  : 4.0 * std::fabs(parameter.value);
+    const double least = bare || parameter.value < 0.0 ? -reach : 0.0;
+    infos.push_back({parameter.name, parameter.value, least, reach});
+  }
+  if (bare) {
+    return infos;
   }
   for (const Mass& mass : network.masses) {
     if (mass.mass != no_argument && network.arguments[mass.mass].size() == 1 &&
@@ -291,7 +300,7 @@ Result<Compiled> compile(const Network& network, const Preset& preset,
   Compiled compiled;
   Instrument& instrument = compiled.instrument;
   Program program = make_program(network, options.rate_hz, options.rescale);
-  auto infos = parameter_infos(network, preset);
+  auto infos = parameter_infos(network, preset, options.bare);
   if (!infos) {
     return infos.error();
   }
@@ -325,6 +334,7 @@ Result<Compiled> compile(const Network& network, const Preset& preset,
   playing.bare = options.bare;
   playing.release_s = preset.release_s;
   playing.noise = preset.noise;
+  playing.transpose = preset.transpose;
   playing.highest_factor = highest_stiffness_factor(network, box, program.rate_ratio);
   if (preset.keyboard) {
     instrument.mode = lowest_mode(network, program.parameters);

@@ -348,7 +348,7 @@ struct Engine::Voices {
 
   // The key's frequency, brought by octaves to where the model is stable.
   double playable_hz(int key) const {
-    double hz = 440.0 * std::exp2((key - 69) / 12.0);
+    double hz = 440.0 * std::exp2((key + playing.transpose - 69) / 12.0);
     const double highest = std::max(1.0, playing.highest_factor);
     while (hz > 1.0 && (hz >= 0.5 * program.rate_hz ||
                         stiffness_factor(playing.mode_stiffness, playing.mode_damping, hz,

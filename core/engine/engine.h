@@ -50,6 +50,7 @@ struct Playing {
   double release_s = 0.0;       // after its key is released a voice fades this long; 0: rings out
   bool noise = false;           // the outputs shape white noise instead of being heard themselves
   Tuning tuning = Tuning::fixed;
+  int transpose = 0;            // semitones
   double mode_stiffness = 0.0;  // k/m of the lowest mode, at Program::rate_hz; 0: none known
   double mode_damping = 0.0;    // z/m of the same
   double highest_factor = 1.0;  // the stiffness factor up to which the model is proved stable

@@ -271,13 +271,14 @@ Result<Preset> parse_preset(std::string_view text) {
   Preset preset;
   Table reader(root, "a preset", error);
   reader.allow({"model", "description", "voices", "gain", "release_s", "noise", "tuning",
-                "parameters", "control"});
+                "transpose", "parameters", "control"});
   reader.text("model", preset.model);
   reader.text("description", preset.description);
   reader.integer("voices", preset.voices, 1, max_voices);
   reader.number("gain", preset.gain, 0.0, 1e9);
   reader.number("release_s", preset.release_s, 0.0, 60.0);
   reader.flag("noise", preset.noise);
+  reader.integer("transpose", preset.transpose, -96, 96);
   std::string tuning = "keyboard";
   reader.text("tuning", tuning);
   preset.keyboard = tuning == "keyboard";

@@ -48,6 +48,7 @@ struct Preset {
   double release_s = 0.0;   // 0: a voice rings out
   bool noise = false;       // the outputs shape white noise
   bool keyboard = true;     // a key sets the pitch
+  int transpose = 0;        // semitones between a key and the pitch that it sets
   std::vector<ParameterSetting> parameters;
   std::vector<ControlSetting> controls;
   bool operator==(const Preset&) const = default;

@@ -1,0 +1,41 @@
+#include "app/audio.h"
+
+#include <pthread.h>
+
+#include <chrono>
+
+namespace ressort {
+
+Result<AudioDevice> open_audio(const std::string& wanted, Process& process,
+                               const AudioOptions& options) {
+  if (wanted == "jack") {
+    return open_jack(process, options);
+  }
+  if (wanted == "alsa") {
+    return open_alsa(process, options);
+  }
+  if (wanted == "dummy") {
+    return open_dummy(process, options);
+  }
+  if (auto device = open_jack(process, options)) {
+    return device;
+  }
+  if (auto device = open_alsa(process, options)) {
+    return device;
+  }
+  return open_dummy(process, options);
+}
+
+void raise_priority() {
+  sched_param priority{};
+  priority.sched_priority = 70;  // above desktops, below the kernel's own audio threads
+  pthread_setschedparam(pthread_self(), SCHED_FIFO, &priority);
+}
+
+std::int64_t monotonic_ns() {
+  return std::chrono::duration_cast<std::chrono::nanoseconds>(
+             std::chrono::steady_clock::now().time_since_epoch())
+      .count();
+}
+
+}  // namespace ressort

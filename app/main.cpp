@@ -1,0 +1,174 @@
+// app: the command line, turned into one of the commands.
+#include <CLI/CLI.hpp>
+#include <map>
+
+#include "app/commands.h"
+#include "core/model/expression.h"
+
+namespace {
+
+using namespace ressort;
+
+const char* const play_examples =
+    "Examples:\n"
+    "  ressort play                              the triangle, on JACK, else ALSA, else silent\n"
+    "  ressort play PolyTriangle -j              connected to the speakers and every keyboard\n"
+    "  ressort play my.mdl -a alsa -d hw:1       a model of your own on one sound card\n"
+    "  oscsend localhost 9777 /note/on ii 69 100 a note by OSC, from another terminal\n";
+
+const char* const render_examples =
+    "A score is text, a line an event: TIME_SECONDS ADDRESS ARGUMENTS, the addresses being the\n"
+    "OSC ones:\n"
+    "  0.0  /note/on 69 100\n"
+    "  0.5  /param/m_K 0.2\n"
+    "A preset without a score plays a short phrase; a bare .mdl is the network alone: no gain, no\n"
+    "smoothing, one channel for each output.\n"
+    "Examples:\n"
+    "  ressort render PolyTriangle -o out.wav\n"
+    "  ressort render my.mdl -o out.wav --input gesture.wav --format double\n";
+
+void add_play(CLI::App& app, PlayOptions& options, int& code) {
+  CLI::App* command = app.add_subcommand("play", "plays a model or a preset");
+  command->footer(play_examples);
+  command->add_option("MODEL", options.name, "a preset's or a model's name, or a file")
+      ->capture_default_str();
+  command->add_option("-a,--audio", options.audio, "where the sound goes")
+      ->check(CLI::IsMember({"auto", "jack", "alsa", "dummy"}))
+      ->capture_default_str();
+  command->add_option("-d,--device", options.device.device, "the ALSA device")
+      ->capture_default_str();
+  command->add_option("-m,--midi", options.midi, "where keyboards come from")
+      ->check(CLI::IsMember({"auto", "jack", "alsa", "none"}))
+      ->capture_default_str();
+  command->add_flag("-j,--connect", options.device.connect,
+                    "connect to the speakers and to every keyboard (JACK)");
+  command->add_option("-n,--name", options.device.client_name, "the name of our JACK client")
+      ->capture_default_str();
+  command->add_option("-g,--gain", options.gain_db, "dB on top of the preset's gain")
+      ->check(CLI::Range(-120.0, 60.0));
+  command->add_option("-p,--voices", options.voices, "how many notes sound at once")
+      ->check(CLI::Range(1, max_voices));
+  command->add_option("-r,--rate", options.device.rate_hz, "Hz; JACK has its own")
+      ->check(CLI::Range(8000.0, 384000.0))
+      ->capture_default_str();
+  command->add_option("-z,--period", options.device.period_frames, "frames; JACK has its own")
+      ->check(CLI::Range(16, 8192))
+      ->capture_default_str();
+  static std::map<std::string, Precision> precisions{{"double", Precision::float64},
+                                                     {"float", Precision::float32}};
+  command->add_option("--precision", options.precision, "double or float")
+      ->transform(CLI::CheckedTransformer(precisions));
+  command->add_flag("!--no-rescale", options.rescale,
+                    "take the model's numbers raw at rates other than 44100 Hz");
+  command->add_flag("-i,--no-console", options.no_console, "do not read commands");
+  command->add_option("-e,--execute", options.script, "a file of console commands, run first");
+  command
+      ->add_option_function<std::string>(
+          "-u,--osc-port",
+          [&options](const std::string& text) {
+            double port = 0.0;
+            if (text != "off" && (!parse_number(text, port) || port < 1.0 || port > 65535.0)) {
+              throw CLI::ValidationError("--osc-port", "must be 1 to 65535, or off");
+            }
+            options.osc_port = static_cast<int>(port);
+          },
+          "the UDP port for OSC, or off (9777)");
+  command->add_option("-B,--osc-bind", options.osc_bind, "the address that OSC listens at")
+      ->capture_default_str();
+  command->add_flag("--exit-on-loss", options.exit_on_loss,
+                    "end with 75 when the audio server dies, instead of waiting for it");
+  command->callback([&options, &code] { code = play(options); });
+}
+
+struct RenderChoice {
+  RenderOptions options;
+  std::vector<std::string> settings;
+  double seconds = 0.0;
+  long long frames = 0;
+  bool is_quiet = false;
+};
+
+void add_render(CLI::App& app, RenderChoice& choice, int& code) {
+  RenderOptions& options = choice.options;
+  CLI::App* command = app.add_subcommand("render", "renders a model or a preset to a WAV file");
+  command->footer(render_examples);
+  command->add_option("MODEL", options.name, "a preset's or a model's name, or a file")->required();
+  command->add_option("-o,--output", options.output, "the WAV file")->required();
+  CLI::Option* seconds = command->add_option("-s,--seconds", choice.seconds, "how long")
+                             ->check(CLI::Range(0.0, 86400.0));
+  CLI::Option* frames =
+      command->add_option("--frames", choice.frames, "how long, in samples")
+          ->check(CLI::NonNegativeNumber)
+          ->excludes(seconds);
+  command->add_option("-r,--rate", options.rate_hz, "Hz")
+      ->check(CLI::Range(1000.0, 768000.0))
+      ->capture_default_str();
+  command->add_option("--input", options.input, "a WAV file; its channel n drives input n");
+  command->add_option("--score", options.score, "a file of events");
+  command->add_option("--set", choice.settings, "NAME=VALUE, a parameter from the start");
+  static std::map<std::string, SampleFormat> formats{{"float", SampleFormat::float32},
+                                                     {"double", SampleFormat::float64},
+                                                     {"pcm24", SampleFormat::pcm24}};
+  command->add_option("--format", options.format, "float, double or pcm24")
+      ->transform(CLI::CheckedTransformer(formats));
+  static std::map<std::string, Precision> precisions{{"double", Precision::float64},
+                                                     {"float", Precision::float32}};
+  command->add_option("--precision", options.precision, "of the computation: double or float")
+      ->transform(CLI::CheckedTransformer(precisions));
+  command->add_option("-p,--voices", options.voices, "how many notes sound at once")
+      ->check(CLI::Range(1, max_voices));
+  command->add_flag("--limit", options.limit, "keep below full scale, 1 ms late");
+  command->add_flag("!--no-rescale", options.rescale,
+                    "take the model's numbers raw at rates other than 44100 Hz");
+  command->add_flag("-q,--quiet", choice.is_quiet, "say nothing unless something is wrong");
+  command->callback([&choice, seconds, frames, &code] {
+    if (seconds->count() > 0) {
+      choice.options.seconds = choice.seconds;
+    }
+    if (frames->count() > 0) {
+      choice.options.frames = choice.frames;
+    }
+    for (const std::string& setting : choice.settings) {
+      const std::size_t equals = setting.find('=');
+      double value = 0.0;
+      if (equals == std::string::npos || !parse_number(setting.substr(equals + 1), value)) {
+        throw CLI::ValidationError("--set", "expected NAME=VALUE, found '" + setting + "'");
+      }
+      choice.options.parameters.emplace_back(setting.substr(0, equals), value);
+    }
+    code = render_command(choice.options, choice.is_quiet);
+  });
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  CLI::App app{"ressort plays networks of masses and springs, read from .mdl files."};
+  app.footer(
+      "Start with 'ressort play', then type 'help' at its prompt.\n"
+      "'ressort COMMAND --help' tells more of each command.\n"
+      "Exit codes: 0 done, 1 our failure, 2 wrong use or unreadable input, 75 no audio.");
+  app.set_version_flag("-V,--version", "ressort " RESSORT_VERSION);
+  app.require_subcommand(1);
+  int code = exit_code::done;
+  PlayOptions play_options;
+  RenderChoice render_choice;
+  std::string checked;
+  bool as_json = false;
+  add_play(app, play_options, code);
+  add_render(app, render_choice, code);
+  CLI::App* check_command =
+      app.add_subcommand("check", "reads a model or a preset and says what it found");
+  check_command->add_option("FILE", checked, "a file, or a preset's or model's name")->required();
+  check_command->add_flag("--json", as_json, "for machines");
+  check_command->callback([&] { code = check(checked, as_json); });
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    return app.exit(error) == 0 ? exit_code::done : exit_code::wrong_use;
+  } catch (const std::exception& error) {
+    std::fprintf(stderr, "ressort: %s\n", error.what());
+    return exit_code::our_failure;
+  }
+  return code;
+}

@@ -1,0 +1,222 @@
+#include "app/offline.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "app/process.h"
+#include "core/compile/compile.h"
+#include "core/model/expression.h"
+
+namespace ressort {
+namespace {
+
+constexpr std::size_t block_frames = 256;
+constexpr std::size_t max_score_bytes = std::size_t{64} << 20;
+constexpr double ring_out_s = 2.0;
+constexpr double longest_s = 24.0 * 3600.0;
+
+struct ScoredEvent {
+  long long frame = 0;
+  Event event;
+};
+
+// The calls of a score as events; an error has the score's line.
+Result<std::vector<ScoredEvent>> read_score(const std::string& path, const std::string& text,
+                                            const Instrument& instrument, std::uint32_t serial,
+                                            double rate_hz) {
+  auto lines = parse_score(text);
+  const auto at = [&](int line, int column, const std::string& message) {
+    return Error{path + ":" + std::to_string(line) + ":" + std::to_string(column) +
+                 ": error: " + message};
+  };
+  if (!lines) {
+    return at(lines.error().line, lines.error().column, lines.error().message);
+  }
+  std::vector<ScoredEvent> scored;
+  for (const ScoreLine& line : *lines) {
+    auto events = to_events(line.call, instrument, serial);
+    if (!events) {
+      return at(line.line, 1, events.error().message);
+    }
+    for (const Event& event : *events) {
+      scored.push_back({std::llround(line.time_s * rate_hz), event});
+    }
+  }
+  std::stable_sort(scored.begin(), scored.end(),
+                   [](const ScoredEvent& a, const ScoredEvent& b) { return a.frame < b.frame; });
+  return scored;
+}
+
+struct Inputs {
+  Sound sound;
+  long long frames() const {
+    return sound.channels.empty() ? 0 : static_cast<long long>(sound.channels[0].size());
+  }
+  // The block's pointers; silence after the end.
+  std::vector<const double*> at(long long frame, std::size_t count,
+                                std::vector<std::vector<double>>& buffers) const {
+    std::vector<const double*> pointers;
+    buffers.assign(sound.channels.size(), std::vector<double>(count, 0.0));
+    for (std::size_t c = 0; c < sound.channels.size(); ++c) {
+      for (std::size_t n = 0; n < count; ++n) {
+        const auto i = static_cast<std::size_t>(frame) + n;
+        if (i < sound.channels[c].size()) {
+          buffers[c][n] = sound.channels[c][i];
+        }
+      }
+      pointers.push_back(buffers[c].data());
+    }
+    return pointers;
+  }
+};
+
+long long length_in_frames(const RenderOptions& options, const std::vector<ScoredEvent>& score,
+                           const Inputs& inputs) {
+  if (options.frames) {
+    return *options.frames;
+  }
+  if (options.seconds) {
+    return std::llround(*options.seconds * options.rate_hz);
+  }
+  const long long last = std::max(score.empty() ? 0 : score.back().frame, inputs.frames());
+  return last + std::llround(ring_out_s * options.rate_hz);
+}
+
+}  // namespace
+
+std::string default_phrase() {
+  return "0.00 /note/on 57 100\n0.45 /note/off 57\n"
+         "0.50 /note/on 60 90\n0.95 /note/off 60\n"
+         "1.00 /note/on 64 100\n1.45 /note/off 64\n"
+         "1.50 /note/on 69 110\n1.95 /note/off 69\n"
+         "2.00 /note/on 57 120\n2.00 /note/on 64 110\n2.00 /note/on 72 110\n"
+         "3.20 /note/off 57\n3.20 /note/off 64\n3.20 /note/off 72\n";
+}
+
+Result<Rendered> render(const RenderOptions& options, const std::function<bool(double)>& progress) {
+  auto scene = load_scene(options.name, true);
+  if (!scene) {
+    return scene.error();
+  }
+  const bool is_bare = !scene->has_preset;
+  auto compiled = compile(scene->network, scene->preset,
+                          {.rate_hz = options.rate_hz, .rescale = options.rescale, .bare = is_bare,
+                           .voices = options.voices, .precision = options.precision});
+  if (!compiled) {
+    const Error& error = compiled.error();
+    return Error{scene->path + ":" + std::to_string(error.line) + ":" +
+                 std::to_string(error.column) + ": error: " + error.message};
+  }
+  const Instrument instrument = compiled->instrument;
+  if (instrument.outputs == 0) {
+    return Error{scene->model_path + ": the model has no output, so there is nothing to render"};
+  }
+  constexpr std::uint32_t serial = 1;
+
+  Inputs inputs;
+  if (!options.input.empty()) {
+    auto sound = read_wav(options.input);
+    if (!sound) {
+      return sound.error();
+    }
+    inputs.sound = *std::move(sound);
+    if (inputs.sound.rate_hz != options.rate_hz) {
+      return Error{"'" + options.input + "' is at " +
+                   std::to_string(static_cast<int>(inputs.sound.rate_hz)) +
+                   " Hz, the render at " + std::to_string(static_cast<int>(options.rate_hz)) +
+                   "; give --rate " + std::to_string(static_cast<int>(inputs.sound.rate_hz))};
+    }
+  }
+  std::string score_text;
+  if (!options.score.empty()) {
+    auto text = read_text(options.score, max_score_bytes);
+    if (!text) {
+      return text.error();
+    }
+    score_text = *std::move(text);
+  } else if (!is_bare && options.input.empty()) {
+    score_text = default_phrase();
+  }
+  auto score = read_score(options.score, score_text, instrument, serial, options.rate_hz);
+  if (!score) {
+    return score.error();
+  }
+
+  Process process(options.rate_hz, options.limit);
+  for (const auto& [name, value] : options.parameters) {
+    auto events = to_events({"/param/" + name, {value}}, instrument, serial);
+    if (!events) {
+      return events.error();
+    }
+    for (const Event& event : *events) {
+      if (event.value != value) {
+        return Error{"the preset keeps '" + name + "' between " +
+                     print_number(instrument.parameters[event.index].minimum) + " and " +
+                     print_number(instrument.parameters[event.index].maximum)};
+      }
+      process.schedule(0, event);
+    }
+  }
+  process.slot.offer(new Sounding{std::move(compiled->engine), serial});
+
+  Rendered rendered{.name = scene->name, .frames = length_in_frames(options, *score, inputs),
+                    .channels = is_bare ? instrument.outputs : std::max(2, instrument.outputs),
+                    .warnings = scene->warnings};
+  if (static_cast<double>(rendered.frames) > longest_s * options.rate_hz) {
+    return Error{"that is longer than a day of sound"};
+  }
+  const auto channels = static_cast<std::size_t>(rendered.channels);
+  auto file = WavWriter::open(options.output, options.rate_hz, rendered.channels, options.format);
+  if (!file) {
+    return file.error();
+  }
+  std::vector<double> samples(channels * block_frames);
+  std::vector<double> interleaved(samples.size());
+  std::vector<double*> outputs;
+  for (std::size_t c = 0; c < channels; ++c) {
+    outputs.push_back(samples.data() + c * block_frames);
+  }
+  std::vector<std::vector<double>> input_buffers;
+  std::size_t next = 0;
+  double energy = 0.0;
+  long long frame = 0;
+  while (frame < rendered.frames && !rendered.was_interrupted) {
+    const auto count =
+        static_cast<std::size_t>(std::min<long long>(block_frames, rendered.frames - frame));
+    const long long end = frame + static_cast<long long>(count);
+    while (next < score->size() && (*score)[next].frame < end) {
+      if (!process.schedule((*score)[next].frame, (*score)[next].event)) {
+        return Error{options.score + ": more than " + std::to_string(Process::max_events) +
+                     " events within " + std::to_string(block_frames) + " samples"};
+      }
+      ++next;
+    }
+    const std::vector<const double*> pointers = inputs.at(frame, count, input_buffers);
+    process.block(std::span<const double* const>(pointers), std::span<double* const>(outputs),
+                  count, {}, 0);
+    for (std::size_t n = 0; n < count; ++n) {
+      for (std::size_t c = 0; c < channels; ++c) {
+        const double y = outputs[c][n];
+        interleaved[n * channels + c] = y;
+        rendered.peak = std::max(rendered.peak, std::fabs(y));
+        energy += y * y;
+      }
+    }
+    if (auto wrote = file->write(interleaved.data(), count); !wrote) {
+      return wrote.error();
+    }
+    frame = end;
+    if (progress && !progress(static_cast<double>(frame) / static_cast<double>(rendered.frames))) {
+      rendered.was_interrupted = true;
+    }
+  }
+  if (auto closed = file->close(); !closed) {
+    return closed.error();
+  }
+  rendered.frames = frame;
+  rendered.rms = frame > 0 ? std::sqrt(energy / static_cast<double>(frame * rendered.channels)) : 0.0;
+  rendered.resets = process.meters.resets.get();
+  return rendered;
+}
+
+}  // namespace ressort

@@ -1,0 +1,50 @@
+// app: renders to a file, through the same block function as the live backends.
+#pragma once
+
+#include <functional>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "app/calls.h"
+#include "app/files.h"
+#include "app/loader.h"
+#include "core/result.h"
+
+namespace ressort {
+
+struct RenderOptions {
+  std::string name;                // model or preset
+  std::string output;              // a WAV file
+  double rate_hz = 44100.0;
+  std::optional<double> seconds;   // at most one of these; without both: as long as score and
+  std::optional<long long> frames; //   input last, and two seconds to ring out
+  std::string input;               // a WAV file; channel n drives input n
+  std::string score;               // a file of calls
+  std::vector<std::pair<std::string, double>> parameters;  // set before the first sample
+  SampleFormat format = SampleFormat::float32;
+  Precision precision = Precision::float64;
+  bool rescale = true;
+  bool limit = false;
+  int voices = 0;
+};
+
+struct Rendered {
+  std::string name;
+  long long frames = 0;
+  int channels = 0;
+  double peak = 0.0;
+  double rms = 0.0;
+  std::uint64_t resets = 0;
+  bool was_interrupted = false;
+  std::vector<std::string> warnings;
+};
+
+// `progress` gets 0..1 now and then and answers false to stop. [control]
+Result<Rendered> render(const RenderOptions& options, const std::function<bool(double)>& progress);
+
+// The short phrase that a preset plays when nobody says what to play.
+std::string default_phrase();
+
+}  // namespace ressort

@@ -1,0 +1,603 @@
+#include "app/osc.h"
+
+#include <arpa/inet.h>
+#include <lo/lo.h>
+#include <netinet/in.h>
+#include <poll.h>
+#include <sys/eventfd.h>
+#include <sys/socket.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+#include <cerrno>
+#include <cmath>
+#include <cstring>
+#include <ctime>
+#include <limits>
+#include <map>
+#include <mutex>
+#include <optional>
+#include <thread>
+
+#include "app/audio.h"
+#include "app/osc_packet.h"
+#include "core/model/expression.h"
+
+namespace ressort {
+namespace {
+
+constexpr std::size_t max_address_bytes = 255;
+constexpr std::size_t max_text_bytes = 4096;  // of one string of an answer
+constexpr int max_answers = 4096;             // to one packet: nobody is drowned through us
+constexpr int max_malformed_answers = 10;     // in a second
+constexpr int max_loads_waiting = 16;
+constexpr std::size_t max_bundle_events = 4096;  // as many as the process can hold
+constexpr int receive_buffer_bytes = 1 << 20;
+
+// --- time tags ----------------------------------------------------------------------------------
+
+constexpr double tags_per_second = 4294967296.0;  // an NTP time counts 2^-32 s from 1900 on
+constexpr std::uint64_t ntp_to_unix_s = 2208988800;
+constexpr std::int64_t second_ns = 1'000'000'000;
+constexpr double horizon_s = 10.0;  // farther ahead nothing is kept
+constexpr std::int64_t clock_step_ns = 5'000'000;
+constexpr double max_anchor_error_s = 0.01;
+constexpr double anchor_life_s = 10.0;  // without use
+
+// How far the wall clock is before the monotonic one. The closest of a few readings counts: the
+// others were interrupted.
+std::int64_t wall_offset_ns() {
+  std::int64_t closest = std::numeric_limits<std::int64_t>::max();
+  std::int64_t offset = 0;
+  for (int i = 0; i < 8; ++i) {
+    timespec wall{};
+    const std::int64_t before = monotonic_ns();
+    clock_gettime(CLOCK_REALTIME, &wall);
+    const std::int64_t took = monotonic_ns() - before;
+    if (took < closest) {
+      closest = took;
+      offset = wall.tv_sec * second_ns + wall.tv_nsec - (before + took / 2);
+    }
+  }
+  return offset;
+}
+
+// Seconds from one tag to another; tags wrap around in 2036.
+double seconds_between(std::uint64_t from, std::uint64_t to) {
+  return static_cast<double>(static_cast<std::int64_t>(to - from)) / tags_per_second;
+}
+
+// From time tags to frames. Every block's clock reading jitters a little, so that a passage is
+// counted from one anchor: equal distances of tags are equal distances of frames, whatever the
+// readings between them say. The anchor is a whole frame at its own tag, so that tags that are
+// whole frames apart never come near the edge where rounding decides. It is given up when it is
+// 10 ms wrong, because the sound card's clock drifts or has stood still, and after a pause.
+class TagClock {
+ public:
+  // What the wall clock says may be set anew at any time.
+  void follow_wall_clock() {
+    const std::int64_t offset_ns = wall_offset_ns();
+    if (std::abs(offset_ns - offset_ns_) > clock_step_ns) {
+      offset_ns_ = offset_ns;
+      rate_hz_ = 0.0;
+    }
+  }
+
+  // The tag of the newest block's first frame.
+  std::uint64_t now(const ClockReading& clock) const {
+    const auto wall_ns = static_cast<std::uint64_t>(clock.time_ns + offset_ns_);
+    const std::uint64_t fraction_ns = wall_ns % second_ns;
+    return ((wall_ns / second_ns + ntp_to_unix_s) << 32) + (fraction_ns << 32) / second_ns;
+  }
+
+  std::int64_t frame(std::uint64_t tag, const ClockReading& clock) {
+    const std::uint64_t now_tag = now(clock);
+    const double ahead_s = seconds_between(now_tag, tag);
+    const std::int64_t by_clock = clock.frame + std::llround(ahead_s * clock.rate_hz);
+    if (std::fabs(ahead_s) > horizon_s) {
+      return by_clock;
+    }
+    const std::int64_t by_anchor =
+        frame_ + std::llround(seconds_between(tag_, tag) * clock.rate_hz);
+    const bool is_anchored =
+        rate_hz_ == clock.rate_hz && seconds_between(used_, now_tag) < anchor_life_s &&
+        static_cast<double>(std::abs(by_anchor - by_clock)) <= max_anchor_error_s * clock.rate_hz;
+    used_ = now_tag;
+    if (is_anchored) {
+      return by_anchor;
+    }
+    tag_ = tag;
+    frame_ = by_clock;
+    rate_hz_ = clock.rate_hz;
+    return by_clock;
+  }
+
+ private:
+  std::int64_t offset_ns_ = wall_offset_ns();
+  std::uint64_t tag_ = 0;  // the anchor: this tag is this frame at this rate
+  std::int64_t frame_ = 0;
+  double rate_hz_ = 0.0;  // 0: no anchor
+  std::uint64_t used_ = 0;
+};
+
+// --- messages -----------------------------------------------------------------------------------
+
+using Message = std::unique_ptr<void, decltype(&lo_message_free)>;
+
+template <class T>
+double number_at(const lo_arg* argument) {
+  T value;
+  std::memcpy(&value, argument, sizeof value);  // liblo aligns nothing to 8 bytes
+  return static_cast<double>(value);
+}
+
+// What a message says; nothing where an argument is neither a number nor a text.
+std::optional<Call> read_call(std::span<const std::uint8_t> bytes) {
+  // liblo copies the bytes before it turns them; it only lacks the const.
+  const Message message(
+      lo_message_deserialise(const_cast<std::uint8_t*>(bytes.data()), bytes.size(), nullptr),
+      lo_message_free);
+  if (message == nullptr) {
+    return std::nullopt;
+  }
+  Call call{reinterpret_cast<const char*>(bytes.data()), {}};
+  const char* const types = lo_message_get_types(message.get());
+  const lo_arg* const* const values = lo_message_get_argv(message.get());
+  const int count = lo_message_get_argc(message.get());
+  for (int i = 0; i < count; ++i) {
+    switch (types[i]) {
+      case LO_INT32:
+        call.arguments.emplace_back(number_at<std::int32_t>(values[i]));
+        break;
+      case LO_INT64:
+        call.arguments.emplace_back(number_at<std::int64_t>(values[i]));
+        break;
+      case LO_FLOAT:
+        call.arguments.emplace_back(number_at<float>(values[i]));
+        break;
+      case LO_DOUBLE:
+        call.arguments.emplace_back(number_at<double>(values[i]));
+        break;
+      case LO_TRUE:
+        call.arguments.emplace_back(1.0);
+        break;
+      case LO_FALSE:
+        call.arguments.emplace_back(0.0);
+        break;
+      case LO_STRING:
+      case LO_SYMBOL:
+        call.arguments.emplace_back(std::string(reinterpret_cast<const char*>(values[i])));
+        break;
+      default:
+        return std::nullopt;
+    }
+  }
+  return call;
+}
+
+// An answer as it is being written.
+class Reply {
+ public:
+  explicit Reply(std::string address) : address_(std::move(address)) {}
+
+  Reply& text(std::string_view text) {
+    const std::string clipped(text.substr(0, std::min(max_text_bytes, text.find('\0'))));
+    lo_message_add_string(message_.get(), clipped.c_str());
+    return *this;
+  }
+  Reply& whole(std::uint64_t count) {
+    constexpr std::uint64_t most = std::numeric_limits<std::int32_t>::max();
+    lo_message_add_int32(message_.get(), static_cast<std::int32_t>(std::min(count, most)));
+    return *this;
+  }
+  Reply& real(double value) {
+    lo_message_add_float(message_.get(), static_cast<float>(value));
+    return *this;
+  }
+  Reply& precise(double value) {
+    lo_message_add_double(message_.get(), value);
+    return *this;
+  }
+  // As it came.
+  Reply& argument(const Argument& argument) {
+    if (const std::string* const word = std::get_if<std::string>(&argument)) {
+      return text(*word);
+    }
+    const double value = std::get<double>(argument);
+    if (value == std::rint(value) && std::fabs(value) <= std::numeric_limits<std::int32_t>::max()) {
+      lo_message_add_int32(message_.get(), static_cast<std::int32_t>(value));
+      return *this;
+    }
+    return precise(value);
+  }
+
+  std::vector<std::uint8_t> bytes() const {
+    std::vector<std::uint8_t> bytes(lo_message_length(message_.get(), address_.c_str()));
+    lo_message_serialise(message_.get(), address_.c_str(), bytes.data(), nullptr);
+    return bytes;
+  }
+
+ private:
+  std::string address_;
+  Message message_{lo_message_new(), lo_message_free};
+};
+
+// Others of our kind send these to us when somebody lies about who he is; were they answered, the
+// two would go on for ever.
+bool is_answer(std::string_view address) {
+  constexpr std::array<std::string_view, 6> answers = {
+      "/error", "/done", "/fail", "/status.reply", "/describe.reply", "/describe.end"};
+  return std::find(answers.begin(), answers.end(), address) != answers.end();
+}
+
+// --- the way back -------------------------------------------------------------------------------
+
+// All that an answer needs, however late it comes: a load may end after the server has.
+class Outlet {
+ public:
+  explicit Outlet(int socket) : socket_(socket) {}
+  ~Outlet() { close(); }
+  Outlet(const Outlet&) = delete;
+  Outlet& operator=(const Outlet&) = delete;
+
+  void send(const sockaddr_in& to, const std::vector<std::uint8_t>& bytes) {
+    const std::lock_guard lock(mutex_);
+    if (socket_ >= 0) {
+      // Whoever cannot be reached has gone; UDP promises nothing.
+      sendto(socket_, bytes.data(), bytes.size(), 0, reinterpret_cast<const sockaddr*>(&to),
+             sizeof to);
+    }
+  }
+  void close() {
+    const std::lock_guard lock(mutex_);
+    if (socket_ >= 0) {
+      ::close(socket_);
+      socket_ = -1;
+    }
+  }
+  bool begin_load() {
+    const std::lock_guard lock(mutex_);
+    return loads_waiting_ < max_loads_waiting && ++loads_waiting_ > 0;
+  }
+  void end_load() {
+    const std::lock_guard lock(mutex_);
+    --loads_waiting_;
+  }
+
+ private:
+  std::mutex mutex_;
+  int socket_;
+  int loads_waiting_ = 0;
+};
+
+// Who has sent a packet, and how many answers are left to him.
+struct Client {
+  std::shared_ptr<Outlet> outlet;
+  sockaddr_in address{};
+  int answers_left = max_answers;
+
+  void answer(const Reply& reply) {
+    if (answers_left > 0) {
+      --answers_left;
+      outlet->send(address, reply.bytes());
+    }
+  }
+  void error(const std::string& about, const std::string& message) {
+    answer(Reply("/error").text(about).text(message));
+  }
+};
+
+Result<int> open_socket(const OscOptions& options) {
+  sockaddr_in address{};
+  address.sin_family = AF_INET;
+  if (inet_pton(AF_INET, options.bind_address.c_str(), &address.sin_addr) != 1) {
+    return Error{"'" + options.bind_address +
+                 "' is no address to bind OSC to; use 127.0.0.1 for this machine alone, 0.0.0.0 "
+                 "for every network"};
+  }
+  if (options.port < 0 || options.port > 65535) {
+    return Error{"the OSC port must lie between 0 and 65535, found " +
+                 std::to_string(options.port)};
+  }
+  address.sin_port = htons(static_cast<std::uint16_t>(options.port));
+  const int socket = ::socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0);
+  if (socket < 0) {
+    return Error{std::string("no socket for OSC: ") + std::strerror(errno)};
+  }
+  if (bind(socket, reinterpret_cast<const sockaddr*>(&address), sizeof address) != 0) {
+    const int failure = errno;
+    close(socket);
+    const std::string place =
+        "port " + std::to_string(options.port) + " of " + options.bind_address;
+    return failure == EADDRINUSE
+               ? Error{place +
+                       " is taken, perhaps by another ressort; choose another with "
+                       "--osc-port or switch OSC off with --osc-port off"}
+               : Error{"OSC cannot use " + place + ": " + std::strerror(failure)};
+  }
+  // Bursts shall not be lost; the system may grant less.
+  setsockopt(socket, SOL_SOCKET, SO_RCVBUF, &receive_buffer_bytes, sizeof receive_buffer_bytes);
+  return socket;
+}
+
+}  // namespace
+
+// --- the server ---------------------------------------------------------------------------------
+
+struct OscServer::Server {
+  // Playing messages with one time tag.
+  struct Group {
+    std::string address;  // of the first
+    std::vector<TimedEvent> events;
+  };
+  using Groups = std::map<std::uint64_t, Group>;  // by time tag
+
+  Server(Process& process_in, Session& session_in, int socket_in, int wake_in)
+      : process(process_in),
+        session(session_in),
+        socket(socket_in),
+        wake(wake_in),
+        outlet(std::make_shared<Outlet>(socket_in)),
+        thread([this] { run(); }) {}
+
+  ~Server() {
+    eventfd_write(wake, 1);
+    thread.join();
+    outlet->close();
+    close(wake);
+  }
+
+  void run() {
+    std::vector<std::uint8_t> buffer(max_osc_packet_bytes + 1);
+    std::array<pollfd, 2> waits{{{socket, POLLIN, 0}, {wake, POLLIN, 0}}};
+    while (true) {
+      if (poll(waits.data(), waits.size(), -1) < 0) {
+        continue;  // a signal
+      }
+      if (waits[1].revents != 0) {
+        return;
+      }
+      Client client{outlet};
+      socklen_t length = sizeof client.address;
+      const ssize_t size = recvfrom(socket, buffer.data(), buffer.size(), MSG_DONTWAIT,
+                                    reinterpret_cast<sockaddr*>(&client.address), &length);
+      if (size >= 0) {
+        receive({buffer.data(), static_cast<std::size_t>(size)}, client);
+      }
+    }
+  }
+
+  void receive(std::span<const std::uint8_t> packet, Client& client) {
+    const auto messages = check_packet(packet);
+    if (!messages) {
+      if (may_answer_malformed()) {
+        client.error("", messages.error().message);
+      }
+      return;
+    }
+    Groups groups;
+    for (const OscMessage& message : *messages) {
+      const char* const address = reinterpret_cast<const char*>(message.bytes.data());
+      if (std::strlen(address) > max_address_bytes) {
+        client.error("",
+                     "an address has at most " + std::to_string(max_address_bytes) + " characters");
+      } else if (is_answer(address)) {
+        continue;
+      } else if (const auto call = read_call(message.bytes)) {
+        // 0 is not in the standard, but some send it for "at once".
+        handle(*call, std::max<std::uint64_t>(1, message.time_tag), groups, client);
+      } else {
+        client.error(address, "arguments are numbers (i f d h T F) or texts (s S)");
+      }
+    }
+    for (auto& [time_tag, group] : groups) {
+      play(time_tag, group, client);
+    }
+  }
+
+  // Whoever sends rubbish under another's name shall not have him flooded.
+  bool may_answer_malformed() {
+    const std::int64_t second = monotonic_ns() / second_ns;
+    if (second != malformed_second) {
+      malformed_second = second;
+      malformed_answers = 0;
+    }
+    return ++malformed_answers <= max_malformed_answers;
+  }
+
+  // Playing messages join their group; the others are answered at once, whatever their time tag.
+  void handle(const Call& call, std::uint64_t time_tag, Groups& groups, Client& client) {
+    if (call.address == "/model/load" || call.address == "/preset/load") {
+      load(call, client);
+    } else if (call.address == "/status") {
+      tell_status(client);
+    } else if (call.address == "/describe") {
+      describe(client);
+    } else if (call.address.starts_with("/param/") && call.arguments.empty()) {
+      tell_parameters(call, client);
+    } else if (const auto events = session.events(call); !events) {
+      client.error(call.address, events.error().message);
+    } else {
+      Group& group = groups.try_emplace(time_tag, Group{call.address, {}}).first->second;
+      if (group.events.size() + events->size() > max_bundle_events) {
+        client.error(call.address,
+                     "a bundle may have at most " + std::to_string(max_bundle_events) + " events");
+        return;
+      }
+      for (const Event& event : *events) {
+        group.events.push_back({.event = event});
+      }
+    }
+  }
+
+  void play(std::uint64_t time_tag, Group& group, Client& client) {
+    double late_s = 0.0;
+    TimedEvent timed;
+    if (time_tag > 1) {
+      const ClockReading clock = process.clock.read();
+      // Blocks that ended long ago tell nothing of when the next will begin.
+      if (clock.rate_hz <= 0.0 || monotonic_ns() - clock.time_ns > second_ns) {
+        client.error(group.address, "no audio is running: a time tag cannot be kept");
+        return;
+      }
+      tags.follow_wall_clock();
+      const double ahead_s = seconds_between(tags.now(clock), time_tag);
+      if (ahead_s > horizon_s) {
+        client.error(group.address, "the time tag is " + seconds_text(ahead_s) +
+                                        " s ahead; at most " + print_number(horizon_s) +
+                                        " s are kept");
+        return;
+      }
+      timed.timing = TimedEvent::When::at_frame;
+      timed.when = tags.frame(time_tag, clock);
+      // The newest block has its events already; a late one begins the next, and is counted there.
+      late_s = static_cast<double>(clock.frame + clock.period - timed.when) / clock.rate_hz;
+    }
+    std::size_t following = group.events.size();
+    for (TimedEvent& event : group.events) {
+      event.timing = timed.timing;
+      event.when = timed.when;
+      event.following = static_cast<std::uint16_t>(--following);
+    }
+    if (!process.from_osc.push_all(group.events)) {
+      client.error(group.address, "busy: no room for " + std::to_string(group.events.size()) +
+                                      (group.events.size() == 1 ? " event" : " events") +
+                                      ", try again");
+    } else if (late_s > 0.0) {
+      client.error(group.address, "late by " + seconds_text(late_s) + " s, acts now");
+    }
+  }
+
+  static std::string seconds_text(double seconds) {
+    return print_number(std::round(seconds * 1e4) / 1e4);
+  }
+
+  void load(const Call& call, Client& client) {
+    if (call.arguments.empty() || call.arguments.size() > 2 ||
+        !std::holds_alternative<std::string>(call.arguments[0])) {
+      client.error(call.address, call.address + ": expected NAME [ID]");
+      return;
+    }
+    if (!client.outlet->begin_load()) {
+      client.error(call.address,
+                   "busy: " + std::to_string(max_loads_waiting) + " loads are waiting, try again");
+      return;
+    }
+    const auto answer = [call, later = Client{client.outlet, client.address}](
+                            const Result<std::shared_ptr<const Loaded>>& result) mutable {
+      Reply reply(result ? "/done" : "/fail");
+      reply.text(call.address);
+      if (call.arguments.size() > 1) {
+        reply.argument(call.arguments[1]);
+      }
+      if (!result) {
+        reply.text(result.error().message);
+      }
+      later.outlet->end_load();
+      later.answer(reply);
+    };
+    session.load(std::get<std::string>(call.arguments[0]), answer);
+  }
+
+  // /status.reply s:model f:cpu (0 to 1, -1: not known) i:voices i:max_voices i:xruns i:resets
+  // d:rate i:period f:load_ms f:peak_db (-999: silence) i:late i:dropped s:backend
+  void tell_status(Client& client) {
+    const Status status = session.status();
+    client.answer(Reply("/status.reply")
+                      .text(status.model)
+                      .real(status.cpu)
+                      .whole(static_cast<std::uint64_t>(status.voices))
+                      .whole(static_cast<std::uint64_t>(status.max_voices))
+                      .whole(status.xruns)
+                      .whole(status.resets)
+                      .precise(status.rate_hz)
+                      .whole(static_cast<std::uint64_t>(status.period_frames))
+                      .real(status.load_ms)
+                      .real(std::max(-999.0, status.peak_db))
+                      .whole(status.late)
+                      .whole(status.dropped)
+                      .text(status.backend));
+  }
+
+  void tell_parameters(const Call& call, Client& client) {
+    const std::string_view pattern = std::string_view(call.address).substr(7);
+    const auto loaded = session.current();
+    bool has_any = false;
+    for (const ParameterInfo& info : loaded->instrument.parameters) {
+      if (fits(pattern, info.name)) {
+        has_any = true;
+        // Nothing if another model came in between.
+        if (const auto value = session.parameter(info.name)) {
+          client.answer(Reply("/param/" + info.name).real(*value));
+        }
+      }
+    }
+    if (!has_any) {
+      client.error(call.address, "the model has no such parameter; /param/* lists what it has");
+    }
+  }
+
+  // A row s:address s:arguments s:meaning for everything, then /describe.end i:rows, so that
+  // whoever counts knows if one was lost on the way. A parameter's meaning is its value, minimum
+  // and maximum.
+  void describe(Client& client) {
+    const auto loaded = session.current();
+    std::uint64_t rows = 0;
+    const auto row = [&](std::string_view address, std::string_view arguments,
+                         std::string_view meaning) {
+      ++rows;
+      client.answer(Reply("/describe.reply").text(address).text(arguments).text(meaning));
+    };
+    for (const AddressRow& known : addresses()) {
+      row(known.address, known.arguments, known.does);
+    }
+    for (const ParameterInfo& info : loaded->instrument.parameters) {
+      row("/param/" + info.name, "f",
+          print_number(session.parameter(info.name).value_or(info.value)) + " " +
+              print_number(info.minimum) + " " + print_number(info.maximum));
+    }
+    for (const CustomInfo& custom : loaded->instrument.custom) {
+      row(custom.address, "f", "a control of the preset, 0-1");
+    }
+    client.answer(Reply("/describe.end").whole(rows));
+  }
+
+  Process& process;
+  Session& session;
+  const int socket;  // the outlet's, which closes it after the thread has ended
+  const int wake;
+  std::shared_ptr<Outlet> outlet;
+  TagClock tags;
+  std::int64_t malformed_second = 0;
+  int malformed_answers = 0;
+  std::thread thread;  // last, so that all else is there when it starts
+};
+
+OscServer::OscServer(std::unique_ptr<Server> server) : server_(std::move(server)) {}
+OscServer::~OscServer() = default;
+
+Result<std::unique_ptr<OscServer>> OscServer::open(const OscOptions& options, Process& process,
+                                                   Session& session) {
+  const auto socket = open_socket(options);
+  if (!socket) {
+    return socket.error();
+  }
+  const int wake = eventfd(0, EFD_CLOEXEC);
+  if (wake < 0) {
+    const std::string reason = std::strerror(errno);
+    close(*socket);
+    return Error{"OSC cannot start: " + reason};
+  }
+  return std::unique_ptr<OscServer>(
+      new OscServer(std::make_unique<Server>(process, session, *socket, wake)));
+}
+
+int OscServer::port() const {
+  sockaddr_in address{};
+  socklen_t length = sizeof address;
+  getsockname(server_->socket, reinterpret_cast<sockaddr*>(&address), &length);
+  return ntohs(address.sin_port);
+}
+
+}  // namespace ressort

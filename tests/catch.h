@@ -1,0 +1,9 @@
+// tests: the one place that knows which Catch2 is installed, 2 or 3.
+#pragma once
+
+#if __has_include(<catch2/catch.hpp>)
+#include <catch2/catch.hpp>
+#else
+#include <catch2/catch_all.hpp>
+using Catch::Approx;
+#endif

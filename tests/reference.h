@@ -1,0 +1,373 @@
+// tests: a slow textbook simulator, one object per element: the oracle for every kernel. Written
+// from the formulas of the model language's section 2 and never from the engine.
+//
+// Positions are kept as x[n] and x[n-1], as published. That form loses u/theta of a slow mode's
+// precision, so it is carried out in the widest arithmetic that the machine has.
+#pragma once
+
+#include <cmath>
+#include <deque>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "core/model/network.h"
+
+namespace ressort::reference {
+
+using Real = long double;
+using Number = const Real*;  // lives in the simulator, so that a parameter may change it
+
+inline Real sgn(Real x) {
+  return x > 0 ? 1 : x < 0 ? -1 : 0;
+}
+
+// --- what has a position
+// --------------------------------------------------------------------------
+
+class Point {
+ public:
+  Point(Real x, Real x_before) : x_(x), x_before_(x_before) {}
+  virtual ~Point() = default;
+  Point(const Point&) = delete;
+  Point& operator=(const Point&) = delete;
+
+  virtual void step() = 0;
+  void receive(Real force) { force_ += force; }
+  Real position() const { return x_; }
+  Real velocity() const { return x_ - x_before_; }
+
+ protected:
+  void move_to(Real x) {
+    x_before_ = x_;
+    x_ = x;
+    force_ = 0;
+  }
+  Real x_;
+  Real x_before_;
+  Real force_ = 0;
+};
+
+// X[n] = 2 X[n-1] - X[n-2] + F/M
+class MassPoint : public Point {
+ public:
+  MassPoint(Number m, Real x0, Real x1) : Point(x0, x1), m_(m) {}
+  void step() override { move_to(2 * x_ - x_before_ + force_ / *m_); }
+
+ private:
+  Number m_;
+};
+
+// X[n] = (2 - (K+Z)/M) X[n-1] + (Z/M - 1) X[n-2] + F/M
+class Oscillator : public Point {
+ public:
+  Oscillator(Number m, Number k, Number z, Real x0, Real x1) : Point(x0, x1), m_(m), k_(k), z_(z) {}
+  void step() override {
+    move_to((2 - (*k_ + *z_) / *m_) * x_ + (*z_ / *m_ - 1) * x_before_ + force_ / *m_);
+  }
+
+ private:
+  Number m_;
+  Number k_;
+  Number z_;
+};
+
+// X[n] = x0
+class Ground : public Point {
+ public:
+  explicit Ground(Real x0) : Point(x0, x0) {}
+  void step() override { move_to(x_); }
+};
+
+// X[n] = in[n]
+class PositionInput : public Point {
+ public:
+  explicit PositionInput(Real x0) : Point(x0, x0), in_(x0) {}
+  void feed(Real in) { in_ = in; }
+  void step() override { move_to(in_); }
+
+ private:
+  Real in_;
+};
+
+// --- what exerts a force: F_a -= f, F_b += f
+// ------------------------------------------------------
+
+class Interaction {
+ public:
+  Interaction(Point& a, Point& b) : a_(a), b_(b) {}
+  virtual ~Interaction() = default;
+  Interaction(const Interaction&) = delete;
+  Interaction& operator=(const Interaction&) = delete;
+
+  void step() {
+    const Real f = force(a_.position() - b_.position(), a_.velocity() - b_.velocity());
+    a_.receive(-f);
+    b_.receive(f);
+  }
+
+ protected:
+  virtual Real force(Real delta, Real nu) const = 0;
+
+ private:
+  Point& a_;
+  Point& b_;
+};
+
+class SpringDamper : public Interaction {
+ public:
+  SpringDamper(Point& a, Point& b, Number k, Number z) : Interaction(a, b), k_(k), z_(z) {}
+
+ private:
+  Real force(Real delta, Real nu) const override { return *k_ * delta + *z_ * nu; }
+  Number k_;
+  Number z_;
+};
+
+class Pluck : public Interaction {
+ public:
+  Pluck(Point& a, Point& b, Number k, Number s, Number z)
+      : Interaction(a, b), k_(k), s_(s), z_(z) {}
+
+ private:
+  Real force(Real delta, Real nu) const override {
+    const Real k = *k_;
+    const Real s = *s_;
+    if (std::fabs(delta) < s / 10) {
+      return -(k - k / 10) * delta + *z_ * nu;
+    }
+    if (std::fabs(delta) < s) {
+      return -sgn(delta) * (s / 10) * k + (k / 10) * delta + *z_ * nu;
+    }
+    return 0;
+  }
+  Number k_;
+  Number s_;
+  Number z_;
+};
+
+class Bow : public Interaction {
+ public:
+  Bow(Point& a, Point& b, Number z, Number s) : Interaction(a, b), z_(z), s_(s) {}
+
+ private:
+  Real force(Real, Real nu) const override {
+    const Real z = *z_;
+    const Real s = *s_;
+    if (std::fabs(nu) < s / 3) {
+      return (z - z / 3) * nu;
+    }
+    if (std::fabs(nu) < s) {
+      return sgn(nu) * (s / 3) * z - (z / 3) * nu;
+    }
+    return 0;
+  }
+  Number z_;
+  Number s_;
+};
+
+class SmoothBow : public Interaction {
+ public:
+  SmoothBow(Point& a, Point& b, Number z, Number s) : Interaction(a, b), z_(z), s_(s) {}
+
+ private:
+  Real force(Real, Real nu) const override {
+    const Real ratio = nu / *s_;
+    return 0.63L * *z_ * nu * std::exp(-4 * ratio * ratio + 0.5L);
+  }
+  Number z_;
+  Number s_;
+};
+
+class Contact : public Interaction {
+ public:
+  Contact(Point& a, Point& b, Number k, Number z, Number threshold)
+      : Interaction(a, b), k_(k), z_(z), threshold_(threshold) {}
+
+ private:
+  Real force(Real delta, Real nu) const override {
+    return delta > -*threshold_ ? *k_ * (delta + *threshold_) + *z_ * nu : 0;
+  }
+  Number k_;
+  Number z_;
+  Number threshold_;
+};
+
+// --- all of them together
+// -------------------------------------------------------------------------
+
+class Simulator {
+ public:
+  // A number that the elements may use, and that may be set later.
+  Real& number(Real value) { return numbers_.emplace_back(value); }
+
+  Point& add_mass(Number m, Real x0, Real x1) { return add_point<MassPoint>(m, x0, x1); }
+  Point& add_oscillator(Number m, Number k, Number z, Real x0, Real x1) {
+    return add_point<Oscillator>(m, k, z, x0, x1);
+  }
+  Point& add_ground(Real x0) { return add_point<Ground>(x0); }
+  PositionInput& add_position_point(Real x0) {
+    auto& point = static_cast<PositionInput&>(add_point<PositionInput>(x0));
+    position_points_.push_back(&point);
+    points_in_order_.pop_back();
+    return point;
+  }
+
+  void add_spring(Point& a, Point& b, Number k, Number z) { add<SpringDamper>(a, b, k, z); }
+  void add_pluck(Point& a, Point& b, Number k, Number s, Number z) { add<Pluck>(a, b, k, s, z); }
+  void add_bow(Point& a, Point& b, Number z, Number s) { add<Bow>(a, b, z, s); }
+  void add_smooth_bow(Point& a, Point& b, Number z, Number s) { add<SmoothBow>(a, b, z, s); }
+  void add_contact(Point& a, Point& b, Number k, Number z, Number threshold) {
+    add<Contact>(a, b, k, z, threshold);
+  }
+
+  // Inputs are numbered as they are added, forces and positions together; so are outputs.
+  void add_force_input(Point& point) { inputs_.push_back({&point, nullptr}); }
+  void add_position_input(PositionInput& point) { inputs_.push_back({nullptr, &point}); }
+  void add_output(const Point* point) { outputs_.push_back(point); }  // null: always 0
+
+  std::size_t input_count() const { return inputs_.size(); }
+  std::size_t output_count() const { return outputs_.size(); }
+
+  // One tick, in the paper's timing: a force input acts on the position of the same tick; then
+  // masses, position inputs, links; an output reads the new position.
+  std::vector<double> step(std::span<const double> inputs) {
+    for (std::size_t i = 0; i < inputs_.size(); ++i) {
+      if (inputs_[i].pushed != nullptr) {
+        inputs_[i].pushed->receive(inputs[i]);
+      } else {
+        inputs_[i].moved->feed(inputs[i]);
+      }
+    }
+    for (Point* const point : points_in_order_) {
+      point->step();
+    }
+    for (PositionInput* const point : position_points_) {
+      point->step();
+    }
+    for (const auto& link : links_) {
+      link->step();
+    }
+    std::vector<double> outputs;
+    outputs.reserve(outputs_.size());
+    for (const Point* const point : outputs_) {
+      outputs.push_back(point == nullptr ? 0.0 : static_cast<double>(point->position()));
+    }
+    return outputs;
+  }
+
+ private:
+  struct Input {
+    Point* pushed = nullptr;
+    PositionInput* moved = nullptr;
+  };
+
+  template <class T, class... Arguments>
+  Point& add_point(Arguments... arguments) {
+    points_.push_back(std::make_unique<T>(arguments...));
+    points_in_order_.push_back(points_.back().get());
+    return *points_.back();
+  }
+  template <class T, class... Arguments>
+  void add(Point& a, Point& b, Arguments... arguments) {
+    links_.push_back(std::make_unique<T>(a, b, arguments...));
+  }
+
+  std::deque<Real> numbers_;
+  std::vector<std::unique_ptr<Point>> points_;
+  std::vector<Point*> points_in_order_;  // masses, oscillators, grounds
+  std::vector<PositionInput*> position_points_;
+  std::vector<std::unique_ptr<Interaction>> links_;
+  std::vector<Input> inputs_;
+  std::vector<const Point*> outputs_;
+};
+
+// A Network's simulator and the numbers that its parameters move.
+struct Simulation {
+  Simulator simulator;
+  std::vector<Real*> arguments;  // [ArgumentId]
+
+  void set_parameters(const Network& network, std::span<const double> values) {
+    for (std::size_t i = 0; i < arguments.size(); ++i) {
+      *arguments[i] = argument_value(network, static_cast<ArgumentId>(i), values);
+    }
+  }
+};
+
+inline Simulation make_simulation(const Network& network, std::span<const double> parameters) {
+  Simulation made;
+  Simulator& simulator = made.simulator;
+  for (std::size_t i = 0; i < network.arguments.size(); ++i) {
+    made.arguments.push_back(&simulator.number(0));
+  }
+  made.set_parameters(network, parameters);
+  const Number zero = &simulator.number(0);
+  const auto number = [&](ArgumentId id) { return id == no_argument ? zero : made.arguments[id]; };
+  std::vector<Point*> points;
+  std::vector<PositionInput*> hands;
+  for (const Mass& mass : network.masses) {
+    const Real x0 = mass.position;
+    const Real x1 = network.third == ThirdArgument::delayed_position
+                        ? Real{mass.third}
+                        : x0 - Real{mass.third} / 44100;
+    PositionInput* hand = nullptr;
+    switch (mass.kind) {
+      case MassKind::mass:
+        points.push_back(&simulator.add_mass(number(mass.mass), x0, x1));
+        break;
+      case MassKind::oscillator:
+        points.push_back(&simulator.add_oscillator(number(mass.mass), number(mass.stiffness),
+                                                   number(mass.damping), x0, x1));
+        break;
+      case MassKind::ground:
+        points.push_back(&simulator.add_ground(x0));
+        break;
+      case MassKind::position:
+        hand = &simulator.add_position_point(x0);
+        points.push_back(hand);
+        break;
+    }
+    hands.push_back(hand);
+  }
+  for (const Link& link : network.links) {
+    Point& a = *points[link.a];
+    Point& b = *points[link.b];
+    const Number first = number(link.arguments[0]);
+    const Number second = number(link.arguments[1]);
+    const Number last = number(link.arguments[2]);
+    switch (link.kind) {
+      case LinkKind::spring:
+        simulator.add_spring(a, b, first, second);
+        break;
+      case LinkKind::pluck:
+        simulator.add_pluck(a, b, first, second, last);
+        break;
+      case LinkKind::bow:
+        simulator.add_bow(a, b, first, second);
+        break;
+      case LinkKind::smooth_bow:
+        simulator.add_smooth_bow(a, b, first, second);
+        break;
+      case LinkKind::contact:
+        simulator.add_contact(a, b, first, second, last);
+        break;
+    }
+  }
+  for (const Input& input : network.inputs) {
+    if (input.is_force) {
+      simulator.add_force_input(*points[input.mass]);
+    } else {
+      simulator.add_position_input(*hands[input.mass]);
+    }
+  }
+  std::vector<const Point*> channels(static_cast<std::size_t>(output_count(network)), nullptr);
+  for (const Output& output : network.outputs) {
+    channels[static_cast<std::size_t>(output.number - 1)] = points[output.mass];
+  }
+  for (const Point* const point : channels) {
+    simulator.add_output(point);
+  }
+  return made;
+}
+
+}  // namespace ressort::reference

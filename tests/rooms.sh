@@ -1,0 +1,152 @@
+#!/bin/sh
+# The rooms of the code and which way they look: fails on every #include that the table of the
+# design does not have, and prints it. Before it looks at the code it looks at itself: a list of
+# forbidden includes must all be found.
+#
+#   rooms.sh [ROOT]      ROOT is where core/ and app/ are; without it, the folder above this one.
+set -eu
+root=${1:-$(dirname -- "$0")/..}
+cd -- "$root"
+
+# Reads "file:line:#include <what>"; prints the lines that break a rule.
+judge() {
+  awk '
+    function starts(text, prefix) { return index(text, prefix) == 1 }
+    function refuse(reason) { if (why == "") why = reason }
+    BEGIN {
+      # What core may never see: streams, files, threads, clocks.
+      split("iostream fstream ostream istream thread atomic mutex shared_mutex condition_variable " \
+            "future stop_token semaphore latch barrier filesystem chrono ctime", words, " ")
+      for (i in words) impure[words[i]] = 1
+      # Libraries of others, each with the one place that may see it.
+      owner["jack/"] = "app/jack.cpp"
+      owner["alsa/"] = "app/alsa.cpp"
+      owner["RtMidi.h"] = "app/rtmidi.cpp"
+      owner["rtmidi/"] = "app/rtmidi.cpp"
+      owner["lo/"] = "app/osc.cpp"
+      owner["sndfile"] = "app/files.cpp"
+      owner["histedit.h"] = "app/console.cpp"
+      owner["editline/"] = "app/console.cpp"
+      owner["readerwriterqueue"] = "app/lockfree.h"
+      owner["atomic"] = "app/lockfree.h"
+      owner["toml++/"] = "core/model/"
+      owner["Eigen/"] = "core/analysis/"
+      owner["unsupported/Eigen/"] = "core/analysis/"
+      owner["Spectra/"] = "core/analysis/"
+      # Which rooms a room may see; the folders of core and, as "core", result.h and formula.h.
+      sees["core"] = "core"
+      sees["core/model"] = "core core/model"
+      sees["core/analysis"] = "core core/model core/analysis"
+      sees["core/engine"] = "core/formula.h core/engine"
+      sees["core/compile"] = "core core/model core/analysis core/engine core/compile"
+      sees["app"] = "core core/model core/analysis core/engine core/compile app"
+      # The audio thread and the devices know engines, not models.
+      audio = "^app/(process|lockfree|midi|midi_input|audio|jack|alsa|dummy|rtmidi)[.]"
+    }
+    {
+      line = $0
+      why = ""
+      colon = index(line, ":")
+      file = substr(line, 1, colon - 1)
+      what = line
+      if (!sub(/^[^#]*#[ \t]*include[ \t]*[<"]/, "", what)) refuse("an include that cannot be read")
+      sub(/[>"].*/, "", what)
+      ours = line ~ /#[ \t]*include[ \t]*"/
+      room = file
+      if (room ~ /^core\/[^\/]*\//) {
+        sub(/\/[^\/]*$/, "", room)
+      } else {
+        sub(/\/.*/, "", room)
+      }
+      for (prefix in owner) {
+        if (!ours && (prefix == "atomic" ? what == prefix : starts(what, prefix)) &&
+            !starts(file, owner[prefix])) {
+          refuse("only " owner[prefix] " may see <" prefix ">")
+        }
+      }
+      if (ours) {
+        target = what
+        if (target ~ /^core\/[^\/]*\//) {
+          sub(/\/[^\/]*$/, "", target)
+        } else if (target == "core/result.h" || target == "core/formula.h") {
+          target = "core"
+        } else if (target ~ /^app\/[^\/]*$/) {
+          target = "app"
+        }
+        count = split(sees[room], rooms, " ")
+        seen = 0
+        for (i = 1; i <= count; ++i) seen = seen || rooms[i] == target || rooms[i] == what
+        if (!seen) refuse(room " may not see " what)
+        if (file ~ audio && (target == "core/model" || target == "core/compile" ||
+                             target == "core/analysis" || what == "app/session.h" ||
+                             what == "app/loader.h" || what == "app/files.h" ||
+                             what == "app/calls.h")) {
+          refuse("the audio side may not see " what)
+        }
+      } else if (starts(file, "core/")) {
+        if (what in impure) refuse("core knows no streams, files, threads or clocks")
+        if (what !~ /^[a-z_0-9]+$/ && !starts(what, "toml++/") && !starts(what, "Eigen/") &&
+            !starts(what, "unsupported/Eigen/") && !starts(what, "Spectra/")) {
+          refuse("core knows the standard library only")
+        }
+      }
+      if (file ~ /^app\/(process|lockfree|midi)[.]/ && what in impure && what != "atomic") {
+        refuse("the audio thread knows no streams, files, locks or clocks")
+      }
+      if (why != "") print line ": " why
+    }'
+}
+
+includes() {
+  find core app -name '*.h' -o -name '*.cpp' | LC_ALL=C sort |
+    xargs grep -n '^[[:space:]]*#[[:space:]]*include' /dev/null
+}
+
+forbidden='core/result.h:1:#include "core/model/network.h"
+core/model/mdl.cpp:1:#include "core/engine/engine.h"
+core/model/mdl.cpp:1:#include <iostream>
+core/model/mdl.cpp:1:#include <Eigen/Dense>
+core/model/mdl.cpp:1:#include "app/files.h"
+core/analysis/linear.cpp:1:#include "core/engine/program.h"
+core/analysis/linear.cpp:1:#include <toml++/toml.h>
+core/engine/engine.cpp:1:#include "core/model/network.h"
+core/engine/engine.cpp:1:#include "core/result.h"
+core/engine/engine.cpp:1:#include "core/compile/compile.h"
+core/engine/direct.cpp:1:#  include <immintrin.h>
+core/engine/engine.cpp:1:#include <atomic>
+core/engine/engine.cpp:1:#include <jack/jack.h>
+core/compile/compile.cpp:1:#include <Spectra/SymEigsSolver.h>
+core/compile/compile.cpp:1:#include <chrono>
+core/compile/compile.cpp:1:#include "tests/scenes.h"
+core/engine/laws.h:1:#include LAWS
+app/session.cpp:1:#include <atomic>
+app/session.cpp:1:#include <sndfile.h>
+app/process.h:1:#include "app/session.h"
+app/process.cpp:1:#include "core/model/network.h"
+app/process.cpp:1:#include <mutex>
+app/jack.cpp:1:#include "core/compile/compile.h"
+app/jack.cpp:1:#include <alsa/asoundlib.h>
+app/alsa.cpp:1:#include <jack/jack.h>
+app/console.cpp:1:#include <lo/lo.h>
+app/osc.cpp:1:#include <histedit.h>
+app/midi.cpp:1:#include <RtMidi.h>
+app/process.cpp:1:#include <readerwriterqueue/readerwriterqueue.h>'
+planted=$(printf '%s\n' "$forbidden" | wc -l)
+caught=$(printf '%s\n' "$forbidden" | judge | wc -l)
+if [ "$planted" -ne "$caught" ]; then
+  echo "rooms.sh finds $caught of $planted planted offences:"
+  printf '%s\n' "$forbidden" | judge
+  exit 1
+fi
+
+looked_at=$(includes | wc -l)
+if [ "$looked_at" -lt 50 ]; then
+  echo "rooms.sh: found only $looked_at includes under $(pwd)/core and app"
+  exit 1
+fi
+offences=$(includes | judge)
+if [ -n "$offences" ]; then
+  printf '%s\n' "$offences"
+  exit 1
+fi
+echo "$looked_at includes, every one allowed"
