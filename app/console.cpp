@@ -376,14 +376,15 @@ Result<Done> set(Desk& desk, Words words) {
 
 // --- looking ------------------------------------------------------------------------------------
 
-std::string decibels(double level) {
-  return std::isfinite(level) ? fixed(level, 1) + " dB" : std::string("silence");
+std::string peak(double level_db) {
+  return std::isfinite(level_db) ? "peak " + fixed(level_db, 1) + " dBFS" : std::string("silence");
 }
 
 Result<Done> status(Desk& desk, Words) {
   const Status now = desk.session.status();
-  const std::string limiter =
-      now.limited_db > -0.05 ? "limiter idle" : "limiter down to " + decibels(now.limited_db);
+  const std::string limiter = now.limited_db > -0.05
+                                  ? "limiter idle"
+                                  : "limiter down to " + fixed(now.limited_db, 1) + " dB";
   std::vector<std::vector<std::string>> rows = {
       {"model",
        now.model.empty() ? "none" : now.model + ", loaded in " + fixed(now.load_ms, 1) + " ms"},
@@ -393,8 +394,7 @@ Result<Done> status(Desk& desk, Words) {
       {"cpu", now.cpu < 0.0 ? "not known" : fixed(100.0 * now.cpu, 1) + " % of the time there is"},
       {"voices", std::to_string(now.voices) + " of " + std::to_string(now.max_voices) + ", " +
                      std::to_string(now.stolen) + " stolen"},
-      {"output",
-       "peak " + decibels(now.peak_db) + " of full scale since the last status, " + limiter},
+      {"output", peak(now.peak_db) + " since the last status, " + limiter},
       {"xruns", std::to_string(now.xruns)},
       {"resets", std::to_string(now.resets) + " voices that became unstable"},
       {"events", std::to_string(now.late) + " late, " + std::to_string(now.dropped) + " dropped, " +
@@ -510,11 +510,11 @@ constexpr CommandRow command_rows[] = {
     {"Looking", "status", "", "tells what sounds, how loud, at what cost",
      "The peak and the limiter's deepest cut are those since the last status.", status},
     {"Looking", "explain", "", "tells how the model is computed and what plays it", "", explain},
-    {"Else", "rec", "FILE|stop", "records what is heard to a WAV file, or ends that",
+    {"Other", "rec", "FILE|stop", "records what is heard to a WAV file, or ends that",
      "The file has 24 bits a sample and the rate of the audio. A file of that name is replaced.",
      record},
-    {"Else", "help", "[COMMAND]", "tells more", "", help},
-    {"Else", "quit", "", "ends the program", "", quit},
+    {"Other", "help", "[COMMAND]", "tells more", "", help},
+    {"Other", "quit", "", "ends the program", "", quit},
 };
 
 Result<const CommandRow*> find_command(std::string_view name) {
@@ -915,20 +915,7 @@ struct Terminal::Input {
   // Waits for a key, or the end of the input. Negative: as long as it takes.
   Woken wait(int timeout_ms) {
     while (true) {
-      pollfd both[] = {{STDIN_FILENO, POLLIN, 0}, {wake[0], POLLIN, 0}};
-      const int count = poll(both, 2, timeout_ms);
-      if (count == 0) {
-        return Woken::nothing;
-      }
-      if (count < 0 && errno == EINTR) {
-        continue;
-      }
-      if (count < 0) {
-        return Woken::over;
-      }
-      if (both[1].revents != 0) {
-        char bytes[64];
-        static_cast<void>(!read(wake[0], bytes, sizeof bytes));
+      {
         const std::lock_guard lock(mutex);
         if (is_over) {
           return Woken::over;
@@ -938,7 +925,18 @@ struct Terminal::Input {
           el_set(editor, EL_REFRESH);
         }
       }
-      if (both[0].revents != 0) {
+      pollfd both[] = {{STDIN_FILENO, POLLIN, 0}, {wake[0], POLLIN, 0}};
+      const int count = poll(both, 2, timeout_ms);
+      if (count == 0) {
+        return Woken::nothing;
+      }
+      if (count < 0 && errno != EINTR) {
+        return Woken::over;
+      }
+      if (count > 0 && both[1].revents != 0) {
+        char bytes[64];
+        static_cast<void>(!read(wake[0], bytes, sizeof bytes));
+      } else if (count > 0) {
         return Woken::key;
       }
     }
@@ -1028,11 +1026,11 @@ struct Terminal::Input {
                              typed != nullptr ? static_cast<std::size_t>(count) : 0);
       set_editing(false);
       if (!line.ends_with('\n')) {
-        put("\n");
+        put(must_end() ? "\n" : "\nThe console is closed, the sound goes on; Ctrl-C ends it.\n");
         break;
       }
-      const std::string words = line.substr(0, line.size() - 1);
-      if (words.find_first_not_of(" \t") != words.npos) {
+      const std::string words = line.substr(0, line.find_last_not_of(" \t\n") + 1);
+      if (!words.empty()) {
         history(lines, &event, H_ENTER, words.c_str());
       }
       goes_on = run_line(words);
@@ -1041,6 +1039,11 @@ struct Terminal::Input {
       history(lines, &event, H_SAVE, path.c_str());
     }
     history_end(lines);
+  }
+
+  bool must_end() {
+    const std::lock_guard lock(mutex);
+    return is_over;
   }
 
   void set_editing(bool now) {

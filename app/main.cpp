@@ -1,6 +1,8 @@
 // app: the command line, turned into one of the commands.
 #include <CLI/CLI.hpp>
-#include <map>
+#include <string>
+#include <utility>
+#include <vector>
 
 #include "app/commands.h"
 #include "core/model/expression.h"
@@ -26,6 +28,40 @@ const char* const render_examples =
     "Examples:\n"
     "  ressort render PolyTriangle -o out.wav\n"
     "  ressort render my.mdl -o out.wav --input gesture.wav --format double\n";
+
+// One of a few words.
+template <class T>
+void add_choice(CLI::App& command, const std::string& name, T& target,
+                const std::vector<std::pair<std::string, T>>& choices, const std::string& help) {
+  std::string words;
+  for (const auto& [word, value] : choices) {
+    words += (words.empty() ? "" : ", ") + word;
+  }
+  command
+      .add_option_function<std::string>(
+          name,
+          [&target, choices, name, words](const std::string& text) {
+            for (const auto& [word, value] : choices) {
+              if (word == text) {
+                target = value;
+                return;
+              }
+            }
+            throw CLI::ValidationError(name, "must be one of " + words + ", found " + text);
+          },
+          help + ": " + words + " (" + choices.front().first + ")")
+      ->type_name("WORD");
+}
+
+// How the network is computed, for every command that computes it.
+void add_numbers(CLI::App& command, Precision& precision, bool& rescale) {
+  add_choice<Precision>(command, "--precision", precision,
+                        {{"double", Precision::float64}, {"float", Precision::float32}},
+                        "of the computation");
+  command.add_flag_callback(
+      "--no-rescale", [&rescale] { rescale = false; },
+      "take the model's numbers raw at rates other than 44100 Hz");
+}
 
 void add_play(CLI::App& app, PlayOptions& options, int& code) {
   CLI::App* command = app.add_subcommand("play", "plays a model or a preset");
@@ -54,12 +90,7 @@ void add_play(CLI::App& app, PlayOptions& options, int& code) {
   command->add_option("-z,--period", options.device.period_frames, "frames; JACK has its own")
       ->check(CLI::Range(16, 8192))
       ->capture_default_str();
-  static std::map<std::string, Precision> precisions{{"double", Precision::float64},
-                                                     {"float", Precision::float32}};
-  command->add_option("--precision", options.precision, "double or float")
-      ->transform(CLI::CheckedTransformer(precisions));
-  command->add_flag("!--no-rescale", options.rescale,
-                    "take the model's numbers raw at rates other than 44100 Hz");
+  add_numbers(*command, options.precision, options.rescale);
   command->add_flag("-i,--no-console", options.no_console, "do not read commands");
   command->add_option("-e,--execute", options.script, "a file of console commands, run first");
   command
@@ -106,20 +137,15 @@ void add_render(CLI::App& app, RenderChoice& choice, int& code) {
   command->add_option("--input", options.input, "a WAV file; its channel n drives input n");
   command->add_option("--score", options.score, "a file of events");
   command->add_option("--set", choice.settings, "NAME=VALUE, a parameter from the start");
-  static std::map<std::string, SampleFormat> formats{{"float", SampleFormat::float32},
-                                                     {"double", SampleFormat::float64},
-                                                     {"pcm24", SampleFormat::pcm24}};
-  command->add_option("--format", options.format, "float, double or pcm24")
-      ->transform(CLI::CheckedTransformer(formats));
-  static std::map<std::string, Precision> precisions{{"double", Precision::float64},
-                                                     {"float", Precision::float32}};
-  command->add_option("--precision", options.precision, "of the computation: double or float")
-      ->transform(CLI::CheckedTransformer(precisions));
+  add_choice(*command, "--format", options.format,
+             {{"float", SampleFormat::float32},
+              {"double", SampleFormat::float64},
+              {"pcm24", SampleFormat::pcm24}},
+             "of the file's samples");
+  add_numbers(*command, options.precision, options.rescale);
   command->add_option("-p,--voices", options.voices, "how many notes sound at once")
       ->check(CLI::Range(1, max_voices));
   command->add_flag("--limit", options.limit, "keep below full scale, 1 ms late");
-  command->add_flag("!--no-rescale", options.rescale,
-                    "take the model's numbers raw at rates other than 44100 Hz");
   command->add_flag("-q,--quiet", choice.is_quiet, "say nothing unless something is wrong");
   command->callback([&choice, seconds, frames, &code] {
     if (seconds->count() > 0) {
@@ -149,7 +175,8 @@ int main(int argc, char** argv) {
       "'ressort COMMAND --help' tells more of each command.\n"
       "Exit codes: 0 done, 1 our failure, 2 wrong use or unreadable input, 75 no audio.");
   app.set_version_flag("-V,--version", "ressort " RESSORT_VERSION);
-  app.require_subcommand(1);
+  app.name("ressort");
+  app.require_subcommand(0, 1);
   int code = exit_code::done;
   PlayOptions play_options;
   RenderChoice render_choice;
@@ -169,6 +196,10 @@ int main(int argc, char** argv) {
   } catch (const std::exception& error) {
     std::fprintf(stderr, "ressort: %s\n", error.what());
     return exit_code::our_failure;
+  }
+  if (app.get_subcommands().empty()) {
+    std::fprintf(stderr, "%s", app.help().c_str());
+    return exit_code::wrong_use;
   }
   return code;
 }

@@ -12,6 +12,7 @@
 #include <array>
 #include <cerrno>
 #include <cmath>
+#include <cstdlib>
 #include <cstring>
 #include <ctime>
 #include <limits>
@@ -125,13 +126,6 @@ class TagClock {
 
 using Message = std::unique_ptr<void, decltype(&lo_message_free)>;
 
-template <class T>
-double number_at(const lo_arg* argument) {
-  T value;
-  std::memcpy(&value, argument, sizeof value);  // liblo aligns nothing to 8 bytes
-  return static_cast<double>(value);
-}
-
 // What a message says; nothing where an argument is neither a number nor a text.
 std::optional<Call> read_call(std::span<const std::uint8_t> bytes) {
   // liblo copies the bytes before it turns them; it only lacks the const.
@@ -143,34 +137,19 @@ std::optional<Call> read_call(std::span<const std::uint8_t> bytes) {
   }
   Call call{reinterpret_cast<const char*>(bytes.data()), {}};
   const char* const types = lo_message_get_types(message.get());
-  const lo_arg* const* const values = lo_message_get_argv(message.get());
+  lo_arg** const values = lo_message_get_argv(message.get());
   const int count = lo_message_get_argc(message.get());
   for (int i = 0; i < count; ++i) {
-    switch (types[i]) {
-      case LO_INT32:
-        call.arguments.emplace_back(number_at<std::int32_t>(values[i]));
-        break;
-      case LO_INT64:
-        call.arguments.emplace_back(number_at<std::int64_t>(values[i]));
-        break;
-      case LO_FLOAT:
-        call.arguments.emplace_back(number_at<float>(values[i]));
-        break;
-      case LO_DOUBLE:
-        call.arguments.emplace_back(number_at<double>(values[i]));
-        break;
-      case LO_TRUE:
-        call.arguments.emplace_back(1.0);
-        break;
-      case LO_FALSE:
-        call.arguments.emplace_back(0.0);
-        break;
-      case LO_STRING:
-      case LO_SYMBOL:
-        call.arguments.emplace_back(std::string(reinterpret_cast<const char*>(values[i])));
-        break;
-      default:
-        return std::nullopt;
+    const auto type = static_cast<lo_type>(types[i]);
+    if (lo_is_numerical_type(type)) {
+      // liblo reads it: it keeps nothing aligned to 8 bytes.
+      call.arguments.emplace_back(static_cast<double>(lo_hires_val(type, values[i])));
+    } else if (lo_is_string_type(type)) {
+      call.arguments.emplace_back(std::string(reinterpret_cast<const char*>(values[i])));
+    } else if (type == LO_TRUE || type == LO_FALSE) {
+      call.arguments.emplace_back(type == LO_TRUE ? 1.0 : 0.0);
+    } else {
+      return std::nullopt;
     }
   }
   return call;
@@ -256,9 +235,14 @@ class Outlet {
       socket_ = -1;
     }
   }
+  // False when enough are waiting already.
   bool begin_load() {
     const std::lock_guard lock(mutex_);
-    return loads_waiting_ < max_loads_waiting && ++loads_waiting_ > 0;
+    if (loads_waiting_ >= max_loads_waiting) {
+      return false;
+    }
+    ++loads_waiting_;
+    return true;
   }
   void end_load() {
     const std::lock_guard lock(mutex_);

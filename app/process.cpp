@@ -51,6 +51,7 @@ Process::Process(double rate_hz, bool limit)
   pending_.reserve(max_events);
   due_.reserve(max_events);
   matching_.reserve(max_events);
+  meters.limited.set(1.0);
   set_rate(rate_hz);
 }
 

@@ -1,6 +1,73 @@
-// The test program's main, the same for Catch2 version 2 and 3.
+// The test program's main, the same for Catch2 version 2 and 3, and its heap, which counts.
 #define CATCH_CONFIG_RUNNER
+#include <cstdlib>
+#include <new>
+
 #include "tests/catch.h"
+#include "tests/rig.h"
+
+namespace ressort::rig {
+namespace {
+thread_local bool is_watched = false;
+thread_local std::size_t calls_counted = 0;
+}  // namespace
+
+HeapWatch::HeapWatch() {
+  calls_counted = 0;
+  is_watched = true;
+}
+HeapWatch::~HeapWatch() {
+  is_watched = false;
+}
+std::size_t HeapWatch::calls() const {
+  return calls_counted;
+}
+
+}  // namespace ressort::rig
+
+namespace {
+
+void* allocate(std::size_t size, std::size_t alignment) {
+  using namespace ressort::rig;
+  calls_counted += is_watched ? 1 : 0;
+  const std::size_t rounded = (std::max<std::size_t>(size, 1) + alignment - 1) / alignment;
+  void* const memory = alignment <= alignof(std::max_align_t)
+                           ? std::malloc(std::max<std::size_t>(size, 1))
+                           : std::aligned_alloc(alignment, rounded * alignment);
+  if (memory == nullptr) {
+    throw std::bad_alloc();
+  }
+  return memory;
+}
+
+void release(void* memory) {
+  using namespace ressort::rig;
+  calls_counted += is_watched && memory != nullptr ? 1 : 0;
+  std::free(memory);
+}
+
+}  // namespace
+
+// Not inlined: the compiler would warn of every malloc that it sees meet a delete.
+#define NOT_INLINED __attribute__((noinline))
+NOT_INLINED void* operator new(std::size_t size) {
+  return allocate(size, 1);
+}
+NOT_INLINED void* operator new(std::size_t size, std::align_val_t alignment) {
+  return allocate(size, static_cast<std::size_t>(alignment));
+}
+NOT_INLINED void operator delete(void* memory) noexcept {
+  release(memory);
+}
+NOT_INLINED void operator delete(void* memory, std::size_t) noexcept {
+  release(memory);
+}
+NOT_INLINED void operator delete(void* memory, std::align_val_t) noexcept {
+  release(memory);
+}
+NOT_INLINED void operator delete(void* memory, std::size_t, std::align_val_t) noexcept {
+  release(memory);
+}
 
 int main(int argc, char** argv) {
   return Catch::Session().run(argc, argv);

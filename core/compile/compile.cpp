@@ -212,6 +212,9 @@ Result<Control> make_control(const Network& network, const ControlSetting& setti
                                            std::to_string(network.inputs.size()));
   }
   control.target = static_cast<std::uint16_t>(target);
+  if (to_parameter && control.source == Source::audio) {
+    return preset_error(setting.place, "an audio channel drives an input, not a parameter");
+  }
   if (!to_parameter) {
     const bool is_force = network.inputs[static_cast<std::size_t>(target)].is_force;
     const bool wants_force = control.gesture == Gesture::impulse;

@@ -33,6 +33,7 @@ struct Voice {
   double factor = 1.0;        // on every stiffness
   double gain = 1.0;
   double gain_step = 0.0;     // per sample
+  double peak = 0.0;          // of the network's output since the last settling
   double level = 0.0;         // peak of the output, slowly forgotten
   std::size_t quiet_frames = 0;
 };
@@ -41,9 +42,15 @@ struct Voice {
 template <class T>
 struct Bank {
   Bank(const Program& program, std::size_t lanes)
-      : groups((lanes + lane_count<T> - 1) / lane_count<T>, State<T>(program)),
-        drive(max_segment_frames * program.inputs.size()),
-        outputs(max_segment_frames * program.outputs.size()) {}
+      : drive(max_segment_frames * program.inputs.size()),
+        outputs(max_segment_frames * program.outputs.size()) {
+    // One by one: a copy would not have the room that a State reserves for its ramps.
+    const std::size_t count = (lanes + lane_count<T> - 1) / lane_count<T>;
+    groups.reserve(count);
+    while (groups.size() < count) {
+      groups.emplace_back(program);
+    }
+  }
 
   std::size_t lanes() const { return groups.size() * lane_count<T>; }
 
@@ -112,6 +119,7 @@ struct Engine::Voices {
     changes.reserve(max_changes);
     told.reserve(max_changes);
     start(0, 0.0);
+    voices[0].level = 0.0;  // no note: the first one may take its place
   }
 
   std::size_t lanes_wanted() const {
@@ -303,7 +311,7 @@ struct Engine::Voices {
       }
     }
     if (live >= static_cast<std::size_t>(std::max(1, playing.voices))) {
-      ++stolen;
+      stolen += voices[quietest].level > quiet_level ? 1 : 0;
       fade(quietest, steal_fade_s);
     }
     // A reserve lane is free unless several voices were stolen within one fade; then the one
@@ -516,6 +524,15 @@ struct Engine::Voices {
     listen(inputs, at, frames);
     std::visit([&](auto& b) { segment_in(b, inputs, outputs, at, frames); }, bank);
     remember_audio(inputs, at + frames);
+    since_settled += frames;
+    if (since_settled == max_segment_frames) {
+      since_settled = 0;
+      for (std::size_t lane = 0; lane < voices.size(); ++lane) {
+        if (voices[lane].awake) {
+          settle(lane);
+        }
+      }
+    }
     if (playing.noise) {
       for (std::size_t n = at; n < at + frames; ++n) {
         for (double* const output : outputs) {
@@ -628,14 +645,19 @@ struct Engine::Voices {
         outputs[channel][at + n] += gain * static_cast<double>(b.outputs[n * channels + channel][i]);
       }
     }
-    settle(lane, peak * playing.gain * voice.gain, frames);
+    voice.peak = std::max(voice.peak, peak);
   }
 
-  // Keeps the voice's level and sends it to sleep when it has faded or come to rest.
-  void settle(std::size_t lane, double peak, std::size_t frames) {
+  // Keeps the voice's level and sends it to sleep when it has faded or come to rest. Once in
+  // max_segment_frames, counted from the engine's start: so what sleeps or gives way does not
+  // depend on how the time is cut into blocks.
+  void settle(std::size_t lane) {
     Voice& voice = voices[lane];
-    const auto span = static_cast<double>(frames);
-    voice.level = std::max(peak, voice.level * std::exp(-span / (level_memory_s * program.rate_hz)));
+    constexpr std::size_t frames = max_segment_frames;
+    const double peak = voice.peak * playing.gain * voice.gain;
+    voice.peak = 0.0;
+    voice.level = std::max(peak, voice.level * std::exp(-static_cast<double>(frames) /
+                                                        (level_memory_s * program.rate_hz)));
     if (voice.fading && voice.gain == 0.0) {
       voice = Voice{};
       return;
@@ -700,6 +722,7 @@ struct Engine::Voices {
   double bend = 0.0;
   std::array<bool, 16> pedal{};
   std::size_t last = 0;             // the lane that was played last: direct gestures act on it
+  std::size_t since_settled = 0;    // frames, below max_segment_frames between two segments
   std::uint64_t births = 0;
   std::uint64_t resets = 0;
   std::uint64_t stolen = 0;
@@ -722,7 +745,7 @@ void Engine::process(std::span<const Event> events, std::span<const double* cons
     while (next < events.size() && events[next].frame <= at) {
       voices_->handle(events[next++]);
     }
-    std::size_t end = std::min(frames, at + max_segment_frames);
+    std::size_t end = std::min(frames, at + max_segment_frames - voices_->since_settled);
     if (next < events.size()) {
       end = std::min<std::size_t>(end, events[next].frame);
     }
@@ -746,7 +769,7 @@ double Engine::rate_hz() const { return voices_->program.rate_hz; }
 EngineMeters Engine::meters() const {
   EngineMeters meters;
   for (const Voice& voice : voices_->voices) {
-    meters.voices += voice.awake && voice.level > quiet_level ? 1 : 0;
+    meters.voices += voice.awake && !voice.fading && voice.level > quiet_level ? 1 : 0;
   }
   meters.resets = voices_->resets;
   meters.stolen = voices_->stolen;

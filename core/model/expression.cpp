@@ -21,14 +21,15 @@ constexpr Function functions[] = {
 bool is_digit(char c) { return c >= '0' && c <= '9'; }
 bool is_letter(char c) { return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || c == '_'; }
 
-// The number that `text` starts with; `length` is 0 where it starts with none.
+// The number that `text` starts with, infinite where it is out of a double's range; `length` is 0
+// where it starts with none.
 double leading_number(std::string_view text, std::size_t& length) {
   double number = 0.0;
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);
-  length = error == std::errc{} && (is_digit(text[0]) || text[0] == '.')
+  length = error != std::errc::invalid_argument && (is_digit(text[0]) || text[0] == '.')
                ? static_cast<std::size_t>(end - text.data())
                : 0;
-  return number;
+  return error == std::errc{} ? number : HUGE_VAL;
 }
 
 // Recursive descent; every rule writes its steps and tracks how deep the stack would be.
@@ -113,7 +114,7 @@ class Parser {
     const double number = leading_number(text_.substr(at_), length);
     if (length > 0) {
       if (!std::isfinite(number)) {
-        return fail("the number is too large");
+        return fail("the number is too large or too small");
       }
       at_ += length;
       return push({Op::number, 0, number}, 1);

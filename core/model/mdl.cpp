@@ -64,6 +64,7 @@ constexpr Keyword keywords[] = {
 };
 
 constexpr std::size_t most_diagnostics = 100;
+constexpr std::size_t most_suggestions = 2000;  // names looked at; no suggestion is worth a wait
 
 struct Token {
   std::string_view text;
@@ -151,8 +152,8 @@ std::string suggestion(std::string_view word, const Names& names, std::string_vi
   }
   std::size_t looked_at = 0;
   for (std::string_view name : names) {
-    if (++looked_at > 2000) {
-      break;  // a suggestion is not worth the wait
+    if (++looked_at > most_suggestions) {
+      break;
     }
     const std::size_t far = distance(word, name);
     if (far < least) {
@@ -399,7 +400,6 @@ void Reader::add_link(const Line& line) {
   const auto a = reference(line, 0);
   const auto b = reference(line, 1);
   for (std::size_t i = 2; i < line.rest.size(); ++i) {
-    const ArgumentId id = argument(line, i);
     const std::size_t slot = static_cast<std::size_t>(line.keyword->first) + i - 2;
     if (link.kind == LinkKind::bow && slot == 2) {
       // The profile is a choice, not a quantity that could be turned while playing.
@@ -409,7 +409,7 @@ void Reader::add_link(const Line& line) {
       }
       link.kind = smooth > 0.0 ? LinkKind::smooth_bow : LinkKind::bow;
     } else {
-      link.arguments[slot] = id;
+      link.arguments[slot] = argument(line, i);
     }
   }
   shows_velocity_ |= (link.kind == LinkKind::contact && line.rest.size() == 4) ||
@@ -535,10 +535,11 @@ std::optional<std::uint32_t> Reader::reference(const Line& line, std::size_t at)
     return found->second;
   }
   std::vector<std::string_view> names;
-  for (const auto& [label, index] : masses_) {
-    names.push_back(label);
+  for (const Line& other : lines_) {
+    if (names.size() < most_suggestions && masses_.contains(other.label.text)) {
+      names.push_back(other.label.text);
+    }
   }
-  std::sort(names.begin(), names.end());
   error(line, token,
         labels_.contains(name)
             ? quoted(token.text) + " is no mass, so nothing can be attached to it"

@@ -1,0 +1,119 @@
+#!/bin/sh
+# Bad input, as a person would give it: a clear sentence, the right exit code. And good input: the
+# same file from the same render. command_line.sh PROGRAM SOURCE_FOLDER
+set -u
+program=$1
+source=$2
+folder=$(mktemp -d)
+trap 'rm -rf "$folder"' EXIT
+cd "$folder" || exit 1
+export RESSORT_DATA="$source" JACK_DEFAULT_SERVER=ressort-nobody JACK_NO_START_SERVER=1
+failures=0
+
+# expect CODE TEXT COMMAND...: the exit code, and a text that must be in what is said.
+expect() {
+  code=$1
+  text=$2
+  shift 2
+  said=$(timeout 60 "$@" 2>&1 < /dev/null)
+  got=$?
+  if [ "$got" != "$code" ]; then
+    echo "FAILED: $* ended with $got instead of $code, saying: $said"
+    failures=$((failures + 1))
+  elif ! printf '%s' "$said" | grep -qF -- "$text"; then
+    echo "FAILED: $* did not say '$text' but: $said"
+    failures=$((failures + 1))
+  fi
+}
+
+model() { printf '%b' "$2" > "$1"; }
+
+# The command line itself.
+expect 2 "Subcommands:" "$program"
+expect 2 "nosuch" "$program" nosuch
+expect 0 "play" "$program" --help
+expect 0 "/note/on" "$program" render --help
+expect 2 "--osc-port" "$program" play -u 99999999
+
+# Files.
+expect 2 "there is no model or preset 'nosuch.mdl'" "$program" check nosuch.mdl
+expect 2 "is a folder" "$program" check "$folder"
+: > empty.mdl
+expect 2 "empty.mdl:1:1: error: the model is empty" "$program" check empty.mdl
+head -c 3000 /dev/urandom > binary.mdl
+printf '\0' >> binary.mdl
+expect 2 "this is no text" "$program" check binary.mdl
+head -c 52428800 /dev/zero > large.mdl
+expect 2 "at most 32 MiB" "$program" check large.mdl
+
+# Texts, with file, line and column.
+model word.mdl '@m mass 1. 0. 0.\n@r sprnig @m @m 0.1 0.1\n'
+expect 2 "word.mdl:2:4: error: unknown keyword 'sprnig'; did you mean 'spring'?" \
+  "$program" check word.mdl
+model count.mdl '@m mass 1. 0.\n'
+expect 2 "count.mdl:1:14: error: 'mass' takes 3 arguments (M POSITION VELOCITY), found 2" \
+  "$program" check count.mdl
+model name.mdl '@m0 mass 1. 0. 0.\n@r springDamper @m0 @m1 0.1 0.1\n'
+expect 2 "name.mdl:2:21: error: no mass is called '@m1'; did you mean '@m0'?" \
+  "$program" check name.mdl
+model number.mdl '@m mass 1. 0.x 0.\n'
+expect 2 "number.mdl:1:12: error: found '0.x' where a number was expected" \
+  "$program" check number.mdl
+model nan.mdl '@K param nan\n@m mass 1. 0. 0.\n'
+expect 2 "nan.mdl:1:10: error: found 'nan'" "$program" check nan.mdl
+model light.mdl '@m mass 0. 0. 0.\n'
+expect 2 "light.mdl:1:9: error: a mass must be above 0" "$program" check light.mdl
+expect 2 "error" "$program" check light.mdl --json
+
+# Presets.
+model broken.toml 'model = "PolyTriangle.mdl\n'
+expect 2 "broken.toml:1:" "$program" check broken.toml
+model key.toml 'model = "PolyTriangle.mdl"\nvoicse = 3\n'
+expect 2 "key.toml:2:10: error: unknown key 'voicse'" "$program" check key.toml
+model far.toml 'model = "PolyTriangle.mdl"\nvoices = 1000\n'
+expect 2 "'voices' must lie between 1 and 256" "$program" check far.toml
+model target.toml 'model = "PolyTriangle.mdl"\n[[control]]\nfrom = "cc1"\nto = "m_Q"\n'
+expect 2 "the model has no parameter 'm_Q'; it has m_K, m_Z" "$program" check target.toml
+model lost.toml 'model = "nosuch.mdl"\n'
+expect 2 "lost.toml:1:1: error: the model 'nosuch.mdl'" "$program" check lost.toml
+
+# Rendering.
+expect 2 "there is no file 'nosuch.wav'" \
+  "$program" render PolyTriangle -o out.wav --input nosuch.wav
+expect 2 "cannot be written" "$program" render PolyTriangle -o no/such/folder/out.wav
+model bad.score '0.0 /note/on 60 100\nsoon /note/off 60\n'
+expect 2 "bad.score:2:1: error: found 'soon' where a time" \
+  "$program" render PolyTriangle -o out.wav --score bad.score
+model wrong.score '0.0 /in/7/force 1\n'
+expect 2 "wrong.score:1:1: error: /in/7/force" \
+  "$program" render PolyTriangle -o out.wav --score wrong.score
+expect 2 "the preset keeps 'm_K' between" \
+  "$program" render PolyTriangle -o out.wav --set m_K=7
+model wild.mdl '@s ground 0.\n@m mass 1. 1. 1.\n@r spring @s @m 5.\n@out1 posOutput @m\n'
+expect 0 "became unstable" "$program" render wild.mdl -o wild.wav --seconds 1
+
+# Playing without what it needs.
+expect 75 "no JACK server answers to the name 'ressort-nobody'" "$program" play -a jack -i
+expect 75 "does not open" "$program" play -a alsa -d nosuchdevice -i
+expect 2 "there is no model or preset 'nosuch'" "$program" play nosuch -a dummy -i
+"$program" play PolyTriangle -a dummy -m none -i -u 19778 > first.log 2>&1 &
+first=$!
+for _ in 1 2 3 4 5 6 7 8 9 10; do
+  grep -q "OSC on" first.log && break
+  sleep 0.2
+done
+expect 1 "port 19778 of 127.0.0.1 is taken" "$program" play -a dummy -m none -i -u 19778
+kill -TERM "$first"
+wait "$first"
+[ $? = 0 ] || { echo "FAILED: SIGTERM did not end the program with 0"; failures=$((failures + 1)); }
+
+# The same render gives the same file, and a phrase that can be heard.
+expect 0 "peak" "$program" render IPlayTheTriangle -o one.wav
+expect 0 "peak" "$program" render IPlayTheTriangle -o two.wav
+cmp -s one.wav two.wav || { echo "FAILED: two renders differ"; failures=$((failures + 1)); }
+for preset in "$source"/presets/*.toml; do
+  expect 0 "peak -" "$program" render "$preset" --limit -o phrase.wav --seconds 1
+done
+
+[ "$failures" = 0 ] && echo "all as expected"
+exit "$((failures > 0))"

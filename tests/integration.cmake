@@ -1,0 +1,29 @@
+# The whole program against real servers. These share one JACK server name and one audio clock, so
+# they run one after the other.
+add_library(rtspy MODULE rtspy.cpp)
+target_compile_options(rtspy PRIVATE -Wno-conversion -Wno-nonnull-compare)
+target_link_libraries(rtspy PRIVATE PkgConfig::JACK ${CMAKE_DL_LIBS})
+
+add_executable(ressort_stage_tests main.cpp stage_test.cpp)
+target_link_libraries(ressort_stage_tests PRIVATE PkgConfig::JACK PkgConfig::LIBLO Threads::Threads)
+target_compile_definitions(ressort_stage_tests PRIVATE
+  RESSORT_PROGRAM="$<TARGET_FILE:ressort>" RESSORT_SPY="$<TARGET_FILE:rtspy>")
+target_include_directories(ressort_stage_tests PRIVATE ${CMAKE_SOURCE_DIR})
+if(TARGET Catch2::Catch2)
+  target_link_libraries(ressort_stage_tests PRIVATE Catch2::Catch2)
+endif()
+add_dependencies(ressort_stage_tests ressort rtspy)
+
+# A sanitizer brings its own malloc, which the spy cannot stand in for.
+set(stage_tags jack_midi osc_time rtmidi alsa server_loss)
+if(NOT RESSORT_ADDRESS_SANITIZER AND NOT RESSORT_THREAD_SANITIZER)
+  list(APPEND stage_tags callback)
+endif()
+foreach(tag IN LISTS stage_tags)
+  add_test(NAME stage_${tag} COMMAND ressort_stage_tests "[${tag}]")
+  set_tests_properties(stage_${tag} PROPERTIES TIMEOUT 240 LABELS stage RUN_SERIAL TRUE)
+endforeach()
+
+add_test(NAME command_line COMMAND ${CMAKE_CURRENT_SOURCE_DIR}/command_line.sh
+  $<TARGET_FILE:ressort> ${CMAKE_SOURCE_DIR})
+set_tests_properties(command_line PROPERTIES TIMEOUT 240 LABELS stage RUN_SERIAL TRUE)

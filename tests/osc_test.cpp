@@ -1,0 +1,638 @@
+#include "app/osc.h"
+
+#include <arpa/inet.h>
+#include <netinet/in.h>
+#include <poll.h>
+#include <sys/socket.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <cmath>
+#include <cstdlib>
+#include <ctime>
+#include <filesystem>
+#include <fstream>
+#include <random>
+#include <variant>
+
+#include "app/audio.h"
+#include "app/osc_packet.h"
+#include "tests/catch.h"
+
+namespace ressort {
+namespace {
+
+using Bytes = std::vector<std::uint8_t>;
+using Value = std::variant<std::int32_t, float, double, std::string>;
+
+constexpr double rate_hz = 48000.0;
+constexpr std::size_t period = 256;
+
+// --- packets, made and read without liblo -------------------------------------------------------
+
+void put(Bytes& bytes, std::uint64_t value, int size) {
+  for (int shift = 8 * (size - 1); shift >= 0; shift -= 8) {
+    bytes.push_back(static_cast<std::uint8_t>(value >> shift));
+  }
+}
+
+void put(Bytes& bytes, std::string_view text) {
+  bytes.insert(bytes.end(), text.begin(), text.end());
+  bytes.resize(bytes.size() / 4 * 4 + 4);
+}
+
+void put(Bytes& bytes, const Value& value) {
+  if (const auto* const whole = std::get_if<std::int32_t>(&value)) {
+    put(bytes, static_cast<std::uint32_t>(*whole), 4);
+  } else if (const auto* const real = std::get_if<float>(&value)) {
+    put(bytes, std::bit_cast<std::uint32_t>(*real), 4);
+  } else if (const auto* const precise = std::get_if<double>(&value)) {
+    put(bytes, std::bit_cast<std::uint64_t>(*precise), 8);
+  } else {
+    put(bytes, std::string_view(std::get<std::string>(value)));
+  }
+}
+
+Bytes message(std::string_view address, const std::vector<Value>& values = {}) {
+  Bytes bytes;
+  put(bytes, address);
+  std::string tags = ",";
+  for (const Value& value : values) {
+    tags += "ifds"[value.index()];
+  }
+  put(bytes, std::string_view(tags));
+  for (const Value& value : values) {
+    put(bytes, value);
+  }
+  return bytes;
+}
+
+Bytes bundle(std::uint64_t time_tag, const std::vector<Bytes>& elements) {
+  Bytes bytes;
+  put(bytes, std::string_view("#bundle"));
+  put(bytes, time_tag, 8);
+  for (const Bytes& element : elements) {
+    put(bytes, element.size(), 4);
+    bytes.insert(bytes.end(), element.begin(), element.end());
+  }
+  return bytes;
+}
+
+struct Answer {
+  std::string address;
+  std::vector<Value> values;
+  const std::string& text(std::size_t i) const { return std::get<std::string>(values.at(i)); }
+};
+
+Answer read_answer(const Bytes& bytes) {
+  const auto text_at = [&](std::size_t& at) {
+    const std::string text(reinterpret_cast<const char*>(bytes.data() + at));
+    at += text.size() / 4 * 4 + 4;
+    return text;
+  };
+  const auto number_at = [&](std::size_t& at, std::size_t size) {
+    std::uint64_t value = 0;
+    for (std::size_t end = at + size; at < end; ++at) {
+      value = value << 8 | bytes.at(at);
+    }
+    return value;
+  };
+  std::size_t at = 0;
+  Answer answer{text_at(at), {}};
+  for (const char tag : text_at(at).substr(1)) {
+    if (tag == 's') {
+      answer.values.emplace_back(text_at(at));
+    } else if (tag == 'd') {
+      answer.values.emplace_back(std::bit_cast<double>(number_at(at, 8)));
+    } else if (const auto word = static_cast<std::uint32_t>(number_at(at, 4)); tag == 'f') {
+      answer.values.emplace_back(std::bit_cast<float>(word));
+    } else {
+      answer.values.emplace_back(static_cast<std::int32_t>(word));
+    }
+  }
+  return answer;
+}
+
+// --- a client, and a process that the test drives -----------------------------------------------
+
+class Client {
+ public:
+  explicit Client(int port) : socket_(socket(AF_INET, SOCK_DGRAM, 0)) {
+    sockaddr_in server{};
+    server.sin_family = AF_INET;
+    server.sin_port = htons(static_cast<std::uint16_t>(port));
+    server.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+    REQUIRE(connect(socket_, reinterpret_cast<const sockaddr*>(&server), sizeof server) == 0);
+  }
+  ~Client() { close(socket_); }
+
+  void send(const Bytes& bytes) {
+    REQUIRE(::send(socket_, bytes.data(), bytes.size(), 0) == static_cast<ssize_t>(bytes.size()));
+  }
+
+  // The next answer; nothing after a wait that is far longer than any answer takes.
+  std::optional<Answer> receive(int most_ms = 20000) {
+    pollfd wait{socket_, POLLIN, 0};
+    if (poll(&wait, 1, most_ms) != 1) {
+      return std::nullopt;
+    }
+    Bytes bytes(max_osc_packet_bytes);
+    const ssize_t size = recv(socket_, bytes.data(), bytes.size(), 0);
+    if (size <= 0) {
+      return std::nullopt;
+    }
+    bytes.resize(static_cast<std::size_t>(size));
+    REQUIRE(check_packet(bytes));  // we speak as strictly as we listen
+    return read_answer(bytes);
+  }
+
+  Answer ask(const Bytes& bytes) {
+    send(bytes);
+    const auto answer = receive();
+    REQUIRE(answer);
+    return *answer;
+  }
+
+  // Waits until the server has done everything that was sent; gives back what it said before.
+  std::vector<Answer> sync() {
+    std::vector<Answer> before;
+    for (int tries = 0; tries < 40; ++tries) {  // what is sent into a full buffer is lost
+      send(message("/status"));
+      while (auto answer = receive(500)) {
+        if (answer->address == "/status.reply") {
+          return before;
+        }
+        before.push_back(*std::move(answer));
+      }
+    }
+    FAIL("the server does not answer");
+    return before;
+  }
+
+ private:
+  int socket_;
+};
+
+class TemporaryFile {
+ public:
+  explicit TemporaryFile(std::string_view text)
+      : path_(std::filesystem::temp_directory_path() /
+              ("ressort_osc_test_" + std::to_string(getpid()) + ".mdl")) {
+    std::ofstream(path_) << text;
+  }
+  ~TemporaryFile() { std::filesystem::remove(path_); }
+  std::string path() const { return path_.string(); }
+
+ private:
+  std::filesystem::path path_;
+};
+
+std::unique_ptr<OscServer> open_server(Process& process, Session& session) {
+  auto server = OscServer::open({.port = 0}, process, session);
+  REQUIRE(server);
+  return *std::move(server);
+}
+
+// Two masses that a push moves at once and that are still again long before the next.
+struct Rig {
+  TemporaryFile model{
+      "@m_K param 0.02\n"
+      "@m_Z param 0.2\n"
+      "@m_a osc 1. m_K m_Z 0. 0.\n"
+      "@m_b osc 1. 0.02 0.2 0. 0.\n"
+      "@in1 frcInput @m_a\n"
+      "@in2 frcInput @m_b\n"
+      "@out1 posOutput @m_a\n"
+      "@out2 posOutput @m_b\n"};
+  Process process{rate_hz, false};
+  Session session{process, {.compile = {.rate_hz = rate_hz, .bare = true}}, {}};
+  bool is_loaded = static_cast<bool>(session.load_and_wait(model.path()));
+  std::unique_ptr<OscServer> server = open_server(process, session);
+  Client client{server->port()};
+
+  // An hour ahead, so that however slow this machine is, the process is never behind its time.
+  std::int64_t start_ns = monotonic_ns() + 3600'000'000'000;
+  std::array<std::vector<float>, 2> sound;
+
+  Rig() { REQUIRE(is_loaded); }
+
+  std::int64_t time_ns(std::int64_t frame) const { return start_ns + frame * 62500 / 3; }
+
+  void drive(std::size_t blocks, std::int64_t jitter_ns = 0) {
+    for (std::size_t i = 0; i < blocks; ++i) {
+      const std::size_t at = sound[0].size();
+      std::array<float*, 2> outputs{};
+      for (std::size_t c = 0; c < 2; ++c) {
+        sound[c].resize(at + period);
+        outputs[c] = sound[c].data() + at;
+      }
+      process.block(std::span<const float* const>{}, std::span<float* const>(outputs), period, {},
+                    time_ns(static_cast<std::int64_t>(at)) + jitter_ns);
+    }
+  }
+
+  // The time tag for a moment of the driven clock.
+  std::uint64_t tag(std::int64_t time_ns) const {
+    const std::int64_t wall_ns = time_ns + wall_offset_ns;
+    return (static_cast<std::uint64_t>(wall_ns / 1'000'000'000 + 2208988800) << 32) +
+           (static_cast<std::uint64_t>(wall_ns % 1'000'000'000) << 32) / 1'000'000'000;
+  }
+  std::int64_t wall_offset_ns = [] {
+    timespec wall{};
+    clock_gettime(CLOCK_REALTIME, &wall);
+    return wall.tv_sec * 1'000'000'000 + wall.tv_nsec - monotonic_ns();
+  }();
+
+  // The frames where a channel begins to sound after a silence.
+  std::vector<std::int64_t> onsets(std::size_t channel) const {
+    std::vector<std::int64_t> frames;
+    std::size_t still = period;
+    for (std::size_t n = 0; n < sound[channel].size(); ++n) {
+      const bool sounds = std::fabs(sound[channel][n]) > 1e-6f;
+      if (sounds && still >= period) {
+        frames.push_back(static_cast<std::int64_t>(n));
+      }
+      still = sounds ? 0 : still + 1;
+    }
+    return frames;
+  }
+};
+
+bool has(const Answer& answer, std::string_view address, std::string_view about,
+         std::string_view part) {
+  return answer.address == address && answer.text(0) == about &&
+         std::get<std::string>(answer.values.back()).find(part) != std::string::npos;
+}
+
+// --- the check ----------------------------------------------------------------------------------
+
+Bytes raw(std::string_view text) {
+  return Bytes(text.begin(), text.end());
+}
+
+#define RAW(literal) raw(std::string_view(literal, sizeof(literal) - 1))
+
+TEST_CASE("check_packet gives the messages of good packets") {
+  const Bytes single = RAW("/a\0\0,i\0\0\0\0\0\7");
+  const auto one = check_packet(single);
+  REQUIRE(one);
+  REQUIRE(one->size() == 1);
+  CHECK(one->front().bytes.size() == 12);
+  CHECK(one->front().time_tag == 1);
+
+  CHECK(check_packet(RAW("/abc\0\0\0\0,\0\0\0")));
+  CHECK(check_packet(RAW("/a\0\0,TFNI\0\0\0")));
+  CHECK(
+      check_packet(RAW("/a\0\0,hdt\0\0\0\0"
+                       "12345678abcdefgh\0\0\0\0\0\0\0\1")));
+  CHECK(check_packet(RAW("/a\0\0,sSb\0\0\0\0text\0\0\0\0abc\0\0\0\0\5hello\0\0\0")));
+  CHECK(check_packet(RAW("/a\0\0,crm\0\0\0\0\0\0\0xRGBA\1\2\3\4")));
+  CHECK(check_packet(RAW("/a\0\0,b\0\0\0\0\0\0")));
+
+  const auto empty = check_packet(bundle(5, {}));
+  REQUIRE(empty);
+  CHECK(empty->empty());
+
+  const Bytes outer =
+      bundle(5, {message("/a"), bundle(7, {message("/b", {1, 2.5f})}), message("/c")});
+  const auto nested = check_packet(outer);
+  REQUIRE(nested);
+  REQUIRE(nested->size() == 3);
+  CHECK((*nested)[0].time_tag == 5);
+  CHECK((*nested)[1].time_tag == 7);
+  CHECK((*nested)[2].time_tag == 5);
+  CHECK((*nested)[2].bytes[1] == 'c');
+}
+
+TEST_CASE("check_packet refuses every kind of bad packet") {
+  const auto refused = [](const Bytes& bytes, std::string_view because) {
+    const auto result = check_packet(bytes);
+    INFO(because);
+    REQUIRE_FALSE(result);
+    INFO(result.error().message);
+    CHECK(result.error().message.find(because) != std::string::npos);
+  };
+  refused({}, "not 0");
+  refused(RAW("/a\0\0,\0\0"), "multiple of 4");
+  refused(Bytes(max_osc_packet_bytes + 1), "at most 65507 bytes");
+  refused(RAW("abc\0,\0\0\0"), "begin with '/'");
+  refused(RAW("\0\0\0\0,\0\0\0"), "begin with '/'");
+  refused(RAW("/\x7f\0\0,\0\0\0"), "printable");
+  refused(RAW("/\xc3\xa4\0,\0\0\0"), "printable");
+  refused(RAW("/abc"), "an address does not end");
+  refused(RAW("/a\0x,\0\0\0"), "an address is not padded");
+  refused(RAW("/a\0\0"), "no type tags");
+  refused(RAW("/a\0\0i\0\0\0\0\0\0\0"), "begin with ','");
+  refused(RAW("/a\0\0,iii"), "a type tag string does not end");
+  refused(RAW("/a\0\0,\0\0i"), "a type tag string is not padded");
+  refused(RAW("/a\0\0,[]\0"), "none of");
+  refused(RAW("/a\0\0,i\0\0"), "fewer arguments");
+  refused(RAW("/a\0\0,d\0\0\0\0\0\0"), "fewer arguments");
+  refused(RAW("/a\0\0,\0\0\0\0\0\0\0"), "more bytes");
+  refused(RAW("/a\0\0,s\0\0abcd"), "a string argument does not end");
+  refused(RAW("/a\0\0,s\0\0a\0\0x"), "a string argument is not padded");
+  refused(RAW("/a\0\0,b\0\0"), "a blob's size is missing");
+  refused(RAW("/a\0\0,b\0\0\0\0\0\5abcd"), "a blob is longer");
+  refused(RAW("/a\0\0,b\0\0\xff\xff\xff\xff"), "a blob is longer");
+  refused(RAW("/a\0\0,b\0\0\0\0\0\1axxx"), "a blob is not padded");
+  refused(RAW("#bundl\0\0\0\0\0\0\0\0\0\1"), "#bundle");
+  refused(RAW("#bundle\0\0\0\0\1"), "#bundle");
+  refused(RAW("#bundle\0\0\0\0\0\0\0\0\1\0\0\0\0"), "not 0");
+  refused(RAW("#bundle\0\0\0\0\0\0\0\0\1\0\0\0\6/a\0\0,\0\0\0"), "multiple of 4");
+  refused(RAW("#bundle\0\0\0\0\0\0\0\0\1\0\0\0\x0c/a\0\0,\0\0\0"), "longer than the bundle");
+  refused(RAW("#bundle\0\0\0\0\0\0\0\0\1\xff\xff\xff\xfc"), "longer than the bundle");
+  refused(bundle(1, {message("/a"), RAW("/b\0\0")}), "no type tags");
+
+  Bytes deep = message("/a");
+  for (int depth = 0; depth < max_osc_bundle_depth; ++depth) {
+    deep = bundle(1, {deep});
+  }
+  CHECK(check_packet(deep));
+  refused(bundle(1, {deep}), "depth");
+}
+
+// --- the server ---------------------------------------------------------------------------------
+
+TEST_CASE("a parameter is set and asked for over OSC") {
+  Rig rig;
+  Client& client = rig.client;
+  CHECK(std::get<float>(client.ask(message("/param/m_K")).values.at(0)) == 0.02f);
+  client.send(message("/param/m_K", {0.03}));
+  const Answer one = client.ask(message("/param/m_K"));
+  CHECK(one.address == "/param/m_K");
+  CHECK(std::get<float>(one.values.at(0)) == 0.03f);
+
+  client.send(message("/param/m_[KZ]", {0.025f}));
+  client.send(message("/param/*"));
+  const auto all = client.sync();
+  REQUIRE(all.size() == 2);
+  CHECK(all[0].address == "/param/m_K");
+  CHECK(all[1].address == "/param/m_Z");
+  CHECK(std::get<float>(all[1].values.at(0)) == 0.025f);
+
+  CHECK(has(client.ask(message("/param/none")), "/error", "/param/none", "no such parameter"));
+  CHECK(has(client.ask(message("/param/none", {1})), "/error", "/param/none", "m_K"));
+  CHECK(has(client.ask(message("/param/m_K", {"much"})), "/error", "/param/m_K", "number"));
+  CHECK(has(client.ask(message("/param/m_K", {std::nanf("")})), "/error", "/param/m_K", "number"));
+  CHECK(has(client.ask(RAW("/cc\0,b\0\0\0\0\0\0")), "/error", "/cc", "numbers"));
+  CHECK(has(client.ask(message("/nowhere")), "/error", "/nowhere", "unknown address"));
+  CHECK(has(client.ask(message("/" + std::string(300, 'a'))), "/error", "", "255"));
+}
+
+TEST_CASE("status and describe answer in full") {
+  Rig rig;
+  rig.drive(1);
+  const Answer status = rig.client.ask(message("/status"));
+  CHECK(status.address == "/status.reply");
+  REQUIRE(status.values.size() == 13);
+  CHECK(status.text(0).starts_with("ressort_osc_test_"));
+  CHECK(std::get<double>(status.values[6]) == rate_hz);
+  CHECK(std::get<std::int32_t>(status.values[7]) == static_cast<std::int32_t>(period));
+  CHECK(std::get<float>(status.values[9]) == -999.0f);
+
+  rig.client.send(message("/describe"));
+  auto rows = rig.client.sync();
+  REQUIRE_FALSE(rows.empty());
+  CHECK(rows.back().address == "/describe.end");
+  CHECK(std::get<std::int32_t>(rows.back().values.at(0)) == static_cast<int>(rows.size()) - 1);
+  rows.pop_back();
+  CHECK(rows.size() == addresses().size() + 2);
+  CHECK(has(rows[0], "/describe.reply", "/note/on", "note"));
+  CHECK(has(rows.back(), "/describe.reply", "/param/m_Z", "0.2 "));
+}
+
+TEST_CASE("the messages of a bundle act together") {
+  Rig rig;
+  rig.drive(1);
+  rig.client.send(bundle(1, {message("/in/1/force", {0.1}), message("/in/2/force", {0.1})}));
+  rig.client.sync();
+  rig.drive(4);
+  REQUIRE(rig.onsets(0).size() == 1);
+  CHECK(rig.onsets(0) == rig.onsets(1));
+
+  const auto tag = rig.tag(rig.time_ns(48000));
+  rig.client.send(bundle(
+      tag, {message("/note/on", {60, 100}), bundle(tag, {message("/note/on", {64.0, 90.0f})})}));
+  rig.client.sync();
+  TimedEvent first;
+  TimedEvent second;
+  REQUIRE(rig.process.from_osc.pop(first));
+  REQUIRE(rig.process.from_osc.pop(second));
+  CHECK(first.event.index == 60);
+  CHECK(first.following == 1);
+  CHECK(second.event.index == 64);
+  CHECK(second.following == 0);
+  CHECK(first.timing == TimedEvent::When::at_frame);
+  CHECK(second.timing == TimedEvent::When::at_frame);
+  CHECK(std::abs(first.when - 48000) < 48);  // the two clocks' offset is measured twice
+  CHECK(first.when == second.when);
+}
+
+TEST_CASE("time tags keep their distance to the frame") {
+  Rig rig;
+  CHECK(has(rig.client.ask(bundle(rig.tag(rig.time_ns(0)), {message("/panic")})), "/error",
+            "/panic", "no audio"));
+
+  // The distance is no whole number of blocks, and the audio thread is never quite in time.
+  constexpr std::int64_t distance = 31007;
+  constexpr std::uint64_t count = 24;
+  const std::uint64_t first_tag = rig.tag(rig.time_ns(9600) + 7777);
+  std::mt19937 random(1);
+  std::uniform_int_distribution<std::int64_t> jitter_ns(-2'000'000, 2'000'000);
+  for (std::uint64_t k = 0; k < count; ++k) {
+    const std::uint64_t offset = (k * distance << 32) / 48000;  // to the last bit of a tag
+    while (static_cast<std::int64_t>(rig.sound[0].size()) <
+           static_cast<std::int64_t>(k) * distance + 1) {
+      rig.drive(1, jitter_ns(random));
+    }
+    rig.client.send(bundle(first_tag + offset, {message("/in/1/force", {0.1})}));
+    CHECK(rig.client.sync().empty());
+  }
+  rig.drive(100);
+  const auto onsets = rig.onsets(0);
+  REQUIRE(onsets.size() == count);
+  CHECK(std::abs(onsets[0] - 9600) < 150);  // as exact as the first block's clock reading
+  for (std::size_t k = 1; k < count; ++k) {
+    CHECK(onsets[k] - onsets[k - 1] == distance);
+  }
+
+  // A time that has passed acts at once, and whoever asked for it hears of it.
+  const auto now = static_cast<std::int64_t>(rig.sound[0].size());
+  const auto late =
+      rig.client.ask(bundle(rig.tag(rig.time_ns(now - 24000)), {message("/in/1/force", {0.1})}));
+  CHECK(has(late, "/error", "/in/1/force", "late by 0."));
+  rig.drive(2);
+  CHECK(rig.onsets(0).back() == now);
+  CHECK(rig.process.meters.late.get() == 1);
+
+  CHECK(has(rig.client.ask(bundle(rig.tag(rig.time_ns(now + 11 * 48000)), {message("/panic")})),
+            "/error", "/panic", "s ahead"));
+}
+
+TEST_CASE("time tags follow the clock when the audio has stood still") {
+  Rig rig;
+  rig.drive(1);
+  rig.client.send(bundle(rig.tag(rig.time_ns(9600)), {message("/in/1/force", {0.1})}));
+  CHECK(rig.client.sync().empty());
+  rig.drive(50);
+  // Every block is 50 ms later than the frames before it say: 2400 frames fewer until a tag.
+  rig.drive(1, 50'000'000);
+  rig.client.send(bundle(rig.tag(rig.time_ns(24000)), {message("/in/1/force", {0.1})}));
+  CHECK(rig.client.sync().empty());
+  rig.drive(50, 50'000'000);
+  const auto onsets = rig.onsets(0);
+  REQUIRE(onsets.size() == 2);
+  CHECK(std::abs(onsets[0] - 9600) < 48);
+  CHECK(std::abs(onsets[1] - 21600) < 48);
+}
+
+TEST_CASE("a taken port and a wrong address are told apart") {
+  Rig rig;
+  const auto second = OscServer::open({.port = rig.server->port()}, rig.process, rig.session);
+  REQUIRE_FALSE(second);
+  CHECK(second.error().message.find("is taken") != std::string::npos);
+  CHECK(second.error().message.find("--osc-port off") != std::string::npos);
+  const auto nowhere = OscServer::open({.bind_address = "nowhere"}, rig.process, rig.session);
+  REQUIRE_FALSE(nowhere);
+  CHECK(nowhere.error().message.find("'nowhere'") != std::string::npos);
+  const auto foreign =
+      OscServer::open({.bind_address = "192.0.2.1", .port = 0}, rig.process, rig.session);
+  REQUIRE_FALSE(foreign);
+  CHECK(foreign.error().message.find("192.0.2.1") != std::string::npos);
+  CHECK_FALSE(OscServer::open({.port = 65536}, rig.process, rig.session));
+
+  const int port = rig.server->port();
+  rig.server.reset();
+  CHECK(OscServer::open({.port = port}, rig.process, rig.session));
+}
+
+TEST_CASE("loading answers done or fail, with the asker's number") {
+  Rig rig;
+  const Answer done = rig.client.ask(message("/model/load", {rig.model.path(), 7}));
+  CHECK(done.address == "/done");
+  REQUIRE(done.values.size() == 2);
+  CHECK(done.text(0) == "/model/load");
+  CHECK(std::get<std::int32_t>(done.values[1]) == 7);
+
+  const Answer fail = rig.client.ask(message("/preset/load", {"/no/such/preset.toml", "mine"}));
+  CHECK(has(fail, "/fail", "/preset/load", "/no/such/preset.toml"));
+  REQUIRE(fail.values.size() == 3);
+  CHECK(fail.text(1) == "mine");
+  CHECK(rig.client.ask(message("/model/load", {rig.model.path()})).values.size() == 1);
+  CHECK(has(rig.client.ask(message("/model/load")), "/error", "/model/load", "NAME"));
+
+  // The server may end while a load is under way.
+  for (int i = 0; i < 8; ++i) {
+    rig.client.send(message("/model/load", {rig.model.path(), i}));
+  }
+  rig.server.reset();
+  CHECK(rig.session.load_and_wait(rig.model.path()));
+}
+
+TEST_CASE("a full queue refuses, and takes again when there is room") {
+  Rig rig;
+  const Bytes many = bundle(1, std::vector<Bytes>(1500, message("/bend", {0.5f})));
+  bool was_refused = false;
+  for (int i = 0; i < 8 && !was_refused; ++i) {
+    rig.client.send(many);
+    for (const Answer& answer : rig.client.sync()) {
+      CHECK(has(answer, "/error", "/bend", "busy"));
+      was_refused = true;
+    }
+  }
+  CHECK(was_refused);
+  rig.drive(8);
+  rig.client.send(many);
+  CHECK(rig.client.sync().empty());
+}
+
+TEST_CASE("answers are not answered, and rubbish seldom") {
+  Rig rig;
+  rig.client.send(message("/error", {"/a", "b"}));
+  rig.client.send(bundle(1, {message("/done"), message("/status.reply")}));
+  CHECK(rig.client.sync().empty());
+
+  const std::int64_t start_ns = monotonic_ns();
+  std::int64_t answers = 0;
+  for (int i = 0; i < 200; ++i) {
+    rig.client.send(RAW("rubbish"));
+  }
+  for (const Answer& answer : rig.client.sync()) {
+    CHECK(has(answer, "/error", "", ""));
+    ++answers;
+  }
+  CHECK(answers > 0);
+  CHECK(answers <= 10 * ((monotonic_ns() - start_ns) / 1'000'000'000 + 2));
+}
+
+TEST_CASE("ten thousand broken packets leave the server and the sound whole") {
+  Rig rig;
+  rig.drive(1);
+  const std::vector<Bytes> seeds = {
+      message("/note/on", {60, 100}),
+      message("/note/off", {60}),
+      message("/cc", {1, 64.0f}),
+      message("/bend", {0.5}),
+      message("/param/m_K", {0.01}),
+      message("/param/{m_K,m_Z}", {0.01f}),
+      message("/param/*"),
+      message("/in/1/force", {1.0f, 0.01}),
+      message("/in/2/force", {-1e9f}),
+      message("/model/load", {rig.model.path(), 1}),
+      message("/preset/load", {"none"}),
+      message("/describe"),
+      bundle(1, {message("/note/on", {60, 100}), message("/in/1/force", {0.5})}),
+      bundle(rig.tag(rig.time_ns(9600)),
+             {bundle(1, {message("/panic")}), message("/in/1/force", {0.5})})};
+  std::mt19937 random(20240607);
+  const auto below = [&](std::size_t limit) {
+    return std::uniform_int_distribution<std::size_t>(0, limit - 1)(random);
+  };
+  for (int i = 0; i < 10000; ++i) {
+    Bytes packet = seeds[below(seeds.size())];
+    if (i % 5 == 0) {
+      packet.resize(below(200));
+      for (std::uint8_t& byte : packet) {
+        byte = static_cast<std::uint8_t>(below(256));
+      }
+    }
+    for (std::size_t changes = i % 5 == 0 ? 0 : below(4); changes > 0 && !packet.empty();
+         --changes) {
+      const std::size_t at = below(packet.size());
+      const auto place = packet.begin() + static_cast<std::ptrdiff_t>(at);
+      switch (below(5)) {
+        case 0:
+          packet[at] = static_cast<std::uint8_t>(below(256));
+          break;
+        case 1:
+          packet[at] ^= static_cast<std::uint8_t>(1u << below(8));
+          break;
+        case 2:
+          packet.resize(at);
+          break;
+        case 3:
+          packet.erase(place);
+          break;
+        default:
+          packet.insert(place, 4, static_cast<std::uint8_t>(below(2) * 255));
+          break;
+      }
+    }
+    rig.client.send(packet);
+    if (i % 50 == 49) {
+      rig.client.sync();
+      rig.drive(2);
+    }
+  }
+  CHECK(Client(rig.server->port()).ask(message("/status")).address == "/status.reply");
+  rig.drive(20);
+  for (const std::vector<float>& channel : rig.sound) {
+    CHECK(std::all_of(channel.begin(), channel.end(), [](float x) { return std::isfinite(x); }));
+  }
+  CHECK(rig.process.meters.frames.get() == rig.sound[0].size());
+}
+
+}  // namespace
+}  // namespace ressort

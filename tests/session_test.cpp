@@ -1,0 +1,187 @@
+// The control side and the audio thread together: loading, swapping, and giving back.
+#include "app/session.h"
+
+#include <malloc.h>
+#include <unistd.h>
+
+#include <atomic>
+#include <cmath>
+#include <filesystem>
+#include <fstream>
+#include <thread>
+
+#include "tests/catch.h"
+
+using namespace ressort;
+
+namespace {
+
+// A folder with files of its own that vanish with it.
+struct Folder {
+  std::filesystem::path path =
+      std::filesystem::temp_directory_path() / ("ressort-session-" + std::to_string(getpid()));
+  Folder() { std::filesystem::create_directories(path); }
+  ~Folder() { std::filesystem::remove_all(path); }
+  std::string write(const std::string& name, const std::string& text) const {
+    std::ofstream(path / name) << text;
+    return (path / name).string();
+  }
+};
+
+const char* const model =
+    "@K param 0.1\n@s ground 0.\n@m mass 1. 0. 0.\n@n mass 1. 0. 0.\n"
+    "@r0 springDamper @s @m K 0.0005\n@r1 springDamper @m @n K 0.0005\n"
+    "@in1 frcInput @m\n@out1 posOutput @n\n";
+
+std::string preset(double stiffness) {
+  return "model = \"m.mdl\"\nvoices = 4\ngain = 0.5\n[parameters]\nK = { value = " +
+         std::to_string(stiffness) +
+         ", range = [0.01, 0.3] }\n[[control]]\nfrom = \"note\"\nto = \"in1\"\nhow = "
+         "\"impulse\"\nrange = [0.02, 0.1]\n";
+}
+
+// An audio thread that never waits: it plays on until told to stop, and listens.
+class Player {
+ public:
+  explicit Player(Process& process) : process_(process), thread_([this] { run(); }) {}
+  ~Player() {
+    stop_ = true;
+    thread_.join();
+  }
+  bool is_finite() const { return is_finite_; }
+  float largest_step() const { return largest_step_; }
+  std::uint64_t blocks() const { return blocks_; }
+
+ private:
+  void run() {
+    std::vector<float> left(64);
+    std::vector<float> right(64);
+    std::vector<float*> outputs{left.data(), right.data()};
+    const std::uint8_t on[] = {0x90, 60, 100};
+    const std::uint8_t off[] = {0x80, 60, 0};
+    float before = 0.0f;
+    while (!stop_) {
+      const std::uint64_t n = blocks_;
+      const MidiPacket packet{static_cast<std::uint32_t>(n % 64),
+                              n % 40 == 0 ? std::span(on) : std::span(off)};
+      process_.block(std::span<const float* const>(), std::span<float* const>(outputs), 64,
+                     n % 40 == 0 || n % 40 == 30 ? std::span(&packet, 1)
+                                                 : std::span<const MidiPacket>(),
+                     static_cast<std::int64_t>(n) * 64 * 1'000'000'000 / 48000);
+      for (const float sample : left) {
+        is_finite_ = is_finite_ && std::isfinite(sample);
+        largest_step_ = std::max(largest_step_.load(), std::fabs(sample - before));
+        before = sample;
+      }
+      ++blocks_;
+      if (blocks_ % 16 == 0) {
+        std::this_thread::yield();
+      }
+    }
+  }
+
+  Process& process_;
+  std::atomic<bool> stop_{false};
+  std::atomic<bool> is_finite_{true};
+  std::atomic<float> largest_step_{0.0f};
+  std::atomic<std::uint64_t> blocks_{0};
+  std::thread thread_;
+};
+
+SessionOptions at_48k() { return {.compile = {.rate_hz = 48000.0}}; }
+
+void wait_for_blocks(const Player& player, std::uint64_t count) {
+  const std::uint64_t end = player.blocks() + count;
+  while (player.blocks() < end) {
+    std::this_thread::yield();
+  }
+}
+
+// The largest step between two samples of one model played alone.
+float step_of(const std::string& path) {
+  Process process(48000.0);
+  Session session(process, at_48k(), {});
+  REQUIRE(session.load_and_wait(path));
+  const Player player(process);
+  wait_for_blocks(player, 6000);
+  return player.largest_step();
+}
+
+}  // namespace
+
+TEST_CASE("A thousand swaps while notes sound neither click, leak nor break", "[session]") {
+  const Folder folder;
+  folder.write("m.mdl", model);
+  const std::string soft = folder.write("soft.toml", preset(0.05));
+  const std::string hard = folder.write("hard.toml", preset(0.25));
+  const float own = std::max(step_of(soft), step_of(hard));
+  Process process(48000.0);
+  Session session(process, at_48k(), {});
+  REQUIRE(session.load_and_wait(soft));
+  const Player player(process);
+  wait_for_blocks(player, 200);
+  for (int n = 0; n < 20; ++n) {  // what a first time allocates for good
+    REQUIRE(session.load_and_wait(n % 2 == 0 ? hard : soft));
+  }
+  wait_for_blocks(player, 400);
+  const auto before = mallinfo2().uordblks;
+  for (int n = 0; n < 1000; ++n) {
+    REQUIRE(session.load_and_wait(n % 2 == 0 ? hard : soft));
+    wait_for_blocks(player, n % 50);  // some wait for the fade's end, some come in its midst
+  }
+  // The last engine to fade has to be collected by the worker before memory is counted.
+  std::size_t after = mallinfo2().uordblks;
+  for (int patience = 0; patience < 400 && after > before + 4096; ++patience) {
+    wait_for_blocks(player, 50);
+    std::this_thread::sleep_for(std::chrono::milliseconds(10));
+    after = mallinfo2().uordblks;
+  }
+  CAPTURE(own, player.largest_step(), before, after);
+  CHECK(player.is_finite());
+  CHECK(player.largest_step() <= own * 1.0001f);  // a float's rounding
+  CHECK(after <= before + 4096);                  // bytes; an engine has more than 20 000
+  CHECK(process.meters.swaps.get() > 100);
+}
+
+TEST_CASE("What cannot be loaded is told in full, and what sounds goes on", "[session]") {
+  const Folder folder;
+  folder.write("m.mdl", model);
+  const std::string good = folder.write("good.toml", preset(0.1));
+  const std::string bad = folder.write("bad.mdl", "@m mass 1. 0. 0.\n@r sprong @m @m 1\n@x\n");
+  Process process(48000.0);
+  Session session(process, at_48k(), {});
+  REQUIRE(session.load_and_wait(good));
+  const auto failed = session.load_and_wait(bad);
+  REQUIRE_FALSE(failed);
+  CHECK(failed.error().message.find(bad + ":2:4: error: unknown keyword 'sprong'") == 0);
+  CHECK(failed.error().message.find(bad + ":3:3: error:") != std::string::npos);
+  CHECK(session.current()->name == "good");
+  const Player player(process);
+  wait_for_blocks(player, 100);
+  CHECK(player.largest_step() > 0.001f);
+}
+
+TEST_CASE("Parameters are remembered, clamped, and followed when a controller turns them",
+          "[session]") {
+  const Folder folder;
+  folder.write("m.mdl", model);
+  const std::string file = folder.write(
+      "p.toml", preset(0.1) + "[[control]]\nfrom = \"cc74\"\nto = \"K\"\nrange = [0.02, 0.2]\n");
+  Process process(48000.0);
+  Session session(process, at_48k(), {});
+  CHECK_FALSE(session.parameter("K"));
+  REQUIRE(session.load_and_wait(file));
+  CHECK(session.parameter("K") == 0.1);
+  REQUIRE(session.events({"/param/K", {0.7}}));
+  CHECK(session.parameter("K") == 0.3);  // the range's end
+  std::vector<float> samples(64);
+  std::vector<float*> outputs{samples.data()};
+  const std::uint8_t turn[] = {0xb0, 74, 127};
+  const MidiPacket packet{0, turn};
+  process.block(std::span<const float* const>(), std::span<float* const>(outputs), 64,
+                std::span(&packet, 1), 0);
+  for (int patience = 0; patience < 500 && session.parameter("K") != 0.2; ++patience) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(10));
+  }
+  CHECK(session.parameter("K") == 0.2);
+}
