@@ -35,10 +35,10 @@ struct Alsa {
   unsigned channels = 2;
   unsigned rate_hz = 48000;
   snd_pcm_uframes_t frames = 256;
-  bool is_timed = false;  // the device takes everything at once: we keep the time
-  std::vector<float> samples;      // [channel][frame]
+  bool is_timed = false;       // the device takes everything at once: we keep the time
+  std::vector<float> samples;  // [channel][frame]
   std::vector<float*> outputs;
-  std::vector<std::byte> packed;   // [frame][channel] in the device's format
+  std::vector<std::byte> packed;  // [frame][channel] in the device's format
   Meter<double> load;
   Flag stop;
   Flag lost;
@@ -57,9 +57,15 @@ void Alsa::interleave() {
     }
   };
   switch (format) {
-    case SND_PCM_FORMAT_S32: fill(std::int32_t{}, 2147483647.0); break;
-    case SND_PCM_FORMAT_S16: fill(std::int16_t{}, 32767.0); break;
-    default: fill(float{}, 1.0); break;
+    case SND_PCM_FORMAT_S32:
+      fill(std::int32_t{}, 2147483647.0);
+      break;
+    case SND_PCM_FORMAT_S16:
+      fill(std::int16_t{}, 32767.0);
+      break;
+    default:
+      fill(float{}, 1.0);
+      break;
   }
 }
 
@@ -117,8 +123,8 @@ int configure(Alsa& alsa, const AudioOptions& options) {
   int failure = snd_pcm_hw_params_any(alsa.pcm, hardware);
   const auto step = [&](int result) { failure = failure < 0 ? failure : result; };
   step(snd_pcm_hw_params_set_access(alsa.pcm, hardware, SND_PCM_ACCESS_RW_INTERLEAVED));
-  const auto* format = std::find_if(
-      std::begin(formats), std::end(formats), [&](snd_pcm_format_t wanted) {
+  const auto* format =
+      std::find_if(std::begin(formats), std::end(formats), [&](snd_pcm_format_t wanted) {
         return snd_pcm_hw_params_test_format(alsa.pcm, hardware, wanted) == 0;
       });
   alsa.format = format != std::end(formats) ? *format : SND_PCM_FORMAT_S16;
@@ -144,8 +150,8 @@ Result<AudioDevice> open_alsa(Process& process, const AudioOptions& options) {
   auto alsa = std::make_shared<Alsa>(process);
   int failure = snd_pcm_open(&alsa->pcm, options.device.c_str(), SND_PCM_STREAM_PLAYBACK, 0);
   if (failure < 0) {
-    return Error{"the ALSA device '" + options.device + "' does not open: " +
-                 snd_strerror(failure) +
+    return Error{"the ALSA device '" + options.device +
+                 "' does not open: " + snd_strerror(failure) +
                  "; 'aplay -L' lists the devices, -d NAME chooses one, -a dummy does without"};
   }
   failure = configure(*alsa, options);
@@ -163,8 +169,8 @@ Result<AudioDevice> open_alsa(Process& process, const AudioOptions& options) {
   alsa->thread = std::thread([alsa = alsa.get()] { alsa->run(); });
   AudioDevice device;
   device.rate_hz = alsa->rate_hz;
-  device.description = "ALSA '" + options.device + "', " + std::to_string(alsa->rate_hz) +
-                       " Hz, " + std::to_string(alsa->frames) + " frames";
+  device.description = "ALSA '" + options.device + "', " + std::to_string(alsa->rate_hz) + " Hz, " +
+                       std::to_string(alsa->frames) + " frames";
   device.close = [alsa] {
     alsa->stop.raise();
     alsa->thread.join();

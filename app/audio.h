@@ -13,10 +13,10 @@ namespace ressort {
 
 struct AudioOptions {
   std::string client_name = "ressort";
-  bool connect = false;        // to the physical outputs and to every MIDI source
-  int outputs = 2;             // ports: out_left and out_right, or out_1...
-  double rate_hz = 48000.0;    // a wish; JACK has its own
-  int period_frames = 256;     // a wish; JACK has its own
+  bool connect = false;            // to the physical outputs and to every MIDI source
+  int outputs = 2;                 // ports: out_left and out_right, or out_1...
+  double rate_hz = 48000.0;        // a wish; JACK has its own
+  int period_frames = 256;         // a wish; JACK has its own
   std::string device = "default";  // ALSA's
 };
 
@@ -26,12 +26,12 @@ struct AudioDevice {
   std::string description;  // "JACK, 48000 Hz, 256 frames"
   double rate_hz = 48000.0;
   std::function<void()> close;
-  std::function<bool()> is_lost;             // the server or the device is gone, or runs at
-                                             //   another rate: close it and open it anew
-  std::function<double()> cpu;               // share of a period spent, 0..1
-  std::function<void(int)> set_audio_inputs; // the model wants so many
-  std::function<void()> tick;                // about every second: connects what was plugged in
-  bool has_midi = false;                     // brings its own MIDI, with exact frames
+  std::function<bool()> is_lost;              // the server or the device is gone, or runs at
+                                              //   another rate: close it and open it anew
+  std::function<double()> cpu;                // share of a period spent, 0..1
+  std::function<void(int)> set_audio_inputs;  // the model wants so many
+  std::function<void()> tick;                 // about every second: connects what was plugged in
+  bool has_midi = false;                      // brings its own MIDI, with exact frames
 
   AudioDevice() = default;
   AudioDevice(AudioDevice&& other) noexcept { *this = std::move(other); }

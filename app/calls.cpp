@@ -20,8 +20,10 @@ constexpr AddressRow rows[] = {
     {"/in/N/position", "POSITION", "moves the hand at input N, smoothed", true},
     {"/in/N/force", "FORCE [SECONDS]", "pushes input N: one sample, or as long as told", true},
     {"/in/N/pluck", "STRENGTH", "the finger at input N sweeps through the string; 0-1", true},
-    {"/in/N/bow", "SPEED [PRESSURE]", "draws the bow at input N; speed -1 to 1, pressure 0-1; "
-                                      "speed 0 stops", true},
+    {"/in/N/bow", "SPEED [PRESSURE]",
+     "draws the bow at input N; speed -1 to 1, pressure 0-1; "
+     "speed 0 stops",
+     true},
     {"/panic", "", "silence at once", true},
     {"/model/load", "NAME [ID]", "loads a model or preset; answers /done or /fail", false},
     {"/preset/load", "NAME [ID]", "the same for a preset", false},
@@ -111,7 +113,8 @@ Result<std::vector<Event>> parameter_events(const Call& call, const Instrument& 
   for (std::size_t i = 0; i < instrument.parameters.size(); ++i) {
     const ParameterInfo& info = instrument.parameters[i];
     if (fits(pattern, info.name)) {
-      events.push_back({.kind = EventKind::parameter, .index = static_cast<std::uint16_t>(i),
+      events.push_back({.kind = EventKind::parameter,
+                        .index = static_cast<std::uint16_t>(i),
                         .model = serial,
                         .value = std::clamp(value, info.minimum, info.maximum)});
     }
@@ -134,9 +137,9 @@ Result<std::vector<Event>> input_events(const Call& call, const Instrument& inst
                                   [&](const InputInfo& info) { return info.number == number; });
   if (failure != std::errc{} || found == instrument.inputs.end()) {
     return Error{call.address + ": the model has " +
-                 (instrument.inputs.empty() ? "no inputs"
-                                            : "the inputs 1 to " +
-                                                  std::to_string(instrument.inputs.back().number))};
+                 (instrument.inputs.empty()
+                      ? "no inputs"
+                      : "the inputs 1 to " + std::to_string(instrument.inputs.back().number))};
   }
   Event event{.index = static_cast<std::uint16_t>(number), .model = serial};
   Arguments arguments(call);
@@ -179,8 +182,8 @@ Result<std::vector<Event>> simple_event(const Call& call) {
     const double velocity = arguments.in_range_or("the velocity", 100.0, 0.0, 127.0);
     event.index = static_cast<std::uint16_t>(std::lround(key));
     event.value = velocity / 127.0;
-    event.kind = call.address == "/note/on" && velocity > 0.0 ? EventKind::note_on
-                                                               : EventKind::note_off;
+    event.kind =
+        call.address == "/note/on" && velocity > 0.0 ? EventKind::note_on : EventKind::note_off;
   } else if (call.address == "/cc") {
     event.kind = EventKind::controller;
     event.index =
@@ -241,7 +244,9 @@ bool fits_one(std::string_view pattern, char c, std::size_t& length) {
 
 }  // namespace
 
-std::span<const AddressRow> addresses() { return rows; }
+std::span<const AddressRow> addresses() {
+  return rows;
+}
 
 bool plays(const Call& call, const Instrument& instrument) {
   if (call.address.starts_with("/param/")) {
@@ -269,7 +274,8 @@ Result<std::vector<Event>> to_events(const Call& call, const Instrument& instrum
       return *error;
     }
     return std::vector{Event{.kind = EventKind::custom,
-                             .index = static_cast<std::uint16_t>(custom->row), .model = serial,
+                             .index = static_cast<std::uint16_t>(custom->row),
+                             .model = serial,
                              .value = value}};
   }
   return Error{"unknown address '" + call.address + "'; /describe lists what there is"};

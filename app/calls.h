@@ -27,7 +27,7 @@ struct AddressRow {
   std::string_view address;    // N and NAME stand for a number and a name
   std::string_view arguments;  // as a person writes them
   std::string_view does;
-  bool plays;                  // becomes events; the others are the session's
+  bool plays;  // becomes events; the others are the session's
 };
 std::span<const AddressRow> addresses();
 

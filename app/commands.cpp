@@ -29,7 +29,9 @@ std::string db(double factor) {
   return text;
 }
 
-void complain(const std::string& text) { std::fprintf(stderr, "%s\n", text.c_str()); }
+void complain(const std::string& text) {
+  std::fprintf(stderr, "%s\n", text.c_str());
+}
 
 // Signals are waited for, not handled: every thread inherits this, so that they reach main alone.
 sigset_t block_signals() {
@@ -80,14 +82,14 @@ class Player {
     if (const int failure = open_device(); failure != exit_code::done) {
       return failure;
     }
-    session_ = std::make_unique<Session>(
-        process_,
-        SessionOptions{.compile = {.rate_hz = device_.rate_hz,
-                                   .rescale = options_.rescale,
-                                   .voices = options_.voices,
-                                   .precision = options_.precision},
-                       .gain = std::pow(10.0, options_.gain_db / 20.0)},
-        [this](const std::string& news) { voice_.say(news); });
+    session_ =
+        std::make_unique<Session>(process_,
+                                  SessionOptions{.compile = {.rate_hz = device_.rate_hz,
+                                                             .rescale = options_.rescale,
+                                                             .voices = options_.voices,
+                                                             .precision = options_.precision},
+                                                 .gain = std::pow(10.0, options_.gain_db / 20.0)},
+                                  [this](const std::string& news) { voice_.say(news); });
     connect_session();
     const auto loaded = session_->load_and_wait(options_.name);
     if (!loaded) {
@@ -160,8 +162,8 @@ class Player {
     if (options_.osc_port == 0) {
       return exit_code::done;
     }
-    auto osc = OscServer::open({options_.osc_bind, options_.osc_port.value_or(9777)}, process_,
-                               *session_);
+    auto osc =
+        OscServer::open({options_.osc_bind, options_.osc_port.value_or(9777)}, process_, *session_);
     if (osc) {
       osc_ = *std::move(osc);
       voice_.say("OSC on " + options_.osc_bind + " port " + std::to_string(osc_->port()));
@@ -192,11 +194,10 @@ class Player {
   }
 
   int converse() {
-    console_ = std::make_unique<Console>(process_, *session_,
-                                         [](const std::string& text) {
-                                           std::printf("%s\n", text.c_str());
-                                           std::fflush(stdout);
-                                         });
+    console_ = std::make_unique<Console>(process_, *session_, [](const std::string& text) {
+      std::printf("%s\n", text.c_str());
+      std::fflush(stdout);
+    });
     if (!options_.script.empty()) {
       if (auto ran = console_->run_script(options_.script); !ran) {
         complain(ran.error().message);
@@ -345,22 +346,26 @@ void print_check(const Scene& scene, const Compiled& compiled) {
   }
   std::printf("runs as\n  %s", describe(compiled.plan).c_str());
   if (instrument.mode) {
-    std::printf("lowest mode %.3f Hz; keys are in tune up to %.0f Hz, higher ones come down by "
-                "octaves\n",
-                instrument.mode->frequency_hz, instrument.highest_frequency_hz);
+    std::printf(
+        "lowest mode %.3f Hz; keys are in tune up to %.0f Hz, higher ones come down by "
+        "octaves\n",
+        instrument.mode->frequency_hz, instrument.highest_frequency_hz);
   }
   if (instrument.stiffness_margin >= 1.0) {
     std::printf("stable: every stiffness may grow by %.3g at least\n", instrument.stiffness_margin);
   } else {
-    std::printf("warning: stability is not proved; stiffness and damping may be too high for the "
-                "masses (margin %.3g)\n",
-                instrument.stiffness_margin);
+    std::printf(
+        "warning: stability is not proved; stiffness and damping may be too high for the "
+        "masses (margin %.3g)\n",
+        instrument.stiffness_margin);
   }
 }
 
 }  // namespace
 
-int play(const PlayOptions& options) { return Player(options).run(); }
+int play(const PlayOptions& options) {
+  return Player(options).run();
+}
 
 int render_command(const RenderOptions& options, bool is_quiet) {
   signal(SIGINT, [](int) { interrupted.raise(); });

@@ -559,11 +559,10 @@ std::string examples(const Desk& desk) {
   }
   lines.push_back({"noteon 60 100", "# the middle C, loud"});
   lines.push_back({"noteoff 60"});
-  for (const ParameterInfo& info :
-       current ? current->instrument.parameters : std::vector<ParameterInfo>{}) {
+  if (current && !current->instrument.parameters.empty()) {
+    const ParameterInfo& info = current->instrument.parameters.front();
     lines.push_back({"set " + info.name + " " + print_number(info.value),
                      "# " + print_number(info.minimum) + " to " + print_number(info.maximum)});
-    break;
   }
   lines.push_back({"rec take.wav", "# what is heard from now on"});
   lines.push_back({"rec stop"});
@@ -613,24 +612,24 @@ Result<Done> act(Desk& desk, const Command& command) {
   return (*row)->act(desk, command.words);
 }
 
-// Files whose names go on from `typed`, and folders; only files with one of the endings, if any
-// is given.
+// Files with one of the endings whose names go on from `typed`, and folders.
 std::vector<std::string> files(const std::string& typed,
                                std::span<const std::string_view> endings) {
   const std::size_t slash = typed.rfind('/');
   const std::string folder = slash == typed.npos ? "" : typed.substr(0, slash + 1);
   const std::string begun = typed.substr(folder.size());
   std::vector<std::string> found;
-  std::error_code error;
-  for (const fs::directory_entry& entry :
-       fs::directory_iterator(folder.empty() ? "." : folder, error)) {
-    const std::string name = entry.path().filename().string();
+  std::error_code stop;  // an unreadable folder has nothing to offer
+  for (fs::directory_iterator at(folder.empty() ? "." : folder, stop); !stop && at != end(at);
+       at.increment(stop)) {
+    const std::string name = at->path().filename().string();
     if (!name.starts_with(begun) || (begun.empty() && name.starts_with('.'))) {
       continue;
     }
-    if (entry.is_directory(error)) {
+    std::error_code unknown;
+    if (at->is_directory(unknown)) {
       found.push_back(folder + name + "/");
-    } else if (std::find(endings.begin(), endings.end(), entry.path().extension().string()) !=
+    } else if (std::find(endings.begin(), endings.end(), at->path().extension().string()) !=
                endings.end()) {
       found.push_back(folder + name);
     }
@@ -1013,7 +1012,8 @@ struct Terminal::Input {
     el_set(editor, EL_SIGNAL, 0);
     el_set(editor, EL_GETCFN, next_character);
     el_set(editor, EL_HIST, history, lines);
-    el_set(editor, EL_ADDFN, "ressort-complete", "Completes a word", complete);
+    // The narrow form of this one would leak its copies.
+    el_wset(editor, EL_ADDFN, L"ressort-complete", L"Completes a word", complete);
     el_set(editor, EL_BIND, "^I", "ressort-complete", nullptr);
     el_set(editor, EL_BIND, "^R", "em-inc-search-prev", nullptr);
     bool goes_on = true;

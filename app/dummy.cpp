@@ -27,7 +27,8 @@ struct Dummy {
     const double period_ns = 1e9 * static_cast<double>(frames) / rate_hz;
     const std::int64_t start = monotonic_ns();
     for (std::uint64_t n = 0; !stop.is_raised(); ++n) {
-      const auto due = start + static_cast<std::int64_t>(std::llround(period_ns * static_cast<double>(n)));
+      const auto due =
+          start + static_cast<std::int64_t>(std::llround(period_ns * static_cast<double>(n)));
       const timespec wake{due / 1'000'000'000, due % 1'000'000'000};
       while (clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &wake, nullptr) != 0) {
       }

@@ -165,10 +165,9 @@ Result<std::string> find_scene(const std::string& name) {
   }
   std::error_code error;
   const fs::path data = data_folder();
-  for (const fs::path& path :
-       {fs::path(name), fs::path(name + ".toml"), fs::path(name + ".mdl"),
-        data / "presets" / (name + ".toml"), data / "presets" / name,
-        data / "models" / (name + ".mdl"), data / "models" / name}) {
+  for (const fs::path& path : {fs::path(name), fs::path(name + ".toml"), fs::path(name + ".mdl"),
+                               data / "presets" / (name + ".toml"), data / "presets" / name,
+                               data / "models" / (name + ".mdl"), data / "models" / name}) {
     if (fs::exists(path, error) && !fs::is_directory(path, error)) {
       return path.string();
     }
@@ -185,8 +184,14 @@ Result<std::string> find_scene(const std::string& name) {
                ", or give the path of a .mdl or .toml file"};
 }
 
-std::vector<std::string> known_presets() { return names_in(data_folder() / "presets", ".toml"); }
-std::vector<std::string> known_models() { return names_in(data_folder() / "models", ".mdl"); }
-std::string models_folder() { return (data_folder() / "models").string(); }
+std::vector<std::string> known_presets() {
+  return names_in(data_folder() / "presets", ".toml");
+}
+std::vector<std::string> known_models() {
+  return names_in(data_folder() / "models", ".mdl");
+}
+std::string models_folder() {
+  return (data_folder() / "models").string();
+}
 
 }  // namespace ressort

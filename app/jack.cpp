@@ -25,7 +25,7 @@ struct Jack {
   std::vector<jack_port_t*> outputs;
   jack_port_t* midi = nullptr;
   std::array<Published<jack_port_t>, most_audio_inputs> inputs;  // registered as models want them
-  std::int64_t clock_offset_ns = 0;  // monotonic clock less JACK's
+  std::int64_t clock_offset_ns = 0;                              // monotonic clock less JACK's
   double rate_hz = 48000.0;
   Flag lost;
 
@@ -50,8 +50,8 @@ int on_process(jack_nframes_t frames, void* self) {
     jack.input_buffers[inputs] = static_cast<const float*>(buffer(port));
   }
   void* const midi = buffer(jack.midi);
-  const std::size_t count = std::min<std::size_t>(jack_midi_get_event_count(midi),
-                                                  jack.packets.size());
+  const std::size_t count =
+      std::min<std::size_t>(jack_midi_get_event_count(midi), jack.packets.size());
   for (std::size_t i = 0; i < count; ++i) {
     jack_midi_event_t event;
     jack_midi_event_get(&event, midi, static_cast<std::uint32_t>(i));
@@ -77,7 +77,9 @@ int on_xrun(void* self) {
 }
 
 // The engine takes any number of frames, so that nothing has to be made ready for a new one.
-int on_buffer_size(jack_nframes_t, void*) { return 0; }
+int on_buffer_size(jack_nframes_t, void*) {
+  return 0;
+}
 
 // A new rate needs a new engine: the control side opens the client again.
 int on_sample_rate(jack_nframes_t rate, void* self) {
@@ -156,7 +158,8 @@ bool register_ports(Jack& jack) {
                                               JackPortIsOutput | JackPortIsTerminal, 0));
   }
   jack.output_buffers.resize(jack.outputs.size());
-  jack.midi = jack_port_register(jack.client, "midi_in", JACK_DEFAULT_MIDI_TYPE, JackPortIsInput, 0);
+  jack.midi =
+      jack_port_register(jack.client, "midi_in", JACK_DEFAULT_MIDI_TYPE, JackPortIsInput, 0);
   return jack.midi != nullptr && jack.outputs.back() != nullptr;
 }
 
@@ -175,9 +178,7 @@ Result<AudioDevice> open_jack(Process& process, const AudioOptions& options) {
                  "; start one (qjackctl, or jackd -d alsa), or choose another output: -a alsa, "
                  "-a dummy"};
   }
-  const auto close = [jack] {
-    jack_client_close(jack->client);
-  };
+  const auto close = [jack] { jack_client_close(jack->client); };
   jack->rate_hz = static_cast<double>(jack_get_sample_rate(jack->client));
   jack->clock_offset_ns = monotonic_ns() - static_cast<std::int64_t>(jack_get_time()) * 1000;
   process.set_rate(jack->rate_hz);

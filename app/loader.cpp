@@ -40,15 +40,15 @@ Result<Done> read_model(const std::string& path, Scene& scene) {
 Result<std::string> find_model(const std::string& preset_path, const std::string& model) {
   std::error_code error;
   const fs::path folder = fs::path(preset_path).parent_path();
-  for (const fs::path& path : {folder / model, folder / ".." / "models" / model,
-                               fs::path(models_folder()) / model}) {
+  for (const fs::path& path :
+       {folder / model, folder / ".." / "models" / model, fs::path(models_folder()) / model}) {
     if (fs::is_regular_file(path, error)) {
       return path.lexically_normal().string();
     }
   }
-  return Error{"the model '" + model + "' is neither beside the preset nor in '" +
-                   models_folder() + "'",
-               1, 1};
+  return Error{
+      "the model '" + model + "' is neither beside the preset nor in '" + models_folder() + "'", 1,
+      1};
 }
 
 }  // namespace

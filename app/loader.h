@@ -12,8 +12,8 @@
 namespace ressort {
 
 struct Scene {
-  std::string name;   // "PolyTriangle", for people
-  std::string path;   // of the file that was asked for
+  std::string name;  // "PolyTriangle", for people
+  std::string path;  // of the file that was asked for
   std::string model_path;
   Network network;
   Preset preset;

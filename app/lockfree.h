@@ -47,11 +47,11 @@ class Slot {
 template <class T>
 class Ring {
  public:
-  explicit Ring(std::size_t capacity) : queue_(capacity) {}
+  explicit Ring(std::size_t capacity) : capacity_(capacity), queue_(capacity) {}
   bool push(const T& item) { return queue_.try_enqueue(item); }  // [its one writer] wait-free
-  // All or none.
+  // All or none. The queue may have more room than it was asked for, but promises only that.
   bool push_all(std::span<const T> items) {  // [its one writer] wait-free
-    if (queue_.size_approx() + items.size() > queue_.max_capacity()) {
+    if (queue_.size_approx() + items.size() > capacity_) {
       return false;
     }
     for (const T& item : items) {
@@ -64,6 +64,7 @@ class Ring {
   std::size_t size() const { return queue_.size_approx(); }
 
  private:
+  std::size_t capacity_;
   moodycamel::ReaderWriterQueue<T> queue_;
 };
 

@@ -93,17 +93,16 @@ void add_play(CLI::App& app, PlayOptions& options, int& code) {
   add_numbers(*command, options.precision, options.rescale);
   command->add_flag("-i,--no-console", options.no_console, "do not read commands");
   command->add_option("-e,--execute", options.script, "a file of console commands, run first");
-  command
-      ->add_option_function<std::string>(
-          "-u,--osc-port",
-          [&options](const std::string& text) {
-            double port = 0.0;
-            if (text != "off" && (!parse_number(text, port) || port < 1.0 || port > 65535.0)) {
-              throw CLI::ValidationError("--osc-port", "must be 1 to 65535, or off");
-            }
-            options.osc_port = static_cast<int>(port);
-          },
-          "the UDP port for OSC, or off (9777)");
+  command->add_option_function<std::string>(
+      "-u,--osc-port",
+      [&options](const std::string& text) {
+        double port = 0.0;
+        if (text != "off" && (!parse_number(text, port) || port < 1.0 || port > 65535.0)) {
+          throw CLI::ValidationError("--osc-port", "must be 1 to 65535, or off");
+        }
+        options.osc_port = static_cast<int>(port);
+      },
+      "the UDP port for OSC, or off (9777)");
   command->add_option("-B,--osc-bind", options.osc_bind, "the address that OSC listens at")
       ->capture_default_str();
   command->add_flag("--exit-on-loss", options.exit_on_loss,
@@ -127,10 +126,9 @@ void add_render(CLI::App& app, RenderChoice& choice, int& code) {
   command->add_option("-o,--output", options.output, "the WAV file")->required();
   CLI::Option* seconds = command->add_option("-s,--seconds", choice.seconds, "how long")
                              ->check(CLI::Range(0.0, 86400.0));
-  CLI::Option* frames =
-      command->add_option("--frames", choice.frames, "how long, in samples")
-          ->check(CLI::NonNegativeNumber)
-          ->excludes(seconds);
+  CLI::Option* frames = command->add_option("--frames", choice.frames, "how long, in samples")
+                            ->check(CLI::NonNegativeNumber)
+                            ->excludes(seconds);
   command->add_option("-r,--rate", options.rate_hz, "Hz")
       ->check(CLI::Range(1000.0, 768000.0))
       ->capture_default_str();

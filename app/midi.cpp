@@ -7,9 +7,12 @@ namespace {
 int data_bytes(std::uint8_t status) {
   switch (status & 0xf0) {
     case 0xc0:
-    case 0xd0: return 1;
-    case 0xf0: return status == 0xf1 || status == 0xf3 ? 1 : status == 0xf2 ? 2 : 0;
-    default: return 2;
+    case 0xd0:
+      return 1;
+    case 0xf0:
+      return status == 0xf1 || status == 0xf3 ? 1 : status == 0xf2 ? 2 : 0;
+    default:
+      return 2;
   }
 }
 
@@ -52,10 +55,18 @@ bool MidiReader::finish(Event& event) {
   event.index = data_[0];
   event.value = data_[1] / 127.0;
   switch (status_ & 0xf0) {
-    case 0x90: event.kind = data_[1] > 0 ? EventKind::note_on : EventKind::note_off; return true;
-    case 0x80: event.kind = EventKind::note_off; return true;
-    case 0xa0: event.kind = EventKind::key_pressure; return true;
-    case 0xb0: event.kind = EventKind::controller; return true;
+    case 0x90:
+      event.kind = data_[1] > 0 ? EventKind::note_on : EventKind::note_off;
+      return true;
+    case 0x80:
+      event.kind = EventKind::note_off;
+      return true;
+    case 0xa0:
+      event.kind = EventKind::key_pressure;
+      return true;
+    case 0xb0:
+      event.kind = EventKind::controller;
+      return true;
     case 0xd0:
       event.kind = EventKind::pressure;
       event.index = 0;
@@ -68,8 +79,11 @@ bool MidiReader::finish(Event& event) {
       event.value = bend < 0 ? bend / 8192.0 : bend / 8191.0;
       return true;
     }
-    case 0xf0: status_ = 0; return false;  // system common has no running status
-    default: return false;                 // program change
+    case 0xf0:
+      status_ = 0;
+      return false;  // system common has no running status
+    default:
+      return false;  // program change
   }
 }
 

@@ -100,8 +100,11 @@ Result<Rendered> render(const RenderOptions& options, const std::function<bool(d
   }
   const bool is_bare = !scene->has_preset;
   auto compiled = compile(scene->network, scene->preset,
-                          {.rate_hz = options.rate_hz, .rescale = options.rescale, .bare = is_bare,
-                           .voices = options.voices, .precision = options.precision});
+                          {.rate_hz = options.rate_hz,
+                           .rescale = options.rescale,
+                           .bare = is_bare,
+                           .voices = options.voices,
+                           .precision = options.precision});
   if (!compiled) {
     const Error& error = compiled.error();
     return Error{scene->path + ":" + std::to_string(error.line) + ":" +
@@ -122,9 +125,9 @@ Result<Rendered> render(const RenderOptions& options, const std::function<bool(d
     inputs.sound = *std::move(sound);
     if (inputs.sound.rate_hz != options.rate_hz) {
       return Error{"'" + options.input + "' is at " +
-                   std::to_string(static_cast<int>(inputs.sound.rate_hz)) +
-                   " Hz, the render at " + std::to_string(static_cast<int>(options.rate_hz)) +
-                   "; give --rate " + std::to_string(static_cast<int>(inputs.sound.rate_hz))};
+                   std::to_string(static_cast<int>(inputs.sound.rate_hz)) + " Hz, the render at " +
+                   std::to_string(static_cast<int>(options.rate_hz)) + "; give --rate " +
+                   std::to_string(static_cast<int>(inputs.sound.rate_hz))};
     }
   }
   std::string score_text;
@@ -159,7 +162,8 @@ Result<Rendered> render(const RenderOptions& options, const std::function<bool(d
   }
   process.slot.offer(new Sounding{std::move(compiled->engine), serial});
 
-  Rendered rendered{.name = scene->name, .frames = length_in_frames(options, *score, inputs),
+  Rendered rendered{.name = scene->name,
+                    .frames = length_in_frames(options, *score, inputs),
                     .channels = is_bare ? instrument.outputs : std::max(2, instrument.outputs),
                     .warnings = scene->warnings};
   if (static_cast<double>(rendered.frames) > longest_s * options.rate_hz) {
@@ -214,7 +218,8 @@ Result<Rendered> render(const RenderOptions& options, const std::function<bool(d
     return closed.error();
   }
   rendered.frames = frame;
-  rendered.rms = frame > 0 ? std::sqrt(energy / static_cast<double>(frame * rendered.channels)) : 0.0;
+  rendered.rms =
+      frame > 0 ? std::sqrt(energy / static_cast<double>(frame * rendered.channels)) : 0.0;
   rendered.resets = process.meters.resets.get();
   return rendered;
 }

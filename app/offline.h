@@ -15,13 +15,13 @@
 namespace ressort {
 
 struct RenderOptions {
-  std::string name;                // model or preset
-  std::string output;              // a WAV file
+  std::string name;    // model or preset
+  std::string output;  // a WAV file
   double rate_hz = 44100.0;
-  std::optional<double> seconds;   // at most one of these; without both: as long as score and
-  std::optional<long long> frames; //   input last, and two seconds to ring out
-  std::string input;               // a WAV file; channel n drives input n
-  std::string score;               // a file of calls
+  std::optional<double> seconds;    // at most one of these; without both: as long as score and
+  std::optional<long long> frames;  //   input last, and two seconds to ring out
+  std::string input;                // a WAV file; channel n drives input n
+  std::string score;                // a file of calls
   std::vector<std::pair<std::string, double>> parameters;  // set before the first sample
   SampleFormat format = SampleFormat::float32;
   Precision precision = Precision::float64;

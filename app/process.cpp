@@ -15,8 +15,12 @@ namespace {
 class DenormalsFlushed {
  public:
 #if defined(__SSE2__)
-  DenormalsFlushed() : before_(_mm_getcsr()) { _mm_setcsr(before_ | 0x8040u); }  // FTZ and DAZ
-  ~DenormalsFlushed() { _mm_setcsr(before_); }
+  DenormalsFlushed() : before_(_mm_getcsr()) {
+    _mm_setcsr(before_ | 0x8040u);
+  }  // FTZ and DAZ
+  ~DenormalsFlushed() {
+    _mm_setcsr(before_);
+  }
 
  private:
   unsigned before_;
@@ -25,7 +29,9 @@ class DenormalsFlushed {
     asm volatile("mrs %0, fpcr" : "=r"(before_));
     asm volatile("msr fpcr, %0" ::"r"(before_ | (std::uint64_t{1} << 24)));
   }
-  ~DenormalsFlushed() { asm volatile("msr fpcr, %0" ::"r"(before_)); }
+  ~DenormalsFlushed() {
+    asm volatile("msr fpcr, %0" ::"r"(before_));
+  }
 
  private:
   std::uint64_t before_;
@@ -115,8 +121,7 @@ void Process::run(std::span<const Sample* const> inputs, std::span<Sample* const
 // Everything that has arrived becomes an event at a frame.
 void Process::gather(std::size_t frames, std::span<const MidiPacket> midi, std::int64_t time_ns) {
   for (const MidiPacket& packet : midi) {
-    midi_.read(packet.bytes,
-               [&](const Event& event) { schedule(frame_ + packet.frame, event); });
+    midi_.read(packet.bytes, [&](const Event& event) { schedule(frame_ + packet.frame, event); });
   }
   meters.malformed.set(midi_.malformed());
   drain(from_midi, frames, time_ns);
@@ -139,9 +144,9 @@ void Process::drain(Ring<TimedEvent>& ring, std::size_t frames, std::int64_t tim
     } else if (timed.timing == TimedEvent::When::at_time) {
       // Constant latency: what happened during the last period is played during this one.
       const double since = static_cast<double>(timed.when - time_ns) * 1e-9 * rate_hz_;
-      frame = frame_ + std::clamp<std::int64_t>(
-                           static_cast<std::int64_t>(frames) + std::llround(since), 0,
-                           static_cast<std::int64_t>(frames) - 1);
+      frame =
+          frame_ + std::clamp<std::int64_t>(static_cast<std::int64_t>(frames) + std::llround(since),
+                                            0, static_cast<std::int64_t>(frames) - 1);
     }
     if (frame < frame_) {
       meters.late.add(1);
@@ -168,7 +173,8 @@ void Process::collect_due(std::size_t frames) {
   while (!pending_.empty() && pending_.front().frame < end) {
     std::pop_heap(pending_.begin(), pending_.end(), later<Pending>);
     Event event = pending_.back().event;
-    event.frame = static_cast<std::uint32_t>(std::max<std::int64_t>(0, pending_.back().frame - frame_));
+    event.frame =
+        static_cast<std::uint32_t>(std::max<std::int64_t>(0, pending_.back().frame - frame_));
     due_.push_back(event);
     pending_.pop_back();
   }
@@ -205,8 +211,7 @@ void Process::play_models(std::size_t input_count, std::size_t output_count, std
     const auto sources = static_cast<std::size_t>(count);
     for (std::size_t k = 0; k < std::max<std::size_t>(sources, sources == 1 ? output_count : 0);
          ++k) {
-      const double* const source =
-          samples.data() + (sources == 1 ? 0 : k) * chunk_frames;
+      const double* const source = samples.data() + (sources == 1 ? 0 : k) * chunk_frames;
       double* const target = out[k % output_count];
       for (std::size_t n = 0; n < frames; ++n) {
         target[n] += gain(n) * source[n];

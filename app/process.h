@@ -58,26 +58,26 @@ struct RecordedChunk {
 
 // Where others look in. Written by the audio thread, but for the flags.
 struct Meters {
-  Meter<std::uint64_t> frames;     // since the start
+  Meter<std::uint64_t> frames;  // since the start
   Meter<int> voices;
-  Meter<std::uint64_t> resets;     // voices that became unstable
+  Meter<std::uint64_t> resets;  // voices that became unstable
   Meter<std::uint64_t> stolen;
   Meter<std::uint64_t> dropped;    // events that found no room
   Meter<std::uint64_t> late;       // events that came after their time
   Meter<std::uint64_t> malformed;  // MIDI that could not be read
   Meter<std::uint64_t> swaps;
   Meter<std::uint64_t> record_lost;  // chunks that the recording missed
-  Meter<double> peak;              // of the output since the last reading
-  Meter<double> limited;           // the limiter's deepest gain since the last reading
-  Meter<std::uint64_t> xruns;      // [the backend's own notification thread]
-  Flag read;                       // raised by a reader: peak and limited start anew
+  Meter<double> peak;                // of the output since the last reading
+  Meter<double> limited;             // the limiter's deepest gain since the last reading
+  Meter<std::uint64_t> xruns;        // [the backend's own notification thread]
+  Flag read;                         // raised by a reader: peak and limited start anew
 };
 
 struct Process {
-  static constexpr std::size_t chunk_frames = 512;     // engines see no longer block
-  static constexpr std::size_t max_channels = 64;      // of a model
-  static constexpr std::size_t max_events = 4096;      // in one chunk, and waiting for their frame
-  static constexpr double fade_s = 0.05;               // between two models
+  static constexpr std::size_t chunk_frames = 512;  // engines see no longer block
+  static constexpr std::size_t max_channels = 64;   // of a model
+  static constexpr std::size_t max_events = 4096;   // in one chunk, and waiting for their frame
+  static constexpr double fade_s = 0.05;            // between two models
 
   explicit Process(double rate_hz, bool limit = true);
   ~Process();
@@ -101,11 +101,11 @@ struct Process {
   void set_rate(double rate_hz);
 
   // --- shared with other threads --------------------------------------------------------------
-  Slot<Sounding> slot;                 // offered by the session's worker
+  Slot<Sounding> slot;  // offered by the session's worker
   Ring<TimedEvent> from_osc{4096};
   Ring<TimedEvent> from_console{1024};
-  Ring<TimedEvent> from_midi{4096};    // RtMidi's thread
-  Ring<Report> reports{4096};          // to the session's worker
+  Ring<TimedEvent> from_midi{4096};  // RtMidi's thread
+  Ring<Report> reports{4096};        // to the session's worker
   Ring<RecordedChunk> recording{8192};
   Flag is_recording;
   ClockBoard clock;
@@ -133,7 +133,7 @@ struct Process {
 
   double rate_hz_;
   bool limit_;
-  std::int64_t frame_ = 0;     // of the next sample
+  std::int64_t frame_ = 0;  // of the next sample
   std::uint64_t order_ = 0;
   MidiReader midi_;
   Sounding* current_ = nullptr;
@@ -142,14 +142,14 @@ struct Process {
   std::size_t fade_frames_ = 0;
   std::uint64_t resets_told_ = 0;  // of the current engine
   Limiter limiter_;
-  std::vector<Pending> pending_;   // a heap, the earliest on top; never grows
-  std::vector<Event> due_;         // of this chunk, sorted
-  std::vector<Event> matching_;    // those of one engine
+  std::vector<Pending> pending_;  // a heap, the earliest on top; never grows
+  std::vector<Event> due_;        // of this chunk, sorted
+  std::vector<Event> matching_;   // those of one engine
   std::array<const double*, max_channels> input_pointers_{};
-  std::vector<double> input_;      // [channel][chunk_frames]
-  std::vector<double> sound_;      // [channel][chunk_frames] of the current engine
-  std::vector<double> fade_sound_; // [channel][chunk_frames] of the fading one
-  std::vector<double> mixed_;      // [output][chunk_frames]
+  std::vector<double> input_;       // [channel][chunk_frames]
+  std::vector<double> sound_;       // [channel][chunk_frames] of the current engine
+  std::vector<double> fade_sound_;  // [channel][chunk_frames] of the fading one
+  std::vector<double> mixed_;       // [output][chunk_frames]
 };
 
 }  // namespace ressort

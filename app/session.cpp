@@ -7,7 +7,9 @@
 namespace ressort {
 namespace {
 
-double to_db(double factor) { return 20.0 * std::log10(factor); }
+double to_db(double factor) {
+  return 20.0 * std::log10(factor);
+}
 
 }  // namespace
 

@@ -19,8 +19,8 @@
 namespace ressort {
 
 struct SessionOptions {
-  CompileOptions compile;   // its rate is the backend's
-  double gain = 1.0;        // on top of every preset's
+  CompileOptions compile;  // its rate is the backend's
+  double gain = 1.0;       // on top of every preset's
 };
 
 // What sounds now, as people see it. Never changes once published.
@@ -43,8 +43,8 @@ struct Status {
   double load_ms = 0.0;
   int voices = 0;
   int max_voices = 0;
-  double cpu = 0.0;       // share of the time there is, 0..1; -1: not known
-  double peak_db = 0.0;   // since the last asking; -inf is silence
+  double cpu = 0.0;         // share of the time there is, 0..1; -1: not known
+  double peak_db = 0.0;     // since the last asking; -inf is silence
   double limited_db = 0.0;  // the limiter's deepest cut since the last asking
   std::uint64_t xruns = 0;
   std::uint64_t resets = 0;
@@ -120,9 +120,9 @@ class Session {
   std::function<double()> cpu_;
   std::function<void(int)> prepare_inputs_;
 
-  std::uint32_t serial_ = 0;     // [worker]
-  std::string scene_name_;       // [worker] what was loaded last
-  std::thread worker_;           // last, so that it ends first
+  std::uint32_t serial_ = 0;  // [worker]
+  std::string scene_name_;    // [worker] what was loaded last
+  std::thread worker_;        // last, so that it ends first
 };
 
 }  // namespace ressort

@@ -14,8 +14,20 @@ namespace ressort {
 enum class Op : std::uint8_t {
   number,     // push `value`
   parameter,  // push the parameter `index`
-  negate, add, subtract, multiply, divide,
-  sqrt, abs, sin, cos, exp, power, minimum, maximum, clamp,
+  negate,
+  add,
+  subtract,
+  multiply,
+  divide,
+  sqrt,
+  abs,
+  sin,
+  cos,
+  exp,
+  power,
+  minimum,
+  maximum,
+  clamp,
 };
 
 struct Step {
@@ -37,30 +49,61 @@ inline double evaluate(std::span<const Step> formula, std::span<const double> pa
   std::size_t top = 0;
   for (const Step& step : formula) {
     switch (step.op) {
-      case Op::number: stack[top++] = step.value; continue;
-      case Op::parameter: stack[top++] = parameters[step.index]; continue;
-      case Op::negate: stack[top - 1] = -stack[top - 1]; continue;
-      case Op::sqrt: stack[top - 1] = std::sqrt(stack[top - 1]); continue;
-      case Op::abs: stack[top - 1] = std::fabs(stack[top - 1]); continue;
-      case Op::sin: stack[top - 1] = std::sin(stack[top - 1]); continue;
-      case Op::cos: stack[top - 1] = std::cos(stack[top - 1]); continue;
-      case Op::exp: stack[top - 1] = std::exp(stack[top - 1]); continue;
+      case Op::number:
+        stack[top++] = step.value;
+        continue;
+      case Op::parameter:
+        stack[top++] = parameters[step.index];
+        continue;
+      case Op::negate:
+        stack[top - 1] = -stack[top - 1];
+        continue;
+      case Op::sqrt:
+        stack[top - 1] = std::sqrt(stack[top - 1]);
+        continue;
+      case Op::abs:
+        stack[top - 1] = std::fabs(stack[top - 1]);
+        continue;
+      case Op::sin:
+        stack[top - 1] = std::sin(stack[top - 1]);
+        continue;
+      case Op::cos:
+        stack[top - 1] = std::cos(stack[top - 1]);
+        continue;
+      case Op::exp:
+        stack[top - 1] = std::exp(stack[top - 1]);
+        continue;
       case Op::clamp:
         top -= 2;
         stack[top - 1] = std::min(std::max(stack[top - 1], stack[top]), stack[top + 1]);
         continue;
-      default: break;
+      default:
+        break;
     }
     const double right = stack[--top];
     double& left = stack[top - 1];
     switch (step.op) {
-      case Op::add: left += right; break;
-      case Op::subtract: left -= right; break;
-      case Op::multiply: left *= right; break;
-      case Op::divide: left /= right; break;
-      case Op::power: left = std::pow(left, right); break;
-      case Op::minimum: left = std::min(left, right); break;
-      default: left = std::max(left, right); break;
+      case Op::add:
+        left += right;
+        break;
+      case Op::subtract:
+        left -= right;
+        break;
+      case Op::multiply:
+        left *= right;
+        break;
+      case Op::divide:
+        left /= right;
+        break;
+      case Op::power:
+        left = std::pow(left, right);
+        break;
+      case Op::minimum:
+        left = std::min(left, right);
+        break;
+      default:
+        left = std::max(left, right);
+        break;
     }
   }
   return top == 0 ? 0.0 : stack[0];

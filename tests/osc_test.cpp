@@ -8,112 +8,23 @@
 
 #include <algorithm>
 #include <array>
-#include <bit>
 #include <cmath>
 #include <cstdlib>
 #include <ctime>
 #include <filesystem>
 #include <fstream>
 #include <random>
-#include <variant>
 
 #include "app/audio.h"
 #include "app/osc_packet.h"
 #include "tests/catch.h"
+#include "tests/osc_bytes.h"
 
 namespace ressort {
 namespace {
 
-using Bytes = std::vector<std::uint8_t>;
-using Value = std::variant<std::int32_t, float, double, std::string>;
-
 constexpr double rate_hz = 48000.0;
 constexpr std::size_t period = 256;
-
-// --- packets, made and read without liblo -------------------------------------------------------
-
-void put(Bytes& bytes, std::uint64_t value, int size) {
-  for (int shift = 8 * (size - 1); shift >= 0; shift -= 8) {
-    bytes.push_back(static_cast<std::uint8_t>(value >> shift));
-  }
-}
-
-void put(Bytes& bytes, std::string_view text) {
-  bytes.insert(bytes.end(), text.begin(), text.end());
-  bytes.resize(bytes.size() / 4 * 4 + 4);
-}
-
-void put(Bytes& bytes, const Value& value) {
-  if (const auto* const whole = std::get_if<std::int32_t>(&value)) {
-    put(bytes, static_cast<std::uint32_t>(*whole), 4);
-  } else if (const auto* const real = std::get_if<float>(&value)) {
-    put(bytes, std::bit_cast<std::uint32_t>(*real), 4);
-  } else if (const auto* const precise = std::get_if<double>(&value)) {
-    put(bytes, std::bit_cast<std::uint64_t>(*precise), 8);
-  } else {
-    put(bytes, std::string_view(std::get<std::string>(value)));
-  }
-}
-
-Bytes message(std::string_view address, const std::vector<Value>& values = {}) {
-  Bytes bytes;
-  put(bytes, address);
-  std::string tags = ",";
-  for (const Value& value : values) {
-    tags += "ifds"[value.index()];
-  }
-  put(bytes, std::string_view(tags));
-  for (const Value& value : values) {
-    put(bytes, value);
-  }
-  return bytes;
-}
-
-Bytes bundle(std::uint64_t time_tag, const std::vector<Bytes>& elements) {
-  Bytes bytes;
-  put(bytes, std::string_view("#bundle"));
-  put(bytes, time_tag, 8);
-  for (const Bytes& element : elements) {
-    put(bytes, element.size(), 4);
-    bytes.insert(bytes.end(), element.begin(), element.end());
-  }
-  return bytes;
-}
-
-struct Answer {
-  std::string address;
-  std::vector<Value> values;
-  const std::string& text(std::size_t i) const { return std::get<std::string>(values.at(i)); }
-};
-
-Answer read_answer(const Bytes& bytes) {
-  const auto text_at = [&](std::size_t& at) {
-    const std::string text(reinterpret_cast<const char*>(bytes.data() + at));
-    at += text.size() / 4 * 4 + 4;
-    return text;
-  };
-  const auto number_at = [&](std::size_t& at, std::size_t size) {
-    std::uint64_t value = 0;
-    for (std::size_t end = at + size; at < end; ++at) {
-      value = value << 8 | bytes.at(at);
-    }
-    return value;
-  };
-  std::size_t at = 0;
-  Answer answer{text_at(at), {}};
-  for (const char tag : text_at(at).substr(1)) {
-    if (tag == 's') {
-      answer.values.emplace_back(text_at(at));
-    } else if (tag == 'd') {
-      answer.values.emplace_back(std::bit_cast<double>(number_at(at, 8)));
-    } else if (const auto word = static_cast<std::uint32_t>(number_at(at, 4)); tag == 'f') {
-      answer.values.emplace_back(std::bit_cast<float>(word));
-    } else {
-      answer.values.emplace_back(static_cast<std::int32_t>(word));
-    }
-  }
-  return answer;
-}
 
 // --- a client, and a process that the test drives -----------------------------------------------
 
@@ -266,96 +177,9 @@ bool has(const Answer& answer, std::string_view address, std::string_view about,
          std::get<std::string>(answer.values.back()).find(part) != std::string::npos;
 }
 
-// --- the check ----------------------------------------------------------------------------------
-
-Bytes raw(std::string_view text) {
-  return Bytes(text.begin(), text.end());
-}
-
-#define RAW(literal) raw(std::string_view(literal, sizeof(literal) - 1))
-
-TEST_CASE("check_packet gives the messages of good packets") {
-  const Bytes single = RAW("/a\0\0,i\0\0\0\0\0\7");
-  const auto one = check_packet(single);
-  REQUIRE(one);
-  REQUIRE(one->size() == 1);
-  CHECK(one->front().bytes.size() == 12);
-  CHECK(one->front().time_tag == 1);
-
-  CHECK(check_packet(RAW("/abc\0\0\0\0,\0\0\0")));
-  CHECK(check_packet(RAW("/a\0\0,TFNI\0\0\0")));
-  CHECK(
-      check_packet(RAW("/a\0\0,hdt\0\0\0\0"
-                       "12345678abcdefgh\0\0\0\0\0\0\0\1")));
-  CHECK(check_packet(RAW("/a\0\0,sSb\0\0\0\0text\0\0\0\0abc\0\0\0\0\5hello\0\0\0")));
-  CHECK(check_packet(RAW("/a\0\0,crm\0\0\0\0\0\0\0xRGBA\1\2\3\4")));
-  CHECK(check_packet(RAW("/a\0\0,b\0\0\0\0\0\0")));
-
-  const auto empty = check_packet(bundle(5, {}));
-  REQUIRE(empty);
-  CHECK(empty->empty());
-
-  const Bytes outer =
-      bundle(5, {message("/a"), bundle(7, {message("/b", {1, 2.5f})}), message("/c")});
-  const auto nested = check_packet(outer);
-  REQUIRE(nested);
-  REQUIRE(nested->size() == 3);
-  CHECK((*nested)[0].time_tag == 5);
-  CHECK((*nested)[1].time_tag == 7);
-  CHECK((*nested)[2].time_tag == 5);
-  CHECK((*nested)[2].bytes[1] == 'c');
-}
-
-TEST_CASE("check_packet refuses every kind of bad packet") {
-  const auto refused = [](const Bytes& bytes, std::string_view because) {
-    const auto result = check_packet(bytes);
-    INFO(because);
-    REQUIRE_FALSE(result);
-    INFO(result.error().message);
-    CHECK(result.error().message.find(because) != std::string::npos);
-  };
-  refused({}, "not 0");
-  refused(RAW("/a\0\0,\0\0"), "multiple of 4");
-  refused(Bytes(max_osc_packet_bytes + 1), "at most 65507 bytes");
-  refused(RAW("abc\0,\0\0\0"), "begin with '/'");
-  refused(RAW("\0\0\0\0,\0\0\0"), "begin with '/'");
-  refused(RAW("/\x7f\0\0,\0\0\0"), "printable");
-  refused(RAW("/\xc3\xa4\0,\0\0\0"), "printable");
-  refused(RAW("/abc"), "an address does not end");
-  refused(RAW("/a\0x,\0\0\0"), "an address is not padded");
-  refused(RAW("/a\0\0"), "no type tags");
-  refused(RAW("/a\0\0i\0\0\0\0\0\0\0"), "begin with ','");
-  refused(RAW("/a\0\0,iii"), "a type tag string does not end");
-  refused(RAW("/a\0\0,\0\0i"), "a type tag string is not padded");
-  refused(RAW("/a\0\0,[]\0"), "none of");
-  refused(RAW("/a\0\0,i\0\0"), "fewer arguments");
-  refused(RAW("/a\0\0,d\0\0\0\0\0\0"), "fewer arguments");
-  refused(RAW("/a\0\0,\0\0\0\0\0\0\0"), "more bytes");
-  refused(RAW("/a\0\0,s\0\0abcd"), "a string argument does not end");
-  refused(RAW("/a\0\0,s\0\0a\0\0x"), "a string argument is not padded");
-  refused(RAW("/a\0\0,b\0\0"), "a blob's size is missing");
-  refused(RAW("/a\0\0,b\0\0\0\0\0\5abcd"), "a blob is longer");
-  refused(RAW("/a\0\0,b\0\0\xff\xff\xff\xff"), "a blob is longer");
-  refused(RAW("/a\0\0,b\0\0\0\0\0\1axxx"), "a blob is not padded");
-  refused(RAW("#bundl\0\0\0\0\0\0\0\0\0\1"), "#bundle");
-  refused(RAW("#bundle\0\0\0\0\1"), "#bundle");
-  refused(RAW("#bundle\0\0\0\0\0\0\0\0\1\0\0\0\0"), "not 0");
-  refused(RAW("#bundle\0\0\0\0\0\0\0\0\1\0\0\0\6/a\0\0,\0\0\0"), "multiple of 4");
-  refused(RAW("#bundle\0\0\0\0\0\0\0\0\1\0\0\0\x0c/a\0\0,\0\0\0"), "longer than the bundle");
-  refused(RAW("#bundle\0\0\0\0\0\0\0\0\1\xff\xff\xff\xfc"), "longer than the bundle");
-  refused(bundle(1, {message("/a"), RAW("/b\0\0")}), "no type tags");
-
-  Bytes deep = message("/a");
-  for (int depth = 0; depth < max_osc_bundle_depth; ++depth) {
-    deep = bundle(1, {deep});
-  }
-  CHECK(check_packet(deep));
-  refused(bundle(1, {deep}), "depth");
-}
-
 // --- the server ---------------------------------------------------------------------------------
 
-TEST_CASE("a parameter is set and asked for over OSC") {
+TEST_CASE("a parameter is set and asked for over OSC", "[osc]") {
   Rig rig;
   Client& client = rig.client;
   CHECK(std::get<float>(client.ask(message("/param/m_K")).values.at(0)) == 0.02f);
@@ -381,7 +205,7 @@ TEST_CASE("a parameter is set and asked for over OSC") {
   CHECK(has(client.ask(message("/" + std::string(300, 'a'))), "/error", "", "255"));
 }
 
-TEST_CASE("status and describe answer in full") {
+TEST_CASE("status and describe answer in full", "[osc]") {
   Rig rig;
   rig.drive(1);
   const Answer status = rig.client.ask(message("/status"));
@@ -403,7 +227,7 @@ TEST_CASE("status and describe answer in full") {
   CHECK(has(rows.back(), "/describe.reply", "/param/m_Z", "0.2 "));
 }
 
-TEST_CASE("the messages of a bundle act together") {
+TEST_CASE("the messages of a bundle act together", "[osc]") {
   Rig rig;
   rig.drive(1);
   rig.client.send(bundle(1, {message("/in/1/force", {0.1}), message("/in/2/force", {0.1})}));
@@ -430,7 +254,7 @@ TEST_CASE("the messages of a bundle act together") {
   CHECK(first.when == second.when);
 }
 
-TEST_CASE("time tags keep their distance to the frame") {
+TEST_CASE("time tags keep their distance to the frame", "[osc]") {
   Rig rig;
   CHECK(has(rig.client.ask(bundle(rig.tag(rig.time_ns(0)), {message("/panic")})), "/error",
             "/panic", "no audio"));
@@ -471,7 +295,7 @@ TEST_CASE("time tags keep their distance to the frame") {
             "/error", "/panic", "s ahead"));
 }
 
-TEST_CASE("time tags follow the clock when the audio has stood still") {
+TEST_CASE("time tags follow the clock when the audio has stood still", "[osc]") {
   Rig rig;
   rig.drive(1);
   rig.client.send(bundle(rig.tag(rig.time_ns(9600)), {message("/in/1/force", {0.1})}));
@@ -488,7 +312,7 @@ TEST_CASE("time tags follow the clock when the audio has stood still") {
   CHECK(std::abs(onsets[1] - 21600) < 48);
 }
 
-TEST_CASE("a taken port and a wrong address are told apart") {
+TEST_CASE("a taken port and a wrong address are told apart", "[osc]") {
   Rig rig;
   const auto second = OscServer::open({.port = rig.server->port()}, rig.process, rig.session);
   REQUIRE_FALSE(second);
@@ -508,7 +332,7 @@ TEST_CASE("a taken port and a wrong address are told apart") {
   CHECK(OscServer::open({.port = port}, rig.process, rig.session));
 }
 
-TEST_CASE("loading answers done or fail, with the asker's number") {
+TEST_CASE("loading answers done or fail, with the asker's number", "[osc]") {
   Rig rig;
   const Answer done = rig.client.ask(message("/model/load", {rig.model.path(), 7}));
   CHECK(done.address == "/done");
@@ -531,7 +355,7 @@ TEST_CASE("loading answers done or fail, with the asker's number") {
   CHECK(rig.session.load_and_wait(rig.model.path()));
 }
 
-TEST_CASE("a full queue refuses, and takes again when there is room") {
+TEST_CASE("a full queue refuses, and takes again when there is room", "[osc]") {
   Rig rig;
   const Bytes many = bundle(1, std::vector<Bytes>(1500, message("/bend", {0.5f})));
   bool was_refused = false;
@@ -548,7 +372,7 @@ TEST_CASE("a full queue refuses, and takes again when there is room") {
   CHECK(rig.client.sync().empty());
 }
 
-TEST_CASE("answers are not answered, and rubbish seldom") {
+TEST_CASE("answers are not answered, and rubbish seldom", "[osc]") {
   Rig rig;
   rig.client.send(message("/error", {"/a", "b"}));
   rig.client.send(bundle(1, {message("/done"), message("/status.reply")}));
@@ -567,7 +391,7 @@ TEST_CASE("answers are not answered, and rubbish seldom") {
   CHECK(answers <= 10 * ((monotonic_ns() - start_ns) / 1'000'000'000 + 2));
 }
 
-TEST_CASE("ten thousand broken packets leave the server and the sound whole") {
+TEST_CASE("ten thousand broken packets leave the server and the sound whole", "[osc]") {
   Rig rig;
   rig.drive(1);
   const std::vector<Bytes> seeds = {

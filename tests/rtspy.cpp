@@ -74,10 +74,22 @@ void* __libc_realloc(void*, size_t);
 void* __libc_memalign(size_t, size_t);
 void __libc_free(void*);
 
-void* malloc(size_t size) { count(allocations); return __libc_malloc(size); }
-void* calloc(size_t n, size_t size) { count(allocations); return __libc_calloc(n, size); }
-void* realloc(void* old, size_t size) { count(allocations); return __libc_realloc(old, size); }
-void* memalign(size_t align, size_t size) { count(allocations); return __libc_memalign(align, size); }
+void* malloc(size_t size) {
+  count(allocations);
+  return __libc_malloc(size);
+}
+void* calloc(size_t n, size_t size) {
+  count(allocations);
+  return __libc_calloc(n, size);
+}
+void* realloc(void* old, size_t size) {
+  count(allocations);
+  return __libc_realloc(old, size);
+}
+void* memalign(size_t align, size_t size) {
+  count(allocations);
+  return __libc_memalign(align, size);
+}
 void* aligned_alloc(size_t align, size_t size) {
   count(allocations);
   return __libc_memalign(align, size);
@@ -94,11 +106,11 @@ void free(void* memory) {
   __libc_free(memory);
 }
 
-#define PASS(kind, name, declared, passed)                     \
-  int name declared {                                          \
-    static const auto next = real(&name, #name);               \
-    count(kind);                                               \
-    return next passed;                                        \
+#define PASS(kind, name, declared, passed)       \
+  int name declared {                            \
+    static const auto next = real(&name, #name); \
+    count(kind);                                 \
+    return next passed;                          \
   }
 PASS(locks, pthread_mutex_lock, (pthread_mutex_t * m), (m))
 PASS(locks, pthread_mutex_trylock, (pthread_mutex_t * m), (m))

@@ -148,9 +148,9 @@ class Server {
  public:
   explicit Server(int period_frames) {
     use_test_server();
-    jackd_ = std::make_unique<Child>(std::vector<std::string>{
-        "jackd", "-r", "-n", server_name, "-d", "dummy", "-r", "48000", "-p",
-        std::to_string(period_frames)});
+    jackd_ = std::make_unique<Child>(std::vector<std::string>{"jackd", "-r", "-n", server_name,
+                                                              "-d", "dummy", "-r", "48000", "-p",
+                                                              std::to_string(period_frames)});
     REQUIRE(eventually([] {
       jack_client_t* client = jack_client_open("knock", JackNoStartServer, nullptr);
       if (client != nullptr) {
@@ -244,7 +244,8 @@ class Listener {
                             message.bytes.data(), message.bytes.size());
     }
     const std::size_t room = heard_.size() - std::min(heard_.size(), at);
-    std::copy(audio, audio + std::min<std::size_t>(frames, room), heard_.begin() + static_cast<std::ptrdiff_t>(at));
+    std::copy(audio, audio + std::min<std::size_t>(frames, room),
+              heard_.begin() + static_cast<std::ptrdiff_t>(at));
     at_ = at + std::min<std::size_t>(frames, room);
     return 0;
   }

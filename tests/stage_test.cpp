@@ -180,7 +180,8 @@ TEST_CASE("The callback allocates, locks, reads, writes and waits never", "[call
           lo_send(osc(), "/in/1/force", "ff", 0.001f, 0.01f);
           lo_send(osc(), "/nonsense", "s", "x");
         }
-        lo_send(osc(), "/model/load", "s", scenes[static_cast<std::size_t>(round) % std::size(scenes)]);
+        lo_send(osc(), "/model/load", "s",
+                scenes[static_cast<std::size_t>(round) % std::size(scenes)]);
         play.write("set m_K 0.1\nnoteon 60\npluck\nstatus\n");
         play.forget();
         std::this_thread::sleep_for(100ms);
@@ -190,7 +191,8 @@ TEST_CASE("The callback allocates, locks, reads, writes and waits never", "[call
     }
     auto found = counts();
     CHECK(found["callbacks"] > 10000);
-    for (const char* kind : {"allocations", "releases", "locks", "reads", "writes", "waits", "others"}) {
+    for (const char* kind :
+         {"allocations", "releases", "locks", "reads", "writes", "waits", "others"}) {
       INFO(kind);
       CHECK(found[kind] == 0);
     }
@@ -218,7 +220,8 @@ TEST_CASE("RtMidi's messages are heard, through its JACK side", "[rtmidi]") {
 }
 
 TEST_CASE("The ALSA null device runs, and plays what OSC asks for", "[alsa]") {
-  Child play(program({"play", "PolyTriangle", "-a", "alsa", "-d", "null", "-m", "none", "-u", osc_port}));
+  Child play(
+      program({"play", "PolyTriangle", "-a", "alsa", "-d", "null", "-m", "none", "-u", osc_port}));
   REQUIRE(answers());
   CHECK(play.said().find("ALSA 'null'") != std::string::npos);
   CHECK(eventually([&] {
@@ -255,7 +258,8 @@ TEST_CASE("The death of the server is survived, or told by the exit code", "[ser
   }
 
   SECTION("--exit-on-loss ends with 75") {
-    Child play(program({"play", "PolyTriangle", "-a", "jack", "-i", "--exit-on-loss", "-u", osc_port}));
+    Child play(
+        program({"play", "PolyTriangle", "-a", "jack", "-i", "--exit-on-loss", "-u", osc_port}));
     REQUIRE(answers());
     server->kill();
     CHECK(play.exit_code() == 75);

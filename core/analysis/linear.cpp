@@ -1,9 +1,9 @@
 #include "core/analysis/linear.h"
 
-#include <Eigen/Dense>
-#include <Eigen/Sparse>
 #include <Spectra/MatOp/SparseSymShiftSolve.h>
 #include <Spectra/SymEigsShiftSolver.h>
+#include <Eigen/Dense>
+#include <Eigen/Sparse>
 #include <algorithm>
 #include <cmath>
 #include <numbers>
@@ -14,7 +14,7 @@ namespace {
 using Sparse = Eigen::SparseMatrix<double>;
 using Vector = Eigen::VectorXd;
 
-constexpr int dense_size = 64;  // below this a dense solver is faster and never fails
+constexpr int dense_size = 64;   // below this a dense solver is faster and never fails
 constexpr double rigid = 1e-12;  // a smaller share of the largest stiffness is rounding
 
 // M^(-1/2) A M^(-1/2) for A = K and A = Z, over the masses that move.
@@ -85,7 +85,7 @@ bool lowest_pair(const Sparse& matrix, double floor, double& value, Vector& vect
     // The shift lies a little below 0, so that free networks can be factored too.
     Spectra::SparseSymShiftSolve<double> shifted(matrix);
     Spectra::SymEigsShiftSolver<Spectra::SparseSymShiftSolve<double>> solver(shifted, 6, 24,
-                                                                            -1e3 * floor);
+                                                                             -1e3 * floor);
     solver.init();
     solver.compute(Spectra::SortRule::LargestMagn, 200, 1e-10, Spectra::SortRule::SmallestAlge);
     if (solver.info() != Spectra::CompInfo::Successful) {

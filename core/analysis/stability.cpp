@@ -18,17 +18,21 @@ struct Weight {
 Weight weight_of(const Network& network, const Link& link, std::span<const double> highest,
                  double r) {
   const auto value = [&](int i) {
-    return std::max(0.0, argument_value(network, link.arguments[static_cast<std::size_t>(i)],
-                                        highest));
+    return std::max(0.0,
+                    argument_value(network, link.arguments[static_cast<std::size_t>(i)], highest));
   };
   switch (link.kind) {
     case LinkKind::spring:
-    case LinkKind::contact: return {value(0) * r * r, 2.0 * value(1) * r};
-    case LinkKind::pluck: return {0.1 * value(0) * r * r, 2.0 * value(2) * r};
+    case LinkKind::contact:
+      return {value(0) * r * r, 2.0 * value(1) * r};
+    case LinkKind::pluck:
+      return {0.1 * value(0) * r * r, 2.0 * value(2) * r};
     // A bow's friction grows with the square root of the factor; counting it with the factor
     // itself is on the safe side above 1.
-    case LinkKind::bow: return {2.0 * value(0) * r * 2.0 / 3.0, 0.0};
-    case LinkKind::smooth_bow: return {2.0 * value(0) * r * 1.0387, 0.0};
+    case LinkKind::bow:
+      return {2.0 * value(0) * r * 2.0 / 3.0, 0.0};
+    case LinkKind::smooth_bow:
+      return {2.0 * value(0) * r * 1.0387, 0.0};
   }
   return {};
 }

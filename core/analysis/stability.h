@@ -18,7 +18,6 @@ struct ParameterBox {
 // mass; plucks, bows and contacts enter with their steepest slopes. `rate_ratio` is 44100 / rate.
 // At most 0 where the dampers alone are too strong; 1e9 where there is nothing to bound.
 // O(links). [any thread but audio]
-double highest_stiffness_factor(const Network& network, const ParameterBox& box,
-                                double rate_ratio);
+double highest_stiffness_factor(const Network& network, const ParameterBox& box, double rate_ratio);
 
 }  // namespace ressort

@@ -27,11 +27,16 @@ struct LawRow {
 // Which law a link follows, and how its arguments scale.
 LawRow law_of(LinkKind kind) {
   switch (kind) {
-    case LinkKind::spring: return {Law::spring, {Unit::stiffness, Unit::damping, Unit::plain}};
-    case LinkKind::pluck: return {Law::pluck, {Unit::stiffness, Unit::plain, Unit::damping}};
-    case LinkKind::bow: return {Law::bow, {Unit::friction, Unit::speed, Unit::plain}};
-    case LinkKind::smooth_bow: return {Law::smooth_bow, {Unit::friction, Unit::speed, Unit::plain}};
-    case LinkKind::contact: return {Law::contact, {Unit::stiffness, Unit::damping, Unit::plain}};
+    case LinkKind::spring:
+      return {Law::spring, {Unit::stiffness, Unit::damping, Unit::plain}};
+    case LinkKind::pluck:
+      return {Law::pluck, {Unit::stiffness, Unit::plain, Unit::damping}};
+    case LinkKind::bow:
+      return {Law::bow, {Unit::friction, Unit::speed, Unit::plain}};
+    case LinkKind::smooth_bow:
+      return {Law::smooth_bow, {Unit::friction, Unit::speed, Unit::plain}};
+    case LinkKind::contact:
+      return {Law::contact, {Unit::stiffness, Unit::damping, Unit::plain}};
   }
   return {};
 }
@@ -202,8 +207,8 @@ Result<Control> make_control(const Network& network, const ControlSetting& setti
   control.exponential = setting.exponential;
   control.travel = setting.travel;
   const bool to_parameter = control.gesture == Gesture::parameter;
-  const int target = to_parameter ? find_parameter(network, setting.target)
-                                  : find_input(network, setting.target);
+  const int target =
+      to_parameter ? find_parameter(network, setting.target) : find_input(network, setting.target);
   if (target < 0) {
     return preset_error(setting.place,
                         to_parameter ? "the model has no parameter '" + setting.target +
@@ -344,8 +349,7 @@ Result<Compiled> compile(const Network& network, const Preset& preset,
   }
   if (instrument.mode) {
     playing.tuning = Tuning::keyboard;
-    playing.mode_stiffness =
-        instrument.mode->stiffness * program.rate_ratio * program.rate_ratio;
+    playing.mode_stiffness = instrument.mode->stiffness * program.rate_ratio * program.rate_ratio;
     playing.mode_damping = instrument.mode->damping * program.rate_ratio;
     instrument.is_tuned = true;
     instrument.highest_frequency_hz =

@@ -36,7 +36,8 @@ std::vector<std::uint32_t> connected(const Network& network) {
 
 std::string_view method_name(Method method) {
   switch (method) {
-    case Method::direct: return "direct";
+    case Method::direct:
+      return "direct";
   }
   return "";
 }

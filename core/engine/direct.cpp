@@ -101,16 +101,21 @@ void step_links(const Program& program, State<T>& state) {
 
 double coefficient_value(const Program& program, const Coefficient& coefficient,
                          std::span<const double> parameters, double stiffness_factor) {
-  const double value = evaluate(
-      std::span(program.steps).subspan(coefficient.first, coefficient.count), parameters);
+  const double value =
+      evaluate(std::span(program.steps).subspan(coefficient.first, coefficient.count), parameters);
   const double r = program.rate_ratio;
   switch (coefficient.unit) {
-    case Unit::plain: return value;
-    case Unit::stiffness: return value * r * r * stiffness_factor;
-    case Unit::damping: return value * r;
+    case Unit::plain:
+      return value;
+    case Unit::stiffness:
+      return value * r * r * stiffness_factor;
+    case Unit::damping:
+      return value * r;
     case Unit::friction:
-    case Unit::speed: return value * r * std::sqrt(stiffness_factor);
-    case Unit::inverse_mass: return 1.0 / value;
+    case Unit::speed:
+      return value * r * std::sqrt(stiffness_factor);
+    case Unit::inverse_mass:
+      return 1.0 / value;
   }
   return value;
 }
@@ -140,8 +145,8 @@ void reset_lane(const Program& program, State<T>& state, std::size_t lane) {
 }
 
 template <class T>
-void step_direct(const Program& program, State<T>& state, const Drive<T>* drive,
-                 Lanes<T>* outputs, std::size_t frames) {
+void step_direct(const Program& program, State<T>& state, const Drive<T>* drive, Lanes<T>* outputs,
+                 std::size_t frames) {
   using V = Lanes<T>;
   for (std::size_t frame = 0; frame < frames; ++frame) {
     if (state.ramp_frames > 0) {

@@ -11,13 +11,13 @@
 namespace ressort {
 namespace {
 
-constexpr std::size_t ramp_frames = 128;     // of a parameter; a shorter ramp is heard as a click
-constexpr double smoothing_hz = 44.1;        // of a position: its one-pole's (1 - pole) * rate
-constexpr double bow_start_s = 0.005;        // a bow reaches its speed as a one-pole of this time
-constexpr double steal_fade_s = 0.005;       // a voice that gives way takes this long to vanish
-constexpr double level_memory_s = 0.1;       // how long a voice's level remembers a peak
-constexpr double quiet_level = 1e-5;         // -100 dBFS
-constexpr double quiet_s = 0.5;              // longer than half a period of the slowest sound
+constexpr std::size_t ramp_frames = 128;  // of a parameter; a shorter ramp is heard as a click
+constexpr double smoothing_hz = 44.1;     // of a position: its one-pole's (1 - pole) * rate
+constexpr double bow_start_s = 0.005;     // a bow reaches its speed as a one-pole of this time
+constexpr double steal_fade_s = 0.005;    // a voice that gives way takes this long to vanish
+constexpr double level_memory_s = 0.1;    // how long a voice's level remembers a peak
+constexpr double quiet_level = 1e-5;      // -100 dBFS
+constexpr double quiet_s = 0.5;           // longer than half a period of the slowest sound
 constexpr double bend_semitones = 2.0;
 constexpr std::size_t most_reserve_lanes = 4;
 
@@ -32,9 +32,9 @@ struct Voice {
   double frequency_hz = 0.0;  // without bend; 0: as the model is written
   double factor = 1.0;        // on every stiffness
   double gain = 1.0;
-  double gain_step = 0.0;     // per sample
-  double peak = 0.0;          // of the network's output since the last settling
-  double level = 0.0;         // peak of the output, slowly forgotten
+  double gain_step = 0.0;  // per sample
+  double peak = 0.0;       // of the network's output since the last settling
+  double level = 0.0;      // peak of the output, slowly forgotten
   std::size_t quiet_frames = 0;
 };
 
@@ -74,14 +74,13 @@ struct Bank {
     State<T>& state = groups[lane / lane_count<T>];
     state.ramp_frames = state.ramping.empty() ? 0 : frames;
     for (const std::uint32_t c : state.ramping) {
-      state.increment[c] =
-          (state.target[c] - state.coefficient[c]) / static_cast<T>(frames);
+      state.increment[c] = (state.target[c] - state.coefficient[c]) / static_cast<T>(frames);
     }
   }
 
   std::vector<State<T>> groups;
-  std::vector<Drive<T>> drive;       // [frame][input]
-  std::vector<Lanes<T>> outputs;     // [frame][channel]
+  std::vector<Drive<T>> drive;    // [frame][input]
+  std::vector<Lanes<T>> outputs;  // [frame][channel]
 };
 
 }  // namespace
@@ -170,9 +169,16 @@ struct Engine::Voices {
 
   void perform(const Control& control, std::size_t lane, double amount) {
     switch (control.gesture) {
-      case Gesture::parameter: set_parameter(control.target, mapped(control, amount)); break;
-      case Gesture::position: move_to(control.target, mapped(control, amount)); break;
-      case Gesture::pluck: wake(lane); pluck(lane, control, amount); break;
+      case Gesture::parameter:
+        set_parameter(control.target, mapped(control, amount));
+        break;
+      case Gesture::position:
+        move_to(control.target, mapped(control, amount));
+        break;
+      case Gesture::pluck:
+        wake(lane);
+        pluck(lane, control, amount);
+        break;
       case Gesture::bow:
         wake(lane);
         hand(lane, control.target).draw(paced(mapped(control, amount), lane), bow_pole);
@@ -225,19 +231,18 @@ struct Engine::Voices {
   }
 
   void set_coefficient(std::size_t lane, std::uint32_t c, bool ramped) {
-    const double value = coefficient_value(program, program.coefficients[c], parameters,
-                                           voices[lane].factor);
+    const double value =
+        coefficient_value(program, program.coefficients[c], parameters, voices[lane].factor);
     std::visit([&](auto& b) { b.set_coefficient(lane, c, value, ramped); }, bank);
   }
 
   void tune(std::size_t lane, bool ramped) {
     Voice& voice = voices[lane];
     const double bent = std::exp2(bend * bend_semitones / 12.0);
-    const double factor =
-        voice.frequency_hz > 0.0
-            ? stiffness_factor(playing.mode_stiffness, playing.mode_damping,
-                               voice.frequency_hz * bent, program.rate_hz)
-            : bent * bent;
+    const double factor = voice.frequency_hz > 0.0
+                              ? stiffness_factor(playing.mode_stiffness, playing.mode_damping,
+                                                 voice.frequency_hz * bent, program.rate_hz)
+                              : bent * bent;
     voice.factor = std::min(factor, std::max(1.0, playing.highest_factor));
     for (std::uint32_t c = 0; c < program.coefficients.size(); ++c) {
       set_coefficient(lane, c, ramped);
@@ -411,7 +416,9 @@ struct Engine::Voices {
         }
         break;
       }
-      case 120: panic(); break;
+      case 120:
+        panic();
+        break;
       case 123:
         for (std::size_t lane = 0; lane < voices.size(); ++lane) {
           if (voices[lane].held && voices[lane].channel == channel) {
@@ -419,7 +426,8 @@ struct Engine::Voices {
           }
         }
         break;
-      default: break;
+      default:
+        break;
     }
     perform_all(last, event.value, [&](const Control& control) {
       return control.source == Source::controller && control.number == event.index;
@@ -451,11 +459,15 @@ struct Engine::Voices {
 
   void handle(const Event& event) {
     switch (event.kind) {
-      case EventKind::note_on: return note_on(event);
-      case EventKind::note_off: return note_off(event);
-      case EventKind::controller: return controller(event);
+      case EventKind::note_on:
+        return note_on(event);
+      case EventKind::note_off:
+        return note_off(event);
+      case EventKind::controller:
+        return controller(event);
       case EventKind::pressure:
-      case EventKind::key_pressure: return press(event.value);
+      case EventKind::key_pressure:
+        return press(event.value);
       case EventKind::bend:
         bend = std::clamp(event.value, -1.0, 1.0);
         for (std::size_t lane = 0; lane < voices.size(); ++lane) {
@@ -469,7 +481,8 @@ struct Engine::Voices {
           perform(playing.controls[event.index], last, event.value);
         }
         return;
-      case EventKind::parameter: return set_parameter(event.index, event.value);
+      case EventKind::parameter:
+        return set_parameter(event.index, event.value);
       case EventKind::position:
         for (std::size_t i = 0; i < program.inputs.size(); ++i) {
           if (program.inputs[i].number == event.index && !program.inputs[i].is_force) {
@@ -491,8 +504,9 @@ struct Engine::Voices {
         return;
       case EventKind::bow:
         if (const Control* control = control_for(event.index, Gesture::bow)) {
-          const double speed = std::copysign(event.value == 0.0 ? 0.0 : control->high, event.value) *
-                               std::min(1.0, std::fabs(event.value));
+          const double speed =
+              std::copysign(event.value == 0.0 ? 0.0 : control->high, event.value) *
+              std::min(1.0, std::fabs(event.value));
           wake(last);
           hand(last, control->target).draw(paced(speed, last), bow_pole);
           if (event.value2 >= 0.0) {
@@ -500,7 +514,8 @@ struct Engine::Voices {
           }
         }
         return;
-      case EventKind::panic: return panic();
+      case EventKind::panic:
+        return panic();
     }
   }
 
@@ -574,8 +589,8 @@ struct Engine::Voices {
       if (const double* const audio = audio_for(input, inputs)) {
         const Control& control = *audio_control[input];
         double before = audio_before[input];
-        const double scale = is_force ? control.high * program.rate_ratio * program.rate_ratio
-                                      : control.high;
+        const double scale =
+            is_force ? control.high * program.rate_ratio * program.rate_ratio : control.high;
         for (std::size_t n = 0; n < frames; ++n) {
           const double value = scale * audio[at + n];
           drive[n * count].value = Lanes<T>{} + static_cast<T>(value);
@@ -642,7 +657,8 @@ struct Engine::Voices {
       voice.gain = std::max(0.0, voice.gain + voice.gain_step);
       const double gain = playing.gain * voice.gain;
       for (std::size_t channel = 0; channel < channels; ++channel) {
-        outputs[channel][at + n] += gain * static_cast<double>(b.outputs[n * channels + channel][i]);
+        outputs[channel][at + n] +=
+            gain * static_cast<double>(b.outputs[n * channels + channel][i]);
       }
     }
     voice.peak = std::max(voice.peak, peak);
@@ -709,20 +725,20 @@ struct Engine::Voices {
   Program program;
   Playing playing;
   std::variant<Bank<float>, Bank<double>> bank;
-  std::vector<Voice> voices;        // [lane]
-  std::vector<Hand> hands;          // [lane][input]
-  std::vector<double> parameters;   // as they are now
-  std::vector<std::uint16_t> changes;  // parameters, since the last take_changes()
-  std::vector<std::uint16_t> told;     // what the last one gave
-  std::vector<double> rest;         // [input] where a new voice's hand starts
+  std::vector<Voice> voices;                  // [lane]
+  std::vector<Hand> hands;                    // [lane][input]
+  std::vector<double> parameters;             // as they are now
+  std::vector<std::uint16_t> changes;         // parameters, since the last take_changes()
+  std::vector<std::uint16_t> told;            // what the last one gave
+  std::vector<double> rest;                   // [input] where a new voice's hand starts
   std::vector<const Control*> audio_control;  // [input] null where no audio drives it
   std::vector<double> audio_before;           // [input]
   double pole = 0.0;
   double bow_pole = 0.0;
   double bend = 0.0;
   std::array<bool, 16> pedal{};
-  std::size_t last = 0;             // the lane that was played last: direct gestures act on it
-  std::size_t since_settled = 0;    // frames, below max_segment_frames between two segments
+  std::size_t last = 0;           // the lane that was played last: direct gestures act on it
+  std::size_t since_settled = 0;  // frames, below max_segment_frames between two segments
   std::uint64_t births = 0;
   std::uint64_t resets = 0;
   std::uint64_t stolen = 0;
@@ -760,11 +776,17 @@ std::span<const std::uint16_t> Engine::take_changes() {
   return voices_->told;
 }
 
-double Engine::parameter(std::uint16_t index) const { return voices_->parameters[index]; }
+double Engine::parameter(std::uint16_t index) const {
+  return voices_->parameters[index];
+}
 
-int Engine::output_count() const { return static_cast<int>(voices_->program.outputs.size()); }
+int Engine::output_count() const {
+  return static_cast<int>(voices_->program.outputs.size());
+}
 
-double Engine::rate_hz() const { return voices_->program.rate_hz; }
+double Engine::rate_hz() const {
+  return voices_->program.rate_hz;
+}
 
 EngineMeters Engine::meters() const {
   EngineMeters meters;

@@ -26,15 +26,15 @@ enum class Gesture : std::uint8_t {
 // One row of the control map: what drives which input or parameter, and how.
 struct Control {
   Source source = Source::note;
-  std::uint16_t number = 0;    // controller 0..127 or audio channel from 0
+  std::uint16_t number = 0;  // controller 0..127 or audio channel from 0
   std::uint8_t lowest_key = 0;
   std::uint8_t highest_key = 127;
   Gesture gesture = Gesture::position;
-  std::uint16_t target = 0;    // index into Program::inputs or Program::parameters
-  double low = 0.0;            // 0..1 becomes low..high: positions, forces, speeds per sample at
-  double high = 1.0;           //   44 100 Hz, parameter values
-  bool exponential = false;    // equal steps are equal ratios
-  double travel = 0.0;         // pluck: how far from its middle the hand rests, on either side
+  std::uint16_t target = 0;  // index into Program::inputs or Program::parameters
+  double low = 0.0;          // 0..1 becomes low..high: positions, forces, speeds per sample at
+  double high = 1.0;         //   44 100 Hz, parameter values
+  bool exponential = false;  // equal steps are equal ratios
+  double travel = 0.0;       // pluck: how far from its middle the hand rests, on either side
 };
 
 enum class Tuning : std::uint8_t {
@@ -45,10 +45,10 @@ enum class Tuning : std::uint8_t {
 // How a Program is played. Plain data, made by the compile room.
 struct Playing {
   int voices = 1;
-  double gain = 1.0;            // output per position unit
-  bool bare = false;            // the network alone: no ramps, no smoothing, no sleep
-  double release_s = 0.0;       // after its key is released a voice fades this long; 0: rings out
-  bool noise = false;           // the outputs shape white noise instead of being heard themselves
+  double gain = 1.0;       // output per position unit
+  bool bare = false;       // the network alone: no ramps, no smoothing, no sleep
+  double release_s = 0.0;  // after its key is released a voice fades this long; 0: rings out
+  bool noise = false;      // the outputs shape white noise instead of being heard themselves
   Tuning tuning = Tuning::fixed;
   int transpose = 0;            // semitones
   double mode_stiffness = 0.0;  // k/m of the lowest mode, at Program::rate_hz; 0: none known
@@ -60,9 +60,9 @@ struct Playing {
 enum class Precision : std::uint8_t { float32, float64 };
 
 struct EngineMeters {
-  int voices = 0;                 // that sound
-  std::uint64_t resets = 0;       // voices that went out of bounds and were put back to rest
-  std::uint64_t stolen = 0;       // voices that had to give way to a new note
+  int voices = 0;            // that sound
+  std::uint64_t resets = 0;  // voices that went out of bounds and were put back to rest
+  std::uint64_t stolen = 0;  // voices that had to give way to a new note
 };
 
 inline constexpr std::size_t max_segment_frames = 64;  // the kernels' block

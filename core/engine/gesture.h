@@ -53,17 +53,18 @@ class Hand {
     held_frames_ = frames;
   }
 
-  bool is_moving() const {
-    return motion_ != Motion::rest || pulse_ != 0.0 || held_frames_ > 0;
-  }
+  bool is_moving() const { return motion_ != Motion::rest || pulse_ != 0.0 || held_frames_ > 0; }
   double value() const { return value_; }
   double target() const { return target_; }
 
   HandSample next_position() {
     const double before = value_;
     switch (motion_) {
-      case Motion::rest: return {value_, 0.0};
-      case Motion::follow: approach(); break;
+      case Motion::rest:
+        return {value_, 0.0};
+      case Motion::follow:
+        approach();
+        break;
       case Motion::sweep:
         if (std::fabs(target_ - value_) <= speed_) {
           value_ = target_;

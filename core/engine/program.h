@@ -89,15 +89,15 @@ struct State {
   using V = Lanes<T>;
   explicit State(const Program& program);
 
-  std::vector<V> x;      // [node] position
-  std::vector<V> v;      // [node] change of position per sample
-  std::vector<V> force;  // [node] summed by the links, used by the next tick
-  std::vector<V> coefficient;           // [coefficient]
-  std::vector<V> increment;             // [coefficient] per sample, while ramping
-  std::vector<V> target;                // [coefficient] where the ramp ends
-  std::vector<std::uint32_t> ramping;   // coefficients that move; at most all of them
-  std::vector<bool> is_ramping;         // [coefficient]
-  std::size_t ramp_frames = 0;          // how many samples they still move
+  std::vector<V> x;                    // [node] position
+  std::vector<V> v;                    // [node] change of position per sample
+  std::vector<V> force;                // [node] summed by the links, used by the next tick
+  std::vector<V> coefficient;          // [coefficient]
+  std::vector<V> increment;            // [coefficient] per sample, while ramping
+  std::vector<V> target;               // [coefficient] where the ramp ends
+  std::vector<std::uint32_t> ramping;  // coefficients that move; at most all of them
+  std::vector<bool> is_ramping;        // [coefficient]
+  std::size_t ramp_frames = 0;         // how many samples they still move
 };
 
 // Puts one lane back to where the model starts; its coefficients stay. [audio] wait-free
@@ -114,7 +114,7 @@ struct Drive {
 // Steps `frames` samples by the published scheme, v += F/M, x += v: masses, then position inputs,
 // then links; outputs[frame][channel] are the new positions. [audio] wait-free
 template <class T>
-void step_direct(const Program& program, State<T>& state, const Drive<T>* drive,
-                 Lanes<T>* outputs, std::size_t frames);
+void step_direct(const Program& program, State<T>& state, const Drive<T>* drive, Lanes<T>* outputs,
+                 std::size_t frames);
 
 }  // namespace ressort

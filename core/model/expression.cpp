@@ -13,13 +13,17 @@ struct Function {
 };
 
 constexpr Function functions[] = {
-    {"sqrt", Op::sqrt, 1},    {"abs", Op::abs, 1},     {"sin", Op::sin, 1},
-    {"cos", Op::cos, 1},      {"exp", Op::exp, 1},     {"pow", Op::power, 2},
-    {"min", Op::minimum, 2},  {"max", Op::maximum, 2}, {"clamp", Op::clamp, 3},
+    {"sqrt", Op::sqrt, 1},   {"abs", Op::abs, 1},     {"sin", Op::sin, 1},
+    {"cos", Op::cos, 1},     {"exp", Op::exp, 1},     {"pow", Op::power, 2},
+    {"min", Op::minimum, 2}, {"max", Op::maximum, 2}, {"clamp", Op::clamp, 3},
 };
 
-bool is_digit(char c) { return c >= '0' && c <= '9'; }
-bool is_letter(char c) { return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || c == '_'; }
+bool is_digit(char c) {
+  return c >= '0' && c <= '9';
+}
+bool is_letter(char c) {
+  return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || c == '_';
+}
 
 // The number that `text` starts with, infinite where it is out of a double's range; `length` is 0
 // where it starts with none.

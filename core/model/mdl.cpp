@@ -11,8 +11,16 @@
 namespace ressort {
 namespace {
 
-enum class Element { parameter, ground, mass, oscillator, position_input, force_input,
-                     position_output, link };
+enum class Element {
+  parameter,
+  ground,
+  mass,
+  oscillator,
+  position_input,
+  force_input,
+  position_output,
+  link
+};
 
 // Everything that tells one keyword from another. The reader, its messages and its suggestions
 // have no other list.
@@ -30,37 +38,95 @@ struct Keyword {
 
 constexpr Keyword keywords[] = {
     {.word = "param", .element = Element::parameter, .least = 1, .most = 1, .arguments = "VALUE"},
-    {.word = "ground", .element = Element::ground, .least = 1, .most = 1, .drawable = true,
+    {.word = "ground",
+     .element = Element::ground,
+     .least = 1,
+     .most = 1,
+     .drawable = true,
      .arguments = "POSITION"},
-    {.word = "mass", .element = Element::mass, .least = 3, .most = 3, .drawable = true,
+    {.word = "mass",
+     .element = Element::mass,
+     .least = 3,
+     .most = 3,
+     .drawable = true,
      .arguments = "M POSITION VELOCITY"},
-    {.word = "osc", .element = Element::oscillator, .least = 5, .most = 5, .drawable = true,
+    {.word = "osc",
+     .element = Element::oscillator,
+     .least = 5,
+     .most = 5,
+     .drawable = true,
      .arguments = "M K Z POSITION VELOCITY"},
-    {.word = "cel", .element = Element::oscillator, .least = 5, .most = 5, .drawable = true,
+    {.word = "cel",
+     .element = Element::oscillator,
+     .least = 5,
+     .most = 5,
+     .drawable = true,
      .arguments = "M K Z POSITION VELOCITY"},
-    {.word = "posInput", .element = Element::position_input, .least = 1, .most = 1,
-     .drawable = true, .arguments = "POSITION"},
+    {.word = "posInput",
+     .element = Element::position_input,
+     .least = 1,
+     .most = 1,
+     .drawable = true,
+     .arguments = "POSITION"},
     {.word = "frcInput", .element = Element::force_input, .references = 1, .arguments = "@MASS"},
-    {.word = "forceInput", .element = Element::force_input, .references = 1,
+    {.word = "forceInput", .element = Element::force_input, .references = 1, .arguments = "@MASS"},
+    {.word = "posOutput",
+     .element = Element::position_output,
+     .references = 1,
      .arguments = "@MASS"},
-    {.word = "posOutput", .element = Element::position_output, .references = 1,
-     .arguments = "@MASS"},
-    {.word = "spring", .element = Element::link, .references = 2, .least = 1, .most = 2,
+    {.word = "spring",
+     .element = Element::link,
+     .references = 2,
+     .least = 1,
+     .most = 2,
      .arguments = "@A @B K [Z]"},
-    {.word = "springDamper", .element = Element::link, .references = 2, .least = 1, .most = 2,
+    {.word = "springDamper",
+     .element = Element::link,
+     .references = 2,
+     .least = 1,
+     .most = 2,
      .arguments = "@A @B K [Z]"},
-    {.word = "springDamperDamper", .element = Element::link, .references = 2, .least = 1,
-     .most = 2, .arguments = "@A @B K [Z]"},
-    {.word = "damper", .element = Element::link, .references = 2, .least = 1, .most = 1,
-     .first = 1, .arguments = "@A @B Z"},
-    {.word = "nlPluck", .element = Element::link, .link = LinkKind::pluck, .references = 2,
-     .least = 2, .most = 3, .arguments = "@A @B K SCALE [Z]"},
-    {.word = "nlBow", .element = Element::link, .link = LinkKind::bow, .references = 2, .least = 2,
-     .most = 3, .arguments = "@A @B Z SCALE [SMOOTH]"},
-    {.word = "contact", .element = Element::link, .link = LinkKind::contact, .references = 2,
-     .least = 2, .most = 3, .arguments = "@A @B K Z [THRESHOLD]"},
-    {.word = "detent", .element = Element::link, .link = LinkKind::contact, .references = 2,
-     .least = 2, .most = 3, .arguments = "@A @B K Z [THRESHOLD]"},
+    {.word = "springDamperDamper",
+     .element = Element::link,
+     .references = 2,
+     .least = 1,
+     .most = 2,
+     .arguments = "@A @B K [Z]"},
+    {.word = "damper",
+     .element = Element::link,
+     .references = 2,
+     .least = 1,
+     .most = 1,
+     .first = 1,
+     .arguments = "@A @B Z"},
+    {.word = "nlPluck",
+     .element = Element::link,
+     .link = LinkKind::pluck,
+     .references = 2,
+     .least = 2,
+     .most = 3,
+     .arguments = "@A @B K SCALE [Z]"},
+    {.word = "nlBow",
+     .element = Element::link,
+     .link = LinkKind::bow,
+     .references = 2,
+     .least = 2,
+     .most = 3,
+     .arguments = "@A @B Z SCALE [SMOOTH]"},
+    {.word = "contact",
+     .element = Element::link,
+     .link = LinkKind::contact,
+     .references = 2,
+     .least = 2,
+     .most = 3,
+     .arguments = "@A @B K Z [THRESHOLD]"},
+    {.word = "detent",
+     .element = Element::link,
+     .link = LinkKind::contact,
+     .references = 2,
+     .least = 2,
+     .most = 3,
+     .arguments = "@A @B K Z [THRESHOLD]"},
 };
 
 constexpr std::size_t most_diagnostics = 100;
@@ -79,7 +145,9 @@ struct Line {
   std::vector<Token> rest;
 };
 
-bool is_blank(char c) { return c == ' ' || c == '\t' || c == '\r' || c == '\f' || c == '\v'; }
+bool is_blank(char c) {
+  return c == ' ' || c == '\t' || c == '\r' || c == '\f' || c == '\v';
+}
 
 bool is_identifier(std::string_view text) {
   return !text.empty() && std::isdigit(static_cast<unsigned char>(text[0])) == 0 &&
@@ -217,9 +285,9 @@ class Reader {
   ParsedNetwork out_;
   std::vector<Line> lines_;
   std::vector<std::string> parameter_names_;
-  std::unordered_map<std::string_view, std::uint32_t> masses_;   // label -> index
-  std::unordered_map<std::string_view, int> labels_;             // every label -> its line
-  std::unordered_map<std::string_view, ArgumentId> arguments_;   // text -> index
+  std::unordered_map<std::string_view, std::uint32_t> masses_;  // label -> index
+  std::unordered_map<std::string_view, int> labels_;            // every label -> its line
+  std::unordered_map<std::string_view, ArgumentId> arguments_;  // text -> index
   bool shows_velocity_ = false;  // the file uses a form that only MIMS4Max has
   bool shows_delayed_ = false;   // the file uses a form that only MIMS has
 };
@@ -312,8 +380,8 @@ void Reader::read_line(std::string_view text, int number) {
 void Reader::declare(const Line& line) {
   const auto [entry, is_new] = labels_.try_emplace(line.label.text, line.number);
   if (!is_new) {
-    const std::string where = "'@" + std::string(line.label.text) + "' is already declared in line " +
-                              std::to_string(entry->second);
+    const std::string where = "'@" + std::string(line.label.text) +
+                              "' is already declared in line " + std::to_string(entry->second);
     if (line.keyword->element != Element::link) {
       return error(line, line.label, where);
     }
@@ -325,11 +393,13 @@ void Reader::declare(const Line& line) {
       if (!is_identifier(line.label.text)) {
         error(line, line.label, "a parameter's name has letters, digits and '_' only");
       }
-      Parameter parameter{.name = std::string(line.label.text), .value = 0.0,
+      Parameter parameter{.name = std::string(line.label.text),
+                          .value = 0.0,
                           .place = {line.number, line.label.column}};
       if (check_count(line) && !parse_number(line.rest[0].text, parameter.value)) {
-        error(line, line.rest[0], "found " + quoted(line.rest[0].text) +
-                                      " where the parameter's value, a number, was expected");
+        error(line, line.rest[0],
+              "found " + quoted(line.rest[0].text) +
+                  " where the parameter's value, a number, was expected");
       }
       parameter_names_.push_back(parameter.name);
       network.parameters.push_back(std::move(parameter));
@@ -342,7 +412,8 @@ void Reader::declare(const Line& line) {
       masses_.emplace(line.label.text, static_cast<std::uint32_t>(network.masses.size()));
       network.masses.emplace_back();
       break;
-    default: break;
+    default:
+      break;
   }
 }
 
@@ -351,11 +422,17 @@ void Reader::build(const Line& line) {
     return;
   }
   switch (line.keyword->element) {
-    case Element::link: return add_link(line);
-    case Element::position_output: return add_output(line);
-    case Element::force_input: return add_input(line);
-    case Element::position_input: add_input(line); return add_mass(line);
-    default: return add_mass(line);
+    case Element::link:
+      return add_link(line);
+    case Element::position_output:
+      return add_output(line);
+    case Element::force_input:
+      return add_input(line);
+    case Element::position_input:
+      add_input(line);
+      return add_mass(line);
+    default:
+      return add_mass(line);
   }
 }
 
@@ -369,10 +446,18 @@ void Reader::add_mass(const Line& line) {
   mass.place = {line.number, line.label.column};
   std::size_t at = 0;
   switch (line.keyword->element) {
-    case Element::ground: mass.kind = MassKind::ground; break;
-    case Element::position_input: mass.kind = MassKind::position; break;
-    case Element::oscillator: mass.kind = MassKind::oscillator; break;
-    default: mass.kind = MassKind::mass; break;
+    case Element::ground:
+      mass.kind = MassKind::ground;
+      break;
+    case Element::position_input:
+      mass.kind = MassKind::position;
+      break;
+    case Element::oscillator:
+      mass.kind = MassKind::oscillator;
+      break;
+    default:
+      mass.kind = MassKind::mass;
+      break;
   }
   if (line.keyword->most > 1) {
     mass.mass = argument(line, at++);
@@ -431,11 +516,13 @@ void Reader::add_input(const Line& line) {
   const auto number = channel(line, "in");
   const bool is_force = line.keyword->element == Element::force_input;
   const auto found = masses_.find(line.label.text);
-  const auto mass = is_force ? reference(line, 0)
-                             : found == masses_.end() ? std::nullopt
-                                                      : std::optional(found->second);
+  const auto mass = is_force                 ? reference(line, 0)
+                    : found == masses_.end() ? std::nullopt
+                                             : std::optional(found->second);
   if (number && mass) {
-    out_.network.inputs.push_back({.number = *number, .is_force = is_force, .mass = *mass,
+    out_.network.inputs.push_back({.number = *number,
+                                   .is_force = is_force,
+                                   .mass = *mass,
                                    .place = {line.number, line.label.column}});
   }
 }
@@ -478,8 +565,8 @@ std::uint32_t Reader::drawing(const Line& line, std::size_t at) {
     return 0;
   }
   shows_delayed_ = true;
-  Drawing drawing{.group = std::string(line.rest[at].text), .x = state(line, at + 1),
-                  .y = state(line, at + 2)};
+  Drawing drawing{
+      .group = std::string(line.rest[at].text), .x = state(line, at + 1), .y = state(line, at + 2)};
   out_.network.drawings.push_back(std::move(drawing));
   return static_cast<std::uint32_t>(out_.network.drawings.size());
 }
@@ -526,7 +613,8 @@ double Reader::state(const Line& line, std::size_t at) {
 std::optional<std::uint32_t> Reader::reference(const Line& line, std::size_t at) {
   const Token& token = line.rest[at];
   if (token.text[0] != '@') {
-    error(line, token, "found " + quoted(token.text) + " where '@' and the label of a mass were expected");
+    error(line, token,
+          "found " + quoted(token.text) + " where '@' and the label of a mass were expected");
     return std::nullopt;
   }
   const std::string_view name = token.text.substr(1);
@@ -568,8 +656,8 @@ std::optional<int> Reader::channel(const Line& line, std::string_view prefix) {
 // rest away from 0 is written (x, x) in one meaning and (x, 0) in the other.
 void Reader::decide_third_argument() {
   Network& network = out_.network;
-  const bool starts_at_zero_speed = std::any_of(
-      network.masses.begin(), network.masses.end(), [](const Mass& mass) {
+  const bool starts_at_zero_speed =
+      std::any_of(network.masses.begin(), network.masses.end(), [](const Mass& mass) {
         return (mass.kind == MassKind::mass || mass.kind == MassKind::oscillator) &&
                mass.position != 0.0 && mass.third == 0.0;
       });
@@ -627,7 +715,9 @@ bool ParsedNetwork::ok() const {
                       [](const Diagnostic& d) { return d.severity == Severity::error; });
 }
 
-ParsedNetwork parse_network(std::string_view text) { return Reader().read(text); }
+ParsedNetwork parse_network(std::string_view text) {
+  return Reader().read(text);
+}
 
 std::string to_string(const Diagnostic& diagnostic, std::string_view file) {
   return std::string(file) + ":" + std::to_string(diagnostic.line) + ":" +

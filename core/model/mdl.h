@@ -22,7 +22,7 @@ struct Diagnostic {
 };
 
 struct ParsedNetwork {
-  Network network;  // complete only if ok()
+  Network network;                      // complete only if ok()
   std::vector<Diagnostic> diagnostics;  // in the order of the lines
   bool ok() const;
 };

@@ -22,9 +22,8 @@ double initial_velocity(const Network& network, const Mass& mass) {
   if (mass.kind == MassKind::ground || mass.kind == MassKind::position) {
     return 0.0;
   }
-  return network.third == ThirdArgument::delayed_position
-             ? mass.position - mass.third
-             : mass.third / Network::reference_rate_hz;
+  return network.third == ThirdArgument::delayed_position ? mass.position - mass.third
+                                                          : mass.third / Network::reference_rate_hz;
 }
 
 int input_count(const Network& network) {

@@ -109,7 +109,7 @@ struct Network {
   std::vector<Parameter> parameters;
   std::vector<Formula> arguments;  // the distinct arguments of all elements
   std::vector<Drawing> drawings;
-  std::vector<Mass> masses;        // grounds and position inputs too, as declared
+  std::vector<Mass> masses;  // grounds and position inputs too, as declared
   std::vector<Link> links;
   std::vector<Input> inputs;    // sorted by number; several may share one
   std::vector<Output> outputs;  // sorted by number

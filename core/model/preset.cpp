@@ -1,13 +1,18 @@
 #include "core/model/preset.h"
 
 #include <algorithm>
-#include <cmath>
 #include <cctype>
 #include <charconv>
+#include <cmath>
 #include <cstdio>
 #include <initializer_list>
 
 #define TOML_EXCEPTIONS 0
+#include <toml++/impl/preprocessor.h>
+// toml++ 3.3 asserts, and in a release build has the compiler assume, what its parser then goes on
+// to report as an error, such as the header "[?]".
+#undef TOML_ASSERT_ASSUME
+#define TOML_ASSERT_ASSUME(expression) static_assert(true)
 #include <toml++/toml.h>
 
 namespace ressort {
@@ -135,8 +140,8 @@ void read_parameters(const toml::table& table, Preset& preset, std::optional<Err
     const toml::table* row = node.as_table();
     Table reader(row != nullptr ? *row : table, "the parameter '" + setting.name + "'", error);
     if (row == nullptr) {
-      return reader.fail(node, "'" + setting.name +
-                                   "' must be a table: { value = 0.1, range = [0.001, 0.3] }");
+      return reader.fail(
+          node, "'" + setting.name + "' must be a table: { value = 0.1, range = [0.001, 0.3] }");
     }
     reader.allow({"value", "range"});
     if (row->get("value") == nullptr || row->get("range") == nullptr) {
@@ -244,8 +249,8 @@ void read_control(const toml::table& table, Preset& preset, std::optional<Error>
 bool is_linked(const Network& network, std::uint32_t mass, LinkKind kind, double& scale) {
   const auto parameters = parameter_values(network);
   for (const Link& link : network.links) {
-    const bool same = link.kind == kind || (kind == LinkKind::bow &&
-                                            link.kind == LinkKind::smooth_bow);
+    const bool same =
+        link.kind == kind || (kind == LinkKind::bow && link.kind == LinkKind::smooth_bow);
     if (same && (link.a == mass || link.b == mass)) {
       scale = argument_value(network, link.arguments[1], parameters);
       return true;
@@ -342,15 +347,21 @@ Preset default_preset(const Network& network, bool bare) {
     }
     if (!input.is_force && !bare) {
       const double reach = note.travel > 0.0 ? note.travel : 1.0;
-      ControlSetting wheel{.source = ControlSource::controller, .number = 1,
-                           .target = note.target, .low = middle - reach, .high = middle + reach};
+      ControlSetting wheel{.source = ControlSource::controller,
+                           .number = 1,
+                           .target = note.target,
+                           .low = middle - reach,
+                           .high = middle + reach};
       if (played && note.gesture == ControlGesture::pluck) {
         preset.controls.push_back(wheel);
       }
     }
     if (bare || !played) {
-      preset.controls.push_back({.source = ControlSource::audio, .number = input.number,
-                                 .target = note.target, .low = 0.0, .high = 1.0});
+      preset.controls.push_back({.source = ControlSource::audio,
+                                 .number = input.number,
+                                 .target = note.target,
+                                 .low = 0.0,
+                                 .high = 1.0});
     }
   }
   return preset;

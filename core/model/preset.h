@@ -26,14 +26,14 @@ enum class ControlGesture { position, pluck, bow, impulse, hold, parameter };
 
 struct ControlSetting {
   ControlSource source = ControlSource::note;
-  int number = 0;             // of the controller (0..127) or the audio channel (from 1)
-  std::string address;        // of an OSC name, such as "/finger"
-  std::string target;         // "in1", or a parameter's name
+  int number = 0;       // of the controller (0..127) or the audio channel (from 1)
+  std::string address;  // of an OSC name, such as "/finger"
+  std::string target;   // "in1", or a parameter's name
   ControlGesture gesture = ControlGesture::position;
-  double low = 0.0;           // what 0 and 1 of the source become: a position, a force, a speed in
-  double high = 1.0;          //   units per sample at 44 100 Hz, a parameter's value
+  double low = 0.0;   // what 0 and 1 of the source become: a position, a force, a speed in
+  double high = 1.0;  //   units per sample at 44 100 Hz, a parameter's value
   bool exponential = false;
-  double travel = 0.0;        // pluck: how far on either side of the string the finger rests
+  double travel = 0.0;  // pluck: how far on either side of the string the finger rests
   int lowest_key = 0;
   int highest_key = 127;
   Place place;
@@ -44,11 +44,11 @@ struct Preset {
   std::string model;        // a file's name, beside the preset or in the models' folder
   std::string description;  // one line for a person
   int voices = 1;
-  double gain = 1.0;        // output per unit of position
-  double release_s = 0.0;   // 0: a voice rings out
-  bool noise = false;       // the outputs shape white noise
-  bool keyboard = true;     // a key sets the pitch
-  int transpose = 0;        // semitones between a key and the pitch that it sets
+  double gain = 1.0;       // output per unit of position
+  double release_s = 0.0;  // 0: a voice rings out
+  bool noise = false;      // the outputs shape white noise
+  bool keyboard = true;    // a key sets the pitch
+  int transpose = 0;       // semitones between a key and the pitch that it sets
   std::vector<ParameterSetting> parameters;
   std::vector<ControlSetting> controls;
   bool operator==(const Preset&) const = default;

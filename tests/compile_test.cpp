@@ -1,0 +1,118 @@
+// From a network and a preset to an engine: what the preset may not name, and what is told.
+#include "core/compile/compile.h"
+
+#include "tests/player.h"
+
+namespace ressort {
+namespace {
+
+using namespace rig;
+
+Error error_of(const std::string& model, const std::string& toml) {
+  const auto preset = parse_preset("model = \"x.mdl\"\n" + toml);
+  REQUIRE(preset);
+  auto compiled = compile(network_of(model), *preset, {});
+  REQUIRE_FALSE(compiled);
+  return compiled.error();
+}
+
+}  // namespace
+
+TEST_CASE("a preset that names what the model has not is refused with its line", "[compile]") {
+  const std::string model = scenes::iplay_the_triangle();
+  Error error = error_of(model, "[parameters]\nm_k = { value = 1, range = [0, 1] }");
+  CHECK(error.message == "the model has no parameter 'm_k'; it has m_K, m_Z");
+  CHECK(error.line == 3);
+  error = error_of(model, "[[control]]\nfrom = \"cc1\"\nto = \"m_Q\"");
+  CHECK(error.message == "the model has no parameter 'm_Q'; it has m_K, m_Z");
+  CHECK(error.line == 2);
+  error = error_of(model, "[[control]]\nfrom = \"note\"\nto = \"in2\"");
+  CHECK(error.message == "the model has no input 'in2'; it has 1");
+  error = error_of(model, "[[control]]\nfrom = \"note\"\nto = \"in1\"\nhow = \"impulse\"");
+  CHECK(error.message == "'in1' is a position input, which this gesture cannot play");
+  error = error_of(scenes::poly_triangle(),
+                   "[[control]]\nfrom = \"note\"\nto = \"in1\"\nhow = \"bow\"");
+  CHECK(error.message == "'in1' is a force input, which this gesture cannot play");
+  // The engine keeps audio by input.
+  error = error_of(model, "[[control]]\nfrom = \"audio1\"\nto = \"m_K\"");
+  CHECK(error.message == "an audio channel drives an input, not a parameter");
+}
+
+TEST_CASE("an instrument says what can be played", "[compile]") {
+  Preset preset = struck(7);
+  preset.parameters.push_back({"m_K", 0.2, 0.1, 0.25});
+  const Player player(scenes::poly_triangle(), preset);
+  const Instrument& instrument = player.compiled.instrument;
+  REQUIRE(instrument.parameters.size() == 2);
+  CHECK(instrument.parameters[0].name == "m_K");
+  CHECK(instrument.parameters[0].value == 0.2);
+  CHECK(instrument.parameters[0].minimum == 0.1);
+  CHECK(instrument.parameters[0].maximum == 0.25);
+  CHECK(instrument.parameters[1].value == 0.001);  // as the model has it
+  REQUIRE(instrument.inputs.size() == 1);
+  CHECK(instrument.inputs[0].is_force);
+  CHECK(instrument.inputs[0].attached_to == "m_m1");
+  CHECK(instrument.outputs == 1);
+  CHECK(instrument.voices == 7);
+  CHECK(instrument.masses == 3);
+  CHECK(instrument.links == 4);
+  CHECK(instrument.is_tuned);
+  CHECK(player.compiled.engine->parameter(0) == 0.2);
+  // The margin is that of the worst corner of the ranges: m_K = .25, m_Z as it is.
+  CHECK(instrument.stiffness_margin == Approx((3.92 - .008) / 1.0).epsilon(1e-12));
+  REQUIRE(instrument.mode);
+  CHECK(instrument.highest_frequency_hz > instrument.mode->frequency_hz);
+
+  const Player bowed(scenes::bowed_string(),
+                     default_preset(network_of(scenes::bowed_string()), false));
+  CHECK(bowed.compiled.instrument.inputs[0].can_bow);
+  CHECK_FALSE(bowed.compiled.instrument.inputs[0].can_pluck);
+  CHECK(bowed.compiled.instrument.inputs[0].attached_to == "low_m133");
+}
+
+TEST_CASE("the plan counts the parts that hang together and says how they run", "[compile]") {
+  const Plan plan =
+      make_plan(network_of(scenes::string("a", 5, ".1", ".1") + scenes::string("b", 1, ".1", ".1") +
+                           "@p nlPluck @a_m1 @a_m3 1 1\n@free mass 1. 0. 0.\n"));
+  REQUIRE(plan.parts.size() == 3);
+  std::vector<std::pair<std::size_t, std::size_t>> sizes;
+  for (const Part& part : plan.parts) {
+    sizes.emplace_back(part.masses, part.links);
+    CHECK(part.method == Method::direct);
+  }
+  std::sort(sizes.begin(), sizes.end());
+  CHECK(sizes == std::vector<std::pair<std::size_t, std::size_t>>{{1, 0}, {1, 2}, {5, 7}});
+  const std::string text = describe(plan);
+  CHECK(text.find("5 masses, 7 links") != std::string::npos);
+  CHECK(text.find("1 of the links follow") != std::string::npos);
+  CHECK(describe(make_plan(network_of("@g ground 0."))) == "nothing moves\n");
+}
+
+TEST_CASE("at another rate a network keeps its pitch and decay, unless told not to", "[compile]") {
+  // One oscillator: r^n = (1 - z)^(n/2), theta by the closed form, at either rate.
+  const std::string text = "@o osc 1. 0.001 0.0002 1. 0.\n@out1 posOutput @o\n";
+  const Network network = network_of(text);
+  const auto ring = [&](double rate_hz, bool rescale) {
+    Bare<double> bare(make_program(network, rate_hz, rescale));
+    const auto frames = static_cast<std::size_t>(rate_hz / 4);  // a quarter of a second
+    std::vector<double> y;
+    for (std::size_t n = 0; n < frames; ++n) {
+      y.push_back(bare.step({})[0]);
+    }
+    const auto crossings = std::count_if(y.begin() + 1, y.end(), [&](const double& now) {
+      return (now < 0.0) != ((&now)[-1] < 0.0);
+    });
+    return std::pair(static_cast<double>(crossings) / 0.5, peak(std::span(y).last(frames / 20)));
+  };
+  const auto [hz, left] = ring(44100.0, true);
+  CHECK(hz == Approx(44100.0 * std::sqrt(0.001) / (2 * std::numbers::pi)).margin(2.1));
+  CHECK(left == Approx(std::exp(-0.0001 * 0.2 * 44100.0)).epsilon(0.05));
+  for (const double rate_hz : {22050.0, 48000.0, 96000.0}) {
+    const auto [other_hz, other_left] = ring(rate_hz, true);
+    CHECK(std::fabs(other_hz - hz) <= 2.0);  // half a period more or less in a quarter second
+    CHECK(other_left == Approx(left).epsilon(0.02));
+  }
+  CHECK(ring(88200.0, false).first == Approx(2.0 * hz).margin(4.1));
+}
+
+}  // namespace ressort
