@@ -23,15 +23,14 @@ bool MidiReader::take(std::uint8_t byte, Event& event) {
     return false;  // clock, active sensing, reset: not for us, and no part of any message
   }
   if (byte >= 0x80) {
-    if (have_ > 0 && have_ < need_) {
-      ++malformed_;
-    }
+    malformed_ += is_begun_ ? 1 : 0;
     in_exclusive_ = byte == 0xf0;
     // 0xf4, 0xf5 are not defined; 0xf7 ends an exclusive.
     malformed_ += byte == 0xf4 || byte == 0xf5 ? 1 : 0;
     status_ = byte;
     need_ = data_bytes(byte);
     have_ = 0;
+    is_begun_ = need_ > 0;
     return false;
   }
   if (in_exclusive_) {
@@ -42,7 +41,8 @@ bool MidiReader::take(std::uint8_t byte, Event& event) {
     return false;
   }
   data_[have_++] = byte;
-  if (have_ < need_) {
+  is_begun_ = have_ < need_;
+  if (is_begun_) {
     return false;
   }
   have_ = 0;
@@ -88,10 +88,9 @@ bool MidiReader::finish(Event& event) {
 }
 
 void MidiReader::end_packet() {
-  if (have_ > 0 && have_ < need_) {
-    ++malformed_;
-    have_ = 0;
-  }
+  malformed_ += is_begun_ ? 1 : 0;
+  is_begun_ = false;
+  have_ = 0;
 }
 
 }  // namespace ressort

@@ -37,6 +37,7 @@ class MidiReader {
   std::uint8_t data_[2] = {0, 0};
   int have_ = 0;
   int need_ = 0;
+  bool is_begun_ = false;  // a message that is not yet complete
   bool in_exclusive_ = false;
   std::uint64_t malformed_ = 0;
 };
