@@ -1,5 +1,4 @@
 #include <alsa/asoundlib.h>
-#include <time.h>
 
 #include <algorithm>
 #include <cmath>
@@ -99,9 +98,7 @@ void Alsa::run() {
     if (is_timed) {
       const auto due =
           start + static_cast<std::int64_t>(std::llround(period_ns * static_cast<double>(n)));
-      const timespec wake{due / 1'000'000'000, due % 1'000'000'000};
-      while (clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &wake, nullptr) != 0) {
-      }
+      sleep_until(due);
     }
     const std::int64_t before = monotonic_ns();
     process.block(std::span<const float* const>(), std::span<float* const>(outputs), frames, {},

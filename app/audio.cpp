@@ -1,7 +1,9 @@
 #include "app/audio.h"
 
 #include <pthread.h>
+#include <time.h>
 
+#include <cerrno>
 #include <chrono>
 
 namespace ressort {
@@ -30,6 +32,12 @@ void raise_priority() {
   sched_param priority{};
   priority.sched_priority = 70;  // above desktops, below the kernel's own audio threads
   pthread_setschedparam(pthread_self(), SCHED_FIFO, &priority);
+}
+
+void sleep_until(std::int64_t time_ns) {
+  const timespec wake{time_ns / 1'000'000'000, time_ns % 1'000'000'000};
+  while (clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &wake, nullptr) == EINTR) {
+  }
 }
 
 std::int64_t monotonic_ns() {

@@ -65,6 +65,9 @@ Result<AudioDevice> open_audio(const std::string& wanted, Process& process,
 // Asks for real-time priority for the calling thread; without the right to it, it stays as it is.
 void raise_priority();
 
+// Sleeps until the monotonic clock reads this.
+void sleep_until(std::int64_t time_ns);
+
 // The monotonic clock, in ns. Reads shared memory, makes no system call. [any thread]
 std::int64_t monotonic_ns();
 

@@ -1,5 +1,4 @@
 // A timer instead of a sound card: everything runs as it would, nothing is heard.
-#include <time.h>
 
 #include <cmath>
 #include <memory>
@@ -29,9 +28,7 @@ struct Dummy {
     for (std::uint64_t n = 0; !stop.is_raised(); ++n) {
       const auto due =
           start + static_cast<std::int64_t>(std::llround(period_ns * static_cast<double>(n)));
-      const timespec wake{due / 1'000'000'000, due % 1'000'000'000};
-      while (clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &wake, nullptr) != 0) {
-      }
+      sleep_until(due);
       const std::int64_t before = monotonic_ns();
       process.block(std::span<const float* const>(), std::span<float* const>(outputs), frames, {},
                     due);

@@ -1,10 +1,12 @@
 // The test program's main, the same for Catch2 version 2 and 3, and its heap, which counts.
 #define CATCH_CONFIG_RUNNER
+#include <algorithm>
+#include <cstddef>
 #include <cstdlib>
 #include <new>
 
 #include "tests/catch.h"
-#include "tests/rig.h"
+#include "tests/heap.h"
 
 namespace ressort::rig {
 namespace {

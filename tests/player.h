@@ -7,6 +7,7 @@
 
 #include "core/compile/compile.h"
 #include "core/engine/engine.h"
+#include "tests/heap.h"
 #include "tests/rig.h"
 
 namespace ressort::rig {

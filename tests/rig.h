@@ -38,17 +38,6 @@ inline std::string show(double value) {
   return text;
 }
 
-// Counts this thread's calls of operator new and delete from its making on; at most one lives.
-// main.cpp keeps the heap.
-class HeapWatch {
- public:
-  HeapWatch();
-  ~HeapWatch();
-  HeapWatch(const HeapWatch&) = delete;
-  HeapWatch& operator=(const HeapWatch&) = delete;
-  std::size_t calls() const;
-};
-
 // The same numbers on every machine (splitmix64).
 class Random {
  public:

@@ -27,107 +27,38 @@ enum class Element {
 struct Keyword {
   std::string_view word;
   Element element;
-  LinkKind link = LinkKind::spring;
-  int references = 0;          // of masses, before the arguments
-  int least = 0;               // arguments
-  int most = 0;                // arguments, without a drawing
-  int first = 0;               // links: which of Link::arguments the first argument is
-  bool drawable = false;       // may be followed by GROUP X Y
+  LinkKind link;               // of Element::link
+  int references;              // of masses, before the arguments
+  int least;                   // arguments
+  int most;                    // arguments, without a drawing
+  int first;                   // links: which of Link::arguments the first argument is
+  bool drawable;               // may be followed by GROUP X Y
   std::string_view arguments;  // as a person writes them
 };
 
+using E = Element;
+using L = LinkKind;
+// clang-format off
 constexpr Keyword keywords[] = {
-    {.word = "param", .element = Element::parameter, .least = 1, .most = 1, .arguments = "VALUE"},
-    {.word = "ground",
-     .element = Element::ground,
-     .least = 1,
-     .most = 1,
-     .drawable = true,
-     .arguments = "POSITION"},
-    {.word = "mass",
-     .element = Element::mass,
-     .least = 3,
-     .most = 3,
-     .drawable = true,
-     .arguments = "M POSITION VELOCITY"},
-    {.word = "osc",
-     .element = Element::oscillator,
-     .least = 5,
-     .most = 5,
-     .drawable = true,
-     .arguments = "M K Z POSITION VELOCITY"},
-    {.word = "cel",
-     .element = Element::oscillator,
-     .least = 5,
-     .most = 5,
-     .drawable = true,
-     .arguments = "M K Z POSITION VELOCITY"},
-    {.word = "posInput",
-     .element = Element::position_input,
-     .least = 1,
-     .most = 1,
-     .drawable = true,
-     .arguments = "POSITION"},
-    {.word = "frcInput", .element = Element::force_input, .references = 1, .arguments = "@MASS"},
-    {.word = "forceInput", .element = Element::force_input, .references = 1, .arguments = "@MASS"},
-    {.word = "posOutput",
-     .element = Element::position_output,
-     .references = 1,
-     .arguments = "@MASS"},
-    {.word = "spring",
-     .element = Element::link,
-     .references = 2,
-     .least = 1,
-     .most = 2,
-     .arguments = "@A @B K [Z]"},
-    {.word = "springDamper",
-     .element = Element::link,
-     .references = 2,
-     .least = 1,
-     .most = 2,
-     .arguments = "@A @B K [Z]"},
-    {.word = "springDamperDamper",
-     .element = Element::link,
-     .references = 2,
-     .least = 1,
-     .most = 2,
-     .arguments = "@A @B K [Z]"},
-    {.word = "damper",
-     .element = Element::link,
-     .references = 2,
-     .least = 1,
-     .most = 1,
-     .first = 1,
-     .arguments = "@A @B Z"},
-    {.word = "nlPluck",
-     .element = Element::link,
-     .link = LinkKind::pluck,
-     .references = 2,
-     .least = 2,
-     .most = 3,
-     .arguments = "@A @B K SCALE [Z]"},
-    {.word = "nlBow",
-     .element = Element::link,
-     .link = LinkKind::bow,
-     .references = 2,
-     .least = 2,
-     .most = 3,
-     .arguments = "@A @B Z SCALE [SMOOTH]"},
-    {.word = "contact",
-     .element = Element::link,
-     .link = LinkKind::contact,
-     .references = 2,
-     .least = 2,
-     .most = 3,
-     .arguments = "@A @B K Z [THRESHOLD]"},
-    {.word = "detent",
-     .element = Element::link,
-     .link = LinkKind::contact,
-     .references = 2,
-     .least = 2,
-     .most = 3,
-     .arguments = "@A @B K Z [THRESHOLD]"},
+    {"param",              E::parameter,       {},         0, 1, 1, 0, false, "VALUE"},
+    {"ground",             E::ground,          {},         0, 1, 1, 0, true,  "POSITION"},
+    {"mass",               E::mass,            {},         0, 3, 3, 0, true,  "M POSITION VELOCITY"},
+    {"osc",                E::oscillator,      {},         0, 5, 5, 0, true,  "M K Z POSITION VELOCITY"},
+    {"cel",                E::oscillator,      {},         0, 5, 5, 0, true,  "M K Z POSITION VELOCITY"},
+    {"posInput",           E::position_input,  {},         0, 1, 1, 0, true,  "POSITION"},
+    {"frcInput",           E::force_input,     {},         1, 0, 0, 0, false, "@MASS"},
+    {"forceInput",         E::force_input,     {},         1, 0, 0, 0, false, "@MASS"},
+    {"posOutput",          E::position_output, {},         1, 0, 0, 0, false, "@MASS"},
+    {"spring",             E::link,            L::spring,  2, 1, 2, 0, false, "@A @B K [Z]"},
+    {"springDamper",       E::link,            L::spring,  2, 1, 2, 0, false, "@A @B K [Z]"},
+    {"springDamperDamper", E::link,            L::spring,  2, 1, 2, 0, false, "@A @B K [Z]"},
+    {"damper",             E::link,            L::spring,  2, 1, 1, 1, false, "@A @B Z"},
+    {"nlPluck",            E::link,            L::pluck,   2, 2, 3, 0, false, "@A @B K SCALE [Z]"},
+    {"nlBow",              E::link,            L::bow,     2, 2, 3, 0, false, "@A @B Z SCALE [SMOOTH]"},
+    {"contact",            E::link,            L::contact, 2, 2, 3, 0, false, "@A @B K Z [THRESHOLD]"},
+    {"detent",             E::link,            L::contact, 2, 2, 3, 0, false, "@A @B K Z [THRESHOLD]"},
 };
+// clang-format on
 
 constexpr std::size_t most_diagnostics = 100;
 constexpr std::size_t most_suggestions = 2000;  // names looked at; no suggestion is worth a wait
