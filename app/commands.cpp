@@ -10,8 +10,8 @@
 #include <nlohmann/json.hpp>
 #include <thread>
 
-#include "app/console.h"
 #include "app/midi_input.h"
+#include "app/terminal.h"
 
 namespace ressort {
 namespace {
@@ -202,6 +202,9 @@ class Player {
       if (auto ran = console_->run_script(options_.script); !ran) {
         complain(ran.error().message);
         return exit_code::wrong_use;
+      }
+      if (console_->has_quit()) {
+        return exit_code::done;
       }
     }
     if (!options_.no_console) {

@@ -1,5 +1,4 @@
-// app: the small console: its commands, and the terminal that they are typed at, which has a
-// thread of its own.
+// app: the small console's commands. Where they are typed is terminal.h's.
 #pragma once
 
 #include <functional>
@@ -41,6 +40,9 @@ std::span<const CommandRow> commands();
 // which words the command takes.
 Result<Command> parse_command(std::string_view line);
 
+// Where the last word of a line starts, quote and all; empty at the end and after a blank.
+std::string_view last_word(std::string_view line);
+
 // A keyboard without lines: calls `on_key` for each key, and with 0 when none has come for a
 // second, until `on_key` answers false or the input ends.
 using Keyboard = std::function<void(const std::function<bool(char key)>& on_key)>;
@@ -73,24 +75,6 @@ class Console {
 
  private:
   std::unique_ptr<Desk> desk_;
-};
-
-// Reads lines from the terminal with editing and history until the end of input or `quit`; then
-// calls `on_quit`, on its own thread, only if it was `quit`. Without a terminal it reads plain
-// lines and shows no prompt. Installs no signal handler. The destructor interrupts it, waiting for
-// a command that is at work, and leaves the terminal as it was; it must come before the console's
-// and the session's.
-class Terminal {
- public:
-  Terminal(Console& console, std::function<void()> on_quit);
-  ~Terminal();
-
-  // Prints a line without harm to what is being typed. [any thread but audio]
-  void say(const std::string& text);
-
- private:
-  struct Input;
-  std::unique_ptr<Input> input_;
 };
 
 }  // namespace ressort

@@ -40,9 +40,10 @@ const fs::path& data_folder() {
 std::vector<std::string> names_in(const fs::path& folder, const char* ending) {
   std::set<std::string> names;
   std::error_code error;
-  for (const fs::directory_entry& entry : fs::directory_iterator(folder, error)) {
-    if (entry.path().extension() == ending) {
-      names.insert(entry.path().stem().string());
+  fs::directory_iterator entry(folder, error);
+  for (; !error && entry != fs::directory_iterator(); entry.increment(error)) {
+    if (entry->path().extension() == ending) {
+      names.insert(entry->path().stem().string());
     }
   }
   return {names.begin(), names.end()};
@@ -128,8 +129,8 @@ Result<WavWriter> WavWriter::open(const std::string& path, double rate_hz, int c
   info.samplerate = static_cast<int>(std::lround(rate_hz));
   info.channels = channels;
   info.format = SF_FORMAT_WAV | (format == SampleFormat::float32   ? SF_FORMAT_FLOAT
-                                 : format == SampleFormat::float64 ? SF_FORMAT_DOUBLE
-                                                                   : SF_FORMAT_PCM_24);
+                                  : format == SampleFormat::float64 ? SF_FORMAT_DOUBLE
+                                                                    : SF_FORMAT_PCM_24);
   auto file = std::make_unique<File>();
   file->path = path;
   file->handle = sf_open(path.c_str(), SFM_WRITE, &info);

@@ -362,7 +362,10 @@ struct OscServer::Server {
       client.error(group.address, "busy: no room for " + std::to_string(group.events.size()) +
                                       (group.events.size() == 1 ? " event" : " events") +
                                       ", try again");
-    } else if (late_s > 0.0) {
+      return;
+    }
+    session.remember(group.events);
+    if (late_s > 0.0) {
       client.error(group.address, "late by " + seconds_text(late_s) + " s, acts now");
     }
   }

@@ -28,6 +28,11 @@ Session::~Session() {
   }
   wake_.notify_all();
   worker_.join();
+  for (const Job& job : jobs_) {
+    if (job.answer) {
+      job.answer(Error{"the program is ending"});
+    }
+  }
 }
 
 void Session::load(std::string name, Answer answer) {
@@ -72,17 +77,19 @@ std::optional<double> Session::parameter(const std::string& name) const {
   return std::nullopt;
 }
 
-Result<std::vector<Event>> Session::events(const Call& call) {
+Result<std::vector<Event>> Session::events(const Call& call) const {
   const std::lock_guard lock(mutex_);
-  auto events = to_events(call, current_->instrument, current_->serial);
-  if (events) {
-    for (const Event& event : *events) {
-      if (event.kind == EventKind::parameter) {
-        values_[event.index] = event.value;
-      }
+  return to_events(call, current_->instrument, current_->serial);
+}
+
+void Session::remember(std::span<const TimedEvent> events) {
+  const std::lock_guard lock(mutex_);
+  for (const TimedEvent& timed : events) {
+    const Event& event = timed.event;
+    if (event.kind == EventKind::parameter && event.model == current_->serial) {
+      values_[event.index] = event.value;
     }
   }
-  return events;
 }
 
 Status Session::status() {

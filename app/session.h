@@ -82,9 +82,11 @@ class Session {
   // A parameter's present value; nothing where the model has none of that name.
   std::optional<double> parameter(const std::string& name) const;
 
-  // The events of a playing call, for the model that sounds now. Remembers what parameters they
-  // set. [any thread but audio]
-  Result<std::vector<Event>> events(const Call& call);
+  // The events of a playing call, for the model that sounds now. [any thread but audio]
+  Result<std::vector<Event>> events(const Call& call) const;
+
+  // What parameters these events set, once a queue has taken them. [any thread but audio]
+  void remember(std::span<const TimedEvent> events);
 
   Status status();
 

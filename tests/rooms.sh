@@ -25,8 +25,8 @@ judge() {
       owner["rtmidi/"] = "app/rtmidi.cpp"
       owner["lo/"] = "app/osc.cpp"
       owner["sndfile"] = "app/files.cpp"
-      owner["histedit.h"] = "app/console.cpp"
-      owner["editline/"] = "app/console.cpp"
+      owner["histedit.h"] = "app/terminal.cpp"
+      owner["editline/"] = "app/terminal.cpp"
       owner["readerwriterqueue"] = "app/lockfree.h"
       owner["atomic"] = "app/lockfree.h"
       owner["toml++/"] = "core/model/"
@@ -127,7 +127,7 @@ app/process.cpp:1:#include <mutex>
 app/jack.cpp:1:#include "core/compile/compile.h"
 app/jack.cpp:1:#include <alsa/asoundlib.h>
 app/alsa.cpp:1:#include <jack/jack.h>
-app/console.cpp:1:#include <lo/lo.h>
+app/terminal.cpp:1:#include <lo/lo.h>
 app/osc.cpp:1:#include <histedit.h>
 app/midi.cpp:1:#include <RtMidi.h>
 app/process.cpp:1:#include <readerwriterqueue/readerwriterqueue.h>'

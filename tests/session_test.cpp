@@ -181,7 +181,11 @@ TEST_CASE("Parameters are remembered, clamped, and followed when a controller tu
   CHECK_FALSE(session.parameter("K"));
   REQUIRE(session.load_and_wait(file));
   CHECK(session.parameter("K") == 0.1);
-  REQUIRE(session.events({"/param/K", {0.7}}));
+  const auto events = session.events({"/param/K", {0.7}});
+  REQUIRE(events);
+  CHECK(session.parameter("K") == 0.1);  // not before it is sent
+  const TimedEvent sent{.event = events->front()};
+  session.remember({&sent, 1});
   CHECK(session.parameter("K") == 0.3);  // the range's end
   std::vector<float> samples(64);
   std::vector<float*> outputs{samples.data()};
