@@ -202,7 +202,6 @@ Result<std::shared_ptr<const Loaded>> Session::build(const std::string& name) {
   if (!scene) {
     return scene.error();
   }
-  scene->preset.gain *= options_.gain;
   CompileOptions options = options_.compile;
   std::function<void(int)> prepare_inputs;
   {
@@ -210,6 +209,10 @@ Result<std::shared_ptr<const Loaded>> Session::build(const std::string& name) {
     options.rate_hz = rate_hz_;
     prepare_inputs = prepare_inputs_;
   }
+  if (!scene->has_preset) {
+    scene->preset.gain = comfortable_gain(scene->network, scene->preset, options);
+  }
+  scene->preset.gain *= options_.gain;
   auto compiled = compile(scene->network, scene->preset, options);
   if (!compiled) {
     const Error& error = compiled.error();

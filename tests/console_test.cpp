@@ -11,6 +11,7 @@
 #include <future>
 
 #include "app/files.h"
+#include "app/terminal.h"
 #include "tests/catch.h"
 #include "tests/scenes.h"
 

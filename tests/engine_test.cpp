@@ -448,7 +448,7 @@ TEST_CASE("process() never calls the heap", "[engine]") {
   }
   const HeapWatch watch;  // and the watch does see the heap
   const auto seen = std::make_unique<int>(1);
-  CHECK(watch.calls() >= 1);
+  CHECK((watch.calls() >= 1) == heap_is_counted);
 }
 
 }  // namespace ressort

@@ -3,7 +3,22 @@
 
 #include <cstddef>
 
+// The sanitizers bring a heap of their own, which tells more than a count would.
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+#define RESSORT_OTHER_HEAP 1
+#elif defined(__has_feature)
+#if __has_feature(address_sanitizer) || __has_feature(thread_sanitizer)
+#define RESSORT_OTHER_HEAP 1
+#endif
+#endif
+
 namespace ressort::rig {
+
+#ifdef RESSORT_OTHER_HEAP
+inline constexpr bool heap_is_counted = false;
+#else
+inline constexpr bool heap_is_counted = true;
+#endif
 
 // Counts this thread's calls of operator new and delete from its making on; at most one lives.
 // main.cpp keeps the heap.

@@ -27,6 +27,7 @@ std::size_t HeapWatch::calls() const {
 
 }  // namespace ressort::rig
 
+#ifndef RESSORT_OTHER_HEAP
 namespace {
 
 void* allocate(std::size_t size, std::size_t alignment) {
@@ -70,6 +71,7 @@ NOT_INLINED void operator delete(void* memory, std::align_val_t) noexcept {
 NOT_INLINED void operator delete(void* memory, std::size_t, std::align_val_t) noexcept {
   release(memory);
 }
+#endif  // RESSORT_OTHER_HEAP
 
 int main(int argc, char** argv) {
   return Catch::Session().run(argc, argv);

@@ -370,4 +370,39 @@ Result<Compiled> compile(const Network& network, const Preset& preset,
   return compiled;
 }
 
+double comfortable_gain(const Network& network, const Preset& preset,
+                        const CompileOptions& options) {
+  constexpr double forte = 0.8;
+  constexpr double wanted_peak = 0.5;
+  constexpr double most_steps = 4e6;
+  constexpr std::size_t block = 256;
+  Preset plain = preset;
+  plain.gain = 1.0;
+  auto compiled = compile(network, plain, options);
+  if (!compiled || compiled->instrument.outputs == 0) {
+    return 1.0;
+  }
+  const auto masses = static_cast<double>(std::max<std::size_t>(1, compiled->instrument.masses));
+  const auto frames = static_cast<std::size_t>(
+      std::clamp(most_steps / masses, 0.05 * options.rate_hz, options.rate_hz));
+  std::vector<std::vector<double>> channels(static_cast<std::size_t>(compiled->instrument.outputs),
+                                            std::vector<double>(block));
+  std::vector<double*> outputs;
+  for (std::vector<double>& channel : channels) {
+    outputs.push_back(channel.data());
+  }
+  const Event note{.kind = EventKind::note_on, .index = 60, .value = forte};
+  double peak = 0.0;
+  for (std::size_t at = 0; at < frames; at += block) {
+    compiled->engine->process({&note, at == 0 ? std::size_t{1} : std::size_t{0}}, {}, outputs,
+                              block);
+    for (const std::vector<double>& channel : channels) {
+      for (const double sample : channel) {
+        peak = std::max(peak, std::fabs(sample));
+      }
+    }
+  }
+  return peak > 1e-12 ? wanted_peak / peak : 1.0;
+}
+
 }  // namespace ressort

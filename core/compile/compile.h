@@ -71,6 +71,12 @@ struct Compiled {
 Result<Compiled> compile(const Network& network, const Preset& preset,
                          const CompileOptions& options);
 
+// The gain at which a forte note peaks at -6 dBFS, found by playing one: what a model that comes
+// without a preset is played with. 1 where notes excite nothing. Bounded to about 4 million steps
+// of a mass. [any thread but audio]
+double comfortable_gain(const Network& network, const Preset& preset,
+                        const CompileOptions& options);
+
 // The tables alone, for tests and other ways of playing them.
 Program make_program(const Network& network, double rate_hz, bool rescale);
 

@@ -66,9 +66,9 @@ Plan make_plan(const Network& network) {
   Plan plan;
   for (const auto& [first, count] : counts) {
     std::string reason = "the published scheme, mass by mass and link by link; ";
-    reason += count.nonlinear == 0
-                  ? std::string("every link is linear")
-                  : std::to_string(count.nonlinear) + " of the links follow a nonlinear law";
+    reason += count.nonlinear == 0   ? std::string("every link is linear")
+              : count.nonlinear == 1 ? std::string("one link is nonlinear")
+                                     : std::to_string(count.nonlinear) + " links are nonlinear";
     plan.parts.push_back({Method::direct, count.masses, count.links, std::move(reason)});
   }
   return plan;
