@@ -166,7 +166,7 @@ void Session::listen() {
       const bool is_current = report.model == current_->serial;
       if (report.kind == Report::Kind::parameter && is_current) {
         values_[report.index] = report.value;
-      } else if (report.kind == Report::Kind::reset) {
+      } else if (report.kind == Report::Kind::reset && may_tell_reset()) {
         news = (is_current ? current_->name : std::string("the last model")) +
                ": a voice became unstable and was put back to rest; lower its stiffness or "
                "damping, or raise its mass";
@@ -178,6 +178,16 @@ void Session::listen() {
       tell_(news);
     }
   }
+}
+
+// An unstable voice may be put back in every block; once in a while is enough to hear of it.
+bool Session::may_tell_reset() {
+  const auto now = std::chrono::steady_clock::now();
+  if (now < next_reset_news_) {
+    return false;
+  }
+  next_reset_news_ = now + std::chrono::seconds(5);
+  return true;
 }
 
 void Session::do_load(const Job& job) {

@@ -2,6 +2,7 @@
 // and destroys what has sounded.
 #pragma once
 
+#include <chrono>
 #include <condition_variable>
 #include <deque>
 #include <functional>
@@ -106,6 +107,7 @@ class Session {
   void do_load(const Job& job);
   Result<std::shared_ptr<const Loaded>> build(const std::string& name);
   void listen();
+  bool may_tell_reset();
 
   Process& process_;
   SessionOptions options_;
@@ -122,9 +124,10 @@ class Session {
   std::function<double()> cpu_;
   std::function<void(int)> prepare_inputs_;
 
-  std::uint32_t serial_ = 0;  // [worker]
-  std::string scene_name_;    // [worker] what was loaded last
-  std::thread worker_;        // last, so that it ends first
+  std::uint32_t serial_ = 0;                                 // [worker]
+  std::string scene_name_;                                   // [worker] what was loaded last
+  std::chrono::steady_clock::time_point next_reset_news_{};  // [worker]
+  std::thread worker_;                                       // last, so that it ends first
 };
 
 }  // namespace ressort

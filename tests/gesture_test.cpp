@@ -224,7 +224,7 @@ TEST_CASE("audio moves the input that the preset gives it", "[gesture]") {
   const double* const channels[] = {nullptr, audio.data()};
   player.run(2000, {}, {97}, channels);
   for (std::size_t n = 0; n < audio.size(); ++n) {
-    REQUIRE(player.out[0][n] == 0.5 * audio[n]);
+    REQUIRE(player.out[0][n] == 0.5 + 0.5 * audio[n]);  // from where the hand is
   }
   CHECK(player.compiled.instrument.audio_inputs == 2);
   // Where the channel is not connected the hand is at its place.

@@ -1,0 +1,134 @@
+// core/engine: what an Engine is made of. Its own header, for engine.cpp and voices.cpp only.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <variant>
+#include <vector>
+
+#include "core/engine/bank.h"
+#include "core/engine/engine.h"
+#include "core/engine/gesture.h"
+
+namespace ressort {
+
+inline constexpr double steal_fade_s = 0.005;  // a voice that gives way takes this long to vanish
+inline constexpr double quiet_level = 1e-5;    // -100 dBFS
+
+struct Voice {
+  bool awake = false;      // steps and is heard
+  bool fading = false;     // gives way; its lane is free when the fade ends
+  bool held = false;       // by a key
+  bool sustained = false;  // by the pedal, its key being up
+  std::uint8_t key = 0;
+  std::uint8_t channel = 0;
+  double frequency_hz = 0.0;  // without bend; 0: as the model is written
+  double factor = 1.0;        // on every stiffness
+  double gain = 1.0;
+  double gain_step = 0.0;  // per sample
+  double peak = 0.0;       // of the network's output since the last settling
+  double level = 0.0;      // peak of the output, slowly forgotten
+  std::size_t quiet_frames = 0;
+};
+
+struct Engine::Voices {
+  Voices(Program program_in, Playing playing_in, Precision precision);
+  std::size_t lanes_wanted() const;
+
+  // --- inputs ---
+  double middle(std::size_t input) const;
+  Hand& hand(std::size_t lane, std::size_t input);
+  double mapped(const Control& control, double amount) const;
+  // A speed or an impulse that gives the same displacement at every rate and pitch.
+  double paced(double amount, std::size_t lane) const;
+  void move_to(std::size_t input, double position);
+  void pluck(std::size_t lane, const Control& control, double strength);
+  void perform(const Control& control, std::size_t lane, double amount);
+  template <class Wanted>
+  void perform_all(std::size_t lane, double amount, Wanted&& wanted);
+
+  // --- parameters ---
+  void set_parameter(std::size_t index, double value);
+  void note_change(std::uint16_t index);
+  void set_coefficient(std::size_t lane, std::uint32_t c, bool ramped);
+  void tune(std::size_t lane, bool ramped);
+
+  // --- voices ---
+  // Puts the lane to the model's start, tuned; 0 Hz: as the model is written.
+  void start(std::size_t lane, double frequency_hz);
+  void rest_lane(std::size_t lane);
+  void wake(std::size_t lane);
+  void fade(std::size_t lane, double seconds);
+  bool is_live(std::size_t lane) const { return voices[lane].awake && !voices[lane].fading; }
+  // A lane for a new note: the same key's, a free one, or the quietest's place.
+  std::size_t lane_for(int key, int channel);
+
+  // --- events ---
+  void handle(const Event& event);
+  void note_on(const Event& event);
+  // The key's frequency, brought by octaves to where the model is stable.
+  double playable_hz(int key) const;
+  void note_off(const Event& event);
+  void release(std::size_t lane);
+  void controller(const Event& event);
+  void panic();
+  const Control* control_for(int number, Gesture gesture) const;
+  void press(double amount);
+  // A force of no length is an impulse; its effect does not depend on the sample rate, nor does
+  // that of a force that lasts.
+  void push(std::size_t input, double force, double seconds);
+
+  // --- sound ---
+  void segment(std::span<const double* const> inputs, std::span<double* const> outputs,
+               std::size_t at, std::size_t frames);
+  template <class T>
+  void segment_in(Bank<T>& b, std::span<const double* const> inputs,
+                  std::span<double* const> outputs, std::size_t at, std::size_t frames);
+  template <class T>
+  void fill_drive(Bank<T>& b, std::size_t first, std::span<const double* const> inputs,
+                  std::size_t at, std::size_t frames);
+  // What comes in moves the hand from where it is; in the bare network it is the hand.
+  template <class T>
+  void add_audio(Bank<T>& b, std::size_t input, const double* audio, std::size_t frames);
+  const double* audio_for(std::size_t input, std::span<const double* const> inputs) const;
+  // Sound at an audio input wakes the voice that it drives.
+  void listen(std::span<const double* const> inputs, std::size_t at, std::size_t frames);
+  // The last position of an audio input, for the velocity of the next segment's first sample.
+  void remember_audio(std::span<const double* const> inputs, std::size_t end);
+  template <class T>
+  void mix(Bank<T>& b, std::size_t lane, std::size_t i, std::span<double* const> outputs,
+           std::size_t at, std::size_t frames);
+  // Keeps the voice's level and sends it to sleep when it has faded or come to rest. Once in
+  // max_segment_frames, counted from the engine's start: so what sleeps or gives way does not
+  // depend on how the time is cut into blocks.
+  void settle(std::size_t lane);
+  // Whether nothing moves anywhere: a slow wave may still be on its way to the output.
+  bool is_at_rest(std::size_t lane) const;
+  // Uniform in -1..1: xorshift, from a fixed seed so that a render repeats.
+  double white();
+
+  Program program;
+  Playing playing;
+  std::variant<Bank<float>, Bank<double>> bank;
+  std::vector<Voice> voices;                  // [lane]
+  std::vector<Hand> hands;                    // [lane][input]
+  std::vector<double> parameters;             // as they are now
+  std::vector<std::uint16_t> changes;         // parameters, since the last take_changes()
+  std::vector<std::uint16_t> told;            // what the last one gave
+  std::vector<double> rest;                   // [input] where a new voice's hand starts
+  std::vector<const Control*> audio_control;  // [input] null where no audio drives it
+  std::vector<double> audio_before;           // [input]
+  double pole = 0.0;
+  double bow_pole = 0.0;
+  double bend = 0.0;
+  std::array<bool, 16> pedal{};
+  std::size_t last = 0;           // the lane that was played last: direct gestures act on it
+  std::size_t since_settled = 0;  // frames, below max_segment_frames between two segments
+  std::uint64_t resets = 0;
+  std::uint64_t stolen = 0;
+  std::uint64_t noise = 0x9e3779b97f4a7c15u;
+};
+
+}  // namespace ressort
