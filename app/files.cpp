@@ -26,7 +26,7 @@ const fs::path& data_folder() {
     std::error_code error;
     const fs::path program = fs::read_symlink("/proc/self/exe", error);
     tried.push_back(program.parent_path().parent_path() / "share" / "ressort");
-    tried.push_back(program.parent_path().parent_path());
+    tried.emplace_back(RESSORT_SOURCE);
     for (const fs::path& path : tried) {
       if (fs::is_directory(path / "models", error)) {
         return path;

@@ -2,6 +2,7 @@
 #include "core/engine/gesture.h"
 
 #include "tests/player.h"
+#include "tests/reference.h"
 
 namespace ressort {
 namespace {
@@ -212,7 +213,8 @@ TEST_CASE("a force lasts as long as told, and means the same at every rate", "[g
   CHECK(at_one_second(88200.0, 0.5, 0.01) == Approx(held).epsilon(1e-4));
 }
 
-TEST_CASE("audio moves the input that the preset gives it", "[gesture]") {
+TEST_CASE("audio moves the hand from where it is; in the bare network it is the hand",
+          "[gesture]") {
   Preset preset = played(
       {.source = ControlSource::audio, .number = 2, .target = "in1", .low = 0.0, .high = 0.5});
   Player player(puppet, preset);
@@ -223,9 +225,23 @@ TEST_CASE("audio moves the input that the preset gives it", "[gesture]") {
   }
   const double* const channels[] = {nullptr, audio.data()};
   player.run(2000, {}, {97}, channels);
+  Player bare(puppet, preset, {.bare = true});
+  bare.run(2000, {}, {97}, channels);
+  const Network network = network_of(puppet);
+  auto moved = reference::make_simulation(network, parameter_values(network));
+  auto driven = reference::make_simulation(network, parameter_values(network));
+  Comparison error;
   for (std::size_t n = 0; n < audio.size(); ++n) {
-    REQUIRE(player.out[0][n] == 0.5 + 0.5 * audio[n]);  // from where the hand is
+    REQUIRE(player.out[0][n] == 0.5 + 0.5 * audio[n]);
+    REQUIRE(bare.out[0][n] == 0.5 * audio[n]);
+    // Its velocity is felt by the mass that it pulls.
+    const double from_rest[] = {0.5 + 0.5 * audio[n]};
+    const double as_it_is[] = {0.5 * audio[n]};
+    error.add(moved.simulator.step(from_rest)[1], player.out[1][n]);
+    error.add(driven.simulator.step(as_it_is)[1], bare.out[1][n]);
   }
+  INFO(show(error.relative()));
+  CHECK(error.relative() < 1e-12);
   CHECK(player.compiled.instrument.audio_inputs == 2);
   // Where the channel is not connected the hand is at its place.
   Player quiet(puppet, preset);
