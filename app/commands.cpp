@@ -25,7 +25,8 @@ std::string db(double factor) {
     return "silent";
   }
   char text[32];
-  std::snprintf(text, sizeof text, "%.1f dBFS", 20.0 * std::log10(factor));
+  const double level = 20.0 * std::log10(factor);
+  std::snprintf(text, sizeof text, "%.1f dBFS", level > -0.05 && level < 0.0 ? 0.0 : level);
   return text;
 }
 

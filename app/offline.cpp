@@ -89,7 +89,7 @@ std::string default_phrase() {
          "0.50 /note/on 60 90\n0.95 /note/off 60\n"
          "1.00 /note/on 64 100\n1.45 /note/off 64\n"
          "1.50 /note/on 69 110\n1.95 /note/off 69\n"
-         "2.00 /note/on 57 120\n2.00 /note/on 64 110\n2.00 /note/on 72 110\n"
+         "2.00 /note/on 57 80\n2.00 /note/on 64 70\n2.00 /note/on 72 70\n"
          "3.20 /note/off 57\n3.20 /note/off 64\n3.20 /note/off 72\n";
 }
 

@@ -1,4 +1,5 @@
 #include <RtMidi.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <map>
@@ -54,6 +55,13 @@ MidiInput::~MidiInput() = default;
 
 Result<std::unique_ptr<MidiInput>> MidiInput::open(MidiApi api, const std::string& client_name,
                                                    bool connect, MidiDoor& door) {
+  const Error missing{api == MidiApi::alsa
+                          ? "there is no ALSA sequencer (/dev/snd/seq), so no keyboard can be "
+                            "heard through ALSA; play by OSC or from the console"
+                          : "no JACK server answers, so no keyboard can be heard through JACK"};
+  if (api == MidiApi::alsa && access("/dev/snd/seq", R_OK | W_OK) != 0) {
+    return missing;  // RtMidi would find out too, but not without printing
+  }
   const RtMidi::Api rt_api = api == MidiApi::alsa ? RtMidi::LINUX_ALSA : RtMidi::UNIX_JACK;
   try {
     auto sources = std::make_unique<Sources>(Sources{rt_api, client_name, connect, door, {}, {}});
@@ -64,10 +72,7 @@ Result<std::unique_ptr<MidiInput>> MidiInput::open(MidiApi api, const std::strin
     input->tick();
     return input;
   } catch (const RtMidiError&) {
-    return Error{api == MidiApi::alsa
-                     ? "there is no ALSA sequencer (/dev/snd/seq), so no keyboard can be heard "
-                       "through ALSA; play by OSC or from the console"
-                     : "no JACK server answers, so no keyboard can be heard through JACK"};
+    return missing;
   }
 }
 
