@@ -129,8 +129,8 @@ Result<WavWriter> WavWriter::open(const std::string& path, double rate_hz, int c
   info.samplerate = static_cast<int>(std::lround(rate_hz));
   info.channels = channels;
   info.format = SF_FORMAT_WAV | (format == SampleFormat::float32   ? SF_FORMAT_FLOAT
-                                  : format == SampleFormat::float64 ? SF_FORMAT_DOUBLE
-                                                                    : SF_FORMAT_PCM_24);
+                                 : format == SampleFormat::float64 ? SF_FORMAT_DOUBLE
+                                                                   : SF_FORMAT_PCM_24);
   auto file = std::make_unique<File>();
   file->path = path;
   file->handle = sf_open(path.c_str(), SFM_WRITE, &info);
@@ -165,7 +165,7 @@ Result<std::string> find_scene(const std::string& name) {
     return Error{"expected the name of a model or a preset"};
   }
   std::error_code error;
-  const fs::path data = data_folder();
+  const fs::path& data = data_folder();
   for (const fs::path& path : {fs::path(name), fs::path(name + ".toml"), fs::path(name + ".mdl"),
                                data / "presets" / (name + ".toml"), data / "presets" / name,
                                data / "models" / (name + ".mdl"), data / "models" / name}) {

@@ -164,9 +164,7 @@ void add_render(CLI::App& app, RenderChoice& choice, int& code) {
   });
 }
 
-}  // namespace
-
-int main(int argc, char** argv) {
+int run(int argc, char** argv) {
   CLI::App app{"ressort plays networks of masses and springs, read from .mdl files."};
   app.footer(
       "Start with 'ressort play', then type 'help' at its prompt.\n"
@@ -191,13 +189,23 @@ int main(int argc, char** argv) {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
     return app.exit(error) == 0 ? exit_code::done : exit_code::wrong_use;
-  } catch (const std::exception& error) {
-    std::fprintf(stderr, "ressort: %s\n", error.what());
-    return exit_code::our_failure;
   }
   if (app.get_subcommands().empty()) {
     std::fprintf(stderr, "%s", app.help().c_str());
     return exit_code::wrong_use;
   }
   return code;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  try {
+    return run(argc, argv);
+  } catch (const std::exception& error) {
+    std::fputs(error.what(), stderr);
+  } catch (...) {
+    std::fputs("an error without a name", stderr);
+  }
+  return exit_code::our_failure;
 }

@@ -208,6 +208,9 @@ void Process::play_models(std::size_t input_count, std::size_t output_count, std
   const std::span<double* const> out(channels.data(), output_count);
   // A model with one output is heard on both sides; one with more than the device has is folded.
   const auto add = [&](const std::vector<double>& samples, int count, auto&& gain) {
+    if (output_count == 0) {
+      return;
+    }
     const auto sources = static_cast<std::size_t>(count);
     for (std::size_t k = 0; k < std::max<std::size_t>(sources, sources == 1 ? output_count : 0);
          ++k) {
@@ -218,9 +221,6 @@ void Process::play_models(std::size_t input_count, std::size_t output_count, std
       }
     }
   };
-  if (output_count == 0) {
-    return;
-  }
   const double length = static_cast<double>(std::max<std::size_t>(1, fade_frames_));
   const auto old_gain = [&](std::size_t n) {
     return n < fade_left_ ? static_cast<double>(fade_left_ - n) / length : 0.0;

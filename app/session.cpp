@@ -13,9 +13,9 @@ double to_db(double factor) {
 
 }  // namespace
 
-Session::Session(Process& process, SessionOptions options, Tell tell)
+Session::Session(Process& process, const SessionOptions& options, Tell tell)
     : process_(process),
-      options_(std::move(options)),
+      options_(options),
       tell_(std::move(tell)),
       rate_hz_(options_.compile.rate_hz),
       current_(std::make_shared<Loaded>()),

@@ -64,7 +64,7 @@ class Session {
 
   // `tell` gets what happens by itself, such as a voice that became unstable; on the worker's
   // thread. The process must outlive the session.
-  Session(Process& process, SessionOptions options, Tell tell);
+  Session(Process& process, const SessionOptions& options, Tell tell);
   ~Session();
 
   // Loads in the worker; `answer` is called there, with what sounds now or with the error's whole

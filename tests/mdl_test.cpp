@@ -372,7 +372,7 @@ TEST_CASE("a file of nothing but errors is given up after a hundred", "[mdl]") {
   }
   const ParsedNetwork parsed = parse_network(unknown_masses);
   CHECK(parsed.diagnostics.back().message ==
-        "too many problems; the rest of the file was not looked at");
+        "too many problems; those after this are not told");
 }
 
 TEST_CASE("the third argument is a delayed position or a velocity, as the file shows", "[mdl]") {

@@ -195,16 +195,17 @@ class Reader {
   void look_over();
 
   void say(Severity severity, int line, const Token& token, std::string message) {
-    if (out_.diagnostics.size() < most_diagnostics) {
-      out_.diagnostics.push_back({severity, line, token.column,
-                                  std::max(1, static_cast<int>(token.text.size())),
-                                  std::move(message)});
+    if (out_.diagnostics.size() > most_diagnostics) {
+      return;
     }
-  }
-  // After so many problems one more helps nobody.
-  void say_last(const Line& line) {
-    out_.diagnostics.push_back({Severity::error, line.number, 1, 1,
-                                "too many problems; the rest of the file was not looked at"});
+    if (out_.diagnostics.size() == most_diagnostics) {
+      out_.diagnostics.push_back({Severity::error, line, token.column, 1,
+                                  "too many problems; those after this are not told"});
+      return;
+    }
+    out_.diagnostics.push_back({severity, line, token.column,
+                                std::max(1, static_cast<int>(token.text.size())),
+                                std::move(message)});
   }
   void error(const Line& line, const Token& token, std::string message) {
     say(Severity::error, line.number, token, std::move(message));
@@ -252,8 +253,7 @@ ParsedNetwork Reader::read(std::string_view text) {
     declare(line);
   }
   for (const Line& line : lines_) {
-    if (out_.diagnostics.size() >= most_diagnostics) {
-      say_last(line);
+    if (out_.diagnostics.size() > most_diagnostics) {
       break;
     }
     build(line);
