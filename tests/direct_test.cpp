@@ -186,6 +186,59 @@ TEST_CASE("so it is for every law and every start that the nine do not have", "[
   CHECK(channels[4].worst == 0.0);
 }
 
+TEST_CASE("nonlinear springs, clipped contacts, gravity and force outputs equal the textbook's",
+          "[direct]") {
+  // Both meanings of gravity, a limiter that clips in both directions, reactions at a hand and at a
+  // ground.
+  for (const char* const text :
+       {"@g ground 0.\n@in1 posInput 0.\n@in2 frcInput @a\n@a mass 1. 0.3 0.3\n"
+        "@b massG 2. 0.00001 0. 0.\n@c osc 1. 0.01 0.001 0. 0. drawing 1. 2.\n"
+        "@q nlSpring2 @a @g 0.02 0.05 0.002\n@k nlSpring3 @b @g 0.01 0.2 0.003\n"
+        "@h springDamper @in1 @c 0.02 0.01\n@l nlSpring @a @b 0.01 0.03 0.001\n"
+        "@out1 posOutput @a\n@out2 posOutput @b\n@out3 frcOutput @g\n@out4 frcOutput @in1\n"
+        "@out5 frcOutput @a\n",
+        "@g ground 0.\n@in1 posInput 1.\n@in2 frcInput @b\n@a mass 1. 0.5 [0. 0. 0.3] 0.\n"
+        "@b osc 1. 0.01 0.002 0.2 0. 0.\n@s nlSpringDamper @a @g .01 .02 .03 .002\n"
+        "@t nlSpringDamper @b @a .02 0. .1 .001\n@u nlContact @b @in1 .001 .05 .04 .002 .3\n"
+        "@v nlContact @g @b .05 .1 .02 .001\n@out1 posOutput @a\n@out2 posOutput @b\n"
+        "@out3 frcOutput @in1\n@out4 frcOutput @b\n@out5 frcOutput @g\n"}) {
+    const Network network = network_of(text);
+    auto oracle = reference::make_simulation(network, parameter_values(network));
+    Bare<double> bare(make_program(network, 44100.0, true));
+    const rig::Motion hand(51, 0.5, 30.0);
+    const rig::Motion force(52, 20.0, 2000.0);
+    std::vector<Comparison> channels(5);
+    for (std::size_t n = 0; n < 2000; ++n) {  // impacts are chaotic: later even doubles differ
+      const double rest = network.masses[1].position;
+      const std::vector<double> inputs = {rest + 0.8 * hand(n), 0.02 * force(n)};
+      const auto expected = oracle.simulator.step(inputs);
+      const auto found = bare.step(inputs);
+      for (std::size_t c = 0; c < channels.size(); ++c) {
+        channels[c].add(expected[c], found[c]);
+      }
+    }
+    for (std::size_t c = 0; c < channels.size(); ++c) {
+      INFO("output " << c + 1 << ": residual " << show(channels[c].relative()));
+      CHECK(channels[c].peak > 0.0);
+      CHECK(channels[c].relative() < 1e-9);
+    }
+  }
+}
+
+TEST_CASE("the limiting spring is continuous where it clips", "[direct]") {
+  // b = sqrt((k - s)/c) = sqrt(0.49/10) = 0.2213594: the force on both sides, by hand.
+  using V = Lanes<double>;
+  const auto force = [](double d) {
+    const V zero{};
+    return clipped_spring_force(zero + d, zero, zero + 0.01, zero + 10.0, zero + 0.5, zero)[0];
+  };
+  const double b = std::sqrt(0.049);
+  CHECK(force(0.2) == Approx(0.01 * 0.2 + 10.0 * 0.008).epsilon(1e-14));
+  CHECK(force(b - 1e-9) == Approx(0.5 * b).epsilon(1e-7));
+  CHECK(force(b + 1e-9) == Approx(0.5 * b).epsilon(1e-7));
+  CHECK(force(-1.0) == Approx(-0.5).epsilon(1e-14));
+}
+
 TEST_CASE("single precision keeps 90 dB over a second on what is linear", "[direct]") {
   for (const Example& example : scenes::nine_instruments()) {
     if (!example.is_linear) {

@@ -56,6 +56,42 @@ std::vector<double> alone(const std::string& text, const Preset& preset, std::si
 
 }  // namespace
 
+TEST_CASE("a parameter that audio gives acts sample by sample, through expressions too",
+          "[engine]") {
+  const std::string text =
+      "@k audioParam @in2\n@g ground 0.\n@a mass 1. 0. 0.\n@b mass 1.5 0. 0.\n"
+      "@s springDamper @a @g [0.05+0.04*k] 0.001\n@t springDamper @a @b k 0.001\n"
+      "@in1 frcInput @a\n@out1 posOutput @b\n";
+  const Network network = network_of(text);
+  auto compiled = compile(network, default_preset(network, true), {.bare = true});
+  REQUIRE(compiled);
+  CHECK(compiled->instrument.audio_inputs == 2);
+  auto oracle = reference::make_simulation(network, parameter_values(network));
+  constexpr std::size_t frames = 20000;
+  std::vector<double> force(frames);
+  std::vector<double> stiffness(frames);
+  std::vector<double> expected(frames);
+  const Motion motion(61, 20.0, 900.0);
+  for (std::size_t n = 0; n < frames; ++n) {
+    force[n] = n % 5000 == 0 ? 0.1 : 0.0;
+    stiffness[n] = 0.1 + 0.05 * motion(n);
+    oracle.set_parameters(network, std::vector{stiffness[n]});
+    const std::vector<double> inputs{force[n]};
+    expected[n] = oracle.simulator.step(inputs)[0];
+  }
+  std::vector<double> found(frames);
+  double* const outputs[] = {found.data()};
+  const double* const inputs[] = {force.data(), stiffness.data()};
+  compiled->engine->process({}, inputs, outputs, frames);
+  Comparison comparison;
+  for (std::size_t n = 0; n < frames; ++n) {
+    comparison.add(expected[n], found[n]);
+  }
+  INFO("residual " << show(comparison.relative()));
+  CHECK(comparison.peak > 0.01);
+  CHECK(comparison.relative() < 1e-12);
+}
+
 // --- pitch
 // ----------------------------------------------------------------------------------------
 

@@ -36,6 +36,7 @@ class Point {
   void receive(Real force) { force_ += force; }
   Real position() const { return x_; }
   Real velocity() const { return x_ - x_before_; }
+  Real force() const { return force_; }  // received since the last step
 
  protected:
   void move_to(Real x) {
@@ -122,6 +123,75 @@ class SpringDamper : public Interaction {
   Real force(Real delta, Real nu) const override { return *k_ * delta + *z_ * nu; }
   Number k_;
   Number z_;
+};
+
+// f = K d + Q sgn(d) d^2 + Z v, or with d^3
+class NonlinearSpring : public Interaction {
+ public:
+  NonlinearSpring(Point& a, Point& b, Number k, Number q, Number z, bool cubic)
+      : Interaction(a, b), k_(k), q_(q), z_(z), cubic_(cubic) {}
+
+ private:
+  Real force(Real delta, Real nu) const override {
+    const Real bent = cubic_ ? delta * delta * delta : sgn(delta) * delta * delta;
+    return *k_ * delta + *q_ * bent + *z_ * nu;
+  }
+  Number k_;
+  Number q_;
+  Number z_;
+  bool cubic_;
+};
+
+class ClippedSpring : public Interaction {
+ public:
+  ClippedSpring(Point& a, Point& b, Number s, Number c, Number k, Number z)
+      : Interaction(a, b), s_(s), c_(c), k_(k), z_(z) {}
+
+ private:
+  Real force(Real delta, Real nu) const override {
+    if (*c_ == 0) {
+      return *s_ * delta + *z_ * nu;
+    }
+    if (*s_ >= *k_) {
+      return *k_ * delta + *z_ * nu;
+    }
+    const Real b = std::sqrt((*k_ - *s_) / *c_);
+    return std::fabs(delta) <= b ? *s_ * delta + *c_ * delta * delta * delta + *z_ * nu
+                                 : *k_ * delta + (*z_ + 0.3L * *k_) * nu;
+  }
+  Number s_;
+  Number c_;
+  Number k_;
+  Number z_;
+};
+
+class ClippedContact : public Interaction {
+ public:
+  ClippedContact(Point& a, Point& b, Number s, Number c, Number k, Number z, Number threshold)
+      : Interaction(a, b), s_(s), c_(c), k_(k), z_(z), threshold_(threshold) {}
+
+ private:
+  Real force(Real delta, Real nu) const override {
+    if (!(delta > -*threshold_)) {
+      return 0;
+    }
+    const Real depth = delta + *threshold_;
+    const Real k = *k_ < *s_ ? *s_ : *k_;
+    const Real c = *k_ < *s_ ? 0 : *c_;
+    if (c == 0) {
+      return *s_ * depth + *z_ * nu;
+    }
+    if (*s_ >= k) {
+      return k * depth + *z_ * nu;
+    }
+    const Real b = std::sqrt((k - *s_) / c);
+    return (std::fabs(depth) <= b ? *s_ * depth + c * depth * depth * depth : k * depth) + *z_ * nu;
+  }
+  Number s_;
+  Number c_;
+  Number k_;
+  Number z_;
+  Number threshold_;
 };
 
 class Pluck : public Interaction {
@@ -220,11 +290,28 @@ class Simulator {
   void add_contact(Point& a, Point& b, Number k, Number z, Number threshold) {
     add<Contact>(a, b, k, z, threshold);
   }
+  void add_nonlinear_spring(Point& a, Point& b, Number k, Number q, Number z, bool cubic) {
+    add<NonlinearSpring>(a, b, k, q, z, cubic);
+  }
+  void add_clipped_spring(Point& a, Point& b, Number s, Number c, Number k, Number z) {
+    add<ClippedSpring>(a, b, s, c, k, z);
+  }
+  void add_clipped_contact(Point& a, Point& b, Number s, Number c, Number k, Number z,
+                           Number threshold) {
+    add<ClippedContact>(a, b, s, c, k, z, threshold);
+  }
+
+  // A force of -g / divisor at every tick.
+  void add_gravity(Point& point, Number g, Real divisor) {
+    weights_.push_back({&point, g, divisor});
+  }
 
   // Inputs are numbered as they are added, forces and positions together; so are outputs.
   void add_force_input(Point& point) { inputs_.push_back({&point, nullptr}); }
   void add_position_input(PositionInput& point) { inputs_.push_back({nullptr, &point}); }
-  void add_output(const Point* point) { outputs_.push_back(point); }  // null: always 0
+  void add_output(const Point* point, bool is_force = false) {  // null: always 0
+    outputs_.push_back({point, is_force});
+  }
 
   std::size_t input_count() const { return inputs_.size(); }
   std::size_t output_count() const { return outputs_.size(); }
@@ -239,6 +326,9 @@ class Simulator {
         inputs_[i].moved->feed(inputs[i]);
       }
     }
+    for (const Weight& weight : weights_) {
+      weight.point->receive(-*weight.g / weight.divisor);
+    }
     for (Point* const point : points_in_order_) {
       point->step();
     }
@@ -250,13 +340,31 @@ class Simulator {
     }
     std::vector<double> outputs;
     outputs.reserve(outputs_.size());
-    for (const Point* const point : outputs_) {
-      outputs.push_back(point == nullptr ? 0.0 : static_cast<double>(point->position()));
+    for (const Output& output : outputs_) {
+      Real value = 0;
+      if (output.point != nullptr && output.is_force) {
+        value = output.point->force();  // of the links, and of the inputs of this tick
+        for (std::size_t i = 0; i < inputs_.size(); ++i) {
+          value += inputs_[i].pushed == output.point ? Real{inputs[i]} : Real{0};
+        }
+      } else if (output.point != nullptr) {
+        value = output.point->position();
+      }
+      outputs.push_back(static_cast<double>(value));
     }
     return outputs;
   }
 
  private:
+  struct Weight {
+    Point* point = nullptr;
+    Number g = nullptr;
+    Real divisor = 1;
+  };
+  struct Output {
+    const Point* point = nullptr;
+    bool is_force = false;
+  };
   struct Input {
     Point* pushed = nullptr;
     PositionInput* moved = nullptr;
@@ -279,7 +387,8 @@ class Simulator {
   std::vector<PositionInput*> position_points_;
   std::vector<std::unique_ptr<Interaction>> links_;
   std::vector<Input> inputs_;
-  std::vector<const Point*> outputs_;
+  std::vector<Weight> weights_;
+  std::vector<Output> outputs_;
 };
 
 // A Network's simulator and the numbers that its parameters move.
@@ -328,6 +437,10 @@ inline Simulation make_simulation(const Network& network, std::span<const double
         break;
     }
     hands.push_back(hand);
+    if (mass.gravity != no_argument) {
+      simulator.add_gravity(*points.back(), number(mass.gravity),
+                            mass.gravity_per_rate ? Real{44100} : Real{1});
+    }
   }
   for (const Link& link : network.links) {
     Point& a = *points[link.a];
@@ -335,6 +448,8 @@ inline Simulation make_simulation(const Network& network, std::span<const double
     const Number first = number(link.arguments[0]);
     const Number second = number(link.arguments[1]);
     const Number last = number(link.arguments[2]);
+    const Number fourth = number(link.arguments[3]);
+    const Number fifth = number(link.arguments[4]);
     switch (link.kind) {
       case LinkKind::spring:
         simulator.add_spring(a, b, first, second);
@@ -348,6 +463,17 @@ inline Simulation make_simulation(const Network& network, std::span<const double
       case LinkKind::smooth_bow:
         simulator.add_smooth_bow(a, b, first, second);
         break;
+      case LinkKind::quadratic_spring:
+      case LinkKind::cubic_spring:
+        simulator.add_nonlinear_spring(a, b, first, second, last,
+                                       link.kind == LinkKind::cubic_spring);
+        break;
+      case LinkKind::clipped_spring:
+        simulator.add_clipped_spring(a, b, first, second, last, fourth);
+        break;
+      case LinkKind::clipped_contact:
+        simulator.add_clipped_contact(a, b, first, second, last, fourth, fifth);
+        break;
       case LinkKind::contact:
         simulator.add_contact(a, b, first, second, last);
         break;
@@ -360,12 +486,13 @@ inline Simulation make_simulation(const Network& network, std::span<const double
       simulator.add_position_input(*hands[input.mass]);
     }
   }
-  std::vector<const Point*> channels(static_cast<std::size_t>(output_count(network)), nullptr);
+  std::vector<const Output*> channels(static_cast<std::size_t>(output_count(network)), nullptr);
   for (const Output& output : network.outputs) {
-    channels[static_cast<std::size_t>(output.number - 1)] = points[output.mass];
+    channels[static_cast<std::size_t>(output.number - 1)] = &output;
   }
-  for (const Point* const point : channels) {
-    simulator.add_output(point);
+  for (const Output* const output : channels) {
+    simulator.add_output(output == nullptr ? nullptr : points[output->mass],
+                         output != nullptr && output->is_force);
   }
   return made;
 }

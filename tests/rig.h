@@ -125,7 +125,7 @@ class Bare {
 
   // Steps every lane; gives one lane's outputs.
   std::vector<double> run(std::size_t lane) {
-    step_direct(program_, state_, drive_.data(), out_.data(), 1);
+    step_direct(program_, state_, drive_.data(), nullptr, out_.data(), 1);
     return outputs(lane);
   }
   std::vector<double> outputs(std::size_t lane) const {

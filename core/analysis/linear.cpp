@@ -48,11 +48,12 @@ Scaled scaled_matrices(const Network& network, std::span<const double> parameter
     }
   }
   for (const Link& link : network.links) {
-    if (link.kind != LinkKind::spring || link.a == link.b) {
+    if (link.a == link.b) {
       continue;
     }
-    const double k = argument_value(network, link.arguments[0], parameters);
-    const double z = argument_value(network, link.arguments[1], parameters);
+    const LinearPart part = linear_part(link);
+    const double k = argument_value(network, part.stiffness, parameters);
+    const double z = argument_value(network, part.damping, parameters);
     const int a = index[link.a];
     const int b = index[link.b];
     if (a >= 0) {

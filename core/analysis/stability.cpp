@@ -25,6 +25,19 @@ Weight weight_of(const Network& network, const Link& link, std::span<const doubl
     case LinkKind::spring:
     case LinkKind::contact:
       return {value(0) * r * r, 2.0 * value(1) * r};
+    // The steepest slope of a quadratic or cubic spring grows with the amplitude, which is not
+    // known here; its linear part is what counts at rest.
+    case LinkKind::quadratic_spring:
+    case LinkKind::cubic_spring:
+      return {value(0) * r * r, 2.0 * value(2) * r};
+    case LinkKind::clipped_spring: {
+      const double k = std::max(value(0), value(2));
+      return {1.6 * k * r * r, 2.0 * value(3) * r};
+    }
+    case LinkKind::clipped_contact: {
+      const double k = std::max(value(0), value(2));
+      return {k * r * r, 2.0 * value(3) * r};
+    }
     case LinkKind::pluck:
       return {0.1 * value(0) * r * r, 2.0 * value(2) * r};
     // A bow's friction grows with the square root of the factor; counting it with the factor

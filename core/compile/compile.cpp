@@ -21,22 +21,31 @@ bool moves(const Mass& mass) {
 
 struct LawRow {
   Law law;
-  std::array<Unit, max_link_arguments> units;
+  std::array<Unit, max_link_arguments> units;  // the rest are plain
 };
 
 // Which law a link follows, and how its arguments scale.
 LawRow law_of(LinkKind kind) {
+  using enum Unit;
   switch (kind) {
     case LinkKind::spring:
-      return {Law::spring, {Unit::stiffness, Unit::damping, Unit::plain}};
+      return {Law::spring, {stiffness, damping}};
+    case LinkKind::quadratic_spring:
+      return {Law::quadratic_spring, {stiffness, stiffness, damping}};
+    case LinkKind::cubic_spring:
+      return {Law::cubic_spring, {stiffness, stiffness, damping}};
+    case LinkKind::clipped_spring:
+      return {Law::clipped_spring, {stiffness, stiffness, stiffness, damping}};
     case LinkKind::pluck:
-      return {Law::pluck, {Unit::stiffness, Unit::plain, Unit::damping}};
+      return {Law::pluck, {stiffness, plain, damping}};
     case LinkKind::bow:
-      return {Law::bow, {Unit::friction, Unit::speed, Unit::plain}};
+      return {Law::bow, {friction, speed}};
     case LinkKind::smooth_bow:
-      return {Law::smooth_bow, {Unit::friction, Unit::speed, Unit::plain}};
+      return {Law::smooth_bow, {friction, speed}};
     case LinkKind::contact:
-      return {Law::contact, {Unit::stiffness, Unit::damping, Unit::plain}};
+      return {Law::contact, {stiffness, damping}};
+    case LinkKind::clipped_contact:
+      return {Law::clipped_contact, {stiffness, stiffness, stiffness, damping}};
   }
   return {};
 }
@@ -56,10 +65,24 @@ class ProgramMaker {
     for (const Input& input : network_.inputs) {
       program_.inputs.push_back({input.number, input.is_force, node_[input.mass]});
     }
-    program_.outputs.assign(static_cast<std::size_t>(output_count(network_)), Program::no_node);
+    program_.outputs.assign(static_cast<std::size_t>(output_count(network_)),
+                            {Program::no_node, false});
     for (const Output& output : network_.outputs) {
-      program_.outputs[static_cast<std::size_t>(output.number - 1)] = node_[output.mass];
+      program_.outputs[static_cast<std::size_t>(output.number - 1)] = {node_[output.mass],
+                                                                       output.is_force};
     }
+    for (std::uint32_t i = 0; i < network_.parameters.size(); ++i) {
+      if (const int input = network_.parameters[i].audio_input; input > 0) {
+        program_.audio_parameters.push_back({i, input - 1});
+        auto& coefficients = program_.audio_coefficients;
+        coefficients.insert(coefficients.end(), program_.depending[i].begin(),
+                            program_.depending[i].end());
+      }
+    }
+    std::sort(program_.audio_coefficients.begin(), program_.audio_coefficients.end());
+    program_.audio_coefficients.erase(
+        std::unique(program_.audio_coefficients.begin(), program_.audio_coefficients.end()),
+        program_.audio_coefficients.end());
     return std::move(program_);
   }
 
@@ -94,7 +117,8 @@ class ProgramMaker {
     const auto rank = [&](std::uint32_t i) {
       const Mass& m = masses[i];
       const int group = moves(m) ? 0 : m.kind == MassKind::ground ? 1 : 2;
-      return std::tuple(group, m.kind, m.mass, m.stiffness, m.damping);
+      return std::tuple(group, m.kind, m.mass, m.stiffness, m.damping, m.gravity,
+                        m.gravity_per_rate);
     };
     std::stable_sort(order.begin(), order.end(),
                      [&](std::uint32_t a, std::uint32_t b) { return rank(a) < rank(b); });
@@ -112,12 +136,15 @@ class ProgramMaker {
         ++program_.mass_runs.back().count;
         continue;
       }
+      const Unit gravity_unit = mass.gravity_per_rate ? Unit::gravity_per_rate : Unit::gravity;
       program_.mass_runs.push_back({.first = node,
                                     .count = 1,
                                     .inverse_mass = coefficient(mass.mass, Unit::inverse_mass),
                                     .stiffness = coefficient(mass.stiffness, Unit::stiffness),
                                     .damping = coefficient(mass.damping, Unit::damping),
-                                    .is_oscillator = mass.kind == MassKind::oscillator});
+                                    .gravity = coefficient(mass.gravity, gravity_unit),
+                                    .is_oscillator = mass.kind == MassKind::oscillator,
+                                    .has_gravity = mass.gravity != no_argument});
     }
   }
 
@@ -336,6 +363,9 @@ Result<Compiled> compile(const Network& network, const Preset& preset,
       instrument.audio_inputs = std::max(instrument.audio_inputs, setting.number);
     }
     playing.controls.push_back(*control);
+  }
+  for (const Parameter& parameter : network.parameters) {
+    instrument.audio_inputs = std::max(instrument.audio_inputs, parameter.audio_input);
   }
   playing.voices = options.voices > 0 ? options.voices : preset.voices;
   playing.gain = preset.gain;

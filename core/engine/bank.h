@@ -16,6 +16,7 @@ template <class T>
 struct Bank {
   Bank(const Program& program, std::size_t lanes)
       : drive(max_segment_frames * program.inputs.size()),
+        audio(max_segment_frames * program.audio_coefficients.size()),
         outputs(max_segment_frames * program.outputs.size()) {
     // One by one: a copy would not have the room that a State reserves for its ramps.
     const std::size_t count = (lanes + lane_count<T> - 1) / lane_count<T>;
@@ -53,6 +54,7 @@ struct Bank {
 
   std::vector<State<T>> groups;
   std::vector<Drive<T>> drive;    // [frame][input]
+  std::vector<Lanes<T>> audio;    // [frame][audio coefficient]
   std::vector<Lanes<T>> outputs;  // [frame][channel]
 };
 

@@ -9,6 +9,8 @@
 namespace ressort {
 namespace {
 
+constexpr double reference_rate_hz = 44100.0;
+
 template <class T>
 void ramp_coefficients(State<T>& state) {
   if (--state.ramp_frames > 0) {
@@ -24,33 +26,38 @@ void ramp_coefficients(State<T>& state) {
   state.ramping.clear();
 }
 
-template <class T>
-void step_masses(const Program& program, State<T>& state) {
+// The loop over one run's masses; `pull` is what acts on one besides its links.
+template <class T, class Pull>
+void move_masses(const MassRun& run, State<T>& state, Pull&& pull) {
   using V = Lanes<T>;
+  const V inverse_mass = state.coefficient[run.inverse_mass];
   V* const x = state.x.data();
   V* const v = state.v.data();
   V* const force = state.force.data();
+  for (std::uint32_t i = run.first; i < run.first + run.count; ++i) {
+    v[i] += (force[i] - pull(x[i], v[i])) * inverse_mass;
+    x[i] += v[i];
+    force[i] = V{};
+  }
+}
+
+template <class T>
+void step_masses(const Program& program, State<T>& state) {
+  using V = Lanes<T>;
   for (const MassRun& run : program.mass_runs) {
-    const V inverse_mass = state.coefficient[run.inverse_mass];
-    const std::uint32_t end = run.first + run.count;
+    const V k = state.coefficient[run.stiffness];
+    const V z = state.coefficient[run.damping];
+    const V g = run.has_gravity ? state.coefficient[run.gravity] : V{};
     if (run.is_oscillator) {
-      const V k = state.coefficient[run.stiffness];
-      const V z = state.coefficient[run.damping];
-      for (std::uint32_t i = run.first; i < end; ++i) {
-        v[i] += (force[i] - k * x[i] - z * v[i]) * inverse_mass;
-        x[i] += v[i];
-        force[i] = V{};
-      }
+      move_masses(run, state, [=](V x, V v) { return k * x + z * v + g; });
+    } else if (run.has_gravity) {
+      move_masses(run, state, [=](V, V) { return g; });
     } else {
-      for (std::uint32_t i = run.first; i < end; ++i) {
-        v[i] += force[i] * inverse_mass;
-        x[i] += v[i];
-        force[i] = V{};
-      }
+      move_masses(run, state, [](V, V) { return V{}; });
     }
   }
   for (std::size_t i = program.moving; i < state.force.size(); ++i) {
-    force[i] = V{};
+    state.force[i] = V{};
   }
 }
 
@@ -77,9 +84,27 @@ void step_links(const Program& program, State<T>& state) {
     const V c0 = state.coefficient[run.coefficients[0]];
     const V c1 = state.coefficient[run.coefficients[1]];
     const V c2 = state.coefficient[run.coefficients[2]];
+    const V c3 = state.coefficient[run.coefficients[3]];
+    const V c4 = state.coefficient[run.coefficients[4]];
     switch (run.law) {
       case Law::spring:
         add_forces(program, run, state, [=](V d, V v) { return spring_force(d, v, c0, c1); });
+        break;
+      case Law::quadratic_spring:
+        add_forces(program, run, state,
+                   [=](V d, V v) { return quadratic_spring_force(d, v, c0, c1, c2); });
+        break;
+      case Law::cubic_spring:
+        add_forces(program, run, state,
+                   [=](V d, V v) { return cubic_spring_force(d, v, c0, c1, c2); });
+        break;
+      case Law::clipped_spring:
+        add_forces(program, run, state,
+                   [=](V d, V v) { return clipped_spring_force(d, v, c0, c1, c2, c3); });
+        break;
+      case Law::clipped_contact:
+        add_forces(program, run, state,
+                   [=](V d, V v) { return clipped_contact_force(d, v, c0, c1, c2, c3, c4); });
         break;
       case Law::pluck:
         add_forces(program, run, state, [=](V d, V v) { return pluck_force(d, v, c0, c1, c2); });
@@ -95,6 +120,24 @@ void step_links(const Program& program, State<T>& state) {
         break;
     }
   }
+}
+
+template <class T>
+Lanes<T> read_output(const Program& program, const State<T>& state, const Drive<T>* drive,
+                     const OutputSlot& output) {
+  if (output.node == Program::no_node) {
+    return Lanes<T>{};
+  }
+  if (!output.is_force) {
+    return state.x[output.node];
+  }
+  Lanes<T> force = state.force[output.node];
+  for (std::size_t i = 0; i < program.inputs.size(); ++i) {
+    if (program.inputs[i].is_force && program.inputs[i].node == output.node) {
+      force += drive[i].value;
+    }
+  }
+  return force / static_cast<T>(program.rate_ratio * program.rate_ratio);
 }
 
 }  // namespace
@@ -116,6 +159,10 @@ double coefficient_value(const Program& program, const Coefficient& coefficient,
       return value * r * std::sqrt(stiffness_factor);
     case Unit::inverse_mass:
       return 1.0 / value;
+    case Unit::gravity:
+      return value * r * r;
+    case Unit::gravity_per_rate:
+      return value * r * r / reference_rate_hz;
   }
   return value;
 }
@@ -145,12 +192,14 @@ void reset_lane(const Program& program, State<T>& state, std::size_t lane) {
 }
 
 template <class T>
-void step_direct(const Program& program, State<T>& state, const Drive<T>* drive, Lanes<T>* outputs,
-                 std::size_t frames) {
-  using V = Lanes<T>;
+void step_direct(const Program& program, State<T>& state, const Drive<T>* drive,
+                 const Lanes<T>* audio, Lanes<T>* outputs, std::size_t frames) {
   for (std::size_t frame = 0; frame < frames; ++frame) {
     if (state.ramp_frames > 0) {
       ramp_coefficients(state);
+    }
+    for (const std::uint32_t c : program.audio_coefficients) {
+      state.coefficient[c] = *audio++;
     }
     for (std::size_t i = 0; i < program.inputs.size(); ++i) {
       if (program.inputs[i].is_force) {
@@ -164,11 +213,11 @@ void step_direct(const Program& program, State<T>& state, const Drive<T>* drive,
         state.v[program.inputs[i].node] = drive[i].velocity;
       }
     }
-    drive += program.inputs.size();
     step_links(program, state);
-    for (const std::uint32_t node : program.outputs) {
-      *outputs++ = node == Program::no_node ? V{} : state.x[node];
+    for (const OutputSlot& output : program.outputs) {
+      *outputs++ = read_output(program, state, drive, output);
     }
+    drive += program.inputs.size();
   }
 }
 
@@ -176,9 +225,9 @@ template struct State<float>;
 template struct State<double>;
 template void reset_lane(const Program&, State<float>&, std::size_t);
 template void reset_lane(const Program&, State<double>&, std::size_t);
-template void step_direct(const Program&, State<float>&, const Drive<float>*, Lanes<float>*,
-                          std::size_t);
-template void step_direct(const Program&, State<double>&, const Drive<double>*, Lanes<double>*,
-                          std::size_t);
+template void step_direct(const Program&, State<float>&, const Drive<float>*, const Lanes<float>*,
+                          Lanes<float>*, std::size_t);
+template void step_direct(const Program&, State<double>&, const Drive<double>*,
+                          const Lanes<double>*, Lanes<double>*, std::size_t);
 
 }  // namespace ressort

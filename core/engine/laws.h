@@ -17,6 +17,33 @@ inline V spring_force(V d, V v, V k, V z) {
   return k * d + z * v;
 }
 
+// f = K d + Q sgn(d) d^2 + Z v
+template <class V>
+inline V quadratic_spring_force(V d, V v, V k, V q, V z) {
+  return k * d + q * d * absolute(d) + z * v;
+}
+
+// f = K d + Q d^3 + Z v
+template <class V>
+inline V cubic_spring_force(V d, V v, V k, V q, V z) {
+  return k * d + q * d * d * d + z * v;
+}
+
+// A cubic spring whose stiffness s grows no further than k, at |d| = b = sqrt((k - s)/c); beyond
+// b it is damped more. mi.lib's b is sqrt(k - s)/c, where the force jumps; this one is continuous.
+//   c = 0:      f = s d + Z v
+//   s >= k:     f = k d + Z v
+//   |d| <= b:   f = s d + c d^3 + Z v
+//   else:       f = k d + (Z + 0.3 k) v
+template <class V>
+inline V clipped_spring_force(V d, V v, V s, V c, V k, V z) {
+  using T = std::remove_reference_t<decltype(v[0])>;
+  const V within = s * d + c * d * d * d + z * v;
+  const V beyond = k * d + (z + T(0.3) * k) * v;
+  const V cubic = select(c > V{}, select(c * d * d <= k - s, within, beyond), beyond);
+  return select(c == V{}, s * d + z * v, select(s >= k, k * d + z * v, cubic));
+}
+
 // A repulsive triangle: slope 0.9 K up to |d| = s/10, then falling with K/10 to 0 at |d| = s:
 //   |d| < s/10:        f = -(K - K/10) d + Z v
 //   s/10 <= |d| < s:   f = -sgn(d) (s/10) K + (K/10) d + Z v
@@ -56,6 +83,19 @@ inline V smooth_bow_force(V v, V z, V s) {
 template <class V>
 inline V contact_force(V d, V v, V k, V z, V t) {
   return select(d > -t, k * (d + t) + z * v, V{});
+}
+
+// The same with a cubic spring that is clipped at k; without the clipped spring's extra damping.
+// With D = d + t, and s instead of k where k < s:
+//   d > -t: f = s D + c D^3 + Z v up to |D| = sqrt((k - s)/c), then k D + Z v; else 0
+template <class V>
+inline V clipped_contact_force(V d, V v, V s, V c, V k, V z, V t) {
+  const V depth = d + t;
+  const V cubic = s * depth + c * depth * depth * depth;
+  const V clipped = k * depth;
+  const V bent = select(c > V{}, select(c * depth * depth <= k - s, cubic, clipped), clipped);
+  const V elastic = select(k < s, s * depth, select(c == V{}, s * depth, bent));
+  return select(d > -t, elastic + z * v, V{});
 }
 
 }  // namespace ressort

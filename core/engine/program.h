@@ -2,7 +2,9 @@
 // changes. Indices and numbers only; the compile room knows the names.
 #pragma once
 
+#include <array>
 #include <cstdint>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -14,12 +16,14 @@ namespace ressort {
 // How a coefficient follows the sample rate and a voice's pitch. With r = 44100 / rate and s the
 // voice's stiffness factor, a coefficient is its formula's value times r^a s^b.
 enum class Unit : std::uint8_t {
-  plain,         // distances and thresholds: a = 0, b = 0
-  stiffness,     // K: a = 2, b = 1
-  damping,       // Z: a = 1, b = 0, so that a decay stays what it is at every pitch
-  friction,      // Z of a bow: a = 1, b = 1/2, as the string's impedance
-  speed,         // a bow's velocity scale: a = 1, b = 1/2
-  inverse_mass,  // 1/M: a = 0, b = 0
+  plain,             // distances and thresholds: a = 0, b = 0
+  stiffness,         // K: a = 2, b = 1
+  damping,           // Z: a = 1, b = 0, so that a decay stays what it is at every pitch
+  friction,          // Z of a bow: a = 1, b = 1/2, as the string's impedance
+  speed,             // a bow's velocity scale: a = 1, b = 1/2
+  inverse_mass,      // 1/M: a = 0, b = 0
+  gravity,           // g: a = 2, b = 0
+  gravity_per_rate,  // the same, divided by 44100
 };
 
 struct Coefficient {
@@ -28,7 +32,17 @@ struct Coefficient {
   Unit unit = Unit::plain;
 };
 
-enum class Law : std::uint8_t { spring, pluck, bow, smooth_bow, contact };
+enum class Law : std::uint8_t {
+  spring,
+  quadratic_spring,
+  cubic_spring,
+  clipped_spring,
+  pluck,
+  bow,
+  smooth_bow,
+  contact,
+  clipped_contact,
+};
 
 // Consecutive nodes that share their coefficients.
 struct MassRun {
@@ -37,7 +51,9 @@ struct MassRun {
   std::uint32_t inverse_mass = 0;  // coefficients
   std::uint32_t stiffness = 0;     // read only if is_oscillator
   std::uint32_t damping = 0;
+  std::uint32_t gravity = 0;  // read only if has_gravity
   bool is_oscillator = false;
+  bool has_gravity = false;
 };
 
 // Consecutive links that share law and coefficients.
@@ -45,7 +61,7 @@ struct LinkRun {
   Law law = Law::spring;
   std::uint32_t first = 0;
   std::uint32_t count = 0;
-  std::uint32_t coefficients[3] = {0, 0, 0};  // in the order of laws.h
+  std::array<std::uint32_t, 5> coefficients{};  // in the order of laws.h
 };
 
 struct Ends {
@@ -59,6 +75,17 @@ struct InputSlot {
   std::uint32_t node = 0;
 };
 
+struct OutputSlot {
+  std::uint32_t node = 0;  // Program::no_node for a gap
+  bool is_force = false;   // what the links and this tick's inputs exert, at the reference rate
+};
+
+// A parameter that an audio channel gives for every sample.
+struct AudioParameter {
+  std::uint32_t parameter = 0;
+  int channel = 0;  // from 0
+};
+
 // Nodes are numbered: masses that move, run by run; then grounds; then position inputs.
 struct Program {
   double rate_hz = 44100.0;
@@ -70,8 +97,10 @@ struct Program {
   std::vector<LinkRun> link_runs;
   std::vector<Ends> ends;  // [link]
   std::vector<InputSlot> inputs;
-  std::vector<std::uint32_t> outputs;  // [channel] node, or no_node for a gap
-  std::vector<double> parameters;      // [parameter] at the start
+  std::vector<OutputSlot> outputs;  // [channel]
+  std::vector<AudioParameter> audio_parameters;
+  std::vector<std::uint32_t> audio_coefficients;  // those that depend on an audio parameter
+  std::vector<double> parameters;                 // [parameter] at the start
   std::vector<Step> steps;
   std::vector<Coefficient> coefficients;
   std::vector<std::vector<std::uint32_t>> depending;  // [parameter] coefficients
@@ -111,10 +140,11 @@ struct Drive {
   Lanes<T> velocity;  // of a position, per sample
 };
 
-// Steps `frames` samples by the published scheme, v += F/M, x += v: masses, then position inputs,
-// then links; outputs[frame][channel] are the new positions. [audio] wait-free
+// `audio`: [frame][audio coefficient] values, per lane. Steps `frames` samples by the published
+// scheme, v += F/M, x += v: masses, then position inputs, then links; outputs[frame][channel] are
+// the new positions. [audio] wait-free
 template <class T>
-void step_direct(const Program& program, State<T>& state, const Drive<T>* drive, Lanes<T>* outputs,
-                 std::size_t frames);
+void step_direct(const Program& program, State<T>& state, const Drive<T>* drive,
+                 const Lanes<T>* audio, Lanes<T>* outputs, std::size_t frames);
 
 }  // namespace ressort

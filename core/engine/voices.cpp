@@ -167,7 +167,8 @@ void Engine::Voices::segment_in(Bank<T>& b, std::span<const double* const> input
       continue;
     }
     fill_drive(b, first, inputs, at, frames);
-    step_direct(program, b.groups[group], b.drive.data(), b.outputs.data(), frames);
+    fill_audio(b, first, inputs, at, frames);
+    step_direct(program, b.groups[group], b.drive.data(), b.audio.data(), b.outputs.data(), frames);
     for (std::size_t i = 0; i < lane_count<T>; ++i) {
       if (voices[first + i].awake) {
         mix(b, first + i, i, outputs, at, frames);
@@ -212,6 +213,27 @@ void Engine::Voices::add_audio(Bank<T>& b, std::size_t input, const double* audi
     drive->velocity = kept * drive->velocity + static_cast<T>(value - before);
     before = value;
     drive += program.inputs.size();
+  }
+}
+
+template <class T>
+void Engine::Voices::fill_audio(Bank<T>& b, std::size_t first,
+                                std::span<const double* const> inputs, std::size_t at,
+                                std::size_t frames) {
+  Lanes<T>* value = b.audio.data();
+  for (std::size_t n = at; n < at + frames && !program.audio_parameters.empty(); ++n) {
+    for (const AudioParameter& audio : program.audio_parameters) {
+      const auto channel = static_cast<std::size_t>(audio.channel);
+      const bool is_there = channel < inputs.size() && inputs[channel] != nullptr;
+      parameters[audio.parameter] = is_there ? inputs[channel][n] : 0.0;
+    }
+    for (const std::uint32_t c : program.audio_coefficients) {
+      for (std::size_t i = 0; i < lane_count<T>; ++i) {
+        (*value)[i] = static_cast<T>(coefficient_value(program, program.coefficients[c], parameters,
+                                                       voices[first + i].factor));
+      }
+      ++value;
+    }
   }
 }
 

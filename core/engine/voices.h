@@ -89,6 +89,10 @@ struct Engine::Voices {
   template <class T>
   void fill_drive(Bank<T>& b, std::size_t first, std::span<const double* const> inputs,
                   std::size_t at, std::size_t frames);
+  // What depends on a parameter that audio gives, for every sample.
+  template <class T>
+  void fill_audio(Bank<T>& b, std::size_t first, std::span<const double* const> inputs,
+                  std::size_t at, std::size_t frames);
   // What comes in moves the hand from where it is; in the bare network it is the hand.
   template <class T>
   void add_audio(Bank<T>& b, std::size_t input, const double* audio, std::size_t frames);

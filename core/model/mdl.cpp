@@ -13,13 +13,15 @@ namespace {
 
 enum class Element {
   parameter,
+  audio_parameter,
   ground,
   mass,
   oscillator,
   position_input,
   force_input,
   position_output,
-  link
+  force_output,
+  link,
 };
 
 // Everything that tells one keyword from another. The reader, its messages and its suggestions
@@ -40,23 +42,31 @@ using E = Element;
 using L = LinkKind;
 // clang-format off
 constexpr Keyword keywords[] = {
-    {"param",              E::parameter,       {},         0, 1, 1, 0, false, "VALUE"},
-    {"ground",             E::ground,          {},         0, 1, 1, 0, true,  "POSITION"},
-    {"mass",               E::mass,            {},         0, 3, 3, 0, true,  "M POSITION VELOCITY"},
-    {"osc",                E::oscillator,      {},         0, 5, 5, 0, true,  "M K Z POSITION VELOCITY"},
-    {"cel",                E::oscillator,      {},         0, 5, 5, 0, true,  "M K Z POSITION VELOCITY"},
-    {"posInput",           E::position_input,  {},         0, 1, 1, 0, true,  "POSITION"},
-    {"frcInput",           E::force_input,     {},         1, 0, 0, 0, false, "@MASS"},
-    {"forceInput",         E::force_input,     {},         1, 0, 0, 0, false, "@MASS"},
-    {"posOutput",          E::position_output, {},         1, 0, 0, 0, false, "@MASS"},
-    {"spring",             E::link,            L::spring,  2, 1, 2, 0, false, "@A @B K [Z]"},
-    {"springDamper",       E::link,            L::spring,  2, 1, 2, 0, false, "@A @B K [Z]"},
-    {"springDamperDamper", E::link,            L::spring,  2, 1, 2, 0, false, "@A @B K [Z]"},
-    {"damper",             E::link,            L::spring,  2, 1, 1, 1, false, "@A @B Z"},
-    {"nlPluck",            E::link,            L::pluck,   2, 2, 3, 0, false, "@A @B K SCALE [Z]"},
-    {"nlBow",              E::link,            L::bow,     2, 2, 3, 0, false, "@A @B Z SCALE [SMOOTH]"},
-    {"contact",            E::link,            L::contact, 2, 2, 3, 0, false, "@A @B K Z [THRESHOLD]"},
-    {"detent",             E::link,            L::contact, 2, 2, 3, 0, false, "@A @B K Z [THRESHOLD]"},
+    {"param",              E::parameter,       {},                  0, 1, 1, 0, false, "VALUE"},
+    {"audioParam",         E::audio_parameter, {},                  0, 1, 1, 0, false, "@inN"},
+    {"ground",             E::ground,          {},                  0, 1, 1, 0, true,  "POSITION"},
+    {"mass",               E::mass,            {},                  0, 3, 4, 0, true,  "M [G] POSITION VELOCITY"},
+    {"massG",              E::mass,            {},                  0, 4, 4, 0, true,  "M G POSITION DELAYED_POSITION"},
+    {"osc",                E::oscillator,      {},                  0, 5, 6, 0, true,  "M K Z [G] POSITION VELOCITY"},
+    {"cel",                E::oscillator,      {},                  0, 5, 6, 0, true,  "M K Z [G] POSITION VELOCITY"},
+    {"posInput",           E::position_input,  {},                  0, 1, 1, 0, true,  "POSITION"},
+    {"frcInput",           E::force_input,     {},                  1, 0, 0, 0, false, "@MASS"},
+    {"forceInput",         E::force_input,     {},                  1, 0, 0, 0, false, "@MASS"},
+    {"posOutput",          E::position_output, {},                  1, 0, 0, 0, false, "@MASS"},
+    {"frcOutput",          E::force_output,    {},                  1, 0, 0, 0, false, "@MASS"},
+    {"spring",             E::link,            L::spring,           2, 1, 2, 0, false, "@A @B K [Z]"},
+    {"springDamper",       E::link,            L::spring,           2, 1, 2, 0, false, "@A @B K [Z]"},
+    {"springDamperDamper", E::link,            L::spring,           2, 1, 2, 0, false, "@A @B K [Z]"},
+    {"damper",             E::link,            L::spring,           2, 1, 1, 1, false, "@A @B Z"},
+    {"nlSpring",           E::link,            L::quadratic_spring, 2, 3, 3, 0, false, "@A @B K Q Z"},
+    {"nlSpring2",          E::link,            L::quadratic_spring, 2, 3, 3, 0, false, "@A @B K Q Z"},
+    {"nlSpring3",          E::link,            L::cubic_spring,     2, 3, 3, 0, false, "@A @B K Q Z"},
+    {"nlSpringDamper",     E::link,            L::clipped_spring,   2, 4, 4, 0, false, "@A @B S C K Z"},
+    {"nlPluck",            E::link,            L::pluck,            2, 2, 3, 0, false, "@A @B K SCALE [Z]"},
+    {"nlBow",              E::link,            L::bow,              2, 2, 3, 0, false, "@A @B Z SCALE [SMOOTH]"},
+    {"contact",            E::link,            L::contact,          2, 2, 3, 0, false, "@A @B K Z [THRESHOLD]"},
+    {"detent",             E::link,            L::contact,          2, 2, 3, 0, false, "@A @B K Z [THRESHOLD]"},
+    {"nlContact",          E::link,            L::clipped_contact,  2, 4, 5, 0, false, "@A @B S C K Z [THRESHOLD]"},
 };
 // clang-format on
 
@@ -71,8 +81,9 @@ struct Token {
 struct Line {
   int number = 0;
   const Keyword* keyword = nullptr;
-  Token label;  // without its '@'
-  Token word;   // the keyword as written
+  Token label;             // without its '@'
+  Token word;              // the keyword as written
+  std::string_view group;  // of the display block around it; empty if there is none
   std::vector<Token> rest;
 };
 
@@ -188,7 +199,12 @@ class Reader {
   bool check_count(const Line& line);
   std::uint32_t drawing(const Line& line, std::size_t at);
   ArgumentId argument(const Line& line, std::size_t at);
+  void read_gravity(const Line& line, Mass& mass, std::size_t& at);
+  bool position(const Line& line, std::size_t at, double& z, double& x, double& y);
   double state(const Line& line, std::size_t at);
+  int audio_input(const Line& line);
+  void read_block(const std::vector<Token>& tokens, int number);
+  std::string with_slash(std::string_view text) const;
   std::optional<std::uint32_t> reference(const Line& line, std::size_t at);
   std::optional<int> channel(const Line& line, std::string_view prefix);
   void decide_third_argument();
@@ -214,14 +230,33 @@ class Reader {
     say(Severity::warning, line.number, token, std::move(message));
   }
 
+  // Channels are numbered by hand; one that is left out is silent.
+  template <class Channels>
+  void tell_gaps(const Channels& channels, std::string_view name) {
+    int last = 0;
+    std::vector<int> numbers;
+    for (const auto& channel : channels) {
+      numbers.push_back(channel.number);
+      last = std::max(last, channel.number);
+    }
+    for (int number = 1; number < last; ++number) {
+      if (std::find(numbers.begin(), numbers.end(), number) == numbers.end()) {
+        say(Severity::warning, channels.front().place.line, {name, channels.front().place.column},
+            "there is @" + std::string(name) + std::to_string(last) + ", but no @" +
+                std::string(name) + std::to_string(number));
+      }
+    }
+  }
+
   ParsedNetwork out_;
   std::vector<Line> lines_;
   std::vector<std::string> parameter_names_;
   std::unordered_map<std::string_view, std::uint32_t> masses_;  // label -> index
   std::unordered_map<std::string_view, int> labels_;            // every label -> its line
   std::unordered_map<std::string_view, ArgumentId> arguments_;  // text -> index
-  bool shows_velocity_ = false;  // the file uses a form that only MIMS4Max has
-  bool shows_delayed_ = false;   // the file uses a form that only MIMS has
+  std::vector<std::string_view> groups_;  // of the display blocks that are open
+  bool shows_velocity_ = false;           // the file uses a form that only MIMS4Max has
+  bool shows_delayed_ = false;            // the file uses a form that only MIMS has
 };
 
 ParsedNetwork Reader::read(std::string_view text) {
@@ -277,6 +312,9 @@ void Reader::read_line(std::string_view text, int number) {
   if (tokens.empty()) {
     return;
   }
+  if (tokens[0].text[0] == '~') {
+    return read_block(tokens, number);
+  }
   Line line{.number = number, .keyword = nullptr, .label = tokens[0], .word = {}, .rest = {}};
   if (line.label.text[0] != '@') {
     return warning(line, line.label,
@@ -303,8 +341,27 @@ void Reader::read_line(std::string_view text, int number) {
                  "unknown keyword " + quoted(line.word.text) + suggestion(line.word.text, words));
   }
   line.keyword = found;
+  line.group = groups_.empty() ? std::string_view() : groups_.back();
   line.rest.assign(tokens.begin() + 2, tokens.end());
   lines_.push_back(std::move(line));
+}
+
+// ~begin NAME and ~end NAME: what is declared between them is drawn in the group NAME.
+void Reader::read_block(const std::vector<Token>& tokens, int number) {
+  const Line line{.number = number, .label = tokens[0]};
+  const bool begins = tokens[0].text == "~begin";
+  if ((!begins && tokens[0].text != "~end") || tokens.size() != 2) {
+    return error(line, tokens[0], "expected '~begin NAME' or '~end NAME'");
+  }
+  if (begins) {
+    shows_velocity_ = true;
+    return groups_.push_back(tokens[1].text);
+  }
+  const auto found = std::find(groups_.rbegin(), groups_.rend(), tokens[1].text);
+  if (found == groups_.rend()) {
+    return error(line, tokens[1], "no block " + quoted(tokens[1].text) + " is open here");
+  }
+  groups_.erase(std::next(found).base());
 }
 
 // Enters a line's label, and the value of a parameter.
@@ -320,14 +377,19 @@ void Reader::declare(const Line& line) {
   }
   Network& network = out_.network;
   switch (line.keyword->element) {
-    case Element::parameter: {
+    case Element::parameter:
+    case Element::audio_parameter: {
       if (!is_identifier(line.label.text)) {
         error(line, line.label, "a parameter's name has letters, digits and '_' only");
       }
       Parameter parameter{.name = std::string(line.label.text),
                           .value = 0.0,
                           .place = {line.number, line.label.column}};
-      if (check_count(line) && !parse_number(line.rest[0].text, parameter.value)) {
+      if (!check_count(line)) {
+        // It has been told.
+      } else if (line.keyword->element == Element::audio_parameter) {
+        parameter.audio_input = audio_input(line);
+      } else if (!parse_number(line.rest[0].text, parameter.value)) {
         error(line, line.rest[0],
               "found " + quoted(line.rest[0].text) +
                   " where the parameter's value, a number, was expected");
@@ -349,13 +411,16 @@ void Reader::declare(const Line& line) {
 }
 
 void Reader::build(const Line& line) {
-  if (line.keyword->element == Element::parameter || !check_count(line)) {
+  const bool is_parameter = line.keyword->element == Element::parameter ||
+                            line.keyword->element == Element::audio_parameter;
+  if (is_parameter || !check_count(line)) {
     return;
   }
   switch (line.keyword->element) {
     case Element::link:
       return add_link(line);
     case Element::position_output:
+    case Element::force_output:
       return add_output(line);
     case Element::force_input:
       return add_input(line);
@@ -390,7 +455,8 @@ void Reader::add_mass(const Line& line) {
       mass.kind = MassKind::mass;
       break;
   }
-  if (line.keyword->most > 1) {
+  const bool has_inertia = line.keyword->most > 1;
+  if (has_inertia) {
     mass.mass = argument(line, at++);
     if (mass.kind == MassKind::oscillator) {
       mass.stiffness = argument(line, at++);
@@ -400,12 +466,34 @@ void Reader::add_mass(const Line& line) {
         !(argument_value(out_.network, mass.mass, {}) > 0.0)) {
       error(line, line.rest[0], "a mass must be above 0, found " + quoted(line.rest[0].text));
     }
+    read_gravity(line, mass, at);
   }
-  mass.position = state(line, at++);
-  if (line.keyword->most > 1) {
-    mass.third = state(line, at++);
+  double x = 0.0;
+  double y = 0.0;
+  const bool is_placed = position(line, at++, mass.position, x, y);
+  if (has_inertia) {
+    double unused = 0.0;
+    position(line, at++, mass.third, unused, unused);
   }
   mass.drawing = drawing(line, at);
+  if (mass.drawing == 0 && (is_placed || !line.group.empty())) {
+    out_.network.drawings.push_back({.group = std::string(line.group), .x = x, .y = y});
+    mass.drawing = static_cast<std::uint32_t>(out_.network.drawings.size());
+  }
+}
+
+// MIMS writes gravity by a keyword of its own, MIMS4Max by one argument more.
+void Reader::read_gravity(const Line& line, Mass& mass, std::size_t& at) {
+  const bool by_keyword = line.keyword->word == "massG";
+  const auto most = static_cast<std::size_t>(line.keyword->most);
+  if (by_keyword) {
+    shows_delayed_ = true;
+    mass.gravity = argument(line, at++);
+  } else if (line.rest.size() == most) {
+    shows_velocity_ = true;
+    mass.gravity = argument(line, at++);
+    mass.gravity_per_rate = true;
+  }
 }
 
 void Reader::add_link(const Line& line) {
@@ -428,10 +516,11 @@ void Reader::add_link(const Line& line) {
       link.arguments[slot] = argument(line, i);
     }
   }
-  shows_velocity_ |= (link.kind == LinkKind::contact && line.rest.size() == 4) ||
-                     (link.kind == LinkKind::pluck && line.rest.size() == 5) ||
-                     (link.kind == LinkKind::smooth_bow) ||
-                     (link.kind == LinkKind::bow && line.rest.size() == 5);
+  shows_velocity_ |=
+      link.kind == LinkKind::clipped_contact || link.kind == LinkKind::clipped_spring ||
+      (link.kind == LinkKind::contact && line.rest.size() == 4) ||
+      (link.kind == LinkKind::pluck && line.rest.size() == 5) ||
+      (link.kind == LinkKind::smooth_bow) || (link.kind == LinkKind::bow && line.rest.size() == 5);
   if (!a || !b) {
     return;
   }
@@ -462,9 +551,21 @@ void Reader::add_output(const Line& line) {
   const auto number = channel(line, "out");
   const auto mass = reference(line, 0);
   if (number && mass) {
-    out_.network.outputs.push_back(
-        {.number = *number, .mass = *mass, .place = {line.number, line.label.column}});
+    out_.network.outputs.push_back({.number = *number,
+                                    .is_force = line.keyword->element == Element::force_output,
+                                    .mass = *mass,
+                                    .place = {line.number, line.label.column}});
   }
+}
+
+// The N of the argument "@inN".
+int Reader::audio_input(const Line& line) {
+  Line asked = line;
+  asked.label = line.rest[0];
+  if (asked.label.text[0] == '@') {
+    asked.label.text.remove_prefix(1);
+  }
+  return channel(asked, "in").value_or(0);
 }
 
 bool Reader::check_count(const Line& line) {
@@ -472,7 +573,7 @@ bool Reader::check_count(const Line& line) {
   const int found = static_cast<int>(line.rest.size());
   const int least = keyword.references + keyword.least;
   const int most = keyword.references + keyword.most;
-  const bool drawn = keyword.drawable && found == most + 3;
+  const bool drawn = keyword.drawable && found == least + 3;
   if ((found >= least && found <= most) || drawn) {
     return true;
   }
@@ -502,6 +603,32 @@ std::uint32_t Reader::drawing(const Line& line, std::size_t at) {
   return static_cast<std::uint32_t>(out_.network.drawings.size());
 }
 
+// The text with the '/' that one editor deletes put back: "sqrt(kScale3)" is "sqrt(kScale/3)" where
+// kScale is a parameter and kScale3 is none. Empty where there is nothing to put back.
+std::string Reader::with_slash(std::string_view text) const {
+  std::size_t at = 0;
+  while (at < text.size()) {
+    std::size_t end = at;
+    while (end < text.size() &&
+           (std::isalnum(static_cast<unsigned char>(text[end])) != 0 || text[end] == '_')) {
+      ++end;
+    }
+    const std::string_view word = text.substr(at, end - at);
+    for (const std::string& name : parameter_names_) {
+      const bool is_followed = word.size() > name.size() && word.starts_with(name) &&
+                               std::all_of(word.begin() + static_cast<std::ptrdiff_t>(name.size()),
+                                           word.end(), [](char c) { return c >= '0' && c <= '9'; });
+      if (is_followed && std::find(parameter_names_.begin(), parameter_names_.end(), word) ==
+                             parameter_names_.end()) {
+        const std::size_t cut = at + name.size();
+        return std::string(text.substr(0, cut)) + "/" + std::string(text.substr(cut));
+      }
+    }
+    at = std::max(end, at + 1);
+  }
+  return "";
+}
+
 ArgumentId Reader::argument(const Line& line, std::size_t at) {
   const Token token = unwrapped(line.rest[at]);
   const auto known = arguments_.find(token.text);
@@ -514,6 +641,15 @@ ArgumentId Reader::argument(const Line& line, std::size_t at) {
     formula.push_back({Op::number, 0, number});
   } else {
     auto parsed = parse_expression(token.text, parameter_names_);
+    if (!parsed) {
+      const std::string repaired = with_slash(token.text);
+      parsed = repaired.empty() ? std::move(parsed) : parse_expression(repaired, parameter_names_);
+      if (parsed) {
+        warning(
+            line, token,
+            "a '/' is missing, as MIMS4Max loses the first of a file; read as " + quoted(repaired));
+      }
+    }
     if (!parsed) {
       const Token place{token.text, token.column + parsed.error().column - 1};
       std::string hint;
@@ -529,6 +665,31 @@ ArgumentId Reader::argument(const Line& line, std::size_t at) {
   out_.network.arguments.push_back(std::move(formula));
   arguments_.emplace(token.text, id);
   return id;
+}
+
+// A scalar, or [x y z] of which z swings and x and y are for drawing; true if there was an x and y.
+bool Reader::position(const Line& line, std::size_t at, double& z, double& x, double& y) {
+  const Token& token = line.rest[at];
+  if (token.text[0] != '[') {
+    z = state(line, at);
+    return false;
+  }
+  shows_velocity_ = true;
+  const Token inner = unwrapped(token);
+  const std::vector<Token> parts = split(inner.text);
+  double* const targets[] = {&x, &y, &z};
+  if (parts.size() != 3) {
+    error(line, token,
+          "a place is one number or three, [x y z]; found " + std::to_string(parts.size()));
+    return false;
+  }
+  for (std::size_t i = 0; i < 3; ++i) {
+    if (!parse_number(parts[i].text, *targets[i])) {
+      error(line, {parts[i].text, inner.column + parts[i].column - 1},
+            "found " + quoted(parts[i].text) + " where a number was expected");
+    }
+  }
+  return true;
 }
 
 double Reader::state(const Line& line, std::size_t at) {
@@ -619,6 +780,18 @@ void Reader::look_over() {
           "nothing is attached to '@" + mass.name + "'");
     }
   }
+  for (const Link& link : network.links) {
+    const bool is_contact =
+        link.kind == LinkKind::contact || link.kind == LinkKind::clipped_contact;
+    if (is_contact && network.masses[link.a].kind == MassKind::position &&
+        network.masses[link.b].kind != MassKind::position) {
+      say(Severity::warning, link.place.line, {link.name, link.place.column},
+          "the contact's ends look swapped: it acts while the second is below the first, here '@" +
+              network.masses[link.b].name + "' below '@" + network.masses[link.a].name + "'");
+    }
+  }
+  tell_gaps(network.inputs, "in");
+  tell_gaps(network.outputs, "out");
   std::vector<bool> used(network.parameters.size(), false);
   for (const Formula& formula : network.arguments) {
     for (const Step& step : formula) {

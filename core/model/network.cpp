@@ -9,6 +9,20 @@ double argument_value(const Network& network, ArgumentId argument,
   return argument == no_argument ? 0.0 : evaluate(network.arguments[argument], parameters);
 }
 
+LinearPart linear_part(const Link& link) {
+  switch (link.kind) {
+    case LinkKind::spring:
+      return {link.arguments[0], link.arguments[1]};
+    case LinkKind::quadratic_spring:
+    case LinkKind::cubic_spring:
+      return {link.arguments[0], link.arguments[2]};
+    case LinkKind::clipped_spring:
+      return {link.arguments[0], link.arguments[3]};
+    default:
+      return {};
+  }
+}
+
 std::vector<double> parameter_values(const Network& network) {
   std::vector<double> values;
   values.reserve(network.parameters.size());

@@ -18,11 +18,12 @@ struct Place {
   bool operator==(const Place&) const { return true; }  // the same network, wherever it is written
 };
 
-// A control-rate scalar that may change while the network sounds. Numbers are per sample at
-// 44 100 Hz (see Network).
+// A scalar that may change while the network sounds: turned by a person, or, if `audio_input` is
+// not 0, read from that input for every sample. Numbers are per sample at 44 100 Hz (see Network).
 struct Parameter {
   std::string name;
   double value = 0.0;
+  int audio_input = 0;  // N of @inN
   Place place;
   bool operator==(const Parameter&) const = default;
 };
@@ -45,6 +46,8 @@ struct Mass {
   ArgumentId mass = no_argument;       // M
   ArgumentId stiffness = no_argument;  // K, oscillators only
   ArgumentId damping = no_argument;    // Z, oscillators only
+  ArgumentId gravity = no_argument;    // g, a force towards -x
+  bool gravity_per_rate = false;       // MIMS4Max divides g by the reference rate, MIMS does not
   double position = 0.0;               // x0
   double third = 0.0;                  // the last state argument; Network::third says what it means
   std::uint32_t drawing = 0;           // 1 + index into Network::drawings; 0 for none
@@ -61,14 +64,18 @@ struct Drawing {
 };
 
 enum class LinkKind : std::uint8_t {
-  spring,      // K, Z: springs, dampers and both together
-  pluck,       // K, scale, Z
-  bow,         // Z, scale
-  smooth_bow,  // the same arguments, the exponential profile
-  contact,     // K, Z, threshold
+  spring,            // K, Z: springs, dampers and both together
+  quadratic_spring,  // K, Q, Z
+  cubic_spring,      // K, Q, Z
+  clipped_spring,    // s, c, k, Z
+  pluck,             // K, scale, Z
+  bow,               // Z, scale
+  smooth_bow,        // the same arguments, the exponential profile
+  contact,           // K, Z, threshold
+  clipped_contact,   // s, c, k, Z, threshold
 };
 
-inline constexpr std::size_t max_link_arguments = 3;
+inline constexpr std::size_t max_link_arguments = 5;
 
 // Between two masses, first and second as written: a link's force f acts as F_a -= f, F_b += f.
 struct Link {
@@ -76,10 +83,18 @@ struct Link {
   LinkKind kind = LinkKind::spring;
   std::uint32_t a = 0;  // indices into Network::masses
   std::uint32_t b = 0;
-  std::array<ArgumentId, max_link_arguments> arguments = {no_argument, no_argument, no_argument};
+  std::array<ArgumentId, max_link_arguments> arguments = {no_argument, no_argument, no_argument,
+                                                          no_argument, no_argument};
   Place place;
   bool operator==(const Link&) const = default;
 };
+
+// What a link does near rest: its K and Z. Plucks, bows and contacts do nothing there.
+struct LinearPart {
+  ArgumentId stiffness = no_argument;
+  ArgumentId damping = no_argument;
+};
+LinearPart linear_part(const Link& link);
 
 // Input N of the model: either the position of a mass of kind `position`, or a force on any mass.
 struct Input {
@@ -90,9 +105,10 @@ struct Input {
   bool operator==(const Input&) const = default;
 };
 
-// Output N of the model: the position of a mass.
+// Output N of the model: the position of a mass, or the force on it.
 struct Output {
   int number = 1;
+  bool is_force = false;
   std::uint32_t mass = 0;
   Place place;
   bool operator==(const Output&) const = default;
