@@ -19,13 +19,16 @@ Result<AudioDevice> open_audio(const std::string& wanted, Process& process,
   if (wanted == "dummy") {
     return open_dummy(process, options);
   }
-  if (auto device = open_jack(process, options)) {
-    return device;
+  std::string note;
+  for (auto* const open : {open_jack, open_alsa, open_dummy}) {
+    auto device = open(process, options);
+    if (device) {
+      device->note = std::move(note);
+      return device;
+    }
+    note += (note.empty() ? "" : "\n") + device.error().message;
   }
-  if (auto device = open_alsa(process, options)) {
-    return device;
-  }
-  return open_dummy(process, options);
+  return Error{std::move(note)};
 }
 
 void raise_priority() {

@@ -32,6 +32,7 @@ struct AudioDevice {
   std::function<void(int)> set_audio_inputs;  // the model wants so many
   std::function<void()> tick;                 // about every second: connects what was plugged in
   bool has_midi = false;                      // brings its own MIDI, with exact frames
+  std::string note;                           // what was tried before it, and why it failed
 
   AudioDevice() = default;
   AudioDevice(AudioDevice&& other) noexcept { *this = std::move(other); }
@@ -44,6 +45,7 @@ struct AudioDevice {
     std::swap(set_audio_inputs, other.set_audio_inputs);
     std::swap(tick, other.tick);
     std::swap(has_midi, other.has_midi);
+    std::swap(note, other.note);
     return *this;
   }
   ~AudioDevice() {

@@ -160,7 +160,8 @@ Result<std::vector<Event>> input_events(const Call& call, const Instrument& inst
   } else if (verb == "/bow") {
     event.kind = EventKind::bow;
     event.value = arguments.in_range("the speed", -1.0, 1.0);
-    event.value2 = arguments.in_range_or("the pressure", -1.0, -1.0, 1.0);
+    const bool has_pressure = call.arguments.size() > 1;
+    event.value2 = has_pressure ? arguments.in_range("the pressure", 0.0, 1.0) : -1.0;
     unfit = found->can_bow ? nullptr : "has no bow in this preset";
   } else {
     return Error{call.address + ": an input knows /position, /force, /pluck and /bow"};
@@ -322,8 +323,10 @@ Result<std::vector<ScoreLine>> parse_score(std::string_view text) {
       continue;
     }
     ScoreLine score{.line = number};
-    if (!parse_number(words[0], score.time_s) || score.time_s < 0.0) {
-      return Error{"found '" + words[0] + "' where a time in seconds was expected", number, 1};
+    constexpr double latest_s = 24.0 * 3600.0;
+    if (!parse_number(words[0], score.time_s) || score.time_s < 0.0 || score.time_s > latest_s) {
+      return Error{"found '" + words[0] + "' where a time in seconds was expected, at most a day",
+                   number, 1};
     }
     if (words.size() < 2 || words[1][0] != '/') {
       return Error{"expected an address such as /note/on after the time", number,

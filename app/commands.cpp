@@ -12,6 +12,7 @@
 
 #include "app/midi_input.h"
 #include "app/terminal.h"
+#include "app/text.h"
 
 namespace ressort {
 namespace {
@@ -145,11 +146,13 @@ class Player {
   }
 
   void greet(const Loaded& loaded) {
-    voice_.say(loaded.name + ": " + std::to_string(loaded.instrument.masses) + " masses, " +
-               std::to_string(loaded.instrument.links) + " links, " +
-               std::to_string(loaded.instrument.voices) +
-               (loaded.instrument.voices == 1 ? " voice" : " voices") + " on " +
-               device_.description);
+    if (!device_.note.empty()) {
+      voice_.say(device_.note);
+    }
+    voice_.say(loaded.name + ": " + counted(loaded.instrument.masses, "mass", "masses") + ", " +
+               counted(loaded.instrument.links, "link", "links") + ", " +
+               counted(static_cast<std::size_t>(loaded.instrument.voices), "voice", "voices") +
+               " on " + device_.description);
     if (!loaded.description.empty()) {
       voice_.say(loaded.description);
     }
@@ -342,8 +345,11 @@ void print_check(const Scene& scene, const Compiled& compiled) {
   for (const std::string& warning : scene.warnings) {
     std::printf("%s\n", warning.c_str());
   }
-  std::printf("%s: %zu masses that move, %zu links, %zu inputs, %d outputs\n", scene.path.c_str(),
-              instrument.masses, instrument.links, instrument.inputs.size(), instrument.outputs);
+  std::printf("%s: %s, %s, %s, %s\n", scene.path.c_str(),
+              counted(instrument.masses, "mass that moves", "masses that move").c_str(),
+              counted(instrument.links, "link", "links").c_str(),
+              counted(instrument.inputs.size(), "input", "inputs").c_str(),
+              counted(static_cast<std::size_t>(instrument.outputs), "output", "outputs").c_str());
   for (const ParameterInfo& info : instrument.parameters) {
     std::printf("  %-12s %-10g from %g to %g\n", info.name.c_str(), info.value, info.minimum,
                 info.maximum);
@@ -401,7 +407,8 @@ int render_command(const RenderOptions& options, bool is_quiet) {
     if (rendered->peak > 1.0) {
       complain("the peak passes full scale; --limit keeps it below");
     }
-    if (rendered->peak == 0.0) {
+    const bool was_asked = !options.score.empty() || !options.input.empty();
+    if (rendered->peak == 0.0 && rendered->frames > 0 && !was_asked) {
       complain("nothing excites the model: give it a --score or an --input");
     }
   }

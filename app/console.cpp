@@ -103,7 +103,11 @@ Result<const CommandRow*> find_command(std::string_view name) {
   if (meant.size() == 1) {
     return found;
   }
-  const std::string typed = "'" + std::string(name) + "'";
+  std::string typed = "'";  // shown without what could command the terminal
+  for (const char c : name.substr(0, 40)) {
+    typed += static_cast<unsigned char>(c) < 0x20 || c == 0x7f ? '?' : c;
+  }
+  typed += name.size() > 40 ? "...'" : "'";
   if (meant.size() > 1) {
     return Error{typed + " could be " + joined(meant, " or ")};
   }

@@ -295,8 +295,16 @@ Result<Done> act::set(Desk& desk, Words words) {
 
 namespace {
 
+// ", 24 semitones lower", or nothing.
+std::string transposition(int semitones) {
+  return semitones == 0 ? ""
+                        : ", " + std::to_string(std::abs(semitones)) +
+                              (semitones < 0 ? " semitones lower" : " semitones higher");
+}
+
 std::string peak(double level_db) {
-  return std::isfinite(level_db) ? "peak " + fixed(level_db, 1) + " dBFS" : std::string("silence");
+  return level_db > -120.0 ? "peak " + fixed(std::min(level_db, -0.0) + 0.0, 1) + " dBFS"
+                           : std::string("silence");
 }
 
 }  // namespace
@@ -358,10 +366,10 @@ Result<Done> act::explain(Desk& desk, Words) {
       {"lowest mode", instrument.mode
                           ? fixed(instrument.mode->frequency_hz, 2) + " Hz as it is written"
                           : "none that keys could tune"},
-      {"keys", instrument.is_tuned
-                   ? "set the pitch, up to " + fixed(instrument.highest_frequency_hz, 1) +
-                         " Hz; higher ones are folded down by octaves"
-                   : "all sound as the model is written"},
+      {"keys", instrument.is_tuned ? "set the pitch" + transposition(instrument.transpose) +
+                                         ", up to " + fixed(instrument.highest_frequency_hz, 1) +
+                                         " Hz; higher ones are folded down by octaves"
+                                   : "all sound as the model is written"},
       {"stability", margin >= nothing_to_bound ? "nothing to bound"
                     : margin >= 1.0
                         ? "proved; every stiffness may grow " + fixed(margin, 2) + " times"

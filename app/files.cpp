@@ -125,6 +125,9 @@ WavWriter::~WavWriter() = default;
 
 Result<WavWriter> WavWriter::open(const std::string& path, double rate_hz, int channels,
                                   SampleFormat format) {
+  if (path.ends_with(".mdl") || path.ends_with(".toml")) {
+    return Error{"'" + path + "' is the name of a model or a preset, not of a sound"};
+  }
   SF_INFO info{};
   info.samplerate = static_cast<int>(std::lround(rate_hz));
   info.channels = channels;

@@ -27,6 +27,7 @@ Result<Sound> read_wav(const std::string& path);
 // Writes as it goes; the file is complete after close() or destruction.
 class WavWriter {
  public:
+  // Refuses to write over a model or a preset.
   static Result<WavWriter> open(const std::string& path, double rate_hz, int channels,
                                 SampleFormat format);
   WavWriter(WavWriter&&) noexcept;

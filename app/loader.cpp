@@ -20,16 +20,16 @@ Result<Done> read_model(const std::string& path, Scene& scene) {
     return text.error();
   }
   ParsedNetwork parsed = parse_network(*text);
-  std::string errors;
+  std::string all;
   for (const Diagnostic& diagnostic : parsed.diagnostics) {
+    const std::string text_of = to_string(diagnostic, path);
+    all += (all.empty() ? "" : "\n") + text_of;
     if (diagnostic.severity == Severity::warning) {
-      scene.warnings.push_back(to_string(diagnostic, path));
-    } else {
-      errors += (errors.empty() ? "" : "\n") + to_string(diagnostic, path);
+      scene.warnings.push_back(text_of);
     }
   }
   if (!parsed.ok()) {
-    return Error{std::move(errors)};
+    return Error{std::move(all)};  // a warning may explain an error
   }
   scene.model_path = path;
   scene.network = std::move(parsed.network);

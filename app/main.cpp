@@ -29,6 +29,18 @@ const char* const render_examples =
     "  ressort render PolyTriangle -o out.wav\n"
     "  ressort render my.mdl -o out.wav --input gesture.wav --format double\n";
 
+// A number within a range; what is no number is in none.
+CLI::Validator within(double least, double most) {
+  const std::string range = print_number(least) + " to " + print_number(most);
+  return {[=](std::string& text) {
+            double number = 0.0;
+            return parse_number(text, number) && number >= least && number <= most
+                       ? std::string()
+                       : "must be " + range + ", found " + text;
+          },
+          range};
+}
+
 // One of a few words.
 template <class T>
 void add_choice(CLI::App& command, const std::string& name, T& target,
@@ -79,16 +91,23 @@ void add_play(CLI::App& app, PlayOptions& options, int& code) {
   command->add_flag("-j,--connect", options.device.connect,
                     "connect to the speakers and to every keyboard (JACK)");
   command->add_option("-n,--name", options.device.client_name, "the name of our JACK client")
+      ->check(CLI::Validator(
+          [](std::string& name) {
+            return name.empty() || name.size() > 60 || name.find(':') != std::string::npos
+                       ? std::string("must have 1 to 60 characters, and no ':' among them")
+                       : std::string();
+          },
+          "NAME"))
       ->capture_default_str();
   command->add_option("-g,--gain", options.gain_db, "dB on top of the preset's gain")
-      ->check(CLI::Range(-120.0, 60.0));
+      ->check(within(-120.0, 60.0));
   command->add_option("-p,--voices", options.voices, "how many notes sound at once")
-      ->check(CLI::Range(1, max_voices));
+      ->check(within(1, max_voices));
   command->add_option("-r,--rate", options.device.rate_hz, "Hz; JACK has its own")
-      ->check(CLI::Range(8000.0, 384000.0))
+      ->check(within(8000.0, 384000.0))
       ->capture_default_str();
   command->add_option("-z,--period", options.device.period_frames, "frames; JACK has its own")
-      ->check(CLI::Range(16, 8192))
+      ->check(within(16, 8192))
       ->capture_default_str();
   add_numbers(*command, options.precision, options.rescale);
   command->add_flag("-i,--no-console", options.no_console, "do not read commands");
@@ -104,6 +123,7 @@ void add_play(CLI::App& app, PlayOptions& options, int& code) {
       },
       "the UDP port for OSC, or off (9777)");
   command->add_option("-B,--osc-bind", options.osc_bind, "the address that OSC listens at")
+      ->check(CLI::ValidIPV4)
       ->capture_default_str();
   command->add_flag("--exit-on-loss", options.exit_on_loss,
                     "end with 75 when the audio server dies, instead of waiting for it");
@@ -124,13 +144,13 @@ void add_render(CLI::App& app, RenderChoice& choice, int& code) {
   command->footer(render_examples);
   command->add_option("MODEL", options.name, "a preset's or a model's name, or a file")->required();
   command->add_option("-o,--output", options.output, "the WAV file")->required();
-  CLI::Option* seconds = command->add_option("-s,--seconds", choice.seconds, "how long")
-                             ->check(CLI::Range(0.0, 86400.0));
+  CLI::Option* seconds =
+      command->add_option("-s,--seconds", choice.seconds, "how long")->check(within(0.0, 86400.0));
   CLI::Option* frames = command->add_option("--frames", choice.frames, "how long, in samples")
-                            ->check(CLI::NonNegativeNumber)
+                            ->check(within(0.0, 1e10))
                             ->excludes(seconds);
   command->add_option("-r,--rate", options.rate_hz, "Hz")
-      ->check(CLI::Range(1000.0, 768000.0))
+      ->check(within(1000.0, 768000.0))
       ->capture_default_str();
   command->add_option("--input", options.input, "a WAV file; its channel n drives input n");
   command->add_option("--score", options.score, "a file of events");
@@ -142,7 +162,7 @@ void add_render(CLI::App& app, RenderChoice& choice, int& code) {
              "of the file's samples");
   add_numbers(*command, options.precision, options.rescale);
   command->add_option("-p,--voices", options.voices, "how many notes sound at once")
-      ->check(CLI::Range(1, max_voices));
+      ->check(within(1, max_voices));
   command->add_flag("--limit", options.limit, "keep below full scale, 1 ms late");
   command->add_flag("-q,--quiet", choice.is_quiet, "say nothing unless something is wrong");
   command->callback([&choice, seconds, frames, &code] {

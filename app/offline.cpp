@@ -94,6 +94,9 @@ std::string default_phrase() {
 }
 
 Result<Rendered> render(const RenderOptions& options, const std::function<bool(double)>& progress) {
+  if (options.output == options.input || options.output == options.score) {
+    return Error{"'" + options.output + "' is read: it cannot be written too"};
+  }
   auto scene = load_scene(options.name, true);
   if (!scene) {
     return scene.error();

@@ -233,6 +233,7 @@ struct Terminal::Input {
   void read_lines() {
     constexpr std::size_t max_line = 65536;
     std::string text;
+    bool is_skipping = false;  // the rest of a line that is too long
     while (wait(-1) == Woken::key) {
       char bytes[4096];
       const ssize_t got = read(STDIN_FILENO, bytes, sizeof bytes);
@@ -241,12 +242,14 @@ struct Terminal::Input {
       }
       const bool is_end = got <= 0;
       text.append(bytes, static_cast<std::size_t>(is_end ? 0 : got));
-      if (text.size() > max_line || (is_end && !text.empty())) {
+      if (is_end && !text.empty()) {
         text += '\n';
       }
       std::size_t at = 0;
       for (std::size_t end = 0; (end = text.find('\n', at)) != text.npos; at = end + 1) {
-        if (!run_line(std::string_view(text).substr(at, end - at))) {
+        if (is_skipping) {
+          is_skipping = false;
+        } else if (!run_line(std::string_view(text).substr(at, end - at))) {
           return;
         }
       }
@@ -254,6 +257,13 @@ struct Terminal::Input {
         return;
       }
       text.erase(0, at);
+      if (text.size() > max_line) {
+        if (!is_skipping) {
+          put("error: a line of more than 65536 characters was left out\n");
+        }
+        is_skipping = true;
+        text.clear();
+      }
     }
   }
 

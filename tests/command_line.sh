@@ -51,7 +51,7 @@ model word.mdl '@m mass 1. 0. 0.\n@r sprnig @m @m 0.1 0.1\n'
 expect 2 "word.mdl:2:4: error: unknown keyword 'sprnig'; did you mean 'spring'?" \
   "$program" check word.mdl
 model count.mdl '@m mass 1. 0.\n'
-expect 2 "count.mdl:1:14: error: 'mass' takes 3 arguments (M POSITION VELOCITY), found 2" \
+expect 2 "count.mdl:1:14: error: 'mass' takes 3 to 4 arguments (M [G] POSITION MOTION), found 2" \
   "$program" check count.mdl
 model name.mdl '@m0 mass 1. 0. 0.\n@r springDamper @m0 @m1 0.1 0.1\n'
 expect 2 "name.mdl:2:21: error: no mass is called '@m1'; did you mean '@m0'?" \
@@ -84,6 +84,14 @@ expect 2 "cannot be written" "$program" render PolyTriangle -o no/such/folder/ou
 model bad.score '0.0 /note/on 60 100\nsoon /note/off 60\n'
 expect 2 "bad.score:2:1: error: found 'soon' where a time" \
   "$program" render PolyTriangle -o out.wav --score bad.score
+model infinite.mdl '@g ground 0.\n@m mass 1. 0. 0.\n@r spring @g @m [0/0]\n'
+model late.score '1e300 /note/on 60\n'
+expect 2 "where a time in seconds was expected, at most a day" \
+  "$program" render PolyTriangle -o out.wav --score late.score
+expect 2 "cannot be written too" "$program" render PolyTriangle -o bad.score --score bad.score
+expect 2 "the name of a model" "$program" render PolyTriangle -o word.mdl
+expect 2 "must be -120 to 60, found nan" "$program" play -g nan
+expect 2 "no finite number" "$program" check infinite.mdl
 model wrong.score '0.0 /in/7/force 1\n'
 expect 2 "wrong.score:1:1: error: /in/7/force" \
   "$program" render PolyTriangle -o out.wav --score wrong.score

@@ -59,33 +59,38 @@ TEST_CASE("the models are the published networks", "[models]") {
   }
 }
 
-TEST_CASE("a forte note of every preset peaks near -6 dBFS, in tune and stable", "[models]") {
+TEST_CASE("a forte note of every preset peaks near -6 dBFS, softer ones below it", "[models]") {
   for (const Instrument9& instrument : nine()) {
     INFO(instrument.name);
     const auto scene = load_scene(instrument.name, false);
     REQUIRE(scene);
     REQUIRE(scene->has_preset);
-    auto compiled = compile(scene->network, scene->preset, {});
-    REQUIRE(compiled);
-    CHECK(compiled->instrument.stiffness_margin >= 1.0);  // in every corner of the ranges
-    const std::size_t frames = 44100;
-    std::vector<std::vector<double>> channels(
-        static_cast<std::size_t>(compiled->instrument.outputs), std::vector<double>(frames));
-    std::vector<double*> outputs;
-    for (auto& channel : channels) {
-      outputs.push_back(channel.data());
-    }
-    const Event note{.kind = EventKind::note_on, .index = 60, .value = 104.0 / 127.0};
-    compiled->engine->process({&note, 1}, {}, outputs, frames);
-    double peak = 0.0;
-    for (const auto& channel : channels) {
-      for (const double sample : channel) {
-        peak = std::max(peak, std::fabs(sample));
+    std::vector<double> levels_db;
+    for (const double velocity : {20.0, 60.0, 104.0}) {
+      auto compiled = compile(scene->network, scene->preset, {});
+      REQUIRE(compiled);
+      CHECK(compiled->instrument.stiffness_margin >= 1.0);  // in every corner of the ranges
+      const std::size_t frames = 66150;                     // a bow takes its time
+      std::vector<std::vector<double>> channels(
+          static_cast<std::size_t>(compiled->instrument.outputs), std::vector<double>(frames));
+      std::vector<double*> outputs;
+      for (auto& channel : channels) {
+        outputs.push_back(channel.data());
       }
+      const Event note{.kind = EventKind::note_on, .index = 60, .value = velocity / 127.0};
+      compiled->engine->process({&note, 1}, {}, outputs, frames);
+      double peak = 0.0;
+      for (const auto& channel : channels) {
+        for (const double sample : channel) {
+          peak = std::max(peak, std::fabs(sample));
+        }
+      }
+      levels_db.push_back(20.0 * std::log10(peak));
     }
-    const double level_db = 20.0 * std::log10(peak);
-    CAPTURE(level_db);
-    CHECK(level_db > -9.0);
-    CHECK(level_db < -3.0);
+    CAPTURE(levels_db[0], levels_db[1], levels_db[2]);
+    CHECK(levels_db[0] < levels_db[1]);
+    CHECK(levels_db[1] < levels_db[2]);
+    CHECK(levels_db[2] > -9.0);
+    CHECK(levels_db[2] < -3.0);
   }
 }

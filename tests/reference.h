@@ -9,6 +9,7 @@
 #include <deque>
 #include <memory>
 #include <span>
+#include <stdexcept>
 #include <vector>
 
 #include "core/model/network.h"
@@ -431,6 +432,8 @@ inline Simulation make_simulation(const Network& network, std::span<const double
       case MassKind::ground:
         points.push_back(&simulator.add_ground(x0));
         break;
+      case MassKind::point:
+        throw std::logic_error("the textbook has no macros: write them out");
       case MassKind::position:
         hand = &simulator.add_position_point(x0);
         points.push_back(hand);

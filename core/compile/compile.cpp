@@ -11,6 +11,7 @@
 #include <tuple>
 
 #include "core/analysis/stability.h"
+#include "core/model/topology.h"
 
 namespace ressort {
 namespace {
@@ -65,6 +66,7 @@ class ProgramMaker {
     for (const Input& input : network_.inputs) {
       program_.inputs.push_back({input.number, input.is_force, node_[input.mass]});
     }
+    place_taps();
     program_.outputs.assign(static_cast<std::size_t>(output_count(network_)),
                             {Program::no_node, false});
     for (const Output& output : network_.outputs) {
@@ -145,6 +147,28 @@ class ProgramMaker {
                                     .gravity = coefficient(mass.gravity, gravity_unit),
                                     .is_oscillator = mass.kind == MassKind::oscillator,
                                     .has_gravity = mass.gravity != no_argument});
+    }
+  }
+
+  void place_taps() {
+    std::map<std::uint32_t, std::uint32_t> known;  // first mass of a macro -> its tap nodes
+    for (std::size_t i = 0; i < network_.masses.size(); ++i) {
+      if (network_.masses[i].kind != MassKind::point) {
+        continue;
+      }
+      const Tap& tap = network_.taps[network_.masses[i].tap];
+      const auto next = static_cast<std::uint32_t>(program_.tap_nodes.size());
+      const auto [entry, is_new] = known.try_emplace(tap.first, next);
+      for (std::uint32_t k = 0; is_new && k < tap.length * tap.width; ++k) {
+        program_.tap_nodes.push_back(node_[tap.first + k]);
+      }
+      program_.taps.push_back({.node = node_[i],
+                               .first = entry->second,
+                               .length = tap.length,
+                               .width = tap.width,
+                               .u = coefficient(tap.u, Unit::plain),
+                               .v = coefficient(tap.v, Unit::plain)});
+      program_.position[node_[i]] = network_.masses[tap.first].position;
     }
   }
 
@@ -249,13 +273,11 @@ Result<Control> make_control(const Network& network, const ControlSetting& setti
   }
   if (!to_parameter) {
     const bool is_force = network.inputs[static_cast<std::size_t>(target)].is_force;
-    const bool wants_force = control.gesture == Gesture::impulse;
     const bool wants_position =
         control.gesture == Gesture::pluck || control.gesture == Gesture::bow;
-    if ((is_force && wants_position) || (!is_force && wants_force)) {
-      return preset_error(setting.place, "'" + setting.target + "' is a " +
-                                             (is_force ? "force" : "position") +
-                                             " input, which this gesture cannot play");
+    if (is_force && wants_position) {
+      return preset_error(setting.place, "'" + setting.target +
+                                             "' is a force input, which this gesture cannot play");
     }
   }
   return control;
@@ -327,11 +349,15 @@ InputInfo input_info(const Network& network, std::size_t index, const Playing& p
 }  // namespace
 
 Program make_program(const Network& network, double rate_hz, bool rescale) {
-  return ProgramMaker(network, rate_hz, rescale).make();
+  return network.macros.empty() ? ProgramMaker(network, rate_hz, rescale).make()
+                                : ProgramMaker(expand_macros(network), rate_hz, rescale).make();
 }
 
 Result<Compiled> compile(const Network& network, const Preset& preset,
                          const CompileOptions& options) {
+  if (!network.macros.empty()) {
+    return compile(expand_macros(network), preset, options);
+  }
   Compiled compiled;
   Instrument& instrument = compiled.instrument;
   Program program = make_program(network, options.rate_hz, options.rescale);
@@ -348,6 +374,16 @@ Result<Compiled> compile(const Network& network, const Preset& preset,
         [&](const ParameterSetting& s) { return s.name == instrument.parameters[i].name; });
     box.lowest.push_back(given ? instrument.parameters[i].minimum : program.parameters[i]);
     box.highest.push_back(given ? instrument.parameters[i].maximum : program.parameters[i]);
+  }
+
+  for (const Coefficient& coefficient : program.coefficients) {
+    if (!std::isfinite(coefficient_value(program, coefficient, program.parameters, 1.0)) &&
+        program.audio_parameters.empty()) {
+      return Error{
+          "with the parameters' values an argument of the model is no finite number, or a "
+          "mass is 0",
+          1, 1};
+    }
   }
 
   Playing playing;
@@ -382,6 +418,7 @@ Result<Compiled> compile(const Network& network, const Preset& preset,
     playing.mode_stiffness = instrument.mode->stiffness * program.rate_ratio * program.rate_ratio;
     playing.mode_damping = instrument.mode->damping * program.rate_ratio;
     instrument.is_tuned = true;
+    instrument.transpose = preset.transpose;
     instrument.highest_frequency_hz =
         frequency_of(*instrument.mode, std::max(1.0, playing.highest_factor), program.rate_ratio,
                      program.rate_hz);

@@ -55,6 +55,7 @@ struct Instrument {
   std::size_t masses = 0;  // that move
   std::size_t links = 0;
   bool is_tuned = false;              // keys set the pitch
+  int transpose = 0;                  // semitones from a key to its pitch
   std::optional<Mode> mode;           // the lowest
   double highest_frequency_hz = 0.0;  // of a key, before it is folded down; 0: not tuned
   double stiffness_margin = 0.0;      // every stiffness may grow by this factor; below 1: unproved

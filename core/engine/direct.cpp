@@ -122,6 +122,96 @@ void step_links(const Program& program, State<T>& state) {
   }
 }
 
+// Calls `use(node, weight)` for the up to four nodes around a tap's place in one lane.
+template <class T, class Use>
+void around(const Program& program, const TapSlot& tap, const TapPlace<T>& place, std::size_t lane,
+            Use&& use) {
+  const T alpha = place.alpha[lane];
+  const T beta = place.beta[lane];
+  const std::uint32_t* const row =
+      program.tap_nodes.data() + tap.first + place.row[lane] * tap.width + place.column[lane];
+  use(row[0], (1 - alpha) * (1 - beta));
+  if (beta > 0) {
+    use(row[1], (1 - alpha) * beta);
+  }
+  if (alpha > 0) {
+    use(row[tap.width], alpha * (1 - beta));
+    if (beta > 0) {
+      use(row[tap.width + 1], alpha * beta);
+    }
+  }
+}
+
+// w_i = max(0, 1 - |p - i|) along each side, p being the coordinate in nodes.
+template <class T>
+void place_taps(const Program& program, State<T>& state) {
+  const auto locate = [](T coordinate, std::uint32_t nodes, std::uint32_t& below, T& beyond) {
+    // Not std::clamp: what is no number becomes 0.
+    const T within = coordinate > 0 ? (coordinate < 1 ? coordinate : T(1)) : T(0);
+    const T p = within * static_cast<T>(nodes - 1);
+    below = static_cast<std::uint32_t>(p);
+    beyond = p - static_cast<T>(below);
+  };
+  for (std::size_t i = 0; i < program.taps.size(); ++i) {
+    const TapSlot& tap = program.taps[i];
+    TapPlace<T>& place = state.taps[i];
+    for (std::size_t lane = 0; lane < lane_count<T>; ++lane) {
+      T beyond = 0;
+      locate(state.coefficient[tap.u][lane], tap.length, place.row[lane], beyond);
+      place.alpha[lane] = beyond;
+      locate(state.coefficient[tap.v][lane], tap.width, place.column[lane], beyond);
+      place.beta[lane] = beyond;
+    }
+  }
+}
+
+// A point moves with the nodes around it, and along them when its coordinate changes.
+template <class T>
+void move_taps(const Program& program, State<T>& state) {
+  for (std::size_t i = 0; i < program.taps.size(); ++i) {
+    const TapSlot& tap = program.taps[i];
+    Lanes<T> position{};
+    for (std::size_t lane = 0; lane < lane_count<T>; ++lane) {
+      around(program, tap, state.taps[i], lane,
+             [&](std::uint32_t node, T weight) { position[lane] += weight * state.x[node][lane]; });
+    }
+    state.v[tap.node] = position - state.x[tap.node];
+    state.x[tap.node] = position;
+  }
+}
+
+// What acts on the points goes to the nodes around them.
+template <class T>
+void spread_taps(const Program& program, State<T>& state) {
+  for (std::size_t i = 0; i < program.taps.size(); ++i) {
+    const TapSlot& tap = program.taps[i];
+    const Lanes<T> force = state.force[tap.node];
+    state.force[tap.node] = Lanes<T>{};
+    for (std::size_t lane = 0; lane < lane_count<T>; ++lane) {
+      around(program, tap, state.taps[i], lane, [&](std::uint32_t node, T weight) {
+        state.force[node][lane] += weight * force[lane];
+      });
+    }
+  }
+}
+
+// The force at a point is that of the nodes around it, interpolated.
+template <class T>
+Lanes<T> force_at(const Program& program, const State<T>& state, std::uint32_t node) {
+  for (std::size_t i = 0; i < program.taps.size(); ++i) {
+    if (program.taps[i].node == node) {
+      Lanes<T> force{};
+      for (std::size_t lane = 0; lane < lane_count<T>; ++lane) {
+        around(program, program.taps[i], state.taps[i], lane, [&](std::uint32_t near, T weight) {
+          force[lane] += weight * state.force[near][lane];
+        });
+      }
+      return force;
+    }
+  }
+  return state.force[node];
+}
+
 template <class T>
 Lanes<T> read_output(const Program& program, const State<T>& state, const Drive<T>* drive,
                      const OutputSlot& output) {
@@ -131,7 +221,7 @@ Lanes<T> read_output(const Program& program, const State<T>& state, const Drive<
   if (!output.is_force) {
     return state.x[output.node];
   }
-  Lanes<T> force = state.force[output.node];
+  Lanes<T> force = force_at(program, state, output.node);
   for (std::size_t i = 0; i < program.inputs.size(); ++i) {
     if (program.inputs[i].is_force && program.inputs[i].node == output.node) {
       force += drive[i].value;
@@ -171,6 +261,7 @@ template <class T>
 State<T>::State(const Program& program)
     : x(program.position.size()),
       v(program.position.size()),
+      taps(program.taps.size()),
       force(program.position.size()),
       coefficient(program.coefficients.size()),
       increment(program.coefficients.size()),
@@ -206,6 +297,10 @@ void step_direct(const Program& program, State<T>& state, const Drive<T>* drive,
         state.force[program.inputs[i].node] += drive[i].value;
       }
     }
+    if (!program.taps.empty()) {
+      place_taps(program, state);
+      spread_taps(program, state);
+    }
     step_masses(program, state);
     for (std::size_t i = 0; i < program.inputs.size(); ++i) {
       if (!program.inputs[i].is_force) {
@@ -213,7 +308,9 @@ void step_direct(const Program& program, State<T>& state, const Drive<T>* drive,
         state.v[program.inputs[i].node] = drive[i].velocity;
       }
     }
+    move_taps(program, state);
     step_links(program, state);
+    spread_taps(program, state);
     for (const OutputSlot& output : program.outputs) {
       *outputs++ = read_output(program, state, drive, output);
     }

@@ -35,6 +35,12 @@ double Engine::Voices::paced(double amount, std::size_t lane) const {
   return amount * program.rate_ratio * std::sqrt(voices[lane].factor);
 }
 
+double Engine::Voices::struck(const Control& control, double amount, std::size_t lane) const {
+  return program.inputs[control.target].is_force
+             ? paced(amount, lane)
+             : amount / (program.rate_ratio * std::sqrt(voices[lane].factor));
+}
+
 void Engine::Voices::move_to(std::size_t input, double position) {
   rest[input] = position;
   for (std::size_t lane = 0; lane < voices.size(); ++lane) {
@@ -71,7 +77,7 @@ void Engine::Voices::perform(const Control& control, std::size_t lane, double am
       break;
     case Gesture::impulse:
       wake(lane);
-      hand(lane, control.target).strike(paced(mapped(control, amount), lane));
+      hand(lane, control.target).strike(struck(control, mapped(control, amount), lane));
       break;
     case Gesture::hold:
       wake(lane);

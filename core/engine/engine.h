@@ -18,7 +18,7 @@ enum class Gesture : std::uint8_t {
   position,   // the hand goes where it is told, smoothed
   pluck,      // the hand sweeps from one side of the string to the other
   bow,        // the hand moves on and on while the note is held
-  impulse,    // one sample of force
+  impulse,    // one sample of force, or of displacement
   hold,       // the hand is at the second end of its range while the note is held
   parameter,  // not a hand: the parameter `target` follows
 };

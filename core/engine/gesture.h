@@ -44,7 +44,7 @@ class Hand {
     pole_ = pole;
   }
 
-  // One sample of force, on top of whatever else goes on.
+  // One sample of force or of displacement, on top of whatever else goes on.
   void strike(double force) { pulse_ += force; }
 
   // A constant force for `frames` samples.
@@ -53,11 +53,39 @@ class Hand {
     held_frames_ = frames;
   }
 
-  bool is_moving() const { return motion_ != Motion::rest || pulse_ != 0.0 || held_frames_ > 0; }
+  bool is_moving() const {
+    return motion_ != Motion::rest || pulse_ != 0.0 || bump_ != 0.0 || held_frames_ > 0;
+  }
   double value() const { return value_; }
   double target() const { return target_; }
 
   HandSample next_position() {
+    const double before = bump_;
+    bump_ = pulse_;
+    pulse_ = 0.0;
+    HandSample sample = move();
+    sample.value += bump_;
+    sample.velocity += bump_ - before;
+    return sample;
+  }
+
+  HandSample next_force() {
+    if (motion_ == Motion::follow) {
+      approach();
+    }
+    double force = value_ + pulse_;
+    pulse_ = 0.0;
+    if (held_frames_ > 0) {
+      force += held_;
+      --held_frames_;
+    }
+    return {force, 0.0};
+  }
+
+ private:
+  enum class Motion : std::uint8_t { rest, follow, sweep, draw };
+
+  HandSample move() {
     const double before = value_;
     switch (motion_) {
       case Motion::rest:
@@ -87,22 +115,6 @@ class Hand {
     return {value_, value_ - before};
   }
 
-  HandSample next_force() {
-    if (motion_ == Motion::follow) {
-      approach();
-    }
-    double force = value_ + pulse_;
-    pulse_ = 0.0;
-    if (held_frames_ > 0) {
-      force += held_;
-      --held_frames_;
-    }
-    return {force, 0.0};
-  }
-
- private:
-  enum class Motion : std::uint8_t { rest, follow, sweep, draw };
-
   void approach() {
     value_ = pole_ * value_ + (1.0 - pole_) * target_;
     if (std::fabs(target_ - value_) <= 1e-12 * (1.0 + std::fabs(target_))) {
@@ -117,6 +129,7 @@ class Hand {
   double speed_ = 0.0;
   double pole_ = 0.0;
   double pulse_ = 0.0;
+  double bump_ = 0.0;  // of a position, in this sample
   double held_ = 0.0;
   std::size_t held_frames_ = 0;
   Motion motion_ = Motion::rest;

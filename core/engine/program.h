@@ -86,7 +86,18 @@ struct AudioParameter {
   int channel = 0;  // from 0
 };
 
-// Nodes are numbered: masses that move, run by run; then grounds; then position inputs.
+// A place on a rectangle of length * width nodes, by coordinates 0..1. It has no inertia: its
+// position is interpolated, and what acts on it acts on the nodes around it.
+struct TapSlot {
+  std::uint32_t node = 0;   // its own
+  std::uint32_t first = 0;  // of its nodes in Program::tap_nodes, row by row
+  std::uint32_t length = 1;
+  std::uint32_t width = 1;
+  std::uint32_t u = 0;  // coefficients
+  std::uint32_t v = 0;
+};
+
+// Nodes are numbered: masses that move, run by run; then grounds; then position inputs and points.
 struct Program {
   double rate_hz = 44100.0;
   double rate_ratio = 1.0;       // r above; 1 where numbers are taken raw
@@ -97,7 +108,9 @@ struct Program {
   std::vector<LinkRun> link_runs;
   std::vector<Ends> ends;  // [link]
   std::vector<InputSlot> inputs;
-  std::vector<OutputSlot> outputs;  // [channel]
+  std::vector<TapSlot> taps;
+  std::vector<std::uint32_t> tap_nodes;  // nodes
+  std::vector<OutputSlot> outputs;       // [channel]
   std::vector<AudioParameter> audio_parameters;
   std::vector<std::uint32_t> audio_coefficients;  // those that depend on an audio parameter
   std::vector<double> parameters;                 // [parameter] at the start
@@ -112,6 +125,15 @@ struct Program {
 double coefficient_value(const Program& program, const Coefficient& coefficient,
                          std::span<const double> parameters, double stiffness_factor);
 
+// Where a tap is in each lane: its lowest corner, and how far it is beyond it.
+template <class T>
+struct TapPlace {
+  std::array<std::uint32_t, lane_count<T>> row{};
+  std::array<std::uint32_t, lane_count<T>> column{};
+  Lanes<T> alpha{};  // 0..1, towards the next row
+  Lanes<T> beta{};   // 0..1, towards the next column
+};
+
 // Everything that changes in `lane_count<T>` voices that are stepped together.
 template <class T>
 struct State {
@@ -120,6 +142,7 @@ struct State {
 
   std::vector<V> x;                    // [node] position
   std::vector<V> v;                    // [node] change of position per sample
+  std::vector<TapPlace<T>> taps;       // [tap] in this tick
   std::vector<V> force;                // [node] summed by the links, used by the next tick
   std::vector<V> coefficient;          // [coefficient]
   std::vector<V> increment;            // [coefficient] per sample, while ramping

@@ -43,6 +43,8 @@ struct Engine::Voices {
   double mapped(const Control& control, double amount) const;
   // A speed or an impulse that gives the same displacement at every rate and pitch.
   double paced(double amount, std::size_t lane) const;
+  // A blow's force, or the displacement that gives the same blow through a spring.
+  double struck(const Control& control, double amount, std::size_t lane) const;
   void move_to(std::size_t input, double position);
   void pluck(std::size_t lane, const Control& control, double strength);
   void perform(const Control& control, std::size_t lane, double amount);

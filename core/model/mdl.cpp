@@ -3,10 +3,12 @@
 #include <algorithm>
 #include <cctype>
 #include <charconv>
+#include <cmath>
 #include <optional>
 #include <unordered_map>
 
 #include "core/model/expression.h"
+#include "core/model/topology.h"
 
 namespace ressort {
 namespace {
@@ -17,6 +19,7 @@ enum class Element {
   ground,
   mass,
   oscillator,
+  macro,
   position_input,
   force_input,
   position_output,
@@ -36,6 +39,7 @@ struct Keyword {
   int first;                   // links: which of Link::arguments the first argument is
   bool drawable;               // may be followed by GROUP X Y
   std::string_view arguments;  // as a person writes them
+  MacroKind macro{};           // of Element::macro
 };
 
 using E = Element;
@@ -45,10 +49,16 @@ constexpr Keyword keywords[] = {
     {"param",              E::parameter,       {},                  0, 1, 1, 0, false, "VALUE"},
     {"audioParam",         E::audio_parameter, {},                  0, 1, 1, 0, false, "@inN"},
     {"ground",             E::ground,          {},                  0, 1, 1, 0, true,  "POSITION"},
-    {"mass",               E::mass,            {},                  0, 3, 4, 0, true,  "M [G] POSITION VELOCITY"},
-    {"massG",              E::mass,            {},                  0, 4, 4, 0, true,  "M G POSITION DELAYED_POSITION"},
-    {"osc",                E::oscillator,      {},                  0, 5, 6, 0, true,  "M K Z [G] POSITION VELOCITY"},
-    {"cel",                E::oscillator,      {},                  0, 5, 6, 0, true,  "M K Z [G] POSITION VELOCITY"},
+    {"mass",               E::mass,            {},                  0, 3, 4, 0, true,  "M [G] POSITION MOTION"},
+    {"massG",              E::mass,            {},                  0, 4, 4, 0, true,  "M G POSITION MOTION"},
+    {"osc",                E::oscillator,      {},                  0, 5, 6, 0, true,  "M K Z [G] POSITION MOTION"},
+    {"cel",                E::oscillator,      {},                  0, 5, 6, 0, true,  "M K Z [G] POSITION MOTION"},
+    {"string",             E::macro,           {},                  0, 5, 7, 0, false, "N M K Z [ZO] POSITION [MOTION]", MacroKind::string},
+    {"chain",              E::macro,           {},                  0, 5, 7, 0, false, "N M K Z [ZO] POSITION [MOTION]", MacroKind::chain},
+    {"stiffString",        E::macro,           {},                  0, 6, 8, 0, false, "N M K K2 Z [ZO] POSITION [MOTION]", MacroKind::stiff_string},
+    {"mesh",               E::macro,           {},                  0, 6, 8, 0, false, "LENGTH WIDTH M K Z [ZO] POSITION [MOTION]", MacroKind::mesh},
+    {"closedMesh",         E::macro,           {},                  0, 6, 8, 0, false, "LENGTH WIDTH M K Z [ZO] POSITION [MOTION]", MacroKind::closed_mesh},
+    {"cornerMesh",         E::macro,           {},                  0, 6, 8, 0, false, "LENGTH WIDTH M K Z [ZO] POSITION [MOTION]", MacroKind::corner_mesh},
     {"posInput",           E::position_input,  {},                  0, 1, 1, 0, true,  "POSITION"},
     {"frcInput",           E::force_input,     {},                  1, 0, 0, 0, false, "@MASS"},
     {"forceInput",         E::force_input,     {},                  1, 0, 0, 0, false, "@MASS"},
@@ -70,6 +80,7 @@ constexpr Keyword keywords[] = {
 };
 // clang-format on
 
+constexpr double least_mass = 1e-300;  // a smaller one has no finite inverse
 constexpr std::size_t most_diagnostics = 100;
 constexpr std::size_t most_suggestions = 2000;  // names looked at; no suggestion is worth a wait
 
@@ -85,6 +96,7 @@ struct Line {
   Token word;              // the keyword as written
   std::string_view group;  // of the display block around it; empty if there is none
   std::vector<Token> rest;
+  std::vector<Token> coordinates;  // of macros that are referred to without brackets, in MIMS
 };
 
 bool is_blank(char c) {
@@ -189,12 +201,15 @@ class Reader {
  private:
   void read_line(std::string_view line, int number);
   void declare(const Line& line);
-  void build(const Line& line);
+  void build(Line& line);
+  void take_coordinates(Line& line);
 
   void add_mass(const Line& line);
-  void add_link(const Line& line);
-  void add_input(const Line& line);
-  void add_output(const Line& line);
+  void add_macro(const Line& line);
+  std::uint32_t size(const Line& line, std::size_t at, std::uint32_t least);
+  void add_link(Line& line);
+  void add_input(Line& line);
+  void add_output(Line& line);
 
   bool check_count(const Line& line);
   std::uint32_t drawing(const Line& line, std::size_t at);
@@ -205,7 +220,10 @@ class Reader {
   int audio_input(const Line& line);
   void read_block(const std::vector<Token>& tokens, int number);
   std::string with_slash(std::string_view text) const;
-  std::optional<std::uint32_t> reference(const Line& line, std::size_t at);
+  std::optional<std::uint32_t> reference(Line& line, std::size_t at);
+  std::optional<std::uint32_t> tap(const Line& line, const Token& token, const Token& label,
+                                   std::vector<Token> coordinates);
+  ArgumentId expression(const Line& line, const Token& token);
   std::optional<int> channel(const Line& line, std::string_view prefix);
   void decide_third_argument();
   void look_over();
@@ -252,6 +270,10 @@ class Reader {
   std::vector<Line> lines_;
   std::vector<std::string> parameter_names_;
   std::unordered_map<std::string_view, std::uint32_t> masses_;  // label -> index
+  std::unordered_map<std::string_view, std::uint32_t> macros_;  // label -> index
+  std::vector<const Keyword*> macro_keywords_;                  // [macro]
+  std::vector<std::uint32_t> resting_;                          // macros without a velocity
+  std::uint64_t nodes_ = 0;                                     // of all macros
   std::unordered_map<std::string_view, int> labels_;            // every label -> its line
   std::unordered_map<std::string_view, ArgumentId> arguments_;  // text -> index
   std::vector<std::string_view> groups_;  // of the display blocks that are open
@@ -265,6 +287,9 @@ ParsedNetwork Reader::read(std::string_view text) {
         "the model is " + std::to_string(text.size() >> 20) + " MiB long; at most " +
             std::to_string(max_model_bytes >> 20) + " MiB are read");
     return std::move(out_);
+  }
+  if (text.starts_with("\xef\xbb\xbf")) {
+    text.remove_prefix(3);  // the mark that some editors put before UTF-8
   }
   const std::size_t zero = text.find('\0');
   if (zero != std::string_view::npos) {
@@ -287,7 +312,7 @@ ParsedNetwork Reader::read(std::string_view text) {
   for (const Line& line : lines_) {
     declare(line);
   }
-  for (const Line& line : lines_) {
+  for (Line& line : lines_) {
     if (out_.diagnostics.size() > most_diagnostics) {
       break;
     }
@@ -405,12 +430,34 @@ void Reader::declare(const Line& line) {
       masses_.emplace(line.label.text, static_cast<std::uint32_t>(network.masses.size()));
       network.masses.emplace_back();
       break;
+    case Element::macro:
+      macros_.emplace(line.label.text, static_cast<std::uint32_t>(network.macros.size()));
+      macro_keywords_.push_back(line.keyword);
+      network.macros.emplace_back();
+      break;
     default:
       break;
   }
 }
 
-void Reader::build(const Line& line) {
+// MIMS writes the place on a macro behind all other arguments: u, or u:v for a mesh.
+void Reader::take_coordinates(Line& line) {
+  std::size_t count = 0;
+  for (std::size_t i = 0;
+       i < line.rest.size() && i < static_cast<std::size_t>(line.keyword->references); ++i) {
+    const std::string_view text = line.rest[i].text;
+    count += text[0] == '@' && macros_.contains(text.substr(1)) ? 1 : 0;
+  }
+  count = std::min(
+      count, line.rest.size() -
+                 std::min(line.rest.size(), static_cast<std::size_t>(line.keyword->references)));
+  line.coordinates.assign(line.rest.end() - static_cast<std::ptrdiff_t>(count), line.rest.end());
+  line.rest.resize(line.rest.size() - count);
+  shows_delayed_ |= count > 0;
+}
+
+void Reader::build(Line& line) {
+  take_coordinates(line);
   const bool is_parameter = line.keyword->element == Element::parameter ||
                             line.keyword->element == Element::audio_parameter;
   if (is_parameter || !check_count(line)) {
@@ -419,6 +466,8 @@ void Reader::build(const Line& line) {
   switch (line.keyword->element) {
     case Element::link:
       return add_link(line);
+    case Element::macro:
+      return add_macro(line);
     case Element::position_output:
     case Element::force_output:
       return add_output(line);
@@ -463,7 +512,7 @@ void Reader::add_mass(const Line& line) {
       mass.damping = argument(line, at++);
     }
     if (mass.mass != no_argument && is_constant(out_.network.arguments[mass.mass]) &&
-        !(argument_value(out_.network, mass.mass, {}) > 0.0)) {
+        !(argument_value(out_.network, mass.mass, {}) > least_mass)) {
       error(line, line.rest[0], "a mass must be above 0, found " + quoted(line.rest[0].text));
     }
     read_gravity(line, mass, at);
@@ -496,7 +545,68 @@ void Reader::read_gravity(const Line& line, Mass& mass, std::size_t& at) {
   }
 }
 
-void Reader::add_link(const Line& line) {
+void Reader::add_macro(const Line& line) {
+  Macro& macro = out_.network.macros[macros_.at(line.label.text)];
+  if (!macro.name.empty()) {
+    return;  // a second declaration; it has been told
+  }
+  macro.name = std::string(line.label.text);
+  macro.kind = line.keyword->macro;
+  macro.place = {line.number, line.label.column};
+  const bool is_mesh = macro.kind != MacroKind::string && macro.kind != MacroKind::chain &&
+                       macro.kind != MacroKind::stiff_string;
+  std::size_t at = 0;
+  macro.length = size(line, at++, macro.kind == MacroKind::stiff_string ? 3 : 2);
+  macro.width = is_mesh ? size(line, at++, 2) : 1;
+  nodes_ += node_count(macro);
+  if (nodes_ > max_macro_nodes) {
+    macro.length = macro.width = 2;
+    error(line, line.rest[0],
+          "the macros have more than " + std::to_string(max_macro_nodes) + " nodes together");
+  }
+  macro.mass = argument(line, at++);
+  macro.stiffness = argument(line, at++);
+  if (macro.kind == MacroKind::stiff_string) {
+    macro.second_stiffness = argument(line, at++);
+  }
+  macro.damping = argument(line, at++);
+  if (line.rest.size() == static_cast<std::size_t>(line.keyword->most)) {
+    macro.air_damping = argument(line, at++);
+  }
+  double x = 0.0;
+  double y = 0.0;
+  bool is_placed = position(line, at++, macro.position, x, y);
+  if (line.rest.size() == static_cast<std::size_t>(line.keyword->least)) {
+    shows_delayed_ = true;
+    resting_.push_back(macros_.at(line.label.text));
+  } else {
+    shows_velocity_ = true;
+    double far_x = 0.0;  // the drawn line's other end
+    double far_y = 0.0;
+    is_placed |= position(line, at++, macro.third, far_x, far_y);
+  }
+  if (is_placed || !line.group.empty()) {
+    out_.network.drawings.push_back({.group = std::string(line.group), .x = x, .y = y});
+    macro.drawing = static_cast<std::uint32_t>(out_.network.drawings.size());
+  }
+}
+
+// A count of nodes: no parameter, and no more than there may be in all.
+std::uint32_t Reader::size(const Line& line, std::size_t at, std::uint32_t least) {
+  const std::string_view text = line.rest[at].text;
+  std::uint64_t number = 0;
+  const char* const end = text.data() + text.size();
+  const auto [last, failure] = std::from_chars(text.data(), end, number);
+  if (failure != std::errc{} || last != end || number < least || number > max_macro_nodes) {
+    error(line, line.rest[at],
+          "found " + quoted(text) + " where a number of nodes from " + std::to_string(least) +
+              " to " + std::to_string(max_macro_nodes) + " was expected");
+    return least;
+  }
+  return static_cast<std::uint32_t>(number);
+}
+
+void Reader::add_link(Line& line) {
   Link link;
   link.name = std::string(line.label.text);
   link.kind = line.keyword->link;
@@ -532,7 +642,7 @@ void Reader::add_link(const Line& line) {
   out_.network.links.push_back(std::move(link));
 }
 
-void Reader::add_input(const Line& line) {
+void Reader::add_input(Line& line) {
   const auto number = channel(line, "in");
   const bool is_force = line.keyword->element == Element::force_input;
   const auto found = masses_.find(line.label.text);
@@ -547,7 +657,7 @@ void Reader::add_input(const Line& line) {
   }
 }
 
-void Reader::add_output(const Line& line) {
+void Reader::add_output(Line& line) {
   const auto number = channel(line, "out");
   const auto mass = reference(line, 0);
   if (number && mass) {
@@ -630,7 +740,10 @@ std::string Reader::with_slash(std::string_view text) const {
 }
 
 ArgumentId Reader::argument(const Line& line, std::size_t at) {
-  const Token token = unwrapped(line.rest[at]);
+  return expression(line, unwrapped(line.rest[at]));
+}
+
+ArgumentId Reader::expression(const Line& line, const Token& token) {
   const auto known = arguments_.find(token.text);
   if (known != arguments_.end()) {
     return known->second;
@@ -660,6 +773,9 @@ ArgumentId Reader::argument(const Line& line, std::size_t at) {
       return no_argument;
     }
     formula = *std::move(parsed);
+  }
+  if (is_constant(formula) && !std::isfinite(evaluate(formula, {}))) {
+    error(line, token, quoted(token.text) + " is no finite number");
   }
   const auto id = static_cast<ArgumentId>(out_.network.arguments.size());
   out_.network.arguments.push_back(std::move(formula));
@@ -702,8 +818,35 @@ double Reader::state(const Line& line, std::size_t at) {
   return number;
 }
 
-std::optional<std::uint32_t> Reader::reference(const Line& line, std::size_t at) {
-  const Token& token = line.rest[at];
+std::optional<std::uint32_t> Reader::reference(Line& line, std::size_t at) {
+  const Token token = line.rest[at];
+  if (token.text[0] == '[') {
+    shows_velocity_ = true;
+    const Token inner = unwrapped(token);
+    std::vector<Token> parts = split(inner.text);
+    for (Token& part : parts) {
+      part.column += inner.column - 1;
+    }
+    if (!parts.empty() && parts[0].text[0] == '@') {
+      const Token label = parts[0];
+      parts.erase(parts.begin());
+      return tap(line, token, label, std::move(parts));
+    }
+  }
+  if (token.text[0] == '@' && macros_.contains(token.text.substr(1))) {
+    std::vector<Token> coordinates;
+    if (!line.coordinates.empty()) {
+      const Token both = line.coordinates.front();
+      line.coordinates.erase(line.coordinates.begin());
+      const std::size_t colon = both.text.find(':');
+      coordinates.push_back({both.text.substr(0, colon), both.column});
+      if (colon != std::string_view::npos) {
+        coordinates.push_back(
+            {both.text.substr(colon + 1), both.column + static_cast<int>(colon) + 1});
+      }
+    }
+    return tap(line, token, token, std::move(coordinates));
+  }
   if (token.text[0] != '@') {
     error(line, token,
           "found " + quoted(token.text) + " where '@' and the label of a mass were expected");
@@ -725,6 +868,49 @@ std::optional<std::uint32_t> Reader::reference(const Line& line, std::size_t at)
             ? quoted(token.text) + " is no mass, so nothing can be attached to it"
             : "no mass is called " + quoted(token.text) + suggestion(name, names, "@"));
   return std::nullopt;
+}
+
+// A place on a macro: one coordinate on a string, which may be written with blanks in it, two on a
+// mesh.
+std::optional<std::uint32_t> Reader::tap(const Line& line, const Token& token, const Token& label,
+                                         std::vector<Token> coordinates) {
+  const auto found = macros_.find(label.text.substr(1));
+  if (found == macros_.end()) {
+    std::vector<std::string_view> names;
+    for (const auto& [name, index] : macros_) {
+      names.push_back(name);
+    }
+    error(line, label,
+          masses_.contains(label.text.substr(1))
+              ? quoted(label.text) + " is one mass, so it has no places on it: write it without '['"
+              : "no macro is called " + quoted(label.text) +
+                    suggestion(label.text.substr(1), names, "@"));
+    return std::nullopt;
+  }
+  const Keyword& keyword = *macro_keywords_.at(found->second);
+  const bool is_mesh = keyword.arguments.starts_with("LENGTH");
+  const std::size_t wanted = is_mesh ? 2 : 1;
+  if (!is_mesh && coordinates.size() > 1) {
+    const char* const start = coordinates.front().text.data();
+    const std::string_view last = coordinates.back().text;
+    const auto length = static_cast<std::size_t>(last.data() + last.size() - start);
+    coordinates = {{std::string_view(start, length), coordinates.front().column}};
+  }
+  if (coordinates.size() != wanted) {
+    error(line, token,
+          quoted(label.text) + " is a " + std::string(keyword.word) + ": a place on it needs " +
+              (is_mesh ? "two coordinates, [@m u v]" : "one coordinate, [@s u]") +
+              ", each from 0 to 1");
+    return std::nullopt;
+  }
+  Network& network = out_.network;
+  Mass point{.kind = MassKind::point, .tap = static_cast<std::uint32_t>(network.taps.size())};
+  point.place = {line.number, token.column};
+  network.taps.push_back({.macro = found->second,
+                          .u = expression(line, coordinates[0]),
+                          .v = is_mesh ? expression(line, coordinates[1]) : no_argument});
+  network.masses.push_back(std::move(point));
+  return static_cast<std::uint32_t>(network.masses.size() - 1);
 }
 
 std::optional<int> Reader::channel(const Line& line, std::string_view prefix) {
@@ -755,6 +941,9 @@ void Reader::decide_third_argument() {
       });
   const bool velocity = shows_velocity_ || (!shows_delayed_ && starts_at_zero_speed);
   network.third = velocity ? ThirdArgument::velocity_per_second : ThirdArgument::delayed_position;
+  for (const std::uint32_t macro : resting_) {
+    network.macros[macro].third = velocity ? 0.0 : network.macros[macro].position;
+  }
 }
 
 // What is legal and yet hardly meant.
@@ -763,7 +952,7 @@ void Reader::look_over() {
   if (!out_.ok()) {
     return;
   }
-  if (network.masses.empty()) {
+  if (network.masses.empty() && network.macros.empty()) {
     return say(Severity::error, 1, {"", 1}, "the model has no masses: nothing can sound");
   }
   std::vector<bool> attached(network.masses.size(), false);
@@ -775,7 +964,7 @@ void Reader::look_over() {
   }
   for (std::size_t i = 0; i < network.masses.size(); ++i) {
     const Mass& mass = network.masses[i];
-    if (!attached[i] && mass.kind != MassKind::oscillator) {
+    if (!attached[i] && mass.kind != MassKind::oscillator && mass.kind != MassKind::point) {
       say(Severity::warning, mass.place.line, {mass.name, mass.place.column},
           "nothing is attached to '@" + mass.name + "'");
     }

@@ -38,6 +38,7 @@ enum class MassKind : std::uint8_t {
   oscillator,  // the same, with a spring and a damper to a ground at 0
   ground,      // never moves
   position,    // follows an input; has no inertia
+  point,       // a place on a macro, between its nodes (see Tap); has no inertia
 };
 
 struct Mass {
@@ -50,9 +51,50 @@ struct Mass {
   bool gravity_per_rate = false;       // MIMS4Max divides g by the reference rate, MIMS does not
   double position = 0.0;               // x0
   double third = 0.0;                  // the last state argument; Network::third says what it means
+  std::uint32_t tap = 0;               // index into Network::taps, points only
   std::uint32_t drawing = 0;           // 1 + index into Network::drawings; 0 for none
   Place place;
   bool operator==(const Mass&) const = default;
+};
+
+enum class MacroKind : std::uint8_t {
+  string,        // both ends fixed; neighbours linked by K, Z
+  chain,         // the same without fixed ends
+  stiff_string,  // a string with undamped K2 between every second node, clamped at both ends
+  mesh,          // a rectangle, neighbours linked by K, Z
+  closed_mesh,   // with its border fixed
+  corner_mesh,   // with its corners fixed
+};
+
+// Many masses in one line. Nodes are numbered row by row; every one that moves has mass M, and
+// with air damping a damper Zo to 0.
+struct Macro {
+  std::string name;
+  MacroKind kind = MacroKind::string;
+  std::uint32_t length = 2;  // nodes, fixed ones included; rows of a mesh
+  std::uint32_t width = 1;   // nodes in a row
+  ArgumentId mass = no_argument;
+  ArgumentId stiffness = no_argument;
+  ArgumentId second_stiffness = no_argument;  // K2
+  ArgumentId damping = no_argument;
+  ArgumentId air_damping = no_argument;  // Zo
+  double position = 0.0;                 // of every node
+  double third = 0.0;                    // as of Mass
+  std::uint32_t drawing = 0;
+  Place place;
+  bool operator==(const Macro&) const = default;
+};
+
+// A place on a macro by coordinates 0..1, interpolated between the nodes around it.
+struct Tap {
+  std::uint32_t macro = 0;
+  ArgumentId u = no_argument;  // along the length
+  ArgumentId v = no_argument;  // along the width
+  // Where the macro's nodes are, once it is expanded: masses [first, first + length * width).
+  std::uint32_t first = 0;
+  std::uint32_t length = 0;
+  std::uint32_t width = 0;
+  bool operator==(const Tap&) const = default;
 };
 
 // Where an element is drawn; of no consequence to the sound.
@@ -126,6 +168,8 @@ struct Network {
   std::vector<Formula> arguments;  // the distinct arguments of all elements
   std::vector<Drawing> drawings;
   std::vector<Mass> masses;  // grounds and position inputs too, as declared
+  std::vector<Macro> macros;
+  std::vector<Tap> taps;
   std::vector<Link> links;
   std::vector<Input> inputs;    // sorted by number; several may share one
   std::vector<Output> outputs;  // sorted by number

@@ -348,8 +348,10 @@ Preset default_preset(const Network& network, bool bare) {
     } else if (is_linked(network, input.mass, LinkKind::pluck, scale)) {
       note.gesture = ControlGesture::pluck;
       note.travel = 5.0 * scale;
-      note.low = 0.005 * scale;
-      note.high = 0.1 * scale;
+      // The slower the finger, the more it gives to the string before that slips away.
+      note.low = 0.3 * scale;
+      note.high = 0.05 * scale;
+      note.exponential = true;
     } else if (is_linked(network, input.mass, LinkKind::bow, scale)) {
       note.gesture = ControlGesture::bow;
       note.low = 0.35 * scale;

@@ -1,0 +1,16 @@
+// core/model: the shapes that macros stand for.
+#pragma once
+
+#include "core/model/network.h"
+
+namespace ressort {
+
+inline constexpr std::uint64_t max_macro_nodes = 4'000'000;  // of one model
+
+std::uint64_t node_count(const Macro& macro);
+
+// The same network with every macro written out as masses and links, which have no names, and its
+// taps told where its nodes are. O(nodes). [any thread but audio]
+Network expand_macros(const Network& network);
+
+}  // namespace ressort
