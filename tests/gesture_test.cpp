@@ -213,6 +213,22 @@ TEST_CASE("a force lasts as long as told, and means the same at every rate", "[g
   CHECK(at_one_second(88200.0, 0.5, 0.01) == Approx(held).epsilon(1e-4));
 }
 
+TEST_CASE("a blow on a position is one sample beside it, with the velocity of both steps",
+          "[gesture]") {
+  Hand hand;
+  hand.place(0.5);
+  hand.strike(0.25);
+  const HandSample away = hand.next_position();
+  const HandSample back = hand.next_position();
+  const HandSample rest = hand.next_position();
+  CHECK(away.value == 0.75);
+  CHECK(away.velocity == 0.25);
+  CHECK(back.value == 0.5);
+  CHECK(back.velocity == -0.25);
+  CHECK(rest.velocity == 0.0);
+  CHECK_FALSE(hand.is_moving());
+}
+
 TEST_CASE("audio moves the hand from where it is; in the bare network it is the hand",
           "[gesture]") {
   Preset preset = played(

@@ -1,0 +1,116 @@
+// core/model: the reader behind parse_network, for mdl.cpp and elements.cpp only.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <unordered_map>
+#include <vector>
+
+#include "core/model/keywords.h"
+#include "core/model/mdl.h"
+#include "core/model/tokens.h"
+
+namespace ressort {
+
+inline constexpr std::size_t most_diagnostics = 100;
+
+struct Line {
+  int number = 0;
+  const Keyword* keyword = nullptr;
+  Token label;             // without its '@'
+  Token word;              // the keyword as written
+  std::string_view group;  // of the display block around it; empty if there is none
+  std::vector<Token> rest;
+  std::vector<Token> coordinates;  // of macros that are referred to without brackets, in MIMS
+};
+
+class Reader {
+ public:
+  ParsedNetwork read(std::string_view text);
+
+ private:
+  void read_line(std::string_view line, int number);
+  void declare(const Line& line);
+  void build(Line& line);
+  void take_coordinates(Line& line);
+
+  void add_mass(const Line& line);
+  void add_macro(const Line& line);
+  std::uint32_t size(const Line& line, std::size_t at, std::uint32_t least);
+  void add_link(Line& line);
+  void add_input(Line& line);
+  void add_output(Line& line);
+
+  bool check_count(const Line& line);
+  std::uint32_t drawing(const Line& line, std::size_t at);
+  ArgumentId argument(const Line& line, std::size_t at);
+  void read_gravity(const Line& line, Mass& mass, std::size_t& at);
+  bool position(const Line& line, std::size_t at, double& z, double& x, double& y);
+  double state(const Line& line, std::size_t at);
+  int audio_input(const Line& line);
+  void read_block(const std::vector<Token>& tokens, int number);
+  std::string with_slash(std::string_view text) const;
+  std::optional<std::uint32_t> reference(Line& line, std::size_t at);
+  std::optional<std::uint32_t> tap(const Line& line, const Token& token, const Token& label,
+                                   std::vector<Token> coordinates);
+  ArgumentId expression(const Line& line, const Token& token);
+  std::optional<int> channel(const Line& line, std::string_view prefix);
+  void decide_third_argument();
+  void look_over();
+
+  void say(Severity severity, int line, const Token& token, std::string message) {
+    if (out_.diagnostics.size() > most_diagnostics) {
+      return;
+    }
+    if (out_.diagnostics.size() == most_diagnostics) {
+      out_.diagnostics.push_back({Severity::error, line, token.column, 1,
+                                  "too many problems; those after this are not told"});
+      return;
+    }
+    out_.diagnostics.push_back({severity, line, token.column,
+                                std::max(1, static_cast<int>(token.text.size())),
+                                std::move(message)});
+  }
+  void error(const Line& line, const Token& token, std::string message) {
+    say(Severity::error, line.number, token, std::move(message));
+  }
+  void warning(const Line& line, const Token& token, std::string message) {
+    say(Severity::warning, line.number, token, std::move(message));
+  }
+
+  // Channels are numbered by hand; one that is left out is silent.
+  template <class Channels>
+  void tell_gaps(const Channels& channels, std::string_view name) {
+    int last = 0;
+    std::vector<int> numbers;
+    for (const auto& channel : channels) {
+      numbers.push_back(channel.number);
+      last = std::max(last, channel.number);
+    }
+    for (int number = 1; number < last; ++number) {
+      if (std::find(numbers.begin(), numbers.end(), number) == numbers.end()) {
+        say(Severity::warning, channels.front().place.line, {name, channels.front().place.column},
+            "there is @" + std::string(name) + std::to_string(last) + ", but no @" +
+                std::string(name) + std::to_string(number));
+      }
+    }
+  }
+
+  ParsedNetwork out_;
+  std::vector<Line> lines_;
+  std::vector<std::string> parameter_names_;
+  std::unordered_map<std::string_view, std::uint32_t> masses_;  // label -> index
+  std::unordered_map<std::string_view, std::uint32_t> macros_;  // label -> index
+  std::vector<const Keyword*> macro_keywords_;                  // [macro]
+  std::vector<std::uint32_t> resting_;                          // macros without a velocity
+  std::uint64_t nodes_ = 0;                                     // of all macros
+  std::unordered_map<std::string_view, int> labels_;            // every label -> its line
+  std::unordered_map<std::string_view, ArgumentId> arguments_;  // text -> index
+  std::vector<std::string_view> groups_;  // of the display blocks that are open
+  bool shows_velocity_ = false;           // the file uses a form that only MIMS4Max has
+  bool shows_delayed_ = false;            // the file uses a form that only MIMS has
+};
+
+}  // namespace ressort

@@ -1,0 +1,81 @@
+#include "core/model/tokens.h"
+
+#include <algorithm>
+#include <cctype>
+
+namespace ressort {
+namespace {
+
+bool is_blank(char c) {
+  return c == ' ' || c == '\t' || c == '\r' || c == '\f' || c == '\v';
+}
+
+}  // namespace
+
+bool is_identifier(std::string_view text) {
+  return !text.empty() && std::isdigit(static_cast<unsigned char>(text[0])) == 0 &&
+         std::all_of(text.begin(), text.end(), [](char c) {
+           return std::isalnum(static_cast<unsigned char>(c)) != 0 || c == '_';
+         });
+}
+
+std::vector<Token> split(std::string_view line) {
+  std::vector<Token> tokens;
+  std::size_t at = 0;
+  while (at < line.size()) {
+    if (is_blank(line[at])) {
+      ++at;
+      continue;
+    }
+    if (line[at] == '#') {
+      break;
+    }
+    const std::size_t start = at;
+    if (line[at] == '[' || line[at] == '\'') {
+      const std::size_t end = line.find(line[at] == '[' ? ']' : '\'', at + 1);
+      at = end == std::string_view::npos ? line.size() : end + 1;
+    } else {
+      while (at < line.size() && !is_blank(line[at]) && line[at] != '#' && line[at] != '[') {
+        ++at;
+      }
+    }
+    tokens.push_back({line.substr(start, at - start), static_cast<int>(start) + 1});
+  }
+  return tokens;
+}
+
+Token unwrapped(Token token) {
+  const std::string_view text = token.text;
+  if (text.size() >= 2 && ((text.front() == '[' && text.back() == ']') ||
+                           (text.front() == '\'' && text.back() == '\''))) {
+    return {text.substr(1, text.size() - 2), token.column + 1};
+  }
+  return token;
+}
+
+std::size_t distance(std::string_view from, std::string_view to) {
+  std::vector<std::size_t> row(to.size() + 1);
+  for (std::size_t j = 0; j <= to.size(); ++j) {
+    row[j] = j;
+  }
+  for (std::size_t i = 1; i <= from.size(); ++i) {
+    std::size_t diagonal = row[0];
+    row[0] = i;
+    for (std::size_t j = 1; j <= to.size(); ++j) {
+      const std::size_t substituted = diagonal + (from[i - 1] == to[j - 1] ? 0 : 1);
+      diagonal = row[j];
+      row[j] = std::min({row[j] + 1, row[j - 1] + 1, substituted});
+    }
+  }
+  return row[to.size()];
+}
+
+std::string quoted(std::string_view text) {
+  std::string shown = "'";
+  for (const char c : text.substr(0, 40)) {
+    shown += std::isprint(static_cast<unsigned char>(c)) != 0 ? c : '?';
+  }
+  return shown + (text.size() > 40 ? "...'" : "'");
+}
+
+}  // namespace ressort
