@@ -275,6 +275,21 @@ TEST_CASE("gravity, vectors and display blocks are read in both dialects", "[mdl
   CHECK(max.network.masses[1].position == 5.0);
 }
 
+TEST_CASE("a label that two kinds of element want is told, whichever comes first", "[mdl]") {
+  for (const char* const first : {"@x param 1", "@x spring @a @b 1", "@x string 4 1 1 0 0 0",
+                                  "@x mass 1 0 0", "@x audioParam @in1"}) {
+    for (const char* const second : {"@x mass 1 0 0", "@x string 4 1 1 0 0 0", "@x param 2",
+                                     "@x osc 1 1 0 0 0", "@x ground 0"}) {
+      INFO(first << ", then " << second);
+      const ParsedNetwork parsed =
+          parse_network(two_masses + first + "\n" + second + "\n@y spring @x @a 1\n");
+      CHECK_FALSE(parsed.ok());
+      CHECK(said(parsed, Severity::error)[0].message.find("already declared in line 3") !=
+            std::string::npos);
+    }
+  }
+}
+
 TEST_CASE("a slash that an editor has lost is put back, with a warning", "[mdl]") {
   const ParsedNetwork parsed = parse_network(
       "@k param 0.3\n@g ground 0.\n@m mass 1. 0. 0.\n@r springDamper @g @m [sqrt(k3)] 0.01\n"

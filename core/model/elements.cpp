@@ -17,6 +17,9 @@ constexpr double least_mass = 1e-300;  // a smaller one has no finite inverse
 
 void Reader::add_mass(const Line& line) {
   const auto found = masses_.find(line.label.text);
+  if (found == masses_.end()) {
+    return;  // the label is another element's; it has been told
+  }
   Mass& mass = out_.network.masses[found->second];
   if (!mass.name.empty()) {
     return;  // a second declaration; it has been told
@@ -80,7 +83,11 @@ void Reader::read_gravity(const Line& line, Mass& mass, std::size_t& at) {
 }
 
 void Reader::add_macro(const Line& line) {
-  Macro& macro = out_.network.macros[macros_.at(line.label.text)];
+  const auto found = macros_.find(line.label.text);
+  if (found == macros_.end()) {
+    return;  // the label is another element's; it has been told
+  }
+  Macro& macro = out_.network.macros[found->second];
   if (!macro.name.empty()) {
     return;  // a second declaration; it has been told
   }
@@ -112,7 +119,7 @@ void Reader::add_macro(const Line& line) {
   bool is_placed = position(line, at++, macro.position, x, y);
   if (line.rest.size() == static_cast<std::size_t>(line.keyword->least)) {
     shows_delayed_ = true;
-    resting_.push_back(macros_.at(line.label.text));
+    resting_.push_back(found->second);
   } else {
     shows_velocity_ = true;
     double far_x = 0.0;  // the drawn line's other end
