@@ -220,7 +220,7 @@ TEST_CASE("nonlinear springs, clipped contacts, gravity and force outputs equal 
     for (std::size_t c = 0; c < channels.size(); ++c) {
       INFO("output " << c + 1 << ": residual " << show(channels[c].relative()));
       CHECK(channels[c].peak > 0.0);
-      CHECK(channels[c].relative() < 1e-9);
+      CHECK(channels[c].relative() < 1e-11);
     }
   }
 }
