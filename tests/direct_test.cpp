@@ -13,7 +13,7 @@ using rig::Comparison;
 using rig::network_of;
 using rig::show;
 using scenes::Example;
-using V = Lanes<double>;
+using V = Pack<double, 16>;
 
 constexpr std::size_t second = 44100;  // frames
 
@@ -227,7 +227,7 @@ TEST_CASE("nonlinear springs, clipped contacts, gravity and force outputs equal 
 
 TEST_CASE("the limiting spring is continuous where it clips", "[direct]") {
   // b = sqrt((k - s)/c) = sqrt(0.49/10) = 0.2213594: the force on both sides, by hand.
-  using V = Lanes<double>;
+  using V = Pack<double, 16>;
   const auto force = [](double d) {
     const V zero{};
     return clipped_spring_force(zero + d, zero, zero + 0.01, zero + 10.0, zero + 0.5, zero)[0];

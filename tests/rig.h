@@ -12,6 +12,8 @@
 #include <vector>
 
 #include "core/compile/compile.h"
+#include "core/compile/machine.h"
+#include "core/engine/kernel.h"
 #include "core/model/mdl.h"
 #include "tests/catch.h"
 #include "tests/scenes.h"
@@ -84,32 +86,38 @@ class Motion {
   std::array<Sine, 5> sines_;
 };
 
-// A Program stepped with nothing around it: the kernel alone, one State.
+// A Program stepped with nothing around it: its kernel alone.
 template <class T>
 class Bare {
  public:
-  static constexpr std::size_t lanes = lane_count<T>;
-
-  explicit Bare(Program program)
-      : program_(std::move(program)),
-        state_(program_),
-        drive_(program_.inputs.size()),
-        out_(program_.outputs.size()),
-        before_(program_.inputs.size()) {
-    for (std::size_t c = 0; c < program_.coefficients.size(); ++c) {
-      const double value =
-          coefficient_value(program_, program_.coefficients[c], program_.parameters, 1.0);
-      state_.coefficient[c] = Lanes<T>{} + static_cast<T>(value);
+  explicit Bare(Program program, std::size_t voices = 1, Isa isa = best_isa())
+      : program_(std::move(program)), kernel_(make_kernel<T>(program_, voices, isa)) {
+    value_.resize(program_.inputs.size() * lanes());
+    velocity_.resize(value_.size());
+    outputs_.resize(program_.outputs.size() * lanes());
+    for (std::size_t lane = 0; lane < lanes(); ++lane) {
+      set_coefficients(lane, program_.parameters, 1.0, false);
+      for (const InputSlot& input : program_.inputs) {
+        before_.push_back(input.is_force ? 0.0 : program_.position[input.node]);
+      }
     }
-    for (std::size_t i = 0; i < before_.size(); ++i) {
-      before_[i].fill(program_.position[program_.inputs[i].node]);
+  }
+
+  std::size_t lanes() const { return kernel_->width(); }
+
+  void set_coefficients(std::size_t lane, const std::vector<double>& parameters, double factor,
+                        bool ramped) {
+    for (std::uint32_t c = 0; c < program_.coefficients.size(); ++c) {
+      kernel_->coefficients.set(
+          lane, c, coefficient_value(program_, program_.coefficients[c], parameters, factor),
+          ramped);
     }
   }
 
   // inputs[i] is the same in every lane.
   std::vector<double> step(const std::vector<double>& inputs) {
-    for (std::size_t i = 0; i < drive_.size(); ++i) {
-      for (std::size_t lane = 0; lane < lanes; ++lane) {
+    for (std::size_t i = 0; i < program_.inputs.size(); ++i) {
+      for (std::size_t lane = 0; lane < lanes(); ++lane) {
         feed(lane, i, inputs[i]);
       }
     }
@@ -118,33 +126,40 @@ class Bare {
 
   // One input's position or force in one lane, for the next run().
   void feed(std::size_t lane, std::size_t input, double value) {
-    drive_[input].value[lane] = static_cast<T>(value);
-    drive_[input].velocity[lane] = static_cast<T>(value - before_[input][lane]);
-    before_[input][lane] = value;
+    double& before = before_[lane * program_.inputs.size() + input];
+    value_[input * lanes() + lane] = static_cast<T>(value);
+    velocity_[input * lanes() + lane] = static_cast<T>(value - before);
+    before = value;
   }
 
   // Steps every lane; gives one lane's outputs.
   std::vector<double> run(std::size_t lane) {
-    step_direct(program_, state_, drive_.data(), nullptr, out_.data(), 1);
+    kernel_->step({.frames = 1,
+                   .value = value_.data(),
+                   .velocity = velocity_.data(),
+                   .audio = nullptr,
+                   .outputs = outputs_.data()});
     return outputs(lane);
   }
-  std::vector<double> outputs(std::size_t lane) const {
+  std::vector<double> outputs(std::size_t lane) const {  // [channel]
     std::vector<double> values;
-    for (const auto& out : out_) {
-      values.push_back(static_cast<double>(out[lane]));
+    for (std::size_t i = 0; i < program_.outputs.size(); ++i) {
+      values.resize(std::max<std::size_t>(values.size(), program_.outputs[i].channel + 1));
+      values[program_.outputs[i].channel] = static_cast<double>(outputs_[i * lanes() + lane]);
     }
     return values;
   }
 
   const Program& program() const { return program_; }
-  State<T>& state() { return state_; }
+  Kernel<T>& kernel() { return *kernel_; }
 
  private:
   Program program_;
-  State<T> state_;
-  std::vector<Drive<T>> drive_;
-  std::vector<Lanes<T>> out_;
-  std::vector<std::array<double, lanes>> before_;
+  std::unique_ptr<Kernel<T>> kernel_;
+  Aligned<T> value_;  // [input][lane]
+  Aligned<T> velocity_;
+  Aligned<T> outputs_;
+  std::vector<double> before_;  // [lane][input]
 };
 
 // Two series compared: the largest difference in shares of the largest value, and in dB.

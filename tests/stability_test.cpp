@@ -51,15 +51,11 @@ double stiffest(const Network& network) {
 // How large a network that was kicked gets when every stiffness is multiplied.
 double growth(const Network& network, double factor) {
   Program program = make_program(network, 44100.0, true);
-  rig::Bare<double> bare(program);
-  for (std::size_t c = 0; c < program.coefficients.size(); ++c) {
-    bare.state().coefficient[c] =
-        Lanes<double>{} +
-        coefficient_value(program, program.coefficients[c], program.parameters, factor);
-  }
   for (std::size_t i = 0; i < program.moving; ++i) {
-    bare.state().v[i] = Lanes<double>{} + std::cos(3.0 * static_cast<double>(i));
+    program.velocity[i] = std::cos(3.0 * static_cast<double>(i));
   }
+  rig::Bare<double> bare(program);
+  bare.set_coefficients(0, program.parameters, factor, false);
   double largest = 0.0;
   for (int n = 0; n < 20000 && largest < 1e12; ++n) {
     for (const double y : bare.step({})) {

@@ -11,197 +11,11 @@
 #include <tuple>
 
 #include "core/analysis/stability.h"
+#include "core/compile/machine.h"
 #include "core/model/topology.h"
 
 namespace ressort {
 namespace {
-
-bool moves(const Mass& mass) {
-  return mass.kind == MassKind::mass || mass.kind == MassKind::oscillator;
-}
-
-struct LawRow {
-  Law law;
-  std::array<Unit, max_link_arguments> units;  // the rest are plain
-};
-
-// Which law a link follows, and how its arguments scale.
-LawRow law_of(LinkKind kind) {
-  using enum Unit;
-  switch (kind) {
-    case LinkKind::spring:
-      return {Law::spring, {stiffness, damping}};
-    case LinkKind::quadratic_spring:
-      return {Law::quadratic_spring, {stiffness, stiffness, damping}};
-    case LinkKind::cubic_spring:
-      return {Law::cubic_spring, {stiffness, stiffness, damping}};
-    case LinkKind::clipped_spring:
-      return {Law::clipped_spring, {stiffness, stiffness, stiffness, damping}};
-    case LinkKind::pluck:
-      return {Law::pluck, {stiffness, plain, damping}};
-    case LinkKind::bow:
-      return {Law::bow, {friction, speed}};
-    case LinkKind::smooth_bow:
-      return {Law::smooth_bow, {friction, speed}};
-    case LinkKind::contact:
-      return {Law::contact, {stiffness, damping}};
-    case LinkKind::clipped_contact:
-      return {Law::clipped_contact, {stiffness, stiffness, stiffness, damping}};
-  }
-  return {};
-}
-
-class ProgramMaker {
- public:
-  ProgramMaker(const Network& network, double rate_hz, bool rescale) : network_(network) {
-    program_.rate_hz = rate_hz;
-    program_.rate_ratio = rescale ? Network::reference_rate_hz / rate_hz : 1.0;
-    program_.parameters = parameter_values(network);
-    program_.depending.resize(network.parameters.size());
-  }
-
-  Program make() {
-    place_masses();
-    place_links();
-    for (const Input& input : network_.inputs) {
-      program_.inputs.push_back({input.number, input.is_force, node_[input.mass]});
-    }
-    place_taps();
-    program_.outputs.assign(static_cast<std::size_t>(output_count(network_)),
-                            {Program::no_node, false});
-    for (const Output& output : network_.outputs) {
-      program_.outputs[static_cast<std::size_t>(output.number - 1)] = {node_[output.mass],
-                                                                       output.is_force};
-    }
-    for (std::uint32_t i = 0; i < network_.parameters.size(); ++i) {
-      if (const int input = network_.parameters[i].audio_input; input > 0) {
-        program_.audio_parameters.push_back({i, input - 1});
-        auto& coefficients = program_.audio_coefficients;
-        coefficients.insert(coefficients.end(), program_.depending[i].begin(),
-                            program_.depending[i].end());
-      }
-    }
-    std::sort(program_.audio_coefficients.begin(), program_.audio_coefficients.end());
-    program_.audio_coefficients.erase(
-        std::unique(program_.audio_coefficients.begin(), program_.audio_coefficients.end()),
-        program_.audio_coefficients.end());
-    return std::move(program_);
-  }
-
- private:
-  // One coefficient for every distinct pair of argument and unit.
-  std::uint32_t coefficient(ArgumentId argument, Unit unit) {
-    const auto next = static_cast<std::uint32_t>(program_.coefficients.size());
-    const auto [entry, is_new] = known_.try_emplace({argument, unit}, next);
-    if (!is_new) {
-      return entry->second;
-    }
-    static const Formula nothing = {{Op::number, 0, 0.0}};
-    const Formula& formula = argument == no_argument ? nothing : network_.arguments[argument];
-    program_.coefficients.push_back({static_cast<std::uint32_t>(program_.steps.size()),
-                                     static_cast<std::uint32_t>(formula.size()), unit});
-    for (const Step& step : formula) {
-      program_.steps.push_back(step);
-      if (step.op == Op::parameter) {
-        auto& depending = program_.depending[step.index];
-        if (depending.empty() || depending.back() != next) {
-          depending.push_back(next);
-        }
-      }
-    }
-    return next;
-  }
-
-  void place_masses() {
-    const auto& masses = network_.masses;
-    std::vector<std::uint32_t> order(masses.size());
-    std::iota(order.begin(), order.end(), 0u);
-    const auto rank = [&](std::uint32_t i) {
-      const Mass& m = masses[i];
-      const int group = moves(m) ? 0 : m.kind == MassKind::ground ? 1 : 2;
-      return std::tuple(group, m.kind, m.mass, m.stiffness, m.damping, m.gravity,
-                        m.gravity_per_rate);
-    };
-    std::stable_sort(order.begin(), order.end(),
-                     [&](std::uint32_t a, std::uint32_t b) { return rank(a) < rank(b); });
-    node_.resize(masses.size());
-    for (std::uint32_t node = 0; node < order.size(); ++node) {
-      const Mass& mass = masses[order[node]];
-      node_[order[node]] = node;
-      program_.position.push_back(mass.position);
-      program_.velocity.push_back(initial_velocity(network_, mass) * program_.rate_ratio);
-      if (!moves(mass)) {
-        continue;
-      }
-      ++program_.moving;
-      if (node > 0 && rank(order[node]) == rank(order[node - 1])) {
-        ++program_.mass_runs.back().count;
-        continue;
-      }
-      const Unit gravity_unit = mass.gravity_per_rate ? Unit::gravity_per_rate : Unit::gravity;
-      program_.mass_runs.push_back({.first = node,
-                                    .count = 1,
-                                    .inverse_mass = coefficient(mass.mass, Unit::inverse_mass),
-                                    .stiffness = coefficient(mass.stiffness, Unit::stiffness),
-                                    .damping = coefficient(mass.damping, Unit::damping),
-                                    .gravity = coefficient(mass.gravity, gravity_unit),
-                                    .is_oscillator = mass.kind == MassKind::oscillator,
-                                    .has_gravity = mass.gravity != no_argument});
-    }
-  }
-
-  void place_taps() {
-    std::map<std::uint32_t, std::uint32_t> known;  // first mass of a macro -> its tap nodes
-    for (std::size_t i = 0; i < network_.masses.size(); ++i) {
-      if (network_.masses[i].kind != MassKind::point) {
-        continue;
-      }
-      const Tap& tap = network_.taps[network_.masses[i].tap];
-      const auto next = static_cast<std::uint32_t>(program_.tap_nodes.size());
-      const auto [entry, is_new] = known.try_emplace(tap.first, next);
-      for (std::uint32_t k = 0; is_new && k < tap.length * tap.width; ++k) {
-        program_.tap_nodes.push_back(node_[tap.first + k]);
-      }
-      program_.taps.push_back({.node = node_[i],
-                               .first = entry->second,
-                               .length = tap.length,
-                               .width = tap.width,
-                               .u = coefficient(tap.u, Unit::plain),
-                               .v = coefficient(tap.v, Unit::plain)});
-      program_.position[node_[i]] = network_.masses[tap.first].position;
-    }
-  }
-
-  void place_links() {
-    std::vector<std::uint32_t> order(network_.links.size());
-    std::iota(order.begin(), order.end(), 0u);
-    const auto rank = [&](std::uint32_t i) {
-      const Link& link = network_.links[i];
-      return std::tuple(link.kind, link.arguments);
-    };
-    std::stable_sort(order.begin(), order.end(),
-                     [&](std::uint32_t a, std::uint32_t b) { return rank(a) < rank(b); });
-    for (std::uint32_t i = 0; i < order.size(); ++i) {
-      const Link& link = network_.links[order[i]];
-      program_.ends.push_back({node_[link.a], node_[link.b]});
-      if (i > 0 && rank(order[i]) == rank(order[i - 1])) {
-        ++program_.link_runs.back().count;
-        continue;
-      }
-      const LawRow row = law_of(link.kind);
-      LinkRun run{.law = row.law, .first = i, .count = 1};
-      for (std::size_t k = 0; k < max_link_arguments; ++k) {
-        run.coefficients[k] = coefficient(link.arguments[k], row.units[k]);
-      }
-      program_.link_runs.push_back(run);
-    }
-  }
-
-  const Network& network_;
-  Program program_;
-  std::vector<std::uint32_t> node_;  // [mass of the network] node
-  std::map<std::pair<ArgumentId, Unit>, std::uint32_t> known_;
-};
 
 Error preset_error(const Place& place, std::string message) {
   return {std::move(message), place.line, place.column};
@@ -348,11 +162,6 @@ InputInfo input_info(const Network& network, std::size_t index, const Playing& p
 
 }  // namespace
 
-Program make_program(const Network& network, double rate_hz, bool rescale) {
-  return network.macros.empty() ? ProgramMaker(network, rate_hz, rescale).make()
-                                : ProgramMaker(expand_macros(network), rate_hz, rescale).make();
-}
-
 Result<Compiled> compile(const Network& network, const Preset& preset,
                          const CompileOptions& options) {
   if (!network.macros.empty()) {
@@ -360,7 +169,7 @@ Result<Compiled> compile(const Network& network, const Preset& preset,
   }
   Compiled compiled;
   Instrument& instrument = compiled.instrument;
-  Program program = make_program(network, options.rate_hz, options.rescale);
+  Machine machine = make_machine(network, options.rate_hz, options.rescale);
   auto infos = parameter_infos(network, preset, options.bare);
   if (!infos) {
     return infos.error();
@@ -368,21 +177,23 @@ Result<Compiled> compile(const Network& network, const Preset& preset,
   instrument.parameters = *std::move(infos);
   ParameterBox box;
   for (std::size_t i = 0; i < instrument.parameters.size(); ++i) {
-    program.parameters[i] = instrument.parameters[i].value;
+    machine.parameters[i] = instrument.parameters[i].value;
     const bool given = std::any_of(
         preset.parameters.begin(), preset.parameters.end(),
         [&](const ParameterSetting& s) { return s.name == instrument.parameters[i].name; });
-    box.lowest.push_back(given ? instrument.parameters[i].minimum : program.parameters[i]);
-    box.highest.push_back(given ? instrument.parameters[i].maximum : program.parameters[i]);
+    box.lowest.push_back(given ? instrument.parameters[i].minimum : machine.parameters[i]);
+    box.highest.push_back(given ? instrument.parameters[i].maximum : machine.parameters[i]);
   }
 
-  for (const Coefficient& coefficient : program.coefficients) {
-    if (!std::isfinite(coefficient_value(program, coefficient, program.parameters, 1.0)) &&
-        program.audio_parameters.empty()) {
-      return Error{
-          "with the parameters' values an argument of the model is no finite number, or a "
-          "mass is 0",
-          1, 1};
+  for (const Program& program : machine.parts) {
+    for (const Coefficient& coefficient : program.coefficients) {
+      if (!std::isfinite(coefficient_value(program, coefficient, machine.parameters, 1.0)) &&
+          program.audio_parameters.empty()) {
+        return Error{
+            "with the parameters' values an argument of the model is no finite number, or a "
+            "mass is 0",
+            1, 1};
+      }
     }
   }
 
@@ -409,31 +220,33 @@ Result<Compiled> compile(const Network& network, const Preset& preset,
   playing.release_s = preset.release_s;
   playing.noise = preset.noise;
   playing.transpose = preset.transpose;
-  playing.highest_factor = highest_stiffness_factor(network, box, program.rate_ratio);
+  playing.highest_factor = highest_stiffness_factor(network, box, machine.rate_ratio);
   if (preset.keyboard) {
-    instrument.mode = lowest_mode(network, program.parameters);
+    instrument.mode = lowest_mode(network, machine.parameters);
   }
   if (instrument.mode) {
     playing.tuning = Tuning::keyboard;
-    playing.mode_stiffness = instrument.mode->stiffness * program.rate_ratio * program.rate_ratio;
-    playing.mode_damping = instrument.mode->damping * program.rate_ratio;
+    playing.mode_stiffness = instrument.mode->stiffness * machine.rate_ratio * machine.rate_ratio;
+    playing.mode_damping = instrument.mode->damping * machine.rate_ratio;
     instrument.is_tuned = true;
     instrument.transpose = preset.transpose;
     instrument.highest_frequency_hz =
-        frequency_of(*instrument.mode, std::max(1.0, playing.highest_factor), program.rate_ratio,
-                     program.rate_hz);
+        frequency_of(*instrument.mode, std::max(1.0, playing.highest_factor), machine.rate_ratio,
+                     machine.rate_hz);
   }
   for (std::size_t i = 0; i < network.inputs.size(); ++i) {
     instrument.inputs.push_back(input_info(network, i, playing));
   }
   instrument.outputs = output_count(network);
   instrument.voices = playing.voices;
-  instrument.masses = program.moving;
+  for (const Program& program : machine.parts) {
+    instrument.masses += program.moving;
+  }
   instrument.links = network.links.size();
   instrument.stiffness_margin = playing.highest_factor;
   compiled.plan = make_plan(network);
   compiled.engine =
-      std::make_unique<Engine>(std::move(program), std::move(playing), options.precision);
+      std::make_unique<Engine>(std::move(machine), std::move(playing), options.precision);
   return compiled;
 }
 

@@ -78,7 +78,4 @@ Result<Compiled> compile(const Network& network, const Preset& preset,
 double comfortable_gain(const Network& network, const Preset& preset,
                         const CompileOptions& options);
 
-// The tables alone, for tests and other ways of playing them.
-Program make_program(const Network& network, double rate_hz, bool rescale);
-
 }  // namespace ressort

@@ -1,61 +1,59 @@
-// core/engine: the kernels' side of an engine. All lanes' states in one precision, and the buffers
-// that drive them and that they fill.
+// core/engine: the kernels' side of an engine. Every part's kernels in one precision, and the
+// buffers that drive them and that they fill.
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
+#include <memory>
 #include <vector>
 
-#include "core/engine/engine.h"
-#include "core/engine/program.h"
+#include "core/engine/kernel.h"
 
 namespace ressort {
 
-// The kernels' side: all lanes' states in one precision.
+// One part of the machine, in as many voices as are wanted.
+template <class T>
+struct PartBank {
+  PartBank(const Program& program_in, std::size_t voices, Isa isa) : program(program_in) {
+    kernels.push_back(make_kernel<T>(program, voices, isa));
+    width = kernels[0]->width();
+    while (kernels.size() * width < voices) {
+      kernels.push_back(make_kernel<T>(program, voices, isa));
+    }
+  }
+  Kernel<T>& of(std::size_t voice) { return *kernels[voice / width]; }
+  const Kernel<T>& of(std::size_t voice) const { return *kernels[voice / width]; }
+
+  const Program& program;
+  std::size_t width = 1;
+  std::vector<std::unique_ptr<Kernel<T>>> kernels;  // [voice / width]
+};
+
 template <class T>
 struct Bank {
-  Bank(const Program& program, std::size_t lanes)
-      : drive(max_segment_frames * program.inputs.size()),
-        audio(max_segment_frames * program.audio_coefficients.size()),
-        outputs(max_segment_frames * program.outputs.size()) {
-    // One by one: a copy would not have the room that a State reserves for its ramps.
-    const std::size_t count = (lanes + lane_count<T> - 1) / lane_count<T>;
-    groups.reserve(count);
-    while (groups.size() < count) {
-      groups.emplace_back(program);
+  Bank(const Machine& machine, std::size_t voices, Isa isa) {
+    std::size_t inputs = 0;
+    std::size_t audio_coefficients = 0;
+    std::size_t channels = 0;
+    for (const Program& program : machine.parts) {
+      const std::size_t width = parts.emplace_back(program, voices, isa).width;
+      inputs = std::max(inputs, width * program.inputs.size());
+      audio_coefficients = std::max(audio_coefficients, width * program.audio_coefficients.size());
+      channels = std::max(channels, width * program.outputs.size());
     }
+    value.resize(max_block_frames * inputs);
+    velocity.resize(value.size());
+    audio.resize(max_block_frames * audio_coefficients);
+    outputs.resize(max_block_frames * channels);
   }
 
-  std::size_t lanes() const { return groups.size() * lane_count<T>; }
-
-  // Sets one lane's coefficient: at once, or to be reached by the next ramp().
-  void set_coefficient(std::size_t lane, std::uint32_t c, double value, bool ramped) {
-    State<T>& state = groups[lane / lane_count<T>];
-    const std::size_t i = lane % lane_count<T>;
-    if (ramped && !state.is_ramping[c]) {
-      state.is_ramping[c] = true;
-      state.ramping.push_back(c);
-      state.target[c] = state.coefficient[c];
-    }
-    state.target[c][i] = static_cast<T>(value);
-    if (!ramped) {
-      state.coefficient[c][i] = state.target[c][i];
-      state.increment[c][i] = T(0);
-    }
-  }
-
-  void ramp(std::size_t lane, std::size_t frames) {
-    State<T>& state = groups[lane / lane_count<T>];
-    state.ramp_frames = state.ramping.empty() ? 0 : frames;
-    for (const std::uint32_t c : state.ramping) {
-      state.increment[c] = (state.target[c] - state.coefficient[c]) / static_cast<T>(frames);
-    }
-  }
-
-  std::vector<State<T>> groups;
-  std::vector<Drive<T>> drive;    // [frame][input]
-  std::vector<Lanes<T>> audio;    // [frame][audio coefficient]
-  std::vector<Lanes<T>> outputs;  // [frame][channel]
+  std::vector<PartBank<T>> parts;
+  // As Block says; each part in turn.
+  Aligned<T> value;
+  Aligned<T> velocity;
+  Aligned<T> audio;
+  Aligned<T> outputs;
 };
 
 }  // namespace ressort

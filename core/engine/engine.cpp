@@ -16,12 +16,11 @@ constexpr double bend_semitones = 2.0;
 }  // namespace
 
 double Engine::Voices::middle(std::size_t input) const {
-  const InputSlot& slot = program.inputs[input];
-  return slot.is_force ? 0.0 : program.position[slot.node];
+  return machine.hands[input].is_force ? 0.0 : machine.hands[input].position;
 }
 
 Hand& Engine::Voices::hand(std::size_t lane, std::size_t input) {
-  return hands[lane * program.inputs.size() + input];
+  return hands[lane * machine.hands.size() + input];
 }
 
 double Engine::Voices::mapped(const Control& control, double amount) const {
@@ -32,13 +31,13 @@ double Engine::Voices::mapped(const Control& control, double amount) const {
 }
 
 double Engine::Voices::paced(double amount, std::size_t lane) const {
-  return amount * program.rate_ratio * std::sqrt(voices[lane].factor);
+  return amount * machine.rate_ratio * std::sqrt(voices[lane].factor);
 }
 
 double Engine::Voices::struck(const Control& control, double amount, std::size_t lane) const {
-  return program.inputs[control.target].is_force
+  return machine.hands[control.target].is_force
              ? paced(amount, lane)
-             : amount / (program.rate_ratio * std::sqrt(voices[lane].factor));
+             : amount / (machine.rate_ratio * std::sqrt(voices[lane].factor));
 }
 
 void Engine::Voices::move_to(std::size_t input, double position) {
@@ -101,16 +100,18 @@ void Engine::Voices::set_parameter(std::size_t index, double value) {
   }
   parameters[index] = value;
   note_change(static_cast<std::uint16_t>(index));
-  for (const std::uint32_t c : program.depending[index]) {
-    for (std::size_t lane = 0; lane < voices.size(); ++lane) {
-      if (voices[lane].awake) {
-        set_coefficient(lane, c, !playing.bare);
+  each_part([&](auto& part) {
+    for (const std::uint32_t c : part.program.depending[index]) {
+      for (std::size_t lane = 0; lane < voices.size(); ++lane) {
+        if (voices[lane].awake) {
+          set_coefficient(part, lane, c, !playing.bare);
+        }
       }
     }
-  }
-  for (std::size_t lane = 0; lane < voices.size(); ++lane) {
-    std::visit([&](auto& b) { b.ramp(lane, ramp_frames); }, bank);
-  }
+    for (const auto& kernel : part.kernels) {
+      kernel->coefficients.ramp(ramp_frames);
+    }
+  });
 }
 
 void Engine::Voices::note_change(std::uint16_t index) {
@@ -120,10 +121,12 @@ void Engine::Voices::note_change(std::uint16_t index) {
   }
 }
 
-void Engine::Voices::set_coefficient(std::size_t lane, std::uint32_t c, bool ramped) {
-  const double value =
-      coefficient_value(program, program.coefficients[c], parameters, voices[lane].factor);
-  std::visit([&](auto& b) { b.set_coefficient(lane, c, value, ramped); }, bank);
+template <class T>
+void Engine::Voices::set_coefficient(PartBank<T>& part, std::size_t lane, std::uint32_t c,
+                                     bool ramped) {
+  const double value = coefficient_value(part.program, part.program.coefficients[c], parameters,
+                                         voices[lane].factor);
+  part.of(lane).coefficients.set(lane % part.width, c, value, ramped);
 }
 
 void Engine::Voices::tune(std::size_t lane, bool ramped) {
@@ -131,15 +134,17 @@ void Engine::Voices::tune(std::size_t lane, bool ramped) {
   const double bent = std::exp2(bend * bend_semitones / 12.0);
   const double factor = voice.frequency_hz > 0.0
                             ? stiffness_factor(playing.mode_stiffness, playing.mode_damping,
-                                               voice.frequency_hz * bent, program.rate_hz)
+                                               voice.frequency_hz * bent, machine.rate_hz)
                             : bent * bent;
   voice.factor = std::min(factor, std::max(1.0, playing.highest_factor));
-  for (std::uint32_t c = 0; c < program.coefficients.size(); ++c) {
-    set_coefficient(lane, c, ramped);
-  }
-  if (ramped) {
-    std::visit([&](auto& b) { b.ramp(lane, ramp_frames); }, bank);
-  }
+  each_part([&](auto& part) {
+    for (std::uint32_t c = 0; c < part.program.coefficients.size(); ++c) {
+      set_coefficient(part, lane, c, ramped);
+    }
+    if (ramped) {
+      part.of(lane).coefficients.ramp(ramp_frames);
+    }
+  });
 }
 
 void Engine::Voices::note_on(const Event& event) {
@@ -173,9 +178,9 @@ void Engine::Voices::note_on(const Event& event) {
 double Engine::Voices::playable_hz(int key) const {
   double hz = 440.0 * std::exp2((key + playing.transpose - 69) / 12.0);
   const double highest = std::max(1.0, playing.highest_factor);
-  while (hz > 1.0 && (hz >= 0.5 * program.rate_hz ||
+  while (hz > 1.0 && (hz >= 0.5 * machine.rate_hz ||
                       stiffness_factor(playing.mode_stiffness, playing.mode_damping, hz,
-                                       program.rate_hz) > highest)) {
+                                       machine.rate_hz) > highest)) {
     hz *= 0.5;
   }
   return hz;
@@ -255,7 +260,7 @@ void Engine::Voices::panic() {
 
 const Control* Engine::Voices::control_for(int number, Gesture gesture) const {
   for (const Control& control : playing.controls) {
-    if (control.gesture == gesture && program.inputs[control.target].number == number) {
+    if (control.gesture == gesture && machine.hands[control.target].number == number) {
       return &control;
     }
   }
@@ -294,15 +299,15 @@ void Engine::Voices::handle(const Event& event) {
     case EventKind::parameter:
       return set_parameter(event.index, event.value);
     case EventKind::position:
-      for (std::size_t i = 0; i < program.inputs.size(); ++i) {
-        if (program.inputs[i].number == event.index && !program.inputs[i].is_force) {
+      for (std::size_t i = 0; i < machine.hands.size(); ++i) {
+        if (machine.hands[i].number == event.index && !machine.hands[i].is_force) {
           move_to(i, event.value);
         }
       }
       return;
     case EventKind::force:
-      for (std::size_t i = 0; i < program.inputs.size(); ++i) {
-        if (program.inputs[i].number == event.index && program.inputs[i].is_force) {
+      for (std::size_t i = 0; i < machine.hands.size(); ++i) {
+        if (machine.hands[i].number == event.index && machine.hands[i].is_force) {
           push(i, event.value, event.value2);
         }
       }
@@ -330,8 +335,8 @@ void Engine::Voices::handle(const Event& event) {
 
 void Engine::Voices::push(std::size_t input, double force, double seconds) {
   wake(last);
-  const double r = program.rate_ratio;
-  const auto frames = static_cast<std::size_t>(std::max(0.0, seconds) * program.rate_hz + 0.5);
+  const double r = machine.rate_ratio;
+  const auto frames = static_cast<std::size_t>(std::max(0.0, seconds) * machine.rate_hz + 0.5);
   if (frames == 0) {
     hand(last, input).strike(force * r);
   } else {
@@ -339,8 +344,8 @@ void Engine::Voices::push(std::size_t input, double force, double seconds) {
   }
 }
 
-Engine::Engine(Program program, Playing playing, Precision precision)
-    : voices_(std::make_unique<Voices>(std::move(program), std::move(playing), precision)) {}
+Engine::Engine(Machine machine, Playing playing, Precision precision, Isa isa)
+    : voices_(std::make_unique<Voices>(std::move(machine), std::move(playing), precision, isa)) {}
 
 Engine::~Engine() = default;
 
@@ -355,7 +360,7 @@ void Engine::process(std::span<const Event> events, std::span<const double* cons
     while (next < events.size() && events[next].frame <= at) {
       voices_->handle(events[next++]);
     }
-    std::size_t end = std::min(frames, at + max_segment_frames - voices_->since_settled);
+    std::size_t end = std::min(frames, at + max_block_frames - voices_->since_settled);
     if (next < events.size()) {
       end = std::min<std::size_t>(end, events[next].frame);
     }
@@ -375,11 +380,11 @@ double Engine::parameter(std::uint16_t index) const {
 }
 
 int Engine::output_count() const {
-  return static_cast<int>(voices_->program.outputs.size());
+  return static_cast<int>(voices_->machine.channels);
 }
 
 double Engine::rate_hz() const {
-  return voices_->program.rate_hz;
+  return voices_->machine.rate_hz;
 }
 
 EngineMeters Engine::meters() const {

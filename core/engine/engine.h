@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "core/engine/event.h"
+#include "core/engine/isa.h"
 #include "core/engine/program.h"
 
 namespace ressort {
@@ -30,7 +31,7 @@ struct Control {
   std::uint8_t lowest_key = 0;
   std::uint8_t highest_key = 127;
   Gesture gesture = Gesture::position;
-  std::uint16_t target = 0;  // index into Program::inputs or Program::parameters
+  std::uint16_t target = 0;  // index into Machine::hands or Machine::parameters
   double low = 0.0;          // 0..1 becomes low..high: positions, forces, speeds per sample at
   double high = 1.0;         //   44 100 Hz, parameter values
   bool exponential = false;  // equal steps are equal ratios
@@ -42,7 +43,7 @@ enum class Tuning : std::uint8_t {
   keyboard,  // a key's voice sounds at that key's frequency
 };
 
-// How a Program is played. Plain data, made by the compile room.
+// How a Machine is played. Plain data, made by the compile room.
 struct Playing {
   int voices = 1;
   double gain = 1.0;       // output per position unit
@@ -51,7 +52,7 @@ struct Playing {
   bool noise = false;      // the outputs shape white noise instead of being heard themselves
   Tuning tuning = Tuning::fixed;
   int transpose = 0;            // semitones
-  double mode_stiffness = 0.0;  // k/m of the lowest mode, at Program::rate_hz; 0: none known
+  double mode_stiffness = 0.0;  // k/m of the lowest mode, at Machine::rate_hz; 0: none known
   double mode_damping = 0.0;    // z/m of the same
   double highest_factor = 1.0;  // the stiffness factor up to which the model is proved stable
   std::vector<Control> controls;
@@ -65,13 +66,12 @@ struct EngineMeters {
   std::uint64_t stolen = 0;  // voices that had to give way to a new note
 };
 
-inline constexpr std::size_t max_segment_frames = 64;  // the kernels' block
 inline constexpr double runaway = 1e9;  // a voice whose output passes this has lost its stability
 
 // The heap is used by the constructor and never again.
 class Engine {
  public:
-  Engine(Program program, Playing playing, Precision precision);
+  Engine(Machine machine, Playing playing, Precision precision, Isa isa = best_isa());
   ~Engine();
   Engine(const Engine&) = delete;
   Engine& operator=(const Engine&) = delete;

@@ -1,55 +1,95 @@
-// core/engine: the one SIMD type. Kernels are written once over Lanes<T>; nothing else knows how
-// wide a register is.
+// core/engine: the one SIMD type, and memory for it. Kernels are written once over Pack<T, Bytes>
+// and compiled for each instruction set (see isa.h). What is `static` here has a copy in every
+// such unit: code for a wide machine can never be linked into what runs on a narrow one.
 #pragma once
 
 #include <cmath>
 #include <cstddef>
+#include <new>
+#include <vector>
 
 namespace ressort {
 
-inline constexpr std::size_t lane_bytes = 16;  // what every x86-64 and every NEON has
-
-template <class T>
-struct LaneTraits;
-template <>
-struct LaneTraits<float> {
-  typedef float Type __attribute__((vector_size(lane_bytes)));
+template <class T, std::size_t Bytes>
+struct PackOf;
+template <std::size_t Bytes>
+struct PackOf<float, Bytes> {
+  typedef float Type __attribute__((vector_size(Bytes), may_alias));
 };
-template <>
-struct LaneTraits<double> {
-  typedef double Type __attribute__((vector_size(lane_bytes)));
+template <std::size_t Bytes>
+struct PackOf<double, Bytes> {
+  typedef double Type __attribute__((vector_size(Bytes), may_alias));
 };
 
-// `lane_count<T>` numbers that are worked on together, one voice in each.
-template <class T>
-using Lanes = typename LaneTraits<T>::Type;
-template <class T>
-inline constexpr std::size_t lane_count = lane_bytes / sizeof(T);
+// Bytes / sizeof(T) numbers that are worked on together.
+template <class T, std::size_t Bytes>
+using Pack = typename PackOf<T, Bytes>::Type;
+
+// What a pack is made of; a plain number is its own.
+template <class V>
+struct ElementOf {
+  using Type = decltype(V{}[0] + V{}[0]);
+};
+template <>
+struct ElementOf<float> {
+  using Type = float;
+};
+template <>
+struct ElementOf<double> {
+  using Type = double;
+};
+template <class V>
+using Element = typename ElementOf<V>::Type;
 
 // a where the mask holds, b elsewhere, lane by lane.
 template <class V, class Mask>
-inline V select(Mask mask, V a, V b) {
+static inline V select(Mask mask, V a, V b) {
   return mask ? a : b;
 }
 
 template <class V>
-inline V absolute(V x) {
+static inline V absolute(V x) {
   return select(x < V{}, -x, x);
 }
 
 // -1, 0 or 1.
 template <class V>
-inline V sign(V x) {
+static inline V sign(V x) {
   const V one = V{} + 1;
   return select(x > V{}, one, select(x < V{}, -one, V{}));
 }
 
 template <class V>
-inline V exponential(V x) {
-  for (std::size_t i = 0; i < sizeof(V) / sizeof(x[0]); ++i) {
-    x[i] = std::exp(x[i]);
+static inline V exponential(V x) {
+  if constexpr (sizeof(V) == sizeof(Element<V>)) {
+    return std::exp(x);
+  } else {
+    for (std::size_t i = 0; i < sizeof(V) / sizeof(Element<V>); ++i) {
+      x[i] = std::exp(x[i]);
+    }
+    return x;
   }
-  return x;
 }
+
+inline constexpr std::size_t widest_bytes = 64;  // of any pack
+
+// Begins on a cache line, so that every pack in it is aligned.
+template <class T>
+struct LineAllocator {
+  using value_type = T;
+  LineAllocator() = default;
+  template <class U>
+  LineAllocator(const LineAllocator<U>&) {}
+  T* allocate(std::size_t count) {
+    return static_cast<T*>(::operator new (count * sizeof(T), std::align_val_t{widest_bytes}));
+  }
+  void deallocate(T* memory, std::size_t) {
+    ::operator delete (memory, std::align_val_t{widest_bytes});
+  }
+  bool operator==(const LineAllocator&) const = default;
+};
+
+template <class T>
+using Aligned = std::vector<T, LineAllocator<T>>;
 
 }  // namespace ressort

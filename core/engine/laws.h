@@ -8,24 +8,25 @@
 #pragma once
 
 #include "core/engine/lanes.h"
+#include "core/engine/program.h"
 
 namespace ressort {
 
 // f = K d + Z v
 template <class V>
-inline V spring_force(V d, V v, V k, V z) {
+static inline V spring_force(V d, V v, V k, V z) {
   return k * d + z * v;
 }
 
 // f = K d + Q sgn(d) d^2 + Z v
 template <class V>
-inline V quadratic_spring_force(V d, V v, V k, V q, V z) {
+static inline V quadratic_spring_force(V d, V v, V k, V q, V z) {
   return k * d + q * d * absolute(d) + z * v;
 }
 
 // f = K d + Q d^3 + Z v
 template <class V>
-inline V cubic_spring_force(V d, V v, V k, V q, V z) {
+static inline V cubic_spring_force(V d, V v, V k, V q, V z) {
   return k * d + q * d * d * d + z * v;
 }
 
@@ -36,8 +37,8 @@ inline V cubic_spring_force(V d, V v, V k, V q, V z) {
 //   |d| <= b:   f = s d + c d^3 + Z v
 //   else:       f = k d + (Z + 0.3 k) v
 template <class V>
-inline V clipped_spring_force(V d, V v, V s, V c, V k, V z) {
-  using T = std::remove_reference_t<decltype(v[0])>;
+static inline V clipped_spring_force(V d, V v, V s, V c, V k, V z) {
+  using T = Element<V>;
   const V within = s * d + c * d * d * d + z * v;
   const V beyond = k * d + (z + T(0.3) * k) * v;
   const V cubic = select(c > V{}, select(c * d * d <= k - s, within, beyond), beyond);
@@ -49,7 +50,7 @@ inline V clipped_spring_force(V d, V v, V s, V c, V k, V z) {
 //   s/10 <= |d| < s:   f = -sgn(d) (s/10) K + (K/10) d + Z v
 //   else:              f = 0
 template <class V>
-inline V pluck_force(V d, V v, V k, V s, V z) {
+static inline V pluck_force(V d, V v, V k, V s, V z) {
   const V far = absolute(d);
   const V tenth = k / 10;
   const V inner = -(k - tenth) * d;
@@ -62,7 +63,7 @@ inline V pluck_force(V d, V v, V k, V s, V z) {
 //   s/3 <= |v| < s:   f = sgn(v) (s/3) Z - (Z/3) v
 //   else:             f = 0
 template <class V>
-inline V bow_force(V v, V z, V s) {
+static inline V bow_force(V v, V z, V s) {
   const V fast = absolute(v);
   const V third = z / 3;
   const V stick = (z - third) * v;
@@ -72,16 +73,16 @@ inline V bow_force(V v, V z, V s) {
 
 // The same in one smooth curve: f = 0.63 Z v exp(-4 (v/s)^2 + 1/2)
 template <class V>
-inline V smooth_bow_force(V v, V z, V s) {
+static inline V smooth_bow_force(V v, V z, V s) {
   const V ratio = v / s;
-  using T = std::remove_reference_t<decltype(v[0])>;
+  using T = Element<V>;
   return z * v * T(0.63) * exponential(V{} - 4 * ratio * ratio + T(0.5));
 }
 
 // a is the lower body, b the upper, t the distance at which they touch:
 //   d > -t: f = K (d + t) + Z v, else 0. It may pull on the way out, as published.
 template <class V>
-inline V contact_force(V d, V v, V k, V z, V t) {
+static inline V contact_force(V d, V v, V k, V z, V t) {
   return select(d > -t, k * (d + t) + z * v, V{});
 }
 
@@ -89,13 +90,39 @@ inline V contact_force(V d, V v, V k, V z, V t) {
 // With D = d + t, and s instead of k where k < s:
 //   d > -t: f = s D + c D^3 + Z v up to |D| = sqrt((k - s)/c), then k D + Z v; else 0
 template <class V>
-inline V clipped_contact_force(V d, V v, V s, V c, V k, V z, V t) {
+static inline V clipped_contact_force(V d, V v, V s, V c, V k, V z, V t) {
   const V depth = d + t;
   const V cubic = s * depth + c * depth * depth * depth;
   const V clipped = k * depth;
   const V bent = select(c > V{}, select(c * depth * depth <= k - s, cubic, clipped), clipped);
   const V elastic = select(k < s, s * depth, select(c == V{}, s * depth, bent));
   return select(d > -t, elastic + z * v, V{});
+}
+
+// Calls `use` with the law as a function of (d, v); the coefficients in the order of each law's
+// arguments after them. The choice is made here, outside of every loop.
+template <class V, class Use>
+static inline void with_law(Law law, V c0, V c1, V c2, V c3, V c4, Use&& use) {
+  switch (law) {
+    case Law::spring:
+      return use([=](V d, V v) { return spring_force(d, v, c0, c1); });
+    case Law::quadratic_spring:
+      return use([=](V d, V v) { return quadratic_spring_force(d, v, c0, c1, c2); });
+    case Law::cubic_spring:
+      return use([=](V d, V v) { return cubic_spring_force(d, v, c0, c1, c2); });
+    case Law::clipped_spring:
+      return use([=](V d, V v) { return clipped_spring_force(d, v, c0, c1, c2, c3); });
+    case Law::pluck:
+      return use([=](V d, V v) { return pluck_force(d, v, c0, c1, c2); });
+    case Law::bow:
+      return use([=](V, V v) { return bow_force(v, c0, c1); });
+    case Law::smooth_bow:
+      return use([=](V, V v) { return smooth_bow_force(v, c0, c1); });
+    case Law::contact:
+      return use([=](V d, V v) { return contact_force(d, v, c0, c1, c2); });
+    case Law::clipped_contact:
+      return use([=](V d, V v) { return clipped_contact_force(d, v, c0, c1, c2, c3, c4); });
+  }
 }
 
 }  // namespace ressort

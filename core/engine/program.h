@@ -1,14 +1,13 @@
-// core/engine: what runs. Program is constant and shared by all voices; State is everything that
-// changes. Indices and numbers only; the compile room knows the names.
+// core/engine: what runs. A Program is constant and shared by all voices; what changes is in the
+// kernels. Indices and numbers only; the compile room knows the names.
 #pragma once
 
 #include <array>
 #include <cstdint>
 #include <span>
-#include <string>
 #include <vector>
 
-#include "core/engine/lanes.h"
+#include "core/engine/forms.h"
 #include "core/formula.h"
 
 namespace ressort {
@@ -70,14 +69,15 @@ struct Ends {
 };
 
 struct InputSlot {
-  int number = 1;  // from 1, as in the model
+  std::uint32_t hand = 0;  // index into Machine::hands: what drives it
   bool is_force = false;
   std::uint32_t node = 0;
 };
 
 struct OutputSlot {
-  std::uint32_t node = 0;  // Program::no_node for a gap
-  bool is_force = false;   // what the links and this tick's inputs exert, at the reference rate
+  std::uint32_t channel = 0;  // from 0
+  std::uint32_t node = 0;
+  bool is_force = false;  // what the links and this tick's inputs exert, at the reference rate
 };
 
 // A parameter that an audio channel gives for every sample.
@@ -97,8 +97,10 @@ struct TapSlot {
   std::uint32_t v = 0;
 };
 
-// Nodes are numbered: masses that move, run by run; then grounds; then position inputs and points.
+// A part of a network, which no other part touches. Nodes are numbered: masses that move, run by
+// run; then grounds; then position inputs and points.
 struct Program {
+  Form form;
   double rate_hz = 44100.0;
   double rate_ratio = 1.0;       // r above; 1 where numbers are taken raw
   std::uint32_t moving = 0;      // nodes [0, moving) have inertia
@@ -110,64 +112,34 @@ struct Program {
   std::vector<InputSlot> inputs;
   std::vector<TapSlot> taps;
   std::vector<std::uint32_t> tap_nodes;  // nodes
-  std::vector<OutputSlot> outputs;       // [channel]
+  std::vector<OutputSlot> outputs;
   std::vector<AudioParameter> audio_parameters;
   std::vector<std::uint32_t> audio_coefficients;  // those that depend on an audio parameter
   std::vector<double> parameters;                 // [parameter] at the start
   std::vector<Step> steps;
   std::vector<Coefficient> coefficients;
   std::vector<std::vector<std::uint32_t>> depending;  // [parameter] coefficients
+};
 
-  static constexpr std::uint32_t no_node = 0xffffffffu;
+// What drives an input, wherever in the network it is.
+struct HandSlot {
+  int number = 1;  // from 1, as in the model
+  bool is_force = false;
+  double position = 0.0;  // where it starts; 0 for a force
+};
+
+// A whole network: parts that do not touch each other, each a Program with the same parameters.
+struct Machine {
+  double rate_hz = 44100.0;
+  double rate_ratio = 1.0;
+  std::vector<double> parameters;  // [parameter] at the start
+  std::vector<HandSlot> hands;     // [input of the model]
+  std::uint32_t channels = 0;
+  std::vector<Program> parts;
 };
 
 // A coefficient's value for a voice. [any thread] wait-free
 double coefficient_value(const Program& program, const Coefficient& coefficient,
                          std::span<const double> parameters, double stiffness_factor);
-
-// Where a tap is in each lane: its lowest corner, and how far it is beyond it.
-template <class T>
-struct TapPlace {
-  std::array<std::uint32_t, lane_count<T>> row{};
-  std::array<std::uint32_t, lane_count<T>> column{};
-  Lanes<T> alpha{};  // 0..1, towards the next row
-  Lanes<T> beta{};   // 0..1, towards the next column
-};
-
-// Everything that changes in `lane_count<T>` voices that are stepped together.
-template <class T>
-struct State {
-  using V = Lanes<T>;
-  explicit State(const Program& program);
-
-  std::vector<V> x;                    // [node] position
-  std::vector<V> v;                    // [node] change of position per sample
-  std::vector<TapPlace<T>> taps;       // [tap] in this tick
-  std::vector<V> force;                // [node] summed by the links, used by the next tick
-  std::vector<V> coefficient;          // [coefficient]
-  std::vector<V> increment;            // [coefficient] per sample, while ramping
-  std::vector<V> target;               // [coefficient] where the ramp ends
-  std::vector<std::uint32_t> ramping;  // coefficients that move; at most all of them
-  std::vector<bool> is_ramping;        // [coefficient]
-  std::size_t ramp_frames = 0;         // how many samples they still move
-};
-
-// Puts one lane back to where the model starts; its coefficients stay. [audio] wait-free
-template <class T>
-void reset_lane(const Program& program, State<T>& state, std::size_t lane);
-
-// What drives one step of a block: [frame][input].
-template <class T>
-struct Drive {
-  Lanes<T> value;     // position, or force
-  Lanes<T> velocity;  // of a position, per sample
-};
-
-// `audio`: [frame][audio coefficient] values, per lane. Steps `frames` samples by the published
-// scheme, v += F/M, x += v: masses, then position inputs, then links; outputs[frame][channel] are
-// the new positions. [audio] wait-free
-template <class T>
-void step_direct(const Program& program, State<T>& state, const Drive<T>* drive,
-                 const Lanes<T>* audio, Lanes<T>* outputs, std::size_t frames);
 
 }  // namespace ressort

@@ -15,20 +15,20 @@ constexpr std::size_t most_reserve_lanes = 4;
 
 }  // namespace
 
-Engine::Voices::Voices(Program program_in, Playing playing_in, Precision precision)
-    : program(std::move(program_in)),
+Engine::Voices::Voices(Machine machine_in, Playing playing_in, Precision precision, Isa isa)
+    : machine(std::move(machine_in)),
       playing(std::move(playing_in)),
       bank(precision == Precision::float32
-               ? decltype(bank)(std::in_place_type<Bank<float>>, program, lanes_wanted())
-               : decltype(bank)(std::in_place_type<Bank<double>>, program, lanes_wanted())),
-      voices(std::visit([](const auto& b) { return b.lanes(); }, bank)),
-      hands(voices.size() * program.inputs.size()),
-      parameters(program.parameters),
-      rest(program.inputs.size()),
-      audio_control(program.inputs.size(), nullptr),
-      audio_before(program.inputs.size()),
-      pole(playing.bare ? 0.0 : 1.0 - std::min(1.0, smoothing_hz / program.rate_hz)),
-      bow_pole(playing.bare ? 0.0 : std::exp(-1.0 / (bow_start_s * program.rate_hz))) {
+               ? decltype(bank)(std::in_place_type<Bank<float>>, machine, lanes_wanted(), isa)
+               : decltype(bank)(std::in_place_type<Bank<double>>, machine, lanes_wanted(), isa)),
+      voices(lanes_wanted()),
+      hands(voices.size() * machine.hands.size()),
+      parameters(machine.parameters),
+      rest(machine.hands.size()),
+      audio_control(machine.hands.size(), nullptr),
+      audio_before(machine.hands.size()),
+      pole(playing.bare ? 0.0 : 1.0 - std::min(1.0, smoothing_hz / machine.rate_hz)),
+      bow_pole(playing.bare ? 0.0 : std::exp(-1.0 / (bow_start_s * machine.rate_hz))) {
   for (std::size_t i = 0; i < rest.size(); ++i) {
     rest[i] = middle(i);
   }
@@ -67,13 +67,8 @@ void Engine::Voices::start(std::size_t lane, double frequency_hz) {
 }
 
 void Engine::Voices::rest_lane(std::size_t lane) {
-  std::visit(
-      [&](auto& b) {
-        const std::size_t width = b.lanes() / b.groups.size();
-        reset_lane(program, b.groups[lane / width], lane % width);
-      },
-      bank);
-  for (std::size_t i = 0; i < program.inputs.size(); ++i) {
+  each_part([&](auto& part) { part.of(lane).reset(lane % part.width); });
+  for (std::size_t i = 0; i < machine.hands.size(); ++i) {
     hand(lane, i).place(rest[i]);
   }
 }
@@ -87,7 +82,7 @@ void Engine::Voices::wake(std::size_t lane) {
 
 void Engine::Voices::fade(std::size_t lane, double seconds) {
   Voice& voice = voices[lane];
-  const double step = -1.0 / std::max(1.0, seconds * program.rate_hz);
+  const double step = -1.0 / std::max(1.0, seconds * machine.rate_hz);
   voice.gain_step = std::min(voice.gain_step, step);
   voice.fading = true;
   voice.held = voice.sustained = false;
@@ -136,7 +131,7 @@ void Engine::Voices::segment(std::span<const double* const> inputs,
   std::visit([&](auto& b) { segment_in(b, inputs, outputs, at, frames); }, bank);
   remember_audio(inputs, at + frames);
   since_settled += frames;
-  if (since_settled == max_segment_frames) {
+  if (since_settled == max_block_frames) {
     since_settled = 0;
     for (std::size_t lane = 0; lane < voices.size(); ++lane) {
       if (voices[lane].awake) {
@@ -157,82 +152,95 @@ template <class T>
 void Engine::Voices::segment_in(Bank<T>& b, std::span<const double* const> inputs,
                                 std::span<double* const> outputs, std::size_t at,
                                 std::size_t frames) {
-  for (std::size_t group = 0; group < b.groups.size(); ++group) {
-    const std::size_t first = group * lane_count<T>;
-    bool any_awake = false;
-    for (std::size_t i = 0; i < lane_count<T>; ++i) {
-      any_awake |= voices[first + i].awake;
-    }
-    if (!any_awake) {
-      continue;
-    }
-    fill_drive(b, first, inputs, at, frames);
-    fill_audio(b, first, inputs, at, frames);
-    step_direct(program, b.groups[group], b.drive.data(), b.audio.data(), b.outputs.data(), frames);
-    for (std::size_t i = 0; i < lane_count<T>; ++i) {
-      if (voices[first + i].awake) {
-        mix(b, first + i, i, outputs, at, frames);
+  for (PartBank<T>& part : b.parts) {
+    for (std::size_t first = 0; first < voices.size(); first += part.width) {
+      const std::size_t end = std::min(voices.size(), first + part.width);
+      const auto is_awake = [](const Voice& voice) { return voice.awake; };
+      if (std::none_of(voices.begin() + static_cast<std::ptrdiff_t>(first),
+                       voices.begin() + static_cast<std::ptrdiff_t>(end), is_awake)) {
+        continue;
       }
+      fill_drive(b, part, first, inputs, at, frames);
+      fill_audio(b, part, first, inputs, at, frames);
+      part.of(first).step({.frames = frames,
+                           .value = b.value.data(),
+                           .velocity = b.velocity.data(),
+                           .audio = b.audio.data(),
+                           .outputs = b.outputs.data()});
+      for (std::size_t lane = first; lane < end; ++lane) {
+        if (voices[lane].awake) {
+          mix(b, part, lane, outputs, at, frames);
+        }
+      }
+    }
+  }
+  for (Voice& voice : voices) {
+    for (std::size_t n = 0; n < frames && voice.gain_step != 0.0; ++n) {
+      voice.gain = voice.next_gain(voice.gain);
     }
   }
 }
 
 template <class T>
-void Engine::Voices::fill_drive(Bank<T>& b, std::size_t first,
+void Engine::Voices::fill_drive(Bank<T>& b, const PartBank<T>& part, std::size_t first,
                                 std::span<const double* const> inputs, std::size_t at,
                                 std::size_t frames) {
-  const std::size_t count = program.inputs.size();
-  for (std::size_t input = 0; input < count; ++input) {
-    const bool is_force = program.inputs[input].is_force;
-    Drive<T>* const drive = b.drive.data() + input;
-    for (std::size_t i = 0; i < lane_count<T>; ++i) {
-      Hand& mover = hand(first + i, input);
-      for (std::size_t n = 0; n < frames; ++n) {
-        const HandSample sample = is_force ? mover.next_force() : mover.next_position();
-        drive[n * count].value[i] = static_cast<T>(sample.value);
-        drive[n * count].velocity[i] = static_cast<T>(sample.velocity);
+  const std::size_t step = part.program.inputs.size() * part.width;  // from frame to frame
+  for (std::size_t i = 0; i < part.program.inputs.size(); ++i) {
+    const InputSlot& slot = part.program.inputs[i];
+    const double* const audio = audio_for(slot.hand, inputs);
+    for (std::size_t lane = first; lane < std::min(voices.size(), first + part.width); ++lane) {
+      T* value = b.value.data() + i * part.width + lane - first;
+      T* velocity = b.velocity.data() + i * part.width + lane - first;
+      if (!voices[lane].awake) {
+        continue;
       }
-    }
-    if (const double* const audio = audio_for(input, inputs)) {
-      add_audio(b, input, audio + at, frames);
+      Hand& mover = hand(lane, slot.hand);
+      for (std::size_t n = 0; n < frames; ++n) {
+        const HandSample sample = slot.is_force ? mover.next_force() : mover.next_position();
+        value[n * step] = static_cast<T>(sample.value);
+        velocity[n * step] = static_cast<T>(sample.velocity);
+      }
+      if (audio != nullptr) {
+        add_audio(slot.hand, audio + at, frames, step, value, velocity);
+      }
     }
   }
 }
 
 template <class T>
-void Engine::Voices::add_audio(Bank<T>& b, std::size_t input, const double* audio,
-                               std::size_t frames) {
-  const double r = program.inputs[input].is_force ? program.rate_ratio : 1.0;
+void Engine::Voices::add_audio(std::size_t input, const double* audio, std::size_t frames,
+                               std::size_t step, T* value, T* velocity) {
+  const double r = machine.hands[input].is_force ? machine.rate_ratio : 1.0;
   const double scale = audio_control[input]->high * r * r;
   const T kept = playing.bare ? T(0) : T(1);
   double before = audio_before[input];
-  Drive<T>* drive = b.drive.data() + input;
   for (std::size_t n = 0; n < frames; ++n) {
-    const double value = scale * audio[n];
-    drive->value = kept * drive->value + static_cast<T>(value);
-    drive->velocity = kept * drive->velocity + static_cast<T>(value - before);
-    before = value;
-    drive += program.inputs.size();
+    const double here = scale * audio[n];
+    value[n * step] = kept * value[n * step] + static_cast<T>(here);
+    velocity[n * step] = kept * velocity[n * step] + static_cast<T>(here - before);
+    before = here;
   }
 }
 
 template <class T>
-void Engine::Voices::fill_audio(Bank<T>& b, std::size_t first,
+void Engine::Voices::fill_audio(Bank<T>& b, const PartBank<T>& part, std::size_t first,
                                 std::span<const double* const> inputs, std::size_t at,
                                 std::size_t frames) {
-  Lanes<T>* value = b.audio.data();
-  for (std::size_t n = at; n < at + frames && !program.audio_parameters.empty(); ++n) {
+  const Program& program = part.program;
+  T* value = b.audio.data();
+  for (std::size_t n = at; n < at + frames && !program.audio_coefficients.empty(); ++n) {
     for (const AudioParameter& audio : program.audio_parameters) {
       const auto channel = static_cast<std::size_t>(audio.channel);
       const bool is_there = channel < inputs.size() && inputs[channel] != nullptr;
       parameters[audio.parameter] = is_there ? inputs[channel][n] : 0.0;
     }
     for (const std::uint32_t c : program.audio_coefficients) {
-      for (std::size_t i = 0; i < lane_count<T>; ++i) {
-        (*value)[i] = static_cast<T>(coefficient_value(program, program.coefficients[c], parameters,
-                                                       voices[first + i].factor));
+      for (std::size_t lane = first; lane < first + part.width; ++lane) {
+        *value++ =
+            static_cast<T>(coefficient_value(program, program.coefficients[c], parameters,
+                                             lane < voices.size() ? voices[lane].factor : 1.0));
       }
-      ++value;
     }
   }
 }
@@ -245,7 +253,7 @@ const double* Engine::Voices::audio_for(std::size_t input,
 
 void Engine::Voices::listen(std::span<const double* const> inputs, std::size_t at,
                             std::size_t frames) {
-  for (std::size_t input = 0; input < program.inputs.size(); ++input) {
+  for (std::size_t input = 0; input < machine.hands.size(); ++input) {
     const double* const audio = audio_for(input, inputs);
     if (audio != nullptr &&
         std::any_of(audio + at, audio + at + frames, [](double sample) { return sample != 0.0; })) {
@@ -255,7 +263,7 @@ void Engine::Voices::listen(std::span<const double* const> inputs, std::size_t a
 }
 
 void Engine::Voices::remember_audio(std::span<const double* const> inputs, std::size_t end) {
-  for (std::size_t input = 0; input < program.inputs.size(); ++input) {
+  for (std::size_t input = 0; input < machine.hands.size(); ++input) {
     if (const double* const audio = audio_for(input, inputs)) {
       audio_before[input] = audio_control[input]->high * audio[end - 1];
     }
@@ -263,27 +271,33 @@ void Engine::Voices::remember_audio(std::span<const double* const> inputs, std::
 }
 
 template <class T>
-void Engine::Voices::mix(Bank<T>& b, std::size_t lane, std::size_t i,
+void Engine::Voices::mix(const Bank<T>& b, const PartBank<T>& part, std::size_t lane,
                          std::span<double* const> outputs, std::size_t at, std::size_t frames) {
   Voice& voice = voices[lane];
-  const std::size_t channels = program.outputs.size();
+  const std::size_t count = part.program.outputs.size();
+  const auto heard = [&](std::size_t n, std::size_t output) {
+    return static_cast<double>(b.outputs[(n * count + output) * part.width + lane % part.width]);
+  };
   double peak = 0.0;
   bool in_bounds = true;
-  for (std::size_t n = 0; n < frames * channels; ++n) {
-    const double y = std::fabs(static_cast<double>(b.outputs[n][i]));
-    in_bounds &= y < runaway;  // false for what is no number
-    peak = std::max(peak, y);
+  for (std::size_t n = 0; n < frames; ++n) {
+    for (std::size_t output = 0; output < count; ++output) {
+      const double y = std::fabs(heard(n, output));
+      in_bounds &= y < runaway;  // false for what is no number
+      peak = std::max(peak, y);
+    }
   }
   if (!in_bounds) {
     ++resets;
     rest_lane(lane);
     return;
   }
+  double faded = voice.gain;
   for (std::size_t n = 0; n < frames; ++n) {
-    voice.gain = std::max(0.0, voice.gain + voice.gain_step);
-    const double gain = playing.gain * voice.gain;
-    for (std::size_t channel = 0; channel < channels; ++channel) {
-      outputs[channel][at + n] += gain * static_cast<double>(b.outputs[n * channels + channel][i]);
+    faded = voice.next_gain(faded);
+    const double gain = playing.gain * faded;
+    for (std::size_t output = 0; output < count; ++output) {
+      outputs[part.program.outputs[output].channel][at + n] += gain * heard(n, output);
     }
   }
   voice.peak = std::max(voice.peak, peak);
@@ -291,22 +305,22 @@ void Engine::Voices::mix(Bank<T>& b, std::size_t lane, std::size_t i,
 
 void Engine::Voices::settle(std::size_t lane) {
   Voice& voice = voices[lane];
-  constexpr std::size_t frames = max_segment_frames;
+  constexpr std::size_t frames = max_block_frames;
   const double peak = voice.peak * playing.gain * voice.gain;
   voice.peak = 0.0;
   voice.level = std::max(peak, voice.level * std::exp(-static_cast<double>(frames) /
-                                                      (level_memory_s * program.rate_hz)));
+                                                      (level_memory_s * machine.rate_hz)));
   if (voice.fading && voice.gain == 0.0) {
     voice = Voice{};
     return;
   }
   voice.quiet_frames = peak < quiet_level ? voice.quiet_frames + frames : 0;
   if (playing.bare || voice.held || voice.sustained ||
-      static_cast<double>(voice.quiet_frames) < quiet_s * program.rate_hz) {
+      static_cast<double>(voice.quiet_frames) < quiet_s * machine.rate_hz) {
     return;
   }
   voice.quiet_frames = 0;
-  for (std::size_t input = 0; input < program.inputs.size(); ++input) {
+  for (std::size_t input = 0; input < machine.hands.size(); ++input) {
     if (hand(lane, input).is_moving()) {
       return;
     }
@@ -322,15 +336,9 @@ bool Engine::Voices::is_at_rest(std::size_t lane) const {
   const double bound = quiet_level / std::max(1e-30, playing.gain);
   return std::visit(
       [&](const auto& b) {
-        const std::size_t width = b.lanes() / b.groups.size();
-        const auto& state = b.groups[lane / width];
-        for (std::size_t i = 0; i < program.moving; ++i) {
-          const double x = static_cast<double>(state.x[i][lane % width]) - program.position[i];
-          if (!(std::fabs(x) < bound)) {
-            return false;
-          }
-        }
-        return true;
+        return std::all_of(b.parts.begin(), b.parts.end(), [&](const auto& part) {
+          return part.of(lane).is_near_start(lane % part.width, bound);
+        });
       },
       bank);
 }

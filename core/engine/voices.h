@@ -1,6 +1,7 @@
 // core/engine: what an Engine is made of. Its own header, for engine.cpp and voices.cpp only.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <cstdint>
@@ -28,14 +29,27 @@ struct Voice {
   double factor = 1.0;        // on every stiffness
   double gain = 1.0;
   double gain_step = 0.0;  // per sample
+  double next_gain(double now) const { return std::max(0.0, now + gain_step); }
   double peak = 0.0;       // of the network's output since the last settling
   double level = 0.0;      // peak of the output, slowly forgotten
   std::size_t quiet_frames = 0;
 };
 
 struct Engine::Voices {
-  Voices(Program program_in, Playing playing_in, Precision precision);
+  Voices(Machine machine_in, Playing playing_in, Precision precision, Isa isa);
   std::size_t lanes_wanted() const;
+
+  // Calls `use(part)` for every PartBank.
+  template <class Use>
+  void each_part(Use&& use) {
+    std::visit(
+        [&](auto& b) {
+          for (auto& part : b.parts) {
+            use(part);
+          }
+        },
+        bank);
+  }
 
   // --- inputs ---
   double middle(std::size_t input) const;
@@ -54,7 +68,8 @@ struct Engine::Voices {
   // --- parameters ---
   void set_parameter(std::size_t index, double value);
   void note_change(std::uint16_t index);
-  void set_coefficient(std::size_t lane, std::uint32_t c, bool ramped);
+  template <class T>
+  void set_coefficient(PartBank<T>& part, std::size_t lane, std::uint32_t c, bool ramped);
   void tune(std::size_t lane, bool ramped);
 
   // --- voices ---
@@ -88,26 +103,28 @@ struct Engine::Voices {
   template <class T>
   void segment_in(Bank<T>& b, std::span<const double* const> inputs,
                   std::span<double* const> outputs, std::size_t at, std::size_t frames);
+  // The buffers for the voices of one kernel, the first of which is `first`.
   template <class T>
-  void fill_drive(Bank<T>& b, std::size_t first, std::span<const double* const> inputs,
-                  std::size_t at, std::size_t frames);
+  void fill_drive(Bank<T>& b, const PartBank<T>& part, std::size_t first,
+                  std::span<const double* const> inputs, std::size_t at, std::size_t frames);
   // What depends on a parameter that audio gives, for every sample.
   template <class T>
-  void fill_audio(Bank<T>& b, std::size_t first, std::span<const double* const> inputs,
-                  std::size_t at, std::size_t frames);
+  void fill_audio(Bank<T>& b, const PartBank<T>& part, std::size_t first,
+                  std::span<const double* const> inputs, std::size_t at, std::size_t frames);
   // What comes in moves the hand from where it is; in the bare network it is the hand.
   template <class T>
-  void add_audio(Bank<T>& b, std::size_t input, const double* audio, std::size_t frames);
+  void add_audio(std::size_t input, const double* audio, std::size_t frames, std::size_t step,
+                 T* value, T* velocity);
   const double* audio_for(std::size_t input, std::span<const double* const> inputs) const;
   // Sound at an audio input wakes the voice that it drives.
   void listen(std::span<const double* const> inputs, std::size_t at, std::size_t frames);
   // The last position of an audio input, for the velocity of the next segment's first sample.
   void remember_audio(std::span<const double* const> inputs, std::size_t end);
   template <class T>
-  void mix(Bank<T>& b, std::size_t lane, std::size_t i, std::span<double* const> outputs,
-           std::size_t at, std::size_t frames);
+  void mix(const Bank<T>& b, const PartBank<T>& part, std::size_t lane,
+           std::span<double* const> outputs, std::size_t at, std::size_t frames);
   // Keeps the voice's level and sends it to sleep when it has faded or come to rest. Once in
-  // max_segment_frames, counted from the engine's start: so what sleeps or gives way does not
+  // max_block_frames, counted from the engine's start: so what sleeps or gives way does not
   // depend on how the time is cut into blocks.
   void settle(std::size_t lane);
   // Whether nothing moves anywhere: a slow wave may still be on its way to the output.
@@ -115,7 +132,7 @@ struct Engine::Voices {
   // Uniform in -1..1: xorshift, from a fixed seed so that a render repeats.
   double white();
 
-  Program program;
+  Machine machine;
   Playing playing;
   std::variant<Bank<float>, Bank<double>> bank;
   std::vector<Voice> voices;                  // [lane]
@@ -131,7 +148,7 @@ struct Engine::Voices {
   double bend = 0.0;
   std::array<bool, 16> pedal{};
   std::size_t last = 0;           // the lane that was played last: direct gestures act on it
-  std::size_t since_settled = 0;  // frames, below max_segment_frames between two segments
+  std::size_t since_settled = 0;  // frames, below max_block_frames between two segments
   std::uint64_t resets = 0;
   std::uint64_t stolen = 0;
   std::uint64_t noise = 0x9e3779b97f4a7c15u;

@@ -1,0 +1,368 @@
+#include "core/compile/machine.h"
+
+#include <algorithm>
+#include <array>
+#include <map>
+#include <numeric>
+#include <tuple>
+
+#include "core/model/topology.h"
+
+namespace ressort {
+namespace {
+
+constexpr std::uint32_t nowhere = 0xffffffffu;
+
+bool moves(const Mass& mass) {
+  return mass.kind == MassKind::mass || mass.kind == MassKind::oscillator;
+}
+
+struct LawRow {
+  Law law;
+  std::array<Unit, max_link_arguments> units;  // the rest are plain
+};
+
+// Which law a link follows, and how its arguments scale.
+LawRow law_of(LinkKind kind) {
+  using enum Unit;
+  switch (kind) {
+    case LinkKind::spring:
+      return {Law::spring, {stiffness, damping}};
+    case LinkKind::quadratic_spring:
+      return {Law::quadratic_spring, {stiffness, stiffness, damping}};
+    case LinkKind::cubic_spring:
+      return {Law::cubic_spring, {stiffness, stiffness, damping}};
+    case LinkKind::clipped_spring:
+      return {Law::clipped_spring, {stiffness, stiffness, stiffness, damping}};
+    case LinkKind::pluck:
+      return {Law::pluck, {stiffness, plain, damping}};
+    case LinkKind::bow:
+      return {Law::bow, {friction, speed}};
+    case LinkKind::smooth_bow:
+      return {Law::smooth_bow, {friction, speed}};
+    case LinkKind::contact:
+      return {Law::contact, {stiffness, damping}};
+    case LinkKind::clipped_contact:
+      return {Law::clipped_contact, {stiffness, stiffness, stiffness, damping}};
+  }
+  return {};
+}
+
+// What of a network goes into one Program, in the network's order.
+struct Share {
+  std::vector<std::uint32_t> masses;
+  std::vector<std::uint32_t> links;
+};
+
+class ProgramMaker {
+ public:
+  ProgramMaker(const Network& network, const Share& share, double rate_hz, bool rescale)
+      : network_(network), share_(share) {
+    program_.rate_hz = rate_hz;
+    program_.rate_ratio = rescale ? Network::reference_rate_hz / rate_hz : 1.0;
+    program_.parameters = parameter_values(network);
+    program_.depending.resize(network.parameters.size());
+  }
+
+  Program make() {
+    place_masses();
+    place_links();
+    for (std::uint32_t i = 0; i < network_.inputs.size(); ++i) {
+      const Input& input = network_.inputs[i];
+      if (node_[input.mass] != nowhere) {
+        program_.inputs.push_back({i, input.is_force, node_[input.mass]});
+      }
+    }
+    place_taps();
+    for (const Output& output : network_.outputs) {
+      if (node_[output.mass] != nowhere) {
+        program_.outputs.push_back(
+            {static_cast<std::uint32_t>(output.number - 1), node_[output.mass], output.is_force});
+      }
+    }
+    for (std::uint32_t i = 0; i < network_.parameters.size(); ++i) {
+      if (const int input = network_.parameters[i].audio_input; input > 0) {
+        program_.audio_parameters.push_back({i, input - 1});
+        auto& coefficients = program_.audio_coefficients;
+        coefficients.insert(coefficients.end(), program_.depending[i].begin(),
+                            program_.depending[i].end());
+      }
+    }
+    std::sort(program_.audio_coefficients.begin(), program_.audio_coefficients.end());
+    program_.audio_coefficients.erase(
+        std::unique(program_.audio_coefficients.begin(), program_.audio_coefficients.end()),
+        program_.audio_coefficients.end());
+    return std::move(program_);
+  }
+
+ private:
+  // One coefficient for every distinct pair of argument and unit.
+  std::uint32_t coefficient(ArgumentId argument, Unit unit) {
+    const auto next = static_cast<std::uint32_t>(program_.coefficients.size());
+    const auto [entry, is_new] = known_.try_emplace({argument, unit}, next);
+    if (!is_new) {
+      return entry->second;
+    }
+    static const Formula nothing = {{Op::number, 0, 0.0}};
+    const Formula& formula = argument == no_argument ? nothing : network_.arguments[argument];
+    program_.coefficients.push_back({static_cast<std::uint32_t>(program_.steps.size()),
+                                     static_cast<std::uint32_t>(formula.size()), unit});
+    for (const Step& step : formula) {
+      program_.steps.push_back(step);
+      if (step.op == Op::parameter) {
+        auto& depending = program_.depending[step.index];
+        if (depending.empty() || depending.back() != next) {
+          depending.push_back(next);
+        }
+      }
+    }
+    return next;
+  }
+
+  void place_masses() {
+    const auto& masses = network_.masses;
+    std::vector<std::uint32_t> order = share_.masses;
+    const auto rank = [&](std::uint32_t i) {
+      const Mass& m = masses[i];
+      const int group = moves(m) ? 0 : m.kind == MassKind::ground ? 1 : 2;
+      return std::tuple(group, m.kind, m.mass, m.stiffness, m.damping, m.gravity,
+                        m.gravity_per_rate);
+    };
+    std::stable_sort(order.begin(), order.end(),
+                     [&](std::uint32_t a, std::uint32_t b) { return rank(a) < rank(b); });
+    node_.resize(masses.size(), nowhere);
+    for (std::uint32_t node = 0; node < order.size(); ++node) {
+      const Mass& mass = masses[order[node]];
+      node_[order[node]] = node;
+      program_.position.push_back(mass.position);
+      program_.velocity.push_back(initial_velocity(network_, mass) * program_.rate_ratio);
+      if (!moves(mass)) {
+        continue;
+      }
+      ++program_.moving;
+      if (node > 0 && rank(order[node]) == rank(order[node - 1])) {
+        ++program_.mass_runs.back().count;
+        continue;
+      }
+      const Unit gravity_unit = mass.gravity_per_rate ? Unit::gravity_per_rate : Unit::gravity;
+      program_.mass_runs.push_back({.first = node,
+                                    .count = 1,
+                                    .inverse_mass = coefficient(mass.mass, Unit::inverse_mass),
+                                    .stiffness = coefficient(mass.stiffness, Unit::stiffness),
+                                    .damping = coefficient(mass.damping, Unit::damping),
+                                    .gravity = coefficient(mass.gravity, gravity_unit),
+                                    .is_oscillator = mass.kind == MassKind::oscillator,
+                                    .has_gravity = mass.gravity != no_argument});
+    }
+  }
+
+  void place_taps() {
+    std::map<std::uint32_t, std::uint32_t> known;  // first mass of a macro -> its tap nodes
+    for (const std::uint32_t i : share_.masses) {
+      if (network_.masses[i].kind != MassKind::point) {
+        continue;
+      }
+      const Tap& tap = network_.taps[network_.masses[i].tap];
+      const auto next = static_cast<std::uint32_t>(program_.tap_nodes.size());
+      const auto [entry, is_new] = known.try_emplace(tap.first, next);
+      for (std::uint32_t k = 0; is_new && k < tap.length * tap.width; ++k) {
+        program_.tap_nodes.push_back(node_[tap.first + k]);
+      }
+      program_.taps.push_back({.node = node_[i],
+                               .first = entry->second,
+                               .length = tap.length,
+                               .width = tap.width,
+                               .u = coefficient(tap.u, Unit::plain),
+                               .v = coefficient(tap.v, Unit::plain)});
+      program_.position[node_[i]] = network_.masses[tap.first].position;
+    }
+  }
+
+  void place_links() {
+    std::vector<std::uint32_t> order = share_.links;
+    const auto rank = [&](std::uint32_t i) {
+      const Link& link = network_.links[i];
+      return std::tuple(link.kind, link.arguments);
+    };
+    std::stable_sort(order.begin(), order.end(),
+                     [&](std::uint32_t a, std::uint32_t b) { return rank(a) < rank(b); });
+    for (std::uint32_t i = 0; i < order.size(); ++i) {
+      const Link& link = network_.links[order[i]];
+      program_.ends.push_back({node_[link.a], node_[link.b]});
+      if (i > 0 && rank(order[i]) == rank(order[i - 1])) {
+        ++program_.link_runs.back().count;
+        continue;
+      }
+      const LawRow row = law_of(link.kind);
+      LinkRun run{.law = row.law, .first = i, .count = 1};
+      for (std::size_t k = 0; k < max_link_arguments; ++k) {
+        run.coefficients[k] = coefficient(link.arguments[k], row.units[k]);
+      }
+      program_.link_runs.push_back(run);
+    }
+  }
+
+  const Network& network_;
+  const Share& share_;
+  Program program_;
+  std::vector<std::uint32_t> node_;  // [mass of the network] node, or nowhere
+  std::map<std::pair<ArgumentId, Unit>, std::uint32_t> known_;
+};
+
+// Who hangs together, by union-find.
+class Groups {
+ public:
+  explicit Groups(std::size_t count) : parent_(count) {
+    std::iota(parent_.begin(), parent_.end(), 0u);
+  }
+  std::uint32_t find(std::uint32_t i) {
+    while (parent_[i] != i) {
+      i = parent_[i] = parent_[parent_[i]];
+    }
+    return i;
+  }
+  void join(std::uint32_t a, std::uint32_t b) { parent_[find(a)] = find(b); }
+
+ private:
+  std::vector<std::uint32_t> parent_;
+};
+
+// Divides a network without macros. What is held by a ground alone holds nothing together, unless
+// somebody listens to the ground.
+class Divider {
+ public:
+  explicit Divider(const Network& network)
+      : network_(network), groups_(network.masses.size()), binds_(network.masses.size()) {
+    for (std::size_t i = 0; i < binds_.size(); ++i) {
+      binds_[i] = network.masses[i].kind != MassKind::ground;
+    }
+    for (const Output& output : network.outputs) {
+      binds_[output.mass] = true;
+    }
+    for (const Link& link : network.links) {
+      if (binds_[link.a] && binds_[link.b]) {
+        groups_.join(link.a, link.b);
+      }
+    }
+    for (std::uint32_t i = 0; i < binds_.size(); ++i) {
+      if (network.masses[i].kind == MassKind::point) {
+        each_node(network.taps[network.masses[i].tap], [&](std::uint32_t node) {
+          binds_[node] = true;
+          groups_.join(i, node);
+        });
+      }
+    }
+  }
+
+  std::vector<Share> divide() {
+    choose_parts();
+    std::vector<Share> shares(parts_);
+    for (std::uint32_t i = 0; i < binds_.size(); ++i) {
+      if (binds_[i]) {
+        shares[part_of(i)].masses.push_back(i);
+      }
+    }
+    std::vector<std::uint32_t> seen(binds_.size(), nowhere);  // in which part a ground is, the last
+    for (std::uint32_t l = 0; l < network_.links.size(); ++l) {
+      const Link& link = network_.links[l];
+      const std::size_t part = binds_[link.a]   ? part_of(link.a)
+                               : binds_[link.b] ? part_of(link.b)
+                                                : parts_ - 1;
+      shares[part].links.push_back(l);
+    }
+    for (std::uint32_t part = 0; part < parts_; ++part) {
+      for (const std::uint32_t l : shares[part].links) {
+        for (const std::uint32_t end : {network_.links[l].a, network_.links[l].b}) {
+          if (!binds_[end] && seen[end] != part) {
+            seen[end] = part;
+            shares[part].masses.push_back(end);
+          }
+        }
+      }
+      std::sort(shares[part].masses.begin(), shares[part].masses.end());
+    }
+    return shares;
+  }
+
+ private:
+  template <class Use>
+  static void each_node(const Tap& tap, Use&& use) {
+    for (std::uint32_t k = 0; k < tap.length * tap.width; ++k) {
+      use(tap.first + k);
+    }
+  }
+
+  std::size_t part_of(std::uint32_t mass) { return part_[groups_.find(mass)]; }
+
+  // The largest groups become parts of their own, all others one together.
+  void choose_parts() {
+    std::vector<std::uint32_t> count(binds_.size(), 0);
+    std::vector<std::uint32_t> roots;
+    for (std::uint32_t i = 0; i < binds_.size(); ++i) {
+      if (moves(network_.masses[i]) && count[groups_.find(i)]++ == 0) {
+        roots.push_back(groups_.find(i));
+      }
+    }
+    std::stable_sort(roots.begin(), roots.end(),
+                     [&](std::uint32_t a, std::uint32_t b) { return count[a] > count[b]; });
+    part_.assign(binds_.size(), nowhere);
+    for (const std::uint32_t root : roots) {
+      if (parts_ < most_parts && count[root] >= least_part_masses) {
+        part_[root] = static_cast<std::uint32_t>(parts_++);
+      }
+    }
+    bool has_rest = parts_ == 0;
+    for (std::uint32_t i = 0; i < binds_.size(); ++i) {
+      has_rest |= binds_[i] && part_of(i) == nowhere;
+    }
+    if (has_rest) {
+      std::replace(part_.begin(), part_.end(), nowhere, static_cast<std::uint32_t>(parts_++));
+    }
+  }
+
+  const Network& network_;
+  Groups groups_;
+  std::vector<bool> binds_;          // [mass]
+  std::vector<std::uint32_t> part_;  // [root]
+  std::size_t parts_ = 0;
+};
+
+Machine machine_of(const Network& network, double rate_hz, bool rescale) {
+  Machine machine{.rate_hz = rate_hz,
+                  .rate_ratio = rescale ? Network::reference_rate_hz / rate_hz : 1.0,
+                  .parameters = parameter_values(network),
+                  .channels = static_cast<std::uint32_t>(output_count(network))};
+  for (const Input& input : network.inputs) {
+    machine.hands.push_back(
+        {.number = input.number,
+         .is_force = input.is_force,
+         .position = input.is_force ? 0.0 : network.masses[input.mass].position});
+  }
+  for (const Share& share : Divider(network).divide()) {
+    machine.parts.push_back(ProgramMaker(network, share, rate_hz, rescale).make());
+  }
+  return machine;
+}
+
+Program program_of(const Network& network, double rate_hz, bool rescale) {
+  Share everything;
+  everything.masses.resize(network.masses.size());
+  everything.links.resize(network.links.size());
+  std::iota(everything.masses.begin(), everything.masses.end(), 0u);
+  std::iota(everything.links.begin(), everything.links.end(), 0u);
+  return ProgramMaker(network, everything, rate_hz, rescale).make();
+}
+
+}  // namespace
+
+Machine make_machine(const Network& network, double rate_hz, bool rescale) {
+  return network.macros.empty() ? machine_of(network, rate_hz, rescale)
+                                : machine_of(expand_macros(network), rate_hz, rescale);
+}
+
+Program make_program(const Network& network, double rate_hz, bool rescale) {
+  return network.macros.empty() ? program_of(network, rate_hz, rescale)
+                                : program_of(expand_macros(network), rate_hz, rescale);
+}
+
+}  // namespace ressort

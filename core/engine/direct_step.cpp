@@ -1,0 +1,261 @@
+// The loops of the direct kernel, compiled for each instruction set.
+#include "core/engine/direct.h"
+#include "core/engine/laws.h"
+
+namespace ressort::RESSORT_ISA {
+namespace {
+
+// DirectState, seen in packs.
+template <class T, std::size_t Bytes>
+struct View {
+  using V = Pack<T, Bytes>;
+  static constexpr std::size_t lanes = Bytes / sizeof(T);
+
+  explicit View(DirectState<T>& state_in)
+      : state(state_in),
+        x(reinterpret_cast<V*>(state.x)),
+        v(reinterpret_cast<V*>(state.v)),
+        force(reinterpret_cast<V*>(state.force)),
+        coefficient(reinterpret_cast<const V*>(state.ramps.value)) {}
+
+  DirectState<T>& state;
+  V* x;
+  V* v;
+  V* force;
+  const V* coefficient;
+};
+
+// The loop over one run's masses; `pull` is what acts on one besides its links.
+template <class S, class Pull>
+void move_masses(const MassRun& run, S& s, Pull&& pull) {
+  using V = typename S::V;
+  const V inverse_mass = s.coefficient[run.inverse_mass];
+  for (std::uint32_t i = run.first; i < run.first + run.count; ++i) {
+    s.v[i] += (s.force[i] - pull(s.x[i], s.v[i])) * inverse_mass;
+    s.x[i] += s.v[i];
+    s.force[i] = V{};
+  }
+}
+
+template <class S>
+void step_masses(const Program& program, S& s) {
+  using V = typename S::V;
+  for (const MassRun& run : program.mass_runs) {
+    const V k = s.coefficient[run.stiffness];
+    const V z = s.coefficient[run.damping];
+    const V g = run.has_gravity ? s.coefficient[run.gravity] : V{};
+    if (run.is_oscillator) {
+      move_masses(run, s, [=](V x, V v) { return k * x + z * v + g; });
+    } else if (run.has_gravity) {
+      move_masses(run, s, [=](V, V) { return g; });
+    } else {
+      move_masses(run, s, [](V, V) { return V{}; });
+    }
+  }
+  for (std::size_t i = program.moving; i < s.state.nodes; ++i) {
+    s.force[i] = V{};
+  }
+}
+
+// The loop over one run's links, for any law of (d, v).
+template <class S, class ForceLaw>
+void add_forces(const Program& program, const LinkRun& run, S& s, ForceLaw&& law) {
+  using V = typename S::V;
+  const Ends* const ends = program.ends.data() + run.first;
+  for (std::uint32_t i = 0; i < run.count; ++i) {
+    const auto [a, b] = ends[i];
+    const V f = law(s.x[a] - s.x[b], s.v[a] - s.v[b]);
+    s.force[a] -= f;
+    s.force[b] += f;
+  }
+}
+
+template <class S>
+void step_links(const Program& program, S& s) {
+  using V = typename S::V;
+  for (const LinkRun& run : program.link_runs) {
+    const V c0 = s.coefficient[run.coefficients[0]];
+    const V c1 = s.coefficient[run.coefficients[1]];
+    const V c2 = s.coefficient[run.coefficients[2]];
+    const V c3 = s.coefficient[run.coefficients[3]];
+    const V c4 = s.coefficient[run.coefficients[4]];
+    with_law<V>(run.law, c0, c1, c2, c3, c4, [&](auto&& law) { add_forces(program, run, s, law); });
+  }
+}
+
+// Calls `use(at, weight)` for the up to four nodes around a tap's place in one lane; `at` is the
+// node's own number in [node][lane].
+template <class S, class Use>
+void around(const Program& program, const S& s, std::size_t tap, std::size_t lane, Use&& use) {
+  const TapSlot& slot = program.taps[tap];
+  const std::size_t at = tap * S::lanes + lane;
+  const auto alpha = s.state.alpha[at];
+  const auto beta = s.state.beta[at];
+  const std::uint32_t* const row =
+      program.tap_nodes.data() + slot.first + s.state.row[at] * slot.width + s.state.column[at];
+  const auto there = [&](std::size_t step) { return row[step] * S::lanes + lane; };
+  use(there(0), (1 - alpha) * (1 - beta));
+  if (beta > 0) {
+    use(there(1), (1 - alpha) * beta);
+  }
+  if (alpha > 0) {
+    use(there(slot.width), alpha * (1 - beta));
+    if (beta > 0) {
+      use(there(slot.width + 1), alpha * beta);
+    }
+  }
+}
+
+// w_i = max(0, 1 - |p - i|) along each side, p being the coordinate in nodes.
+template <class S>
+void place_taps(const Program& program, S& s) {
+  using T = Element<typename S::V>;
+  const auto locate = [](T coordinate, std::uint32_t nodes, std::uint32_t& below, T& beyond) {
+    // Not std::clamp: what is no number becomes 0.
+    const T within = coordinate > 0 ? (coordinate < 1 ? coordinate : T(1)) : T(0);
+    const T p = within * static_cast<T>(nodes - 1);
+    below = static_cast<std::uint32_t>(p);
+    beyond = p - static_cast<T>(below);
+  };
+  for (std::size_t i = 0; i < program.taps.size(); ++i) {
+    const TapSlot& tap = program.taps[i];
+    for (std::size_t lane = 0; lane < S::lanes; ++lane) {
+      const std::size_t at = i * S::lanes + lane;
+      locate(s.state.ramps.value[tap.u * S::lanes + lane], tap.length, s.state.row[at],
+             s.state.alpha[at]);
+      locate(s.state.ramps.value[tap.v * S::lanes + lane], tap.width, s.state.column[at],
+             s.state.beta[at]);
+    }
+  }
+}
+
+// A point moves with the nodes around it, and along them when its coordinate changes.
+template <class S>
+void move_taps(const Program& program, S& s) {
+  using V = typename S::V;
+  using T = Element<V>;
+  for (std::size_t i = 0; i < program.taps.size(); ++i) {
+    V position{};
+    for (std::size_t lane = 0; lane < S::lanes; ++lane) {
+      around(program, s, i, lane,
+             [&](std::size_t at, T weight) { position[lane] += weight * s.state.x[at]; });
+    }
+    const std::uint32_t node = program.taps[i].node;
+    s.v[node] = position - s.x[node];
+    s.x[node] = position;
+  }
+}
+
+// What acts on the points goes to the nodes around them.
+template <class S>
+void spread_taps(const Program& program, S& s) {
+  using V = typename S::V;
+  using T = Element<V>;
+  for (std::size_t i = 0; i < program.taps.size(); ++i) {
+    const std::uint32_t node = program.taps[i].node;
+    const V force = s.force[node];
+    s.force[node] = V{};
+    for (std::size_t lane = 0; lane < S::lanes; ++lane) {
+      around(program, s, i, lane,
+             [&](std::size_t at, T weight) { s.state.force[at] += weight * force[lane]; });
+    }
+  }
+}
+
+// The force at a point is that of the nodes around it, interpolated.
+template <class S>
+typename S::V force_at(const Program& program, const S& s, std::uint32_t node) {
+  using V = typename S::V;
+  using T = Element<V>;
+  for (std::size_t i = 0; i < program.taps.size(); ++i) {
+    if (program.taps[i].node == node) {
+      V force{};
+      for (std::size_t lane = 0; lane < S::lanes; ++lane) {
+        around(program, s, i, lane,
+               [&](std::size_t at, T weight) { force[lane] += weight * s.state.force[at]; });
+      }
+      return force;
+    }
+  }
+  return s.force[node];
+}
+
+template <class S>
+typename S::V read_output(const Program& program, const S& s, const typename S::V* value,
+                          const OutputSlot& output) {
+  if (!output.is_force) {
+    return s.x[output.node];
+  }
+  auto force = force_at(program, s, output.node);
+  for (std::size_t i = 0; i < program.inputs.size(); ++i) {
+    if (program.inputs[i].is_force && program.inputs[i].node == output.node) {
+      force += value[i];
+    }
+  }
+  return force / static_cast<Element<typename S::V>>(program.rate_ratio * program.rate_ratio);
+}
+
+template <class T, std::size_t Bytes>
+void step(const Program& program, DirectState<T>& state, const Block<T>& block) {
+  using S = View<T, Bytes>;
+  using V = typename S::V;
+  S s(state);
+  const auto* value = reinterpret_cast<const V*>(block.value);
+  const auto* velocity = reinterpret_cast<const V*>(block.velocity);
+  const auto* audio = reinterpret_cast<const V*>(block.audio);
+  auto* coefficient = reinterpret_cast<V*>(state.ramps.value);
+  auto* outputs = reinterpret_cast<V*>(block.outputs);
+  const std::size_t inputs = program.inputs.size();
+  for (std::size_t frame = 0; frame < block.frames; ++frame) {
+    advance(state.ramps);
+    for (const std::uint32_t c : program.audio_coefficients) {
+      coefficient[c] = *audio++;
+    }
+    for (std::size_t i = 0; i < inputs; ++i) {
+      if (program.inputs[i].is_force) {
+        s.force[program.inputs[i].node] += value[i];
+      }
+    }
+    if (!program.taps.empty()) {
+      place_taps(program, s);
+      spread_taps(program, s);
+    }
+    step_masses(program, s);
+    for (std::size_t i = 0; i < inputs; ++i) {
+      if (!program.inputs[i].is_force) {
+        s.x[program.inputs[i].node] = value[i];
+        s.v[program.inputs[i].node] = velocity[i];
+      }
+    }
+    move_taps(program, s);
+    step_links(program, s);
+    spread_taps(program, s);
+    for (const OutputSlot& output : program.outputs) {
+      *outputs++ = read_output(program, s, value, output);
+    }
+    value += inputs;
+    velocity += inputs;
+  }
+}
+
+}  // namespace
+
+template <class T>
+DirectStep<T> direct_step(std::size_t bytes) {
+  if constexpr (RESSORT_VECTOR_BYTES >= 64) {
+    if (bytes == 64) {
+      return step<T, 64>;
+    }
+  }
+  if constexpr (RESSORT_VECTOR_BYTES >= 32) {
+    if (bytes == 32) {
+      return step<T, 32>;
+    }
+  }
+  return step<T, 16>;
+}
+
+template DirectStep<float> direct_step(std::size_t);
+template DirectStep<double> direct_step(std::size_t);
+
+}  // namespace ressort::RESSORT_ISA

@@ -1,0 +1,76 @@
+#include "core/engine/kernel.h"
+
+#include "core/engine/direct.h"
+
+namespace ressort {
+
+template <class T>
+Coefficients<T>::Coefficients(const Program& program, std::size_t width_in)
+    : width(width_in),
+      value(program.coefficients.size() * width),
+      increment(value.size()),
+      target(value.size()),
+      is_ramping(program.coefficients.size()) {
+  ramping.reserve(program.coefficients.size());
+}
+
+template <class T>
+void Coefficients<T>::set(std::size_t lane, std::uint32_t c, double wanted, bool ramped) {
+  if (ramped && !is_ramping[c]) {
+    is_ramping[c] = true;
+    ramping.push_back(c);
+    for (std::size_t i = c * width; i < (c + 1) * width; ++i) {
+      target[i] = value[i];
+    }
+  }
+  const std::size_t at = c * width + lane;
+  target[at] = static_cast<T>(wanted);
+  if (!ramped) {
+    value[at] = target[at];
+    increment[at] = T(0);
+  }
+}
+
+template <class T>
+void Coefficients<T>::ramp(std::size_t frames) {
+  ramp_frames = ramping.empty() ? 0 : frames;
+  for (const std::uint32_t c : ramping) {
+    for (std::size_t i = c * width; i < (c + 1) * width; ++i) {
+      increment[i] = (target[i] - value[i]) / static_cast<T>(frames);
+    }
+  }
+}
+
+template <class T>
+void Coefficients<T>::finish(std::size_t frames) {
+  if (ramp_frames == 0) {
+    return;
+  }
+  ramp_frames -= frames < ramp_frames ? frames : ramp_frames;
+  if (ramp_frames == 0) {
+    for (const std::uint32_t c : ramping) {
+      is_ramping[c] = false;
+    }
+    ramping.clear();
+  }
+}
+
+template <class T>
+std::unique_ptr<Kernel<T>> make_kernel(const Program& program, std::size_t voices, Isa isa) {
+  struct Maker {
+    const Program& program;
+    std::size_t voices;
+    Isa isa;
+    std::unique_ptr<Kernel<T>> operator()(const Direct&) const {
+      return std::make_unique<DirectKernel<T>>(program, voices, isa);
+    }
+  };
+  return std::visit(Maker{program, voices, isa}, program.form);
+}
+
+template class Coefficients<float>;
+template class Coefficients<double>;
+template std::unique_ptr<Kernel<float>> make_kernel(const Program&, std::size_t, Isa);
+template std::unique_ptr<Kernel<double>> make_kernel(const Program&, std::size_t, Isa);
+
+}  // namespace ressort

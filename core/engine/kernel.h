@@ -1,0 +1,108 @@
+// core/engine: one way of stepping a Program, for as many voices at once as it has lanes.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <vector>
+
+#include "core/engine/isa.h"
+#include "core/engine/lanes.h"
+#include "core/engine/program.h"
+
+namespace ressort {
+
+inline constexpr std::size_t max_block_frames = 64;
+
+// What a kernel is driven by and what it fills, for at most max_block_frames samples.
+template <class T>
+struct Block {
+  std::size_t frames = 0;
+  const T* value = nullptr;     // [frame][input][lane] position, or force
+  const T* velocity = nullptr;  // [frame][input][lane] of a position, per sample
+  const T* audio = nullptr;     // [frame][audio coefficient][lane]
+  T* outputs = nullptr;         // [frame][output][lane]
+};
+
+// The coefficients of a kernel's voices, and how they move: all that are on their way arrive
+// after the same number of samples.
+template <class T>
+class Coefficients {
+ public:
+  Coefficients(const Program& program, std::size_t width);
+
+  // At once, or to be reached by the next ramp(). [audio] wait-free
+  void set(std::size_t lane, std::uint32_t c, double value, bool ramped);
+  void ramp(std::size_t frames);
+  // What a block of samples did to the ramps; values are kept by who steps them.
+  void finish(std::size_t frames);
+
+  std::size_t width;
+  Aligned<T> value;                    // [coefficient][lane]
+  Aligned<T> increment;                // [coefficient][lane] per sample, while ramping
+  Aligned<T> target;                   // [coefficient][lane] where the ramp ends
+  std::vector<std::uint32_t> ramping;  // those that move; at most all of them
+  std::vector<bool> is_ramping;        // [coefficient]
+  std::size_t ramp_frames = 0;         // how many samples they still move
+};
+
+// The same for code that is compiled for several instruction sets. One sample's step:
+template <class T>
+struct Ramps {
+  T* value;
+  const T* increment;
+  const T* target;
+  const std::uint32_t* ramping;
+  std::size_t count;
+  std::size_t width;
+  std::size_t frames;
+};
+template <class T>
+Ramps<T> ramps_of(Coefficients<T>& coefficients) {
+  return {coefficients.value.data(),   coefficients.increment.data(), coefficients.target.data(),
+          coefficients.ramping.data(), coefficients.ramping.size(),   coefficients.width,
+          coefficients.ramp_frames};
+}
+template <class T>
+static inline void advance(Ramps<T>& ramps) {
+  if (ramps.frames == 0) {
+    return;
+  }
+  const bool arrives = --ramps.frames == 0;
+  for (std::size_t i = 0; i < ramps.count; ++i) {
+    const std::size_t first = ramps.ramping[i] * ramps.width;
+    for (std::size_t c = first; c < first + ramps.width; ++c) {
+      ramps.value[c] = arrives ? ramps.target[c] : ramps.value[c] + ramps.increment[c];
+    }
+  }
+}
+
+// The Program outlives its kernels and is shared by them. Nothing here throws or allocates after
+// construction.
+template <class T>
+class Kernel {
+ public:
+  Kernel(const Program& program, std::size_t width) : coefficients(program, width) {}
+  virtual ~Kernel() = default;
+  Kernel(const Kernel&) = delete;
+  Kernel& operator=(const Kernel&) = delete;
+
+  std::size_t width() const { return coefficients.width; }
+
+  // Puts one lane back to where the model starts; its coefficients stay. [audio]
+  virtual void reset(std::size_t lane) = 0;
+  // Plays the block by the published scheme, v += F/M, x += v: masses, then position inputs, then
+  // links; the outputs are the new positions. Forces given act in their own sample. [audio]
+  virtual void step(const Block<T>& block) = 0;
+  // Whether every mass of a lane is nearer than `bound` to where it starts. [audio]
+  virtual bool is_near_start(std::size_t lane, double bound) const = 0;
+
+  Coefficients<T> coefficients;
+};
+
+// The kernel that the Program asks for (Program::form), with at least one lane and no more than
+// `voices` need. The instruction set may be narrower than the machine's, never wider.
+template <class T>
+std::unique_ptr<Kernel<T>> make_kernel(const Program& program, std::size_t voices, Isa isa);
+
+}  // namespace ressort
