@@ -13,6 +13,7 @@
 #include "app/midi_input.h"
 #include "app/terminal.h"
 #include "app/text.h"
+#include "core/model/print.h"
 
 namespace ressort {
 namespace {
@@ -440,6 +441,20 @@ int check(const std::string& name, bool as_json) {
   } else {
     print_check(*scene, *compiled);
   }
+  return exit_code::done;
+}
+
+int print_model(const std::string& name) {
+  const auto scene = load_scene(name, false);
+  if (!scene) {
+    complain(scene.error().message);
+    return exit_code::wrong_use;
+  }
+  for (const std::string& warning : scene->warnings) {
+    complain(warning);
+  }
+  const std::string text = print_network(scene->network);
+  std::fwrite(text.data(), 1, text.size(), stdout);
   return exit_code::done;
 }
 

@@ -37,5 +37,6 @@ struct PlayOptions {
 int play(const PlayOptions& options);
 int render_command(const RenderOptions& options, bool is_quiet);
 int check(const std::string& name, bool as_json);
+int print_model(const std::string& name);
 
 }  // namespace ressort

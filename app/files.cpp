@@ -86,6 +86,16 @@ Result<std::string> read_text(const std::string& path, std::size_t max_bytes) {
   return text;
 }
 
+Result<Done> write_text(const std::string& path, const std::string& text) {
+  std::ofstream file(path, std::ios::binary);
+  file << text;
+  file.close();
+  if (!file) {
+    return Error{"'" + path + "' cannot be written: " + std::strerror(errno)};
+  }
+  return Done{};
+}
+
 Result<Sound> read_wav(const std::string& path) {
   std::error_code error;
   if (!fs::exists(path, error)) {

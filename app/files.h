@@ -1,4 +1,4 @@
-// app: the program's whole file system. Reads text, reads and writes WAV, knows where the models
+// app: the program's whole file system. Reads and writes text and WAV, knows where the models
 // and presets are.
 #pragma once
 
@@ -13,6 +13,9 @@ namespace ressort {
 // A whole text file of at most `max_bytes`. The error says what is in the way: missing, a
 // directory, too large, unreadable.
 Result<std::string> read_text(const std::string& path, std::size_t max_bytes);
+
+// Replaces what was there.
+Result<Done> write_text(const std::string& path, const std::string& text);
 
 enum class SampleFormat { float32, float64, pcm24 };
 

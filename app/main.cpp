@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "app/commands.h"
+#include "app/make.h"
 #include "core/model/expression.h"
 
 namespace {
@@ -29,6 +30,21 @@ const char* const render_examples =
     "  ressort render PolyTriangle -o out.wav\n"
     "  ressort render my.mdl -o out.wav --input gesture.wav --format double\n";
 
+const char* const make_examples =
+    "KIND, and the points along each side, the fixed ones included:\n"
+    "  string N         a row, both ends fixed    chain N          a row without fixed ends\n"
+    "  stiffString N    with K2 to the next but one\n"
+    "  mesh N N         a free rectangle          closedMesh N N   its border fixed\n"
+    "  cornerMesh N N   its corners fixed\n"
+    "  triangle N       N points a side: N(N+1)/2 points, 3N(N-1)/2 links\n"
+    "  hexagon N        N rings around a point: 1+3N(N+1) points, 9N^2+3N links\n"
+    "Numbers are per sample at 44100 Hz: a mass M on a spring K swings at 7000 sqrt(K/M) Hz. What\n"
+    "nothing fixes is held by one more ground, so that a push does not send it away for good.\n"
+    "Examples:\n"
+    "  ressort make string 50 -o my.mdl            then: ressort play my.mdl\n"
+    "  ressort make hexagon 6 --name drum -K 0.2   to be read, or pasted into a model\n"
+    "  ressort make closedMesh 150 150 --macro     the same as one line\n";
+
 // A number within a range; what is no number is in none.
 CLI::Validator within(double least, double most) {
   const std::string range = print_number(least) + " to " + print_number(most);
@@ -43,13 +59,14 @@ CLI::Validator within(double least, double most) {
 
 // One of a few words.
 template <class T>
-void add_choice(CLI::App& command, const std::string& name, T& target,
-                const std::vector<std::pair<std::string, T>>& choices, const std::string& help) {
+CLI::Option* add_choice(CLI::App& command, const std::string& name, T& target,
+                        const std::vector<std::pair<std::string, T>>& choices,
+                        const std::string& help) {
   std::string words;
   for (const auto& [word, value] : choices) {
     words += (words.empty() ? "" : ", ") + word;
   }
-  command
+  return command
       .add_option_function<std::string>(
           name,
           [&target, choices, name, words](const std::string& text) {
@@ -184,6 +201,52 @@ void add_render(CLI::App& app, RenderChoice& choice, int& code) {
   });
 }
 
+void add_make(CLI::App& app, MakeOptions& options, std::vector<std::uint32_t>& sizes, int& code) {
+  Shape& shape = options.shape;
+  CLI::App* command = app.add_subcommand("make", "writes a model: a string, a mesh, a triangle...");
+  command->footer(make_examples);
+  add_choice<ShapeKind>(*command, "KIND", shape.kind,
+                        {{"string", ShapeKind::string},
+                         {"stiffString", ShapeKind::stiff_string},
+                         {"chain", ShapeKind::chain},
+                         {"mesh", ShapeKind::mesh},
+                         {"closedMesh", ShapeKind::closed_mesh},
+                         {"cornerMesh", ShapeKind::corner_mesh},
+                         {"triangle", ShapeKind::triangle},
+                         {"hexagon", ShapeKind::hexagon}},
+                        "of shape")
+      ->required();
+  command->add_option("N", sizes, "one size, or a mesh's two")->required()->expected(1, 2);
+  command->add_option("--name", shape.name, "stands before every label: NAME_m0, NAME_K")
+      ->capture_default_str();
+  command->add_option("-M,--mass", shape.mass, "of every point, above 0")->capture_default_str();
+  command->add_option("-K,--stiffness", shape.stiffness, "of every link, force per position")
+      ->capture_default_str();
+  command->add_option("--K2", shape.second_stiffness, "of a stiffString's second links")
+      ->capture_default_str();
+  command->add_option("-Z,--damping", shape.damping, "of every link, force per position a sample")
+      ->capture_default_str();
+  command->add_option("--Zo", shape.air_damping, "damping of every point against the air")
+      ->capture_default_str();
+  command->add_option("--position", shape.position, "where every point rests")
+      ->capture_default_str();
+  add_choice<FixedPoints>(*command, "--fixed", shape.fixed,
+                          {{"corners", FixedPoints::corners},
+                           {"border", FixedPoints::border},
+                           {"none", FixedPoints::none}},
+                          "what holds a triangle or hexagon");
+  command->add_flag("--macro", shape.as_macro, "one line instead of every mass and link");
+  command->add_flag_callback(
+      "--bare", [&shape] { shape.with_io = false; },
+      "without @in1, a force, and @out1, a position");
+  command->add_option("-o,--output", options.output, "the file; without it, the screen");
+  command->callback([&options, &sizes, &code] {
+    options.shape.length = sizes[0];
+    options.shape.width = sizes.size() > 1 ? sizes[1] : 0;
+    code = make(options);
+  });
+}
+
 int run(int argc, char** argv) {
   CLI::App app{"ressort plays networks of masses and springs, read from .mdl files."};
   app.footer(
@@ -198,13 +261,21 @@ int run(int argc, char** argv) {
   RenderChoice render_choice;
   std::string checked;
   bool as_json = false;
+  bool as_model = false;
+  MakeOptions make_options;
+  std::vector<std::uint32_t> make_sizes;
   add_play(app, play_options, code);
   add_render(app, render_choice, code);
   CLI::App* check_command =
       app.add_subcommand("check", "reads a model or a preset and says what it found");
   check_command->add_option("FILE", checked, "a file, or a preset's or model's name")->required();
-  check_command->add_flag("--json", as_json, "for machines");
-  check_command->callback([&] { code = check(checked, as_json); });
+  CLI::Option* json = check_command->add_flag("--json", as_json, "for machines");
+  check_command
+      ->add_flag("--print", as_model, "nothing but the model, as text in one clean dialect")
+      ->excludes(json);
+  check_command->callback(
+      [&] { code = as_model ? print_model(checked) : check(checked, as_json); });
+  add_make(app, make_options, make_sizes, code);
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {

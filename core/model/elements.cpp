@@ -73,10 +73,10 @@ void Reader::read_gravity(const Line& line, Mass& mass, std::size_t& at) {
   const bool by_keyword = line.keyword->word == "massG";
   const auto most = static_cast<std::size_t>(line.keyword->most);
   if (by_keyword) {
-    shows_delayed_ = true;
+    show(delayed_, line, "has 'massG'");
     mass.gravity = argument(line, at++);
   } else if (line.rest.size() == most) {
-    shows_velocity_ = true;
+    show(velocity_, line, "gives a gravity without 'massG'");
     mass.gravity = argument(line, at++);
     mass.gravity_per_rate = true;
   }
@@ -94,11 +94,9 @@ void Reader::add_macro(const Line& line) {
   macro.name = std::string(line.label.text);
   macro.kind = line.keyword->macro;
   macro.place = {line.number, line.label.column};
-  const bool is_mesh = macro.kind != MacroKind::string && macro.kind != MacroKind::chain &&
-                       macro.kind != MacroKind::stiff_string;
   std::size_t at = 0;
   macro.length = size(line, at++, macro.kind == MacroKind::stiff_string ? 3 : 2);
-  macro.width = is_mesh ? size(line, at++, 2) : 1;
+  macro.width = is_mesh(macro.kind) ? size(line, at++, 2) : 1;
   nodes_ += node_count(macro);
   if (nodes_ > max_macro_nodes) {
     macro.length = macro.width = 2;
@@ -118,10 +116,10 @@ void Reader::add_macro(const Line& line) {
   double y = 0.0;
   bool is_placed = position(line, at++, macro.position, x, y);
   if (line.rest.size() == static_cast<std::size_t>(line.keyword->least)) {
-    shows_delayed_ = true;
+    show(delayed_, line, "gives a macro no motion");
     resting_.push_back(found->second);
   } else {
-    shows_velocity_ = true;
+    show(velocity_, line, "gives a macro a motion");
     double far_x = 0.0;  // the drawn line's other end
     double far_y = 0.0;
     is_placed |= position(line, at++, macro.third, far_x, far_y);
@@ -167,11 +165,7 @@ void Reader::add_link(Line& line) {
       link.arguments[slot] = argument(line, i);
     }
   }
-  shows_velocity_ |=
-      link.kind == LinkKind::clipped_contact || link.kind == LinkKind::clipped_spring ||
-      (link.kind == LinkKind::contact && line.rest.size() == 4) ||
-      (link.kind == LinkKind::pluck && line.rest.size() == 5) ||
-      (link.kind == LinkKind::smooth_bow) || (link.kind == LinkKind::bow && line.rest.size() == 5);
+  show_dialect(line, link.kind);
   if (!a || !b) {
     return;
   }
@@ -181,6 +175,22 @@ void Reader::add_link(Line& line) {
   link.a = *a;
   link.b = *b;
   out_.network.links.push_back(std::move(link));
+}
+
+// MIMS4Max alone has the clipped laws, and counts of arguments of its own.
+void Reader::show_dialect(const Line& line, LinkKind kind) {
+  const std::size_t count = line.rest.size();
+  if (kind == LinkKind::clipped_contact) {
+    show(velocity_, line, "has 'nlContact'");
+  } else if (kind == LinkKind::clipped_spring) {
+    show(velocity_, line, "has 'nlSpringDamper'");
+  } else if (kind == LinkKind::contact && count == 4) {
+    show(velocity_, line, "gives a contact no threshold");
+  } else if (kind == LinkKind::pluck && count == 5) {
+    show(velocity_, line, "gives a pluck a damping");
+  } else if ((kind == LinkKind::bow || kind == LinkKind::smooth_bow) && count == 5) {
+    show(velocity_, line, "chooses a bow's profile");
+  }
 }
 
 void Reader::add_input(Line& line) {
@@ -223,7 +233,7 @@ std::uint32_t Reader::drawing(const Line& line, std::size_t at) {
   if (line.rest.size() < at + 3) {
     return 0;
   }
-  shows_delayed_ = true;
+  show(delayed_, line, "names a drawing behind its arguments");
   Drawing drawing{
       .group = std::string(line.rest[at].text), .x = state(line, at + 1), .y = state(line, at + 2)};
   out_.network.drawings.push_back(std::move(drawing));
@@ -257,7 +267,11 @@ std::string Reader::with_slash(std::string_view text) const {
 }
 
 ArgumentId Reader::argument(const Line& line, std::size_t at) {
-  return expression(line, unwrapped(line.rest[at]));
+  const Token token = unwrapped(line.rest[at]);
+  if (token.text.size() != line.rest[at].text.size()) {
+    show(velocity_, line, "writes an argument in brackets");
+  }
+  return expression(line, token);
 }
 
 ArgumentId Reader::expression(const Line& line, const Token& token) {
@@ -307,7 +321,7 @@ bool Reader::position(const Line& line, std::size_t at, double& z, double& x, do
     z = state(line, at);
     return false;
   }
-  shows_velocity_ = true;
+  show(velocity_, line, "writes a place as [x y z]");
   const Token inner = unwrapped(token);
   const std::vector<Token> parts = split(inner.text);
   double* const targets[] = {&x, &y, &z};
@@ -338,7 +352,7 @@ double Reader::state(const Line& line, std::size_t at) {
 std::optional<std::uint32_t> Reader::reference(Line& line, std::size_t at) {
   const Token token = line.rest[at];
   if (token.text[0] == '[') {
-    shows_velocity_ = true;
+    show(velocity_, line, "writes a place on a macro in brackets");
     const Token inner = unwrapped(token);
     std::vector<Token> parts = split(inner.text);
     for (Token& part : parts) {
@@ -405,9 +419,9 @@ std::optional<std::uint32_t> Reader::tap(const Line& line, const Token& token, c
     return std::nullopt;
   }
   const Keyword& keyword = *macro_keywords_.at(found->second);
-  const bool is_mesh = keyword.arguments.starts_with("LENGTH");
-  const std::size_t wanted = is_mesh ? 2 : 1;
-  if (!is_mesh && coordinates.size() > 1) {
+  const bool is_plane = is_mesh(keyword.macro);
+  const std::size_t wanted = is_plane ? 2 : 1;
+  if (!is_plane && coordinates.size() > 1) {
     const char* const start = coordinates.front().text.data();
     const std::string_view last = coordinates.back().text;
     const auto length = static_cast<std::size_t>(last.data() + last.size() - start);
@@ -416,7 +430,7 @@ std::optional<std::uint32_t> Reader::tap(const Line& line, const Token& token, c
   if (coordinates.size() != wanted) {
     error(line, token,
           quoted(label.text) + " is a " + std::string(keyword.word) + ": a place on it needs " +
-              (is_mesh ? "two coordinates, [@m u v]" : "one coordinate, [@s u]") +
+              (is_plane ? "two coordinates, [@m u v]" : "one coordinate, [@s u]") +
               ", each from 0 to 1");
     return std::nullopt;
   }
@@ -425,7 +439,7 @@ std::optional<std::uint32_t> Reader::tap(const Line& line, const Token& token, c
   point.place = {line.number, token.column};
   network.taps.push_back({.macro = found->second,
                           .u = expression(line, coordinates[0]),
-                          .v = is_mesh ? expression(line, coordinates[1]) : no_argument});
+                          .v = is_plane ? expression(line, coordinates[1]) : no_argument});
   network.masses.push_back(std::move(point));
   return static_cast<std::uint32_t>(network.masses.size() - 1);
 }

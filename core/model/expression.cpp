@@ -1,5 +1,6 @@
 #include "core/model/expression.h"
 
+#include <algorithm>
 #include <charconv>
 #include <cmath>
 
@@ -233,6 +234,64 @@ class Parser {
   Formula formula_;
 };
 
+// How tightly the outermost operator of a text holds.
+enum class Binding { sum, product, sign, primary };
+
+struct Piece {
+  std::string text;
+  Binding binding = Binding::primary;
+};
+
+std::string held(const Piece& piece, Binding least) {
+  return piece.binding < least ? "(" + piece.text + ")" : piece.text;
+}
+
+Piece infix(const Piece& left, char sign, const Piece& right, Binding binding) {
+  // An operator to the right with the same binding would be done first, on the left it is anyway.
+  const auto tighter = static_cast<Binding>(static_cast<int>(binding) + 1);
+  return {held(left, binding) + sign + held(right, tighter), binding};
+}
+
+const Function* function_of(Op op) {
+  const auto* const found = std::find_if(std::begin(functions), std::end(functions),
+                                         [&](const Function& f) { return f.op == op; });
+  return found == std::end(functions) ? nullptr : found;
+}
+
+std::size_t operands(Op op) {
+  if (const Function* const function = function_of(op)) {
+    return static_cast<std::size_t>(function->arguments);
+  }
+  return op == Op::number || op == Op::parameter ? 0 : op == Op::negate ? 1 : 2;
+}
+
+Piece piece(const Step& step, std::span<const Piece> of, std::span<const std::string> parameters) {
+  switch (step.op) {
+    case Op::number:
+      return {print_number(step.value),
+              std::signbit(step.value) ? Binding::sign : Binding::primary};
+    case Op::parameter:
+      return {parameters[step.index], Binding::primary};
+    case Op::negate:
+      return {"-" + held(of[0], Binding::primary), Binding::sign};
+    case Op::add:
+      return infix(of[0], '+', of[1], Binding::sum);
+    case Op::subtract:
+      return infix(of[0], '-', of[1], Binding::sum);
+    case Op::multiply:
+      return infix(of[0], '*', of[1], Binding::product);
+    case Op::divide:
+      return infix(of[0], '/', of[1], Binding::product);
+    default:
+      break;
+  }
+  std::string text(function_of(step.op)->name);
+  for (std::size_t i = 0; i < of.size(); ++i) {
+    text += (i == 0 ? "(" : ",") + of[i].text;
+  }
+  return {text + ")", Binding::primary};
+}
+
 }  // namespace
 
 bool parse_number(std::string_view text, double& number) {
@@ -255,7 +314,20 @@ bool parse_number(std::string_view text, double& number) {
 std::string print_number(double number) {
   char text[32];
   const auto [end, error] = std::to_chars(text, text + sizeof text, number);
-  return error == std::errc{} ? std::string(text, end) : std::string("0");
+  std::string printed = error == std::errc{} ? std::string(text, end) : std::string("0");
+  std::erase(printed, '+');  // an exponent needs none, and MIMS4Max divides arguments at it
+  return printed;
+}
+
+std::string print_expression(const Formula& formula, std::span<const std::string> parameters) {
+  std::vector<Piece> stack;
+  for (const Step& step : formula) {
+    const std::size_t first = stack.size() - operands(step.op);
+    Piece made = piece(step, std::span(stack).subspan(first), parameters);
+    stack.resize(first);
+    stack.push_back(std::move(made));
+  }
+  return stack.empty() ? "0" : stack.front().text;
 }
 
 Result<Formula> parse_expression(std::string_view text, std::span<const std::string> parameters) {

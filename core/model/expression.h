@@ -14,11 +14,14 @@ namespace ressort {
 // "1.", ".1", "-0.2", "1e-3" are numbers; "", "1x", "nan", "inf" are not. [any thread]
 bool parse_number(std::string_view text, double& number);
 
-// The shortest text that reads back as the same number.
+// The shortest text that reads back as the same number; no '+' is in it.
 std::string print_number(double number);
 
 // Infix + - * / ( ), unary signs, numbers, parameter names and the functions
 // sqrt abs sin cos exp pow min max clamp. The error's column counts from 1 within `text`.
 Result<Formula> parse_expression(std::string_view text, std::span<const std::string> parameters);
+
+// Infix without blanks and with the fewest parentheses; parse_expression gives the same steps back.
+std::string print_expression(const Formula& formula, std::span<const std::string> parameters);
 
 }  // namespace ressort

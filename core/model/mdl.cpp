@@ -7,7 +7,7 @@
 
 namespace ressort {
 
-ParsedNetwork Reader::read(std::string_view text) {
+ParsedNetwork Reader::read(std::string_view text, const ReadOptions& options) {
   if (text.size() > max_model_bytes) {
     say(Severity::error, 1, {"", 1},
         "the model is " + std::to_string(text.size() >> 20) + " MiB long; at most " +
@@ -48,13 +48,13 @@ ParsedNetwork Reader::read(std::string_view text) {
     say(Severity::error, 1, {"", 1},
         "the model is empty: expected elements such as '@m mass 1. 0. 0.'");
   }
-  decide_third_argument();
+  decide_motion(options);
   look_over();
-  const auto by_number = [](const auto& a, const auto& b) { return a.number < b.number; };
-  std::stable_sort(out_.network.inputs.begin(), out_.network.inputs.end(), by_number);
-  std::stable_sort(out_.network.outputs.begin(), out_.network.outputs.end(), by_number);
   std::stable_sort(out_.diagnostics.begin(), out_.diagnostics.end(),
                    [](const Diagnostic& a, const Diagnostic& b) { return a.line < b.line; });
+  if (out_.ok()) {
+    out_.network = canonical(std::move(out_.network));
+  }
   return std::move(out_);
 }
 
@@ -97,15 +97,19 @@ void Reader::read_line(std::string_view text, int number) {
   lines_.push_back(std::move(line));
 }
 
-// ~begin NAME and ~end NAME: what is declared between them is drawn in the group NAME.
+// ~motion MEANING, or ~begin NAME and ~end NAME: what is declared between them is drawn in the
+// group NAME.
 void Reader::read_block(const std::vector<Token>& tokens, int number) {
   const Line line{.number = number, .label = tokens[0]};
+  if (tokens[0].text == "~motion") {
+    return read_motion(line, tokens);
+  }
   const bool begins = tokens[0].text == "~begin";
   if ((!begins && tokens[0].text != "~end") || tokens.size() != 2) {
     return error(line, tokens[0], "expected '~begin NAME' or '~end NAME'");
   }
   if (begins) {
-    shows_velocity_ = true;
+    show(velocity_, line, "opens a block");
     return groups_.push_back(tokens[1].text);
   }
   const auto found = std::find(groups_.rbegin(), groups_.rend(), tokens[1].text);
@@ -117,11 +121,12 @@ void Reader::read_block(const std::vector<Token>& tokens, int number) {
 
 // Enters a line's label, and the value of a parameter.
 void Reader::declare(const Line& line) {
-  const auto [entry, is_new] = labels_.try_emplace(line.label.text, line.number);
+  const auto [entry, is_new] = labels_.try_emplace(line.label.text, &line);
   if (!is_new) {
+    const Line& first = *entry->second;
     const std::string where = "'@" + std::string(line.label.text) +
-                              "' is already declared in line " + std::to_string(entry->second);
-    if (line.keyword->element != Element::link) {
+                              "' is already declared in line " + std::to_string(first.number);
+    if (line.keyword->element != Element::link || first.keyword->element != Element::link) {
       return error(line, line.label, where);
     }
     warning(line, line.label, where + "; both links are kept");
@@ -157,6 +162,9 @@ void Reader::declare(const Line& line) {
       network.masses.emplace_back();
       break;
     case Element::macro:
+      if (line.label.text.find(']') != std::string_view::npos) {
+        error(line, line.label, "a macro's label must not have a ']', which ends a place on it");
+      }
       macros_.emplace(line.label.text, static_cast<std::uint32_t>(network.macros.size()));
       macro_keywords_.push_back(line.keyword);
       network.macros.emplace_back();
@@ -179,7 +187,9 @@ void Reader::take_coordinates(Line& line) {
                  std::min(line.rest.size(), static_cast<std::size_t>(line.keyword->references)));
   line.coordinates.assign(line.rest.end() - static_cast<std::ptrdiff_t>(count), line.rest.end());
   line.rest.resize(line.rest.size() - count);
-  shows_delayed_ |= count > 0;
+  if (count > 0) {
+    show(delayed_, line, "writes a place on a macro without brackets");
+  }
 }
 
 void Reader::build(Line& line) {
@@ -229,21 +239,6 @@ bool Reader::check_count(const Line& line) {
             (most == 1 ? " argument (" : " arguments (") + std::string(keyword.arguments) +
             "), found " + std::to_string(found));
   return false;
-}
-// The dialects agree when the file shows which one it is in; else the state itself tells: at
-// rest away from 0 is written (x, x) in one meaning and (x, 0) in the other.
-void Reader::decide_third_argument() {
-  Network& network = out_.network;
-  const bool starts_at_zero_speed =
-      std::any_of(network.masses.begin(), network.masses.end(), [](const Mass& mass) {
-        return (mass.kind == MassKind::mass || mass.kind == MassKind::oscillator) &&
-               mass.position != 0.0 && mass.third == 0.0;
-      });
-  const bool velocity = shows_velocity_ || (!shows_delayed_ && starts_at_zero_speed);
-  network.third = velocity ? ThirdArgument::velocity_per_second : ThirdArgument::delayed_position;
-  for (const std::uint32_t macro : resting_) {
-    network.macros[macro].third = velocity ? 0.0 : network.macros[macro].position;
-  }
 }
 
 // What is legal and yet hardly meant.
@@ -306,8 +301,8 @@ bool ParsedNetwork::ok() const {
                       [](const Diagnostic& d) { return d.severity == Severity::error; });
 }
 
-ParsedNetwork parse_network(std::string_view text) {
-  return Reader().read(text);
+ParsedNetwork parse_network(std::string_view text, const ReadOptions& options) {
+  return Reader().read(text, options);
 }
 
 std::string to_string(const Diagnostic& diagnostic, std::string_view file) {

@@ -1,6 +1,7 @@
 // core/model: the .mdl text and the Network.
 #pragma once
 
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -21,16 +22,22 @@ struct Diagnostic {
   std::string message;
 };
 
+struct ReadOptions {
+  // What the third state argument means, whatever the text says or shows.
+  std::optional<ThirdArgument> third;
+};
+
 struct ParsedNetwork {
-  Network network;                      // complete only if ok()
+  Network network;                      // canonical; complete only if ok()
   std::vector<Diagnostic> diagnostics;  // in the order of the lines
+  std::string motion;                   // what Network::third is, and why, for a person
   bool ok() const;
 };
 
 // Reads a whole model; goes on after an error, so that every problem is told at once. Never
 // throws; what it takes in memory is bounded by the text. A model may be at most
 // `max_model_bytes` long. [any thread but audio]
-ParsedNetwork parse_network(std::string_view text);
+ParsedNetwork parse_network(std::string_view text, const ReadOptions& options = {});
 
 inline constexpr std::size_t max_model_bytes = std::size_t{32} << 20;
 inline constexpr int max_channels = 64;  // of inputs, and of outputs

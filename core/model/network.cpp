@@ -1,8 +1,170 @@
 #include "core/model/network.h"
 
 #include <algorithm>
+#include <bit>
+#include <unordered_map>
 
 namespace ressort {
+namespace {
+
+void append(std::string& key, std::uint64_t bits) {
+  key.append(reinterpret_cast<const char*>(&bits), sizeof bits);
+}
+
+// Two formulas with one key are the same, -0 and 0 being two numbers.
+std::string key_of(const Formula& formula) {
+  std::string key;
+  for (const Step& step : formula) {
+    key += static_cast<char>(step.op);
+    append(key, step.op == Op::parameter ? step.index : std::bit_cast<std::uint64_t>(step.value));
+  }
+  return key;
+}
+
+std::string key_of(const Drawing& drawing) {
+  std::string key;
+  append(key, std::bit_cast<std::uint64_t>(drawing.x + 0.0));  // -0 is drawn where 0 is
+  append(key, std::bit_cast<std::uint64_t>(drawing.y + 0.0));
+  return key + drawing.group;
+}
+
+// Builds the canonical network element by element, taking what each one needs from the old.
+class Renumbering {
+ public:
+  explicit Renumbering(Network network)
+      : old_(std::move(network)),
+        places_(old_.masses.size(), unplaced),
+        arguments_(old_.arguments.size(), no_argument) {}
+
+  Network run() {
+    const auto by_number = [](const auto& a, const auto& b) { return a.number < b.number; };
+    std::stable_sort(old_.inputs.begin(), old_.inputs.end(), by_number);
+    std::stable_sort(old_.outputs.begin(), old_.outputs.end(), by_number);
+    new_.parameters = std::move(old_.parameters);
+    new_.third = old_.third;
+    place_masses();
+    for (Macro& macro : old_.macros) {
+      for (ArgumentId* const id : {&macro.mass, &macro.stiffness, &macro.second_stiffness,
+                                   &macro.damping, &macro.air_damping}) {
+        *id = argument(*id);
+      }
+      macro.drawing = drawing(macro.drawing);
+    }
+    new_.macros = std::move(old_.macros);
+    place_points();
+    for (Link& link : old_.links) {
+      for (ArgumentId& id : link.arguments) {
+        id = argument(id);
+      }
+    }
+    new_.links = std::move(old_.links);
+    new_.inputs = std::move(old_.inputs);
+    new_.outputs = std::move(old_.outputs);
+    if (rests_at_zero(new_)) {
+      new_.third = ThirdArgument::delayed_position;  // its two meanings are one here
+    }
+    return std::move(new_);
+  }
+
+ private:
+  static constexpr std::uint32_t unplaced = 0xffffffffu;
+
+  void place_masses() {
+    for (std::uint32_t i = 0; i < old_.masses.size(); ++i) {
+      if (old_.masses[i].kind != MassKind::position && old_.masses[i].kind != MassKind::point) {
+        place(i);
+      }
+    }
+    for (const Input& input : old_.inputs) {
+      if (!input.is_force) {
+        place(input.mass);
+      }
+    }
+  }
+
+  void place(std::uint32_t index) {
+    if (places_[index] != unplaced) {
+      return;
+    }
+    places_[index] = static_cast<std::uint32_t>(new_.masses.size());
+    Mass& mass = new_.masses.emplace_back(std::move(old_.masses[index]));
+    for (ArgumentId* const id : {&mass.mass, &mass.stiffness, &mass.damping, &mass.gravity}) {
+      *id = argument(*id);
+    }
+    mass.drawing = drawing(mass.drawing);
+  }
+
+  void place_points() {
+    for (Link& link : old_.links) {
+      link.a = end(link.a);
+      link.b = end(link.b);
+    }
+    for (Input& input : old_.inputs) {
+      input.mass = end(input.mass);
+    }
+    for (Output& output : old_.outputs) {
+      output.mass = end(output.mass);
+    }
+  }
+
+  // Where the mass at one end is now; a point is made anew for every end.
+  std::uint32_t end(std::uint32_t index) {
+    if (places_[index] != unplaced) {
+      return places_[index];
+    }
+    Mass point = old_.masses[index];
+    Tap tap = old_.taps[point.tap];
+    tap.u = argument(tap.u);
+    tap.v = argument(tap.v);
+    tap.first = tap.length > 0 ? places_[tap.first] : 0;
+    point.tap = static_cast<std::uint32_t>(new_.taps.size());
+    new_.taps.push_back(tap);
+    new_.masses.push_back(std::move(point));
+    return static_cast<std::uint32_t>(new_.masses.size() - 1);
+  }
+
+  ArgumentId argument(ArgumentId id) {
+    if (id == no_argument) {
+      return no_argument;
+    }
+    if (arguments_[id] == no_argument) {
+      Formula& formula = old_.arguments[id];
+      const auto [entry, is_new] =
+          formulas_.try_emplace(key_of(formula), static_cast<ArgumentId>(new_.arguments.size()));
+      if (is_new) {
+        new_.arguments.push_back(std::move(formula));
+      }
+      arguments_[id] = entry->second;
+    }
+    return arguments_[id];
+  }
+
+  std::uint32_t drawing(std::uint32_t number) {
+    if (number == 0) {
+      return 0;
+    }
+    const Drawing& drawing = old_.drawings[number - 1];
+    const auto [entry, is_new] = drawings_.try_emplace(
+        key_of(drawing), static_cast<std::uint32_t>(new_.drawings.size() + 1));
+    if (is_new) {
+      new_.drawings.push_back(drawing);
+    }
+    return entry->second;
+  }
+
+  Network old_;
+  Network new_;
+  std::vector<std::uint32_t> places_;  // [old mass], points are never placed
+  std::vector<ArgumentId> arguments_;  // [old argument]
+  std::unordered_map<std::string, ArgumentId> formulas_;
+  std::unordered_map<std::string, std::uint32_t> drawings_;
+};
+
+}  // namespace
+
+Network canonical(Network network) {
+  return Renumbering(std::move(network)).run();
+}
 
 double argument_value(const Network& network, ArgumentId argument,
                       std::span<const double> parameters) {
@@ -38,6 +200,18 @@ double initial_velocity(const Network& network, const Mass& mass) {
   }
   return network.third == ThirdArgument::delayed_position ? mass.position - mass.third
                                                           : mass.third / Network::reference_rate_hz;
+}
+
+bool rests_at_zero(const Network& network) {
+  const auto rests = [](const auto& element) {
+    return element.position == 0.0 && element.third == 0.0;
+  };
+  return std::all_of(network.masses.begin(), network.masses.end(),
+                     [&](const Mass& mass) {
+                       return (mass.kind != MassKind::mass && mass.kind != MassKind::oscillator) ||
+                              rests(mass);
+                     }) &&
+         std::all_of(network.macros.begin(), network.macros.end(), rests);
 }
 
 int input_count(const Network& network) {

@@ -179,6 +179,13 @@ struct Network {
   static constexpr double reference_rate_hz = 44100.0;
 };
 
+// The same network in the one form that equal networks share. Masses come as declared, then
+// position inputs by their number, then points, one for every end that uses one; inputs and outputs
+// are sorted by number. Formulas, drawings and taps are numbered in the order in which masses,
+// macros, points and links first use them, equal ones once, unused ones not at all. O(n) in time
+// and memory. [any thread but audio]
+Network canonical(Network network);
+
 // The argument's value with the parameters as given; 0 for no_argument.
 double argument_value(const Network& network, ArgumentId argument,
                       std::span<const double> parameters);
@@ -188,6 +195,9 @@ std::vector<double> parameter_values(const Network& network);
 
 // The change of position from one sample to the next that a mass starts with.
 double initial_velocity(const Network& network, const Mass& mass);
+
+// Does everything that moves start with two zeros? Then the third argument's meanings agree.
+bool rests_at_zero(const Network& network);
 
 // The highest channel number in use; 0 for none.
 int input_count(const Network& network);

@@ -1,4 +1,4 @@
-// core/model: the reader behind parse_network, for mdl.cpp and elements.cpp only.
+// core/model: the reader behind parse_network, for mdl.cpp, elements.cpp and motion.cpp only.
 #pragma once
 
 #include <cstdint>
@@ -26,9 +26,15 @@ struct Line {
   std::vector<Token> coordinates;  // of macros that are referred to without brackets, in MIMS
 };
 
+// The first line that shows something, and by what: "opens a block".
+struct Evidence {
+  int line = 0;  // 0: none does
+  std::string_view what;
+};
+
 class Reader {
  public:
-  ParsedNetwork read(std::string_view text);
+  ParsedNetwork read(std::string_view text, const ReadOptions& options);
 
  private:
   void read_line(std::string_view line, int number);
@@ -40,6 +46,7 @@ class Reader {
   void add_macro(const Line& line);
   std::uint32_t size(const Line& line, std::size_t at, std::uint32_t least);
   void add_link(Line& line);
+  void show_dialect(const Line& line, LinkKind kind);
   void add_input(Line& line);
   void add_output(Line& line);
 
@@ -57,7 +64,11 @@ class Reader {
                                    std::vector<Token> coordinates);
   ArgumentId expression(const Line& line, const Token& token);
   std::optional<int> channel(const Line& line, std::string_view prefix);
-  void decide_third_argument();
+  void read_motion(const Line& line, const std::vector<Token>& tokens);
+  void decide_motion(const ReadOptions& options);
+  void decide_by_dialect();
+  void decide_by_states();
+  void choose_motion(ThirdArgument third, const std::string& why);
   void look_over();
 
   void say(Severity severity, int line, const Token& token, std::string message) {
@@ -78,6 +89,12 @@ class Reader {
   }
   void warning(const Line& line, const Token& token, std::string message) {
     say(Severity::warning, line.number, token, std::move(message));
+  }
+
+  static void show(Evidence& evidence, const Line& line, std::string_view what) {
+    if (evidence.line == 0) {
+      evidence = {line.number, what};
+    }
   }
 
   // Channels are numbered by hand; one that is left out is silent.
@@ -106,11 +123,13 @@ class Reader {
   std::vector<const Keyword*> macro_keywords_;                  // [macro]
   std::vector<std::uint32_t> resting_;                          // macros without a velocity
   std::uint64_t nodes_ = 0;                                     // of all macros
-  std::unordered_map<std::string_view, int> labels_;            // every label -> its line
+  std::unordered_map<std::string_view, const Line*> labels_;    // every label -> its line
   std::unordered_map<std::string_view, ArgumentId> arguments_;  // text -> index
   std::vector<std::string_view> groups_;  // of the display blocks that are open
-  bool shows_velocity_ = false;           // the file uses a form that only MIMS4Max has
-  bool shows_delayed_ = false;            // the file uses a form that only MIMS has
+  Evidence velocity_;                     // of a form that only MIMS4Max has
+  Evidence delayed_;                      // of a form that only MIMS has
+  std::optional<ThirdArgument> said_;     // by ~motion
+  int said_line_ = 0;
 };
 
 }  // namespace ressort

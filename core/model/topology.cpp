@@ -69,6 +69,11 @@ void add_links(const Macro& macro, std::uint32_t first, Network& network) {
 
 }  // namespace
 
+bool is_mesh(MacroKind kind) {
+  return kind == MacroKind::mesh || kind == MacroKind::closed_mesh ||
+         kind == MacroKind::corner_mesh;
+}
+
 std::uint64_t node_count(const Macro& macro) {
   return std::uint64_t{macro.length} * macro.width;
 }

@@ -1,0 +1,17 @@
+// app: writes the models that have a regular shape. The exit code comes back.
+#pragma once
+
+#include <string>
+
+#include "core/model/generate.h"
+
+namespace ressort {
+
+struct MakeOptions {
+  Shape shape;
+  std::string output;  // a file; empty for stdout
+};
+
+int make(const MakeOptions& options);
+
+}  // namespace ressort

@@ -1,0 +1,129 @@
+// What the third state argument means: asked for, said in the text, shown by its dialect, or told
+// by the states themselves.
+#include "core/model/reader.h"
+
+namespace ressort {
+namespace {
+
+constexpr ThirdArgument velocity = ThirdArgument::velocity_per_second;
+constexpr ThirdArgument delayed = ThirdArgument::delayed_position;
+
+std::string line_of(int number) {
+  return "line " + std::to_string(number);
+}
+
+bool moves(const Mass& mass) {
+  return mass.kind == MassKind::mass || mass.kind == MassKind::oscillator;
+}
+
+}  // namespace
+
+void Reader::read_motion(const Line& line, const std::vector<Token>& tokens) {
+  const bool is_velocity = tokens.size() == 2 && tokens[1].text == "velocity";
+  if (!is_velocity && (tokens.size() != 2 || tokens[1].text != "delayed")) {
+    return error(line, tokens.size() > 1 ? tokens[1] : tokens[0],
+                 "expected '~motion velocity' or '~motion delayed'");
+  }
+  const ThirdArgument third = is_velocity ? velocity : delayed;
+  if (said_ && *said_ != third) {
+    return error(line, tokens[1], line_of(said_line_) + " says the opposite");
+  }
+  said_ = third;
+  said_line_ = line.number;
+}
+
+void Reader::choose_motion(ThirdArgument third, const std::string& why) {
+  out_.network.third = third;
+  out_.motion = (third == velocity ? "a velocity in units per second, as "
+                                   : "the position one sample before, as ") +
+                why;
+}
+
+void Reader::decide_motion(const ReadOptions& options) {
+  Network& network = out_.network;
+  if (options.third) {
+    choose_motion(*options.third, "was asked for");
+  } else if (said_) {
+    choose_motion(*said_, line_of(said_line_) + " says");
+  } else if (rests_at_zero(network)) {
+    out_.motion = "both meanings agree: every mass starts at 0, at rest";
+  } else if (velocity_.line > 0 || delayed_.line > 0) {
+    decide_by_dialect();
+  } else {
+    decide_by_states();
+  }
+  for (const std::uint32_t macro : resting_) {
+    network.macros[macro].third = network.third == velocity ? 0.0 : network.macros[macro].position;
+  }
+}
+
+// MIMS4Max wins over MIMS, being the one that is still written.
+void Reader::decide_by_dialect() {
+  if (velocity_.line == 0) {
+    return choose_motion(
+        delayed, line_of(delayed_.line) + " " + std::string(delayed_.what) + ", which is MIMS");
+  }
+  choose_motion(velocity, line_of(velocity_.line) + " " + std::string(velocity_.what) +
+                              ", which is MIMS4Max");
+  if (delayed_.line == 0) {
+    return;
+  }
+  const auto doubt = [&](const auto& element) {
+    say(Severity::warning, element.place.line, {element.name, element.place.column},
+        "its motion is read as " + out_.motion + "; but " + line_of(delayed_.line) + " " +
+            std::string(delayed_.what) +
+            ", which is MIMS: '~motion delayed' reads the motions as "
+            "MIMS does, '~motion velocity' ends this doubt");
+  };
+  for (const Mass& mass : out_.network.masses) {
+    if (moves(mass) && mass.third != 0.0) {
+      return doubt(mass);
+    }
+  }
+  for (const Macro& macro : out_.network.macros) {
+    if (macro.third != 0.0) {
+      return doubt(macro);
+    }
+  }
+}
+
+// Rest away from 0 is written (x, x) in one meaning and (x, 0) in the other; and who starts from 0
+// with a speed writes (0, x), which is a tiny one per second.
+void Reader::decide_by_states() {
+  Network& network = out_.network;
+  const Mass* shows_delayed = nullptr;
+  const Mass* shows_velocity = nullptr;
+  for (const Mass& mass : network.masses) {
+    const bool from_zero = mass.position == 0.0 || mass.third == mass.position;
+    if (moves(mass) && mass.third != 0.0 && from_zero && shows_delayed == nullptr) {
+      shows_delayed = &mass;
+    }
+    if (moves(mass) && mass.third == 0.0 && mass.position != 0.0 && shows_velocity == nullptr) {
+      shows_velocity = &mass;
+    }
+  }
+  if (shows_delayed == nullptr && shows_velocity == nullptr) {
+    return choose_motion(delayed, "nothing shows another meaning");
+  }
+  if (shows_delayed == nullptr) {
+    return choose_motion(velocity,
+                         line_of(shows_velocity->place.line) + " has a rest away from 0 with 0");
+  }
+  const bool is_rest = shows_delayed->position != 0.0;
+  choose_motion(delayed, line_of(shows_delayed->place.line) +
+                             (is_rest ? " has a rest with the position itself" : " starts from 0"));
+  if (shows_velocity == nullptr) {
+    return;
+  }
+  say(Severity::warning, shows_velocity->place.line,
+      {shows_velocity->name, shows_velocity->place.column},
+      "a motion of 0 is read as rest, although the motion is " + out_.motion +
+          "; '~motion velocity' or '~motion delayed' ends this doubt");
+  for (Mass& mass : network.masses) {
+    if (moves(mass) && mass.third == 0.0) {
+      mass.third = mass.position;
+    }
+  }
+}
+
+}  // namespace ressort
