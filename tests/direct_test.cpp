@@ -2,7 +2,7 @@
 #include <string_view>
 
 #include "core/engine/laws.h"
-#include "tests/reference.h"
+#include "tests/reference_network.h"
 #include "tests/rig.h"
 
 namespace ressort {

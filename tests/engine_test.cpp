@@ -2,7 +2,7 @@
 #include "core/engine/engine.h"
 
 #include "tests/player.h"
-#include "tests/reference.h"
+#include "tests/reference_network.h"
 
 namespace ressort {
 namespace {

@@ -2,7 +2,6 @@
 // against the published array algorithm.
 #include <cmath>
 
-#include "tests/reference.h"
 #include "tests/rig.h"
 
 namespace ressort {

@@ -1,18 +1,17 @@
 // tests: a slow textbook simulator, one object per element: the oracle for every kernel. Written
-// from the formulas of the model language's section 2 and never from the engine.
+// from the published formulas and never from the engine. reference_network.h builds one from a
+// Network.
 //
 // Positions are kept as x[n] and x[n-1], as published. That form loses u/theta of a slow mode's
 // precision, so it is carried out in the widest arithmetic that the machine has.
 #pragma once
 
+#include <algorithm>
 #include <cmath>
 #include <deque>
 #include <memory>
 #include <span>
-#include <stdexcept>
 #include <vector>
-
-#include "core/model/network.h"
 
 namespace ressort::reference {
 
@@ -23,8 +22,7 @@ inline Real sgn(Real x) {
   return x > 0 ? 1 : x < 0 ? -1 : 0;
 }
 
-// --- what has a position
-// --------------------------------------------------------------------------
+// --- what has a position ----------------------------------------------------------------------
 
 class Point {
  public:
@@ -35,9 +33,16 @@ class Point {
 
   virtual void step() = 0;
   void receive(Real force) { force_ += force; }
+  // A force input's value, which is felt for the whole tick although it moves the mass at once.
+  virtual void push(Real force) {
+    receive(force);
+    pushed_ += force;
+  }
+  void begin_tick() { pushed_ = 0; }
   Real position() const { return x_; }
   Real velocity() const { return x_ - x_before_; }
-  Real force() const { return force_; }  // received since the last step
+  // What the links have exerted since the last step, and the inputs in this tick.
+  virtual Real felt() const { return force_ + pushed_; }
 
  protected:
   void move_to(Real x) {
@@ -48,6 +53,7 @@ class Point {
   Real x_;
   Real x_before_;
   Real force_ = 0;
+  Real pushed_ = 0;
 };
 
 // X[n] = 2 X[n-1] - X[n-2] + F/M
@@ -92,8 +98,56 @@ class PositionInput : public Point {
   Real in_;
 };
 
-// --- what exerts a force: F_a -= f, F_b += f
-// ------------------------------------------------------
+// A place on rows * columns nodes, with no mass of its own. Along each side node i counts with
+// w_i = max(0, 1 - |p - i|), p being the coordinate in nodes: X = sum w_i x_i, F_i += w_i F.
+class MacroPoint : public Point {
+ public:
+  MacroPoint(std::vector<Point*> nodes, std::size_t rows, std::size_t columns, Number u, Number v)
+      : Point(0, 0), nodes_(std::move(nodes)), rows_(rows), columns_(columns), u_(u), v_(v) {
+    x_ = x_before_ = sum([](const Point& node) { return node.position(); });
+  }
+  void step() override {
+    move_to(sum([](const Point& node) { return node.position(); }));
+  }
+  void push(Real force) override {
+    for (std::size_t i = 0; i < nodes_.size(); ++i) {
+      nodes_[i]->push(weight(i) * force);
+    }
+  }
+  Real felt() const override {
+    return sum([](const Point& node) { return node.felt(); });
+  }
+  void spread() {
+    for (std::size_t i = 0; i < nodes_.size(); ++i) {
+      nodes_[i]->receive(weight(i) * force_);
+    }
+    force_ = 0;
+  }
+
+ private:
+  static Real hat(Real coordinate, std::size_t nodes, std::size_t i) {
+    const Real p = std::clamp<Real>(coordinate, 0, 1) * static_cast<Real>(nodes - 1);
+    return std::max<Real>(0, 1 - std::fabs(p - static_cast<Real>(i)));
+  }
+  Real weight(std::size_t i) const {
+    return hat(*u_, rows_, i / columns_) * hat(*v_, columns_, i % columns_);
+  }
+  template <class Of>
+  Real sum(Of&& of) const {
+    Real total = 0;
+    for (std::size_t i = 0; i < nodes_.size(); ++i) {
+      total += weight(i) * of(*nodes_[i]);
+    }
+    return total;
+  }
+  std::vector<Point*> nodes_;
+  std::size_t rows_;
+  std::size_t columns_;
+  Number u_;
+  Number v_;
+};
+
+// --- what exerts a force: F_a -= f, F_b += f --------------------------------------------------
 
 class Interaction {
  public:
@@ -264,8 +318,7 @@ class Contact : public Interaction {
   Number threshold_;
 };
 
-// --- all of them together
-// -------------------------------------------------------------------------
+// --- all of them together ---------------------------------------------------------------------
 
 class Simulator {
  public:
@@ -282,6 +335,13 @@ class Simulator {
     position_points_.push_back(&point);
     points_in_order_.pop_back();
     return point;
+  }
+  Point& add_macro_point(std::vector<Point*> nodes, std::size_t rows, std::size_t columns, Number u,
+                         Number v) {
+    auto point = std::make_unique<MacroPoint>(std::move(nodes), rows, columns, u, v);
+    macro_points_.push_back(point.get());
+    points_.push_back(std::move(point));
+    return *points_.back();
   }
 
   void add_spring(Point& a, Point& b, Number k, Number z) { add<SpringDamper>(a, b, k, z); }
@@ -317,12 +377,16 @@ class Simulator {
   std::size_t input_count() const { return inputs_.size(); }
   std::size_t output_count() const { return outputs_.size(); }
 
-  // One tick, in the paper's timing: a force input acts on the position of the same tick; then
-  // masses, position inputs, links; an output reads the new position.
+  // One tick, in the paper's timing: a force input acts on the position of the same tick, a place
+  // on a macro is where its coordinates are in this tick; then masses, position inputs, places,
+  // links; an output reads what is new.
   std::vector<double> step(std::span<const double> inputs) {
+    for (const auto& point : points_) {
+      point->begin_tick();
+    }
     for (std::size_t i = 0; i < inputs_.size(); ++i) {
       if (inputs_[i].pushed != nullptr) {
-        inputs_[i].pushed->receive(inputs[i]);
+        inputs_[i].pushed->push(inputs[i]);
       } else {
         inputs_[i].moved->feed(inputs[i]);
       }
@@ -336,21 +400,21 @@ class Simulator {
     for (PositionInput* const point : position_points_) {
       point->step();
     }
+    for (MacroPoint* const point : macro_points_) {
+      point->step();
+    }
     for (const auto& link : links_) {
       link->step();
+    }
+    for (MacroPoint* const point : macro_points_) {
+      point->spread();
     }
     std::vector<double> outputs;
     outputs.reserve(outputs_.size());
     for (const Output& output : outputs_) {
-      Real value = 0;
-      if (output.point != nullptr && output.is_force) {
-        value = output.point->force();  // of the links, and of the inputs of this tick
-        for (std::size_t i = 0; i < inputs_.size(); ++i) {
-          value += inputs_[i].pushed == output.point ? Real{inputs[i]} : Real{0};
-        }
-      } else if (output.point != nullptr) {
-        value = output.point->position();
-      }
+      const Real value = output.point == nullptr ? 0
+                         : output.is_force       ? output.point->felt()
+                                                 : output.point->position();
       outputs.push_back(static_cast<double>(value));
     }
     return outputs;
@@ -386,118 +450,11 @@ class Simulator {
   std::vector<std::unique_ptr<Point>> points_;
   std::vector<Point*> points_in_order_;  // masses, oscillators, grounds
   std::vector<PositionInput*> position_points_;
+  std::vector<MacroPoint*> macro_points_;
   std::vector<std::unique_ptr<Interaction>> links_;
   std::vector<Input> inputs_;
   std::vector<Weight> weights_;
   std::vector<Output> outputs_;
 };
-
-// A Network's simulator and the numbers that its parameters move.
-struct Simulation {
-  Simulator simulator;
-  std::vector<Real*> arguments;  // [ArgumentId]
-
-  void set_parameters(const Network& network, std::span<const double> values) {
-    for (std::size_t i = 0; i < arguments.size(); ++i) {
-      *arguments[i] = argument_value(network, static_cast<ArgumentId>(i), values);
-    }
-  }
-};
-
-inline Simulation make_simulation(const Network& network, std::span<const double> parameters) {
-  Simulation made;
-  Simulator& simulator = made.simulator;
-  for (std::size_t i = 0; i < network.arguments.size(); ++i) {
-    made.arguments.push_back(&simulator.number(0));
-  }
-  made.set_parameters(network, parameters);
-  const Number zero = &simulator.number(0);
-  const auto number = [&](ArgumentId id) { return id == no_argument ? zero : made.arguments[id]; };
-  std::vector<Point*> points;
-  std::vector<PositionInput*> hands;
-  for (const Mass& mass : network.masses) {
-    const Real x0 = mass.position;
-    const Real x1 = network.third == ThirdArgument::delayed_position
-                        ? Real{mass.third}
-                        : x0 - Real{mass.third} / 44100;
-    PositionInput* hand = nullptr;
-    switch (mass.kind) {
-      case MassKind::mass:
-        points.push_back(&simulator.add_mass(number(mass.mass), x0, x1));
-        break;
-      case MassKind::oscillator:
-        points.push_back(&simulator.add_oscillator(number(mass.mass), number(mass.stiffness),
-                                                   number(mass.damping), x0, x1));
-        break;
-      case MassKind::ground:
-        points.push_back(&simulator.add_ground(x0));
-        break;
-      case MassKind::point:
-        throw std::logic_error("the textbook has no macros: write them out");
-      case MassKind::position:
-        hand = &simulator.add_position_point(x0);
-        points.push_back(hand);
-        break;
-    }
-    hands.push_back(hand);
-    if (mass.gravity != no_argument) {
-      simulator.add_gravity(*points.back(), number(mass.gravity),
-                            mass.gravity_per_rate ? Real{44100} : Real{1});
-    }
-  }
-  for (const Link& link : network.links) {
-    Point& a = *points[link.a];
-    Point& b = *points[link.b];
-    const Number first = number(link.arguments[0]);
-    const Number second = number(link.arguments[1]);
-    const Number last = number(link.arguments[2]);
-    const Number fourth = number(link.arguments[3]);
-    const Number fifth = number(link.arguments[4]);
-    switch (link.kind) {
-      case LinkKind::spring:
-        simulator.add_spring(a, b, first, second);
-        break;
-      case LinkKind::pluck:
-        simulator.add_pluck(a, b, first, second, last);
-        break;
-      case LinkKind::bow:
-        simulator.add_bow(a, b, first, second);
-        break;
-      case LinkKind::smooth_bow:
-        simulator.add_smooth_bow(a, b, first, second);
-        break;
-      case LinkKind::quadratic_spring:
-      case LinkKind::cubic_spring:
-        simulator.add_nonlinear_spring(a, b, first, second, last,
-                                       link.kind == LinkKind::cubic_spring);
-        break;
-      case LinkKind::clipped_spring:
-        simulator.add_clipped_spring(a, b, first, second, last, fourth);
-        break;
-      case LinkKind::clipped_contact:
-        simulator.add_clipped_contact(a, b, first, second, last, fourth, fifth);
-        break;
-      case LinkKind::contact:
-        simulator.add_contact(a, b, first, second, last);
-        break;
-    }
-  }
-  for (const Input& input : network.inputs) {
-    if (input.is_force) {
-      simulator.add_force_input(*points[input.mass]);
-    } else {
-      simulator.add_position_input(*hands[input.mass]);
-    }
-  }
-  std::vector<const Output*> channels(static_cast<std::size_t>(output_count(network)), nullptr);
-  for (const Output& output : network.outputs) {
-    channels[static_cast<std::size_t>(output.number - 1)] = &output;
-  }
-  for (const Output* const output : channels) {
-    simulator.add_output(output == nullptr ? nullptr : points[output->mass],
-                         output != nullptr && output->is_force);
-  }
-  return made;
-}
 
 }  // namespace ressort::reference
