@@ -162,22 +162,51 @@ void spread_taps(const Program& program, S& s) {
   }
 }
 
-// The force at a point is that of the nodes around it, interpolated.
+// The place that a node is, an index into taps; their count where it is none.
+std::size_t place_of(const Program& program, std::uint32_t node) {
+  std::size_t i = 0;
+  while (i < program.taps.size() && program.taps[i].node != node) {
+    ++i;
+  }
+  return i;
+}
+
+// The links' force at a point is that of the nodes around it, interpolated.
 template <class S>
 typename S::V force_at(const Program& program, const S& s, std::uint32_t node) {
   using V = typename S::V;
   using T = Element<V>;
-  for (std::size_t i = 0; i < program.taps.size(); ++i) {
-    if (program.taps[i].node == node) {
-      V force{};
-      for (std::size_t lane = 0; lane < S::lanes; ++lane) {
-        around(program, s, i, lane,
-               [&](std::size_t at, T weight) { force[lane] += weight * s.state.force[at]; });
-      }
-      return force;
-    }
+  const std::size_t place = place_of(program, node);
+  if (place == program.taps.size()) {
+    return s.force[node];
   }
-  return s.force[node];
+  V force{};
+  for (std::size_t lane = 0; lane < S::lanes; ++lane) {
+    around(program, s, place, lane,
+           [&](std::size_t at, T weight) { force[lane] += weight * s.state.force[at]; });
+  }
+  return force;
+}
+
+// How much of what pushes one node is felt at another: all of it where they are one, and between
+// two places the product of their weights on every node that both have around them.
+template <class S>
+typename S::V share(const Program& program, const S& s, std::uint32_t from, std::uint32_t at) {
+  using V = typename S::V;
+  using T = Element<V>;
+  V sum{};
+  const std::size_t i = place_of(program, from);
+  const std::size_t j = place_of(program, at);
+  if (i == program.taps.size() || j == program.taps.size()) {
+    return from == at ? sum + T(1) : sum;
+  }
+  for (std::size_t lane = 0; lane < S::lanes; ++lane) {
+    around(program, s, i, lane, [&](std::size_t pushed, T weight) {
+      around(program, s, j, lane,
+             [&](std::size_t felt, T part) { sum[lane] += pushed == felt ? weight * part : T(0); });
+    });
+  }
+  return sum;
 }
 
 template <class S>
@@ -188,8 +217,8 @@ typename S::V read_output(const Program& program, const S& s, const typename S::
   }
   auto force = force_at(program, s, output.node);
   for (std::size_t i = 0; i < program.inputs.size(); ++i) {
-    if (program.inputs[i].is_force && program.inputs[i].node == output.node) {
-      force += value[i];
+    if (program.inputs[i].is_force) {
+      force += share(program, s, program.inputs[i].node, output.node) * value[i];
     }
   }
   return force / static_cast<Element<typename S::V>>(program.rate_ratio * program.rate_ratio);
