@@ -274,7 +274,13 @@ void Reader::look_over() {
               network.masses[link.b].name + "' below '@" + network.masses[link.a].name + "'");
     }
   }
-  tell_gaps(network.inputs, "in");
+  std::vector<Input> heard = network.inputs;
+  for (const Parameter& parameter : network.parameters) {
+    if (parameter.audio_input > 0) {
+      heard.push_back({.number = parameter.audio_input, .place = parameter.place});
+    }
+  }
+  tell_gaps(heard, "in");
   tell_gaps(network.outputs, "out");
   std::vector<bool> used(network.parameters.size(), false);
   for (const Formula& formula : network.arguments) {

@@ -101,14 +101,18 @@ class Reader {
   template <class Channels>
   void tell_gaps(const Channels& channels, std::string_view name) {
     int last = 0;
+    Place place;
     std::vector<int> numbers;
     for (const auto& channel : channels) {
       numbers.push_back(channel.number);
-      last = std::max(last, channel.number);
+      if (channel.number > last) {
+        last = channel.number;
+        place = channel.place;
+      }
     }
     for (int number = 1; number < last; ++number) {
       if (std::find(numbers.begin(), numbers.end(), number) == numbers.end()) {
-        say(Severity::warning, channels.front().place.line, {name, channels.front().place.column},
+        say(Severity::warning, place.line, {name, place.column},
             "there is @" + std::string(name) + std::to_string(last) + ", but no @" +
                 std::string(name) + std::to_string(number));
       }
