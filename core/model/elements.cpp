@@ -307,6 +307,7 @@ ArgumentId Reader::expression(const Line& line, const Token& token) {
   }
   if (is_constant(formula) && !std::isfinite(evaluate(formula, {}))) {
     error(line, token, quoted(token.text) + " is no finite number");
+    return no_argument;
   }
   const auto id = static_cast<ArgumentId>(out_.network.arguments.size());
   out_.network.arguments.push_back(std::move(formula));
@@ -421,7 +422,7 @@ std::optional<std::uint32_t> Reader::tap(const Line& line, const Token& token, c
   const Keyword& keyword = *macro_keywords_.at(found->second);
   const bool is_plane = is_mesh(keyword.macro);
   const std::size_t wanted = is_plane ? 2 : 1;
-  if (!is_plane && coordinates.size() > 1) {
+  if (!is_plane && coordinates.size() > 1 && token.text[0] == '[') {
     const char* const start = coordinates.front().text.data();
     const std::string_view last = coordinates.back().text;
     const auto length = static_cast<std::size_t>(last.data() + last.size() - start);
