@@ -218,6 +218,14 @@ void Reader::build(Line& line) {
 }
 
 bool Reader::check_count(const Line& line) {
+  for (const Token& token : line.rest) {
+    const char opened = token.text[0];
+    if ((opened == '[' && token.text.back() != ']') ||
+        (opened == '\'' && (token.text.size() == 1 || token.text.back() != '\''))) {
+      error(line, token, "this " + std::string(1, opened) + " is never closed");
+      return false;
+    }
+  }
   const Keyword& keyword = *line.keyword;
   const int found = static_cast<int>(line.rest.size());
   const int least = keyword.references + keyword.least;
@@ -237,7 +245,8 @@ bool Reader::check_count(const Line& line) {
         "'" + std::string(keyword.word) + "' takes " + std::to_string(least) +
             (most > least ? " to " + std::to_string(most) : "") +
             (most == 1 ? " argument (" : " arguments (") + std::string(keyword.arguments) +
-            "), found " + std::to_string(found));
+            "), found " + std::to_string(found) +
+            (line.coordinates.empty() ? "" : " before the place on a macro"));
   return false;
 }
 
