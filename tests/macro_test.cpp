@@ -2,12 +2,29 @@
 // against the published array algorithm.
 #include <cmath>
 
+#include "core/model/topology.h"
 #include "tests/rig.h"
+#include "tests/told.h"
 
 namespace ressort {
 namespace {
 
 using namespace rig;
+using told::check_error;
+
+constexpr auto delayed = ThirdArgument::delayed_position;
+constexpr auto velocity = ThirdArgument::velocity_per_second;
+
+const std::string two_masses = "@a mass 1. 0. 0.\n@b mass 1. 0. 0.\n";
+
+double value(const Network& network, ArgumentId id) {
+  return argument_value(network, id, parameter_values(network));
+}
+
+// Argument `slot` of the last link.
+double link_value(const Network& network, std::size_t slot) {
+  return value(network, network.links.back().arguments[slot]);
+}
 
 // One line of appendix A: unit force at tick 0 through the place `in`, heard at `out`. There a
 // force acts one tick after it is given, here on the same; so tick n there is n - 1 here.
@@ -177,38 +194,147 @@ TEST_CASE("a place that moves at audio rate follows the published array algorith
   CHECK(forces.relative() < 2e-12);
 }
 
-TEST_CASE("wrong macros and places are told with line and column", "[macro]") {
-  struct Wrong {
-    const char* text;
-    int column;
-    const char* message;
+TEST_CASE("a macro's number of arguments tells its dialect and its air", "[macro]") {
+  struct Form {
+    std::string start;
+    int least;
   };
-  for (const Wrong& wrong :
-       {Wrong{"@s string 2000000000 1 1 0 0 0\n", 11, "a number of nodes from 2 to 4000000"},
-        Wrong{"@s string 1 1 1 0 0 0\n", 11, "a number of nodes from 2"},
-        Wrong{"@s mesh 3000 3000 1 1 0 0 0\n", 9, "more than 4000000 nodes together"},
-        Wrong{"@s string 5 1 1 0\n", 18, "'string' takes 5 to 7 arguments"},
-        Wrong{"@s string n 1 1 0 0 0\n", 11, "found 'n' where a number of nodes"}}) {
-    INFO(wrong.text);
-    const ParsedNetwork parsed = parse_network(wrong.text);
-    REQUIRE_FALSE(parsed.ok());
-    CHECK(parsed.diagnostics[0].column == wrong.column);
-    CHECK(parsed.diagnostics[0].message.find(wrong.message) != std::string::npos);
+  for (const Form& form :
+       {Form{"@s string 5 2 3 4", 5}, Form{"@s chain 5 2 3 4", 5},
+        Form{"@s stiffString 5 2 3 9 4", 6}, Form{"@s mesh 3 3 2 3 4", 6},
+        Form{"@s closedMesh 3 3 2 3 4", 6}, Form{"@s cornerMesh 3 3 2 3 4", 6}}) {
+    INFO(form.start);
+    const Network mims = network_of(form.start + " 0.5");
+    const Network max = network_of(form.start + " 0.5 7");
+    const Network air = network_of(form.start + " 6 0.5 7");
+    CHECK(mims.third == delayed);
+    CHECK(mims.macros[0].third == 0.5);  // at rest
+    CHECK(max.third == velocity);
+    CHECK(max.macros[0].third == 7.0);
+    CHECK(air.third == velocity);
+    CHECK(air.macros[0].third == 7.0);
+    CHECK(mims.macros[0].air_damping == no_argument);
+    CHECK(max.macros[0].air_damping == no_argument);
+    CHECK(value(air, air.macros[0].air_damping) == 6.0);
+    for (const Network& network : {mims, max, air}) {
+      const Macro& macro = network.macros[0];
+      CHECK(value(network, macro.mass) == 2.0);
+      CHECK(value(network, macro.stiffness) == 3.0);
+      CHECK(value(network, macro.damping) == 4.0);
+      CHECK(macro.position == 0.5);
+      CHECK(value(network, macro.second_stiffness) ==
+            (macro.kind == MacroKind::stiff_string ? 9.0 : 0.0));
+    }
   }
-  const std::string string = "@s string 5 1 1 0 0 0\n@m mesh 3 3 1 1 0 0 0\n@p mass 1 0 0\n";
-  for (const Wrong& wrong :
-       {Wrong{"@o springDamper @m @p 1 0.1 0.5", 17, "needs two coordinates, [@m u v]"},
-        Wrong{"@o spring [@m 0.5] @p 1", 11, "needs two coordinates, [@m u v]"},
-        Wrong{"@o spring [@q 0.5] @p 1", 12, "no macro is called '@q'"},
-        Wrong{"@o spring [@p 0.5] [@s 1] 1", 12, "is one mass"},
-        Wrong{"@o spring [@s w] @p 1", 15, "'w' is no parameter"}}) {
-    INFO(wrong.text);
-    const ParsedNetwork parsed = parse_network(string + wrong.text);
-    REQUIRE_FALSE(parsed.ok());
-    CHECK(parsed.diagnostics[0].line == 4);
-    CHECK(parsed.diagnostics[0].column == wrong.column);
-    CHECK(parsed.diagnostics[0].message.find(wrong.message) != std::string::npos);
+  // At rest in a file of the other dialect too.
+  const Network mixed = network_of("@s string 5 2 3 4 0.5\n@m mass 1 [0 0 1] 0\n");
+  CHECK(mixed.third == velocity);
+  CHECK(mixed.macros[0].third == 0.0);
+  check_error("@s string 5 1 1 0", 1, 18,
+              "'string' takes 5 to 7 arguments (N M K Z [ZO] POSITION [MOTION]), found 4");
+  check_error("@s mesh 3 3 1 1 1 1 1 1 1", 1, 25,
+              "'mesh' takes 6 to 8 arguments (LENGTH WIDTH M K Z [ZO] POSITION [MOTION]), found 9");
+  const std::string count = " where a number of nodes from 2 to 4000000 was expected";
+  check_error("@s string 2000000000 1 1 0 0 0", 1, 11, "found '2000000000'" + count);
+  check_error("@s string 99999999999999999999999 1 1 0 0 0", 1, 11,
+              "found '99999999999999999999999'" + count);
+  check_error("@s string -5 1 1 0 0 0", 1, 11, "found '-5'" + count);
+  check_error("@s string 5.0 1 1 0 0 0", 1, 11, "found '5.0'" + count);
+  check_error("@s stiffString 2 1 1 1 0 0 0", 1, 16,
+              "found '2' where a number of nodes from 3 to 4000000 was expected");
+  check_error("@s mesh 3000 3000 1 1 0 0 0", 1, 9,
+              "the macros have more than 4000000 nodes together");
+  check_error("@s string 3000000 1 1 0 0 0\n@t string 3000000 1 1 0 0 0", 2, 11,
+              "the macros have more than 4000000 nodes together");
+}
+
+TEST_CASE("a place behind the arguments is taken off before they are counted", "[macro]") {
+  const std::string macros =
+      two_masses + "@s chain 5 1 1 1 0\n@q mesh 3 4 1 1 1 0\n@p param 0.25\n";
+  const auto tapped = [&](const std::string& line) { return network_of(macros + line); };
+  const auto coordinate = [](const Network& network, std::size_t tap) {
+    return std::pair(value(network, network.taps.at(tap).u),
+                     value(network, network.taps.at(tap).v));
+  };
+  Network n = tapped("@l contact @s @a 1 2 3 0.5");
+  CHECK(link_value(n, 2) == 3.0);
+  CHECK(coordinate(n, 0) == std::pair(0.5, 0.0));
+  n = tapped("@l contact @a @s 1 2 0.5");
+  CHECK(n.links[0].arguments[2] == no_argument);
+  CHECK(coordinate(n, 0) == std::pair(0.5, 0.0));
+  n = tapped("@l springDamper @s @q 1 2 p 0.1:p+0.5");
+  CHECK(link_value(n, 1) == 2.0);
+  CHECK(coordinate(n, 0) == std::pair(0.25, 0.0));
+  CHECK(coordinate(n, 1) == std::pair(0.1, 0.75));
+  CHECK(n.masses[n.links[0].a].kind == MassKind::point);
+  CHECK(n.masses[n.links[0].b].tap == 1);
+  n = tapped("@in1 frcInput @q 0:1\n@out1 frcOutput @s 1.");
+  CHECK(coordinate(n, 0) == std::pair(0.0, 1.0));
+  CHECK(coordinate(n, 1) == std::pair(1.0, 0.0));
+  // The newer dialect's brackets say the same.
+  CHECK(network_of(macros + "@m ground [0 0 0]\n@l spring [@s p] [@q 0.1 p+0.5] 1 2").links ==
+        network_of(macros + "@m ground [0 0 0]\n@l spring @s @q 1 2 p 0.1:p+0.5").links);
+  CHECK(coordinate(tapped("@l spring [@s p + 0.1] @a 1"), 0) == std::pair(0.35, 0.0));
+  CHECK(coordinate(tapped("@l spring [ @s  0.5 ] @a 1"), 0) == std::pair(0.5, 0.0));
+
+  const std::string one =
+      " is a chain: a place on it needs one coordinate, [@s u], each from 0 to 1";
+  const std::string two =
+      " is a mesh: a place on it needs two coordinates, [@m u v], each from 0 to 1";
+  check_error(macros + "@l spring @a @s 1", 6, 16,
+              "'spring' takes 3 to 4 arguments (@A @B K [Z]), found 2 before the place on a macro");
+  check_error(macros + "@out1 posOutput @s", 6, 17, "'@s'" + one);
+  check_error(macros + "@out1 posOutput [@s]", 6, 17, "'@s'" + one);
+  check_error(macros + "@out1 posOutput @q 0.5", 6, 17, "'@q'" + two);
+  check_error(macros + "@out1 posOutput [@q 0.5]", 6, 17, "'@q'" + two);
+  check_error(macros + "@out1 posOutput [@q 0.1 0.2 0.3]", 6, 17, "'@q'" + two);
+  check_error(macros + "@out1 posOutput @s 0.1:0.2", 6, 17, "'@s'" + one);
+  check_error(macros + "@out1 posOutput [@s 0.1 0.2]", 6, 25,
+              "found '0' where an operator or the end was expected");
+  check_error(macros + "@out1 posOutput [@a 0.5]", 6, 18,
+              "'@a' is one mass, so it has no places on it: write it without '['");
+  check_error(macros + "@out1 posOutput [@ss 0.5]", 6, 18,
+              "no macro is called '@ss'; did you mean '@s'?");
+  check_error(macros + "@out1 posOutput @a 0.5", 6, 20,
+              "'posOutput' takes 1 argument (@MASS), found 2");
+  check_error(macros + "@out1 posOutput [@s w]", 6, 21,
+              "'w' is no parameter of this model; did you mean 'p'?");
+}
+
+TEST_CASE("places, grounds and hands start at rest where they are", "[macro]") {
+  // Dampers alone: at the first tick nothing has moved, so nothing is felt.
+  rig::Bare<double> bare(
+      make_program(network_of("@in1 posInput 3\n@g ground -2\n@s chain 5 1 0.1 0 [0 0 1.5] 0\n"
+                              "@q closedMesh 4 4 1 0.1 0 [0 0 0.5] [0 0 0]\n"
+                              "@k damper [@s 0.3] @in1 1\n@l damper [@s 0.6] @g 1\n"
+                              "@m damper [@q 0.4 0.6] @g 1\n@out1 frcOutput @in1\n"
+                              "@out2 frcOutput @g\n@out3 posOutput [@s 0.4]\n"
+                              "@out4 posOutput [@q 0.3 0.3]"),
+                   44100.0, true));
+  for (int n = 0; n < 10; ++n) {
+    const auto outputs = bare.step({3.0});
+    CHECK(std::fabs(outputs[0]) < 1e-15);
+    CHECK(std::fabs(outputs[1]) < 1e-15);
+    CHECK(std::fabs(outputs[2] - 1.5) < 1e-14);
+    CHECK(std::fabs(outputs[3] - 0.5) < 1e-14);
   }
+  // A string's ends stay where they are, whatever its speed.
+  const Network moving = expand_macros(network_of("@s string 4 1 0.1 0 0 441"));
+  CHECK(initial_velocity(moving, moving.masses[0]) == 0.0);
+  CHECK(initial_velocity(moving, moving.masses[1]) == 0.01);
+  CHECK(initial_velocity(moving, moving.masses[3]) == 0.0);
+}
+
+TEST_CASE("the force at a place is that of the nodes around it, inputs included", "[macro]") {
+  // 3 nodes: 0.25 is between the first two. A push there is felt at half of that on each, so half
+  // of it is felt where it acts, and a quarter at 0.125, which is nearer to the first: 3/4 and 1/4.
+  rig::Bare<double> bare(
+      make_program(network_of("@s chain 3 1 0 0 0 0\n@in1 frcInput [@s 0.25]\n"
+                              "@out1 frcOutput [@s 0.25]\n@out2 frcOutput [@s 0.125]\n"
+                              "@out3 frcOutput [@s 1]\n@out4 posOutput [@s 0.25]"),
+                   44100.0, true));
+  CHECK(bare.step({1.0}) == std::vector{0.5, 0.5, 0.0, 0.5});
+  CHECK(bare.step({0.0}) == std::vector{0.0, 0.0, 0.0, 1.0});
 }
 
 }  // namespace ressort

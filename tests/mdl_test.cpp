@@ -49,17 +49,6 @@ void check_error(const Complaint& complaint) {
   CHECK(errors[0].length >= 1);
 }
 
-void check_warning(const Complaint& complaint) {
-  const ParsedNetwork parsed = parse_network(complaint.text);
-  const auto warnings = said(parsed, Severity::warning);
-  INFO(complaint.text);
-  CHECK(parsed.ok());
-  REQUIRE(warnings.size() == 1);
-  CHECK(warnings[0].message == complaint.message);
-  CHECK(warnings[0].line == complaint.line);
-  CHECK(warnings[0].column == complaint.column);
-}
-
 }  // namespace
 
 TEST_CASE("every keyword takes its numbers of arguments and no other", "[mdl]") {
@@ -252,55 +241,6 @@ TEST_CASE("lines may come in any order and layout", "[mdl]") {
   check_error({"\n\n\t@m\tmass\t0\t0\t0", 3, 10, "a mass must be above 0, found '0'"});
 }
 
-TEST_CASE("gravity, vectors and display blocks are read in both dialects", "[mdl]") {
-  const ParsedNetwork mims =
-      parse_network("@m massG 2. 0.5 1. 1.\n@o osc 1. 2. 3. 0. 0. b 4. 5.\n");
-  REQUIRE(mims.ok());
-  CHECK(mims.network.third == ThirdArgument::delayed_position);
-  CHECK(argument_value(mims.network, mims.network.masses[0].gravity, {}) == 0.5);
-  CHECK_FALSE(mims.network.masses[0].gravity_per_rate);
-  CHECK(mims.network.masses[1].gravity == no_argument);
-
-  const ParsedNetwork max = parse_network(
-      "~begin strings\n@m mass 2. 0.5 [1. 2. 3.] -100\n~end strings\n@o osc 1. 2. 3. 4. 5. 6.\n");
-  REQUIRE(max.ok());
-  CHECK(max.network.third == ThirdArgument::velocity_per_second);
-  const Mass& mass = max.network.masses[0];
-  CHECK(mass.gravity_per_rate);
-  CHECK(mass.position == 3.0);  // the third component swings
-  CHECK(mass.third == -100.0);
-  REQUIRE(mass.drawing == 1);
-  CHECK(max.network.drawings[0] == Drawing{"strings", 1.0, 2.0});
-  CHECK(argument_value(max.network, max.network.masses[1].gravity, {}) == 4.0);
-  CHECK(max.network.masses[1].position == 5.0);
-}
-
-TEST_CASE("a label that two kinds of element want is told, whichever comes first", "[mdl]") {
-  for (const char* const first : {"@x param 1", "@x spring @a @b 1", "@x string 4 1 1 0 0 0",
-                                  "@x mass 1 0 0", "@x audioParam @in1"}) {
-    for (const char* const second : {"@x mass 1 0 0", "@x string 4 1 1 0 0 0", "@x param 2",
-                                     "@x osc 1 1 0 0 0", "@x ground 0"}) {
-      INFO(first << ", then " << second);
-      const ParsedNetwork parsed =
-          parse_network(two_masses + first + "\n" + second + "\n@y spring @x @a 1\n");
-      CHECK_FALSE(parsed.ok());
-      CHECK(said(parsed, Severity::error)[0].message.find("already declared in line 3") !=
-            std::string::npos);
-    }
-  }
-}
-
-TEST_CASE("a slash that an editor has lost is put back, with a warning", "[mdl]") {
-  const ParsedNetwork parsed = parse_network(
-      "@k param 0.3\n@g ground 0.\n@m mass 1. 0. 0.\n@r springDamper @g @m [sqrt(k3)] 0.01\n"
-      "@out1 posOutput @m\n");
-  REQUIRE(parsed.ok());
-  const ArgumentId stiffness = parsed.network.links[0].arguments[0];
-  CHECK(argument_value(parsed.network, stiffness, std::vector{0.3}) == Approx(std::sqrt(0.1)));
-  REQUIRE(parsed.diagnostics.size() == 1);
-  CHECK(parsed.diagnostics[0].message.find("read as 'sqrt(k/3)'") != std::string::npos);
-}
-
 TEST_CASE("every error tells its line, its column and what was expected", "[mdl]") {
   const std::string p = "@m_K param 1\n";
   const std::vector<Complaint> complaints = {
@@ -383,36 +323,6 @@ TEST_CASE("every error tells its line, its column and what was expected", "[mdl]
   }
 }
 
-TEST_CASE("what is legal and hardly meant is told as a warning", "[mdl]") {
-  const std::string sounding = two_masses + "@l spring @a @b 1\n@out1 posOutput @a\n";
-  CHECK(parse_network(sounding).diagnostics.empty());
-  check_warning({sounding + "mass 1. 0. 0.", 5, 1,
-                 "ignored: an element starts with '@', a comment with '#', found 'mass'"});
-  check_warning({sounding + "@p param 1", 5, 1, "the parameter 'p' is used nowhere"});
-  check_warning({sounding + "@c mass 1 0 0", 5, 1, "nothing is attached to '@c'"});
-  check_warning({sounding + "@l spring @b @a 1", 5, 1,
-                 "'@l' is already declared in line 3; both links are kept"});
-  check_warning({sounding + "@k spring @b @b 1", 5, 14,
-                 "the link's two ends are the same mass: it has no effect"});
-  check_warning(
-      {two_masses + "@l spring @a @b 1\n", 1, 1, "the model has no output, so it will be silent"});
-  // Both links with one label are there, as the seed paper's own listing has them.
-  CHECK(network_of(scenes::poly_triangle()).links.size() == 4);
-}
-
-TEST_CASE("all problems are told at once, in the order of the lines", "[mdl]") {
-  const ParsedNetwork parsed = parse_network(
-      "@out1 posOutput @c\n@a mass 1 0 0\n@b mas 1 0 0\n@l spring @a @a\n@in1 frcInput @a\n@in2");
-  const auto errors = said(parsed, Severity::error);
-  REQUIRE(errors.size() == 4);
-  CHECK(errors[0].line == 1);
-  CHECK(errors[1].line == 3);
-  CHECK(errors[2].line == 4);
-  CHECK(errors[3].line == 6);
-  CHECK(to_string(errors[1], "dir/x.mdl") ==
-        "dir/x.mdl:3:4: error: unknown keyword 'mas'; did you mean 'mass'?");
-}
-
 TEST_CASE("a file of nothing but errors is given up after a hundred", "[mdl]") {
   // Each kind costs the reader most in another way; the test's time limit is what they break.
   std::string unknown_words;
@@ -433,36 +343,6 @@ TEST_CASE("a file of nothing but errors is given up after a hundred", "[mdl]") {
   }
   const ParsedNetwork parsed = parse_network(unknown_masses);
   CHECK(parsed.diagnostics.back().message == "too many problems; those after this are not told");
-}
-
-TEST_CASE("the third argument is a delayed position or a velocity, as the file shows", "[mdl]") {
-  const auto third = [](const std::string& text) { return network_of(text).third; };
-  constexpr auto delayed = ThirdArgument::delayed_position;
-  constexpr auto velocity = ThirdArgument::velocity_per_second;
-  // Only states to go by: (x, x) is at rest in one meaning, (x, 0) in the other.
-  CHECK(third("@a mass 1 0 0") == delayed);
-  CHECK(third("@a mass 1 1 1") == delayed);
-  CHECK(third("@a mass 1 0 1") == delayed);
-  CHECK(third("@a mass 1 1 0") == velocity);
-  CHECK(third("@a osc 1 .1 0 1 0") == velocity);
-  // A form that only one dialect has decides.
-  CHECK(third("@a mass 1 1 0 group 0 0") == delayed);
-  CHECK(third(two_masses + "@c mass 1 0 1\n@l contact @a @b 1 1") == velocity);
-  CHECK(third(two_masses + "@c mass 1 0 1\n@l contact @a @b 1 1 0") == delayed);
-  CHECK(third(two_masses + "@c mass 1 0 1\n@l nlPluck @a @b 1 1 0") == velocity);
-  CHECK(third(two_masses + "@c mass 1 0 1\n@l nlPluck @a @b 1 1") == delayed);
-  CHECK(third(two_masses + "@c mass 1 0 1\n@l nlBow @a @b 1 1 0") == velocity);
-  CHECK(third(two_masses + "@c mass 1 0 1\n@l nlBow @a @b 1 1 1") == velocity);
-  CHECK(third(two_masses + "@c mass 1 0 1\n@l nlBow @a @b 1 1") == delayed);
-
-  // What it comes to: the change of position per sample at the start.
-  const Network falling = network_of("@a mass 1 1. 0.9");
-  CHECK(initial_velocity(falling, falling.masses[0]) == 1. - 0.9);
-  const Network thrown = network_of("@a mass 1 2 -441\n@b mass 1 1 0\n@l contact @a @b 1 1");
-  CHECK(initial_velocity(thrown, thrown.masses[0]) == -441. / 44100.);
-  const Network still = network_of("@g ground 3\n@in1 posInput 2\n@m mass 1 0 0");
-  CHECK(initial_velocity(still, still.masses[0]) == 0.0);
-  CHECK(initial_velocity(still, still.masses[1]) == 0.0);
 }
 
 TEST_CASE("text that no person wrote does no harm", "[mdl]") {
