@@ -7,13 +7,11 @@
 #include <cmath>
 #include <cstdio>
 #include <mutex>
-#include <nlohmann/json.hpp>
 #include <thread>
 
 #include "app/midi_input.h"
 #include "app/terminal.h"
 #include "app/text.h"
-#include "core/model/print.h"
 
 namespace ressort {
 namespace {
@@ -76,7 +74,7 @@ class Player {
   explicit Player(const PlayOptions& options) : options_(options), signals_(block_signals()) {}
 
   int run() {
-    const auto scene = load_scene(options_.name, false);
+    const auto scene = load_scene(options_.name, {.third = options_.third});
     if (!scene) {
       complain(scene.error().message);
       return exit_code::wrong_use;
@@ -91,7 +89,8 @@ class Player {
                                                              .rescale = options_.rescale,
                                                              .voices = options_.voices,
                                                              .precision = options_.precision},
-                                                 .gain = std::pow(10.0, options_.gain_db / 20.0)},
+                                                 .gain = std::pow(10.0, options_.gain_db / 20.0),
+                                                 .third = options_.third},
                                   [this](const std::string& news) { voice_.say(news); });
     connect_session();
     const auto loaded = session_->load_and_wait(options_.name);
@@ -308,70 +307,6 @@ class Player {
   std::unique_ptr<Terminal> terminal_;
 };
 
-nlohmann::json to_json(const Scene& scene, const Compiled& compiled) {
-  using nlohmann::json;
-  const Instrument& instrument = compiled.instrument;
-  json parameters = json::array();
-  for (const ParameterInfo& info : instrument.parameters) {
-    parameters.push_back({{"name", info.name},
-                          {"value", info.value},
-                          {"minimum", info.minimum},
-                          {"maximum", info.maximum}});
-  }
-  json plan = json::array();
-  for (const Part& part : compiled.plan.parts) {
-    plan.push_back({{"method", method_name(part.method)},
-                    {"masses", part.masses},
-                    {"links", part.links},
-                    {"reason", part.reason}});
-  }
-  json out{{"file", scene.path},
-           {"model", scene.model_path},
-           {"warnings", scene.warnings},
-           {"masses", instrument.masses},
-           {"links", instrument.links},
-           {"inputs", instrument.inputs.size()},
-           {"outputs", instrument.outputs},
-           {"parameters", parameters},
-           {"plan", plan},
-           {"stiffness_margin", instrument.stiffness_margin}};
-  if (instrument.mode) {
-    out["lowest_mode_hz"] = instrument.mode->frequency_hz;
-  }
-  return out;
-}
-
-void print_check(const Scene& scene, const Compiled& compiled) {
-  const Instrument& instrument = compiled.instrument;
-  for (const std::string& warning : scene.warnings) {
-    std::printf("%s\n", warning.c_str());
-  }
-  std::printf("%s: %s, %s, %s, %s\n", scene.path.c_str(),
-              counted(instrument.masses, "mass that moves", "masses that move").c_str(),
-              counted(instrument.links, "link", "links").c_str(),
-              counted(instrument.inputs.size(), "input", "inputs").c_str(),
-              counted(static_cast<std::size_t>(instrument.outputs), "output", "outputs").c_str());
-  for (const ParameterInfo& info : instrument.parameters) {
-    std::printf("  %-12s %-10g from %g to %g\n", info.name.c_str(), info.value, info.minimum,
-                info.maximum);
-  }
-  std::printf("runs as\n  %s", describe(compiled.plan).c_str());
-  if (instrument.mode) {
-    std::printf(
-        "lowest mode %.3f Hz; keys are in tune up to %.0f Hz, higher ones come down by "
-        "octaves\n",
-        instrument.mode->frequency_hz, instrument.highest_frequency_hz);
-  }
-  if (instrument.stiffness_margin >= 1.0) {
-    std::printf("stable: every stiffness may grow by %.3g at least\n", instrument.stiffness_margin);
-  } else {
-    std::printf(
-        "warning: stability is not proved; stiffness and damping may be too high for the "
-        "masses (margin %.3g)\n",
-        instrument.stiffness_margin);
-  }
-}
-
 }  // namespace
 
 int play(const PlayOptions& options) {
@@ -418,44 +353,6 @@ int render_command(const RenderOptions& options, bool is_quiet) {
              std::to_string(rendered->resets) + " times; the sound is not to be trusted");
   }
   return rendered->was_interrupted ? exit_code::our_failure : exit_code::done;
-}
-
-int check(const std::string& name, bool as_json) {
-  const auto scene = load_scene(name, false);
-  if (!scene) {
-    if (as_json) {
-      std::printf("%s\n", nlohmann::json{{"error", scene.error().message}}.dump(2).c_str());
-    } else {
-      complain(scene.error().message);
-    }
-    return exit_code::wrong_use;
-  }
-  const auto compiled = compile(scene->network, scene->preset, {});
-  if (!compiled) {
-    complain(scene->path + ":" + std::to_string(compiled.error().line) + ":" +
-             std::to_string(compiled.error().column) + ": error: " + compiled.error().message);
-    return exit_code::wrong_use;
-  }
-  if (as_json) {
-    std::printf("%s\n", to_json(*scene, *compiled).dump(2).c_str());
-  } else {
-    print_check(*scene, *compiled);
-  }
-  return exit_code::done;
-}
-
-int print_model(const std::string& name) {
-  const auto scene = load_scene(name, false);
-  if (!scene) {
-    complain(scene.error().message);
-    return exit_code::wrong_use;
-  }
-  for (const std::string& warning : scene->warnings) {
-    complain(warning);
-  }
-  const std::string text = print_network(scene->network);
-  std::fwrite(text.data(), 1, text.size(), stdout);
-  return exit_code::done;
 }
 
 }  // namespace ressort

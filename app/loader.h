@@ -1,7 +1,9 @@
 // app: from a name to what can be compiled: finds the files, reads the texts.
 #pragma once
 
+#include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "core/model/mdl.h"
@@ -11,6 +13,27 @@
 
 namespace ressort {
 
+// Something to say about a file.
+struct Finding {
+  std::string file;
+  Diagnostic diagnostic;  // line 0: about the file as a whole
+  std::string source;     // the line itself; empty where there is none
+};
+
+// An error at a place of the text that is all of `file`.
+Finding finding_of(const std::string& file, std::string_view text, const Error& error);
+
+// "file:line:column: error: message".
+std::string to_string(const Finding& finding);
+
+// The same, and under it the line with the place marked, for a terminal.
+std::string with_source(const Finding& finding);
+
+struct SceneOptions {
+  bool bare = false;                   // the model without a preset: the network alone
+  std::optional<ThirdArgument> third;  // whatever preset and model say
+};
+
 struct Scene {
   std::string name;  // "PolyTriangle", for people
   std::string path;  // of the file that was asked for
@@ -18,12 +41,22 @@ struct Scene {
   Network network;
   Preset preset;
   bool has_preset = false;            // read from a file, not made up
+  std::string motion;                 // what the third state argument means, and why
   std::vector<std::string> warnings;  // "file:line:column: warning: ..."
 };
 
-// Finds and reads a model or a preset with its model. Without a preset the model gets a default
-// one, `bare` or playable. The error's message is all diagnostics, one a line, each with its file,
-// line and column. Blocks on the disk. [any thread but audio]
-Result<Scene> load_scene(const std::string& name, bool bare);
+// What came of a name: a scene unless a finding is an error.
+struct Reading {
+  std::optional<Scene> scene;
+  std::vector<Finding> findings;
+};
+
+// Finds and reads a model or a preset with its model; goes on after an error in the model, so that
+// every problem is told at once. Without a preset the model gets a default one, `bare` or
+// playable. Blocks on the disk. [any thread but audio]
+Reading read_scene(const std::string& name, const SceneOptions& options);
+
+// The same for who wants the scene or nothing. The error's message is all findings, one a line.
+Result<Scene> load_scene(const std::string& name, const SceneOptions& options);
 
 }  // namespace ressort

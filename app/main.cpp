@@ -4,6 +4,7 @@
 #include <utility>
 #include <vector>
 
+#include "app/check.h"
 #include "app/commands.h"
 #include "app/make.h"
 #include "core/model/expression.h"
@@ -44,6 +45,14 @@ const char* const make_examples =
     "  ressort make string 50 -o my.mdl            then: ressort play my.mdl\n"
     "  ressort make hexagon 6 --name drum -K 0.2   to be read, or pasted into a model\n"
     "  ressort make closedMesh 150 150 --macro     the same as one line\n";
+
+const char* const check_examples =
+    "Every problem is told at once, as FILE:LINE:COLUMN: error|warning: what, and what was\n"
+    "expected; then what the model has, how it will be computed, and whether it is stable.\n"
+    "Examples:\n"
+    "  ressort check my.mdl\n"
+    "  ressort check my.mdl --json\n"
+    "  ressort check old.mdl --print > new.mdl\n";
 
 // A number within a range; what is no number is in none.
 CLI::Validator within(double least, double most) {
@@ -92,6 +101,21 @@ void add_numbers(CLI::App& command, Precision& precision, bool& rescale) {
       "take the model's numbers raw at rates other than 44100 Hz");
 }
 
+// What the last argument of a mass means, for every command that reads a model.
+void add_motion(CLI::App& command, std::optional<ThirdArgument>& third) {
+  command
+      .add_option_function<std::string>(
+          "--motion",
+          [&third](const std::string& word) {
+            third = word == "velocity" ? ThirdArgument::velocity_per_second
+                                       : ThirdArgument::delayed_position;
+          },
+          "what the last argument of a mass means: velocity, in units per second, or delayed, the\n"
+          "position one sample before; without it, what the preset or the model says or shows")
+      ->check(CLI::IsMember({"velocity", "delayed"}))
+      ->type_name("WORD");
+}
+
 void add_play(CLI::App& app, PlayOptions& options, int& code) {
   CLI::App* command = app.add_subcommand("play", "plays a model or a preset");
   command->footer(play_examples);
@@ -127,6 +151,7 @@ void add_play(CLI::App& app, PlayOptions& options, int& code) {
       ->check(within(16, 8192))
       ->capture_default_str();
   add_numbers(*command, options.precision, options.rescale);
+  add_motion(*command, options.third);
   command->add_flag("-i,--no-console", options.no_console, "do not read commands");
   command->add_option("-e,--execute", options.script, "a file of console commands, run first");
   command->add_option_function<std::string>(
@@ -178,6 +203,7 @@ void add_render(CLI::App& app, RenderChoice& choice, int& code) {
               {"pcm24", SampleFormat::pcm24}},
              "of the file's samples");
   add_numbers(*command, options.precision, options.rescale);
+  add_motion(*command, options.third);
   command->add_option("-p,--voices", options.voices, "how many notes sound at once")
       ->check(within(1, max_voices));
   command->add_flag("--limit", options.limit, "keep below full scale, 1 ms late");
@@ -247,6 +273,22 @@ void add_make(CLI::App& app, MakeOptions& options, std::vector<std::uint32_t>& s
   });
 }
 
+void add_check(CLI::App& app, CheckOptions& options, int& code) {
+  CLI::App* command =
+      app.add_subcommand("check", "reads a model or a preset and says what it found");
+  command->footer(check_examples);
+  command->add_option("FILE", options.name, "a file, or a preset's or model's name")->required();
+  CLI::Option* json = command->add_flag_callback(
+      "--json", [&options] { options.as = CheckAs::json; }, "for machines, errors included");
+  command
+      ->add_flag_callback(
+          "--print", [&options] { options.as = CheckAs::model; },
+          "nothing but the model, as text in one clean dialect")
+      ->excludes(json);
+  add_motion(*command, options.third);
+  command->callback([&options, &code] { code = check(options); });
+}
+
 int run(int argc, char** argv) {
   CLI::App app{"ressort plays networks of masses and springs, read from .mdl files."};
   app.footer(
@@ -259,22 +301,12 @@ int run(int argc, char** argv) {
   int code = exit_code::done;
   PlayOptions play_options;
   RenderChoice render_choice;
-  std::string checked;
-  bool as_json = false;
-  bool as_model = false;
+  CheckOptions check_options;
   MakeOptions make_options;
   std::vector<std::uint32_t> make_sizes;
   add_play(app, play_options, code);
   add_render(app, render_choice, code);
-  CLI::App* check_command =
-      app.add_subcommand("check", "reads a model or a preset and says what it found");
-  check_command->add_option("FILE", checked, "a file, or a preset's or model's name")->required();
-  CLI::Option* json = check_command->add_flag("--json", as_json, "for machines");
-  check_command
-      ->add_flag("--print", as_model, "nothing but the model, as text in one clean dialect")
-      ->excludes(json);
-  check_command->callback(
-      [&] { code = as_model ? print_model(checked) : check(checked, as_json); });
+  add_check(app, check_options, code);
   add_make(app, make_options, make_sizes, code);
   try {
     app.parse(argc, argv);

@@ -2,7 +2,7 @@
 
 #include <cstdio>
 
-#include "app/commands.h"
+#include "app/exit_code.h"
 #include "app/files.h"
 #include "app/text.h"
 #include "core/model/mdl.h"

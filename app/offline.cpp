@@ -97,7 +97,7 @@ Result<Rendered> render(const RenderOptions& options, const std::function<bool(d
   if (options.output == options.input || options.output == options.score) {
     return Error{"'" + options.output + "' is read: it cannot be written too"};
   }
-  auto scene = load_scene(options.name, true);
+  auto scene = load_scene(options.name, {.bare = true, .third = options.third});
   if (!scene) {
     return scene.error();
   }

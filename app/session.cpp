@@ -208,7 +208,7 @@ void Session::do_load(const Job& job) {
 
 Result<std::shared_ptr<const Loaded>> Session::build(const std::string& name) {
   const auto start = std::chrono::steady_clock::now();
-  auto scene = load_scene(name, options_.compile.bare);
+  auto scene = load_scene(name, {.bare = options_.compile.bare, .third = options_.third});
   if (!scene) {
     return scene.error();
   }

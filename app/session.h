@@ -20,8 +20,9 @@
 namespace ressort {
 
 struct SessionOptions {
-  CompileOptions compile;  // its rate is the backend's
-  double gain = 1.0;       // on top of every preset's
+  CompileOptions compile;              // its rate is the backend's
+  double gain = 1.0;                   // on top of every preset's
+  std::optional<ThirdArgument> third;  // of every model, whatever it shows
 };
 
 // What sounds now, as people see it. Never changes once published.

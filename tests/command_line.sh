@@ -63,7 +63,15 @@ model nan.mdl '@K param nan\n@m mass 1. 0. 0.\n'
 expect 2 "nan.mdl:1:10: error: found 'nan'" "$program" check nan.mdl
 model light.mdl '@m mass 0. 0. 0.\n'
 expect 2 "light.mdl:1:9: error: a mass must be above 0" "$program" check light.mdl
-expect 2 "error" "$program" check light.mdl --json
+expect 2 '"message": "a mass must be above 0' "$program" check light.mdl --json
+model motion.mdl '@m mass 1. 0. 5.\n@g ground 0.\n@r spring @m @g 0.1\n@out1 posOutput @m\n'
+expect 0 "a mass's motion is the position one sample before" "$program" check motion.mdl
+expect 0 '"motion": "velocity"' "$program" check motion.mdl --json --motion velocity
+expect 2 "--motion" "$program" check motion.mdl --motion sideways
+model motion.toml 'model = "motion.mdl"\nmotion = "velocity"\n'
+expect 0 "~motion velocity" "$program" check motion.toml --print
+model motion.toml 'model = "motion.mdl"\nmotion = "sideways"\n'
+expect 2 "motion.toml:2:" "$program" check motion.toml
 
 # Presets.
 model broken.toml 'model = "PolyTriangle.mdl\n'

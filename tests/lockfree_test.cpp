@@ -180,19 +180,18 @@ TEST_CASE("a clock board is never read half written", "[lockfree]") {
   CHECK(board.read().rate_hz == 0.0);
   std::atomic<bool> done{false};
   std::thread writer([&] {
-    for (std::int64_t i = 1; i <= 50000; ++i) {
+    for (std::int64_t i = 1; !done.load(); ++i) {
       board.write({i, 3 * i, static_cast<double>(5 * i), 7 * i});
       if (i % 64 == 0) {
         std::this_thread::yield();
       }
     }
-    done.store(true);
   });
   bool whole = true;
   bool forward = true;
   std::int64_t before = 0;
   int seen = 0;
-  while (!done.load()) {
+  while (seen < 2000) {
     const ClockReading reading = board.read();
     whole = whole && reading.time_ns == 3 * reading.frame && reading.period == 7 * reading.frame &&
             reading.rate_hz == static_cast<double>(5 * reading.frame);
@@ -201,11 +200,10 @@ TEST_CASE("a clock board is never read half written", "[lockfree]") {
     before = reading.frame;
     std::this_thread::yield();
   }
+  done.store(true);
   writer.join();
   CHECK(whole);
   CHECK(forward);
-  CHECK(seen > 10);
-  CHECK(board.read().frame == 50000);
 }
 
 TEST_CASE("meters and flags", "[lockfree]") {

@@ -48,7 +48,7 @@ std::multiset<std::tuple<LinkKind, std::string, std::string>> ends(const Network
 TEST_CASE("the models are the published networks", "[models]") {
   for (const Instrument9& instrument : nine()) {
     INFO(instrument.name);
-    const auto scene = load_scene(std::string(instrument.name) + ".mdl", true);
+    const auto scene = load_scene(std::string(instrument.name) + ".mdl", {.bare = true});
     REQUIRE(scene);
     CHECK(scene->warnings.empty());
     const Network expected = rig::network_of(instrument.scene);
@@ -62,7 +62,7 @@ TEST_CASE("the models are the published networks", "[models]") {
 TEST_CASE("a forte note of every preset peaks near -6 dBFS, softer ones below it", "[models]") {
   for (const Instrument9& instrument : nine()) {
     INFO(instrument.name);
-    const auto scene = load_scene(instrument.name, false);
+    const auto scene = load_scene(instrument.name, {});
     REQUIRE(scene);
     REQUIRE(scene->has_preset);
     std::vector<double> levels_db;

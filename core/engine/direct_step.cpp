@@ -109,7 +109,7 @@ void around(const Program& program, const S& s, std::size_t tap, std::size_t lan
 // w_i = max(0, 1 - |p - i|) along each side, p being the coordinate in nodes.
 template <class S>
 void place_taps(const Program& program, S& s) {
-  using T = Element<typename S::V>;
+  using T = Scalar<typename S::V>;
   const auto locate = [](T coordinate, std::uint32_t nodes, std::uint32_t& below, T& beyond) {
     // Not std::clamp: what is no number becomes 0.
     const T within = coordinate > 0 ? (coordinate < 1 ? coordinate : T(1)) : T(0);
@@ -133,7 +133,7 @@ void place_taps(const Program& program, S& s) {
 template <class S>
 void move_taps(const Program& program, S& s) {
   using V = typename S::V;
-  using T = Element<V>;
+  using T = Scalar<V>;
   for (std::size_t i = 0; i < program.taps.size(); ++i) {
     V position{};
     for (std::size_t lane = 0; lane < S::lanes; ++lane) {
@@ -150,7 +150,7 @@ void move_taps(const Program& program, S& s) {
 template <class S>
 void spread_taps(const Program& program, S& s) {
   using V = typename S::V;
-  using T = Element<V>;
+  using T = Scalar<V>;
   for (std::size_t i = 0; i < program.taps.size(); ++i) {
     const std::uint32_t node = program.taps[i].node;
     const V force = s.force[node];
@@ -175,7 +175,7 @@ std::size_t place_of(const Program& program, std::uint32_t node) {
 template <class S>
 typename S::V force_at(const Program& program, const S& s, std::uint32_t node) {
   using V = typename S::V;
-  using T = Element<V>;
+  using T = Scalar<V>;
   const std::size_t place = place_of(program, node);
   if (place == program.taps.size()) {
     return s.force[node];
@@ -193,7 +193,7 @@ typename S::V force_at(const Program& program, const S& s, std::uint32_t node) {
 template <class S>
 typename S::V share(const Program& program, const S& s, std::uint32_t from, std::uint32_t at) {
   using V = typename S::V;
-  using T = Element<V>;
+  using T = Scalar<V>;
   V sum{};
   const std::size_t i = place_of(program, from);
   const std::size_t j = place_of(program, at);
@@ -221,7 +221,7 @@ typename S::V read_output(const Program& program, const S& s, const typename S::
       force += share(program, s, program.inputs[i].node, output.node) * value[i];
     }
   }
-  return force / static_cast<Element<typename S::V>>(program.rate_ratio * program.rate_ratio);
+  return force / static_cast<Scalar<typename S::V>>(program.rate_ratio * program.rate_ratio);
 }
 
 template <class T, std::size_t Bytes>

@@ -27,19 +27,19 @@ using Pack = typename PackOf<T, Bytes>::Type;
 
 // What a pack is made of; a plain number is its own.
 template <class V>
-struct ElementOf {
+struct ScalarOf {
   using Type = decltype(V{}[0] + V{}[0]);
 };
 template <>
-struct ElementOf<float> {
+struct ScalarOf<float> {
   using Type = float;
 };
 template <>
-struct ElementOf<double> {
+struct ScalarOf<double> {
   using Type = double;
 };
 template <class V>
-using Element = typename ElementOf<V>::Type;
+using Scalar = typename ScalarOf<V>::Type;
 
 // a where the mask holds, b elsewhere, lane by lane.
 template <class V, class Mask>
@@ -61,10 +61,10 @@ static inline V sign(V x) {
 
 template <class V>
 static inline V exponential(V x) {
-  if constexpr (sizeof(V) == sizeof(Element<V>)) {
+  if constexpr (sizeof(V) == sizeof(Scalar<V>)) {
     return std::exp(x);
   } else {
-    for (std::size_t i = 0; i < sizeof(V) / sizeof(Element<V>); ++i) {
+    for (std::size_t i = 0; i < sizeof(V) / sizeof(Scalar<V>); ++i) {
       x[i] = std::exp(x[i]);
     }
     return x;

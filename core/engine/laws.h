@@ -38,7 +38,7 @@ static inline V cubic_spring_force(V d, V v, V k, V q, V z) {
 //   else:       f = k d + (Z + 0.3 k) v
 template <class V>
 static inline V clipped_spring_force(V d, V v, V s, V c, V k, V z) {
-  using T = Element<V>;
+  using T = Scalar<V>;
   const V within = s * d + c * d * d * d + z * v;
   const V beyond = k * d + (z + T(0.3) * k) * v;
   const V cubic = select(c > V{}, select(c * d * d <= k - s, within, beyond), beyond);
@@ -75,7 +75,7 @@ static inline V bow_force(V v, V z, V s) {
 template <class V>
 static inline V smooth_bow_force(V v, V z, V s) {
   const V ratio = v / s;
-  using T = Element<V>;
+  using T = Scalar<V>;
   return z * v * T(0.63) * exponential(V{} - 4 * ratio * ratio + T(0.5));
 }
 

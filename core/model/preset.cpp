@@ -292,7 +292,7 @@ Result<Preset> parse_preset(std::string_view text) {
   Preset preset;
   Table reader(root, "a preset", error);
   reader.allow({"model", "description", "voices", "gain", "release_s", "noise", "tuning",
-                "transpose", "parameters", "control"});
+                "transpose", "motion", "parameters", "control"});
   reader.text("model", preset.model);
   reader.text("description", preset.description);
   reader.integer("voices", preset.voices, 1, max_voices);
@@ -305,6 +305,15 @@ Result<Preset> parse_preset(std::string_view text) {
   preset.keyboard = tuning == "keyboard";
   if (!error && !preset.keyboard && tuning != "fixed") {
     reader.fail(*root.get("tuning"), "'tuning' must be keyboard or fixed");
+  }
+  std::string motion;
+  reader.text("motion", motion);
+  if (motion == "velocity") {
+    preset.third = ThirdArgument::velocity_per_second;
+  } else if (motion == "delayed") {
+    preset.third = ThirdArgument::delayed_position;
+  } else if (!error && root.get("motion") != nullptr) {
+    reader.fail(*root.get("motion"), "'motion' must be velocity or delayed");
   }
   if (!error && preset.model.empty()) {
     reader.fail(Place{1, 1}, "a preset needs a model: model = \"PolyTriangle.mdl\"");

@@ -49,6 +49,7 @@ struct Preset {
   bool noise = false;      // the outputs shape white noise
   bool keyboard = true;    // a key sets the pitch
   int transpose = 0;       // semitones between a key and the pitch that it sets
+  std::optional<ThirdArgument> third;  // of the model's masses, whatever the model shows
   std::vector<ParameterSetting> parameters;
   std::vector<ControlSetting> controls;
   bool operator==(const Preset&) const = default;

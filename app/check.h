@@ -1,0 +1,23 @@
+// app: says what is in a model or a preset. The exit code comes back.
+#pragma once
+
+#include <optional>
+#include <string>
+
+#include "core/model/network.h"
+
+namespace ressort {
+
+enum class CheckAs { report, json, model };
+
+struct CheckOptions {
+  std::string name;
+  CheckAs as = CheckAs::report;        // model: the text in one clean dialect
+  std::optional<ThirdArgument> third;  // whatever preset and model say
+};
+
+// Findings go to stderr, with their lines if that is a terminal; with json all is one object on
+// stdout.
+int check(const CheckOptions& options);
+
+}  // namespace ressort
