@@ -73,6 +73,25 @@ expect 0 "~motion velocity" "$program" check motion.toml --print
 model motion.toml 'model = "motion.mdl"\nmotion = "sideways"\n'
 expect 2 "motion.toml:2:" "$program" check motion.toml
 
+# Models as text again: what is printed is read, and printed the same.
+model other.mdl '@g ground 0.\n@a cel 1. .1 0.01 0. 0.\n@r spring @g @a 0.1 .001\n@out1 posOutput @a\n'
+expect 0 "@r springDamper @g @a 0.1 0.001" "$program" check other.mdl --print
+"$program" check other.mdl --print > once.mdl
+"$program" check once.mdl --print > twice.mdl
+cmp -s once.mdl twice.mdl || { echo "FAILED: printed twice, it differs"; failures=$((failures + 1)); }
+expect 2 "no mass is called '@m1'" "$program" check name.mdl --print
+expect 2 "excludes" "$program" check other.mdl --print --json
+expect 0 "NAME_m0" "$program" make --help
+expect 0 "@out1 posOutput" "$program" make string 50
+expect 0 "hex.mdl: 92 masses, 253 links" "$program" make hexagon 5 --fixed none -K 0.2 -o hex.mdl
+expect 0 "stable" "$program" check hex.mdl
+expect 0 "@d closedMesh 150 150 d_M d_K d_Z 0 0" "$program" make closedMesh 150 150 --name d --macro
+expect 2 "at least 2 by 2" "$program" make mesh 5
+expect 2 "KIND: must be one of string, stiffString" "$program" make sphere 5
+expect 2 "at most 100000 points" "$program" make string 100001
+expect 2 "a mass must be above 0" "$program" make string 5 -M 0
+expect 2 "cannot be written" "$program" make string 5 -o no/such/folder/s.mdl
+
 # Presets.
 model broken.toml 'model = "PolyTriangle.mdl\n'
 expect 2 "broken.toml:1:" "$program" check broken.toml

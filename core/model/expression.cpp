@@ -312,8 +312,13 @@ bool parse_number(std::string_view text, double& number) {
 }
 
 std::string print_number(double number) {
+  // Of the two shortest forms, 0.0005 is easier on the eye than 5e-04, and 1e-20 than its zeros.
+  const double size = std::fabs(number);
+  const bool is_usual = number == 0.0 || (size >= 1e-7 && size < 1e15);
   char text[32];
-  const auto [end, error] = std::to_chars(text, text + sizeof text, number);
+  const auto [end, error] =
+      std::to_chars(text, text + sizeof text, number,
+                    is_usual ? std::chars_format::fixed : std::chars_format::scientific);
   std::string printed = error == std::errc{} ? std::string(text, end) : std::string("0");
   std::erase(printed, '+');  // an exponent needs none, and MIMS4Max divides arguments at it
   return printed;

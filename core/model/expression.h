@@ -14,7 +14,7 @@ namespace ressort {
 // "1.", ".1", "-0.2", "1e-3" are numbers; "", "1x", "nan", "inf" are not. [any thread]
 bool parse_number(std::string_view text, double& number);
 
-// The shortest text that reads back as the same number; no '+' is in it.
+// Digits enough to read back as the same number, and no more; no '+' is among them.
 std::string print_number(double number);
 
 // Infix + - * / ( ), unary signs, numbers, parameter names and the functions
