@@ -83,7 +83,7 @@ expect 2 "no mass is called '@m1'" "$program" check name.mdl --print
 expect 2 "excludes" "$program" check other.mdl --print --json
 expect 0 "NAME_m0" "$program" make --help
 expect 0 "@out1 posOutput" "$program" make string 50
-expect 0 "hex.mdl: 92 masses, 253 links" "$program" make hexagon 5 --fixed none -K 0.2 -o hex.mdl
+expect 0 "hex.mdl: 92 masses, 241 links" "$program" make hexagon 5 --fixed none -K 0.2 -o hex.mdl
 expect 0 "stable" "$program" check hex.mdl
 expect 0 "@d closedMesh 150 150 d_M d_K d_Z 0 0" "$program" make closedMesh 150 150 --name d --macro
 expect 2 "at least 2 by 2" "$program" make mesh 5

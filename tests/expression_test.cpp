@@ -147,6 +147,9 @@ TEST_CASE("numbers are read and written free of the locale, and come back the sa
   }
   CHECK(print_number(0.1) == "0.1");
   CHECK(print_number(44100.0) == "44100");
+  CHECK(print_number(0.0005) == "0.0005");
+  CHECK(print_number(-1e-20) == "-1e-20");
+  CHECK(print_number(1e22) == "1e22");
 }
 
 TEST_CASE("a formula as text and its value agree with the same sum written here", "[expression]") {
