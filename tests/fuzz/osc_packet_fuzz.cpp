@@ -1,5 +1,5 @@
 // A libFuzzer target: whatever bytes come, the check neither reads beyond them nor lets liblo do
-// so. Build with clang++ -fsanitize=fuzzer,address,undefined and app/osc_packet.cpp, link -llo.
+// so.
 #include <lo/lo.h>
 
 #include <algorithm>
