@@ -16,7 +16,7 @@ namespace ressort {
 namespace {
 
 constexpr std::size_t frames = 128;
-constexpr std::uint64_t most_nodes = 3000;  // for speed alone: the reader takes millions
+constexpr std::uint64_t most_nodes = 1000;  // for speed alone: the reader takes millions
 
 void require(bool holds) {
   if (!holds) {
