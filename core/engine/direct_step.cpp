@@ -162,27 +162,28 @@ void spread_taps(const Program& program, S& s) {
   }
 }
 
-// The place that a node is, an index into taps; their count where it is none.
-std::size_t place_of(const Program& program, std::uint32_t node) {
-  std::size_t i = 0;
-  while (i < program.taps.size() && program.taps[i].node != node) {
-    ++i;
-  }
-  return i;
+// Whether a node is a place on a macro; it is then taps[node - taps[0].node].
+bool is_place(const Program& program, std::uint32_t node) {
+  return !program.taps.empty() && node >= program.taps[0].node;
 }
 
-// The links' force at a point is that of the nodes around it, interpolated.
+// Calls `use(at, weight)` for what a node stands for in one lane: itself, or what is around it.
+template <class S, class Use>
+void behind(const Program& program, const S& s, std::uint32_t node, std::size_t lane, Use&& use) {
+  if (!is_place(program, node)) {
+    return use(node * S::lanes + lane, Scalar<typename S::V>(1));
+  }
+  around(program, s, node - program.taps[0].node, lane, use);
+}
+
+// The links' force at a node; at a place that of the nodes around it, interpolated.
 template <class S>
 typename S::V force_at(const Program& program, const S& s, std::uint32_t node) {
   using V = typename S::V;
   using T = Scalar<V>;
-  const std::size_t place = place_of(program, node);
-  if (place == program.taps.size()) {
-    return s.force[node];
-  }
   V force{};
   for (std::size_t lane = 0; lane < S::lanes; ++lane) {
-    around(program, s, place, lane,
+    behind(program, s, node, lane,
            [&](std::size_t at, T weight) { force[lane] += weight * s.state.force[at]; });
   }
   return force;
@@ -195,14 +196,9 @@ typename S::V share(const Program& program, const S& s, std::uint32_t from, std:
   using V = typename S::V;
   using T = Scalar<V>;
   V sum{};
-  const std::size_t i = place_of(program, from);
-  const std::size_t j = place_of(program, at);
-  if (i == program.taps.size() || j == program.taps.size()) {
-    return from == at ? sum + T(1) : sum;
-  }
   for (std::size_t lane = 0; lane < S::lanes; ++lane) {
-    around(program, s, i, lane, [&](std::size_t pushed, T weight) {
-      around(program, s, j, lane,
+    behind(program, s, from, lane, [&](std::size_t pushed, T weight) {
+      behind(program, s, at, lane,
              [&](std::size_t felt, T part) { sum[lane] += pushed == felt ? weight * part : T(0); });
     });
   }

@@ -98,7 +98,7 @@ struct TapSlot {
 };
 
 // A part of a network, which no other part touches. Nodes are numbered: masses that move, run by
-// run; then grounds; then position inputs and points.
+// run; then grounds; then position inputs; then places on macros, in the order of `taps`.
 struct Program {
   Form form;
   double rate_hz = 44100.0;
