@@ -9,7 +9,7 @@
 #include "core/model/print.h"
 #include "core/model/topology.h"
 #include "tests/catch.h"
-#include "tests/reference.h"
+#include "tests/reference_network.h"
 #include "tests/rig.h"
 
 namespace ressort {

@@ -39,7 +39,7 @@ ParsedNetwork Reader::read(std::string_view text, const ReadOptions& options) {
     declare(line);
   }
   for (Line& line : lines_) {
-    if (out_.diagnostics.size() > most_diagnostics) {
+    if (errors_ > most_diagnostics) {
       break;
     }
     build(line);
@@ -110,6 +110,10 @@ void Reader::read_block(const std::vector<Token>& tokens, int number) {
   }
   if (begins) {
     show(velocity_, line, "opens a block");
+    if (groups_.size() == most_open_blocks) {
+      return error(line, tokens[0],
+                   "more than " + std::to_string(most_open_blocks) + " blocks are open here");
+    }
     return groups_.push_back(tokens[1].text);
   }
   const auto found = std::find(groups_.rbegin(), groups_.rend(), tokens[1].text);
@@ -135,6 +139,10 @@ void Reader::declare(const Line& line) {
   switch (line.keyword->element) {
     case Element::parameter:
     case Element::audio_parameter: {
+      if (parameter_names_.size() == most_parameters) {
+        return error(line, line.label,
+                     "a model has at most " + std::to_string(most_parameters) + " parameters");
+      }
       if (!is_identifier(line.label.text)) {
         error(line, line.label, "a parameter's name has letters, digits and '_' only");
       }

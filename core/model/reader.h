@@ -14,7 +14,9 @@
 
 namespace ressort {
 
-inline constexpr std::size_t most_diagnostics = 100;
+inline constexpr int most_diagnostics = 100;           // errors, and as many warnings
+inline constexpr std::size_t most_parameters = 1024;   // each is looked for in every expression
+inline constexpr std::size_t most_open_blocks = 1024;  // ~begin without its ~end
 
 struct Line {
   int number = 0;
@@ -72,12 +74,12 @@ class Reader {
   void look_over();
 
   void say(Severity severity, int line, const Token& token, std::string message) {
-    if (out_.diagnostics.size() > most_diagnostics) {
-      return;
-    }
-    if (out_.diagnostics.size() == most_diagnostics) {
-      out_.diagnostics.push_back({Severity::error, line, token.column, 1,
-                                  "too many problems; those after this are not told"});
+    int& told = severity == Severity::error ? errors_ : warnings_;
+    if (++told > most_diagnostics) {
+      if (told == most_diagnostics + 1) {
+        out_.diagnostics.push_back(
+            {severity, line, token.column, 1, "too many problems; those after this are not told"});
+      }
       return;
     }
     out_.diagnostics.push_back({severity, line, token.column,
@@ -120,6 +122,8 @@ class Reader {
   }
 
   ParsedNetwork out_;
+  int errors_ = 0;
+  int warnings_ = 0;
   std::vector<Line> lines_;
   std::vector<std::string> parameter_names_;
   std::unordered_map<std::string_view, std::uint32_t> masses_;  // label -> index
