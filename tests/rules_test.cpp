@@ -539,6 +539,32 @@ TEST_CASE("every problem of a file is told in one pass", "[rules]") {
        {Severity::error, 11, 9, 1, "this [ is never closed"}});
 }
 
+TEST_CASE("a hundred warnings are enough, and no error", "[rules]") {
+  std::string text = two_masses + "@l spring @a @b 1\n" + heard;
+  for (int i = 0; i < 300; ++i) {
+    text += "prose\n";
+  }
+  const ParsedNetwork parsed = parse_network(text);
+  CHECK(parsed.ok());
+  REQUIRE(parsed.diagnostics.size() == 101);
+  CHECK(parsed.diagnostics.back().message == "too many problems; those after this are not told");
+  // Behind them an error is still told.
+  const ParsedNetwork wrong = parse_network(text + "@c mas 1 0 0");
+  CHECK_FALSE(wrong.ok());
+  CHECK(wrong.diagnostics.back().line == 305);
+}
+
+TEST_CASE("what is looked for in every line has a bound", "[rules]") {
+  std::string text = two_masses;
+  std::string blocks = two_masses;
+  for (int i = 0; i < 1025; ++i) {
+    text += "@p" + std::to_string(i) + " param 1\n";
+    blocks += "~begin b\n";
+  }
+  check_error(text, 1027, 1, "a model has at most 1024 parameters");
+  check_error(blocks, 1027, 1, "more than 1024 blocks are open here");
+}
+
 TEST_CASE("a problem is shown as compilers show theirs", "[rules]") {
   const ParsedNetwork parsed = parse_network(two_masses + "@l sprng @a @b 1\nx\n");
   REQUIRE(parsed.diagnostics.size() == 2);
