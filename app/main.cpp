@@ -6,6 +6,7 @@
 
 #include "app/check.h"
 #include "app/commands.h"
+#include "app/export.h"
 #include "app/make.h"
 #include "core/model/expression.h"
 
@@ -53,6 +54,15 @@ const char* const check_examples =
     "  ressort check my.mdl\n"
     "  ressort check my.mdl --json\n"
     "  ressort check old.mdl --print > new.mdl\n";
+
+const char* const export_examples =
+    "FAUST (faust.grame.fr) makes plugins, web pages and programs for boards of it. A slider for\n"
+    "each parameter, the preset's range where there is one; input and output N of the model are\n"
+    "channel N. It is the network alone: no notes, no gain. It computes what 'ressort render' of\n"
+    "the bare .mdl does, sample by sample, at every rate; give faust -double for long decays.\n"
+    "Examples:\n"
+    "  ressort export PolyTriangle --to faust -o triangle.dsp\n"
+    "  faust2jaqt triangle.dsp && ./triangle\n";
 
 // A number within a range; what is no number is in none.
 CLI::Validator within(double least, double most) {
@@ -289,6 +299,23 @@ void add_check(CLI::App& app, CheckOptions& options, int& code) {
   command->callback([&options, &code] { code = check(options); });
 }
 
+void add_export(CLI::App& app, ExportOptions& options, int& code) {
+  CLI::App* command = app.add_subcommand("export", "writes a model in another language");
+  command->footer(export_examples);
+  command->add_option("MODEL", options.name, "a preset's or a model's name, or a file")->required();
+  command
+      ->add_option_function<std::string>(
+          "--to", [](const std::string&) {}, "the language")
+      ->check(CLI::IsMember({"faust"}))
+      ->required();
+  command->add_option("-o,--output", options.output, "the file; without it, the screen");
+  command->add_flag_callback(
+      "--no-rescale", [&options] { options.rescale = false; },
+      "take the model's numbers raw at rates other than 44100 Hz");
+  add_motion(*command, options.third);
+  command->callback([&options, &code] { code = export_to_faust(options); });
+}
+
 int run(int argc, char** argv) {
   CLI::App app{"ressort plays networks of masses and springs, read from .mdl files."};
   app.footer(
@@ -302,12 +329,14 @@ int run(int argc, char** argv) {
   PlayOptions play_options;
   RenderChoice render_choice;
   CheckOptions check_options;
+  ExportOptions export_options;
   MakeOptions make_options;
   std::vector<std::uint32_t> make_sizes;
   add_play(app, play_options, code);
   add_render(app, render_choice, code);
   add_check(app, check_options, code);
   add_make(app, make_options, make_sizes, code);
+  add_export(app, export_options, code);
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {

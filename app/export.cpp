@@ -1,0 +1,63 @@
+#include "app/export.h"
+
+#include <cstdio>
+
+#include "app/exit_code.h"
+#include "app/files.h"
+#include "app/loader.h"
+#include "core/compile/compile.h"
+#include "core/model/faust.h"
+
+namespace ressort {
+namespace {
+
+// The scene's sliders are what its parameters may be turned to when it is played.
+Result<std::string> to_faust(const Scene& scene, bool rescale) {
+  const auto compiled = compile(scene.network, scene.preset, {.voices = 1});
+  if (!compiled) {
+    return Error{to_string(finding_of(scene.path, "", compiled.error()))};
+  }
+  std::vector<ParameterSetting> sliders;
+  for (const ParameterInfo& info : compiled->instrument.parameters) {
+    sliders.push_back({info.name, info.value, info.minimum, info.maximum, {}});
+  }
+  auto text =
+      faust_text(scene.network, {.name = scene.name, .sliders = sliders, .rescale = rescale});
+  if (!text) {
+    return Error{to_string(finding_of(scene.model_path, "", text.error()))};
+  }
+  return text;
+}
+
+}  // namespace
+
+int export_to_faust(const ExportOptions& options) {
+  const auto scene = load_scene(options.name, {.third = options.third});
+  if (!scene) {
+    std::fprintf(stderr, "%s\n", scene.error().message.c_str());
+    return exit_code::wrong_use;
+  }
+  for (const std::string& warning : scene->warnings) {
+    std::fprintf(stderr, "%s\n", warning.c_str());
+  }
+  const auto text = to_faust(*scene, options.rescale);
+  if (!text) {
+    std::fprintf(stderr, "%s\n", text.error().message.c_str());
+    return exit_code::wrong_use;
+  }
+  if (const std::size_t count = faust_elements(scene->network);
+      count > comfortable_faust_elements) {
+    std::fprintf(stderr,
+                 "warning: %zu masses and links; beyond %zu FAUST takes minutes and gigabytes\n",
+                 count, comfortable_faust_elements);
+  }
+  if (options.output.empty()) {
+    std::fputs(text->c_str(), stdout);
+  } else if (auto written = write_text(options.output, *text); !written) {
+    std::fprintf(stderr, "%s\n", written.error().message.c_str());
+    return exit_code::wrong_use;
+  }
+  return exit_code::done;
+}
+
+}  // namespace ressort

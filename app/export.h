@@ -1,0 +1,21 @@
+// app: a model in another program's language.
+#pragma once
+
+#include <optional>
+#include <string>
+
+#include "core/model/network.h"
+
+namespace ressort {
+
+struct ExportOptions {
+  std::string name;    // model or preset
+  std::string output;  // a file; empty: to stdout
+  bool rescale = true;
+  std::optional<ThirdArgument> third;  // whatever preset and model say
+};
+
+// Writes the model as a FAUST program; the exit code comes back. [main]
+int export_to_faust(const ExportOptions& options);
+
+}  // namespace ressort
