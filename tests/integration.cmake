@@ -27,3 +27,16 @@ endforeach()
 add_test(NAME command_line COMMAND ${CMAKE_CURRENT_SOURCE_DIR}/command_line.sh
   $<TARGET_FILE:ressort> ${CMAKE_SOURCE_DIR})
 set_tests_properties(command_line PROPERTIES TIMEOUT 240 LABELS stage RUN_SERIAL TRUE)
+
+# What is exported to FAUST, through the faust compiler and this C++ compiler.
+add_executable(ressort_export_tests main.cpp export_test.cpp)
+target_link_libraries(ressort_export_tests PRIVATE ressort_app)
+target_include_directories(ressort_export_tests PRIVATE ${CMAKE_SOURCE_DIR})
+target_compile_definitions(ressort_export_tests PRIVATE
+  RESSORT_PROGRAM="$<TARGET_FILE:ressort>" RESSORT_CXX="${CMAKE_CXX_COMPILER}")
+if(TARGET Catch2::Catch2)
+  target_link_libraries(ressort_export_tests PRIVATE Catch2::Catch2)
+endif()
+add_dependencies(ressort_export_tests ressort)
+add_test(NAME export COMMAND ressort_export_tests)
+set_tests_properties(export PROPERTIES TIMEOUT 300 LABELS integration)

@@ -121,8 +121,15 @@ class Writer {
     return argument == no_argument ? "0.0"
                                    : faust_formula(network_.arguments[argument], parameter_);
   }
-  std::string divisor(ArgumentId argument) const {
-    return faust_formula(network_.arguments[argument], parameter_, Tightness::atom);
+  // Terms of a force as terms of what it does to the mass's velocity.
+  Words divided(Words force, const Mass& mass) const {
+    const Formula& formula = network_.arguments[mass.mass];
+    if (force.empty() || (is_constant(formula) && evaluate(formula, {}) == 1.0)) {
+      return force;
+    }
+    const std::string over = "/" + faust_formula(formula, parameter_, Tightness::atom);
+    return force.size() == 1 ? Words{force[0] + over}
+                             : Words{"+ (" + faust_sum(std::move(force)) + ")" + over};
   }
 
   bool is_audio(ArgumentId argument) const {
@@ -219,8 +226,11 @@ class Writer {
   std::string masses() {
     std::string text;
     for (std::size_t i = 0; i < network_.masses.size(); ++i) {
-      text += "  " + mass_line(i) + "  F_" + mass_[i] + " = " + faust_sum(forces_[i]) + ";" +
-              (moves(i) ? leaving(i) : "") + "\n";
+      text += "  " + mass_line(i);
+      if (network_.masses[i].kind != MassKind::point || !forces_[i].empty()) {
+        text += "  F_" + mass_[i] + " = " + faust_sum(forces_[i]) + ";";
+      }
+      text += (moves(i) ? leaving(i) : "") + "\n";
     }
     return text;
   }
@@ -279,7 +289,8 @@ class Writer {
     return is_audio(mass.mass) || is_audio(mass.stiffness) || is_audio(mass.damping);
   }
 
-  std::string outside(std::size_t i) const {
+  // Terms of what acts on it besides its links, at once.
+  Words outside(std::size_t i) const {
     const Mass& mass = network_.masses[i];
     Words terms = outside_[i];
     if (mass.gravity != no_argument) {
@@ -287,37 +298,46 @@ class Writer {
           "- push(" + value(mass.gravity) + ")" +
           (mass.gravity_per_rate ? "/" + faust_number(Network::reference_rate_hz) : ""));
     }
-    return terms.empty() ? "" : faust_sum(terms);
+    return terms;
   }
 
   std::string plain_mass(std::size_t i) {
     const Mass& mass = network_.masses[i];
     const std::string& name = mass_[i];
-    const std::string x0 = faust_number(mass.position);
-    const double v0 = initial_velocity(network_, mass);
-    std::string v = "n_" + name;
-    if (const std::string force = outside(i); !force.empty()) {
-      v += " + (" + force + ")/" + divisor(mass.mass);
+    Words terms = divided(outside(i), mass);
+    terms.insert(terms.begin(), "+ n_" + name);
+    if (const std::string start = start_velocity(mass); start != "0.0") {
+      terms.push_back("+ first(" + start + ")");
     }
-    const std::string speed = faust_number(v0) + "*r";
-    const bool is_held = mass.kind == MassKind::oscillator && (mass.position != 0.0 || v0 != 0.0);
-    if (is_held) {
-      v += " + first(" + speed + " - " + held(mass, x0, speed) + "/" + divisor(mass.mass) + ")";
-    } else if (v0 != 0.0) {
-      v += " + first(" + speed + ")";
+    return "v_" + name + " = " + faust_sum(terms) + ";  x_" + name + " = travel(" +
+           faust_number(mass.position) + ", v_" + name + ");";
+  }
+
+  // What a mass would have fed back at the tick before the first.
+  std::string start_velocity(const Mass& mass) {
+    Words terms;
+    std::string speed = "0.0";
+    if (const double v0 = initial_velocity(network_, mass); v0 != 0.0) {
+      speed = faust_number(v0) + "*r";
+      terms.push_back("+ " + speed);
     }
-    return "v_" + name + " = " + v + ";  x_" + name + " = travel(" + x0 + ", v_" + name + ");";
+    if (mass.kind == MassKind::oscillator && (mass.position != 0.0 || speed != "0.0")) {
+      const Words pull = divided({"- " + held(mass, faust_number(mass.position), speed)}, mass);
+      terms.insert(terms.end(), pull.begin(), pull.end());
+    }
+    return faust_sum(terms);
   }
 
   std::string driven_mass(std::size_t i) {
     const Mass& mass = network_.masses[i];
     used_.insert("swing");
     used_.insert("spring");
-    const std::string force = outside(i);
+    Words force = outside(i);
+    force.insert(force.begin(), "+ n_" + mass_[i]);
     const std::string swing = "swing(" + value(mass.mass) + ", " + value(mass.stiffness) + ", " +
                               value(mass.damping) + ", " + faust_number(mass.position) + ", " +
-                              faust_number(initial_velocity(network_, mass)) + "*r, n_" + mass_[i] +
-                              (force.empty() ? "" : " + (" + force + ")") + ")";
+                              faust_number(initial_velocity(network_, mass)) + "*r, " +
+                              faust_sum(force) + ")";
     return "x_" + mass_[i] + " = " + swing + " : _, !;  v_" + mass_[i] + " = " + swing + " : !, _;";
   }
 
@@ -332,15 +352,17 @@ class Writer {
   std::string leaving(std::size_t i) {
     const Mass& mass = network_.masses[i];
     const std::string& name = mass_[i];
-    std::string to = "  to_" + name + " = ";
+    const std::string to = "  to_" + name + " = ";
     if (drives_itself(mass)) {
       return to + "F_" + name + ";";
     }
-    to += "v_" + name + " + ";
-    return mass.kind == MassKind::oscillator
-               ? to + "(F_" + name + " - " + held(mass, "x_" + name, "v_" + name) + ")/" +
-                     divisor(mass.mass) + ";"
-               : to + "F_" + name + "/" + divisor(mass.mass) + ";";
+    Words force = {"+ F_" + name};
+    if (mass.kind == MassKind::oscillator) {
+      force.push_back("- " + held(mass, "x_" + name, "v_" + name));
+    }
+    Words terms = divided(std::move(force), mass);
+    terms.insert(terms.begin(), "+ v_" + name);
+    return to + faust_sum(terms) + ";";
   }
 
   std::string links() {
