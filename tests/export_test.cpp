@@ -20,7 +20,7 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr std::size_t frames = 2000;
-constexpr std::size_t channels = 5;  // of the input; no model has more
+constexpr std::size_t channels = 7;  // of the input; no model has more
 constexpr double tolerance = 1e-9;   // of each channel's peak
 
 // What surrounds every compiled program: `runner NAME RATE IN OUT [PARAMETER VALUE]` steps it over
@@ -94,8 +94,9 @@ int main(int argc, char** argv) {
 )";
 
 void run(const std::string& command) {
+  const int code = std::system(command.c_str());
   INFO(command);
-  REQUIRE(std::system(command.c_str()) == 0);
+  REQUIRE(code == 0);
 }
 
 void write(const fs::path& path, const std::string& text) {
@@ -137,7 +138,7 @@ class Stage {
     for (const auto& [name, text] : models) {
       write(folder_ / (name + ".mdl"), text);
       run(std::string(RESSORT_PROGRAM) + " export " + path(name + ".mdl") + " --to faust -o " +
-          path(name + ".dsp") + options + " 2> " + path("said"));
+          path(name + ".dsp") + options);
       run("faust -double -lang cpp -cn " + name + "_dsp " + path(name + ".dsp") + " -o " +
           path(name + ".h"));
       runner += "#include \"" + name + ".h\"\n";
@@ -212,7 +213,7 @@ TEST_CASE("what FAUST makes of an exported model sounds as the model does", "[ex
     INFO(name << " differs by " << rig::show(found));
     CHECK(found < tolerance);
   }
-  for (const int rate_hz : {22050, 48000, 96000}) {
+  for (const int rate_hz : {32000, 48000, 96000}) {
     for (const char* name :
          {"newer_start", "older_start", "places", "driven", "clipped_spring", "bow", "smooth_bow",
           "clipped_contact", "damped_pluck", "wiring", "raised_string", "falling"}) {

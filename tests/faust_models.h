@@ -38,11 +38,11 @@ inline const std::vector<std::pair<std::string, std::string>>& faust_models() {
       {"damped_pluck", law("nlPluck @in2 @m 0.1 0.1 0.01")},
       {"bow", law("nlBow @in2 @m 0.2 0.02")},
       {"smooth_bow", law("nlBow @in2 @m 0.2 0.02 1")},
-      {"contact", law("contact @in2 @m 0.1 0.01 0.05")},
+      {"contact", law("contact @m @in2 0.1 0.01 0.05")},
       {"plain_contact", law("contact @m @in2 0.1 0.01")},
-      {"clipped_contact", law("nlContact @in2 @m 0.02 0.5 0.1 0.01 0.05")},
-      {"clipped_contact_flat", law("nlContact @in2 @m 0.02 0. 0.1 0.01")},
-      {"clipped_contact_stiff", law("nlContact @in2 @m 0.2 0.5 0.1 0.01")},
+      {"clipped_contact", law("nlContact @m @in2 0.02 0.5 0.1 0.01 0.05")},
+      {"clipped_contact_flat", law("nlContact @m @in2 0.02 0. 0.1 0.01")},
+      {"clipped_contact_stiff", law("nlContact @m @in2 0.2 0.5 0.1 0.01")},
       // Gravity and what moves at the start, in both dialects.
       {"older_start",
        "@g ground 0.3\n@m massG 1.2 0.002 1. 0.9\n@o osc 2. 0.1 0.01 0.5 0.45\n"
@@ -71,16 +71,16 @@ inline const std::vector<std::pair<std::string, std::string>>& faust_models() {
       {"places",
        "@p param 0.3\n@q audioParam @in2\n@s string 9 1. 0.3 0.003 0. 0.\n"
        "@me closedMesh 5 5 1. 0.2 0.002 0. 0.\n@in1 frcInput [@s p+0.1]\n@in3 posInput 0.\n"
-       "@pick nlPluck @in3 [@s q] 0.1 0.1\n@bridge spring [@s [1.1*p]] [@me q p] 0.02 0.001\n"
+       "@pick nlPluck @in3 [@s q] 0.1 0.1\n@bridge spring [@s 1.1*p] [@me q p] 0.02 0.001\n"
        "@tie spring [@s 0.4] [@s 0.65] 0.01 0.001\n@out1 posOutput [@s q]\n"
-       "@out2 posOutput [@me [0.5+0.4*q] q]\n@out3 frcOutput [@me q 0.5]\n@out4 frcOutput @in3\n"},
+       "@out2 posOutput [@me 0.5+0.4*q q]\n@out3 frcOutput [@me q 0.5]\n@out4 frcOutput @in3\n"},
       // A channel that turns everything.
       {"driven",
        "@w audioParam @in2\n@T param 0.1\n@g ground 0.2\n@m mass [1.5+w] [10*w] 0.3 50.\n"
        "@o osc [1.2+0.3*w] [0.1+0.05*w] [0.01+0.004*w] [5*w] 0.1 40.\n"
        "@o2 osc 1. [0.1+0.02*w] 0.01 0. 0.\n@r springDamper @g @m [T+0.05*w] [0.01+0.003*w]\n"
        "@l nlSpring3 @m @o [0.05+0.02*w] [0.1*w] 0.001\n@q spring @o @o2 0.03\n"
-       "@in1 frcInput @m\n@in1 frcInput @o\n@in2 posInput 0.\n@t spring @in2 @o2 0.01 [0.01*w*w]\n"
+       "@in1 frcInput @m\n@in3 frcInput @o\n@in2 posInput 0.\n@t spring @in2 @o2 0.01 [0.01*w*w]\n"
        "@out1 posOutput @m\n@out2 posOutput @o\n@out3 posOutput @o2\n@out4 frcOutput @o\n"},
       // Everything that an expression may hold; names that FAUST has for itself.
       {"expressions",
@@ -92,14 +92,14 @@ inline const std::vector<std::pair<std::string, std::string>>& faust_models() {
        "@r springDamper @mem @m-x [0.01-(process-0.1)-(-0.01)] [min(r,1)/(2*in/4)]\n"
        "@x springDamper @import @m-x [0.05*sin(in)+0.001*cos(in)*in/in*2] [0.001]\n"
        "@in1 frcInput @mem\n@out1 posOutput @m-x\n@out2 posOutput @mem\n"},
-      // Channels with gaps, shared channels, parallel links, lines in any order, a mass without
+      // Channels with gaps, parallel links, lines in any order, a mass without
       // links, a link from a mass to itself, outputs of what does not move.
       {"wiring",
        "@out7 posOutput @b\n@in1 frcInput @a\n@in5 frcInput @b\n@l1 spring @a @b 0.05 0.001\n"
        "@l2 spring @b @a 0.03 0.002\n@l3 spring @g @b 0.02 0.001\n@lone mass 3. 0. 0.\n"
-       "@in1 frcInput @lone\n@a mass 1. 0. 0.\n@b mass 2. 0. 0.\n@g ground 0.\n@in3 posInput 0.1\n"
-       "@l4 spring @in3 @a 0.02 0.001\n@l5 spring @a @a 0.1 0.1\n@in5 frcInput @a\n"
-       "@in1 frcInput @g\n@out1 frcOutput @g\n@out2 posOutput @in3\n@out3 frcOutput @in3\n"
+       "@in2 frcInput @lone\n@a mass 1. 0. 0.\n@b mass 2. 0. 0.\n@g ground 0.\n@in3 posInput 0.1\n"
+       "@l4 spring @in3 @a 0.02 0.001\n@l5 spring @a @a 0.1 0.1\n@in4 frcInput @a\n"
+       "@in7 frcInput @g\n@out1 frcOutput @g\n@out2 posOutput @in3\n@out3 frcOutput @in3\n"
        "@out5 posOutput @lone\n@out6 frcOutput @a\n@out8 posOutput @g\n"},
       {"nothing_moves",
        "@in1 posInput 0.2\n@g ground 0.1\n@r spring @g @in1 0.1 0.2\n@out1 frcOutput @in1\n"
