@@ -47,9 +47,8 @@ int export_to_faust(const ExportOptions& options) {
   }
   if (const std::size_t count = faust_elements(scene->network);
       count > comfortable_faust_elements) {
-    std::fprintf(stderr,
-                 "warning: %zu masses and links; beyond %zu FAUST takes minutes\n",
-                 count, comfortable_faust_elements);
+    std::fprintf(stderr, "warning: %zu masses and links; beyond %zu FAUST takes minutes\n", count,
+                 comfortable_faust_elements);
   }
   if (options.output.empty()) {
     std::fputs(text->c_str(), stdout);

@@ -112,7 +112,7 @@ expect 0 'hslider("m_K", 0.1, 0.001, 0.2,' "$program" export PolyTriangle --to f
 model mute.mdl '@m mass 1. 0. 0.\n'
 expect 2 "mute.mdl:1:1: error: the model has no output" "$program" export mute.mdl --to faust
 model plate.mdl '@s string 2000 1. 0.1 0.01 0. 0.\n@out1 posOutput [@s 0.5]\n'
-expect 0 "3999 masses and links" "$program" export plate.mdl --to faust -o plate.dsp
+expect 0 "4000 masses and links" "$program" export plate.mdl --to faust -o plate.dsp
 expect 2 "is the name of a model" "$program" export PolyTriangle --to faust -o plate.mdl
 expect 2 "cannot be written" "$program" export PolyTriangle --to faust -o no/such/folder/out.dsp
 
