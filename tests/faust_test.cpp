@@ -52,7 +52,7 @@ TEST_CASE("a model is a line for each mass and link", "[faust]") {
       "// input 1: force on m\n// input 2: not used\n// input 3: force on n\n"
       "// output 1: silent\n// output 2: position of n\n// output 3: force on m\n");
   has(text, "declare name \"one\";\n");
-  has(text, "p_K = hslider(\"K\", 0.1, 0.0, 0.4, 1.0e-04);\n");
+  has(text, "p_K = hslider(\"K\", 0.1, 0.0, 0.4, 0.0001);\n");
   has(text,
       "model(n_m, n_n, in1, in2, in3) =\n"
       "    to_m, to_n, 0.0, x_n, F_m/push(1.0) + in1\nwith {\n");
@@ -104,7 +104,7 @@ TEST_CASE("an expression keeps its order", "[faust]") {
   CHECK(stiffness("K*(L/2)") == "p_K*(p_L/2.0)");
   CHECK(stiffness("-K*L") == "(0.0 - p_K)*p_L");
   CHECK(stiffness("-0.5*K") == "(-0.5)*p_K");
-  CHECK(stiffness("1e-5+pow(K,2)") == "1.0e-05 + pow(p_K, 2.0)");
+  CHECK(stiffness("1e-5+pow(K,2)") == "0.00001 + pow(p_K, 2.0)");
   CHECK(stiffness("clamp(K,0,sqrt(L))") == "min(max(p_K, 0.0), sqrt(p_L))");
 }
 
