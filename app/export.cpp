@@ -32,6 +32,11 @@ Result<std::string> to_faust(const Scene& scene, bool rescale) {
 }  // namespace
 
 int export_to_faust(const ExportOptions& options) {
+  if (options.output.ends_with(".mdl") || options.output.ends_with(".toml")) {
+    std::fprintf(stderr, "'%s' is the name of a model or a preset, not of a FAUST program\n",
+                 options.output.c_str());
+    return exit_code::wrong_use;
+  }
   const auto scene = load_scene(options.name, {.third = options.third});
   if (!scene) {
     std::fprintf(stderr, "%s\n", scene.error().message.c_str());

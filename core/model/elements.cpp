@@ -451,7 +451,8 @@ std::optional<int> Reader::channel(const Line& line, std::string_view prefix) {
   if (label.starts_with(prefix)) {
     const char* end = label.data() + label.size();
     const auto [last, failure] = std::from_chars(label.data() + prefix.size(), end, number);
-    if (failure == std::errc{} && last == end && number >= 1 && number <= max_channels) {
+    if (failure == std::errc{} && last == end && number >= 1 && number <= max_channels &&
+        label.substr(prefix.size()) == std::to_string(number)) {  // not "in01" beside "in1"
       return number;
     }
   }

@@ -1,5 +1,6 @@
 // A libFuzzer target: whatever text comes, it is read or refused with a place and a sentence; what
-// is read and not too large is compiled and played, and what is heard is finite.
+// is read comes back from its print, and if it is not too large it is exported, compiled and played,
+// and what is heard is finite.
 #include <array>
 #include <cmath>
 #include <cstddef>
@@ -9,7 +10,9 @@
 #include <vector>
 
 #include "core/compile/compile.h"
+#include "core/model/faust.h"
 #include "core/model/mdl.h"
+#include "core/model/print.h"
 #include "core/model/topology.h"
 
 namespace ressort {
@@ -87,6 +90,10 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
       parse_network(std::string_view(reinterpret_cast<const char*>(data), size));
   check_told(parsed);
   if (parsed.ok() && is_small(parsed.network)) {
+    const ParsedNetwork again = parse_network(print_network(parsed.network));
+    require(again.ok() && again.network == parsed.network);
+    const auto faust = faust_text(parsed.network, {.name = "fuzz"});
+    require(faust ? !faust->empty() : !faust.error().message.empty());
     play(parsed.network, false);
     play(parsed.network, true);
   }
