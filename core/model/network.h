@@ -171,7 +171,7 @@ struct Network {
   std::vector<Macro> macros;
   std::vector<Tap> taps;
   std::vector<Link> links;
-  std::vector<Input> inputs;    // sorted by number; several may share one
+  std::vector<Input> inputs;    // sorted by number
   std::vector<Output> outputs;  // sorted by number
   ThirdArgument third = ThirdArgument::delayed_position;
   bool operator==(const Network&) const = default;

@@ -86,15 +86,6 @@ class Printer {
     return name;
   }
 
-  // The label of a channel; a second one with the same number is written with zeros before it.
-  std::string channel(const std::string& prefix, int number) {
-    std::string digits = std::to_string(number);
-    while (!used_.insert(prefix + digits).second) {
-      digits.insert(0, 1, '0');
-    }
-    return prefix + digits;
-  }
-
   void heading(const char* words) {
     enter("");
     text_ += (text_.empty() ? "# " : "\n# ") + std::string(words) + "\n";
@@ -247,7 +238,7 @@ class Printer {
     for (const Input& input : network_.inputs) {
       if (input.is_force) {
         const std::string end = " " + reference(input.mass);
-        line(channel("in", input.number), "frcInput", end);
+        line("in" + std::to_string(input.number), "frcInput", end);
         continue;
       }
       const Mass& mass = network_.masses[input.mass];
@@ -262,7 +253,7 @@ class Printer {
     }
     for (const Output& output : network_.outputs) {
       const std::string end = " " + reference(output.mass);
-      line(channel("out", output.number), output.is_force ? "frcOutput" : "posOutput", end);
+      line("out" + std::to_string(output.number), output.is_force ? "frcOutput" : "posOutput", end);
     }
   }
 

@@ -92,7 +92,8 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   if (parsed.ok() && is_small(parsed.network)) {
     const ParsedNetwork again = parse_network(print_network(parsed.network));
     require(again.ok() && again.network == parsed.network);
-    const auto faust = faust_text(parsed.network, {.name = "fuzz"});
+    std::vector<ParameterSetting> sliders(parsed.network.parameters.size());
+    const auto faust = faust_text(parsed.network, {.name = "fuzz", .sliders = sliders});
     require(faust ? !faust->empty() : !faust.error().message.empty());
     play(parsed.network, false);
     play(parsed.network, true);
