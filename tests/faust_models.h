@@ -84,12 +84,12 @@ inline const std::vector<std::pair<std::string, std::string>>& faust_models() {
        "@out1 posOutput @m\n@out2 posOutput @o\n@out3 posOutput @o2\n@out4 frcOutput @o\n"},
       // Everything that an expression may hold; names that FAUST has for itself.
       {"expressions",
-       "@process param 0.1\n@with param -0.02\n@in param 2\n@r param 1e-5\n"
+       "@process param 0.1\n@with param -0.02\n@in param 2\n@rest param 1e-5\n"
        "@import ground 0.\n@mem mass [max(1,in-0.5)] 0. 0.\n@m-x mass [abs(with)*50+pow(in,0.5)] "
        "0. 0.\n"
        "@select2 springDamper @import @mem [process*sqrt(in/4)] [exp(with)*0.001]\n"
-       "@r springDamper @mem @m-x [-with*(process+(in-1)-0.9)] [clamp(r*100,0.0005,0.01)]\n"
-       "@r springDamper @mem @m-x [0.01-(process-0.1)-(-0.01)] [min(r,1)/(2*in/4)]\n"
+       "@r springDamper @mem @m-x [-with*(process+(in-1)-0.9)] [clamp(rest*100,0.0005,0.01)]\n"
+       "@r springDamper @mem @m-x [0.01-(process-0.1)-(-0.01)] [min(rest,1)/(2*in/4)]\n"
        "@x springDamper @import @m-x [0.05*sin(in)+0.001*cos(in)*in/in*2] [0.001]\n"
        "@in1 frcInput @mem\n@out1 posOutput @m-x\n@out2 posOutput @mem\n"},
       // Channels with gaps, parallel links, lines in any order, a mass without
