@@ -1,5 +1,6 @@
 // The lowest mode against closed forms: strings, chains, the triangle, one oscillator.
 #include "core/analysis/linear.h"
+#include "core/model/topology.h"
 
 #include "tests/rig.h"
 
@@ -123,6 +124,14 @@ TEST_CASE("the parameters as they are set count, not as they are written", "[lin
   const double values[] = {2.0, 0.4, 0.002};  // M, K, Z
   const double share = 4.0 * sin_squared(std::numbers::pi / 22.0) / 2.0;
   check_mode("set", lowest_mode(network, values), 0.4 * share, 0.002 * share, 1e-12);
+}
+
+TEST_CASE("a matrix that cannot be factored has no lowest mode", "[linear]") {
+  // A chain of 98 with a mass that a parameter makes negative: every stiffness is below 0.
+  const Network network = rig::network_of(
+      "@m param -2\n@s chain 98 m 0.001 0.1 0\n@c cornerMesh 5 41 0.08 0.002 0 0\n"
+      "@out1 posOutput [@s 0]\n");
+  CHECK_FALSE(lowest_mode(expand_macros(network), parameter_values(network)));
 }
 
 }  // namespace ressort

@@ -238,6 +238,7 @@ TEST_CASE("lines may come in any order and layout", "[mdl]") {
   // The lines of a complaint are counted the same way.
   check_error({"#\r\n\r\n@m mass 0 0 0\r\n", 3, 9, "a mass must be above 0, found '0'"});
   check_error({"#\r\r@m mass 0 0 0\r", 3, 9, "a mass must be above 0, found '0'"});
+  check_error({"@s chain 9 0.0-2 1 1 0", 1, 12, "a mass must be above 0, found '0.0-2'"});
   check_error({"\n\n\t@m\tmass\t0\t0\t0", 3, 10, "a mass must be above 0, found '0'"});
 }
 

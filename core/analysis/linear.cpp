@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <stdexcept>
 
 namespace ressort {
 namespace {
@@ -74,6 +75,28 @@ Scaled scaled_matrices(const Network& network, std::span<const double> parameter
   return matrices;
 }
 
+// The eigenpairs nearest to `shift`, which lies a little below 0 so that free networks can be
+// factored too. Not every matrix can: one of negative stiffness may be singular there.
+bool near_zero(const Sparse& matrix, double shift, Eigen::VectorXd& values,
+               Eigen::MatrixXd& vectors) {
+  try {  // Spectra tells by exceptions what it cannot factor or iterate
+    Spectra::SparseSymShiftSolve<double> shifted(matrix);
+    Spectra::SymEigsShiftSolver<Spectra::SparseSymShiftSolve<double>> solver(shifted, 6, 24, shift);
+    solver.init();
+    solver.compute(Spectra::SortRule::LargestMagn, 200, 1e-10, Spectra::SortRule::SmallestAlge);
+    if (solver.info() != Spectra::CompInfo::Successful) {
+      return false;
+    }
+    values = solver.eigenvalues();
+    vectors = solver.eigenvectors();
+    return true;
+  } catch (const std::logic_error&) {
+    return false;
+  } catch (const std::runtime_error&) {
+    return false;
+  }
+}
+
 // The lowest eigenpair above `floor`.
 bool lowest_pair(const Sparse& matrix, double floor, double& value, Vector& vector) {
   Eigen::VectorXd values;
@@ -82,18 +105,8 @@ bool lowest_pair(const Sparse& matrix, double floor, double& value, Vector& vect
     const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> solver{Eigen::MatrixXd(matrix)};
     values = solver.eigenvalues();
     vectors = solver.eigenvectors();
-  } else {
-    // The shift lies a little below 0, so that free networks can be factored too.
-    Spectra::SparseSymShiftSolve<double> shifted(matrix);
-    Spectra::SymEigsShiftSolver<Spectra::SparseSymShiftSolve<double>> solver(shifted, 6, 24,
-                                                                             -1e3 * floor);
-    solver.init();
-    solver.compute(Spectra::SortRule::LargestMagn, 200, 1e-10, Spectra::SortRule::SmallestAlge);
-    if (solver.info() != Spectra::CompInfo::Successful) {
-      return false;
-    }
-    values = solver.eigenvalues();
-    vectors = solver.eigenvectors();
+  } else if (!near_zero(matrix, -1e3 * floor, values, vectors)) {
+    return false;
   }
   for (Eigen::Index i = 0; i < values.size(); ++i) {
     if (values[i] > floor) {

@@ -48,10 +48,7 @@ void Reader::add_mass(const Line& line) {
       mass.stiffness = argument(line, at++);
       mass.damping = argument(line, at++);
     }
-    if (mass.mass != no_argument && is_constant(out_.network.arguments[mass.mass]) &&
-        !(argument_value(out_.network, mass.mass, {}) > least_mass)) {
-      error(line, line.rest[0], "a mass must be above 0, found " + quoted(line.rest[0].text));
-    }
+    check_mass(line, 0, mass.mass);
     read_gravity(line, mass, at);
   }
   double x = 0.0;
@@ -82,6 +79,14 @@ void Reader::read_gravity(const Line& line, Mass& mass, std::size_t& at) {
   }
 }
 
+// A number that is to be a mass; one that a parameter gives is looked at where it is played.
+void Reader::check_mass(const Line& line, std::size_t at, ArgumentId mass) {
+  if (mass != no_argument && is_constant(out_.network.arguments[mass]) &&
+      !(argument_value(out_.network, mass, {}) > least_mass)) {
+    error(line, line.rest[at], "a mass must be above 0, found " + quoted(line.rest[at].text));
+  }
+}
+
 void Reader::add_macro(const Line& line) {
   const auto found = macros_.find(line.label.text);
   if (found == macros_.end()) {
@@ -103,7 +108,8 @@ void Reader::add_macro(const Line& line) {
     error(line, line.rest[0],
           "the macros have more than " + std::to_string(max_macro_nodes) + " nodes together");
   }
-  macro.mass = argument(line, at++);
+  macro.mass = argument(line, at);
+  check_mass(line, at++, macro.mass);
   macro.stiffness = argument(line, at++);
   if (macro.kind == MacroKind::stiff_string) {
     macro.second_stiffness = argument(line, at++);

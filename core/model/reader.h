@@ -55,6 +55,7 @@ class Reader {
   bool check_count(const Line& line);
   std::uint32_t drawing(const Line& line, std::size_t at);
   ArgumentId argument(const Line& line, std::size_t at);
+  void check_mass(const Line& line, std::size_t at, ArgumentId mass);
   void read_gravity(const Line& line, Mass& mass, std::size_t& at);
   bool position(const Line& line, std::size_t at, double& z, double& x, double& y);
   double state(const Line& line, std::size_t at);
