@@ -2,13 +2,36 @@
 // the Program's own. Pure data, made by the compile room, shared by all voices.
 #pragma once
 
+#include <cstdint>
 #include <variant>
+#include <vector>
 
 namespace ressort {
 
 // As it is written, mass by mass and link by link; one voice in each lane. Every Program.
 struct Direct {};
 
-using Form = std::variant<Direct>;
+// Equal masses in a row, each tied to the next by the same spring.
+struct Chain {
+  static constexpr std::uint32_t free = 0xffffffffu;
+
+  std::uint32_t first = 0;  // of its masses in Chains::nodes, from one end to the other
+  std::uint32_t count = 0;
+  std::uint32_t mass_run = 0;   // of the Program, that all of them are in
+  std::uint32_t stiffness = 0;  // coefficients of the springs
+  std::uint32_t damping = 0;
+  std::uint32_t left = free;   // the ground or position input that holds the first mass by the
+  std::uint32_t right = free;  // same spring, and the last; or free
+};
+
+// Chains folded into the lanes of packs, one voice; everything else number by number.
+struct Chains {
+  std::vector<Chain> chains;
+  std::vector<std::uint32_t> nodes;  // chain by chain
+  std::vector<std::uint32_t> loose;  // nodes that move and are in no chain, ascending
+  std::vector<std::uint32_t> links;  // those that are no chain's springs, ascending
+};
+
+using Form = std::variant<Direct, Chains>;
 
 }  // namespace ressort

@@ -1,5 +1,6 @@
 #include "core/engine/kernel.h"
 
+#include "core/engine/chains.h"
 #include "core/engine/direct.h"
 
 namespace ressort {
@@ -63,6 +64,9 @@ std::unique_ptr<Kernel<T>> make_kernel(const Program& program, std::size_t voice
     Isa isa;
     std::unique_ptr<Kernel<T>> operator()(const Direct&) const {
       return std::make_unique<DirectKernel<T>>(program, voices, isa);
+    }
+    std::unique_ptr<Kernel<T>> operator()(const Chains&) const {
+      return std::make_unique<ChainsKernel<T>>(program, isa);
     }
   };
   return std::visit(Maker{program, voices, isa}, program.form);

@@ -1,0 +1,264 @@
+#include "core/engine/chains.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace ressort {
+namespace {
+
+template <class T>
+ChainsStep<T> step_for(std::size_t bytes, Isa isa) {
+#if RESSORT_X86_LEVELS
+  if (isa == Isa::v4) {
+    return v4::chains_step<T>(bytes);
+  }
+  if (isa == Isa::v3) {
+    return v3::chains_step<T>(bytes);
+  }
+#endif
+  static_cast<void>(isa);
+  return base::chains_step<T>(bytes);
+}
+
+// The widest that the longest chain fills often enough for the passes to be worth more than their
+// ends.
+template <class T>
+std::size_t lanes_for(const Chains& form, Isa isa) {
+  std::uint32_t longest = 0;
+  for (const Chain& chain : form.chains) {
+    longest = std::max(longest, chain.count);
+  }
+  std::size_t bytes = 16;
+  while (bytes < vector_bytes(isa) && longest >= 3 * (2 * bytes / sizeof(T))) {
+    bytes *= 2;
+  }
+  return bytes / sizeof(T);
+}
+
+// Puts nodes in their places, and everything that names nodes into tables that name places.
+class TablesMaker {
+ public:
+  TablesMaker(const Program& program, std::size_t lanes, std::vector<Place>& place)
+      : program_(program),
+        form_(std::get<Chains>(program.form)),
+        lanes_(static_cast<std::uint32_t>(lanes)),
+        place_(place),
+        site_mass_(program.position.size(), nowhere),
+        force_(program.position.size(), nowhere) {
+    place_.assign(program.position.size(), nowhere);
+  }
+
+  ChainsTables make() {
+    fold_chains();
+    place_others();
+    find_sites();
+    number_loose();
+    for (std::uint32_t node = program_.moving; node < place_.size(); ++node) {
+      force_[node] = next_force();
+    }
+    make_links();
+    for (const InputSlot& input : program_.inputs) {
+      tables_.inputs.push_back({place_[input.node], force_[input.node], input.is_force});
+    }
+    make_outputs();
+    return std::move(tables_);
+  }
+
+ private:
+  std::uint32_t next_force() { return static_cast<std::uint32_t>(tables_.forces++); }
+
+  // Position `lane` of a pair.
+  Place place_of(std::uint32_t pair, std::uint32_t lane) const { return 2 * lanes_ * pair + lane; }
+
+  void fold_chains() {
+    std::uint32_t next = 0;
+    for (const Chain& chain : form_.chains) {
+      const std::uint32_t packs = (chain.count + lanes_ - 1) / lanes_;
+      for (std::uint32_t i = 0; i < chain.count; ++i) {
+        const std::uint32_t node = form_.nodes[chain.first + i];
+        place_[node] = place_of(next + i % packs, i / packs);
+        site_mass_[node] = program_.mass_runs[chain.mass_run].inverse_mass;
+      }
+      tables_.chains.push_back({.first = next,
+                                .packs = packs,
+                                .last = (chain.count - 1) % packs,
+                                .last_lane = (chain.count - 1) / packs,
+                                .stiffness = chain.stiffness,
+                                .damping = chain.damping,
+                                .mass = program_.mass_runs[chain.mass_run]});
+      next += packs;
+    }
+    tables_.bodies = next;
+  }
+
+  void place_others() {
+    std::uint32_t others = 0;
+    for (Place& place : place_) {
+      if (place == nowhere) {
+        place =
+            place_of(static_cast<std::uint32_t>(tables_.bodies) + others / lanes_, others % lanes_);
+        ++others;
+      }
+    }
+    tables_.bodies += (others + lanes_ - 1) / lanes_;
+    for (std::size_t i = 0; i < form_.chains.size(); ++i) {
+      const auto place = [&](std::uint32_t node) {
+        return node == Chain::free ? nowhere : place_[node];
+      };
+      tables_.chains[i].left = place(form_.chains[i].left);
+      tables_.chains[i].right = place(form_.chains[i].right);
+    }
+  }
+
+  // Masses of chains that something else acts on, or whose force is listened to.
+  void find_sites() {
+    const auto touch = [&](std::uint32_t node) {
+      if (site_mass_[node] != nowhere && force_[node] == nowhere) {
+        force_[node] = next_force();
+        tables_.sites.push_back({place_[node], site_mass_[node]});
+      }
+    };
+    for (const std::uint32_t link : form_.links) {
+      touch(program_.ends[link].a);
+      touch(program_.ends[link].b);
+    }
+    for (const InputSlot& input : program_.inputs) {
+      touch(input.node);
+    }
+    for (const OutputSlot& output : program_.outputs) {
+      if (output.is_force) {
+        touch(output.node);
+      }
+    }
+  }
+
+  void number_loose() {
+    std::size_t run = 0;
+    for (const std::uint32_t node : form_.loose) {
+      const auto& runs = program_.mass_runs;
+      for (; node >= runs[run].first + runs[run].count; ++run) {
+      }
+      auto& loose_runs = tables_.loose_runs;
+      const auto at = static_cast<std::uint32_t>(tables_.loose.size());
+      if (loose_runs.empty() || loose_runs.back().mass.first != runs[run].first) {
+        loose_runs.push_back({.mass = runs[run], .first = at});
+      }
+      ++loose_runs.back().count;
+      force_[node] = next_force();
+      tables_.loose.push_back(place_[node]);
+    }
+  }
+
+  void make_links() {
+    std::size_t run = 0;
+    for (const std::uint32_t link : form_.links) {
+      const auto& runs = program_.link_runs;
+      std::size_t of = run;
+      for (; link >= runs[of].first + runs[of].count; ++of) {
+      }
+      auto& link_runs = tables_.link_runs;
+      if (link_runs.empty() || of != run) {
+        link_runs.push_back(runs[of]);
+        link_runs.back().first = static_cast<std::uint32_t>(tables_.ends.size());
+        link_runs.back().count = 0;
+      }
+      run = of;
+      ++link_runs.back().count;
+      const auto [a, b] = program_.ends[link];
+      tables_.ends.push_back({place_[a], place_[b], force_[a], force_[b]});
+    }
+  }
+
+  void make_outputs() {
+    for (const OutputSlot& output : program_.outputs) {
+      PlacedOutput placed{.place = place_[output.node], .is_force = output.is_force};
+      placed.first = static_cast<std::uint32_t>(tables_.probes.size());
+      if (output.is_force) {
+        placed.force = force_[output.node];
+        add_probes(output.node);
+      }
+      placed.count = static_cast<std::uint32_t>(tables_.probes.size()) - placed.first;
+      tables_.outputs.push_back(placed);
+    }
+  }
+
+  // The springs of chains at a node.
+  void add_probes(std::uint32_t node) {
+    for (const Chain& chain : form_.chains) {
+      const std::uint32_t* const nodes = form_.nodes.data() + chain.first;
+      const auto spring = [&](std::uint32_t a, std::uint32_t b) {
+        if (a == node || b == node) {
+          tables_.probes.push_back({place_[a == node ? b : a], chain.stiffness, chain.damping});
+        }
+      };
+      if (chain.left != Chain::free) {
+        spring(chain.left, nodes[0]);
+      }
+      for (std::uint32_t i = 0; i + 1 < chain.count; ++i) {
+        spring(nodes[i], nodes[i + 1]);
+      }
+      if (chain.right != Chain::free) {
+        spring(nodes[chain.count - 1], chain.right);
+      }
+    }
+  }
+
+  const Program& program_;
+  const Chains& form_;
+  std::uint32_t lanes_;
+  std::vector<Place>& place_;             // [node]
+  std::vector<std::uint32_t> site_mass_;  // [node] coefficient, if it is in a chain
+  std::vector<std::uint32_t> force_;      // [node]
+  ChainsTables tables_;
+};
+
+}  // namespace
+
+template <class T>
+ChainsKernel<T>::ChainsKernel(const Program& program, Isa isa)
+    : Kernel<T>(program, 1),
+      program_(program),
+      lanes_(lanes_for<T>(std::get<Chains>(program.form), isa)),
+      tables_(TablesMaker(program, lanes_, place_).make()),
+      step_(step_for<T>(lanes_ * sizeof(T), isa)),
+      bodies_(2 * lanes_ * tables_.bodies),
+      held_(2 * tables_.chains.size()),
+      force_(tables_.forces) {
+  reset(0);
+}
+
+template <class T>
+void ChainsKernel<T>::reset(std::size_t) {
+  for (std::size_t node = 0; node < place_.size(); ++node) {
+    bodies_[place_[node]] = static_cast<T>(program_.position[node]);
+    bodies_[place_[node] + lanes_] = static_cast<T>(program_.velocity[node]);
+  }
+  std::fill(held_.begin(), held_.end(), T(0));
+  std::fill(force_.begin(), force_.end(), T(0));
+}
+
+template <class T>
+void ChainsKernel<T>::step(const Block<T>& block) {
+  ChainsState<T> state{.ramps = ramps_of(this->coefficients),
+                       .bodies = bodies_.data(),
+                       .held = held_.data(),
+                       .force = force_.data()};
+  step_(program_, tables_, state, block);
+  this->coefficients.finish(block.frames);
+}
+
+template <class T>
+bool ChainsKernel<T>::is_near_start(std::size_t, double bound) const {
+  for (std::size_t node = 0; node < program_.moving; ++node) {
+    const auto x = static_cast<double>(bodies_[place_[node]]);
+    if (!(std::fabs(x - program_.position[node]) < bound)) {
+      return false;
+    }
+  }
+  return true;
+}
+
+template class ChainsKernel<float>;
+template class ChainsKernel<double>;
+
+}  // namespace ressort

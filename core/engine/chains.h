@@ -1,0 +1,132 @@
+// core/engine: strings. The masses of a chain lie in lanes so that each one's neighbours are in
+// the packs before and after its own, and one pass over memory does it all:
+//   y = K x + Z v,  v += (y[i-1] - 2 y[i] + y[i+1])/M,  x += v
+// All other links and masses are stepped number by number; what they do to a chain's mass is added
+// after the pass, to v and to x, which is the same as if it had been in the sum.
+#pragma once
+
+#include "core/engine/kernel.h"
+
+namespace ressort {
+
+// Where a node's position is among the numbers of ChainsState::bodies; its velocity is one pack
+// further. Bodies are pairs of packs, positions and velocities.
+using Place = std::uint32_t;
+inline constexpr std::uint32_t nowhere = 0xffffffffu;
+
+// A chain of n masses in `packs` pairs: mass i is in lane i / packs of pair first + i % packs.
+struct FoldedChain {
+  std::uint32_t first = 0;
+  std::uint32_t packs = 0;
+  std::uint32_t last = 0;  // where its last mass is: pair first + last...
+  std::uint32_t last_lane = 0;
+  Place left = nowhere;  // of what holds the ends, nowhere: free
+  Place right = nowhere;
+  std::uint32_t stiffness = 0;  // coefficients
+  std::uint32_t damping = 0;
+  MassRun mass;
+};
+
+// A mass of a chain that more than its chain acts on.
+struct ChainSite {
+  Place place = 0;
+  std::uint32_t inverse_mass = 0;  // coefficient
+};
+
+struct LoosePlaces {
+  MassRun mass;             // coefficients
+  std::uint32_t first = 0;  // of ChainsTables::loose
+  std::uint32_t count = 0;
+};
+
+struct PlacedEnds {
+  Place a = 0;
+  Place b = 0;
+  std::uint32_t force_a = 0;  // of ChainsState::force
+  std::uint32_t force_b = 0;
+};
+
+struct PlacedInput {
+  Place place = 0;
+  std::uint32_t force = 0;
+  bool is_force = false;
+};
+
+// A spring of a chain, seen from a node whose force somebody listens to.
+struct Probe {
+  Place neighbour = 0;
+  std::uint32_t stiffness = 0;  // coefficients
+  std::uint32_t damping = 0;
+};
+
+struct PlacedOutput {
+  Place place = 0;
+  bool is_force = false;
+  std::uint32_t force = 0;
+  std::uint32_t first = 0;  // of ChainsTables::probes
+  std::uint32_t count = 0;
+};
+
+// What a kernel makes of a Program and its lanes, once.
+struct ChainsTables {
+  std::vector<FoldedChain> chains;
+  std::vector<ChainSite> sites;  // [force], the first of them
+  std::vector<LoosePlaces> loose_runs;
+  std::vector<Place> loose;  // [force - sites]
+  std::vector<LinkRun> link_runs;
+  std::vector<PlacedEnds> ends;  // [link]
+  std::vector<PlacedInput> inputs;
+  std::vector<PlacedOutput> outputs;
+  std::vector<Probe> probes;
+  std::size_t forces = 0;  // those of sites, of loose masses, then of what does not move
+  std::size_t bodies = 0;  // pairs
+};
+
+// Everything that one step of ChainsKernel touches.
+template <class T>
+struct ChainsState {
+  Ramps<T> ramps;
+  T* bodies;  // [pair][position or velocity][lane]
+  T* held;    // [chain][2] the K and Z that forces of the last sample had: 0 at the start
+  T* force;   // [force] summed by the links, used by the next sample
+};
+
+template <class T>
+using ChainsStep = void (*)(const Program& program, const ChainsTables& tables,
+                            ChainsState<T>& state, const Block<T>& block);
+
+// The function for packs of so many bytes.
+namespace base {
+template <class T>
+ChainsStep<T> chains_step(std::size_t bytes);
+}
+namespace v3 {
+template <class T>
+ChainsStep<T> chains_step(std::size_t bytes);
+}
+namespace v4 {
+template <class T>
+ChainsStep<T> chains_step(std::size_t bytes);
+}
+
+template <class T>
+class ChainsKernel final : public Kernel<T> {
+ public:
+  // The Program's form is Chains.
+  ChainsKernel(const Program& program, Isa isa);
+  void reset(std::size_t lane) override;
+  void step(const Block<T>& block) override;
+  bool is_near_start(std::size_t lane, double bound) const override;
+
+ private:
+  const Program& program_;
+  std::size_t lanes_;         // of a pack
+  std::vector<Place> place_;  // [node]
+  ChainsTables tables_;
+  ChainsStep<T> step_;
+  Aligned<T> bodies_;
+  Aligned<T> held_;
+  Aligned<T> force_;
+};
+
+}  // namespace ressort
