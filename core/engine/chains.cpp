@@ -53,19 +53,19 @@ class TablesMaker {
     place_others();
     find_sites();
     number_loose();
-    for (std::uint32_t node = program_.moving; node < place_.size(); ++node) {
-      force_[node] = next_force();
-    }
+    find_listened();
     make_links();
-    for (const InputSlot& input : program_.inputs) {
-      tables_.inputs.push_back({place_[input.node], force_[input.node], input.is_force});
+    for (std::uint32_t i = 0; i < program_.inputs.size(); ++i) {
+      const InputSlot& input = program_.inputs[i];
+      (input.is_force ? tables_.forces : tables_.positions)
+          .push_back({place_[input.node], force_[input.node], i});
     }
     make_outputs();
     return std::move(tables_);
   }
 
  private:
-  std::uint32_t next_force() { return static_cast<std::uint32_t>(tables_.forces++); }
+  std::uint32_t next_force() { return static_cast<std::uint32_t>(tables_.force_count++); }
 
   // Position `lane` of a pair.
   Place place_of(std::uint32_t pair, std::uint32_t lane) const { return 2 * lanes_ * pair + lane; }
@@ -79,16 +79,15 @@ class TablesMaker {
         place_[node] = place_of(next + i % packs, i / packs);
         site_mass_[node] = program_.mass_runs[chain.mass_run].inverse_mass;
       }
-      tables_.chains.push_back({.first = next,
+      tables_.chains.push_back({.first = place_of(next, 0),
                                 .packs = packs,
                                 .last = (chain.count - 1) % packs,
-                                .last_lane = (chain.count - 1) / packs,
                                 .stiffness = chain.stiffness,
                                 .damping = chain.damping,
                                 .mass = program_.mass_runs[chain.mass_run]});
       next += packs;
     }
-    tables_.bodies = next;
+    tables_.pairs = next;
   }
 
   void place_others() {
@@ -96,11 +95,11 @@ class TablesMaker {
     for (Place& place : place_) {
       if (place == nowhere) {
         place =
-            place_of(static_cast<std::uint32_t>(tables_.bodies) + others / lanes_, others % lanes_);
+            place_of(static_cast<std::uint32_t>(tables_.pairs) + others / lanes_, others % lanes_);
         ++others;
       }
     }
-    tables_.bodies += (others + lanes_ - 1) / lanes_;
+    tables_.pairs += (others + lanes_ - 1) / lanes_;
     for (std::size_t i = 0; i < form_.chains.size(); ++i) {
       const auto place = [&](std::uint32_t node) {
         return node == Chain::free ? nowhere : place_[node];
@@ -115,7 +114,8 @@ class TablesMaker {
     const auto touch = [&](std::uint32_t node) {
       if (site_mass_[node] != nowhere && force_[node] == nowhere) {
         force_[node] = next_force();
-        tables_.sites.push_back({place_[node], site_mass_[node]});
+        const std::uint32_t lane = place_[node] % lanes_;
+        tables_.sites.push_back({place_[node] - lane, lane, site_mass_[node]});
       }
     };
     for (const std::uint32_t link : form_.links) {
@@ -139,14 +139,24 @@ class TablesMaker {
       for (; node >= runs[run].first + runs[run].count; ++run) {
       }
       auto& loose_runs = tables_.loose_runs;
-      const auto at = static_cast<std::uint32_t>(tables_.loose.size());
       if (loose_runs.empty() || loose_runs.back().mass.first != runs[run].first) {
-        loose_runs.push_back({.mass = runs[run], .first = at});
+        loose_runs.push_back({.mass = runs[run]});
       }
       ++loose_runs.back().count;
       force_[node] = next_force();
       tables_.loose.push_back(place_[node]);
     }
+  }
+
+  // What acts on a node that does not move is of interest only to an output.
+  void find_listened() {
+    for (const OutputSlot& output : program_.outputs) {
+      if (output.is_force && force_[output.node] == nowhere) {
+        force_[output.node] = next_force();
+        tables_.listened.push_back(force_[output.node]);
+      }
+    }
+    std::replace(force_.begin(), force_.end(), nowhere, next_force());
   }
 
   void make_links() {
@@ -221,14 +231,28 @@ ChainsKernel<T>::ChainsKernel(const Program& program, Isa isa)
       lanes_(lanes_for<T>(std::get<Chains>(program.form), isa)),
       tables_(TablesMaker(program, lanes_, place_).make()),
       step_(step_for<T>(lanes_ * sizeof(T), isa)),
-      bodies_(2 * lanes_ * tables_.bodies),
+      masks_(3 * lanes_ * tables_.chains.size()),
+      units_(lanes_ * lanes_),
+      bodies_(2 * lanes_ * tables_.pairs),
       held_(2 * tables_.chains.size()),
-      force_(tables_.forces) {
+      force_(tables_.force_count) {
+  const auto& chains = std::get<Chains>(program.form).chains;
+  for (std::size_t i = 0; i < chains.size(); ++i) {
+    const std::size_t last_lane = (chains[i].count - 1) / tables_.chains[i].packs;
+    T* const masks = masks_.data() + 3 * lanes_ * i;
+    std::fill_n(masks, last_lane + 1, T(1));
+    std::fill_n(masks + lanes_, last_lane, T(1));
+    masks[2 * lanes_ + last_lane] = T(1);
+  }
+  for (std::size_t lane = 0; lane < lanes_; ++lane) {
+    units_[lane * lanes_ + lane] = T(1);
+  }
   reset(0);
 }
 
 template <class T>
 void ChainsKernel<T>::reset(std::size_t) {
+  std::fill(bodies_.begin(), bodies_.end(), T(0));  // empty lanes too, should they be no numbers
   for (std::size_t node = 0; node < place_.size(); ++node) {
     bodies_[place_[node]] = static_cast<T>(program_.position[node]);
     bodies_[place_[node] + lanes_] = static_cast<T>(program_.velocity[node]);
@@ -240,6 +264,8 @@ void ChainsKernel<T>::reset(std::size_t) {
 template <class T>
 void ChainsKernel<T>::step(const Block<T>& block) {
   ChainsState<T> state{.ramps = ramps_of(this->coefficients),
+                       .masks = masks_.data(),
+                       .units = units_.data(),
                        .bodies = bodies_.data(),
                        .held = held_.data(),
                        .force = force_.data()};

@@ -14,13 +14,12 @@ namespace ressort {
 using Place = std::uint32_t;
 inline constexpr std::uint32_t nowhere = 0xffffffffu;
 
-// A chain of n masses in `packs` pairs: mass i is in lane i / packs of pair first + i % packs.
+// A chain of n masses in `packs` pairs: mass i is in lane i / packs of the pair i % packs.
 struct FoldedChain {
-  std::uint32_t first = 0;
+  Place first = 0;
   std::uint32_t packs = 0;
-  std::uint32_t last = 0;  // where its last mass is: pair first + last...
-  std::uint32_t last_lane = 0;
-  Place left = nowhere;  // of what holds the ends, nowhere: free
+  std::uint32_t last = 0;  // the pair that its last mass is in
+  Place left = nowhere;    // of what holds the ends, nowhere: free
   Place right = nowhere;
   std::uint32_t stiffness = 0;  // coefficients
   std::uint32_t damping = 0;
@@ -29,14 +28,14 @@ struct FoldedChain {
 
 // A mass of a chain that more than its chain acts on.
 struct ChainSite {
-  Place place = 0;
+  Place pair = 0;
+  std::uint32_t lane = 0;
   std::uint32_t inverse_mass = 0;  // coefficient
 };
 
 struct LoosePlaces {
   MassRun mass;             // coefficients
-  std::uint32_t first = 0;  // of ChainsTables::loose
-  std::uint32_t count = 0;
+  std::uint32_t count = 0;  // of the next of ChainsTables::loose
 };
 
 struct PlacedEnds {
@@ -49,7 +48,7 @@ struct PlacedEnds {
 struct PlacedInput {
   Place place = 0;
   std::uint32_t force = 0;
-  bool is_force = false;
+  std::uint32_t index = 0;  // of Program::inputs
 };
 
 // A spring of a chain, seen from a node whose force somebody listens to.
@@ -74,21 +73,26 @@ struct ChainsTables {
   std::vector<LoosePlaces> loose_runs;
   std::vector<Place> loose;  // [force - sites]
   std::vector<LinkRun> link_runs;
-  std::vector<PlacedEnds> ends;  // [link]
-  std::vector<PlacedInput> inputs;
+  std::vector<PlacedEnds> ends;         // [link]
+  std::vector<std::uint32_t> listened;  // forces on what does not move, for outputs
+  std::vector<PlacedInput> positions;
+  std::vector<PlacedInput> forces;
   std::vector<PlacedOutput> outputs;
   std::vector<Probe> probes;
-  std::size_t forces = 0;  // those of sites, of loose masses, then of what does not move
-  std::size_t bodies = 0;  // pairs
+  std::size_t force_count = 0;  // sites, loose masses, listened; the last one is never read
+  std::size_t pairs = 0;
 };
 
 // Everything that one step of ChainsKernel touches.
 template <class T>
 struct ChainsState {
   Ramps<T> ramps;
-  T* bodies;  // [pair][position or velocity][lane]
-  T* held;    // [chain][2] the K and Z that forces of the last sample had: 0 at the start
-  T* force;   // [force] summed by the links, used by the next sample
+  const T* masks;  // [chain][3][lane] 1 or 0: is a mass here, up to the last one's pair; is one
+                   // beyond it; is it the last
+  const T* units;  // [lane][lane] 1 where both are the same
+  T* bodies;       // [pair][position or velocity][lane]
+  T* held;         // [chain][2] the K and Z that forces of the last sample had: 0 at the start
+  T* force;        // [force] summed by the links, used by the next sample
 };
 
 template <class T>
@@ -124,6 +128,8 @@ class ChainsKernel final : public Kernel<T> {
   std::vector<Place> place_;  // [node]
   ChainsTables tables_;
   ChainsStep<T> step_;
+  Aligned<T> masks_;
+  Aligned<T> units_;
   Aligned<T> bodies_;
   Aligned<T> held_;
   Aligned<T> force_;

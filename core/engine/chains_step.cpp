@@ -7,29 +7,73 @@
 namespace ressort::RESSORT_ISA {
 namespace {
 
+// A vector's numbers, where stores into packs cannot move them as far as the compiler knows.
+template <class Row>
+struct Table {
+  explicit Table(const std::vector<Row>& rows)
+      : first(rows.data()), last(rows.data() + rows.size()) {}
+  const Row* begin() const { return first; }
+  const Row* end() const { return last; }
+
+  const Row* first;
+  const Row* last;
+};
+
 template <class T, std::size_t Bytes>
 struct View {
   using V = Pack<T, Bytes>;
-  static constexpr std::uint32_t lanes = Bytes / sizeof(T);
+  static constexpr std::size_t lanes = Bytes / sizeof(T);
 
-  explicit View(ChainsState<T>& state)
-      : pair(reinterpret_cast<V*>(state.bodies)),
+  View(const ChainsTables& tables, ChainsState<T>& state)
+      : chains(tables.chains),
+        sites(tables.sites),
+        loose_runs(tables.loose_runs),
+        loose(tables.loose.data()),
+        link_runs(tables.link_runs),
+        ends(tables.ends.data()),
+        listened(tables.listened),
+        positions(tables.positions),
+        forces(tables.forces),
+        outputs(tables.outputs),
         bodies(state.bodies),
+        masks(state.masks),
+        units(state.units),
         held(state.held),
         force(state.force),
-        coefficient(state.ramps.value) {
-    for (std::uint32_t i = 0; i < lanes; ++i) {
-      lane[i] = static_cast<T>(i);
-    }
-  }
+        coefficient(state.ramps.value) {}
 
-  V* pair;    // positions at 2 i, velocities at 2 i + 1
-  T* bodies;  // the same
-  V lane;     // 0, 1, 2...
+  Table<FoldedChain> chains;
+  Table<ChainSite> sites;
+  Table<LoosePlaces> loose_runs;
+  const Place* loose;
+  Table<LinkRun> link_runs;
+  const PlacedEnds* ends;
+  Table<std::uint32_t> listened;
+  Table<PlacedInput> positions;
+  Table<PlacedInput> forces;
+  Table<PlacedOutput> outputs;
+  T* bodies;
+  const T* masks;
+  const T* units;
   T* held;
   T* force;
   const T* coefficient;
 };
+
+// The same number in every lane. Not V{} + x, which is not x if x is -0.
+template <class V>
+V all(Element<V> x) {
+  return x - V{};
+}
+
+template <class V>
+V& pack_at(Element<V>* numbers) {
+  return *reinterpret_cast<V*>(numbers);
+}
+template <class V>
+const V& pack_at(const Element<V>* numbers) {
+  return *reinterpret_cast<const V*>(numbers);
+}
 
 // Lane i is lane i - 1 of y; the first is that of `first`.
 template <class V, std::size_t... I>
@@ -44,146 +88,148 @@ V down(V y, std::index_sequence<I...>) {
 
 // What the springs make of one chain's masses; `pull` is what acts on one besides.
 template <class S, class Pull>
-void move_chain(const FoldedChain& chain, S& s, const typename S::V k, const typename S::V z,
-                Pull&& pull) {
+void move_chain(const FoldedChain& chain, const Element<typename S::V>* masks, S& s,
+                Element<typename S::V> spring_k, Element<typename S::V> spring_z, Pull&& pull) {
   using V = typename S::V;
-  using T = Element<V>;
   const auto others = std::make_index_sequence<S::lanes - 1>{};
-  V* const pair = s.pair + 2 * chain.first;
-  const auto tension = [=](std::uint32_t j) { return k * pair[2 * j] + z * pair[2 * j + 1]; };
+  V* const begin = &pack_at<V>(s.bodies + chain.first);
+  V* const last = begin + 2 * chain.last;
+  V* const back = begin + 2 * (chain.packs - 1);
+  const V k = all<V>(spring_k);
+  const V z = all<V>(spring_z);
+  const auto tension = [=](const V* pair) { return k * pair[0] + z * pair[1]; };
   // A free end is next to one that moves with it.
   const auto end = [&](Place place, V itself) {
-    return place == nowhere ? itself : k * s.bodies[place] + z * s.bodies[place + S::lanes];
+    return place == nowhere
+               ? itself
+               : all<V>(spring_k * s.bodies[place] + spring_z * s.bodies[place + S::lanes]);
   };
-  const V first = tension(0);
+  const V first = tension(begin);
   V y = first;
-  V before = y - up(end(chain.left, first), tension(chain.packs - 1), others);
-  const auto move = [&](std::uint32_t j, V next, V inverse_mass) {
-    V& x = pair[2 * j];
-    V& v = pair[2 * j + 1];
+  V before = y - up(end(chain.left, first), tension(back), others);
+  const auto move = [&](V* pair, V next, V inverse_mass) {
     const V after = next - y;
-    v += (after - before - pull(x, v)) * inverse_mass;
-    x += v;
+    const V v = pair[1] + (after - before - pull(pair[0], pair[1])) * inverse_mass;
+    pair[1] = v;
+    pair[0] += v;
     before = after;
     y = next;
   };
-  // Lanes behind the last mass are empty and stay so: their mass is infinite.
-  const V limit = V{} + static_cast<T>(chain.last_lane);
-  const V inverse_mass = V{} + s.coefficient[chain.mass.inverse_mass];
-  const V within = select(s.lane <= limit, inverse_mass, V{});
-  const V beyond = select(s.lane < limit, inverse_mass, V{});
-  for (std::uint32_t j = 0; j < chain.last; ++j) {
-    move(j, tension(j + 1), within);
-  }
-  const bool is_full = chain.last + 1 == chain.packs;
-  const V next = is_full ? down(first, others) : tension(chain.last + 1);
-  move(chain.last, select(s.lane == limit, end(chain.right, y), next), within);
-  if (!is_full) {
-    for (std::uint32_t j = chain.last + 1; j + 1 < chain.packs; ++j) {
-      move(j, tension(j + 1), beyond);
+  const auto move_until = [&](V* pair, const V* stop, V inverse_mass) {
+    for (; stop - pair >= 8; pair += 8) {
+      move(pair, tension(pair + 2), inverse_mass);
+      move(pair + 2, tension(pair + 4), inverse_mass);
+      move(pair + 4, tension(pair + 6), inverse_mass);
+      move(pair + 6, tension(pair + 8), inverse_mass);
     }
-    move(chain.packs - 1, down(first, others), beyond);
+    for (; pair != stop; pair += 2) {
+      move(pair, tension(pair + 2), inverse_mass);
+    }
+  };
+  // Lanes behind the last mass are empty and stay so: their mass is infinite.
+  const V inverse_mass = all<V>(s.coefficient[chain.mass.inverse_mass]);
+  const V within = inverse_mass * pack_at<V>(masks);
+  const V beyond = inverse_mass * pack_at<V>(masks + S::lanes);
+  move_until(begin, last, within);
+  const V next = last == back ? down(first, others) : tension(last + 2);
+  const auto is_last = pack_at<V>(masks + 2 * S::lanes) > V{};
+  move(last, select(is_last, end(chain.right, y), next), within);
+  if (last != back) {
+    move_until(last + 2, back, beyond);
+    move(back, down(first, others), beyond);
   }
 }
 
 template <class S>
-void step_chains(const ChainsTables& tables, S& s) {
+void step_chains(S& s) {
   using V = typename S::V;
-  const FoldedChain* const chains = tables.chains.data();
-  for (std::size_t i = 0; i < tables.chains.size(); ++i) {
-    const FoldedChain& chain = chains[i];
-    const V k = V{} + s.held[2 * i];
-    const V z = V{} + s.held[2 * i + 1];
+  const auto* held = s.held;
+  const auto* masks = s.masks;
+  for (const FoldedChain& chain : s.chains) {
+    const auto k = held[0];
+    const auto z = held[1];
     if (chain.mass.is_oscillator || chain.mass.has_gravity) {
       const bool pulls = chain.mass.is_oscillator;
-      const V own_k = V{} + (pulls ? s.coefficient[chain.mass.stiffness] : 0);
-      const V own_z = V{} + (pulls ? s.coefficient[chain.mass.damping] : 0);
-      const V g = V{} + (chain.mass.has_gravity ? s.coefficient[chain.mass.gravity] : 0);
-      move_chain(chain, s, k, z, [=](V x, V v) { return own_k * x + own_z * v + g; });
+      const V own_k = all<V>(pulls ? s.coefficient[chain.mass.stiffness] : 0);
+      const V own_z = all<V>(pulls ? s.coefficient[chain.mass.damping] : 0);
+      const V g = all<V>(chain.mass.has_gravity ? s.coefficient[chain.mass.gravity] : 0);
+      move_chain(chain, masks, s, k, z, [=](V x, V v) { return own_k * x + own_z * v + g; });
     } else {
-      move_chain(chain, s, k, z, [](V, V) { return V{}; });
+      move_chain(chain, masks, s, k, z, [](V, V) { return V{}; });
     }
+    held += 2;
+    masks += 3 * S::lanes;
   }
 }
 
 // In whole packs: the next pass could not load a pack soon of which a part has just been written.
 template <class S>
-void push_sites(const ChainsTables& tables, S& s) {
+void push_sites(S& s) {
   using V = typename S::V;
-  using T = Element<V>;
-  const ChainSite* const sites = tables.sites.data();
-  for (std::size_t i = 0; i < tables.sites.size(); ++i) {
-    const Place place = sites[i].place;
-    V* const pair = s.pair + place / (2 * S::lanes) * 2;
-    const V push = V{} + s.force[i] * s.coefficient[sites[i].inverse_mass];
-    const V change = select(s.lane == V{} + static_cast<T>(place % S::lanes), push, V{});
-    pair[0] += change;
-    pair[1] += change;
-    s.force[i] = 0;
+  auto* force = s.force;
+  for (const ChainSite& site : s.sites) {
+    const V push = all<V>(*force * s.coefficient[site.inverse_mass]) *
+                   pack_at<V>(s.units + site.lane * S::lanes);
+    V* const pair = &pack_at<V>(s.bodies + site.pair);
+    pair[0] += push;
+    pair[1] += push;
+    *force++ = 0;
   }
 }
 
 template <class S>
-void step_loose(const ChainsTables& tables, S& s) {
+void step_loose(S& s) {
   using T = Element<typename S::V>;
-  T* const force = s.force + tables.sites.size();
-  const Place* const loose = tables.loose.data();
-  const LoosePlaces* const runs = tables.loose_runs.data();
-  for (std::size_t r = 0; r < tables.loose_runs.size(); ++r) {
-    const MassRun& mass = runs[r].mass;
+  T* force = s.force + (s.sites.last - s.sites.first);
+  const Place* place = s.loose;
+  for (const LoosePlaces& run : s.loose_runs) {
+    const MassRun& mass = run.mass;
     const T inverse_mass = s.coefficient[mass.inverse_mass];
     const T k = mass.is_oscillator ? s.coefficient[mass.stiffness] : 0;
     const T z = mass.is_oscillator ? s.coefficient[mass.damping] : 0;
     const T g = mass.has_gravity ? s.coefficient[mass.gravity] : 0;
-    for (std::uint32_t i = runs[r].first; i < runs[r].first + runs[r].count; ++i) {
-      T& x = s.bodies[loose[i]];
-      T& v = s.bodies[loose[i] + S::lanes];
-      v += (force[i] - k * x - z * v - g) * inverse_mass;
+    for (std::uint32_t i = 0; i < run.count; ++i) {
+      T& x = s.bodies[*place];
+      T& v = s.bodies[*place++ + S::lanes];
+      v += (*force - k * x - z * v - g) * inverse_mass;
       x += v;
-      force[i] = 0;
+      *force++ = 0;
     }
-  }
-  for (std::size_t i = tables.sites.size() + tables.loose.size(); i < tables.forces; ++i) {
-    s.force[i] = 0;
   }
 }
 
 template <class S>
-void step_links(const ChainsTables& tables, S& s) {
+void step_links(S& s) {
   using T = Element<typename S::V>;
-  const LinkRun* const runs = tables.link_runs.data();
-  for (std::size_t r = 0; r < tables.link_runs.size(); ++r) {
-    const LinkRun& run = runs[r];
+  for (const LinkRun& run : s.link_runs) {
     const auto c = [&](std::size_t i) { return s.coefficient[run.coefficients[i]]; };
     with_law<T>(run.law, c(0), c(1), c(2), c(3), c(4), [&](auto&& law) {
-      const PlacedEnds* const ends = tables.ends.data() + run.first;
-      for (std::uint32_t i = 0; i < run.count; ++i) {
-        const auto [a, b, force_a, force_b] = ends[i];
-        const T f = law(s.bodies[a] - s.bodies[b], s.bodies[a + S::lanes] - s.bodies[b + S::lanes]);
-        s.force[force_a] -= f;
-        s.force[force_b] += f;
+      const PlacedEnds* const last = s.ends + run.first + run.count;
+      for (const PlacedEnds* ends = last - run.count; ends != last; ++ends) {
+        const T* const a = s.bodies + ends->a;
+        const T* const b = s.bodies + ends->b;
+        const T f = law(a[0] - b[0], a[S::lanes] - b[S::lanes]);
+        s.force[ends->force_a] -= f;
+        s.force[ends->force_b] += f;
       }
     });
   }
 }
 
 template <class S, class T>
-T read_output(const Program& program, const ChainsTables& tables, const S& s, const T* value,
-              const PlacedOutput& output) {
-  const T x = s.bodies[output.place];
-  if (!output.is_force) {
-    return x;
-  }
-  const T v = s.bodies[output.place + S::lanes];
+T force_at(const Program& program, const ChainsTables& tables, const S& s, const T* value,
+           const PlacedOutput& output) {
+  const T* const here = s.bodies + output.place;
   T force = s.force[output.force];
   for (std::uint32_t i = output.first; i < output.first + output.count; ++i) {
     const Probe& probe = tables.probes[i];
-    force += spring_force(s.bodies[probe.neighbour] - x, s.bodies[probe.neighbour + S::lanes] - v,
+    const T* const there = s.bodies + probe.neighbour;
+    force += spring_force(there[0] - here[0], there[S::lanes] - here[S::lanes],
                           s.coefficient[probe.stiffness], s.coefficient[probe.damping]);
   }
-  for (std::size_t i = 0; i < tables.inputs.size(); ++i) {
-    if (tables.inputs[i].is_force && tables.inputs[i].place == output.place) {
-      force += value[i];
+  for (const PlacedInput& input : s.forces) {
+    if (input.place == output.place) {
+      force += value[input.index];
     }
   }
   return force / static_cast<T>(program.rate_ratio * program.rate_ratio);
@@ -192,38 +238,43 @@ T read_output(const Program& program, const ChainsTables& tables, const S& s, co
 template <class T, std::size_t Bytes>
 void step(const Program& program, const ChainsTables& tables, ChainsState<T>& state,
           const Block<T>& block) {
-  View<T, Bytes> s(state);
+  using S = View<T, Bytes>;
+  S s(tables, state);
+  Ramps<T> ramps = state.ramps;
+  const Table<std::uint32_t> audio_coefficients(program.audio_coefficients);
   const T* value = block.value;
   const T* velocity = block.velocity;
   const T* audio = block.audio;
   T* outputs = block.outputs;
-  const std::size_t inputs = tables.inputs.size();
-  for (std::size_t frame = 0; frame < block.frames; ++frame) {
-    advance(state.ramps);
-    for (const std::uint32_t c : program.audio_coefficients) {
-      state.ramps.value[c] = *audio++;
+  const std::size_t inputs = program.inputs.size();
+  const std::size_t frames = block.frames;
+  for (std::size_t frame = 0; frame < frames; ++frame) {
+    advance(ramps);
+    for (const std::uint32_t c : audio_coefficients) {
+      ramps.value[c] = *audio++;
     }
-    for (std::size_t i = 0; i < inputs; ++i) {
-      if (tables.inputs[i].is_force) {
-        s.force[tables.inputs[i].force] += value[i];
-      }
+    for (const PlacedInput& input : s.forces) {
+      s.force[input.force] += value[input.index];
     }
-    step_chains(tables, s);
-    push_sites(tables, s);
-    step_loose(tables, s);
-    for (std::size_t i = 0; i < inputs; ++i) {
-      if (!tables.inputs[i].is_force) {
-        s.bodies[tables.inputs[i].place] = value[i];
-        s.bodies[tables.inputs[i].place + View<T, Bytes>::lanes] = velocity[i];
-      }
+    step_chains(s);
+    push_sites(s);
+    step_loose(s);
+    for (const PlacedInput& input : s.positions) {
+      s.bodies[input.place] = value[input.index];
+      s.bodies[input.place + S::lanes] = velocity[input.index];
     }
-    step_links(tables, s);
-    for (std::size_t i = 0; i < tables.chains.size(); ++i) {
-      s.held[2 * i] = s.coefficient[tables.chains[i].stiffness];
-      s.held[2 * i + 1] = s.coefficient[tables.chains[i].damping];
+    for (const std::uint32_t i : s.listened) {
+      s.force[i] = 0;
     }
-    for (const PlacedOutput& output : tables.outputs) {
-      *outputs++ = read_output(program, tables, s, value, output);
+    step_links(s);
+    T* held = s.held;
+    for (const FoldedChain& chain : s.chains) {
+      *held++ = s.coefficient[chain.stiffness];
+      *held++ = s.coefficient[chain.damping];
+    }
+    for (const PlacedOutput& output : s.outputs) {
+      *outputs++ =
+          output.is_force ? force_at(program, tables, s, value, output) : s.bodies[output.place];
     }
     value += inputs;
     velocity += inputs;
