@@ -58,7 +58,7 @@ class TablesMaker {
     for (std::uint32_t i = 0; i < program_.inputs.size(); ++i) {
       const InputSlot& input = program_.inputs[i];
       (input.is_force ? tables_.forces : tables_.positions)
-          .push_back({place_[input.node], force_[input.node], i});
+          .push_back({place_[input.node], force_at(input.node), i});
     }
     make_outputs();
     return std::move(tables_);
@@ -156,7 +156,12 @@ class TablesMaker {
         tables_.listened.push_back(force_[output.node]);
       }
     }
-    std::replace(force_.begin(), force_.end(), nowhere, next_force());
+  }
+
+  // Where nobody reads it each end of a link has a force of its own, so that no sum waits for
+  // another.
+  std::uint32_t force_at(std::uint32_t node) {
+    return force_[node] == nowhere ? next_force() : force_[node];
   }
 
   void make_links() {
@@ -175,7 +180,7 @@ class TablesMaker {
       run = of;
       ++link_runs.back().count;
       const auto [a, b] = program_.ends[link];
-      tables_.ends.push_back({place_[a], place_[b], force_[a], force_[b]});
+      tables_.ends.push_back({place_[a], place_[b], force_at(a), force_at(b)});
     }
   }
 

@@ -79,7 +79,7 @@ struct ChainsTables {
   std::vector<PlacedInput> forces;
   std::vector<PlacedOutput> outputs;
   std::vector<Probe> probes;
-  std::size_t force_count = 0;  // sites, loose masses, listened; the last one is never read
+  std::size_t force_count = 0;  // sites, loose masses, listened, then those never read
   std::size_t pairs = 0;
 };
 

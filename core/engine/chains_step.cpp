@@ -21,6 +21,7 @@ struct Table {
 
 template <class T, std::size_t Bytes>
 struct View {
+  using Number = T;
   using V = Pack<T, Bytes>;
   static constexpr std::size_t lanes = Bytes / sizeof(T);
 
@@ -88,8 +89,8 @@ V down(V y, std::index_sequence<I...>) {
 
 // What the springs make of one chain's masses; `pull` is what acts on one besides.
 template <class S, class Pull>
-void move_chain(const FoldedChain& chain, const Element<typename S::V>* masks, S& s,
-                Element<typename S::V> spring_k, Element<typename S::V> spring_z, Pull&& pull) {
+void move_chain(const FoldedChain& chain, const typename S::Number* masks, S& s,
+                typename S::Number spring_k, typename S::Number spring_z, Pull&& pull) {
   using V = typename S::V;
   const auto others = std::make_index_sequence<S::lanes - 1>{};
   V* const begin = &pack_at<V>(s.bodies + chain.first);
@@ -179,7 +180,7 @@ void push_sites(S& s) {
 
 template <class S>
 void step_loose(S& s) {
-  using T = Element<typename S::V>;
+  using T = typename S::Number;
   T* force = s.force + (s.sites.last - s.sites.first);
   const Place* place = s.loose;
   for (const LoosePlaces& run : s.loose_runs) {
@@ -198,19 +199,36 @@ void step_loose(S& s) {
   }
 }
 
+// Several links at once, or one in the first lane.
+template <class P, class S, class ForceLaw, std::size_t... I>
+void add_forces(const PlacedEnds* ends, S& s, ForceLaw&& law, std::index_sequence<I...>) {
+  const auto difference = [&](std::size_t i, std::size_t of) {
+    return s.bodies[ends[i].a + of] - s.bodies[ends[i].b + of];
+  };
+  const P f = law(P{difference(I, 0)...}, P{difference(I, S::lanes)...});
+  const auto add = [&](std::size_t i, typename S::Number force) {
+    s.force[ends[i].force_a] -= force;
+    s.force[ends[i].force_b] += force;
+  };
+  (add(I, f[I]), ...);
+}
+
+// In packs even where a link is alone: laws have no branches there that could be guessed wrongly.
 template <class S>
 void step_links(S& s) {
-  using T = Element<typename S::V>;
+  using T = typename S::Number;
+  using P = Pack<T, 16>;
+  constexpr std::uint32_t lanes = 16 / sizeof(T);
   for (const LinkRun& run : s.link_runs) {
-    const auto c = [&](std::size_t i) { return s.coefficient[run.coefficients[i]]; };
-    with_law<T>(run.law, c(0), c(1), c(2), c(3), c(4), [&](auto&& law) {
-      const PlacedEnds* const last = s.ends + run.first + run.count;
-      for (const PlacedEnds* ends = last - run.count; ends != last; ++ends) {
-        const T* const a = s.bodies + ends->a;
-        const T* const b = s.bodies + ends->b;
-        const T f = law(a[0] - b[0], a[S::lanes] - b[S::lanes]);
-        s.force[ends->force_a] -= f;
-        s.force[ends->force_b] += f;
+    const auto c = [&](std::size_t i) { return all<P>(s.coefficient[run.coefficients[i]]); };
+    with_law<P>(run.law, c(0), c(1), c(2), c(3), c(4), [&](auto&& law) {
+      const PlacedEnds* ends = s.ends + run.first;
+      std::uint32_t left = run.count;
+      for (; false && left >= lanes; left -= lanes, ends += lanes) {
+        add_forces<P>(ends, s, law, std::make_index_sequence<lanes>{});
+      }
+      for (; left > 0; --left, ++ends) {
+        add_forces<P>(ends, s, law, std::make_index_sequence<1>{});
       }
     });
   }
