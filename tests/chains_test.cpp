@@ -174,4 +174,93 @@ TEST_CASE("strings of every length fold into every pack", "[chains]") {
   }
 }
 
+TEST_CASE("everything beside a string acts on it", "[chains]") {
+  // Two strings of unlike masses; a loose mass and an oscillator between them, every smooth law,
+  // gravity, forces heard at a mass within, at an end, at a loose mass, at what holds a string.
+  const std::string text =
+      row("a", 40, "mass 1.", "0.2 0.01") + row("b", 23, "osc 2. 0.001 0.002", "k 0.02") +
+      "@k param 0.3\n@q param 0.02\n@g ground 0.1\n@h ground -0.1\n@in1 posInput 0.\n"
+      "@in2 frcInput @a_m17\n@in3 frcInput @o\n@in4 frcInput @g\n"
+      "@ga springDamper @g @a_m0 0.2 0.01\n@gb springDamper @in1 @b_m22 k 0.02\n"
+      "@o osc 1.5 0.01 0.001 0. 0.\n@p mass 3. 0.1 0.\n@w massG 1. 0.0001 0. 0.\n"
+      "@l1 springDamper @o @a_m3 q 0.01\n@l2 nlSpring2 @p @o 0.05 0.01 0.01\n"
+      "@l3 nlSpring3 @p @b_m4 0.05 0.01 0.01\n@l4 springDamper @w @h 0.05 0.01\n"
+      "@l5 nlSpringDamper @w @a_m39 0.01 0.02 0.1 0.01\n@l6 nlBow @in1 @a_m30 0.01 0.5 1\n"
+      "@l7 damper @a_m5 @b_m5 0.01\n@l8 springDamper @a_m20 @a_m21 q 0.\n"
+      "@out1 posOutput @a_m20\n@out2 posOutput @b_m0\n@out3 posOutput @w\n@out4 posOutput @in1\n"
+      "@out5 frcOutput @a_m17\n@out6 frcOutput @a_m39\n@out7 frcOutput @o\n@out8 frcOutput @g\n"
+      "@out9 frcOutput @in1\n@out10 frcOutput @b_m9\n";
+  for (std::uint64_t seed = 1; seed <= 3; ++seed) {
+    CAPTURE(seed);
+    const Program program = formed(shuffled(text, seed));
+    CHECK(std::get<Chains>(program.form).chains.size() == 2);
+    CHECK(std::get<Chains>(program.form).loose.size() == 3);
+    check_both(program,
+               {.frames = 15000, .seed = seed, .reach = 0.05, .turns = seed > 1, .pitch = 0.9});
+  }
+}
+
+TEST_CASE("random strings tied to each other move as they are written", "[chains]") {
+  for (std::uint64_t seed = 1; seed <= 12; ++seed) {
+    CAPTURE(seed);
+    Random random(seed);
+    std::string text = "@k param 0.2\n@z param 0.01\n@in1 posInput 0.\n@g ground 0.\n";
+    std::vector<std::string> masses = {"@g", "@in1"};
+    for (const std::string name : {"a", "b", "c", "d"}) {
+      const int count = static_cast<int>(4 + random.below(90));
+      text += row(name, count, random.below(3) == 0 ? "osc 1.5 0.01 0.001" : "mass 1.2",
+                  random.below(2) == 0 ? "k z" : "0.1 0.02");
+      for (int i = 0; i < count; ++i) {
+        masses.push_back(scenes::at(name + "_m", i));
+      }
+      text += "@h" + name + " springDamper @g " + scenes::at(name + "_m", 0) + " k z\n";
+    }
+    for (int i = 0; i < 12; ++i) {
+      text += scenes::at("x", i) + " springDamper " + masses[random.below(masses.size())] + " " +
+              masses[random.below(masses.size())] + (random.below(3) == 0 ? " k z\n" : " 0.05 z\n");
+    }
+    text += "@in2 frcInput " + masses[5] + "\n" + scenes::output(1, masses[4].substr(1)) +
+            scenes::output(2, masses.back().substr(1));
+    Program program = program_of(shuffled(text, seed));
+    if (auto form = chains_form(program)) {
+      program.form = std::move(*form);
+      check_both(program, {.frames = 6000, .seed = seed, .turns = true});
+    }
+  }
+}
+
+TEST_CASE("places on a string and beside it move and are moved", "[chains]") {
+  const std::string text =
+      "@u param 0.3\n@s string 60 1. 0.2 0.01 0.0005 0. 0.\n@t chain 5 1. 0.1 0.01 0. 0.\n"
+      "@in1 posInput 0.\n@in2 frcInput [@s u]\n@in3 frcInput [@t u]\n"
+      "@l1 springDamper @in1 [@s 0.77] 0.1 0.01\n@l2 springDamper [@s 1.1 * u] [@t 2 * u] 0.1 0.\n"
+      "@l3 springDamper [@s 1 - u] [@s u] 0.05 0.01\n@l4 springDamper [@t 0.] @in1 0.1 0.01\n"
+      "@out1 posOutput [@s 2 * u]\n@out2 posOutput [@t u]\n";
+  for (const bool turns : {false, true}) {
+    CAPTURE(turns);
+    const Program program = formed(text);
+    CHECK(program.taps.size() >= 7);
+    check_both(program, {.frames = 15000, .turns = turns});
+  }
+  CHECK(!chains_form(program_of(text + "@out3 frcOutput @in1\n")));
+}
+
+TEST_CASE("a reset string starts over, whatever became of it", "[chains]") {
+  const Program program = formed(scenes::resonator());
+  rig::Bare<float> used(program);
+  rig::Bare<float> fresh(program);
+  CHECK(used.kernel().is_near_start(0, 1e-9));
+  used.step({std::numeric_limits<double>::quiet_NaN()});
+  for (int n = 0; n < 100; ++n) {
+    used.step({0.5});
+  }
+  CHECK(!used.kernel().is_near_start(0, 1e9));
+  used.kernel().reset(0);
+  CHECK(used.kernel().is_near_start(0, 1e-9));
+  used.feed(0, 0, 0.0);
+  for (int n = 0; n < 100; ++n) {
+    CHECK(used.step({0.1 * n}) == fresh.step({0.1 * n}));
+  }
+}
+
 }  // namespace ressort

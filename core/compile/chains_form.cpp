@@ -169,8 +169,10 @@ class ChainFinder {
 }  // namespace
 
 std::optional<Chains> chains_form(const Program& program) {
-  if (!program.taps.empty()) {
-    return std::nullopt;
+  const auto is_force = [](const OutputSlot& output) { return output.is_force; };
+  if (!program.taps.empty() &&
+      std::any_of(program.outputs.begin(), program.outputs.end(), is_force)) {
+    return std::nullopt;  // what a point does to a node is never summed
   }
   return ChainFinder(program).find();
 }

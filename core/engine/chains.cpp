@@ -54,6 +54,7 @@ class TablesMaker {
     find_sites();
     number_loose();
     find_listened();
+    place_taps();
     make_links();
     for (std::uint32_t i = 0; i < program_.inputs.size(); ++i) {
       const InputSlot& input = program_.inputs[i];
@@ -109,13 +110,17 @@ class TablesMaker {
     }
   }
 
+  ChainSite site_of(std::uint32_t node) const {
+    const std::uint32_t lane = place_[node] % lanes_;
+    return {place_[node] - lane, lane * lanes_, site_mass_[node]};
+  }
+
   // Masses of chains that something else acts on, or whose force is listened to.
   void find_sites() {
     const auto touch = [&](std::uint32_t node) {
       if (site_mass_[node] != nowhere && force_[node] == nowhere) {
         force_[node] = next_force();
-        const std::uint32_t lane = place_[node] % lanes_;
-        tables_.sites.push_back({place_[node] - lane, lane, site_mass_[node]});
+        tables_.sites.push_back(site_of(node));
       }
     };
     for (const std::uint32_t link : form_.links) {
@@ -185,15 +190,33 @@ class TablesMaker {
   }
 
   void make_outputs() {
-    for (const OutputSlot& output : program_.outputs) {
-      PlacedOutput placed{.place = place_[output.node], .is_force = output.is_force};
-      placed.first = static_cast<std::uint32_t>(tables_.probes.size());
+    for (std::uint32_t i = 0; i < program_.outputs.size(); ++i) {
+      const OutputSlot& output = program_.outputs[i];
+      const Place place = place_[output.node];
       if (output.is_force) {
-        placed.force = force_[output.node];
+        const auto first = static_cast<std::uint32_t>(tables_.probes.size());
         add_probes(output.node);
+        const auto count = static_cast<std::uint32_t>(tables_.probes.size()) - first;
+        tables_.heard_forces.push_back({place, i, force_[output.node], first, count});
+      } else {
+        tables_.heard_positions.push_back({place, i});
       }
-      placed.count = static_cast<std::uint32_t>(tables_.probes.size()) - placed.first;
-      tables_.outputs.push_back(placed);
+    }
+  }
+
+  void place_taps() {
+    for (const TapSlot& tap : program_.taps) {
+      force_[tap.node] = next_force();
+      tables_.taps.push_back({tap, place_[tap.node], force_[tap.node]});
+    }
+    for (const std::uint32_t node : program_.tap_nodes) {
+      PlacedNode placed{.place = place_[node], .force = nowhere, .site = {}};
+      if (site_mass_[node] != nowhere) {
+        placed.site = site_of(node);
+      } else {
+        placed.force = force_at(node);
+      }
+      tables_.tap_nodes.push_back(placed);
     }
   }
 
@@ -240,7 +263,9 @@ ChainsKernel<T>::ChainsKernel(const Program& program, Isa isa)
       units_(lanes_ * lanes_),
       bodies_(2 * lanes_ * tables_.pairs),
       held_(2 * tables_.chains.size()),
-      force_(tables_.force_count) {
+      force_(tables_.force_count),
+      corners_(4 * program.taps.size()),
+      tap_pull_(program.taps.size()) {
   const auto& chains = std::get<Chains>(program.form).chains;
   for (std::size_t i = 0; i < chains.size(); ++i) {
     const std::size_t last_lane = (chains[i].count - 1) / tables_.chains[i].packs;
@@ -264,6 +289,7 @@ void ChainsKernel<T>::reset(std::size_t) {
   }
   std::fill(held_.begin(), held_.end(), T(0));
   std::fill(force_.begin(), force_.end(), T(0));
+  std::fill(tap_pull_.begin(), tap_pull_.end(), T(0));
 }
 
 template <class T>
@@ -273,7 +299,9 @@ void ChainsKernel<T>::step(const Block<T>& block) {
                        .units = units_.data(),
                        .bodies = bodies_.data(),
                        .held = held_.data(),
-                       .force = force_.data()};
+                       .force = force_.data(),
+                       .corners = corners_.data(),
+                       .tap_pull = tap_pull_.data()};
   step_(program_, tables_, state, block);
   this->coefficients.finish(block.frames);
 }

@@ -29,7 +29,7 @@ struct FoldedChain {
 // A mass of a chain that more than its chain acts on.
 struct ChainSite {
   Place pair = 0;
-  std::uint32_t lane = 0;
+  std::uint32_t unit = 0;          // of ChainsState::units: its lane's pack
   std::uint32_t inverse_mass = 0;  // coefficient
 };
 
@@ -58,12 +58,37 @@ struct Probe {
   std::uint32_t damping = 0;
 };
 
-struct PlacedOutput {
+struct HeardPosition {
   Place place = 0;
-  bool is_force = false;
+  std::uint32_t index = 0;  // of Program::outputs
+};
+
+struct HeardForce {
+  Place place = 0;
+  std::uint32_t index = 0;
   std::uint32_t force = 0;
   std::uint32_t first = 0;  // of ChainsTables::probes
   std::uint32_t count = 0;
+};
+
+// A node under a point: what acts on it is added to a force, or to a chain's mass itself.
+struct PlacedNode {
+  Place place = 0;
+  std::uint32_t force = nowhere;
+  ChainSite site;
+};
+
+struct PlacedTap {
+  TapSlot slot;
+  Place place = 0;
+  std::uint32_t force = 0;
+};
+
+// One of the four nodes around a point.
+template <class T>
+struct Corner {
+  std::uint32_t node = 0;  // of Program::tap_nodes
+  T weight = 0;
 };
 
 // What a kernel makes of a Program and its lanes, once.
@@ -77,9 +102,12 @@ struct ChainsTables {
   std::vector<std::uint32_t> listened;  // forces on what does not move, for outputs
   std::vector<PlacedInput> positions;
   std::vector<PlacedInput> forces;
-  std::vector<PlacedOutput> outputs;
+  std::vector<HeardPosition> heard_positions;
+  std::vector<HeardForce> heard_forces;
   std::vector<Probe> probes;
-  std::size_t force_count = 0;  // sites, loose masses, listened, then those never read
+  std::vector<PlacedTap> taps;
+  std::vector<PlacedNode> tap_nodes;  // those of the Program
+  std::size_t force_count = 0;        // sites, loose masses, listened, points, those never read
   std::size_t pairs = 0;
 };
 
@@ -87,12 +115,14 @@ struct ChainsTables {
 template <class T>
 struct ChainsState {
   Ramps<T> ramps;
-  const T* masks;  // [chain][3][lane] 1 or 0: is a mass here, up to the last one's pair; is one
-                   // beyond it; is it the last
-  const T* units;  // [lane][lane] 1 where both are the same
-  T* bodies;       // [pair][position or velocity][lane]
-  T* held;         // [chain][2] the K and Z that forces of the last sample had: 0 at the start
-  T* force;        // [force] summed by the links, used by the next sample
+  const T* masks;      // [chain][3][lane] 1 or 0: is a mass here, up to the last one's pair; is one
+                       // beyond it; is it the last
+  const T* units;      // [lane][lane] 1 where both are the same
+  T* bodies;           // [pair][position or velocity][lane]
+  T* held;             // [chain][2] the K and Z that forces of the last sample had: 0 at the start
+  T* force;            // [force] summed by the links, used by the next sample
+  Corner<T>* corners;  // [tap][4] where it is in this sample
+  T* tap_pull;         // [tap] what the links of this sample do to it, for the next one
 };
 
 template <class T>
@@ -133,6 +163,8 @@ class ChainsKernel final : public Kernel<T> {
   Aligned<T> bodies_;
   Aligned<T> held_;
   Aligned<T> force_;
+  std::vector<Corner<T>> corners_;
+  Aligned<T> tap_pull_;
 };
 
 }  // namespace ressort

@@ -32,15 +32,20 @@ struct View {
         loose(tables.loose.data()),
         link_runs(tables.link_runs),
         ends(tables.ends.data()),
+        taps(tables.taps),
+        tap_nodes(tables.tap_nodes.data()),
         listened(tables.listened),
         positions(tables.positions),
         forces(tables.forces),
-        outputs(tables.outputs),
+        heard_positions(tables.heard_positions),
+        heard_forces(tables.heard_forces),
         bodies(state.bodies),
         masks(state.masks),
         units(state.units),
         held(state.held),
         force(state.force),
+        corners(state.corners),
+        tap_pull(state.tap_pull),
         coefficient(state.ramps.value) {}
 
   Table<FoldedChain> chains;
@@ -49,15 +54,20 @@ struct View {
   const Place* loose;
   Table<LinkRun> link_runs;
   const PlacedEnds* ends;
+  Table<PlacedTap> taps;
+  const PlacedNode* tap_nodes;
   Table<std::uint32_t> listened;
   Table<PlacedInput> positions;
   Table<PlacedInput> forces;
-  Table<PlacedOutput> outputs;
+  Table<HeardPosition> heard_positions;
+  Table<HeardForce> heard_forces;
   T* bodies;
   const T* masks;
   const T* units;
   T* held;
   T* force;
+  Corner<T>* corners;
+  T* tap_pull;
   const T* coefficient;
 };
 
@@ -165,15 +175,20 @@ void step_chains(S& s) {
 
 // In whole packs: the next pass could not load a pack soon of which a part has just been written.
 template <class S>
-void push_sites(S& s) {
+void push(const ChainSite& site, typename S::Number force, S& s) {
   using V = typename S::V;
+  const V change =
+      all<V>(force * s.coefficient[site.inverse_mass]) * pack_at<V>(s.units + site.unit);
+  V* const pair = &pack_at<V>(s.bodies + site.pair);
+  pair[0] += change;
+  pair[1] += change;
+}
+
+template <class S>
+void push_sites(S& s) {
   auto* force = s.force;
   for (const ChainSite& site : s.sites) {
-    const V push = all<V>(*force * s.coefficient[site.inverse_mass]) *
-                   pack_at<V>(s.units + site.lane * S::lanes);
-    V* const pair = &pack_at<V>(s.bodies + site.pair);
-    pair[0] += push;
-    pair[1] += push;
+    push(site, *force, s);
     *force++ = 0;
   }
 }
@@ -199,44 +214,103 @@ void step_loose(S& s) {
   }
 }
 
-// Several links at once, or one in the first lane.
-template <class P, class S, class ForceLaw, std::size_t... I>
-void add_forces(const PlacedEnds* ends, S& s, ForceLaw&& law, std::index_sequence<I...>) {
-  const auto difference = [&](std::size_t i, std::size_t of) {
-    return s.bodies[ends[i].a + of] - s.bodies[ends[i].b + of];
-  };
-  const P f = law(P{difference(I, 0)...}, P{difference(I, S::lanes)...});
-  const auto add = [&](std::size_t i, typename S::Number force) {
-    s.force[ends[i].force_a] -= force;
-    s.force[ends[i].force_b] += force;
-  };
-  (add(I, f[I]), ...);
-}
-
-// In packs even where a link is alone: laws have no branches there that could be guessed wrongly.
+// In the first lane of a pack: laws have no branches there that could be guessed wrongly.
 template <class S>
 void step_links(S& s) {
-  using T = typename S::Number;
-  using P = Pack<T, 16>;
-  constexpr std::uint32_t lanes = 16 / sizeof(T);
+  using P = Pack<typename S::Number, 16>;
   for (const LinkRun& run : s.link_runs) {
     const auto c = [&](std::size_t i) { return all<P>(s.coefficient[run.coefficients[i]]); };
     with_law<P>(run.law, c(0), c(1), c(2), c(3), c(4), [&](auto&& law) {
-      const PlacedEnds* ends = s.ends + run.first;
-      std::uint32_t left = run.count;
-      for (; false && left >= lanes; left -= lanes, ends += lanes) {
-        add_forces<P>(ends, s, law, std::make_index_sequence<lanes>{});
-      }
-      for (; left > 0; --left, ++ends) {
-        add_forces<P>(ends, s, law, std::make_index_sequence<1>{});
+      const PlacedEnds* const last = s.ends + run.first + run.count;
+      for (const PlacedEnds* ends = last - run.count; ends != last; ++ends) {
+        const auto* const a = s.bodies + ends->a;
+        const auto* const b = s.bodies + ends->b;
+        const auto f = law(P{a[0] - b[0]}, P{a[S::lanes] - b[S::lanes]})[0];
+        s.force[ends->force_a] -= f;
+        s.force[ends->force_b] += f;
       }
     });
   }
 }
 
+// w_i = max(0, 1 - |p - i|) along each side, p being the coordinate in nodes.
+template <class S>
+void locate(const PlacedTap& tap, const S& s, Corner<typename S::Number>* corners) {
+  using T = typename S::Number;
+  const auto split = [&](std::uint32_t coefficient, std::uint32_t nodes, std::uint32_t& below) {
+    // Not std::clamp: what is no number becomes 0.
+    const T u = s.coefficient[coefficient];
+    const T p = (u > 0 ? (u < 1 ? u : T(1)) : T(0)) * static_cast<T>(nodes - 1);
+    below = static_cast<std::uint32_t>(p);
+    return p - static_cast<T>(below);
+  };
+  std::uint32_t row = 0;
+  std::uint32_t column = 0;
+  const T alpha = split(tap.slot.u, tap.slot.length, row);
+  const T beta = split(tap.slot.v, tap.slot.width, column);
+  const std::uint32_t node = tap.slot.first + row * tap.slot.width + column;
+  const std::uint32_t next = alpha > 0 ? node + tap.slot.width : node;
+  const std::uint32_t aside = beta > 0 ? 1 : 0;
+  corners[0] = {node, (1 - alpha) * (1 - beta)};
+  corners[1] = {node + aside, (1 - alpha) * beta};
+  corners[2] = {next, alpha * (1 - beta)};
+  corners[3] = {next + aside, alpha * beta};
+}
+
+// What acts on a point goes to the nodes around it.
+template <class S>
+void spread(const Corner<typename S::Number>* corners, typename S::Number force, S& s) {
+  for (std::size_t i = 0; i < 4; ++i) {
+    const PlacedNode& node = s.tap_nodes[corners[i].node];
+    const auto share = corners[i].weight * force;
+    if (node.force != nowhere) {
+      s.force[node.force] += share;
+    } else {
+      push(node.site, share, s);
+    }
+  }
+}
+
+// Links pull where a point was in the last sample, this sample's inputs where it is in this one.
+template <class S>
+void push_taps(S& s) {
+  auto* corners = s.corners;
+  auto* pull = s.tap_pull;
+  for (const PlacedTap& tap : s.taps) {
+    spread(corners, *pull++, s);
+    locate(tap, s, corners);
+    spread(corners, s.force[tap.force], s);
+    s.force[tap.force] = 0;
+    corners += 4;
+  }
+}
+
+// A point moves with the nodes around it, and along them when its coordinate changes.
+template <class S>
+void move_taps(S& s) {
+  const auto* corner = s.corners;
+  for (const PlacedTap& tap : s.taps) {
+    typename S::Number position = 0;
+    for (std::size_t i = 0; i < 4; ++i, ++corner) {
+      position += corner->weight * s.bodies[s.tap_nodes[corner->node].place];
+    }
+    s.bodies[tap.place + S::lanes] = position - s.bodies[tap.place];
+    s.bodies[tap.place] = position;
+  }
+}
+
+template <class S>
+void pull_taps(S& s) {
+  auto* pull = s.tap_pull;
+  for (const PlacedTap& tap : s.taps) {
+    *pull++ = s.force[tap.force];
+    s.force[tap.force] = 0;
+  }
+}
+
 template <class S, class T>
 T force_at(const Program& program, const ChainsTables& tables, const S& s, const T* value,
-           const PlacedOutput& output) {
+           const HeardForce& output) {
   const T* const here = s.bodies + output.place;
   T force = s.force[output.force];
   for (std::uint32_t i = output.first; i < output.first + output.count; ++i) {
@@ -265,6 +339,7 @@ void step(const Program& program, const ChainsTables& tables, ChainsState<T>& st
   const T* audio = block.audio;
   T* outputs = block.outputs;
   const std::size_t inputs = program.inputs.size();
+  const std::size_t output_count = program.outputs.size();
   const std::size_t frames = block.frames;
   for (std::size_t frame = 0; frame < frames; ++frame) {
     advance(ramps);
@@ -276,24 +351,30 @@ void step(const Program& program, const ChainsTables& tables, ChainsState<T>& st
     }
     step_chains(s);
     push_sites(s);
+    push_taps(s);
     step_loose(s);
     for (const PlacedInput& input : s.positions) {
       s.bodies[input.place] = value[input.index];
       s.bodies[input.place + S::lanes] = velocity[input.index];
     }
+    move_taps(s);
     for (const std::uint32_t i : s.listened) {
       s.force[i] = 0;
     }
     step_links(s);
+    pull_taps(s);
     T* held = s.held;
     for (const FoldedChain& chain : s.chains) {
       *held++ = s.coefficient[chain.stiffness];
       *held++ = s.coefficient[chain.damping];
     }
-    for (const PlacedOutput& output : s.outputs) {
-      *outputs++ =
-          output.is_force ? force_at(program, tables, s, value, output) : s.bodies[output.place];
+    for (const HeardPosition& output : s.heard_positions) {
+      outputs[output.index] = s.bodies[output.place];
     }
+    for (const HeardForce& output : s.heard_forces) {
+      outputs[output.index] = force_at(program, tables, s, value, output);
+    }
+    outputs += output_count;
     value += inputs;
     velocity += inputs;
   }
