@@ -21,18 +21,17 @@ ChainsStep<T> step_for(std::size_t bytes, Isa isa) {
 }
 
 // The widest that the longest chain fills often enough for the passes to be worth more than their
-// ends.
+// ends. Packs of 64 bytes are slower than two of 32 wherever a pack takes two turns, and the ends
+// of a pass cost more of them.
 template <class T>
 std::size_t lanes_for(const Chains& form, Isa isa) {
   std::uint32_t longest = 0;
   for (const Chain& chain : form.chains) {
     longest = std::max(longest, chain.count);
   }
-  std::size_t bytes = 16;
-  while (bytes < vector_bytes(isa) && longest >= 3 * (2 * bytes / sizeof(T))) {
-    bytes *= 2;
-  }
-  return bytes / sizeof(T);
+  constexpr std::size_t wide_lanes = 32 / sizeof(T);
+  const bool is_wide = vector_bytes(isa) >= 32 && longest >= 3 * wide_lanes;
+  return is_wide ? wide_lanes : 16 / sizeof(T);
 }
 
 // Puts nodes in their places, and everything that names nodes into tables that name places.

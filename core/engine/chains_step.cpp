@@ -384,11 +384,6 @@ void step(const Program& program, const ChainsTables& tables, ChainsState<T>& st
 
 template <class T>
 ChainsStep<T> chains_step(std::size_t bytes) {
-  if constexpr (RESSORT_VECTOR_BYTES >= 64) {
-    if (bytes == 64) {
-      return step<T, 64>;
-    }
-  }
   if constexpr (RESSORT_VECTOR_BYTES >= 32) {
     if (bytes == 32) {
       return step<T, 32>;
