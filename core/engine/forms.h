@@ -33,5 +33,19 @@ struct Chains {
 };
 
 using Form = std::variant<Direct, Chains>;
+// A small body for one voice: between contacts a whole block of samples is one product of a dense
+// matrix with the state. The matrices depend on a voice's coefficients: they are the kernel's own.
+struct DenseSpring {
+  std::uint32_t a = 0;  // nodes
+  std::uint32_t b = 0;
+  std::uint32_t stiffness = 0;  // coefficients
+struct DensePort {
+  std::uint32_t run = 0;   // of Program::link_runs
+  std::uint32_t link = 0;  // of Program::ends
+struct Dense {
+  std::vector<DenseSpring> springs;  // every linear link that moves a mass
+  std::vector<DensePort> ports;      // every other link that moves a mass
+  bool has_constant = false;         // gravity, or a spring to what stands elsewhere than at 0
+using Form = std::variant<Direct, Dense>;
 
 }  // namespace ressort

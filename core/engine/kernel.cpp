@@ -1,6 +1,7 @@
 #include "core/engine/kernel.h"
 
 #include "core/engine/chains.h"
+#include "core/engine/dense.h"
 #include "core/engine/direct.h"
 
 namespace ressort {
@@ -67,6 +68,8 @@ std::unique_ptr<Kernel<T>> make_kernel(const Program& program, std::size_t voice
     }
     std::unique_ptr<Kernel<T>> operator()(const Chains&) const {
       return std::make_unique<ChainsKernel<T>>(program, isa);
+    std::unique_ptr<Kernel<T>> operator()(const Dense& form) const {
+      return std::make_unique<DenseKernel<T>>(program, form, isa);
     }
   };
   return std::visit(Maker{program, voices, isa}, program.form);

@@ -1,0 +1,404 @@
+#include "core/engine/dense.h"
+
+#include <algorithm>
+#include <cmath>
+#include <span>
+
+namespace ressort {
+namespace {
+
+constexpr std::size_t own_vectors = 4;  // of DenseBody::matrix: 1/M, own stiffness, damping, weight
+constexpr std::size_t least_leap = 6;   // frames; fewer are walked
+
+// A port's law that is 0 nowhere makes every block a walk.
+bool acts_everywhere(Law law) {
+  switch (law) {
+    case Law::pluck:
+    case Law::bow:
+    case Law::contact:
+    case Law::clipped_contact:
+      return false;
+    case Law::spring:
+    case Law::quadratic_spring:
+    case Law::cubic_spring:
+    case Law::clipped_spring:
+    case Law::smooth_bow:
+      return true;
+  }
+  return true;
+}
+
+template <class T>
+DenseSteps<T> steps_for(std::size_t masses, Isa isa) {
+#if RESSORT_X86_LEVELS
+  if (isa == Isa::v4) {
+    return v4::dense_steps<T>(masses);
+  }
+  if (isa == Isa::v3) {
+    return v3::dense_steps<T>(masses);
+  }
+#endif
+  static_cast<void>(isa);
+  return base::dense_steps<T>(masses);
+}
+
+std::size_t round_up(std::size_t count, std::size_t to) {
+  return (count + to - 1) / to * to;
+}
+
+// Hands out pieces of one memory, each on a cache line; first counts, then gives.
+template <class T>
+class Arena {
+ public:
+  explicit Arena(T* memory) : memory_(memory) {}
+  void give(T*& piece, std::size_t count) {
+    piece = memory_ == nullptr ? nullptr : memory_ + used_;
+    used_ += round_up(count + dense_pad, widest_bytes / sizeof(T));
+  }
+  std::size_t used() const { return used_; }
+
+ private:
+  T* memory_;
+  std::size_t used_ = 0;
+};
+
+struct Layout {
+  std::size_t stride;
+  std::size_t padded;
+  std::span<const std::uint32_t> sources;
+};
+
+// `matrix` as DenseBody says, of coefficients of any kind: their values or how they move.
+template <class U, class Value>
+void assemble(const Program& program, const Dense& form, const Layout& layout, U* matrix,
+              bool summed, Value&& value) {
+  const auto [stride, padded, sources] = layout;
+  const std::size_t moving = program.moving;
+  const auto column = [&](std::size_t vector) { return matrix + vector * stride; };
+  U* const k_columns = column(own_vectors);
+  U* const kz_columns = column(own_vectors + padded);
+  std::fill_n(matrix, (own_vectors + 2 * padded + 2 * sources.size()) * stride, U(0));
+  for (const MassRun& run : program.mass_runs) {
+    for (std::uint32_t i = run.first; i < run.first + run.count; ++i) {
+      column(0)[i] = value(run.inverse_mass);
+      column(1)[i] = run.is_oscillator ? value(run.stiffness) : U(0);
+      column(2)[i] = run.is_oscillator ? value(run.damping) : U(0);
+      column(3)[i] = run.has_gravity ? value(run.gravity) : U(0);
+    }
+  }
+  const auto pull = [&, stride = stride, padded = padded, sources = sources](
+                        std::uint32_t mass, std::uint32_t node, U k, U z) {
+    const U kz = summed ? k + z : z;
+    if (mass >= moving) {
+      return;
+    }
+    k_columns[mass * stride + mass] -= k;
+    kz_columns[mass * stride + mass] -= kz;
+    if (node < moving) {
+      k_columns[node * stride + mass] += k;
+      kz_columns[node * stride + mass] += kz;
+      return;
+    }
+    const auto slot = static_cast<std::uint32_t>(stride + node - moving);
+    const auto source =
+        static_cast<std::size_t>(std::find(sources.begin(), sources.end(), slot) - sources.begin());
+    column(own_vectors + 2 * padded + 2 * source)[mass] += k;
+    column(own_vectors + 2 * padded + 2 * source + 1)[mass] += z;
+  };
+  for (const DenseSpring& spring : form.springs) {
+    const U k = value(spring.stiffness);
+    const U z = value(spring.damping);
+    pull(spring.a, spring.b, k, z);
+    pull(spring.b, spring.a, k, z);
+  }
+}
+
+}  // namespace
+
+template <class T>
+DenseKernel<T>::DenseKernel(const Program& program, const Dense& form, Isa isa)
+    : Kernel<T>(program, 1),
+      program_(program),
+      form_(form),
+      steps_(steps_for<T>(program.moving, isa)),
+      known_(program.coefficients.size()),
+      arranged_(program.inputs.size() * 2 * max_block_frames) {
+  body_.masses = program.moving;
+  const DensePacks packs = dense_packs(body_.masses, sizeof(T), isa);
+  body_.stride = packs.count * packs.bytes / sizeof(T);
+  body_.padded = body_.stride <= 4 ? body_.stride : body_.masses;
+  body_.columns = 2 * body_.masses + (form.has_constant ? 1 : 0);
+  body_.rows = round_up(body_.columns, vector_bytes(isa) / sizeof(T));
+  body_.fixed = program.position.size() - program.moving;
+  place_links();
+  place_signals();
+  allocate();
+  reset(0);
+}
+
+template <class T>
+std::uint32_t DenseKernel<T>::slot(std::uint32_t node) const {
+  return node < program_.moving ? node
+                                : static_cast<std::uint32_t>(body_.stride + node - program_.moving);
+}
+
+template <class T>
+void DenseKernel<T>::place_links() {
+  const auto hand_of = [&](std::uint32_t node) {
+    for (std::uint32_t i = 0; i < program_.inputs.size(); ++i) {
+      if (!program_.inputs[i].is_force && program_.inputs[i].node == node) {
+        return i;
+      }
+    }
+    return no_hand;
+  };
+  for (const DensePort& port : form_.ports) {
+    const LinkRun& run = program_.link_runs[port.run];
+    const auto [a, b] = program_.ends[port.link];
+    can_leap_ &= !acts_everywhere(run.law);
+    ports_.push_back({.law = run.law,
+                      .coefficients = run.coefficients,
+                      .a = slot(a),
+                      .b = slot(b),
+                      .hand_a = hand_of(a),
+                      .hand_b = hand_of(b),
+                      .a_moves = a < program_.moving,
+                      .b_moves = b < program_.moving});
+  }
+  for (const DenseSpring& spring : form_.springs) {
+    for (const std::uint32_t end : {spring.a, spring.b}) {
+      const std::uint32_t at = slot(end);
+      if (end >= program_.moving &&
+          std::find(sources_.begin(), sources_.end(), at) == sources_.end()) {
+        sources_.push_back(at);
+      }
+    }
+  }
+}
+
+template <class T>
+void DenseKernel<T>::place_signals() {
+  for (std::uint32_t i = 0; i < program_.inputs.size(); ++i) {
+    const auto [hand, is_force, node] = program_.inputs[i];
+    const bool pushes = is_force && node < program_.moving;
+    force_inputs_.push_back(pushes ? node : no_hand);
+    hand_slots_.push_back(is_force ? no_hand : slot(node));
+    if (pushes) {
+      signals_.push_back({DenseSignal::Kind::force, i, node});
+    }
+    const auto source = std::find(sources_.begin(), sources_.end(), slot(node));
+    if (!is_force && source != sources_.end()) {
+      const auto at = static_cast<std::uint32_t>(source - sources_.begin());
+      signals_.push_back({DenseSignal::Kind::position, i, at});
+      signals_.push_back({DenseSignal::Kind::velocity, i, at});
+    }
+  }
+  for (const OutputSlot& output : program_.outputs) {
+    heard_.push_back(output.node);
+  }
+}
+
+template <class T>
+void DenseKernel<T>::allocate() {
+  DenseBody<T>& b = body_;
+  b.inputs = program_.inputs.size();
+  b.outputs = program_.outputs.size();
+  b.ports = ports_.size();
+  b.signals = signals_.size();
+  b.sources = sources_.size();
+  b.port = ports_.data();
+  b.signal = signals_.data();
+  b.source = sources_.data();
+  b.force_input = force_inputs_.data();
+  b.hand_slot = hand_slots_.data();
+  b.heard = heard_.data();
+  sounding_.resize(b.signals);
+  b.sounding = sounding_.data();
+  b.matrix_vectors = own_vectors + 2 * b.padded + 2 * b.sources;
+  const std::size_t heard_frames = dense_frames * b.outputs;
+  T* unit = nullptr;
+  T* push = nullptr;
+  const auto lay_out = [&](T* memory) {
+    Arena<T> arena(memory);
+    arena.give(b.matrix, b.matrix_vectors * b.stride);
+    arena.give(b.slope, b.matrix_vectors * b.stride);
+    arena.give(unit, b.ports * b.stride);
+    arena.give(push, b.inputs * b.stride);
+    arena.give(b.state, b.rows);
+    arena.give(b.force, b.stride);
+    arena.give(b.port_force, b.ports);
+    arena.give(b.x, b.stride + b.fixed);
+    arena.give(b.v, b.stride + b.fixed);
+    arena.give(b.heard_table, b.columns * heard_frames);
+    arena.give(b.port_table, b.ports * b.columns * dense_frames);
+    arena.give(b.jump, dense_powers * b.columns * b.rows);
+    arena.give(b.injection, b.signals * dense_frames * b.rows);
+    arena.give(b.heard_response, b.signals * 2 * heard_frames);
+    arena.give(b.port_response, b.signals * b.ports * 2 * dense_frames);
+    arena.give(b.scratch, dense_scratch_size(b));
+    return arena.used();
+  };
+  numbers_.resize(lay_out(nullptr));
+  lay_out(numbers_.data());
+  for (std::size_t p = 0; p < b.ports; ++p) {
+    if (ports_[p].a_moves) {
+      unit[p * b.stride + ports_[p].a] -= T(1);
+    }
+    if (ports_[p].b_moves) {
+      unit[p * b.stride + ports_[p].b] += T(1);
+    }
+  }
+  for (std::size_t i = 0; i < b.inputs; ++i) {
+    if (force_inputs_[i] != no_hand) {
+      push[i * b.stride + force_inputs_[i]] = T(1);
+    }
+  }
+  b.unit = unit;
+  b.push = push;
+  b.ramps = ramps_of(this->coefficients);
+  exact_.resize(b.matrix_vectors * b.stride + dense_build_size(b));
+  b.exact = exact_.data();
+  b.build = exact_.data() + b.matrix_vectors * b.stride;
+}
+
+template <class T>
+void DenseKernel<T>::reset(std::size_t) {
+  for (std::uint32_t node = 0; node < program_.position.size(); ++node) {
+    const auto x = static_cast<T>(program_.position[node]);
+    const auto v = static_cast<T>(program_.velocity[node]);
+    if (node < body_.masses) {
+      body_.state[node] = x;
+      body_.state[body_.masses + node] = v;
+    } else {
+      body_.x[slot(node)] = x;
+      body_.v[slot(node)] = v;
+    }
+  }
+  if (form_.has_constant) {
+    body_.state[2 * body_.masses] = T(1);
+  }
+  std::fill_n(body_.force, body_.stride, T(0));
+  body_.touches = false;
+  has_force_ = true;
+  is_settled_ = false;
+}
+
+template <class T>
+DenseDrive<T> DenseKernel<T>::arrange(const Block<T>& block) {
+  if (body_.inputs == 1) {
+    return {block.value, block.velocity, block.outputs};
+  }
+  T* const value = arranged_.data();
+  T* const velocity = value + body_.inputs * max_block_frames;
+  for (std::size_t i = 0; i < body_.inputs; ++i) {
+    for (std::size_t n = 0; n < block.frames; ++n) {
+      value[i * max_block_frames + n] = block.value[n * body_.inputs + i];
+      velocity[i * max_block_frames + n] = block.velocity[n * body_.inputs + i];
+    }
+  }
+  return {value, velocity, block.outputs};
+}
+
+template <class T>
+void DenseKernel<T>::step(const Block<T>& block) {
+  const DenseDrive<T> drive = arrange(block);
+  const std::size_t ramped = std::min(this->coefficients.ramp_frames, block.frames);
+  if (ramped > 0) {
+    walk_ramp(drive, ramped);
+    this->coefficients.finish(ramped);
+  }
+  if (ramped < block.frames) {
+    follow_coefficients();
+    play(drive, ramped, block.frames);
+  }
+}
+
+// The matrices are sums of coefficients, so they move as straight as these do.
+template <class T>
+void DenseKernel<T>::walk_ramp(const DenseDrive<T>& drive, std::size_t frames) {
+  const Layout layout{body_.stride, body_.padded, sources_};
+  const Coefficients<T>& c = this->coefficients;
+  refresh_force();
+  assemble(program_, form_, layout, body_.matrix, true,
+           [&](std::uint32_t i) { return c.value[i]; });
+  assemble(program_, form_, layout, body_.slope, false,
+           [&](std::uint32_t i) { return c.is_ramping[i] ? c.increment[i] : T(0); });
+  body_.ramps = ramps_of(this->coefficients);
+  body_.damping_moves =
+      std::any_of(form_.springs.begin(), form_.springs.end(), [&](const DenseSpring& spring) {
+        return c.is_ramping[spring.damping] && c.increment[spring.damping] != T(0);
+      });
+  steps_.walk(body_, drive, 0, frames, true);
+  has_tables_ = false;
+  is_settled_ = false;
+}
+
+template <class T>
+void DenseKernel<T>::follow_coefficients() {
+  const Layout layout{body_.stride, body_.padded, sources_};
+  const Aligned<T>& value = this->coefficients.value;
+  if (is_settled_ && std::equal(value.begin(), value.end(), known_.begin())) {
+    return;
+  }
+  refresh_force();
+  assemble(program_, form_, layout, body_.matrix, true, [&](std::uint32_t i) { return value[i]; });
+  if (!std::equal(value.begin(), value.end(), known_.begin())) {
+    std::copy(value.begin(), value.end(), known_.begin());
+    has_tables_ = false;
+  }
+  is_settled_ = false;
+}
+
+template <class T>
+void DenseKernel<T>::play(const DenseDrive<T>& drive, std::size_t at, std::size_t end) {
+  const Layout layout{body_.stride, body_.padded, sources_};
+  while (at < end) {
+    const std::size_t count = std::min(end - at, dense_frames);
+    const bool leaps = can_leap_ && !body_.touches && count >= least_leap;
+    std::size_t walked = count;
+    if (leaps && is_settled_) {
+      if (!has_tables_) {
+        assemble(program_, form_, layout, body_.exact, true,
+                 [&](std::uint32_t i) { return static_cast<double>(known_[i]); });
+        steps_.build(body_);
+        has_tables_ = true;
+      }
+      const std::size_t leapt = steps_.leap(body_, drive, at, count);
+      has_force_ &= leapt == 0;
+      at += leapt;
+      walked = count - leapt;
+    } else if (leaps) {
+      walked = 1;
+    }
+    if (walked > 0) {
+      refresh_force();
+      steps_.walk(body_, drive, at, walked, false);
+      is_settled_ = true;
+      at += walked;
+    }
+  }
+}
+
+// A leap leaves no forces behind. What acts next must still be by the matrices of its own sample.
+template <class T>
+void DenseKernel<T>::refresh_force() {
+  if (!has_force_) {
+    steps_.pull(body_);
+    has_force_ = true;
+  }
+}
+
+template <class T>
+bool DenseKernel<T>::is_near_start(std::size_t, double bound) const {
+  for (std::size_t i = 0; i < body_.masses; ++i) {
+    if (!(std::fabs(static_cast<double>(body_.state[i]) - program_.position[i]) < bound)) {
+      return false;
+    }
+  }
+  return true;
+}
+
+template class DenseKernel<float>;
+template class DenseKernel<double>;
+
+}  // namespace ressort

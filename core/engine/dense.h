@@ -1,0 +1,211 @@
+// core/engine: a small body in one voice, by dense matrices.
+//
+// Between contacts the body is linear: with its state s (positions and velocities), what is heard
+// for the next dense_frames samples is a product of s with rows C A^k, time in the lanes, plus
+// impulse responses where a force or a hand acts; then s jumps by A^dense_frames. Links of any
+// other law are ports: their free motion over the block is computed first, and if one of them
+// comes into the zone where its law acts, the block ends there ("leap"). From there on, and while
+// coefficients move, the body goes sample by sample, with the masses in the lanes ("walk").
+#pragma once
+
+#include "core/engine/kernel.h"
+
+namespace ressort {
+
+inline constexpr std::size_t dense_frames = 32;  // of a leap; at most
+inline constexpr std::size_t dense_powers = 6;   // of A: 1, 2, 4 ... dense_frames
+inline constexpr std::size_t dense_pad = 8;      // numbers beyond a row that a pack may write
+
+inline constexpr std::uint32_t no_hand = 0xffffffffu;
+
+// Slots are where a node's x and v are while walking: masses at [0, stride), others after them.
+struct DenseLink {
+  Law law = Law::spring;
+  std::array<std::uint32_t, 5> coefficients{};
+  std::uint32_t a = 0;  // slots
+  std::uint32_t b = 0;
+  std::uint32_t hand_a = no_hand;  // inputs, where such an end is moved by one
+  std::uint32_t hand_b = no_hand;
+  bool a_moves = false;  // is a mass
+  bool b_moves = false;
+};
+
+// What drives the state besides itself: a force; or one of the two numbers of a hand that pulls a
+// spring, which acts a sample later.
+struct DenseSignal {
+  enum class Kind : std::uint8_t { force, position, velocity };
+  Kind kind = Kind::force;
+  std::uint32_t input = 0;
+  std::uint32_t at = 0;  // the mass, or the index in `sources`
+};
+
+// Everything the loops touch. Matrices are of columns: the effect of one number on all masses.
+template <class T>
+struct DenseBody {
+  std::size_t masses = 0;
+  std::size_t stride = 0;   // masses, rounded up to the packs of a walk
+  std::size_t padded = 0;   // columns of K in `matrix`: masses, or stride if that is at most 4
+  std::size_t columns = 0;  // of the state: x, v of each mass; and 1 if something is constant
+  std::size_t rows = 0;     // columns, rounded up to the widest packs
+  std::size_t fixed = 0;    // nodes that are no masses
+  std::size_t inputs = 0;
+  std::size_t outputs = 0;
+  std::size_t ports = 0;
+  std::size_t signals = 0;
+  std::size_t sources = 0;
+  std::size_t matrix_vectors = 0;  // in `matrix`
+
+  const DenseLink* port = nullptr;             // [port]
+  const DenseSignal* signal = nullptr;         // [signal]
+  const std::uint32_t* source = nullptr;       // [source] the slot of a fixed node with springs
+  const std::uint32_t* force_input = nullptr;  // [input] the mass it pushes, or no_hand
+  const std::uint32_t* hand_slot = nullptr;    // [input] the slot that it moves, or no_hand
+  const std::uint32_t* heard = nullptr;        // [output] mass
+  const T* unit = nullptr;                     // [port][stride] what its force is to the masses
+
+  Ramps<T> ramps{};
+  const T* push = nullptr;  // [input][stride] the mass that a force acts on
+  // Of a walk, `stride` numbers in each vector: 1/M; the own stiffness, damping and weight of each
+  // mass; then columns: -K of each mass, -(K + Z) of each mass, -K and -Z of each source.
+  T* matrix = nullptr;
+  T* slope = nullptr;  // per sample, while coefficients move; with -Z instead of -(K + Z)
+  bool damping_moves = false;
+  double* exact = nullptr;  // the same as `matrix`, for the tables
+
+  T* state = nullptr;       // [rows]
+  T* force = nullptr;       // [stride] for the next sample
+  T* port_force = nullptr;  // [port] the last one
+  T* x = nullptr;           // [slot], of masses only while walking
+  T* v = nullptr;
+  bool touches = false;  // a port's force waits for the next sample
+
+  // Of a leap. The responses have zeros in front of them, as many as they are long.
+  T* heard_table = nullptr;      // [column][frame * outputs + output]
+  T* port_table = nullptr;       // [port][column][frame] of the difference that the law asks for
+  T* jump = nullptr;             // [power][column][row] A^(2^power) - 1
+  T* injection = nullptr;        // [signal][dense_frames - 1 - frame][row] the state so much later
+  const T** sounding = nullptr;  // [signal] over the present leap, or null
+  T* heard_response = nullptr;   // [signal][2 * frames * outputs]
+  T* port_response = nullptr;    // [signal][port][2 * frames]
+  T* scratch = nullptr;          // dense_scratch_size()
+  double* build = nullptr;       // for making the tables
+};
+
+// A block's inputs one after the other, and where its outputs go.
+template <class T>
+struct DenseDrive {
+  const T* value = nullptr;     // [input][max_block_frames]
+  const T* velocity = nullptr;  // [input][max_block_frames]
+  T* outputs = nullptr;         // [frame][output]
+};
+
+// How many numbers a leap needs besides: outputs, a port's motion, the state, shifted signals.
+template <class T>
+std::size_t dense_scratch_size(const DenseBody<T>& body) {
+  return dense_frames * body.outputs + dense_frames + body.rows + body.signals * dense_frames;
+}
+
+// How many doubles build() needs.
+template <class T>
+std::size_t dense_build_size(const DenseBody<T>& body) {
+  const std::size_t observed = body.outputs + body.ports;
+  return 2 * body.columns * body.rows + observed * body.columns * (dense_frames + dense_pad) +
+         body.signals * dense_frames * body.rows;
+}
+
+template <class T>
+struct DenseSteps {
+  // Frames [at, at + count) sample by sample; `moves`: coefficients are on their way.
+  void (*walk)(DenseBody<T>& body, const DenseDrive<T>& drive, std::size_t at, std::size_t count,
+               bool moves);
+  // The springs' forces of the last sample, after a leap.
+  void (*pull)(DenseBody<T>& body);
+  // At most `count` <= dense_frames frames from `at` on, up to the first contact. Gives how many.
+  std::size_t (*leap)(DenseBody<T>& body, const DenseDrive<T>& drive, std::size_t at,
+                      std::size_t count);
+  // The tables of a leap from `exact`. Of the order of (2 masses)^3 dense_powers operations.
+  void (*build)(DenseBody<T>& body);
+};
+
+namespace base {
+template <class T>
+DenseSteps<T> dense_steps(std::size_t masses);
+template <class T>
+void build_dense(DenseBody<T>& body);
+}  // namespace base
+namespace v3 {
+template <class T>
+DenseSteps<T> dense_steps(std::size_t masses);
+template <class T>
+void build_dense(DenseBody<T>& body);
+}  // namespace v3
+namespace v4 {
+template <class T>
+DenseSteps<T> dense_steps(std::size_t masses);
+template <class T>
+void build_dense(DenseBody<T>& body);
+}  // namespace v4
+
+inline constexpr std::size_t most_dense_masses = 16;
+
+// The packs that hold a body's masses while it walks: the narrowest pack that holds them all, or
+// as many of the widest as it takes; above 4, as many as the largest body takes.
+struct DensePacks {
+  std::size_t bytes = 16;  // of one
+  std::size_t count = 1;
+};
+constexpr DensePacks dense_packs(std::size_t masses, std::size_t number_bytes, Isa isa) {
+  DensePacks packs;
+  while (packs.bytes < vector_bytes(isa) && packs.bytes < masses * number_bytes) {
+    packs.bytes *= 2;
+  }
+  packs.count = (masses * number_bytes + packs.bytes - 1) / packs.bytes;
+  if (packs.count > 4) {
+    packs.count = most_dense_masses * number_bytes / packs.bytes;
+  }
+  return packs;
+}
+
+// At most most_dense_masses masses; no taps, force outputs or audio coefficients; outputs are of
+// masses. One voice.
+template <class T>
+class DenseKernel final : public Kernel<T> {
+ public:
+  DenseKernel(const Program& program, const Dense& form, Isa isa);
+  void reset(std::size_t lane) override;
+  void step(const Block<T>& block) override;
+  bool is_near_start(std::size_t lane, double bound) const override;
+
+ private:
+  std::uint32_t slot(std::uint32_t node) const;
+  void place_links();
+  void place_signals();
+  void allocate();
+  DenseDrive<T> arrange(const Block<T>& block);
+  void walk_ramp(const DenseDrive<T>& drive, std::size_t frames);
+  void follow_coefficients();
+  void play(const DenseDrive<T>& drive, std::size_t at, std::size_t end);
+  void refresh_force();
+
+  const Program& program_;
+  const Dense& form_;
+  DenseSteps<T> steps_;
+  DenseBody<T> body_;
+  std::vector<DenseLink> ports_;
+  std::vector<DenseSignal> signals_;
+  std::vector<const T*> sounding_;
+  std::vector<std::uint32_t> sources_;
+  std::vector<std::uint32_t> force_inputs_;
+  std::vector<std::uint32_t> hand_slots_;
+  std::vector<std::uint32_t> heard_;
+  Aligned<T> numbers_;     // all that body_ points to
+  Aligned<double> exact_;  // and these
+  Aligned<T> known_;       // [coefficient] what the matrices were made of
+  Aligned<T> arranged_;    // [input][value, velocity][max_block_frames]
+  bool can_leap_ = true;   // no port's law acts everywhere
+  bool has_tables_ = false;
+  bool has_force_ = false;   // body_.force is that of the state
+  bool is_settled_ = false;  // ... by the coefficients of now
+};
+
+}  // namespace ressort

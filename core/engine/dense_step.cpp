@@ -1,0 +1,557 @@
+// The loops of the dense kernel, compiled for each instruction set.
+#include <type_traits>
+
+#include "core/engine/dense.h"
+#include "core/engine/laws.h"
+
+namespace ressort::RESSORT_ISA {
+namespace {
+
+constexpr std::size_t own_vectors = 4;  // of DenseBody::matrix, as dense.cpp makes it
+
+template <class V>
+V load(const Element<V>* from) {
+  V pack;
+  __builtin_memcpy(&pack, from, sizeof pack);
+  return pack;
+}
+template <class V>
+void store(Element<V>* to, V pack) {
+  __builtin_memcpy(to, &pack, sizeof pack);
+}
+
+// --- sample by sample -------------------------------------------------------------------------
+
+// The ports' forces of a sample, given to `add(port, force)`.
+template <class T>
+struct AnyPorts {
+  template <class Add>
+  void operator()(const DenseBody<T>& b, Add&& add) const {
+    for (std::size_t p = 0; p < b.ports; ++p) {
+      const DenseLink& port = b.port[p];
+      const T d = b.x[port.a] - b.x[port.b];
+      const T v = b.v[port.a] - b.v[port.b];
+      const auto c = [&](std::size_t i) { return b.ramps.value[port.coefficients[i]]; };
+      with_law<T>(port.law, c(0), c(1), c(2), c(3), c(4), [&](auto&& law) { add(p, law(d, v)); });
+    }
+  }
+};
+
+// The same for one port whose law is chosen already.
+template <class T, class ForceLaw>
+struct OnePort {
+  ForceLaw law;
+
+  template <class Add>
+  void operator()(const DenseBody<T>& b, Add&& add) const {
+    const DenseLink& port = b.port[0];
+    add(std::size_t(0), law(b.x[port.a] - b.x[port.b], b.v[port.a] - b.v[port.b]));
+  }
+};
+
+// Count packs for every vector of masses.
+template <class T, std::size_t Bytes, std::size_t Count>
+struct Walk {
+  using V = Pack<T, Bytes>;
+  static constexpr std::size_t lanes = Bytes / sizeof(T);
+  static constexpr std::size_t stride = Count * lanes;
+
+  struct Vector {
+    V pack[Count];
+  };
+
+  static Vector vector(const T* from) {
+    Vector a;
+    for (std::size_t c = 0; c < Count; ++c) {
+      a.pack[c] = load<V>(from + c * lanes);
+    }
+    return a;
+  }
+  static void put(T* to, const Vector& a) {
+    for (std::size_t c = 0; c < Count; ++c) {
+      store<V>(to + c * lanes, a.pack[c]);
+    }
+  }
+  // sum += column * by
+  static void add(Vector& sum, const T* column, T by) {
+    for (std::size_t c = 0; c < Count; ++c) {
+      sum.pack[c] += load<V>(column + c * lanes) * by;
+    }
+  }
+  // sum += columns * by, one number for each column; in memory they are `in_memory`.
+  static void add_columns(Vector& sum, const DenseBody<T>& b, const T* columns, const Vector& by,
+                          const T* in_memory) {
+    if constexpr (stride <= 4) {
+      // From register to register, and in two chains: this is what the next sample waits for.
+      Vector other{};
+      for (std::size_t k = 0; k < stride; k += 2) {
+        add(sum, columns + k * stride, by.pack[k / lanes][k % lanes]);
+        add(other, columns + (k + 1) * stride, by.pack[(k + 1) / lanes][(k + 1) % lanes]);
+      }
+      for (std::size_t c = 0; c < Count; ++c) {
+        sum.pack[c] += other.pack[c];
+      }
+    } else {
+      for (std::size_t k = 0; k < b.masses; ++k) {
+        add(sum, columns + k * stride, in_memory[k]);
+      }
+    }
+  }
+  static void add_sources(Vector& sum, const DenseBody<T>& b, const T* matrix) {
+    const T* column = matrix + (own_vectors + 2 * b.padded) * stride;
+    for (std::size_t i = 0; i < b.sources; ++i) {
+      add(sum, column, b.x[b.source[i]]);
+      add(sum, column + stride, b.v[b.source[i]]);
+      column += 2 * stride;
+    }
+  }
+  // A vector of the matrix, `steps` samples on its way.
+  template <bool moves>
+  static Vector own(const DenseBody<T>& b, std::size_t i, T steps) {
+    Vector a = vector(b.matrix + i * stride);
+    if constexpr (moves) {
+      add(a, b.slope + i * stride, steps);
+    }
+    return a;
+  }
+
+  static void begin(const DenseBody<T>& b) {
+    for (std::size_t i = 0; i < b.masses; ++i) {
+      b.x[i] = b.state[i];
+      b.v[i] = b.state[b.masses + i];
+    }
+    for (std::size_t i = b.masses; i < stride; ++i) {
+      b.x[i] = b.v[i] = T(0);
+    }
+  }
+
+  static void pull(DenseBody<T>& body) {
+    const DenseBody<T> b = body;
+    begin(b);
+    Vector force{};
+    const Vector v = vector(b.v);
+    Vector before = vector(b.x);
+    for (std::size_t c = 0; c < Count; ++c) {
+      before.pack[c] -= v.pack[c];
+    }
+    T x[stride];
+    put(x, before);
+    const T* const k = b.matrix + own_vectors * stride;
+    add_columns(force, b, k, before, x);
+    add_columns(force, b, k + b.padded * stride, v, b.v);
+    add_sources(force, b, b.matrix);
+    put(b.force, force);
+  }
+
+  // K x' + Z v' = K x + (K + Z) v' with x' = x + v': only the velocities of a sample are waited
+  // for before the next one. A port's force reaches the next velocity without the springs' detour.
+  template <bool moves, class Ports>
+  static void walk(DenseBody<T>& body, const DenseDrive<T>& drive, std::size_t at,
+                   std::size_t count, const Ports& ports) {
+    DenseBody<T> b = body;  // nothing that is stored can be meant by this one
+    begin(b);
+    const T* const k = b.matrix + own_vectors * stride;
+    const T* const kz = k + b.padded * stride;
+    Vector x = vector(b.x);
+    Vector v = vector(b.v);
+    Vector force = vector(b.force);
+    Vector kick{};
+    T steps = 0;
+    for (std::size_t n = at; n < at + count; ++n) {
+      if constexpr (moves) {
+        advance(b.ramps);
+        steps += T(1);
+      }
+      for (std::size_t i = 0; i < b.inputs; ++i) {
+        if (b.force_input[i] != no_hand) {
+          add(force, b.push + i * stride, drive.value[i * max_block_frames + n]);
+        }
+      }
+      Vector next{};
+      add_columns(next, b, k, x, b.x);
+      const Vector inverse_mass = own<moves>(b, 0, steps);
+      const Vector own_k = own<moves>(b, 1, steps);
+      const Vector own_z = own<moves>(b, 2, steps);
+      const Vector weight = own<moves>(b, 3, steps);
+      for (std::size_t c = 0; c < Count; ++c) {
+        const V own = own_k.pack[c] * x.pack[c] + own_z.pack[c] * v.pack[c] + weight.pack[c];
+        v.pack[c] += (force.pack[c] - own) * inverse_mass.pack[c];
+        v.pack[c] += moves ? kick.pack[c] * inverse_mass.pack[c] : kick.pack[c];
+        x.pack[c] += v.pack[c];
+      }
+      put(b.x, x);
+      put(b.v, v);
+      for (std::size_t i = 0; i < b.inputs; ++i) {
+        if (b.hand_slot[i] != no_hand) {
+          b.x[b.hand_slot[i]] = drive.value[i * max_block_frames + n];
+          b.v[b.hand_slot[i]] = drive.velocity[i * max_block_frames + n];
+        }
+      }
+      add_columns(next, b, kz, v, b.v);
+      add_sources(next, b, b.matrix);
+      if constexpr (moves) {
+        Vector rise{};
+        add_columns(rise, b, b.slope + own_vectors * stride, x, b.x);
+        if (b.damping_moves) {
+          add_columns(rise, b, b.slope + (own_vectors + b.padded) * stride, v, b.v);
+        }
+        add_sources(rise, b, b.slope);
+        for (std::size_t c = 0; c < Count; ++c) {
+          next.pack[c] += rise.pack[c] * steps;
+        }
+      }
+      force = next;
+      kick = Vector{};
+      ports(b, [&](std::size_t p, T pulled) {
+        b.port_force[p] = pulled;
+        for (std::size_t c = 0; c < Count; ++c) {
+          const V unit = load<V>(b.unit + p * stride + c * lanes);
+          kick.pack[c] += (moves ? unit : unit * inverse_mass.pack[c]) * pulled;
+        }
+      });
+      for (std::size_t o = 0; o < b.outputs; ++o) {
+        drive.outputs[n * b.outputs + o] = b.x[b.heard[o]];
+      }
+    }
+    body.touches = false;
+    for (std::size_t p = 0; p < b.ports; ++p) {
+      body.touches |= b.port_force[p] != T(0);
+      add(force, b.unit + p * stride, b.port_force[p]);
+    }
+    put(b.force, force);
+    for (std::size_t i = 0; i < b.masses; ++i) {
+      b.state[i] = b.x[i];
+      b.state[b.masses + i] = b.v[i];
+    }
+  }
+
+  static void step(DenseBody<T>& b, const DenseDrive<T>& drive, std::size_t at, std::size_t count,
+                   bool moves) {
+    if (moves) {
+      return walk<true>(b, drive, at, count, AnyPorts<T>{});
+    }
+    if constexpr (stride <= 4) {
+      if (b.ports == 1) {
+        const auto c = [&](std::size_t i) { return b.ramps.value[b.port[0].coefficients[i]]; };
+        return with_law<T>(b.port[0].law, c(0), c(1), c(2), c(3), c(4), [&]<class F>(F&& law) {
+          walk<false>(b, drive, at, count, OnePort<T, std::remove_reference_t<F>>{law});
+        });
+      }
+    }
+    walk<false>(b, drive, at, count, AnyPorts<T>{});
+  }
+};
+
+// --- block by block ---------------------------------------------------------------------------
+
+constexpr std::size_t widest = RESSORT_VECTOR_BYTES;
+
+template <class T>
+using Wide = Pack<T, widest>;
+
+template <class T>
+constexpr std::size_t wide_lanes = widest / sizeof(T);
+
+// Calls `some<Count>(row)` for all rows, Count packs at once and at most Most; rows are whole
+// packs.
+template <class T, std::size_t Most, class Some>
+void in_packs(std::size_t row, std::size_t rows, Some&& some) {
+  while (row + Most * wide_lanes<T> <= rows) {
+    some.template operator()<Most>(row);
+    row += Most * wide_lanes<T>;
+  }
+  if constexpr (Most > 1) {
+    if (row < rows) {
+      in_packs<T, Most - 1>(row, rows, some);
+    }
+  }
+}
+
+// out = table * factor for Count packs of rows, the table being [column][rows]. Few packs are
+// summed in several chains: otherwise each column would wait for the one before.
+template <class T, std::size_t Count>
+void expand_some(const T* table, std::size_t rows, std::size_t columns, const T* factor, T* out) {
+  using V = Wide<T>;
+  constexpr std::size_t chains = Count <= 3 ? 4 : Count <= 6 ? 2 : 1;
+  V sum[chains][Count] = {};
+  std::size_t column = 0;
+  for (; column + chains <= columns; column += chains) {
+    for (std::size_t k = 0; k < chains; ++k) {
+      const V by = factor[column + k] + V{};
+      for (std::size_t i = 0; i < Count; ++i) {
+        sum[k][i] += load<V>(table + (column + k) * rows + i * wide_lanes<T>) * by;
+      }
+    }
+  }
+  for (; column < columns; ++column) {
+    for (std::size_t i = 0; i < Count; ++i) {
+      sum[0][i] += load<V>(table + column * rows + i * wide_lanes<T>) * factor[column];
+    }
+  }
+  for (std::size_t i = 0; i < Count; ++i) {
+    for (std::size_t k = 1; k < chains; ++k) {
+      sum[0][i] += sum[k][i];
+    }
+    store<V>(out + i * wide_lanes<T>, sum[0][i]);
+  }
+}
+
+template <class T>
+void expand(const T* table, std::size_t rows, std::size_t columns, const T* factor, T* out) {
+  in_packs<T, 8>(0, rows, [&]<std::size_t Count>(std::size_t row) {
+    expand_some<T, Count>(table + row, rows, columns, factor, out + row);
+  });
+}
+
+// out += what the signal u[0..count) does over `length` numbers, `each` numbers a frame.
+template <class T>
+void respond(const T* response, const T* u, std::size_t count, std::size_t length, std::size_t each,
+             T* out) {
+  using V = Wide<T>;
+  in_packs<T, 4>(0, length, [&]<std::size_t Count>(std::size_t row) {
+    V sum[2][Count] = {};
+    const auto add = [&](V(&to)[Count], std::size_t m) {
+      for (std::size_t i = 0; i < Count; ++i) {
+        to[i] += load<V>(response + length - m * each + row + i * wide_lanes<T>) * u[m];
+      }
+    };
+    const std::size_t reached = (row + Count * wide_lanes<T> + each - 1) / each;
+    const std::size_t until = count < reached ? count : reached;
+    for (std::size_t m = 0; m + 1 < until; m += 2) {
+      add(sum[0], m);
+      add(sum[1], m + 1);
+    }
+    if (until % 2 == 1) {
+      add(sum[0], until - 1);
+    }
+    for (std::size_t i = 0; i < Count; ++i) {
+      T* const to = out + row + i * wide_lanes<T>;
+      store<V>(to, load<V>(to) + (sum[0][i] + sum[1][i]));
+    }
+  });
+}
+
+// The least number in a pack.
+template <class T>
+T least_of(const Wide<T>& pack) {
+  T least = pack[0];
+  for (std::size_t i = 1; i < wide_lanes<T>; ++i) {
+    least = pack[i] < least ? pack[i] : least;
+  }
+  return least;
+}
+
+// How far d (or a velocity) is from where the law acts; it acts below 0.
+template <class V, class T>
+V distance(const DenseBody<T>& b, const DenseLink& port, V d) {
+  const auto c = [&](std::size_t i) { return b.ramps.value[port.coefficients[i]]; };
+  switch (port.law) {
+    case Law::contact:
+      return V{} - c(2) - d;
+    case Law::clipped_contact:
+      return V{} - c(4) - d;
+    default:
+      return absolute(d) - c(1);
+  }
+}
+
+// What one leap works on.
+template <class T>
+struct Leap {
+  using V = Wide<T>;
+  static constexpr std::size_t lanes = wide_lanes<T>;
+
+  const DenseBody<T> b;
+  const DenseDrive<T> drive;
+  std::size_t at;
+  std::size_t count;
+  T* heard = b.scratch;
+  T* motion = heard + dense_frames * b.outputs;
+  T* next = motion + dense_frames;
+  T* shifted = next + b.rows;
+
+  bool is_silent(const T* u) const {
+    if (count == dense_frames) {
+      V least{};
+      for (std::size_t n = 0; n < dense_frames; n += lanes) {
+        least = select(load<V>(u + n) != V{}, V{} - 1, least);
+      }
+      return !(least_of<T>(least) < T(0));
+    }
+    std::size_t n = 0;
+    while (n < count && u[n] == T(0)) {
+      ++n;
+    }
+    return n == count;
+  }
+
+  // The signals over the leap, or nothing where one is silent.
+  void listen() {
+    for (std::size_t s = 0; s < b.signals; ++s) {
+      const DenseSignal& slot = b.signal[s];
+      const bool is_velocity = slot.kind == DenseSignal::Kind::velocity;
+      const T* const input =
+          (is_velocity ? drive.velocity : drive.value) + slot.input * max_block_frames + at;
+      const T* u = input;
+      if (slot.kind != DenseSignal::Kind::force) {
+        T* const late = shifted + s * dense_frames;
+        const std::uint32_t hand = b.source[slot.at];
+        late[0] = is_velocity ? b.v[hand] : b.x[hand];
+        for (std::size_t n = 1; n < count; ++n) {
+          late[n] = input[n - 1];
+        }
+        u = late;
+      }
+      b.sounding[s] = is_silent(u) ? nullptr : u;
+    }
+  }
+
+  // The first frame in which the port's law acts, or count.
+  std::size_t first_touch(std::size_t p) {
+    const DenseLink& port = b.port[p];
+    expand(b.port_table + p * b.columns * dense_frames, dense_frames, b.columns, b.state, motion);
+    for (std::size_t s = 0; s < b.signals; ++s) {
+      if (const T* const u = b.sounding[s]) {
+        respond(b.port_response + (s * b.ports + p) * 2 * dense_frames, u, count, dense_frames,
+                std::size_t(1), motion);
+      }
+    }
+    const bool is_bow = port.law == Law::bow;
+    const auto add_end = [&](std::uint32_t slot, std::uint32_t hand, bool is_mass, T by) {
+      if (is_mass) {
+        return;
+      }
+      if (hand == no_hand) {
+        const T still = by * (is_bow ? b.v[slot] : b.x[slot]);
+        for (std::size_t n = 0; n < dense_frames; ++n) {
+          motion[n] += still;
+        }
+        return;
+      }
+      const T* const moved = (is_bow ? drive.velocity : drive.value) + hand * max_block_frames + at;
+      for (std::size_t n = 0; n < count; ++n) {
+        motion[n] += by * moved[n];
+      }
+    };
+    add_end(port.a, port.hand_a, port.a_moves, T(1));
+    add_end(port.b, port.hand_b, port.b_moves, T(-1));
+    if (count == dense_frames) {
+      V least = distance(b, port, load<V>(motion));
+      for (std::size_t n = lanes; n < dense_frames; n += lanes) {
+        const V here = distance(b, port, load<V>(motion + n));
+        least = select(here < least, here, least);
+      }
+      if (!(least_of<T>(least) < T(0))) {
+        return count;
+      }
+    }
+    std::size_t n = 0;
+    while (n < count && !(distance(b, port, motion[n]) < T(0))) {
+      ++n;
+    }
+    return n;
+  }
+
+  void hear() {
+    const std::size_t length = dense_frames * b.outputs;
+    const bool is_whole = count == dense_frames;
+    T* const to = drive.outputs + at * b.outputs;
+    T* const out = is_whole ? to : heard;
+    expand(b.heard_table, length, b.columns, b.state, out);
+    for (std::size_t s = 0; s < b.signals; ++s) {
+      if (const T* const u = b.sounding[s]) {
+        respond(b.heard_response + s * 2 * length, u, count, length, b.outputs, out);
+      }
+    }
+    for (std::size_t i = 0; i < count * b.outputs && !is_whole; ++i) {
+      to[i] = out[i];
+    }
+  }
+
+  void add_next() {
+    for (std::size_t i = 0; i < b.rows; i += lanes) {
+      store<V>(b.state + i, load<V>(b.state + i) + load<V>(next + i));
+    }
+  }
+
+  void jump() {
+    for (std::size_t power = 0; power < dense_powers; ++power) {
+      if ((count >> power & 1) != 0) {
+        expand(b.jump + power * b.columns * b.rows, b.rows, b.columns, b.state, next);
+        add_next();
+      }
+    }
+    for (std::size_t s = 0; s < b.signals; ++s) {
+      if (const T* const u = b.sounding[s]) {
+        const T* const late = b.injection + (s + 1) * dense_frames * b.rows - count * b.rows;
+        expand(late, b.rows, count, u, next);
+        add_next();
+      }
+    }
+    for (std::size_t i = 0; i < b.inputs; ++i) {
+      if (b.hand_slot[i] != no_hand) {
+        b.x[b.hand_slot[i]] = drive.value[i * max_block_frames + at + count - 1];
+        b.v[b.hand_slot[i]] = drive.velocity[i * max_block_frames + at + count - 1];
+      }
+    }
+  }
+};
+
+template <class T>
+std::size_t leap(DenseBody<T>& b, const DenseDrive<T>& drive, std::size_t at, std::size_t count) {
+  Leap<T> l{b, drive, at, count};
+  l.listen();
+  for (std::size_t p = 0; p < b.ports; ++p) {
+    l.count = l.first_touch(p);
+  }
+  if (l.count > 0) {
+    l.hear();
+    l.jump();
+  }
+  return l.count;
+}
+
+template <class T, std::size_t Bytes>
+DenseSteps<T> steps_of(std::size_t packs) {
+  const auto of = []<std::size_t Count>() {
+    using W = Walk<T, Bytes, Count>;
+    return DenseSteps<T>{W::step, W::pull, leap<T>, build_dense<T>};
+  };
+  if (packs == 1) {
+    return of.template operator()<1>();
+  }
+  if (packs == 2) {
+    return of.template operator()<2>();
+  }
+  if (packs == 3) {
+    return of.template operator()<3>();
+  }
+  if (packs == 4) {
+    return of.template operator()<4>();
+  }
+  return of.template operator()<most_dense_masses * sizeof(T) / Bytes>();
+}
+
+}  // namespace
+
+template <class T>
+DenseSteps<T> dense_steps(std::size_t masses) {
+  constexpr Isa isa = widest == 64 ? Isa::v4 : widest == 32 ? Isa::v3 : Isa::base;
+  const auto [bytes, packs] = dense_packs(masses, sizeof(T), isa);
+  if constexpr (widest >= 64) {
+    if (bytes == 64) {
+      return steps_of<T, 64>(packs);
+    }
+  }
+  if constexpr (widest >= 32) {
+    if (bytes == 32) {
+      return steps_of<T, 32>(packs);
+    }
+  }
+  return steps_of<T, 16>(packs);
+}
+
+template DenseSteps<float> dense_steps(std::size_t);
+template DenseSteps<double> dense_steps(std::size_t);
+
+}  // namespace ressort::RESSORT_ISA
