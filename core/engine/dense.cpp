@@ -66,50 +66,50 @@ struct Layout {
   std::size_t stride;
   std::size_t padded;
   std::span<const std::uint32_t> sources;
+  std::span<const std::uint32_t> slots;
 };
 
 // `matrix` as DenseBody says, of coefficients of any kind: their values or how they move.
 template <class U, class Value>
 void assemble(const Program& program, const Dense& form, const Layout& layout, U* matrix,
               bool summed, Value&& value) {
-  const auto [stride, padded, sources] = layout;
-  const std::size_t moving = program.moving;
-  const auto column = [&](std::size_t vector) { return matrix + vector * stride; };
+  const std::span<const std::uint32_t> slots = layout.slots;
+  const auto column = [&](std::size_t vector) { return matrix + vector * layout.stride; };
   U* const k_columns = column(own_vectors);
-  U* const kz_columns = column(own_vectors + padded);
-  std::fill_n(matrix, (own_vectors + 2 * padded + 2 * sources.size()) * stride, U(0));
+  U* const kz_columns = column(own_vectors + layout.padded);
+  std::fill_n(matrix, (own_vectors + 2 * layout.padded + 2 * layout.sources.size()) * layout.stride,
+              U(0));
   for (const MassRun& run : program.mass_runs) {
-    for (std::uint32_t i = run.first; i < run.first + run.count; ++i) {
+    for (std::uint32_t node = run.first; node < run.first + run.count; ++node) {
+      const std::uint32_t i = slots[node];
       column(0)[i] = value(run.inverse_mass);
       column(1)[i] = run.is_oscillator ? value(run.stiffness) : U(0);
       column(2)[i] = run.is_oscillator ? value(run.damping) : U(0);
       column(3)[i] = run.has_gravity ? value(run.gravity) : U(0);
     }
   }
-  const auto pull = [&, stride = stride, padded = padded, sources = sources](
-                        std::uint32_t mass, std::uint32_t node, U k, U z) {
+  const auto pull = [&](std::uint32_t mass, std::uint32_t other, U k, U z) {
+    if (mass >= layout.stride) {
+      return;
+    }
     const U kz = summed ? k + z : z;
-    if (mass >= moving) {
+    k_columns[mass * layout.stride + mass] -= k;
+    kz_columns[mass * layout.stride + mass] -= kz;
+    if (other < layout.stride) {
+      k_columns[other * layout.stride + mass] += k;
+      kz_columns[other * layout.stride + mass] += kz;
       return;
     }
-    k_columns[mass * stride + mass] -= k;
-    kz_columns[mass * stride + mass] -= kz;
-    if (node < moving) {
-      k_columns[node * stride + mass] += k;
-      kz_columns[node * stride + mass] += kz;
-      return;
-    }
-    const auto slot = static_cast<std::uint32_t>(stride + node - moving);
-    const auto source =
-        static_cast<std::size_t>(std::find(sources.begin(), sources.end(), slot) - sources.begin());
-    column(own_vectors + 2 * padded + 2 * source)[mass] += k;
-    column(own_vectors + 2 * padded + 2 * source + 1)[mass] += z;
+    const auto source = static_cast<std::size_t>(
+        std::find(layout.sources.begin(), layout.sources.end(), other) - layout.sources.begin());
+    column(own_vectors + 2 * layout.padded + 2 * source)[mass] += k;
+    column(own_vectors + 2 * layout.padded + 2 * source + 1)[mass] += z;
   };
   for (const DenseSpring& spring : form.springs) {
     const U k = value(spring.stiffness);
     const U z = value(spring.damping);
-    pull(spring.a, spring.b, k, z);
-    pull(spring.b, spring.a, k, z);
+    pull(slots[spring.a], slots[spring.b], k, z);
+    pull(slots[spring.b], slots[spring.a], k, z);
   }
 }
 
@@ -130,6 +130,7 @@ DenseKernel<T>::DenseKernel(const Program& program, const Dense& form, Isa isa)
   body_.columns = 2 * body_.masses + (form.has_constant ? 1 : 0);
   body_.rows = round_up(body_.columns, vector_bytes(isa) / sizeof(T));
   body_.fixed = program.position.size() - program.moving;
+  place_nodes();
   place_links();
   place_signals();
   allocate();
@@ -137,9 +138,25 @@ DenseKernel<T>::DenseKernel(const Program& program, const Dense& form, Isa isa)
 }
 
 template <class T>
-std::uint32_t DenseKernel<T>::slot(std::uint32_t node) const {
-  return node < program_.moving ? node
-                                : static_cast<std::uint32_t>(body_.stride + node - program_.moving);
+void DenseKernel<T>::place_nodes() {
+  const std::uint32_t nowhere = no_hand;
+  std::uint32_t next = 0;
+  slots_.assign(program_.position.size(), nowhere);
+  const auto place = [&](std::uint32_t node) {
+    if (node < program_.moving && slots_[node] == nowhere) {
+      slots_[node] = next++;
+    }
+  };
+  if (!form_.ports.empty()) {
+    place(program_.ends[form_.ports[0].link].a);
+    place(program_.ends[form_.ports[0].link].b);
+  }
+  for (std::uint32_t node = 0; node < slots_.size(); ++node) {
+    place(node);
+    if (node >= program_.moving) {
+      slots_[node] = static_cast<std::uint32_t>(body_.stride + node - program_.moving);
+    }
+  }
 }
 
 template <class T>
@@ -158,8 +175,8 @@ void DenseKernel<T>::place_links() {
     can_leap_ &= !acts_everywhere(run.law);
     ports_.push_back({.law = run.law,
                       .coefficients = run.coefficients,
-                      .a = slot(a),
-                      .b = slot(b),
+                      .a = slots_[a],
+                      .b = slots_[b],
                       .hand_a = hand_of(a),
                       .hand_b = hand_of(b),
                       .a_moves = a < program_.moving,
@@ -167,7 +184,7 @@ void DenseKernel<T>::place_links() {
   }
   for (const DenseSpring& spring : form_.springs) {
     for (const std::uint32_t end : {spring.a, spring.b}) {
-      const std::uint32_t at = slot(end);
+      const std::uint32_t at = slots_[end];
       if (end >= program_.moving &&
           std::find(sources_.begin(), sources_.end(), at) == sources_.end()) {
         sources_.push_back(at);
@@ -180,13 +197,13 @@ template <class T>
 void DenseKernel<T>::place_signals() {
   for (std::uint32_t i = 0; i < program_.inputs.size(); ++i) {
     const auto [hand, is_force, node] = program_.inputs[i];
-    const bool pushes = is_force && node < program_.moving;
-    force_inputs_.push_back(pushes ? node : no_hand);
-    hand_slots_.push_back(is_force ? no_hand : slot(node));
-    if (pushes) {
-      signals_.push_back({DenseSignal::Kind::force, i, node});
+    if (!is_force) {
+      hands_.push_back({i, slots_[node]});
+    } else if (node < program_.moving) {
+      pushes_.push_back({i, slots_[node]});
+      signals_.push_back({DenseSignal::Kind::force, i, slots_[node]});
     }
-    const auto source = std::find(sources_.begin(), sources_.end(), slot(node));
+    const auto source = std::find(sources_.begin(), sources_.end(), slots_[node]);
     if (!is_force && source != sources_.end()) {
       const auto at = static_cast<std::uint32_t>(source - sources_.begin());
       signals_.push_back({DenseSignal::Kind::position, i, at});
@@ -194,14 +211,15 @@ void DenseKernel<T>::place_signals() {
     }
   }
   for (const OutputSlot& output : program_.outputs) {
-    heard_.push_back(output.node);
+    heard_.push_back(slots_[output.node]);
   }
 }
 
 template <class T>
 void DenseKernel<T>::allocate() {
   DenseBody<T>& b = body_;
-  b.inputs = program_.inputs.size();
+  b.hands = hands_.size();
+  b.pushes = pushes_.size();
   b.outputs = program_.outputs.size();
   b.ports = ports_.size();
   b.signals = signals_.size();
@@ -209,21 +227,19 @@ void DenseKernel<T>::allocate() {
   b.port = ports_.data();
   b.signal = signals_.data();
   b.source = sources_.data();
-  b.force_input = force_inputs_.data();
-  b.hand_slot = hand_slots_.data();
+  b.hand = hands_.data();
+  b.push = pushes_.data();
   b.heard = heard_.data();
   sounding_.resize(b.signals);
   b.sounding = sounding_.data();
   b.matrix_vectors = own_vectors + 2 * b.padded + 2 * b.sources;
   const std::size_t heard_frames = dense_frames * b.outputs;
   T* unit = nullptr;
-  T* push = nullptr;
   const auto lay_out = [&](T* memory) {
     Arena<T> arena(memory);
     arena.give(b.matrix, b.matrix_vectors * b.stride);
     arena.give(b.slope, b.matrix_vectors * b.stride);
-    arena.give(unit, b.ports * b.stride);
-    arena.give(push, b.inputs * b.stride);
+    arena.give(unit, (b.pushes + b.ports) * b.stride);
     arena.give(b.state, b.rows);
     arena.give(b.force, b.stride);
     arena.give(b.port_force, b.ports);
@@ -240,21 +256,20 @@ void DenseKernel<T>::allocate() {
   };
   numbers_.resize(lay_out(nullptr));
   lay_out(numbers_.data());
-  for (std::size_t p = 0; p < b.ports; ++p) {
-    if (ports_[p].a_moves) {
-      unit[p * b.stride + ports_[p].a] -= T(1);
-    }
-    if (ports_[p].b_moves) {
-      unit[p * b.stride + ports_[p].b] += T(1);
-    }
-  }
-  for (std::size_t i = 0; i < b.inputs; ++i) {
-    if (force_inputs_[i] != no_hand) {
-      push[i * b.stride + force_inputs_[i]] = T(1);
-    }
-  }
   b.unit = unit;
-  b.push = push;
+  for (const DenseInput& push : pushes_) {
+    unit[push.slot] = T(1);
+    unit += b.stride;
+  }
+  for (const DenseLink& port : ports_) {
+    if (port.a_moves) {
+      unit[port.a] -= T(1);
+    }
+    if (port.b_moves) {
+      unit[port.b] += T(1);
+    }
+    unit += b.stride;
+  }
   b.ramps = ramps_of(this->coefficients);
   exact_.resize(b.matrix_vectors * b.stride + dense_build_size(b));
   b.exact = exact_.data();
@@ -267,11 +282,11 @@ void DenseKernel<T>::reset(std::size_t) {
     const auto x = static_cast<T>(program_.position[node]);
     const auto v = static_cast<T>(program_.velocity[node]);
     if (node < body_.masses) {
-      body_.state[node] = x;
-      body_.state[body_.masses + node] = v;
+      body_.state[slots_[node]] = x;
+      body_.state[body_.masses + slots_[node]] = v;
     } else {
-      body_.x[slot(node)] = x;
-      body_.v[slot(node)] = v;
+      body_.x[slots_[node]] = x;
+      body_.v[slots_[node]] = v;
     }
   }
   if (form_.has_constant) {
@@ -285,15 +300,16 @@ void DenseKernel<T>::reset(std::size_t) {
 
 template <class T>
 DenseDrive<T> DenseKernel<T>::arrange(const Block<T>& block) {
-  if (body_.inputs == 1) {
+  if (program_.inputs.size() == 1) {
     return {block.value, block.velocity, block.outputs};
   }
+  const std::size_t inputs = program_.inputs.size();
   T* const value = arranged_.data();
-  T* const velocity = value + body_.inputs * max_block_frames;
-  for (std::size_t i = 0; i < body_.inputs; ++i) {
+  T* const velocity = value + inputs * max_block_frames;
+  for (std::size_t i = 0; i < inputs; ++i) {
     for (std::size_t n = 0; n < block.frames; ++n) {
-      value[i * max_block_frames + n] = block.value[n * body_.inputs + i];
-      velocity[i * max_block_frames + n] = block.velocity[n * body_.inputs + i];
+      value[i * max_block_frames + n] = block.value[n * inputs + i];
+      velocity[i * max_block_frames + n] = block.velocity[n * inputs + i];
     }
   }
   return {value, velocity, block.outputs};
@@ -316,7 +332,7 @@ void DenseKernel<T>::step(const Block<T>& block) {
 // The matrices are sums of coefficients, so they move as straight as these do.
 template <class T>
 void DenseKernel<T>::walk_ramp(const DenseDrive<T>& drive, std::size_t frames) {
-  const Layout layout{body_.stride, body_.padded, sources_};
+  const Layout layout{body_.stride, body_.padded, sources_, slots_};
   const Coefficients<T>& c = this->coefficients;
   refresh_force();
   assemble(program_, form_, layout, body_.matrix, true,
@@ -335,7 +351,7 @@ void DenseKernel<T>::walk_ramp(const DenseDrive<T>& drive, std::size_t frames) {
 
 template <class T>
 void DenseKernel<T>::follow_coefficients() {
-  const Layout layout{body_.stride, body_.padded, sources_};
+  const Layout layout{body_.stride, body_.padded, sources_, slots_};
   const Aligned<T>& value = this->coefficients.value;
   if (is_settled_ && std::equal(value.begin(), value.end(), known_.begin())) {
     return;
@@ -351,7 +367,7 @@ void DenseKernel<T>::follow_coefficients() {
 
 template <class T>
 void DenseKernel<T>::play(const DenseDrive<T>& drive, std::size_t at, std::size_t end) {
-  const Layout layout{body_.stride, body_.padded, sources_};
+  const Layout layout{body_.stride, body_.padded, sources_, slots_};
   while (at < end) {
     const std::size_t count = std::min(end - at, dense_frames);
     const bool leaps = can_leap_ && !body_.touches && count >= least_leap;
@@ -391,7 +407,7 @@ void DenseKernel<T>::refresh_force() {
 template <class T>
 bool DenseKernel<T>::is_near_start(std::size_t, double bound) const {
   for (std::size_t i = 0; i < body_.masses; ++i) {
-    if (!(std::fabs(static_cast<double>(body_.state[i]) - program_.position[i]) < bound)) {
+    if (!(std::fabs(static_cast<double>(body_.state[slots_[i]]) - program_.position[i]) < bound)) {
       return false;
     }
   }

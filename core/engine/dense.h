@@ -19,6 +19,7 @@ inline constexpr std::size_t dense_pad = 8;      // numbers beyond a row that a 
 inline constexpr std::uint32_t no_hand = 0xffffffffu;
 
 // Slots are where a node's x and v are while walking: masses at [0, stride), others after them.
+// A mass has the same number in the state. That of the first port is 0, its other one 1.
 struct DenseLink {
   Law law = Law::spring;
   std::array<std::uint32_t, 5> coefficients{};
@@ -28,6 +29,11 @@ struct DenseLink {
   std::uint32_t hand_b = no_hand;
   bool a_moves = false;  // is a mass
   bool b_moves = false;
+};
+
+struct DenseInput {
+  std::uint32_t input = 0;
+  std::uint32_t slot = 0;
 };
 
 // What drives the state besides itself: a force; or one of the two numbers of a hand that pulls a
@@ -48,23 +54,23 @@ struct DenseBody {
   std::size_t columns = 0;  // of the state: x, v of each mass; and 1 if something is constant
   std::size_t rows = 0;     // columns, rounded up to the widest packs
   std::size_t fixed = 0;    // nodes that are no masses
-  std::size_t inputs = 0;
+  std::size_t hands = 0;
+  std::size_t pushes = 0;
   std::size_t outputs = 0;
   std::size_t ports = 0;
   std::size_t signals = 0;
   std::size_t sources = 0;
   std::size_t matrix_vectors = 0;  // in `matrix`
 
-  const DenseLink* port = nullptr;             // [port]
-  const DenseSignal* signal = nullptr;         // [signal]
-  const std::uint32_t* source = nullptr;       // [source] the slot of a fixed node with springs
-  const std::uint32_t* force_input = nullptr;  // [input] the mass it pushes, or no_hand
-  const std::uint32_t* hand_slot = nullptr;    // [input] the slot that it moves, or no_hand
-  const std::uint32_t* heard = nullptr;        // [output] mass
-  const T* unit = nullptr;                     // [port][stride] what its force is to the masses
+  const DenseLink* port = nullptr;        // [port]
+  const DenseSignal* signal = nullptr;    // [signal]
+  const std::uint32_t* source = nullptr;  // [source] the slot of a fixed node with springs
+  const DenseInput* hand = nullptr;       // [hand] moves a slot
+  const DenseInput* push = nullptr;       // [push] acts on a mass
+  const std::uint32_t* heard = nullptr;   // [output] mass
+  const T* unit = nullptr;                // [push or port][stride] what its force is to the masses
 
   Ramps<T> ramps{};
-  const T* push = nullptr;  // [input][stride] the mass that a force acts on
   // Of a walk, `stride` numbers in each vector: 1/M; the own stiffness, damping and weight of each
   // mass; then columns: -K of each mass, -(K + Z) of each mass, -K and -Z of each source.
   T* matrix = nullptr;
@@ -177,7 +183,7 @@ class DenseKernel final : public Kernel<T> {
   bool is_near_start(std::size_t lane, double bound) const override;
 
  private:
-  std::uint32_t slot(std::uint32_t node) const;
+  void place_nodes();
   void place_links();
   void place_signals();
   void allocate();
@@ -195,8 +201,9 @@ class DenseKernel final : public Kernel<T> {
   std::vector<DenseSignal> signals_;
   std::vector<const T*> sounding_;
   std::vector<std::uint32_t> sources_;
-  std::vector<std::uint32_t> force_inputs_;
-  std::vector<std::uint32_t> hand_slots_;
+  std::vector<DenseInput> hands_;
+  std::vector<DenseInput> pushes_;
+  std::vector<std::uint32_t> slots_;  // [node]
   std::vector<std::uint32_t> heard_;
   Aligned<T> numbers_;     // all that body_ points to
   Aligned<double> exact_;  // and these

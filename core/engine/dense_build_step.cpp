@@ -105,8 +105,8 @@ struct Build {
   }
 
   bool is_hand(std::uint32_t slot) const {
-    for (std::size_t i = 0; i < b.inputs; ++i) {
-      if (b.hand_slot[i] == slot) {
+    for (std::size_t i = 0; i < b.hands; ++i) {
+      if (b.hand[i].slot == slot) {
         return true;
       }
     }

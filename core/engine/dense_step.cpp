@@ -22,11 +22,11 @@ void store(Element<V>* to, V pack) {
 
 // --- sample by sample -------------------------------------------------------------------------
 
-// The ports' forces of a sample, given to `add(port, force)`.
+// The ports' forces of a sample, given to `add(port, force)`. `first` is the x of mass 0.
 template <class T>
 struct AnyPorts {
   template <class Add>
-  void operator()(const DenseBody<T>& b, Add&& add) const {
+  void operator()(const DenseBody<T>& b, T, T, Add&& add) const {
     for (std::size_t p = 0; p < b.ports; ++p) {
       const DenseLink& port = b.port[p];
       const T d = b.x[port.a] - b.x[port.b];
@@ -37,15 +37,16 @@ struct AnyPorts {
   }
 };
 
-// The same for one port whose law is chosen already.
+// The same for one port whose law is chosen already, and whose mass is in a register.
 template <class T, class ForceLaw>
 struct OnePort {
   ForceLaw law;
+  std::uint32_t other;
+  T by;  // -1 if mass 0 is its b
 
   template <class Add>
-  void operator()(const DenseBody<T>& b, Add&& add) const {
-    const DenseLink& port = b.port[0];
-    add(std::size_t(0), law(b.x[port.a] - b.x[port.b], b.v[port.a] - b.v[port.b]));
+  void operator()(const DenseBody<T>& b, T x, T v, Add&& add) const {
+    add(std::size_t(0), law(by * x - by * b.x[other], by * v - by * b.v[other]));
   }
 };
 
@@ -125,8 +126,7 @@ struct Walk {
     }
   }
 
-  static void pull(DenseBody<T>& body) {
-    const DenseBody<T> b = body;
+  static void pull(DenseBody<T>& b) {
     begin(b);
     Vector force{};
     const Vector v = vector(b.v);
@@ -143,52 +143,96 @@ struct Walk {
     put(b.force, force);
   }
 
+  // What a walk reads and never writes, apart from the body: what is stored cannot mean it.
+  static DenseBody<T> constants(const DenseBody<T>& b) {
+    DenseBody<T> c;
+    c.masses = b.masses;
+    c.padded = b.padded;
+    c.hands = b.hands;
+    c.pushes = b.pushes;
+    c.outputs = b.outputs;
+    c.ports = b.ports;
+    c.sources = b.sources;
+    c.port = b.port;
+    c.source = b.source;
+    c.hand = b.hand;
+    c.push = b.push;
+    c.heard = b.heard;
+    c.unit = b.unit;
+    c.ramps = b.ramps;
+    c.matrix = b.matrix;
+    c.slope = b.slope;
+    c.damping_moves = b.damping_moves;
+    c.state = b.state;
+    c.force = b.force;
+    c.port_force = b.port_force;
+    c.x = b.x;
+    c.v = b.v;
+    return c;
+  }
+
+  // The next velocity but for what pushes: of the springs' force, and what a mass does by itself.
+  template <bool moves>
+  static Vector next_velocity(const DenseBody<T>& b, const Vector& x, const Vector& v,
+                              const Vector& force, T steps) {
+    const Vector inverse_mass = own<moves>(b, 0, steps);
+    const Vector own_k = own<moves>(b, 1, steps);
+    const Vector own_z = own<moves>(b, 2, steps);
+    const Vector weight = own<moves>(b, 3, steps);
+    Vector next;
+    for (std::size_t c = 0; c < Count; ++c) {
+      const V pull = own_k.pack[c] * x.pack[c] + own_z.pack[c] * v.pack[c] + weight.pack[c];
+      next.pack[c] = v.pack[c] - pull * inverse_mass.pack[c];
+      next.pack[c] += force.pack[c] * inverse_mass.pack[c];
+    }
+    return next;
+  }
+  // next += what a force does along one of the units.
+  static void push(Vector& next, const DenseBody<T>& b, std::size_t unit,
+                   const Vector& inverse_mass, T force) {
+    for (std::size_t c = 0; c < Count; ++c) {
+      next.pack[c] += load<V>(b.unit + unit * stride + c * lanes) * inverse_mass.pack[c] * force;
+    }
+  }
+
   // K x' + Z v' = K x + (K + Z) v' with x' = x + v': only the velocities of a sample are waited
   // for before the next one. A port's force reaches the next velocity without the springs' detour.
   template <bool moves, class Ports>
-  static void walk(DenseBody<T>& body, const DenseDrive<T>& drive, std::size_t at,
-                   std::size_t count, const Ports& ports) {
-    DenseBody<T> b = body;  // nothing that is stored can be meant by this one
+  static void walk(DenseBody<T>& body, const DenseDrive<T>& block, std::size_t at,
+                   std::size_t count, const Ports& all_ports) {
+    DenseBody<T> b = constants(body);
+    const DenseDrive<T> drive = block;
+    const Ports ports = all_ports;
     begin(b);
     const T* const k = b.matrix + own_vectors * stride;
     const T* const kz = k + b.padded * stride;
     Vector x = vector(b.x);
     Vector v = vector(b.v);
     Vector force = vector(b.force);
-    Vector kick{};
-    T steps = 0;
+    T steps = moves ? T(1) : T(0);
+    Vector next = next_velocity<moves>(b, x, v, force, steps);
     for (std::size_t n = at; n < at + count; ++n) {
       if constexpr (moves) {
         advance(b.ramps);
-        steps += T(1);
       }
-      for (std::size_t i = 0; i < b.inputs; ++i) {
-        if (b.force_input[i] != no_hand) {
-          add(force, b.push + i * stride, drive.value[i * max_block_frames + n]);
-        }
-      }
-      Vector next{};
-      add_columns(next, b, k, x, b.x);
       const Vector inverse_mass = own<moves>(b, 0, steps);
-      const Vector own_k = own<moves>(b, 1, steps);
-      const Vector own_z = own<moves>(b, 2, steps);
-      const Vector weight = own<moves>(b, 3, steps);
+      for (std::size_t i = 0; i < b.pushes; ++i) {
+        push(next, b, i, inverse_mass, drive.value[b.push[i].input * max_block_frames + n]);
+      }
+      force = Vector{};
+      add_columns(force, b, k, x, b.x);
+      v = next;
       for (std::size_t c = 0; c < Count; ++c) {
-        const V own = own_k.pack[c] * x.pack[c] + own_z.pack[c] * v.pack[c] + weight.pack[c];
-        v.pack[c] += (force.pack[c] - own) * inverse_mass.pack[c];
-        v.pack[c] += moves ? kick.pack[c] * inverse_mass.pack[c] : kick.pack[c];
         x.pack[c] += v.pack[c];
       }
       put(b.x, x);
       put(b.v, v);
-      for (std::size_t i = 0; i < b.inputs; ++i) {
-        if (b.hand_slot[i] != no_hand) {
-          b.x[b.hand_slot[i]] = drive.value[i * max_block_frames + n];
-          b.v[b.hand_slot[i]] = drive.velocity[i * max_block_frames + n];
-        }
+      for (std::size_t i = 0; i < b.hands; ++i) {
+        b.x[b.hand[i].slot] = drive.value[b.hand[i].input * max_block_frames + n];
+        b.v[b.hand[i].slot] = drive.velocity[b.hand[i].input * max_block_frames + n];
       }
-      add_columns(next, b, kz, v, b.v);
-      add_sources(next, b, b.matrix);
+      add_columns(force, b, kz, v, b.v);
+      add_sources(force, b, b.matrix);
       if constexpr (moves) {
         Vector rise{};
         add_columns(rise, b, b.slope + own_vectors * stride, x, b.x);
@@ -197,17 +241,15 @@ struct Walk {
         }
         add_sources(rise, b, b.slope);
         for (std::size_t c = 0; c < Count; ++c) {
-          next.pack[c] += rise.pack[c] * steps;
+          force.pack[c] += rise.pack[c] * steps;
         }
+        steps += T(1);
       }
-      force = next;
-      kick = Vector{};
-      ports(b, [&](std::size_t p, T pulled) {
+      next = next_velocity<moves>(b, x, v, force, steps);
+      const Vector next_inverse_mass = own<moves>(b, 0, steps);
+      ports(b, x.pack[0][0], v.pack[0][0], [&](std::size_t p, T pulled) {
         b.port_force[p] = pulled;
-        for (std::size_t c = 0; c < Count; ++c) {
-          const V unit = load<V>(b.unit + p * stride + c * lanes);
-          kick.pack[c] += (moves ? unit : unit * inverse_mass.pack[c]) * pulled;
-        }
+        push(next, b, b.pushes + p, next_inverse_mass, pulled);
       });
       for (std::size_t o = 0; o < b.outputs; ++o) {
         drive.outputs[n * b.outputs + o] = b.x[b.heard[o]];
@@ -216,7 +258,7 @@ struct Walk {
     body.touches = false;
     for (std::size_t p = 0; p < b.ports; ++p) {
       body.touches |= b.port_force[p] != T(0);
-      add(force, b.unit + p * stride, b.port_force[p]);
+      add(force, b.unit + (b.pushes + p) * stride, b.port_force[p]);
     }
     put(b.force, force);
     for (std::size_t i = 0; i < b.masses; ++i) {
@@ -232,9 +274,12 @@ struct Walk {
     }
     if constexpr (stride <= 4) {
       if (b.ports == 1) {
-        const auto c = [&](std::size_t i) { return b.ramps.value[b.port[0].coefficients[i]]; };
-        return with_law<T>(b.port[0].law, c(0), c(1), c(2), c(3), c(4), [&]<class F>(F&& law) {
-          walk<false>(b, drive, at, count, OnePort<T, std::remove_reference_t<F>>{law});
+        const DenseLink& port = b.port[0];
+        const std::uint32_t other = port.a == 0 ? port.b : port.a;
+        const T by = port.a == 0 ? T(1) : T(-1);
+        const auto c = [&](std::size_t i) { return b.ramps.value[port.coefficients[i]]; };
+        return with_law<T>(port.law, c(0), c(1), c(2), c(3), c(4), [&]<class F>(F&& law) {
+          walk<false>(b, drive, at, count, OnePort<T, std::remove_reference_t<F>>{law, other, by});
         });
       }
     }
@@ -361,8 +406,8 @@ struct Leap {
   using V = Wide<T>;
   static constexpr std::size_t lanes = wide_lanes<T>;
 
-  const DenseBody<T> b;
-  const DenseDrive<T> drive;
+  const DenseBody<T>& b;
+  const DenseDrive<T>& drive;
   std::size_t at;
   std::size_t count;
   T* heard = b.scratch;
@@ -488,11 +533,10 @@ struct Leap {
         add_next();
       }
     }
-    for (std::size_t i = 0; i < b.inputs; ++i) {
-      if (b.hand_slot[i] != no_hand) {
-        b.x[b.hand_slot[i]] = drive.value[i * max_block_frames + at + count - 1];
-        b.v[b.hand_slot[i]] = drive.velocity[i * max_block_frames + at + count - 1];
-      }
+    for (std::size_t i = 0; i < b.hands; ++i) {
+      const std::size_t last = b.hand[i].input * max_block_frames + at + count - 1;
+      b.x[b.hand[i].slot] = drive.value[last];
+      b.v[b.hand[i].slot] = drive.velocity[last];
     }
   }
 };
