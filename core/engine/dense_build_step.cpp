@@ -30,7 +30,7 @@ void combine_some(const double* from, const double* vectors, std::size_t step, c
     sum[j] = load(from + j * lanes) * scale;
   }
   for (std::size_t i = 0; i < terms; ++i) {
-    const V by = factor[i * factor_step] + V{};
+    const double by = factor[i * factor_step];
     for (std::size_t j = 0; j < Count; ++j) {
       sum[j] += load(vectors + i * step + j * lanes) * by;
     }

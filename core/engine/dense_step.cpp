@@ -297,53 +297,70 @@ using Wide = Pack<T, widest>;
 template <class T>
 constexpr std::size_t wide_lanes = widest / sizeof(T);
 
-// Calls `some<Count>(row)` for all rows, Count packs at once and at most Most; rows are whole
+// Calls `some<Count>(row)` for all rows, Count packs at once and at most Most <= 8; rows are whole
 // packs.
 template <class T, std::size_t Most, class Some>
-void in_packs(std::size_t row, std::size_t rows, Some&& some) {
-  while (row + Most * wide_lanes<T> <= rows) {
+inline void in_packs(std::size_t rows, Some&& some) {
+  std::size_t row = 0;
+  for (; row + Most * wide_lanes<T> <= rows; row += Most * wide_lanes<T>) {
     some.template operator()<Most>(row);
-    row += Most * wide_lanes<T>;
   }
-  if constexpr (Most > 1) {
-    if (row < rows) {
-      in_packs<T, Most - 1>(row, rows, some);
+  const auto rest = [&]<std::size_t Count>() {
+    if constexpr (Count < Most) {
+      some.template operator()<Count>(row);
     }
+  };
+  switch ((rows - row) / wide_lanes<T>) {
+    case 1:
+      return rest.template operator()<1>();
+    case 2:
+      return rest.template operator()<2>();
+    case 3:
+      return rest.template operator()<3>();
+    case 4:
+      return rest.template operator()<4>();
+    case 5:
+      return rest.template operator()<5>();
+    case 6:
+      return rest.template operator()<6>();
+    case 7:
+      return rest.template operator()<7>();
+    default:
+      return;
   }
 }
 
-// out = table * factor for Count packs of rows, the table being [column][rows]. Few packs are
-// summed in several chains: otherwise each column would wait for the one before.
+// out = table * factor for Count packs of rows, the table being [column][rows]. In two
+// chains: otherwise each column would wait for the one before.
 template <class T, std::size_t Count>
 void expand_some(const T* table, std::size_t rows, std::size_t columns, const T* factor, T* out) {
   using V = Wide<T>;
-  constexpr std::size_t chains = Count <= 3 ? 4 : Count <= 6 ? 2 : 1;
-  V sum[chains][Count] = {};
-  std::size_t column = 0;
-  for (; column + chains <= columns; column += chains) {
-    for (std::size_t k = 0; k < chains; ++k) {
-      const V by = factor[column + k] + V{};
-      for (std::size_t i = 0; i < Count; ++i) {
-        sum[k][i] += load<V>(table + (column + k) * rows + i * wide_lanes<T>) * by;
-      }
-    }
-  }
-  for (; column < columns; ++column) {
+  V sum[Count] = {};
+  V other[Count] = {};
+  const T* const end = factor + columns;
+  if (columns % 2 == 1) {
     for (std::size_t i = 0; i < Count; ++i) {
-      sum[0][i] += load<V>(table + column * rows + i * wide_lanes<T>) * factor[column];
+      sum[i] = load<V>(table + i * wide_lanes<T>) * *factor;
+    }
+    ++factor;
+    table += rows;
+  }
+  for (; factor != end; factor += 2, table += 2 * rows) {
+    for (std::size_t i = 0; i < Count; ++i) {
+      sum[i] += load<V>(table + i * wide_lanes<T>) * factor[0];
+    }
+    for (std::size_t i = 0; i < Count; ++i) {
+      other[i] += load<V>(table + rows + i * wide_lanes<T>) * factor[1];
     }
   }
   for (std::size_t i = 0; i < Count; ++i) {
-    for (std::size_t k = 1; k < chains; ++k) {
-      sum[0][i] += sum[k][i];
-    }
-    store<V>(out + i * wide_lanes<T>, sum[0][i]);
+    store<V>(out + i * wide_lanes<T>, sum[i] + other[i]);
   }
 }
 
 template <class T>
 void expand(const T* table, std::size_t rows, std::size_t columns, const T* factor, T* out) {
-  in_packs<T, 8>(0, rows, [&]<std::size_t Count>(std::size_t row) {
+  in_packs<T, 4>(rows, [&]<std::size_t Count>(std::size_t row) {
     expand_some<T, Count>(table + row, rows, columns, factor, out + row);
   });
 }
@@ -353,7 +370,7 @@ template <class T>
 void respond(const T* response, const T* u, std::size_t count, std::size_t length, std::size_t each,
              T* out) {
   using V = Wide<T>;
-  in_packs<T, 4>(0, length, [&]<std::size_t Count>(std::size_t row) {
+  in_packs<T, 4>(length, [&]<std::size_t Count>(std::size_t row) {
     V sum[2][Count] = {};
     const auto add = [&](V(&to)[Count], std::size_t m) {
       for (std::size_t i = 0; i < Count; ++i) {
@@ -468,13 +485,16 @@ struct Leap {
       }
       if (hand == no_hand) {
         const T still = by * (is_bow ? b.v[slot] : b.x[slot]);
-        for (std::size_t n = 0; n < dense_frames; ++n) {
-          motion[n] += still;
+        for (std::size_t n = 0; n < dense_frames; n += lanes) {
+          store<V>(motion + n, load<V>(motion + n) + still);
         }
         return;
       }
       const T* const moved = (is_bow ? drive.velocity : drive.value) + hand * max_block_frames + at;
-      for (std::size_t n = 0; n < count; ++n) {
+      for (std::size_t n = 0; n < dense_frames && count == dense_frames; n += lanes) {
+        store<V>(motion + n, load<V>(motion + n) + load<V>(moved + n) * by);
+      }
+      for (std::size_t n = 0; n < count && count < dense_frames; ++n) {
         motion[n] += by * moved[n];
       }
     };
