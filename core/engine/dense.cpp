@@ -7,8 +7,7 @@
 namespace ressort {
 namespace {
 
-constexpr std::size_t own_vectors = 4;  // of DenseBody::matrix: 1/M, own stiffness, damping, weight
-constexpr std::size_t least_leap = 6;   // frames; fewer are walked
+constexpr std::size_t least_leap = 6;  // frames; fewer are walked
 
 // A port's law that is 0 nowhere makes every block a walk.
 bool acts_everywhere(Law law) {

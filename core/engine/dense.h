@@ -16,6 +16,8 @@ inline constexpr std::size_t dense_frames = 32;  // of a leap; at most
 inline constexpr std::size_t dense_powers = 6;   // of A: 1, 2, 4 ... dense_frames
 inline constexpr std::size_t dense_pad = 8;      // numbers beyond a row that a pack may write
 
+inline constexpr std::size_t own_vectors = 4;  // of DenseBody::matrix, before its columns
+
 inline constexpr std::uint32_t no_hand = 0xffffffffu;
 
 // Slots are where a node's x and v are while walking: masses at [0, stride), others after them.
@@ -137,17 +139,26 @@ namespace base {
 template <class T>
 DenseSteps<T> dense_steps(std::size_t masses);
 template <class T>
+std::size_t leap_dense(DenseBody<T>& body, const DenseDrive<T>& drive, std::size_t at,
+                       std::size_t count);
+template <class T>
 void build_dense(DenseBody<T>& body);
 }  // namespace base
 namespace v3 {
 template <class T>
 DenseSteps<T> dense_steps(std::size_t masses);
 template <class T>
+std::size_t leap_dense(DenseBody<T>& body, const DenseDrive<T>& drive, std::size_t at,
+                       std::size_t count);
+template <class T>
 void build_dense(DenseBody<T>& body);
 }  // namespace v3
 namespace v4 {
 template <class T>
 DenseSteps<T> dense_steps(std::size_t masses);
+template <class T>
+std::size_t leap_dense(DenseBody<T>& body, const DenseDrive<T>& drive, std::size_t at,
+                       std::size_t count);
 template <class T>
 void build_dense(DenseBody<T>& body);
 }  // namespace v4

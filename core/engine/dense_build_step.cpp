@@ -3,40 +3,31 @@
 //
 // Everything is made by doubling: from A^L and what the first L samples need, the next L.
 #include "core/engine/dense.h"
+#include "core/engine/dense_packs.h"
 
 namespace ressort::RESSORT_ISA {
 namespace {
 
-constexpr std::size_t own_vectors = 4;  // of DenseBody::matrix, as dense.cpp makes it
 constexpr std::size_t lanes = RESSORT_VECTOR_BYTES / sizeof(double);
 constexpr std::size_t row_length = dense_frames + dense_pad;
 
 using V = Pack<double, RESSORT_VECTOR_BYTES>;
-
-V load(const double* from) {
-  V pack;
-  __builtin_memcpy(&pack, from, sizeof pack);
-  return pack;
-}
-void store(double* to, V pack) {
-  __builtin_memcpy(to, &pack, sizeof pack);
-}
 
 template <std::size_t Count>
 void combine_some(const double* from, const double* vectors, std::size_t step, const double* factor,
                   std::size_t factor_step, std::size_t terms, double scale, double* to) {
   V sum[Count];
   for (std::size_t j = 0; j < Count; ++j) {
-    sum[j] = load(from + j * lanes) * scale;
+    sum[j] = load<V>(from + j * lanes) * scale;
   }
   for (std::size_t i = 0; i < terms; ++i) {
     const double by = factor[i * factor_step];
     for (std::size_t j = 0; j < Count; ++j) {
-      sum[j] += load(vectors + i * step + j * lanes) * by;
+      sum[j] += load<V>(vectors + i * step + j * lanes) * by;
     }
   }
   for (std::size_t j = 0; j < Count; ++j) {
-    store(to + j * lanes, sum[j]);
+    store<V>(to + j * lanes, sum[j]);
   }
 }
 
