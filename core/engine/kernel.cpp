@@ -3,6 +3,7 @@
 #include "core/engine/chains.h"
 #include "core/engine/dense.h"
 #include "core/engine/direct.h"
+#include "core/engine/modal.h"
 
 namespace ressort {
 
@@ -70,6 +71,8 @@ std::unique_ptr<Kernel<T>> make_kernel(const Program& program, std::size_t voice
       return std::make_unique<ChainsKernel<T>>(program, isa);
     std::unique_ptr<Kernel<T>> operator()(const Dense& form) const {
       return std::make_unique<DenseKernel<T>>(program, form, isa);
+    std::unique_ptr<Kernel<T>> operator()(const Modes& modes) const {
+      return std::make_unique<ModalKernel<T>>(program, modes, isa);
     }
   };
   return std::visit(Maker{program, voices, isa}, program.form);
