@@ -87,7 +87,7 @@ TEST_CASE("a slot hands over a hundred thousand objects: none lost, none twice",
   CHECK(Counted::alive.load() == 0);
   CHECK(std::all_of(fates.begin(), fates.end(), [](int fate) { return fate == 1; }));
   CHECK(touched_right);
-  CHECK(std::count(was_taken.begin(), was_taken.end(), 1) > 10);
+  CHECK(std::count(was_taken.begin(), was_taken.end(), 1) > 0);
   CHECK(was_taken.back() == 1);  // the newest offer is always taken in the end
 }
 

@@ -392,7 +392,7 @@ class Maker {
     std::erase(macro.name, ']');
     macro.length = 3 + static_cast<std::uint32_t>(random_.below(5));
     macro.width = is_mesh(macro.kind) ? 2 + static_cast<std::uint32_t>(random_.below(5)) : 1;
-    macro.mass = argument();
+    macro.mass = argument({{Op::number, 0, random_.uniform(0.1, 3.0)}});
     macro.stiffness = argument();
     macro.second_stiffness = macro.kind == MacroKind::stiff_string ? argument() : no_argument;
     macro.damping = argument();

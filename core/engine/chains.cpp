@@ -292,7 +292,7 @@ void ChainsKernel<T>::reset(std::size_t) {
 }
 
 template <class T>
-void ChainsKernel<T>::step(const Block<T>& block) {
+void ChainsKernel<T>::play(const Block<T>& block) {
   ChainsState<T> state{.ramps = ramps_of(this->coefficients),
                        .masks = masks_.data(),
                        .units = units_.data(),

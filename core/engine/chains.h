@@ -149,10 +149,10 @@ class ChainsKernel final : public Kernel<T> {
   // The Program's form is Chains.
   ChainsKernel(const Program& program, Isa isa);
   void reset(std::size_t lane) override;
-  void step(const Block<T>& block) override;
   bool is_near_start(std::size_t lane, double bound) const override;
 
  private:
+  void play(const Block<T>& block) override;
   const Program& program_;
   std::size_t lanes_;         // of a pack
   std::vector<Place> place_;  // [node]

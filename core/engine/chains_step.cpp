@@ -73,16 +73,16 @@ struct View {
 
 // The same number in every lane. Not V{} + x, which is not x if x is -0.
 template <class V>
-V all(Element<V> x) {
+V all(Scalar<V> x) {
   return x - V{};
 }
 
 template <class V>
-V& pack_at(Element<V>* numbers) {
+V& pack_at(Scalar<V>* numbers) {
   return *reinterpret_cast<V*>(numbers);
 }
 template <class V>
-const V& pack_at(const Element<V>* numbers) {
+const V& pack_at(const Scalar<V>* numbers) {
   return *reinterpret_cast<const V*>(numbers);
 }
 

@@ -315,7 +315,7 @@ DenseDrive<T> DenseKernel<T>::arrange(const Block<T>& block) {
 }
 
 template <class T>
-void DenseKernel<T>::step(const Block<T>& block) {
+void DenseKernel<T>::play(const Block<T>& block) {
   const DenseDrive<T> drive = arrange(block);
   const std::size_t ramped = std::min(this->coefficients.ramp_frames, block.frames);
   if (ramped > 0) {

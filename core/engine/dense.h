@@ -190,10 +190,10 @@ class DenseKernel final : public Kernel<T> {
  public:
   DenseKernel(const Program& program, const Dense& form, Isa isa);
   void reset(std::size_t lane) override;
-  void step(const Block<T>& block) override;
   bool is_near_start(std::size_t lane, double bound) const override;
 
  private:
+  void play(const Block<T>& block) override;
   void place_nodes();
   void place_links();
   void place_signals();

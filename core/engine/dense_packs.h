@@ -6,14 +6,14 @@
 namespace ressort {
 
 template <class V>
-static inline V load(const Element<V>* from) {
+static inline V load(const Scalar<V>* from) {
   V pack;
   __builtin_memcpy(&pack, from, sizeof pack);
   return pack;
 }
 
 template <class V>
-static inline void store(Element<V>* to, V pack) {
+static inline void store(Scalar<V>* to, V pack) {
   __builtin_memcpy(to, &pack, sizeof pack);
 }
 

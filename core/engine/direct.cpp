@@ -59,7 +59,7 @@ void DirectKernel<T>::reset(std::size_t lane) {
 }
 
 template <class T>
-void DirectKernel<T>::step(const Block<T>& block) {
+void DirectKernel<T>::play(const Block<T>& block) {
   DirectState<T> state{.ramps = ramps_of(this->coefficients),
                        .x = x_.data(),
                        .v = v_.data(),

@@ -46,10 +46,10 @@ class DirectKernel final : public Kernel<T> {
  public:
   DirectKernel(const Program& program, std::size_t voices, Isa isa);
   void reset(std::size_t lane) override;
-  void step(const Block<T>& block) override;
   bool is_near_start(std::size_t lane, double bound) const override;
 
  private:
+  void play(const Block<T>& block) override;
   const Program& program_;
   DirectStep<T> step_;
   Aligned<T> x_;

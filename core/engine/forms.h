@@ -2,6 +2,7 @@
 // the Program's own. Pure data, made by the compile room, shared by all voices.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <variant>
 #include <vector>
@@ -32,21 +33,24 @@ struct Chains {
   std::vector<std::uint32_t> links;  // those that are no chain's springs, ascending
 };
 
-using Form = std::variant<Direct, Chains>;
 // A small body for one voice: between contacts a whole block of samples is one product of a dense
 // matrix with the state. The matrices depend on a voice's coefficients: they are the kernel's own.
 struct DenseSpring {
   std::uint32_t a = 0;  // nodes
   std::uint32_t b = 0;
   std::uint32_t stiffness = 0;  // coefficients
+  std::uint32_t damping = 0;
+};
 struct DensePort {
   std::uint32_t run = 0;   // of Program::link_runs
   std::uint32_t link = 0;  // of Program::ends
+};
 struct Dense {
   std::vector<DenseSpring> springs;  // every linear link that moves a mass
   std::vector<DensePort> ports;      // every other link that moves a mass
   bool has_constant = false;         // gravity, or a spring to what stands elsewhere than at 0
-using Form = std::variant<Direct, Dense>;
+};
+
 // A stiffness or damping in the eigenvectors: what one coefficient gives to each mode, for masses
 // of 1. Links exert what they computed one tick before, with the coefficient of then; oscillators
 // pull with the coefficient of now.
@@ -54,24 +58,34 @@ struct ModalShare {
   std::uint32_t coefficient = 0;
   bool is_late = false;
   std::vector<double> factor;  // [mode]
+};
+
 // A mass that is heard or touched: its position is rest + sum of shape * q.
 struct ModalPlace {
   double rest = 0.0;
   std::vector<double> shape;  // [mode]
+};
+
 // Nonlinear links of one law. Their ends are places, numbered first, or Modes::ends.
 struct ModalHold {
   std::uint32_t run = 0;  // of Program::link_runs: the law and its coefficients
   std::vector<std::uint32_t> a;
   std::vector<std::uint32_t> b;  // [link] ends
+};
+
 // An end that is no mass: it follows a position input, or stays.
 struct ModalEnd {
   bool follows = false;
   std::uint32_t input = 0;
   double position = 0.0;
+};
+
 struct ModalOutput {
   std::uint32_t end = 0;  // as in ModalHold, if it is no mass
   bool is_place = false;  // else:
   ModalPlace place;
+};
+
 // A force that does not depend on the masses, spread by `shape` over the modes.
 struct ModalPush {
   enum class By : std::uint8_t {
@@ -83,8 +97,11 @@ struct ModalPush {
   By by = By::force;
   std::uint32_t input = 0;
   std::uint32_t stiffness = 0;  // coefficients; the constant's is the first
+  std::uint32_t damping = 0;
   double start = 0.0;
   std::vector<double> shape;  // [mode]
+};
+
 // The linear links and the masses in their common eigenvectors, everything else holds on to places
 // of them; one voice. Exact, not truncated. With masses of 1/w times the relative mass of each,
 //   d += w (push - sum of coefficient * factor * q - the same of damping * d);  q += d
@@ -102,6 +119,68 @@ struct Modes {
   std::vector<ModalEnd> ends;      // numbered on from the places
   std::vector<ModalHold> holds;
   std::vector<ModalOutput> outputs;  // [output]
-using Form = std::variant<Direct, Modes>;
+};
+
+inline constexpr std::uint32_t grid_line = 16;  // slots; as many as the widest pack has lanes
+
+// Slots that are `offsets` away from those they are linked to, all of them.
+struct GridSegment {
+  std::uint32_t first = 0;            // slots, multiples of grid_line
+  std::uint32_t count = 0;            //
+  std::vector<std::int32_t> offsets;  // at most most_grid_offsets
+};
+
+// Links of one run, whose second ends are `offsets` above their first.
+struct GridLinks {
+  std::uint32_t run = 0;     // of Program::link_runs
+  bool is_reversed = false;  // ...or their first above their second
+  std::vector<std::uint32_t> offsets;
+  std::vector<std::vector<std::uint8_t>> is_linked;  // [offset][slot - Grid::first] from there
+};
+
+// Links that fit into nothing, one by one.
+struct GridRest {
+  std::uint32_t run = 0;    // of Program::link_runs
+  std::uint32_t first = 0;  // of Grid::rest_ends
+  std::uint32_t count = 0;
+  bool is_excess = false;  // taken away from what the segments do instead
+};
+
+// A mass outside the grid.
+struct GridLoose {
+  std::uint32_t mass_run = 0;  // of Program::mass_runs
+  std::uint32_t slot = 0;
+};
+
+// A network of rows that are alike, one voice. Every node has a slot; those of the grid lie so that
+// what is linked is at the same few offsets everywhere, with empty slots where rows end. An empty
+// slot is a mass that stays at 0; a ground may lie in several slots, or in none if it is at 0.
+//
+// With one kind of spring everywhere (`segments` is not empty), a mass feels how far y = K x + Z v
+// is from its own at every offset, less what it feels from the `missing` ones. Otherwise the forces
+// of each law in `links` are computed one by one, offset by offset.
+struct Grid {
+  std::uint32_t slots = 0;
+  std::uint32_t first = 0;     // slots [first, first + count) are the grid, multiples of grid_line;
+  std::uint32_t count = 0;     // no offset reaches below 0 or beyond the last slot
+  std::uint32_t mass_run = 0;  // of Program::mass_runs, for all of the grid
+  std::vector<std::uint32_t> slot;    // [node]
+  std::vector<double> position;       // [slot] at the start
+  std::vector<double> velocity;       // [slot]
+  std::vector<std::uint8_t> moves;    // [slot - first] 1 where a mass is, 0 elsewhere
+  std::uint32_t spring_run = 0;       // of Program::link_runs, for the segments
+  std::vector<GridSegment> segments;  // none overlap
+  // [slot - first] how many offsets lead to nobody; fewer, by those that hold it at 0 besides
+  std::vector<std::int8_t> missing;
+  std::vector<GridLinks> links;
+  std::vector<GridRest> rest;
+  std::vector<std::array<std::uint32_t, 2>> rest_ends;  // slots
+  std::vector<std::uint32_t> ports;                     // slots of rest_ends and of force inputs
+  std::vector<GridLoose> loose;
+};
+
+inline constexpr std::size_t most_grid_offsets = 8;
+
+using Form = std::variant<Direct, Chains, Dense, Modes, Grid>;
 
 }  // namespace ressort

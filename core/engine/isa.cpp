@@ -17,6 +17,26 @@ Isa best_isa() {
   return Isa::base;
 }
 
+#if RESSORT_X86_LEVELS
+namespace {
+
+const bool has_wide_registers = best_isa() != Isa::base;
+
+__attribute__((target("avx"))) void clear() {
+  __builtin_ia32_vzeroupper();
+}
+
+}  // namespace
+#endif
+
+void clear_wide_registers() {
+#if RESSORT_X86_LEVELS
+  if (has_wide_registers) {
+    clear();
+  }
+#endif
+}
+
 std::string_view isa_name(Isa isa) {
   switch (isa) {
     case Isa::base:

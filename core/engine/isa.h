@@ -16,6 +16,10 @@ enum class Isa {
 Isa best_isa();  // of this machine. [any thread]
 std::string_view isa_name(Isa isa);
 
+// Code for narrow registers runs several times slower while the upper halves of wide ones are in
+// use, and compilers do not always clear those on the way out. [audio]
+void clear_wide_registers();
+
 // Of one register.
 constexpr std::size_t vector_bytes(Isa isa) {
   return isa == Isa::v4 ? 64 : isa == Isa::v3 ? 32 : 16;

@@ -3,6 +3,7 @@
 #include "core/engine/chains.h"
 #include "core/engine/dense.h"
 #include "core/engine/direct.h"
+#include "core/engine/grid.h"
 #include "core/engine/modal.h"
 
 namespace ressort {
@@ -69,10 +70,15 @@ std::unique_ptr<Kernel<T>> make_kernel(const Program& program, std::size_t voice
     }
     std::unique_ptr<Kernel<T>> operator()(const Chains&) const {
       return std::make_unique<ChainsKernel<T>>(program, isa);
+    }
     std::unique_ptr<Kernel<T>> operator()(const Dense& form) const {
       return std::make_unique<DenseKernel<T>>(program, form, isa);
+    }
     std::unique_ptr<Kernel<T>> operator()(const Modes& modes) const {
       return std::make_unique<ModalKernel<T>>(program, modes, isa);
+    }
+    std::unique_ptr<Kernel<T>> operator()(const Grid& grid) const {
+      return std::make_unique<GridKernel<T>>(program, grid, isa);
     }
   };
   return std::visit(Maker{program, voices, isa}, program.form);

@@ -93,11 +93,17 @@ class Kernel {
   virtual void reset(std::size_t lane) = 0;
   // Plays the block by the published scheme, v += F/M, x += v: masses, then position inputs, then
   // links; the outputs are the new positions. Forces given act in their own sample. [audio]
-  virtual void step(const Block<T>& block) = 0;
+  void step(const Block<T>& block) {
+    play(block);
+    clear_wide_registers();
+  }
   // Whether every mass of a lane is nearer than `bound` to where it starts. [audio]
   virtual bool is_near_start(std::size_t lane, double bound) const = 0;
 
   Coefficients<T> coefficients;
+
+ private:
+  virtual void play(const Block<T>& block) = 0;
 };
 
 // The kernel that the Program asks for (Program::form), with at least one lane and no more than

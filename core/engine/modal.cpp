@@ -183,7 +183,7 @@ void ModalKernel<T>::reset(std::size_t) {
 }
 
 template <class T>
-void ModalKernel<T>::step(const Block<T>& block) {
+void ModalKernel<T>::play(const Block<T>& block) {
   state_.ramps = ramps_of(this->coefficients);
   step_(program_, modes_, state_, block);
   this->coefficients.finish(block.frames);

@@ -88,11 +88,11 @@ class ModalKernel final : public Kernel<T> {
  public:
   ModalKernel(const Program& program, const Modes& modes, Isa isa);
   void reset(std::size_t lane) override;
-  void step(const Block<T>& block) override;
   // By the length of the modes' displacement, which no mass exceeds: it may be late, never early.
   bool is_near_start(std::size_t lane, double bound) const override;
 
  private:
+  void play(const Block<T>& block) override;
   const Program& program_;
   const Modes& modes_;
   ModalStep<T> step_;

@@ -30,8 +30,8 @@ struct Voice {
   double gain = 1.0;
   double gain_step = 0.0;  // per sample
   double next_gain(double now) const { return std::max(0.0, now + gain_step); }
-  double peak = 0.0;       // of the network's output since the last settling
-  double level = 0.0;      // peak of the output, slowly forgotten
+  double peak = 0.0;   // of the network's output since the last settling
+  double level = 0.0;  // peak of the output, slowly forgotten
   std::size_t quiet_frames = 0;
 };
 

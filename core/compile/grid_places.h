@@ -1,0 +1,32 @@
+// core/compile: where the rows of a regular network lie among the slots of a Grid.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "core/compile/grid_rows.h"
+
+namespace ressort {
+
+// Slots in a row, with the same offsets to what they are linked to.
+struct GridSpan {
+  std::uint32_t first = 0;  // multiples of grid_line
+  std::uint32_t count = 0;
+};
+
+struct GridPlaces {
+  std::uint32_t reach = 0;             // no offset may be larger
+  std::uint32_t slots = 0;             // at least twice `reach` more than the spans, on either side
+  std::vector<std::uint32_t> slot;     // [node], or nowhere
+  std::vector<std::uint32_t> node_at;  // [slot], or nowhere
+  std::vector<GridSpan> spans;         // in order
+};
+
+// Every row at the same distance from the last, shifted so that its links have the offsets of those
+// before. One span.
+GridPlaces places_in_lines(const GridGraph& graph, const GridRows& rows);
+
+// Every row in a span of its own, no longer than it needs.
+GridPlaces places_by_row(const GridGraph& graph, const GridRows& rows);
+
+}  // namespace ressort

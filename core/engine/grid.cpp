@@ -1,0 +1,155 @@
+#include "core/engine/grid.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdlib>
+#include <map>
+
+namespace ressort {
+namespace {
+
+template <class T>
+GridStep<T> step_for(Isa isa) {
+#if RESSORT_X86_LEVELS
+  if (isa == Isa::v4) {
+    return v4::grid_step<T>();
+  }
+  if (isa == Isa::v3) {
+    return v3::grid_step<T>();
+  }
+#endif
+  static_cast<void>(isa);
+  return base::grid_step<T>();
+}
+
+std::vector<std::uint32_t> offsets_of(const Grid& grid) {
+  std::vector<std::uint32_t> offsets;
+  for (const GridLinks& links : grid.links) {
+    offsets.insert(offsets.end(), links.offsets.begin(), links.offsets.end());
+  }
+  return offsets;
+}
+
+std::uint32_t furthest_offset(const Grid& grid) {
+  std::int32_t furthest = 0;
+  for (const GridSegment& segment : grid.segments) {
+    for (const std::int32_t offset : segment.offsets) {
+      furthest = std::max(furthest, std::abs(offset));
+    }
+  }
+  return static_cast<std::uint32_t>(furthest);
+}
+
+}  // namespace
+
+template <class T>
+GridKernel<T>::GridKernel(const Program& program, const Grid& grid, Isa isa)
+    : Kernel<T>(program, 1),
+      program_(program),
+      grid_(grid),
+      step_(step_for<T>(isa)),
+      x_(grid.slots),
+      v_(grid.slots),
+      force_(grid.slots),
+      held_(grid.links.size() * 5),
+      offset_(offsets_of(grid)),
+      shift_((furthest_offset(grid) + grid_line - 1) / grid_line * grid_line),
+      inverse_mass_(grid.slots, grid_fixed),
+      pushed_(program.taps.size() * grid_pushes),
+      taps_(program.taps.size()) {
+  for (const MassRun& run : program.mass_runs) {
+    for (std::uint32_t node = run.first; node < run.first + run.count; ++node) {
+      inverse_mass_[grid.slot[node]] = run.inverse_mass;
+    }
+  }
+  y_.resize(grid.segments.empty() ? 0 : grid.slots + shift_);
+  link_force_.resize(offset_.size() * grid.slots);
+  make_stamps(grid_bytes(vector_bytes(isa)) / sizeof(T));
+  reset(0);
+}
+
+// Packs that have the same weights share them: in a large grid they stay in the nearest cache.
+template <class T>
+void GridKernel<T>::make_stamps(std::size_t lanes) {
+  std::map<std::vector<T>, std::uint32_t> known;
+  std::vector<T> weights;
+  for (std::size_t at = 0; at < grid_.count; at += lanes) {
+    weights.clear();
+    const auto add = [&](const auto& row) {
+      const auto begin = row.begin() + static_cast<std::ptrdiff_t>(at);
+      weights.insert(weights.end(), begin, begin + static_cast<std::ptrdiff_t>(lanes));
+    };
+    add(grid_.moves);
+    if (!grid_.segments.empty()) {
+      add(grid_.missing);
+    }
+    for (const GridLinks& links : grid_.links) {
+      for (const auto& is_linked : links.is_linked) {
+        add(is_linked);
+      }
+    }
+    const auto next = static_cast<std::uint32_t>(known.size());
+    const auto [entry, is_new] = known.try_emplace(weights, next);
+    if (is_new) {
+      weights_.insert(weights_.end(), weights.begin(), weights.end());
+    }
+    stamp_.push_back(entry->second);
+  }
+}
+
+template <class T>
+void GridKernel<T>::reset(std::size_t) {
+  for (std::size_t slot = 0; slot < grid_.slots; ++slot) {
+    x_[slot] = static_cast<T>(grid_.position[slot]);
+    v_[slot] = static_cast<T>(grid_.velocity[slot]);
+  }
+  for (auto* zero : {&force_, &y_, &link_force_}) {
+    std::fill(zero->begin(), zero->end(), T(0));
+  }
+  pushes_ = 0;
+  is_fresh_ = true;
+}
+
+template <class T>
+void GridKernel<T>::play(const Block<T>& block) {
+  GridState<T> state{.ramps = ramps_of(this->coefficients),
+                     .x = x_.data(),
+                     .v = v_.data(),
+                     .force = force_.data(),
+                     .y = y_.data() + (is_forward_ ? shift_ : 0),
+                     .next_y = y_.data() + (is_forward_ ? 0 : shift_),
+                     .shift = shift_,
+                     .is_forward = is_forward_,
+                     .link_force = link_force_.data(),
+                     .held = held_.data(),
+                     .stamp = stamp_.data(),
+                     .weights = weights_.data(),
+                     .offset = offset_.data(),
+                     .rows = offset_.size(),
+                     .is_fresh = is_fresh_,
+                     .inverse_mass = inverse_mass_.data(),
+                     .pushed = pushed_.data(),
+                     .pushes = pushes_,
+                     .taps = taps_.data()};
+  step_(program_, grid_, state, block);
+  is_forward_ = state.is_forward;
+  is_fresh_ = state.is_fresh;
+  pushes_ = state.pushes;
+  this->coefficients.finish(block.frames);
+}
+
+template <class T>
+bool GridKernel<T>::is_near_start(std::size_t, double bound) const {
+  for (std::size_t node = 0; node < program_.moving; ++node) {
+    const std::size_t slot = grid_.slot[node];
+    if (!(std::fabs(static_cast<double>(x_[slot]) - grid_.position[slot]) < bound)) {
+      return false;
+    }
+  }
+  return true;
+}
+
+template class GridKernel<float>;
+template class GridKernel<double>;
+
+}  // namespace ressort

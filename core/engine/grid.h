@@ -1,0 +1,101 @@
+// core/engine: a regular network (Grid), its slots side by side in the lanes. One voice.
+#pragma once
+
+#include "core/engine/kernel.h"
+
+namespace ressort {
+
+// Of one pack: half a cache line at most. Neighbours are not aligned, and every wider load of them
+// would touch two lines.
+constexpr std::size_t grid_bytes(std::size_t vector_bytes) {
+  return vector_bytes < 32 ? vector_bytes : 32;
+}
+
+inline constexpr std::uint32_t grid_fixed = 0xffffffffu;
+inline constexpr std::size_t grid_pushes = 8;  // of a tap: its corners before and after it moved
+
+// Where a tap is in this sample: its lowest corner, and how far it is beyond it, 0..1.
+template <class T>
+struct GridTapState {
+  std::uint32_t row = 0;
+  std::uint32_t column = 0;
+  T alpha = T(0);  // towards the next row
+  T beta = T(0);   // and column
+};
+
+// Everything that one step of GridKernel touches.
+template <class T>
+struct GridState {
+  Ramps<T> ramps;
+  T* x;                        // [slot] position
+  T* v;                        // [slot] change of position per sample
+  T* force;                    // [slot] of what is not the grid's, used by the next sample
+  T* y;                        // [slot] K x + Z v, if there are segments
+  T* next_y;                   // [slot] the same of the next sample: `shift` below y, or above it
+  std::ptrdiff_t shift;        // as far as any offset
+  bool is_forward;             // below, and the slots are to be stepped upwards
+  T* link_force;               // [row][slot] if there are no segments: a row for each offset
+  T* held;                     // [links][5] coefficients with which those are still to be computed
+  const std::uint32_t* stamp;  // [pack of the grid] which weights it has
+  // [stamp][row][lane] With segments: where a mass is, and what it misses; else where a mass is,
+  // and for each offset where a link is.
+  const T* weights;
+  const std::uint32_t* offset;  // [row] of all links
+  std::size_t rows;
+  bool is_fresh;                      // no sample yet: nothing pulls
+  const std::uint32_t* inverse_mass;  // [slot] coefficient, or grid_fixed
+  std::uint32_t* pushed;              // slots that points push in the next sample
+  std::size_t pushes;
+  GridTapState<T>* taps;  // [tap]
+};
+
+template <class T>
+using GridStep = void (*)(const Program& program, const Grid& grid, GridState<T>& state,
+                          const Block<T>& block);
+
+namespace base {
+template <class T>
+GridStep<T> grid_step();
+}
+namespace v3 {
+template <class T>
+GridStep<T> grid_step();
+}
+namespace v4 {
+template <class T>
+GridStep<T> grid_step();
+}
+
+template <class T>
+class GridKernel final : public Kernel<T> {
+ public:
+  GridKernel(const Program& program, const Grid& grid, Isa isa);
+  void reset(std::size_t lane) override;
+  bool is_near_start(std::size_t lane, double bound) const override;
+
+ private:
+  void play(const Block<T>& block) override;
+  void make_stamps(std::size_t lanes);
+
+  const Program& program_;
+  const Grid& grid_;
+  GridStep<T> step_;
+  Aligned<T> x_;
+  Aligned<T> v_;
+  Aligned<T> force_;
+  Aligned<T> y_;
+  Aligned<T> link_force_;
+  Aligned<T> held_;
+  std::vector<std::uint32_t> offset_;
+  std::vector<std::uint32_t> stamp_;
+  Aligned<T> weights_;
+  std::uint32_t shift_;
+  std::vector<std::uint32_t> inverse_mass_;
+  std::vector<std::uint32_t> pushed_;
+  std::size_t pushes_ = 0;
+  std::vector<GridTapState<T>> taps_;
+  bool is_forward_ = true;
+  bool is_fresh_ = true;
+};
+
+}  // namespace ressort
