@@ -53,6 +53,7 @@ json scene_json(const Scene& scene, const Compiled& compiled) {
     plan.push_back({{"method", method_name(part.method)},
                     {"masses", part.masses},
                     {"links", part.links},
+                    {"predicted_ns", part.predicted_ns},
                     {"reason", part.reason}});
   }
   const bool is_velocity = scene.network.third == ThirdArgument::velocity_per_second;
@@ -108,7 +109,7 @@ int check(const CheckOptions& options) {
   Reading reading = read_scene(options.name, {.third = options.third});
   std::optional<Compiled> compiled;
   if (reading.scene) {
-    auto made = compile(reading.scene->network, reading.scene->preset, {});
+    auto made = compile(reading.scene->network, reading.scene->preset, {.method = options.method});
     if (made) {
       compiled = *std::move(made);
     } else {

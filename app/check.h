@@ -4,6 +4,7 @@
 #include <optional>
 #include <string>
 
+#include "core/compile/plan.h"
 #include "core/model/network.h"
 
 namespace ressort {
@@ -14,6 +15,7 @@ struct CheckOptions {
   std::string name;
   CheckAs as = CheckAs::report;        // model: the text in one clean dialect
   std::optional<ThirdArgument> third;  // whatever preset and model say
+  std::optional<Method> method;        // without one, the plan's choice
 };
 
 // Findings go to stderr, with their lines if that is a terminal; with json all is one object on

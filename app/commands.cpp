@@ -88,7 +88,8 @@ class Player {
                                   SessionOptions{.compile = {.rate_hz = device_.rate_hz,
                                                              .rescale = options_.rescale,
                                                              .voices = options_.voices,
-                                                             .precision = options_.precision},
+                                                             .precision = options_.precision,
+                                                             .method = options_.method},
                                                  .gain = std::pow(10.0, options_.gain_db / 20.0),
                                                  .third = options_.third},
                                   [this](const std::string& news) { voice_.say(news); });

@@ -21,6 +21,7 @@ struct PlayOptions {
   int voices = 0;
   Precision precision = Precision::float64;
   bool rescale = true;
+  std::optional<Method> method;        // without one, the plan's choice
   std::optional<ThirdArgument> third;  // whatever the models show
   bool no_console = false;
   std::string script;

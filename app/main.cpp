@@ -101,6 +101,27 @@ CLI::Option* add_choice(CLI::App& command, const std::string& name, T& target,
       ->type_name("WORD");
 }
 
+void add_method(CLI::App& command, std::optional<Method>& method) {
+  std::vector<std::string> words = {"auto"};
+  for (const Method known : all_methods) {
+    words.emplace_back(method_name(known));
+  }
+  command
+      .add_option_function<std::string>(
+          "--method",
+          [&method](const std::string& word) {
+            for (const Method known : all_methods) {
+              if (method_name(known) == word) {
+                method = known;
+              }
+            }
+          },
+          "how each part is computed, where it can be: auto takes what is fastest, but for a\n"
+          "bare model direct, which is the published scheme bit for bit on every machine")
+      ->check(CLI::IsMember(words))
+      ->type_name("WORD");
+}
+
 // How the network is computed, for every command that computes it.
 void add_numbers(CLI::App& command, Precision& precision, bool& rescale) {
   add_choice<Precision>(command, "--precision", precision,
@@ -161,6 +182,7 @@ void add_play(CLI::App& app, PlayOptions& options, int& code) {
       ->check(within(16, 8192))
       ->capture_default_str();
   add_numbers(*command, options.precision, options.rescale);
+  add_method(*command, options.method);
   add_motion(*command, options.third);
   command->add_flag("-i,--no-console", options.no_console, "do not read commands");
   command->add_option("-e,--execute", options.script, "a file of console commands, run first");
@@ -213,6 +235,7 @@ void add_render(CLI::App& app, RenderChoice& choice, int& code) {
               {"pcm24", SampleFormat::pcm24}},
              "of the file's samples");
   add_numbers(*command, options.precision, options.rescale);
+  add_method(*command, options.method);
   add_motion(*command, options.third);
   command->add_option("-p,--voices", options.voices, "how many notes sound at once")
       ->check(within(1, max_voices));
@@ -296,6 +319,7 @@ void add_check(CLI::App& app, CheckOptions& options, int& code) {
           "nothing but the model, as text in one clean dialect")
       ->excludes(json);
   add_motion(*command, options.third);
+  add_method(*command, options.method);
   command->callback([&options, &code] { code = check(options); });
 }
 

@@ -107,7 +107,8 @@ Result<Rendered> render(const RenderOptions& options, const std::function<bool(d
                            .rescale = options.rescale,
                            .bare = is_bare,
                            .voices = options.voices,
-                           .precision = options.precision});
+                           .precision = options.precision,
+                           .method = options.method});
   if (!compiled) {
     const Error& error = compiled.error();
     return Error{scene->path + ":" + std::to_string(error.line) + ":" +

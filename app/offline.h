@@ -26,6 +26,7 @@ struct RenderOptions {
   SampleFormat format = SampleFormat::float32;
   Precision precision = Precision::float64;
   bool rescale = true;
+  std::optional<Method> method;        // without one, the plan's choice
   std::optional<ThirdArgument> third;  // whatever the model shows
   bool limit = false;
   int voices = 0;

@@ -219,9 +219,7 @@ Result<std::shared_ptr<const Loaded>> Session::build(const std::string& name) {
     options.rate_hz = rate_hz_;
     prepare_inputs = prepare_inputs_;
   }
-  if (!scene->has_preset) {
-    scene->preset.gain = comfortable_gain(scene->network, scene->preset, options);
-  }
+  options.find_gain = !scene->has_preset;
   scene->preset.gain *= options_.gain;
   auto compiled = compile(scene->network, scene->preset, options);
   if (!compiled) {

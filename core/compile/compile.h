@@ -2,6 +2,7 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -20,6 +21,9 @@ struct CompileOptions {
   bool bare = false;    // no smoothing, no sleep: the network as it is written
   int voices = 0;       // instead of the preset's; 0: the preset's
   Precision precision = Precision::float64;
+  std::optional<Method> method;  // instead of the plan's choice, or the bare network's direct form
+  Isa isa = best_isa();          // no wider than the machine's
+  bool find_gain = false;        // so that a forte note peaks at -6 dBFS, instead of the preset's
 };
 
 // A parameter as people reach it: by name, in its own unit, within its range.
@@ -71,11 +75,5 @@ struct Compiled {
 // [any thread but audio]
 Result<Compiled> compile(const Network& network, const Preset& preset,
                          const CompileOptions& options);
-
-// The gain at which a forte note peaks at -6 dBFS, found by playing one: what a model that comes
-// without a preset is played with. 1 where notes excite nothing. Bounded to about 4 million steps
-// of a mass. [any thread but audio]
-double comfortable_gain(const Network& network, const Preset& preset,
-                        const CompileOptions& options);
 
 }  // namespace ressort

@@ -1,36 +1,149 @@
 #include "core/compile/plan.h"
 
 #include <algorithm>
-#include <map>
-#include <numeric>
+#include <cmath>
+
+#include "core/compile/chains_form.h"
+#include "core/compile/dense_form.h"
+#include "core/compile/grid_form.h"
+#include "core/compile/modal_form.h"
 
 namespace ressort {
 namespace {
 
-bool moves(const Mass& mass) {
-  return mass.kind == MassKind::mass || mass.kind == MassKind::oscillator;
+template <class T>
+std::optional<Form> any(std::optional<T> form) {
+  return form ? std::optional<Form>(std::move(*form)) : std::nullopt;
 }
 
-// Which masses hang together, by union-find; what does not move holds nothing together.
-std::vector<std::uint32_t> connected(const Network& network) {
-  std::vector<std::uint32_t> root(network.masses.size());
-  std::iota(root.begin(), root.end(), 0u);
-  const auto find = [&](std::uint32_t i) {
-    while (root[i] != i) {
-      i = root[i] = root[root[i]];
-    }
-    return i;
-  };
-  for (const Link& link : network.links) {
-    if (moves(network.masses[link.a]) && moves(network.masses[link.b])) {
-      root[find(link.a)] = find(link.b);
-    }
+std::optional<Form> form_of(const Program& program, Method method) {
+  switch (method) {
+    case Method::direct:
+      return Direct{};
+    case Method::chains:
+      return any(chains_form(program));
+    case Method::dense:
+      return any(dense_form(program));
+    case Method::modal:
+      return any(modal_form(program));
+    case Method::grid:
+      return any(grid_form(program));
   }
-  for (std::uint32_t i = 0; i < root.size(); ++i) {
-    root[i] = find(i);
-  }
-  return root;
+  return std::nullopt;
 }
+
+std::string count_of(std::size_t count, const char* one, const char* many) {
+  return std::to_string(count) + " " + (count == 1 ? one : many);
+}
+
+// What the form is, of this part.
+struct Describer {
+  const Program& program;
+
+  std::string operator()(const Direct&) const {
+    return "mass by mass and link by link, as published, a voice in each lane";
+  }
+  std::string operator()(const Chains& form) const {
+    return count_of(form.chains.size(), "row of equal masses", "rows of equal masses") +
+           " folded into vectors, " + count_of(form.loose.size(), "mass", "masses") + " and " +
+           count_of(form.links.size(), "link", "links") + " one by one";
+  }
+  std::string operator()(const Dense& form) const {
+    return form.ports.empty() ? "blocks of samples by one matrix"
+                              : "blocks of samples by one matrix between contacts, " +
+                                    count_of(form.ports.size(), "link", "links") + " one by one";
+  }
+  std::string operator()(const Modes& form) const {
+    return count_of(form.modes, "mode", "modes") + " in place of the masses, " +
+           count_of(form.places.size(), "place", "places") + " where links hold on";
+  }
+  std::string operator()(const Grid& form) const {
+    return std::string(form.segments.empty() ? "forces" : "rows that are alike") +
+           " in vectors along the index, " + count_of(form.rest_ends.size(), "link", "links") +
+           " one by one";
+  }
+};
+
+std::string in_ns(double ns) {
+  char text[32];
+  std::snprintf(text, sizeof text, ns < 9.95 ? "%.1f ns" : "%.0f ns", ns);
+  return text;
+}
+
+class Chooser {
+ public:
+  Chooser(Program& program, const Load& load) : program_(program), load_(load) {}
+
+  Part choose() {
+    for (const Method method : all_methods) {
+      if (method == Method::modal && !may_be_modal()) {
+        continue;
+      }
+      consider(method);
+    }
+    return take("");
+  }
+
+  Part obey(Method method) {
+    consider(Method::direct);
+    if (method == Method::direct || consider(method)) {
+      best_ = candidates_.size() - 1;
+      return take("as asked for");
+    }
+    return take(std::string(method_name(method)) + " cannot do this part");
+  }
+
+ private:
+  struct Candidate {
+    Method method;
+    Form form;
+    double ns;
+  };
+
+  bool may_be_modal() const {
+    return program_.moving <= most_planned_modes && program_.moving > 4 &&
+           least_modal_ns(program_, load_) < candidates_[best_].ns;
+  }
+
+  bool consider(Method method) {
+    auto form = form_of(program_, method);
+    if (!form) {
+      return false;
+    }
+    program_.form = *std::move(form);
+    const double ns = predicted_ns(program_, load_);
+    candidates_.push_back({method, std::move(program_.form), ns});
+    if (ns < candidates_[best_].ns) {
+      best_ = candidates_.size() - 1;
+    }
+    return true;
+  }
+
+  Part take(const std::string& why) {
+    Candidate& best = candidates_[best_];
+    Part part{.method = best.method,
+              .masses = program_.moving,
+              .links = program_.ends.size(),
+              .predicted_ns = best.ns,
+              .reason = std::visit(Describer{program_}, best.form)};
+    std::string others;
+    for (const Candidate& candidate : candidates_) {
+      if (candidate.method != best.method) {
+        others += (others.empty() ? "" : ", ") + std::string(method_name(candidate.method)) +
+                  " would take " + in_ns(candidate.ns);
+      }
+    }
+    part.reason += "; at most about " + in_ns(best.ns) + " a sample";
+    part.reason += !why.empty() ? ", " + why : others.empty() ? "" : ", " + others;
+    program_.form = std::move(best.form);
+    return part;
+  }
+
+  Program& program_;
+  const Load& load_;
+  std::vector<Candidate> candidates_;
+  std::size_t best_ = 0;
+};
 
 }  // namespace
 
@@ -38,38 +151,26 @@ std::string_view method_name(Method method) {
   switch (method) {
     case Method::direct:
       return "direct";
+    case Method::chains:
+      return "chains";
+    case Method::dense:
+      return "dense";
+    case Method::modal:
+      return "modal";
+    case Method::grid:
+      return "grid";
   }
   return "";
 }
 
-Plan make_plan(const Network& network) {
-  const std::vector<std::uint32_t> root = connected(network);
-  struct Count {
-    std::size_t masses = 0;
-    std::size_t links = 0;
-    std::size_t nonlinear = 0;
-  };
-  std::map<std::uint32_t, Count> counts;
-  for (std::uint32_t i = 0; i < root.size(); ++i) {
-    if (moves(network.masses[i])) {
-      ++counts[root[i]].masses;
-    }
-  }
-  for (const Link& link : network.links) {
-    const std::uint32_t end = moves(network.masses[link.a]) ? link.a : link.b;
-    if (moves(network.masses[end])) {
-      Count& count = counts[root[end]];
-      ++count.links;
-      count.nonlinear += link.kind == LinkKind::spring ? 0 : 1;
-    }
-  }
+Plan make_plan(Machine& machine, const Load& load, std::optional<Method> method) {
   Plan plan;
-  for (const auto& [first, count] : counts) {
-    std::string reason = "the published scheme, mass by mass and link by link; ";
-    reason += count.nonlinear == 0   ? std::string("every link is linear")
-              : count.nonlinear == 1 ? std::string("one link is nonlinear")
-                                     : std::to_string(count.nonlinear) + " links are nonlinear";
-    plan.parts.push_back({Method::direct, count.masses, count.links, std::move(reason)});
+  for (Program& program : machine.parts) {
+    Chooser chooser(program, load);
+    Part part = method ? chooser.obey(*method) : chooser.choose();
+    if (part.masses > 0) {
+      plan.parts.push_back(std::move(part));
+    }
   }
   return plan;
 }
@@ -77,9 +178,8 @@ Plan make_plan(const Network& network) {
 std::string describe(const Plan& plan) {
   std::string text;
   for (const Part& part : plan.parts) {
-    text += std::string(method_name(part.method)) + ": " + std::to_string(part.masses) +
-            (part.masses == 1 ? " mass, " : " masses, ") + std::to_string(part.links) +
-            (part.links == 1 ? " link (" : " links (") + part.reason + ")\n";
+    text += std::string(method_name(part.method)) + ": " + count_of(part.masses, "mass", "masses") +
+            ", " + count_of(part.links, "link", "links") + " (" + part.reason + ")\n";
   }
   return text.empty() ? "nothing moves\n" : text;
 }

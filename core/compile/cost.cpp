@@ -1,0 +1,135 @@
+#include "core/compile/cost.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace ressort {
+namespace {
+
+// Links by what they cost: those that only pull, and those that have to look first.
+struct Count {
+  double springs = 0.0;
+  double others = 0.0;
+};
+
+Count links_of(const Program& program) {
+  Count count;
+  for (const LinkRun& run : program.link_runs) {
+    (run.law == Law::spring ? count.springs : count.others) += run.count;
+  }
+  return count;
+}
+
+// Parameters are still most of the time, so that a moving one counts by half; without that no mesh
+// whose stiffness can be turned would ever be stepped by its modes.
+double modal_ns(double modes, double places, double heard, double pushed, const Load& load) {
+  const double wide = load.isa == Isa::v4 ? 0.85 : load.isa == Isa::v3 ? 1.0 : 2.4;
+  const double each = wide * (load.is_double ? 1.0 : 0.5) * modes;
+  const double rows = places + pushed;
+  const double slope = rows > 8.0 ? 0.23 : 0.09;
+  const double bound = 25.0 + 5.0 * places + each * (0.30 + slope * rows);
+  const double moving = 0.5 * (bound + 0.45 * each);
+  const double still = places > 0.0 ? bound : 6.0 + each * (0.11 + 0.04 * heard + 0.045 * pushed);
+  return std::max(still, moving);
+}
+
+class Predictor {
+ public:
+  Predictor(const Program& program, const Load& load)
+      : program_(program), load_(load), wide_(load.isa == Isa::base ? 0.0 : 1.0) {}
+
+  double operator()(const Direct&) const {
+    const auto widest = vector_bytes(load_.isa) / (load_.is_double ? 8 : 4);
+    const auto groups = std::ceil(load_.voices / static_cast<double>(widest));
+    const double lanes = std::min<double>(load_.voices, static_cast<double>(widest));
+    const Count links = links_of(program_);
+    return groups * (12.0 + 1.6 * (program_.moving + links.springs) + 5.0 * links.others +
+                     10.0 * lanes * static_cast<double>(program_.taps.size()));
+  }
+
+  double operator()(const Chains& form) const {
+    std::uint32_t longest = 0;
+    for (const Chain& chain : form.chains) {
+      longest = std::max(longest, chain.count);
+    }
+    const bool is_wide = wide_ > 0.0 && longest >= (load_.is_double ? 12u : 24u);
+    const double lanes = (is_wide ? 32.0 : 16.0) / (load_.is_double ? 8.0 : 4.0);
+    double sum = 6.0;
+    for (const Chain& chain : form.chains) {
+      sum += 3.7 + (wide_ > 0.0 ? 0.62 : 0.9) * std::ceil(chain.count / lanes);
+    }
+    if (!form.links.empty()) {
+      sum += 4.0;
+    }
+    for (const std::uint32_t link : form.links) {
+      const auto run = std::find_if(
+          program_.link_runs.begin(), program_.link_runs.end(),
+          [&](const LinkRun& r) { return link >= r.first && link < r.first + r.count; });
+      sum += run->law == Law::spring || run->law == Law::contact ? 2.3 : 5.0;
+    }
+    sum += 3.2 * static_cast<double>(form.loose.size()) + heard_and_pushed(0.5) +
+           10.0 * static_cast<double>(program_.taps.size());
+    return sum * load_.voices;
+  }
+
+  double operator()(const Dense& form) const {
+    const double n = program_.moving;
+    const double half = load_.is_double ? 1.0 : 0.5;
+    if (form.ports.empty()) {
+      const double slope = load_.isa == Isa::base ? 0.46 : 0.21;
+      const double heard = static_cast<double>(program_.outputs.size());
+      return load_.voices * (1.0 + half * n * slope * (1.0 + 0.4 * (heard - 1.0)) +
+                             half * (2.0 + 0.2 * n) * static_cast<double>(program_.inputs.size()));
+    }
+    const double bytes = n * (load_.is_double ? 8.0 : 4.0);
+    const double packs = std::ceil(bytes / static_cast<double>(vector_bytes(load_.isa)));
+    return load_.voices * (packs <= 1.0 ? 11.0 : 10.0 + 6.0 * packs + 2.0 * n) +
+           3.0 * static_cast<double>(form.ports.size() - 1);
+  }
+
+  double operator()(const Modes& form) const {
+    return load_.voices * modal_ns(form.modes, static_cast<double>(form.places.size()),
+                                   static_cast<double>(form.outputs.size()),
+                                   static_cast<double>(form.pushes.size()), load_);
+  }
+
+  double operator()(const Grid& form) const {
+    const double slow = wide_ > 0.0 ? 1.0 : 2.3;
+    const double d = load_.is_double ? 1.0 : 0.0;
+    const double rest = static_cast<double>(form.rest_ends.size() + form.ports.size());
+    double sum = (3.5 + 1.5 * d) * rest + 10.0 * static_cast<double>(program_.taps.size());
+    for (const GridSegment& segment : form.segments) {
+      const double offsets = static_cast<double>(segment.offsets.size());
+      sum += 6.0 + 4.0 * d + slow * segment.count * (0.13 + 0.14 * d + (0.03 + 0.02 * d) * offsets);
+    }
+    for (const GridLinks& links : form.links) {
+      const bool is_cheap = program_.link_runs[links.run].law == Law::spring;
+      sum += slow * form.count * static_cast<double>(links.offsets.size()) * (0.24 + 0.21 * d) *
+             (is_cheap ? 0.8 : 1.2);
+    }
+    return load_.voices * sum;
+  }
+
+ private:
+  double heard_and_pushed(double each) const {
+    return each * static_cast<double>(program_.inputs.size() + program_.outputs.size());
+  }
+
+  const Program& program_;
+  const Load& load_;
+  double wide_;
+};
+
+}  // namespace
+
+double predicted_ns(const Program& program, const Load& load) {
+  return std::visit(Predictor(program, load), program.form);
+}
+
+double least_modal_ns(const Program& program, const Load& load) {
+  // Two links at one mass share its place, so each is counted as half of one.
+  return load.voices * modal_ns(program.moving, 0.5 * links_of(program).others,
+                                static_cast<double>(program.outputs.size()), 0.0, load);
+}
+
+}  // namespace ressort

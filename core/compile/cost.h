@@ -1,0 +1,24 @@
+// core/compile: what a kernel will cost, predicted from its tables.
+#pragma once
+
+#include "core/engine/isa.h"
+#include "core/engine/program.h"
+
+namespace ressort {
+
+// What the prediction is for.
+struct Load {
+  bool is_double = true;
+  Isa isa = Isa::base;
+  int voices = 1;
+};
+
+// Nanoseconds a sample for all voices in the form that the Program has, everything that can touch
+// touching all the time: what a block's budget has to hold. Fitted to measurements on one machine
+// (Zen 4 at 3.7 GHz), to about a quarter; what matters is the order of the forms.
+double predicted_ns(const Program& program, const Load& load);
+
+// The same for the modal form before it is known: what it will cost at least.
+double least_modal_ns(const Program& program, const Load& load);
+
+}  // namespace ressort
