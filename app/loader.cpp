@@ -34,7 +34,7 @@ class SceneReader {
     }
     scene_.path = *path;
     scene_.name = fs::path(*path).stem().string();
-    if (path->ends_with(".toml") ? read_preset() : read_model(*path, options_.third)) {
+    if (path->ends_with(".toml") ? read_preset() : read_model(*path, {.third = options_.third})) {
       if (!scene_.has_preset) {
         scene_.preset = default_preset(scene_.network, options_.bare);
       }
@@ -67,15 +67,17 @@ class SceneReader {
                        models_folder() + "'",
                    1, 1});
     }
-    return read_model(*model, options_.third ? options_.third : scene_.preset.third);
+    return options_.third
+               ? read_model(*model, {.third = options_.third})
+               : read_model(*model, {.third = scene_.preset.third, .third_by = "the preset says"});
   }
 
-  bool read_model(const std::string& path, std::optional<ThirdArgument> third) {
+  bool read_model(const std::string& path, const ReadOptions& options) {
     auto text = read_text(path, max_model_bytes);
     if (!text) {
       return fail("", "", text.error());
     }
-    ParsedNetwork parsed = parse_network(*text, {.third = third});
+    ParsedNetwork parsed = parse_network(*text, options);
     for (const Diagnostic& diagnostic : parsed.diagnostics) {
       out_.findings.push_back({path, diagnostic, line_of(*text, diagnostic.line)});
       if (diagnostic.severity == Severity::warning) {

@@ -93,6 +93,8 @@ TEST_CASE("who asks for a meaning gets it, whatever the text says", "[motion]") 
       CHECK(parsed.network.third == third);
       CHECK(parsed.network.masses[0].third == parse_network(text).network.masses[0].third);
       CHECK(parsed.motion.ends_with(", as was asked for"));
+      CHECK(parse_network(text, {.third = third, .third_by = "the preset says"})
+                .motion.ends_with(", as the preset says"));
     }
   }
 }

@@ -25,6 +25,7 @@ struct Diagnostic {
 struct ReadOptions {
   // What the third state argument means, whatever the text says or shows.
   std::optional<ThirdArgument> third;
+  std::string_view third_by = "was asked for";  // how ParsedNetwork::motion says who chose it
 };
 
 struct ParsedNetwork {

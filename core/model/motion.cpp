@@ -42,7 +42,7 @@ void Reader::choose_motion(ThirdArgument third, const std::string& why) {
 void Reader::decide_motion(const ReadOptions& options) {
   Network& network = out_.network;
   if (options.third) {
-    choose_motion(*options.third, "was asked for");
+    choose_motion(*options.third, std::string(options.third_by));
   } else if (said_) {
     choose_motion(*said_, line_of(said_line_) + " says");
   } else if (rests_at_zero(network)) {
