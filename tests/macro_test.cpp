@@ -11,6 +11,7 @@ namespace {
 
 using namespace rig;
 using told::check_error;
+using told::check_warning;
 
 constexpr auto delayed = ThirdArgument::delayed_position;
 constexpr auto velocity = ThirdArgument::velocity_per_second;
@@ -299,6 +300,15 @@ TEST_CASE("a place behind the arguments is taken off before they are counted", "
               "'posOutput' takes 1 argument (@MASS), found 2");
   check_error(macros + "@out1 posOutput [@s w]", 6, 21,
               "'w' is no parameter of this model; did you mean 'p'?");
+}
+
+TEST_CASE("a place beyond a macro's end is taken at the end, with a warning", "[macro]") {
+  const std::string models = "@s chain 5 1 1 0 0 0\n@q mesh 3 3 1 1 0 0 0\n";
+  const std::string beyond = "a place on a macro goes from 0 to 1; ";
+  check_warning(models + "@out1 posOutput [@s 1.5]", 3, 21, beyond + "'1.5' is taken as 1");
+  check_warning(models + "@out1 posOutput [@q 1 -0.1]", 3, 23, beyond + "'-0.1' is taken as 0");
+  check_warning(models + "@out1 posOutput @s 2", 3, 20, beyond + "'2' is taken as 1");
+  told::check_told(models + "@out1 posOutput [@q 0 1]", {});
 }
 
 TEST_CASE("places, grounds and hands start at rest where they are", "[macro]") {

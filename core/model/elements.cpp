@@ -442,6 +442,14 @@ std::optional<std::uint32_t> Reader::tap(const Line& line, const Token& token, c
     return std::nullopt;
   }
   Network& network = out_.network;
+  for (const Token& coordinate : coordinates) {
+    double number = 0.0;
+    if (parse_number(coordinate.text, number) && (number < 0.0 || number > 1.0)) {
+      warning(line, coordinate,
+              "a place on a macro goes from 0 to 1; " + quoted(coordinate.text) + " is taken as " +
+                  (number < 0.0 ? "0" : "1"));
+    }
+  }
   Mass point{.kind = MassKind::point, .tap = static_cast<std::uint32_t>(network.taps.size())};
   point.place = {line.number, token.column};
   network.taps.push_back({.macro = found->second,
