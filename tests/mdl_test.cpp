@@ -299,6 +299,12 @@ TEST_CASE("every error tells its line, its column and what was expected", "[mdl]
        "expected 0 (piecewise) or 1 (smooth) for the bow's profile"},
       {two_masses + "@p param 1\n@l nlBow @a @b 1 1 p", 4, 20,
        "expected 0 (piecewise) or 1 (smooth) for the bow's profile"},
+      {two_masses + "@K param 1\n@l spring @a @b K * 2", 4, 21,
+       "'spring' takes 3 to 4 arguments (@A @B K [Z]), found 5; an expression with blanks needs "
+       "brackets, [K * 2]"},
+      {two_masses + "@l springDamper @a @b 1 + 2", 3, 27,
+       "'springDamper' takes 3 to 4 arguments (@A @B K [Z]), found 5; an expression with blanks "
+       "needs brackets, [K * 2]"},
       {two_masses + "@in0 frcInput @a", 3, 1,
        "'frcInput' needs the label '@inN' with N from 1 to 64, found '@in0'"},
       {two_masses + "@in65 frcInput @a", 3, 1,

@@ -333,8 +333,6 @@ TEST_CASE("a plus adds, and a sum is scaled as a whole", "[rules]") {
   CHECK(link_value(network, 1) == 0.002 + 0.004 * 0.5);
   CHECK(link_value(linked("spring @a @b 1e+2"), 0) == 100.0);
   CHECK(link_value(linked("spring @a @b +p"), 0) == 0.5);
-  check_error(two_masses + "@l springDamper @a @b 1 + 2", 3, 27,
-              "'springDamper' takes 3 to 4 arguments (@A @B K [Z]), found 5");
   // At twice the rate a damping is half, both of its terms.
   const Program program = make_program(network, 88200.0, true);
   const LinkRun& run = program.link_runs.at(0);

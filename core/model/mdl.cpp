@@ -28,7 +28,7 @@ ParsedNetwork Reader::read(std::string_view text, const ReadOptions& options) {
     return std::move(out_);
   }
   int number = 0;
-  while (!text.empty()) {
+  while (!text.empty() && errors_ <= most_diagnostics) {
     const std::size_t end = std::min(text.find_first_of("\r\n"), text.size());
     read_line(text.substr(0, end), ++number);
     const bool pair = end + 1 < text.size() && text[end] == '\r' && text[end + 1] == '\n';
@@ -249,12 +249,18 @@ bool Reader::check_count(const Line& line) {
     const Token& last = found == 0 ? line.word : line.rest.back();
     place = {"", last.column + static_cast<int>(last.text.size())};
   }
+  const bool has_blanks =
+      found > most && std::any_of(line.rest.begin(), line.rest.end(), [](const Token& token) {
+        return token.text.size() == 1 &&
+               std::string_view("+-*/").find(token.text[0]) != std::string_view::npos;
+      });
   error(line, place,
         "'" + std::string(keyword.word) + "' takes " + std::to_string(least) +
             (most > least ? " to " + std::to_string(most) : "") +
             (most == 1 ? " argument (" : " arguments (") + std::string(keyword.arguments) +
             "), found " + std::to_string(found) +
-            (line.coordinates.empty() ? "" : " before the place on a macro"));
+            (line.coordinates.empty() ? "" : " before the place on a macro") +
+            (has_blanks ? "; an expression with blanks needs brackets, [K * 2]" : ""));
   return false;
 }
 
