@@ -81,10 +81,15 @@ void print_report(const Scene& scene, const Compiled& compiled) {
               counted(instrument.links, "link", "links").c_str(),
               counted(instrument.inputs.size(), "input", "inputs").c_str(),
               counted(static_cast<std::size_t>(instrument.outputs), "output", "outputs").c_str());
-  std::printf("a mass's motion is %s\n", scene.motion.c_str());
-  for (const ParameterInfo& info : instrument.parameters) {
-    std::printf("  %-12s %-10g from %g to %g\n", info.name.c_str(), info.value, info.minimum,
-                info.maximum);
+  std::printf("motion: %s\n", scene.motion.c_str());
+  for (std::size_t i = 0; i < instrument.parameters.size(); ++i) {
+    const ParameterInfo& info = instrument.parameters[i];
+    if (const int input = scene.network.parameters[i].audio_input; input > 0) {
+      std::printf("  %-12s is input %d, sample by sample\n", info.name.c_str(), input);
+    } else {
+      std::printf("  %-12s %-10g from %g to %g\n", info.name.c_str(), info.value, info.minimum,
+                  info.maximum);
+    }
   }
   std::printf("runs as\n  %s", describe(compiled.plan).c_str());
   if (instrument.mode) {

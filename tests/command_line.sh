@@ -65,13 +65,17 @@ model light.mdl '@m mass 0. 0. 0.\n'
 expect 2 "light.mdl:1:9: error: a mass must be above 0" "$program" check light.mdl
 expect 2 '"message": "a mass must be above 0' "$program" check light.mdl --json
 model motion.mdl '@m mass 1. 0. 5.\n@g ground 0.\n@r spring @m @g 0.1\n@out1 posOutput @m\n'
-expect 0 "a mass's motion is the position one sample before" "$program" check motion.mdl
+expect 0 "motion: the position one sample before" "$program" check motion.mdl
 expect 0 '"motion": "velocity"' "$program" check motion.mdl --json --motion velocity
 expect 2 "--motion" "$program" check motion.mdl --motion sideways
 model motion.toml 'model = "motion.mdl"\nmotion = "velocity"\n'
 expect 0 "~motion velocity" "$program" check motion.toml --print
+expect 0 "motion: a velocity in units per second, as the preset says" "$program" check motion.toml
+expect 0 "sample before, as was asked for" "$program" check motion.toml --motion delayed
 model motion.toml 'model = "motion.mdl"\nmotion = "sideways"\n'
 expect 2 "motion.toml:2:" "$program" check motion.toml
+model heard.mdl '@K audioParam @in2\n@o osc 1. K 0. 0. 0.\n@out1 posOutput @o\n'
+expect 0 "K            is input 2, sample by sample" "$program" check heard.mdl
 
 # Models as text again: what is printed is read, and printed the same.
 model other.mdl '@g ground 0.\n@a cel 1. .1 0.01 0. 0.\n@r spring @g @a 0.1 .001\n@out1 posOutput @a\n'
