@@ -42,11 +42,16 @@ json findings_json(const std::vector<Finding>& findings) {
 json scene_json(const Scene& scene, const Compiled& compiled) {
   const Instrument& instrument = compiled.instrument;
   json parameters = json::array();
-  for (const ParameterInfo& info : instrument.parameters) {
-    parameters.push_back({{"name", info.name},
-                          {"value", info.value},
-                          {"minimum", info.minimum},
-                          {"maximum", info.maximum}});
+  for (std::size_t i = 0; i < instrument.parameters.size(); ++i) {
+    const ParameterInfo& info = instrument.parameters[i];
+    if (const int input = scene.network.parameters[i].audio_input; input > 0) {
+      parameters.push_back({{"name", info.name}, {"input", input}});
+    } else {
+      parameters.push_back({{"name", info.name},
+                            {"value", info.value},
+                            {"minimum", info.minimum},
+                            {"maximum", info.maximum}});
+    }
   }
   json plan = json::array();
   for (const Part& part : compiled.plan.parts) {

@@ -76,6 +76,7 @@ model motion.toml 'model = "motion.mdl"\nmotion = "sideways"\n'
 expect 2 "motion.toml:2:" "$program" check motion.toml
 model heard.mdl '@K audioParam @in2\n@o osc 1. K 0. 0. 0.\n@out1 posOutput @o\n'
 expect 0 "K            is input 2, sample by sample" "$program" check heard.mdl
+expect 0 '"input": 2,' "$program" check heard.mdl --json
 
 # Models as text again: what is printed is read, and printed the same.
 model other.mdl '@g ground 0.\n@a cel 1. .1 0.01 0. 0.\n@r spring @g @a 0.1 .001\n@out1 posOutput @a\n'
