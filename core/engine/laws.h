@@ -54,7 +54,8 @@ static inline V pluck_force(V d, V v, V k, V s, V z) {
   const V far = absolute(d);
   const V tenth = k / 10;
   const V inner = -(k - tenth) * d;
-  const V outer = -sign(d) * (s / 10) * k + tenth * d;
+  const V hold = s / 10 * k;
+  const V outer = tenth * d - select(d < V{}, -hold, hold);
   return select(far < s, select(far < s / 10, inner, outer) + z * v, V{});
 }
 
@@ -67,7 +68,8 @@ static inline V bow_force(V v, V z, V s) {
   const V fast = absolute(v);
   const V third = z / 3;
   const V stick = (z - third) * v;
-  const V slip = sign(v) * (s / 3) * z - third * v;
+  const V most = s / 3 * z;
+  const V slip = select(v < V{}, -most, most) - third * v;
   return select(fast < s, select(fast < s / 3, stick, slip), V{});
 }
 
