@@ -192,6 +192,19 @@ TEST_CASE("a contact that lasts sounds as in the direct kernel", "[dense]") {
   }
 }
 
+TEST_CASE("larger bodies in contact sound as in the direct kernel", "[dense]") {
+  for (const int masses : {6, 11, 16}) {
+    for (const char* second_link : {"", "@rest contact @in1 @s_m3 0.02 0.001 1.\n"}) {
+      CAPTURE(masses, second_link);
+      const std::string text = scenes::string("s", masses, "0.1", "0.001") +
+                               "@in1 posInput 0.\n@hold nlBow @s_m2 @in1 0.02 5.\n" + second_link +
+                               scenes::output(1, "s_m1");
+      agree(dense(text), {.frames = second / 4, .reach = 0.02});
+      agree(dense(text), {.frames = second / 4, .reach = 0.02, .turns = true});
+    }
+  }
+}
+
 TEST_CASE("contacts that come and go end a block where they begin", "[dense]") {
   // The window before two builds of the direct kernel would part.
   agree(dense(held_triangle("contact @m_m1 @in1 0.05 0.01 0.")),

@@ -8,6 +8,7 @@ namespace ressort {
 namespace {
 
 constexpr std::size_t least_leap = 6;  // frames; fewer are walked
+constexpr std::size_t most_walk = 32;  // frames, before the next leap is tried
 
 // A port's law that is 0 nowhere makes every block a walk.
 bool acts_everywhere(Law law) {
@@ -63,7 +64,6 @@ class Arena {
 
 struct Layout {
   std::size_t stride;
-  std::size_t padded;
   std::span<const std::uint32_t> sources;
   std::span<const std::uint32_t> slots;
 };
@@ -75,8 +75,8 @@ void assemble(const Program& program, const Dense& form, const Layout& layout, U
   const std::span<const std::uint32_t> slots = layout.slots;
   const auto column = [&](std::size_t vector) { return matrix + vector * layout.stride; };
   U* const k_columns = column(own_vectors);
-  U* const kz_columns = column(own_vectors + layout.padded);
-  std::fill_n(matrix, (own_vectors + 2 * layout.padded + 2 * layout.sources.size()) * layout.stride,
+  U* const kz_columns = column(own_vectors + layout.stride);
+  std::fill_n(matrix, (own_vectors + 2 * layout.stride + 2 * layout.sources.size()) * layout.stride,
               U(0));
   for (const MassRun& run : program.mass_runs) {
     for (std::uint32_t node = run.first; node < run.first + run.count; ++node) {
@@ -101,8 +101,8 @@ void assemble(const Program& program, const Dense& form, const Layout& layout, U
     }
     const auto source = static_cast<std::size_t>(
         std::find(layout.sources.begin(), layout.sources.end(), other) - layout.sources.begin());
-    column(own_vectors + 2 * layout.padded + 2 * source)[mass] += k;
-    column(own_vectors + 2 * layout.padded + 2 * source + 1)[mass] += z;
+    column(own_vectors + 2 * layout.stride + 2 * source)[mass] += k;
+    column(own_vectors + 2 * layout.stride + 2 * source + 1)[mass] += z;
   };
   for (const DenseSpring& spring : form.springs) {
     const U k = value(spring.stiffness);
@@ -125,7 +125,6 @@ DenseKernel<T>::DenseKernel(const Program& program, const Dense& form, Isa isa)
   body_.masses = program.moving;
   const DensePacks packs = dense_packs(body_.masses, sizeof(T), isa);
   body_.stride = packs.count * packs.bytes / sizeof(T);
-  body_.padded = body_.stride <= 4 ? body_.stride : body_.masses;
   body_.columns = 2 * body_.masses + (form.has_constant ? 1 : 0);
   body_.rows = round_up(body_.columns, vector_bytes(isa) / sizeof(T));
   body_.fixed = program.position.size() - program.moving;
@@ -231,25 +230,28 @@ void DenseKernel<T>::allocate() {
   b.heard = heard_.data();
   sounding_.resize(b.signals);
   b.sounding = sounding_.data();
-  b.matrix_vectors = own_vectors + 2 * b.padded + 2 * b.sources;
-  const std::size_t heard_frames = dense_frames * b.outputs;
+  b.matrix_vectors = own_vectors + 2 * b.stride + 2 * b.sources;
   T* unit = nullptr;
   const auto lay_out = [&](T* memory) {
     Arena<T> arena(memory);
     arena.give(b.matrix, b.matrix_vectors * b.stride);
     arena.give(b.slope, b.matrix_vectors * b.stride);
+    arena.give(b.pace, b.matrix_vectors * b.stride);
     arena.give(unit, (b.pushes + b.ports) * b.stride);
+    arena.give(b.reach, (b.pushes + b.ports) * b.stride);
+    arena.give(b.echo, b.ports * b.stride);
     arena.give(b.state, b.rows);
     arena.give(b.force, b.stride);
     arena.give(b.port_force, b.ports);
     arena.give(b.x, b.stride + b.fixed);
     arena.give(b.v, b.stride + b.fixed);
-    arena.give(b.heard_table, b.columns * heard_frames);
+    arena.give(b.heard_table, b.columns * dense_frames * b.outputs);
     arena.give(b.port_table, b.ports * b.columns * dense_frames);
+    arena.give(b.port_bound, b.ports * b.rows);
     arena.give(b.jump, dense_powers * b.columns * b.rows);
-    arena.give(b.injection, b.signals * dense_frames * b.rows);
-    arena.give(b.heard_response, b.signals * 2 * heard_frames);
-    arena.give(b.port_response, b.signals * b.ports * 2 * dense_frames);
+    arena.give(b.injection, b.signals * driven_frames * b.rows);
+    arena.give(b.heard_response, b.signals * 2 * driven_frames * b.outputs);
+    arena.give(b.port_response, b.signals * b.ports * 2 * driven_frames);
     arena.give(b.scratch, dense_scratch_size(b));
     return arena.used();
   };
@@ -292,8 +294,9 @@ void DenseKernel<T>::reset(std::size_t) {
     body_.state[2 * body_.masses] = T(1);
   }
   std::fill_n(body_.force, body_.stride, T(0));
+  std::fill_n(body_.port_force, body_.ports, T(0));
   body_.touches = false;
-  has_force_ = true;
+  body_.has_force = true;
   is_settled_ = false;
 }
 
@@ -331,7 +334,7 @@ void DenseKernel<T>::play(const Block<T>& block) {
 // The matrices are sums of coefficients, so they move as straight as these do.
 template <class T>
 void DenseKernel<T>::walk_ramp(const DenseDrive<T>& drive, std::size_t frames) {
-  const Layout layout{body_.stride, body_.padded, sources_, slots_};
+  const Layout layout{body_.stride, sources_, slots_};
   const Coefficients<T>& c = this->coefficients;
   refresh_force();
   assemble(program_, form_, layout, body_.matrix, true,
@@ -350,7 +353,7 @@ void DenseKernel<T>::walk_ramp(const DenseDrive<T>& drive, std::size_t frames) {
 
 template <class T>
 void DenseKernel<T>::follow_coefficients() {
-  const Layout layout{body_.stride, body_.padded, sources_, slots_};
+  const Layout layout{body_.stride, sources_, slots_};
   const Aligned<T>& value = this->coefficients.value;
   if (is_settled_ && std::equal(value.begin(), value.end(), known_.begin())) {
     return;
@@ -359,47 +362,79 @@ void DenseKernel<T>::follow_coefficients() {
   assemble(program_, form_, layout, body_.matrix, true, [&](std::uint32_t i) { return value[i]; });
   if (!std::equal(value.begin(), value.end(), known_.begin())) {
     std::copy(value.begin(), value.end(), known_.begin());
+    assemble(program_, form_, layout, body_.exact, true,
+             [&](std::uint32_t i) { return static_cast<double>(known_[i]); });
+    make_pace();
     has_tables_ = false;
   }
   is_settled_ = false;
 }
 
 template <class T>
+void DenseKernel<T>::make_pace() {
+  const std::size_t stride = body_.stride;
+  const double* const exact = body_.exact;
+  const double* const own_k = exact + stride;
+  const double* const own_z = own_k + stride;
+  const double* const weight = own_z + stride;
+  const auto by_v = [&](std::size_t column, std::size_t r) {
+    const double own = r == column ? own_k[r] + own_z[r] : 0.0;
+    return exact[r] * (exact[(own_vectors + stride + column) * stride + r] - own);
+  };
+  for (std::size_t r = 0; r < stride; ++r) {
+    const auto put = [&](std::size_t vector, double value) {
+      body_.pace[vector * stride + r] = static_cast<T>(value);
+    };
+    put(3, -exact[r] * weight[r]);
+    for (std::size_t column = 0; column < stride; ++column) {
+      const std::size_t vector = own_vectors + column;
+      put(vector, exact[r] * (exact[vector * stride + r] - (r == column ? own_k[r] : 0.0)));
+      put(vector + stride, by_v(column, r));
+    }
+    for (std::size_t vector = own_vectors + 2 * stride; vector < body_.matrix_vectors; ++vector) {
+      put(vector, exact[r] * exact[vector * stride + r]);
+    }
+    for (std::size_t unit = 0; unit < body_.pushes + body_.ports; ++unit) {
+      body_.reach[unit * stride + r] =
+          static_cast<T>(exact[r] * static_cast<double>(body_.unit[unit * stride + r]));
+    }
+    for (std::size_t p = 0; p < body_.ports; ++p) {
+      const T* const unit = body_.unit + (body_.pushes + p) * stride;
+      double reached = exact[r] * static_cast<double>(unit[r]);
+      for (std::size_t k = 0; k < stride; ++k) {
+        reached += by_v(k, r) * exact[k] * static_cast<double>(unit[k]);
+      }
+      body_.echo[p * stride + r] = static_cast<T>(reached);
+    }
+  }
+}
+
+template <class T>
 void DenseKernel<T>::play(const DenseDrive<T>& drive, std::size_t at, std::size_t end) {
-  const Layout layout{body_.stride, body_.padded, sources_, slots_};
   while (at < end) {
-    const std::size_t count = std::min(end - at, dense_frames);
-    const bool leaps = can_leap_ && !body_.touches && count >= least_leap;
-    std::size_t walked = count;
+    const bool leaps = can_leap_ && !body_.touches && end - at >= least_leap;
     if (leaps && is_settled_) {
       if (!has_tables_) {
-        assemble(program_, form_, layout, body_.exact, true,
-                 [&](std::uint32_t i) { return static_cast<double>(known_[i]); });
         steps_.build(body_);
         has_tables_ = true;
       }
-      const std::size_t leapt = steps_.leap(body_, drive, at, count);
-      has_force_ &= leapt == 0;
+      const std::size_t leapt = steps_.leap(body_, drive, at, std::min(end - at, dense_frames));
+      body_.has_force &= leapt == 0;
       at += leapt;
-      walked = count - leapt;
-    } else if (leaps) {
-      walked = 1;
+      continue;
     }
-    if (walked > 0) {
-      refresh_force();
-      steps_.walk(body_, drive, at, walked, false);
-      is_settled_ = true;
-      at += walked;
-    }
+    const std::size_t walked = std::min(end - at, leaps ? 1 : most_walk);
+    steps_.walk(body_, drive, at, walked, false);
+    is_settled_ = true;
+    at += walked;
   }
 }
 
 // A leap leaves no forces behind. What acts next must still be by the matrices of its own sample.
 template <class T>
 void DenseKernel<T>::refresh_force() {
-  if (!has_force_) {
+  if (!body_.has_force) {
     steps_.pull(body_);
-    has_force_ = true;
   }
 }
 

@@ -3,18 +3,20 @@
 // Between contacts the body is linear: with its state s (positions and velocities), what is heard
 // for the next dense_frames samples is a product of s with rows C A^k, time in the lanes, plus
 // impulse responses where a force or a hand acts; then s jumps by A^dense_frames. Links of any
-// other law are ports: their free motion over the block is computed first, and if one of them
-// comes into the zone where its law acts, the block ends there ("leap"). From there on, and while
-// coefficients move, the body goes sample by sample, with the masses in the lanes ("walk").
+// other law are ports: unless a bound shows that they stay away, their free motion over the block
+// is computed first, and if one of them comes into the zone where its law acts, the block ends
+// there ("leap"). From there on, and while coefficients move, the body goes sample by sample, with
+// the masses in the lanes ("walk").
 #pragma once
 
 #include "core/engine/kernel.h"
 
 namespace ressort {
 
-inline constexpr std::size_t dense_frames = 32;  // of a leap; at most
-inline constexpr std::size_t dense_powers = 6;   // of A: 1, 2, 4 ... dense_frames
-inline constexpr std::size_t dense_pad = 8;      // numbers beyond a row that a pack may write
+inline constexpr std::size_t dense_frames = 64;   // of a leap; at most
+inline constexpr std::size_t driven_frames = 32;  // of a leap with forces: their work is quadratic
+inline constexpr std::size_t dense_powers = 7;    // of A: 1, 2, 4 ... dense_frames
+inline constexpr std::size_t dense_pad = 8;       // numbers beyond a row that a pack may write
 
 inline constexpr std::size_t own_vectors = 4;  // of DenseBody::matrix, before its columns
 
@@ -52,7 +54,6 @@ template <class T>
 struct DenseBody {
   std::size_t masses = 0;
   std::size_t stride = 0;   // masses, rounded up to the packs of a walk
-  std::size_t padded = 0;   // columns of K in `matrix`: masses, or stride if that is at most 4
   std::size_t columns = 0;  // of the state: x, v of each mass; and 1 if something is constant
   std::size_t rows = 0;     // columns, rounded up to the widest packs
   std::size_t fixed = 0;    // nodes that are no masses
@@ -78,23 +79,29 @@ struct DenseBody {
   T* matrix = nullptr;
   T* slope = nullptr;  // per sample, while coefficients move; with -Z instead of -(K + Z)
   bool damping_moves = false;
-  double* exact = nullptr;  // the same as `matrix`, for the tables
+  double* exact = nullptr;  // the same as `matrix`, for what is made of it
+  // While coefficients stand: `exact` over M, the own stiffness and damping being in the columns.
+  T* pace = nullptr;
+  T* reach = nullptr;  // [push or port][stride] `unit` over M
+  T* echo = nullptr;   // [port][stride] what a port's force does to the velocity after the next
 
   T* state = nullptr;       // [rows]
-  T* force = nullptr;       // [stride] for the next sample
+  T* force = nullptr;       // [stride] for the next sample, if has_force
   T* port_force = nullptr;  // [port] the last one
+  bool has_force = false;   // else it is the springs' by `matrix`, and the ports' last ones
   T* x = nullptr;           // [slot], of masses only while walking
   T* v = nullptr;
-  bool touches = false;  // a port's force waits for the next sample
+  bool touches = false;  // a port's force waits for the next sample, or begins there
 
   // Of a leap. The responses have zeros in front of them, as many as they are long.
   T* heard_table = nullptr;      // [column][frame * outputs + output]
   T* port_table = nullptr;       // [port][column][frame] of the difference that the law asks for
+  T* port_bound = nullptr;       // [port][row] no less than any frame of a column is
   T* jump = nullptr;             // [power][column][row] A^(2^power) - 1
-  T* injection = nullptr;        // [signal][dense_frames - 1 - frame][row] the state so much later
+  T* injection = nullptr;        // [signal][driven_frames - 1 - frame][row] the state so much later
   const T** sounding = nullptr;  // [signal] over the present leap, or null
-  T* heard_response = nullptr;   // [signal][2 * frames * outputs]
-  T* port_response = nullptr;    // [signal][port][2 * frames]
+  T* heard_response = nullptr;   // [signal][2 * driven_frames * outputs]
+  T* port_response = nullptr;    // [signal][port][2 * driven_frames]
   T* scratch = nullptr;          // dense_scratch_size()
   double* build = nullptr;       // for making the tables
 };
@@ -118,7 +125,7 @@ template <class T>
 std::size_t dense_build_size(const DenseBody<T>& body) {
   const std::size_t observed = body.outputs + body.ports;
   return 2 * body.columns * body.rows + observed * body.columns * (dense_frames + dense_pad) +
-         body.signals * dense_frames * body.rows;
+         body.signals * driven_frames * body.rows;
 }
 
 template <class T>
@@ -126,9 +133,10 @@ struct DenseSteps {
   // Frames [at, at + count) sample by sample; `moves`: coefficients are on their way.
   void (*walk)(DenseBody<T>& body, const DenseDrive<T>& drive, std::size_t at, std::size_t count,
                bool moves);
-  // The springs' forces of the last sample, after a leap.
+  // The forces of the last sample, where there are none.
   void (*pull)(DenseBody<T>& body);
-  // At most `count` <= dense_frames frames from `at` on, up to the first contact. Gives how many.
+  // At most `count` <= dense_frames frames from `at` on, up to the first contact, which makes the
+  // body touch; fewer if forces act. Gives how many.
   std::size_t (*leap)(DenseBody<T>& body, const DenseDrive<T>& drive, std::size_t at,
                       std::size_t count);
   // The tables of a leap from `exact`. Of the order of (2 masses)^3 dense_powers operations.
@@ -201,6 +209,7 @@ class DenseKernel final : public Kernel<T> {
   DenseDrive<T> arrange(const Block<T>& block);
   void walk_ramp(const DenseDrive<T>& drive, std::size_t frames);
   void follow_coefficients();
+  void make_pace();
   void play(const DenseDrive<T>& drive, std::size_t at, std::size_t end);
   void refresh_force();
 
@@ -222,8 +231,7 @@ class DenseKernel final : public Kernel<T> {
   Aligned<T> arranged_;    // [input][value, velocity][max_block_frames]
   bool can_leap_ = true;   // no port's law acts everywhere
   bool has_tables_ = false;
-  bool has_force_ = false;   // body_.force is that of the state
-  bool is_settled_ = false;  // ... by the coefficients of now
+  bool is_settled_ = false;  // the next sample's forces are by the coefficients of now
 };
 
 }  // namespace ressort

@@ -71,7 +71,7 @@ struct Build {
       double* const of_x = power + k * b.rows;
       double* const of_v = power + (n + k) * b.rows;
       const double* const stiff = vector(own_vectors + k);
-      const double* const both = vector(own_vectors + b.padded + k);
+      const double* const both = vector(own_vectors + b.stride + k);
       for (std::size_t r = 0; r < n; ++r) {
         of_x[r] = of_x[n + r] = (stiff[r] - (r == k ? own_k[k] : 0.0)) * b.exact[r];
         of_v[n + r] = (both[r] - stiff[r] - (r == k ? own_z[k] : 0.0)) * b.exact[r];
@@ -84,9 +84,9 @@ struct Build {
         double pull = -weight[r];
         for (std::size_t i = 0; i < b.sources; ++i) {
           if (!is_hand(b.source[i])) {
-            pull += vector(own_vectors + 2 * b.padded + 2 * i)[r] *
+            pull += vector(own_vectors + 2 * b.stride + 2 * i)[r] *
                     static_cast<double>(b.x[b.source[i]]);
-            pull += vector(own_vectors + 2 * b.padded + 2 * i + 1)[r] *
+            pull += vector(own_vectors + 2 * b.stride + 2 * i + 1)[r] *
                     static_cast<double>(b.v[b.source[i]]);
           }
         }
@@ -134,7 +134,7 @@ struct Build {
     }
     for (std::size_t s = 0; s < b.signals; ++s) {
       const DenseSignal& signal = b.signal[s];
-      double* const at = injected + s * dense_frames * b.rows;
+      double* const at = injected + s * driven_frames * b.rows;
       for (std::size_t r = 0; r < b.rows; ++r) {
         at[r] = 0.0;
       }
@@ -143,7 +143,7 @@ struct Build {
       for (std::size_t r = 0; r < b.masses; ++r) {
         const double force = is_force
                                  ? (r == signal.at ? 1.0 : 0.0)
-                                 : vector(own_vectors + 2 * b.padded + 2 * signal.at + late)[r];
+                                 : vector(own_vectors + 2 * b.stride + 2 * signal.at + late)[r];
         at[r] = at[b.masses + r] = force * b.exact[r];
       }
     }
@@ -158,8 +158,8 @@ struct Build {
                 b.columns, 1.0, rows + c * row_length + known, known);
       }
     }
-    for (std::size_t s = 0; s < b.signals; ++s) {
-      double* const states = injected + s * dense_frames * b.rows;
+    for (std::size_t s = 0; s < b.signals && known < driven_frames; ++s) {
+      double* const states = injected + s * driven_frames * b.rows;
       for (std::size_t n = 0; n < known; ++n) {
         combine(states + n * b.rows, power, b.rows, states + n * b.rows, std::size_t(1), b.columns,
                 1.0, states + (n + known) * b.rows, b.rows);
@@ -200,20 +200,27 @@ struct Build {
       for (std::size_t n = 0; n < dense_frames; ++n) {
         b.port_table[i * dense_frames + n] = static_cast<T>(from[n]);
       }
+      double most = 0.0;
+      for (std::size_t n = 0; n < dense_frames; ++n) {
+        const double moved = from[n] < 0.0 ? -from[n] : from[n];
+        most = moved > most ? moved : most;
+      }
+      // A little more, for what is rounded away in a sum of them.
+      b.port_bound[i / b.columns * b.rows + i % b.columns] = static_cast<T>(1.001 * most);
     }
   }
 
   void keep_responses() {
-    for (std::size_t i = 0; i < b.signals * dense_frames * b.rows; ++i) {
+    for (std::size_t i = 0; i < b.signals * driven_frames * b.rows; ++i) {
       const std::size_t row = i % b.rows;
-      const std::size_t frame = i / b.rows % dense_frames;
+      const std::size_t frame = i / b.rows % driven_frames;
       const std::size_t first = i - row - frame * b.rows;
-      b.injection[first + (dense_frames - 1 - frame) * b.rows + row] = static_cast<T>(injected[i]);
+      b.injection[first + (driven_frames - 1 - frame) * b.rows + row] = static_cast<T>(injected[i]);
     }
-    const std::size_t length = dense_frames * b.outputs;
+    const std::size_t length = driven_frames * b.outputs;
     for (std::size_t s = 0; s < b.signals; ++s) {
-      for (std::size_t n = 0; n < dense_frames; ++n) {
-        const T* const state = b.injection + ((s + 1) * dense_frames - 1 - n) * b.rows;
+      for (std::size_t n = 0; n < driven_frames; ++n) {
+        const T* const state = b.injection + ((s + 1) * driven_frames - 1 - n) * b.rows;
         T* const heard = b.heard_response + s * 2 * length + length + n * b.outputs;
         for (std::size_t o = 0; o < b.outputs; ++o) {
           heard[o] = state[b.heard[o]];
@@ -222,7 +229,7 @@ struct Build {
           const DenseLink& port = b.port[p];
           const T moved = (port.a_moves ? state[entry_of(port, port.a)] : T(0)) -
                           (port.b_moves ? state[entry_of(port, port.b)] : T(0));
-          b.port_response[(s * b.ports + p) * 2 * dense_frames + dense_frames + n] = moved;
+          b.port_response[((s * b.ports + p) * 2 + 1) * driven_frames + n] = moved;
         }
       }
     }

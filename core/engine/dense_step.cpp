@@ -1,5 +1,6 @@
 // The walks of the dense kernel, compiled for each instruction set.
 #include <type_traits>
+#include <utility>
 
 #include "core/engine/dense.h"
 #include "core/engine/dense_packs.h"
@@ -8,20 +9,20 @@
 namespace ressort::RESSORT_ISA {
 namespace {
 
-// The ports' forces of a sample, given to `add(port, force)`. `first` is the x of mass 0.
-template <class T>
-struct AnyPorts {
-  template <class Add>
-  void operator()(const DenseBody<T>& b, T, T, Add&& add) const {
-    for (std::size_t p = 0; p < b.ports; ++p) {
-      const DenseLink& port = b.port[p];
-      const T d = b.x[port.a] - b.x[port.b];
-      const T v = b.v[port.a] - b.v[port.b];
-      const auto c = [&](std::size_t i) { return b.ramps.value[port.coefficients[i]]; };
-      with_law<T>(port.law, c(0), c(1), c(2), c(3), c(4), [&](auto&& law) { add(p, law(d, v)); });
-    }
+// The ports' forces of a sample, given to `add(port, force)`.
+template <class T, class Add>
+inline void each_port(const DenseBody<T>& b, Add&& add) {
+  for (std::size_t p = 0; p < b.ports; ++p) {
+    const DenseLink& port = b.port[p];
+    const T d = b.x[port.a] - b.x[port.b];
+    const T v = b.v[port.a] - b.v[port.b];
+    const auto c = [&](std::size_t i) { return b.ramps.value[port.coefficients[i]]; };
+    with_law<T>(port.law, c(0), c(1), c(2), c(3), c(4), [&](auto&& law) { add(p, law(d, v)); });
   }
-};
+}
+
+// Any number of ports, in memory.
+struct AnyPorts {};
 
 // The same for one port whose law is chosen already, and whose mass is in a register.
 template <class T, class ForceLaw>
@@ -29,12 +30,12 @@ struct OnePort {
   ForceLaw law;
   std::uint32_t other;
   T by;  // -1 if mass 0 is its b
-
-  template <class Add>
-  void operator()(const DenseBody<T>& b, T x, T v, Add&& add) const {
-    add(std::size_t(0), law(by * x - by * b.x[other], by * v - by * b.v[other]));
-  }
 };
+
+template <std::size_t k, class V, std::size_t... lane>
+inline V spread(V pack, std::index_sequence<lane...>) {
+  return __builtin_shufflevector(pack, pack, (lane * 0 + k)...);
+}
 
 // Count packs for every vector of masses. They stay in registers only where all is inlined.
 template <class T, std::size_t Bytes, std::size_t Count>
@@ -59,35 +60,37 @@ struct Walk {
       store<V>(to + c * lanes, a.pack[c]);
     }
   }
-  // sum += column * by
-  [[gnu::always_inline]] static void add(Vector& sum, const T* column, T by) {
+  // sum += column * by, which is a number or the same one in a whole pack
+  template <class By>
+  [[gnu::always_inline]] static void add(Vector& sum, const T* column, By by) {
     for (std::size_t c = 0; c < Count; ++c) {
       sum.pack[c] += load<V>(column + c * lanes) * by;
     }
   }
-  // sum += columns * by, one number for each column; in memory they are `in_memory`.
+  // sum += columns * by, one number for each column. From register to register, and in two chains:
+  // this is what the next sample waits for.
   [[gnu::always_inline]] static void add_columns(Vector& sum, const DenseBody<T>& b,
-                                                 const T* columns, const Vector& by,
-                                                 const T* in_memory) {
-    if constexpr (stride <= 4) {
-      // From register to register, and in two chains: this is what the next sample waits for.
-      Vector other{};
-      for (std::size_t k = 0; k < stride; k += 2) {
-        add(sum, columns + k * stride, by.pack[k / lanes][k % lanes]);
-        add(other, columns + (k + 1) * stride, by.pack[(k + 1) / lanes][(k + 1) % lanes]);
+                                                 const T* columns, const Vector& by) {
+    Vector other{};
+    for (std::size_t c = 0; c < Count; ++c) {
+      if (Count > 4 && c * lanes >= b.masses) {
+        break;
       }
-      for (std::size_t c = 0; c < Count; ++c) {
-        sum.pack[c] += other.pack[c];
+      const T* const of_pack = columns + c * lanes * stride;
+      [&]<std::size_t... k>(std::index_sequence<k...>) {
+        (add(k % 2 == 0 ? sum : other, of_pack + k * stride,
+             spread<k>(by.pack[c], std::make_index_sequence<lanes>())),
+         ...);
       }
-    } else {
-      for (std::size_t k = 0; k < b.masses; ++k) {
-        add(sum, columns + k * stride, in_memory[k]);
-      }
+      (std::make_index_sequence<lanes>());
+    }
+    for (std::size_t c = 0; c < Count; ++c) {
+      sum.pack[c] += other.pack[c];
     }
   }
   [[gnu::always_inline]] static void add_sources(Vector& sum, const DenseBody<T>& b,
                                                  const T* matrix) {
-    const T* column = matrix + (own_vectors + 2 * b.padded) * stride;
+    const T* column = matrix + (own_vectors + 2 * stride) * stride;
     for (std::size_t i = 0; i < b.sources; ++i) {
       add(sum, column, b.x[b.source[i]]);
       add(sum, column + stride, b.v[b.source[i]]);
@@ -122,20 +125,21 @@ struct Walk {
     for (std::size_t c = 0; c < Count; ++c) {
       before.pack[c] -= v.pack[c];
     }
-    T x[stride];
-    put(x, before);
     const T* const k = b.matrix + own_vectors * stride;
-    add_columns(force, b, k, before, x);
-    add_columns(force, b, k + b.padded * stride, v, b.v);
+    add_columns(force, b, k, before);
+    add_columns(force, b, k + stride * stride, v);
     add_sources(force, b, b.matrix);
+    for (std::size_t p = 0; p < b.ports; ++p) {
+      add(force, b.unit + (b.pushes + p) * stride, b.port_force[p]);
+    }
     put(b.force, force);
+    b.has_force = true;
   }
 
   // What a walk reads and never writes, apart from the body: what is stored cannot mean it.
   static DenseBody<T> constants(const DenseBody<T>& b) {
     DenseBody<T> c;
     c.masses = b.masses;
-    c.padded = b.padded;
     c.hands = b.hands;
     c.pushes = b.pushes;
     c.outputs = b.outputs;
@@ -150,6 +154,9 @@ struct Walk {
     c.ramps = b.ramps;
     c.matrix = b.matrix;
     c.slope = b.slope;
+    c.pace = b.pace;
+    c.reach = b.reach;
+    c.echo = b.echo;
     c.damping_moves = b.damping_moves;
     c.state = b.state;
     c.force = b.force;
@@ -184,95 +191,189 @@ struct Walk {
     }
   }
 
+  // Hands move their slots to sample n.
+  [[gnu::always_inline]] static void hold(const DenseBody<T>& b, const DenseDrive<T>& drive,
+                                          std::size_t n) {
+    for (std::size_t i = 0; i < b.hands; ++i) {
+      b.x[b.hand[i].slot] = drive.value[b.hand[i].input * max_block_frames + n];
+      b.v[b.hand[i].slot] = drive.velocity[b.hand[i].input * max_block_frames + n];
+    }
+  }
+  [[gnu::always_inline]] static void hear(const DenseBody<T>& b, const DenseDrive<T>& drive,
+                                          std::size_t n) {
+    for (std::size_t o = 0; o < b.outputs; ++o) {
+      drive.outputs[n * b.outputs + o] = b.x[b.heard[o]];
+    }
+  }
+  static void finish(DenseBody<T>& body) {
+    body.touches = false;
+    for (std::size_t p = 0; p < body.ports; ++p) {
+      body.touches |= body.port_force[p] != T(0);
+    }
+    for (std::size_t i = 0; i < body.masses; ++i) {
+      body.state[i] = body.x[i];
+      body.state[body.masses + i] = body.v[i];
+    }
+  }
+
   // K x' + Z v' = K x + (K + Z) v' with x' = x + v': only the velocities of a sample are waited
-  // for before the next one. A port's force reaches the next velocity without the springs' detour.
-  template <bool moves, class Ports>
-  static void walk(DenseBody<T>& body, const DenseDrive<T>& block, std::size_t at,
-                   std::size_t count, const Ports& all_ports) {
+  // for before the next one.
+  static void walk_ramp(DenseBody<T>& body, const DenseDrive<T>& block, std::size_t at,
+                        std::size_t count) {
     DenseBody<T> b = constants(body);
     const DenseDrive<T> drive = block;
-    const Ports ports = all_ports;
     begin(b);
     const T* const k = b.matrix + own_vectors * stride;
-    const T* const kz = k + b.padded * stride;
+    const T* const kz = k + stride * stride;
     Vector x = vector(b.x);
     Vector v = vector(b.v);
     Vector force = vector(b.force);
-    T steps = moves ? T(1) : T(0);
-    Vector next = next_velocity<moves>(b, x, v, force, steps);
+    T steps = T(1);
+    Vector next = next_velocity<true>(b, x, v, force, steps);
     for (std::size_t n = at; n < at + count; ++n) {
-      if constexpr (moves) {
-        advance(b.ramps);
-      }
-      const Vector inverse_mass = own<moves>(b, 0, steps);
+      advance(b.ramps);
+      const Vector inverse_mass = own<true>(b, 0, steps);
       for (std::size_t i = 0; i < b.pushes; ++i) {
         push(next, b, i, inverse_mass, drive.value[b.push[i].input * max_block_frames + n]);
       }
       force = Vector{};
-      add_columns(force, b, k, x, b.x);
+      add_columns(force, b, k, x);
       v = next;
       for (std::size_t c = 0; c < Count; ++c) {
         x.pack[c] += v.pack[c];
       }
       put(b.x, x);
       put(b.v, v);
-      for (std::size_t i = 0; i < b.hands; ++i) {
-        b.x[b.hand[i].slot] = drive.value[b.hand[i].input * max_block_frames + n];
-        b.v[b.hand[i].slot] = drive.velocity[b.hand[i].input * max_block_frames + n];
-      }
-      add_columns(force, b, kz, v, b.v);
+      hold(b, drive, n);
+      add_columns(force, b, kz, v);
       add_sources(force, b, b.matrix);
-      if constexpr (moves) {
-        Vector rise{};
-        add_columns(rise, b, b.slope + own_vectors * stride, x, b.x);
-        if (b.damping_moves) {
-          add_columns(rise, b, b.slope + (own_vectors + b.padded) * stride, v, b.v);
-        }
-        add_sources(rise, b, b.slope);
-        for (std::size_t c = 0; c < Count; ++c) {
-          force.pack[c] += rise.pack[c] * steps;
-        }
-        steps += T(1);
+      Vector rise{};
+      add_columns(rise, b, b.slope + own_vectors * stride, x);
+      if (b.damping_moves) {
+        add_columns(rise, b, b.slope + (own_vectors + stride) * stride, v);
       }
-      next = next_velocity<moves>(b, x, v, force, steps);
-      const Vector next_inverse_mass = own<moves>(b, 0, steps);
-      ports(b, x.pack[0][0], v.pack[0][0], [&](std::size_t p, T pulled) {
+      add_sources(rise, b, b.slope);
+      for (std::size_t c = 0; c < Count; ++c) {
+        force.pack[c] += rise.pack[c] * steps;
+      }
+      steps += T(1);
+      next = next_velocity<true>(b, x, v, force, steps);
+      const Vector next_inverse_mass = own<true>(b, 0, steps);
+      each_port(b, [&](std::size_t p, T pulled) {
         b.port_force[p] = pulled;
         push(next, b, b.pushes + p, next_inverse_mass, pulled);
       });
-      for (std::size_t o = 0; o < b.outputs; ++o) {
-        drive.outputs[n * b.outputs + o] = b.x[b.heard[o]];
-      }
+      hear(b, drive, n);
     }
-    body.touches = false;
     for (std::size_t p = 0; p < b.ports; ++p) {
-      body.touches |= b.port_force[p] != T(0);
       add(force, b.unit + (b.pushes + p) * stride, b.port_force[p]);
     }
     put(b.force, force);
-    for (std::size_t i = 0; i < b.masses; ++i) {
-      b.state[i] = b.x[i];
-      b.state[b.masses + i] = b.v[i];
+    body.has_force = true;
+    finish(body);
+  }
+
+  // The velocity after v, where x was one sample before v; but for what pushes. Few columns have
+  // chains of their own: x is known earlier, and v is what everything waits for.
+  [[gnu::always_inline]] static Vector velocity_after(const DenseBody<T>& b, const Vector& x,
+                                                      const Vector& v) {
+    Vector pull = vector(b.pace + 3 * stride);
+    Vector after = v;
+    add_sources(pull, b, b.pace);
+    add_columns(pull, b, b.pace + own_vectors * stride, x);
+    add_columns(after, b, b.pace + (own_vectors + stride) * stride, v);
+    for (std::size_t c = 0; c < Count; ++c) {
+      after.pack[c] += pull.pack[c];
     }
+    return after;
+  }
+
+  // While coefficients stand. `next` is the next velocity without the ports' forces f. These reach
+  // the velocity after that along `echo`, beside the matrices' way: so that a force waits for the
+  // force before it, and the masses for the masses, but not one for the other.
+  template <class Ports>
+  static void walk(DenseBody<T>& body, const DenseDrive<T>& block, std::size_t at,
+                   std::size_t count, const Ports& all_ports) {
+    constexpr bool is_one = !std::is_same_v<Ports, AnyPorts>;
+    const DenseBody<T> b = constants(body);
+    const DenseDrive<T> drive = block;
+    const Ports ports = all_ports;
+    begin(b);
+    Vector x = vector(b.x);
+    Vector v = vector(b.v);
+    Vector next;
+    if (body.has_force) {
+      next = next_velocity<false>(b, x, v, vector(b.force), T(0));
+      for (std::size_t p = 0; p < b.ports; ++p) {
+        b.port_force[p] = T(0);  // is in `force`
+      }
+    } else {
+      Vector before = x;
+      for (std::size_t c = 0; c < Count; ++c) {
+        before.pack[c] -= v.pack[c];
+      }
+      next = velocity_after(b, before, v);
+    }
+    const T* const reach = b.reach + b.pushes * stride;
+    T pulled = is_one ? b.port_force[0] : T(0);
+    for (std::size_t n = at; n < at + count; ++n) {
+      for (std::size_t i = 0; i < b.pushes; ++i) {
+        add(next, b.reach + i * stride, drive.value[b.push[i].input * max_block_frames + n]);
+      }
+      hold(b, drive, n);
+      Vector after = velocity_after(b, x, next);
+      v = next;
+      T force = T(0);
+      if constexpr (is_one) {
+        const T lead = ports.by * reach[0] * pulled;
+        const T d = ports.by * (x.pack[0][0] + next.pack[0][0] - b.x[ports.other]);
+        const T speed = ports.by * (next.pack[0][0] - b.v[ports.other]);
+        force = ports.law(d + lead, speed + lead);
+        add(v, reach, pulled);
+        add(after, b.echo, pulled);
+      } else {
+        for (std::size_t p = 0; p < b.ports; ++p) {
+          add(v, reach + p * stride, b.port_force[p]);
+          add(after, b.echo + p * stride, b.port_force[p]);
+        }
+      }
+      for (std::size_t c = 0; c < Count; ++c) {
+        x.pack[c] += v.pack[c];
+      }
+      put(b.x, x);
+      put(b.v, v);
+      if constexpr (is_one) {
+        pulled = force;
+      } else {
+        each_port(b, [&](std::size_t p, T now) { b.port_force[p] = now; });
+      }
+      hear(b, drive, n);
+      next = after;
+    }
+    if constexpr (is_one) {
+      b.port_force[0] = pulled;
+    }
+    body.has_force = false;
+    finish(body);
   }
 
   static void step(DenseBody<T>& b, const DenseDrive<T>& drive, std::size_t at, std::size_t count,
                    bool moves) {
     if (moves) {
-      return walk<true>(b, drive, at, count, AnyPorts<T>{});
+      return walk_ramp(b, drive, at, count);
     }
-    if constexpr (stride <= 4) {
+    if constexpr (Count <= 2) {
       if (b.ports == 1) {
         const DenseLink& port = b.port[0];
         const std::uint32_t other = port.a == 0 ? port.b : port.a;
         const T by = port.a == 0 ? T(1) : T(-1);
         const auto c = [&](std::size_t i) { return b.ramps.value[port.coefficients[i]]; };
         return with_law<T>(port.law, c(0), c(1), c(2), c(3), c(4), [&]<class F>(F&& law) {
-          walk<false>(b, drive, at, count, OnePort<T, std::remove_reference_t<F>>{law, other, by});
+          walk(b, drive, at, count, OnePort<T, std::remove_reference_t<F>>{law, other, by});
         });
       }
     }
-    walk<false>(b, drive, at, count, AnyPorts<T>{});
+    walk(b, drive, at, count, AnyPorts{});
   }
 };
 
