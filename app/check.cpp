@@ -103,6 +103,10 @@ void print_report(const Scene& scene, const Compiled& compiled) {
         "octaves\n",
         instrument.mode->frequency_hz, instrument.highest_frequency_hz);
   }
+  if (instrument.masses > most_tuned_masses) {
+    std::printf("keys do not set the pitch: above %zu masses the lowest mode is not looked for\n",
+                most_tuned_masses);
+  }
   if (instrument.stiffness_margin >= 1.0) {
     std::printf("stable: every stiffness may grow by %.3g at least\n", instrument.stiffness_margin);
   } else {

@@ -258,7 +258,10 @@ Result<Compiled> compile(const Network& network, const Preset& preset,
   playing.noise = preset.noise;
   playing.transpose = preset.transpose;
   playing.highest_factor = highest_stiffness_factor(network, box, machine.rate_ratio);
-  if (preset.keyboard) {
+  for (const Program& program : machine.parts) {
+    instrument.masses += program.moving;
+  }
+  if (preset.keyboard && instrument.masses <= most_tuned_masses) {
     instrument.mode = lowest_mode(network, machine.parameters);
   }
   if (instrument.mode) {
@@ -276,9 +279,6 @@ Result<Compiled> compile(const Network& network, const Preset& preset,
   }
   instrument.outputs = output_count(network);
   instrument.voices = playing.voices;
-  for (const Program& program : machine.parts) {
-    instrument.masses += program.moving;
-  }
   instrument.links = network.links.size();
   instrument.stiffness_margin = playing.highest_factor;
   compiled.plan = make_plan(machine,

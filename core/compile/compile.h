@@ -15,6 +15,9 @@
 
 namespace ressort {
 
+// A larger network is played as it is written: finding its lowest mode would take too long.
+inline constexpr std::size_t most_tuned_masses = 150'000;
+
 struct CompileOptions {
   double rate_hz = 44100.0;
   bool rescale = true;  // numbers are meant at 44 100 Hz: keep pitch and decay at other rates
