@@ -107,6 +107,30 @@ std::string row(const std::string& p, int count, const std::string& mass,
   return text;
 }
 
+// Springs of K2 between every two masses that have one between them.
+std::string second_row(const std::string& p, int count, const std::string& k2) {
+  std::string text;
+  for (int i = 0; i + 2 < count; ++i) {
+    text += scenes::at(p + "_s", i) + " spring " + scenes::at(p + "_m", i + 2) + " " +
+            scenes::at(p + "_m", i) + " " + k2 + "\n";
+  }
+  return text;
+}
+
+// As the macro stiffString lays its springs, of p_K, p_Z and p_K2, between grounds at 0.1 and -0.2.
+std::string stiff_string(const std::string& p, int count) {
+  const std::string first = scenes::at(p + "_m", 0);
+  const std::string last = scenes::at(p + "_m", count - 1);
+  return "@" + p + "_K param 0.3\n@" + p + "_Z param 0.01\n@" + p + "_K2 param 0.1\n@" + p +
+         "_g ground 0.1\n@" + p + "_h ground -0.2\n" +
+         row(p, count, "mass 1.2", p + "_K " + p + "_Z") + second_row(p, count, p + "_K2") +
+         "@a1 springDamper @" + p + "_g " + first + " " + p + "_K " + p + "_Z\n" +
+         "@a2 springDamper " + last + " @" + p + "_h " + p + "_K " + p + "_Z\n" + "@a3 spring @" +
+         p + "_g " + first + " " + p + "_K2\n@a4 spring " + last + " @" + p + "_h " + p +
+         "_K2\n@a5 spring " + scenes::at(p + "_m", 1) + " @" + p + "_g " + p + "_K2\n@a6 spring " +
+         scenes::at(p + "_m", count - 2) + " @" + p + "_h " + p + "_K2\n";
+}
+
 }  // namespace
 
 TEST_CASE("strings are found in any order of their lines", "[chains]") {
@@ -189,6 +213,87 @@ TEST_CASE("strings of every length fold into every pack", "[chains]") {
       }
       text += scenes::output(1, "a_m0") + scenes::output(2, scenes::at("a_m", count - 1).substr(1));
       check_duel<double>(formed(text), {.frames = 600, .reach = 0.1}, 1e-12, 200.0);
+    }
+  }
+}
+
+TEST_CASE("stiff strings are found in any order of their lines", "[chains]") {
+  for (std::uint64_t seed = 1; seed <= 5; ++seed) {
+    CAPTURE(seed);
+    const Program program =
+        formed(shuffled(stiff_string("a", 60) + "@in1 frcInput @a_m7\n@out1 posOutput @a_m50\n" +
+                            "@out2 posOutput @a_m59\n",
+                        seed));
+    const auto& form = std::get<Chains>(program.form);
+    REQUIRE(form.chains.size() == 1);
+    CHECK(form.chains[0].count == 60);
+    CHECK(form.chains[0].is_stiff);
+    CHECK(form.loose.empty());
+    CHECK(form.links.empty());
+    const DuelOptions options{.frames = 10000, .seed = seed, .turns = true, .pitch = 0.9};
+    check_duel<double>(program, options, 1e-12, 200.0);
+    check_float(program, options);
+  }
+  // The same from the macro, whose ends are grounds, with places on it.
+  const std::string macro =
+      "@k param 0.4\n@k2 param 0.1\n@s stiffString 152 1. k k2 0.01 0. 0.\n@in1 frcInput [@s 0.3]\n"
+      "@out1 posOutput [@s 0.81]\n";
+  const Program program = formed(macro);
+  CHECK(std::get<Chains>(program.form).chains.at(0).is_stiff);
+  CHECK(std::get<Chains>(program.form).chains.at(0).count == 150);
+  CHECK(std::get<Chains>(program.form).links.size() <= 1);  // that of a ground to itself
+  check_both(program, {.turns = true});
+}
+
+TEST_CASE("second springs that are not everywhere are left as they are", "[chains]") {
+  std::string text = row("a", 40, "mass 1.", "0.2 0.01") + second_row("a", 40, "0.05");
+  const std::string missing = "@a_s17 spring @a_m19 @a_m17 0.05\n";
+  const std::size_t at = text.find(missing);
+  REQUIRE(at != std::string::npos);
+  CHECK(chains_form(program_of(text))->chains.at(0).is_stiff);
+  CHECK(chains_form(program_of(text))->links.empty());
+  // One that is there twice acts twice, one to what holds no end in the chain is a link.
+  const std::string more = text +
+                           "@x spring @a_m19 @a_m17 0.05\n@y spring @a_m3 @a_m30 0.05\n"
+                           "@o mass 2. 0. 0.\n@z spring @a_m0 @o 0.05\n"
+                           "@in1 frcInput @a_m18\n@out1 posOutput @a_m33\n";
+  CHECK(chains_form(program_of(more))->chains.at(0).is_stiff);
+  CHECK(chains_form(program_of(more))->links.size() == 3);
+  check_both(formed(more), {.frames = 10000});
+  const std::string less =
+      text.erase(at, missing.size()) + "@in1 frcInput @a_m18\n@out1 posOutput @a_m33\n";
+  CHECK(!chains_form(program_of(less))->chains.at(0).is_stiff);
+  CHECK(chains_form(program_of(less))->links.size() == 37);
+  check_both(formed(less), {.frames = 10000});
+}
+
+TEST_CASE("stiff strings of every length and every end fold into every pack", "[chains]") {
+  for (int count = 8; count <= 70; ++count) {
+    CAPTURE(count);
+    for (const int ends : {0, 1, 2, 4, 8, 16, 32, 63, 21, 42}) {
+      CAPTURE(ends);
+      std::string text = row("a", count, "osc 1. 0.001 0.001", "0.2 0.01") +
+                         second_row("a", count, "0.07") + "@in1 frcInput @a_m3\n" +
+                         "@in2 posInput 0.5\n@g ground 0.2\n";
+      const auto hold = [&](int bit, const std::string& label, const std::string& holder, int mass,
+                            const std::string& spring) {
+        if (ends & bit) {
+          text += "@" + label + " " + holder + " " + scenes::at("a_m", mass) + " " + spring + "\n";
+        }
+      };
+      hold(1, "e1 springDamper", "@g", 0, "0.2 0.01");
+      hold(2, "e2 springDamper", "@in2", count - 1, "0.2 0.01");
+      hold(4, "e3 spring", "@g", 0, "0.07");
+      hold(8, "e4 spring", "@in2", 1, "0.07");
+      hold(16, "e5 spring", "@g", count - 1, "0.07");
+      hold(32, "e6 spring", "@in2", count - 2, "0.07");
+      text += scenes::output(1, "a_m0") + scenes::output(2, scenes::at("a_m", count - 1).substr(1));
+      text += "@out3 frcOutput @a_m1\n@out4 frcOutput " + scenes::at("a_m", count - 2) +
+              "\n@out5 frcOutput @g\n@out6 frcOutput @in2\n";
+      const Program program = formed(text);
+      CHECK(std::get<Chains>(program.form).chains.at(0).is_stiff);
+      CHECK(std::get<Chains>(program.form).links.empty());
+      check_duel<double>(program, {.frames = 300, .reach = 0.1}, 1e-12, 200.0);
     }
   }
 }

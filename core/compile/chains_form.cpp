@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <array>
-#include <numeric>
 
 namespace ressort {
 namespace {
@@ -15,6 +14,8 @@ class ChainFinder {
       : program_(program),
         mass_run_(program.position.size(), none),
         can_hold_(program.position.size(), true),
+        run_of_(program.ends.size()),
+        springs_at_(program.position.size()),
         near_(program.position.size()),
         is_chained_(program.moving, false),
         is_used_(program.ends.size(), false) {
@@ -26,19 +27,31 @@ class ChainFinder {
     for (const TapSlot& tap : program.taps) {
       can_hold_[tap.node] = false;  // what acts on it does not end there
     }
+    for (const LinkRun& run : program.link_runs) {
+      for (std::uint32_t link = run.first; run.law == Law::spring && link < run.first + run.count;
+           ++link) {
+        run_of_[link] = &run;
+        springs_at_[program.ends[link].a].push_back(link);
+        springs_at_[program.ends[link].b].push_back(link);
+      }
+    }
   }
 
   std::optional<Chains> find() {
-    std::vector<std::uint32_t> order(program_.link_runs.size());
-    std::iota(order.begin(), order.end(), 0u);
-    std::stable_sort(order.begin(), order.end(), [&](std::uint32_t a, std::uint32_t b) {
-      return program_.link_runs[a].count > program_.link_runs[b].count;
-    });
-    for (const std::uint32_t run : order) {
-      if (program_.link_runs[run].law == Law::spring &&
-          program_.link_runs[run].count + 1 >= least_chain_masses) {
-        search(program_.link_runs[run]);
+    struct Candidate {
+      const LinkRun* run;
+      std::size_t springs;
+    };
+    std::vector<Candidate> candidates;
+    for (const LinkRun& run : program_.link_runs) {
+      if (run.law == Law::spring && run.count + 1 >= least_chain_masses) {
+        candidates.push_back({&run, search(run).springs.size()});
       }
+    }
+    std::stable_sort(candidates.begin(), candidates.end(),
+                     [](const Candidate& a, const Candidate& b) { return a.springs > b.springs; });
+    for (const Candidate& candidate : candidates) {
+      take(search(*candidate.run));
     }
     if (form_.chains.empty()) {
       return std::nullopt;
@@ -65,13 +78,21 @@ class ChainFinder {
     bool is_seen = false;
   };
 
+  // The chains of one kind of spring, and all that they would make superfluous.
+  struct Found {
+    std::vector<Chain> chains;
+    std::vector<std::uint32_t> nodes;
+    std::vector<std::uint32_t> springs;
+  };
+
   bool is_equal(const Ends& ends) const {
     const auto [a, b] = ends;
     return a != b && mass_run_[a] != none && mass_run_[a] == mass_run_[b] && !is_chained_[a] &&
            !is_chained_[b];
   }
 
-  void search(const LinkRun& run) {
+  Found search(const LinkRun& run) {
+    Found found;
     const auto each_spring = [&](auto&& use) {
       for (std::uint32_t link = run.first; link < run.first + run.count; ++link) {
         use(link, program_.ends[link]);
@@ -95,31 +116,39 @@ class ChainFinder {
       }
     });
     // From their ends; what is left then are rings, that may be cut anywhere.
-    const std::size_t before = form_.nodes.size();
     for (const bool from_end : {true, false}) {
       each_spring([&](std::uint32_t, const Ends& ends) {
         for (const std::uint32_t node : {ends.a, ends.b}) {
           const Near& near = near_[node];
           if (!near.is_seen && near.springs[0] != none && (near.springs[1] == none) == from_end) {
-            add_chain(run, node);
+            add_chain(run, node, found);
           }
         }
       });
     }
-    for (std::size_t i = before; i < form_.nodes.size(); ++i) {
-      is_chained_[form_.nodes[i]] = true;
-    }
+    return found;
   }
 
-  void add_chain(const LinkRun& run, std::uint32_t node) {
-    Chain chain{.first = static_cast<std::uint32_t>(form_.nodes.size()),
-                .mass_run = mass_run_[node],
-                .stiffness = run.coefficients[0],
-                .damping = run.coefficients[1]};
+  void take(Found found) {
+    for (Chain& chain : found.chains) {
+      chain.first += static_cast<std::uint32_t>(form_.nodes.size());
+      form_.chains.push_back(chain);
+    }
+    for (const std::uint32_t node : found.nodes) {
+      is_chained_[node] = true;
+    }
+    for (const std::uint32_t spring : found.springs) {
+      is_used_[spring] = true;
+    }
+    form_.nodes.insert(form_.nodes.end(), found.nodes.begin(), found.nodes.end());
+  }
+
+  void add_chain(const LinkRun& run, std::uint32_t node, Found& found) {
+    std::vector<std::uint32_t> row;
     std::vector<std::uint32_t> springs;
     while (node != none) {
       near_[node].is_seen = true;
-      form_.nodes.push_back(node);
+      row.push_back(node);
       std::uint32_t next = none;
       for (const std::uint32_t spring : near_[node].springs) {
         if (next == none && spring != none && !near_[other(spring, node)].is_seen) {
@@ -129,27 +158,71 @@ class ChainFinder {
       }
       node = next;
     }
-    chain.count = static_cast<std::uint32_t>(form_.nodes.size()) - chain.first;
-    if (chain.count < least_chain_masses) {
-      form_.nodes.resize(chain.first);
+    if (row.size() < least_chain_masses) {
       return;
     }
-    for (const std::uint32_t spring : springs) {
-      is_used_[spring] = true;
-    }
-    chain.left = held_by(form_.nodes[chain.first]);
-    chain.right = held_by(form_.nodes.back());
-    form_.chains.push_back(chain);
+    Chain chain{.first = static_cast<std::uint32_t>(found.nodes.size()),
+                .count = static_cast<std::uint32_t>(row.size()),
+                .mass_run = mass_run_[row[0]],
+                .stiffness = run.coefficients[0],
+                .damping = run.coefficients[1],
+                .left = held_by(near_[row.front()].holder, row.front(), springs),
+                .right = held_by(near_[row.back()].holder, row.back(), springs)};
+    stiffen(run, row, chain, springs);
+    found.chains.push_back(chain);
+    found.nodes.insert(found.nodes.end(), row.begin(), row.end());
+    found.springs.insert(found.springs.end(), springs.begin(), springs.end());
   }
 
   // What holds a chain's end, by a spring that is then used.
-  std::uint32_t held_by(std::uint32_t node) {
-    const std::uint32_t spring = near_[node].holder;
+  std::uint32_t held_by(std::uint32_t spring, std::uint32_t node,
+                        std::vector<std::uint32_t>& springs) const {
     if (spring == none) {
       return Chain::free;
     }
-    is_used_[spring] = true;
+    springs.push_back(spring);
     return other(spring, node);
+  }
+
+  // Second springs from each mass of a row to the next but one, if there are any everywhere.
+  void stiffen(const LinkRun& run, const std::vector<std::uint32_t>& row, Chain& chain,
+               std::vector<std::uint32_t>& springs) const {
+    for (const std::uint32_t first : springs_at_[row[0]]) {
+      const LinkRun& second = *run_of_[first];
+      std::vector<std::uint32_t> used;
+      for (std::size_t i = 0; i + 2 < row.size() && used.size() == i; ++i) {
+        const std::uint32_t spring =
+            spring_at(row[i], second, [&](std::uint32_t node) { return node == row[i + 2]; });
+        if (spring != none) {
+          used.push_back(spring);
+        }
+      }
+      if (&second == &run || used.size() + 2 != row.size()) {
+        continue;
+      }
+      chain.is_stiff = true;
+      chain.second_stiffness = second.coefficients[0];
+      chain.second_damping = second.coefficients[1];
+      const auto holder = [&](std::uint32_t node) {
+        const auto can_hold = [&](std::uint32_t end) { return bool{can_hold_[end]}; };
+        return held_by(spring_at(node, second, can_hold), node, used);
+      };
+      chain.second_left = {holder(row[0]), holder(row[1])};
+      chain.second_right = {holder(row.back()), holder(row[row.size() - 2])};
+      springs.insert(springs.end(), used.begin(), used.end());
+      return;
+    }
+  }
+
+  // A spring of one run from a node to one that is asked for.
+  template <class IsAskedFor>
+  std::uint32_t spring_at(std::uint32_t node, const LinkRun& run, IsAskedFor&& is_asked_for) const {
+    for (const std::uint32_t spring : springs_at_[node]) {
+      if (run_of_[spring] == &run && !is_used_[spring] && is_asked_for(other(spring, node))) {
+        return spring;
+      }
+    }
+    return none;
   }
 
   std::uint32_t other(std::uint32_t link, std::uint32_t node) const {
@@ -158,11 +231,13 @@ class ChainFinder {
   }
 
   const Program& program_;
-  std::vector<std::uint32_t> mass_run_;  // [node], none: it does not move
-  std::vector<bool> can_hold_;           // [node] grounds and position inputs
-  std::vector<Near> near_;               // [node]
-  std::vector<bool> is_chained_;         // [moving node]
-  std::vector<bool> is_used_;            // [link]
+  std::vector<std::uint32_t> mass_run_;                 // [node], none: it does not move
+  std::vector<bool> can_hold_;                          // [node] grounds and position inputs
+  std::vector<const LinkRun*> run_of_;                  // [link] if it is a spring
+  std::vector<std::vector<std::uint32_t>> springs_at_;  // [node] links
+  std::vector<Near> near_;                              // [node]
+  std::vector<bool> is_chained_;                        // [moving node]
+  std::vector<bool> is_used_;                           // [link]
   Chains form_;
 };
 

@@ -25,12 +25,14 @@ ChainsStep<T> step_for(std::size_t bytes, Isa isa) {
 // of a pass cost more of them.
 template <class T>
 std::size_t lanes_for(const Chains& form, Isa isa) {
+  constexpr std::size_t wide_lanes = 32 / sizeof(T);
   std::uint32_t longest = 0;
+  bool has_two_pairs = true;  // as the next mass but one is in another pair than its own
   for (const Chain& chain : form.chains) {
     longest = std::max(longest, chain.count);
+    has_two_pairs = has_two_pairs && (!chain.is_stiff || chain.count > wide_lanes);
   }
-  constexpr std::size_t wide_lanes = 32 / sizeof(T);
-  const bool is_wide = vector_bytes(isa) >= 32 && longest >= 3 * wide_lanes;
+  const bool is_wide = vector_bytes(isa) >= 32 && longest >= 3 * wide_lanes && has_two_pairs;
   return is_wide ? wide_lanes : 16 / sizeof(T);
 }
 
@@ -82,8 +84,9 @@ class TablesMaker {
       tables_.chains.push_back({.first = place_of(next, 0),
                                 .packs = packs,
                                 .last = (chain.count - 1) % packs,
-                                .stiffness = chain.stiffness,
-                                .damping = chain.damping,
+                                .is_stiff = chain.is_stiff,
+                                .springs = {chain.stiffness, chain.damping, chain.second_stiffness,
+                                            chain.second_damping},
                                 .mass = program_.mass_runs[chain.mass_run]});
       next += packs;
     }
@@ -104,8 +107,14 @@ class TablesMaker {
       const auto place = [&](std::uint32_t node) {
         return node == Chain::free ? nowhere : place_[node];
       };
-      tables_.chains[i].left = place(form_.chains[i].left);
-      tables_.chains[i].right = place(form_.chains[i].right);
+      const Chain& chain = form_.chains[i];
+      FoldedChain& folded = tables_.chains[i];
+      folded.left = place(chain.left);
+      folded.right = place(chain.right);
+      for (std::size_t end = 0; end < 2; ++end) {
+        folded.second_left[end] = place(chain.second_left[end]);
+        folded.second_right[end] = place(chain.second_right[end]);
+      }
     }
   }
 
@@ -223,19 +232,26 @@ class TablesMaker {
   void add_probes(std::uint32_t node) {
     for (const Chain& chain : form_.chains) {
       const std::uint32_t* const nodes = form_.nodes.data() + chain.first;
-      const auto spring = [&](std::uint32_t a, std::uint32_t b) {
-        if (a == node || b == node) {
-          tables_.probes.push_back({place_[a == node ? b : a], chain.stiffness, chain.damping});
+      const std::uint32_t* const last = nodes + chain.count - 1;
+      const auto add = [&](std::uint32_t a, std::uint32_t b, std::uint32_t k, std::uint32_t z) {
+        if (a != Chain::free && (a == node || b == node)) {
+          tables_.probes.push_back({place_[a == node ? b : a], k, z});
         }
       };
-      if (chain.left != Chain::free) {
-        spring(chain.left, nodes[0]);
-      }
-      for (std::uint32_t i = 0; i + 1 < chain.count; ++i) {
-        spring(nodes[i], nodes[i + 1]);
-      }
-      if (chain.right != Chain::free) {
-        spring(nodes[chain.count - 1], chain.right);
+      const auto add_row = [&](std::uint32_t reach, std::uint32_t k, std::uint32_t z) {
+        for (std::uint32_t i = 0; i + reach < chain.count; ++i) {
+          add(nodes[i], nodes[i + reach], k, z);
+        }
+      };
+      add(chain.left, nodes[0], chain.stiffness, chain.damping);
+      add(chain.right, *last, chain.stiffness, chain.damping);
+      add_row(1, chain.stiffness, chain.damping);
+      if (chain.is_stiff) {
+        for (std::uint32_t i = 0; i < 2; ++i) {
+          add(chain.second_left[i], nodes[i], chain.second_stiffness, chain.second_damping);
+          add(chain.second_right[i], *(last - i), chain.second_stiffness, chain.second_damping);
+        }
+        add_row(2, chain.second_stiffness, chain.second_damping);
       }
     }
   }
@@ -258,20 +274,22 @@ ChainsKernel<T>::ChainsKernel(const Program& program, Isa isa)
       lanes_(lanes_for<T>(std::get<Chains>(program.form), isa)),
       tables_(TablesMaker(program, lanes_, place_).make()),
       step_(step_for<T>(lanes_ * sizeof(T), isa)),
-      masks_(3 * lanes_ * tables_.chains.size()),
+      masks_(4 * lanes_ * tables_.chains.size()),
       units_(lanes_ * lanes_),
       bodies_(2 * lanes_ * tables_.pairs),
-      held_(2 * tables_.chains.size()),
+      held_(4 * tables_.chains.size()),
       force_(tables_.force_count),
       corners_(4 * program.taps.size()),
       tap_pull_(program.taps.size()) {
   const auto& chains = std::get<Chains>(program.form).chains;
   for (std::size_t i = 0; i < chains.size(); ++i) {
-    const std::size_t last_lane = (chains[i].count - 1) / tables_.chains[i].packs;
-    T* const masks = masks_.data() + 3 * lanes_ * i;
+    const std::uint32_t packs = tables_.chains[i].packs;
+    const std::size_t last_lane = (chains[i].count - 1) / packs;
+    T* const masks = masks_.data() + 4 * lanes_ * i;
     std::fill_n(masks, last_lane + 1, T(1));
     std::fill_n(masks + lanes_, last_lane, T(1));
     masks[2 * lanes_ + last_lane] = T(1);
+    masks[3 * lanes_ + (chains[i].count - 2) / packs] = T(1);
   }
   for (std::size_t lane = 0; lane < lanes_; ++lane) {
     units_[lane * lanes_ + lane] = T(1);

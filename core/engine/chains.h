@@ -1,6 +1,7 @@
 // core/engine: strings. The masses of a chain lie in lanes so that each one's neighbours are in
 // the packs before and after its own, and one pass over memory does it all:
 //   y = K x + Z v,  v += (y[i-1] - 2 y[i] + y[i+1])/M,  x += v
+// A stiff one has a second y, from two masses before and behind.
 // All other links and masses are stepped number by number; what they do to a chain's mass is added
 // after the pass, to v and to x, which is the same as if it had been in the sum.
 #pragma once
@@ -21,8 +22,10 @@ struct FoldedChain {
   std::uint32_t last = 0;  // the pair that its last mass is in
   Place left = nowhere;    // of what holds the ends, nowhere: free
   Place right = nowhere;
-  std::uint32_t stiffness = 0;  // coefficients
-  std::uint32_t damping = 0;
+  bool is_stiff = false;
+  std::array<Place, 2> second_left{nowhere, nowhere};  // as in Chain
+  std::array<Place, 2> second_right{nowhere, nowhere};
+  std::array<std::uint32_t, 4> springs{};  // coefficients: K and Z, those of the second springs
   MassRun mass;
 };
 
@@ -115,11 +118,11 @@ struct ChainsTables {
 template <class T>
 struct ChainsState {
   Ramps<T> ramps;
-  const T* masks;      // [chain][3][lane] 1 or 0: is a mass here, up to the last one's pair; is one
-                       // beyond it; is it the last
+  const T* masks;      // [chain][4][lane] 1 or 0: is a mass here, up to the last one's pair; is one
+                       // beyond it; is it the last, in its pair; is it the last but one
   const T* units;      // [lane][lane] 1 where both are the same
   T* bodies;           // [pair][position or velocity][lane]
-  T* held;             // [chain][2] the K and Z that forces of the last sample had: 0 at the start
+  T* held;             // [chain][4] the springs that forces of the last sample had: 0 at the start
   T* force;            // [force] summed by the links, used by the next sample
   Corner<T>* corners;  // [tap][4] where it is in this sample
   T* tap_pull;         // [tap] what the links of this sample do to it, for the next one

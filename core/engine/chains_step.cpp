@@ -97,24 +97,28 @@ V down(V y, std::index_sequence<I...>) {
   return __builtin_shufflevector(y, y, (I + 1)..., sizeof...(I));
 }
 
+// What holds an end of a chain by springs of K and Z; a free end is next to one that moves with it.
+template <class S>
+typename S::V tension_of(Place place, const typename S::Number* held, typename S::V itself,
+                         const S& s) {
+  return place == nowhere
+             ? itself
+             : all<typename S::V>(held[0] * s.bodies[place] + held[1] * s.bodies[place + S::lanes]);
+}
+
 // What the springs make of one chain's masses; `pull` is what acts on one besides.
 template <class S, class Pull>
-void move_chain(const FoldedChain& chain, const typename S::Number* masks, S& s,
-                typename S::Number spring_k, typename S::Number spring_z, Pull&& pull) {
+void move_chain(const FoldedChain& chain, const typename S::Number* masks,
+                const typename S::Number* held, S& s, Pull&& pull) {
   using V = typename S::V;
   const auto others = std::make_index_sequence<S::lanes - 1>{};
   V* const begin = &pack_at<V>(s.bodies + chain.first);
   V* const last = begin + 2 * chain.last;
   V* const back = begin + 2 * (chain.packs - 1);
-  const V k = all<V>(spring_k);
-  const V z = all<V>(spring_z);
+  const V k = all<V>(held[0]);
+  const V z = all<V>(held[1]);
   const auto tension = [=](const V* pair) { return k * pair[0] + z * pair[1]; };
-  // A free end is next to one that moves with it.
-  const auto end = [&](Place place, V itself) {
-    return place == nowhere
-               ? itself
-               : all<V>(spring_k * s.bodies[place] + spring_z * s.bodies[place + S::lanes]);
-  };
+  const auto end = [&](Place place, V itself) { return tension_of(place, held, itself, s); };
   const V first = tension(begin);
   V y = first;
   V before = y - up(end(chain.left, first), tension(back), others);
@@ -151,25 +155,107 @@ void move_chain(const FoldedChain& chain, const typename S::Number* masks, S& s,
   }
 }
 
+// The same for a stiff one.
+template <class S, class Pull>
+void move_stiff_chain(const FoldedChain& chain, const typename S::Number* masks,
+                      const typename S::Number* held, S& s, Pull&& pull) {
+  using V = typename S::V;
+  struct Tension {
+    V near;
+    V far;
+  };
+  const auto others = std::make_index_sequence<S::lanes - 1>{};
+  V* const begin = &pack_at<V>(s.bodies + chain.first);
+  V* const last = begin + 2 * chain.last;
+  V* const back = begin + 2 * (chain.packs - 1);
+  V* const last_but_one = last == begin ? back : last - 2;
+  const V k = all<V>(held[0]);
+  const V z = all<V>(held[1]);
+  const V far_k = all<V>(held[2]);
+  const V far_z = all<V>(held[3]);
+  const auto tension = [=](const V* pair) {
+    return Tension{k * pair[0] + z * pair[1], far_k * pair[0] + far_z * pair[1]};
+  };
+  const auto far_end = [&](Place place, V itself) {
+    return tension_of(place, held + 2, itself, s);
+  };
+  const Tension first = tension(begin);
+  const Tension second = tension(begin + 2);
+  const Tension below = tension(back);
+  Tension here = first;
+  Tension next = second;
+  V before = here.near - up(tension_of(chain.left, held, here.near, s), below.near, others);
+  V far_before =
+      here.far - up(far_end(chain.second_left[0], here.far), tension(back - 2).far, others);
+  V far_between = next.far - up(far_end(chain.second_left[1], next.far), below.far, others);
+  const auto move = [&](V* pair, V near, Tension ahead, V far, V inverse_mass) {
+    const V after = near - here.near;
+    const V far_after = far - here.far;
+    const V force = after - before + (far_after - far_before);
+    const V v = pair[1] + (force - pull(pair[0], pair[1])) * inverse_mass;
+    pair[1] = v;
+    pair[0] += v;
+    before = after;
+    far_before = far_between;
+    far_between = far_after;
+    here = next;
+    next = ahead;
+  };
+  const V inverse_mass = all<V>(s.coefficient[chain.mass.inverse_mass]);
+  const V within = inverse_mass * pack_at<V>(masks);
+  const V beyond = inverse_mass * pack_at<V>(masks + S::lanes);
+  const auto is_last = pack_at<V>(masks + 2 * S::lanes) > V{};
+  const auto is_last_but_one = pack_at<V>(masks + 3 * S::lanes) > V{};
+  V* pair = begin;
+  for (V* const stop = last == begin ? begin : last - 2; pair != stop; pair += 2) {
+    const Tension ahead = tension(pair + 4);
+    move(pair, next.near, ahead, ahead.far, within);
+  }
+  for (; pair <= back; pair += 2) {
+    const Tension& turned = pair == back ? second : first;
+    const Tension ahead = pair < back - 2
+                              ? tension(pair + 4)
+                              : Tension{down(turned.near, others), down(turned.far, others)};
+    V near = next.near;
+    V far = ahead.far;
+    if (pair == last_but_one) {
+      far = select(is_last_but_one, far_end(chain.second_right[1], here.far), far);
+    }
+    if (pair == last) {
+      near = select(is_last, tension_of(chain.right, held, here.near, s), near);
+      far = select(is_last, far_end(chain.second_right[0], here.far), far);
+    }
+    move(pair, near, ahead, far, pair <= last ? within : beyond);
+  }
+}
+
+template <class S, class Pull>
+void move_any_chain(const FoldedChain& chain, const typename S::Number* masks,
+                    const typename S::Number* held, S& s, Pull&& pull) {
+  if (chain.is_stiff) {
+    move_stiff_chain(chain, masks, held, s, pull);
+  } else {
+    move_chain(chain, masks, held, s, pull);
+  }
+}
+
 template <class S>
 void step_chains(S& s) {
   using V = typename S::V;
   const auto* held = s.held;
   const auto* masks = s.masks;
   for (const FoldedChain& chain : s.chains) {
-    const auto k = held[0];
-    const auto z = held[1];
     if (chain.mass.is_oscillator || chain.mass.has_gravity) {
       const bool pulls = chain.mass.is_oscillator;
       const V own_k = all<V>(pulls ? s.coefficient[chain.mass.stiffness] : 0);
       const V own_z = all<V>(pulls ? s.coefficient[chain.mass.damping] : 0);
       const V g = all<V>(chain.mass.has_gravity ? s.coefficient[chain.mass.gravity] : 0);
-      move_chain(chain, masks, s, k, z, [=](V x, V v) { return own_k * x + own_z * v + g; });
+      move_any_chain(chain, masks, held, s, [=](V x, V v) { return own_k * x + own_z * v + g; });
     } else {
-      move_chain(chain, masks, s, k, z, [](V, V) { return V{}; });
+      move_any_chain(chain, masks, held, s, [](V, V) { return V{}; });
     }
-    held += 2;
-    masks += 3 * S::lanes;
+    held += 4;
+    masks += 4 * S::lanes;
   }
 }
 
@@ -365,8 +451,9 @@ void step(const Program& program, const ChainsTables& tables, ChainsState<T>& st
     pull_taps(s);
     T* held = s.held;
     for (const FoldedChain& chain : s.chains) {
-      *held++ = s.coefficient[chain.stiffness];
-      *held++ = s.coefficient[chain.damping];
+      for (const std::uint32_t c : chain.springs) {
+        *held++ = s.coefficient[c];
+      }
     }
     for (const HeardPosition& output : s.heard_positions) {
       outputs[output.index] = s.bodies[output.place];

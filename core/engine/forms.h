@@ -12,7 +12,8 @@ namespace ressort {
 // As it is written, mass by mass and link by link; one voice in each lane. Every Program.
 struct Direct {};
 
-// Equal masses in a row, each tied to the next by the same spring.
+// Equal masses in a row, each tied to the next by the same spring; in a stiff one also each to the
+// next but one, by a second kind of spring. What holds an end is a ground or a position input.
 struct Chain {
   static constexpr std::uint32_t free = 0xffffffffu;
 
@@ -21,8 +22,14 @@ struct Chain {
   std::uint32_t mass_run = 0;   // of the Program, that all of them are in
   std::uint32_t stiffness = 0;  // coefficients of the springs
   std::uint32_t damping = 0;
-  std::uint32_t left = free;   // the ground or position input that holds the first mass by the
-  std::uint32_t right = free;  // same spring, and the last; or free
+  std::uint32_t left = free;  // holds the first mass by the same spring
+  std::uint32_t right = free;
+  bool is_stiff = false;
+  std::uint32_t second_stiffness = 0;  // coefficients of the second springs
+  std::uint32_t second_damping = 0;
+  std::array<std::uint32_t, 2> second_left{free,
+                                           free};  // hold the first and the second mass by one
+  std::array<std::uint32_t, 2> second_right{free, free};  // ...the last and the last but one
 };
 
 // Chains folded into the lanes of packs, one voice; everything else number by number.
