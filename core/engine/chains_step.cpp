@@ -1,4 +1,5 @@
 // The loops of the chains' kernel, compiled for each instruction set.
+#include <limits>
 #include <utility>
 
 #include "core/engine/chains.h"
@@ -274,8 +275,11 @@ template <class S>
 void push_sites(S& s) {
   auto* force = s.force;
   for (const ChainSite& site : s.sites) {
-    push(site, *force, s);
-    *force++ = 0;
+    if (*force != 0) {
+      push(site, *force, s);
+      *force = 0;
+    }
+    ++force;
   }
 }
 
@@ -300,22 +304,58 @@ void step_loose(S& s) {
   }
 }
 
-// In the first lane of a pack: laws have no branches there that could be guessed wrongly.
+// The distances between which a law gives anything at all.
+template <class T>
+struct Reach {
+  T low;
+  T high;
+};
+
+template <class S>
+Reach<typename S::Number> reach_of(const LinkRun& run, const S& s) {
+  using T = typename S::Number;
+  constexpr T far = std::numeric_limits<T>::infinity();
+  const auto c = [&](std::size_t i) { return s.coefficient[run.coefficients[i]]; };
+  switch (run.law) {
+    case Law::pluck:
+      return {-c(1), c(1)};
+    case Law::contact:
+      return {-c(2), far};
+    case Law::clipped_contact:
+      return {-c(4), far};
+    default:
+      return {-far, far};
+  }
+}
+
+// In the first lane of a pack: laws have no branches there that could be guessed wrongly. Whether
+// bodies are near enough to touch is guessed, as it seldom changes: the next sample then waits for
+// no force.
+template <class S, class ForceLaw>
+void add_forces(const LinkRun& run, S& s, ForceLaw&& law) {
+  using P = Pack<typename S::Number, 16>;
+  const auto reach = reach_of(run, s);
+  const PlacedEnds* const last = s.ends + run.first + run.count;
+  for (const PlacedEnds* ends = last - run.count; ends != last; ++ends) {
+    const auto* const a = s.bodies + ends->a;
+    const auto* const b = s.bodies + ends->b;
+    const auto d = a[0] - b[0];
+    if (d <= reach.low || d >= reach.high) {
+      continue;
+    }
+    const auto f = law(P{d}, P{a[S::lanes] - b[S::lanes]})[0];
+    s.force[ends->force_a] -= f;
+    s.force[ends->force_b] += f;
+  }
+}
+
 template <class S>
 void step_links(S& s) {
   using P = Pack<typename S::Number, 16>;
   for (const LinkRun& run : s.link_runs) {
     const auto c = [&](std::size_t i) { return all<P>(s.coefficient[run.coefficients[i]]); };
-    with_law<P>(run.law, c(0), c(1), c(2), c(3), c(4), [&](auto&& law) {
-      const PlacedEnds* const last = s.ends + run.first + run.count;
-      for (const PlacedEnds* ends = last - run.count; ends != last; ++ends) {
-        const auto* const a = s.bodies + ends->a;
-        const auto* const b = s.bodies + ends->b;
-        const auto f = law(P{a[0] - b[0]}, P{a[S::lanes] - b[S::lanes]})[0];
-        s.force[ends->force_a] -= f;
-        s.force[ends->force_b] += f;
-      }
-    });
+    with_law<P>(run.law, c(0), c(1), c(2), c(3), c(4),
+                [&](auto&& law) { add_forces(run, s, law); });
   }
 }
 
