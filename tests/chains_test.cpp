@@ -326,6 +326,18 @@ TEST_CASE("everything beside a string acts on it", "[chains]") {
   }
 }
 
+TEST_CASE("what touches a string acts while it does", "[chains]") {
+  const Program program =
+      formed(row("a", 40, "mass 1.", "0.2 0.01") +
+             "@g ground 0.\n@s springDamper @g @a_m0 0.2 0.01\n@in1 posInput -0.2\n"
+             "@in2 posInput 0.1\n@c1 contact @in1 @a_m7 0.05 0.02 0.15\n"
+             "@c2 contact @a_m22 @in2 0.05 0.02 -0.02\n"
+             "@c3 nlContact @a_m30 @in2 0.02 0.5 0.1 0.01 0.03\n"
+             "@out1 posOutput @a_m39\n");
+  check_duel<double>(program, {.frames = 8000, .reach = 0.2, .lowest_hz = 5.0, .highest_hz = 50.0},
+                     1e-11, 200.0);
+}
+
 TEST_CASE("random strings tied to each other move as they are written", "[chains]") {
   for (std::uint64_t seed = 1; seed <= 12; ++seed) {
     CAPTURE(seed);

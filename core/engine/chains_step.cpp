@@ -156,10 +156,11 @@ void move_chain(const FoldedChain& chain, const typename S::Number* masks,
   }
 }
 
-// The same for a stiff one.
+// The same for a stiff one. Not inlined, with a copy of the view: the one of everything else then
+// stays in registers, where stores into packs cannot change it.
 template <class S, class Pull>
-void move_stiff_chain(const FoldedChain& chain, const typename S::Number* masks,
-                      const typename S::Number* held, S& s, Pull&& pull) {
+[[gnu::noinline]] void move_stiff_chain(const FoldedChain& chain, const typename S::Number* masks,
+                                        const typename S::Number* held, S s, Pull&& pull) {
   using V = typename S::V;
   struct Tension {
     V near;
@@ -385,7 +386,7 @@ void locate(const PlacedTap& tap, const S& s, Corner<typename S::Number>* corner
 
 // What acts on a point goes to the nodes around it.
 template <class S>
-void spread(const Corner<typename S::Number>* corners, typename S::Number force, S& s) {
+void spread(const Corner<typename S::Number>* corners, typename S::Number force, S s) {
   for (std::size_t i = 0; i < 4; ++i) {
     const PlacedNode& node = s.tap_nodes[corners[i].node];
     const auto share = corners[i].weight * force;
