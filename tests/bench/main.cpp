@@ -1,0 +1,301 @@
+// What the product costs: every scene in every method and precision, beside the textbook simulator
+// and, if asked for, beside what FAUST makes of the same model. See `run --help`.
+#include <fnmatch.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+#include <csignal>
+#include <cstdio>
+#include <cstdlib>
+#include <optional>
+#include <utility>
+
+#include "app/denormals.h"
+#include "core/compile/chains_form.h"
+#include "core/compile/dense_form.h"
+#include "core/compile/grid_form.h"
+#include "core/compile/modal_form.h"
+#include "core/model/mdl.h"
+#include "tests/bench/measure.h"
+#include "tests/bench/report.h"
+
+namespace {
+
+using namespace ressort;
+using namespace ressort::bench;
+
+constexpr double rate_hz = 44100.0;
+constexpr std::size_t most_reference_elements = 3000;
+constexpr std::size_t most_faust_elements = 3000;
+
+const char* const usage =
+    "usage: tests/bench/run [OPTION...] [SCENE...]\n"
+    "  SCENE        a name or a pattern such as 'chain-*'; without one, all\n"
+    "  --faust      beside the exported model, compiled by faust and g++ and clang++\n"
+    "  --quick      a glance: less exact\n"
+    "  --isa NAME   base, v3 or v4; without it, the best of this machine\n"
+    "  --seconds S  to measure each scene for; 4 without it\n"
+    "  -o DIR       where bench.csv, cost.png and cost.svg go; build/bench without it\n"
+    "  --list       the scenes' names\n";
+
+struct Options {
+  bool faust = false;
+  bool lists = false;
+  Isa isa = best_isa();
+  double seconds = 4.0;
+  std::filesystem::path folder = "build/bench";
+  std::vector<std::string> patterns;
+};
+
+volatile std::sig_atomic_t stops = 0;  // Ctrl-C
+
+// Of what this machine has.
+std::optional<Isa> isa_of(const std::string& name) {
+  constexpr std::array<std::pair<const char*, Isa>, 3> all{
+      {{"base", Isa::base}, {"v3", Isa::v3}, {"v4", Isa::v4}}};
+  for (const auto& [known, isa] : all) {
+    if (known == name && isa <= best_isa()) {
+      return isa;
+    }
+  }
+  return std::nullopt;
+}
+
+std::optional<Options> read(const std::vector<std::string>& arguments) {
+  Options options;
+  for (std::size_t i = 0; i < arguments.size(); ++i) {
+    const std::string& argument = arguments[i];
+    const bool has_value = argument == "--isa" || argument == "--seconds" || argument == "-o";
+    if (has_value && i + 1 == arguments.size()) {
+      return std::nullopt;
+    }
+    if (argument == "--faust") {
+      options.faust = true;
+    } else if (argument == "--list") {
+      options.lists = true;
+    } else if (argument == "--quick") {
+      options.seconds = 0.05;
+    } else if (argument == "--isa") {
+      const auto isa = isa_of(arguments[++i]);
+      if (!isa) {
+        return std::nullopt;
+      }
+      options.isa = *isa;
+    } else if (argument == "--seconds") {
+      options.seconds = std::atof(arguments[++i].c_str());
+    } else if (argument == "-o") {
+      options.folder = arguments[++i];
+    } else if (argument.starts_with("-")) {
+      return std::nullopt;
+    } else {
+      options.patterns.push_back(argument);
+    }
+  }
+  return options;
+}
+
+bool is_wanted(const BenchScene& scene, const std::vector<std::string>& patterns) {
+  return patterns.empty() ||
+         std::any_of(patterns.begin(), patterns.end(), [&](const std::string& pattern) {
+           return fnmatch(pattern.c_str(), scene.name.c_str(), 0) == 0;
+         });
+}
+
+void show_progress(std::size_t done, std::size_t all, const std::string& doing) {
+  constexpr std::size_t width = 30;
+  if (isatty(STDERR_FILENO) == 0) {
+    return;
+  }
+  const std::size_t full = width * done / all;
+  std::fprintf(stderr, "\r\033[K[%s%s] %zu/%zu %s", std::string(full, '#').c_str(),
+               std::string(width - full, '.').c_str(), done, all, doing.c_str());
+  if (done == all) {
+    std::fprintf(stderr, "\r\033[K");
+  }
+}
+
+// --- one scene ----------------------------------------------------------------------------------
+
+// The machine in every form that it has.
+std::vector<Formed> forms_of(const Machine& machine) {
+  std::vector<Formed> forms{{"direct", machine}};
+  const auto add = [&](const char* method, auto&& form) {
+    if (form) {
+      forms.push_back({method, machine});
+      forms.back().machine.parts[0].form = *std::move(form);
+    }
+  };
+  add("chains", chains_form(machine.parts[0]));
+  add("dense", dense_form(machine.parts[0]));
+  add("modal", modal_form(machine.parts[0]));
+  add("grid", grid_form(machine.parts[0]));
+  return forms;
+}
+
+// What the engine plays: until the plan chooses, the form that was fastest when all were calibrated
+// here. The one place to change.
+const Formed& chosen(const std::vector<Formed>& forms, const std::vector<double>& calibrated) {
+  const auto best = std::min_element(calibrated.begin(), calibrated.end());
+  return forms[static_cast<std::size_t>(best - calibrated.begin())];
+}
+
+void add_ours(const BenchScene& scene, const Network& network, const std::vector<Formed>& forms,
+              bool is_double, Isa isa, std::vector<Timed>& all) {
+  std::vector<Timed> kernels;
+  std::vector<double> calibrated;
+  for (const Formed& formed : forms) {
+    const Program& program = formed.machine.parts[0];
+    kernels.emplace_back(formed.method, is_double,
+                         is_double ? play_kernels<double>(scene, network, program, isa)
+                                   : play_kernels<float>(scene, network, program, isa));
+    calibrated.push_back(kernels.back().calibrate());
+  }
+  const Precision precision = is_double ? Precision::float64 : Precision::float32;
+  all.emplace_back("ressort", is_double,
+                   play_engine(scene, network, chosen(forms, calibrated).machine, precision, isa));
+  all.back().calibrate();
+  std::move(kernels.begin(), kernels.end(), std::back_inserter(all));
+}
+
+std::string faust_name(const FaustLibrary& library) {
+  return "faust " + library.variant;
+}
+
+// How many times faster the row is than all others of the same scene.
+void compare(Row& row, const std::vector<Timed>& all, const std::vector<FaustLibrary>& libraries) {
+  for (const Timed& one : all) {
+    if (one.method == "reference") {
+      row.than_reference = one.median() / row.median_ns;
+    }
+    for (const FaustLibrary& library : libraries) {
+      if (one.method != faust_name(library) || one.is_double != library.is_double) {
+        continue;
+      }
+      const double times = one.median() / row.median_ns;
+      row.than_best_faust = std::min(times, row.than_best_faust.value_or(times));
+      if (library.is_default && library.is_double == row.is_double) {
+        row.than_default_faust = times;
+      }
+    }
+  }
+}
+
+std::vector<Row> measure_scene(const BenchScene& scene, const Network& network,
+                               const std::vector<FaustLibrary>& libraries, const Options& options) {
+  const Machine machine = make_machine(network, rate_hz, true);
+  const std::vector<Formed> forms = forms_of(machine);
+  std::vector<Timed> all;
+  for (const bool is_double : {true, false}) {
+    add_ours(scene, network, forms, is_double, options.isa, all);
+  }
+  if (scene.voices == 1 && scene.elements <= most_reference_elements) {
+    all.emplace_back("reference", true, play_reference(scene, network));
+    all.back().calibrate();
+  }
+  for (const FaustLibrary& library : libraries) {
+    all.emplace_back(faust_name(library), library.is_double, play_faust(scene, network, library));
+    all.back().calibrate();
+  }
+  measure(all, options.seconds, stops);
+  std::vector<Row> rows;
+  for (const Timed& one : all) {
+    if (!one.has_played()) {
+      continue;
+    }
+    rows.push_back({.scene = scene.name,
+                    .family = scene.family,
+                    .method = one.method,
+                    .is_double = one.is_double,
+                    .masses = machine.parts[0].moving,
+                    .links = machine.parts[0].ends.size(),
+                    .voices = scene.voices,
+                    .median_ns = one.median(),
+                    .minimum_ns = one.minimum()});
+    compare(rows.back(), all, libraries);
+  }
+  return rows;
+}
+
+// --- all of them --------------------------------------------------------------------------------
+
+struct Prepared {
+  BenchScene scene;
+  Network network;
+  std::vector<FaustLibrary> libraries;
+};
+
+bool prepare(Prepared& prepared, const Options& options) {
+  const BenchScene& scene = prepared.scene;
+  ParsedNetwork parsed = parse_network(scene.text);
+  if (!parsed.ok()) {
+    std::fprintf(stderr, "%s\n", to_string(parsed.diagnostics[0], scene.name).c_str());
+    return false;
+  }
+  prepared.network = std::move(parsed.network);
+  if (options.faust && scene.elements <= most_faust_elements) {
+    prepared.libraries = faust_libraries(scene, prepared.network, options.folder / "faust");
+    if (std::none_of(prepared.libraries.begin(), prepared.libraries.end(),
+                     [](const FaustLibrary& library) { return library.is_default; })) {
+      std::printf("%s: FAUST's default does not compile within the time\n", scene.name.c_str());
+    }
+  }
+  return true;
+}
+
+int run(const Options& options) {
+  std::vector<Prepared> wanted;
+  for (BenchScene& scene : all_scenes()) {
+    if (options.lists) {
+      std::printf("%s\n", scene.name.c_str());
+    } else if (is_wanted(scene, options.patterns)) {
+      wanted.push_back({std::move(scene), {}, {}});
+    }
+  }
+  if (wanted.empty()) {
+    return options.lists ? 0 : 2;
+  }
+  std::filesystem::create_directories(options.folder);
+  const std::string isa(isa_name(options.isa));
+  std::printf("%s\n", machine_line(isa).c_str());
+  // The compilers run on all cores, before anything is measured.
+  for (std::size_t i = 0; i < wanted.size() && options.faust && stops == 0; ++i) {
+    show_progress(i, wanted.size(), "FAUST compiles " + wanted[i].scene.name);
+    prepare(wanted[i], options);
+  }
+  stay_on_one_core();
+  const DenormalsFlushed flushed;
+  print_head();
+  std::vector<Row> rows;
+  for (std::size_t i = 0; i < wanted.size() && stops == 0; ++i) {
+    show_progress(i, wanted.size(), wanted[i].scene.name);
+    if (!options.faust && !prepare(wanted[i], options)) {
+      return 1;
+    }
+    const std::vector<Row> found =
+        measure_scene(wanted[i].scene, wanted[i].network, wanted[i].libraries, options);
+    show_progress(wanted.size(), wanted.size(), "");
+    print(found);
+    rows.insert(rows.end(), found.begin(), found.end());
+    wanted[i] = {};
+  }
+  const bool is_written = write_csv(options.folder / "bench.csv", isa, rows);
+  if (std::any_of(rows.begin(), rows.end(), [](const Row& row) { return !row.family.empty(); }) &&
+      !draw(options.folder, machine_line(isa), rows)) {
+    std::fprintf(stderr, "no picture: gnuplot does not run\n");
+  }
+  return stops != 0 ? 130 : is_written ? 0 : 1;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  std::signal(SIGINT, [](int) { stops = 1; });
+  std::signal(SIGPIPE, SIG_IGN);
+  const auto options = read({argv + 1, argv + argc});
+  if (!options) {
+    std::fputs(usage, stderr);
+    return 2;
+  }
+  return run(*options);
+}

@@ -1,0 +1,148 @@
+#include "tests/bench/report.h"
+
+#include <cstdio>
+#include <cstdlib>
+#include <fstream>
+#include <map>
+
+namespace ressort::bench {
+namespace {
+
+constexpr double budget_ns = 1e9 / 48000.0;  // of one core, per sample
+
+const char* precision_of(const Row& row) {
+  return row.is_double ? "double" : "float";
+}
+
+double ns_per_mass(const Row& row) {
+  return row.median_ns / static_cast<double>(row.masses * row.voices);
+}
+
+std::string number(const char* format, double value) {
+  char text[40];
+  std::snprintf(text, sizeof text, format, value);
+  return text;
+}
+
+std::string ratio(const std::optional<double>& value) {
+  return value ? number("%.3g", *value) : "";
+}
+
+std::string cpu_name() {
+  std::ifstream info("/proc/cpuinfo");
+  for (std::string line; std::getline(info, line);) {
+    if (line.starts_with("model name")) {
+      return line.substr(line.find(':') + 2);
+    }
+  }
+  return "unknown CPU";
+}
+
+std::string title(const Row& row) {
+  return row.method + " " + precision_of(row);
+}
+
+// The curves of one family as gnuplot's data, one after the other.
+using Curves = std::map<std::string, std::string>;
+
+Curves curves_of(const std::string& family, const std::vector<Row>& rows) {
+  Curves curves;
+  for (const Row& row : rows) {
+    if (row.family == family) {
+      curves[title(row)] +=
+          std::to_string(row.masses) + " " + number("%.6g", ns_per_mass(row)) + "\n";
+    }
+  }
+  return curves;
+}
+
+std::string panel(const std::string& family, const std::vector<Row>& rows) {
+  const Curves curves = curves_of(family, rows);
+  if (curves.empty()) {
+    return "";
+  }
+  std::string data;
+  std::string plot;
+  for (const auto& [name, points] : curves) {
+    const std::string block = "$" + family + std::to_string(plot.size());
+    const bool is_float = name.ends_with("float");
+    data += block + " << EOD\n" + points + "EOD\n";
+    plot += (plot.empty() ? "plot " : ", ") + block + " with linespoints dashtype " +
+            (is_float ? "2" : "1") + " title \"" + name + "\"";
+  }
+  return data + "set title \"" + family + "\"\n" + plot + "\n";
+}
+
+std::string picture(const std::filesystem::path& folder, const std::string& machine,
+                    const std::vector<Row>& rows, const std::string& terminal,
+                    const std::string& name) {
+  return "reset\nset terminal " + terminal + "\nset output \"" + (folder / name).string() +
+         "\"\nset logscale xy\nset grid\nset key outside below\nset xlabel \"masses\"\n"
+         "set ylabel \"ns per mass and sample\"\nset format x \"10^%T\"\n"
+         "set multiplot layout 1,2 title \"" +
+         machine + "\" noenhanced\n" + panel("chains", rows) + panel("meshes", rows) +
+         "unset multiplot\nset output\n";
+}
+
+}  // namespace
+
+std::string machine_line(const std::string& isa) {
+  return cpu_name() + ", " + isa + ", " +
+#if defined(__clang__)
+         "clang " __clang_version__;
+#else
+         "g++ " __VERSION__;
+#endif
+}
+
+void print_head() {
+  std::printf("%-26s %-6s %-17s %10s %10s %9s %7s %10s  %s\n", "", "", "", "median", "minimum",
+              "ns/mass", "% core", "times", "times faster than FAUST");
+  std::printf("%-26s %-6s %-17s %10s %10s %9s %7s %10s  %s\n", "scene", "", "method", "ns/sample",
+              "ns/sample", "/sample", "48 kHz", "reference", "best (default)");
+}
+
+void print(const std::vector<Row>& rows) {
+  for (const Row& row : rows) {
+    std::string faust = ratio(row.than_best_faust);
+    if (row.than_default_faust) {
+      faust += " (" + ratio(row.than_default_faust) + ")";
+    }
+    std::printf("%-26s %-6s %-17s %10.4g %10.4g %9.3g %7.3g %10s  %s\n", row.scene.c_str(),
+                precision_of(row), row.method.c_str(), row.median_ns, row.minimum_ns,
+                ns_per_mass(row), 100.0 * row.median_ns / budget_ns,
+                ratio(row.than_reference).c_str(), faust.c_str());
+  }
+  std::fflush(stdout);
+}
+
+bool write_csv(const std::filesystem::path& path, const std::string& isa,
+               const std::vector<Row>& rows) {
+  std::ofstream file(path);
+  file << "scene,precision,method,isa,masses,links,voices,median_ns,minimum_ns,ns_per_mass,"
+          "core_share,times_reference,times_best_faust,times_default_faust\n";
+  for (const Row& row : rows) {
+    file << row.scene << ',' << precision_of(row) << ',' << row.method << ',' << isa << ','
+         << row.masses << ',' << row.links << ',' << row.voices << ','
+         << number("%.6g", row.median_ns) << ',' << number("%.6g", row.minimum_ns) << ','
+         << number("%.6g", ns_per_mass(row)) << ',' << number("%.6g", row.median_ns / budget_ns)
+         << ',' << ratio(row.than_reference) << ',' << ratio(row.than_best_faust) << ','
+         << ratio(row.than_default_faust) << '\n';
+  }
+  file.close();
+  return file.good();
+}
+
+bool draw(const std::filesystem::path& folder, const std::string& machine,
+          const std::vector<Row>& rows) {
+  FILE* const gnuplot = popen("gnuplot", "w");
+  if (gnuplot == nullptr) {
+    return false;
+  }
+  const std::string script = picture(folder, machine, rows, "pngcairo size 1600,800", "cost.png") +
+                             picture(folder, machine, rows, "svg size 1600,800", "cost.svg");
+  std::fputs(script.c_str(), gnuplot);
+  return pclose(gnuplot) == 0;
+}
+
+}  // namespace ressort::bench

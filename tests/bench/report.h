@@ -1,0 +1,41 @@
+// bench: what was measured, for people, for programs and as a picture.
+#pragma once
+
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "tests/bench/bench_scenes.h"
+
+namespace ressort::bench {
+
+struct Row {
+  std::string scene;
+  std::string family;
+  std::string method;
+  bool is_double = true;
+  std::size_t masses = 0;  // that move, of one voice
+  std::size_t links = 0;
+  std::size_t voices = 1;
+  double median_ns = 0.0;  // per sample
+  double minimum_ns = 0.0;
+  // How many times faster it is than others of the same run, by the medians.
+  std::optional<double> than_reference;
+  std::optional<double> than_best_faust;     // in whatever precision
+  std::optional<double> than_default_faust;  // in the same precision
+};
+
+// CPU, instruction set, compiler.
+std::string machine_line(const std::string& isa);
+
+void print_head();
+void print(const std::vector<Row>& rows);
+bool write_csv(const std::filesystem::path& path, const std::string& isa,
+               const std::vector<Row>& rows);
+// cost.png and cost.svg in `folder`, by gnuplot: cost per mass against the number of masses. False
+// where there is no gnuplot.
+bool draw(const std::filesystem::path& folder, const std::string& machine,
+          const std::vector<Row>& rows);
+
+}  // namespace ressort::bench
