@@ -152,8 +152,10 @@ void add_ours(const BenchScene& scene, const Network& network, const std::vector
     calibrated.push_back(kernels.back().calibrate());
   }
   const Precision precision = is_double ? Precision::float64 : Precision::float32;
+  const Formed& played = chosen(forms, calibrated);
   all.emplace_back("ressort", is_double,
-                   play_engine(scene, network, chosen(forms, calibrated).machine, precision, isa));
+                   play_engine(scene, network, played.machine, precision, isa));
+  all.back().form = played.method;
   all.back().calibrate();
   std::move(kernels.begin(), kernels.end(), std::back_inserter(all));
 }
@@ -206,6 +208,7 @@ std::vector<Row> measure_scene(const BenchScene& scene, const Network& network,
     rows.push_back({.scene = scene.name,
                     .family = scene.family,
                     .method = one.method,
+                    .form = one.form,
                     .is_double = one.is_double,
                     .masses = machine.parts[0].moving,
                     .links = machine.parts[0].ends.size(),

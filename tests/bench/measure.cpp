@@ -48,7 +48,7 @@ double Timed::calibrate() {
   if (ns * cycle <= longest_cycle_ns) {
     next_ = 0;
     blocks_ = cycle_blocks * static_cast<std::size_t>(std::ceil(round_ns / (ns * cycle)));
-    ns = play(cycle_blocks);
+    ns = std::min({play(cycle_blocks), play(cycle_blocks), play(cycle_blocks)});
   } else {
     blocks_ = static_cast<std::size_t>(std::ceil(long_round_ns / (ns * block)));
   }

@@ -26,6 +26,7 @@ class Timed {
   double minimum() const;
 
   std::string method;
+  std::string form;  // that an engine plays, for people
   bool is_double;
 
  private:

@@ -38,6 +38,10 @@ std::string cpu_name() {
   return "unknown CPU";
 }
 
+std::string shown_method(const Row& row) {
+  return row.form.empty() ? row.method : row.method + ": " + row.form;
+}
+
 std::string title(const Row& row) {
   return row.method + " " + precision_of(row);
 }
@@ -96,9 +100,9 @@ std::string machine_line(const std::string& isa) {
 }
 
 void print_head() {
-  std::printf("%-26s %-6s %-17s %10s %10s %9s %7s %10s  %s\n", "", "", "", "median", "minimum",
+  std::printf("%-26s %-6s %-20s %10s %10s %9s %7s %10s  %s\n", "", "", "", "median", "minimum",
               "ns/mass", "% core", "times", "times faster than FAUST");
-  std::printf("%-26s %-6s %-17s %10s %10s %9s %7s %10s  %s\n", "scene", "", "method", "ns/sample",
+  std::printf("%-26s %-6s %-20s %10s %10s %9s %7s %10s  %s\n", "scene", "", "method", "ns/sample",
               "ns/sample", "/sample", "48 kHz", "reference", "best (default)");
 }
 
@@ -108,8 +112,8 @@ void print(const std::vector<Row>& rows) {
     if (row.than_default_faust) {
       faust += " (" + ratio(row.than_default_faust) + ")";
     }
-    std::printf("%-26s %-6s %-17s %10.4g %10.4g %9.3g %7.3g %10s  %s\n", row.scene.c_str(),
-                precision_of(row), row.method.c_str(), row.median_ns, row.minimum_ns,
+    std::printf("%-26s %-6s %-20s %10.4g %10.4g %9.3g %7.3g %10s  %s\n", row.scene.c_str(),
+                precision_of(row), shown_method(row).c_str(), row.median_ns, row.minimum_ns,
                 ns_per_mass(row), 100.0 * row.median_ns / budget_ns,
                 ratio(row.than_reference).c_str(), faust.c_str());
   }
@@ -119,11 +123,11 @@ void print(const std::vector<Row>& rows) {
 bool write_csv(const std::filesystem::path& path, const std::string& isa,
                const std::vector<Row>& rows) {
   std::ofstream file(path);
-  file << "scene,precision,method,isa,masses,links,voices,median_ns,minimum_ns,ns_per_mass,"
+  file << "scene,precision,method,form,isa,masses,links,voices,median_ns,minimum_ns,ns_per_mass,"
           "core_share,times_reference,times_best_faust,times_default_faust\n";
   for (const Row& row : rows) {
-    file << row.scene << ',' << precision_of(row) << ',' << row.method << ',' << isa << ','
-         << row.masses << ',' << row.links << ',' << row.voices << ','
+    file << row.scene << ',' << precision_of(row) << ',' << row.method << ',' << row.form << ','
+         << isa << ',' << row.masses << ',' << row.links << ',' << row.voices << ','
          << number("%.6g", row.median_ns) << ',' << number("%.6g", row.minimum_ns) << ','
          << number("%.6g", ns_per_mass(row)) << ',' << number("%.6g", row.median_ns / budget_ns)
          << ',' << ratio(row.than_reference) << ',' << ratio(row.than_best_faust) << ','
@@ -135,7 +139,7 @@ bool write_csv(const std::filesystem::path& path, const std::string& isa,
 
 bool draw(const std::filesystem::path& folder, const std::string& machine,
           const std::vector<Row>& rows) {
-  FILE* const gnuplot = popen("gnuplot", "w");
+  FILE* const gnuplot = popen("gnuplot 2>/dev/null", "w");
   if (gnuplot == nullptr) {
     return false;
   }

@@ -14,6 +14,7 @@ struct Row {
   std::string scene;
   std::string family;
   std::string method;
+  std::string form;  // that an engine plays; else empty
   bool is_double = true;
   std::size_t masses = 0;  // that move, of one voice
   std::size_t links = 0;
