@@ -1,7 +1,7 @@
 #include "tests/bench/report.h"
 
+#include <algorithm>
 #include <cstdio>
-#include <cstdlib>
 #include <fstream>
 #include <map>
 
@@ -42,39 +42,56 @@ std::string shown_method(const Row& row) {
   return row.form.empty() ? row.method : row.method + ": " + row.form;
 }
 
-std::string title(const Row& row) {
-  return row.method + " " + precision_of(row);
-}
+// A curve of the picture: one method in one precision, its points as gnuplot's data.
+struct Curve {
+  std::string method;
+  bool is_double = true;
+  std::string points;
+};
 
-// The curves of one family as gnuplot's data, one after the other.
-using Curves = std::map<std::string, std::string>;
-
-Curves curves_of(const std::string& family, const std::vector<Row>& rows) {
-  Curves curves;
+// Of all that FAUST was made to try, only the fastest of each scene is drawn.
+std::vector<Curve> curves_of(const std::string& family, const std::vector<Row>& rows) {
+  std::vector<Curve> curves;
+  const auto add = [&](const Row& row, const std::string& method, double times) {
+    auto curve = std::find_if(curves.begin(), curves.end(), [&](const Curve& known) {
+      return known.method == method && known.is_double == row.is_double;
+    });
+    if (curve == curves.end()) {
+      curve = curves.insert(curve, {method, row.is_double, ""});
+    }
+    curve->points +=
+        std::to_string(row.masses) + " " + number("%.6g", times * ns_per_mass(row)) + "\n";
+  };
   for (const Row& row : rows) {
-    if (row.family == family) {
-      curves[title(row)] +=
-          std::to_string(row.masses) + " " + number("%.6g", ns_per_mass(row)) + "\n";
+    if (row.family == family && !row.method.starts_with("faust")) {
+      add(row, row.method, 1.0);
+    }
+    if (row.family == family && row.method == "ressort" && row.is_double && row.than_best_faust) {
+      add(row, "best FAUST", *row.than_best_faust);
     }
   }
   return curves;
 }
 
+// The same in every panel.
+std::string style_of(const Curve& curve) {
+  static const std::map<std::string, std::string> colours{
+      {"ressort", "black"}, {"direct", "red"},  {"chains", "blue"},      {"dense", "orange"},
+      {"modal", "#008040"}, {"grid", "purple"}, {"reference", "gray50"}, {"best FAUST", "brown"}};
+  return " with linespoints linecolor rgb \"" + colours.at(curve.method) + "\" linewidth " +
+         (curve.method == "ressort" ? "2.5" : "1.2") + " dashtype " + (curve.is_double ? "1" : "2");
+}
+
 std::string panel(const std::string& family, const std::vector<Row>& rows) {
-  const Curves curves = curves_of(family, rows);
-  if (curves.empty()) {
-    return "";
-  }
   std::string data;
   std::string plot;
-  for (const auto& [name, points] : curves) {
+  for (const Curve& curve : curves_of(family, rows)) {
     const std::string block = "$" + family + std::to_string(plot.size());
-    const bool is_float = name.ends_with("float");
-    data += block + " << EOD\n" + points + "EOD\n";
-    plot += (plot.empty() ? "plot " : ", ") + block + " with linespoints dashtype " +
-            (is_float ? "2" : "1") + " title \"" + name + "\"";
+    data += block + " << EOD\n" + curve.points + "EOD\n";
+    plot += (plot.empty() ? "plot " : ", ") + block + style_of(curve) + " title \"" + curve.method +
+            (curve.is_double ? "" : ", float") + "\"";
   }
-  return data + "set title \"" + family + "\"\n" + plot + "\n";
+  return plot.empty() ? "" : data + "set title \"" + family + "\"\n" + plot + "\n";
 }
 
 std::string picture(const std::filesystem::path& folder, const std::string& machine,
