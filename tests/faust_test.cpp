@@ -79,6 +79,16 @@ TEST_CASE("only the laws that are used are there", "[faust]") {
       "f_p = pluck(0.1, 0.2, 0.0, x_in1 - x_a, v_in1 - v_a);");
 }
 
+TEST_CASE("a law brings the one that it stands on", "[faust]") {
+  const std::string ends = "@a mass 1. 0. 0.\n@g ground 0.\n@out1 posOutput @a\n@l ";
+  for (const char* const law :
+       {"nlSpring2 @g @a 0.1 0.2 0.", "nlSpring3 @g @a 0.1 0.2 0.",
+        "nlSpringDamper @g @a 0.1 0.2 0.3 0.", "contact @g @a 0.1 0.2 0."}) {
+    has(exported(ends + law + "\n"), "\nspring(k, z, d, v) =");
+  }
+  CHECK(exported(ends + "nlBow @g @a 0.1 0.2\n").find("spring(") == std::string::npos);
+}
+
 TEST_CASE("a mass starts where and as fast as the model says", "[faust]") {
   const std::string text = exported(
       "@a mass 1. 0.5 0.25\n@b osc 2. 0.1 0.01 -1. -1.\n@in1 posInput 2.\n"

@@ -413,11 +413,21 @@ class Writer {
   std::string laws() const {
     std::string text;
     for (const FaustDefinition& definition : faust_definitions()) {
-      if (used_.contains(definition.name)) {
+      if (is_used(definition.name)) {
         text += definition.text;
       }
     }
     return text;
+  }
+
+  // By the model, or by what the model uses; no definition stands on more than one other.
+  bool is_used(const std::string& name) const {
+    const auto definitions = faust_definitions();
+    return used_.contains(name) ||
+           std::any_of(definitions.begin(), definitions.end(), [&](const FaustDefinition& other) {
+             return used_.contains(other.name) &&
+                    std::string_view(other.text).find(" " + name + "(") != std::string_view::npos;
+           });
   }
 
   std::string parameters() const {

@@ -264,7 +264,9 @@ int run(const Options& options) {
   // The compilers run on all cores, before anything is measured.
   for (std::size_t i = 0; i < wanted.size() && options.faust && stops == 0; ++i) {
     show_progress(i, wanted.size(), "FAUST compiles " + wanted[i].scene.name);
-    prepare(wanted[i], options);
+    if (!prepare(wanted[i], options)) {
+      return 1;
+    }
   }
   stay_on_one_core();
   const DenormalsFlushed flushed;
