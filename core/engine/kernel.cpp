@@ -1,6 +1,7 @@
 #include "core/engine/kernel.h"
 
 #include "core/engine/chains.h"
+#include "core/engine/chorus.h"
 #include "core/engine/dense.h"
 #include "core/engine/direct.h"
 #include "core/engine/grid.h"
@@ -79,6 +80,9 @@ std::unique_ptr<Kernel<T>> make_kernel(const Program& program, std::size_t voice
     }
     std::unique_ptr<Kernel<T>> operator()(const Grid& grid) const {
       return std::make_unique<GridKernel<T>>(program, grid, isa);
+    }
+    std::unique_ptr<Kernel<T>> operator()(const Chorus& chorus) const {
+      return std::make_unique<ChorusKernel<T>>(program, chorus, voices, isa);
     }
   };
   return std::visit(Maker{program, voices, isa}, program.form);

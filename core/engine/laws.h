@@ -50,13 +50,31 @@ static inline V clipped_spring_force(V d, V v, V s, V c, V k, V z) {
 //   s/10 <= |d| < s:   f = -sgn(d) (s/10) K + (K/10) d + Z v
 //   else:              f = 0
 template <class V>
-static inline V pluck_force(V d, V v, V k, V s, V z) {
+struct PluckShape {
+  PluckShape(V k, V s) : rise(k - k / 10), fall(k / 10), inner(s / 10), outer(s), top(s / 10 * k) {}
+  explicit PluckShape(const V* kept)  // as a row of its numbers
+      : rise(kept[0]), fall(kept[1]), inner(kept[2]), outer(kept[3]), top(kept[4]) {}
+  V rise;
+  V fall;
+  V inner;
+  V outer;
+  V top;  // where the outer slopes would meet at 0
+};
+template <class V>
+static inline V pluck_force(V d, V v, const PluckShape<V>& shape, V z) {
   const V far = absolute(d);
   const V tenth = k / 10;
   const V inner = -(k - tenth) * d;
   const V hold = s / 10 * k;
   const V outer = tenth * d - select(d < V{}, -hold, hold);
   return select(far < s, select(far < s / 10, inner, outer) + z * v, V{});
+  const V within = -shape.rise * d;
+  const V beyond = -sign(d) * shape.top + shape.fall * d;
+  return select(far < shape.outer, select(far < shape.inner, within, beyond) + z * v, V{});
+}
+template <class V>
+static inline V pluck_force(V d, V v, V k, V s, V z) {
+  return pluck_force(d, v, PluckShape<V>(k, s), z);
 }
 
 // Friction that rises to 2/9 Z s at |v| = s/3 and falls to 0 at s:

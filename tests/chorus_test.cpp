@@ -1,0 +1,310 @@
+// What is held in registers, and that every voice moves as it does alone.
+#include "core/compile/chorus_form.h"
+#include "tests/rig.h"
+
+namespace ressort {
+namespace {
+
+using rig::Comparison;
+using rig::network_of;
+using rig::Random;
+using rig::show;
+
+constexpr std::uint32_t none = ChorusAnchor::none;
+
+Program program_of(const std::string& text) {
+  return make_program(network_of(text), 44100.0, true);
+}
+
+Program formed(const std::string& text) {
+  Program program = program_of(text);
+  auto form = chorus_form(program);
+  REQUIRE(form.has_value());
+  program.form = std::move(*form);
+  return program;
+}
+
+std::vector<Isa> isas() {
+  std::vector<Isa> all = {Isa::base};
+  for (const Isa isa : {Isa::v3, Isa::v4}) {
+    if (isa <= best_isa()) {
+      all.push_back(isa);
+    }
+  }
+  return all;
+}
+
+// As many kernels as the voices need, each voice at its own pitch and with its own hands.
+template <class T>
+class Choir {
+ public:
+  Choir(const Program& program, std::size_t voices, Isa isa) : program_(program), voices_(voices) {
+    while (kernels_.size() * width_ < voices) {
+      kernels_.push_back(make_kernel<T>(program_, voices, isa));
+      width_ = kernels_[0]->width();
+    }
+    value_.resize(max_block_frames * program_.inputs.size() * width_);
+    velocity_.resize(value_.size());
+    outputs_.resize(max_block_frames * program_.outputs.size() * width_);
+    for (std::size_t voice = 0; voice < kernels_.size() * width_; ++voice) {
+      turn(voice, program_.parameters, false);
+    }
+  }
+
+  Kernel<T>& of(std::size_t voice) { return *kernels_[voice / width_]; }
+  std::size_t lane(std::size_t voice) const { return voice % width_; }
+
+  void turn(std::size_t voice, const std::vector<double>& parameters, bool ramped) {
+    const double pitch = 1.0 / (1.0 + 0.07 * static_cast<double>(voice));
+    auto& coefficients = of(voice).coefficients;
+    for (std::uint32_t c = 0; c < program_.coefficients.size(); ++c) {
+      coefficients.set(lane(voice), c,
+                       coefficient_value(program_, program_.coefficients[c], parameters, pitch),
+                       ramped);
+    }
+    if (ramped) {
+      coefficients.ramp(128);
+    }
+  }
+
+  // hands(frame, voice, input); gives [voice][frame][output], one voice after the other.
+  template <class Hands>
+  std::vector<double> play(std::size_t at, std::size_t frames, Hands&& hands) {
+    std::vector<double> heard;
+    for (std::size_t first = 0; first < voices_; first += width_) {
+      each_value(frames, program_.inputs.size(), [&](std::size_t n, std::size_t i, std::size_t k) {
+        const double here = hands(at + n, first + k, i);
+        const double before =
+            at + n == 0 ? hands(0, first + k, i) : hands(at + n - 1, first + k, i);
+        value_[place(n, i, k, program_.inputs.size())] = static_cast<T>(here);
+        velocity_[place(n, i, k, program_.inputs.size())] = static_cast<T>(here - before);
+      });
+      of(first).step({.frames = frames,
+                      .value = value_.data(),
+                      .velocity = velocity_.data(),
+                      .audio = nullptr,
+                      .outputs = outputs_.data()});
+      const std::size_t count = program_.outputs.size();
+      for (std::size_t k = 0; k < std::min(width_, voices_ - first); ++k) {
+        for (std::size_t n = 0; n < frames * count; ++n) {
+          heard.push_back(static_cast<double>(outputs_[n * width_ + k]));
+        }
+      }
+    }
+    return heard;
+  }
+
+ private:
+  std::size_t place(std::size_t n, std::size_t i, std::size_t k, std::size_t count) const {
+    return (n * count + i) * width_ + k;
+  }
+  template <class Use>
+  void each_value(std::size_t frames, std::size_t count, Use&& use) const {
+    for (std::size_t n = 0; n < frames; ++n) {
+      for (std::size_t i = 0; i < count; ++i) {
+        for (std::size_t k = 0; k < width_; ++k) {
+          use(n, i, k);
+        }
+      }
+    }
+  }
+
+  Program program_;
+  std::size_t voices_;
+  std::size_t width_ = 1;
+  std::vector<std::unique_ptr<Kernel<T>>> kernels_;
+  Aligned<T> value_;
+  Aligned<T> velocity_;
+  Aligned<T> outputs_;
+};
+
+struct Contest {
+  std::size_t voices = 1;
+  std::size_t frames = 2000;
+  double reach = 0.02;
+  bool turns = false;  // of the parameters, in one voice at a time
+  Isa isa = best_isa();
+};
+
+// One Comparison for each voice, against the direct kernel in double.
+template <class T>
+std::vector<Comparison> contest(const Program& program, const Contest& options) {
+  Program plain = program;
+  plain.form = Direct{};
+  Choir<double> reference(plain, options.voices, Isa::base);
+  Choir<T> found(program, options.voices, options.isa);
+  const auto hands = [&](std::size_t n, std::size_t voice, std::size_t input) {
+    const InputSlot& slot = program.inputs[input];
+    const double t = static_cast<double>(n) / 44100.0 * (slot.is_force ? 3000.0 : 90.0);
+    const double wave = std::sin(t * (1.0 + 0.1 * static_cast<double>(voice % 17)));
+    return (slot.is_force ? 0.0 : program.position[slot.node]) + options.reach * wave;
+  };
+  Random random(options.voices);
+  std::vector<Comparison> voices(options.voices);
+  std::size_t blocks = 0;
+  for (std::size_t at = 0; at < options.frames; ++blocks) {
+    if (options.turns && blocks % 5 == 4) {
+      auto parameters = program.parameters;
+      for (double& parameter : parameters) {
+        parameter *= random.uniform(0.9, 1.1);
+      }
+      const std::size_t voice = random.below(options.voices);
+      reference.turn(voice, parameters, true);
+      found.turn(voice, parameters, true);
+    }
+    const std::size_t longest = random.below(3) == 0 ? 1 + random.below(64) : 64;
+    const std::size_t frames = std::min(longest, options.frames - at);
+    const auto expected = reference.play(at, frames, hands);
+    const auto heard = found.play(at, frames, hands);
+    for (std::size_t i = 0; i < expected.size(); ++i) {
+      voices[i / (frames * program.outputs.size())].add(expected[i], heard[i]);
+    }
+    at += frames;
+  }
+  return voices;
+}
+
+template <class T>
+void check(const Program& program, Contest options, double most_relative) {
+  for (const Isa isa : isas()) {
+    for (const std::size_t voices : {1u, 3u, 5u, 16u, 64u}) {
+      options.voices = voices;
+      options.isa = isa;
+      const auto heard = contest<T>(program, options);
+      for (std::size_t voice = 0; voice < voices; ++voice) {
+        INFO(isa_name(isa) << ", " << voice << " of " << voices << " voices: residual "
+                           << show(heard[voice].relative()));
+        CHECK(heard[voice].peak > 0.0);
+        CHECK(heard[voice].relative() < most_relative);
+      }
+    }
+  }
+}
+
+std::string example(const std::string& name) {
+  for (const auto& each : scenes::nine_instruments()) {
+    if (each.name == name) {
+      return each.text;
+    }
+  }
+  return "";
+}
+
+// Masses of every kind, every pair of them held by one of the laws, or by none.
+std::string random_body(std::uint64_t seed, std::size_t masses) {
+  Random random(seed);
+  std::string text = "@k param 0.02\n@z param 0.001\n@s0 ground 0.\n@s1 ground 0.01\n";
+  for (std::size_t i = 0; i < masses; ++i) {
+    const std::string name = "@m" + std::to_string(i);
+    text += name + (random.below(3) == 0 ? " osc 1.5 0.01 0.001 0. 0.\n" : " mass 1. 0. 0.\n") +
+            name + "g springDamper @s" + std::to_string(random.below(2)) + " " + name + " k z\n";
+  }
+  const char* const laws[] = {"springDamper", "springDamper", "nlSpring3", "nlPluck", "contact"};
+  const char* const numbers[] = {" k z", " 0.03 z", " k 0.1 z", " 0.001 0.5 z",
+                                 " 0.01 0.001 0.001"};
+  for (std::size_t i = 0; i < 2 * masses; ++i) {
+    const std::size_t a = random.below(masses);
+    const std::size_t b = random.below(masses);
+    const std::size_t law = random.below(std::size(laws));
+    if (a != b) {
+      text += "@r" + std::to_string(i) + " " + laws[law] + " @m" + std::to_string(a) + " @m" +
+              std::to_string(b) + numbers[law] + "\n";
+    }
+  }
+  return text + "@in1 frcInput @m0\n@in2 posInput 0.\n@h springDamper @in2 @m" +
+         std::to_string(masses - 1) + " k z\n@out1 posOutput @m0\n@out2 posOutput @m" +
+         std::to_string(masses / 2) + "\n";
+}
+
+}  // namespace
+
+TEST_CASE("a triangle is held whole, its pick is walked", "[chorus]") {
+  const Program program = formed(example("IPlayTheTriangle"));
+  const auto& chorus = std::get<Chorus>(program.form);
+  const auto holds = [&](std::uint32_t run) {
+    return run != none && program.link_runs[run].law == Law::spring;
+  };
+  CHECK((holds(chorus.pairs[0]) && holds(chorus.pairs[1]) && holds(chorus.pairs[2])));
+  CHECK(chorus.pairs[3] == none);
+  int anchors = 0;
+  for (const ChorusAnchor& anchor : chorus.anchors) {
+    anchors += holds(anchor.run) ? 1 : 0;
+  }
+  CHECK(anchors == 1);
+  REQUIRE(chorus.links.size() == 1);
+  CHECK(program.link_runs[chorus.links[0].run].law == Law::pluck);
+  CHECK(chorus.ends.size() == 1);
+}
+
+TEST_CASE("a second spring in the same place, and all those of more masses, are walked",
+          "[chorus]") {
+  const std::string twice = scenes::triangle("0.1", "0.001") +
+                            "@a springDamper @m_m0 @m_m1 0.01 0.\n@out1 posOutput @m_m0\n";
+  const auto chorus = chorus_form(program_of(twice));
+  REQUIRE(chorus.has_value());
+  CHECK(chorus->ends.size() == 1);
+  const auto walked =
+      chorus_form(program_of(scenes::string("s", 5, "0.1", "0.001") + scenes::output(1, "s_m2")));
+  REQUIRE(walked.has_value());
+  CHECK(walked->ends.size() == 6);
+  CHECK_FALSE(chorus_form(program_of(scenes::string("s", 17, "0.1", "0.001"))).has_value());
+  CHECK_FALSE(chorus_form(program_of(scenes::triangle("0.1", "0.001") + "@out1 frcOutput @m_m0\n"))
+                  .has_value());
+}
+
+TEST_CASE("as many packs as the voices need, up to what fits", "[chorus]") {
+  const Program program = formed(example("PolyTriangle"));
+  for (const Isa isa : isas()) {
+    for (const std::size_t voices : {1u, 3u, 9u, 16u, 64u}) {
+      const std::size_t width = make_kernel<double>(program, voices, isa)->width();
+      CAPTURE(isa_name(isa), voices, width);
+      CHECK(width <= std::max<std::size_t>(2 * voices, 2));
+      CHECK(width <= 16);
+      CHECK((width >= voices || width >= 8));
+    }
+  }
+}
+
+TEST_CASE("every voice of a choir is the voice alone", "[chorus]") {
+  check<double>(formed(example("PolyTriangle")), {}, 1e-12);
+  check<float>(formed(example("PolyTriangle")), {}, 1e-5);
+  check<double>(formed(example("IPlayTheTriangle")), {}, 1e-11);
+  check<double>(formed(example("PhysicalLFO")), {}, 1e-11);
+}
+
+TEST_CASE("parameters are ramped in one voice, and the others do not hear it", "[chorus]") {
+  check<double>(formed(example("PolyTriangle")), {.turns = true}, 1e-12);
+  check<double>(formed(example("IPlayTheTriangle")), {.turns = true}, 1e-11);
+}
+
+TEST_CASE("bodies of every size, of any laws", "[chorus]") {
+  for (std::uint64_t seed = 1; seed <= 16; ++seed) {
+    const std::string text = random_body(seed, 1 + seed % 8);
+    INFO("seed " << seed << "\n" << text);
+    const auto heard = contest<double>(formed(text), {.voices = 5, .turns = true});
+    for (const Comparison& voice : heard) {
+      INFO("residual " << show(voice.relative()));
+      CHECK(voice.relative() < 1e-9);
+    }
+  }
+}
+
+TEST_CASE("a lane is put back, and the others play on", "[chorus]") {
+  const Program program = formed(example("PolyTriangle"));
+  Choir<double> choir(program, 16, best_isa());
+  Choir<double> other(program, 16, best_isa());
+  const auto push = [](std::size_t n, std::size_t, std::size_t) { return n < 9 ? 0.1 : 0.0; };
+  choir.play(0, 64, push);
+  other.play(0, 64, push);
+  CHECK_FALSE(choir.of(5).is_near_start(choir.lane(5), 1e-6));
+  choir.of(5).reset(choir.lane(5));
+  CHECK(choir.of(5).is_near_start(choir.lane(5), 1e-12));
+  CHECK_FALSE(choir.of(4).is_near_start(choir.lane(4), 1e-6));
+  const auto heard = choir.play(64, 64, push);
+  const auto expected = other.play(64, 64, push);
+  for (std::size_t i = 0; i < heard.size(); ++i) {
+    CHECK(heard[i] == (i / 64 == 5 ? 0.0 : expected[i]));
+  }
+}
+
+}  // namespace ressort
