@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "core/engine/kernel.h"
+#include "core/engine/mix.h"
 
 namespace ressort {
 
@@ -32,20 +33,29 @@ struct PartBank {
 
 template <class T>
 struct Bank {
-  Bank(const Machine& machine, std::size_t voices, Isa isa) {
+  Bank(const Machine& machine, std::size_t voices, Isa isa) : mixer(mixer_for<T>(isa)) {
     std::size_t inputs = 0;
     std::size_t audio_coefficients = 0;
     std::size_t channels = 0;
+    std::size_t lanes = 0;
+    std::size_t outputs_of_one = 0;
     for (const Program& program : machine.parts) {
       const std::size_t width = parts.emplace_back(program, voices, isa).width;
       inputs = std::max(inputs, width * program.inputs.size());
       audio_coefficients = std::max(audio_coefficients, width * program.audio_coefficients.size());
       channels = std::max(channels, width * program.outputs.size());
+      lanes = std::max(lanes, width);
+      outputs_of_one = std::max(outputs_of_one, program.outputs.size());
     }
     value.resize(max_block_frames * inputs);
     velocity.resize(value.size());
     audio.resize(max_block_frames * audio_coefficients);
     outputs.resize(max_block_frames * channels);
+    row.resize(inputs);
+    filled.resize(inputs);
+    peak.resize(lanes);
+    gain.resize(lanes);
+    sum.resize(max_block_frames * outputs_of_one);
   }
 
   std::vector<PartBank<T>> parts;
@@ -54,6 +64,18 @@ struct Bank {
   Aligned<T> velocity;
   Aligned<T> audio;
   Aligned<T> outputs;
+
+  // Hands that rest give every frame the same row, [input][lane], and no velocity. Of what the
+  // buffers hold, `filled` is in so many frames of `filled_part`.
+  Aligned<T> row;
+  Aligned<T> filled;
+  const PartBank<T>* filled_part = nullptr;
+  std::size_t filled_frames = 0;
+
+  Mixer<T> mixer;
+  Aligned<T> peak;       // [lane]
+  Aligned<double> gain;  // [lane]
+  Aligned<double> sum;   // [frame][output]
 };
 
 }  // namespace ressort

@@ -167,11 +167,7 @@ void Engine::Voices::segment_in(Bank<T>& b, std::span<const double* const> input
                            .velocity = b.velocity.data(),
                            .audio = b.audio.data(),
                            .outputs = b.outputs.data()});
-      for (std::size_t lane = first; lane < end; ++lane) {
-        if (voices[lane].awake) {
-          mix(b, part, lane, outputs, at, frames);
-        }
-      }
+      mix(b, part, first, outputs, at, frames);
     }
   }
   for (Voice& voice : voices) {
@@ -182,20 +178,49 @@ void Engine::Voices::segment_in(Bank<T>& b, std::span<const double* const> input
 }
 
 template <class T>
+void Engine::Voices::fill_rest(Bank<T>& b, const PartBank<T>& part, std::size_t first,
+                               std::size_t frames) {
+  const std::size_t width = part.width;
+  const std::size_t step = part.program.inputs.size() * width;
+  for (std::size_t i = 0; i < part.program.inputs.size(); ++i) {
+    for (std::size_t k = 0; k < width; ++k) {
+      b.row[i * width + k] =
+          first + k < voices.size()
+              ? static_cast<T>(hand(first + k, part.program.inputs[i].hand).value())
+              : T(0);
+    }
+  }
+  const auto end = b.row.begin() + static_cast<std::ptrdiff_t>(step);
+  if (b.filled_part == &part && b.filled_frames >= frames &&
+      std::equal(b.row.begin(), end, b.filled.begin())) {
+    return;
+  }
+  for (std::size_t n = 0; n < frames; ++n) {
+    std::copy(b.row.begin(), end, b.value.begin() + static_cast<std::ptrdiff_t>(n * step));
+  }
+  std::fill_n(b.velocity.begin(), frames * step, T(0));
+  std::copy(b.row.begin(), end, b.filled.begin());
+  b.filled_part = &part;
+  b.filled_frames = frames;
+}
+
+template <class T>
 void Engine::Voices::fill_drive(Bank<T>& b, const PartBank<T>& part, std::size_t first,
                                 std::span<const double* const> inputs, std::size_t at,
                                 std::size_t frames) {
+  fill_rest(b, part, first, frames);
   const std::size_t step = part.program.inputs.size() * part.width;  // from frame to frame
   for (std::size_t i = 0; i < part.program.inputs.size(); ++i) {
     const InputSlot& slot = part.program.inputs[i];
     const double* const audio = audio_for(slot.hand, inputs);
     for (std::size_t lane = first; lane < std::min(voices.size(), first + part.width); ++lane) {
-      T* value = b.value.data() + i * part.width + lane - first;
-      T* velocity = b.velocity.data() + i * part.width + lane - first;
-      if (!voices[lane].awake) {
+      Hand& mover = hand(lane, slot.hand);
+      if (!voices[lane].awake || (!mover.is_moving() && audio == nullptr)) {
         continue;
       }
-      Hand& mover = hand(lane, slot.hand);
+      b.filled_part = nullptr;
+      T* value = b.value.data() + i * part.width + lane - first;
+      T* velocity = b.velocity.data() + i * part.width + lane - first;
       for (std::size_t n = 0; n < frames; ++n) {
         const HandSample sample = slot.is_force ? mover.next_force() : mover.next_position();
         value[n * step] = static_cast<T>(sample.value);
@@ -271,36 +296,56 @@ void Engine::Voices::remember_audio(std::span<const double* const> inputs, std::
 }
 
 template <class T>
-void Engine::Voices::mix(const Bank<T>& b, const PartBank<T>& part, std::size_t lane,
+void Engine::Voices::mix(Bank<T>& b, const PartBank<T>& part, std::size_t first,
                          std::span<double* const> outputs, std::size_t at, std::size_t frames) {
-  Voice& voice = voices[lane];
   const std::size_t count = part.program.outputs.size();
-  const auto heard = [&](std::size_t n, std::size_t output) {
-    return static_cast<double>(b.outputs[(n * count + output) * part.width + lane % part.width]);
-  };
-  double peak = 0.0;
-  bool in_bounds = true;
-  for (std::size_t n = 0; n < frames; ++n) {
-    for (std::size_t output = 0; output < count; ++output) {
-      const double y = std::fabs(heard(n, output));
-      in_bounds &= y < runaway;  // false for what is no number
-      peak = std::max(peak, y);
+  const Heard<T> heard{
+      .outputs = b.outputs.data(), .frames = frames, .count = count, .width = part.width};
+  b.mixer.find_peaks(heard, runaway, b.peak.data());
+  std::fill(b.gain.begin(), b.gain.end(), 0.0);
+  for (std::size_t lane = first; lane < std::min(voices.size(), first + part.width); ++lane) {
+    Voice& voice = voices[lane];
+    if (!voice.awake) {
+      continue;
+    }
+    const auto peak = static_cast<double>(b.peak[lane - first]);
+    if (!(peak < runaway)) {
+      ++resets;
+      rest_lane(lane);
+      continue;
+    }
+    voice.peak = std::max(voice.peak, peak);
+    if (voice.gain_step != 0.0) {
+      mix_fading(b, part, lane, outputs, at, frames);
+    } else {
+      b.gain[lane - first] = playing.gain * voice.gain;
     }
   }
-  if (!in_bounds) {
-    ++resets;
-    rest_lane(lane);
-    return;
+  b.mixer.add_voices(heard, b.gain.data(), b.sum.data());
+  clear_wide_registers();
+  for (std::size_t output = 0; output < count; ++output) {
+    double* const channel = outputs[part.program.outputs[output].channel] + at;
+    for (std::size_t n = 0; n < frames; ++n) {
+      channel[n] += b.sum[n * count + output];
+    }
   }
-  double faded = voice.gain;
+}
+
+template <class T>
+void Engine::Voices::mix_fading(const Bank<T>& b, const PartBank<T>& part, std::size_t lane,
+                                std::span<double* const> outputs, std::size_t at,
+                                std::size_t frames) {
+  const std::size_t count = part.program.outputs.size();
+  double faded = voices[lane].gain;
   for (std::size_t n = 0; n < frames; ++n) {
-    faded = voice.next_gain(faded);
+    faded = voices[lane].next_gain(faded);
     const double gain = playing.gain * faded;
     for (std::size_t output = 0; output < count; ++output) {
-      outputs[part.program.outputs[output].channel][at + n] += gain * heard(n, output);
+      const std::size_t from = (n * count + output) * part.width + lane % part.width;
+      outputs[part.program.outputs[output].channel][at + n] +=
+          gain * static_cast<double>(b.outputs[from]);
     }
   }
-  voice.peak = std::max(voice.peak, peak);
 }
 
 void Engine::Voices::settle(std::size_t lane) {

@@ -103,7 +103,10 @@ struct Engine::Voices {
   template <class T>
   void segment_in(Bank<T>& b, std::span<const double* const> inputs,
                   std::span<double* const> outputs, std::size_t at, std::size_t frames);
-  // The buffers for the voices of one kernel, the first of which is `first`.
+  // The buffers for the voices of one kernel, the first of which is `first`: what rests...
+  template <class T>
+  void fill_rest(Bank<T>& b, const PartBank<T>& part, std::size_t first, std::size_t frames);
+  // ...and what moves.
   template <class T>
   void fill_drive(Bank<T>& b, const PartBank<T>& part, std::size_t first,
                   std::span<const double* const> inputs, std::size_t at, std::size_t frames);
@@ -120,9 +123,14 @@ struct Engine::Voices {
   void listen(std::span<const double* const> inputs, std::size_t at, std::size_t frames);
   // The last position of an audio input, for the velocity of the next segment's first sample.
   void remember_audio(std::span<const double* const> inputs, std::size_t end);
+  // Adds what the voices of one kernel say to the outputs; what is out of bounds is put to rest.
   template <class T>
-  void mix(const Bank<T>& b, const PartBank<T>& part, std::size_t lane,
-           std::span<double* const> outputs, std::size_t at, std::size_t frames);
+  void mix(Bank<T>& b, const PartBank<T>& part, std::size_t first, std::span<double* const> outputs,
+           std::size_t at, std::size_t frames);
+  // The same of a voice whose gain moves.
+  template <class T>
+  void mix_fading(const Bank<T>& b, const PartBank<T>& part, std::size_t lane,
+                  std::span<double* const> outputs, std::size_t at, std::size_t frames);
   // Keeps the voice's level and sends it to sleep when it has faded or come to rest. Once in
   // max_block_frames, counted from the engine's start: so what sleeps or gives way does not
   // depend on how the time is cut into blocks.
