@@ -66,11 +66,12 @@ struct Bank {
   Aligned<T> outputs;
 
   // Hands that rest give every frame the same row, [input][lane], and no velocity. Of what the
-  // buffers hold, `filled` is in so many frames of `filled_part`.
+  // buffers hold, `filled` is in so many frames of `filled_part`, and so many velocities are 0.
   Aligned<T> row;
   Aligned<T> filled;
   const PartBank<T>* filled_part = nullptr;
   std::size_t filled_frames = 0;
+  std::size_t still = 0;
 
   Mixer<T> mixer;
   Aligned<T> peak;       // [lane]

@@ -69,6 +69,22 @@ class Hand {
     return sample;
   }
 
+  // The next positions, `step` apart in memory: next_position() again and again.
+  template <class T>
+  void fill_positions(std::size_t frames, std::size_t step, T* value, T* velocity) {
+    for (std::size_t n = 0; n < frames;) {
+      if (motion_ == Motion::follow && pulse_ == 0.0 && bump_ == 0.0) {
+        n = fill_approach(n, frames, step, value, velocity);
+      }
+      if (n < frames) {
+        const HandSample sample = next_position();
+        value[n * step] = static_cast<T>(sample.value);
+        velocity[n * step] = static_cast<T>(sample.velocity);
+        ++n;
+      }
+    }
+  }
+
   HandSample next_force() {
     if (motion_ == Motion::follow) {
       approach();
@@ -115,9 +131,33 @@ class Hand {
     return {value_, value_ - before};
   }
 
+  double arrival() const { return 1e-12 * (1.0 + std::fabs(target_)); }
+
+  // As long as it is on its way; returns the first sample that is not filled.
+  template <class T>
+  std::size_t fill_approach(std::size_t n, std::size_t frames, std::size_t step, T* value,
+                            T* velocity) {
+    const double pole = pole_;
+    const double target = target_;
+    const double pull = (1.0 - pole) * target;
+    const double near = arrival();
+    double here = value_;
+    for (; n < frames; ++n) {
+      const double next = pole * here + pull;
+      if (std::fabs(target - next) <= near) {
+        break;
+      }
+      value[n * step] = static_cast<T>(next);
+      velocity[n * step] = static_cast<T>(next - here);
+      here = next;
+    }
+    value_ = here;
+    return n;
+  }
+
   void approach() {
     value_ = pole_ * value_ + (1.0 - pole_) * target_;
-    if (std::fabs(target_ - value_) <= 1e-12 * (1.0 + std::fabs(target_))) {
+    if (std::fabs(target_ - value_) <= arrival()) {
       value_ = target_;
       motion_ = Motion::rest;
     }

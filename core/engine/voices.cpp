@@ -190,6 +190,10 @@ void Engine::Voices::fill_rest(Bank<T>& b, const PartBank<T>& part, std::size_t 
               : T(0);
     }
   }
+  if (b.still < frames * step) {
+    std::fill_n(b.velocity.begin(), frames * step, T(0));
+    b.still = frames * step;
+  }
   const auto end = b.row.begin() + static_cast<std::ptrdiff_t>(step);
   if (b.filled_part == &part && b.filled_frames >= frames &&
       std::equal(b.row.begin(), end, b.filled.begin())) {
@@ -198,7 +202,6 @@ void Engine::Voices::fill_rest(Bank<T>& b, const PartBank<T>& part, std::size_t 
   for (std::size_t n = 0; n < frames; ++n) {
     std::copy(b.row.begin(), end, b.value.begin() + static_cast<std::ptrdiff_t>(n * step));
   }
-  std::fill_n(b.velocity.begin(), frames * step, T(0));
   std::copy(b.row.begin(), end, b.filled.begin());
   b.filled_part = &part;
   b.filled_frames = frames;
@@ -221,12 +224,16 @@ void Engine::Voices::fill_drive(Bank<T>& b, const PartBank<T>& part, std::size_t
       b.filled_part = nullptr;
       T* value = b.value.data() + i * part.width + lane - first;
       T* velocity = b.velocity.data() + i * part.width + lane - first;
-      for (std::size_t n = 0; n < frames; ++n) {
-        const HandSample sample = slot.is_force ? mover.next_force() : mover.next_position();
-        value[n * step] = static_cast<T>(sample.value);
-        velocity[n * step] = static_cast<T>(sample.velocity);
+      if (slot.is_force) {
+        for (std::size_t n = 0; n < frames; ++n) {
+          value[n * step] = static_cast<T>(mover.next_force().value);
+        }
+      } else {
+        b.still = 0;
+        mover.fill_positions(frames, step, value, velocity);
       }
       if (audio != nullptr) {
+        b.still = 0;
         add_audio(slot.hand, audio + at, frames, step, value, velocity);
       }
     }
