@@ -6,11 +6,13 @@
 namespace ressort {
 namespace {
 
-// Of one pack: the narrowest that holds the voices, or two of the widest that there is.
+// Of one pack: the narrowest that holds the voices, or the widest that there is. Where there are
+// registers enough, two of them are worked on as one.
 template <class T>
 std::size_t pack_bytes(std::size_t voices, Isa isa) {
+  const std::size_t widest = isa == Isa::v4 ? 2 * vector_bytes(isa) : vector_bytes(isa);
   std::size_t bytes = 16;
-  while (bytes < 2 * vector_bytes(isa) && bytes / sizeof(T) < voices) {
+  while (bytes < widest && bytes / sizeof(T) < voices) {
     bytes *= 2;
   }
   return bytes;
@@ -61,6 +63,16 @@ void add_held(const Program& program, const Chorus& chorus, ChorusTable& table) 
   }
 }
 
+void add_pushes(const Program& program, ChorusTable& table) {
+  for (std::uint32_t i = 0; i < program.inputs.size(); ++i) {
+    const InputSlot& input = program.inputs[i];
+    if (input.is_force && input.node < table.held && (table.pushed >> input.node & 1) == 0) {
+      table.pushed |= 1u << input.node;
+      table.pusher[input.node] = i;
+    }
+  }
+}
+
 void add_pulls(const Program& program, ChorusTable& table) {
   for (const MassRun& run : program.mass_runs) {
     for (std::uint32_t i = 0; i < run.count && table.is_pulled; ++i) {
@@ -78,6 +90,7 @@ ChorusTable table_of(const Program& program, const Chorus& chorus, std::size_t p
                     .held = program.moving <= most_held_masses ? program.moving : 0};
   add_masses(program, table);
   add_held(program, chorus, table);
+  add_pushes(program, table);
   add_pulls(program, table);
   table.first_node = chorus_slots(table.masses, table.held);
   table.first_pull = table.first_node + 3 * table.nodes;

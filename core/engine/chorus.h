@@ -2,12 +2,14 @@
 // which are stepped in turn within a sample, so that none waits for its own last result.
 #pragma once
 
+#include <array>
+#include <vector>
+
 #include "core/engine/kernel.h"
 
 namespace ressort {
 
-// What one number takes in all of a kernel's voices, at most; twice as many where one register
-// holds half of it.
+// What one number takes in all of a kernel's voices, at most.
 inline constexpr std::size_t chorus_bytes = 128;
 
 // Everything that a pack of voices needs lies together, one cell for each number:
@@ -30,6 +32,8 @@ struct ChorusTable {
   std::uint32_t held = 0;      // all masses, or none
   std::uint32_t linked = 0;    // a bit for each pair
   std::uint32_t anchored = 0;  // a bit for each mass held
+  std::uint32_t pushed = 0;    // a bit for each mass held that a force input acts on
+  std::array<std::uint32_t, most_held_masses> pusher{};  // ...and the first of these inputs
   bool is_pulled = false;
   std::uint32_t first_node = 0;  // cells
   std::uint32_t first_pull = 0;
@@ -50,8 +54,7 @@ template <class T>
 using ChorusStep = void (*)(const Program& program, const Chorus& chorus, const ChorusTable& table,
                             ChorusState<T>& state, const Block<T>& block);
 
-// The function for so many masses held, in packs of so many bytes or twins
-// of the widest.
+// The function for so many masses held, in packs of so many bytes; 128 are a twin of 64.
 namespace base {
 template <class T>
 ChorusStep<T> chorus_step(std::uint32_t held, std::size_t bytes);

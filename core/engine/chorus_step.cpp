@@ -58,9 +58,11 @@ void fill_slots(const Program& program, const Chorus& chorus, const ChorusTable&
   }
 }
 
-// Masses and springs held in registers.
+// Masses and springs held in registers, and what pushes them: a force that had just been added up
+// in memory would have to be waited for.
 template <class V, std::uint32_t N>
-[[gnu::always_inline]] inline void hold(const Chorus& chorus, const ChorusTable& table, V* cells) {
+[[gnu::always_inline]] inline void hold(const Chorus& chorus, const ChorusTable& table, V* cells,
+                                        const V* value) {
   constexpr std::uint32_t anchors = N + N * (N - 1);
   auto* const node = reinterpret_cast<Node<V>*>(cells + chorus_slots(N, N));
   V x[N];
@@ -70,6 +72,9 @@ template <class V, std::uint32_t N>
     x[i] = node[i].x;
     v[i] = node[i].v;
     f[i] = node[i].force;
+    if ((table.pushed >> i & 1) != 0) {
+      f[i] += value[table.pusher[i] * table.packs];
+    }
   });
   if (table.is_pulled) {
     const V* const pull = cells + table.first_pull;
@@ -151,18 +156,17 @@ void tick(const Program& program, const Chorus& chorus, const ChorusTable& table
           const V* value, const V* velocity, V* outputs) {
   auto* const node =
       reinterpret_cast<Node<V>*>(cells + (N > 0 ? chorus_slots(N, N) : table.first_node));
-  for (const InputSlot& input : program.inputs) {
-    if (input.is_force) {
-      node[input.node].force += *value;
-    } else {
-      put(*value, node[input.node].x);
-      put(*velocity, node[input.node].v);
+  for (std::uint32_t i = 0; i < program.inputs.size(); ++i) {
+    const InputSlot& input = program.inputs[i];
+    if (!input.is_force) {
+      put(value[i * table.packs], node[input.node].x);
+      put(velocity[i * table.packs], node[input.node].v);
+    } else if (input.node >= N || table.pusher[input.node] != i) {
+      node[input.node].force += value[i * table.packs];
     }
-    value += table.packs;
-    velocity += table.packs;
   }
   if constexpr (N > 0) {
-    hold<V, N>(chorus, table, cells);
+    hold<V, N>(chorus, table, cells, value);
   } else {
     walk(table, cells, node);
   }
@@ -233,10 +237,10 @@ ChorusStep<Scalar<V>> step_for(std::uint32_t held) {
 
 template <class T>
 ChorusStep<T> chorus_step(std::uint32_t held, std::size_t bytes) {
-  if (bytes == 2 * RESSORT_VECTOR_BYTES) {
-    return step_for<Twin<Pack<T, RESSORT_VECTOR_BYTES>>>(held);
-  }
   if constexpr (RESSORT_VECTOR_BYTES >= 64) {
+    if (bytes == 128) {
+      return step_for<Twin<Pack<T, 64>>>(held);
+    }
     if (bytes == 64) {
       return step_for<Pack<T, 64>>(held);
     }
