@@ -56,7 +56,9 @@ class Predictor {
     const double lanes = (is_wide ? 32.0 : 16.0) / (load_.is_double ? 8.0 : 4.0);
     double sum = 6.0;
     for (const Chain& chain : form.chains) {
-      sum += 3.7 + (wide_ > 0.0 ? 0.62 : 0.9) * std::ceil(chain.count / lanes);
+      const double stiff = chain.is_stiff ? 2.2 : 1.0;
+      sum += 3.7 + stiff * (wide_ > 0.0 ? 0.62 : 0.9) * std::ceil(chain.count / lanes) +
+             (chain.is_stiff ? 24.0 : 0.0);
     }
     if (!form.links.empty()) {
       sum += 4.0;
@@ -68,23 +70,34 @@ class Predictor {
       sum += run->law == Law::spring || run->law == Law::contact ? 2.3 : 5.0;
     }
     sum += 3.2 * static_cast<double>(form.loose.size()) + heard_and_pushed(0.5) +
-           10.0 * static_cast<double>(program_.taps.size());
+           22.0 * static_cast<double>(program_.taps.size());
     return sum * load_.voices;
   }
 
+  // A force that sounds all the time costs more than the body; a body in contact is walked sample
+  // by sample.
   double operator()(const Dense& form) const {
     const double n = program_.moving;
-    const double half = load_.is_double ? 1.0 : 0.5;
+    const double slow = wide_ > 0.0 ? 1.0 : 1.8;
+    const double half = load_.is_double ? 1.0 : 0.6;
+    const double signals = static_cast<double>(program_.inputs.size() * program_.outputs.size());
     if (form.ports.empty()) {
-      const double slope = load_.isa == Isa::base ? 0.46 : 0.21;
-      const double heard = static_cast<double>(program_.outputs.size());
-      return load_.voices * (1.0 + half * n * slope * (1.0 + 0.4 * (heard - 1.0)) +
-                             half * (2.0 + 0.2 * n) * static_cast<double>(program_.inputs.size()));
+      return load_.voices * slow * (0.95 + half * 0.12 * n + 3.0 * signals);
     }
-    const double bytes = n * (load_.is_double ? 8.0 : 4.0);
-    const double packs = std::ceil(bytes / static_cast<double>(vector_bytes(load_.isa)));
-    return load_.voices * (packs <= 1.0 ? 11.0 : 10.0 + 6.0 * packs + 2.0 * n) +
-           3.0 * static_cast<double>(form.ports.size() - 1);
+    const double stride = load_.is_double ? 4.0 * std::ceil(n / 4.0) : 2.0 * std::ceil(n / 2.0);
+    const double one = n <= 4.0 ? 8.0 : load_.is_double ? 2.8 * stride - 5.7 : 1.3 * stride + 2.0;
+    return load_.voices * slow * (one + 5.0 * static_cast<double>(form.ports.size() - 1));
+  }
+
+  // Beyond four masses nothing is held in registers, and it is dearer than the direct form.
+  double operator()(const Chorus&) const {
+    const auto lanes = static_cast<double>(vector_bytes(load_.isa) / (load_.is_double ? 8 : 4));
+    const double packs = std::ceil(load_.voices / lanes);
+    const Count links = links_of(program_);
+    const double small = program_.moving <= 4 ? 1.0 : 2.0;
+    return small * std::max(12.0 + 5.0 * links.others,
+                            packs * (load_.isa == Isa::v4 ? 1.4 : 1.15) *
+                                (0.6 * program_.moving + 1.6 * links.springs + 7.0 * links.others));
   }
 
   double operator()(const Modes& form) const {

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "core/compile/chains_form.h"
+#include "core/compile/chorus_form.h"
 #include "core/compile/dense_form.h"
 #include "core/compile/grid_form.h"
 #include "core/compile/modal_form.h"
@@ -28,6 +29,8 @@ std::optional<Form> form_of(const Program& program, Method method) {
       return any(modal_form(program));
     case Method::grid:
       return any(grid_form(program));
+    case Method::chorus:
+      return any(chorus_form(program));
   }
   return std::nullopt;
 }
@@ -56,6 +59,9 @@ struct Describer {
   std::string operator()(const Modes& form) const {
     return count_of(form.modes, "mode", "modes") + " in place of the masses, " +
            count_of(form.places.size(), "place", "places") + " where links hold on";
+  }
+  std::string operator()(const Chorus&) const {
+    return "its masses in registers, a voice in each lane";
   }
   std::string operator()(const Grid& form) const {
     return std::string(form.segments.empty() ? "forces" : "rows that are alike") +
@@ -159,6 +165,8 @@ std::string_view method_name(Method method) {
       return "modal";
     case Method::grid:
       return "grid";
+    case Method::chorus:
+      return "chorus";
   }
   return "";
 }

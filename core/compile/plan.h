@@ -12,10 +12,10 @@
 
 namespace ressort {
 
-enum class Method { direct, chains, dense, modal, grid };
+enum class Method { direct, chains, dense, modal, grid, chorus };
 
 inline constexpr Method all_methods[] = {Method::direct, Method::chains, Method::dense,
-                                         Method::modal, Method::grid};
+                                         Method::modal,  Method::grid,   Method::chorus};
 
 std::string_view method_name(Method method);
 

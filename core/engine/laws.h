@@ -63,13 +63,8 @@ struct PluckShape {
 template <class V>
 static inline V pluck_force(V d, V v, const PluckShape<V>& shape, V z) {
   const V far = absolute(d);
-  const V tenth = k / 10;
-  const V inner = -(k - tenth) * d;
-  const V hold = s / 10 * k;
-  const V outer = tenth * d - select(d < V{}, -hold, hold);
-  return select(far < s, select(far < s / 10, inner, outer) + z * v, V{});
   const V within = -shape.rise * d;
-  const V beyond = -sign(d) * shape.top + shape.fall * d;
+  const V beyond = shape.fall * d - select(d < V{}, -shape.top, shape.top);
   return select(far < shape.outer, select(far < shape.inner, within, beyond) + z * v, V{});
 }
 template <class V>
