@@ -12,10 +12,7 @@
 #include <utility>
 
 #include "app/denormals.h"
-#include "core/compile/chains_form.h"
-#include "core/compile/dense_form.h"
-#include "core/compile/grid_form.h"
-#include "core/compile/modal_form.h"
+#include "core/compile/plan.h"
 #include "core/model/mdl.h"
 #include "tests/bench/measure.h"
 #include "tests/bench/report.h"
@@ -119,43 +116,33 @@ void show_progress(std::size_t done, std::size_t all, const std::string& doing) 
 
 // The machine in every form that it has.
 std::vector<Formed> forms_of(const Machine& machine) {
-  std::vector<Formed> forms{{"direct", machine}};
-  const auto add = [&](const char* method, auto&& form) {
-    if (form) {
-      forms.push_back({method, machine});
-      forms.back().machine.parts[0].form = *std::move(form);
+  std::vector<Formed> forms;
+  for (const Method method : all_methods) {
+    Formed formed{std::string(method_name(method)), machine};
+    const Plan plan = make_plan(formed.machine, {}, method);
+    if (plan.parts.size() == 1 && plan.parts[0].method == method) {
+      forms.push_back(std::move(formed));
     }
-  };
-  add("chains", chains_form(machine.parts[0]));
-  add("dense", dense_form(machine.parts[0]));
-  add("modal", modal_form(machine.parts[0]));
-  add("grid", grid_form(machine.parts[0]));
+  }
   return forms;
-}
-
-// What the engine plays: until the plan chooses, the form that was fastest when all were calibrated
-// here. The one place to change.
-const Formed& chosen(const std::vector<Formed>& forms, const std::vector<double>& calibrated) {
-  const auto best = std::min_element(calibrated.begin(), calibrated.end());
-  return forms[static_cast<std::size_t>(best - calibrated.begin())];
 }
 
 void add_ours(const BenchScene& scene, const Network& network, const std::vector<Formed>& forms,
               bool is_double, Isa isa, std::vector<Timed>& all) {
   std::vector<Timed> kernels;
-  std::vector<double> calibrated;
   for (const Formed& formed : forms) {
     const Program& program = formed.machine.parts[0];
     kernels.emplace_back(formed.method, is_double,
                          is_double ? play_kernels<double>(scene, network, program, isa)
                                    : play_kernels<float>(scene, network, program, isa));
-    calibrated.push_back(kernels.back().calibrate());
+    kernels.back().calibrate();
   }
   const Precision precision = is_double ? Precision::float64 : Precision::float32;
-  const Formed& played = chosen(forms, calibrated);
-  all.emplace_back("ressort", is_double,
-                   play_engine(scene, network, played.machine, precision, isa));
-  all.back().form = played.method;
+  Machine planned = forms.front().machine;
+  const Plan plan = make_plan(
+      planned, {.is_double = is_double, .isa = isa, .voices = static_cast<int>(scene.voices)});
+  all.emplace_back("ressort", is_double, play_engine(scene, network, planned, precision, isa));
+  all.back().form = method_name(plan.parts.front().method);
   all.back().calibrate();
   std::move(kernels.begin(), kernels.end(), std::back_inserter(all));
 }
