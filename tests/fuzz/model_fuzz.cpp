@@ -1,6 +1,6 @@
 // A libFuzzer target: whatever text comes, it is read or refused with a place and a sentence; what
-// is read comes back from its print, and if it is not too large it is exported, compiled and played,
-// and what is heard is finite.
+// is read comes back from its print, and if it is not too large it is exported, compiled and
+// played, and what is heard is finite.
 #include <array>
 #include <cmath>
 #include <cstddef>
@@ -19,7 +19,7 @@ namespace ressort {
 namespace {
 
 constexpr std::size_t frames = 128;
-constexpr std::uint64_t most_nodes = 1000;  // for speed alone: the reader takes millions
+constexpr std::uint64_t most_nodes = 300;  // for speed alone: the reader takes millions
 
 void require(bool holds) {
   if (!holds) {
