@@ -1,7 +1,6 @@
 // core/model: the pieces of a line of text, and how they are shown to a person.
 #pragma once
 
-#include <algorithm>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -34,7 +33,7 @@ inline constexpr std::size_t most_suggestions = 2000;  // names looked at; none 
 template <class Names>
 std::string suggestion(std::string_view word, const Names& names, std::string_view prefix = "") {
   std::string_view best;
-  std::size_t least = std::min(word.size(), word.size() / 3 + 2);
+  std::size_t least = word.size() / 3 + 2;
   if (word.size() > 64) {
     return "";
   }
