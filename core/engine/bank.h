@@ -33,7 +33,8 @@ struct PartBank {
 
 template <class T>
 struct Bank {
-  Bank(const Machine& machine, std::size_t voices, Isa isa) : mixer(mixer_for<T>(isa)) {
+  Bank(const Machine& machine, std::size_t voices, Isa isa)
+      : mixer(with_isa(isa, []<Isa level>() { return make_mixer<level, T>(); })) {
     std::size_t inputs = 0;
     std::size_t audio_coefficients = 0;
     std::size_t channels = 0;

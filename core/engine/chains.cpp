@@ -6,20 +6,6 @@
 namespace ressort {
 namespace {
 
-template <class T>
-ChainsStep<T> step_for(std::size_t bytes, Isa isa) {
-#if RESSORT_X86_LEVELS
-  if (isa == Isa::v4) {
-    return v4::chains_step<T>(bytes);
-  }
-  if (isa == Isa::v3) {
-    return v3::chains_step<T>(bytes);
-  }
-#endif
-  static_cast<void>(isa);
-  return base::chains_step<T>(bytes);
-}
-
 // The widest that the longest chain fills often enough for the passes to be worth more than their
 // ends. Packs of 64 bytes are slower than two of 32 wherever a pack takes two turns, and the ends
 // of a pass cost more of them.
@@ -273,13 +259,13 @@ ChainsKernel<T>::ChainsKernel(const Program& program, Isa isa)
       program_(program),
       lanes_(lanes_for<T>(std::get<Chains>(program.form), isa)),
       tables_(TablesMaker(program, lanes_, place_).make()),
-      step_(step_for<T>(lanes_ * sizeof(T), isa)),
+      step_(with_isa(isa, [&]<Isa level>() { return chains_step<level, T>(lanes_ * sizeof(T)); })),
       masks_(4 * lanes_ * tables_.chains.size()),
       units_(lanes_ * lanes_),
       bodies_(2 * lanes_ * tables_.pairs),
       held_(4 * tables_.chains.size()),
       force_(tables_.force_count),
-      corners_(4 * program.taps.size()),
+      corners_(program.taps.size()),
       tap_pull_(program.taps.size()) {
   const auto& chains = std::get<Chains>(program.form).chains;
   for (std::size_t i = 0; i < chains.size(); ++i) {

@@ -7,6 +7,7 @@
 #pragma once
 
 #include "core/engine/kernel.h"
+#include "core/engine/taps.h"
 
 namespace ressort {
 
@@ -87,13 +88,6 @@ struct PlacedTap {
   std::uint32_t force = 0;
 };
 
-// One of the four nodes around a point.
-template <class T>
-struct Corner {
-  std::uint32_t node = 0;  // of Program::tap_nodes
-  T weight = 0;
-};
-
 // What a kernel makes of a Program and its lanes, once.
 struct ChainsTables {
   std::vector<FoldedChain> chains;
@@ -118,14 +112,14 @@ struct ChainsTables {
 template <class T>
 struct ChainsState {
   Ramps<T> ramps;
-  const T* masks;      // [chain][4][lane] 1 or 0: is a mass here, up to the last one's pair; is one
-                       // beyond it; is it the last, in its pair; is it the last but one
-  const T* units;      // [lane][lane] 1 where both are the same
-  T* bodies;           // [pair][position or velocity][lane]
-  T* held;             // [chain][4] the springs that forces of the last sample had: 0 at the start
-  T* force;            // [force] summed by the links, used by the next sample
-  Corner<T>* corners;  // [tap][4] where it is in this sample
-  T* tap_pull;         // [tap] what the links of this sample do to it, for the next one
+  const T* masks;  // [chain][4][lane] 1 or 0: is a mass here, up to the last one's pair; is one
+                   // beyond it; is it the last, in its pair; is it the last but one
+  const T* units;  // [lane][lane] 1 where both are the same
+  T* bodies;       // [pair][position or velocity][lane]
+  T* held;         // [chain][4] the springs that forces of the last sample had: 0 at the start
+  T* force;        // [force] summed by the links, used by the next sample
+  Corners<T>* corners;  // [tap] in this sample
+  T* tap_pull;          // [tap] what the links of this sample do to it, for the next one
 };
 
 template <class T>
@@ -133,18 +127,8 @@ using ChainsStep = void (*)(const Program& program, const ChainsTables& tables,
                             ChainsState<T>& state, const Block<T>& block);
 
 // The function for packs of so many bytes.
-namespace base {
-template <class T>
+template <Isa isa, class T>
 ChainsStep<T> chains_step(std::size_t bytes);
-}
-namespace v3 {
-template <class T>
-ChainsStep<T> chains_step(std::size_t bytes);
-}
-namespace v4 {
-template <class T>
-ChainsStep<T> chains_step(std::size_t bytes);
-}
 
 template <class T>
 class ChainsKernel final : public Kernel<T> {
@@ -166,7 +150,7 @@ class ChainsKernel final : public Kernel<T> {
   Aligned<T> bodies_;
   Aligned<T> held_;
   Aligned<T> force_;
-  std::vector<Corner<T>> corners_;
+  std::vector<Corners<T>> corners_;
   Aligned<T> tap_pull_;
 };
 

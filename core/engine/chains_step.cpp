@@ -67,7 +67,7 @@ struct View {
   const T* units;
   T* held;
   T* force;
-  Corner<T>* corners;
+  Corners<T>* corners;
   T* tap_pull;
   const T* coefficient;
 };
@@ -360,42 +360,17 @@ void step_links(S& s) {
   }
 }
 
-// w_i = max(0, 1 - |p - i|) along each side, p being the coordinate in nodes.
-template <class S>
-void locate(const PlacedTap& tap, const S& s, Corner<typename S::Number>* corners) {
-  using T = typename S::Number;
-  const auto split = [&](std::uint32_t coefficient, std::uint32_t nodes, std::uint32_t& below) {
-    // Not std::clamp: what is no number becomes 0.
-    const T u = s.coefficient[coefficient];
-    const T p = (u > 0 ? (u < 1 ? u : T(1)) : T(0)) * static_cast<T>(nodes - 1);
-    below = static_cast<std::uint32_t>(p);
-    return p - static_cast<T>(below);
-  };
-  std::uint32_t row = 0;
-  std::uint32_t column = 0;
-  const T alpha = split(tap.slot.u, tap.slot.length, row);
-  const T beta = split(tap.slot.v, tap.slot.width, column);
-  const std::uint32_t node = tap.slot.first + row * tap.slot.width + column;
-  const std::uint32_t next = alpha > 0 ? node + tap.slot.width : node;
-  const std::uint32_t aside = beta > 0 ? 1 : 0;
-  corners[0] = {node, (1 - alpha) * (1 - beta)};
-  corners[1] = {node + aside, (1 - alpha) * beta};
-  corners[2] = {next, alpha * (1 - beta)};
-  corners[3] = {next + aside, alpha * beta};
-}
-
 // What acts on a point goes to the nodes around it.
-template <class S>
-void spread(const Corner<typename S::Number>* corners, typename S::Number force, S s) {
-  for (std::size_t i = 0; i < 4; ++i) {
-    const PlacedNode& node = s.tap_nodes[corners[i].node];
-    const auto share = corners[i].weight * force;
+template <class S, class T>
+void spread(const Corners<T>& corners, T force, S s) {
+  each_corner(corners, [&](std::uint32_t corner, T weight) {
+    const PlacedNode& node = s.tap_nodes[corner];
     if (node.force != nowhere) {
-      s.force[node.force] += share;
+      s.force[node.force] += weight * force;
     } else {
-      push(node.site, share, s);
+      push(node.site, weight * force, s);
     }
-  }
+  });
 }
 
 // Links pull where a point was in the last sample, this sample's inputs where it is in this one.
@@ -404,23 +379,23 @@ void push_taps(S& s) {
   auto* corners = s.corners;
   auto* pull = s.tap_pull;
   for (const PlacedTap& tap : s.taps) {
-    spread(corners, *pull++, s);
-    locate(tap, s, corners);
-    spread(corners, s.force[tap.force], s);
+    spread(*corners, *pull++, s);
+    *corners = corners_at(tap.slot, s.coefficient[tap.slot.u], s.coefficient[tap.slot.v]);
+    spread(*corners, s.force[tap.force], s);
     s.force[tap.force] = 0;
-    corners += 4;
+    ++corners;
   }
 }
 
 // A point moves with the nodes around it, and along them when its coordinate changes.
 template <class S>
 void move_taps(S& s) {
-  const auto* corner = s.corners;
+  const auto* corners = s.corners;
   for (const PlacedTap& tap : s.taps) {
     typename S::Number position = 0;
-    for (std::size_t i = 0; i < 4; ++i, ++corner) {
-      position += corner->weight * s.bodies[s.tap_nodes[corner->node].place];
-    }
+    each_corner(*corners++, [&](std::uint32_t corner, auto weight) {
+      position += weight * s.bodies[s.tap_nodes[corner].place];
+    });
     s.bodies[tap.place + S::lanes] = position - s.bodies[tap.place];
     s.bodies[tap.place] = position;
   }
@@ -508,11 +483,9 @@ void step(const Program& program, const ChainsTables& tables, ChainsState<T>& st
   }
 }
 
-}  // namespace
-
 template <class T>
-ChainsStep<T> chains_step(std::size_t bytes) {
-  if constexpr (RESSORT_VECTOR_BYTES >= 32) {
+ChainsStep<T> step_in(std::size_t bytes) {
+  if constexpr (vector_bytes(Isa::RESSORT_ISA) >= 32) {
     if (bytes == 32) {
       return step<T, 32>;
     }
@@ -520,7 +493,19 @@ ChainsStep<T> chains_step(std::size_t bytes) {
   return step<T, 16>;
 }
 
-template ChainsStep<float> chains_step(std::size_t);
-template ChainsStep<double> chains_step(std::size_t);
-
+}  // namespace
 }  // namespace ressort::RESSORT_ISA
+
+namespace ressort {
+
+template <>
+ChainsStep<float> chains_step<Isa::RESSORT_ISA, float>(std::size_t bytes) {
+  return RESSORT_ISA::step_in<float>(bytes);
+}
+
+template <>
+ChainsStep<double> chains_step<Isa::RESSORT_ISA, double>(std::size_t bytes) {
+  return RESSORT_ISA::step_in<double>(bytes);
+}
+
+}  // namespace ressort

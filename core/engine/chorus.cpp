@@ -26,20 +26,6 @@ std::size_t chorus_width(std::size_t voices, Isa isa) {
   return lanes * std::min(chorus_bytes / bytes, (voices + lanes - 1) / lanes);
 }
 
-template <class T>
-ChorusStep<T> step_for(std::uint32_t held, std::size_t bytes, Isa isa) {
-#if RESSORT_X86_LEVELS
-  if (isa == Isa::v4) {
-    return v4::chorus_step<T>(held, bytes);
-  }
-  if (isa == Isa::v3) {
-    return v3::chorus_step<T>(held, bytes);
-  }
-#endif
-  static_cast<void>(isa);
-  return base::chorus_step<T>(held, bytes);
-}
-
 void add_masses(const Program& program, ChorusTable& table) {
   for (const MassRun& run : program.mass_runs) {
     table.slots.insert(table.slots.end(), run.count, run.inverse_mass);
@@ -110,7 +96,9 @@ ChorusKernel<T>::ChorusKernel(const Program& program, const Chorus& chorus, std:
       chorus_(chorus),
       lanes_(pack_bytes<T>(voices, isa) / sizeof(T)),
       table_(table_of(program, chorus, this->width() / lanes_)),
-      step_(step_for<T>(table_.held, lanes_ * sizeof(T), isa)),
+      step_(with_isa(
+          isa,
+          [&]<Isa level>() { return chorus_step<level, T>(table_.held, lanes_ * sizeof(T)); })),
       cells_(table_.cells * this->width()) {
   for (std::size_t lane = 0; lane < this->width(); ++lane) {
     reset(lane);

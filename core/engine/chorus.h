@@ -55,18 +55,8 @@ using ChorusStep = void (*)(const Program& program, const Chorus& chorus, const 
                             ChorusState<T>& state, const Block<T>& block);
 
 // The function for so many masses held, in packs of so many bytes; 128 are a twin of 64.
-namespace base {
-template <class T>
+template <Isa isa, class T>
 ChorusStep<T> chorus_step(std::uint32_t held, std::size_t bytes);
-}
-namespace v3 {
-template <class T>
-ChorusStep<T> chorus_step(std::uint32_t held, std::size_t bytes);
-}
-namespace v4 {
-template <class T>
-ChorusStep<T> chorus_step(std::uint32_t held, std::size_t bytes);
-}
 
 template <class T>
 class ChorusKernel final : public Kernel<T> {

@@ -233,11 +233,9 @@ ChorusStep<Scalar<V>> step_for(std::uint32_t held) {
   }
 }
 
-}  // namespace
-
 template <class T>
-ChorusStep<T> chorus_step(std::uint32_t held, std::size_t bytes) {
-  if constexpr (RESSORT_VECTOR_BYTES >= 64) {
+ChorusStep<T> step_in(std::uint32_t held, std::size_t bytes) {
+  if constexpr (vector_bytes(Isa::RESSORT_ISA) >= 64) {
     if (bytes == 128) {
       return step_for<Twin<Pack<T, 64>>>(held);
     }
@@ -245,7 +243,7 @@ ChorusStep<T> chorus_step(std::uint32_t held, std::size_t bytes) {
       return step_for<Pack<T, 64>>(held);
     }
   }
-  if constexpr (RESSORT_VECTOR_BYTES >= 32) {
+  if constexpr (vector_bytes(Isa::RESSORT_ISA) >= 32) {
     if (bytes == 32) {
       return step_for<Pack<T, 32>>(held);
     }
@@ -253,7 +251,19 @@ ChorusStep<T> chorus_step(std::uint32_t held, std::size_t bytes) {
   return step_for<Pack<T, 16>>(held);
 }
 
-template ChorusStep<float> chorus_step(std::uint32_t, std::size_t);
-template ChorusStep<double> chorus_step(std::uint32_t, std::size_t);
-
+}  // namespace
 }  // namespace ressort::RESSORT_ISA
+
+namespace ressort {
+
+template <>
+ChorusStep<float> chorus_step<Isa::RESSORT_ISA, float>(std::uint32_t held, std::size_t bytes) {
+  return RESSORT_ISA::step_in<float>(held, bytes);
+}
+
+template <>
+ChorusStep<double> chorus_step<Isa::RESSORT_ISA, double>(std::uint32_t held, std::size_t bytes) {
+  return RESSORT_ISA::step_in<double>(held, bytes);
+}
+
+}  // namespace ressort

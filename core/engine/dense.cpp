@@ -28,20 +28,6 @@ bool acts_everywhere(Law law) {
   return true;
 }
 
-template <class T>
-DenseSteps<T> steps_for(std::size_t masses, Isa isa) {
-#if RESSORT_X86_LEVELS
-  if (isa == Isa::v4) {
-    return v4::dense_steps<T>(masses);
-  }
-  if (isa == Isa::v3) {
-    return v3::dense_steps<T>(masses);
-  }
-#endif
-  static_cast<void>(isa);
-  return base::dense_steps<T>(masses);
-}
-
 std::size_t round_up(std::size_t count, std::size_t to) {
   return (count + to - 1) / to * to;
 }
@@ -119,7 +105,7 @@ DenseKernel<T>::DenseKernel(const Program& program, const Dense& form, Isa isa)
     : Kernel<T>(program, 1),
       program_(program),
       form_(form),
-      steps_(steps_for<T>(program.moving, isa)),
+      steps_(with_isa(isa, [&]<Isa level>() { return dense_steps<level, T>(program.moving); })),
       known_(program.coefficients.size()),
       arranged_(program.inputs.size() * 2 * max_block_frames) {
   body_.masses = program.moving;

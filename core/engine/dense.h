@@ -143,33 +143,13 @@ struct DenseSteps {
   void (*build)(DenseBody<T>& body);
 };
 
-namespace base {
-template <class T>
+template <Isa isa, class T>
 DenseSteps<T> dense_steps(std::size_t masses);
-template <class T>
+template <Isa isa, class T>
 std::size_t leap_dense(DenseBody<T>& body, const DenseDrive<T>& drive, std::size_t at,
                        std::size_t count);
-template <class T>
+template <Isa isa, class T>
 void build_dense(DenseBody<T>& body);
-}  // namespace base
-namespace v3 {
-template <class T>
-DenseSteps<T> dense_steps(std::size_t masses);
-template <class T>
-std::size_t leap_dense(DenseBody<T>& body, const DenseDrive<T>& drive, std::size_t at,
-                       std::size_t count);
-template <class T>
-void build_dense(DenseBody<T>& body);
-}  // namespace v3
-namespace v4 {
-template <class T>
-DenseSteps<T> dense_steps(std::size_t masses);
-template <class T>
-std::size_t leap_dense(DenseBody<T>& body, const DenseDrive<T>& drive, std::size_t at,
-                       std::size_t count);
-template <class T>
-void build_dense(DenseBody<T>& body);
-}  // namespace v4
 
 inline constexpr std::size_t most_dense_masses = 16;
 

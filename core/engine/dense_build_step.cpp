@@ -8,10 +8,10 @@
 namespace ressort::RESSORT_ISA {
 namespace {
 
-constexpr std::size_t lanes = RESSORT_VECTOR_BYTES / sizeof(double);
+constexpr std::size_t lanes = vector_bytes(Isa::RESSORT_ISA) / sizeof(double);
 constexpr std::size_t row_length = dense_frames + dense_pad;
 
-using V = Pack<double, RESSORT_VECTOR_BYTES>;
+using V = Pack<double, vector_bytes(Isa::RESSORT_ISA)>;
 
 template <std::size_t Count>
 void combine_some(const double* from, const double* vectors, std::size_t step, const double* factor,
@@ -236,10 +236,8 @@ struct Build {
   }
 };
 
-}  // namespace
-
 template <class T>
-void build_dense(DenseBody<T>& body) {
+void build_all(DenseBody<T>& body) {
   Build<T> build{body};
   build.put_first_power();
   build.put_first_sample();
@@ -254,7 +252,19 @@ void build_dense(DenseBody<T>& body) {
   build.keep_responses();
 }
 
-template void build_dense(DenseBody<float>&);
-template void build_dense(DenseBody<double>&);
-
+}  // namespace
 }  // namespace ressort::RESSORT_ISA
+
+namespace ressort {
+
+template <>
+void build_dense<Isa::RESSORT_ISA, float>(DenseBody<float>& body) {
+  RESSORT_ISA::build_all(body);
+}
+
+template <>
+void build_dense<Isa::RESSORT_ISA, double>(DenseBody<double>& body) {
+  RESSORT_ISA::build_all(body);
+}
+
+}  // namespace ressort

@@ -6,7 +6,7 @@
 namespace ressort::RESSORT_ISA {
 namespace {
 
-constexpr std::size_t widest = RESSORT_VECTOR_BYTES;
+constexpr std::size_t widest = vector_bytes(Isa::RESSORT_ISA);
 
 template <class T>
 using Wide = Pack<T, widest>;
@@ -346,11 +346,8 @@ struct Leap {
   }
 };
 
-}  // namespace
-
 template <class T>
-std::size_t leap_dense(DenseBody<T>& b, const DenseDrive<T>& drive, std::size_t at,
-                       std::size_t count) {
+std::size_t leap(DenseBody<T>& b, const DenseDrive<T>& drive, std::size_t at, std::size_t count) {
   Leap<T> l{b, drive, at, count};
   l.listen();
   for (std::size_t p = 0; p < b.ports; ++p) {
@@ -365,9 +362,23 @@ std::size_t leap_dense(DenseBody<T>& b, const DenseDrive<T>& drive, std::size_t 
   return l.count;
 }
 
-template std::size_t leap_dense(DenseBody<float>&, const DenseDrive<float>&, std::size_t,
-                                std::size_t);
-template std::size_t leap_dense(DenseBody<double>&, const DenseDrive<double>&, std::size_t,
-                                std::size_t);
-
+}  // namespace
 }  // namespace ressort::RESSORT_ISA
+
+namespace ressort {
+
+template <>
+std::size_t leap_dense<Isa::RESSORT_ISA, float>(DenseBody<float>& body,
+                                                const DenseDrive<float>& drive, std::size_t at,
+                                                std::size_t count) {
+  return RESSORT_ISA::leap(body, drive, at, count);
+}
+
+template <>
+std::size_t leap_dense<Isa::RESSORT_ISA, double>(DenseBody<double>& body,
+                                                 const DenseDrive<double>& drive, std::size_t at,
+                                                 std::size_t count) {
+  return RESSORT_ISA::leap(body, drive, at, count);
+}
+
+}  // namespace ressort

@@ -381,7 +381,8 @@ template <class T, std::size_t Bytes>
 DenseSteps<T> steps_of(std::size_t packs) {
   const auto of = []<std::size_t Count>() {
     using W = Walk<T, Bytes, Count>;
-    return DenseSteps<T>{W::step, W::pull, leap_dense<T>, build_dense<T>};
+    return DenseSteps<T>{W::step, W::pull, leap_dense<Isa::RESSORT_ISA, T>,
+                         build_dense<Isa::RESSORT_ISA, T>};
   };
   if (packs == 1) {
     return of.template operator()<1>();
@@ -398,13 +399,10 @@ DenseSteps<T> steps_of(std::size_t packs) {
   return of.template operator()<most_dense_masses * sizeof(T) / Bytes>();
 }
 
-}  // namespace
-
 template <class T>
-DenseSteps<T> dense_steps(std::size_t masses) {
-  constexpr std::size_t widest = RESSORT_VECTOR_BYTES;
-  constexpr Isa isa = widest == 64 ? Isa::v4 : widest == 32 ? Isa::v3 : Isa::base;
-  const auto [bytes, packs] = dense_packs(masses, sizeof(T), isa);
+DenseSteps<T> steps_for(std::size_t masses) {
+  constexpr std::size_t widest = vector_bytes(Isa::RESSORT_ISA);
+  const auto [bytes, packs] = dense_packs(masses, sizeof(T), Isa::RESSORT_ISA);
   if constexpr (widest >= 64) {
     if (bytes == 64) {
       return steps_of<T, 64>(packs);
@@ -418,7 +416,19 @@ DenseSteps<T> dense_steps(std::size_t masses) {
   return steps_of<T, 16>(packs);
 }
 
-template DenseSteps<float> dense_steps(std::size_t);
-template DenseSteps<double> dense_steps(std::size_t);
-
+}  // namespace
 }  // namespace ressort::RESSORT_ISA
+
+namespace ressort {
+
+template <>
+DenseSteps<float> dense_steps<Isa::RESSORT_ISA, float>(std::size_t masses) {
+  return RESSORT_ISA::steps_for<float>(masses);
+}
+
+template <>
+DenseSteps<double> dense_steps<Isa::RESSORT_ISA, double>(std::size_t masses) {
+  return RESSORT_ISA::steps_for<double>(masses);
+}
+
+}  // namespace ressort

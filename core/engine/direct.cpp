@@ -15,34 +15,18 @@ std::size_t lanes_for(std::size_t voices, Isa isa) {
   return bytes / sizeof(T);
 }
 
-template <class T>
-DirectStep<T> step_for(std::size_t bytes, Isa isa) {
-#if RESSORT_X86_LEVELS
-  if (isa == Isa::v4) {
-    return v4::direct_step<T>(bytes);
-  }
-  if (isa == Isa::v3) {
-    return v3::direct_step<T>(bytes);
-  }
-#endif
-  static_cast<void>(isa);
-  return base::direct_step<T>(bytes);
-}
-
 }  // namespace
 
 template <class T>
 DirectKernel<T>::DirectKernel(const Program& program, std::size_t voices, Isa isa)
     : Kernel<T>(program, lanes_for<T>(voices, isa)),
       program_(program),
-      step_(step_for<T>(this->width() * sizeof(T), isa)),
+      step_(with_isa(
+          isa, [&]<Isa level>() { return direct_step<level, T>(this->width() * sizeof(T)); })),
       x_(program.position.size() * this->width()),
       v_(x_.size()),
       force_(x_.size()),
-      row_(program.taps.size() * this->width()),
-      column_(row_.size()),
-      alpha_(row_.size()),
-      beta_(row_.size()) {
+      corners_(program.taps.size() * this->width()) {
   for (std::size_t lane = 0; lane < this->width(); ++lane) {
     reset(lane);
   }
@@ -64,10 +48,7 @@ void DirectKernel<T>::play(const Block<T>& block) {
                        .x = x_.data(),
                        .v = v_.data(),
                        .force = force_.data(),
-                       .row = row_.data(),
-                       .column = column_.data(),
-                       .alpha = alpha_.data(),
-                       .beta = beta_.data(),
+                       .corners = corners_.data(),
                        .nodes = program_.position.size()};
   step_(program_, state, block);
   this->coefficients.finish(block.frames);

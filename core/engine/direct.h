@@ -7,6 +7,7 @@
 #pragma once
 
 #include "core/engine/kernel.h"
+#include "core/engine/taps.h"
 
 namespace ressort {
 
@@ -14,13 +15,10 @@ namespace ressort {
 template <class T>
 struct DirectState {
   Ramps<T> ramps;
-  T* x;                // [node][lane] position
-  T* v;                // [node][lane] change of position per sample
-  T* force;            // [node][lane] summed by the links, used by the next sample
-  std::uint32_t* row;  // [tap][lane] where it is in this sample: its lowest corner...
-  std::uint32_t* column;
-  T* alpha;  // [tap][lane] ...and how far it is beyond it, 0..1, towards the next row
-  T* beta;   // [tap][lane] and column
+  T* x;                 // [node][lane] position
+  T* v;                 // [node][lane] change of position per sample
+  T* force;             // [node][lane] summed by the links, used by the next sample
+  Corners<T>* corners;  // [tap][lane] in this sample
   std::size_t nodes;
 };
 
@@ -28,18 +26,8 @@ template <class T>
 using DirectStep = void (*)(const Program& program, DirectState<T>& state, const Block<T>& block);
 
 // The function for lanes that fill so many bytes.
-namespace base {
-template <class T>
+template <Isa isa, class T>
 DirectStep<T> direct_step(std::size_t bytes);
-}
-namespace v3 {
-template <class T>
-DirectStep<T> direct_step(std::size_t bytes);
-}
-namespace v4 {
-template <class T>
-DirectStep<T> direct_step(std::size_t bytes);
-}
 
 template <class T>
 class DirectKernel final : public Kernel<T> {
@@ -55,10 +43,7 @@ class DirectKernel final : public Kernel<T> {
   Aligned<T> x_;
   Aligned<T> v_;
   Aligned<T> force_;
-  std::vector<std::uint32_t> row_;
-  std::vector<std::uint32_t> column_;
-  Aligned<T> alpha_;
-  Aligned<T> beta_;
+  std::vector<Corners<T>> corners_;
 };
 
 }  // namespace ressort

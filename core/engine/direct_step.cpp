@@ -87,44 +87,19 @@ void step_links(const Program& program, S& s) {
 // node's own number in [node][lane].
 template <class S, class Use>
 void around(const Program& program, const S& s, std::size_t tap, std::size_t lane, Use&& use) {
-  const TapSlot& slot = program.taps[tap];
-  const std::size_t at = tap * S::lanes + lane;
-  const auto alpha = s.state.alpha[at];
-  const auto beta = s.state.beta[at];
-  const std::uint32_t* const row =
-      program.tap_nodes.data() + slot.first + s.state.row[at] * slot.width + s.state.column[at];
-  const auto there = [&](std::size_t step) { return row[step] * S::lanes + lane; };
-  use(there(0), (1 - alpha) * (1 - beta));
-  if (beta > 0) {
-    use(there(1), (1 - alpha) * beta);
-  }
-  if (alpha > 0) {
-    use(there(slot.width), alpha * (1 - beta));
-    if (beta > 0) {
-      use(there(slot.width + 1), alpha * beta);
-    }
-  }
+  each_corner(s.state.corners[tap * S::lanes + lane], [&](std::uint32_t node, auto weight) {
+    use(program.tap_nodes[node] * S::lanes + lane, weight);
+  });
 }
 
-// w_i = max(0, 1 - |p - i|) along each side, p being the coordinate in nodes.
 template <class S>
 void place_taps(const Program& program, S& s) {
-  using T = Scalar<typename S::V>;
-  const auto locate = [](T coordinate, std::uint32_t nodes, std::uint32_t& below, T& beyond) {
-    // Not std::clamp: what is no number becomes 0.
-    const T within = coordinate > 0 ? (coordinate < 1 ? coordinate : T(1)) : T(0);
-    const T p = within * static_cast<T>(nodes - 1);
-    below = static_cast<std::uint32_t>(p);
-    beyond = p - static_cast<T>(below);
-  };
+  const auto* const c = s.state.ramps.value;
   for (std::size_t i = 0; i < program.taps.size(); ++i) {
     const TapSlot& tap = program.taps[i];
     for (std::size_t lane = 0; lane < S::lanes; ++lane) {
-      const std::size_t at = i * S::lanes + lane;
-      locate(s.state.ramps.value[tap.u * S::lanes + lane], tap.length, s.state.row[at],
-             s.state.alpha[at]);
-      locate(s.state.ramps.value[tap.v * S::lanes + lane], tap.width, s.state.column[at],
-             s.state.beta[at]);
+      s.state.corners[i * S::lanes + lane] =
+          corners_at(tap, c[tap.u * S::lanes + lane], c[tap.v * S::lanes + lane]);
     }
   }
 }
@@ -263,16 +238,14 @@ void step(const Program& program, DirectState<T>& state, const Block<T>& block) 
   }
 }
 
-}  // namespace
-
 template <class T>
-DirectStep<T> direct_step(std::size_t bytes) {
-  if constexpr (RESSORT_VECTOR_BYTES >= 64) {
+DirectStep<T> step_in(std::size_t bytes) {
+  if constexpr (vector_bytes(Isa::RESSORT_ISA) >= 64) {
     if (bytes == 64) {
       return step<T, 64>;
     }
   }
-  if constexpr (RESSORT_VECTOR_BYTES >= 32) {
+  if constexpr (vector_bytes(Isa::RESSORT_ISA) >= 32) {
     if (bytes == 32) {
       return step<T, 32>;
     }
@@ -280,7 +253,19 @@ DirectStep<T> direct_step(std::size_t bytes) {
   return step<T, 16>;
 }
 
-template DirectStep<float> direct_step(std::size_t);
-template DirectStep<double> direct_step(std::size_t);
-
+}  // namespace
 }  // namespace ressort::RESSORT_ISA
+
+namespace ressort {
+
+template <>
+DirectStep<float> direct_step<Isa::RESSORT_ISA, float>(std::size_t bytes) {
+  return RESSORT_ISA::step_in<float>(bytes);
+}
+
+template <>
+DirectStep<double> direct_step<Isa::RESSORT_ISA, double>(std::size_t bytes) {
+  return RESSORT_ISA::step_in<double>(bytes);
+}
+
+}  // namespace ressort

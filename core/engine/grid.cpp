@@ -8,20 +8,6 @@
 namespace ressort {
 namespace {
 
-template <class T>
-GridStep<T> step_for(Isa isa) {
-#if RESSORT_X86_LEVELS
-  if (isa == Isa::v4) {
-    return v4::grid_step<T>();
-  }
-  if (isa == Isa::v3) {
-    return v3::grid_step<T>();
-  }
-#endif
-  static_cast<void>(isa);
-  return base::grid_step<T>();
-}
-
 std::vector<std::uint32_t> offsets_of(const Grid& grid) {
   std::vector<std::uint32_t> offsets;
   for (const GridLinks& links : grid.links) {
@@ -47,7 +33,7 @@ GridKernel<T>::GridKernel(const Program& program, const Grid& grid, Isa isa)
     : Kernel<T>(program, 1),
       program_(program),
       grid_(grid),
-      step_(step_for<T>(isa)),
+      step_(with_isa(isa, [&]<Isa level>() { return grid_step<level, T>(); })),
       x_(grid.slots),
       v_(grid.slots),
       force_(grid.slots),
@@ -56,7 +42,7 @@ GridKernel<T>::GridKernel(const Program& program, const Grid& grid, Isa isa)
       shift_((furthest_offset(grid) + grid_line - 1) / grid_line * grid_line),
       inverse_mass_(grid.slots, grid_fixed),
       pushed_(program.taps.size() * grid_pushes),
-      taps_(program.taps.size()) {
+      corners_(program.taps.size()) {
   for (const MassRun& run : program.mass_runs) {
     for (std::uint32_t node = run.first; node < run.first + run.count; ++node) {
       inverse_mass_[grid.slot[node]] = run.inverse_mass;
@@ -130,7 +116,7 @@ void GridKernel<T>::play(const Block<T>& block) {
                      .inverse_mass = inverse_mass_.data(),
                      .pushed = pushed_.data(),
                      .pushes = pushes_,
-                     .taps = taps_.data()};
+                     .corners = corners_.data()};
   step_(program_, grid_, state, block);
   is_forward_ = state.is_forward;
   is_fresh_ = state.is_fresh;

@@ -2,6 +2,7 @@
 #pragma once
 
 #include "core/engine/kernel.h"
+#include "core/engine/taps.h"
 
 namespace ressort {
 
@@ -13,15 +14,6 @@ constexpr std::size_t grid_bytes(std::size_t vector_bytes) {
 
 inline constexpr std::uint32_t grid_fixed = 0xffffffffu;
 inline constexpr std::size_t grid_pushes = 8;  // of a tap: its corners before and after it moved
-
-// Where a tap is in this sample: its lowest corner, and how far it is beyond it, 0..1.
-template <class T>
-struct GridTapState {
-  std::uint32_t row = 0;
-  std::uint32_t column = 0;
-  T alpha = T(0);  // towards the next row
-  T beta = T(0);   // and column
-};
 
 // Everything that one step of GridKernel touches.
 template <class T>
@@ -46,25 +38,15 @@ struct GridState {
   const std::uint32_t* inverse_mass;  // [slot] coefficient, or grid_fixed
   std::uint32_t* pushed;              // slots that points push in the next sample
   std::size_t pushes;
-  GridTapState<T>* taps;  // [tap]
+  Corners<T>* corners;  // [tap] in this sample
 };
 
 template <class T>
 using GridStep = void (*)(const Program& program, const Grid& grid, GridState<T>& state,
                           const Block<T>& block);
 
-namespace base {
-template <class T>
+template <Isa isa, class T>
 GridStep<T> grid_step();
-}
-namespace v3 {
-template <class T>
-GridStep<T> grid_step();
-}
-namespace v4 {
-template <class T>
-GridStep<T> grid_step();
-}
 
 template <class T>
 class GridKernel final : public Kernel<T> {
@@ -93,7 +75,7 @@ class GridKernel final : public Kernel<T> {
   std::vector<std::uint32_t> inverse_mass_;
   std::vector<std::uint32_t> pushed_;
   std::size_t pushes_ = 0;
-  std::vector<GridTapState<T>> taps_;
+  std::vector<Corners<T>> corners_;
   bool is_forward_ = true;
   bool is_fresh_ = true;
 };

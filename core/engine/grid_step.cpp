@@ -11,7 +11,7 @@ namespace {
 // What the loops of one step know.
 template <class T>
 struct View {
-  static constexpr std::size_t lanes = grid_bytes(RESSORT_VECTOR_BYTES) / sizeof(T);
+  static constexpr std::size_t lanes = grid_bytes(vector_bytes(Isa::RESSORT_ISA)) / sizeof(T);
   using V = Pack<T, lanes * sizeof(T)>;
 
   const Program& program;
@@ -298,38 +298,17 @@ void push_ports(const View<T>& s) {
 // Calls use(slot, weight) for the up to four nodes around a tap's place.
 template <class T, class Use>
 void around(const View<T>& s, std::size_t tap, Use&& use) {
-  const TapSlot& slot = s.program.taps[tap];
-  const auto [row, column, alpha, beta] = s.state.taps[tap];
-  const std::uint32_t* const corner =
-      s.program.tap_nodes.data() + slot.first + row * slot.width + column;
-  const auto there = [&](std::size_t step) { return s.grid.slot[corner[step]]; };
-  use(there(0), (1 - alpha) * (1 - beta));
-  if (beta > 0) {
-    use(there(1), (1 - alpha) * beta);
-  }
-  if (alpha > 0) {
-    use(there(slot.width), alpha * (1 - beta));
-    if (beta > 0) {
-      use(there(slot.width + 1), alpha * beta);
-    }
-  }
+  each_corner(s.state.corners[tap], [&](std::uint32_t node, T weight) {
+    use(s.grid.slot[s.program.tap_nodes[node]], weight);
+  });
 }
 
-// w_i = max(0, 1 - |p - i|) along each side, p being the coordinate in nodes.
 template <class T>
 void place_taps(const View<T>& s) {
-  const auto locate = [&](std::uint32_t c, std::uint32_t nodes, std::uint32_t& below, T& beyond) {
-    const T coordinate = s.state.ramps.value[c];
-    // What is no number becomes 0.
-    const T within = coordinate > 0 ? (coordinate < 1 ? coordinate : T(1)) : T(0);
-    const T p = within * static_cast<T>(nodes - 1);
-    below = static_cast<std::uint32_t>(p);
-    beyond = p - static_cast<T>(below);
-  };
+  const T* const c = s.state.ramps.value;
   for (std::size_t i = 0; i < s.program.taps.size(); ++i) {
     const TapSlot& tap = s.program.taps[i];
-    locate(tap.u, tap.length, s.state.taps[i].row, s.state.taps[i].alpha);
-    locate(tap.v, tap.width, s.state.taps[i].column, s.state.taps[i].beta);
+    s.state.corners[i] = corners_at(tap, c[tap.u], c[tap.v]);
   }
 }
 
@@ -424,13 +403,18 @@ void step(const Program& program, const Grid& grid, GridState<T>& state, const B
 }
 
 }  // namespace
+}  // namespace ressort::RESSORT_ISA
 
-template <class T>
-GridStep<T> grid_step() {
-  return step<T>;
+namespace ressort {
+
+template <>
+GridStep<float> grid_step<Isa::RESSORT_ISA, float>() {
+  return RESSORT_ISA::step<float>;
 }
 
-template GridStep<float> grid_step();
-template GridStep<double> grid_step();
+template <>
+GridStep<double> grid_step<Isa::RESSORT_ISA, double>() {
+  return RESSORT_ISA::step<double>;
+}
 
-}  // namespace ressort::RESSORT_ISA
+}  // namespace ressort

@@ -1,5 +1,6 @@
 // core/engine: which instructions this machine has. Files named *_step.cpp are compiled once for
-// each of these, into a namespace of that name; everything else is compiled for the base.
+// each of these, into a namespace of that name; everything else is compiled for the base. What such
+// a file offers is a function template over Isa, which the file specialises for its own.
 #pragma once
 
 #include <cstddef>
@@ -19,6 +20,21 @@ std::string_view isa_name(Isa isa);
 // Code for narrow registers runs several times slower while the upper halves of wide ones are in
 // use, and compilers do not always clear those on the way out. [audio]
 void clear_wide_registers();
+
+// What `make.operator()<Isa>()` gives, called with the instruction set. [any thread]
+template <class Make>
+auto with_isa(Isa isa, const Make& make) {
+#if RESSORT_X86_LEVELS
+  if (isa == Isa::v4) {
+    return make.template operator()<Isa::v4>();
+  }
+  if (isa == Isa::v3) {
+    return make.template operator()<Isa::v3>();
+  }
+#endif
+  static_cast<void>(isa);
+  return make.template operator()<Isa::base>();
+}
 
 // Of one register.
 constexpr std::size_t vector_bytes(Isa isa) {

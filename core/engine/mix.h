@@ -23,31 +23,7 @@ struct Mixer {
   void (*add_voices)(const Heard<T>& heard, const double* gain, double* sum);
 };
 
-namespace base {
-template <class T>
-Mixer<T> mixer();
-}
-namespace v3 {
-template <class T>
-Mixer<T> mixer();
-}
-namespace v4 {
-template <class T>
-Mixer<T> mixer();
-}
-
-template <class T>
-Mixer<T> mixer_for(Isa isa) {
-#if RESSORT_X86_LEVELS
-  if (isa == Isa::v4) {
-    return v4::mixer<T>();
-  }
-  if (isa == Isa::v3) {
-    return v3::mixer<T>();
-  }
-#endif
-  static_cast<void>(isa);
-  return base::mixer<T>();
-}
+template <Isa isa, class T>
+Mixer<T> make_mixer();
 
 }  // namespace ressort

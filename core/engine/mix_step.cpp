@@ -27,10 +27,10 @@ void peaks_of(const Heard<T>& heard, double bound, std::size_t lane, T* peak) {
 
 template <class T>
 void find_peaks(const Heard<T>& heard, double bound, T* peak) {
-  constexpr std::size_t lanes = RESSORT_VECTOR_BYTES / sizeof(T);
+  constexpr std::size_t lanes = vector_bytes(Isa::RESSORT_ISA) / sizeof(T);
   std::size_t lane = 0;
   for (; lane + lanes <= heard.width; lane += lanes) {
-    peaks_of<Pack<T, RESSORT_VECTOR_BYTES>>(heard, bound, lane, peak);
+    peaks_of<Pack<T, vector_bytes(Isa::RESSORT_ISA)>>(heard, bound, lane, peak);
   }
   for (; lane + 16 / sizeof(T) <= heard.width; lane += 16 / sizeof(T)) {
     peaks_of<Pack<T, 16>>(heard, bound, lane, peak);
@@ -64,8 +64,8 @@ void add_voices(const Heard<T>& heard, const double* gain, double* sum) {
     const T* const row = heard.outputs + i * heard.width;
     sum[i] = 0.0;
     std::size_t lane = 0;
-    if (heard.width * sizeof(double) >= RESSORT_VECTOR_BYTES) {
-      lane = add_packs<RESSORT_VECTOR_BYTES>(row, 0, heard.width, gain, sum[i]);
+    if (heard.width * sizeof(double) >= vector_bytes(Isa::RESSORT_ISA)) {
+      lane = add_packs<vector_bytes(Isa::RESSORT_ISA)>(row, 0, heard.width, gain, sum[i]);
     }
     for (; lane < heard.width; ++lane) {
       sum[i] += gain[lane] == 0.0 ? 0.0 : gain[lane] * static_cast<double>(row[lane]);
@@ -73,14 +73,24 @@ void add_voices(const Heard<T>& heard, const double* gain, double* sum) {
   }
 }
 
-}  // namespace
-
 template <class T>
-Mixer<T> mixer() {
+Mixer<T> mixer_of() {
   return {find_peaks<T>, add_voices<T>};
 }
 
-template Mixer<float> mixer();
-template Mixer<double> mixer();
-
+}  // namespace
 }  // namespace ressort::RESSORT_ISA
+
+namespace ressort {
+
+template <>
+Mixer<float> make_mixer<Isa::RESSORT_ISA, float>() {
+  return RESSORT_ISA::mixer_of<float>();
+}
+
+template <>
+Mixer<double> make_mixer<Isa::RESSORT_ISA, double>() {
+  return RESSORT_ISA::mixer_of<double>();
+}
+
+}  // namespace ressort

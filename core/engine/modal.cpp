@@ -6,20 +6,6 @@
 namespace ressort {
 namespace {
 
-template <class T>
-ModalStep<T> step_for(Isa isa) {
-#if RESSORT_X86_LEVELS
-  if (isa == Isa::v4) {
-    return v4::modal_step<T>();
-  }
-  if (isa == Isa::v3) {
-    return v3::modal_step<T>();
-  }
-#endif
-  static_cast<void>(isa);
-  return base::modal_step<T>();
-}
-
 constexpr std::size_t most_rows = 16;  // of one sweep
 
 constexpr std::size_t round_up(std::size_t count, std::size_t unit) {
@@ -144,7 +130,7 @@ ModalKernel<T>::ModalKernel(const Program& program, const Modes& modes, Isa isa)
     : Kernel<T>(program, 1),
       program_(program),
       modes_(modes),
-      step_(step_for<T>(isa)),
+      step_(with_isa(isa, [&]<Isa level>() { return modal_step<level, T>(); })),
       rows_(modes.places.size() + modes.pushes.size() + modes.outputs.size() + most_rows),
       bundled_rows_(rows_.size()),
       indices_(modes.pushes.size() + 2 * modes.places.size() + modes.holds.size()),

@@ -70,18 +70,8 @@ template <class T>
 using ModalStep = void (*)(const Program& program, const Modes& modes, ModalState<T>& state,
                            const Block<T>& block);
 
-namespace base {
-template <class T>
+template <Isa isa, class T>
 ModalStep<T> modal_step();
-}
-namespace v3 {
-template <class T>
-ModalStep<T> modal_step();
-}
-namespace v4 {
-template <class T>
-ModalStep<T> modal_step();
-}
 
 template <class T>
 class ModalKernel final : public Kernel<T> {

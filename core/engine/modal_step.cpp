@@ -560,13 +560,18 @@ void step(const Program& program, const Modes& modes, ModalState<T>& state, cons
 }
 
 }  // namespace
+}  // namespace ressort::RESSORT_ISA
 
-template <class T>
-ModalStep<T> modal_step() {
-  return step<T>;
+namespace ressort {
+
+template <>
+ModalStep<float> modal_step<Isa::RESSORT_ISA, float>() {
+  return RESSORT_ISA::step<float>;
 }
 
-template ModalStep<float> modal_step();
-template ModalStep<double> modal_step();
+template <>
+ModalStep<double> modal_step<Isa::RESSORT_ISA, double>() {
+  return RESSORT_ISA::step<double>;
+}
 
-}  // namespace ressort::RESSORT_ISA
+}  // namespace ressort

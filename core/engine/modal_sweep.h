@@ -11,9 +11,9 @@ constexpr std::size_t most_kicked = 8;  // rows that one sweep takes along
 constexpr std::size_t most_heard = 8;
 
 template <class T>
-using ModePack = Pack<T, RESSORT_VECTOR_BYTES>;
+using ModePack = Pack<T, vector_bytes(Isa::RESSORT_ISA)>;
 template <class T>
-constexpr std::size_t mode_lanes = RESSORT_VECTOR_BYTES / sizeof(T);
+constexpr std::size_t mode_lanes = vector_bytes(Isa::RESSORT_ISA) / sizeof(T);
 
 template <class T>
 ModePack<T>* packs(T* numbers) {
@@ -29,7 +29,7 @@ std::size_t pack_count(const ModalState<T>& s) {
 }
 
 // By halves: one lane after the other would take as long as the rest of a short sweep.
-template <class T, std::size_t Bytes = RESSORT_VECTOR_BYTES>
+template <class T, std::size_t Bytes = vector_bytes(Isa::RESSORT_ISA)>
 T total(Pack<T, Bytes> sum) {
   if constexpr (Bytes > 16) {
     const auto* const halves = reinterpret_cast<const Pack<T, Bytes / 2>*>(&sum);
