@@ -199,7 +199,8 @@ TEST_CASE("a score is times and addresses", "[calls]") {
     CHECK(read.error().line == line);
     CHECK(read.error().column == column);
   };
-  wrong("0 /panic\nsoon /panic", 2, 1, "found 'soon' where a time in seconds was expected, at most a day");
+  wrong("0 /panic\nsoon /panic", 2, 1,
+        "found 'soon' where a time in seconds was expected, at most a day");
   wrong("-1 /panic", 1, 1, "found '-1' where a time in seconds was expected, at most a day");
   wrong("0.5", 1, 5, "expected an address such as /note/on after the time");
   wrong("\n0.5 note", 2, 5, "expected an address such as /note/on after the time");

@@ -9,13 +9,10 @@ namespace {
 
 using rig::Comparison;
 using rig::DuelOptions;
-using rig::network_of;
+using rig::isas;
+using rig::program_of;
 using rig::Random;
 using rig::show;
-
-Program program_of(const std::string& text) {
-  return make_program(network_of(text), 44100.0, true);
-}
 
 // The same in the form of chains, of which there must be some.
 Program formed(const std::string& text) {
@@ -24,16 +21,6 @@ Program formed(const std::string& text) {
   REQUIRE(form.has_value());
   program.form = std::move(*form);
   return program;
-}
-
-std::vector<Isa> isas() {
-  std::vector<Isa> all = {Isa::base};
-  for (const Isa isa : {Isa::v3, Isa::v4}) {
-    if (isa <= best_isa()) {
-      all.push_back(isa);
-    }
-  }
-  return all;
 }
 
 template <class T>

@@ -6,15 +6,12 @@ namespace ressort {
 namespace {
 
 using rig::Comparison;
-using rig::network_of;
+using rig::isas;
+using rig::program_of;
 using rig::Random;
 using rig::show;
 
 constexpr std::uint32_t none = ChorusAnchor::none;
-
-Program program_of(const std::string& text) {
-  return make_program(network_of(text), 44100.0, true);
-}
 
 Program formed(const std::string& text) {
   Program program = program_of(text);
@@ -22,16 +19,6 @@ Program formed(const std::string& text) {
   REQUIRE(form.has_value());
   program.form = std::move(*form);
   return program;
-}
-
-std::vector<Isa> isas() {
-  std::vector<Isa> all = {Isa::base};
-  for (const Isa isa : {Isa::v3, Isa::v4}) {
-    if (isa <= best_isa()) {
-      all.push_back(isa);
-    }
-  }
-  return all;
 }
 
 // As many kernels as the voices need, each voice at its own pitch and with its own hands.

@@ -12,18 +12,18 @@ using rig::Comparison;
 using rig::duel;
 using rig::DuelOptions;
 using rig::Fighter;
-using rig::network_of;
+using rig::program_of;
 using rig::Random;
 using rig::show;
 
 constexpr std::size_t second = 44100;  // frames
 
 std::optional<Dense> form_of(const std::string& text) {
-  return dense_form(make_program(network_of(text), 44100.0, true));
+  return dense_form(program_of(text));
 }
 
 Program dense(const std::string& text) {
-  Program program = make_program(network_of(text), 44100.0, true);
+  Program program = program_of(text);
   auto form = dense_form(program);
   REQUIRE(form.has_value());
   program.form = std::move(*form);
@@ -31,11 +31,9 @@ Program dense(const std::string& text) {
 }
 
 void each_isa(const std::function<void(Isa)>& use) {
-  for (const Isa isa : {Isa::base, Isa::v3, Isa::v4}) {
-    if (isa <= best_isa()) {
-      INFO(isa_name(isa));
-      use(isa);
-    }
+  for (const Isa isa : rig::isas()) {
+    INFO(isa_name(isa));
+    use(isa);
   }
 }
 

@@ -11,13 +11,10 @@ namespace {
 
 using rig::Comparison;
 using rig::DuelOptions;
-using rig::network_of;
+using rig::isas;
+using rig::program_of;
 using rig::Random;
 using rig::show;
-
-Program program_of(const std::string& text) {
-  return make_program(network_of(text), Network::reference_rate_hz, true);
-}
 
 Program formed(const std::string& text) {
   Program program = program_of(text);
@@ -29,16 +26,6 @@ Program formed(const std::string& text) {
 
 const Grid& grid_of(const Program& program) {
   return std::get<Grid>(program.form);
-}
-
-std::vector<Isa> isas() {
-  std::vector<Isa> all;
-  for (const Isa isa : {Isa::base, Isa::v3, Isa::v4}) {
-    if (isa <= best_isa()) {
-      all.push_back(isa);
-    }
-  }
-  return all;
 }
 
 // Every output in every instruction set: double within `relative`, float above `db`.

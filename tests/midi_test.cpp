@@ -91,8 +91,8 @@ TEST_CASE("system exclusive is passed over, in one packet or in several", "[midi
 }
 
 TEST_CASE("what is cut short or unknown makes no event and is counted", "[midi]") {
-  const std::vector<Bytes> wrong = {{0x90}, {0x90, 60}, {60}, {0xf4},
-                                    {0xf5}, {0xe0, 1},  {0xd0},    {0xf2, 1}};
+  const std::vector<Bytes> wrong = {{0x90}, {0x90, 60}, {60},   {0xf4},
+                                    {0xf5}, {0xe0, 1},  {0xd0}, {0xf2, 1}};
   for (const Bytes& bytes : wrong) {
     MidiReader reader;
     CAPTURE(bytes);

@@ -8,6 +8,7 @@ namespace {
 using rig::Comparison;
 using rig::duel;
 using rig::DuelOptions;
+using rig::isas;
 using rig::network_of;
 using rig::Random;
 using rig::show;
@@ -23,7 +24,7 @@ const Modes& modes_of(const Program& program) {
   return std::get<Modes>(program.form);
 }
 bool has_modes(const std::string& text) {
-  return modal_form(make_program(network_of(text), 44100.0, true)).has_value();
+  return modal_form(rig::program_of(text)).has_value();
 }
 
 template <class T>
@@ -35,19 +36,6 @@ void check_duel(const Program& program, const DuelOptions& options, double toler
     CHECK(output.peak > 0.0);
     CHECK(output.relative() < tolerance);
   }
-}
-
-const std::vector<Isa>& isas() {
-  static const std::vector<Isa> all = [] {
-    std::vector<Isa> found;
-    for (const Isa isa : {Isa::base, Isa::v3, Isa::v4}) {
-      if (isa <= best_isa()) {
-        found.push_back(isa);
-      }
-    }
-    return found;
-  }();
-  return all;
 }
 
 TEST_CASE("The modes of a string are those of the textbook", "[modal]") {

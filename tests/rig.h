@@ -33,6 +33,22 @@ inline Network network_of(const std::string& text) {
   return std::move(parsed.network);
 }
 
+// In the published units, before a form is chosen for it.
+inline Program program_of(const std::string& text) {
+  return make_program(network_of(text), Network::reference_rate_hz, true);
+}
+
+// All that this machine has.
+inline std::vector<Isa> isas() {
+  std::vector<Isa> all = {Isa::base};
+  for (const Isa isa : {Isa::v3, Isa::v4}) {
+    if (isa <= best_isa()) {
+      all.push_back(isa);
+    }
+  }
+  return all;
+}
+
 // A number as a person reads it: Catch would print 1e-13 as 0.
 inline std::string show(double value) {
   char text[40];

@@ -29,7 +29,7 @@ Scaled scaled_matrices(const Network& network, std::span<const double> parameter
   std::vector<double> scale;
   for (std::size_t i = 0; i < network.masses.size(); ++i) {
     const Mass& mass = network.masses[i];
-    if (mass.kind == MassKind::mass || mass.kind == MassKind::oscillator) {
+    if (moves(mass)) {
       index[i] = static_cast<int>(scale.size());
       scale.push_back(1.0 / std::sqrt(argument_value(network, mass.mass, parameters)));
     }

@@ -13,10 +13,6 @@ namespace {
 
 constexpr std::uint32_t nowhere = 0xffffffffu;
 
-bool moves(const Mass& mass) {
-  return mass.kind == MassKind::mass || mass.kind == MassKind::oscillator;
-}
-
 struct LawRow {
   Law law;
   std::array<Unit, max_link_arguments> units;  // the rest are plain

@@ -62,10 +62,7 @@ class Writer {
   }
 
  private:
-  bool moves(std::size_t i) const {
-    const MassKind kind = network_.masses[i].kind;
-    return kind == MassKind::mass || kind == MassKind::oscillator;
-  }
+  bool moves(std::size_t i) const { return ressort::moves(network_.masses[i]); }
 
   // --- names ---------------------------------------------------------------------------------
 
@@ -442,9 +439,8 @@ class Writer {
   }
 
   std::string header(int inputs) const {
-    const auto moving = std::count_if(
-        network_.masses.begin(), network_.masses.end(),
-        [](const Mass& m) { return m.kind == MassKind::mass || m.kind == MassKind::oscillator; });
+    const auto moving = std::count_if(network_.masses.begin(), network_.masses.end(),
+                                      [](const Mass& mass) { return ressort::moves(mass); });
     std::string text = "// " + plain(options_.name) +
                        ", a network of masses and springs: " + std::to_string(moving) +
                        " that move, " + std::to_string(network_.links.size()) + " links.\n";

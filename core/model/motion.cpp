@@ -12,10 +12,6 @@ std::string line_of(int number) {
   return "line " + std::to_string(number);
 }
 
-bool moves(const Mass& mass) {
-  return mass.kind == MassKind::mass || mass.kind == MassKind::oscillator;
-}
-
 }  // namespace
 
 void Reader::read_motion(const Line& line, const std::vector<Token>& tokens) {

@@ -207,10 +207,7 @@ bool rests_at_zero(const Network& network) {
     return element.position == 0.0 && element.third == 0.0;
   };
   return std::all_of(network.masses.begin(), network.masses.end(),
-                     [&](const Mass& mass) {
-                       return (mass.kind != MassKind::mass && mass.kind != MassKind::oscillator) ||
-                              rests(mass);
-                     }) &&
+                     [&](const Mass& mass) { return !moves(mass) || rests(mass); }) &&
          std::all_of(network.macros.begin(), network.macros.end(), rests);
 }
 

@@ -57,6 +57,11 @@ struct Mass {
   bool operator==(const Mass&) const = default;
 };
 
+// What is not held, driven or a place on a macro.
+inline bool moves(const Mass& mass) {
+  return mass.kind == MassKind::mass || mass.kind == MassKind::oscillator;
+}
+
 enum class MacroKind : std::uint8_t {
   string,        // both ends fixed; neighbours linked by K, Z
   chain,         // the same without fixed ends

@@ -44,11 +44,11 @@ struct Preset {
   std::string model;        // a file's name, beside the preset or in the models' folder
   std::string description;  // one line for a person
   int voices = 1;
-  double gain = 1.0;       // output per unit of position
-  double release_s = 0.0;  // 0: a voice rings out
-  bool noise = false;      // the outputs shape white noise
-  bool keyboard = true;    // a key sets the pitch
-  int transpose = 0;       // semitones between a key and the pitch that it sets
+  double gain = 1.0;                   // output per unit of position
+  double release_s = 0.0;              // 0: a voice rings out
+  bool noise = false;                  // the outputs shape white noise
+  bool keyboard = true;                // a key sets the pitch
+  int transpose = 0;                   // semitones between a key and the pitch that it sets
   std::optional<ThirdArgument> third;  // of the model's masses, whatever the model shows
   std::vector<ParameterSetting> parameters;
   std::vector<ControlSetting> controls;
