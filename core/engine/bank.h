@@ -56,7 +56,7 @@ struct Bank {
     filled.resize(inputs);
     peak.resize(lanes);
     gain.resize(lanes);
-    sum.resize(max_block_frames * outputs_of_one);
+    heard.resize(outputs_of_one);
   }
 
   std::vector<PartBank<T>> parts;
@@ -75,9 +75,9 @@ struct Bank {
   std::size_t still = 0;
 
   Mixer<T> mixer;
-  Aligned<T> peak;       // [lane]
-  Aligned<double> gain;  // [lane]
-  Aligned<double> sum;   // [frame][output]
+  Aligned<T> peak;             // [lane]
+  Aligned<double> gain;        // [lane]
+  std::vector<double*> heard;  // [output] where it is to be added
 };
 
 }  // namespace ressort

@@ -3,7 +3,6 @@
 //
 // Everything is made by doubling: from A^L and what the first L samples need, the next L.
 #include "core/engine/dense.h"
-#include "core/engine/dense_packs.h"
 
 namespace ressort::RESSORT_ISA {
 namespace {

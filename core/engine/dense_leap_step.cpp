@@ -1,6 +1,5 @@
 // The leaps of the dense kernel, compiled for each instruction set.
 #include "core/engine/dense.h"
-#include "core/engine/dense_packs.h"
 #include "core/engine/laws.h"
 
 namespace ressort::RESSORT_ISA {

@@ -3,7 +3,6 @@
 #include <utility>
 
 #include "core/engine/dense.h"
-#include "core/engine/dense_packs.h"
 #include "core/engine/laws.h"
 
 namespace ressort::RESSORT_ISA {

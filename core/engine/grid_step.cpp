@@ -1,5 +1,4 @@
 // The loops of the grid kernel, compiled for each instruction set.
-#include <cstring>
 #include <utility>
 
 #include "core/engine/grid.h"
@@ -18,17 +17,6 @@ struct View {
   const Grid& grid;
   GridState<T>& state;
 };
-
-template <class V>
-V load(const Scalar<V>* from) {
-  V pack;
-  std::memcpy(&pack, from, sizeof(V));
-  return pack;
-}
-template <class V>
-void store(Scalar<V>* to, V pack) {
-  std::memcpy(to, &pack, sizeof(V));
-}
 
 // Calls use.operator()<n>() for a count 1 <= n <= most that is known only now.
 template <std::size_t most, class Use>

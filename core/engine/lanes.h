@@ -41,6 +41,19 @@ struct ScalarOf<double> {
 template <class V>
 using Scalar = typename ScalarOf<V>::Type;
 
+// From and to wherever it is: packs need not be aligned.
+template <class V>
+static inline V load(const Scalar<V>* from) {
+  V pack;
+  __builtin_memcpy(&pack, from, sizeof pack);
+  return pack;
+}
+
+template <class V>
+static inline void store(Scalar<V>* to, V pack) {
+  __builtin_memcpy(to, &pack, sizeof pack);
+}
+
 // a where the mask holds, b elsewhere, lane by lane.
 template <class V, class Mask>
 static inline V select(Mask mask, V a, V b) {

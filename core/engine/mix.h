@@ -1,4 +1,5 @@
-// core/engine: what the voices of one kernel add to the channels, [frame][output][lane].
+// core/engine: what goes to the voices of one kernel from outside, and what they add to the
+// channels.
 #pragma once
 
 #include <cstddef>
@@ -7,6 +8,7 @@
 
 namespace ressort {
 
+// [frame][output][lane]
 template <class T>
 struct Heard {
   const T* outputs = nullptr;
@@ -15,12 +17,30 @@ struct Heard {
   std::size_t width = 1;  // lanes
 };
 
+// Sound that moves one input of all lanes, on top of what it does by itself or instead of that.
+template <class T>
+struct AudioHand {
+  const double* samples = nullptr;
+  std::size_t frames = 0;
+  double scale = 1.0;     // of the samples
+  double before = 0.0;    // the last scaled sample
+  bool replaces = false;  // what is there
+  T* value = nullptr;     // [frame * step + lane]
+  T* velocity = nullptr;  // of a position only
+  std::size_t step = 1;
+  std::size_t width = 1;  // lanes
+};
+
 template <class T>
 struct Mixer {
+  bool (*is_silent)(const double* samples, std::size_t frames);
+  // The same row in every frame, [frame * step + i].
+  void (*fill_rows)(const T* row, std::size_t step, std::size_t frames, T* value);
+  void (*add_audio)(const AudioHand<T>& hand);
   // The largest |y| of each lane; infinity where one is not below `bound`, or is no number.
   void (*find_peaks)(const Heard<T>& heard, double bound, T* peak);
-  // sum[frame][output] = the sum of gain[lane] * y; what has the gain 0 may be anything.
-  void (*add_voices)(const Heard<T>& heard, const double* gain, double* sum);
+  // channels[output][frame] += the sum of gain[lane] * y; what has the gain 0 may be anything.
+  void (*add_voices)(const Heard<T>& heard, const double* gain, double* const* channels);
 };
 
 template <Isa isa, class T>

@@ -1,81 +1,199 @@
 // The loops over the voices of one kernel, compiled for each instruction set.
 #include "core/engine/mix.h"
 
-#include "core/engine/lanes.h"
+#include "core/engine/kernel.h"
 
 namespace ressort::RESSORT_ISA {
 namespace {
 
-template <class V, class T>
-V load(const T* from) {
-  return *reinterpret_cast<const V*>(from);
+constexpr std::size_t widest = vector_bytes(Isa::RESSORT_ISA);
+
+template <std::size_t Bytes>
+double sum_of(Pack<double, Bytes> pack) {
+  if constexpr (Bytes == 16) {
+    return pack[0] + pack[1];
+  } else {
+    Pack<double, Bytes / 2> halves[2];
+    store(reinterpret_cast<double*>(halves), pack);
+    return sum_of<Bytes / 2>(halves[0] + halves[1]);
+  }
 }
 
+// --- what goes in -------------------------------------------------------------------------------
+
+bool is_silent(const double* samples, std::size_t frames) {
+  using V = Pack<double, widest>;
+  constexpr std::size_t lanes = widest / sizeof(double);
+  V most{};
+  std::size_t n = 0;
+  for (; n + lanes <= frames; n += lanes) {
+    const V here = absolute(load<V>(samples + n));
+    most = select(here > most, here, most);
+  }
+  double sum = sum_of<widest>(most);
+  for (; n < frames; ++n) {
+    sum += absolute(samples[n]);
+  }
+  return sum == 0.0;
+}
+
+template <class T>
+void fill_rows(const T* row, std::size_t step, std::size_t frames, T* value) {
+  if (step == 1) {
+    for (std::size_t n = 0; n < frames; ++n) {
+      value[n] = *row;
+    }
+    return;
+  }
+  for (std::size_t n = 0; n < frames; ++n) {
+    for (std::size_t i = 0; i < step; ++i) {
+      value[n * step + i] = row[i];
+    }
+  }
+}
+
+// rows[n * step + lane] = kept * rows[n * step + lane] + added[n]
+template <class T>
+[[gnu::always_inline]] inline void add_rows(const double* added, T kept, std::size_t frames,
+                                            std::size_t step, std::size_t width, T* rows) {
+  for (std::size_t n = 0; n < frames; ++n) {
+    const T more = static_cast<T>(added[n]);
+    for (std::size_t at = n * step; at < n * step + width; ++at) {
+      rows[at] = kept * rows[at] + more;
+    }
+  }
+}
+
+template <class T>
+[[gnu::always_inline]] inline void add_to(const AudioHand<T>& hand, const double* added, T* rows) {
+  const T kept = hand.replaces ? T(0) : T(1);
+  if (hand.step == 1) {  // one voice and one input: the usual case, and the compiler is to know it
+    add_rows(added, kept, hand.frames, 1, 1, rows);
+  } else {
+    add_rows(added, kept, hand.frames, hand.step, hand.width, rows);
+  }
+}
+
+template <class T>
+void add_audio(const AudioHand<T>& hand) {
+  double here[max_block_frames + 1];
+  here[0] = hand.before;
+  for (std::size_t n = 0; n < hand.frames; ++n) {
+    here[n + 1] = hand.scale * hand.samples[n];
+  }
+  add_to(hand, here + 1, hand.value);
+  if (hand.velocity != nullptr) {
+    double change[max_block_frames];
+    for (std::size_t n = 0; n < hand.frames; ++n) {
+      change[n] = here[n + 1] - here[n];
+    }
+    add_to(hand, change, hand.velocity);
+  }
+}
+
+// --- peaks --------------------------------------------------------------------------------------
+
 template <class V, class T>
-void peaks_of(const Heard<T>& heard, double bound, std::size_t lane, T* peak) {
+void peaks_of(const T* y, std::size_t count, std::size_t step, double bound, T* peak) {
   const V most = V{} + static_cast<T>(bound);
   const V beyond = V{} + static_cast<T>(__builtin_huge_val());
   V found{};
   V outside{};
-  for (std::size_t row = 0; row < heard.frames * heard.count; ++row) {
-    const V y = absolute(load<V>(heard.outputs + row * heard.width + lane));
-    found = select(y > found, y, found);
-    outside = select(y < most, outside, beyond);
+  for (std::size_t i = 0; i < count; ++i) {
+    const V here = absolute(load<V>(y + i * step));
+    found = select(here > found, here, found);
+    outside = select(here < most, outside, beyond);
   }
-  *reinterpret_cast<V*>(peak + lane) = select(outside > V{}, beyond, found);
+  store(peak, select(outside > V{}, beyond, found));
+}
+
+// One lane: its samples lie one after the other.
+template <class T>
+T peak_of_one(const T* y, std::size_t count, double bound) {
+  using V = Pack<T, widest>;
+  constexpr std::size_t lanes = widest / sizeof(T);
+  const std::size_t whole = count - count % lanes;
+  T peaks[lanes + 1] = {};
+  peaks_of<V>(y, whole / lanes, lanes, bound, peaks);
+  peaks_of<T>(y + whole, count - whole, 1, bound, peaks + lanes);
+  T most = peaks[0];
+  for (const T peak : peaks) {
+    most = peak > most ? peak : most;
+  }
+  return most;
 }
 
 template <class T>
 void find_peaks(const Heard<T>& heard, double bound, T* peak) {
-  constexpr std::size_t lanes = vector_bytes(Isa::RESSORT_ISA) / sizeof(T);
+  constexpr std::size_t lanes = widest / sizeof(T);
+  const std::size_t rows = heard.frames * heard.count;
+  if (heard.width == 1) {
+    *peak = peak_of_one(heard.outputs, rows, bound);
+    return;
+  }
   std::size_t lane = 0;
   for (; lane + lanes <= heard.width; lane += lanes) {
-    peaks_of<Pack<T, vector_bytes(Isa::RESSORT_ISA)>>(heard, bound, lane, peak);
+    peaks_of<Pack<T, widest>>(heard.outputs + lane, rows, heard.width, bound, peak + lane);
   }
   for (; lane + 16 / sizeof(T) <= heard.width; lane += 16 / sizeof(T)) {
-    peaks_of<Pack<T, 16>>(heard, bound, lane, peak);
+    peaks_of<Pack<T, 16>>(heard.outputs + lane, rows, heard.width, bound, peak + lane);
   }
   for (; lane < heard.width; ++lane) {
-    peaks_of<T>(heard, bound, lane, peak);
+    peaks_of<T>(heard.outputs + lane, rows, heard.width, bound, peak + lane);
   }
 }
 
-// Adds to `sum` what whole packs of a row give; returns the first lane beyond them.
-template <std::size_t Bytes, class T>
-std::size_t add_packs(const T* row, std::size_t lane, std::size_t width, const double* gain,
-                      double& sum) {
-  using D = Pack<double, Bytes>;
-  constexpr std::size_t lanes = Bytes / sizeof(double);
+// --- what comes out -----------------------------------------------------------------------------
+
+template <class T>
+double sum_of_lanes(const T* row, std::size_t width, const double* gain) {
+  using D = Pack<double, widest>;
+  constexpr std::size_t lanes = widest / sizeof(double);
   D packs{};
+  std::size_t lane = 0;
   for (; lane + lanes <= width; lane += lanes) {
     const D g = load<D>(gain + lane);
     const D y = __builtin_convertvector(load<Pack<T, lanes * sizeof(T)>>(row + lane), D);
     packs += select(g == D{}, D{}, g * y);
   }
-  for (std::size_t i = 0; i < lanes; ++i) {
-    sum += packs[i];
+  double sum = sum_of<widest>(packs);
+  for (; lane < width; ++lane) {
+    sum += gain[lane] == 0.0 ? 0.0 : gain[lane] * static_cast<double>(row[lane]);
   }
-  return lane;
+  return sum;
 }
 
 template <class T>
-void add_voices(const Heard<T>& heard, const double* gain, double* sum) {
-  for (std::size_t i = 0; i < heard.frames * heard.count; ++i) {
-    const T* const row = heard.outputs + i * heard.width;
-    sum[i] = 0.0;
-    std::size_t lane = 0;
-    if (heard.width * sizeof(double) >= vector_bytes(Isa::RESSORT_ISA)) {
-      lane = add_packs<vector_bytes(Isa::RESSORT_ISA)>(row, 0, heard.width, gain, sum[i]);
-    }
-    for (; lane < heard.width; ++lane) {
-      sum[i] += gain[lane] == 0.0 ? 0.0 : gain[lane] * static_cast<double>(row[lane]);
+[[gnu::always_inline]] inline void add_one(const T* y, std::size_t frames, std::size_t step,
+                                           double gain, double* channel) {
+  for (std::size_t n = 0; n < frames; ++n) {
+    channel[n] += gain * static_cast<double>(y[n * step]);
+  }
+}
+
+template <class T>
+void add_voices(const Heard<T>& heard, const double* gain, double* const* channels) {
+  if (heard.width == 1 && *gain == 0.0) {
+    return;
+  }
+  for (std::size_t output = 0; output < heard.count; ++output) {
+    const T* const y = heard.outputs + output * heard.width;
+    double* const channel = channels[output];
+    if (heard.width > 1) {
+      for (std::size_t n = 0; n < heard.frames; ++n) {
+        channel[n] += sum_of_lanes(y + n * heard.count * heard.width, heard.width, gain);
+      }
+    } else if (heard.count > 1) {
+      add_one(y, heard.frames, heard.count, *gain, channel);
+    } else {  // the usual case, and the compiler is to know it
+      add_one(y, heard.frames, 1, *gain, channel);
     }
   }
 }
 
 template <class T>
 Mixer<T> mixer_of() {
-  return {find_peaks<T>, add_voices<T>};
+  return {is_silent, fill_rows<T>, add_audio<T>, find_peaks<T>, add_voices<T>};
 }
 
 }  // namespace

@@ -28,7 +28,9 @@ Engine::Voices::Voices(Machine machine_in, Playing playing_in, Precision precisi
       audio_control(machine.hands.size(), nullptr),
       audio_before(machine.hands.size()),
       pole(playing.bare ? 0.0 : 1.0 - std::min(1.0, smoothing_hz / machine.rate_hz)),
-      bow_pole(playing.bare ? 0.0 : std::exp(-1.0 / (bow_start_s * machine.rate_hz))) {
+      bow_pole(playing.bare ? 0.0 : std::exp(-1.0 / (bow_start_s * machine.rate_hz))),
+      level_kept(
+          std::exp(-static_cast<double>(max_block_frames) / (level_memory_s * machine.rate_hz))) {
   for (std::size_t i = 0; i < rest.size(); ++i) {
     rest[i] = middle(i);
   }
@@ -199,9 +201,7 @@ void Engine::Voices::fill_rest(Bank<T>& b, const PartBank<T>& part, std::size_t 
       std::equal(b.row.begin(), end, b.filled.begin())) {
     return;
   }
-  for (std::size_t n = 0; n < frames; ++n) {
-    std::copy(b.row.begin(), end, b.value.begin() + static_cast<std::ptrdiff_t>(n * step));
-  }
+  b.mixer.fill_rows(b.row.data(), step, frames, b.value.data());
   std::copy(b.row.begin(), end, b.filled.begin());
   b.filled_part = &part;
   b.filled_frames = frames;
@@ -215,10 +215,9 @@ void Engine::Voices::fill_drive(Bank<T>& b, const PartBank<T>& part, std::size_t
   const std::size_t step = part.program.inputs.size() * part.width;  // from frame to frame
   for (std::size_t i = 0; i < part.program.inputs.size(); ++i) {
     const InputSlot& slot = part.program.inputs[i];
-    const double* const audio = audio_for(slot.hand, inputs);
     for (std::size_t lane = first; lane < std::min(voices.size(), first + part.width); ++lane) {
       Hand& mover = hand(lane, slot.hand);
-      if (!voices[lane].awake || (!mover.is_moving() && audio == nullptr)) {
+      if (!voices[lane].awake || !mover.is_moving()) {
         continue;
       }
       b.filled_part = nullptr;
@@ -232,26 +231,24 @@ void Engine::Voices::fill_drive(Bank<T>& b, const PartBank<T>& part, std::size_t
         b.still = 0;
         mover.fill_positions(frames, step, value, velocity);
       }
-      if (audio != nullptr) {
-        b.still = 0;
-        add_audio(slot.hand, audio + at, frames, step, value, velocity);
-      }
     }
-  }
-}
-
-template <class T>
-void Engine::Voices::add_audio(std::size_t input, const double* audio, std::size_t frames,
-                               std::size_t step, T* value, T* velocity) {
-  const double r = machine.hands[input].is_force ? machine.rate_ratio : 1.0;
-  const double scale = audio_control[input]->high * r * r;
-  const T kept = playing.bare ? T(0) : T(1);
-  double before = audio_before[input];
-  for (std::size_t n = 0; n < frames; ++n) {
-    const double here = scale * audio[n];
-    value[n * step] = kept * value[n * step] + static_cast<T>(here);
-    velocity[n * step] = kept * velocity[n * step] + static_cast<T>(here - before);
-    before = here;
+    if (const double* const audio = audio_for(slot.hand, inputs)) {
+      b.filled_part = nullptr;
+      AudioHand<T> added{.samples = audio + at,
+                         .frames = frames,
+                         .scale = audio_scale(slot.hand),
+                         .before = audio_before[slot.hand],
+                         .replaces = playing.bare,
+                         .value = b.value.data() + i * part.width,
+                         .velocity = nullptr,
+                         .step = step,
+                         .width = part.width};
+      if (!slot.is_force) {
+        b.still = 0;
+        added.velocity = b.velocity.data() + i * part.width;
+      }
+      b.mixer.add_audio(added);
+    }
   }
 }
 
@@ -277,6 +274,11 @@ void Engine::Voices::fill_audio(Bank<T>& b, const PartBank<T>& part, std::size_t
   }
 }
 
+double Engine::Voices::audio_scale(std::size_t input) const {
+  const double r = machine.hands[input].is_force ? machine.rate_ratio : 1.0;
+  return audio_control[input]->high * r * r;
+}
+
 const double* Engine::Voices::audio_for(std::size_t input,
                                         std::span<const double* const> inputs) const {
   const Control* const control = audio_control[input];
@@ -287,8 +289,8 @@ void Engine::Voices::listen(std::span<const double* const> inputs, std::size_t a
                             std::size_t frames) {
   for (std::size_t input = 0; input < machine.hands.size(); ++input) {
     const double* const audio = audio_for(input, inputs);
-    if (audio != nullptr &&
-        std::any_of(audio + at, audio + at + frames, [](double sample) { return sample != 0.0; })) {
+    const auto is_silent = [&](const auto& b) { return b.mixer.is_silent(audio + at, frames); };
+    if (audio != nullptr && !std::visit(is_silent, bank)) {
       wake(last);
     }
   }
@@ -297,7 +299,7 @@ void Engine::Voices::listen(std::span<const double* const> inputs, std::size_t a
 void Engine::Voices::remember_audio(std::span<const double* const> inputs, std::size_t end) {
   for (std::size_t input = 0; input < machine.hands.size(); ++input) {
     if (const double* const audio = audio_for(input, inputs)) {
-      audio_before[input] = audio_control[input]->high * audio[end - 1];
+      audio_before[input] = audio_scale(input) * audio[end - 1];
     }
   }
 }
@@ -328,14 +330,11 @@ void Engine::Voices::mix(Bank<T>& b, const PartBank<T>& part, std::size_t first,
       b.gain[lane - first] = playing.gain * voice.gain;
     }
   }
-  b.mixer.add_voices(heard, b.gain.data(), b.sum.data());
-  clear_wide_registers();
   for (std::size_t output = 0; output < count; ++output) {
-    double* const channel = outputs[part.program.outputs[output].channel] + at;
-    for (std::size_t n = 0; n < frames; ++n) {
-      channel[n] += b.sum[n * count + output];
-    }
+    b.heard[output] = outputs[part.program.outputs[output].channel] + at;
   }
+  b.mixer.add_voices(heard, b.gain.data(), b.heard.data());
+  clear_wide_registers();
 }
 
 template <class T>
@@ -360,8 +359,7 @@ void Engine::Voices::settle(std::size_t lane) {
   constexpr std::size_t frames = max_block_frames;
   const double peak = voice.peak * playing.gain * voice.gain;
   voice.peak = 0.0;
-  voice.level = std::max(peak, voice.level * std::exp(-static_cast<double>(frames) /
-                                                      (level_memory_s * machine.rate_hz)));
+  voice.level = std::max(peak, voice.level * level_kept);
   if (voice.fading && voice.gain == 0.0) {
     voice = Voice{};
     return;

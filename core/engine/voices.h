@@ -115,9 +115,7 @@ struct Engine::Voices {
   void fill_audio(Bank<T>& b, const PartBank<T>& part, std::size_t first,
                   std::span<const double* const> inputs, std::size_t at, std::size_t frames);
   // What comes in moves the hand from where it is; in the bare network it is the hand.
-  template <class T>
-  void add_audio(std::size_t input, const double* audio, std::size_t frames, std::size_t step,
-                 T* value, T* velocity);
+  double audio_scale(std::size_t input) const;
   const double* audio_for(std::size_t input, std::span<const double* const> inputs) const;
   // Sound at an audio input wakes the voice that it drives.
   void listen(std::span<const double* const> inputs, std::size_t at, std::size_t frames);
@@ -153,6 +151,7 @@ struct Engine::Voices {
   std::vector<double> audio_before;           // [input]
   double pole = 0.0;
   double bow_pole = 0.0;
+  double level_kept = 0.0;  // of a voice's level from one settling to the next
   double bend = 0.0;
   std::array<bool, 16> pedal{};
   std::size_t last = 0;           // the lane that was played last: direct gestures act on it
