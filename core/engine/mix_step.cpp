@@ -24,17 +24,19 @@ double sum_of(Pack<double, Bytes> pack) {
 bool is_silent(const double* samples, std::size_t frames) {
   using V = Pack<double, widest>;
   constexpr std::size_t lanes = widest / sizeof(double);
-  V most{};
+  auto sounds = V{} != V{};
   std::size_t n = 0;
   for (; n + lanes <= frames; n += lanes) {
-    const V here = absolute(load<V>(samples + n));
-    most = select(here > most, here, most);
+    sounds |= load<V>(samples + n) != V{};
   }
-  double sum = sum_of<widest>(most);
+  bool any = false;
+  for (std::size_t i = 0; i < lanes; ++i) {
+    any |= sounds[i] != 0;
+  }
   for (; n < frames; ++n) {
-    sum += absolute(samples[n]);
+    any |= samples[n] != 0.0;
   }
-  return sum == 0.0;
+  return !any;
 }
 
 template <class T>

@@ -27,6 +27,7 @@ Engine::Voices::Voices(Machine machine_in, Playing playing_in, Precision precisi
       rest(machine.hands.size()),
       audio_control(machine.hands.size(), nullptr),
       audio_before(machine.hands.size()),
+      sound(machine.hands.size()),
       pole(playing.bare ? 0.0 : 1.0 - std::min(1.0, smoothing_hz / machine.rate_hz)),
       bow_pole(playing.bare ? 0.0 : std::exp(-1.0 / (bow_start_s * machine.rate_hz))),
       level_kept(
@@ -162,7 +163,7 @@ void Engine::Voices::segment_in(Bank<T>& b, std::span<const double* const> input
                        voices.begin() + static_cast<std::ptrdiff_t>(end), is_awake)) {
         continue;
       }
-      fill_drive(b, part, first, inputs, at, frames);
+      fill_drive(b, part, first, frames);
       fill_audio(b, part, first, inputs, at, frames);
       part.of(first).step({.frames = frames,
                            .value = b.value.data(),
@@ -209,7 +210,6 @@ void Engine::Voices::fill_rest(Bank<T>& b, const PartBank<T>& part, std::size_t 
 
 template <class T>
 void Engine::Voices::fill_drive(Bank<T>& b, const PartBank<T>& part, std::size_t first,
-                                std::span<const double* const> inputs, std::size_t at,
                                 std::size_t frames) {
   fill_rest(b, part, first, frames);
   const std::size_t step = part.program.inputs.size() * part.width;  // from frame to frame
@@ -232,9 +232,9 @@ void Engine::Voices::fill_drive(Bank<T>& b, const PartBank<T>& part, std::size_t
         mover.fill_positions(frames, step, value, velocity);
       }
     }
-    if (const double* const audio = audio_for(slot.hand, inputs)) {
+    if (const double* const audio = sound[slot.hand]) {
       b.filled_part = nullptr;
-      AudioHand<T> added{.samples = audio + at,
+      AudioHand<T> added{.samples = audio,
                          .frames = frames,
                          .scale = audio_scale(slot.hand),
                          .before = audio_before[slot.hand],
@@ -288,10 +288,18 @@ const double* Engine::Voices::audio_for(std::size_t input,
 void Engine::Voices::listen(std::span<const double* const> inputs, std::size_t at,
                             std::size_t frames) {
   for (std::size_t input = 0; input < machine.hands.size(); ++input) {
+    sound[input] = nullptr;
     const double* const audio = audio_for(input, inputs);
-    const auto is_silent = [&](const auto& b) { return b.mixer.is_silent(audio + at, frames); };
-    if (audio != nullptr && !std::visit(is_silent, bank)) {
+    if (audio == nullptr) {
+      continue;
+    }
+    const bool is_silent =
+        std::visit([&](const auto& b) { return b.mixer.is_silent(audio + at, frames); }, bank);
+    if (!is_silent) {
       wake(last);
+    }
+    if (!is_silent || audio_before[input] != 0.0 || playing.bare) {
+      sound[input] = audio + at;
     }
   }
 }

@@ -108,8 +108,7 @@ struct Engine::Voices {
   void fill_rest(Bank<T>& b, const PartBank<T>& part, std::size_t first, std::size_t frames);
   // ...and what moves.
   template <class T>
-  void fill_drive(Bank<T>& b, const PartBank<T>& part, std::size_t first,
-                  std::span<const double* const> inputs, std::size_t at, std::size_t frames);
+  void fill_drive(Bank<T>& b, const PartBank<T>& part, std::size_t first, std::size_t frames);
   // What depends on a parameter that audio gives, for every sample.
   template <class T>
   void fill_audio(Bank<T>& b, const PartBank<T>& part, std::size_t first,
@@ -117,7 +116,7 @@ struct Engine::Voices {
   // What comes in moves the hand from where it is; in the bare network it is the hand.
   double audio_scale(std::size_t input) const;
   const double* audio_for(std::size_t input, std::span<const double* const> inputs) const;
-  // Sound at an audio input wakes the voice that it drives.
+  // Sound at an audio input wakes the voice that it drives; silence is not looked at again.
   void listen(std::span<const double* const> inputs, std::size_t at, std::size_t frames);
   // The last position of an audio input, for the velocity of the next segment's first sample.
   void remember_audio(std::span<const double* const> inputs, std::size_t end);
@@ -149,6 +148,7 @@ struct Engine::Voices {
   std::vector<double> rest;                   // [input] where a new voice's hand starts
   std::vector<const Control*> audio_control;  // [input] null where no audio drives it
   std::vector<double> audio_before;           // [input]
+  std::vector<const double*> sound;           // [input] of this segment; null where all is silent
   double pole = 0.0;
   double bow_pole = 0.0;
   double level_kept = 0.0;  // of a voice's level from one settling to the next
