@@ -366,7 +366,7 @@ class ModesFinder {
     const auto [entry, is_new] = end_of_.try_emplace(node, next);
     if (is_new) {
       const bool follows = hand_[node] != nowhere;
-      modes_.ends.push_back({follows, follows ? hand_[node] : 0, program_.position[node]});
+      modes_.ends.push_back({follows, follows ? hand_[node] : 0, node});
     }
     return entry->second;
   }
@@ -402,6 +402,11 @@ class ModesFinder {
     modes_.modes = static_cast<std::uint32_t>(kept_.size());
     modes_.q = kept(q_);
     modes_.d = kept(d_);
+    for (const std::uint32_t i : kept_) {
+      for (std::uint32_t mass = 0; mass < count_; ++mass) {
+        modes_.basis.push_back(shape_(i, mass) / root_[mass]);
+      }
+    }
     for (std::size_t i = 0; i < pushed_.size(); ++i) {
       modes_.pushes[i].shape = kept(pushed_[i]);
     }

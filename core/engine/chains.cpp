@@ -280,19 +280,28 @@ ChainsKernel<T>::ChainsKernel(const Program& program, Isa isa)
   for (std::size_t lane = 0; lane < lanes_; ++lane) {
     units_[lane * lanes_ + lane] = T(1);
   }
-  reset(0);
+  this->reset(0);
 }
 
 template <class T>
-void ChainsKernel<T>::reset(std::size_t) {
+void ChainsKernel<T>::place(std::size_t, const double* x, const double* v) {
   std::fill(bodies_.begin(), bodies_.end(), T(0));  // empty lanes too, should they be no numbers
   for (std::size_t node = 0; node < place_.size(); ++node) {
-    bodies_[place_[node]] = static_cast<T>(program_.position[node]);
-    bodies_[place_[node] + lanes_] = static_cast<T>(program_.velocity[node]);
+    bodies_[place_[node]] = static_cast<T>(x[node]);
+    bodies_[place_[node] + lanes_] = static_cast<T>(v[node]);
   }
   std::fill(held_.begin(), held_.end(), T(0));
   std::fill(force_.begin(), force_.end(), T(0));
   std::fill(tap_pull_.begin(), tap_pull_.end(), T(0));
+}
+
+template <class T>
+bool ChainsKernel<T>::save(std::size_t, double* x, double* v) const {
+  for (std::size_t node = 0; node < place_.size(); ++node) {
+    x[node] = static_cast<double>(bodies_[place_[node]]);
+    v[node] = static_cast<double>(bodies_[place_[node] + lanes_]);
+  }
+  return true;
 }
 
 template <class T>

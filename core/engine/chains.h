@@ -135,7 +135,8 @@ class ChainsKernel final : public Kernel<T> {
  public:
   // The Program's form is Chains.
   ChainsKernel(const Program& program, Isa isa);
-  void reset(std::size_t lane) override;
+  void place(std::size_t lane, const double* x, const double* v) override;
+  bool save(std::size_t lane, double* x, double* v) const override;
   bool is_near_start(std::size_t lane, double bound) const override;
 
  private:

@@ -101,18 +101,28 @@ ChorusKernel<T>::ChorusKernel(const Program& program, const Chorus& chorus, std:
           [&]<Isa level>() { return chorus_step<level, T>(table_.held, lanes_ * sizeof(T)); })),
       cells_(table_.cells * this->width()) {
   for (std::size_t lane = 0; lane < this->width(); ++lane) {
-    reset(lane);
+    this->reset(lane);
   }
 }
 
 template <class T>
-void ChorusKernel<T>::reset(std::size_t lane) {
+void ChorusKernel<T>::place(std::size_t lane, const double* x, const double* v) {
   for (std::size_t node = 0; node < table_.nodes; ++node) {
     T* const cell = cells_.data() + at(node, lane);
-    cell[0] = static_cast<T>(program_.position[node]);
-    cell[lanes_] = static_cast<T>(program_.velocity[node]);
+    cell[0] = static_cast<T>(x[node]);
+    cell[lanes_] = static_cast<T>(v[node]);
     cell[2 * lanes_] = T(0);
   }
+}
+
+template <class T>
+bool ChorusKernel<T>::save(std::size_t lane, double* x, double* v) const {
+  for (std::size_t node = 0; node < table_.nodes; ++node) {
+    const T* const cell = cells_.data() + at(node, lane);
+    x[node] = static_cast<double>(cell[0]);
+    v[node] = static_cast<double>(cell[lanes_]);
+  }
+  return true;
 }
 
 template <class T>

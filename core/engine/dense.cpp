@@ -118,7 +118,7 @@ DenseKernel<T>::DenseKernel(const Program& program, const Dense& form, Isa isa)
   place_links();
   place_signals();
   allocate();
-  reset(0);
+  this->reset(0);
 }
 
 template <class T>
@@ -264,17 +264,10 @@ void DenseKernel<T>::allocate() {
 }
 
 template <class T>
-void DenseKernel<T>::reset(std::size_t) {
+void DenseKernel<T>::place(std::size_t, const double* x, const double* v) {
   for (std::uint32_t node = 0; node < program_.position.size(); ++node) {
-    const auto x = static_cast<T>(program_.position[node]);
-    const auto v = static_cast<T>(program_.velocity[node]);
-    if (node < body_.masses) {
-      body_.state[slots_[node]] = x;
-      body_.state[body_.masses + slots_[node]] = v;
-    } else {
-      body_.x[slots_[node]] = x;
-      body_.v[slots_[node]] = v;
-    }
+    position_of(node) = static_cast<T>(x[node]);
+    velocity_of(node) = static_cast<T>(v[node]);
   }
   if (form_.has_constant) {
     body_.state[2 * body_.masses] = T(1);
@@ -284,6 +277,25 @@ void DenseKernel<T>::reset(std::size_t) {
   body_.touches = false;
   body_.has_force = true;
   is_settled_ = false;
+}
+
+template <class T>
+T& DenseKernel<T>::position_of(std::uint32_t node) const {
+  return node < body_.masses ? body_.state[slots_[node]] : body_.x[slots_[node]];
+}
+
+template <class T>
+T& DenseKernel<T>::velocity_of(std::uint32_t node) const {
+  return node < body_.masses ? body_.state[body_.masses + slots_[node]] : body_.v[slots_[node]];
+}
+
+template <class T>
+bool DenseKernel<T>::save(std::size_t, double* x, double* v) const {
+  for (std::uint32_t node = 0; node < program_.position.size(); ++node) {
+    x[node] = static_cast<double>(position_of(node));
+    v[node] = static_cast<double>(velocity_of(node));
+  }
+  return true;
 }
 
 template <class T>

@@ -177,11 +177,14 @@ template <class T>
 class DenseKernel final : public Kernel<T> {
  public:
   DenseKernel(const Program& program, const Dense& form, Isa isa);
-  void reset(std::size_t lane) override;
+  void place(std::size_t lane, const double* x, const double* v) override;
+  bool save(std::size_t lane, double* x, double* v) const override;
   bool is_near_start(std::size_t lane, double bound) const override;
 
  private:
   void play(const Block<T>& block) override;
+  T& position_of(std::uint32_t node) const;
+  T& velocity_of(std::uint32_t node) const;
   void place_nodes();
   void place_links();
   void place_signals();

@@ -28,18 +28,28 @@ DirectKernel<T>::DirectKernel(const Program& program, std::size_t voices, Isa is
       force_(x_.size()),
       corners_(program.taps.size() * this->width()) {
   for (std::size_t lane = 0; lane < this->width(); ++lane) {
-    reset(lane);
+    this->reset(lane);
   }
 }
 
 template <class T>
-void DirectKernel<T>::reset(std::size_t lane) {
+void DirectKernel<T>::place(std::size_t lane, const double* x, const double* v) {
   for (std::size_t node = 0; node < program_.position.size(); ++node) {
     const std::size_t at = node * this->width() + lane;
-    x_[at] = static_cast<T>(program_.position[node]);
-    v_[at] = static_cast<T>(program_.velocity[node]);
+    x_[at] = static_cast<T>(x[node]);
+    v_[at] = static_cast<T>(v[node]);
     force_[at] = T(0);
   }
+}
+
+template <class T>
+bool DirectKernel<T>::save(std::size_t lane, double* x, double* v) const {
+  for (std::size_t node = 0; node < program_.position.size(); ++node) {
+    const std::size_t at = node * this->width() + lane;
+    x[node] = static_cast<double>(x_[at]);
+    v[node] = static_cast<double>(v_[at]);
+  }
+  return true;
 }
 
 template <class T>

@@ -84,7 +84,7 @@ struct ModalHold {
 struct ModalEnd {
   bool follows = false;
   std::uint32_t input = 0;
-  double position = 0.0;
+  std::uint32_t node = 0;
 };
 
 struct ModalOutput {
@@ -119,6 +119,7 @@ struct Modes {
   double reach = 1.0;                     // no mass moves farther than reach * |q|
   std::vector<double> q;                  // [mode] at the start
   std::vector<double> d;
+  std::vector<double> basis;  // [mode][mass] what a mass's displacement or velocity is to a mode's
   std::vector<ModalShare> stiffness;
   std::vector<ModalShare> damping;
   std::vector<ModalPush> pushes;

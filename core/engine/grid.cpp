@@ -51,7 +51,7 @@ GridKernel<T>::GridKernel(const Program& program, const Grid& grid, Isa isa)
   y_.resize(grid.segments.empty() ? 0 : grid.slots + shift_);
   link_force_.resize(offset_.size() * grid.slots);
   make_stamps(grid_bytes(vector_bytes(isa)) / sizeof(T));
-  reset(0);
+  this->reset(0);
 }
 
 // Packs that have the same weights share them: in a large grid they stay in the nearest cache.
@@ -84,16 +84,32 @@ void GridKernel<T>::make_stamps(std::size_t lanes) {
 }
 
 template <class T>
-void GridKernel<T>::reset(std::size_t) {
-  for (std::size_t slot = 0; slot < grid_.slots; ++slot) {
+void GridKernel<T>::place(std::size_t, const double* x, const double* v) {
+  for (std::size_t slot = 0; slot < grid_.slots; ++slot) {  // empty ones and all of a ground's too
     x_[slot] = static_cast<T>(grid_.position[slot]);
     v_[slot] = static_cast<T>(grid_.velocity[slot]);
+  }
+  for (std::size_t node = 0; node < grid_.slot.size(); ++node) {
+    if (grid_.slot[node] < grid_.slots) {
+      x_[grid_.slot[node]] = static_cast<T>(x[node]);
+      v_[grid_.slot[node]] = static_cast<T>(v[node]);
+    }
   }
   for (auto* zero : {&force_, &y_, &link_force_}) {
     std::fill(zero->begin(), zero->end(), T(0));
   }
   pushes_ = 0;
   is_fresh_ = true;
+}
+
+template <class T>
+bool GridKernel<T>::save(std::size_t, double* x, double* v) const {
+  for (std::size_t node = 0; node < grid_.slot.size(); ++node) {
+    const bool is_there = grid_.slot[node] < grid_.slots;
+    x[node] = is_there ? static_cast<double>(x_[grid_.slot[node]]) : 0.0;
+    v[node] = is_there ? static_cast<double>(v_[grid_.slot[node]]) : 0.0;
+  }
+  return true;
 }
 
 template <class T>

@@ -52,7 +52,8 @@ template <class T>
 class GridKernel final : public Kernel<T> {
  public:
   GridKernel(const Program& program, const Grid& grid, Isa isa);
-  void reset(std::size_t lane) override;
+  void place(std::size_t lane, const double* x, const double* v) override;
+  bool save(std::size_t lane, double* x, double* v) const override;
   bool is_near_start(std::size_t lane, double bound) const override;
 
  private:

@@ -82,15 +82,22 @@ static inline void advance(Ramps<T>& ramps) {
 template <class T>
 class Kernel {
  public:
-  Kernel(const Program& program, std::size_t width) : coefficients(program, width) {}
+  Kernel(const Program& program, std::size_t width)
+      : coefficients(program, width), start_(program) {}
   virtual ~Kernel() = default;
   Kernel(const Kernel&) = delete;
   Kernel& operator=(const Kernel&) = delete;
 
   std::size_t width() const { return coefficients.width; }
 
-  // Puts one lane back to where the model starts; its coefficients stay. [audio]
-  virtual void reset(std::size_t lane) = 0;
+  // Puts one lane to positions and velocities, [node]; its coefficients stay. Nothing pulls in the
+  // next sample. [audio]
+  virtual void place(std::size_t lane, const double* x, const double* v) = 0;
+  // The same, to where the model starts.
+  void reset(std::size_t lane) { place(lane, start_.position.data(), start_.velocity.data()); }
+  // Where every node is after the last sample, and how fast; false where the kernel does not know
+  // of all. [audio]
+  virtual bool save(std::size_t lane, double* x, double* v) const = 0;
   // Plays the block by the published scheme, v += F/M, x += v: masses, then position inputs, then
   // links; the outputs are the new positions. Forces given act in their own sample. [audio]
   void step(const Block<T>& block) {
@@ -104,6 +111,8 @@ class Kernel {
 
  private:
   virtual void play(const Block<T>& block) = 0;
+
+  const Program& start_;
 };
 
 // The kernel that the Program asks for (Program::form), with at least one lane and no more than

@@ -145,18 +145,25 @@ ModalKernel<T>::ModalKernel(const Program& program, const Modes& modes, Isa isa)
   state_.place_of = state_.row_of + modes.places.size();
   state_.held = state_.place_of + modes.places.size();
   state_.held_ends = held_ends_.data();
-  reset(0);
+  this->reset(0);
 }
 
 template <class T>
-void ModalKernel<T>::reset(std::size_t) {
+void ModalKernel<T>::place(std::size_t, const double* x, const double* v) {
   const std::size_t places = modes_.places.size();
+  const double* basis = modes_.basis.data();
   for (std::size_t i = 0; i < modes_.modes; ++i) {
-    state_.q[i] = static_cast<T>(modes_.q[i]);
-    state_.d[i] = static_cast<T>(modes_.d[i]);
+    double q = modes_.q[i];
+    double d = modes_.d[i];
+    for (std::size_t node = 0; node < program_.moving; ++node, ++basis) {
+      q += *basis * (x[node] - program_.position[node]);
+      d += *basis * (v[node] - program_.velocity[node]);
+    }
+    state_.q[i] = static_cast<T>(q);
+    state_.d[i] = static_cast<T>(d);
   }
   for (std::size_t i = 0; i < modes_.ends.size(); ++i) {
-    state_.x[places + i] = static_cast<T>(modes_.ends[i].position);
+    state_.x[places + i] = static_cast<T>(x[modes_.ends[i].node]);
     state_.v[places + i] = T(0);
   }
   // No link has computed anything yet: in the first sample there is nothing to feel.
@@ -166,6 +173,11 @@ void ModalKernel<T>::reset(std::size_t) {
   state_.touched_frames = 0;
   state_.surprised_frames = 0;
   state_.kick_norm = T(0);
+}
+
+template <class T>
+bool ModalKernel<T>::save(std::size_t, double*, double*) const {
+  return false;
 }
 
 template <class T>

@@ -77,7 +77,9 @@ template <class T>
 class ModalKernel final : public Kernel<T> {
  public:
   ModalKernel(const Program& program, const Modes& modes, Isa isa);
-  void reset(std::size_t lane) override;
+  void place(std::size_t lane, const double* x, const double* v) override;
+  // Modes that nobody hears are left out: false.
+  bool save(std::size_t lane, double* x, double* v) const override;
   // By the length of the modes' displacement, which no mass exceeds: it may be late, never early.
   bool is_near_start(std::size_t lane, double bound) const override;
 

@@ -142,7 +142,8 @@ struct Player {
 
   T position_of(std::uint32_t end, std::size_t n) const {
     const ModalEnd& other = modes.ends[end - places];
-    return other.follows ? block.value[n * inputs + other.input] : static_cast<T>(other.position);
+    return other.follows ? block.value[n * inputs + other.input]
+                         : static_cast<T>(program.position[other.node]);
   }
 
   // The norm that the modes have at most in this block, without what links do.
