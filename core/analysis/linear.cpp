@@ -18,10 +18,85 @@ using Vector = Eigen::VectorXd;
 constexpr int dense_size = 64;   // below this a dense solver is faster and never fails
 constexpr double rigid = 1e-12;  // a smaller share of the largest stiffness is rounding
 
-// M^(-1/2) A M^(-1/2) for A = K and A = Z, over the masses that move.
-struct Scaled {
-  Sparse stiffness;
-  Sparse damping;
+// The linear part of a network: what moves, numbered anew, and what pulls at it.
+class Body {
+ public:
+  Body(const Network& network, std::span<const double> parameters)
+      : network_(network), index_(network.masses.size(), held) {
+    for (const Formula& formula : network.arguments) {
+      values_.push_back(evaluate(formula, parameters));
+    }
+    for (std::size_t i = 0; i < network.masses.size(); ++i) {
+      const Mass& mass = network.masses[i];
+      if (mass.kind == MassKind::mass || mass.kind == MassKind::oscillator) {
+        index_[i] = static_cast<int>(scale_.size());
+        scale_.push_back(1.0 / std::sqrt(value(mass.mass)));
+      }
+    }
+  }
+
+  // M^(-1/2) K M^(-1/2), its lower half.
+  Sparse stiffness() const {
+    Vector diagonal = Vector::Zero(size());
+    std::vector<Eigen::Triplet<double>> entries;
+    entries.reserve(network_.links.size() + scale_.size());
+    each_spring([&](int a, int b, double k, double) {
+      for (const int i : {a, b}) {
+        if (i != held) {
+          diagonal[i] += k * scale(i) * scale(i);
+        }
+      }
+      if (a != held && b != held && k != 0.0) {
+        entries.emplace_back(std::max(a, b), std::min(a, b), -k * scale(a) * scale(b));
+      }
+    });
+    for (int i = 0; i < size(); ++i) {
+      entries.emplace_back(i, i, diagonal[i]);
+    }
+    Sparse matrix(size(), size());
+    matrix.setFromTriplets(entries.begin(), entries.end());
+    return matrix;
+  }
+
+  // The share of Z in a vector of length 1.
+  double damping(const Vector& shape) const {
+    double sum = 0.0;
+    const auto moved = [&](int i) { return i == held ? 0.0 : shape[i] * scale(i); };
+    each_spring([&](int a, int b, double, double z) {
+      const double stretch = moved(a) - moved(b);
+      sum += z * stretch * stretch;
+    });
+    return sum;
+  }
+
+ private:
+  static constexpr int held = -1;
+
+  int size() const { return static_cast<int>(scale_.size()); }
+  double scale(int i) const { return scale_[static_cast<std::size_t>(i)]; }
+  double value(ArgumentId id) const { return id == no_argument ? 0.0 : values_[id]; }
+
+  // Calls use(one end, the other, k, z).
+  template <class Use>
+  void each_spring(Use&& use) const {
+    for (std::size_t i = 0; i < index_.size(); ++i) {
+      const Mass& mass = network_.masses[i];
+      if (mass.kind == MassKind::oscillator) {
+        use(index_[i], held, value(mass.stiffness), value(mass.damping));
+      }
+    }
+    for (const Link& link : network_.links) {
+      if (link.a != link.b) {
+        const LinearPart part = linear_part(link);
+        use(index_[link.a], index_[link.b], value(part.stiffness), value(part.damping));
+      }
+    }
+  }
+
+  const Network& network_;
+  std::vector<double> values_;  // [argument]
+  std::vector<int> index_;      // [mass] among those that move, or held
+  std::vector<double> scale_;   // [moving mass] M^(-1/2)
 };
 
 Scaled scaled_matrices(const Network& network, std::span<const double> parameters) {
@@ -32,63 +107,47 @@ Scaled scaled_matrices(const Network& network, std::span<const double> parameter
     if (moves(mass)) {
       index[i] = static_cast<int>(scale.size());
       scale.push_back(1.0 / std::sqrt(argument_value(network, mass.mass, parameters)));
+// (A - shift)^-1, as Spectra wants it, for a positive A - shift: half of what a general one takes.
+class Inverse {
+ public:
+  using Scalar = double;
+  explicit Inverse(const Sparse& lower) : matrix_(lower) {}
+  Eigen::Index rows() const { return matrix_.rows(); }
+  Eigen::Index cols() const { return matrix_.cols(); }
+  void set_shift(double shift) {
+    factor_.setShift(-shift);
+    factor_.compute(matrix_);
+    if (factor_.info() != Eigen::Success) {
+      throw std::runtime_error("not positive");
     }
   }
-  std::vector<Eigen::Triplet<double>> stiffness;
-  std::vector<Eigen::Triplet<double>> damping;
-  const auto add = [&](int i, int j, double k, double z) {
-    const double s = scale[static_cast<std::size_t>(i)] * scale[static_cast<std::size_t>(j)];
-    stiffness.emplace_back(i, j, k * s);
-    damping.emplace_back(i, j, z * s);
-  };
-  for (std::size_t i = 0; i < network.masses.size(); ++i) {
-    const Mass& mass = network.masses[i];
-    if (mass.kind == MassKind::oscillator) {
-      add(index[i], index[i], argument_value(network, mass.stiffness, parameters),
-          argument_value(network, mass.damping, parameters));
-    }
+  void perform_op(const double* from, double* to) const {
+    Eigen::Map<Vector>(to, rows()) = factor_.solve(Eigen::Map<const Vector>(from, rows()));
   }
-  for (const Link& link : network.links) {
-    if (link.a == link.b) {
-      continue;
-    }
-    const LinearPart part = linear_part(link);
-    const double k = argument_value(network, part.stiffness, parameters);
-    const double z = argument_value(network, part.damping, parameters);
-    const int a = index[link.a];
-    const int b = index[link.b];
-    if (a >= 0) {
-      add(a, a, k, z);
-    }
-    if (b >= 0) {
-      add(b, b, k, z);
-    }
-    if (a >= 0 && b >= 0) {
-      add(a, b, -k, -z);
-      add(b, a, -k, -z);
-    }
-  }
-  const auto size = static_cast<Eigen::Index>(scale.size());
-  Scaled matrices{Sparse(size, size), Sparse(size, size)};
-  matrices.stiffness.setFromTriplets(stiffness.begin(), stiffness.end());
-  matrices.damping.setFromTriplets(damping.begin(), damping.end());
-  return matrices;
-}
 
-// The eigenpairs nearest to `shift`, which lies a little below 0 so that free networks can be
-// factored too. Not every matrix can: one of negative stiffness may be singular there.
-bool near_zero(const Sparse& matrix, double shift, Eigen::VectorXd& values,
-               Eigen::MatrixXd& vectors) {
+ private:
+  const Sparse& matrix_;
+  Eigen::SimplicialLLT<Sparse> factor_;
+};
+
+struct Pairs {
+  Eigen::VectorXd values;  // ascending
+  Eigen::MatrixXd vectors;
+};
+
+// The `count` eigenpairs nearest to `shift`, which lies a little below 0 so that free networks can
+// be factored too.
+template <class Shifted>
+bool near_zero(const Sparse& lower, double shift, int count, Pairs& pairs) {
   try {  // Spectra tells by exceptions what it cannot factor or iterate
-    Spectra::SparseSymShiftSolve<double> shifted(matrix);
-    Spectra::SymEigsShiftSolver<Spectra::SparseSymShiftSolve<double>> solver(shifted, 6, 24, shift);
+    Shifted shifted(lower);
+    Spectra::SymEigsShiftSolver<Shifted> solver(shifted, count, std::max(12, 4 * count), shift);
     solver.init();
     solver.compute(Spectra::SortRule::LargestMagn, 200, 1e-10, Spectra::SortRule::SmallestAlge);
     if (solver.info() != Spectra::CompInfo::Successful) {
       return false;
     }
-    values = solver.eigenvalues();
-    vectors = solver.eigenvectors();
+    pairs = {solver.eigenvalues(), solver.eigenvectors()};
     return true;
   } catch (const std::logic_error&) {
     return false;
@@ -97,22 +156,25 @@ bool near_zero(const Sparse& matrix, double shift, Eigen::VectorXd& values,
   }
 }
 
-// The lowest eigenpair above `floor`.
-bool lowest_pair(const Sparse& matrix, double floor, double& value, Vector& vector) {
-  Eigen::VectorXd values;
-  Eigen::MatrixXd vectors;
-  if (matrix.rows() <= dense_size) {
-    const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> solver{Eigen::MatrixXd(matrix)};
-    values = solver.eigenvalues();
-    vectors = solver.eigenvectors();
-  } else if (!near_zero(matrix, -1e3 * floor, values, vectors)) {
-    return false;
-  }
-  for (Eigen::Index i = 0; i < values.size(); ++i) {
-    if (values[i] > floor) {
-      value = values[i];
-      vector = vectors.col(i);
-      return true;
+// The lowest eigenpair above `floor`. Most often it is the first.
+bool lowest_pair(const Sparse& lower, double floor, double& value, Vector& vector) {
+  using General = Spectra::SparseSymShiftSolve<double>;  // for negative stiffnesses
+  const double shift = -1e3 * floor;
+  Pairs pairs;
+  for (const int count : {1, 6}) {
+    if (lower.rows() <= dense_size) {
+      const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> solver{Eigen::MatrixXd(lower)};
+      pairs = {solver.eigenvalues(), solver.eigenvectors()};
+    } else if (!near_zero<Inverse>(lower, shift, count, pairs) &&
+               !near_zero<General>(lower, shift, count, pairs)) {
+      return false;
+    }
+    for (Eigen::Index i = 0; i < pairs.values.size(); ++i) {
+      if (pairs.values[i] > floor) {
+        value = pairs.values[i];
+        vector = pairs.vectors.col(i);
+        return true;
+      }
     }
   }
   return false;
@@ -121,23 +183,24 @@ bool lowest_pair(const Sparse& matrix, double floor, double& value, Vector& vect
 }  // namespace
 
 std::optional<Mode> lowest_mode(const Network& network, std::span<const double> parameters) {
-  const Scaled matrices = scaled_matrices(network, parameters);
-  if (matrices.stiffness.rows() == 0) {
+  const Body body(network, parameters);
+  const Sparse stiffness = body.stiffness();
+  if (stiffness.rows() == 0) {
     return std::nullopt;
   }
   double largest = 0.0;
-  for (int k = 0; k < matrices.stiffness.outerSize(); ++k) {
-    for (Sparse::InnerIterator entry(matrices.stiffness, k); entry; ++entry) {
+  for (int k = 0; k < stiffness.outerSize(); ++k) {
+    for (Sparse::InnerIterator entry(stiffness, k); entry; ++entry) {
       largest = std::max(largest, std::fabs(entry.value()));
     }
   }
   Mode mode;
   Vector shape;
   if (!std::isfinite(largest) || largest == 0.0 ||
-      !lowest_pair(matrices.stiffness, rigid * largest, mode.stiffness, shape)) {
+      !lowest_pair(stiffness, rigid * largest, mode.stiffness, shape)) {
     return std::nullopt;
   }
-  mode.damping = shape.dot(matrices.damping * shape);
+  mode.damping = body.damping(shape);
   const double z = std::clamp(mode.damping, 0.0, 0.999);
   const double cosine = (2.0 - mode.stiffness - z) / (2.0 * std::sqrt(1.0 - z));
   mode.frequency_hz = Network::reference_rate_hz / (2.0 * std::numbers::pi) *
