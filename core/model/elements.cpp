@@ -16,14 +16,10 @@ constexpr double least_mass = 1e-300;  // a smaller one has no finite inverse
 }  // namespace
 
 void Reader::add_mass(const Line& line) {
-  const auto found = masses_.find(line.label.text);
-  if (found == masses_.end()) {
+  if (line.element == undeclared) {
     return;  // the label is another element's; it has been told
   }
-  Mass& mass = out_.network.masses[found->second];
-  if (!mass.name.empty()) {
-    return;  // a second declaration; it has been told
-  }
+  Mass& mass = out_.network.masses[line.element];
   mass.name = std::string(line.label.text);
   mass.place = {line.number, line.label.column};
   std::size_t at = 0;
@@ -88,14 +84,10 @@ void Reader::check_mass(const Line& line, std::size_t at, ArgumentId mass) {
 }
 
 void Reader::add_macro(const Line& line) {
-  const auto found = macros_.find(line.label.text);
-  if (found == macros_.end()) {
+  if (line.element == undeclared) {
     return;  // the label is another element's; it has been told
   }
-  Macro& macro = out_.network.macros[found->second];
-  if (!macro.name.empty()) {
-    return;  // a second declaration; it has been told
-  }
+  Macro& macro = out_.network.macros[line.element];
   macro.name = std::string(line.label.text);
   macro.kind = line.keyword->macro;
   macro.place = {line.number, line.label.column};
@@ -123,7 +115,7 @@ void Reader::add_macro(const Line& line) {
   bool is_placed = position(line, at++, macro.position, x, y);
   if (line.rest.size() == static_cast<std::size_t>(line.keyword->least)) {
     show(delayed_, line, "gives a macro no motion");
-    resting_.push_back(found->second);
+    resting_.push_back(line.element);
   } else {
     show(velocity_, line, "gives a macro a motion");
     double far_x = 0.0;  // the drawn line's other end
@@ -202,10 +194,9 @@ void Reader::show_dialect(const Line& line, LinkKind kind) {
 void Reader::add_input(Line& line) {
   const auto number = channel(line, "in");
   const bool is_force = line.keyword->element == Element::force_input;
-  const auto found = masses_.find(line.label.text);
-  const auto mass = is_force                 ? reference(line, 0)
-                    : found == masses_.end() ? std::nullopt
-                                             : std::optional(found->second);
+  const auto mass = is_force                     ? reference(line, 0)
+                    : line.element == undeclared ? std::nullopt
+                                                 : std::optional(line.element);
   if (number && mass) {
     out_.network.inputs.push_back({.number = *number,
                                    .is_force = is_force,
@@ -330,17 +321,17 @@ bool Reader::position(const Line& line, std::size_t at, double& z, double& x, do
   }
   show(velocity_, line, "writes a place as [x y z]");
   const Token inner = unwrapped(token);
-  const std::vector<Token> parts = split(inner.text);
+  split(inner.text, parts_);
   double* const targets[] = {&x, &y, &z};
-  if (parts.size() != 3) {
+  if (parts_.size() != 3) {
     error(line, token,
-          "a place is one number or three, [x y z]; found " + std::to_string(parts.size()));
+          "a place is one number or three, [x y z]; found " + std::to_string(parts_.size()));
     return false;
   }
   for (std::size_t i = 0; i < 3; ++i) {
-    if (!parse_number(parts[i].text, *targets[i])) {
-      error(line, {parts[i].text, inner.column + parts[i].column - 1},
-            "found " + quoted(parts[i].text) + " where a number was expected");
+    if (!parse_number(parts_[i].text, *targets[i])) {
+      error(line, {parts_[i].text, inner.column + parts_[i].column - 1},
+            "found " + quoted(parts_[i].text) + " where a number was expected");
     }
   }
   return true;
@@ -371,11 +362,11 @@ std::optional<std::uint32_t> Reader::reference(Line& line, std::size_t at) {
       return tap(line, token, label, std::move(parts));
     }
   }
-  if (token.text[0] == '@' && macros_.contains(token.text.substr(1))) {
+  if (token.text[0] == '@' && macro_of(token.text.substr(1))) {
     std::vector<Token> coordinates;
     if (!line.coordinates.empty()) {
       const Token both = line.coordinates.front();
-      line.coordinates.erase(line.coordinates.begin());
+      line.coordinates = line.coordinates.subspan(1);
       const std::size_t colon = both.text.find(':');
       coordinates.push_back({both.text.substr(0, colon), both.column});
       if (colon != std::string_view::npos) {
@@ -391,18 +382,17 @@ std::optional<std::uint32_t> Reader::reference(Line& line, std::size_t at) {
     return std::nullopt;
   }
   const std::string_view name = token.text.substr(1);
-  const auto found = masses_.find(name);
-  if (found != masses_.end()) {
-    return found->second;
+  if (const auto mass = mass_of(name)) {
+    return mass;
   }
   std::vector<std::string_view> names;
-  for (const Line& other : lines_) {
-    if (names.size() < most_suggestions && masses_.contains(other.label.text)) {
-      names.push_back(other.label.text);
+  for (const Entry& other : entries_) {
+    if (names.size() < most_suggestions && is_mass(keywords[other.keyword].element)) {
+      names.push_back(label_of(other));
     }
   }
   error(line, token,
-        labels_.contains(name)
+        entry_of(name) != undeclared
             ? quoted(token.text) + " is no mass, so nothing can be attached to it"
             : "no mass is called " + quoted(token.text) + suggestion(name, names, "@"));
   return std::nullopt;
@@ -412,20 +402,22 @@ std::optional<std::uint32_t> Reader::reference(Line& line, std::size_t at) {
 // mesh.
 std::optional<std::uint32_t> Reader::tap(const Line& line, const Token& token, const Token& label,
                                          std::vector<Token> coordinates) {
-  const auto found = macros_.find(label.text.substr(1));
-  if (found == macros_.end()) {
+  const auto macro = macro_of(label.text.substr(1));
+  if (!macro) {
     std::vector<std::string_view> names;
-    for (const auto& [name, index] : macros_) {
-      names.push_back(name);
+    for (const Entry& other : entries_) {
+      if (keywords[other.keyword].element == Element::macro) {
+        names.push_back(label_of(other));
+      }
     }
     error(line, label,
-          masses_.contains(label.text.substr(1))
+          mass_of(label.text.substr(1))
               ? quoted(label.text) + " is one mass, so it has no places on it: write it without '['"
               : "no macro is called " + quoted(label.text) +
                     suggestion(label.text.substr(1), names, "@"));
     return std::nullopt;
   }
-  const Keyword& keyword = *macro_keywords_.at(found->second);
+  const Keyword& keyword = *macro_keywords_.at(*macro);
   const bool is_plane = is_mesh(keyword.macro);
   const std::size_t wanted = is_plane ? 2 : 1;
   if (!is_plane && coordinates.size() > 1 && token.text[0] == '[') {
@@ -452,7 +444,7 @@ std::optional<std::uint32_t> Reader::tap(const Line& line, const Token& token, c
   }
   Mass point{.kind = MassKind::point, .tap = static_cast<std::uint32_t>(network.taps.size())};
   point.place = {line.number, token.column};
-  network.taps.push_back({.macro = found->second,
+  network.taps.push_back({.macro = *macro,
                           .u = expression(line, coordinates[0]),
                           .v = is_plane ? expression(line, coordinates[1]) : no_argument});
   network.masses.push_back(std::move(point));

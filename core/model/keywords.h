@@ -21,6 +21,14 @@ enum class Element {
   link,
 };
 
+inline bool is_mass(Element element) {
+  return element == Element::ground || element == Element::mass || element == Element::oscillator ||
+         element == Element::position_input;
+}
+inline bool is_parameter(Element element) {
+  return element == Element::parameter || element == Element::audio_parameter;
+}
+
 // Everything that tells one keyword from another. The reader, its messages and its suggestions
 // have no other list.
 struct Keyword {

@@ -1,6 +1,7 @@
 #include "core/model/mdl.h"
 
 #include <algorithm>
+#include <bit>
 
 #include "core/model/expression.h"
 #include "core/model/reader.h"
@@ -27,24 +28,26 @@ ParsedNetwork Reader::read(std::string_view text, const ReadOptions& options) {
         "found a zero byte: this is no text, so it is no model");
     return std::move(out_);
   }
+  text_ = text;
   int number = 0;
   while (!text.empty() && errors_ <= most_diagnostics) {
-    const std::size_t end = std::min(text.find_first_of("\r\n"), text.size());
+    const auto* const last =
+        std::find_if(text.begin(), text.end(), [](char c) { return c == '\n' || c == '\r'; });
+    const auto end = static_cast<std::size_t>(last - text.begin());
     read_line(text.substr(0, end), ++number);
     const bool pair = end + 1 < text.size() && text[end] == '\r' && text[end + 1] == '\n';
     text.remove_prefix(std::min(text.size(), end + (pair ? 2 : 1)));
   }
   // Declarations first: a line may refer to one that comes after it.
-  for (const Line& line : lines_) {
-    declare(line);
-  }
-  for (Line& line : lines_) {
+  declare_all();
+  for (const Entry& entry : entries_) {
     if (errors_ > most_diagnostics) {
       break;
     }
+    Line line = open(entry);
     build(line);
   }
-  if (lines_.empty() && out_.ok()) {
+  if (entries_.empty() && out_.ok()) {
     say(Severity::error, 1, {"", 1},
         "the model is empty: expected elements such as '@m mass 1. 0. 0.'");
   }
@@ -59,14 +62,14 @@ ParsedNetwork Reader::read(std::string_view text, const ReadOptions& options) {
 }
 
 void Reader::read_line(std::string_view text, int number) {
-  std::vector<Token> tokens = split(text);
-  if (tokens.empty()) {
+  split(text, tokens_);
+  if (tokens_.empty()) {
     return;
   }
-  if (tokens[0].text[0] == '~') {
-    return read_block(tokens, number);
+  if (tokens_[0].text[0] == '~') {
+    return read_block(tokens_, number);
   }
-  Line line{.number = number, .keyword = nullptr, .label = tokens[0], .word = {}, .rest = {}};
+  Line line{.number = number, .label = tokens_[0]};
   if (line.label.text[0] != '@') {
     return warning(line, line.label,
                    "ignored: an element starts with '@', a comment with '#', found " +
@@ -76,25 +79,68 @@ void Reader::read_line(std::string_view text, int number) {
   if (line.label.text.empty()) {
     return error(line, line.label, "expected a label right after '@'");
   }
-  if (tokens.size() < 2) {
+  if (tokens_.size() < 2) {
     return error(line, {"", line.label.column + static_cast<int>(line.label.text.size()) + 1},
                  "the line ends where a keyword was expected, such as 'mass' or 'springDamper'");
   }
-  line.word = tokens[1];
+  const Token& word = tokens_[1];
   const auto* found = std::find_if(std::begin(keywords), std::end(keywords),
-                                   [&](const Keyword& k) { return k.word == line.word.text; });
+                                   [&](const Keyword& k) { return k.word == word.text; });
   if (found == std::end(keywords)) {
     std::vector<std::string_view> words;
     for (const Keyword& keyword : keywords) {
       words.push_back(keyword.word);
     }
-    return error(line, line.word,
-                 "unknown keyword " + quoted(line.word.text) + suggestion(line.word.text, words));
+    return error(line, word, "unknown keyword " + quoted(word.text) + suggestion(word.text, words));
   }
-  line.keyword = found;
-  line.group = groups_.empty() ? std::string_view() : groups_.back();
-  line.rest.assign(tokens.begin() + 2, tokens.end());
-  lines_.push_back(std::move(line));
+  entries_.push_back({.at = static_cast<std::uint32_t>(text.data() - text_.data()),
+                      .length = static_cast<std::uint32_t>(text.size()),
+                      .number = number,
+                      .group = groups_.empty() ? 0 : groups_.back(),
+                      .keyword = static_cast<std::uint8_t>(found - std::begin(keywords))});
+}
+
+// The line, until the next one is opened.
+Line Reader::open(const Entry& entry) {
+  split(text_.substr(entry.at, entry.length), tokens_);
+  Line line{.number = entry.number,
+            .keyword = &keywords[entry.keyword],
+            .label = tokens_[0],
+            .word = tokens_[1],
+            .group = group_names_[entry.group],
+            .rest = std::span(tokens_).subspan(2),
+            .element = entry.element};
+  line.label.text.remove_prefix(1);
+  return line;
+}
+
+std::string_view Reader::label_of(const Entry& entry) const {
+  const std::string_view text = text_.substr(entry.at, entry.length);
+  return first_word(text.substr(text.find('@') + 1));
+}
+
+// The entry of the label in the hash table; a free place of it where there is none.
+std::uint32_t& Reader::entry_of(std::string_view label) {
+  for (std::size_t at = std::hash<std::string_view>()(label);; ++at) {
+    std::uint32_t& entry = labels_[at & (labels_.size() - 1)];
+    if (entry == undeclared || label_of(entries_[entry]) == label) {
+      return entry;
+    }
+  }
+}
+
+std::optional<std::uint32_t> Reader::mass_of(std::string_view label) {
+  const std::uint32_t entry = entry_of(label);
+  return entry != undeclared && is_mass(keywords[entries_[entry].keyword].element)
+             ? std::optional(entries_[entry].element)
+             : std::nullopt;
+}
+
+std::optional<std::uint32_t> Reader::macro_of(std::string_view label) {
+  const std::uint32_t entry = entry_of(label);
+  return entry != undeclared && keywords[entries_[entry].keyword].element == Element::macro
+             ? std::optional(entries_[entry].element)
+             : std::nullopt;
 }
 
 // ~motion MEANING, or ~begin NAME and ~end NAME: what is declared between them is drawn in the
@@ -114,72 +160,95 @@ void Reader::read_block(const std::vector<Token>& tokens, int number) {
       return error(line, tokens[0],
                    "more than " + std::to_string(most_open_blocks) + " blocks are open here");
     }
-    return groups_.push_back(tokens[1].text);
+    groups_.push_back(static_cast<std::uint32_t>(group_names_.size()));
+    return group_names_.push_back(tokens[1].text);
   }
-  const auto found = std::find(groups_.rbegin(), groups_.rend(), tokens[1].text);
+  const auto found = std::find_if(groups_.rbegin(), groups_.rend(), [&](std::uint32_t group) {
+    return group_names_[group] == tokens[1].text;
+  });
   if (found == groups_.rend()) {
     return error(line, tokens[1], "no block " + quoted(tokens[1].text) + " is open here");
   }
   groups_.erase(std::next(found).base());
 }
 
-// Enters a line's label, and the value of a parameter.
-void Reader::declare(const Line& line) {
-  const auto [entry, is_new] = labels_.try_emplace(line.label.text, &line);
-  if (!is_new) {
-    const Line& first = *entry->second;
-    const std::string where = "'@" + std::string(line.label.text) +
-                              "' is already declared in line " + std::to_string(first.number);
-    if (line.keyword->element != Element::link || first.keyword->element != Element::link) {
-      return error(line, line.label, where);
+void Reader::declare_all() {
+  labels_.assign(std::bit_ceil(2 * entries_.size() + 2), undeclared);
+  const auto count_of = [&](auto is_wanted) {
+    return static_cast<std::size_t>(std::count_if(
+        entries_.begin(), entries_.end(),
+        [&](const Entry& entry) { return is_wanted(keywords[entry.keyword].element); }));
+  };
+  out_.network.masses.reserve(count_of(is_mass));
+  out_.network.links.reserve(count_of([](Element element) { return element == Element::link; }));
+  for (std::uint32_t i = 0; i < entries_.size(); ++i) {
+    if (enter_label(i)) {
+      declare(entries_[i]);
     }
-    warning(line, line.label, where + "; both links are kept");
   }
+}
+
+// False if the label is another's, which is an error unless both are links.
+bool Reader::enter_label(std::uint32_t index) {
+  const Entry& entry = entries_[index];
+  std::uint32_t& place = entry_of(label_of(entry));
+  if (place == undeclared) {
+    place = index;
+    return true;
+  }
+  const Line line = open(entry);
+  const Entry& first = entries_[place];
+  const std::string where = "'@" + std::string(line.label.text) + "' is already declared in line " +
+                            std::to_string(first.number);
+  if (line.keyword->element != Element::link || keywords[first.keyword].element != Element::link) {
+    error(line, line.label, where);
+    return false;
+  }
+  warning(line, line.label, where + "; both links are kept");
+  return true;
+}
+
+void Reader::declare(Entry& entry) {
   Network& network = out_.network;
-  switch (line.keyword->element) {
-    case Element::parameter:
-    case Element::audio_parameter: {
-      if (parameter_names_.size() == most_parameters) {
-        return error(line, line.label,
-                     "a model has at most " + std::to_string(most_parameters) + " parameters");
-      }
-      if (!is_identifier(line.label.text)) {
-        error(line, line.label, "a parameter's name has letters, digits and '_' only");
-      }
-      Parameter parameter{.name = std::string(line.label.text),
-                          .value = 0.0,
-                          .place = {line.number, line.label.column}};
-      if (!check_count(line)) {
-        // It has been told.
-      } else if (line.keyword->element == Element::audio_parameter) {
-        parameter.audio_input = audio_input(line);
-      } else if (!parse_number(line.rest[0].text, parameter.value)) {
-        error(line, line.rest[0],
-              "found " + quoted(line.rest[0].text) +
-                  " where the parameter's value, a number, was expected");
-      }
-      parameter_names_.push_back(parameter.name);
-      network.parameters.push_back(std::move(parameter));
-      break;
+  const Keyword& keyword = keywords[entry.keyword];
+  if (is_mass(keyword.element)) {
+    entry.element = static_cast<std::uint32_t>(network.masses.size());
+    network.masses.emplace_back();
+  } else if (keyword.element == Element::macro) {
+    const Line line = open(entry);
+    if (line.label.text.find(']') != std::string_view::npos) {
+      error(line, line.label, "a macro's label must not have a ']', which ends a place on it");
     }
-    case Element::ground:
-    case Element::mass:
-    case Element::oscillator:
-    case Element::position_input:
-      masses_.emplace(line.label.text, static_cast<std::uint32_t>(network.masses.size()));
-      network.masses.emplace_back();
-      break;
-    case Element::macro:
-      if (line.label.text.find(']') != std::string_view::npos) {
-        error(line, line.label, "a macro's label must not have a ']', which ends a place on it");
-      }
-      macros_.emplace(line.label.text, static_cast<std::uint32_t>(network.macros.size()));
-      macro_keywords_.push_back(line.keyword);
-      network.macros.emplace_back();
-      break;
-    default:
-      break;
+    entry.element = static_cast<std::uint32_t>(network.macros.size());
+    macro_keywords_.push_back(&keyword);
+    network.macros.emplace_back();
+  } else if (is_parameter(keyword.element)) {
+    declare_parameter(open(entry));
   }
+}
+
+void Reader::declare_parameter(const Line& line) {
+  if (parameter_names_.size() == most_parameters) {
+    return error(line, line.label,
+                 "a model has at most " + std::to_string(most_parameters) + " parameters");
+  }
+  if (!is_identifier(line.label.text)) {
+    error(line, line.label, "a parameter's name has letters, digits and '_' only");
+  }
+  Parameter parameter{.name = std::string(line.label.text),
+                      .value = 0.0,
+                      .place = {line.number, line.label.column}};
+  if (!check_count(line)) {
+    // It has been told.
+  } else if (line.keyword->element == Element::audio_parameter) {
+    parameter.audio_input = audio_input(line);
+  } else if (!parse_number(line.rest[0].text, parameter.value)) {
+    error(line, line.rest[0],
+          "found " + quoted(line.rest[0].text) +
+              " where the parameter's value, a number, was expected");
+  }
+  parameter_names_.push_back(parameter.name);
+  out_.network.parameters.push_back(std::move(parameter));
 }
 
 // MIMS writes the place on a macro behind all other arguments: u, or u:v for a mesh.
@@ -188,13 +257,13 @@ void Reader::take_coordinates(Line& line) {
   for (std::size_t i = 0;
        i < line.rest.size() && i < static_cast<std::size_t>(line.keyword->references); ++i) {
     const std::string_view text = line.rest[i].text;
-    count += text[0] == '@' && macros_.contains(text.substr(1)) ? 1 : 0;
+    count += text[0] == '@' && macro_of(text.substr(1)) ? 1 : 0;
   }
   count = std::min(
       count, line.rest.size() -
                  std::min(line.rest.size(), static_cast<std::size_t>(line.keyword->references)));
-  line.coordinates.assign(line.rest.end() - static_cast<std::ptrdiff_t>(count), line.rest.end());
-  line.rest.resize(line.rest.size() - count);
+  line.coordinates = line.rest.last(count);
+  line.rest = line.rest.first(line.rest.size() - count);
   if (count > 0) {
     show(delayed_, line, "writes a place on a macro without brackets");
   }
@@ -202,9 +271,7 @@ void Reader::take_coordinates(Line& line) {
 
 void Reader::build(Line& line) {
   take_coordinates(line);
-  const bool is_parameter = line.keyword->element == Element::parameter ||
-                            line.keyword->element == Element::audio_parameter;
-  if (is_parameter || !check_count(line)) {
+  if (is_parameter(line.keyword->element) || !check_count(line)) {
     return;
   }
   switch (line.keyword->element) {

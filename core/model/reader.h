@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <optional>
+#include <span>
 #include <string>
 #include <string_view>
 #include <unordered_map>
@@ -18,14 +19,30 @@ inline constexpr int most_diagnostics = 100;           // errors, and as many wa
 inline constexpr std::size_t most_parameters = 1024;   // each is looked for in every expression
 inline constexpr std::size_t most_open_blocks = 1024;  // ~begin without its ~end
 
+// What stands for the mass or macro that a line declares where it declares none, or not as the
+// first to do so.
+inline constexpr std::uint32_t undeclared = 0xffffffffu;
+
+// What is kept of a line, a few bytes each; it is split anew for every reading.
+struct Entry {
+  std::uint32_t at = 0;  // where it starts in the text, and how long it is
+  std::uint32_t length = 0;
+  int number = 0;
+  std::uint32_t group = 0;  // index into Reader::group_names_
+  std::uint32_t element = undeclared;
+  std::uint8_t keyword = 0;  // index into keywords
+};
+
+// A line that is being read.
 struct Line {
   int number = 0;
   const Keyword* keyword = nullptr;
   Token label;             // without its '@'
   Token word;              // the keyword as written
   std::string_view group;  // of the display block around it; empty if there is none
-  std::vector<Token> rest;
-  std::vector<Token> coordinates;  // of macros that are referred to without brackets, in MIMS
+  std::span<const Token> rest;
+  std::span<const Token> coordinates;  // of macros referred to without brackets, in MIMS
+  std::uint32_t element = undeclared;  // the mass or macro
 };
 
 // The first line that shows something, and by what: "opens a block".
@@ -40,7 +57,15 @@ class Reader {
 
  private:
   void read_line(std::string_view line, int number);
-  void declare(const Line& line);
+  Line open(const Entry& entry);
+  std::string_view label_of(const Entry& entry) const;
+  std::uint32_t& entry_of(std::string_view label);
+  std::optional<std::uint32_t> mass_of(std::string_view label);
+  std::optional<std::uint32_t> macro_of(std::string_view label);
+  void declare_all();
+  bool enter_label(std::uint32_t index);
+  void declare(Entry& entry);
+  void declare_parameter(const Line& line);
   void build(Line& line);
   void take_coordinates(Line& line);
 
@@ -125,19 +150,21 @@ class Reader {
   ParsedNetwork out_;
   int errors_ = 0;
   int warnings_ = 0;
-  std::vector<Line> lines_;
+  std::string_view text_;
+  std::vector<Entry> entries_;
+  std::vector<std::uint32_t> labels_;  // a hash table of entries
+  std::vector<Token> tokens_;          // of the line that is being read
+  std::vector<Token> parts_;           // of a place in it
   std::vector<std::string> parameter_names_;
-  std::unordered_map<std::string_view, std::uint32_t> masses_;  // label -> index
-  std::unordered_map<std::string_view, std::uint32_t> macros_;  // label -> index
   std::vector<const Keyword*> macro_keywords_;                  // [macro]
   std::vector<std::uint32_t> resting_;                          // macros without a velocity
   std::uint64_t nodes_ = 0;                                     // of all macros
-  std::unordered_map<std::string_view, const Line*> labels_;    // every label -> its line
   std::unordered_map<std::string_view, ArgumentId> arguments_;  // text -> index
-  std::vector<std::string_view> groups_;  // of the display blocks that are open
-  Evidence velocity_;                     // of a form that only MIMS4Max has
-  Evidence delayed_;                      // of a form that only MIMS has
-  std::optional<ThirdArgument> said_;     // by ~motion
+  std::vector<std::string_view> group_names_ = {""};            // of all display blocks
+  std::vector<std::uint32_t> groups_;                           // those that are open
+  Evidence velocity_;                                           // of a form that only MIMS4Max has
+  Evidence delayed_;                                            // of a form that only MIMS has
+  std::optional<ThirdArgument> said_;                           // by ~motion
   int said_line_ = 0;
 };
 

@@ -19,8 +19,13 @@ bool is_identifier(std::string_view text) {
          });
 }
 
-std::vector<Token> split(std::string_view line) {
-  std::vector<Token> tokens;
+std::string_view first_word(std::string_view text) {
+  const auto ends = [](char c) { return is_blank(c) || c == '#' || c == '['; };
+  return {text.begin(), std::find_if(text.begin(), text.end(), ends)};
+}
+
+void split(std::string_view line, std::vector<Token>& tokens) {
+  tokens.clear();
   std::size_t at = 0;
   while (at < line.size()) {
     if (is_blank(line[at])) {
@@ -35,12 +40,15 @@ std::vector<Token> split(std::string_view line) {
       const std::size_t end = line.find(line[at] == '[' ? ']' : '\'', at + 1);
       at = end == std::string_view::npos ? line.size() : end + 1;
     } else {
-      while (at < line.size() && !is_blank(line[at]) && line[at] != '#' && line[at] != '[') {
-        ++at;
-      }
+      at += first_word(line.substr(at)).size();
     }
     tokens.push_back({line.substr(start, at - start), static_cast<int>(start) + 1});
   }
+}
+
+std::vector<Token> split(std::string_view line) {
+  std::vector<Token> tokens;
+  split(line, tokens);
   return tokens;
 }
 

@@ -13,7 +13,11 @@ struct Token {
 };
 
 // Tokens are divided by blanks; [...] and '...' hold together; '#' starts a comment.
+void split(std::string_view line, std::vector<Token>& tokens);
 std::vector<Token> split(std::string_view line);
+
+// The characters of a text before a blank, a comment or a '['.
+std::string_view first_word(std::string_view text);
 
 // What stands between [ ] or ' ', or the token itself.
 Token unwrapped(Token token);
