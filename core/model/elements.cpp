@@ -392,7 +392,7 @@ std::optional<std::uint32_t> Reader::reference(Line& line, std::size_t at) {
     }
   }
   error(line, token,
-        entry_of(name) != undeclared
+        entry_of(name) != IndexTable::none
             ? quoted(token.text) + " is no mass, so nothing can be attached to it"
             : "no mass is called " + quoted(token.text) + suggestion(name, names, "@"));
   return std::nullopt;

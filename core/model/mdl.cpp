@@ -1,7 +1,6 @@
 #include "core/model/mdl.h"
 
 #include <algorithm>
-#include <bit>
 
 #include "core/model/expression.h"
 #include "core/model/reader.h"
@@ -55,6 +54,8 @@ ParsedNetwork Reader::read(std::string_view text, const ReadOptions& options) {
   look_over();
   std::stable_sort(out_.diagnostics.begin(), out_.diagnostics.end(),
                    [](const Diagnostic& a, const Diagnostic& b) { return a.line < b.line; });
+  entries_ = {};
+  labels_ = IndexTable();
   if (out_.ok()) {
     out_.network = canonical(std::move(out_.network));
   }
@@ -119,26 +120,22 @@ std::string_view Reader::label_of(const Entry& entry) const {
   return first_word(text.substr(text.find('@') + 1));
 }
 
-// The entry of the label in the hash table; a free place of it where there is none.
+// The entry of the label, or where it is to be entered.
 std::uint32_t& Reader::entry_of(std::string_view label) {
-  for (std::size_t at = std::hash<std::string_view>()(label);; ++at) {
-    std::uint32_t& entry = labels_[at & (labels_.size() - 1)];
-    if (entry == undeclared || label_of(entries_[entry]) == label) {
-      return entry;
-    }
-  }
+  return labels_.find(std::hash<std::string_view>()(label),
+                      [&](std::uint32_t entry) { return label_of(entries_[entry]) == label; });
 }
 
 std::optional<std::uint32_t> Reader::mass_of(std::string_view label) {
   const std::uint32_t entry = entry_of(label);
-  return entry != undeclared && is_mass(keywords[entries_[entry].keyword].element)
+  return entry != IndexTable::none && is_mass(keywords[entries_[entry].keyword].element)
              ? std::optional(entries_[entry].element)
              : std::nullopt;
 }
 
 std::optional<std::uint32_t> Reader::macro_of(std::string_view label) {
   const std::uint32_t entry = entry_of(label);
-  return entry != undeclared && keywords[entries_[entry].keyword].element == Element::macro
+  return entry != IndexTable::none && keywords[entries_[entry].keyword].element == Element::macro
              ? std::optional(entries_[entry].element)
              : std::nullopt;
 }
@@ -173,7 +170,7 @@ void Reader::read_block(const std::vector<Token>& tokens, int number) {
 }
 
 void Reader::declare_all() {
-  labels_.assign(std::bit_ceil(2 * entries_.size() + 2), undeclared);
+  labels_ = IndexTable(entries_.size());
   const auto count_of = [&](auto is_wanted) {
     return static_cast<std::size_t>(std::count_if(
         entries_.begin(), entries_.end(),
@@ -192,7 +189,7 @@ void Reader::declare_all() {
 bool Reader::enter_label(std::uint32_t index) {
   const Entry& entry = entries_[index];
   std::uint32_t& place = entry_of(label_of(entry));
-  if (place == undeclared) {
+  if (place == IndexTable::none) {
     place = index;
     return true;
   }

@@ -4,6 +4,8 @@
 #include <bit>
 #include <unordered_map>
 
+#include "core/model/index_table.h"
+
 namespace ressort {
 namespace {
 
@@ -21,11 +23,10 @@ std::string key_of(const Formula& formula) {
   return key;
 }
 
-std::string key_of(const Drawing& drawing) {
-  std::string key;
-  append(key, std::bit_cast<std::uint64_t>(drawing.x + 0.0));  // -0 is drawn where 0 is
-  append(key, std::bit_cast<std::uint64_t>(drawing.y + 0.0));
-  return key + drawing.group;
+std::size_t hash_of(const Drawing& drawing) {
+  const std::hash<double> hash;
+  return 31 * (31 * hash(drawing.x) + hash(drawing.y)) +
+         std::hash<std::string_view>()(drawing.group);
 }
 
 // Builds the canonical network element by element, taking what each one needs from the old.
@@ -34,7 +35,8 @@ class Renumbering {
   explicit Renumbering(Network network)
       : old_(std::move(network)),
         places_(old_.masses.size(), unplaced),
-        arguments_(old_.arguments.size(), no_argument) {}
+        arguments_(old_.arguments.size(), no_argument),
+        drawings_(old_.drawings.size()) {}
 
   Network run() {
     const auto by_number = [](const auto& a, const auto& b) { return a.number < b.number; };
@@ -70,6 +72,8 @@ class Renumbering {
   static constexpr std::uint32_t unplaced = 0xffffffffu;
 
   void place_masses() {
+    new_.masses.reserve(old_.masses.size());
+    new_.drawings.reserve(old_.drawings.size());
     for (std::uint32_t i = 0; i < old_.masses.size(); ++i) {
       if (old_.masses[i].kind != MassKind::position && old_.masses[i].kind != MassKind::point) {
         place(i);
@@ -144,12 +148,13 @@ class Renumbering {
       return 0;
     }
     const Drawing& drawing = old_.drawings[number - 1];
-    const auto [entry, is_new] = drawings_.try_emplace(
-        key_of(drawing), static_cast<std::uint32_t>(new_.drawings.size() + 1));
-    if (is_new) {
+    std::uint32_t& index = drawings_.find(
+        hash_of(drawing), [&](std::uint32_t i) { return new_.drawings[i] == drawing; });
+    if (index == IndexTable::none) {
+      index = static_cast<std::uint32_t>(new_.drawings.size());
       new_.drawings.push_back(drawing);
     }
-    return entry->second;
+    return index + 1;
   }
 
   Network old_;
@@ -157,7 +162,7 @@ class Renumbering {
   std::vector<std::uint32_t> places_;  // [old mass], points are never placed
   std::vector<ArgumentId> arguments_;  // [old argument]
   std::unordered_map<std::string, ArgumentId> formulas_;
-  std::unordered_map<std::string, std::uint32_t> drawings_;
+  IndexTable drawings_;
 };
 
 }  // namespace

@@ -9,6 +9,7 @@
 #include <unordered_map>
 #include <vector>
 
+#include "core/model/index_table.h"
 #include "core/model/keywords.h"
 #include "core/model/mdl.h"
 #include "core/model/tokens.h"
@@ -152,9 +153,9 @@ class Reader {
   int warnings_ = 0;
   std::string_view text_;
   std::vector<Entry> entries_;
-  std::vector<std::uint32_t> labels_;  // a hash table of entries
-  std::vector<Token> tokens_;          // of the line that is being read
-  std::vector<Token> parts_;           // of a place in it
+  IndexTable labels_;          // of entries
+  std::vector<Token> tokens_;  // of the line that is being read
+  std::vector<Token> parts_;   // of a place in it
   std::vector<std::string> parameter_names_;
   std::vector<const Keyword*> macro_keywords_;                  // [macro]
   std::vector<std::uint32_t> resting_;                          // macros without a velocity
