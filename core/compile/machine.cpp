@@ -127,6 +127,8 @@ class ProgramMaker {
     std::stable_sort(order.begin(), order.end(),
                      [&](std::uint32_t a, std::uint32_t b) { return rank(a) < rank(b); });
     node_.resize(masses.size(), nowhere);
+    program_.position.reserve(order.size());
+    program_.velocity.reserve(order.size());
     for (std::uint32_t node = 0; node < order.size(); ++node) {
       const Mass& mass = masses[order[node]];
       node_[order[node]] = node;
@@ -182,6 +184,7 @@ class ProgramMaker {
     };
     std::stable_sort(order.begin(), order.end(),
                      [&](std::uint32_t a, std::uint32_t b) { return rank(a) < rank(b); });
+    program_.ends.reserve(order.size());
     for (std::uint32_t i = 0; i < order.size(); ++i) {
       const Link& link = network_.links[order[i]];
       program_.ends.push_back({node_[link.a], node_[link.b]});

@@ -14,7 +14,7 @@ class IndexTable {
   static constexpr std::uint32_t none = 0xffffffffu;
 
   explicit IndexTable(std::size_t most_indices = 0)
-      : places_(std::bit_ceil(2 * most_indices + 1), none) {}
+      : places_(std::bit_ceil(most_indices + most_indices / 2 + 1), none) {}
 
   // The place of the index that is the one looked for, or, holding `none`, where it belongs.
   template <class IsIt>

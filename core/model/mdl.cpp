@@ -170,6 +170,7 @@ void Reader::read_block(const std::vector<Token>& tokens, int number) {
 }
 
 void Reader::declare_all() {
+  entries_.shrink_to_fit();
   labels_ = IndexTable(entries_.size());
   const auto count_of = [&](auto is_wanted) {
     return static_cast<std::size_t>(std::count_if(
@@ -177,6 +178,7 @@ void Reader::declare_all() {
         [&](const Entry& entry) { return is_wanted(keywords[entry.keyword].element); }));
   };
   out_.network.masses.reserve(count_of(is_mass));
+  out_.network.drawings.reserve(out_.network.masses.capacity());
   out_.network.links.reserve(count_of([](Element element) { return element == Element::link; }));
   for (std::uint32_t i = 0; i < entries_.size(); ++i) {
     if (enter_label(i)) {
@@ -348,7 +350,7 @@ void Reader::look_over() {
     const Mass& mass = network.masses[i];
     if (!attached[i] && mass.kind != MassKind::oscillator && mass.kind != MassKind::point) {
       say(Severity::warning, mass.place.line, {mass.name, mass.place.column},
-          "nothing is attached to '@" + mass.name + "'");
+          "nothing is attached to '@" + mass.name.text() + "'");
     }
   }
   for (const Link& link : network.links) {
@@ -358,7 +360,8 @@ void Reader::look_over() {
         network.masses[link.b].kind != MassKind::position) {
       say(Severity::warning, link.place.line, {link.name, link.place.column},
           "the contact's ends look swapped: it acts while the second is below the first, here '@" +
-              network.masses[link.b].name + "' below '@" + network.masses[link.a].name + "'");
+              network.masses[link.b].name.text() + "' below '@" +
+              network.masses[link.a].name.text() + "'");
     }
   }
   std::vector<Input> heard = network.inputs;

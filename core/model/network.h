@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "core/formula.h"
+#include "core/model/name.h"
 
 namespace ressort {
 
@@ -42,7 +43,7 @@ enum class MassKind : std::uint8_t {
 };
 
 struct Mass {
-  std::string name;
+  Name name;
   MassKind kind = MassKind::mass;
   ArgumentId mass = no_argument;       // M
   ArgumentId stiffness = no_argument;  // K, oscillators only
@@ -104,7 +105,7 @@ struct Tap {
 
 // Where an element is drawn; of no consequence to the sound.
 struct Drawing {
-  std::string group;
+  Name group;
   double x = 0.0;
   double y = 0.0;
   bool operator==(const Drawing&) const = default;
@@ -126,7 +127,7 @@ inline constexpr std::size_t max_link_arguments = 5;
 
 // Between two masses, first and second as written: a link's force f acts as F_a -= f, F_b += f.
 struct Link {
-  std::string name;
+  Name name;
   LinkKind kind = LinkKind::spring;
   std::uint32_t a = 0;  // indices into Network::masses
   std::uint32_t b = 0;

@@ -64,18 +64,18 @@ class Printer {
       used_.insert(parameter.name);
     }
     for (const Mass& mass : network_.masses) {
-      used_.insert(mass.name);
+      used_.insert(mass.name.text());
     }
     for (const Macro& macro : network_.macros) {
       used_.insert(macro.name);
     }
     for (const Link& link : network_.links) {
-      used_.insert(link.name);
+      used_.insert(link.name.text());
     }
     for (std::size_t i = 0; i < network_.masses.size(); ++i) {
       const Mass& mass = network_.masses[i];
       const bool is_unnamed = mass.name.empty() && mass.kind != MassKind::point;
-      masses_.push_back(is_unnamed ? unused("m" + std::to_string(i)) : mass.name);
+      masses_.push_back(is_unnamed ? unused("m" + std::to_string(i)) : mass.name.text());
     }
   }
 
@@ -96,7 +96,7 @@ class Printer {
   }
 
   // Opens and closes blocks, so that what comes next stands in the group.
-  void enter(const std::string& group) {
+  void enter(std::string_view group) {
     if (group == group_) {
       return;
     }
@@ -104,7 +104,7 @@ class Printer {
       text_ += "~end " + group_ + "\n";
     }
     if (!group.empty()) {
-      text_ += "~begin " + group + "\n";
+      text_ += "~begin " + std::string(group) + "\n";
     }
     group_ = group;
   }
@@ -213,7 +213,7 @@ class Printer {
       const Link& link = network_.links[i];
       const std::string ends = " " + reference(link.a) + " " + reference(link.b);
       const Keyword& keyword = keyword_of(link);
-      line(link.name.empty() ? unused("r" + std::to_string(i)) : link.name, keyword.word,
+      line(link.name.empty() ? unused("r" + std::to_string(i)) : link.name.text(), keyword.word,
            ends + link_arguments(link, keyword));
     }
   }

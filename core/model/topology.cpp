@@ -21,6 +21,13 @@ bool is_fixed(const Macro& macro, std::uint32_t i, std::uint32_t j) {
   return false;
 }
 
+std::size_t link_count(const Macro& macro) {
+  const std::size_t rows = macro.length;
+  const std::size_t columns = macro.width;
+  const std::size_t near = rows * (columns - 1) + (rows - 1) * columns;
+  return macro.kind == MacroKind::stiff_string ? near + rows : near;
+}
+
 void add_nodes(const Macro& macro, Network& network) {
   for (std::uint32_t i = 0; i < macro.length; ++i) {
     for (std::uint32_t j = 0; j < macro.width; ++j) {
@@ -81,6 +88,14 @@ std::uint64_t node_count(const Macro& macro) {
 Network expand_macros(const Network& network) {
   Network expanded = network;
   expanded.macros.clear();
+  std::size_t nodes = network.masses.size();
+  std::size_t links = network.links.size();
+  for (const Macro& macro : network.macros) {
+    nodes += node_count(macro);
+    links += link_count(macro);
+  }
+  expanded.masses.reserve(nodes);
+  expanded.links.reserve(links);
   std::vector<std::uint32_t> first;
   for (const Macro& macro : network.macros) {
     first.push_back(static_cast<std::uint32_t>(expanded.masses.size()));
