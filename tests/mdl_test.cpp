@@ -387,4 +387,22 @@ TEST_CASE("text that no person wrote does no harm", "[mdl]") {
   }
 }
 
+TEST_CASE("labels of any length are kept, and copied with their network", "[mdl]") {
+  for (const std::size_t length : {1, 14, 15, 16, 17, 127, 300}) {
+    const std::string label(length, 'm');
+    const std::string text = "@" + label + " mass 1. 0. 0.\n@g ground 0.\n@" + label +
+                             "s spring @" + label + " @g 0.1\n@out1 posOutput @" + label + "\n";
+    ParsedNetwork parsed = parse_network(text);
+    REQUIRE(parsed.ok());
+    Network copy = parsed.network;
+    parsed = parse_network(text);  // what the copy's names might still point to is gone
+    CHECK(copy == parsed.network);
+    CHECK(copy.masses[0].name == label);
+    CHECK(copy.links[0].name == label + "s");
+    copy.masses[0].name = copy.links[0].name;
+    CHECK(copy.masses[0].name == label + "s");
+    CHECK_FALSE(copy == parsed.network);
+  }
+}
+
 }  // namespace ressort
