@@ -28,7 +28,7 @@ class Body {
     }
     for (std::size_t i = 0; i < network.masses.size(); ++i) {
       const Mass& mass = network.masses[i];
-      if (mass.kind == MassKind::mass || mass.kind == MassKind::oscillator) {
+      if (moves(mass)) {
         index_[i] = static_cast<int>(scale_.size());
         scale_.push_back(1.0 / std::sqrt(value(mass.mass)));
       }
@@ -99,14 +99,6 @@ class Body {
   std::vector<double> scale_;   // [moving mass] M^(-1/2)
 };
 
-Scaled scaled_matrices(const Network& network, std::span<const double> parameters) {
-  std::vector<int> index(network.masses.size(), -1);
-  std::vector<double> scale;
-  for (std::size_t i = 0; i < network.masses.size(); ++i) {
-    const Mass& mass = network.masses[i];
-    if (moves(mass)) {
-      index[i] = static_cast<int>(scale.size());
-      scale.push_back(1.0 / std::sqrt(argument_value(network, mass.mass, parameters)));
 // (A - shift)^-1, as Spectra wants it, for a positive A - shift: half of what a general one takes.
 class Inverse {
  public:
