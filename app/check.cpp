@@ -2,12 +2,15 @@
 
 #include <unistd.h>
 
+#include <cmath>
 #include <cstdio>
 #include <nlohmann/json.hpp>
 
 #include "app/exit_code.h"
+#include "app/files.h"
 #include "app/loader.h"
 #include "app/text.h"
+#include "core/analysis/stability.h"
 #include "core/compile/compile.h"
 #include "core/model/print.h"
 
@@ -39,19 +42,99 @@ json findings_json(const std::vector<Finding>& findings) {
   return out;
 }
 
-json scene_json(const Scene& scene, const Compiled& compiled) {
+// What is proved of a scene.
+struct Proved {
+  Certificate certificate;  // everywhere in the preset's ranges, or at the model's own values
+  double stiffness_factor = 0.0;
+  bool others_move = true;  // the limits below hold wherever the others are turned to
+  std::vector<std::optional<SafeRange>> safe;  // [parameter]
+};
+
+Proved prove(const Scene& scene, const Instrument& instrument) {
+  const ParameterBox box = preset_box(instrument.parameters, scene.preset);
+  ParameterBox as_written;
+  for (const ParameterInfo& info : instrument.parameters) {
+    as_written.lowest.push_back(info.value);
+    as_written.highest.push_back(info.value);
+  }
+  Stability stability(scene.network, 1.0);
+  Proved proved{.certificate = stability.certify(box),
+                .stiffness_factor = stability.stiffness_factor(box)};
+  proved.others_move = proved.certificate.verdict == Verdict::stable;
+  for (std::size_t i = 0; i < instrument.parameters.size(); ++i) {
+    proved.safe.push_back(stability.safe_range(proved.others_move ? box : as_written, i,
+                                               instrument.parameters[i].value));
+  }
+  return proved;
+}
+
+const char* verdict_name(Verdict verdict) {
+  switch (verdict) {
+    case Verdict::stable:
+      return "stable";
+    case Verdict::unstable:
+      return "unstable";
+    case Verdict::unproved:
+      return "unproved";
+  }
+  return "";
+}
+
+// "stable below 1.31568"
+std::string describe(const std::optional<SafeRange>& safe) {
+  if (!safe) {
+    return "stable nowhere";
+  }
+  const bool has_lowest = safe->lowest != 0.0 && std::isfinite(safe->lowest);
+  const bool has_highest = safe->highest != 0.0 && std::isfinite(safe->highest);
+  const std::string lowest = print_limit(safe->lowest, false);
+  const std::string highest = print_limit(safe->highest, true);
+  return has_lowest && has_highest ? "stable between " + lowest + " and " + highest
+         : has_lowest              ? "stable above " + lowest
+         : has_highest             ? "stable below " + highest
+                                   : "stable anywhere";
+}
+
+json limit_json(double value) {
+  return std::isfinite(value) ? json(value) : json();
+}
+
+json parameter_json(const ParameterInfo& info, int input, const std::optional<SafeRange>& safe) {
+  json out{{"name", info.name}};
+  if (input > 0) {
+    out["input"] = input;
+  } else {
+    out.update({{"value", info.value}, {"minimum", info.minimum}, {"maximum", info.maximum}});
+  }
+  // A limit that there is not is null; what is stable nowhere has no limits.
+  if (safe) {
+    out["stable_above"] = limit_json(safe->lowest);
+    out["stable_below"] = limit_json(safe->highest);
+  }
+  return out;
+}
+
+json stability_json(const Proved& proved) {
+  json out{{"verdict", verdict_name(proved.certificate.verdict)},
+           {"limits_hold", proved.others_move ? "in all ranges" : "at the start's values"},
+           {"stiffness_factor", limit_json(proved.stiffness_factor)}};
+  if (const std::optional<Culprit>& culprit = proved.certificate.culprit) {
+    out["culprit"] = {{"name", culprit->name},
+                      {"line", culprit->place.line},
+                      {"quantity", quantity_name(culprit->quantity)},
+                      {"argument", culprit->argument},
+                      {"value", limit_json(culprit->value)},
+                      {"limit", culprit->limit ? json(*culprit->limit) : json()}};
+  }
+  return out;
+}
+
+json scene_json(const Scene& scene, const Compiled& compiled, const Proved& proved) {
   const Instrument& instrument = compiled.instrument;
   json parameters = json::array();
   for (std::size_t i = 0; i < instrument.parameters.size(); ++i) {
-    const ParameterInfo& info = instrument.parameters[i];
-    if (const int input = scene.network.parameters[i].audio_input; input > 0) {
-      parameters.push_back({{"name", info.name}, {"input", input}});
-    } else {
-      parameters.push_back({{"name", info.name},
-                            {"value", info.value},
-                            {"minimum", info.minimum},
-                            {"maximum", info.maximum}});
-    }
+    parameters.push_back(parameter_json(instrument.parameters[i],
+                                        scene.network.parameters[i].audio_input, proved.safe[i]));
   }
   json plan = json::array();
   for (const Part& part : compiled.plan.parts) {
@@ -72,6 +155,7 @@ json scene_json(const Scene& scene, const Compiled& compiled) {
            {"outputs", instrument.outputs},
            {"parameters", parameters},
            {"plan", plan},
+           {"stability", stability_json(proved)},
            {"stiffness_margin", instrument.stiffness_margin}};
   if (instrument.mode) {
     out["lowest_mode_hz"] = instrument.mode->frequency_hz;
@@ -79,7 +163,41 @@ json scene_json(const Scene& scene, const Compiled& compiled) {
   return out;
 }
 
-void print_report(const Scene& scene, const Compiled& compiled) {
+// Names the element that makes the scene unstable, at its line of the model.
+void warn(const Proved& proved, const Scene& scene, std::vector<Finding>& findings) {
+  if (proved.certificate.verdict == Verdict::stable) {
+    return;
+  }
+  const auto text = read_text(scene.model_path, max_model_bytes);
+  Finding finding = finding_of(scene.model_path, text ? std::string_view(*text) : "",
+                               complaint(proved.certificate));
+  finding.diagnostic.severity = Severity::warning;
+  findings.push_back(std::move(finding));
+}
+
+// The report's last line.
+std::string conclusion(const Scene& scene, const Proved& proved) {
+  const bool has_ranges = !scene.preset.parameters.empty();
+  switch (proved.certificate.verdict) {
+    case Verdict::stable:
+      break;
+    case Verdict::unstable:
+      return has_ranges
+                 ? "not stable everywhere in the parameters' ranges; the limits above are "
+                   "for one of them while the others stay where they start"
+                 : "not stable; the limits above are for one parameter while the others stay";
+    case Verdict::unproved:
+      return "not proved stable: above " + std::to_string(Stability::most_exact_masses) +
+             " masses only a bound is known, which is too careful by up to two times";
+  }
+  const std::string proof = has_ranges ? "stable, wherever the parameters are turned to" : "stable";
+  return std::isfinite(proved.stiffness_factor)
+             ? proof + ": every stiffness may grow " + print_limit(proved.stiffness_factor, true) +
+                   " times"
+             : proof;
+}
+
+void print_report(const Scene& scene, const Compiled& compiled, const Proved& proved) {
   const Instrument& instrument = compiled.instrument;
   std::printf("%s: %s, %s, %s, %s\n", scene.path.c_str(),
               counted(instrument.masses, "mass that moves", "masses that move").c_str(),
@@ -89,11 +207,13 @@ void print_report(const Scene& scene, const Compiled& compiled) {
   std::printf("motion: %s\n", scene.motion.c_str());
   for (std::size_t i = 0; i < instrument.parameters.size(); ++i) {
     const ParameterInfo& info = instrument.parameters[i];
+    const std::string safe = describe(proved.safe[i]);
     if (const int input = scene.network.parameters[i].audio_input; input > 0) {
-      std::printf("  %-12s is input %d, sample by sample\n", info.name.c_str(), input);
+      std::printf("  %-12s is input %d, sample by sample; %s\n", info.name.c_str(), input,
+                  safe.c_str());
     } else {
-      std::printf("  %-12s %-10g from %g to %g\n", info.name.c_str(), info.value, info.minimum,
-                  info.maximum);
+      std::printf("  %-12s %-10g from %g to %g; %s\n", info.name.c_str(), info.value, info.minimum,
+                  info.maximum, safe.c_str());
     }
   }
   std::printf("runs as\n  %s", describe(compiled.plan).c_str());
@@ -107,14 +227,7 @@ void print_report(const Scene& scene, const Compiled& compiled) {
     std::printf("keys do not set the pitch: above %zu masses the lowest mode is not looked for\n",
                 most_tuned_masses);
   }
-  if (instrument.stiffness_margin >= 1.0) {
-    std::printf("stable: every stiffness may grow by %.3g at least\n", instrument.stiffness_margin);
-  } else {
-    std::printf(
-        "warning: stability is not proved; stiffness and damping may be too high for the "
-        "masses (margin %.3g)\n",
-        instrument.stiffness_margin);
-  }
+  std::printf("%s\n", conclusion(scene, proved).c_str());
 }
 
 }  // namespace
@@ -130,8 +243,13 @@ int check(const CheckOptions& options) {
       reading.findings.push_back(finding_of(reading.scene->path, "", made.error()));
     }
   }
+  std::optional<Proved> proved;
+  if (compiled && options.as != CheckAs::model) {
+    proved = prove(*reading.scene, compiled->instrument);
+    warn(*proved, *reading.scene, reading.findings);
+  }
   if (options.as == CheckAs::json) {
-    json out = compiled ? scene_json(*reading.scene, *compiled) : json::object();
+    json out = compiled ? scene_json(*reading.scene, *compiled, *proved) : json::object();
     out["ok"] = compiled.has_value();
     out["findings"] = findings_json(reading.findings);
     // Names may be in any encoding; what is no UTF-8 is replaced.
@@ -143,7 +261,7 @@ int check(const CheckOptions& options) {
     return exit_code::wrong_use;
   }
   if (options.as == CheckAs::report) {
-    print_report(*reading.scene, *compiled);
+    print_report(*reading.scene, *compiled, *proved);
   } else if (options.as == CheckAs::model) {
     const std::string text = print_network(reading.scene->network);
     std::fwrite(text.data(), 1, text.size(), stdout);

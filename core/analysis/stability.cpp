@@ -1,97 +1,285 @@
 #include "core/analysis/stability.h"
 
 #include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "core/analysis/proofs.h"
+#include "core/model/topology.h"
 
 namespace ressort {
 namespace {
 
-// 4 is the limit; a little below it modes near the Nyquist frequency still decay.
-constexpr double limit = 4.0 * 0.98;
-
-// What a link adds to k + 2z at its ends: the part that grows with the stiffness factor, and the
-// part that does not.
-struct Weight {
-  double stiff = 0.0;
-  double damped = 0.0;
-};
-
-Weight weight_of(const Network& network, const Link& link, std::span<const double> highest,
-                 double r) {
-  const auto value = [&](int i) {
-    return std::max(0.0,
-                    argument_value(network, link.arguments[static_cast<std::size_t>(i)], highest));
-  };
-  switch (link.kind) {
-    case LinkKind::spring:
-    case LinkKind::contact:
-      return {value(0) * r * r, 2.0 * value(1) * r};
-    // The steepest slope of a quadratic or cubic spring grows with the amplitude, which is not
-    // known here; its linear part is what counts at rest.
-    case LinkKind::quadratic_spring:
-    case LinkKind::cubic_spring:
-      return {value(0) * r * r, 2.0 * value(2) * r};
-    case LinkKind::clipped_spring: {
-      const double k = std::max(value(0), value(2));
-      return {1.6 * k * r * r, 2.0 * value(3) * r};
-    }
-    case LinkKind::clipped_contact: {
-      const double k = std::max(value(0), value(2));
-      return {k * r * r, 2.0 * value(3) * r};
-    }
-    case LinkKind::pluck:
-      return {0.1 * value(0) * r * r, 2.0 * value(2) * r};
-    // A bow's friction grows with the square root of the factor; counting it with the factor
-    // itself is on the safe side above 1.
-    case LinkKind::bow:
-      return {2.0 * value(0) * r * 2.0 / 3.0, 0.0};
-    case LinkKind::smooth_bow:
-      return {2.0 * value(0) * r * 1.0387, 0.0};
-  }
-  return {};
-}
+constexpr double infinity = std::numeric_limits<double>::infinity();
+constexpr double safe_limit = 4.0 * (1.0 - 1e-9);  // whatever the rounding
+constexpr double comfortable_limit = 4.0 * 0.98;   // modes near the Nyquist frequency still decay
 
 }  // namespace
 
 double highest_stiffness_factor(const Network& network, const ParameterBox& box,
                                 double rate_ratio) {
-  std::vector<Weight> sums(network.masses.size());
-  std::vector<double> inverse_mass(network.masses.size(), 0.0);
-  for (std::size_t i = 0; i < network.masses.size(); ++i) {
-    const Mass& mass = network.masses[i];
-    if (mass.kind != MassKind::mass && mass.kind != MassKind::oscillator) {
-      continue;
-    }
-    inverse_mass[i] = 1.0 / std::max(1e-30, argument_value(network, mass.mass, box.lowest));
-    sums[i].stiff = std::max(0.0, argument_value(network, mass.stiffness, box.highest)) *
-                    rate_ratio * rate_ratio;
-    sums[i].damped =
-        2.0 * std::max(0.0, argument_value(network, mass.damping, box.highest)) * rate_ratio;
-  }
-  for (const Link& link : network.links) {
-    const Weight weight = weight_of(network, link, box.highest, rate_ratio);
-    for (const std::uint32_t end : {link.a, link.b}) {
-      sums[end].stiff += weight.stiff;
-      sums[end].damped += weight.damped;
+  const Stencil stencil = make_stencil(network);
+  const std::vector<Range> arguments = argument_ranges(network, box);
+  std::vector<Load> sums(stencil.masses.size());
+  for (const Stencil::Term& term : stencil.terms) {
+    const Load load = highest_load(network, term, arguments, rate_ratio);
+    for (const Stencil::Entry& entry : stencil.of(term)) {
+      // Friction grows with the factor's root; with the factor it is on the safe side above 1.
+      sums[entry.row].stiff += std::fabs(entry.share) * (load.stiff + load.rubbed);
+      sums[entry.row].damped += std::fabs(entry.share) * load.damped;
     }
   }
   double factor = 1e9;
-  const auto bound = [&](double stiff, double damped) {
+  for (const Stencil::Term& term : stencil.terms) {
+    double stiff = 0.0;
+    double damped = 0.0;
+    for (const Stencil::Entry& entry : stencil.of(term)) {
+      const Mass& mass = network.masses[stencil.masses[entry.row]];
+      const double inverse = 1.0 / std::max(1e-30, arguments[mass.mass].lowest);
+      stiff += std::fabs(entry.share) * sums[entry.row].stiff * inverse;
+      damped += std::fabs(entry.share) * sums[entry.row].damped * inverse;
+    }
     if (stiff > 0.0) {
-      factor = std::min(factor, (limit - damped) / stiff);
-    } else if (damped > limit) {
+      factor = std::min(factor, (comfortable_limit - damped) / stiff);
+    } else if (damped > comfortable_limit) {
       factor = 0.0;
     }
-  };
-  for (const Link& link : network.links) {
-    const double a = inverse_mass[link.a];
-    const double b = inverse_mass[link.b];
-    bound(sums[link.a].stiff * a + sums[link.b].stiff * b,
-          sums[link.a].damped * a + sums[link.b].damped * b);
-  }
-  for (std::size_t i = 0; i < sums.size(); ++i) {
-    bound(sums[i].stiff * inverse_mass[i], sums[i].damped * inverse_mass[i]);
   }
   return factor;
+}
+
+Proofs::Proofs(Network network, double rate_ratio)
+    : macros_(network.macros),
+      network_(network.macros.empty() ? std::move(network) : expand_macros(network)),
+      rate_ratio_(rate_ratio),
+      stencil_(make_stencil(network_)),
+      is_exact_(stencil_.masses.size() <= Stability::most_exact_masses),
+      edges_(stencil_, is_exact_) {}
+
+// --- weights ------------------------------------------------------------------------------------
+
+std::vector<Load> Proofs::loads(std::span<const Range> arguments) const {
+  std::vector<Load> all;
+  all.reserve(stencil_.terms.size());
+  for (const Stencil::Term& term : stencil_.terms) {
+    all.push_back(highest_load(network_, term, arguments, rate_ratio_));
+  }
+  return all;
+}
+
+std::vector<Load> Proofs::lowest_loads(std::span<const Range> arguments) const {
+  std::vector<Load> all;
+  all.reserve(stencil_.terms.size());
+  for (const Stencil::Term& term : stencil_.terms) {
+    all.push_back(lowest_load(network_, term, arguments, rate_ratio_));
+  }
+  return all;
+}
+
+Weights Proofs::weigh(std::span<const Range> arguments) {
+  Weights weights;
+  for (const std::uint32_t mass : stencil_.masses) {
+    weights.masses.push_back(range_at(arguments, network_.masses[mass].mass).lowest);
+  }
+  for (const Load& load : loads(arguments)) {
+    weights.terms.push_back(load.total());
+  }
+  weights.feeds = feeds(arguments);
+  return weights;
+}
+
+Weights Proofs::weigh(std::span<const Range> arguments, const Instead& instead) {
+  std::vector<Range> changed(arguments.begin(), arguments.end());
+  changed[instead.argument] = {instead.value, instead.value};
+  Weights weights = weigh(arguments);
+  if (instead.quantity == Quantity::mass) {
+    weights.masses = weigh(changed).masses;
+    return weights;
+  }
+  const std::vector<Load> before = loads(arguments);
+  const std::vector<Load> after = loads(changed);
+  for (std::size_t t = 0; t < before.size(); ++t) {
+    weights.terms[t] = instead.quantity == Quantity::stiffness
+                           ? after[t].stiff + before[t].damped + before[t].rubbed
+                           : before[t].stiff + after[t].damped + after[t].rubbed;
+  }
+  return weights;
+}
+
+// Some may be negative as long as the whole is not: a spring that pushes beside one that pulls.
+bool Proofs::feeds(std::span<const Range> arguments) {
+  std::vector<double> stiff;
+  std::vector<double> damped;
+  double least = 0.0;
+  for (const Load& load : lowest_loads(arguments)) {
+    stiff.push_back(load.stiff);
+    damped.push_back(load.damped);
+    least = std::min({least, load.stiff, load.damped});
+  }
+  return least < 0.0 && !(is_exact_ && is_positive(stiff) && is_positive(damped));
+}
+
+bool Proofs::is_positive(std::span<const double> terms) {
+  double largest = 0.0;
+  std::vector<double> negated;
+  for (const double term : terms) {
+    if (!std::isfinite(term)) {
+      return false;
+    }
+    largest = std::max(largest, std::fabs(term));
+    negated.push_back(-term);
+  }
+  const std::vector<double> rounding(stencil_.masses.size(), 1e-12 * largest);
+  return largest == 0.0 || edges_.is_definite(rounding, negated);
+}
+
+// How what counts for stability goes when one parameter moves.
+Proofs::Course Proofs::course_along(std::size_t parameter) const {
+  const auto index = static_cast<std::uint32_t>(parameter);
+  std::vector<ArgumentId> used;
+  for (const std::uint32_t i : stencil_.masses) {
+    const Mass& mass = network_.masses[i];
+    used.insert(used.end(), {mass.mass, mass.stiffness, mass.damping});
+  }
+  for (const Link& link : network_.links) {
+    used.insert(used.end(), link.arguments.begin(), link.arguments.end());
+  }
+  std::sort(used.begin(), used.end());
+  used.erase(std::unique(used.begin(), used.end()), used.end());
+  Course course = Course::flat;
+  for (const ArgumentId id : used) {
+    if (id == no_argument) {
+      continue;
+    }
+    const Formula& formula = network_.arguments[id];
+    if (!is_affine(formula, index)) {
+      return Course::bent;
+    }
+    if (std::any_of(formula.begin(), formula.end(), [&](const Step& step) {
+          return step.op == Op::parameter && step.index == index;
+        })) {
+      course = Course::straight;
+    }
+  }
+  return course;
+}
+
+// --- what is asked ------------------------------------------------------------------------------
+
+Verdict Proofs::prove(const ParameterBox& box) {
+  const std::vector<Range> arguments = argument_ranges(network_, box);
+  return edges_.holds(weigh(arguments), safe_limit) ? Verdict::stable
+         : is_exact_ || nonsense(arguments)         ? Verdict::unstable
+                                                    : Verdict::unproved;
+}
+
+Certificate Proofs::certify(const ParameterBox& box) {
+  const std::vector<Range> arguments = argument_ranges(network_, box);
+  if (const auto suspect = nonsense(arguments)) {
+    return {Verdict::unstable, 0.0, accuse(*suspect, arguments)};
+  }
+  const Weights weights = weigh(arguments);
+  if (edges_.holds(weights, safe_limit)) {
+    return {};
+  }
+  if (weights.feeds) {
+    return {Verdict::unstable, 0.0, accuse(feeder(arguments), arguments)};
+  }
+  const auto all_together = [&](double factor) {
+    Weights scaled = weights;
+    for (double& term : scaled.terms) {
+      term *= factor;
+    }
+    return scaled;
+  };
+  const Edge edge = edges_.between(all_together, 0.0, 1.0);
+  const Suspect suspect = weakest(weights, arguments, edge.shape);
+  Culprit culprit = accuse(suspect, arguments);
+  culprit.limit = limit(suspect, arguments);
+  return {is_exact_ ? Verdict::unstable : Verdict::unproved, edge.value, std::move(culprit)};
+}
+
+std::optional<SafeRange> Proofs::safe_range(const ParameterBox& box, std::size_t parameter,
+                                            double start) {
+  const Course course = course_along(parameter);
+  const double side = start < 0.0 ? -1.0 : 1.0;
+  // All values from `from` to `to` at once; if the course is straight, the ends say it all.
+  const auto between = [&](double from, double to) {
+    ParameterBox moved = box;
+    moved.lowest[parameter] = std::min(side * from, side * to);
+    moved.highest[parameter] = std::max(side * from, side * to);
+    return weigh(argument_ranges(network_, moved));
+  };
+  const auto holds = [&](double at) { return edges_.holds(between(at, at), 4.0); };
+  const double size = std::fabs(start);
+  std::vector<double> tries = {size, 0.0};
+  for (double far = 16.0; course != Course::flat && far < 1e8; far *= 16.0) {
+    tries.insert(tries.end(), {(size > 0.0 ? size : 1.0) * far, size / far});
+  }
+  const auto anchor = std::find_if(tries.begin(), tries.end(), holds);
+  if (anchor == tries.end()) {
+    return std::nullopt;
+  }
+  if (course == Course::flat) {
+    return SafeRange{-infinity, infinity};
+  }
+  const Line line = [&](double at) {
+    return course == Course::straight ? between(at, at) : between(*anchor, at);
+  };
+  const SafeRange found = range_around(line, *anchor);
+  return start < 0.0 ? SafeRange{-found.highest, -found.lowest} : found;
+}
+
+SafeRange Proofs::range_around(const Line& line, double anchor) {
+  SafeRange range{0.0, infinity};
+  if (const auto edge = edges_.outwards(line, anchor)) {
+    range.highest = edge->value;
+  }
+  if (!edges_.holds(line(0.0), 4.0)) {
+    range.lowest = edges_.between(line, anchor, 0.0).value;
+  }
+  return range;
+}
+
+double Proofs::stiffness_factor(const ParameterBox& box) {
+  const std::vector<Range> arguments = argument_ranges(network_, box);
+  const Weights weights = weigh(arguments);
+  const std::vector<Load> all = loads(arguments);
+  const auto line = [&](double factor) {
+    Weights scaled = weights;
+    for (std::size_t t = 0; t < all.size(); ++t) {
+      scaled.terms[t] = all[t].stiff * factor + all[t].damped + all[t].rubbed * std::sqrt(factor);
+    }
+    return scaled;
+  };
+  if (edges_.holds(line(1.0), 4.0)) {
+    const auto edge = edges_.outwards(line, 1.0);
+    return edge ? edge->value : infinity;
+  }
+  return edges_.holds(line(0.0), 4.0) ? edges_.between(line, 0.0, 1.0).value : 0.0;
+}
+
+// --- the door -----------------------------------------------------------------------------------
+
+Stability::Stability(Network network, double rate_ratio)
+    : proofs_(std::make_unique<Proofs>(std::move(network), rate_ratio)) {}
+Stability::~Stability() = default;
+
+Verdict Stability::prove(const ParameterBox& box) {
+  return proofs_->prove(box);
+}
+
+Certificate Stability::certify(const ParameterBox& box) {
+  return proofs_->certify(box);
+}
+
+std::optional<SafeRange> Stability::safe_range(const ParameterBox& box, std::size_t parameter,
+                                               double start) {
+  return proofs_->safe_range(box, parameter, start);
+}
+
+double Stability::stiffness_factor(const ParameterBox& box) {
+  return proofs_->stiffness_factor(box);
 }
 
 }  // namespace ressort

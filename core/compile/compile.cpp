@@ -199,6 +199,18 @@ double comfortable_gain(const Machine& machine, const Playing& playing,
 
 }  // namespace
 
+ParameterBox preset_box(const std::vector<ParameterInfo>& parameters, const Preset& preset) {
+  ParameterBox box;
+  for (const ParameterInfo& info : parameters) {
+    const bool is_given =
+        std::any_of(preset.parameters.begin(), preset.parameters.end(),
+                    [&](const ParameterSetting& setting) { return setting.name == info.name; });
+    box.lowest.push_back(is_given ? info.minimum : info.value);
+    box.highest.push_back(is_given ? info.maximum : info.value);
+  }
+  return box;
+}
+
 Result<Compiled> compile(const Network& network, const Preset& preset,
                          const CompileOptions& options) {
   if (!network.macros.empty()) {
@@ -212,14 +224,8 @@ Result<Compiled> compile(const Network& network, const Preset& preset,
     return infos.error();
   }
   instrument.parameters = *std::move(infos);
-  ParameterBox box;
   for (std::size_t i = 0; i < instrument.parameters.size(); ++i) {
     machine.parameters[i] = instrument.parameters[i].value;
-    const bool given = std::any_of(
-        preset.parameters.begin(), preset.parameters.end(),
-        [&](const ParameterSetting& s) { return s.name == instrument.parameters[i].name; });
-    box.lowest.push_back(given ? instrument.parameters[i].minimum : machine.parameters[i]);
-    box.highest.push_back(given ? instrument.parameters[i].maximum : machine.parameters[i]);
   }
 
   for (const Program& program : machine.parts) {
@@ -257,7 +263,8 @@ Result<Compiled> compile(const Network& network, const Preset& preset,
   playing.release_s = preset.release_s;
   playing.noise = preset.noise;
   playing.transpose = preset.transpose;
-  playing.highest_factor = highest_stiffness_factor(network, box, machine.rate_ratio);
+  playing.highest_factor = highest_stiffness_factor(
+      network, preset_box(instrument.parameters, preset), machine.rate_ratio);
   for (const Program& program : machine.parts) {
     instrument.masses += program.moving;
   }

@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "core/analysis/interval.h"
 #include "core/analysis/linear.h"
 #include "core/compile/plan.h"
 #include "core/engine/engine.h"
@@ -73,6 +74,9 @@ struct Compiled {
   Instrument instrument;
   Plan plan;
 };
+
+// Where the preset lets the parameters be turned to; those that it does not name stay.
+ParameterBox preset_box(const std::vector<ParameterInfo>& parameters, const Preset& preset);
 
 // Fails, with the preset's line, where the preset names what the model does not have.
 // [any thread but audio]

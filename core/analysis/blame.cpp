@@ -1,0 +1,250 @@
+// Which element makes a network unstable, and how to say it.
+#include <algorithm>
+#include <cmath>
+#include <set>
+
+#include "core/analysis/proofs.h"
+#include "core/model/expression.h"
+
+namespace ressort {
+namespace {
+
+// Where the argument of a link's stiffness or damping stands.
+std::size_t slot_of(const Link& link, Quantity quantity, std::span<const Range> arguments) {
+  const bool is_stiffness = quantity == Quantity::stiffness;
+  switch (link.kind) {
+    case LinkKind::spring:
+    case LinkKind::contact:
+      return is_stiffness ? 0 : 1;
+    case LinkKind::quadratic_spring:
+    case LinkKind::cubic_spring:
+    case LinkKind::pluck:
+      return is_stiffness ? 0 : 2;
+    case LinkKind::clipped_spring:
+    case LinkKind::clipped_contact: {
+      const bool starts_stiffer = range_at(arguments, link.arguments[0]).highest >
+                                  range_at(arguments, link.arguments[2]).highest;
+      return !is_stiffness ? 3 : starts_stiffer ? 0 : 2;
+    }
+    case LinkKind::bow:
+    case LinkKind::smooth_bow:
+      return 0;
+  }
+  return 0;
+}
+
+// "the stiffness m_K = 5 of 'r1' and 2 more"
+std::string described(const Culprit& culprit) {
+  const std::string number = print_number(culprit.value);
+  std::string text = std::string("the ") + quantity_name(culprit.quantity) + " " + culprit.argument;
+  if (culprit.argument != number) {
+    text += " = " + number;
+  }
+  text += culprit.name.empty() ? "" : " of '" + culprit.name + "'";
+  return culprit.others == 0 ? text : text + " and " + std::to_string(culprit.others) + " more";
+}
+
+}  // namespace
+
+// A mass that weighs nothing, or what is no number.
+std::optional<Proofs::Suspect> Proofs::nonsense(std::span<const Range> arguments) const {
+  for (std::size_t row = 0; row < stencil_.masses.size(); ++row) {
+    const Range mass = range_at(arguments, network_.masses[stencil_.masses[row]].mass);
+    if (!(mass.lowest > 0.0 && std::isfinite(mass.highest))) {
+      return Suspect{Quantity::mass, row};
+    }
+  }
+  const std::vector<Load> all = loads(arguments);
+  for (std::size_t t = 0; t < all.size(); ++t) {
+    if (!std::isfinite(all[t].total())) {
+      const bool is_stiff = !std::isfinite(all[t].stiff);
+      return Suspect{is_stiff ? Quantity::stiffness : Quantity::damping, t};
+    }
+  }
+  return std::nullopt;
+}
+
+Proofs::Suspect Proofs::feeder(std::span<const Range> arguments) const {
+  const std::vector<Load> all = lowest_loads(arguments);
+  const auto least = std::min_element(all.begin(), all.end(), [](const Load& a, const Load& b) {
+    return std::min(a.stiff, a.damped) < std::min(b.stiff, b.damped);
+  });
+  return {least->stiff < least->damped ? Quantity::stiffness : Quantity::damping,
+          static_cast<std::size_t>(least - all.begin())};
+}
+
+Proofs::Suspect Proofs::heavier_part(std::size_t term, std::span<const Range> arguments) const {
+  const Load load = highest_load(network_, stencil_.terms[term], arguments, rate_ratio_);
+  return {load.stiff >= load.damped + load.rubbed ? Quantity::stiffness : Quantity::damping, term};
+}
+
+// Who has the largest share of the motion that does not decay. A mass that moves nearly alone,
+// between several links, is too light; else it is the link that is pulled the most.
+Proofs::Suspect Proofs::weakest(const Weights& weights, std::span<const Range> arguments,
+                                std::span<const double> shape) const {
+  if (shape.empty()) {
+    return heavier_part(edge_bound(stencil_, weights).term, arguments);
+  }
+  double inertia = 0.0;
+  double pull = 0.0;
+  std::size_t row = 0;
+  std::size_t term = 0;
+  std::vector<double> share_of_row;
+  std::vector<double> share_of_term;
+  for (std::size_t i = 0; i < shape.size(); ++i) {
+    share_of_row.push_back(weights.masses[i] * shape[i] * shape[i]);
+    inertia += share_of_row[i];
+    row = share_of_row[i] > share_of_row[row] ? i : row;
+  }
+  for (std::size_t t = 0; t < stencil_.terms.size(); ++t) {
+    double stretch = 0.0;
+    for (const Stencil::Entry& entry : stencil_.of(stencil_.terms[t])) {
+      stretch += entry.share * shape[entry.row];
+    }
+    share_of_term.push_back(weights.terms[t] * stretch * stretch);
+    pull += share_of_term[t];
+    term = share_of_term[t] > share_of_term[term] ? t : term;
+  }
+  const double alone = share_of_row[row] / inertia;
+  const bool is_light = alone > 0.5 && share_of_term[term] / pull < 2.0 / 3.0 * alone;
+  return is_light ? Suspect{Quantity::mass, row} : heavier_part(term, arguments);
+}
+
+ArgumentId Proofs::argument_of(const Suspect& suspect, std::span<const Range> arguments) const {
+  if (suspect.quantity == Quantity::mass) {
+    return network_.masses[stencil_.masses[suspect.index]].mass;
+  }
+  const Stencil::Term& term = stencil_.terms[suspect.index];
+  if (term.is_link) {
+    const Link& link = network_.links[term.element];
+    return link.arguments[slot_of(link, suspect.quantity, arguments)];
+  }
+  const Mass& mass = network_.masses[term.element];
+  return suspect.quantity == Quantity::stiffness ? mass.stiffness : mass.damping;
+}
+
+const Place& Proofs::place_of(const Suspect& suspect) const {
+  if (suspect.quantity == Quantity::mass) {
+    return network_.masses[stencil_.masses[suspect.index]].place;
+  }
+  const Stencil::Term& term = stencil_.terms[suspect.index];
+  return term.is_link ? network_.links[term.element].place : network_.masses[term.element].place;
+}
+
+Culprit Proofs::accuse(const Suspect& suspect, std::span<const Range> arguments) const {
+  Culprit culprit;
+  culprit.quantity = suspect.quantity;
+  culprit.place = place_of(suspect);
+  if (suspect.quantity == Quantity::mass) {
+    culprit.name = network_.masses[stencil_.masses[suspect.index]].name;
+  } else {
+    const Stencil::Term& term = stencil_.terms[suspect.index];
+    culprit.name =
+        term.is_link ? network_.links[term.element].name : network_.masses[term.element].name;
+  }
+  for (const Macro& macro : macros_) {
+    const bool is_it =
+        macro.place.line == culprit.place.line && macro.place.column == culprit.place.column;
+    culprit.name = is_it && culprit.name.empty() ? macro.name : culprit.name;
+  }
+  const ArgumentId argument = argument_of(suspect, arguments);
+  if (argument != no_argument) {
+    std::vector<std::string> names;
+    for (const Parameter& parameter : network_.parameters) {
+      names.push_back(parameter.name);
+    }
+    culprit.argument = print_expression(network_.arguments[argument], names);
+    const Range range = arguments[argument];
+    const bool is_lowest = suspect.quantity == Quantity::mass || range.highest <= 0.0;
+    culprit.value = is_lowest ? range.lowest : range.highest;
+  }
+  culprit.others = users(suspect, arguments) - 1;
+  return culprit;
+}
+
+// Elements whose same quantity is written with the same argument; a macro is one of them.
+std::size_t Proofs::users(const Suspect& suspect, std::span<const Range> arguments) const {
+  const ArgumentId argument = argument_of(suspect, arguments);
+  const std::size_t count =
+      suspect.quantity == Quantity::mass ? stencil_.masses.size() : stencil_.terms.size();
+  std::set<std::pair<int, int>> places;
+  for (std::size_t i = 0; i < count; ++i) {
+    const Suspect other{suspect.quantity, i};
+    if (argument_of(other, arguments) == argument) {
+      places.insert({place_of(other).line, place_of(other).column});
+    }
+  }
+  return places.size();
+}
+
+// How far the one argument may go with everything else as it is.
+std::optional<double> Proofs::limit(const Suspect& suspect, std::span<const Range> arguments) {
+  const ArgumentId argument = argument_of(suspect, arguments);
+  if (argument == no_argument) {
+    return std::nullopt;
+  }
+  const auto line = [&](double value) {
+    return weigh(arguments, {suspect.quantity, argument, value});
+  };
+  if (suspect.quantity != Quantity::mass) {
+    return edges_.holds(line(0.0), 4.0)
+               ? std::optional(edges_.between(line, 0.0, arguments[argument].highest).value)
+               : std::nullopt;
+  }
+  const double lightest = arguments[argument].lowest;
+  for (double factor = 16.0; factor < 1e12; factor *= 16.0) {
+    if (edges_.holds(line(factor * lightest), 4.0)) {
+      return edges_.between(line, factor * lightest, lightest).value;
+    }
+  }
+  return std::nullopt;
+}
+
+const char* quantity_name(Quantity quantity) {
+  switch (quantity) {
+    case Quantity::mass:
+      return "mass";
+    case Quantity::stiffness:
+      return "stiffness";
+    case Quantity::damping:
+      return "damping";
+  }
+  return "";
+}
+
+std::string print_limit(double value, bool is_upper) {
+  if (value == 0.0 || !std::isfinite(value)) {
+    return value == 0.0 ? "0" : value < 0.0 ? "-inf" : "inf";
+  }
+  constexpr double found_to = 1e-12;
+  const double unit = std::pow(10.0, std::floor(std::log10(std::fabs(value))) - 5.0);
+  const double units = value / unit;
+  const double slack = found_to * std::fabs(units);
+  const double safe = is_upper ? std::floor(units + slack) : std::ceil(units - slack);
+  return print_number(unit < 1.0 ? safe / std::round(1.0 / unit) : safe * unit);
+}
+
+Error complaint(const Certificate& certificate) {
+  if (!certificate.culprit) {
+    return {"the model is stable", 0, 0};
+  }
+  const Culprit& culprit = *certificate.culprit;
+  const bool is_mass = culprit.quantity == Quantity::mass;
+  std::string text = certificate.verdict == Verdict::unproved ? "may be unstable: " : "unstable: ";
+  text += described(culprit);
+  if (culprit.limit) {
+    text += is_mass ? " must stay above " : " must stay below ";
+    text += print_limit(*culprit.limit, !is_mass);
+  } else if (certificate.factor > 0.0) {
+    text += is_mass ? " is too little" : " is too much";
+    text += ", but not by itself: all stiffness and damping must come down to " +
+            print_limit(certificate.factor, true) + " of what they are";
+  } else if (!std::isfinite(culprit.value)) {
+    text += " is no number";
+  } else {
+    text += is_mass ? " must be above 0" : " is negative, and motion grows by itself";
+  }
+  return {std::move(text), culprit.place.line, culprit.place.column};
+}
+
+}  // namespace ressort

@@ -1,0 +1,31 @@
+// core/analysis: whether a diagonal less a stencil's sum is positive definite.
+#pragma once
+
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "core/analysis/stencil.h"
+
+namespace ressort {
+
+// D - sum over terms of w g gT by a sparse Cholesky factorisation. Where the zeros are is found out
+// at the first use and kept. O(rows) for strings, about O(rows^1.5) for meshes. Keeps a reference.
+class Definite {
+ public:
+  explicit Definite(const Stencil& stencil);
+  ~Definite();
+
+  // With D by row and w by term: is the matrix positive definite? [any thread but audio]
+  bool factor(std::span<const double> diagonal, std::span<const double> weights);
+
+  // Solves for x in place, with the last matrix that factor() found positive definite.
+  void solve(std::vector<double>& x) const;
+
+ private:
+  struct Matrix;
+  const Stencil& stencil_;
+  std::unique_ptr<Matrix> matrix_;
+};
+
+}  // namespace ressort

@@ -1,0 +1,173 @@
+#include "core/analysis/edge.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace ressort {
+namespace {
+
+constexpr double limit_of_scheme = 4.0;
+constexpr double precision = 1e-13;
+constexpr double bound_precision = 1e-3;  // of what is an estimate anyway
+
+bool is_usable(const Weights& weights) {
+  const auto finite = [](double w) { return std::isfinite(w); };
+  return !weights.feeds && std::all_of(weights.masses.begin(), weights.masses.end(), [](double m) {
+    return m > 0.0 && std::isfinite(m);
+  }) && std::all_of(weights.terms.begin(), weights.terms.end(), finite);
+}
+
+}  // namespace
+
+Bound edge_bound(const Stencil& stencil, const Weights& weights) {
+  std::vector<double> sums(stencil.masses.size(), 0.0);
+  for (std::size_t t = 0; t < stencil.terms.size(); ++t) {
+    for (const Stencil::Entry& entry : stencil.of(stencil.terms[t])) {
+      sums[entry.row] += std::fabs(entry.share) * weights.terms[t];
+    }
+  }
+  Bound bound;
+  for (std::size_t t = 0; t < stencil.terms.size(); ++t) {
+    double sum = 0.0;
+    for (const Stencil::Entry& entry : stencil.of(stencil.terms[t])) {
+      sum += std::fabs(entry.share) * sums[entry.row] / weights.masses[entry.row];
+    }
+    if (weights.terms[t] > 0.0 && sum > bound.value) {
+      bound = {sum, t};
+    }
+  }
+  return bound;
+}
+
+EdgeFinder::EdgeFinder(const Stencil& stencil, bool is_exact)
+    : stencil_(stencil), is_exact_(is_exact), definite_(stencil) {}
+
+bool EdgeFinder::holds(const Weights& weights, double limit) {
+  return is_usable(weights) &&
+         (edge_bound(stencil_, weights).value < limit || (is_exact_ && factors(weights, limit)));
+}
+
+bool EdgeFinder::is_definite(std::span<const double> diagonal, std::span<const double> terms) {
+  return definite_.factor(diagonal, terms);
+}
+
+bool EdgeFinder::factors(const Weights& weights, double limit) {
+  if (!is_usable(weights)) {
+    return false;
+  }
+  // What the diagonal refuses needs no factorisation.
+  std::vector<double> diagonal;
+  for (const double mass : weights.masses) {
+    diagonal.push_back(limit * mass);
+  }
+  std::vector<double> rest = diagonal;
+  for (std::size_t t = 0; t < stencil_.terms.size(); ++t) {
+    for (const Stencil::Entry& entry : stencil_.of(stencil_.terms[t])) {
+      rest[entry.row] -= weights.terms[t] * entry.share * entry.share;
+    }
+  }
+  return std::all_of(rest.begin(), rest.end(), [](double d) { return d > 0.0; }) &&
+         definite_.factor(diagonal, weights.terms);
+}
+
+// xT (4M - K - 2Z) x, and the larger of what it is the difference of.
+EdgeFinder::Margin EdgeFinder::margin(const Weights& weights, std::span<const double> shape) const {
+  double inertia = 0.0;
+  for (std::size_t i = 0; i < shape.size(); ++i) {
+    inertia += limit_of_scheme * weights.masses[i] * shape[i] * shape[i];
+  }
+  double pull = 0.0;
+  for (std::size_t t = 0; t < stencil_.terms.size(); ++t) {
+    double stretch = 0.0;
+    for (const Stencil::Entry& entry : stencil_.of(stencil_.terms[t])) {
+      stretch += entry.share * shape[entry.row];
+    }
+    pull += weights.terms[t] * stretch * stretch;
+  }
+  return {inertia - pull, std::max(inertia, pull)};
+}
+
+// Where the shape's margin is 0: at once if the line is straight, else by halves.
+double EdgeFinder::crossing(const Line& line, std::span<const double> shape, double safe,
+                            double bad) const {
+  constexpr double rounding = 1e-14;
+  const double inside = margin(line(safe), shape).rest;
+  const double outside = margin(line(bad), shape).rest;
+  if (!(inside > 0.0 && outside < 0.0 && std::isfinite(outside))) {
+    return bad;
+  }
+  const double straight = safe + (bad - safe) * inside / (inside - outside);
+  const Margin there = margin(line(straight), shape);
+  if (std::fabs(there.rest) < rounding * there.size) {
+    return straight;
+  }
+  for (int i = 0; i < 52; ++i) {
+    const double middle = safe + 0.5 * (bad - safe);
+    (margin(line(middle), shape).rest > 0.0 ? safe : bad) = middle;
+  }
+  return bad;
+}
+
+// Towards the motion that the last factored matrix holds back least, by inverse iteration.
+void EdgeFinder::refine(const Weights& weights, std::vector<double>& shape) const {
+  for (int i = 0; i < 3; ++i) {
+    double largest = 0.0;
+    for (std::size_t row = 0; row < shape.size(); ++row) {
+      shape[row] *= weights.masses[row];
+    }
+    definite_.solve(shape);
+    for (const double x : shape) {
+      largest = std::max(largest, std::fabs(x));
+    }
+    for (double& x : shape) {
+      x /= largest;
+    }
+  }
+}
+
+Edge EdgeFinder::between(const Line& line, double safe, double bad) {
+  std::vector<double> shape(is_exact_ ? stencil_.masses.size() : 0);
+  for (std::size_t i = 0; i < shape.size(); ++i) {
+    shape[i] = std::cos(static_cast<double>(i * i));  // like no mode in particular
+  }
+  const auto is_safe = [&](double at) {
+    const Weights weights = line(at);
+    return is_exact_ ? factors(weights, limit_of_scheme) : holds(weights, limit_of_scheme);
+  };
+  bool has_factor = is_exact_ && is_safe(safe);  // of the matrix at `safe`
+  for (int round = 0; round < 100; ++round) {
+    const double enough = is_exact_ ? precision : bound_precision;
+    if (std::fabs(bad - safe) <= enough * std::max(std::fabs(bad), std::fabs(safe))) {
+      break;
+    }
+    double next = safe + 0.5 * (bad - safe);
+    if (has_factor) {
+      refine(line(safe), shape);
+      // The shape grows at the crossing, so the edge is no further; and most of the way to it is
+      // safe, the more surely the better the shape is.
+      bad = crossing(line, shape, safe, bad);
+      next = bad - 0.01 * (bad - safe);
+    }
+    has_factor = is_safe(next);
+    (has_factor ? safe : bad) = next;
+    has_factor &= is_exact_;
+  }
+  return {is_exact_ ? bad : safe, std::move(shape)};
+}
+
+std::optional<Edge> EdgeFinder::outwards(const Line& line, double safe) {
+  const double direction = safe < 0.0 ? -1.0 : 1.0;
+  const auto is_safe = [&](double at) { return holds(line(at), limit_of_scheme); };
+  if (is_safe(safe + direction * 1e12 * std::max(std::fabs(safe), 1.0))) {
+    return std::nullopt;
+  }
+  double step = direction * std::max(std::fabs(safe), 1e-9);
+  double before = safe;
+  while (is_safe(safe + step)) {
+    before = safe + step;
+    step *= 16.0;
+  }
+  return between(line, before, safe + step);
+}
+
+}  // namespace ressort

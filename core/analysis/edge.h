@@ -1,0 +1,72 @@
+// core/analysis: where stability ends on a line through what a stencil's weights may be.
+#pragma once
+
+#include <functional>
+#include <optional>
+#include <vector>
+
+#include "core/analysis/definite.h"
+#include "core/analysis/stencil.h"
+
+namespace ressort {
+
+// What stability depends on, at one point.
+struct Weights {
+  std::vector<double> masses;  // [row]
+  std::vector<double> terms;   // [term] w
+  bool feeds = false;          // negative stiffness or damping makes motion grow by itself
+};
+
+// The weights along a line: where one parameter goes, for instance.
+using Line = std::function<Weights(double)>;
+
+struct Edge {
+  double value = 0.0;
+  std::vector<double> shape;  // of the motion that does not decay there; [row], empty where unknown
+};
+
+// The largest of sum |g_i| d_i / m_i over the terms, and whose it is; d is the sum of |g| w at a
+// mass, so for a link it is d_a/m_a + d_b/m_b. Never below the largest eigenvalue of
+// M^-1 (K + 2Z): Gershgorin's bound on the terms' own matrix, which has the same spectrum.
+struct Bound {
+  double value = 0.0;
+  std::size_t term = 0;
+};
+Bound edge_bound(const Stencil& stencil, const Weights& weights);
+
+// Looks for where 4M - K - 2Z stops being positive definite. Keeps a reference to the stencil, and
+// the factorisation's pattern. [any thread but audio]
+class EdgeFinder {
+ public:
+  // Not exact: by the edge bound alone, without factorisations.
+  EdgeFinder(const Stencil& stencil, bool is_exact);
+
+  // Is it stable there? At once where the edge bound says so. A `limit` below 4 is for rounding.
+  bool holds(const Weights& weights, double limit);
+
+  // The edge between a place that holds and one that does not: to 13 digits, with about eight
+  // factorisations where the line is straight; by the bound to three, on the safe side.
+  Edge between(const Line& line, double safe, double bad);
+
+  // The first edge beyond `safe`, going away from 0, upwards if `safe` is 0; nothing up to 1e12.
+  std::optional<Edge> outwards(const Line& line, double safe);
+
+  // Is D less the sum over terms positive definite, with D by row?
+  bool is_definite(std::span<const double> diagonal, std::span<const double> terms);
+
+ private:
+  bool factors(const Weights& weights, double limit);
+  struct Margin {
+    double rest = 0.0;
+    double size = 0.0;
+  };
+  Margin margin(const Weights& weights, std::span<const double> shape) const;
+  double crossing(const Line& line, std::span<const double> shape, double safe, double bad) const;
+  void refine(const Weights& weights, std::vector<double>& shape) const;
+
+  const Stencil& stencil_;
+  bool is_exact_;
+  Definite definite_;
+};
+
+}  // namespace ressort

@@ -1,0 +1,67 @@
+// core/analysis: inside Stability. One network taken apart, and what is asked of it.
+#pragma once
+
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "core/analysis/edge.h"
+#include "core/analysis/stability.h"
+#include "core/analysis/stencil.h"
+
+namespace ressort {
+
+class Proofs {
+ public:
+  Proofs(Network network, double rate_ratio);
+
+  Verdict prove(const ParameterBox& box);
+  Certificate certify(const ParameterBox& box);
+  std::optional<SafeRange> safe_range(const ParameterBox& box, std::size_t parameter, double start);
+  double stiffness_factor(const ParameterBox& box);
+
+ private:
+  // Instead of what one quantity's argument amounts to. One text may be a stiffness here and a
+  // damping there; only the one is changed.
+  struct Instead {
+    Quantity quantity = Quantity::stiffness;
+    ArgumentId argument = no_argument;
+    double value = 0.0;
+  };
+  // A term's stiffness or damping, or the mass of a row.
+  struct Suspect {
+    Quantity quantity = Quantity::stiffness;
+    std::size_t index = 0;
+  };
+  enum class Course { flat, straight, bent };
+
+  std::vector<Load> loads(std::span<const Range> arguments) const;
+  std::vector<Load> lowest_loads(std::span<const Range> arguments) const;
+  Weights weigh(std::span<const Range> arguments);
+  Weights weigh(std::span<const Range> arguments, const Instead& instead);
+  bool feeds(std::span<const Range> arguments);
+  bool is_positive(std::span<const double> terms);
+  Course course_along(std::size_t parameter) const;
+  SafeRange range_around(const Line& line, double anchor);
+
+  // blame.cpp
+  std::optional<Suspect> nonsense(std::span<const Range> arguments) const;
+  Suspect feeder(std::span<const Range> arguments) const;
+  Suspect weakest(const Weights& weights, std::span<const Range> arguments,
+                  std::span<const double> shape) const;
+  Suspect heavier_part(std::size_t term, std::span<const Range> arguments) const;
+  Culprit accuse(const Suspect& suspect, std::span<const Range> arguments) const;
+  ArgumentId argument_of(const Suspect& suspect, std::span<const Range> arguments) const;
+  std::optional<double> limit(const Suspect& suspect, std::span<const Range> arguments);
+  std::size_t users(const Suspect& suspect, std::span<const Range> arguments) const;
+  const Place& place_of(const Suspect& suspect) const;
+
+  std::vector<Macro> macros_;
+  Network network_;  // without macros
+  double rate_ratio_;
+  Stencil stencil_;
+  bool is_exact_;
+  EdgeFinder edges_;
+};
+
+}  // namespace ressort

@@ -1,0 +1,69 @@
+// core/analysis: a network as the sum that stability looks at.
+//
+//   K + 2Z = sum over terms of w g gT
+//
+// A term is what one link, or an oscillator's own spring, adds; g says which masses it joins, and w
+// is its k + 2z where it is steepest.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "core/analysis/interval.h"
+#include "core/model/network.h"
+
+namespace ressort {
+
+// The w of a term, by how its parts grow with a factor on every stiffness: with the factor itself,
+// not at all, and with its root.
+struct Load {
+  double stiff = 0.0;
+  double damped = 0.0;
+  double rubbed = 0.0;
+  double total() const { return stiff + damped + rubbed; }
+};
+
+struct Stencil {
+  struct Entry {
+    std::uint32_t row = 0;  // which of the masses that move
+    double share = 0.0;
+  };
+  struct Term {
+    std::uint32_t first = 0;  // of `entries`
+    std::uint32_t count = 0;
+    std::uint32_t element = 0;  // index into Network::links, or Network::masses
+    bool is_link = true;
+    bool wanders = false;  // one of several that together bound a link at a place that moves
+    double scale = 1.0;    // of its w
+  };
+  std::vector<std::uint32_t> masses;  // [row] index into Network::masses
+  std::vector<Term> terms;
+  std::vector<Entry> entries;
+
+  std::span<const Entry> of(const Term& term) const {
+    return std::span(entries).subspan(term.first, term.count);
+  }
+};
+
+// Of a network without macros. A place on a macro counts with the nodes around it; one whose
+// coordinates are live counts at all nodes at once, which is on the safe side. O(masses + links).
+Stencil make_stencil(const Network& network);
+
+// What every argument can amount to in the box. [argument]
+std::vector<Range> argument_ranges(const Network& network, const ParameterBox& box);
+
+// 0 for no_argument.
+Range range_at(std::span<const Range> arguments, ArgumentId argument);
+
+// The largest load of a term in these ranges; `rate_ratio` is 44100 / rate. Quadratic and cubic
+// springs count as they are at rest: how steep they become depends on the amplitude.
+Load highest_load(const Network& network, const Stencil::Term& term,
+                  std::span<const Range> arguments, double rate_ratio);
+
+// The least stiffness and damping that a term surely has: at rest plucks, bows and contacts have
+// none, but may still have a negative one.
+Load lowest_load(const Network& network, const Stencil::Term& term,
+                 std::span<const Range> arguments, double rate_ratio);
+
+}  // namespace ressort
