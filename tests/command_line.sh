@@ -97,6 +97,20 @@ expect 2 "at most 100000 points" "$program" make string 100001
 expect 2 "a mass must be above 0" "$program" make string 5 -M 0
 expect 2 "cannot be written" "$program" make string 5 -o no/such/folder/s.mdl
 
+# Stability: what breaks it, by name and line, and how far each parameter may go.
+model stiff.mdl '@K param 1.5\n@g ground 0.\n@m osc 1. K 0. 1. 1.\n@out1 posOutput @m\n'
+expect 0 "stable: every stiffness may grow 2.66666 times" "$program" check stiff.mdl
+expect 0 "K            1.5        from 0 to 6; stable below 4" "$program" check stiff.mdl
+model wild.mdl '@s ground 0.\n@m mass 1. 1. 1.\n@r spring @s @m 5.\n@out1 posOutput @m\n'
+expect 0 "wild.mdl:3:1: warning: unstable: the stiffness 5 of 'r' must stay below 4" \
+  "$program" check wild.mdl
+expect 0 '"verdict": "unstable"' "$program" check wild.mdl --json
+expect 0 '"limit": 4.0' "$program" check wild.mdl --json
+model wide.toml 'model = "stiff.mdl"\n[parameters]\nK = { value = 1, range = [0, 5] }\n'
+expect 0 "stiff.mdl:3:1: warning: unstable: the stiffness K = 5 of 'm' must stay below 4" \
+  "$program" check wide.toml
+expect 0 "not stable everywhere in the parameters' ranges" "$program" check wide.toml
+
 # Presets.
 model broken.toml 'model = "PolyTriangle.mdl\n'
 expect 2 "broken.toml:1:" "$program" check broken.toml
@@ -141,7 +155,6 @@ expect 2 "wrong.score:1:1: error: /in/7/force" \
   "$program" render PolyTriangle -o out.wav --score wrong.score
 expect 2 "the preset keeps 'm_K' between" \
   "$program" render PolyTriangle -o out.wav --set m_K=7
-model wild.mdl '@s ground 0.\n@m mass 1. 1. 1.\n@r spring @s @m 5.\n@out1 posOutput @m\n'
 expect 0 "became unstable" "$program" render wild.mdl -o wild.wav --seconds 1
 
 # Playing without what it needs.

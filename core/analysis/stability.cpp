@@ -108,6 +108,10 @@ Weights Proofs::weigh(std::span<const Range> arguments, const Instead& instead) 
 
 // Some may be negative as long as the whole is not: a spring that pushes beside one that pulls.
 bool Proofs::feeds(std::span<const Range> arguments) {
+  if (std::none_of(arguments.begin(), arguments.end(),
+                   [](const Range& range) { return range.lowest < 0.0; })) {
+    return false;
+  }
   std::vector<double> stiff;
   std::vector<double> damped;
   double least = 0.0;
