@@ -165,7 +165,7 @@ json scene_json(const Scene& scene, const Compiled& compiled, const Proved& prov
 
 // Names the element that makes the scene unstable, at its line of the model.
 void warn(const Proved& proved, const Scene& scene, std::vector<Finding>& findings) {
-  if (proved.certificate.verdict == Verdict::stable) {
+  if (!proved.certificate.culprit) {
     return;
   }
   const auto text = read_text(scene.model_path, max_model_bytes);
@@ -175,8 +175,15 @@ void warn(const Proved& proved, const Scene& scene, std::vector<Finding>& findin
   findings.push_back(std::move(finding));
 }
 
+std::string too_large(const Instrument& instrument) {
+  constexpr std::size_t most = Stability::most_exact_masses;
+  return instrument.masses <= most
+             ? ""
+             : "; above " + std::to_string(most) + " masses by a bound, which may be too careful";
+}
+
 // The report's last line.
-std::string conclusion(const Scene& scene, const Proved& proved) {
+std::string conclusion(const Scene& scene, const Instrument& instrument, const Proved& proved) {
   const bool has_ranges = !scene.preset.parameters.empty();
   switch (proved.certificate.verdict) {
     case Verdict::stable:
@@ -187,14 +194,19 @@ std::string conclusion(const Scene& scene, const Proved& proved) {
                    "for one of them while the others stay where they start"
                  : "not stable; the limits above are for one parameter while the others stay";
     case Verdict::unproved:
-      return "not proved stable: above " + std::to_string(Stability::most_exact_masses) +
-             " masses only a bound is known, which is too careful by up to two times";
+      return "not proved stable" + too_large(instrument);
   }
-  const std::string proof = has_ranges ? "stable, wherever the parameters are turned to" : "stable";
-  return std::isfinite(proved.stiffness_factor)
-             ? proof + ": every stiffness may grow " + print_limit(proved.stiffness_factor, true) +
-                   " times"
-             : proof;
+  std::string text = has_ranges ? "stable, wherever the parameters are turned to" : "stable";
+  const auto& parameters = scene.network.parameters;
+  if (std::any_of(parameters.begin(), parameters.end(),
+                  [](const Parameter& parameter) { return parameter.audio_input > 0; })) {
+    text += has_ranges ? "" : " as it starts";
+    text += ", as long as the inputs keep to the limits above";
+  }
+  if (std::isfinite(proved.stiffness_factor)) {
+    text += ": every stiffness may grow " + print_limit(proved.stiffness_factor, true) + " times";
+  }
+  return text + too_large(instrument);
 }
 
 void print_report(const Scene& scene, const Compiled& compiled, const Proved& proved) {
@@ -227,7 +239,7 @@ void print_report(const Scene& scene, const Compiled& compiled, const Proved& pr
     std::printf("keys do not set the pitch: above %zu masses the lowest mode is not looked for\n",
                 most_tuned_masses);
   }
-  std::printf("%s\n", conclusion(scene, proved).c_str());
+  std::printf("%s\n", conclusion(scene, instrument, proved).c_str());
 }
 
 }  // namespace

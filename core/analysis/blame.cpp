@@ -226,7 +226,7 @@ std::string print_limit(double value, bool is_upper) {
 
 Error complaint(const Certificate& certificate) {
   if (!certificate.culprit) {
-    return {"the model is stable", 0, 0};
+    return {certificate.verdict == Verdict::stable ? "stable" : "not proved stable", 0, 0};
   }
   const Culprit& culprit = *certificate.culprit;
   const bool is_mass = culprit.quantity == Quantity::mass;
@@ -242,7 +242,7 @@ Error complaint(const Certificate& certificate) {
   } else if (!std::isfinite(culprit.value)) {
     text += " is no number";
   } else {
-    text += is_mass ? " must be above 0" : " is negative, and motion grows by itself";
+    text += is_mass ? " must be above 0" : " is negative, and motion may grow by itself";
   }
   return {std::move(text), culprit.place.line, culprit.place.column};
 }

@@ -40,10 +40,10 @@ Bound edge_bound(const Stencil& stencil, const Weights& weights) {
 }
 
 EdgeFinder::EdgeFinder(const Stencil& stencil, bool is_exact)
-    : stencil_(stencil), is_exact_(is_exact), definite_(stencil) {}
+    : stencil_(stencil), is_exact_(is_exact && stencil.is_complete), definite_(stencil) {}
 
 bool EdgeFinder::holds(const Weights& weights, double limit) {
-  return is_usable(weights) &&
+  return stencil_.is_complete && is_usable(weights) &&
          (edge_bound(stencil_, weights).value < limit || (is_exact_ && factors(weights, limit)));
 }
 

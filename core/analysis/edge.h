@@ -40,6 +40,7 @@ class EdgeFinder {
  public:
   // Not exact: by the edge bound alone, without factorisations.
   EdgeFinder(const Stencil& stencil, bool is_exact);
+  bool is_exact() const { return is_exact_; }
 
   // Is it stable there? At once where the edge bound says so. A `limit` below 4 is for rounding.
   bool holds(const Weights& weights, double limit);

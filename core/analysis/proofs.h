@@ -60,7 +60,6 @@ class Proofs {
   Network network_;  // without macros
   double rate_ratio_;
   Stencil stencil_;
-  bool is_exact_;
   EdgeFinder edges_;
 };
 

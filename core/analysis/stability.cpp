@@ -12,49 +12,15 @@ namespace {
 
 constexpr double infinity = std::numeric_limits<double>::infinity();
 constexpr double safe_limit = 4.0 * (1.0 - 1e-9);  // whatever the rounding
-constexpr double comfortable_limit = 4.0 * 0.98;   // modes near the Nyquist frequency still decay
 
 }  // namespace
-
-double highest_stiffness_factor(const Network& network, const ParameterBox& box,
-                                double rate_ratio) {
-  const Stencil stencil = make_stencil(network);
-  const std::vector<Range> arguments = argument_ranges(network, box);
-  std::vector<Load> sums(stencil.masses.size());
-  for (const Stencil::Term& term : stencil.terms) {
-    const Load load = highest_load(network, term, arguments, rate_ratio);
-    for (const Stencil::Entry& entry : stencil.of(term)) {
-      // Friction grows with the factor's root; with the factor it is on the safe side above 1.
-      sums[entry.row].stiff += std::fabs(entry.share) * (load.stiff + load.rubbed);
-      sums[entry.row].damped += std::fabs(entry.share) * load.damped;
-    }
-  }
-  double factor = 1e9;
-  for (const Stencil::Term& term : stencil.terms) {
-    double stiff = 0.0;
-    double damped = 0.0;
-    for (const Stencil::Entry& entry : stencil.of(term)) {
-      const Mass& mass = network.masses[stencil.masses[entry.row]];
-      const double inverse = 1.0 / std::max(1e-30, arguments[mass.mass].lowest);
-      stiff += std::fabs(entry.share) * sums[entry.row].stiff * inverse;
-      damped += std::fabs(entry.share) * sums[entry.row].damped * inverse;
-    }
-    if (stiff > 0.0) {
-      factor = std::min(factor, (comfortable_limit - damped) / stiff);
-    } else if (damped > comfortable_limit) {
-      factor = 0.0;
-    }
-  }
-  return factor;
-}
 
 Proofs::Proofs(Network network, double rate_ratio)
     : macros_(network.macros),
       network_(network.macros.empty() ? std::move(network) : expand_macros(network)),
       rate_ratio_(rate_ratio),
       stencil_(make_stencil(network_)),
-      is_exact_(stencil_.masses.size() <= Stability::most_exact_masses),
-      edges_(stencil_, is_exact_) {}
+      edges_(stencil_, stencil_.masses.size() <= Stability::most_exact_masses) {}
 
 // --- weights ------------------------------------------------------------------------------------
 
@@ -120,7 +86,7 @@ bool Proofs::feeds(std::span<const Range> arguments) {
     damped.push_back(load.damped);
     least = std::min({least, load.stiff, load.damped});
   }
-  return least < 0.0 && !(is_exact_ && is_positive(stiff) && is_positive(damped));
+  return least < 0.0 && !(edges_.is_exact() && is_positive(stiff) && is_positive(damped));
 }
 
 bool Proofs::is_positive(std::span<const double> terms) {
@@ -172,22 +138,25 @@ Proofs::Course Proofs::course_along(std::size_t parameter) const {
 
 Verdict Proofs::prove(const ParameterBox& box) {
   const std::vector<Range> arguments = argument_ranges(network_, box);
-  return edges_.holds(weigh(arguments), safe_limit) ? Verdict::stable
-         : is_exact_ || nonsense(arguments)         ? Verdict::unstable
-                                                    : Verdict::unproved;
+  const Weights weights = weigh(arguments);
+  return edges_.holds(weights, safe_limit)     ? Verdict::stable
+         : nonsense(arguments)                 ? Verdict::unstable
+         : edges_.is_exact() && !weights.feeds ? Verdict::unstable
+                                               : Verdict::unproved;
 }
 
 Certificate Proofs::certify(const ParameterBox& box) {
+  const Verdict verdict = prove(box);
+  if (verdict == Verdict::stable || !stencil_.is_complete) {
+    return {.verdict = verdict};
+  }
   const std::vector<Range> arguments = argument_ranges(network_, box);
   if (const auto suspect = nonsense(arguments)) {
-    return {Verdict::unstable, 0.0, accuse(*suspect, arguments)};
+    return {verdict, 0.0, accuse(*suspect, arguments)};
   }
   const Weights weights = weigh(arguments);
-  if (edges_.holds(weights, safe_limit)) {
-    return {};
-  }
   if (weights.feeds) {
-    return {Verdict::unstable, 0.0, accuse(feeder(arguments), arguments)};
+    return {verdict, 0.0, accuse(feeder(arguments), arguments)};
   }
   const auto all_together = [&](double factor) {
     Weights scaled = weights;
@@ -200,7 +169,7 @@ Certificate Proofs::certify(const ParameterBox& box) {
   const Suspect suspect = weakest(weights, arguments, edge.shape);
   Culprit culprit = accuse(suspect, arguments);
   culprit.limit = limit(suspect, arguments);
-  return {is_exact_ ? Verdict::unstable : Verdict::unproved, edge.value, std::move(culprit)};
+  return {verdict, edge.value, std::move(culprit)};
 }
 
 std::optional<SafeRange> Proofs::safe_range(const ParameterBox& box, std::size_t parameter,

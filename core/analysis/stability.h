@@ -23,9 +23,10 @@ namespace ressort {
 
 // The factor on every stiffness up to which the explicit scheme is certainly stable, anywhere in
 // the box: the edge bound max over links of (d_i/m_i + d_j/m_j) < 3.92, with d the sum of k + 2z
-// at a mass; plucks, bows and contacts enter with their steepest slopes. `rate_ratio` is
-// 44100 / rate. At most 0 where the dampers alone are too strong; 1e9 where there is nothing to
-// bound. O(links), and no more than two times too careful. [any thread but audio]
+// at a mass; a place counts with the masses around it, a live one with whichever is the worst.
+// `rate_ratio` is 44100 / rate. At most 0 where the dampers alone are too strong; 1e9 where there
+// is nothing to bound. No more than two times too careful where no place is live. For a network
+// without macros. O(masses + links). [any thread but audio]
 double highest_stiffness_factor(const Network& network, const ParameterBox& box, double rate_ratio);
 
 enum class Quantity { mass, stiffness, damping };
@@ -46,7 +47,7 @@ struct Culprit {
 enum class Verdict {
   stable,    // proved
   unstable,  // somewhere in the box, each element being at its worst
-  unproved,  // too large for a factorisation, and the edge bound does not hold
+  unproved,  // too large for a factorisation, or something is negative
 };
 
 struct Certificate {
@@ -66,6 +67,8 @@ struct SafeRange {
   double lowest = 0.0;
   double highest = 0.0;
 };
+
+class Proofs;
 
 // Proofs and limits for one network; takes its macros apart once. Exact up to `most_exact_masses`,
 // above by the edge bound, on the safe side. Places on macros whose coordinates are live are
@@ -94,7 +97,7 @@ class Stability {
   double stiffness_factor(const ParameterBox& box);
 
  private:
-  std::unique_ptr<class Proofs> proofs_;
+  std::unique_ptr<Proofs> proofs_;
 };
 
 }  // namespace ressort

@@ -3,10 +3,13 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/analysis/places.h"
+
 namespace ressort {
 namespace {
 
 constexpr std::uint32_t held = 0xffffffffu;
+constexpr std::uint64_t most_wandering = 4'000'000;  // terms
 
 class StencilMaker {
  public:
@@ -38,7 +41,7 @@ class StencilMaker {
  private:
   void place(std::uint32_t index) {
     const Link& link = network_.links[index];
-    if (!wanders(link.a) && !wanders(link.b)) {
+    if (!is_live_place(network_, link.a) && !is_live_place(network_, link.b)) {
       add_end(link.a, 1.0);
       add_end(link.b, -1.0);
       close(index, true);
@@ -47,13 +50,16 @@ class StencilMaker {
     // The square of an average is at most the average of squares, and (p - q)^2 <= 2 p^2 + 2 q^2.
     const double scale = is_held(link.a) || is_held(link.b) ? 1.0 : 2.0;
     for (const std::uint32_t end : {link.a, link.b}) {
-      if (!wanders(end)) {
+      if (!is_live_place(network_, end)) {
         add_end(end, 1.0);
         close(index, true, scale);
         continue;
       }
       const Tap& tap = network_.taps[network_.masses[end].tap];
-      for (std::uint32_t node = tap.first; node < tap.first + tap.length * tap.width; ++node) {
+      wandering_ += std::uint64_t{tap.length} * tap.width;
+      out_.is_complete &= wandering_ <= most_wandering;
+      const std::uint32_t nodes = out_.is_complete ? tap.length * tap.width : 0;
+      for (std::uint32_t node = tap.first; node < tap.first + nodes; ++node) {
         add_end(node, 1.0);
         close(index, true, scale);
       }
@@ -64,46 +70,9 @@ class StencilMaker {
     return network_.masses[mass].kind != MassKind::point && row_[mass] == held;
   }
 
-  bool wanders(std::uint32_t mass) const {
-    if (network_.masses[mass].kind != MassKind::point) {
-      return false;
-    }
-    const Tap& tap = network_.taps[network_.masses[mass].tap];
-    const auto is_live = [&](ArgumentId id) {
-      return id != no_argument && !is_constant(network_.arguments[id]);
-    };
-    return is_live(tap.u) || is_live(tap.v);
-  }
-
   void add_end(std::uint32_t mass, double share) {
-    if (network_.masses[mass].kind != MassKind::point) {
-      add(row_[mass], share);
-      return;
-    }
-    const Tap& tap = network_.taps[network_.masses[mass].tap];
-    const Side u = side(tap.u, tap.length);
-    const Side v = side(tap.v, tap.width);
-    for (std::uint32_t i = 0; i < 2; ++i) {
-      for (std::uint32_t j = 0; j < 2; ++j) {
-        const double weight =
-            (i == 0 ? 1.0 - u.beyond : u.beyond) * (j == 0 ? 1.0 - v.beyond : v.beyond);
-        if (weight > 0.0) {
-          add(row_[tap.first + (u.below + i) * tap.width + v.below + j], share * weight);
-        }
-      }
-    }
-  }
-
-  // Between which nodes along one side, as the kernels have it.
-  struct Side {
-    std::uint32_t below = 0;
-    double beyond = 0.0;
-  };
-  Side side(ArgumentId coordinate, std::uint32_t nodes) const {
-    const double value = argument_value(network_, coordinate, {});
-    const double p = (value > 0.0 ? std::min(value, 1.0) : 0.0) * static_cast<double>(nodes - 1);
-    const auto below = static_cast<std::uint32_t>(p);
-    return {below, p - below};
+    each_share(network_, mass,
+               [&](std::uint32_t node, double part) { add(row_[node], share * part); });
   }
 
   void add(std::uint32_t row, double share) {
@@ -137,6 +106,7 @@ class StencilMaker {
   Stencil out_;
   std::vector<std::uint32_t> row_;  // [mass of the network]
   std::size_t first_ = 0;           // of the entries of the term at hand
+  std::uint64_t wandering_ = 0;     // terms that stand for links at live places
 };
 
 }  // namespace

@@ -40,6 +40,7 @@ struct Stencil {
   std::vector<std::uint32_t> masses;  // [row] index into Network::masses
   std::vector<Term> terms;
   std::vector<Entry> entries;
+  bool is_complete = true;  // not if live places would have taken too many terms
 
   std::span<const Entry> of(const Term& term) const {
     return std::span(entries).subspan(term.first, term.count);
@@ -47,7 +48,8 @@ struct Stencil {
 };
 
 // Of a network without macros. A place on a macro counts with the nodes around it; one whose
-// coordinates are live counts at all nodes at once, which is on the safe side. O(masses + links).
+// coordinates are live counts at all nodes at once, which is on the safe side.
+// O(masses + links), and a term for every node under a live place, up to 4 million.
 Stencil make_stencil(const Network& network);
 
 // What every argument can amount to in the box. [argument]
