@@ -386,6 +386,12 @@ TEST_CASE("around the exact limit a simulation decays or grows", "[stability]") 
   const double edge = highest(scenes::poly_triangle(), "m_K");
   CHECK(growth(at(edge * (1 - 1e-4)), 1.0) < 1e3);
   CHECK(growth(at(edge * (1 + 1e-3)), 1.0) > 1e10);
+  const auto verdict = [&](double k) {
+    const Network network = at(k);
+    return Stability(network, 1.0).prove(as_written(network));
+  };
+  CHECK(verdict(edge * (1 - 1e-8)) == Verdict::stable);
+  CHECK(verdict(edge * (1 + 1e-8)) == Verdict::unstable);
 }
 
 TEST_CASE("every law counts in the proof with its steepest slope", "[stability]") {
