@@ -87,9 +87,9 @@ class Bound {
   void divide_by_masses() {
     for (std::size_t i = 0; i < sums_.size(); ++i) {
       const Mass& mass = network_.masses[i];
-      const bool moves = mass.kind == MassKind::mass || mass.kind == MassKind::oscillator;
+      const bool is_moving = moves(mass);
       const double m = range_at(arguments_, mass.mass).lowest;
-      const double inverse = moves ? 1.0 / std::max(1e-30, m) : 0.0;
+      const double inverse = is_moving ? 1.0 / std::max(1e-30, m) : 0.0;
       sums_[i] = {sums_[i].stiff * inverse, sums_[i].damped * inverse};
     }
     for (const auto& [first, size] : size_) {

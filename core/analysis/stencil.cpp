@@ -18,8 +18,7 @@ class StencilMaker {
 
   Stencil make() {
     for (std::uint32_t i = 0; i < network_.masses.size(); ++i) {
-      const MassKind kind = network_.masses[i].kind;
-      if (kind == MassKind::mass || kind == MassKind::oscillator) {
+      if (moves(network_.masses[i])) {
         row_[i] = static_cast<std::uint32_t>(out_.masses.size());
         out_.masses.push_back(i);
       }
