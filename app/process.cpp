@@ -161,11 +161,16 @@ void Process::swap_models() {
   }
   if (Sounding* const next = slot.take()) {
     fading_ = current_;
-    fade_left_ = fading_ != nullptr ? fade_frames_ : 0;
+    fade_left_ = fading_ == nullptr || goes_on(*next) ? 0 : fade_frames_;
+    resets_told_ = fade_left_ == 0 ? resets_told_ : 0;
     current_ = next;
-    resets_told_ = 0;
     meters.swaps.add(1);
   }
+}
+
+bool Process::goes_on(const Sounding& next) const {
+  return next.serial != 0 && next.serial == current_->serial &&
+         next.engine->go_on_from(*current_->engine);
 }
 
 void Process::play_models(std::size_t input_count, std::size_t output_count, std::size_t frames) {

@@ -14,7 +14,8 @@
 
 namespace ressort {
 
-// An engine and the number that events for it carry.
+// An engine and the number that events for it carry. One of the same number, unless it is 0, goes
+// on where the other is, in the same sample.
 struct Sounding {
   std::unique_ptr<Engine> engine;
   std::uint32_t serial = 0;
@@ -128,6 +129,7 @@ struct Process {
   void play(Sounding& sounding, std::size_t input_count, std::vector<double>& samples,
             std::size_t frames);
   void swap_models();
+  bool goes_on(const Sounding& next) const;
   void tell();
   void record(std::size_t channels, std::size_t frames);
 

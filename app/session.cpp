@@ -1,5 +1,6 @@
 #include "app/session.h"
 
+#include <algorithm>
 #include <chrono>
 #include <cmath>
 #include <future>
@@ -9,6 +10,14 @@ namespace {
 
 double to_db(double factor) {
   return 20.0 * std::log10(factor);
+}
+
+// Modes leave out what nobody hears, so that nothing can go on from them.
+bool may_gain(const Plan& plan) {
+  const auto& parts = plan.parts;
+  return std::any_of(parts.begin(), parts.end(), [](const Part& part) { return part.may_gain; }) &&
+         std::none_of(parts.begin(), parts.end(),
+                      [](const Part& part) { return part.method == Method::modal; });
 }
 
 }  // namespace
@@ -151,8 +160,28 @@ void Session::work() {
     listen();
     if (has_job) {
       do_load(job);
+    } else if (improvement_) {
+      improve();
     }
   }
+}
+
+// The same model by forms that took too long to find while somebody waited; it goes on where the
+// other is.
+void Session::improve() {
+  const Improvement work = std::move(*improvement_);
+  improvement_.reset();
+  auto compiled = compile(work.network, work.preset, work.options);
+  if (!compiled) {
+    return;
+  }
+  {
+    const std::lock_guard lock(mutex_);
+    auto loaded = std::make_shared<Loaded>(*current_);
+    loaded->plan = std::move(compiled->plan);
+    current_ = std::move(loaded);
+  }
+  delete process_.slot.offer(new Sounding{std::move(compiled->engine), serial_});
 }
 
 // What the audio thread has sent: engines to destroy, and news.
@@ -220,6 +249,7 @@ Result<std::shared_ptr<const Loaded>> Session::build(const std::string& name) {
     prepare_inputs = prepare_inputs_;
   }
   options.find_gain = !scene->has_preset;
+  options.most_modes = quick_modes;
   scene->preset.gain *= options_.gain;
   auto compiled = compile(scene->network, scene->preset, options);
   if (!compiled) {
@@ -250,6 +280,13 @@ Result<std::shared_ptr<const Loaded>> Session::build(const std::string& name) {
     }
   }
   delete process_.slot.offer(new Sounding{std::move(compiled->engine), loaded->serial});
+  improvement_.reset();
+  if (may_gain(loaded->plan)) {
+    options.find_gain = false;
+    scene->preset.gain = loaded->instrument.gain;
+    options.most_modes = patient_modes;
+    improvement_ = {std::move(scene->network), std::move(scene->preset), options};
+  }
   return std::shared_ptr<const Loaded>(std::move(loaded));
 }
 

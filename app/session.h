@@ -104,9 +104,17 @@ class Session {
     Answer answer;
   };
 
+  // What sounds, compiled once more with more patience.
+  struct Improvement {
+    Network network;
+    Preset preset;
+    CompileOptions options;
+  };
+
   void work();
   void do_load(const Job& job);
   Result<std::shared_ptr<const Loaded>> build(const std::string& name);
+  void improve();
   void listen();
   bool may_tell_reset();
 
@@ -127,6 +135,7 @@ class Session {
 
   std::uint32_t serial_ = 0;                                 // [worker]
   std::string scene_name_;                                   // [worker] what was loaded last
+  std::optional<Improvement> improvement_;                   // [worker] what may still gain
   std::chrono::steady_clock::time_point next_reset_news_{};  // [worker]
   std::thread worker_;                                       // last, so that it ends first
 };

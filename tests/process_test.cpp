@@ -210,7 +210,7 @@ TEST_CASE("two models cross-fade in a straight line of 50 ms", "[process]") {
     stage.run(block, block);
     CHECK(stage.y()[0] == 0.75);  // the first one is there at once
     stage.out[0].clear();
-    stage.process.slot.offer(constant("-0.25"));
+    stage.process.slot.offer(constant("-0.25", 2));
     stage.run(4000, block);
     double worst = 0.0;
     for (std::size_t n = 0; n < 4000; ++n) {

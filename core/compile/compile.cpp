@@ -292,10 +292,12 @@ Result<Compiled> compile(const Network& network, const Preset& preset,
                             {.is_double = options.precision == Precision::float64,
                              .isa = options.isa,
                              .voices = playing.voices},
-                            options.bare && !options.method ? Method::direct : options.method);
+                            options.bare && !options.method ? Method::direct : options.method,
+                            options.most_modes);
   if (options.find_gain) {
     playing.gain *= comfortable_gain(machine, playing, options);
   }
+  instrument.gain = playing.gain;
   compiled.engine = std::make_unique<Engine>(std::move(machine), std::move(playing),
                                              options.precision, options.isa);
   return compiled;

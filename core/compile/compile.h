@@ -27,7 +27,8 @@ struct CompileOptions {
   Precision precision = Precision::float64;
   std::optional<Method> method;  // instead of the plan's choice, or the bare network's direct form
   Isa isa = best_isa();          // no wider than the machine's
-  bool find_gain = false;        // so that a forte note peaks at -6 dBFS, instead of the preset's
+  std::uint32_t most_modes = patient_modes;  // of a part, for the plan
+  bool find_gain = false;  // so that a forte note peaks at -6 dBFS, instead of the preset's
 };
 
 // A parameter as people reach it: by name, in its own unit, within its range.
@@ -60,6 +61,7 @@ struct Instrument {
   int outputs = 0;
   int audio_inputs = 0;  // the highest audio channel that a control listens to
   int voices = 1;
+  double gain = 1.0;       // output per position unit: the preset's, or what was found
   std::size_t masses = 0;  // that move
   std::size_t links = 0;
   bool is_tuned = false;              // keys set the pitch

@@ -78,7 +78,8 @@ std::string in_ns(double ns) {
 
 class Chooser {
  public:
-  Chooser(Program& program, const Load& load) : program_(program), load_(load) {}
+  Chooser(Program& program, const Load& load, std::uint32_t most_modes)
+      : program_(program), load_(load), most_modes_(most_modes) {}
 
   Part choose() {
     for (const Method method : all_methods) {
@@ -87,7 +88,9 @@ class Chooser {
       }
       consider(method);
     }
-    return take("");
+    Part part = take("");
+    part.may_gain = may_gain_;
+    return part;
   }
 
   Part obey(Method method) {
@@ -106,9 +109,11 @@ class Chooser {
     double ns;
   };
 
-  bool may_be_modal() const {
-    return program_.moving <= most_planned_modes && program_.moving > 4 &&
-           least_modal_ns(program_, load_) < candidates_[best_].ns;
+  bool may_be_modal() {
+    const bool may_pay = program_.moving <= patient_modes && program_.moving > 4 &&
+                         least_modal_ns(program_, load_) < candidates_[best_].ns;
+    may_gain_ = may_pay && program_.moving > most_modes_;
+    return may_pay && !may_gain_;
   }
 
   bool consider(Method method) {
@@ -147,6 +152,8 @@ class Chooser {
 
   Program& program_;
   const Load& load_;
+  std::uint32_t most_modes_;
+  bool may_gain_ = false;
   std::vector<Candidate> candidates_;
   std::size_t best_ = 0;
 };
@@ -171,10 +178,11 @@ std::string_view method_name(Method method) {
   return "";
 }
 
-Plan make_plan(Machine& machine, const Load& load, std::optional<Method> method) {
+Plan make_plan(Machine& machine, const Load& load, std::optional<Method> method,
+               std::uint32_t most_modes) {
   Plan plan;
   for (Program& program : machine.parts) {
-    Chooser chooser(program, load);
+    Chooser chooser(program, load, most_modes);
     Part part = method ? chooser.obey(*method) : chooser.choose();
     if (part.masses > 0) {
       plan.parts.push_back(std::move(part));

@@ -14,14 +14,17 @@ namespace ressort {
 
 enum class Method { direct, chains, dense, modal, grid, chorus };
 
+// The modal form last: it is only sought where it may beat all others.
 inline constexpr Method all_methods[] = {Method::direct, Method::chains, Method::dense,
-                                         Method::modal,  Method::grid,   Method::chorus};
+                                         Method::grid,   Method::chorus, Method::modal};
 
 std::string_view method_name(Method method);
 
-// Beyond, the eigenvectors would keep a person waiting: the time grows with the third power, from a
-// tenth of a second here. A method that is asked for by name is not held back by this.
-inline constexpr std::uint32_t most_planned_modes = 640;
+// For how many masses the eigenvectors may be sought; the time grows with the third power. A method
+// that is asked for by name is not held back by this.
+inline constexpr std::uint32_t quick_modes = 320;  // while a person waits: 20 ms
+inline constexpr std::uint32_t patient_modes =
+    1000;  // while the model sounds already: half a second
 
 // Masses that hang together, and the kernel that steps them.
 struct Part {
@@ -29,6 +32,7 @@ struct Part {
   std::size_t masses = 0;  // that move
   std::size_t links = 0;
   double predicted_ns = 0.0;  // a sample, of all voices, with everything touching all the time
+  bool may_gain = false;      // by its modes, had it more patience
   std::string reason;
 };
 
@@ -37,9 +41,10 @@ struct Plan {
 };
 
 // Gives every part of the machine the form that the cost model says is the cheapest at its worst,
-// or the one of `method` where a part has it. O(elements), and the eigenvectors of a part for which
-// the modal form may pay: a tenth of a second for 600 masses. [any thread but audio]
-Plan make_plan(Machine& machine, const Load& load, std::optional<Method> method = {});
+// or the one of `method` where a part has it. O(elements), and the eigenvectors of a part of up to
+// `most_modes` masses for which the modal form may pay. [any thread but audio]
+Plan make_plan(Machine& machine, const Load& load, std::optional<Method> method = {},
+               std::uint32_t most_modes = patient_modes);
 
 // One line a part.
 std::string describe(const Plan& plan);

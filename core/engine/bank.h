@@ -40,6 +40,7 @@ struct Bank {
     std::size_t channels = 0;
     std::size_t lanes = 0;
     std::size_t outputs_of_one = 0;
+    std::size_t nodes = 0;
     for (const Program& program : machine.parts) {
       const std::size_t width = parts.emplace_back(program, voices, isa).width;
       inputs = std::max(inputs, width * program.inputs.size());
@@ -47,6 +48,7 @@ struct Bank {
       channels = std::max(channels, width * program.outputs.size());
       lanes = std::max(lanes, width);
       outputs_of_one = std::max(outputs_of_one, program.outputs.size());
+      nodes = std::max(nodes, program.position.size());
     }
     value.resize(max_block_frames * inputs);
     velocity.resize(value.size());
@@ -57,6 +59,8 @@ struct Bank {
     peak.resize(lanes);
     gain.resize(lanes);
     heard.resize(outputs_of_one);
+    x.resize(nodes);
+    v.resize(nodes);
   }
 
   std::vector<PartBank<T>> parts;
@@ -75,8 +79,10 @@ struct Bank {
   std::size_t still = 0;
 
   Mixer<T> mixer;
-  Aligned<T> peak;             // [lane]
-  Aligned<double> gain;        // [lane]
+  Aligned<T> peak;        // [lane]
+  Aligned<double> gain;   // [lane]
+  std::vector<double> x;  // [node] of a voice that is taken over
+  std::vector<double> v;
   std::vector<double*> heard;  // [output] where it is to be added
 };
 

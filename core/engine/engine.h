@@ -82,6 +82,11 @@ class Engine {
   void process(std::span<const Event> events, std::span<const double* const> inputs,
                std::span<double* const> outputs, std::size_t frames) noexcept;
 
+  // Becomes what `from` is, another engine of the same Machine in other forms: its next sample is
+  // what that of `from` would be. False, and nothing is changed, if a kernel there does not
+  // know where all of its masses are. [audio] wait-free, O(awake voices * (nodes + modes * masses))
+  bool go_on_from(const Engine& from);
+
   // The parameters that notes and controllers have changed since the last call, at most
   // `max_changes`; then it starts anew. [audio] wait-free
   std::span<const std::uint16_t> take_changes();

@@ -1,5 +1,7 @@
 #include "core/engine/kernel.h"
 
+#include <algorithm>
+
 #include "core/engine/chains.h"
 #include "core/engine/chorus.h"
 #include "core/engine/dense.h"
@@ -44,6 +46,19 @@ void Coefficients<T>::ramp(std::size_t frames) {
       increment[i] = (target[i] - value[i]) / static_cast<T>(frames);
     }
   }
+}
+
+template <class T>
+void Coefficients<T>::go_on(std::size_t lane, const Coefficients& from, std::size_t from_lane) {
+  for (std::uint32_t c = 0; c < is_ramping.size(); ++c) {
+    const std::size_t there = c * from.width + from_lane;
+    set(lane, c, static_cast<double>(from.value[there]), false);
+    if (from.is_ramping[c]) {
+      set(lane, c, static_cast<double>(from.target[there]), true);
+      increment[c * width + lane] = from.increment[there];
+    }
+  }
+  ramp_frames = std::max(ramp_frames, from.ramp_frames);
 }
 
 template <class T>

@@ -34,6 +34,8 @@ class Coefficients {
   // At once, or to be reached by the next ramp(). [audio] wait-free
   void set(std::size_t lane, std::uint32_t c, double value, bool ramped);
   void ramp(std::size_t frames);
+  // One lane as it is in another kernel of the same Program, ramps and all.
+  void go_on(std::size_t lane, const Coefficients& from, std::size_t from_lane);
   // What a block of samples did to the ramps; values are kept by who steps them.
   void finish(std::size_t frames);
 

@@ -97,6 +97,16 @@ struct Engine::Voices {
   // that of a force that lasts.
   void push(std::size_t input, double force, double seconds);
 
+  // --- taking over ---
+  template <class T>
+  void place_before(Bank<T>& b, PartBank<T>& part, std::size_t lane) const;
+  template <class T>
+  void go_on(Bank<T>& b, PartBank<T>& part, const PartBank<T>& from, std::size_t first);
+  template <class T>
+  void go_on(Bank<T>& b, const Bank<T>& from);
+  bool go_on_from(const Voices& from);
+  void take_controls(const Voices& from);
+
   // --- sound ---
   void segment(std::span<const double* const> inputs, std::span<double* const> outputs,
                std::size_t at, std::size_t frames);

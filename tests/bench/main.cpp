@@ -14,6 +14,7 @@
 #include "app/denormals.h"
 #include "core/compile/plan.h"
 #include "core/model/mdl.h"
+#include "tests/bench/limit.h"
 #include "tests/bench/measure.h"
 #include "tests/bench/report.h"
 
@@ -161,17 +162,40 @@ void compare(Row& row, const std::vector<Timed>& all, const std::vector<FaustLib
       if (one.method != faust_name(library) || one.is_double != library.is_double) {
         continue;
       }
+      if (row.is_double != library.is_double) {
+        continue;
+      }
       const double times = one.median() / row.median_ns;
       row.than_best_faust = std::min(times, row.than_best_faust.value_or(times));
-      if (library.is_default && library.is_double == row.is_double) {
+      if (library.is_default) {
         row.than_default_faust = times;
       }
     }
   }
 }
 
+// What the machine can do at most.
+struct Limits {
+  double double_per_ns = 0.0;  // multiply-adds
+  double float_per_ns = 0.0;
+};
+
+void compare(Row& row, const std::vector<Formed>& forms, const Limits& limits) {
+  const auto form = std::find_if(forms.begin(), forms.end(),
+                                 [&](const Formed& formed) { return formed.method == row.method; });
+  if (form == forms.end()) {
+    return;
+  }
+  if (const auto work = multiply_adds(form->machine.parts[0])) {
+    const double least_ns = *work * static_cast<double>(row.voices) /
+                            (row.is_double ? limits.double_per_ns : limits.float_per_ns);
+    row.of_limit = least_ns / row.median_ns;
+  }
+}
+
 std::vector<Row> measure_scene(const BenchScene& scene, const Network& network,
-                               const std::vector<FaustLibrary>& libraries, const Options& options) {
+                               const std::vector<FaustLibrary>& libraries, const Options& options,
+                               const Limits& limits) {
   const Machine machine = make_machine(network, rate_hz, true);
   const std::vector<Formed> forms = forms_of(machine);
   std::vector<Timed> all;
@@ -203,6 +227,7 @@ std::vector<Row> measure_scene(const BenchScene& scene, const Network& network,
                     .median_ns = one.median(),
                     .minimum_ns = one.minimum()});
     compare(rows.back(), all, libraries);
+    compare(rows.back(), forms, limits);
   }
   return rows;
 }
@@ -257,6 +282,10 @@ int run(const Options& options) {
   }
   stay_on_one_core();
   const DenormalsFlushed flushed;
+  const Limits limits{multiply_adds_per_ns(options.isa, true),
+                      multiply_adds_per_ns(options.isa, false)};
+  std::printf("limit: %.1f multiply-adds a nanosecond in double, %.1f in float\n",
+              limits.double_per_ns, limits.float_per_ns);
   print_head();
   std::vector<Row> rows;
   for (std::size_t i = 0; i < wanted.size() && stops == 0; ++i) {
@@ -265,12 +294,13 @@ int run(const Options& options) {
       return 1;
     }
     const std::vector<Row> found =
-        measure_scene(wanted[i].scene, wanted[i].network, wanted[i].libraries, options);
+        measure_scene(wanted[i].scene, wanted[i].network, wanted[i].libraries, options, limits);
     show_progress(wanted.size(), wanted.size(), "");
     print(found);
     rows.insert(rows.end(), found.begin(), found.end());
     wanted[i] = {};
   }
+  print_regrets(rows);
   const bool is_written = write_csv(options.folder / "bench.csv", isa, rows);
   if (std::any_of(rows.begin(), rows.end(), [](const Row& row) { return !row.family.empty(); }) &&
       !draw(options.folder, machine_line(isa), rows)) {

@@ -23,8 +23,10 @@ struct Row {
   double minimum_ns = 0.0;
   // How many times faster it is than others of the same run, by the medians.
   std::optional<double> than_reference;
-  std::optional<double> than_best_faust;     // in whatever precision
-  std::optional<double> than_default_faust;  // in the same precision
+  std::optional<double> than_best_faust;  // in the same precision
+  std::optional<double> than_default_faust;
+  // Of what the multiply-adds alone would take if the core did nothing else.
+  std::optional<double> of_limit;
 };
 
 // CPU, instruction set, compiler.
@@ -32,6 +34,9 @@ std::string machine_line(const std::string& isa);
 
 void print_head();
 void print(const std::vector<Row>& rows);
+// Where another kernel is more than a tenth faster in the scene than the one that the plan chose
+// for its worst case.
+void print_regrets(const std::vector<Row>& rows);
 bool write_csv(const std::filesystem::path& path, const std::string& isa,
                const std::vector<Row>& rows);
 // cost.png and cost.svg in `folder`, by gnuplot: cost per mass against the number of masses. False

@@ -1,0 +1,125 @@
+// One engine goes on where another of the same model is: with other kernels, in the same sample.
+#include <algorithm>
+#include <type_traits>
+#include <utility>
+
+#include "core/engine/voices.h"
+
+namespace ressort {
+
+// A sample before where b.x and b.v are: from there, with nothing that pulls but the mass's own
+// spring, it gets there, and then its links have pulled.
+template <class T>
+void Engine::Voices::place_before(Bank<T>& b, PartBank<T>& part, std::size_t lane) const {
+  const Program& program = part.program;
+  Kernel<T>& kernel = part.of(lane);
+  const auto coefficient = [&](std::uint32_t c) {
+    return static_cast<double>(kernel.coefficients.value[c * part.width + lane % part.width]);
+  };
+  for (std::size_t node = 0; node < program.position.size(); ++node) {
+    b.x[node] -= b.v[node];
+  }
+  for (const MassRun& run : program.mass_runs) {
+    const double w = coefficient(run.inverse_mass);
+    const double k = run.is_oscillator ? coefficient(run.stiffness) : 0.0;
+    const double z = run.is_oscillator ? coefficient(run.damping) : 0.0;
+    const double g = run.has_gravity ? coefficient(run.gravity) : 0.0;
+    for (std::uint32_t node = run.first; node < run.first + run.count; ++node) {
+      b.v[node] = (b.v[node] + w * (k * b.x[node] + g)) / (1.0 - w * z);
+    }
+  }
+  kernel.place(lane % part.width, b.x.data(), b.v.data());
+}
+
+// The voices of one kernel.
+template <class T>
+void Engine::Voices::go_on(Bank<T>& b, PartBank<T>& part, const PartBank<T>& from,
+                           std::size_t first) {
+  const Program& program = part.program;
+  Kernel<T>& kernel = part.of(first);
+  Coefficients<T>& coefficients = kernel.coefficients;
+  for (std::size_t lane = first; lane < std::min(voices.size(), first + part.width); ++lane) {
+    if (!voices[lane].awake) {
+      continue;
+    }
+    from.of(lane).save(lane % from.width, b.x.data(), b.v.data());
+    coefficients.go_on(lane % part.width, from.of(lane).coefficients, lane % from.width);
+    for (std::size_t i = 0; i < program.inputs.size(); ++i) {
+      const InputSlot& input = program.inputs[i];
+      const std::size_t at = i * part.width + lane - first;
+      b.value[at] = input.is_force ? T(0) : static_cast<T>(b.x[input.node]);
+      b.velocity[at] = input.is_force ? T(0) : static_cast<T>(b.v[input.node]);
+    }
+    place_before(b, part, lane);
+  }
+  T* audio = b.audio.data();
+  for (const std::uint32_t c : program.audio_coefficients) {
+    audio = std::copy_n(coefficients.value.begin() + static_cast<std::ptrdiff_t>(c * part.width),
+                        part.width, audio);
+  }
+  const std::size_t ramp_frames = std::exchange(coefficients.ramp_frames, 0);
+  kernel.step({.frames = 1,
+               .value = b.value.data(),
+               .velocity = b.velocity.data(),
+               .audio = b.audio.data(),
+               .outputs = b.outputs.data()});
+  coefficients.ramp_frames = ramp_frames;
+}
+
+template <class T>
+void Engine::Voices::go_on(Bank<T>& b, const Bank<T>& from) {
+  b.filled_part = nullptr;
+  b.still = 0;
+  for (std::size_t p = 0; p < b.parts.size(); ++p) {
+    PartBank<T>& part = b.parts[p];
+    for (std::size_t first = 0; first < voices.size(); first += part.width) {
+      const auto begin = voices.begin() + static_cast<std::ptrdiff_t>(first);
+      const auto end =
+          voices.begin() + static_cast<std::ptrdiff_t>(std::min(voices.size(), first + part.width));
+      if (std::any_of(begin, end, [](const Voice& voice) { return voice.awake; })) {
+        go_on(b, part, from.parts[p], first);
+      }
+    }
+  }
+}
+
+bool Engine::Voices::go_on_from(const Voices& from) {
+  return std::visit(
+      [&](auto& b) {
+        using Same = std::remove_reference_t<decltype(b)>;
+        const auto* const other = std::get_if<Same>(&from.bank);
+        if (other == nullptr ||
+            !std::all_of(other->parts.begin(), other->parts.end(), [&](const auto& part) {
+              return part.of(0).save(0, b.x.data(), b.v.data());
+            })) {
+          return false;
+        }
+        take_controls(from);
+        go_on(b, *other);
+        return true;
+      },
+      bank);
+}
+
+// Everything but the kernels and what they are driven by.
+void Engine::Voices::take_controls(const Voices& from) {
+  voices = from.voices;
+  hands = from.hands;
+  parameters = from.parameters;
+  changes = from.changes;
+  rest = from.rest;
+  audio_before = from.audio_before;
+  bend = from.bend;
+  pedal = from.pedal;
+  last = from.last;
+  since_settled = from.since_settled;
+  resets = from.resets;
+  stolen = from.stolen;
+  noise = from.noise;
+}
+
+bool Engine::go_on_from(const Engine& from) {
+  return voices_->go_on_from(*from.voices_);
+}
+
+}  // namespace ressort

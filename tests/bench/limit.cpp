@@ -1,0 +1,113 @@
+#include "tests/bench/limit.h"
+
+#include <algorithm>
+#include <chrono>
+
+#include "core/engine/lanes.h"
+
+#if RESSORT_X86_LEVELS
+#define RESSORT_TARGET(levels) __attribute__((target(levels)))
+#else
+#define RESSORT_TARGET(levels)
+#endif
+
+namespace ressort::bench {
+namespace {
+
+constexpr std::size_t chains = 12;  // that do not wait for each other: the latency is hidden
+constexpr std::size_t turns = 20'000;
+
+// Inlined into functions for each instruction set.
+template <class V>
+[[gnu::always_inline]] inline double run(Scalar<V> by, Scalar<V> more) {
+  V sum[chains] = {};
+  const V factor = V{} + by;
+  const V added = V{} + more;
+  for (std::size_t turn = 0; turn < turns; ++turn) {
+    for (V& one : sum) {
+      one = one * factor + added;
+    }
+  }
+  V all{};
+  for (const V& one : sum) {
+    all += one;
+  }
+  return static_cast<double>(all[0]);
+}
+
+template <class T>
+double run_base(T by, T more) {
+  return run<Pack<T, 16>>(by, more);
+}
+template <class T>
+RESSORT_TARGET("avx2,fma")
+double run_v3(T by, T more) {
+  return run<Pack<T, 32>>(by, more);
+}
+template <class T>
+RESSORT_TARGET("avx512f,avx512dq,avx512vl,fma,prefer-vector-width=512")
+double run_v4(T by, T more) {
+  return run<Pack<T, 64>>(by, more);
+}
+
+template <class T>
+double fastest(Isa isa) {
+  using Clock = std::chrono::steady_clock;
+  const auto once = isa == Isa::v4 ? run_v4<T> : isa == Isa::v3 ? run_v3<T> : run_base<T>;
+  const double lanes = static_cast<double>(vector_bytes(isa) / sizeof(T));
+  double best = 0.0;
+  volatile double kept = 0.0;
+  for (int i = 0; i < 50; ++i) {
+    const auto start = Clock::now();
+    kept = kept + once(T(0.5), T(1));
+    const std::chrono::duration<double, std::nano> took = Clock::now() - start;
+    best = std::max(best, lanes * static_cast<double>(chains * turns) / took.count());
+  }
+  clear_wide_registers();
+  return best;
+}
+
+struct Arithmetic {
+  // d += force - K q - Z d; q += d; and one for each place that is pushed or heard.
+  std::optional<double> operator()(const Modes& form) const {
+    if (!form.places.empty()) {
+      return std::nullopt;
+    }
+    const auto rows = static_cast<double>(form.outputs.size() + form.pushes.size());
+    return form.modes * (3.0 + rows);
+  }
+  // y = K x + Z v; the sum over the offsets; v += w sum; x += v.
+  std::optional<double> operator()(const Grid& form) const {
+    if (form.segments.empty()) {
+      return std::nullopt;
+    }
+    double sum = 0.0;
+    for (const GridSegment& segment : form.segments) {
+      sum += segment.count * (5.0 + static_cast<double>(segment.offsets.size()));
+    }
+    return sum;
+  }
+  std::optional<double> operator()(const Chains& form) const {
+    double sum = 0.0;
+    for (const Chain& chain : form.chains) {
+      sum += chain.count * (chain.is_stiff ? 12.0 : 6.0);
+    }
+    return sum;
+  }
+  template <class Form>
+  std::optional<double> operator()(const Form&) const {
+    return std::nullopt;
+  }
+};
+
+}  // namespace
+
+double multiply_adds_per_ns(Isa isa, bool is_double) {
+  return is_double ? fastest<double>(isa) : fastest<float>(isa);
+}
+
+std::optional<double> multiply_adds(const Program& program) {
+  return std::visit(Arithmetic{}, program.form);
+}
+
+}  // namespace ressort::bench
