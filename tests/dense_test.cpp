@@ -150,7 +150,7 @@ TEST_CASE("a hand holds a spring's far end", "[dense]") {
   double held = 0.0;
   for (int block = 0; block < 50; ++block) {
     const double hand = block < 25 ? 1.0 : 0.25;
-    for (const double found : kernel.play({64, {hand}})) {
+    for (const double found : kernel.play(std::vector(64, std::vector{hand}))) {
       const double next = 2.0 * x - before + k * (held - x);
       before = x;
       x = next;
@@ -199,6 +199,19 @@ TEST_CASE("larger bodies in contact sound as in the direct kernel", "[dense]") {
                                scenes::output(1, "s_m1");
       agree(dense(text), {.frames = second / 4, .reach = 0.02});
       agree(dense(text), {.frames = second / 4, .reach = 0.02, .turns = true});
+    }
+  }
+}
+
+TEST_CASE("a link between two masses sounds as in the direct kernel", "[dense]") {
+  for (const int masses : {3, 6, 11, 16}) {
+    for (const char* link : {"nlBow @s_m0 @s_m2 0.02 5.", "nlBow @s_m1 @s_m0 0.02 5.",
+                             "nlSpring2 @s_m2 @s_m0 0.01 0.02 0.001"}) {
+      CAPTURE(masses, link);
+      const std::string text = scenes::string("s", masses, "0.1", "0.001") +
+                               "@in1 frcInput @s_m1\n@hold " + link + "\n" +
+                               scenes::output(1, "s_m2");
+      agree(dense(text), {.frames = second / 4, .reach = 0.02});
     }
   }
 }

@@ -23,7 +23,8 @@ inline void each_port(const DenseBody<T>& b, Add&& add) {
 // Any number of ports, in memory.
 struct AnyPorts {};
 
-// The same for one port whose law is chosen already, and whose mass is in a register.
+// The same for one port whose law is chosen already, and whose mass is in a register; its other
+// end is no mass, and so is where it is before the masses have moved.
 template <class T, class ForceLaw>
 struct OnePort {
   ForceLaw law;
@@ -362,10 +363,10 @@ struct Walk {
       return walk_ramp(b, drive, at, count);
     }
     if constexpr (Count <= 2) {
-      if (b.ports == 1) {
+      if (b.ports == 1 && b.port[0].a_moves != b.port[0].b_moves) {
         const DenseLink& port = b.port[0];
-        const std::uint32_t other = port.a == 0 ? port.b : port.a;
-        const T by = port.a == 0 ? T(1) : T(-1);
+        const std::uint32_t other = port.a_moves ? port.b : port.a;
+        const T by = port.a_moves ? T(1) : T(-1);
         const auto c = [&](std::size_t i) { return b.ramps.value[port.coefficients[i]]; };
         return with_law<T>(port.law, c(0), c(1), c(2), c(3), c(4), [&]<class F>(F&& law) {
           walk(b, drive, at, count, OnePort<T, std::remove_reference_t<F>>{law, other, by});
