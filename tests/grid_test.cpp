@@ -243,6 +243,44 @@ TEST_CASE("Networks that are regular but for a few things", "[grid]") {
   }
 }
 
+TEST_CASE("Strings of several kinds all move", "[grid]") {
+  for (const int longer : {10, 70, 100, 300}) {
+    for (const int shorter : {9, 16, 40}) {
+      INFO(longer << " and " << shorter << " masses");
+      std::string text = "@s_K param 0.1\n@t_K param 0.05\n@g ground 0.\n";
+      for (const auto& [prefix, count] :
+           {std::pair<std::string, int>("s", longer), std::pair<std::string, int>("t", shorter)}) {
+        for (int i = 0; i < count; ++i) {
+          text += scenes::at(prefix + "_m", i) + " mass 1. 0. 0.\n" + scenes::at(prefix + "_r", i) +
+                  " springDamper " + (i == 0 ? "@g" : scenes::at(prefix + "_m", i - 1)) + " " +
+                  scenes::at(prefix + "_m", i) + " " + prefix + "_K 0.01\n";
+        }
+      }
+      text += "@in1 frcInput @s_m3\n@in2 frcInput @t_m3\n" + scenes::output(1, "s_m1") +
+              scenes::output(2, "t_m1");
+      Program program = program_of(text);
+      if (const std::optional<Grid> grid = grid_form(program)) {
+        program.form = *grid;
+        same_as_direct(program, {.frames = 1000}, 1e-12, 100.0);
+      }
+    }
+  }
+}
+
+TEST_CASE("What closes a ring is no offset of all of it", "[grid]") {
+  // Each mass would see two empty slots in its sum, and float would lose its place.
+  std::string text = "@k param 0.01\n@g ground 0.\n";
+  for (int i = 0; i < 29; ++i) {
+    text += scenes::at("m", i) + " mass 1. 0. 0.\n" + scenes::at("r", i) + " springDamper " +
+            scenes::at("m", i) + " " + scenes::at("m", (i + 1) % 29) + " k 0.01\n";
+  }
+  const Program program =
+      formed(text + "@h springDamper @m3 @g 0.1 0.01\n@in1 frcInput @m8\n@out1 posOutput @m20\n");
+  CHECK(grid_of(program).segments.at(0).offsets == std::vector<std::int32_t>{-1, 1});
+  CHECK(grid_of(program).rest_ends.size() == 2);
+  same_as_direct(program, {.frames = 20000}, 1e-12, 115.0);
+}
+
 TEST_CASE("A grid begins again as it began", "[grid]") {
   for (const std::string keyword : {"springDamper", "nlSpring3"}) {
     const Program program =

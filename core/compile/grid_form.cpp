@@ -104,7 +104,8 @@ class Fit {
     return {run, std::max(a, b) - std::min(a, b), a > b && !is_odd(program_.link_runs[run].law)};
   }
 
-  // The offsets that many links of a span have.
+  // The offsets that many links of a span have. Where an offset leads to nobody, the sum over
+  // neighbours loses what makes it exact: a few links are not worth that.
   void choose_families() {
     std::vector<std::map<Family, std::uint32_t>> counts(families_.size());
     each_link([&](std::uint32_t run, Ends ends) {
@@ -126,6 +127,7 @@ class Fit {
   void choose_of_span(const std::map<Family, std::uint32_t>& counts,
                       std::vector<Chosen>& chosen) const {
     constexpr std::uint32_t least_share = 32;
+    const std::uint32_t least_count = families_.size() == 1 ? 4 : 1;
     constexpr std::ptrdiff_t most_of_a_law = most_grid_offsets / 2;
     const std::size_t most = is_sum() ? most_of_a_law : most_grid_offsets;
     std::vector<std::pair<Family, std::uint32_t>> sorted(counts.begin(), counts.end());
@@ -137,8 +139,8 @@ class Fit {
                         [run = family.run, reversed = family.is_reversed](const Chosen& other) {
                           return other.family.run == run && other.family.is_reversed == reversed;
                         });
-      if (count * least_share >= sorted.front().second && chosen.size() < most &&
-          of_law < most_of_a_law) {
+      if (count >= least_count && count * least_share >= sorted.front().second &&
+          chosen.size() < most && of_law < most_of_a_law) {
         chosen.push_back({family, static_cast<std::uint32_t>(chosen.size())});
       }
     }
@@ -232,8 +234,8 @@ class Fit {
     }
     for (const auto& span : offsets) {
       grid_.segments.push_back({.offsets = {span.begin(), span.end()}});
-      if (span.size() > most_grid_offsets) {
-        return false;
+      if (span.empty() || span.size() > most_grid_offsets) {
+        return false;  // masses move by their segment's sum, which is made of one offset at least
       }
     }
     for (std::uint32_t slot = 0; slot < places_.slots; ++slot) {
