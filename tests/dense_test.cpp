@@ -125,7 +125,7 @@ TEST_CASE("a free mass keeps the speed of a push", "[dense]") {
     Fighter<double> kernel(dense("@m mass 4. 0. 0.\n@in1 frcInput @m\n@out1 posOutput @m\n"), 1.0,
                            isa);
     double n = 0.0;
-    for (const std::size_t frames : {64, 1, 31, 32, 33, 7, 63}) {
+    for (const std::size_t frames : {64u, 1u, 31u, 32u, 33u, 7u, 63u}) {
       std::vector<std::vector<double>> inputs(frames, {0.0});
       if (n == 0.0) {
         inputs[0][0] = 2.0;
