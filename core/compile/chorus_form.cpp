@@ -5,23 +5,33 @@
 namespace ressort {
 namespace {
 
-// Whether the spring is one of those held; it is then put there.
-bool hold_spring(const Program& program, std::uint32_t run, Ends ends, Chorus& chorus) {
+// Whether the link is one of the springs held; it is then put there.
+bool hold_spring(const Program& program, const LinkRun& run, Ends ends, Chorus& chorus) {
   const auto [a, b] = std::minmax(ends.a, ends.b);
-  if (program.link_runs[run].law != Law::spring || program.moving > most_held_masses ||
-      a >= program.moving || a == b) {
+  if (run.law != Law::spring || a >= program.moving || a == b) {
     return false;
   }
-  std::uint32_t& place =
-      b < program.moving ? chorus.pairs[b * (b - 1) / 2 + a] : chorus.anchors[a].run;
-  if (place != ChorusAnchor::none) {
+  const bool is_pair = b < program.moving;
+  ChorusSpring& place = is_pair ? chorus.pairs[b * (b - 1) / 2 + a] : chorus.anchors[a];
+  if (place.stiffness != ChorusSpring::none) {
     return false;
   }
-  place = run;
-  if (b >= program.moving) {
-    chorus.anchors[a].node = b;
-  }
+  place = {.stiffness = run.coefficients[0],
+           .damping = run.coefficients[1],
+           .node = is_pair ? ChorusSpring::none : b};
   return true;
+}
+
+void hold_links(const Program& program, Chorus& chorus) {
+  for (std::uint32_t run = 0; run < program.link_runs.size(); ++run) {
+    const LinkRun& links = program.link_runs[run];
+    for (std::uint32_t i = links.first; i < links.first + links.count; ++i) {
+      const Ends ends = program.ends[i];
+      if (!hold_spring(program, links, ends, chorus)) {
+        chorus.links.push_back({run, ends.a, ends.b});
+      }
+    }
+  }
 }
 
 }  // namespace
@@ -33,18 +43,8 @@ std::optional<Chorus> chorus_form(const Program& program) {
     return std::nullopt;
   }
   Chorus chorus;
-  chorus.pairs.fill(ChorusAnchor::none);
-  for (std::uint32_t run = 0; run < program.link_runs.size(); ++run) {
-    const auto first = static_cast<std::uint32_t>(chorus.ends.size());
-    const LinkRun& links = program.link_runs[run];
-    for (std::uint32_t i = links.first; i < links.first + links.count; ++i) {
-      if (!hold_spring(program, run, program.ends[i], chorus)) {
-        chorus.ends.push_back({program.ends[i].a, program.ends[i].b});
-      }
-    }
-    if (const auto count = static_cast<std::uint32_t>(chorus.ends.size()) - first; count > 0) {
-      chorus.links.push_back({run, first, count});
-    }
+  if (program.moving <= most_held_masses) {
+    hold_links(program, chorus);
   }
   return chorus;
 }

@@ -2,103 +2,198 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 namespace ressort {
 namespace {
 
-// Of one pack: the narrowest that holds the voices, or the widest that there is. Where there are
-// registers enough, two of them are worked on as one.
+constexpr std::size_t most_bytes = 16 * 1024;  // of a kernel's cells: half of what is nearest
+
+// Of a pack: the narrowest that holds the voices, or the widest that there is.
 template <class T>
-std::size_t pack_bytes(std::size_t voices, Isa isa) {
-  const std::size_t widest = isa == Isa::v4 ? 2 * vector_bytes(isa) : vector_bytes(isa);
+std::size_t pack_lanes(std::size_t voices, Isa isa) {
   std::size_t bytes = 16;
-  while (bytes < widest && bytes / sizeof(T) < voices) {
+  while (bytes < vector_bytes(isa) && bytes / sizeof(T) < voices) {
     bytes *= 2;
   }
-  return bytes;
+  return bytes / sizeof(T);
 }
 
-// As many packs as the voices need, and fit.
-template <class T>
-std::size_t chorus_width(std::size_t voices, Isa isa) {
-  const std::size_t bytes = pack_bytes<T>(voices, isa);
-  const std::size_t lanes = bytes / sizeof(T);
-  return lanes * std::min(chorus_bytes / bytes, (voices + lanes - 1) / lanes);
+constexpr std::size_t parts_of(std::size_t whole, std::size_t part) {
+  return (whole + part - 1) / part;
 }
 
-void add_masses(const Program& program, ChorusTable& table) {
-  for (const MassRun& run : program.mass_runs) {
-    table.slots.insert(table.slots.end(), run.count, run.inverse_mass);
-    table.is_pulled |= run.is_oscillator || run.has_gravity;
-  }
-}
-
-void add_held(const Program& program, const Chorus& chorus, ChorusTable& table) {
-  const auto add = [&](std::uint32_t run, std::uint32_t bit, std::uint32_t& bits) {
-    const bool is_there = run != ChorusAnchor::none;
-    bits |= is_there ? bit : 0;
-    for (std::size_t k = 0; k < 2; ++k) {
-      table.slots.push_back(is_there ? program.link_runs[run].coefficients[k] : chorus_zero);
+// Fills the table slot by slot.
+class Filler {
+ public:
+  Filler(const Program& program, const Chorus& chorus) : program_(program), chorus_(chorus) {
+    table_.nodes = static_cast<std::uint32_t>(program.position.size());
+    if (program.moving <= most_held_masses) {
+      table_.held = program.moving;
+      add_held();
+      note_touched();
+    } else {
+      add_walked();
     }
-  };
-  for (std::uint32_t pair = 0; pair < table.held * (table.held - 1) / 2; ++pair) {
-    add(chorus.pairs[pair], 1u << pair, table.linked);
+    table_.cells = chorus_node_cells * table_.nodes + slots_;
   }
-  for (std::uint32_t mass = 0; mass < table.held; ++mass) {
-    add(chorus.anchors[mass].run, 1u << mass, table.anchored);
-  }
-}
 
-void add_pushes(const Program& program, ChorusTable& table) {
-  for (std::uint32_t i = 0; i < program.inputs.size(); ++i) {
-    const InputSlot& input = program.inputs[i];
-    if (input.is_force && input.node < table.held && (table.pushed >> input.node & 1) == 0) {
-      table.pushed |= 1u << input.node;
-      table.pusher[input.node] = i;
+  ChorusTable table() && { return std::move(table_); }
+
+ private:
+  void copy(std::uint32_t coefficient) {
+    table_.copies.push_back({static_cast<std::uint32_t>(slots_), coefficient});
+    ++slots_;
+  }
+
+  void add_held() {
+    table_.is_alike = is_alike();
+    for (const MassRun& run : program_.mass_runs) {
+      for (std::uint32_t i = 0; i < run.count; ++i) {
+        add_alike([&] { copy(run.inverse_mass); }, 1, slots_ == 0);
+      }
+      table_.is_pulled |= run.is_oscillator || run.has_gravity;
+    }
+    for (std::uint32_t pair = 0; pair < pairs(); ++pair) {
+      add_alike([&] { add_spring(chorus_.pairs[pair], 1u << pair, table_.linked); }, 2, pair == 0);
+    }
+    for (std::uint32_t mass = 0; mass < table_.held; ++mass) {
+      add_spring(chorus_.anchors[mass], 1u << mass, table_.anchored);
+    }
+    for (const MassRun& run : program_.mass_runs) {
+      for (std::uint32_t i = 0; i < run.count && table_.is_pulled; ++i) {
+        add_pull(run);
+      }
+    }
+    table_.first_link = slots_;
+    for (const ChorusLink& link : chorus_.links) {
+      add_link(program_.link_runs[link.run]);
     }
   }
-}
 
-void add_pulls(const Program& program, ChorusTable& table) {
-  for (const MassRun& run : program.mass_runs) {
-    for (std::uint32_t i = 0; i < run.count && table.is_pulled; ++i) {
-      table.pulls.push_back(run.is_oscillator ? run.stiffness : chorus_zero);
-      table.pulls.push_back(run.is_oscillator ? run.damping : chorus_zero);
-      table.pulls.push_back(run.has_gravity ? run.gravity : chorus_zero);
+  std::uint32_t pairs() const { return table_.held * (table_.held - 1) / 2; }
+
+  bool is_alike() const {
+    const auto differs = [&](const ChorusSpring& pair) {
+      return pair.stiffness != chorus_.pairs[0].stiffness ||
+             pair.damping != chorus_.pairs[0].damping;
+    };
+    const auto is_other = [&](const MassRun& run) {
+      return run.inverse_mass != program_.mass_runs[0].inverse_mass;
+    };
+    return std::none_of(program_.mass_runs.begin(), program_.mass_runs.end(), is_other) &&
+           std::none_of(chorus_.pairs.begin(), chorus_.pairs.begin() + pairs(), differs);
+  }
+
+  // Slots that nobody looks at, where all are alike and these are not the first.
+  template <class Add>
+  void add_alike(Add&& add, std::size_t slots, bool is_first) {
+    if (is_first || !table_.is_alike) {
+      add();
+    } else {
+      slots_ += slots;
     }
   }
-}
 
-ChorusTable table_of(const Program& program, const Chorus& chorus, std::size_t packs) {
-  ChorusTable table{.masses = program.moving,
-                    .nodes = static_cast<std::uint32_t>(program.position.size()),
-                    .packs = static_cast<std::uint32_t>(packs),
-                    .held = program.moving <= most_held_masses ? program.moving : 0};
-  add_masses(program, table);
-  add_held(program, chorus, table);
-  add_pushes(program, table);
-  add_pulls(program, table);
-  table.first_node = chorus_slots(table.masses, table.held);
-  table.first_pull = table.first_node + 3 * table.nodes;
-  table.first_link = table.first_pull + static_cast<std::uint32_t>(table.pulls.size());
-  table.cells =
-      table.first_link + static_cast<std::uint32_t>(chorus.links.size()) * chorus_link_slots;
-  return table;
-}
+  void add_spring(const ChorusSpring& spring, std::uint32_t bit, std::uint32_t& bits) {
+    if (spring.stiffness == ChorusSpring::none) {
+      slots_ += 2;
+      return;
+    }
+    bits |= bit;
+    copy(spring.stiffness);
+    copy(spring.damping);
+  }
+
+  void add_pull(const MassRun& run) {
+    if (run.is_oscillator) {
+      copy(run.stiffness);
+      copy(run.damping);
+    } else {
+      slots_ += 2;
+    }
+    if (run.has_gravity) {
+      copy(run.gravity);
+    } else {
+      ++slots_;
+    }
+  }
+
+  void add_link(const LinkRun& run) {
+    table_.laws.push_back(run.law);
+    for (const std::uint32_t coefficient : run.coefficients) {
+      copy(coefficient);
+    }
+    copy(run.coefficients[2]);
+  }
+
+  void add_walked() {
+    for (const MassRun& run : program_.mass_runs) {
+      copy(run.inverse_mass);
+      add_pull(run);
+    }
+    table_.first_link = slots_;
+    for (const LinkRun& run : program_.link_runs) {
+      add_link(run);
+    }
+  }
+
+  void note_touched() {
+    const auto touch = [&](std::uint32_t node) {
+      table_.touched |= node < table_.held ? 1u << node : 0;
+    };
+    for (const ChorusLink& link : chorus_.links) {
+      touch(link.a);
+      touch(link.b);
+    }
+    for (std::uint32_t i = 0; i < program_.inputs.size(); ++i) {
+      const auto [hand, is_force, node] = program_.inputs[i];
+      if (!is_force || node >= table_.held) {
+        continue;
+      }
+      if ((table_.pushed >> node & 1) != 0) {
+        touch(node);
+      } else {
+        table_.pushed |= 1u << node;
+        table_.pusher[node] = i;
+      }
+    }
+  }
+
+  const Program& program_;
+  const Chorus& chorus_;
+  ChorusTable table_;
+  std::size_t slots_ = 0;
+};
 
 }  // namespace
 
 template <class T>
 ChorusKernel<T>::ChorusKernel(const Program& program, const Chorus& chorus, std::size_t voices,
                               Isa isa)
-    : Kernel<T>(program, chorus_width<T>(voices, isa)),
+    : ChorusKernel(
+          program, chorus,
+          [&] {
+            const std::size_t bytes = pack_lanes<T>(voices, isa) * sizeof(T);
+            ChorusTable table = Filler(program, chorus).table();
+            // Shared evenly by as many kernels as it takes.
+            const std::size_t wanted = parts_of(voices * sizeof(T), bytes);
+            const std::size_t most = std::max<std::size_t>(1, most_bytes / (table.cells * bytes));
+            table.packs = parts_of(wanted, parts_of(wanted, most));
+            return table;
+          }(),
+          pack_lanes<T>(voices, isa), isa) {}
+
+template <class T>
+ChorusKernel<T>::ChorusKernel(const Program& program, const Chorus& chorus, ChorusTable table,
+                              std::size_t lanes, Isa isa)
+    : Kernel<T>(program, lanes * table.packs),
       program_(program),
       chorus_(chorus),
-      lanes_(pack_bytes<T>(voices, isa) / sizeof(T)),
-      table_(table_of(program, chorus, this->width() / lanes_)),
+      lanes_(lanes),
+      table_(std::move(table)),
       step_(with_isa(
-          isa,
-          [&]<Isa level>() { return chorus_step<level, T>(table_.held, lanes_ * sizeof(T)); })),
+          isa, [&]<Isa level>() { return chorus_step<level, T>(table_, lanes_ * sizeof(T)); })),
       cells_(table_.cells * this->width()) {
   for (std::size_t lane = 0; lane < this->width(); ++lane) {
     this->reset(lane);
@@ -134,9 +229,9 @@ void ChorusKernel<T>::play(const Block<T>& block) {
 
 template <class T>
 bool ChorusKernel<T>::is_near_start(std::size_t lane, double bound) const {
-  for (std::size_t node = 0; node < table_.masses; ++node) {
-    if (!(std::fabs(static_cast<double>(cells_[at(node, lane)]) - program_.position[node]) <
-          bound)) {
+  for (std::size_t node = 0; node < program_.moving; ++node) {
+    const auto x = static_cast<double>(cells_[at(node, lane)]);
+    if (!(std::fabs(x - program_.position[node]) < bound)) {
       return false;
     }
   }

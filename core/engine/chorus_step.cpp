@@ -3,7 +3,6 @@
 
 #include "core/engine/chorus.h"
 #include "core/engine/laws.h"
-#include "core/engine/twin.h"
 
 namespace ressort::RESSORT_ISA {
 namespace {
@@ -24,231 +23,419 @@ template <std::uint32_t N, std::uint32_t I = 0, class Use>
   }
 }
 
-// Copies what the coefficients are now, and what of the laws depends on nothing else.
-template <class V>
-void fill_slots(const Program& program, const Chorus& chorus, const ChorusTable& table,
-                const Scalar<V>* values, std::size_t pack, V* cells) {
-  const auto value = [&](std::uint32_t c) {
-    return c == chorus_zero ? V{} : reinterpret_cast<const V*>(values)[c * table.packs + pack];
-  };
-  const std::uint32_t* const slots = table.slots.data();
-  for (std::uint32_t i = 0; i < table.first_node; ++i) {
-    cells[i] = value(slots[i]);
-  }
-  const std::uint32_t* const pulls = table.pulls.data();
-  for (std::uint32_t i = table.first_pull; i < table.first_link; ++i) {
-    cells[i] = value(pulls[i - table.first_pull]);
-  }
-  V* slot = cells + table.first_link;
-  for (const ChorusLinks& links : chorus.links) {
-    const LinkRun& run = program.link_runs[links.run];
-    for (std::size_t k = 0; k < 5; ++k) {
-      slot[k] = value(run.coefficients[k]);
-    }
-    if (run.law == Law::pluck) {
-      const PluckShape<V> shape(slot[0], slot[1]);
-      slot[5] = slot[2];
-      slot[0] = shape.rise;
-      slot[1] = shape.fall;
-      slot[2] = shape.inner;
-      slot[3] = shape.outer;
-      slot[4] = shape.top;
-    }
-    slot += chorus_link_slots;
-  }
-}
-
-// Masses and springs held in registers, and what pushes them: a force that had just been added up
-// in memory would have to be waited for.
-template <class V, std::uint32_t N>
-[[gnu::always_inline]] inline void hold(const Chorus& chorus, const ChorusTable& table, V* cells,
-                                        const V* value) {
-  constexpr std::uint32_t anchors = N + N * (N - 1);
-  auto* const node = reinterpret_cast<Node<V>*>(cells + chorus_slots(N, N));
-  V x[N];
-  V v[N];
-  V f[N];
-  each<N>([&](auto i) {
-    x[i] = node[i].x;
-    v[i] = node[i].v;
-    f[i] = node[i].force;
-    if ((table.pushed >> i & 1) != 0) {
-      f[i] += value[table.pusher[i] * table.packs];
+// Calls `use` with the law as a constant: it is not chosen anew for every pack.
+template <class Use>
+[[gnu::always_inline]] inline void with_constant(Law law, Use&& use) {
+  each<static_cast<std::uint32_t>(Law::clipped_contact) + 1>([&](auto i) {
+    constexpr auto constant = static_cast<Law>(decltype(i)::value);
+    if (law == constant) {
+      use(std::integral_constant<Law, constant>{});
     }
   });
-  if (table.is_pulled) {
-    const V* const pull = cells + table.first_pull;
-    each<N>([&](auto i) { f[i] -= pull[3 * i] * x[i] + pull[3 * i + 1] * v[i] + pull[3 * i + 2]; });
-  }
-  each<N>([&](auto i) {
-    v[i] += f[i] * cells[i];
-    x[i] += v[i];
-    f[i] = V{};
-    if ((table.anchored >> i & 1) != 0) {
-      const Node<V>& anchor = node[chorus.anchors[i].node];
-      f[i] = spring_force(anchor.x - x[i], anchor.v - v[i], cells[anchors + 2 * i],
-                          cells[anchors + 2 * i + 1]);
-    }
-  });
-  each<N>([&](auto b) {
-    each<b>([&](auto a) {
-      constexpr std::uint32_t pair = b * (b - 1) / 2 + a;
-      if ((table.linked >> pair & 1) != 0) {
-        const V force =
-            spring_force(x[a] - x[b], v[a] - v[b], cells[N + 2 * pair], cells[N + 2 * pair + 1]);
-        f[a] -= force;
-        f[b] += force;
-      }
-    });
-  });
-  each<N>([&](auto i) { node[i] = {x[i], v[i], f[i]}; });
 }
 
-// The masses alone, however many.
-template <class V>
-void walk(const ChorusTable& table, V* cells, Node<V>* node) {
-  if (table.is_pulled) {
-    const V* pull = cells + table.first_pull;
-    for (std::uint32_t i = 0; i < table.masses; ++i, pull += 3) {
-      node[i].force -= pull[0] * node[i].x + pull[1] * node[i].v + pull[2];
-    }
-  }
-  for (std::uint32_t i = 0; i < table.masses; ++i) {
-    node[i].v += node[i].force * cells[i];
-    node[i].x += node[i].v;
-    node[i].force = V{};
-  }
-}
-
-template <class V, class ForceLaw>
-void add_forces(const std::array<std::uint32_t, 2>* ends, std::uint32_t count, Node<V>* node,
-                ForceLaw&& law) {
-  for (std::uint32_t i = 0; i < count; ++i) {
-    Node<V>& a = node[ends[i][0]];
-    Node<V>& b = node[ends[i][1]];
-    const V f = law(a.x - b.x, a.v - b.v);
-    a.force -= f;
-    b.force += f;
-  }
-}
-
-// What has no inertia gathers forces that nobody asks for.
-template <class V>
-void step_links(const Program& program, const Chorus& chorus, const V* slot, Node<V>* node) {
-  for (const ChorusLinks& links : chorus.links) {
-    const auto* const ends = chorus.ends.data() + links.first;
-    const auto add = [&](auto&& law) { add_forces(ends, links.count, node, law); };
-    const Law law = program.link_runs[links.run].law;
-    if (law == Law::pluck) {
-      const PluckShape<V> shape(slot);
-      const V z = slot[5];
-      add([=](V d, V v) { return pluck_force(d, v, shape, z); });
-    } else {
-      with_law<V>(law, slot[0], slot[1], slot[2], slot[3], slot[4], add);
-    }
-    slot += chorus_link_slots;
-  }
-}
-
-// One sample of one pack.
-template <class V, std::uint32_t N>
-void tick(const Program& program, const Chorus& chorus, const ChorusTable& table, V* cells,
-          const V* value, const V* velocity, V* outputs) {
-  auto* const node =
-      reinterpret_cast<Node<V>*>(cells + (N > 0 ? chorus_slots(N, N) : table.first_node));
-  for (std::uint32_t i = 0; i < program.inputs.size(); ++i) {
-    const InputSlot& input = program.inputs[i];
-    if (!input.is_force) {
-      put(value[i * table.packs], node[input.node].x);
-      put(velocity[i * table.packs], node[input.node].v);
-    } else if (input.node >= N || table.pusher[input.node] != i) {
-      node[input.node].force += value[i * table.packs];
-    }
-  }
-  if constexpr (N > 0) {
-    hold<V, N>(chorus, table, cells, value);
+template <class V, Law law>
+[[gnu::always_inline]] inline V force_of(const V* slot, V d, V v) {
+  if constexpr (law == Law::pluck) {
+    return pluck_force(d, v, PluckShape<V>(slot), slot[5]);
+  } else if constexpr (law == Law::bow) {
+    return bow_force(v, BowShape<V>(slot));
   } else {
-    walk(table, cells, node);
-  }
-  if (!chorus.links.empty()) {
-    step_links(program, chorus, cells + table.first_link, node);
-  }
-  for (const OutputSlot& output : program.outputs) {
-    put(node[output.node].x, *outputs);
-    outputs += table.packs;
+    V force{};
+    with_law<V>(law, slot[0], slot[1], slot[2], slot[3], slot[4],
+                [&](auto&& exact) { force = exact(d, v); });
+    return force;
   }
 }
+
+// All packs, for what is done to each of them in turn.
+template <class V>
+struct Packs {
+  Packs(const ChorusTable& table, void* memory)
+      : count(table.packs),
+        stride(table.cells),
+        cells(static_cast<V*>(memory)),
+        slots(cells + chorus_node_cells * table.nodes) {}
+
+  Node<V>* nodes(std::size_t pack) const {
+    return reinterpret_cast<Node<V>*>(cells + pack * stride);
+  }
+
+  std::size_t count;
+  std::size_t stride;
+  V* cells;
+  V* slots;
+};
+
+// Where a block is in the rows of all voices.
+template <class V>
+struct Rows {
+  Rows(const Program& program, const ChorusTable& table, const auto& block)
+      : value(reinterpret_cast<const V*>(block.value)),
+        velocity(reinterpret_cast<const V*>(block.velocity)),
+        outputs(reinterpret_cast<V*>(block.outputs)),
+        in(program.inputs.size() * table.packs),
+        out(program.outputs.size() * table.packs) {}
+
+  void advance() {
+    value += in;
+    velocity += in;
+    outputs += out;
+  }
+
+  const V* value;
+  const V* velocity;
+  V* outputs;
+  std::size_t in;
+  std::size_t out;
+};
 
 // Returns whether any coefficient moved.
 template <class T>
-bool move_coefficients(const Program& program, ChorusState<T>& state, const T*& audio) {
-  const bool moves = state.ramps.frames > 0 || !program.audio_coefficients.empty();
-  advance(state.ramps);
+bool move_coefficients(const Program& program, Ramps<T>& ramps, const T*& audio) {
+  const bool moves = ramps.frames > 0 || !program.audio_coefficients.empty();
+  advance(ramps);
   for (const std::uint32_t c : program.audio_coefficients) {
-    for (std::size_t lane = 0; lane < state.ramps.width; ++lane) {
-      state.ramps.value[c * state.ramps.width + lane] = *audio++;
+    for (std::size_t lane = 0; lane < ramps.width; ++lane) {
+      ramps.value[c * ramps.width + lane] = *audio++;
     }
   }
   return moves;
 }
 
-template <class V, std::uint32_t N>
-void step(const Program& program, const Chorus& chorus, const ChorusTable& table,
-          ChorusState<Scalar<V>>& state, const Block<Scalar<V>>& block) {
-  const auto* value = reinterpret_cast<const V*>(block.value);
-  const auto* velocity = reinterpret_cast<const V*>(block.velocity);
-  auto* outputs = reinterpret_cast<V*>(block.outputs);
-  auto* const cells = reinterpret_cast<V*>(state.cells);
-  const auto* audio = block.audio;
-  const std::size_t packs = table.packs;
-  for (std::size_t frame = 0; frame < block.frames; ++frame) {
-    if (move_coefficients(program, state, audio) || frame == 0) {
-      for (std::size_t pack = 0; pack < packs; ++pack) {
-        fill_slots<V>(program, chorus, table, state.ramps.value, pack, cells + pack * table.cells);
+// Copies what the coefficients are now, and what of the laws follows from them alone.
+template <class V>
+void fill_slots(const ChorusTable& table, const V* coefficients, const Packs<V>& packs) {
+  for (const ChorusTable::Copy copy : table.copies) {
+    const V* const from = coefficients + copy.coefficient * packs.count;
+    V* to = packs.slots + copy.slot;
+    for (std::size_t pack = 0; pack < packs.count; ++pack, to += packs.stride) {
+      *to = from[pack];
+    }
+  }
+  V* slots = packs.slots + table.first_link;
+  for (const Law law : table.laws) {
+    V* slot = slots;
+    for (std::size_t pack = 0; pack < packs.count; ++pack, slot += packs.stride) {
+      if (law == Law::pluck) {
+        PluckShape<V>(slot[0], slot[1]).keep(slot);
+      } else if (law == Law::bow) {
+        BowShape<V>(slot[0], slot[1]).keep(slot);
       }
     }
-    for (std::size_t pack = 0; pack < packs; ++pack) {
-      tick<V, N>(program, chorus, table, cells + pack * table.cells, value + pack, velocity + pack,
-                 outputs + pack);
-    }
-    value += program.inputs.size() * packs;
-    velocity += program.inputs.size() * packs;
-    outputs += program.outputs.size() * packs;
+    slots += chorus_link_slots;
   }
 }
 
 template <class V>
-ChorusStep<Scalar<V>> step_for(std::uint32_t held) {
-  switch (held) {
-    case 1:
-      return step<V, 1>;
-    case 2:
-      return step<V, 2>;
-    case 3:
-      return step<V, 3>;
-    case 4:
-      return step<V, 4>;
-    default:
-      return step<V, 0>;
+void take_positions(const Program& program, const Packs<V>& packs, const Rows<V>& rows) {
+  const V* value = rows.value;
+  const V* velocity = rows.velocity;
+  for (const InputSlot& input : program.inputs) {
+    for (std::size_t pack = 0; pack < packs.count && !input.is_force; ++pack) {
+      Node<V>& node = packs.nodes(pack)[input.node];
+      node.x = value[pack];
+      node.v = velocity[pack];
+    }
+    value += packs.count;
+    velocity += packs.count;
   }
 }
 
-template <class T>
-ChorusStep<T> step_in(std::uint32_t held, std::size_t bytes) {
-  if constexpr (vector_bytes(Isa::RESSORT_ISA) >= 64) {
-    if (bytes == 128) {
-      return step_for<Twin<Pack<T, 64>>>(held);
+template <class V>
+void take_force(std::uint32_t node, const Packs<V>& packs, const V* value) {
+  for (std::size_t pack = 0; pack < packs.count; ++pack) {
+    packs.nodes(pack)[node].force += value[pack];
+  }
+}
+
+template <class V>
+void give_positions(const Program& program, const Packs<V>& packs, V* outputs) {
+  for (const OutputSlot& output : program.outputs) {
+    for (std::size_t pack = 0; pack < packs.count; ++pack) {
+      outputs[pack] = packs.nodes(pack)[output.node].x;
     }
+    outputs += packs.count;
+  }
+}
+
+// Adds what a link exerts to the masses' forces.
+template <class V, Law law>
+[[gnu::always_inline]] inline void link(const Packs<V>& packs, const V* slot, std::uint32_t a,
+                                        std::uint32_t b, std::uint32_t masses) {
+  for (std::size_t pack = 0; pack < packs.count; ++pack, slot += packs.stride) {
+    Node<V>* const nodes = packs.nodes(pack);
+    const V force = force_of<V, law>(slot, nodes[a].x - nodes[b].x, nodes[a].v - nodes[b].v);
+    if (a < masses) {
+      nodes[a].force -= force;
+    }
+    if (b < masses) {
+      nodes[b].force += force;
+    }
+  }
+}
+
+// --- masses in registers -------------------------------------------------------------------------
+
+// A sample's step in two halves: the springs exert their forces, and the masses move by them. In a
+// block the second half of one sample and the first of the one before are taken together, so that
+// the forces never leave the registers; only those of a block's last sample wait for the next.
+enum class Half { move, exert, exert_and_move };
+
+template <class V, std::uint32_t N, bool is_alike>
+class Holder {
+ public:
+  Holder(const Program& program, const Chorus& chorus, const ChorusTable& table,
+         const Packs<V>& packs)
+      : program_(program), chorus_(chorus), table_(table), packs_(packs) {
+    each<N>([&](auto i) {
+      anchor_[i] = chorus.anchors[i].node;
+      pusher_[i] = table.pusher[i] * packs.count;
+    });
+  }
+
+  void move(const V* value) const {
+    push_again(value);
+    pass<Half::move>(value);
+  }
+  void exert() const {
+    exert_links();
+    pass<Half::exert>(nullptr);
+  }
+  void exert_and_move(const V* value) const {
+    exert_links();
+    push_again(value);
+    pass<Half::exert_and_move>(value);
+  }
+
+ private:
+  static constexpr std::uint32_t pairs = N;  // slots
+  static constexpr std::uint32_t anchors = pairs + N * (N - 1);
+  static constexpr std::uint32_t pulls = anchors + 2 * N;
+
+  template <Half half>
+  [[gnu::always_inline]] void pass(const V* value) const {
+    const std::uint32_t touched = table_.touched;
+    const std::uint32_t anchored = table_.anchored;
+    const std::uint32_t linked = table_.linked;
+    const std::uint32_t pushed = table_.pushed;
+    const bool is_pulled = table_.is_pulled;
+    const V* slot = packs_.slots;
+    for (std::size_t pack = 0; pack < packs_.count; ++pack, slot += packs_.stride) {
+      Node<V>* const nodes = packs_.nodes(pack);
+      V x[N];
+      V v[N];
+      V f[N];
+      each<N>([&](auto i) {
+        x[i] = nodes[i].x;
+        v[i] = nodes[i].v;
+        f[i] = V{};
+        if (half == Half::move || (touched & 1u << i) != 0) {
+          f[i] = nodes[i].force;
+          nodes[i].force = V{};
+        }
+      });
+      if constexpr (half != Half::move) {
+        exert_springs(nodes, slot, anchored, linked, x, v, f);
+      }
+      if constexpr (half == Half::exert) {
+        each<N>([&](auto i) { nodes[i].force = f[i]; });
+        continue;
+      }
+      each<N>([&](auto i) {
+        if ((pushed & 1u << i) != 0) {
+          f[i] += value[pusher_[i] + pack];
+        }
+      });
+      if (is_pulled) {
+        const V* const pull = slot + pulls;
+        each<N>(
+            [&](auto i) { f[i] -= pull[3 * i] * x[i] + pull[3 * i + 1] * v[i] + pull[3 * i + 2]; });
+      }
+      each<N>([&](auto i) {
+        v[i] += f[i] * slot[is_alike ? 0 : i()];
+        x[i] += v[i];
+        nodes[i].x = x[i];
+        nodes[i].v = v[i];
+      });
+    }
+  }
+
+  // Among three masses the springs that there are not are computed too, from zeros.
+  [[gnu::always_inline]] void exert_springs(const Node<V>* nodes, const V* slot,
+                                            std::uint32_t anchored, std::uint32_t linked,
+                                            const V (&x)[N], const V (&v)[N], V (&f)[N]) const {
+    each<N>([&](auto i) {
+      if ((anchored & 1u << i) != 0) {
+        const Node<V>& anchor = nodes[anchor_[i]];
+        const V* const own = slot + anchors + 2 * i;
+        f[i] += spring_force(anchor.x - x[i], anchor.v - v[i], own[0], own[1]);
+      }
+    });
+    each<N>([&](auto b) {
+      each<b>([&](auto a) {
+        constexpr std::uint32_t pair = b * (b - 1) / 2 + a;
+        if (is_alike || N <= 3 || (linked & 1u << pair) != 0) {
+          const V* const own = slot + pairs + (is_alike ? 0 : 2 * pair);
+          const V force = spring_force(x[a] - x[b], v[a] - v[b], own[0], own[1]);
+          f[a] -= force;
+          f[b] += force;
+        }
+      });
+    });
+  }
+
+  void exert_links() const {
+    const V* slot = packs_.slots + table_.first_link;
+    const Law* law = table_.laws.data();
+    for (const ChorusLink& each_link : chorus_.links) {
+      with_constant(*law, [&](auto constant) {
+        link<V, decltype(constant)::value>(packs_, slot, each_link.a, each_link.b, N);
+      });
+      slot += chorus_link_slots;
+      ++law;
+    }
+  }
+
+  // The force inputs that are not the first on their mass.
+  void push_again(const V* value) const {
+    for (std::size_t i = 0; i < program_.inputs.size() && (table_.touched & table_.pushed) != 0;
+         ++i) {
+      const InputSlot& input = program_.inputs[i];
+      if (input.is_force && input.node < N && table_.pusher[input.node] != i) {
+        take_force(input.node, packs_, value + i * packs_.count);
+      }
+    }
+  }
+
+  const Program& program_;
+  const Chorus& chorus_;
+  const ChorusTable& table_;
+  const Packs<V>& packs_;
+  std::size_t anchor_[N];
+  std::size_t pusher_[N];
+};
+
+template <class V, std::uint32_t N, bool is_alike>
+void hold(const Program& program, const Chorus& chorus, const ChorusTable& table,
+          ChorusState<Scalar<V>>& state, const Block<Scalar<V>>& block) {
+  const Packs<V> packs(table, state.cells);
+  const Holder<V, N, is_alike> holder(program, chorus, table, packs);
+  Rows<V> rows(program, table, block);
+  const auto* audio = block.audio;
+  for (std::size_t frame = 0; frame < block.frames;) {
+    const bool moves = move_coefficients(program, state.ramps, audio);
+    fill_slots(table, reinterpret_cast<const V*>(state.ramps.value), packs);
+    const std::size_t end = moves ? frame + 1 : block.frames;
+    holder.move(rows.value);
+    for (;;) {
+      take_positions(program, packs, rows);
+      give_positions(program, packs, rows.outputs);
+      rows.advance();
+      if (++frame == end) {
+        break;
+      }
+      holder.exert_and_move(rows.value);
+    }
+    holder.exert();
+  }
+}
+
+// --- masses in memory ----------------------------------------------------------------------------
+
+template <class V>
+void walk_masses(const Program& program, const Packs<V>& packs) {
+  const V* slots = packs.slots;
+  for (const MassRun& run : program.mass_runs) {
+    for (std::uint32_t i = run.first; i < run.first + run.count; ++i) {
+      const V* slot = slots;
+      for (std::size_t pack = 0; pack < packs.count; ++pack, slot += packs.stride) {
+        Node<V>& node = packs.nodes(pack)[i];
+        const V pull = slot[1] * node.x + slot[2] * node.v + slot[3];
+        const V v = node.v + (node.force - pull) * slot[0];
+        node.v = v;
+        node.x += v;
+        node.force = V{};
+      }
+    }
+    slots += chorus_run_slots;
+  }
+}
+
+template <class V>
+void walk_links(const Program& program, const ChorusTable& table, const Packs<V>& packs) {
+  const V* slot = packs.slots + table.first_link;
+  for (const LinkRun& run : program.link_runs) {
+    with_constant(run.law, [&](auto law) {
+      const Ends* const ends = program.ends.data() + run.first;
+      for (std::uint32_t i = 0; i < run.count; ++i) {
+        link<V, decltype(law)::value>(packs, slot, ends[i].a, ends[i].b, program.moving);
+      }
+    });
+    slot += chorus_link_slots;
+  }
+}
+
+template <class V>
+void walk(const Program& program, const Chorus&, const ChorusTable& table,
+          ChorusState<Scalar<V>>& state, const Block<Scalar<V>>& block) {
+  const Packs<V> packs(table, state.cells);
+  Rows<V> rows(program, table, block);
+  const auto* audio = block.audio;
+  for (std::size_t frame = 0; frame < block.frames; ++frame) {
+    if (move_coefficients(program, state.ramps, audio) || frame == 0) {
+      fill_slots(table, reinterpret_cast<const V*>(state.ramps.value), packs);
+    }
+    for (std::size_t i = 0; i < program.inputs.size(); ++i) {
+      if (program.inputs[i].is_force) {
+        take_force(program.inputs[i].node, packs, rows.value + i * packs.count);
+      }
+    }
+    walk_masses(program, packs);
+    take_positions(program, packs, rows);
+    walk_links(program, table, packs);
+    give_positions(program, packs, rows.outputs);
+    rows.advance();
+  }
+}
+
+// --- which ---------------------------------------------------------------------------------------
+
+template <class V, bool is_alike>
+ChorusStep<Scalar<V>> hold_for(std::uint32_t held) {
+  switch (held) {
+    case 1:
+      return hold<V, 1, is_alike>;
+    case 2:
+      return hold<V, 2, is_alike>;
+    case 3:
+      return hold<V, 3, is_alike>;
+    default:
+      return hold<V, 4, is_alike>;
+  }
+}
+
+template <class V>
+ChorusStep<Scalar<V>> step_for(const ChorusTable& table) {
+  if (table.held == 0) {
+    return walk<V>;
+  }
+  return table.is_alike ? hold_for<V, true>(table.held) : hold_for<V, false>(table.held);
+}
+
+template <class T>
+ChorusStep<T> step_in(const ChorusTable& table, std::size_t bytes) {
+  if constexpr (vector_bytes(Isa::RESSORT_ISA) >= 64) {
     if (bytes == 64) {
-      return step_for<Pack<T, 64>>(held);
+      return step_for<Pack<T, 64>>(table);
     }
   }
   if constexpr (vector_bytes(Isa::RESSORT_ISA) >= 32) {
     if (bytes == 32) {
-      return step_for<Pack<T, 32>>(held);
+      return step_for<Pack<T, 32>>(table);
     }
   }
-  return step_for<Pack<T, 16>>(held);
+  return step_for<Pack<T, 16>>(table);
 }
 
 }  // namespace
@@ -257,13 +444,15 @@ ChorusStep<T> step_in(std::uint32_t held, std::size_t bytes) {
 namespace ressort {
 
 template <>
-ChorusStep<float> chorus_step<Isa::RESSORT_ISA, float>(std::uint32_t held, std::size_t bytes) {
-  return RESSORT_ISA::step_in<float>(held, bytes);
+ChorusStep<float> chorus_step<Isa::RESSORT_ISA, float>(const ChorusTable& table,
+                                                       std::size_t bytes) {
+  return RESSORT_ISA::step_in<float>(table, bytes);
 }
 
 template <>
-ChorusStep<double> chorus_step<Isa::RESSORT_ISA, double>(std::uint32_t held, std::size_t bytes) {
-  return RESSORT_ISA::step_in<double>(held, bytes);
+ChorusStep<double> chorus_step<Isa::RESSORT_ISA, double>(const ChorusTable& table,
+                                                         std::size_t bytes) {
+  return RESSORT_ISA::step_in<double>(table, bytes);
 }
 
 }  // namespace ressort

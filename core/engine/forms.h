@@ -189,32 +189,31 @@ struct Grid {
 
 inline constexpr std::size_t most_grid_offsets = 8;
 
-// A spring that a mass hangs by, on what has no inertia.
-struct ChorusAnchor {
+// A spring of a Chorus, if there is one.
+struct ChorusSpring {
   static constexpr std::uint32_t none = 0xffffffffu;
-  std::uint32_t run = none;  // of Program::link_runs
-  std::uint32_t node = 0;
+  std::uint32_t stiffness = none;  // coefficients
+  std::uint32_t damping = none;
+  std::uint32_t node = none;  // what has no inertia, that an anchor hangs on
 };
 
-// Links of one run that are none of the springs held, one by one.
-struct ChorusLinks {
-  std::uint32_t run = 0;    // of Program::link_runs
-  std::uint32_t first = 0;  // of Chorus::ends
-  std::uint32_t count = 0;
+// Any other link of a Chorus.
+struct ChorusLink {
+  std::uint32_t run = 0;  // of Program::link_runs
+  std::uint32_t a = 0;    // nodes
+  std::uint32_t b = 0;
 };
 
 inline constexpr std::uint32_t most_held_masses = 4;
 inline constexpr std::uint32_t most_held_pairs = 6;
 
-// A small body in many voices, several packs of them. At most most_held_masses masses are held in
-// registers, with the springs between any two of them and one anchor each; the links that do not
-// fit, and all of them where there are more masses, are walked through one by one.
+// A small body in many voices, several packs of them as one. At most most_held_masses masses stay
+// in registers, with the springs between any two of them and one anchor each; the links that are
+// none of these follow one by one. More masses are walked through in memory, as they are written.
 struct Chorus {
-  // Of Program::link_runs or ChorusAnchor::none, for the masses (0, 1), (0, 2), (1, 2), (0, 3)...
-  std::array<std::uint32_t, most_held_pairs> pairs;
-  std::array<ChorusAnchor, most_held_masses> anchors;  // [mass]
-  std::vector<ChorusLinks> links;
-  std::vector<std::array<std::uint32_t, 2>> ends;  // nodes
+  std::array<ChorusSpring, most_held_pairs> pairs;     // masses (0, 1), (0, 2), (1, 2), (0, 3)...
+  std::array<ChorusSpring, most_held_masses> anchors;  // [mass]
+  std::vector<ChorusLink> links;
 };
 
 using Form = std::variant<Direct, Chains, Dense, Modes, Grid, Chorus>;

@@ -54,6 +54,13 @@ struct PluckShape {
   PluckShape(V k, V s) : rise(k - k / 10), fall(k / 10), inner(s / 10), outer(s), top(s / 10 * k) {}
   explicit PluckShape(const V* kept)  // as a row of its numbers
       : rise(kept[0]), fall(kept[1]), inner(kept[2]), outer(kept[3]), top(kept[4]) {}
+  void keep(V* row) const {
+    row[0] = rise;
+    row[1] = fall;
+    row[2] = inner;
+    row[3] = outer;
+    row[4] = top;
+  }
   V rise;
   V fall;
   V inner;
@@ -77,13 +84,33 @@ static inline V pluck_force(V d, V v, V k, V s, V z) {
 //   s/3 <= |v| < s:   f = sgn(v) (s/3) Z - (Z/3) v
 //   else:             f = 0
 template <class V>
-static inline V bow_force(V v, V z, V s) {
+struct BowShape {
+  BowShape(V z, V s) : stick(z - z / 3), slip(z / 3), inner(s / 3), outer(s), top(s / 3 * z) {}
+  explicit BowShape(const V* kept)  // as a row of its numbers
+      : stick(kept[0]), slip(kept[1]), inner(kept[2]), outer(kept[3]), top(kept[4]) {}
+  void keep(V* row) const {
+    row[0] = stick;
+    row[1] = slip;
+    row[2] = inner;
+    row[3] = outer;
+    row[4] = top;
+  }
+  V stick;
+  V slip;
+  V inner;
+  V outer;
+  V top;  // where the outer slopes would meet at 0
+};
+template <class V>
+static inline V bow_force(V v, const BowShape<V>& shape) {
   const V fast = absolute(v);
-  const V third = z / 3;
-  const V stick = (z - third) * v;
-  const V most = s / 3 * z;
-  const V slip = select(v < V{}, -most, most) - third * v;
-  return select(fast < s, select(fast < s / 3, stick, slip), V{});
+  const V within = shape.stick * v;
+  const V beyond = select(v < V{}, -shape.top, shape.top) - shape.slip * v;
+  return select(fast < shape.outer, select(fast < shape.inner, within, beyond), V{});
+}
+template <class V>
+static inline V bow_force(V v, V z, V s) {
+  return bow_force(v, BowShape<V>(z, s));
 }
 
 // The same in one smooth curve: f = 0.63 Z v exp(-4 (v/s)^2 + 1/2)
