@@ -105,6 +105,11 @@ TEST_CASE("the plan takes the form that is cheapest at its worst", "[compile]") 
   CHECK(chosen(scenes::poly_triangle()) == Method::dense);
   CHECK(chosen(scenes::iplay_the_triangle()) == Method::dense);
   CHECK(chosen(scenes::iplay_the_triangle(), 64) == Method::chorus);
+  const std::string picked = scenes::string("s", 8, "0.1", "0.01") +
+                             "@in1 posInput 0.\n@pick nlPluck @in1 @s_m3 0.05 0.01\n" +
+                             scenes::output(1, "s_m6");
+  CHECK(chosen(picked) == Method::dense);
+  CHECK(chosen(picked, 64) == Method::chorus);
   CHECK(chosen(scenes::physical_lfo()) == Method::dense);
   CHECK(chosen(scenes::resonator()) == Method::chains);
   CHECK(chosen(scenes::bowed_string()) == Method::chains);

@@ -6,18 +6,30 @@
 namespace ressort {
 namespace {
 
-// Links by what they cost: those that only pull, and those that have to look first.
+// Links by what they cost: those that only pull, in a line or bent, and those that have to look
+// first.
 struct Count {
   double springs = 0.0;
+  double bent = 0.0;
   double others = 0.0;
 };
 
 Count links_of(const Program& program) {
   Count count;
   for (const LinkRun& run : program.link_runs) {
-    (run.law == Law::spring ? count.springs : count.others) += run.count;
+    const bool is_bent = run.law == Law::quadratic_spring || run.law == Law::cubic_spring;
+    (run.law == Law::spring ? count.springs : is_bent ? count.bent : count.others) += run.count;
   }
   return count;
+}
+
+// How many packs the voices fill, each counted as often as it is dearer than one of AVX2: the
+// widest are worked on in two halves.
+double packs_of(const Load& load) {
+  const double size = load.is_double ? 8.0 : 4.0;
+  const double lanes = static_cast<double>(vector_bytes(load.isa)) / size;
+  const bool is_halved = load.isa == Isa::v4 && load.voices > lanes / 2.0;
+  return std::ceil(load.voices / lanes) * (is_halved ? 2.0 : load.isa == Isa::base ? 1.1 : 1.0);
 }
 
 // Parameters are still most of the time, so that a moving one counts by half; without that no mesh
@@ -39,12 +51,13 @@ class Predictor {
       : program_(program), load_(load), wide_(load.isa == Isa::base ? 0.0 : 1.0) {}
 
   double operator()(const Direct&) const {
-    const auto widest = vector_bytes(load_.isa) / (load_.is_double ? 8 : 4);
-    const auto groups = std::ceil(load_.voices / static_cast<double>(widest));
-    const double lanes = std::min<double>(load_.voices, static_cast<double>(widest));
+    const auto widest =
+        static_cast<double>(vector_bytes(load_.isa)) / (load_.is_double ? 8.0 : 4.0);
     const Count links = links_of(program_);
-    return groups * (12.0 + 1.6 * (program_.moving + links.springs) + 5.0 * links.others +
-                     10.0 * lanes * static_cast<double>(program_.taps.size()));
+    return packs_of(load_) *
+               (12.0 + 1.6 * (program_.moving + links.springs + links.bent) + 5.0 * links.others) +
+           10.0 * std::ceil(load_.voices / widest) * std::min<double>(load_.voices, widest) *
+               static_cast<double>(program_.taps.size());
   }
 
   double operator()(const Chains& form) const {
@@ -89,15 +102,15 @@ class Predictor {
     return load_.voices * slow * (one + 5.0 * static_cast<double>(form.ports.size() - 1));
   }
 
-  // Beyond four masses nothing is held in registers, and it is dearer than the direct form.
+  // Beyond most_held_masses everything goes through memory.
   double operator()(const Chorus&) const {
-    const auto lanes = static_cast<double>(vector_bytes(load_.isa) / (load_.is_double ? 8 : 4));
-    const double packs = std::ceil(load_.voices / lanes);
     const Count links = links_of(program_);
-    const double small = program_.moving <= 4 ? 1.0 : 2.0;
-    return small * std::max(12.0 + 5.0 * links.others,
-                            packs * (load_.isa == Isa::v4 ? 1.4 : 1.15) *
-                                (0.6 * program_.moving + 1.6 * links.springs + 7.0 * links.others));
+    const double others = links.bent + links.others;
+    if (program_.moving <= most_held_masses) {
+      return 6.0 + 3.0 * others +
+             packs_of(load_) * (0.6 * (program_.moving + links.springs) + 2.8 * others);
+    }
+    return 6.0 + (0.6 + 1.6 * packs_of(load_)) * (program_.moving + links.springs + others);
   }
 
   double operator()(const Modes& form) const {
@@ -140,8 +153,9 @@ double predicted_ns(const Program& program, const Load& load) {
 }
 
 double least_modal_ns(const Program& program, const Load& load) {
+  const Count links = links_of(program);
   // Two links at one mass share its place, so each is counted as half of one.
-  return load.voices * modal_ns(program.moving, 0.5 * links_of(program).others,
+  return load.voices * modal_ns(program.moving, 0.5 * (links.bent + links.others),
                                 static_cast<double>(program.outputs.size()), 0.0, load);
 }
 

@@ -61,7 +61,9 @@ struct Describer {
            count_of(form.places.size(), "place", "places") + " where links hold on";
   }
   std::string operator()(const Chorus&) const {
-    return "its masses in registers, a voice in each lane";
+    return std::string(program.moving <= most_held_masses ? "its masses in registers"
+                                                          : "mass by mass and link by link") +
+           ", a voice in each lane of many packs at once";
   }
   std::string operator()(const Grid& form) const {
     return std::string(form.segments.empty() ? "forces" : "rows that are alike") +
