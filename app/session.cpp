@@ -5,6 +5,8 @@
 #include <cmath>
 #include <future>
 
+#include "app/timing.h"
+
 namespace ressort {
 namespace {
 
@@ -175,6 +177,7 @@ void Session::improve() {
   if (!compiled) {
     return;
   }
+  measure(compiled->plan, *compiled->engine, work.options, compiled->instrument.voices);
   {
     const std::lock_guard lock(mutex_);
     auto loaded = std::make_shared<Loaded>(*current_);
@@ -257,6 +260,7 @@ Result<std::shared_ptr<const Loaded>> Session::build(const std::string& name) {
     return Error{scene->path + ":" + std::to_string(error.line) + ":" +
                  std::to_string(error.column) + ": error: " + error.message};
   }
+  measure(compiled->plan, *compiled->engine, options, compiled->instrument.voices);
   const std::chrono::duration<double, std::milli> took = std::chrono::steady_clock::now() - start;
   auto loaded = std::make_shared<Loaded>();
   loaded->serial = ++serial_;

@@ -197,7 +197,9 @@ std::string describe(const Plan& plan) {
   std::string text;
   for (const Part& part : plan.parts) {
     text += std::string(method_name(part.method)) + ": " + count_of(part.masses, "mass", "masses") +
-            ", " + count_of(part.links, "link", "links") + " (" + part.reason + ")\n";
+            ", " + count_of(part.links, "link", "links") + " (" + part.reason +
+            (part.measured_ns > 0.0 ? "; measured at rest: " + in_ns(part.measured_ns) : "") +
+            ")\n";
   }
   return text.empty() ? "nothing moves\n" : text;
 }

@@ -32,6 +32,7 @@ struct Part {
   std::size_t masses = 0;  // that move
   std::size_t links = 0;
   double predicted_ns = 0.0;  // a sample, of all voices, with everything touching all the time
+  double measured_ns = 0.0;   // the same at rest, by who has tried it; 0: nobody
   bool may_gain = false;      // by its modes, had it more patience
   std::string reason;
 };

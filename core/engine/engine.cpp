@@ -379,6 +379,10 @@ double Engine::parameter(std::uint16_t index) const {
   return voices_->parameters[index];
 }
 
+const Machine& Engine::machine() const {
+  return voices_->machine;
+}
+
 int Engine::output_count() const {
   return static_cast<int>(voices_->machine.channels);
 }

@@ -93,7 +93,8 @@ class Engine {
   double parameter(std::uint16_t index) const;  // [audio]
   static constexpr std::size_t max_changes = 64;
 
-  int output_count() const;  // [any thread], as long as the engine lives
+  const Machine& machine() const;  // [any thread], as long as the engine lives
+  int output_count() const;        // [any thread], as long as the engine lives
   double rate_hz() const;
   EngineMeters meters() const;  // [audio]
 

@@ -68,13 +68,12 @@ double fastest(Isa isa) {
 }
 
 struct Arithmetic {
-  // d += force - K q - Z d; q += d; and one for each place that is pushed or heard.
+  // d -= K q + Z d; q += d; and one for each place that is heard. Nothing pushes most of the time.
   std::optional<double> operator()(const Modes& form) const {
     if (!form.places.empty()) {
       return std::nullopt;
     }
-    const auto rows = static_cast<double>(form.outputs.size() + form.pushes.size());
-    return form.modes * (3.0 + rows);
+    return form.modes * (3.0 + static_cast<double>(form.outputs.size()));
   }
   // y = K x + Z v; the sum over the offsets; v += w sum; x += v.
   std::optional<double> operator()(const Grid& form) const {
