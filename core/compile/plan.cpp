@@ -8,6 +8,7 @@
 #include "core/compile/dense_form.h"
 #include "core/compile/grid_form.h"
 #include "core/compile/modal_form.h"
+#include "core/compile/sparse_form.h"
 
 namespace ressort {
 namespace {
@@ -31,6 +32,8 @@ std::optional<Form> form_of(const Program& program, Method method) {
       return any(grid_form(program));
     case Method::chorus:
       return any(chorus_form(program));
+    case Method::sparse:
+      return any(sparse_form(program));
   }
   return std::nullopt;
 }
@@ -64,6 +67,9 @@ struct Describer {
     return std::string(program.moving <= most_held_masses ? "its masses in registers"
                                                           : "mass by mass and link by link") +
            ", a voice in each lane of many packs at once";
+  }
+  std::string operator()(const Sparse&) const {
+    return "masses in vectors by how many links they have, neighbours looked up";
   }
   std::string operator()(const Grid& form) const {
     return std::string(form.segments.empty() ? "forces" : "rows that are alike") +
@@ -176,6 +182,8 @@ std::string_view method_name(Method method) {
       return "grid";
     case Method::chorus:
       return "chorus";
+    case Method::sparse:
+      return "sparse";
   }
   return "";
 }

@@ -216,6 +216,23 @@ struct Chorus {
   std::vector<ChorusLink> links;
 };
 
-using Form = std::variant<Direct, Chains, Dense, Modes, Grid, Chorus>;
+// A link that one of its ends computes, for both: the owner, which moves.
+struct SparseLink {
+  std::uint32_t run = 0;     // of Program::link_runs
+  std::uint32_t link = 0;    // of Program::ends
+  bool is_reversed = false;  // its second end is the owner
+};
+
+// A network without any order, one voice. Masses that have as many links are side by side in the
+// lanes; what they are linked to is looked up. Of springs that are many and all alike a mass sums
+// y = K x + Z v of those around it, less its own y for each of them; any other link is computed
+// once, in the lane of its owner, and the other end looks its force up.
+struct Sparse {
+  std::vector<std::uint32_t> order;           // nodes that move, as they lie in the lanes
+  std::vector<std::uint32_t> fields;          // of Program::link_runs: springs that are many
+  std::vector<std::vector<SparseLink>> rest;  // [law that occurs] all others, each of one law
+};
+
+using Form = std::variant<Direct, Chains, Dense, Modes, Grid, Chorus, Sparse>;
 
 }  // namespace ressort

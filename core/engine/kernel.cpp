@@ -8,6 +8,7 @@
 #include "core/engine/direct.h"
 #include "core/engine/grid.h"
 #include "core/engine/modal.h"
+#include "core/engine/sparse.h"
 
 namespace ressort {
 
@@ -98,6 +99,9 @@ std::unique_ptr<Kernel<T>> make_kernel(const Program& program, std::size_t voice
     }
     std::unique_ptr<Kernel<T>> operator()(const Chorus& chorus) const {
       return std::make_unique<ChorusKernel<T>>(program, chorus, voices, isa);
+    }
+    std::unique_ptr<Kernel<T>> operator()(const Sparse& sparse) const {
+      return std::make_unique<SparseKernel<T>>(program, sparse, isa);
     }
   };
   return std::visit(Maker{program, voices, isa}, program.form);

@@ -93,6 +93,27 @@ std::string mesh(int side) {
          "\n" + scenes::output(1, node(7, 6));
 }
 
+// Anything linked to anything, by three links each of the same law.
+std::string random_graph(int masses, const std::string& law) {
+  std::string text = "@g ground 0.\n";
+  std::string links = "@hold springDamper @m_m0 @g 0.05 0.001\n";
+  std::uint32_t seed = 1;
+  const auto any = [&] {
+    seed = seed * 1664525u + 1013904223u;
+    return static_cast<int>((seed >> 8) % static_cast<std::uint32_t>(masses));
+  };
+  for (int i = 0; i < masses; ++i) {
+    text += "@m_m" + std::to_string(i) + " mass 1. 0. 0.\n";
+    for (int k = 0; k < 3; ++k) {
+      const int other = (i + 1 + any() % (masses - 1)) % masses;
+      links += "@m_r" + std::to_string(3 * i + k) + " " + law + "\n";
+      links.replace(links.rfind("@A @B"), 5,
+                    "@m_m" + std::to_string(i) + " @m_m" + std::to_string(other));
+    }
+  }
+  return text + links + "@in1 frcInput @m_m1\n" + scenes::output(1, "m_m2");
+}
+
 // --- scenes -------------------------------------------------------------------------------------
 
 void add_instruments(std::vector<BenchScene>& all) {
@@ -112,6 +133,9 @@ void add_instruments(std::vector<BenchScene>& all) {
   all.push_back({"20x30mesh", mesh_20x30(), blow(0.1)});
   all.push_back({"20x30mesh-cubic", cubic_mesh(), blow(0.1)});
   all.push_back({"1000massString", string_1000(), swing(1.0)});
+  all.push_back({"random-300", random_graph(300, "springDamper @A @B 0.05 0.001"), blow(0.1)});
+  all.push_back(
+      {"random-300-cubic", random_graph(300, "nlSpring3 @A @B 0.05 0.5 0.001"), blow(0.1)});
 }
 
 void add_voices(std::vector<BenchScene>& all) {
