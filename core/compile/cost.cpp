@@ -122,19 +122,16 @@ class Predictor {
   // Looking up costs the same in every width, the laws do not.
   double operator()(const Sparse& form) const {
     const double n = program_.moving;
-    const auto fields = static_cast<double>(form.fields.size());
-    double springs = 0.0;
-    for (const std::uint32_t run : form.fields) {
-      springs += program_.link_runs[run].count;
-    }
+    const bool has_springs = form.springs != Sparse::none;
+    const double springs = has_springs ? program_.link_runs[form.springs].count : 0.0;
     double others = 0.0;
     for (const auto& links : form.rest) {
       others += static_cast<double>(links.size());
     }
     const double half = load_.is_double ? 1.0 : 0.7;
     const double slow = wide_ > 0.0 ? 1.0 : 1.6;
-    return load_.voices * (12.0 + (0.15 + 0.35 * fields) * n + 0.5 * springs +
-                           slow * half * (others > 0.0 ? 0.6 * n + 1.0 * others : 0.0));
+    return load_.voices * (12.0 + 0.15 * n + (has_springs ? 0.35 * n + 0.55 * springs : 0.0) +
+                           slow * half * (others > 0.0 ? 6.0 + 0.6 * n + others : 0.0));
   }
 
   double operator()(const Grid& form) const {

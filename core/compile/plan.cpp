@@ -91,7 +91,8 @@ class Chooser {
 
   Part choose() {
     for (const Method method : all_methods) {
-      if (method == Method::modal && !may_be_modal()) {
+      if ((method == Method::modal && !may_be_modal()) ||
+          (method == Method::sparse && !may_be_sparse())) {
         continue;
       }
       consider(method);
@@ -122,6 +123,11 @@ class Chooser {
                          least_modal_ns(program_, load_) < candidates_[best_].ns;
     may_gain_ = may_pay && program_.moving > most_modes_;
     return may_pay && !may_gain_;
+  }
+
+  // A mass and its link take about a nanosecond; a large regular network is not sorted for nothing.
+  bool may_be_sparse() const {
+    return static_cast<double>(program_.moving) * load_.voices < candidates_[best_].ns;
   }
 
   bool consider(Method method) {

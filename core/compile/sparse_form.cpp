@@ -49,21 +49,31 @@ class SparseMaker {
 
   void share_links() {
     looked_up_.resize(program_.moving);
+    choose_springs();
     std::map<Law, std::vector<std::uint32_t>> runs;
     for (std::uint32_t i = 0; i < program_.link_runs.size(); ++i) {
-      const LinkRun& run = program_.link_runs[i];
-      if (run.law != Law::spring || run.count < program_.moving / 2) {
-        runs[run.law].push_back(i);
-        continue;
-      }
-      form_.fields.push_back(i);
-      for (std::uint32_t link = run.first; link < run.first + run.count; ++link) {
-        look_up(program_.ends[link].a);
-        look_up(program_.ends[link].b);
+      if (i != form_.springs) {
+        runs[program_.link_runs[i].law].push_back(i);
       }
     }
     for (const auto& [law, same] : runs) {
       own_links(same);
+    }
+  }
+
+  void choose_springs() {
+    for (std::uint32_t i = 0; i < program_.link_runs.size(); ++i) {
+      const LinkRun& run = program_.link_runs[i];
+      if (run.law != Law::spring || run.count < program_.moving / 2 ||
+          run.count < program_.ends.size() / 2) {
+        continue;
+      }
+      form_.springs = i;
+      for (std::uint32_t link = run.first; link < run.first + run.count; ++link) {
+        look_up(program_.ends[link].a);
+        look_up(program_.ends[link].b);
+      }
+      return;
     }
   }
 
@@ -113,7 +123,7 @@ class SparseMaker {
   std::vector<std::uint32_t> looked_up_;           // [mass] numbers
 };
 
-// Nobody computes a link between two that stand, except in a field.
+// Nobody computes a link between two that stand, unless it is one of the springs.
 bool hears_such(const Program& program, const Sparse& form) {
   const auto stands = [&](std::uint32_t node) { return node >= program.moving; };
   if (std::none_of(program.outputs.begin(), program.outputs.end(), [&](const OutputSlot& output) {
@@ -123,12 +133,10 @@ bool hears_such(const Program& program, const Sparse& form) {
   }
   for (std::uint32_t i = 0; i < program.link_runs.size(); ++i) {
     const LinkRun& run = program.link_runs[i];
-    if (std::count(form.fields.begin(), form.fields.end(), i) > 0) {
-      continue;
-    }
     const auto first = program.ends.begin() + run.first;
-    if (std::any_of(first, first + run.count,
-                    [&](const Ends& ends) { return stands(ends.a) && stands(ends.b); })) {
+    if (i != form.springs && std::any_of(first, first + run.count, [&](const Ends& ends) {
+          return stands(ends.a) && stands(ends.b);
+        })) {
       return true;
     }
   }

@@ -7,7 +7,7 @@
 
 namespace ressort {
 
-inline constexpr std::uint32_t least_sparse_masses = 8;
+inline constexpr std::uint32_t least_sparse_masses = 10;
 
 // Nothing where fewer masses move, where there are points on macros, or where a force is heard at
 // what stands and two such are linked. O(n log n). [any thread but audio]

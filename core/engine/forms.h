@@ -224,12 +224,14 @@ struct SparseLink {
 };
 
 // A network without any order, one voice. Masses that have as many links are side by side in the
-// lanes; what they are linked to is looked up. Of springs that are many and all alike a mass sums
-// y = K x + Z v of those around it, less its own y for each of them; any other link is computed
+// lanes; what they are linked to is looked up. Of springs that are most of the links and all alike
+// a mass sums how far y = K x + Z v of those around it is from its own; any other link is computed
 // once, in the lane of its owner, and the other end looks its force up.
 struct Sparse {
+  static constexpr std::uint32_t none = 0xffffffffu;
+
   std::vector<std::uint32_t> order;           // nodes that move, as they lie in the lanes
-  std::vector<std::uint32_t> fields;          // of Program::link_runs: springs that are many
+  std::uint32_t springs = none;               // of Program::link_runs: those that are most
   std::vector<std::vector<SparseLink>> rest;  // [law that occurs] all others, each of one law
 };
 

@@ -22,7 +22,7 @@ SparseKernel<T>::SparseKernel(const Program& program, const Sparse& sparse, Isa 
   v_.resize(slots_);
   force_.resize(slots_);
   pairs_.resize(laws_.empty() ? 0 : 2 * slots_);
-  signals_.resize(sparse.fields.size() * slots_ + others_.size() + lanes_);
+  signals_.resize(slots_ + others_.size() + lanes_);
   this->reset(0);
 }
 
@@ -71,64 +71,73 @@ void SparseKernel<T>::make_laws() {
   }
 }
 
-// What lanes without a link compute is thrown away; its coefficients are somebody else's.
 template <class T>
 void SparseKernel<T>::make_rows(const std::vector<SparseLink>& links, SparseLaw& law) {
-  std::vector<std::vector<const SparseLink*>> owned(moving_);
+  std::vector<std::vector<SparseLink>> owned(moving_);
   for (const SparseLink& link : links) {
     const auto [a, b] = program_.ends[link.link];
-    owned[slot_[link.is_reversed ? b : a]].push_back(&link);
+    owned[slot_[link.is_reversed ? b : a]].push_back(link);
   }
-  const auto forces = sparse_.fields.size() * slots_;
   for (std::size_t first = 0; first < moving_; first += lanes_) {
     std::size_t rows = 0;
-    for (std::size_t lane = 0; lane < lanes_; ++lane) {
-      rows = std::max(rows, owned[first + lane].size());
+    for (std::size_t slot = first; slot < first + lanes_; ++slot) {
+      rows = std::max(rows, owned[slot].size());
     }
-    if (rows > 0) {
-      owners_.push_back({static_cast<std::uint32_t>(first), static_cast<std::uint32_t>(rows)});
-      ++law.count;
+    if (rows == 0) {
+      continue;
     }
+    owners_.push_back({static_cast<std::uint32_t>(first), static_cast<std::uint32_t>(rows)});
+    ++law.count;
     for (std::size_t row = 0; row < rows; ++row) {
       if (law.stride > 0 || held_.size() == law.held) {
         held_.resize(held_.size() + 5 * lanes_);
       }
-      const std::size_t coefficients = held_.size() - 5 * lanes_;
       for (std::size_t lane = 0; lane < lanes_; ++lane) {
         const auto& mine = owned[first + lane];
-        const SparseLink& link = row < mine.size() ? *mine[row] : links.front();
-        const auto [a, b] = program_.ends[link.link];
-        const std::uint32_t other = slot_[link.is_reversed ? a : b];
-        for (std::size_t i = 0; i < 5; ++i) {
-          pin(program_.link_runs[link.run].coefficients[i], coefficients + i * lanes_ + lane);
-        }
-        if (row < mine.size()) {
-          heard_[other].push_back(static_cast<std::uint32_t>(forces + others_.size()));
-          signs_.push_back(link.is_reversed ? T(-1) : T(1));
-          others_.push_back(2 * other);
-        } else {
-          signs_.push_back(T(0));
-          others_.push_back(static_cast<std::uint32_t>(2 * first));
-        }
+        row < mine.size() ? add_link(mine[row], lane) : add_nothing(links.front(), first, lane);
       }
     }
+  }
+}
+
+// To the last row.
+template <class T>
+void SparseKernel<T>::add_link(const SparseLink& link, std::size_t lane) {
+  const auto [a, b] = program_.ends[link.link];
+  const std::uint32_t other = slot_[link.is_reversed ? a : b];
+  heard_[other].push_back(static_cast<std::uint32_t>(slots_ + others_.size()));
+  others_.push_back(2 * other);
+  signs_.push_back(link.is_reversed ? T(-1) : T(1));
+  pin_all(link, lane);
+}
+
+// A lane without a link: what it computes, with somebody's coefficients, is thrown away.
+template <class T>
+void SparseKernel<T>::add_nothing(const SparseLink& like, std::size_t slot, std::size_t lane) {
+  others_.push_back(static_cast<std::uint32_t>(2 * slot));
+  signs_.push_back(T(0));
+  pin_all(like, lane);
+}
+
+template <class T>
+void SparseKernel<T>::pin_all(const SparseLink& link, std::size_t lane) {
+  const std::size_t first = held_.size() - 5 * lanes_;
+  for (std::size_t i = 0; i < 5; ++i) {
+    pin(program_.link_runs[link.run].coefficients[i], first + i * lanes_ + lane);
   }
 }
 
 // A mass's own, and those of what stands where its force is heard.
 template <class T>
 void SparseKernel<T>::make_lists() {
-  degree_.resize(sparse_.fields.size() * slots_);
-  for (std::size_t field = 0; field < sparse_.fields.size(); ++field) {
-    const LinkRun& run = program_.link_runs[sparse_.fields[field]];
-    const std::size_t first = field * slots_;
+  std::vector<std::vector<std::uint32_t>> around(slots_);
+  if (sparse_.springs != Sparse::none) {
+    const LinkRun& run = program_.link_runs[sparse_.springs];
     for (std::uint32_t link = run.first; link < run.first + run.count; ++link) {
       const std::uint32_t a = slot_[program_.ends[link].a];
       const std::uint32_t b = slot_[program_.ends[link].b];
-      heard_[a].push_back(static_cast<std::uint32_t>(first + b));
-      heard_[b].push_back(static_cast<std::uint32_t>(first + a));
-      degree_[first + a] += T(1);
-      degree_[first + b] += T(1);
+      around[a].push_back(b);
+      around[b].push_back(a);
     }
   }
   std::vector<bool> is_wanted(slots_);
@@ -136,23 +145,26 @@ void SparseKernel<T>::make_lists() {
   for (const OutputSlot& output : program_.outputs) {
     is_wanted[slot_[output.node]] = is_wanted[slot_[output.node]] || output.is_force;
   }
-  const auto zero = static_cast<std::uint32_t>(sparse_.fields.size() * slots_ + others_.size());
-  list_.push_back(0);
-  for (std::size_t first = 0; first < slots_; first += lanes_) {
+  // Lanes that have fewer than others look up their own y, or a zero.
+  const auto add = [&](std::size_t first, const auto& signals, bool is_own) {
+    lists_.push_back(static_cast<std::uint32_t>(looked_up_.size()));
     std::size_t rows = 0;
     for (std::size_t slot = first; slot < first + lanes_; ++slot) {
-      if (!is_wanted[slot]) {
-        heard_[slot].clear();
-      }
-      rows = std::max(rows, heard_[slot].size());
+      rows = std::max(rows, is_wanted[slot] ? signals[slot].size() : 0);
     }
     for (std::size_t row = 0; row < rows; ++row) {
       for (std::size_t slot = first; slot < first + lanes_; ++slot) {
-        looked_up_.push_back(row < heard_[slot].size() ? heard_[slot][row] : zero);
+        const std::size_t nothing = is_own ? slot : slots_ + others_.size();
+        looked_up_.push_back(row < signals[slot].size() ? signals[slot][row]
+                                                        : static_cast<std::uint32_t>(nothing));
       }
     }
-    list_.push_back(static_cast<std::uint32_t>(looked_up_.size()));
+  };
+  for (std::size_t first = 0; first < slots_; first += lanes_) {
+    add(first, around, true);
+    add(first, heard_, false);
   }
+  lists_.push_back(static_cast<std::uint32_t>(looked_up_.size()));
   heard_ = {};
 }
 
@@ -208,9 +220,8 @@ void SparseKernel<T>::play(const Block<T>& block) {
                        .moving = moving_,
                        .slots = slots_,
                        .slot = slot_.data(),
-                       .list = list_.data(),
+                       .lists = lists_.data(),
                        .looked_up = looked_up_.data(),
-                       .degree = degree_.data(),
                        .pins = pins_.data(),
                        .places = places_.data(),
                        .laws = laws_.data(),

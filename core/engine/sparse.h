@@ -35,7 +35,7 @@ struct SparseLaw {
 
 // Everything that one step of SparseKernel touches. Slots are the masses in the form's order, then,
 // from the next pack on, what has no inertia. Numbers to be looked up are `signals`: y of every
-// field and slot, then the force of every row and lane, then a pack of zeros.
+// slot, then the force of every row and lane, then a pack of zeros.
 template <class T>
 struct SparseState {
   Ramps<T> ramps;
@@ -46,12 +46,12 @@ struct SparseState {
   T* signals;  //
   T* held;     // [1/M, and if a mass is pulled K, Z, g][slot that moves], then of each law
   bool is_pulled;
-  std::size_t moving;              // slots of masses, multiples of a pack
-  std::size_t slots;               // all of them, so too
-  const std::uint32_t* slot;       // [node]
-  const std::uint32_t* list;       // [pack] first of `looked_up`, and one more
+  std::size_t moving;         // slots of masses, multiples of a pack
+  std::size_t slots;          // all of them, so too
+  const std::uint32_t* slot;  // [node]
+  // [pack][y, forces] where they begin in `looked_up`; then where all ends
+  const std::uint32_t* lists;
   const std::uint32_t* looked_up;  // [row of a list][lane] signals
-  const T* degree;                 // [field][slot] springs there
   const SparsePins* pins;          // [coefficient]
   const std::uint32_t* places;     // of held
   const SparseLaw* laws;
@@ -81,6 +81,9 @@ class SparseKernel final : public Kernel<T> {
   void make_slots();
   void make_laws();
   void make_rows(const std::vector<SparseLink>& links, SparseLaw& law);
+  void add_link(const SparseLink& link, std::size_t lane);
+  void add_nothing(const SparseLink& like, std::size_t slot, std::size_t lane);
+  void pin_all(const SparseLink& link, std::size_t lane);
   void make_lists();
   void make_pins();
   void pin(std::uint32_t coefficient, std::size_t place);
@@ -98,9 +101,8 @@ class SparseKernel final : public Kernel<T> {
   std::vector<SparseOwners> owners_;
   std::vector<std::uint32_t> others_;
   Aligned<T> signs_;
-  std::vector<std::uint32_t> list_;
+  std::vector<std::uint32_t> lists_;
   std::vector<std::uint32_t> looked_up_;
-  Aligned<T> degree_;
   std::vector<std::vector<std::uint32_t>> heard_;   // [slot] signals, while the tables are made
   std::vector<std::vector<std::uint32_t>> pinned_;  // [coefficient] places, so too
   std::vector<SparsePins> pins_;

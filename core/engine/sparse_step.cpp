@@ -33,8 +33,26 @@ void hold(const View<T>& s, std::uint32_t coefficient) {
   }
 }
 
-// In every lane the sum of what one mass looks up. Each lane's sum is a number of its own: a pack
-// put together for every row costs more than it saves.
+// In every lane the sum of what one mass looks up, from each number that of `less` taken away.
+// Each lane's sum is a number of its own: a pack put together for every row costs more than it
+// saves, whatever the instructions. Differences first: they are exact where a network is far from 0
+// and moves little.
+template <class V>
+V look_up(const Scalar<V>* signals, const std::uint32_t* from, const std::uint32_t* end,
+          const Scalar<V>* less) {
+  constexpr std::size_t lanes = sizeof(V) / sizeof(Scalar<V>);
+  return [=]<std::size_t... lane>(std::index_sequence<lane...>) {
+    const Scalar<V> own[lanes] = {less[lane]...};
+    Scalar<V> sum[lanes] = {};
+    for (const std::uint32_t* row = from; row != end; row += lanes) {
+      ((sum[lane] += signals[row[lane]] - own[lane]), ...);
+    }
+    return V{sum[lane]...};
+  }
+  (std::make_index_sequence<lanes>{});
+}
+
+// The same sum as it is.
 template <class V>
 V look_up(const Scalar<V>* signals, const std::uint32_t* from, const std::uint32_t* end) {
   constexpr std::size_t lanes = sizeof(V) / sizeof(Scalar<V>);
@@ -48,31 +66,28 @@ V look_up(const Scalar<V>* signals, const std::uint32_t* from, const std::uint32
   (std::make_index_sequence<lanes>{});
 }
 
-template <bool is_pulled, class T>
+template <bool has_springs, bool is_pulled, class T>
 void move_masses(const View<T>& s) {
   using V = typename View<T>::V;
   constexpr std::size_t lanes = View<T>::lanes;
-  const std::size_t fields = s.sparse.fields.size();
   const std::size_t moving = s.state.moving;
-  const std::size_t slots = s.state.slots;
   const T* const inverse_mass = s.state.held;
   const T* const k = inverse_mass + moving;
   const T* const z = k + moving;
   const T* const g = z + moving;
   const T* const signals = s.state.signals;
-  const T* const degree = s.state.degree;
   T* const xs = s.state.x;
   T* const vs = s.state.v;
   T* const forces = s.state.force;
-  const std::uint32_t* list = s.state.list;
-  const std::uint32_t* row = s.state.looked_up;
+  const std::uint32_t* list = s.state.lists;
   const std::uint32_t* const rows = s.state.looked_up;
-  for (std::size_t at = 0; at < moving; at += lanes) {
-    const std::uint32_t* const end = rows + *++list;
-    V force = look_up<V>(signals, row, end) + load<V>(forces + at);
-    row = end;
-    for (std::size_t field = 0; field < fields; ++field) {
-      force -= load<V>(degree + field * slots + at) * load<V>(signals + field * slots + at);
+  for (std::size_t at = 0; at < moving; at += lanes, list += 2) {
+    V force = load<V>(forces + at);
+    if constexpr (has_springs) {
+      force += look_up<V>(signals, rows + list[0], rows + list[1], signals + at);
+    }
+    if (!has_springs || list[1] != list[2]) {
+      force += look_up<V>(signals, rows + list[1], rows + list[2]);
     }
     V x = load<V>(xs + at);
     V v = load<V>(vs + at);
@@ -87,25 +102,24 @@ void move_masses(const View<T>& s) {
   }
 }
 
-// As seen from the first mass: only differences matter, and these are small numbers where
-// everything moves together or far from 0.
+template <bool has_springs, class T>
+void move_masses(const View<T>& s) {
+  s.state.is_pulled ? move_masses<has_springs, true>(s) : move_masses<has_springs, false>(s);
+}
+
+// What the next sample's springs are made of.
 template <class T>
-void lay_fields(const View<T>& s) {
+void lay_springs(const View<T>& s) {
   using V = typename View<T>::V;
+  const auto& c = s.program.link_runs[s.sparse.springs].coefficients;
+  const V k = V{} + s.state.ramps.value[c[0]];
+  const V z = V{} + s.state.ramps.value[c[1]];
   const std::size_t slots = s.state.slots;
   const T* const xs = s.state.x;
   const T* const vs = s.state.v;
-  const V from_x = V{} + xs[0];
-  const V from_v = V{} + vs[0];
-  T* y = s.state.signals;
-  for (const std::uint32_t run : s.sparse.fields) {
-    const auto& c = s.program.link_runs[run].coefficients;
-    const V k = V{} + s.state.ramps.value[c[0]];
-    const V z = V{} + s.state.ramps.value[c[1]];
-    for (std::size_t at = 0; at < slots; at += View<T>::lanes) {
-      store<V>(y + at, k * (load<V>(xs + at) - from_x) + z * (load<V>(vs + at) - from_v));
-    }
-    y += slots;
+  T* const ys = s.state.signals;
+  for (std::size_t at = 0; at < slots; at += View<T>::lanes) {
+    store<V>(ys + at, k * load<V>(xs + at) + z * load<V>(vs + at));
   }
 }
 
@@ -199,7 +213,7 @@ template <Law law, class T>
   const T* c = s.state.held + links.held;
   const std::uint32_t* other = s.state.others + first;
   const T* signs = s.state.signs + first;
-  T* signal = s.state.signals + s.sparse.fields.size() * s.state.slots + first;
+  T* signal = s.state.signals + s.state.slots + first;
   const SparseOwners* const end = s.state.owners + links.first + links.count;
   for (const SparseOwners* owners = end - links.count; owners != end; ++owners) {
     const std::size_t slot = owners->slot;
@@ -208,13 +222,12 @@ template <Law law, class T>
     V own{};
     const T* const last = signal + owners->rows * lanes;
     do {
-      const auto [other_x, other_v] = look_up_pairs<T>(pairs, other);
+      const Pairs<V> at = look_up_pairs<T>(pairs, other);
       const V sign = load<V>(signs);
       V f;
       with_law<V>(law, load<V>(c), load<V>(c + lanes), load<V>(c + 2 * lanes),
-                  load<V>(c + 3 * lanes), load<V>(c + 4 * lanes), [&](auto&& force) {
-                    f = sign * force(sign * (x - other_x), sign * (v - other_v));
-                  });
+                  load<V>(c + 3 * lanes), load<V>(c + 4 * lanes),
+                  [&](auto&& force) { f = sign * force(sign * (x - at.x), sign * (v - at.v)); });
       f = select(sign == V{}, V{}, f);
       store<V>(signal, f);
       own += f;
@@ -247,12 +260,10 @@ T read_output(const View<T>& s, const T* value, const OutputSlot& output) {
     return state.x[slot];
   }
   T force = state.force[slot];
-  const std::uint32_t* const list = state.list + slot / lanes;
-  for (std::uint32_t i = list[0]; i < list[1]; i += lanes) {
-    force += state.signals[state.looked_up[i + slot % lanes]];
-  }
-  for (std::size_t field = 0; field < s.sparse.fields.size(); ++field) {
-    force -= state.degree[field * state.slots + slot] * state.signals[field * state.slots + slot];
+  const std::uint32_t* const list = state.lists + slot / lanes * 2;
+  for (std::uint32_t i = list[0]; i < list[2]; i += lanes) {
+    const T own = i < list[1] ? state.signals[slot] : T(0);
+    force += state.signals[state.looked_up[i + slot % lanes]] - own;
   }
   for (std::size_t i = 0; i < s.program.inputs.size(); ++i) {
     if (s.program.inputs[i].is_force && s.program.inputs[i].node == output.node) {
@@ -271,6 +282,7 @@ void step(const Program& program, const Sparse& sparse, SparseState<T>& state,
   const T* audio = block.audio;
   T* outputs = block.outputs;
   const std::size_t inputs = program.inputs.size();
+  const bool has_springs = sparse.springs != Sparse::none;
   for (std::uint32_t c = 0; c < program.coefficients.size(); ++c) {
     hold(s, c);
   }
@@ -290,14 +302,16 @@ void step(const Program& program, const Sparse& sparse, SparseState<T>& state,
         state.force[state.slot[program.inputs[i].node]] += value[i];
       }
     }
-    state.is_pulled ? move_masses<true>(s) : move_masses<false>(s);
+    has_springs ? move_masses<true>(s) : move_masses<false>(s);
     for (std::size_t i = 0; i < inputs; ++i) {
       if (!program.inputs[i].is_force) {
         state.x[state.slot[program.inputs[i].node]] = value[i];
         state.v[state.slot[program.inputs[i].node]] = velocity[i];
       }
     }
-    lay_fields(s);
+    if (has_springs) {
+      lay_springs(s);
+    }
     if (state.law_count > 0) {
       lay_pairs(s);
       pull_all_links(s);
