@@ -16,9 +16,8 @@ enum class Method { direct, chains, dense, modal, grid, chorus, sparse };
 
 // The modal form last: it is only sought where it may beat all others.
 inline constexpr Method all_methods[] = {Method::direct, Method::chains, Method::dense,
-                                         Method::grid,   Method::chorus, Method::modal};
-                                         Method::modal,  Method::grid,   Method::chorus,
-                                         Method::sparse};
+                                         Method::grid,   Method::chorus, Method::sparse,
+                                         Method::modal};
 
 std::string_view method_name(Method method);
 
