@@ -239,6 +239,8 @@ void add_render(CLI::App& app, RenderChoice& choice, int& code) {
   add_motion(*command, options.third);
   command->add_option("-p,--voices", options.voices, "how many notes sound at once")
       ->check(within(1, max_voices));
+  command->add_option("--threads", options.threads, "for large networks; without it, all cores")
+      ->check(within(1, 1024));
   command->add_flag("--limit", options.limit, "keep below full scale, 1 ms late");
   command->add_flag("-q,--quiet", choice.is_quiet, "say nothing unless something is wrong");
   command->callback([&choice, seconds, frames, &code] {

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "app/crew.h"
 #include "app/process.h"
 #include "core/compile/compile.h"
 #include "core/model/expression.h"
@@ -102,13 +103,15 @@ Result<Rendered> render(const RenderOptions& options, const std::function<bool(d
     return scene.error();
   }
   const bool is_bare = !scene->has_preset;
+  ThreadCrew crew(options.threads > 0 ? static_cast<std::size_t>(options.threads) : core_count());
   auto compiled = compile(scene->network, scene->preset,
                           {.rate_hz = options.rate_hz,
                            .rescale = options.rescale,
                            .bare = is_bare,
                            .voices = options.voices,
                            .precision = options.precision,
-                           .method = options.method});
+                           .method = options.method,
+                           .crew = &crew});
   if (!compiled) {
     const Error& error = compiled.error();
     return Error{scene->path + ":" + std::to_string(error.line) + ":" +

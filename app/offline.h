@@ -30,6 +30,7 @@ struct RenderOptions {
   std::optional<ThirdArgument> third;  // whatever the model shows
   bool limit = false;
   int voices = 0;
+  int threads = 0;  // for large networks; 0: as many as the machine runs at once
 };
 
 struct Rendered {

@@ -294,6 +294,9 @@ Result<Compiled> compile(const Network& network, const Preset& preset,
                              .voices = playing.voices},
                             options.bare && !options.method ? Method::direct : options.method,
                             options.most_modes);
+                             .voices = playing.voices,
+                             .crew = options.crew},
+                            options.bare && !options.method ? Method::direct : options.method);
   if (options.find_gain) {
     playing.gain *= comfortable_gain(machine, playing, options);
   }

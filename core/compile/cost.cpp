@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/engine/sharded.h"
+
 namespace ressort {
 namespace {
 
@@ -151,6 +153,8 @@ class Predictor {
     return load_.voices * sum;
   }
 
+  double operator()(const Shards& form) const { return sharded_ns(form, load_); }
+
  private:
   double heard_and_pushed(double each) const {
     return each * static_cast<double>(program_.inputs.size() + program_.outputs.size());
@@ -162,6 +166,19 @@ class Predictor {
 };
 
 }  // namespace
+
+double exchange_ns(std::size_t copies) {
+  return 3000.0 + 7.0 * static_cast<double>(copies);
+}
+
+double sharded_ns(const Shards& form, const Load& load) {
+  double slowest = 0.0;
+  for (const Shard& shard : *form.shards) {
+    slowest = std::max(slowest, predicted_ns(shard.program, load) +
+                                    exchange_ns(shard.copies.size()) / form.frames);
+  }
+  return slowest;
+}
 
 double predicted_ns(const Program& program, const Load& load) {
   return std::visit(Predictor(program, load), program.form);

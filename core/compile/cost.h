@@ -11,12 +11,19 @@ struct Load {
   bool is_double = true;
   Isa isa = Isa::base;
   int voices = 1;
+  Crew* crew = nullptr;  // that large parts may be shared out to; null: one core for all
 };
+
+// Nanoseconds that shards wait for each other once, and one of them for its copies.
+double exchange_ns(std::size_t copies);
 
 // Nanoseconds a sample for all voices in the form that the Program has, everything that can touch
 // touching all the time: what a block's budget has to hold. Fitted to measurements on one machine
 // (Zen 4 at 3.7 GHz), to about a quarter; what matters is the order of the forms.
 double predicted_ns(const Program& program, const Load& load);
+
+// The same of the slowest shard, and what it waits.
+double sharded_ns(const Shards& form, const Load& load);
 
 // The same for the modal form before it is known: what it will cost at least.
 double least_modal_ns(const Program& program, const Load& load);

@@ -9,6 +9,7 @@
 #include "core/compile/grid_form.h"
 #include "core/compile/modal_form.h"
 #include "core/compile/sparse_form.h"
+#include "core/compile/shards.h"
 
 namespace ressort {
 namespace {
@@ -70,6 +71,10 @@ struct Describer {
   }
   std::string operator()(const Sparse&) const {
     return "masses in vectors by how many links they have, neighbours looked up";
+  }
+  std::string operator()(const Shards& form) const {
+    return "in " + std::to_string(form.shards->size()) + " shards at once, which meet every " +
+           count_of(form.frames, "sample", "samples");
   }
   std::string operator()(const Grid& form) const {
     return std::string(form.segments.empty() ? "forces" : "rows that are alike") +
@@ -200,6 +205,11 @@ Plan make_plan(Machine& machine, const Load& load, std::optional<Method> method,
   for (Program& program : machine.parts) {
     Chooser chooser(program, load, most_modes);
     Part part = method ? chooser.obey(*method) : chooser.choose();
+    if (auto shards = share_out(program, load)) {
+      program.form = *std::move(shards);
+      part.predicted_ns = predicted_ns(program, load);
+      part.reason += ", " + Describer{program}(std::get<Shards>(program.form));
+    }
     if (part.masses > 0) {
       plan.parts.push_back(std::move(part));
     }

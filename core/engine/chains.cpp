@@ -305,6 +305,26 @@ bool ChainsKernel<T>::save(std::size_t, double* x, double* v) const {
 }
 
 template <class T>
+bool ChainsKernel<T>::read(std::span<const std::uint32_t> nodes, T* x, T* v) const {
+  for (const std::uint32_t node : nodes) {
+    *x++ = bodies_[place_[node]];
+    *v++ = bodies_[place_[node] + lanes_];
+  }
+  return true;
+}
+
+template <class T>
+bool ChainsKernel<T>::mend(std::span<const std::uint32_t> nodes, const T* x, const T* v) {
+  for (const std::uint32_t node : nodes) {
+    bodies_[place_[node]] = *x++;
+    bodies_[place_[node] + lanes_] = *v++;
+  }
+  std::fill(force_.begin(), force_.end(), T(0));
+  this->step({});
+  return true;
+}
+
+template <class T>
 void ChainsKernel<T>::play(const Block<T>& block) {
   ChainsState<T> state{.ramps = ramps_of(this->coefficients),
                        .masks = masks_.data(),

@@ -137,6 +137,8 @@ class ChainsKernel final : public Kernel<T> {
   ChainsKernel(const Program& program, Isa isa);
   void place(std::size_t lane, const double* x, const double* v) override;
   bool save(std::size_t lane, double* x, double* v) const override;
+  bool read(std::span<const std::uint32_t> nodes, T* x, T* v) const override;
+  bool mend(std::span<const std::uint32_t> nodes, const T* x, const T* v) override;
   bool is_near_start(std::size_t lane, double bound) const override;
 
  private:

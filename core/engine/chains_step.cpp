@@ -72,6 +72,13 @@ struct View {
   const T* coefficient;
 };
 
+// The same after nodes were mended: of its own type, so that what is called for
+// every sample remains the only one of its kind and is put in its place.
+template <class T, std::size_t Bytes>
+struct Mended : View<T, Bytes> {
+  using View<T, Bytes>::View;
+};
+
 // The same number in every lane. Not V{} + x, which is not x if x is -0.
 template <class V>
 V all(Scalar<V> x) {
@@ -410,6 +417,19 @@ void pull_taps(S& s) {
   }
 }
 
+// What acts in the next sample.
+template <class S>
+void pull(S& s) {
+  step_links(s);
+  pull_taps(s);
+  auto* held = s.held;
+  for (const FoldedChain& chain : s.chains) {
+    for (const std::uint32_t c : chain.springs) {
+      *held++ = s.coefficient[c];
+    }
+  }
+}
+
 template <class S, class T>
 T force_at(const Program& program, const ChainsTables& tables, const S& s, const T* value,
            const HeardForce& output) {
@@ -443,6 +463,10 @@ void step(const Program& program, const ChainsTables& tables, ChainsState<T>& st
   const std::size_t inputs = program.inputs.size();
   const std::size_t output_count = program.outputs.size();
   const std::size_t frames = block.frames;
+  if (frames == 0) {
+    Mended<T, Bytes> mended(tables, state);
+    pull(mended);
+  }
   for (std::size_t frame = 0; frame < frames; ++frame) {
     advance(ramps);
     for (const std::uint32_t c : audio_coefficients) {
@@ -463,14 +487,7 @@ void step(const Program& program, const ChainsTables& tables, ChainsState<T>& st
     for (const std::uint32_t i : s.listened) {
       s.force[i] = 0;
     }
-    step_links(s);
-    pull_taps(s);
-    T* held = s.held;
-    for (const FoldedChain& chain : s.chains) {
-      for (const std::uint32_t c : chain.springs) {
-        *held++ = s.coefficient[c];
-      }
-    }
+    pull(s);
     for (const HeardPosition& output : s.heard_positions) {
       outputs[output.index] = s.bodies[output.place];
     }

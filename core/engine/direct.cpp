@@ -1,5 +1,6 @@
 #include "core/engine/direct.h"
 
+#include <algorithm>
 #include <cmath>
 
 namespace ressort {
@@ -49,6 +50,28 @@ bool DirectKernel<T>::save(std::size_t lane, double* x, double* v) const {
     x[node] = static_cast<double>(x_[at]);
     v[node] = static_cast<double>(v_[at]);
   }
+  return true;
+}
+
+template <class T>
+bool DirectKernel<T>::read(std::span<const std::uint32_t> nodes, T* x, T* v) const {
+  const std::size_t width = this->width();
+  for (const std::uint32_t node : nodes) {
+    x = std::copy_n(x_.data() + node * width, width, x);
+    v = std::copy_n(v_.data() + node * width, width, v);
+  }
+  return true;
+}
+
+template <class T>
+bool DirectKernel<T>::mend(std::span<const std::uint32_t> nodes, const T* x, const T* v) {
+  const std::size_t width = this->width();
+  for (std::size_t i = 0; i < nodes.size(); ++i) {
+    std::copy_n(x + i * width, width, x_.data() + nodes[i] * width);
+    std::copy_n(v + i * width, width, v_.data() + nodes[i] * width);
+  }
+  std::fill(force_.begin(), force_.end(), T(0));
+  this->step({});
   return true;
 }
 

@@ -25,6 +25,13 @@ struct View {
   const V* coefficient;
 };
 
+// The same after nodes were mended: of its own type, so that what is called for
+// every sample remains the only one of its kind and is put in its place.
+template <class T, std::size_t Bytes>
+struct Mended : View<T, Bytes> {
+  using View<T, Bytes>::View;
+};
+
 // The loop over one run's masses; `pull` is what acts on one besides its links.
 template <class S, class Pull>
 void move_masses(const MassRun& run, S& s, Pull&& pull) {
@@ -180,6 +187,13 @@ typename S::V share(const Program& program, const S& s, std::uint32_t from, std:
   return sum;
 }
 
+// What acts in the next sample.
+template <class S>
+void pull(const Program& program, S& s) {
+  step_links(program, s);
+  spread_taps(program, s);
+}
+
 template <class S>
 typename S::V read_output(const Program& program, const S& s, const typename S::V* value,
                           const OutputSlot& output) {
@@ -206,6 +220,10 @@ void step(const Program& program, DirectState<T>& state, const Block<T>& block) 
   auto* coefficient = reinterpret_cast<V*>(state.ramps.value);
   auto* outputs = reinterpret_cast<V*>(block.outputs);
   const std::size_t inputs = program.inputs.size();
+  if (block.frames == 0) {
+    Mended<T, Bytes> mended(state);
+    pull(program, mended);
+  }
   for (std::size_t frame = 0; frame < block.frames; ++frame) {
     advance(state.ramps);
     for (const std::uint32_t c : program.audio_coefficients) {
@@ -228,8 +246,7 @@ void step(const Program& program, DirectState<T>& state, const Block<T>& block) 
       }
     }
     move_taps(program, s);
-    step_links(program, s);
-    spread_taps(program, s);
+    pull(program, s);
     for (const OutputSlot& output : program.outputs) {
       *outputs++ = read_output(program, s, value, output);
     }

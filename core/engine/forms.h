@@ -4,6 +4,7 @@
 
 #include <array>
 #include <cstdint>
+#include <memory>
 #include <variant>
 #include <vector>
 
@@ -236,5 +237,14 @@ struct Sparse {
 };
 
 using Form = std::variant<Direct, Chains, Dense, Modes, Grid, Chorus, Sparse>;
+// A large network on several cores: shards of it (sharded.h), each in a form of its own, stepped by
+// a crew at the same time.
+struct Shard;
+class Crew;
+struct Shards {
+  std::shared_ptr<const std::vector<Shard>> shards;
+  Crew* crew = nullptr;      // outlives the kernels
+  std::uint32_t frames = 1;  // samples that they go on without each other
+using Form = std::variant<Direct, Chains, Dense, Modes, Grid, Chorus, Shards>;
 
 }  // namespace ressort

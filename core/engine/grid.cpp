@@ -113,6 +113,42 @@ bool GridKernel<T>::save(std::size_t, double* x, double* v) const {
 }
 
 template <class T>
+bool GridKernel<T>::read(std::span<const std::uint32_t> nodes, T* x, T* v) const {
+  for (const std::uint32_t node : nodes) {
+    const std::size_t slot = grid_.slot[node];
+    *x++ = slot < grid_.slots ? x_[slot] : T(0);
+    *v++ = slot < grid_.slots ? v_[slot] : T(0);
+  }
+  return true;
+}
+
+template <class T>
+bool GridKernel<T>::mend(std::span<const std::uint32_t> nodes, const T* x, const T* v) {
+  const bool is_sum = !grid_.segments.empty();
+  const auto coefficient = [&](std::size_t i) {
+    return is_sum ? this->coefficients.value[program_.link_runs[grid_.spring_run].coefficients[i]]
+                  : T(0);
+  };
+  const T stiffness = coefficient(0);
+  const T damping = coefficient(1);
+  for (const std::uint32_t node : nodes) {
+    const T here = *x++;
+    const T speed = *v++;
+    if (const std::size_t slot = grid_.slot[node]; slot < grid_.slots) {
+      x_[slot] = here;
+      v_[slot] = speed;
+      if (is_sum && slot - grid_.first < grid_.count) {
+        y_[slot + (is_forward_ ? shift_ : 0)] = stiffness * here + damping * speed;
+      }
+    }
+  }
+  std::fill(force_.begin(), force_.end(), T(0));
+  pushes_ = 0;
+  this->step({});
+  return true;
+}
+
+template <class T>
 void GridKernel<T>::play(const Block<T>& block) {
   GridState<T> state{.ramps = ramps_of(this->coefficients),
                      .x = x_.data(),

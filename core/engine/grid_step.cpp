@@ -213,6 +213,18 @@ void move_packs(const View<T>& s, const Mover<T>& mover, std::size_t begin, std:
   }
 }
 
+// The links of the grid will be computed in the next sample, with the coefficients of this one.
+template <class T>
+void hold(const View<T>& s) {
+  T* held = s.state.held;
+  for (const GridLinks& links : s.grid.links) {
+    for (const std::uint32_t c : s.program.link_runs[links.run].coefficients) {
+      *held++ = s.state.ramps.value[c];
+    }
+  }
+  s.state.is_fresh = false;
+}
+
 // Links as of the last sample, and the masses moved by them, some packs at a time: far enough
 // apart that no force is read while it is still on its way to memory.
 template <class T>
@@ -229,13 +241,7 @@ void step_links(const View<T>& s, const Mover<T>& mover, bool is_pulled) {
                 : move_packs<n, false>(s, mover, begin, end);
     });
   }
-  T* held = s.state.held;
-  for (const GridLinks& links : s.grid.links) {
-    for (const std::uint32_t c : s.program.link_runs[links.run].coefficients) {
-      *held++ = s.state.ramps.value[c];
-    }
-  }
-  s.state.is_fresh = false;
+  hold(s);
 }
 
 // Masses outside the grid; their links are in `force`.
@@ -343,6 +349,14 @@ template <class T>
   }
 }
 
+// What acts in the next sample, except what the segments and the links of the grid do by
+// themselves.
+template <class T>
+void pull(const View<T>& s) {
+  step_rest(s);
+  spread_taps(s);
+}
+
 template <class T>
 void step(const Program& program, const Grid& grid, GridState<T>& state, const Block<T>& block) {
   const View<T> s{program, grid, state};
@@ -352,6 +366,10 @@ void step(const Program& program, const Grid& grid, GridState<T>& state, const B
   const T* audio = block.audio;
   T* outputs = block.outputs;
   const std::size_t inputs = program.inputs.size();
+  if (block.frames == 0) {
+    hold(s);
+    pull(s);
+  }
   for (std::size_t frame = 0; frame < block.frames; ++frame) {
     advance(state.ramps);
     for (const std::uint32_t c : program.audio_coefficients) {
@@ -376,8 +394,7 @@ void step(const Program& program, const Grid& grid, GridState<T>& state, const B
       }
     }
     move_taps(s);
-    step_rest(s);
-    spread_taps(s);
+    pull(s);
     for (const OutputSlot& output : program.outputs) {
       *outputs++ = state.x[grid.slot[output.node]];
     }

@@ -9,6 +9,7 @@
 #include "core/engine/grid.h"
 #include "core/engine/modal.h"
 #include "core/engine/sparse.h"
+#include "core/engine/sharded.h"
 
 namespace ressort {
 
@@ -77,6 +78,16 @@ void Coefficients<T>::finish(std::size_t frames) {
 }
 
 template <class T>
+bool Kernel<T>::read(std::span<const std::uint32_t>, T*, T*) const {
+  return false;
+}
+
+template <class T>
+bool Kernel<T>::mend(std::span<const std::uint32_t>, const T*, const T*) {
+  return false;
+}
+
+template <class T>
 std::unique_ptr<Kernel<T>> make_kernel(const Program& program, std::size_t voices, Isa isa) {
   struct Maker {
     const Program& program;
@@ -102,6 +113,8 @@ std::unique_ptr<Kernel<T>> make_kernel(const Program& program, std::size_t voice
     }
     std::unique_ptr<Kernel<T>> operator()(const Sparse& sparse) const {
       return std::make_unique<SparseKernel<T>>(program, sparse, isa);
+    std::unique_ptr<Kernel<T>> operator()(const Shards& shards) const {
+      return std::make_unique<ShardedKernel<T>>(program, shards, voices, isa);
     }
   };
   return std::visit(Maker{program, voices, isa}, program.form);
@@ -109,6 +122,8 @@ std::unique_ptr<Kernel<T>> make_kernel(const Program& program, std::size_t voice
 
 template class Coefficients<float>;
 template class Coefficients<double>;
+template class Kernel<float>;
+template class Kernel<double>;
 template std::unique_ptr<Kernel<float>> make_kernel(const Program&, std::size_t, Isa);
 template std::unique_ptr<Kernel<double>> make_kernel(const Program&, std::size_t, Isa);
 

@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <memory>
+#include <span>
 #include <vector>
 
 #include "core/engine/isa.h"
@@ -14,7 +15,8 @@ namespace ressort {
 
 inline constexpr std::size_t max_block_frames = 64;
 
-// What a kernel is driven by and what it fills, for at most max_block_frames samples.
+// What a kernel is driven by and what it fills, for at most max_block_frames samples. To a kernel's
+// loops a block of none says that nodes were mended.
 template <class T>
 struct Block {
   std::size_t frames = 0;
@@ -100,6 +102,12 @@ class Kernel {
   // Where every node is after the last sample, and how fast; false where the kernel does not know
   // of all. [audio]
   virtual bool save(std::size_t lane, double* x, double* v) const = 0;
+  // The same of some nodes, [i][lane], as the numbers that they are. [audio]
+  virtual bool read(std::span<const std::uint32_t> nodes, T* x, T* v) const;
+  // Moves some nodes between two blocks. In the next sample links pull as if these had come to be
+  // there by themselves; nothing else is touched, not even the last bit. False where the kernel
+  // knows of no single nodes. [audio]
+  virtual bool mend(std::span<const std::uint32_t> nodes, const T* x, const T* v);
   // Plays the block by the published scheme, v += F/M, x += v: masses, then position inputs, then
   // links; the outputs are the new positions. Forces given act in their own sample. [audio]
   void step(const Block<T>& block) {

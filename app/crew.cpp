@@ -1,0 +1,43 @@
+#include "app/crew.h"
+
+#include <algorithm>
+
+#include "app/denormals.h"
+
+namespace ressort {
+
+ThreadCrew::ThreadCrew(std::size_t count)
+    : start_(static_cast<std::ptrdiff_t>(count)), finish_(static_cast<std::ptrdiff_t>(count)) {
+  for (std::size_t i = 1; i < count; ++i) {
+    threads_.emplace_back([this, i] { serve(i); });
+  }
+}
+
+ThreadCrew::~ThreadCrew() {
+  work_ = nullptr;
+  start_.arrive_and_wait();
+}
+
+void ThreadCrew::run(std::size_t count, const std::function<void(std::size_t)>& work) {
+  work_ = &work;
+  count_ = count;
+  start_.arrive_and_wait();
+  work(0);
+  finish_.arrive_and_wait();
+}
+
+void ThreadCrew::serve(std::size_t i) {
+  const DenormalsFlushed flushed;
+  for (start_.arrive_and_wait(); work_ != nullptr; start_.arrive_and_wait()) {
+    if (i < count_) {
+      (*work_)(i);
+    }
+    finish_.arrive_and_wait();
+  }
+}
+
+std::size_t core_count() {
+  return std::max(1u, std::thread::hardware_concurrency());
+}
+
+}  // namespace ressort

@@ -1,0 +1,20 @@
+// core/compile: divides a large Program among several cores.
+#pragma once
+
+#include <optional>
+
+#include "core/compile/cost.h"
+#include "core/engine/sharded.h"
+
+namespace ressort {
+
+// As many shards, each with what is within a little more than `frames` links of its own, in the
+// direct form; nothing where a point wanders over a macro, as it may be anywhere. O(nodes + links).
+std::vector<Shard> make_shards(const Program& program, std::size_t count, std::uint32_t frames);
+
+// Shards in the Program's own form for load.crew, if they are predicted to pay: of direct, chains
+// or grid, where a sample takes several microseconds. O(nodes + links), and what the form takes.
+// [any thread but audio]
+std::optional<Shards> share_out(const Program& program, const Load& load);
+
+}  // namespace ressort
