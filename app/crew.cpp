@@ -6,8 +6,7 @@
 
 namespace ressort {
 
-ThreadCrew::ThreadCrew(std::size_t count)
-    : start_(static_cast<std::ptrdiff_t>(count)), finish_(static_cast<std::ptrdiff_t>(count)) {
+ThreadCrew::ThreadCrew(std::size_t count) : start_(count), finish_(count) {
   for (std::size_t i = 1; i < count; ++i) {
     threads_.emplace_back([this, i] { serve(i); });
   }
@@ -15,24 +14,24 @@ ThreadCrew::ThreadCrew(std::size_t count)
 
 ThreadCrew::~ThreadCrew() {
   work_ = nullptr;
-  start_.arrive_and_wait();
+  start_.wait();
 }
 
 void ThreadCrew::run(std::size_t count, const std::function<void(std::size_t)>& work) {
   work_ = &work;
   count_ = count;
-  start_.arrive_and_wait();
+  start_.wait();
   work(0);
-  finish_.arrive_and_wait();
+  finish_.wait();
 }
 
 void ThreadCrew::serve(std::size_t i) {
   const DenormalsFlushed flushed;
-  for (start_.arrive_and_wait(); work_ != nullptr; start_.arrive_and_wait()) {
+  for (start_.wait(); work_ != nullptr; start_.wait()) {
     if (i < count_) {
       (*work_)(i);
     }
-    finish_.arrive_and_wait();
+    finish_.wait();
   }
 }
 

@@ -1,10 +1,10 @@
 // app: threads that step the shards of large networks, where time does not matter: rendering.
 #pragma once
 
-#include <barrier>
 #include <thread>
 #include <vector>
 
+#include "app/lockfree.h"
 #include "core/engine/sharded.h"
 
 namespace ressort {
@@ -20,8 +20,8 @@ class ThreadCrew final : public Crew {
  private:
   void serve(std::size_t i);
 
-  std::barrier<> start_;
-  std::barrier<> finish_;
+  Meeting start_;
+  Meeting finish_;
   const std::function<void(std::size_t)>* work_ = nullptr;  // null: the crew goes home
   std::size_t count_ = 0;
   std::vector<std::jthread> threads_;

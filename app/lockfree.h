@@ -96,6 +96,35 @@ class Flag {
   std::atomic<bool> raised_{false};
 };
 
+// Where several threads wait for each other, again and again.
+class Meeting {
+ public:
+  explicit Meeting(std::size_t threads) : threads_(threads) {}
+  // Returns when all of them have come. What takes about as long as a block of samples is waited
+  // for awake, as waking up takes about as long, too; what takes longer asleep.
+  void wait() {
+    const std::uint32_t before = held_.load(std::memory_order_acquire);
+    if (here_.fetch_add(1, std::memory_order_acq_rel) + 1 == threads_) {
+      here_.store(0, std::memory_order_relaxed);
+      held_.fetch_add(1, std::memory_order_release);
+      held_.notify_all();
+      return;
+    }
+    for (int i = 0; i < looks; ++i) {
+      if (held_.load(std::memory_order_acquire) != before) {
+        return;
+      }
+    }
+    held_.wait(before, std::memory_order_acquire);
+  }
+
+ private:
+  static constexpr int looks = 20'000;  // some ten microseconds
+  const std::size_t threads_;
+  std::atomic<std::size_t> here_{0};
+  std::atomic<std::uint32_t> held_{0};  // so many times
+};
+
 // A pointer that one thread publishes and the audio thread reads; what it points to outlives both.
 template <class T>
 class Published {

@@ -449,6 +449,13 @@ T force_at(const Program& program, const ChainsTables& tables, const S& s, const
   return force / static_cast<T>(program.rate_ratio * program.rate_ratio);
 }
 
+// Not inlined, as it costs step() registers.
+template <class T, std::size_t Bytes>
+[[gnu::noinline]] void mend(const ChainsTables& tables, ChainsState<T>& state) {
+  Mended<T, Bytes> s(tables, state);
+  pull(s);
+}
+
 template <class T, std::size_t Bytes>
 void step(const Program& program, const ChainsTables& tables, ChainsState<T>& state,
           const Block<T>& block) {
@@ -464,8 +471,7 @@ void step(const Program& program, const ChainsTables& tables, ChainsState<T>& st
   const std::size_t output_count = program.outputs.size();
   const std::size_t frames = block.frames;
   if (frames == 0) {
-    Mended<T, Bytes> mended(tables, state);
-    pull(mended);
+    return mend<T, Bytes>(tables, state);
   }
   for (std::size_t frame = 0; frame < frames; ++frame) {
     advance(ramps);
