@@ -1,7 +1,6 @@
 #include "core/compile/shards.h"
 
 #include <algorithm>
-#include <array>
 #include <numeric>
 
 #include "core/compile/chains_form.h"
@@ -12,10 +11,12 @@ namespace ressort {
 namespace {
 
 constexpr std::uint32_t none = 0xffffffffu;
-constexpr std::uint32_t spare_levels = 2;  // forces are heard one link from where they come; points
+// So many links farther than samples: the last sample's forces are heard, too, and those at a point
+// are those at the nodes around it, of which the shard owns one.
+constexpr std::uint32_t spare_levels = 2;
 constexpr std::uint32_t most_levels = max_block_frames + spare_levels;
-constexpr double least_shared_ns = 300.0;
-constexpr double least_gain = 1.2;  // below, a core is better left to somebody else
+constexpr double least_shared_ns = 700.0;  // below, shards would wait more than compute
+constexpr double least_gain = 1.2;         // below, a core is better left to somebody else
 
 // The nodes around every point, in single precision or in double; nothing where one may wander.
 std::optional<std::vector<std::vector<std::uint32_t>>> corners_of(const Program& program) {
@@ -100,21 +101,23 @@ class Divider {
     const std::size_t count = division.at_level.size();
     std::vector<Shard> shards(count);
     std::vector<std::uint32_t> place(binds_.size(), none);  // [node] in its owner's `given`
-    std::vector<std::vector<std::uint32_t>> local(count);
     for (std::uint32_t s = 0; s < count; ++s) {
-      make_program(division.owner, s, frames, shards[s], local[s]);
+      make_program(division.owner, s, frames, shards[s]);
     }
     for (std::uint32_t s = 0; s < count; ++s) {
-      for (const std::uint32_t node : shards[s].nodes) {
+      for (std::uint32_t i = 0; i < shards[s].nodes.size(); ++i) {
+        const std::uint32_t node = shards[s].nodes[i];
         const std::uint32_t owner = division.owner[node];
         if (owner == s || owner == none) {
           continue;
         }
         if (place[node] == none) {
           place[node] = static_cast<std::uint32_t>(shards[owner].given.size());
-          shards[owner].given.push_back(local[owner][node]);
+          const auto& nodes = shards[owner].nodes;
+          const auto there = std::lower_bound(nodes.begin(), nodes.end(), node);
+          shards[owner].given.push_back(static_cast<std::uint32_t>(there - nodes.begin()));
         }
-        shards[s].copies.push_back(local[s][node]);
+        shards[s].copies.push_back(i);
         auto& sources = shards[s].sources;
         if (sources.empty() || sources.back().shard != owner ||
             sources.back().first + sources.back().count != place[node]) {
@@ -276,7 +279,7 @@ class Divider {
   }
 
   void make_program(const std::vector<std::uint32_t>& owner, std::uint32_t s, std::uint32_t frames,
-                    Shard& shard, std::vector<std::uint32_t>& local) const {
+                    Shard& shard) const {
     const std::vector<bool> is_here = nodes_of(owner, s, frames);
     Program& program = shard.program;
     program.rate_hz = program_.rate_hz;
@@ -287,7 +290,7 @@ class Divider {
     program.steps = program_.steps;
     program.coefficients = program_.coefficients;
     program.depending = program_.depending;
-    local.assign(is_here.size(), none);
+    std::vector<std::uint32_t> local(is_here.size(), none);
     for (std::uint32_t node = 0; node < is_here.size(); ++node) {
       if (is_here[node]) {
         local[node] = static_cast<std::uint32_t>(shard.nodes.size());

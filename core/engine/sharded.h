@@ -31,7 +31,7 @@ struct ShardSource {
 // that it touches; of an input or output each shard has its own row, where it has any.
 struct Shard {
   Program program;
-  std::vector<std::uint32_t> nodes;    // [node] of the whole
+  std::vector<std::uint32_t> nodes;    // [node] of the whole, ascending
   std::vector<std::uint32_t> inputs;   // [input] of the whole
   std::vector<std::uint32_t> outputs;  // [output] of the whole
   std::vector<std::uint32_t> given;    // own nodes that others have copies of
@@ -56,7 +56,7 @@ class ShardedKernel final : public Kernel<T> {
     Aligned<T> value, velocity, outputs;
     Aligned<T> given_x, given_v;
     Aligned<T> copied_x, copied_v;
-    std::vector<double> x, v;  // [node] of one lane
+    std::vector<double> x, v;  // [node] of one lane, for place() and save()
   };
 
   ShardedKernel(const Program& program, const Shards& form, Kernels kernels);
