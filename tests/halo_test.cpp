@@ -133,7 +133,7 @@ TEST_CASE("points on macros and what has no order are divided too", "[halo]") {
   ThreadCrew crew(3);
   const std::string macro =
       "@k param 0.2\n@p closedMesh 45 46 1. k 0.003 0. 0.\n@in1 frcInput [@p 0.49 0.3]\n"
-      "@in2 posInput 0.\n@finger contact [@p 0.503 0.5] @in2 0. 0.01 0.\n"
+      "@in2 posInput 0.\n@finger contact [@p 0.503 0.8] @in2 0. 0.01 0.\n"
       "@out1 posOutput [@p 0.51 0.7]\n@out2 posOutput [@p 0.1 0.1]\n@out3 frcOutput [@p 0.497 "
       "0.51]\n";
   for (const Cut& cut : mesh_cuts) {
