@@ -291,12 +291,10 @@ Result<Compiled> compile(const Network& network, const Preset& preset,
   compiled.plan = make_plan(machine,
                             {.is_double = options.precision == Precision::float64,
                              .isa = options.isa,
-                             .voices = playing.voices},
-                            options.bare && !options.method ? Method::direct : options.method,
-                            options.most_modes);
                              .voices = playing.voices,
                              .crew = options.crew},
-                            options.bare && !options.method ? Method::direct : options.method);
+                            options.bare && !options.method ? Method::direct : options.method,
+                            options.most_modes);
   if (options.find_gain) {
     playing.gain *= comfortable_gain(machine, playing, options);
   }

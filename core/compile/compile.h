@@ -28,9 +28,8 @@ struct CompileOptions {
   std::optional<Method> method;  // instead of the plan's choice, or the bare network's direct form
   Isa isa = best_isa();          // no wider than the machine's
   std::uint32_t most_modes = patient_modes;  // of a part, for the plan
+  Crew* crew = nullptr;    // outlives the engine, which it steps large parts of; null: none
   bool find_gain = false;  // so that a forte note peaks at -6 dBFS, instead of the preset's
-  Crew* crew = nullptr;          // outlives the engine, which it steps large parts of; null: none
-  bool find_gain = false;        // so that a forte note peaks at -6 dBFS, instead of the preset's
 };
 
 // A parameter as people reach it: by name, in its own unit, within its range.

@@ -8,8 +8,8 @@
 #include "core/compile/dense_form.h"
 #include "core/compile/grid_form.h"
 #include "core/compile/modal_form.h"
-#include "core/compile/sparse_form.h"
 #include "core/compile/shards.h"
+#include "core/compile/sparse_form.h"
 
 namespace ressort {
 namespace {

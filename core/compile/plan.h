@@ -43,14 +43,11 @@ struct Plan {
 };
 
 // Gives every part of the machine the form that the cost model says is the cheapest at its worst,
-// or the one of `method` where a part has it. O(elements), and the eigenvectors of a part of up to
-// `most_modes` masses for which the modal form may pay. [any thread but audio]
+// or the one of `method` where a part has it; divided among load.crew where that pays. O(elements),
+// and the eigenvectors of a part of up to `most_modes` masses for which the modal form may pay.
+// [any thread but audio]
 Plan make_plan(Machine& machine, const Load& load, std::optional<Method> method = {},
                std::uint32_t most_modes = patient_modes);
-// or the one of `method` where a part has it; divided among load.crew where that pays. O(elements),
-// and the eigenvectors of a part for which the modal form may pay: a tenth of a second for 600
-// masses. [any thread but audio]
-Plan make_plan(Machine& machine, const Load& load, std::optional<Method> method = {});
 
 // One line a part.
 std::string describe(const Plan& plan);

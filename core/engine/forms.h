@@ -236,7 +236,6 @@ struct Sparse {
   std::vector<std::vector<SparseLink>> rest;  // [law that occurs] all others, each of one law
 };
 
-using Form = std::variant<Direct, Chains, Dense, Modes, Grid, Chorus, Sparse>;
 // A large network on several cores: shards of it (sharded.h), each in a form of its own, stepped by
 // a crew at the same time.
 struct Shard;
@@ -245,6 +244,8 @@ struct Shards {
   std::shared_ptr<const std::vector<Shard>> shards;
   Crew* crew = nullptr;      // outlives the kernels
   std::uint32_t frames = 1;  // samples that they go on without each other
-using Form = std::variant<Direct, Chains, Dense, Modes, Grid, Chorus, Shards>;
+};
+
+using Form = std::variant<Direct, Chains, Dense, Modes, Grid, Chorus, Sparse, Shards>;
 
 }  // namespace ressort

@@ -8,8 +8,8 @@
 #include "core/engine/direct.h"
 #include "core/engine/grid.h"
 #include "core/engine/modal.h"
-#include "core/engine/sparse.h"
 #include "core/engine/sharded.h"
+#include "core/engine/sparse.h"
 
 namespace ressort {
 
@@ -113,6 +113,7 @@ std::unique_ptr<Kernel<T>> make_kernel(const Program& program, std::size_t voice
     }
     std::unique_ptr<Kernel<T>> operator()(const Sparse& sparse) const {
       return std::make_unique<SparseKernel<T>>(program, sparse, isa);
+    }
     std::unique_ptr<Kernel<T>> operator()(const Shards& shards) const {
       return std::make_unique<ShardedKernel<T>>(program, shards, voices, isa);
     }
