@@ -8,6 +8,7 @@
 #include "core/compile/dense_form.h"
 #include "core/compile/grid_form.h"
 #include "core/compile/modal_form.h"
+#include "core/compile/sparse_form.h"
 #include "tests/agreement.h"
 #include "tests/duel.h"
 #include "tests/random_network.h"
@@ -38,6 +39,7 @@ std::vector<std::pair<Method, Form>> forms_of(const Program& program) {
   add_form(forms, Method::modal, modal_form(program));
   add_form(forms, Method::grid, grid_form(program));
   add_form(forms, Method::chorus, chorus_form(program));
+  add_form(forms, Method::sparse, sparse_form(program));
   return forms;
 }
 
