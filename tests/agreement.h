@@ -8,9 +8,9 @@
 
 namespace ressort::rig {
 
-// Of the peak, in double. Direct forms (direct, chains, grid, chorus, sparse) add up the forces that are
-// written, sample by sample, if in another order. A dense body leaps over whole blocks by a matrix,
-// and modes are another basis.
+// Of the peak, in double. Direct forms (direct, chains, grid, chorus, sparse) add up the forces
+// that are written, sample by sample, if in another order. A dense body leaps over whole blocks by
+// a matrix, and modes are another basis.
 inline double tolerance_of(Method method) {
   return method == Method::dense || method == Method::modal ? 1e-9 : 1e-12;
 }
