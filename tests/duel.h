@@ -204,4 +204,22 @@ std::vector<Comparison> duel(const Program& formed, const DuelOptions& options) 
                  perform<T>(formed, score, options.isa));
 }
 
+// Every output in every instruction set: double within `relative`, float above `db`.
+inline void same_as_direct(const Program& program, DuelOptions options, double relative,
+                           double db) {
+  for (const Isa isa : isas()) {
+    options.isa = isa;
+    INFO(isa_name(isa));
+    for (const Comparison& output : duel<double>(program, options)) {
+      INFO("double is off by " << show(output.relative()));
+      CHECK(output.peak > 0.0);
+      CHECK(output.relative() < relative);
+    }
+    for (const Comparison& output : duel<float>(program, options)) {
+      INFO("float has " << output.snr_db() << " dB");
+      CHECK(output.snr_db() > db);
+    }
+  }
+}
+
 }  // namespace ressort::rig

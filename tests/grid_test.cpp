@@ -11,9 +11,9 @@ namespace {
 
 using rig::Comparison;
 using rig::DuelOptions;
-using rig::isas;
 using rig::program_of;
 using rig::Random;
+using rig::same_as_direct;
 using rig::show;
 
 Program formed(const std::string& text) {
@@ -26,23 +26,6 @@ Program formed(const std::string& text) {
 
 const Grid& grid_of(const Program& program) {
   return std::get<Grid>(program.form);
-}
-
-// Every output in every instruction set: double within `relative`, float above `db`.
-void same_as_direct(const Program& program, DuelOptions options, double relative, double db) {
-  for (const Isa isa : isas()) {
-    options.isa = isa;
-    INFO(isa_name(isa));
-    for (const Comparison& output : rig::duel<double>(program, options)) {
-      INFO("double is off by " << show(output.relative()));
-      CHECK(output.peak > 0.0);
-      CHECK(output.relative() < relative);
-    }
-    for (const Comparison& output : rig::duel<float>(program, options)) {
-      INFO("float has " << output.snr_db() << " dB");
-      CHECK(output.snr_db() > db);
-    }
-  }
 }
 
 // The text's lines with what they declare, in another order; ends exchanged here and there.

@@ -188,8 +188,9 @@ bool draw(const std::filesystem::path& folder, const std::string& machine,
   if (gnuplot == nullptr) {
     return false;
   }
-  const std::string script = picture(folder, machine, rows, "pngcairo size 1600,800", "cost.png") +
-                             picture(folder, machine, rows, "svg size 1600,800", "cost.svg");
+  const std::string script =
+      picture(folder, machine, rows, "pngcairo size 1600,800", "cost.png") +
+      picture(folder, machine, rows, "svg size 1600,800 background \"white\"", "cost.svg");
   std::fputs(script.c_str(), gnuplot);
   return pclose(gnuplot) == 0;
 }
