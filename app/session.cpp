@@ -177,14 +177,27 @@ void Session::improve() {
   if (!compiled) {
     return;
   }
-  measure(compiled->plan, *compiled->engine, work.options, compiled->instrument.voices);
   {
     const std::lock_guard lock(mutex_);
     auto loaded = std::make_shared<Loaded>(*current_);
     loaded->plan = std::move(compiled->plan);
     current_ = std::move(loaded);
   }
-  delete process_.slot.offer(new Sounding{std::move(compiled->engine), serial_});
+  offer(std::move(compiled->engine));
+  time_parts();
+}
+
+void Session::offer(std::unique_ptr<Engine> engine) {
+  offered_ = engine.get();
+  delete process_.slot.offer(new Sounding{std::move(engine), serial_});
+}
+
+// Only the worker destroys engines, and not before another one has been offered.
+void Session::time_parts() {
+  auto timed = std::make_shared<Loaded>(*current());
+  measure(timed->plan, *offered_, options_.compile, timed->instrument.voices);
+  const std::lock_guard lock(mutex_);
+  current_ = std::move(timed);
 }
 
 // What the audio thread has sent: engines to destroy, and news.
@@ -236,6 +249,9 @@ void Session::do_load(const Job& job) {
   } else if (!result && tell_) {
     tell_(result.error().message);
   }
+  if (result) {
+    time_parts();
+  }
 }
 
 Result<std::shared_ptr<const Loaded>> Session::build(const std::string& name) {
@@ -260,7 +276,6 @@ Result<std::shared_ptr<const Loaded>> Session::build(const std::string& name) {
     return Error{scene->path + ":" + std::to_string(error.line) + ":" +
                  std::to_string(error.column) + ": error: " + error.message};
   }
-  measure(compiled->plan, *compiled->engine, options, compiled->instrument.voices);
   const std::chrono::duration<double, std::milli> took = std::chrono::steady_clock::now() - start;
   auto loaded = std::make_shared<Loaded>();
   loaded->serial = ++serial_;
@@ -283,7 +298,7 @@ Result<std::shared_ptr<const Loaded>> Session::build(const std::string& name) {
       values_.push_back(info.value);
     }
   }
-  delete process_.slot.offer(new Sounding{std::move(compiled->engine), loaded->serial});
+  offer(std::move(compiled->engine));
   improvement_.reset();
   if (may_gain(loaded->plan)) {
     options.find_gain = false;

@@ -115,6 +115,9 @@ class Session {
   void do_load(const Job& job);
   Result<std::shared_ptr<const Loaded>> build(const std::string& name);
   void improve();
+  // Hands the engine over; its parts are timed when nobody waits any more.
+  void offer(std::unique_ptr<Engine> engine);
+  void time_parts();
   void listen();
   bool may_tell_reset();
 
@@ -135,6 +138,7 @@ class Session {
 
   std::uint32_t serial_ = 0;                                 // [worker]
   std::string scene_name_;                                   // [worker] what was loaded last
+  const Engine* offered_ = nullptr;                          // [worker] until the next is offered
   std::optional<Improvement> improvement_;                   // [worker] what may still gain
   std::chrono::steady_clock::time_point next_reset_news_{};  // [worker]
   std::thread worker_;                                       // last, so that it ends first

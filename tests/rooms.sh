@@ -140,6 +140,17 @@ if [ "$planted" -ne "$caught" ]; then
   exit 1
 fi
 
+# What stands beside the rooms, in a checkout; elsewhere nobody knows what else is there.
+if git rev-parse --is-inside-work-tree >/dev/null 2>&1; then
+  strangers=$(git ls-files | sed 's|/.*||' | sort -u |
+    grep -vx -e '\..*' -e CMakeLists.txt -e app -e core -e models -e presets -e tests -e README.md ||
+    true)
+  if [ -n "$strangers" ]; then
+    printf 'does not belong to the top level: %s\n' "$strangers"
+    exit 1
+  fi
+fi
+
 looked_at=$(includes | wc -l)
 if [ "$looked_at" -lt 50 ]; then
   echo "rooms.sh: found only $looked_at includes under $(pwd)/core and app"

@@ -94,28 +94,11 @@ bool Engine::Voices::go_on_from(const Voices& from) {
             })) {
           return false;
         }
-        take_controls(from);
+        static_cast<Playback&>(*this) = from;
         go_on(b, *other);
         return true;
       },
       bank);
-}
-
-// Everything but the kernels and what they are driven by.
-void Engine::Voices::take_controls(const Voices& from) {
-  voices = from.voices;
-  hands = from.hands;
-  parameters = from.parameters;
-  changes = from.changes;
-  rest = from.rest;
-  audio_before = from.audio_before;
-  bend = from.bend;
-  pedal = from.pedal;
-  last = from.last;
-  since_settled = from.since_settled;
-  resets = from.resets;
-  stolen = from.stolen;
-  noise = from.noise;
 }
 
 bool Engine::go_on_from(const Engine& from) {

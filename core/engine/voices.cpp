@@ -21,19 +21,18 @@ Engine::Voices::Voices(Machine machine_in, Playing playing_in, Precision precisi
       bank(precision == Precision::float32
                ? decltype(bank)(std::in_place_type<Bank<float>>, machine, lanes_wanted(), isa)
                : decltype(bank)(std::in_place_type<Bank<double>>, machine, lanes_wanted(), isa)),
-      voices(lanes_wanted()),
-      hands(voices.size() * machine.hands.size()),
-      parameters(machine.parameters),
-      rest(machine.hands.size()),
       audio_control(machine.hands.size(), nullptr),
-      audio_before(machine.hands.size()),
       sound(machine.hands.size()),
       pole(playing.bare ? 0.0 : 1.0 - std::min(1.0, smoothing_hz / machine.rate_hz)),
       bow_pole(playing.bare ? 0.0 : std::exp(-1.0 / (bow_start_s * machine.rate_hz))),
       level_kept(
           std::exp(-static_cast<double>(max_block_frames) / (level_memory_s * machine.rate_hz))) {
-  for (std::size_t i = 0; i < rest.size(); ++i) {
-    rest[i] = middle(i);
+  voices.resize(lanes_wanted());
+  hands.resize(voices.size() * machine.hands.size());
+  parameters = machine.parameters;
+  audio_before.resize(machine.hands.size());
+  for (std::size_t i = 0; i < machine.hands.size(); ++i) {
+    rest.push_back(middle(i));
   }
   for (const Control& control : playing.controls) {
     if (control.gesture == Gesture::pluck) {

@@ -35,7 +35,25 @@ struct Voice {
   std::size_t quiet_frames = 0;
 };
 
-struct Engine::Voices {
+// What an engine is in the midst of: all but its kernels and what they are driven by. Another
+// engine of the same model goes on by a copy of it.
+struct Playback {
+  std::vector<Voice> voices;           // [lane]
+  std::vector<Hand> hands;             // [lane][input]
+  std::vector<double> parameters;      // as they are now
+  std::vector<std::uint16_t> changes;  // parameters, since the last take_changes()
+  std::vector<double> rest;            // [input] where a new voice's hand starts
+  std::vector<double> audio_before;    // [input]
+  double bend = 0.0;
+  std::array<bool, 16> pedal{};
+  std::size_t last = 0;           // the lane that was played last: direct gestures act on it
+  std::size_t since_settled = 0;  // frames, below max_block_frames between two segments
+  std::uint64_t resets = 0;
+  std::uint64_t stolen = 0;
+  std::uint64_t noise = 0x9e3779b97f4a7c15u;
+};
+
+struct Engine::Voices : Playback {
   Voices(Machine machine_in, Playing playing_in, Precision precision, Isa isa);
   std::size_t lanes_wanted() const;
 
@@ -105,7 +123,6 @@ struct Engine::Voices {
   template <class T>
   void go_on(Bank<T>& b, const Bank<T>& from);
   bool go_on_from(const Voices& from);
-  void take_controls(const Voices& from);
 
   // --- sound ---
   void segment(std::span<const double* const> inputs, std::span<double* const> outputs,
@@ -150,25 +167,12 @@ struct Engine::Voices {
   Machine machine;
   Playing playing;
   std::variant<Bank<float>, Bank<double>> bank;
-  std::vector<Voice> voices;                  // [lane]
-  std::vector<Hand> hands;                    // [lane][input]
-  std::vector<double> parameters;             // as they are now
-  std::vector<std::uint16_t> changes;         // parameters, since the last take_changes()
-  std::vector<std::uint16_t> told;            // what the last one gave
-  std::vector<double> rest;                   // [input] where a new voice's hand starts
+  std::vector<std::uint16_t> told;            // what the last take_changes() gave
   std::vector<const Control*> audio_control;  // [input] null where no audio drives it
-  std::vector<double> audio_before;           // [input]
   std::vector<const double*> sound;           // [input] of this segment; null where all is silent
   double pole = 0.0;
   double bow_pole = 0.0;
   double level_kept = 0.0;  // of a voice's level from one settling to the next
-  double bend = 0.0;
-  std::array<bool, 16> pedal{};
-  std::size_t last = 0;           // the lane that was played last: direct gestures act on it
-  std::size_t since_settled = 0;  // frames, below max_block_frames between two segments
-  std::uint64_t resets = 0;
-  std::uint64_t stolen = 0;
-  std::uint64_t noise = 0x9e3779b97f4a7c15u;
 };
 
 }  // namespace ressort
