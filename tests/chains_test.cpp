@@ -376,46 +376,7 @@ TEST_CASE("a stiffness that audio gives acts sample by sample", "[chains]") {
   const Program program = formed("@k audioParam @in2\n" + row("a", 20, "mass 1.", "k 0.01") +
                                  "@in1 frcInput @a_m4\n@out1 posOutput @a_m16\n");
   REQUIRE(program.audio_coefficients.size() == 1);
-  Program plain = program;
-  plain.form = Direct{};
-  std::vector<std::vector<double>> heard;
-  for (const Program* each : {&program, &std::as_const(plain)}) {
-    const auto kernel = make_kernel<double>(*each, 1, best_isa());
-    const std::size_t width = kernel->width();
-    for (std::uint32_t c = 0; c < each->coefficients.size(); ++c) {
-      const double value = coefficient_value(*each, each->coefficients[c], each->parameters, 1.0);
-      for (std::size_t lane = 0; lane < width; ++lane) {
-        kernel->coefficients.set(lane, c, value, false);
-      }
-    }
-    heard.emplace_back();
-    Aligned<double> value(64 * width);
-    Aligned<double> velocity(64 * width);
-    Aligned<double> audio(64 * width);
-    Aligned<double> outputs(64 * width);
-    for (int block = 0; block < 40; ++block) {
-      for (std::size_t i = 0; i < value.size(); ++i) {
-        const double n = 64.0 * block + static_cast<double>(i / width);
-        value[i] = 0.01 * std::sin(0.05 * n);
-        audio[i] = 0.3 + 0.2 * std::sin(0.37 * n);
-      }
-      kernel->step({.frames = 64,
-                    .value = value.data(),
-                    .velocity = velocity.data(),
-                    .audio = audio.data(),
-                    .outputs = outputs.data()});
-      for (std::size_t i = 0; i < outputs.size(); i += width) {
-        heard.back().push_back(outputs[i]);
-      }
-    }
-  }
-  Comparison comparison;
-  for (std::size_t n = 0; n < heard[0].size(); ++n) {
-    comparison.add(heard[1][n], heard[0][n]);
-  }
-  INFO(show(comparison.relative()) << " of " << show(comparison.peak));
-  CHECK(comparison.peak > 0.01);
-  CHECK(comparison.relative() < 1e-12);
+  check_duel<double>(program, {.frames = 2560}, 1e-12, 200.0);
 }
 
 TEST_CASE("a reset string starts over, whatever became of it", "[chains]") {
