@@ -31,4 +31,8 @@ class HeapWatch {
   std::size_t calls() const;
 };
 
+// What all threads hold of operator new, in bytes; 0 where the heap is not counted. The C library's
+// own figure counts what it keeps for each thread's next use as well.
+std::size_t heap_bytes();
+
 }  // namespace ressort::rig

@@ -1,6 +1,9 @@
 // The test program's main, the same for Catch2 version 2 and 3, and its heap, which counts.
 #define CATCH_CONFIG_RUNNER
+#include <malloc.h>
+
 #include <algorithm>
+#include <atomic>
 #include <cstddef>
 #include <cstdlib>
 #include <new>
@@ -12,7 +15,12 @@ namespace ressort::rig {
 namespace {
 thread_local bool is_watched = false;
 thread_local std::size_t calls_counted = 0;
+std::atomic<std::size_t> bytes_held{0};
 }  // namespace
+
+std::size_t heap_bytes() {
+  return bytes_held;
+}
 
 HeapWatch::HeapWatch() {
   calls_counted = 0;
@@ -40,12 +48,14 @@ void* allocate(std::size_t size, std::size_t alignment) {
   if (memory == nullptr) {
     throw std::bad_alloc();
   }
+  bytes_held += malloc_usable_size(memory);
   return memory;
 }
 
 void release(void* memory) {
   using namespace ressort::rig;
   calls_counted += is_watched && memory != nullptr ? 1 : 0;
+  bytes_held -= malloc_usable_size(memory);
   std::free(memory);
 }
 
