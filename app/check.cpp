@@ -249,7 +249,8 @@ int check(const CheckOptions& options) {
   Reading reading = read_scene(options.name, {.third = options.third});
   std::optional<Compiled> compiled;
   if (reading.scene) {
-    auto made = compile(reading.scene->network, reading.scene->preset, {.method = options.method});
+    auto made = compile(reading.scene->network, reading.scene->preset,
+                        {.method = options.method, .budget = options.budget});
     if (made) {
       compiled = *std::move(made);
     } else {

@@ -16,6 +16,7 @@ struct CheckOptions {
   CheckAs as = CheckAs::report;        // model: the text in one clean dialect
   std::optional<ThirdArgument> third;  // whatever preset and model say
   std::optional<Method> method;        // without one, the plan's choice
+  std::optional<Budget> budget;        // instead of the preset's
 };
 
 // Findings go to stderr, with their lines if that is a terminal; with json all is one object on

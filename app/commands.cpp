@@ -89,7 +89,8 @@ class Player {
                                                              .rescale = options_.rescale,
                                                              .voices = options_.voices,
                                                              .precision = options_.precision,
-                                                             .method = options_.method},
+                                                             .method = options_.method,
+                                                             .budget = options_.budget},
                                                  .gain = std::pow(10.0, options_.gain_db / 20.0),
                                                  .third = options_.third},
                                   [this](const std::string& news) { voice_.say(news); });

@@ -22,6 +22,7 @@ struct PlayOptions {
   Precision precision = Precision::float64;
   bool rescale = true;
   std::optional<Method> method;        // without one, the plan's choice
+  std::optional<Budget> budget;        // instead of the preset's
   std::optional<ThirdArgument> third;  // whatever the models show
   bool no_console = false;
   std::string script;

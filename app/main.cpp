@@ -122,6 +122,24 @@ void add_method(CLI::App& command, std::optional<Method>& method) {
       ->type_name("WORD");
 }
 
+void add_budget(CLI::App& command, std::optional<Budget>& budget) {
+  command
+      .add_option_function<std::string>(
+          "--budget",
+          [&budget](const std::string& text) {
+            const auto parsed = parse_budget(text);
+            if (!parsed) {
+              throw CLI::ValidationError("--budget", parsed.error().message);
+            }
+            budget = *parsed;
+          },
+          "how far the sound may be from the continuous network, and what may be left out:\n"
+          "'cents=3 t60=5 silence=-60 passive=auto'; cents of pitch, % of decay, dB below the\n"
+          "loudest, and whether contacts may not gain energy: auto, always, never. Without it\n"
+          "what the preset says, else the published scheme where that is safe")
+      ->type_name("TEXT");
+}
+
 // How the network is computed, for every command that computes it.
 void add_numbers(CLI::App& command, Precision& precision, bool& rescale) {
   add_choice<Precision>(command, "--precision", precision,
@@ -183,6 +201,7 @@ void add_play(CLI::App& app, PlayOptions& options, int& code) {
       ->capture_default_str();
   add_numbers(*command, options.precision, options.rescale);
   add_method(*command, options.method);
+  add_budget(*command, options.budget);
   add_motion(*command, options.third);
   command->add_flag("-i,--no-console", options.no_console, "do not read commands");
   command->add_option("-e,--execute", options.script, "a file of console commands, run first");
@@ -236,6 +255,7 @@ void add_render(CLI::App& app, RenderChoice& choice, int& code) {
              "of the file's samples");
   add_numbers(*command, options.precision, options.rescale);
   add_method(*command, options.method);
+  add_budget(*command, options.budget);
   add_motion(*command, options.third);
   command->add_option("-p,--voices", options.voices, "how many notes sound at once")
       ->check(within(1, max_voices));
@@ -322,6 +342,7 @@ void add_check(CLI::App& app, CheckOptions& options, int& code) {
       ->excludes(json);
   add_motion(*command, options.third);
   add_method(*command, options.method);
+  add_budget(*command, options.budget);
   command->callback([&options, &code] { code = check(options); });
 }
 

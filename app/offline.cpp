@@ -111,6 +111,7 @@ Result<Rendered> render(const RenderOptions& options, const std::function<bool(d
                            .voices = options.voices,
                            .precision = options.precision,
                            .method = options.method,
+                           .budget = options.budget,
                            .crew = &crew});
   if (!compiled) {
     const Error& error = compiled.error();

@@ -27,6 +27,7 @@ struct RenderOptions {
   Precision precision = Precision::float64;
   bool rescale = true;
   std::optional<Method> method;        // without one, the plan's choice
+  std::optional<Budget> budget;        // instead of the preset's
   std::optional<ThirdArgument> third;  // whatever the model shows
   bool limit = false;
   int voices = 0;

@@ -294,7 +294,7 @@ Result<Compiled> compile(const Network& network, const Preset& preset,
                              .voices = playing.voices,
                              .crew = options.crew},
                             options.bare && !options.method ? Method::direct : options.method,
-                            options.most_modes);
+                            options.most_modes, options.budget.value_or(preset.budget));
   if (options.find_gain) {
     playing.gain *= comfortable_gain(machine, playing, options);
   }

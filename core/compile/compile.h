@@ -26,6 +26,7 @@ struct CompileOptions {
   int voices = 0;       // instead of the preset's; 0: the preset's
   Precision precision = Precision::float64;
   std::optional<Method> method;  // instead of the plan's choice, or the bare network's direct form
+  std::optional<Budget> budget;  // instead of the preset's
   Isa isa = best_isa();          // no wider than the machine's
   std::uint32_t most_modes = patient_modes;  // of a part, for the plan
   Crew* crew = nullptr;    // outlives the engine, which it steps large parts of; null: none

@@ -200,7 +200,7 @@ std::string_view method_name(Method method) {
 }
 
 Plan make_plan(Machine& machine, const Load& load, std::optional<Method> method,
-               std::uint32_t most_modes) {
+               std::uint32_t most_modes, const Budget&) {
   Plan plan;
   for (Program& program : machine.parts) {
     Chooser chooser(program, load, most_modes);

@@ -9,6 +9,7 @@
 
 #include "core/compile/cost.h"
 #include "core/engine/program.h"
+#include "core/model/budget.h"
 
 namespace ressort {
 
@@ -47,7 +48,7 @@ struct Plan {
 // and the eigenvectors of a part of up to `most_modes` masses for which the modal form may pay.
 // [any thread but audio]
 Plan make_plan(Machine& machine, const Load& load, std::optional<Method> method = {},
-               std::uint32_t most_modes = patient_modes);
+               std::uint32_t most_modes = patient_modes, const Budget& budget = {});
 
 // One line a part.
 std::string describe(const Plan& plan);

@@ -55,9 +55,18 @@ struct MassRun {
   bool has_gravity = false;
 };
 
-// Consecutive links that share law and coefficients.
+// How the force of a link is found.
+enum class Scheme : std::uint8_t {
+  plain,     // from where its ends are, as published
+  centred,   // from where they were and will be, so that it gains no energy
+  substeps,  // several times a sample
+};
+
+// Consecutive links that share law, coefficients and scheme.
 struct LinkRun {
   Law law = Law::spring;
+  Scheme scheme = Scheme::plain;
+  std::uint16_t substeps = 1;  // read only with Scheme::substeps
   std::uint32_t first = 0;
   std::uint32_t count = 0;
   std::array<std::uint32_t, 5> coefficients{};  // in the order of laws.h

@@ -292,7 +292,7 @@ Result<Preset> parse_preset(std::string_view text) {
   Preset preset;
   Table reader(root, "a preset", error);
   reader.allow({"model", "description", "voices", "gain", "release_s", "noise", "tuning",
-                "transpose", "motion", "parameters", "control"});
+                "transpose", "motion", "budget", "parameters", "control"});
   reader.text("model", preset.model);
   reader.text("description", preset.description);
   reader.integer("voices", preset.voices, 1, max_voices);
@@ -300,6 +300,13 @@ Result<Preset> parse_preset(std::string_view text) {
   reader.number("release_s", preset.release_s, 0.0, 60.0);
   reader.flag("noise", preset.noise);
   reader.integer("transpose", preset.transpose, -96, 96);
+  std::string budget;
+  reader.text("budget", budget);
+  if (const auto parsed = parse_budget(budget)) {
+    preset.budget = *parsed;
+  } else if (!error) {
+    reader.fail(*root.get("budget"), "'budget': " + parsed.error().message);
+  }
   std::string tuning = "keyboard";
   reader.text("tuning", tuning);
   preset.keyboard = tuning == "keyboard";

@@ -7,6 +7,7 @@
 #include <string_view>
 #include <vector>
 
+#include "core/model/budget.h"
 #include "core/model/network.h"
 #include "core/result.h"
 
@@ -50,6 +51,7 @@ struct Preset {
   bool keyboard = true;                // a key sets the pitch
   int transpose = 0;                   // semitones between a key and the pitch that it sets
   std::optional<ThirdArgument> third;  // of the model's masses, whatever the model shows
+  Budget budget;                       // of errors, for who computes it
   std::vector<ParameterSetting> parameters;
   std::vector<ControlSetting> controls;
   bool operator==(const Preset&) const = default;
