@@ -71,8 +71,9 @@ TEST_CASE("an instrument says what can be played", "[compile]") {
 TEST_CASE("the plan counts the parts that hang together and says how they run", "[compile]") {
   Machine machine = make_machine(
       network_of(scenes::string("a", 5, ".1", ".1") + scenes::string("b", 3, ".1", ".1") +
-                 "@p nlPluck @a_m1 @a_m3 1 1\n@free mass 1. 0. 0.\n@out1 posOutput @a_m1\n"
-                 "@out2 posOutput @b_m1\n@lone osc 1 .1 0 0 0\n"),
+                 "@p nlPluck @a_m1 @a_m3 1 1\n@free mass 1. 0. 1.\n@out1 posOutput @a_m1\n"
+                 "@out2 posOutput @b_m1\n@lone osc 1 .1 0 0 1\n@in1 frcInput @a_m2\n"
+                 "@in2 frcInput @b_m2\n@out3 posOutput @free\n@out4 posOutput @lone\n"),
       44100.0, true);
   const Plan plan = make_plan(machine, {}, Method::direct);
   REQUIRE(plan.parts.size() == 3);  // the largest first; what is too small, together

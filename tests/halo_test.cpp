@@ -287,13 +287,13 @@ TEST_CASE("a network is shared out where that pays", "[halo]") {
     }
     return shards == nullptr ? 0 : static_cast<int>(shards->shards->size());
   };
-  const std::string string = "@s string 30000 1. 0.1 0.001 0. 0.\n@out1 posOutput [@s 0.3]\n";
-  const std::string mesh = "@s mesh 200 200 1. 0.1 0.001 0. 0.\n@out1 posOutput [@s 0.3 0.3]\n";
+  const std::string string = "@s string 30000 1. 0.1 0.001 0. 1.\n@out1 posOutput [@s 0.3]\n";
+  const std::string mesh = "@s mesh 200 200 1. 0.1 0.001 0. 1.\n@out1 posOutput [@s 0.3 0.3]\n";
   CHECK(planned(string, &crew, {}) == 2);
   CHECK(planned(mesh, &crew, {}) == 2);
   CHECK(planned(string, &crew, Method::direct) == 2);
   CHECK(planned(string, nullptr, {}) == 0);
-  CHECK(planned("@s string 1000 1. 0.1 0.001 0. 0.\n@out1 posOutput [@s 0.3]\n", &crew, {}) == 0);
+  CHECK(planned("@s string 1000 1. 0.1 0.001 0. 1.\n@out1 posOutput [@s 0.3]\n", &crew, {}) == 0);
   // A finger that may be put anywhere ties everything together.
   CHECK(planned(string + "@u param 0.5\n@in1 frcInput [@s u]\n", &crew, {}) == 0);
   CHECK(planned(string + "@in1 frcInput [@s 0.5]\n", &crew, {}) == 2);

@@ -11,7 +11,9 @@
 #include <tuple>
 
 #include "core/analysis/stability.h"
+#include "core/compile/cull.h"
 #include "core/compile/machine.h"
+#include "core/compile/merge.h"
 #include "core/model/topology.h"
 
 namespace ressort {
@@ -197,6 +199,11 @@ double comfortable_gain(const Machine& machine, const Playing& playing,
   return peak > 1e-12 ? wanted_peak / peak : 1.0;
 }
 
+// The bare network is computed as it is written, unless somebody says how far off it may be.
+bool may_merge(const CompileOptions& options, const Budget& budget) {
+  return !options.bare || budget != Budget{};
+}
+
 }  // namespace
 
 ParameterBox preset_box(const std::vector<ParameterInfo>& parameters, const Preset& preset) {
@@ -211,11 +218,11 @@ ParameterBox preset_box(const std::vector<ParameterInfo>& parameters, const Pres
   return box;
 }
 
-Result<Compiled> compile(const Network& network, const Preset& preset,
-                         const CompileOptions& options) {
-  if (!network.macros.empty()) {
-    return compile(expand_macros(network), preset, options);
-  }
+namespace {
+
+// As it is written now, without macros.
+Result<Compiled> compile_as_is(const Network& network, const Preset& preset,
+                               const CompileOptions& options, const Budget& budget) {
   Compiled compiled;
   Instrument& instrument = compiled.instrument;
   Machine machine = make_machine(network, options.rate_hz, options.rescale);
@@ -294,13 +301,30 @@ Result<Compiled> compile(const Network& network, const Preset& preset,
                              .voices = playing.voices,
                              .crew = options.crew},
                             options.bare && !options.method ? Method::direct : options.method,
-                            options.most_modes, options.budget.value_or(preset.budget));
+                            options.most_modes, budget);
+  compiled.plan.left_out = describe(cull(network));
   if (options.find_gain) {
     playing.gain *= comfortable_gain(machine, playing, options);
   }
   instrument.gain = playing.gain;
   compiled.engine = std::make_unique<Engine>(std::move(machine), std::move(playing),
                                              options.precision, options.isa);
+  return compiled;
+}
+
+}  // namespace
+
+Result<Compiled> compile(const Network& network, const Preset& preset,
+                         const CompileOptions& options) {
+  if (!network.macros.empty()) {
+    return compile(expand_macros(network), preset, options);
+  }
+  const Budget budget = options.budget.value_or(preset.budget);
+  const auto merged = may_merge(options, budget) ? merge(network, budget) : std::nullopt;
+  auto compiled = compile_as_is(merged ? merged->network : network, preset, options, budget);
+  if (compiled && merged) {
+    compiled->plan.merged = describe(*merged);
+  }
   return compiled;
 }
 

@@ -6,6 +6,8 @@
 #include <numeric>
 #include <tuple>
 
+#include "core/compile/cull.h"
+#include "core/compile/groups.h"
 #include "core/model/topology.h"
 
 namespace ressort {
@@ -208,43 +210,29 @@ class ProgramMaker {
   std::map<std::pair<ArgumentId, Unit>, std::uint32_t> known_;
 };
 
-// Who hangs together, by union-find.
-class Groups {
- public:
-  explicit Groups(std::size_t count) : parent_(count) {
-    std::iota(parent_.begin(), parent_.end(), 0u);
-  }
-  std::uint32_t find(std::uint32_t i) {
-    while (parent_[i] != i) {
-      i = parent_[i] = parent_[parent_[i]];
-    }
-    return i;
-  }
-  void join(std::uint32_t a, std::uint32_t b) { parent_[find(a)] = find(b); }
-
- private:
-  std::vector<std::uint32_t> parent_;
-};
-
-// Divides a network without macros. What is held by a ground alone holds nothing together, unless
-// somebody listens to the ground.
+// Divides what is left of a network without macros. What is held by a ground alone holds nothing
+// together, unless somebody listens to the ground.
 class Divider {
  public:
   explicit Divider(const Network& network)
-      : network_(network), groups_(network.masses.size()), binds_(network.masses.size()) {
+      : network_(network),
+        culled_(cull(network)),
+        groups_(network.masses.size()),
+        binds_(network.masses.size()) {
     for (std::size_t i = 0; i < binds_.size(); ++i) {
-      binds_[i] = network.masses[i].kind != MassKind::ground;
+      binds_[i] = network.masses[i].kind != MassKind::ground && !culled_.is_dead[i];
     }
     for (const Output& output : network.outputs) {
-      binds_[output.mass] = true;
+      binds_[output.mass] = !culled_.is_dead[output.mass];
     }
-    for (const Link& link : network.links) {
-      if (binds_[link.a] && binds_[link.b]) {
+    for (std::size_t l = 0; l < network.links.size(); ++l) {
+      const Link& link = network.links[l];
+      if (!culled_.is_slack[l] && binds_[link.a] && binds_[link.b]) {
         groups_.join(link.a, link.b);
       }
     }
     for (std::uint32_t i = 0; i < binds_.size(); ++i) {
-      if (network.masses[i].kind == MassKind::point) {
+      if (binds_[i] && network.masses[i].kind == MassKind::point) {
         each_node(network.taps[network.masses[i].tap], [&](std::uint32_t node) {
           binds_[node] = true;
           groups_.join(i, node);
@@ -264,6 +252,9 @@ class Divider {
     std::vector<std::uint32_t> seen(binds_.size(), nowhere);  // in which part a ground is, the last
     for (std::uint32_t l = 0; l < network_.links.size(); ++l) {
       const Link& link = network_.links[l];
+      if (culled_.is_slack[l]) {
+        continue;
+      }
       const std::size_t part = binds_[link.a]   ? part_of(link.a)
                                : binds_[link.b] ? part_of(link.b)
                                                 : parts_ - 1;
@@ -298,7 +289,7 @@ class Divider {
     std::vector<std::uint32_t> count(binds_.size(), 0);
     std::vector<std::uint32_t> roots;
     for (std::uint32_t i = 0; i < binds_.size(); ++i) {
-      if (moves(network_.masses[i]) && count[groups_.find(i)]++ == 0) {
+      if (binds_[i] && moves(network_.masses[i]) && count[groups_.find(i)]++ == 0) {
         roots.push_back(groups_.find(i));
       }
     }
@@ -320,6 +311,7 @@ class Divider {
   }
 
   const Network& network_;
+  Culled culled_;
   Groups groups_;
   std::vector<bool> binds_;          // [mass]
   std::vector<std::uint32_t> part_;  // [root]

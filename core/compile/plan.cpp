@@ -225,7 +225,10 @@ std::string describe(const Plan& plan) {
             (part.measured_ns > 0.0 ? "; measured at rest: " + in_ns(part.measured_ns) : "") +
             ")\n";
   }
-  return text.empty() ? "nothing moves\n" : text;
+  text = text.empty() ? "nothing moves\n" : text;
+  text += plan.merged.empty() ? "" : "merged: " + plan.merged + "\n";
+  text += plan.left_out.empty() ? "" : "left out: " + plan.left_out + "\n";
+  return text;
 }
 
 }  // namespace ressort

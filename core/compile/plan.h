@@ -41,6 +41,8 @@ struct Part {
 
 struct Plan {
   std::vector<Part> parts;
+  std::string merged;    // what became one with something else; may be empty
+  std::string left_out;  // what need not be computed at all; empty if all is
 };
 
 // Gives every part of the machine the form that the cost model says is the cheapest at its worst,

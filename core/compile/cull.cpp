@@ -1,0 +1,207 @@
+#include "core/compile/cull.h"
+
+#include <algorithm>
+
+#include "core/compile/groups.h"
+
+namespace ressort {
+namespace {
+
+// How many of a link's arguments are stiffness and damping; the others say where it acts.
+std::size_t strengths(LinkKind kind) {
+  switch (kind) {
+    case LinkKind::spring:
+      return 2;
+    case LinkKind::quadratic_spring:
+    case LinkKind::cubic_spring:
+      return 3;
+    case LinkKind::clipped_spring:
+    case LinkKind::clipped_contact:
+      return 4;
+    case LinkKind::pluck:  // K, scale, Z
+      return 3;
+    case LinkKind::bow:
+    case LinkKind::smooth_bow:
+      return 1;
+    case LinkKind::contact:
+      return 2;
+  }
+  return 0;
+}
+
+class Culler {
+ public:
+  explicit Culler(const Network& network)
+      : network_(network),
+        groups_(network.masses.size()),
+        is_heard_(network.masses.size()),
+        is_moved_(network.masses.size()),
+        is_listened_(network.masses.size()) {}
+
+  Culled cull() {
+    for (const Link& link : network_.links) {
+      culled_.is_slack.push_back(is_idle(link));
+      const bool is_tied = moves(network_.masses[link.a]) || moves(network_.masses[link.b]);
+      culled_.idle += culled_.is_slack.back() && is_tied ? 1 : 0;
+    }
+    join();
+    listen();
+    look_for_motion();
+    decide();
+    return std::move(culled_);
+  }
+
+ private:
+  bool is_zero(ArgumentId argument) const {
+    return argument == no_argument || (is_constant(network_.arguments[argument]) &&
+                                       evaluate(network_.arguments[argument], {}) == 0.0);
+  }
+
+  bool is_idle(const Link& link) const {
+    for (std::size_t i = 0; i < strengths(link.kind); ++i) {
+      const bool is_distance = link.kind == LinkKind::pluck && i == 1;
+      if (!is_distance && !is_zero(link.arguments[i])) {
+        return false;
+      }
+    }
+    return true;
+  }
+
+  bool carries(std::uint32_t mass) const {
+    return moves(network_.masses[mass]) || network_.masses[mass].kind == MassKind::point;
+  }
+
+  void join() {
+    each_live_link([&](const Link& link) {
+      if (carries(link.a) && carries(link.b)) {
+        groups_.join(link.a, link.b);
+      }
+    });
+    for (std::uint32_t i = 0; i < network_.masses.size(); ++i) {
+      if (network_.masses[i].kind == MassKind::point) {
+        const Tap& tap = network_.taps[network_.masses[i].tap];
+        for (std::uint32_t k = 0; k < tap.length * tap.width; ++k) {
+          groups_.join(i, tap.first + k);
+        }
+      }
+    }
+  }
+
+  // Who hears a force at a ground or at a hand hears what pulls there.
+  void listen() {
+    std::vector<bool> hears_links(network_.masses.size());
+    for (const Output& output : network_.outputs) {
+      is_listened_[output.mass] = true;
+      hears_links[output.mass] =
+          hears_links[output.mass] || (output.is_force && !carries(output.mass));
+      mark(is_heard_, output.mass);
+    }
+    each_live_link([&](const Link& link) {
+      for (const auto& [end, other] : {std::pair(link.a, link.b), std::pair(link.b, link.a)}) {
+        if (hears_links[end]) {
+          mark(is_heard_, other);
+        }
+      }
+    });
+  }
+
+  void look_for_motion() {
+    for (const Input& input : network_.inputs) {
+      mark(is_moved_, input.mass);
+    }
+    for (std::uint32_t i = 0; i < network_.masses.size(); ++i) {
+      const Mass& mass = network_.masses[i];
+      const bool starts =
+          moves(mass) && (mass.position != 0.0 || initial_velocity(network_, mass) != 0.0 ||
+                          mass.gravity != no_argument);
+      if (starts) {
+        mark(is_moved_, i);
+      }
+    }
+    each_live_link([&](const Link& link) {
+      for (const auto& [end, other] : {std::pair(link.a, link.b), std::pair(link.b, link.a)}) {
+        const Mass& mass = network_.masses[end];
+        if (mass.kind == MassKind::position || mass.position != 0.0 || may_push(link)) {
+          mark(is_moved_, other);
+        }
+      }
+    });
+  }
+
+  // A contact may be closed where both of its ends are at 0.
+  bool may_push(const Link& link) const {
+    return link.kind == LinkKind::contact           ? !is_zero(link.arguments[2])
+           : link.kind == LinkKind::clipped_contact ? !is_zero(link.arguments[4])
+                                                    : false;
+  }
+
+  void decide() {
+    culled_.is_dead.assign(network_.masses.size(), true);
+    for (std::uint32_t i = 0; i < network_.masses.size(); ++i) {
+      if (!carries(i)) {
+        culled_.is_dead[i] = !is_listened_[i];
+        continue;
+      }
+      const std::uint32_t group = groups_.find(i);
+      culled_.is_dead[i] = !is_heard_[group] || !is_moved_[group];
+      culled_.unheard += is_heard_[group] || !moves(network_.masses[i]) ? 0 : 1;
+      culled_.unmoved += is_heard_[group] && !is_moved_[group] && moves(network_.masses[i]) ? 1 : 0;
+    }
+    for (std::size_t l = 0; l < network_.links.size(); ++l) {
+      const Link& link = network_.links[l];
+      const bool a_dead = carries(link.a) && culled_.is_dead[link.a];
+      const bool b_dead = carries(link.b) && culled_.is_dead[link.b];
+      if (a_dead || b_dead) {
+        culled_.is_slack[l] = true;
+      }
+      if (!culled_.is_slack[l]) {
+        culled_.is_dead[link.a] = false;
+        culled_.is_dead[link.b] = false;
+      }
+    }
+  }
+
+  template <class Use>
+  void each_live_link(Use&& use) {
+    for (std::size_t l = 0; l < network_.links.size(); ++l) {
+      if (!culled_.is_slack[l]) {
+        use(network_.links[l]);
+      }
+    }
+  }
+
+  void mark(std::vector<bool>& marks, std::uint32_t mass) { marks[groups_.find(mass)] = true; }
+
+  const Network& network_;
+  Groups groups_;
+  Culled culled_;
+  std::vector<bool> is_heard_;  // [group]
+  std::vector<bool> is_moved_;
+  std::vector<bool> is_listened_;  // [mass] by an output
+};
+
+std::string masses(std::size_t count) {
+  return std::to_string(count) + (count == 1 ? " mass" : " masses");
+}
+
+}  // namespace
+
+Culled cull(const Network& network) {
+  return Culler(network).cull();
+}
+
+std::string describe(const Culled& culled) {
+  std::string text;
+  const auto add = [&](std::size_t count, const std::string& what) {
+    if (count > 0) {
+      text += (text.empty() ? "" : ", ") + what;
+    }
+  };
+  add(culled.unheard, masses(culled.unheard) + " that no output hears");
+  add(culled.unmoved, masses(culled.unmoved) + " that nothing moves");
+  add(culled.idle, std::to_string(culled.idle) +
+                       (culled.idle == 1 ? " link that exerts" : " links that exert") + " nothing");
+  return text;
+}
+
+}  // namespace ressort
