@@ -224,6 +224,17 @@ std::string print_limit(double value, bool is_upper) {
   return print_number(unit < 1.0 ? safe / std::round(1.0 / unit) : safe * unit);
 }
 
+std::string describe(const SafeRange& safe) {
+  const bool has_lowest = safe.lowest != 0.0 && std::isfinite(safe.lowest);
+  const bool has_highest = safe.highest != 0.0 && std::isfinite(safe.highest);
+  const std::string lowest = print_limit(safe.lowest, false);
+  const std::string highest = print_limit(safe.highest, true);
+  return has_lowest && has_highest ? "stable between " + lowest + " and " + highest
+         : has_lowest              ? "stable above " + lowest
+         : has_highest             ? "stable below " + highest
+                                   : "stable anywhere";
+}
+
 Error complaint(const Certificate& certificate) {
   if (!certificate.culprit) {
     return {certificate.verdict == Verdict::stable ? "stable" : "not proved stable", 0, 0};

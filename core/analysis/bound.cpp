@@ -126,7 +126,7 @@ class Bound {
   std::map<std::uint32_t, Sum> live_;            // by tap
   std::map<std::uint32_t, std::uint32_t> size_;  // nodes, by a macro's first one
   std::map<std::uint32_t, Sum> worst_;           // by the same
-  double factor_ = 1e9;
+  double factor_ = most_bounded;
 };
 
 }  // namespace

@@ -19,23 +19,35 @@ bool is_usable(const Weights& weights) {
 
 }  // namespace
 
-Bound edge_bound(const Stencil& stencil, const Weights& weights) {
+namespace {
+
+// Calls `use(term, its bound)`.
+template <class Use>
+void each_bound(const Stencil& stencil, const Weights& weights, Use&& use) {
   std::vector<double> sums(stencil.masses.size(), 0.0);
   for (std::size_t t = 0; t < stencil.terms.size(); ++t) {
     for (const Stencil::Entry& entry : stencil.of(stencil.terms[t])) {
       sums[entry.row] += std::fabs(entry.share) * weights.terms[t];
     }
   }
-  Bound bound;
   for (std::size_t t = 0; t < stencil.terms.size(); ++t) {
     double sum = 0.0;
     for (const Stencil::Entry& entry : stencil.of(stencil.terms[t])) {
       sum += std::fabs(entry.share) * sums[entry.row] / weights.masses[entry.row];
     }
-    if (weights.terms[t] > 0.0 && sum > bound.value) {
-      bound = {sum, t};
-    }
+    use(t, weights.terms[t] > 0.0 ? sum : 0.0);
   }
+}
+
+}  // namespace
+
+Bound edge_bound(const Stencil& stencil, const Weights& weights) {
+  Bound bound;
+  each_bound(stencil, weights, [&](std::size_t term, double value) {
+    if (value > bound.value) {
+      bound = {value, term};
+    }
+  });
   return bound;
 }
 
@@ -123,6 +135,43 @@ void EdgeFinder::refine(const Weights& weights, std::vector<double>& shape) cons
       x /= largest;
     }
   }
+}
+
+// The bound of every term is a straight line in what the weights are straight in, or in its
+// inverse if that is a mass: two places say where the first of them meets the limit.
+std::optional<double> EdgeFinder::met(const Line& line, double safe) {
+  const double other = safe > 0.0 ? 0.5 * safe : 1.0;
+  const auto bounds_at = [&](double at) {
+    std::vector<double> bounds(stencil_.terms.size());
+    each_bound(stencil_, line(at), [&](std::size_t term, double value) { bounds[term] = value; });
+    return bounds;
+  };
+  const std::vector<double> here = bounds_at(safe);
+  const std::vector<double> there = bounds_at(other);
+  const auto first_meeting = [&](double from, double to) {
+    double nearest = HUGE_VAL;
+    for (std::size_t t = 0; t < here.size(); ++t) {
+      const double slope = (there[t] - here[t]) / (to - from);
+      const double meets = from + (limit_of_scheme - here[t]) / slope;
+      nearest = meets > from ? std::min(nearest, meets) : nearest;
+    }
+    return nearest;
+  };
+  constexpr double step = 1e-9;
+  const auto is_edge = [&](double at) {
+    const double outwards = at > safe ? 1.0 + step : 1.0 - step;
+    return std::isfinite(at) && at > 0.0 && holds(line(at / outwards), limit_of_scheme) &&
+           !holds(line(at * outwards), limit_of_scheme);
+  };
+  if (const double up = first_meeting(safe, other); is_edge(up)) {
+    return up;
+  }
+  if (safe > 0.0) {
+    if (const double down = 1.0 / first_meeting(1.0 / safe, 1.0 / other); is_edge(down)) {
+      return down;
+    }
+  }
+  return std::nullopt;
 }
 
 Edge EdgeFinder::between(const Line& line, double safe, double bad) {

@@ -52,6 +52,10 @@ class EdgeFinder {
   // The first edge beyond `safe`, going away from 0, upwards if `safe` is 0; nothing up to 1e12.
   std::optional<Edge> outwards(const Line& line, double safe);
 
+  // The edge by the bound alone, on either side of `safe` and 0 or above; at once, with six looks
+  // at the line. Nothing where it has to be searched for.
+  std::optional<double> met(const Line& line, double safe);
+
   // Is D less the sum over terms positive definite, with D by row?
   bool is_definite(std::span<const double> diagonal, std::span<const double> terms);
 

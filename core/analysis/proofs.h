@@ -13,11 +13,12 @@ namespace ressort {
 
 class Proofs {
  public:
-  Proofs(Network network, double rate_ratio);
+  Proofs(Network network, double rate_ratio, std::size_t most_exact);
 
   Verdict prove(const ParameterBox& box);
   Certificate certify(const ParameterBox& box);
   std::optional<SafeRange> safe_range(const ParameterBox& box, std::size_t parameter, double start);
+  double share(const ParameterBox& safe, const ParameterBox& wide);
   double stiffness_factor(const ParameterBox& box);
 
  private:

@@ -15,12 +15,27 @@ constexpr double safe_limit = 4.0 * (1.0 - 1e-9);  // whatever the rounding
 
 }  // namespace
 
-Proofs::Proofs(Network network, double rate_ratio)
+Network always_felt(Network network) {
+  std::erase_if(network.links, [](const Link& link) {
+    const LinearPart part = linear_part(link);
+    return part.stiffness == no_argument && part.damping == no_argument;
+  });
+  for (Link& link : network.links) {
+    const LinearPart part = linear_part(link);
+    link.kind = LinkKind::spring;
+    link.arguments.fill(no_argument);
+    link.arguments[0] = part.stiffness;
+    link.arguments[1] = part.damping;
+  }
+  return network;
+}
+
+Proofs::Proofs(Network network, double rate_ratio, std::size_t most_exact)
     : macros_(network.macros),
       network_(network.macros.empty() ? std::move(network) : expand_macros(network)),
       rate_ratio_(rate_ratio),
       stencil_(make_stencil(network_)),
-      edges_(stencil_, stencil_.masses.size() <= Stability::most_exact_masses) {}
+      edges_(stencil_, stencil_.masses.size() <= most_exact) {}
 
 // --- weights ------------------------------------------------------------------------------------
 
@@ -205,6 +220,15 @@ std::optional<SafeRange> Proofs::safe_range(const ParameterBox& box, std::size_t
 
 SafeRange Proofs::range_around(const Line& line, double anchor) {
   SafeRange range{0.0, infinity};
+  if (const auto edge = edges_.is_exact() ? std::nullopt : edges_.met(line, anchor)) {
+    // Masses from there, stiffness up to there; the other side may have another.
+    const bool is_lowest = *edge < anchor;
+    (is_lowest ? range.lowest : range.highest) = *edge;
+    if (edges_.holds(line(is_lowest ? 1e12 * anchor : 0.0), 4.0)) {
+      return range;
+    }
+    range = {0.0, infinity};
+  }
   if (const auto edge = edges_.outwards(line, anchor)) {
     range.highest = edge->value;
   }
@@ -212,6 +236,18 @@ SafeRange Proofs::range_around(const Line& line, double anchor) {
     range.lowest = edges_.between(line, anchor, 0.0).value;
   }
   return range;
+}
+
+double Proofs::share(const ParameterBox& safe, const ParameterBox& wide) {
+  const auto line = [&](double way) {
+    ParameterBox box;
+    for (std::size_t i = 0; i < safe.lowest.size(); ++i) {
+      box.lowest.push_back(std::lerp(safe.lowest[i], wide.lowest[i], way));
+      box.highest.push_back(std::lerp(safe.highest[i], wide.highest[i], way));
+    }
+    return weigh(argument_ranges(network_, box));
+  };
+  return edges_.holds(line(1.0), safe_limit) ? 1.0 : edges_.between(line, 0.0, 1.0).value;
 }
 
 double Proofs::stiffness_factor(const ParameterBox& box) {
@@ -234,9 +270,11 @@ double Proofs::stiffness_factor(const ParameterBox& box) {
 
 // --- the door -----------------------------------------------------------------------------------
 
-Stability::Stability(Network network, double rate_ratio)
-    : proofs_(std::make_unique<Proofs>(std::move(network), rate_ratio)) {}
+Stability::Stability(Network network, double rate_ratio, std::size_t most_exact)
+    : proofs_(std::make_unique<Proofs>(std::move(network), rate_ratio, most_exact)) {}
 Stability::~Stability() = default;
+Stability::Stability(Stability&&) noexcept = default;
+Stability& Stability::operator=(Stability&&) noexcept = default;
 
 Verdict Stability::prove(const ParameterBox& box) {
   return proofs_->prove(box);
@@ -249,6 +287,10 @@ Certificate Stability::certify(const ParameterBox& box) {
 std::optional<SafeRange> Stability::safe_range(const ParameterBox& box, std::size_t parameter,
                                                double start) {
   return proofs_->safe_range(box, parameter, start);
+}
+
+double Stability::share(const ParameterBox& safe, const ParameterBox& wide) {
+  return proofs_->share(safe, wide);
 }
 
 double Stability::stiffness_factor(const ParameterBox& box) {

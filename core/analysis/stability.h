@@ -24,9 +24,10 @@ namespace ressort {
 // The factor on every stiffness up to which the explicit scheme is certainly stable, anywhere in
 // the box: the edge bound max over links of (d_i/m_i + d_j/m_j) < 3.92, with d the sum of k + 2z
 // at a mass; a place counts with the masses around it, a live one with whichever is the worst.
-// `rate_ratio` is 44100 / rate. At most 0 where the dampers alone are too strong; 1e9 where there
-// is nothing to bound. No more than two times too careful where no place is live. For a network
-// without macros. O(masses + links). [any thread but audio]
+// `rate_ratio` is 44100 / rate. At most 0 where the dampers alone are too strong; that much where
+// there is nothing to bound. No more than two times too careful where no place is live. For a
+// network without macros. O(masses + links). [any thread but audio]
+inline constexpr double most_bounded = 1e9;
 double highest_stiffness_factor(const Network& network, const ParameterBox& box, double rate_ratio);
 
 enum class Quantity { mass, stiffness, damping };
@@ -68,17 +69,26 @@ struct SafeRange {
   double highest = 0.0;
 };
 
+// What is always felt: springs, dampers, oscillators, and what nonlinear springs are at rest.
+// Without plucks, bows and contacts, of which nothing may ever touch.
+Network always_felt(Network network);
+
+// "stable below 1.31568", "stable between 0.1 and 4", "stable anywhere".
+std::string describe(const SafeRange& safe);
+
 class Proofs;
 
-// Proofs and limits for one network; takes its macros apart once. Exact up to `most_exact_masses`,
+// Proofs and limits for one network; takes its macros apart once. Exact up to `most_exact` masses,
 // above by the edge bound, on the safe side. Places on macros whose coordinates are live are
 // counted at all nodes at once: safe, not exact. [any thread but audio]
 class Stability {
  public:
   static constexpr std::size_t most_exact_masses = 40'000;
 
-  Stability(Network network, double rate_ratio);
+  Stability(Network network, double rate_ratio, std::size_t most_exact = most_exact_masses);
   ~Stability();
+  Stability(Stability&&) noexcept;
+  Stability& operator=(Stability&&) noexcept;
 
   // Is it stable with the parameters anywhere in the box? O(links) where the edge bound says yes,
   // one factorisation otherwise.
@@ -91,6 +101,9 @@ class Stability {
   // `start` if that is stable: exact if every argument is a straight line along it, else what is
   // proved by intervals. On the side of 0 on which `start` is. Nothing where no value was found.
   std::optional<SafeRange> safe_range(const ParameterBox& box, std::size_t parameter, double start);
+
+  // How far of the way from one box, where it is stable, to one that holds it: 0..1.
+  double share(const ParameterBox& safe, const ParameterBox& wide);
 
   // The exact factor on every stiffness up to which it is stable anywhere in the box; bows count
   // with its root. 0 where the dampers alone are too strong, infinite where nothing bounds.
