@@ -17,6 +17,8 @@ constexpr AddressRow rows[] = {
     {"/pressure", "VALUE", "channel pressure, 0-127", true},
     {"/bend", "VALUE", "pitch bend, -1 to 1 (two semitones)", true},
     {"/param/NAME", "[VALUE]", "a parameter: sets it, or answers its value", true},
+    {"/param/NAME/range", "", "answers its minimum and maximum, and between what it is stable",
+     false},
     {"/in/N/position", "POSITION", "moves the hand at input N, smoothed", true},
     {"/in/N/force", "FORCE [SECONDS]", "pushes input N: one sample, or as long as told", true},
     {"/in/N/pluck", "STRENGTH", "the finger at input N sweeps through the string; 0-1", true},
@@ -251,7 +253,7 @@ std::span<const AddressRow> addresses() {
 
 bool plays(const Call& call, const Instrument& instrument) {
   if (call.address.starts_with("/param/")) {
-    return !call.arguments.empty();
+    return !call.arguments.empty() && !call.address.ends_with("/range");
   }
   return is_simple(call.address) || call.address.starts_with("/in/") ||
          find_custom(instrument, call.address) != nullptr;
@@ -280,6 +282,19 @@ Result<std::vector<Event>> to_events(const Call& call, const Instrument& instrum
                              .value = value}};
   }
   return Error{"unknown address '" + call.address + "'; /describe lists what there is"};
+}
+
+std::string told_limit(const Call& call, const Event& event, const Instrument& instrument) {
+  if (event.kind != EventKind::parameter || call.arguments.empty()) {
+    return "";
+  }
+  const double* const wanted = std::get_if<double>(call.arguments.data());
+  const ParameterInfo& info = instrument.parameters[event.index];
+  const bool is_beyond = wanted != nullptr && ((event.value < *wanted && info.is_lowered) ||
+                                               (event.value > *wanted && info.is_raised));
+  return is_beyond ? info.name + ": " + print_number(*wanted) +
+                         " is beyond what is stable, set to " + print_number(event.value)
+                   : "";
 }
 
 std::vector<std::string> split_words(std::string_view text) {

@@ -40,6 +40,10 @@ bool plays(const Call& call, const Instrument& instrument);
 Result<std::vector<Event>> to_events(const Call& call, const Instrument& instrument,
                                      std::uint32_t serial);
 
+// What became of a parameter's value that would not have been stable, as "m_K: 1.5 is beyond what
+// is stable, set to 1.31568"; nothing for any other event of the call.
+std::string told_limit(const Call& call, const Event& event, const Instrument& instrument);
+
 // One line of a score: TIME_SECONDS ADDRESS ARG... ; blank lines and # comments have no call.
 struct ScoreLine {
   int line = 0;  // from 1

@@ -7,6 +7,7 @@
 #include <cstdio>
 #include <nlohmann/json.hpp>
 
+#include "app/admit.h"
 #include "app/exit_code.h"
 #include "app/files.h"
 #include "app/loader.h"
@@ -81,19 +82,8 @@ const char* verdict_name(Verdict verdict) {
   return "";
 }
 
-// "stable below 1.31568"
 std::string describe(const std::optional<SafeRange>& safe) {
-  if (!safe) {
-    return "stable nowhere";
-  }
-  const bool has_lowest = safe->lowest != 0.0 && std::isfinite(safe->lowest);
-  const bool has_highest = safe->highest != 0.0 && std::isfinite(safe->highest);
-  const std::string lowest = print_limit(safe->lowest, false);
-  const std::string highest = print_limit(safe->highest, true);
-  return has_lowest && has_highest ? "stable between " + lowest + " and " + highest
-         : has_lowest              ? "stable above " + lowest
-         : has_highest             ? "stable below " + highest
-                                   : "stable anywhere";
+  return safe ? describe(*safe) : "stable nowhere";
 }
 
 json limit_json(double value) {
@@ -261,6 +251,9 @@ int check(const CheckOptions& options) {
   if (compiled && options.as != CheckAs::model) {
     proved = prove(*reading.scene, compiled->instrument);
     warn(*proved, *reading.scene, reading.findings);
+    for (Finding& narrowed : narrowed_ranges(*reading.scene, compiled->gate)) {
+      reading.findings.push_back(std::move(narrowed));
+    }
   }
   if (options.as == CheckAs::json) {
     json out = compiled ? scene_json(*reading.scene, *compiled, *proved) : json::object();

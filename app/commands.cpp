@@ -95,7 +95,7 @@ class Player {
                                                  .third = options_.third},
                                   [this](const std::string& news) { voice_.say(news); });
     connect_session();
-    const auto loaded = session_->load_and_wait(options_.name);
+    const auto loaded = session_->load_and_wait(options_.name, options_.force);
     if (!loaded) {
       complain(loaded.error().message);
       return exit_code::wrong_use;

@@ -24,6 +24,7 @@ struct PlayOptions {
   std::optional<Method> method;        // without one, the plan's choice
   std::optional<Budget> budget;        // instead of the preset's
   std::optional<ThirdArgument> third;  // whatever the models show
+  bool force = false;                  // play the first model even if it is not stable
   bool no_console = false;
   std::string script;
   std::optional<int> osc_port;  // 0: none; without: 9777, or none if that is taken

@@ -48,12 +48,13 @@ LineShape shape_of(std::string_view line) {
 Result<Done> help(Desk& desk, Words words);
 
 constexpr CommandRow command_rows[] = {
-    {"Models", "load", "MODEL", "loads a model or a preset",
+    {"Models", "load", "MODEL [--force]", "loads a model or a preset",
      "MODEL is the name of a preset or a model that came with the program, or the path of a .mdl\n"
      "or .toml file. What sounds goes on until the new model is ready and then fades into it; if\n"
-     "there is an error in the file, it simply goes on.",
+     "there is an error in the file, it simply goes on. A model that is not stable is such an\n"
+     "error; --force plays it all the same, putting back to rest what runs away.",
      act::load},
-    {"Models", "preset", "PRESET", "the same; Tab offers the presets only",
+    {"Models", "preset", "PRESET [--force]", "the same; Tab offers the presets only",
      "A preset is a model with ranges for its parameters and a plan of what plays it.", act::load},
     {"Models", "models", "", "lists what came with the program",
      "Presets go first, each with what it is; then the models that they are made of.", act::models},
@@ -233,10 +234,15 @@ Result<Command> parse_command(std::string_view line) {
   const auto needed = static_cast<std::size_t>(
       std::count_if(wanted.begin(), wanted.end(),
                     [](const std::string& word) { return !word.starts_with('['); }));
-  if (words.size() < needed || words.size() > wanted.size()) {
+  // What is written as [--WORD] may be left out, but is nothing else.
+  bool is_other = false;
+  for (std::size_t i = needed; i < std::min(words.size(), wanted.size()); ++i) {
+    is_other |= wanted[i].starts_with("[--") && wanted[i] != "[" + words[i] + "]";
+  }
+  if (words.size() < needed || words.size() > wanted.size() || is_other) {
     return Error{"the command is '" + usage(row) + "', found " +
                  counted(words.size(), "word", "words") + " after '" + std::string(row.name) + "'" +
-                 (words.size() > wanted.size() && needed > 0
+                 ((words.size() > wanted.size() && needed > 0) || is_other
                       ? "; a word with blanks in it is written in quotes"
                       : "")};
   }

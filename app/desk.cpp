@@ -186,7 +186,7 @@ Result<Done> act::keys(Desk& desk, Words) {
 // --- models -------------------------------------------------------------------------------------
 
 Result<Done> act::load(Desk& desk, Words words) {
-  const auto result = desk.session.load_and_wait(words[0]);
+  const auto result = desk.session.load_and_wait(words[0], words.size() > 1);
   if (!result) {
     return Error{"'" + words[0] + "' was not loaded\n" + result.error().message};
   }
@@ -235,10 +235,12 @@ Result<Done> act::params(Desk& desk, Words) {
   if (!current) {
     return nothing_loaded;
   }
+  const bool is_proved = current->instrument.verdict == Verdict::stable;
   std::vector<std::vector<std::string>> rows;
   for (const ParameterInfo& info : current->instrument.parameters) {
     rows.push_back({info.name, print_number(desk.session.parameter(info.name).value_or(info.value)),
-                    print_number(info.minimum) + " .. " + print_number(info.maximum)});
+                    print_number(info.minimum) + " .. " + print_number(info.maximum),
+                    is_proved ? describe(info.safe) : ""});
   }
   desk.print(rows.empty() ? current->name + " has no parameters" : table(rows));
   return Done{};
@@ -268,7 +270,8 @@ Result<Done> act::get(Desk& desk, Words words) {
 
 Result<Done> act::set(Desk& desk, Words words) {
   const auto current = loaded(desk);
-  const auto events = play(desk, {"/param/" + words[0], {to_argument(words[1])}});
+  const Call call{"/param/" + words[0], {to_argument(words[1])}};
+  const auto events = play(desk, call);
   if (!events) {
     return events.error();
   }
@@ -285,7 +288,8 @@ Result<Done> act::set(Desk& desk, Words words) {
     if (event.value != wanted) {
       line += ", the " + std::string(event.value < wanted ? "highest" : "lowest") + " it may be";
     }
-    lines.push_back(std::move(line));
+    const std::string limited = told_limit(call, event, current->instrument);
+    lines.push_back(limited.empty() ? std::move(line) : limited);
   }
   desk.print(joined(lines, "\n"));
   return Done{};
@@ -326,6 +330,7 @@ Result<Done> act::status(Desk& desk, Words) {
       {"output", peak(now.peak_db) + " since the last status, " + limiter},
       {"xruns", std::to_string(now.xruns)},
       {"resets", std::to_string(now.resets) + " voices that became unstable"},
+      {"limits", std::to_string(now.beyond) + " times a parameter was kept where it is stable"},
       {"events", std::to_string(now.late) + " late, " + std::to_string(now.dropped) + " dropped, " +
                      std::to_string(now.malformed) + " malformed"},
   };
@@ -353,14 +358,28 @@ std::string describe(const InputInfo& input) {
 
 }  // namespace
 
+namespace {
+
+std::string describe_stability(const Instrument& instrument) {
+  if (instrument.verdict == Verdict::unstable) {
+    return "none: it plays by force, and what runs away is put back to rest";
+  }
+  const std::string proved = instrument.verdict == Verdict::stable ? "proved" : "not proved";
+  const double margin = instrument.stiffness_margin;
+  return margin >= most_bounded ? "nothing to bound"
+         : margin >= 1.0 ? proved + "; every stiffness may grow " + fixed(margin, 2) + " times"
+                         : proved + " while nothing touches; with what may, up to " +
+                               fixed(std::max(0.0, margin), 2) + " of the stiffness";
+}
+
+}  // namespace
+
 Result<Done> act::explain(Desk& desk, Words) {
   const auto current = loaded(desk);
   if (!current) {
     return nothing_loaded;
   }
   const Instrument& instrument = current->instrument;
-  constexpr double nothing_to_bound = 1e9;
-  const double margin = instrument.stiffness_margin;
   std::vector<std::vector<std::string>> rows = {
       {"model", current->model_path},
       {"lowest mode", instrument.mode
@@ -370,11 +389,7 @@ Result<Done> act::explain(Desk& desk, Words) {
                                          ", up to " + fixed(instrument.highest_frequency_hz, 1) +
                                          " Hz; higher ones are folded down by octaves"
                                    : "all sound as the model is written"},
-      {"stability", margin >= nothing_to_bound ? "nothing to bound"
-                    : margin >= 1.0
-                        ? "proved; every stiffness may grow " + fixed(margin, 2) + " times"
-                        : "not proved; the bound is met at " + fixed(std::max(0.0, margin), 2) +
-                              " of the stiffness"},
+      {"stability", describe_stability(instrument)},
   };
   for (const InputInfo& input : instrument.inputs) {
     rows.push_back({"input " + std::to_string(input.number), describe(input)});

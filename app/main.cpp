@@ -150,6 +150,12 @@ void add_numbers(CLI::App& command, Precision& precision, bool& rescale) {
       "take the model's numbers raw at rates other than 44100 Hz");
 }
 
+void add_force(CLI::App& command, bool& force) {
+  command.add_flag("--force", force,
+                   "play a model that is not stable all the same; what runs away is put back to "
+                   "rest");
+}
+
 // What the last argument of a mass means, for every command that reads a model.
 void add_motion(CLI::App& command, std::optional<ThirdArgument>& third) {
   command
@@ -203,6 +209,7 @@ void add_play(CLI::App& app, PlayOptions& options, int& code) {
   add_method(*command, options.method);
   add_budget(*command, options.budget);
   add_motion(*command, options.third);
+  add_force(*command, options.force);
   command->add_flag("-i,--no-console", options.no_console, "do not read commands");
   command->add_option("-e,--execute", options.script, "a file of console commands, run first");
   command->add_option_function<std::string>(
@@ -257,6 +264,7 @@ void add_render(CLI::App& app, RenderChoice& choice, int& code) {
   add_method(*command, options.method);
   add_budget(*command, options.budget);
   add_motion(*command, options.third);
+  add_force(*command, options.force);
   command->add_option("-p,--voices", options.voices, "how many notes sound at once")
       ->check(within(1, max_voices));
   command->add_option("--threads", options.threads, "for large networks; without it, all cores")
@@ -276,7 +284,7 @@ void add_render(CLI::App& app, RenderChoice& choice, int& code) {
       if (equals == std::string::npos || !parse_number(setting.substr(equals + 1), value)) {
         throw CLI::ValidationError("--set", "expected NAME=VALUE, found '" + setting + "'");
       }
-      choice.options.parameters.emplace_back(setting.substr(0, equals), value);
+      choice.options.parameters.push_back({setting.substr(0, equals), value});
     }
     code = render_command(choice.options, choice.is_quiet);
   });

@@ -2,7 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <set>
 
+#include "app/admit.h"
 #include "app/crew.h"
 #include "app/process.h"
 #include "core/compile/compile.h"
@@ -21,26 +23,64 @@ struct ScoredEvent {
   Event event;
 };
 
-// The calls of a score as events; an error has the score's line.
-Result<std::vector<ScoredEvent>> read_score(const std::string& path, const std::string& text,
-                                            const Instrument& instrument, std::uint32_t serial,
-                                            double rate_hz) {
-  auto lines = parse_score(text);
-  const auto at = [&](int line, int column, const std::string& message) {
-    return Error{path + ":" + std::to_string(line) + ":" + std::to_string(column) +
-                 ": error: " + message};
-  };
-  if (!lines) {
-    return at(lines.error().line, lines.error().column, lines.error().message);
+Error at(const std::string& path, const Error& error) {
+  return {to_string(finding_of(path, "", error))};
+}
+
+// The lines of the score that was asked for, or of the phrase that is played instead; an error has
+// the score's line.
+Result<std::vector<ScoreLine>> read_score(const RenderOptions& options, bool is_bare) {
+  if (options.score.empty()) {
+    return parse_score(is_bare || !options.input.empty() ? "" : default_phrase());
   }
+  auto text = read_text(options.score, max_score_bytes);
+  if (!text) {
+    return text.error();
+  }
+  auto lines = parse_score(*text);
+  return lines ? std::move(lines) : at(options.score, lines.error());
+}
+
+// What the score gives to parameters.
+std::vector<Setting> reach_of(const std::vector<ScoreLine>& lines, const Network& network) {
+  constexpr std::string_view prefix = "/param/";
+  std::vector<Setting> reach;
+  for (const ScoreLine& line : lines) {
+    const std::string_view address = line.call.address;
+    const auto& arguments = line.call.arguments;
+    if (!address.starts_with(prefix) || arguments.empty() ||
+        !std::holds_alternative<double>(arguments[0])) {
+      continue;
+    }
+    for (const Parameter& parameter : network.parameters) {
+      if (fits(address.substr(prefix.size()), parameter.name)) {
+        reach.push_back({parameter.name, std::get<double>(arguments[0])});
+      }
+    }
+  }
+  return reach;
+}
+
+// The calls of a score as events; an error has the score's line. What a parameter could not take is
+// told, once for each.
+Result<std::vector<ScoredEvent>> score_events(const RenderOptions& options,
+                                              const std::vector<ScoreLine>& lines,
+                                              const Instrument& instrument, std::uint32_t serial,
+                                              std::vector<std::string>& warnings) {
   std::vector<ScoredEvent> scored;
-  for (const ScoreLine& line : *lines) {
+  std::set<std::uint16_t> told;
+  for (const ScoreLine& line : lines) {
     auto events = to_events(line.call, instrument, serial);
     if (!events) {
-      return at(line.line, 1, events.error().message);
+      return at(options.score, {events.error().message, line.line, 1});
     }
     for (const Event& event : *events) {
-      scored.push_back({std::llround(line.time_s * rate_hz), event});
+      scored.push_back({std::llround(line.time_s * options.rate_hz), event});
+      const std::string news = told_limit(line.call, event, instrument);
+      if (!news.empty() && told.insert(event.index).second) {
+        warnings.push_back(options.score + ":" + std::to_string(line.line) +
+                           ":1: warning: " + news);
+      }
     }
   }
   std::stable_sort(scored.begin(), scored.end(),
@@ -103,20 +143,26 @@ Result<Rendered> render(const RenderOptions& options, const std::function<bool(d
     return scene.error();
   }
   const bool is_bare = !scene->has_preset;
+  const auto lines = read_score(options, is_bare);
+  if (!lines) {
+    return lines.error();
+  }
   ThreadCrew crew(options.threads > 0 ? static_cast<std::size_t>(options.threads) : core_count());
-  auto compiled = compile(scene->network, scene->preset,
-                          {.rate_hz = options.rate_hz,
-                           .rescale = options.rescale,
-                           .bare = is_bare,
-                           .voices = options.voices,
-                           .precision = options.precision,
-                           .method = options.method,
-                           .budget = options.budget,
-                           .crew = &crew});
+  auto compiled = admit(*scene,
+                        {.rate_hz = options.rate_hz,
+                         .rescale = options.rescale,
+                         .bare = is_bare,
+                         .voices = options.voices,
+                         .precision = options.precision,
+                         .method = options.method,
+                         .budget = options.budget,
+                         .crew = &crew,
+                         .force = options.force,
+                         .settings = options.parameters,
+                         .reach = reach_of(*lines, scene->network)},
+                        scene->warnings);
   if (!compiled) {
-    const Error& error = compiled.error();
-    return Error{scene->path + ":" + std::to_string(error.line) + ":" +
-                 std::to_string(error.column) + ": error: " + error.message};
+    return compiled.error();
   }
   const Instrument instrument = compiled->instrument;
   if (instrument.outputs == 0) {
@@ -138,29 +184,22 @@ Result<Rendered> render(const RenderOptions& options, const std::function<bool(d
                    std::to_string(static_cast<int>(inputs.sound.rate_hz))};
     }
   }
-  std::string score_text;
-  if (!options.score.empty()) {
-    auto text = read_text(options.score, max_score_bytes);
-    if (!text) {
-      return text.error();
-    }
-    score_text = *std::move(text);
-  } else if (!is_bare && options.input.empty()) {
-    score_text = default_phrase();
-  }
-  auto score = read_score(options.score, score_text, instrument, serial, options.rate_hz);
+  auto score = score_events(options, *lines, instrument, serial, scene->warnings);
   if (!score) {
     return score.error();
   }
 
   Process process(options.rate_hz, options.limit);
   for (const auto& [name, value] : options.parameters) {
-    auto events = to_events({"/param/" + name, {value}}, instrument, serial);
+    const Call call{"/param/" + name, {value}};
+    auto events = to_events(call, instrument, serial);
     if (!events) {
       return events.error();
     }
     for (const Event& event : *events) {
-      if (event.value != value) {
+      if (const std::string news = told_limit(call, event, instrument); !news.empty()) {
+        scene->warnings.push_back(news);
+      } else if (event.value != value) {
         return Error{"the preset keeps '" + name + "' between " +
                      print_number(instrument.parameters[event.index].minimum) + " and " +
                      print_number(instrument.parameters[event.index].maximum)};

@@ -4,7 +4,6 @@
 #include <functional>
 #include <optional>
 #include <string>
-#include <utility>
 #include <vector>
 
 #include "app/calls.h"
@@ -22,7 +21,7 @@ struct RenderOptions {
   std::optional<long long> frames;  //   input last, and two seconds to ring out
   std::string input;                // a WAV file; channel n drives input n
   std::string score;                // a file of calls
-  std::vector<std::pair<std::string, double>> parameters;  // set before the first sample
+  std::vector<Setting> parameters;  // set before the first sample
   SampleFormat format = SampleFormat::float32;
   Precision precision = Precision::float64;
   bool rescale = true;
@@ -30,6 +29,7 @@ struct RenderOptions {
   std::optional<Budget> budget;        // instead of the preset's
   std::optional<ThirdArgument> third;  // whatever the model shows
   bool limit = false;
+  bool force = false;  // even if it is not stable
   int voices = 0;
   int threads = 0;  // for large networks; 0: as many as the machine runs at once
 };

@@ -313,7 +313,7 @@ struct OscServer::Server {
     } else if (call.address == "/describe") {
       describe(client);
     } else if (call.address.starts_with("/param/") && call.arguments.empty()) {
-      tell_parameters(call, client);
+      call.address.ends_with("/range") ? tell_ranges(call, client) : tell_parameters(call, client);
     } else if (const auto events = session.events(call); !events) {
       client.error(call.address, events.error().message);
     } else {
@@ -323,8 +323,14 @@ struct OscServer::Server {
                      "a bundle may have at most " + std::to_string(max_bundle_events) + " events");
         return;
       }
+      const auto loaded = session.current();
       for (const Event& event : *events) {
         group.events.push_back({.event = event});
+        const bool is_known = event.model == loaded->serial;
+        if (const std::string news = is_known ? told_limit(call, event, loaded->instrument) : "";
+            !news.empty()) {
+          client.error(call.address, news);
+        }
       }
     }
   }
@@ -402,7 +408,8 @@ struct OscServer::Server {
   }
 
   // /status.reply s:model f:cpu (0 to 1, -1: not known) i:voices i:max_voices i:xruns i:resets
-  // d:rate i:period f:load_ms f:peak_db (-999: silence) i:late i:dropped s:backend
+  // d:rate i:period f:load_ms f:peak_db (-999: silence) i:late i:dropped s:backend i:beyond (times
+  // that a parameter was kept where it is stable)
   void tell_status(Client& client) {
     const Status status = session.status();
     client.answer(Reply("/status.reply")
@@ -418,20 +425,21 @@ struct OscServer::Server {
                       .real(std::max(-999.0, status.peak_db))
                       .whole(status.late)
                       .whole(status.dropped)
-                      .text(status.backend));
+                      .text(status.backend)
+                      .whole(status.beyond));
   }
 
-  void tell_parameters(const Call& call, Client& client) {
-    const std::string_view pattern = std::string_view(call.address).substr(7);
+  // Calls `tell` for the parameters whose name fits what is between /param/ and the ending.
+  template <class Tell>
+  void each_parameter(const Call& call, std::string_view ending, Client& client, Tell&& tell) {
+    std::string_view pattern = std::string_view(call.address).substr(7);
+    pattern.remove_suffix(ending.size());
     const auto loaded = session.current();
     bool has_any = false;
     for (const ParameterInfo& info : loaded->instrument.parameters) {
       if (fits(pattern, info.name)) {
         has_any = true;
-        // Nothing if another model came in between.
-        if (const auto value = session.parameter(info.name)) {
-          client.answer(Reply("/param/" + info.name).real(*value));
-        }
+        tell(info);
       }
     }
     if (!has_any) {
@@ -439,9 +447,30 @@ struct OscServer::Server {
     }
   }
 
+  void tell_parameters(const Call& call, Client& client) {
+    each_parameter(call, "", client, [&](const ParameterInfo& info) {
+      // Nothing if another model came in between.
+      if (const auto value = session.parameter(info.name)) {
+        client.answer(Reply("/param/" + info.name).real(*value));
+      }
+    });
+  }
+
+  // f:minimum f:maximum f:lowest f:highest that is stable, infinite where nothing limits
+  void tell_ranges(const Call& call, Client& client) {
+    constexpr std::string_view ending = "/range";
+    each_parameter(call, ending, client, [&](const ParameterInfo& info) {
+      client.answer(Reply("/param/" + info.name + std::string(ending))
+                        .real(info.minimum)
+                        .real(info.maximum)
+                        .real(info.safe.lowest)
+                        .real(info.safe.highest));
+    });
+  }
+
   // A row s:address s:arguments s:meaning for everything, then /describe.end i:rows, so that
   // whoever counts knows if one was lost on the way. A parameter's meaning is its value, minimum
-  // and maximum.
+  // and maximum, and between what it is stable.
   void describe(Client& client) {
     const auto loaded = session.current();
     std::uint64_t rows = 0;
@@ -456,7 +485,8 @@ struct OscServer::Server {
     for (const ParameterInfo& info : loaded->instrument.parameters) {
       row("/param/" + info.name, "f",
           print_number(session.parameter(info.name).value_or(info.value)) + " " +
-              print_number(info.minimum) + " " + print_number(info.maximum));
+              print_number(info.minimum) + " " + print_number(info.maximum) + " " +
+              print_limit(info.safe.lowest, false) + " " + print_limit(info.safe.highest, true));
     }
     for (const CustomInfo& custom : loaded->instrument.custom) {
       row(custom.address, "f", "a control of the preset, 0-1");

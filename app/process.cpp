@@ -70,7 +70,10 @@ void Process::run(std::span<const Sample* const> inputs, std::span<Sample* const
       double* const samples = input_.data() + c * chunk_frames;
       input_pointers_[c] = inputs[c] != nullptr ? samples : nullptr;
       if (inputs[c] != nullptr) {
-        std::copy(inputs[c] + at, inputs[c] + at + n, samples);
+        // What is no number would never leave the network again.
+        std::transform(inputs[c] + at, inputs[c] + at + n, samples, [](Sample sample) {
+          return std::isfinite(sample) ? static_cast<double>(sample) : 0.0;
+        });
       }
     }
     collect_due(n);
@@ -163,6 +166,7 @@ void Process::swap_models() {
     fading_ = current_;
     fade_left_ = fading_ == nullptr || goes_on(*next) ? 0 : fade_frames_;
     resets_told_ = fade_left_ == 0 ? resets_told_ : 0;
+    beyond_told_ = fade_left_ == 0 ? beyond_told_ : 0;
     current_ = next;
     meters.swaps.add(1);
   }
@@ -265,6 +269,8 @@ void Process::tell() {
   const EngineMeters now = engine.meters();
   meters.voices.set(now.voices);
   meters.stolen.set(now.stolen);
+  meters.beyond.add(now.beyond - beyond_told_);
+  beyond_told_ = now.beyond;
   if (now.resets != resets_told_) {
     meters.resets.add(now.resets - resets_told_);
     resets_told_ = now.resets;

@@ -63,6 +63,7 @@ struct Meters {
   Meter<int> voices;
   Meter<std::uint64_t> resets;  // voices that became unstable
   Meter<std::uint64_t> stolen;
+  Meter<std::uint64_t> beyond;     // times that a parameter was kept where it is stable
   Meter<std::uint64_t> dropped;    // events that found no room
   Meter<std::uint64_t> late;       // events that came after their time
   Meter<std::uint64_t> malformed;  // MIDI that could not be read
@@ -143,6 +144,7 @@ struct Process {
   std::size_t fade_left_ = 0;
   std::size_t fade_frames_ = 0;
   std::uint64_t resets_told_ = 0;  // of the current engine
+  std::uint64_t beyond_told_ = 0;  // of the same
   Limiter limiter_;
   std::vector<Pending> pending_;  // a heap, the earliest on top; never grows
   std::vector<Event> due_;        // of this chunk, sorted

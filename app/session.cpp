@@ -5,6 +5,7 @@
 #include <cmath>
 #include <future>
 
+#include "app/admit.h"
 #include "app/timing.h"
 
 namespace ressort {
@@ -46,17 +47,18 @@ Session::~Session() {
   }
 }
 
-void Session::load(std::string name, Answer answer) {
+void Session::load(std::string name, Answer answer, bool force) {
   {
     const std::lock_guard lock(mutex_);
-    jobs_.push_back({std::move(name), std::move(answer)});
+    jobs_.push_back({std::move(name), std::move(answer), force});
   }
   wake_.notify_all();
 }
 
-Result<std::shared_ptr<const Loaded>> Session::load_and_wait(const std::string& name) {
+Result<std::shared_ptr<const Loaded>> Session::load_and_wait(const std::string& name, bool force) {
   std::promise<Result<std::shared_ptr<const Loaded>>> promise;
-  load(name, [&](const auto& result) { promise.set_value(result); });
+  load(
+      name, [&](const auto& result) { promise.set_value(result); }, force);
   return promise.get_future().get();
 }
 
@@ -123,6 +125,7 @@ Status Session::status() {
   status.xruns = meters.xruns.get();
   status.resets = meters.resets.get();
   status.stolen = meters.stolen.get();
+  status.beyond = meters.beyond.get();
   status.dropped = meters.dropped.get();
   status.late = meters.late.get();
   status.malformed = meters.malformed.get();
@@ -240,9 +243,10 @@ void Session::do_load(const Job& job) {
   if (again && scene_name_.empty()) {
     return;
   }
-  const auto result = build(again ? scene_name_ : job.name);
+  const auto result = build(again ? scene_name_ : job.name, again ? is_forced_ : job.force);
   if (result && !again) {
     scene_name_ = job.name;
+    is_forced_ = job.force;
   }
   if (job.answer) {
     job.answer(result);
@@ -254,7 +258,7 @@ void Session::do_load(const Job& job) {
   }
 }
 
-Result<std::shared_ptr<const Loaded>> Session::build(const std::string& name) {
+Result<std::shared_ptr<const Loaded>> Session::build(const std::string& name, bool force) {
   const auto start = std::chrono::steady_clock::now();
   auto scene = load_scene(name, {.bare = options_.compile.bare, .third = options_.third});
   if (!scene) {
@@ -269,12 +273,11 @@ Result<std::shared_ptr<const Loaded>> Session::build(const std::string& name) {
   }
   options.find_gain = !scene->has_preset;
   options.most_modes = quick_modes;
+  options.force = force;
   scene->preset.gain *= options_.gain;
-  auto compiled = compile(scene->network, scene->preset, options);
+  auto compiled = admit(*scene, options, scene->warnings);
   if (!compiled) {
-    const Error& error = compiled.error();
-    return Error{scene->path + ":" + std::to_string(error.line) + ":" +
-                 std::to_string(error.column) + ": error: " + error.message};
+    return compiled.error();
   }
   const std::chrono::duration<double, std::milli> took = std::chrono::steady_clock::now() - start;
   auto loaded = std::make_shared<Loaded>();

@@ -51,6 +51,7 @@ struct Status {
   std::uint64_t xruns = 0;
   std::uint64_t resets = 0;
   std::uint64_t stolen = 0;
+  std::uint64_t beyond = 0;  // times that a parameter was kept where it is stable
   std::uint64_t dropped = 0;
   std::uint64_t late = 0;
   std::uint64_t malformed = 0;
@@ -70,10 +71,11 @@ class Session {
 
   // Loads in the worker; `answer` is called there, with what sounds now or with the error's whole
   // text. On an error what sounded goes on. [any thread but audio]
-  void load(std::string name, Answer answer);
+  // What is not stable is such an error, unless it is forced.
+  void load(std::string name, Answer answer, bool force = false);
 
   // The same, waiting for it.
-  Result<std::shared_ptr<const Loaded>> load_and_wait(const std::string& name);
+  Result<std::shared_ptr<const Loaded>> load_and_wait(const std::string& name, bool force = false);
 
   // The backend runs at another rate: what sounds is compiled anew.
   void set_rate(double rate_hz);
@@ -102,6 +104,7 @@ class Session {
   struct Job {
     std::string name;  // empty: the present scene again, at a new rate
     Answer answer;
+    bool force = false;
   };
 
   // What sounds, compiled once more with more patience.
@@ -113,7 +116,7 @@ class Session {
 
   void work();
   void do_load(const Job& job);
-  Result<std::shared_ptr<const Loaded>> build(const std::string& name);
+  Result<std::shared_ptr<const Loaded>> build(const std::string& name, bool force);
   void improve();
   // Hands the engine over; its parts are timed when nobody waits any more.
   void offer(std::unique_ptr<Engine> engine);
@@ -138,6 +141,7 @@ class Session {
 
   std::uint32_t serial_ = 0;                                 // [worker]
   std::string scene_name_;                                   // [worker] what was loaded last
+  bool is_forced_ = false;                                   // [worker] and whether by force
   const Engine* offered_ = nullptr;                          // [worker] until the next is offered
   std::optional<Improvement> improvement_;                   // [worker] what may still gain
   std::chrono::steady_clock::time_point next_reset_news_{};  // [worker]

@@ -100,7 +100,7 @@ expect 2 "cannot be written" "$program" make string 5 -o no/such/folder/s.mdl
 # Stability: what breaks it, by name and line, and how far each parameter may go.
 model stiff.mdl '@K param 1.5\n@g ground 0.\n@m osc 1. K 0. 1. 1.\n@out1 posOutput @m\n'
 expect 0 "stable: every stiffness may grow 2.66666 times" "$program" check stiff.mdl
-expect 0 "K            1.5        from 0 to 6; stable below 4" "$program" check stiff.mdl
+expect 0 "K            1.5        from 0 to 3.99999; stable below 4" "$program" check stiff.mdl
 model wild.mdl '@s ground 0.\n@m mass 1. 1. 1.\n@r spring @s @m 5.\n@out1 posOutput @m\n'
 expect 0 "wild.mdl:3:1: warning: unstable: the stiffness 5 of 'r' must stay below 4" \
   "$program" check wild.mdl
@@ -155,7 +155,30 @@ expect 2 "wrong.score:1:1: error: /in/7/force" \
   "$program" render PolyTriangle -o out.wav --score wrong.score
 expect 2 "the preset keeps 'm_K' between" \
   "$program" render PolyTriangle -o out.wav --set m_K=7
-expect 0 "became unstable" "$program" render wild.mdl -o wild.wav --seconds 1
+
+# The gate.
+expect 2 "wild.mdl:3:1: error: unstable: the stiffness 5 of 'r' must stay below 4; --force plays" \
+  "$program" render wild.mdl -o wild.wav --seconds 1
+expect 0 "became unstable" "$program" render wild.mdl -o wild.wav --seconds 1 --force
+expect 0 "wild.mdl:3:1: warning: unstable: the stiffness 5 of 'r'" \
+  "$program" render wild.mdl -o wild.wav --seconds 1 --force
+expect 2 "wild.mdl:3:1: error: unstable" "$program" play wild.mdl -a dummy -i
+expect 0 "wide.toml:3:5: warning: 'K' is kept below 3.99999; above it the model is not stable" \
+  "$program" render wide.toml -o wide.wav --seconds 1
+expect 0 "K: 4.5 is beyond what is stable, set to 3.99999" \
+  "$program" render wide.toml -o wide.wav --seconds 1 --set K=4.5
+expect 2 "the stiffness K = 4.5 of 'm' must stay below 4" \
+  "$program" render stiff.mdl -o stiff.wav --seconds 1 --set K=4.5
+expect 0 "peak" "$program" render stiff.mdl -o stiff.wav --seconds 1 --set K=3.9
+model steep.score '0.1 /param/K 4.5\n0.2 /param/K 9\n'
+expect 0 "steep.score:1:1: warning: K: 4.5 is beyond what is stable, set to 3.99999" \
+  "$program" render stiff.mdl -o stiff.wav --score steep.score
+# The same numbers at half the rate are four times as stiff.
+expect 2 "the stiffness K = 1.5 of 'm' must stay below 1, at 22050 Hz" \
+  "$program" render stiff.mdl -o stiff.wav --seconds 1 --rate 22050
+expect 0 "peak" "$program" render stiff.mdl -o stiff.wav --seconds 1 --rate 22050 --no-rescale
+model push.score '0 /in/1/force nan\n'
+expect 2 "must be a number" "$program" render PolyTriangle -o out.wav --score push.score
 
 # Playing without what it needs.
 expect 75 "no JACK server answers to the name 'ressort-nobody'" "$program" play -a jack -i

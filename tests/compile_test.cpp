@@ -57,7 +57,10 @@ TEST_CASE("an instrument says what can be played", "[compile]") {
   CHECK(instrument.is_tuned);
   CHECK(player.compiled.engine->parameter(0) == 0.2);
   // The margin is that of the worst corner of the ranges: m_K = .25, m_Z as it is.
-  CHECK(instrument.stiffness_margin == Approx((3.92 - .028) / 1.05).epsilon(1e-12));
+  // The worst motion is that of m0 against m1 and m2 together: with s the factor,
+  // (4 - .024 - .55 s)(4 - .002 - .25 s) = 2 (.002 + .25 s)^2.
+  CHECK(instrument.stiffness_margin ==
+        Approx((3.1949 - std::sqrt(3.1949 * 3.1949 - .05 * 15.89604)) / .025).epsilon(1e-12));
   REQUIRE(instrument.mode);
   CHECK(instrument.highest_frequency_hz > instrument.mode->frequency_hz);
 

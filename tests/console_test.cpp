@@ -263,7 +263,7 @@ TEST_CASE("set turns a parameter within its range, get tells it", "[console]") {
   CHECK(rig.say("get m_K") == "m_K = 0.05\n");
   CHECK(rig.say("set m_K 5") == "m_K = 0.2, the highest it may be\n");
   CHECK(rig.say("set m_K -1") == "m_K = 0.01, the lowest it may be\n");
-  CHECK(has(rig.say("params"), "m_K  0.01   0.01 .. 0.2\n"));
+  CHECK(has(rig.say("params"), "m_K  0.01   0.01 .. 0.2     stable below 1.5"));
   CHECK(rig.say("get m_*") == "m_K = 0.01\nm_Z = 0.001\n");
   CHECK(rig.say("get x") == "error: tri has no parameter 'x'; it has m_K, m_Z\n");
   CHECK(has(rig.say("set x 1"), "m_K, m_Z"));

@@ -210,7 +210,7 @@ TEST_CASE("status and describe answer in full", "[osc]") {
   rig.drive(1);
   const Answer status = rig.client.ask(message("/status"));
   CHECK(status.address == "/status.reply");
-  REQUIRE(status.values.size() == 13);
+  REQUIRE(status.values.size() == 14);
   CHECK(status.text(0).starts_with("ressort_osc_test_"));
   CHECK(std::get<double>(status.values[6]) == rate_hz);
   CHECK(std::get<std::int32_t>(status.values[7]) == static_cast<std::int32_t>(period));

@@ -180,7 +180,7 @@ TEST_CASE("a bundle waits until all of it is there, and acts in one frame", "[pr
 TEST_CASE("what comes first acts first, and what finds no room is counted", "[process]") {
   Stage stage;
   stage.process.slot.offer(sounding(hand_text, holding(), 1));
-  for (const double target : {5.0, 7.0, 2.0}) {
+  for (const double target : {0.03, 0.04, 0.02}) {
     stage.process.from_osc.push(
         {.event = {.kind = EventKind::parameter, .index = 0, .value = target},
          .timing = TimedEvent::When::at_frame,
@@ -191,7 +191,7 @@ TEST_CASE("what comes first acts first, and what finds no room is counted", "[pr
   REQUIRE(stage.process.reports.pop(report));
   CHECK(report.kind == Report::Kind::parameter);
   CHECK(report.model == 1);
-  CHECK(report.value == 2.0);
+  CHECK(report.value == 0.02);
   CHECK_FALSE(stage.process.reports.pop(report));
 
   for (std::size_t i = 0; i < Process::max_events + 10; ++i) {

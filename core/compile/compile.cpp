@@ -19,6 +19,8 @@
 namespace ressort {
 namespace {
 
+constexpr double to_spare = 0.98;  // of the stiffness that keys may use: higher, modes hardly decay
+
 Error preset_error(const Place& place, std::string message) {
   return {std::move(message), place.line, place.column};
 }
@@ -109,7 +111,8 @@ Result<std::vector<ParameterInfo>> parameter_infos(const Network& network, const
                          : parameter.value == 0.0 ? 1.0
                                                   : 4.0 * std::fabs(parameter.value);
     const double least = bare || parameter.value < 0.0 ? -reach : 0.0;
-    infos.push_back({parameter.name, parameter.value, least, reach});
+    infos.push_back(
+        {.name = parameter.name, .value = parameter.value, .minimum = least, .maximum = reach});
   }
   if (bare) {
     return infos;
@@ -127,8 +130,10 @@ Result<std::vector<ParameterInfo>> parameter_infos(const Network& network, const
       return preset_error(setting.place, "the model has no parameter '" + setting.name +
                                              "'; it has " + names(network));
     }
-    infos[static_cast<std::size_t>(index)] = {setting.name, setting.value, setting.minimum,
-                                              setting.maximum};
+    ParameterInfo& info = infos[static_cast<std::size_t>(index)];
+    info.value = setting.value;
+    info.minimum = setting.minimum;
+    info.maximum = setting.maximum;
   }
   return infos;
 }
@@ -209,11 +214,12 @@ bool may_merge(const CompileOptions& options, const Budget& budget) {
 ParameterBox preset_box(const std::vector<ParameterInfo>& parameters, const Preset& preset) {
   ParameterBox box;
   for (const ParameterInfo& info : parameters) {
-    const bool is_given =
-        std::any_of(preset.parameters.begin(), preset.parameters.end(),
-                    [&](const ParameterSetting& setting) { return setting.name == info.name; });
-    box.lowest.push_back(is_given ? info.minimum : info.value);
-    box.highest.push_back(is_given ? info.maximum : info.value);
+    const auto given =
+        std::find_if(preset.parameters.begin(), preset.parameters.end(),
+                     [&](const ParameterSetting& setting) { return setting.name == info.name; });
+    const bool is_given = given != preset.parameters.end();
+    box.lowest.push_back(is_given ? given->minimum : info.value);
+    box.highest.push_back(is_given ? given->maximum : info.value);
   }
   return box;
 }
@@ -223,6 +229,28 @@ namespace {
 // As it is written now, without macros.
 Result<Compiled> compile_as_is(const Network& network, const Preset& preset,
                                const CompileOptions& options, const Budget& budget) {
+// The same with what was narrowed.
+ParameterBox proved_box(const std::vector<ParameterInfo>& parameters, const Preset& preset) {
+  ParameterBox box = preset_box(parameters, preset);
+  for (std::size_t i = 0; i < parameters.size(); ++i) {
+    box.lowest[i] = std::max(box.lowest[i], parameters[i].minimum);
+    box.highest[i] = std::min(box.highest[i], parameters[i].maximum);
+  }
+  return box;
+}
+
+// The factor up to which all that there is stays stable, plucks, bows and contacts as if always
+// felt: exactly where that is quick, else `bound`.
+double stiffness_margin(const Network& network, const ParameterBox& box, double rate_ratio,
+                        double bound) {
+  return bound >= most_bounded || network.masses.size() > most_quick_masses
+             ? bound
+             : std::min(most_bounded, Stability(network, rate_ratio).stiffness_factor(box));
+}
+
+// `written` may still have the macros that `network` has no more.
+Result<Compiled> compile_expanded(const Network& written, const Network& network,
+                                  const Preset& preset, const CompileOptions& options) {
   Compiled compiled;
   Instrument& instrument = compiled.instrument;
   Machine machine = make_machine(network, options.rate_hz, options.rescale);
@@ -270,8 +298,24 @@ Result<Compiled> compile_as_is(const Network& network, const Preset& preset,
   playing.release_s = preset.release_s;
   playing.noise = preset.noise;
   playing.transpose = preset.transpose;
-  playing.highest_factor = highest_stiffness_factor(
-      network, preset_box(instrument.parameters, preset), machine.rate_ratio);
+  compiled.gate = guard({.written = written,
+                         .expanded = network,
+                         .preset = preset,
+                         .rate_hz = machine.rate_hz,
+                         .rate_ratio = machine.rate_ratio,
+                         .bare = options.bare,
+                         .is_open = options.force,
+                         .settings = options.settings,
+                         .reach = options.reach},
+                        instrument.parameters);
+  instrument.verdict = compiled.gate.verdict;
+  for (const Range& limit : compiled.gate.limits) {
+    playing.limits.push_back({limit.lowest, limit.highest});
+  }
+  const ParameterBox proved = proved_box(instrument.parameters, preset);
+  const double bound = highest_stiffness_factor(network, proved, machine.rate_ratio);
+  instrument.stiffness_margin = stiffness_margin(network, proved, machine.rate_ratio, bound);
+  playing.highest_factor = std::max(bound, to_spare * instrument.stiffness_margin);
   for (const Program& program : machine.parts) {
     instrument.masses += program.moving;
   }
@@ -294,7 +338,6 @@ Result<Compiled> compile_as_is(const Network& network, const Preset& preset,
   instrument.outputs = output_count(network);
   instrument.voices = playing.voices;
   instrument.links = network.links.size();
-  instrument.stiffness_margin = playing.highest_factor;
   compiled.plan = make_plan(machine,
                             {.is_double = options.precision == Precision::float64,
                              .isa = options.isa,
@@ -326,6 +369,9 @@ Result<Compiled> compile(const Network& network, const Preset& preset,
     compiled->plan.merged = describe(*merged);
   }
   return compiled;
+  return network.macros.empty()
+             ? compile_expanded(network, network, preset, options)
+             : compile_expanded(network, expand_macros(network), preset, options);
 }
 
 }  // namespace ressort

@@ -8,6 +8,7 @@
 
 #include "core/analysis/interval.h"
 #include "core/analysis/linear.h"
+#include "core/compile/gate.h"
 #include "core/compile/plan.h"
 #include "core/engine/engine.h"
 #include "core/model/network.h"
@@ -29,16 +30,11 @@ struct CompileOptions {
   std::optional<Budget> budget;  // instead of the preset's
   Isa isa = best_isa();          // no wider than the machine's
   std::uint32_t most_modes = patient_modes;  // of a part, for the plan
-  Crew* crew = nullptr;    // outlives the engine, which it steps large parts of; null: none
-  bool find_gain = false;  // so that a forte note peaks at -6 dBFS, instead of the preset's
-};
-
-// A parameter as people reach it: by name, in its own unit, within its range.
-struct ParameterInfo {
-  std::string name;
-  double value = 0.0;  // at the start
-  double minimum = 0.0;
-  double maximum = 0.0;
+  Crew* crew = nullptr;           // outlives the engine, which it steps large parts of; null: none
+  bool find_gain = false;         // so that a forte note peaks at -6 dBFS, instead of the preset's
+  bool force = false;             // no range is narrowed to what is stable
+  std::vector<Setting> settings;  // values that the bare network's parameters get at once
+  std::vector<Setting> reach;     // and those that they will get later: the bare network's ranges
 };
 
 struct InputInfo {
@@ -71,15 +67,18 @@ struct Instrument {
   std::optional<Mode> mode;           // the lowest
   double highest_frequency_hz = 0.0;  // of a key, before it is folded down; 0: not tuned
   double stiffness_margin = 0.0;      // every stiffness may grow by this factor; below 1: unproved
+  Verdict verdict = Verdict::stable;  // of what is always felt, in all ranges
 };
 
 struct Compiled {
   std::unique_ptr<Engine> engine;
   Instrument instrument;
   Plan plan;
+  Gate gate;  // whoever lets it sound has asked this
 };
 
-// Where the preset lets the parameters be turned to; those that it does not name stay.
+// Where the preset lets the parameters be turned to; those that it does not name stay. As it says,
+// not as it was narrowed.
 ParameterBox preset_box(const std::vector<ParameterInfo>& parameters, const Preset& preset);
 
 // Fails, with the preset's line, where the preset names what the model does not have.

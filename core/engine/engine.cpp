@@ -94,8 +94,17 @@ void Engine::Voices::perform_all(std::size_t lane, double amount, Wanted&& wante
   }
 }
 
-void Engine::Voices::set_parameter(std::size_t index, double value) {
-  if (index >= parameters.size() || parameters[index] == value) {
+double Engine::Voices::within_limits(std::size_t index, double value) const {
+  return std::max(playing.limits[index].lowest, std::min(value, playing.limits[index].highest));
+}
+
+void Engine::Voices::set_parameter(std::size_t index, double wanted) {
+  if (index >= parameters.size()) {
+    return;
+  }
+  const double value = within_limits(index, wanted);
+  beyond += value == wanted ? 0 : 1;
+  if (parameters[index] == value) {
     return;
   }
   parameters[index] = value;
@@ -273,6 +282,9 @@ void Engine::Voices::press(double amount) {
 }
 
 void Engine::Voices::handle(const Event& event) {
+  if (!std::isfinite(event.value) || !std::isfinite(event.value2)) {
+    return;  // nothing that could be meant
+  }
   switch (event.kind) {
     case EventKind::note_on:
       return note_on(event);
@@ -398,6 +410,7 @@ EngineMeters Engine::meters() const {
   }
   meters.resets = voices_->resets;
   meters.stolen = voices_->stolen;
+  meters.beyond = voices_->beyond;
   return meters;
 }
 

@@ -3,6 +3,7 @@
 
 #include <array>
 #include <cstdint>
+#include <limits>
 #include <memory>
 #include <span>
 #include <vector>
@@ -43,6 +44,12 @@ enum class Tuning : std::uint8_t {
   keyboard,  // a key's voice sounds at that key's frequency
 };
 
+// Where a parameter keeps the network stable.
+struct Limits {
+  double lowest = -std::numeric_limits<double>::infinity();
+  double highest = std::numeric_limits<double>::infinity();
+};
+
 // How a Machine is played. Plain data, made by the compile room.
 struct Playing {
   int voices = 1;
@@ -56,6 +63,7 @@ struct Playing {
   double mode_damping = 0.0;    // z/m of the same
   double highest_factor = 1.0;  // the stiffness factor up to which the model is proved stable
   std::vector<Control> controls;
+  std::vector<Limits> limits;  // [parameter] that no event and no audio leaves; empty: none
 };
 
 enum class Precision : std::uint8_t { float32, float64 };
@@ -64,6 +72,7 @@ struct EngineMeters {
   int voices = 0;            // that sound
   std::uint64_t resets = 0;  // voices that went out of bounds and were put back to rest
   std::uint64_t stolen = 0;  // voices that had to give way to a new note
+  std::uint64_t beyond = 0;  // times that a parameter was kept within its limits; by audio, blocks
 };
 
 inline constexpr double runaway = 1e9;  // a voice whose output passes this has lost its stability

@@ -27,6 +27,7 @@ Engine::Voices::Voices(Machine machine_in, Playing playing_in, Precision precisi
       bow_pole(playing.bare ? 0.0 : std::exp(-1.0 / (bow_start_s * machine.rate_hz))),
       level_kept(
           std::exp(-static_cast<double>(max_block_frames) / (level_memory_s * machine.rate_hz))) {
+  playing.limits.resize(machine.parameters.size());
   voices.resize(lanes_wanted());
   hands.resize(voices.size() * machine.hands.size());
   parameters = machine.parameters;
@@ -257,11 +258,14 @@ void Engine::Voices::fill_audio(Bank<T>& b, const PartBank<T>& part, std::size_t
                                 std::size_t frames) {
   const Program& program = part.program;
   T* value = b.audio.data();
+  bool is_beyond = false;
   for (std::size_t n = at; n < at + frames && !program.audio_coefficients.empty(); ++n) {
     for (const AudioParameter& audio : program.audio_parameters) {
       const auto channel = static_cast<std::size_t>(audio.channel);
       const bool is_there = channel < inputs.size() && inputs[channel] != nullptr;
-      parameters[audio.parameter] = is_there ? inputs[channel][n] : 0.0;
+      const double wanted = is_there ? inputs[channel][n] : 0.0;
+      parameters[audio.parameter] = within_limits(audio.parameter, wanted);
+      is_beyond |= parameters[audio.parameter] != wanted;
     }
     for (const std::uint32_t c : program.audio_coefficients) {
       for (std::size_t lane = first; lane < first + part.width; ++lane) {
@@ -271,6 +275,7 @@ void Engine::Voices::fill_audio(Bank<T>& b, const PartBank<T>& part, std::size_t
       }
     }
   }
+  beyond += is_beyond ? 1 : 0;
 }
 
 double Engine::Voices::audio_scale(std::size_t input) const {

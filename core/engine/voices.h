@@ -50,6 +50,7 @@ struct Playback {
   std::size_t since_settled = 0;  // frames, below max_block_frames between two segments
   std::uint64_t resets = 0;
   std::uint64_t stolen = 0;
+  std::uint64_t beyond = 0;
   std::uint64_t noise = 0x9e3779b97f4a7c15u;
 };
 
@@ -84,7 +85,9 @@ struct Engine::Voices : Playback {
   void perform_all(std::size_t lane, double amount, Wanted&& wanted);
 
   // --- parameters ---
-  void set_parameter(std::size_t index, double value);
+  // The nearest value that the parameter may have.
+  double within_limits(std::size_t index, double value) const;
+  void set_parameter(std::size_t index, double wanted);
   void note_change(std::uint16_t index);
   template <class T>
   void set_coefficient(PartBank<T>& part, std::size_t lane, std::uint32_t c, bool ramped);
