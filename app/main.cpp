@@ -1,5 +1,8 @@
 // app: the command line, turned into one of the commands.
 #include <CLI/CLI.hpp>
+#include <algorithm>
+#include <iterator>
+#include <map>
 #include <string>
 #include <utility>
 #include <vector>
@@ -102,22 +105,25 @@ CLI::Option* add_choice(CLI::App& command, const std::string& name, T& target,
 }
 
 void add_method(CLI::App& command, std::optional<Method>& method) {
+  std::map<std::string, Method> methods;
   std::vector<std::string> words = {"auto"};
-  for (const Method known : all_methods) {
+  const auto add = [&](Method known) {
     words.emplace_back(method_name(known));
-  }
+    methods[words.back()] = known;
+  };
+  std::for_each(std::begin(all_methods), std::end(all_methods), add);
+  std::for_each(std::begin(physical_methods), std::end(physical_methods), add);
   command
       .add_option_function<std::string>(
           "--method",
-          [&method](const std::string& word) {
-            for (const Method known : all_methods) {
-              if (method_name(known) == word) {
-                method = known;
-              }
+          [&method, methods](const std::string& word) {
+            if (const auto known = methods.find(word); known != methods.end()) {
+              method = known->second;
             }
           },
           "how each part is computed, where it can be: auto takes what is fastest, but for a\n"
-          "bare model direct, which is the published scheme bit for bit on every machine")
+          "bare model direct, which is the published scheme bit for bit on every machine; fourth\n"
+          "is true to the continuous network instead")
       ->check(CLI::IsMember(words))
       ->type_name("WORD");
 }

@@ -346,6 +346,16 @@ Result<Compiled> compile_expanded(const Network& written, const Network& network
                             options.bare && !options.method ? Method::direct : options.method,
                             options.most_modes, budget);
   compiled.plan.left_out = describe(cull(network));
+  instrument.stiffness_margin = playing.highest_factor;
+  const Budget budget = options.budget.value_or(preset.budget);
+  const bool is_published = options.bare && !options.method && !budget.is_physical();
+  compiled.plan =
+      make_plan(machine,
+                {.is_double = options.precision == Precision::float64,
+                 .isa = options.isa,
+                 .voices = playing.voices,
+                 .crew = options.crew},
+                is_published ? Method::direct : options.method, options.most_modes, budget);
   if (options.find_gain) {
     playing.gain *= comfortable_gain(machine, playing, options);
   }

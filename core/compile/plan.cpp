@@ -6,6 +6,7 @@
 #include "core/compile/chains_form.h"
 #include "core/compile/chorus_form.h"
 #include "core/compile/dense_form.h"
+#include "core/compile/fourth_form.h"
 #include "core/compile/grid_form.h"
 #include "core/compile/modal_form.h"
 #include "core/compile/shards.h"
@@ -35,6 +36,8 @@ std::optional<Form> form_of(const Program& program, Method method) {
       return any(chorus_form(program));
     case Method::sparse:
       return any(sparse_form(program));
+    case Method::fourth:
+      return any(fourth_form(program));
   }
   return std::nullopt;
 }
@@ -72,6 +75,14 @@ struct Describer {
   std::string operator()(const Sparse&) const {
     return "masses in vectors by how many links they have, neighbours looked up";
   }
+  std::string operator()(const Fourth& form) const {
+    std::size_t springs = 0;
+    for (const FourthLinks& links : form.springs) {
+      springs += links.count;
+    }
+    return "to fourth order, springs and dampers twice, " +
+           count_of(program.ends.size() - springs, "link", "links") + " as published";
+  }
   std::string operator()(const Shards& form) const {
     return "in " + std::to_string(form.shards->size()) + " shards at once, which meet every " +
            count_of(form.frames, "sample", "samples");
@@ -86,6 +97,12 @@ struct Describer {
 std::string in_ns(double ns) {
   char text[32];
   std::snprintf(text, sizeof text, ns < 9.95 ? "%.1f ns" : "%.0f ns", ns);
+  return text;
+}
+
+std::string rounded(double value) {
+  char text[32];
+  std::snprintf(text, sizeof text, "%.3g", value);
   return text;
 }
 
@@ -105,6 +122,26 @@ class Chooser {
     Part part = take("");
     part.may_gain = may_gain_;
     return part;
+  }
+
+  // Nothing where the published scheme is as near to the continuous network as the budget asks, or
+  // where no physical method can do this part.
+  std::optional<Part> approximate(const Budget& budget) {
+    if (!budget.is_physical()) {
+      return std::nullopt;
+    }
+    const SchemeError error = published_error(steepness_of(program_));
+    if (error.cents <= budget.cents && error.t60_percent <= budget.t60_percent) {
+      return std::nullopt;
+    }
+    for (const Method method : physical_methods) {
+      consider(method);
+    }
+    if (candidates_.empty()) {
+      return std::nullopt;
+    }
+    return take("for the budget: as published up to " + rounded(error.cents) + " cents and " +
+                rounded(error.t60_percent) + " % of decay off");
   }
 
   Part obey(Method method) {
@@ -195,16 +232,22 @@ std::string_view method_name(Method method) {
       return "chorus";
     case Method::sparse:
       return "sparse";
+    case Method::fourth:
+      return "fourth";
   }
   return "";
 }
 
 Plan make_plan(Machine& machine, const Load& load, std::optional<Method> method,
-               std::uint32_t most_modes, const Budget&) {
+               std::uint32_t most_modes, const Budget& budget) {
   Plan plan;
   for (Program& program : machine.parts) {
     Chooser chooser(program, load, most_modes);
-    Part part = method ? chooser.obey(*method) : chooser.choose();
+    std::optional<Part> physical;
+    if (!method) {
+      physical = chooser.approximate(budget);
+    }
+    Part part = physical ? *std::move(physical) : method ? chooser.obey(*method) : chooser.choose();
     if (auto shards = share_out(program, load)) {
       program.form = *std::move(shards);
       part.predicted_ns = predicted_ns(program, load);

@@ -13,12 +13,15 @@
 
 namespace ressort {
 
-enum class Method { direct, chains, dense, modal, grid, chorus, sparse };
+enum class Method { direct, chains, dense, modal, grid, chorus, sparse, fourth };
 
 // The modal form last: it is only sought where it may beat all others.
 inline constexpr Method all_methods[] = {Method::direct, Method::chains, Method::dense,
                                          Method::grid,   Method::chorus, Method::sparse,
                                          Method::modal};
+
+// These are true to the continuous network instead: only for a budget that asks for it, or by name.
+inline constexpr Method physical_methods[] = {Method::fourth};
 
 std::string_view method_name(Method method);
 
@@ -46,9 +49,10 @@ struct Plan {
 };
 
 // Gives every part of the machine the form that the cost model says is the cheapest at its worst,
-// or the one of `method` where a part has it; divided among load.crew where that pays. O(elements),
-// and the eigenvectors of a part of up to `most_modes` masses for which the modal form may pay.
-// [any thread but audio]
+// or the one of `method` where a part has it; divided among load.crew where that pays. With a
+// budget for pitch or decay, the cheapest of the physical methods where the published scheme misses
+// it. O(elements), and the eigenvectors of a part of up to `most_modes` masses for which the modal
+// form may pay. [any thread but audio]
 Plan make_plan(Machine& machine, const Load& load, std::optional<Method> method = {},
                std::uint32_t most_modes = patient_modes, const Budget& budget = {});
 

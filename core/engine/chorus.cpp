@@ -9,16 +9,6 @@ namespace {
 
 constexpr std::size_t most_bytes = 16 * 1024;  // of a kernel's cells: half of what is nearest
 
-// Of a pack: the narrowest that holds the voices, or the widest that there is.
-template <class T>
-std::size_t pack_lanes(std::size_t voices, Isa isa) {
-  std::size_t bytes = 16;
-  while (bytes < vector_bytes(isa) && bytes / sizeof(T) < voices) {
-    bytes *= 2;
-  }
-  return bytes / sizeof(T);
-}
-
 constexpr std::size_t parts_of(std::size_t whole, std::size_t part) {
   return (whole + part - 1) / part;
 }
@@ -174,7 +164,7 @@ ChorusKernel<T>::ChorusKernel(const Program& program, const Chorus& chorus, std:
     : ChorusKernel(
           program, chorus,
           [&] {
-            const std::size_t bytes = pack_lanes<T>(voices, isa) * sizeof(T);
+            const std::size_t bytes = lanes_for<T>(voices, isa) * sizeof(T);
             ChorusTable table = Filler(program, chorus).table();
             // Shared evenly by as many kernels as it takes.
             const std::size_t wanted = parts_of(voices * sizeof(T), bytes);
@@ -182,7 +172,7 @@ ChorusKernel<T>::ChorusKernel(const Program& program, const Chorus& chorus, std:
             table.packs = parts_of(wanted, parts_of(wanted, most));
             return table;
           }(),
-          pack_lanes<T>(voices, isa), isa) {}
+          lanes_for<T>(voices, isa), isa) {}
 
 template <class T>
 ChorusKernel<T>::ChorusKernel(const Program& program, const Chorus& chorus, ChorusTable table,

@@ -4,20 +4,6 @@
 #include <cmath>
 
 namespace ressort {
-namespace {
-
-// The narrowest pack that holds the voices, or the widest that there is.
-template <class T>
-std::size_t lanes_for(std::size_t voices, Isa isa) {
-  std::size_t bytes = 16;
-  while (bytes < vector_bytes(isa) && bytes / sizeof(T) < voices) {
-    bytes *= 2;
-  }
-  return bytes / sizeof(T);
-}
-
-}  // namespace
-
 template <class T>
 DirectKernel<T>::DirectKernel(const Program& program, std::size_t voices, Isa isa)
     : Kernel<T>(program, lanes_for<T>(voices, isa)),

@@ -246,6 +246,19 @@ struct Shards {
   std::uint32_t frames = 1;  // samples that they go on without each other
 };
 
-using Form = std::variant<Direct, Chains, Dense, Modes, Grid, Chorus, Sparse, Shards>;
+// Links that follow each other.
+struct FourthLinks {
+  std::uint32_t run = 0;    // of Program::link_runs: the law and its coefficients
+  std::uint32_t first = 0;  // of Program::ends
+  std::uint32_t count = 0;
+};
+
+// The continuous network to fourth order in time (fourth.h), link by link; one voice in each lane.
+struct Fourth {
+  std::vector<FourthLinks> springs;  // linear, between nodes that are no points
+  std::vector<FourthLinks> others;   // all others, each added as it is written
+};
+
+using Form = std::variant<Direct, Chains, Dense, Modes, Grid, Chorus, Sparse, Shards, Fourth>;
 
 }  // namespace ressort

@@ -41,4 +41,14 @@ constexpr std::size_t vector_bytes(Isa isa) {
   return isa == Isa::v4 ? 64 : isa == Isa::v3 ? 32 : 16;
 }
 
+// Of the narrowest register that holds the voices, or of the widest that there is.
+template <class T>
+constexpr std::size_t lanes_for(std::size_t voices, Isa isa) {
+  std::size_t bytes = 16;
+  while (bytes < vector_bytes(isa) && bytes / sizeof(T) < voices) {
+    bytes *= 2;
+  }
+  return bytes / sizeof(T);
+}
+
 }  // namespace ressort

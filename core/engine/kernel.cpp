@@ -6,6 +6,7 @@
 #include "core/engine/chorus.h"
 #include "core/engine/dense.h"
 #include "core/engine/direct.h"
+#include "core/engine/fourth.h"
 #include "core/engine/grid.h"
 #include "core/engine/modal.h"
 #include "core/engine/sharded.h"
@@ -116,6 +117,9 @@ std::unique_ptr<Kernel<T>> make_kernel(const Program& program, std::size_t voice
     }
     std::unique_ptr<Kernel<T>> operator()(const Shards& shards) const {
       return std::make_unique<ShardedKernel<T>>(program, shards, voices, isa);
+    }
+    std::unique_ptr<Kernel<T>> operator()(const Fourth& fourth) const {
+      return std::make_unique<FourthKernel<T>>(program, fourth, voices, isa);
     }
   };
   return std::visit(Maker{program, voices, isa}, program.form);
