@@ -1,0 +1,429 @@
+#include "core/analysis/continuous.h"
+
+#include <Eigen/Eigenvalues>
+#include <Eigen/LU>
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <utility>
+
+#include "core/analysis/places.h"
+#include "core/model/topology.h"
+
+namespace ressort {
+namespace {
+
+using Matrix = Eigen::MatrixXd;
+using Vector = Eigen::VectorXd;
+using Complex = std::complex<double>;
+
+constexpr double shared_tolerance = 1e-9;  // of the largest: is Z diagonal in the modes of K?
+constexpr double zero = 1e-13;             // of the largest stiffness or damping: none
+
+// A spring and damper between two sums of masses: it pulls by k (sum of share x - offset).
+struct Bar {
+  std::vector<std::pair<Eigen::Index, double>> shares;
+  double offset = 0.0;
+  double k = 0.0;
+  double z = 0.0;
+};
+
+// The network for masses of 1: row i is mass i times the root of its M.
+class Body {
+ public:
+  Body(const Network& network, std::span<const double> parameters)
+      : network_(network), parameters_(parameters), row_(network.masses.size(), held) {
+    for (std::size_t i = 0; i < network.masses.size(); ++i) {
+      if (moves(network.masses[i])) {
+        row_[i] = static_cast<Eigen::Index>(root_.size());
+        root_.push_back(std::sqrt(value(network.masses[i].mass)));
+      }
+    }
+    force_ = Vector::Zero(size());
+    for (std::uint32_t i = 0; i < network.masses.size(); ++i) {
+      const Mass& mass = network.masses[i];
+      if (mass.kind == MassKind::oscillator) {
+        Bar bar{.k = value(mass.stiffness), .z = value(mass.damping)};
+        hang(bar, i, 1.0);
+        bars_.push_back(bar);
+      }
+      if (mass.gravity != no_argument && row_[i] != held) {
+        force_[row_[i]] -= value(mass.gravity) /
+                           (mass.gravity_per_rate ? Network::reference_rate_hz : 1.0) /
+                           root_[static_cast<std::size_t>(row_[i])];
+      }
+    }
+    for (const Link& link : network.links) {
+      const LinearPart part = linear_part(link);
+      Bar bar{.k = value(part.stiffness), .z = value(part.damping)};
+      hang(bar, link.a, 1.0);
+      hang(bar, link.b, -1.0);
+      bars_.push_back(bar);
+    }
+    for (const Bar& bar : bars_) {
+      for (const auto& [row, share] : bar.shares) {
+        force_[row] += bar.k * bar.offset * share;
+      }
+    }
+  }
+
+  Eigen::Index size() const { return static_cast<Eigen::Index>(root_.size()); }
+  bool has_mass() const {
+    return !root_.empty() && std::all_of(root_.begin(), root_.end(), [](double root) {
+      return root > 0.0 && std::isfinite(root);
+    });
+  }
+  const Vector& force() const { return force_; }
+
+  Matrix matrix(double Bar::*of) const {
+    Matrix sum = Matrix::Zero(size(), size());
+    for (const Bar& bar : bars_) {
+      for (const auto& [i, a] : bar.shares) {
+        for (const auto& [j, b] : bar.shares) {
+          sum(i, j) += bar.*of * a * b;
+        }
+      }
+    }
+    return sum;
+  }
+
+  // A shape's stiffness or damping as a sum of squares: exact even where small.
+  double along(double Bar::*of, const Vector& shape) const {
+    double sum = 0.0;
+    for (const Bar& bar : bars_) {
+      double stretch = 0.0;
+      for (const auto& [row, share] : bar.shares) {
+        stretch += share * shape[row];
+      }
+      sum += bar.*of * stretch * stretch;
+    }
+    return sum;
+  }
+
+  std::pair<Vector, Vector> start() const {
+    Vector x(size());
+    Vector v(size());
+    for (std::size_t i = 0; i < row_.size(); ++i) {
+      if (row_[i] != held) {
+        const double root = root_[static_cast<std::size_t>(row_[i])];
+        x[row_[i]] = root * network_.masses[i].position;
+        v[row_[i]] = root * initial_velocity(network_, network_.masses[i]);
+      }
+    }
+    return {x, v};
+  }
+
+  // What a mass's position is, as a sum over rows and a constant.
+  Bar reading(std::uint32_t mass) const {
+    Bar bar;
+    hang(bar, mass, 1.0);
+    return bar;
+  }
+
+  std::vector<double> masses_of(const Vector& rows) const {
+    std::vector<double> all(row_.size(), 0.0);
+    for (std::size_t i = 0; i < row_.size(); ++i) {
+      if (row_[i] != held) {
+        all[i] = rows[row_[i]] / root_[static_cast<std::size_t>(row_[i])];
+      }
+    }
+    return all;
+  }
+
+ private:
+  static constexpr Eigen::Index held = -1;
+
+  double value(ArgumentId id) const { return argument_value(network_, id, parameters_); }
+
+  void hang(Bar& bar, std::uint32_t mass, double sign) const {
+    each_share(network_, mass, [&](std::uint32_t i, double share) {
+      if (row_[i] == held) {
+        bar.offset -= sign * share * network_.masses[i].position;
+      } else {
+        bar.shares.emplace_back(row_[i], sign * share / root_[static_cast<std::size_t>(row_[i])]);
+      }
+    });
+  }
+
+  const Network& network_;
+  std::span<const double> parameters_;
+  std::vector<Eigen::Index> row_;  // [mass]
+  std::vector<double> root_;       // [row] of its M
+  std::vector<Bar> bars_;
+  Vector force_;  // [row] with every mass at 0
+};
+
+class Solver {
+ public:
+  Solver(const Network& network, const Body& body) : body_(body) {
+    for (const Output& output : network.outputs) {
+      reading_.push_back(body.reading(output.mass));
+      made_.outputs.push_back({.rest = -reading_.back().offset});
+    }
+    std::tie(x_, v_) = body.start();
+    made_.energy = 0.5 * v_.squaredNorm();
+  }
+
+  std::optional<Continuous> solve() {
+    const Matrix k = body_.matrix(&Bar::k);
+    const Matrix z = body_.matrix(&Bar::z);
+    const double k_scale = std::max(k.cwiseAbs().maxCoeff(), 1e-300);
+    const double z_scale = std::max(z.cwiseAbs().maxCoeff(), 1e-300);
+    // Of a mixture in odd shares: modes that K alone cannot tell apart, Z may.
+    const Matrix shapes =
+        Eigen::SelfAdjointEigenSolver<Matrix>(k / k_scale + 0.6180339887498949 / z_scale * z)
+            .eigenvectors();
+    const auto is_diagonal = [&](const Matrix& matrix, double scale) {
+      Matrix rest = shapes.transpose() * matrix * shapes;
+      rest.diagonal().setZero();
+      return rest.cwiseAbs().maxCoeff() <= shared_tolerance * scale;
+    };
+    made_.is_proportional = is_diagonal(k, k_scale) && is_diagonal(z, z_scale);
+    if (made_.is_proportional) {
+      Vector rest = Vector::Zero(body_.size());
+      for (Eigen::Index j = 0; j < shapes.cols(); ++j) {
+        add_mode(shapes.col(j), k_scale, z_scale, rest);
+      }
+      made_.rest = body_.masses_of(rest);
+    } else if (body_.size() > static_cast<Eigen::Index>(most_crossed_modes) ||
+               !add_crossed_modes(k, z)) {
+      return std::nullopt;
+    }
+    rank();
+    return std::move(made_);
+  }
+
+ private:
+  double read(std::size_t output, const Vector& shape) const {
+    double sum = 0.0;
+    for (const auto& [row, share] : reading_[output].shares) {
+      sum += share * shape[row];
+    }
+    return sum;
+  }
+
+  // q'' + damping q' + stiffness q = force, for a shape that swings alone.
+  void add_mode(const Vector& shape, double k_scale, double z_scale, Vector& rest) {
+    double stiffness = body_.along(&Bar::k, shape);
+    double damping = body_.along(&Bar::z, shape);
+    stiffness = stiffness < zero * k_scale ? 0.0 : stiffness;
+    damping = damping < zero * z_scale ? 0.0 : damping;
+    const double force = shape.dot(body_.force());
+    const double q = shape.dot(x_);
+    const double v = shape.dot(v_);
+    if (stiffness == 0.0) {
+      add_free(shape, damping, force, q, v);
+      rest += q * shape;
+      return;
+    }
+    const double still = force / stiffness;
+    rest += still * shape;
+    for (std::size_t o = 0; o < reading_.size(); ++o) {
+      made_.outputs[o].rest += read(o, shape) * still;
+    }
+    double inner = stiffness - 0.25 * damping * damping;
+    if (std::fabs(inner) < 1e-12 * stiffness) {
+      inner = 1e-12 * stiffness;  // critical: two partials that can be told apart
+    }
+    const Complex omega = std::sqrt(Complex(inner));
+    const Complex pole(Complex(-0.5 * damping) + Complex(0.0, 1.0) * omega);
+    if (inner > 0.0) {
+      const Complex amplitude(q - still, -(v + 0.5 * damping * (q - still)) / omega.real());
+      add_terms(shape, {{amplitude, pole}});
+      made_.modes.push_back({.pole = pole, .shape = body_.masses_of(shape)});
+      keep_amplitude(shape, amplitude);
+      return;
+    }
+    const double slow = -stiffness / (0.5 * damping + omega.imag());  // no difference of equals
+    const double fast = -0.5 * damping - omega.imag();
+    const double a = (v - fast * (q - still)) / (slow - fast);
+    add_terms(shape, {{a, slow}, {q - still - a, fast}});
+  }
+
+  void add_free(const Vector& shape, double damping, double force, double q, double v) {
+    for (std::size_t o = 0; o < reading_.size(); ++o) {
+      ContinuousOutput& output = made_.outputs[o];
+      const double share = read(o, shape);
+      if (damping == 0.0) {
+        output.rest += share * q;
+        output.drift += share * v;
+        output.fall += share * force;
+      } else {
+        const double final = force / damping;  // velocity
+        output.rest += share * (q + (v - final) / damping);
+        output.drift += share * final;
+        output.terms.push_back({-share * (v - final) / damping, -damping});
+      }
+    }
+  }
+
+  void add_terms(const Vector& shape, const std::vector<ContinuousOutput::Term>& terms) {
+    for (std::size_t o = 0; o < reading_.size(); ++o) {
+      for (const ContinuousOutput::Term& term : terms) {
+        made_.outputs[o].terms.push_back({read(o, shape) * term.amplitude, term.pole});
+      }
+    }
+  }
+
+  void keep_amplitude(const Vector& shape, Complex amplitude) {
+    amplitudes_.emplace_back();
+    for (std::size_t o = 0; o < reading_.size(); ++o) {
+      amplitudes_.back().push_back(std::abs(amplitude * read(o, shape)));
+    }
+  }
+
+  // The eigenvectors of (x, v)' = (v, f - K x - Z v).
+  bool add_crossed_modes(const Matrix& k, const Matrix& z) {
+    const Eigen::Index n = body_.size();
+    Matrix flow = Matrix::Zero(2 * n, 2 * n);
+    flow.topRightCorner(n, n).setIdentity();
+    flow.bottomLeftCorner(n, n) = -k;
+    flow.bottomRightCorner(n, n) = -z;
+    const Eigen::EigenSolver<Matrix> eigen(flow);
+    if (eigen.info() != Eigen::Success) {
+      return false;
+    }
+    const Vector still = k.colPivHouseholderQr().solve(body_.force());
+    if (!((k * still - body_.force()).norm() <= 1e-9 * (1e-300 + body_.force().norm()))) {
+      return false;
+    }
+    made_.rest = body_.masses_of(still);
+    Vector state(2 * n);
+    state << x_ - still, v_;
+    const Eigen::MatrixXcd vectors = eigen.eigenvectors();
+    const Eigen::PartialPivLU<Eigen::MatrixXcd> inverse(vectors);
+    const Eigen::VectorXcd share = inverse.solve(state.cast<Complex>());
+    if (!((vectors * share - state.cast<Complex>()).norm() <= 1e-9 * (1e-300 + state.norm()))) {
+      return false;
+    }
+    for (std::size_t o = 0; o < reading_.size(); ++o) {
+      made_.outputs[o].rest += read(o, still);
+    }
+    for (Eigen::Index j = 0; j < 2 * n; ++j) {
+      const Complex pole = eigen.eigenvalues()[j];
+      if (pole.imag() < 0.0) {
+        continue;  // counted with its conjugate
+      }
+      const bool swings = pole.imag() > 0.0;
+      std::vector<double> loud;
+      for (std::size_t o = 0; o < reading_.size(); ++o) {
+        Complex amplitude = 0.0;
+        for (const auto& [row, part] : reading_[o].shares) {
+          amplitude += part * vectors(row, j) * share[j] * (swings ? 2.0 : 1.0);
+        }
+        made_.outputs[o].terms.push_back({amplitude, pole});
+        loud.push_back(std::abs(amplitude));
+      }
+      if (swings) {
+        made_.modes.push_back({.pole = pole});
+        amplitudes_.push_back(std::move(loud));
+      }
+    }
+    return true;
+  }
+
+  // Loudness against the loudest at each output; by frequency.
+  void rank() {
+    for (std::size_t o = 0; o < reading_.size(); ++o) {
+      double loudest = 0.0;
+      for (const auto& amplitude : amplitudes_) {
+        loudest = std::max(loudest, amplitude[o]);
+      }
+      for (std::size_t j = 0; loudest > 0.0 && j < amplitudes_.size(); ++j) {
+        made_.modes[j].loudness = std::max(made_.modes[j].loudness, amplitudes_[j][o] / loudest);
+      }
+    }
+    std::sort(made_.modes.begin(), made_.modes.end(),
+              [](const ContinuousMode& a, const ContinuousMode& b) {
+                return a.pole.imag() < b.pole.imag();
+              });
+  }
+
+  const Body& body_;
+  std::vector<Bar> reading_;  // [output]
+  Vector x_;                  // [row] at the start
+  Vector v_;
+  Continuous made_;
+  std::vector<std::vector<double>> amplitudes_;  // [mode][output]
+};
+
+}  // namespace
+
+double ContinuousMode::frequency_hz() const {
+  return pole.imag() * Network::reference_rate_hz / (2.0 * std::numbers::pi);
+}
+
+double ContinuousMode::t60_s() const {
+  return 3.0 * std::numbers::ln10 / -pole.real() / Network::reference_rate_hz;
+}
+
+bool is_linear(const Network& network) {
+  for (const Link& link : network.links) {
+    if (link.kind != LinkKind::spring) {
+      return false;
+    }
+  }
+  for (std::uint32_t i = 0; i < network.masses.size(); ++i) {
+    if (is_live_place(network, i)) {
+      return false;
+    }
+  }
+  return true;
+}
+
+std::vector<double> Continuous::play(std::size_t output, std::size_t frames, double step) const {
+  constexpr std::size_t anew = 256;  // after so many products e^(pole t) is computed again
+  const ContinuousOutput& heard = outputs[output];
+  std::vector<double> sound(frames);
+  for (std::size_t n = 0; n < frames; ++n) {
+    const double t = step * static_cast<double>(n + 1);
+    sound[n] = heard.rest + t * (heard.drift + 0.5 * t * heard.fall);
+  }
+  for (const ContinuousOutput::Term& term : heard.terms) {
+    const std::complex<double> turn = std::exp(term.pole * step);
+    std::complex<double> value;
+    for (std::size_t n = 0; n < frames; ++n) {
+      value = n % anew == 0
+                  ? term.amplitude * std::exp(term.pole * (step * static_cast<double>(n + 1)))
+                  : value * turn;
+      sound[n] += value.real();
+    }
+  }
+  return sound;
+}
+
+std::optional<Continuous> solve_continuous(const Network& network,
+                                           std::span<const double> parameters) {
+  if (!network.macros.empty()) {
+    return solve_continuous(expand_macros(network), parameters);
+  }
+  const Body body(network, parameters);
+  if (!is_linear(network) || !body.has_mass() ||
+      body.size() > static_cast<Eigen::Index>(most_exact_modes) ||
+      std::any_of(network.outputs.begin(), network.outputs.end(),
+                  [](const Output& output) { return output.is_force; })) {
+    return std::nullopt;
+  }
+  return Solver(network, body).solve();
+}
+
+std::vector<std::complex<double>> factors_between(const std::vector<std::vector<double>>& before,
+                                                  const std::vector<std::vector<double>>& after) {
+  const auto n = static_cast<Eigen::Index>(before.size());
+  Matrix from(n, n);
+  Matrix to(n, n);
+  for (Eigen::Index c = 0; c < n; ++c) {
+    const auto column = static_cast<std::size_t>(c);
+    from.col(c) = Eigen::Map<const Vector>(before[column].data(), n);
+    to.col(c) = Eigen::Map<const Vector>(after[column].data(), n);
+  }
+  const Eigen::FullPivLU<Matrix> inverse(from);
+  const Matrix step = inverse.isInvertible() ? Matrix(to * inverse.inverse()) : Matrix();
+  if (step.size() == 0 || !step.allFinite()) {
+    return {};
+  }
+  const Eigen::VectorXcd values = Eigen::EigenSolver<Matrix>(step, false).eigenvalues();
+  return {values.data(), values.data() + n};
+}
+
+}  // namespace ressort

@@ -1,0 +1,227 @@
+#include "core/engine/truth.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "core/engine/laws.h"
+
+namespace ressort {
+
+template <>
+struct ScalarOf<long double> {
+  using Type = long double;
+};
+
+namespace {
+
+std::vector<double> coefficients_of(const Program& program) {
+  std::vector<double> values;
+  for (const Coefficient& coefficient : program.coefficients) {
+    values.push_back(coefficient_value(program, coefficient, program.parameters, 1.0));
+  }
+  return values;
+}
+
+template <class T>
+std::vector<double> narrowed(const std::vector<T>& wide) {
+  return {wide.begin(), wide.end()};
+}
+
+// The integral of the force from 0, its dampers at rest.
+
+double clipped_potential(double d, double s, double c, double k) {
+  const double far = std::fabs(d);
+  if (c == 0.0) {
+    return 0.5 * s * d * d;
+  }
+  if (s >= k) {
+    return 0.5 * k * d * d;
+  }
+  const double b = std::sqrt((k - s) / c);
+  const auto cubic = [&](double x) { return x * x * (0.5 * s + 0.25 * c * x * x); };
+  return far <= b ? cubic(far) : cubic(b) + 0.5 * k * (d * d - b * b);
+}
+
+double pluck_potential(double d, double k, double s) {
+  const double far = std::fabs(d);
+  if (far >= s) {
+    return 0.0;  // counted from where it lets go
+  }
+  const double inner = s / 10.0;
+  const auto beyond = [&](double x) { return 0.5 * (k / 10.0) * (s - x) * (s - x); };
+  return far >= inner ? beyond(far) : beyond(inner) + 0.45 * k * (inner * inner - d * d);
+}
+
+double potential(Law law, double d, const std::array<double, 5>& c) {
+  switch (law) {
+    case Law::spring:
+      return 0.5 * c[0] * d * d;
+    case Law::quadratic_spring:
+      return d * d * (0.5 * c[0] + c[1] * std::fabs(d) / 3.0);
+    case Law::cubic_spring:
+      return d * d * (0.5 * c[0] + 0.25 * c[1] * d * d);
+    case Law::clipped_spring:
+      return clipped_potential(d, c[0], c[1], c[2]);
+    case Law::pluck:
+      return pluck_potential(d, c[0], c[1]);
+    case Law::bow:
+    case Law::smooth_bow:
+      return 0.0;
+    case Law::contact:
+      return d > -c[2] ? 0.5 * c[0] * (d + c[2]) * (d + c[2]) : 0.0;
+    case Law::clipped_contact:
+      return d > -c[4] ? clipped_potential(d + c[4], c[0], c[1], std::max(c[0], c[2])) : 0.0;
+  }
+  return 0.0;
+}
+
+bool lets_go(Law law) {
+  return law == Law::pluck || law == Law::contact || law == Law::clipped_contact;
+}
+
+}  // namespace
+
+Textbook::Textbook(const Program& program)
+    : program_(program),
+      x_(program.position.begin(), program.position.end()),
+      v_(program.velocity.begin(), program.velocity.end()),
+      force_(x_.size()),
+      pushed_(x_.size()) {
+  for (const double value : coefficients_of(program)) {
+    coefficient_.push_back(value);
+  }
+  for (const TapSlot& tap : program.taps) {
+    corners_.push_back(corners_at<Real>(tap, coefficient_[tap.u], coefficient_[tap.v]));
+  }
+}
+
+// What a node stands for: itself, or the nodes around it.
+template <class Use>
+void Textbook::behind(std::uint32_t node, Use&& use) const {
+  if (program_.taps.empty() || node < program_.taps[0].node) {
+    return use(node, Real(1));
+  }
+  each_corner(corners_[node - program_.taps[0].node],
+              [&](std::uint32_t at, Real weight) { use(program_.tap_nodes[at], weight); });
+}
+
+void Textbook::push(std::uint32_t node, Real force) {
+  behind(node, [&](std::uint32_t at, Real weight) {
+    force_[at] += weight * force;
+    pushed_[at] += weight * force;
+  });
+}
+
+void Textbook::move_masses() {
+  for (const MassRun& run : program_.mass_runs) {
+    const Real k = run.is_oscillator ? coefficient_[run.stiffness] : 0;
+    const Real z = run.is_oscillator ? coefficient_[run.damping] : 0;
+    const Real g = run.has_gravity ? coefficient_[run.gravity] : 0;
+    for (std::uint32_t i = run.first; i < run.first + run.count; ++i) {
+      v_[i] += (force_[i] - k * x_[i] - z * v_[i] - g) * coefficient_[run.inverse_mass];
+      x_[i] += v_[i];
+    }
+  }
+  std::fill(force_.begin(), force_.end(), Real(0));
+}
+
+void Textbook::move_places() {
+  for (const TapSlot& tap : program_.taps) {
+    Real position = 0;
+    behind(tap.node, [&](std::uint32_t at, Real weight) { position += weight * x_[at]; });
+    v_[tap.node] = position - x_[tap.node];
+    x_[tap.node] = position;
+  }
+}
+
+void Textbook::pull() {
+  for (const LinkRun& run : program_.link_runs) {
+    std::array<Real, 5> c{};
+    for (std::size_t i = 0; i < c.size(); ++i) {
+      c[i] = coefficient_[run.coefficients[i]];
+    }
+    with_law<Real>(run.law, c[0], c[1], c[2], c[3], c[4], [&](auto&& law) {
+      for (std::uint32_t i = run.first; i < run.first + run.count; ++i) {
+        const auto [a, b] = program_.ends[i];
+        const Real f = law(x_[a] - x_[b], v_[a] - v_[b]);
+        force_[a] -= f;
+        force_[b] += f;
+      }
+    });
+  }
+  for (const TapSlot& tap : program_.taps) {
+    const Real force = force_[tap.node];
+    force_[tap.node] = 0;
+    behind(tap.node, [&](std::uint32_t at, Real weight) { force_[at] += weight * force; });
+  }
+}
+
+void Textbook::step(std::span<const double> value, std::span<const double> velocity) {
+  std::fill(pushed_.begin(), pushed_.end(), Real(0));
+  for (std::size_t i = 0; i < program_.inputs.size(); ++i) {
+    if (program_.inputs[i].is_force) {
+      push(program_.inputs[i].node, value[i]);
+    }
+  }
+  move_masses();
+  for (std::size_t i = 0; i < program_.inputs.size(); ++i) {
+    if (!program_.inputs[i].is_force) {
+      x_[program_.inputs[i].node] = value[i];
+      v_[program_.inputs[i].node] = velocity[i];
+    }
+  }
+  move_places();
+  pull();
+}
+
+std::vector<double> Textbook::outputs() const {
+  std::vector<double> values;
+  const Real unit = Real{program_.rate_ratio} * program_.rate_ratio;
+  for (const OutputSlot& output : program_.outputs) {
+    Real value = x_[output.node];
+    if (output.is_force) {
+      value = 0;
+      behind(output.node, [&](std::uint32_t at, Real weight) {
+        value += weight * (force_[at] + pushed_[at]) / unit;
+      });
+    }
+    values.push_back(static_cast<double>(value));
+  }
+  return values;
+}
+
+std::vector<double> Textbook::positions() const {
+  return narrowed(x_);
+}
+std::vector<double> Textbook::velocities() const {
+  return narrowed(v_);
+}
+
+Energy energy_of(const Program& program, std::span<const double> x,
+                 std::span<const double> v_before, std::span<const double> v_after) {
+  const std::vector<double> coefficient = coefficients_of(program);
+  Energy energy;
+  for (const MassRun& run : program.mass_runs) {
+    const double inverse = coefficient[run.inverse_mass];
+    const double k = run.is_oscillator ? coefficient[run.stiffness] : 0.0;
+    const double g = run.has_gravity ? coefficient[run.gravity] : 0.0;
+    for (std::uint32_t i = run.first; i < run.first + run.count; ++i) {
+      energy.total += 0.5 * v_before[i] * v_after[i] / inverse + 0.5 * k * x[i] * x[i] + g * x[i];
+    }
+  }
+  for (const LinkRun& run : program.link_runs) {
+    std::array<double, 5> c{};
+    for (std::size_t i = 0; i < c.size(); ++i) {
+      c[i] = coefficient[run.coefficients[i]];
+    }
+    for (std::uint32_t i = run.first; i < run.first + run.count; ++i) {
+      const double held = potential(run.law, x[program.ends[i].a] - x[program.ends[i].b], c);
+      energy.total += held;
+      energy.held += lets_go(run.law) ? held : 0.0;
+    }
+  }
+  return energy;
+}
+
+}  // namespace ressort
