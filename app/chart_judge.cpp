@@ -19,8 +19,17 @@ constexpr double loud_partial = 1e-3;      // 60 dB below the loudest
 constexpr std::size_t small_scene = 1000;  // masses and links, for 256 times the rate
 constexpr unsigned stress_times = 16;
 constexpr double stress_s = 0.1;
-constexpr double stress_gain = 1.1;    // of energy, without any work done
-constexpr double stress_excess = 4.0;  // of energy, or twice the peak, above 16 times the rate
+constexpr double contact_stress_s = 5.0;  // a contact gains little at a time
+constexpr double stress_gain = 1.1;       // of energy, without any work done
+constexpr double stress_excess = 4.0;     // of energy, or twice the peak, above 16 times the rate
+
+double stress_length_s(const ChartScene& scene) {
+  const auto elements =
+      static_cast<double>(scene.network.masses.size() + scene.network.links.size());
+  return scene.has_contacts && !scene.is_driven()
+             ? std::clamp(100.0 / elements, stress_s, contact_stress_s)
+             : stress_s;
+}
 
 std::size_t frames_of(double seconds) {
   return static_cast<std::size_t>(std::lround(seconds * rate_hz));
@@ -329,6 +338,9 @@ Stress::Stress(const ChartScene& scene, Isa isa) : isa_(isa) {
     worst.network.parameters[p].value = scene.worst[p];
   }
   const bool has_range = worst.network.parameters != scene.network.parameters;
+  if (scene.has_contacts) {
+    cases_.push_back({.name = "as it is", .scene = scene});
+  }
   if (!scene.is_linear || !has_range) {
     cases_.push_back({.name = "hit ten times harder", .scene = struck_harder(scene)});
   }
@@ -340,9 +352,10 @@ Stress::Stress(const ChartScene& scene, Isa isa) : isa_(isa) {
         {.name = "hit harder at the ends of the ranges", .scene = struck_harder(worst)});
   }
   for (Case& one : cases_) {
-    if (auto fine = make_way(one.scene, direct_at(stress_times), stress_s, isa)) {
-      one.peak = peak_of(render_way(*fine, frames_of(stress_s)));
-      const auto energy = watch_energy(one.scene, *fine, stress_s);
+    const double seconds = stress_length_s(one.scene);
+    if (auto fine = make_way(one.scene, direct_at(stress_times), seconds, isa)) {
+      one.peak = peak_of(render_way(*fine, frames_of(seconds)));
+      const auto energy = watch_energy(one.scene, *fine, seconds);
       one.energy = energy ? energy->highest : HUGE_VAL;
     }
   }
@@ -358,15 +371,16 @@ std::string Stress::verdict(const Way& way) const {
 }
 
 std::string Stress::verdict(const Case& one, const Way& way) const {
-  auto made = make_way(one.scene, way, stress_s, isa_);
+  const double seconds = stress_length_s(one.scene);
+  auto made = make_way(one.scene, way, seconds, isa_);
   if (!made) {
     return "";
   }
-  const double peak = peak_of(render_way(*made, frames_of(stress_s)));
+  const double peak = peak_of(render_way(*made, frames_of(seconds)));
   if (!(peak < runaway)) {
     return "out of all bounds";
   }
-  const auto energy = watch_energy(one.scene, *made, stress_s);
+  const auto energy = watch_energy(one.scene, *made, seconds);
   if (!energy) {
     return peak > std::sqrt(stress_excess) * one.peak ? "louder than it can be" : "";
   }

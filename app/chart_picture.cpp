@@ -96,7 +96,7 @@ class Panel {
     left_ *= 0.6;
     right_ *= 2.2;
     if (shows_ == Shows::cents) {
-      bottom_ = least_cents / 2.0;
+      bottom_ = low < HUGE_VAL ? 0.3 * low : least_cents;
       top_ = std::max(10.0, 4.0 * high);
     } else {
       top_ = 8.0;
@@ -181,7 +181,7 @@ class Panel {
   void draw_labels() {
     std::string points;
     for (const ChartRow& row : sheet_.rows) {
-      if (is_drawn(row) && !row.way.label.empty()) {
+      if (is_drawn(row) && !row.way.label.empty() && row.way.precision == Precision::float64) {
         points += number(row.ns) + " " + number(y_of(row)) + " \"" + row.way.label + "\"\n";
       }
     }
@@ -225,11 +225,10 @@ class Panel {
                                     ? "largest error of a partial, cents"
                                     : "error below signal, first " + window() + ", dB";
     return "set title \"" + title() + "\" noenhanced offset 0," + (is_small_ ? "-0.4" : "0.6") +
-           "\nset logscale x\nset logscale x2\nset xrange [" + number(left_) + ":" +
-           number(right_) + "]\nset x2range [" + number(left_) + ":" + number(right_) +
-           "]\nset yrange [" + number(bottom_) + ":" + number(top_) + "]\n" +
-           (shows_ == Shows::cents ? "set logscale y\nset format y \"10^{%T}\"\nset ytics auto\n"
-                                   : "unset logscale y\nset format y \"%g\"\nset ytics auto\n") +
+           "\nset logscale x\nset logscale x2\nunset logscale y\nset xrange [" + number(left_) +
+           ":" + number(right_) + "]\nset x2range [" + number(left_) + ":" + number(right_) +
+           "]\nset yrange [" + number(bottom_) + ":" + number(top_) + "]\nset format y " +
+           (shows_ == Shows::cents ? "\"10^{%T}\"\nset logscale y\n" : "\"%g\"\n") +
            "set x2tics (" + tics + ")\n" +
            (is_small_ ? "unset x2tics\nset xlabel\nset ylabel\nset x2label\n"
                       : "set xlabel \"ns of one core per output sample\"\n"
@@ -254,7 +253,7 @@ class Panel {
 // The marks and colours that occur, in place of a panel.
 std::string legend(const std::vector<const ChartSheet*>& sheets) {
   std::set<std::string> methods;
-  std::set<int> precisions;
+  std::set<int, std::greater<>> precisions;
   bool has_budget = false;
   bool has_failed = false;
   bool has_floor = false;
@@ -298,7 +297,8 @@ std::string legend(const std::vector<const ChartSheet*>& sheets) {
 }
 
 const char* const begin_panel =
-    "set border 31 lc rgb \"#404040\"\nset tics nomirror\nset grid x y lc rgb \"#e4e4e4\"\n"
+    "set border 31 lc rgb \"#404040\"\nset tics nomirror\nset grid xtics ytics lt 1 lc rgb "
+    "\"#e4e4e4\"\n"
     "unset key\n";
 
 std::string margins(double left, double right, double bottom, double top) {

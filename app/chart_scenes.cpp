@@ -54,7 +54,7 @@ Network triangle() {
 
 Network ball() {
   return parsed(
-      "@floor ground 0.\n@ball mass 1. 0.00001 0.01 0.01\n"
+      "@floor ground 0.\n@ball massG 1. 0.00001 0.01 0.01\n"
       "@touch contact @floor @ball 0.5 0. 0.\n@out1 posOutput @ball\n");
 }
 

@@ -56,7 +56,7 @@ void add_method(std::vector<Way>& ways, Method method) {
 // Modes that are exact, and fewer and fewer of them.
 void add_truncation(std::vector<Way>& ways, const std::string& line, std::optional<Method> method,
                     const std::string& budget) {
-  if (method) {
+  if (method && !budget.empty()) {
     ways.push_back({.name = line, .line = line, .method = method, .budget = budget});
   }
   for (const char* const silence : silences) {
