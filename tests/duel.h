@@ -130,6 +130,8 @@ class Fighter {
     return heard;
   }
 
+  const Kernel<T>& kernel() const { return *kernel_; }
+
  private:
   double coefficient(std::uint32_t c) const {
     return coefficient_value(program_, program_.coefficients[c], parameters_, pitch_);

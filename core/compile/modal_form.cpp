@@ -13,6 +13,7 @@ namespace {
 constexpr std::uint32_t nowhere = 0xffffffffu;
 constexpr double shared_tolerance = 1e-12;  // of a matrix' largest element: is it diagonal?
 constexpr double zero_tolerance = 1e-13;    // of the largest: is it anything?
+constexpr double least_stiffness = 1e-12;   // below, a mode is taken to swing as widely as with it
 
 using Matrix = Eigen::MatrixXd;
 using Vector = Eigen::VectorXd;
@@ -35,7 +36,10 @@ struct Frame {
 
 class ModesFinder {
  public:
-  explicit ModesFinder(const Program& program) : program_(program), count_(program.moving) {}
+  ModesFinder(const Program& program, const Budget& budget)
+      : program_(program), count_(program.moving) {
+    modes_.silence = std::pow(10.0, budget.silence_db / 20.0);
+  }
 
   std::optional<Modes> find() {
     if (count_ == 0 || count_ > most_modes || !program_.taps.empty() ||
@@ -399,6 +403,9 @@ class ModesFinder {
         kept_.push_back(i);
       }
     }
+    if (modes_.silence > 0.0) {
+      sort_by_life();
+    }
     modes_.modes = static_cast<std::uint32_t>(kept_.size());
     modes_.q = kept(q_);
     modes_.d = kept(d_);
@@ -419,6 +426,45 @@ class ModesFinder {
         output.place.shape = kept(heard_[row++]);
       }
     }
+  }
+
+  // Those first that will be heard the longest: the time until a mode is below the budget, from as
+  // loud as it is at most beside the loudest, by a blow anywhere or from the start.
+  void sort_by_life() {
+    Vector stiffness = Vector::Zero(count_);
+    Vector damping = Vector::Zero(count_);
+    const double w = modes_.inverse_mass == Modes::own_mass ? 1.0 : value_[modes_.inverse_mass];
+    for (const Frame& frame : stiffness_) {
+      stiffness += w * value_[frame.coefficient] * frame.factor;
+    }
+    for (const Frame& frame : damping_) {
+      damping += w * value_[frame.coefficient] * frame.factor;
+    }
+    // What a blow of 1 becomes, and what is there from the start.
+    const Vector swing = stiffness.cwiseMax(least_stiffness).cwiseSqrt().cwiseInverse();
+    std::vector<Vector> blows{(q_.cwiseAbs2() + (d_.cwiseProduct(swing)).cwiseAbs2()).cwiseSqrt()};
+    for (const Vector& row : pushed_) {
+      blows.push_back(row.cwiseProduct(swing).cwiseAbs());
+    }
+    for (std::size_t i = 0; i < modes_.places.size(); ++i) {
+      blows.push_back(heard_[i].cwiseProduct(swing).cwiseAbs());
+    }
+    Vector loudness = Vector::Zero(count_);
+    for (const Vector& blow : blows) {
+      for (const Vector& row : heard_) {
+        const Vector heard = blow.cwiseProduct(row.cwiseAbs());
+        if (const double loudest = heard.maxCoeff(); loudest > 0.0) {
+          loudness = loudness.cwiseMax(heard / loudest);
+        }
+      }
+    }
+    std::vector<double> life(count_);
+    for (std::uint32_t i = 0; i < count_; ++i) {
+      const double above = std::log(std::max(loudness[i], 1e-30) / std::min(modes_.silence, 0.1));
+      life[i] = above / std::max(0.5 * damping[i], 1e-15);
+    }
+    std::stable_sort(kept_.begin(), kept_.end(),
+                     [&](std::uint32_t a, std::uint32_t b) { return life[a] > life[b]; });
   }
 
   std::vector<double> kept(const Vector& row) const {
@@ -450,8 +496,8 @@ class ModesFinder {
 
 }  // namespace
 
-std::optional<Modes> modal_form(const Program& program) {
-  return ModesFinder(program).find();
+std::optional<Modes> modal_form(const Program& program, const Budget& budget) {
+  return ModesFinder(program, budget).find();
 }
 
 }  // namespace ressort

@@ -4,6 +4,7 @@
 #include <optional>
 
 #include "core/engine/program.h"
+#include "core/model/budget.h"
 
 namespace ressort {
 
@@ -13,6 +14,6 @@ inline constexpr std::size_t most_modes = 1200;  // beyond, the eigenvectors tak
 // Nothing where they do not, where parameters turn the masses one by one, for points on macros,
 // force outputs, audio parameters, and more than most_modes masses. O(n^3): about 20 ms for 300
 // masses, 0.1 s for 600. [any thread but audio]
-std::optional<Modes> modal_form(const Program& program);
+std::optional<Modes> modal_form(const Program& program, const Budget& budget = {});
 
 }  // namespace ressort

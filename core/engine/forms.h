@@ -111,13 +111,15 @@ struct ModalPush {
 };
 
 // The linear links and the masses in their common eigenvectors, everything else holds on to places
-// of them; one voice. Exact, not truncated. With masses of 1/w times the relative mass of each,
+// of them; one voice. With masses of 1/w times the relative mass of each,
 //   d += w (push - sum of coefficient * factor * q - the same of damping * d);  q += d
 struct Modes {
   static constexpr std::uint32_t own_mass = 0xffffffffu;
   std::uint32_t modes = 0;
   std::uint32_t inverse_mass = own_mass;  // the coefficient w, or 1
   double reach = 1.0;                     // no mass moves farther than reach * |q|
+  double silence = 0.0;  // so loud may all be that sleep, to the loudest; 0: none sleeps
+  double quiet = 0.0;    // so loud they may be in any case, in positions
   std::vector<double> q;                  // [mode] at the start
   std::vector<double> d;
   std::vector<double> basis;  // [mode][mass] what a mass's displacement or velocity is to a mode's

@@ -81,6 +81,12 @@ static inline void advance(Ramps<T>& ramps) {
   }
 }
 
+// How much of a kernel's work is being done.
+struct Awake {
+  std::size_t modes = 0;
+  std::size_t of = 0;  // 0: it has no modes
+};
+
 // The Program outlives its kernels and is shared by them. Nothing here throws or allocates after
 // construction.
 template <class T>
@@ -116,6 +122,7 @@ class Kernel {
   }
   // Whether every mass of a lane is nearer than `bound` to where it starts. [audio]
   virtual bool is_near_start(std::size_t lane, double bound) const = 0;
+  virtual Awake awake() const { return {}; }
 
   Coefficients<T> coefficients;
 

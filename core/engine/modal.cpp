@@ -62,10 +62,12 @@ class Furnisher {
     const std::size_t observed = places + modes_.outputs.size();
     state.modes = padded_;
     state.stride = stride_;
-    for (T** row :
-         {&state.q, &state.d, &state.k, &state.z, &state.load, &state.saved_q, &state.saved_d}) {
+    for (T** row : {&state.q, &state.d, &state.k, &state.z, &state.load, &state.saved_q,
+                    &state.saved_d, &state.spread, &state.decay, &state.swing, &state.debt}) {
       *row = arena_.take(stride_);
     }
+    state.loudest = arena_.take(observed);
+    state.room = arena_.take(observed);
     state.stiffness = rows(
         modes_.stiffness, [](auto& share) -> auto& { return share.factor; });
     state.damping = rows(
@@ -145,6 +147,11 @@ ModalKernel<T>::ModalKernel(const Program& program, const Modes& modes, Isa isa)
   state_.place_of = state_.row_of + modes.places.size();
   state_.held = state_.place_of + modes.places.size();
   state_.held_ends = held_ends_.data();
+  state_.silence = static_cast<T>(modes.silence);
+  state_.quiet = static_cast<T>(modes.quiet);
+  // 60 dB in 0.2 s
+  state_.lately_kept =
+      static_cast<T>(std::pow(1e-3, static_cast<double>(nap_frames) / (0.2 * program.rate_hz)));
   this->reset(0);
 }
 
@@ -173,6 +180,28 @@ void ModalKernel<T>::place(std::size_t, const double* x, const double* v) {
   state_.touched_frames = 0;
   state_.surprised_frames = 0;
   state_.kick_norm = T(0);
+  state_.awake = modes_.modes;
+  state_.swept = state_.modes;
+  state_.until_nap = nap_frames;
+  std::fill_n(state_.debt, state_.modes, T(0));
+  std::fill_n(state_.loudest, places + modes_.outputs.size(), T(0));
+}
+
+template <class T>
+Awake ModalKernel<T>::awake() const {
+  return {state_.awake, modes_.modes};
+}
+
+template <class T>
+double ModalKernel<T>::owed(std::size_t listener) const {
+  const std::size_t places = modes_.places.size();
+  const T* const row = listener < places ? state_.places + listener * state_.stride
+                                         : state_.outputs + (listener - places) * state_.stride;
+  double sum = 0.0;
+  for (std::size_t i = 0; i < modes_.modes; ++i) {
+    sum += std::fabs(static_cast<double>(row[i])) * static_cast<double>(state_.debt[i]);
+  }
+  return sum;
 }
 
 template <class T>

@@ -5,12 +5,15 @@
 //   free   nothing nonlinear acts: mode by mode, a few packs in registers for the whole block
 //   bound  sample by sample, so that what links do in one is felt in the next
 // A block is free if the energy cannot bring any mass to where a link acts, or if a free motion
-// turns out not to have met one.
+// turns out not to have met one. With Modes::silence only those modes take part that are not asleep
+// (modal_sleep.h), a first part of the rows.
 #pragma once
 
 #include "core/engine/kernel.h"
 
 namespace ressort {
+
+inline constexpr std::size_t nap_frames = 256;  // from one look at what may sleep to the next
 
 // Everything that one step of ModalKernel touches. Rows of modes are `stride` apart and filled up
 // with zeros to `modes`, whole packs of every kind. Ends: the places, then Modes::ends.
@@ -19,6 +22,8 @@ struct ModalState {
   Ramps<T> ramps;
   std::size_t modes;
   std::size_t stride;
+  std::size_t awake;  // the first so many modes are
+  std::size_t swept;  // the same in whole pairs of packs
   const T* stiffness;   // [share][mode] factors
   const T* damping;     // [share][mode]
   const T* pushes;      // [push][mode] shapes
@@ -54,7 +59,18 @@ struct ModalState {
   std::uint32_t* place_of;  // [row] its inverse
   std::uint32_t* held;      // [hold] how many of its links are computed
   Ends* held_ends;          // [link that is computed]
+  T* spread;         // [mode] square of the amplitude per that of the state; 0: does not ring
+  T* decay;          // [mode] of an amplitude in nap_frames
+  T* swing;          // [mode] amplitude
+  T* debt;           // [mode] amplitude of what was dropped
+  T* loudest;        // [listener] amplitude of the strongest mode, now or lately
+  T* room;           // [listener] what may still be dropped
+  T silence;         // share of `loudest` that may be dropped; 0: nothing sleeps
+  T quiet;           // what may be dropped in any case
+  T lately_kept;     // of `loudest` in nap_frames
+  std::size_t saved_awake = 0;
   std::size_t bundled = 0;
+  std::size_t bundled_modes = 0;
   std::size_t pushing = 0;
   std::uint32_t held_places = 0;
   std::size_t held_links = 0;
@@ -63,7 +79,8 @@ struct ModalState {
   std::uint32_t surprised_frames = 0;  // so long all links are computed
   T kick_norm = 0;                     // what the links added to the norm in their last block
   bool is_stale = true;                // k, z and compliance are not those of `used`
-  bool has_bounds = false;             // the energy limits the motion
+  std::uint32_t until_nap = nap_frames;
+  bool has_bounds = false;  // the energy limits the motion
 };
 
 template <class T>
@@ -82,6 +99,9 @@ class ModalKernel final : public Kernel<T> {
   bool save(std::size_t lane, double* x, double* v) const override;
   // By the length of the modes' displacement, which no mass exceeds: it may be late, never early.
   bool is_near_start(std::size_t lane, double bound) const override;
+  Awake awake() const override;
+  // The most that a listener, a place or then an output, may be off by what sleeps or has slept.
+  double owed(std::size_t listener) const;
 
  private:
   void play(const Block<T>& block) override;

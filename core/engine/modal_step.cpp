@@ -1,6 +1,7 @@
 // The modal kernel's way through a block, compiled for each instruction set.
 #include "core/engine/laws.h"
 #include "core/engine/modal_bounds.h"
+#include "core/engine/modal_sleep.h"
 
 namespace ressort::RESSORT_ISA {
 namespace {
@@ -24,11 +25,16 @@ struct Player {
     for (std::size_t at = 0; at < block.frames;) {
       const std::size_t left = block.frames - at;
       const std::size_t moving = moving_frames();
-      const std::size_t frames = moving > 0 && moving < left ? moving : left;
+      std::size_t frames = moving > 0 && moving < left ? moving : left;
       if (moving > 0) {
+        wake();
         hold_all();
         play_bound<true>(at, frames);
         s.is_stale = true;
+      } else if (s.silence > 0) {
+        frames = frames < s.until_nap ? frames : s.until_nap;
+        play_steady(at, frames);
+        settle(at + frames - 1, frames);
       } else {
         play_steady(at, frames);
       }
@@ -36,14 +42,39 @@ struct Player {
     }
   }
 
+  void wake() {
+    if (s.awake < modes.modes) {
+      stay_awake(s, modes.modes);
+    }
+  }
+  // Lets modes sleep that are neither pushed nor held after frame `last`.
+  void settle(std::size_t last, std::size_t frames) {
+    s.until_nap -= static_cast<std::uint32_t>(frames);
+    if (s.until_nap > 0) {
+      return;
+    }
+    s.until_nap = nap_frames;
+    find_pushes(last, 1);
+    if (s.pushing == 0 && !is_held()) {
+      nap(s, places, places + outputs);
+    }
+  }
+
   void play_steady(std::size_t first, std::size_t frames) {
     if (s.is_stale) {
       mix();
       s.has_bounds = measure_compliance(s, places);
+      if (s.silence > 0) {
+        measure_ringing(s);
+      }
       s.is_stale = false;
     }
     for (std::size_t n = first; n < first + frames; ++n) {
       fill_amplitudes(n);
+    }
+    find_pushes(first, frames);
+    if (s.pushing > 0) {
+      wake();
     }
     if (s.touched_frames > 0 || is_held() || !play_free(first, frames)) {
       play_touched(first, frames);
@@ -81,14 +112,14 @@ struct Player {
     *used = w;
   }
   T* mix(const ModalShare* shares, std::size_t number, const T* factors, T w, T* out, T* used) {
-    for (std::size_t i = 0; i < pack_count(s); ++i) {
+    for (std::size_t i = 0; i < all_packs(s); ++i) {
       packs(out)[i] = ModePack<T>{};
     }
     for (std::size_t j = 0; j < number; ++j, ++used) {
       const T now = coefficient(shares[j].coefficient);
       const T value = w * (shares[j].is_late ? *used : now);
       *used = now;
-      for (std::size_t i = 0; i < pack_count(s); ++i) {
+      for (std::size_t i = 0; i < all_packs(s); ++i) {
         packs(out)[i] += value * packs(factors + j * s.stride)[i];
       }
     }
@@ -210,6 +241,7 @@ struct Player {
     }
   }
   void save() {
+    s.saved_awake = s.awake;
     keep(s, s.saved_q, s.q);
     keep(s, s.saved_d, s.d);
     for (std::size_t p = 0; p < places; ++p) {
@@ -219,6 +251,7 @@ struct Player {
   void restore() {
     keep(s, s.q, s.saved_q);
     keep(s, s.d, s.saved_d);
+    stay_awake(s, s.saved_awake);
     for (std::size_t p = 0; p < places; ++p) {
       s.force[p] = s.saved_force[p];
     }
@@ -265,7 +298,7 @@ struct Player {
   template <bool Moving>
   void play_bound(std::size_t first, std::size_t frames) {
     locate_places();
-    choose_rows<Moving>(first, frames);
+    choose_rows<Moving>();
     bool acts = false;
     for (std::size_t n = first; n < first + frames; ++n) {
       if constexpr (Moving) {
@@ -299,13 +332,11 @@ struct Player {
 
   // The rows of a sample's sweep: places, pushes that push, and outputs.
   template <bool Moving>
-  void choose_rows(std::size_t first, std::size_t frames) {
+  void choose_rows() {
     if (Moving) {
       for (s.pushing = 0; s.pushing < pushes; ++s.pushing) {
         s.push_of[s.pushing] = static_cast<std::uint32_t>(s.pushing);
       }
-    } else {
-      find_pushes(first, frames);
     }
     std::size_t rows = 0;
     for (std::size_t r = 0; r < s.held_places; ++r) {
@@ -327,13 +358,21 @@ struct Player {
   void move_modes(std::size_t n) {
     const T w = inverse_mass();
     const std::size_t kicked = s.held_places + s.pushing;
+    bool acts = false;
     for (std::size_t r = 0; r < s.held_places; ++r) {
       const std::uint32_t p = s.place_of[r];
       s.kick[r] = w * s.force[p];
+      acts |= s.kick[r] != 0;
       s.kicked[p] += absolute(s.kick[r]);
     }
     for (std::size_t r = 0; r < s.pushing; ++r) {
       s.kick[s.held_places + r] = s.amplitude[n * pushes + s.push_of[r]];
+    }
+    if (acts && s.awake < modes.modes) {
+      wake();
+      if (kicked <= most_kicked) {
+        bundle(s, s.bundled);
+      }
     }
     if (kicked > most_kicked) {
       sweep_rows(s, kicked, outputs);
@@ -409,7 +448,6 @@ struct Player {
       }
     }
     const std::size_t heard = rows;
-    find_pushes(first, frames);
     if (s.pushing > 2 || (!modes.holds.empty() && !find_suspects(first, frames, rows)) ||
         rows > most_heard) {
       return false;

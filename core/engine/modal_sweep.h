@@ -25,6 +25,10 @@ const ModePack<T>* packs(const T* numbers) {
 }
 template <class T>
 std::size_t pack_count(const ModalState<T>& s) {
+  return s.swept / mode_lanes<T>;
+}
+template <class T>
+std::size_t all_packs(const ModalState<T>& s) {
   return s.modes / mode_lanes<T>;
 }
 
@@ -62,7 +66,7 @@ void keep(const ModalState<T>& s, T* to, const T* from) {
 // Lays the rows that a sweep needs side by side, pack by pack; null is a row of zeros.
 template <class T>
 void bundle(ModalState<T>& s, std::size_t rows) {
-  bool is_same = rows == s.bundled;
+  bool is_same = rows == s.bundled && s.swept <= s.bundled_modes;
   for (std::size_t r = 0; r < rows && is_same; ++r) {
     is_same = s.rows[r] == s.bundled_rows[r];
   }
@@ -70,6 +74,7 @@ void bundle(ModalState<T>& s, std::size_t rows) {
     return;
   }
   s.bundled = rows;
+  s.bundled_modes = s.swept;
   for (std::size_t r = 0; r < rows; ++r) {
     s.bundled_rows[r] = s.rows[r];
     for (std::size_t i = 0; i < pack_count(s); ++i) {
