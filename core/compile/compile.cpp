@@ -226,9 +226,6 @@ ParameterBox preset_box(const std::vector<ParameterInfo>& parameters, const Pres
 
 namespace {
 
-// As it is written now, without macros.
-Result<Compiled> compile_as_is(const Network& network, const Preset& preset,
-                               const CompileOptions& options, const Budget& budget) {
 // The same with what was narrowed.
 ParameterBox proved_box(const std::vector<ParameterInfo>& parameters, const Preset& preset) {
   ParameterBox box = preset_box(parameters, preset);
@@ -250,7 +247,8 @@ double stiffness_margin(const Network& network, const ParameterBox& box, double 
 
 // `written` may still have the macros that `network` has no more.
 Result<Compiled> compile_expanded(const Network& written, const Network& network,
-                                  const Preset& preset, const CompileOptions& options) {
+                                  const Preset& preset, const CompileOptions& options,
+                                  const Budget& budget) {
   Compiled compiled;
   Instrument& instrument = compiled.instrument;
   Machine machine = make_machine(network, options.rate_hz, options.rescale);
@@ -338,16 +336,6 @@ Result<Compiled> compile_expanded(const Network& written, const Network& network
   instrument.outputs = output_count(network);
   instrument.voices = playing.voices;
   instrument.links = network.links.size();
-  compiled.plan = make_plan(machine,
-                            {.is_double = options.precision == Precision::float64,
-                             .isa = options.isa,
-                             .voices = playing.voices,
-                             .crew = options.crew},
-                            options.bare && !options.method ? Method::direct : options.method,
-                            options.most_modes, budget);
-  compiled.plan.left_out = describe(cull(network));
-  instrument.stiffness_margin = playing.highest_factor;
-  const Budget budget = options.budget.value_or(preset.budget);
   const bool is_published = options.bare && !options.method && !budget.is_physical();
   compiled.plan =
       make_plan(machine,
@@ -356,6 +344,7 @@ Result<Compiled> compile_expanded(const Network& written, const Network& network
                  .voices = playing.voices,
                  .crew = options.crew},
                 is_published ? Method::direct : options.method, options.most_modes, budget);
+  compiled.plan.left_out = describe(cull(network));
   if (options.find_gain) {
     playing.gain *= comfortable_gain(machine, playing, options);
   }
@@ -369,19 +358,19 @@ Result<Compiled> compile_expanded(const Network& written, const Network& network
 
 Result<Compiled> compile(const Network& network, const Preset& preset,
                          const CompileOptions& options) {
-  if (!network.macros.empty()) {
-    return compile(expand_macros(network), preset, options);
-  }
+  const std::optional<Network> expanded =
+      network.macros.empty() ? std::nullopt : std::optional(expand_macros(network));
+  const Network& whole = expanded ? *expanded : network;
   const Budget budget = options.budget.value_or(preset.budget);
-  const auto merged = may_merge(options, budget) ? merge(network, budget) : std::nullopt;
-  auto compiled = compile_as_is(merged ? merged->network : network, preset, options, budget);
-  if (compiled && merged) {
+  const auto merged = may_merge(options, budget) ? merge(whole, budget) : std::nullopt;
+  if (!merged) {
+    return compile_expanded(network, whole, preset, options, budget);
+  }
+  auto compiled = compile_expanded(merged->network, merged->network, preset, options, budget);
+  if (compiled) {
     compiled->plan.merged = describe(*merged);
   }
   return compiled;
-  return network.macros.empty()
-             ? compile_expanded(network, network, preset, options)
-             : compile_expanded(network, expand_macros(network), preset, options);
 }
 
 }  // namespace ressort
