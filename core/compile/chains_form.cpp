@@ -245,6 +245,9 @@ class ChainFinder {
 
 std::optional<Chains> chains_form(const Program& program) {
   const auto is_force = [](const OutputSlot& output) { return output.is_force; };
+  if (!is_plain(program)) {
+    return std::nullopt;
+  }
   if (!program.taps.empty() &&
       std::any_of(program.outputs.begin(), program.outputs.end(), is_force)) {
     return std::nullopt;  // what a point does to a node is never summed

@@ -207,6 +207,41 @@ double comfortable_gain(const Machine& machine, const Playing& playing,
 // The bare network is computed as it is written, unless somebody says how far off it may be.
 bool may_merge(const CompileOptions& options, const Budget& budget) {
   return !options.bare || budget != Budget{};
+// The lowest mode, by which keys find their pitch.
+void find_mode(const Network& network, const Preset& preset, Instrument& instrument) {
+  instrument.masses =
+      static_cast<std::size_t>(std::count_if(network.masses.begin(), network.masses.end(), moves));
+  if (preset.keyboard && instrument.masses <= most_tuned_masses) {
+    std::vector<double> values;
+    for (const ParameterInfo& info : instrument.parameters) {
+      values.push_back(info.value);
+    }
+    instrument.mode = lowest_mode(network, values);
+  }
+}
+
+// By what the parameters may be turned to, and by the stiffness of the highest key there is.
+Schemes schemes_of(const Network& network, const Preset& preset, const CompileOptions& options,
+                   const Instrument& instrument) {
+  constexpr double highest_key_hz = 4186.0;
+  const bool is_told = options.budget || !options.bare;
+  const Passivity passive =
+      is_told ? options.budget.value_or(preset.budget).passive : Passivity::never;
+  Conditions conditions{
+      .box = {},
+      .rate_ratio = options.rescale ? Network::reference_rate_hz / options.rate_hz : 1.0};
+  for (const ParameterInfo& info : instrument.parameters) {
+    conditions.box.lowest.push_back(options.bare ? info.value : info.minimum);
+    conditions.box.highest.push_back(options.bare ? info.value : info.maximum);
+  }
+  if (instrument.mode && !options.bare) {
+    const double octaves = highest_key_hz / instrument.mode->frequency_hz;
+    const double most = highest_stiffness_factor(network, preset_box(instrument.parameters, preset),
+                                                 conditions.rate_ratio);
+    conditions.stiffness_factor =
+        std::max(1.0, std::min(most, octaves * octaves * std::exp2(preset.transpose / 6.0)));
+  }
+  return choose_schemes(network, preset, conditions, passive, options.passive_links);
 }
 
 }  // namespace
@@ -251,12 +286,14 @@ Result<Compiled> compile_expanded(const Network& written, const Network& network
                                   const Budget& budget) {
   Compiled compiled;
   Instrument& instrument = compiled.instrument;
-  Machine machine = make_machine(network, options.rate_hz, options.rescale);
   auto infos = parameter_infos(network, preset, options.bare);
   if (!infos) {
     return infos.error();
   }
   instrument.parameters = *std::move(infos);
+  find_mode(network, preset, instrument);
+  Schemes schemes = schemes_of(network, preset, options, instrument);
+  Machine machine = make_machine(network, options.rate_hz, options.rescale, schemes.links);
   for (std::size_t i = 0; i < instrument.parameters.size(); ++i) {
     machine.parameters[i] = instrument.parameters[i].value;
   }
@@ -320,6 +357,8 @@ Result<Compiled> compile_expanded(const Network& written, const Network& network
   if (preset.keyboard && instrument.masses <= most_tuned_masses) {
     instrument.mode = lowest_mode(network, machine.parameters);
   }
+  playing.highest_factor = highest_stiffness_factor(
+      network, preset_box(instrument.parameters, preset), machine.rate_ratio);
   if (instrument.mode) {
     playing.tuning = Tuning::keyboard;
     playing.mode_stiffness = instrument.mode->stiffness * machine.rate_ratio * machine.rate_ratio;
@@ -345,6 +384,16 @@ Result<Compiled> compile_expanded(const Network& written, const Network& network
                  .crew = options.crew},
                 is_published ? Method::direct : options.method, options.most_modes, budget);
   compiled.plan.left_out = describe(cull(network));
+  instrument.stiffness_margin = playing.highest_factor;
+  compiled.plan = make_plan(machine,
+                            {.is_double = options.precision == Precision::float64,
+                             .isa = options.isa,
+                             .voices = playing.voices,
+                             .crew = options.crew},
+                            options.bare && !options.method ? Method::direct : options.method,
+                            options.most_modes, options.budget.value_or(preset.budget));
+  compiled.plan.notes = std::move(schemes.notes);
+  compiled.schemes = std::move(schemes.links);
   if (options.find_gain) {
     playing.gain *= comfortable_gain(machine, playing, options);
   }

@@ -10,6 +10,7 @@
 #include "core/analysis/linear.h"
 #include "core/compile/gate.h"
 #include "core/compile/plan.h"
+#include "core/compile/schemes.h"
 #include "core/engine/engine.h"
 #include "core/model/network.h"
 #include "core/model/preset.h"
@@ -28,7 +29,8 @@ struct CompileOptions {
   Precision precision = Precision::float64;
   std::optional<Method> method;  // instead of the plan's choice, or the bare network's direct form
   std::optional<Budget> budget;  // instead of the preset's
-  Isa isa = best_isa();          // no wider than the machine's
+  std::vector<std::uint32_t> passive_links;  // passive in any case: of a network without macros
+  Isa isa = best_isa();                      // no wider than the machine's
   std::uint32_t most_modes = patient_modes;  // of a part, for the plan
   Crew* crew = nullptr;           // outlives the engine, which it steps large parts of; null: none
   bool find_gain = false;         // so that a forte note peaks at -6 dBFS, instead of the preset's
@@ -75,6 +77,7 @@ struct Compiled {
   Instrument instrument;
   Plan plan;
   Gate gate;  // whoever lets it sound has asked this
+  std::vector<LinkScheme> schemes;  // [link] of the network without macros
 };
 
 // Where the preset lets the parameters be turned to; those that it does not name stay. As it says,

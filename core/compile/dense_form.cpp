@@ -29,7 +29,7 @@ bool fits(const Program& program) {
 }  // namespace
 
 std::optional<Dense> dense_form(const Program& program) {
-  if (!fits(program)) {
+  if (!is_plain(program) || !fits(program)) {
     return std::nullopt;
   }
   Dense form;

@@ -439,6 +439,9 @@ std::uint32_t largest_spring_run(const Program& program) {
 }  // namespace
 
 std::optional<Grid> grid_form(const Program& program) {
+  if (!is_plain(program)) {
+    return std::nullopt;
+  }
   const bool has_force_output =
       std::any_of(program.outputs.begin(), program.outputs.end(),
                   [](const OutputSlot& output) { return output.is_force; });

@@ -54,8 +54,9 @@ struct Share {
 
 class ProgramMaker {
  public:
-  ProgramMaker(const Network& network, const Share& share, double rate_hz, bool rescale)
-      : network_(network), share_(share) {
+  ProgramMaker(const Network& network, const Share& share, double rate_hz, bool rescale,
+               std::span<const LinkScheme> schemes)
+      : network_(network), share_(share), schemes_(schemes) {
     program_.rate_hz = rate_hz;
     program_.rate_ratio = rescale ? Network::reference_rate_hz / rate_hz : 1.0;
     program_.parameters = parameter_values(network);
@@ -182,7 +183,7 @@ class ProgramMaker {
     std::vector<std::uint32_t> order = share_.links;
     const auto rank = [&](std::uint32_t i) {
       const Link& link = network_.links[i];
-      return std::tuple(link.kind, link.arguments);
+      return std::tuple(link.kind, link.arguments, scheme_of(i));
     };
     std::stable_sort(order.begin(), order.end(),
                      [&](std::uint32_t a, std::uint32_t b) { return rank(a) < rank(b); });
@@ -195,7 +196,12 @@ class ProgramMaker {
         continue;
       }
       const LawRow row = law_of(link.kind);
-      LinkRun run{.law = row.law, .first = i, .count = 1};
+      const LinkScheme scheme = scheme_of(order[i]);
+      LinkRun run{.law = row.law,
+                  .scheme = scheme.scheme,
+                  .substeps = scheme.substeps,
+                  .first = i,
+                  .count = 1};
       for (std::size_t k = 0; k < max_link_arguments; ++k) {
         run.coefficients[k] = coefficient(link.arguments[k], row.units[k]);
       }
@@ -203,8 +209,13 @@ class ProgramMaker {
     }
   }
 
+  LinkScheme scheme_of(std::uint32_t link) const {
+    return link < schemes_.size() ? schemes_[link] : LinkScheme{};
+  }
+
   const Network& network_;
   const Share& share_;
+  std::span<const LinkScheme> schemes_;  // [link of the network]
   Program program_;
   std::vector<std::uint32_t> node_;  // [mass of the network] node, or nowhere
   std::map<std::pair<ArgumentId, Unit>, std::uint32_t> known_;
@@ -318,7 +329,8 @@ class Divider {
   std::size_t parts_ = 0;
 };
 
-Machine machine_of(const Network& network, double rate_hz, bool rescale) {
+Machine machine_of(const Network& network, double rate_hz, bool rescale,
+                   std::span<const LinkScheme> schemes) {
   Machine machine{.rate_hz = rate_hz,
                   .rate_ratio = rescale ? Network::reference_rate_hz / rate_hz : 1.0,
                   .parameters = parameter_values(network),
@@ -330,30 +342,33 @@ Machine machine_of(const Network& network, double rate_hz, bool rescale) {
          .position = input.is_force ? 0.0 : network.masses[input.mass].position});
   }
   for (const Share& share : Divider(network).divide()) {
-    machine.parts.push_back(ProgramMaker(network, share, rate_hz, rescale).make());
+    machine.parts.push_back(ProgramMaker(network, share, rate_hz, rescale, schemes).make());
   }
   return machine;
 }
 
-Program program_of(const Network& network, double rate_hz, bool rescale) {
+Program program_of(const Network& network, double rate_hz, bool rescale,
+                   std::span<const LinkScheme> schemes) {
   Share everything;
   everything.masses.resize(network.masses.size());
   everything.links.resize(network.links.size());
   std::iota(everything.masses.begin(), everything.masses.end(), 0u);
   std::iota(everything.links.begin(), everything.links.end(), 0u);
-  return ProgramMaker(network, everything, rate_hz, rescale).make();
+  return ProgramMaker(network, everything, rate_hz, rescale, schemes).make();
 }
 
 }  // namespace
 
-Machine make_machine(const Network& network, double rate_hz, bool rescale) {
-  return network.macros.empty() ? machine_of(network, rate_hz, rescale)
-                                : machine_of(expand_macros(network), rate_hz, rescale);
+Machine make_machine(const Network& network, double rate_hz, bool rescale,
+                     std::span<const LinkScheme> schemes) {
+  return network.macros.empty() ? machine_of(network, rate_hz, rescale, schemes)
+                                : machine_of(expand_macros(network), rate_hz, rescale, {});
 }
 
-Program make_program(const Network& network, double rate_hz, bool rescale) {
-  return network.macros.empty() ? program_of(network, rate_hz, rescale)
-                                : program_of(expand_macros(network), rate_hz, rescale);
+Program make_program(const Network& network, double rate_hz, bool rescale,
+                     std::span<const LinkScheme> schemes) {
+  return network.macros.empty() ? program_of(network, rate_hz, rescale, schemes)
+                                : program_of(expand_macros(network), rate_hz, rescale, {});
 }
 
 }  // namespace ressort

@@ -498,6 +498,8 @@ class ModesFinder {
 
 std::optional<Modes> modal_form(const Program& program, const Budget& budget) {
   return ModesFinder(program, budget).find();
+std::optional<Modes> modal_form(const Program& program) {
+  return is_plain(program) ? ModesFinder(program).find() : std::nullopt;
 }
 
 }  // namespace ressort

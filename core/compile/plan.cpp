@@ -272,6 +272,10 @@ std::string describe(const Plan& plan) {
   text += plan.merged.empty() ? "" : "merged: " + plan.merged + "\n";
   text += plan.left_out.empty() ? "" : "left out: " + plan.left_out + "\n";
   return text;
+  for (const std::string& note : plan.notes) {
+    text += note + "\n";
+  }
+  return text.empty() ? "nothing moves\n" : text;
 }
 
 }  // namespace ressort

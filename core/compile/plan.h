@@ -46,6 +46,7 @@ struct Plan {
   std::vector<Part> parts;
   std::string merged;    // what became one with something else; may be empty
   std::string left_out;  // what need not be computed at all; empty if all is
+  std::vector<std::string> notes;  // on links that are not as published
 };
 
 // Gives every part of the machine the form that the cost model says is the cheapest at its worst,
@@ -56,7 +57,7 @@ struct Plan {
 Plan make_plan(Machine& machine, const Load& load, std::optional<Method> method = {},
                std::uint32_t most_modes = patient_modes, const Budget& budget = {});
 
-// One line a part.
+// One line a part, and one a note.
 std::string describe(const Plan& plan);
 
 }  // namespace ressort

@@ -146,7 +146,7 @@ bool hears_such(const Program& program, const Sparse& form) {
 }  // namespace
 
 std::optional<Sparse> sparse_form(const Program& program) {
-  if (program.moving < least_sparse_masses || !program.taps.empty()) {
+  if (!is_plain(program) || program.moving < least_sparse_masses || !program.taps.empty()) {
     return std::nullopt;
   }
   Sparse form = SparseMaker(program).make();

@@ -7,6 +7,7 @@
 #pragma once
 
 #include "core/engine/kernel.h"
+#include "core/engine/passive.h"
 #include "core/engine/taps.h"
 
 namespace ressort {
@@ -20,6 +21,11 @@ struct DirectState {
   T* force;             // [node][lane] summed by the links, used by the next sample
   Corners<T>* corners;  // [tap][lane] in this sample
   std::size_t nodes;
+  const std::vector<PassiveLink>& passive;
+  const std::uint32_t* inverse_mass;  // [moving node] coefficient, if there are passive links
+  T* memory;                          // [passive link][passive_rows][lane]
+  T* awake;                           // [lane] 0 in the first sample after place(), else 1
+  T* felt;  // [node][lane] what passive links did in this sample; null: nobody listens
 };
 
 template <class T>
@@ -47,6 +53,11 @@ class DirectKernel final : public Kernel<T> {
   Aligned<T> v_;
   Aligned<T> force_;
   std::vector<Corners<T>> corners_;
+  std::vector<PassiveLink> passive_;
+  std::vector<std::uint32_t> inverse_mass_;
+  Aligned<T> memory_;
+  Aligned<T> awake_;
+  Aligned<T> felt_;
 };
 
 }  // namespace ressort

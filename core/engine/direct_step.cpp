@@ -1,6 +1,7 @@
 // The loops of the direct kernel, compiled for each instruction set.
 #include "core/engine/direct.h"
 #include "core/engine/laws.h"
+#include "core/engine/passive.h"
 
 namespace ressort::RESSORT_ISA {
 namespace {
@@ -81,6 +82,9 @@ template <class S>
 void step_links(const Program& program, S& s) {
   using V = typename S::V;
   for (const LinkRun& run : program.link_runs) {
+    if (run.scheme != Scheme::plain) {
+      continue;
+    }
     const V c0 = s.coefficient[run.coefficients[0]];
     const V c1 = s.coefficient[run.coefficients[1]];
     const V c2 = s.coefficient[run.coefficients[2]];
@@ -165,8 +169,10 @@ typename S::V force_at(const Program& program, const S& s, std::uint32_t node) {
   using T = Scalar<V>;
   V force{};
   for (std::size_t lane = 0; lane < S::lanes; ++lane) {
-    behind(program, s, node, lane,
-           [&](std::size_t at, T weight) { force[lane] += weight * s.state.force[at]; });
+    behind(program, s, node, lane, [&](std::size_t at, T weight) {
+      force[lane] += weight * s.state.force[at];
+      force[lane] += s.state.felt == nullptr ? T(0) : weight * s.state.felt[at];
+    });
   }
   return force;
 }
@@ -185,6 +191,115 @@ typename S::V share(const Program& program, const S& s, std::uint32_t from, std:
     });
   }
   return sum;
+}
+
+// Links that are not plain see nodes and places alike.
+template <class S>
+struct Passive {
+  using V = typename S::V;
+  using T = Scalar<V>;
+
+  V coefficient(std::uint32_t c) const { return s.coefficient[c]; }
+  V awake() const { return *reinterpret_cast<const V*>(s.state.awake); }
+  V distance_now(Ends ends) const { return s.x[ends.a] - s.x[ends.b]; }
+  V speed_now(Ends ends) const { return s.v[ends.a] - s.v[ends.b]; }
+  V distance(Ends ends) const { return position(ends.a) - position(ends.b); }
+  V speed(Ends ends) const { return speed(ends.a) - speed(ends.b); }
+  V gamma(Ends ends) const {
+    const auto [a, b] = ends;
+    const bool may_meet = a == b || is_place(program, a) || is_place(program, b);
+    return give(a, a) + give(b, b) - (may_meet ? 2 * give(a, b) : V{});
+  }
+  void push(Ends ends, V x, V v) {
+    push_node(ends.a, -x, -v);
+    push_node(ends.b, x, v);
+  }
+
+ private:
+  V position(std::uint32_t node) const {
+    if (!is_place(program, node)) {
+      return s.x[node];
+    }
+    V position{};
+    for (std::size_t lane = 0; lane < S::lanes; ++lane) {
+      behind(program, s, node, lane,
+             [&](std::size_t at, T weight) { position[lane] += weight * s.state.x[at]; });
+    }
+    return position;
+  }
+
+  V speed(std::uint32_t node) const {
+    return is_place(program, node) ? position(node) - s.x[node] : s.v[node];
+  }
+
+  // How far one node is moved by a force of 1 at another.
+  V give(std::uint32_t from, std::uint32_t at) const {
+    if (from == at && !is_place(program, at)) {
+      return at < program.moving ? s.coefficient[s.state.inverse_mass[at]] : V{};
+    }
+    V sum{};
+    for (std::size_t lane = 0; lane < S::lanes; ++lane) {
+      behind(program, s, from, lane, [&](std::size_t pushed, T weight) {
+        behind(program, s, at, lane, [&](std::size_t felt, T part) {
+          sum[lane] += pushed == felt ? weight * part * inverse_mass(pushed, lane) : T(0);
+        });
+      });
+    }
+    return sum;
+  }
+
+  T inverse_mass(std::size_t at, std::size_t lane) const {
+    const std::size_t node = at / S::lanes;
+    return node < program.moving ? s.state.ramps.value[s.state.inverse_mass[node] * S::lanes + lane]
+                                 : T(0);
+  }
+
+  void push_node(std::uint32_t node, V x, V v) {
+    if (!is_place(program, node)) {
+      if (node < program.moving) {
+        const V inverse_mass = s.coefficient[s.state.inverse_mass[node]];
+        s.x[node] += inverse_mass * x;
+        s.v[node] += inverse_mass * v;
+      }
+      if (s.state.felt != nullptr) {
+        reinterpret_cast<V*>(s.state.felt)[node] += v;
+      }
+      return;
+    }
+    for (std::size_t lane = 0; lane < S::lanes; ++lane) {
+      behind(program, s, node, lane, [&](std::size_t at, T weight) {
+        const T part = weight * inverse_mass(at, lane);
+        s.state.x[at] += part * x[lane];
+        s.state.v[at] += part * v[lane];
+        if (s.state.felt != nullptr) {
+          s.state.felt[at] += weight * v[lane];
+        }
+      });
+    }
+  }
+
+ public:
+  const Program& program;
+  S& s;
+};
+
+template <class S>
+[[gnu::noinline]] void remember_links(const Program& program, S& s) {
+  using V = typename S::V;
+  remember(s.state.passive, reinterpret_cast<V*>(s.state.memory), Passive<S>{program, s});
+}
+
+template <class S>
+[[gnu::noinline]] void correct_links(const Program& program, S& s) {
+  using V = typename S::V;
+  if (s.state.felt != nullptr) {
+    for (std::size_t i = 0; i < s.state.nodes * S::lanes; ++i) {
+      s.state.felt[i] = 0;
+    }
+  }
+  Passive<S> body{program, s};
+  correct(s.state.passive, reinterpret_cast<V*>(s.state.memory), body);
+  *reinterpret_cast<V*>(s.state.awake) = V{} + 1;
 }
 
 // What acts in the next sample.
@@ -220,6 +335,7 @@ void step(const Program& program, DirectState<T>& state, const Block<T>& block) 
   auto* coefficient = reinterpret_cast<V*>(state.ramps.value);
   auto* outputs = reinterpret_cast<V*>(block.outputs);
   const std::size_t inputs = program.inputs.size();
+  const bool has_passive = !state.passive.empty();
   if (block.frames == 0) {
     Mended<T, Bytes> mended(state);
     pull(program, mended);
@@ -228,6 +344,9 @@ void step(const Program& program, DirectState<T>& state, const Block<T>& block) 
     advance(state.ramps);
     for (const std::uint32_t c : program.audio_coefficients) {
       coefficient[c] = *audio++;
+    }
+    if (has_passive) {
+      remember_links(program, s);
     }
     for (std::size_t i = 0; i < inputs; ++i) {
       if (program.inputs[i].is_force) {
@@ -244,6 +363,9 @@ void step(const Program& program, DirectState<T>& state, const Block<T>& block) 
         s.x[program.inputs[i].node] = value[i];
         s.v[program.inputs[i].node] = velocity[i];
       }
+    }
+    if (has_passive) {
+      correct_links(program, s);
     }
     move_taps(program, s);
     pull(program, s);

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstddef>
 #include <new>
+#include <type_traits>
 #include <vector>
 
 namespace ressort {
@@ -81,6 +82,32 @@ static inline V exponential(V x) {
       x[i] = std::exp(x[i]);
     }
     return x;
+  }
+}
+
+template <class V>
+static inline V square_root(V x) {
+  if constexpr (sizeof(V) == sizeof(Scalar<V>)) {
+    return std::sqrt(x);
+  } else {
+    for (std::size_t i = 0; i < sizeof(V) / sizeof(Scalar<V>); ++i) {
+      x[i] = std::sqrt(x[i]);
+    }
+    return x;
+  }
+}
+
+// Whether a mask, as comparisons give it, holds in any lane.
+template <class Mask>
+static inline bool any_of(Mask mask) {
+  if constexpr (std::is_integral_v<Mask>) {
+    return mask != 0;
+  } else {
+    bool any = false;
+    for (std::size_t i = 0; i < sizeof mask / sizeof mask[0]; ++i) {
+      any = any || mask[i] != 0;
+    }
+    return any;
   }
 }
 

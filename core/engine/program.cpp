@@ -1,5 +1,6 @@
 #include "core/engine/program.h"
 
+#include <algorithm>
 #include <cmath>
 
 namespace ressort {
@@ -8,6 +9,11 @@ namespace {
 constexpr double reference_rate_hz = 44100.0;
 
 }  // namespace
+
+bool is_plain(const Program& program) {
+  return std::all_of(program.link_runs.begin(), program.link_runs.end(),
+                     [](const LinkRun& run) { return run.scheme == Scheme::plain; });
+}
 
 double coefficient_value(const Program& program, const Coefficient& coefficient,
                          std::span<const double> parameters, double stiffness_factor) {

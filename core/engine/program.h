@@ -130,6 +130,9 @@ struct Program {
   std::vector<std::vector<std::uint32_t>> depending;  // [parameter] coefficients
 };
 
+// Whether every link's force is found as published.
+bool is_plain(const Program& program);
+
 // What drives an input, wherever in the network it is.
 struct HandSlot {
   int number = 1;  // from 1, as in the model

@@ -1,0 +1,338 @@
+#include "core/compile/schemes.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <limits>
+#include <map>
+#include <optional>
+#include <string_view>
+
+#include "core/analysis/places.h"
+#include "core/engine/centred.h"
+
+namespace ressort {
+namespace {
+
+constexpr double soft_contact = 0.08;  // K/M
+constexpr double soft_damper = 0.5;    // Z/M
+constexpr double soft_bow = 0.3;
+constexpr double hard_bow = 2.5;
+constexpr double soft_snap = 2.0;     // 0.9 K/M
+constexpr double slow_samples = 20;   // from where a pluck is felt to where it is not any more
+constexpr double soft_tangent = 1.5;  // (dF/dd)/M
+
+std::string number(double value) {
+  char text[32];
+  std::snprintf(text, sizeof text, "%.3g", value);
+  return text;
+}
+
+// What would go wrong as published, in words, and how bad it is: the worst of its kind is told.
+struct Finding {
+  LinkScheme scheme;
+  double badness = 0.0;  // against what is still safe; above 1 it is not
+  std::string trouble;
+};
+
+class Judge {
+ public:
+  Judge(const Network& network, const Preset& preset, const Conditions& conditions)
+      : network_(network),
+        preset_(preset),
+        r_(conditions.rate_ratio),
+        stiffer_(r_ * r_ * conditions.stiffness_factor),
+        grippier_(r_ * std::sqrt(conditions.stiffness_factor)) {
+    for (const Formula& formula : network.arguments) {
+      ranges_.push_back(formula_range(formula, conditions.box));
+    }
+    find_reach();
+  }
+
+  // Nothing where the law is linear.
+  std::optional<Finding> judge(const Link& link) const {
+    const double g = give(link.a) + give(link.b);
+    switch (link.kind) {
+      case LinkKind::spring:
+        return std::nullopt;
+      case LinkKind::contact:
+        return contact(stiffer_ * most(link, 0) * g, r_ * most(link, 1) * g);
+      case LinkKind::clipped_contact:
+        return contact(stiffer_ * steepest_clipped(link) * g, r_ * most(link, 3) * g);
+      case LinkKind::bow:
+      case LinkKind::smooth_bow:
+        return bow(grippier_ * most(link, 0) * g);
+      case LinkKind::pluck:
+        return pluck(link, stiffer_ * most(link, 0) * g);
+      case LinkKind::clipped_spring: {
+        const bool is_bent = most(link, 1) > 0.0 && most(link, 2) > least(link, 0);
+        return spring(stiffer_ * steepest_clipped(link) * g,
+                      (r_ * most(link, 3) + (is_bent ? 0.3 * stiffer_ * most(link, 2) : 0.0)) * g);
+      }
+      case LinkKind::quadratic_spring:
+      case LinkKind::cubic_spring:
+        return spring(stiffer_ * tangent(link) * g, 0.0);
+    }
+    return std::nullopt;
+  }
+
+ private:
+  // An argument's largest value, and its smallest; not below 0.
+  double most(const Link& link, std::size_t i) const {
+    const ArgumentId id = link.arguments[i];
+    return id == no_argument ? 0.0 : std::max(0.0, ranges_[id].highest);
+  }
+  double least(const Link& link, std::size_t i) const {
+    const ArgumentId id = link.arguments[i];
+    return id == no_argument ? 0.0 : std::max(0.0, ranges_[id].lowest);
+  }
+
+  double inverse_mass(std::uint32_t mass) const {
+    const Mass& m = network_.masses[mass];
+    return !moves(m) || m.mass == no_argument ? 0.0 : 1.0 / std::max(0.0, ranges_[m.mass].lowest);
+  }
+
+  // How far a node moves by a force of 1 at most; a live place like the lightest node it may be at.
+  double give(std::uint32_t mass) const {
+    double sum = 0.0;
+    if (is_live_place(network_, mass)) {
+      const Tap& tap = network_.taps[network_.masses[mass].tap];
+      for (std::uint32_t i = 0; i < tap.length * tap.width; ++i) {
+        sum = std::max(sum, inverse_mass(tap.first + i));
+      }
+      return sum;
+    }
+    each_share(network_, mass, [&](std::uint32_t node, double share) {
+      sum += share * share * inverse_mass(node);
+    });
+    return sum;
+  }
+
+  // The slope of s d + c d^3 where it is clipped at k, which is 3 k - 2 s; with c = 0 it is s.
+  double steepest_clipped(const Link& link) const {
+    const double s = most(link, 0);
+    const double k = most(link, 2);
+    return most(link, 1) > 0.0 ? std::max(s, 3.0 * k - 2.0 * least(link, 0)) : std::max(s, k);
+  }
+
+  // How far apart two ends may come as far as is known, and what else may set them in motion.
+  void find_reach() {
+    double low = std::numeric_limits<double>::infinity();
+    double high = -low;
+    const auto include = [&](double position) {
+      low = std::min(low, position);
+      high = std::max(high, position);
+    };
+    for (std::uint32_t i = 0; i < network_.masses.size(); ++i) {
+      const Mass& mass = network_.masses[i];
+      include(mass.position);
+      if (moves(mass) && mass.mass != no_argument) {
+        const double v = initial_velocity(network_, mass);
+        energy_ += 0.5 * ranges_[mass.mass].highest * v * v;
+      }
+    }
+    for (const ControlSetting& control : preset_.controls) {
+      const double size = std::max(std::fabs(control.low), std::fabs(control.high));
+      const Input* const input = input_of(control);
+      if (input == nullptr) {
+        continue;
+      }
+      if (control.gesture == ControlGesture::impulse && input->is_force) {
+        energy_ += 0.5 * size * size * inverse_mass(input->mass);
+      } else if (input->is_force) {
+        force_ += size;
+      } else if (control.gesture == ControlGesture::pluck) {
+        include(control.travel);
+        include(-control.travel);
+      } else if (control.gesture != ControlGesture::bow) {
+        include(control.low);
+        include(control.high);
+      }
+    }
+    reach_ = high > low ? high - low : 0.0;
+  }
+
+  const Input* input_of(const ControlSetting& control) const {
+    for (const Input& input : network_.inputs) {
+      if (control.gesture != ControlGesture::parameter &&
+          control.target == "in" + std::to_string(input.number)) {
+        return &input;
+      }
+    }
+    return nullptr;
+  }
+
+  // dF/dd at the farthest: where masses and hands stand, where the energy is all in the spring, or
+  // twice where the forces that last would hold it.
+  double tangent(const Link& link) const {
+    const double k = most(link, 0);
+    const double q = most(link, 1);
+    if (q == 0.0) {
+      return k;
+    }
+    const bool is_cubic = link.kind == LinkKind::cubic_spring;
+    const double by_energy = is_cubic ? std::sqrt(2.0 * std::sqrt(energy_ / q))  // Q d^4/4
+                                      : std::cbrt(3.0 * energy_ / q);            // Q d^3/3
+    const double by_k = k > 0.0 ? std::sqrt(2.0 * energy_ / k) : by_energy;
+    const double by_force = 2.0 * (is_cubic ? std::cbrt(force_ / q) : std::sqrt(force_ / q));
+    const double d = std::max({reach_, std::min(by_energy, by_k), by_force});
+    return k + (is_cubic ? 3.0 * q * d * d : 2.0 * q * d);
+  }
+
+  static Finding contact(double k, double z) {
+    const LinkScheme centred{Scheme::centred, 1};
+    if (k / soft_contact >= z / soft_damper) {
+      return {centred, k / soft_contact,
+              "could gain " + number(12.5 * k) + " % of speed at a touch (K/M up to " + number(k) +
+                  ")"};
+    }
+    return {centred, z / soft_damper, "would damp too hard (Z/M up to " + number(z) + ")"};
+  }
+
+  static Finding bow(double z) {
+    const bool is_hard = z > hard_bow;
+    return {{is_hard ? Scheme::substeps : Scheme::centred,
+             is_hard ? static_cast<std::uint16_t>(least_substeps) : std::uint16_t{1}},
+            z / soft_bow,
+            "would grip a sample too late (Z/M up to " + number(z) + ")"};
+  }
+
+  Finding pluck(const Link& link, double k) const {
+    const double scale = least(link, 1);
+    double speed = 0.0;
+    for (const ControlSetting& control : preset_.controls) {
+      const Input* const input = input_of(control);
+      if (input != nullptr && !input->is_force && control.gesture == ControlGesture::pluck &&
+          (input->mass == link.a || input->mass == link.b)) {
+        speed = std::max({speed, std::fabs(control.low) * r_, std::fabs(control.high) * r_});
+      }
+    }
+    const double steps = std::max(std::ceil(std::sqrt(1.2 * k)),
+                                  scale > 0.0 ? std::ceil(10.0 * speed / scale) : 0.0);
+    const LinkScheme scheme{Scheme::substeps, static_cast<std::uint16_t>(std::clamp<double>(
+                                                  steps, least_substeps, most_substeps))};
+    const double samples = speed > 0.0 ? 2.0 * scale / speed : 2.0 * slow_samples;
+    if (0.9 * k / soft_snap >= slow_samples / samples) {
+      return {scheme, 0.9 * k / soft_snap, "could snap wrongly (K/M up to " + number(k) + ")"};
+    }
+    return {scheme, slow_samples / samples, "may be passed in " + number(samples) + " samples"};
+  }
+
+  static Finding spring(double k, double z) {
+    return {{Scheme::centred, 1},
+            std::max(k / soft_tangent, z),
+            "could blow up where it is the stiffest (K/M up to " + number(k) + ")"};
+  }
+
+  const Network& network_;
+  const Preset& preset_;
+  double r_;
+  double stiffer_;             // what a stiffness is multiplied by at worst
+  double grippier_;            // ...and a bow's Z
+  std::vector<Range> ranges_;  // [argument]
+  double reach_ = 0.0;
+  double energy_ = 0.0;
+  double force_ = 0.0;
+};
+
+std::string kind_name(LinkKind kind, std::size_t count) {
+  const auto of = [&](const char* one, const char* many) { return count == 1 ? one : many; };
+  switch (kind) {
+    case LinkKind::contact:
+    case LinkKind::clipped_contact:
+      return of("contact", "contacts");
+    case LinkKind::bow:
+    case LinkKind::smooth_bow:
+      return of("bow", "bows");
+    case LinkKind::pluck:
+      return of("pluck", "plucks");
+    case LinkKind::spring:
+      return of("spring", "springs");
+    default:
+      return of("spring that grows stiffer", "springs that grow stiffer");
+  }
+}
+
+// All that is told in one sentence.
+struct Told {
+  LinkKind kind = LinkKind::spring;
+  std::size_t count = 0;
+  std::optional<Finding> worst;
+  LinkScheme scheme;
+};
+
+std::string sentence(const Told& told) {
+  const std::string who = std::to_string(told.count) + " " + kind_name(told.kind, told.count);
+  const bool is_bad = told.worst && told.worst->badness > 1.0;
+  const std::string how = told.scheme.scheme == Scheme::plain ? " as published"
+                          : told.scheme.scheme == Scheme::centred
+                              ? " centred"
+                              : " in " + std::to_string(told.scheme.substeps) + " steps a sample";
+  if (told.scheme.scheme == Scheme::plain) {
+    return who + how + ", which " + told.worst->trouble;
+  }
+  return who + how +
+         (is_bad ? ": as published " + std::string(told.count == 1 ? "it " : "they ") +
+                       told.worst->trouble
+                 : ", as asked for");
+}
+
+}  // namespace
+
+Schemes choose_schemes(const Network& network, const Preset& preset, const Conditions& conditions,
+                       Passivity passive, const std::vector<std::uint32_t>& forced) {
+  Schemes schemes;
+  schemes.links.resize(network.links.size());
+  const auto is_linear = [](const Link& link) { return link.kind == LinkKind::spring; };
+  if (forced.empty() && std::all_of(network.links.begin(), network.links.end(), is_linear)) {
+    return schemes;
+  }
+  const Judge judge(network, preset, conditions);
+  std::vector<bool> is_forced(network.links.size(), false);
+  for (const std::uint32_t link : forced) {
+    if (link < is_forced.size()) {
+      is_forced[link] = true;
+    }
+  }
+  std::map<std::pair<LinkKind, LinkScheme>, Told> tellings;
+  for (std::size_t i = 0; i < network.links.size(); ++i) {
+    const Link& link = network.links[i];
+    const std::optional<Finding> finding = judge.judge(link);
+    const bool is_bad = finding && finding->badness > 1.0;
+    const bool is_wanted =
+        passive == Passivity::always || (passive == Passivity::where_needed && is_bad);
+    if (is_forced[i] || (finding && is_wanted)) {
+      schemes.links[i] = finding ? finding->scheme : LinkScheme{Scheme::centred, 1};
+    } else if (!is_bad) {
+      continue;
+    }
+    Told& told = tellings[{link.kind, schemes.links[i]}];
+    ++told.count;
+    told.kind = link.kind;
+    told.scheme = schemes.links[i];
+    if (!told.worst || (finding && finding->badness > told.worst->badness)) {
+      told.worst = finding;
+    }
+  }
+  for (const auto& [key, told] : tellings) {
+    schemes.notes.push_back(sentence(told));
+  }
+  return schemes;
+}
+
+Network always_felt(const Network& network, const std::vector<LinkScheme>& links) {
+  Network felt = network;
+  felt.links.clear();
+  for (std::size_t i = 0; i < network.links.size(); ++i) {
+    const LinkKind kind = network.links[i].kind;
+    // Quadratic and cubic springs count with what they are at rest, by their own K and Z.
+    const bool counts = i >= links.size() || links[i].scheme == Scheme::plain ||
+                        kind == LinkKind::quadratic_spring || kind == LinkKind::cubic_spring;
+    if (counts) {
+      felt.links.push_back(network.links[i]);
+    }
+  }
+  return felt;
+}
+
+}  // namespace ressort
