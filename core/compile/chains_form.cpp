@@ -3,10 +3,16 @@
 #include <algorithm>
 #include <array>
 
+#include "core/engine/passive.h"
+
 namespace ressort {
 namespace {
 
 constexpr std::uint32_t none = 0xffffffffu;
+
+bool is_spring(const LinkRun& run) {
+  return run.law == Law::spring && run.scheme == Scheme::plain;
+}
 
 class ChainFinder {
  public:
@@ -28,8 +34,7 @@ class ChainFinder {
       can_hold_[tap.node] = false;  // what acts on it does not end there
     }
     for (const LinkRun& run : program.link_runs) {
-      for (std::uint32_t link = run.first; run.law == Law::spring && link < run.first + run.count;
-           ++link) {
+      for (std::uint32_t link = run.first; is_spring(run) && link < run.first + run.count; ++link) {
         run_of_[link] = &run;
         springs_at_[program.ends[link].a].push_back(link);
         springs_at_[program.ends[link].b].push_back(link);
@@ -44,7 +49,7 @@ class ChainFinder {
     };
     std::vector<Candidate> candidates;
     for (const LinkRun& run : program_.link_runs) {
-      if (run.law == Law::spring && run.count + 1 >= least_chain_masses) {
+      if (is_spring(run) && run.count + 1 >= least_chain_masses) {
         candidates.push_back({&run, search(run).springs.size()});
       }
     }
@@ -245,12 +250,12 @@ class ChainFinder {
 
 std::optional<Chains> chains_form(const Program& program) {
   const auto is_force = [](const OutputSlot& output) { return output.is_force; };
-  if (!is_plain(program)) {
-    return std::nullopt;
-  }
-  if (!program.taps.empty() &&
+  if ((!program.taps.empty() || !is_plain(program)) &&
       std::any_of(program.outputs.begin(), program.outputs.end(), is_force)) {
-    return std::nullopt;  // what a point does to a node is never summed
+    return std::nullopt;  // what a point or a passive link does to a node is never summed
+  }
+  if (holds_places(program)) {
+    return std::nullopt;
   }
   return ChainFinder(program).find();
 }

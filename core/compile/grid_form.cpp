@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "core/compile/grid_places.h"
+#include "core/engine/passive.h"
 
 namespace ressort {
 namespace {
@@ -90,11 +91,13 @@ class Fit {
     return node != nowhere && node < program_.moving;
   }
 
+  // Those that are not plain are the kernel's own matter.
   template <class Use>
   void each_link(Use&& use) const {
     for (std::uint32_t run = 0; run < program_.link_runs.size(); ++run) {
       const LinkRun& links = program_.link_runs[run];
-      for (std::uint32_t i = links.first; i < links.first + links.count; ++i) {
+      for (std::uint32_t i = links.first;
+           links.scheme == Scheme::plain && i < links.first + links.count; ++i) {
         use(run, program_.ends[i]);
       }
     }
@@ -428,7 +431,8 @@ std::uint32_t largest_spring_run(const Program& program) {
   std::uint32_t largest = nowhere;
   for (std::uint32_t run = 0; run < program.link_runs.size(); ++run) {
     const LinkRun& links = program.link_runs[run];
-    if (links.law == Law::spring && links.count >= least_regular_links &&
+    if (links.law == Law::spring && links.scheme == Scheme::plain &&
+        links.count >= least_regular_links &&
         (largest == nowhere || links.count > program.link_runs[largest].count)) {
       largest = run;
     }
@@ -439,13 +443,10 @@ std::uint32_t largest_spring_run(const Program& program) {
 }  // namespace
 
 std::optional<Grid> grid_form(const Program& program) {
-  if (!is_plain(program)) {
-    return std::nullopt;
-  }
   const bool has_force_output =
       std::any_of(program.outputs.begin(), program.outputs.end(),
                   [](const OutputSlot& output) { return output.is_force; });
-  if (program.moving < least_grid_masses || has_force_output) {
+  if (program.moving < least_grid_masses || has_force_output || holds_places(program)) {
     return std::nullopt;
   }
   const std::uint32_t mass_run = largest_mass_run(program);

@@ -43,6 +43,7 @@ class TablesMaker {
     find_listened();
     place_taps();
     make_links();
+    place_passive();
     for (std::uint32_t i = 0; i < program_.inputs.size(); ++i) {
       const InputSlot& input = program_.inputs[i];
       (input.is_force ? tables_.forces : tables_.positions)
@@ -170,6 +171,9 @@ class TablesMaker {
       std::size_t of = run;
       for (; link >= runs[of].first + runs[of].count; ++of) {
       }
+      if (runs[of].scheme != Scheme::plain) {
+        continue;
+      }
       auto& link_runs = tables_.link_runs;
       if (link_runs.empty() || of != run) {
         link_runs.push_back(runs[of]);
@@ -181,6 +185,27 @@ class TablesMaker {
       const auto [a, b] = program_.ends[link];
       tables_.ends.push_back({place_[a], place_[b], force_at(a), force_at(b)});
     }
+  }
+
+  void place_passive() {
+    const auto add = [&](std::uint32_t node) {
+      const bool is_chained = site_mass_[node] != nowhere;
+      const auto next = static_cast<std::uint32_t>(tables_.passive_ends.size());
+      tables_.passive_ends.push_back(
+          {.place = place_[node],
+           .unit = is_chained ? site_of(node).unit : nowhere,
+           .inverse_mass = node < program_.moving ? mass_run_of(node).inverse_mass : nowhere});
+      return next;
+    };
+    tables_.passive = passive_links(program_);
+    for (PassiveLink& link : tables_.passive) {
+      link.ends = {add(link.ends.a), add(link.ends.b)};
+    }
+  }
+
+  const MassRun& mass_run_of(std::uint32_t node) const {
+    return *std::find_if(program_.mass_runs.begin(), program_.mass_runs.end(),
+                         [&](const MassRun& run) { return node < run.first + run.count; });
   }
 
   void make_outputs() {
@@ -266,7 +291,8 @@ ChainsKernel<T>::ChainsKernel(const Program& program, Isa isa)
       held_(4 * tables_.chains.size()),
       force_(tables_.force_count),
       corners_(program.taps.size()),
-      tap_pull_(program.taps.size()) {
+      tap_pull_(program.taps.size()),
+      memory_(tables_.passive.size() * passive_rows) {
   const auto& chains = std::get<Chains>(program.form).chains;
   for (std::size_t i = 0; i < chains.size(); ++i) {
     const std::uint32_t packs = tables_.chains[i].packs;
@@ -293,6 +319,7 @@ void ChainsKernel<T>::place(std::size_t, const double* x, const double* v) {
   std::fill(held_.begin(), held_.end(), T(0));
   std::fill(force_.begin(), force_.end(), T(0));
   std::fill(tap_pull_.begin(), tap_pull_.end(), T(0));
+  awake_ = T(0);
 }
 
 template <class T>
@@ -320,6 +347,7 @@ bool ChainsKernel<T>::mend(std::span<const std::uint32_t> nodes, const T* x, con
     bodies_[place_[node] + lanes_] = *v++;
   }
   std::fill(force_.begin(), force_.end(), T(0));
+  awake_ = T(1);
   this->step({});
   return true;
 }
@@ -333,7 +361,9 @@ void ChainsKernel<T>::play(const Block<T>& block) {
                        .held = held_.data(),
                        .force = force_.data(),
                        .corners = corners_.data(),
-                       .tap_pull = tap_pull_.data()};
+                       .tap_pull = tap_pull_.data(),
+                       .memory = memory_.data(),
+                       .awake = &awake_};
   step_(program_, tables_, state, block);
   this->coefficients.finish(block.frames);
 }

@@ -7,6 +7,7 @@
 #pragma once
 
 #include "core/engine/kernel.h"
+#include "core/engine/passive.h"
 #include "core/engine/taps.h"
 
 namespace ressort {
@@ -88,6 +89,13 @@ struct PlacedTap {
   std::uint32_t force = 0;
 };
 
+// A node that a link holds whose force is not the plain one.
+struct PassiveEnd {
+  Place place = 0;
+  std::uint32_t unit = nowhere;          // if it is in a chain, as ChainSite says
+  std::uint32_t inverse_mass = nowhere;  // coefficient, if it moves
+};
+
 // What a kernel makes of a Program and its lanes, once.
 struct ChainsTables {
   std::vector<FoldedChain> chains;
@@ -104,7 +112,9 @@ struct ChainsTables {
   std::vector<Probe> probes;
   std::vector<PlacedTap> taps;
   std::vector<PlacedNode> tap_nodes;  // those of the Program
-  std::size_t force_count = 0;        // sites, loose masses, listened, points, those never read
+  std::vector<PassiveLink> passive;   // ends: of the next
+  std::vector<PassiveEnd> passive_ends;
+  std::size_t force_count = 0;  // sites, loose masses, listened, points, those never read
   std::size_t pairs = 0;
 };
 
@@ -120,6 +130,8 @@ struct ChainsState {
   T* force;        // [force] summed by the links, used by the next sample
   Corners<T>* corners;  // [tap] in this sample
   T* tap_pull;          // [tap] what the links of this sample do to it, for the next one
+  T* memory;            // [passive link][passive_rows]
+  T* awake;             // 0 in the first sample after place(), else 1
 };
 
 template <class T>
@@ -155,6 +167,8 @@ class ChainsKernel final : public Kernel<T> {
   Aligned<T> force_;
   std::vector<Corners<T>> corners_;
   Aligned<T> tap_pull_;
+  Aligned<T> memory_;
+  T awake_ = T(0);
 };
 
 }  // namespace ressort

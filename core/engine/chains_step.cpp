@@ -449,6 +449,63 @@ T force_at(const Program& program, const ChainsTables& tables, const S& s, const
   return force / static_cast<T>(program.rate_ratio * program.rate_ratio);
 }
 
+// Links that are not plain, number by number.
+template <class S>
+struct Passive {
+  using T = typename S::Number;
+  using V = typename S::V;
+
+  T coefficient(std::uint32_t c) const { return s.coefficient[c]; }
+  T awake() const { return *state.awake; }
+  T distance_now(Ends ends) const { return body(ends.a)[0] - body(ends.b)[0]; }
+  T speed_now(Ends ends) const { return body(ends.a)[S::lanes] - body(ends.b)[S::lanes]; }
+  T distance(Ends ends) const { return distance_now(ends); }
+  T speed(Ends ends) const { return speed_now(ends); }
+  T gamma(Ends ends) const { return ends.a == ends.b ? T(0) : give(ends.a) + give(ends.b); }
+  void push(Ends ends, T x, T v) {
+    push_end(ends.a, -x, -v);
+    push_end(ends.b, x, v);
+  }
+
+  const T* body(std::uint32_t end) const { return s.bodies + tables.passive_ends[end].place; }
+  T give(std::uint32_t end) const {
+    const std::uint32_t mass = tables.passive_ends[end].inverse_mass;
+    return mass == nowhere ? T(0) : s.coefficient[mass];
+  }
+  // In whole packs where a chain is, as push() above.
+  void push_end(std::uint32_t index, T x, T v) {
+    const PassiveEnd& end = tables.passive_ends[index];
+    const T inverse_mass = give(index);
+    if (end.unit == nowhere) {
+      s.bodies[end.place] += inverse_mass * x;
+      s.bodies[end.place + S::lanes] += inverse_mass * v;
+      return;
+    }
+    const V unit = pack_at<V>(s.units + end.unit);
+    V* const pair = &pack_at<V>(s.bodies + (end.place - end.unit / S::lanes));
+    pair[0] += all<V>(inverse_mass * x) * unit;
+    pair[1] += all<V>(inverse_mass * v) * unit;
+  }
+
+  const ChainsTables& tables;
+  ChainsState<T>& state;
+  S s;
+};
+
+// With a view of their own, as they cost step() registers.
+template <class T, std::size_t Bytes>
+[[gnu::noinline]] void remember_links(const ChainsTables& tables, ChainsState<T>& state) {
+  using S = Mended<T, Bytes>;
+  remember(tables.passive, state.memory, Passive<S>{tables, state, S(tables, state)});
+}
+template <class T, std::size_t Bytes>
+[[gnu::noinline]] void correct_links(const ChainsTables& tables, ChainsState<T>& state) {
+  using S = Mended<T, Bytes>;
+  Passive<S> body{tables, state, S(tables, state)};
+  correct(tables.passive, state.memory, body);
+  *state.awake = 1;
+}
+
 // Not inlined, as it costs step() registers.
 template <class T, std::size_t Bytes>
 [[gnu::noinline]] void mend(const ChainsTables& tables, ChainsState<T>& state) {
@@ -470,6 +527,7 @@ void step(const Program& program, const ChainsTables& tables, ChainsState<T>& st
   const std::size_t inputs = program.inputs.size();
   const std::size_t output_count = program.outputs.size();
   const std::size_t frames = block.frames;
+  const bool has_passive = !tables.passive.empty();
   if (frames == 0) {
     return mend<T, Bytes>(tables, state);
   }
@@ -477,6 +535,9 @@ void step(const Program& program, const ChainsTables& tables, ChainsState<T>& st
     advance(ramps);
     for (const std::uint32_t c : audio_coefficients) {
       ramps.value[c] = *audio++;
+    }
+    if (has_passive) {
+      remember_links<T, Bytes>(tables, state);
     }
     for (const PlacedInput& input : s.forces) {
       s.force[input.force] += value[input.index];
@@ -488,6 +549,9 @@ void step(const Program& program, const ChainsTables& tables, ChainsState<T>& st
     for (const PlacedInput& input : s.positions) {
       s.bodies[input.place] = value[input.index];
       s.bodies[input.place + S::lanes] = velocity[input.index];
+    }
+    if (has_passive) {
+      correct_links<T, Bytes>(tables, state);
     }
     move_taps(s);
     for (const std::uint32_t i : s.listened) {

@@ -42,7 +42,12 @@ GridKernel<T>::GridKernel(const Program& program, const Grid& grid, Isa isa)
       shift_((furthest_offset(grid) + grid_line - 1) / grid_line * grid_line),
       inverse_mass_(grid.slots, grid_fixed),
       pushed_(program.taps.size() * grid_pushes),
-      corners_(program.taps.size()) {
+      corners_(program.taps.size()),
+      passive_(passive_links(program)),
+      memory_(passive_.size() * passive_rows) {
+  for (PassiveLink& link : passive_) {
+    link.ends = {grid.slot[link.ends.a], grid.slot[link.ends.b]};
+  }
   for (const MassRun& run : program.mass_runs) {
     for (std::uint32_t node = run.first; node < run.first + run.count; ++node) {
       inverse_mass_[grid.slot[node]] = run.inverse_mass;
@@ -100,6 +105,7 @@ void GridKernel<T>::place(std::size_t, const double* x, const double* v) {
   }
   pushes_ = 0;
   is_fresh_ = true;
+  awake_ = T(0);
 }
 
 template <class T>
@@ -144,6 +150,7 @@ bool GridKernel<T>::mend(std::span<const std::uint32_t> nodes, const T* x, const
   }
   std::fill(force_.begin(), force_.end(), T(0));
   pushes_ = 0;
+  awake_ = T(1);
   this->step({});
   return true;
 }
@@ -168,7 +175,10 @@ void GridKernel<T>::play(const Block<T>& block) {
                      .inverse_mass = inverse_mass_.data(),
                      .pushed = pushed_.data(),
                      .pushes = pushes_,
-                     .corners = corners_.data()};
+                     .corners = corners_.data(),
+                     .passive = passive_,
+                     .memory = memory_.data(),
+                     .awake = &awake_};
   step_(program_, grid_, state, block);
   is_forward_ = state.is_forward;
   is_fresh_ = state.is_fresh;

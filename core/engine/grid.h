@@ -2,6 +2,7 @@
 #pragma once
 
 #include "core/engine/kernel.h"
+#include "core/engine/passive.h"
 #include "core/engine/taps.h"
 
 namespace ressort {
@@ -38,7 +39,10 @@ struct GridState {
   const std::uint32_t* inverse_mass;  // [slot] coefficient, or grid_fixed
   std::uint32_t* pushed;              // slots that points push in the next sample
   std::size_t pushes;
-  Corners<T>* corners;  // [tap] in this sample
+  Corners<T>* corners;                      // [tap] in this sample
+  const std::vector<PassiveLink>& passive;  // ends: slots
+  T* memory;                                // [passive link][passive_rows]
+  T* awake;                                 // 0 in the first sample after place(), else 1
 };
 
 template <class T>
@@ -81,6 +85,9 @@ class GridKernel final : public Kernel<T> {
   std::vector<Corners<T>> corners_;
   bool is_forward_ = true;
   bool is_fresh_ = true;
+  std::vector<PassiveLink> passive_;
+  Aligned<T> memory_;
+  T awake_ = T(0);
 };
 
 }  // namespace ressort

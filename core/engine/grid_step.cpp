@@ -257,6 +257,23 @@ void step_loose(const View<T>& s) {
   }
 }
 
+// Moves what moves further, and makes it faster.
+template <class T>
+void move(const View<T>& s, std::uint32_t slot, T further, T faster) {
+  if (s.state.inverse_mass[slot] == grid_fixed) {
+    return;
+  }
+  const T v = s.state.v[slot] + faster;
+  const T x = s.state.x[slot] + further;
+  s.state.v[slot] = v;
+  s.state.x[slot] = x;
+  if (!s.grid.segments.empty()) {
+    const T* const c = s.state.ramps.value;
+    const LinkRun& run = s.program.link_runs[s.grid.spring_run];
+    s.state.next_y[slot] = c[run.coefficients[0]] * x + c[run.coefficients[1]] * v;
+  }
+}
+
 // A force f moves a mass by f/M more, which may as well be added when it has moved.
 template <class T>
 void push(const View<T>& s, std::uint32_t slot) {
@@ -268,14 +285,7 @@ void push(const View<T>& s, std::uint32_t slot) {
     return;
   }
   const T more = force * c[inverse_mass];
-  const T v = s.state.v[slot] + more;
-  const T x = s.state.x[slot] + more;
-  s.state.v[slot] = v;
-  s.state.x[slot] = x;
-  if (!s.grid.segments.empty()) {
-    const LinkRun& run = s.program.link_runs[s.grid.spring_run];
-    s.state.next_y[slot] = c[run.coefficients[0]] * x + c[run.coefficients[1]] * v;
-  }
+  move(s, slot, more, more);
 }
 
 template <class T>
@@ -349,6 +359,40 @@ template <class T>
   }
 }
 
+// Links that are not plain.
+template <class T>
+struct Passive {
+  T coefficient(std::uint32_t c) const { return s.state.ramps.value[c]; }
+  T awake() const { return *s.state.awake; }
+  T distance_now(Ends ends) const { return s.state.x[ends.a] - s.state.x[ends.b]; }
+  T speed_now(Ends ends) const { return s.state.v[ends.a] - s.state.v[ends.b]; }
+  T distance(Ends ends) const { return distance_now(ends); }
+  T speed(Ends ends) const { return speed_now(ends); }
+  T gamma(Ends ends) const { return ends.a == ends.b ? T(0) : give(ends.a) + give(ends.b); }
+  void push(Ends ends, T x, T v) {
+    move(s, ends.a, -x * give(ends.a), -v * give(ends.a));
+    move(s, ends.b, x * give(ends.b), v * give(ends.b));
+  }
+  T give(std::uint32_t slot) const {
+    const std::uint32_t inverse_mass = s.state.inverse_mass[slot];
+    return inverse_mass == grid_fixed ? T(0) : coefficient(inverse_mass);
+  }
+
+  const View<T>& s;
+};
+
+template <class T>
+[[gnu::noinline]] void remember_links(const View<T>& s) {
+  remember(s.state.passive, s.state.memory, Passive<T>{s});
+}
+
+template <class T>
+[[gnu::noinline]] void correct_links(const View<T>& s) {
+  Passive<T> body{s};
+  correct(s.state.passive, s.state.memory, body);
+  *s.state.awake = 1;
+}
+
 // What acts in the next sample, except what the segments and the links of the grid do by
 // themselves.
 template <class T>
@@ -375,6 +419,9 @@ void step(const Program& program, const Grid& grid, GridState<T>& state, const B
     for (const std::uint32_t c : program.audio_coefficients) {
       state.ramps.value[c] = *audio++;
     }
+    if (!state.passive.empty()) {
+      remember_links(s);
+    }
     for (std::size_t i = 0; i < inputs; ++i) {
       if (program.inputs[i].is_force) {
         state.force[grid.slot[program.inputs[i].node]] += value[i];
@@ -392,6 +439,9 @@ void step(const Program& program, const Grid& grid, GridState<T>& state, const B
         state.x[grid.slot[program.inputs[i].node]] = value[i];
         state.v[grid.slot[program.inputs[i].node]] = velocity[i];
       }
+    }
+    if (!state.passive.empty()) {
+      correct_links(s);
     }
     move_taps(s);
     pull(s);

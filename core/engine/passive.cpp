@@ -20,6 +20,17 @@ void each_moved(const Program& program, std::uint32_t end, Use&& use) {
 
 }  // namespace
 
+bool holds_places(const Program& program) {
+  if (program.taps.empty()) {
+    return false;
+  }
+  const std::vector<PassiveLink> links = passive_links(program);
+  const std::uint32_t first = program.taps[0].node;
+  return std::any_of(links.begin(), links.end(), [&](const PassiveLink& link) {
+    return link.ends.a >= first || link.ends.b >= first;
+  });
+}
+
 std::vector<std::uint32_t> inverse_masses(const Program& program) {
   std::vector<std::uint32_t> coefficients(program.moving);
   for (const MassRun& run : program.mass_runs) {

@@ -22,6 +22,9 @@ struct PassiveLink {
 // Those of the Program, in its order. O(links + nodes of macros that points are on).
 std::vector<PassiveLink> passive_links(const Program& program);
 
+// Whether any of them holds a place on a macro.
+bool holds_places(const Program& program);
+
 // [moving node] the coefficient 1/M.
 std::vector<std::uint32_t> inverse_masses(const Program& program);
 
