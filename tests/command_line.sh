@@ -177,6 +177,10 @@ expect 0 "steep.score:1:1: warning: K: 4.5 is beyond what is stable, set to 3.99
 expect 2 "the stiffness K = 1.5 of 'm' must stay below 1, at 22050 Hz" \
   "$program" render stiff.mdl -o stiff.wav --seconds 1 --rate 22050
 expect 0 "peak" "$program" render stiff.mdl -o stiff.wav --seconds 1 --rate 22050 --no-rescale
+# What may never touch is no reason to refuse; the report warns of it.
+model hard.mdl '@g ground 0.\n@m osc 1. 0.1 0.001 0. 0.\n@c contact @m @g 9 0.1 0.\n@in1 frcInput @m\n@out1 posOutput @m\n'
+expect 0 "the stiffness 9 of 'c' must stay below" "$program" check hard.mdl
+expect 0 "peak" "$program" render hard.mdl -o hard.wav --seconds 1
 model push.score '0 /in/1/force nan\n'
 expect 2 "must be a number" "$program" render PolyTriangle -o out.wav --score push.score
 

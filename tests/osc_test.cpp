@@ -205,6 +205,26 @@ TEST_CASE("a parameter is set and asked for over OSC", "[osc]") {
   CHECK(has(client.ask(message("/" + std::string(300, 'a'))), "/error", "", "255"));
 }
 
+TEST_CASE("what is beyond what is stable is told over OSC, and where that ends", "[osc]") {
+  const TemporaryFile model("@K param 1.\n@o osc 1. K 0. 0. 0.\n@out1 posOutput @o\n");
+  Process process(44100.0, false);
+  Session session(process, {.compile = {.rate_hz = 44100.0}}, {});
+  REQUIRE(session.load_and_wait(model.path()));
+  const auto server = open_server(process, session);
+  Client client(server->port());
+  const Answer range = client.ask(message("/param/K/range"));
+  CHECK(range.address == "/param/K/range");
+  REQUIRE(range.values.size() == 4);
+  CHECK(std::get<float>(range.values[0]) == 0.0f);
+  CHECK(std::get<float>(range.values[1]) == 3.99999f);
+  CHECK(std::get<float>(range.values[2]) == 0.0f);
+  CHECK(std::get<float>(range.values[3]) == 4.0f);
+  CHECK(has(client.ask(message("/param/K", {4.5})), "/error", "/param/K",
+            "K: 4.5 is beyond what is stable, set to 3.99999"));
+  CHECK(session.parameter("K") == 3.99999);
+  CHECK(has(client.ask(message("/param/L/range")), "/error", "/param/L/range", "no such"));
+}
+
 TEST_CASE("status and describe answer in full", "[osc]") {
   Rig rig;
   rig.drive(1);

@@ -282,8 +282,9 @@ void Engine::Voices::press(double amount) {
 }
 
 void Engine::Voices::handle(const Event& event) {
-  if (!std::isfinite(event.value) || !std::isfinite(event.value2)) {
-    return;  // nothing that could be meant
+  const bool is_number = std::isfinite(event.value) && std::isfinite(event.value2);
+  if (!is_number && event.kind != EventKind::panic) {
+    return;
   }
   switch (event.kind) {
     case EventKind::note_on:
