@@ -121,19 +121,24 @@ bool Proofs::is_positive(std::span<const double> terms) {
 // How what counts for stability goes when one parameter moves.
 Proofs::Course Proofs::course_along(std::size_t parameter) const {
   const auto index = static_cast<std::uint32_t>(parameter);
-  std::vector<ArgumentId> used;
+  std::vector<bool> is_used(network_.arguments.size(), false);
+  const auto use = [&](ArgumentId id) {
+    if (id != no_argument) {
+      is_used[id] = true;
+    }
+  };
   for (const std::uint32_t i : stencil_.masses) {
     const Mass& mass = network_.masses[i];
-    used.insert(used.end(), {mass.mass, mass.stiffness, mass.damping});
+    use(mass.mass);
+    use(mass.stiffness);
+    use(mass.damping);
   }
   for (const Link& link : network_.links) {
-    used.insert(used.end(), link.arguments.begin(), link.arguments.end());
+    std::for_each(link.arguments.begin(), link.arguments.end(), use);
   }
-  std::sort(used.begin(), used.end());
-  used.erase(std::unique(used.begin(), used.end()), used.end());
   Course course = Course::flat;
-  for (const ArgumentId id : used) {
-    if (id == no_argument) {
+  for (std::size_t id = 0; id < is_used.size(); ++id) {
+    if (!is_used[id]) {
       continue;
     }
     const Formula& formula = network_.arguments[id];

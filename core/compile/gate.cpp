@@ -186,7 +186,9 @@ class Gatekeeper {
   // Writes back what one parameter came to.
   void settle(std::size_t i) {
     ParameterInfo& info = parameters_[i];
-    if (const auto safe = stability_.safe_range(box_, i, start_[i])) {
+    // Nobody reads it of the bare network.
+    if (const auto safe =
+            request_.bare ? std::nullopt : stability_.safe_range(box_, i, start_[i])) {
       info.safe = *safe;
     }
     info.is_raised = box_.lowest[i] > asked_.lowest[i];
