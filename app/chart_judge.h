@@ -89,7 +89,7 @@ class Stress {
     std::string name;
     ChartScene scene;
     double peak = 0.0;    // of what 16 times the rate plays
-    double energy = 0.0;  // the highest of the same
+    double energy = 0.0;  // the highest of the same, or of the scene as it is
   };
   std::string verdict(const Case& one, const Way& way) const;
   std::vector<Case> cases_;

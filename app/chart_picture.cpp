@@ -93,6 +93,9 @@ class Panel {
         high = std::max(high, y_of(row));
       }
     }
+    if (shows_ == Shows::physical && !sheet_.is_linear) {
+      low = std::min(low, -sheet_.floor_db[sheet_.window]);
+    }
     left_ *= 0.6;
     right_ *= 2.2;
     if (shows_ == Shows::cents) {
@@ -211,7 +214,10 @@ class Panel {
                                        : "pitch beside the continuous network";
   }
 
-  std::string window() const { return number(1e3 * chart_windows_s[sheet_.window]) + " ms"; }
+  std::string window() const {
+    const double seconds = chart_windows_s[sheet_.window];
+    return seconds < 1.0 ? number(1e3 * seconds) + " ms" : number(seconds) + " s";
+  }
 
   std::string axes() const {
     std::string tics;
@@ -330,7 +336,7 @@ std::string picture_of(const ChartSheet& sheet, const std::string& machine) {
     panels.insert(panels.begin() + 1, Shows::cents);
   }
   const double width = 440.0;
-  const double legend_width = 210.0;
+  const double legend_width = 250.0;
   const double count = static_cast<double>(panels.size());
   const double whole = count * width + legend_width;
   std::string body = "set multiplot title \"" + sheet.scene + ": " + sheet.about + " (" + machine +

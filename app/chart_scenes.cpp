@@ -1,6 +1,7 @@
 #include "app/chart_scenes.h"
 
 #include <algorithm>
+#include <cctype>
 #include <cmath>
 
 #include "core/analysis/continuous.h"
@@ -237,8 +238,16 @@ std::vector<double> worst_of(const Network& network, const Preset& preset) {
   return worst;
 }
 
+// As a file may be called.
+std::string plain(std::string name) {
+  std::replace_if(
+      name.begin(), name.end(), [](unsigned char c) { return std::isalnum(c) == 0 && c != '-'; },
+      '_');
+  return name;
+}
+
 Result<ChartScene> scene_of(const std::string& name, Network network, const Preset& preset) {
-  ChartScene scene{.name = name, .network = expand_macros(network)};
+  ChartScene scene{.name = plain(name), .network = expand_macros(network)};
   const auto heard = std::any_of(scene.network.parameters.begin(), scene.network.parameters.end(),
                                  [](const Parameter& p) { return p.audio_input > 0; });
   if (heard) {

@@ -97,6 +97,26 @@ expect 2 "at most 100000 points" "$program" make string 100001
 expect 2 "a mass must be above 0" "$program" make string 5 -M 0
 expect 2 "cannot be written" "$program" make string 5 -o no/such/folder/s.mdl
 
+# The chart: all its columns, a row for each way, and what to do without gnuplot.
+expect 0 "grey stairs" "$program" chart --help
+expect 2 "there is no model or preset 'nosuch'" "$program" chart nosuch -o drawn
+expect 0 "no pictures: gnuplot is not installed" \
+  env PATH=/nowhere "$program" chart triangle -t 0.1 -o drawn
+columns=scene,way,precision,methods,oversampling,budget,ns,voices_48k,predicted_ns
+for truth in t1 t2; do
+  columns=$columns,snr_${truth}_5ms,snr_${truth}_50ms,snr_${truth}_1s,cents_$truth,t60_$truth
+  columns=$columns,energy_$truth
+done
+grep -qx "$columns,energy,front_t1,front_t2,failure,also" drawn/chart.csv &&
+  grep -q '^triangle,direct,double,direct,1,,[0-9.]*,[0-9.]*,[0-9.]*,' drawn/chart.csv &&
+  grep -q '^triangle,direct 8x,float,direct,8,' drawn/chart.csv &&
+  grep -q '^# scene triangle: .*predicted_area_t2 1' drawn/chart.csv ||
+  { echo "FAILED: the chart's table lacks something"; failures=$((failures + 1)); }
+[ "$(grep -c '^triangle,' drawn/chart.csv)" -ge 12 ] ||
+  { echo "FAILED: the chart's table lacks ways"; failures=$((failures + 1)); }
+grep -q 'set output "triangle.svg"' drawn/chart.gp ||
+  { echo "FAILED: the chart's script draws no triangle"; failures=$((failures + 1)); }
+
 # Stability: what breaks it, by name and line, and how far each parameter may go.
 model stiff.mdl '@K param 1.5\n@g ground 0.\n@m osc 1. K 0. 1. 1.\n@out1 posOutput @m\n'
 expect 0 "stable: every stiffness may grow 2.66666 times" "$program" check stiff.mdl
