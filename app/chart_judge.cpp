@@ -82,48 +82,73 @@ class EnergyMeter {
   double held_ = -HUGE_VAL;     // at any time
 };
 
-Truth published(const ChartScene& scene) {
-  const Machine machine = make_machine(scene.network, rate_hz, true);
-  const std::size_t frames = frames_of(heard_s);
-  Truth truth{.waves = Waves(machine.channels, std::vector<double>(frames)), .how = "long double"};
-  truth.floor_db.fill(exact_db);
-  std::vector<EnergyMeter> meters(1);
-  std::vector<Energy> energy(frames_of(energy_s));
-  for (const Program& program : machine.parts) {
-    Textbook book(program);
-    std::vector<double> value(program.inputs.size());
-    std::vector<double> velocity(value.size());
-    std::vector<double> x;
-    std::vector<double> v;
-    for (std::size_t n = 0; n < frames; ++n) {
-      for (std::size_t i = 0; i < value.size(); ++i) {
-        const HandSlot& slot = machine.hands[program.inputs[i].hand];
-        const HandMotion& hand = scene.hands[program.inputs[i].hand];
-        const double before = n > 0 ? value[i] : hand ? hand(0.0) : slot.position;
-        value[i] = hand ? hand(static_cast<double>(n + 1) / rate_hz) : slot.position;
-        velocity[i] = value[i] - before;
-      }
-      book.step(value, velocity);
-      const std::vector<double> outputs = book.outputs();
-      for (std::size_t i = 0; i < outputs.size(); ++i) {
-        truth.waves[program.outputs[i].channel][n] += outputs[i];
-      }
-      if (n <= energy.size()) {
-        const std::vector<double> after = book.velocities();
-        if (n > 0) {
-          const Energy more = energy_of(program, x, v, after);
-          energy[n - 1].total += more.total;
-          energy[n - 1].held += more.held;
-        }
-        x = book.positions();
-        v = after;
-      }
+// The hands of one part, sample by sample.
+class PartHands {
+ public:
+  PartHands(const ChartScene& scene, const Machine& machine, const Program& program)
+      : value(program.inputs.size()), velocity(value.size()) {
+    for (const InputSlot& input : program.inputs) {
+      motion_.push_back(scene.hands[input.hand]);
+      rest_.push_back(machine.hands[input.hand].position);
+    }
+    move_to(0.0);
+  }
+  void move_to(double seconds) {
+    for (std::size_t i = 0; i < value.size(); ++i) {
+      const double next = motion_[i] ? motion_[i](seconds) : rest_[i];
+      velocity[i] = next - value[i];
+      value[i] = next;
     }
   }
-  for (const Energy& one : energy) {
-    meters[0].add(one);
+  std::vector<double> value;
+  std::vector<double> velocity;
+
+ private:
+  std::vector<HandMotion> motion_;
+  std::vector<double> rest_;
+};
+
+// Adds one part's sound and energy to those of the others.
+void play_textbook(const Program& program, PartHands hands, Waves& waves,
+                   std::vector<Energy>& energy) {
+  Textbook book(program);
+  std::vector<double> x;
+  std::vector<double> v;
+  for (std::size_t n = 0; n < waves[0].size(); ++n) {
+    hands.move_to(static_cast<double>(n + 1) / rate_hz);
+    book.step(hands.value, hands.velocity);
+    const std::vector<double> outputs = book.outputs();
+    for (std::size_t i = 0; i < outputs.size(); ++i) {
+      waves[program.outputs[i].channel][n] += outputs[i];
+    }
+    if (n > energy.size()) {
+      continue;
+    }
+    std::vector<double> after = book.velocities();
+    if (n > 0) {
+      const Energy more = energy_of(program, x, v, after);
+      energy[n - 1].total += more.total;
+      energy[n - 1].held += more.held;
+    }
+    x = book.positions();
+    v = std::move(after);
   }
-  truth.energy = meters[0].reading().highest;
+}
+
+Truth published(const ChartScene& scene) {
+  const Machine machine = make_machine(scene.network, rate_hz, true);
+  Truth truth{.waves = Waves(machine.channels, std::vector<double>(frames_of(heard_s))),
+              .how = "long double"};
+  truth.floor_db.fill(exact_db);
+  std::vector<Energy> energy(frames_of(energy_s));
+  for (const Program& program : machine.parts) {
+    play_textbook(program, PartHands(scene, machine, program), truth.waves, energy);
+  }
+  EnergyMeter meter;
+  for (const Energy& one : energy) {
+    meter.add(one);
+  }
+  truth.energy = meter.reading().highest;
   return truth;
 }
 
@@ -251,7 +276,7 @@ std::optional<EnergyReading> watch_energy(const ChartScene& scene, MadeWay& way,
   EnergyMeter meter;
   way.player->rewind();
   way.player->play(1, nullptr);
-  if (!way.player->save(x, v)) {
+  if (!way.player->save(x, v) || x.size() != programs.size()) {
     return std::nullopt;
   }
   for (std::size_t n = 0; n < frames_of(seconds); ++n) {

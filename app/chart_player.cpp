@@ -131,6 +131,8 @@ class KernelPlayer final : public ChartPlayer {
   }
 
   bool save(States& x, States& v) const override {
+    x.resize(parts_.size());
+    v.resize(parts_.size());
     for (std::size_t i = 0; i < parts_.size(); ++i) {
       x[i].resize(parts_[i].program.position.size());
       v[i].resize(x[i].size());

@@ -24,7 +24,7 @@ class ChartPlayer {
   // The next `frames` samples of the machine's own rate; [frame][channel] to `outputs`, if it is
   // not null.
   virtual void play(std::size_t frames, double* outputs) = 0;
-  // False where a kernel does not know.
+  // Where every node is, and how fast; false where a kernel does not know.
   virtual bool save(States& x, States& v) const = 0;
 };
 
