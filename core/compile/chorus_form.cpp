@@ -38,7 +38,8 @@ void hold_links(const Program& program, Chorus& chorus) {
 
 std::optional<Chorus> chorus_form(const Program& program) {
   const auto is_force = [](const OutputSlot& output) { return output.is_force; };
-  if (program.moving == 0 || !is_plain(program) || program.moving > most_chorus_masses || !program.taps.empty() ||
+  if (program.moving == 0 || !is_plain(program) || program.moving > most_chorus_masses ||
+      !program.taps.empty() ||
       std::any_of(program.outputs.begin(), program.outputs.end(), is_force)) {
     return std::nullopt;
   }

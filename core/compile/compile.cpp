@@ -207,6 +207,8 @@ double comfortable_gain(const Machine& machine, const Playing& playing,
 // The bare network is computed as it is written, unless somebody says how far off it may be.
 bool may_merge(const CompileOptions& options, const Budget& budget) {
   return !options.bare || budget != Budget{};
+}
+
 // The lowest mode, by which keys find their pitch.
 void find_mode(const Network& network, const Preset& preset, Instrument& instrument) {
   instrument.masses =
@@ -222,11 +224,10 @@ void find_mode(const Network& network, const Preset& preset, Instrument& instrum
 
 // By what the parameters may be turned to, and by the stiffness of the highest key there is.
 Schemes schemes_of(const Network& network, const Preset& preset, const CompileOptions& options,
-                   const Instrument& instrument) {
+                   const Budget& budget, const Instrument& instrument) {
   constexpr double highest_key_hz = 4186.0;
   const bool is_told = options.budget || !options.bare;
-  const Passivity passive =
-      is_told ? options.budget.value_or(preset.budget).passive : Passivity::never;
+  const Passivity passive = is_told ? budget.passive : Passivity::never;
   Conditions conditions{
       .box = {},
       .rate_ratio = options.rescale ? Network::reference_rate_hz / options.rate_hz : 1.0};
@@ -292,7 +293,7 @@ Result<Compiled> compile_expanded(const Network& written, const Network& network
   }
   instrument.parameters = *std::move(infos);
   find_mode(network, preset, instrument);
-  Schemes schemes = schemes_of(network, preset, options, instrument);
+  Schemes schemes = schemes_of(network, preset, options, budget, instrument);
   Machine machine = make_machine(network, options.rate_hz, options.rescale, schemes.links);
   for (std::size_t i = 0; i < instrument.parameters.size(); ++i) {
     machine.parameters[i] = instrument.parameters[i].value;
@@ -351,14 +352,6 @@ Result<Compiled> compile_expanded(const Network& written, const Network& network
   const double bound = highest_stiffness_factor(network, proved, machine.rate_ratio);
   instrument.stiffness_margin = stiffness_margin(network, proved, machine.rate_ratio, bound);
   playing.highest_factor = std::max(bound, to_spare * instrument.stiffness_margin);
-  for (const Program& program : machine.parts) {
-    instrument.masses += program.moving;
-  }
-  if (preset.keyboard && instrument.masses <= most_tuned_masses) {
-    instrument.mode = lowest_mode(network, machine.parameters);
-  }
-  playing.highest_factor = highest_stiffness_factor(
-      network, preset_box(instrument.parameters, preset), machine.rate_ratio);
   if (instrument.mode) {
     playing.tuning = Tuning::keyboard;
     playing.mode_stiffness = instrument.mode->stiffness * machine.rate_ratio * machine.rate_ratio;
@@ -383,16 +376,10 @@ Result<Compiled> compile_expanded(const Network& written, const Network& network
                  .voices = playing.voices,
                  .crew = options.crew},
                 is_published ? Method::direct : options.method, options.most_modes, budget);
-  compiled.plan.left_out = describe(cull(network));
-  instrument.stiffness_margin = playing.highest_factor;
-  compiled.plan = make_plan(machine,
-                            {.is_double = options.precision == Precision::float64,
-                             .isa = options.isa,
-                             .voices = playing.voices,
-                             .crew = options.crew},
-                            options.bare && !options.method ? Method::direct : options.method,
-                            options.most_modes, options.budget.value_or(preset.budget));
   compiled.plan.notes = std::move(schemes.notes);
+  if (const std::string left_out = describe(cull(network)); !left_out.empty()) {
+    compiled.plan.notes.push_back("left out: " + left_out);
+  }
   compiled.schemes = std::move(schemes.links);
   if (options.find_gain) {
     playing.gain *= comfortable_gain(machine, playing, options);
@@ -417,7 +404,7 @@ Result<Compiled> compile(const Network& network, const Preset& preset,
   }
   auto compiled = compile_expanded(merged->network, merged->network, preset, options, budget);
   if (compiled) {
-    compiled->plan.merged = describe(*merged);
+    compiled->plan.notes.push_back("merged: " + describe(*merged));
   }
   return compiled;
 }

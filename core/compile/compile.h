@@ -76,7 +76,7 @@ struct Compiled {
   std::unique_ptr<Engine> engine;
   Instrument instrument;
   Plan plan;
-  Gate gate;  // whoever lets it sound has asked this
+  Gate gate;                        // whoever lets it sound has asked this
   std::vector<LinkScheme> schemes;  // [link] of the network without macros
 };
 

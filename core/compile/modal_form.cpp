@@ -497,9 +497,7 @@ class ModesFinder {
 }  // namespace
 
 std::optional<Modes> modal_form(const Program& program, const Budget& budget) {
-  return ModesFinder(program, budget).find();
-std::optional<Modes> modal_form(const Program& program) {
-  return is_plain(program) ? ModesFinder(program).find() : std::nullopt;
+  return is_plain(program) ? ModesFinder(program, budget).find() : std::nullopt;
 }
 
 }  // namespace ressort

@@ -269,13 +269,10 @@ std::string describe(const Plan& plan) {
             ")\n";
   }
   text = text.empty() ? "nothing moves\n" : text;
-  text += plan.merged.empty() ? "" : "merged: " + plan.merged + "\n";
-  text += plan.left_out.empty() ? "" : "left out: " + plan.left_out + "\n";
-  return text;
   for (const std::string& note : plan.notes) {
     text += note + "\n";
   }
-  return text.empty() ? "nothing moves\n" : text;
+  return text;
 }
 
 }  // namespace ressort

@@ -44,9 +44,7 @@ struct Part {
 
 struct Plan {
   std::vector<Part> parts;
-  std::string merged;    // what became one with something else; may be empty
-  std::string left_out;  // what need not be computed at all; empty if all is
-  std::vector<std::string> notes;  // on links that are not as published
+  std::vector<std::string> notes;  // on what is not computed as it is written, or not at all
 };
 
 // Gives every part of the machine the form that the cost model says is the cheapest at its worst,

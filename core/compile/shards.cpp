@@ -446,7 +446,8 @@ std::vector<Shard> make_shards(const Program& program, std::size_t count, std::u
 
 std::optional<Shards> share_out(const Program& program, const Load& load) {
   const double whole_ns = predicted_ns(program, load);
-  if (load.crew == nullptr || !is_plain(program) || load.crew->size() < 2 || whole_ns < least_shared_ns) {
+  if (load.crew == nullptr || !is_plain(program) || load.crew->size() < 2 ||
+      whole_ns < least_shared_ns) {
     return std::nullopt;
   }
   auto corners = corners_of(program);
