@@ -88,9 +88,10 @@ class Stress {
   struct Case {
     std::string name;
     ChartScene scene;
-    double peak = 0.0;    // of what 16 times the rate plays
-    double energy = 0.0;  // the highest of the same, or of the scene as it is
+    double peak = 0.0;    // of what 16 times the rate plays, here or in the scene as it is
+    double energy = 0.0;  // the highest of the same
   };
+  void measure(Case& one) const;
   std::string verdict(const Case& one, const Way& way) const;
   std::vector<Case> cases_;
   Isa isa_;

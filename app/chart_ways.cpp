@@ -1,7 +1,7 @@
 #include "app/chart_ways.h"
 
 #include <algorithm>
-#include <cmath>
+#include <span>
 
 namespace ressort {
 namespace {
@@ -15,6 +15,7 @@ constexpr NamedPrecision precisions[] = {{Precision::float64, "double"},
 
 constexpr unsigned oversamplings[] = {2, 4, 8};
 constexpr const char* silences[] = {"-120", "-100", "-80", "-60", "-40"};
+constexpr const char* usual_silences[] = {"-100", "-80", "-60"};
 
 // Budgets beside a method: what the line is called, and the budget.
 struct Asked {
@@ -53,13 +54,13 @@ void add_method(std::vector<Way>& ways, Method method) {
   }
 }
 
-// Modes that are exact, and fewer and fewer of them.
+// Less and less of what is below the loudest.
 void add_truncation(std::vector<Way>& ways, const std::string& line, std::optional<Method> method,
-                    const std::string& budget) {
+                    const std::string& budget, std::span<const char* const> levels) {
   if (method && !budget.empty()) {
     ways.push_back({.name = line, .line = line, .method = method, .budget = budget});
   }
-  for (const char* const silence : silences) {
+  for (const char* const silence : levels) {
     const std::string less = "silence=" + std::string(silence);
     ways.push_back({.name = line + " " + less,
                     .line = line,
@@ -86,14 +87,14 @@ std::vector<Way> all_ways() {
   for (const Method method : all_methods) {
     add_method(ways, method);
   }
-  add_truncation(ways, "modal cents=1", Method::modal, "cents=1");
-  add_truncation(ways, "modal", Method::modal, "");
+  add_truncation(ways, "modal cents=1", Method::modal, "cents=1", silences);
+  add_truncation(ways, "modal", Method::modal, "", silences);
   for (const Asked& asked : plans_choice) {
     ways.push_back(
         {.name = asked.name, .line = asked.name, .budget = asked.budget, .is_bare = false});
   }
-  add_truncation(ways, "auto", {}, "");
-  add_truncation(ways, "auto cents=1", {}, "cents=1");
+  add_truncation(ways, "auto", {}, "", usual_silences);
+  add_truncation(ways, "auto cents=1", {}, "cents=1", usual_silences);
   std::vector<Way> all;
   for (const auto& [precision, name] : precisions) {
     for (Way way : ways) {
