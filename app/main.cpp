@@ -169,8 +169,11 @@ void add_budget(CLI::App& command, std::optional<Budget>& budget) {
 // How the network is computed, for every command that computes it.
 void add_numbers(CLI::App& command, Precision& precision, bool& rescale) {
   add_choice<Precision>(command, "--precision", precision,
-                        {{"double", Precision::float64}, {"float", Precision::float32}},
-                        "of the computation");
+                        {{"double", Precision::float64},
+                         {"float", Precision::float32},
+                         {"compensated", Precision::compensated32}},
+                        "of the computation; compensated is float with twice the digits where\n"
+                        "positions are added up, for what moves little and far from 0");
   command.add_flag_callback(
       "--no-rescale", [&rescale] { rescale = false; },
       "take the model's numbers raw at rates other than 44100 Hz");

@@ -66,9 +66,9 @@ void measure(Plan& plan, const Engine& engine, const CompileOptions& options, in
     }
     const auto patience = longest / static_cast<long>(plan.parts.size());
     const auto count = static_cast<std::size_t>(std::max(1, voices));
-    (part++)->measured_ns = options.precision == Precision::float64
-                                ? measured_ns<double>(program, count, options.isa, patience)
-                                : measured_ns<float>(program, count, options.isa, patience);
+    (part++)->measured_ns = options.precision == Precision::float32
+                                ? measured_ns<float>(program, count, options.isa, patience)
+                                : measured_ns<double>(program, count, options.isa, patience);
   }
 }
 

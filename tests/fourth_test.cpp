@@ -1,5 +1,8 @@
 // The fourth-order form against the continuous network, which is known in closed form.
+#include <deque>
+
 #include "core/compile/fourth_form.h"
+#include "core/compile/plan.h"
 #include "tests/duel.h"
 #include "tests/poles.h"
 
@@ -169,6 +172,159 @@ TEST_CASE("what is stable as published is so to fourth order", "[fourth]") {
     program.form = form;
     CHECK(rig::spectral_radius(rig::transition(program)) < 1.0);
   }
+}
+
+// A force that rises and stays, on a body at rest, and what it does in the long run and on the way.
+TEST_CASE("a force moves the fourth-order form as the continuous network", "[fourth]") {
+  const std::string text = scenes::string("s", 20, "0.2", "0.002") + "@in1 frcInput @s_m4\n" +
+                           scenes::output(1, "s_m11");
+  // The same at 16 times the rate is 2^16 times nearer, and so is the truth.
+  constexpr std::size_t finer = 16;
+  constexpr std::size_t frames = 4000;
+  const auto force = [](double t) {  // smooth, and long beside a sample
+    return 0.01 * (1.0 - std::cos(2.0 * std::numbers::pi * t / 97.0)) * std::exp(-t / 400.0);
+  };
+  // A force's sample acts between its own tick and the one before.
+  const auto perform = [&](const Program& program, std::size_t steps) {
+    Bare<double> bare(program);
+    std::vector<double> out;
+    const double pace = static_cast<double>(steps);
+    for (std::size_t n = 1; n <= frames * steps; ++n) {
+      const double x = bare.step({force((static_cast<double>(n) - 1.0) / pace) / (pace * pace)})[0];
+      if (n % steps == 0) {
+        out.push_back(x);
+      }
+    }
+    return out;
+  };
+  const auto truth = perform(formed(make_program(network_of(text), 44100.0 * finer, true)), finer);
+  const Program program = program_of(text);
+  Comparison published;
+  Comparison found;
+  const auto plain = perform(program, 1);
+  const auto corrected = perform(formed(program), 1);
+  for (std::size_t n = 0; n < frames; ++n) {
+    published.add(truth[n], plain[n]);
+    found.add(truth[n], corrected[n]);
+  }
+  INFO(found.snr_db() << " dB, as published " << published.snr_db());
+  CHECK(found.snr_db() > published.snr_db() + 20.0);
+  CHECK(found.snr_db() > 55.0);
+}
+
+TEST_CASE("every instruction set and precision is of fourth order alike", "[fourth]") {
+  const Program program = struck(string50(), Network::reference_rate_hz, 13);
+  const double expected = nearness_db(formed(program), Isa::base);
+  for (const Isa isa : isas()) {
+    INFO(isa_name(isa));
+    CHECK(std::fabs(nearness_db<double>(formed(program), isa) - expected) < 1e-3);
+    CHECK(std::fabs(nearness_db<float>(formed(program), isa) - expected) < 0.1);
+  }
+}
+
+// What turns, at any pitch, and whatever else pulls: nearer to the same at a higher rate than the
+// published scheme is.
+TEST_CASE("the fourth-order form follows what is turned and touched", "[fourth]") {
+  const std::string text = scenes::string("s", 16, "0.1", "0.004") +
+                           "@o osc 2. 0.02 0.001 0. 0.\n@c springDamper @o @s_m9 0.05 0.001\n"
+                           "@in1 frcInput @s_m3\n@in2 posInput 0.\n"
+                           "@h springDamper @in2 @s_m12 0.05 0.003\n"
+                           "@b nlSpring3 @s_m2 @o 0.01 0.05 0.001\n" +
+                           scenes::output(1, "s_m6") + scenes::output(2, "o");
+  const Program program = program_of(text);
+  for (const bool turns : {false, true}) {
+    for (const double pitch : {1.0, 0.6}) {
+      const rig::DuelOptions options{.frames = 8000,
+                                     .push = 0.001,
+                                     .lowest_hz = 5.0,
+                                     .highest_hz = 60.0,
+                                     .turns = turns,
+                                     .pitch = pitch};
+      const rig::Score score = rig::score_of(program, options);
+      const auto expected = rig::perform<double>(formed(program), score, Isa::base);
+      const auto published = rig::perform_directly(program, score);
+      for (const Isa isa : isas()) {
+        INFO(isa_name(isa) << (turns ? ", turning" : ", steady") << " at pitch " << pitch);
+        for (const Comparison& output :
+             rig::compare(2, expected, rig::perform<double>(formed(program), score, isa))) {
+          CHECK(output.relative() < 1e-12);
+        }
+        for (const Comparison& output :
+             rig::compare(2, expected, rig::perform<float>(formed(program), score, isa))) {
+          CHECK(output.snr_db() > 85.0);
+        }
+      }
+      for (const Comparison& output : rig::compare(2, expected, published)) {
+        INFO("published: " << output.snr_db() << " dB");
+        CHECK(output.peak > 1e-4);
+        CHECK(output.snr_db() < 60.0);  // another scheme indeed
+        CHECK(output.snr_db() > 0.0);   // of the same network
+      }
+    }
+  }
+}
+
+// Points have no inertia: links at them are added as published.
+TEST_CASE("points on macros are held in the fourth-order form", "[fourth]") {
+  const std::string text =
+      "@k param 0.05\n@u param 0.3\n@s string 24 1. k 0.003 0. 0.\n@t string 20 1. k 0.003 0. 0.\n"
+      "@in1 frcInput [@s u]\n@j springDamper [@s 0.8] [@t 1-u] 0.03 0.001\n"
+      "@out1 posOutput [@t u]\n";
+  const Program program = program_of(text);
+  const rig::Score score = rig::score_of(program, {.frames = 4000, .push = 0.001, .turns = true});
+  const auto expected = rig::perform_directly(program, score);
+  for (const Isa isa : isas()) {
+    const auto found = rig::perform<double>(formed(program), score, isa);
+    const Comparison output = rig::compare(1, expected, found)[0];
+    INFO(output.snr_db() << " dB from the published scheme");
+    CHECK(output.snr_db() > 10.0);
+    CHECK(output.snr_db() < 60.0);
+  }
+}
+
+TEST_CASE("voices side by side are of fourth order each", "[fourth]") {
+  const Program program = formed(program_of(string50() + "@in1 frcInput @s_m4\n"));
+  for (const Isa isa : isas()) {
+    Bare<double> all(program, 8, isa);
+    std::deque<Bare<double>> alone;
+    for (std::size_t lane = 0; lane < all.lanes(); ++lane) {
+      alone.emplace_back(program, 1, isa);
+      const double factor = 1.0 - 0.1 * static_cast<double>(lane);
+      all.set_coefficients(lane, program.parameters, factor, false);
+      alone[lane].set_coefficients(0, program.parameters, factor, false);
+    }
+    for (std::size_t n = 0; n < 500; ++n) {
+      for (std::size_t lane = 0; lane < all.lanes(); ++lane) {
+        const double force = n == 3 * lane ? 0.01 : 0.0;
+        all.feed(lane, 0, force);
+        alone[lane].feed(0, 0, force);
+      }
+      all.run(0);
+      for (std::size_t lane = 0; lane < all.lanes(); ++lane) {
+        CHECK(all.outputs(lane)[0] == alone[lane].run(0)[0]);
+      }
+    }
+  }
+}
+
+TEST_CASE("a budget for pitch or decay gets the fourth-order form where it is needed", "[fourth]") {
+  const auto method_for = [](const std::string& text, const Budget& budget) {
+    Machine machine = make_machine(network_of(text), Network::reference_rate_hz, true);
+    return make_plan(machine, {}, {}, 0, budget).parts.at(0).method;
+  };
+  const std::string touched =
+      string50() + "@in1 posInput 1.\n@c contact @s_m9 @in1 0.01 0.01 0.01\n";
+  const std::string heavy =
+      "@m mass 1. 0. 0.\n@n mass 0.001 0. 0.\n@o mass 1. 0. 0.\n"
+      "@g ground 0.\n@s springDamper @m @n 1. 0.\n"
+      "@t springDamper @o @m 1. 0.\n@u springDamper @o @g 1. 0.\n" +
+      scenes::output(1, "m");
+  CHECK(method_for(touched, {}) != Method::fourth);
+  CHECK(method_for(touched, {.cents = 100.0}) != Method::fourth);
+  CHECK(method_for(touched, {.cents = 3.0}) == Method::fourth);
+  CHECK(method_for(touched, {.t60_percent = 1.0}) != Method::fourth);
+  CHECK(method_for(touched, {.t60_percent = 0.01}) == Method::fourth);
+  CHECK(method_for(heavy, {.cents = 3.0}) != Method::fourth);  // K + 6Z > 12M
 }
 
 }  // namespace ressort

@@ -381,6 +381,16 @@ Result<Compiled> compile_expanded(const Network& written, const Network& network
     compiled.plan.notes.push_back("left out: " + left_out);
   }
   compiled.schemes = std::move(schemes.links);
+  compiled.plan = make_plan(
+      machine,
+      {.is_double = options.precision == Precision::float64,
+       .is_compensated = options.precision == Precision::compensated32,
+       .isa = options.isa,
+       .voices = playing.voices,
+       .highest_factor =
+           playing.tuning == Tuning::keyboard ? std::max(1.0, playing.highest_factor) : 1.0,
+       .crew = options.crew},
+      is_published ? Method::direct : options.method, options.most_modes, budget);
   if (options.find_gain) {
     playing.gain *= comfortable_gain(machine, playing, options);
   }

@@ -156,6 +156,17 @@ class Predictor {
   // Twice through the springs, and two loops over the masses.
   double operator()(const Fourth&) const { return 2.3 * (*this)(Direct{}); }
 
+  // A fifth more than without.
+  double operator()(const Compensated&) const { return 1.2 * (*this)(Direct{}); }
+
+  // A voice's outputs, and its share of a coarse step.
+  double operator()(const Slow& form) const {
+    Load one = load_;
+    one.voices = 1;
+    return load_.voices * (4.0 + 3.0 * static_cast<double>(program_.outputs.size()) +
+                           predicted_ns(*form.coarse, one) / form.frames);
+  }
+
   double operator()(const Shards& form) const { return sharded_ns(form, load_); }
 
  private:

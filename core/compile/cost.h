@@ -9,9 +9,11 @@ namespace ressort {
 // What the prediction is for.
 struct Load {
   bool is_double = true;
+  bool is_compensated = false;  // which only one form is
   Isa isa = Isa::base;
   int voices = 1;
-  Crew* crew = nullptr;  // that large parts may be shared out to; null: one core for all
+  double highest_factor = 1.0;  // on every stiffness, that a voice may have
+  Crew* crew = nullptr;         // that large parts may be shared out to; null: one core for all
 };
 
 // Nanoseconds that shards wait for each other once, and one of them for its copies.

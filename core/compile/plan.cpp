@@ -10,6 +10,7 @@
 #include "core/compile/grid_form.h"
 #include "core/compile/modal_form.h"
 #include "core/compile/shards.h"
+#include "core/compile/slow_form.h"
 #include "core/compile/sparse_form.h"
 
 namespace ressort {
@@ -20,7 +21,7 @@ std::optional<Form> any(std::optional<T> form) {
   return form ? std::optional<Form>(std::move(*form)) : std::nullopt;
 }
 
-std::optional<Form> form_of(const Program& program, Method method) {
+std::optional<Form> form_of(const Program& program, Method method, const Load& load) {
   switch (method) {
     case Method::direct:
       return Direct{};
@@ -38,6 +39,8 @@ std::optional<Form> form_of(const Program& program, Method method) {
       return any(sparse_form(program));
     case Method::fourth:
       return any(fourth_form(program));
+    case Method::slow:
+      return any(slow_form(program, load.highest_factor));
   }
   return std::nullopt;
 }
@@ -83,6 +86,14 @@ struct Describer {
     return "to fourth order, springs and dampers twice, " +
            count_of(program.ends.size() - springs, "link", "links") + " as published";
   }
+  std::string operator()(const Compensated&) const {
+    return "mass by mass and link by link, as published, each position in two numbers";
+  }
+  std::string operator()(const Slow& form) const {
+    return "to fourth order once in " + std::to_string(form.frames) +
+           " samples, a cubic between; what comes in acts up to " +
+           std::to_string(2 * form.frames) + " samples later";
+  }
   std::string operator()(const Shards& form) const {
     return "in " + std::to_string(form.shards->size()) + " shards at once, which meet every " +
            count_of(form.frames, "sample", "samples");
@@ -111,37 +122,26 @@ class Chooser {
   Chooser(Program& program, const Load& load, std::uint32_t most_modes)
       : program_(program), load_(load), most_modes_(most_modes) {}
 
-  Part choose() {
-    for (const Method method : all_methods) {
-      if ((method == Method::modal && !may_be_modal()) ||
-          (method == Method::sparse && !may_be_sparse())) {
-        continue;
-      }
-      consider(method);
+  Part choose(const Budget& budget) {
+    if (budget.is_physical() || budget.silence_db > -Budget::unlimited) {
+      consider(Method::slow);
     }
-    Part part = take("");
+    const std::string misses = what_misses(budget);
+    if (!misses.empty()) {
+      consider(Method::fourth);
+    }
+    if (misses.empty() || candidates_.empty()) {
+      consider_identical();
+    }
+    Part part = take(misses);
     part.may_gain = may_gain_;
     return part;
   }
 
-  // Nothing where the published scheme is as near to the continuous network as the budget asks, or
-  // where no physical method can do this part.
-  std::optional<Part> approximate(const Budget& budget) {
-    if (!budget.is_physical()) {
-      return std::nullopt;
-    }
-    const SchemeError error = published_error(steepness_of(program_));
-    if (error.cents <= budget.cents && error.t60_percent <= budget.t60_percent) {
-      return std::nullopt;
-    }
-    for (const Method method : physical_methods) {
-      consider(method);
-    }
-    if (candidates_.empty()) {
-      return std::nullopt;
-    }
-    return take("for the budget: as published up to " + rounded(error.cents) + " cents and " +
-                rounded(error.t60_percent) + " % of decay off");
+  // In single precision with compensated positions there is one form for all.
+  Part compensate() {
+    add(Method::direct, Compensated{});
+    return take("in the precision asked for");
   }
 
   Part obey(Method method) {
@@ -160,6 +160,30 @@ class Chooser {
     double ns;
   };
 
+  void consider_identical() {
+    for (const Method method : all_methods) {
+      if ((method == Method::modal && !may_be_modal()) ||
+          (method == Method::sparse && !may_be_sparse())) {
+        continue;
+      }
+      consider(method);
+    }
+  }
+
+  // How the published scheme is farther from the continuous network than the budget allows; "" if
+  // it is not.
+  std::string what_misses(const Budget& budget) const {
+    if (!budget.is_physical()) {
+      return "";
+    }
+    const SchemeError error = published_error(steepness_of(program_));
+    if (error.cents <= budget.cents && error.t60_percent <= budget.t60_percent) {
+      return "";
+    }
+    return "for the budget: as published up to " + rounded(error.cents) + " cents and " +
+           rounded(error.t60_percent) + " % of decay off";
+  }
+
   bool may_be_modal() {
     const bool may_pay = program_.moving <= patient_modes && program_.moving > 4 &&
                          least_modal_ns(program_, load_) < candidates_[best_].ns;
@@ -173,17 +197,21 @@ class Chooser {
   }
 
   bool consider(Method method) {
-    auto form = form_of(program_, method);
+    auto form = form_of(program_, method, load_);
     if (!form) {
       return false;
     }
-    program_.form = *std::move(form);
+    add(method, *std::move(form));
+    return true;
+  }
+
+  void add(Method method, Form form) {
+    program_.form = std::move(form);
     const double ns = predicted_ns(program_, load_);
     candidates_.push_back({method, std::move(program_.form), ns});
     if (ns < candidates_[best_].ns) {
       best_ = candidates_.size() - 1;
     }
-    return true;
   }
 
   Part take(const std::string& why) {
@@ -234,6 +262,8 @@ std::string_view method_name(Method method) {
       return "sparse";
     case Method::fourth:
       return "fourth";
+    case Method::slow:
+      return "slow";
   }
   return "";
 }
@@ -243,11 +273,9 @@ Plan make_plan(Machine& machine, const Load& load, std::optional<Method> method,
   Plan plan;
   for (Program& program : machine.parts) {
     Chooser chooser(program, load, most_modes);
-    std::optional<Part> physical;
-    if (!method) {
-      physical = chooser.approximate(budget);
-    }
-    Part part = physical ? *std::move(physical) : method ? chooser.obey(*method) : chooser.choose();
+    Part part = load.is_compensated ? chooser.compensate()
+                : method            ? chooser.obey(*method)
+                                    : chooser.choose(budget);
     if (auto shards = share_out(program, load)) {
       program.form = *std::move(shards);
       part.predicted_ns = predicted_ns(program, load);

@@ -26,6 +26,10 @@ struct DirectState {
   T* memory;                          // [passive link][passive_rows][lane]
   T* awake;                           // [lane] 0 in the first sample after place(), else 1
   T* felt;  // [node][lane] what passive links did in this sample; null: nobody listens
+  // Only where positions are compensated:
+  T* rest = nullptr;              // [node][lane] what a position is more than x
+  const T* value_rest = nullptr;  // [frame][input][lane] the same of the position inputs
+  T* output_rest = nullptr;       // [frame][output][lane] and of the outputs
 };
 
 template <class T>
@@ -34,6 +38,10 @@ using DirectStep = void (*)(const Program& program, DirectState<T>& state, const
 // The function for lanes that fill so many bytes.
 template <Isa isa, class T>
 DirectStep<T> direct_step(std::size_t bytes);
+
+// The same with compensated positions.
+template <Isa isa>
+DirectStep<float> compensated_step(std::size_t bytes);
 
 template <class T>
 class DirectKernel final : public Kernel<T> {

@@ -20,10 +20,72 @@ struct View {
         coefficient(reinterpret_cast<const V*>(state.ramps.value)) {}
 
   DirectState<T>& state;
+  // Where a node is from another.
+  V between(std::size_t a, std::size_t b) const { return x[a] - x[b]; }
+  void move(std::size_t node) { x[node] += v[node]; }
+  // One lane's position, `at` being its number in [node][lane].
+  T exact(std::size_t at) const { return state.x[at]; }
+  void move_to(std::size_t at, T position) {
+    state.v[at] = position - state.x[at];
+    state.x[at] = position;
+  }
+  // What the position inputs and the outputs of a frame leave out.
+  void take_rests(const Program&) {}
+  void give_rests(const Program&) {}
+
   V* x;
   V* v;
   V* force;
   const V* coefficient;
+};
+
+// The same with positions that are sums of two numbers, x + rest. A step's rounding is kept in the
+// rest instead of lost, so that a small motion far from 0 is as exact as one at 0.
+template <std::size_t Bytes>
+struct Summed : View<float, Bytes> {
+  using Base = View<float, Bytes>;
+  using V = typename Base::V;
+
+  explicit Summed(DirectState<float>& state_in)
+      : Base(state_in),
+        rest(reinterpret_cast<V*>(state_in.rest)),
+        value_rest(reinterpret_cast<const V*>(state_in.value_rest)),
+        output_rest(reinterpret_cast<V*>(state_in.output_rest)) {}
+
+  V between(std::size_t a, std::size_t b) const {
+    return Base::between(a, b) + (rest[a] - rest[b]);
+  }
+  void move(std::size_t node) {
+    const V y = this->v[node] + rest[node];
+    const V sum = this->x[node] + y;
+    rest[node] = y - (sum - this->x[node]);
+    this->x[node] = sum;
+  }
+  double exact(std::size_t at) const {
+    return static_cast<double>(this->state.x[at]) + static_cast<double>(this->state.rest[at]);
+  }
+  void move_to(std::size_t at, double position) {
+    this->state.v[at] = static_cast<float>(position - exact(at));
+    this->state.x[at] = static_cast<float>(position);
+    this->state.rest[at] = static_cast<float>(position - static_cast<double>(this->state.x[at]));
+  }
+  void take_rests(const Program& program) {
+    for (const InputSlot& input : program.inputs) {
+      if (!input.is_force) {
+        rest[input.node] = *value_rest;
+      }
+      ++value_rest;
+    }
+  }
+  void give_rests(const Program& program) {
+    for (const OutputSlot& output : program.outputs) {
+      *output_rest++ = output.is_force ? V{} : rest[output.node];
+    }
+  }
+
+  V* rest;
+  const V* value_rest;
+  V* output_rest;
 };
 
 // The same after nodes were mended: of its own type, so that what is called for
@@ -40,7 +102,7 @@ void move_masses(const MassRun& run, S& s, Pull&& pull) {
   const V inverse_mass = s.coefficient[run.inverse_mass];
   for (std::uint32_t i = run.first; i < run.first + run.count; ++i) {
     s.v[i] += (s.force[i] - pull(s.x[i], s.v[i])) * inverse_mass;
-    s.x[i] += s.v[i];
+    s.move(i);
     s.force[i] = V{};
   }
 }
@@ -72,7 +134,7 @@ void add_forces(const Program& program, const LinkRun& run, S& s, ForceLaw&& law
   const Ends* const ends = program.ends.data() + run.first;
   for (std::uint32_t i = 0; i < run.count; ++i) {
     const auto [a, b] = ends[i];
-    const V f = law(s.x[a] - s.x[b], s.v[a] - s.v[b]);
+    const V f = law(s.between(a, b), s.v[a] - s.v[b]);
     s.force[a] -= f;
     s.force[b] += f;
   }
@@ -118,17 +180,14 @@ void place_taps(const Program& program, S& s) {
 // A point moves with the nodes around it, and along them when its coordinate changes.
 template <class S>
 void move_taps(const Program& program, S& s) {
-  using V = typename S::V;
-  using T = Scalar<V>;
   for (std::size_t i = 0; i < program.taps.size(); ++i) {
-    V position{};
     for (std::size_t lane = 0; lane < S::lanes; ++lane) {
+      const std::size_t node = program.taps[i].node * S::lanes + lane;
+      decltype(s.exact(node)) position = 0;
       around(program, s, i, lane,
-             [&](std::size_t at, T weight) { position[lane] += weight * s.state.x[at]; });
+             [&](std::size_t at, auto weight) { position += weight * s.exact(at); });
+      s.move_to(node, position);
     }
-    const std::uint32_t node = program.taps[i].node;
-    s.v[node] = position - s.x[node];
-    s.x[node] = position;
   }
 }
 
@@ -324,9 +383,8 @@ typename S::V read_output(const Program& program, const S& s, const typename S::
   return force / static_cast<Scalar<typename S::V>>(program.rate_ratio * program.rate_ratio);
 }
 
-template <class T, std::size_t Bytes>
+template <class T, std::size_t Bytes, class S = View<T, Bytes>>
 void step(const Program& program, DirectState<T>& state, const Block<T>& block) {
-  using S = View<T, Bytes>;
   using V = typename S::V;
   S s(state);
   const auto* value = reinterpret_cast<const V*>(block.value);
@@ -367,11 +425,13 @@ void step(const Program& program, DirectState<T>& state, const Block<T>& block) 
     if (has_passive) {
       correct_links(program, s);
     }
+    s.take_rests(program);
     move_taps(program, s);
     pull(program, s);
     for (const OutputSlot& output : program.outputs) {
       *outputs++ = read_output(program, s, value, output);
     }
+    s.give_rests(program);
     value += inputs;
     velocity += inputs;
   }
@@ -392,6 +452,20 @@ DirectStep<T> step_in(std::size_t bytes) {
   return step<T, 16>;
 }
 
+DirectStep<float> compensated_step_in(std::size_t bytes) {
+  if constexpr (vector_bytes(Isa::RESSORT_ISA) >= 64) {
+    if (bytes == 64) {
+      return step<float, 64, Summed<64>>;
+    }
+  }
+  if constexpr (vector_bytes(Isa::RESSORT_ISA) >= 32) {
+    if (bytes == 32) {
+      return step<float, 32, Summed<32>>;
+    }
+  }
+  return step<float, 16, Summed<16>>;
+}
+
 }  // namespace
 }  // namespace ressort::RESSORT_ISA
 
@@ -405,6 +479,11 @@ DirectStep<float> direct_step<Isa::RESSORT_ISA, float>(std::size_t bytes) {
 template <>
 DirectStep<double> direct_step<Isa::RESSORT_ISA, double>(std::size_t bytes) {
   return RESSORT_ISA::step_in<double>(bytes);
+}
+
+template <>
+DirectStep<float> compensated_step<Isa::RESSORT_ISA>(std::size_t bytes) {
+  return RESSORT_ISA::compensated_step_in(bytes);
 }
 
 }  // namespace ressort

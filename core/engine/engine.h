@@ -66,7 +66,11 @@ struct Playing {
   std::vector<Limits> limits;  // [parameter] that no event and no audio leaves; empty: none
 };
 
-enum class Precision : std::uint8_t { float32, float64 };
+enum class Precision : std::uint8_t {
+  float32,
+  float64,
+  compensated32,  // float32, but each position is the sum of two numbers
+};
 
 struct EngineMeters {
   int voices = 0;            // that sound

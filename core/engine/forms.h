@@ -261,6 +261,18 @@ struct Fourth {
   std::vector<FourthLinks> others;   // all others, each added as it is written
 };
 
-using Form = std::variant<Direct, Chains, Dense, Modes, Grid, Chorus, Sparse, Shards, Fourth>;
+// As Direct, in single precision, each position as the sum of two numbers.
+struct Compensated {};
+
+// What is slow, stepped once in `frames` samples and interpolated (slow.h); one voice.
+struct Program;
+struct Slow {
+  std::shared_ptr<const Program> fine;    // the same, for the first `frames` samples
+  std::shared_ptr<const Program> coarse;  // the same at 1/frames of the rate
+  std::uint32_t frames = 1;
+};
+
+using Form = std::variant<Direct, Chains, Dense, Modes, Grid, Chorus, Sparse, Shards, Fourth,
+                          Compensated, Slow>;
 
 }  // namespace ressort

@@ -4,12 +4,14 @@
 
 #include "core/engine/chains.h"
 #include "core/engine/chorus.h"
+#include "core/engine/compensated.h"
 #include "core/engine/dense.h"
 #include "core/engine/direct.h"
 #include "core/engine/fourth.h"
 #include "core/engine/grid.h"
 #include "core/engine/modal.h"
 #include "core/engine/sharded.h"
+#include "core/engine/slow.h"
 #include "core/engine/sparse.h"
 
 namespace ressort {
@@ -120,6 +122,12 @@ std::unique_ptr<Kernel<T>> make_kernel(const Program& program, std::size_t voice
     }
     std::unique_ptr<Kernel<T>> operator()(const Fourth& fourth) const {
       return std::make_unique<FourthKernel<T>>(program, fourth, voices, isa);
+    }
+    std::unique_ptr<Kernel<T>> operator()(const Compensated&) const {
+      return std::make_unique<CompensatedKernel<T>>(program, voices, isa);
+    }
+    std::unique_ptr<Kernel<T>> operator()(const Slow& slow) const {
+      return std::make_unique<SlowKernel<T>>(program, slow, isa);
     }
   };
   return std::visit(Maker{program, voices, isa}, program.form);

@@ -150,6 +150,9 @@ struct Machine {
   std::vector<Program> parts;
 };
 
+// How much larger a coefficient is at a rate lower by r: r^a above.
+double rate_factor(Unit unit, double r);
+
 // A coefficient's value for a voice. [any thread] wait-free
 double coefficient_value(const Program& program, const Coefficient& coefficient,
                          std::span<const double> parameters, double stiffness_factor);
