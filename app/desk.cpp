@@ -327,6 +327,7 @@ Result<Done> act::status(Desk& desk, Words) {
       {"cpu", now.cpu < 0.0 ? "not known" : fixed(100.0 * now.cpu, 1) + " % of the time there is"},
       {"voices", std::to_string(now.voices) + " of " + std::to_string(now.max_voices) + ", " +
                      std::to_string(now.stolen) + " stolen"},
+      {"asleep", fixed(100.0 * now.saved, 0) + " % of what all voices would take"},
       {"output", peak(now.peak_db) + " since the last status, " + limiter},
       {"xruns", std::to_string(now.xruns)},
       {"resets", std::to_string(now.resets) + " voices that became unstable"},

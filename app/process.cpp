@@ -271,10 +271,14 @@ void Process::tell() {
   meters.stolen.set(now.stolen);
   meters.beyond.add(now.beyond - beyond_told_);
   beyond_told_ = now.beyond;
+  meters.saved.set(now.saved);
   if (now.resets != resets_told_) {
     meters.resets.add(now.resets - resets_told_);
     resets_told_ = now.resets;
     reports.push({Report::Kind::reset, current_->serial, 0, 0.0});
+  }
+  for (const std::uint32_t link : engine.take_creators()) {
+    reports.push({Report::Kind::created, current_->serial, 0, static_cast<double>(link)});
   }
   for (const std::uint16_t index : engine.take_changes()) {
     reports.push({Report::Kind::parameter, current_->serial, index, engine.parameter(index)});

@@ -42,11 +42,11 @@ struct MidiPacket {
 
 // What the audio thread has to tell.
 struct Report {
-  enum class Kind : std::uint8_t { parameter, reset, late };
+  enum class Kind : std::uint8_t { parameter, reset, late, created };
   Kind kind = Kind::reset;
   std::uint32_t model = 0;  // serial
   std::uint16_t index = 0;  // parameter
-  double value = 0.0;       // of the parameter; seconds late
+  double value = 0.0;       // of the parameter; seconds late; the link that created energy
 };
 
 // A piece of the output on its way to a recording.
@@ -64,6 +64,7 @@ struct Meters {
   Meter<std::uint64_t> resets;  // voices that became unstable
   Meter<std::uint64_t> stolen;
   Meter<std::uint64_t> beyond;     // times that a parameter was kept where it is stable
+  Meter<double> saved;             // share of the steps that sleep saves
   Meter<std::uint64_t> dropped;    // events that found no room
   Meter<std::uint64_t> late;       // events that came after their time
   Meter<std::uint64_t> malformed;  // MIDI that could not be read

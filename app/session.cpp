@@ -3,10 +3,12 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <filesystem>
 #include <future>
 
 #include "app/admit.h"
 #include "app/timing.h"
+#include "core/model/topology.h"
 
 namespace ressort {
 namespace {
@@ -16,11 +18,39 @@ double to_db(double factor) {
 }
 
 // Modes leave out what nobody hears, so that nothing can go on from them.
-bool may_gain(const Plan& plan) {
-  const auto& parts = plan.parts;
-  return std::any_of(parts.begin(), parts.end(), [](const Part& part) { return part.may_gain; }) &&
-         std::none_of(parts.begin(), parts.end(),
+bool can_be_relieved(const Plan& plan) {
+  return std::none_of(plan.parts.begin(), plan.parts.end(),
                       [](const Part& part) { return part.method == Method::modal; });
+}
+
+bool may_gain(const Plan& plan) {
+  return std::any_of(plan.parts.begin(), plan.parts.end(),
+                     [](const Part& part) { return part.may_gain; }) &&
+         can_be_relieved(plan);
+}
+
+bool is_straight(const Network& network) {
+  return std::all_of(network.links.begin(), network.links.end(),
+                     [](const Link& link) { return link.kind == LinkKind::spring; });
+}
+
+std::string_view kind_of(const Link& link) {
+  switch (link.kind) {
+    case LinkKind::spring:
+    case LinkKind::quadratic_spring:
+    case LinkKind::cubic_spring:
+    case LinkKind::clipped_spring:
+      return "spring";
+    case LinkKind::pluck:
+      return "pluck";
+    case LinkKind::bow:
+    case LinkKind::smooth_bow:
+      return "bow";
+    case LinkKind::contact:
+    case LinkKind::clipped_contact:
+      return "contact";
+  }
+  return "link";
 }
 
 }  // namespace
@@ -126,6 +156,7 @@ Status Session::status() {
   status.resets = meters.resets.get();
   status.stolen = meters.stolen.get();
   status.beyond = meters.beyond.get();
+  status.saved = meters.saved.get();
   status.dropped = meters.dropped.get();
   status.late = meters.late.get();
   status.malformed = meters.malformed.get();
@@ -165,18 +196,17 @@ void Session::work() {
     listen();
     if (has_job) {
       do_load(job);
-    } else if (improvement_) {
+    } else if (source_ && source_->may_gain) {
       improve();
     }
   }
 }
 
-// The same model by forms that took too long to find while somebody waited; it goes on where the
-// other is.
+// The same model by other forms, of which some took too long to find while somebody waited; it goes
+// on where the other is.
 void Session::improve() {
-  const Improvement work = std::move(*improvement_);
-  improvement_.reset();
-  auto compiled = compile(work.network, work.preset, work.options);
+  source_->may_gain = false;
+  auto compiled = compile(source_->network, source_->preset, source_->options);
   if (!compiled) {
     return;
   }
@@ -218,6 +248,8 @@ void Session::listen() {
         news = (is_current ? current_->name : std::string("the last model")) +
                ": a voice became unstable and was put back to rest; lower its stiffness or "
                "damping, or raise its mass";
+      } else if (report.kind == Report::Kind::created && is_current) {
+        news = calm(static_cast<std::uint32_t>(report.value));
       } else if (report.kind == Report::Kind::late && report.value > 0.05) {
         news = "an event came " + std::to_string(report.value) + " s after its time";
       }
@@ -236,6 +268,26 @@ bool Session::may_tell_reset() {
   }
   next_reset_news_ = now + std::chrono::seconds(5);
   return true;
+}
+
+std::string Session::calm(std::uint32_t link) {
+  if (!source_) {
+    return {};
+  }
+  auto& passive = source_->options.passive_links;
+  if (std::find(passive.begin(), passive.end(), link) != passive.end()) {
+    return {};
+  }
+  passive.push_back(link);
+  source_->may_gain = can_be_relieved(current_->plan);
+  const Network whole =
+      source_->network.macros.empty() ? source_->network : expand_macros(source_->network);
+  const Link& creator = whole.links[link];
+  return "the " + std::string(kind_of(creator)) + " '" + creator.name.text() + "' (" +
+         std::filesystem::path(current_->model_path).filename().string() + ":" +
+         std::to_string(creator.place.line) + ") created energy" +
+         (source_->may_gain ? ": computed passively from now on"
+                            : "; load it with --budget passive=always");
 }
 
 void Session::do_load(const Job& job) {
@@ -302,12 +354,13 @@ Result<std::shared_ptr<const Loaded>> Session::build(const std::string& name, bo
     }
   }
   offer(std::move(compiled->engine));
-  improvement_.reset();
-  if (may_gain(loaded->plan)) {
+  source_.reset();
+  if (may_gain(loaded->plan) || !is_straight(scene->network)) {
     options.find_gain = false;
     scene->preset.gain = loaded->instrument.gain;
     options.most_modes = patient_modes;
-    improvement_ = {std::move(scene->network), std::move(scene->preset), options};
+    source_ = {std::move(scene->network), std::move(scene->preset), options,
+               may_gain(loaded->plan)};
   }
   return std::shared_ptr<const Loaded>(std::move(loaded));
 }

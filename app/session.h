@@ -45,6 +45,7 @@ struct Status {
   double load_ms = 0.0;
   int voices = 0;
   int max_voices = 0;
+  double saved = 0.0;       // the share of the computing that sleep saves, 0..1
   double cpu = 0.0;         // share of the time there is, 0..1; -1: not known
   double peak_db = 0.0;     // since the last asking; -inf is silence
   double limited_db = 0.0;  // the limiter's deepest cut since the last asking
@@ -107,11 +108,12 @@ class Session {
     bool force = false;
   };
 
-  // What sounds, compiled once more with more patience.
-  struct Improvement {
+  // What sounds, to be compiled once more: with more patience, or with links found passively.
+  struct Source {
     Network network;
     Preset preset;
     CompileOptions options;
+    bool may_gain = false;
   };
 
   void work();
@@ -123,6 +125,8 @@ class Session {
   void time_parts();
   void listen();
   bool may_tell_reset();
+  // A link of what sounds made energy of nothing: what there is to say of it, once.
+  std::string calm(std::uint32_t link);
 
   Process& process_;
   SessionOptions options_;
@@ -143,7 +147,7 @@ class Session {
   std::string scene_name_;                                   // [worker] what was loaded last
   bool is_forced_ = false;                                   // [worker] and whether by force
   const Engine* offered_ = nullptr;                          // [worker] until the next is offered
-  std::optional<Improvement> improvement_;                   // [worker] what may still gain
+  std::optional<Source> source_;                             // [worker] of what may be improved
   std::chrono::steady_clock::time_point next_reset_news_{};  // [worker]
   std::thread worker_;                                       // last, so that it ends first
 };

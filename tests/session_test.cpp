@@ -7,6 +7,7 @@
 #include <cmath>
 #include <filesystem>
 #include <fstream>
+#include <mutex>
 #include <thread>
 
 #include "tests/catch.h"
@@ -222,4 +223,30 @@ TEST_CASE("Parameters are remembered, clamped, and followed when a controller tu
     std::this_thread::sleep_for(std::chrono::milliseconds(10));
   }
   CHECK(session.parameter("K") == 0.2);
+}
+
+TEST_CASE("A contact that creates energy is named, and compiled anew behind the sound",
+          "[session]") {
+  const Folder folder;
+  const std::string file =
+      folder.write("ball.mdl",
+                   "@g ground 0.\n@m massG 1. 0.00001 0.01 0.01\n@hit contact @g @m 0.5 0. 0.\n"
+                   "@in1 frcInput @m\n@out1 posOutput @m\n");
+  Process process(48000.0);
+  std::mutex mutex;
+  std::vector<std::string> told;
+  Session session(process, at_48k(), [&](const std::string& news) {
+    const std::lock_guard lock(mutex);
+    told.push_back(news);
+  });
+  REQUIRE(session.load_and_wait(file));
+  const Player player(process);
+  for (int patience = 0; patience < 2000 && process.meters.swaps.get() < 2; ++patience) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(10));
+  }
+  CHECK(process.meters.swaps.get() == 2);
+  const std::lock_guard lock(mutex);
+  CAPTURE(told);
+  REQUIRE(told.size() == 1);
+  CHECK(told[0] == "the contact 'hit' (ball.mdl:3) created energy: computed passively from now on");
 }

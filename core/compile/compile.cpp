@@ -14,6 +14,7 @@
 #include "core/compile/cull.h"
 #include "core/compile/machine.h"
 #include "core/compile/merge.h"
+#include "core/compile/repose.h"
 #include "core/model/topology.h"
 
 namespace ressort {
@@ -347,6 +348,16 @@ Result<Compiled> compile_expanded(const Network& written, const Network& network
   instrument.verdict = compiled.gate.verdict;
   for (const Range& limit : compiled.gate.limits) {
     playing.limits.push_back({limit.lowest, limit.highest});
+  playing.highest_factor = highest_stiffness_factor(
+      network, preset_box(instrument.parameters, preset), machine.rate_ratio);
+  if (!options.bare && playing.highest_factor >= 1.0) {
+    playing.repose = make_repose(network, machine, preset_box(instrument.parameters, preset));
+  }
+  for (const Program& program : machine.parts) {
+    instrument.masses += program.moving;
+  }
+  if (preset.keyboard && instrument.masses <= most_tuned_masses) {
+    instrument.mode = lowest_mode(network, machine.parameters);
   }
   const ParameterBox proved = proved_box(instrument.parameters, preset);
   const double bound = highest_stiffness_factor(network, proved, machine.rate_ratio);

@@ -188,6 +188,7 @@ class ProgramMaker {
     std::stable_sort(order.begin(), order.end(),
                      [&](std::uint32_t a, std::uint32_t b) { return rank(a) < rank(b); });
     program_.ends.reserve(order.size());
+    program_.origins = order;
     for (std::uint32_t i = 0; i < order.size(); ++i) {
       const Link& link = network_.links[order[i]];
       program_.ends.push_back({node_[link.a], node_[link.b]});

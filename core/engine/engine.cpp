@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <utility>
 
 #include "core/engine/voices.h"
 
@@ -109,7 +110,14 @@ void Engine::Voices::set_parameter(std::size_t index, double wanted) {
   }
   parameters[index] = value;
   note_change(static_cast<std::uint16_t>(index));
+  std::size_t p = 0;
   each_part([&](auto& part) {
+    for (std::size_t lane = 0; lane < voices.size(); ++lane) {
+      if (voices[lane].awake && !part.program.depending[index].empty()) {
+        stir(lane, p);
+      }
+    }
+    ++p;
     for (const std::uint32_t c : part.program.depending[index]) {
       for (std::size_t lane = 0; lane < voices.size(); ++lane) {
         if (voices[lane].awake) {
@@ -146,7 +154,9 @@ void Engine::Voices::tune(std::size_t lane, bool ramped) {
                                                voice.frequency_hz * bent, machine.rate_hz)
                             : bent * bent;
   voice.factor = std::min(factor, std::max(1.0, playing.highest_factor));
+  std::size_t p = 0;
   each_part([&](auto& part) {
+    stir(lane, p++);
     for (std::uint32_t c = 0; c < part.program.coefficients.size(); ++c) {
       set_coefficient(part, lane, c, ramped);
     }
@@ -388,6 +398,11 @@ std::span<const std::uint16_t> Engine::take_changes() {
   return voices_->told;
 }
 
+std::span<const std::uint32_t> Engine::take_creators() {
+  const std::size_t first = std::exchange(voices_->creators_told, voices_->creators.size());
+  return std::span(voices_->creators).subspan(first);
+}
+
 double Engine::parameter(std::uint16_t index) const {
   return voices_->parameters[index];
 }
@@ -412,6 +427,7 @@ EngineMeters Engine::meters() const {
   meters.resets = voices_->resets;
   meters.stolen = voices_->stolen;
   meters.beyond = voices_->beyond;
+  meters.saved = voices_->saved();
   return meters;
 }
 

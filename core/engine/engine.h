@@ -48,6 +48,18 @@ enum class Tuning : std::uint8_t {
 struct Limits {
   double lowest = -std::numeric_limits<double>::infinity();
   double highest = std::numeric_limits<double>::infinity();
+// What is known of a part's stillness. With an energy E, measured from where it rests, and nothing
+// that stirs it, an output stays within sqrt(2 E c / s) for ever; c is its compliance where every
+// stiffness is as small as the box of parameters lets it be, s the voice's stiffness factor.
+struct Repose {
+  struct Reach {
+    std::uint32_t link = 0;   // a contact or a pluck
+    double compliance = 0.0;  // of the distance of its ends
+  };
+  std::vector<double> compliances;  // [output]; none: nothing is known
+  std::vector<Reach> reaches;
+  std::vector<double> lowest;  // [parameter]
+  std::vector<double> highest;
 };
 
 // How a Machine is played. Plain data, made by the compile room.
@@ -64,6 +76,7 @@ struct Playing {
   double highest_factor = 1.0;  // the stiffness factor up to which the model is proved stable
   std::vector<Control> controls;
   std::vector<Limits> limits;  // [parameter] that no event and no audio leaves; empty: none
+  std::vector<Repose> repose;  // [part], or none
 };
 
 enum class Precision : std::uint8_t {
@@ -74,12 +87,16 @@ enum class Precision : std::uint8_t {
 
 struct EngineMeters {
   int voices = 0;            // that sound
-  std::uint64_t resets = 0;  // voices that went out of bounds and were put back to rest
+  std::uint64_t resets = 0;  // voices that went out of bounds and were faded out
   std::uint64_t stolen = 0;  // voices that had to give way to a new note
   std::uint64_t beyond = 0;  // times that a parameter was kept within its limits; by audio, blocks
+  double saved = 0.0;        // the share of the steps that nobody has to take, 0..1
 };
 
-inline constexpr double runaway = 1e9;  // a voice whose output passes this has lost its stability
+// A voice that is louder than this, or no number, has lost its stability: 60 dB over full scale; in
+// the bare network, where outputs are positions, a number that no position reaches.
+inline constexpr double runaway_level = 1e3;
+inline constexpr double runaway = 1e9;
 
 // The heap is used by the constructor and never again.
 class Engine {
@@ -105,6 +122,12 @@ class Engine {
   std::span<const std::uint16_t> take_changes();
   double parameter(std::uint16_t index) const;  // [audio]
   static constexpr std::size_t max_changes = 64;
+
+  // The links, by Program::origins, that have made energy of nothing since the last call: while no
+  // hand moved, no sound came in and no parameter turned. None is told twice, and at most
+  // max_creators are. [audio] wait-free
+  std::span<const std::uint32_t> take_creators();
+  static constexpr std::size_t max_creators = 16;
 
   const Machine& machine() const;  // [any thread], as long as the engine lives
   int output_count() const;        // [any thread], as long as the engine lives

@@ -117,7 +117,8 @@ struct Program {
   std::vector<double> velocity;  // [node] per sample of rate_hz
   std::vector<MassRun> mass_runs;
   std::vector<LinkRun> link_runs;
-  std::vector<Ends> ends;  // [link]
+  std::vector<Ends> ends;              // [link]
+  std::vector<std::uint32_t> origins;  // [link] where the model has it
   std::vector<InputSlot> inputs;
   std::vector<TapSlot> taps;
   std::vector<std::uint32_t> tap_nodes;  // nodes

@@ -95,6 +95,9 @@ bool Engine::Voices::go_on_from(const Voices& from) {
           return false;
         }
         static_cast<Playback&>(*this) = from;
+        for (Watch& here : watches) {
+          here.is_judged = false;
+        }
         go_on(b, *other);
         return true;
       },

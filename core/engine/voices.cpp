@@ -29,6 +29,15 @@ Engine::Voices::Voices(Machine machine_in, Playing playing_in, Precision precisi
           std::exp(-static_cast<double>(max_block_frames) / (level_memory_s * machine.rate_hz))) {
   playing.limits.resize(machine.parameters.size());
   voices.resize(lanes_wanted());
+  first_output.push_back(0);
+  for (const Program& program : machine.parts) {
+    first_output.push_back(first_output.back() + program.outputs.size());
+    elements.push_back(static_cast<double>(program.position.size() + program.ends.size()));
+  }
+  watches.resize(voices.size() * machine.parts.size());
+  held.resize(voices.size() * first_output.back());
+  creators.reserve(max_creators);
+  loudest = playing.bare ? runaway : std::min(runaway, runaway_level / playing.gain);
   hands.resize(voices.size() * machine.hands.size());
   parameters = machine.parameters;
   audio_before.resize(machine.hands.size());
@@ -70,7 +79,11 @@ void Engine::Voices::start(std::size_t lane, double frequency_hz) {
 }
 
 void Engine::Voices::rest_lane(std::size_t lane) {
-  each_part([&](auto& part) { part.of(lane).reset(lane % part.width); });
+  std::size_t p = 0;
+  each_part([&](auto& part) {
+    part.of(lane).reset(lane % part.width);
+    watch(lane, p++) = Watch{};
+  });
   for (std::size_t i = 0; i < machine.hands.size(); ++i) {
     hand(lane, i).place(rest[i]);
   }
@@ -136,6 +149,7 @@ void Engine::Voices::segment(std::span<const double* const> inputs,
   since_settled += frames;
   if (since_settled == max_block_frames) {
     since_settled = 0;
+    look_around();
     for (std::size_t lane = 0; lane < voices.size(); ++lane) {
       if (voices[lane].awake) {
         settle(lane);
@@ -155,22 +169,21 @@ template <class T>
 void Engine::Voices::segment_in(Bank<T>& b, std::span<const double* const> inputs,
                                 std::span<double* const> outputs, std::size_t at,
                                 std::size_t frames) {
-  for (PartBank<T>& part : b.parts) {
+  for (std::size_t p = 0; p < b.parts.size(); ++p) {
+    PartBank<T>& part = b.parts[p];
     for (std::size_t first = 0; first < voices.size(); first += part.width) {
-      const std::size_t end = std::min(voices.size(), first + part.width);
-      const auto is_awake = [](const Voice& voice) { return voice.awake; };
-      if (std::none_of(voices.begin() + static_cast<std::ptrdiff_t>(first),
-                       voices.begin() + static_cast<std::ptrdiff_t>(end), is_awake)) {
-        continue;
+      const bool steps = is_stepped(b, p, first);
+      mix_still(p, first, part.width, outputs, at, frames);
+      if (steps) {
+        fill_drive(b, part, first, frames);
+        fill_audio(b, part, first, inputs, at, frames);
+        part.of(first).step({.frames = frames,
+                             .value = b.value.data(),
+                             .velocity = b.velocity.data(),
+                             .audio = b.audio.data(),
+                             .outputs = b.outputs.data()});
+        mix(b, p, first, outputs, at, frames);
       }
-      fill_drive(b, part, first, frames);
-      fill_audio(b, part, first, inputs, at, frames);
-      part.of(first).step({.frames = frames,
-                           .value = b.value.data(),
-                           .velocity = b.velocity.data(),
-                           .audio = b.audio.data(),
-                           .outputs = b.outputs.data()});
-      mix(b, part, first, outputs, at, frames);
     }
   }
   for (Voice& voice : voices) {
@@ -178,6 +191,28 @@ void Engine::Voices::segment_in(Bank<T>& b, std::span<const double* const> input
       voice.gain = voice.next_gain(voice.gain);
     }
   }
+  fade_lost();
+}
+
+template <class T>
+bool Engine::Voices::is_stepped(const Bank<T>& b, std::size_t p, std::size_t first) {
+  const PartBank<T>& part = b.parts[p];
+  const Program& program = part.program;
+  bool any = false;
+  for (std::size_t lane = first; lane < std::min(voices.size(), first + part.width); ++lane) {
+    if (!voices[lane].awake) {
+      continue;
+    }
+    Watch& here = watch(lane, p);
+    if (part.of(lane).coefficients.ramp_frames > 0 || !program.audio_coefficients.empty() ||
+        std::any_of(program.inputs.begin(), program.inputs.end(), [&](const InputSlot& input) {
+          return sound[input.hand] != nullptr || hand(lane, input.hand).is_moving();
+        })) {
+      stir(lane, p);
+    }
+    any |= !here.is_still;
+  }
+  return any;
 }
 
 template <class T>
@@ -317,30 +352,31 @@ void Engine::Voices::remember_audio(std::span<const double* const> inputs, std::
 }
 
 template <class T>
-void Engine::Voices::mix(Bank<T>& b, const PartBank<T>& part, std::size_t first,
+void Engine::Voices::mix(Bank<T>& b, std::size_t p, std::size_t first,
                          std::span<double* const> outputs, std::size_t at, std::size_t frames) {
+  PartBank<T>& part = b.parts[p];
   const std::size_t count = part.program.outputs.size();
   const Heard<T> heard{
       .outputs = b.outputs.data(), .frames = frames, .count = count, .width = part.width};
-  b.mixer.find_peaks(heard, runaway, b.peak.data());
+  b.mixer.find_peaks(heard, loudest, b.peak.data());
   std::fill(b.gain.begin(), b.gain.end(), 0.0);
   for (std::size_t lane = first; lane < std::min(voices.size(), first + part.width); ++lane) {
     Voice& voice = voices[lane];
-    if (!voice.awake) {
+    if (!voice.awake || watch(lane, p).is_still) {
       continue;
     }
     const auto peak = static_cast<double>(b.peak[lane - first]);
-    if (!(peak < runaway)) {
-      ++resets;
-      rest_lane(lane);
+    if (!(peak < loudest)) {
+      lose(b, p, lane, outputs, at, frames);
       continue;
     }
     voice.peak = std::max(voice.peak, peak);
     if (voice.gain_step != 0.0) {
-      mix_fading(b, part, lane, outputs, at, frames);
+      mix_some(b, p, lane, outputs, at, frames);
     } else {
       b.gain[lane - first] = playing.gain * voice.gain;
     }
+    keep(b, p, lane, frames);
   }
   for (std::size_t output = 0; output < count; ++output) {
     b.heard[output] = outputs[part.program.outputs[output].channel] + at;
@@ -350,9 +386,10 @@ void Engine::Voices::mix(Bank<T>& b, const PartBank<T>& part, std::size_t first,
 }
 
 template <class T>
-void Engine::Voices::mix_fading(const Bank<T>& b, const PartBank<T>& part, std::size_t lane,
-                                std::span<double* const> outputs, std::size_t at,
-                                std::size_t frames) {
+void Engine::Voices::mix_some(const Bank<T>& b, std::size_t p, std::size_t lane,
+                              std::span<double* const> outputs, std::size_t at,
+                              std::size_t frames) {
+  const PartBank<T>& part = b.parts[p];
   const std::size_t count = part.program.outputs.size();
   double faded = voices[lane].gain;
   for (std::size_t n = 0; n < frames; ++n) {
@@ -364,6 +401,44 @@ void Engine::Voices::mix_fading(const Bank<T>& b, const PartBank<T>& part, std::
           gain * static_cast<double>(b.outputs[from]);
     }
   }
+}
+
+template <class T>
+void Engine::Voices::keep(const Bank<T>& b, std::size_t p, std::size_t lane, std::size_t frames) {
+  const PartBank<T>& part = b.parts[p];
+  const std::size_t count = part.program.outputs.size();
+  double* const kept = held_of(lane, p);
+  for (std::size_t output = 0; frames > 0 && output < count; ++output) {
+    kept[output] = static_cast<double>(
+        b.outputs[((frames - 1) * count + output) * part.width + lane % part.width]);
+  }
+}
+
+template <class T>
+void Engine::Voices::lose(Bank<T>& b, std::size_t p, std::size_t lane,
+                          std::span<double* const> outputs, std::size_t at, std::size_t frames) {
+  PartBank<T>& part = b.parts[p];
+  const std::size_t count = part.program.outputs.size();
+  const auto is_sane = [&](std::size_t n) {
+    for (std::size_t output = 0; output < count; ++output) {
+      const T y = b.outputs[(n * count + output) * part.width + lane % part.width];
+      if (!(std::fabs(static_cast<double>(y)) < loudest)) {
+        return false;
+      }
+    }
+    return true;
+  };
+  std::size_t sane = 0;
+  while (sane < frames && is_sane(sane)) {
+    ++sane;
+  }
+  mix_some(b, p, lane, outputs, at, sane);
+  keep(b, p, lane, sane);
+  resets += voices[lane].lost ? 0 : 1;
+  voices[lane].lost = true;
+  watch(lane, p).is_still = true;
+  part.of(lane).reset(lane % part.width);  // nothing is to be slow for numbers that are none
+  mix_held(p, lane, outputs, at, sane, frames);
 }
 
 void Engine::Voices::settle(std::size_t lane) {

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "core/engine/bank.h"
+#include "core/engine/energy.h"
 #include "core/engine/engine.h"
 #include "core/engine/gesture.h"
 
@@ -17,9 +18,11 @@ namespace ressort {
 
 inline constexpr double steal_fade_s = 0.005;  // a voice that gives way takes this long to vanish
 inline constexpr double quiet_level = 1e-5;    // -100 dBFS
+inline constexpr double silent_level = 1e-6;   // -120 dBFS: nothing that stands still was louder
 
 struct Voice {
   bool awake = false;      // steps and is heard
+  bool lost = false;       // its stability: it fades from where it was
   bool fading = false;     // gives way; its lane is free when the fade ends
   bool held = false;       // by a key
   bool sustained = false;  // by the pedal, its key being up
@@ -35,11 +38,22 @@ struct Voice {
   std::size_t quiet_frames = 0;
 };
 
+// One part in one voice, and what is known of its energy.
+struct Watch {
+  bool is_still = false;   // is not stepped; its outputs are what they were
+  bool is_stirred = true;  // something came from outside since the last look
+  bool is_judged = false;  // `most` is known
+  double most = 0.0;       // energy that it may have, as long as nothing stirs it
+  double energy = 0.0;     // at the last look
+};
+
 // What an engine is in the midst of: all but its kernels and what they are driven by. Another
 // engine of the same model goes on by a copy of it.
 struct Playback {
   std::vector<Voice> voices;           // [lane]
   std::vector<Hand> hands;             // [lane][input]
+  std::vector<Watch> watches;          // [lane][part]
+  std::vector<double> held;            // [lane][output of the machine] the last sample's
   std::vector<double> parameters;      // as they are now
   std::vector<std::uint16_t> changes;  // parameters, since the last take_changes()
   std::vector<double> rest;            // [input] where a new voice's hand starts
@@ -57,6 +71,12 @@ struct Playback {
 struct Engine::Voices : Playback {
   Voices(Machine machine_in, Playing playing_in, Precision precision, Isa isa);
   std::size_t lanes_wanted() const;
+  Watch& watch(std::size_t lane, std::size_t part) {
+    return watches[lane * machine.parts.size() + part];
+  }
+  double* held_of(std::size_t lane, std::size_t part) {
+    return held.data() + lane * first_output.back() + first_output[part];
+  }
 
   // Calls `use(part)` for every PartBank.
   template <class Use>
@@ -89,6 +109,8 @@ struct Engine::Voices : Playback {
   double within_limits(std::size_t index, double value) const;
   void set_parameter(std::size_t index, double wanted);
   void note_change(std::uint16_t index);
+  // Something comes to a part from outside.
+  void stir(std::size_t lane, std::size_t part);
   template <class T>
   void set_coefficient(PartBank<T>& part, std::size_t lane, std::uint32_t c, bool ramped);
   void tune(std::size_t lane, bool ramped);
@@ -150,14 +172,44 @@ struct Engine::Voices : Playback {
   void listen(std::span<const double* const> inputs, std::size_t at, std::size_t frames);
   // The last position of an audio input, for the velocity of the next segment's first sample.
   void remember_audio(std::span<const double* const> inputs, std::size_t end);
-  // Adds what the voices of one kernel say to the outputs; what is out of bounds is put to rest.
+  // Whether the kernel of a part that begins with voice `first` has anything to step. What is moved
+  // from outside is not still any more.
   template <class T>
-  void mix(Bank<T>& b, const PartBank<T>& part, std::size_t first, std::span<double* const> outputs,
+  bool is_stepped(const Bank<T>& b, std::size_t p, std::size_t first);
+  // Adds what the voices of one kernel say to the outputs, and keeps their last samples.
+  template <class T>
+  void mix(Bank<T>& b, std::size_t p, std::size_t first, std::span<double* const> outputs,
            std::size_t at, std::size_t frames);
-  // The same of a voice whose gain moves.
+  // The same of one voice, by itself.
   template <class T>
-  void mix_fading(const Bank<T>& b, const PartBank<T>& part, std::size_t lane,
-                  std::span<double* const> outputs, std::size_t at, std::size_t frames);
+  void mix_some(const Bank<T>& b, std::size_t p, std::size_t lane, std::span<double* const> outputs,
+                std::size_t at, std::size_t frames);
+  template <class T>
+  void keep(const Bank<T>& b, std::size_t p, std::size_t lane, std::size_t frames);
+  // The last samples of what stands still, for frames [from, frames) of the segment.
+  void mix_held(std::size_t p, std::size_t lane, std::span<double* const> outputs, std::size_t at,
+                std::size_t from, std::size_t frames);
+  void mix_still(std::size_t p, std::size_t first, std::size_t width,
+                 std::span<double* const> outputs, std::size_t at, std::size_t frames);
+  // A voice whose output has left its bounds is heard as long as it is sane; then it stands still
+  // and, from the next segment on, fades.
+  template <class T>
+  void lose(Bank<T>& b, std::size_t p, std::size_t lane, std::span<double* const> outputs,
+            std::size_t at, std::size_t frames);
+  void fade_lost();
+
+  // --- what watches the energy ---
+  // Once in max_block_frames: looks at one part after the other, seldom enough for its cost to be
+  // a small share of what stepping takes.
+  void look_around();
+  template <class T>
+  void look(Bank<T>& b, std::size_t at);
+  template <class T>
+  void accuse(const Program& program, LaneValues<T> values, const Bank<T>& b, std::size_t at);
+  template <class T>
+  bool may_rest(const Bank<T>& b, std::size_t lane, std::size_t p, double energy) const;
+  double saved() const;
+
   // Keeps the voice's level and sends it to sleep when it has faded or come to rest. Once in
   // max_block_frames, counted from the engine's start: so what sleeps or gives way does not
   // depend on how the time is cut into blocks.
@@ -173,6 +225,16 @@ struct Engine::Voices : Playback {
   std::vector<std::uint16_t> told;            // what the last take_changes() gave
   std::vector<const Control*> audio_control;  // [input] null where no audio drives it
   std::vector<const double*> sound;           // [input] of this segment; null where all is silent
+  std::vector<std::size_t> first_output;      // [part] among all parts' outputs; then their number
+  std::vector<double> elements;               // [part] nodes and links
+  std::vector<std::uint32_t> creators;        // links that made energy of nothing, by origin
+  std::size_t creators_told = 0;
+  static constexpr std::size_t none = static_cast<std::size_t>(-1);
+  std::size_t suspect = none;  // of the watches: is looked at more often, as something was created
+  std::size_t looks_left = 0;  // at it
+  std::size_t turn = 0;        // of the watches: the next to be looked at
+  double stepped = 0.0;        // elements, times max_block_frames, since then
+  double loudest = 0.0;        // what no output reaches
   double pole = 0.0;
   double bow_pole = 0.0;
   double level_kept = 0.0;  // of a voice's level from one settling to the next

@@ -1,0 +1,71 @@
+#include "core/compile/repose.h"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+
+#include "core/analysis/compliance.h"
+
+namespace ressort {
+namespace {
+
+constexpr std::size_t most_places = 64;  // each takes a solution
+
+bool comes_and_goes(const Link& link) {
+  return link.kind == LinkKind::pluck || link.kind == LinkKind::contact ||
+         link.kind == LinkKind::clipped_contact;
+}
+
+}  // namespace
+
+std::vector<Repose> make_repose(const Network& network, const Machine& machine,
+                                const ParameterBox& box) {
+  std::map<std::uint32_t, double> given;  // mass -> its compliance
+  for (const Output& output : network.outputs) {
+    given[output.mass] = 0.0;
+  }
+  for (const Link& link : network.links) {
+    if (comes_and_goes(link)) {
+      given[link.a] = given[link.b] = 0.0;
+    }
+  }
+  std::vector<std::uint32_t> masses;
+  for (const auto& [mass, compliance] : given) {
+    masses.push_back(mass);
+  }
+  if (masses.size() > most_places) {
+    return {};
+  }
+  const std::vector<double> found = compliances(network, box, machine.rate_ratio, masses);
+  if (found.empty()) {
+    return {};
+  }
+  for (std::size_t i = 0; i < masses.size(); ++i) {
+    given[masses[i]] = found[i];
+  }
+  std::vector<Repose> reposes;
+  for (const Program& program : machine.parts) {
+    Repose repose{.compliances = {}, .reaches = {}, .lowest = box.lowest, .highest = box.highest};
+    bool is_known = true;
+    for (const OutputSlot& slot : program.outputs) {
+      const auto output = std::find_if(
+          network.outputs.begin(), network.outputs.end(), [&](const Output& candidate) {
+            return candidate.number == static_cast<int>(slot.channel) + 1;
+          });
+      const double compliance = given[output->mass];
+      is_known = is_known && !slot.is_force && std::isfinite(compliance);
+      repose.compliances.push_back(compliance);
+    }
+    for (std::uint32_t i = 0; i < program.origins.size(); ++i) {
+      const Link& link = network.links[program.origins[i]];
+      if (comes_and_goes(link)) {
+        const double root = std::sqrt(given[link.a]) + std::sqrt(given[link.b]);
+        repose.reaches.push_back({i, root * root});
+      }
+    }
+    reposes.push_back(is_known ? std::move(repose) : Repose{});
+  }
+  return reposes;
+}
+
+}  // namespace ressort
