@@ -240,8 +240,12 @@ TEST_CASE("A contact that creates energy is named, and compiled anew behind the 
     told.push_back(news);
   });
   REQUIRE(session.load_and_wait(file));
-  const Player player(process);
+  Ear ear(process, 1'000'000);  // strikes nothing
+  std::uint64_t n = 2;
   for (int patience = 0; patience < 2000 && process.meters.swaps.get() < 2; ++patience) {
+    for (const std::uint64_t end = n + 50; n < end; ++n) {
+      ear.block(n);
+    }
     std::this_thread::sleep_for(std::chrono::milliseconds(10));
   }
   CHECK(process.meters.swaps.get() == 2);

@@ -198,19 +198,20 @@ template <class T>
 bool Engine::Voices::is_stepped(const Bank<T>& b, std::size_t p, std::size_t first) {
   const PartBank<T>& part = b.parts[p];
   const Program& program = part.program;
+  const bool is_turned =
+      part.of(first).coefficients.ramp_frames > 0 || !program.audio_coefficients.empty();
   bool any = false;
   for (std::size_t lane = first; lane < std::min(voices.size(), first + part.width); ++lane) {
     if (!voices[lane].awake) {
       continue;
     }
-    Watch& here = watch(lane, p);
-    if (part.of(lane).coefficients.ramp_frames > 0 || !program.audio_coefficients.empty() ||
-        std::any_of(program.inputs.begin(), program.inputs.end(), [&](const InputSlot& input) {
-          return sound[input.hand] != nullptr || hand(lane, input.hand).is_moving();
-        })) {
+    const auto moves = [&](const InputSlot& input) {
+      return sound[input.hand] != nullptr || hand(lane, input.hand).is_moving();
+    };
+    if (is_turned || std::any_of(program.inputs.begin(), program.inputs.end(), moves)) {
       stir(lane, p);
     }
-    any |= !here.is_still;
+    any |= !watch(lane, p).is_still;
   }
   return any;
 }
@@ -360,6 +361,7 @@ void Engine::Voices::mix(Bank<T>& b, std::size_t p, std::size_t first,
       .outputs = b.outputs.data(), .frames = frames, .count = count, .width = part.width};
   b.mixer.find_peaks(heard, loudest, b.peak.data());
   std::fill(b.gain.begin(), b.gain.end(), 0.0);
+  const T* const last = b.outputs.data() + (frames - 1) * count * part.width;
   for (std::size_t lane = first; lane < std::min(voices.size(), first + part.width); ++lane) {
     Voice& voice = voices[lane];
     if (!voice.awake || watch(lane, p).is_still) {
@@ -376,7 +378,7 @@ void Engine::Voices::mix(Bank<T>& b, std::size_t p, std::size_t first,
     } else {
       b.gain[lane - first] = playing.gain * voice.gain;
     }
-    keep(b, p, lane, frames);
+    keep(last + lane - first, part.width, p, lane);
   }
   for (std::size_t output = 0; output < count; ++output) {
     b.heard[output] = outputs[part.program.outputs[output].channel] + at;
@@ -404,13 +406,11 @@ void Engine::Voices::mix_some(const Bank<T>& b, std::size_t p, std::size_t lane,
 }
 
 template <class T>
-void Engine::Voices::keep(const Bank<T>& b, std::size_t p, std::size_t lane, std::size_t frames) {
-  const PartBank<T>& part = b.parts[p];
-  const std::size_t count = part.program.outputs.size();
+void Engine::Voices::keep(const T* outputs, std::size_t width, std::size_t p, std::size_t lane) {
   double* const kept = held_of(lane, p);
-  for (std::size_t output = 0; frames > 0 && output < count; ++output) {
-    kept[output] = static_cast<double>(
-        b.outputs[((frames - 1) * count + output) * part.width + lane % part.width]);
+  const std::size_t count = first_output[p + 1] - first_output[p];
+  for (std::size_t output = 0; output < count; ++output) {
+    kept[output] = static_cast<double>(outputs[output * width]);
   }
 }
 
@@ -433,7 +433,10 @@ void Engine::Voices::lose(Bank<T>& b, std::size_t p, std::size_t lane,
     ++sane;
   }
   mix_some(b, p, lane, outputs, at, sane);
-  keep(b, p, lane, sane);
+  if (sane > 0) {
+    keep(b.outputs.data() + (sane - 1) * count * part.width + lane % part.width, part.width, p,
+         lane);
+  }
   resets += voices[lane].lost ? 0 : 1;
   voices[lane].lost = true;
   watch(lane, p).is_still = true;

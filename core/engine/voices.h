@@ -184,8 +184,9 @@ struct Engine::Voices : Playback {
   template <class T>
   void mix_some(const Bank<T>& b, std::size_t p, std::size_t lane, std::span<double* const> outputs,
                 std::size_t at, std::size_t frames);
+  // The outputs of a voice's last sample, from its lane in the row.
   template <class T>
-  void keep(const Bank<T>& b, std::size_t p, std::size_t lane, std::size_t frames);
+  void keep(const T* outputs, std::size_t width, std::size_t p, std::size_t lane);
   // The last samples of what stands still, for frames [from, frames) of the segment.
   void mix_held(std::size_t p, std::size_t lane, std::span<double* const> outputs, std::size_t at,
                 std::size_t from, std::size_t frames);

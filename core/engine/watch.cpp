@@ -80,27 +80,34 @@ double Engine::Voices::saved() const {
 // --- energy -------------------------------------------------------------------------------------
 
 void Engine::Voices::look_around() {
+  double now = 0.0;
+  for (std::size_t lane = 0; lane < voices.size(); ++lane) {
+    for (std::size_t p = 0; voices[lane].awake && p < elements.size(); ++p) {
+      now += watch(lane, p).is_still ? 0.0 : elements[p] * max_block_frames;
+    }
+  }
+  if (now == 0.0) {
+    return;
+  }
+  stepped += now;
   const auto steps = [&](std::size_t i) {
     return voices[i / elements.size()].awake && !watches[i].is_still;
   };
-  for (std::size_t i = 0; i < watches.size(); ++i) {
-    stepped += steps(i) ? elements[i % elements.size()] * max_block_frames : 0.0;
-  }
   if (suspect != none && steps(suspect)) {
     std::visit([&](auto& b) { look(b, suspect); }, bank);
     looks_left -= looks_left > 0 ? 1 : 0;
   }
   suspect = looks_left > 0 ? suspect : none;
   for (std::size_t i = 0; i < watches.size(); ++i) {
-    const std::size_t p = turn % elements.size();
     if (steps(turn)) {
-      if (stepped < elements[p] * samples_per_look) {
+      const double price = elements[turn % elements.size()] * samples_per_look;
+      if (stepped < price) {
         return;
       }
-      stepped -= elements[p] * samples_per_look;
+      stepped -= price;
       std::visit([&](auto& b) { look(b, turn); }, bank);
     }
-    turn = (turn + 1) % watches.size();
+    turn = turn + 1 < watches.size() ? turn + 1 : 0;
   }
   stepped = 0.0;  // all were looked at
 }
