@@ -1,5 +1,6 @@
 // What nobody would do to an instrument, for as long as one likes: ressort_abuse SECONDS [SEED
-// [NAME...]]. Every parameter over its whole range and beyond, at audio rate; strikes, forces and
+// [NAME...]]. Every parameter over its whole range and beyond, at audio rate, once where the
+// program keeps it stable and once where it is forced to do as it is told; strikes, forces and
 // hands of any size; keys, bends and controllers at random; audio inputs with noise, and with what
 // is no number. Not one sample of what comes out may be non-finite or above the limiter's ceiling.
 // The random numbers are printed by their seed, so that what was found can be found again.
@@ -46,8 +47,8 @@ class Random {
 
 class Abuser {
  public:
-  Abuser(const Instrument& instrument, std::uint64_t seed)
-      : instrument_(instrument), random_(seed) {}
+  Abuser(const Instrument& instrument, std::uint64_t seed, bool force)
+      : instrument_(instrument), random_(seed), one_in_is_beyond_(force ? 3 : 50) {}
 
   // A few events for a block; at times none at all, so that something can fade away.
   std::vector<Event> events(std::size_t frames) {
@@ -98,7 +99,7 @@ class Abuser {
 
   double value_of(const ParameterInfo& info) {
     const double width = info.maximum - info.minimum;
-    const double beyond = random_.chance(50) ? 10.0 * width : 0.0;
+    const double beyond = random_.chance(one_in_is_beyond_) ? 10.0 * width : 0.0;
     return random_.uniform(info.minimum - beyond, info.maximum + beyond);
   }
 
@@ -151,6 +152,7 @@ class Abuser {
 
   const Instrument& instrument_;
   Random random_;
+  std::size_t one_in_is_beyond_;
   std::size_t calm_blocks_ = 0;
 };
 
@@ -160,11 +162,11 @@ struct Found {
   std::uint64_t runaways = 0;
 };
 
-Found abuse(Compiled compiled, double seconds, std::uint64_t seed) {
+Found abuse(Compiled compiled, double seconds, std::uint64_t seed, bool force) {
   const Instrument instrument = compiled.instrument;
   Process process(rate_hz);
   process.slot.offer(new Sounding{std::move(compiled.engine), serial});
-  Abuser abuser(instrument, seed);
+  Abuser abuser(instrument, seed, force);
   Random lengths(seed + 1);
   const auto channels = static_cast<std::size_t>(std::max(2, instrument.outputs));
   std::vector<std::vector<double>> out(channels);
@@ -223,18 +225,21 @@ int main(int argc, char** argv) {
       std::fprintf(stderr, "%s\n", scene.error().message.c_str());
       return 2;
     }
-    auto compiled = compile(scene->network, scene->preset, {.rate_hz = rate_hz});
-    if (!compiled) {
-      std::fprintf(stderr, "%s: %s\n", name.c_str(), compiled.error().message.c_str());
-      return 2;
+    for (const bool force : {false, true}) {
+      auto compiled = compile(scene->network, scene->preset, {.rate_hz = rate_hz, .force = force});
+      if (!compiled) {
+        std::fprintf(stderr, "%s: %s\n", name.c_str(), compiled.error().message.c_str());
+        return 2;
+      }
+      const Found found = abuse(*std::move(compiled), seconds, seed, force);
+      std::printf("%-20s %6g s, seed %llu%s: peak %.3f, %llu voices ran away, %llu samples wrong\n",
+                  name.c_str(), seconds, static_cast<unsigned long long>(seed),
+                  force ? ", forced" : "", found.peak,
+                  static_cast<unsigned long long>(found.runaways),
+                  static_cast<unsigned long long>(found.wrong));
+      std::fflush(stdout);
+      failures += found.wrong > 0 ? 1 : 0;
     }
-    const Found found = abuse(*std::move(compiled), seconds, seed);
-    std::printf("%-20s %6g s, seed %llu: peak %.3f, %llu voices ran away, %llu samples wrong\n",
-                name.c_str(), seconds, static_cast<unsigned long long>(seed), found.peak,
-                static_cast<unsigned long long>(found.runaways),
-                static_cast<unsigned long long>(found.wrong));
-    std::fflush(stdout);
-    failures += found.wrong > 0 ? 1 : 0;
   }
   return failures == 0 ? 0 : 1;
 }

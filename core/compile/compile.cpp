@@ -348,21 +348,14 @@ Result<Compiled> compile_expanded(const Network& written, const Network& network
   instrument.verdict = compiled.gate.verdict;
   for (const Range& limit : compiled.gate.limits) {
     playing.limits.push_back({limit.lowest, limit.highest});
-  playing.highest_factor = highest_stiffness_factor(
-      network, preset_box(instrument.parameters, preset), machine.rate_ratio);
-  if (!options.bare && playing.highest_factor >= 1.0) {
-    playing.repose = make_repose(network, machine, preset_box(instrument.parameters, preset));
-  }
-  for (const Program& program : machine.parts) {
-    instrument.masses += program.moving;
-  }
-  if (preset.keyboard && instrument.masses <= most_tuned_masses) {
-    instrument.mode = lowest_mode(network, machine.parameters);
   }
   const ParameterBox proved = proved_box(instrument.parameters, preset);
   const double bound = highest_stiffness_factor(network, proved, machine.rate_ratio);
   instrument.stiffness_margin = stiffness_margin(network, proved, machine.rate_ratio, bound);
   playing.highest_factor = std::max(bound, to_spare * instrument.stiffness_margin);
+  if (!options.bare && playing.highest_factor >= 1.0) {
+    playing.repose = make_repose(network, machine, proved);
+  }
   if (instrument.mode) {
     playing.tuning = Tuning::keyboard;
     playing.mode_stiffness = instrument.mode->stiffness * machine.rate_ratio * machine.rate_ratio;
@@ -380,18 +373,6 @@ Result<Compiled> compile_expanded(const Network& written, const Network& network
   instrument.voices = playing.voices;
   instrument.links = network.links.size();
   const bool is_published = options.bare && !options.method && !budget.is_physical();
-  compiled.plan =
-      make_plan(machine,
-                {.is_double = options.precision == Precision::float64,
-                 .isa = options.isa,
-                 .voices = playing.voices,
-                 .crew = options.crew},
-                is_published ? Method::direct : options.method, options.most_modes, budget);
-  compiled.plan.notes = std::move(schemes.notes);
-  if (const std::string left_out = describe(cull(network)); !left_out.empty()) {
-    compiled.plan.notes.push_back("left out: " + left_out);
-  }
-  compiled.schemes = std::move(schemes.links);
   compiled.plan = make_plan(
       machine,
       {.is_double = options.precision == Precision::float64,
@@ -402,6 +383,11 @@ Result<Compiled> compile_expanded(const Network& written, const Network& network
            playing.tuning == Tuning::keyboard ? std::max(1.0, playing.highest_factor) : 1.0,
        .crew = options.crew},
       is_published ? Method::direct : options.method, options.most_modes, budget);
+  compiled.plan.notes = std::move(schemes.notes);
+  if (const std::string left_out = describe(cull(network)); !left_out.empty()) {
+    compiled.plan.notes.push_back("left out: " + left_out);
+  }
+  compiled.schemes = std::move(schemes.links);
   if (options.find_gain) {
     playing.gain *= comfortable_gain(machine, playing, options);
   }

@@ -29,7 +29,6 @@ struct CompileOptions {
   Precision precision = Precision::float64;
   std::optional<Method> method;  // instead of the plan's choice, or the bare network's direct form
   std::optional<Budget> budget;  // instead of the preset's
-  std::vector<std::uint32_t> passive_links;  // passive in any case: of a network without macros
   std::vector<std::uint32_t> passive_links;  // of Network::links with its macros written out: to
                                              // be found passively, whatever the budget says
   Isa isa = best_isa();                      // no wider than the machine's

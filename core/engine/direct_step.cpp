@@ -422,10 +422,10 @@ void step(const Program& program, DirectState<T>& state, const Block<T>& block) 
         s.v[program.inputs[i].node] = velocity[i];
       }
     }
+    s.take_rests(program);
     if (has_passive) {
       correct_links(program, s);
     }
-    s.take_rests(program);
     move_taps(program, s);
     pull(program, s);
     for (const OutputSlot& output : program.outputs) {

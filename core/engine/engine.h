@@ -48,6 +48,8 @@ enum class Tuning : std::uint8_t {
 struct Limits {
   double lowest = -std::numeric_limits<double>::infinity();
   double highest = std::numeric_limits<double>::infinity();
+};
+
 // What is known of a part's stillness. With an energy E, measured from where it rests, and nothing
 // that stirs it, an output stays within sqrt(2 E c / s) for ever; c is its compliance where every
 // stiffness is as small as the box of parameters lets it be, s the voice's stiffness factor.

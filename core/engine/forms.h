@@ -118,9 +118,9 @@ struct Modes {
   std::uint32_t modes = 0;
   std::uint32_t inverse_mass = own_mass;  // the coefficient w, or 1
   double reach = 1.0;                     // no mass moves farther than reach * |q|
-  double silence = 0.0;  // so loud may all be that sleep, to the loudest; 0: none sleeps
-  double quiet = 0.0;    // so loud they may be in any case, in positions
-  std::vector<double> q;                  // [mode] at the start
+  double silence = 0.0;   // so loud may all be that sleep, to the loudest; 0: none sleeps
+  double quiet = 0.0;     // so loud they may be in any case, in positions
+  std::vector<double> q;  // [mode] at the start
   std::vector<double> d;
   std::vector<double> basis;  // [mode][mass] what a mass's displacement or velocity is to a mode's
   std::vector<ModalShare> stiffness;

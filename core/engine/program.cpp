@@ -13,6 +13,8 @@ constexpr double reference_rate_hz = 44100.0;
 bool is_plain(const Program& program) {
   return std::all_of(program.link_runs.begin(), program.link_runs.end(),
                      [](const LinkRun& run) { return run.scheme == Scheme::plain; });
+}
+
 double rate_factor(Unit unit, double r) {
   switch (unit) {
     case Unit::stiffness:
