@@ -210,6 +210,31 @@ TEST_CASE("no controller, event or start value turns a parameter further than is
   CHECK(play({.force = true}, turn)[2] > 0.0);
 }
 
+TEST_CASE("a key that sounds high comes down before a parameter makes it unstable", "[gate]") {
+  // As written, m_K may be quadrupled, and keys may use 11.6 times the stiffness; not both.
+  Player player(scenes::poly_triangle(), struck(1));
+  const ParameterInfo& stiffness = player.compiled.instrument.parameters[0];
+  CHECK(stiffness.maximum == 0.4);
+  CHECK_FALSE(stiffness.is_lowered);
+  const auto key_hz = [](int key) { return 440.0 * std::exp2((key - 69) / 12.0); };
+  int key = 60;
+  while (key_hz(key + 1) < player.compiled.instrument.highest_frequency_hz) {
+    ++key;
+  }
+  CHECK(key_hz(key) > 2500.0);
+  player.run(44100, {note_on(0, key),
+                     parameter(5000, 0, 0.11),
+                     parameter(10000, 0, 0.25),
+                     parameter(15000, 0, 0.4),
+                     parameter(16000, 1, 0.004),
+                     note_on(20000, key + 1),
+                     {.frame = 30000, .kind = EventKind::bend, .value = 1.0}});
+  CHECK(player.engine().parameter(0) == 0.4);
+  CHECK(player.engine().meters().resets == 0);
+  CHECK(player.heap_calls == 0);
+  CHECK(peak(player.y()) < 1.0);
+}
+
 TEST_CASE("a parameter that is sound keeps to what is stable, sample by sample", "[gate]") {
   const std::string text =
       "@K audioParam @in2\n@o osc 1. K 0.01 0. 0.\n@in1 frcInput @o\n" + scenes::output(1, "o");

@@ -273,13 +273,59 @@ ParameterBox proved_box(const std::vector<ParameterInfo>& parameters, const Pres
   return box;
 }
 
-// The factor up to which all that there is stays stable, plucks, bows and contacts as if always
-// felt: exactly where that is quick, else `bound`.
-double stiffness_margin(const Network& network, const ParameterBox& box, double rate_ratio,
-                        double bound) {
-  return bound >= most_bounded || network.masses.size() > most_quick_masses
-             ? bound
-             : std::min(most_bounded, Stability(network, rate_ratio).stiffness_factor(box));
+// Finds factors up to which all that there is stays stable, plucks, bows and contacts as if always
+// felt: exactly where that is quick.
+class Margins {
+ public:
+  Margins(const Network& network, double rate_ratio) : network_(network), rate_ratio_(rate_ratio) {
+    if (network.masses.size() <= most_quick_masses) {
+      stability_.emplace(network, rate_ratio);
+    }
+  }
+  double at(const ParameterBox& box) {
+    const double bound = highest_stiffness_factor(network_, box, rate_ratio_);
+    return bound >= most_bounded || !stability_
+               ? bound
+               : std::min(most_bounded, stability_->stiffness_factor(box));
+  }
+  // The same with something to spare, which the bound has by itself.
+  double for_keys(const ParameterBox& box) {
+    return std::max(highest_stiffness_factor(network_, box, rate_ratio_), to_spare * at(box));
+  }
+
+ private:
+  const Network& network_;
+  double rate_ratio_;
+  std::optional<Stability> stability_;
+};
+
+// What keys may use of the stiffness while parameters go from where the preset has them to where
+// they may go at all; where nothing limits them, that does not depend on them.
+void leave_to_keys(Margins& margins, const ParameterBox& box, Playing& playing) {
+  constexpr int steps = 8;
+  ParameterBox far = box;
+  bool may_leave = false;
+  for (std::size_t i = 0; i < box.lowest.size(); ++i) {
+    const Limits& limits = playing.limits[i];
+    far.lowest[i] =
+        std::isfinite(limits.lowest) ? std::min(limits.lowest, box.lowest[i]) : box.lowest[i];
+    far.highest[i] =
+        std::isfinite(limits.highest) ? std::max(limits.highest, box.highest[i]) : box.highest[i];
+    may_leave |= far.lowest[i] < box.lowest[i] || far.highest[i] > box.highest[i];
+    Limits home;
+    home.lowest = far.lowest[i] < box.lowest[i] ? box.lowest[i] : home.lowest;
+    home.highest = far.highest[i] > box.highest[i] ? box.highest[i] : home.highest;
+    playing.home.push_back(home);
+  }
+  for (int step = 1; may_leave && step <= steps; ++step) {
+    const double way = static_cast<double>(step) / steps;
+    ParameterBox between = box;
+    for (std::size_t i = 0; i < box.lowest.size(); ++i) {
+      between.lowest[i] = std::lerp(box.lowest[i], far.lowest[i], way);
+      between.highest[i] = std::lerp(box.highest[i], far.highest[i], way);
+    }
+    playing.away.push_back(margins.for_keys(between));
+  }
 }
 
 // `written` may still have the macros that `network` has no more.
@@ -355,6 +401,17 @@ Result<Compiled> compile_expanded(const Network& written, const Network& network
   playing.highest_factor = std::max(bound, to_spare * instrument.stiffness_margin);
   if (!options.bare && playing.highest_factor >= 1.0) {
     playing.repose = make_repose(network, machine, proved);
+  Margins margins(network, machine.rate_ratio);
+  instrument.stiffness_margin = margins.at(proved);
+  playing.highest_factor = margins.for_keys(proved);
+  if (!options.bare) {
+    leave_to_keys(margins, proved, playing);
+  }
+  for (const Program& program : machine.parts) {
+    instrument.masses += program.moving;
+  }
+  if (preset.keyboard && instrument.masses <= most_tuned_masses) {
+    instrument.mode = lowest_mode(network, machine.parameters);
   }
   if (instrument.mode) {
     playing.tuning = Tuning::keyboard;

@@ -99,6 +99,24 @@ double Engine::Voices::within_limits(std::size_t index, double value) const {
   return std::max(playing.limits[index].lowest, std::min(value, playing.limits[index].highest));
 }
 
+double Engine::Voices::highest_factor() const {
+  double way = 0.0;
+  for (std::size_t i = 0; i < parameters.size(); ++i) {
+    const Limits& home = playing.home[i];
+    const Limits& limits = playing.limits[i];
+    if (parameters[i] > home.highest) {
+      way = std::max(way, (parameters[i] - home.highest) / (limits.highest - home.highest));
+    } else if (parameters[i] < home.lowest) {
+      way = std::max(way, (home.lowest - parameters[i]) / (home.lowest - limits.lowest));
+    }
+  }
+  if (way == 0.0 || playing.away.empty()) {
+    return std::max(1.0, playing.highest_factor);
+  }
+  const double steps = static_cast<double>(playing.away.size());
+  return std::max(1.0, playing.away[static_cast<std::size_t>(std::ceil(way * steps)) - 1]);
+}
+
 void Engine::Voices::set_parameter(std::size_t index, double wanted) {
   if (index >= parameters.size()) {
     return;
@@ -108,6 +126,7 @@ void Engine::Voices::set_parameter(std::size_t index, double wanted) {
   if (parameters[index] == value) {
     return;
   }
+  const double highest_before = highest_factor();
   parameters[index] = value;
   note_change(static_cast<std::uint16_t>(index));
   std::size_t p = 0;
@@ -129,6 +148,13 @@ void Engine::Voices::set_parameter(std::size_t index, double wanted) {
       kernel->coefficients.ramp(ramp_frames);
     }
   });
+  if (highest_factor() != highest_before) {
+    for (std::size_t lane = 0; lane < voices.size(); ++lane) {
+      if (voices[lane].awake) {
+        tune(lane, !playing.bare);
+      }
+    }
+  }
 }
 
 void Engine::Voices::note_change(std::uint16_t index) {
@@ -155,6 +181,7 @@ void Engine::Voices::tune(std::size_t lane, bool ramped) {
                             : bent * bent;
   voice.factor = std::min(factor, std::max(1.0, playing.highest_factor));
   std::size_t p = 0;
+  voice.factor = std::min(factor, highest_factor());
   each_part([&](auto& part) {
     stir(lane, p++);
     for (std::uint32_t c = 0; c < part.program.coefficients.size(); ++c) {
@@ -196,7 +223,7 @@ void Engine::Voices::note_on(const Event& event) {
 
 double Engine::Voices::playable_hz(int key) const {
   double hz = 440.0 * std::exp2((key + playing.transpose - 69) / 12.0);
-  const double highest = std::max(1.0, playing.highest_factor);
+  const double highest = highest_factor();
   while (hz > 1.0 && (hz >= 0.5 * machine.rate_hz ||
                       stiffness_factor(playing.mode_stiffness, playing.mode_damping, hz,
                                        machine.rate_hz) > highest)) {

@@ -76,6 +76,8 @@ struct Playing {
   double mode_stiffness = 0.0;  // k/m of the lowest mode, at Machine::rate_hz; 0: none known
   double mode_damping = 0.0;    // z/m of the same
   double highest_factor = 1.0;  // the stiffness factor up to which the model is proved stable
+  std::vector<Limits> home;     // [parameter] while they are there; empty: wherever they are
+  std::vector<double> away;     // the same factor at equal steps from there to their limits
   std::vector<Control> controls;
   std::vector<Limits> limits;  // [parameter] that no event and no audio leaves; empty: none
   std::vector<Repose> repose;  // [part], or none

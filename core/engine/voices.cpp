@@ -28,6 +28,7 @@ Engine::Voices::Voices(Machine machine_in, Playing playing_in, Precision precisi
       level_kept(
           std::exp(-static_cast<double>(max_block_frames) / (level_memory_s * machine.rate_hz))) {
   playing.limits.resize(machine.parameters.size());
+  playing.home.resize(machine.parameters.size());
   voices.resize(lanes_wanted());
   first_output.push_back(0);
   for (const Program& program : machine.parts) {

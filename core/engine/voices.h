@@ -107,6 +107,8 @@ struct Engine::Voices : Playback {
   // --- parameters ---
   // The nearest value that the parameter may have.
   double within_limits(std::size_t index, double value) const;
+  // The stiffness factor that the parameters, as they are, leave to keys and bend.
+  double highest_factor() const;
   void set_parameter(std::size_t index, double wanted);
   void note_change(std::uint16_t index);
   // Something comes to a part from outside.
