@@ -396,22 +396,14 @@ Result<Compiled> compile_expanded(const Network& written, const Network& network
     playing.limits.push_back({limit.lowest, limit.highest});
   }
   const ParameterBox proved = proved_box(instrument.parameters, preset);
-  const double bound = highest_stiffness_factor(network, proved, machine.rate_ratio);
-  instrument.stiffness_margin = stiffness_margin(network, proved, machine.rate_ratio, bound);
-  playing.highest_factor = std::max(bound, to_spare * instrument.stiffness_margin);
-  if (!options.bare && playing.highest_factor >= 1.0) {
-    playing.repose = make_repose(network, machine, proved);
   Margins margins(network, machine.rate_ratio);
   instrument.stiffness_margin = margins.at(proved);
   playing.highest_factor = margins.for_keys(proved);
   if (!options.bare) {
     leave_to_keys(margins, proved, playing);
   }
-  for (const Program& program : machine.parts) {
-    instrument.masses += program.moving;
-  }
-  if (preset.keyboard && instrument.masses <= most_tuned_masses) {
-    instrument.mode = lowest_mode(network, machine.parameters);
+  if (!options.bare && playing.highest_factor >= 1.0) {
+    playing.repose = make_repose(network, machine, proved);
   }
   if (instrument.mode) {
     playing.tuning = Tuning::keyboard;

@@ -36,6 +36,7 @@ CompensatedKernel<T>::CompensatedKernel(const Program& program, std::size_t voic
       coefficient_(this->coefficients.value.size()),
       increment_(coefficient_.size()),
       target_(coefficient_.size()),
+      passive_(program, this->width()),
       value_(max_block_frames * program.inputs.size() * this->width()),
       value_rest_(value_.size()),
       velocity_(value_.size()),
@@ -61,6 +62,7 @@ void CompensatedKernel<T>::place(std::size_t lane, const double* x, const double
     v_[at] = narrow(v[node]);
     force_[at] = 0.0f;
   }
+  passive_.awake[lane] = 0.0f;
 }
 
 template <class T>
@@ -95,6 +97,11 @@ void CompensatedKernel<T>::play(const Block<T>& block) {
       .force = force_.data(),
       .corners = corners_.data(),
       .nodes = program_.position.size(),
+      .passive = passive_.links,
+      .inverse_mass = passive_.inverse_mass.data(),
+      .memory = passive_.memory.data(),
+      .awake = passive_.awake.data(),
+      .felt = passive_.felt_or_null(),
       .rest = rest_.data(),
       .value_rest = value_rest_.data(),
       .output_rest = output_rest_.data()};

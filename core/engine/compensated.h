@@ -29,6 +29,7 @@ class CompensatedKernel final : public Kernel<T> {
   std::vector<Corners<float>> corners_;
   // The coefficients, and what a block says, in single precision.
   Aligned<float> coefficient_, increment_, target_;
+  PassiveRoom<float> passive_;
   Aligned<float> value_, value_rest_, velocity_, audio_, outputs_, output_rest_;
 };
 

@@ -14,16 +14,7 @@ DirectKernel<T>::DirectKernel(const Program& program, std::size_t voices, Isa is
       v_(x_.size()),
       force_(x_.size()),
       corners_(program.taps.size() * this->width()),
-      passive_(passive_links(program)),
-      memory_(passive_.size() * passive_rows * this->width()),
-      awake_(this->width()) {
-  if (!passive_.empty()) {
-    inverse_mass_ = inverse_masses(program);
-    const auto is_force = [](const OutputSlot& output) { return output.is_force; };
-    if (std::any_of(program.outputs.begin(), program.outputs.end(), is_force)) {
-      felt_.resize(x_.size());
-    }
-  }
+      passive_(program, this->width()) {
   for (std::size_t lane = 0; lane < this->width(); ++lane) {
     this->reset(lane);
   }
@@ -37,7 +28,7 @@ void DirectKernel<T>::place(std::size_t lane, const double* x, const double* v) 
     v_[at] = static_cast<T>(v[node]);
     force_[at] = T(0);
   }
-  awake_[lane] = T(0);
+  passive_.awake[lane] = T(0);
 }
 
 template <class T>
@@ -68,7 +59,7 @@ bool DirectKernel<T>::mend(std::span<const std::uint32_t> nodes, const T* x, con
     std::copy_n(v + i * width, width, v_.data() + nodes[i] * width);
   }
   std::fill(force_.begin(), force_.end(), T(0));
-  std::fill(awake_.begin(), awake_.end(), T(1));
+  std::fill(passive_.awake.begin(), passive_.awake.end(), T(1));
   this->step({});
   return true;
 }
@@ -81,11 +72,11 @@ void DirectKernel<T>::play(const Block<T>& block) {
                        .force = force_.data(),
                        .corners = corners_.data(),
                        .nodes = program_.position.size(),
-                       .passive = passive_,
-                       .inverse_mass = inverse_mass_.data(),
-                       .memory = memory_.data(),
-                       .awake = awake_.data(),
-                       .felt = felt_.empty() ? nullptr : felt_.data()};
+                       .passive = passive_.links,
+                       .inverse_mass = passive_.inverse_mass.data(),
+                       .memory = passive_.memory.data(),
+                       .awake = passive_.awake.data(),
+                       .felt = passive_.felt_or_null()};
   step_(program_, state, block);
   this->coefficients.finish(block.frames);
 }

@@ -22,7 +22,8 @@ struct View {
   DirectState<T>& state;
   // Where a node is from another.
   V between(std::size_t a, std::size_t b) const { return x[a] - x[b]; }
-  void move(std::size_t node) { x[node] += v[node]; }
+  void move(std::size_t node) { shift(node, v[node]); }
+  void shift(std::size_t node, V way) { x[node] += way; }
   // One lane's position, `at` being its number in [node][lane].
   T exact(std::size_t at) const { return state.x[at]; }
   void move_to(std::size_t at, T position) {
@@ -55,8 +56,9 @@ struct Summed : View<float, Bytes> {
   V between(std::size_t a, std::size_t b) const {
     return Base::between(a, b) + (rest[a] - rest[b]);
   }
-  void move(std::size_t node) {
-    const V y = this->v[node] + rest[node];
+  void move(std::size_t node) { shift(node, this->v[node]); }
+  void shift(std::size_t node, V way) {
+    const V y = way + rest[node];
     const V sum = this->x[node] + y;
     rest[node] = y - (sum - this->x[node]);
     this->x[node] = sum;
@@ -260,9 +262,13 @@ struct Passive {
 
   V coefficient(std::uint32_t c) const { return s.coefficient[c]; }
   V awake() const { return *reinterpret_cast<const V*>(s.state.awake); }
-  V distance_now(Ends ends) const { return s.x[ends.a] - s.x[ends.b]; }
+  V distance_now(Ends ends) const { return s.between(ends.a, ends.b); }
   V speed_now(Ends ends) const { return s.v[ends.a] - s.v[ends.b]; }
-  V distance(Ends ends) const { return position(ends.a) - position(ends.b); }
+  V distance(Ends ends) const {
+    return is_place(program, ends.a) || is_place(program, ends.b)
+               ? position(ends.a) - position(ends.b)
+               : s.between(ends.a, ends.b);
+  }
   V speed(Ends ends) const { return speed(ends.a) - speed(ends.b); }
   V gamma(Ends ends) const {
     const auto [a, b] = ends;
@@ -317,7 +323,7 @@ struct Passive {
     if (!is_place(program, node)) {
       if (node < program.moving) {
         const V inverse_mass = s.coefficient[s.state.inverse_mass[node]];
-        s.x[node] += inverse_mass * x;
+        s.shift(node, inverse_mass * x);
         s.v[node] += inverse_mass * v;
       }
       if (s.state.felt != nullptr) {

@@ -179,9 +179,8 @@ void Engine::Voices::tune(std::size_t lane, bool ramped) {
                             ? stiffness_factor(playing.mode_stiffness, playing.mode_damping,
                                                voice.frequency_hz * bent, machine.rate_hz)
                             : bent * bent;
-  voice.factor = std::min(factor, std::max(1.0, playing.highest_factor));
-  std::size_t p = 0;
   voice.factor = std::min(factor, highest_factor());
+  std::size_t p = 0;
   each_part([&](auto& part) {
     stir(lane, p++);
     for (std::uint32_t c = 0; c < part.program.coefficients.size(); ++c) {
