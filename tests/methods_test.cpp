@@ -80,6 +80,7 @@ Preset preset_of(const Network& network, bool bare, int voices) {
   Preset preset;
   preset.voices = voices;
   preset.keyboard = !bare;
+  preset.budget.passive = Passivity::never;  // which not every method knows how to be
   preset.controls.push_back(
       {.target = "in1", .gesture = ControlGesture::impulse, .low = 0.001, .high = 0.01});
   for (const Input& input : network.inputs) {

@@ -324,6 +324,54 @@ TEST_CASE("S20: a clipped spring has no step, and gives back no more than it got
   CHECK(std::fabs(far.x[0]) < b * 1.1);
 }
 
+TEST_CASE("what is safe stays as published, and the rest is told", "[passive]") {
+  const std::string text =
+      "@k param 0.05\n@g ground 0.\n@in1 posInput 0.\n@m mass 1. 0.5 0.5\n@n mass 1. 0.5 0.5\n"
+      "@s spring @g @m 0.1\n@c1 contact @g @m k 0.01\n@c2 contact @g @n 0.25 0.01\n"
+      "@c3 contact @m @n 0.02 0.01\n@q nlSpring3 @g @n 0.01 3. 0.\n@p nlPluck @in1 @m 0.4 0.01\n"
+      "@b nlBow @in1 @n 0.2 0.01\n@out1 posOutput @m\n";
+  const Network network = network_of(text);
+  using enum Scheme;
+  const auto schemes_at = [&](double k, const Budget& budget) {
+    return choose_schemes(network, Preset{}, {.box = {{0.01}, {k}}}, budget, {});
+  };
+  const auto found = [](const Schemes& schemes) {
+    std::vector<Scheme> all;
+    for (const LinkScheme& link : schemes.links) {
+      all.push_back(link.scheme);
+    }
+    return all;
+  };
+  const Schemes needed = schemes_at(.05, {});
+  CHECK(found(needed) == std::vector{plain, plain, centred, plain, centred, plain, plain});
+  CHECK(needed.notes == std::vector<std::string>{
+                            "1 spring that grows stiffer centred: as published it could blow up "
+                            "where it is the stiffest (K/M up to 2.26)",
+                            "1 contact centred: as published it could gain 3.12 % of speed at a "
+                            "touch (K/M up to 0.25)"});
+  // What a parameter may be turned to counts, not where it is.
+  CHECK(schemes_at(.09, {}).links[1].scheme == centred);
+  CHECK(found(schemes_at(.05, {.passive = Passivity::always})) ==
+        std::vector{plain, centred, centred, centred, centred, substeps, centred});
+  const Schemes never = schemes_at(.05, {.passive = Passivity::never});
+  CHECK(found(never) == std::vector(7, plain));
+  CHECK(never.notes.back() ==
+        "1 contact as published, which could gain 3.12 % of speed at a touch (K/M up to 0.25)");
+  // A link may be asked for by its index; what is passive needs no proof any more.
+  const Schemes forced = choose_schemes(network, Preset{}, {.box = {{.05}, {.05}}},
+                                        {.passive = Passivity::never}, {3, 5});
+  CHECK(found(forced) == std::vector{plain, plain, plain, centred, plain, substeps, plain});
+  CHECK(always_felt(network, forced.links).links.size() == 5);
+  CHECK(always_felt(network, needed.links).links.size() == 6);
+  // The kernel's runs never mix them.
+  const Program program = make_program(network, 44100.0, true, needed.links);
+  std::size_t passive = 0;
+  for (const LinkRun& run : program.link_runs) {
+    passive += run.scheme == plain ? 0 : run.count;
+  }
+  CHECK(passive == 2);
+}
+
 TEST_CASE("a passive law depends on no other lane", "[passive]") {
   // Every law in packs as in single numbers, whatever is in the lanes beside it.
   using V = Pack<double, 16>;

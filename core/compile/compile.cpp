@@ -229,6 +229,8 @@ Schemes schemes_of(const Network& network, const Preset& preset, const CompileOp
   constexpr double highest_key_hz = 4186.0;
   const bool is_told = options.budget || !options.bare;
   const Passivity passive = is_told ? budget.passive : Passivity::never;
+  const Budget unasked{.passive = Passivity::never};
+  const Budget budget = options.budget.value_or(options.bare ? unasked : preset.budget);
   Conditions conditions{
       .box = {},
       .rate_ratio = options.rescale ? Network::reference_rate_hz / options.rate_hz : 1.0};
@@ -243,7 +245,7 @@ Schemes schemes_of(const Network& network, const Preset& preset, const CompileOp
     conditions.stiffness_factor =
         std::max(1.0, std::min(most, octaves * octaves * std::exp2(preset.transpose / 6.0)));
   }
-  return choose_schemes(network, preset, conditions, passive, options.passive_links);
+  return choose_schemes(network, preset, conditions, budget, options.passive_links);
 }
 
 }  // namespace

@@ -19,10 +19,40 @@ struct Count {
 Count links_of(const Program& program) {
   Count count;
   for (const LinkRun& run : program.link_runs) {
+    if (run.scheme != Scheme::plain) {
+      continue;
+    }
     const bool is_bent = run.law == Law::quadratic_spring || run.law == Law::cubic_spring;
     (run.law == Law::spring ? count.springs : is_bent ? count.bent : count.others) += run.count;
   }
   return count;
+}
+
+// What a link takes that is not plain, once for all lanes, or for one number: while it touches.
+double passive_ns(const LinkRun& run) {
+  const double steps = run.scheme == Scheme::substeps ? run.substeps : 1.0;
+  switch (run.law) {
+    case Law::pluck:
+      return 15.0 + 5.5 * steps;
+    case Law::bow:
+      return 15.0 + 15.0 * (steps - 1.0);
+    case Law::smooth_bow:
+      return 75.0 * steps;
+    case Law::cubic_spring:
+    case Law::spring:
+      return 16.0;
+    case Law::contact:
+      return 35.0;
+    default:
+      return 80.0;  // by Newton
+  }
+}
+double passive_ns(const Program& program) {
+  double sum = 0.0;
+  for (const LinkRun& run : program.link_runs) {
+    sum += run.scheme == Scheme::plain ? 0.0 : passive_ns(run) * run.count;
+  }
+  return sum;
 }
 
 // How many packs the voices fill, each counted as often as it is dearer than one of AVX2: the
@@ -57,7 +87,8 @@ class Predictor {
         static_cast<double>(vector_bytes(load_.isa)) / (load_.is_double ? 8.0 : 4.0);
     const Count links = links_of(program_);
     return packs_of(load_) *
-               (12.0 + 1.6 * (program_.moving + links.springs + links.bent) + 5.0 * links.others) +
+               (12.0 + 1.5 * passive_ns(program_) +
+                1.6 * (program_.moving + links.springs + links.bent) + 5.0 * links.others) +
            10.0 * std::ceil(load_.voices / widest) * std::min<double>(load_.voices, widest) *
                static_cast<double>(program_.taps.size());
   }
@@ -82,10 +113,13 @@ class Predictor {
       const auto run = std::find_if(
           program_.link_runs.begin(), program_.link_runs.end(),
           [&](const LinkRun& r) { return link >= r.first && link < r.first + r.count; });
+      if (run->scheme != Scheme::plain) {
+        continue;
+      }
       sum += run->law == Law::spring || run->law == Law::contact ? 2.3 : 5.0;
     }
     sum += 3.2 * static_cast<double>(form.loose.size()) + heard_and_pushed(0.5) +
-           22.0 * static_cast<double>(program_.taps.size());
+           22.0 * static_cast<double>(program_.taps.size()) + passive_ns(program_);
     return sum * load_.voices;
   }
 
@@ -140,7 +174,8 @@ class Predictor {
     const double slow = wide_ > 0.0 ? 1.0 : 2.3;
     const double d = load_.is_double ? 1.0 : 0.0;
     const double rest = static_cast<double>(form.rest_ends.size() + form.ports.size());
-    double sum = (3.5 + 1.5 * d) * rest + 10.0 * static_cast<double>(program_.taps.size());
+    double sum = passive_ns(program_) + (3.5 + 1.5 * d) * rest +
+                 10.0 * static_cast<double>(program_.taps.size());
     for (const GridSegment& segment : form.segments) {
       const double offsets = static_cast<double>(segment.offsets.size());
       sum += 6.0 + 4.0 * d + slow * segment.count * (0.13 + 0.14 * d + (0.03 + 0.02 * d) * offsets);

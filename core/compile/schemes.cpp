@@ -37,9 +37,11 @@ struct Finding {
 
 class Judge {
  public:
-  Judge(const Network& network, const Preset& preset, const Conditions& conditions)
+  Judge(const Network& network, const Preset& preset, const Conditions& conditions,
+        bool is_physical)
       : network_(network),
         preset_(preset),
+        is_physical_(is_physical),
         r_(conditions.rate_ratio),
         stiffer_(r_ * r_ * conditions.stiffness_factor),
         grippier_(r_ * std::sqrt(conditions.stiffness_factor)) {
@@ -212,7 +214,7 @@ class Judge {
     const LinkScheme scheme{Scheme::substeps, static_cast<std::uint16_t>(std::clamp<double>(
                                                   steps, least_substeps, most_substeps))};
     const double samples = speed > 0.0 ? 2.0 * scale / speed : 2.0 * slow_samples;
-    if (0.9 * k / soft_snap >= slow_samples / samples) {
+    if (!is_physical_ || 0.9 * k / soft_snap >= slow_samples / samples) {
       return {scheme, 0.9 * k / soft_snap, "could snap wrongly (K/M up to " + number(k) + ")"};
     }
     return {scheme, slow_samples / samples, "may be passed in " + number(samples) + " samples"};
@@ -226,6 +228,7 @@ class Judge {
 
   const Network& network_;
   const Preset& preset_;
+  bool is_physical_;
   double r_;
   double stiffer_;             // what a stiffness is multiplied by at worst
   double grippier_;            // ...and a bow's Z
@@ -280,14 +283,14 @@ std::string sentence(const Told& told) {
 }  // namespace
 
 Schemes choose_schemes(const Network& network, const Preset& preset, const Conditions& conditions,
-                       Passivity passive, const std::vector<std::uint32_t>& forced) {
+                       const Budget& budget, const std::vector<std::uint32_t>& forced) {
   Schemes schemes;
   schemes.links.resize(network.links.size());
   const auto is_linear = [](const Link& link) { return link.kind == LinkKind::spring; };
   if (forced.empty() && std::all_of(network.links.begin(), network.links.end(), is_linear)) {
     return schemes;
   }
-  const Judge judge(network, preset, conditions);
+  const Judge judge(network, preset, conditions, budget.is_physical());
   std::vector<bool> is_forced(network.links.size(), false);
   for (const std::uint32_t link : forced) {
     if (link < is_forced.size()) {
@@ -299,8 +302,8 @@ Schemes choose_schemes(const Network& network, const Preset& preset, const Condi
     const Link& link = network.links[i];
     const std::optional<Finding> finding = judge.judge(link);
     const bool is_bad = finding && finding->badness > 1.0;
-    const bool is_wanted =
-        passive == Passivity::always || (passive == Passivity::where_needed && is_bad);
+    const bool is_wanted = budget.passive == Passivity::always ||
+                           (budget.passive == Passivity::where_needed && is_bad);
     if (is_forced[i] || (finding && is_wanted)) {
       schemes.links[i] = finding ? finding->scheme : LinkScheme{Scheme::centred, 1};
     } else if (!is_bad) {

@@ -30,13 +30,14 @@ struct Conditions {
 //   contacts  plain while K g <= 0.08: at most a percent of speed gained at each touch (K g / 8),
 //             and Z g <= 0.5
 //   bows      plain while Z g <= 0.3, centred up to 2.5, above in substeps
-//   plucks    plain while 0.9 K g <= 2 and no hand of the preset takes less than 20 samples to
-//             pass 2 scale; else substeps
+//   plucks    plain while 0.9 K g <= 2; else substeps. Where the budget asks for the continuous
+//             network, also if a hand of the preset passes 2 scale in less than 20 samples: as
+//             published such a pluck is a lottery, but a bounded one
 //   springs   that grow stiffer: plain while (dF/dd) g <= 1.5 at the farthest that is known, by
 //             where masses start and how hands are driven and struck
 // For a network without macros. O(links + masses + controls). [any thread but audio]
 Schemes choose_schemes(const Network& network, const Preset& preset, const Conditions& conditions,
-                       Passivity passive, const std::vector<std::uint32_t>& forced);
+                       const Budget& budget, const std::vector<std::uint32_t>& forced);
 
 // The network without the links that their scheme keeps stable whatever their numbers are: what
 // remains is what a proof of stability has to be about. Springs keep their K and Z.

@@ -212,6 +212,12 @@ static inline V share_inside(const Meeting<V>& m, V t) {
   return (share_inside(m.before() + t, depth) + share_inside(depth, m.free + t)) / 2;
 }
 
+// Whether it may touch in any lane; where not, it exerts nothing.
+template <class V>
+static inline bool may_touch(const Meeting<V>& m, V t) {
+  return any_of((m.before() > -t) | (m.now > -t) | (m.free > -t));
+}
+
 // P = K/2 max(0, d + t)^2, with a damper as far as it touches. With u = before + t, s = after -
 // before, a = free - before, h = gamma K/2 and m = 1 + gamma Z/2 every case is at most a quadratic,
 // solved without any cancellation:
@@ -220,6 +226,9 @@ static inline V share_inside(const Meeting<V>& m, V t) {
 //   entering:    (m + h) p^2 - (a + 2 m u) p + u (a + m u) = 0, p = u + s > 0
 template <class V>
 static inline V centred_contact_force(const Meeting<V>& meeting, V k, V z, V t) {
+  if (!may_touch(meeting, t)) {
+    return V{};
+  }
   const V u = meeting.before() + t;
   const V a = meeting.free - meeting.before();
   const V damper = z / 2 * share_inside(meeting, t);
@@ -245,6 +254,9 @@ static inline V centred_contact_force(const Meeting<V>& meeting, V k, V z, V t) 
 // P of the clipped contact, with a damper as far as it touches.
 template <class V>
 static inline V centred_clipped_contact_force(const Meeting<V>& m, V s, V c, V k, V z, V t) {
+  if (!may_touch(m, t)) {
+    return V{};
+  }
   const auto is_bent = (c > V{}) & (k >= s);
   const V straight = select((k < s) | (c == V{}), s, k);
   const ClippedWall<V> wall{
