@@ -324,6 +324,44 @@ TEST_CASE("S20: a clipped spring has no step, and gives back no more than it got
   CHECK(std::fabs(far.x[0]) < b * 1.1);
 }
 
+TEST_CASE("a point on a macro is hit as the mass that it lies on", "[passive]") {
+  const std::string rest = "@w ground -0.001\n@out1 posOutput ";
+  Stepper<double> masses(scenes::string("s", 9, "0.1", "0.001") +
+                             "@c contact @w @s_m4 5. 0.1\n@in1 frcInput @s_m2\n" + rest + "@s_m6\n",
+                         Passivity::always);
+  Stepper<double> macro(
+      "@s string 11 1. 0.1 0.001 0. 0. 0.\n@c contact @w [@s 0.5] 5. 0.1\n"
+      "@in1 frcInput [@s 0.3]\n" +
+          rest + "[@s 0.7]\n",
+      Passivity::always);
+  Comparison difference;
+  for (int n = 0; n < 1000; ++n) {
+    const std::vector<double> push = {n % 100 == 0 ? -.01 : 0.0};
+    difference.add(masses.step(push)[0], macro.step(push)[0]);
+  }
+  CHECK(difference.peak > 1e-3);
+  CAPTURE(show(difference.relative()));
+  CHECK(difference.relative() < 1e-11);
+}
+
+TEST_CASE("the force on a ball is what changes its speed", "[passive]") {
+  Stepper<double> ball(
+      "@w ground 0.\n@b mass 1. 0. 0.\n@c contact @w @b 3. 0.2\n@out1 frcOutput @b\n"
+      "@out2 frcOutput @w\n",
+      Passivity::always);
+  ball.place(1.3, -.4);
+  double most = 0.0;
+  for (int n = 0; n < 12; ++n) {
+    const double before = ball.v[0];
+    const std::vector<double> forces = ball.step({});
+    ball.kernel().save(0, ball.x.data(), ball.v.data());
+    CHECK(forces[0] == Approx(ball.v[0] - before).margin(1e-15));
+    CHECK(forces[1] == -forces[0]);
+    most = std::max(most, forces[0]);
+  }
+  CHECK(most > .1);
+}
+
 TEST_CASE("what is safe stays as published, and the rest is told", "[passive]") {
   const std::string text =
       "@k param 0.05\n@g ground 0.\n@in1 posInput 0.\n@m mass 1. 0.5 0.5\n@n mass 1. 0.5 0.5\n"
