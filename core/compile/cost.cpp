@@ -189,10 +189,12 @@ class Predictor {
   }
 
   // Twice through the springs, and two loops over the masses.
-  double operator()(const Fourth&) const { return 2.3 * (*this)(Direct{}); }
+  double operator()(const Fourth&) const { return 2.5 * (*this)(Direct{}); }
 
-  // A fifth more than without.
-  double operator()(const Compensated&) const { return 1.2 * (*this)(Direct{}); }
+  // A third more than without.
+  double operator()(const Compensated&) const {
+    return (wide_ > 0.0 ? 1.3 : 4.0) * (*this)(Direct{});
+  }
 
   // A voice's outputs, and its share of a coarse step.
   double operator()(const Slow& form) const {
