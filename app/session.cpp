@@ -246,7 +246,7 @@ void Session::listen() {
         values_[report.index] = report.value;
       } else if (report.kind == Report::Kind::reset && may_tell_reset()) {
         news = (is_current ? current_->name : std::string("the last model")) +
-               ": a voice became unstable and was put back to rest; lower its stiffness or "
+               ": a voice became unstable and was faded out; lower its stiffness or "
                "damping, or raise its mass";
       } else if (report.kind == Report::Kind::created && is_current) {
         news = calm(static_cast<std::uint32_t>(report.value));

@@ -173,9 +173,11 @@ void Engine::Voices::segment_in(Bank<T>& b, std::span<const double* const> input
   for (std::size_t p = 0; p < b.parts.size(); ++p) {
     PartBank<T>& part = b.parts[p];
     for (std::size_t first = 0; first < voices.size(); first += part.width) {
-      const bool steps = is_stepped(b, p, first);
-      mix_still(p, first, part.width, outputs, at, frames);
-      if (steps) {
+      const Pace pace = pace_of(b, p, first);
+      if (pace.stands) {
+        mix_still(p, first, part.width, outputs, at, frames);
+      }
+      if (pace.steps) {
         fill_drive(b, part, first, frames);
         fill_audio(b, part, first, inputs, at, frames);
         part.of(first).step({.frames = frames,
@@ -192,16 +194,18 @@ void Engine::Voices::segment_in(Bank<T>& b, std::span<const double* const> input
       voice.gain = voice.next_gain(voice.gain);
     }
   }
-  fade_lost();
+  if (has_lost) {
+    fade_lost();
+  }
 }
 
 template <class T>
-bool Engine::Voices::is_stepped(const Bank<T>& b, std::size_t p, std::size_t first) {
+Engine::Voices::Pace Engine::Voices::pace_of(const Bank<T>& b, std::size_t p, std::size_t first) {
   const PartBank<T>& part = b.parts[p];
   const Program& program = part.program;
   const bool is_turned =
       part.of(first).coefficients.ramp_frames > 0 || !program.audio_coefficients.empty();
-  bool any = false;
+  Pace pace;
   for (std::size_t lane = first; lane < std::min(voices.size(), first + part.width); ++lane) {
     if (!voices[lane].awake) {
       continue;
@@ -212,9 +216,11 @@ bool Engine::Voices::is_stepped(const Bank<T>& b, std::size_t p, std::size_t fir
     if (is_turned || std::any_of(program.inputs.begin(), program.inputs.end(), moves)) {
       stir(lane, p);
     }
-    any |= !watch(lane, p).is_still;
+    const bool is_still = watch(lane, p).is_still;
+    pace.steps |= !is_still;
+    pace.stands |= is_still;
   }
-  return any;
+  return pace;
 }
 
 template <class T>
@@ -439,7 +445,7 @@ void Engine::Voices::lose(Bank<T>& b, std::size_t p, std::size_t lane,
          lane);
   }
   resets += voices[lane].lost ? 0 : 1;
-  voices[lane].lost = true;
+  voices[lane].lost = has_lost = true;
   watch(lane, p).is_still = true;
   part.of(lane).reset(lane % part.width);  // nothing is to be slow for numbers that are none
   mix_held(p, lane, outputs, at, sane, frames);

@@ -174,10 +174,14 @@ struct Engine::Voices : Playback {
   void listen(std::span<const double* const> inputs, std::size_t at, std::size_t frames);
   // The last position of an audio input, for the velocity of the next segment's first sample.
   void remember_audio(std::span<const double* const> inputs, std::size_t end);
-  // Whether the kernel of a part that begins with voice `first` has anything to step. What is moved
-  // from outside is not still any more.
+  // What there is to do for the kernel of a part that begins with voice `first`. What is moved from
+  // outside is not still any more.
+  struct Pace {
+    bool steps = false;   // there is somebody to step
+    bool stands = false;  // and somebody who stands still
+  };
   template <class T>
-  bool is_stepped(const Bank<T>& b, std::size_t p, std::size_t first);
+  Pace pace_of(const Bank<T>& b, std::size_t p, std::size_t first);
   // Adds what the voices of one kernel say to the outputs, and keeps their last samples.
   template <class T>
   void mix(Bank<T>& b, std::size_t p, std::size_t first, std::span<double* const> outputs,
@@ -237,6 +241,7 @@ struct Engine::Voices : Playback {
   std::size_t looks_left = 0;  // at it
   std::size_t turn = 0;        // of the watches: the next to be looked at
   double stepped = 0.0;        // elements, times max_block_frames, since then
+  bool has_lost = false;       // a voice its stability, in this segment
   double loudest = 0.0;        // what no output reaches
   double pole = 0.0;
   double bow_pole = 0.0;

@@ -56,6 +56,7 @@ void Engine::Voices::mix_still(std::size_t p, std::size_t first, std::size_t wid
 }
 
 void Engine::Voices::fade_lost() {
+  has_lost = false;
   for (std::size_t lane = 0; lane < voices.size(); ++lane) {
     if (voices[lane].lost && !voices[lane].fading) {
       fade(lane, steal_fade_s);
@@ -126,7 +127,7 @@ void Engine::Voices::look(Bank<T>& b, std::size_t at) {
   const Energy energy = energy_of(part.program, values, b.x.data(), b.v.data());
   if (!std::isfinite(energy.value)) {
     resets += voices[lane].lost ? 0 : 1;
-    voices[lane].lost = here.is_still = true;
+    voices[lane].lost = here.is_still = has_lost = true;
     part.of(lane).reset(lane % part.width);
     return;
   }
