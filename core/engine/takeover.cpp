@@ -95,6 +95,7 @@ bool Engine::Voices::go_on_from(const Voices& from) {
           return false;
         }
         static_cast<Playback&>(*this) = from;
+        is_idle = false;
         for (Watch& here : watches) {
           here.is_judged = false;
         }

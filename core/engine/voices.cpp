@@ -72,6 +72,7 @@ void Engine::Voices::start(std::size_t lane, double frequency_hz) {
   Voice& voice = voices[lane];
   voice = Voice{};
   voice.awake = true;
+  is_idle = false;
   voice.frequency_hz = frequency_hz;
   voice.level = 1.0;  // not yet heard: not yet the quietest
   rest_lane(lane);
@@ -145,17 +146,14 @@ std::size_t Engine::Voices::lane_for(int key, int channel) {
 void Engine::Voices::segment(std::span<const double* const> inputs,
                              std::span<double* const> outputs, std::size_t at, std::size_t frames) {
   listen(inputs, at, frames);
-  std::visit([&](auto& b) { segment_in(b, inputs, outputs, at, frames); }, bank);
+  if (!is_idle) {
+    std::visit([&](auto& b) { segment_in(b, inputs, outputs, at, frames); }, bank);
+  }
   remember_audio(inputs, at + frames);
   since_settled += frames;
   if (since_settled == max_block_frames) {
     since_settled = 0;
-    look_around();
-    for (std::size_t lane = 0; lane < voices.size(); ++lane) {
-      if (voices[lane].awake) {
-        settle(lane);
-      }
-    }
+    settle_all();
   }
   if (playing.noise) {
     for (std::size_t n = at; n < at + frames; ++n) {
@@ -449,6 +447,20 @@ void Engine::Voices::lose(Bank<T>& b, std::size_t p, std::size_t lane,
   watch(lane, p).is_still = true;
   part.of(lane).reset(lane % part.width);  // nothing is to be slow for numbers that are none
   mix_held(p, lane, outputs, at, sane, frames);
+}
+
+void Engine::Voices::settle_all() {
+  if (is_idle) {
+    return;
+  }
+  look_around();
+  is_idle = true;
+  for (std::size_t lane = 0; lane < voices.size(); ++lane) {
+    if (voices[lane].awake) {
+      settle(lane);
+    }
+    is_idle = is_idle && !voices[lane].awake;
+  }
 }
 
 void Engine::Voices::settle(std::size_t lane) {

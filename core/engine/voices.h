@@ -72,7 +72,7 @@ struct Engine::Voices : Playback {
   Voices(Machine machine_in, Playing playing_in, Precision precision, Isa isa);
   std::size_t lanes_wanted() const;
   Watch& watch(std::size_t lane, std::size_t part) {
-    return watches[lane * machine.parts.size() + part];
+    return watches[lane * elements.size() + part];
   }
   double* held_of(std::size_t lane, std::size_t part) {
     return held.data() + lane * first_output.back() + first_output[part];
@@ -221,6 +221,7 @@ struct Engine::Voices : Playback {
   // max_block_frames, counted from the engine's start: so what sleeps or gives way does not
   // depend on how the time is cut into blocks.
   void settle(std::size_t lane);
+  void settle_all();
   // Whether nothing moves anywhere: a slow wave may still be on its way to the output.
   bool is_at_rest(std::size_t lane) const;
   // Uniform in -1..1: xorshift, from a fixed seed so that a render repeats.
@@ -241,6 +242,7 @@ struct Engine::Voices : Playback {
   std::size_t looks_left = 0;  // at it
   std::size_t turn = 0;        // of the watches: the next to be looked at
   double stepped = 0.0;        // elements, times max_block_frames, since then
+  bool is_idle = false;        // nobody is awake
   bool has_lost = false;       // a voice its stability, in this segment
   double loudest = 0.0;        // what no output reaches
   double pole = 0.0;
