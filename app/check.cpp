@@ -15,6 +15,7 @@
 #include "core/analysis/stability.h"
 #include "core/compile/compile.h"
 #include "core/model/print.h"
+#include "core/model/topology.h"
 
 namespace ressort {
 namespace {
@@ -52,14 +53,19 @@ struct Proved {
   std::vector<std::optional<SafeRange>> safe;  // [parameter]
 };
 
-Proved prove(const Scene& scene, const Instrument& instrument) {
+Proved prove(const Scene& scene, const Compiled& compiled) {
+  const Instrument& instrument = compiled.instrument;
   const ParameterBox box = preset_box(instrument.parameters, scene.preset);
   ParameterBox as_written;
   for (const ParameterInfo& info : instrument.parameters) {
     as_written.lowest.push_back(info.value);
     as_written.highest.push_back(info.value);
   }
-  Stability stability(scene.network, 1.0);
+  // What is computed passively is stable whatever its numbers are.
+  Stability stability(all_plain(compiled.schemes)
+                          ? scene.network
+                          : always_felt(expand_macros(scene.network), compiled.schemes),
+                      1.0);
   Proved proved{.certificate = stability.certify(box),
                 .stiffness_factor = stability.stiffness_factor(box)};
   proved.others_move = proved.certificate.verdict == Verdict::stable;
@@ -249,7 +255,7 @@ int check(const CheckOptions& options) {
   }
   std::optional<Proved> proved;
   if (compiled && options.as != CheckAs::model) {
-    proved = prove(*reading.scene, compiled->instrument);
+    proved = prove(*reading.scene, *compiled);
     warn(*proved, *reading.scene, reading.findings);
     for (Finding& narrowed : narrowed_ranges(*reading.scene, compiled->gate)) {
       reading.findings.push_back(std::move(narrowed));

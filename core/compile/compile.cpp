@@ -227,10 +227,8 @@ void find_mode(const Network& network, const Preset& preset, Instrument& instrum
 Schemes schemes_of(const Network& network, const Preset& preset, const CompileOptions& options,
                    const Budget& budget, const Instrument& instrument) {
   constexpr double highest_key_hz = 4186.0;
-  const bool is_told = options.budget || !options.bare;
-  const Passivity passive = is_told ? budget.passive : Passivity::never;
   const Budget unasked{.passive = Passivity::never};
-  const Budget budget = options.budget.value_or(options.bare ? unasked : preset.budget);
+  const bool is_asked = options.budget || !options.bare;
   Conditions conditions{
       .box = {},
       .rate_ratio = options.rescale ? Network::reference_rate_hz / options.rate_hz : 1.0};
@@ -245,7 +243,8 @@ Schemes schemes_of(const Network& network, const Preset& preset, const CompileOp
     conditions.stiffness_factor =
         std::max(1.0, std::min(most, octaves * octaves * std::exp2(preset.transpose / 6.0)));
   }
-  return choose_schemes(network, preset, conditions, budget, options.passive_links);
+  return choose_schemes(network, preset, conditions, is_asked ? budget : unasked,
+                        options.passive_links);
 }
 
 }  // namespace
@@ -398,7 +397,9 @@ Result<Compiled> compile_expanded(const Network& written, const Network& network
     playing.limits.push_back({limit.lowest, limit.highest});
   }
   const ParameterBox proved = proved_box(instrument.parameters, preset);
-  Margins margins(network, machine.rate_ratio);
+  const bool is_plain = all_plain(schemes.links);
+  const Network felt = is_plain ? Network{} : always_felt(network, schemes.links);
+  Margins margins(is_plain ? network : felt, machine.rate_ratio);
   instrument.stiffness_margin = margins.at(proved);
   playing.highest_factor = margins.for_keys(proved);
   if (!options.bare) {

@@ -323,6 +323,11 @@ Schemes choose_schemes(const Network& network, const Preset& preset, const Condi
   return schemes;
 }
 
+bool all_plain(const std::vector<LinkScheme>& links) {
+  return std::all_of(links.begin(), links.end(),
+                     [](const LinkScheme& link) { return link.scheme == Scheme::plain; });
+}
+
 Network always_felt(const Network& network, const std::vector<LinkScheme>& links) {
   Network felt = network;
   felt.links.clear();

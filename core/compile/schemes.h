@@ -39,6 +39,8 @@ struct Conditions {
 Schemes choose_schemes(const Network& network, const Preset& preset, const Conditions& conditions,
                        const Budget& budget, const std::vector<std::uint32_t>& forced);
 
+bool all_plain(const std::vector<LinkScheme>& links);
+
 // The network without the links that their scheme keeps stable whatever their numbers are: what
 // remains is what a proof of stability has to be about. Springs keep their K and Z.
 Network always_felt(const Network& network, const std::vector<LinkScheme>& links);
