@@ -185,7 +185,7 @@ TEST_CASE("only a budget makes a part slow", "[slow]") {
 
   Preset preset = rig::struck(2);
   rig::Player plain(text, preset, {.budget = Budget{}});
-  rig::Player slow(text, preset, {.budget = Budget{.silence_db = -60.0}});
+  rig::Player slow(text, preset, {.method = Method::slow});
   Comparison lfo_output;
   Comparison string_output;
   const std::vector<Event> events = {rig::note_on(100, 60), rig::note_on(30'000, 64)};
