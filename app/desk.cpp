@@ -335,6 +335,12 @@ Result<Done> act::status(Desk& desk, Words) {
       {"events", std::to_string(now.late) + " late, " + std::to_string(now.dropped) + " dropped, " +
                      std::to_string(now.malformed) + " malformed"},
   };
+  if (now.modes > 0) {
+    const double saved =
+        100.0 * (1.0 - static_cast<double>(now.modes_awake) / static_cast<double>(now.modes));
+    rows.push_back({"modes", std::to_string(now.modes_awake) + " of " + std::to_string(now.modes) +
+                                 " awake, saves " + fixed(saved, 0) + " %"});
+  }
   if (desk.recorder.is_running()) {
     rows.push_back({"recording", "yes"});
   }

@@ -272,6 +272,8 @@ void Process::tell() {
   meters.beyond.add(now.beyond - beyond_told_);
   beyond_told_ = now.beyond;
   meters.saved.set(now.saved);
+  meters.modes.set(now.modes);
+  meters.modes_awake.set(now.modes_awake);
   if (now.resets != resets_told_) {
     meters.resets.add(now.resets - resets_told_);
     resets_told_ = now.resets;

@@ -63,8 +63,10 @@ struct Meters {
   Meter<int> voices;
   Meter<std::uint64_t> resets;  // voices that became unstable
   Meter<std::uint64_t> stolen;
-  Meter<std::uint64_t> beyond;     // times that a parameter was kept where it is stable
-  Meter<double> saved;             // share of the steps that sleep saves
+  Meter<std::uint64_t> beyond;  // times that a parameter was kept where it is stable
+  Meter<double> saved;          // share of the steps that sleep saves
+  Meter<std::uint64_t> modes;   // of the voices that sound
+  Meter<std::uint64_t> modes_awake;
   Meter<std::uint64_t> dropped;    // events that found no room
   Meter<std::uint64_t> late;       // events that came after their time
   Meter<std::uint64_t> malformed;  // MIDI that could not be read

@@ -157,6 +157,8 @@ Status Session::status() {
   status.stolen = meters.stolen.get();
   status.beyond = meters.beyond.get();
   status.saved = meters.saved.get();
+  status.modes = meters.modes.get();
+  status.modes_awake = meters.modes_awake.get();
   status.dropped = meters.dropped.get();
   status.late = meters.late.get();
   status.malformed = meters.malformed.get();

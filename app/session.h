@@ -53,6 +53,8 @@ struct Status {
   std::uint64_t resets = 0;
   std::uint64_t stolen = 0;
   std::uint64_t beyond = 0;  // times that a parameter was kept where it is stable
+  std::uint64_t modes = 0;   // of the voices that sound
+  std::uint64_t modes_awake = 0;
   std::uint64_t dropped = 0;
   std::uint64_t late = 0;
   std::uint64_t malformed = 0;

@@ -21,6 +21,8 @@ namespace ressort {
 namespace {
 
 constexpr double to_spare = 0.98;  // of the stiffness that keys may use: higher, modes hardly decay
+// What may sleep whatever else sounds: -120 dBFS.
+constexpr double inaudible_level = 1e-6;
 
 Error preset_error(const Place& place, std::string message) {
   return {std::move(message), place.line, place.column};
@@ -424,7 +426,8 @@ Result<Compiled> compile_expanded(const Network& written, const Network& network
   instrument.outputs = output_count(network);
   instrument.voices = playing.voices;
   instrument.links = network.links.size();
-  const bool is_published = options.bare && !options.method && !budget.is_physical();
+  const bool is_published = options.bare && !options.method && !budget.is_physical() &&
+                            budget.silence_db == -Budget::unlimited;
   compiled.plan = make_plan(
       machine,
       {.is_double = options.precision == Precision::float64,
@@ -444,6 +447,11 @@ Result<Compiled> compile_expanded(const Network& written, const Network& network
     playing.gain *= comfortable_gain(machine, playing, options);
   }
   instrument.gain = playing.gain;
+  for (Program& program : machine.parts) {
+    if (Modes* const modes = std::get_if<Modes>(&program.form)) {
+      modes->quiet = inaudible_level / std::max(1e-30, playing.gain);
+    }
+  }
   compiled.engine = std::make_unique<Engine>(std::move(machine), std::move(playing),
                                              options.precision, options.isa);
   return compiled;

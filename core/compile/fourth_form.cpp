@@ -133,12 +133,10 @@ SchemeError fourth_error(const Steepness& steepness) {
 
 std::optional<Fourth> fourth_form(const Program& program) {
   const auto is_force = [](const OutputSlot& output) { return output.is_force; };
-  const auto is_plain = [](const LinkRun& run) { return run.scheme == Scheme::plain; };
   if (program.moving == 0 ||
       (!program.taps.empty() &&
        std::any_of(program.outputs.begin(), program.outputs.end(), is_force)) ||
-      !std::all_of(program.link_runs.begin(), program.link_runs.end(), is_plain) ||
-      !(steepness_of(program).both < 12.0)) {
+      !is_plain(program) || !(steepness_of(program).both < 12.0)) {
     return std::nullopt;
   }
   Fourth form;

@@ -3,9 +3,12 @@
 #include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
+#include <complex>
 #include <limits>
 #include <map>
 #include <utility>
+
+#include "core/compile/modal_worth.h"
 
 namespace ressort {
 namespace {
@@ -13,7 +16,6 @@ namespace {
 constexpr std::uint32_t nowhere = 0xffffffffu;
 constexpr double shared_tolerance = 1e-12;  // of a matrix' largest element: is it diagonal?
 constexpr double zero_tolerance = 1e-13;    // of the largest: is it anything?
-constexpr double least_stiffness = 1e-12;   // below, a mode is taken to swing as widely as with it
 
 using Matrix = Eigen::MatrixXd;
 using Vector = Eigen::VectorXd;
@@ -34,16 +36,32 @@ struct Frame {
   Vector factor;  // [mode]
 };
 
+// The published scheme's lK and lZ that are the continuous K and Z, sampled; gives the force's gain
+// (core/engine/modal_exact.h).
+double make_exact(double& k, double& z) {
+  const std::complex<double> pole =
+      std::exp(std::complex<double>(-0.5 * z) + std::sqrt(std::complex<double>(0.25 * z * z - k)));
+  const double r = std::exp(-0.5 * z);
+  const double stiffness = 1.0 + r * r - (pole + r * r / pole).real();
+  const double gain = k > 0.0 ? stiffness / k : 1.0;
+  k = stiffness;
+  z = 1.0 - r * r;
+  return gain;
+}
+
+constexpr double left_out_share = 0.02;  // of the budget
+
 class ModesFinder {
  public:
   ModesFinder(const Program& program, const Budget& budget)
       : program_(program), count_(program.moving) {
+    modes_.is_exact = budget.is_physical();
     modes_.silence = std::pow(10.0, budget.silence_db / 20.0);
   }
 
   std::optional<Modes> find() {
     if (count_ == 0 || count_ > most_modes || !program_.taps.empty() ||
-        !program_.audio_coefficients.empty() || has_force_output()) {
+        !program_.audio_coefficients.empty() || has_force_output() || has_other_schemes()) {
       return std::nullopt;
     }
     look_at_parameters();
@@ -73,6 +91,11 @@ class ModesFinder {
   bool has_force_output() const {
     return std::any_of(program_.outputs.begin(), program_.outputs.end(),
                        [](const OutputSlot& output) { return output.is_force; });
+  }
+
+  bool has_other_schemes() const {
+    return std::any_of(program_.link_runs.begin(), program_.link_runs.end(),
+                       [](const LinkRun& run) { return run.scheme != Scheme::plain; });
   }
 
   void look_at_parameters() {
@@ -404,7 +427,7 @@ class ModesFinder {
       }
     }
     if (modes_.silence > 0.0) {
-      sort_by_life();
+      leave_out();
     }
     modes_.modes = static_cast<std::uint32_t>(kept_.size());
     modes_.q = kept(q_);
@@ -428,43 +451,71 @@ class ModesFinder {
     }
   }
 
-  // Those first that will be heard the longest: the time until a mode is below the budget, from as
-  // loud as it is at most beside the loudest, by a blow anywhere or from the start.
-  void sort_by_life() {
-    Vector stiffness = Vector::Zero(count_);
-    Vector damping = Vector::Zero(count_);
+  // What all stiffnesses or dampings give to each mode, at the start.
+  Vector sum_of(const std::vector<Frame>& frames) const {
     const double w = modes_.inverse_mass == Modes::own_mass ? 1.0 : value_[modes_.inverse_mass];
-    for (const Frame& frame : stiffness_) {
-      stiffness += w * value_[frame.coefficient] * frame.factor;
+    Vector sum = Vector::Zero(count_);
+    for (const Frame& frame : frames) {
+      sum += w * value_[frame.coefficient] * frame.factor;
     }
-    for (const Frame& frame : damping_) {
-      damping += w * value_[frame.coefficient] * frame.factor;
+    return sum;
+  }
+
+  // Most of the budget is for modes that sleep: these cost nothing either.
+  void leave_out() {
+    Vector stiffness = sum_of(stiffness_);
+    Vector damping = sum_of(damping_);
+    const Vector flexible = stiffness;
+    Vector root = Vector::Ones(count_);
+    for (std::uint32_t i = 0; modes_.is_exact && i < count_; ++i) {
+      root[i] = std::sqrt(make_exact(stiffness[i], damping[i]));
     }
-    // What a blow of 1 becomes, and what is there from the start.
-    const Vector swing = stiffness.cwiseMax(least_stiffness).cwiseSqrt().cwiseInverse();
-    std::vector<Vector> blows{(q_.cwiseAbs2() + (d_.cwiseProduct(swing)).cwiseAbs2()).cwiseSqrt()};
+    const auto kept_of = [&](const Vector& row) { return kept(row.cwiseProduct(root)); };
+    const auto start_of = [&](const Vector& row) { return kept(row.cwiseQuotient(root)); };
+    Hearing hearing{kept(stiffness), kept(damping), {}, {start_of(q_), start_of(d_)}, {}};
     for (const Vector& row : pushed_) {
-      blows.push_back(row.cwiseProduct(swing).cwiseAbs());
+      hearing.blows.push_back(kept_of(row));
     }
-    for (std::size_t i = 0; i < modes_.places.size(); ++i) {
-      blows.push_back(heard_[i].cwiseProduct(swing).cwiseAbs());
-    }
-    Vector loudness = Vector::Zero(count_);
-    for (const Vector& blow : blows) {
-      for (const Vector& row : heard_) {
-        const Vector heard = blow.cwiseProduct(row.cwiseAbs());
-        if (const double loudest = heard.maxCoeff(); loudest > 0.0) {
-          loudness = loudness.cwiseMax(heard / loudest);
-        }
+    for (std::size_t i = 0; i < heard_.size(); ++i) {
+      hearing.listeners.push_back(kept_of(heard_[i]));
+      if (i < modes_.places.size()) {
+        hearing.blows.push_back(hearing.listeners.back());
       }
     }
-    std::vector<double> life(count_);
-    for (std::uint32_t i = 0; i < count_; ++i) {
-      const double above = std::log(std::max(loudness[i], 1e-30) / std::min(modes_.silence, 0.1));
-      life[i] = above / std::max(0.5 * damping[i], 1e-15);
+    const Worth worth = weigh(hearing, left_out_share * modes_.silence);
+    modes_.of = static_cast<std::uint32_t>(kept_.size());
+    modes_.left_out = worth.share;
+    modes_.silence -= worth.share;
+    const std::vector<std::uint32_t> all = std::exchange(kept_, {});
+    for (const std::uint32_t i : worth.kept) {
+      kept_.push_back(all[i]);
     }
-    std::stable_sort(kept_.begin(), kept_.end(),
-                     [&](std::uint32_t a, std::uint32_t b) { return life[a] > life[b]; });
+    give_at_holds(worth.left_out, all, flexible);
+  }
+
+  // How far the modes that are left out let the ends of a link give way, per force, with the
+  // stiffness of the first frame.
+  void give_at_holds(const std::vector<std::uint32_t>& left_out,
+                     const std::vector<std::uint32_t>& all, const Vector& stiffness) {
+    if (left_out.empty() || stiffness_.empty()) {
+      return;
+    }
+    const double w = modes_.inverse_mass == Modes::own_mass ? 1.0 : value_[modes_.inverse_mass];
+    modes_.give_by = stiffness_.front().coefficient;
+    const Vector nothing = Vector::Zero(count_);
+    const auto shape_at = [&](std::uint32_t end) -> const Vector& {
+      return end < modes_.places.size() ? heard_[end] : nothing;
+    };
+    for (ModalHold& hold : modes_.holds) {
+      for (std::size_t link = 0; link < hold.a.size(); ++link) {
+        const Vector apart = shape_at(hold.a[link]) - shape_at(hold.b[link]);
+        double give = 0.0;
+        for (const std::uint32_t i : left_out) {
+          give += w * apart[all[i]] * apart[all[i]] / stiffness[all[i]];
+        }
+        hold.give.push_back(give * value_[modes_.give_by]);
+      }
+    }
   }
 
   std::vector<double> kept(const Vector& row) const {

@@ -21,7 +21,8 @@ std::optional<Form> any(std::optional<T> form) {
   return form ? std::optional<Form>(std::move(*form)) : std::nullopt;
 }
 
-std::optional<Form> form_of(const Program& program, Method method, const Load& load) {
+std::optional<Form> form_of(const Program& program, Method method, const Load& load,
+                            const Budget& budget) {
   switch (method) {
     case Method::direct:
       return Direct{};
@@ -30,7 +31,7 @@ std::optional<Form> form_of(const Program& program, Method method, const Load& l
     case Method::dense:
       return any(dense_form(program));
     case Method::modal:
-      return any(modal_form(program));
+      return any(modal_form(program, budget));
     case Method::grid:
       return any(grid_form(program));
     case Method::chorus:
@@ -47,6 +48,12 @@ std::optional<Form> form_of(const Program& program, Method method, const Load& l
 
 std::string count_of(std::size_t count, const char* one, const char* many) {
   return std::to_string(count) + " " + (count == 1 ? one : many);
+}
+
+std::string in_db(double share) {
+  char text[32];
+  std::snprintf(text, sizeof text, "%.0f dB", 20.0 * std::log10(std::max(share, 1e-15)));
+  return text;
 }
 
 // What the form is, of this part.
@@ -67,8 +74,20 @@ struct Describer {
                                     count_of(form.ports.size(), "link", "links") + " one by one";
   }
   std::string operator()(const Modes& form) const {
-    return count_of(form.modes, "mode", "modes") + " in place of the masses, " +
-           count_of(form.places.size(), "place", "places") + " where links hold on";
+    std::string text = count_of(form.modes, "mode", "modes");
+    if (form.modes < form.of) {
+      text = std::to_string(form.modes) + " of " + count_of(form.of, "mode", "modes") +
+             ", the rest at most " + in_db(form.left_out) + ",";
+    }
+    text += " in place of the masses, ";
+    if (form.is_exact) {
+      text += "true to the continuous network, ";
+    }
+    text += count_of(form.places.size(), "place", "places") + " where links hold on";
+    if (form.silence > 0.0) {
+      text += ", asleep when all that sleep are below " + in_db(form.silence);
+    }
+    return text;
   }
   std::string operator()(const Chorus&) const {
     return std::string(program.moving <= most_held_masses ? "its masses in registers"
@@ -119,21 +138,28 @@ std::string rounded(double value) {
 
 class Chooser {
  public:
-  Chooser(Program& program, const Load& load, std::uint32_t most_modes)
-      : program_(program), load_(load), most_modes_(most_modes) {}
+  Chooser(Program& program, const Load& load, std::uint32_t most_modes, const Budget& budget)
+      : program_(program),
+        load_(load),
+        most_modes_(most_modes),
+        budget_(budget),
+        is_asked_(budget.is_physical() || budget.silence_db > -Budget::unlimited) {
+    if (budget.is_physical()) {
+      judge();
+    }
+  }
 
-  Part choose(const Budget& budget) {
-    if (budget.is_physical() || budget.silence_db > -Budget::unlimited) {
+  Part choose() {
+    if (is_asked_) {
       consider(Method::slow);
     }
-    const std::string misses = what_misses(budget);
-    if (!misses.empty()) {
-      consider(Method::fourth);
+    if (!published_.empty()) {
+      consider_physical();
     }
-    if (misses.empty() || candidates_.empty()) {
+    if (published_.empty() || candidates_.empty()) {
       consider_identical();
     }
-    Part part = take(misses);
+    Part part = take("");
     part.may_gain = may_gain_;
     return part;
   }
@@ -170,23 +196,44 @@ class Chooser {
     }
   }
 
-  // How the published scheme is farther from the continuous network than the budget allows; "" if
-  // it is not.
-  std::string what_misses(const Budget& budget) const {
-    if (!budget.is_physical()) {
-      return "";
+  // What is nearer to the continuous network than the published scheme: modes, which are exact, or
+  // the fourth order where that is near enough or there are no modes.
+  void consider_physical() {
+    bool has_modes = false;
+    if (program_.moving <= most_modes_) {
+      has_modes = consider(Method::modal);
+    } else {
+      may_gain_ = program_.moving <= patient_modes;
     }
+    if (!has_modes || meets(fourth_error(steepness_of(program_)))) {
+      consider(Method::fourth);
+    }
+  }
+
+  bool meets(const SchemeError& error) const {
+    return error.cents <= budget_.cents && error.t60_percent <= budget_.t60_percent;
+  }
+
+  // Where the published scheme is near enough, no other is needed.
+  void judge() {
     const SchemeError error = published_error(steepness_of(program_));
-    if (error.cents <= budget.cents && error.t60_percent <= budget.t60_percent) {
-      return "";
+    if (meets(error)) {
+      budget_.cents = budget_.t60_percent = Budget::unlimited;
+      return;
     }
-    return "for the budget: as published up to " + rounded(error.cents) + " cents and " +
-           rounded(error.t60_percent) + " % of decay off";
+    published_ = ", as published up to " + rounded(error.cents) + " cents and " +
+                 rounded(error.t60_percent) + " % of a decay off the continuous network";
+  }
+
+  // Of modes most sleep most of the time, where they may.
+  double worth_ns(Method method, double ns) const {
+    return method == Method::modal && budget_.silence_db > -Budget::unlimited ? 0.5 * ns : ns;
   }
 
   bool may_be_modal() {
-    const bool may_pay = program_.moving <= patient_modes && program_.moving > 4 &&
-                         least_modal_ns(program_, load_) < candidates_[best_].ns;
+    const bool may_pay =
+        program_.moving <= patient_modes && program_.moving > 4 &&
+        worth_ns(Method::modal, least_modal_ns(program_, load_)) < candidates_[best_].ns;
     may_gain_ = may_pay && program_.moving > most_modes_;
     return may_pay && !may_gain_;
   }
@@ -197,7 +244,7 @@ class Chooser {
   }
 
   bool consider(Method method) {
-    auto form = form_of(program_, method, load_);
+    auto form = form_of(program_, method, load_, budget_);
     if (!form) {
       return false;
     }
@@ -209,7 +256,7 @@ class Chooser {
     program_.form = std::move(form);
     const double ns = predicted_ns(program_, load_);
     candidates_.push_back({method, std::move(program_.form), ns});
-    if (ns < candidates_[best_].ns) {
+    if (worth_ns(method, ns) < worth_ns(candidates_[best_].method, candidates_[best_].ns)) {
       best_ = candidates_.size() - 1;
     }
   }
@@ -229,6 +276,7 @@ class Chooser {
       }
     }
     part.reason += "; at most about " + in_ns(best.ns) + " a sample";
+    part.reason += published_;
     part.reason += !why.empty() ? ", " + why : others.empty() ? "" : ", " + others;
     program_.form = std::move(best.form);
     return part;
@@ -237,6 +285,9 @@ class Chooser {
   Program& program_;
   const Load& load_;
   std::uint32_t most_modes_;
+  Budget budget_;  // without what the published scheme meets
+  bool is_asked_;
+  std::string published_;  // how far off it would be, where that is too far
   bool may_gain_ = false;
   std::vector<Candidate> candidates_;
   std::size_t best_ = 0;
@@ -272,10 +323,10 @@ Plan make_plan(Machine& machine, const Load& load, std::optional<Method> method,
                std::uint32_t most_modes, const Budget& budget) {
   Plan plan;
   for (Program& program : machine.parts) {
-    Chooser chooser(program, load, most_modes);
+    Chooser chooser(program, load, most_modes, budget);
     Part part = load.is_compensated ? chooser.compensate()
                 : method            ? chooser.obey(*method)
-                                    : chooser.choose(budget);
+                                    : chooser.choose();
     if (auto shards = share_out(program, load)) {
       program.form = *std::move(shards);
       part.predicted_ns = predicted_ns(program, load);

@@ -450,6 +450,15 @@ EngineMeters Engine::meters() const {
   for (const Voice& voice : voices_->voices) {
     meters.voices += voice.awake && !voice.fading && voice.level > quiet_level ? 1 : 0;
   }
+  voices_->each_part([&](const auto& part) {
+    for (std::size_t lane = 0; lane < voices_->voices.size(); ++lane) {
+      if (voices_->voices[lane].awake) {
+        const Awake awake = part.of(lane).awake();
+        meters.modes += awake.of;
+        meters.modes_awake += awake.modes;
+      }
+    }
+  });
   meters.resets = voices_->resets;
   meters.stolen = voices_->stolen;
   meters.beyond = voices_->beyond;

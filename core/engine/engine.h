@@ -95,6 +95,8 @@ struct EngineMeters {
   std::uint64_t stolen = 0;  // voices that had to give way to a new note
   std::uint64_t beyond = 0;  // times that a parameter was kept within its limits; by audio, blocks
   double saved = 0.0;        // the share of the steps that nobody has to take, 0..1
+  std::size_t modes = 0;     // of all voices that are awake
+  std::size_t modes_awake = 0;
 };
 
 // A voice that is louder than this, or no number, has lost its stability: 60 dB over full scale; in

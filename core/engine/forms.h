@@ -79,6 +79,9 @@ struct ModalHold {
   std::uint32_t run = 0;  // of Program::link_runs: the law and its coefficients
   std::vector<std::uint32_t> a;
   std::vector<std::uint32_t> b;  // [link] ends
+  // [link] how far the ends give way by the modes that are left out, per force, times the
+  // coefficient Modes::give_by; empty where none are
+  std::vector<double> give;
 };
 
 // An end that is no mass: it follows a position input, or stays.
@@ -118,8 +121,13 @@ struct Modes {
   std::uint32_t modes = 0;
   std::uint32_t inverse_mass = own_mass;  // the coefficient w, or 1
   double reach = 1.0;                     // no mass moves farther than reach * |q|
-  double silence = 0.0;   // so loud may all be that sleep, to the loudest; 0: none sleeps
-  double quiet = 0.0;     // so loud they may be in any case, in positions
+  bool is_exact = false;      // true to the continuous network instead of the published scheme
+  std::uint32_t of = 0;       // modes before some were left out; 0: none were to be
+  std::uint32_t give_by = 0;  // the coefficient that ModalHold::give is divided by
+  // Shares of how far all modes together could swing an output or a place:
+  double left_out = 0.0;  // by those that are not here, at most
+  double silence = 0.0;   // by those that sleep, at most; 0: none sleeps
+  double quiet = 0.0;     // and by how much in any case, in positions
   std::vector<double> q;  // [mode] at the start
   std::vector<double> d;
   std::vector<double> basis;  // [mode][mass] what a mass's displacement or velocity is to a mode's

@@ -122,7 +122,7 @@ class Kernel {
   }
   // Whether every mass of a lane is nearer than `bound` to where it starts. [audio]
   virtual bool is_near_start(std::size_t lane, double bound) const = 0;
-  virtual Awake awake() const { return {}; }
+  virtual Awake awake() const { return {}; }  // [audio]
 
   Coefficients<T> coefficients;
 

@@ -66,7 +66,8 @@ class Furnisher {
                     &state.saved_d, &state.spread, &state.decay, &state.swing, &state.debt}) {
       *row = arena_.take(stride_);
     }
-    state.loudest = arena_.take(observed);
+    state.held_give = arena_.take(link_count(modes_));
+    state.loudness = arena_.take(observed);
     state.room = arena_.take(observed);
     state.stiffness = rows(
         modes_.stiffness, [](auto& share) -> auto& { return share.factor; });
@@ -78,6 +79,17 @@ class Furnisher {
         modes_.places, [](auto& place) -> auto& { return place.shape; });
     state.outputs = rows(
         modes_.outputs, [](auto& output) -> auto& { return output.place.shape; });
+    if (modes_.is_exact) {
+      for (T** row : {&state.root, &state.k_step, &state.z_step}) {
+        *row = arena_.take(stride_);
+      }
+      const std::size_t count = shape_count() * stride_;
+      T* const shape = arena_.take(count);
+      if (shape != nullptr) {
+        std::copy_n(state.pushes, count, shape);
+      }
+      state.shape = shape;
+    }
     state.push_norm = norms(
         modes_.pushes, [](auto& push) -> auto& { return push.shape; });
     state.place_norm = norms(
@@ -100,8 +112,11 @@ class Furnisher {
   }
 
  private:
+  std::size_t shape_count() const {
+    return modes_.pushes.size() + modes_.places.size() + modes_.outputs.size();
+  }
   template <class Items, class ShapeOf>
-  const T* rows(const Items& items, ShapeOf&& shape_of) {
+  T* rows(const Items& items, ShapeOf&& shape_of) {
     T* const first = arena_.take(items.size() * stride_);
     for (std::size_t i = 0; first != nullptr && i < items.size(); ++i) {
       const std::vector<double>& shape = shape_of(items[i]);
@@ -149,9 +164,8 @@ ModalKernel<T>::ModalKernel(const Program& program, const Modes& modes, Isa isa)
   state_.held_ends = held_ends_.data();
   state_.silence = static_cast<T>(modes.silence);
   state_.quiet = static_cast<T>(modes.quiet);
-  // 60 dB in 0.2 s
   state_.lately_kept =
-      static_cast<T>(std::pow(1e-3, static_cast<double>(nap_frames) / (0.2 * program.rate_hz)));
+      static_cast<T>(std::pow(1e-3, static_cast<double>(nap_frames) / program.rate_hz));
   this->reset(0);
 }
 
@@ -180,11 +194,17 @@ void ModalKernel<T>::place(std::size_t, const double* x, const double* v) {
   state_.touched_frames = 0;
   state_.surprised_frames = 0;
   state_.kick_norm = T(0);
+  if (modes_.is_exact) {
+    std::fill_n(state_.root, state_.modes, T(1));
+  }
+  state_.is_stale = true;
+  state_.fresh_frames = 0;
   state_.awake = modes_.modes;
   state_.swept = state_.modes;
   state_.until_nap = nap_frames;
+  state_.is_long_nap = false;
   std::fill_n(state_.debt, state_.modes, T(0));
-  std::fill_n(state_.loudest, places + modes_.outputs.size(), T(0));
+  std::fill_n(state_.loudness, places + modes_.outputs.size(), T(0));
 }
 
 template <class T>
@@ -220,7 +240,8 @@ template <class T>
 bool ModalKernel<T>::is_near_start(std::size_t, double bound) const {
   double sum = 0.0;
   for (std::size_t i = 0; i < modes_.modes; ++i) {
-    const double moved = static_cast<double>(state_.q[i]) - modes_.q[i];
+    const double root = modes_.is_exact ? static_cast<double>(state_.root[i]) : 1.0;
+    const double moved = root * static_cast<double>(state_.q[i]) - modes_.q[i];
     sum += moved * moved;
   }
   return modes_.reach * std::sqrt(sum) < bound;

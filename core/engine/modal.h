@@ -13,7 +13,8 @@
 
 namespace ressort {
 
-inline constexpr std::size_t nap_frames = 256;  // from one look at what may sleep to the next
+inline constexpr std::size_t nap_frames = 32;  // from one look at what may sleep to the next...
+inline constexpr std::size_t long_nap_frames = 128;  // ...while few are awake
 
 // Everything that one step of ModalKernel touches. Rows of modes are `stride` apart and filled up
 // with zeros to `modes`, whole packs of every kind. Ends: the places, then Modes::ends.
@@ -22,13 +23,13 @@ struct ModalState {
   Ramps<T> ramps;
   std::size_t modes;
   std::size_t stride;
-  std::size_t awake;  // the first so many modes are
-  std::size_t swept;  // the same in whole pairs of packs
+  std::size_t awake;    // the first so many modes are
+  std::size_t swept;    // the same in whole pairs of packs
   const T* stiffness;   // [share][mode] factors
   const T* damping;     // [share][mode]
-  const T* pushes;      // [push][mode] shapes
-  const T* places;      // [place][mode]
-  const T* outputs;     // [output][mode]
+  T* pushes;            // [push][mode] shapes, and without a gap
+  T* places;            // [place][mode]
+  T* outputs;           // [output][mode]
   const T* push_norm;   // [push] length of the shape
   const T* place_norm;  // [place]
   T* q;                 // [mode]
@@ -59,15 +60,20 @@ struct ModalState {
   std::uint32_t* place_of;  // [row] its inverse
   std::uint32_t* held;      // [hold] how many of its links are computed
   Ends* held_ends;          // [link that is computed]
-  T* spread;         // [mode] square of the amplitude per that of the state; 0: does not ring
-  T* decay;          // [mode] of an amplitude in nap_frames
-  T* swing;          // [mode] amplitude
-  T* debt;           // [mode] amplitude of what was dropped
-  T* loudest;        // [listener] amplitude of the strongest mode, now or lately
-  T* room;           // [listener] what may still be dropped
-  T silence;         // share of `loudest` that may be dropped; 0: nothing sleeps
-  T quiet;           // what may be dropped in any case
-  T lately_kept;     // of `loudest` in nap_frames
+  T* held_give;             // [link that is computed]
+  const T* shape;           // [push, place, output][mode] as they are written, if is_exact
+  T* root;                  // [mode] of the gain that all of these have, if is_exact
+  T* k_step;                // [mode] per sample, if is_exact
+  T* z_step;                // [mode]
+  T* spread;      // [mode] square of the amplitude per that of the state; 0: does not ring
+  T* decay;       // [mode] of an amplitude in nap_frames
+  T* swing;       // [mode] amplitude
+  T* debt;        // [mode] amplitude of what was dropped
+  T* loudness;    // [listener] sum of all amplitudes, now or lately
+  T* room;        // [listener] what may still be dropped
+  T silence;      // share of `loudness` that may be dropped; 0: nothing sleeps
+  T quiet;        // what may be dropped in any case
+  T lately_kept;  // of `loudness` in nap_frames
   std::size_t saved_awake = 0;
   std::size_t bundled = 0;
   std::size_t bundled_modes = 0;
@@ -80,6 +86,8 @@ struct ModalState {
   T kick_norm = 0;                     // what the links added to the norm in their last block
   bool is_stale = true;                // k, z and compliance are not those of `used`
   std::uint32_t until_nap = nap_frames;
+  std::uint32_t fresh_frames = 0;  // since they were placed; up to 2
+  bool is_long_nap = false;
   bool has_bounds = false;  // the energy limits the motion
 };
 

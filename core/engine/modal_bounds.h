@@ -88,6 +88,34 @@ bool may_act(const LinkRun& run, const T* coefficients, Range<T> d) {
       return true;
   }
 }
+// What is left of a link's force where its ends give way, as a spring in series with it does. For
+// a curved law by the line through where it is; what only rubs is not felt by a spring.
+template <class T>
+T share_of_give(const LinkRun& run, const T* coefficients, T d, T give) {
+  const auto c = [&](std::size_t i) { return coefficients[run.coefficients[i]]; };
+  T stiffness = 0;
+  switch (run.law) {
+    case Law::quadratic_spring:
+      stiffness = c(0) + c(1) * absolute(d);
+      break;
+    case Law::cubic_spring:
+      stiffness = c(0) + c(1) * d * d;
+      break;
+    case Law::contact:
+      stiffness = c(0);
+      break;
+    case Law::clipped_spring:
+    case Law::clipped_contact:
+      stiffness = c(2);
+      break;
+    case Law::pluck:
+      stiffness = c(0) / 10;
+      break;
+    default:
+      break;
+  }
+  return give > 0 && stiffness > 0 ? 1 / (1 + give * stiffness) : T(1);
+}
 inline bool acts_by_position(Law law) {
   return law == Law::pluck || law == Law::contact || law == Law::clipped_contact;
 }

@@ -3,14 +3,14 @@
 // A mode that is left alone rings as q = A r^n cos(...), with r^2 = 1 - lZ and
 //   A^2 = (lK q^2 + (lZ - lK) q d + (1 - lZ) d^2) (1 - lZ) / (lK - (lK + lZ)^2 / 4),
 // so that it never again moves a listener, an output or a place that links hold, by more than
-// |shape| A. Once in nap_frames the modes are looked at from the one that dies first. As long as
-// the sum of |shape| A of all that sleep stays below the share `silence` of the loudest mode of now
-// or lately (it is forgotten by 60 dB in 0.2 s, sooner than by the ear), at every listener, the
-// next one falls asleep: its state is dropped. What was dropped is owed: it goes on decaying in
-// `debt` until it is nothing, awake or asleep, and counts in that sum. So at any time the error at
-// a listener is at most the sum of |shape| debt.
+// |shape| A. The loudness of a listener is the sum of these, how far all modes together could swing
+// it, now or lately: it is forgotten as a room forgets in which a sound dies away in a second.
 //
-// Whatever acts on the modes wakes all of them, in its own sample.
+// Once in a while the modes are looked at from the one that dies first. As long as all that
+// sleep can move no listener by more than the share `silence` of its loudness, the next one falls
+// asleep: its state is dropped. What was dropped is owed: it goes on decaying in `debt`, awake or
+// asleep, and counts in that sum. So the error at a listener is never more than its sum of |shape|
+// debt. Whatever acts on the modes wakes all of them, in its own sample.
 #pragma once
 
 #include "core/engine/modal_sweep.h"
@@ -19,11 +19,23 @@ namespace ressort::RESSORT_ISA {
 namespace {
 
 // r^2 to this power is r^nap_frames.
-constexpr std::size_t nap_doublings = 7;
+constexpr std::size_t nap_doublings = 4;
 static_assert(std::size_t{2} << nap_doublings == nap_frames);
+constexpr std::size_t long_nap_doublings = 2;
+static_assert(nap_frames << long_nap_doublings == long_nap_frames);
+constexpr std::size_t few_modes = 16;
 
 constexpr double least_ringing = 1e-4;  // share of lK; nearer to the aperiodic limit nothing sleeps
 constexpr double endless = 1e15;        // the amplitude of what does not ring, for a state of 1
+
+// What is left, after a nap as long as the last, of what a short one leaves `kept` of.
+template <class V, class T>
+V after_nap(const ModalState<T>& s, V kept) {
+  for (std::size_t i = 0; s.is_long_nap && i < long_nap_doublings; ++i) {
+    kept *= kept;
+  }
+  return kept;
+}
 
 template <class T>
 const T* listener(const ModalState<T>& s, std::size_t places, std::size_t l) {
@@ -80,21 +92,19 @@ void measure_room(ModalState<T>& s, std::size_t places, std::size_t listeners) {
   using V = ModePack<T>;
   for (std::size_t l = 0; l < listeners; ++l) {
     const T* const row = listener(s, places, l);
-    V loudest{};
+    V loud{};
     for (std::size_t i = 0; i < pack_count(s); ++i) {
       const V part = absolute(packs(row)[i]) * packs(s.swing)[i];
-      loudest = select(part > loudest, part, loudest);
+      loud += select(packs(s.spread)[i] > V{}, part, V{});
     }
     V owed{};
     for (std::size_t i = 0; i < all_packs(s); ++i) {
       owed += absolute(packs(row)[i]) * packs(s.debt)[i];
     }
-    T most = s.lately_kept * s.loudest[l];
-    for (std::size_t lane = 0; lane < mode_lanes<T>; ++lane) {
-      most = loudest[lane] > most ? loudest[lane] : most;
-    }
-    s.loudest[l] = most;
-    const T room = s.silence * most + s.quiet - total<T>(owed);
+    const T now = total<T>(loud);
+    const T lately = after_nap(s, s.lately_kept) * s.loudness[l];
+    s.loudness[l] = now > lately ? now : lately;
+    const T room = s.silence * s.loudness[l] + s.quiet - total<T>(owed);
     s.room[l] = room > 0 ? room : T(0);
   }
 }
@@ -123,7 +133,7 @@ void stay_awake(ModalState<T>& s, std::size_t modes) {
 template <class T>
 void nap(ModalState<T>& s, std::size_t places, std::size_t listeners) {
   for (std::size_t i = 0; i < all_packs(s); ++i) {
-    packs(s.debt)[i] *= packs(s.decay)[i];
+    packs(s.debt)[i] *= after_nap(s, packs(s.decay)[i]);
   }
   measure_amplitudes(s);
   measure_room(s, places, listeners);
@@ -134,6 +144,7 @@ void nap(ModalState<T>& s, std::size_t places, std::size_t listeners) {
     s.q[mode] = s.d[mode] = s.saved_q[mode] = s.saved_d[mode] = 0;
   }
   stay_awake(s, awake);
+  s.is_long_nap = awake <= few_modes;
 }
 
 }  // namespace

@@ -1,6 +1,7 @@
 // The modal kernel's way through a block, compiled for each instruction set.
 #include "core/engine/laws.h"
 #include "core/engine/modal_bounds.h"
+#include "core/engine/modal_mix.h"
 #include "core/engine/modal_sleep.h"
 
 namespace ressort::RESSORT_ISA {
@@ -10,10 +11,13 @@ constexpr std::uint32_t frames_after_touch = 256;  // until a free motion is tri
 constexpr std::uint32_t nowhere = 0xffffffffu;
 
 template <class T>
-struct Player {
+struct Player : Mixer<T> {
+  using Mixer<T>::modes;
+  using Mixer<T>::s;
+  using Mixer<T>::coefficient;
+  using Mixer<T>::inverse_mass;
+  using Mixer<T>::mix;
   const Program& program;
-  const Modes& modes;
-  ModalState<T>& s;
   const Block<T>& block;
   const std::size_t places = modes.places.size();
   const std::size_t pushes = modes.pushes.size();
@@ -24,15 +28,18 @@ struct Player {
   void play() {
     for (std::size_t at = 0; at < block.frames;) {
       const std::size_t left = block.frames - at;
-      const std::size_t moving = moving_frames();
+      const std::size_t moving = this->moving_frames();
       std::size_t frames = moving > 0 && moving < left ? moving : left;
       if (moving > 0) {
         wake();
+        if (modes.is_exact) {
+          frames = this->begin_exact(frames);
+        }
         hold_all();
         play_bound<true>(at, frames);
         s.is_stale = true;
       } else if (s.silence > 0) {
-        frames = frames < s.until_nap ? frames : s.until_nap;
+        frames = frames < s.until_nap || is_held() ? frames : s.until_nap;
         play_steady(at, frames);
         settle(at + frames - 1, frames);
       } else {
@@ -45,24 +52,26 @@ struct Player {
   void wake() {
     if (s.awake < modes.modes) {
       stay_awake(s, modes.modes);
+      s.until_nap = nap_frames;
+      s.is_long_nap = false;
     }
   }
   // Lets modes sleep that are neither pushed nor held after frame `last`.
   void settle(std::size_t last, std::size_t frames) {
-    s.until_nap -= static_cast<std::uint32_t>(frames);
+    s.until_nap -= frames < s.until_nap ? static_cast<std::uint32_t>(frames) : s.until_nap;
     if (s.until_nap > 0) {
       return;
     }
-    s.until_nap = nap_frames;
     find_pushes(last, 1);
     if (s.pushing == 0 && !is_held()) {
       nap(s, places, places + outputs);
     }
+    s.until_nap = s.is_long_nap ? long_nap_frames : nap_frames;
   }
 
   void play_steady(std::size_t first, std::size_t frames) {
     if (s.is_stale) {
-      mix();
+      mix(0, s.k, s.z);
       s.has_bounds = measure_compliance(s, places);
       if (s.silence > 0) {
         measure_ringing(s);
@@ -79,51 +88,6 @@ struct Player {
     if (s.touched_frames > 0 || is_held() || !play_free(first, frames)) {
       play_touched(first, frames);
     }
-  }
-
-  // --- coefficients ---------------------------------------------------------------------------
-
-  T coefficient(std::uint32_t c) const { return s.ramps.value[c]; }
-  T inverse_mass() const {
-    return modes.inverse_mass == Modes::own_mass ? T(1) : coefficient(modes.inverse_mass);
-  }
-
-  // For how many samples from now on the modes are not what they were in the sample before.
-  std::size_t moving_frames() const {
-    if (s.ramps.frames > 0) {
-      return s.ramps.frames;
-    }
-    const T* used = s.used;
-    bool is_same = true;
-    for (const ModalShare& share : modes.stiffness) {
-      is_same &= *used++ == coefficient(share.coefficient);
-    }
-    for (const ModalShare& share : modes.damping) {
-      is_same &= *used++ == coefficient(share.coefficient);
-    }
-    return is_same && *used == inverse_mass() ? 0 : 1;
-  }
-
-  // This sample's lK and lZ.
-  void mix() {
-    const T w = inverse_mass();
-    T* used = mix(modes.stiffness.data(), modes.stiffness.size(), s.stiffness, w, s.k, s.used);
-    used = mix(modes.damping.data(), modes.damping.size(), s.damping, w, s.z, used);
-    *used = w;
-  }
-  T* mix(const ModalShare* shares, std::size_t number, const T* factors, T w, T* out, T* used) {
-    for (std::size_t i = 0; i < all_packs(s); ++i) {
-      packs(out)[i] = ModePack<T>{};
-    }
-    for (std::size_t j = 0; j < number; ++j, ++used) {
-      const T now = coefficient(shares[j].coefficient);
-      const T value = w * (shares[j].is_late ? *used : now);
-      *used = now;
-      for (std::size_t i = 0; i < all_packs(s); ++i) {
-        packs(out)[i] += value * packs(factors + j * s.stride)[i];
-      }
-    }
-    return used;
   }
 
   // What acts on the modes from outside in this sample.
@@ -280,6 +244,7 @@ struct Player {
       s.held[h] = 0;
       for (std::size_t i = 0; i < hold.a.size(); ++i, ++s.links) {
         if (condition(program.link_runs[hold.run], hold.a[i], hold.b[i])) {
+          s.held_give[s.held_links] = hold.give.empty() ? T(0) : static_cast<T>(hold.give[i]);
           s.held_ends[s.held_links++] = {hold.a[i], hold.b[i]};
           ++s.held[h];
           hold_place(hold.a[i]);
@@ -303,7 +268,11 @@ struct Player {
     for (std::size_t n = first; n < first + frames; ++n) {
       if constexpr (Moving) {
         advance(s.ramps);
-        mix();
+        if (modes.is_exact) {
+          this->advance_exact();
+        } else {
+          mix(0, s.k, s.z);
+        }
         fill_amplitudes(n);
       }
       move_modes(n);
@@ -403,13 +372,18 @@ struct Player {
   bool act() {
     bool acts = false;
     const Ends* ends = s.held_ends;
+    const T* give = s.held_give;
     for (std::size_t h = 0; h < modes.holds.size(); ++h) {
       const LinkRun& run = program.link_runs[modes.holds[h].run];
       const auto c = [&](std::size_t i) { return coefficient(run.coefficients[i]); };
       with_law<T>(run.law, c(0), c(1), c(2), c(3), c(4), [&](auto&& law) {
-        for (std::size_t i = 0; i < s.held[h]; ++i, ++ends) {
+        for (std::size_t i = 0; i < s.held[h]; ++i, ++ends, ++give) {
           const auto [a, b] = *ends;
-          const T f = law(s.x[a] - s.x[b], s.v[a] - s.v[b]);
+          const T d = s.x[a] - s.x[b];
+          T f = law(d, s.v[a] - s.v[b]);
+          if (*give > 0) {
+            f *= share_of_give(run, s.ramps.value, d, *give / coefficient(modes.give_by));
+          }
           acts |= f != 0;
           s.force[a] -= f;
           s.force[b] += f;
@@ -595,7 +569,7 @@ struct Player {
 
 template <class T>
 void step(const Program& program, const Modes& modes, ModalState<T>& state, const Block<T>& block) {
-  Player<T>{program, modes, state, block}.play();
+  Player<T>{{modes, state}, program, block}.play();
 }
 
 }  // namespace
