@@ -215,7 +215,8 @@ std::vector<std::string> creators(const std::string& text, const CompileOptions&
 
 TEST_CASE("A contact that creates energy is found, and no other", "[energy]") {
   for (const Precision precision : {Precision::float64, Precision::float32}) {
-    const CompileOptions options{.precision = precision};
+    const CompileOptions options{.precision = precision,
+                                 .budget = Budget{.passive = Passivity::never}};
     CHECK(creators(ball("0.5 0. 0."), options) == std::vector<std::string>{"hit"});
     // The far one would be within reach of what this one does in seconds.
     CHECK(creators(ball("3. 0. 0."), options, 22050) == std::vector<std::string>{"hit"});
@@ -255,7 +256,9 @@ TEST_CASE("A voice that runs away fades from where it was, and nobody else notic
   Preset preset = rig::struck(3);
   preset.controls[0].high = 100.0;
   for (const Precision precision : {Precision::float64, Precision::float32}) {
-    const CompileOptions options{.precision = precision, .method = Method::direct};
+    const CompileOptions options{.precision = precision,
+                                 .method = Method::direct,
+                                 .budget = Budget{.passive = Passivity::never}};
     rig::Player calm(text, preset, options);
     rig::Player both(text, preset, options);
     constexpr std::uint32_t strike = 1001;

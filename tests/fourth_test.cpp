@@ -317,7 +317,7 @@ TEST_CASE("a budget for pitch or decay gets the fourth-order form where it is ne
   const std::string heavy =
       "@m mass 1. 0. 0.\n@n mass 0.001 0. 0.\n@o mass 1. 0. 0.\n"
       "@g ground 0.\n@s springDamper @m @n 1. 0.\n"
-      "@t springDamper @o @m 1. 0.\n@u springDamper @o @g 1. 0.\n" +
+      "@t springDamper @o @m 1. 0.\n@u springDamper @o @g 1. 0.\n@in1 frcInput @m\n" +
       scenes::output(1, "m");
   CHECK(method_for(touched, {}) != Method::fourth);
   CHECK(method_for(touched, {.cents = 100.0}) != Method::fourth);

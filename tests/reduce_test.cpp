@@ -2,6 +2,7 @@
 #include "core/analysis/linear.h"
 #include "core/compile/cull.h"
 #include "core/compile/merge.h"
+#include "core/model/topology.h"
 #include "tests/duel.h"
 #include "tests/player.h"
 #include "tests/random_network.h"
@@ -142,6 +143,18 @@ TEST_CASE("springs side by side are one", "[reduce]") {
 
 // A ground, a spring, a light mass, a spring, a mass of 1: numerics by hand. The light mass moves
 // by w = k2/(k1 + k2) of the other, which its inertia makes heavier by m w^2.
+TEST_CASE("springs without a damper are merged as well", "[reduce]") {
+  const Network network = network_of(
+      "@s stiffString 5 1. .1 .02 .01 0. 0. 0.\n@t springDamper [@s .5] [@s .5] .1 0.\n@out1 "
+      "posOutput [@s .5]\n");
+  const Network expanded = expand_macros(network);
+  Network twice = expanded;
+  twice.links.insert(twice.links.end(), expanded.links.begin(), expanded.links.end());
+  const auto merged = merge(twice, {});
+  REQUIRE(merged);
+  CHECK(merged->parallel >= expanded.links.size() - 1);
+}
+
 TEST_CASE("a light mass between springs weighs as little as is said", "[reduce]") {
   const double k1 = .0008;
   const double k2 = .0012;

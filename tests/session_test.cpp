@@ -235,7 +235,9 @@ TEST_CASE("A contact that creates energy is named, and compiled anew behind the 
   Process process(48000.0);
   std::mutex mutex;
   std::vector<std::string> told;
-  Session session(process, at_48k(), [&](const std::string& news) {
+  SessionOptions as_published = at_48k();
+  as_published.compile.budget = Budget{.passive = Passivity::never};
+  Session session(process, as_published, [&](const std::string& news) {
     const std::lock_guard lock(mutex);
     told.push_back(news);
   });

@@ -41,7 +41,8 @@ class Culler {
   Culled cull() {
     for (const Link& link : network_.links) {
       culled_.is_slack.push_back(is_idle(link));
-      const bool is_tied = moves(network_.masses[link.a]) || moves(network_.masses[link.b]);
+      const bool is_tied =
+          link.a != link.b && (moves(network_.masses[link.a]) || moves(network_.masses[link.b]));
       culled_.idle += culled_.is_slack.back() && is_tied ? 1 : 0;
     }
     join();

@@ -67,6 +67,9 @@ class Merger {
 
   // Both formulas on the stack, and their sum; nothing where that would be too long.
   std::optional<ArgumentId> sum(ArgumentId left, ArgumentId right) {
+    if (left == no_argument || right == no_argument) {
+      return left == no_argument ? right : left;
+    }
     const auto [entry, is_new] = sums_.try_emplace({left, right});
     if (is_new) {
       Formula formula = now().arguments[left];
@@ -82,8 +85,9 @@ class Merger {
 
   void silence(std::uint32_t link) {
     const ArgumentId nothing = zero();
-    edit().network.links[link].arguments = {nothing, nothing, no_argument, no_argument,
-                                            no_argument};
+    Link& gone = edit().network.links[link];
+    gone.arguments = {nothing, nothing, no_argument, no_argument, no_argument};
+    gone.b = gone.a;
   }
 
   void merge_parallel() {
@@ -227,8 +231,6 @@ class Merger {
     link.b = right.end;
     link.arguments = {k, z, no_argument, no_argument, no_argument};
     silence(right.link);
-    Link& gone = edit().network.links[right.link];
-    gone.a = gone.b = mass;
     Mass& ground = edit().network.masses[mass];
     ground.kind = MassKind::ground;
     ground.mass = no_argument;

@@ -150,7 +150,7 @@ void Engine::Voices::set_parameter(std::size_t index, double wanted) {
   });
   if (highest_factor() != highest_before) {
     for (std::size_t lane = 0; lane < voices.size(); ++lane) {
-      if (voices[lane].awake) {
+      if (voices[lane].awake && factor_for(lane) != voices[lane].factor) {
         tune(lane, !playing.bare);
       }
     }
@@ -172,14 +172,18 @@ void Engine::Voices::set_coefficient(PartBank<T>& part, std::size_t lane, std::u
   part.of(lane).coefficients.set(lane % part.width, c, value, ramped);
 }
 
-void Engine::Voices::tune(std::size_t lane, bool ramped) {
-  Voice& voice = voices[lane];
+double Engine::Voices::factor_for(std::size_t lane) const {
+  const Voice& voice = voices[lane];
   const double bent = std::exp2(bend * bend_semitones / 12.0);
   const double factor = voice.frequency_hz > 0.0
                             ? stiffness_factor(playing.mode_stiffness, playing.mode_damping,
                                                voice.frequency_hz * bent, machine.rate_hz)
                             : bent * bent;
-  voice.factor = std::min(factor, highest_factor());
+  return std::min(factor, highest_factor());
+}
+
+void Engine::Voices::tune(std::size_t lane, bool ramped) {
+  voices[lane].factor = factor_for(lane);
   std::size_t p = 0;
   each_part([&](auto& part) {
     stir(lane, p++);

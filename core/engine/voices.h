@@ -115,6 +115,7 @@ struct Engine::Voices : Playback {
   void stir(std::size_t lane, std::size_t part);
   template <class T>
   void set_coefficient(PartBank<T>& part, std::size_t lane, std::uint32_t c, bool ramped);
+  double factor_for(std::size_t lane) const;  // on every stiffness, for its key and the bend
   void tune(std::size_t lane, bool ramped);
 
   // --- voices ---
