@@ -11,6 +11,7 @@
 #include <fstream>
 
 #include "app/chart_picture.h"
+#include "app/chart_start.h"
 #include "app/exit_code.h"
 #include "app/files.h"
 #include "app/lockfree.h"
@@ -56,13 +57,13 @@ bool is_same(const Heard& a, const Heard& b) {
 }
 
 // All ways that can, and each kind of bits only once.
-std::vector<Heard> hear_all(const ChartScene& scene, Isa isa, const Tells& tells) {
+std::vector<Heard> hear_all(const Starts& starts, Isa isa, const Tells& tells) {
   std::vector<Heard> all;
   for (const Way& way : all_ways()) {
     if (!tells(way.name + ", " + precision_name(way.precision))) {
       return {};
     }
-    auto made = make_way(scene, way, heard_s, isa);
+    auto made = make_way(starts.at(way.oversampling), way, heard_s, isa);
     if (!made) {
       continue;
     }
@@ -159,7 +160,8 @@ Result<ChartSheet> make_sheet(const ChartScene& scene, Isa isa, double patience_
   if (!tells("the truth")) {
     return sheet;
   }
-  auto truths = find_truths(scene, isa);
+  const Starts starts(scene);
+  auto truths = find_truths(scene, starts.at(1), isa);
   if (!truths) {
     return Error{scene.name + ": " + truths.error().message};
   }
@@ -168,7 +170,7 @@ Result<ChartSheet> make_sheet(const ChartScene& scene, Isa isa, double patience_
   sheet.is_linear = truths->continuous.has_value();
   sheet.floor_db = truths->physical.floor_db;
   sheet.window = truths->window;
-  std::vector<Heard> all = hear_all(scene, isa, tells);
+  std::vector<Heard> all = hear_all(starts, isa, tells);
   Poles published;
   if (truths->continuous && !all.empty()) {
     published = poles_of(scene, *truths->continuous, all[0].made);

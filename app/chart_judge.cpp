@@ -307,8 +307,8 @@ std::optional<EnergyReading> watch_energy(const ChartScene& scene, MadeWay& way,
   return meter.reading();
 }
 
-Result<Truths> find_truths(const ChartScene& scene, Isa isa) {
-  Truths truths{.identical = published(scene)};
+Result<Truths> find_truths(const ChartScene& scene, const ChartScene& stepped, Isa isa) {
+  Truths truths{.identical = published(stepped)};
   if (scene.is_linear) {
     truths.continuous = solve_continuous(scene.network, parameter_values(scene.network));
   }

@@ -59,8 +59,9 @@ using Poles = std::vector<std::complex<double>>;
 // Plays the scene in a way, from the start; [channel][output sample] at 44 100 Hz.
 Waves render_way(MadeWay& way, std::size_t frames);
 
-// Blocks for seconds where the scene is not linear. Fails where it is too large.
-Result<Truths> find_truths(const ChartScene& scene, Isa isa);
+// `stepped`: the same as a scheme starts it. Blocks for seconds where the scene is not linear.
+// Fails where it is too large.
+Result<Truths> find_truths(const ChartScene& scene, const ChartScene& stepped, Isa isa);
 
 // The partials of a linear scene as this way has them, for each of the continuous modes.
 Poles poles_of(const ChartScene& scene, const Continuous& continuous, MadeWay& way);

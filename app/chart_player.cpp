@@ -189,7 +189,7 @@ class KernelPlayer final : public ChartPlayer {
 std::unique_ptr<ChartPlayer> make_player(const Machine& machine,
                                          const std::vector<HandMotion>& hands, double seconds,
                                          Precision precision, Isa isa) {
-  if (precision == Precision::float64) {
+  if (precision != Precision::float32) {  // compensated positions are heard in double
     return std::make_unique<KernelPlayer<double>>(machine, hands, seconds, isa);
   }
   return std::make_unique<KernelPlayer<float>>(machine, hands, seconds, isa);

@@ -11,7 +11,8 @@ struct NamedPrecision {
   const char* name;
 };
 constexpr NamedPrecision precisions[] = {{Precision::float64, "double"},
-                                         {Precision::float32, "float"}};
+                                         {Precision::float32, "float"},
+                                         {Precision::compensated32, "compensated"}};
 
 constexpr unsigned oversamplings[] = {2, 4, 8};
 constexpr const char* silences[] = {"-120", "-100", "-80", "-60", "-40"};
@@ -87,6 +88,9 @@ std::vector<Way> all_ways() {
   for (const Method method : all_methods) {
     add_method(ways, method);
   }
+  for (const Method method : physical_methods) {
+    add_method(ways, method);
+  }
   add_truncation(ways, "modal cents=1", Method::modal, "cents=1", silences);
   add_truncation(ways, "modal", Method::modal, "", silences);
   for (const Asked& asked : plans_choice) {
@@ -98,6 +102,11 @@ std::vector<Way> all_ways() {
   std::vector<Way> all;
   for (const auto& [precision, name] : precisions) {
     for (Way way : ways) {
+      // With compensated positions there is but one form.
+      if (precision == Precision::compensated32 &&
+          (way.method != Method::direct || way.oversampling > 1)) {
+        continue;
+      }
       way.precision = precision;
       all.push_back(std::move(way));
     }
