@@ -31,7 +31,7 @@ Result<Compiled> admit(const Scene& scene, const CompileOptions& options,
   const Gate& gate = compiled->gate;
   if (gate.verdict == Verdict::unstable && !options.force) {
     Error error = *gate.complaint;
-    error.message += "; --force plays it all the same, putting back to rest what runs away";
+    error.message += "; --force plays it all the same, fading out what runs away";
     return Error{to_string(at(scene.model_path, max_model_bytes, error, Severity::error))};
   }
   if (gate.complaint) {

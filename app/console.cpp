@@ -52,7 +52,7 @@ constexpr CommandRow command_rows[] = {
      "MODEL is the name of a preset or a model that came with the program, or the path of a .mdl\n"
      "or .toml file. What sounds goes on until the new model is ready and then fades into it; if\n"
      "there is an error in the file, it simply goes on. A model that is not stable is such an\n"
-     "error; --force plays it all the same, putting back to rest what runs away.",
+     "error; --force plays it all the same, fading out what runs away.",
      act::load},
     {"Models", "preset", "PRESET [--force]", "the same; Tab offers the presets only",
      "A preset is a model with ranges for its parameters and a plan of what plays it.", act::load},

@@ -369,7 +369,7 @@ namespace {
 
 std::string describe_stability(const Instrument& instrument) {
   if (instrument.verdict == Verdict::unstable) {
-    return "none: it plays by force, and what runs away is put back to rest";
+    return "none: it plays by force, and what runs away is faded out";
   }
   const std::string proved = instrument.verdict == Verdict::stable ? "proved" : "not proved";
   const double margin = instrument.stiffness_margin;

@@ -57,7 +57,7 @@ TEST_CASE("what is unstable as it starts is refused by name and place, or forced
   CHECK(
       said_to(stiff) ==
       "there.mdl:3:1: error: unstable: the stiffness 5 of 'r' must stay below 4; --force plays it "
-      "all the same, putting back to rest what runs away");
+      "all the same, fading out what runs away");
   CHECK(said_to(stiff, {.force = true}) ==
         "there.mdl:3:1: warning: unstable: the stiffness 5 of 'r' must stay below 4");
   CHECK(
