@@ -7,7 +7,7 @@
 #include <utility>
 #include <vector>
 
-#include "app/chart.h"
+#include "app/chart/chart.h"
 #include "app/check.h"
 #include "app/commands.h"
 #include "app/export.h"

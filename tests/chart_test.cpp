@@ -1,12 +1,12 @@
 // The chart: fronts by hand, the two truths against closed forms and the textbook simulator, and
 // that the ways stay as good as they were.
-#include "app/chart.h"
+#include "app/chart/chart.h"
 
 #include <cmath>
 #include <numbers>
 
-#include "app/chart_judge.h"
-#include "app/chart_start.h"
+#include "app/chart/judge.h"
+#include "app/chart/start.h"
 #include "core/engine/truth.h"
 #include "tests/catch.h"
 #include "tests/reference_network.h"

@@ -1,4 +1,4 @@
-#include "app/chart_start.h"
+#include "app/chart/start.h"
 
 #include <bit>
 

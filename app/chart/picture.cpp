@@ -1,4 +1,4 @@
-#include "app/chart_picture.h"
+#include "app/chart/picture.h"
 
 #include <algorithm>
 #include <cmath>

@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "app/chart_player.h"
+#include "app/chart/player.h"
 #include "core/compile/compile.h"
 
 namespace ressort {

@@ -10,7 +10,7 @@
 #include <string>
 #include <vector>
 
-#include "app/chart_ways.h"
+#include "app/chart/ways.h"
 #include "core/analysis/continuous.h"
 
 namespace ressort {

@@ -4,10 +4,10 @@
 #include <string>
 #include <vector>
 
-#include "app/chart_clock.h"
-#include "app/chart_front.h"
-#include "app/chart_judge.h"
-#include "app/chart_ways.h"
+#include "app/chart/clock.h"
+#include "app/chart/front.h"
+#include "app/chart/judge.h"
+#include "app/chart/ways.h"
 
 namespace ressort {
 

@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "app/chart_table.h"
+#include "app/chart/table.h"
 
 namespace ressort {
 

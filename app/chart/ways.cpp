@@ -1,4 +1,4 @@
-#include "app/chart_ways.h"
+#include "app/chart/ways.h"
 
 #include <algorithm>
 #include <span>

@@ -1,4 +1,4 @@
-#include "app/chart_clock.h"
+#include "app/chart/clock.h"
 
 #include <sched.h>
 

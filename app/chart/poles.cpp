@@ -5,7 +5,7 @@
 #include <limits>
 #include <numbers>
 
-#include "app/chart_judge.h"
+#include "app/chart/judge.h"
 #include "core/compile/machine.h"
 
 namespace ressort {

@@ -1,4 +1,4 @@
-#include "app/chart_scenes.h"
+#include "app/chart/scenes.h"
 
 #include <algorithm>
 #include <cctype>

@@ -4,7 +4,7 @@
 #include <memory>
 #include <vector>
 
-#include "app/chart_scenes.h"
+#include "app/chart/scenes.h"
 #include "core/engine/engine.h"
 #include "core/engine/program.h"
 

@@ -1,4 +1,4 @@
-#include "app/chart_player.h"
+#include "app/chart/player.h"
 
 #include <algorithm>
 #include <cmath>

@@ -1,4 +1,4 @@
-#include "app/chart_judge.h"
+#include "app/chart/judge.h"
 
 #include <algorithm>
 #include <cmath>

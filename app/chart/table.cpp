@@ -1,4 +1,4 @@
-#include "app/chart_table.h"
+#include "app/chart/table.h"
 
 #include <cmath>
 #include <cstdio>

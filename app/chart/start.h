@@ -4,7 +4,7 @@
 #include <array>
 #include <cstddef>
 
-#include "app/chart_scenes.h"
+#include "app/chart/scenes.h"
 
 namespace ressort {
 

@@ -4,7 +4,7 @@
 #include <functional>
 #include <vector>
 
-#include "app/chart_ways.h"
+#include "app/chart/ways.h"
 
 namespace ressort {
 

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "app/chart_table.h"
+#include "app/chart/table.h"
 #include "core/result.h"
 
 namespace ressort {

@@ -1,4 +1,4 @@
-#include "app/chart.h"
+#include "app/chart/chart.h"
 
 #include <unistd.h>
 
@@ -10,8 +10,8 @@
 #include <filesystem>
 #include <fstream>
 
-#include "app/chart_picture.h"
-#include "app/chart_start.h"
+#include "app/chart/picture.h"
+#include "app/chart/start.h"
 #include "app/exit_code.h"
 #include "app/files.h"
 #include "app/lockfree.h"

@@ -1,4 +1,4 @@
-#include "app/chart_front.h"
+#include "app/chart/front.h"
 
 #include <algorithm>
 #include <cmath>
