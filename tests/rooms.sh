@@ -40,7 +40,8 @@ judge() {
       sees["core/analysis"] = "core core/model core/analysis"
       sees["core/engine"] = "core/formula.h core/engine"
       sees["core/compile"] = "core core/model core/analysis core/engine core/compile"
-      sees["app"] = "core core/model core/analysis core/engine core/compile app"
+      sees["app"] = "core core/model core/analysis core/engine core/compile app app/chart/chart.h"
+      sees["app/chart"] = sees["app"] " app/chart"
       # The audio thread and the devices know engines, not models.
       audio = "^app/(process|lockfree|midi|midi_input|audio|jack|alsa|dummy|rtmidi)[.]"
     }
@@ -54,7 +55,7 @@ judge() {
       sub(/[>"].*/, "", what)
       ours = line ~ /#[ \t]*include[ \t]*"/
       room = file
-      if (room ~ /^core\/[^\/]*\//) {
+      if (room ~ /^(core|app)\/[^\/]*\//) {
         sub(/\/[^\/]*$/, "", room)
       } else {
         sub(/\/.*/, "", room)
@@ -67,7 +68,7 @@ judge() {
       }
       if (ours) {
         target = what
-        if (target ~ /^core\/[^\/]*\//) {
+        if (target ~ /^(core|app)\/[^\/]*\//) {
           sub(/\/[^\/]*$/, "", target)
         } else if (target == "core/result.h" || target == "core/formula.h") {
           target = "core"
@@ -120,6 +121,7 @@ core/compile/compile.cpp:1:#include <Spectra/SymEigsSolver.h>
 core/compile/compile.cpp:1:#include <chrono>
 core/compile/compile.cpp:1:#include "tests/scenes.h"
 core/engine/laws.h:1:#include LAWS
+app/session.cpp:1:#include "app/chart/ways.h"
 app/session.cpp:1:#include <atomic>
 app/session.cpp:1:#include <sndfile.h>
 app/process.h:1:#include "app/session.h"
