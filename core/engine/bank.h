@@ -22,13 +22,17 @@ struct PartBank {
     while (kernels.size() * width < voices) {
       kernels.push_back(make_kernel<T>(program, voices, isa));
     }
+    last.resize(kernels.size() * row());
   }
+  T* last_of(std::size_t voice) { return last.data() + voice / width * row(); }
+  std::size_t row() const { return program.outputs.size() * width; }  // of one kernel
   Kernel<T>& of(std::size_t voice) { return *kernels[voice / width]; }
   const Kernel<T>& of(std::size_t voice) const { return *kernels[voice / width]; }
 
   const Program& program;
   std::size_t width = 1;
   std::vector<std::unique_ptr<Kernel<T>>> kernels;  // [voice / width]
+  Aligned<T> last;                                  // [kernel][output][lane] the last sample's
 };
 
 template <class T>

@@ -83,18 +83,36 @@ void add(Energy& energy, double value) {
   energy.scale += std::fabs(value);
 }
 
+// Some of the nodes, or of the links.
+struct Share {
+  std::size_t first = 0;
+  std::size_t end = 0;
+};
+
+template <class Run, class Use>
+void each_of(const Run& run, Share share, Use&& use) {
+  const std::size_t end = std::min<std::size_t>(run.first + run.count, share.end);
+  for (std::size_t i = std::max<std::size_t>(run.first, share.first); i < end; ++i) {
+    use(i);
+  }
+}
+
 template <class T>
-void add_masses(const MassRun& run, LaneValues<T> c, const double* x, const double* v,
+void add_masses(const MassRun& run, Share share, LaneValues<T> c, const double* x, const double* v,
                 Energy& energy) {
   const double m = 1.0 / c[run.inverse_mass];
   const double k = run.is_oscillator ? c[run.stiffness] : 0.0;
   const double z = run.is_oscillator ? c[run.damping] : 0.0;
   const double g = run.has_gravity ? c[run.gravity] : 0.0;
-  for (std::uint32_t i = run.first; i < run.first + run.count; ++i) {
+  each_of(run, share, [&](std::size_t i) {
     add(energy, (0.5 * m - 0.25 * z) * v[i] * v[i]);
-    add(energy, 0.5 * k * x[i] * (x[i] - v[i]));
-    add(energy, g * (x[i] - 0.5 * v[i]));
-  }
+    if (run.is_oscillator) {
+      add(energy, 0.5 * k * x[i] * (x[i] - v[i]));
+    }
+    if (run.has_gravity) {
+      add(energy, g * (x[i] - 0.5 * v[i]));
+    }
+  });
 }
 
 // One elongation d, that was d - v a sample before.
@@ -136,14 +154,14 @@ void add_bent(Law law, const Numbers& c, ForceLaw&& force, double d, double v, E
 }
 
 template <class T>
-void add_links(const Program& program, const LinkRun& run, LaneValues<T> coefficients,
+void add_links(const Program& program, const LinkRun& run, Share share, LaneValues<T> coefficients,
                const double* x, const double* v, Energy& energy) {
   const Numbers c = numbers_of(run, coefficients);
   const auto each = [&](auto&& use) {
-    for (std::uint32_t i = run.first; i < run.first + run.count; ++i) {
+    each_of(run, share, [&](std::size_t i) {
       const auto [a, b] = program.ends[i];
       use(x[a] - x[b], v[a] - v[b]);
-    }
+    });
   };
   if (run.law == Law::spring) {
     each([&](double d, double speed) { add_straight(c[0], c[1], d, speed, energy); });
@@ -220,13 +238,22 @@ template <class T>
 Energy energy_of(const Program& program, LaneValues<T> coefficients, const double* x,
                  const double* v) {
   Energy energy;
+  add_energy(program, coefficients, x, v, 0, program.position.size() + program.ends.size(), energy);
+  return energy;
+}
+
+template <class T>
+void add_energy(const Program& program, LaneValues<T> coefficients, const double* x,
+                const double* v, std::size_t first, std::size_t end, Energy& energy) {
+  const std::size_t nodes = program.position.size();
+  const Share masses{first, std::min(end, nodes)};
+  const Share links{std::max(first, nodes) - nodes, std::max(end, nodes) - nodes};
   for (const MassRun& run : program.mass_runs) {
-    add_masses(run, coefficients, x, v, energy);
+    add_masses(run, masses, coefficients, x, v, energy);
   }
   for (const LinkRun& run : program.link_runs) {
-    add_links(program, run, coefficients, x, v, energy);
+    add_links(program, run, links, coefficients, x, v, energy);
   }
-  return energy;
 }
 
 template <class T>
@@ -308,6 +335,10 @@ std::uint32_t likely_creator(const Program& program, LaneValues<T> coefficients,
 
 template Energy energy_of(const Program&, LaneValues<float>, const double*, const double*);
 template Energy energy_of(const Program&, LaneValues<double>, const double*, const double*);
+template void add_energy(const Program&, LaneValues<float>, const double*, const double*,
+                         std::size_t, std::size_t, Energy&);
+template void add_energy(const Program&, LaneValues<double>, const double*, const double*,
+                         std::size_t, std::size_t, Energy&);
 template bool rests_at_zero(const Program&, LaneValues<float>, const double*);
 template bool rests_at_zero(const Program&, LaneValues<double>, const double*);
 template double distance_at_rest(const Program&, LaneValues<float>, const double*, std::uint32_t);

@@ -37,6 +37,11 @@ template <class T>
 Energy energy_of(const Program& program, LaneValues<T> coefficients, const double* x,
                  const double* v);
 
+// The same of the elements [first, end) alone, added: nodes, then links. [audio] wait-free
+template <class T>
+void add_energy(const Program& program, LaneValues<T> coefficients, const double* x,
+                const double* v, std::size_t first, std::size_t end, Energy& energy);
+
 // May a link of the Program make energy of nothing? [any thread] O(link runs)
 bool may_create(const Program& program);
 

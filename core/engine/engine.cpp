@@ -413,10 +413,13 @@ void Engine::process(std::span<const Event> events, std::span<const double* cons
     while (next < events.size() && events[next].frame <= at) {
       voices_->handle(events[next++]);
     }
-    std::size_t end = std::min(frames, at + max_block_frames - voices_->since_settled);
-    if (next < events.size()) {
-      end = std::min<std::size_t>(end, events[next].frame);
+    const std::size_t until =
+        next < events.size() ? std::min<std::size_t>(frames, events[next].frame) : frames;
+    if (voices_->is_idle && voices_->sleeps_through(inputs, at, until - at)) {
+      at = until;
+      continue;
     }
+    const std::size_t end = std::min(until, at + max_block_frames - voices_->since_settled);
     voices_->segment(inputs, outputs, at, end - at);
     at = end;
   }
@@ -467,6 +470,7 @@ EngineMeters Engine::meters() const {
   meters.stolen = voices_->stolen;
   meters.beyond = voices_->beyond;
   meters.saved = voices_->saved();
+  voices_->read_energy(meters);
   return meters;
 }
 

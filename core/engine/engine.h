@@ -97,6 +97,11 @@ struct EngineMeters {
   double saved = 0.0;        // the share of the steps that nobody has to take, 0..1
   std::size_t modes = 0;     // of all voices that are awake
   std::size_t modes_awake = 0;
+  // Of all that steps, when it was last looked at, in mass * (position per sample at 44 100 Hz)^2.
+  double energy = 0.0;
+  double loss = 0.0;       // of it in a second
+  bool is_driven = false;  // something came in meanwhile: the loss is that of the rest
+  bool is_whole = true;    // if not, there is more: in modes, or not yet looked at
 };
 
 // A voice that is louder than this, or no number, has lost its stability: 60 dB over full scale; in

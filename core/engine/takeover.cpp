@@ -63,6 +63,7 @@ void Engine::Voices::go_on(Bank<T>& b, PartBank<T>& part, const PartBank<T>& fro
                .velocity = b.velocity.data(),
                .audio = b.audio.data(),
                .outputs = b.outputs.data()});
+  std::copy_n(b.outputs.data(), part.row(), part.last_of(first));
   coefficients.ramp_frames = ramp_frames;
 }
 
@@ -96,6 +97,7 @@ bool Engine::Voices::go_on_from(const Voices& from) {
         }
         static_cast<Playback&>(*this) = from;
         is_idle = false;
+        looking = Look{};
         for (Watch& here : watches) {
           here.is_judged = false;
         }

@@ -33,7 +33,7 @@ Engine::Voices::Voices(Machine machine_in, Playing playing_in, Precision precisi
   first_output.push_back(0);
   for (const Program& program : machine.parts) {
     first_output.push_back(first_output.back() + program.outputs.size());
-    elements.push_back(static_cast<double>(program.position.size() + program.ends.size()));
+    elements.push_back(program.position.size() + program.ends.size());
   }
   watches.resize(voices.size() * machine.parts.size());
   held.resize(voices.size() * first_output.back());
@@ -84,7 +84,7 @@ void Engine::Voices::rest_lane(std::size_t lane) {
   std::size_t p = 0;
   each_part([&](auto& part) {
     part.of(lane).reset(lane % part.width);
-    watch(lane, p++) = Watch{};
+    forget(watch(lane, p++));
   });
   for (std::size_t i = 0; i < machine.hands.size(); ++i) {
     hand(lane, i).place(rest[i]);
@@ -146,7 +146,8 @@ std::size_t Engine::Voices::lane_for(int key, int channel) {
 void Engine::Voices::segment(std::span<const double* const> inputs,
                              std::span<double* const> outputs, std::size_t at, std::size_t frames) {
   listen(inputs, at, frames);
-  if (!is_idle) {
+  const bool sounds = !is_idle;
+  if (sounds) {
     std::visit([&](auto& b) { segment_in(b, inputs, outputs, at, frames); }, bank);
   }
   remember_audio(inputs, at + frames);
@@ -155,7 +156,7 @@ void Engine::Voices::segment(std::span<const double* const> inputs,
     since_settled = 0;
     settle_all();
   }
-  if (playing.noise) {
+  if (playing.noise && sounds) {
     for (std::size_t n = at; n < at + frames; ++n) {
       for (double* const output : outputs) {
         output[n] *= white();
@@ -176,7 +177,7 @@ void Engine::Voices::segment_in(Bank<T>& b, std::span<const double* const> input
         mix_still(p, first, part.width, outputs, at, frames);
       }
       if (pace.steps) {
-        fill_drive(b, part, first, frames);
+        fill_drive(b, p, first, frames);
         fill_audio(b, part, first, inputs, at, frames);
         part.of(first).step({.frames = frames,
                              .value = b.value.data(),
@@ -199,19 +200,29 @@ void Engine::Voices::segment_in(Bank<T>& b, std::span<const double* const> input
 
 template <class T>
 Engine::Voices::Pace Engine::Voices::pace_of(const Bank<T>& b, std::size_t p, std::size_t first) {
-  const PartBank<T>& part = b.parts[p];
-  const Program& program = part.program;
-  const bool is_turned =
-      part.of(first).coefficients.ramp_frames > 0 || !program.audio_coefficients.empty();
+  if (still > 0) {
+    return pace_of_some(b, p, first);
+  }
+  const std::size_t end = std::min(voices.size(), first + b.parts[p].width);
+  return {.steps = std::any_of(voices.begin() + static_cast<std::ptrdiff_t>(first),
+                               voices.begin() + static_cast<std::ptrdiff_t>(end),
+                               [](const Voice& voice) { return voice.awake; })};
+}
+
+template <class T>
+Engine::Voices::Pace Engine::Voices::pace_of_some(const Bank<T>& b, std::size_t p,
+                                                  std::size_t first) {
+  const Program& program = b.parts[p].program;
   Pace pace;
-  for (std::size_t lane = first; lane < std::min(voices.size(), first + part.width); ++lane) {
+  for (std::size_t lane = first; lane < std::min(voices.size(), first + b.parts[p].width); ++lane) {
     if (!voices[lane].awake) {
       continue;
     }
     const auto moves = [&](const InputSlot& input) {
       return sound[input.hand] != nullptr || hand(lane, input.hand).is_moving();
     };
-    if (is_turned || std::any_of(program.inputs.begin(), program.inputs.end(), moves)) {
+    if (watch(lane, p).is_still &&
+        std::any_of(program.inputs.begin(), program.inputs.end(), moves)) {
       stir(lane, p);
     }
     const bool is_still = watch(lane, p).is_still;
@@ -250,8 +261,8 @@ void Engine::Voices::fill_rest(Bank<T>& b, const PartBank<T>& part, std::size_t 
 }
 
 template <class T>
-void Engine::Voices::fill_drive(Bank<T>& b, const PartBank<T>& part, std::size_t first,
-                                std::size_t frames) {
+void Engine::Voices::fill_drive(Bank<T>& b, std::size_t p, std::size_t first, std::size_t frames) {
+  const PartBank<T>& part = b.parts[p];
   fill_rest(b, part, first, frames);
   const std::size_t step = part.program.inputs.size() * part.width;  // from frame to frame
   for (std::size_t i = 0; i < part.program.inputs.size(); ++i) {
@@ -261,6 +272,7 @@ void Engine::Voices::fill_drive(Bank<T>& b, const PartBank<T>& part, std::size_t
       if (!voices[lane].awake || !mover.is_moving()) {
         continue;
       }
+      watch(lane, p).is_stirred = true;
       b.filled_part = nullptr;
       T* value = b.value.data() + i * part.width + lane - first;
       T* velocity = b.velocity.data() + i * part.width + lane - first;
@@ -274,6 +286,9 @@ void Engine::Voices::fill_drive(Bank<T>& b, const PartBank<T>& part, std::size_t
       }
     }
     if (const double* const audio = sound[slot.hand]) {
+      for (std::size_t lane = first; lane < std::min(voices.size(), first + part.width); ++lane) {
+        watch(lane, p).is_stirred = true;
+      }
       b.filled_part = nullptr;
       AudioHand<T> added{.samples = audio,
                          .frames = frames,
@@ -324,6 +339,23 @@ double Engine::Voices::audio_scale(std::size_t input) const {
   return audio_control[input]->high * r * r;
 }
 
+bool Engine::Voices::is_silent(const double* audio, std::size_t frames) const {
+  return std::visit([&](const auto& b) { return b.mixer.is_silent(audio, frames); }, bank);
+}
+
+bool Engine::Voices::sleeps_through(std::span<const double* const> inputs, std::size_t at,
+                                    std::size_t frames) {
+  for (std::size_t input = 0; input < machine.hands.size(); ++input) {
+    const double* const audio = audio_for(input, inputs);
+    if (audio != nullptr && !is_silent(audio + at, frames)) {
+      return false;
+    }
+  }
+  remember_audio(inputs, at + frames);
+  since_settled = (since_settled + frames) % max_block_frames;
+  return true;
+}
+
 const double* Engine::Voices::audio_for(std::size_t input,
                                         std::span<const double* const> inputs) const {
   const Control* const control = audio_control[input];
@@ -338,12 +370,11 @@ void Engine::Voices::listen(std::span<const double* const> inputs, std::size_t a
     if (audio == nullptr) {
       continue;
     }
-    const bool is_silent =
-        std::visit([&](const auto& b) { return b.mixer.is_silent(audio + at, frames); }, bank);
-    if (!is_silent) {
+    const bool sounds = !is_silent(audio + at, frames);
+    if (sounds) {
       wake(last);
     }
-    if (!is_silent || audio_before[input] != 0.0 || playing.bare) {
+    if (sounds || audio_before[input] != 0.0 || playing.bare) {
       sound[input] = audio + at;
     }
   }
@@ -366,10 +397,9 @@ void Engine::Voices::mix(Bank<T>& b, std::size_t p, std::size_t first,
       .outputs = b.outputs.data(), .frames = frames, .count = count, .width = part.width};
   b.mixer.find_peaks(heard, loudest, b.peak.data());
   std::fill(b.gain.begin(), b.gain.end(), 0.0);
-  const T* const last = b.outputs.data() + (frames - 1) * count * part.width;
   for (std::size_t lane = first; lane < std::min(voices.size(), first + part.width); ++lane) {
     Voice& voice = voices[lane];
-    if (!voice.awake || watch(lane, p).is_still) {
+    if (!voice.awake || (still > 0 && watch(lane, p).is_still)) {
       continue;
     }
     const auto peak = static_cast<double>(b.peak[lane - first]);
@@ -383,8 +413,8 @@ void Engine::Voices::mix(Bank<T>& b, std::size_t p, std::size_t first,
     } else {
       b.gain[lane - first] = playing.gain * voice.gain;
     }
-    keep(last + lane - first, part.width, p, lane);
   }
+  std::copy_n(b.outputs.data() + (frames - 1) * part.row(), part.row(), part.last_of(first));
   for (std::size_t output = 0; output < count; ++output) {
     b.heard[output] = outputs[part.program.outputs[output].channel] + at;
   }
@@ -411,15 +441,6 @@ void Engine::Voices::mix_some(const Bank<T>& b, std::size_t p, std::size_t lane,
 }
 
 template <class T>
-void Engine::Voices::keep(const T* outputs, std::size_t width, std::size_t p, std::size_t lane) {
-  double* const kept = held_of(lane, p);
-  const std::size_t count = first_output[p + 1] - first_output[p];
-  for (std::size_t output = 0; output < count; ++output) {
-    kept[output] = static_cast<double>(outputs[output * width]);
-  }
-}
-
-template <class T>
 void Engine::Voices::lose(Bank<T>& b, std::size_t p, std::size_t lane,
                           std::span<double* const> outputs, std::size_t at, std::size_t frames) {
   PartBank<T>& part = b.parts[p];
@@ -438,18 +459,16 @@ void Engine::Voices::lose(Bank<T>& b, std::size_t p, std::size_t lane,
     ++sane;
   }
   mix_some(b, p, lane, outputs, at, sane);
-  if (sane > 0) {
-    keep(b.outputs.data() + (sane - 1) * count * part.width + lane % part.width, part.width, p,
-         lane);
-  }
   resets += voices[lane].lost ? 0 : 1;
   voices[lane].lost = has_lost = true;
-  watch(lane, p).is_still = true;
+  lay_still(sane > 0 ? b.outputs.data() + (sane - 1) * part.row() : part.last_of(lane), part.width,
+            lane, p);
   part.of(lane).reset(lane % part.width);  // nothing is to be slow for numbers that are none
   mix_held(p, lane, outputs, at, sane, frames);
 }
 
 void Engine::Voices::settle_all() {
+  ++settled;
   if (is_idle) {
     return;
   }
@@ -486,6 +505,9 @@ void Engine::Voices::settle(std::size_t lane) {
   }
   if (is_at_rest(lane)) {
     const double frequency_hz = voice.frequency_hz;
+    for (std::size_t p = 0; p < elements.size(); ++p) {
+      forget(watch(lane, p));
+    }
     voice = Voice{};
     voice.frequency_hz = frequency_hz;
   }

@@ -44,7 +44,22 @@ struct Watch {
   bool is_stirred = true;  // something came from outside since the last look
   bool is_judged = false;  // `most` is known
   double most = 0.0;       // energy that it may have, as long as nothing stirs it
-  double energy = 0.0;     // at the last look
+  // At the last look, and the one before:
+  bool is_metered = false;
+  double energy = 0.0;
+  double loss = 0.0;         // of it in a sample between them, unless...
+  bool is_driven = true;     // ...something came from outside then
+  std::uint64_t looked = 0;  // Playback::settled
+};
+
+// A look at one part in one voice: as it was at one time, its energy added up a slice at a time.
+struct Look {
+  static constexpr std::size_t none = static_cast<std::size_t>(-1);
+  std::size_t at = none;  // of the watches
+  std::size_t done = 0;   // of its elements
+  bool was_stirred = false;
+  std::uint64_t settled = 0;  // when it was
+  Energy energy;
 };
 
 // What an engine is in the midst of: all but its kernels and what they are driven by. Another
@@ -53,7 +68,7 @@ struct Playback {
   std::vector<Voice> voices;           // [lane]
   std::vector<Hand> hands;             // [lane][input]
   std::vector<Watch> watches;          // [lane][part]
-  std::vector<double> held;            // [lane][output of the machine] the last sample's
+  std::vector<double> held;            // [lane][output of the machine] of what stands still
   std::vector<double> parameters;      // as they are now
   std::vector<std::uint16_t> changes;  // parameters, since the last take_changes()
   std::vector<double> rest;            // [input] where a new voice's hand starts
@@ -62,6 +77,8 @@ struct Playback {
   std::array<bool, 16> pedal{};
   std::size_t last = 0;           // the lane that was played last: direct gestures act on it
   std::size_t since_settled = 0;  // frames, below max_block_frames between two segments
+  std::uint64_t settled = 0;      // times
+  std::size_t still = 0;          // watches of what stands still
   std::uint64_t resets = 0;
   std::uint64_t stolen = 0;
   std::uint64_t beyond = 0;
@@ -113,6 +130,10 @@ struct Engine::Voices : Playback {
   void note_change(std::uint16_t index);
   // Something comes to a part from outside.
   void stir(std::size_t lane, std::size_t part);
+  // From the next segment on it says what is in its kernel's row, [output][lane].
+  template <class T>
+  void lay_still(const T* row, std::size_t width, std::size_t lane, std::size_t part);
+  void forget(Watch& here);
   template <class T>
   void set_coefficient(PartBank<T>& part, std::size_t lane, std::uint32_t c, bool ramped);
   double factor_for(std::size_t lane) const;  // on every stiffness, for its key and the bend
@@ -158,12 +179,15 @@ struct Engine::Voices : Playback {
   template <class T>
   void segment_in(Bank<T>& b, std::span<const double* const> inputs,
                   std::span<double* const> outputs, std::size_t at, std::size_t frames);
+  bool is_silent(const double* audio, std::size_t frames) const;
+  // Nobody is awake and nobody wakes: true if no sound comes in.
+  bool sleeps_through(std::span<const double* const> inputs, std::size_t at, std::size_t frames);
   // The buffers for the voices of one kernel, the first of which is `first`: what rests...
   template <class T>
   void fill_rest(Bank<T>& b, const PartBank<T>& part, std::size_t first, std::size_t frames);
   // ...and what moves.
   template <class T>
-  void fill_drive(Bank<T>& b, const PartBank<T>& part, std::size_t first, std::size_t frames);
+  void fill_drive(Bank<T>& b, std::size_t p, std::size_t first, std::size_t frames);
   // What depends on a parameter that audio gives, for every sample.
   template <class T>
   void fill_audio(Bank<T>& b, const PartBank<T>& part, std::size_t first,
@@ -175,15 +199,17 @@ struct Engine::Voices : Playback {
   void listen(std::span<const double* const> inputs, std::size_t at, std::size_t frames);
   // The last position of an audio input, for the velocity of the next segment's first sample.
   void remember_audio(std::span<const double* const> inputs, std::size_t end);
-  // What there is to do for the kernel of a part that begins with voice `first`. What is moved from
-  // outside is not still any more.
+  // What there is to do for the kernel of a part that begins with voice `first`. What is moved
+  // from outside is not still any more.
   struct Pace {
     bool steps = false;   // there is somebody to step
     bool stands = false;  // and somebody who stands still
   };
   template <class T>
   Pace pace_of(const Bank<T>& b, std::size_t p, std::size_t first);
-  // Adds what the voices of one kernel say to the outputs, and keeps their last samples.
+  template <class T>
+  Pace pace_of_some(const Bank<T>& b, std::size_t p, std::size_t first);
+  // Adds what the voices of one kernel say to the outputs, and keeps their last sample.
   template <class T>
   void mix(Bank<T>& b, std::size_t p, std::size_t first, std::span<double* const> outputs,
            std::size_t at, std::size_t frames);
@@ -191,10 +217,7 @@ struct Engine::Voices : Playback {
   template <class T>
   void mix_some(const Bank<T>& b, std::size_t p, std::size_t lane, std::span<double* const> outputs,
                 std::size_t at, std::size_t frames);
-  // The outputs of a voice's last sample, from its lane in the row.
-  template <class T>
-  void keep(const T* outputs, std::size_t width, std::size_t p, std::size_t lane);
-  // The last samples of what stands still, for frames [from, frames) of the segment.
+  // The last sample of what stands still, for frames [from, frames) of the segment.
   void mix_held(std::size_t p, std::size_t lane, std::span<double* const> outputs, std::size_t at,
                 std::size_t from, std::size_t frames);
   void mix_still(std::size_t p, std::size_t first, std::size_t width,
@@ -208,10 +231,18 @@ struct Engine::Voices : Playback {
 
   // --- what watches the energy ---
   // Once in max_block_frames: looks at one part after the other, seldom enough for its cost to be
-  // a small share of what stepping takes.
+  // a small share of what stepping takes; at a large one for several times on end.
   void look_around();
+  bool steps(std::size_t at) const;
+  void look(std::size_t at);
   template <class T>
-  void look(Bank<T>& b, std::size_t at);
+  void begin_look(Bank<T>& b, std::size_t at);
+  template <class T>
+  void go_on_looking(Bank<T>& b);
+  template <class T>
+  void judge(Bank<T>& b, const Look& seen);
+  void enter(Watch& here, const Look& seen);
+  void read_energy(EngineMeters& meters) const;
   template <class T>
   void accuse(const Program& program, LaneValues<T> values, const Bank<T>& b, std::size_t at);
   template <class T>
@@ -235,14 +266,15 @@ struct Engine::Voices : Playback {
   std::vector<const Control*> audio_control;  // [input] null where no audio drives it
   std::vector<const double*> sound;           // [input] of this segment; null where all is silent
   std::vector<std::size_t> first_output;      // [part] among all parts' outputs; then their number
-  std::vector<double> elements;               // [part] nodes and links
+  std::vector<std::size_t> elements;          // [part] nodes and links
   std::vector<std::uint32_t> creators;        // links that made energy of nothing, by origin
   std::size_t creators_told = 0;
-  static constexpr std::size_t none = static_cast<std::size_t>(-1);
+  Look looking;  // b.x and b.v are its own until it is done
+  static constexpr std::size_t none = Look::none;
   std::size_t suspect = none;  // of the watches: is looked at more often, as something was created
   std::size_t looks_left = 0;  // at it
   std::size_t turn = 0;        // of the watches: the next to be looked at
-  double stepped = 0.0;        // elements, times max_block_frames, since then
+  std::size_t looks_due = 0;   // at it, in shares of settlings_per_look
   bool is_idle = false;        // nobody is awake
   bool has_lost = false;       // a voice its stability, in this segment
   double loudest = 0.0;        // what no output reaches

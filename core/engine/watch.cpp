@@ -2,14 +2,20 @@
 // nothing is told, who has lost stability fades.
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "core/engine/voices.h"
 
 namespace ressort {
 namespace {
 
-// So many samples are stepped for one look. A look costs as much as some five to twenty steps.
-constexpr double samples_per_look = 4096.0;
+// So many settlings are there for one look at each part of each voice. A look costs as much as some
+// five to twenty steps.
+constexpr std::size_t settlings_per_look = 4096 / max_block_frames;
+
+// What is added up in one settling. Looking at a larger part takes several, and who makes energy
+// there is not sought.
+constexpr std::size_t most_elements = 16384;
 
 // What energy may rise by and be rounding: a share of all its terms.
 template <class T>
@@ -24,8 +30,30 @@ constexpr double least_energy = 1e-30;  // below this there is nothing to be tol
 void Engine::Voices::stir(std::size_t lane, std::size_t p) {
   Watch& here = watch(lane, p);
   here.is_stirred = true;
-  here.is_still = here.is_still && voices[lane].lost;
+  if (here.is_still && !voices[lane].lost) {
+    here.is_still = false;
+    --still;
+  }
 }
+
+void Engine::Voices::forget(Watch& here) {
+  still -= here.is_still ? 1 : 0;
+  here = Watch{};
+}
+
+template <class T>
+void Engine::Voices::lay_still(const T* row, std::size_t width, std::size_t lane, std::size_t p) {
+  Watch& here = watch(lane, p);
+  still += here.is_still ? 0 : 1;
+  here.is_still = true;
+  double* const kept = held_of(lane, p);
+  for (std::size_t output = 0; output < machine.parts[p].outputs.size(); ++output) {
+    kept[output] = static_cast<double>(row[output * width + lane % width]);
+  }
+}
+
+template void Engine::Voices::lay_still(const float*, std::size_t, std::size_t, std::size_t);
+template void Engine::Voices::lay_still(const double*, std::size_t, std::size_t, std::size_t);
 
 // --- what stands still --------------------------------------------------------------------------
 
@@ -69,10 +97,10 @@ double Engine::Voices::saved() const {
   double all = 0.0;
   double taken = 0.0;
   for (std::size_t p = 0; p < elements.size(); ++p) {
-    all += static_cast<double>(wanted) * elements[p];
+    const auto each = static_cast<double>(elements[p]);
+    all += static_cast<double>(wanted) * each;
     for (std::size_t lane = 0; lane < voices.size(); ++lane) {
-      const bool steps = voices[lane].awake && !watches[lane * elements.size() + p].is_still;
-      taken += steps ? elements[p] : 0.0;
+      taken += steps(lane * elements.size() + p) ? each : 0.0;
     }
   }
   return all > 0.0 ? std::max(0.0, 1.0 - taken / all) : 0.0;
@@ -80,71 +108,117 @@ double Engine::Voices::saved() const {
 
 // --- energy -------------------------------------------------------------------------------------
 
+bool Engine::Voices::steps(std::size_t at) const {
+  return voices[at / elements.size()].awake && !watches[at].is_still;
+}
+
 void Engine::Voices::look_around() {
-  double now = 0.0;
-  for (std::size_t lane = 0; lane < voices.size(); ++lane) {
-    for (std::size_t p = 0; voices[lane].awake && p < elements.size(); ++p) {
-      now += watch(lane, p).is_still ? 0.0 : elements[p] * max_block_frames;
-    }
-  }
-  if (now == 0.0) {
+  if (looking.at != none) {
+    std::visit([&](auto& b) { go_on_looking(b); }, bank);
     return;
   }
-  stepped += now;
-  const auto steps = [&](std::size_t i) {
-    return voices[i / elements.size()].awake && !watches[i].is_still;
-  };
   if (suspect != none && steps(suspect)) {
-    std::visit([&](auto& b) { look(b, suspect); }, bank);
+    look(suspect);
     looks_left -= looks_left > 0 ? 1 : 0;
   }
   suspect = looks_left > 0 ? suspect : none;
-  for (std::size_t i = 0; i < watches.size(); ++i) {
+  looks_due += watches.size();
+  for (; looks_due >= settlings_per_look && looking.at == none; looks_due -= settlings_per_look) {
     if (steps(turn)) {
-      const double price = elements[turn % elements.size()] * samples_per_look;
-      if (stepped < price) {
-        return;
-      }
-      stepped -= price;
-      std::visit([&](auto& b) { look(b, turn); }, bank);
+      look(turn);
     }
     turn = turn + 1 < watches.size() ? turn + 1 : 0;
   }
-  stepped = 0.0;  // all were looked at
+}
+
+void Engine::Voices::look(std::size_t at) {
+  std::visit([&](auto& b) { begin_look(b, at); }, bank);
 }
 
 template <class T>
-void Engine::Voices::look(Bank<T>& b, std::size_t at) {
+void Engine::Voices::begin_look(Bank<T>& b, std::size_t at) {
   const std::size_t lane = at / elements.size();
-  const std::size_t p = at % elements.size();
-  PartBank<T>& part = b.parts[p];
+  const PartBank<T>& part = b.parts[at % elements.size()];
   const Kernel<T>& kernel = part.of(lane);
-  Watch& here = watches[at];
   if (!kernel.save(lane % part.width, b.x.data(), b.v.data())) {
     return;
   }
-  const LaneValues<T> values{kernel.coefficients.value.data() + lane % part.width, part.width};
-  const Energy energy = energy_of(part.program, values, b.x.data(), b.v.data());
+  looking = {
+      .at = at, .done = 0, .was_stirred = watches[at].is_stirred, .settled = settled, .energy = {}};
+  watches[at].is_stirred =
+      kernel.coefficients.ramp_frames > 0 || !part.program.audio_coefficients.empty();
+  go_on_looking(b);
+}
+
+template <class T>
+void Engine::Voices::go_on_looking(Bank<T>& b) {
+  const std::size_t lane = looking.at / elements.size();
+  const std::size_t p = looking.at % elements.size();
+  const PartBank<T>& part = b.parts[p];
+  const LaneValues<T> values{part.of(lane).coefficients.value.data() + lane % part.width,
+                             part.width};
+  const std::size_t end = std::min(elements[p], looking.done + most_elements);
+  add_energy(part.program, values, b.x.data(), b.v.data(), looking.done, end, looking.energy);
+  looking.done = end;
+  if (end == elements[p]) {
+    judge(b, std::exchange(looking, Look{}));
+  }
+}
+
+void Engine::Voices::enter(Watch& here, const Look& seen) {
+  here.is_driven = seen.was_stirred || !here.is_metered;
+  const auto frames = static_cast<double>((seen.settled - here.looked) * max_block_frames);
+  here.loss = here.is_driven ? 0.0 : (here.energy - seen.energy.value) / frames;
+  here.is_metered = true;
+  here.energy = seen.energy.value;
+  here.looked = seen.settled;
+}
+
+void Engine::Voices::read_energy(EngineMeters& meters) const {
+  const double unit = machine.rate_ratio * machine.rate_ratio;
+  for (std::size_t i = 0; i < watches.size(); ++i) {
+    if (steps(i)) {
+      const Watch& here = watches[i];
+      meters.energy += here.energy / unit;
+      meters.loss += here.loss / unit * machine.rate_hz;
+      meters.is_driven |= here.is_driven;
+      meters.is_whole &= here.is_metered;
+    }
+  }
+}
+
+template <class T>
+void Engine::Voices::judge(Bank<T>& b, const Look& seen) {
+  const std::size_t lane = seen.at / elements.size();
+  const std::size_t p = seen.at % elements.size();
+  PartBank<T>& part = b.parts[p];
+  const LaneValues<T> values{part.of(lane).coefficients.value.data() + lane % part.width,
+                             part.width};
+  Watch& here = watches[seen.at];
+  const Energy& energy = seen.energy;
+  if (elements[p] > most_elements && here.is_stirred) {
+    here.is_judged = false;  // since it was seen
+    return;
+  }
   if (!std::isfinite(energy.value)) {
     resets += voices[lane].lost ? 0 : 1;
-    voices[lane].lost = here.is_still = has_lost = true;
+    voices[lane].lost = has_lost = true;
+    lay_still(part.last_of(lane), part.width, lane, p);
     part.of(lane).reset(lane % part.width);
     return;
   }
   const double slack = rounding<T> * energy.scale + least_energy;
-  here.energy = energy.value;
-  if (here.is_judged && !here.is_stirred && energy.value - energy.doubt > here.most + slack) {
-    accuse(part.program, values, b, at);
+  const bool is_free = here.is_judged && !seen.was_stirred;
+  enter(here, seen);
+  if (is_free && energy.value - energy.doubt > here.most + slack) {
+    accuse(part.program, values, b, seen.at);
     here.is_judged = false;
-  }
-  if (here.is_judged && !here.is_stirred &&
-      may_rest(b, lane, p, std::max(0.0, energy.value) + energy.doubt)) {
-    here.is_still = true;
+  } else if (is_free && may_rest(b, lane, p, std::max(0.0, energy.value) + energy.doubt)) {
+    lay_still(part.last_of(lane), part.width, lane, p);
   }
   const double most = energy.value + energy.doubt;
-  here.most = here.is_judged && !here.is_stirred ? std::min(here.most, most) : most;
-  here.is_judged = !here.is_stirred;
-  here.is_stirred = false;
+  here.most = is_free && here.is_judged ? std::min(here.most, most) : most;
+  here.is_judged = !seen.was_stirred;
 }
 
 // Who it was is seen from near by: the first time the part is only looked at more often.
@@ -152,7 +226,8 @@ template <class T>
 void Engine::Voices::accuse(const Program& program, LaneValues<T> values, const Bank<T>& b,
                             std::size_t at) {
   if (suspect != at) {
-    if (suspect == none && creators.size() < max_creators && may_create(program)) {
+    if (suspect == none && creators.size() < max_creators && may_create(program) &&
+        elements[at % elements.size()] <= most_elements) {
       suspect = at;
       looks_left = most_looks;
     }
