@@ -234,6 +234,7 @@ struct Engine::Voices : Playback {
   // a small share of what stepping takes; at a large one for several times on end.
   void look_around();
   bool steps(std::size_t at) const;
+  std::size_t price_of(std::size_t at) const;
   void look(std::size_t at);
   template <class T>
   void begin_look(Bank<T>& b, std::size_t at);
@@ -274,7 +275,7 @@ struct Engine::Voices : Playback {
   std::size_t suspect = none;  // of the watches: is looked at more often, as something was created
   std::size_t looks_left = 0;  // at it
   std::size_t turn = 0;        // of the watches: the next to be looked at
-  std::size_t looks_due = 0;   // at it, in shares of settlings_per_look
+  std::size_t looks_due = 0;   // settlings, times watches: what looks are paid with
   bool is_idle = false;        // nobody is awake
   bool has_lost = false;       // a voice its stability, in this segment
   double loudest = 0.0;        // what no output reaches

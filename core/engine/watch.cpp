@@ -13,6 +13,9 @@ namespace {
 // five to twenty steps.
 constexpr std::size_t settlings_per_look = 4096 / max_block_frames;
 
+// Where one kernel steps several voices a step costs each of them less, a look does not.
+constexpr std::size_t dearest = 4;
+
 // What is added up in one settling. Looking at a larger part takes several, and who makes energy
 // there is not sought.
 constexpr std::size_t most_elements = 16384;
@@ -113,6 +116,9 @@ bool Engine::Voices::steps(std::size_t at) const {
 }
 
 void Engine::Voices::look_around() {
+  if (watches.empty()) {
+    return;
+  }
   if (looking.at != none) {
     std::visit([&](auto& b) { go_on_looking(b); }, bank);
     return;
@@ -123,12 +129,20 @@ void Engine::Voices::look_around() {
   }
   suspect = looks_left > 0 ? suspect : none;
   looks_due += watches.size();
-  for (; looks_due >= settlings_per_look && looking.at == none; looks_due -= settlings_per_look) {
+  for (std::size_t price = price_of(turn); looks_due >= price && looking.at == none;
+       price = price_of(turn)) {
+    looks_due -= price;
     if (steps(turn)) {
       look(turn);
     }
     turn = turn + 1 < watches.size() ? turn + 1 : 0;
   }
+}
+
+std::size_t Engine::Voices::price_of(std::size_t at) const {
+  const std::size_t p = at % elements.size();
+  const std::size_t width = std::visit([&](const auto& b) { return b.parts[p].width; }, bank);
+  return settlings_per_look * std::min(width, dearest);
 }
 
 void Engine::Voices::look(std::size_t at) {
