@@ -13,9 +13,6 @@ namespace {
 // five to twenty steps.
 constexpr std::size_t settlings_per_look = 4096 / max_block_frames;
 
-// Where one kernel steps several voices a step costs each of them less, a look does not.
-constexpr std::size_t dearest = 4;
-
 // What is added up in one settling. Looking at a larger part takes several, and who makes energy
 // there is not sought.
 constexpr std::size_t most_elements = 16384;
@@ -139,10 +136,11 @@ void Engine::Voices::look_around() {
   }
 }
 
+// Where one kernel steps many voices a step costs each of them less; a look does not.
 std::size_t Engine::Voices::price_of(std::size_t at) const {
   const std::size_t p = at % elements.size();
   const std::size_t width = std::visit([&](const auto& b) { return b.parts[p].width; }, bank);
-  return settlings_per_look * std::min(width, dearest);
+  return settlings_per_look * std::clamp<std::size_t>(std::min(width, voices.size()) / 4, 1, 4);
 }
 
 void Engine::Voices::look(std::size_t at) {
