@@ -351,8 +351,8 @@ int render_command(const RenderOptions& options, bool is_quiet) {
     }
   }
   if (rendered->resets > 0) {
-    complain(rendered->name + ": became unstable and was put back to rest " +
-             std::to_string(rendered->resets) + " times; the sound is not to be trusted");
+    complain(rendered->name + ": " + counted(rendered->resets, "voice", "voices") +
+             " became unstable and faded out; the sound is not to be trusted");
   }
   return rendered->was_interrupted ? exit_code::our_failure : exit_code::done;
 }

@@ -181,8 +181,7 @@ void add_numbers(CLI::App& command, Precision& precision, bool& rescale) {
 
 void add_force(CLI::App& command, bool& force) {
   command.add_flag("--force", force,
-                   "play a model that is not stable all the same; what runs away is put back to "
-                   "rest");
+                   "play a model that is not stable all the same; what runs away fades out");
 }
 
 // What the last argument of a mass means, for every command that reads a model.
