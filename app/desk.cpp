@@ -4,6 +4,7 @@
 #include <array>
 #include <cctype>
 #include <cmath>
+#include <cstdio>
 #include <cstdlib>
 #include <filesystem>
 
@@ -311,6 +312,31 @@ std::string peak(double level_db) {
                            : std::string("silence");
 }
 
+// Three digits of it.
+std::string about(double number) {
+  std::array<char, 32> text{};
+  std::snprintf(text.data(), text.size(), "%.3g", number);
+  return text.data();
+}
+
+// What modes hold is not known, nor, while a hand moves, what is lost.
+std::string describe_energy(const Status& now) {
+  if (now.voices == 0) {
+    return "none";
+  }
+  const std::string voices = "; " + std::to_string(now.voices) + " of " +
+                             counted(static_cast<std::size_t>(now.max_voices), "voice", "voices");
+  if (!now.is_whole) {
+    return (now.energy > 0.0 ? about(now.energy) + " and that of modes" : "not known of modes") +
+           voices;
+  }
+  const std::string change = now.is_driven     ? "driven from outside"
+                             : now.loss == 0.0 ? "neither rising nor falling"
+                                               : (now.loss > 0.0 ? "falling by " : "rising by ") +
+                                                     about(std::fabs(now.loss)) + " a second";
+  return about(now.energy) + ", " + change + voices;
+}
+
 }  // namespace
 
 Result<Done> act::status(Desk& desk, Words) {
@@ -328,6 +354,7 @@ Result<Done> act::status(Desk& desk, Words) {
       {"voices", std::to_string(now.voices) + " of " + std::to_string(now.max_voices) + ", " +
                      std::to_string(now.stolen) + " stolen"},
       {"asleep", fixed(100.0 * now.saved, 0) + " % of what all voices would take"},
+      {"energy", describe_energy(now)},
       {"output", peak(now.peak_db) + " since the last status, " + limiter},
       {"xruns", std::to_string(now.xruns)},
       {"resets", std::to_string(now.resets) + " voices that became unstable"},
@@ -370,6 +397,7 @@ namespace {
 std::string describe_stability(const Instrument& instrument) {
   if (instrument.verdict == Verdict::unstable) {
     return "none: it plays by force, and what runs away is faded out";
+    return "none: it plays by force, and what runs away fades out";
   }
   const std::string proved = instrument.verdict == Verdict::stable ? "proved" : "not proved";
   const double margin = instrument.stiffness_margin;

@@ -274,6 +274,10 @@ void Process::tell() {
   meters.saved.set(now.saved);
   meters.modes.set(now.modes);
   meters.modes_awake.set(now.modes_awake);
+  meters.energy.set(now.energy);
+  meters.loss.set(now.loss);
+  meters.is_driven.set(now.is_driven);
+  meters.is_whole.set(now.is_whole);
   if (now.resets != resets_told_) {
     meters.resets.add(now.resets - resets_told_);
     resets_told_ = now.resets;

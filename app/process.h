@@ -67,6 +67,10 @@ struct Meters {
   Meter<double> saved;          // share of the steps that sleep saves
   Meter<std::uint64_t> modes;   // of the voices that sound
   Meter<std::uint64_t> modes_awake;
+  Meter<double> energy;            // of what sounds, as EngineMeters says
+  Meter<double> loss;              // of it in a second
+  Meter<bool> is_driven;           // something comes in: the loss is not all known
+  Meter<bool> is_whole;            // all of the energy is known
   Meter<std::uint64_t> dropped;    // events that found no room
   Meter<std::uint64_t> late;       // events that came after their time
   Meter<std::uint64_t> malformed;  // MIDI that could not be read

@@ -159,6 +159,10 @@ Status Session::status() {
   status.saved = meters.saved.get();
   status.modes = meters.modes.get();
   status.modes_awake = meters.modes_awake.get();
+  status.energy = meters.energy.get();
+  status.loss = meters.loss.get();
+  status.is_driven = meters.is_driven.get();
+  status.is_whole = meters.is_whole.get();
   status.dropped = meters.dropped.get();
   status.late = meters.late.get();
   status.malformed = meters.malformed.get();
@@ -262,7 +266,7 @@ void Session::listen() {
   }
 }
 
-// An unstable voice may be put back in every block; once in a while is enough to hear of it.
+// An unstable voice may be lost with every note; once in a while is enough to hear of it.
 bool Session::may_tell_reset() {
   const auto now = std::chrono::steady_clock::now();
   if (now < next_reset_news_) {
@@ -289,7 +293,7 @@ std::string Session::calm(std::uint32_t link) {
          std::filesystem::path(current_->model_path).filename().string() + ":" +
          std::to_string(creator.place.line) + ") created energy" +
          (source_->may_gain ? ": computed passively from now on"
-                            : "; load it with --budget passive=always");
+                            : "; play it with --budget passive=always");
 }
 
 void Session::do_load(const Job& job) {

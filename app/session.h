@@ -55,6 +55,10 @@ struct Status {
   std::uint64_t beyond = 0;  // times that a parameter was kept where it is stable
   std::uint64_t modes = 0;   // of the voices that sound
   std::uint64_t modes_awake = 0;
+  double energy = 0.0;     // of what sounds, as EngineMeters says
+  double loss = 0.0;       // of it in a second
+  bool is_driven = false;  // something comes in: the loss is not all known
+  bool is_whole = true;    // all of the energy is known
   std::uint64_t dropped = 0;
   std::uint64_t late = 0;
   std::uint64_t malformed = 0;
