@@ -20,10 +20,6 @@ double Engine::Voices::middle(std::size_t input) const {
   return machine.hands[input].is_force ? 0.0 : machine.hands[input].position;
 }
 
-Hand& Engine::Voices::hand(std::size_t lane, std::size_t input) {
-  return hands[lane * machine.hands.size() + input];
-}
-
 double Engine::Voices::mapped(const Control& control, double amount) const {
   const double a = std::clamp(amount, 0.0, 1.0);
   return control.exponential && control.low > 0.0 && control.high > 0.0

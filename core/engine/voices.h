@@ -109,7 +109,9 @@ struct Engine::Voices : Playback {
 
   // --- inputs ---
   double middle(std::size_t input) const;
-  Hand& hand(std::size_t lane, std::size_t input);
+  Hand& hand(std::size_t lane, std::size_t input) {
+    return hands[lane * machine.hands.size() + input];
+  }
   double mapped(const Control& control, double amount) const;
   // A speed or an impulse that gives the same displacement at every rate and pitch.
   double paced(double amount, std::size_t lane) const;
