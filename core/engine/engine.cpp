@@ -449,7 +449,7 @@ double Engine::rate_hz() const {
 }
 
 EngineMeters Engine::meters() const {
-  EngineMeters meters;
+  EngineMeters meters = voices_->metered;
   for (const Voice& voice : voices_->voices) {
     meters.voices += voice.awake && !voice.fading && voice.level > quiet_level ? 1 : 0;
   }
@@ -466,7 +466,6 @@ EngineMeters Engine::meters() const {
   meters.stolen = voices_->stolen;
   meters.beyond = voices_->beyond;
   meters.saved = voices_->saved();
-  voices_->read_energy(meters);
   return meters;
 }
 

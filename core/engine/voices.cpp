@@ -12,6 +12,7 @@ constexpr double bow_start_s = 0.005;   // a bow reaches its speed as a one-pole
 constexpr double level_memory_s = 0.1;  // how long a voice's level remembers a peak
 constexpr double quiet_s = 0.5;         // longer than half a period of the slowest sound
 constexpr std::size_t most_reserve_lanes = 4;
+constexpr std::size_t settlings_per_reading = 16;  // of the energy: 20 ms or so
 
 }  // namespace
 
@@ -479,6 +480,9 @@ void Engine::Voices::settle_all() {
       settle(lane);
     }
     is_idle = is_idle && !voices[lane].awake;
+  }
+  if (is_idle || settled % settlings_per_reading == 0) {
+    read_energy();
   }
 }
 

@@ -79,6 +79,7 @@ struct Playback {
   std::size_t since_settled = 0;  // frames, below max_block_frames between two segments
   std::uint64_t settled = 0;      // times
   std::size_t still = 0;          // watches of what stands still
+  EngineMeters metered;           // the energy, as read_energy() found it
   std::uint64_t resets = 0;
   std::uint64_t stolen = 0;
   std::uint64_t beyond = 0;
@@ -245,7 +246,7 @@ struct Engine::Voices : Playback {
   template <class T>
   void judge(Bank<T>& b, const Look& seen);
   void enter(Watch& here, const Look& seen);
-  void read_energy(EngineMeters& meters) const;
+  void read_energy();
   template <class T>
   void accuse(const Program& program, LaneValues<T> values, const Bank<T>& b, std::size_t at);
   template <class T>

@@ -186,15 +186,16 @@ void Engine::Voices::enter(Watch& here, const Look& seen) {
   here.looked = seen.settled;
 }
 
-void Engine::Voices::read_energy(EngineMeters& meters) const {
+void Engine::Voices::read_energy() {
   const double unit = machine.rate_ratio * machine.rate_ratio;
+  metered = EngineMeters{};
   for (std::size_t i = 0; i < watches.size(); ++i) {
     if (steps(i)) {
       const Watch& here = watches[i];
-      meters.energy += here.energy / unit;
-      meters.loss += here.loss / unit * machine.rate_hz;
-      meters.is_driven |= here.is_driven;
-      meters.is_whole &= here.is_metered;
+      metered.energy += here.energy / unit;
+      metered.loss += here.loss / unit * machine.rate_hz;
+      metered.is_driven |= here.is_driven;
+      metered.is_whole &= here.is_metered;
     }
   }
 }
