@@ -128,6 +128,12 @@ void add_centred(Law law, const Numbers& c, double d, double v, Energy& energy) 
     add(energy, 0.25 * c[1] * d * d * before * before);
     return;
   }
+  if (law == Law::quadratic_spring) {  // centred in its quadratic part
+    const Numbers bent{0.0, c[1]};
+    add_straight(c[0], c[2], d, v, energy);
+    add(energy, 0.5 * (potential(law, bent, d) + potential(law, bent, before)));
+    return;
+  }
   add(energy, 0.5 * (potential(law, c, d) + potential(law, c, before)));
 }
 
