@@ -188,14 +188,18 @@ class TablesMaker {
   }
 
   void place_passive() {
+    std::vector<std::uint32_t> end(program_.position.size(), nowhere);
     const auto add = [&](std::uint32_t node) {
+      if (end[node] != nowhere) {
+        return end[node];
+      }
       const bool is_chained = site_mass_[node] != nowhere;
-      const auto next = static_cast<std::uint32_t>(tables_.passive_ends.size());
+      end[node] = static_cast<std::uint32_t>(tables_.passive_ends.size());
       tables_.passive_ends.push_back(
           {.place = place_[node],
            .unit = is_chained ? site_of(node).unit : nowhere,
            .inverse_mass = node < program_.moving ? mass_run_of(node).inverse_mass : nowhere});
-      return next;
+      return end[node];
     };
     tables_.passive = passive_links(program_);
     for (PassiveLink& link : tables_.passive) {

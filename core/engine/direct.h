@@ -6,7 +6,6 @@
 // large ones.
 #pragma once
 
-#include <algorithm>
 #include "core/engine/kernel.h"
 #include "core/engine/passive.h"
 #include "core/engine/taps.h"
@@ -43,29 +42,6 @@ DirectStep<T> direct_step(std::size_t bytes);
 // The same with compensated positions.
 template <Isa isa>
 DirectStep<float> compensated_step(std::size_t bytes);
-
-// What passive links keep from one sample to the next.
-template <class T>
-struct PassiveRoom {
-  PassiveRoom(const Program& program, std::size_t width)
-      : links(passive_links(program)), memory(links.size() * passive_rows * width), awake(width) {
-    if (links.empty()) {
-      return;
-    }
-    inverse_mass = inverse_masses(program);
-    const auto is_force = [](const OutputSlot& output) { return output.is_force; };
-    if (std::any_of(program.outputs.begin(), program.outputs.end(), is_force)) {
-      felt.resize(program.position.size() * width);
-    }
-  }
-  T* felt_or_null() { return felt.empty() ? nullptr : felt.data(); }
-
-  std::vector<PassiveLink> links;
-  std::vector<std::uint32_t> inverse_mass;
-  Aligned<T> memory;
-  Aligned<T> awake;
-  Aligned<T> felt;
-};
 
 template <class T>
 class DirectKernel final : public Kernel<T> {
