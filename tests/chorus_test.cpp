@@ -1,6 +1,6 @@
 // What is held in registers, and that every voice moves as it does alone.
 #include "core/compile/chorus_form.h"
-#include "tests/rig.h"
+#include "tests/passive.h"
 
 namespace ressort {
 namespace {
@@ -269,6 +269,40 @@ TEST_CASE("bodies of every size, of any laws", "[chorus]") {
     for (const Comparison& voice : heard) {
       INFO("residual " << show(voice.relative()));
       CHECK(voice.relative() < 1e-12);
+    }
+  }
+}
+
+TEST_CASE("hard contacts are passive in every voice", "[chorus]") {
+  // In registers and in memory; links of every scheme, some on the same mass, a hand that moves.
+  for (const int masses : {1, 2, 3, 4, 7, 16}) {
+    std::string text = "@w ground -0.01\n@g ground 0.\n@in1 posInput 0.\n@k param 0.1\n";
+    const auto at = [&](int i) { return " @m" + std::to_string(i % masses) + " "; };
+    for (int i = 0; i < masses; ++i) {
+      text += "@m" + std::to_string(i) + (i % 3 == 2 ? " osc 1.5 k 0.01" : " mass 1.") + " 0. 0.\n";
+      text += "@s" + std::to_string(i) + " springDamper" + (i == 0 ? " @g " : at(i - 1)) + at(i) +
+              "k 0.001\n";
+    }
+    text += "@in2 frcInput" + at(0) + "\n@out1 posOutput" + at(masses - 1) + "\n";
+    text += "@c1 contact @w" + at(0) + "[50 * k] 0.05\n@c2 nlContact @w" + at(1) +
+            "0.1 20. 3. 0.01 0.005\n@q nlSpring3 @g" + at(2) + "0.01 5. 0.\n@p nlPluck @in1" +
+            at(3) + "0.4 0.01\n@b nlBow @in1" + at(4) + "0.3 0.01\n@d nlSpring @g" + at(5) +
+            "0.01 2. 0.001\n";
+    Program program = program_of(text, Passivity::always);
+    auto form = chorus_form(program);
+    REQUIRE(form);
+    program.form = std::move(*form);
+    for (const Isa isa : isas()) {
+      for (const std::size_t voices : {1, 13}) {
+        CAPTURE(masses, isa_name(isa), voices);
+        const Contest options{
+            .voices = voices, .frames = 300, .reach = 0.03, .turns = true, .isa = isa};
+        for (const Comparison& voice : contest<double>(program, options)) {
+          CAPTURE(show(voice.relative()));
+          CHECK(voice.peak > 1e-3);
+          CHECK(voice.relative() < 1e-11);
+        }
+      }
     }
   }
 }

@@ -25,6 +25,9 @@ bool hold_spring(const Program& program, const LinkRun& run, Ends ends, Chorus& 
 void hold_links(const Program& program, Chorus& chorus) {
   for (std::uint32_t run = 0; run < program.link_runs.size(); ++run) {
     const LinkRun& links = program.link_runs[run];
+    if (links.scheme != Scheme::plain) {
+      continue;
+    }
     for (std::uint32_t i = links.first; i < links.first + links.count; ++i) {
       const Ends ends = program.ends[i];
       if (!hold_spring(program, links, ends, chorus)) {
@@ -38,8 +41,7 @@ void hold_links(const Program& program, Chorus& chorus) {
 
 std::optional<Chorus> chorus_form(const Program& program) {
   const auto is_force = [](const OutputSlot& output) { return output.is_force; };
-  if (program.moving == 0 || !is_plain(program) || program.moving > most_chorus_masses ||
-      !program.taps.empty() ||
+  if (program.moving == 0 || program.moving > most_chorus_masses || !program.taps.empty() ||
       std::any_of(program.outputs.begin(), program.outputs.end(), is_force)) {
     return std::nullopt;
   }

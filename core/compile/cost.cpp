@@ -142,11 +142,13 @@ class Predictor {
   double operator()(const Chorus&) const {
     const Count links = links_of(program_);
     const double others = links.bent + links.others;
+    const double passive = 0.8 * packs_of(load_) * passive_ns(program_);
     if (program_.moving <= most_held_masses) {
-      return 6.0 + 3.0 * others +
+      return 6.0 + 3.0 * others + passive +
              packs_of(load_) * (0.6 * (program_.moving + links.springs) + 2.8 * others);
     }
-    return 6.0 + (0.6 + 1.6 * packs_of(load_)) * (program_.moving + links.springs + others);
+    return 6.0 + passive +
+           (0.6 + 1.6 * packs_of(load_)) * (program_.moving + links.springs + others);
   }
 
   double operator()(const Modes& form) const {

@@ -124,7 +124,9 @@ class Filler {
     }
     table_.first_link = slots_;
     for (const LinkRun& run : program_.link_runs) {
-      add_link(run);
+      if (run.scheme == Scheme::plain) {
+        add_link(run);
+      }
     }
   }
 
@@ -184,7 +186,8 @@ ChorusKernel<T>::ChorusKernel(const Program& program, const Chorus& chorus, Chor
       table_(std::move(table)),
       step_(with_isa(
           isa, [&]<Isa level>() { return chorus_step<level, T>(table_, lanes_ * sizeof(T)); })),
-      cells_(table_.cells * this->width()) {
+      cells_(table_.cells * this->width()),
+      passive_(program, this->width()) {
   for (std::size_t lane = 0; lane < this->width(); ++lane) {
     this->reset(lane);
   }
@@ -198,6 +201,7 @@ void ChorusKernel<T>::place(std::size_t lane, const double* x, const double* v) 
     cell[lanes_] = static_cast<T>(v[node]);
     cell[2 * lanes_] = T(0);
   }
+  passive_.awake[lane] = T(0);
 }
 
 template <class T>
@@ -212,7 +216,12 @@ bool ChorusKernel<T>::save(std::size_t lane, double* x, double* v) const {
 
 template <class T>
 void ChorusKernel<T>::play(const Block<T>& block) {
-  ChorusState<T> state{.ramps = ramps_of(this->coefficients), .cells = cells_.data()};
+  ChorusState<T> state{.ramps = ramps_of(this->coefficients),
+                       .cells = cells_.data(),
+                       .passive = passive_.links,
+                       .inverse_mass = passive_.inverse_mass.data(),
+                       .memory = passive_.memory.data(),
+                       .awake = passive_.awake.data()};
   step_(program_, chorus_, table_, state, block);
   this->coefficients.finish(block.frames);
 }

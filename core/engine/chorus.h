@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "core/engine/kernel.h"
+#include "core/engine/passive.h"
 
 namespace ressort {
 
@@ -50,6 +51,10 @@ template <class T>
 struct ChorusState {
   Ramps<T> ramps;
   T* cells;  // [pack][cell][lane]
+  const std::vector<PassiveLink>& passive;
+  const std::uint32_t* inverse_mass;  // [moving node] coefficient, if there are passive links
+  T* memory;                          // [pack][passive link][passive_rows][lane]
+  T* awake;                           // [pack][lane] 0 in the first sample after place(), else 1
 };
 
 template <class T>
@@ -83,6 +88,7 @@ class ChorusKernel final : public Kernel<T> {
   ChorusTable table_;
   ChorusStep<T> step_;
   Aligned<T> cells_;
+  PassiveRoom<T> passive_;
 };
 
 }  // namespace ressort

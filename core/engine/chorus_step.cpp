@@ -175,6 +175,89 @@ template <class V, Law law>
   }
 }
 
+// --- links that are not plain --------------------------------------------------------------------
+
+// Those of one pack.
+template <class V>
+struct Passive {
+  V coefficient(std::uint32_t c) const { return coefficients[c * packs]; }
+  V awake() const { return is_awake; }
+  V distance_now(Ends ends) const { return nodes[ends.a].x - nodes[ends.b].x; }
+  V speed_now(Ends ends) const { return nodes[ends.a].v - nodes[ends.b].v; }
+  V distance(Ends ends) const { return distance_now(ends); }
+  V speed(Ends ends) const { return speed_now(ends); }
+  V gamma(Ends ends) const { return ends.a == ends.b ? V{} : give(ends.a) + give(ends.b); }
+  void push(Ends ends, V x, V v) {
+    push_node(ends.a, -x, -v);
+    push_node(ends.b, x, v);
+  }
+
+  V give(std::uint32_t node) const { return node < masses ? coefficient(inverse_mass[node]) : V{}; }
+  void push_node(std::uint32_t node, V x, V v) {
+    if (node < masses) {
+      const V way = give(node);
+      nodes[node].x += way * x;
+      nodes[node].v += way * v;
+    }
+  }
+
+  Node<V>* nodes;
+  const V* coefficients;  // of the pack; the next is as many further as there are packs
+  std::size_t packs;
+  const std::uint32_t* inverse_mass;
+  std::uint32_t masses;
+  V is_awake;
+};
+
+template <class V, class T>
+class PassiveLinks {
+ public:
+  PassiveLinks(const Program& program, const Packs<V>& packs, ChorusState<T>& state)
+      : program_(program), packs_(packs), state_(state), is_any_(!state.passive.empty()) {}
+
+  void remember() const {
+    if (is_any_) {
+      remember_all();
+    }
+  }
+  void correct() const {
+    if (is_any_) {
+      correct_all();
+    }
+  }
+
+ private:
+  Passive<V> body(std::size_t pack) const {
+    return {.nodes = packs_.nodes(pack),
+            .coefficients = reinterpret_cast<const V*>(state_.ramps.value) + pack,
+            .packs = packs_.count,
+            .inverse_mass = state_.inverse_mass,
+            .masses = program_.moving,
+            .is_awake = reinterpret_cast<const V*>(state_.awake)[pack]};
+  }
+  V* memory(std::size_t pack) const {
+    return reinterpret_cast<V*>(state_.memory) + pack * passive_rows * state_.passive.size();
+  }
+
+  [[gnu::noinline]] void remember_all() const {
+    for (std::size_t pack = 0; pack < packs_.count; ++pack) {
+      ressort::remember(state_.passive, memory(pack), body(pack));
+    }
+  }
+  [[gnu::noinline]] void correct_all() const {
+    for (std::size_t pack = 0; pack < packs_.count; ++pack) {
+      Passive<V> own = body(pack);
+      ressort::correct(state_.passive, memory(pack), own);
+      reinterpret_cast<V*>(state_.awake)[pack] = V{} + 1;
+    }
+  }
+
+  const Program& program_;
+  const Packs<V>& packs_;
+  ChorusState<T>& state_;
+  bool is_any_;
+};
+
 // --- masses in registers -------------------------------------------------------------------------
 
 // A sample's step in two halves: the springs exert their forces, and the masses move by them. In a
@@ -321,20 +404,24 @@ void hold(const Program& program, const Chorus& chorus, const ChorusTable& table
           ChorusState<Scalar<V>>& state, const Block<Scalar<V>>& block) {
   const Packs<V> packs(table, state.cells);
   const Holder<V, N, is_alike> holder(program, chorus, table, packs);
+  const PassiveLinks passive(program, packs, state);
   Rows<V> rows(program, table, block);
   const auto* audio = block.audio;
   for (std::size_t frame = 0; frame < block.frames;) {
     const bool moves = move_coefficients(program, state.ramps, audio);
     fill_slots(table, reinterpret_cast<const V*>(state.ramps.value), packs);
     const std::size_t end = moves ? frame + 1 : block.frames;
+    passive.remember();
     holder.move(rows.value);
     for (;;) {
       take_positions(program, packs, rows);
+      passive.correct();
       give_positions(program, packs, rows.outputs);
       rows.advance();
       if (++frame == end) {
         break;
       }
+      passive.remember();
       holder.exert_and_move(rows.value);
     }
     holder.exert();
@@ -366,6 +453,9 @@ template <class V>
 void walk_links(const Program& program, const ChorusTable& table, const Packs<V>& packs) {
   const V* slot = packs.slots + table.first_link;
   for (const LinkRun& run : program.link_runs) {
+    if (run.scheme != Scheme::plain) {
+      continue;
+    }
     with_constant(run.law, [&](auto law) {
       const Ends* const ends = program.ends.data() + run.first;
       for (std::uint32_t i = 0; i < run.count; ++i) {
@@ -380,6 +470,7 @@ template <class V>
 void walk(const Program& program, const Chorus&, const ChorusTable& table,
           ChorusState<Scalar<V>>& state, const Block<Scalar<V>>& block) {
   const Packs<V> packs(table, state.cells);
+  const PassiveLinks passive(program, packs, state);
   Rows<V> rows(program, table, block);
   const auto* audio = block.audio;
   for (std::size_t frame = 0; frame < block.frames; ++frame) {
@@ -391,8 +482,10 @@ void walk(const Program& program, const Chorus&, const ChorusTable& table,
         take_force(program.inputs[i].node, packs, rows.value + i * packs.count);
       }
     }
+    passive.remember();
     walk_masses(program, packs);
     take_positions(program, packs, rows);
+    passive.correct();
     walk_links(program, table, packs);
     give_positions(program, packs, rows.outputs);
     rows.advance();
