@@ -396,7 +396,6 @@ namespace {
 
 std::string describe_stability(const Instrument& instrument) {
   if (instrument.verdict == Verdict::unstable) {
-    return "none: it plays by force, and what runs away is faded out";
     return "none: it plays by force, and what runs away fades out";
   }
   const std::string proved = instrument.verdict == Verdict::stable ? "proved" : "not proved";

@@ -13,8 +13,8 @@
 
 namespace ressort {
 
-inline constexpr std::size_t nap_frames = 32;  // from one look at what may sleep to the next...
-inline constexpr std::size_t long_nap_frames = 128;  // ...while few are awake
+inline constexpr std::uint32_t nap_frames = 32;  // from one look at what may sleep to the next...
+inline constexpr std::uint32_t long_nap_frames = 128;  // ...while few are awake
 
 // Everything that one step of ModalKernel touches. Rows of modes are `stride` apart and filled up
 // with zeros to `modes`, whole packs of every kind. Ends: the places, then Modes::ends.
