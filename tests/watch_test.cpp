@@ -114,6 +114,40 @@ TEST_CASE("A large part's energy is added up in slices", "[watch]") {
   CHECK(std::fabs(now.loss) < 1e-9 * given);
 }
 
+// --- who sleeps altogether ----------------------------------------------------------------------
+
+TEST_CASE("When sleep ends does not depend on how time is cut", "[watch]") {
+  const bool has_noise = GENERATE(false, true);
+  Preset preset = rig::struck(1);
+  preset.noise = has_noise;
+  preset.controls.push_back(
+      {.source = ControlSource::audio, .number = 1, .target = "in1", .low = 0.0, .high = 0.1});
+  const std::string text =
+      scenes::string("s", 10, "0.1", "0.01") + "@in1 frcInput @s_m2\n" + scenes::output(1, "s_m6");
+  constexpr std::size_t frames = 200000;
+  std::vector<double> audio(frames);
+  audio[100037] = audio[150129] = 1.0;
+  const std::vector<const double*> inputs = {audio.data()};
+  const std::vector<Event> events = {rig::note_on(3, 57), rig::note_off(2000, 57)};
+  Player whole(text, preset, {.method = Method::direct});  // to the last bit
+  Player cut(text, preset, {.method = Method::direct});
+  whole.run(90000, events, {4096}, inputs);
+  CHECK(whole.engine().meters().saved == 1.0);
+  cut.run(90000, events, {64, 100, 17, 1}, inputs);
+  const std::vector<const double*> later = {audio.data() + 90000};
+  const std::vector<Event> again = {rig::note_on(30077, 60)};
+  whole.run(110000, again, {4096}, later);
+  cut.run(110000, again, {64, 100, 17, 1}, later);
+  CHECK(rig::peak({whole.y().data() + 100037, 1000}) > 1e-4);
+  std::size_t off = 0;
+  while (off < frames && whole.y()[off] == cut.y()[off]) {
+    ++off;
+  }
+  INFO("until " << off << " "
+                << (off < frames ? show(whole.y()[off]) + " " + show(cut.y()[off]) : ""));
+  CHECK(std::equal(whole.y().begin(), whole.y().end(), cut.y().begin(), cut.y().end()));
+}
+
 // --- who is not accused -------------------------------------------------------------------------
 
 TEST_CASE("Nobody in the instruments creates energy or runs away", "[watch]") {

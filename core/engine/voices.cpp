@@ -147,8 +147,7 @@ std::size_t Engine::Voices::lane_for(int key, int channel) {
 void Engine::Voices::segment(std::span<const double* const> inputs,
                              std::span<double* const> outputs, std::size_t at, std::size_t frames) {
   listen(inputs, at, frames);
-  const bool sounds = !is_idle;
-  if (sounds) {
+  if (!is_idle) {
     std::visit([&](auto& b) { segment_in(b, inputs, outputs, at, frames); }, bank);
   }
   remember_audio(inputs, at + frames);
@@ -157,7 +156,7 @@ void Engine::Voices::segment(std::span<const double* const> inputs,
     since_settled = 0;
     settle_all();
   }
-  if (playing.noise && sounds) {
+  if (playing.noise) {
     for (std::size_t n = at; n < at + frames; ++n) {
       for (double* const output : outputs) {
         output[n] *= white();
@@ -346,6 +345,9 @@ bool Engine::Voices::is_silent(const double* audio, std::size_t frames) const {
 
 bool Engine::Voices::sleeps_through(std::span<const double* const> inputs, std::size_t at,
                                     std::size_t frames) {
+  if (playing.noise) {
+    return false;  // it goes on
+  }
   for (std::size_t input = 0; input < machine.hands.size(); ++input) {
     const double* const audio = audio_for(input, inputs);
     if (audio != nullptr && !is_silent(audio + at, frames)) {

@@ -183,7 +183,7 @@ struct Engine::Voices : Playback {
   void segment_in(Bank<T>& b, std::span<const double* const> inputs,
                   std::span<double* const> outputs, std::size_t at, std::size_t frames);
   bool is_silent(const double* audio, std::size_t frames) const;
-  // Nobody is awake and nobody wakes: true if no sound comes in.
+  // Nobody is awake and nobody wakes: true if no sound comes in, and nothing is left to do.
   bool sleeps_through(std::span<const double* const> inputs, std::size_t at, std::size_t frames);
   // The buffers for the voices of one kernel, the first of which is `first`: what rests...
   template <class T>
