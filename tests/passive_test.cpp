@@ -286,7 +286,7 @@ TEST_CASE("S07, T13: a Duffing oscillator keeps its period when it swings little
     drift = std::max(drift, std::fabs(energy() / start - 1.0));
   }
   CAPTURE(show(drift));
-  CHECK(drift < 1e-10);
+  CHECK(drift < 3e-11);  // 2.75e-11: x += v where v is far larger; two positions keep 4e-13
   Stepper<double> published = sprung("nlSpring3", "0.01 1. 0.", 20.0, 0.0, Passivity::never);
   for (int n = 0; n < 20; ++n) {
     published.go();
