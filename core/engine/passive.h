@@ -225,8 +225,11 @@ struct Joint {
 template <class V, class Body>
 [[gnu::noinline]] static void settle(const std::vector<PassiveLink>& links, V* memory, Body& body,
                                      decltype(V{} == V{}) live) {
+  const auto shared = std::count_if(links.begin(), links.end(),
+                                    [](const PassiveLink& link) { return link.is_shared; });
+  const int rounds = shared > static_cast<std::ptrdiff_t>(most_joint) ? most_rounds : 1;
   bool goes_on = true;
-  for (int round = 0; round < most_rounds && goes_on; ++round) {
+  for (int round = 0; round < rounds && goes_on; ++round) {
     goes_on = false;
     Joint<V> joint;
     V* row = memory;
