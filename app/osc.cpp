@@ -228,6 +228,7 @@ struct OscServer::Server {
   struct Group {
     std::string address;  // of the first
     std::vector<TimedEvent> events;
+    std::vector<std::pair<std::string, std::string>> news;  // for when they act: address, message
   };
   using Groups = std::map<std::uint64_t, Group>;  // by time tag
 
@@ -329,7 +330,7 @@ struct OscServer::Server {
         const bool is_known = event.model == loaded->serial;
         if (const std::string news = is_known ? told_limit(call, event, loaded->instrument) : "";
             !news.empty()) {
-          client.error(call.address, news);
+          group.news.emplace_back(call.address, news);
         }
       }
     }
@@ -371,6 +372,9 @@ struct OscServer::Server {
       return;
     }
     session.remember(group.events);
+    for (const auto& [address, news] : group.news) {
+      client.error(address, news);
+    }
     if (late_s > 0.0) {
       client.error(group.address, "late by " + seconds_text(late_s) + " s, acts now");
     }
