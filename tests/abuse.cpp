@@ -15,6 +15,7 @@
 #include "app/loader.h"
 #include "app/process.h"
 #include "core/compile/compile.h"
+#include "tests/random.h"
 
 namespace {
 
@@ -23,27 +24,7 @@ using namespace ressort;
 constexpr double rate_hz = 44100.0;
 constexpr std::uint32_t serial = 1;
 
-// The same numbers on every machine (splitmix64).
-class Random {
- public:
-  explicit Random(std::uint64_t seed) : state_(seed) {}
-  std::uint64_t next() {
-    std::uint64_t z = (state_ += 0x9e3779b97f4a7c15u);
-    z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9u;
-    z = (z ^ (z >> 27)) * 0x94d049bb133111ebu;
-    return z ^ (z >> 31);
-  }
-  double uniform(double low, double high) {
-    return low + (high - low) * static_cast<double>(next() >> 11) * 0x1p-53;
-  }
-  std::size_t below(std::size_t count) { return static_cast<std::size_t>(next() % count); }
-  bool chance(std::size_t one_in) { return below(one_in) == 0; }
-  // Of either sign, from a millionth to a million.
-  double any_size() { return (chance(2) ? 1.0 : -1.0) * std::pow(10.0, uniform(-6.0, 6.0)); }
-
- private:
-  std::uint64_t state_;
-};
+using rig::Random;
 
 class Abuser {
  public:
@@ -52,7 +33,7 @@ class Abuser {
 
   // A few events for a block; at times none at all, so that something can fade away.
   std::vector<Event> events(std::size_t frames) {
-    if (random_.chance(400)) {
+    if (chance(400)) {
       calm_blocks_ = random_.below(300);
     }
     std::vector<Event> events;
@@ -65,7 +46,7 @@ class Abuser {
       events.push_back(event());
       events.back().frame = static_cast<std::uint32_t>(random_.below(frames));
     }
-    if (!instrument_.parameters.empty() && random_.chance(4)) {
+    if (!instrument_.parameters.empty() && chance(4)) {
       sweep(events, frames);
     }
     for (Event& event : events) {
@@ -78,10 +59,10 @@ class Abuser {
   void fill(std::vector<double>& samples) {
     static constexpr double nothings[] = {std::numeric_limits<double>::quiet_NaN(),
                                           std::numeric_limits<double>::infinity(), -1e300, 1e38};
-    const double level = random_.chance(3) ? 0.0 : std::pow(10.0, random_.uniform(-4.0, 2.0));
+    const double level = chance(3) ? 0.0 : std::pow(10.0, random_.uniform(-4.0, 2.0));
     for (double& sample : samples) {
-      sample = random_.chance(20'000) ? nothings[random_.below(std::size(nothings))]
-                                      : random_.uniform(-level, level);
+      sample = chance(20'000) ? nothings[random_.below(std::size(nothings))]
+                              : random_.uniform(-level, level);
     }
   }
 
@@ -97,9 +78,15 @@ class Abuser {
     }
   }
 
+  bool chance(std::size_t one_in) { return random_.below(one_in) == 0; }
+  // Of either sign, from a millionth to a million.
+  double any_size() {
+    return (chance(2) ? 1.0 : -1.0) * std::pow(10.0, random_.uniform(-6.0, 6.0));
+  }
+
   double value_of(const ParameterInfo& info) {
     const double width = info.maximum - info.minimum;
-    const double beyond = random_.chance(one_in_is_beyond_) ? 10.0 * width : 0.0;
+    const double beyond = chance(one_in_is_beyond_) ? 10.0 * width : 0.0;
     return random_.uniform(info.minimum - beyond, info.maximum + beyond);
   }
 
@@ -124,12 +111,12 @@ class Abuser {
       case 5:
         return {.kind = EventKind::pressure, .value = random_.uniform(0.0, 1.0)};
       case 6:
-        return {.kind = EventKind::position, .index = input(), .value = random_.any_size()};
+        return {.kind = EventKind::position, .index = input(), .value = any_size()};
       case 7:
         return {.kind = EventKind::force,
                 .index = input(),
-                .value = random_.any_size(),
-                .value2 = random_.chance(2) ? 0.0 : random_.uniform(0.0, 0.1)};
+                .value = any_size(),
+                .value2 = chance(2) ? 0.0 : random_.uniform(0.0, 0.1)};
       case 8:
         return {.kind = EventKind::pluck, .index = input(), .value = random_.uniform(0.0, 1.0)};
       case 9:
@@ -145,8 +132,8 @@ class Abuser {
                                instrument_.custom[random_.below(instrument_.custom.size())].row),
                            .value = random_.uniform(0.0, 1.0)};
       default:
-        return random_.chance(200) ? Event{.kind = EventKind::panic}
-                                   : Event{.kind = EventKind::note_off, .index = key()};
+        return chance(200) ? Event{.kind = EventKind::panic}
+                           : Event{.kind = EventKind::note_off, .index = key()};
     }
   }
 
@@ -174,7 +161,7 @@ Found abuse(Compiled compiled, double seconds, std::uint64_t seed, bool force) {
   Found found;
   const auto total = static_cast<std::int64_t>(seconds * rate_hz);
   for (std::int64_t at = 0; at < total;) {
-    const std::size_t frames = lengths.chance(3) ? 1 + lengths.below(512) : 64;
+    const std::size_t frames = lengths.below(3) == 0 ? 1 + lengths.below(512) : 64;
     std::vector<double*> outputs;
     for (std::vector<double>& channel : out) {
       channel.assign(frames, 0.0);

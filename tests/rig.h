@@ -16,6 +16,7 @@
 #include "core/engine/kernel.h"
 #include "core/model/mdl.h"
 #include "tests/catch.h"
+#include "tests/random.h"
 #include "tests/scenes.h"
 
 namespace ressort::rig {
@@ -55,25 +56,6 @@ inline std::string show(double value) {
   std::snprintf(text, sizeof text, "%.10g", value);
   return text;
 }
-
-// The same numbers on every machine (splitmix64).
-class Random {
- public:
-  explicit Random(std::uint64_t seed) : state_(seed) {}
-  std::uint64_t next() {
-    std::uint64_t z = (state_ += 0x9e3779b97f4a7c15u);
-    z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9u;
-    z = (z ^ (z >> 27)) * 0x94d049bb133111ebu;
-    return z ^ (z >> 31);
-  }
-  double uniform(double low, double high) {
-    return low + (high - low) * static_cast<double>(next() >> 11) * 0x1p-53;
-  }
-  std::size_t below(std::size_t count) { return static_cast<std::size_t>(next() % count); }
-
- private:
-  std::uint64_t state_;
-};
 
 // A hand that wanders smoothly within -1..1: a few slow sines of random pitch and phase. It
 // starts at 0.

@@ -295,6 +295,16 @@ double top(double angle) {
 
 }  // namespace
 
+TEST_CASE("a parameter that starts at 0 may go to both sides", "[stability]") {
+  // k = 0.5 + w between 0 and 4 - 2z, with z = 0.1.
+  const std::string text = "@w param 0.\n@o osc 1. [0.5+w] 0.1 0. 0.\n";
+  const SafeRange both = range_of(text, "w");
+  CHECK(both.lowest == Approx(-0.5).epsilon(1e-9));
+  CHECK(both.highest == Approx(3.3).epsilon(1e-9));
+  // A damper below 0 feeds, whatever else there is.
+  CHECK(range_of("@w param 0.\n@o osc 1. 0.5 w 0. 0.\n", "w").lowest == 0.0);
+}
+
 TEST_CASE("every unstable root is a negative eigenvalue of 4M - K - 2Z, and the proof says so",
           "[stability]") {
   rig::Random random(11);

@@ -291,7 +291,16 @@ Certificate Stability::certify(const ParameterBox& box) {
 
 std::optional<SafeRange> Stability::safe_range(const ParameterBox& box, std::size_t parameter,
                                                double start) {
-  return proofs_->safe_range(box, parameter, start);
+  auto safe = proofs_->safe_range(box, parameter, start);
+  if (start == 0.0 && safe && safe->lowest == 0.0) {
+    // On the other side as well, unless that feeds at once, as a stiffness below 0 does.
+    constexpr double beside = 1e-6;
+    const auto below = proofs_->safe_range(box, parameter, -beside);
+    if (below && below->highest > -beside && below->lowest < -beside) {
+      safe->lowest = below->lowest;
+    }
+  }
+  return safe;
 }
 
 double Stability::share(const ParameterBox& safe, const ParameterBox& wide) {

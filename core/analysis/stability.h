@@ -99,7 +99,8 @@ class Stability {
 
   // Where one parameter keeps the network stable with the others anywhere in the box, around
   // `start` if that is stable: exact if every argument is a straight line along it, else what is
-  // proved by intervals. On the side of 0 on which `start` is. Nothing where no value was found.
+  // proved by intervals. On the side of 0 on which `start` is, on both from 0. Nothing where no
+  // value was found.
   std::optional<SafeRange> safe_range(const ParameterBox& box, std::size_t parameter, double start);
 
   // How far of the way from one box, where it is stable, to one that holds it: 0..1.

@@ -186,6 +186,9 @@ class Gatekeeper {
   // Writes back what one parameter came to.
   void settle(std::size_t i) {
     ParameterInfo& info = parameters_[i];
+    if (is_audio(i) && box_.lowest[i] == box_.highest[i]) {
+      return;  // nothing is proved of it; sound that cannot move would be of no use
+    }
     // Nobody reads it of the bare network.
     if (const auto safe =
             request_.bare ? std::nullopt : stability_.safe_range(box_, i, start_[i])) {
