@@ -65,7 +65,7 @@ class Hands {
 }  // namespace
 
 TEST_CASE("the laws give what their formulas give by hand", "[direct]") {
-  // As printed by mi.lib itself (model-language.md 2.2); the force on a is -f.
+  // As printed by mi.lib itself; the force on a is -f.
   const double deltas[] = {.005, .0099, .01, .05, .099, .1, -.005, -.05};
   const double on_a[] = {.0045, .00891, .009, .005, .0001, 0, -.0045, -.005};
   for (std::size_t i = 0; i < std::size(deltas); ++i) {
@@ -290,7 +290,7 @@ TEST_CASE("voices in neighbouring lanes do not hear each other", "[direct]") {
   }
 }
 
-// --- golden values: model-language.md, appendix A
+// --- golden values of the published laws
 // -------------------------------------------------
 
 namespace {
@@ -382,7 +382,7 @@ TEST_CASE("golden values of appendix A, current laws", "[direct]") {
                 {2000, "0.00518850612"}});
 }
 
-// --- sample values: numerics.md 4.4
+// --- sample values, from an independent simulation
 // ---------------------------------------------------------------
 
 namespace {

@@ -58,7 +58,7 @@ TEST_CASE("a string's lowest mode is 4 sin^2(pi / 2(N+1)) of K and of Z", "[line
                mode_of(scenes::string("s", count, "0.1", "0.001")), 0.1 * share, 0.001 * share,
                1e-9);
   }
-  // numerics.md 4.4
+  // By closed forms and an independent eigenvalue solver.
   CHECK(mode_of(scenes::string("s", 50, "0.1", "0.001"))->frequency_hz ==
         Approx(136.70267890413).epsilon(1e-9));
   CHECK(mode_of(scenes::bowed_string())->frequency_hz == Approx(79.9810014580398).epsilon(1e-9));
@@ -88,7 +88,7 @@ TEST_CASE("the triangle's lowest mode is that of its 2x2 by hand", "[linear]") {
                       (1.0 + slope * slope);
   const auto mode = mode_of(scenes::poly_triangle());
   check_mode("triangle", mode, kappa, zeta, 1e-12);
-  // The true pole, damped out of proportion, is at 858.455895 Hz (numerics.md 4.4).
+  // The true pole, damped out of proportion, is at 858.455895 Hz.
   INFO(show(mode->frequency_hz));
   CHECK(std::fabs(mode->frequency_hz / 858.455895090791 - 1.0) < 1e-4);
 }

@@ -141,7 +141,7 @@ TEST_CASE("springs side by side are one", "[reduce]") {
   CHECK(second.compiled.plan.notes == std::vector<std::string>{"merged: 2 springs beside others"});
 }
 
-// A ground, a spring, a light mass, a spring, a mass of 1: numerics by hand. The light mass moves
+// A ground, a spring, a light mass, a spring, a mass of 1: by hand. The light mass moves
 // by w = k2/(k1 + k2) of the other, which its inertia makes heavier by m w^2.
 TEST_CASE("springs without a damper are merged as well", "[reduce]") {
   const Network network = network_of(

@@ -362,7 +362,7 @@ TEST_CASE("the exact factor on every stiffness is where the lowest eigenvalue is
 }
 
 TEST_CASE("how far one parameter may go, as theory has it", "[stability]") {
-  // numerics: the triangle, by the dense eigenvalues of its three masses.
+  // The triangle, by the dense eigenvalues of its three masses.
   CHECK(highest(scenes::poly_triangle(), "m_K") == exactly(1.31568650461023));
   CHECK(highest(scenes::poly_triangle(), "m_Z") == exactly(0.608843252305113));
   // A string of N: the highest of 2 - 2 cos is 4 cos^2(pi/(2N + 2)), for K + 2Z.
