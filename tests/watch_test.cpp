@@ -148,6 +148,54 @@ TEST_CASE("When sleep ends does not depend on how time is cut", "[watch]") {
   CHECK(std::equal(whole.y().begin(), whole.y().end(), cut.y().begin(), cut.y().end()));
 }
 
+// --- who never stands still ---------------------------------------------------------------------
+
+// As the program does it: with a gain of its own, keys, and the wheel.
+TEST_CASE("What has no bound at rest is played", "[watch]") {
+  struct Case {
+    std::string name;
+    std::string text;
+  };
+  const std::string live = "@K param 0.1\n";
+  const std::vector<Case> cases = {
+      {"a free pair", live + "@a mass 1. 0. 0.\n@b mass 1. 0. 0.\n@s springDamper @a @b K 0.001\n"
+                             "@in1 frcInput @a\n@out1 posOutput @b\n"},
+      {"a free mesh", live + "@p mesh 5 5 1. K 0.001 0. 0.\n@in1 frcInput [@p 0.3 0.3]\n"
+                             "@out1 posOutput [@p 0.7 0.2]\n"},
+      {"a ball on a floor", live + "@g ground 0.\n@m massG 1. 0.00001 0.01 0.01\n"
+                                   "@hit contact @g @m 0.3+K 0. 0.\n@in1 frcInput @m\n"
+                                   "@out1 posOutput @m\n"},
+      {"a force that is heard", live + "@g ground 0.\n@s string 20 1. K 0.001 0. 0.\n"
+                                       "@in1 frcInput [@s 0.3]\n@out1 posOutput [@s 0.7]\n"
+                                       "@out2 frcOutput [@s 0.1]\n"},
+      {"a spring that may let go",
+       "@K param 0.0\n@g ground 0.\n@a mass 1. 0. 0.\n"
+       "@s springDamper @a @g K 0.001\n@in1 frcInput @a\n"
+       "@out1 posOutput @a\n"},
+  };
+  for (const Case& one : cases) {
+    const Network network = rig::network_of(one.text);
+    for (const Precision precision : {Precision::float32, Precision::float64}) {
+      Player player(one.text, default_preset(network, false),
+                    {.voices = 2, .precision = precision, .find_gain = true});
+      INFO(one.name);
+      player.run(30000, {rig::note_on(0, 60), rig::note_on(20000, 67)});
+      for (const double value : {0.0, 0.05, 0.1, 0.2}) {
+        player.run(20000, {rig::parameter(3, 0, value), rig::note_on(5000, 64)});
+      }
+      player.run(300000, {rig::note_off(0, 60), rig::note_off(0, 67), rig::note_off(0, 64)});
+      for (const auto& channel : player.out) {
+        CHECK(
+            std::all_of(channel.begin(), channel.end(), [](double y) { return std::isfinite(y); }));
+      }
+      CHECK(rig::peak(player.y()) > 0.0);
+      CHECK(player.heap_calls == 0);
+      const EngineMeters meters = player.engine().meters();
+      CHECK(meters.resets == 0);
+    }
+  }
+}
+
 // --- who is not accused -------------------------------------------------------------------------
 
 TEST_CASE("Nobody in the instruments creates energy or runs away", "[watch]") {

@@ -18,8 +18,9 @@ bool comes_and_goes(const Link& link) {
 
 }  // namespace
 
-std::vector<Repose> make_repose(const Network& network, const Machine& machine,
-                                const ParameterBox& box) {
+std::vector<std::optional<Repose>> make_repose(const Network& network, const Machine& machine,
+                                               const ParameterBox& box, const Progress& progress) {
+  std::vector<std::optional<Repose>> reposes(machine.parts.size());
   std::map<std::uint32_t, double> given;  // mass -> its compliance
   for (const Output& output : network.outputs) {
     given[output.mass] = 0.0;
@@ -34,18 +35,22 @@ std::vector<Repose> make_repose(const Network& network, const Machine& machine,
     masses.push_back(mass);
   }
   if (masses.size() > most_places) {
-    return {};
+    return reposes;
   }
-  const std::vector<double> found = compliances(network, box, machine.rate_ratio, masses);
-  if (found.empty()) {
-    return {};
+  const auto found = compliances(network, box, machine.rate_ratio, masses, progress);
+  if (!found) {
+    return reposes;
   }
   for (std::size_t i = 0; i < masses.size(); ++i) {
-    given[masses[i]] = found[i];
+    given[masses[i]] = (*found)[i];
   }
-  std::vector<Repose> reposes;
-  for (const Program& program : machine.parts) {
-    Repose repose{.compliances = {}, .reaches = {}, .lowest = box.lowest, .highest = box.highest};
+  std::vector<Limits> limits;
+  for (std::size_t i = 0; i < box.lowest.size(); ++i) {
+    limits.push_back({box.lowest[i], box.highest[i]});
+  }
+  for (std::size_t p = 0; p < reposes.size(); ++p) {
+    const Program& program = machine.parts[p];
+    Repose repose{.compliances = {}, .reaches = {}, .box = limits};
     bool is_known = true;
     for (const OutputSlot& slot : program.outputs) {
       const auto output = std::find_if(
@@ -63,7 +68,9 @@ std::vector<Repose> make_repose(const Network& network, const Machine& machine,
         repose.reaches.push_back({i, root * root});
       }
     }
-    reposes.push_back(is_known ? std::move(repose) : Repose{});
+    if (is_known) {
+      reposes[p] = std::move(repose);
+    }
   }
   return reposes;
 }

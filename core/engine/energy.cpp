@@ -44,6 +44,7 @@ double potential(Law law, const Numbers& c, double d) {
       return pluck_potential(d, c[0], c[1]);
     case Law::bow:
     case Law::smooth_bow:
+    case Law::either_bow:
       return 0.0;
     case Law::contact: {
       const double depth = std::max(0.0, d + c[2]);
@@ -197,6 +198,7 @@ double slope(Law law, const Numbers& c, double d) {
     case Law::pluck:
     case Law::bow:
     case Law::smooth_bow:
+    case Law::either_bow:
     case Law::contact:
       return c[0];
   }

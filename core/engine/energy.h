@@ -23,12 +23,13 @@ struct Energy {
   double scale = 0.0;  // its terms' magnitudes added: what rounding is a share of
 };
 
-// The coefficients of one lane: [coefficient * width].
+// The coefficients of one lane: [coefficient * width + lane].
 template <class T>
 struct LaneValues {
   const T* value = nullptr;
   std::size_t width = 1;
-  double operator[](std::uint32_t c) const { return static_cast<double>(value[c * width]); }
+  std::size_t lane = 0;
+  double operator[](std::uint32_t c) const { return static_cast<double>(value[c * width + lane]); }
 };
 
 // `x` and `v`: [node], as Kernel::save gives them. What only gravity pulls has its potential above

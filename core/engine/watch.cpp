@@ -167,8 +167,8 @@ void Engine::Voices::go_on_looking(Bank<T>& b) {
   const std::size_t lane = looking.at / elements.size();
   const std::size_t p = looking.at % elements.size();
   const PartBank<T>& part = b.parts[p];
-  const LaneValues<T> values{part.of(lane).coefficients.value.data() + lane % part.width,
-                             part.width};
+  const LaneValues<T> values{part.of(lane).coefficients.value.data(), part.width,
+                             lane % part.width};
   const std::size_t end = std::min(elements[p], looking.done + most_elements);
   add_energy(part.program, values, b.x.data(), b.v.data(), looking.done, end, looking.energy);
   looking.done = end;
@@ -205,8 +205,8 @@ void Engine::Voices::judge(Bank<T>& b, const Look& seen) {
   const std::size_t lane = seen.at / elements.size();
   const std::size_t p = seen.at % elements.size();
   PartBank<T>& part = b.parts[p];
-  const LaneValues<T> values{part.of(lane).coefficients.value.data() + lane % part.width,
-                             part.width};
+  const LaneValues<T> values{part.of(lane).coefficients.value.data(), part.width,
+                             lane % part.width};
   Watch& here = watches[seen.at];
   const Energy& energy = seen.energy;
   if (elements[p] > most_elements && here.is_stirred) {
@@ -259,10 +259,10 @@ void Engine::Voices::accuse(const Program& program, LaneValues<T> values, const 
 template <class T>
 bool Engine::Voices::may_rest(const Bank<T>& b, std::size_t lane, std::size_t p,
                               double energy) const {
-  if (playing.bare || p >= playing.repose.size() || voices[lane].fading) {
+  if (playing.bare || !playing.repose[p] || voices[lane].fading) {
     return false;
   }
-  const Repose& repose = playing.repose[p];
+  const Repose& repose = *playing.repose[p];
   const PartBank<T>& part = b.parts[p];
   const double most = 2.0 * energy / voices[lane].factor;
   for (const double compliance : repose.compliances) {
@@ -272,13 +272,13 @@ bool Engine::Voices::may_rest(const Bank<T>& b, std::size_t lane, std::size_t p,
   }
   for (std::size_t i = 0; i < parameters.size(); ++i) {
     if (!part.program.depending[i].empty() &&
-        !(parameters[i] >= repose.lowest[i] && parameters[i] <= repose.highest[i])) {
+        !(parameters[i] >= repose.box[i].lowest && parameters[i] <= repose.box[i].highest)) {
       return false;
     }
   }
-  const LaneValues<T> values{part.of(lane).coefficients.value.data() + lane % part.width,
-                             part.width};
-  return !repose.compliances.empty() && rests_at_zero(part.program, values, b.x.data()) &&
+  const LaneValues<T> values{part.of(lane).coefficients.value.data(), part.width,
+                             lane % part.width};
+  return rests_at_zero(part.program, values, b.x.data()) &&
          std::all_of(repose.reaches.begin(), repose.reaches.end(), [&](const Repose::Reach& reach) {
            return distance_at_rest(part.program, values, b.x.data(), reach.link) >
                   std::sqrt(most * reach.compliance);
