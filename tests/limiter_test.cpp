@@ -114,6 +114,26 @@ TEST_CASE("the gain moves without a step, down before the peak and slowly back",
   CHECK(gain.back() == 1.0);  // and in the end it is a pure delay again
 }
 
+TEST_CASE("the reduction is a share, however deep", "[limiter]") {
+  // One peak each: the gains of those before leave nothing in the later ones' but what they need.
+  for (const double amplitude : {1e3, 1e9, 1e15, 1e17, 1e18, 1e100, 1e300}) {
+    Limiter limiter(44100.0);
+    std::vector<double> y(20 * late, 0.0);
+    std::fill(y.begin() + 10, y.begin() + 4 * late, amplitude);
+    double deepest = 1.0;
+    for (double& sample : y) {
+      double* const channel[] = {&sample};
+      limiter.process(channel, 1);
+      const double reduction = limiter.take_reduction();
+      CHECK(reduction > 0.0);
+      CHECK(reduction <= 1.0);
+      deepest = std::min(deepest, reduction);
+    }
+    INFO(show(amplitude) << " " << show(deepest));
+    CHECK(deepest == Approx(Limiter::ceiling / amplitude).epsilon(1e-14));
+  }
+}
+
 TEST_CASE("all channels share one gain", "[limiter]") {
   Limiter limiter(44100.0);
   std::vector<double> left = sine(4.0, 300.0, 5000);

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 
 namespace ressort {
 namespace {
@@ -11,7 +12,6 @@ constexpr double release_s = 0.08;
 Limiter::Limiter(double rate_hz) : release_(1.0 - std::exp(-1.0 / (release_s * rate_hz))) {
   wanted_.fill(1.0);
   smoothed_.fill(1.0);
-  sum_ = static_cast<double>(lookahead_frames);
 }
 
 // A sample leaves when it is lookahead_frames old. The gain at that moment is the mean of the last
@@ -30,7 +30,6 @@ void Limiter::process(std::span<double* const> channels, std::size_t frames) {
     }
     const double wanted = peak > ceiling ? ceiling / peak : 1.0;
     calm_ = peak > ceiling ? 0 : calm_ + 1;
-    double gain = 1.0;
     if (calm_ <= lookahead_frames || released_ < 1.0) {
       // The sample that leaves now still counts: wanted_[at_] is its.
       const double least = std::min(wanted, *std::min_element(wanted_.begin(), wanted_.end()));
@@ -41,21 +40,18 @@ void Limiter::process(std::span<double* const> channels, std::size_t frames) {
       }
     }
     wanted_[at_] = wanted;
-    if (released_ < 1.0 || sum_ < span) {
-      sum_ += released_ - smoothed_[at_];
+    if (released_ < 1.0 || gain_ < 1.0) {
       smoothed_[at_] = released_;
-      gain = sum_ / span;
-      if (std::all_of(smoothed_.begin(), smoothed_.end(), [](double g) { return g == 1.0; })) {
-        sum_ = span;  // sheds what rounding has gathered
-        gain = 1.0;
-      }
+      // Added up anew each time: a running sum would keep what the roundings of loud and quiet
+      // left.
+      gain_ = std::accumulate(smoothed_.begin(), smoothed_.end(), 0.0) / span;
     }
     for (std::size_t c = 0; c < channels.size(); ++c) {
       const double late = delayed_[c][at_];
       delayed_[c][at_] = channels[c][n];
-      channels[c][n] = gain == 1.0 ? late : std::clamp(late * gain, -ceiling, ceiling);
+      channels[c][n] = gain_ == 1.0 ? late : std::clamp(late * gain_, -ceiling, ceiling);
     }
-    deepest_ = std::min(deepest_, gain);
+    deepest_ = std::min(deepest_, gain_);
     at_ = (at_ + 1) % lookahead_frames;
   }
 }

@@ -28,7 +28,7 @@ class Limiter {
   std::array<std::array<double, lookahead_frames>, max_channels> delayed_{};
   std::array<double, lookahead_frames> wanted_{};    // gain that each sample in flight needs
   std::array<double, lookahead_frames> smoothed_{};  // the last gains, for their mean
-  double sum_ = 0.0;
+  double gain_ = 1.0;
   double released_ = 1.0;
   double release_ = 0.0;
   double deepest_ = 1.0;
