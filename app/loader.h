@@ -6,9 +6,11 @@
 #include <string_view>
 #include <vector>
 
+#include "app/files.h"
 #include "core/model/mdl.h"
 #include "core/model/network.h"
 #include "core/model/preset.h"
+#include "core/progress.h"
 #include "core/result.h"
 
 namespace ressort {
@@ -32,6 +34,8 @@ std::string with_source(const Finding& finding);
 struct SceneOptions {
   bool bare = false;                   // the model without a preset: the network alone
   std::optional<ThirdArgument> third;  // whatever preset and model say
+  Reach reach = Reach::any_file;       // of the name, and of the preset's model
+  Progress progress = {};              // a reading that it stops fails with `stopped`
 };
 
 struct Scene {
@@ -40,9 +44,10 @@ struct Scene {
   std::string model_path;
   Network network;
   Preset preset;
-  bool has_preset = false;            // read from a file, not made up
-  std::string motion;                 // what the third state argument means, and why
-  std::vector<std::string> warnings;  // "file:line:column: warning: ..."
+  bool has_preset = false;             // read from a file, not made up
+  std::optional<ThirdArgument> third;  // what the third state argument means, if that matters
+  std::string motion;                  // the same for a person, and why
+  std::vector<std::string> warnings;   // "file:line:column: warning: ..."
 };
 
 // What came of a name: a scene unless a finding is an error.
@@ -50,6 +55,10 @@ struct Reading {
   std::optional<Scene> scene;
   std::vector<Finding> findings;
 };
+
+// What was told of files, for who may not read them: of what has a place in one, the file's name,
+// line and column and what is wrong, without a word of the text.
+std::string without_source(std::string_view told);
 
 // Finds and reads a model or a preset with its model; goes on after an error in the model, so that
 // every problem is told at once. Without a preset the model gets a default one, `bare` or

@@ -28,6 +28,7 @@ std::size_t slot_of(const Link& link, Quantity quantity, std::span<const Range> 
     }
     case LinkKind::bow:
     case LinkKind::smooth_bow:
+    case LinkKind::either_bow:
       return 0;
   }
   return 0;
@@ -187,9 +188,15 @@ std::optional<double> Proofs::limit(const Suspect& suspect, std::span<const Rang
     return weigh(arguments, {suspect.quantity, argument, value});
   };
   if (suspect.quantity != Quantity::mass) {
-    return edges_.holds(line(0.0), 4.0)
-               ? std::optional(edges_.between(line, 0.0, arguments[argument].highest).value)
-               : std::nullopt;
+    if (!edges_.holds(line(0.0), 4.0)) {
+      return std::nullopt;
+    }
+    // No nearer to where doubles end than need be: there nothing can be halved often enough.
+    double bad = arguments[argument].highest;
+    while (bad > 1e6 && !edges_.holds(line(std::sqrt(bad)), 4.0)) {
+      bad = std::sqrt(bad);
+    }
+    return edges_.between(line, 0.0, bad).value;
   }
   const double lightest = arguments[argument].lowest;
   for (double factor = 16.0; factor < 1e12; factor *= 16.0) {
@@ -252,8 +259,10 @@ Error complaint(const Certificate& certificate) {
             print_limit(certificate.factor, true) + " of what they are";
   } else if (!std::isfinite(culprit.value)) {
     text += " is no number";
-  } else {
+  } else if (is_mass || culprit.value < 0.0) {
     text += is_mass ? " must be above 0" : " is negative, and motion may grow by itself";
+  } else {
+    text += " is too large to be reckoned with";
   }
   return {std::move(text), culprit.place.line, culprit.place.column};
 }

@@ -46,21 +46,26 @@ class Anchors {
 
 }  // namespace
 
-std::vector<double> compliances(const Network& network, const ParameterBox& box, double rate_ratio,
-                                std::span<const std::uint32_t> masses) {
+std::optional<std::vector<double>> compliances(const Network& network, const ParameterBox& box,
+                                               double rate_ratio,
+                                               std::span<const std::uint32_t> masses,
+                                               const Progress& progress) {
   const auto moving = std::count_if(network.masses.begin(), network.masses.end(),
                                     [](const Mass& mass) { return moves(mass); });
   if (static_cast<std::size_t>(moving) > most_compliant_masses) {
-    return {};
+    return std::nullopt;
   }
   const Stencil stencil = make_stencil(network);
+  if (!stencil.is_complete) {
+    return std::nullopt;
+  }
   const std::vector<Range> arguments = argument_ranges(network, box);
   Anchors anchors(stencil);
   std::vector<double> weights;
   for (const Stencil::Term& term : stencil.terms) {
     const double stiff = lowest_load(network, term, arguments, rate_ratio).stiff;
     if (!(stiff >= 0.0)) {
-      return {};
+      return std::nullopt;
     }
     if (stiff > 0.0) {
       anchors.join(stencil.of(term));
@@ -74,12 +79,13 @@ std::vector<double> compliances(const Network& network, const ParameterBox& box,
     diagonal[row] = anchors.holds(row) ? 0.0 : 1.0;
     row_of[stencil.masses[row]] = row;
   }
-  Definite matrix(stencil);
-  if (!matrix.factor(diagonal, weights)) {
-    return {};
+  Definite matrix(stencil, progress);
+  if (!matrix.is_feasible() || !matrix.factor(diagonal, weights)) {
+    return std::nullopt;
   }
   std::vector<double> found;
   for (const std::uint32_t mass : masses) {
+    progress.spend(2 * diagonal.size());
     std::vector<double> push(diagonal.size());
     bool is_held = !is_live_place(network, mass);
     if (is_held) {

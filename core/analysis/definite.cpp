@@ -1,14 +1,14 @@
 #include "core/analysis/definite.h"
 
-#include <Eigen/Sparse>
 #include <algorithm>
 #include <cassert>
-#include <cmath>
+
+#include "core/analysis/cholesky.h"
 
 namespace ressort {
 namespace {
 
-using Sparse = Eigen::SparseMatrix<double>;
+using Sparse = Cholesky::Matrix;
 
 // Calls `use(row, column, share)` for what a term has in the lower triangle.
 template <class Use>
@@ -24,7 +24,7 @@ void each_pair(std::span<const Stencil::Entry> entries, Use&& use) {
 }  // namespace
 
 struct Definite::Matrix {
-  explicit Matrix(const Stencil& stencil) {
+  Matrix(const Stencil& stencil, const Progress& progress) {
     const auto size = static_cast<int>(stencil.masses.size());
     std::vector<Eigen::Triplet<double>> triplets;
     for (int i = 0; i < size; ++i) {
@@ -33,10 +33,15 @@ struct Definite::Matrix {
     for (const Stencil::Term& term : stencil.terms) {
       each_pair(stencil.of(term),
                 [&](int row, int column, double) { triplets.emplace_back(row, column, 0.0); });
+      progress.spend(1);
     }
     sum.resize(size, size);
     sum.setFromTriplets(triplets.begin(), triplets.end());
-    solver.analyzePattern(sum);
+    progress.spend(triplets.size());
+    is_feasible = solver.analyze(sum, progress);
+    if (!is_feasible) {
+      return;
+    }
     slots.reserve(triplets.size() - stencil.masses.size());
     for (std::size_t i = stencil.masses.size(); i < triplets.size(); ++i) {
       slots.push_back(slot(triplets[i].row(), triplets[i].col()));
@@ -53,16 +58,24 @@ struct Definite::Matrix {
 
   Sparse sum;
   std::vector<int> slots;  // [pair of a term]
-  Eigen::SimplicialLLT<Sparse, Eigen::Lower> solver;
+  Cholesky solver;
+  bool is_feasible = false;
 };
 
-Definite::Definite(const Stencil& stencil) : stencil_(stencil) {}
+Definite::Definite(const Stencil& stencil, Progress progress)
+    : stencil_(stencil), progress_(std::move(progress)) {}
 Definite::~Definite() = default;
 
-bool Definite::factor(std::span<const double> diagonal, std::span<const double> weights) {
+bool Definite::is_feasible() {
   if (!matrix_) {
-    matrix_ = std::make_unique<Matrix>(stencil_);
+    matrix_ = std::make_unique<Matrix>(stencil_, progress_);
   }
+  return matrix_->is_feasible;
+}
+
+bool Definite::factor(std::span<const double> diagonal, std::span<const double> weights) {
+  [[maybe_unused]] const bool can = is_feasible();
+  assert(can);
   double* const values = matrix_->sum.valuePtr();
   std::fill_n(values, matrix_->sum.nonZeros(), 0.0);
   for (std::size_t i = 0; i < diagonal.size(); ++i) {
@@ -73,15 +86,13 @@ bool Definite::factor(std::span<const double> diagonal, std::span<const double> 
     each_pair(stencil_.of(stencil_.terms[t]),
               [&](int, int, double share) { values[*at++] -= weights[t] * share; });
   }
-  matrix_->solver.factorize(matrix_->sum);
-  return matrix_->solver.info() == Eigen::Success;
+  progress_.spend(weights.size());
+  return matrix_->solver.factor(matrix_->sum, progress_);
 }
 
 void Definite::solve(std::vector<double>& x) const {
   assert(matrix_);
-  Eigen::Map<Eigen::VectorXd> mapped(x.data(), static_cast<Eigen::Index>(x.size()));
-  const Eigen::VectorXd solved = matrix_->solver.solve(mapped);
-  mapped = solved;
+  matrix_->solver.solve(x.data());
 }
 
 }  // namespace ressort

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "core/analysis/stencil.h"
+#include "core/progress.h"
 
 namespace ressort {
 
@@ -13,8 +14,12 @@ namespace ressort {
 // at the first use and kept. O(rows) for strings, about O(rows^1.5) for meshes. Keeps a reference.
 class Definite {
  public:
-  explicit Definite(const Stencil& stencil);
+  explicit Definite(const Stencil& stencil, Progress progress = {});
   ~Definite();
+
+  // Whether a factorisation takes no more than Cholesky::most_work: not where rows hang together
+  // at random. Else nothing else may be asked.
+  bool is_feasible();
 
   // With D by row and w by term: is the matrix positive definite? [any thread but audio]
   bool factor(std::span<const double> diagonal, std::span<const double> weights);
@@ -25,6 +30,7 @@ class Definite {
  private:
   struct Matrix;
   const Stencil& stencil_;
+  Progress progress_;
   std::unique_ptr<Matrix> matrix_;
 };
 

@@ -51,12 +51,21 @@ Bound edge_bound(const Stencil& stencil, const Weights& weights) {
   return bound;
 }
 
-EdgeFinder::EdgeFinder(const Stencil& stencil, bool is_exact)
-    : stencil_(stencil), is_exact_(is_exact && stencil.is_complete), definite_(stencil) {}
+EdgeFinder::EdgeFinder(const Stencil& stencil, bool is_exact, Progress progress)
+    : stencil_(stencil),
+      is_exact_(is_exact && stencil.is_complete),
+      progress_(std::move(progress)),
+      definite_(stencil, progress_) {}
+
+bool EdgeFinder::is_exact() {
+  is_exact_ = is_exact_ && definite_.is_feasible();
+  return is_exact_;
+}
 
 bool EdgeFinder::holds(const Weights& weights, double limit) {
+  progress_.spend(stencil_.entries.size());
   return stencil_.is_complete && is_usable(weights) &&
-         (edge_bound(stencil_, weights).value < limit || (is_exact_ && factors(weights, limit)));
+         (edge_bound(stencil_, weights).value < limit || factors(weights, limit));
 }
 
 bool EdgeFinder::is_definite(std::span<const double> diagonal, std::span<const double> terms) {
@@ -64,7 +73,7 @@ bool EdgeFinder::is_definite(std::span<const double> diagonal, std::span<const d
 }
 
 bool EdgeFinder::factors(const Weights& weights, double limit) {
-  if (!is_usable(weights)) {
+  if (!is_exact_ || !is_usable(weights)) {
     return false;
   }
   // What the diagonal refuses needs no factorisation.
@@ -78,7 +87,7 @@ bool EdgeFinder::factors(const Weights& weights, double limit) {
       rest[entry.row] -= weights.terms[t] * entry.share * entry.share;
     }
   }
-  return std::all_of(rest.begin(), rest.end(), [](double d) { return d > 0.0; }) &&
+  return std::all_of(rest.begin(), rest.end(), [](double d) { return d > 0.0; }) && is_exact() &&
          definite_.factor(diagonal, weights.terms);
 }
 
@@ -100,7 +109,7 @@ EdgeFinder::Margin EdgeFinder::margin(const Weights& weights, std::span<const do
 }
 
 // Where the shape's margin is 0: at once if the line is straight, else by halves.
-double EdgeFinder::crossing(const Line& line, std::span<const double> shape, double safe,
+double EdgeFinder::crossing(const WeightLine& line, std::span<const double> shape, double safe,
                             double bad) const {
   constexpr double rounding = 1e-14;
   const double inside = margin(line(safe), shape).rest;
@@ -139,7 +148,7 @@ void EdgeFinder::refine(const Weights& weights, std::vector<double>& shape) cons
 
 // The bound of every term is a straight line in what the weights are straight in, or in its
 // inverse if that is a mass: two places say where the first of them meets the limit.
-std::optional<double> EdgeFinder::met(const Line& line, double safe) {
+std::optional<double> EdgeFinder::met(const WeightLine& line, double safe) {
   const double other = safe > 0.0 ? 0.5 * safe : 1.0;
   const auto bounds_at = [&](double at) {
     std::vector<double> bounds(stencil_.terms.size());
@@ -174,18 +183,19 @@ std::optional<double> EdgeFinder::met(const Line& line, double safe) {
   return std::nullopt;
 }
 
-Edge EdgeFinder::between(const Line& line, double safe, double bad) {
-  std::vector<double> shape(is_exact_ ? stencil_.masses.size() : 0);
+Edge EdgeFinder::between(const WeightLine& line, double safe, double bad) {
+  const bool is_exact = this->is_exact();
+  std::vector<double> shape(is_exact ? stencil_.masses.size() : 0);
   for (std::size_t i = 0; i < shape.size(); ++i) {
     shape[i] = std::cos(static_cast<double>(i * i));  // like no mode in particular
   }
   const auto is_safe = [&](double at) {
     const Weights weights = line(at);
-    return is_exact_ ? factors(weights, limit_of_scheme) : holds(weights, limit_of_scheme);
+    return is_exact ? factors(weights, limit_of_scheme) : holds(weights, limit_of_scheme);
   };
-  bool has_factor = is_exact_ && is_safe(safe);  // of the matrix at `safe`
+  bool has_factor = is_exact && is_safe(safe);  // of the matrix at `safe`
   for (int round = 0; round < 100; ++round) {
-    const double enough = is_exact_ ? precision : bound_precision;
+    const double enough = is_exact ? precision : bound_precision;
     if (std::fabs(bad - safe) <= enough * std::max(std::fabs(bad), std::fabs(safe))) {
       break;
     }
@@ -199,12 +209,12 @@ Edge EdgeFinder::between(const Line& line, double safe, double bad) {
     }
     has_factor = is_safe(next);
     (has_factor ? safe : bad) = next;
-    has_factor &= is_exact_;
+    has_factor &= is_exact;
   }
-  return {is_exact_ ? bad : safe, std::move(shape)};
+  return {is_exact ? bad : safe, std::move(shape)};
 }
 
-std::optional<Edge> EdgeFinder::outwards(const Line& line, double safe) {
+std::optional<Edge> EdgeFinder::outwards(const WeightLine& line, double safe) {
   const double direction = safe < 0.0 ? -1.0 : 1.0;
   const auto is_safe = [&](double at) { return holds(line(at), limit_of_scheme); };
   if (is_safe(safe + direction * 1e12 * std::max(std::fabs(safe), 1.0))) {

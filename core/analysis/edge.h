@@ -18,7 +18,7 @@ struct Weights {
 };
 
 // The weights along a line: where one parameter goes, for instance.
-using Line = std::function<Weights(double)>;
+using WeightLine = std::function<Weights(double)>;
 
 struct Edge {
   double value = 0.0;
@@ -38,23 +38,23 @@ Bound edge_bound(const Stencil& stencil, const Weights& weights);
 // the factorisation's pattern. [any thread but audio]
 class EdgeFinder {
  public:
-  // Not exact: by the edge bound alone, without factorisations.
-  EdgeFinder(const Stencil& stencil, bool is_exact);
-  bool is_exact() const { return is_exact_; }
+  // Not exact, as wanted or because factorisations would take too long: by the edge bound alone.
+  EdgeFinder(const Stencil& stencil, bool is_exact, Progress progress = {});
+  bool is_exact();
 
   // Is it stable there? At once where the edge bound says so. A `limit` below 4 is for rounding.
   bool holds(const Weights& weights, double limit);
 
   // The edge between a place that holds and one that does not: to 13 digits, with about eight
   // factorisations where the line is straight; by the bound to three, on the safe side.
-  Edge between(const Line& line, double safe, double bad);
+  Edge between(const WeightLine& line, double safe, double bad);
 
   // The first edge beyond `safe`, going away from 0, upwards if `safe` is 0; nothing up to 1e12.
-  std::optional<Edge> outwards(const Line& line, double safe);
+  std::optional<Edge> outwards(const WeightLine& line, double safe);
 
   // The edge by the bound alone, on either side of `safe` and 0 or above; at once, with six looks
   // at the line. Nothing where it has to be searched for.
-  std::optional<double> met(const Line& line, double safe);
+  std::optional<double> met(const WeightLine& line, double safe);
 
   // Is D less the sum over terms positive definite, with D by row?
   bool is_definite(std::span<const double> diagonal, std::span<const double> terms);
@@ -66,11 +66,13 @@ class EdgeFinder {
     double size = 0.0;
   };
   Margin margin(const Weights& weights, std::span<const double> shape) const;
-  double crossing(const Line& line, std::span<const double> shape, double safe, double bad) const;
+  double crossing(const WeightLine& line, std::span<const double> shape, double safe,
+                  double bad) const;
   void refine(const Weights& weights, std::vector<double>& shape) const;
 
   const Stencil& stencil_;
-  bool is_exact_;
+  bool is_exact_;  // as far as is known yet
+  Progress progress_;
   Definite definite_;
 };
 

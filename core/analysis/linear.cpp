@@ -9,13 +9,16 @@
 #include <numbers>
 #include <stdexcept>
 
+#include "core/analysis/cholesky.h"
+
 namespace ressort {
 namespace {
 
-using Sparse = Eigen::SparseMatrix<double>;
+using Sparse = Cholesky::Matrix;
 using Vector = Eigen::VectorXd;
 
-constexpr int dense_size = 64;   // below this a dense solver is faster and never fails
+constexpr int dense_size = 64;  // below this a dense solver is faster and never fails
+constexpr Eigen::Index most_general_masses = 20'000;  // their factorisation cannot be stopped
 constexpr double rigid = 1e-12;  // a smaller share of the largest stiffness is rounding
 
 // The linear part of a network: what moves, numbered anew, and what pulls at it.
@@ -103,23 +106,35 @@ class Body {
 class Inverse {
  public:
   using Scalar = double;
-  explicit Inverse(const Sparse& lower) : matrix_(lower) {}
-  Eigen::Index rows() const { return matrix_.rows(); }
-  Eigen::Index cols() const { return matrix_.cols(); }
-  void set_shift(double shift) {
-    factor_.setShift(-shift);
-    factor_.compute(matrix_);
-    if (factor_.info() != Eigen::Success) {
-      throw std::runtime_error("not positive");
-    }
-  }
+  Inverse(const Cholesky& factor, Eigen::Index size, const Progress& progress)
+      : factor_(factor), size_(size), progress_(progress) {}
+  Eigen::Index rows() const { return size_; }
+  Eigen::Index cols() const { return size_; }
+  void set_shift(double) {}  // it has been factored
   void perform_op(const double* from, double* to) const {
-    Eigen::Map<Vector>(to, rows()) = factor_.solve(Eigen::Map<const Vector>(from, rows()));
+    std::copy_n(from, size_, to);
+    factor_.solve(to);
+    progress_.spend(static_cast<std::size_t>(4 * size_));
   }
 
  private:
-  const Sparse& matrix_;
-  Eigen::SimplicialLLT<Sparse> factor_;
+  const Cholesky& factor_;
+  Eigen::Index size_;
+  const Progress& progress_;
+};
+
+// The same for negative stiffnesses.
+class General : public Spectra::SparseSymShiftSolve<double> {
+ public:
+  General(const Sparse& lower, const Progress& progress)
+      : Spectra::SparseSymShiftSolve<double>(lower), progress_(progress) {}
+  void perform_op(const double* from, double* to) const {
+    Spectra::SparseSymShiftSolve<double>::perform_op(from, to);
+    progress_.spend(static_cast<std::size_t>(8 * rows()));
+  }
+
+ private:
+  const Progress& progress_;
 };
 
 struct Pairs {
@@ -130,12 +145,15 @@ struct Pairs {
 // The `count` eigenpairs nearest to `shift`, which lies a little below 0 so that free networks can
 // be factored too.
 template <class Shifted>
-bool near_zero(const Sparse& lower, double shift, int count, Pairs& pairs) {
+bool near_zero(Shifted shifted, double shift, int count, Pairs& pairs) {
+  constexpr Eigen::Index most_numbers = 30'000'000;  // of the vectors of all rounds
+  const int vectors = std::max(12, 4 * count);
+  const Eigen::Index rounds =
+      std::clamp<Eigen::Index>(most_numbers / (vectors * shifted.rows()), 10, 200);
   try {  // Spectra tells by exceptions what it cannot factor or iterate
-    Shifted shifted(lower);
-    Spectra::SymEigsShiftSolver<Shifted> solver(shifted, count, std::max(12, 4 * count), shift);
+    Spectra::SymEigsShiftSolver<Shifted> solver(shifted, count, vectors, shift);
     solver.init();
-    solver.compute(Spectra::SortRule::LargestMagn, 200, 1e-10, Spectra::SortRule::SmallestAlge);
+    solver.compute(Spectra::SortRule::LargestMagn, rounds, 1e-10, Spectra::SortRule::SmallestAlge);
     if (solver.info() != Spectra::CompInfo::Successful) {
       return false;
     }
@@ -149,16 +167,32 @@ bool near_zero(const Sparse& lower, double shift, int count, Pairs& pairs) {
 }
 
 // The lowest eigenpair above `floor`. Most often it is the first.
-bool lowest_pair(const Sparse& lower, double floor, double& value, Vector& vector) {
-  using General = Spectra::SparseSymShiftSolve<double>;  // for negative stiffnesses
+bool lowest_pair(const Sparse& lower, double floor, const Progress& progress, double& value,
+                 Vector& vector) {
   const double shift = -1e3 * floor;
+  Cholesky factor;
+  bool is_positive = false;
+  if (lower.rows() > dense_size) {
+    if (!factor.analyze(lower, progress)) {
+      return false;
+    }
+    Sparse shifted = lower;
+    for (Eigen::Index k = 0; k < lower.rows(); ++k) {
+      shifted.coeffRef(k, k) -= shift;
+    }
+    is_positive = factor.factor(shifted, progress);
+    if (!is_positive && lower.rows() > most_general_masses) {
+      return false;
+    }
+  }
   Pairs pairs;
   for (const int count : {1, 6}) {
     if (lower.rows() <= dense_size) {
       const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> solver{Eigen::MatrixXd(lower)};
       pairs = {solver.eigenvalues(), solver.eigenvectors()};
-    } else if (!near_zero<Inverse>(lower, shift, count, pairs) &&
-               !near_zero<General>(lower, shift, count, pairs)) {
+    } else if (!(is_positive
+                     ? near_zero(Inverse(factor, lower.rows(), progress), shift, count, pairs)
+                     : near_zero(General(lower, progress), shift, count, pairs))) {
       return false;
     }
     for (Eigen::Index i = 0; i < pairs.values.size(); ++i) {
@@ -174,7 +208,8 @@ bool lowest_pair(const Sparse& lower, double floor, double& value, Vector& vecto
 
 }  // namespace
 
-std::optional<Mode> lowest_mode(const Network& network, std::span<const double> parameters) {
+std::optional<Mode> lowest_mode(const Network& network, std::span<const double> parameters,
+                                const Progress& progress) {
   const Body body(network, parameters);
   const Sparse stiffness = body.stiffness();
   if (stiffness.rows() == 0) {
@@ -189,7 +224,7 @@ std::optional<Mode> lowest_mode(const Network& network, std::span<const double> 
   Mode mode;
   Vector shape;
   if (!std::isfinite(largest) || largest == 0.0 ||
-      !lowest_pair(stiffness, rigid * largest, mode.stiffness, shape)) {
+      !lowest_pair(stiffness, rigid * largest, progress, mode.stiffness, shape)) {
     return std::nullopt;
   }
   mode.damping = body.damping(shape);

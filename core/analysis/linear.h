@@ -5,6 +5,7 @@
 #include <span>
 
 #include "core/model/network.h"
+#include "core/progress.h"
 
 namespace ressort {
 
@@ -17,8 +18,10 @@ struct Mode {
 
 // The slowest mode that is no rigid motion, with springs, dampers and oscillators only: plucks,
 // bows and contacts are open, position inputs are held. Its damping is the modal share of Z.
-// Nothing where no mass is sprung. Sparse shift and invert: milliseconds for 1000 masses.
-// [any thread but audio]
-std::optional<Mode> lowest_mode(const Network& network, std::span<const double> parameters);
+// Nothing where no mass is sprung, and where it would take too long: where masses hang together at
+// random (Cholesky::most_work), or nearly alone. Sparse shift and invert: milliseconds for 1000
+// masses. [any thread but audio]
+std::optional<Mode> lowest_mode(const Network& network, std::span<const double> parameters,
+                                const Progress& progress = {});
 
 }  // namespace ressort

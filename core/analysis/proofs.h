@@ -13,7 +13,10 @@ namespace ressort {
 
 class Proofs {
  public:
-  Proofs(Network network, double rate_ratio, std::size_t most_exact);
+  Proofs(Network network, double rate_ratio, std::size_t most_exact, Progress progress);
+
+  bool is_exact() { return edges_.is_exact(); }
+  std::size_t size() const { return stencil_.terms.size(); }
 
   Verdict prove(const ParameterBox& box);
   Certificate certify(const ParameterBox& box);
@@ -43,7 +46,7 @@ class Proofs {
   bool feeds(std::span<const Range> arguments);
   bool is_positive(std::span<const double> terms);
   Course course_along(std::size_t parameter) const;
-  SafeRange range_around(const Line& line, double anchor);
+  SafeRange range_around(const WeightLine& line, double anchor);
 
   // blame.cpp
   std::optional<Suspect> nonsense(std::span<const Range> arguments) const;
@@ -60,6 +63,7 @@ class Proofs {
   std::vector<Macro> macros_;
   Network network_;  // without macros
   double rate_ratio_;
+  Progress progress_;
   Stencil stencil_;
   EdgeFinder edges_;
 };

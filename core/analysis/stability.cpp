@@ -30,16 +30,20 @@ Network always_felt(Network network) {
   return network;
 }
 
-Proofs::Proofs(Network network, double rate_ratio, std::size_t most_exact)
+Proofs::Proofs(Network network, double rate_ratio, std::size_t most_exact, Progress progress)
     : macros_(network.macros),
       network_(network.macros.empty() ? std::move(network) : expand_macros(network)),
       rate_ratio_(rate_ratio),
+      progress_(std::move(progress)),
       stencil_(make_stencil(network_)),
-      edges_(stencil_, stencil_.masses.size() <= most_exact) {}
+      edges_(stencil_, stencil_.masses.size() <= most_exact, progress_) {
+  progress_.spend(stencil_.entries.size());
+}
 
 // --- weights ------------------------------------------------------------------------------------
 
 std::vector<Load> Proofs::loads(std::span<const Range> arguments) const {
+  progress_.spend(stencil_.terms.size());
   std::vector<Load> all;
   all.reserve(stencil_.terms.size());
   for (const Stencil::Term& term : stencil_.terms) {
@@ -49,6 +53,7 @@ std::vector<Load> Proofs::loads(std::span<const Range> arguments) const {
 }
 
 std::vector<Load> Proofs::lowest_loads(std::span<const Range> arguments) const {
+  progress_.spend(stencil_.terms.size());
   std::vector<Load> all;
   all.reserve(stencil_.terms.size());
   for (const Stencil::Term& term : stencil_.terms) {
@@ -216,14 +221,14 @@ std::optional<SafeRange> Proofs::safe_range(const ParameterBox& box, std::size_t
   if (course == Course::flat) {
     return SafeRange{-infinity, infinity};
   }
-  const Line line = [&](double at) {
+  const WeightLine line = [&](double at) {
     return course == Course::straight ? between(at, at) : between(*anchor, at);
   };
   const SafeRange found = range_around(line, *anchor);
   return start < 0.0 ? SafeRange{-found.highest, -found.lowest} : found;
 }
 
-SafeRange Proofs::range_around(const Line& line, double anchor) {
+SafeRange Proofs::range_around(const WeightLine& line, double anchor) {
   SafeRange range{0.0, infinity};
   if (const auto edge = edges_.is_exact() ? std::nullopt : edges_.met(line, anchor)) {
     // Masses from there, stiffness up to there; the other side may have another.
@@ -275,11 +280,20 @@ double Proofs::stiffness_factor(const ParameterBox& box) {
 
 // --- the door -----------------------------------------------------------------------------------
 
-Stability::Stability(Network network, double rate_ratio, std::size_t most_exact)
-    : proofs_(std::make_unique<Proofs>(std::move(network), rate_ratio, most_exact)) {}
+Stability::Stability(Network network, double rate_ratio, std::size_t most_exact, Progress progress)
+    : proofs_(std::make_unique<Proofs>(std::move(network), rate_ratio, most_exact,
+                                       std::move(progress))) {}
 Stability::~Stability() = default;
 Stability::Stability(Stability&&) noexcept = default;
 Stability& Stability::operator=(Stability&&) noexcept = default;
+
+bool Stability::is_exact() {
+  return proofs_->is_exact();
+}
+
+std::size_t Stability::size() const {
+  return proofs_->size();
+}
 
 Verdict Stability::prove(const ParameterBox& box) {
   return proofs_->prove(box);

@@ -17,6 +17,7 @@
 
 #include "core/analysis/interval.h"
 #include "core/model/network.h"
+#include "core/progress.h"
 #include "core/result.h"
 
 namespace ressort {
@@ -78,17 +79,24 @@ std::string describe(const SafeRange& safe);
 
 class Proofs;
 
-// Proofs and limits for one network; takes its macros apart once. Exact up to `most_exact` masses,
-// above by the edge bound, on the safe side. Places on macros whose coordinates are live are
+// Proofs and limits for one network; takes its macros apart once. Exact up to `most_exact` masses
+// that do not hang together at random (Cholesky::most_work), else by the edge bound, on the safe
+// side. Places on macros whose coordinates are live are
 // counted at all nodes at once: safe, not exact. [any thread but audio]
 class Stability {
  public:
   static constexpr std::size_t most_exact_masses = 40'000;
 
-  Stability(Network network, double rate_ratio, std::size_t most_exact = most_exact_masses);
+  Stability(Network network, double rate_ratio, std::size_t most_exact = most_exact_masses,
+            Progress progress = {});
   ~Stability();
   Stability(Stability&&) noexcept;
   Stability& operator=(Stability&&) noexcept;
+
+  // Whether it is; else by the bound.
+  bool is_exact();
+  // How many links and oscillators it has to do with.
+  std::size_t size() const;
 
   // Is it stable with the parameters anywhere in the box? O(links) where the edge bound says yes,
   // one factorisation otherwise.

@@ -29,7 +29,12 @@ class StencilMaker {
         close(i, false);
       }
     }
-    for (std::uint32_t i = 0; i < network_.links.size(); ++i) {
+    std::uint64_t wandering = 0;
+    for (const Link& link : network_.links) {
+      wandering += link.a == link.b ? 0 : nodes_under(link.a) + nodes_under(link.b);
+    }
+    out_.is_complete = wandering <= most_wandering;
+    for (std::uint32_t i = 0; i < network_.links.size() && out_.is_complete; ++i) {
       if (network_.links[i].a != network_.links[i].b) {
         place(i);
       }
@@ -55,14 +60,20 @@ class StencilMaker {
         continue;
       }
       const Tap& tap = network_.taps[network_.masses[end].tap];
-      wandering_ += std::uint64_t{tap.length} * tap.width;
-      out_.is_complete &= wandering_ <= most_wandering;
-      const std::uint32_t nodes = out_.is_complete ? tap.length * tap.width : 0;
-      for (std::uint32_t node = tap.first; node < tap.first + nodes; ++node) {
+      for (std::uint32_t node = tap.first; node < tap.first + tap.length * tap.width; ++node) {
         add_end(node, 1.0);
         close(index, true, scale);
       }
     }
+  }
+
+  // How many terms an end at a place that moves takes.
+  std::uint64_t nodes_under(std::uint32_t mass) const {
+    if (!is_live_place(network_, mass)) {
+      return 0;
+    }
+    const Tap& tap = network_.taps[network_.masses[mass].tap];
+    return std::uint64_t{tap.length} * tap.width;
   }
 
   bool is_held(std::uint32_t mass) const {
@@ -105,7 +116,6 @@ class StencilMaker {
   Stencil out_;
   std::vector<std::uint32_t> row_;  // [mass of the network]
   std::size_t first_ = 0;           // of the entries of the term at hand
-  std::uint64_t wandering_ = 0;     // terms that stand for links at live places
 };
 
 }  // namespace
@@ -161,6 +171,7 @@ Load highest_load(const Network& network, const Stencil::Term& term,
     case LinkKind::bow:
       return {.rubbed = 2.0 * value(0) * r * 2.0 / 3.0};
     case LinkKind::smooth_bow:
+    case LinkKind::either_bow:  // the smooth one is the steeper
       return {.rubbed = 2.0 * value(0) * r * 1.0387};
   }
   return {};
@@ -195,6 +206,7 @@ Load lowest_load(const Network& network, const Stencil::Term& term,
       return load(value[0], value[1], false);
     case LinkKind::bow:
     case LinkKind::smooth_bow:
+    case LinkKind::either_bow:
       return load(no_argument, value[0], false);
   }
   return {};

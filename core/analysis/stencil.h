@@ -40,7 +40,7 @@ struct Stencil {
   std::vector<std::uint32_t> masses;  // [row] index into Network::masses
   std::vector<Term> terms;
   std::vector<Entry> entries;
-  bool is_complete = true;  // not if live places would have taken too many terms
+  bool is_complete = true;  // not if live places would take too many terms: then no link is in it
 
   std::span<const Entry> of(const Term& term) const {
     return std::span(entries).subspan(term.first, term.count);

@@ -16,8 +16,9 @@ bool is_spring(const LinkRun& run) {
 
 class ChainFinder {
  public:
-  explicit ChainFinder(const Program& program)
+  ChainFinder(const Program& program, const Progress& progress)
       : program_(program),
+        progress_(progress),
         mass_run_(program.position.size(), none),
         can_hold_(program.position.size(), true),
         run_of_(program.ends.size()),
@@ -98,6 +99,7 @@ class ChainFinder {
 
   Found search(const LinkRun& run) {
     Found found;
+    progress_.spend(6 * std::size_t{run.count});
     const auto each_spring = [&](auto&& use) {
       for (std::uint32_t link = run.first; link < run.first + run.count; ++link) {
         use(link, program_.ends[link]);
@@ -192,7 +194,13 @@ class ChainFinder {
   // Second springs from each mass of a row to the next but one, if there are any everywhere.
   void stiffen(const LinkRun& run, const std::vector<std::uint32_t>& row, Chain& chain,
                std::vector<std::uint32_t>& springs) const {
+    constexpr int most_tries = 8;
+    int tries = 0;
     for (const std::uint32_t first : springs_at_[row[0]]) {
+      if (row.size() < 3 || other(first, row[0]) != row[2] || is_used_[first] ||
+          ++tries > most_tries) {
+        continue;
+      }
       const LinkRun& second = *run_of_[first];
       std::vector<std::uint32_t> used;
       for (std::size_t i = 0; i + 2 < row.size() && used.size() == i; ++i) {
@@ -222,6 +230,7 @@ class ChainFinder {
   // A spring of one run from a node to one that is asked for.
   template <class IsAskedFor>
   std::uint32_t spring_at(std::uint32_t node, const LinkRun& run, IsAskedFor&& is_asked_for) const {
+    progress_.spend(springs_at_[node].size());
     for (const std::uint32_t spring : springs_at_[node]) {
       if (run_of_[spring] == &run && !is_used_[spring] && is_asked_for(other(spring, node))) {
         return spring;
@@ -236,6 +245,7 @@ class ChainFinder {
   }
 
   const Program& program_;
+  const Progress& progress_;
   std::vector<std::uint32_t> mass_run_;                 // [node], none: it does not move
   std::vector<bool> can_hold_;                          // [node] grounds and position inputs
   std::vector<const LinkRun*> run_of_;                  // [link] if it is a spring
@@ -248,7 +258,7 @@ class ChainFinder {
 
 }  // namespace
 
-std::optional<Chains> chains_form(const Program& program) {
+std::optional<Chains> chains_form(const Program& program, const Progress& progress) {
   const auto is_force = [](const OutputSlot& output) { return output.is_force; };
   if ((!program.taps.empty() || !is_plain(program)) &&
       std::any_of(program.outputs.begin(), program.outputs.end(), is_force)) {
@@ -257,7 +267,8 @@ std::optional<Chains> chains_form(const Program& program) {
   if (holds_places(program)) {
     return std::nullopt;
   }
-  return ChainFinder(program).find();
+  progress.spend(4 * program.ends.size());
+  return ChainFinder(program, progress).find();
 }
 
 }  // namespace ressort

@@ -4,6 +4,7 @@
 #include <optional>
 
 #include "core/engine/program.h"
+#include "core/progress.h"
 
 namespace ressort {
 
@@ -14,6 +15,6 @@ inline constexpr std::uint32_t least_chain_masses = 8;  // below, folding is not
 // in no chain, and what ties chains to each other is a link like any other. Springs from every mass
 // to the next but one belong to a chain too. Force outputs beside points on macros are refused.
 // O(nodes + links). [any thread but audio]
-std::optional<Chains> chains_form(const Program& program);
+std::optional<Chains> chains_form(const Program& program, const Progress& progress = {});
 
 }  // namespace ressort

@@ -2,8 +2,8 @@
 
 #include <algorithm>
 #include <array>
-#include <charconv>
 #include <cmath>
+#include <cstdio>
 #include <limits>
 #include <map>
 #include <numbers>
@@ -13,8 +13,11 @@
 #include "core/analysis/stability.h"
 #include "core/compile/cull.h"
 #include "core/compile/machine.h"
+#include "core/compile/memory.h"
 #include "core/compile/merge.h"
 #include "core/compile/repose.h"
+#include "core/engine/passive.h"
+#include "core/model/fit.h"
 #include "core/model/topology.h"
 
 namespace ressort {
@@ -24,45 +27,8 @@ constexpr double to_spare = 0.98;  // of the stiffness that keys may use: higher
 // What may sleep whatever else sounds: -120 dBFS.
 constexpr double inaudible_level = 1e-6;
 
-Error preset_error(const Place& place, std::string message) {
-  return {std::move(message), place.line, place.column};
-}
-
-// The input "inN" of the network, as an index; -1 where it has none.
-int find_input(const Network& network, std::string_view target) {
-  int number = 0;
-  if (target.starts_with("in")) {
-    const char* const end = target.data() + target.size();
-    const auto [last, failure] = std::from_chars(target.data() + 2, end, number);
-    if (failure == std::errc{} && last == end) {
-      for (std::size_t i = 0; i < network.inputs.size(); ++i) {
-        if (network.inputs[i].number == number) {
-          return static_cast<int>(i);
-        }
-      }
-    }
-  }
-  return -1;
-}
-
-int find_parameter(const Network& network, std::string_view name) {
-  for (std::size_t i = 0; i < network.parameters.size(); ++i) {
-    if (network.parameters[i].name == name) {
-      return static_cast<int>(i);
-    }
-  }
-  return -1;
-}
-
-std::string names(const Network& network) {
-  std::string text;
-  for (const Parameter& parameter : network.parameters) {
-    text += (text.empty() ? "" : ", ") + parameter.name;
-  }
-  return text.empty() ? "none" : text;
-}
-
-Result<Control> make_control(const Network& network, const ControlSetting& setting) {
+// Of what fits the network.
+Control make_control(const Network& network, const ControlSetting& setting) {
   static constexpr Source sources[] = {Source::note, Source::controller, Source::pressure,
                                        Source::custom, Source::audio};
   static constexpr Gesture gestures[] = {Gesture::position, Gesture::pluck, Gesture::bow,
@@ -78,44 +44,27 @@ Result<Control> make_control(const Network& network, const ControlSetting& setti
   control.high = setting.high;
   control.exponential = setting.exponential;
   control.travel = setting.travel;
-  const bool to_parameter = control.gesture == Gesture::parameter;
-  const int target =
-      to_parameter ? find_parameter(network, setting.target) : find_input(network, setting.target);
-  if (target < 0) {
-    return preset_error(setting.place,
-                        to_parameter ? "the model has no parameter '" + setting.target +
-                                           "'; it has " + names(network)
-                                     : "the model has no input '" + setting.target + "'; it has " +
-                                           std::to_string(network.inputs.size()));
-  }
-  control.target = static_cast<std::uint16_t>(target);
-  if (to_parameter && control.source == Source::audio) {
-    return preset_error(setting.place, "an audio channel drives an input, not a parameter");
-  }
-  if (!to_parameter) {
-    const bool is_force = network.inputs[static_cast<std::size_t>(target)].is_force;
-    const bool wants_position =
-        control.gesture == Gesture::pluck || control.gesture == Gesture::bow;
-    if (is_force && wants_position) {
-      return preset_error(setting.place, "'" + setting.target +
-                                             "' is a force input, which this gesture cannot play");
-    }
-  }
+  control.target = static_cast<std::uint16_t>(control.gesture == Gesture::parameter
+                                                  ? find_parameter(network, setting.target)
+                                                  : find_input(network, setting.target));
   return control;
 }
 
 // What the parameters may be turned to: the preset's ranges; without one, a generous one. The bare
 // network is research: there anything goes.
-Result<std::vector<ParameterInfo>> parameter_infos(const Network& network, const Preset& preset,
-                                                   bool bare) {
+std::vector<ParameterInfo> parameter_infos(const Network& network, const Preset& preset,
+                                           bool bare) {
   std::vector<ParameterInfo> infos;
   for (const Parameter& parameter : network.parameters) {
     const double reach = bare                     ? std::numeric_limits<double>::max()
                          : parameter.value == 0.0 ? 1.0
                                                   : 4.0 * std::fabs(parameter.value);
     const double least = bare || parameter.value < 0.0 ? -reach : 0.0;
-    infos.push_back(
-        {.name = parameter.name, .value = parameter.value, .minimum = least, .maximum = reach});
+    infos.push_back({.name = parameter.name,
+                     .value = parameter.value,
+                     .minimum = least,
+                     .maximum = reach,
+                     .audio_input = parameter.audio_input});
   }
   if (bare) {
     return infos;
@@ -128,17 +77,32 @@ Result<std::vector<ParameterInfo>> parameter_infos(const Network& network, const
     }
   }
   for (const ParameterSetting& setting : preset.parameters) {
-    const int index = find_parameter(network, setting.name);
-    if (index < 0) {
-      return preset_error(setting.place, "the model has no parameter '" + setting.name +
-                                             "'; it has " + names(network));
-    }
-    ParameterInfo& info = infos[static_cast<std::size_t>(index)];
+    ParameterInfo& info = infos[static_cast<std::size_t>(find_parameter(network, setting.name))];
     info.value = setting.value;
     info.minimum = setting.minimum;
     info.maximum = setting.maximum;
   }
   return infos;
+}
+
+std::vector<double> start_values(const Network& network, const Preset& preset,
+                                 const CompileOptions& options) {
+  std::vector<double> values = parameter_values(network);
+  const auto set = [&](std::string_view name, double value) {
+    if (const int index = find_parameter(network, name); index >= 0) {
+      values[static_cast<std::size_t>(index)] = value;
+    }
+  };
+  if (!options.bare) {
+    for (const ParameterSetting& setting : preset.parameters) {
+      set(setting.name, setting.value);
+    }
+    return values;
+  }
+  for (const Setting& setting : options.settings) {
+    set(setting.parameter, setting.value);
+  }
+  return values;
 }
 
 // The frequency at which a mode's stiffness has grown by `factor`.
@@ -172,23 +136,36 @@ InputInfo input_info(const Network& network, std::size_t index, const Playing& p
 
 // The gain at which a forte note peaks at -6 dBFS, found by playing one: what a model that comes
 // without a preset is played with. 1 where notes excite nothing. Bounded to about 4 million steps
-// of a mass.
-double comfortable_gain(const Machine& machine, const Playing& playing,
-                        const CompileOptions& options) {
+// of a mass; nothing where even the beginning of a note might take seconds.
+std::optional<double> comfortable_gain(const Machine& machine, const Playing& playing,
+                                       const CompileOptions& options) {
   constexpr double forte = 0.8;
   constexpr double wanted_peak = 0.5;
   constexpr double most_steps = 4e6;
-  constexpr std::size_t block = 256;
+  constexpr double most_steps_at_worst = 1e9;
+  constexpr double most_steps_of_block = 4e6;
+  constexpr double steps_of_shared_link = 200.0;  // passive ones are solved together, by Newton
   Playing plain = playing;
   plain.gain = 1.0;
   plain.voices = 1;
-  double masses = 1.0;
+  double steps = 1.0;  // of a sample
+  double at_worst = 1.0;
   for (const Program& program : machine.parts) {
-    masses += program.moving;
+    at_worst += worst_steps(program);
+    steps += program.moving;
+    for (const PassiveLink& link : passive_links(program)) {
+      steps += link.is_shared ? steps_of_shared_link : 1.0;
+    }
   }
-  Engine engine(machine, plain, options.precision, options.isa);
-  const auto frames = static_cast<std::size_t>(
-      std::clamp(most_steps / masses, 0.05 * options.rate_hz, options.rate_hz));
+  const double least = 0.05 * options.rate_hz;
+  const double most = std::min(options.rate_hz, most_steps_at_worst / at_worst);
+  if (most < least) {
+    return std::nullopt;
+  }
+  Engine engine(machine, plain, options.precision, options.isa, options.progress);
+  const auto frames = static_cast<std::size_t>(std::clamp(most_steps / steps, least, most));
+  const auto block =
+      static_cast<std::size_t>(std::clamp(most_steps_of_block / at_worst, 1.0, 256.0));
   std::vector<std::vector<double>> channels(machine.channels, std::vector<double>(block));
   std::vector<double*> outputs;
   for (std::vector<double>& channel : channels) {
@@ -197,6 +174,7 @@ double comfortable_gain(const Machine& machine, const Playing& playing,
   const Event note{.kind = EventKind::note_on, .index = 60, .value = forte};
   double peak = 0.0;
   for (std::size_t at = 0; at < frames; at += block) {
+    options.progress.spend(static_cast<std::size_t>(static_cast<double>(block) * at_worst));
     engine.process({&note, at == 0 ? std::size_t{1} : std::size_t{0}}, {}, outputs, block);
     for (const std::vector<double>& channel : channels) {
       for (const double sample : channel) {
@@ -207,13 +185,43 @@ double comfortable_gain(const Machine& machine, const Playing& playing,
   return peak > 1e-12 ? wanted_peak / peak : 1.0;
 }
 
+std::string in_bytes(std::uint64_t bytes) {
+  char text[32];
+  const double mega = static_cast<double>(bytes) / 1e6;
+  std::snprintf(text, sizeof text, mega < 1e3 ? "%.0f MB" : "%.1f GB",
+                mega < 1e3 ? mega : mega / 1e3);
+  return text;
+}
+
+// Said before the memory is taken: afterwards it would be too late.
+std::optional<Error> shortage(const Machine& machine, int voices, const CompileOptions& options) {
+  const auto bytes_of = [&](int count) { return engine_bytes(machine, count, options.precision); };
+  if (bytes_of(voices) <= options.most_bytes) {
+    return std::nullopt;
+  }
+  int fitting = voices;
+  while (fitting > 0 && bytes_of(fitting) > options.most_bytes) {
+    --fitting;
+  }
+  std::size_t masses = 0;
+  for (const Program& program : machine.parts) {
+    masses += program.moving;
+  }
+  return Error{std::to_string(voices) + (voices == 1 ? " voice" : " voices") + " of " +
+               std::to_string(masses) + " masses would take " + in_bytes(bytes_of(voices)) +
+               " of memory, and there are " + in_bytes(options.most_bytes) + "; " +
+               (fitting > 0 ? "lower the voices to " + std::to_string(fitting)
+                            : std::string("use a smaller model"))};
+}
+
 // The bare network is computed as it is written, unless somebody says how far off it may be.
 bool may_merge(const CompileOptions& options, const Budget& budget) {
   return !options.bare || budget != Budget{};
 }
 
 // The lowest mode, by which keys find their pitch.
-void find_mode(const Network& network, const Preset& preset, Instrument& instrument) {
+void find_mode(const Network& network, const Preset& preset, const Progress& progress,
+               Instrument& instrument) {
   instrument.masses =
       static_cast<std::size_t>(std::count_if(network.masses.begin(), network.masses.end(), moves));
   if (preset.keyboard && instrument.masses <= most_tuned_masses) {
@@ -221,7 +229,8 @@ void find_mode(const Network& network, const Preset& preset, Instrument& instrum
     for (const ParameterInfo& info : instrument.parameters) {
       values.push_back(info.value);
     }
-    instrument.mode = lowest_mode(network, values);
+    progress.stage("finding its lowest mode");
+    instrument.mode = lowest_mode(network, values, progress);
   }
 }
 
@@ -246,7 +255,7 @@ Schemes schemes_of(const Network& network, const Preset& preset, const CompileOp
         std::max(1.0, std::min(most, octaves * octaves * std::exp2(preset.transpose / 6.0)));
   }
   return choose_schemes(network, preset, conditions, is_asked ? budget : unasked,
-                        options.passive_links);
+                        options.passive_links, options.progress);
 }
 
 }  // namespace
@@ -280,12 +289,14 @@ ParameterBox proved_box(const std::vector<ParameterInfo>& parameters, const Pres
 // felt: exactly where that is quick.
 class Margins {
  public:
-  Margins(const Network& network, double rate_ratio) : network_(network), rate_ratio_(rate_ratio) {
+  Margins(const Network& network, double rate_ratio, const Progress& progress)
+      : network_(network), rate_ratio_(rate_ratio), progress_(progress) {
     if (network.masses.size() <= most_quick_masses) {
-      stability_.emplace(network, rate_ratio);
+      stability_.emplace(network, rate_ratio, most_quick_masses, progress);
     }
   }
   double at(const ParameterBox& box) {
+    progress_.spend(4 * network_.links.size());
     const double bound = highest_stiffness_factor(network_, box, rate_ratio_);
     return bound >= most_bounded || !stability_
                ? bound
@@ -299,6 +310,7 @@ class Margins {
  private:
   const Network& network_;
   double rate_ratio_;
+  Progress progress_;
   std::optional<Stability> stability_;
 };
 
@@ -337,43 +349,26 @@ Result<Compiled> compile_expanded(const Network& written, const Network& network
                                   const Budget& budget) {
   Compiled compiled;
   Instrument& instrument = compiled.instrument;
-  auto infos = parameter_infos(network, preset, options.bare);
-  if (!infos) {
-    return infos.error();
-  }
-  instrument.parameters = *std::move(infos);
-  find_mode(network, preset, instrument);
+  instrument.parameters = parameter_infos(network, preset, options.bare);
+  const Progress& progress = options.progress;
+  find_mode(network, preset, progress, instrument);
+  progress.stage("dividing it into parts");
   Schemes schemes = schemes_of(network, preset, options, budget, instrument);
-  Machine machine = make_machine(network, options.rate_hz, options.rescale, schemes.links);
+  Machine machine =
+      make_machine(network, options.rate_hz, options.rescale, schemes.links, progress);
   for (std::size_t i = 0; i < instrument.parameters.size(); ++i) {
     machine.parameters[i] = instrument.parameters[i].value;
   }
 
-  for (const Program& program : machine.parts) {
-    for (const Coefficient& coefficient : program.coefficients) {
-      if (!std::isfinite(coefficient_value(program, coefficient, machine.parameters, 1.0)) &&
-          program.audio_parameters.empty()) {
-        return Error{
-            "with the parameters' values an argument of the model is no finite number, or a "
-            "mass is 0",
-            1, 1};
-      }
-    }
-  }
-
   Playing playing;
   for (const ControlSetting& setting : preset.controls) {
-    auto control = make_control(network, setting);
-    if (!control) {
-      return control.error();
-    }
     if (setting.source == ControlSource::osc) {
       instrument.custom.push_back({setting.address, static_cast<int>(playing.controls.size())});
     }
     if (setting.source == ControlSource::audio) {
       instrument.audio_inputs = std::max(instrument.audio_inputs, setting.number);
     }
-    playing.controls.push_back(*control);
+    playing.controls.push_back(make_control(network, setting));
   }
   for (const Parameter& parameter : network.parameters) {
     instrument.audio_inputs = std::max(instrument.audio_inputs, parameter.audio_input);
@@ -384,6 +379,7 @@ Result<Compiled> compile_expanded(const Network& written, const Network& network
   playing.release_s = preset.release_s;
   playing.noise = preset.noise;
   playing.transpose = preset.transpose;
+  progress.stage("proving that it is stable");
   compiled.gate = guard({.written = written,
                          .expanded = network,
                          .preset = preset,
@@ -392,7 +388,8 @@ Result<Compiled> compile_expanded(const Network& written, const Network& network
                          .bare = options.bare,
                          .is_open = options.force,
                          .settings = options.settings,
-                         .reach = options.reach},
+                         .reach = options.reach,
+                         .progress = progress},
                         instrument.parameters);
   instrument.verdict = compiled.gate.verdict;
   for (const Range& limit : compiled.gate.limits) {
@@ -401,14 +398,14 @@ Result<Compiled> compile_expanded(const Network& written, const Network& network
   const ParameterBox proved = proved_box(instrument.parameters, preset);
   const bool is_plain = all_plain(schemes.links);
   const Network felt = is_plain ? Network{} : always_felt(network, schemes.links);
-  Margins margins(is_plain ? network : felt, machine.rate_ratio);
+  Margins margins(is_plain ? network : felt, machine.rate_ratio, progress);
   instrument.stiffness_margin = margins.at(proved);
   playing.highest_factor = margins.for_keys(proved);
   if (!options.bare) {
     leave_to_keys(margins, proved, playing);
   }
   if (!options.bare && playing.highest_factor >= 1.0) {
-    playing.repose = make_repose(network, machine, proved);
+    playing.repose = make_repose(network, machine, proved, progress);
   }
   if (instrument.mode) {
     playing.tuning = Tuning::keyboard;
@@ -428,6 +425,7 @@ Result<Compiled> compile_expanded(const Network& written, const Network& network
   instrument.links = network.links.size();
   const bool is_published = options.bare && !options.method && !budget.is_physical() &&
                             budget.silence_db == -Budget::unlimited;
+  progress.stage("finding the fastest way to compute it");
   compiled.plan = make_plan(
       machine,
       {.is_double = options.precision == Precision::float64,
@@ -437,14 +435,33 @@ Result<Compiled> compile_expanded(const Network& written, const Network& network
        .highest_factor =
            playing.tuning == Tuning::keyboard ? std::max(1.0, playing.highest_factor) : 1.0,
        .crew = options.crew},
-      is_published ? Method::direct : options.method, options.most_modes, budget);
+      is_published ? Method::direct : options.method, options.most_modes, budget, progress);
   compiled.plan.notes = std::move(schemes.notes);
   if (const std::string left_out = describe(cull(network)); !left_out.empty()) {
     compiled.plan.notes.push_back("left out: " + left_out);
   }
   compiled.schemes = std::move(schemes.links);
+  if (compiled.gate.is_together) {
+    compiled.plan.notes.push_back(
+        "the limits of so many parameters of so many links were not found one by one: all ranges "
+        "were narrowed alike");
+  }
+  if (preset.keyboard && !instrument.mode && instrument.masses > most_quick_masses) {
+    compiled.plan.notes.push_back(
+        "keys do not set the pitch: the lowest mode of so many masses was not found in time");
+  }
+  if (const auto error = shortage(machine, playing.voices, options)) {
+    return *error;
+  }
   if (options.find_gain) {
-    playing.gain *= comfortable_gain(machine, playing, options);
+    progress.stage("finding its gain");
+    if (const auto gain = comfortable_gain(machine, playing, options)) {
+      playing.gain *= *gain;
+    } else {
+      compiled.plan.notes.push_back(
+          "its gain was not looked for, as a note of so large a network takes too long to try; -g "
+          "sets it");
+    }
   }
   instrument.gain = playing.gain;
   for (Program& program : machine.parts) {
@@ -452,20 +469,30 @@ Result<Compiled> compile_expanded(const Network& written, const Network& network
       modes->quiet = inaudible_level / std::max(1e-30, playing.gain);
     }
   }
+  progress.stage("making its voices");
   compiled.engine = std::make_unique<Engine>(std::move(machine), std::move(playing),
-                                             options.precision, options.isa);
+                                             options.precision, options.isa, progress);
   return compiled;
 }
 
-}  // namespace
-
-Result<Compiled> compile(const Network& network, const Preset& preset,
-                         const CompileOptions& options) {
+Result<Compiled> compile_whole(const Network& network, const Preset& preset,
+                               const CompileOptions& options) {
+  options.progress.stage("putting it together");
+  if (auto wrong = misfits(network, preset); !wrong.empty()) {
+    return std::move(wrong.front());
+  }
+  const double rate_ratio = options.rescale ? Network::reference_rate_hz / options.rate_hz : 1.0;
+  if (auto error = no_number(network, start_values(network, preset, options), rate_ratio)) {
+    return *std::move(error);
+  }
   const std::optional<Network> expanded =
-      network.macros.empty() ? std::nullopt : std::optional(expand_macros(network));
+      network.macros.empty() ? std::nullopt
+                             : std::optional(expand_macros(network, options.progress));
   const Network& whole = expanded ? *expanded : network;
+  options.progress.spend(8 * whole.links.size());
   const Budget budget = options.budget.value_or(preset.budget);
-  const auto merged = may_merge(options, budget) ? merge(whole, budget) : std::nullopt;
+  const auto merged =
+      may_merge(options, budget) ? merge(whole, budget, options.progress) : std::nullopt;
   if (!merged) {
     return compile_expanded(network, whole, preset, options, budget);
   }
@@ -474,6 +501,17 @@ Result<Compiled> compile(const Network& network, const Preset& preset,
     compiled->plan.notes.push_back("merged: " + describe(*merged));
   }
   return compiled;
+}
+
+}  // namespace
+
+Result<Compiled> compile(const Network& network, const Preset& preset,
+                         const CompileOptions& options) {
+  try {
+    return compile_whole(network, preset, options);
+  } catch (const Stopped&) {
+    return Error{stopped};
+  }
 }
 
 }  // namespace ressort

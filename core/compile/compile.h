@@ -1,6 +1,8 @@
 // core/compile: the only bridge from names to numbers. A Network and a Preset become an Engine.
 #pragma once
 
+#include <cstdint>
+#include <limits>
 #include <memory>
 #include <optional>
 #include <string>
@@ -14,6 +16,7 @@
 #include "core/engine/engine.h"
 #include "core/model/network.h"
 #include "core/model/preset.h"
+#include "core/progress.h"
 #include "core/result.h"
 
 namespace ressort {
@@ -38,6 +41,8 @@ struct CompileOptions {
   bool force = false;             // no range is narrowed to what is stable
   std::vector<Setting> settings;  // values that the bare network's parameters get at once
   std::vector<Setting> reach;     // and those that they will get later: the bare network's ranges
+  Progress progress = {};         // a load that it stops fails with `stopped`
+  std::uint64_t most_bytes = std::numeric_limits<std::uint64_t>::max();  // that the engine may take
 };
 
 struct InputInfo {
@@ -85,7 +90,8 @@ struct Compiled {
 // not as it was narrowed.
 ParameterBox preset_box(const std::vector<ParameterInfo>& parameters, const Preset& preset);
 
-// Fails, with the preset's line, where the preset names what the model does not have.
+// Fails, with the preset's line, where the preset does not fit (see misfits()); and with the
+// model's line where an argument of the model is no finite number as it starts.
 // [any thread but audio]
 Result<Compiled> compile(const Network& network, const Preset& preset,
                          const CompileOptions& options);

@@ -38,6 +38,8 @@ double passive_ns(const LinkRun& run) {
       return 15.0 + 15.0 * (steps - 1.0);
     case Law::smooth_bow:
       return 75.0 * steps;
+    case Law::either_bow:  // both
+      return 90.0 * steps;
     case Law::cubic_spring:
     case Law::spring:
       return 16.0;
@@ -57,7 +59,7 @@ double passive_ns(const Program& program) {
 
 // How many packs the voices fill, each counted as often as it is dearer than one of AVX2: the
 // widest are worked on in two halves.
-double packs_of(const Load& load) {
+double packs_of(const Workload& load) {
   const double size = load.is_double ? 8.0 : 4.0;
   const double lanes = static_cast<double>(vector_bytes(load.isa)) / size;
   const bool is_halved = load.isa == Isa::v4 && load.voices > lanes / 2.0;
@@ -66,7 +68,7 @@ double packs_of(const Load& load) {
 
 // Parameters are still most of the time, so that a moving one counts by half; without that no mesh
 // whose stiffness can be turned would ever be stepped by its modes.
-double modal_ns(double modes, double places, double heard, double pushed, const Load& load) {
+double modal_ns(double modes, double places, double heard, double pushed, const Workload& load) {
   const double wide = load.isa == Isa::v4 ? 0.85 : load.isa == Isa::v3 ? 1.0 : 2.4;
   const double each = wide * (load.is_double ? 1.0 : 0.5) * modes;
   const double rows = places + pushed;
@@ -79,7 +81,7 @@ double modal_ns(double modes, double places, double heard, double pushed, const 
 
 class Predictor {
  public:
-  Predictor(const Program& program, const Load& load)
+  Predictor(const Program& program, const Workload& load)
       : program_(program), load_(load), wide_(load.isa == Isa::base ? 0.0 : 1.0) {}
 
   double operator()(const Direct&) const {
@@ -200,7 +202,7 @@ class Predictor {
 
   // A voice's outputs, and its share of a coarse step.
   double operator()(const Slow& form) const {
-    Load one = load_;
+    Workload one = load_;
     one.voices = 1;
     return load_.voices * (4.0 + 3.0 * static_cast<double>(program_.outputs.size()) +
                            predicted_ns(*form.coarse, one) / form.frames);
@@ -214,7 +216,7 @@ class Predictor {
   }
 
   const Program& program_;
-  const Load& load_;
+  const Workload& load_;
   double wide_;
 };
 
@@ -224,7 +226,7 @@ double exchange_ns(std::size_t copies) {
   return 3000.0 + 7.0 * static_cast<double>(copies);
 }
 
-double sharded_ns(const Shards& form, const Load& load) {
+double sharded_ns(const Shards& form, const Workload& load) {
   double slowest = 0.0;
   for (const Shard& shard : *form.shards) {
     slowest = std::max(slowest, predicted_ns(shard.program, load) +
@@ -233,15 +235,28 @@ double sharded_ns(const Shards& form, const Load& load) {
   return slowest;
 }
 
-double predicted_ns(const Program& program, const Load& load) {
+double predicted_ns(const Program& program, const Workload& load) {
   return std::visit(Predictor(program, load), program.form);
 }
 
-double least_modal_ns(const Program& program, const Load& load) {
+double least_modal_ns(const Program& program, const Workload& load) {
   const Count links = links_of(program);
   // Two links at one mass share its place, so each is counted as half of one.
   return load.voices * modal_ns(program.moving, 0.5 * (links.bent + links.others),
                                 static_cast<double>(program.outputs.size()), 0.0, load);
+}
+
+double worst_steps(const Program& program) {
+  constexpr double of_a_point = 10.0;
+  constexpr double of_an_audio_coefficient = 20.0;
+  constexpr double of_a_solved_link = 400.0;
+  double steps = program.moving + static_cast<double>(program.ends.size()) +
+                 of_a_point * static_cast<double>(program.taps.size()) +
+                 of_an_audio_coefficient * static_cast<double>(program.audio_coefficients.size());
+  for (const LinkRun& run : program.link_runs) {
+    steps += run.scheme == Scheme::plain ? 0.0 : of_a_solved_link * run.count;
+  }
+  return steps;
 }
 
 }  // namespace ressort

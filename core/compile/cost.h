@@ -7,7 +7,7 @@
 namespace ressort {
 
 // What the prediction is for.
-struct Load {
+struct Workload {
   bool is_double = true;
   bool is_compensated = false;  // which only one form is
   Isa isa = Isa::base;
@@ -22,12 +22,16 @@ double exchange_ns(std::size_t copies);
 // Nanoseconds a sample for all voices in the form that the Program has, everything that can touch
 // touching all the time: what a block's budget has to hold. Fitted to measurements on one machine
 // (Zen 4 at 3.7 GHz), to about a quarter; what matters is the order of the forms.
-double predicted_ns(const Program& program, const Load& load);
+double predicted_ns(const Program& program, const Workload& load);
 
 // The same of the slowest shard, and what it waits.
-double sharded_ns(const Shards& form, const Load& load);
+double sharded_ns(const Shards& form, const Workload& load);
 
 // The same for the modal form before it is known: what it will cost at least.
-double least_modal_ns(const Program& program, const Load& load);
+double least_modal_ns(const Program& program, const Workload& load);
+
+// A sample of one voice at the very worst, in visits of some nanoseconds, links that are not plain
+// going through each other as long as they may: to know what not to try. O(runs)
+double worst_steps(const Program& program);
 
 }  // namespace ressort

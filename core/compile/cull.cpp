@@ -22,6 +22,7 @@ std::size_t strengths(LinkKind kind) {
       return 3;
     case LinkKind::bow:
     case LinkKind::smooth_bow:
+    case LinkKind::either_bow:
       return 1;
     case LinkKind::contact:
       return 2;
@@ -31,8 +32,9 @@ std::size_t strengths(LinkKind kind) {
 
 class Culler {
  public:
-  explicit Culler(const Network& network)
+  Culler(const Network& network, const Progress& progress)
       : network_(network),
+        progress_(progress),
         groups_(network.masses.size()),
         is_heard_(network.masses.size()),
         is_moved_(network.masses.size()),
@@ -78,12 +80,16 @@ class Culler {
         groups_.join(link.a, link.b);
       }
     });
+    std::vector<bool> is_joined(network_.masses.size(), false);  // [first node] of a macro
     for (std::uint32_t i = 0; i < network_.masses.size(); ++i) {
       if (network_.masses[i].kind == MassKind::point) {
         const Tap& tap = network_.taps[network_.masses[i].tap];
-        for (std::uint32_t k = 0; k < tap.length * tap.width; ++k) {
+        groups_.join(i, tap.first);
+        progress_.spend(is_joined[tap.first] ? 1 : tap.length * tap.width);
+        for (std::uint32_t k = 1; !is_joined[tap.first] && k < tap.length * tap.width; ++k) {
           groups_.join(i, tap.first + k);
         }
+        is_joined[tap.first] = true;
       }
     }
   }
@@ -164,6 +170,7 @@ class Culler {
 
   template <class Use>
   void each_live_link(Use&& use) {
+    progress_.spend(2 * network_.links.size());
     for (std::size_t l = 0; l < network_.links.size(); ++l) {
       if (!culled_.is_slack[l]) {
         use(network_.links[l]);
@@ -174,6 +181,7 @@ class Culler {
   void mark(std::vector<bool>& marks, std::uint32_t mass) { marks[groups_.find(mass)] = true; }
 
   const Network& network_;
+  const Progress& progress_;
   Groups groups_;
   Culled culled_;
   std::vector<bool> is_heard_;  // [group]
@@ -187,8 +195,8 @@ std::string masses(std::size_t count) {
 
 }  // namespace
 
-Culled cull(const Network& network) {
-  return Culler(network).cull();
+Culled cull(const Network& network, const Progress& progress) {
+  return Culler(network, progress).cull();
 }
 
 std::string describe(const Culled& culled) {

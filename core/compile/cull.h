@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "core/model/network.h"
+#include "core/progress.h"
 
 namespace ressort {
 
@@ -21,7 +22,7 @@ struct Culled {
 };
 
 // For a network without macros. O(n). [any thread but audio]
-Culled cull(const Network& network);
+Culled cull(const Network& network, const Progress& progress = {});
 
 // "12 masses that no output hears, 3 that nothing moves"; empty if nothing is left out.
 std::string describe(const Culled& culled);

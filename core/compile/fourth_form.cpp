@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <map>
 
 namespace ressort {
 namespace {
@@ -25,10 +26,17 @@ class Bounder {
   // hold themselves; d is the sum of the weights at a mass.
   double operator()(const Weighing& weighing) const {
     std::vector<double> sum(program_.position.size(), 0.0);
+    std::map<std::uint32_t, double> at_macro;  // by its first place in tap_nodes
     each_link(weighing, [&](Ends ends, double weight) {
-      each_node(ends.a, [&](std::uint32_t node) { sum[node] += weight; });
-      each_node(ends.b, [&](std::uint32_t node) { sum[node] += weight; });
+      for (const std::uint32_t end : {ends.a, ends.b}) {
+        const TapSlot* const tap = tap_at(end);
+        (tap == nullptr ? sum[end] : at_macro[tap->first]) += weight;
+      }
     });
+    for (const auto& [first, added] : at_macro) {
+      const double weight = added;  // older compilers do not capture a binding
+      each_node(first, [&](std::uint32_t node) { sum[node] += weight; });
+    }
     double bound = 0.0;
     for (const MassRun& run : program_.mass_runs) {
       const double own =
@@ -39,10 +47,14 @@ class Bounder {
       }
     }
     std::fill(sum.begin() + program_.moving, sum.end(), 0.0);
-    const auto most_at = [&](std::uint32_t end) {
+    for (auto& [first, highest] : at_macro) {
       double most = 0.0;
-      each_node(end, [&](std::uint32_t node) { most = std::max(most, sum[node]); });
-      return most;
+      each_node(first, [&](std::uint32_t node) { most = std::max(most, sum[node]); });
+      highest = most;
+    }
+    const auto most_at = [&](std::uint32_t end) {
+      const TapSlot* const tap = tap_at(end);
+      return tap == nullptr ? sum[end] : at_macro.at(tap->first);
     };
     each_link(weighing, [&](Ends ends, double weight) {
       bound = weight > 0.0 ? std::max(bound, most_at(ends.a) + most_at(ends.b)) : bound;
@@ -56,14 +68,18 @@ class Bounder {
            weighing.damping * std::max(0.0, damping);
   }
 
-  // A node, or all that a point may be between.
+  const TapSlot* tap_at(std::uint32_t end) const {
+    return program_.taps.empty() || end < program_.taps[0].node
+               ? nullptr
+               : &program_.taps[end - program_.taps[0].node];
+  }
+
+  // All that a point of this macro may be between.
   template <class Use>
-  void each_node(std::uint32_t end, Use&& use) const {
-    if (program_.taps.empty() || end < program_.taps[0].node) {
-      return use(end);
-    }
-    const TapSlot& tap = program_.taps[end - program_.taps[0].node];
-    for (std::uint32_t i = tap.first; i < tap.first + tap.length * tap.width; ++i) {
+  void each_node(std::uint32_t first, Use&& use) const {
+    const auto tap = std::find_if(program_.taps.begin(), program_.taps.end(),
+                                  [&](const TapSlot& slot) { return slot.first == first; });
+    for (std::uint32_t i = first; i < first + tap->length * tap->width; ++i) {
       use(program_.tap_nodes[i]);
     }
   }

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <initializer_list>
 
 #include "core/model/expression.h"
 
@@ -9,6 +10,7 @@ namespace ressort {
 namespace {
 
 constexpr double infinity = std::numeric_limits<double>::infinity();
+constexpr std::size_t most_quick_work = 10'000'000;  // parameters times links
 constexpr double anywhere = 1e12;  // what counts as no limit where one has to reckon with it
 
 double finite(double value) {
@@ -20,7 +22,10 @@ class Gatekeeper {
   Gatekeeper(const GateRequest& request, std::vector<ParameterInfo>& parameters)
       : request_(request),
         parameters_(parameters),
-        stability_(always_felt(request.expanded), request.rate_ratio, most_quick_masses) {}
+        stability_(always_felt(request.expanded), request.rate_ratio, most_quick_masses,
+                   request.progress) {
+    gate_.is_together = parameters.size() * stability_.size() > most_quick_work;
+  }
 
   Gate run() {
     gate_.limits.assign(parameters_.size(), {-infinity, infinity});
@@ -63,14 +68,16 @@ class Gatekeeper {
     if (verdict != Verdict::unproved || request_.expanded.masses.size() <= most_quick_masses) {
       return verdict;
     }
-    stability_ = Stability(always_felt(request_.expanded), request_.rate_ratio);
+    stability_ = Stability(always_felt(request_.expanded), request_.rate_ratio,
+                           Stability::most_exact_masses, request_.progress);
     return stability_.prove(box_);
   }
 
   // By the network as it is written, where a macro is one element.
   Error complain() const {
-    Error error =
-        complaint(Stability(always_felt(request_.written), request_.rate_ratio).certify(box_));
+    Error error = complaint(Stability(always_felt(request_.written), request_.rate_ratio,
+                                      Stability::most_exact_masses, request_.progress)
+                                .certify(box_));
     if (request_.rate_ratio != 1.0) {
       error.message += ", at " + print_number(request_.rate_hz) + " Hz";
     }
@@ -133,10 +140,10 @@ class Gatekeeper {
       box_ = std::move(wide);
       return;
     }
-    for (const std::size_t i : which) {
-      stretch(i, box_, wide);
+    for (std::size_t i = 0; !gate_.is_together && i < which.size(); ++i) {
+      stretch(which[i], box_, wide);
     }
-    if (stability_.prove(wide) == Verdict::stable) {
+    if (!gate_.is_together && stability_.prove(wide) == Verdict::stable) {
       box_ = std::move(wide);
       return;
     }
@@ -150,7 +157,8 @@ class Gatekeeper {
     if (stability_.prove(shared) != Verdict::stable) {
       return;
     }
-    for (const std::size_t i : which) {
+    for (std::size_t k = 0; !gate_.is_together && k < which.size(); ++k) {
+      const std::size_t i = which[k];
       ParameterBox wider = shared;
       stretch(i, shared, wider);
       if (stability_.prove(wider) == Verdict::stable) {
@@ -190,8 +198,9 @@ class Gatekeeper {
       return;  // nothing is proved of it; sound that cannot move would be of no use
     }
     // Nobody reads it of the bare network.
-    if (const auto safe =
-            request_.bare ? std::nullopt : stability_.safe_range(box_, i, start_[i])) {
+    if (const auto safe = request_.bare || gate_.is_together
+                              ? std::nullopt
+                              : stability_.safe_range(box_, i, start_[i])) {
       info.safe = *safe;
     }
     info.is_raised = box_.lowest[i] > asked_.lowest[i];
@@ -231,7 +240,102 @@ class Gatekeeper {
   std::vector<std::optional<Place>> place_;  // in the preset, of what it has ranges for
 };
 
+// Looks at the arguments of one element after the other, for no_number().
+class NumberCheck {
+ public:
+  NumberCheck(const Network& network, std::span<const double> parameters, double rate_ratio)
+      : network_(network), parameters_(parameters) {
+    const double grown = std::max(1.0, rate_ratio * rate_ratio);
+    for (const Formula& formula : network.arguments) {
+      const double value = evaluate(formula, parameters);
+      const bool is_live = std::any_of(formula.begin(), formula.end(), [&](const Step& step) {
+        return step.op == Op::parameter && network.parameters[step.index].audio_input > 0;
+      });
+      is_wrong_.push_back(!is_live && !std::isfinite(grown * value));
+      is_nothing_.push_back(!is_live && !std::isfinite(1.0 / value));
+    }
+  }
+
+  std::optional<Error> run() {
+    for (const Mass& mass : network_.masses) {
+      look(mass, {{"mass", mass.mass},
+                  {"stiffness", mass.stiffness},
+                  {"damping", mass.damping},
+                  {"gravity", mass.gravity}});
+      if (mass.kind == MassKind::point) {
+        const Tap& tap = network_.taps[mass.tap];
+        look(mass, {{"place", tap.u}, {"place", tap.v}});
+      }
+    }
+    for (const Macro& macro : network_.macros) {
+      look(macro, {{"mass", macro.mass},
+                   {"stiffness", macro.stiffness},
+                   {"stiffness", macro.second_stiffness},
+                   {"damping", macro.damping},
+                   {"damping", macro.air_damping}});
+    }
+    for (const Link& link : network_.links) {
+      for (const ArgumentId argument : link.arguments) {
+        look(link, {{"argument", argument}});
+      }
+    }
+    return std::move(error_);
+  }
+
+ private:
+  struct Asked {
+    std::string_view quantity;
+    ArgumentId argument;
+  };
+
+  template <class Element>
+  void look(const Element& element, std::initializer_list<Asked> all) {
+    for (const Asked& asked : all) {
+      if (error_ || asked.argument == no_argument) {
+        continue;
+      }
+      const bool is_wrong = is_wrong_[asked.argument];
+      if (is_wrong || (asked.quantity == "mass" && is_nothing_[asked.argument])) {
+        error_ = {told(asked, std::string(element.name),
+                       is_wrong ? " is no finite number" : " is not above 0"),
+                  element.place.line, element.place.column};
+      }
+    }
+  }
+
+  // "the argument 1/P of 'r' is no finite number where P = 0"
+  std::string told(const Asked& asked, const std::string& name, std::string_view what) const {
+    const Formula& formula = network_.arguments[asked.argument];
+    std::vector<std::string> names;
+    for (const Parameter& parameter : network_.parameters) {
+      names.push_back(parameter.name);
+    }
+    std::string values;
+    for (std::size_t i = 0; i < names.size(); ++i) {
+      if (std::any_of(formula.begin(), formula.end(), [&](const Step& step) {
+            return step.op == Op::parameter && step.index == i;
+          })) {
+        values += (values.empty() ? " where " : " and ") + names[i] + " = " +
+                  print_number(parameters_[i]);
+      }
+    }
+    return "the " + std::string(asked.quantity) + " " + print_expression(formula, names) +
+           (name.empty() ? "" : " of '" + name + "'") + std::string(what) + values;
+  }
+
+  const Network& network_;
+  std::span<const double> parameters_;
+  std::vector<bool> is_wrong_;    // [argument]
+  std::vector<bool> is_nothing_;  // [argument] if it is a mass
+  std::optional<Error> error_;
+};
+
 }  // namespace
+
+std::optional<Error> no_number(const Network& network, std::span<const double> parameters,
+                               double rate_ratio) {
+  return NumberCheck(network, parameters, rate_ratio).run();
+}
 
 double inside_limit(double limit, bool is_upper) {
   constexpr double room = 1e-8;  // more than the proof leaves for rounding

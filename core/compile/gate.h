@@ -4,6 +4,7 @@
 
 #include <limits>
 #include <optional>
+#include <span>
 #include <string>
 #include <utility>
 #include <vector>
@@ -11,6 +12,7 @@
 #include "core/analysis/stability.h"
 #include "core/model/network.h"
 #include "core/model/preset.h"
+#include "core/progress.h"
 #include "core/result.h"
 
 namespace ressort {
@@ -24,6 +26,7 @@ struct ParameterInfo {
   double value = 0.0;  // at the start
   double minimum = 0.0;
   double maximum = 0.0;
+  int audio_input = 0;  // that gives it, sample by sample; nobody else can
   // Where it keeps what is always felt stable, wherever in their ranges the others are.
   SafeRange safe{-std::numeric_limits<double>::infinity(), std::numeric_limits<double>::infinity()};
   bool is_raised = false;   // the minimum is more than was asked for, for that
@@ -45,6 +48,7 @@ struct GateRequest {
   bool is_open = false;                  // whatever comes of it
   const std::vector<Setting>& settings;  // of the bare network's start, instead of its own
   const std::vector<Setting>& reach;     // values that parameters will be given later
+  Progress progress = {};
 };
 
 struct Gate {
@@ -52,12 +56,19 @@ struct Gate {
   std::optional<Error> complaint;     // unless stable: of the model, with its line
   std::vector<Error> narrowed;  // ranges that the preset gives and that are too wide; its lines
   std::vector<Range> limits;    // [parameter] that nothing may leave; infinite where unknown
+  bool is_together = false;     // too many parameters for a limit of each: all were narrowed alike
 };
 
 // Looks at the start; if that is proved, widens it to the ranges of `parameters` as far as the
 // whole of their box is proved, and writes back what it came to. A start that is not proved keeps
 // its ranges. O(links) where the edge bound says yes. [any thread but audio]
 Gate guard(const GateRequest& request, std::vector<ParameterInfo>& parameters);
+
+// The first element, in the order of the network, of which an argument is no finite number with
+// these values of the parameters, or which weighs nothing; with its line. What an audio input gives
+// is not looked at. [any thread but audio]
+std::optional<Error> no_number(const Network& network, std::span<const double> parameters,
+                               double rate_ratio);
 
 // The nearest value in six digits that is surely inside the limit.
 double inside_limit(double limit, bool is_upper);

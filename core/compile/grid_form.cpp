@@ -22,8 +22,10 @@ bool is_odd(Law law) {
 // neighbours, all others are rest. Without: the links of every run that has many, offset by offset.
 class Fit {
  public:
-  Fit(const Program& program, std::uint32_t mass_run, GridPlaces places, std::uint32_t spring_run)
+  Fit(const Program& program, std::uint32_t mass_run, GridPlaces places, std::uint32_t spring_run,
+      const Progress& progress)
       : program_(program),
+        progress_(progress),
         mass_run_(mass_run),
         spring_run_(spring_run),
         places_(std::move(places)),
@@ -96,6 +98,7 @@ class Fit {
   void each_link(Use&& use) const {
     for (std::uint32_t run = 0; run < program_.link_runs.size(); ++run) {
       const LinkRun& links = program_.link_runs[run];
+      progress_.spend(8 * std::size_t{links.count});
       for (std::uint32_t i = links.first;
            links.scheme == Scheme::plain && i < links.first + links.count; ++i) {
         use(run, program_.ends[i]);
@@ -125,6 +128,14 @@ class Fit {
       rows = std::max(rows, families_[span].size());
     }
     linked_.assign(rows, std::vector<std::uint8_t>(places_.slots));
+    std::set<std::uint32_t> known;
+    for (const auto& span : families_) {
+      for (const Chosen& chosen : span) {
+        if (known.size() < most_grid_offsets && known.insert(chosen.family.offset).second) {
+          offsets_.push_back(chosen.family.offset);
+        }
+      }
+    }
   }
 
   void choose_of_span(const std::map<Family, std::uint32_t>& counts,
@@ -171,10 +182,11 @@ class Fit {
     each_link([&](std::uint32_t run, Ends ends) {
       const auto [a, b] = ends;
       const bool is_inner = is_in_grid(a) && is_in_grid(b) && a != b;
-      if (!is_regular(run)) {
-        left_.push_back({false, run, slot_[a], slot_[b]});
-      } else if (is_inner && add(run, slot_[a], slot_[b])) {
-      } else if ((is_in_grid(a) && is_ground(b)) || (is_in_grid(b) && is_ground(a))) {
+      const bool is_hung = (is_in_grid(a) && is_ground(b)) || (is_in_grid(b) && is_ground(a));
+      if (is_regular(run) && is_inner && add(run, slot_[a], slot_[b])) {
+        return;
+      }
+      if (is_regular(run) && is_hung) {
         held_.push_back({run, ends});
       } else {
         left_.push_back({false, run, slot_[a], slot_[b]});
@@ -206,14 +218,13 @@ class Fit {
                         program_.velocity[other] == program_.velocity[ground]
                   : other == nowhere);
     };
-    for (const auto& span : families_) {
-      for (const Chosen& chosen : span) {
-        for (const std::uint32_t slot : {at - chosen.family.offset, at + chosen.family.offset}) {
-          const bool is_first = ground == ends.a;
-          if (may_be_at(slot) && add(run, is_first ? slot : at, is_first ? at : slot)) {
-            copy_[slot] = ground;
-            return true;
-          }
+    progress_.spend(4 * offsets_.size());
+    for (const std::uint32_t offset : offsets_) {
+      for (const std::uint32_t slot : {at - offset, at + offset}) {
+        const bool is_first = ground == ends.a;
+        if (may_be_at(slot) && add(run, is_first ? slot : at, is_first ? at : slot)) {
+          copy_[slot] = ground;
+          return true;
         }
       }
     }
@@ -390,6 +401,7 @@ class Fit {
   }
 
   const Program& program_;
+  const Progress& progress_;
   std::uint32_t mass_run_;
   std::uint32_t spring_run_;  // or nowhere
   GridPlaces places_;
@@ -399,6 +411,7 @@ class Fit {
   std::vector<std::uint32_t> copy_;                // [slot] a ground that is here too, or nowhere
   std::vector<std::uint32_t> span_at_;             // [slot]
   std::vector<std::vector<Chosen>> families_;      // [span]
+  std::vector<std::uint32_t> offsets_;             // of them all, up to most_grid_offsets
   std::vector<std::vector<std::uint8_t>> linked_;  // [row][slot] at the lower end
   std::vector<std::uint8_t> degree_;               // [slot]
   std::vector<std::pair<std::uint32_t, Ends>> held_;  // run and ends of links to grounds
@@ -414,10 +427,14 @@ double cost(const Grid& grid) {
          16.0 * static_cast<double>(grid.loose.size());
 }
 
+std::size_t most_slots(const Program& program) {
+  return 64 + 4 * std::size_t{program.moving};
+}
+
 // Whether the rest is little.
 bool is_worth_it(const Program& program, const Grid& grid) {
   return grid.rest_ends.size() <= 24 + program.ends.size() / 16 &&
-         grid.loose.size() <= 8 + program.moving / 16 && grid.count <= 64 + 4 * program.moving;
+         grid.loose.size() <= 8 + program.moving / 16 && grid.count <= most_slots(program);
 }
 
 // Where most masses, or most springs, are alike.
@@ -442,7 +459,7 @@ std::uint32_t largest_spring_run(const Program& program) {
 
 }  // namespace
 
-std::optional<Grid> grid_form(const Program& program) {
+std::optional<Grid> grid_form(const Program& program, const Progress& progress) {
   const bool has_force_output =
       std::any_of(program.outputs.begin(), program.outputs.end(),
                   [](const OutputSlot& output) { return output.is_force; });
@@ -452,23 +469,31 @@ std::optional<Grid> grid_form(const Program& program) {
   const std::uint32_t mass_run = largest_mass_run(program);
   const std::uint32_t spring_run = largest_spring_run(program);
   const GridGraph graph = grid_graph(program, mass_run);
+  const std::size_t most = most_slots(program);
   std::optional<Grid> best;
-  const auto offer = [&](GridPlaces places, std::uint32_t springs) {
-    std::optional<Grid> grid = Fit(program, mass_run, std::move(places), springs).make();
+  const auto offer = [&](std::optional<GridPlaces> places, std::uint32_t springs) {
+    progress.spend(8 * program.position.size());
+    if (!places) {
+      return;
+    }
+    std::optional<Grid> grid = Fit(program, mass_run, *std::move(places), springs, progress).make();
+    progress.spend(8 * program.ends.size());
     if (grid && is_worth_it(program, *grid) && (!best || cost(*grid) < cost(*best))) {
       best = std::move(grid);
     }
   };
   for (const bool is_written : {true, false}) {
-    const GridRows rows = is_written ? rows_as_written(program, graph) : rows_by_walk(graph);
+    const GridRows rows =
+        is_written ? rows_as_written(program, graph, progress) : rows_by_walk(graph, progress);
+    progress.spend(8 * program.ends.size());
     if (rows.empty()) {
       return std::nullopt;
     }
     if (spring_run != nowhere) {
-      offer(places_in_lines(graph, rows), spring_run);
-      offer(places_by_row(graph, rows), spring_run);
+      offer(places_in_lines(graph, rows, most, progress), spring_run);
+      offer(places_by_row(graph, rows, most, progress), spring_run);
     }
-    offer(places_in_lines(graph, rows), nowhere);
+    offer(places_in_lines(graph, rows, most, progress), nowhere);
   }
   return best;
 }

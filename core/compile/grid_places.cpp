@@ -60,7 +60,7 @@ std::uint32_t gap_of(const GridGraph& graph, const std::vector<Address>& all,
 // By how much each row is shifted, so that the most links to the row before have an offset that is
 // already there.
 std::vector<std::int64_t> shifts(const GridGraph& graph, const std::vector<Address>& all,
-                                 const GridRows& rows) {
+                                 const GridRows& rows, const Progress& progress) {
   std::vector<std::int64_t> shift(rows.size(), 0);
   std::set<std::int64_t> known;  // column differences to the row before
   for (std::uint32_t row = 1; row < rows.size(); ++row) {
@@ -70,13 +70,16 @@ std::vector<std::int64_t> shifts(const GridGraph& graph, const std::vector<Addre
         ++differences[here.column - there.column - shift[row - 1]];
       }
     });
+    progress.spend(rows[row].size() + 8 * differences.size());
     std::size_t best = 0;
+    const std::set<std::int64_t> wanted = known.empty() ? std::set<std::int64_t>{0} : known;
     for (const auto& [difference, count] : differences) {
-      const std::set<std::int64_t> wanted = known.empty() ? std::set<std::int64_t>{0} : known;
       for (const std::int64_t fit : wanted) {
         std::size_t score = 0;
-        for (const auto& [other, links] : differences) {
-          score += wanted.contains(other - difference + fit) ? links : 0;
+        progress.spend(wanted.size());
+        for (const std::int64_t met : wanted) {
+          const auto other = differences.find(met + difference - fit);
+          score += other != differences.end() ? other->second : 0;
         }
         if (score > best) {
           best = score;
@@ -122,9 +125,10 @@ GridPlaces empty_places(const GridGraph& graph, std::uint32_t reach, std::uint32
 
 }  // namespace
 
-GridPlaces places_in_lines(const GridGraph& graph, const GridRows& rows) {
+std::optional<GridPlaces> places_in_lines(const GridGraph& graph, const GridRows& rows,
+                                          std::size_t most, const Progress& progress) {
   const std::vector<Address> all = addresses(graph, rows);
-  const std::vector<std::int64_t> shift = shifts(graph, all, rows);
+  const std::vector<std::int64_t> shift = shifts(graph, all, rows, progress);
   const std::int64_t gap = gap_of(graph, all, rows);
   std::int64_t pitch = 0;
   for (std::size_t row = 0; row < rows.size(); ++row) {
@@ -139,6 +143,9 @@ GridPlaces places_in_lines(const GridGraph& graph, const GridRows& rows) {
     const std::int64_t begin = static_cast<std::int64_t>(row) * pitch + shift[row];
     lowest = std::min(lowest, begin);
     highest = std::max(highest, begin + static_cast<std::int64_t>(rows[row].size()));
+  }
+  if (static_cast<std::size_t>(highest - lowest) > most) {
+    return std::nullopt;  // rows so unlike that most places would be empty
   }
   const auto count = whole_lines(static_cast<std::uint32_t>(highest - lowest));
   const std::uint32_t reach =
@@ -155,14 +162,19 @@ GridPlaces places_in_lines(const GridGraph& graph, const GridRows& rows) {
   return places;
 }
 
-GridPlaces places_by_row(const GridGraph& graph, const GridRows& rows) {
+std::optional<GridPlaces> places_by_row(const GridGraph& graph, const GridRows& rows,
+                                        std::size_t most, const Progress& progress) {
   const std::uint32_t gap = gap_of(graph, addresses(graph, rows), rows);
+  progress.spend(graph.neighbours.size());
   std::uint32_t count = 0;
   std::uint32_t longest = 0;
   for (const auto& row : rows) {
     const std::uint32_t length = whole_lines(static_cast<std::uint32_t>(row.size()) + gap);
     longest = std::max(longest, length);
     count += length;
+  }
+  if (count > most) {
+    return std::nullopt;
   }
   GridPlaces places = empty_places(graph, longest + least_reach, count);
   std::uint32_t slot = 2 * places.reach;

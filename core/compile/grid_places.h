@@ -1,7 +1,9 @@
 // core/compile: where the rows of a regular network lie among the slots of a Grid.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <vector>
 
 #include "core/compile/grid_rows.h"
@@ -23,10 +25,12 @@ struct GridPlaces {
 };
 
 // Every row at the same distance from the last, shifted so that its links have the offsets of those
-// before. One span.
-GridPlaces places_in_lines(const GridGraph& graph, const GridRows& rows);
+// before. One span. Nothing where that would take more than `most` slots.
+std::optional<GridPlaces> places_in_lines(const GridGraph& graph, const GridRows& rows,
+                                          std::size_t most, const Progress& progress);
 
-// Every row in a span of its own, no longer than it needs.
-GridPlaces places_by_row(const GridGraph& graph, const GridRows& rows);
+// Every row in a span of its own, no longer than it needs; nothing as above.
+std::optional<GridPlaces> places_by_row(const GridGraph& graph, const GridRows& rows,
+                                        std::size_t most, const Progress& progress);
 
 }  // namespace ressort

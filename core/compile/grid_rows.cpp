@@ -14,8 +14,12 @@ std::span<const std::uint32_t> neighbours_of(const GridGraph& graph, std::uint32
 
 class Walk {
  public:
-  explicit Walk(const GridGraph& graph)
-      : graph_(graph), is_seen_(graph.start.size() - 1), rank_(is_seen_.size(), nowhere) {}
+  Walk(const GridGraph& graph, const Progress& progress)
+      : graph_(graph),
+        progress_(progress),
+        is_seen_(graph.start.size() - 1),
+        rank_(is_seen_.size(), nowhere),
+        linked_to_(is_seen_.size(), nowhere) {}
 
   GridRows rows() {
     std::vector<std::uint32_t> order(is_seen_.size());
@@ -35,20 +39,23 @@ class Walk {
  private:
   std::size_t degree(std::uint32_t node) const { return neighbours_of(graph_, node).size(); }
 
-  bool are_linked(std::uint32_t a, std::uint32_t b) const {
-    const auto all = neighbours_of(graph_, a);
-    return std::find(all.begin(), all.end(), b) != all.end();
-  }
-
   // From a corner along a side, where nodes have fewer neighbours than inside, to the next corner.
   std::vector<std::uint32_t> side_from(std::uint32_t node) {
     std::vector<std::uint32_t> row = {node};
     is_seen_[node] = true;
     std::size_t side_degree = 0;
     for (;;) {
+      const std::uint32_t before = row.size() > 1 ? row[row.size() - 2] : nowhere;
+      progress_.spend(degree(row.back()) + 1);
+      if (before != nowhere) {
+        progress_.spend(degree(before));
+        for (const std::uint32_t other : neighbours_of(graph_, before)) {
+          linked_to_[other] = before;
+        }
+      }
       std::uint32_t next = nowhere;
       for (const std::uint32_t other : neighbours_of(graph_, row.back())) {
-        const bool turns_back = row.size() > 1 && are_linked(other, row[row.size() - 2]);
+        const bool turns_back = before != nowhere && linked_to_[other] == before;
         if (!is_seen_[other] && !turns_back && (next == nowhere || degree(other) < degree(next))) {
           next = other;
         }
@@ -69,6 +76,7 @@ class Walk {
   bool add_next() {
     std::vector<std::uint32_t> next;
     for (const std::uint32_t node : rows_.back()) {
+      progress_.spend(3 * degree(node) + 1);
       for (const std::uint32_t other : neighbours_of(graph_, node)) {
         if (!is_seen_[other]) {
           is_seen_[other] = true;
@@ -113,8 +121,10 @@ class Walk {
   }
 
   const GridGraph& graph_;
+  const Progress& progress_;
   std::vector<bool> is_seen_;
-  std::vector<std::uint32_t> rank_;  // [node] in the row that is being made, while it waits
+  std::vector<std::uint32_t> rank_;       // [node] in the row that is being made, while it waits
+  std::vector<std::uint32_t> linked_to_;  // [node] the last of those that were asked for
   GridRows rows_;
 };
 
@@ -183,11 +193,12 @@ GridGraph grid_graph(const Program& program, std::uint32_t mass_run) {
   return graph;
 }
 
-GridRows rows_as_written(const Program& program, const GridGraph& graph) {
+GridRows rows_as_written(const Program& program, const GridGraph& graph, const Progress& progress) {
   GridRows rows;
   bool follows = false;  // whether the node is linked to the one before
   for (std::uint32_t node = 0; node < program.moving; ++node) {
     const auto all = neighbours_of(graph, node);
+    progress.spend(all.size() + 1);
     if (!all.empty()) {
       if (!follows) {
         rows.emplace_back();
@@ -199,8 +210,8 @@ GridRows rows_as_written(const Program& program, const GridGraph& graph) {
   return rows;
 }
 
-GridRows rows_by_walk(const GridGraph& graph) {
-  return Walk(graph).rows();
+GridRows rows_by_walk(const GridGraph& graph, const Progress& progress) {
+  return Walk(graph, progress).rows();
 }
 
 }  // namespace ressort

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "core/engine/program.h"
+#include "core/progress.h"
 
 namespace ressort {
 
@@ -26,8 +27,8 @@ std::vector<bool> driven_nodes(const Program& program);
 using GridRows = std::vector<std::vector<std::uint32_t>>;
 
 // As the nodes are numbered, without grounds. O(n)
-GridRows rows_as_written(const Program& program, const GridGraph& graph);
+GridRows rows_as_written(const Program& program, const GridGraph& graph, const Progress& progress);
 // One along a side, then what is next to it, and so on. O(n log n)
-GridRows rows_by_walk(const GridGraph& graph);
+GridRows rows_by_walk(const GridGraph& graph, const Progress& progress);
 
 }  // namespace ressort

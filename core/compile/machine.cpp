@@ -38,6 +38,8 @@ LawRow law_of(LinkKind kind) {
       return {Law::bow, {friction, speed}};
     case LinkKind::smooth_bow:
       return {Law::smooth_bow, {friction, speed}};
+    case LinkKind::either_bow:
+      return {Law::either_bow, {friction, speed}};
     case LinkKind::contact:
       return {Law::contact, {stiffness, damping}};
     case LinkKind::clipped_contact:
@@ -226,9 +228,9 @@ class ProgramMaker {
 // together, unless somebody listens to the ground.
 class Divider {
  public:
-  explicit Divider(const Network& network)
+  Divider(const Network& network, const Progress& progress)
       : network_(network),
-        culled_(cull(network)),
+        culled_(cull(network, progress)),
         groups_(network.masses.size()),
         binds_(network.masses.size()) {
     for (std::size_t i = 0; i < binds_.size(); ++i) {
@@ -243,12 +245,17 @@ class Divider {
         groups_.join(link.a, link.b);
       }
     }
+    std::vector<bool> is_joined(binds_.size(), false);  // [first node] of a macro
     for (std::uint32_t i = 0; i < binds_.size(); ++i) {
       if (binds_[i] && network.masses[i].kind == MassKind::point) {
-        each_node(network.taps[network.masses[i].tap], [&](std::uint32_t node) {
-          binds_[node] = true;
-          groups_.join(i, node);
-        });
+        const Tap& tap = network.taps[network.masses[i].tap];
+        groups_.join(i, tap.first);
+        progress.spend(is_joined[tap.first] ? 1 : tap.length * tap.width);
+        for (std::uint32_t k = 0; !is_joined[tap.first] && k < tap.length * tap.width; ++k) {
+          binds_[tap.first + k] = true;
+          groups_.join(i, tap.first + k);
+        }
+        is_joined[tap.first] = true;
       }
     }
   }
@@ -287,13 +294,6 @@ class Divider {
   }
 
  private:
-  template <class Use>
-  static void each_node(const Tap& tap, Use&& use) {
-    for (std::uint32_t k = 0; k < tap.length * tap.width; ++k) {
-      use(tap.first + k);
-    }
-  }
-
   std::size_t part_of(std::uint32_t mass) { return part_[groups_.find(mass)]; }
 
   // The largest groups become parts of their own, all others one together.
@@ -331,7 +331,7 @@ class Divider {
 };
 
 Machine machine_of(const Network& network, double rate_hz, bool rescale,
-                   std::span<const LinkScheme> schemes) {
+                   std::span<const LinkScheme> schemes, const Progress& progress) {
   Machine machine{.rate_hz = rate_hz,
                   .rate_ratio = rescale ? Network::reference_rate_hz / rate_hz : 1.0,
                   .parameters = parameter_values(network),
@@ -342,7 +342,8 @@ Machine machine_of(const Network& network, double rate_hz, bool rescale,
          .is_force = input.is_force,
          .position = input.is_force ? 0.0 : network.masses[input.mass].position});
   }
-  for (const Share& share : Divider(network).divide()) {
+  for (const Share& share : Divider(network, progress).divide()) {
+    progress.spend(16 * (share.masses.size() + share.links.size()));
     machine.parts.push_back(ProgramMaker(network, share, rate_hz, rescale, schemes).make());
   }
   return machine;
@@ -361,9 +362,10 @@ Program program_of(const Network& network, double rate_hz, bool rescale,
 }  // namespace
 
 Machine make_machine(const Network& network, double rate_hz, bool rescale,
-                     std::span<const LinkScheme> schemes) {
-  return network.macros.empty() ? machine_of(network, rate_hz, rescale, schemes)
-                                : machine_of(expand_macros(network), rate_hz, rescale, {});
+                     std::span<const LinkScheme> schemes, const Progress& progress) {
+  return network.macros.empty()
+             ? machine_of(network, rate_hz, rescale, schemes, progress)
+             : machine_of(expand_macros(network), rate_hz, rescale, {}, progress);
 }
 
 Program make_program(const Network& network, double rate_hz, bool rescale,

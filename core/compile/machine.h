@@ -5,6 +5,7 @@
 
 #include "core/engine/program.h"
 #include "core/model/network.h"
+#include "core/progress.h"
 
 namespace ressort {
 
@@ -23,7 +24,7 @@ struct LinkScheme {
 // `schemes` are those of the links of a network without macros; nothing: all as published.
 // O(n log n). [any thread but audio]
 Machine make_machine(const Network& network, double rate_hz, bool rescale,
-                     std::span<const LinkScheme> schemes = {});
+                     std::span<const LinkScheme> schemes = {}, const Progress& progress = {});
 
 // The same as one part, for tests and other ways of playing it.
 Program make_program(const Network& network, double rate_hz, bool rescale,

@@ -22,7 +22,8 @@ double cents_of(double mass_ratio) {
 
 class Merger {
  public:
-  Merger(const Network& network, const Budget& budget) : source_(network) {
+  Merger(const Network& network, const Budget& budget, const Progress& progress)
+      : source_(network), progress_(progress) {
     allowed_cents_ = budget.cents < Budget::unlimited ? budget.cents : 0.0;
   }
 
@@ -31,6 +32,7 @@ class Merger {
     count_links();
     mark_used();
     for (std::uint32_t mass = 0; mass < source_.masses.size(); ++mass) {
+      progress_.spend(2);
       try_series(mass);
     }
     return std::move(merged_);
@@ -122,6 +124,7 @@ class Merger {
   }
 
   void take_over(std::uint32_t stays, std::uint32_t goes) {
+    progress_.spend(20);
     const auto k = sum(now().links[stays].arguments[0], now().links[goes].arguments[0]);
     const auto z = sum(now().links[stays].arguments[1], now().links[goes].arguments[1]);
     if (k && z) {
@@ -161,8 +164,14 @@ class Merger {
     for (const Output& output : now().outputs) {
       is_used_[output.mass] = true;
     }
+    std::vector<bool> is_marked(now().masses.size(), false);  // [first node] of a macro
     for (const Tap& tap : now().taps) {
-      std::fill_n(is_used_.begin() + tap.first, tap.length * tap.width, true);
+      progress_.spend(1);
+      if (!is_marked[tap.first]) {
+        progress_.spend(tap.length * tap.width);
+        std::fill_n(is_used_.begin() + tap.first, tap.length * tap.width, true);
+        is_marked[tap.first] = true;
+      }
     }
   }
 
@@ -243,6 +252,7 @@ class Merger {
   static constexpr std::size_t max_sum_steps = 64;
 
   const Network& source_;
+  const Progress& progress_;
   std::optional<Merged> merged_;
   double allowed_cents_ = 0.0;
   std::optional<ArgumentId> zero_;
@@ -255,8 +265,9 @@ class Merger {
 
 }  // namespace
 
-std::optional<Merged> merge(const Network& network, const Budget& budget) {
-  return Merger(network, budget).merge();
+std::optional<Merged> merge(const Network& network, const Budget& budget,
+                            const Progress& progress) {
+  return Merger(network, budget, progress).merge();
 }
 
 std::string describe(const Merged& merged) {

@@ -7,6 +7,7 @@
 
 #include "core/model/budget.h"
 #include "core/model/network.h"
+#include "core/progress.h"
 
 namespace ressort {
 
@@ -29,7 +30,8 @@ inline constexpr double forced_cents = 5.0;
 // For a network without macros. Masses and springs whose numbers a parameter changes are merged
 // only where that stays right at all of its values. Nothing where there is nothing to merge. O(n).
 // [any thread but audio]
-std::optional<Merged> merge(const Network& network, const Budget& budget);
+std::optional<Merged> merge(const Network& network, const Budget& budget,
+                            const Progress& progress = {});
 
 // "4 springs beside others, 1 light mass between springs (0.8 cents at most)"; may be empty.
 std::string describe(const Merged& merged);

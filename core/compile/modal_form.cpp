@@ -50,11 +50,14 @@ double make_exact(double& k, double& z) {
 }
 
 constexpr double left_out_share = 0.02;  // of the budget
+// Each takes a matrix of all masses, or a vector; with so many the form is of no use.
+constexpr std::size_t most_frames = 256;
+constexpr std::size_t most_runs = 65'536;
 
 class ModesFinder {
  public:
-  ModesFinder(const Program& program, const Budget& budget)
-      : program_(program), count_(program.moving) {
+  ModesFinder(const Program& program, const Budget& budget, const Progress& progress)
+      : program_(program), progress_(progress), count_(program.moving) {
     modes_.is_exact = budget.is_physical();
     modes_.silence = std::pow(10.0, budget.silence_db / 20.0);
   }
@@ -68,8 +71,12 @@ class ModesFinder {
     if (has_sliding_ground() || !weigh_masses()) {
       return std::nullopt;
     }
-    sort_links();
+    if (!sort_links() || program_.link_runs.size() > most_runs) {
+      return std::nullopt;
+    }
+    progress_.spend(program_.ends.size());
     solve();
+    progress_.spend(std::size_t{count_} * count_);
     if (!measure(stiffness_) || !measure(damping_)) {
       return std::nullopt;
     }
@@ -181,8 +188,8 @@ class ModesFinder {
     frame.pull[bar.a] += bar.weight * position;
   }
 
-  // Linear links and oscillators become frames, all others holds.
-  void sort_links() {
+  // Linear links and oscillators become frames, all others holds. False if there are too many.
+  bool sort_links() {
     for (const MassRun& run : program_.mass_runs) {
       for (std::uint32_t i = run.first; run.is_oscillator && i < run.first + run.count; ++i) {
         add_bar(stiffness_, run.stiffness, false, {i}, 0.0);
@@ -206,7 +213,11 @@ class ModesFinder {
         add_bar(stiffness_, run.coefficients[0], true, bar, position);
         add_bar(damping_, run.coefficients[1], true, bar, 0.0);
       }
+      if (stiffness_.size() + damping_.size() > most_frames) {
+        return false;
+      }
     }
+    return true;
   }
 
   // The eigenvectors of a mixture of all frames in odd shares: where frames share eigenvectors,
@@ -216,6 +227,7 @@ class ModesFinder {
     double share = 1.0;
     for (auto* frames : {&stiffness_, &damping_}) {
       for (const Frame& frame : *frames) {
+        progress_.spend(std::size_t{count_} * count_ / 8);
         share = std::fmod(share + 0.6180339887498949, 1.0) + 0.1;
         Matrix matrix = Matrix::Zero(count_, count_);
         for (const Bar& bar : frame.bars) {
@@ -246,6 +258,7 @@ class ModesFinder {
   // if an eigenvector is none of a frame's.
   bool measure(std::vector<Frame>& frames) {
     for (Frame& frame : frames) {
+      progress_.spend((frame.bars.size() + count_) * count_ / 8);
       frame.factor = Vector::Zero(count_);
       Matrix image = Matrix::Zero(count_, count_);  // [mode, mass]
       Vector stretch(count_);
@@ -527,6 +540,7 @@ class ModesFinder {
   }
 
   const Program& program_;
+  const Progress& progress_;
   const std::uint32_t count_;
   Modes modes_;
   std::vector<bool> is_live_;        // [coefficient] does a parameter move it?
@@ -547,8 +561,9 @@ class ModesFinder {
 
 }  // namespace
 
-std::optional<Modes> modal_form(const Program& program, const Budget& budget) {
-  return is_plain(program) ? ModesFinder(program, budget).find() : std::nullopt;
+std::optional<Modes> modal_form(const Program& program, const Budget& budget,
+                                const Progress& progress) {
+  return is_plain(program) ? ModesFinder(program, budget, progress).find() : std::nullopt;
 }
 
 }  // namespace ressort

@@ -5,6 +5,7 @@
 
 #include "core/engine/program.h"
 #include "core/model/budget.h"
+#include "core/progress.h"
 
 namespace ressort {
 
@@ -16,6 +17,7 @@ inline constexpr std::size_t most_modes = 1200;  // beyond, the eigenvectors tak
 // masses, 0.1 s for 600. With a budget of cents or decays true to the continuous network; with one
 // of silence without the modes that are never heard, the others sorted and told to sleep. [any
 // thread but audio]
-std::optional<Modes> modal_form(const Program& program, const Budget& budget = {});
+std::optional<Modes> modal_form(const Program& program, const Budget& budget = {},
+                                const Progress& progress = {});
 
 }  // namespace ressort

@@ -21,23 +21,24 @@ std::optional<Form> any(std::optional<T> form) {
   return form ? std::optional<Form>(std::move(*form)) : std::nullopt;
 }
 
-std::optional<Form> form_of(const Program& program, Method method, const Load& load,
-                            const Budget& budget) {
+std::optional<Form> form_of(const Program& program, Method method, const Workload& load,
+                            const Budget& budget, const Progress& progress) {
+  progress.spend(program.ends.size() + program.position.size());
   switch (method) {
     case Method::direct:
       return Direct{};
     case Method::chains:
-      return any(chains_form(program));
+      return any(chains_form(program, progress));
     case Method::dense:
       return any(dense_form(program));
     case Method::modal:
-      return any(modal_form(program, budget));
+      return any(modal_form(program, budget, progress));
     case Method::grid:
-      return any(grid_form(program));
+      return any(grid_form(program, progress));
     case Method::chorus:
       return any(chorus_form(program));
     case Method::sparse:
-      return any(sparse_form(program));
+      return any(sparse_form(program, progress));
     case Method::fourth:
       return any(fourth_form(program));
     case Method::slow:
@@ -138,9 +139,11 @@ std::string rounded(double value) {
 
 class Chooser {
  public:
-  Chooser(Program& program, const Load& load, std::uint32_t most_modes, const Budget& budget)
+  Chooser(Program& program, const Workload& load, std::uint32_t most_modes, const Budget& budget,
+          const Progress& progress)
       : program_(program),
         load_(load),
+        progress_(progress),
         most_modes_(most_modes),
         budget_(budget),
         is_asked_(budget.is_physical() || budget.silence_db > -Budget::unlimited) {
@@ -244,7 +247,7 @@ class Chooser {
   }
 
   bool consider(Method method) {
-    auto form = form_of(program_, method, load_, budget_);
+    auto form = form_of(program_, method, load_, budget_, progress_);
     if (!form) {
       return false;
     }
@@ -283,7 +286,8 @@ class Chooser {
   }
 
   Program& program_;
-  const Load& load_;
+  const Workload& load_;
+  const Progress& progress_;
   std::uint32_t most_modes_;
   Budget budget_;  // without what the published scheme meets
   bool is_asked_;
@@ -319,15 +323,15 @@ std::string_view method_name(Method method) {
   return "";
 }
 
-Plan make_plan(Machine& machine, const Load& load, std::optional<Method> method,
-               std::uint32_t most_modes, const Budget& budget) {
+Plan make_plan(Machine& machine, const Workload& load, std::optional<Method> method,
+               std::uint32_t most_modes, const Budget& budget, const Progress& progress) {
   Plan plan;
   for (Program& program : machine.parts) {
-    Chooser chooser(program, load, most_modes, budget);
+    Chooser chooser(program, load, most_modes, budget, progress);
     Part part = load.is_compensated ? chooser.compensate()
                 : method            ? chooser.obey(*method)
                                     : chooser.choose();
-    if (auto shards = share_out(program, load)) {
+    if (auto shards = share_out(program, load, progress)) {
       program.form = *std::move(shards);
       part.predicted_ns = predicted_ns(program, load);
       part.reason += ", " + Describer{program}(std::get<Shards>(program.form));

@@ -10,6 +10,7 @@
 #include "core/compile/cost.h"
 #include "core/engine/program.h"
 #include "core/model/budget.h"
+#include "core/progress.h"
 
 namespace ressort {
 
@@ -53,8 +54,9 @@ struct Plan {
 // budget for pitch or decay, the cheapest of the physical methods where the published scheme misses
 // it. O(elements), and the eigenvectors of a part of up to `most_modes` masses for which the modal
 // form may pay. [any thread but audio]
-Plan make_plan(Machine& machine, const Load& load, std::optional<Method> method = {},
-               std::uint32_t most_modes = patient_modes, const Budget& budget = {});
+Plan make_plan(Machine& machine, const Workload& load, std::optional<Method> method = {},
+               std::uint32_t most_modes = patient_modes, const Budget& budget = {},
+               const Progress& progress = {});
 
 // One line a part, and one a note.
 std::string describe(const Plan& plan);

@@ -38,8 +38,9 @@ struct Finding {
 class Judge {
  public:
   Judge(const Network& network, const Preset& preset, const Conditions& conditions,
-        bool is_physical)
+        bool is_physical, const Progress& progress)
       : network_(network),
+        progress_(progress),
         preset_(preset),
         is_physical_(is_physical),
         r_(conditions.rate_ratio),
@@ -63,6 +64,7 @@ class Judge {
         return contact(stiffer_ * steepest_clipped(link) * g, r_ * most(link, 3) * g);
       case LinkKind::bow:
       case LinkKind::smooth_bow:
+      case LinkKind::either_bow:
         return bow(grippier_ * most(link, 0) * g);
       case LinkKind::pluck:
         return pluck(link, stiffer_ * most(link, 0) * g);
@@ -99,10 +101,12 @@ class Judge {
     double sum = 0.0;
     if (is_live_place(network_, mass)) {
       const Tap& tap = network_.taps[network_.masses[mass].tap];
-      for (std::uint32_t i = 0; i < tap.length * tap.width; ++i) {
-        sum = std::max(sum, inverse_mass(tap.first + i));
+      const auto [known, is_new] = lightest_.try_emplace(tap.first, 0.0);
+      progress_.spend(is_new ? tap.length * tap.width : 1);
+      for (std::uint32_t i = 0; is_new && i < tap.length * tap.width; ++i) {
+        known->second = std::max(known->second, inverse_mass(tap.first + i));
       }
-      return sum;
+      return known->second;
     }
     each_share(network_, mass, [&](std::uint32_t node, double share) {
       sum += share * share * inverse_mass(node);
@@ -227,12 +231,14 @@ class Judge {
   }
 
   const Network& network_;
+  const Progress& progress_;
   const Preset& preset_;
   bool is_physical_;
   double r_;
-  double stiffer_;             // what a stiffness is multiplied by at worst
-  double grippier_;            // ...and a bow's Z
-  std::vector<Range> ranges_;  // [argument]
+  double stiffer_;                                    // what a stiffness is multiplied by at worst
+  double grippier_;                                   // ...and a bow's Z
+  std::vector<Range> ranges_;                         // [argument]
+  mutable std::map<std::uint32_t, double> lightest_;  // node's 1/M, by a macro's first node
   double reach_ = 0.0;
   double energy_ = 0.0;
   double force_ = 0.0;
@@ -246,6 +252,7 @@ std::string kind_name(LinkKind kind, std::size_t count) {
       return of("contact", "contacts");
     case LinkKind::bow:
     case LinkKind::smooth_bow:
+    case LinkKind::either_bow:
       return of("bow", "bows");
     case LinkKind::pluck:
       return of("pluck", "plucks");
@@ -283,14 +290,15 @@ std::string sentence(const Told& told) {
 }  // namespace
 
 Schemes choose_schemes(const Network& network, const Preset& preset, const Conditions& conditions,
-                       const Budget& budget, const std::vector<std::uint32_t>& forced) {
+                       const Budget& budget, const std::vector<std::uint32_t>& forced,
+                       const Progress& progress) {
   Schemes schemes;
   schemes.links.resize(network.links.size());
   const auto is_linear = [](const Link& link) { return link.kind == LinkKind::spring; };
   if (forced.empty() && std::all_of(network.links.begin(), network.links.end(), is_linear)) {
     return schemes;
   }
-  const Judge judge(network, preset, conditions, budget.is_physical());
+  const Judge judge(network, preset, conditions, budget.is_physical(), progress);
   std::vector<bool> is_forced(network.links.size(), false);
   for (const std::uint32_t link : forced) {
     if (link < is_forced.size()) {
@@ -300,6 +308,7 @@ Schemes choose_schemes(const Network& network, const Preset& preset, const Condi
   std::map<std::pair<LinkKind, LinkScheme>, Told> tellings;
   for (std::size_t i = 0; i < network.links.size(); ++i) {
     const Link& link = network.links[i];
+    progress.spend(4);
     const std::optional<Finding> finding = judge.judge(link);
     const bool is_bad = finding && finding->badness > 1.0;
     const bool is_wanted = budget.passive == Passivity::always ||

@@ -9,6 +9,7 @@
 #include "core/model/budget.h"
 #include "core/model/network.h"
 #include "core/model/preset.h"
+#include "core/progress.h"
 
 namespace ressort {
 
@@ -37,7 +38,8 @@ struct Conditions {
 //             where masses start and how hands are driven and struck
 // For a network without macros. O(links + masses + controls). [any thread but audio]
 Schemes choose_schemes(const Network& network, const Preset& preset, const Conditions& conditions,
-                       const Budget& budget, const std::vector<std::uint32_t>& forced);
+                       const Budget& budget, const std::vector<std::uint32_t>& forced,
+                       const Progress& progress = {});
 
 bool all_plain(const std::vector<LinkScheme>& links);
 

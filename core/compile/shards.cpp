@@ -416,10 +416,11 @@ struct Reformer {
  private:
   template <class Found>
   bool take(std::optional<Found> form) const {
-    if (form) {
-      program.form = *std::move(form);
+    if (!form) {
+      return false;
     }
-    return form.has_value();
+    program.form = *std::move(form);
+    return true;
   }
 };
 
@@ -444,7 +445,8 @@ std::vector<Shard> make_shards(const Program& program, std::size_t count, std::u
   return divider.make(divider.divide(count, false), frames);
 }
 
-std::optional<Shards> share_out(const Program& program, const Load& load) {
+std::optional<Shards> share_out(const Program& program, const Workload& load,
+                                const Progress& progress) {
   const double whole_ns = predicted_ns(program, load);
   if (load.crew == nullptr || !is_plain(program) || load.crew->size() < 2 ||
       whole_ns < least_shared_ns) {
@@ -461,12 +463,14 @@ std::optional<Shards> share_out(const Program& program, const Load& load) {
   for (const bool is_breadth_first : {false, true}) {
     Choice choice;
     for (std::size_t count = load.crew->size(); count > 1; count /= 2) {
+      progress.spend(4 * count * program.position.size());
       choose_frames(divider.divide(count, is_breadth_first), whole_ns / program.moving, choice);
     }
     if (choice.ns >= best_ns) {
       continue;
     }
     auto shards = reformed(divider.make(choice.division, choice.frames), program.form);
+    progress.spend(64 * program.ends.size());
     if (shards.empty()) {
       continue;
     }

@@ -5,6 +5,7 @@
 
 #include "core/compile/cost.h"
 #include "core/engine/sharded.h"
+#include "core/progress.h"
 
 namespace ressort {
 
@@ -15,6 +16,7 @@ std::vector<Shard> make_shards(const Program& program, std::size_t count, std::u
 // Shards in the Program's own form for load.crew, if they are predicted to pay: of direct, chains
 // or grid, where a sample takes several microseconds. O(nodes + links), and what the form takes.
 // [any thread but audio]
-std::optional<Shards> share_out(const Program& program, const Load& load);
+std::optional<Shards> share_out(const Program& program, const Workload& load,
+                                const Progress& progress = {});
 
 }  // namespace ressort

@@ -145,10 +145,11 @@ bool hears_such(const Program& program, const Sparse& form) {
 
 }  // namespace
 
-std::optional<Sparse> sparse_form(const Program& program) {
+std::optional<Sparse> sparse_form(const Program& program, const Progress& progress) {
   if (!is_plain(program) || program.moving < least_sparse_masses || !program.taps.empty()) {
     return std::nullopt;
   }
+  progress.spend(8 * program.ends.size());
   Sparse form = SparseMaker(program).make();
   return hears_such(program, form) ? std::nullopt : std::optional(std::move(form));
 }

@@ -4,6 +4,7 @@
 #include <optional>
 
 #include "core/engine/program.h"
+#include "core/progress.h"
 
 namespace ressort {
 
@@ -11,6 +12,6 @@ inline constexpr std::uint32_t least_sparse_masses = 10;
 
 // Nothing where fewer masses move, where there are points on macros, or where a force is heard at
 // what stands and two such are linked. O(n log n). [any thread but audio]
-std::optional<Sparse> sparse_form(const Program& program);
+std::optional<Sparse> sparse_form(const Program& program, const Progress& progress = {});
 
 }  // namespace ressort

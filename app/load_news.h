@@ -1,0 +1,27 @@
+// app: what a person hears of a load that takes long.
+#pragma once
+
+#include <chrono>
+#include <functional>
+#include <string>
+#include <string_view>
+
+namespace ressort {
+
+// Tells what is being done with something, after a second and then every two. [one thread]
+class LoadNews {
+ public:
+  using Tell = std::function<void(const std::string&)>;
+  LoadNews(std::string name, Tell tell);
+
+  void at(std::string_view stage);
+
+ private:
+  using Clock = std::chrono::steady_clock;
+  std::string name_;
+  Tell tell_;
+  Clock::time_point start_ = Clock::now();
+  Clock::time_point next_ = start_ + std::chrono::seconds(1);
+};
+
+}  // namespace ressort

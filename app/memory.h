@@ -1,0 +1,12 @@
+// app: how much memory there is to take.
+#pragma once
+
+#include <cstdint>
+
+namespace ressort {
+
+// What the machine has free, or what `ulimit -v` and the control group leave of it, in bytes.
+// [any thread but audio]
+std::uint64_t free_memory_bytes();
+
+}  // namespace ressort
