@@ -10,18 +10,20 @@
 
 #include "core/engine/kernel.h"
 #include "core/engine/mix.h"
+#include "core/progress.h"
 
 namespace ressort {
 
 // One part of the machine, in as many voices as are wanted.
 template <class T>
 struct PartBank {
-  PartBank(const Program& program_in, std::size_t voices, Isa isa) : program(program_in) {
-    kernels.push_back(make_kernel<T>(program, voices, isa));
-    width = kernels[0]->width();
-    while (kernels.size() * width < voices) {
+  PartBank(const Program& program_in, std::size_t voices, Isa isa, const Progress& progress)
+      : program(program_in) {
+    do {
+      progress.spend(4 * program.position.size() + program.ends.size());
       kernels.push_back(make_kernel<T>(program, voices, isa));
-    }
+      width = kernels[0]->width();
+    } while (kernels.size() * width < voices);
     last.resize(kernels.size() * row());
   }
   T* last_of(std::size_t voice) { return last.data() + voice / width * row(); }
@@ -37,7 +39,7 @@ struct PartBank {
 
 template <class T>
 struct Bank {
-  Bank(const Machine& machine, std::size_t voices, Isa isa)
+  Bank(const Machine& machine, std::size_t voices, Isa isa, const Progress& progress)
       : mixer(with_isa(isa, []<Isa level>() { return make_mixer<level, T>(); })) {
     std::size_t inputs = 0;
     std::size_t audio_coefficients = 0;
@@ -46,7 +48,7 @@ struct Bank {
     std::size_t outputs_of_one = 0;
     std::size_t nodes = 0;
     for (const Program& program : machine.parts) {
-      const std::size_t width = parts.emplace_back(program, voices, isa).width;
+      const std::size_t width = parts.emplace_back(program, voices, isa, progress).width;
       inputs = std::max(inputs, width * program.inputs.size());
       audio_coefficients = std::max(audio_coefficients, width * program.audio_coefficients.size());
       channels = std::max(channels, width * program.outputs.size());

@@ -296,6 +296,18 @@ static inline V gripping_force(V z, V s, V wanted, V last, V half) {
   return force_between(V{}, last, wanted, half, g);
 }
 
+// What any bow exerts at that speed, by its law.
+template <class V>
+static inline V bow_grip(Law law, V z, V s, V profile, V wanted, V last, V half) {
+  if (law == Law::smooth_bow) {
+    return gripping_force(z, s, wanted, last, half);
+  }
+  const V piecewise = gripping_force(BowShape<V>(z, s), wanted, last, half);
+  return law == Law::bow
+             ? piecewise
+             : select(profile > V{}, gripping_force(z, s, wanted, last, half), piecewise);
+}
+
 // Goes through the sample in `count` steps of 1/count: half a way, a kick, half a way. Without the
 // link it would go from now on evenly accelerated, so that `speed` and `fast` are those of the
 // middles of the sample before and of this one. `kick` gives the force for the distance,
@@ -345,9 +357,9 @@ static inline V centred_force(Law law, const Meeting<V>& m, V c0, V c1, V c2, V 
     case Law::clipped_spring:
       return centred_clipped_spring_force(m, c0, c1, c2, c3);
     case Law::bow:
-      return gripping_force(BowShape<V>(c0, c1), wanted, m.speed, m.gamma / 2);
     case Law::smooth_bow:
-      return gripping_force(c0, c1, wanted, m.speed, m.gamma / 2);
+    case Law::either_bow:
+      return bow_grip(law, c0, c1, c2, wanted, m.speed, m.gamma / 2);
     case Law::contact:
       return centred_contact_force(m, c0, c1, c2);
     case Law::clipped_contact:
@@ -366,10 +378,10 @@ static inline Push<V> passive_push(Law law, Scheme scheme, int substeps, const M
   if (law == Law::pluck) {
     return substepped_pluck(m, substeps, c0, c1, c2);
   }
-  if (scheme == Scheme::substeps && (law == Law::bow || law == Law::smooth_bow)) {
+  const bool is_bow = law == Law::bow || law == Law::smooth_bow || law == Law::either_bow;
+  if (scheme == Scheme::substeps && is_bow) {
     return substep(m, substeps, [&](V, V v, V more, V gamma) {
-      return law == Law::bow ? gripping_force(BowShape<V>(c0, c1), v + more / 2, v, gamma / 2)
-                             : gripping_force(c0, c1, v + more / 2, v, gamma / 2);
+      return bow_grip(law, c0, c1, c2, v + more / 2, v, gamma / 2);
     });
   }
   const V f = centred_force(law, m, c0, c1, c2, c3, c4);

@@ -25,7 +25,7 @@ std::size_t lanes_for(const Chains& form, Isa isa) {
 // Puts nodes in their places, and everything that names nodes into tables that name places.
 class TablesMaker {
  public:
-  TablesMaker(const Program& program, std::size_t lanes, std::vector<Place>& place)
+  TablesMaker(const Program& program, std::size_t lanes, std::vector<ChainPlace>& place)
       : program_(program),
         form_(std::get<Chains>(program.form)),
         lanes_(static_cast<std::uint32_t>(lanes)),
@@ -57,7 +57,9 @@ class TablesMaker {
   std::uint32_t next_force() { return static_cast<std::uint32_t>(tables_.force_count++); }
 
   // Position `lane` of a pair.
-  Place place_of(std::uint32_t pair, std::uint32_t lane) const { return 2 * lanes_ * pair + lane; }
+  ChainPlace place_of(std::uint32_t pair, std::uint32_t lane) const {
+    return 2 * lanes_ * pair + lane;
+  }
 
   void fold_chains() {
     std::uint32_t next = 0;
@@ -82,7 +84,7 @@ class TablesMaker {
 
   void place_others() {
     std::uint32_t others = 0;
-    for (Place& place : place_) {
+    for (ChainPlace& place : place_) {
       if (place == nowhere) {
         place =
             place_of(static_cast<std::uint32_t>(tables_.pairs) + others / lanes_, others % lanes_);
@@ -215,7 +217,7 @@ class TablesMaker {
   void make_outputs() {
     for (std::uint32_t i = 0; i < program_.outputs.size(); ++i) {
       const OutputSlot& output = program_.outputs[i];
-      const Place place = place_[output.node];
+      const ChainPlace place = place_[output.node];
       if (output.is_force) {
         const auto first = static_cast<std::uint32_t>(tables_.probes.size());
         add_probes(output.node);
@@ -274,7 +276,7 @@ class TablesMaker {
   const Program& program_;
   const Chains& form_;
   std::uint32_t lanes_;
-  std::vector<Place>& place_;             // [node]
+  std::vector<ChainPlace>& place_;        // [node]
   std::vector<std::uint32_t> site_mass_;  // [node] coefficient, if it is in a chain
   std::vector<std::uint32_t> force_;      // [node]
   ChainsTables tables_;

@@ -14,26 +14,26 @@ namespace ressort {
 
 // Where a node's position is among the numbers of ChainsState::bodies; its velocity is one pack
 // further. Bodies are pairs of packs, positions and velocities.
-using Place = std::uint32_t;
+using ChainPlace = std::uint32_t;
 inline constexpr std::uint32_t nowhere = 0xffffffffu;
 
 // A chain of n masses in `packs` pairs: mass i is in lane i / packs of the pair i % packs.
 struct FoldedChain {
-  Place first = 0;
+  ChainPlace first = 0;
   std::uint32_t packs = 0;
-  std::uint32_t last = 0;  // the pair that its last mass is in
-  Place left = nowhere;    // of what holds the ends, nowhere: free
-  Place right = nowhere;
+  std::uint32_t last = 0;     // the pair that its last mass is in
+  ChainPlace left = nowhere;  // of what holds the ends, nowhere: free
+  ChainPlace right = nowhere;
   bool is_stiff = false;
-  std::array<Place, 2> second_left{nowhere, nowhere};  // as in Chain
-  std::array<Place, 2> second_right{nowhere, nowhere};
+  std::array<ChainPlace, 2> second_left{nowhere, nowhere};  // as in Chain
+  std::array<ChainPlace, 2> second_right{nowhere, nowhere};
   std::array<std::uint32_t, 4> springs{};  // coefficients: K and Z, those of the second springs
   MassRun mass;
 };
 
 // A mass of a chain that more than its chain acts on.
 struct ChainSite {
-  Place pair = 0;
+  ChainPlace pair = 0;
   std::uint32_t unit = 0;          // of ChainsState::units: its lane's pack
   std::uint32_t inverse_mass = 0;  // coefficient
 };
@@ -44,32 +44,32 @@ struct LoosePlaces {
 };
 
 struct PlacedEnds {
-  Place a = 0;
-  Place b = 0;
+  ChainPlace a = 0;
+  ChainPlace b = 0;
   std::uint32_t force_a = 0;  // of ChainsState::force
   std::uint32_t force_b = 0;
 };
 
 struct PlacedInput {
-  Place place = 0;
+  ChainPlace place = 0;
   std::uint32_t force = 0;
   std::uint32_t index = 0;  // of Program::inputs
 };
 
 // A spring of a chain, seen from a node whose force somebody listens to.
 struct Probe {
-  Place neighbour = 0;
+  ChainPlace neighbour = 0;
   std::uint32_t stiffness = 0;  // coefficients
   std::uint32_t damping = 0;
 };
 
 struct HeardPosition {
-  Place place = 0;
+  ChainPlace place = 0;
   std::uint32_t index = 0;  // of Program::outputs
 };
 
 struct HeardForce {
-  Place place = 0;
+  ChainPlace place = 0;
   std::uint32_t index = 0;
   std::uint32_t force = 0;
   std::uint32_t first = 0;  // of ChainsTables::probes
@@ -78,20 +78,20 @@ struct HeardForce {
 
 // A node under a point: what acts on it is added to a force, or to a chain's mass itself.
 struct PlacedNode {
-  Place place = 0;
+  ChainPlace place = 0;
   std::uint32_t force = nowhere;
   ChainSite site;
 };
 
 struct PlacedTap {
   TapSlot slot;
-  Place place = 0;
+  ChainPlace place = 0;
   std::uint32_t force = 0;
 };
 
 // A node that a link holds whose force is not the plain one.
 struct PassiveEnd {
-  Place place = 0;
+  ChainPlace place = 0;
   std::uint32_t unit = nowhere;          // if it is in a chain, as ChainSite says
   std::uint32_t inverse_mass = nowhere;  // coefficient, if it moves
 };
@@ -101,7 +101,7 @@ struct ChainsTables {
   std::vector<FoldedChain> chains;
   std::vector<ChainSite> sites;  // [force], the first of them
   std::vector<LoosePlaces> loose_runs;
-  std::vector<Place> loose;  // [force - sites]
+  std::vector<ChainPlace> loose;  // [force - sites]
   std::vector<LinkRun> link_runs;
   std::vector<PlacedEnds> ends;         // [link]
   std::vector<std::uint32_t> listened;  // forces on what does not move, for outputs
@@ -156,8 +156,8 @@ class ChainsKernel final : public Kernel<T> {
  private:
   void play(const Block<T>& block) override;
   const Program& program_;
-  std::size_t lanes_;         // of a pack
-  std::vector<Place> place_;  // [node]
+  std::size_t lanes_;              // of a pack
+  std::vector<ChainPlace> place_;  // [node]
   ChainsTables tables_;
   ChainsStep<T> step_;
   Aligned<T> masks_;

@@ -52,7 +52,7 @@ struct View {
   Table<FoldedChain> chains;
   Table<ChainSite> sites;
   Table<LoosePlaces> loose_runs;
-  const Place* loose;
+  const ChainPlace* loose;
   Table<LinkRun> link_runs;
   const PlacedEnds* ends;
   Table<PlacedTap> taps;
@@ -107,7 +107,7 @@ V down(V y, std::index_sequence<I...>) {
 
 // What holds an end of a chain by springs of K and Z; a free end is next to one that moves with it.
 template <class S>
-typename S::V tension_of(Place place, const typename S::Number* held, typename S::V itself,
+typename S::V tension_of(ChainPlace place, const typename S::Number* held, typename S::V itself,
                          const S& s) {
   return place == nowhere
              ? itself
@@ -126,7 +126,7 @@ void move_chain(const FoldedChain& chain, const typename S::Number* masks,
   const V k = all<V>(held[0]);
   const V z = all<V>(held[1]);
   const auto tension = [=](const V* pair) { return k * pair[0] + z * pair[1]; };
-  const auto end = [&](Place place, V itself) { return tension_of(place, held, itself, s); };
+  const auto end = [&](ChainPlace place, V itself) { return tension_of(place, held, itself, s); };
   const V first = tension(begin);
   V y = first;
   V before = y - up(end(chain.left, first), tension(back), others);
@@ -185,7 +185,7 @@ template <class S, class Pull>
   const auto tension = [=](const V* pair) {
     return Tension{k * pair[0] + z * pair[1], far_k * pair[0] + far_z * pair[1]};
   };
-  const auto far_end = [&](Place place, V itself) {
+  const auto far_end = [&](ChainPlace place, V itself) {
     return tension_of(place, held + 2, itself, s);
   };
   const Tension first = tension(begin);
@@ -295,7 +295,7 @@ template <class S>
 void step_loose(S& s) {
   using T = typename S::Number;
   T* force = s.force + (s.sites.last - s.sites.first);
-  const Place* place = s.loose;
+  const ChainPlace* place = s.loose;
   for (const LoosePlaces& run : s.loose_runs) {
     const MassRun& mass = run.mass;
     const T inverse_mass = s.coefficient[mass.inverse_mass];

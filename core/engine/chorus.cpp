@@ -7,7 +7,8 @@
 namespace ressort {
 namespace {
 
-constexpr std::size_t most_bytes = 16 * 1024;  // of a kernel's cells: half of what is nearest
+constexpr std::size_t most_bytes =
+    std::size_t{16} * 1024;  // of a kernel's cells: half of what is nearest
 
 constexpr std::size_t parts_of(std::size_t whole, std::size_t part) {
   return (whole + part - 1) / part;

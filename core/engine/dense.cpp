@@ -23,6 +23,7 @@ bool acts_everywhere(Law law) {
     case Law::cubic_spring:
     case Law::clipped_spring:
     case Law::smooth_bow:
+    case Law::either_bow:
       return true;
   }
   return true;

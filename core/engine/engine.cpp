@@ -28,13 +28,13 @@ double Engine::Voices::mapped(const Control& control, double amount) const {
 }
 
 double Engine::Voices::paced(double amount, std::size_t lane) const {
-  return amount * machine.rate_ratio * std::sqrt(voices[lane].factor);
+  return amount * machine.rate_ratio * std::sqrt(factor_of(lane));
 }
 
 double Engine::Voices::struck(const Control& control, double amount, std::size_t lane) const {
   return machine.hands[control.target].is_force
              ? paced(amount, lane)
-             : amount / (machine.rate_ratio * std::sqrt(voices[lane].factor));
+             : amount / (machine.rate_ratio * std::sqrt(factor_of(lane)));
 }
 
 void Engine::Voices::move_to(std::size_t input, double position) {
@@ -122,35 +122,15 @@ void Engine::Voices::set_parameter(std::size_t index, double wanted) {
   if (parameters[index] == value) {
     return;
   }
-  const double highest_before = highest_factor();
+  if (turned.empty()) {
+    highest_before = highest_factor();
+  }
+  if (!is_turned[index]) {
+    is_turned[index] = has_changed = true;
+    turned.push_back(static_cast<std::uint16_t>(index));
+  }
   parameters[index] = value;
   note_change(static_cast<std::uint16_t>(index));
-  std::size_t p = 0;
-  each_part([&](auto& part) {
-    for (std::size_t lane = 0; lane < voices.size(); ++lane) {
-      if (voices[lane].awake && !part.program.depending[index].empty()) {
-        stir(lane, p);
-      }
-    }
-    ++p;
-    for (const std::uint32_t c : part.program.depending[index]) {
-      for (std::size_t lane = 0; lane < voices.size(); ++lane) {
-        if (voices[lane].awake) {
-          set_coefficient(part, lane, c, !playing.bare);
-        }
-      }
-    }
-    for (const auto& kernel : part.kernels) {
-      kernel->coefficients.ramp(ramp_frames);
-    }
-  });
-  if (highest_factor() != highest_before) {
-    for (std::size_t lane = 0; lane < voices.size(); ++lane) {
-      if (voices[lane].awake && factor_for(lane) != voices[lane].factor) {
-        tune(lane, !playing.bare);
-      }
-    }
-  }
 }
 
 void Engine::Voices::note_change(std::uint16_t index) {
@@ -168,6 +148,73 @@ void Engine::Voices::set_coefficient(PartBank<T>& part, std::size_t lane, std::u
   part.of(lane).coefficients.set(lane % part.width, c, value, ramped);
 }
 
+template <class T>
+void Engine::Voices::set_coefficients(PartBank<T>& part, std::size_t lane, bool ramped) {
+  if (voices[lane].is_new || voices[lane].is_retuned) {
+    for (std::uint32_t c = 0; c < part.program.coefficients.size(); ++c) {
+      set_coefficient(part, lane, c, ramped);
+    }
+    return;
+  }
+  for (const std::uint16_t index : turned) {
+    for (const std::uint32_t c : part.program.depending[index]) {
+      set_coefficient(part, lane, c, ramped);
+    }
+  }
+}
+
+template <class T>
+void Engine::Voices::apply_changes(PartBank<T>& part, std::size_t p) {
+  const bool has_turned = std::any_of(turned.begin(), turned.end(), [&](std::uint16_t index) {
+    return !part.program.depending[index].empty();
+  });
+  for (std::size_t first = 0; first < voices.size(); first += part.width) {
+    bool ramps = false;
+    for (std::size_t lane = first; lane < std::min(voices.size(), first + part.width); ++lane) {
+      const Voice& voice = voices[lane];
+      if (!voice.awake || !(has_turned || voice.is_new || voice.is_retuned)) {
+        continue;
+      }
+      stir(lane, p);
+      if (voice.is_new) {
+        part.of(lane).reset(lane % part.width);
+      }
+      const bool ramped = !voice.is_new && !playing.bare;
+      set_coefficients(part, lane, ramped);
+      ramps |= ramped;
+    }
+    if (ramps) {
+      part.of(first).coefficients.ramp(ramp_frames);
+    }
+  }
+}
+
+void Engine::Voices::apply_changes() {
+  if (!has_changed) {
+    return;
+  }
+  const bool retunes = !turned.empty() && highest_factor() != highest_before;
+  for (std::size_t lane = 0; lane < voices.size(); ++lane) {
+    Voice& voice = voices[lane];
+    if (!voice.awake || !(retunes || voice.is_new || voice.is_retuned)) {
+      continue;
+    }
+    const double factor = factor_for(lane);
+    voice.is_retuned |= factor != voice.factor;
+    voice.factor = factor;
+  }
+  std::size_t p = 0;
+  each_part([&](auto& part) { apply_changes(part, p++); });
+  for (Voice& voice : voices) {
+    voice.is_new = voice.is_retuned = false;
+  }
+  for (const std::uint16_t index : turned) {
+    is_turned[index] = false;
+  }
+  turned.clear();
+  has_changed = false;
+}
+
 double Engine::Voices::factor_for(std::size_t lane) const {
   const Voice& voice = voices[lane];
   const double bent = std::exp2(bend * bend_semitones / 12.0);
@@ -178,18 +225,13 @@ double Engine::Voices::factor_for(std::size_t lane) const {
   return std::min(factor, highest_factor());
 }
 
-void Engine::Voices::tune(std::size_t lane, bool ramped) {
-  voices[lane].factor = factor_for(lane);
-  std::size_t p = 0;
-  each_part([&](auto& part) {
-    stir(lane, p++);
-    for (std::uint32_t c = 0; c < part.program.coefficients.size(); ++c) {
-      set_coefficient(part, lane, c, ramped);
-    }
-    if (ramped) {
-      part.of(lane).coefficients.ramp(ramp_frames);
-    }
-  });
+void Engine::Voices::tune(std::size_t lane) {
+  voices[lane].is_retuned = has_changed = true;
+}
+
+double Engine::Voices::factor_of(std::size_t lane) const {
+  const Voice& voice = voices[lane];
+  return voice.is_new || voice.is_retuned ? factor_for(lane) : voice.factor;
 }
 
 void Engine::Voices::note_on(const Event& event) {
@@ -336,7 +378,7 @@ void Engine::Voices::handle(const Event& event) {
       bend = std::clamp(event.value, -1.0, 1.0);
       for (std::size_t lane = 0; lane < voices.size(); ++lane) {
         if (voices[lane].awake) {
-          tune(lane, !playing.bare);
+          tune(lane);
         }
       }
       return;
@@ -385,7 +427,8 @@ void Engine::Voices::handle(const Event& event) {
 void Engine::Voices::push(std::size_t input, double force, double seconds) {
   wake(last);
   const double r = machine.rate_ratio;
-  const auto frames = static_cast<std::size_t>(std::max(0.0, seconds) * machine.rate_hz + 0.5);
+  const auto frames =
+      static_cast<std::size_t>(std::llround(std::max(0.0, seconds) * machine.rate_hz));
   if (frames == 0) {
     hand(last, input).strike(force * r);
   } else {
@@ -393,8 +436,10 @@ void Engine::Voices::push(std::size_t input, double force, double seconds) {
   }
 }
 
-Engine::Engine(Machine machine, Playing playing, Precision precision, Isa isa)
-    : voices_(std::make_unique<Voices>(std::move(machine), std::move(playing), precision, isa)) {}
+Engine::Engine(Machine machine, Playing playing, Precision precision, Isa isa,
+               const Progress& progress)
+    : voices_(std::make_unique<Voices>(std::move(machine), std::move(playing), precision, isa,
+                                       progress)) {}
 
 Engine::~Engine() = default;
 
@@ -419,6 +464,14 @@ void Engine::process(std::span<const Event> events, std::span<const double* cons
     voices_->segment(inputs, outputs, at, end - at);
     at = end;
   }
+}
+
+void Engine::limit_voices(int most) {
+  voices_->limit_voices(static_cast<std::size_t>(std::max(1, most)));
+}
+
+int Engine::voice_count() const {
+  return std::max(1, voices_->playing.voices);
 }
 
 std::span<const std::uint16_t> Engine::take_changes() {
@@ -452,6 +505,7 @@ EngineMeters Engine::meters() const {
   EngineMeters meters = voices_->metered;
   for (const Voice& voice : voices_->voices) {
     meters.voices += voice.awake && !voice.fading && voice.level > quiet_level ? 1 : 0;
+    meters.stepped += voice.awake && !voice.fading ? 1 : 0;
   }
   voices_->each_part([&](const auto& part) {
     for (std::size_t lane = 0; lane < voices_->voices.size(); ++lane) {
@@ -464,6 +518,7 @@ EngineMeters Engine::meters() const {
   });
   meters.resets = voices_->resets;
   meters.stolen = voices_->stolen;
+  meters.shed = voices_->shed;
   meters.beyond = voices_->beyond;
   meters.saved = voices_->saved();
   return meters;

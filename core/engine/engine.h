@@ -5,12 +5,14 @@
 #include <cstdint>
 #include <limits>
 #include <memory>
+#include <optional>
 #include <span>
 #include <vector>
 
 #include "core/engine/event.h"
 #include "core/engine/isa.h"
 #include "core/engine/program.h"
+#include "core/progress.h"
 
 namespace ressort {
 
@@ -58,10 +60,9 @@ struct Repose {
     std::uint32_t link = 0;   // a contact or a pluck
     double compliance = 0.0;  // of the distance of its ends
   };
-  std::vector<double> compliances;  // [output]; none: nothing is known
+  std::vector<double> compliances;  // [output]
   std::vector<Reach> reaches;
-  std::vector<double> lowest;  // [parameter]
-  std::vector<double> highest;
+  std::vector<Limits> box;  // [parameter]
 };
 
 // How a Machine is played. Plain data, made by the compile room.
@@ -80,7 +81,7 @@ struct Playing {
   std::vector<double> away;     // the same factor at equal steps from there to their limits
   std::vector<Control> controls;
   std::vector<Limits> limits;  // [parameter] that no event and no audio leaves; empty: none
-  std::vector<Repose> repose;  // [part], or none
+  std::vector<std::optional<Repose>> repose;  // [part]; nothing, or no element: never at rest
 };
 
 enum class Precision : std::uint8_t {
@@ -91,8 +92,10 @@ enum class Precision : std::uint8_t {
 
 struct EngineMeters {
   int voices = 0;            // that sound
+  int stepped = 0;           // that take time, too quiet ones among them, but for what fades
   std::uint64_t resets = 0;  // voices that went out of bounds and were faded out
   std::uint64_t stolen = 0;  // voices that had to give way to a new note
+  std::uint64_t shed = 0;    // voices that had to give way to limit_voices()
   std::uint64_t beyond = 0;  // times that a parameter was kept within its limits; by audio, blocks
   double saved = 0.0;        // the share of the steps that nobody has to take, 0..1
   std::size_t modes = 0;     // of all voices that are awake
@@ -109,10 +112,11 @@ struct EngineMeters {
 inline constexpr double runaway_level = 1e3;
 inline constexpr double runaway = 1e9;
 
-// The heap is used by the constructor and never again.
+// The heap is used by the constructor and never again; it throws what a Progress does.
 class Engine {
  public:
-  Engine(Machine machine, Playing playing, Precision precision, Isa isa = best_isa());
+  Engine(Machine machine, Playing playing, Precision precision, Isa isa = best_isa(),
+         const Progress& progress = {});
   ~Engine();
   Engine(const Engine&) = delete;
   Engine& operator=(const Engine&) = delete;
@@ -127,6 +131,12 @@ class Engine {
   // what that of `from` would be. False, and nothing is changed, if a kernel there does not
   // know where all of its masses are. [audio] wait-free, O(awake voices * (nodes + modes * masses))
   bool go_on_from(const Engine& from);
+
+  // So many voices sound at once from now on, at least one and at most what Playing says. Those
+  // that are too many fade as stolen ones do: first whose key is up, then who is quietest, and
+  // never a held one that was played last. [audio] wait-free, O(voices^2)
+  void limit_voices(int most);
+  int voice_count() const;  // as Playing says
 
   // The parameters that notes and controllers have changed since the last call, at most
   // `max_changes`; then it starts anew. [audio] wait-free

@@ -121,6 +121,12 @@ static inline V smooth_bow_force(V v, V z, V s) {
   return z * v * T(0.63) * exponential(V{} - 4 * ratio * ratio + T(0.5));
 }
 
+// Smooth while the profile is above 0.
+template <class V>
+static inline V either_bow_force(V v, V z, V s, V profile) {
+  return select(profile > V{}, smooth_bow_force(v, z, s), bow_force(v, z, s));
+}
+
 // a is the lower body, b the upper, t the distance at which they touch:
 //   d > -t: f = K (d + t) + Z v, else 0. It may pull on the way out, as published.
 template <class V>
@@ -160,6 +166,8 @@ static inline void with_law(Law law, V c0, V c1, V c2, V c3, V c4, Use&& use) {
       return use([=](V, V v) { return bow_force(v, c0, c1); });
     case Law::smooth_bow:
       return use([=](V, V v) { return smooth_bow_force(v, c0, c1); });
+    case Law::either_bow:
+      return use([=](V, V v) { return either_bow_force(v, c0, c1, c2); });
     case Law::contact:
       return use([=](V d, V v) { return contact_force(d, v, c0, c1, c2); });
     case Law::clipped_contact:

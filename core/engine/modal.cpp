@@ -173,10 +173,12 @@ template <class T>
 void ModalKernel<T>::place(std::size_t, const double* x, const double* v) {
   const std::size_t places = modes_.places.size();
   const double* basis = modes_.basis.data();
+  // Where the model starts, nothing is displaced.
+  const bool is_start = x == program_.position.data() && v == program_.velocity.data();
   for (std::size_t i = 0; i < modes_.modes; ++i) {
     double q = modes_.q[i];
     double d = modes_.d[i];
-    for (std::size_t node = 0; node < program_.moving; ++node, ++basis) {
+    for (std::size_t node = 0; !is_start && node < program_.moving; ++node, ++basis) {
       q += *basis * (x[node] - program_.position[node]);
       d += *basis * (v[node] - program_.velocity[node]);
     }

@@ -83,6 +83,7 @@ bool may_act(const LinkRun& run, const T* coefficients, Range<T> d) {
       return d.high > -c(4);
     case Law::bow:
     case Law::smooth_bow:
+    case Law::either_bow:
       return c(0) != 0;
     default:
       return true;

@@ -39,6 +39,7 @@ enum class Law : std::uint8_t {
   pluck,
   bow,
   smooth_bow,
+  either_bow,
   contact,
   clipped_contact,
 };

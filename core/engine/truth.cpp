@@ -67,6 +67,7 @@ double potential(Law law, double d, const std::array<double, 5>& c) {
       return pluck_potential(d, c[0], c[1]);
     case Law::bow:
     case Law::smooth_bow:
+    case Law::either_bow:
       return 0.0;
     case Law::contact:
       return d > -c[2] ? 0.5 * c[0] * (d + c[2]) * (d + c[2]) : 0.0;
@@ -198,10 +199,10 @@ std::vector<double> Textbook::velocities() const {
   return narrowed(v_);
 }
 
-Energy energy_of(const Program& program, std::span<const double> x,
-                 std::span<const double> v_before, std::span<const double> v_after) {
+StoredEnergy energy_of(const Program& program, std::span<const double> x,
+                       std::span<const double> v_before, std::span<const double> v_after) {
   const std::vector<double> coefficient = coefficients_of(program);
-  Energy energy;
+  StoredEnergy energy;
   for (const MassRun& run : program.mass_runs) {
     const double inverse = coefficient[run.inverse_mass];
     const double k = run.is_oscillator ? coefficient[run.stiffness] : 0.0;

@@ -41,7 +41,7 @@ class Textbook {
   std::vector<Corners<Real>> corners_;  // [tap]
 };
 
-struct Energy {
+struct StoredEnergy {
   double total = 0.0;
   double held = 0.0;  // that part of it which is in contacts and plucks
 };
@@ -50,7 +50,7 @@ struct Energy {
 //   1/2 sum of M v_before v_after, and every link's potential at x
 // For springs without damping this does not change by as much as a bit of rounding. Bows and
 // dampers hold nothing.
-Energy energy_of(const Program& program, std::span<const double> x,
-                 std::span<const double> v_before, std::span<const double> v_after);
+StoredEnergy energy_of(const Program& program, std::span<const double> x,
+                       std::span<const double> v_before, std::span<const double> v_after);
 
 }  // namespace ressort

@@ -16,12 +16,15 @@ constexpr std::size_t settlings_per_reading = 16;  // of the energy: 20 ms or so
 
 }  // namespace
 
-Engine::Voices::Voices(Machine machine_in, Playing playing_in, Precision precision, Isa isa)
+Engine::Voices::Voices(Machine machine_in, Playing playing_in, Precision precision, Isa isa,
+                       const Progress& progress)
     : machine(std::move(machine_in)),
       playing(std::move(playing_in)),
       bank(precision == Precision::float32
-               ? decltype(bank)(std::in_place_type<Bank<float>>, machine, lanes_wanted(), isa)
-               : decltype(bank)(std::in_place_type<Bank<double>>, machine, lanes_wanted(), isa)),
+               ? decltype(bank)(std::in_place_type<Bank<float>>, machine, lanes_wanted(), isa,
+                                progress)
+               : decltype(bank)(std::in_place_type<Bank<double>>, machine, lanes_wanted(), isa,
+                                progress)),
       audio_control(machine.hands.size(), nullptr),
       sound(machine.hands.size()),
       pole(playing.bare ? 0.0 : 1.0 - std::min(1.0, smoothing_hz / machine.rate_hz)),
@@ -30,6 +33,7 @@ Engine::Voices::Voices(Machine machine_in, Playing playing_in, Precision precisi
           std::exp(-static_cast<double>(max_block_frames) / (level_memory_s * machine.rate_hz))) {
   playing.limits.resize(machine.parameters.size());
   playing.home.resize(machine.parameters.size());
+  playing.repose.resize(machine.parts.size());
   voices.resize(lanes_wanted());
   first_output.push_back(0);
   for (const Program& program : machine.parts) {
@@ -60,7 +64,10 @@ Engine::Voices::Voices(Machine machine_in, Playing playing_in, Precision precisi
   }
   changes.reserve(max_changes);
   told.reserve(max_changes);
+  turned.reserve(parameters.size());
+  is_turned.resize(parameters.size());
   start(0, 0.0);
+  apply_changes();
   voices[0].level = 0.0;  // no note: the first one may take its place
 }
 
@@ -76,20 +83,14 @@ void Engine::Voices::start(std::size_t lane, double frequency_hz) {
   is_idle = false;
   voice.frequency_hz = frequency_hz;
   voice.level = 1.0;  // not yet heard: not yet the quietest
-  rest_lane(lane);
-  tune(lane, false);
-  last = lane;
-}
-
-void Engine::Voices::rest_lane(std::size_t lane) {
-  std::size_t p = 0;
-  each_part([&](auto& part) {
-    part.of(lane).reset(lane % part.width);
-    forget(watch(lane, p++));
-  });
+  voice.is_new = has_changed = true;
+  for (std::size_t p = 0; p < elements.size(); ++p) {
+    forget(watch(lane, p));
+  }
   for (std::size_t i = 0; i < machine.hands.size(); ++i) {
     hand(lane, i).place(rest[i]);
   }
+  last = lane;
 }
 
 void Engine::Voices::wake(std::size_t lane) {
@@ -105,6 +106,34 @@ void Engine::Voices::fade(std::size_t lane, double seconds) {
   voice.gain_step = std::min(voice.gain_step, step);
   voice.fading = true;
   voice.held = voice.sustained = false;
+}
+
+std::size_t Engine::Voices::voices_allowed() const {
+  return std::min(static_cast<std::size_t>(std::max(1, playing.voices)), most_voices);
+}
+
+void Engine::Voices::limit_voices(std::size_t most) {
+  most_voices = std::max<std::size_t>(1, most);
+  std::size_t live = 0;
+  for (std::size_t lane = 0; lane < voices.size(); ++lane) {
+    live += is_live(lane) ? 1 : 0;
+  }
+  const auto is_heard_less = [](const Voice& a, const Voice& b) {
+    const bool a_is_up = !a.held && !a.sustained;
+    const bool b_is_up = !b.held && !b.sustained;
+    return a_is_up != b_is_up ? a_is_up : a.level < b.level;
+  };
+  for (; live > voices_allowed(); --live) {
+    std::size_t least = voices.size();
+    for (std::size_t lane = 0; lane < voices.size(); ++lane) {
+      const bool may_go = is_live(lane) && !(lane == last && voices[lane].held);
+      if (may_go && (least == voices.size() || is_heard_less(voices[lane], voices[least]))) {
+        least = lane;
+      }
+    }
+    shed += voices[least].level > quiet_level ? 1 : 0;
+    fade(least, steal_fade_s);
+  }
 }
 
 std::size_t Engine::Voices::lane_for(int key, int channel) {
@@ -125,7 +154,7 @@ std::size_t Engine::Voices::lane_for(int key, int channel) {
       return lane;
     }
   }
-  if (live >= static_cast<std::size_t>(std::max(1, playing.voices))) {
+  if (live >= voices_allowed()) {
     stolen += voices[quietest].level > quiet_level ? 1 : 0;
     fade(quietest, steal_fade_s);
   }
@@ -147,6 +176,7 @@ std::size_t Engine::Voices::lane_for(int key, int channel) {
 void Engine::Voices::segment(std::span<const double* const> inputs,
                              std::span<double* const> outputs, std::size_t at, std::size_t frames) {
   listen(inputs, at, frames);
+  apply_changes();
   if (!is_idle) {
     std::visit([&](auto& b) { segment_in(b, inputs, outputs, at, frames); }, bank);
   }

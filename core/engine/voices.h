@@ -5,6 +5,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <span>
 #include <variant>
 #include <vector>
@@ -21,11 +22,13 @@ inline constexpr double quiet_level = 1e-5;    // -100 dBFS
 inline constexpr double silent_level = 1e-6;   // -120 dBFS: nothing that stands still was louder
 
 struct Voice {
-  bool awake = false;      // steps and is heard
-  bool lost = false;       // its stability: it fades from where it was
-  bool fading = false;     // gives way; its lane is free when the fade ends
-  bool held = false;       // by a key
-  bool sustained = false;  // by the pedal, its key being up
+  bool awake = false;       // steps and is heard
+  bool lost = false;        // its stability: it fades from where it was
+  bool fading = false;      // gives way; its lane is free when the fade ends
+  bool held = false;        // by a key
+  bool sustained = false;   // by the pedal, its key being up
+  bool is_new = false;      // its kernels are to be put to the start,
+  bool is_retuned = false;  // or to its factor, before they step
   std::uint8_t key = 0;
   std::uint8_t channel = 0;
   double frequency_hz = 0.0;  // without bend; 0: as the model is written
@@ -82,12 +85,15 @@ struct Playback {
   EngineMeters metered;           // the energy, as read_energy() found it
   std::uint64_t resets = 0;
   std::uint64_t stolen = 0;
+  std::uint64_t shed = 0;
+  std::size_t most_voices = std::numeric_limits<std::size_t>::max();  // as limit_voices() said
   std::uint64_t beyond = 0;
   std::uint64_t noise = 0x9e3779b97f4a7c15u;
 };
 
 struct Engine::Voices : Playback {
-  Voices(Machine machine_in, Playing playing_in, Precision precision, Isa isa);
+  Voices(Machine machine_in, Playing playing_in, Precision precision, Isa isa,
+         const Progress& progress);
   std::size_t lanes_wanted() const;
   Watch& watch(std::size_t lane, std::size_t part) {
     return watches[lane * elements.size() + part];
@@ -139,16 +145,24 @@ struct Engine::Voices : Playback {
   void forget(Watch& here);
   template <class T>
   void set_coefficient(PartBank<T>& part, std::size_t lane, std::uint32_t c, bool ramped);
+  template <class T>
+  void set_coefficients(PartBank<T>& part, std::size_t lane, bool ramped);
+  template <class T>
+  void apply_changes(PartBank<T>& part, std::size_t p);
+  // Brings the kernels to what the events before this segment want: once, however many they were.
+  void apply_changes();
   double factor_for(std::size_t lane) const;  // on every stiffness, for its key and the bend
-  void tune(std::size_t lane, bool ramped);
+  double factor_of(std::size_t lane) const;   // the voice's, even if its kernels have yet to know
+  void tune(std::size_t lane);
 
   // --- voices ---
   // Puts the lane to the model's start, tuned; 0 Hz: as the model is written.
   void start(std::size_t lane, double frequency_hz);
-  void rest_lane(std::size_t lane);
   void wake(std::size_t lane);
   void fade(std::size_t lane, double seconds);
   bool is_live(std::size_t lane) const { return voices[lane].awake && !voices[lane].fading; }
+  std::size_t voices_allowed() const;
+  void limit_voices(std::size_t most);
   // A lane for a new note: the same key's, a free one, or the quietest's place.
   std::size_t lane_for(int key, int channel);
 
@@ -273,7 +287,11 @@ struct Engine::Voices : Playback {
   std::vector<std::size_t> elements;          // [part] nodes and links
   std::vector<std::uint32_t> creators;        // links that made energy of nothing, by origin
   std::size_t creators_told = 0;
-  Look looking;  // b.x and b.v are its own until it is done
+  bool has_changed = false;           // something is to be applied
+  std::vector<std::uint16_t> turned;  // parameters, since the last segment
+  std::vector<bool> is_turned;        // [parameter]
+  double highest_before = 1.0;        // highest_factor() before the first of them
+  Look looking;                       // b.x and b.v are its own until it is done
   static constexpr std::size_t none = Look::none;
   std::size_t suspect = none;  // of the watches: is looked at more often, as something was created
   std::size_t looks_left = 0;  // at it
