@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "core/model/tokens.h"
 #include "tests/catch.h"
 #include "tests/rig.h"
 
@@ -60,12 +61,12 @@ TEST_CASE("every keyword takes its numbers of arguments and no other", "[mdl]") 
   };
   const std::vector<Form> forms = {
       {"@p param", "param", {1}},
-      {"@g ground", "ground", {1, 4}},
-      {"@m mass", "mass", {3, 4, 6}},
-      {"@m massG", "massG", {4, 7}},
-      {"@o osc", "osc", {5, 6, 8}},
-      {"@o cel", "cel", {5, 6, 8}},
-      {"@in1 posInput", "posInput", {1, 4}},
+      {"@g ground", "ground", {1}},
+      {"@m mass", "mass", {3, 4}},
+      {"@m massG", "massG", {4}},
+      {"@o osc", "osc", {5, 6}},
+      {"@o cel", "cel", {5, 6}},
+      {"@in1 posInput", "posInput", {1}},
       {"@in1 frcInput @a", "frcInput", {0}, 1},
       {"@in1 forceInput @a", "forceInput", {0}, 1},
       {"@out1 posOutput @a", "posOutput", {0}, 1},
@@ -97,10 +98,10 @@ TEST_CASE("every keyword takes its numbers of arguments and no other", "[mdl]") 
         REQUIRE(errors.size() == 1);
         CHECK(errors[0].line == 3);
         CHECK(errors[0].message.starts_with("'" + form.word + "' takes "));
-        CHECK(errors[0].message.ends_with("found " + std::to_string(count + form.references)));
+        CHECK(errors[0].message.find("found " + std::to_string(count + form.references)) !=
+              std::string::npos);
         // At the end of the line where something is missing, at the first one too many else.
-        const bool drawn = form.accepted.back() == form.accepted.front() + 3;
-        const int most = drawn ? *std::next(form.accepted.rbegin()) : form.accepted.back();
+        const int most = form.accepted.back();
         const bool missing = count < form.accepted.front();
         const std::size_t column =
             missing ? line.size() + 1 : form.start.size() + 2 + 2 * static_cast<std::size_t>(most);
@@ -295,10 +296,7 @@ TEST_CASE("every error tells its line, its column and what was expected", "[mdl]
       {p + "@m mass m_K 0 0\n@out1 posOutput @m_K", 3, 17,
        "'@m_K' is no mass, so nothing can be attached to it"},
       {"@m mass 1e999 0. 0.", 1, 9, "the number is too large or too small"},
-      {two_masses + "@l nlBow @a @b 1 1 smooth", 3, 20,
-       "expected 0 (piecewise) or 1 (smooth) for the bow's profile"},
-      {two_masses + "@p param 1\n@l nlBow @a @b 1 1 p", 4, 20,
-       "expected 0 (piecewise) or 1 (smooth) for the bow's profile"},
+      {two_masses + "@l nlBow @a @b 1 1 smooth", 3, 20, "'smooth' is no parameter of this model"},
       {two_masses + "@K param 1\n@l spring @a @b K * 2", 4, 21,
        "'spring' takes 3 to 4 arguments (@A @B K [Z]), found 5; an expression with blanks needs "
        "brackets, [K * 2]"},
@@ -385,6 +383,45 @@ TEST_CASE("text that no person wrote does no harm", "[mdl]") {
       }
     }
   }
+}
+
+TEST_CASE("texts that are monstrous are refused in a sentence with a place", "[mdl]") {
+  const std::string big(1'000'000, '(');
+  const std::string rest = " 0. 0.";
+  check_error({"@a mass " + big + "1" + rest, 1, 42, "the parentheses are nested too deeply"});
+  check_error({"@a mass " + std::string(1'000'000, '1') + rest, 1, 9,
+               "the number is too large or too small"});
+  check_error({"@a mass 1e999999" + rest, 1, 9, "the number is too large or too small"});
+  check_error({"@K param 1e999999\n@a mass 1" + rest, 1, 10,
+               "found '1e999999' where the parameter's value, a number, was expected"});
+  check_error({"@a mass 1 1e999999 0.", 1, 11, "found '1e999999' where a number was expected"});
+  check_error(
+      {"@" + std::string(1'000'000, 'm') + " mass 1" + rest, 1, 1,
+       "'" + std::string(40, 'm') +
+           "...' is no label: it is longer than 1000 bytes, or has what cannot be printed"});
+  check_error({"@a\x1b[2J mass 1" + rest, 1, 1,
+               "'a?' is no label: it is longer than 1000 bytes, or has what cannot be printed"});
+  check_error({"@a mass " + std::string(1'000'000, 'x') + rest, 1, 9,
+               "'" + std::string(40, 'x') + "...' is no parameter of this model"});
+  // A lone CR ends a line, also where the text ends in what is none.
+  check_error({std::string("@a mass 1 0 0\r@b mass 1 0 0\r\n@c\0", 32), 3, 3,
+               "found a zero byte: this is no text, so it is no model"});
+}
+
+TEST_CASE("letters of several bytes are shown as they are, all else as '?'", "[mdl]") {
+  CHECK(ressort::quoted("caf\u00e9 \u266a") == "'caf\u00e9 \u266a'");
+  CHECK(ressort::quoted("\xe9\x1b\x80\xc2\x85\xe2\x82") == "'" + std::string(7, '?') + "'");
+  CHECK(ressort::quoted(std::string(50, 'a')) == "'" + std::string(40, 'a') + "...'");
+  std::string accents;
+  for (int i = 0; i < 41; ++i) {
+    accents += "\u00e9";
+  }
+  CHECK(ressort::quoted(accents) == "'" + accents.substr(0, 80) + "...'");
+  check_error({"@a mass K\u00e9 0. 0.", 1, 9, "'K' is no parameter of this model"});
+  check_error(
+      {"@a mass 1\u00e9 0. 0.", 1, 10, "found '\u00e9' where an operator or the end was expected"});
+  check_error({"@mmm\u00e9 mass 1 0 0\n@l spring @mmm @mmm\u00e9 1\n", 2, 11,
+               "no mass is called '@mmm'; did you mean '@mmm\u00e9'?"});
 }
 
 TEST_CASE("labels of any length are kept, and copied with their network", "[mdl]") {

@@ -118,6 +118,9 @@ TEST_CASE("every form of every keyword is printed in one", "[print]") {
            Form{"@l nlBow @a @b 1 2", "@l nlBow @a @b 1 2"},
            Form{"@l nlBow @a @b 1 2 0", "@l nlBow @a @b 1 2"},
            Form{"@l nlBow @a @b 1 2 [1]", "@l nlBow @a @b 1 2 1"},
+           Form{"@l nlBow @a @b 1 2 (2-1)", "@l nlBow @a @b 1 2 1"},
+           Form{"@p param 0\n@l nlBow @a @b 1 2 p", "@l nlBow @a @b 1 2 p"},
+           Form{"@p param 0\n@l nlBow @a @b 1 2 [1 - p]", "@l nlBow @a @b 1 2 1-p"},
            Form{"@l contact @a @b 1 2", "@l contact @a @b 1 2"},
            Form{"@l detent @a @b 1 2 3", "@l contact @a @b 1 2 3"},
            Form{"@l nlContact @a @b 1 2 3 4", "@l nlContact @a @b 1 2 3 4"},
@@ -432,10 +435,10 @@ class Maker {
   }
 
   void add_link() {
-    static constexpr int least[] = {0, 3, 3, 4, 2, 2, 2, 2, 4};
-    static constexpr int most[] = {0, 3, 3, 4, 3, 2, 2, 3, 5};
+    static constexpr int least[] = {0, 3, 3, 4, 2, 2, 2, 2, 2, 4};
+    static constexpr int most[] = {0, 3, 3, 4, 3, 2, 2, 2, 3, 5};
     Link link{.name = chance() ? "twice" : name()};
-    link.kind = static_cast<LinkKind>(random_.below(9));
+    link.kind = static_cast<LinkKind>(random_.below(std::size(least)));
     const auto kind = static_cast<std::size_t>(link.kind);
     for (int i = 0; i < (chance() ? most : least)[kind]; ++i) {
       link.arguments[static_cast<std::size_t>(i)] = argument();
@@ -444,6 +447,11 @@ class Maker {
       const std::size_t which = random_.below(3);
       link.arguments[0] = which < 2 ? argument() : no_argument;
       link.arguments[1] = which > 0 ? argument() : no_argument;
+    }
+    if (link.kind == LinkKind::either_bow) {  // its profile is no number
+      link.kind = network_.parameters.empty() ? LinkKind::bow : link.kind;
+      link.arguments[2] =
+          network_.parameters.empty() ? no_argument : argument({{Op::parameter, 0, 0.0}});
     }
     link.a = end();
     link.b = end();

@@ -152,16 +152,10 @@ void Reader::add_link(Line& line) {
   const auto b = reference(line, 1);
   for (std::size_t i = 2; i < line.rest.size(); ++i) {
     const std::size_t slot = static_cast<std::size_t>(line.keyword->first) + i - 2;
-    if (link.kind == LinkKind::bow && slot == 2) {
-      // The profile is a choice, not a quantity that could be turned while playing.
-      double smooth = 0.0;
-      if (!parse_number(unwrapped(line.rest[i]).text, smooth)) {
-        error(line, line.rest[i], "expected 0 (piecewise) or 1 (smooth) for the bow's profile");
-      }
-      link.kind = smooth > 0.0 ? LinkKind::smooth_bow : LinkKind::bow;
-    } else {
-      link.arguments[slot] = argument(line, i);
-    }
+    link.arguments[slot] = argument(line, i);
+  }
+  if (link.kind == LinkKind::bow) {
+    choose_profile(link);
   }
   show_dialect(line, link.kind);
   if (!a || !b) {
@@ -175,6 +169,21 @@ void Reader::add_link(Line& line) {
   out_.network.links.push_back(std::move(link));
 }
 
+// A bow whose profile is a number has no choice left.
+void Reader::choose_profile(Link& link) const {
+  ArgumentId& profile = link.arguments[2];
+  if (profile == no_argument) {
+    return;
+  }
+  const Formula& formula = out_.network.arguments[profile];
+  if (!is_constant(formula)) {
+    link.kind = LinkKind::either_bow;
+    return;
+  }
+  link.kind = evaluate(formula, {}) > 0.0 ? LinkKind::smooth_bow : LinkKind::bow;
+  profile = no_argument;
+}
+
 // MIMS4Max alone has the clipped laws, and counts of arguments of its own.
 void Reader::show_dialect(const Line& line, LinkKind kind) {
   const std::size_t count = line.rest.size();
@@ -186,7 +195,7 @@ void Reader::show_dialect(const Line& line, LinkKind kind) {
     show(velocity_, line, "gives a contact no threshold");
   } else if (kind == LinkKind::pluck && count == 5) {
     show(velocity_, line, "gives a pluck a damping");
-  } else if ((kind == LinkKind::bow || kind == LinkKind::smooth_bow) && count == 5) {
+  } else if (is_bow(kind) && count == 5) {
     show(velocity_, line, "chooses a bow's profile");
   }
 }
@@ -342,7 +351,10 @@ double Reader::state(const Line& line, std::size_t at) {
   if (!parse_number(line.rest[at].text, number)) {
     error(line, line.rest[at],
           "found " + quoted(line.rest[at].text) + " where a number was expected" +
-              (is_identifier(line.rest[at].text) ? " (a starting state is no parameter)" : ""));
+              (is_identifier(line.rest[at].text) ? " (a starting state is no parameter)"
+               : line.keyword->element == Element::position_input && line.rest[at].text[0] == '@'
+                   ? "; a force on it is a 'frcInput'"
+                   : ""));
   }
   return number;
 }

@@ -4,6 +4,8 @@
 #include <charconv>
 #include <cmath>
 
+#include "core/model/tokens.h"
+
 namespace ressort {
 namespace {
 
@@ -47,7 +49,7 @@ class Parser {
     sum();
     skip_blanks();
     if (!failed_ && at_ < text_.size()) {
-      fail("found '" + std::string(1, text_[at_]) + "' where an operator or the end was expected");
+      fail("found " + letter() + " where an operator or the end was expected");
     }
     if (failed_) {
       return error_;
@@ -130,7 +132,7 @@ class Parser {
     if (is_letter(c)) {
       return name();
     }
-    fail("found '" + std::string(1, c) + "' where a number, a name or '(' was expected");
+    fail("found " + letter() + " where a number, a name or '(' was expected");
   }
 
   void parenthesis() {
@@ -160,7 +162,7 @@ class Parser {
       }
     }
     at_ = start;
-    fail("'" + std::string(word) + "' is no parameter of this model");
+    fail(quoted(word) + " is no parameter of this model");
   }
 
   void call(std::string_view word, std::size_t start) {
@@ -185,8 +187,7 @@ class Parser {
       return push({function.op, 0, 0.0}, 1 - function.arguments);
     }
     at_ = start;
-    fail("unknown function '" + std::string(word) +
-         "'; there are sqrt abs sin cos exp pow min max clamp");
+    fail("unknown function " + quoted(word) + "; there are sqrt abs sin cos exp pow min max clamp");
   }
 
   void push_operator(Op op) { push({op, 0, 0.0}, -1); }
@@ -215,6 +216,12 @@ class Parser {
     while (at_ < text_.size() && (text_[at_] == ' ' || text_[at_] == '\t')) {
       ++at_;
     }
+  }
+
+  // Where the text is read.
+  std::string letter() const {
+    std::size_t length = 0;
+    return quoted(first_letter(text_.substr(at_), length));
   }
 
   void fail(std::string message) {

@@ -47,6 +47,8 @@ constexpr FaustDefinition definitions[] = {
     {"smooth_bow",
      "smooth_bow(z, s, d, v) = 0.63*z*r*v*exp(0.5 - 4.0*ratio*ratio) with { ratio = v/(s*r); "
      "};\n"},
+    {"either_bow",
+     "either_bow(z, s, p, d, v) = select2(p > 0.0, bow(z, s, d, v), smooth_bow(z, s, d, v));\n"},
     {"contact", "contact(k, z, t, d, v) = select2(d > 0.0 - t, 0.0, spring(k, z, d + t, v));\n"},
     {"clipped_contact",
      "clipped_contact(s, c, k, z, t, d, v) =\n"
@@ -259,6 +261,8 @@ FaustLaw faust_law(LinkKind kind) {
       return {"bow", 2};
     case LinkKind::smooth_bow:
       return {"smooth_bow", 2};
+    case LinkKind::either_bow:
+      return {"either_bow", 3};
     case LinkKind::contact:
       return {"contact", 3};
     case LinkKind::clipped_contact:

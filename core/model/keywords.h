@@ -73,7 +73,7 @@ inline constexpr Keyword keywords[] = {
     {"nlSpring3",          Element::link,            LinkKind::cubic_spring,     2, 3, 3, 0, false, "@A @B K Q Z"},
     {"nlSpringDamper",     Element::link,            LinkKind::clipped_spring,   2, 4, 4, 0, false, "@A @B S C K Z"},
     {"nlPluck",            Element::link,            LinkKind::pluck,            2, 2, 3, 0, false, "@A @B K SCALE [Z]"},
-    {"nlBow",              Element::link,            LinkKind::bow,              2, 2, 3, 0, false, "@A @B Z SCALE [SMOOTH]"},
+    {"nlBow",              Element::link,            LinkKind::bow,              2, 2, 3, 0, false, "@A @B Z SCALE [PROFILE]"},
     {"contact",            Element::link,            LinkKind::contact,          2, 2, 3, 0, false, "@A @B K Z [THRESHOLD]"},
     {"detent",             Element::link,            LinkKind::contact,          2, 2, 3, 0, false, "@A @B K Z [THRESHOLD]"},
     {"nlContact",          Element::link,            LinkKind::clipped_contact,  2, 4, 5, 0, false, "@A @B S C K Z [THRESHOLD]"},

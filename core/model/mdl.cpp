@@ -1,6 +1,7 @@
 #include "core/model/mdl.h"
 
 #include <algorithm>
+#include <cctype>
 
 #include "core/model/expression.h"
 #include "core/model/reader.h"
@@ -19,14 +20,20 @@ ParsedNetwork Reader::read(std::string_view text, const ReadOptions& options) {
   }
   const std::size_t zero = text.find('\0');
   if (zero != std::string_view::npos) {
-    const auto before = text.substr(0, zero);
-    const auto line = std::count(before.begin(), before.end(), '\n') + 1;
-    const std::size_t start = before.rfind('\n');
-    say(Severity::error, static_cast<int>(line),
-        {"", static_cast<int>(start == std::string_view::npos ? zero + 1 : zero - start)},
+    int line = 1;
+    std::size_t start = 0;
+    for (std::size_t i = 0; i < zero; ++i) {
+      if (text[i] == '\n' || (text[i] == '\r' && text[i + 1] != '\n')) {
+        ++line;
+        start = i + 1;
+      }
+    }
+    say(Severity::error, line, {"", static_cast<int>(zero - start) + 1},
         "found a zero byte: this is no text, so it is no model");
     return std::move(out_);
   }
+  const Progress& progress = options.progress;
+  progress.stage("reading it");
   text_ = text;
   int number = 0;
   while (!text.empty() && errors_ <= most_diagnostics) {
@@ -34,24 +41,30 @@ ParsedNetwork Reader::read(std::string_view text, const ReadOptions& options) {
         std::find_if(text.begin(), text.end(), [](char c) { return c == '\n' || c == '\r'; });
     const auto end = static_cast<std::size_t>(last - text.begin());
     read_line(text.substr(0, end), ++number);
+    progress.spend(end / 8 + 1);
     const bool pair = end + 1 < text.size() && text[end] == '\r' && text[end + 1] == '\n';
     text.remove_prefix(std::min(text.size(), end + (pair ? 2 : 1)));
   }
   // Declarations first: a line may refer to one that comes after it.
   declare_all();
+  progress.spend(entries_.size());
   for (const Entry& entry : entries_) {
     if (errors_ > most_diagnostics) {
       break;
     }
     Line line = open(entry);
     build(line);
+    progress.spend(20);
   }
   if (entries_.empty() && out_.ok()) {
     say(Severity::error, 1, {"", 1},
         "the model is empty: expected elements such as '@m mass 1. 0. 0.'");
   }
+  progress.spend(8 * entries_.size());
   decide_motion(options);
+  progress.spend(8 * entries_.size());
   look_over();
+  progress.spend(8 * entries_.size());
   std::stable_sort(out_.diagnostics.begin(), out_.diagnostics.end(),
                    [](const Diagnostic& a, const Diagnostic& b) { return a.line < b.line; });
   entries_ = {};
@@ -79,6 +92,13 @@ void Reader::read_line(std::string_view text, int number) {
   line.label.text.remove_prefix(1);
   if (line.label.text.empty()) {
     return error(line, line.label, "expected a label right after '@'");
+  }
+  if (line.label.text.size() > longest_label ||
+      std::any_of(line.label.text.begin(), line.label.text.end(),
+                  [](char c) { return std::iscntrl(static_cast<unsigned char>(c)) != 0; })) {
+    return error(line, line.label,
+                 quoted(line.label.text) + " is no label: it is longer than " +
+                     std::to_string(longest_label) + " bytes, or has what cannot be printed");
   }
   if (tokens_.size() < 2) {
     return error(line, {"", line.label.column + static_cast<int>(line.label.text.size()) + 1},
@@ -197,8 +217,8 @@ bool Reader::enter_label(std::uint32_t index) {
   }
   const Line line = open(entry);
   const Entry& first = entries_[place];
-  const std::string where = "'@" + std::string(line.label.text) + "' is already declared in line " +
-                            std::to_string(first.number);
+  const std::string where = quoted("@" + std::string(line.label.text)) +
+                            " is already declared in line " + std::to_string(first.number);
   if (line.keyword->element != Element::link || keywords[first.keyword].element != Element::link) {
     error(line, line.label, where);
     return false;
@@ -304,8 +324,13 @@ bool Reader::check_count(const Line& line) {
   const int found = static_cast<int>(line.rest.size());
   const int least = keyword.references + keyword.least;
   const int most = keyword.references + keyword.most;
-  const bool drawn = keyword.drawable && found == least + 3;
-  if ((found >= least && found <= most) || drawn) {
+  // GROUP X Y: what is a number, or a place, is no group's name.
+  double number = 0.0;
+  const bool is_like_drawing = keyword.drawable && found == least + 3;
+  const std::string_view group =
+      is_like_drawing ? line.rest[static_cast<std::size_t>(least)].text : "";
+  const bool is_drawn = is_like_drawing && group[0] != '[' && !parse_number(group, number);
+  if ((found >= least && found <= most) || is_drawn) {
     return true;
   }
   Token place;
@@ -326,6 +351,8 @@ bool Reader::check_count(const Line& line) {
             (most == 1 ? " argument (" : " arguments (") + std::string(keyword.arguments) +
             "), found " + std::to_string(found) +
             (line.coordinates.empty() ? "" : " before the place on a macro") +
+            (is_like_drawing ? "; a drawing is GROUP X Y, and " + quoted(group) + " is no group"
+                             : "") +
             (has_blanks ? "; an expression with blanks needs brackets, [K * 2]" : ""));
   return false;
 }
@@ -350,7 +377,7 @@ void Reader::look_over() {
     const Mass& mass = network.masses[i];
     if (!attached[i] && mass.kind != MassKind::oscillator && mass.kind != MassKind::point) {
       say(Severity::warning, mass.place.line, {mass.name, mass.place.column},
-          "nothing is attached to '@" + mass.name.text() + "'");
+          "nothing is attached to " + quoted("@" + mass.name.text()));
     }
   }
   for (const Link& link : network.links) {
@@ -359,9 +386,19 @@ void Reader::look_over() {
     if (is_contact && network.masses[link.a].kind == MassKind::position &&
         network.masses[link.b].kind != MassKind::position) {
       say(Severity::warning, link.place.line, {link.name, link.place.column},
-          "the contact's ends look swapped: it acts while the second is below the first, here '@" +
-              network.masses[link.b].name.text() + "' below '@" +
-              network.masses[link.a].name.text() + "'");
+          "the contact's ends look swapped: it acts while the second is below the first, here " +
+              quoted("@" + network.masses[link.b].name.text()) + " below " +
+              quoted("@" + network.masses[link.a].name.text()));
+    }
+  }
+  for (const Input& input : network.inputs) {
+    const Mass& pushed = network.masses[input.mass];
+    if (input.is_force && (pushed.kind == MassKind::ground || pushed.kind == MassKind::position)) {
+      const std::string label = "in" + std::to_string(input.number);
+      say(Severity::warning, input.place.line, {label, input.place.column},
+          "'@" + label + "' pushes " + quoted("@" + pushed.name.text()) + ", which " +
+              (pushed.kind == MassKind::ground ? "never moves" : "moves only as its input says") +
+              ": it does nothing");
     }
   }
   std::vector<Input> heard = network.inputs;
@@ -384,7 +421,7 @@ void Reader::look_over() {
     if (!used[i]) {
       const Parameter& parameter = network.parameters[i];
       say(Severity::warning, parameter.place.line, {parameter.name, parameter.place.column},
-          "the parameter '" + parameter.name + "' is used nowhere");
+          "the parameter " + quoted(parameter.name) + " is used nowhere");
     }
   }
   if (network.outputs.empty()) {
@@ -398,7 +435,11 @@ bool ParsedNetwork::ok() const {
 }
 
 ParsedNetwork parse_network(std::string_view text, const ReadOptions& options) {
-  return Reader().read(text, options);
+  try {
+    return Reader().read(text, options);
+  } catch (const Stopped&) {
+    return {.network = {}, .diagnostics = {{.message = stopped}}, .motion = {}};
+  }
 }
 
 std::string to_string(const Diagnostic& diagnostic, std::string_view file) {

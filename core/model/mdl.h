@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "core/model/network.h"
+#include "core/progress.h"
 
 namespace ressort {
 
@@ -26,12 +27,14 @@ struct ReadOptions {
   // What the third state argument means, whatever the text says or shows.
   std::optional<ThirdArgument> third;
   std::string_view third_by = "was asked for";  // how ParsedNetwork::motion says who chose it
+  Progress progress = {};  // of what it stops, the only diagnostic is `stopped`, without a line
 };
 
 struct ParsedNetwork {
   Network network;                      // canonical; complete only if ok()
   std::vector<Diagnostic> diagnostics;  // in the order of the lines
-  std::string motion;                   // what Network::third is, and why, for a person
+  std::optional<ThirdArgument> third;   // nothing: the meanings agree
+  std::string motion;                   // the same for a person, and why
   bool ok() const;
 };
 

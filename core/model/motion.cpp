@@ -30,6 +30,7 @@ void Reader::read_motion(const Line& line, const std::vector<Token>& tokens) {
 
 void Reader::choose_motion(ThirdArgument third, const std::string& why) {
   out_.network.third = third;
+  out_.third = third;
   out_.motion = (third == velocity ? "a velocity in units per second, as "
                                    : "the position one sample before, as ") +
                 why;

@@ -20,7 +20,7 @@ class Name {
       bytes_[most_held] = static_cast<char>(text.size());
     } else {
       const std::string* const owned = new std::string(text);
-      std::memcpy(bytes_.data(), &owned, sizeof owned);
+      std::memcpy(bytes_.data(), &owned, sizeof(void*));
       bytes_[most_held] = elsewhere;
     }
   }
@@ -55,7 +55,7 @@ class Name {
 
   const std::string* owned() const {
     const std::string* text = nullptr;
-    std::memcpy(&text, bytes_.data(), sizeof text);
+    std::memcpy(&text, bytes_.data(), sizeof(void*));
     return text;
   }
 

@@ -119,6 +119,7 @@ enum class LinkKind : std::uint8_t {
   pluck,             // K, scale, Z
   bow,               // Z, scale
   smooth_bow,        // the same arguments, the exponential profile
+  either_bow,        // Z, scale, profile: a smooth bow while that is above 0
   contact,           // K, Z, threshold
   clipped_contact,   // s, c, k, Z, threshold
 };
@@ -136,6 +137,11 @@ struct Link {
   Place place;
   bool operator==(const Link&) const = default;
 };
+
+// Of any profile.
+constexpr bool is_bow(LinkKind kind) {
+  return kind == LinkKind::bow || kind == LinkKind::smooth_bow || kind == LinkKind::either_bow;
+}
 
 // What a link does near rest: its K and Z. Plucks, bows and contacts do nothing there.
 struct LinearPart {

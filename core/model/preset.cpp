@@ -7,6 +7,10 @@
 #include <cstdio>
 #include <initializer_list>
 
+#include "core/model/tokens.h"
+#include "core/model/toml_depth.h"
+#include "core/model/topology.h"
+
 #define TOML_EXCEPTIONS 0
 #if __has_include(<toml++/toml.hpp>)
 #include <toml++/impl/preprocessor.hpp>
@@ -49,11 +53,12 @@ Place place_of(const toml::node& node) {
   return {static_cast<int>(node.source().begin.line), static_cast<int>(node.source().begin.column)};
 }
 
-// Takes values out of one table and keeps the first problem.
+// Takes values out of one table, and goes on after a problem so that all are told at once. What
+// takes a value says whether it is there and right; what is wrong has been told.
 class Table {
  public:
-  Table(const toml::table& table, std::string name, std::optional<Error>& error)
-      : table_(table), name_(std::move(name)), error_(error) {}
+  Table(const toml::table& table, std::string name, std::vector<Error>& errors)
+      : table_(table), name_(std::move(name)), errors_(errors) {}
 
   // Every key of the table must be one of these.
   void allow(std::initializer_list<std::string_view> keys) {
@@ -63,63 +68,68 @@ class Table {
         for (const std::string_view k : keys) {
           expected += (expected.empty() ? "" : ", ") + std::string(k);
         }
-        fail(value, "unknown key '" + std::string(key.str()) + "' in " + name_ + "; there are " +
-                        expected);
-        return;
+        fail(value,
+             "unknown key " + quoted(key.str()) + " in " + name_ + "; there are " + expected);
       }
     }
   }
 
-  void number(std::string_view key, double& target, double least, double most) {
+  bool number(std::string_view key, double& target, double least, double most) {
     const toml::node* node = table_.get(key);
-    if (node == nullptr) {
-      return;
-    }
-    number(*node, key, target, least, most);
+    return node != nullptr && number(*node, key, target, least, most);
   }
 
   void integer(std::string_view key, int& target, int least, int most) {
     double value = target;
-    number(key, value, least, most);
-    if (value != std::floor(value)) {
+    if (number(key, value, least, most) && value != std::floor(value)) {
       fail(*table_.get(key), "'" + std::string(key) + "' must be a whole number");
     }
     target = static_cast<int>(value);
   }
 
-  void text(std::string_view key, std::string& target) { take(key, target, "a text in quotes"); }
-  void flag(std::string_view key, bool& target) { take(key, target, "true or false"); }
+  bool text(std::string_view key, std::string& target) {
+    return take(key, target, "a text in quotes");
+  }
+  bool flag(std::string_view key, bool& target) { return take(key, target, "true or false"); }
 
   // [low, high]
-  bool pair(std::string_view key, double& low, double& high) {
+  bool pair(std::string_view key, double& low, double& high, double least = -1e12,
+            double most = 1e12) {
     const toml::node* node = table_.get(key);
     if (node == nullptr) {
       return false;
     }
     const toml::array* both = node->as_array();
     if (both == nullptr || both->size() != 2) {
-      fail(*node, "'" + std::string(key) + "' must be two numbers: [low, high]");
+      return fail(*node, "'" + std::string(key) + "' must be two numbers: [low, high]");
+    }
+    const bool is_first = number((*both)[0], key, low, least, most);
+    return number((*both)[1], key, high, least, most) && is_first;
+  }
+  // The same, and not the other way round.
+  bool range(std::string_view key, double& low, double& high, double least = -1e12,
+             double most = 1e12) {
+    if (!pair(key, low, high, least, most)) {
       return false;
     }
-    number((*both)[0], key, low, -1e12, 1e12);
-    number((*both)[1], key, high, -1e12, 1e12);
-    return true;
+    return low <= high || fail(*table_.get(key), "'" + std::string(key) +
+                                                     "' is the wrong way round: the lower number "
+                                                     "comes first, [low, high]");
   }
 
   const toml::node* get(std::string_view key) const { return table_.get(key); }
 
-  void fail(const toml::node& node, std::string message) {
-    const Place place = place_of(node);
-    fail(place, std::move(message));
+  // Always false, for who has failed.
+  bool fail(const toml::node& node, std::string message) {
+    return fail(place_of(node), std::move(message));
   }
-  void fail(Place place, std::string message) {
-    if (!error_) {
-      error_ = Error{std::move(message), place.line, place.column};
-    }
+  bool fail(Place place, std::string message) {
+    errors_.push_back({std::move(message), place.line, place.column});
+    return false;
   }
 
  private:
-  void number(const toml::node& node, std::string_view key, double& target, double least,
+  bool number(const toml::node& node, std::string_view key, double& target, double least,
               double most) {
     const auto value = node.value<double>();
     if (!value || node.is_boolean() || !std::isfinite(*value)) {
@@ -131,47 +141,70 @@ class Table {
       return fail(node, "'" + std::string(key) + "' " + range);
     }
     target = *value;
+    return true;
   }
 
   template <class T>
-  void take(std::string_view key, T& target, std::string_view expected) {
+  bool take(std::string_view key, T& target, std::string_view expected) {
     const toml::node* node = table_.get(key);
     if (node == nullptr) {
-      return;
+      return false;
     }
     if (!node->is<T>()) {
       return fail(*node, "'" + std::string(key) + "' must be " + std::string(expected));
     }
     target = *node->value<T>();
+    return true;
   }
 
   const toml::table& table_;
   std::string name_;
-  std::optional<Error>& error_;
+  std::vector<Error>& errors_;
 };
 
-void read_parameters(const toml::table& table, Preset& preset, std::optional<Error>& error) {
-  for (const auto& [key, node] : table) {
-    ParameterSetting setting{.name = std::string(key.str()), .place = place_of(node)};
-    const toml::table* row = node.as_table();
-    Table reader(row != nullptr ? *row : table, "the parameter '" + setting.name + "'", error);
-    if (row == nullptr) {
-      return reader.fail(
-          node, "'" + setting.name + "' must be a table: { value = 0.1, range = [0.001, 0.3] }");
-    }
-    reader.allow({"value", "range"});
-    if (row->get("value") == nullptr || row->get("range") == nullptr) {
-      return reader.fail(node, "'" + setting.name + "' needs a value and a range");
-    }
-    reader.number("value", setting.value, -1e12, 1e12);
-    reader.pair("range", setting.minimum, setting.maximum);
-    if (!error && !(setting.minimum <= setting.value && setting.value <= setting.maximum)) {
-      reader.fail(node, "the value of '" + setting.name + "' lies outside its range");
-    }
-    preset.parameters.push_back(std::move(setting));
+void read_parameter(std::string name, const toml::node& node, Preset& preset,
+                    std::vector<Error>& errors) {
+  ParameterSetting setting{.name = std::move(name), .place = place_of(node)};
+  const std::string shown = quoted(setting.name);
+  const toml::table* row = node.as_table();
+  if (row == nullptr) {
+    errors.push_back({shown + " must be a table: { value = 0.1, range = [0.001, 0.3] }",
+                      setting.place.line, setting.place.column});
+    return;
   }
-  std::sort(preset.parameters.begin(), preset.parameters.end(),
-            [](const auto& a, const auto& b) { return a.name < b.name; });
+  Table reader(*row, "the parameter " + shown, errors);
+  reader.allow({"value", "range"});
+  if (row->get("value") == nullptr || row->get("range") == nullptr) {
+    reader.fail(node, shown + " needs a value and a range");
+    return;
+  }
+  const bool has_value = reader.number("value", setting.value, -1e12, 1e12);
+  const bool has_range = reader.range("range", setting.minimum, setting.maximum);
+  if (has_value && has_range &&
+      !(setting.minimum <= setting.value && setting.value <= setting.maximum)) {
+    reader.fail(node, "the value of " + shown + " lies outside its range");
+  }
+  preset.parameters.push_back(std::move(setting));
+}
+
+// What the program itself listens to or answers with.
+bool is_taken(std::string_view address) {
+  constexpr std::string_view whole[] = {
+      "/note/on", "/note/off", "/cc",           "/pressure",       "/bend",        "/panic",
+      "/error",   "/done",     "/model/load",   "/preset/load",    "/status",      "/describe",
+      "/fail",    "/progress", "/status.reply", "/describe.reply", "/describe.end"};
+  return address.starts_with("/param/") || address.starts_with("/in/") ||
+         std::find(std::begin(whole), std::end(whole), address) != std::end(whole);
+}
+
+// Whether a message, or a line of a score, can have this address.
+bool is_address(std::string_view text) {
+  constexpr std::size_t longest = 255;
+  return text.size() > 1 && text.size() <= longest && text[0] == '/' &&
+         std::all_of(text.begin(), text.end(), [](char c) {
+           constexpr std::string_view meant_otherwise = "#*,?[]{}";
+           return c > ' ' && c <= '~' && meant_otherwise.find(c) == std::string_view::npos;
+         });
 }
 
 // "note", "pressure", "cc1", "audio2", "/name"
@@ -196,7 +229,7 @@ bool read_source(std::string_view text, ControlSetting& control) {
     control.source = ControlSource::controller;
   } else if (numbered("audio", 1, 64)) {
     control.source = ControlSource::audio;
-  } else if (text.size() > 1 && text[0] == '/') {
+  } else if (text.starts_with('/')) {
     control.source = ControlSource::osc;
     control.address = std::string(text);
   } else {
@@ -205,129 +238,127 @@ bool read_source(std::string_view text, ControlSetting& control) {
   return true;
 }
 
-void read_control(const toml::table& table, Preset& preset, std::optional<Error>& error) {
-  Table reader(table, "a control", error);
+// Without a word the target tells: an input is moved, a parameter is turned.
+ControlGesture usual_gesture(std::string_view target) {
+  return target.starts_with("in") && target.size() > 2 &&
+                 std::isdigit(static_cast<unsigned char>(target[2])) != 0
+             ? ControlGesture::position
+             : ControlGesture::parameter;
+}
+
+void read_control(const toml::table& table, Preset& preset, std::vector<Error>& errors) {
+  const std::size_t before = errors.size();
+  Table reader(table, "a control", errors);
   reader.allow({"from", "to", "how", "range", "curve", "travel", "keys"});
   ControlSetting control{.place = place_of(table)};
   std::string from;
-  std::string how;
-  std::string curve = "linear";
-  reader.text("from", from);
-  reader.text("to", control.target);
-  reader.text("how", how);
-  reader.text("curve", curve);
-  if (error) {
-    return;
-  }
-  if (!read_source(from, control)) {
+  if ((reader.text("from", from) || table.get("from") == nullptr) && !read_source(from, control)) {
     const toml::node* node = table.get("from");
-    return reader.fail(node != nullptr ? *node : table,
-                       "'from' must be \"note\", \"pressure\", \"cc0\" to \"cc119\", \"audio1\", "
-                       "or an OSC name such as \"/finger\"");
+    reader.fail(node != nullptr ? *node : table,
+                "'from' must be \"note\", \"pressure\", \"cc0\" to \"cc119\", \"audio1\", "
+                "or an OSC name such as \"/finger\"");
   }
-  if (control.target.empty()) {
-    return reader.fail(table, "a control needs 'to': an input such as \"in1\" or a parameter");
+  if (control.source == ControlSource::osc && !is_address(control.address)) {
+    reader.fail(*table.get("from"),
+                "an OSC name has 2 to 255 characters: '/', then letters, digits and signs, but no "
+                "blanks and none of # * , ? [ ] { }");
+  } else if (control.source == ControlSource::osc && is_taken(control.address)) {
+    reader.fail(*table.get("from"), quoted(control.address) +
+                                        " is an address of the program's own; choose another, such "
+                                        "as \"/finger\"");
   }
-  const auto* choice = std::find_if(std::begin(gestures), std::end(gestures),
-                                    [&](const Choice& c) { return c.word == how; });
-  if (choice != std::end(gestures)) {
-    control.gesture = choice->gesture;
-  } else if (how.empty()) {
-    control.gesture = control.target.starts_with("in") && control.target.size() > 2 &&
-                              std::isdigit(static_cast<unsigned char>(control.target[2])) != 0
-                          ? ControlGesture::position
-                          : ControlGesture::parameter;
-  } else {
-    return reader.fail(*table.get("how"),
-                       "'how' must be position, pluck, bow, impulse, hold or parameter");
+  if ((reader.text("to", control.target) || table.get("to") == nullptr) && control.target.empty()) {
+    reader.fail(table, "a control needs 'to': an input such as \"in1\" or a parameter");
   }
-  reader.pair("range", control.low, control.high);
-  reader.number("travel", control.travel, 0.0, 1e12);
-  double lowest = 0.0;
-  double highest = 127.0;
-  if (reader.pair("keys", lowest, highest)) {
-    control.lowest_key = static_cast<int>(std::clamp(lowest, 0.0, 127.0));
-    control.highest_key = static_cast<int>(std::clamp(highest, 0.0, 127.0));
-  }
-  control.exponential = curve == "exponential";
-  if (!control.exponential && curve != "linear") {
-    return reader.fail(*table.get("curve"), "'curve' must be linear or exponential");
-  }
-  if (control.exponential && !(control.low > 0.0 && control.high > 0.0)) {
-    return reader.fail(table, "an exponential curve needs a range above 0");
-  }
-  if (control.gesture == ControlGesture::pluck && !(control.travel > 0.0)) {
-    return reader.fail(table, "a pluck needs 'travel': how far from the string the finger rests");
-  }
-  preset.controls.push_back(std::move(control));
-}
-
-bool is_linked(const Network& network, std::uint32_t mass, LinkKind kind, double& scale) {
-  const auto parameters = parameter_values(network);
-  for (const Link& link : network.links) {
-    const bool same =
-        link.kind == kind || (kind == LinkKind::bow && link.kind == LinkKind::smooth_bow);
-    if (same && (link.a == mass || link.b == mass)) {
-      scale = argument_value(network, link.arguments[1], parameters);
-      return true;
+  control.gesture = usual_gesture(control.target);
+  if (std::string how; reader.text("how", how)) {
+    const auto* choice = std::find_if(std::begin(gestures), std::end(gestures),
+                                      [&](const Choice& c) { return c.word == how; });
+    if (choice != std::end(gestures)) {
+      control.gesture = choice->gesture;
+    } else {
+      reader.fail(*table.get("how"),
+                  "'how' must be position, pluck, bow, impulse, hold or parameter");
     }
   }
-  return false;
+  const bool has_range = reader.pair("range", control.low, control.high);
+  const bool has_travel = reader.number("travel", control.travel, 0.0, 1e12);
+  double lowest = 0.0;
+  double highest = 127.0;
+  if (reader.range("keys", lowest, highest, 0.0, 127.0)) {
+    control.lowest_key = static_cast<int>(lowest);
+    control.highest_key = static_cast<int>(highest);
+  }
+  std::string curve = "linear";
+  if (reader.text("curve", curve) && curve != "exponential" && curve != "linear") {
+    reader.fail(*table.get("curve"), "'curve' must be linear or exponential");
+  }
+  control.exponential = curve == "exponential";
+  if (control.exponential && (has_range || table.get("range") == nullptr) &&
+      !(control.low > 0.0 && control.high > 0.0)) {
+    reader.fail(table, "an exponential curve needs a range above 0");
+  }
+  if (control.gesture == ControlGesture::pluck && (has_travel || table.get("travel") == nullptr) &&
+      !(control.travel > 0.0)) {
+    reader.fail(table, "a pluck needs 'travel': how far from the string the finger rests");
+  }
+  if (errors.size() == before) {
+    preset.controls.push_back(std::move(control));
+  }
 }
 
-}  // namespace
-
-Result<Preset> parse_preset(std::string_view text) {
-  if (text.size() > max_preset_bytes) {
-    return Error{"the preset is longer than 1 MiB", 1, 1};
-  }
-  const toml::parse_result parsed = toml::parse(text);
-  if (!parsed) {
-    const auto& begin = parsed.error().source().begin;
-    return Error{std::string(parsed.error().description()), static_cast<int>(begin.line),
-                 static_cast<int>(begin.column)};
-  }
-  const toml::table& root = parsed.table();
-  std::optional<Error> error;
-  Preset preset;
-  Table reader(root, "a preset", error);
+void read_root(const toml::table& root, Preset& preset, std::vector<Error>& errors) {
+  Table reader(root, "a preset", errors);
   reader.allow({"model", "description", "voices", "gain", "release_s", "noise", "tuning",
                 "transpose", "motion", "budget", "parameters", "control"});
-  reader.text("model", preset.model);
+  const toml::node* const model = root.get("model");
+  if (model != nullptr) {
+    preset.model_place = place_of(*model);
+  }
+  if ((reader.text("model", preset.model) || model == nullptr) && preset.model.empty()) {
+    reader.fail(preset.model_place, "a preset needs a model: model = \"PolyTriangle.mdl\"");
+  }
+  constexpr std::size_t longest_path = 4096;
+  if (preset.model.size() > longest_path) {
+    reader.fail(preset.model_place, "'model' is longer than any file's path");
+    preset.model.clear();
+  } else if (!preset.model.empty() && !preset.model.ends_with(".mdl")) {
+    reader.fail(preset.model_place, "'model' must be the name of a .mdl file");
+    preset.model.clear();
+  }
   reader.text("description", preset.description);
   reader.integer("voices", preset.voices, 1, max_voices);
   reader.number("gain", preset.gain, 0.0, 1e9);
   reader.number("release_s", preset.release_s, 0.0, 60.0);
   reader.flag("noise", preset.noise);
   reader.integer("transpose", preset.transpose, -96, 96);
-  std::string budget;
-  reader.text("budget", budget);
-  if (const auto parsed = parse_budget(budget)) {
-    preset.budget = *parsed;
-  } else if (!error) {
-    reader.fail(*root.get("budget"), "'budget': " + parsed.error().message);
+  if (std::string budget; reader.text("budget", budget)) {
+    if (const auto parsed = parse_budget(budget)) {
+      preset.budget = *parsed;
+    } else {
+      reader.fail(*root.get("budget"), "'budget': " + parsed.error().message);
+    }
   }
-  std::string tuning = "keyboard";
-  reader.text("tuning", tuning);
-  preset.keyboard = tuning == "keyboard";
-  if (!error && !preset.keyboard && tuning != "fixed") {
-    reader.fail(*root.get("tuning"), "'tuning' must be keyboard or fixed");
+  if (std::string tuning; reader.text("tuning", tuning)) {
+    preset.keyboard = tuning == "keyboard";
+    if (!preset.keyboard && tuning != "fixed") {
+      reader.fail(*root.get("tuning"), "'tuning' must be keyboard or fixed");
+    }
   }
-  std::string motion;
-  reader.text("motion", motion);
-  if (motion == "velocity") {
-    preset.third = ThirdArgument::velocity_per_second;
-  } else if (motion == "delayed") {
-    preset.third = ThirdArgument::delayed_position;
-  } else if (!error && root.get("motion") != nullptr) {
-    reader.fail(*root.get("motion"), "'motion' must be velocity or delayed");
-  }
-  if (!error && preset.model.empty()) {
-    reader.fail(Place{1, 1}, "a preset needs a model: model = \"PolyTriangle.mdl\"");
+  if (std::string motion; reader.text("motion", motion)) {
+    if (motion == "velocity") {
+      preset.third = ThirdArgument::velocity_per_second;
+    } else if (motion == "delayed") {
+      preset.third = ThirdArgument::delayed_position;
+    } else {
+      reader.fail(*root.get("motion"), "'motion' must be velocity or delayed");
+    }
   }
   if (const toml::node* node = root.get("parameters")) {
     if (const toml::table* table = node->as_table()) {
-      read_parameters(*table, preset, error);
+      for (const auto& [key, row] : *table) {
+        read_parameter(std::string(key.str()), row, preset, errors);
+      }
     } else {
       reader.fail(*node, "'parameters' must be a table: [parameters]");
     }
@@ -338,14 +369,70 @@ Result<Preset> parse_preset(std::string_view text) {
       reader.fail(*node, "controls are written one by one: [[control]]");
     } else {
       for (const toml::node& row : *rows) {
-        read_control(*row.as_table(), preset, error);
+        read_control(*row.as_table(), preset, errors);
       }
     }
   }
-  if (error) {
-    return *error;
+}
+
+bool is_linked(const Network& network, std::uint32_t mass, LinkKind kind, double& scale) {
+  const auto parameters = parameter_values(network);
+  for (const Link& link : network.links) {
+    const bool same = link.kind == kind || (is_bow(kind) && is_bow(link.kind));
+    if (same && (link.a == mass || link.b == mass)) {
+      scale = argument_value(network, link.arguments[1], parameters);
+      return true;
+    }
   }
-  return preset;
+  return false;
+}
+
+bool never_moves(const Mass& mass) {
+  return mass.kind == MassKind::ground || mass.kind == MassKind::position;
+}
+
+// What a force could strike, as a line refers to it; empty where nothing moves.
+std::string something_to_strike(const Network& network) {
+  for (const Mass& mass : network.masses) {
+    if (moves(mass)) {
+      return "@" + mass.name.text();
+    }
+  }
+  return network.macros.empty() ? ""
+                                : "[@" + network.macros[0].name +
+                                      (is_mesh(network.macros[0].kind) ? " 0.3 0.4]" : " 0.3]");
+}
+
+}  // namespace
+
+ParsedPreset parse_preset(std::string_view text) {
+  ParsedPreset read;
+  if (text.size() > max_preset_bytes) {
+    read.errors.push_back({"the preset is longer than 64 KiB", 1, 1});
+    return read;
+  }
+  if (auto error = too_deep(text)) {
+    read.errors.push_back(*std::move(error));
+    return read;
+  }
+  const toml::parse_result parsed = toml::parse(text);
+  if (!parsed) {
+    const auto& begin = parsed.error().source().begin;
+    read.errors.push_back({std::string(parsed.error().description()), static_cast<int>(begin.line),
+                           static_cast<int>(begin.column)});
+    return read;
+  }
+  read_root(parsed.table(), read.preset, read.errors);
+  std::sort(read.preset.parameters.begin(), read.preset.parameters.end(),
+            [](const auto& a, const auto& b) { return a.name < b.name; });
+  std::stable_sort(read.errors.begin(), read.errors.end(), [](const Error& a, const Error& b) {
+    return std::pair(a.line, a.column) < std::pair(b.line, b.column);
+  });
+  if (read.errors.size() > most_preset_errors) {
+    read.errors[most_preset_errors].message = "too many problems; those after this are not told";
+    read.errors.resize(most_preset_errors + 1);
+  }
+  return read;
 }
 
 Preset default_preset(const Network& network, bool bare) {
@@ -356,7 +443,7 @@ Preset default_preset(const Network& network, bool bare) {
     ControlSetting note{.target = "in" + std::to_string(input.number)};
     const double middle = network.masses[input.mass].position;
     double scale = 0.0;
-    bool played = true;
+    bool played = !input.is_force || !never_moves(network.masses[input.mass]);
     if (input.is_force) {
       note.gesture = ControlGesture::impulse;
       note.low = 0.01;
@@ -399,6 +486,34 @@ Preset default_preset(const Network& network, bool bare) {
     }
   }
   return preset;
+}
+
+std::optional<Error> idle_keys(const Network& network, const Preset& preset) {
+  constexpr std::size_t most_told = 3;
+  const std::string target = something_to_strike(network);
+  if (target.empty() || std::any_of(preset.controls.begin(), preset.controls.end(),
+                                    [](const ControlSetting& control) {
+                                      return control.source == ControlSource::note;
+                                    })) {
+    return std::nullopt;
+  }
+  std::string why;
+  for (std::size_t i = 0; i < std::min(most_told, network.inputs.size()); ++i) {
+    const Input& input = network.inputs[i];
+    why += (i == 0 ? "" : ", ") + ("'@in" + std::to_string(input.number)) +
+           (input.is_force ? "' pushes what never moves" : "' moves no pluck and no bow");
+  }
+  if (network.inputs.size() > most_told) {
+    why += ", nor do " + std::to_string(network.inputs.size() - most_told) + " more";
+  }
+  int next = input_count(network) + 1;
+  for (const Parameter& parameter : network.parameters) {
+    next = std::max(next, parameter.audio_input + 1);
+  }
+  const Place place = network.inputs.empty() ? Place{1, 1} : network.inputs[0].place;
+  return Error{"no key plays this model: " + (why.empty() ? "it has no input" : why) + "; '@in" +
+                   std::to_string(next) + " frcInput " + target + "' would let keys strike it",
+               place.line, place.column};
 }
 
 }  // namespace ressort

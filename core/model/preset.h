@@ -43,6 +43,7 @@ struct ControlSetting {
 
 struct Preset {
   std::string model;        // a file's name, beside the preset or in the models' folder
+  Place model_place{1, 1};  // of that name
   std::string description;  // one line for a person
   int voices = 1;
   double gain = 1.0;                   // output per unit of position
@@ -58,15 +59,26 @@ struct Preset {
 };
 
 inline constexpr int max_voices = 256;
-inline constexpr std::size_t max_preset_bytes = std::size_t{1} << 20;
+inline constexpr std::size_t max_preset_bytes = std::size_t{64} << 10;
+inline constexpr std::size_t most_preset_errors = 100;
 
-// Reads a preset. An unknown key, a wrong type or a value out of range is an error with line and
-// column; never a silent drop. [any thread but audio]
-Result<Preset> parse_preset(std::string_view toml);
+struct ParsedPreset {
+  Preset preset;              // whole only if ok()
+  std::vector<Error> errors;  // in the order of the lines, each with its line and column
+  bool ok() const { return errors.empty(); }
+};
+
+// Reads a preset; goes on after an error, so that every problem is told at once. An unknown key, a
+// wrong type or a value out of range is an error; never a silent drop. [any thread but audio]
+ParsedPreset parse_preset(std::string_view toml);
 
 // What a model without a preset is played with: notes and the modulation wheel drive its first
 // input by the gesture that its links ask for, audio channels drive the inputs that no hand does.
 // `bare`: gain 1, audio channel n on input n, for rendering the network alone.
 Preset default_preset(const Network& network, bool bare);
+
+// Why no key plays a network with its default preset, and the line that would let one, at the place
+// of the first input; nothing where keys do play, or nothing moves.
+std::optional<Error> idle_keys(const Network& network, const Preset& preset);
 
 }  // namespace ressort

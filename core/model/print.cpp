@@ -27,6 +27,7 @@ const Keyword& keyword_of(const Link& link) {
     case LinkKind::quadratic_spring:
       return keyword_of("nlSpring2");
     case LinkKind::smooth_bow:
+    case LinkKind::either_bow:
       return keyword_of("nlBow");
     default:
       return *std::find_if(std::begin(keywords), std::end(keywords), [&](const Keyword& keyword) {

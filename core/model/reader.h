@@ -16,7 +16,8 @@
 
 namespace ressort {
 
-inline constexpr int most_diagnostics = 100;           // errors, and as many warnings
+inline constexpr int most_diagnostics = 100;  // errors, and as many warnings
+inline constexpr std::size_t longest_label = 1000;
 inline constexpr std::size_t most_parameters = 1024;   // each is looked for in every expression
 inline constexpr std::size_t most_open_blocks = 1024;  // ~begin without its ~end
 
@@ -74,6 +75,7 @@ class Reader {
   void add_macro(const Line& line);
   std::uint32_t size(const Line& line, std::size_t at, std::uint32_t least);
   void add_link(Line& line);
+  void choose_profile(Link& link) const;
   void show_dialect(const Line& line, LinkKind kind);
   void add_input(Line& line);
   void add_output(Line& line);

@@ -78,12 +78,28 @@ std::size_t distance(std::string_view from, std::string_view to) {
   return row[to.size()];
 }
 
-std::string quoted(std::string_view text) {
-  std::string shown = "'";
-  for (const char c : text.substr(0, 40)) {
-    shown += std::isprint(static_cast<unsigned char>(c)) != 0 ? c : '?';
+std::string_view first_letter(std::string_view text, std::size_t& length) {
+  const auto byte = [&](std::size_t i) { return static_cast<unsigned char>(text[i]); };
+  const unsigned char first = byte(0);
+  const std::size_t wanted = first < 0xc2 ? 1 : first < 0xe0 ? 2 : first < 0xf0 ? 3 : 4;
+  bool is_letter = wanted == 1 ? std::isprint(first) != 0 : wanted <= text.size() && first < 0xf5;
+  for (std::size_t i = 1; is_letter && i < wanted; ++i) {
+    is_letter = (byte(i) & 0xc0) == 0x80;
   }
-  return shown + (text.size() > 40 ? "...'" : "'");
+  is_letter &= !(first == 0xc2 && wanted <= text.size() && byte(1) < 0xa0);  // more controls
+  length = is_letter ? wanted : 1;
+  return is_letter ? text.substr(0, wanted) : "?";
+}
+
+std::string quoted(std::string_view text) {
+  constexpr int most_letters = 40;
+  std::string shown = "'";
+  for (int letters = 0; letters < most_letters && !text.empty(); ++letters) {
+    std::size_t length = 0;
+    shown += first_letter(text, length);
+    text.remove_prefix(length);
+  }
+  return shown + (text.empty() ? "'" : "...'");
 }
 
 }  // namespace ressort

@@ -25,6 +25,10 @@ Token unwrapped(Token token);
 // Letters, digits and '_', no digit first.
 bool is_identifier(std::string_view text);
 
+// The first letter of a text, of one byte or several; a '?' in its place where it cannot be printed
+// or is no UTF-8, and `length` is how much of the text it takes.
+std::string_view first_letter(std::string_view text, std::size_t& length);
+
 // 'text', without what cannot be printed, and not too long.
 std::string quoted(std::string_view text);
 
@@ -52,7 +56,8 @@ std::string suggestion(std::string_view word, const Names& names, std::string_vi
       best = name;
     }
   }
-  return best.empty() ? "" : "; did you mean '" + std::string(prefix) + std::string(best) + "'?";
+  return best.empty() ? ""
+                      : "; did you mean " + ressort::quoted(std::string(prefix).append(best)) + "?";
 }
 
 }  // namespace ressort

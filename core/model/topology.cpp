@@ -28,8 +28,9 @@ std::size_t link_count(const Macro& macro) {
   return macro.kind == MacroKind::stiff_string ? near + rows : near;
 }
 
-void add_nodes(const Macro& macro, Network& network) {
+void add_nodes(const Macro& macro, const Progress& progress, Network& network) {
   for (std::uint32_t i = 0; i < macro.length; ++i) {
+    progress.spend(4 * std::size_t{macro.width});
     for (std::uint32_t j = 0; j < macro.width; ++j) {
       Mass node{.position = macro.position, .third = macro.third, .place = macro.place};
       if (is_fixed(macro, i, j)) {
@@ -46,7 +47,8 @@ void add_nodes(const Macro& macro, Network& network) {
   }
 }
 
-void add_links(const Macro& macro, std::uint32_t first, Network& network) {
+void add_links(const Macro& macro, std::uint32_t first, const Progress& progress,
+               Network& network) {
   const auto add = [&](std::uint32_t a, std::uint32_t b, ArgumentId stiffness, ArgumentId damping) {
     Link link{.a = first + a, .b = first + b, .place = macro.place};
     link.arguments[0] = stiffness;
@@ -56,11 +58,13 @@ void add_links(const Macro& macro, std::uint32_t first, Network& network) {
   const std::uint32_t rows = macro.length;
   const std::uint32_t columns = macro.width;
   for (std::uint32_t i = 0; i < rows; ++i) {
+    progress.spend(4 * std::size_t{columns});
     for (std::uint32_t j = 0; j + 1 < columns; ++j) {
       add(i * columns + j, i * columns + j + 1, macro.stiffness, macro.damping);
     }
   }
   for (std::uint32_t i = 0; i + 1 < rows; ++i) {
+    progress.spend(4 * std::size_t{columns});
     for (std::uint32_t j = 0; j < columns; ++j) {
       add(i * columns + j, (i + 1) * columns + j, macro.stiffness, macro.damping);
     }
@@ -85,7 +89,7 @@ std::uint64_t node_count(const Macro& macro) {
   return std::uint64_t{macro.length} * macro.width;
 }
 
-Network expand_macros(const Network& network) {
+Network expand_macros(const Network& network, const Progress& progress) {
   Network expanded = network;
   expanded.macros.clear();
   std::size_t nodes = network.masses.size();
@@ -99,8 +103,8 @@ Network expand_macros(const Network& network) {
   std::vector<std::uint32_t> first;
   for (const Macro& macro : network.macros) {
     first.push_back(static_cast<std::uint32_t>(expanded.masses.size()));
-    add_nodes(macro, expanded);
-    add_links(macro, first.back(), expanded);
+    add_nodes(macro, progress, expanded);
+    add_links(macro, first.back(), progress, expanded);
   }
   for (Tap& tap : expanded.taps) {
     const Macro& macro = network.macros[tap.macro];

@@ -2,6 +2,7 @@
 #pragma once
 
 #include "core/model/network.h"
+#include "core/progress.h"
 
 namespace ressort {
 
@@ -13,6 +14,6 @@ std::uint64_t node_count(const Macro& macro);
 
 // The same network with every macro written out as masses and links, which have no names, and its
 // taps told where its nodes are. O(nodes). [any thread but audio]
-Network expand_macros(const Network& network);
+Network expand_macros(const Network& network, const Progress& progress = {});
 
 }  // namespace ressort
