@@ -20,8 +20,8 @@ class ThreadCrew final : public Crew {
  private:
   void serve(std::size_t i);
 
-  Meeting start_;
-  Meeting finish_;
+  Barrier start_;
+  Barrier finish_;
   const std::function<void(std::size_t)>* work_ = nullptr;  // null: the crew goes home
   std::size_t count_ = 0;
   std::vector<std::jthread> threads_;

@@ -2,12 +2,11 @@
 // the others, and the promise that each side makes.
 #pragma once
 
-#include <readerwriterqueue/readerwriterqueue.h>
-
-#include <array>
 #include <atomic>
+#include <cstddef>
 #include <cstdint>
 #include <span>
+#include <vector>
 
 namespace ressort {
 
@@ -47,25 +46,70 @@ class Slot {
 template <class T>
 class Ring {
  public:
-  explicit Ring(std::size_t capacity) : capacity_(capacity), queue_(capacity) {}
-  bool push(const T& item) { return queue_.try_enqueue(item); }  // [its one writer] wait-free
-  // All or none. The queue may have more room than it was asked for, but promises only that.
-  bool push_all(std::span<const T> items) {  // [its one writer] wait-free
-    if (queue_.size_approx() + items.size() > capacity_) {
+  explicit Ring(std::size_t capacity) : items_(capacity) {}
+  bool push(const T& item) { return push_all({&item, 1}); }  // [its one writer] wait-free
+  // All or none, and as much as `spare` stays free; the reader finds all of them or none.
+  bool push_all(std::span<const T> items, std::size_t spare = 0) {  // [its one writer] wait-free
+    const std::size_t end = end_.load(std::memory_order_relaxed);
+    const std::size_t held = end - begin_.load(std::memory_order_acquire);
+    if (held + items.size() + spare > items_.size()) {
       return false;
     }
-    for (const T& item : items) {
-      queue_.try_enqueue(item);
+    for (std::size_t i = 0; i < items.size(); ++i) {
+      items_[(end + i) % items_.size()] = items[i];
     }
+    end_.store(end + items.size(), std::memory_order_release);
     return true;
   }
-  bool pop(T& item) { return queue_.try_dequeue(item); }  // [its one reader] wait-free
-  const T* peek() const { return queue_.peek(); }         // [its one reader] wait-free
-  std::size_t size() const { return queue_.size_approx(); }
+  bool pop(T& item) {  // [its one reader] wait-free
+    const std::size_t begin = begin_.load(std::memory_order_relaxed);
+    if (begin == end_.load(std::memory_order_acquire)) {
+      return false;
+    }
+    item = items_[begin % items_.size()];
+    begin_.store(begin + 1, std::memory_order_release);
+    return true;
+  }
+  std::size_t size() const {  // [its writer or its reader]
+    return end_.load(std::memory_order_acquire) - begin_.load(std::memory_order_acquire);
+  }
+  std::size_t capacity() const { return items_.size(); }
 
  private:
-  std::size_t capacity_;
-  moodycamel::ReaderWriterQueue<T> queue_;
+  std::vector<T> items_;
+  alignas(64) std::atomic<std::size_t> begin_{0};  // what has ever been taken...
+  alignas(64) std::atomic<std::size_t> end_{0};    // ...and put; apart, as two threads write them
+};
+
+// Places that are taken before something is handed over, and given back when it is done with: who
+// finds none knows at once.
+class Places {
+ public:
+  explicit Places(std::size_t count) : free_(count) {}
+  bool take(std::size_t count) {  // [its one taker] wait-free
+    if (count > free_.load(std::memory_order_acquire)) {
+      return false;
+    }
+    free_.fetch_sub(count, std::memory_order_relaxed);
+    return true;
+  }
+  void give_back(std::size_t count) {  // [any thread] wait-free
+    free_.fetch_add(count, std::memory_order_release);
+  }
+  std::size_t free() const { return free_.load(std::memory_order_acquire); }
+
+ private:
+  std::atomic<std::size_t> free_;
+};
+
+// A count that any thread adds to and any may read.
+class Counter {
+ public:
+  void add(std::uint64_t amount) { count_.fetch_add(amount, std::memory_order_relaxed); }
+  std::uint64_t get() const { return count_.load(std::memory_order_relaxed); }
+
+ private:
+  std::atomic<std::uint64_t> count_{0};
 };
 
 // A number that one thread writes and any may read. No order is promised between two of them.
@@ -97,9 +141,9 @@ class Flag {
 };
 
 // Where several threads wait for each other, again and again.
-class Meeting {
+class Barrier {
  public:
-  explicit Meeting(std::size_t threads) : threads_(threads) {}
+  explicit Barrier(std::size_t threads) : threads_(threads) {}
   // Returns when all of them have come. What takes about as long as a block of samples is waited
   // for awake, as waking up takes about as long, too; what takes longer asleep.
   void wait() {

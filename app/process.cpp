@@ -14,19 +14,41 @@ bool later(const Pending& a, const Pending& b) {
   return a.frame != b.frame ? a.frame > b.frame : a.order > b.order;
 }
 
+// Each moment at which something acts cuts a chunk in two and may retune every voice on both sides.
+// On average they may be so many frames apart...
+constexpr std::size_t frames_per_moment = 8;
+// ...but in the shortest chunk a chord may be strummed.
+constexpr std::size_t least_moments = 16;
+
+bool is_controller(const Event& event, int number) {
+  return event.kind == EventKind::controller && event.index == number;
+}
+
+bool is_panic(const Event& event) {
+  return event.kind == EventKind::panic || is_controller(event, 120);
+}
+
+bool ends_sound(const Event& event) {
+  return is_panic(event) || event.kind == EventKind::note_off || is_controller(event, 64) ||
+         is_controller(event, 123);
+}
+
 }  // namespace
 
-Process::Process(double rate_hz, bool limit)
+Process::Process(double rate_hz, bool limit, Clock clock_ns)
     : rate_hz_(rate_hz),
       limit_(limit),
+      clock_ns_(clock_ns),
       limiter_(rate_hz),
       input_(max_channels * chunk_frames),
       sound_(max_channels * chunk_frames),
       fade_sound_(max_channels * chunk_frames),
       mixed_(max_channels * chunk_frames) {
-  pending_.reserve(max_events);
-  due_.reserve(max_events);
-  matching_.reserve(max_events);
+  now_.reserve(from_osc.capacity() + from_console.capacity() + from_midi.capacity() + max_now +
+               max_endings);
+  pending_.reserve(max_ahead);
+  due_.reserve(now_.capacity() + max_ahead);
+  matching_.reserve(due_.capacity());
   meters.limited.set(1.0);
   set_rate(rate_hz);
 }
@@ -40,6 +62,7 @@ Process::~Process() {
 
 void Process::set_rate(double rate_hz) {
   rate_hz_ = rate_hz;
+  load_.forget();
   limiter_ = Limiter(rate_hz);
   fade_frames_ = static_cast<std::size_t>(fade_s * rate_hz);
 }
@@ -59,9 +82,12 @@ void Process::block(std::span<const double* const> inputs, std::span<double* con
 template <class Sample>
 void Process::run(std::span<const Sample* const> inputs, std::span<Sample* const> outputs,
                   std::size_t frames, std::span<const MidiPacket> midi, std::int64_t time_ns) {
+  const std::int64_t start_ns = clock_ns_ != nullptr ? clock_ns_() : 0;
   const DenormalsFlushed flushed;
   clock.write({frame_, time_ns, rate_hz_, static_cast<std::int64_t>(frames)});
-  gather(frames, midi, time_ns);
+  if (frames > 0) {
+    gather(frames, midi, time_ns);
+  }
   const std::size_t input_count = std::min(inputs.size(), max_channels);
   const std::size_t output_count = std::min(outputs.size(), max_channels);
   for (std::size_t at = 0; at < frames; at += chunk_frames) {
@@ -89,67 +115,144 @@ void Process::run(std::span<const Sample* const> inputs, std::span<Sample* const
     frame_ += static_cast<std::int64_t>(n);
   }
   tell();
+  if (clock_ns_ != nullptr) {
+    weigh(1e-9 * static_cast<double>(clock_ns_() - start_ns), frames);
+  }
+}
+
+bool Process::send(Ring<TimedEvent>& ring, std::span<const TimedEvent> events) {
+  const bool ends = std::any_of(events.begin(), events.end(),
+                                [](const TimedEvent& timed) { return ends_sound(timed.event); });
+  const std::size_t spare =
+      (ends ? 0 : max_endings) + (&ring == &from_osc ? ahead_.free() : std::size_t{0});
+  const bool has_room = ring.push_all(events, spare);
+  meters.dropped.add(has_room ? 0 : events.size());
+  return has_room;
+}
+
+bool Process::send_ahead(std::span<const TimedEvent> events) {
+  // Nobody else has taken as much of the ring as there are places ahead.
+  const bool has_room = ahead_.take(events.size()) && from_osc.push_all(events);
+  meters.dropped.add(has_room ? 0 : events.size());
+  return has_room;
+}
+
+bool Process::schedule(std::int64_t frame, const Event& event) {
+  keeps_every_frame_ = true;  // nobody is waiting for the sound
+  if (!ahead_.take(1)) {
+    meters.dropped.add(1);
+    return false;
+  }
+  wait(frame, event);
+  return true;
 }
 
 // Everything that has arrived becomes an event at a frame.
 void Process::gather(std::size_t frames, std::span<const MidiPacket> midi, std::int64_t time_ns) {
-  for (const MidiPacket& packet : midi) {
-    midi_.read(packet.bytes, [&](const Event& event) { schedule(frame_ + packet.frame, event); });
-  }
-  meters.malformed.set(midi_.malformed());
-  drain(from_midi, frames, time_ns);
+  now_.clear();
+  next_now_ = 0;
   drain(from_osc, frames, time_ns);
   drain(from_console, frames, time_ns);
+  drain(from_midi, frames, time_ns);
+  const std::size_t before = now_.size();
+  const auto last = static_cast<std::int64_t>(frames) - 1;
+  for (const MidiPacket& packet : midi) {
+    midi_.read(packet.bytes, [&](const Event& event) {
+      if (now_.size() - before < max_now + (ends_sound(event) ? max_endings : 0)) {
+        enter(frame_ + std::min<std::int64_t>(packet.frame, last), event);
+      } else {
+        meters.dropped.add(1);
+      }
+    });
+  }
+  meters.malformed.set(midi_.malformed());
+  const auto earlier = [](const Pending& a, const Pending& b) { return later(b, a); };
+  if (!std::is_sorted(now_.begin(), now_.end(), earlier)) {
+    std::sort(now_.begin(), now_.end(), earlier);
+  }
 }
 
 void Process::drain(Ring<TimedEvent>& ring, std::size_t frames, std::int64_t time_ns) {
-  for (std::size_t n = 0; n < max_events; ++n) {
-    const TimedEvent* const first = ring.peek();
-    // A bundle that is still on its way waits, so that its events act in one block.
-    if (first == nullptr || ring.size() <= first->following) {
-      return;
-    }
-    TimedEvent timed;
-    ring.pop(timed);
-    std::int64_t frame = frame_;
-    if (timed.timing == TimedEvent::When::at_frame) {
-      frame = timed.when;
+  TimedEvent timed;
+  // What comes meanwhile is the next block's.
+  for (std::size_t left = ring.size(); left > 0 && ring.pop(timed); --left) {
+    if (timed.timing == TimedEvent::When::at_frame && timed.when >= frame_) {
+      wait(timed.when, timed.event);
+    } else if (timed.timing == TimedEvent::When::at_frame) {
+      meters.late_s.set(static_cast<double>(frame_ - timed.when) / rate_hz_);
+      meters.late.add(1);
+      ahead_.give_back(1);
+      enter(frame_, timed.event);
     } else if (timed.timing == TimedEvent::When::at_time) {
       // Constant latency: what happened during the last period is played during this one.
       const double since = static_cast<double>(timed.when - time_ns) * 1e-9 * rate_hz_;
-      frame =
-          frame_ + std::clamp<std::int64_t>(static_cast<std::int64_t>(frames) + std::llround(since),
-                                            0, static_cast<std::int64_t>(frames) - 1);
+      const auto block = static_cast<std::int64_t>(frames);
+      enter(frame_ + std::clamp<std::int64_t>(block + std::llround(since), 0, block - 1),
+            timed.event);
+    } else {
+      enter(frame_, timed.event);
     }
-    if (frame < frame_) {
-      meters.late.add(1);
-      reports.push({Report::Kind::late, timed.event.model, 0,
-                    static_cast<double>(frame_ - frame) / rate_hz_});
-    }
-    schedule(frame, timed.event);
   }
 }
 
-bool Process::schedule(std::int64_t frame, const Event& event) {
-  if (pending_.size() >= max_events) {
-    meters.dropped.add(1);
-    return false;
+// Acts in this block.
+void Process::enter(std::int64_t frame, const Event& event) {
+  now_.push_back({frame, order_++, event});
+  if (is_panic(event)) {
+    forget_after(frame);
   }
+}
+
+// Acts when its frame comes; it has its place already.
+void Process::wait(std::int64_t frame, const Event& event) {
+  latest_ = std::max(latest_, frame);
   pending_.push_back({frame, order_++, event});
   std::push_heap(pending_.begin(), pending_.end(), later<Pending>);
-  return true;
+}
+
+void Process::forget_after(std::int64_t frame) {
+  if (latest_ <= frame) {
+    return;  // a flood of panics has nothing more to forget
+  }
+  latest_ = frame;
+  ahead_.give_back(
+      std::erase_if(pending_, [&](const Pending& pending) { return pending.frame > frame; }));
+  std::make_heap(pending_.begin(), pending_.end(), later<Pending>);
 }
 
 void Process::collect_due(std::size_t frames) {
   due_.clear();
   const std::int64_t end = frame_ + static_cast<std::int64_t>(frames);
-  while (!pending_.empty() && pending_.front().frame < end) {
-    std::pop_heap(pending_.begin(), pending_.end(), later<Pending>);
-    Event event = pending_.back().event;
-    event.frame =
-        static_cast<std::uint32_t>(std::max<std::int64_t>(0, pending_.back().frame - frame_));
+  const std::size_t most_moments =
+      keeps_every_frame_ ? frames : std::max(least_moments, frames / frames_per_moment);
+  std::size_t moments = 0;
+  const auto collect = [&](const Pending& next) {
+    Event event = next.event;
+    event.frame = static_cast<std::uint32_t>(std::max<std::int64_t>(0, next.frame - frame_));
+    if (due_.empty() || event.frame != due_.back().frame) {
+      // The rest of a flood acts with its last moment: early, but all of it and in its order.
+      event.frame = ++moments <= most_moments ? event.frame : due_.back().frame;
+    }
     due_.push_back(event);
-    pending_.pop_back();
+  };
+  const auto is_due = [&](const Pending& next) { return next.frame < end; };
+  while (true) {
+    const bool has_now = next_now_ < now_.size() && is_due(now_[next_now_]);
+    const bool has_ahead = !pending_.empty() && is_due(pending_.front());
+    if (has_ahead && (!has_now || pending_.front().frame <= now_[next_now_].frame)) {
+      const Pending next = pending_.front();
+      std::pop_heap(pending_.begin(), pending_.end(), later<Pending>);
+      pending_.pop_back();
+      ahead_.give_back(1);
+      collect(next);
+      if (is_panic(next.event)) {
+        forget_after(next.frame);
+      }
+    } else if (has_now) {
+      collect(now_[next_now_++]);
+    } else {
+      return;
+    }
   }
 }
 
@@ -167,6 +270,10 @@ void Process::swap_models() {
     fade_left_ = fading_ == nullptr || goes_on(*next) ? 0 : fade_frames_;
     resets_told_ = fade_left_ == 0 ? resets_told_ : 0;
     beyond_told_ = fade_left_ == 0 ? beyond_told_ : 0;
+    shed_told_ = fade_left_ == 0 ? shed_told_ : 0;
+    if (fade_left_ > 0) {
+      load_.begin_anew();
+    }
     current_ = next;
     meters.swaps.add(1);
   }
@@ -229,6 +336,7 @@ void Process::play_models(std::size_t input_count, std::size_t output_count, std
     }
   }
   if (meters.read.lower()) {
+    meters.load_peak.set(0.0);
     meters.peak.set(0.0);
     meters.limited.set(1.0);
   }
@@ -268,7 +376,10 @@ void Process::tell() {
   Engine& engine = *current_->engine;
   const EngineMeters now = engine.meters();
   meters.voices.set(now.voices);
+  stepped_ = now.stepped;
   meters.stolen.set(now.stolen);
+  meters.shed.add(now.shed - shed_told_);
+  shed_told_ = now.shed;
   meters.beyond.add(now.beyond - beyond_told_);
   beyond_told_ = now.beyond;
   meters.saved.set(now.saved);
@@ -283,11 +394,42 @@ void Process::tell() {
     resets_told_ = now.resets;
     reports.push({Report::Kind::reset, current_->serial, 0, 0.0});
   }
+  if (reports.size() + Engine::max_creators + Engine::max_changes > reports.capacity()) {
+    return;  // nobody is listening just now: the engine keeps them
+  }
   for (const std::uint32_t link : engine.take_creators()) {
     reports.push({Report::Kind::created, current_->serial, 0, static_cast<double>(link)});
   }
   for (const std::uint16_t index : engine.take_changes()) {
     reports.push({Report::Kind::parameter, current_->serial, index, engine.parameter(index)});
+  }
+}
+
+// What the block took, and what follows from it: a model on its way out goes first, then voices.
+void Process::weigh(double took_s, std::size_t frames) {
+  const double sound_s = static_cast<double>(frames) / rate_hz_;
+  load_.add(took_s, sound_s);
+  meters.load.set(load_.mean());
+  meters.load_peak.raise(frames > 0 ? took_s / sound_s : 0.0);
+  meters.overruns.add(took_s > sound_s ? 1 : 0);
+  if (current_ == nullptr) {
+    return;
+  }
+  if (load_.is_over() && fade_left_ > 0) {
+    fading_->engine->limit_voices(1);
+    load_.forget();
+    return;
+  }
+  const double load = load_.lasting();
+  const int before = load_.limit();
+  if (const auto voices = load_.judge(stepped_, current_->engine->voice_count())) {
+    current_->engine->limit_voices(*voices);
+  }
+  const bool gave_way = load_.limit() > 0 && (before == 0 || load_.limit() < before);
+  if ((gave_way || load > 1.0) && frame_ >= next_overload_news_) {
+    next_overload_news_ = frame_ + static_cast<std::int64_t>(rate_hz_);
+    reports.push({Report::Kind::overload, current_->serial,
+                  static_cast<std::uint16_t>(load_.limit()), load});
   }
 }
 

@@ -2,10 +2,13 @@
 
 #include <algorithm>
 #include <chrono>
+#include <cmath>
 #include <memory>
 #include <vector>
 
 #include "app/denormals.h"
+#include "app/dsp_load.h"
+#include "app/text.h"
 #include "core/engine/kernel.h"
 
 namespace ressort {
@@ -14,6 +17,7 @@ namespace {
 using Clock = std::chrono::steady_clock;
 constexpr std::chrono::microseconds longest{3000};  // for all parts
 constexpr std::size_t least_blocks = 3;
+constexpr double most_steps = 1e6;  // of all voices in a sample: more are not waited for
 
 template <class T>
 double measured_ns(const Program& program, std::size_t voices, Isa isa, Clock::duration patience) {
@@ -66,10 +70,50 @@ void measure(Plan& plan, const Engine& engine, const CompileOptions& options, in
     }
     const auto patience = longest / static_cast<long>(plan.parts.size());
     const auto count = static_cast<std::size_t>(std::max(1, voices));
+    if (static_cast<double>(count) * worst_steps(program) > most_steps) {
+      ++part;
+      continue;
+    }
     (part++)->measured_ns = options.precision == Precision::float32
                                 ? measured_ns<float>(program, count, options.isa, patience)
                                 : measured_ns<double>(program, count, options.isa, patience);
   }
+}
+
+std::string too_much(const Plan& plan, int voices, double rate_hz, Precision precision) {
+  double predicted_ns = 0.0;
+  for (const Part& part : plan.parts) {
+    predicted_ns += part.predicted_ns;
+  }
+  const double share = predicted_ns * 1e-9 * rate_hz;
+  if (!(share > DspLoad::most)) {
+    return {};
+  }
+  const double each = share / std::max(1, voices);
+  const int fitting = static_cast<int>(DspLoad::most / each);
+  const auto percent = [](double part) {
+    return "about " + std::to_string(std::llround(100.0 * part)) + " % of one core";
+  };
+  return (voices > 1 ? "all " + std::to_string(voices) + " voices" : std::string("its one voice")) +
+         " would take " + percent(share) +
+         (fitting > 0  ? ": " + std::to_string(fitting) + " fit"
+          : voices > 1 ? ", one alone " + percent(each)
+                       : "") +
+         "; what makes room: " + ways_to_make_room(fitting, precision);
+}
+
+std::string ways_to_make_room(int voices, Precision precision) {
+  std::vector<std::string> ways;
+  if (voices > 0) {
+    ways.push_back("-p " + std::to_string(voices));
+  } else {
+    ways.emplace_back("a smaller model");
+  }
+  ways.emplace_back("a lower rate");
+  if (precision != Precision::float32) {
+    ways.emplace_back("--precision float");
+  }
+  return joined(ways, ", ");
 }
 
 }  // namespace ressort

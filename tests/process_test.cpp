@@ -1,89 +1,15 @@
 // The audio thread's whole: events on their frames, models that change while they sound.
-#include "app/process.h"
-
 #include <set>
 
-#include "tests/player.h"
+#include "tests/process_rig.h"
 
 namespace ressort {
 namespace {
 
 using namespace rig;
 
-constexpr double rate = 44100.0;
-constexpr std::size_t fade_frames = 2205;  // 50 ms
-
-Sounding* sounding(const std::string& text, const Preset& preset, std::uint32_t serial) {
-  // In the direct form, which rounds alike however the time is cut into blocks.
-  auto compiled = compile(network_of(text), preset, {.method = Method::direct});
-  REQUIRE(compiled);
-  return new Sounding{std::move(compiled->engine), serial};
-}
-
-// A model that stands still at a height.
-Sounding* constant(const std::string& height, std::uint32_t serial = 1) {
-  return sounding("@g ground " + height + "\n@out1 posOutput @g\n", Preset{}, serial);
-}
-
-// Output 1 is the hand, which a note holds at 1 and a release takes back to 0.
-const std::string hand_text =
-    "@in1 posInput 0.\n@m mass 1. 0. 0.\n@g ground 0.\n@k param 0.01\n"
-    "@l springDamper @in1 @m k 0.01\n@r springDamper @m @g 0.01 0.01\n@out1 posOutput @in1\n";
-
-Preset holding() {
-  Preset preset;
-  preset.keyboard = false;
-  preset.controls.push_back({.target = "in1", .gesture = ControlGesture::hold});
-  return preset;
-}
-
-// A free mass that an impulse of 1 sends off with 1 a sample: its position is the time since.
-const std::string clock_text = "@m mass 1. 0. 0.\n@in1 frcInput @m\n@out1 posOutput @m\n";
-
-Event push(double force = 1.0) {
-  return {.kind = EventKind::force, .index = 1, .value = force};
-}
-
-// A process and all that it has played.
-struct Stage {
-  explicit Stage(bool limit = false, std::size_t channels = 1)
-      : process(rate, limit), out(channels) {}
-
-  void run(std::size_t frames, std::size_t block = 256, const std::vector<MidiPacket>& midi = {}) {
-    for (std::size_t at = 0; at < frames; at += block) {
-      const std::size_t n = std::min(block, frames - at);
-      std::vector<double*> outputs;
-      for (auto& channel : out) {
-        channel.resize(channel.size() + n, 1e300);
-        outputs.push_back(channel.data() + channel.size() - n);
-      }
-      const auto now_ns = static_cast<std::int64_t>(static_cast<double>(played) / rate * 1e9);
-      const HeapWatch watch;
-      process.block(std::span<const double* const>(), outputs, n,
-                    at == 0 ? midi : std::vector<MidiPacket>(), now_ns);
-      heap_calls += watch.calls();
-      played += n;
-    }
-  }
-  const std::vector<double>& y() const { return out[0]; }
-
-  Process process;
-  std::vector<std::vector<double>> out;
-  std::size_t played = 0;
-  std::size_t heap_calls = 0;
-};
-
 double old_gain(std::size_t n) {
   return n < fade_frames ? 1.0 - static_cast<double>(n) / fade_frames : 0.0;
-}
-
-// The frame at which a clock model was pushed, from its output.
-std::size_t pushed_at(const std::vector<double>& y) {
-  std::size_t n = 0;
-  while (n < y.size() && y[n] == 0.0) {
-    ++n;
-  }
-  return n;
 }
 
 }  // namespace
@@ -115,25 +41,21 @@ TEST_CASE("MIDI acts on its exact frame, whatever the block", "[process]") {
 }
 
 TEST_CASE("an event for a frame acts on it, and one that is late at once", "[process]") {
-  using When = TimedEvent::When;
   Stage stage;
   Preset faint;  // what drifts this far would be taken for a voice that lost its stability
   faint.gain = 0x1p-10;
   stage.process.slot.offer(sounding(clock_text, faint, 1));
-  stage.process.from_osc.push({.event = push(), .timing = When::at_frame, .when = 1717});
+  stage.at(1717, push());
   stage.run(4000, 100);
   CHECK(pushed_at(stage.y()) == 1717);
   CHECK(stage.process.meters.late.get() == 0);
   stage.out[0].clear();
   // Twice as fast from now on; 90 frames too late.
-  stage.process.from_console.push({.event = push(), .timing = When::at_frame, .when = 3910});
+  stage.at(3910, push());
   stage.run(100, 100);
   CHECK(stage.y()[1] - stage.y()[0] == 2.0 * faint.gain);
   CHECK(stage.process.meters.late.get() == 1);
-  Report report;
-  REQUIRE(stage.process.reports.pop(report));
-  CHECK(report.kind == Report::Kind::late);
-  CHECK(report.value == Approx(90.0 / rate).epsilon(1e-12));
+  CHECK(stage.process.meters.late_s.get() == Approx(90.0 / rate).epsilon(1e-12));
 }
 
 TEST_CASE("events with a time keep one latency, however they come", "[process]") {
@@ -163,30 +85,22 @@ TEST_CASE("events with a time keep one latency, however they come", "[process]")
   }
 }
 
-TEST_CASE("a bundle waits until all of it is there, and acts in one frame", "[process]") {
+TEST_CASE("the events of a bundle act in one frame", "[process]") {
   Stage stage;
   stage.process.slot.offer(sounding(clock_text, Preset{}, 1));
   stage.run(256);
-  stage.process.from_osc.push({.event = push(), .following = 2});
+  CHECK(stage.now(push(), 3));
   stage.run(256);
-  stage.process.from_osc.push({.event = push(), .following = 1});
-  stage.run(256);
-  CHECK(peak(stage.y()) == 0.0);
-  stage.process.from_osc.push({.event = push(), .following = 0});
-  stage.run(256);
-  CHECK(pushed_at(stage.y()) == 768);
-  CHECK(stage.y()[768] == 3.0);
-  CHECK(stage.y()[769] == 6.0);
+  CHECK(pushed_at(stage.y()) == 256);
+  CHECK(stage.y()[256] == 3.0);
+  CHECK(stage.y()[257] == 6.0);
 }
 
 TEST_CASE("what comes first acts first, and what finds no room is counted", "[process]") {
   Stage stage;
   stage.process.slot.offer(sounding(hand_text, holding(), 1));
   for (const double target : {0.03, 0.04, 0.02}) {
-    stage.process.from_osc.push(
-        {.event = {.kind = EventKind::parameter, .index = 0, .value = target},
-         .timing = TimedEvent::When::at_frame,
-         .when = 300});
+    stage.at(300, parameter(0, 0, target));
   }
   stage.run(1000);
   Report report;
@@ -196,8 +110,8 @@ TEST_CASE("what comes first acts first, and what finds no room is counted", "[pr
   CHECK(report.value == 0.02);
   CHECK_FALSE(stage.process.reports.pop(report));
 
-  for (std::size_t i = 0; i < Process::max_events + 10; ++i) {
-    CHECK(stage.process.schedule(1000000, push()) == (i < Process::max_events));
+  for (std::size_t i = 0; i < Process::max_ahead + 10; ++i) {
+    CHECK(stage.process.schedule(1000000, push()) == (i < Process::max_ahead));
   }
   CHECK(stage.process.meters.dropped.get() == 10);
 }
@@ -229,14 +143,12 @@ TEST_CASE("a note that began before the swap ends in the old model, a new one be
           "[process]") {
   Stage stage;
   stage.process.slot.offer(sounding(hand_text, holding(), 1));
-  stage.process.from_osc.push({.event = note_on(0, 60)});
+  stage.now(note_on(0, 60));
   stage.run(10240);  // the hand has come to 1
   stage.out[0].clear();
   stage.process.slot.offer(constant("0.", 2));
-  stage.process.from_osc.push(
-      {.event = note_off(0, 60), .timing = TimedEvent::When::at_frame, .when = 10240 + 500});
-  stage.process.from_osc.push(
-      {.event = note_on(0, 60), .timing = TimedEvent::When::at_frame, .when = 10240 + 1500});
+  stage.at(10240 + 500, note_off(0, 60));
+  stage.at(10240 + 1500, note_on(0, 60));
   stage.run(2000);
   Player player(hand_text, holding());
   player.run(12240, {note_on(0, 60), note_off(10740, 60)});
@@ -252,13 +164,11 @@ TEST_CASE("a note that began before the swap ends in the old model, a new one be
 TEST_CASE("an event for one model does not act in another", "[process]") {
   Stage stage;
   stage.process.slot.offer(sounding(clock_text, Preset{}, 7));
-  stage.process.from_osc.push(
-      {.event = {.kind = EventKind::force, .index = 1, .model = 6, .value = 1.0}});
+  stage.now({.kind = EventKind::force, .index = 1, .model = 6, .value = 1.0});
   stage.run(256);
   CHECK(peak(stage.y()) == 0.0);
   stage.process.slot.offer(sounding(clock_text, Preset{}, 8));
-  stage.process.from_osc.push(
-      {.event = {.kind = EventKind::force, .index = 1, .model = 7, .value = 1.0}});
+  stage.now({.kind = EventKind::force, .index = 1, .model = 7, .value = 1.0});
   stage.run(256);
   for (std::size_t n = 0; n < 256; ++n) {  // in the old one, which fades
     CHECK(std::fabs(stage.y()[256 + n] - old_gain(n) * static_cast<double>(n + 1)) < 1e-12);
