@@ -114,7 +114,11 @@ Result<std::vector<Event>> parameter_events(const Call& call, const Instrument& 
   std::vector<Event> events;
   for (std::size_t i = 0; i < instrument.parameters.size(); ++i) {
     const ParameterInfo& info = instrument.parameters[i];
-    if (fits(pattern, info.name)) {
+    if (info.audio_input > 0 && pattern == info.name) {
+      return Error{call.address + ": input " + std::to_string(info.audio_input) +
+                   " gives it, sample by sample; it cannot be set"};
+    }
+    if (info.audio_input == 0 && fits(pattern, info.name)) {
       events.push_back({.kind = EventKind::parameter,
                         .index = static_cast<std::uint16_t>(i),
                         .model = serial,
@@ -212,10 +216,29 @@ bool is_simple(std::string_view address) {
          address == "/pressure" || address == "/bend" || address == "/panic";
 }
 
-const CustomInfo* find_custom(const Instrument& instrument, std::string_view address) {
-  const auto found = std::find_if(instrument.custom.begin(), instrument.custom.end(),
-                                  [&](const CustomInfo& info) { return info.address == address; });
-  return found == instrument.custom.end() ? nullptr : &*found;
+bool is_custom(const Instrument& instrument, std::string_view address) {
+  return std::any_of(instrument.custom.begin(), instrument.custom.end(),
+                     [&](const CustomInfo& info) { return info.address == address; });
+}
+
+// One address may drive several inputs and parameters.
+Result<std::vector<Event>> custom_events(const Call& call, const Instrument& instrument,
+                                         std::uint32_t serial) {
+  Arguments arguments(call);
+  const double value = arguments.in_range("the value", 0.0, 1.0);
+  if (const auto error = arguments.end()) {
+    return *error;
+  }
+  std::vector<Event> events;
+  for (const CustomInfo& info : instrument.custom) {
+    if (info.address == call.address) {
+      events.push_back({.kind = EventKind::custom,
+                        .index = static_cast<std::uint16_t>(info.row),
+                        .model = serial,
+                        .value = value});
+    }
+  }
+  return events;
 }
 
 // One element of a pattern that is not '*': does it fit `c`? `length` is how much of the pattern
@@ -256,7 +279,7 @@ bool plays(const Call& call, const Instrument& instrument) {
     return !call.arguments.empty() && !call.address.ends_with("/range");
   }
   return is_simple(call.address) || call.address.starts_with("/in/") ||
-         find_custom(instrument, call.address) != nullptr;
+         is_custom(instrument, call.address);
 }
 
 Result<std::vector<Event>> to_events(const Call& call, const Instrument& instrument,
@@ -270,16 +293,8 @@ Result<std::vector<Event>> to_events(const Call& call, const Instrument& instrum
   if (call.address.starts_with("/in/")) {
     return input_events(call, instrument, serial);
   }
-  if (const CustomInfo* custom = find_custom(instrument, call.address)) {
-    Arguments arguments(call);
-    const double value = arguments.in_range("the value", 0.0, 1.0);
-    if (const auto error = arguments.end()) {
-      return *error;
-    }
-    return std::vector{Event{.kind = EventKind::custom,
-                             .index = static_cast<std::uint16_t>(custom->row),
-                             .model = serial,
-                             .value = value}};
+  if (is_custom(instrument, call.address)) {
+    return custom_events(call, instrument, serial);
   }
   return Error{"unknown address '" + call.address + "'; /describe lists what there is"};
 }
@@ -337,15 +352,17 @@ Result<std::vector<ScoreLine>> parse_score(std::string_view text) {
     if (words.empty()) {
       continue;
     }
-    ScoreLine score{.line = number};
+    const std::size_t first = line.find_first_not_of(" \t\r");
+    const std::size_t second =
+        std::min(line.find_first_not_of(" \t\r", first + words[0].size()), line.size() + 1);
+    ScoreLine score{.line = number, .column = static_cast<int>(second) + 1};
     constexpr double latest_s = 24.0 * 3600.0;
     if (!parse_number(words[0], score.time_s) || score.time_s < 0.0 || score.time_s > latest_s) {
       return Error{"found '" + words[0] + "' where a time in seconds was expected, at most a day",
-                   number, 1};
+                   number, static_cast<int>(first) + 1};
     }
     if (words.size() < 2 || words[1][0] != '/') {
-      return Error{"expected an address such as /note/on after the time", number,
-                   static_cast<int>(words[0].size()) + 2};
+      return Error{"expected an address such as /note/on after the time", number, score.column};
     }
     score.call.address = words[1];
     for (std::size_t i = 2; i < words.size(); ++i) {

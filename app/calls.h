@@ -46,7 +46,8 @@ std::string told_limit(const Call& call, const Event& event, const Instrument& i
 
 // One line of a score: TIME_SECONDS ADDRESS ARG... ; blank lines and # comments have no call.
 struct ScoreLine {
-  int line = 0;  // from 1
+  int line = 0;    // from 1
+  int column = 1;  // of its address
   double time_s = 0.0;
   Call call;
 };

@@ -1,11 +1,8 @@
 #include "app/osc.h"
 
-#include <arpa/inet.h>
 #include <lo/lo.h>
-#include <netinet/in.h>
 #include <poll.h>
 #include <sys/eventfd.h>
-#include <sys/socket.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -15,12 +12,18 @@
 #include <cstdlib>
 #include <cstring>
 #include <map>
-#include <mutex>
 #include <optional>
+#include <set>
+#include <string_view>
+#include <system_error>
 #include <thread>
 
 #include "app/audio.h"
+#include "app/osc_outlet.h"
 #include "app/osc_packet.h"
+#include "app/osc_senders.h"
+#include "app/rate_limit.h"
+#include "app/text.h"
 #include "app/time_tags.h"
 #include "core/model/expression.h"
 
@@ -29,11 +32,8 @@ namespace {
 
 constexpr std::size_t max_address_bytes = 255;
 constexpr std::size_t max_text_bytes = 4096;  // of one string of an answer
-constexpr int max_answers = 4096;             // to one packet: nobody is drowned through us
 constexpr int max_malformed_answers = 10;     // in a second
-constexpr int max_loads_waiting = 16;
-constexpr std::size_t max_bundle_events = 4096;  // as many as the process can hold
-constexpr int receive_buffer_bytes = 1 << 20;
+constexpr std::size_t max_bundle_events = std::min(Process::max_now, Process::max_ahead);
 constexpr std::int64_t second_ns = 1'000'000'000;
 
 // --- messages -----------------------------------------------------------------------------------
@@ -126,98 +126,60 @@ bool is_answer(std::string_view address) {
 
 // --- the way back -------------------------------------------------------------------------------
 
-// All that an answer needs, however late it comes: a load may end after the server has.
-class Outlet {
- public:
-  explicit Outlet(int socket) : socket_(socket) {}
-  ~Outlet() { close(); }
-  Outlet(const Outlet&) = delete;
-  Outlet& operator=(const Outlet&) = delete;
-
-  void send(const sockaddr_in& to, const std::vector<std::uint8_t>& bytes) {
-    const std::lock_guard lock(mutex_);
-    if (socket_ >= 0) {
-      // Whoever cannot be reached has gone; UDP promises nothing.
-      sendto(socket_, bytes.data(), bytes.size(), 0, reinterpret_cast<const sockaddr*>(&to),
-             sizeof to);
-    }
-  }
-  void close() {
-    const std::lock_guard lock(mutex_);
-    if (socket_ >= 0) {
-      ::close(socket_);
-      socket_ = -1;
-    }
-  }
-  // False when enough are waiting already.
-  bool begin_load() {
-    const std::lock_guard lock(mutex_);
-    if (loads_waiting_ >= max_loads_waiting) {
-      return false;
-    }
-    ++loads_waiting_;
-    return true;
-  }
-  void end_load() {
-    const std::lock_guard lock(mutex_);
-    --loads_waiting_;
-  }
-
- private:
-  std::mutex mutex_;
-  int socket_;
-  int loads_waiting_ = 0;
-};
-
-// Who has sent a packet, and how many answers are left to him.
+// Who has sent a packet.
 struct Client {
-  std::shared_ptr<Outlet> outlet;
-  sockaddr_in address{};
-  int answers_left = max_answers;
+  std::shared_ptr<OscOutlet> outlet;
+  OscSender sender;
 
-  void answer(const Reply& reply) {
-    if (answers_left > 0) {
-      --answers_left;
-      outlet->send(address, reply.bytes());
+  // Whether he is answered now; if not, he is told so once.
+  bool is_heard() const {
+    if (outlet->may_answer(sender)) {
+      return true;
+    }
+    if (const double pause_s = outlet->tell_pause_s(sender); pause_s > 0.0) {
+      const double ms = std::ceil(1e3 * pause_s);
+      outlet->answer(sender, {Reply("/error")
+                                  .text("")
+                                  .text("too much was asked: nothing is answered for " +
+                                        print_number(ms) + " ms; what is played is played")
+                                  .bytes()});
+    }
+    return false;
+  }
+  void answer(const Reply& reply) const {
+    if (is_heard()) {
+      outlet->answer(sender, {reply.bytes()});
     }
   }
-  void error(const std::string& about, const std::string& message) {
+  void error(const std::string& about, const std::string& message) const {
     answer(Reply("/error").text(about).text(message));
   }
 };
 
-Result<int> open_socket(const OscOptions& options) {
-  sockaddr_in address{};
-  address.sin_family = AF_INET;
-  if (inet_pton(AF_INET, options.bind_address.c_str(), &address.sin_addr) != 1) {
-    return Error{"'" + options.bind_address +
-                 "' is no address to bind OSC to; use 127.0.0.1 for this machine alone, 0.0.0.0 "
-                 "for every network"};
+// An answer of many rows, which are all sent or none.
+class Rows {
+ public:
+  explicit Rows(const Client& client) : client_(client) {}
+
+  // Before anything is gathered.
+  bool may_begin(const std::string& about) const {
+    if (!client_.is_heard()) {
+      return false;
+    }
+    if (!client_.outlet->has_room()) {
+      client_.error(about, "busy: too many answers are on their way, try again");
+      return false;
+    }
+    return true;
   }
-  if (options.port < 0 || options.port > 65535) {
-    return Error{"the OSC port must lie between 0 and 65535, found " +
-                 std::to_string(options.port)};
-  }
-  address.sin_port = htons(static_cast<std::uint16_t>(options.port));
-  const int socket = ::socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0);
-  if (socket < 0) {
-    return Error{std::string("no socket for OSC: ") + std::strerror(errno)};
-  }
-  if (bind(socket, reinterpret_cast<const sockaddr*>(&address), sizeof address) != 0) {
-    const int failure = errno;
-    close(socket);
-    const std::string place =
-        "port " + std::to_string(options.port) + " of " + options.bind_address;
-    return failure == EADDRINUSE
-               ? Error{place +
-                       " is taken, perhaps by another ressort; choose another with "
-                       "--osc-port or switch OSC off with --osc-port off"}
-               : Error{"OSC cannot use " + place + ": " + std::strerror(failure)};
-  }
-  // Bursts shall not be lost; the system may grant less.
-  setsockopt(socket, SOL_SOCKET, SO_RCVBUF, &receive_buffer_bytes, sizeof receive_buffer_bytes);
-  return socket;
-}
+  void add(const Reply& reply) { rows_.push_back(reply.bytes()); }
+  std::size_t size() const { return rows_.size(); }
+  void send() { client_.outlet->answer(client_.sender, std::move(rows_)); }
+
+ private:
+  const Client& client_;
+  std::vector<OscOutlet::Bytes> rows_;
+};
 
 }  // namespace
 
@@ -232,12 +194,14 @@ struct OscServer::Server {
   };
   using Groups = std::map<std::uint64_t, Group>;  // by time tag
 
-  Server(Process& process_in, Session& session_in, int socket_in, int wake_in)
+  Server(Process& process_in, Session& session_in, int socket_in, int wake_in,
+         std::vector<Subnet> allowed_in, OscOutlet::Tell tell)
       : process(process_in),
         session(session_in),
         socket(socket_in),
         wake(wake_in),
-        outlet(std::make_shared<Outlet>(socket_in)),
+        allowed(std::move(allowed_in)),
+        outlet(std::make_shared<OscOutlet>(socket_in, std::move(tell))),
         thread([this] { run(); }) {}
 
   ~Server() {
@@ -251,23 +215,44 @@ struct OscServer::Server {
     std::vector<std::uint8_t> buffer(max_osc_packet_bytes + 1);
     std::array<pollfd, 2> waits{{{socket, POLLIN, 0}, {wake, POLLIN, 0}}};
     while (true) {
-      if (poll(waits.data(), waits.size(), -1) < 0) {
+      if (poll(waits.data(), waits.size(), outlet->send_due()) < 0) {
         continue;  // a signal
       }
       if (waits[1].revents != 0) {
         return;
       }
-      Client client{outlet};
-      socklen_t length = sizeof client.address;
-      const ssize_t size = recvfrom(socket, buffer.data(), buffer.size(), MSG_DONTWAIT,
-                                    reinterpret_cast<sockaddr*>(&client.address), &length);
-      if (size >= 0) {
-        receive({buffer.data(), static_cast<std::size_t>(size)}, client);
+      if (const auto arrived = receive_packet(socket, buffer)) {
+        count_lost(arrived->lost);
+        const Client client{outlet, arrived->from};
+        if (may_send(allowed, arrived->from.address)) {
+          outlet->received(arrived->from, arrived->bytes);
+          receive({buffer.data(), arrived->bytes}, client);
+        } else {
+          count_stranger(arrived->from);
+        }
       }
     }
   }
 
-  void receive(std::span<const std::uint8_t> packet, Client& client) {
+  void count_lost(std::uint32_t lost_in_all) {
+    // It goes around; a packet that had come before the last loss does not know of it.
+    if (const std::uint32_t more = lost_in_all - lost; more < 1u << 31) {
+      lost = lost_in_all;
+      process.meters.dropped.add(more);
+    }
+  }
+
+  void count_stranger(const OscSender& from) {
+    const std::string address = print_address(from.address);
+    process.meters.strangers.add(1);
+    strangers.add("OSC: a packet from " + address + " was ignored; --osc-allow " + address +
+                  " lets it in");
+    if (const auto news = strangers.take()) {
+      outlet->tell(*news);
+    }
+  }
+
+  void receive(std::span<const std::uint8_t> packet, const Client& client) {
     const auto messages = check_packet(packet);
     if (!messages) {
       if (may_answer_malformed()) {
@@ -306,7 +291,7 @@ struct OscServer::Server {
   }
 
   // Playing messages join their group; the others are answered at once, whatever their time tag.
-  void handle(const Call& call, std::uint64_t time_tag, Groups& groups, Client& client) {
+  void handle(const Call& call, std::uint64_t time_tag, Groups& groups, const Client& client) {
     if (call.address == "/model/load" || call.address == "/preset/load") {
       load(call, client);
     } else if (call.address == "/status") {
@@ -336,7 +321,7 @@ struct OscServer::Server {
     }
   }
 
-  void play(std::uint64_t time_tag, Group& group, Client& client) {
+  void play(std::uint64_t time_tag, Group& group, const Client& client) {
     double late_s = 0.0;
     TimedEvent timed;
     if (time_tag > 1) {
@@ -359,16 +344,19 @@ struct OscServer::Server {
       // The newest block has its events already; a late one begins the next, and is counted there.
       late_s = static_cast<double>(clock.frame + clock.period - timed.when) / clock.rate_hz;
     }
-    std::size_t following = group.events.size();
     for (TimedEvent& event : group.events) {
       event.timing = timed.timing;
       event.when = timed.when;
-      event.following = static_cast<std::uint16_t>(--following);
     }
-    if (!process.from_osc.push_all(group.events)) {
-      client.error(group.address, "busy: no room for " + std::to_string(group.events.size()) +
-                                      (group.events.size() == 1 ? " event" : " events") +
-                                      ", try again");
+    const bool is_ahead = timed.timing == TimedEvent::When::at_frame;
+    if (is_ahead ? !process.send_ahead(group.events)
+                 : !process.send(process.from_osc, group.events)) {
+      const std::string events = counted(group.events.size(), "event", "events");
+      client.error(group.address,
+                   is_ahead ? "refused whole: " + std::to_string(Process::max_ahead) +
+                                  " events may wait for their time, and there is no room for " +
+                                  events + " more; try again later"
+                            : "busy: no room for " + events + ", try again");
       return;
     }
     session.remember(group.events);
@@ -376,7 +364,10 @@ struct OscServer::Server {
       client.error(address, news);
     }
     if (late_s > 0.0) {
-      client.error(group.address, "late by " + seconds_text(late_s) + " s, acts now");
+      lates.add("late by " + seconds_text(late_s) + " s, acts now");
+      if (const auto news = lates.take()) {
+        client.error(group.address, *news);
+      }
     }
   }
 
@@ -384,37 +375,41 @@ struct OscServer::Server {
     return print_number(std::round(seconds * 1e4) / 1e4);
   }
 
-  void load(const Call& call, Client& client) {
+  void load(const Call& call, const Client& client) {
     if (call.arguments.empty() || call.arguments.size() > 2 ||
         !std::holds_alternative<std::string>(call.arguments[0])) {
       client.error(call.address, call.address + ": expected NAME [ID]");
       return;
     }
     if (!client.outlet->begin_load()) {
-      client.error(call.address,
-                   "busy: " + std::to_string(max_loads_waiting) + " loads are waiting, try again");
+      client.error(call.address, "busy: enough loads are waiting, try again");
       return;
     }
-    const auto answer = [call, later = Client{client.outlet, client.address}](
-                            const Result<std::shared_ptr<const Loaded>>& result) mutable {
+    const auto answer = [call, client](const Result<std::shared_ptr<const Loaded>>& result) {
+      client.outlet->end_load();
       Reply reply(result ? "/done" : "/fail");
       reply.text(call.address);
       if (call.arguments.size() > 1) {
         reply.argument(call.arguments[1]);
       }
       if (!result) {
-        reply.text(result.error().message);
+        const std::string& full = result.error().message;
+        const std::string told = without_source(full);
+        reply.text(told);
+        if (told != full) {
+          client.outlet->tell_failure("OSC could not load it:\n" + full);
+        }
       }
-      later.outlet->end_load();
-      later.answer(reply);
+      client.answer(reply);
     };
-    session.load(std::get<std::string>(call.arguments[0]), answer);
+    session.load(std::get<std::string>(call.arguments[0]), answer, false, Reach::own_folders);
   }
 
-  // /status.reply s:model f:cpu (0 to 1, -1: not known) i:voices i:max_voices i:xruns i:resets
-  // d:rate i:period f:load_ms f:peak_db (-999: silence) i:late i:dropped s:backend i:beyond (times
-  // that a parameter was kept where it is stable)
-  void tell_status(Client& client) {
+  // /status.reply s:model f:cpu (1: all the time there is; -1: nothing runs) i:voices i:max_voices
+  // i:xruns i:resets d:rate i:period f:load_ms f:peak_db (-999: silence) i:late i:dropped s:backend
+  // i:beyond (times that a parameter was kept where it is stable) f:cpu_peak (of one period, since
+  // the last reply)
+  void tell_status(const Client& client) {
     const Status status = session.status();
     client.answer(Reply("/status.reply")
                       .text(status.model)
@@ -430,12 +425,18 @@ struct OscServer::Server {
                       .whole(status.late)
                       .whole(status.dropped)
                       .text(status.backend)
-                      .whole(status.beyond));
+                      .whole(status.beyond)
+                      .real(status.cpu_peak));
   }
 
-  // Calls `tell` for the parameters whose name fits what is between /param/ and the ending.
+  // What `tell` says of the parameters whose name fits what is between /param/ and the ending.
   template <class Tell>
-  void each_parameter(const Call& call, std::string_view ending, Client& client, Tell&& tell) {
+  void each_parameter(const Call& call, std::string_view ending, const Client& client,
+                      Tell&& tell) {
+    Rows rows(client);
+    if (!rows.may_begin(call.address)) {
+      return;
+    }
     std::string_view pattern = std::string_view(call.address).substr(7);
     pattern.remove_suffix(ending.size());
     const auto loaded = session.current();
@@ -443,45 +444,48 @@ struct OscServer::Server {
     for (const ParameterInfo& info : loaded->instrument.parameters) {
       if (fits(pattern, info.name)) {
         has_any = true;
-        tell(info);
+        tell(info, rows);
       }
     }
+    rows.send();
     if (!has_any) {
       client.error(call.address, "the model has no such parameter; /param/* lists what it has");
     }
   }
 
-  void tell_parameters(const Call& call, Client& client) {
-    each_parameter(call, "", client, [&](const ParameterInfo& info) {
+  void tell_parameters(const Call& call, const Client& client) {
+    each_parameter(call, "", client, [&](const ParameterInfo& info, Rows& rows) {
       // Nothing if another model came in between.
       if (const auto value = session.parameter(info.name)) {
-        client.answer(Reply("/param/" + info.name).real(*value));
+        rows.add(Reply("/param/" + info.name).real(*value));
       }
     });
   }
 
   // f:minimum f:maximum f:lowest f:highest that is stable, infinite where nothing limits
-  void tell_ranges(const Call& call, Client& client) {
+  void tell_ranges(const Call& call, const Client& client) {
     constexpr std::string_view ending = "/range";
-    each_parameter(call, ending, client, [&](const ParameterInfo& info) {
-      client.answer(Reply("/param/" + info.name + std::string(ending))
-                        .real(info.minimum)
-                        .real(info.maximum)
-                        .real(info.safe.lowest)
-                        .real(info.safe.highest));
+    each_parameter(call, ending, client, [&](const ParameterInfo& info, Rows& rows) {
+      rows.add(Reply("/param/" + info.name + std::string(ending))
+                   .real(info.minimum)
+                   .real(info.maximum)
+                   .real(info.safe.lowest)
+                   .real(info.safe.highest));
     });
   }
 
   // A row s:address s:arguments s:meaning for everything, then /describe.end i:rows, so that
   // whoever counts knows if one was lost on the way. A parameter's meaning is its value, minimum
   // and maximum, and between what it is stable.
-  void describe(Client& client) {
+  void describe(const Client& client) {
+    Rows rows(client);
+    if (!rows.may_begin("/describe")) {
+      return;
+    }
     const auto loaded = session.current();
-    std::uint64_t rows = 0;
     const auto row = [&](std::string_view address, std::string_view arguments,
                          std::string_view meaning) {
-      ++rows;
-      client.answer(Reply("/describe.reply").text(address).text(arguments).text(meaning));
+      rows.add(Reply("/describe.reply").text(address).text(arguments).text(meaning));
     };
     for (const AddressRow& known : addresses()) {
       row(known.address, known.arguments, known.does);
@@ -492,20 +496,28 @@ struct OscServer::Server {
               print_number(info.minimum) + " " + print_number(info.maximum) + " " +
               print_limit(info.safe.lowest, false) + " " + print_limit(info.safe.highest, true));
     }
+    std::set<std::string_view> customs;  // one may drive several things
     for (const CustomInfo& custom : loaded->instrument.custom) {
-      row(custom.address, "f", "a control of the preset, 0-1");
+      if (customs.insert(custom.address).second) {
+        row(custom.address, "f", "a control of the preset, 0-1");
+      }
     }
-    client.answer(Reply("/describe.end").whole(rows));
+    rows.add(Reply("/describe.end").whole(rows.size()));
+    rows.send();
   }
 
   Process& process;
   Session& session;
   const int socket;  // the outlet's, which closes it after the thread has ended
   const int wake;
-  std::shared_ptr<Outlet> outlet;
+  const std::vector<Subnet> allowed;
+  std::shared_ptr<OscOutlet> outlet;
   TagClock tags;
+  RateLimit lates{std::chrono::seconds(1)};
   std::int64_t malformed_second = 0;
   int malformed_answers = 0;
+  std::uint32_t lost = 0;  // by the system, as it counts
+  RateLimit strangers;
   std::thread thread;  // last, so that all else is there when it starts
 };
 
@@ -513,26 +525,35 @@ OscServer::OscServer(std::unique_ptr<Server> server) : server_(std::move(server)
 OscServer::~OscServer() = default;
 
 Result<std::unique_ptr<OscServer>> OscServer::open(const OscOptions& options, Process& process,
-                                                   Session& session) {
-  const auto socket = open_socket(options);
+                                                   Session& session, Tell tell) {
+  const auto allowed = allowed_senders(options);
+  if (!allowed) {
+    return allowed.error();
+  }
+  const auto socket = open_osc_socket(options);
   if (!socket) {
     return socket.error();
   }
   const int wake = eventfd(0, EFD_CLOEXEC);
   if (wake < 0) {
-    const std::string reason = std::strerror(errno);
+    const std::string reason = std::generic_category().message(errno);
     close(*socket);
     return Error{"OSC cannot start: " + reason};
   }
-  return std::unique_ptr<OscServer>(
-      new OscServer(std::make_unique<Server>(process, session, *socket, wake)));
+  return std::unique_ptr<OscServer>(new OscServer(
+      std::make_unique<Server>(process, session, *socket, wake, *allowed, std::move(tell))));
+}
+
+std::string OscServer::access() const {
+  std::string others;
+  for (const Subnet& subnet : server_->allowed) {
+    others += (others.empty() ? "" : ", ") + print_subnet(subnet);
+  }
+  return others.empty() ? "for this machine alone" : "open to this machine and " + others;
 }
 
 int OscServer::port() const {
-  sockaddr_in address{};
-  socklen_t length = sizeof address;
-  getsockname(server_->socket, reinterpret_cast<sockaddr*>(&address), &length);
-  return ntohs(address.sin_port);
+  return port_of(server_->socket);
 }
 
 }  // namespace ressort

@@ -22,7 +22,9 @@ const Instrument& instrument() {
          .target = "s_K",
          .gesture = ControlGesture::parameter,
          .low = 0.05,
-         .high = 0.2}};
+         .high = 0.2},
+        {.source = ControlSource::osc, .address = "/both", .target = "in1"},
+        {.source = ControlSource::osc, .address = "/both", .target = "in2"}};
     auto compiled = compile(network_of(scenes::string("s", 5, "0.1", "0.001") +
                                        "@in1 posInput 0.\n@in2 posInput 0.\n@in3 frcInput @s_m0\n"
                                        "@p nlPluck @in1 @s_m1 .1 .1\n@b nlBow @in2 @s_m2 .1 .1\n" +
@@ -92,7 +94,26 @@ TEST_CASE("every playing address becomes its event", "[calls]") {
   CHECK(event("/in/2/bow 1").value2 < 0.0);  // the pressure stays as it is
   CHECK(event("/in/2/bow 1 0.25").value2 == 0.25);
   check(event("/finger 0.5"), EventKind::custom, 2, 0.5, 9);
+  const auto both = to_events(call("/both 0.25"), instrument(), 9);
+  REQUIRE(both);
+  REQUIRE(both->size() == 2);
+  check((*both)[0], EventKind::custom, 4, 0.25, 9);
+  check((*both)[1], EventKind::custom, 5, 0.25, 9);
   check(event("/brightness 1"), EventKind::custom, 3, 1.0, 9);
+}
+
+TEST_CASE("what an input gives cannot be set", "[calls]") {
+  const auto compiled =
+      compile(network_of("@K audioParam @in2\n@Z param 0.1\n@o osc 1 K Z 0 0\n"), {}, {});
+  REQUIRE(compiled);
+  const auto one = to_events(call("/param/K 0.1"), compiled->instrument, 9);
+  REQUIRE_FALSE(one);
+  CHECK(one.error().message == "/param/K: input 2 gives it, sample by sample; it cannot be set");
+  // Among others it is left out.
+  const auto all = to_events(call("/param/* 0.1"), compiled->instrument, 9);
+  REQUIRE(all);
+  REQUIRE(all->size() == 1);
+  CHECK((*all)[0].index == 1);
 }
 
 TEST_CASE("a parameter keeps to its range, and a pattern reaches several", "[calls]") {
@@ -181,6 +202,8 @@ TEST_CASE("a score is times and addresses", "[calls]") {
   REQUIRE(score);
   REQUIRE(score->size() == 3);
   CHECK((*score)[0].line == 2);
+  CHECK((*score)[0].column == 3);
+  CHECK((*score)[1].column == 8);
   CHECK((*score)[0].time_s == 0.0);
   CHECK((*score)[0].call.address == "/note/on");
   CHECK((*score)[0].call.arguments == std::vector<Argument>{60.0, 100.0});
@@ -204,6 +227,8 @@ TEST_CASE("a score is times and addresses", "[calls]") {
   wrong("-1 /panic", 1, 1, "found '-1' where a time in seconds was expected, at most a day");
   wrong("0.5", 1, 5, "expected an address such as /note/on after the time");
   wrong("\n0.5 note", 2, 5, "expected an address such as /note/on after the time");
+  wrong("  0.5\t note", 1, 8, "expected an address such as /note/on after the time");
+  wrong("\t soon", 1, 3, "found 'soon' where a time in seconds was expected, at most a day");
 }
 
 TEST_CASE("patterns fit as OSC says", "[calls]") {

@@ -1,24 +1,17 @@
 #include "app/osc.h"
 
-#include <arpa/inet.h>
-#include <netinet/in.h>
-#include <poll.h>
-#include <sys/socket.h>
-#include <unistd.h>
-
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstdlib>
 #include <ctime>
-#include <filesystem>
-#include <fstream>
 #include <random>
 
 #include "app/audio.h"
 #include "app/osc_packet.h"
 #include "tests/catch.h"
-#include "tests/osc_bytes.h"
+#include "tests/data_folder.h"
+#include "tests/osc_client.h"
 
 namespace ressort {
 namespace {
@@ -28,87 +21,26 @@ constexpr std::size_t period = 256;
 
 // --- a client, and a process that the test drives -----------------------------------------------
 
-class Client {
- public:
-  explicit Client(int port) : socket_(socket(AF_INET, SOCK_DGRAM, 0)) {
-    sockaddr_in server{};
-    server.sin_family = AF_INET;
-    server.sin_port = htons(static_cast<std::uint16_t>(port));
-    server.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
-    REQUIRE(connect(socket_, reinterpret_cast<const sockaddr*>(&server), sizeof server) == 0);
-  }
-  ~Client() { close(socket_); }
-
-  void send(const Bytes& bytes) {
-    REQUIRE(::send(socket_, bytes.data(), bytes.size(), 0) == static_cast<ssize_t>(bytes.size()));
-  }
-
-  // The next answer; nothing after a wait that is far longer than any answer takes.
-  std::optional<Answer> receive(int most_ms = 20000) {
-    pollfd wait{socket_, POLLIN, 0};
-    if (poll(&wait, 1, most_ms) != 1) {
-      return std::nullopt;
-    }
-    Bytes bytes(max_osc_packet_bytes);
-    const ssize_t size = recv(socket_, bytes.data(), bytes.size(), 0);
-    if (size <= 0) {
-      return std::nullopt;
-    }
-    bytes.resize(static_cast<std::size_t>(size));
-    REQUIRE(check_packet(bytes));  // we speak as strictly as we listen
-    return read_answer(bytes);
-  }
-
-  Answer ask(const Bytes& bytes) {
-    send(bytes);
-    const auto answer = receive();
-    REQUIRE(answer);
-    return *answer;
-  }
-
-  // Waits until the server has done everything that was sent; gives back what it said before.
-  std::vector<Answer> sync() {
-    std::vector<Answer> before;
-    for (int tries = 0; tries < 40; ++tries) {  // what is sent into a full buffer is lost
-      send(message("/status"));
-      while (auto answer = receive(500)) {
-        if (answer->address == "/status.reply") {
-          return before;
-        }
-        before.push_back(*std::move(answer));
-      }
-    }
-    FAIL("the server does not answer");
-    return before;
-  }
-
- private:
-  int socket_;
-};
-
-class TemporaryFile {
- public:
-  explicit TemporaryFile(std::string_view text)
-      : path_(std::filesystem::temp_directory_path() /
-              ("ressort_osc_test_" + std::to_string(getpid()) + ".mdl")) {
-    std::ofstream(path_) << text;
-  }
-  ~TemporaryFile() { std::filesystem::remove(path_); }
-  std::string path() const { return path_.string(); }
-
- private:
-  std::filesystem::path path_;
-};
-
 std::unique_ptr<OscServer> open_server(Process& process, Session& session) {
-  auto server = OscServer::open({.port = 0}, process, session);
+  auto server = OscServer::open({.port = 0}, process, session, {});
   REQUIRE(server);
   return *std::move(server);
 }
 
 // Two masses that a push moves at once and that are still again long before the next.
 struct Rig {
-  TemporaryFile model{
+  DataFolder data;
+  Process process{rate_hz, false};
+  Session session{process, {.compile = {.rate_hz = rate_hz, .bare = true}}, {}};
+  bool is_loaded = load();
+  std::unique_ptr<OscServer> server = open_server(process, session);
+  Client client{server->port()};
+
+  bool load() {
+    data.write("models/two.mdl", model);
+    return static_cast<bool>(session.load_and_wait("two"));
+  }
+  static constexpr const char* model =
       "@m_K param 0.02\n"
       "@m_Z param 0.2\n"
       "@m_a osc 1. m_K m_Z 0. 0.\n"
@@ -116,12 +48,7 @@ struct Rig {
       "@in1 frcInput @m_a\n"
       "@in2 frcInput @m_b\n"
       "@out1 posOutput @m_a\n"
-      "@out2 posOutput @m_b\n"};
-  Process process{rate_hz, false};
-  Session session{process, {.compile = {.rate_hz = rate_hz, .bare = true}}, {}};
-  bool is_loaded = static_cast<bool>(session.load_and_wait(model.path()));
-  std::unique_ptr<OscServer> server = open_server(process, session);
-  Client client{server->port()};
+      "@out2 posOutput @m_b\n";
 
   // An hour ahead, so that however slow this machine is, the process is never behind its time.
   std::int64_t start_ns = monotonic_ns() + 3600'000'000'000;
@@ -206,10 +133,11 @@ TEST_CASE("a parameter is set and asked for over OSC", "[osc]") {
 }
 
 TEST_CASE("what is beyond what is stable is told over OSC, and where that ends", "[osc]") {
-  const TemporaryFile model("@K param 1.\n@o osc 1. K 0. 0. 0.\n@out1 posOutput @o\n");
+  const DataFolder data;
+  data.write("models/one.mdl", "@K param 1.\n@o osc 1. K 0. 0. 0.\n@out1 posOutput @o\n");
   Process process(44100.0, false);
   Session session(process, {.compile = {.rate_hz = 44100.0}}, {});
-  REQUIRE(session.load_and_wait(model.path()));
+  REQUIRE(session.load_and_wait("one"));
   const auto server = open_server(process, session);
   Client client(server->port());
   const Answer range = client.ask(message("/param/K/range"));
@@ -230,8 +158,8 @@ TEST_CASE("status and describe answer in full", "[osc]") {
   rig.drive(1);
   const Answer status = rig.client.ask(message("/status"));
   CHECK(status.address == "/status.reply");
-  REQUIRE(status.values.size() == 14);
-  CHECK(status.text(0).starts_with("ressort_osc_test_"));
+  REQUIRE(status.values.size() == 15);
+  CHECK(status.text(0) == "two");
   CHECK(std::get<double>(status.values[6]) == rate_hz);
   CHECK(std::get<std::int32_t>(status.values[7]) == static_cast<std::int32_t>(period));
   CHECK(std::get<float>(status.values[9]) == -999.0f);
@@ -265,9 +193,7 @@ TEST_CASE("the messages of a bundle act together", "[osc]") {
   REQUIRE(rig.process.from_osc.pop(first));
   REQUIRE(rig.process.from_osc.pop(second));
   CHECK(first.event.index == 60);
-  CHECK(first.following == 1);
   CHECK(second.event.index == 64);
-  CHECK(second.following == 0);
   CHECK(first.timing == TimedEvent::When::at_frame);
   CHECK(second.timing == TimedEvent::When::at_frame);
   CHECK(std::abs(first.when - 48000) < 48);  // the two clocks' offset is measured twice
@@ -334,51 +260,56 @@ TEST_CASE("time tags follow the clock when the audio has stood still", "[osc]") 
 
 TEST_CASE("a taken port and a wrong address are told apart", "[osc]") {
   Rig rig;
-  const auto second = OscServer::open({.port = rig.server->port()}, rig.process, rig.session);
+  const auto second = OscServer::open({.port = rig.server->port()}, rig.process, rig.session, {});
   REQUIRE_FALSE(second);
   CHECK(second.error().message.find("is taken") != std::string::npos);
-  CHECK(second.error().message.find("--osc-port off") != std::string::npos);
-  const auto nowhere = OscServer::open({.bind_address = "nowhere"}, rig.process, rig.session);
+  CHECK(second.error().message.find("choose another with -u") != std::string::npos);
+  const auto nowhere = OscServer::open({.bind_address = "nowhere"}, rig.process, rig.session, {});
   REQUIRE_FALSE(nowhere);
   CHECK(nowhere.error().message.find("'nowhere'") != std::string::npos);
   const auto foreign =
-      OscServer::open({.bind_address = "192.0.2.1", .port = 0}, rig.process, rig.session);
+      OscServer::open({.bind_address = "192.0.2.1", .port = 0, .allow = "192.0.2.0/24"},
+                      rig.process, rig.session, {});
   REQUIRE_FALSE(foreign);
   CHECK(foreign.error().message.find("192.0.2.1") != std::string::npos);
-  CHECK_FALSE(OscServer::open({.port = 65536}, rig.process, rig.session));
+  CHECK_FALSE(OscServer::open({.port = 65536}, rig.process, rig.session, {}));
 
   const int port = rig.server->port();
   rig.server.reset();
-  CHECK(OscServer::open({.port = port}, rig.process, rig.session));
+  CHECK(OscServer::open({.port = port}, rig.process, rig.session, {}));
 }
 
 TEST_CASE("loading answers done or fail, with the asker's number", "[osc]") {
   Rig rig;
-  const Answer done = rig.client.ask(message("/model/load", {rig.model.path(), 7}));
+  const Answer done = rig.client.ask(message("/model/load", {"two", 7}));
   CHECK(done.address == "/done");
   REQUIRE(done.values.size() == 2);
   CHECK(done.text(0) == "/model/load");
   CHECK(std::get<std::int32_t>(done.values[1]) == 7);
 
-  const Answer fail = rig.client.ask(message("/preset/load", {"/no/such/preset.toml", "mine"}));
-  CHECK(has(fail, "/fail", "/preset/load", "/no/such/preset.toml"));
+  const Answer fail = rig.client.ask(message("/preset/load", {"nosuch", "mine"}));
+  CHECK(has(fail, "/fail", "/preset/load", "there is no model or preset 'nosuch'"));
   REQUIRE(fail.values.size() == 3);
   CHECK(fail.text(1) == "mine");
-  CHECK(rig.client.ask(message("/model/load", {rig.model.path()})).values.size() == 1);
+  CHECK(rig.client.ask(message("/model/load", {"two"})).values.size() == 1);
   CHECK(has(rig.client.ask(message("/model/load")), "/error", "/model/load", "NAME"));
+
+  CHECK(has(rig.client.ask(message("/model/load", {""})), "/fail", "/model/load",
+            "expected the name of a model or a preset"));
 
   // The server may end while a load is under way.
   for (int i = 0; i < 8; ++i) {
-    rig.client.send(message("/model/load", {rig.model.path(), i}));
+    rig.client.send(message("/model/load", {"two", i}));
   }
   rig.server.reset();
-  CHECK(rig.session.load_and_wait(rig.model.path()));
+  CHECK(rig.session.load_and_wait("two"));
 }
 
 TEST_CASE("a full queue refuses, and takes again when there is room", "[osc]") {
   Rig rig;
   const Bytes many = bundle(1, std::vector<Bytes>(1500, message("/bend", {0.5f})));
   bool was_refused = false;
+  rig.drive(1);
   for (int i = 0; i < 8 && !was_refused; ++i) {
     rig.client.send(many);
     for (const Answer& answer : rig.client.sync()) {
@@ -390,6 +321,53 @@ TEST_CASE("a full queue refuses, and takes again when there is room", "[osc]") {
   rig.drive(8);
   rig.client.send(many);
   CHECK(rig.client.sync().empty());
+}
+
+TEST_CASE("a bundle that finds no room ahead is refused whole; what is to act now is taken",
+          "[osc]") {
+  Rig rig;
+  rig.drive(1);
+  const std::vector<Bytes> pushes(1500, message("/in/1/force", {0.1}));
+  const auto ahead = [&] { return rig.tag(rig.time_ns(48000 * 49 / 5)); };
+  rig.client.send(bundle(ahead(), pushes));
+  rig.client.send(bundle(ahead(), pushes));
+  CHECK(rig.client.sync().empty());
+  for (int i = 0; i < 2; ++i) {
+    CHECK(has(rig.client.ask(bundle(ahead(), pushes)), "/error", "/in/1/force",
+              "refused whole: 4096 events may wait for their time, and there is no room for 1500 "
+              "events more; try again later"));
+    CHECK(rig.process.meters.dropped.get() == 1500u * (static_cast<unsigned>(i) + 1));
+    rig.drive(4);  // the audio thread has taken them all, and they still wait
+  }
+  CHECK(rig.onsets(0).empty());
+  rig.client.send(message("/in/1/force", {0.1}));
+  CHECK(rig.client.sync().empty());
+  const auto now = static_cast<std::int64_t>(rig.sound[0].size());
+  rig.drive(2);
+  CHECK(rig.onsets(0) == std::vector<std::int64_t>{now});
+  rig.client.send(message("/panic"));
+  CHECK(rig.client.sync().empty());
+  rig.drive(1);
+  rig.client.send(bundle(ahead(), pushes));
+  CHECK(rig.client.sync().empty());
+}
+
+TEST_CASE("lateness is answered once in a while, with how often it was", "[osc]") {
+  Rig rig;
+  rig.drive(200);
+  const std::int64_t start_ns = monotonic_ns();
+  std::int64_t answers = 0;
+  for (int i = 0; i < 738; ++i) {
+    rig.client.send(bundle(rig.tag(rig.time_ns(24000)), {message("/in/1/force", {0.1})}));
+    if (i % 50 == 49) {
+      for (const Answer& answer : rig.client.sync()) {
+        CHECK(has(answer, "/error", "/in/1/force", "late by 0."));
+        ++answers;
+      }
+    }
+  }
+  CHECK(answers > 0);
+  CHECK(answers <= (monotonic_ns() - start_ns) / 1'000'000'000 + 2);
 }
 
 TEST_CASE("answers are not answered, and rubbish seldom", "[osc]") {
@@ -424,12 +402,13 @@ TEST_CASE("ten thousand broken packets leave the server and the sound whole", "[
       message("/param/*"),
       message("/in/1/force", {1.0f, 0.01}),
       message("/in/2/force", {-1e9f}),
-      message("/model/load", {rig.model.path(), 1}),
+      message("/model/load", {"two", 1}),
       message("/preset/load", {"none"}),
       message("/describe"),
       bundle(1, {message("/note/on", {60, 100}), message("/in/1/force", {0.5})}),
       bundle(rig.tag(rig.time_ns(9600)),
              {bundle(1, {message("/panic")}), message("/in/1/force", {0.5})})};
+  Client other(rig.server->port());  // who is answered while the first has asked too much
   std::mt19937 random(20240607);
   const auto below = [&](std::size_t limit) {
     return std::uniform_int_distribution<std::size_t>(0, limit - 1)(random);
@@ -466,7 +445,7 @@ TEST_CASE("ten thousand broken packets leave the server and the sound whole", "[
     }
     rig.client.send(packet);
     if (i % 50 == 49) {
-      rig.client.sync();
+      other.sync();
       rig.drive(2);
     }
   }
