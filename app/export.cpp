@@ -4,6 +4,7 @@
 
 #include "app/exit_code.h"
 #include "app/files.h"
+#include "app/load_news.h"
 #include "app/loader.h"
 #include "core/compile/compile.h"
 #include "core/model/faust.h"
@@ -12,8 +13,8 @@ namespace ressort {
 namespace {
 
 // The scene's sliders are what its parameters may be turned to when it is played.
-Result<std::string> to_faust(const Scene& scene, bool rescale) {
-  const auto compiled = compile(scene.network, scene.preset, {.voices = 1});
+Result<std::string> to_faust(const Scene& scene, bool rescale, const Progress& progress) {
+  const auto compiled = compile(scene.network, scene.preset, {.voices = 1, .progress = progress});
   if (!compiled) {
     return Error{to_string(finding_of(scene.path, "", compiled.error()))};
   }
@@ -21,6 +22,7 @@ Result<std::string> to_faust(const Scene& scene, bool rescale) {
   for (const ParameterInfo& info : compiled->instrument.parameters) {
     sliders.push_back({info.name, info.value, info.minimum, info.maximum, {}});
   }
+  progress.stage("writing it in the other language");
   auto text =
       faust_text(scene.network, {.name = scene.name, .sliders = sliders, .rescale = rescale});
   if (!text) {
@@ -37,7 +39,13 @@ int export_to_faust(const ExportOptions& options) {
                  options.output.c_str());
     return exit_code::wrong_use;
   }
-  const auto scene = load_scene(options.name, {.third = options.third});
+  LoadNews news(options.name,
+                [](const std::string& text) { std::fprintf(stderr, "%s\n", text.c_str()); });
+  const Progress progress([&](std::string_view stage) {
+    news.at(stage);
+    return true;  // Ctrl-C ends it at once
+  });
+  const auto scene = load_scene(options.name, {.third = options.third, .progress = progress});
   if (!scene) {
     std::fprintf(stderr, "%s\n", scene.error().message.c_str());
     return exit_code::wrong_use;
@@ -45,7 +53,12 @@ int export_to_faust(const ExportOptions& options) {
   for (const std::string& warning : scene->warnings) {
     std::fprintf(stderr, "%s\n", warning.c_str());
   }
-  const auto text = to_faust(*scene, options.rescale);
+  const std::string read[] = {scene->path, scene->model_path};
+  if (auto spared = spare(options.output, read); !spared) {
+    std::fprintf(stderr, "%s\n", spared.error().message.c_str());
+    return exit_code::wrong_use;
+  }
+  const auto text = to_faust(*scene, options.rescale, progress);
   if (!text) {
     std::fprintf(stderr, "%s\n", text.error().message.c_str());
     return exit_code::wrong_use;
@@ -57,11 +70,9 @@ int export_to_faust(const ExportOptions& options) {
   }
   if (options.output.empty()) {
     std::fputs(text->c_str(), stdout);
-  } else if (auto written = write_text(options.output, *text); !written) {
-    std::fprintf(stderr, "%s\n", written.error().message.c_str());
-    return exit_code::wrong_use;
+    return exit_code::done;
   }
-  return exit_code::done;
+  return put_text(options.output, *text, options.force);
 }
 
 }  // namespace ressort

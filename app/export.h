@@ -11,6 +11,7 @@ namespace ressort {
 struct ExportOptions {
   std::string name;    // model or preset
   std::string output;  // a file; empty: to stdout
+  bool force = false;  // write over a file that is there
   bool rescale = true;
   std::optional<ThirdArgument> third;  // whatever preset and model say
 };

@@ -1,16 +1,15 @@
 #include "app/files.h"
 
-#include <sndfile.h>
-
 #include <algorithm>
 #include <cerrno>
-#include <cmath>
+#include <cstdio>
 #include <cstdlib>
-#include <cstring>
 #include <filesystem>
 #include <fstream>
 #include <set>
 #include <system_error>
+
+#include "app/exit_code.h"
 
 namespace ressort {
 namespace {
@@ -18,24 +17,34 @@ namespace {
 namespace fs = std::filesystem;
 
 // The installed place or the source tree, whichever is there; RESSORT_DATA goes before both.
-const fs::path& data_folder() {
-  static const fs::path folder = [] {
-    std::vector<fs::path> tried;
-    if (const char* given = std::getenv("RESSORT_DATA")) {
-      tried.emplace_back(given);
+fs::path data_folder() {
+  std::vector<fs::path> tried;
+  if (const char* given = std::getenv("RESSORT_DATA")) {
+    tried.emplace_back(given);
+  }
+  std::error_code error;
+  const fs::path program = fs::read_symlink("/proc/self/exe", error);
+  tried.push_back(program.parent_path().parent_path() / "share" / "ressort");
+  tried.emplace_back(RESSORT_SOURCE);
+  for (const fs::path& path : tried) {
+    if (fs::is_directory(path / "models", error)) {
+      return path;
     }
-    std::error_code error;
-    const fs::path program = fs::read_symlink("/proc/self/exe", error);
-    tried.push_back(program.parent_path().parent_path() / "share" / "ressort");
-    tried.emplace_back(RESSORT_SOURCE);
-    for (const fs::path& path : tried) {
-      if (fs::is_directory(path / "models", error)) {
-        return path;
-      }
-    }
-    return fs::current_path(error);
-  }();
-  return folder;
+  }
+  return fs::current_path(error);
+}
+
+bool is_below(const fs::path& path, const fs::path& folder) {
+  return std::mismatch(folder.begin(), folder.end(), path.begin(), path.end()).first ==
+         folder.end();
+}
+
+std::string names_of_presets() {
+  std::string names;
+  for (const std::string& preset : known_presets()) {
+    names += (names.empty() ? "" : ", ") + preset;
+  }
+  return names;
 }
 
 std::vector<std::string> names_in(const fs::path& folder, const char* ending) {
@@ -50,13 +59,20 @@ std::vector<std::string> names_in(const fs::path& folder, const char* ending) {
   return {names.begin(), names.end()};
 }
 
-// Numbers of samples go to libsndfile in whole frames.
-template <class T, class Write>
-Result<Done> write_frames(SNDFILE* file, const T* samples, std::size_t frames, Write&& write) {
-  if (write(file, samples, static_cast<sf_count_t>(frames)) != static_cast<sf_count_t>(frames)) {
-    return Error{std::string("writing the sound failed: ") + sf_strerror(file)};
+// A text without the mark that some editors put before it.
+Result<std::string> unmarked(const std::string& path, std::string text) {
+  if (text.starts_with("\xff\xfe") || text.starts_with("\xfe\xff")) {
+    return Error{"'" + path + "' is text in UTF-16; save it as UTF-8"};
   }
-  return Done{};
+  if (text.starts_with("\xef\xbb\xbf")) {
+    text.erase(0, 3);
+  }
+  return text;
+}
+
+std::string in_bytes(std::uintmax_t size) {
+  return size >> 20 == 0 ? std::to_string(size >> 10) + " KiB"
+                         : std::to_string(size >> 20) + " MiB";
 }
 
 }  // namespace
@@ -75,114 +91,65 @@ Result<std::string> read_text(const std::string& path, std::size_t max_bytes) {
   }
   const auto size = fs::file_size(path, error);
   if (!error && size > max_bytes) {
-    return Error{"'" + path + "' has " + std::to_string(size >> 20) + " MiB; at most " +
-                 std::to_string(max_bytes >> 20) + " MiB are read"};
+    return Error{"'" + path + "' has " + in_bytes(size) + "; at most " + in_bytes(max_bytes) +
+                 " are read"};
   }
   std::ifstream file(path, std::ios::binary);
   std::string text(static_cast<std::size_t>(size), '\0');
   if (!file || !file.read(text.data(), static_cast<std::streamsize>(text.size()))) {
-    return Error{"'" + path + "' cannot be read: " + std::strerror(errno)};
+    return Error{"'" + path + "' cannot be read: " + std::generic_category().message(errno)};
   }
-  return text;
+  return unmarked(path, std::move(text));
 }
 
-Result<Done> write_text(const std::string& path, const std::string& text) {
-  std::ofstream file(path, std::ios::binary);
-  file << text;
-  file.close();
+Result<Done> write_text(const std::string& path, const std::string& text, Existing existing) {
+  auto file = NewFile::open(path, existing);
   if (!file) {
-    return Error{"'" + path + "' cannot be written: " + std::strerror(errno)};
+    return file.error();
   }
-  return Done{};
+  const auto written = file->write(text);
+  return written ? file->keep() : written;
 }
 
-Result<Sound> read_wav(const std::string& path) {
-  std::error_code error;
-  if (!fs::exists(path, error)) {
-    return Error{"there is no file '" + path + "'"};
-  }
-  SF_INFO info{};
-  const std::unique_ptr<SNDFILE, int (*)(SNDFILE*)> file(sf_open(path.c_str(), SFM_READ, &info),
-                                                         sf_close);
+int put_text(const std::string& path, const std::string& text, bool force) {
+  const auto complain = [](const Error& error, int code) {
+    std::fprintf(stderr, "%s\n", error.message.c_str());
+    return code;
+  };
+  auto file = NewFile::open(path, force ? Existing::replace : Existing::refuse);
   if (!file) {
-    return Error{"'" + path + "' is no sound file that can be read: " + sf_strerror(nullptr)};
+    return complain(file.error(), exit_code::wrong_use);
   }
-  const auto channels = static_cast<std::size_t>(info.channels);
-  Sound sound{.rate_hz = static_cast<double>(info.samplerate), .channels = {}};
-  sound.channels.resize(channels);
-  std::vector<double> block(4096 * channels);
-  for (sf_count_t got = 0; (got = sf_readf_double(file.get(), block.data(), 4096)) > 0;) {
-    for (std::size_t i = 0; i < static_cast<std::size_t>(got) * channels; ++i) {
-      sound.channels[i % channels].push_back(block[i]);
-    }
-  }
-  return sound;
+  auto written = file->write(text);
+  written = written ? file->keep() : written;
+  return written ? exit_code::done : complain(written.error(), exit_code::our_failure);
 }
 
-struct WavWriter::File {
-  SNDFILE* handle = nullptr;
-  std::string path;
-  ~File() {
-    if (handle != nullptr) {
-      sf_close(handle);
-    }
-  }
-};
-
-WavWriter::WavWriter(std::unique_ptr<File> file) : file_(std::move(file)) {}
-WavWriter::WavWriter(WavWriter&&) noexcept = default;
-WavWriter& WavWriter::operator=(WavWriter&&) noexcept = default;
-WavWriter::~WavWriter() = default;
-
-Result<WavWriter> WavWriter::open(const std::string& path, double rate_hz, int channels,
-                                  SampleFormat format) {
-  if (path.ends_with(".mdl") || path.ends_with(".toml")) {
-    return Error{"'" + path + "' is the name of a model or a preset, not of a sound"};
-  }
-  SF_INFO info{};
-  info.samplerate = static_cast<int>(std::lround(rate_hz));
-  info.channels = channels;
-  info.format = SF_FORMAT_WAV | (format == SampleFormat::float32   ? SF_FORMAT_FLOAT
-                                 : format == SampleFormat::float64 ? SF_FORMAT_DOUBLE
-                                                                   : SF_FORMAT_PCM_24);
-  auto file = std::make_unique<File>();
-  file->path = path;
-  file->handle = sf_open(path.c_str(), SFM_WRITE, &info);
-  if (file->handle == nullptr) {
-    return Error{"'" + path + "' cannot be written: " + sf_strerror(nullptr)};
-  }
-  sf_command(file->handle, SFC_SET_CLIPPING, nullptr, SF_TRUE);
-  // No peak chunk: it holds the time of day, and the same render shall give the same file.
-  sf_command(file->handle, SFC_SET_ADD_PEAK_CHUNK, nullptr, SF_FALSE);
-  return WavWriter(std::move(file));
-}
-
-Result<Done> WavWriter::write(const double* interleaved, std::size_t frames) {
-  return write_frames(file_->handle, interleaved, frames, sf_writef_double);
-}
-
-Result<Done> WavWriter::write(const float* interleaved, std::size_t frames) {
-  return write_frames(file_->handle, interleaved, frames, sf_writef_float);
-}
-
-Result<Done> WavWriter::close() {
-  const int failure = sf_close(file_->handle);
-  file_->handle = nullptr;
-  if (failure != 0) {
-    return Error{"'" + file_->path + "' could not be completed: " + sf_error_number(failure)};
-  }
-  return Done{};
-}
-
-Result<std::string> find_scene(const std::string& name) {
+Result<std::string> find_scene(const std::string& name, Reach reach) {
   if (name.empty()) {
     return Error{"expected the name of a model or a preset"};
   }
   std::error_code error;
-  const fs::path& data = data_folder();
-  for (const fs::path& path : {fs::path(name), fs::path(name + ".toml"), fs::path(name + ".mdl"),
-                               data / "presets" / (name + ".toml"), data / "presets" / name,
-                               data / "models" / (name + ".mdl"), data / "models" / name}) {
+  const fs::path data = data_folder();
+  const std::vector<fs::path> own = {data / "presets" / (name + ".toml"), data / "presets" / name,
+                                     data / "models" / (name + ".mdl"), data / "models" / name};
+  if (reach == Reach::own_folders) {
+    for (const fs::path& path : own) {
+      if (const auto found = own_file(path.string()); found && fs::path(name).is_relative()) {
+        return *found;
+      }
+    }
+    const std::string presets = names_of_presets();
+    return Error{"there is no model or preset '" + name +
+                 "' in the program's own folders, and OSC loads no others; there are " +
+                 (presets.empty() ? "none" : presets)};
+  }
+  for (const fs::path& path : {fs::path(name), fs::path(name + ".toml"), fs::path(name + ".mdl")}) {
+    if (fs::exists(path, error) && !fs::is_directory(path, error)) {
+      return path.string();
+    }
+  }
+  for (const fs::path& path : own) {
     if (fs::exists(path, error) && !fs::is_directory(path, error)) {
       return path.string();
     }
@@ -190,13 +157,26 @@ Result<std::string> find_scene(const std::string& name) {
   if (fs::is_directory(name, error)) {
     return Error{"'" + name + "' is a folder; expected a .mdl model or a .toml preset"};
   }
-  std::string known;
-  for (const std::string& preset : known_presets()) {
-    known += (known.empty() ? "" : ", ") + preset;
-  }
+  const std::string presets = names_of_presets();
   return Error{"there is no model or preset '" + name + "'; there are " +
-               (known.empty() ? "none in '" + data.string() + "'" : known) +
+               (presets.empty() ? "none in '" + data.string() + "'" : presets) +
                ", or give the path of a .mdl or .toml file"};
+}
+
+std::optional<std::string> own_file(const std::string& path) {
+  std::error_code error;
+  const fs::path found = fs::canonical(path, error);
+  if (error || !fs::is_regular_file(found, error) ||
+      (found.extension() != ".mdl" && found.extension() != ".toml")) {
+    return std::nullopt;
+  }
+  for (const char* const name : {"models", "presets"}) {
+    const fs::path folder = fs::canonical(data_folder() / name, error);
+    if (!error && is_below(found, folder)) {
+      return found.string();
+    }
+  }
+  return std::nullopt;
 }
 
 std::vector<std::string> known_presets() {

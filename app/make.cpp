@@ -28,8 +28,8 @@ int make(const MakeOptions& options) {
     std::fwrite(text.data(), 1, text.size(), stdout);
     return exit_code::done;
   }
-  if (const auto written = write_text(options.output, text); !written) {
-    return complain(written.error().message);
+  if (const int failure = put_text(options.output, text, options.force)) {
+    return failure;
   }
   std::printf("%s: %s, %s\n", options.output.c_str(),
               options.shape.as_macro ? "one macro"

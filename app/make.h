@@ -10,6 +10,7 @@ namespace ressort {
 struct MakeOptions {
   Shape shape;
   std::string output;  // a file; empty for stdout
+  bool force = false;  // write over a file that is there
 };
 
 int make(const MakeOptions& options);

@@ -6,6 +6,8 @@
 
 #include "app/admit.h"
 #include "app/crew.h"
+#include "app/files.h"
+#include "app/memory.h"
 #include "app/process.h"
 #include "core/compile/compile.h"
 #include "core/model/expression.h"
@@ -19,6 +21,8 @@ constexpr double ring_out_s = 2.0;
 constexpr double longest_s = 24.0 * 3600.0;
 
 struct ScoredEvent {
+  int line = 0;
+  int column = 1;
   long long frame = 0;
   Event event;
 };
@@ -72,14 +76,15 @@ Result<std::vector<ScoredEvent>> score_events(const RenderOptions& options,
   for (const ScoreLine& line : lines) {
     auto events = to_events(line.call, instrument, serial);
     if (!events) {
-      return at(options.score, {events.error().message, line.line, 1});
+      return at(options.score, {events.error().message, line.line, line.column});
     }
     for (const Event& event : *events) {
-      scored.push_back({std::llround(line.time_s * options.rate_hz), event});
+      scored.push_back(
+          {line.line, line.column, std::llround(line.time_s * options.rate_hz), event});
       const std::string news = told_limit(line.call, event, instrument);
       if (!news.empty() && told.insert(event.index).second) {
-        warnings.push_back(options.score + ":" + std::to_string(line.line) +
-                           ":1: warning: " + news);
+        warnings.push_back(options.score + ":" + std::to_string(line.line) + ":" +
+                           std::to_string(line.column) + ": warning: " + news);
       }
     }
   }
@@ -88,28 +93,67 @@ Result<std::vector<ScoredEvent>> score_events(const RenderOptions& options,
   return scored;
 }
 
+// What drives the model's inputs, read as it is needed: nothing, or a sound file.
 struct Inputs {
-  Sound sound;
-  long long frames() const {
-    return sound.channels.empty() ? 0 : static_cast<long long>(sound.channels[0].size());
+  std::optional<SoundReader> file;
+  std::vector<double> interleaved;
+  std::vector<double> samples;  // [channel][block_frames]
+  std::vector<const double*> pointers;
+
+  explicit Inputs(std::optional<SoundReader> from) : file(std::move(from)) {
+    const std::size_t channels = file ? file->channels() : 0;
+    interleaved.resize(channels * block_frames);
+    samples.resize(interleaved.size());
+    for (std::size_t c = 0; c < channels; ++c) {
+      pointers.push_back(samples.data() + c * block_frames);
+    }
   }
-  // The block's pointers; silence after the end.
-  std::vector<const double*> at(long long frame, std::size_t count,
-                                std::vector<std::vector<double>>& buffers) const {
-    std::vector<const double*> pointers;
-    buffers.assign(sound.channels.size(), std::vector<double>(count, 0.0));
-    for (std::size_t c = 0; c < sound.channels.size(); ++c) {
-      for (std::size_t n = 0; n < count; ++n) {
-        const auto i = static_cast<std::size_t>(frame) + n;
-        if (i < sound.channels[c].size()) {
-          buffers[c][n] = sound.channels[c][i];
+
+  // The next block; silence after the end.
+  std::span<const double* const> next(std::size_t count) {
+    if (file) {
+      const std::size_t got = file->read(interleaved.data(), count);
+      for (std::size_t c = 0; c < pointers.size(); ++c) {
+        for (std::size_t n = 0; n < count; ++n) {
+          samples[c * block_frames + n] = n < got ? interleaved[n * pointers.size() + c] : 0.0;
         }
       }
-      pointers.push_back(buffers[c].data());
     }
     return pointers;
   }
 };
+
+Result<std::optional<SoundReader>> open_input(const RenderOptions& options) {
+  if (options.input.empty()) {
+    return std::optional<SoundReader>();
+  }
+  auto sound = SoundReader::open(options.input);
+  if (!sound) {
+    return sound.error();
+  }
+  if (sound->rate_hz() != options.rate_hz) {
+    const std::string rate = std::to_string(static_cast<int>(sound->rate_hz()));
+    return Error{"'" + options.input + "' is at " + rate + " Hz, the render at " +
+                 std::to_string(static_cast<int>(options.rate_hz)) + "; give --rate " + rate};
+  }
+  if (sound->frames() < 0 && !options.frames && !options.seconds) {
+    return Error{"'" + options.input + "' does not say how long it is; give --seconds"};
+  }
+  return std::optional<SoundReader>(*std::move(sound));
+}
+
+// A value that the preset does not allow, at the line that says so.
+Error beyond_range(const Scene& scene, const ParameterInfo& info) {
+  Error error{"the preset keeps '" + info.name + "' between " + print_number(info.minimum) +
+              " and " + print_number(info.maximum)};
+  for (const ParameterSetting& setting : scene.preset.parameters) {
+    if (setting.name == info.name) {
+      error.line = setting.place.line;
+      error.column = setting.place.column;
+    }
+  }
+  return at(scene.path, error);
+}
 
 long long length_in_frames(const RenderOptions& options, const std::vector<ScoredEvent>& score,
                            const Inputs& inputs) {
@@ -119,7 +163,8 @@ long long length_in_frames(const RenderOptions& options, const std::vector<Score
   if (options.seconds) {
     return std::llround(*options.seconds * options.rate_hz);
   }
-  const long long last = std::max(score.empty() ? 0 : score.back().frame, inputs.frames());
+  const long long last =
+      std::max(score.empty() ? 0 : score.back().frame, inputs.file ? inputs.file->frames() : 0);
   return last + std::llround(ring_out_s * options.rate_hz);
 }
 
@@ -135,19 +180,26 @@ std::string default_phrase() {
 }
 
 Result<Rendered> render(const RenderOptions& options, const std::function<bool(double)>& progress) {
-  if (options.output == options.input || options.output == options.score) {
-    return Error{"'" + options.output + "' is read: it cannot be written too"};
-  }
-  auto scene = load_scene(options.name, {.bare = true, .third = options.third});
+  auto scene =
+      load_scene(options.name, {.bare = true, .third = options.third, .progress = options.loading});
   if (!scene) {
     return scene.error();
+  }
+  const std::string read[] = {scene->path, scene->model_path, options.score, options.input};
+  if (auto spared = spare(options.output, read); !spared) {
+    return spared.error();
   }
   const bool is_bare = !scene->has_preset;
   const auto lines = read_score(options, is_bare);
   if (!lines) {
     return lines.error();
   }
-  ThreadCrew crew(options.threads > 0 ? static_cast<std::size_t>(options.threads) : core_count());
+  const auto threads = static_cast<std::size_t>(options.threads);
+  if (threads > core_count()) {
+    scene->warnings.push_back("--threads " + std::to_string(threads) + ": this machine runs " +
+                              std::to_string(core_count()) + " at once, and so many are used");
+  }
+  ThreadCrew crew(threads > 0 ? std::min(threads, core_count()) : core_count());
   auto compiled = admit(*scene,
                         {.rate_hz = options.rate_hz,
                          .rescale = options.rescale,
@@ -159,31 +211,21 @@ Result<Rendered> render(const RenderOptions& options, const std::function<bool(d
                          .crew = &crew,
                          .force = options.force,
                          .settings = options.parameters,
-                         .reach = reach_of(*lines, scene->network)},
+                         .reach = reach_of(*lines, scene->network),
+                         .progress = options.loading,
+                         .most_bytes = free_memory_bytes()},
                         scene->warnings);
   if (!compiled) {
     return compiled.error();
   }
   const Instrument instrument = compiled->instrument;
-  if (instrument.outputs == 0) {
-    return Error{scene->model_path + ": the model has no output, so there is nothing to render"};
-  }
   constexpr std::uint32_t serial = 1;
 
-  Inputs inputs;
-  if (!options.input.empty()) {
-    auto sound = read_wav(options.input);
-    if (!sound) {
-      return sound.error();
-    }
-    inputs.sound = *std::move(sound);
-    if (inputs.sound.rate_hz != options.rate_hz) {
-      return Error{"'" + options.input + "' is at " +
-                   std::to_string(static_cast<int>(inputs.sound.rate_hz)) + " Hz, the render at " +
-                   std::to_string(static_cast<int>(options.rate_hz)) + "; give --rate " +
-                   std::to_string(static_cast<int>(inputs.sound.rate_hz))};
-    }
+  auto input = open_input(options);
+  if (!input) {
+    return input.error();
   }
+  Inputs inputs(*std::move(input));
   auto score = score_events(options, *lines, instrument, serial, scene->warnings);
   if (!score) {
     return score.error();
@@ -194,15 +236,13 @@ Result<Rendered> render(const RenderOptions& options, const std::function<bool(d
     const Call call{"/param/" + name, {value}};
     auto events = to_events(call, instrument, serial);
     if (!events) {
-      return events.error();
+      return Error{"--set " + name + "=" + print_number(value) + ": " + events.error().message};
     }
     for (const Event& event : *events) {
       if (const std::string news = told_limit(call, event, instrument); !news.empty()) {
         scene->warnings.push_back(news);
       } else if (event.value != value) {
-        return Error{"the preset keeps '" + name + "' between " +
-                     print_number(instrument.parameters[event.index].minimum) + " and " +
-                     print_number(instrument.parameters[event.index].maximum)};
+        return beyond_range(*scene, instrument.parameters[event.index]);
       }
       process.schedule(0, event);
     }
@@ -211,13 +251,21 @@ Result<Rendered> render(const RenderOptions& options, const std::function<bool(d
 
   Rendered rendered{.name = scene->name,
                     .frames = length_in_frames(options, *score, inputs),
-                    .channels = is_bare ? instrument.outputs : std::max(2, instrument.outputs),
+                    .channels = std::max(is_bare ? 1 : 2, instrument.outputs),
                     .warnings = scene->warnings};
   if (static_cast<double>(rendered.frames) > longest_s * options.rate_hz) {
     return Error{"that is longer than a day of sound"};
   }
   const auto channels = static_cast<std::size_t>(rendered.channels);
-  auto file = WavWriter::open(options.output, options.rate_hz, rendered.channels, options.format);
+  if (progress && !progress(0.0)) {
+    return Error{"interrupted before the first sample"};
+  }
+  auto file = SoundWriter::open(options.output,
+                                {.rate_hz = options.rate_hz,
+                                 .channels = rendered.channels,
+                                 .samples = options.format,
+                                 .frames = rendered.frames},
+                                Existing::replace);
   if (!file) {
     return file.error();
   }
@@ -227,7 +275,6 @@ Result<Rendered> render(const RenderOptions& options, const std::function<bool(d
   for (std::size_t c = 0; c < channels; ++c) {
     outputs.push_back(samples.data() + c * block_frames);
   }
-  std::vector<std::vector<double>> input_buffers;
   std::size_t next = 0;
   double energy = 0.0;
   long long frame = 0;
@@ -237,14 +284,13 @@ Result<Rendered> render(const RenderOptions& options, const std::function<bool(d
     const long long end = frame + static_cast<long long>(count);
     while (next < score->size() && (*score)[next].frame < end) {
       if (!process.schedule((*score)[next].frame, (*score)[next].event)) {
-        return Error{options.score + ": more than " + std::to_string(Process::max_events) +
-                     " events within " + std::to_string(block_frames) + " samples"};
+        return at(options.score, {"more than " + std::to_string(Process::max_ahead) +
+                                      " events within " + std::to_string(block_frames) + " samples",
+                                  (*score)[next].line, (*score)[next].column});
       }
       ++next;
     }
-    const std::vector<const double*> pointers = inputs.at(frame, count, input_buffers);
-    process.block(std::span<const double* const>(pointers), std::span<double* const>(outputs),
-                  count, {}, 0);
+    process.block(inputs.next(count), std::span<double* const>(outputs), count, {}, 0);
     for (std::size_t n = 0; n < count; ++n) {
       for (std::size_t c = 0; c < channels; ++c) {
         const double y = outputs[c][n];
@@ -254,7 +300,8 @@ Result<Rendered> render(const RenderOptions& options, const std::function<bool(d
       }
     }
     if (auto wrote = file->write(interleaved.data(), count); !wrote) {
-      return wrote.error();
+      rendered.failure = wrote.error();
+      return rendered;
     }
     frame = end;
     if (progress && !progress(static_cast<double>(frame) / static_cast<double>(rendered.frames))) {
@@ -262,7 +309,8 @@ Result<Rendered> render(const RenderOptions& options, const std::function<bool(d
     }
   }
   if (auto closed = file->close(); !closed) {
-    return closed.error();
+    rendered.failure = closed.error();
+    return rendered;
   }
   rendered.frames = frame;
   rendered.rms =

@@ -1,6 +1,5 @@
 #include "app/recorder.h"
 
-#include <charconv>
 #include <chrono>
 #include <condition_variable>
 #include <mutex>
@@ -8,7 +7,8 @@
 #include <thread>
 #include <vector>
 
-#include "app/files.h"
+#include "app/sound_file.h"
+#include "app/text.h"
 
 namespace ressort {
 namespace {
@@ -16,36 +16,38 @@ namespace {
 constexpr std::chrono::milliseconds poll_time{10};  // the ring holds seconds
 constexpr double unknown_rate_hz = 44100.0;         // until the first block tells
 
-std::string with_two_digits(double number) {
-  char text[32];
-  const auto end = std::to_chars(text, text + sizeof text, number, std::chars_format::fixed, 2).ptr;
-  return {text, end};
-}
-
 }  // namespace
 
 struct Recorder::Work {
-  explicit Work(Process& of) : process(of) {}
+  Work(Process& of, Tell teller) : process(of), tell(std::move(teller)) {}
 
   Process& process;
+  Tell tell;
   std::string path;
-  std::optional<WavWriter> file;
+  Existing existing = Existing::refuse;
+  std::optional<SoundWriter> file;
   double rate_hz = unknown_rate_hz;  // of the file
   int channels = 2;
   std::uint64_t frames = 0;       // written so far
   std::uint64_t lost_before = 0;  // the meter's reading at the start
   std::uint64_t unfit = 0;        // chunks that came with another number of channels
-  std::optional<Error> failure;   // the first; what comes after it is not written
+  std::optional<Error> failure;   // ends it
   std::vector<float> samples;     // of one round, so that the disk gets few large pieces
 
   std::mutex mutex;
   std::condition_variable wake;
   bool is_stopping = false;
+  Flag has_failed;
   std::thread thread;
 
   Result<Done> open() {
     file.reset();
-    auto opened = WavWriter::open(path, rate_hz, channels, SampleFormat::pcm24);
+    auto opened = SoundWriter::open(path,
+                                    {.rate_hz = rate_hz,
+                                     .channels = channels,
+                                     .preferred = SampleFormat::pcm24,
+                                     .is_shown = true},
+                                    existing);
     if (!opened) {
       return opened.error();
     }
@@ -70,7 +72,7 @@ struct Recorder::Work {
     samples.clear();
     RecordedChunk chunk;
     while (process.recording.pop(chunk)) {
-      if (frames == 0 && samples.empty() && !failure) {
+      if (frames == 0 && samples.empty()) {
         take_form_of(chunk);
       }
       if (chunk.channels != channels) {
@@ -80,15 +82,27 @@ struct Recorder::Work {
       const auto count = static_cast<std::ptrdiff_t>(chunk.frames * chunk.channels);
       samples.insert(samples.end(), chunk.samples.begin(), chunk.samples.begin() + count);
     }
-    if (samples.empty() || failure) {
+    const std::size_t count = samples.size() / static_cast<std::size_t>(channels);
+    if (count == 0 || failure) {
       return;
     }
-    const std::size_t count = samples.size() / static_cast<std::size_t>(channels);
     if (auto written = file->write(samples.data(), count); !written) {
-      failure = written.error();
+      failure = Error{written.error().message + "; the recording ended after " +
+                      fixed(static_cast<double>(frames) / rate_hz, 2) + " s, which are kept"};
       return;
     }
     frames += count;
+  }
+
+  // Completes the file, of as much as there is.
+  void end() {
+    if (file) {
+      auto closed = failure ? file->salvage() : file->close();
+      file.reset();
+      if (!closed && !failure) {
+        failure = closed.error();
+      }
+    }
   }
 
   void work() {
@@ -96,30 +110,38 @@ struct Recorder::Work {
     while (!wake.wait_for(lock, poll_time, [this] { return is_stopping; })) {
       lock.unlock();
       write_what_came();
+      if (failure) {
+        process.is_recording.lower();
+        end();
+        tell(failure->message);
+        has_failed.raise();
+        return;
+      }
       lock.lock();
     }
   }
 };
 
-Recorder::Recorder(Process& process) : work_(std::make_unique<Work>(process)) {}
+Recorder::Recorder(Process& process, Tell tell)
+    : work_(std::make_unique<Work>(process, std::move(tell))) {}
 
 Recorder::~Recorder() {
-  if (is_running()) {
-    static_cast<void>(stop());
-  }
+  static_cast<void>(stop());
 }
 
 bool Recorder::is_running() const {
-  return work_->thread.joinable();
+  return work_->thread.joinable() && !work_->has_failed.is_raised();
 }
 
-Result<Done> Recorder::start(const std::string& path) {
+Result<Done> Recorder::start(const std::string& path, Existing existing) {
   Work& work = *work_;
   if (is_running()) {
     return Error{"a recording to '" + work.path + "' is going on"};
   }
+  static_cast<void>(stop());  // one that has ended by itself
   const double rate_now = work.process.clock.read().rate_hz;
   work.path = path;
+  work.existing = existing;
   work.rate_hz = rate_now > 0.0 ? rate_now : unknown_rate_hz;
   work.channels = 2;
   if (auto opened = work.open(); !opened) {
@@ -132,6 +154,7 @@ Result<Done> Recorder::start(const std::string& path) {
   work.unfit = 0;
   work.failure.reset();
   work.is_stopping = false;
+  work.has_failed.lower();
   work.lost_before = work.process.meters.record_lost.get();
   work.process.is_recording.raise();
   work.thread = std::thread([&work] { work.work(); });
@@ -140,7 +163,7 @@ Result<Done> Recorder::start(const std::string& path) {
 
 Result<std::string> Recorder::stop() {
   Work& work = *work_;
-  if (!is_running()) {
+  if (!work.thread.joinable()) {
     return Error{"nothing is being recorded"};
   }
   work.process.is_recording.lower();
@@ -150,20 +173,15 @@ Result<std::string> Recorder::stop() {
   }
   work.wake.notify_all();
   work.thread.join();
-  work.write_what_came();
-  if (work.file) {
-    auto closed = work.file->close();
-    work.file.reset();
-    if (!closed && !work.failure) {
-      work.failure = closed.error();
-    }
+  if (!work.failure) {
+    work.write_what_came();
+    work.end();
   }
   if (work.failure) {
     return *work.failure;
   }
   const std::uint64_t lost = work.process.meters.record_lost.get() - work.lost_before + work.unfit;
-  return work.path + ": " + with_two_digits(static_cast<double>(work.frames) / work.rate_hz) +
-         " s, " +
+  return work.path + ": " + fixed(static_cast<double>(work.frames) / work.rate_hz, 2) + " s, " +
          (lost == 0 ? "nothing lost"
                     : std::to_string(lost) + (lost == 1 ? " piece lost" : " pieces lost"));
 }

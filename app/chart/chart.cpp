@@ -101,7 +101,7 @@ bool has_gnuplot() {
 }
 
 // What goes on, in one line that is written over on a terminal.
-class Progress {
+class ProgressLine {
  public:
   bool tell(const std::string& scene, const std::string& text) {
     if (shows_) {
@@ -129,7 +129,8 @@ int write_all(const ChartOptions& options, const std::vector<ChartSheet>& sheets
   for (const auto& [name, text] :
        {std::pair(std::string("chart.csv"), chart_csv(sheets, machine)),
         std::pair(std::string("chart.gp"), chart_script(sheets, machine))}) {
-    if (const auto written = write_text((folder / name).string(), text); !written) {
+    if (const auto written = write_text((folder / name).string(), text, Existing::replace);
+        !written) {
       complain(written.error().message);
       return exit_code::wrong_use;
     }
@@ -220,7 +221,7 @@ int chart(const ChartOptions& options) {
     scenes.push_back(*std::move(scene));
   }
   stay_on_one_core();
-  Progress progress;
+  ProgressLine progress;
   std::vector<ChartSheet> sheets;
   for (const ChartScene& scene : scenes) {
     auto sheet = make_sheet(scene, best_isa(), options.patience_s, [&](const std::string& text) {

@@ -60,7 +60,7 @@ std::array<double, 3> snr_of(const Waves& truth, const Waves& found, std::size_t
 // Keeps the first and the highest.
 class EnergyMeter {
  public:
-  void add(const Energy& energy) {
+  void add(const StoredEnergy& energy) {
     if (!has_begun_) {
       reading_.first = energy.total;
     }
@@ -110,7 +110,7 @@ class PartHands {
 
 // Adds one part's sound and energy to those of the others.
 void play_textbook(const Program& program, PartHands hands, Waves& waves,
-                   std::vector<Energy>& energy) {
+                   std::vector<StoredEnergy>& energy) {
   Textbook book(program);
   std::vector<double> x;
   std::vector<double> v;
@@ -126,7 +126,7 @@ void play_textbook(const Program& program, PartHands hands, Waves& waves,
     }
     std::vector<double> after = book.velocities();
     if (n > 0) {
-      const Energy more = energy_of(program, x, v, after);
+      const StoredEnergy more = energy_of(program, x, v, after);
       energy[n - 1].total += more.total;
       energy[n - 1].held += more.held;
     }
@@ -140,12 +140,12 @@ Truth published(const ChartScene& scene) {
   Truth truth{.waves = Waves(machine.channels, std::vector<double>(frames_of(heard_s))),
               .how = "long double"};
   truth.floor_db.fill(exact_db);
-  std::vector<Energy> energy(frames_of(energy_s));
+  std::vector<StoredEnergy> energy(frames_of(energy_s));
   for (const Program& program : machine.parts) {
     play_textbook(program, PartHands(scene, machine, program), truth.waves, energy);
   }
   EnergyMeter meter;
-  for (const Energy& one : energy) {
+  for (const StoredEnergy& one : energy) {
     meter.add(one);
   }
   truth.energy = meter.reading().highest;
@@ -282,7 +282,7 @@ std::optional<EnergyReading> watch_energy(const ChartScene& scene, MadeWay& way,
   for (std::size_t n = 0; n < frames_of(seconds); ++n) {
     way.player->play(1, nullptr);
     way.player->save(next_x, next_v);
-    Energy energy;
+    StoredEnergy energy;
     for (std::size_t i = 0; i < programs.size(); ++i) {
       if (x[i].size() != programs[i]->position.size()) {
         return std::nullopt;  // what is stepped is not what is written
@@ -291,7 +291,7 @@ std::optional<EnergyReading> watch_energy(const ChartScene& scene, MadeWay& way,
         v[i][node] *= times;
         next_v[i][node] *= times;
       }
-      const Energy more = energy_of(*programs[i], x[i], v[i], next_v[i]);
+      const StoredEnergy more = energy_of(*programs[i], x[i], v[i], next_v[i]);
       energy.total += more.total;
       energy.held += more.held;
     }

@@ -365,8 +365,9 @@ std::string overview_of(const std::vector<ChartSheet>& sheets, const std::string
       machine + ")\" noenhanced\n";
   std::vector<const ChartSheet*> all;
   const auto corner = [&](std::size_t i) {
+    const std::size_t row = i / columns;
     return std::pair(static_cast<double>(i % columns) * width,
-                     whole_height - head - static_cast<double>(i / columns) * height);
+                     whole_height - head - static_cast<double>(row) * height);
   };
   for (std::size_t i = 0; i < sheets.size(); ++i) {
     const auto [left, top] = corner(i);

@@ -1,0 +1,125 @@
+#include "app/say.h"
+
+#include <poll.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <chrono>
+#include <condition_variable>
+#include <deque>
+#include <mutex>
+#include <thread>
+#include <utility>
+
+#include "app/text.h"
+
+namespace ressort {
+namespace {
+
+constexpr std::size_t most_bytes = std::size_t{1} << 20;
+constexpr std::chrono::milliseconds patience{200};
+
+// Returns when all of it is written, or nothing can be any more.
+void write_all(int descriptor, const std::string& text) {
+  for (std::size_t at = 0; at < text.size();) {
+    const ssize_t count = write(descriptor, text.data() + at, text.size() - at);
+    if (count > 0) {
+      at += static_cast<std::size_t>(count);
+    } else if (count < 0 && errno == EAGAIN) {
+      pollfd ready{descriptor, POLLOUT, 0};
+      poll(&ready, 1, -1);
+    } else if (count == 0 || errno != EINTR) {
+      return;
+    }
+  }
+}
+
+// Its thread may wait for a reader for ever, so that it is never joined and this never ends.
+class Mouth {
+ public:
+  Mouth() {
+    std::thread([this] { run(); }).detach();
+  }
+
+  void put(int descriptor, const std::string& line) {
+    const std::lock_guard lock(mutex_);
+    if (is_silent_) {
+      return;
+    }
+    if (bytes_ + line.size() > most_bytes) {
+      ++left_out_;
+      return;
+    }
+    add(descriptor, line);
+  }
+
+  bool wait() {
+    std::unique_lock lock(mutex_);
+    return idle_.wait_for(lock, patience, [this] { return lines_.empty() || is_silent_; });
+  }
+
+  void fall_silent() {
+    const std::lock_guard lock(mutex_);
+    is_silent_ = true;
+    lines_.resize(std::min<std::size_t>(lines_.size(), 1));  // the first is being written
+    idle_.notify_all();
+  }
+
+ private:
+  void add(int descriptor, const std::string& line) {
+    bytes_ += line.size() + 1;
+    lines_.emplace_back(descriptor, line + "\n");
+    wake_.notify_one();
+  }
+
+  void run() {
+    std::unique_lock lock(mutex_);
+    while (true) {
+      wake_.wait(lock, [this] { return !lines_.empty(); });
+      const auto& [descriptor, text] = lines_.front();  // stays where it is as others are added
+      lock.unlock();
+      write_all(descriptor, text);
+      lock.lock();
+      bytes_ -= text.size();
+      const int last = descriptor;
+      lines_.pop_front();
+      if (const std::size_t count = std::exchange(left_out_, 0); count > 0 && !is_silent_) {
+        add(last, "(" + counted(count, "line was", "lines were") + " left out: nobody read them)");
+      }
+      if (lines_.empty()) {
+        idle_.notify_all();
+      }
+    }
+  }
+
+  std::mutex mutex_;
+  std::condition_variable wake_;
+  std::condition_variable idle_;
+  std::deque<std::pair<int, std::string>> lines_;
+  std::size_t bytes_ = 0;  // of them
+  std::size_t left_out_ = 0;
+  bool is_silent_ = false;
+};
+
+Mouth& mouth() {
+  static Mouth* const one = new Mouth;
+  return *one;
+}
+
+}  // namespace
+
+void say(const std::string& line) {
+  mouth().put(STDOUT_FILENO, line);
+}
+void complain(const std::string& line) {
+  mouth().put(STDERR_FILENO, line);
+}
+bool wait_until_said() {
+  return mouth().wait();
+}
+void fall_silent() {
+  mouth().fall_silent();
+}
+
+}  // namespace ressort
