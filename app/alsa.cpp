@@ -38,7 +38,6 @@ struct Alsa {
   std::vector<float> samples;  // [channel][frame]
   std::vector<float*> outputs;
   std::vector<std::byte> packed;  // [frame][channel] in the device's format
-  Meter<double> load;
   Flag stop;
   Flag lost;
   std::thread thread;
@@ -100,11 +99,8 @@ void Alsa::run() {
           start + static_cast<std::int64_t>(std::llround(period_ns * static_cast<double>(n)));
       sleep_until(due);
     }
-    const std::int64_t before = monotonic_ns();
     process.block(std::span<const float* const>(), std::span<float* const>(outputs), frames, {},
-                  before);
-    load.set(load.get() +
-             0.05 * (static_cast<double>(monotonic_ns() - before) / period_ns - load.get()));
+                  monotonic_ns());
     interleave();
     if (!write()) {
       lost.raise();
@@ -173,9 +169,9 @@ Result<AudioDevice> open_alsa(Process& process, const AudioOptions& options) {
     alsa->thread.join();
   };
   device.is_lost = [alsa] { return alsa->lost.is_raised(); };
-  device.cpu = [alsa] { return alsa->load.get(); };
   device.set_audio_inputs = [](int) {};
   device.tick = [] {};
+  device.wiring = [] { return Wiring{}; };
   return device;
 }
 

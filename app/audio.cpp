@@ -10,19 +10,19 @@ namespace ressort {
 
 Result<AudioDevice> open_audio(const std::string& wanted, Process& process,
                                const AudioOptions& options) {
-  if (wanted == "jack") {
-    return open_jack(process, options);
-  }
-  if (wanted == "alsa") {
-    return open_alsa(process, options);
-  }
-  if (wanted == "dummy") {
-    return open_dummy(process, options);
-  }
+  struct Kind {
+    const char* name;
+    Result<AudioDevice> (*open)(Process&, const AudioOptions&);
+  };
   std::string note;
-  for (auto* const open : {open_jack, open_alsa, open_dummy}) {
-    auto device = open(process, options);
+  for (const Kind& kind :
+       {Kind{"jack", open_jack}, Kind{"alsa", open_alsa}, Kind{"dummy", open_dummy}}) {
+    if (wanted != "auto" && wanted != kind.name) {
+      continue;
+    }
+    auto device = kind.open(process, options);
     if (device) {
+      device->kind = kind.name;
       device->note = std::move(note);
       return device;
     }

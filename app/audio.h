@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "app/process.h"
+#include "app/wiring.h"
 #include "core/result.h"
 
 namespace ressort {
@@ -18,32 +19,35 @@ struct AudioOptions {
   double rate_hz = 48000.0;        // a wish; JACK has its own
   int period_frames = 256;         // a wish; JACK has its own
   std::string device = "default";  // ALSA's
+  Wiring wiring;                   // of the device that was lost, to be made again
 };
 
 // A running backend. Closing it, or letting it go, ends its audio thread; the process may then be
 // used by another. All functions: [control].
 struct AudioDevice {
+  std::string kind;         // "jack", "alsa" or "dummy"
   std::string description;  // "JACK, 48000 Hz, 256 frames"
   double rate_hz = 48000.0;
   std::function<void()> close;
   std::function<bool()> is_lost;              // the server or the device is gone, or runs at
                                               //   another rate: close it and open it anew
-  std::function<double()> cpu;                // share of a period spent, 0..1
   std::function<void(int)> set_audio_inputs;  // the model wants so many
-  std::function<void()> tick;                 // about every second: connects what was plugged in
+  std::function<void()> tick;                 // often: connects what was plugged in
+  std::function<Wiring()> wiring;             // what to make again on the next device
   bool has_midi = false;                      // brings its own MIDI, with exact frames
   std::string note;                           // what was tried before it, and why it failed
 
   AudioDevice() = default;
   AudioDevice(AudioDevice&& other) noexcept { *this = std::move(other); }
   AudioDevice& operator=(AudioDevice&& other) noexcept {
+    std::swap(kind, other.kind);
     std::swap(description, other.description);
     std::swap(rate_hz, other.rate_hz);
     std::swap(close, other.close);
     std::swap(is_lost, other.is_lost);
-    std::swap(cpu, other.cpu);
     std::swap(set_audio_inputs, other.set_audio_inputs);
     std::swap(tick, other.tick);
+    std::swap(wiring, other.wiring);
     std::swap(has_midi, other.has_midi);
     std::swap(note, other.note);
     return *this;

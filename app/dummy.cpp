@@ -29,11 +29,8 @@ struct Dummy {
       const auto due =
           start + static_cast<std::int64_t>(std::llround(period_ns * static_cast<double>(n)));
       sleep_until(due);
-      const std::int64_t before = monotonic_ns();
       process.block(std::span<const float* const>(), std::span<float* const>(outputs), frames, {},
                     due);
-      load.set(load.get() +
-               0.05 * (static_cast<double>(monotonic_ns() - before) / period_ns - load.get()));
     }
   }
 
@@ -42,7 +39,6 @@ struct Dummy {
   std::size_t frames;
   std::vector<float> samples;
   std::vector<float*> outputs;
-  Meter<double> load;
   Flag stop;
   std::thread thread;
 };
@@ -62,9 +58,9 @@ Result<AudioDevice> open_dummy(Process& process, const AudioOptions& options) {
     dummy->thread.join();
   };
   device.is_lost = [] { return false; };
-  device.cpu = [dummy] { return dummy->load.get(); };
   device.set_audio_inputs = [](int) {};
   device.tick = [] {};
+  device.wiring = [] { return Wiring{}; };
   return device;
 }
 

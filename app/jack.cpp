@@ -13,7 +13,7 @@ namespace ressort {
 namespace {
 
 constexpr int most_audio_inputs = 16;
-constexpr std::size_t most_midi_packets = 2048;  // in one block
+constexpr std::size_t most_midi_packets = 4096;  // in one block: more than a port's buffer holds
 
 using Ports = std::unique_ptr<const char*, decltype(&jack_free)>;
 
@@ -30,6 +30,11 @@ struct Jack {
   std::int64_t clock_offset_ns = 0;                              // monotonic clock less JACK's
   double rate_hz = 48000.0;
   Flag lost;
+  Flag rewired;  // ports or connections have changed since the last look
+
+  // Used by the control thread only.
+  Wiring wiring;
+  std::int64_t next_try_ns = 0;  // to plug in what is missing
 
   // Used by the audio thread only.
   std::vector<float*> output_buffers;
@@ -52,8 +57,9 @@ int on_process(jack_nframes_t frames, void* self) {
     jack.input_buffers[inputs] = static_cast<const float*>(buffer(port));
   }
   void* const midi = buffer(jack.midi);
-  const std::size_t count =
-      std::min<std::size_t>(jack_midi_get_event_count(midi), jack.packets.size());
+  const std::size_t arrived = jack_midi_get_event_count(midi);
+  const std::size_t count = std::min(arrived, jack.packets.size());
+  jack.process.meters.dropped.add(arrived - count + jack_midi_get_lost_event_count(midi));
   for (std::size_t i = 0; i < count; ++i) {
     jack_midi_event_t event;
     jack_midi_event_get(&event, midi, static_cast<std::uint32_t>(i));
@@ -96,17 +102,37 @@ void on_shutdown(jack_status_t, const char*, void* self) {
   static_cast<Jack*>(self)->lost.raise();
 }
 
+void on_connect(jack_port_id_t, jack_port_id_t, int, void* self) {
+  static_cast<Jack*>(self)->rewired.raise();
+}
+
+void on_port(jack_port_id_t, int, void* self) {
+  static_cast<Jack*>(self)->rewired.raise();
+}
+
 void say_nothing(const char*) {}
 
-// Our outputs to the physical ones in their order, every physical MIDI source to us. What is
-// connected already stays.
+bool plug(Jack& jack, jack_port_t* ours, const char* theirs) {
+  const char* const name = jack_port_name(ours);
+  const bool is_output = (jack_port_flags(ours) & JackPortIsOutput) != 0;
+  return jack_connect(jack.client, is_output ? name : theirs, is_output ? theirs : name) == 0;
+}
+
+// The same for -j: not where a person has pulled it.
+void plug_anew(Jack& jack, jack_port_t* ours, const char* theirs) {
+  if (!jack.wiring.knows({jack_port_short_name(ours), theirs})) {
+    plug(jack, ours, theirs);
+  }
+}
+
+// Our outputs to the physical ones in their order, every physical MIDI source to us.
 void connect(Jack& jack) {
   const Ports speakers(jack_get_ports(jack.client, nullptr, JACK_DEFAULT_AUDIO_TYPE,
                                       JackPortIsPhysical | JackPortIsInput),
                        jack_free);
   for (std::size_t i = 0; speakers && i < jack.outputs.size() && speakers.get()[i] != nullptr;
        ++i) {
-    jack_connect(jack.client, jack_port_name(jack.outputs[i]), speakers.get()[i]);
+    plug_anew(jack, jack.outputs[i], speakers.get()[i]);
   }
 }
 
@@ -115,9 +141,7 @@ void connect_midi(Jack& jack) {
                                        JackPortIsPhysical | JackPortIsOutput),
                         jack_free);
   for (std::size_t i = 0; keyboards && keyboards.get()[i] != nullptr; ++i) {
-    if (jack_port_connected_to(jack.midi, keyboards.get()[i]) == 0) {
-      jack_connect(jack.client, keyboards.get()[i], jack_port_name(jack.midi));
-    }
+    plug_anew(jack, jack.midi, keyboards.get()[i]);
   }
 }
 
@@ -131,7 +155,7 @@ void connect_inputs(Jack& jack) {
       return;
     }
     if (jack_port_connected(port) == 0) {
-      jack_connect(jack.client, microphones.get()[i], jack_port_name(port));
+      plug_anew(jack, port, microphones.get()[i]);
     }
   }
 }
@@ -145,8 +169,52 @@ void set_audio_inputs(Jack& jack, int wanted) {
                                    JACK_DEFAULT_AUDIO_TYPE, JackPortIsInput, 0));
     }
   }
+  jack.rewired.raise();
+}
+
+std::vector<jack_port_t*> own_ports(const Jack& jack) {
+  std::vector<jack_port_t*> ports = jack.outputs;
+  ports.push_back(jack.midi);
+  for (std::size_t i = 0; i < jack.inputs.size() && jack.inputs[i].get() != nullptr; ++i) {
+    ports.push_back(jack.inputs[i].get());
+  }
+  return ports;
+}
+
+// Sees what is connected, and connects what was or is to be.
+void look_at_ports(Jack& jack) {
+  const std::vector<jack_port_t*> ports = own_ports(jack);
+  std::vector<Cable> present;
+  for (jack_port_t* const port : ports) {
+    const Ports others(jack_port_get_all_connections(jack.client, port), jack_free);
+    for (std::size_t i = 0; others && others.get()[i] != nullptr; ++i) {
+      present.push_back({jack_port_short_name(port), others.get()[i]});
+    }
+  }
+  const auto exists = [&](const std::string& port) {
+    return jack_port_by_name(jack.client, port.c_str()) != nullptr;
+  };
+  jack.wiring.look(present, exists);
+  for (const Cable& cable : jack.wiring.missing()) {
+    for (jack_port_t* const port : ports) {
+      if (jack_port_short_name(port) == cable.ours && exists(cable.theirs)) {
+        plug(jack, port, cable.theirs.c_str());
+      }
+    }
+  }
   if (jack.options.connect) {
+    connect_midi(jack);
     connect_inputs(jack);
+  }
+}
+
+void tick(Jack& jack) {
+  constexpr std::int64_t patience_ns = 1'000'000'000;
+  const std::int64_t now_ns = monotonic_ns();
+  const bool has_changed = jack.rewired.lower();
+  if (has_changed || jack.wiring.is_in_doubt() || now_ns >= jack.next_try_ns) {
+    jack.next_try_ns = now_ns + patience_ns;
+    look_at_ports(jack);
   }
 }
 
@@ -188,15 +256,18 @@ Result<AudioDevice> open_jack(Process& process, const AudioOptions& options) {
   jack_set_xrun_callback(jack->client, on_xrun, jack.get());
   jack_set_buffer_size_callback(jack->client, on_buffer_size, jack.get());
   jack_set_sample_rate_callback(jack->client, on_sample_rate, jack.get());
+  jack_set_port_connect_callback(jack->client, on_connect, jack.get());
+  jack_set_port_registration_callback(jack->client, on_port, jack.get());
   jack_on_info_shutdown(jack->client, on_shutdown, jack.get());
   if (!register_ports(*jack) || jack_activate(jack->client) != 0) {
     close();
     return Error{"the JACK server refused our ports; are there too many clients?"};
   }
+  jack->wiring = options.wiring;
   if (options.connect) {
     connect(*jack);
-    connect_midi(*jack);
   }
+  look_at_ports(*jack);
   AudioDevice device;
   device.rate_hz = jack->rate_hz;
   device.description = "JACK client '" + std::string(jack_get_client_name(jack->client)) + "', " +
@@ -205,18 +276,20 @@ Result<AudioDevice> open_jack(Process& process, const AudioOptions& options) {
   device.has_midi = true;
   device.close = close;
   device.is_lost = [jack] { return jack->lost.is_raised(); };
-  device.cpu = [jack] {
-    return jack->lost.is_raised() ? 0.0 : static_cast<double>(jack_cpu_load(jack->client)) / 100.0;
-  };
   device.set_audio_inputs = [jack](int wanted) {
     if (!jack->lost.is_raised()) {
       set_audio_inputs(*jack, wanted);
     }
   };
   device.tick = [jack] {
-    if (jack->options.connect && !jack->lost.is_raised()) {
-      connect_midi(*jack);
+    if (!jack->lost.is_raised()) {
+      tick(*jack);
     }
+  };
+  device.wiring = [jack] {
+    Wiring wiring = jack->wiring;
+    wiring.lose_all();
+    return wiring;
   };
   return device;
 }

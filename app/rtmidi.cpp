@@ -37,7 +37,8 @@ void MidiDoor::arrive(MidiReader& reader, std::span<const std::uint8_t> bytes,
                       std::int64_t time_ns) {
   const std::lock_guard lock(mutex_);
   reader.read(bytes, [&](const Event& event) {
-    process_.from_midi.push({event, TimedEvent::When::at_time, time_ns});
+    const TimedEvent timed{event, TimedEvent::When::at_time, time_ns};
+    process_.send(process_.from_midi, {&timed, 1});
   });
 }
 
