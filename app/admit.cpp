@@ -1,5 +1,7 @@
 #include "app/admit.h"
 
+#include <algorithm>
+
 #include "app/files.h"
 
 namespace ressort {
@@ -14,34 +16,52 @@ Finding at(const std::string& path, std::size_t most_bytes, const Error& error, 
 
 }  // namespace
 
-std::vector<Finding> narrowed_ranges(const Scene& scene, const Gate& gate) {
-  std::vector<Finding> findings;
-  for (const Error& narrowed : gate.narrowed) {
-    findings.push_back(at(scene.path, max_preset_bytes, narrowed, Severity::warning));
+bool Admission::is_granted() const {
+  return std::none_of(findings.begin(), findings.end(), [](const Finding& finding) {
+    return finding.diagnostic.severity == Severity::error;
+  });
+}
+
+Admission ask_to_play(const Scene& scene, const CompileOptions& options) {
+  Admission admission;
+  auto compiled = compile(scene.network, scene.preset, options);
+  if (!compiled) {
+    // What does not fit the preset was not read, so this is the model's.
+    admission.findings.push_back(
+        at(scene.model_path, max_model_bytes, compiled.error(), Severity::error));
+    return admission;
   }
-  return findings;
+  const Gate& gate = compiled->gate;
+  if (gate.complaint) {
+    const bool is_refused = gate.verdict == Verdict::unstable && !options.force;
+    Error complaint = *gate.complaint;
+    complaint.message +=
+        is_refused ? "; --force plays it all the same, fading out what runs away" : "";
+    admission.findings.push_back(at(scene.model_path, max_model_bytes, complaint,
+                                    is_refused ? Severity::error : Severity::warning));
+  }
+  for (const Error& narrowed : gate.narrowed) {
+    admission.findings.push_back(at(scene.path, max_preset_bytes, narrowed, Severity::warning));
+  }
+  admission.compiled = *std::move(compiled);
+  return admission;
 }
 
 Result<Compiled> admit(const Scene& scene, const CompileOptions& options,
                        std::vector<std::string>& warnings) {
-  auto compiled = compile(scene.network, scene.preset, options);
-  if (!compiled) {
-    return Error{to_string(at(scene.path, max_preset_bytes, compiled.error(), Severity::error))};
+  Admission admission = ask_to_play(scene, options);
+  std::string errors;
+  for (const Finding& finding : admission.findings) {
+    if (finding.diagnostic.severity == Severity::error) {
+      errors += (errors.empty() ? "" : "\n") + to_string(finding);
+    } else {
+      warnings.push_back(to_string(finding));
+    }
   }
-  const Gate& gate = compiled->gate;
-  if (gate.verdict == Verdict::unstable && !options.force) {
-    Error error = *gate.complaint;
-    error.message += "; --force plays it all the same, fading out what runs away";
-    return Error{to_string(at(scene.model_path, max_model_bytes, error, Severity::error))};
+  if (!errors.empty()) {
+    return Error{std::move(errors)};
   }
-  if (gate.complaint) {
-    warnings.push_back(
-        to_string(at(scene.model_path, max_model_bytes, *gate.complaint, Severity::warning)));
-  }
-  for (const Finding& finding : narrowed_ranges(scene, gate)) {
-    warnings.push_back(to_string(finding));
-  }
-  return compiled;
+  return *std::move(admission.compiled);
 }
 
 }  // namespace ressort

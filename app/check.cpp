@@ -10,8 +10,11 @@
 #include "app/admit.h"
 #include "app/exit_code.h"
 #include "app/files.h"
+#include "app/load_news.h"
 #include "app/loader.h"
+#include "app/memory.h"
 #include "app/text.h"
+#include "app/timing.h"
 #include "core/analysis/stability.h"
 #include "core/compile/compile.h"
 #include "core/model/print.h"
@@ -49,11 +52,12 @@ json findings_json(const std::vector<Finding>& findings) {
 struct Proved {
   Certificate certificate;  // everywhere in the preset's ranges, or at the model's own values
   double stiffness_factor = 0.0;
+  bool is_exact = true;     // else by a bound
   bool others_move = true;  // the limits below hold wherever the others are turned to
   std::vector<std::optional<SafeRange>> safe;  // [parameter]
 };
 
-Proved prove(const Scene& scene, const Compiled& compiled) {
+Proved prove(const Scene& scene, const Compiled& compiled, const Progress& progress) {
   const Instrument& instrument = compiled.instrument;
   const ParameterBox box = preset_box(instrument.parameters, scene.preset);
   ParameterBox as_written;
@@ -65,10 +69,13 @@ Proved prove(const Scene& scene, const Compiled& compiled) {
   Stability stability(all_plain(compiled.schemes)
                           ? scene.network
                           : always_felt(expand_macros(scene.network), compiled.schemes),
-                      1.0);
+                      1.0, Stability::most_exact_masses, progress);
+  progress.stage("proving that it is stable in all ranges");
   Proved proved{.certificate = stability.certify(box),
                 .stiffness_factor = stability.stiffness_factor(box)};
   proved.others_move = proved.certificate.verdict == Verdict::stable;
+  proved.is_exact = stability.is_exact();
+  progress.stage("finding the limits of its parameters");
   for (std::size_t i = 0; i < instrument.parameters.size(); ++i) {
     proved.safe.push_back(stability.safe_range(proved.others_move ? box : as_written, i,
                                                instrument.parameters[i].value));
@@ -141,10 +148,12 @@ json scene_json(const Scene& scene, const Compiled& compiled, const Proved& prov
                     {"predicted_ns", part.predicted_ns},
                     {"reason", part.reason}});
   }
-  const bool is_velocity = scene.network.third == ThirdArgument::velocity_per_second;
+  const char* const motion = !scene.third                                         ? "either"
+                             : *scene.third == ThirdArgument::velocity_per_second ? "velocity"
+                                                                                  : "delayed";
   json out{{"file", scene.path},
            {"model", scene.model_path},
-           {"motion", is_velocity ? "velocity" : "delayed"},
+           {"motion", motion},
            {"motion_reason", scene.motion},
            {"masses", instrument.masses},
            {"links", instrument.links},
@@ -172,15 +181,25 @@ void warn(const Proved& proved, const Scene& scene, std::vector<Finding>& findin
   findings.push_back(std::move(finding));
 }
 
-std::string too_large(const Instrument& instrument) {
-  constexpr std::size_t most = Stability::most_exact_masses;
-  return instrument.masses <= most
-             ? ""
-             : "; above " + std::to_string(most) + " masses by a bound, which may be too careful";
+// That there is not enough time for all of its voices.
+void warn(const Scene& scene, const Compiled& compiled, std::vector<Finding>& findings) {
+  const CompileOptions options;
+  const std::string text =
+      too_much(compiled.plan, compiled.instrument.voices, options.rate_hz, options.precision);
+  if (!text.empty()) {
+    Finding finding = finding_of(scene.path, "", Error{text});
+    finding.diagnostic.severity = Severity::warning;
+    findings.push_back(std::move(finding));
+  }
+}
+
+std::string by_bound(const Proved& proved) {
+  return proved.is_exact ? ""
+                         : "; so large a network is judged by a bound, which may be too careful";
 }
 
 // The report's last line.
-std::string conclusion(const Scene& scene, const Instrument& instrument, const Proved& proved) {
+std::string conclusion(const Scene& scene, const Proved& proved) {
   const bool has_ranges = !scene.preset.parameters.empty();
   switch (proved.certificate.verdict) {
     case Verdict::stable:
@@ -191,7 +210,7 @@ std::string conclusion(const Scene& scene, const Instrument& instrument, const P
                    "for one of them while the others stay where they start"
                  : "not stable; the limits above are for one parameter while the others stay";
     case Verdict::unproved:
-      return "not proved stable" + too_large(instrument);
+      return "not proved stable" + by_bound(proved);
   }
   std::string text = has_ranges ? "stable, wherever the parameters are turned to" : "stable";
   const auto& parameters = scene.network.parameters;
@@ -203,7 +222,7 @@ std::string conclusion(const Scene& scene, const Instrument& instrument, const P
   if (std::isfinite(proved.stiffness_factor)) {
     text += ": every stiffness may grow " + print_limit(proved.stiffness_factor, true) + " times";
   }
-  return text + too_large(instrument);
+  return text + by_bound(proved);
 }
 
 void print_report(const Scene& scene, const Compiled& compiled, const Proved& proved) {
@@ -232,38 +251,42 @@ void print_report(const Scene& scene, const Compiled& compiled, const Proved& pr
         "octaves\n",
         instrument.mode->frequency_hz, instrument.highest_frequency_hz);
   }
-  if (instrument.masses > most_tuned_masses) {
-    std::printf("keys do not set the pitch: above %zu masses the lowest mode is not looked for\n",
-                most_tuned_masses);
-  }
-  std::printf("%s\n", conclusion(scene, instrument, proved).c_str());
+  std::printf("%s\n", conclusion(scene, proved).c_str());
 }
 
 }  // namespace
 
 int check(const CheckOptions& options) {
-  Reading reading = read_scene(options.name, {.third = options.third});
-  std::optional<Compiled> compiled;
+  LoadNews news(options.name,
+                [](const std::string& text) { std::fprintf(stderr, "%s\n", text.c_str()); });
+  const Progress progress([&](std::string_view stage) {
+    news.at(stage);
+    return true;  // Ctrl-C ends it at once
+  });
+  Reading reading = read_scene(options.name, {.third = options.third, .progress = progress});
+  Admission admission;
   if (reading.scene) {
-    auto made = compile(reading.scene->network, reading.scene->preset,
-                        {.method = options.method, .budget = options.budget});
-    if (made) {
-      compiled = *std::move(made);
-    } else {
-      reading.findings.push_back(finding_of(reading.scene->path, "", made.error()));
-    }
+    admission = ask_to_play(*reading.scene, {.method = options.method,
+                                             .budget = options.budget,
+                                             .progress = progress,
+                                             .most_bytes = free_memory_bytes()});
   }
+  const std::optional<Compiled>& compiled = admission.compiled;
+  const bool is_ok = compiled && admission.is_granted();
   std::optional<Proved> proved;
   if (compiled && options.as != CheckAs::model) {
-    proved = prove(*reading.scene, *compiled);
-    warn(*proved, *reading.scene, reading.findings);
-    for (Finding& narrowed : narrowed_ranges(*reading.scene, compiled->gate)) {
-      reading.findings.push_back(std::move(narrowed));
+    proved = prove(*reading.scene, *compiled, progress);
+    if (!compiled->gate.complaint) {
+      warn(*proved, *reading.scene, reading.findings);
     }
+    warn(*reading.scene, *compiled, reading.findings);
+  }
+  for (Finding& finding : admission.findings) {
+    reading.findings.push_back(std::move(finding));
   }
   if (options.as == CheckAs::json) {
     json out = compiled ? scene_json(*reading.scene, *compiled, *proved) : json::object();
-    out["ok"] = compiled.has_value();
+    out["ok"] = is_ok;
     out["findings"] = findings_json(reading.findings);
     // Names may be in any encoding; what is no UTF-8 is replaced.
     std::printf("%s\n", out.dump(2, ' ', false, json::error_handler_t::replace).c_str());
@@ -273,13 +296,14 @@ int check(const CheckOptions& options) {
   if (!compiled) {
     return exit_code::wrong_use;
   }
+  // What may not sound is shown all the same: whoever mends it wants to see it.
   if (options.as == CheckAs::report) {
     print_report(*reading.scene, *compiled, *proved);
   } else if (options.as == CheckAs::model) {
     const std::string text = print_network(reading.scene->network);
     std::fwrite(text.data(), 1, text.size(), stdout);
   }
-  return exit_code::done;
+  return is_ok ? exit_code::done : exit_code::wrong_use;
 }
 
 }  // namespace ressort

@@ -1,15 +1,24 @@
 #include "app/commands.h"
 
+#include <poll.h>
 #include <signal.h>
 #include <unistd.h>
 
 #include <chrono>
 #include <cmath>
+#include <condition_variable>
 #include <cstdio>
+#include <cstdlib>
+#include <future>
 #include <mutex>
+#include <optional>
 #include <thread>
+#include <utility>
+#include <vector>
 
+#include "app/load_news.h"
 #include "app/midi_input.h"
+#include "app/say.h"
 #include "app/terminal.h"
 #include "app/text.h"
 
@@ -18,7 +27,7 @@ namespace {
 
 using namespace std::chrono_literals;
 
-Flag interrupted;  // by Ctrl-C, while rendering
+Flag interrupted;  // by a signal, while rendering
 
 std::string db(double factor) {
   if (factor <= 0.0) {
@@ -30,15 +39,21 @@ std::string db(double factor) {
   return text;
 }
 
-void complain(const std::string& text) {
-  std::fprintf(stderr, "%s\n", text.c_str());
+// What ends the program. nohup's promise is kept.
+std::vector<int> ending_signals() {
+  std::vector<int> signals = {SIGINT, SIGTERM};
+  struct sigaction now {};
+  if (sigaction(SIGHUP, nullptr, &now) == 0 && now.sa_handler != SIG_IGN) {
+    signals.push_back(SIGHUP);
+  }
+  return signals;
 }
 
 // Signals are waited for, not handled: every thread inherits this, so that they reach main alone.
 sigset_t block_signals() {
   sigset_t signals;
   sigemptyset(&signals);
-  for (const int signal : {SIGINT, SIGTERM, SIGHUP}) {
+  for (const int signal : ending_signals()) {
     sigaddset(&signals, signal);
   }
   pthread_sigmask(SIG_BLOCK, &signals, nullptr);
@@ -54,8 +69,7 @@ class Voice {
     if (terminal_ != nullptr) {
       terminal_->say(text);
     } else {
-      std::printf("%s\n", text.c_str());
-      std::fflush(stdout);
+      ressort::say(text);
     }
   }
   void set_terminal(Terminal* terminal) {
@@ -68,13 +82,52 @@ class Voice {
   Terminal* terminal_ = nullptr;
 };
 
+// Ends the program where ending takes longer than anybody waits: a library is at work, or what it
+// has freed is large.
+class LastResort {
+ public:
+  LastResort()
+      : thread_([this] {
+          std::unique_lock lock(mutex_);
+          if (!over_.wait_for(lock, 900ms, [this] { return is_over_; })) {
+            std::_Exit(exit_code::done);
+          }
+        }) {}
+  ~LastResort() {
+    {
+      const std::lock_guard lock(mutex_);
+      is_over_ = true;
+    }
+    over_.notify_all();
+    thread_.join();
+  }
+
+ private:
+  std::mutex mutex_;
+  std::condition_variable over_;
+  bool is_over_ = false;
+  std::thread thread_;
+};
+
 // Everything that runs while the program plays, in the order in which it has to end.
 class Player {
  public:
   explicit Player(const PlayOptions& options) : options_(options), signals_(block_signals()) {}
 
   int run() {
-    const auto scene = load_scene(options_.name, {.third = options_.third});
+    if (const auto allowed = allowed_senders(options_.osc); options_.osc.port != 0 && !allowed) {
+      complain(allowed.error().message);
+      return exit_code::wrong_use;
+    }
+    LoadNews news(options_.name, [this](const std::string& text) { voice_.say(text); });
+    const Progress progress([&](std::string_view stage) {
+      news.at(stage);
+      return !is_called_off(0ms);
+    });
+    const auto scene = load_scene(options_.name, {.third = options_.third, .progress = progress});
+    if (is_called_off(0ms)) {
+      return exit_code::done;
+    }
     if (!scene) {
       complain(scene.error().message);
       return exit_code::wrong_use;
@@ -95,20 +148,29 @@ class Player {
                                                  .third = options_.third},
                                   [this](const std::string& news) { voice_.say(news); });
     connect_session();
-    const auto loaded = session_->load_and_wait(options_.name, options_.force);
+    std::promise<Result<std::shared_ptr<const Loaded>>> promise;
+    auto answer = promise.get_future();
+    session_->load(
+        options_.name, [&](const auto& result) { promise.set_value(result); }, options_.force);
+    wait_for(answer);
+    const auto loaded = answer.get();
+    if (has_called_off_) {
+      return exit_code::done;
+    }
     if (!loaded) {
       complain(loaded.error().message);
       return exit_code::wrong_use;
     }
     greet(**loaded);
-    if (const int failure = open_osc(); failure != exit_code::done) {
-      return failure;
-    }
+    open_osc();
     open_midi();
     return converse();
   }
 
   ~Player() {
+    if (session_) {
+      session_->end();  // a command may be waiting for a load
+    }
     voice_.set_terminal(nullptr);
     terminal_.reset();
     console_.reset();
@@ -134,10 +196,7 @@ class Player {
   }
 
   void connect_session() {
-    session_->set_backend(device_.description, [this] {
-      const std::lock_guard lock(device_mutex_);
-      return device_.cpu ? device_.cpu() : 0.0;
-    });
+    session_->set_backend(device_.description, true);
     session_->on_audio_inputs([this](int wanted) {
       const std::lock_guard lock(device_mutex_);
       audio_inputs_ = wanted;
@@ -163,24 +222,20 @@ class Player {
     }
   }
 
-  // Only a port that was asked for has to be had.
-  int open_osc() {
-    if (options_.osc_port == 0) {
-      return exit_code::done;
+  // The sound is worth more than a port.
+  void open_osc() {
+    if (options_.osc.port == 0) {
+      return;
     }
-    auto osc =
-        OscServer::open({options_.osc_bind, options_.osc_port.value_or(9777)}, process_, *session_);
-    if (osc) {
-      osc_ = *std::move(osc);
-      voice_.say("OSC on " + options_.osc_bind + " port " + std::to_string(osc_->port()));
-      return exit_code::done;
+    auto osc = OscServer::open(options_.osc, process_, *session_,
+                               [this](const std::string& news) { voice_.say(news); });
+    if (!osc) {
+      voice_.say("playing without OSC: " + osc.error().message);
+      return;
     }
-    complain(osc.error().message);
-    if (options_.osc_port) {
-      return exit_code::our_failure;
-    }
-    complain("going on without OSC");
-    return exit_code::done;
+    osc_ = *std::move(osc);
+    voice_.say("OSC on " + options_.osc.bind_address + " port " + std::to_string(osc_->port()) +
+               ", " + osc_->access());
   }
 
   void open_midi() {
@@ -200,12 +255,17 @@ class Player {
   }
 
   int converse() {
-    console_ = std::make_unique<Console>(process_, *session_, [](const std::string& text) {
-      std::printf("%s\n", text.c_str());
-      std::fflush(stdout);
-    });
+    console_ = std::make_unique<Console>(process_, *session_, say,
+                                         [this](const std::string& news) { voice_.say(news); });
     if (!options_.script.empty()) {
-      if (auto ran = console_->run_script(options_.script); !ran) {
+      auto script =
+          std::async(std::launch::async, [this] { return console_->run_script(options_.script); });
+      wait_for(script);
+      const auto ran = script.get();
+      if (has_called_off_) {
+        return exit_code::done;
+      }
+      if (!ran) {
         complain(ran.error().message);
         return exit_code::wrong_use;
       }
@@ -223,11 +283,31 @@ class Player {
     return wait();
   }
 
+  // Whether a signal has come, or comes within so long.
+  bool is_called_off(std::chrono::milliseconds patience) {
+    const timespec time{0, std::chrono::nanoseconds(patience).count()};
+    if (!has_called_off_ && sigtimedwait(&signals_, nullptr, &time) > 0) {
+      has_called_off_ = true;
+      last_resort_.emplace();
+    }
+    return has_called_off_;
+  }
+
+  // For what another thread does, or for a signal: that ends the session, and so what is loaded.
+  template <class Future>
+  void wait_for(const Future& future) {
+    while (future.wait_for(0ms) != std::future_status::ready) {
+      if (is_called_off(20ms)) {
+        session_->end();
+        future.wait();
+      }
+    }
+  }
+
   int wait() {
     auto next_tick = std::chrono::steady_clock::now();
     while (!quit_.is_raised()) {
-      const timespec patience{0, 50'000'000};
-      if (sigtimedwait(&signals_, nullptr, &patience) > 0) {
+      if (is_called_off(50ms)) {
         return exit_code::done;
       }
       if (device_.is_lost()) {
@@ -239,9 +319,9 @@ class Player {
           return exit_code::done;
         }
       }
+      device_.tick();
       if (std::chrono::steady_clock::now() >= next_tick) {
         next_tick += 1s;
-        device_.tick();
         if (midi_) {
           midi_->tick();
         }
@@ -252,18 +332,19 @@ class Player {
 
   // Waits for the same backend to come back; false if the user loses patience first.
   bool regain() {
+    const std::string kind = device_.kind;
+    options_.device.wiring = device_.wiring();
+    session_->set_backend("none; waiting for " + device_.description, false);
     {
       const std::lock_guard lock(device_mutex_);
       device_ = AudioDevice();
     }
     voice_.say("waiting for it to come back; 'quit' or Ctrl-C ends that");
     while (!quit_.is_raised()) {
-      const timespec patience{0, 200'000'000};
-      if (sigtimedwait(&signals_, nullptr, &patience) > 0) {
+      if (is_called_off(200ms)) {
         return false;
       }
-      auto device = open_audio(options_.audio == "auto" ? last_kind() : options_.audio, process_,
-                               options_.device);
+      auto device = open_audio(kind, process_, options_.device);
       if (!device) {
         continue;
       }
@@ -272,10 +353,7 @@ class Player {
         device_ = *std::move(device);
         device_.set_audio_inputs(audio_inputs_);
       }
-      session_->set_backend(device_.description, [this] {
-        const std::lock_guard lock(device_mutex_);
-        return device_.cpu ? device_.cpu() : 0.0;
-      });
+      session_->set_backend(device_.description, true);
       session_->set_rate(device_.rate_hz);
       voice_.say("playing again on " + device_.description);
       return true;
@@ -283,19 +361,18 @@ class Player {
     return false;
   }
 
-  std::string last_kind() const {
-    return session_->status().backend.starts_with("JACK") ? "jack" : "alsa";
-  }
-
   // So that leaving does not click.
   void fade_out() {
-    process_.from_console.push({Event{.kind = EventKind::panic}});
+    const TimedEvent panic{Event{.kind = EventKind::panic}};
+    process_.send(process_.from_console, {&panic, 1});
     std::this_thread::sleep_for(50ms);
   }
 
   PlayOptions options_;
   sigset_t signals_;
-  Process process_{48000.0};
+  bool has_called_off_ = false;            // by a signal
+  std::optional<LastResort> last_resort_;  // from then on; it goes last
+  Process process_{48000.0, true, monotonic_ns};
   Voice voice_;
   Flag quit_;
   MidiDoor door_{process_};
@@ -312,26 +389,73 @@ class Player {
 }  // namespace
 
 int play(const PlayOptions& options) {
-  return Player(options).run();
+  const int code = Player(options).run();
+  static_cast<void>(wait_until_said());
+  return code;
 }
 
+namespace {
+
+// From now on a signal ends the render where it is, and a second one the program.
+void watch_signals() {
+  struct sigaction once {};
+  once.sa_handler = [](int) { interrupted.raise(); };
+  once.sa_flags = static_cast<int>(SA_RESETHAND);
+  for (const int signal : ending_signals()) {
+    sigaction(signal, &once, nullptr);
+  }
+}
+
+void ignore_signals_no_more() {
+  for (const int signal : ending_signals()) {
+    ::signal(signal, SIG_DFL);
+  }
+}
+
+// How far it is, where somebody looks and the terminal takes it.
+void show_progress(const std::string& output, int percent) {
+  pollfd ready{STDERR_FILENO, POLLOUT, 0};
+  if (poll(&ready, 1, 0) > 0) {
+    std::fprintf(stderr, "\r%s: %3d %%", output.c_str(), percent);
+  }
+}
+
+}  // namespace
+
 int render_command(const RenderOptions& options, bool is_quiet) {
-  signal(SIGINT, [](int) { interrupted.raise(); });
   const bool shows = !is_quiet && isatty(STDERR_FILENO) != 0;
   int shown = -1;
-  const auto rendered = render(options, [&](double share) {
+  RenderOptions watched = options;
+  LoadNews news(options.name, is_quiet ? LoadNews::Tell() : complain);
+  watched.loading = Progress([&](std::string_view stage) {
+    news.at(stage);
+    return true;  // a signal ends it at once
+  });
+  bool is_watched = false;
+  const auto rendered = render(watched, [&](double share) {
+    if (!std::exchange(is_watched, true)) {
+      watch_signals();
+    }
     if (const int percent = static_cast<int>(100.0 * share); shows && percent != shown) {
       shown = percent;
-      std::fprintf(stderr, "\r%s: %3d %%", options.output.c_str(), percent);
+      show_progress(options.output, percent);
     }
     return !interrupted.is_raised();
   });
+  ignore_signals_no_more();
   if (shows && shown >= 0) {
     std::fprintf(stderr, "\r\033[K");
   }
+  const auto complain = [](const std::string& text) { std::fprintf(stderr, "%s\n", text.c_str()); };
   if (!rendered) {
-    complain(rendered.error().message);
-    return exit_code::wrong_use;
+    const bool was_stopped = interrupted.is_raised();
+    complain(was_stopped ? options.name + ": interrupted before the first sample"
+                         : rendered.error().message);
+    return was_stopped ? exit_code::our_failure : exit_code::wrong_use;
+  }
+  if (rendered->failure) {
+    complain(rendered->failure->message);
+    return exit_code::our_failure;
   }
   if (!is_quiet) {
     for (const std::string& warning : rendered->warnings) {

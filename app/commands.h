@@ -27,8 +27,7 @@ struct PlayOptions {
   bool force = false;                  // play the first model even if it is not stable
   bool no_console = false;
   std::string script;
-  std::optional<int> osc_port;  // 0: none; without: 9777, or none if that is taken
-  std::string osc_bind = "127.0.0.1";
+  OscOptions osc;  // port 0: none
   bool exit_on_loss = false;
 };
 

@@ -6,6 +6,7 @@
 #include "app/calls.h"
 #include "app/desk.h"
 #include "app/files.h"
+#include "app/sound_file.h"
 #include "app/text.h"
 #include "core/model/expression.h"
 #include "core/model/preset.h"
@@ -82,8 +83,10 @@ constexpr CommandRow command_rows[] = {
      "The peak and the limiter's deepest cut are those since the last status.", act::status},
     {"Looking", "explain", "", "tells how the model is computed and what plays it", "",
      act::explain},
-    {"Other", "rec", "FILE|stop", "records what is heard to a WAV file, or ends that",
-     "The file has 24 bits a sample and the rate of the audio. A file of that name is replaced.",
+    {"Other", "rec", "FILE|stop [--force]", "records what is heard to a file, or ends that",
+     "The file's ending says what it is: .wav, .w64, .flac, .ogg, .aiff, .au or .caf; 24 bits a\n"
+     "sample, and the rate of the audio. Over a sound file that is there it is written by --force\n"
+     "only.",
      act::record},
     {"Other", "help", "[COMMAND]", "tells more", "", help},
     {"Other", "quit", "", "ends the program", "", act::quit},
@@ -249,8 +252,9 @@ Result<Command> parse_command(std::string_view line) {
   return Command{std::string(row.name), std::move(words)};
 }
 
-Console::Console(Process& process, Session& session, Print print)
-    : desk_(new Desk{process, session, std::move(print), Recorder(process), {}, false}) {}
+Console::Console(Process& process, Session& session, Print print, Print tell)
+    : desk_(new Desk{
+          process, session, std::move(print), Recorder(process, std::move(tell)), {}, false}) {}
 
 Console::~Console() = default;
 
@@ -319,7 +323,6 @@ std::vector<std::string> Console::completions(std::string_view line) const {
     kind = before.size() <= wanted.size() ? wanted[before.size() - 1] : "";
   }
   constexpr std::string_view scene_endings[] = {".mdl", ".toml"};
-  constexpr std::string_view sound_endings[] = {".wav"};
   std::vector<std::string> words;
   const auto add = [&](std::vector<std::string> more) {
     words.insert(words.end(), more.begin(), more.end());
@@ -338,7 +341,7 @@ std::vector<std::string> Console::completions(std::string_view line) const {
     add(files(typed, scene_endings));
   } else if (kind == "FILE|stop") {
     words.emplace_back("stop");
-    add(files(typed, sound_endings));
+    add(files(typed, sound_endings()));
   }
   std::erase_if(words, [&](const std::string& word) { return !word.starts_with(typed); });
   std::sort(words.begin(), words.end());

@@ -52,7 +52,7 @@ using Keyboard = std::function<void(const std::function<bool(char key)>& on_key)
 class Console {
  public:
   using Print = std::function<void(const std::string&)>;
-  Console(Process& process, Session& session, Print print);
+  Console(Process& process, Session& session, Print print, Print tell);
   ~Console();
 
   // False: the command was to quit. [console thread]

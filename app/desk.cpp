@@ -46,10 +46,9 @@ Result<std::vector<Event>> play(Desk& desk, const Call& call) {
   }
   std::vector<TimedEvent> timed;
   for (const Event& event : *events) {
-    const auto following = static_cast<std::uint16_t>(events->size() - 1 - timed.size());
-    timed.push_back({.event = event, .following = following});
+    timed.push_back({.event = event});
   }
-  if (!desk.process.from_console.push_all(timed)) {
+  if (!desk.process.send(desk.process.from_console, timed)) {
     return Error{"the audio thread is busy and took nothing; try again"};
   }
   desk.session.remember(timed);
@@ -213,8 +212,7 @@ std::string description_of(const std::string& preset_name) {
   if (!text) {
     return "";
   }
-  const auto preset = parse_preset(*text);
-  return preset ? preset->description : "";
+  return parse_preset(*text).preset.description;
 }
 
 }  // namespace
@@ -350,17 +348,22 @@ Result<Done> act::status(Desk& desk, Words) {
       {"audio", now.backend.empty() ? "no backend" : now.backend},
       {"rate", print_number(now.rate_hz) + " Hz, " + std::to_string(now.period_frames) +
                    " frames a period"},
-      {"cpu", now.cpu < 0.0 ? "not known" : fixed(100.0 * now.cpu, 1) + " % of the time there is"},
+      {"cpu", now.cpu < 0.0 ? "nothing runs"
+                            : fixed(100.0 * now.cpu, 1) + " % of the time there is, at most " +
+                                  fixed(100.0 * now.cpu_peak, 1) + " since the last status"},
       {"voices", std::to_string(now.voices) + " of " + std::to_string(now.max_voices) + ", " +
-                     std::to_string(now.stolen) + " stolen"},
+                     std::to_string(now.stolen) + " stolen, " + std::to_string(now.shed) +
+                     " shed for want of time"},
       {"asleep", fixed(100.0 * now.saved, 0) + " % of what all voices would take"},
       {"energy", describe_energy(now)},
       {"output", peak(now.peak_db) + " since the last status, " + limiter},
-      {"xruns", std::to_string(now.xruns)},
+      {"xruns", std::to_string(now.xruns) + "; " + counted(now.overruns, "period", "periods") +
+                    " took too long to compute"},
       {"resets", std::to_string(now.resets) + " voices that became unstable"},
       {"limits", std::to_string(now.beyond) + " times a parameter was kept where it is stable"},
       {"events", std::to_string(now.late) + " late, " + std::to_string(now.dropped) + " dropped, " +
-                     std::to_string(now.malformed) + " malformed"},
+                     std::to_string(now.malformed) + " malformed, " +
+                     std::to_string(now.strangers) + " ignored"},
   };
   if (now.modes > 0) {
     const double saved =
@@ -444,7 +447,8 @@ Result<Done> act::record(Desk& desk, Words words) {
     desk.print(*told);
     return Done{};
   }
-  if (auto started = desk.recorder.start(words[0]); !started) {
+  const Existing existing = words.size() > 1 ? Existing::replace : Existing::refuse;
+  if (auto started = desk.recorder.start(words[0], existing); !started) {
     return started.error();
   }
   desk.print("recording to " + words[0] + "; 'rec stop' ends it");

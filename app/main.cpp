@@ -1,8 +1,14 @@
 // app: the command line, turned into one of the commands.
+#include <fcntl.h>
+#include <signal.h>
+#include <unistd.h>
+
 #include <CLI/CLI.hpp>
 #include <algorithm>
+#include <cstdio>
 #include <iterator>
 #include <map>
+#include <new>
 #include <string>
 #include <utility>
 #include <vector>
@@ -23,6 +29,7 @@ const char* const play_examples =
     "  ressort play                              the triangle, on JACK, else ALSA, else silent\n"
     "  ressort play PolyTriangle -j              connected to the speakers and every keyboard\n"
     "  ressort play my.mdl -a alsa -d hw:1       a model of your own on one sound card\n"
+    "  ressort play -B 0.0.0.0 --osc-allow 192.168.1.23   played by OSC from a tablet, say\n"
     "  oscsend localhost 9777 /note/on ii 69 100 a note by OSC, from another terminal\n";
 
 const char* const render_examples =
@@ -184,6 +191,10 @@ void add_force(CLI::App& command, bool& force) {
                    "play a model that is not stable all the same; what runs away fades out");
 }
 
+void add_overwrite(CLI::App& command, bool& force) {
+  command.add_flag("--force", force, "write over a file that is there");
+}
+
 // What the last argument of a mass means, for every command that reads a model.
 void add_motion(CLI::App& command, std::optional<ThirdArgument>& third) {
   command
@@ -247,12 +258,14 @@ void add_play(CLI::App& app, PlayOptions& options, int& code) {
         if (text != "off" && (!parse_number(text, port) || port < 1.0 || port > 65535.0)) {
           throw CLI::ValidationError("--osc-port", "must be 1 to 65535, or off");
         }
-        options.osc_port = static_cast<int>(port);
+        options.osc.port = static_cast<int>(port);
       },
       "the UDP port for OSC, or off (9777)");
-  command->add_option("-B,--osc-bind", options.osc_bind, "the address that OSC listens at")
-      ->check(CLI::ValidIPV4)
+  command->add_option("-B,--osc-bind", options.osc.bind_address, "the address that OSC listens at")
       ->capture_default_str();
+  command->add_option("--osc-allow", options.osc.allow,
+                      "who may send OSC from elsewhere: addresses or networks, divided by commas,\n"
+                      "192.168.1.23,10.0.0.0/24; needed with any -B but this machine's");
   command->add_flag("--exit-on-loss", options.exit_on_loss,
                     "end with 75 when the audio server dies, instead of waiting for it");
   command->callback([&options, &code] { code = play(options); });
@@ -268,10 +281,17 @@ struct RenderChoice {
 
 void add_render(CLI::App& app, RenderChoice& choice, int& code) {
   RenderOptions& options = choice.options;
-  CLI::App* command = app.add_subcommand("render", "renders a model or a preset to a WAV file");
+  CLI::App* command = app.add_subcommand("render", "renders a model or a preset to a sound file");
   command->footer(render_examples);
   command->add_option("MODEL", options.name, "a preset's or a model's name, or a file")->required();
-  command->add_option("-o,--output", options.output, "the WAV file")->required();
+  std::string endings;
+  for (const std::string_view ending : sound_endings()) {
+    endings += (endings.empty() ? "" : " ") + std::string(ending);
+  }
+  command
+      ->add_option("-o,--output", options.output,
+                   "the sound file, written over if it is there; its ending says which: " + endings)
+      ->required();
   CLI::Option* seconds =
       command->add_option("-s,--seconds", choice.seconds, "how long")->check(within(0.0, 86400.0));
   CLI::Option* frames = command->add_option("--frames", choice.frames, "how long, in samples")
@@ -280,14 +300,20 @@ void add_render(CLI::App& app, RenderChoice& choice, int& code) {
   command->add_option("-r,--rate", options.rate_hz, "Hz")
       ->check(within(1000.0, 768000.0))
       ->capture_default_str();
-  command->add_option("--input", options.input, "a WAV file; its channel n drives input n");
+  command->add_option("--input", options.input, "a sound file; its channel n drives input n");
   command->add_option("--score", options.score, "a file of events");
   command->add_option("--set", choice.settings, "NAME=VALUE, a parameter from the start");
-  add_choice(*command, "--format", options.format,
-             {{"float", SampleFormat::float32},
-              {"double", SampleFormat::float64},
-              {"pcm24", SampleFormat::pcm24}},
-             "of the file's samples");
+  command
+      ->add_option_function<std::string>(
+          "--format",
+          [&options](const std::string& word) {
+            options.format = word == "float"    ? SampleFormat::float32
+                             : word == "double" ? SampleFormat::float64
+                                                : SampleFormat::pcm24;
+          },
+          "of the file's samples; without it float, or pcm24 in a .flac")
+      ->check(CLI::IsMember({"float", "double", "pcm24"}))
+      ->type_name("WORD");
   add_numbers(*command, options.precision, options.rescale);
   add_method(*command, options.method);
   add_budget(*command, options.budget);
@@ -357,6 +383,7 @@ void add_make(CLI::App& app, MakeOptions& options, std::vector<std::uint32_t>& s
       "--bare", [&shape] { shape.with_io = false; },
       "without @in1, a force, and @out1, a position");
   command->add_option("-o,--output", options.output, "the file; without it, the screen");
+  add_overwrite(*command, options.force);
   command->callback([&options, &sizes, &code] {
     options.shape.length = sizes[0];
     options.shape.width = sizes.size() > 1 ? sizes[1] : 0;
@@ -404,6 +431,7 @@ void add_export(CLI::App& app, ExportOptions& options, int& code) {
       ->check(CLI::IsMember({"faust"}))
       ->required();
   command->add_option("-o,--output", options.output, "the file; without it, the screen");
+  add_overwrite(*command, options.force);
   command->add_flag_callback(
       "--no-rescale", [&options] { options.rescale = false; },
       "take the model's numbers raw at rates other than 44100 Hz");
@@ -446,15 +474,35 @@ int run(int argc, char** argv) {
   return code;
 }
 
+// What was to be said and could not be is a failure, however well the rest went.
+int said(int code) {
+  if (std::fflush(stdout) == 0 && std::ferror(stdout) == 0) {
+    return code;
+  }
+  std::fputs("the output could not be written whole: is the disk full?\n", stderr);
+  return code == exit_code::done ? exit_code::our_failure : code;
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
+  // Without these, a file that is opened would take their place, and what is said go into it. What
+  // can only be read refuses what is said, as a closed one does.
+  for (const int descriptor : {STDIN_FILENO, STDOUT_FILENO, STDERR_FILENO}) {
+    if (fcntl(descriptor, F_GETFD) < 0) {
+      static_cast<void>(open("/dev/null", O_RDONLY));
+    }
+  }
+  signal(SIGXFSZ, SIG_IGN);  // a file that may not grow is an error like a full disk
   try {
-    return run(argc, argv);
+    return said(run(argc, argv));
+  } catch (const std::bad_alloc&) {
+    std::fputs("there is not enough memory; a smaller model or fewer voices take less\n", stderr);
+    return exit_code::wrong_use;
   } catch (const std::exception& error) {
-    std::fputs(error.what(), stderr);
+    std::fprintf(stderr, "%s\n", error.what());
   } catch (...) {
-    std::fputs("an error without a name", stderr);
+    std::fputs("an error without a name\n", stderr);
   }
   return exit_code::our_failure;
 }

@@ -5,13 +5,20 @@
 #include <cmath>
 #include <filesystem>
 #include <future>
+#include <new>
+#include <utility>
 
 #include "app/admit.h"
+#include "app/load_news.h"
+#include "app/memory.h"
+#include "app/text.h"
 #include "app/timing.h"
 #include "core/model/topology.h"
 
 namespace ressort {
 namespace {
+
+constexpr double least_lateness_s = 0.05;  // to be told of: what is less is hardly heard
 
 double to_db(double factor) {
   return 20.0 * std::log10(factor);
@@ -34,6 +41,15 @@ bool is_straight(const Network& network) {
                      [](const Link& link) { return link.kind == LinkKind::spring; });
 }
 
+const char* const ending = "the program is ending";
+const char* const replaced = "replaced by a newer load";
+
+std::string describe(const std::exception& error) {
+  return dynamic_cast<const std::bad_alloc*>(&error) != nullptr
+             ? "there is not enough memory; a smaller model or fewer voices (-p) take less"
+             : error.what();
+}
+
 std::string_view kind_of(const Link& link) {
   switch (link.kind) {
     case LinkKind::spring:
@@ -45,6 +61,7 @@ std::string_view kind_of(const Link& link) {
       return "pluck";
     case LinkKind::bow:
     case LinkKind::smooth_bow:
+    case LinkKind::either_bow:
       return "bow";
     case LinkKind::contact:
     case LinkKind::clipped_contact:
@@ -60,29 +77,35 @@ Session::Session(Process& process, const SessionOptions& options, Tell tell)
       options_(options),
       tell_(std::move(tell)),
       rate_hz_(options_.compile.rate_hz),
+      built_rate_hz_(rate_hz_),
       current_(std::make_shared<Loaded>()),
       worker_([this] { work(); }) {}
 
 Session::~Session() {
+  end();
+  worker_.join();
+}
+
+void Session::end() {
   {
     const std::lock_guard lock(mutex_);
     stop_ = true;
   }
   wake_.notify_all();
-  worker_.join();
-  for (const Job& job : jobs_) {
-    if (job.answer) {
-      job.answer(Error{"the program is ending"});
-    }
-  }
 }
 
-void Session::load(std::string name, Answer answer, bool force) {
+void Session::load(std::string name, Answer answer, bool force, Reach reach) {
   {
     const std::lock_guard lock(mutex_);
-    jobs_.push_back({std::move(name), std::move(answer), force});
+    if (!stop_) {
+      jobs_.push_back({Wish{std::move(name), force, reach}, std::move(answer)});
+      wake_.notify_all();
+      return;
+    }
   }
-  wake_.notify_all();
+  if (answer) {
+    answer(Error{ending});
+  }
 }
 
 Result<std::shared_ptr<const Loaded>> Session::load_and_wait(const std::string& name, bool force) {
@@ -95,11 +118,7 @@ Result<std::shared_ptr<const Loaded>> Session::load_and_wait(const std::string& 
 void Session::set_rate(double rate_hz) {
   {
     const std::lock_guard lock(mutex_);
-    if (rate_hz_ == rate_hz) {
-      return;
-    }
     rate_hz_ = rate_hz;
-    jobs_.push_back({"", {}});
   }
   wake_.notify_all();
 }
@@ -145,11 +164,14 @@ Status Session::status() {
     status.load_ms = current_->load_ms;
     status.max_voices = current_->instrument.voices;
     status.backend = backend_;
-    status.cpu = cpu_ ? cpu_() : -1.0;
+    status.cpu = runs_ ? meters.load.get() : -1.0;
     status.rate_hz = rate_hz_;
   }
   status.period_frames = clock.period;
   status.voices = meters.voices.get();
+  status.cpu_peak = meters.load_peak.get();
+  status.shed = meters.shed.get();
+  status.overruns = meters.overruns.get();
   status.peak_db = to_db(meters.peak.get());
   status.limited_db = to_db(meters.limited.get());
   status.xruns = meters.xruns.get();
@@ -166,15 +188,16 @@ Status Session::status() {
   status.dropped = meters.dropped.get();
   status.late = meters.late.get();
   status.malformed = meters.malformed.get();
+  status.strangers = meters.strangers.get();
   status.swaps = meters.swaps.get();
   process_.meters.read.raise();
   return status;
 }
 
-void Session::set_backend(std::string description, std::function<double()> cpu) {
+void Session::set_backend(std::string description, bool runs) {
   const std::lock_guard lock(mutex_);
   backend_ = std::move(description);
-  cpu_ = std::move(cpu);
+  runs_ = runs;
 }
 
 void Session::on_audio_inputs(std::function<void(int)> prepare) {
@@ -185,37 +208,70 @@ void Session::on_audio_inputs(std::function<void(int)> prepare) {
 void Session::work() {
   using namespace std::chrono_literals;
   while (true) {
-    Job job;
-    bool has_job = false;
+    std::deque<Job> jobs;
+    bool is_ending = false;
+    bool wants_again = false;
     {
       std::unique_lock lock(mutex_);
-      wake_.wait_for(lock, 20ms, [this] { return stop_ || !jobs_.empty(); });
-      if (stop_) {
-        return;
-      }
-      if (!jobs_.empty()) {
-        job = std::move(jobs_.front());
-        jobs_.pop_front();
-        has_job = true;
-      }
+      wake_.wait_for(lock, 20ms, [this] { return stop_ || !jobs_.empty() || has_new_rate(); });
+      jobs.swap(jobs_);
+      is_ending = stop_;
+      wants_again = has_new_rate();
     }
-    listen();
-    if (has_job) {
-      do_load(job);
-    } else if (source_ && source_->may_gain) {
-      improve();
+    while (jobs.size() > (is_ending ? 0 : 1)) {
+      if (jobs.front().answer) {
+        jobs.front().answer(Error{is_ending ? ending : replaced});
+      }
+      jobs.pop_front();
+    }
+    if (is_ending) {
+      return;
+    }
+    try {
+      listen();
+      if (!jobs.empty()) {
+        do_load(jobs.front());
+      } else if (wants_again) {
+        do_again();
+      } else if (source_ && source_->may_gain) {
+        improve();
+      }
+    } catch (const std::exception& error) {
+      // What sounds goes on as it is.
+      if (tell_) {
+        tell_("what goes on behind the sound failed: " + describe(error));
+      }
     }
   }
+}
+
+bool Session::has_new_rate() const {
+  return rate_hz_ != built_rate_hz_;
+}
+
+bool Session::is_outdated(bool is_load) const {
+  const std::lock_guard lock(mutex_);
+  return stop_ || !jobs_.empty() || (!is_load && has_new_rate());
 }
 
 // The same model by other forms, of which some took too long to find while somebody waited; it goes
 // on where the other is.
 void Session::improve() {
   source_->may_gain = false;
-  auto compiled = compile(source_->network, source_->preset, source_->options);
+  bool was_outdated = false;
+  CompileOptions options = source_->options;
+  options.progress = Progress([&](std::string_view) {
+    was_outdated = is_outdated(false);
+    return !was_outdated;
+  });
+  options.most_bytes = free_memory_bytes();
+  auto compiled = compile(source_->network, source_->preset, options);
   if (!compiled) {
+    source_->may_gain = was_outdated;  // another time, if it still sounds
     return;
   }
+  const std::string news = too_much(compiled->plan, compiled->instrument.voices,
+                                    source_->options.rate_hz, source_->options.precision);
   {
     const std::lock_guard lock(mutex_);
     auto loaded = std::make_shared<Loaded>(*current_);
@@ -223,6 +279,9 @@ void Session::improve() {
     current_ = std::move(loaded);
   }
   offer(std::move(compiled->engine));
+  if (!news.empty() && tell_) {
+    tell_(news);
+  }
   time_parts();
 }
 
@@ -244,36 +303,48 @@ void Session::listen() {
   delete process_.slot.collect();
   Report report;
   while (process_.reports.pop(report)) {
-    std::string news;
-    {
-      const std::lock_guard lock(mutex_);
-      const bool is_current = report.model == current_->serial;
-      if (report.kind == Report::Kind::parameter && is_current) {
-        values_[report.index] = report.value;
-      } else if (report.kind == Report::Kind::reset && may_tell_reset()) {
-        news = (is_current ? current_->name : std::string("the last model")) +
-               ": a voice became unstable and was faded out; lower its stiffness or "
-               "damping, or raise its mass";
-      } else if (report.kind == Report::Kind::created && is_current) {
-        news = calm(static_cast<std::uint32_t>(report.value));
-      } else if (report.kind == Report::Kind::late && report.value > 0.05) {
-        news = "an event came " + std::to_string(report.value) + " s after its time";
+    const std::lock_guard lock(mutex_);
+    const bool is_current = report.model == current_->serial;
+    if (report.kind == Report::Kind::parameter && is_current) {
+      values_[report.index] = report.value;
+    } else if (report.kind == Report::Kind::reset) {
+      resets_.add((is_current ? current_->name : std::string("the last model")) +
+                  ": a voice became unstable and was faded out; lower its stiffness or "
+                  "damping, or raise its mass");
+    } else if (report.kind == Report::Kind::created && is_current) {
+      if (std::string news = calm(static_cast<std::uint32_t>(report.value)); !news.empty()) {
+        creations_.add(std::move(news));
       }
+    } else if (report.kind == Report::Kind::overload && is_current) {
+      overloads_.add(describe_overload(report));
     }
-    if (!news.empty() && tell_) {
-      tell_(news);
+  }
+  const Meters& meters = process_.meters;
+  if (const std::uint64_t late = meters.late.get();
+      late != late_told_ && meters.late_s.get() > least_lateness_s) {
+    lates_.add("an event came " + fixed(meters.late_s.get(), 3) + " s after its time",
+               late - std::exchange(late_told_, late));
+  }
+  if (const std::uint64_t dropped = meters.dropped.get(); dropped != dropped_told_) {
+    drops_.add("an event found no room and was dropped: more came than can be played",
+               dropped - std::exchange(dropped_told_, dropped));
+  }
+  for (RateLimit* const limit : {&resets_, &creations_, &overloads_, &lates_, &drops_}) {
+    if (const auto news = limit->take(); news && tell_) {
+      tell_(*news);
     }
   }
 }
 
-// An unstable voice may be lost with every note; once in a while is enough to hear of it.
-bool Session::may_tell_reset() {
-  const auto now = std::chrono::steady_clock::now();
-  if (now < next_reset_news_) {
-    return false;
-  }
-  next_reset_news_ = now + std::chrono::seconds(5);
-  return true;
+std::string Session::describe_overload(const Report& report) const {
+  const std::string ways = ways_to_make_room(report.index, options_.compile.precision);
+  return "the sound takes " + std::to_string(std::lround(100.0 * report.value)) +
+         " % of the time there is" +
+         (report.index > 0
+              ? "; the quietest voices fade out, and " +
+                    counted(report.index, "sounds", "sound at once") + " until there is time again"
+              : "") +
+         "; what makes room: a longer period, " + ways;
 }
 
 std::string Session::calm(std::uint32_t link) {
@@ -297,14 +368,9 @@ std::string Session::calm(std::uint32_t link) {
 }
 
 void Session::do_load(const Job& job) {
-  const bool again = job.name.empty();
-  if (again && scene_name_.empty()) {
-    return;
-  }
-  const auto result = build(again ? scene_name_ : job.name, again ? is_forced_ : job.force);
-  if (result && !again) {
-    scene_name_ = job.name;
-    is_forced_ = job.force;
+  const auto result = build(job.wish);
+  if (result) {
+    scene_ = job.wish;
   }
   if (job.answer) {
     job.answer(result);
@@ -316,12 +382,54 @@ void Session::do_load(const Job& job) {
   }
 }
 
-Result<std::shared_ptr<const Loaded>> Session::build(const std::string& name, bool force) {
-  const auto start = std::chrono::steady_clock::now();
-  auto scene = load_scene(name, {.bare = options_.compile.bare, .third = options_.third});
-  if (!scene) {
-    return scene.error();
+// What sounds, at the backend's new rate.
+void Session::do_again() {
+  if (!scene_) {
+    const std::lock_guard lock(mutex_);
+    built_rate_hz_ = rate_hz_;
+    return;
   }
+  double rate_hz = 0.0;
+  {
+    const std::lock_guard lock(mutex_);
+    rate_hz = rate_hz_;
+  }
+  const auto result = build(*scene_);
+  if (result) {
+    time_parts();
+  } else if (!is_outdated(true)) {
+    if (tell_) {
+      tell_(result.error().message);
+    }
+    const std::lock_guard lock(mutex_);
+    built_rate_hz_ = rate_hz;  // it is not tried again and again
+  }
+}
+
+// Whatever happens, somebody is answered and what sounded goes on.
+Result<std::shared_ptr<const Loaded>> Session::build(const Wish& wish) {
+  LoadNews news(wish.name, tell_);
+  bool was_outdated = false;
+  const Progress progress([&](std::string_view stage) {
+    news.at(stage);
+    was_outdated = is_outdated(true);
+    return !was_outdated;
+  });
+  try {
+    auto result = build_now(wish, progress);
+    if (was_outdated && !result) {
+      const std::lock_guard lock(mutex_);
+      return Error{stop_ ? ending : replaced};
+    }
+    return result;
+  } catch (const std::exception& error) {
+    return Error{"'" + wish.name + "' could not be loaded: " + describe(error)};
+  }
+}
+
+Result<std::shared_ptr<const Loaded>> Session::build_now(const Wish& wish,
+                                                         const Progress& progress) {
+  const auto start = std::chrono::steady_clock::now();
   CompileOptions options = options_.compile;
   std::function<void(int)> prepare_inputs;
   {
@@ -329,13 +437,30 @@ Result<std::shared_ptr<const Loaded>> Session::build(const std::string& name, bo
     options.rate_hz = rate_hz_;
     prepare_inputs = prepare_inputs_;
   }
+  auto scene = load_scene(wish.name, {.bare = options_.compile.bare,
+                                      .third = options_.third,
+                                      .reach = wish.reach,
+                                      .progress = progress});
+  if (!scene) {
+    return scene.error();
+  }
   options.find_gain = !scene->has_preset;
   options.most_modes = quick_modes;
-  options.force = force;
+  options.force = wish.force;
+  options.progress = progress;
+  options.most_bytes = free_memory_bytes();
   scene->preset.gain *= options_.gain;
   auto compiled = admit(*scene, options, scene->warnings);
   if (!compiled) {
     return compiled.error();
+  }
+  // What may gain by its modes is judged when they are found.
+  if (!may_gain(compiled->plan)) {
+    if (std::string warning = too_much(compiled->plan, compiled->instrument.voices, options.rate_hz,
+                                       options.precision);
+        !warning.empty()) {
+      scene->warnings.push_back(std::move(warning));
+    }
   }
   const std::chrono::duration<double, std::milli> took = std::chrono::steady_clock::now() - start;
   auto loaded = std::make_shared<Loaded>();
@@ -351,13 +476,15 @@ Result<std::shared_ptr<const Loaded>> Session::build(const std::string& name, bo
   if (prepare_inputs) {
     prepare_inputs(loaded->instrument.audio_inputs);
   }
+  std::vector<double> values;
+  for (const ParameterInfo& info : loaded->instrument.parameters) {
+    values.push_back(info.value);
+  }
   {
     const std::lock_guard lock(mutex_);
     current_ = loaded;
-    values_.clear();
-    for (const ParameterInfo& info : loaded->instrument.parameters) {
-      values_.push_back(info.value);
-    }
+    values_ = std::move(values);
+    built_rate_hz_ = options.rate_hz;
   }
   offer(std::move(compiled->engine));
   source_.reset();
@@ -365,6 +492,7 @@ Result<std::shared_ptr<const Loaded>> Session::build(const std::string& name, bo
     options.find_gain = false;
     scene->preset.gain = loaded->instrument.gain;
     options.most_modes = patient_modes;
+    options.progress = {};
     source_ = {std::move(scene->network), std::move(scene->preset), options,
                may_gain(loaded->plan)};
   }

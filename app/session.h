@@ -15,6 +15,7 @@
 #include "app/calls.h"
 #include "app/loader.h"
 #include "app/process.h"
+#include "app/rate_limit.h"
 #include "core/compile/compile.h"
 
 namespace ressort {
@@ -46,14 +47,17 @@ struct Status {
   int voices = 0;
   int max_voices = 0;
   double saved = 0.0;       // the share of the computing that sleep saves, 0..1
-  double cpu = 0.0;         // share of the time there is, 0..1; -1: not known
+  double cpu = 0.0;         // share of the time there is, over a second; -1: nothing runs
+  double cpu_peak = 0.0;    // of one block since the last asking
   double peak_db = 0.0;     // since the last asking; -inf is silence
   double limited_db = 0.0;  // the limiter's deepest cut since the last asking
   std::uint64_t xruns = 0;
   std::uint64_t resets = 0;
   std::uint64_t stolen = 0;
-  std::uint64_t beyond = 0;  // times that a parameter was kept where it is stable
-  std::uint64_t modes = 0;   // of the voices that sound
+  std::uint64_t shed = 0;      // voices that there was no time for
+  std::uint64_t overruns = 0;  // blocks that took longer than they sound
+  std::uint64_t beyond = 0;    // times that a parameter was kept where it is stable
+  std::uint64_t modes = 0;     // of the voices that sound
   std::uint64_t modes_awake = 0;
   double energy = 0.0;     // of what sounds, as EngineMeters says
   double loss = 0.0;       // of it in a second
@@ -62,6 +66,7 @@ struct Status {
   std::uint64_t dropped = 0;
   std::uint64_t late = 0;
   std::uint64_t malformed = 0;
+  std::uint64_t strangers = 0;  // packets of who may not send OSC
   std::uint64_t swaps = 0;
   std::string backend;
 };
@@ -78,14 +83,19 @@ class Session {
 
   // Loads in the worker; `answer` is called there, with what sounds now or with the error's whole
   // text. On an error what sounded goes on. [any thread but audio]
-  // What is not stable is such an error, unless it is forced.
-  void load(std::string name, Answer answer, bool force = false);
+  // What is not stable is such an error, unless it is forced; so is a load that a newer one
+  // replaces, and one that comes after end(), which is answered at once.
+  void load(std::string name, Answer answer, bool force = false, Reach reach = Reach::any_file);
 
   // The same, waiting for it.
   Result<std::shared_ptr<const Loaded>> load_and_wait(const std::string& name, bool force = false);
 
   // The backend runs at another rate: what sounds is compiled anew.
   void set_rate(double rate_hz);
+
+  // Gives up what is being loaded, and all that waits: the program is ending. Returns at once.
+  // [any thread but audio]
+  void end();
 
   // Never null; before the first load it has no name and no parameters.
   std::shared_ptr<const Loaded> current() const;
@@ -101,17 +111,23 @@ class Session {
 
   Status status();
 
-  // What a backend knows of itself; set by whoever starts one.
-  void set_backend(std::string description, std::function<double()> cpu);
+  // What plays, or what is waited for; set by whoever starts a backend.
+  void set_backend(std::string description, bool runs);
 
   // Called in the worker before an engine is offered, with the number of its audio inputs.
   void on_audio_inputs(std::function<void(int)> prepare);
 
  private:
-  struct Job {
-    std::string name;  // empty: the present scene again, at a new rate
-    Answer answer;
+  // A scene, and how far its name may lead.
+  struct Wish {
+    std::string name;
     bool force = false;
+    Reach reach = Reach::any_file;
+  };
+
+  struct Job {
+    Wish wish;
+    Answer answer;
   };
 
   // What sounds, to be compiled once more: with more patience, or with links found passively.
@@ -124,13 +140,18 @@ class Session {
 
   void work();
   void do_load(const Job& job);
-  Result<std::shared_ptr<const Loaded>> build(const std::string& name, bool force);
+  void do_again();
+  Result<std::shared_ptr<const Loaded>> build(const Wish& wish);
+  Result<std::shared_ptr<const Loaded>> build_now(const Wish& wish, const Progress& progress);
   void improve();
+  // Whether somebody wants something else of the worker; a load gives way to a newer one only.
+  bool is_outdated(bool is_load) const;
+  bool has_new_rate() const;  // under the lock
   // Hands the engine over; its parts are timed when nobody waits any more.
   void offer(std::unique_ptr<Engine> engine);
   void time_parts();
   void listen();
-  bool may_tell_reset();
+  std::string describe_overload(const Report& report) const;
   // A link of what sounds made energy of nothing: what there is to say of it, once.
   std::string calm(std::uint32_t link);
 
@@ -143,19 +164,25 @@ class Session {
   std::deque<Job> jobs_;
   bool stop_ = false;
   double rate_hz_;
+  double built_rate_hz_;  // what sounds was made for, or was tried to be
   std::shared_ptr<const Loaded> current_;
   std::vector<double> values_;  // of the current parameters
   std::string backend_;
-  std::function<double()> cpu_;
+  bool runs_ = false;  // the backend
   std::function<void(int)> prepare_inputs_;
 
-  std::uint32_t serial_ = 0;                                 // [worker]
-  std::string scene_name_;                                   // [worker] what was loaded last
-  bool is_forced_ = false;                                   // [worker] and whether by force
-  const Engine* offered_ = nullptr;                          // [worker] until the next is offered
-  std::optional<Source> source_;                             // [worker] of what may be improved
-  std::chrono::steady_clock::time_point next_reset_news_{};  // [worker]
-  std::thread worker_;                                       // last, so that it ends first
+  std::uint32_t serial_ = 0;         // [worker]
+  std::optional<Wish> scene_;        // [worker] what was loaded last
+  const Engine* offered_ = nullptr;  // [worker] until the next is offered
+  std::optional<Source> source_;     // [worker] of what may be improved
+  RateLimit resets_;                 // [worker] all of these
+  RateLimit creations_;
+  RateLimit overloads_{std::chrono::seconds(10)};
+  RateLimit lates_;
+  RateLimit drops_;
+  std::uint64_t late_told_ = 0;
+  std::uint64_t dropped_told_ = 0;
+  std::thread worker_;  // last, so that it ends first
 };
 
 }  // namespace ressort

@@ -10,14 +10,18 @@
 #include <algorithm>
 #include <array>
 #include <cerrno>
+#include <chrono>
 #include <clocale>
 #include <cstdio>
 #include <cstdlib>
 #include <cwchar>
 #include <filesystem>
+#include <future>
 #include <mutex>
 #include <thread>
 #include <vector>
+
+#include "app/say.h"
 
 namespace ressort {
 
@@ -114,9 +118,20 @@ std::string history_path() {
   return error ? "" : (folder / "history").string();
 }
 
+// Between the keys of a line that is being edited; waits for the terminal.
 void put(const std::string& text) {
   std::fputs(text.c_str(), stdout);
   std::fflush(stdout);
+}
+
+// Lets a terminal that was stopped, or that nobody reads, go on: what it has not shown is gone.
+void release_terminal() {
+  if (isatty(STDOUT_FILENO) != 0 && tcgetpgrp(STDOUT_FILENO) == getpgrp()) {
+    tcflush(STDOUT_FILENO, TCOFLUSH);
+    // The two together wake who waits to write.
+    tcflow(STDOUT_FILENO, TCOOFF);  // NOLINT(concurrency-mt-unsafe): a system call, no more
+    tcflow(STDOUT_FILENO, TCOON);   // NOLINT(concurrency-mt-unsafe)
+  }
 }
 
 }  // namespace
@@ -126,7 +141,9 @@ struct Terminal::Input {
     if (pipe2(wake.data(), O_CLOEXEC | O_NONBLOCK) != 0) {
       wake = {-1, -1};
     }
-    thread = std::thread([this] { work(); });
+    std::packaged_task<void()> task([this] { work(); });
+    over = task.get_future();
+    thread = std::thread(std::move(task));
   }
 
   ~Input() {
@@ -135,6 +152,14 @@ struct Terminal::Input {
       is_over = true;
     }
     rouse();
+    constexpr std::chrono::milliseconds patience{200};
+    if (over.wait_for(patience) != std::future_status::ready && !wait_until_said()) {
+      fall_silent();
+    }
+    constexpr std::chrono::milliseconds moment{10};
+    while (over.wait_for(moment) != std::future_status::ready) {
+      release_terminal();
+    }
     thread.join();
     console.lend_keyboard({});
     close(wake[0]);
@@ -150,6 +175,7 @@ struct Terminal::Input {
   std::string unsaid;          // waits for the thread to put it above the line being typed
   EditLine* editor = nullptr;  // [the thread]
   std::thread thread;
+  std::future<void> over;  // the thread's work
 
   enum class Woken { key, nothing, over };
 
@@ -163,26 +189,31 @@ struct Terminal::Input {
     {
       const std::lock_guard lock(mutex);
       if (!is_editing) {
-        put(text + "\n");
+        ressort::say(text);
         return;
       }
-      unsaid += text + "\n";
+      constexpr std::size_t most_bytes = std::size_t{1} << 20;  // of a terminal that is stopped
+      if (unsaid.size() < most_bytes) {
+        unsaid += text + "\n";
+      }
     }
     rouse();
   }
 
   // Waits for a key, or the end of the input. Negative: as long as it takes.
   Woken wait(int timeout_ms) {
+    std::string news;
     while (true) {
       {
         const std::lock_guard lock(mutex);
         if (is_over) {
           return Woken::over;
         }
-        if (is_editing && !unsaid.empty()) {
-          put("\r\x1b[K" + std::exchange(unsaid, {}));
-          el_set(editor, EL_REFRESH);
-        }
+        news = is_editing ? std::exchange(unsaid, {}) : "";
+      }
+      if (!news.empty()) {
+        put("\r\x1b[K" + news);
+        el_set(editor, EL_REFRESH);
       }
       pollfd both[] = {{STDIN_FILENO, POLLIN, 0}, {wake[0], POLLIN, 0}};
       const int count = poll(both, 2, timeout_ms);
@@ -259,7 +290,7 @@ struct Terminal::Input {
       text.erase(0, at);
       if (text.size() > max_line) {
         if (!is_skipping) {
-          put("error: a line of more than 65536 characters was left out\n");
+          ressort::say("error: a line of more than 65536 characters was left out");
         }
         is_skipping = true;
         text.clear();
@@ -289,6 +320,7 @@ struct Terminal::Input {
     bool goes_on = true;
     while (goes_on) {
       el_resize(editor);
+      wait_until_said();  // the prompt comes after it
       set_editing(true);
       int count = 0;
       const char* const typed = el_gets(editor, &count);
@@ -296,7 +328,8 @@ struct Terminal::Input {
                              typed != nullptr ? static_cast<std::size_t>(count) : 0);
       set_editing(false);
       if (!line.ends_with('\n')) {
-        put(must_end() ? "\n" : "\nThe console is closed, the sound goes on; Ctrl-C ends it.\n");
+        ressort::say(must_end() ? ""
+                                : "\nThe console is closed, the sound goes on; Ctrl-C ends it.");
         break;
       }
       const std::string words = line.substr(0, line.find_last_not_of(" \t\n") + 1);
@@ -320,7 +353,8 @@ struct Terminal::Input {
     const std::lock_guard lock(mutex);
     is_editing = now;
     if (!unsaid.empty()) {
-      put(std::exchange(unsaid, {}));
+      unsaid.pop_back();  // a line's end comes by itself
+      ressort::say(std::exchange(unsaid, {}));
     }
   }
 
@@ -385,6 +419,7 @@ struct Terminal::Input {
       if (got <= 0) {
         return 0;
       }
+      // NOLINTNEXTLINE(concurrency-mt-unsafe): it has a state of its own
       const std::size_t used = std::mbrtowc(character, &byte, 1, &state);
       if (used == static_cast<std::size_t>(-1)) {
         state = {};  // no UTF-8; passed over
