@@ -1,31 +1,18 @@
 // A libFuzzer target: whatever text comes, it is read or refused with a place and a sentence; what
 // is read comes back from its print, and if it is not too large it is exported, compiled and
 // played, and what is heard is finite.
-#include <array>
-#include <cmath>
-#include <cstddef>
-#include <cstdint>
-#include <cstdlib>
-#include <string_view>
-#include <vector>
-
-#include "core/compile/compile.h"
 #include "core/model/faust.h"
-#include "core/model/mdl.h"
 #include "core/model/print.h"
 #include "core/model/topology.h"
+#include "tests/fuzz/stage.h"
+#include "tests/system/every_control.h"
 
-namespace ressort {
+namespace ressort::fuzz {
 namespace {
 
-constexpr std::size_t frames = 128;
-constexpr std::uint64_t most_nodes = 300;  // for speed alone: the reader takes millions
-
-void require(bool holds) {
-  if (!holds) {
-    std::abort();
-  }
-}
+constexpr std::size_t frames = 4096;
+constexpr std::size_t block_frames = 256;
+constexpr std::uint64_t most_nodes = 120;  // for speed alone: the reader takes millions
 
 void check_told(const ParsedNetwork& parsed) {
   for (const Diagnostic& diagnostic : parsed.diagnostics) {
@@ -42,61 +29,114 @@ bool is_small(const Network& network) {
   return nodes <= most_nodes;
 }
 
-// A key, every gesture that an input can be asked for, and the first parameter turned up and off.
-constexpr std::array<Event, 9> gestures = {{
-    {.frame = 0, .kind = EventKind::note_on, .index = 69, .value = 0.8},
-    {.frame = 8, .kind = EventKind::force, .index = 1, .value = 1.0, .value2 = 0.0005},
-    {.frame = 16, .kind = EventKind::position, .index = 1, .value = -0.5},
-    {.frame = 24, .kind = EventKind::pluck, .index = 1, .value = 1.0},
-    {.frame = 32, .kind = EventKind::parameter, .index = 0, .value = 1e6},
-    {.frame = 40, .kind = EventKind::bow, .index = 1, .value = 1.0, .value2 = 0.5},
-    {.frame = 48, .kind = EventKind::bend, .value = 1.0},
-    {.frame = 64, .kind = EventKind::parameter, .index = 0, .value = 0.0},
-    {.frame = 80, .kind = EventKind::note_off, .index = 69},
-}};
-
-void play(const Network& network, bool bare) {
-  auto compiled = compile(network, default_preset(network, bare),
-                          {.rate_hz = bare ? 44100.0 : 48000.0, .bare = bare});
-  if (!compiled) {
-    return require(!compiled.error().message.empty());
+// Keys, every gesture that an input can be asked for, controllers, one parameter after the other to
+// both ends and beyond; panic before the last block.
+std::vector<Event> events_of(const Instrument& instrument, std::size_t block) {
+  const auto input = static_cast<std::uint16_t>(1 + block % 3);
+  const std::array<Event, 9> gestures = {{
+      {.frame = 8, .kind = EventKind::force, .index = input, .value = 1.0, .value2 = 0.0005},
+      {.frame = 16, .kind = EventKind::position, .index = input, .value = -0.5},
+      {.frame = 24, .kind = EventKind::pluck, .index = input, .value = 1.0},
+      {.frame = 40, .kind = EventKind::bow, .index = input, .value = 1.0, .value2 = 0.5},
+      {.frame = 48, .kind = EventKind::bend, .value = block % 2 == 0 ? 1.0 : -1.0},
+      {.frame = 50, .kind = EventKind::pressure, .value = 1.0},
+      {.frame = 52, .kind = EventKind::custom, .index = input, .value = 1.0},
+      {.frame = 54, .kind = EventKind::controller, .index = input, .value = 1.0},
+      {.frame = 80, .kind = EventKind::note_off, .index = 69},
+  }};
+  std::vector<Event> events = {
+      {.kind = EventKind::note_on, .index = block % 2 == 0 ? 69 : 40, .value = 0.8}};
+  events.insert(events.end(), gestures.begin(), gestures.end());
+  if (!instrument.parameters.empty()) {
+    const std::size_t index = block % instrument.parameters.size();
+    const ParameterInfo& info = instrument.parameters[index];
+    for (const double value : {info.maximum, info.minimum, 1e6, info.value}) {
+      events.push_back({.frame = 100,
+                        .kind = EventKind::parameter,
+                        .index = static_cast<std::uint16_t>(index),
+                        .value = value});
+    }
   }
-  std::vector<double> audio(frames);
-  for (std::size_t n = 0; n < frames; ++n) {
+  if (block + 2 == frames / block_frames) {
+    events.push_back({.frame = 200, .kind = EventKind::panic});
+  }
+  return events;
+}
+
+void play_blocks(Engine& engine, const Instrument& instrument, std::size_t first,
+                 std::size_t last) {
+  std::vector<double> audio(block_frames);
+  for (std::size_t n = 0; n < block_frames; ++n) {
     audio[n] = std::sin(0.3 * static_cast<double>(n));
   }
-  const std::vector<const double*> inputs(
-      static_cast<std::size_t>(compiled->instrument.audio_inputs), audio.data());
-  std::vector<std::array<double, frames>> heard(
-      static_cast<std::size_t>(compiled->instrument.outputs));
+  const std::vector<const double*> inputs(static_cast<std::size_t>(instrument.audio_inputs),
+                                          audio.data());
+  std::vector<std::array<double, block_frames>> heard(static_cast<std::size_t>(instrument.outputs));
   std::vector<double*> outputs;
   for (auto& channel : heard) {
     outputs.push_back(channel.data());
   }
-  compiled->engine->process(gestures, inputs, outputs, frames);
-  for (const auto& channel : heard) {
-    for (const double sample : channel) {
-      require(std::isfinite(sample));
+  for (std::size_t block = first; block < last; ++block) {
+    engine.process(events_of(instrument, block), inputs, outputs, block_frames);
+    for (const auto& channel : heard) {
+      for (const double sample : channel) {
+        require(std::isfinite(sample));
+      }
     }
+  }
+  require(std::isfinite(engine.meters().energy) && std::isfinite(engine.meters().loss));
+}
+
+// As `play` does, and by force what it refuses: a gain that is found if nobody gives one, and
+// halfway the form that more patience finds, which goes on where the other is.
+void play(const Network& network, Preset preset, CompileOptions options) {
+  auto first = compile(network, preset, options);
+  if (!first) {
+    return require(!first.error().message.empty());
+  }
+  if (first->gate.verdict == Verdict::unstable) {
+    require(first->gate.complaint.has_value());
+    options.force = true;
+    first = compile(network, preset, options);
+    require(static_cast<bool>(first));
+  }
+  constexpr std::size_t blocks = frames / block_frames;
+  play_blocks(*first->engine, first->instrument, 0, blocks / 2);
+  preset.gain = first->instrument.gain;
+  options.find_gain = false;
+  options.most_modes = patient_modes;
+  const auto second = compile(network, preset, options);
+  require(static_cast<bool>(second));
+  second->engine->go_on_from(*first->engine);
+  play_blocks(*second->engine, second->instrument, blocks / 2, blocks);
+}
+
+void play(const Network& network) {
+  play(network, default_preset(network, false),
+       {.rate_hz = 48000.0, .most_modes = quick_modes, .find_gain = true});
+  play(network, default_preset(network, true), {.rate_hz = 44100.0, .bare = true});
+  const std::size_t turn = network.links.size() + 7 * network.masses.size();
+  const auto preset = parse_preset(rig::PresetWriter(network, "fuzz.mdl", turn).write());
+  if (preset.ok()) {  // a name may be no TOML, a range too wide
+    play(network, preset.preset, {.rate_hz = 48000.0, .most_modes = quick_modes});
   }
 }
 
 }  // namespace
-}  // namespace ressort
+}  // namespace ressort::fuzz
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   using namespace ressort;
-  const ParsedNetwork parsed =
-      parse_network(std::string_view(reinterpret_cast<const char*>(data), size));
-  check_told(parsed);
-  if (parsed.ok() && is_small(parsed.network)) {
+  using fuzz::require;
+  const ParsedNetwork parsed = parse_network(fuzz::text_of(data, size));
+  fuzz::check_told(parsed);
+  if (parsed.ok() && fuzz::is_small(parsed.network)) {
     const ParsedNetwork again = parse_network(print_network(parsed.network));
     require(again.ok() && again.network == parsed.network);
     std::vector<ParameterSetting> sliders(parsed.network.parameters.size());
     const auto faust = faust_text(parsed.network, {.name = "fuzz", .sliders = sliders});
     require(faust ? !faust->empty() : !faust.error().message.empty());
-    play(parsed.network, false);
-    play(parsed.network, true);
+    fuzz::play(parsed.network);
   }
   return 0;
 }

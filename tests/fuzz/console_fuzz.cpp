@@ -1,0 +1,54 @@
+// A libFuzzer target: whatever somebody types, there is an answer and the sound goes on. Files are
+// written in a folder of the run's own, and no other is named.
+#include <unistd.h>
+#include <filesystem>
+
+#include "app/calls.h"
+#include "app/console.h"
+#include "app/session.h"
+#include "tests/fuzz/stage.h"
+
+namespace {
+
+namespace fs = std::filesystem;
+
+// Where the files of the run lie and vanish with it.
+struct Folder {
+  const fs::path path = fs::temp_directory_path() / ("ressort-fuzz-" + std::to_string(getpid()));
+  Folder() {
+    fs::create_directories(path);
+    fs::current_path(path);
+  }
+  ~Folder() {
+    fs::current_path("/");
+    fs::remove_all(path);
+  }
+};
+
+}  // namespace
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  using namespace ressort;
+  using fuzz::require;
+  static const Folder folder;
+  fuzz::Stage stage;
+  Session session(stage.process, {.compile = {.rate_hz = fuzz::Stage::rate_hz}, .third = {}},
+                  [](const std::string&) {});
+  const auto print = [](const std::string& text) { require(!text.empty()); };
+  Console console(stage.process, session, print, print);
+  std::string_view text = fuzz::text_of(data, size);
+  for (int i = 0; i < 20 && !text.empty() && !console.has_quit(); ++i) {
+    const std::string_view line = text.substr(0, text.find('\n'));
+    text.remove_prefix(std::min(text.size(), line.size() + 1));
+    if (line.find('/') != line.npos) {
+      continue;
+    }
+    console.completions(line);
+    last_word(line);
+    const auto command = parse_command(line);
+    require(command || !command.error().message.empty());
+    console.run_line(line);
+    stage.block(256);
+  }
+  return 0;
+}

@@ -1,0 +1,33 @@
+// A libFuzzer target: whatever bytes a keyboard sends, cut into whatever packets, they are played
+// or counted. A byte gives the length of the packet after it, its highest bit the way in.
+#include "app/midi_input.h"
+#include "tests/fuzz/stage.h"
+#include "tests/system/every_control.h"
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  using namespace ressort;
+  using fuzz::require;
+  static const auto preset =
+      parse_preset(rig::PresetWriter(fuzz::network(), "fuzz.mdl", 0).write());
+  require(preset.ok());
+  auto compiled = compile(fuzz::network(), preset.preset, {.rate_hz = fuzz::Stage::rate_hz});
+  require(static_cast<bool>(compiled));
+  fuzz::Stage stage(*std::move(compiled));
+  MidiDoor door(stage.process);
+  MidiReader reader;
+  std::vector<MidiPacket> packets;
+  std::span<const std::uint8_t> rest(data, size);
+  while (!rest.empty() && packets.size() < 64) {
+    const std::uint8_t head = rest[0];
+    const auto packet = rest.subspan(1, std::min<std::size_t>(rest.size() - 1, head & 0x7f));
+    rest = rest.subspan(1 + packet.size());
+    if ((head & 0x80) != 0) {
+      door.arrive(reader, packet, stage.time_ns + head);
+    } else {
+      packets.push_back({static_cast<std::uint32_t>(packets.size()), packet});
+    }
+  }
+  stage.block(512, packets);
+  stage.block(512);
+  return 0;
+}

@@ -1,0 +1,38 @@
+// A libFuzzer target: whatever text comes, it is read as a preset or refused with a place and a
+// sentence; what is read is put on a model that has something of everything, and played.
+#include "core/model/preset.h"
+#include "tests/fuzz/stage.h"
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  using namespace ressort;
+  using fuzz::require;
+  const ParsedPreset parsed = parse_preset(fuzz::text_of(data, size));
+  for (const Error& error : parsed.errors) {
+    require(!error.message.empty() && error.line >= 1 && error.column >= 1);
+  }
+  if (!parsed.ok()) {
+    return 0;
+  }
+  const Preset& preset = parsed.preset;
+  require(preset.voices >= 1 && preset.voices <= max_voices);
+  auto compiled = compile(fuzz::network(), preset,
+                          {.rate_hz = fuzz::Stage::rate_hz, .voices = std::min(preset.voices, 3)});
+  if (!compiled) {
+    require(!compiled.error().message.empty() && compiled.error().line >= 1);
+    return 0;
+  }
+  fuzz::Stage stage(*std::move(compiled));
+  std::vector<std::uint8_t> bytes = {0x90, 60, 100, 0xd0, 90, 0xe0, 0, 0};
+  for (std::uint8_t number = 0; number < 120; ++number) {
+    bytes.insert(bytes.end(), {0xb0, number, static_cast<std::uint8_t>(127 - number)});
+  }
+  const MidiPacket packet{3, bytes};
+  stage.block(512, std::span(&packet, 1));
+  for (const CustomInfo& custom : stage.instrument.custom) {
+    const auto row = static_cast<std::uint16_t>(custom.row);
+    const TimedEvent event{{.kind = EventKind::custom, .index = row, .value = 1.0}};
+    stage.process.send(stage.process.from_osc, {&event, 1});
+  }
+  stage.block(512);
+  return 0;
+}
