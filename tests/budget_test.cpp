@@ -42,7 +42,7 @@ TEST_CASE("what is wrong with a budget is told with its place", "[budget]") {
     CHECK(budget.error().column == c.column);
   }
   const auto preset = parse_preset("model = \"x.mdl\"\nbudget = \"cents=-1\"\n");
-  REQUIRE_FALSE(preset);
-  CHECK(preset.error().line == 2);
-  CHECK(preset.error().message == "'budget': 'cents' must be above 0, up to 1200, found '-1'");
+  REQUIRE(preset.errors.size() == 1);
+  CHECK(preset.errors[0].line == 2);
+  CHECK(preset.errors[0].message == "'budget': 'cents' must be above 0, up to 1200, found '-1'");
 }

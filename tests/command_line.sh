@@ -74,6 +74,9 @@ expect 0 "motion: a velocity in units per second, as the preset says" "$program"
 expect 0 "sample before, as was asked for" "$program" check motion.toml --motion delayed
 model motion.toml 'model = "motion.mdl"\nmotion = "sideways"\n'
 expect 2 "motion.toml:2:" "$program" check motion.toml
+model still.mdl '@g ground 0.\n@m mass 1. 0. 0.\n@r spring @g @m 0.1\n@out1 posOutput @m\n'
+expect 0 '"motion": "either"' "$program" check still.mdl --json
+expect 0 "motion: both meanings agree" "$program" check still.mdl
 model heard.mdl '@K audioParam @in2\n@o osc 1. K 0. 0. 0.\n@out1 posOutput @o\n'
 expect 0 "K            is input 2, sample by sample" "$program" check heard.mdl
 expect 0 '"input": 2,' "$program" check heard.mdl --json
@@ -122,10 +125,13 @@ model stiff.mdl '@K param 1.5\n@g ground 0.\n@m osc 1. K 0. 1. 1.\n@out1 posOutp
 expect 0 "stable: every stiffness may grow 2.66666 times" "$program" check stiff.mdl
 expect 0 "K            1.5        from 0 to 3.99999; stable below 4" "$program" check stiff.mdl
 model wild.mdl '@s ground 0.\n@m mass 1. 1. 1.\n@r spring @s @m 5.\n@out1 posOutput @m\n'
-expect 0 "wild.mdl:3:1: warning: unstable: the stiffness 5 of 'r' must stay below 4" \
+expect 2 "wild.mdl:3:1: error: unstable: the stiffness 5 of 'r' must stay below 4; --force plays" \
   "$program" check wild.mdl
-expect 0 '"verdict": "unstable"' "$program" check wild.mdl --json
-expect 0 '"limit": 4.0' "$program" check wild.mdl --json
+expect 2 '"verdict": "unstable"' "$program" check wild.mdl --json
+expect 2 '"limit": 4.0' "$program" check wild.mdl --json
+expect 2 '"ok": false' "$program" check wild.mdl --json
+expect 0 '"ok": true' "$program" check stiff.mdl --json
+expect 2 "@r spring @s @m 5" "$program" check wild.mdl --print
 model wide.toml 'model = "stiff.mdl"\n[parameters]\nK = { value = 1, range = [0, 5] }\n'
 expect 0 "stiff.mdl:3:1: warning: unstable: the stiffness K = 5 of 'm' must stay below 4" \
   "$program" check wide.toml
@@ -141,7 +147,16 @@ expect 2 "'voices' must lie between 1 and 256" "$program" check far.toml
 model target.toml 'model = "PolyTriangle.mdl"\n[[control]]\nfrom = "cc1"\nto = "m_Q"\n'
 expect 2 "the model has no parameter 'm_Q'; it has m_K, m_Z" "$program" check target.toml
 model lost.toml 'model = "nosuch.mdl"\n'
-expect 2 "lost.toml:1:1: error: the model 'nosuch.mdl'" "$program" check lost.toml
+expect 2 "lost.toml:1:9: error: the model 'nosuch.mdl'" "$program" check lost.toml
+model two.toml 'model = "name.mdl"\nvoices = 0\n[[control]]\nfrom = "cc1"\nto = "m_Q"\nhow = "x"\n'
+expect 2 "two.toml:2:10: error: 'voices' must lie" "$program" check two.toml
+expect 2 "two.toml:6:7: error: 'how' must be" "$program" check two.toml
+expect 2 "name.mdl:2:21: error: no mass is called '@m1'" "$program" check two.toml
+{ printf 'model = "PolyTriangle.mdl"\n'; head -c 60000 /dev/zero | sed 's/\x00/a./g' | head -c 60000
+  printf 'a = 1\n'; } > deep.toml
+expect 2 "deep.toml:2:18: error: this is nested more than 8 deep" "$program" check deep.toml
+head -c 65537 /dev/zero > big.toml
+expect 2 "at most 64 KiB are read" "$program" check big.toml
 
 # Exporting.
 expect 2 "--to" "$program" export PolyTriangle
@@ -167,14 +182,131 @@ model late.score '1e300 /note/on 60\n'
 expect 2 "where a time in seconds was expected, at most a day" \
   "$program" render PolyTriangle -o out.wav --score late.score
 expect 2 "cannot be written too" "$program" render PolyTriangle -o bad.score --score bad.score
-expect 2 "the name of a model" "$program" render PolyTriangle -o word.mdl
+expect 2 "word.mdl' is the name of no sound file; these are written: .wav, .w64, .flac, .ogg" \
+  "$program" render PolyTriangle -o word.mdl
 expect 2 "must be -120 to 60, found nan" "$program" play -g nan
 expect 2 "no finite number" "$program" check infinite.mdl
 model wrong.score '0.0 /in/7/force 1\n'
-expect 2 "wrong.score:1:1: error: /in/7/force" \
+expect 2 "wrong.score:1:5: error: /in/7/force" \
   "$program" render PolyTriangle -o out.wav --score wrong.score
-expect 2 "the preset keeps 'm_K' between" \
+expect 2 "PolyTriangle.toml:$(grep -n '^m_K' "$source/presets/PolyTriangle.toml" | cut -d: -f1):" \
   "$program" render PolyTriangle -o out.wav --set m_K=7
+expect 2 "error: the preset keeps 'm_K' between" \
+  "$program" render PolyTriangle -o out.wav --set m_K=7
+
+expect 2 "--set m_Q=1: /param/m_Q: the model has no such parameter; it has m_K, m_Z" \
+  "$program" render PolyTriangle -o out.wav --set m_Q=1
+model marked.score '\357\273\2770.0 /note/on 60 100\n'
+expect 0 "peak -" "$program" render PolyTriangle -o out.wav --score marked.score --seconds 0.1
+model wide.score '\377\3760\0'
+expect 2 "wide.score' is text in UTF-16" "$program" render PolyTriangle -o out.wav --score wide.score
+expect 0 "at once, and so many are used" \
+  "$program" render PolyTriangle -o out.wav --seconds 0.1 --threads 1024
+mkfifo pipe
+expect 2 "pipe' is no ordinary file" "$program" render PolyTriangle -o out.wav --input pipe
+
+# Files: nothing that is read is lost, under no name; nor what was there before.
+fail() {
+  echo "FAILED: $*"
+  failures=$((failures + 1))
+}
+model own.mdl '@g ground 0.\n@m osc 1. .1 .001 0. 0.\n@in1 frcInput @m\n@out1 posOutput @m\n'
+model own.toml 'model = "own.mdl"\n'
+model own.score '0 /in/1/force 1\n'
+"$program" render own.mdl -q -o in.wav --score own.score --seconds 0.1
+mkdir before sub
+for file in own.mdl own.toml own.score in.wav; do
+  cp "$file" before
+  ln -s "$file" "soft-$file.wav"
+  ln "$file" "hard-$file.wav"
+  for name in "soft-$file.wav" "hard-$file.wav" "./hard-$file.wav" "sub/../hard-$file.wav" \
+    "$folder/hard-$file.wav"; do
+    expect 2 "cannot be written too" \
+      "$program" render own.toml -o "$name" --input in.wav --score own.score
+    expect 2 "" "$program" export "$file" --to faust -o "$name" --force
+  done
+done
+for name in in.wav ./in.wav sub/../in.wav "$folder/in.wav"; do
+  expect 2 "cannot be written too" "$program" render own.mdl -o "$name" --input in.wav
+done
+expect 2 "cannot be written too" "$program" export own.mdl --to faust -o hard-own.mdl.wav --force
+expect 2 "is no sound: it is not written over" "$program" render own.mdl -o hard-own.score.wav
+for file in own.mdl own.toml own.score in.wav; do
+  cmp -s "$file" "before/$file" || fail "$file was written over"
+done
+expect 0 "peak" "$program" render own.mdl -o again.wav --score own.score --seconds 0.1
+expect 0 "peak" "$program" render own.mdl -o again.wav --score own.score --seconds 0.1
+cmp -s in.wav again.wav || fail "a sound that was there is not written over"
+for command in "make string 5" "export own.mdl --to faust"; do
+  printf 'mine' > there.txt
+  # shellcheck disable=SC2086
+  expect 2 "there.txt' is there already; --force" "$program" $command -o there.txt
+  [ "$(cat there.txt)" = mine ] || fail "$command wrote over a file unasked"
+  # shellcheck disable=SC2086
+  expect 0 "" "$program" $command -o there.txt --force
+  [ "$(cat there.txt)" = mine ] && fail "$command --force did not write"
+done
+
+# Every ending, and no other.
+for ending in wav w64 flac ogg aiff aif au caf WAV; do
+  expect 0 "peak" "$program" render own.mdl -o "all.$ending" --score own.score --seconds 0.5
+  expect 0 "0.50 s" "$program" render own.mdl -o out.wav --input "all.$ending" --seconds 0.5
+done
+expect 2 "is the name of no sound file" "$program" render own.mdl -o all.mp4
+expect 2 "pipe' is a pipe" "$program" render own.mdl -o pipe
+expect 2 "a .flac holds pcm24, no floats" "$program" render own.mdl -o all.flac --format double
+expect 2 "a .ogg holds no such samples" "$program" render own.mdl -o all.ogg --format pcm24
+expect 2 "a .au ends at 4 GB" "$program" render own.mdl -o big.au --seconds 86400
+
+# Full disks.
+expect_full() {
+  said=$(timeout 60 "$@" 2>&1 > /dev/full < /dev/null)
+  got=$?
+  [ "$got" = 1 ] && printf '%s' "$said" | grep -q "could not be written whole" ||
+    fail "$* to a full disk ended with $got, saying: $said"
+}
+expect_full "$program" check own.mdl
+expect_full "$program" check own.mdl --json
+expect_full "$program" check own.mdl --print
+expect_full "$program" export own.mdl --to faust
+expect_full "$program" make string 500
+expect_full "$program" --help
+said=$("$program" check own.mdl 2>&1 >&-)
+[ $? = 1 ] || fail "a closed stdout is no failure: $said"
+expect 1 "No space left on device" "$program" make string 500 -o /dev/full
+expect 1 "failed: File too large" \
+  sh -c 'ulimit -f 64; exec "$@"' - "$program" render own.mdl -o again.wav --seconds 10
+cmp -s in.wav again.wav || fail "what was there is lost on a full disk"
+
+# Signals while it renders: what there is is kept, whole.
+for signal in TERM HUP INT; do
+  "$program" render own.mdl -q -o "cut$signal.wav" --seconds 86000 &
+  rendering=$!
+  for _ in $(seq 100); do
+    [ "$(stat -c %s "cut$signal.part.wav" 2> /dev/null || echo 0)" -gt 100000 ] && break
+    sleep 0.05
+  done
+  kill "-$signal" "$rendering"
+  wait "$rendering"
+  got=$?
+  size=$(stat -c %s "cut$signal.wav")
+  told=$(od -An -tu4 -j4 -N4 "cut$signal.wav")
+  [ "$got" = 1 ] && [ "$size" -gt 100000 ] && [ "$((told + 8))" = "$size" ] ||
+    fail "SIG$signal in a render: exit $got, $size bytes, the header says $told"
+done
+rm -f cut*.wav
+"$program" render own.mdl -q -o killed.wav --seconds 86000 &
+rendering=$!
+for _ in $(seq 100); do
+  told=$(od -An -tu4 -j4 -N4 killed.part.wav 2> /dev/null || echo 0)
+  [ "${told:-0}" -gt 100000 ] && break
+  sleep 0.1
+done
+kill -KILL "$rendering"
+wait "$rendering" 2> /dev/null
+[ "$told" -gt 100000 ] || fail "the header of a killed render says $told bytes"
+rm -f killed.part.wav
+[ -z "$(find . -name '*.part*')" ] || fail "left behind: $(find . -name '*.part*')"
 
 # The gate.
 expect 2 "wild.mdl:3:1: error: unstable: the stiffness 5 of 'r' must stay below 4; --force plays" \
@@ -183,6 +315,27 @@ expect 0 "became unstable" "$program" render wild.mdl -o wild.wav --seconds 1 --
 expect 0 "wild.mdl:3:1: warning: unstable: the stiffness 5 of 'r'" \
   "$program" render wild.mdl -o wild.wav --seconds 1 --force
 expect 2 "wild.mdl:3:1: error: unstable" "$program" play wild.mdl -a dummy -i
+# Whoever is asked says the same.
+model zero.mdl '@P param 0\n@g ground 0.\n@m mass 1. 0. 0.\n@r spring @g @m 1/P\n@out1 posOutput @m\n'
+expect 2 "zero.mdl:4:1: error: the argument 1/P of 'r' is no finite number where P = 0" \
+  "$program" check zero.mdl
+for refused in wild.mdl zero.mdl light.mdl two.toml target.toml; do
+  "$program" check $refused 2>&1 > checked.out | grep error: > checked
+  "$program" render $refused -o refused.wav 2>&1 < /dev/null | grep error: > rendered
+  "$program" play $refused -a dummy -r 44100 -u off -m none -i 2>&1 < /dev/null |
+    grep error: > played
+  if ! [ -s checked ] || ! cmp -s checked rendered || ! cmp -s checked played; then
+    echo "FAILED: check, render and play of $refused differ:" "$(cat checked rendered played)"
+    failures=$((failures + 1))
+  fi
+done
+# What nobody hears may be played, rendered and checked; each warns.
+silent="mute.mdl:1:1: warning: the model has no output, so it will be silent"
+expect 0 "$silent" "$program" check mute.mdl
+expect 0 "$silent" "$program" render mute.mdl -o mute.wav --seconds 0.1
+printf 'quit\n' > quit.script
+expect 0 "$silent" "$program" play mute.mdl -a dummy -u off -m none -e quit.script
+expect 0 "would let keys strike it" "$program" play mute.mdl -a dummy -u off -m none -e quit.script
 expect 0 "wide.toml:3:5: warning: 'K' is kept below 3.99999; above it the model is not stable" \
   "$program" render wide.toml -o wide.wav --seconds 1
 expect 0 "K: 4.5 is beyond what is stable, set to 3.99999" \
@@ -191,7 +344,7 @@ expect 2 "the stiffness K = 4.5 of 'm' must stay below 4" \
   "$program" render stiff.mdl -o stiff.wav --seconds 1 --set K=4.5
 expect 0 "peak" "$program" render stiff.mdl -o stiff.wav --seconds 1 --set K=3.9
 model steep.score '0.1 /param/K 4.5\n0.2 /param/K 9\n'
-expect 0 "steep.score:1:1: warning: K: 4.5 is beyond what is stable, set to 3.99999" \
+expect 0 "steep.score:1:5: warning: K: 4.5 is beyond what is stable, set to 3.99999" \
   "$program" render stiff.mdl -o stiff.wav --score steep.score
 # The same numbers at half the rate are four times as stiff.
 expect 2 "the stiffness K = 1.5 of 'm' must stay below 1, at 22050 Hz" \
@@ -209,16 +362,118 @@ expect 2 "must be a number" "$program" render PolyTriangle -o out.wav --score pu
 expect 75 "no JACK server answers to the name 'ressort-nobody'" "$program" play -a jack -i
 expect 75 "does not open" "$program" play -a alsa -d nosuchdevice -i
 expect 2 "there is no model or preset 'nosuch'" "$program" play nosuch -a dummy -i
+
+# Loads that take long. A signal ends them wherever they are, with what a program ends with.
+play="play -a dummy -m none -u off"
+model large.mdl '@K param 0.01\n@s mesh 700 700 1. K 0.001 0. 0.\n@in1 frcInput [@s 0.2 0.2]
+@out1 posOutput [@s 0.3 0.3]\n'
+printf 'load large\n' > load.txt
+ends() {
+  signal=$1
+  delay=$2
+  shift 2
+  timeout -s "$signal" -k 30 --preserve-status "$delay" "$@" > ends.log 2>&1
+  got=$?
+  # Before it is up a signal ends it as it does any program.
+  case $got in
+    0 | 129 | 130 | 143) ;;
+    *)
+      echo "FAILED: SIG$signal after $delay s of '$*': ended with $got, saying: $(cat ends.log)"
+      failures=$((failures + 1))
+      ;;
+  esac
+}
+for delay in 0.1 0.3 0.6 1 1.5 2.5; do
+  ends TERM "$delay" "$program" $play -i large.mdl < /dev/null
+  ends INT "$delay" "$program" $play < load.txt
+  ends HUP "$delay" "$program" $play -i -e load.txt < /dev/null
+done
+# What takes more memory than there is is refused, and the console goes on.
+model huge.mdl '@s string 3900000 1. 0.1 0. 0. 0.\n@out1 posOutput [@s 0.3]\n'
+said=$(ulimit -v 700000; printf 'load huge\nparams\nquit\n' | timeout 60 "$program" $play 2>&1)
+got=$?
+case $got:$said in
+  0:*"'huge' could not be loaded: there is not enough memory"*m_K*) ;;
+  *)
+    echo "FAILED: a load without memory ended with $got, saying: $said"
+    failures=$((failures + 1))
+    ;;
+esac
+expect 2 "there is not enough memory" sh -c "ulimit -v 700000; $program check huge.mdl"
+
 "$program" play PolyTriangle -a dummy -m none -i -u 19778 > first.log 2>&1 &
 first=$!
 for _ in 1 2 3 4 5 6 7 8 9 10; do
   grep -q "OSC on" first.log && break
   sleep 0.2
 done
-expect 1 "port 19778 of 127.0.0.1 is taken" "$program" play -a dummy -m none -i -u 19778
+printf 'quit\n' > quit.script
+expect 0 "playing without OSC: port 19778 of 127.0.0.1 is taken, perhaps by another ressort; choose another with -u 19779" \
+  "$program" play -a dummy -m none -i -u 19778 -e quit.script
+expect 0 "port 19779, open to this machine and 10.0.0.0/8" "$program" play -a dummy -m none -i \
+  -u 19779 -B 0.0.0.0 --osc-allow 10.0.0.0/8 -e quit.script
+expect 2 "say who may send with --osc-allow" "$program" play -a dummy -m none -i -B 0.0.0.0
+expect 2 "--osc-allow 10.0.0.5 needs -B too" "$program" play -a dummy -i --osc-allow 10.0.0.5
 kill -TERM "$first"
 wait "$first"
 [ $? = 0 ] || { echo "FAILED: SIGTERM did not end the program with 0"; failures=$((failures + 1)); }
+
+# Nobody reads what it says: it goes through its script, records, and ends when it is told to.
+mkfifo stalled
+sleep 60 < stalled &
+reader=$!
+{
+  yes help | head -n 1000
+  echo "rec stage.wav"
+} > talk
+"$program" play PolyTriangle -a dummy -m none -i -u off -e talk > stalled 2>&1 &
+player=$!
+for _ in $(seq 100); do
+  [ "$(stat -c %s stage.wav 2> /dev/null || echo 0)" -gt 100000 ] && break
+  sleep 0.1
+done
+kill -HUP "$player"
+for _ in $(seq 100); do
+  kill -0 "$player" 2> /dev/null || break
+  sleep 0.1
+done
+kill -KILL "$player" 2> /dev/null && fail "a stalled stdout keeps the program from ending"
+wait "$player"
+kill "$reader"
+size=$(stat -c %s stage.wav)
+[ "$size" -gt 100000 ] && [ "$(($(od -An -tu4 -j4 -N4 stage.wav) + 8))" = "$size" ] ||
+  fail "a recording that SIGHUP ended has $size bytes"
+
+# A terminal that shows nothing any more: the same.
+awk 'BEGIN {
+  print "@g ground 0.\n@m osc 1. .1 .001 0. 0.\n@in1 frcInput @m\n@out1 posOutput @m"
+  for (i = 0; i < 1000; i++) print "@parameter_" i " param 1"
+}' > many.mdl
+printf 'rec screen.wav\nparams\nparams\nparams\n' > asked
+mkfifo keyboard
+script -qec "kill -STOP \$PPID; exec '$program' play many.mdl -a dummy -m none -u off -e asked" \
+  screen.log < keyboard > screen &
+screen=$!
+exec 8> keyboard
+for _ in $(seq 100); do
+  [ "$(stat -c %s screen.wav 2> /dev/null || echo 0)" -gt 50000 ] && break
+  sleep 0.1
+done
+player=$(cat "/proc/$screen/task/$screen/children")
+player=${player% }
+kill -TERM "$player"
+for _ in $(seq 100); do
+  grep -q '^State:.*Z' "/proc/$player/status" && break
+  sleep 0.1
+done
+grep -q '^State:.*Z' "/proc/$player/status" || fail "a stalled terminal keeps the program from ending"
+kill -KILL "$player"
+kill -CONT "$screen"
+exec 8>&-
+wait "$screen"
+size=$(stat -c %s screen.wav)
+[ "$size" -gt 50000 ] && [ "$(($(od -An -tu4 -j4 -N4 screen.wav) + 8))" = "$size" ] ||
+  fail "a recording that SIGTERM ended has $size bytes"
 
 # The same render gives the same file, and a phrase that can be heard.
 expect 0 "peak" "$program" render IPlayTheTriangle -o one.wav

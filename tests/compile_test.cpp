@@ -10,8 +10,8 @@ using namespace rig;
 
 Error error_of(const std::string& model, const std::string& toml) {
   const auto preset = parse_preset("model = \"x.mdl\"\n" + toml);
-  REQUIRE(preset);
-  auto compiled = compile(network_of(model), *preset, {});
+  REQUIRE(preset.ok());
+  auto compiled = compile(network_of(model), preset.preset, {});
   REQUIRE_FALSE(compiled);
   return compiled.error();
 }

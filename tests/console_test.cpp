@@ -1,93 +1,18 @@
 // The console: what it understands, what it completes, and what its commands do to a process that
-// is driven by hand. The recorder with it, for `rec` is its only door.
+// is driven by hand.
 #include "app/console.h"
 
 #include <unistd.h>
 
 #include <chrono>
-#include <cmath>
-#include <filesystem>
-#include <fstream>
 #include <future>
 
-#include "app/files.h"
 #include "app/terminal.h"
 #include "tests/catch.h"
-#include "tests/scenes.h"
+#include "tests/console_rig.h"
 
 namespace ressort {
 namespace {
-
-namespace fs = std::filesystem;
-
-constexpr std::size_t period = 256;
-
-// A folder of its own, gone with it.
-class Folder {
- public:
-  Folder() {
-    std::string name = (fs::temp_directory_path() / "ressort_console_XXXXXX").string();
-    REQUIRE(mkdtemp(name.data()) != nullptr);
-    path_ = name;
-  }
-  ~Folder() {
-    std::error_code error;
-    fs::remove_all(path_, error);
-  }
-  Folder(const Folder&) = delete;
-  Folder& operator=(const Folder&) = delete;
-
-  std::string file(const std::string& name) const { return (path_ / name).string(); }
-  std::string write(const std::string& name, const std::string& text) const {
-    std::ofstream(path_ / name) << text;
-    return file(name);
-  }
-
- private:
-  fs::path path_;
-};
-
-// A console and all that it works on; the test is the audio thread.
-struct Rig {
-  explicit Rig(std::size_t channels = 2) : buffers(channels, std::vector<float>(period)) {}
-
-  Process process{48000.0};
-  Session session{process, {.compile = {.rate_hz = 48000.0}}, {}};
-  std::string said;
-  Console console{process, session, [this](const std::string& text) { said += text + "\n"; }};
-  std::vector<std::vector<float>> buffers;
-
-  // What the console says to a line.
-  std::string say(const std::string& line) {
-    said.clear();
-    console.run_line(line);
-    return said;
-  }
-
-  // Plays one period at most; gives the first channel.
-  std::vector<float> play(std::size_t frames = period) {
-    std::vector<float*> outputs;
-    for (auto& buffer : buffers) {
-      outputs.push_back(buffer.data());
-    }
-    process.block(std::span<const float* const>{}, std::span<float* const>(outputs), frames, {}, 0);
-    return {buffers[0].begin(), buffers[0].begin() + static_cast<std::ptrdiff_t>(frames)};
-  }
-
-  double loudest(int periods) {
-    double peak = 0.0;
-    for (int i = 0; i < periods; ++i) {
-      for (const float sample : play()) {
-        peak = std::max(peak, std::fabs(static_cast<double>(sample)));
-      }
-    }
-    return peak;
-  }
-};
-
-bool has(const std::string& text, const std::string& part) {
-  return text.find(part) != text.npos;
-}
 
 bool contains(const std::vector<std::string>& words, const std::string& word) {
   return std::find(words.begin(), words.end(), word) != words.end();
@@ -97,23 +22,6 @@ std::string error_of(std::string_view line) {
   const auto command = parse_command(line);
   REQUIRE_FALSE(command);
   return command.error().message;
-}
-
-const std::string triangle_preset =
-    "model = \"triangle.mdl\"\n"
-    "description = \"three masses, struck\"\n"
-    "voices = 4\n"
-    "[parameters]\n"
-    "m_K = { value = 0.1, range = [0.01, 0.2] }\n"
-    "[[control]]\n"
-    "from = \"note\"\n"
-    "to = \"in1\"\n"
-    "how = \"impulse\"\n"
-    "range = [0.01, 0.1]\n";
-
-std::string write_triangle(const Folder& folder) {
-  folder.write("triangle.mdl", scenes::poly_triangle());
-  return folder.write("tri.toml", triangle_preset);
 }
 
 }  // namespace
@@ -312,8 +220,6 @@ TEST_CASE("a pattern sets several parameters in one block", "[console]") {
   TimedEvent second;
   REQUIRE(rig.process.from_console.pop(first));
   REQUIRE(rig.process.from_console.pop(second));
-  CHECK(first.following == 1);
-  CHECK(second.following == 0);
   CHECK(first.timing == TimedEvent::When::now);
 }
 
@@ -364,7 +270,7 @@ TEST_CASE("a full ring is told, not waited for", "[console]") {
   Rig rig;
   rig.say("load " + write_triangle(folder));
   bool was_told = false;
-  for (int i = 0; i < 4096 && !was_told; ++i) {
+  for (std::size_t i = 0; i <= Process::max_now && !was_told; ++i) {
     was_told = has(rig.say("noteon 60"), "busy");
   }
   CHECK(was_told);
@@ -445,94 +351,6 @@ TEST_CASE("the keys play notes as on a piano", "[console]") {
   CHECK(played == std::vector<int>{60, -60, 61, -61, 50, -50, 72, -72});
 }
 
-TEST_CASE("rec writes what is heard, frame by frame", "[console]") {
-  const Folder folder;
-  const std::string path = folder.file("take.wav");
-  Rig rig;
-  rig.say("load " + write_triangle(folder));
-  rig.say("noteon 60 127");
-  rig.loudest(4);
-  CHECK(rig.say("rec " + path) == "recording to " + path + "; 'rec stop' ends it\n");
-  CHECK(has(rig.say("status"), "recording  yes"));
-  CHECK(has(rig.say("rec " + path), "error: a recording to '" + path + "' is going on"));
-  std::vector<double> heard;
-  for (const std::size_t frames : {period, std::size_t{1}, std::size_t{100}, period}) {
-    for (const float sample : rig.play(frames)) {
-      heard.push_back(static_cast<double>(sample));
-    }
-  }
-  CHECK(rig.say("rec stop") == path + ": 0.01 s, nothing lost\n");
-  rig.play();
-
-  const auto sound = read_wav(path);
-  REQUIRE(sound);
-  CHECK(sound->rate_hz == 48000.0);
-  REQUIRE(sound->channels.size() == 2);
-  REQUIRE(sound->channels[0].size() == heard.size());
-  REQUIRE(sound->channels[1].size() == heard.size());
-  double worst = 0.0;
-  for (std::size_t i = 0; i < heard.size(); ++i) {
-    worst = std::max(worst, std::fabs(sound->channels[0][i] - heard[i]));
-  }
-  CHECK(worst <= 0x1p-23);  // one step of 24 bits
-  CHECK(has(rig.say("rec stop"), "error: nothing is being recorded"));
-}
-
-TEST_CASE("a recording begins where it is told to, with the channels there are", "[console]") {
-  const Folder folder;
-  Rig rig(4);
-  rig.process.is_recording.raise();  // left over in the ring
-  rig.play();
-  rig.process.is_recording.lower();
-  rig.say("rec " + folder.file("four.wav"));
-  rig.play(100);
-  CHECK(has(rig.say("rec stop"), "nothing lost"));
-  const auto sound = read_wav(folder.file("four.wav"));
-  REQUIRE(sound);
-  REQUIRE(sound->channels.size() == 4);
-  CHECK(sound->channels[3].size() == 100);
-}
-
-TEST_CASE("a recording of nothing is a valid file", "[console]") {
-  const Folder folder;
-  Rig rig;
-  rig.say("rec " + folder.file("nothing.wav"));
-  CHECK(has(rig.say("rec stop"), "nothing.wav: 0.00 s, nothing lost"));
-  const auto sound = read_wav(folder.file("nothing.wav"));
-  REQUIRE(sound);
-  CHECK(sound->channels.size() == 2);
-  CHECK(sound->channels[0].empty());
-}
-
-TEST_CASE("what a recording misses is told", "[console]") {
-  const Folder folder;
-  Rig rig;
-  rig.say("rec " + folder.file("gap.wav"));
-  rig.play();
-  rig.process.meters.record_lost.add(3);
-  CHECK(has(rig.say("rec stop"), "gap.wav: 0.01 s, 3 pieces lost"));
-}
-
-TEST_CASE("a file that cannot be written is told at once", "[console]") {
-  const Folder folder;
-  Rig rig;
-  CHECK(has(rig.say("rec " + folder.file("none/x.wav")), "x.wav' cannot be written"));
-  CHECK_FALSE(rig.process.is_recording.is_raised());
-  CHECK(has(rig.say("rec stop"), "error: nothing is being recorded"));
-}
-
-TEST_CASE("a recording that is left alone ends with the console", "[console]") {
-  const Folder folder;
-  {
-    Rig rig;
-    rig.say("rec " + folder.file("end.wav"));
-    rig.play(100);
-  }
-  const auto sound = read_wav(folder.file("end.wav"));
-  REQUIRE(sound);
-  CHECK(sound->channels[0].size() == 100);
-}
-
 namespace {
 
 // Stands in for the standard input while it lives.
@@ -592,7 +410,7 @@ TEST_CASE("the end of the input ends only the console", "[console]") {
   TypedInput input;
   bool has_quit = false;
   std::promise<void> promise;
-  Console console(rig.process, rig.session, [&](const std::string&) { promise.set_value(); });
+  Console console(rig.process, rig.session, [&](const std::string&) { promise.set_value(); }, {});
   {
     Terminal terminal(console, [&] { has_quit = true; });
     input.type("status");  // without its line end

@@ -44,7 +44,7 @@ constexpr Model models[] = {
     {"common_thrown_0_x",                          2,  1, 0, 0, 0, 0, 1, delayed,  0},
     {"common_triangle_duplicate_link_labels",      4,  4, 0, 0, 2, 1, 2, delayed,  2},
     {"common_two_masses",                          3,  2, 0, 0, 0, 1, 1, delayed,  0},
-    {"force_inputs_on_one_mass_and_gaps",          3,  2, 0, 0, 0, 5, 4, delayed,  4},
+    {"force_inputs_on_one_mass_and_gaps",          3,  2, 0, 0, 0, 5, 4, delayed,  6},
     {"force_outputs_at_places",                    0,  1, 2, 9, 0, 2, 5, velocity, 0},
     {"forward_references",                         3,  3, 1, 2, 4, 1, 2, velocity, 0},
     {"layout_cr_no_final_newline",                 2,  1, 0, 0, 0, 1, 1, delayed,  0},

@@ -115,6 +115,16 @@ TEST_CASE("a bow grips hardest at a third of its speed, a smooth one at s/sqrt 8
   CHECK(steepest / 1e-9 == Approx(1.0387 * z).epsilon(1e-4));
 }
 
+TEST_CASE("a bow may be turned from one profile to the other", "[direct]") {
+  for (int i = -30; i <= 30; ++i) {
+    const double v = 0.05 * i / 20.0;
+    for (const double profile : {-1.0, 0.0, 1e-9, 0.5, 1.0, 7.0}) {
+      const double found = either_bow_force(lanes(v), lanes(0.1), lanes(0.05), lanes(profile))[0];
+      CHECK(found == (profile > 0.0 ? smooth_bow(v, 0.1, 0.05) : bow(v, 0.1, 0.05)));
+    }
+  }
+}
+
 TEST_CASE("the scenes have the published sizes", "[direct]") {
   for (const Example& example : scenes::nine_instruments()) {
     CAPTURE(example.name);

@@ -301,7 +301,13 @@ TEST_CASE("a parameter turned while others ramp, and in a sleeping voice, ends w
   const std::vector<Event> notes = {note_on(0, 60), note_on(0, 67), note_on(0, 72)};
   turned.run(5000, notes);
   set.run(5000, notes);
-  CHECK(turned.y() == set.y());
+  // The notes sound in other voices here and there, which are added up in another order.
+  Comparison error;
+  for (std::size_t n = 0; n < set.y().size(); ++n) {
+    error.add(set.y()[n], turned.y()[n]);
+  }
+  INFO(show(error.relative()));
+  CHECK(error.relative() < 1e-15);
 }
 
 // --- the guard

@@ -8,10 +8,10 @@
 #include <utility>
 #include <vector>
 
-#include "app/files.h"
 #include "tests/catch.h"
 #include "tests/faust_models.h"
 #include "tests/rig.h"
+#include "tests/sound.h"
 
 using namespace ressort;
 
@@ -160,8 +160,11 @@ class Stage {
   // channel's peak.
   double difference(const std::string& name, int rate_hz, const std::string& parameter = "",
                     const std::string& value = "") {
-    auto wav =
-        WavWriter::open(path("in.wav"), rate_hz, static_cast<int>(channels), SampleFormat::float64);
+    auto wav = SoundWriter::open(path("in.wav"),
+                                 {.rate_hz = static_cast<double>(rate_hz),
+                                  .channels = static_cast<int>(channels),
+                                  .samples = SampleFormat::float64},
+                                 Existing::replace);
     REQUIRE(wav);
     REQUIRE(wav->write(input_.data(), frames));
     REQUIRE(wav->close());
@@ -171,7 +174,7 @@ class Stage {
         options_ + (parameter.empty() ? "" : " --set " + parameter + "=" + value));
     run(path("runner") + " " + name + " " + std::to_string(rate_hz) + " " + path("in.raw") + " " +
         path("found.raw") + " " + parameter + " " + value);
-    const auto expected = read_wav(path("expected.wav"));
+    const auto expected = read_sound(path("expected.wav"));
     REQUIRE(expected);
     return compare(expected->channels);
   }
@@ -223,6 +226,7 @@ TEST_CASE("what FAUST makes of an exported model sounds as the model does", "[ex
     }
   }
   CHECK(stage.difference("poly_triangle", 44100, "m_K", "0.2") < tolerance);
+  CHECK(stage.difference("turned_bow", 44100, "p", "1") < tolerance);
 }
 
 TEST_CASE("raw numbers are the same numbers at every rate", "[export]") {

@@ -38,6 +38,8 @@ inline const std::vector<std::pair<std::string, std::string>>& faust_models() {
       {"damped_pluck", law("nlPluck @in2 @m 0.1 0.1 0.01")},
       {"bow", law("nlBow @in2 @m 0.2 0.02")},
       {"smooth_bow", law("nlBow @in2 @m 0.2 0.02 1")},
+      {"turned_bow", "@p param 0.\n" + law("nlBow @in2 @m 0.2 0.02 [1 - p]")},
+      {"sounding_bow", "@p audioParam @in1\n" + law("nlBow @in2 @m 0.2 0.02 p")},
       {"contact", law("contact @m @in2 0.1 0.01 0.05")},
       {"plain_contact", law("contact @m @in2 0.1 0.01")},
       {"clipped_contact", law("nlContact @m @in2 0.02 5. 0.1 0.01 0.05")},

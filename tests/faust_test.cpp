@@ -87,6 +87,10 @@ TEST_CASE("a law brings the one that it stands on", "[faust]") {
     has(exported(ends + law + "\n"), "\nspring(k, z, d, v) =");
   }
   CHECK(exported(ends + "nlBow @g @a 0.1 0.2\n").find("spring(") == std::string::npos);
+  const std::string turned = exported("@p param 0.\n" + ends + "nlBow @g @a 0.1 0.2 p\n");
+  has(turned, "\nbow(z, s, d, v) =");
+  has(turned, "\nsmooth_bow(z, s, d, v) =");
+  has(turned, "f_l = either_bow(0.1, 0.2, p_p, ");
 }
 
 TEST_CASE("a mass starts where and as fast as the model says", "[faust]") {

@@ -76,6 +76,41 @@ TEST_CASE("what is unstable as it starts is refused by name and place, or forced
   CHECK(said_to(ground + "@r spring @g @m 1.5\n", {.rate_hz = 22050.0, .rescale = false}) == "");
 }
 
+TEST_CASE("what is no number is refused by its element, place and parameters", "[gate]") {
+  const auto said = [](const std::string& text, const std::vector<Setting>& settings = {}) {
+    return said_to(text, {.bare = true, .force = true, .settings = settings});
+  };
+  CHECK(said("@P param 0\n" + ground + "@r spring @g @m 1/P\n") ==
+        "there.mdl:4:1: error: the argument 1/P of 'r' is no finite number where P = 0");
+  CHECK(said("@P param 2\n" + ground + "@r spring @g @m 1/P\n") == "");
+  CHECK(said("@P param 2\n" + ground + "@r spring @g @m 1/P\n", {{"P", 0.0}}) ==
+        "there.mdl:4:1: error: the argument 1/P of 'r' is no finite number where P = 0");
+  CHECK(said("@P param 0\n@Q param 3\n  @o osc Q*P 0.1 0 0 0\n") ==
+        "there.mdl:3:3: error: the mass Q*P of 'o' is not above 0 where P = 0 and Q = 3");
+  CHECK(said("@P param 900\n@o osc 1 0.1 exp(P) 0 0\n") ==
+        "there.mdl:2:1: error: the damping exp(P) of 'o' is no finite number where P = 900");
+  CHECK(said("@P param 0\n@s string 9 1 0.1 1/P 0 0\n") ==
+        "there.mdl:2:1: error: the damping 1/P of 's' is no finite number where P = 0");
+  CHECK(said("@P param 0\n@s string 9 1 0.1 0 0 0\n@out1 posOutput [@s 1/P]\n") ==
+        "there.mdl:3:17: error: the place 1/P is no finite number where P = 0");
+  // At a lower rate the stiffness grows; what an input gives is not known.
+  CHECK(said_to(ground + "@r spring @g @m 1e308\n", {.rate_hz = 8000.0, .force = true}) ==
+        "there.mdl:3:1: error: the argument " + std::string("1e308") +
+            " of 'r' is no finite number");
+  CHECK(compile(network_of("@K audioParam @in1\n@o osc 1 1/K 0 0 0\n"), {}, {}));
+}
+
+TEST_CASE("numbers where doubles end are told for what they are", "[gate]") {
+  CHECK(said_to(ground + "@r spring @g @m 0.1 1e308\n")
+            .find("the damping 1e308 of 'r' is too "
+                  "large to be reckoned with; ") != std::string::npos);
+  for (const char* const stiffness : {"1e150", "1e262", "1e308"}) {
+    INFO(stiffness);
+    CHECK(said_to(ground + "@r spring @g @m " + stiffness + " 0.1\n")
+              .find("of 'r' must stay below 3.8;") != std::string::npos);
+  }
+}
+
 TEST_CASE("what may never touch is no reason to refuse, nor what is not proved", "[gate]") {
   for (const char* const link :
        {"contact @g @m 50 0.1 0.", "nlContact @g @m 0.1 0.1 50 0.1 0.", "nlPluck @g @m 500 0.1 0.",

@@ -31,6 +31,12 @@ Program sharded(Program program, const Cut& cut, Crew& crew, Reform&& reform) {
   program.form = Shards{.shards = std::move(shards), .crew = &crew, .frames = cut.frames};
   return program;
 }
+std::optional<Chains> as_chains(const Program& program) {
+  return chains_form(program);
+}
+std::optional<Grid> as_grid(const Program& program) {
+  return grid_form(program);
+}
 std::optional<Direct> as_it_is(const Program&) {
   return Direct{};
 }
@@ -193,8 +199,8 @@ TEST_CASE("chains and grids in shards are held to the direct form", "[halo]") {
     options.isa = isa;
     for (const bool turns : {false, true}) {
       options.turns = turns;
-      check(chain_scene(), heard_forces(), cuts, chains_form);
-      check(mesh_scene(), "", mesh_cuts, grid_form);
+      check(chain_scene(), heard_forces(), cuts, as_chains);
+      check(mesh_scene(), "", mesh_cuts, as_grid);
     }
   }
 }
@@ -210,7 +216,7 @@ TEST_CASE("a grid with a law on every link goes on in shards", "[halo]") {
     run.coefficients[2] = run.coefficients[1];
     run.coefficients[1] = run.coefficients[0];
   }
-  for (const auto& output : duel<double>(sharded(cubic, {2, 10}, crew, grid_form),
+  for (const auto& output : duel<double>(sharded(cubic, {2, 10}, crew, as_grid),
                                          {.frames = 8820, .reach = 2.0, .turns = true})) {
     INFO(show(output.relative()));
     CHECK(output.relative() < 1e-12);
@@ -256,7 +262,7 @@ TEST_CASE("shards do not drift", "[halo]") {
   ThreadCrew crew(2);
   Program program = program_of(scenes::string("s", 2000, "0.3", "0") +
                                "@in1 frcInput @s_m20\n@out1 posOutput @s_m1700\n");
-  Program cut = sharded(program, {2, 64}, crew, chains_form);
+  Program cut = sharded(program, {2, 64}, crew, as_chains);
   program.form = *chains_form(program);
   Fighter<double> whole(program, 1.0, best_isa());
   Fighter<double> shards(cut, 1.0, best_isa());
@@ -302,7 +308,7 @@ TEST_CASE("a network is shared out where that pays", "[halo]") {
 TEST_CASE("kernels in shards are placed and saved as one", "[halo]") {
   ThreadCrew crew(2);
   const Program program = program_of(chain_scene());
-  const Program cut = sharded(program, {2, 16}, crew, chains_form);
+  const Program cut = sharded(program, {2, 16}, crew, as_chains);
   const auto kernel = make_kernel<double>(cut, 1, best_isa());
   CHECK(kernel->is_near_start(0, 1e-9));
   std::vector<double> x(program.position.size());

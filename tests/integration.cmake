@@ -4,18 +4,14 @@ add_library(rtspy MODULE rtspy.cpp)
 target_compile_options(rtspy PRIVATE -Wno-conversion -Wno-nonnull-compare)
 target_link_libraries(rtspy PRIVATE PkgConfig::JACK ${CMAKE_DL_LIBS})
 
-add_executable(ressort_stage_tests main.cpp stage_test.cpp)
+add_ressort_tests(ressort_stage_tests stage_test.cpp)
 target_link_libraries(ressort_stage_tests PRIVATE PkgConfig::JACK PkgConfig::LIBLO Threads::Threads)
 target_compile_definitions(ressort_stage_tests PRIVATE
   RESSORT_PROGRAM="$<TARGET_FILE:ressort>" RESSORT_SPY="$<TARGET_FILE:rtspy>")
-target_include_directories(ressort_stage_tests PRIVATE ${CMAKE_SOURCE_DIR})
-if(TARGET Catch2::Catch2)
-  target_link_libraries(ressort_stage_tests PRIVATE Catch2::Catch2)
-endif()
 add_dependencies(ressort_stage_tests ressort rtspy)
 
 # A sanitizer brings its own malloc, which the spy cannot stand in for.
-set(stage_tags jack_midi osc_time rtmidi alsa server_loss)
+set(stage_tags jack_midi osc_time flood rtmidi alsa server_loss)
 if(NOT RESSORT_ADDRESS_SANITIZER AND NOT RESSORT_THREAD_SANITIZER)
   list(APPEND stage_tags callback)
 endif()
@@ -29,14 +25,10 @@ add_test(NAME command_line COMMAND ${CMAKE_CURRENT_SOURCE_DIR}/command_line.sh
 set_tests_properties(command_line PROPERTIES TIMEOUT 240 LABELS stage RUN_SERIAL TRUE)
 
 # What is exported to FAUST, through the faust compiler and this C++ compiler.
-add_executable(ressort_export_tests main.cpp export_test.cpp)
+add_ressort_tests(ressort_export_tests export_test.cpp)
 target_link_libraries(ressort_export_tests PRIVATE ressort_app)
-target_include_directories(ressort_export_tests PRIVATE ${CMAKE_SOURCE_DIR})
 target_compile_definitions(ressort_export_tests PRIVATE
   RESSORT_PROGRAM="$<TARGET_FILE:ressort>" RESSORT_CXX="${CMAKE_CXX_COMPILER}")
-if(TARGET Catch2::Catch2)
-  target_link_libraries(ressort_export_tests PRIVATE Catch2::Catch2)
-endif()
 add_dependencies(ressort_export_tests ressort)
 add_test(NAME export COMMAND ressort_export_tests)
 set_tests_properties(export PROPERTIES TIMEOUT 300 LABELS integration)

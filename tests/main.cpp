@@ -83,11 +83,6 @@ NOT_INLINED void operator delete(void* memory, std::size_t, std::align_val_t) no
 }
 #endif  // RESSORT_OTHER_HEAP
 
-// The rings order their data by fences, which ThreadSanitizer does not know.
-extern "C" const char* __tsan_default_suppressions() {
-  return "race:moodycamel::\n";
-}
-
 int main(int argc, char** argv) {
   return Catch::Session().run(argc, argv);
 }

@@ -77,6 +77,7 @@ TEST_CASE("the reader says which meaning a motion has, and why", "[motion]") {
     const ParsedNetwork parsed = parse_network(c.text);
     REQUIRE(parsed.ok());
     CHECK(parsed.network.third == c.third);
+    CHECK(parsed.third == (c.motion.starts_with("both") ? std::nullopt : std::optional(c.third)));
     CHECK(parsed.motion == c.motion);
     CHECK(doubt(parsed).empty());
   }

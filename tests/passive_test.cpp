@@ -416,9 +416,12 @@ TEST_CASE("a passive law depends on no other lane", "[passive]") {
   Random random(7);
   for (int i = 0; i < 3000; ++i) {
     const auto any = [&](double size) { return size * random.uniform(-1.0, 1.0); };
-    const Law law = static_cast<Law>(random.below(9));
-    const double c[] = {std::fabs(any(2.)), std::fabs(any(2.)) + .01, std::fabs(any(2.)),
-                        std::fabs(any(.2)), any(.2)};
+    const Law law =
+        static_cast<Law>(random.below(static_cast<std::size_t>(Law::clipped_contact) + 1));
+    const double profile = i % 2;
+    const double c[] = {std::fabs(any(2.)), std::fabs(any(2.)) + .01,
+                        law == Law::either_bow ? profile : std::fabs(any(2.)), std::fabs(any(.2)),
+                        any(.2)};
     Meeting<V> both{};
     for (std::size_t lane = 0; lane < 2; ++lane) {
       both.now[lane] = any(1.);
@@ -438,6 +441,36 @@ TEST_CASE("a passive law depends on no other lane", "[passive]") {
         CHECK(push.x[lane] == Approx(alone.x).margin(1e-13).epsilon(1e-11));
         CHECK(push.v[lane] == Approx(alone.v).margin(1e-13).epsilon(1e-11));
       }
+    }
+  }
+}
+
+TEST_CASE("a bow of either profile is the one or the other, bit for bit", "[passive]") {
+  using V = Pack<double, 16>;
+  Random random(8);
+  for (int i = 0; i < 2000; ++i) {
+    const auto any = [&](double size) { return size * random.uniform(-1.0, 1.0); };
+    const V z = V{} + std::fabs(any(9.));
+    const V s = V{} + std::fabs(any(1.)) + .01;
+    const V profile = i % 2 == 0 ? V{0.0, 1.0} : V{1e-9, -0.3};
+    Meeting<V> m{V{} + any(1.), V{} + any(1.), V{}, V{} + any(1.), V{} + random.uniform(0., 3.)};
+    m.free = m.now + m.fast;
+    for (const Scheme scheme : {Scheme::centred, Scheme::substeps}) {
+      const auto push = [&](Law law) {
+        return passive_push(law, scheme, 8, m, z, s, profile, V{}, V{}).x;
+      };
+      const V either = push(Law::either_bow);
+      const V piecewise = push(Law::bow);
+      const V smooth = push(Law::smooth_bow);
+      for (std::size_t lane = 0; lane < 2; ++lane) {
+        CHECK(either[lane] == (profile[lane] > 0.0 ? smooth : piecewise)[lane]);
+      }
+    }
+    const V v = m.speed;
+    const V plain = either_bow_force(v, z, s, profile);
+    for (std::size_t lane = 0; lane < 2; ++lane) {
+      CHECK(plain[lane] ==
+            (profile[lane] > 0.0 ? smooth_bow_force(v, z, s) : bow_force(v, z, s))[lane]);
     }
   }
 }

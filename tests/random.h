@@ -1,8 +1,10 @@
-// tests: numbers that repeat.
+// tests: numbers that repeat, and how they are written.
 #pragma once
 
 #include <cstddef>
 #include <cstdint>
+#include <cstdio>
+#include <string>
 
 namespace ressort::rig {
 
@@ -24,5 +26,12 @@ class Random {
  private:
   std::uint64_t state_;
 };
+
+// A number as a person reads it: Catch would print 1e-13 as 0.
+inline std::string show(double value) {
+  char text[40];
+  std::snprintf(text, sizeof text, "%.10g", value);
+  return text;
+}
 
 }  // namespace ressort::rig

@@ -11,11 +11,13 @@
 //   Nor does it where a force is heard: far from 0 that is a small difference of large numbers.
 #pragma once
 
+#include <algorithm>
+#include <iterator>
 #include <string>
 #include <utility>
 #include <vector>
 
-#include "tests/rig.h"
+#include "tests/random.h"
 
 namespace ressort::rig {
 

@@ -304,6 +304,25 @@ class SmoothBow : public Interaction {
   Number s_;
 };
 
+// One of the two, as the profile says at every tick.
+class EitherBow : public Interaction {
+ public:
+  EitherBow(Point& a, Point& b, Number z, Number s, Number profile)
+      : Interaction(a, b), z_(z), s_(s), profile_(profile) {}
+
+ private:
+  Real force(Real, Real nu) const override {
+    const Real fast = std::fabs(nu);
+    if (*profile_ > 0) {
+      return 0.63L * *z_ * nu * std::exp(0.5L - 4 * (nu / *s_) * (nu / *s_));
+    }
+    return fast < *s_ / 3 ? 2 * *z_ * nu / 3 : fast < *s_ ? sgn(nu) * *z_ * (*s_ - fast) / 3 : 0;
+  }
+  Number z_;
+  Number s_;
+  Number profile_;
+};
+
 class Contact : public Interaction {
  public:
   Contact(Point& a, Point& b, Number k, Number z, Number threshold)
@@ -348,6 +367,9 @@ class Simulator {
   void add_pluck(Point& a, Point& b, Number k, Number s, Number z) { add<Pluck>(a, b, k, s, z); }
   void add_bow(Point& a, Point& b, Number z, Number s) { add<Bow>(a, b, z, s); }
   void add_smooth_bow(Point& a, Point& b, Number z, Number s) { add<SmoothBow>(a, b, z, s); }
+  void add_either_bow(Point& a, Point& b, Number z, Number s, Number profile) {
+    add<EitherBow>(a, b, z, s, profile);
+  }
   void add_contact(Point& a, Point& b, Number k, Number z, Number threshold) {
     add<Contact>(a, b, k, z, threshold);
   }

@@ -180,6 +180,8 @@ class Builder {
         return simulator_.add_bow(a, b, n[0], n[1]);
       case LinkKind::smooth_bow:
         return simulator_.add_smooth_bow(a, b, n[0], n[1]);
+      case LinkKind::either_bow:
+        return simulator_.add_either_bow(a, b, n[0], n[1], n[2]);
       case LinkKind::contact:
         return simulator_.add_contact(a, b, n[0], n[1], n[2]);
       case LinkKind::clipped_contact:

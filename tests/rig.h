@@ -5,7 +5,6 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
-#include <cstdio>
 #include <limits>
 #include <numbers>
 #include <string>
@@ -48,13 +47,6 @@ inline std::vector<Isa> isas() {
     }
   }
   return all;
-}
-
-// A number as a person reads it: Catch would print 1e-13 as 0.
-inline std::string show(double value) {
-  char text[40];
-  std::snprintf(text, sizeof text, "%.10g", value);
-  return text;
 }
 
 // A hand that wanders smoothly within -1..1: a few slow sines of random pitch and phase. It

@@ -125,6 +125,13 @@ TEST_CASE("what may be left out is 0", "[rules]") {
   CHECK(linked("nlBow @a @b 2 3").links[0].kind == LinkKind::bow);
   CHECK(linked("nlBow @a @b 2 3 0.0").links[0].kind == LinkKind::bow);
   CHECK(linked("nlBow @a @b 2 3 0.5").links[0].kind == LinkKind::smooth_bow);
+  CHECK(linked("nlBow @a @b 2 3 -1").links[0].kind == LinkKind::bow);
+  CHECK(linked("nlBow @a @b 2 3 [2-1]") == linked("nlBow @a @b 2 3 1"));
+  for (const char* const profile : {"p", "[1-p]", "[p+0*p]"}) {
+    const Network turned = linked(std::string("nlBow @a @b 2 3 ") + profile);
+    CHECK(turned.links[0].kind == LinkKind::either_bow);
+    CHECK(link_value(turned, 2) == 0.5);
+  }
 
   // Of a mass and an oscillator it is the gravity, in the middle.
   const Network heavy = network_of("@a mass 2 3 4 5\n@b osc 2 3 4 5 6 7\n");
@@ -293,6 +300,17 @@ TEST_CASE("display triples and blocks are kept as groups", "[rules]") {
   check_error(two_masses + "~begin", 3, 1, "expected '~begin NAME' or '~end NAME'");
   check_error(two_masses + "~begin x y", 3, 1, "expected '~begin NAME' or '~end NAME'");
   check_error(two_masses + "~open x", 3, 1, "expected '~begin NAME' or '~end NAME'");
+  // What could not be a name is one argument too many.
+  check_error(
+      "@a mass 1 0 0 0 7 7", 1, 17,
+      "'mass' takes 3 to 4 arguments (M [G] POSITION MOTION), found 6; a drawing is GROUP X "
+      "Y, and '0' is no group");
+  check_error("@g ground 0 -1 7 7", 1, 13,
+              "'ground' takes 1 argument (POSITION), found 4; a drawing is GROUP X Y, and '-1' is "
+              "no group");
+  check_error("@o osc 1 1 1 0 0 [1 2 3] 7 7", 1, 26,
+              "'osc' takes 5 to 6 arguments (M K Z [G] POSITION MOTION), found 8; a drawing is "
+              "GROUP X Y, and '[1 2 3]' is no group");
   check_error("@a mass 1 0 0 skin x 0", 1, 20,
               "found 'x' where a number was expected (a starting state is no parameter)");
 }
@@ -388,6 +406,10 @@ TEST_CASE("unusual networks are accepted, and told where they are hardly meant",
       "the contact's ends look swapped: it acts while the second is below the first, here '@b' "
       "below '@in1'");
   check_told(sounding + "@in1 posInput 0\n@k contact @b @in1 1 1 1", {});
+  check_warning(sounding + "@g ground 0\n@k spring @g @a 1\n @in1 frcInput @g", 7, 2,
+                "'@in1' pushes '@g', which never moves: it does nothing");
+  check_warning(sounding + "@in1 posInput 0\n@k spring @in1 @a 1\n@in2 frcInput @in1", 7, 1,
+                "'@in2' pushes '@in1', which moves only as its input says: it does nothing");
   check_error("@p param 1", 1, 1, "the model has no masses: nothing can sound");
   check_error("# nothing", 1, 1,
               "the model is empty: expected elements such as '@m mass 1. 0. 0.'");

@@ -3,8 +3,10 @@
 
 #include <unistd.h>
 
+#include <algorithm>
 #include <atomic>
 #include <cmath>
+#include <cstdio>
 #include <filesystem>
 #include <fstream>
 #include <mutex>
@@ -196,6 +198,63 @@ TEST_CASE("What cannot be loaded is told in full, and what sounds goes on", "[se
   CHECK(player.ear().largest_step.load() > 0.001f);
 }
 
+TEST_CASE("A newer load replaces an older one, and the end replaces all", "[session]") {
+  const Folder folder;
+  // Some seconds of work.
+  const std::string large = folder.write(
+      "large.mdl",
+      "@K param 0.01\n@s mesh 600 600 1. K 0.001 0. 0.\n@out1 posOutput [@s 0.3 0.3]\n");
+  const std::string quick = folder.write("quick.mdl", model);
+  Process process(48000.0);
+  std::mutex mutex;
+  std::vector<std::string> answers;
+  const auto note = [&](const auto& result) {
+    const std::lock_guard lock(mutex);
+    answers.push_back(result ? (*result)->name : result.error().message);
+  };
+  {
+    Session session(process, at_48k(), {});
+    session.load(large, note);
+    std::this_thread::sleep_for(std::chrono::milliseconds(50));  // most often it is at work then
+    session.load(large, note);
+    session.load(large, note);
+    const auto loaded = session.load_and_wait(quick);
+    REQUIRE(loaded);
+    CHECK((*loaded)->name == "quick");
+    CHECK(session.current()->name == "quick");
+    session.load(large, note);
+    std::this_thread::sleep_for(std::chrono::milliseconds(50));
+    session.load(large, note);
+    session.end();
+    const auto late = session.load_and_wait(quick);
+    REQUIRE_FALSE(late);
+    CHECK(late.error().message == "the program is ending");
+  }
+  REQUIRE(answers.size() == 5);
+  for (int i = 0; i < 3; ++i) {
+    CHECK(answers[static_cast<std::size_t>(i)] == "replaced by a newer load");
+  }
+  CHECK((answers[3] == "replaced by a newer load" || answers[3] == "the program is ending"));
+  CHECK(answers[4] == "the program is ending");
+}
+
+TEST_CASE("What sounds is made anew for another rate, once", "[session]") {
+  const Folder folder;
+  const std::string file = folder.write("quick.mdl", model);
+  Process process(48000.0);
+  Session session(process, at_48k(), {});
+  session.set_rate(44100.0);  // before there is anything
+  REQUIRE(session.load_and_wait(file));
+  const std::uint32_t first = session.current()->serial;
+  session.set_rate(96000.0);
+  for (int patience = 0; patience < 1000 && session.current()->serial == first; ++patience) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(10));
+  }
+  std::this_thread::sleep_for(std::chrono::milliseconds(100));
+  CHECK(session.current()->serial == first + 1);
+  CHECK(session.status().rate_hz == 96000.0);
+}
+
 TEST_CASE("Parameters are remembered, clamped, and followed when a controller turns them",
           "[session]") {
   const Folder folder;
@@ -223,6 +282,55 @@ TEST_CASE("Parameters are remembered, clamped, and followed when a controller tu
     std::this_thread::sleep_for(std::chrono::milliseconds(10));
   }
   CHECK(session.parameter("K") == 0.2);
+}
+
+TEST_CASE("What happens again and again is told once, with how often it was", "[session]") {
+  const Folder folder;
+  const std::string file = folder.write("m.mdl", model);
+  Process process(48000.0);
+  std::mutex mutex;
+  std::vector<std::string> told;
+  Session session(process, at_48k(), [&](const std::string& news) {
+    const std::lock_guard lock(mutex);
+    told.push_back(news);
+  });
+  REQUIRE(session.load_and_wait(file));
+  Ear ear(process, 1'000'000);
+  for (std::uint64_t n = 1; n < 751; ++n) {
+    ear.block(n);  // a second has gone by
+  }
+  const TimedEvent late{
+      .event = {.kind = EventKind::bend}, .timing = TimedEvent::When::at_frame, .when = 24000};
+  for (int packet = 0; packet < 738; ++packet) {
+    REQUIRE(process.send_ahead({&late, 1}));
+  }
+  REQUIRE_FALSE(process.send_ahead(std::vector<TimedEvent>(Process::max_ahead, late)));
+  ear.block(751);
+  // How often it was, as it was told; the worker may look while the block is not done.
+  const auto count = [&](const std::string& news) {
+    const std::lock_guard lock(mutex);
+    int times = 0;
+    for (const std::string& text : told) {
+      int more = 0;
+      if (text.starts_with(news)) {
+        std::sscanf(text.c_str() + news.size(), " (and %d more)", &more);
+        times += 1 + more;
+      }
+    }
+    return times;
+  };
+  const std::string late_news = "an event came 0.500 s after its time";
+  const std::string lost_news =
+      "an event found no room and was dropped: more came than can be played";
+  for (int patience = 0; patience < 2000 && (count(late_news) < 738 || count(lost_news) < 4096);
+       ++patience) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(10));
+  }
+  CHECK(count(late_news) == 738);
+  CHECK(count(lost_news) == 4096);
+  const std::lock_guard lock(mutex);
+  CAPTURE(told);
+  CHECK(told.size() <= 4);
 }
 
 TEST_CASE("A contact that creates energy is named, and compiled anew behind the sound",

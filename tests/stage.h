@@ -19,6 +19,7 @@
 #include <memory>
 #include <string>
 #include <thread>
+#include <tuple>
 #include <vector>
 
 #include "tests/catch.h"
@@ -146,11 +147,11 @@ inline void use_test_server() {
 
 class Server {
  public:
-  explicit Server(int period_frames) {
+  explicit Server(int period_frames, int rate_hz = 48000) {
     use_test_server();
-    jackd_ = std::make_unique<Child>(std::vector<std::string>{"jackd", "-r", "-n", server_name,
-                                                              "-d", "dummy", "-r", "48000", "-p",
-                                                              std::to_string(period_frames)});
+    jackd_ = std::make_unique<Child>(
+        std::vector<std::string>{"jackd", "-r", "-n", server_name, "-d", "dummy", "-r",
+                                 std::to_string(rate_hz), "-p", std::to_string(period_frames)});
     REQUIRE(eventually([] {
       jack_client_t* client = jack_client_open("knock", JackNoStartServer, nullptr);
       if (client != nullptr) {
@@ -160,6 +161,7 @@ class Server {
     }));
   }
   void kill() { jackd_->signal(SIGKILL); }
+  void end() { jackd_->signal(SIGTERM); }
 
  private:
   std::unique_ptr<Child> jackd_;
@@ -258,6 +260,49 @@ class Listener {
   std::size_t next_ = 0;
   std::atomic<std::size_t> at_{0};
   std::atomic<bool> is_rolling_{false};
+};
+
+// A JACK client that somebody connects by hand: ports without a sound.
+class Neighbour {
+ public:
+  Neighbour() {
+    client_ = jack_client_open("neighbour", JackNoStartServer, nullptr);
+    REQUIRE(client_ != nullptr);
+    for (const auto& [name, type, flags] :
+         {std::tuple{"left", JACK_DEFAULT_AUDIO_TYPE, JackPortIsInput},
+          std::tuple{"right", JACK_DEFAULT_AUDIO_TYPE, JackPortIsInput},
+          std::tuple{"sound", JACK_DEFAULT_AUDIO_TYPE, JackPortIsOutput},
+          std::tuple{"keys", JACK_DEFAULT_MIDI_TYPE, JackPortIsOutput}}) {
+      REQUIRE(jack_port_register(client_, name, type, static_cast<unsigned long>(flags), 0) !=
+              nullptr);
+    }
+    REQUIRE(jack_activate(client_) == 0);
+  }
+  ~Neighbour() { jack_client_close(client_); }
+
+  bool connect(const std::string& from, const std::string& to) {
+    return eventually([&] {
+      jack_connect(client_, from.c_str(), to.c_str());
+      return is_connected(from, to);
+    });
+  }
+  void disconnect(const std::string& from, const std::string& to) {
+    REQUIRE(jack_disconnect(client_, from.c_str(), to.c_str()) == 0);
+  }
+  bool is_connected(const std::string& from, const std::string& to) const {
+    const jack_port_t* const port = jack_port_by_name(client_, from.c_str());
+    const char** const others =
+        port != nullptr ? jack_port_get_all_connections(client_, port) : nullptr;
+    bool found = false;
+    for (std::size_t i = 0; others != nullptr && others[i] != nullptr; ++i) {
+      found = found || others[i] == to;
+    }
+    jack_free(others);
+    return found;
+  }
+
+ private:
+  jack_client_t* client_ = nullptr;
 };
 
 }  // namespace ressort::stage

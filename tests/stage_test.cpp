@@ -81,6 +81,19 @@ TEST_CASE("MIDI notes start on their frame", "[jack_midi]") {
   std::printf("MIDI onsets: %zu frames after the event, spread %zu\n", *least, *most - *least);
 }
 
+TEST_CASE("The last of two and a half thousand messages in one block is heard", "[jack_midi]") {
+  const Server server(1024);
+  Child play(program({"play", "PolyTriangle", "-a", "jack", "-i", "-u", osc_port}));
+  REQUIRE(answers());
+  Listener listener(48000 * 20);
+  std::vector<Listener::Message> messages(2500, {20000, {0xb0, 3, 0}});
+  messages.push_back({20000, {0x90, 69, 100}});
+  listener.plan(messages);
+  listener.start("ressort:out_left", "ressort:midi_in");
+  REQUIRE(listener.wait_for(48000));
+  CHECK(listener.onset(20000, 48000, 0.01f) < 22500);
+}
+
 TEST_CASE("OSC bundles start on the frame of their time tag", "[osc_time]") {
   const Server server(1024);
   Child play(program({"play", "PolyTriangle", "-a", "jack", "-i", "-u", osc_port}));
@@ -124,6 +137,57 @@ TEST_CASE("OSC bundles start on the frame of their time tag", "[osc_time]") {
   }
   CHECK(worst == 0);  // frames
   std::printf("OSC bundles: at most %zu frames from the exact spacing\n", worst);
+}
+
+// What is sent and asked goes through one socket and one queue: an answer comes after all before
+// it.
+TEST_CASE("Notes and panic get through a flood, with the future full", "[flood]") {
+  Child play(program({"play", "PolyTriangle", "-a", "dummy", "-m", "none", "-u", osc_port}));
+  REQUIRE(answers());
+  lo_timetag now;
+  lo_timetag_now(&now);
+  const lo_timetag ahead{now.sec + 9, now.frac};
+  for (int packet = 0; packet < 4; ++packet) {
+    const lo_bundle bundle = lo_bundle_new(ahead);
+    for (int i = 0; i < 1400; ++i) {
+      const lo_message note = lo_message_new();
+      lo_message_add_int32(note, 30 + i % 90);
+      lo_bundle_add_message(bundle, "/note/on", note);
+    }
+    lo_send_bundle(osc(), bundle);
+    lo_bundle_free_recursive(bundle);
+  }
+  // 4200 do not fit into 4096: the last two were refused, and are counted.
+  CHECK(eventually([&] { return status_shows(play, "2800 dropped"); }));
+
+  std::atomic<bool> enough{false};
+  std::thread flood([&] {
+    const lo_address own = lo_address_new("127.0.0.1", osc_port);
+    for (int i = 0; !enough; ++i) {
+      lo_send(own, i % 2 == 0 ? "/bend" : "/pressure", "f", 0.01f * static_cast<float>(i % 100));
+      if (i % 100 == 99) {
+        std::this_thread::sleep_for(1ms);  // 100 000 a second
+      }
+    }
+    lo_address_free(own);
+  });
+  play.write("noteon 60\n");
+  CHECK(eventually([&] { return status_shows(play, "voices  1 of 16"); }));
+  play.write("noteoff 60\npanic\n");
+  CHECK(eventually([&] { return status_shows(play, "voices  0 of 16"); }));
+  // By OSC too, as often as a packet is lost before the flood lets it in.
+  play.write("noteon 64\n");
+  CHECK(eventually([&] { return status_shows(play, "voices  1 of 16"); }));
+  CHECK(eventually([&] {
+    lo_send(osc(), "/panic", "");
+    return status_shows(play, "voices  0 of 16");
+  }));
+  enough = true;
+  flood.join();
+  std::this_thread::sleep_for(10s);  // the time of the bundles has come, and nobody waits for it
+  CHECK(status_shows(play, "voices  0 of 16"));
+  play.signal(SIGTERM);
+  CHECK(play.exit_code() == 0);
 }
 
 TEST_CASE("The callback allocates, locks, reads, writes and waits never", "[callback]") {
@@ -255,6 +319,64 @@ TEST_CASE("The death of the server is survived, or told by the exit code", "[ser
     listener.start("ressort:out_left", "ressort:midi_in");
     REQUIRE(listener.wait_for(24000));
     CHECK(listener.onset(9600, 24000, 0.01f) < 24000);
+    play.signal(SIGTERM);
+    CHECK(play.exit_code() == 0);
+  }
+
+  SECTION("what a person has connected is connected again, on servers of any kind") {
+    using Cable = std::pair<std::string, std::string>;
+    const std::vector<Cable> kept{{"ressort:out_left", "neighbour:left"},
+                                  {"ressort:out_right", "neighbour:left"},
+                                  {"ressort:out_right", "system:playback_2"},
+                                  {"neighbour:keys", "ressort:midi_in"},
+                                  {"neighbour:sound", "ressort:in_1"}};
+    const Cable pulled{"ressort:out_left", "neighbour:right"};
+    const Cable pulled_from_speaker{"ressort:out_left", "system:playback_1"};
+    // -j connects the speakers by itself, and has to respect what was pulled.
+    Child play(program({"play", "Resonator", "-a", "jack", "-j", "-u", osc_port}));
+    REQUIRE(answers());
+    auto neighbour = std::make_unique<Neighbour>();
+    const auto all_are_back = [&] {
+      return std::all_of(kept.begin(), kept.end(), [&](const Cable& cable) {
+        return neighbour->is_connected(cable.first, cable.second);
+      });
+    };
+    for (const auto& [from, to] : kept) {
+      REQUIRE(neighbour->connect(from, to));
+    }
+    REQUIRE(neighbour->connect(pulled.first, pulled.second));
+    REQUIRE(eventually([&] {
+      return neighbour->is_connected(pulled_from_speaker.first, pulled_from_speaker.second);
+    }));
+    std::this_thread::sleep_for(500ms);  // seen
+    neighbour->disconnect(pulled.first, pulled.second);
+    neighbour->disconnect(pulled_from_speaker.first, pulled_from_speaker.second);
+    std::this_thread::sleep_for(500ms);
+
+    struct Next {
+      int period_frames;
+      int rate_hz;
+      bool is_killed;
+    };
+    for (const Next& next : {Next{512, 48000, true}, Next{128, 44100, false}}) {
+      CAPTURE(next.period_frames, next.is_killed);
+      play.forget();
+      next.is_killed ? server->kill() : server->end();
+      REQUIRE(play.says("is gone"));
+      CHECK(eventually([&] { return status_shows(play, "audio   none; waiting for JACK"); }));
+      CHECK(play.said().find("cpu     nothing runs") != std::string::npos);
+      neighbour.reset();
+      server.reset();
+      server = std::make_unique<Server>(next.period_frames, next.rate_hz);
+      REQUIRE(play.says("playing again"));
+      std::this_thread::sleep_for(300ms);  // it comes later than we
+      neighbour = std::make_unique<Neighbour>();
+      CHECK(eventually(all_are_back));
+      std::this_thread::sleep_for(1500ms);  // longer than anybody waits before he tries again
+      CHECK(all_are_back());
+      CHECK_FALSE(neighbour->is_connected(pulled.first, pulled.second));
+      CHECK_FALSE(neighbour->is_connected(pulled_from_speaker.first, pulled_from_speaker.second));
+    }
     play.signal(SIGTERM);
     CHECK(play.exit_code() == 0);
   }

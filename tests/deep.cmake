@@ -1,0 +1,41 @@
+# The second tier of the tests: parts that take minutes, one after the other behind all others. Each
+# is skipped where it does not fit before RESSORT_DEADLINE; for whoever has never the time for all of
+# them, another comes first with each RESSORT_TURN.
+set(RESSORT_TURN 0 CACHE STRING "Which of the deep tests comes first")
+set(ressort_fuzzers model preset score midi console osc osc_packet)
+list(TRANSFORM ressort_fuzzers PREPEND fuzz_ OUTPUT_VARIABLE ressort_deep_tests)
+list(APPEND ressort_deep_tests arm everything_sanitized everything_more forms_everywhere lint
+  abuse_long)
+list(LENGTH ressort_deep_tests ressort_deep_count)
+
+# SECONDS is about what it needs on two cores.
+function(add_deep_test name seconds)
+  add_test(NAME ${name} COMMAND ${CMAKE_CURRENT_SOURCE_DIR}/part ${seconds} ${ARGN})
+  list(FIND ressort_deep_tests ${name} place)
+  math(EXPR cost "-1 - (${place} + ${RESSORT_TURN}) % ${ressort_deep_count}")
+  set_tests_properties(${name} PROPERTIES LABELS deep TIMEOUT 7200 RUN_SERIAL TRUE COST ${cost}
+    SKIP_RETURN_CODE 77)
+endfunction()
+
+# Bytes that no person wrote, for some seconds each; clang builds the fuzzers beside everything else.
+foreach(fuzzer IN LISTS ressort_fuzzers)
+  add_deep_test(fuzz_${fuzzer} 90 ${CMAKE_CURRENT_SOURCE_DIR}/fuzz/run 40 ${fuzzer})
+endforeach()
+
+# Every model that there is under the same sanitizers, and more of those that nobody wrote.
+add_deep_test(everything_sanitized 240 ${CMAKE_CURRENT_SOURCE_DIR}/system/sanitized 0.1 200)
+add_deep_test(everything_more 120 $<TARGET_FILE:ressort_play_everything> 1 400 201
+  ${CMAKE_SOURCE_DIR}/presets)
+
+# The engine for another kind of machine, as far as a compiler can tell.
+add_deep_test(arm 60 ${CMAKE_CURRENT_SOURCE_DIR}/arm.sh ${CMAKE_SOURCE_DIR})
+
+# All random networks in all forms on all instruction sets.
+add_deep_test(forms_everywhere 240 $<TARGET_FILE:ressort_tests> "[forms_everywhere]")
+
+# A minute of it for each instrument.
+add_deep_test(abuse_long 300 $<TARGET_FILE:ressort_abuse> 60 2)
+
+# Format, clang-tidy and types of one name: of what has changed last, or of all where there is time.
+add_deep_test(lint 240 sh -c
+  "exec ${CMAKE_CURRENT_SOURCE_DIR}/lint $([ -n \"$RESSORT_DEADLINE\" ] || echo --all)")
