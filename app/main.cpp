@@ -13,12 +13,12 @@
 #include <utility>
 #include <vector>
 
-#include "app/chart/chart.h"
-#include "app/check.h"
-#include "app/commands.h"
-#include "app/export.h"
-#include "app/make.h"
-#include "core/model/expression.h"
+#include "app/commands/chart/chart.h"
+#include "app/commands/check.h"
+#include "app/commands/commands.h"
+#include "app/commands/export.h"
+#include "app/commands/make.h"
+#include "core/model/language/expression.h"
 
 namespace {
 

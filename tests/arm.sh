@@ -7,6 +7,6 @@ set -eu
 cd "$1"
 compiler=aarch64-linux-gnu-g++
 command -v $compiler >/dev/null || exit 77
-printf '%s\n' core/engine/*.cpp |
+printf '%s\n' $(find core/kernels core/engine -name "*.cpp") |
   xargs -P 2 -I FILE $compiler -std=c++20 -fsyntax-only -Wall -Wextra -Wconversion \
     -Wno-missing-field-initializers -Wno-psabi -Werror -DRESSORT_ISA=base -DRESSORT_X86_LEVELS=0 -I. FILE

@@ -4,7 +4,7 @@
 #include <set>
 
 #include "core/analysis/proofs.h"
-#include "core/model/expression.h"
+#include "core/model/language/expression.h"
 
 namespace ressort {
 namespace {

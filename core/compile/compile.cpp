@@ -16,8 +16,8 @@
 #include "core/compile/memory.h"
 #include "core/compile/merge.h"
 #include "core/compile/repose.h"
-#include "core/engine/passive.h"
-#include "core/model/fit.h"
+#include "core/kernels/passive.h"
+#include "core/model/preset/fit.h"
 #include "core/model/topology.h"
 
 namespace ressort {

@@ -15,7 +15,7 @@
 #include "core/compile/schemes.h"
 #include "core/engine/engine.h"
 #include "core/model/network.h"
-#include "core/model/preset.h"
+#include "core/model/preset/preset.h"
 #include "core/progress.h"
 #include "core/result.h"
 

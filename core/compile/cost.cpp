@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "core/engine/sharded.h"
+#include "core/kernels/domains/sharded.h"
 
 namespace ressort {
 namespace {

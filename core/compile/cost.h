@@ -1,8 +1,8 @@
 // core/compile: what a kernel will cost, predicted from its tables.
 #pragma once
 
-#include "core/engine/isa.h"
-#include "core/engine/program.h"
+#include "core/kernels/isa.h"
+#include "core/kernels/program.h"
 
 namespace ressort {
 

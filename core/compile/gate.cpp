@@ -4,7 +4,7 @@
 #include <cmath>
 #include <initializer_list>
 
-#include "core/model/expression.h"
+#include "core/model/language/expression.h"
 
 namespace ressort {
 namespace {

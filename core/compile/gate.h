@@ -11,7 +11,7 @@
 
 #include "core/analysis/stability.h"
 #include "core/model/network.h"
-#include "core/model/preset.h"
+#include "core/model/preset/preset.h"
 #include "core/progress.h"
 #include "core/result.h"
 

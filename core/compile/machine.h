@@ -3,7 +3,7 @@
 
 #include <span>
 
-#include "core/engine/program.h"
+#include "core/kernels/program.h"
 #include "core/model/network.h"
 #include "core/progress.h"
 

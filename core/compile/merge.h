@@ -5,8 +5,8 @@
 #include <optional>
 #include <string>
 
-#include "core/model/budget.h"
 #include "core/model/network.h"
+#include "core/model/preset/budget.h"
 #include "core/progress.h"
 
 namespace ressort {

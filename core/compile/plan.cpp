@@ -3,15 +3,15 @@
 #include <algorithm>
 #include <cmath>
 
-#include "core/compile/chains_form.h"
-#include "core/compile/chorus_form.h"
-#include "core/compile/dense_form.h"
-#include "core/compile/fourth_form.h"
-#include "core/compile/grid_form.h"
-#include "core/compile/modal_form.h"
 #include "core/compile/shards.h"
-#include "core/compile/slow_form.h"
-#include "core/compile/sparse_form.h"
+#include "core/kernels/chains/chains_form.h"
+#include "core/kernels/chorus/chorus_form.h"
+#include "core/kernels/dense/dense_form.h"
+#include "core/kernels/direct/fourth_form.h"
+#include "core/kernels/grid/grid_form.h"
+#include "core/kernels/modal/modal_form.h"
+#include "core/kernels/slow/slow_form.h"
+#include "core/kernels/sparse/sparse_form.h"
 
 namespace ressort {
 namespace {

@@ -8,8 +8,8 @@
 #include <vector>
 
 #include "core/compile/cost.h"
-#include "core/engine/program.h"
-#include "core/model/budget.h"
+#include "core/kernels/program.h"
+#include "core/model/preset/budget.h"
 #include "core/progress.h"
 
 namespace ressort {

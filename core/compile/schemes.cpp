@@ -9,7 +9,7 @@
 #include <string_view>
 
 #include "core/analysis/places.h"
-#include "core/engine/centred.h"
+#include "core/kernels/centred.h"
 
 namespace ressort {
 namespace {

@@ -6,9 +6,9 @@
 
 #include "core/analysis/interval.h"
 #include "core/compile/machine.h"
-#include "core/model/budget.h"
 #include "core/model/network.h"
-#include "core/model/preset.h"
+#include "core/model/preset/budget.h"
+#include "core/model/preset/preset.h"
 #include "core/progress.h"
 
 namespace ressort {

@@ -3,9 +3,9 @@
 #include <algorithm>
 #include <numeric>
 
-#include "core/compile/chains_form.h"
-#include "core/compile/grid_form.h"
-#include "core/engine/taps.h"
+#include "core/kernels/chains/chains_form.h"
+#include "core/kernels/grid/grid_form.h"
+#include "core/kernels/taps.h"
 
 namespace ressort {
 namespace {

@@ -4,7 +4,7 @@
 #include <optional>
 
 #include "core/compile/cost.h"
-#include "core/engine/sharded.h"
+#include "core/kernels/domains/sharded.h"
 #include "core/progress.h"
 
 namespace ressort {

@@ -8,8 +8,8 @@
 #include <memory>
 #include <vector>
 
-#include "core/engine/kernel.h"
 #include "core/engine/mix.h"
+#include "core/kernels/kernel.h"
 #include "core/progress.h"
 
 namespace ressort {

@@ -4,7 +4,7 @@
 #include <array>
 #include <cmath>
 
-#include "core/engine/laws.h"
+#include "core/kernels/laws.h"
 
 namespace ressort {
 namespace {

@@ -12,7 +12,7 @@
 #include <cstdint>
 #include <limits>
 
-#include "core/engine/program.h"
+#include "core/kernels/program.h"
 
 namespace ressort {
 

@@ -10,8 +10,8 @@
 #include <vector>
 
 #include "core/engine/event.h"
-#include "core/engine/isa.h"
-#include "core/engine/program.h"
+#include "core/kernels/isa.h"
+#include "core/kernels/program.h"
 #include "core/progress.h"
 
 namespace ressort {

@@ -4,7 +4,7 @@
 
 #include <cstddef>
 
-#include "core/engine/isa.h"
+#include "core/kernels/isa.h"
 
 namespace ressort {
 

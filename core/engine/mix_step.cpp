@@ -1,7 +1,7 @@
 // The loops over the voices of one kernel, compiled for each instruction set.
 #include "core/engine/mix.h"
 
-#include "core/engine/kernel.h"
+#include "core/kernels/kernel.h"
 
 namespace ressort::RESSORT_ISA {
 namespace {

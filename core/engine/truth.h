@@ -5,8 +5,8 @@
 #include <span>
 #include <vector>
 
-#include "core/engine/program.h"
-#include "core/engine/taps.h"
+#include "core/kernels/program.h"
+#include "core/kernels/taps.h"
 
 namespace ressort {
 

@@ -6,7 +6,7 @@
 #include <limits>
 #include <optional>
 
-#include "core/model/tokens.h"
+#include "core/model/language/tokens.h"
 #include "core/model/topology.h"
 
 namespace ressort {

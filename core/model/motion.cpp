@@ -1,6 +1,6 @@
 // What the third state argument means: asked for, said in the text, shown by its dialect, or told
 // by the states themselves.
-#include "core/model/reader.h"
+#include "core/model/language/reader.h"
 
 namespace ressort {
 namespace {

@@ -3,7 +3,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "tests/scenes.h"
+#include "tests/support/scenes.h"
 
 namespace ressort::bench {
 namespace {

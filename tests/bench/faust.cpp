@@ -11,8 +11,8 @@
 #include <functional>
 #include <thread>
 
-#include "core/model/faust.h"
-#include "core/model/mdl.h"
+#include "core/model/faust/faust.h"
+#include "core/model/language/mdl.h"
 
 namespace ressort::bench {
 namespace {

@@ -3,8 +3,8 @@
 
 #include <optional>
 
-#include "core/engine/isa.h"
-#include "core/engine/program.h"
+#include "core/kernels/isa.h"
+#include "core/kernels/program.h"
 
 namespace ressort::bench {
 

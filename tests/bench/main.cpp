@@ -11,9 +11,9 @@
 #include <optional>
 #include <utility>
 
-#include "app/denormals.h"
+#include "app/realtime/denormals.h"
 #include "core/compile/plan.h"
-#include "core/model/mdl.h"
+#include "core/model/language/mdl.h"
 #include "tests/bench/limit.h"
 #include "tests/bench/measure.h"
 #include "tests/bench/report.h"

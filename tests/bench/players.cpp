@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "core/analysis/linear.h"
-#include "tests/reference_network.h"
+#include "tests/support/reference_network.h"
 
 namespace ressort::bench {
 namespace {

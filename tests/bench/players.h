@@ -7,7 +7,7 @@
 
 #include "core/compile/machine.h"
 #include "core/engine/engine.h"
-#include "core/engine/kernel.h"
+#include "core/kernels/kernel.h"
 #include "core/model/network.h"
 #include "tests/bench/bench_scenes.h"
 #include "tests/bench/faust.h"

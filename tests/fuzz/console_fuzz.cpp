@@ -3,9 +3,9 @@
 #include <unistd.h>
 #include <filesystem>
 
-#include "app/calls.h"
-#include "app/console.h"
-#include "app/session.h"
+#include "app/control/calls.h"
+#include "app/control/console.h"
+#include "app/session/session.h"
 #include "tests/fuzz/stage.h"
 
 namespace {

@@ -1,6 +1,6 @@
 // A libFuzzer target: whatever bytes a keyboard sends, cut into whatever packets, they are played
 // or counted. A byte gives the length of the packet after it, its highest bit the way in.
-#include "app/midi_input.h"
+#include "app/devices/midi_input.h"
 #include "tests/fuzz/stage.h"
 #include "tests/system/every_control.h"
 

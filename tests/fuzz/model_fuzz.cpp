@@ -1,8 +1,8 @@
 // A libFuzzer target: whatever text comes, it is read or refused with a place and a sentence; what
 // is read comes back from its print, and if it is not too large it is exported, compiled and
 // played, and what is heard is finite.
-#include "core/model/faust.h"
-#include "core/model/print.h"
+#include "core/model/faust/faust.h"
+#include "core/model/language/print.h"
 #include "core/model/topology.h"
 #include "tests/fuzz/stage.h"
 #include "tests/system/every_control.h"

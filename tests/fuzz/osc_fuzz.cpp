@@ -10,8 +10,8 @@
 #include <array>
 #include <string_view>
 
-#include "app/osc.h"
-#include "app/session.h"
+#include "app/control/osc.h"
+#include "app/session/session.h"
 #include "tests/fuzz/stage.h"
 
 namespace {

@@ -1,6 +1,6 @@
 // A libFuzzer target: whatever text comes, it is read as a preset or refused with a place and a
 // sentence; what is read is put on a model that has something of everything, and played.
-#include "core/model/preset.h"
+#include "core/model/preset/preset.h"
 #include "tests/fuzz/stage.h"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {

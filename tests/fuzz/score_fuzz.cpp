@@ -1,6 +1,6 @@
 // A libFuzzer target: whatever text comes, it is read as a score or refused with a line and a
 // sentence; each of its calls becomes events or is refused, and they are played.
-#include "app/calls.h"
+#include "app/control/calls.h"
 #include "tests/fuzz/stage.h"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {

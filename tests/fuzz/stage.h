@@ -10,9 +10,9 @@
 #include <utility>
 #include <vector>
 
-#include "app/process.h"
+#include "app/realtime/process.h"
 #include "core/compile/compile.h"
-#include "core/model/mdl.h"
+#include "core/model/language/mdl.h"
 
 namespace ressort::fuzz {
 

@@ -9,7 +9,7 @@
 #include <string_view>
 
 #include "core/model/network.h"
-#include "tests/random.h"
+#include "tests/support/random.h"
 
 namespace ressort::rig {
 

@@ -25,13 +25,13 @@
 
 #include <unistd.h>
 
-#include "app/calls.h"
-#include "app/console.h"
-#include "app/process.h"
-#include "app/session.h"
-#include "core/model/mdl.h"
-#include "tests/random.h"
-#include "tests/random_network.h"
+#include "app/control/calls.h"
+#include "app/control/console.h"
+#include "app/realtime/process.h"
+#include "app/session/session.h"
+#include "core/model/language/mdl.h"
+#include "tests/support/random.h"
+#include "tests/support/random_network.h"
 #include "tests/system/every_control.h"
 
 namespace {

@@ -1,0 +1,88 @@
+#include "app/commands/chart/clock.h"
+
+#include <sched.h>
+
+#include <algorithm>
+#include <cmath>
+#include <ctime>
+
+namespace ressort {
+namespace {
+
+constexpr double lengths_s[] = {1.0, 0.3, 0.1, 0.03};
+constexpr std::size_t stretch = 441;  // output samples
+constexpr int least_rounds = 3;
+constexpr int most_rounds = 100;
+
+double cpu_ns() {
+  timespec now{};
+  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
+  return 1e9 * static_cast<double>(now.tv_sec) + static_cast<double>(now.tv_nsec);
+}
+
+// Plays the sound once and keeps the fastest time of every stretch.
+void play_round(MadeWay& way, std::vector<double>& fastest) {
+  way.player->rewind();
+  for (double& kept : fastest) {
+    const double start = cpu_ns();
+    way.player->play(stretch * way.way.oversampling, nullptr);
+    kept = std::min(kept, cpu_ns() - start);
+  }
+}
+
+// All ways once.
+double round_ns(std::vector<MadeWay>& ways, std::vector<std::vector<double>>& fastest,
+                const std::function<bool()>& stops) {
+  const double start = cpu_ns();
+  for (std::size_t i = 0; i < ways.size() && !stops(); ++i) {
+    play_round(ways[i], fastest[i]);
+  }
+  return cpu_ns() - start;
+}
+
+}  // namespace
+
+Timing time_ways(std::vector<MadeWay>& ways, double patience_s,
+                 const std::function<bool()>& stops) {
+  Timing timing;
+  std::vector<std::vector<double>> fastest(ways.size());
+  const auto shorten = [&](double seconds) {
+    timing.seconds = seconds;
+    const double frames = seconds * Network::reference_rate_hz;
+    for (auto& kept : fastest) {
+      kept.assign(static_cast<std::size_t>(frames) / stretch, HUGE_VAL);
+    }
+  };
+  shorten(lengths_s[std::size(lengths_s) - 1]);
+  const double short_ns = round_ns(ways, fastest, stops);
+  for (const double seconds : lengths_s) {
+    if (seconds == lengths_s[std::size(lengths_s) - 1] ||
+        least_rounds * short_ns * seconds / timing.seconds < 1e9 * patience_s) {
+      shorten(seconds);
+      break;
+    }
+  }
+  double spent = 0.0;
+  while (!stops() && timing.rounds < most_rounds &&
+         (timing.rounds < least_rounds || spent < 1e9 * patience_s)) {
+    spent += round_ns(ways, fastest, stops);
+    ++timing.rounds;
+  }
+  for (const auto& kept : fastest) {
+    double sum = 0.0;
+    for (const double ns : kept) {
+      sum += ns;
+    }
+    timing.ns.push_back(sum / static_cast<double>(kept.size() * stretch));
+  }
+  return timing;
+}
+
+void stay_on_one_core() {
+  cpu_set_t cores;
+  CPU_ZERO(&cores);
+  CPU_SET(static_cast<std::size_t>(std::max(0, sched_getcpu())), &cores);
+  sched_setaffinity(0, sizeof cores, &cores);
+}
+
+}  // namespace ressort

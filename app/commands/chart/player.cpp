@@ -1,0 +1,198 @@
+#include "app/commands/chart/player.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "app/realtime/denormals.h"
+#include "core/kernels/kernel.h"
+
+namespace ressort {
+namespace {
+
+constexpr std::size_t most_kept = std::size_t{1} << 22;  // samples of a hand
+
+// Where one hand is at every sample.
+class HandTrack {
+ public:
+  HandTrack(HandMotion motion, double start, double rate_hz, double seconds)
+      : motion_(std::move(motion)), rate_hz_(rate_hz), start_(motion_ ? motion_(0.0) : start) {
+    const auto wanted = static_cast<std::size_t>(std::lround(seconds * rate_hz));
+    for (std::size_t n = 0; motion_ && n < std::min(wanted, most_kept); ++n) {
+      kept_.push_back(motion_(static_cast<double>(n + 1) / rate_hz_));
+    }
+  }
+  bool moves() const { return motion_ != nullptr; }
+  double start() const { return start_; }
+  double at(std::size_t n) const {
+    return n < kept_.size() ? kept_[n] : motion_(static_cast<double>(n + 1) / rate_hz_);
+  }
+
+ private:
+  HandMotion motion_;
+  double rate_hz_;
+  double start_;
+  std::vector<double> kept_;
+};
+
+// One part's kernel and what it is fed with.
+template <class T>
+struct PlayedPart {
+  PlayedPart(const Program& program_in, Isa isa)
+      : program(program_in),
+        kernel(make_kernel<T>(program, 1, isa)),
+        lanes(kernel->width()),
+        value(max_block_frames * lanes * program.inputs.size()),
+        velocity(value.size()),
+        outputs(max_block_frames * lanes * program.outputs.size()),
+        before(program.inputs.size()) {
+    for (std::size_t lane = 0; lane < lanes; ++lane) {
+      for (std::uint32_t c = 0; c < program.coefficients.size(); ++c) {
+        kernel->coefficients.set(
+            lane, c, coefficient_value(program, program.coefficients[c], program.parameters, 1.0),
+            false);
+      }
+    }
+  }
+  void feed(std::size_t frame, std::size_t input, double x, double v) {
+    const std::size_t first = (frame * program.inputs.size() + input) * lanes;
+    for (std::size_t i = first; i < first + lanes; ++i) {
+      value[i] = static_cast<T>(x);
+      velocity[i] = static_cast<T>(v);
+    }
+  }
+
+  const Program& program;
+  std::unique_ptr<Kernel<T>> kernel;
+  std::size_t lanes;
+  Aligned<T> value;  // [frame][input][lane]
+  Aligned<T> velocity;
+  Aligned<T> outputs;          // [frame][output][lane]
+  std::vector<double> before;  // [input] where it was
+};
+
+template <class T>
+class KernelPlayer final : public ChartPlayer {
+ public:
+  KernelPlayer(const Machine& machine, const std::vector<HandMotion>& hands, double seconds,
+               Isa isa)
+      : channels_(machine.channels) {
+    for (std::size_t i = 0; i < machine.hands.size(); ++i) {
+      tracks_.emplace_back(i < hands.size() ? hands[i] : HandMotion(), machine.hands[i].position,
+                           machine.rate_hz, seconds);
+    }
+    parts_.reserve(machine.parts.size());
+    for (const Program& program : machine.parts) {
+      if (program.moving > 0) {
+        parts_.emplace_back(program, isa);
+      }
+    }
+    rewind();
+  }
+
+  void rewind() override {
+    for (PlayedPart<T>& part : parts_) {
+      for (std::size_t lane = 0; lane < part.lanes; ++lane) {
+        part.kernel->reset(lane);
+      }
+    }
+    start_hands();
+  }
+
+  void place(const States& x, const States& v) override {
+    for (std::size_t i = 0; i < parts_.size(); ++i) {
+      for (std::size_t lane = 0; lane < parts_[i].lanes; ++lane) {
+        parts_[i].kernel->place(lane, x[i].data(), v[i].data());
+      }
+    }
+    start_hands();
+  }
+
+  void play(std::size_t frames, double* outputs) override {
+    const DenormalsFlushed flushed;
+    if (outputs != nullptr) {
+      std::fill_n(outputs, frames * channels_, 0.0);
+    }
+    for (std::size_t done = 0; done < frames;) {
+      const std::size_t count = std::min(max_block_frames, frames - done);
+      for (PlayedPart<T>& part : parts_) {
+        feed(part, count);
+        part.kernel->step({.frames = count,
+                           .value = part.value.data(),
+                           .velocity = part.velocity.data(),
+                           .audio = nullptr,
+                           .outputs = part.outputs.data()});
+        if (outputs != nullptr) {
+          collect(part, count, outputs + done * channels_);
+        }
+      }
+      frame_ += count;
+      done += count;
+    }
+  }
+
+  bool save(States& x, States& v) const override {
+    x.resize(parts_.size());
+    v.resize(parts_.size());
+    for (std::size_t i = 0; i < parts_.size(); ++i) {
+      x[i].resize(parts_[i].program.position.size());
+      v[i].resize(x[i].size());
+      if (!parts_[i].kernel->save(0, x[i].data(), v[i].data())) {
+        return false;
+      }
+    }
+    return true;
+  }
+
+ private:
+  void start_hands() {
+    frame_ = 0;
+    for (PlayedPart<T>& part : parts_) {
+      for (std::size_t i = 0; i < part.program.inputs.size(); ++i) {
+        const HandTrack& track = tracks_[part.program.inputs[i].hand];
+        part.before[i] = track.start();
+        for (std::size_t n = 0; n < max_block_frames; ++n) {
+          part.feed(n, i, track.start(), 0.0);
+        }
+      }
+    }
+  }
+
+  void feed(PlayedPart<T>& part, std::size_t count) {
+    for (std::size_t i = 0; i < part.program.inputs.size(); ++i) {
+      const HandTrack& track = tracks_[part.program.inputs[i].hand];
+      for (std::size_t n = 0; track.moves() && n < count; ++n) {
+        const double x = track.at(frame_ + n);
+        part.feed(n, i, x, x - part.before[i]);
+        part.before[i] = x;
+      }
+    }
+  }
+
+  void collect(const PlayedPart<T>& part, std::size_t count, double* outputs) const {
+    const auto& slots = part.program.outputs;
+    for (std::size_t n = 0; n < count; ++n) {
+      for (std::size_t i = 0; i < slots.size(); ++i) {
+        outputs[n * channels_ + slots[i].channel] +=
+            static_cast<double>(part.outputs[(n * slots.size() + i) * part.lanes]);
+      }
+    }
+  }
+
+  std::size_t channels_;
+  std::vector<HandTrack> tracks_;  // [input]
+  std::vector<PlayedPart<T>> parts_;
+  std::size_t frame_ = 0;
+};
+
+}  // namespace
+
+std::unique_ptr<ChartPlayer> make_player(const Machine& machine,
+                                         const std::vector<HandMotion>& hands, double seconds,
+                                         Precision precision, Isa isa) {
+  if (precision != Precision::float32) {  // compensated positions are heard in double
+    return std::make_unique<KernelPlayer<double>>(machine, hands, seconds, isa);
+  }
+  return std::make_unique<KernelPlayer<float>>(machine, hands, seconds, isa);
+}
+
+}  // namespace ressort

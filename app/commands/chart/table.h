@@ -1,0 +1,50 @@
+// app: what the chart knows of a scene, and how it is written down.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "app/commands/chart/clock.h"
+#include "app/commands/chart/front.h"
+#include "app/commands/chart/judge.h"
+#include "app/commands/chart/ways.h"
+
+namespace ressort {
+
+struct ChartRow {
+  Way way;
+  std::string methods;
+  std::vector<std::string> twins;
+  double ns = 0.0;            // per output sample, one voice
+  double predicted_ns = 0.0;  // by the plan's model
+  Judged judged;
+  std::string failure;                   // unstable or not passive, and when; empty if neither
+  bool is_on_front[2] = {false, false};  // [truth]
+};
+
+// One scene's rows beside both truths. The fronts and areas are those of ways that do not fail.
+struct ChartSheet {
+  std::string scene;
+  std::string about;
+  bool is_linear = false;
+  std::string truth[2];              // how each was found
+  std::array<double, 3> floor_db{};  // how far T2 agrees with itself
+  std::size_t window = 0;            // of the chart
+  double timed_s = 0.0;
+  std::vector<ChartRow> rows;
+  double area[2] = {0.0, 0.0};            // dominated hypervolume, by measured times
+  double predicted_area[2] = {0.0, 0.0};  // by predicted ones: the same on every machine
+
+  double snr_db(const ChartRow& row, std::size_t truth) const;  // in the chart's window
+};
+
+// Sets the fronts and areas.
+void find_fronts(ChartSheet& sheet);
+
+// The columns, for who reads them by a program.
+const std::vector<std::string>& chart_columns();
+
+// All sheets as one table: what it means, in lines with '#'; names of columns; rows.
+std::string chart_csv(const std::vector<ChartSheet>& sheets, const std::string& machine);
+
+}  // namespace ressort

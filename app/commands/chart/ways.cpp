@@ -1,0 +1,172 @@
+#include "app/commands/chart/ways.h"
+
+#include <algorithm>
+#include <span>
+
+namespace ressort {
+namespace {
+
+struct NamedPrecision {
+  Precision precision;
+  const char* name;
+};
+constexpr NamedPrecision precisions[] = {{Precision::float64, "double"},
+                                         {Precision::float32, "float"},
+                                         {Precision::compensated32, "compensated"}};
+
+constexpr unsigned oversamplings[] = {2, 4, 8};
+constexpr const char* silences[] = {"-120", "-100", "-80", "-60", "-40"};
+constexpr const char* usual_silences[] = {"-100", "-80", "-60"};
+
+// Budgets beside a method: what the line is called, and the budget.
+struct Asked {
+  std::string name;
+  std::string budget;
+};
+const Asked every_method[] = {{"", ""}, {"passive", "passive=always"}};
+const Asked plans_choice[] = {
+    {"auto", ""}, {"auto cents=1", "cents=1"}, {"auto passive", "passive=always"}};
+
+// Methods whose error falls with the rate.
+bool pays_to_oversample(std::string_view method) {
+  return method == "direct" || method == "fourth";
+}
+
+std::string together(const std::string& a, const std::string& b) {
+  return a + (a.empty() || b.empty() ? "" : " ") + b;
+}
+
+void add_method(std::vector<Way>& ways, Method method) {
+  const std::string name(method_name(method));
+  for (const Asked& asked : every_method) {
+    const std::string line = together(name, asked.name);
+    ways.push_back({.name = line, .line = line, .method = method, .budget = asked.budget});
+    for (const unsigned times : oversamplings) {
+      if (pays_to_oversample(name)) {
+        const std::string label = std::to_string(times) + "x";
+        ways.push_back({.name = line + " " + label,
+                        .line = line,
+                        .label = label,
+                        .method = method,
+                        .budget = asked.budget,
+                        .oversampling = times});
+      }
+    }
+  }
+}
+
+// Less and less of what is below the loudest.
+void add_truncation(std::vector<Way>& ways, const std::string& line, std::optional<Method> method,
+                    const std::string& budget, std::span<const char* const> levels) {
+  if (method && !budget.empty()) {
+    ways.push_back({.name = line, .line = line, .method = method, .budget = budget});
+  }
+  for (const char* const silence : levels) {
+    const std::string less = "silence=" + std::string(silence);
+    ways.push_back({.name = line + " " + less,
+                    .line = line,
+                    .label = silence,
+                    .method = method,
+                    .budget = together(budget, less),
+                    .is_bare = method.has_value()});
+  }
+}
+
+}  // namespace
+
+const char* precision_name(Precision precision) {
+  for (const NamedPrecision& named : precisions) {
+    if (named.precision == precision) {
+      return named.name;
+    }
+  }
+  return "";
+}
+
+std::vector<Way> all_ways() {
+  std::vector<Way> ways;
+  for (const Method method : all_methods) {
+    add_method(ways, method);
+  }
+  for (const Method method : physical_methods) {
+    add_method(ways, method);
+  }
+  add_truncation(ways, "modal cents=1", Method::modal, "cents=1", silences);
+  add_truncation(ways, "modal", Method::modal, "", silences);
+  for (const Asked& asked : plans_choice) {
+    ways.push_back(
+        {.name = asked.name, .line = asked.name, .budget = asked.budget, .is_bare = false});
+  }
+  add_truncation(ways, "auto", {}, "", usual_silences);
+  add_truncation(ways, "auto cents=1", {}, "cents=1", usual_silences);
+  std::vector<Way> all;
+  for (const auto& [precision, name] : precisions) {
+    for (Way way : ways) {
+      // With compensated positions there is but one form.
+      if (precision == Precision::compensated32 &&
+          (way.method != Method::direct || way.oversampling > 1)) {
+        continue;
+      }
+      way.precision = precision;
+      all.push_back(std::move(way));
+    }
+  }
+  return all;
+}
+
+double MadeWay::predicted_ns() const {
+  double sum = 0.0;
+  for (const Part& part : plan.parts) {
+    sum += part.predicted_ns;
+  }
+  return sum * way.oversampling;
+}
+
+Result<MadeWay> make_way(const ChartScene& scene, const Way& way, double seconds, Isa isa) {
+  CompileOptions options{.rate_hz = Network::reference_rate_hz * way.oversampling,
+                         .bare = way.is_bare,
+                         .voices = 1,
+                         .precision = way.precision,
+                         .method = way.method,
+                         .isa = isa};
+  if (!way.budget.empty()) {
+    auto budget = parse_budget(way.budget);
+    if (!budget) {
+      return budget.error();
+    }
+    options.budget = *budget;
+  }
+  auto compiled = compile(scene.network, Preset{.keyboard = false}, options);
+  if (!compiled) {
+    return compiled.error();
+  }
+  MadeWay made{.way = way, .engine = std::move(compiled->engine), .plan = compiled->plan};
+  const bool obeys = std::any_of(made.plan.parts.begin(), made.plan.parts.end(),
+                                 [&](const Part& part) { return part.method == way.method; });
+  if (way.method && !obeys) {
+    return Error{std::string(method_name(*way.method)) + " cannot do this"};
+  }
+  for (const Part& part : made.plan.parts) {
+    const std::string name(method_name(part.method));
+    if (made.methods.find(name) == std::string::npos) {
+      made.methods += (made.methods.empty() ? "" : "+") + name;
+    }
+  }
+  made.player = make_player(made.machine(), scene.hands, seconds, way.precision, isa);
+  return made;
+}
+
+bool same_kind(const Machine& a, const Machine& b) {
+  const auto runs = [](const LinkRun& x, const LinkRun& y) {
+    return x.law == y.law && x.scheme == y.scheme && x.substeps == y.substeps;
+  };
+  const auto parts = [&](const Program& x, const Program& y) {
+    return x.form.index() == y.form.index() &&
+           std::equal(x.link_runs.begin(), x.link_runs.end(), y.link_runs.begin(),
+                      y.link_runs.end(), runs);
+  };
+  return a.rate_hz == b.rate_hz &&
+         std::equal(a.parts.begin(), a.parts.end(), b.parts.begin(), b.parts.end(), parts);
+}
+
+}  // namespace ressort

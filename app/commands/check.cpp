@@ -1,0 +1,309 @@
+#include "app/commands/check.h"
+
+#include <unistd.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <nlohmann/json.hpp>
+
+#include "app/exit_code.h"
+#include "app/session/admit.h"
+#include "app/session/files.h"
+#include "app/session/load_news.h"
+#include "app/session/loader.h"
+#include "app/session/memory.h"
+#include "app/session/timing.h"
+#include "app/text.h"
+#include "core/analysis/stability.h"
+#include "core/compile/compile.h"
+#include "core/model/language/print.h"
+#include "core/model/topology.h"
+
+namespace ressort {
+namespace {
+
+using nlohmann::json;
+
+void tell(const std::vector<Finding>& findings) {
+  const bool is_terminal = isatty(STDERR_FILENO) != 0;
+  for (const Finding& finding : findings) {
+    const std::string text = is_terminal ? with_source(finding) : to_string(finding);
+    std::fprintf(stderr, "%s\n", text.c_str());
+  }
+}
+
+json findings_json(const std::vector<Finding>& findings) {
+  json out = json::array();
+  for (const Finding& finding : findings) {
+    const Diagnostic& diagnostic = finding.diagnostic;
+    out.push_back({{"severity", diagnostic.severity == Severity::error ? "error" : "warning"},
+                   {"file", finding.file},
+                   {"line", diagnostic.line},
+                   {"column", diagnostic.column},
+                   {"length", diagnostic.length},
+                   {"message", diagnostic.message},
+                   {"source", finding.source}});
+  }
+  return out;
+}
+
+// What is proved of a scene.
+struct Proved {
+  Certificate certificate;  // everywhere in the preset's ranges, or at the model's own values
+  double stiffness_factor = 0.0;
+  bool is_exact = true;     // else by a bound
+  bool others_move = true;  // the limits below hold wherever the others are turned to
+  std::vector<std::optional<SafeRange>> safe;  // [parameter]
+};
+
+Proved prove(const Scene& scene, const Compiled& compiled, const Progress& progress) {
+  const Instrument& instrument = compiled.instrument;
+  const ParameterBox box = preset_box(instrument.parameters, scene.preset);
+  ParameterBox as_written;
+  for (const ParameterInfo& info : instrument.parameters) {
+    as_written.lowest.push_back(info.value);
+    as_written.highest.push_back(info.value);
+  }
+  // What is computed passively is stable whatever its numbers are.
+  Stability stability(all_plain(compiled.schemes)
+                          ? scene.network
+                          : always_felt(expand_macros(scene.network), compiled.schemes),
+                      1.0, Stability::most_exact_masses, progress);
+  progress.stage("proving that it is stable in all ranges");
+  Proved proved{.certificate = stability.certify(box),
+                .stiffness_factor = stability.stiffness_factor(box)};
+  proved.others_move = proved.certificate.verdict == Verdict::stable;
+  proved.is_exact = stability.is_exact();
+  progress.stage("finding the limits of its parameters");
+  for (std::size_t i = 0; i < instrument.parameters.size(); ++i) {
+    proved.safe.push_back(stability.safe_range(proved.others_move ? box : as_written, i,
+                                               instrument.parameters[i].value));
+  }
+  return proved;
+}
+
+const char* verdict_name(Verdict verdict) {
+  switch (verdict) {
+    case Verdict::stable:
+      return "stable";
+    case Verdict::unstable:
+      return "unstable";
+    case Verdict::unproved:
+      return "unproved";
+  }
+  return "";
+}
+
+std::string describe(const std::optional<SafeRange>& safe) {
+  return safe ? describe(*safe) : "stable nowhere";
+}
+
+json limit_json(double value) {
+  return std::isfinite(value) ? json(value) : json();
+}
+
+json parameter_json(const ParameterInfo& info, int input, const std::optional<SafeRange>& safe) {
+  json out{{"name", info.name}};
+  if (input > 0) {
+    out["input"] = input;
+  } else {
+    out.update({{"value", info.value}, {"minimum", info.minimum}, {"maximum", info.maximum}});
+  }
+  // A limit that there is not is null; what is stable nowhere has no limits.
+  if (safe) {
+    out["stable_above"] = limit_json(safe->lowest);
+    out["stable_below"] = limit_json(safe->highest);
+  }
+  return out;
+}
+
+json stability_json(const Proved& proved) {
+  json out{{"verdict", verdict_name(proved.certificate.verdict)},
+           {"limits_hold", proved.others_move ? "in all ranges" : "at the start's values"},
+           {"stiffness_factor", limit_json(proved.stiffness_factor)}};
+  if (const std::optional<Culprit>& culprit = proved.certificate.culprit) {
+    out["culprit"] = {{"name", culprit->name},
+                      {"line", culprit->place.line},
+                      {"quantity", quantity_name(culprit->quantity)},
+                      {"argument", culprit->argument},
+                      {"value", limit_json(culprit->value)},
+                      {"limit", culprit->limit ? json(*culprit->limit) : json()}};
+  }
+  return out;
+}
+
+json scene_json(const Scene& scene, const Compiled& compiled, const Proved& proved) {
+  const Instrument& instrument = compiled.instrument;
+  json parameters = json::array();
+  for (std::size_t i = 0; i < instrument.parameters.size(); ++i) {
+    parameters.push_back(parameter_json(instrument.parameters[i],
+                                        scene.network.parameters[i].audio_input, proved.safe[i]));
+  }
+  json plan = json::array();
+  for (const Part& part : compiled.plan.parts) {
+    plan.push_back({{"method", method_name(part.method)},
+                    {"masses", part.masses},
+                    {"links", part.links},
+                    {"predicted_ns", part.predicted_ns},
+                    {"reason", part.reason}});
+  }
+  const char* const motion = !scene.third                                         ? "either"
+                             : *scene.third == ThirdArgument::velocity_per_second ? "velocity"
+                                                                                  : "delayed";
+  json out{{"file", scene.path},
+           {"model", scene.model_path},
+           {"motion", motion},
+           {"motion_reason", scene.motion},
+           {"masses", instrument.masses},
+           {"links", instrument.links},
+           {"inputs", instrument.inputs.size()},
+           {"outputs", instrument.outputs},
+           {"parameters", parameters},
+           {"plan", plan},
+           {"stability", stability_json(proved)},
+           {"stiffness_margin", instrument.stiffness_margin}};
+  if (instrument.mode) {
+    out["lowest_mode_hz"] = instrument.mode->frequency_hz;
+  }
+  return out;
+}
+
+// Names the element that makes the scene unstable, at its line of the model.
+void warn(const Proved& proved, const Scene& scene, std::vector<Finding>& findings) {
+  if (!proved.certificate.culprit) {
+    return;
+  }
+  const auto text = read_text(scene.model_path, max_model_bytes);
+  Finding finding = finding_of(scene.model_path, text ? std::string_view(*text) : "",
+                               complaint(proved.certificate));
+  finding.diagnostic.severity = Severity::warning;
+  findings.push_back(std::move(finding));
+}
+
+// That there is not enough time for all of its voices.
+void warn(const Scene& scene, const Compiled& compiled, std::vector<Finding>& findings) {
+  const CompileOptions options;
+  const std::string text =
+      too_much(compiled.plan, compiled.instrument.voices, options.rate_hz, options.precision);
+  if (!text.empty()) {
+    Finding finding = finding_of(scene.path, "", Error{text});
+    finding.diagnostic.severity = Severity::warning;
+    findings.push_back(std::move(finding));
+  }
+}
+
+std::string by_bound(const Proved& proved) {
+  return proved.is_exact ? ""
+                         : "; so large a network is judged by a bound, which may be too careful";
+}
+
+// The report's last line.
+std::string conclusion(const Scene& scene, const Proved& proved) {
+  const bool has_ranges = !scene.preset.parameters.empty();
+  switch (proved.certificate.verdict) {
+    case Verdict::stable:
+      break;
+    case Verdict::unstable:
+      return has_ranges
+                 ? "not stable everywhere in the parameters' ranges; the limits above are "
+                   "for one of them while the others stay where they start"
+                 : "not stable; the limits above are for one parameter while the others stay";
+    case Verdict::unproved:
+      return "not proved stable" + by_bound(proved);
+  }
+  std::string text = has_ranges ? "stable, wherever the parameters are turned to" : "stable";
+  const auto& parameters = scene.network.parameters;
+  if (std::any_of(parameters.begin(), parameters.end(),
+                  [](const Parameter& parameter) { return parameter.audio_input > 0; })) {
+    text += has_ranges ? "" : " as it starts";
+    text += ", as long as the inputs keep to the limits above";
+  }
+  if (std::isfinite(proved.stiffness_factor)) {
+    text += ": every stiffness may grow " + print_limit(proved.stiffness_factor, true) + " times";
+  }
+  return text + by_bound(proved);
+}
+
+void print_report(const Scene& scene, const Compiled& compiled, const Proved& proved) {
+  const Instrument& instrument = compiled.instrument;
+  std::printf("%s: %s, %s, %s, %s\n", scene.path.c_str(),
+              counted(instrument.masses, "mass that moves", "masses that move").c_str(),
+              counted(instrument.links, "link", "links").c_str(),
+              counted(instrument.inputs.size(), "input", "inputs").c_str(),
+              counted(static_cast<std::size_t>(instrument.outputs), "output", "outputs").c_str());
+  std::printf("motion: %s\n", scene.motion.c_str());
+  for (std::size_t i = 0; i < instrument.parameters.size(); ++i) {
+    const ParameterInfo& info = instrument.parameters[i];
+    const std::string safe = describe(proved.safe[i]);
+    if (const int input = scene.network.parameters[i].audio_input; input > 0) {
+      std::printf("  %-12s is input %d, sample by sample; %s\n", info.name.c_str(), input,
+                  safe.c_str());
+    } else {
+      std::printf("  %-12s %-10g from %g to %g; %s\n", info.name.c_str(), info.value, info.minimum,
+                  info.maximum, safe.c_str());
+    }
+  }
+  std::printf("runs as\n  %s", describe(compiled.plan).c_str());
+  if (instrument.mode) {
+    std::printf(
+        "lowest mode %.3f Hz; keys are in tune up to %.0f Hz, higher ones come down by "
+        "octaves\n",
+        instrument.mode->frequency_hz, instrument.highest_frequency_hz);
+  }
+  std::printf("%s\n", conclusion(scene, proved).c_str());
+}
+
+}  // namespace
+
+int check(const CheckOptions& options) {
+  LoadNews news(options.name,
+                [](const std::string& text) { std::fprintf(stderr, "%s\n", text.c_str()); });
+  const Progress progress([&](std::string_view stage) {
+    news.at(stage);
+    return true;  // Ctrl-C ends it at once
+  });
+  Reading reading = read_scene(options.name, {.third = options.third, .progress = progress});
+  Admission admission;
+  if (reading.scene) {
+    admission = ask_to_play(*reading.scene, {.method = options.method,
+                                             .budget = options.budget,
+                                             .progress = progress,
+                                             .most_bytes = free_memory_bytes()});
+  }
+  const std::optional<Compiled>& compiled = admission.compiled;
+  const bool is_ok = compiled && admission.is_granted();
+  std::optional<Proved> proved;
+  if (compiled && options.as != CheckAs::model) {
+    proved = prove(*reading.scene, *compiled, progress);
+    if (!compiled->gate.complaint) {
+      warn(*proved, *reading.scene, reading.findings);
+    }
+    warn(*reading.scene, *compiled, reading.findings);
+  }
+  for (Finding& finding : admission.findings) {
+    reading.findings.push_back(std::move(finding));
+  }
+  if (options.as == CheckAs::json) {
+    json out = compiled ? scene_json(*reading.scene, *compiled, *proved) : json::object();
+    out["ok"] = is_ok;
+    out["findings"] = findings_json(reading.findings);
+    // Names may be in any encoding; what is no UTF-8 is replaced.
+    std::printf("%s\n", out.dump(2, ' ', false, json::error_handler_t::replace).c_str());
+  } else {
+    tell(reading.findings);
+  }
+  if (!compiled) {
+    return exit_code::wrong_use;
+  }
+  // What may not sound is shown all the same: whoever mends it wants to see it.
+  if (options.as == CheckAs::report) {
+    print_report(*reading.scene, *compiled, *proved);
+  } else if (options.as == CheckAs::model) {
+    const std::string text = print_network(reading.scene->network);
+    std::fwrite(text.data(), 1, text.size(), stdout);
+  }
+  return is_ok ? exit_code::done : exit_code::wrong_use;
+}
+
+}  // namespace ressort

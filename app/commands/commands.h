@@ -1,0 +1,37 @@
+// app: what the program does, one function for each of its commands. The exit code comes back.
+#pragma once
+
+#include <optional>
+#include <string>
+
+#include "app/commands/offline.h"
+#include "app/control/osc.h"
+#include "app/devices/audio.h"
+#include "app/exit_code.h"
+#include "app/session/session.h"
+
+namespace ressort {
+
+struct PlayOptions {
+  std::string name = "IPlayTheTriangle";
+  std::string audio = "auto";  // jack, alsa, dummy, auto
+  std::string midi = "auto";   // auto, alsa, jack, none
+  AudioOptions device;
+  double gain_db = 0.0;
+  int voices = 0;
+  Precision precision = Precision::float64;
+  bool rescale = true;
+  std::optional<Method> method;        // without one, the plan's choice
+  std::optional<Budget> budget;        // instead of the preset's
+  std::optional<ThirdArgument> third;  // whatever the models show
+  bool force = false;                  // play the first model even if it is not stable
+  bool no_console = false;
+  std::string script;
+  OscOptions osc;  // port 0: none
+  bool exit_on_loss = false;
+};
+
+int play(const PlayOptions& options);
+int render_command(const RenderOptions& options, bool is_quiet);
+
+}  // namespace ressort

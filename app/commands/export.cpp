@@ -1,0 +1,78 @@
+#include "app/commands/export.h"
+
+#include <cstdio>
+
+#include "app/exit_code.h"
+#include "app/session/files.h"
+#include "app/session/load_news.h"
+#include "app/session/loader.h"
+#include "core/compile/compile.h"
+#include "core/model/faust/faust.h"
+
+namespace ressort {
+namespace {
+
+// The scene's sliders are what its parameters may be turned to when it is played.
+Result<std::string> to_faust(const Scene& scene, bool rescale, const Progress& progress) {
+  const auto compiled = compile(scene.network, scene.preset, {.voices = 1, .progress = progress});
+  if (!compiled) {
+    return Error{to_string(finding_of(scene.path, "", compiled.error()))};
+  }
+  std::vector<ParameterSetting> sliders;
+  for (const ParameterInfo& info : compiled->instrument.parameters) {
+    sliders.push_back({info.name, info.value, info.minimum, info.maximum, {}});
+  }
+  progress.stage("writing it in the other language");
+  auto text =
+      faust_text(scene.network, {.name = scene.name, .sliders = sliders, .rescale = rescale});
+  if (!text) {
+    return Error{to_string(finding_of(scene.model_path, "", text.error()))};
+  }
+  return text;
+}
+
+}  // namespace
+
+int export_to_faust(const ExportOptions& options) {
+  if (options.output.ends_with(".mdl") || options.output.ends_with(".toml")) {
+    std::fprintf(stderr, "'%s' is the name of a model or a preset, not of a FAUST program\n",
+                 options.output.c_str());
+    return exit_code::wrong_use;
+  }
+  LoadNews news(options.name,
+                [](const std::string& text) { std::fprintf(stderr, "%s\n", text.c_str()); });
+  const Progress progress([&](std::string_view stage) {
+    news.at(stage);
+    return true;  // Ctrl-C ends it at once
+  });
+  const auto scene = load_scene(options.name, {.third = options.third, .progress = progress});
+  if (!scene) {
+    std::fprintf(stderr, "%s\n", scene.error().message.c_str());
+    return exit_code::wrong_use;
+  }
+  for (const std::string& warning : scene->warnings) {
+    std::fprintf(stderr, "%s\n", warning.c_str());
+  }
+  const std::string read[] = {scene->path, scene->model_path};
+  if (auto spared = spare(options.output, read); !spared) {
+    std::fprintf(stderr, "%s\n", spared.error().message.c_str());
+    return exit_code::wrong_use;
+  }
+  const auto text = to_faust(*scene, options.rescale, progress);
+  if (!text) {
+    std::fprintf(stderr, "%s\n", text.error().message.c_str());
+    return exit_code::wrong_use;
+  }
+  if (const std::size_t count = faust_elements(scene->network);
+      count > comfortable_faust_elements) {
+    std::fprintf(stderr, "warning: %zu masses and links; beyond %zu FAUST takes minutes\n", count,
+                 comfortable_faust_elements);
+  }
+  if (options.output.empty()) {
+    std::fputs(text->c_str(), stdout);
+    return exit_code::done;
+  }
+  return put_text(options.output, *text, options.force);
+}
+
+}  // namespace ressort

@@ -1,0 +1,41 @@
+#include "app/commands/make.h"
+
+#include <cstdio>
+
+#include "app/exit_code.h"
+#include "app/session/files.h"
+#include "app/text.h"
+#include "core/model/language/mdl.h"
+#include "core/model/language/print.h"
+
+namespace ressort {
+
+int make(const MakeOptions& options) {
+  const auto complain = [](const std::string& text) {
+    std::fprintf(stderr, "%s\n", text.c_str());
+    return exit_code::wrong_use;
+  };
+  const auto network = generate(options.shape);
+  if (!network) {
+    return complain(network.error().message);
+  }
+  const std::string text = print_network(*network);
+  if (text.size() > max_model_bytes) {
+    return complain("the model would be longer than what is read, " +
+                    std::to_string(max_model_bytes >> 20) + " MiB; a shorter name helps");
+  }
+  if (options.output.empty()) {
+    std::fwrite(text.data(), 1, text.size(), stdout);
+    return exit_code::done;
+  }
+  if (const int failure = put_text(options.output, text, options.force)) {
+    return failure;
+  }
+  std::printf("%s: %s, %s\n", options.output.c_str(),
+              options.shape.as_macro ? "one macro"
+                                     : counted(network->masses.size(), "mass", "masses").c_str(),
+              counted(network->links.size(), "link", "links").c_str());
+  return exit_code::done;
+}
+
+}  // namespace ressort

@@ -1,0 +1,322 @@
+#include "app/commands/offline.h"
+
+#include <algorithm>
+#include <cmath>
+#include <set>
+
+#include "app/realtime/crew.h"
+#include "app/realtime/process.h"
+#include "app/session/admit.h"
+#include "app/session/files.h"
+#include "app/session/memory.h"
+#include "core/compile/compile.h"
+#include "core/model/language/expression.h"
+
+namespace ressort {
+namespace {
+
+constexpr std::size_t block_frames = 256;
+constexpr std::size_t max_score_bytes = std::size_t{64} << 20;
+constexpr double ring_out_s = 2.0;
+constexpr double longest_s = 24.0 * 3600.0;
+
+struct ScoredEvent {
+  int line = 0;
+  int column = 1;
+  long long frame = 0;
+  Event event;
+};
+
+Error at(const std::string& path, const Error& error) {
+  return {to_string(finding_of(path, "", error))};
+}
+
+// The lines of the score that was asked for, or of the phrase that is played instead; an error has
+// the score's line.
+Result<std::vector<ScoreLine>> read_score(const RenderOptions& options, bool is_bare) {
+  if (options.score.empty()) {
+    return parse_score(is_bare || !options.input.empty() ? "" : default_phrase());
+  }
+  auto text = read_text(options.score, max_score_bytes);
+  if (!text) {
+    return text.error();
+  }
+  auto lines = parse_score(*text);
+  return lines ? std::move(lines) : at(options.score, lines.error());
+}
+
+// What the score gives to parameters.
+std::vector<Setting> reach_of(const std::vector<ScoreLine>& lines, const Network& network) {
+  constexpr std::string_view prefix = "/param/";
+  std::vector<Setting> reach;
+  for (const ScoreLine& line : lines) {
+    const std::string_view address = line.call.address;
+    const auto& arguments = line.call.arguments;
+    if (!address.starts_with(prefix) || arguments.empty() ||
+        !std::holds_alternative<double>(arguments[0])) {
+      continue;
+    }
+    for (const Parameter& parameter : network.parameters) {
+      if (fits(address.substr(prefix.size()), parameter.name)) {
+        reach.push_back({parameter.name, std::get<double>(arguments[0])});
+      }
+    }
+  }
+  return reach;
+}
+
+// The calls of a score as events; an error has the score's line. What a parameter could not take is
+// told, once for each.
+Result<std::vector<ScoredEvent>> score_events(const RenderOptions& options,
+                                              const std::vector<ScoreLine>& lines,
+                                              const Instrument& instrument, std::uint32_t serial,
+                                              std::vector<std::string>& warnings) {
+  std::vector<ScoredEvent> scored;
+  std::set<std::uint16_t> told;
+  for (const ScoreLine& line : lines) {
+    auto events = to_events(line.call, instrument, serial);
+    if (!events) {
+      return at(options.score, {events.error().message, line.line, line.column});
+    }
+    for (const Event& event : *events) {
+      scored.push_back(
+          {line.line, line.column, std::llround(line.time_s * options.rate_hz), event});
+      const std::string news = told_limit(line.call, event, instrument);
+      if (!news.empty() && told.insert(event.index).second) {
+        warnings.push_back(options.score + ":" + std::to_string(line.line) + ":" +
+                           std::to_string(line.column) + ": warning: " + news);
+      }
+    }
+  }
+  std::stable_sort(scored.begin(), scored.end(),
+                   [](const ScoredEvent& a, const ScoredEvent& b) { return a.frame < b.frame; });
+  return scored;
+}
+
+// What drives the model's inputs, read as it is needed: nothing, or a sound file.
+struct Inputs {
+  std::optional<SoundReader> file;
+  std::vector<double> interleaved;
+  std::vector<double> samples;  // [channel][block_frames]
+  std::vector<const double*> pointers;
+
+  explicit Inputs(std::optional<SoundReader> from) : file(std::move(from)) {
+    const std::size_t channels = file ? file->channels() : 0;
+    interleaved.resize(channels * block_frames);
+    samples.resize(interleaved.size());
+    for (std::size_t c = 0; c < channels; ++c) {
+      pointers.push_back(samples.data() + c * block_frames);
+    }
+  }
+
+  // The next block; silence after the end.
+  std::span<const double* const> next(std::size_t count) {
+    if (file) {
+      const std::size_t got = file->read(interleaved.data(), count);
+      for (std::size_t c = 0; c < pointers.size(); ++c) {
+        for (std::size_t n = 0; n < count; ++n) {
+          samples[c * block_frames + n] = n < got ? interleaved[n * pointers.size() + c] : 0.0;
+        }
+      }
+    }
+    return pointers;
+  }
+};
+
+Result<std::optional<SoundReader>> open_input(const RenderOptions& options) {
+  if (options.input.empty()) {
+    return std::optional<SoundReader>();
+  }
+  auto sound = SoundReader::open(options.input);
+  if (!sound) {
+    return sound.error();
+  }
+  if (sound->rate_hz() != options.rate_hz) {
+    const std::string rate = std::to_string(static_cast<int>(sound->rate_hz()));
+    return Error{"'" + options.input + "' is at " + rate + " Hz, the render at " +
+                 std::to_string(static_cast<int>(options.rate_hz)) + "; give --rate " + rate};
+  }
+  if (sound->frames() < 0 && !options.frames && !options.seconds) {
+    return Error{"'" + options.input + "' does not say how long it is; give --seconds"};
+  }
+  return std::optional<SoundReader>(*std::move(sound));
+}
+
+// A value that the preset does not allow, at the line that says so.
+Error beyond_range(const Scene& scene, const ParameterInfo& info) {
+  Error error{"the preset keeps '" + info.name + "' between " + print_number(info.minimum) +
+              " and " + print_number(info.maximum)};
+  for (const ParameterSetting& setting : scene.preset.parameters) {
+    if (setting.name == info.name) {
+      error.line = setting.place.line;
+      error.column = setting.place.column;
+    }
+  }
+  return at(scene.path, error);
+}
+
+long long length_in_frames(const RenderOptions& options, const std::vector<ScoredEvent>& score,
+                           const Inputs& inputs) {
+  if (options.frames) {
+    return *options.frames;
+  }
+  if (options.seconds) {
+    return std::llround(*options.seconds * options.rate_hz);
+  }
+  const long long last =
+      std::max(score.empty() ? 0 : score.back().frame, inputs.file ? inputs.file->frames() : 0);
+  return last + std::llround(ring_out_s * options.rate_hz);
+}
+
+}  // namespace
+
+std::string default_phrase() {
+  return "0.00 /note/on 57 100\n0.45 /note/off 57\n"
+         "0.50 /note/on 60 90\n0.95 /note/off 60\n"
+         "1.00 /note/on 64 100\n1.45 /note/off 64\n"
+         "1.50 /note/on 69 110\n1.95 /note/off 69\n"
+         "2.00 /note/on 57 80\n2.00 /note/on 64 70\n2.00 /note/on 72 70\n"
+         "3.20 /note/off 57\n3.20 /note/off 64\n3.20 /note/off 72\n";
+}
+
+Result<Rendered> render(const RenderOptions& options, const std::function<bool(double)>& progress) {
+  auto scene =
+      load_scene(options.name, {.bare = true, .third = options.third, .progress = options.loading});
+  if (!scene) {
+    return scene.error();
+  }
+  const std::string read[] = {scene->path, scene->model_path, options.score, options.input};
+  if (auto spared = spare(options.output, read); !spared) {
+    return spared.error();
+  }
+  const bool is_bare = !scene->has_preset;
+  const auto lines = read_score(options, is_bare);
+  if (!lines) {
+    return lines.error();
+  }
+  const auto threads = static_cast<std::size_t>(options.threads);
+  if (threads > core_count()) {
+    scene->warnings.push_back("--threads " + std::to_string(threads) + ": this machine runs " +
+                              std::to_string(core_count()) + " at once, and so many are used");
+  }
+  ThreadCrew crew(threads > 0 ? std::min(threads, core_count()) : core_count());
+  auto compiled = admit(*scene,
+                        {.rate_hz = options.rate_hz,
+                         .rescale = options.rescale,
+                         .bare = is_bare,
+                         .voices = options.voices,
+                         .precision = options.precision,
+                         .method = options.method,
+                         .budget = options.budget,
+                         .crew = &crew,
+                         .force = options.force,
+                         .settings = options.parameters,
+                         .reach = reach_of(*lines, scene->network),
+                         .progress = options.loading,
+                         .most_bytes = free_memory_bytes()},
+                        scene->warnings);
+  if (!compiled) {
+    return compiled.error();
+  }
+  const Instrument instrument = compiled->instrument;
+  constexpr std::uint32_t serial = 1;
+
+  auto input = open_input(options);
+  if (!input) {
+    return input.error();
+  }
+  Inputs inputs(*std::move(input));
+  auto score = score_events(options, *lines, instrument, serial, scene->warnings);
+  if (!score) {
+    return score.error();
+  }
+
+  Process process(options.rate_hz, options.limit);
+  for (const auto& [name, value] : options.parameters) {
+    const Call call{"/param/" + name, {value}};
+    auto events = to_events(call, instrument, serial);
+    if (!events) {
+      return Error{"--set " + name + "=" + print_number(value) + ": " + events.error().message};
+    }
+    for (const Event& event : *events) {
+      if (const std::string news = told_limit(call, event, instrument); !news.empty()) {
+        scene->warnings.push_back(news);
+      } else if (event.value != value) {
+        return beyond_range(*scene, instrument.parameters[event.index]);
+      }
+      process.schedule(0, event);
+    }
+  }
+  process.slot.offer(new Sounding{std::move(compiled->engine), serial});
+
+  Rendered rendered{.name = scene->name,
+                    .frames = length_in_frames(options, *score, inputs),
+                    .channels = std::max(is_bare ? 1 : 2, instrument.outputs),
+                    .warnings = scene->warnings};
+  if (static_cast<double>(rendered.frames) > longest_s * options.rate_hz) {
+    return Error{"that is longer than a day of sound"};
+  }
+  const auto channels = static_cast<std::size_t>(rendered.channels);
+  if (progress && !progress(0.0)) {
+    return Error{"interrupted before the first sample"};
+  }
+  auto file = SoundWriter::open(options.output,
+                                {.rate_hz = options.rate_hz,
+                                 .channels = rendered.channels,
+                                 .samples = options.format,
+                                 .frames = rendered.frames},
+                                Existing::replace);
+  if (!file) {
+    return file.error();
+  }
+  std::vector<double> samples(channels * block_frames);
+  std::vector<double> interleaved(samples.size());
+  std::vector<double*> outputs;
+  for (std::size_t c = 0; c < channels; ++c) {
+    outputs.push_back(samples.data() + c * block_frames);
+  }
+  std::size_t next = 0;
+  double energy = 0.0;
+  long long frame = 0;
+  while (frame < rendered.frames && !rendered.was_interrupted) {
+    const auto count =
+        static_cast<std::size_t>(std::min<long long>(block_frames, rendered.frames - frame));
+    const long long end = frame + static_cast<long long>(count);
+    while (next < score->size() && (*score)[next].frame < end) {
+      if (!process.schedule((*score)[next].frame, (*score)[next].event)) {
+        return at(options.score, {"more than " + std::to_string(Process::max_ahead) +
+                                      " events within " + std::to_string(block_frames) + " samples",
+                                  (*score)[next].line, (*score)[next].column});
+      }
+      ++next;
+    }
+    process.block(inputs.next(count), std::span<double* const>(outputs), count, {}, 0);
+    for (std::size_t n = 0; n < count; ++n) {
+      for (std::size_t c = 0; c < channels; ++c) {
+        const double y = outputs[c][n];
+        interleaved[n * channels + c] = y;
+        rendered.peak = std::max(rendered.peak, std::fabs(y));
+        energy += y * y;
+      }
+    }
+    if (auto wrote = file->write(interleaved.data(), count); !wrote) {
+      rendered.failure = wrote.error();
+      return rendered;
+    }
+    frame = end;
+    if (progress && !progress(static_cast<double>(frame) / static_cast<double>(rendered.frames))) {
+      rendered.was_interrupted = true;
+    }
+  }
+  if (auto closed = file->close(); !closed) {
+    rendered.failure = closed.error();
+    return rendered;
+  }
+  rendered.frames = frame;
+  rendered.rms =
+      frame > 0 ? std::sqrt(energy / static_cast<double>(frame * rendered.channels)) : 0.0;
+  rendered.resets = process.meters.resets.get();
+  return rendered;
+}
+
+}  // namespace ressort

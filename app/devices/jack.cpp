@@ -1,0 +1,297 @@
+#include <jack/jack.h>
+#include <jack/midiport.h>
+
+#include <algorithm>
+#include <array>
+#include <cstdlib>
+#include <memory>
+#include <vector>
+
+#include "app/devices/audio.h"
+
+namespace ressort {
+namespace {
+
+constexpr int most_audio_inputs = 16;
+constexpr std::size_t most_midi_packets = 4096;  // in one block: more than a port's buffer holds
+
+using Ports = std::unique_ptr<const char*, decltype(&jack_free)>;
+
+struct Jack {
+  Jack(Process& process_in, const AudioOptions& options_in)
+      : process(process_in), options(options_in) {}
+
+  Process& process;
+  AudioOptions options;
+  jack_client_t* client = nullptr;
+  std::vector<jack_port_t*> outputs;
+  jack_port_t* midi = nullptr;
+  std::array<Published<jack_port_t>, most_audio_inputs> inputs;  // registered as models want them
+  std::int64_t clock_offset_ns = 0;                              // monotonic clock less JACK's
+  double rate_hz = 48000.0;
+  Flag lost;
+  Flag rewired;  // ports or connections have changed since the last look
+
+  // Used by the control thread only.
+  Wiring wiring;
+  std::int64_t next_try_ns = 0;  // to plug in what is missing
+
+  // Used by the audio thread only.
+  std::vector<float*> output_buffers;
+  std::array<const float*, most_audio_inputs> input_buffers{};
+  std::array<MidiPacket, most_midi_packets> packets;
+};
+
+int on_process(jack_nframes_t frames, void* self) {
+  Jack& jack = *static_cast<Jack*>(self);
+  const auto buffer = [&](jack_port_t* port) { return jack_port_get_buffer(port, frames); };
+  for (std::size_t i = 0; i < jack.outputs.size(); ++i) {
+    jack.output_buffers[i] = static_cast<float*>(buffer(jack.outputs[i]));
+  }
+  std::size_t inputs = 0;
+  for (; inputs < jack.inputs.size(); ++inputs) {
+    jack_port_t* const port = jack.inputs[inputs].get();
+    if (port == nullptr) {
+      break;
+    }
+    jack.input_buffers[inputs] = static_cast<const float*>(buffer(port));
+  }
+  void* const midi = buffer(jack.midi);
+  const std::size_t arrived = jack_midi_get_event_count(midi);
+  const std::size_t count = std::min(arrived, jack.packets.size());
+  jack.process.meters.dropped.add(arrived - count + jack_midi_get_lost_event_count(midi));
+  for (std::size_t i = 0; i < count; ++i) {
+    jack_midi_event_t event;
+    jack_midi_event_get(&event, midi, static_cast<std::uint32_t>(i));
+    jack.packets[i] = {event.time, {event.buffer, event.size}};
+  }
+  jack_nframes_t frame = 0;
+  jack_time_t now_us = 0;
+  jack_time_t next_us = 0;
+  float period_us = 0.0f;
+  if (jack_get_cycle_times(jack.client, &frame, &now_us, &next_us, &period_us) != 0) {
+    now_us = jack_get_time();
+  }
+  jack.process.block(std::span<const float* const>(jack.input_buffers.data(), inputs),
+                     std::span<float* const>(jack.output_buffers), frames,
+                     {jack.packets.data(), count},
+                     static_cast<std::int64_t>(now_us) * 1000 + jack.clock_offset_ns);
+  return 0;
+}
+
+int on_xrun(void* self) {
+  static_cast<Jack*>(self)->process.meters.xruns.add(1);
+  return 0;
+}
+
+// The engine takes any number of frames, so that nothing has to be made ready for a new one.
+int on_buffer_size(jack_nframes_t, void*) {
+  return 0;
+}
+
+// A new rate needs a new engine: the control side opens the client again.
+int on_sample_rate(jack_nframes_t rate, void* self) {
+  Jack& jack = *static_cast<Jack*>(self);
+  if (static_cast<double>(rate) != jack.rate_hz) {
+    jack.lost.raise();
+  }
+  return 0;
+}
+
+void on_shutdown(jack_status_t, const char*, void* self) {
+  static_cast<Jack*>(self)->lost.raise();
+}
+
+void on_connect(jack_port_id_t, jack_port_id_t, int, void* self) {
+  static_cast<Jack*>(self)->rewired.raise();
+}
+
+void on_port(jack_port_id_t, int, void* self) {
+  static_cast<Jack*>(self)->rewired.raise();
+}
+
+void say_nothing(const char*) {}
+
+bool plug(Jack& jack, jack_port_t* ours, const char* theirs) {
+  const char* const name = jack_port_name(ours);
+  const bool is_output = (jack_port_flags(ours) & JackPortIsOutput) != 0;
+  return jack_connect(jack.client, is_output ? name : theirs, is_output ? theirs : name) == 0;
+}
+
+// The same for -j: not where a person has pulled it.
+void plug_anew(Jack& jack, jack_port_t* ours, const char* theirs) {
+  if (!jack.wiring.knows({jack_port_short_name(ours), theirs})) {
+    plug(jack, ours, theirs);
+  }
+}
+
+// Our outputs to the physical ones in their order, every physical MIDI source to us.
+void connect(Jack& jack) {
+  const Ports speakers(jack_get_ports(jack.client, nullptr, JACK_DEFAULT_AUDIO_TYPE,
+                                      JackPortIsPhysical | JackPortIsInput),
+                       jack_free);
+  for (std::size_t i = 0; speakers && i < jack.outputs.size() && speakers.get()[i] != nullptr;
+       ++i) {
+    plug_anew(jack, jack.outputs[i], speakers.get()[i]);
+  }
+}
+
+void connect_midi(Jack& jack) {
+  const Ports keyboards(jack_get_ports(jack.client, nullptr, JACK_DEFAULT_MIDI_TYPE,
+                                       JackPortIsPhysical | JackPortIsOutput),
+                        jack_free);
+  for (std::size_t i = 0; keyboards && keyboards.get()[i] != nullptr; ++i) {
+    plug_anew(jack, jack.midi, keyboards.get()[i]);
+  }
+}
+
+void connect_inputs(Jack& jack) {
+  const Ports microphones(jack_get_ports(jack.client, nullptr, JACK_DEFAULT_AUDIO_TYPE,
+                                         JackPortIsPhysical | JackPortIsOutput),
+                          jack_free);
+  for (std::size_t i = 0; microphones && i < jack.inputs.size(); ++i) {
+    jack_port_t* const port = jack.inputs[i].get();
+    if (port == nullptr || microphones.get()[i] == nullptr) {
+      return;
+    }
+    if (jack_port_connected(port) == 0) {
+      plug_anew(jack, port, microphones.get()[i]);
+    }
+  }
+}
+
+// Ports only ever come: a connection that a person has made outlives a change of model.
+void set_audio_inputs(Jack& jack, int wanted) {
+  for (int i = 0; i < std::min(wanted, most_audio_inputs); ++i) {
+    Published<jack_port_t>& input = jack.inputs[static_cast<std::size_t>(i)];
+    if (input.get() == nullptr) {
+      input.set(jack_port_register(jack.client, ("in_" + std::to_string(i + 1)).c_str(),
+                                   JACK_DEFAULT_AUDIO_TYPE, JackPortIsInput, 0));
+    }
+  }
+  jack.rewired.raise();
+}
+
+std::vector<jack_port_t*> own_ports(const Jack& jack) {
+  std::vector<jack_port_t*> ports = jack.outputs;
+  ports.push_back(jack.midi);
+  for (std::size_t i = 0; i < jack.inputs.size() && jack.inputs[i].get() != nullptr; ++i) {
+    ports.push_back(jack.inputs[i].get());
+  }
+  return ports;
+}
+
+// Sees what is connected, and connects what was or is to be.
+void look_at_ports(Jack& jack) {
+  const std::vector<jack_port_t*> ports = own_ports(jack);
+  std::vector<Cable> present;
+  for (jack_port_t* const port : ports) {
+    const Ports others(jack_port_get_all_connections(jack.client, port), jack_free);
+    for (std::size_t i = 0; others && others.get()[i] != nullptr; ++i) {
+      present.push_back({jack_port_short_name(port), others.get()[i]});
+    }
+  }
+  const auto exists = [&](const std::string& port) {
+    return jack_port_by_name(jack.client, port.c_str()) != nullptr;
+  };
+  jack.wiring.look(present, exists);
+  for (const Cable& cable : jack.wiring.missing()) {
+    for (jack_port_t* const port : ports) {
+      if (jack_port_short_name(port) == cable.ours && exists(cable.theirs)) {
+        plug(jack, port, cable.theirs.c_str());
+      }
+    }
+  }
+  if (jack.options.connect) {
+    connect_midi(jack);
+    connect_inputs(jack);
+  }
+}
+
+void tick(Jack& jack) {
+  constexpr std::int64_t patience_ns = 1'000'000'000;
+  const std::int64_t now_ns = monotonic_ns();
+  const bool has_changed = jack.rewired.lower();
+  if (has_changed || jack.wiring.is_in_doubt() || now_ns >= jack.next_try_ns) {
+    jack.next_try_ns = now_ns + patience_ns;
+    look_at_ports(jack);
+  }
+}
+
+bool register_ports(Jack& jack) {
+  const int count = std::max(2, jack.options.outputs);
+  for (int i = 0; i < count; ++i) {
+    const std::string name = count > 2 ? "out_" + std::to_string(i + 1)
+                             : i == 0  ? "out_left"
+                                       : "out_right";
+    jack.outputs.push_back(jack_port_register(jack.client, name.c_str(), JACK_DEFAULT_AUDIO_TYPE,
+                                              JackPortIsOutput | JackPortIsTerminal, 0));
+  }
+  jack.output_buffers.resize(jack.outputs.size());
+  jack.midi =
+      jack_port_register(jack.client, "midi_in", JACK_DEFAULT_MIDI_TYPE, JackPortIsInput, 0);
+  return jack.midi != nullptr && jack.outputs.back() != nullptr;
+}
+
+}  // namespace
+
+Result<AudioDevice> open_jack(Process& process, const AudioOptions& options) {
+  jack_set_error_function(say_nothing);
+  jack_set_info_function(say_nothing);
+  auto jack = std::make_shared<Jack>(process, options);
+  jack_status_t status{};
+  jack->client = jack_client_open(options.client_name.c_str(), JackNoStartServer, &status);
+  if (jack->client == nullptr) {
+    const char* const server = std::getenv("JACK_DEFAULT_SERVER");
+    return Error{std::string("no JACK server answers") +
+                 (server != nullptr ? std::string(" to the name '") + server + "'" : "") +
+                 "; start one (qjackctl, or jackd -d alsa), or choose another output: -a alsa, "
+                 "-a dummy"};
+  }
+  const auto close = [jack] { jack_client_close(jack->client); };
+  jack->rate_hz = static_cast<double>(jack_get_sample_rate(jack->client));
+  jack->clock_offset_ns = monotonic_ns() - static_cast<std::int64_t>(jack_get_time()) * 1000;
+  process.set_rate(jack->rate_hz);
+  jack_set_process_callback(jack->client, on_process, jack.get());
+  jack_set_xrun_callback(jack->client, on_xrun, jack.get());
+  jack_set_buffer_size_callback(jack->client, on_buffer_size, jack.get());
+  jack_set_sample_rate_callback(jack->client, on_sample_rate, jack.get());
+  jack_set_port_connect_callback(jack->client, on_connect, jack.get());
+  jack_set_port_registration_callback(jack->client, on_port, jack.get());
+  jack_on_info_shutdown(jack->client, on_shutdown, jack.get());
+  if (!register_ports(*jack) || jack_activate(jack->client) != 0) {
+    close();
+    return Error{"the JACK server refused our ports; are there too many clients?"};
+  }
+  jack->wiring = options.wiring;
+  if (options.connect) {
+    connect(*jack);
+  }
+  look_at_ports(*jack);
+  AudioDevice device;
+  device.rate_hz = jack->rate_hz;
+  device.description = "JACK client '" + std::string(jack_get_client_name(jack->client)) + "', " +
+                       std::to_string(static_cast<int>(jack->rate_hz)) + " Hz, " +
+                       std::to_string(jack_get_buffer_size(jack->client)) + " frames";
+  device.has_midi = true;
+  device.close = close;
+  device.is_lost = [jack] { return jack->lost.is_raised(); };
+  device.set_audio_inputs = [jack](int wanted) {
+    if (!jack->lost.is_raised()) {
+      set_audio_inputs(*jack, wanted);
+    }
+  };
+  device.tick = [jack] {
+    if (!jack->lost.is_raised()) {
+      tick(*jack);
+    }
+  };
+  device.wiring = [jack] {
+    Wiring wiring = jack->wiring;
+    wiring.lose_all();
+    return wiring;
+  };
+  return device;
+}
+
+}  // namespace ressort

@@ -1,0 +1,108 @@
+#include <RtMidi.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <map>
+
+#include "app/devices/audio.h"
+#include "app/devices/midi_input.h"
+
+namespace ressort {
+namespace {
+
+struct Keyboard {
+  Keyboard(RtMidi::Api api, const std::string& client, MidiDoor& door_in)
+      : door(door_in), input(api, client) {
+    input.setCallback(arrived, this);
+    input.ignoreTypes(true, true, true);
+  }
+
+  // RtMidi's thread: it notes the time and passes on, no more. RtMidi's own time is that between
+  // messages; what we need is the clock that the audio thread reads.
+  static void arrived(double, std::vector<unsigned char>* bytes, void* self) {
+    Keyboard& keyboard = *static_cast<Keyboard*>(self);
+    keyboard.door.arrive(keyboard.reader, *bytes, monotonic_ns());
+  }
+
+  MidiDoor& door;
+  MidiReader reader;
+  RtMidiIn input;
+};
+
+void say_nothing(RtMidiError::Type, const std::string&, void*) {}
+
+}  // namespace
+
+void MidiDoor::arrive(MidiReader& reader, std::span<const std::uint8_t> bytes,
+                      std::int64_t time_ns) {
+  const std::lock_guard lock(mutex_);
+  reader.read(bytes, [&](const Event& event) {
+    const TimedEvent timed{event, TimedEvent::When::at_time, time_ns};
+    process_.send(process_.from_midi, {&timed, 1});
+  });
+}
+
+struct MidiInput::Sources {
+  RtMidi::Api api;
+  std::string client;
+  bool connect;
+  MidiDoor& door;
+  std::unique_ptr<Keyboard> own;                             // the port that others connect to
+  std::map<std::string, std::unique_ptr<Keyboard>> sources;  // by name
+};
+
+MidiInput::MidiInput(std::unique_ptr<Sources> sources) : sources_(std::move(sources)) {}
+MidiInput::~MidiInput() = default;
+
+Result<std::unique_ptr<MidiInput>> MidiInput::open(MidiApi api, const std::string& client_name,
+                                                   bool connect, MidiDoor& door) {
+  const Error missing{api == MidiApi::alsa
+                          ? "there is no ALSA sequencer (/dev/snd/seq), so no keyboard can be "
+                            "heard through ALSA; play by OSC or from the console"
+                          : "no JACK server answers, so no keyboard can be heard through JACK"};
+  if (api == MidiApi::alsa && access("/dev/snd/seq", R_OK | W_OK) != 0) {
+    return missing;  // RtMidi would find out too, but not without printing
+  }
+  const RtMidi::Api rt_api = api == MidiApi::alsa ? RtMidi::LINUX_ALSA : RtMidi::UNIX_JACK;
+  try {
+    auto sources = std::make_unique<Sources>(Sources{rt_api, client_name, connect, door, {}, {}});
+    sources->own = std::make_unique<Keyboard>(rt_api, client_name, door);
+    sources->own->input.openVirtualPort("midi_in");
+    sources->own->input.setErrorCallback(say_nothing);
+    auto input = std::unique_ptr<MidiInput>(new MidiInput(std::move(sources)));
+    input->tick();
+    return input;
+  } catch (const RtMidiError&) {
+    return missing;
+  }
+}
+
+void MidiInput::tick() {
+  Sources& s = *sources_;
+  if (!s.connect) {
+    return;
+  }
+  try {
+    std::vector<std::string> present;
+    for (unsigned i = 0; i < s.own->input.getPortCount(); ++i) {
+      const std::string name = s.own->input.getPortName(i);
+      if (name.find(s.client) != std::string::npos ||
+          name.find("Midi Through") != std::string::npos) {
+        continue;
+      }
+      present.push_back(name);
+      if (!s.sources.contains(name)) {
+        auto source = std::make_unique<Keyboard>(s.api, s.client, s.door);
+        source->input.openPort(i, "from " + name);
+        s.sources.emplace(name, std::move(source));
+      }
+    }
+    std::erase_if(s.sources, [&](const auto& source) {
+      return std::find(present.begin(), present.end(), source.first) == present.end();
+    });
+  } catch (const RtMidiError&) {
+    return;  // a source that vanished while we looked; the next tick sees it
+  }
+}
+
+}  // namespace ressort

@@ -1,0 +1,457 @@
+#include "app/realtime/process.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "app/realtime/denormals.h"
+
+namespace ressort {
+namespace {
+
+// The earliest on top of the heap; of equals the one that came first.
+template <class Pending>
+bool later(const Pending& a, const Pending& b) {
+  return a.frame != b.frame ? a.frame > b.frame : a.order > b.order;
+}
+
+// Each moment at which something acts cuts a chunk in two and may retune every voice on both sides.
+// On average they may be so many frames apart...
+constexpr std::size_t frames_per_moment = 8;
+// ...but in the shortest chunk a chord may be strummed.
+constexpr std::size_t least_moments = 16;
+
+bool is_controller(const Event& event, int number) {
+  return event.kind == EventKind::controller && event.index == number;
+}
+
+bool is_panic(const Event& event) {
+  return event.kind == EventKind::panic || is_controller(event, 120);
+}
+
+bool ends_sound(const Event& event) {
+  return is_panic(event) || event.kind == EventKind::note_off || is_controller(event, 64) ||
+         is_controller(event, 123);
+}
+
+}  // namespace
+
+Process::Process(double rate_hz, bool limit, Clock clock_ns)
+    : rate_hz_(rate_hz),
+      limit_(limit),
+      clock_ns_(clock_ns),
+      limiter_(rate_hz),
+      input_(max_channels * chunk_frames),
+      sound_(max_channels * chunk_frames),
+      fade_sound_(max_channels * chunk_frames),
+      mixed_(max_channels * chunk_frames) {
+  now_.reserve(from_osc.capacity() + from_console.capacity() + from_midi.capacity() + max_now +
+               max_endings);
+  pending_.reserve(max_ahead);
+  due_.reserve(now_.capacity() + max_ahead);
+  matching_.reserve(due_.capacity());
+  meters.limited.set(1.0);
+  set_rate(rate_hz);
+}
+
+Process::~Process() {
+  delete current_;
+  delete fading_;
+  delete slot.offer(nullptr);
+  delete slot.collect();
+}
+
+void Process::set_rate(double rate_hz) {
+  rate_hz_ = rate_hz;
+  load_.forget();
+  limiter_ = Limiter(rate_hz);
+  fade_frames_ = static_cast<std::size_t>(fade_s * rate_hz);
+}
+
+void Process::block(std::span<const float* const> inputs, std::span<float* const> outputs,
+                    std::size_t frames, std::span<const MidiPacket> midi,
+                    std::int64_t time_ns) noexcept {
+  run<float>(inputs, outputs, frames, midi, time_ns);
+}
+
+void Process::block(std::span<const double* const> inputs, std::span<double* const> outputs,
+                    std::size_t frames, std::span<const MidiPacket> midi,
+                    std::int64_t time_ns) noexcept {
+  run<double>(inputs, outputs, frames, midi, time_ns);
+}
+
+template <class Sample>
+void Process::run(std::span<const Sample* const> inputs, std::span<Sample* const> outputs,
+                  std::size_t frames, std::span<const MidiPacket> midi, std::int64_t time_ns) {
+  const std::int64_t start_ns = clock_ns_ != nullptr ? clock_ns_() : 0;
+  const DenormalsFlushed flushed;
+  clock.write({frame_, time_ns, rate_hz_, static_cast<std::int64_t>(frames)});
+  if (frames > 0) {
+    gather(frames, midi, time_ns);
+  }
+  const std::size_t input_count = std::min(inputs.size(), max_channels);
+  const std::size_t output_count = std::min(outputs.size(), max_channels);
+  for (std::size_t at = 0; at < frames; at += chunk_frames) {
+    const std::size_t n = std::min(chunk_frames, frames - at);
+    for (std::size_t c = 0; c < input_count; ++c) {
+      double* const samples = input_.data() + c * chunk_frames;
+      input_pointers_[c] = inputs[c] != nullptr ? samples : nullptr;
+      if (inputs[c] != nullptr) {
+        // What is no number would never leave the network again.
+        std::transform(inputs[c] + at, inputs[c] + at + n, samples, [](Sample sample) {
+          return std::isfinite(sample) ? static_cast<double>(sample) : 0.0;
+        });
+      }
+    }
+    collect_due(n);
+    play_models(input_count, output_count, n);
+    for (std::size_t c = 0; c < output_count; ++c) {
+      const double* const samples = mixed_.data() + c * chunk_frames;
+      std::transform(samples, samples + n, outputs[c] + at,
+                     [](double sample) { return static_cast<Sample>(sample); });
+    }
+    if (is_recording.is_raised()) {
+      record(output_count, n);
+    }
+    frame_ += static_cast<std::int64_t>(n);
+  }
+  tell();
+  if (clock_ns_ != nullptr) {
+    weigh(1e-9 * static_cast<double>(clock_ns_() - start_ns), frames);
+  }
+}
+
+bool Process::send(Ring<TimedEvent>& ring, std::span<const TimedEvent> events) {
+  const bool ends = std::any_of(events.begin(), events.end(),
+                                [](const TimedEvent& timed) { return ends_sound(timed.event); });
+  const std::size_t spare =
+      (ends ? 0 : max_endings) + (&ring == &from_osc ? ahead_.free() : std::size_t{0});
+  const bool has_room = ring.push_all(events, spare);
+  meters.dropped.add(has_room ? 0 : events.size());
+  return has_room;
+}
+
+bool Process::send_ahead(std::span<const TimedEvent> events) {
+  // Nobody else has taken as much of the ring as there are places ahead.
+  const bool has_room = ahead_.take(events.size()) && from_osc.push_all(events);
+  meters.dropped.add(has_room ? 0 : events.size());
+  return has_room;
+}
+
+bool Process::schedule(std::int64_t frame, const Event& event) {
+  keeps_every_frame_ = true;  // nobody is waiting for the sound
+  if (!ahead_.take(1)) {
+    meters.dropped.add(1);
+    return false;
+  }
+  wait(frame, event);
+  return true;
+}
+
+// Everything that has arrived becomes an event at a frame.
+void Process::gather(std::size_t frames, std::span<const MidiPacket> midi, std::int64_t time_ns) {
+  now_.clear();
+  next_now_ = 0;
+  drain(from_osc, frames, time_ns);
+  drain(from_console, frames, time_ns);
+  drain(from_midi, frames, time_ns);
+  const std::size_t before = now_.size();
+  const auto last = static_cast<std::int64_t>(frames) - 1;
+  for (const MidiPacket& packet : midi) {
+    midi_.read(packet.bytes, [&](const Event& event) {
+      if (now_.size() - before < max_now + (ends_sound(event) ? max_endings : 0)) {
+        enter(frame_ + std::min<std::int64_t>(packet.frame, last), event);
+      } else {
+        meters.dropped.add(1);
+      }
+    });
+  }
+  meters.malformed.set(midi_.malformed());
+  const auto earlier = [](const Pending& a, const Pending& b) { return later(b, a); };
+  if (!std::is_sorted(now_.begin(), now_.end(), earlier)) {
+    std::sort(now_.begin(), now_.end(), earlier);
+  }
+}
+
+void Process::drain(Ring<TimedEvent>& ring, std::size_t frames, std::int64_t time_ns) {
+  TimedEvent timed;
+  // What comes meanwhile is the next block's.
+  for (std::size_t left = ring.size(); left > 0 && ring.pop(timed); --left) {
+    if (timed.timing == TimedEvent::When::at_frame && timed.when >= frame_) {
+      wait(timed.when, timed.event);
+    } else if (timed.timing == TimedEvent::When::at_frame) {
+      meters.late_s.set(static_cast<double>(frame_ - timed.when) / rate_hz_);
+      meters.late.add(1);
+      ahead_.give_back(1);
+      enter(frame_, timed.event);
+    } else if (timed.timing == TimedEvent::When::at_time) {
+      // Constant latency: what happened during the last period is played during this one.
+      const double since = static_cast<double>(timed.when - time_ns) * 1e-9 * rate_hz_;
+      const auto block = static_cast<std::int64_t>(frames);
+      enter(frame_ + std::clamp<std::int64_t>(block + std::llround(since), 0, block - 1),
+            timed.event);
+    } else {
+      enter(frame_, timed.event);
+    }
+  }
+}
+
+// Acts in this block.
+void Process::enter(std::int64_t frame, const Event& event) {
+  now_.push_back({frame, order_++, event});
+  if (is_panic(event)) {
+    forget_after(frame);
+  }
+}
+
+// Acts when its frame comes; it has its place already.
+void Process::wait(std::int64_t frame, const Event& event) {
+  latest_ = std::max(latest_, frame);
+  pending_.push_back({frame, order_++, event});
+  std::push_heap(pending_.begin(), pending_.end(), later<Pending>);
+}
+
+void Process::forget_after(std::int64_t frame) {
+  if (latest_ <= frame) {
+    return;  // a flood of panics has nothing more to forget
+  }
+  latest_ = frame;
+  ahead_.give_back(
+      std::erase_if(pending_, [&](const Pending& pending) { return pending.frame > frame; }));
+  std::make_heap(pending_.begin(), pending_.end(), later<Pending>);
+}
+
+void Process::collect_due(std::size_t frames) {
+  due_.clear();
+  const std::int64_t end = frame_ + static_cast<std::int64_t>(frames);
+  const std::size_t most_moments =
+      keeps_every_frame_ ? frames : std::max(least_moments, frames / frames_per_moment);
+  std::size_t moments = 0;
+  const auto collect = [&](const Pending& next) {
+    Event event = next.event;
+    event.frame = static_cast<std::uint32_t>(std::max<std::int64_t>(0, next.frame - frame_));
+    if (due_.empty() || event.frame != due_.back().frame) {
+      // The rest of a flood acts with its last moment: early, but all of it and in its order.
+      event.frame = ++moments <= most_moments ? event.frame : due_.back().frame;
+    }
+    due_.push_back(event);
+  };
+  const auto is_due = [&](const Pending& next) { return next.frame < end; };
+  while (true) {
+    const bool has_now = next_now_ < now_.size() && is_due(now_[next_now_]);
+    const bool has_ahead = !pending_.empty() && is_due(pending_.front());
+    if (has_ahead && (!has_now || pending_.front().frame <= now_[next_now_].frame)) {
+      const Pending next = pending_.front();
+      std::pop_heap(pending_.begin(), pending_.end(), later<Pending>);
+      pending_.pop_back();
+      ahead_.give_back(1);
+      collect(next);
+      if (is_panic(next.event)) {
+        forget_after(next.frame);
+      }
+    } else if (has_now) {
+      collect(now_[next_now_++]);
+    } else {
+      return;
+    }
+  }
+}
+
+// A new model is taken at the edge of a chunk, once the last fade is over and its engine is on its
+// way out.
+void Process::swap_models() {
+  if (fading_ != nullptr && fade_left_ == 0 && slot.retire(fading_)) {
+    fading_ = nullptr;
+  }
+  if (fading_ != nullptr) {
+    return;
+  }
+  if (Sounding* const next = slot.take()) {
+    fading_ = current_;
+    fade_left_ = fading_ == nullptr || goes_on(*next) ? 0 : fade_frames_;
+    resets_told_ = fade_left_ == 0 ? resets_told_ : 0;
+    beyond_told_ = fade_left_ == 0 ? beyond_told_ : 0;
+    shed_told_ = fade_left_ == 0 ? shed_told_ : 0;
+    if (fade_left_ > 0) {
+      load_.begin_anew();
+    }
+    current_ = next;
+    meters.swaps.add(1);
+  }
+}
+
+bool Process::goes_on(const Sounding& next) const {
+  return next.serial != 0 && next.serial == current_->serial &&
+         next.engine->go_on_from(*current_->engine);
+}
+
+void Process::play_models(std::size_t input_count, std::size_t output_count, std::size_t frames) {
+  swap_models();
+  std::array<double*, max_channels> channels;
+  for (std::size_t c = 0; c < output_count; ++c) {
+    channels[c] = mixed_.data() + c * chunk_frames;
+    std::fill(channels[c], channels[c] + frames, 0.0);
+  }
+  const std::span<double* const> out(channels.data(), output_count);
+  // A model with one output is heard on both sides; one with more than the device has is folded.
+  const auto add = [&](const std::vector<double>& samples, int count, auto&& gain) {
+    if (output_count == 0) {
+      return;
+    }
+    const auto sources = static_cast<std::size_t>(count);
+    for (std::size_t k = 0; k < std::max<std::size_t>(sources, sources == 1 ? output_count : 0);
+         ++k) {
+      const double* const source = samples.data() + (sources == 1 ? 0 : k) * chunk_frames;
+      double* const target = out[k % output_count];
+      for (std::size_t n = 0; n < frames; ++n) {
+        target[n] += gain(n) * source[n];
+      }
+    }
+  };
+  const double length = static_cast<double>(std::max<std::size_t>(1, fade_frames_));
+  const auto old_gain = [&](std::size_t n) {
+    return n < fade_left_ ? static_cast<double>(fade_left_ - n) / length : 0.0;
+  };
+  const bool is_fading = fading_ != nullptr && fade_left_ > 0;
+  if (is_fading) {
+    play(*fading_, input_count, fade_sound_, frames);
+    add(fade_sound_, fading_->engine->output_count(), old_gain);
+  }
+  if (current_ != nullptr) {
+    play(*current_, input_count, sound_, frames);
+    const int count = current_->engine->output_count();
+    if (is_fading) {
+      add(sound_, count, [&](std::size_t n) { return 1.0 - old_gain(n); });
+    } else {
+      add(sound_, count, [](std::size_t) { return 1.0; });
+    }
+  }
+  fade_left_ -= std::min(fade_left_, frames);
+  if (limit_) {
+    limiter_.process(out, frames);
+  }
+  double peak = 0.0;
+  for (const double* const channel : out) {
+    for (std::size_t n = 0; n < frames; ++n) {
+      peak = std::max(peak, std::fabs(channel[n]));
+    }
+  }
+  if (meters.read.lower()) {
+    meters.load_peak.set(0.0);
+    meters.peak.set(0.0);
+    meters.limited.set(1.0);
+  }
+  meters.peak.raise(peak);
+  if (const double reduction = limiter_.take_reduction(); reduction < meters.limited.get()) {
+    meters.limited.set(reduction);
+  }
+}
+
+// Events that name a model act in that model only; notes and controllers act in both, so that a
+// note that began before a swap ends where it began.
+void Process::play(Sounding& sounding, std::size_t input_count, std::vector<double>& samples,
+                   std::size_t frames) {
+  matching_.clear();
+  const bool is_old = &sounding == fading_;
+  for (const Event& event : due_) {
+    const bool starts = event.kind == EventKind::note_on;
+    if (event.model == sounding.serial || (event.model == 0 && !(is_old && starts))) {
+      matching_.push_back(event);
+    }
+  }
+  std::array<double*, max_channels> outputs;
+  const auto count = static_cast<std::size_t>(sounding.engine->output_count());
+  for (std::size_t c = 0; c < count; ++c) {
+    outputs[c] = samples.data() + c * chunk_frames;
+  }
+  sounding.engine->process(matching_, {input_pointers_.data(), input_count},
+                           {outputs.data(), count}, frames);
+}
+
+// What others may want to know, after the sound is done.
+void Process::tell() {
+  meters.frames.set(static_cast<std::uint64_t>(frame_));
+  if (current_ == nullptr) {
+    return;
+  }
+  Engine& engine = *current_->engine;
+  const EngineMeters now = engine.meters();
+  meters.voices.set(now.voices);
+  stepped_ = now.stepped;
+  meters.stolen.set(now.stolen);
+  meters.shed.add(now.shed - shed_told_);
+  shed_told_ = now.shed;
+  meters.beyond.add(now.beyond - beyond_told_);
+  beyond_told_ = now.beyond;
+  meters.saved.set(now.saved);
+  meters.modes.set(now.modes);
+  meters.modes_awake.set(now.modes_awake);
+  meters.energy.set(now.energy);
+  meters.loss.set(now.loss);
+  meters.is_driven.set(now.is_driven);
+  meters.is_whole.set(now.is_whole);
+  if (now.resets != resets_told_) {
+    meters.resets.add(now.resets - resets_told_);
+    resets_told_ = now.resets;
+    reports.push({Report::Kind::reset, current_->serial, 0, 0.0});
+  }
+  if (reports.size() + Engine::max_creators + Engine::max_changes > reports.capacity()) {
+    return;  // nobody is listening just now: the engine keeps them
+  }
+  for (const std::uint32_t link : engine.take_creators()) {
+    reports.push({Report::Kind::created, current_->serial, 0, static_cast<double>(link)});
+  }
+  for (const std::uint16_t index : engine.take_changes()) {
+    reports.push({Report::Kind::parameter, current_->serial, index, engine.parameter(index)});
+  }
+}
+
+// What the block took, and what follows from it: a model on its way out goes first, then voices.
+void Process::weigh(double took_s, std::size_t frames) {
+  const double sound_s = static_cast<double>(frames) / rate_hz_;
+  load_.add(took_s, sound_s);
+  meters.load.set(load_.mean());
+  meters.load_peak.raise(frames > 0 ? took_s / sound_s : 0.0);
+  meters.overruns.add(took_s > sound_s ? 1 : 0);
+  if (current_ == nullptr) {
+    return;
+  }
+  if (load_.is_over() && fade_left_ > 0) {
+    fading_->engine->limit_voices(1);
+    load_.forget();
+    return;
+  }
+  const double load = load_.lasting();
+  const int before = load_.limit();
+  if (const auto voices = load_.judge(stepped_, current_->engine->voice_count())) {
+    current_->engine->limit_voices(*voices);
+  }
+  const bool gave_way = load_.limit() > 0 && (before == 0 || load_.limit() < before);
+  if ((gave_way || load > 1.0) && frame_ >= next_overload_news_) {
+    next_overload_news_ = frame_ + static_cast<std::int64_t>(rate_hz_);
+    reports.push({Report::Kind::overload, current_->serial,
+                  static_cast<std::uint16_t>(load_.limit()), load});
+  }
+}
+
+void Process::record(std::size_t channels, std::size_t frames) {
+  if (channels == 0) {
+    return;
+  }
+  const std::size_t most = RecordedChunk::max_samples / channels;
+  for (std::size_t at = 0; at < frames; at += most) {
+    RecordedChunk piece;
+    piece.frames = static_cast<std::uint16_t>(std::min(most, frames - at));
+    piece.channels = static_cast<std::uint16_t>(channels);
+    std::size_t i = 0;
+    for (std::size_t n = 0; n < piece.frames; ++n) {
+      for (std::size_t c = 0; c < channels; ++c) {
+        piece.samples[i++] = static_cast<float>(mixed_[c * chunk_frames + at + n]);
+      }
+    }
+    if (!recording.push(piece)) {
+      meters.record_lost.add(1);
+    }
+  }
+}
+
+}  // namespace ressort

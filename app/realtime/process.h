@@ -1,0 +1,203 @@
+// app: the audio thread, whole. Everything that it touches is in this struct.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "app/realtime/dsp_load.h"
+#include "app/realtime/lockfree.h"
+#include "app/realtime/midi.h"
+#include "core/engine/engine.h"
+#include "core/engine/limiter.h"
+
+namespace ressort {
+
+// An engine and the number that events for it carry. One of the same number, unless it is 0, goes
+// on where the other is, in the same sample.
+struct Sounding {
+  std::unique_ptr<Engine> engine;
+  std::uint32_t serial = 0;
+};
+
+// An event on its way to the audio thread, and when it is to act.
+struct TimedEvent {
+  enum class When : std::uint8_t {
+    now,       // at the start of the next block
+    at_frame,  // `when` is a frame of the process's own count
+    at_time,   // `when` is a time of the monotonic clock, ns; it acts one period later
+  };
+  Event event;
+  When timing = When::now;
+  std::int64_t when = 0;
+};
+
+// A MIDI packet of this block, from a backend that has exact frames.
+struct MidiPacket {
+  std::uint32_t frame = 0;
+  std::span<const std::uint8_t> bytes;
+};
+
+// What the audio thread has to tell.
+struct Report {
+  enum class Kind : std::uint8_t { parameter, reset, created, overload };
+  Kind kind = Kind::reset;
+  std::uint32_t model = 0;  // serial
+  std::uint16_t index = 0;  // parameter; the most voices there is time for, or 0
+  double value = 0.0;       // of the parameter; the link that created energy; the load
+};
+
+// A piece of the output on its way to a recording.
+struct RecordedChunk {
+  static constexpr std::size_t max_samples = 128;
+  std::uint16_t frames = 0;
+  std::uint16_t channels = 0;
+  std::array<float, max_samples> samples{};  // interleaved
+};
+
+// Where others look in. Written by the audio thread, but for the flags.
+struct Meters {
+  Meter<std::uint64_t> frames;  // since the start
+  Meter<int> voices;
+  Meter<std::uint64_t> resets;  // voices that became unstable
+  Meter<std::uint64_t> stolen;
+  Meter<std::uint64_t> shed;      // voices that there was no time for
+  Meter<double> load;             // share of the time that blocks take, over about a second
+  Meter<double> load_peak;        // of one block since the last reading
+  Meter<std::uint64_t> overruns;  // blocks that took longer than they sound
+  Meter<std::uint64_t> beyond;    // times that a parameter was kept where it is stable
+  Meter<double> saved;            // share of the steps that sleep saves
+  Meter<std::uint64_t> modes;     // of the voices that sound
+  Meter<std::uint64_t> modes_awake;
+  Meter<double> energy;            // of what sounds, as EngineMeters says
+  Meter<double> loss;              // of it in a second
+  Meter<bool> is_driven;           // something comes in: the loss is not all known
+  Meter<bool> is_whole;            // all of the energy is known
+  Counter dropped;                 // events that found no room
+  Meter<std::uint64_t> late;       // events that came after their time
+  Meter<double> late_s;            // the last of them, by so much
+  Meter<std::uint64_t> malformed;  // MIDI that could not be read
+  Meter<std::uint64_t> swaps;
+  Meter<std::uint64_t> record_lost;  // chunks that the recording missed
+  Meter<double> peak;                // of the output since the last reading
+  Meter<double> limited;             // the limiter's deepest gain since the last reading
+  Meter<std::uint64_t> strangers;    // [OSC's thread] packets of who may not send
+  Meter<std::uint64_t> xruns;        // [the backend's own notification thread]
+  Flag read;                         // raised by a reader: what is since then starts anew
+};
+
+struct Process {
+  static constexpr std::size_t chunk_frames = 512;  // engines see no longer block
+  static constexpr std::size_t max_channels = 64;   // of a model
+  static constexpr std::size_t max_now = 4096;      // events of one source in one block...
+  static constexpr std::size_t max_endings = 1024;  // ...and so many more that end sound
+  static constexpr std::size_t max_ahead = 4096;    // events that wait for their frame
+  static constexpr double fade_s = 0.05;            // between two models
+
+  // A monotonic clock, in ns, that makes no system call.
+  using Clock = std::int64_t (*)();
+
+  // Without a clock nothing is measured, and no voice gives way: offline there is always time.
+  explicit Process(double rate_hz, bool limit = true, Clock clock_ns = nullptr);
+  ~Process();
+  Process(const Process&) = delete;
+  Process& operator=(const Process&) = delete;
+
+  // One callback of any backend: `frames` of any number. `inputs` may hold null channels.
+  // `time_ns`: the monotonic clock at the first frame. [audio] wait-free
+  void block(std::span<const float* const> inputs, std::span<float* const> outputs,
+             std::size_t frames, std::span<const MidiPacket> midi, std::int64_t time_ns) noexcept;
+
+  // The same for buffers in double precision, as the offline renderer has them. [audio]
+  void block(std::span<const double* const> inputs, std::span<double* const> outputs,
+             std::size_t frames, std::span<const MidiPacket> midi, std::int64_t time_ns) noexcept;
+
+  // Schedules an event for a frame of the process's own count; false if there is no room. Only
+  // where no other thread runs block(): offline. [audio]
+  bool schedule(std::int64_t frame, const Event& event);
+
+  // Hands over what is to act in the next block, all of it or nothing; it acts in one block. What
+  // ends sound finds room where other events do not. What is refused is counted. [the ring's one
+  // writer] wait-free
+  bool send(Ring<TimedEvent>& ring, std::span<const TimedEvent> events);
+
+  // The same for events at frames, which wait in a room of their own until the panic that comes
+  // before their time. [OSC's thread] wait-free
+  bool send_ahead(std::span<const TimedEvent> events);
+
+  // Between two runs of a backend, when no audio thread is alive. [control]
+  void set_rate(double rate_hz);
+
+  // --- shared with other threads --------------------------------------------------------------
+  Slot<Sounding> slot;  // offered by the session's worker
+  // Written through send() and send_ahead().
+  Ring<TimedEvent> from_osc{max_now + max_endings + max_ahead};
+  Ring<TimedEvent> from_console{max_now + max_endings};
+  Ring<TimedEvent> from_midi{max_now + max_endings};  // RtMidi's thread
+  Ring<Report> reports{4096};                         // to the session's worker
+  Ring<RecordedChunk> recording{8192};
+  Flag is_recording;
+  ClockBoard clock;
+  Meters meters;
+
+ private:
+  struct Pending {
+    std::int64_t frame = 0;
+    std::uint64_t order = 0;  // what came first acts first
+    Event event;
+  };
+
+  template <class Sample>
+  void run(std::span<const Sample* const> inputs, std::span<Sample* const> outputs,
+           std::size_t frames, std::span<const MidiPacket> midi, std::int64_t time_ns);
+  void gather(std::size_t frames, std::span<const MidiPacket> midi, std::int64_t time_ns);
+  void drain(Ring<TimedEvent>& ring, std::size_t frames, std::int64_t time_ns);
+  void enter(std::int64_t frame, const Event& event);
+  void wait(std::int64_t frame, const Event& event);
+  void forget_after(std::int64_t frame);
+  void collect_due(std::size_t frames);
+  void play_models(std::size_t input_count, std::size_t output_count, std::size_t frames);
+  void play(Sounding& sounding, std::size_t input_count, std::vector<double>& samples,
+            std::size_t frames);
+  void swap_models();
+  bool goes_on(const Sounding& next) const;
+  void tell();
+  void weigh(double took_s, std::size_t frames);
+  void record(std::size_t channels, std::size_t frames);
+
+  double rate_hz_;
+  bool limit_;
+  Clock clock_ns_;
+  DspLoad load_;
+  std::int64_t frame_ = 0;  // of the next sample
+  std::uint64_t order_ = 0;
+  MidiReader midi_;
+  Sounding* current_ = nullptr;
+  Sounding* fading_ = nullptr;
+  std::size_t fade_left_ = 0;
+  std::size_t fade_frames_ = 0;
+  std::uint64_t resets_told_ = 0;        // of the current engine
+  std::uint64_t beyond_told_ = 0;        // of the same
+  std::uint64_t shed_told_ = 0;          // of the same
+  int stepped_ = 0;                      // its voices
+  std::int64_t next_overload_news_ = 0;  // frame
+  Limiter limiter_;
+  // None of these grows.
+  std::vector<Pending> now_;      // of this block, sorted
+  std::size_t next_now_ = 0;      // the first of them that has not acted
+  std::vector<Pending> pending_;  // what waits for its frame: a heap, the earliest on top
+  std::int64_t latest_ = 0;       // no frame there is later
+  Places ahead_{max_ahead};       // of it, and of what is on its way there
+  bool keeps_every_frame_ = false;
+  std::vector<Event> due_;       // of this chunk, sorted
+  std::vector<Event> matching_;  // those of one engine
+  std::array<const double*, max_channels> input_pointers_{};
+  std::vector<double> input_;       // [channel][chunk_frames]
+  std::vector<double> sound_;       // [channel][chunk_frames] of the current engine
+  std::vector<double> fade_sound_;  // [channel][chunk_frames] of the fading one
+  std::vector<double> mixed_;       // [output][chunk_frames]
+};
+
+}  // namespace ressort

@@ -1,0 +1,67 @@
+#include "app/session/admit.h"
+
+#include <algorithm>
+
+#include "app/session/files.h"
+
+namespace ressort {
+namespace {
+
+Finding at(const std::string& path, std::size_t most_bytes, const Error& error, Severity severity) {
+  const auto text = read_text(path, most_bytes);
+  Finding finding = finding_of(path, text ? std::string_view(*text) : "", error);
+  finding.diagnostic.severity = severity;
+  return finding;
+}
+
+}  // namespace
+
+bool Admission::is_granted() const {
+  return std::none_of(findings.begin(), findings.end(), [](const Finding& finding) {
+    return finding.diagnostic.severity == Severity::error;
+  });
+}
+
+Admission ask_to_play(const Scene& scene, const CompileOptions& options) {
+  Admission admission;
+  auto compiled = compile(scene.network, scene.preset, options);
+  if (!compiled) {
+    // What does not fit the preset was not read, so this is the model's.
+    admission.findings.push_back(
+        at(scene.model_path, max_model_bytes, compiled.error(), Severity::error));
+    return admission;
+  }
+  const Gate& gate = compiled->gate;
+  if (gate.complaint) {
+    const bool is_refused = gate.verdict == Verdict::unstable && !options.force;
+    Error complaint = *gate.complaint;
+    complaint.message +=
+        is_refused ? "; --force plays it all the same, fading out what runs away" : "";
+    admission.findings.push_back(at(scene.model_path, max_model_bytes, complaint,
+                                    is_refused ? Severity::error : Severity::warning));
+  }
+  for (const Error& narrowed : gate.narrowed) {
+    admission.findings.push_back(at(scene.path, max_preset_bytes, narrowed, Severity::warning));
+  }
+  admission.compiled = *std::move(compiled);
+  return admission;
+}
+
+Result<Compiled> admit(const Scene& scene, const CompileOptions& options,
+                       std::vector<std::string>& warnings) {
+  Admission admission = ask_to_play(scene, options);
+  std::string errors;
+  for (const Finding& finding : admission.findings) {
+    if (finding.diagnostic.severity == Severity::error) {
+      errors += (errors.empty() ? "" : "\n") + to_string(finding);
+    } else {
+      warnings.push_back(to_string(finding));
+    }
+  }
+  if (!errors.empty()) {
+    return Error{std::move(errors)};
+  }
+  return *std::move(admission.compiled);
+}
+
+}  // namespace ressort

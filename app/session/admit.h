@@ -1,0 +1,30 @@
+// app: compiles what was read, and decides in one place whether it may sound.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "app/session/loader.h"
+#include "core/compile/compile.h"
+
+namespace ressort {
+
+// What came of a scene, for whoever plays, renders or checks it.
+struct Admission {
+  std::optional<Compiled> compiled;  // whatever the findings say; nothing where compile() fails
+  std::vector<Finding> findings;     // an error among them: it shall not sound
+  bool is_granted() const;
+};
+
+// Refuses, with file, line and column, where compile() fails, and where the model is not stable as
+// it starts unless the options say to force it. Tells what is narrowed, forced or not proved.
+// [any thread but audio]
+Admission ask_to_play(const Scene& scene, const CompileOptions& options);
+
+// The same for who wants to play or nothing: warnings are added to `warnings`, an error's message
+// is all errors, one a line.
+Result<Compiled> admit(const Scene& scene, const CompileOptions& options,
+                       std::vector<std::string>& warnings);
+
+}  // namespace ressort

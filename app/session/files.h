@@ -1,0 +1,42 @@
+// app: texts, read and written, and where the models and presets are.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "app/session/new_file.h"
+#include "core/result.h"
+
+namespace ressort {
+
+// A whole text file of at most `max_bytes`, without the byte order mark that it may begin with. The
+// error says what is in the way: missing, a directory, too large, unreadable, UTF-16.
+Result<std::string> read_text(const std::string& path, std::size_t max_bytes);
+
+// All or nothing: what was there stays until the text is whole.
+Result<Done> write_text(const std::string& path, const std::string& text, Existing existing);
+
+// The same for a command's --output, complaining on stderr; the command's exit code.
+int put_text(const std::string& path, const std::string& text, bool force);
+
+// What names may lead to: whoever sits at the machine names any file, whoever sends a packet what
+// is below the program's own models and presets, wherever links and ".." lead.
+enum class Reach { any_file, own_folders };
+
+// The file that a person means by `name`: a path, with or without its ending, or the name of a
+// preset or a model that came with the program. Presets go before models.
+Result<std::string> find_scene(const std::string& name, Reach reach);
+
+// The path without links and "..", where it is that of an ordinary file, a .mdl or a .toml below
+// the program's own folders.
+std::optional<std::string> own_file(const std::string& path);
+
+// All presets and models that came with the program, by name, sorted.
+std::vector<std::string> known_presets();
+std::vector<std::string> known_models();
+
+// The folder where the program's own models are; the presets are beside it.
+std::string models_folder();
+
+}  // namespace ressort

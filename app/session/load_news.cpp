@@ -1,0 +1,19 @@
+#include "app/session/load_news.h"
+
+#include <utility>
+
+namespace ressort {
+
+LoadNews::LoadNews(std::string name, Tell tell) : name_(std::move(name)), tell_(std::move(tell)) {}
+
+void LoadNews::at(std::string_view stage) {
+  const auto now = Clock::now();
+  if (now < next_ || !tell_) {
+    return;
+  }
+  next_ = now + std::chrono::seconds(2);
+  const auto seconds = std::chrono::duration_cast<std::chrono::seconds>(now - start_).count();
+  tell_("still loading '" + name_ + "', " + std::to_string(seconds) + " s: " + std::string(stage));
+}
+
+}  // namespace ressort

@@ -1,0 +1,245 @@
+#include "app/session/loader.h"
+
+#include <algorithm>
+#include <cctype>
+#include <filesystem>
+
+#include "core/model/preset/fit.h"
+
+namespace ressort {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr std::size_t longest_source = 160;  // of a line that is shown
+
+// Goes through a text once, for lines whose numbers never fall.
+class Lines {
+ public:
+  explicit Lines(std::string_view text) : rest_(text) {}
+
+  // Line `number`, from 1.
+  std::string at(int number) {
+    for (; line_ < number && !rest_.empty(); ++line_) {
+      const std::size_t end = std::min(rest_.find_first_of("\r\n"), rest_.size());
+      const bool pair = end + 1 < rest_.size() && rest_[end] == '\r' && rest_[end + 1] == '\n';
+      rest_.remove_prefix(std::min(rest_.size(), end + (pair ? 2 : 1)));
+    }
+    return std::string(rest_.substr(0, std::min(rest_.find_first_of("\r\n"), longest_source)));
+  }
+
+ private:
+  std::string_view rest_;
+  int line_ = 1;
+};
+
+class SceneReader {
+ public:
+  explicit SceneReader(const SceneOptions& options) : options_(options) {}
+
+  Reading read(const std::string& name) {
+    auto path = find_scene(name, options_.reach);
+    if (!path) {
+      fail("", "", path.error());
+      return std::move(out_);
+    }
+    scene_.path = *path;
+    scene_.name = fs::path(*path).stem().string();
+    if (path->ends_with(".toml")
+            ? read_preset()
+            : read_model(*path, {.third = options_.third, .progress = options_.progress})) {
+      out_.scene = std::move(scene_);
+    }
+    return std::move(out_);
+  }
+
+ private:
+  bool fail(const std::string& file, std::string_view text, const Error& error) {
+    out_.findings.push_back(finding_of(file, text, error));
+    return false;
+  }
+
+  bool read_preset() {
+    auto text = read_text(scene_.path, max_preset_bytes);
+    if (!text) {
+      return fail("", "", text.error());
+    }
+    ParsedPreset read = parse_preset(*text);
+    for (const Error& error : read.errors) {
+      fail(scene_.path, *text, error);
+    }
+    scene_.preset = std::move(read.preset);
+    scene_.has_preset = true;
+    if (scene_.preset.model.empty()) {
+      return false;
+    }
+    const auto model = find_model(scene_.preset.model);
+    if (!model) {
+      const std::string missing =
+          options_.reach == Reach::own_folders
+              ? "its model is none of the program's own, and OSC loads no others"
+              : "the model '" + scene_.preset.model + "' is neither beside the preset nor in '" +
+                    models_folder() + "'";
+      return fail(scene_.path, *text,
+                  {missing, scene_.preset.model_place.line, scene_.preset.model_place.column});
+    }
+    const bool is_read =
+        options_.third
+            ? read_model(*model, {.third = options_.third, .progress = options_.progress})
+            : read_model(*model, {.third = scene_.preset.third,
+                                  .third_by = "the preset says",
+                                  .progress = options_.progress});
+    if (!is_read) {
+      return false;
+    }
+    const std::vector<Error> unfit = misfits(scene_.network, scene_.preset);
+    for (const Error& error : unfit) {
+      fail(scene_.path, *text, error);
+    }
+    return read.errors.empty() && unfit.empty();
+  }
+
+  bool read_model(const std::string& path, const ReadOptions& options) {
+    auto text = read_text(path, max_model_bytes);
+    if (!text) {
+      return fail("", "", text.error());
+    }
+    ParsedNetwork parsed = parse_network(*text, options);
+    if (parsed.ok() && !scene_.has_preset) {
+      scene_.preset = default_preset(parsed.network, options_.bare);
+      if (const auto idle = idle_keys(parsed.network, scene_.preset); idle && !options_.bare) {
+        parsed.diagnostics.push_back(
+            {Severity::warning, idle->line, idle->column, 1, idle->message});
+      }
+    }
+    Lines lines(*text);
+    for (const Diagnostic& diagnostic : parsed.diagnostics) {
+      out_.findings.push_back({path, diagnostic, lines.at(diagnostic.line)});
+      if (diagnostic.severity == Severity::warning) {
+        scene_.warnings.push_back(to_string(out_.findings.back()));
+      }
+    }
+    scene_.model_path = path;
+    scene_.third = parsed.third;
+    scene_.motion = std::move(parsed.motion);
+    const bool ok = parsed.ok();
+    scene_.network = std::move(parsed.network);
+    return ok;
+  }
+
+  // A preset's model is beside the preset, or among the program's own.
+  std::optional<std::string> find_model(const std::string& model) const {
+    std::error_code error;
+    const fs::path folder = fs::path(scene_.path).parent_path();
+    for (const fs::path& path :
+         {folder / model, folder / ".." / "models" / model, fs::path(models_folder()) / model}) {
+      if (options_.reach == Reach::own_folders) {
+        if (const auto own = own_file(path.string())) {
+          return own;
+        }
+      } else if (fs::is_regular_file(path, error)) {
+        return path.lexically_normal().string();
+      }
+    }
+    return std::nullopt;
+  }
+
+  const SceneOptions options_;
+  Scene scene_;
+  Reading out_;
+};
+
+}  // namespace
+
+Finding finding_of(const std::string& file, std::string_view text, const Error& error) {
+  Finding finding;
+  finding.file = file;
+  finding.diagnostic.line = error.line;
+  finding.diagnostic.column = error.column;
+  finding.diagnostic.message = error.message;
+  finding.source = error.line > 0 ? Lines(text).at(error.line) : "";
+  return finding;
+}
+
+std::string to_string(const Finding& finding) {
+  return finding.diagnostic.line > 0 ? to_string(finding.diagnostic, finding.file)
+                                     : finding.diagnostic.message;
+}
+
+std::string with_source(const Finding& finding) {
+  std::string text = to_string(finding);
+  if (finding.source.empty()) {
+    return text;
+  }
+  std::string shown;
+  std::string mark;
+  const auto first = static_cast<std::size_t>(std::max(1, finding.diagnostic.column)) - 1;
+  const auto length = static_cast<std::size_t>(std::max(1, finding.diagnostic.length));
+  for (std::size_t i = 0; i < finding.source.size(); ++i) {
+    const auto c = static_cast<unsigned char>(finding.source[i]);
+    shown += c == '\t' || (c >= 0x20 && c != 0x7f) ? finding.source[i] : '?';
+    const bool continues = (c & 0xc0) == 0x80;  // a letter of several bytes is one place wide
+    if (i < first + length && !continues) {
+      mark += i < first ? (c == '\t' ? '\t' : ' ') : i == first ? '^' : '~';
+    }
+  }
+  if (first >= finding.source.size()) {
+    mark += '^';
+  }
+  return text + "\n    " + shown + "\n    " + mark;
+}
+
+// Every word of a source stands in quotes, or behind the ':', ';' or '?' that follows what is
+// wrong.
+std::string without_source(std::string_view told) {
+  const auto is_letter = [](std::string_view text, std::size_t at) {
+    return at < text.size() && std::isalnum(static_cast<unsigned char>(text[at])) != 0;
+  };
+  std::string all;
+  for (std::string_view rest = told; !rest.empty();) {
+    std::string_view line = rest.substr(0, rest.find('\n'));
+    rest.remove_prefix(std::min(rest.size(), line.size() + 1));
+    constexpr std::string_view sign = ": error: ";
+    const std::size_t place_end = line.find(sign);
+    if (place_end == line.npos) {
+      continue;
+    }
+    const std::string_view place = line.substr(0, place_end);
+    line.remove_prefix(place_end + sign.size());
+    // A source may have quotes too: from the first that opens to the last that closes.
+    std::size_t open = line.find('\'');
+    while (open != line.npos && is_letter(line, open - 1)) {
+      open = line.find('\'', open + 1);
+    }
+    std::size_t close = line.rfind('\'');
+    while (close != line.npos && is_letter(line, close + 1)) {
+      close = close == 0 ? line.npos : line.rfind('\'', close - 1);
+    }
+    std::string message(line);
+    if (open != line.npos && close != line.npos && open < close) {
+      message.replace(open, close + 1 - open, "'...'");
+    }
+    message.resize(std::min(message.find_first_of(":;?"), message.size()));
+    all += (all.empty() ? "" : "\n") + std::string(place.substr(place.rfind('/') + 1)) +
+           std::string(sign) + message;
+  }
+  return all.empty() ? std::string(told) : all;
+}
+
+Reading read_scene(const std::string& name, const SceneOptions& options) {
+  return SceneReader(options).read(name);
+}
+
+Result<Scene> load_scene(const std::string& name, const SceneOptions& options) {
+  Reading reading = read_scene(name, options);
+  if (reading.scene) {
+    return *std::move(reading.scene);
+  }
+  std::string all;
+  for (const Finding& finding : reading.findings) {  // a warning may explain an error
+    all += (all.empty() ? "" : "\n") + to_string(finding);
+  }
+  return Error{std::move(all)};
+}
+
+}  // namespace ressort

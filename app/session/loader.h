@@ -1,0 +1,71 @@
+// app: from a name to what can be compiled: finds the files, reads the texts.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "app/session/files.h"
+#include "core/model/language/mdl.h"
+#include "core/model/network.h"
+#include "core/model/preset/preset.h"
+#include "core/progress.h"
+#include "core/result.h"
+
+namespace ressort {
+
+// Something to say about a file.
+struct Finding {
+  std::string file;
+  Diagnostic diagnostic;  // line 0: about the file as a whole
+  std::string source;     // the line itself; empty where there is none
+};
+
+// An error at a place of the text that is all of `file`.
+Finding finding_of(const std::string& file, std::string_view text, const Error& error);
+
+// "file:line:column: error: message".
+std::string to_string(const Finding& finding);
+
+// The same, and under it the line with the place marked, for a terminal.
+std::string with_source(const Finding& finding);
+
+struct SceneOptions {
+  bool bare = false;                   // the model without a preset: the network alone
+  std::optional<ThirdArgument> third;  // whatever preset and model say
+  Reach reach = Reach::any_file;       // of the name, and of the preset's model
+  Progress progress = {};              // a reading that it stops fails with `stopped`
+};
+
+struct Scene {
+  std::string name;  // "PolyTriangle", for people
+  std::string path;  // of the file that was asked for
+  std::string model_path;
+  Network network;
+  Preset preset;
+  bool has_preset = false;             // read from a file, not made up
+  std::optional<ThirdArgument> third;  // what the third state argument means, if that matters
+  std::string motion;                  // the same for a person, and why
+  std::vector<std::string> warnings;   // "file:line:column: warning: ..."
+};
+
+// What came of a name: a scene unless a finding is an error.
+struct Reading {
+  std::optional<Scene> scene;
+  std::vector<Finding> findings;
+};
+
+// What was told of files, for who may not read them: of what has a place in one, the file's name,
+// line and column and what is wrong, without a word of the text.
+std::string without_source(std::string_view told);
+
+// Finds and reads a model or a preset with its model; goes on after an error in the model, so that
+// every problem is told at once. Without a preset the model gets a default one, `bare` or
+// playable. Blocks on the disk. [any thread but audio]
+Reading read_scene(const std::string& name, const SceneOptions& options);
+
+// The same for who wants the scene or nothing. The error's message is all findings, one a line.
+Result<Scene> load_scene(const std::string& name, const SceneOptions& options);
+
+}  // namespace ressort

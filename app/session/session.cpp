@@ -1,0 +1,502 @@
+#include "app/session/session.h"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <filesystem>
+#include <future>
+#include <new>
+#include <utility>
+
+#include "app/session/admit.h"
+#include "app/session/load_news.h"
+#include "app/session/memory.h"
+#include "app/session/timing.h"
+#include "app/text.h"
+#include "core/model/topology.h"
+
+namespace ressort {
+namespace {
+
+constexpr double least_lateness_s = 0.05;  // to be told of: what is less is hardly heard
+
+double to_db(double factor) {
+  return 20.0 * std::log10(factor);
+}
+
+// Modes leave out what nobody hears, so that nothing can go on from them.
+bool can_be_relieved(const Plan& plan) {
+  return std::none_of(plan.parts.begin(), plan.parts.end(),
+                      [](const Part& part) { return part.method == Method::modal; });
+}
+
+bool may_gain(const Plan& plan) {
+  return std::any_of(plan.parts.begin(), plan.parts.end(),
+                     [](const Part& part) { return part.may_gain; }) &&
+         can_be_relieved(plan);
+}
+
+bool is_straight(const Network& network) {
+  return std::all_of(network.links.begin(), network.links.end(),
+                     [](const Link& link) { return link.kind == LinkKind::spring; });
+}
+
+const char* const ending = "the program is ending";
+const char* const replaced = "replaced by a newer load";
+
+std::string describe(const std::exception& error) {
+  return dynamic_cast<const std::bad_alloc*>(&error) != nullptr
+             ? "there is not enough memory; a smaller model or fewer voices (-p) take less"
+             : error.what();
+}
+
+std::string_view kind_of(const Link& link) {
+  switch (link.kind) {
+    case LinkKind::spring:
+    case LinkKind::quadratic_spring:
+    case LinkKind::cubic_spring:
+    case LinkKind::clipped_spring:
+      return "spring";
+    case LinkKind::pluck:
+      return "pluck";
+    case LinkKind::bow:
+    case LinkKind::smooth_bow:
+    case LinkKind::either_bow:
+      return "bow";
+    case LinkKind::contact:
+    case LinkKind::clipped_contact:
+      return "contact";
+  }
+  return "link";
+}
+
+}  // namespace
+
+Session::Session(Process& process, const SessionOptions& options, Tell tell)
+    : process_(process),
+      options_(options),
+      tell_(std::move(tell)),
+      rate_hz_(options_.compile.rate_hz),
+      built_rate_hz_(rate_hz_),
+      current_(std::make_shared<Loaded>()),
+      worker_([this] { work(); }) {}
+
+Session::~Session() {
+  end();
+  worker_.join();
+}
+
+void Session::end() {
+  {
+    const std::lock_guard lock(mutex_);
+    stop_ = true;
+  }
+  wake_.notify_all();
+}
+
+void Session::load(std::string name, Answer answer, bool force, Reach reach) {
+  {
+    const std::lock_guard lock(mutex_);
+    if (!stop_) {
+      jobs_.push_back({Wish{std::move(name), force, reach}, std::move(answer)});
+      wake_.notify_all();
+      return;
+    }
+  }
+  if (answer) {
+    answer(Error{ending});
+  }
+}
+
+Result<std::shared_ptr<const Loaded>> Session::load_and_wait(const std::string& name, bool force) {
+  std::promise<Result<std::shared_ptr<const Loaded>>> promise;
+  load(
+      name, [&](const auto& result) { promise.set_value(result); }, force);
+  return promise.get_future().get();
+}
+
+void Session::set_rate(double rate_hz) {
+  {
+    const std::lock_guard lock(mutex_);
+    rate_hz_ = rate_hz;
+  }
+  wake_.notify_all();
+}
+
+std::shared_ptr<const Loaded> Session::current() const {
+  const std::lock_guard lock(mutex_);
+  return current_;
+}
+
+std::optional<double> Session::parameter(const std::string& name) const {
+  const std::lock_guard lock(mutex_);
+  const auto& parameters = current_->instrument.parameters;
+  for (std::size_t i = 0; i < parameters.size(); ++i) {
+    if (parameters[i].name == name) {
+      return values_[i];
+    }
+  }
+  return std::nullopt;
+}
+
+Result<std::vector<Event>> Session::events(const Call& call) const {
+  const std::lock_guard lock(mutex_);
+  return to_events(call, current_->instrument, current_->serial);
+}
+
+void Session::remember(std::span<const TimedEvent> events) {
+  const std::lock_guard lock(mutex_);
+  for (const TimedEvent& timed : events) {
+    const Event& event = timed.event;
+    if (event.kind == EventKind::parameter && event.model == current_->serial) {
+      values_[event.index] = event.value;
+    }
+  }
+}
+
+Status Session::status() {
+  const Meters& meters = process_.meters;
+  const ClockReading clock = process_.clock.read();
+  Status status;
+  {
+    const std::lock_guard lock(mutex_);
+    status.model = current_->name;
+    status.load_ms = current_->load_ms;
+    status.max_voices = current_->instrument.voices;
+    status.backend = backend_;
+    status.cpu = runs_ ? meters.load.get() : -1.0;
+    status.rate_hz = rate_hz_;
+  }
+  status.period_frames = clock.period;
+  status.voices = meters.voices.get();
+  status.cpu_peak = meters.load_peak.get();
+  status.shed = meters.shed.get();
+  status.overruns = meters.overruns.get();
+  status.peak_db = to_db(meters.peak.get());
+  status.limited_db = to_db(meters.limited.get());
+  status.xruns = meters.xruns.get();
+  status.resets = meters.resets.get();
+  status.stolen = meters.stolen.get();
+  status.beyond = meters.beyond.get();
+  status.saved = meters.saved.get();
+  status.modes = meters.modes.get();
+  status.modes_awake = meters.modes_awake.get();
+  status.energy = meters.energy.get();
+  status.loss = meters.loss.get();
+  status.is_driven = meters.is_driven.get();
+  status.is_whole = meters.is_whole.get();
+  status.dropped = meters.dropped.get();
+  status.late = meters.late.get();
+  status.malformed = meters.malformed.get();
+  status.strangers = meters.strangers.get();
+  status.swaps = meters.swaps.get();
+  process_.meters.read.raise();
+  return status;
+}
+
+void Session::set_backend(std::string description, bool runs) {
+  const std::lock_guard lock(mutex_);
+  backend_ = std::move(description);
+  runs_ = runs;
+}
+
+void Session::on_audio_inputs(std::function<void(int)> prepare) {
+  const std::lock_guard lock(mutex_);
+  prepare_inputs_ = std::move(prepare);
+}
+
+void Session::work() {
+  using namespace std::chrono_literals;
+  while (true) {
+    std::deque<Job> jobs;
+    bool is_ending = false;
+    bool wants_again = false;
+    {
+      std::unique_lock lock(mutex_);
+      wake_.wait_for(lock, 20ms, [this] { return stop_ || !jobs_.empty() || has_new_rate(); });
+      jobs.swap(jobs_);
+      is_ending = stop_;
+      wants_again = has_new_rate();
+    }
+    while (jobs.size() > (is_ending ? 0 : 1)) {
+      if (jobs.front().answer) {
+        jobs.front().answer(Error{is_ending ? ending : replaced});
+      }
+      jobs.pop_front();
+    }
+    if (is_ending) {
+      return;
+    }
+    try {
+      listen();
+      if (!jobs.empty()) {
+        do_load(jobs.front());
+      } else if (wants_again) {
+        do_again();
+      } else if (source_ && source_->may_gain) {
+        improve();
+      }
+    } catch (const std::exception& error) {
+      // What sounds goes on as it is.
+      if (tell_) {
+        tell_("what goes on behind the sound failed: " + describe(error));
+      }
+    }
+  }
+}
+
+bool Session::has_new_rate() const {
+  return rate_hz_ != built_rate_hz_;
+}
+
+bool Session::is_outdated(bool is_load) const {
+  const std::lock_guard lock(mutex_);
+  return stop_ || !jobs_.empty() || (!is_load && has_new_rate());
+}
+
+// The same model by other forms, of which some took too long to find while somebody waited; it goes
+// on where the other is.
+void Session::improve() {
+  source_->may_gain = false;
+  bool was_outdated = false;
+  CompileOptions options = source_->options;
+  options.progress = Progress([&](std::string_view) {
+    was_outdated = is_outdated(false);
+    return !was_outdated;
+  });
+  options.most_bytes = free_memory_bytes();
+  auto compiled = compile(source_->network, source_->preset, options);
+  if (!compiled) {
+    source_->may_gain = was_outdated;  // another time, if it still sounds
+    return;
+  }
+  const std::string news = too_much(compiled->plan, compiled->instrument.voices,
+                                    source_->options.rate_hz, source_->options.precision);
+  {
+    const std::lock_guard lock(mutex_);
+    auto loaded = std::make_shared<Loaded>(*current_);
+    loaded->plan = std::move(compiled->plan);
+    current_ = std::move(loaded);
+  }
+  offer(std::move(compiled->engine));
+  if (!news.empty() && tell_) {
+    tell_(news);
+  }
+  time_parts();
+}
+
+void Session::offer(std::unique_ptr<Engine> engine) {
+  offered_ = engine.get();
+  delete process_.slot.offer(new Sounding{std::move(engine), serial_});
+}
+
+// Only the worker destroys engines, and not before another one has been offered.
+void Session::time_parts() {
+  auto timed = std::make_shared<Loaded>(*current());
+  measure(timed->plan, *offered_, options_.compile, timed->instrument.voices);
+  const std::lock_guard lock(mutex_);
+  current_ = std::move(timed);
+}
+
+// What the audio thread has sent: engines to destroy, and news.
+void Session::listen() {
+  delete process_.slot.collect();
+  Report report;
+  while (process_.reports.pop(report)) {
+    const std::lock_guard lock(mutex_);
+    const bool is_current = report.model == current_->serial;
+    if (report.kind == Report::Kind::parameter && is_current) {
+      values_[report.index] = report.value;
+    } else if (report.kind == Report::Kind::reset) {
+      resets_.add((is_current ? current_->name : std::string("the last model")) +
+                  ": a voice became unstable and was faded out; lower its stiffness or "
+                  "damping, or raise its mass");
+    } else if (report.kind == Report::Kind::created && is_current) {
+      if (std::string news = calm(static_cast<std::uint32_t>(report.value)); !news.empty()) {
+        creations_.add(std::move(news));
+      }
+    } else if (report.kind == Report::Kind::overload && is_current) {
+      overloads_.add(describe_overload(report));
+    }
+  }
+  const Meters& meters = process_.meters;
+  if (const std::uint64_t late = meters.late.get();
+      late != late_told_ && meters.late_s.get() > least_lateness_s) {
+    lates_.add("an event came " + fixed(meters.late_s.get(), 3) + " s after its time",
+               late - std::exchange(late_told_, late));
+  }
+  if (const std::uint64_t dropped = meters.dropped.get(); dropped != dropped_told_) {
+    drops_.add("an event found no room and was dropped: more came than can be played",
+               dropped - std::exchange(dropped_told_, dropped));
+  }
+  for (RateLimit* const limit : {&resets_, &creations_, &overloads_, &lates_, &drops_}) {
+    if (const auto news = limit->take(); news && tell_) {
+      tell_(*news);
+    }
+  }
+}
+
+std::string Session::describe_overload(const Report& report) const {
+  const std::string ways = ways_to_make_room(report.index, options_.compile.precision);
+  return "the sound takes " + std::to_string(std::lround(100.0 * report.value)) +
+         " % of the time there is" +
+         (report.index > 0
+              ? "; the quietest voices fade out, and " +
+                    counted(report.index, "sounds", "sound at once") + " until there is time again"
+              : "") +
+         "; what makes room: a longer period, " + ways;
+}
+
+std::string Session::calm(std::uint32_t link) {
+  if (!source_) {
+    return {};
+  }
+  auto& passive = source_->options.passive_links;
+  if (std::find(passive.begin(), passive.end(), link) != passive.end()) {
+    return {};
+  }
+  passive.push_back(link);
+  source_->may_gain = can_be_relieved(current_->plan);
+  const Network whole =
+      source_->network.macros.empty() ? source_->network : expand_macros(source_->network);
+  const Link& creator = whole.links[link];
+  return "the " + std::string(kind_of(creator)) + " '" + creator.name.text() + "' (" +
+         std::filesystem::path(current_->model_path).filename().string() + ":" +
+         std::to_string(creator.place.line) + ") created energy" +
+         (source_->may_gain ? ": computed passively from now on"
+                            : "; play it with --budget passive=always");
+}
+
+void Session::do_load(const Job& job) {
+  const auto result = build(job.wish);
+  if (result) {
+    scene_ = job.wish;
+  }
+  if (job.answer) {
+    job.answer(result);
+  } else if (!result && tell_) {
+    tell_(result.error().message);
+  }
+  if (result) {
+    time_parts();
+  }
+}
+
+// What sounds, at the backend's new rate.
+void Session::do_again() {
+  if (!scene_) {
+    const std::lock_guard lock(mutex_);
+    built_rate_hz_ = rate_hz_;
+    return;
+  }
+  double rate_hz = 0.0;
+  {
+    const std::lock_guard lock(mutex_);
+    rate_hz = rate_hz_;
+  }
+  const auto result = build(*scene_);
+  if (result) {
+    time_parts();
+  } else if (!is_outdated(true)) {
+    if (tell_) {
+      tell_(result.error().message);
+    }
+    const std::lock_guard lock(mutex_);
+    built_rate_hz_ = rate_hz;  // it is not tried again and again
+  }
+}
+
+// Whatever happens, somebody is answered and what sounded goes on.
+Result<std::shared_ptr<const Loaded>> Session::build(const Wish& wish) {
+  LoadNews news(wish.name, tell_);
+  bool was_outdated = false;
+  const Progress progress([&](std::string_view stage) {
+    news.at(stage);
+    was_outdated = is_outdated(true);
+    return !was_outdated;
+  });
+  try {
+    auto result = build_now(wish, progress);
+    if (was_outdated && !result) {
+      const std::lock_guard lock(mutex_);
+      return Error{stop_ ? ending : replaced};
+    }
+    return result;
+  } catch (const std::exception& error) {
+    return Error{"'" + wish.name + "' could not be loaded: " + describe(error)};
+  }
+}
+
+Result<std::shared_ptr<const Loaded>> Session::build_now(const Wish& wish,
+                                                         const Progress& progress) {
+  const auto start = std::chrono::steady_clock::now();
+  CompileOptions options = options_.compile;
+  std::function<void(int)> prepare_inputs;
+  {
+    const std::lock_guard lock(mutex_);
+    options.rate_hz = rate_hz_;
+    prepare_inputs = prepare_inputs_;
+  }
+  auto scene = load_scene(wish.name, {.bare = options_.compile.bare,
+                                      .third = options_.third,
+                                      .reach = wish.reach,
+                                      .progress = progress});
+  if (!scene) {
+    return scene.error();
+  }
+  options.find_gain = !scene->has_preset;
+  options.most_modes = quick_modes;
+  options.force = wish.force;
+  options.progress = progress;
+  options.most_bytes = free_memory_bytes();
+  scene->preset.gain *= options_.gain;
+  auto compiled = admit(*scene, options, scene->warnings);
+  if (!compiled) {
+    return compiled.error();
+  }
+  // What may gain by its modes is judged when they are found.
+  if (!may_gain(compiled->plan)) {
+    if (std::string warning = too_much(compiled->plan, compiled->instrument.voices, options.rate_hz,
+                                       options.precision);
+        !warning.empty()) {
+      scene->warnings.push_back(std::move(warning));
+    }
+  }
+  const std::chrono::duration<double, std::milli> took = std::chrono::steady_clock::now() - start;
+  auto loaded = std::make_shared<Loaded>();
+  loaded->serial = ++serial_;
+  loaded->name = scene->name;
+  loaded->path = scene->path;
+  loaded->model_path = scene->model_path;
+  loaded->description = scene->preset.description;
+  loaded->instrument = std::move(compiled->instrument);
+  loaded->plan = std::move(compiled->plan);
+  loaded->load_ms = took.count();
+  loaded->warnings = std::move(scene->warnings);
+  if (prepare_inputs) {
+    prepare_inputs(loaded->instrument.audio_inputs);
+  }
+  std::vector<double> values;
+  for (const ParameterInfo& info : loaded->instrument.parameters) {
+    values.push_back(info.value);
+  }
+  {
+    const std::lock_guard lock(mutex_);
+    current_ = loaded;
+    values_ = std::move(values);
+    built_rate_hz_ = options.rate_hz;
+  }
+  offer(std::move(compiled->engine));
+  source_.reset();
+  if (may_gain(loaded->plan) || !is_straight(scene->network)) {
+    options.find_gain = false;
+    scene->preset.gain = loaded->instrument.gain;
+    options.most_modes = patient_modes;
+    options.progress = {};
+    source_ = {std::move(scene->network), std::move(scene->preset), options,
+               may_gain(loaded->plan)};
+  }
+  return std::shared_ptr<const Loaded>(std::move(loaded));
+}
+
+}  // namespace ressort

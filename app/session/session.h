@@ -1,0 +1,188 @@
+// app: the control side. Owns what is loaded and the worker thread that loads, compiles, offers,
+// and destroys what has sounded.
+#pragma once
+
+#include <chrono>
+#include <condition_variable>
+#include <deque>
+#include <functional>
+#include <memory>
+#include <mutex>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "app/control/calls.h"
+#include "app/realtime/process.h"
+#include "app/realtime/rate_limit.h"
+#include "app/session/loader.h"
+#include "core/compile/compile.h"
+
+namespace ressort {
+
+struct SessionOptions {
+  CompileOptions compile;              // its rate is the backend's
+  double gain = 1.0;                   // on top of every preset's
+  std::optional<ThirdArgument> third;  // of every model, whatever it shows
+};
+
+// What sounds now, as people see it. Never changes once published.
+struct Loaded {
+  std::uint32_t serial = 0;
+  std::string name;
+  std::string path;
+  std::string model_path;
+  std::string description;
+  Instrument instrument;
+  Plan plan;
+  double load_ms = 0.0;  // read, parse, compile
+  std::vector<std::string> warnings;
+};
+
+struct Status {
+  std::string model;
+  double rate_hz = 0.0;
+  std::int64_t period_frames = 0;
+  double load_ms = 0.0;
+  int voices = 0;
+  int max_voices = 0;
+  double saved = 0.0;       // the share of the computing that sleep saves, 0..1
+  double cpu = 0.0;         // share of the time there is, over a second; -1: nothing runs
+  double cpu_peak = 0.0;    // of one block since the last asking
+  double peak_db = 0.0;     // since the last asking; -inf is silence
+  double limited_db = 0.0;  // the limiter's deepest cut since the last asking
+  std::uint64_t xruns = 0;
+  std::uint64_t resets = 0;
+  std::uint64_t stolen = 0;
+  std::uint64_t shed = 0;      // voices that there was no time for
+  std::uint64_t overruns = 0;  // blocks that took longer than they sound
+  std::uint64_t beyond = 0;    // times that a parameter was kept where it is stable
+  std::uint64_t modes = 0;     // of the voices that sound
+  std::uint64_t modes_awake = 0;
+  double energy = 0.0;     // of what sounds, as EngineMeters says
+  double loss = 0.0;       // of it in a second
+  bool is_driven = false;  // something comes in: the loss is not all known
+  bool is_whole = true;    // all of the energy is known
+  std::uint64_t dropped = 0;
+  std::uint64_t late = 0;
+  std::uint64_t malformed = 0;
+  std::uint64_t strangers = 0;  // packets of who may not send OSC
+  std::uint64_t swaps = 0;
+  std::string backend;
+};
+
+class Session {
+ public:
+  using Answer = std::function<void(const Result<std::shared_ptr<const Loaded>>&)>;
+  using Tell = std::function<void(const std::string&)>;
+
+  // `tell` gets what happens by itself, such as a voice that became unstable; on the worker's
+  // thread. The process must outlive the session.
+  Session(Process& process, const SessionOptions& options, Tell tell);
+  ~Session();
+
+  // Loads in the worker; `answer` is called there, with what sounds now or with the error's whole
+  // text. On an error what sounded goes on. [any thread but audio]
+  // What is not stable is such an error, unless it is forced; so is a load that a newer one
+  // replaces, and one that comes after end(), which is answered at once.
+  void load(std::string name, Answer answer, bool force = false, Reach reach = Reach::any_file);
+
+  // The same, waiting for it.
+  Result<std::shared_ptr<const Loaded>> load_and_wait(const std::string& name, bool force = false);
+
+  // The backend runs at another rate: what sounds is compiled anew.
+  void set_rate(double rate_hz);
+
+  // Gives up what is being loaded, and all that waits: the program is ending. Returns at once.
+  // [any thread but audio]
+  void end();
+
+  // Never null; before the first load it has no name and no parameters.
+  std::shared_ptr<const Loaded> current() const;
+
+  // A parameter's present value; nothing where the model has none of that name.
+  std::optional<double> parameter(const std::string& name) const;
+
+  // The events of a playing call, for the model that sounds now. [any thread but audio]
+  Result<std::vector<Event>> events(const Call& call) const;
+
+  // What parameters these events set, once a queue has taken them. [any thread but audio]
+  void remember(std::span<const TimedEvent> events);
+
+  Status status();
+
+  // What plays, or what is waited for; set by whoever starts a backend.
+  void set_backend(std::string description, bool runs);
+
+  // Called in the worker before an engine is offered, with the number of its audio inputs.
+  void on_audio_inputs(std::function<void(int)> prepare);
+
+ private:
+  // A scene, and how far its name may lead.
+  struct Wish {
+    std::string name;
+    bool force = false;
+    Reach reach = Reach::any_file;
+  };
+
+  struct Job {
+    Wish wish;
+    Answer answer;
+  };
+
+  // What sounds, to be compiled once more: with more patience, or with links found passively.
+  struct Source {
+    Network network;
+    Preset preset;
+    CompileOptions options;
+    bool may_gain = false;
+  };
+
+  void work();
+  void do_load(const Job& job);
+  void do_again();
+  Result<std::shared_ptr<const Loaded>> build(const Wish& wish);
+  Result<std::shared_ptr<const Loaded>> build_now(const Wish& wish, const Progress& progress);
+  void improve();
+  // Whether somebody wants something else of the worker; a load gives way to a newer one only.
+  bool is_outdated(bool is_load) const;
+  bool has_new_rate() const;  // under the lock
+  // Hands the engine over; its parts are timed when nobody waits any more.
+  void offer(std::unique_ptr<Engine> engine);
+  void time_parts();
+  void listen();
+  std::string describe_overload(const Report& report) const;
+  // A link of what sounds made energy of nothing: what there is to say of it, once.
+  std::string calm(std::uint32_t link);
+
+  Process& process_;
+  SessionOptions options_;
+  Tell tell_;
+
+  mutable std::mutex mutex_;  // everything below; never near the audio thread
+  std::condition_variable wake_;
+  std::deque<Job> jobs_;
+  bool stop_ = false;
+  double rate_hz_;
+  double built_rate_hz_;  // what sounds was made for, or was tried to be
+  std::shared_ptr<const Loaded> current_;
+  std::vector<double> values_;  // of the current parameters
+  std::string backend_;
+  bool runs_ = false;  // the backend
+  std::function<void(int)> prepare_inputs_;
+
+  std::uint32_t serial_ = 0;         // [worker]
+  std::optional<Wish> scene_;        // [worker] what was loaded last
+  const Engine* offered_ = nullptr;  // [worker] until the next is offered
+  std::optional<Source> source_;     // [worker] of what may be improved
+  RateLimit resets_;                 // [worker] all of these
+  RateLimit creations_;
+  RateLimit overloads_{std::chrono::seconds(10)};
+  RateLimit lates_;
+  RateLimit drops_;
+  std::uint64_t late_told_ = 0;
+  std::uint64_t dropped_told_ = 0;
+  std::thread worker_;  // last, so that it ends first
+};
+
+}  // namespace ressort

@@ -1,0 +1,391 @@
+#include "core/kernels/chains/chains.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace ressort {
+namespace {
+
+// The widest that the longest chain fills often enough for the passes to be worth more than their
+// ends. Packs of 64 bytes are slower than two of 32 wherever a pack takes two turns, and the ends
+// of a pass cost more of them.
+template <class T>
+std::size_t lanes_for(const Chains& form, Isa isa) {
+  constexpr std::size_t wide_lanes = 32 / sizeof(T);
+  std::uint32_t longest = 0;
+  bool has_two_pairs = true;  // as the next mass but one is in another pair than its own
+  for (const Chain& chain : form.chains) {
+    longest = std::max(longest, chain.count);
+    has_two_pairs = has_two_pairs && (!chain.is_stiff || chain.count > wide_lanes);
+  }
+  const bool is_wide = vector_bytes(isa) >= 32 && longest >= 3 * wide_lanes && has_two_pairs;
+  return is_wide ? wide_lanes : 16 / sizeof(T);
+}
+
+// Puts nodes in their places, and everything that names nodes into tables that name places.
+class TablesMaker {
+ public:
+  TablesMaker(const Program& program, std::size_t lanes, std::vector<ChainPlace>& place)
+      : program_(program),
+        form_(std::get<Chains>(program.form)),
+        lanes_(static_cast<std::uint32_t>(lanes)),
+        place_(place),
+        site_mass_(program.position.size(), nowhere),
+        force_(program.position.size(), nowhere) {
+    place_.assign(program.position.size(), nowhere);
+  }
+
+  ChainsTables make() {
+    fold_chains();
+    place_others();
+    find_sites();
+    number_loose();
+    find_listened();
+    place_taps();
+    make_links();
+    place_passive();
+    for (std::uint32_t i = 0; i < program_.inputs.size(); ++i) {
+      const InputSlot& input = program_.inputs[i];
+      (input.is_force ? tables_.forces : tables_.positions)
+          .push_back({place_[input.node], force_at(input.node), i});
+    }
+    make_outputs();
+    return std::move(tables_);
+  }
+
+ private:
+  std::uint32_t next_force() { return static_cast<std::uint32_t>(tables_.force_count++); }
+
+  // Position `lane` of a pair.
+  ChainPlace place_of(std::uint32_t pair, std::uint32_t lane) const {
+    return 2 * lanes_ * pair + lane;
+  }
+
+  void fold_chains() {
+    std::uint32_t next = 0;
+    for (const Chain& chain : form_.chains) {
+      const std::uint32_t packs = (chain.count + lanes_ - 1) / lanes_;
+      for (std::uint32_t i = 0; i < chain.count; ++i) {
+        const std::uint32_t node = form_.nodes[chain.first + i];
+        place_[node] = place_of(next + i % packs, i / packs);
+        site_mass_[node] = program_.mass_runs[chain.mass_run].inverse_mass;
+      }
+      tables_.chains.push_back({.first = place_of(next, 0),
+                                .packs = packs,
+                                .last = (chain.count - 1) % packs,
+                                .is_stiff = chain.is_stiff,
+                                .springs = {chain.stiffness, chain.damping, chain.second_stiffness,
+                                            chain.second_damping},
+                                .mass = program_.mass_runs[chain.mass_run]});
+      next += packs;
+    }
+    tables_.pairs = next;
+  }
+
+  void place_others() {
+    std::uint32_t others = 0;
+    for (ChainPlace& place : place_) {
+      if (place == nowhere) {
+        place =
+            place_of(static_cast<std::uint32_t>(tables_.pairs) + others / lanes_, others % lanes_);
+        ++others;
+      }
+    }
+    tables_.pairs += (others + lanes_ - 1) / lanes_;
+    for (std::size_t i = 0; i < form_.chains.size(); ++i) {
+      const auto place = [&](std::uint32_t node) {
+        return node == Chain::free ? nowhere : place_[node];
+      };
+      const Chain& chain = form_.chains[i];
+      FoldedChain& folded = tables_.chains[i];
+      folded.left = place(chain.left);
+      folded.right = place(chain.right);
+      for (std::size_t end = 0; end < 2; ++end) {
+        folded.second_left[end] = place(chain.second_left[end]);
+        folded.second_right[end] = place(chain.second_right[end]);
+      }
+    }
+  }
+
+  ChainSite site_of(std::uint32_t node) const {
+    const std::uint32_t lane = place_[node] % lanes_;
+    return {place_[node] - lane, lane * lanes_, site_mass_[node]};
+  }
+
+  // Masses of chains that something else acts on, or whose force is listened to.
+  void find_sites() {
+    const auto touch = [&](std::uint32_t node) {
+      if (site_mass_[node] != nowhere && force_[node] == nowhere) {
+        force_[node] = next_force();
+        tables_.sites.push_back(site_of(node));
+      }
+    };
+    for (const std::uint32_t link : form_.links) {
+      touch(program_.ends[link].a);
+      touch(program_.ends[link].b);
+    }
+    for (const InputSlot& input : program_.inputs) {
+      touch(input.node);
+    }
+    for (const OutputSlot& output : program_.outputs) {
+      if (output.is_force) {
+        touch(output.node);
+      }
+    }
+  }
+
+  void number_loose() {
+    std::size_t run = 0;
+    for (const std::uint32_t node : form_.loose) {
+      const auto& runs = program_.mass_runs;
+      for (; node >= runs[run].first + runs[run].count; ++run) {
+      }
+      auto& loose_runs = tables_.loose_runs;
+      if (loose_runs.empty() || loose_runs.back().mass.first != runs[run].first) {
+        loose_runs.push_back({.mass = runs[run]});
+      }
+      ++loose_runs.back().count;
+      force_[node] = next_force();
+      tables_.loose.push_back(place_[node]);
+    }
+  }
+
+  // What acts on a node that does not move is of interest only to an output.
+  void find_listened() {
+    for (const OutputSlot& output : program_.outputs) {
+      if (output.is_force && force_[output.node] == nowhere) {
+        force_[output.node] = next_force();
+        tables_.listened.push_back(force_[output.node]);
+      }
+    }
+  }
+
+  // Where nobody reads it each end of a link has a force of its own, so that no sum waits for
+  // another.
+  std::uint32_t force_at(std::uint32_t node) {
+    return force_[node] == nowhere ? next_force() : force_[node];
+  }
+
+  void make_links() {
+    std::size_t run = 0;
+    for (const std::uint32_t link : form_.links) {
+      const auto& runs = program_.link_runs;
+      std::size_t of = run;
+      for (; link >= runs[of].first + runs[of].count; ++of) {
+      }
+      if (runs[of].scheme != Scheme::plain) {
+        continue;
+      }
+      auto& link_runs = tables_.link_runs;
+      if (link_runs.empty() || of != run) {
+        link_runs.push_back(runs[of]);
+        link_runs.back().first = static_cast<std::uint32_t>(tables_.ends.size());
+        link_runs.back().count = 0;
+      }
+      run = of;
+      ++link_runs.back().count;
+      const auto [a, b] = program_.ends[link];
+      tables_.ends.push_back({place_[a], place_[b], force_at(a), force_at(b)});
+    }
+  }
+
+  void place_passive() {
+    std::vector<std::uint32_t> end(program_.position.size(), nowhere);
+    const auto add = [&](std::uint32_t node) {
+      if (end[node] != nowhere) {
+        return end[node];
+      }
+      const bool is_chained = site_mass_[node] != nowhere;
+      end[node] = static_cast<std::uint32_t>(tables_.passive_ends.size());
+      tables_.passive_ends.push_back(
+          {.place = place_[node],
+           .unit = is_chained ? site_of(node).unit : nowhere,
+           .inverse_mass = node < program_.moving ? mass_run_of(node).inverse_mass : nowhere});
+      return end[node];
+    };
+    tables_.passive = passive_links(program_);
+    for (PassiveLink& link : tables_.passive) {
+      link.ends = {add(link.ends.a), add(link.ends.b)};
+    }
+  }
+
+  const MassRun& mass_run_of(std::uint32_t node) const {
+    return *std::find_if(program_.mass_runs.begin(), program_.mass_runs.end(),
+                         [&](const MassRun& run) { return node < run.first + run.count; });
+  }
+
+  void make_outputs() {
+    for (std::uint32_t i = 0; i < program_.outputs.size(); ++i) {
+      const OutputSlot& output = program_.outputs[i];
+      const ChainPlace place = place_[output.node];
+      if (output.is_force) {
+        const auto first = static_cast<std::uint32_t>(tables_.probes.size());
+        add_probes(output.node);
+        const auto count = static_cast<std::uint32_t>(tables_.probes.size()) - first;
+        tables_.heard_forces.push_back({place, i, force_[output.node], first, count});
+      } else {
+        tables_.heard_positions.push_back({place, i});
+      }
+    }
+  }
+
+  void place_taps() {
+    for (const TapSlot& tap : program_.taps) {
+      force_[tap.node] = next_force();
+      tables_.taps.push_back({tap, place_[tap.node], force_[tap.node]});
+    }
+    for (const std::uint32_t node : program_.tap_nodes) {
+      PlacedNode placed{.place = place_[node], .force = nowhere, .site = {}};
+      if (site_mass_[node] != nowhere) {
+        placed.site = site_of(node);
+      } else {
+        placed.force = force_at(node);
+      }
+      tables_.tap_nodes.push_back(placed);
+    }
+  }
+
+  // The springs of chains at a node.
+  void add_probes(std::uint32_t node) {
+    for (const Chain& chain : form_.chains) {
+      const std::uint32_t* const nodes = form_.nodes.data() + chain.first;
+      const std::uint32_t* const last = nodes + chain.count - 1;
+      const auto add = [&](std::uint32_t a, std::uint32_t b, std::uint32_t k, std::uint32_t z) {
+        if (a != Chain::free && (a == node || b == node)) {
+          tables_.probes.push_back({place_[a == node ? b : a], k, z});
+        }
+      };
+      const auto add_row = [&](std::uint32_t reach, std::uint32_t k, std::uint32_t z) {
+        for (std::uint32_t i = 0; i + reach < chain.count; ++i) {
+          add(nodes[i], nodes[i + reach], k, z);
+        }
+      };
+      add(chain.left, nodes[0], chain.stiffness, chain.damping);
+      add(chain.right, *last, chain.stiffness, chain.damping);
+      add_row(1, chain.stiffness, chain.damping);
+      if (chain.is_stiff) {
+        for (std::uint32_t i = 0; i < 2; ++i) {
+          add(chain.second_left[i], nodes[i], chain.second_stiffness, chain.second_damping);
+          add(chain.second_right[i], *(last - i), chain.second_stiffness, chain.second_damping);
+        }
+        add_row(2, chain.second_stiffness, chain.second_damping);
+      }
+    }
+  }
+
+  const Program& program_;
+  const Chains& form_;
+  std::uint32_t lanes_;
+  std::vector<ChainPlace>& place_;        // [node]
+  std::vector<std::uint32_t> site_mass_;  // [node] coefficient, if it is in a chain
+  std::vector<std::uint32_t> force_;      // [node]
+  ChainsTables tables_;
+};
+
+}  // namespace
+
+template <class T>
+ChainsKernel<T>::ChainsKernel(const Program& program, Isa isa)
+    : Kernel<T>(program, 1),
+      program_(program),
+      lanes_(lanes_for<T>(std::get<Chains>(program.form), isa)),
+      tables_(TablesMaker(program, lanes_, place_).make()),
+      step_(with_isa(isa, [&]<Isa level>() { return chains_step<level, T>(lanes_ * sizeof(T)); })),
+      masks_(4 * lanes_ * tables_.chains.size()),
+      units_(lanes_ * lanes_),
+      bodies_(2 * lanes_ * tables_.pairs),
+      held_(4 * tables_.chains.size()),
+      force_(tables_.force_count),
+      corners_(program.taps.size()),
+      tap_pull_(program.taps.size()),
+      memory_(tables_.passive.size() * passive_rows) {
+  const auto& chains = std::get<Chains>(program.form).chains;
+  for (std::size_t i = 0; i < chains.size(); ++i) {
+    const std::uint32_t packs = tables_.chains[i].packs;
+    const std::size_t last_lane = (chains[i].count - 1) / packs;
+    T* const masks = masks_.data() + 4 * lanes_ * i;
+    std::fill_n(masks, last_lane + 1, T(1));
+    std::fill_n(masks + lanes_, last_lane, T(1));
+    masks[2 * lanes_ + last_lane] = T(1);
+    masks[3 * lanes_ + (chains[i].count - 2) / packs] = T(1);
+  }
+  for (std::size_t lane = 0; lane < lanes_; ++lane) {
+    units_[lane * lanes_ + lane] = T(1);
+  }
+  this->reset(0);
+}
+
+template <class T>
+void ChainsKernel<T>::place(std::size_t, const double* x, const double* v) {
+  std::fill(bodies_.begin(), bodies_.end(), T(0));  // empty lanes too, should they be no numbers
+  for (std::size_t node = 0; node < place_.size(); ++node) {
+    bodies_[place_[node]] = static_cast<T>(x[node]);
+    bodies_[place_[node] + lanes_] = static_cast<T>(v[node]);
+  }
+  std::fill(held_.begin(), held_.end(), T(0));
+  std::fill(force_.begin(), force_.end(), T(0));
+  std::fill(tap_pull_.begin(), tap_pull_.end(), T(0));
+  awake_ = T(0);
+}
+
+template <class T>
+bool ChainsKernel<T>::save(std::size_t, double* x, double* v) const {
+  for (std::size_t node = 0; node < place_.size(); ++node) {
+    x[node] = static_cast<double>(bodies_[place_[node]]);
+    v[node] = static_cast<double>(bodies_[place_[node] + lanes_]);
+  }
+  return true;
+}
+
+template <class T>
+bool ChainsKernel<T>::read(std::span<const std::uint32_t> nodes, T* x, T* v) const {
+  for (const std::uint32_t node : nodes) {
+    *x++ = bodies_[place_[node]];
+    *v++ = bodies_[place_[node] + lanes_];
+  }
+  return true;
+}
+
+template <class T>
+bool ChainsKernel<T>::mend(std::span<const std::uint32_t> nodes, const T* x, const T* v) {
+  for (const std::uint32_t node : nodes) {
+    bodies_[place_[node]] = *x++;
+    bodies_[place_[node] + lanes_] = *v++;
+  }
+  std::fill(force_.begin(), force_.end(), T(0));
+  awake_ = T(1);
+  this->step({});
+  return true;
+}
+
+template <class T>
+void ChainsKernel<T>::play(const Block<T>& block) {
+  ChainsState<T> state{.ramps = ramps_of(this->coefficients),
+                       .masks = masks_.data(),
+                       .units = units_.data(),
+                       .bodies = bodies_.data(),
+                       .held = held_.data(),
+                       .force = force_.data(),
+                       .corners = corners_.data(),
+                       .tap_pull = tap_pull_.data(),
+                       .memory = memory_.data(),
+                       .awake = &awake_};
+  step_(program_, tables_, state, block);
+  this->coefficients.finish(block.frames);
+}
+
+template <class T>
+bool ChainsKernel<T>::is_near_start(std::size_t, double bound) const {
+  for (std::size_t node = 0; node < program_.moving; ++node) {
+    const auto x = static_cast<double>(bodies_[place_[node]]);
+    if (!(std::fabs(x - program_.position[node]) < bound)) {
+      return false;
+    }
+  }
+  return true;
+}
+
+template class ChainsKernel<float>;
+template class ChainsKernel<double>;
+
+}  // namespace ressort

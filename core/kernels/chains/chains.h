@@ -1,0 +1,174 @@
+// core/engine: strings. The masses of a chain lie in lanes so that each one's neighbours are in
+// the packs before and after its own, and one pass over memory does it all:
+//   y = K x + Z v,  v += (y[i-1] - 2 y[i] + y[i+1])/M,  x += v
+// A stiff one has a second y, from two masses before and behind.
+// All other links and masses are stepped number by number; what they do to a chain's mass is added
+// after the pass, to v and to x, which is the same as if it had been in the sum.
+#pragma once
+
+#include "core/kernels/kernel.h"
+#include "core/kernels/passive.h"
+#include "core/kernels/taps.h"
+
+namespace ressort {
+
+// Where a node's position is among the numbers of ChainsState::bodies; its velocity is one pack
+// further. Bodies are pairs of packs, positions and velocities.
+using ChainPlace = std::uint32_t;
+inline constexpr std::uint32_t nowhere = 0xffffffffu;
+
+// A chain of n masses in `packs` pairs: mass i is in lane i / packs of the pair i % packs.
+struct FoldedChain {
+  ChainPlace first = 0;
+  std::uint32_t packs = 0;
+  std::uint32_t last = 0;     // the pair that its last mass is in
+  ChainPlace left = nowhere;  // of what holds the ends, nowhere: free
+  ChainPlace right = nowhere;
+  bool is_stiff = false;
+  std::array<ChainPlace, 2> second_left{nowhere, nowhere};  // as in Chain
+  std::array<ChainPlace, 2> second_right{nowhere, nowhere};
+  std::array<std::uint32_t, 4> springs{};  // coefficients: K and Z, those of the second springs
+  MassRun mass;
+};
+
+// A mass of a chain that more than its chain acts on.
+struct ChainSite {
+  ChainPlace pair = 0;
+  std::uint32_t unit = 0;          // of ChainsState::units: its lane's pack
+  std::uint32_t inverse_mass = 0;  // coefficient
+};
+
+struct LoosePlaces {
+  MassRun mass;             // coefficients
+  std::uint32_t count = 0;  // of the next of ChainsTables::loose
+};
+
+struct PlacedEnds {
+  ChainPlace a = 0;
+  ChainPlace b = 0;
+  std::uint32_t force_a = 0;  // of ChainsState::force
+  std::uint32_t force_b = 0;
+};
+
+struct PlacedInput {
+  ChainPlace place = 0;
+  std::uint32_t force = 0;
+  std::uint32_t index = 0;  // of Program::inputs
+};
+
+// A spring of a chain, seen from a node whose force somebody listens to.
+struct Probe {
+  ChainPlace neighbour = 0;
+  std::uint32_t stiffness = 0;  // coefficients
+  std::uint32_t damping = 0;
+};
+
+struct HeardPosition {
+  ChainPlace place = 0;
+  std::uint32_t index = 0;  // of Program::outputs
+};
+
+struct HeardForce {
+  ChainPlace place = 0;
+  std::uint32_t index = 0;
+  std::uint32_t force = 0;
+  std::uint32_t first = 0;  // of ChainsTables::probes
+  std::uint32_t count = 0;
+};
+
+// A node under a point: what acts on it is added to a force, or to a chain's mass itself.
+struct PlacedNode {
+  ChainPlace place = 0;
+  std::uint32_t force = nowhere;
+  ChainSite site;
+};
+
+struct PlacedTap {
+  TapSlot slot;
+  ChainPlace place = 0;
+  std::uint32_t force = 0;
+};
+
+// A node that a link holds whose force is not the plain one.
+struct PassiveEnd {
+  ChainPlace place = 0;
+  std::uint32_t unit = nowhere;          // if it is in a chain, as ChainSite says
+  std::uint32_t inverse_mass = nowhere;  // coefficient, if it moves
+};
+
+// What a kernel makes of a Program and its lanes, once.
+struct ChainsTables {
+  std::vector<FoldedChain> chains;
+  std::vector<ChainSite> sites;  // [force], the first of them
+  std::vector<LoosePlaces> loose_runs;
+  std::vector<ChainPlace> loose;  // [force - sites]
+  std::vector<LinkRun> link_runs;
+  std::vector<PlacedEnds> ends;         // [link]
+  std::vector<std::uint32_t> listened;  // forces on what does not move, for outputs
+  std::vector<PlacedInput> positions;
+  std::vector<PlacedInput> forces;
+  std::vector<HeardPosition> heard_positions;
+  std::vector<HeardForce> heard_forces;
+  std::vector<Probe> probes;
+  std::vector<PlacedTap> taps;
+  std::vector<PlacedNode> tap_nodes;  // those of the Program
+  std::vector<PassiveLink> passive;   // ends: of the next
+  std::vector<PassiveEnd> passive_ends;
+  std::size_t force_count = 0;  // sites, loose masses, listened, points, those never read
+  std::size_t pairs = 0;
+};
+
+// Everything that one step of ChainsKernel touches.
+template <class T>
+struct ChainsState {
+  Ramps<T> ramps;
+  const T* masks;  // [chain][4][lane] 1 or 0: is a mass here, up to the last one's pair; is one
+                   // beyond it; is it the last, in its pair; is it the last but one
+  const T* units;  // [lane][lane] 1 where both are the same
+  T* bodies;       // [pair][position or velocity][lane]
+  T* held;         // [chain][4] the springs that forces of the last sample had: 0 at the start
+  T* force;        // [force] summed by the links, used by the next sample
+  Corners<T>* corners;  // [tap] in this sample
+  T* tap_pull;          // [tap] what the links of this sample do to it, for the next one
+  T* memory;            // [passive link][passive_rows]
+  T* awake;             // 0 in the first sample after place(), else 1
+};
+
+template <class T>
+using ChainsStep = void (*)(const Program& program, const ChainsTables& tables,
+                            ChainsState<T>& state, const Block<T>& block);
+
+// The function for packs of so many bytes.
+template <Isa isa, class T>
+ChainsStep<T> chains_step(std::size_t bytes);
+
+template <class T>
+class ChainsKernel final : public Kernel<T> {
+ public:
+  // The Program's form is Chains.
+  ChainsKernel(const Program& program, Isa isa);
+  void place(std::size_t lane, const double* x, const double* v) override;
+  bool save(std::size_t lane, double* x, double* v) const override;
+  bool read(std::span<const std::uint32_t> nodes, T* x, T* v) const override;
+  bool mend(std::span<const std::uint32_t> nodes, const T* x, const T* v) override;
+  bool is_near_start(std::size_t lane, double bound) const override;
+
+ private:
+  void play(const Block<T>& block) override;
+  const Program& program_;
+  std::size_t lanes_;              // of a pack
+  std::vector<ChainPlace> place_;  // [node]
+  ChainsTables tables_;
+  ChainsStep<T> step_;
+  Aligned<T> masks_;
+  Aligned<T> units_;
+  Aligned<T> bodies_;
+  Aligned<T> held_;
+  Aligned<T> force_;
+  std::vector<Corners<T>> corners_;
+  Aligned<T> tap_pull_;
+  Aligned<T> memory_;
+  T awake_ = T(0);
+};
+
+}  // namespace ressort

@@ -1,0 +1,274 @@
+#include "core/kernels/chains/chains_form.h"
+
+#include <algorithm>
+#include <array>
+
+#include "core/kernels/passive.h"
+
+namespace ressort {
+namespace {
+
+constexpr std::uint32_t none = 0xffffffffu;
+
+bool is_spring(const LinkRun& run) {
+  return run.law == Law::spring && run.scheme == Scheme::plain;
+}
+
+class ChainFinder {
+ public:
+  ChainFinder(const Program& program, const Progress& progress)
+      : program_(program),
+        progress_(progress),
+        mass_run_(program.position.size(), none),
+        can_hold_(program.position.size(), true),
+        run_of_(program.ends.size()),
+        springs_at_(program.position.size()),
+        near_(program.position.size()),
+        is_chained_(program.moving, false),
+        is_used_(program.ends.size(), false) {
+    for (std::uint32_t run = 0; run < program.mass_runs.size(); ++run) {
+      const MassRun& masses = program.mass_runs[run];
+      std::fill_n(mass_run_.begin() + masses.first, masses.count, run);
+      std::fill_n(can_hold_.begin() + masses.first, masses.count, false);
+    }
+    for (const TapSlot& tap : program.taps) {
+      can_hold_[tap.node] = false;  // what acts on it does not end there
+    }
+    for (const LinkRun& run : program.link_runs) {
+      for (std::uint32_t link = run.first; is_spring(run) && link < run.first + run.count; ++link) {
+        run_of_[link] = &run;
+        springs_at_[program.ends[link].a].push_back(link);
+        springs_at_[program.ends[link].b].push_back(link);
+      }
+    }
+  }
+
+  std::optional<Chains> find() {
+    struct Candidate {
+      const LinkRun* run;
+      std::size_t springs;
+    };
+    std::vector<Candidate> candidates;
+    for (const LinkRun& run : program_.link_runs) {
+      if (is_spring(run) && run.count + 1 >= least_chain_masses) {
+        candidates.push_back({&run, search(run).springs.size()});
+      }
+    }
+    std::stable_sort(candidates.begin(), candidates.end(),
+                     [](const Candidate& a, const Candidate& b) { return a.springs > b.springs; });
+    for (const Candidate& candidate : candidates) {
+      take(search(*candidate.run));
+    }
+    if (form_.chains.empty()) {
+      return std::nullopt;
+    }
+    for (std::uint32_t node = 0; node < program_.moving; ++node) {
+      if (!is_chained_[node]) {
+        form_.loose.push_back(node);
+      }
+    }
+    for (std::uint32_t link = 0; link < program_.ends.size(); ++link) {
+      if (!is_used_[link]) {
+        form_.links.push_back(link);
+      }
+    }
+    return std::move(form_);
+  }
+
+ private:
+  // What one run of springs ties a node to.
+  struct Near {
+    std::uint32_t degree = 0;
+    std::array<std::uint32_t, 2> springs{none, none};  // that may be a chain's
+    std::uint32_t holder = none;                       // a spring to what does not move
+    bool is_seen = false;
+  };
+
+  // The chains of one kind of spring, and all that they would make superfluous.
+  struct Found {
+    std::vector<Chain> chains;
+    std::vector<std::uint32_t> nodes;
+    std::vector<std::uint32_t> springs;
+  };
+
+  bool is_equal(const Ends& ends) const {
+    const auto [a, b] = ends;
+    return a != b && mass_run_[a] != none && mass_run_[a] == mass_run_[b] && !is_chained_[a] &&
+           !is_chained_[b];
+  }
+
+  Found search(const LinkRun& run) {
+    Found found;
+    progress_.spend(6 * std::size_t{run.count});
+    const auto each_spring = [&](auto&& use) {
+      for (std::uint32_t link = run.first; link < run.first + run.count; ++link) {
+        use(link, program_.ends[link]);
+      }
+    };
+    each_spring([&](std::uint32_t, const Ends& ends) { near_[ends.a] = near_[ends.b] = {}; });
+    each_spring([&](std::uint32_t link, const Ends& ends) {
+      if (is_equal(ends)) {
+        ++near_[ends.a].degree;
+        ++near_[ends.b].degree;
+      } else if (can_hold_[ends.a] != can_hold_[ends.b]) {
+        near_[can_hold_[ends.a] ? ends.b : ends.a].holder = link;
+      }
+    });
+    each_spring([&](std::uint32_t link, const Ends& ends) {
+      Near& a = near_[ends.a];
+      Near& b = near_[ends.b];
+      if (is_equal(ends) && a.degree <= 2 && b.degree <= 2) {
+        a.springs[a.springs[0] == none ? 0 : 1] = link;
+        b.springs[b.springs[0] == none ? 0 : 1] = link;
+      }
+    });
+    // From their ends; what is left then are rings, that may be cut anywhere.
+    for (const bool from_end : {true, false}) {
+      each_spring([&](std::uint32_t, const Ends& ends) {
+        for (const std::uint32_t node : {ends.a, ends.b}) {
+          const Near& near = near_[node];
+          if (!near.is_seen && near.springs[0] != none && (near.springs[1] == none) == from_end) {
+            add_chain(run, node, found);
+          }
+        }
+      });
+    }
+    return found;
+  }
+
+  void take(Found found) {
+    for (Chain& chain : found.chains) {
+      chain.first += static_cast<std::uint32_t>(form_.nodes.size());
+      form_.chains.push_back(chain);
+    }
+    for (const std::uint32_t node : found.nodes) {
+      is_chained_[node] = true;
+    }
+    for (const std::uint32_t spring : found.springs) {
+      is_used_[spring] = true;
+    }
+    form_.nodes.insert(form_.nodes.end(), found.nodes.begin(), found.nodes.end());
+  }
+
+  void add_chain(const LinkRun& run, std::uint32_t node, Found& found) {
+    std::vector<std::uint32_t> row;
+    std::vector<std::uint32_t> springs;
+    while (node != none) {
+      near_[node].is_seen = true;
+      row.push_back(node);
+      std::uint32_t next = none;
+      for (const std::uint32_t spring : near_[node].springs) {
+        if (next == none && spring != none && !near_[other(spring, node)].is_seen) {
+          springs.push_back(spring);
+          next = other(spring, node);
+        }
+      }
+      node = next;
+    }
+    if (row.size() < least_chain_masses) {
+      return;
+    }
+    Chain chain{.first = static_cast<std::uint32_t>(found.nodes.size()),
+                .count = static_cast<std::uint32_t>(row.size()),
+                .mass_run = mass_run_[row[0]],
+                .stiffness = run.coefficients[0],
+                .damping = run.coefficients[1],
+                .left = held_by(near_[row.front()].holder, row.front(), springs),
+                .right = held_by(near_[row.back()].holder, row.back(), springs)};
+    stiffen(run, row, chain, springs);
+    found.chains.push_back(chain);
+    found.nodes.insert(found.nodes.end(), row.begin(), row.end());
+    found.springs.insert(found.springs.end(), springs.begin(), springs.end());
+  }
+
+  // What holds a chain's end, by a spring that is then used.
+  std::uint32_t held_by(std::uint32_t spring, std::uint32_t node,
+                        std::vector<std::uint32_t>& springs) const {
+    if (spring == none) {
+      return Chain::free;
+    }
+    springs.push_back(spring);
+    return other(spring, node);
+  }
+
+  // Second springs from each mass of a row to the next but one, if there are any everywhere.
+  void stiffen(const LinkRun& run, const std::vector<std::uint32_t>& row, Chain& chain,
+               std::vector<std::uint32_t>& springs) const {
+    constexpr int most_tries = 8;
+    int tries = 0;
+    for (const std::uint32_t first : springs_at_[row[0]]) {
+      if (row.size() < 3 || other(first, row[0]) != row[2] || is_used_[first] ||
+          ++tries > most_tries) {
+        continue;
+      }
+      const LinkRun& second = *run_of_[first];
+      std::vector<std::uint32_t> used;
+      for (std::size_t i = 0; i + 2 < row.size() && used.size() == i; ++i) {
+        const std::uint32_t spring =
+            spring_at(row[i], second, [&](std::uint32_t node) { return node == row[i + 2]; });
+        if (spring != none) {
+          used.push_back(spring);
+        }
+      }
+      if (&second == &run || used.size() + 2 != row.size()) {
+        continue;
+      }
+      chain.is_stiff = true;
+      chain.second_stiffness = second.coefficients[0];
+      chain.second_damping = second.coefficients[1];
+      const auto holder = [&](std::uint32_t node) {
+        const auto can_hold = [&](std::uint32_t end) { return bool{can_hold_[end]}; };
+        return held_by(spring_at(node, second, can_hold), node, used);
+      };
+      chain.second_left = {holder(row[0]), holder(row[1])};
+      chain.second_right = {holder(row.back()), holder(row[row.size() - 2])};
+      springs.insert(springs.end(), used.begin(), used.end());
+      return;
+    }
+  }
+
+  // A spring of one run from a node to one that is asked for.
+  template <class IsAskedFor>
+  std::uint32_t spring_at(std::uint32_t node, const LinkRun& run, IsAskedFor&& is_asked_for) const {
+    progress_.spend(springs_at_[node].size());
+    for (const std::uint32_t spring : springs_at_[node]) {
+      if (run_of_[spring] == &run && !is_used_[spring] && is_asked_for(other(spring, node))) {
+        return spring;
+      }
+    }
+    return none;
+  }
+
+  std::uint32_t other(std::uint32_t link, std::uint32_t node) const {
+    const Ends& ends = program_.ends[link];
+    return ends.a == node ? ends.b : ends.a;
+  }
+
+  const Program& program_;
+  const Progress& progress_;
+  std::vector<std::uint32_t> mass_run_;                 // [node], none: it does not move
+  std::vector<bool> can_hold_;                          // [node] grounds and position inputs
+  std::vector<const LinkRun*> run_of_;                  // [link] if it is a spring
+  std::vector<std::vector<std::uint32_t>> springs_at_;  // [node] links
+  std::vector<Near> near_;                              // [node]
+  std::vector<bool> is_chained_;                        // [moving node]
+  std::vector<bool> is_used_;                           // [link]
+  Chains form_;
+};
+
+}  // namespace
+
+std::optional<Chains> chains_form(const Program& program, const Progress& progress) {
+  const auto is_force = [](const OutputSlot& output) { return output.is_force; };
+  if ((!program.taps.empty() || !is_plain(program)) &&
+      std::any_of(program.outputs.begin(), program.outputs.end(), is_force)) {
+    return std::nullopt;  // what a point or a passive link does to a node is never summed
+  }
+  if (holds_places(program)) {
+    return std::nullopt;
+  }
+  progress.spend(4 * program.ends.size());
+  return ChainFinder(program, progress).find();
+}
+
+}  // namespace ressort

@@ -1,0 +1,20 @@
+// core/compile: finds the strings in a Program.
+#pragma once
+
+#include <optional>
+
+#include "core/kernels/program.h"
+#include "core/progress.h"
+
+namespace ressort {
+
+inline constexpr std::uint32_t least_chain_masses = 8;  // below, folding is not worth it
+
+// The longest rows of equal masses and springs that have no branches, in whatever order they were
+// written; nothing where there is none of at least_chain_masses. A mass with three such springs is
+// in no chain, and what ties chains to each other is a link like any other. Springs from every mass
+// to the next but one belong to a chain too. Force outputs beside points on macros are refused.
+// O(nodes + links). [any thread but audio]
+std::optional<Chains> chains_form(const Program& program, const Progress& progress = {});
+
+}  // namespace ressort

@@ -1,0 +1,598 @@
+// The loops of the chains' kernel, compiled for each instruction set.
+#include <limits>
+#include <utility>
+
+#include "core/kernels/chains/chains.h"
+#include "core/kernels/laws.h"
+
+namespace ressort::RESSORT_ISA {
+namespace {
+
+// A vector's numbers, where stores into packs cannot move them as far as the compiler knows.
+template <class Row>
+struct Table {
+  explicit Table(const std::vector<Row>& rows)
+      : first(rows.data()), last(rows.data() + rows.size()) {}
+  const Row* begin() const { return first; }
+  const Row* end() const { return last; }
+
+  const Row* first;
+  const Row* last;
+};
+
+template <class T, std::size_t Bytes>
+struct View {
+  using Number = T;
+  using V = Pack<T, Bytes>;
+  static constexpr std::size_t lanes = Bytes / sizeof(T);
+
+  View(const ChainsTables& tables, ChainsState<T>& state)
+      : chains(tables.chains),
+        sites(tables.sites),
+        loose_runs(tables.loose_runs),
+        loose(tables.loose.data()),
+        link_runs(tables.link_runs),
+        ends(tables.ends.data()),
+        taps(tables.taps),
+        tap_nodes(tables.tap_nodes.data()),
+        listened(tables.listened),
+        positions(tables.positions),
+        forces(tables.forces),
+        heard_positions(tables.heard_positions),
+        heard_forces(tables.heard_forces),
+        bodies(state.bodies),
+        masks(state.masks),
+        units(state.units),
+        held(state.held),
+        force(state.force),
+        corners(state.corners),
+        tap_pull(state.tap_pull),
+        coefficient(state.ramps.value) {}
+
+  Table<FoldedChain> chains;
+  Table<ChainSite> sites;
+  Table<LoosePlaces> loose_runs;
+  const ChainPlace* loose;
+  Table<LinkRun> link_runs;
+  const PlacedEnds* ends;
+  Table<PlacedTap> taps;
+  const PlacedNode* tap_nodes;
+  Table<std::uint32_t> listened;
+  Table<PlacedInput> positions;
+  Table<PlacedInput> forces;
+  Table<HeardPosition> heard_positions;
+  Table<HeardForce> heard_forces;
+  T* bodies;
+  const T* masks;
+  const T* units;
+  T* held;
+  T* force;
+  Corners<T>* corners;
+  T* tap_pull;
+  const T* coefficient;
+};
+
+// The same after nodes were mended: of its own type, so that what is called for
+// every sample remains the only one of its kind and is put in its place.
+template <class T, std::size_t Bytes>
+struct Mended : View<T, Bytes> {
+  using View<T, Bytes>::View;
+};
+
+// The same number in every lane. Not V{} + x, which is not x if x is -0.
+template <class V>
+V all(Scalar<V> x) {
+  return x - V{};
+}
+
+template <class V>
+V& pack_at(Scalar<V>* numbers) {
+  return *reinterpret_cast<V*>(numbers);
+}
+template <class V>
+const V& pack_at(const Scalar<V>* numbers) {
+  return *reinterpret_cast<const V*>(numbers);
+}
+
+// Lane i is lane i - 1 of y; the first is that of `first`.
+template <class V, std::size_t... I>
+V up(V first, V y, std::index_sequence<I...>) {
+  return __builtin_shufflevector(first, y, 0, (sizeof...(I) + 1 + I)...);
+}
+// Lane i is lane i + 1 of y.
+template <class V, std::size_t... I>
+V down(V y, std::index_sequence<I...>) {
+  return __builtin_shufflevector(y, y, (I + 1)..., sizeof...(I));
+}
+
+// What holds an end of a chain by springs of K and Z; a free end is next to one that moves with it.
+template <class S>
+typename S::V tension_of(ChainPlace place, const typename S::Number* held, typename S::V itself,
+                         const S& s) {
+  return place == nowhere
+             ? itself
+             : all<typename S::V>(held[0] * s.bodies[place] + held[1] * s.bodies[place + S::lanes]);
+}
+
+// What the springs make of one chain's masses; `pull` is what acts on one besides.
+template <class S, class Pull>
+void move_chain(const FoldedChain& chain, const typename S::Number* masks,
+                const typename S::Number* held, S& s, Pull&& pull) {
+  using V = typename S::V;
+  const auto others = std::make_index_sequence<S::lanes - 1>{};
+  V* const begin = &pack_at<V>(s.bodies + chain.first);
+  V* const last = begin + 2 * chain.last;
+  V* const back = begin + 2 * (chain.packs - 1);
+  const V k = all<V>(held[0]);
+  const V z = all<V>(held[1]);
+  const auto tension = [=](const V* pair) { return k * pair[0] + z * pair[1]; };
+  const auto end = [&](ChainPlace place, V itself) { return tension_of(place, held, itself, s); };
+  const V first = tension(begin);
+  V y = first;
+  V before = y - up(end(chain.left, first), tension(back), others);
+  const auto move = [&](V* pair, V next, V inverse_mass) {
+    const V after = next - y;
+    const V v = pair[1] + (after - before - pull(pair[0], pair[1])) * inverse_mass;
+    pair[1] = v;
+    pair[0] += v;
+    before = after;
+    y = next;
+  };
+  const auto move_until = [&](V* pair, const V* stop, V inverse_mass) {
+    for (; stop - pair >= 8; pair += 8) {
+      move(pair, tension(pair + 2), inverse_mass);
+      move(pair + 2, tension(pair + 4), inverse_mass);
+      move(pair + 4, tension(pair + 6), inverse_mass);
+      move(pair + 6, tension(pair + 8), inverse_mass);
+    }
+    for (; pair != stop; pair += 2) {
+      move(pair, tension(pair + 2), inverse_mass);
+    }
+  };
+  // Lanes behind the last mass are empty and stay so: their mass is infinite.
+  const V inverse_mass = all<V>(s.coefficient[chain.mass.inverse_mass]);
+  const V within = inverse_mass * pack_at<V>(masks);
+  const V beyond = inverse_mass * pack_at<V>(masks + S::lanes);
+  move_until(begin, last, within);
+  const V next = last == back ? down(first, others) : tension(last + 2);
+  const auto is_last = pack_at<V>(masks + 2 * S::lanes) > V{};
+  move(last, select(is_last, end(chain.right, y), next), within);
+  if (last != back) {
+    move_until(last + 2, back, beyond);
+    move(back, down(first, others), beyond);
+  }
+}
+
+// The same for a stiff one. Not inlined, with a copy of the view: the one of everything else then
+// stays in registers, where stores into packs cannot change it.
+template <class S, class Pull>
+[[gnu::noinline]] void move_stiff_chain(const FoldedChain& chain, const typename S::Number* masks,
+                                        const typename S::Number* held, S s, Pull&& pull) {
+  using V = typename S::V;
+  struct Tension {
+    V near;
+    V far;
+  };
+  const auto others = std::make_index_sequence<S::lanes - 1>{};
+  V* const begin = &pack_at<V>(s.bodies + chain.first);
+  V* const last = begin + 2 * chain.last;
+  V* const back = begin + 2 * (chain.packs - 1);
+  V* const last_but_one = last == begin ? back : last - 2;
+  const V k = all<V>(held[0]);
+  const V z = all<V>(held[1]);
+  const V far_k = all<V>(held[2]);
+  const V far_z = all<V>(held[3]);
+  const auto tension = [=](const V* pair) {
+    return Tension{k * pair[0] + z * pair[1], far_k * pair[0] + far_z * pair[1]};
+  };
+  const auto far_end = [&](ChainPlace place, V itself) {
+    return tension_of(place, held + 2, itself, s);
+  };
+  const Tension first = tension(begin);
+  const Tension second = tension(begin + 2);
+  const Tension below = tension(back);
+  Tension here = first;
+  Tension next = second;
+  V before = here.near - up(tension_of(chain.left, held, here.near, s), below.near, others);
+  V far_before =
+      here.far - up(far_end(chain.second_left[0], here.far), tension(back - 2).far, others);
+  V far_between = next.far - up(far_end(chain.second_left[1], next.far), below.far, others);
+  const auto move = [&](V* pair, V near, Tension ahead, V far, V inverse_mass) {
+    const V after = near - here.near;
+    const V far_after = far - here.far;
+    const V force = after - before + (far_after - far_before);
+    const V v = pair[1] + (force - pull(pair[0], pair[1])) * inverse_mass;
+    pair[1] = v;
+    pair[0] += v;
+    before = after;
+    far_before = far_between;
+    far_between = far_after;
+    here = next;
+    next = ahead;
+  };
+  const V inverse_mass = all<V>(s.coefficient[chain.mass.inverse_mass]);
+  const V within = inverse_mass * pack_at<V>(masks);
+  const V beyond = inverse_mass * pack_at<V>(masks + S::lanes);
+  const auto is_last = pack_at<V>(masks + 2 * S::lanes) > V{};
+  const auto is_last_but_one = pack_at<V>(masks + 3 * S::lanes) > V{};
+  V* pair = begin;
+  for (V* const stop = last == begin ? begin : last - 2; pair != stop; pair += 2) {
+    const Tension ahead = tension(pair + 4);
+    move(pair, next.near, ahead, ahead.far, within);
+  }
+  for (; pair <= back; pair += 2) {
+    const Tension& turned = pair == back ? second : first;
+    const Tension ahead = pair < back - 2
+                              ? tension(pair + 4)
+                              : Tension{down(turned.near, others), down(turned.far, others)};
+    V near = next.near;
+    V far = ahead.far;
+    if (pair == last_but_one) {
+      far = select(is_last_but_one, far_end(chain.second_right[1], here.far), far);
+    }
+    if (pair == last) {
+      near = select(is_last, tension_of(chain.right, held, here.near, s), near);
+      far = select(is_last, far_end(chain.second_right[0], here.far), far);
+    }
+    move(pair, near, ahead, far, pair <= last ? within : beyond);
+  }
+}
+
+template <class S, class Pull>
+void move_any_chain(const FoldedChain& chain, const typename S::Number* masks,
+                    const typename S::Number* held, S& s, Pull&& pull) {
+  if (chain.is_stiff) {
+    move_stiff_chain(chain, masks, held, s, pull);
+  } else {
+    move_chain(chain, masks, held, s, pull);
+  }
+}
+
+template <class S>
+void step_chains(S& s) {
+  using V = typename S::V;
+  const auto* held = s.held;
+  const auto* masks = s.masks;
+  for (const FoldedChain& chain : s.chains) {
+    if (chain.mass.is_oscillator || chain.mass.has_gravity) {
+      const bool pulls = chain.mass.is_oscillator;
+      const V own_k = all<V>(pulls ? s.coefficient[chain.mass.stiffness] : 0);
+      const V own_z = all<V>(pulls ? s.coefficient[chain.mass.damping] : 0);
+      const V g = all<V>(chain.mass.has_gravity ? s.coefficient[chain.mass.gravity] : 0);
+      move_any_chain(chain, masks, held, s, [=](V x, V v) { return own_k * x + own_z * v + g; });
+    } else {
+      move_any_chain(chain, masks, held, s, [](V, V) { return V{}; });
+    }
+    held += 4;
+    masks += 4 * S::lanes;
+  }
+}
+
+// In whole packs: the next pass could not load a pack soon of which a part has just been written.
+template <class S>
+void push(const ChainSite& site, typename S::Number force, S& s) {
+  using V = typename S::V;
+  const V change =
+      all<V>(force * s.coefficient[site.inverse_mass]) * pack_at<V>(s.units + site.unit);
+  V* const pair = &pack_at<V>(s.bodies + site.pair);
+  pair[0] += change;
+  pair[1] += change;
+}
+
+template <class S>
+void push_sites(S& s) {
+  auto* force = s.force;
+  for (const ChainSite& site : s.sites) {
+    if (*force != 0) {
+      push(site, *force, s);
+      *force = 0;
+    }
+    ++force;
+  }
+}
+
+template <class S>
+void step_loose(S& s) {
+  using T = typename S::Number;
+  T* force = s.force + (s.sites.last - s.sites.first);
+  const ChainPlace* place = s.loose;
+  for (const LoosePlaces& run : s.loose_runs) {
+    const MassRun& mass = run.mass;
+    const T inverse_mass = s.coefficient[mass.inverse_mass];
+    const T k = mass.is_oscillator ? s.coefficient[mass.stiffness] : 0;
+    const T z = mass.is_oscillator ? s.coefficient[mass.damping] : 0;
+    const T g = mass.has_gravity ? s.coefficient[mass.gravity] : 0;
+    for (std::uint32_t i = 0; i < run.count; ++i) {
+      T& x = s.bodies[*place];
+      T& v = s.bodies[*place++ + S::lanes];
+      v += (*force - k * x - z * v - g) * inverse_mass;
+      x += v;
+      *force++ = 0;
+    }
+  }
+}
+
+// The distances between which a law gives anything at all.
+template <class T>
+struct Reach {
+  T low;
+  T high;
+};
+
+template <class S>
+Reach<typename S::Number> reach_of(const LinkRun& run, const S& s) {
+  using T = typename S::Number;
+  constexpr T far = std::numeric_limits<T>::infinity();
+  const auto c = [&](std::size_t i) { return s.coefficient[run.coefficients[i]]; };
+  switch (run.law) {
+    case Law::pluck:
+      return {-c(1), c(1)};
+    case Law::contact:
+      return {-c(2), far};
+    case Law::clipped_contact:
+      return {-c(4), far};
+    default:
+      return {-far, far};
+  }
+}
+
+// In the first lane of a pack: laws have no branches there that could be guessed wrongly. Whether
+// bodies are near enough to touch is guessed, as it seldom changes: the next sample then waits for
+// no force.
+template <class S, class ForceLaw>
+void add_forces(const LinkRun& run, S& s, ForceLaw&& law) {
+  using P = Pack<typename S::Number, 16>;
+  const auto reach = reach_of(run, s);
+  const PlacedEnds* const last = s.ends + run.first + run.count;
+  for (const PlacedEnds* ends = last - run.count; ends != last; ++ends) {
+    const auto* const a = s.bodies + ends->a;
+    const auto* const b = s.bodies + ends->b;
+    const auto d = a[0] - b[0];
+    if (d <= reach.low || d >= reach.high) {
+      continue;
+    }
+    const auto f = law(P{d}, P{a[S::lanes] - b[S::lanes]})[0];
+    s.force[ends->force_a] -= f;
+    s.force[ends->force_b] += f;
+  }
+}
+
+template <class S>
+void step_links(S& s) {
+  using P = Pack<typename S::Number, 16>;
+  for (const LinkRun& run : s.link_runs) {
+    const auto c = [&](std::size_t i) { return all<P>(s.coefficient[run.coefficients[i]]); };
+    with_law<P>(run.law, c(0), c(1), c(2), c(3), c(4),
+                [&](auto&& law) { add_forces(run, s, law); });
+  }
+}
+
+// What acts on a point goes to the nodes around it.
+template <class S, class T>
+void spread(const Corners<T>& corners, T force, S s) {
+  each_corner(corners, [&](std::uint32_t corner, T weight) {
+    const PlacedNode& node = s.tap_nodes[corner];
+    if (node.force != nowhere) {
+      s.force[node.force] += weight * force;
+    } else {
+      push(node.site, weight * force, s);
+    }
+  });
+}
+
+// Links pull where a point was in the last sample, this sample's inputs where it is in this one.
+template <class S>
+void push_taps(S& s) {
+  auto* corners = s.corners;
+  auto* pull = s.tap_pull;
+  for (const PlacedTap& tap : s.taps) {
+    spread(*corners, *pull++, s);
+    *corners = corners_at(tap.slot, s.coefficient[tap.slot.u], s.coefficient[tap.slot.v]);
+    spread(*corners, s.force[tap.force], s);
+    s.force[tap.force] = 0;
+    ++corners;
+  }
+}
+
+// A point moves with the nodes around it, and along them when its coordinate changes.
+template <class S>
+void move_taps(S& s) {
+  const auto* corners = s.corners;
+  for (const PlacedTap& tap : s.taps) {
+    typename S::Number position = 0;
+    each_corner(*corners++, [&](std::uint32_t corner, auto weight) {
+      position += weight * s.bodies[s.tap_nodes[corner].place];
+    });
+    s.bodies[tap.place + S::lanes] = position - s.bodies[tap.place];
+    s.bodies[tap.place] = position;
+  }
+}
+
+template <class S>
+void pull_taps(S& s) {
+  auto* pull = s.tap_pull;
+  for (const PlacedTap& tap : s.taps) {
+    *pull++ = s.force[tap.force];
+    s.force[tap.force] = 0;
+  }
+}
+
+// What acts in the next sample.
+template <class S>
+void pull(S& s) {
+  step_links(s);
+  pull_taps(s);
+  auto* held = s.held;
+  for (const FoldedChain& chain : s.chains) {
+    for (const std::uint32_t c : chain.springs) {
+      *held++ = s.coefficient[c];
+    }
+  }
+}
+
+template <class S, class T>
+T force_at(const Program& program, const ChainsTables& tables, const S& s, const T* value,
+           const HeardForce& output) {
+  const T* const here = s.bodies + output.place;
+  T force = s.force[output.force];
+  for (std::uint32_t i = output.first; i < output.first + output.count; ++i) {
+    const Probe& probe = tables.probes[i];
+    const T* const there = s.bodies + probe.neighbour;
+    force += spring_force(there[0] - here[0], there[S::lanes] - here[S::lanes],
+                          s.coefficient[probe.stiffness], s.coefficient[probe.damping]);
+  }
+  for (const PlacedInput& input : s.forces) {
+    if (input.place == output.place) {
+      force += value[input.index];
+    }
+  }
+  return force / static_cast<T>(program.rate_ratio * program.rate_ratio);
+}
+
+// Links that are not plain, number by number.
+template <class S>
+struct Passive {
+  using T = typename S::Number;
+  using V = typename S::V;
+
+  T coefficient(std::uint32_t c) const { return s.coefficient[c]; }
+  T awake() const { return *state.awake; }
+  T distance_now(Ends ends) const { return body(ends.a)[0] - body(ends.b)[0]; }
+  T speed_now(Ends ends) const { return body(ends.a)[S::lanes] - body(ends.b)[S::lanes]; }
+  T distance(Ends ends) const { return distance_now(ends); }
+  T speed(Ends ends) const { return speed_now(ends); }
+  T gamma(Ends ends) const { return ends.a == ends.b ? T(0) : give(ends.a) + give(ends.b); }
+  void push(Ends ends, T x, T v) {
+    push_end(ends.a, -x, -v);
+    push_end(ends.b, x, v);
+  }
+
+  const T* body(std::uint32_t end) const { return s.bodies + tables.passive_ends[end].place; }
+  T give(std::uint32_t end) const {
+    const std::uint32_t mass = tables.passive_ends[end].inverse_mass;
+    return mass == nowhere ? T(0) : s.coefficient[mass];
+  }
+  // In whole packs where a chain is, as push() above.
+  void push_end(std::uint32_t index, T x, T v) {
+    const PassiveEnd& end = tables.passive_ends[index];
+    const T inverse_mass = give(index);
+    if (end.unit == nowhere) {
+      s.bodies[end.place] += inverse_mass * x;
+      s.bodies[end.place + S::lanes] += inverse_mass * v;
+      return;
+    }
+    const V unit = pack_at<V>(s.units + end.unit);
+    V* const pair = &pack_at<V>(s.bodies + (end.place - end.unit / S::lanes));
+    pair[0] += all<V>(inverse_mass * x) * unit;
+    pair[1] += all<V>(inverse_mass * v) * unit;
+  }
+
+  const ChainsTables& tables;
+  ChainsState<T>& state;
+  S s;
+};
+
+// With a view of their own, as they cost step() registers.
+template <class T, std::size_t Bytes>
+[[gnu::noinline]] void remember_links(const ChainsTables& tables, ChainsState<T>& state) {
+  using S = Mended<T, Bytes>;
+  remember(tables.passive, state.memory, Passive<S>{tables, state, S(tables, state)});
+}
+template <class T, std::size_t Bytes>
+[[gnu::noinline]] void correct_links(const ChainsTables& tables, ChainsState<T>& state) {
+  using S = Mended<T, Bytes>;
+  Passive<S> body{tables, state, S(tables, state)};
+  correct(tables.passive, state.memory, body);
+  *state.awake = 1;
+}
+
+// Not inlined, as it costs step() registers.
+template <class T, std::size_t Bytes>
+[[gnu::noinline]] void mend(const ChainsTables& tables, ChainsState<T>& state) {
+  Mended<T, Bytes> s(tables, state);
+  pull(s);
+}
+
+template <class T, std::size_t Bytes>
+void step(const Program& program, const ChainsTables& tables, ChainsState<T>& state,
+          const Block<T>& block) {
+  using S = View<T, Bytes>;
+  S s(tables, state);
+  Ramps<T> ramps = state.ramps;
+  const Table<std::uint32_t> audio_coefficients(program.audio_coefficients);
+  const T* value = block.value;
+  const T* velocity = block.velocity;
+  const T* audio = block.audio;
+  T* outputs = block.outputs;
+  const std::size_t inputs = program.inputs.size();
+  const std::size_t output_count = program.outputs.size();
+  const std::size_t frames = block.frames;
+  const bool has_passive = !tables.passive.empty();
+  if (frames == 0) {
+    return mend<T, Bytes>(tables, state);
+  }
+  for (std::size_t frame = 0; frame < frames; ++frame) {
+    advance(ramps);
+    for (const std::uint32_t c : audio_coefficients) {
+      ramps.value[c] = *audio++;
+    }
+    if (has_passive) {
+      remember_links<T, Bytes>(tables, state);
+    }
+    for (const PlacedInput& input : s.forces) {
+      s.force[input.force] += value[input.index];
+    }
+    step_chains(s);
+    push_sites(s);
+    push_taps(s);
+    step_loose(s);
+    for (const PlacedInput& input : s.positions) {
+      s.bodies[input.place] = value[input.index];
+      s.bodies[input.place + S::lanes] = velocity[input.index];
+    }
+    if (has_passive) {
+      correct_links<T, Bytes>(tables, state);
+    }
+    move_taps(s);
+    for (const std::uint32_t i : s.listened) {
+      s.force[i] = 0;
+    }
+    pull(s);
+    for (const HeardPosition& output : s.heard_positions) {
+      outputs[output.index] = s.bodies[output.place];
+    }
+    for (const HeardForce& output : s.heard_forces) {
+      outputs[output.index] = force_at(program, tables, s, value, output);
+    }
+    outputs += output_count;
+    value += inputs;
+    velocity += inputs;
+  }
+}
+
+template <class T>
+ChainsStep<T> step_in(std::size_t bytes) {
+  if constexpr (vector_bytes(Isa::RESSORT_ISA) >= 32) {
+    if (bytes == 32) {
+      return step<T, 32>;
+    }
+  }
+  return step<T, 16>;
+}
+
+}  // namespace
+}  // namespace ressort::RESSORT_ISA
+
+namespace ressort {
+
+template <>
+ChainsStep<float> chains_step<Isa::RESSORT_ISA, float>(std::size_t bytes) {
+  return RESSORT_ISA::step_in<float>(bytes);
+}
+
+template <>
+ChainsStep<double> chains_step<Isa::RESSORT_ISA, double>(std::size_t bytes) {
+  return RESSORT_ISA::step_in<double>(bytes);
+}
+
+}  // namespace ressort

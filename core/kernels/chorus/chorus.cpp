@@ -1,0 +1,244 @@
+#include "core/kernels/chorus/chorus.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+namespace ressort {
+namespace {
+
+constexpr std::size_t most_bytes =
+    std::size_t{16} * 1024;  // of a kernel's cells: half of what is nearest
+
+constexpr std::size_t parts_of(std::size_t whole, std::size_t part) {
+  return (whole + part - 1) / part;
+}
+
+// Fills the table slot by slot.
+class Filler {
+ public:
+  Filler(const Program& program, const Chorus& chorus) : program_(program), chorus_(chorus) {
+    table_.nodes = static_cast<std::uint32_t>(program.position.size());
+    if (program.moving <= most_held_masses) {
+      table_.held = program.moving;
+      add_held();
+      note_touched();
+    } else {
+      add_walked();
+    }
+    table_.cells = chorus_node_cells * table_.nodes + slots_;
+  }
+
+  ChorusTable table() && { return std::move(table_); }
+
+ private:
+  void copy(std::uint32_t coefficient) {
+    table_.copies.push_back({static_cast<std::uint32_t>(slots_), coefficient});
+    ++slots_;
+  }
+
+  void add_held() {
+    table_.is_alike = is_alike();
+    for (const MassRun& run : program_.mass_runs) {
+      for (std::uint32_t i = 0; i < run.count; ++i) {
+        add_alike([&] { copy(run.inverse_mass); }, 1, slots_ == 0);
+      }
+      table_.is_pulled |= run.is_oscillator || run.has_gravity;
+    }
+    for (std::uint32_t pair = 0; pair < pairs(); ++pair) {
+      add_alike([&] { add_spring(chorus_.pairs[pair], 1u << pair, table_.linked); }, 2, pair == 0);
+    }
+    for (std::uint32_t mass = 0; mass < table_.held; ++mass) {
+      add_spring(chorus_.anchors[mass], 1u << mass, table_.anchored);
+    }
+    for (const MassRun& run : program_.mass_runs) {
+      for (std::uint32_t i = 0; i < run.count && table_.is_pulled; ++i) {
+        add_pull(run);
+      }
+    }
+    table_.first_link = slots_;
+    for (const ChorusLink& link : chorus_.links) {
+      add_link(program_.link_runs[link.run]);
+    }
+  }
+
+  std::uint32_t pairs() const { return table_.held * (table_.held - 1) / 2; }
+
+  bool is_alike() const {
+    const auto differs = [&](const ChorusSpring& pair) {
+      return pair.stiffness != chorus_.pairs[0].stiffness ||
+             pair.damping != chorus_.pairs[0].damping;
+    };
+    const auto is_other = [&](const MassRun& run) {
+      return run.inverse_mass != program_.mass_runs[0].inverse_mass;
+    };
+    return std::none_of(program_.mass_runs.begin(), program_.mass_runs.end(), is_other) &&
+           std::none_of(chorus_.pairs.begin(), chorus_.pairs.begin() + pairs(), differs);
+  }
+
+  // Slots that nobody looks at, where all are alike and these are not the first.
+  template <class Add>
+  void add_alike(Add&& add, std::size_t slots, bool is_first) {
+    if (is_first || !table_.is_alike) {
+      add();
+    } else {
+      slots_ += slots;
+    }
+  }
+
+  void add_spring(const ChorusSpring& spring, std::uint32_t bit, std::uint32_t& bits) {
+    if (spring.stiffness == ChorusSpring::none) {
+      slots_ += 2;
+      return;
+    }
+    bits |= bit;
+    copy(spring.stiffness);
+    copy(spring.damping);
+  }
+
+  void add_pull(const MassRun& run) {
+    if (run.is_oscillator) {
+      copy(run.stiffness);
+      copy(run.damping);
+    } else {
+      slots_ += 2;
+    }
+    if (run.has_gravity) {
+      copy(run.gravity);
+    } else {
+      ++slots_;
+    }
+  }
+
+  void add_link(const LinkRun& run) {
+    table_.laws.push_back(run.law);
+    for (const std::uint32_t coefficient : run.coefficients) {
+      copy(coefficient);
+    }
+    copy(run.coefficients[2]);
+  }
+
+  void add_walked() {
+    for (const MassRun& run : program_.mass_runs) {
+      copy(run.inverse_mass);
+      add_pull(run);
+    }
+    table_.first_link = slots_;
+    for (const LinkRun& run : program_.link_runs) {
+      if (run.scheme == Scheme::plain) {
+        add_link(run);
+      }
+    }
+  }
+
+  void note_touched() {
+    const auto touch = [&](std::uint32_t node) {
+      table_.touched |= node < table_.held ? 1u << node : 0;
+    };
+    for (const ChorusLink& link : chorus_.links) {
+      touch(link.a);
+      touch(link.b);
+    }
+    for (std::uint32_t i = 0; i < program_.inputs.size(); ++i) {
+      const auto [hand, is_force, node] = program_.inputs[i];
+      if (!is_force || node >= table_.held) {
+        continue;
+      }
+      if ((table_.pushed >> node & 1) != 0) {
+        touch(node);
+      } else {
+        table_.pushed |= 1u << node;
+        table_.pusher[node] = i;
+      }
+    }
+  }
+
+  const Program& program_;
+  const Chorus& chorus_;
+  ChorusTable table_;
+  std::size_t slots_ = 0;
+};
+
+}  // namespace
+
+template <class T>
+ChorusKernel<T>::ChorusKernel(const Program& program, const Chorus& chorus, std::size_t voices,
+                              Isa isa)
+    : ChorusKernel(
+          program, chorus,
+          [&] {
+            const std::size_t bytes = lanes_for<T>(voices, isa) * sizeof(T);
+            ChorusTable table = Filler(program, chorus).table();
+            // Shared evenly by as many kernels as it takes.
+            const std::size_t wanted = parts_of(voices * sizeof(T), bytes);
+            const std::size_t most = std::max<std::size_t>(1, most_bytes / (table.cells * bytes));
+            table.packs = parts_of(wanted, parts_of(wanted, most));
+            return table;
+          }(),
+          lanes_for<T>(voices, isa), isa) {}
+
+template <class T>
+ChorusKernel<T>::ChorusKernel(const Program& program, const Chorus& chorus, ChorusTable table,
+                              std::size_t lanes, Isa isa)
+    : Kernel<T>(program, lanes * table.packs),
+      program_(program),
+      chorus_(chorus),
+      lanes_(lanes),
+      table_(std::move(table)),
+      step_(with_isa(
+          isa, [&]<Isa level>() { return chorus_step<level, T>(table_, lanes_ * sizeof(T)); })),
+      cells_(table_.cells * this->width()),
+      passive_(program, this->width()) {
+  for (std::size_t lane = 0; lane < this->width(); ++lane) {
+    this->reset(lane);
+  }
+}
+
+template <class T>
+void ChorusKernel<T>::place(std::size_t lane, const double* x, const double* v) {
+  for (std::size_t node = 0; node < table_.nodes; ++node) {
+    T* const cell = cells_.data() + at(node, lane);
+    cell[0] = static_cast<T>(x[node]);
+    cell[lanes_] = static_cast<T>(v[node]);
+    cell[2 * lanes_] = T(0);
+  }
+  passive_.awake[lane] = T(0);
+}
+
+template <class T>
+bool ChorusKernel<T>::save(std::size_t lane, double* x, double* v) const {
+  for (std::size_t node = 0; node < table_.nodes; ++node) {
+    const T* const cell = cells_.data() + at(node, lane);
+    x[node] = static_cast<double>(cell[0]);
+    v[node] = static_cast<double>(cell[lanes_]);
+  }
+  return true;
+}
+
+template <class T>
+void ChorusKernel<T>::play(const Block<T>& block) {
+  ChorusState<T> state{.ramps = ramps_of(this->coefficients),
+                       .cells = cells_.data(),
+                       .passive = passive_.links,
+                       .inverse_mass = passive_.inverse_mass.data(),
+                       .memory = passive_.memory.data(),
+                       .awake = passive_.awake.data()};
+  step_(program_, chorus_, table_, state, block);
+  this->coefficients.finish(block.frames);
+}
+
+template <class T>
+bool ChorusKernel<T>::is_near_start(std::size_t lane, double bound) const {
+  for (std::size_t node = 0; node < program_.moving; ++node) {
+    const auto x = static_cast<double>(cells_[at(node, lane)]);
+    if (!(std::fabs(x - program_.position[node]) < bound)) {
+      return false;
+    }
+  }
+  return true;
+}
+
+template class ChorusKernel<float>;
+template class ChorusKernel<double>;
+
+}  // namespace ressort

@@ -1,0 +1,94 @@
+// core/engine: a small network in many voices (Chorus): one voice in each lane of many packs, which
+// take every step of a sample in turn, so that none waits for its own last result.
+#pragma once
+
+#include <array>
+#include <vector>
+
+#include "core/kernels/kernel.h"
+#include "core/kernels/passive.h"
+
+namespace ressort {
+
+// Everything that a pack of voices needs lies together, one cell for each number:
+//   of each node its position, its velocity and a force;
+//   slots, which are copies of coefficients. Where masses are held, those
+//     of the masses    1/M of each
+//     of the springs   K and Z of each pair, then of each anchor
+//     of the pulls     K, Z and g of each mass, if anything pulls any
+//     of the links     as below, of each link
+//   and otherwise
+//     of the masses    1/M, K, Z and g of each run
+//     of the links     those of the law, or a PluckShape or BowShape, and its Z, of each run
+inline constexpr std::size_t chorus_node_cells = 3;
+inline constexpr std::size_t chorus_run_slots = 4;
+inline constexpr std::size_t chorus_link_slots = 6;
+
+struct ChorusTable {
+  struct Copy {
+    std::uint32_t slot = 0;
+    std::uint32_t coefficient = 0;
+  };
+
+  std::uint32_t nodes = 0;
+  std::uint32_t held = 0;      // all masses, or none
+  std::uint32_t linked = 0;    // a bit for each pair
+  std::uint32_t anchored = 0;  // a bit for each mass held
+  std::uint32_t touched = 0;   // ...that other links act on, or more than one force input
+  std::uint32_t pushed = 0;    // ...that a force input acts on
+  std::array<std::uint32_t, most_held_masses> pusher{};  // ...and the first of these inputs
+  bool is_pulled = false;
+  bool is_alike = false;  // masses held, and pairs: the slots of the first are those of all
+  std::size_t packs = 1;
+  std::size_t cells = 0;       // of one pack
+  std::size_t first_link = 0;  // slots
+  std::vector<Copy> copies;    // what is in no slot stays 0
+  std::vector<Law> laws;       // of the links
+};
+
+// Everything that one step of ChorusKernel touches.
+template <class T>
+struct ChorusState {
+  Ramps<T> ramps;
+  T* cells;  // [pack][cell][lane]
+  const std::vector<PassiveLink>& passive;
+  const std::uint32_t* inverse_mass;  // [moving node] coefficient, if there are passive links
+  T* memory;                          // [pack][passive link][passive_rows][lane]
+  T* awake;                           // [pack][lane] 0 in the first sample after place(), else 1
+};
+
+template <class T>
+using ChorusStep = void (*)(const Program& program, const Chorus& chorus, const ChorusTable& table,
+                            ChorusState<T>& state, const Block<T>& block);
+
+// The function for packs of so many bytes.
+template <Isa isa, class T>
+ChorusStep<T> chorus_step(const ChorusTable& table, std::size_t bytes);
+
+template <class T>
+class ChorusKernel final : public Kernel<T> {
+ public:
+  ChorusKernel(const Program& program, const Chorus& chorus, std::size_t voices, Isa isa);
+  void place(std::size_t lane, const double* x, const double* v) override;
+  bool save(std::size_t lane, double* x, double* v) const override;
+  bool is_near_start(std::size_t lane, double bound) const override;
+
+ private:
+  ChorusKernel(const Program& program, const Chorus& chorus, ChorusTable table, std::size_t lanes,
+               Isa isa);
+  void play(const Block<T>& block) override;
+  // Where a node's position is; its velocity and its force are one and two packs after it.
+  std::size_t at(std::size_t node, std::size_t lane) const {
+    const std::size_t cell = lane / lanes_ * table_.cells + chorus_node_cells * node;
+    return cell * lanes_ + lane % lanes_;
+  }
+  const Program& program_;
+  const Chorus& chorus_;
+  std::size_t lanes_;  // of a pack
+  ChorusTable table_;
+  ChorusStep<T> step_;
+  Aligned<T> cells_;
+  PassiveRoom<T> passive_;
+};
+
+}  // namespace ressort

@@ -1,0 +1,55 @@
+#include "core/kernels/chorus/chorus_form.h"
+
+#include <algorithm>
+
+namespace ressort {
+namespace {
+
+// Whether the link is one of the springs held; it is then put there.
+bool hold_spring(const Program& program, const LinkRun& run, Ends ends, Chorus& chorus) {
+  const auto [a, b] = std::minmax(ends.a, ends.b);
+  if (run.law != Law::spring || a >= program.moving || a == b) {
+    return false;
+  }
+  const bool is_pair = b < program.moving;
+  ChorusSpring& place = is_pair ? chorus.pairs[b * (b - 1) / 2 + a] : chorus.anchors[a];
+  if (place.stiffness != ChorusSpring::none) {
+    return false;
+  }
+  place = {.stiffness = run.coefficients[0],
+           .damping = run.coefficients[1],
+           .node = is_pair ? ChorusSpring::none : b};
+  return true;
+}
+
+void hold_links(const Program& program, Chorus& chorus) {
+  for (std::uint32_t run = 0; run < program.link_runs.size(); ++run) {
+    const LinkRun& links = program.link_runs[run];
+    if (links.scheme != Scheme::plain) {
+      continue;
+    }
+    for (std::uint32_t i = links.first; i < links.first + links.count; ++i) {
+      const Ends ends = program.ends[i];
+      if (!hold_spring(program, links, ends, chorus)) {
+        chorus.links.push_back({run, ends.a, ends.b});
+      }
+    }
+  }
+}
+
+}  // namespace
+
+std::optional<Chorus> chorus_form(const Program& program) {
+  const auto is_force = [](const OutputSlot& output) { return output.is_force; };
+  if (program.moving == 0 || program.moving > most_chorus_masses || !program.taps.empty() ||
+      std::any_of(program.outputs.begin(), program.outputs.end(), is_force)) {
+    return std::nullopt;
+  }
+  Chorus chorus;
+  if (program.moving <= most_held_masses) {
+    hold_links(program, chorus);
+  }
+  return chorus;
+}
+
+}  // namespace ressort

@@ -1,0 +1,56 @@
+#include "core/kernels/dense/dense_form.h"
+
+#include <algorithm>
+
+#include "core/kernels/dense/dense.h"
+
+namespace ressort {
+namespace {
+
+bool is_hand(const Program& program, std::uint32_t node) {
+  return std::any_of(program.inputs.begin(), program.inputs.end(),
+                     [&](const InputSlot& input) { return !input.is_force && input.node == node; });
+}
+
+// Whether a spring to it pulls although everything else is at 0.
+bool pulls(const Program& program, std::uint32_t node) {
+  return node >= program.moving && !is_hand(program, node) &&
+         (program.position[node] != 0.0 || program.velocity[node] != 0.0);
+}
+
+bool fits(const Program& program) {
+  return program.moving > 0 && program.moving <= most_dense_masses && program.taps.empty() &&
+         program.audio_coefficients.empty() && !program.outputs.empty() &&
+         std::all_of(program.outputs.begin(), program.outputs.end(), [&](const OutputSlot& output) {
+           return !output.is_force && output.node < program.moving;
+         });
+}
+
+}  // namespace
+
+std::optional<Dense> dense_form(const Program& program) {
+  if (!is_plain(program) || !fits(program)) {
+    return std::nullopt;
+  }
+  Dense form;
+  form.has_constant = std::any_of(program.mass_runs.begin(), program.mass_runs.end(),
+                                  [](const MassRun& run) { return run.has_gravity; });
+  for (std::uint32_t r = 0; r < program.link_runs.size(); ++r) {
+    const LinkRun& run = program.link_runs[r];
+    for (std::uint32_t link = run.first; link < run.first + run.count; ++link) {
+      const auto [a, b] = program.ends[link];
+      if (a == b || (a >= program.moving && b >= program.moving)) {
+        continue;  // moves nothing
+      }
+      if (run.law != Law::spring) {
+        form.ports.push_back({r, link});
+        continue;
+      }
+      form.springs.push_back({a, b, run.coefficients[0], run.coefficients[1]});
+      form.has_constant |= pulls(program, a) || pulls(program, b);
+    }
+  }
+  return form;
+}
+
+}  // namespace ressort

@@ -1,0 +1,14 @@
+// core/compile: whether a Program is a small body for the dense kernel, and its tables.
+#pragma once
+
+#include <optional>
+
+#include "core/kernels/program.h"
+
+namespace ressort {
+
+// Nothing where it has more than most_dense_masses masses, or points, force outputs, audio
+// parameters, or outputs of what is no mass. O(links). [any thread but audio]
+std::optional<Dense> dense_form(const Program& program);
+
+}  // namespace ressort

@@ -1,0 +1,169 @@
+#include "core/kernels/direct/fourth_form.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <map>
+
+namespace ressort {
+namespace {
+
+// What a link weighs: so much of its stiffness, and so much of its damping.
+struct Weighing {
+  double stiffness = 0.0;
+  double damping = 0.0;
+};
+
+class Bounder {
+ public:
+  explicit Bounder(const Program& program) : program_(program) {
+    for (const Coefficient& coefficient : program.coefficients) {
+      value_.push_back(coefficient_value(program, coefficient, program.parameters, 1.0));
+    }
+  }
+
+  // The edge bound: the largest d_a/m_a + d_b/m_b over the links, and d_a/m_a over the masses that
+  // hold themselves; d is the sum of the weights at a mass.
+  double operator()(const Weighing& weighing) const {
+    std::vector<double> sum(program_.position.size(), 0.0);
+    std::map<std::uint32_t, double> at_macro;  // by its first place in tap_nodes
+    each_link(weighing, [&](Ends ends, double weight) {
+      for (const std::uint32_t end : {ends.a, ends.b}) {
+        const TapSlot* const tap = tap_at(end);
+        (tap == nullptr ? sum[end] : at_macro[tap->first]) += weight;
+      }
+    });
+    for (const auto& [first, added] : at_macro) {
+      const double weight = added;  // older compilers do not capture a binding
+      each_node(first, [&](std::uint32_t node) { sum[node] += weight; });
+    }
+    double bound = 0.0;
+    for (const MassRun& run : program_.mass_runs) {
+      const double own =
+          run.is_oscillator ? weight_of(weighing, value_[run.stiffness], value_[run.damping]) : 0.0;
+      for (std::uint32_t node = run.first; node < run.first + run.count; ++node) {
+        sum[node] = (sum[node] + own) * value_[run.inverse_mass];
+        bound = own > 0.0 ? std::max(bound, sum[node]) : bound;
+      }
+    }
+    std::fill(sum.begin() + program_.moving, sum.end(), 0.0);
+    for (auto& [first, highest] : at_macro) {
+      double most = 0.0;
+      each_node(first, [&](std::uint32_t node) { most = std::max(most, sum[node]); });
+      highest = most;
+    }
+    const auto most_at = [&](std::uint32_t end) {
+      const TapSlot* const tap = tap_at(end);
+      return tap == nullptr ? sum[end] : at_macro.at(tap->first);
+    };
+    each_link(weighing, [&](Ends ends, double weight) {
+      bound = weight > 0.0 ? std::max(bound, most_at(ends.a) + most_at(ends.b)) : bound;
+    });
+    return bound;
+  }
+
+ private:
+  static double weight_of(const Weighing& weighing, double stiffness, double damping) {
+    return weighing.stiffness * std::max(0.0, stiffness) +
+           weighing.damping * std::max(0.0, damping);
+  }
+
+  const TapSlot* tap_at(std::uint32_t end) const {
+    return program_.taps.empty() || end < program_.taps[0].node
+               ? nullptr
+               : &program_.taps[end - program_.taps[0].node];
+  }
+
+  // All that a point of this macro may be between.
+  template <class Use>
+  void each_node(std::uint32_t first, Use&& use) const {
+    const auto tap = std::find_if(program_.taps.begin(), program_.taps.end(),
+                                  [&](const TapSlot& slot) { return slot.first == first; });
+    for (std::uint32_t i = first; i < first + tap->length * tap->width; ++i) {
+      use(program_.tap_nodes[i]);
+    }
+  }
+
+  // What always pulls.
+  template <class Use>
+  void each_link(const Weighing& weighing, Use&& use) const {
+    for (const LinkRun& run : program_.link_runs) {
+      const bool is_bent = run.law == Law::quadratic_spring || run.law == Law::cubic_spring;
+      if (run.law != Law::spring && !is_bent) {
+        continue;
+      }
+      const double weight = weight_of(weighing, value_[run.coefficients[0]],
+                                      value_[run.coefficients[is_bent ? 2 : 1]]);
+      for (std::uint32_t link = run.first; link < run.first + run.count; ++link) {
+        use(program_.ends[link], weight);
+      }
+    }
+  }
+
+  const Program& program_;
+  std::vector<double> value_;  // [coefficient]
+};
+
+// How far a recurrence with these numbers is from the continuous mode: z^2 - (2 - k - d) z + 1 - d.
+SchemeError error_of(const Steepness& steepness, double k, double d) {
+  const double sigma = 0.5 * steepness.damping;
+  const double omega_squared = steepness.stiffness - sigma * sigma;
+  const double cosine = (2.0 - k - d) / (2.0 * std::sqrt(1.0 - d));
+  if (!(std::fabs(cosine) < 1.0) || omega_squared <= 0.0) {
+    constexpr double all = std::numeric_limits<double>::infinity();
+    return steepness.stiffness > 0.0 ? SchemeError{all, all} : SchemeError{};
+  }
+  const double found_sigma = -0.5 * std::log1p(-d);
+  return {.cents = std::fabs(1200.0 * std::log2(std::acos(cosine) / std::sqrt(omega_squared))),
+          .t60_percent = sigma > 0.0 ? std::fabs(100.0 * (sigma / found_sigma - 1.0)) : 0.0};
+}
+
+bool touches_point(const Program& program, Ends ends) {
+  return !program.taps.empty() && std::max(ends.a, ends.b) >= program.taps[0].node;
+}
+
+void add(std::vector<FourthLinks>& all, std::uint32_t run, std::uint32_t link) {
+  if (!all.empty() && all.back().run == run && all.back().first + all.back().count == link) {
+    ++all.back().count;
+  } else {
+    all.push_back({run, link, 1});
+  }
+}
+
+}  // namespace
+
+Steepness steepness_of(const Program& program) {
+  const Bounder bound(program);
+  return {.stiffness = bound({1.0, 0.0}), .damping = bound({0.0, 1.0}), .both = bound({1.0, 6.0})};
+}
+
+SchemeError published_error(const Steepness& steepness) {
+  return error_of(steepness, steepness.stiffness, steepness.damping);
+}
+
+SchemeError fourth_error(const Steepness& steepness) {
+  const double k = steepness.stiffness;
+  const double d = steepness.damping;
+  return error_of(steepness, k * (1.0 - k / 12.0 - d / 2.0), d * (1.0 - d / 2.0));
+}
+
+std::optional<Fourth> fourth_form(const Program& program) {
+  const auto is_force = [](const OutputSlot& output) { return output.is_force; };
+  if (program.moving == 0 ||
+      (!program.taps.empty() &&
+       std::any_of(program.outputs.begin(), program.outputs.end(), is_force)) ||
+      !is_plain(program) || !(steepness_of(program).both < 12.0)) {
+    return std::nullopt;
+  }
+  Fourth form;
+  for (std::uint32_t run = 0; run < program.link_runs.size(); ++run) {
+    const LinkRun& links = program.link_runs[run];
+    for (std::uint32_t i = links.first; i < links.first + links.count; ++i) {
+      const bool is_spring = links.law == Law::spring && !touches_point(program, program.ends[i]);
+      add(is_spring ? form.springs : form.others, run, i);
+    }
+  }
+  return form;
+}
+
+}  // namespace ressort

@@ -1,0 +1,154 @@
+#include "core/kernels/domains/sharded.h"
+
+#include <algorithm>
+
+namespace ressort {
+namespace {
+
+// Rows of one table copied to other places in another; a row is a number for each lane.
+template <class T>
+void copy_row(const T* from, std::size_t from_row, T* to, std::size_t to_row, std::size_t width) {
+  std::copy_n(from + from_row * width, width, to + to_row * width);
+}
+
+template <class T>
+std::vector<std::unique_ptr<Kernel<T>>> kernels_of(const Shards& form, std::size_t voices,
+                                                   Isa isa) {
+  std::vector<std::unique_ptr<Kernel<T>>> kernels;
+  for (const Shard& shard : *form.shards) {
+    kernels.push_back(make_kernel<T>(shard.program, voices, isa));
+  }
+  return kernels;
+}
+
+}  // namespace
+
+template <class T>
+ShardedKernel<T>::ShardedKernel(const Program& program, const Shards& form, std::size_t voices,
+                                Isa isa)
+    : ShardedKernel(program, form, kernels_of<T>(form, voices, isa)) {}
+
+template <class T>
+ShardedKernel<T>::ShardedKernel(const Program& program, const Shards& form, Kernels kernels)
+    : Kernel<T>(program, kernels[0]->width()),
+      program_(program),
+      shards_(*form.shards),
+      crew_(*form.crew),
+      frames_(form.frames),
+      kernels_(std::move(kernels)) {
+  const std::size_t width = this->width();
+  for (const Shard& shard : shards_) {
+    Desk& desk = desks_.emplace_back();
+    desk.value.resize(frames_ * shard.inputs.size() * width);
+    desk.velocity.resize(desk.value.size());
+    desk.outputs.resize(frames_ * shard.outputs.size() * width);
+    desk.given_x.resize(shard.given.size() * width);
+    desk.given_v.resize(desk.given_x.size());
+    desk.copied_x.resize(shard.copies.size() * width);
+    desk.copied_v.resize(desk.copied_x.size());
+    desk.x.resize(shard.nodes.size());
+    desk.v.resize(shard.nodes.size());
+  }
+}
+
+template <class T>
+void ShardedKernel<T>::place(std::size_t lane, const double* x, const double* v) {
+  for (std::size_t i = 0; i < shards_.size(); ++i) {
+    Desk& desk = desks_[i];
+    for (std::size_t node = 0; node < desk.x.size(); ++node) {
+      desk.x[node] = x[shards_[i].nodes[node]];
+      desk.v[node] = v[shards_[i].nodes[node]];
+    }
+    kernels_[i]->place(lane, desk.x.data(), desk.v.data());
+  }
+}
+
+template <class T>
+bool ShardedKernel<T>::save(std::size_t lane, double* x, double* v) const {
+  for (std::size_t i = 0; i < shards_.size(); ++i) {
+    Desk& desk = desks_[i];
+    if (!kernels_[i]->save(lane, desk.x.data(), desk.v.data())) {
+      return false;
+    }
+    for (std::size_t node = 0; node < desk.x.size(); ++node) {
+      x[shards_[i].nodes[node]] = desk.x[node];
+      v[shards_[i].nodes[node]] = desk.v[node];
+    }
+  }
+  return true;
+}
+
+template <class T>
+bool ShardedKernel<T>::is_near_start(std::size_t lane, double bound) const {
+  return std::all_of(kernels_.begin(), kernels_.end(),
+                     [&](const auto& kernel) { return kernel->is_near_start(lane, bound); });
+}
+
+template <class T>
+void ShardedKernel<T>::play(const Block<T>& block) {
+  if (block.frames == 0) {
+    return;
+  }
+  for (std::size_t at = 0; at < block.frames; at += frames_) {
+    const std::size_t frames = std::min(frames_, block.frames - at);
+    const auto step = [&](std::size_t i) { step_shard(i, block, at, frames); };
+    crew_.run(shards_.size(), std::ref(step));
+    const auto mend = [&](std::size_t i) { mend_shard(i); };
+    crew_.run(shards_.size(), std::ref(mend));
+  }
+  this->coefficients = kernels_[0]->coefficients;
+}
+
+template <class T>
+void ShardedKernel<T>::step_shard(std::size_t i, const Block<T>& block, std::size_t at,
+                                  std::size_t frames) {
+  const Shard& shard = shards_[i];
+  Kernel<T>& kernel = *kernels_[i];
+  Desk& desk = desks_[i];
+  const std::size_t width = this->width();
+  if (at == 0) {
+    kernel.coefficients = this->coefficients;
+  }
+  std::size_t row = 0;
+  for (std::size_t frame = at; frame < at + frames; ++frame) {
+    for (const std::uint32_t input : shard.inputs) {
+      const std::size_t from = frame * program_.inputs.size() + input;
+      copy_row(block.value, from, desk.value.data(), row, width);
+      copy_row(block.velocity, from, desk.velocity.data(), row++, width);
+    }
+  }
+  const std::size_t audio = at * program_.audio_coefficients.size() * width;
+  kernel.step({.frames = frames,
+               .value = desk.value.data(),
+               .velocity = desk.velocity.data(),
+               .audio = block.audio == nullptr ? nullptr : block.audio + audio,
+               .outputs = desk.outputs.data()});
+  row = 0;
+  for (std::size_t frame = at; frame < at + frames; ++frame) {
+    for (const std::uint32_t output : shard.outputs) {
+      copy_row(desk.outputs.data(), row++, block.outputs, frame * program_.outputs.size() + output,
+               width);
+    }
+  }
+  kernel.read(shard.given, desk.given_x.data(), desk.given_v.data());
+}
+
+template <class T>
+void ShardedKernel<T>::mend_shard(std::size_t i) {
+  const Shard& shard = shards_[i];
+  Desk& desk = desks_[i];
+  const std::size_t width = this->width();
+  T* x = desk.copied_x.data();
+  T* v = desk.copied_v.data();
+  for (const ShardSource& source : shard.sources) {
+    const Desk& truth = desks_[source.shard];
+    x = std::copy_n(truth.given_x.data() + source.first * width, source.count * width, x);
+    v = std::copy_n(truth.given_v.data() + source.first * width, source.count * width, v);
+  }
+  kernels_[i]->mend(shard.copies, desk.copied_x.data(), desk.copied_v.data());
+}
+
+template class ShardedKernel<float>;
+template class ShardedKernel<double>;
+
+}  // namespace ressort

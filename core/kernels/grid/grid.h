@@ -1,0 +1,93 @@
+// core/engine: a regular network (Grid), its slots side by side in the lanes. One voice.
+#pragma once
+
+#include "core/kernels/kernel.h"
+#include "core/kernels/passive.h"
+#include "core/kernels/taps.h"
+
+namespace ressort {
+
+// Of one pack: half a cache line at most. Neighbours are not aligned, and every wider load of them
+// would touch two lines.
+constexpr std::size_t grid_bytes(std::size_t vector_bytes) {
+  return vector_bytes < 32 ? vector_bytes : 32;
+}
+
+inline constexpr std::uint32_t grid_fixed = 0xffffffffu;
+inline constexpr std::size_t grid_pushes = 8;  // of a tap: its corners before and after it moved
+
+// Everything that one step of GridKernel touches.
+template <class T>
+struct GridState {
+  Ramps<T> ramps;
+  T* x;                        // [slot] position
+  T* v;                        // [slot] change of position per sample
+  T* force;                    // [slot] of what is not the grid's, used by the next sample
+  T* y;                        // [slot] K x + Z v, if there are segments
+  T* next_y;                   // [slot] the same of the next sample: `shift` below y, or above it
+  std::ptrdiff_t shift;        // as far as any offset
+  bool is_forward;             // below, and the slots are to be stepped upwards
+  T* link_force;               // [row][slot] if there are no segments: a row for each offset
+  T* held;                     // [links][5] coefficients with which those are still to be computed
+  const std::uint32_t* stamp;  // [pack of the grid] which weights it has
+  // [stamp][row][lane] With segments: where a mass is, and what it misses; else where a mass is,
+  // and for each offset where a link is.
+  const T* weights;
+  const std::uint32_t* offset;  // [row] of all links
+  std::size_t rows;
+  bool is_fresh;                      // no sample yet: nothing pulls
+  const std::uint32_t* inverse_mass;  // [slot] coefficient, or grid_fixed
+  std::uint32_t* pushed;              // slots that points push in the next sample
+  std::size_t pushes;
+  Corners<T>* corners;                      // [tap] in this sample
+  const std::vector<PassiveLink>& passive;  // ends: slots
+  T* memory;                                // [passive link][passive_rows]
+  T* awake;                                 // 0 in the first sample after place(), else 1
+};
+
+template <class T>
+using GridStep = void (*)(const Program& program, const Grid& grid, GridState<T>& state,
+                          const Block<T>& block);
+
+template <Isa isa, class T>
+GridStep<T> grid_step();
+
+template <class T>
+class GridKernel final : public Kernel<T> {
+ public:
+  GridKernel(const Program& program, const Grid& grid, Isa isa);
+  void place(std::size_t lane, const double* x, const double* v) override;
+  bool save(std::size_t lane, double* x, double* v) const override;
+  bool read(std::span<const std::uint32_t> nodes, T* x, T* v) const override;
+  bool mend(std::span<const std::uint32_t> nodes, const T* x, const T* v) override;
+  bool is_near_start(std::size_t lane, double bound) const override;
+
+ private:
+  void play(const Block<T>& block) override;
+  void make_stamps(std::size_t lanes);
+
+  const Program& program_;
+  const Grid& grid_;
+  GridStep<T> step_;
+  Aligned<T> x_;
+  Aligned<T> v_;
+  Aligned<T> force_;
+  Aligned<T> y_;
+  Aligned<T> link_force_;
+  Aligned<T> held_;
+  std::vector<std::uint32_t> offset_;
+  std::vector<std::uint32_t> stamp_;
+  Aligned<T> weights_;
+  std::uint32_t shift_;
+  std::vector<std::uint32_t> inverse_mass_;
+  std::vector<std::uint32_t> pushed_;
+  std::size_t pushes_ = 0;
+  std::vector<Corners<T>> corners_;
+  bool is_forward_ = true;
+  bool is_fresh_ = true;
+  std::vector<PassiveLink> passive_;
+  Aligned<T> memory_;
+  T awake_ = T(0);
+};
+
+}  // namespace ressort

@@ -1,0 +1,18 @@
+// core/compile: whether a Program is a regular network, and its tables if it is.
+#pragma once
+
+#include <optional>
+
+#include "core/kernels/program.h"
+#include "core/progress.h"
+
+namespace ressort {
+
+inline constexpr std::uint32_t least_grid_masses = 16;
+
+// Of a Program whose masses are mostly alike and lie in rows that are alike, in whatever order they
+// were written; what does not fit must be little, and no output a force. O(n log n). [any thread
+// but audio]
+std::optional<Grid> grid_form(const Program& program, const Progress& progress = {});
+
+}  // namespace ressort

@@ -1,0 +1,475 @@
+// The loops of the grid kernel, compiled for each instruction set.
+#include <utility>
+
+#include "core/kernels/grid/grid.h"
+#include "core/kernels/laws.h"
+
+namespace ressort::RESSORT_ISA {
+namespace {
+
+// What the loops of one step know.
+template <class T>
+struct View {
+  static constexpr std::size_t lanes = grid_bytes(vector_bytes(Isa::RESSORT_ISA)) / sizeof(T);
+  using V = Pack<T, lanes * sizeof(T)>;
+
+  const Program& program;
+  const Grid& grid;
+  GridState<T>& state;
+};
+
+// Calls use.operator()<n>() for a count 1 <= n <= most that is known only now.
+template <std::size_t most, class Use>
+void with_count(std::size_t count, Use&& use) {
+  [&]<std::size_t... n>(std::index_sequence<n...>) {
+    static_cast<void>(((count == n + 1 && (use.template operator()<n + 1>(), true)) || ...));
+  }
+  (std::make_index_sequence<most>{});
+}
+
+// What pulls a mass of the grid besides its links, and how it moves.
+template <class T>
+struct Mover {
+  Mover(const MassRun& run, const T* coefficient)
+      : inverse_mass(coefficient[run.inverse_mass]),
+        k(run.is_oscillator ? coefficient[run.stiffness] : T(0)),
+        z(run.is_oscillator ? coefficient[run.damping] : T(0)),
+        g(run.has_gravity ? coefficient[run.gravity] : T(0)) {}
+  T inverse_mass;
+  T k;
+  T z;
+  T g;
+};
+
+// Segments of n offsets: forces from y, then the masses move, then their own y for the next sample.
+template <std::size_t n, bool is_pulled, bool is_forward, class T>
+void move_segments(const View<T>& s, const GridSegment* segment, std::size_t count,
+                   const Mover<T>& mover) {
+  using V = typename View<T>::V;
+  constexpr std::ptrdiff_t lanes = View<T>::lanes;
+  const LinkRun& run = s.program.link_runs[s.grid.spring_run];
+  const V k = V{} + s.state.ramps.value[run.coefficients[0]];
+  const V z = V{} + s.state.ramps.value[run.coefficients[1]];
+  const V inverse_mass = V{} + mover.inverse_mass;
+  const V pull_k = V{} + mover.k;
+  const V pull_z = V{} + mover.z;
+  const V pull_g = V{} + mover.g;
+  constexpr std::ptrdiff_t direction = is_forward ? 1 : -1;
+  const T* const all_weights = s.state.weights;
+  for (std::size_t i = 0; i < count; ++i, segment += direction) {
+    const T* sum_of[n];
+    for (std::size_t j = 0; j < n; ++j) {
+      sum_of[j] = s.state.y + segment->offsets[j];
+    }
+    const T* const ys = s.state.y;
+    T* const next_ys = s.state.next_y;
+    T* const xs = s.state.x;
+    T* const vs = s.state.v;
+    const std::ptrdiff_t first = segment->first;
+    const std::ptrdiff_t last = first + segment->count - lanes;
+    const std::ptrdiff_t end = is_forward ? last + lanes : first - lanes;
+    const std::uint32_t* stamp =
+        s.state.stamp + ((is_forward ? first : last) - s.grid.first) / lanes;
+    for (std::ptrdiff_t at = is_forward ? first : last; at != end; at += direction * lanes) {
+      const T* const weights = all_weights + *stamp * (2 * lanes);
+      stamp += direction;
+      // Differences first: they are exact where a network is far from 0 and moves little.
+      const V y = load<V>(ys + at);
+      V sum = load<V>(sum_of[0] + at) - y;
+      for (std::size_t j = 1; j < n; ++j) {
+        sum += load<V>(sum_of[j] + at) - y;
+      }
+      V x = load<V>(xs + at);
+      V v = load<V>(vs + at);
+      if constexpr (is_pulled) {
+        sum -= pull_k * x + pull_z * v + pull_g;
+      }
+      const V force = load<V>(weights) * sum + load<V>(weights + lanes) * y;
+      v += force * inverse_mass;
+      x += v;
+      store<V>(vs + at, v);
+      store<V>(xs + at, x);
+      store<V>(next_ys + at, k * x + z * v);
+    }
+  }
+}
+
+// In one sample upwards, in the next downwards: what comes last comes first again while it is still
+// in the cache, and next_y may overwrite the y that nobody reads any more.
+template <class T>
+void step_segments(const View<T>& s, const Mover<T>& mover, bool is_pulled) {
+  const auto& segments = s.grid.segments;
+  for (std::size_t i = 0; i < segments.size();) {
+    const GridSegment* const first = &segments[s.state.is_forward ? i : segments.size() - 1 - i];
+    const std::size_t offsets = first->offsets.size();
+    std::size_t count = 1;
+    while (i + count < segments.size() &&
+           (s.state.is_forward ? first + count : first - count)->offsets.size() == offsets) {
+      ++count;
+    }
+    with_count<most_grid_offsets>(offsets, [&]<std::size_t n>() {
+      const auto move = is_pulled            ? s.state.is_forward ? move_segments<n, true, true, T>
+                                                                  : move_segments<n, true, false, T>
+                                   : s.state.is_forward ? move_segments<n, false, true, T>
+                                             : move_segments<n, false, false, T>;
+      move(s, first, count, mover);
+    });
+    i += count;
+  }
+  T* const beyond = s.state.next_y + s.grid.first +
+                    (s.state.is_forward ? std::ptrdiff_t{s.grid.count} : -s.state.shift);
+  for (std::ptrdiff_t i = 0; i < s.state.shift; ++i) {
+    beyond[i] = T(0);
+  }
+}
+
+// The forces of links with n offsets in the packs [begin, end) of the grid, stored offset by
+// offset. Flat, so that no compiler leaves the law a function that is called for every pack.
+template <std::size_t n, class T, class ForceLaw>
+[[gnu::flatten]] void pull_links(const View<T>& s, const GridLinks& links, std::size_t row,
+                                 std::size_t begin, std::size_t end, ForceLaw law) {
+  using V = typename View<T>::V;
+  constexpr std::size_t lanes = View<T>::lanes;
+  const T* const xs = s.state.x + s.grid.first;
+  const T* const vs = s.state.v + s.grid.first;
+  const T* other_x[n];
+  const T* other_v[n];
+  T* force[n];
+  for (std::size_t i = 0; i < n; ++i) {
+    other_x[i] = xs + links.offsets[i];
+    other_v[i] = vs + links.offsets[i];
+    force[i] = s.state.link_force + (row + i) * s.grid.slots + s.grid.first;
+  }
+  const std::uint32_t* const stamp = s.state.stamp;
+  const T* const weights = s.state.weights + (1 + row) * lanes;
+  const std::size_t stamp_size = (1 + s.state.rows) * lanes;
+  for (std::size_t pack = begin; pack < end; ++pack) {
+    const std::size_t at = pack * lanes;
+    const T* const is_linked = weights + stamp[pack] * stamp_size;
+    const V x = load<V>(xs + at);
+    const V v = load<V>(vs + at);
+    for (std::size_t i = 0; i < n; ++i) {
+      const V f = law(x - load<V>(other_x[i] + at), v - load<V>(other_v[i] + at));
+      store<V>(force[i] + at, f * load<V>(is_linked + i * lanes));
+    }
+  }
+}
+
+template <class T>
+void compute_links(const View<T>& s, std::size_t begin, std::size_t end) {
+  using V = typename View<T>::V;
+  std::size_t row = 0;
+  const T* c = s.state.held;
+  for (const GridLinks& links : s.grid.links) {
+    const Law law = s.program.link_runs[links.run].law;
+    with_law<V>(law, V{} + c[0], V{} + c[1], V{} + c[2], V{} + c[3], V{} + c[4], [&](auto&& f) {
+      with_count<most_grid_offsets / 2>(links.offsets.size(), [&]<std::size_t n>() {
+        if (links.is_reversed) {
+          pull_links<n>(s, links, row, begin, end, [f](V d, V v) { return -f(-d, -v); });
+        } else {
+          pull_links<n>(s, links, row, begin, end, f);
+        }
+      });
+    });
+    row += links.offsets.size();
+    c += 5;
+  }
+}
+
+// The masses in the packs [begin, end), by the forces of n offsets.
+template <std::size_t n, bool is_pulled, class T>
+void move_packs(const View<T>& s, const Mover<T>& mover, std::size_t begin, std::size_t end) {
+  using V = typename View<T>::V;
+  constexpr std::size_t lanes = View<T>::lanes;
+  const T* from_here[n];
+  const T* from_below[n];
+  for (std::size_t i = 0; i < n; ++i) {
+    from_here[i] = s.state.link_force + i * s.grid.slots + s.grid.first;
+    from_below[i] = from_here[i] - s.state.offset[i];
+  }
+  const V inverse_mass = V{} + mover.inverse_mass;
+  const V k = V{} + mover.k;
+  const V z = V{} + mover.z;
+  const V g = V{} + mover.g;
+  T* const xs = s.state.x + s.grid.first;
+  T* const vs = s.state.v + s.grid.first;
+  const std::uint32_t* const stamp = s.state.stamp;
+  const T* const weights = s.state.weights;
+  for (std::size_t pack = begin; pack < end; ++pack) {
+    const std::size_t at = pack * lanes;
+    const V moves = load<V>(weights + stamp[pack] * ((1 + n) * lanes));
+    V force = load<V>(from_below[0] + at) - load<V>(from_here[0] + at);
+    for (std::size_t i = 1; i < n; ++i) {
+      force += load<V>(from_below[i] + at) - load<V>(from_here[i] + at);
+    }
+    V x = load<V>(xs + at);
+    V v = load<V>(vs + at);
+    if constexpr (is_pulled) {
+      force -= k * x + z * v + g;
+    }
+    v += force * moves * inverse_mass;
+    store<V>(vs + at, v);
+    store<V>(xs + at, x + v);
+  }
+}
+
+// The links of the grid will be computed in the next sample, with the coefficients of this one.
+template <class T>
+void hold(const View<T>& s) {
+  T* held = s.state.held;
+  for (const GridLinks& links : s.grid.links) {
+    for (const std::uint32_t c : s.program.link_runs[links.run].coefficients) {
+      *held++ = s.state.ramps.value[c];
+    }
+  }
+  s.state.is_fresh = false;
+}
+
+// Links as of the last sample, and the masses moved by them, some packs at a time: far enough
+// apart that no force is read while it is still on its way to memory.
+template <class T>
+void step_links(const View<T>& s, const Mover<T>& mover, bool is_pulled) {
+  constexpr std::size_t stride = 32;
+  const std::size_t packs = s.grid.count / View<T>::lanes;
+  for (std::size_t begin = 0; begin < packs; begin += stride) {
+    const std::size_t end = begin + stride < packs ? begin + stride : packs;
+    if (!s.state.is_fresh) {
+      compute_links(s, begin, end);
+    }
+    with_count<most_grid_offsets>(s.state.rows, [&]<std::size_t n>() {
+      is_pulled ? move_packs<n, true>(s, mover, begin, end)
+                : move_packs<n, false>(s, mover, begin, end);
+    });
+  }
+  hold(s);
+}
+
+// Masses outside the grid; their links are in `force`.
+template <class T>
+void step_loose(const View<T>& s) {
+  for (const GridLoose& loose : s.grid.loose) {
+    const MassRun& run = s.program.mass_runs[loose.mass_run];
+    const Mover<T> mover(run, s.state.ramps.value);
+    T& x = s.state.x[loose.slot];
+    T& v = s.state.v[loose.slot];
+    v -= (mover.k * x + mover.z * v + mover.g) * mover.inverse_mass;
+    x += v;
+  }
+}
+
+// Moves what moves further, and makes it faster.
+template <class T>
+void move(const View<T>& s, std::uint32_t slot, T further, T faster) {
+  if (s.state.inverse_mass[slot] == grid_fixed) {
+    return;
+  }
+  const T v = s.state.v[slot] + faster;
+  const T x = s.state.x[slot] + further;
+  s.state.v[slot] = v;
+  s.state.x[slot] = x;
+  if (!s.grid.segments.empty()) {
+    const T* const c = s.state.ramps.value;
+    const LinkRun& run = s.program.link_runs[s.grid.spring_run];
+    s.state.next_y[slot] = c[run.coefficients[0]] * x + c[run.coefficients[1]] * v;
+  }
+}
+
+// A force f moves a mass by f/M more, which may as well be added when it has moved.
+template <class T>
+void push(const View<T>& s, std::uint32_t slot) {
+  const T* const c = s.state.ramps.value;
+  const std::uint32_t inverse_mass = s.state.inverse_mass[slot];
+  const T force = s.state.force[slot];
+  s.state.force[slot] = T(0);
+  if (inverse_mass == grid_fixed) {
+    return;
+  }
+  const T more = force * c[inverse_mass];
+  move(s, slot, more, more);
+}
+
+template <class T>
+void push_ports(const View<T>& s) {
+  for (const std::uint32_t slot : s.grid.ports) {
+    push(s, slot);
+  }
+  for (std::size_t i = 0; i < s.state.pushes; ++i) {
+    push(s, s.state.pushed[i]);
+  }
+  s.state.pushes = 0;
+}
+
+// Calls use(slot, weight) for the up to four nodes around a tap's place.
+template <class T, class Use>
+void around(const View<T>& s, std::size_t tap, Use&& use) {
+  each_corner(s.state.corners[tap], [&](std::uint32_t node, T weight) {
+    use(s.grid.slot[s.program.tap_nodes[node]], weight);
+  });
+}
+
+template <class T>
+void place_taps(const View<T>& s) {
+  const T* const c = s.state.ramps.value;
+  for (std::size_t i = 0; i < s.program.taps.size(); ++i) {
+    const TapSlot& tap = s.program.taps[i];
+    s.state.corners[i] = corners_at(tap, c[tap.u], c[tap.v]);
+  }
+}
+
+template <class T>
+void move_taps(const View<T>& s) {
+  for (std::size_t i = 0; i < s.program.taps.size(); ++i) {
+    T position = T(0);
+    around(s, i, [&](std::uint32_t slot, T weight) { position += weight * s.state.x[slot]; });
+    const std::uint32_t point = s.grid.slot[s.program.taps[i].node];
+    s.state.v[point] = position - s.state.x[point];
+    s.state.x[point] = position;
+  }
+}
+
+// What acts on the points goes to the nodes around them.
+template <class T>
+void spread_taps(const View<T>& s) {
+  for (std::size_t i = 0; i < s.program.taps.size(); ++i) {
+    const std::uint32_t point = s.grid.slot[s.program.taps[i].node];
+    const T force = s.state.force[point];
+    s.state.force[point] = T(0);
+    around(s, i, [&](std::uint32_t slot, T weight) {
+      s.state.force[slot] += weight * force;
+      s.state.pushed[s.state.pushes++] = slot;
+    });
+  }
+}
+
+template <class T>
+[[gnu::flatten]] void step_rest(const View<T>& s) {
+  const T* const c = s.state.ramps.value;
+  for (const GridRest& rest : s.grid.rest) {
+    const LinkRun& run = s.program.link_runs[rest.run];
+    const auto& k = run.coefficients;
+    const T weight = rest.is_excess ? T(-1) : T(1);
+    with_law<T>(run.law, c[k[0]], c[k[1]], c[k[2]], c[k[3]], c[k[4]], [&](auto&& law) {
+      for (std::uint32_t i = rest.first; i < rest.first + rest.count; ++i) {
+        const auto [a, b] = s.grid.rest_ends[i];
+        const T f = law(s.state.x[a] - s.state.x[b], s.state.v[a] - s.state.v[b]) * weight;
+        s.state.force[a] -= f;
+        s.state.force[b] += f;
+      }
+    });
+  }
+}
+
+// Links that are not plain.
+template <class T>
+struct Passive {
+  T coefficient(std::uint32_t c) const { return s.state.ramps.value[c]; }
+  T awake() const { return *s.state.awake; }
+  T distance_now(Ends ends) const { return s.state.x[ends.a] - s.state.x[ends.b]; }
+  T speed_now(Ends ends) const { return s.state.v[ends.a] - s.state.v[ends.b]; }
+  T distance(Ends ends) const { return distance_now(ends); }
+  T speed(Ends ends) const { return speed_now(ends); }
+  T gamma(Ends ends) const { return ends.a == ends.b ? T(0) : give(ends.a) + give(ends.b); }
+  void push(Ends ends, T x, T v) {
+    move(s, ends.a, -x * give(ends.a), -v * give(ends.a));
+    move(s, ends.b, x * give(ends.b), v * give(ends.b));
+  }
+  T give(std::uint32_t slot) const {
+    const std::uint32_t inverse_mass = s.state.inverse_mass[slot];
+    return inverse_mass == grid_fixed ? T(0) : coefficient(inverse_mass);
+  }
+
+  const View<T>& s;
+};
+
+template <class T>
+[[gnu::noinline]] void remember_links(const View<T>& s) {
+  remember(s.state.passive, s.state.memory, Passive<T>{s});
+}
+
+template <class T>
+[[gnu::noinline]] void correct_links(const View<T>& s) {
+  Passive<T> body{s};
+  correct(s.state.passive, s.state.memory, body);
+  *s.state.awake = 1;
+}
+
+// What acts in the next sample, except what the segments and the links of the grid do by
+// themselves.
+template <class T>
+void pull(const View<T>& s) {
+  step_rest(s);
+  spread_taps(s);
+}
+
+template <class T>
+void step(const Program& program, const Grid& grid, GridState<T>& state, const Block<T>& block) {
+  const View<T> s{program, grid, state};
+  const MassRun& masses = program.mass_runs[grid.mass_run];
+  const T* value = block.value;
+  const T* velocity = block.velocity;
+  const T* audio = block.audio;
+  T* outputs = block.outputs;
+  const std::size_t inputs = program.inputs.size();
+  if (block.frames == 0) {
+    hold(s);
+    pull(s);
+  }
+  for (std::size_t frame = 0; frame < block.frames; ++frame) {
+    advance(state.ramps);
+    for (const std::uint32_t c : program.audio_coefficients) {
+      state.ramps.value[c] = *audio++;
+    }
+    if (!state.passive.empty()) {
+      remember_links(s);
+    }
+    for (std::size_t i = 0; i < inputs; ++i) {
+      if (program.inputs[i].is_force) {
+        state.force[grid.slot[program.inputs[i].node]] += value[i];
+      }
+    }
+    place_taps(s);
+    spread_taps(s);
+    const Mover<T> mover(masses, state.ramps.value);
+    const bool is_pulled = masses.is_oscillator || masses.has_gravity;
+    grid.segments.empty() ? step_links(s, mover, is_pulled) : step_segments(s, mover, is_pulled);
+    step_loose(s);
+    push_ports(s);
+    for (std::size_t i = 0; i < inputs; ++i) {
+      if (!program.inputs[i].is_force) {
+        state.x[grid.slot[program.inputs[i].node]] = value[i];
+        state.v[grid.slot[program.inputs[i].node]] = velocity[i];
+      }
+    }
+    if (!state.passive.empty()) {
+      correct_links(s);
+    }
+    move_taps(s);
+    pull(s);
+    for (const OutputSlot& output : program.outputs) {
+      *outputs++ = state.x[grid.slot[output.node]];
+    }
+    T* const y = state.y;
+    state.y = state.next_y;
+    state.next_y = y;
+    state.is_forward = !state.is_forward;
+    value += inputs;
+    velocity += inputs;
+  }
+}
+
+}  // namespace
+}  // namespace ressort::RESSORT_ISA
+
+namespace ressort {
+
+template <>
+GridStep<float> grid_step<Isa::RESSORT_ISA, float>() {
+  return RESSORT_ISA::step<float>;
+}
+
+template <>
+GridStep<double> grid_step<Isa::RESSORT_ISA, double>() {
+  return RESSORT_ISA::step<double>;
+}
+
+}  // namespace ressort

@@ -1,0 +1,52 @@
+#include "core/kernels/isa.h"
+
+namespace ressort {
+
+Isa best_isa() {
+#if RESSORT_X86_LEVELS
+  if (__builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512bw") &&
+      __builtin_cpu_supports("avx512cd") && __builtin_cpu_supports("avx512dq") &&
+      __builtin_cpu_supports("avx512vl")) {
+    return Isa::v4;
+  }
+  if (__builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma") &&
+      __builtin_cpu_supports("bmi2")) {
+    return Isa::v3;
+  }
+#endif
+  return Isa::base;
+}
+
+#if RESSORT_X86_LEVELS
+namespace {
+
+const bool has_wide_registers = best_isa() != Isa::base;
+
+__attribute__((target("avx"))) void clear() {
+  __builtin_ia32_vzeroupper();
+}
+
+}  // namespace
+#endif
+
+void clear_wide_registers() {
+#if RESSORT_X86_LEVELS
+  if (has_wide_registers) {
+    clear();
+  }
+#endif
+}
+
+std::string_view isa_name(Isa isa) {
+  switch (isa) {
+    case Isa::base:
+      return "SSE2 or alike";
+    case Isa::v3:
+      return "AVX2";
+    case Isa::v4:
+      return "AVX-512";
+  }
+  return "";
+}
+
+}  // namespace ressort

@@ -1,0 +1,127 @@
+// core/engine: a Program in the eigenvectors of its linear links, one voice.
+//
+// Each mode is an oscillator of its own: d -= lK q + lZ d, q += d, which is the published scheme in
+// another basis, not an approximation. Two ways through a block give the same:
+//   free   nothing nonlinear acts: mode by mode, a few packs in registers for the whole block
+//   bound  sample by sample, so that what links do in one is felt in the next
+// A block is free if the energy cannot bring any mass to where a link acts, or if a free motion
+// turns out not to have met one. With Modes::silence only those modes take part that are not asleep
+// (modal_sleep.h), a first part of the rows.
+#pragma once
+
+#include "core/kernels/kernel.h"
+
+namespace ressort {
+
+inline constexpr std::uint32_t nap_frames = 32;  // from one look at what may sleep to the next...
+inline constexpr std::uint32_t long_nap_frames = 128;  // ...while few are awake
+
+// Everything that one step of ModalKernel touches. Rows of modes are `stride` apart and filled up
+// with zeros to `modes`, whole packs of every kind. Ends: the places, then Modes::ends.
+template <class T>
+struct ModalState {
+  Ramps<T> ramps;
+  std::size_t modes;
+  std::size_t stride;
+  std::size_t awake;    // the first so many modes are
+  std::size_t swept;    // the same in whole pairs of packs
+  const T* stiffness;   // [share][mode] factors
+  const T* damping;     // [share][mode]
+  T* pushes;            // [push][mode] shapes, and without a gap
+  T* places;            // [place][mode]
+  T* outputs;           // [output][mode]
+  const T* push_norm;   // [push] length of the shape
+  const T* place_norm;  // [place]
+  T* q;                 // [mode]
+  T* d;                 // [mode] change of q per sample
+  T* saved_q;           // [mode] at the start of a block
+  T* saved_d;           // [mode]
+  T* k;                 // [mode] lK
+  T* z;                 // [mode] lZ
+  T* load;              // [mode] sum of all forces of a sample
+  T* bundle;            // [pack][row][lane] the rows that a sweep needs
+  T* used;              // [share of stiffness, share of damping, mass] coefficient when last used
+  T* late;              // [push] from the tick before, if it acts late
+  T* amplitude;         // [frame][push]
+  T* compliance;        // [place] greatest square of its displacement per energy
+  T* x;                 // [end] position
+  T* v;                 // [end] change per sample
+  T* force;             // [end] summed by the links, used by the next sample
+  T* saved_force;       // [place] at the start of a block
+  T* kicked;            // [place] sum of the sizes of a block's kicks
+  T* kick;              // [sample][row] what a sweep adds to d along a row
+  T* speed;             // [row] how fast the row's place moves after it
+  T* heard;             // [sample][row] where it is
+  T* seen;              // [row][frame] the same for a block
+  const T** rows;       // [row] that a sweep shall have
+  const T** bundled_rows;   // [row] that are in the bundle
+  std::uint32_t* push_of;   // [row] the pushes that push
+  std::uint32_t* row_of;    // [place] where it is among the rows, if it is
+  std::uint32_t* place_of;  // [row] its inverse
+  std::uint32_t* held;      // [hold] how many of its links are computed
+  Ends* held_ends;          // [link that is computed]
+  T* held_give;             // [link that is computed]
+  const T* shape;           // [push, place, output][mode] as they are written, if is_exact
+  T* root;                  // [mode] of the gain that all of these have, if is_exact
+  T* k_step;                // [mode] per sample, if is_exact
+  T* z_step;                // [mode]
+  T* spread;      // [mode] square of the amplitude per that of the state; 0: does not ring
+  T* decay;       // [mode] of an amplitude in nap_frames
+  T* swing;       // [mode] amplitude
+  T* debt;        // [mode] amplitude of what was dropped
+  T* loudness;    // [listener] sum of all amplitudes, now or lately
+  T* room;        // [listener] what may still be dropped
+  T silence;      // share of `loudness` that may be dropped; 0: nothing sleeps
+  T quiet;        // what may be dropped in any case
+  T lately_kept;  // of `loudness` in nap_frames
+  std::size_t saved_awake = 0;
+  std::size_t bundled = 0;
+  std::size_t bundled_modes = 0;
+  std::size_t pushing = 0;
+  std::uint32_t held_places = 0;
+  std::size_t held_links = 0;
+  std::size_t links = 0;
+  std::uint32_t touched_frames = 0;    // so long no block is tried as a free one
+  std::uint32_t surprised_frames = 0;  // so long all links are computed
+  T kick_norm = 0;                     // what the links added to the norm in their last block
+  bool is_stale = true;                // k, z and compliance are not those of `used`
+  std::uint32_t until_nap = nap_frames;
+  std::uint32_t fresh_frames = 0;  // since they were placed; up to 2
+  bool is_long_nap = false;
+  bool has_bounds = false;  // the energy limits the motion
+};
+
+template <class T>
+using ModalStep = void (*)(const Program& program, const Modes& modes, ModalState<T>& state,
+                           const Block<T>& block);
+
+template <Isa isa, class T>
+ModalStep<T> modal_step();
+
+template <class T>
+class ModalKernel final : public Kernel<T> {
+ public:
+  ModalKernel(const Program& program, const Modes& modes, Isa isa);
+  void place(std::size_t lane, const double* x, const double* v) override;
+  // Modes that nobody hears are left out: false.
+  bool save(std::size_t lane, double* x, double* v) const override;
+  // By the length of the modes' displacement, which no mass exceeds: it may be late, never early.
+  bool is_near_start(std::size_t lane, double bound) const override;
+  Awake awake() const override;
+  // The most that a listener, a place or then an output, may be off by what sleeps or has slept.
+  double owed(std::size_t listener) const;
+
+ private:
+  void play(const Block<T>& block) override;
+  const Program& program_;
+  const Modes& modes_;
+  ModalStep<T> step_;
+  Aligned<T> numbers_;  // all arrays of state_
+  std::vector<const T*> rows_;
+  std::vector<const T*> bundled_rows_;
+  std::vector<std::uint32_t> indices_;
+  std::vector<Ends> held_ends_;
+  ModalState<T> state_;
+};
+
+}  // namespace ressort

@@ -1,0 +1,125 @@
+// core/engine: how far the energy lets the modes of a ModalState move, and whether a link can act
+// there; a part of modal_step.cpp, which alone includes it.
+//
+// The energy of a mode, m d^2 + lK (q - d/2)^2 with m = 1 - lZ/2 - lK/4, never grows by itself, and
+// bounds q^2 by 1/lK + 1/(4m) times itself. A soft mode may drift instead: its q^2 counts as well,
+// and it goes no farther in a block than its speed allows. The root of the energy is a norm: what
+// pushes add to it adds up.
+#pragma once
+
+#include <limits>
+
+#include "core/kernels/modal/modal_sweep.h"
+
+namespace ressort::RESSORT_ISA {
+namespace {
+
+constexpr double least_stiffness = 1e-4;  // lK of a mode that is not soft
+constexpr double least_mass = 0.01;       // m, below which nothing is promised
+constexpr double drift_frames = static_cast<double>(max_block_frames);
+
+template <class T>
+struct Range {
+  T low;
+  T high;
+};
+
+// The greatest square of each place's displacement for an energy of 1. False where the modes may
+// gain energy by themselves.
+template <class T>
+bool measure_compliance(ModalState<T>& s, std::size_t places) {
+  for (std::size_t p = 0; p < places; ++p) {
+    s.compliance[p] = 0;
+  }
+  for (std::size_t i = 0; i < s.modes; ++i) {
+    const T k = s.k[i];
+    const T m = 1 - s.z[i] / 2 - k / 4;
+    if (!(k >= 0 && s.z[i] >= 0 && m > T(least_mass))) {
+      return false;
+    }
+    const T drift = T(drift_frames) * (1 + 1 / m);
+    const T square = T(least_stiffness) > k ? drift * drift : 1 / k + 1 / (4 * m);
+    for (std::size_t p = 0; p < places; ++p) {
+      const T shape = s.places[p * s.stride + i];
+      s.compliance[p] += shape * shape * square;
+    }
+  }
+  return true;
+}
+
+template <class T>
+T energy(const ModalState<T>& s) {
+  using V = ModePack<T>;
+  V sum{};
+  for (std::size_t i = 0; i < pack_count(s); ++i) {
+    const V k = packs(s.k)[i];
+    const V q = packs(s.q)[i];
+    const V d = packs(s.d)[i];
+    const V m = 1 - packs(s.z)[i] / 2 - k / 4;
+    const V middle = q - d / 2;
+    const V soft =
+        select(k < V{} + T(least_stiffness), V{} + T(1 / (drift_frames * drift_frames)), V{});
+    sum += m * d * d + k * middle * middle + soft * q * q;
+  }
+  return total<T>(sum);
+}
+
+// How the norm may grow by kicks whose sizes add up to `sum`, along a row of a length.
+template <class T>
+T norm_of_kicks(T sum, T length) {
+  return T(1.001) * sum * length;  // a soft mode's q^2 and roundings included
+}
+
+// Whether a link may act while d is in a range.
+template <class T>
+bool may_act(const LinkRun& run, const T* coefficients, Range<T> d) {
+  const auto c = [&](std::size_t i) { return coefficients[run.coefficients[i]]; };
+  switch (run.law) {
+    case Law::pluck:
+      return (c(0) != 0 || c(2) != 0) && c(1) > d.low && d.high > -c(1);
+    case Law::contact:
+      return (c(0) != 0 || c(1) != 0) && d.high > -c(2);
+    case Law::clipped_contact:
+      return d.high > -c(4);
+    case Law::bow:
+    case Law::smooth_bow:
+    case Law::either_bow:
+      return c(0) != 0;
+    default:
+      return true;
+  }
+}
+// What is left of a link's force where its ends give way, as a spring in series with it does. For
+// a curved law by the line through where it is; what only rubs is not felt by a spring.
+template <class T>
+T share_of_give(const LinkRun& run, const T* coefficients, T d, T give) {
+  const auto c = [&](std::size_t i) { return coefficients[run.coefficients[i]]; };
+  T stiffness = 0;
+  switch (run.law) {
+    case Law::quadratic_spring:
+      stiffness = c(0) + c(1) * absolute(d);
+      break;
+    case Law::cubic_spring:
+      stiffness = c(0) + c(1) * d * d;
+      break;
+    case Law::contact:
+      stiffness = c(0);
+      break;
+    case Law::clipped_spring:
+    case Law::clipped_contact:
+      stiffness = c(2);
+      break;
+    case Law::pluck:
+      stiffness = c(0) / 10;
+      break;
+    default:
+      break;
+  }
+  return give > 0 && stiffness > 0 ? 1 / (1 + give * stiffness) : T(1);
+}
+inline bool acts_by_position(Law law) {
+  return law == Law::pluck || law == Law::contact || law == Law::clipped_contact;
+}
+
+}  // namespace
+}  // namespace ressort::RESSORT_ISA

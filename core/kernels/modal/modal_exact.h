@@ -1,0 +1,98 @@
+// core/engine: the modes true to the continuous network (Modes::is_exact); a part of
+// modal_step.cpp, which alone includes it.
+//
+// q'' + Z q' + K q = F, sampled, is again a mode of the published scheme, with r = e^(-Z/2) and
+// w^2 = K - Z^2/4:  lZ = 1 - r^2,  lK = 1 + r^2 - 2 r cos w, and with lK/K of the force, which
+// gives the same displacement at rest (Gautschi). All of these are smooth functions of K and Z,
+// whether the mode rings or creeps. Of the gain each side takes the root: shapes and q are scaled
+// by it.
+#pragma once
+
+#include "core/kernels/modal/modal_sweep.h"
+
+namespace ressort::RESSORT_ISA {
+namespace {
+
+constexpr double nyquist = 9.8;       // w^2 of the highest frequency that there is: what would be
+                                      // higher is as stiff at rest, but rings here
+constexpr double most_damping = 8.0;  // Z beyond which a mode is gone in a sample anyway
+constexpr double least_share = 1e-6;  // K per Z^2 below which the mode only creeps
+
+template <class V>
+V lesser(V a, double most) {
+  using T = Scalar<V>;
+  return select(a < V{} + T(most), a, V{} + T(most));
+}
+
+// (2 - 2 cos sqrt(u)) / u
+template <class V>
+V ripple(V u) {
+  using T = Scalar<V>;
+  V sum = V{} + 1;
+#pragma GCC unroll 16
+  for (int n = 14; n > 0; --n) {
+    sum = 1 - T(1.0 / ((2 * n + 1) * (2 * n + 2))) * u * sum;
+  }
+  return sum;
+}
+
+// 1 - e^-x, for x up to 1
+template <class V>
+V loss(V x) {
+  using T = Scalar<V>;
+  V sum = V{} + 1;
+#pragma GCC unroll 20
+  for (int n = 18; n > 1; --n) {
+    sum = 1 - T(1.0 / n) * x * sum;
+  }
+  return x * sum;
+}
+
+// Makes lK and lZ of K and Z; gives the force's gain.
+template <class V>
+V make_exact(V& k, V& z) {
+  using T = Scalar<V>;
+  const V damping = lesser(z, most_damping);
+  const V eighth = loss(damping / 8);
+  const V quarter = eighth * (2 - eighth);
+  const V half = quarter * (2 - quarter);
+  const V lost = half * (2 - half);
+  const V creep = -damping * damping / 4;
+  const V ring = lesser(k + creep, nyquist);
+  const V stiffness = (1 - half) * (ring * ripple(ring) - creep * ripple(creep));
+  const V creeping = select(damping > V{}, lost / damping, V{} + 1);
+  const auto rings = k > T(least_share) * damping * damping;
+  const V gain = select(rings, stiffness / k, creeping);
+  k = select(rings, stiffness, creeping * k);
+  z = lost;
+  return gain;
+}
+
+// The same of all modes.
+template <class T>
+void make_exact(ModalState<T>& s, std::size_t shapes, T* k, T* z) {
+  using V = ModePack<T>;
+  for (std::size_t i = 0; i < all_packs(s); ++i) {
+    const V gain = make_exact(packs(k)[i], packs(z)[i]);
+    V root = gain;
+    for (std::size_t lane = 0; lane < mode_lanes<T>; ++lane) {
+      root[lane] = std::sqrt(gain[lane]);
+    }
+    const V change = packs(s.root)[i] / root;
+    packs(s.root)[i] = root;
+    packs(s.q)[i] *= change;
+    packs(s.d)[i] *= change;
+    packs(s.debt)[i] *= change;
+  }
+  for (std::size_t row = 0; row < shapes; ++row) {
+    const V* const shape = packs(s.shape + row * s.stride);
+    V* const scaled = packs(s.pushes + row * s.stride);
+    for (std::size_t i = 0; i < all_packs(s); ++i) {
+      scaled[i] = shape[i] * packs(s.root)[i];
+    }
+  }
+  s.bundled_modes = 0;
+}
+
+}  // namespace
+}  // namespace ressort::RESSORT_ISA

@@ -1,0 +1,99 @@
+// core/engine: what the coefficients make of the modes of a ModalState; a part of modal_step.cpp,
+// which alone includes it.
+#pragma once
+
+#include "core/kernels/modal/modal_exact.h"
+
+namespace ressort::RESSORT_ISA {
+namespace {
+
+template <class T>
+struct Mixer {
+  const Modes& modes;
+  ModalState<T>& s;
+
+  T coefficient(std::uint32_t c) const { return s.ramps.value[c]; }
+  T inverse_mass() const {
+    return modes.inverse_mass == Modes::own_mass ? T(1) : coefficient(modes.inverse_mass);
+  }
+
+  // For how many samples from now on the modes are not what they were in the sample before.
+  std::size_t moving_frames() const {
+    if (s.ramps.frames > 0) {
+      return s.ramps.frames;
+    }
+    const T* used = s.used;
+    bool is_same = true;
+    for (const ModalShare& share : modes.stiffness) {
+      is_same &= *used++ == coefficient(share.coefficient);
+    }
+    for (const ModalShare& share : modes.damping) {
+      is_same &= *used++ == coefficient(share.coefficient);
+    }
+    return is_same && *used == inverse_mass() ? 0 : 1;
+  }
+
+  // A coefficient some samples from now.
+  T coefficient(std::uint32_t c, std::size_t ahead) const {
+    for (std::size_t i = 0; ahead > 0 && i < s.ramps.count; ++i) {
+      if (s.ramps.ramping[i] == c) {
+        return ahead < s.ramps.frames
+                   ? s.ramps.value[c] + static_cast<T>(ahead) * s.ramps.increment[c]
+                   : s.ramps.target[c];
+      }
+    }
+    return coefficient(c);
+  }
+
+  // lK and lZ, some samples from now.
+  void mix(std::size_t ahead, T* k, T* z) {
+    const T w =
+        modes.inverse_mass == Modes::own_mass ? T(1) : coefficient(modes.inverse_mass, ahead);
+    T* used = mix(modes.stiffness, s.stiffness, ahead, w, k, s.used);
+    used = mix(modes.damping, s.damping, ahead, w, z, used);
+    *used = w;
+    if (modes.is_exact) {
+      make_exact(s, modes.pushes.size() + modes.places.size() + modes.outputs.size(), k, z);
+    }
+  }
+  T* mix(const std::vector<ModalShare>& shares, const T* factors, std::size_t ahead, T w, T* out,
+         T* used) {
+    for (std::size_t i = 0; i < all_packs(s); ++i) {
+      packs(out)[i] = ModePack<T>{};
+    }
+    for (std::size_t j = 0; j < shares.size(); ++j, ++used) {
+      const std::uint32_t c = shares[j].coefficient;
+      const T value = w * (!shares[j].is_late ? coefficient(c, ahead)
+                           : ahead > 1        ? coefficient(c, ahead - 1)
+                                              : *used);
+      *used = coefficient(c, ahead);
+      for (std::size_t i = 0; i < all_packs(s); ++i) {
+        packs(out)[i] += value * packs(factors + j * s.stride)[i];
+      }
+    }
+    return used;
+  }
+
+  // Between here and some samples on exact coefficients move in a straight line: gives how many.
+  // What has just been placed is pulled by nothing in its first sample.
+  std::size_t begin_exact(std::size_t frames) {
+    frames = s.fresh_frames < 2 ? 1 : frames;
+    s.fresh_frames += s.fresh_frames < 2;
+    mix(frames, s.k_step, s.z_step);
+    const T share = T(1) / static_cast<T>(frames);
+    for (std::size_t i = 0; i < all_packs(s); ++i) {
+      packs(s.k_step)[i] = share * (packs(s.k_step)[i] - packs(s.k)[i]);
+      packs(s.z_step)[i] = share * (packs(s.z_step)[i] - packs(s.z)[i]);
+    }
+    return frames;
+  }
+  void advance_exact() {
+    for (std::size_t i = 0; i < all_packs(s); ++i) {
+      packs(s.k)[i] += packs(s.k_step)[i];
+      packs(s.z)[i] += packs(s.z_step)[i];
+    }
+  }
+};
+
+}  // namespace
+}  // namespace ressort::RESSORT_ISA

@@ -1,0 +1,58 @@
+#include "core/kernels/program.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace ressort {
+namespace {
+
+constexpr double reference_rate_hz = 44100.0;
+
+}  // namespace
+
+bool is_plain(const Program& program) {
+  return std::all_of(program.link_runs.begin(), program.link_runs.end(),
+                     [](const LinkRun& run) { return run.scheme == Scheme::plain; });
+}
+
+double rate_factor(Unit unit, double r) {
+  switch (unit) {
+    case Unit::stiffness:
+    case Unit::gravity:
+    case Unit::gravity_per_rate:
+      return r * r;
+    case Unit::damping:
+    case Unit::friction:
+    case Unit::speed:
+      return r;
+    case Unit::plain:
+    case Unit::inverse_mass:
+      return 1.0;
+  }
+  return 1.0;
+}
+
+double coefficient_value(const Program& program, const Coefficient& coefficient,
+                         std::span<const double> parameters, double stiffness_factor) {
+  const double value =
+      evaluate(std::span(program.steps).subspan(coefficient.first, coefficient.count), parameters);
+  const double scaled = value * rate_factor(coefficient.unit, program.rate_ratio);
+  switch (coefficient.unit) {
+    case Unit::stiffness:
+      return scaled * stiffness_factor;
+    case Unit::friction:
+    case Unit::speed:
+      return scaled * std::sqrt(stiffness_factor);
+    case Unit::inverse_mass:
+      return 1.0 / value;
+    case Unit::gravity_per_rate:
+      return scaled / reference_rate_hz;
+    case Unit::plain:
+    case Unit::damping:
+    case Unit::gravity:
+      return scaled;
+  }
+  return scaled;
+}
+
+}  // namespace ressort

@@ -1,0 +1,162 @@
+// core/engine: what runs. A Program is constant and shared by all voices; what changes is in the
+// kernels. Indices and numbers only; the compile room knows the names.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "core/formula.h"
+#include "core/kernels/forms.h"
+
+namespace ressort {
+
+// How a coefficient follows the sample rate and a voice's pitch. With r = 44100 / rate and s the
+// voice's stiffness factor, a coefficient is its formula's value times r^a s^b.
+enum class Unit : std::uint8_t {
+  plain,             // distances and thresholds: a = 0, b = 0
+  stiffness,         // K: a = 2, b = 1
+  damping,           // Z: a = 1, b = 0, so that a decay stays what it is at every pitch
+  friction,          // Z of a bow: a = 1, b = 1/2, as the string's impedance
+  speed,             // a bow's velocity scale: a = 1, b = 1/2
+  inverse_mass,      // 1/M: a = 0, b = 0
+  gravity,           // g: a = 2, b = 0
+  gravity_per_rate,  // the same, divided by 44100
+};
+
+struct Coefficient {
+  std::uint32_t first = 0;  // steps [first, first + count) of Program::steps
+  std::uint32_t count = 0;
+  Unit unit = Unit::plain;
+};
+
+enum class Law : std::uint8_t {
+  spring,
+  quadratic_spring,
+  cubic_spring,
+  clipped_spring,
+  pluck,
+  bow,
+  smooth_bow,
+  either_bow,
+  contact,
+  clipped_contact,
+};
+
+// Consecutive nodes that share their coefficients.
+struct MassRun {
+  std::uint32_t first = 0;
+  std::uint32_t count = 0;
+  std::uint32_t inverse_mass = 0;  // coefficients
+  std::uint32_t stiffness = 0;     // read only if is_oscillator
+  std::uint32_t damping = 0;
+  std::uint32_t gravity = 0;  // read only if has_gravity
+  bool is_oscillator = false;
+  bool has_gravity = false;
+};
+
+// How the force of a link is found.
+enum class Scheme : std::uint8_t {
+  plain,     // from where its ends are, as published
+  centred,   // from where they were and will be, so that it gains no energy
+  substeps,  // several times a sample
+};
+
+// Consecutive links that share law, coefficients and scheme.
+struct LinkRun {
+  Law law = Law::spring;
+  Scheme scheme = Scheme::plain;
+  std::uint16_t substeps = 1;  // read only with Scheme::substeps
+  std::uint32_t first = 0;
+  std::uint32_t count = 0;
+  std::array<std::uint32_t, 5> coefficients{};  // in the order of laws.h
+};
+
+struct Ends {
+  std::uint32_t a = 0;  // nodes
+  std::uint32_t b = 0;
+};
+
+struct InputSlot {
+  std::uint32_t hand = 0;  // index into Machine::hands: what drives it
+  bool is_force = false;
+  std::uint32_t node = 0;
+};
+
+struct OutputSlot {
+  std::uint32_t channel = 0;  // from 0
+  std::uint32_t node = 0;
+  bool is_force = false;  // what the links and this tick's inputs exert, at the reference rate
+};
+
+// A parameter that an audio channel gives for every sample.
+struct AudioParameter {
+  std::uint32_t parameter = 0;
+  int channel = 0;  // from 0
+};
+
+// A place on a rectangle of length * width nodes, by coordinates 0..1. It has no inertia: its
+// position is interpolated, and what acts on it acts on the nodes around it.
+struct TapSlot {
+  std::uint32_t node = 0;   // its own
+  std::uint32_t first = 0;  // of its nodes in Program::tap_nodes, row by row
+  std::uint32_t length = 1;
+  std::uint32_t width = 1;
+  std::uint32_t u = 0;  // coefficients
+  std::uint32_t v = 0;
+};
+
+// A part of a network, which no other part touches. Nodes are numbered: masses that move, run by
+// run; then grounds; then position inputs; then places on macros, in the order of `taps`.
+struct Program {
+  Form form;
+  double rate_hz = 44100.0;
+  double rate_ratio = 1.0;       // r above; 1 where numbers are taken raw
+  std::uint32_t moving = 0;      // nodes [0, moving) have inertia
+  std::vector<double> position;  // [node] at the start
+  std::vector<double> velocity;  // [node] per sample of rate_hz
+  std::vector<MassRun> mass_runs;
+  std::vector<LinkRun> link_runs;
+  std::vector<Ends> ends;              // [link]
+  std::vector<std::uint32_t> origins;  // [link] where the model has it
+  std::vector<InputSlot> inputs;
+  std::vector<TapSlot> taps;
+  std::vector<std::uint32_t> tap_nodes;  // nodes
+  std::vector<OutputSlot> outputs;
+  std::vector<AudioParameter> audio_parameters;
+  std::vector<std::uint32_t> audio_coefficients;  // those that depend on an audio parameter
+  std::vector<double> parameters;                 // [parameter] at the start
+  std::vector<Step> steps;
+  std::vector<Coefficient> coefficients;
+  std::vector<std::vector<std::uint32_t>> depending;  // [parameter] coefficients
+};
+
+// Whether every link's force is found as published.
+bool is_plain(const Program& program);
+
+// What drives an input, wherever in the network it is.
+struct HandSlot {
+  int number = 1;  // from 1, as in the model
+  bool is_force = false;
+  double position = 0.0;  // where it starts; 0 for a force
+};
+
+// A whole network: parts that do not touch each other, each a Program with the same parameters.
+struct Machine {
+  double rate_hz = 44100.0;
+  double rate_ratio = 1.0;
+  std::vector<double> parameters;  // [parameter] at the start
+  std::vector<HandSlot> hands;     // [input of the model]
+  std::uint32_t channels = 0;
+  std::vector<Program> parts;
+};
+
+// How much larger a coefficient is at a rate lower by r: r^a above.
+double rate_factor(Unit unit, double r);
+
+// A coefficient's value for a voice. [any thread] wait-free
+double coefficient_value(const Program& program, const Coefficient& coefficient,
+                         std::span<const double> parameters, double stiffness_factor);
+
+}  // namespace ressort

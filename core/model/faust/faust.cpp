@@ -1,0 +1,504 @@
+// The loop of the network in FAUST. Every mass that moves feeds back one signal: the velocity that
+// its links have left it with. So the forces need no loop of their own, and FAUST, whose time
+// grows with the square of what is fed back, compiles this form fastest.
+#include "core/model/faust/faust.h"
+
+#include <algorithm>
+#include <cmath>
+#include <set>
+
+#include "core/model/faust/faust_words.h"
+#include "core/model/topology.h"
+
+namespace ressort {
+namespace {
+
+using Words = std::vector<std::string>;
+
+// How much of a node a point is: its weight as a factor, "0.3*" or "hat(2.0, row_p)*".
+struct Share {
+  std::uint32_t node = 0;
+  std::string factor;
+};
+
+class Writer {
+ public:
+  Writer(const Network& written, const FaustOptions& options)
+      : written_(written), network_(expand_macros(written)), options_(options) {
+    name_parameters();
+    name_masses();
+    name_links();
+    gather_inputs();
+    gather_forces();
+  }
+
+  std::string text() {
+    const std::string body = masses() + links();  // which tells the laws that are needed
+    const int inputs = count_inputs();
+    Words from;
+    Words to;
+    for (std::size_t i = 0; i < network_.masses.size(); ++i) {
+      if (moves(i)) {
+        from.push_back("n_" + mass_[i]);
+        to.push_back("to_" + mass_[i]);
+      }
+    }
+    const std::string moving = std::to_string(from.size());
+    for (int n = 1; n <= inputs; ++n) {
+      from.push_back("in" + std::to_string(n));
+    }
+    const Words heard = outputs();
+    to.insert(to.end(), heard.begin(), heard.end());
+    std::string loop = "process = model;\n";
+    if (moving != "0") {
+      loop = "process = model ~ par(i, " + moving + ", _) : par(i, " + moving + ", !), par(i, " +
+             std::to_string(heard.size()) + ", _);\n";
+    }
+    return header(inputs) + faust_prelude(options_.rescale) + laws() + parameters() +
+           "\n// n_: what to_ was at the tick before; x_, v_, F_: position, velocity and the force "
+           "of\n// the links; f_: a link's force, which pulls its first end down.\nmodel" +
+           (from.empty() ? "" : "(" + flow(from, ", ", 6) + ")") + " =\n    " + flow(to, ", ", 4) +
+           "\nwith {\n" + body + "};\n\n" + loop;
+  }
+
+ private:
+  bool moves(std::size_t i) const { return ressort::moves(network_.masses[i]); }
+
+  // --- names ---------------------------------------------------------------------------------
+
+  void name_parameters() {
+    FaustNames names;
+    for (const Parameter& parameter : network_.parameters) {
+      parameter_.push_back(parameter.audio_input > 0 ? "in" + std::to_string(parameter.audio_input)
+                                                     : "p_" + names.add(parameter.name));
+    }
+  }
+
+  void name_masses() {
+    FaustNames names;
+    std::vector<std::size_t> points(written_.macros.size());
+    for (const Mass& mass : written_.masses) {
+      if (mass.kind != MassKind::point) {
+        mass_.push_back(names.add(mass.name));
+        continue;
+      }
+      const std::uint32_t macro = network_.taps[mass.tap].macro;
+      mass_.push_back(
+          names.add(written_.macros[macro].name + "_at" + std::to_string(++points[macro])));
+    }
+    for (std::uint32_t m = 0; m < written_.macros.size(); ++m) {
+      const Macro& macro = written_.macros[m];
+      for (std::uint32_t k = 0; k < node_count(macro); ++k) {
+        const std::string row = std::to_string(k / macro.width);
+        const std::string column = macro.width > 1 ? "_" + std::to_string(k % macro.width) : "";
+        mass_.push_back(names.add(macro.name + "_" + row + column));
+        macro_of_.push_back(m);
+      }
+    }
+  }
+
+  void name_links() {
+    FaustNames names;
+    std::vector<std::size_t> counts(written_.macros.size());
+    for (std::size_t i = 0; i < network_.links.size(); ++i) {
+      const Link& link = network_.links[i];
+      if (i < written_.links.size()) {
+        link_.push_back(names.add(link.name));
+        continue;
+      }
+      const std::uint32_t macro = macro_of_[link.a - written_.masses.size()];
+      link_.push_back(
+          names.add(written_.macros[macro].name + "_r" + std::to_string(counts[macro]++)));
+    }
+  }
+
+  // --- numbers -------------------------------------------------------------------------------
+
+  std::string value(ArgumentId argument) const {
+    return argument == no_argument ? "0.0"
+                                   : faust_formula(network_.arguments[argument], parameter_);
+  }
+  // Terms of a force as terms of what it does to the mass's velocity.
+  Words divided(Words force, const Mass& mass) const {
+    const Formula& formula = network_.arguments[mass.mass];
+    if (force.empty() || (is_constant(formula) && evaluate(formula, {}) == 1.0)) {
+      return force;
+    }
+    const std::string over = "/" + faust_formula(formula, parameter_, Tightness::atom);
+    return force.size() == 1 ? Words{force[0] + over}
+                             : Words{"+ (" + faust_sum(std::move(force)) + ")" + over};
+  }
+
+  bool is_audio(ArgumentId argument) const {
+    const auto follows = [&](const Step& step) {
+      return step.op == Op::parameter && network_.parameters[step.index].audio_input > 0;
+    };
+    return argument != no_argument && std::any_of(network_.arguments[argument].begin(),
+                                                  network_.arguments[argument].end(), follows);
+  }
+
+  // --- what acts on a mass -------------------------------------------------------------------
+
+  void gather_inputs() {
+    pushes_.resize(network_.masses.size());
+    for (const Input& input : network_.inputs) {
+      if (input.is_force) {
+        pushes_[input.mass].push_back("in" + std::to_string(input.number));
+      }
+    }
+    outside_.resize(network_.masses.size());
+    for (std::size_t i = 0; i < network_.masses.size(); ++i) {
+      for (const std::string& input : pushes_[i]) {
+        if (network_.masses[i].kind != MassKind::point) {
+          outside_[i].push_back("+ push(" + input + ")");
+          continue;
+        }
+        for (const Share& share : shares(i)) {
+          outside_[share.node].push_back("+ " + share.factor + "push(" + input + ")");
+        }
+      }
+    }
+  }
+
+  void gather_forces() {
+    forces_.resize(network_.masses.size());
+    for (std::size_t i = 0; i < network_.links.size(); ++i) {
+      forces_[network_.links[i].a].push_back("- f_" + link_[i]);
+      forces_[network_.links[i].b].push_back("+ f_" + link_[i]);
+    }
+    for (std::size_t i = 0; i < network_.masses.size(); ++i) {
+      if (network_.masses[i].kind == MassKind::point && !forces_[i].empty()) {
+        for (const Share& share : shares(i)) {
+          forces_[share.node].push_back("+ " + share.factor + "F_" + mass_[i]);
+        }
+      }
+    }
+  }
+
+  // The nodes along one side of a macro that a coordinate is between; all of them where it varies.
+  Words side(ArgumentId coordinate, std::uint32_t nodes, const std::string& place) const {
+    Words factors(nodes);
+    static const Formula nowhere = {{Op::number, 0, 0.0}};
+    const Formula& formula = coordinate == no_argument ? nowhere : network_.arguments[coordinate];
+    if (!is_constant(formula)) {
+      for (std::uint32_t i = 0; i < nodes; ++i) {
+        factors[i] = "hat(" + faust_number(i) + ", " + place + ")*";
+      }
+      return factors;
+    }
+    const double p = std::clamp(evaluate(formula, {}), 0.0, 1.0) * (nodes - 1);
+    for (std::uint32_t i = 0; i < nodes; ++i) {
+      const double weight = std::max(0.0, 1.0 - std::fabs(p - i));
+      factors[i] = weight == 0.0 ? "0" : weight == 1.0 ? "" : faust_number(weight) + "*";
+    }
+    return factors;
+  }
+
+  std::vector<Share> shares(std::size_t point) const {
+    const Tap& tap = network_.taps[network_.masses[point].tap];
+    const Words rows = side(tap.u, tap.length, "row_" + mass_[point]);
+    const Words columns = side(tap.v, tap.width, "column_" + mass_[point]);
+    std::vector<Share> all;
+    for (std::uint32_t i = 0; i < tap.length; ++i) {
+      for (std::uint32_t j = 0; j < tap.width; ++j) {
+        if (rows[i] != "0" && columns[j] != "0") {
+          all.push_back({tap.first + i * tap.width + j, rows[i] + columns[j]});
+        }
+      }
+    }
+    return all;
+  }
+
+  // The same of something that every node has, "x_" or "F_", as one sum.
+  std::string interpolated(std::size_t point, const std::string& prefix) const {
+    Words terms;
+    for (const Share& share : shares(point)) {
+      terms.push_back("+ " + share.factor + prefix + mass_[share.node]);
+    }
+    return faust_sum(terms);
+  }
+
+  // --- the lines -----------------------------------------------------------------------------
+
+  std::string masses() {
+    std::string text;
+    for (std::size_t i = 0; i < network_.masses.size(); ++i) {
+      text += "  " + mass_line(i);
+      if (network_.masses[i].kind != MassKind::point || !forces_[i].empty()) {
+        text += "  F_" + mass_[i] + " = " + faust_sum(forces_[i]) + ";";
+      }
+      text += (moves(i) ? leaving(i) : "") + "\n";
+    }
+    return text;
+  }
+
+  std::string mass_line(std::size_t i) {
+    const Mass& mass = network_.masses[i];
+    const std::string& name = mass_[i];
+    switch (mass.kind) {
+      case MassKind::mass:
+      case MassKind::oscillator:
+        return drives_itself(mass) ? driven_mass(i) : plain_mass(i);
+      case MassKind::ground:
+        return "x_" + name + " = " + faust_number(mass.position) + ";  v_" + name + " = 0.0;";
+      case MassKind::position:
+        return "x_" + name + " = " + channel_of(i) + ";  " + moved(i, mass.position);
+      case MassKind::point:
+        break;
+    }
+    const Tap& tap = network_.taps[mass.tap];
+    std::string line;
+    if (!is_fixed(tap.u) || !is_fixed(tap.v)) {
+      used_.insert({"along", "hat"});
+    }
+    if (!is_fixed(tap.u)) {
+      line += "row_" + name + " = along(" + faust_number(tap.length) + ", " + value(tap.u) + ");  ";
+    }
+    if (!is_fixed(tap.v)) {
+      line +=
+          "column_" + name + " = along(" + faust_number(tap.width) + ", " + value(tap.v) + ");  ";
+    }
+    return line + "x_" + name + " = " + interpolated(i, "x_") + ";  " +
+           moved(i, network_.masses[tap.first].position);
+  }
+
+  bool is_fixed(ArgumentId coordinate) const {
+    return coordinate == no_argument || is_constant(network_.arguments[coordinate]);
+  }
+
+  std::string moved(std::size_t i, double start) const {
+    const std::string x = "x_" + mass_[i];
+    return "v_" + mass_[i] + " = " + x + " - was(" + faust_number(start) + ", " + x + ");";
+  }
+
+  std::string channel_of(std::size_t mass) const {
+    for (const Input& input : network_.inputs) {
+      if (!input.is_force && input.mass == mass) {
+        return "in" + std::to_string(input.number);
+      }
+    }
+    return faust_number(network_.masses[mass].position);
+  }
+
+  // Its own M, K or Z are another number at the next tick, when its force acts: so it feeds back
+  // the force, not what becomes of it.
+  bool drives_itself(const Mass& mass) const {
+    return is_audio(mass.mass) || is_audio(mass.stiffness) || is_audio(mass.damping);
+  }
+
+  // Terms of what acts on it besides its links, at once.
+  Words outside(std::size_t i) const {
+    const Mass& mass = network_.masses[i];
+    Words terms = outside_[i];
+    if (mass.gravity != no_argument) {
+      terms.push_back(
+          "- push(" + value(mass.gravity) + ")" +
+          (mass.gravity_per_rate ? "/" + faust_number(Network::reference_rate_hz) : ""));
+    }
+    return terms;
+  }
+
+  std::string plain_mass(std::size_t i) {
+    const Mass& mass = network_.masses[i];
+    const std::string& name = mass_[i];
+    Words terms = divided(outside(i), mass);
+    terms.insert(terms.begin(), "+ n_" + name);
+    if (const std::string start = start_velocity(mass); start != "0.0") {
+      terms.push_back("+ first(" + start + ")");
+    }
+    return "v_" + name + " = " + faust_sum(terms) + ";  x_" + name + " = travel(" +
+           faust_number(mass.position) + ", v_" + name + ");";
+  }
+
+  // What a mass would have fed back at the tick before the first.
+  std::string start_velocity(const Mass& mass) {
+    Words terms;
+    std::string speed = "0.0";
+    if (const double v0 = initial_velocity(network_, mass); v0 != 0.0) {
+      speed = faust_number(v0) + "*r";
+      terms.push_back("+ " + speed);
+    }
+    if (mass.kind == MassKind::oscillator && (mass.position != 0.0 || speed != "0.0")) {
+      const Words pull = divided({"- " + held(mass, faust_number(mass.position), speed)}, mass);
+      terms.insert(terms.end(), pull.begin(), pull.end());
+    }
+    return faust_sum(terms);
+  }
+
+  std::string driven_mass(std::size_t i) {
+    const Mass& mass = network_.masses[i];
+    used_.insert("swing");
+    used_.insert("spring");
+    Words force = outside(i);
+    force.insert(force.begin(), "+ n_" + mass_[i]);
+    const std::string swing = "swing(" + value(mass.mass) + ", " + value(mass.stiffness) + ", " +
+                              value(mass.damping) + ", " + faust_number(mass.position) + ", " +
+                              faust_number(initial_velocity(network_, mass)) + "*r, " +
+                              faust_sum(force) + ")";
+    return "x_" + mass_[i] + " = " + swing + " : _, !;  v_" + mass_[i] + " = " + swing + " : !, _;";
+  }
+
+  // An oscillator's own spring and damper.
+  std::string held(const Mass& mass, const std::string& x, const std::string& v) {
+    used_.insert("spring");
+    return "spring(" + value(mass.stiffness) + ", " + value(mass.damping) + ", " + x + ", " + v +
+           ")";
+  }
+
+  // What a mass feeds back.
+  std::string leaving(std::size_t i) {
+    const Mass& mass = network_.masses[i];
+    const std::string& name = mass_[i];
+    const std::string to = "  to_" + name + " = ";
+    if (drives_itself(mass)) {
+      return to + "F_" + name + ";";
+    }
+    Words force = {"+ F_" + name};
+    if (mass.kind == MassKind::oscillator) {
+      force.push_back("- " + held(mass, "x_" + name, "v_" + name));
+    }
+    Words terms = divided(std::move(force), mass);
+    terms.insert(terms.begin(), "+ v_" + name);
+    return to + faust_sum(terms) + ";";
+  }
+
+  std::string links() {
+    std::string text;
+    for (std::size_t i = 0; i < network_.links.size(); ++i) {
+      const Link& link = network_.links[i];
+      const FaustLaw law = faust_law(link.kind);
+      used_.insert(law.name);
+      text += "  f_" + link_[i] + " = " + law.name + "(";
+      for (std::size_t k = 0; k < law.arguments; ++k) {
+        text += value(link.arguments[k]) + ", ";
+      }
+      const std::string& a = mass_[link.a];
+      const std::string& b = mass_[link.b];
+      text += "x_" + a + " - x_" + b + ", v_" + a + " - v_" + b + ");\n";
+    }
+    return text;
+  }
+
+  Words outputs() const {
+    Words words(static_cast<std::size_t>(output_count(network_)), "0.0");
+    for (const Output& output : network_.outputs) {
+      const std::string& name = mass_[output.mass];
+      std::string& word = words[static_cast<std::size_t>(output.number - 1)];
+      word = "x_" + name;
+      if (output.is_force) {
+        const bool is_point = network_.masses[output.mass].kind == MassKind::point;
+        word =
+            (is_point ? "(" + interpolated(output.mass, "F_") + ")" : "F_" + name) + "/push(1.0)";
+        for (const std::string& input : pushes_[output.mass]) {
+          word += " + " + input;
+        }
+      }
+    }
+    return words;
+  }
+
+  // --- the rest ------------------------------------------------------------------------------
+
+  int count_inputs() const {
+    int count = input_count(network_);
+    for (const Parameter& parameter : network_.parameters) {
+      count = std::max(count, parameter.audio_input);
+    }
+    return count;
+  }
+
+  std::string laws() const {
+    std::string text;
+    for (const FaustDefinition& definition : faust_definitions()) {
+      if (is_used(definition.name)) {
+        text += definition.text;
+      }
+    }
+    return text;
+  }
+
+  // By the model, or by what the model uses; no definition stands on more than one other.
+  bool is_used(const std::string& name) const {
+    const auto definitions = faust_definitions();
+    return used_.contains(name) ||
+           std::any_of(definitions.begin(), definitions.end(), [&](const FaustDefinition& other) {
+             return used_.contains(other.name) &&
+                    std::string_view(other.text).find(" " + name + "(") != std::string_view::npos;
+           });
+  }
+
+  std::string parameters() const {
+    std::string text;
+    for (std::size_t i = 0; i < network_.parameters.size(); ++i) {
+      const Parameter& parameter = network_.parameters[i];
+      if (parameter.audio_input == 0) {
+        text += parameter_[i] + " = " + faust_slider(options_.sliders[i]) + ";\n";
+      }
+    }
+    return text.empty() ? text : "\n" + text;
+  }
+
+  std::string header(int inputs) const {
+    const auto moving = std::count_if(network_.masses.begin(), network_.masses.end(),
+                                      [](const Mass& mass) { return ressort::moves(mass); });
+    std::string text = "// " + plain(options_.name) +
+                       ", a network of masses and springs: " + std::to_string(moving) +
+                       " that move, " + std::to_string(network_.links.size()) + " links.\n";
+    for (int n = 1; n <= inputs; ++n) {
+      text += "// input " + std::to_string(n) + ": " + meaning_of_input(n) + "\n";
+    }
+    std::vector<std::string> heard(static_cast<std::size_t>(output_count(network_)), "silent");
+    for (const Output& output : network_.outputs) {
+      heard[static_cast<std::size_t>(output.number - 1)] =
+          (output.is_force ? "force on " : "position of ") + mass_[output.mass];
+    }
+    for (std::size_t n = 0; n < heard.size(); ++n) {
+      text += "// output " + std::to_string(n + 1) + ": " + heard[n] + "\n";
+    }
+    return text + "declare name \"" + plain(options_.name) + "\";\n\n";
+  }
+
+  std::string meaning_of_input(int number) const {
+    std::string text;
+    const auto add = [&](const std::string& what) { text += (text.empty() ? "" : ", ") + what; };
+    for (const Input& input : network_.inputs) {
+      if (input.number == number) {
+        add((input.is_force ? "force on " : "position of ") + mass_[input.mass]);
+      }
+    }
+    for (const Parameter& parameter : network_.parameters) {
+      if (parameter.audio_input == number) {
+        add("parameter " + plain(parameter.name));
+      }
+    }
+    return text.empty() ? "not used" : text;
+  }
+
+  const Network& written_;
+  const Network network_;  // without macros
+  const FaustOptions& options_;
+  Words parameter_;                      // [parameter] its name in FAUST
+  Words mass_;                           // [mass] the same, after x_, v_, F_, n_, to_
+  Words link_;                           // [link] the same, after f_
+  std::vector<std::uint32_t> macro_of_;  // [mass after the written ones]
+  std::vector<Words> pushes_;            // [mass] channels of the force inputs on it
+  std::vector<Words> outside_;           // [mass] terms that they give it, points spread out
+  std::vector<Words> forces_;            // [mass] terms of its links
+  std::set<std::string> used_;           // of faust_definitions()
+};
+
+}  // namespace
+
+Result<std::string> faust_text(const Network& network, const FaustOptions& options) {
+  if (network.outputs.empty()) {
+    return Error{"the model has no output; FAUST takes no program without one", 1, 1};
+  }
+  return Writer(network, options).text();
+}
+
+std::size_t faust_elements(const Network& network) {
+  const Network expanded = expand_macros(network);
+  return expanded.masses.size() + expanded.links.size();
+}
+
+}  // namespace ressort

@@ -1,0 +1,289 @@
+#include "core/model/faust/faust_words.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "core/model/language/expression.h"
+
+namespace ressort {
+namespace {
+
+constexpr std::size_t line_width = 100;
+
+bool is_word(char c) {
+  return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '_';
+}
+
+// The laws of core/kernels/laws.h, with how their arguments follow the sample rate. Comparisons
+// only choose: where FAUST has to compute with them, its types take ten times as long to find.
+constexpr FaustDefinition definitions[] = {
+    {"spring", "spring(k, z, d, v) = k*r*r*d + z*r*v;\n"},
+    {"quadratic_spring",
+     "quadratic_spring(k, q, z, d, v) = spring(k, z, d, v) + q*r*r*d*abs(d);\n"},
+    {"cubic_spring", "cubic_spring(k, q, z, d, v) = spring(k, z, d, v) + q*r*r*d*d*d;\n"},
+    {"clipped_spring",
+     "clipped_spring(s, c, k, z, d, v) =\n"
+     "  select2(c == 0.0, select2(s >= k, bent, spring(k, z, d, v)), spring(s, z, d, v))\n"
+     "with {\n"
+     "  bent = select2(c > 0.0, beyond, select2(c*d*d <= k - s, beyond, within));\n"
+     "  within = spring(s, z, d, v) + c*r*r*d*d*d;\n"
+     "  beyond = spring(k, z + 0.3*k*r, d, v);\n"
+     "};\n"},
+    {"pluck",
+     "pluck(k, s, z, d, v) =\n"
+     "  select2(abs(d) < s, 0.0, select2(abs(d) < s/10.0, outer, inner)*k*r*r + z*r*v)\n"
+     "with {\n"
+     "  inner = 0.0 - 0.9*d;\n"
+     "  outer = d/10.0 - s/10.0*select2(d < 0.0, 1.0, 0.0 - 1.0);\n"
+     "};\n"},
+    {"bow",
+     "bow(z, s, d, v) =\n"
+     "  select2(abs(v) < s*r, 0.0, select2(abs(v) < s*r/3.0, slip, stick)*z*r)\n"
+     "with {\n"
+     "  stick = 2.0*v/3.0;\n"
+     "  slip = (s*r*select2(v < 0.0, 1.0, 0.0 - 1.0) - v)/3.0;\n"
+     "};\n"},
+    {"smooth_bow",
+     "smooth_bow(z, s, d, v) = 0.63*z*r*v*exp(0.5 - 4.0*ratio*ratio) with { ratio = v/(s*r); "
+     "};\n"},
+    {"either_bow",
+     "either_bow(z, s, p, d, v) = select2(p > 0.0, bow(z, s, d, v), smooth_bow(z, s, d, v));\n"},
+    {"contact", "contact(k, z, t, d, v) = select2(d > 0.0 - t, 0.0, spring(k, z, d + t, v));\n"},
+    {"clipped_contact",
+     "clipped_contact(s, c, k, z, t, d, v) =\n"
+     "  select2(d > 0.0 - t, 0.0, elastic*r*r + z*r*v)\n"
+     "with {\n"
+     "  depth = d + t;\n"
+     "  elastic = select2(k < s, select2(c == 0.0, bent, s*depth), s*depth);\n"
+     "  bent = select2(c > 0.0, k*depth, select2(c*depth*depth <= k - s, k*depth, cubic));\n"
+     "  cubic = s*depth + c*depth*depth*depth;\n"
+     "};\n"},
+    {"swing",
+     "swing(m, k, z, x0, v0, f) = step ~ (_, _)\n"
+     "with {\n"
+     "  step(x, v) = before + now, now with {\n"
+     "    before = x + first(x0);\n"
+     "    speed = v + first(v0);\n"
+     "    now = speed + (f - spring(k, z, before, speed))/m;\n"
+     "  };\n"
+     "};\n"},
+    {"hat", "hat(i, p) = max(0.0, 1.0 - abs(p - i));\n"},
+    {"along", "along(n, u) = (n - 1.0)*max(0.0, min(1.0, u));\n"},
+};
+
+// A formula on its way to text: what binds least in it.
+struct Term {
+  std::string text;
+  Tightness tightness = Tightness::atom;
+};
+
+std::string held(const Term& term, Tightness tightness) {
+  return term.tightness < tightness ? "(" + term.text + ")" : term.text;
+}
+
+Term called(const char* function, std::span<const Term> arguments) {
+  std::string text = function;
+  for (const Term& argument : arguments) {
+    text += (&argument == arguments.data() ? "(" : ", ") + argument.text;
+  }
+  return {text + ")"};
+}
+
+Term joined(Op op, const Term& a, const Term& b) {
+  using enum Tightness;
+  switch (op) {
+    case Op::add:
+      return {a.text + " + " + held(b, product), sum};
+    case Op::subtract:
+      return {a.text + " - " + held(b, product), sum};
+    case Op::multiply:
+      return {held(a, product) + "*" + held(b, atom), product};
+    case Op::divide:
+      return {held(a, product) + "/" + held(b, atom), product};
+    case Op::power:
+      return called("pow", std::array{a, b});
+    case Op::minimum:
+      return called("min", std::array{a, b});
+    default:
+      return called("max", std::array{a, b});
+  }
+}
+
+int operands(Op op) {
+  switch (op) {
+    case Op::number:
+    case Op::parameter:
+      return 0;
+    case Op::negate:
+    case Op::sqrt:
+    case Op::abs:
+    case Op::sin:
+    case Op::cos:
+    case Op::exp:
+      return 1;
+    case Op::clamp:
+      return 3;
+    default:
+      return 2;
+  }
+}
+
+Term applied(const Step& step, std::span<const Term> taken,
+             std::span<const std::string> parameters) {
+  switch (step.op) {
+    case Op::number:
+      return {faust_number(step.value)};
+    case Op::parameter:
+      return {parameters[step.index]};
+    case Op::negate:
+      return {"0.0 - " + held(taken[0], Tightness::product), Tightness::sum};
+    case Op::sqrt:
+      return called("sqrt", taken);
+    case Op::abs:
+      return called("abs", taken);
+    case Op::sin:
+      return called("sin", taken);
+    case Op::cos:
+      return called("cos", taken);
+    case Op::exp:
+      return called("exp", taken);
+    case Op::clamp:
+      return {"min(max(" + taken[0].text + ", " + taken[1].text + "), " + taken[2].text + ")"};
+    default:
+      return joined(step.op, taken[0], taken[1]);
+  }
+}
+
+}  // namespace
+
+std::string FaustNames::add(std::string_view label) {
+  std::string name(label);
+  std::replace_if(
+      name.begin(), name.end(), [](char c) { return !is_word(c); }, '_');
+  std::string free = name;
+  for (int i = 2; !taken_.insert(free).second; ++i) {
+    free = name + "_" + std::to_string(i);
+  }
+  return free;
+}
+
+std::string faust_number(double number) {
+  std::string text = print_number(number);
+  if (text.find('.') == std::string::npos) {
+    text.insert(std::min(text.find('e'), text.size()), ".0");  // an integer is another type
+  }
+  return text[0] == '-' ? "(" + text + ")" : text;
+}
+
+std::string faust_formula(std::span<const Step> formula, std::span<const std::string> parameters,
+                          Tightness tightness) {
+  std::vector<Term> stack;
+  for (const Step& step : formula) {
+    const auto first = stack.end() - operands(step.op);
+    Term term = applied(step, std::span<const Term>(first, stack.end()), parameters);
+    stack.erase(first, stack.end());
+    stack.push_back(std::move(term));
+  }
+  return held(stack.back(), tightness);
+}
+
+std::string faust_sum(std::vector<std::string> terms) {
+  if (terms.empty()) {
+    return "0.0";
+  }
+  std::stable_partition(terms.begin(), terms.end(),
+                        [](const std::string& term) { return term[0] == '+'; });
+  if (terms[0][0] == '+') {
+    terms[0].erase(0, 2);
+  } else {
+    terms.insert(terms.begin(), "0.0");
+  }
+  return flow(terms, " ", 6);
+}
+
+std::string flow(std::span<const std::string> words, std::string_view between, std::size_t indent) {
+  std::string text;
+  std::size_t column = indent;
+  for (const std::string& word : words) {
+    if (!text.empty()) {
+      text += between;
+      if (column + word.size() > line_width) {
+        text.erase(text.find_last_not_of(' ') + 1);
+        text += "\n" + std::string(indent, ' ');
+        column = indent;
+      }
+    }
+    text += word;
+    column += word.size() + between.size();
+  }
+  return text;
+}
+
+std::string plain(std::string_view text) {
+  std::string clean(text);
+  // Brackets, slashes and colons mean something in a slider's name.
+  std::replace_if(
+      clean.begin(), clean.end(),
+      [](char c) {
+        return !is_word(c) && std::string_view(" .,+-()").find(c) == std::string_view::npos;
+      },
+      '_');
+  return clean;
+}
+
+std::string faust_slider(const ParameterSetting& setting) {
+  const double span = setting.maximum - setting.minimum;
+  if (!(span > 0.0)) {
+    return faust_number(setting.value);
+  }
+  const double step = std::pow(10.0, std::floor(std::log10(span / 1000.0)));
+  std::string text = "hslider(\"" + plain(setting.name) + "\"";
+  for (const double number : {setting.value, setting.minimum, setting.maximum, step}) {
+    text += ", " + faust_number(number);
+  }
+  return text + ")";
+}
+
+FaustLaw faust_law(LinkKind kind) {
+  switch (kind) {
+    case LinkKind::spring:
+      return {"spring", 2};
+    case LinkKind::quadratic_spring:
+      return {"quadratic_spring", 3};
+    case LinkKind::cubic_spring:
+      return {"cubic_spring", 3};
+    case LinkKind::clipped_spring:
+      return {"clipped_spring", 4};
+    case LinkKind::pluck:
+      return {"pluck", 3};
+    case LinkKind::bow:
+      return {"bow", 2};
+    case LinkKind::smooth_bow:
+      return {"smooth_bow", 2};
+    case LinkKind::either_bow:
+      return {"either_bow", 3};
+    case LinkKind::contact:
+      return {"contact", 3};
+    case LinkKind::clipped_contact:
+      return {"clipped_contact", 5};
+  }
+  return {"spring", 2};
+}
+
+std::span<const FaustDefinition> faust_definitions() {
+  return definitions;
+}
+
+std::string faust_prelude(bool rescale) {
+  const std::string rate = rescale ? "44100.0/fconstant(int fSamplingFreq, <math.h>);  // numbers "
+                                     "are per sample at 44100 Hz\n"
+                                   : "1.0;  // numbers are per sample, at whatever rate\n";
+  return "r = " + rate +
+         "first(a) = a*(1 - 1');  // at the first tick only\n"
+         "was(start, x) = x' + first(start);\n"
+         "travel(start, v) = v + first(start) : + ~ _;\n"
+         "push(f) = f*r*r;\n";
+}
+
+}  // namespace ressort

@@ -1,0 +1,452 @@
+#include "core/model/language/mdl.h"
+
+#include <algorithm>
+#include <cctype>
+
+#include "core/model/language/expression.h"
+#include "core/model/language/reader.h"
+
+namespace ressort {
+
+ParsedNetwork Reader::read(std::string_view text, const ReadOptions& options) {
+  if (text.size() > max_model_bytes) {
+    say(Severity::error, 1, {"", 1},
+        "the model is " + std::to_string(text.size() >> 20) + " MiB long; at most " +
+            std::to_string(max_model_bytes >> 20) + " MiB are read");
+    return std::move(out_);
+  }
+  if (text.starts_with("\xef\xbb\xbf")) {
+    text.remove_prefix(3);  // the mark that some editors put before UTF-8
+  }
+  const std::size_t zero = text.find('\0');
+  if (zero != std::string_view::npos) {
+    int line = 1;
+    std::size_t start = 0;
+    for (std::size_t i = 0; i < zero; ++i) {
+      if (text[i] == '\n' || (text[i] == '\r' && text[i + 1] != '\n')) {
+        ++line;
+        start = i + 1;
+      }
+    }
+    say(Severity::error, line, {"", static_cast<int>(zero - start) + 1},
+        "found a zero byte: this is no text, so it is no model");
+    return std::move(out_);
+  }
+  const Progress& progress = options.progress;
+  progress.stage("reading it");
+  text_ = text;
+  int number = 0;
+  while (!text.empty() && errors_ <= most_diagnostics) {
+    const auto* const last =
+        std::find_if(text.begin(), text.end(), [](char c) { return c == '\n' || c == '\r'; });
+    const auto end = static_cast<std::size_t>(last - text.begin());
+    read_line(text.substr(0, end), ++number);
+    progress.spend(end / 8 + 1);
+    const bool pair = end + 1 < text.size() && text[end] == '\r' && text[end + 1] == '\n';
+    text.remove_prefix(std::min(text.size(), end + (pair ? 2 : 1)));
+  }
+  // Declarations first: a line may refer to one that comes after it.
+  declare_all();
+  progress.spend(entries_.size());
+  for (const Entry& entry : entries_) {
+    if (errors_ > most_diagnostics) {
+      break;
+    }
+    Line line = open(entry);
+    build(line);
+    progress.spend(20);
+  }
+  if (entries_.empty() && out_.ok()) {
+    say(Severity::error, 1, {"", 1},
+        "the model is empty: expected elements such as '@m mass 1. 0. 0.'");
+  }
+  progress.spend(8 * entries_.size());
+  decide_motion(options);
+  progress.spend(8 * entries_.size());
+  look_over();
+  progress.spend(8 * entries_.size());
+  std::stable_sort(out_.diagnostics.begin(), out_.diagnostics.end(),
+                   [](const Diagnostic& a, const Diagnostic& b) { return a.line < b.line; });
+  entries_ = {};
+  labels_ = IndexTable();
+  if (out_.ok()) {
+    out_.network = canonical(std::move(out_.network));
+  }
+  return std::move(out_);
+}
+
+void Reader::read_line(std::string_view text, int number) {
+  split(text, tokens_);
+  if (tokens_.empty()) {
+    return;
+  }
+  if (tokens_[0].text[0] == '~') {
+    return read_block(tokens_, number);
+  }
+  Line line{.number = number, .label = tokens_[0]};
+  if (line.label.text[0] != '@') {
+    return warning(line, line.label,
+                   "ignored: an element starts with '@', a comment with '#', found " +
+                       quoted(line.label.text));
+  }
+  line.label.text.remove_prefix(1);
+  if (line.label.text.empty()) {
+    return error(line, line.label, "expected a label right after '@'");
+  }
+  if (line.label.text.size() > longest_label ||
+      std::any_of(line.label.text.begin(), line.label.text.end(),
+                  [](char c) { return std::iscntrl(static_cast<unsigned char>(c)) != 0; })) {
+    return error(line, line.label,
+                 quoted(line.label.text) + " is no label: it is longer than " +
+                     std::to_string(longest_label) + " bytes, or has what cannot be printed");
+  }
+  if (tokens_.size() < 2) {
+    return error(line, {"", line.label.column + static_cast<int>(line.label.text.size()) + 1},
+                 "the line ends where a keyword was expected, such as 'mass' or 'springDamper'");
+  }
+  const Token& word = tokens_[1];
+  const auto* found = std::find_if(std::begin(keywords), std::end(keywords),
+                                   [&](const Keyword& k) { return k.word == word.text; });
+  if (found == std::end(keywords)) {
+    std::vector<std::string_view> words;
+    for (const Keyword& keyword : keywords) {
+      words.push_back(keyword.word);
+    }
+    return error(line, word, "unknown keyword " + quoted(word.text) + suggestion(word.text, words));
+  }
+  entries_.push_back({.at = static_cast<std::uint32_t>(text.data() - text_.data()),
+                      .length = static_cast<std::uint32_t>(text.size()),
+                      .number = number,
+                      .group = groups_.empty() ? 0 : groups_.back(),
+                      .keyword = static_cast<std::uint8_t>(found - std::begin(keywords))});
+}
+
+// The line, until the next one is opened.
+Line Reader::open(const Entry& entry) {
+  split(text_.substr(entry.at, entry.length), tokens_);
+  Line line{.number = entry.number,
+            .keyword = &keywords[entry.keyword],
+            .label = tokens_[0],
+            .word = tokens_[1],
+            .group = group_names_[entry.group],
+            .rest = std::span(tokens_).subspan(2),
+            .element = entry.element};
+  line.label.text.remove_prefix(1);
+  return line;
+}
+
+std::string_view Reader::label_of(const Entry& entry) const {
+  const std::string_view text = text_.substr(entry.at, entry.length);
+  return first_word(text.substr(text.find('@') + 1));
+}
+
+// The entry of the label, or where it is to be entered.
+std::uint32_t& Reader::entry_of(std::string_view label) {
+  return labels_.find(std::hash<std::string_view>()(label),
+                      [&](std::uint32_t entry) { return label_of(entries_[entry]) == label; });
+}
+
+std::optional<std::uint32_t> Reader::mass_of(std::string_view label) {
+  const std::uint32_t entry = entry_of(label);
+  return entry != IndexTable::none && is_mass(keywords[entries_[entry].keyword].element)
+             ? std::optional(entries_[entry].element)
+             : std::nullopt;
+}
+
+std::optional<std::uint32_t> Reader::macro_of(std::string_view label) {
+  const std::uint32_t entry = entry_of(label);
+  return entry != IndexTable::none && keywords[entries_[entry].keyword].element == Element::macro
+             ? std::optional(entries_[entry].element)
+             : std::nullopt;
+}
+
+// ~motion MEANING, or ~begin NAME and ~end NAME: what is declared between them is drawn in the
+// group NAME.
+void Reader::read_block(const std::vector<Token>& tokens, int number) {
+  const Line line{.number = number, .label = tokens[0]};
+  if (tokens[0].text == "~motion") {
+    return read_motion(line, tokens);
+  }
+  const bool begins = tokens[0].text == "~begin";
+  if ((!begins && tokens[0].text != "~end") || tokens.size() != 2) {
+    return error(line, tokens[0], "expected '~begin NAME' or '~end NAME'");
+  }
+  if (begins) {
+    show(velocity_, line, "opens a block");
+    if (groups_.size() == most_open_blocks) {
+      return error(line, tokens[0],
+                   "more than " + std::to_string(most_open_blocks) + " blocks are open here");
+    }
+    groups_.push_back(static_cast<std::uint32_t>(group_names_.size()));
+    return group_names_.push_back(tokens[1].text);
+  }
+  const auto found = std::find_if(groups_.rbegin(), groups_.rend(), [&](std::uint32_t group) {
+    return group_names_[group] == tokens[1].text;
+  });
+  if (found == groups_.rend()) {
+    return error(line, tokens[1], "no block " + quoted(tokens[1].text) + " is open here");
+  }
+  groups_.erase(std::next(found).base());
+}
+
+void Reader::declare_all() {
+  entries_.shrink_to_fit();
+  labels_ = IndexTable(entries_.size());
+  const auto count_of = [&](auto is_wanted) {
+    return static_cast<std::size_t>(std::count_if(
+        entries_.begin(), entries_.end(),
+        [&](const Entry& entry) { return is_wanted(keywords[entry.keyword].element); }));
+  };
+  out_.network.masses.reserve(count_of(is_mass));
+  out_.network.drawings.reserve(out_.network.masses.capacity());
+  out_.network.links.reserve(count_of([](Element element) { return element == Element::link; }));
+  for (std::uint32_t i = 0; i < entries_.size(); ++i) {
+    if (enter_label(i)) {
+      declare(entries_[i]);
+    }
+  }
+}
+
+// False if the label is another's, which is an error unless both are links.
+bool Reader::enter_label(std::uint32_t index) {
+  const Entry& entry = entries_[index];
+  std::uint32_t& place = entry_of(label_of(entry));
+  if (place == IndexTable::none) {
+    place = index;
+    return true;
+  }
+  const Line line = open(entry);
+  const Entry& first = entries_[place];
+  const std::string where = quoted("@" + std::string(line.label.text)) +
+                            " is already declared in line " + std::to_string(first.number);
+  if (line.keyword->element != Element::link || keywords[first.keyword].element != Element::link) {
+    error(line, line.label, where);
+    return false;
+  }
+  warning(line, line.label, where + "; both links are kept");
+  return true;
+}
+
+void Reader::declare(Entry& entry) {
+  Network& network = out_.network;
+  const Keyword& keyword = keywords[entry.keyword];
+  if (is_mass(keyword.element)) {
+    entry.element = static_cast<std::uint32_t>(network.masses.size());
+    network.masses.emplace_back();
+  } else if (keyword.element == Element::macro) {
+    const Line line = open(entry);
+    if (line.label.text.find(']') != std::string_view::npos) {
+      error(line, line.label, "a macro's label must not have a ']', which ends a place on it");
+    }
+    entry.element = static_cast<std::uint32_t>(network.macros.size());
+    macro_keywords_.push_back(&keyword);
+    network.macros.emplace_back();
+  } else if (is_parameter(keyword.element)) {
+    declare_parameter(open(entry));
+  }
+}
+
+void Reader::declare_parameter(const Line& line) {
+  if (parameter_names_.size() == most_parameters) {
+    return error(line, line.label,
+                 "a model has at most " + std::to_string(most_parameters) + " parameters");
+  }
+  if (!is_identifier(line.label.text)) {
+    error(line, line.label, "a parameter's name has letters, digits and '_' only");
+  }
+  Parameter parameter{.name = std::string(line.label.text),
+                      .value = 0.0,
+                      .place = {line.number, line.label.column}};
+  if (!check_count(line)) {
+    // It has been told.
+  } else if (line.keyword->element == Element::audio_parameter) {
+    parameter.audio_input = audio_input(line);
+  } else if (!parse_number(line.rest[0].text, parameter.value)) {
+    error(line, line.rest[0],
+          "found " + quoted(line.rest[0].text) +
+              " where the parameter's value, a number, was expected");
+  }
+  parameter_names_.push_back(parameter.name);
+  out_.network.parameters.push_back(std::move(parameter));
+}
+
+// MIMS writes the place on a macro behind all other arguments: u, or u:v for a mesh.
+void Reader::take_coordinates(Line& line) {
+  std::size_t count = 0;
+  for (std::size_t i = 0;
+       i < line.rest.size() && i < static_cast<std::size_t>(line.keyword->references); ++i) {
+    const std::string_view text = line.rest[i].text;
+    count += text[0] == '@' && macro_of(text.substr(1)) ? 1 : 0;
+  }
+  count = std::min(
+      count, line.rest.size() -
+                 std::min(line.rest.size(), static_cast<std::size_t>(line.keyword->references)));
+  line.coordinates = line.rest.last(count);
+  line.rest = line.rest.first(line.rest.size() - count);
+  if (count > 0) {
+    show(delayed_, line, "writes a place on a macro without brackets");
+  }
+}
+
+void Reader::build(Line& line) {
+  take_coordinates(line);
+  if (is_parameter(line.keyword->element) || !check_count(line)) {
+    return;
+  }
+  switch (line.keyword->element) {
+    case Element::link:
+      return add_link(line);
+    case Element::macro:
+      return add_macro(line);
+    case Element::position_output:
+    case Element::force_output:
+      return add_output(line);
+    case Element::force_input:
+      return add_input(line);
+    case Element::position_input:
+      add_input(line);
+      return add_mass(line);
+    default:
+      return add_mass(line);
+  }
+}
+
+bool Reader::check_count(const Line& line) {
+  for (const Token& token : line.rest) {
+    const char opened = token.text[0];
+    if ((opened == '[' && token.text.back() != ']') ||
+        (opened == '\'' && (token.text.size() == 1 || token.text.back() != '\''))) {
+      error(line, token, "this " + std::string(1, opened) + " is never closed");
+      return false;
+    }
+  }
+  const Keyword& keyword = *line.keyword;
+  const int found = static_cast<int>(line.rest.size());
+  const int least = keyword.references + keyword.least;
+  const int most = keyword.references + keyword.most;
+  // GROUP X Y: what is a number, or a place, is no group's name.
+  double number = 0.0;
+  const bool is_like_drawing = keyword.drawable && found == least + 3;
+  const std::string_view group =
+      is_like_drawing ? line.rest[static_cast<std::size_t>(least)].text : "";
+  const bool is_drawn = is_like_drawing && group[0] != '[' && !parse_number(group, number);
+  if ((found >= least && found <= most) || is_drawn) {
+    return true;
+  }
+  Token place;
+  if (found > most) {
+    place = line.rest[static_cast<std::size_t>(most)];
+  } else {
+    const Token& last = found == 0 ? line.word : line.rest.back();
+    place = {"", last.column + static_cast<int>(last.text.size())};
+  }
+  const bool has_blanks =
+      found > most && std::any_of(line.rest.begin(), line.rest.end(), [](const Token& token) {
+        return token.text.size() == 1 &&
+               std::string_view("+-*/").find(token.text[0]) != std::string_view::npos;
+      });
+  error(line, place,
+        "'" + std::string(keyword.word) + "' takes " + std::to_string(least) +
+            (most > least ? " to " + std::to_string(most) : "") +
+            (most == 1 ? " argument (" : " arguments (") + std::string(keyword.arguments) +
+            "), found " + std::to_string(found) +
+            (line.coordinates.empty() ? "" : " before the place on a macro") +
+            (is_like_drawing ? "; a drawing is GROUP X Y, and " + quoted(group) + " is no group"
+                             : "") +
+            (has_blanks ? "; an expression with blanks needs brackets, [K * 2]" : ""));
+  return false;
+}
+
+// What is legal and yet hardly meant.
+void Reader::look_over() {
+  const Network& network = out_.network;
+  if (!out_.ok()) {
+    return;
+  }
+  if (network.masses.empty() && network.macros.empty()) {
+    return say(Severity::error, 1, {"", 1}, "the model has no masses: nothing can sound");
+  }
+  std::vector<bool> attached(network.masses.size(), false);
+  for (const Link& link : network.links) {
+    attached[link.a] = attached[link.b] = true;
+  }
+  for (const Input& input : network.inputs) {
+    attached[input.mass] = attached[input.mass] || input.is_force;
+  }
+  for (std::size_t i = 0; i < network.masses.size(); ++i) {
+    const Mass& mass = network.masses[i];
+    if (!attached[i] && mass.kind != MassKind::oscillator && mass.kind != MassKind::point) {
+      say(Severity::warning, mass.place.line, {mass.name, mass.place.column},
+          "nothing is attached to " + quoted("@" + mass.name.text()));
+    }
+  }
+  for (const Link& link : network.links) {
+    const bool is_contact =
+        link.kind == LinkKind::contact || link.kind == LinkKind::clipped_contact;
+    if (is_contact && network.masses[link.a].kind == MassKind::position &&
+        network.masses[link.b].kind != MassKind::position) {
+      say(Severity::warning, link.place.line, {link.name, link.place.column},
+          "the contact's ends look swapped: it acts while the second is below the first, here " +
+              quoted("@" + network.masses[link.b].name.text()) + " below " +
+              quoted("@" + network.masses[link.a].name.text()));
+    }
+  }
+  for (const Input& input : network.inputs) {
+    const Mass& pushed = network.masses[input.mass];
+    if (input.is_force && (pushed.kind == MassKind::ground || pushed.kind == MassKind::position)) {
+      const std::string label = "in" + std::to_string(input.number);
+      say(Severity::warning, input.place.line, {label, input.place.column},
+          "'@" + label + "' pushes " + quoted("@" + pushed.name.text()) + ", which " +
+              (pushed.kind == MassKind::ground ? "never moves" : "moves only as its input says") +
+              ": it does nothing");
+    }
+  }
+  std::vector<Input> heard = network.inputs;
+  for (const Parameter& parameter : network.parameters) {
+    if (parameter.audio_input > 0) {
+      heard.push_back({.number = parameter.audio_input, .place = parameter.place});
+    }
+  }
+  tell_gaps(heard, "in");
+  tell_gaps(network.outputs, "out");
+  std::vector<bool> used(network.parameters.size(), false);
+  for (const Formula& formula : network.arguments) {
+    for (const Step& step : formula) {
+      if (step.op == Op::parameter) {
+        used[step.index] = true;
+      }
+    }
+  }
+  for (std::size_t i = 0; i < used.size(); ++i) {
+    if (!used[i]) {
+      const Parameter& parameter = network.parameters[i];
+      say(Severity::warning, parameter.place.line, {parameter.name, parameter.place.column},
+          "the parameter " + quoted(parameter.name) + " is used nowhere");
+    }
+  }
+  if (network.outputs.empty()) {
+    say(Severity::warning, 1, {"", 1}, "the model has no output, so it will be silent");
+  }
+}
+
+bool ParsedNetwork::ok() const {
+  return std::none_of(diagnostics.begin(), diagnostics.end(),
+                      [](const Diagnostic& d) { return d.severity == Severity::error; });
+}
+
+ParsedNetwork parse_network(std::string_view text, const ReadOptions& options) {
+  try {
+    return Reader().read(text, options);
+  } catch (const Stopped&) {
+    return {.network = {}, .diagnostics = {{.message = stopped}}, .motion = {}};
+  }
+}
+
+std::string to_string(const Diagnostic& diagnostic, std::string_view file) {
+  return std::string(file) + ":" + std::to_string(diagnostic.line) + ":" +
+         std::to_string(diagnostic.column) +
+         (diagnostic.severity == Severity::error ? ": error: " : ": warning: ") +
+         diagnostic.message;
+}
+
+}  // namespace ressort

@@ -1,0 +1,174 @@
+// core/model: the reader behind parse_network, for mdl.cpp, elements.cpp and motion.cpp only.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+#include <unordered_map>
+#include <vector>
+
+#include "core/model/index_table.h"
+#include "core/model/language/keywords.h"
+#include "core/model/language/mdl.h"
+#include "core/model/language/tokens.h"
+
+namespace ressort {
+
+inline constexpr int most_diagnostics = 100;  // errors, and as many warnings
+inline constexpr std::size_t longest_label = 1000;
+inline constexpr std::size_t most_parameters = 1024;   // each is looked for in every expression
+inline constexpr std::size_t most_open_blocks = 1024;  // ~begin without its ~end
+
+// What stands for the mass or macro that a line declares where it declares none, or not as the
+// first to do so.
+inline constexpr std::uint32_t undeclared = 0xffffffffu;
+
+// What is kept of a line, a few bytes each; it is split anew for every reading.
+struct Entry {
+  std::uint32_t at = 0;  // where it starts in the text, and how long it is
+  std::uint32_t length = 0;
+  int number = 0;
+  std::uint32_t group = 0;  // index into Reader::group_names_
+  std::uint32_t element = undeclared;
+  std::uint8_t keyword = 0;  // index into keywords
+};
+
+// A line that is being read.
+struct Line {
+  int number = 0;
+  const Keyword* keyword = nullptr;
+  Token label;             // without its '@'
+  Token word;              // the keyword as written
+  std::string_view group;  // of the display block around it; empty if there is none
+  std::span<const Token> rest;
+  std::span<const Token> coordinates;  // of macros referred to without brackets, in MIMS
+  std::uint32_t element = undeclared;  // the mass or macro
+};
+
+// The first line that shows something, and by what: "opens a block".
+struct Evidence {
+  int line = 0;  // 0: none does
+  std::string_view what;
+};
+
+class Reader {
+ public:
+  ParsedNetwork read(std::string_view text, const ReadOptions& options);
+
+ private:
+  void read_line(std::string_view line, int number);
+  Line open(const Entry& entry);
+  std::string_view label_of(const Entry& entry) const;
+  std::uint32_t& entry_of(std::string_view label);
+  std::optional<std::uint32_t> mass_of(std::string_view label);
+  std::optional<std::uint32_t> macro_of(std::string_view label);
+  void declare_all();
+  bool enter_label(std::uint32_t index);
+  void declare(Entry& entry);
+  void declare_parameter(const Line& line);
+  void build(Line& line);
+  void take_coordinates(Line& line);
+
+  void add_mass(const Line& line);
+  void add_macro(const Line& line);
+  std::uint32_t size(const Line& line, std::size_t at, std::uint32_t least);
+  void add_link(Line& line);
+  void choose_profile(Link& link) const;
+  void show_dialect(const Line& line, LinkKind kind);
+  void add_input(Line& line);
+  void add_output(Line& line);
+
+  bool check_count(const Line& line);
+  std::uint32_t drawing(const Line& line, std::size_t at);
+  ArgumentId argument(const Line& line, std::size_t at);
+  void check_mass(const Line& line, std::size_t at, ArgumentId mass);
+  void read_gravity(const Line& line, Mass& mass, std::size_t& at);
+  bool position(const Line& line, std::size_t at, double& z, double& x, double& y);
+  double state(const Line& line, std::size_t at);
+  int audio_input(const Line& line);
+  void read_block(const std::vector<Token>& tokens, int number);
+  std::string with_slash(std::string_view text) const;
+  std::optional<std::uint32_t> reference(Line& line, std::size_t at);
+  std::optional<std::uint32_t> tap(const Line& line, const Token& token, const Token& label,
+                                   std::vector<Token> coordinates);
+  ArgumentId expression(const Line& line, const Token& token);
+  std::optional<int> channel(const Line& line, std::string_view prefix);
+  void read_motion(const Line& line, const std::vector<Token>& tokens);
+  void decide_motion(const ReadOptions& options);
+  void decide_by_dialect();
+  void decide_by_states();
+  void choose_motion(ThirdArgument third, const std::string& why);
+  void look_over();
+
+  void say(Severity severity, int line, const Token& token, std::string message) {
+    int& told = severity == Severity::error ? errors_ : warnings_;
+    if (++told > most_diagnostics) {
+      if (told == most_diagnostics + 1) {
+        out_.diagnostics.push_back(
+            {severity, line, token.column, 1, "too many problems; those after this are not told"});
+      }
+      return;
+    }
+    out_.diagnostics.push_back({severity, line, token.column,
+                                std::max(1, static_cast<int>(token.text.size())),
+                                std::move(message)});
+  }
+  void error(const Line& line, const Token& token, std::string message) {
+    say(Severity::error, line.number, token, std::move(message));
+  }
+  void warning(const Line& line, const Token& token, std::string message) {
+    say(Severity::warning, line.number, token, std::move(message));
+  }
+
+  static void show(Evidence& evidence, const Line& line, std::string_view what) {
+    if (evidence.line == 0) {
+      evidence = {line.number, what};
+    }
+  }
+
+  // Channels are numbered by hand; one that is left out is silent.
+  template <class Channels>
+  void tell_gaps(const Channels& channels, std::string_view name) {
+    int last = 0;
+    Place place;
+    std::vector<int> numbers;
+    for (const auto& channel : channels) {
+      numbers.push_back(channel.number);
+      if (channel.number > last) {
+        last = channel.number;
+        place = channel.place;
+      }
+    }
+    for (int number = 1; number < last; ++number) {
+      if (std::find(numbers.begin(), numbers.end(), number) == numbers.end()) {
+        say(Severity::warning, place.line, {name, place.column},
+            "there is @" + std::string(name) + std::to_string(last) + ", but no @" +
+                std::string(name) + std::to_string(number));
+      }
+    }
+  }
+
+  ParsedNetwork out_;
+  int errors_ = 0;
+  int warnings_ = 0;
+  std::string_view text_;
+  std::vector<Entry> entries_;
+  IndexTable labels_;          // of entries
+  std::vector<Token> tokens_;  // of the line that is being read
+  std::vector<Token> parts_;   // of a place in it
+  std::vector<std::string> parameter_names_;
+  std::vector<const Keyword*> macro_keywords_;                  // [macro]
+  std::vector<std::uint32_t> resting_;                          // macros without a velocity
+  std::uint64_t nodes_ = 0;                                     // of all macros
+  std::unordered_map<std::string_view, ArgumentId> arguments_;  // text -> index
+  std::vector<std::string_view> group_names_ = {""};            // of all display blocks
+  std::vector<std::uint32_t> groups_;                           // those that are open
+  Evidence velocity_;                                           // of a form that only MIMS4Max has
+  Evidence delayed_;                                            // of a form that only MIMS has
+  std::optional<ThirdArgument> said_;                           // by ~motion
+  int said_line_ = 0;
+};
+
+}  // namespace ressort

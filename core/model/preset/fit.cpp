@@ -1,0 +1,89 @@
+#include "core/model/preset/fit.h"
+
+#include <algorithm>
+#include <charconv>
+#include <string>
+
+#include "core/model/language/tokens.h"
+
+namespace ressort {
+namespace {
+
+std::string names(const Network& network) {
+  std::string text;
+  for (const Parameter& parameter : network.parameters) {
+    text += (text.empty() ? "" : ", ") + parameter.name;
+  }
+  return text.empty() ? "none" : text;
+}
+
+std::string no_parameter(const Network& network, const std::string& name) {
+  return "the model has no parameter " + quoted(name) + "; it has " + names(network);
+}
+
+// What is wrong with the control; empty if nothing is.
+std::string misfit(const Network& network, const ControlSetting& control) {
+  if (control.gesture == ControlGesture::parameter) {
+    return find_parameter(network, control.target) < 0 ? no_parameter(network, control.target)
+           : control.source == ControlSource::audio
+               ? "an audio channel drives an input, not a parameter"
+               : "";
+  }
+  const int input = find_input(network, control.target);
+  if (input < 0) {
+    return "the model has no input " + quoted(control.target) + "; it has " +
+           std::to_string(network.inputs.size());
+  }
+  const bool wants_position =
+      control.gesture == ControlGesture::pluck || control.gesture == ControlGesture::bow;
+  return network.inputs[static_cast<std::size_t>(input)].is_force && wants_position
+             ? "'" + control.target + "' is a force input, which this gesture cannot play"
+             : "";
+}
+
+}  // namespace
+
+int find_input(const Network& network, std::string_view target) {
+  int number = 0;
+  if (target.starts_with("in")) {
+    const char* const end = target.data() + target.size();
+    const auto [last, failure] = std::from_chars(target.data() + 2, end, number);
+    if (failure == std::errc{} && last == end) {
+      for (std::size_t i = 0; i < network.inputs.size(); ++i) {
+        if (network.inputs[i].number == number) {
+          return static_cast<int>(i);
+        }
+      }
+    }
+  }
+  return -1;
+}
+
+int find_parameter(const Network& network, std::string_view name) {
+  for (std::size_t i = 0; i < network.parameters.size(); ++i) {
+    if (network.parameters[i].name == name) {
+      return static_cast<int>(i);
+    }
+  }
+  return -1;
+}
+
+std::vector<Error> misfits(const Network& network, const Preset& preset) {
+  std::vector<Error> found;
+  for (const ParameterSetting& setting : preset.parameters) {
+    if (find_parameter(network, setting.name) < 0) {
+      found.push_back(
+          {no_parameter(network, setting.name), setting.place.line, setting.place.column});
+    }
+  }
+  for (const ControlSetting& control : preset.controls) {
+    if (std::string message = misfit(network, control); !message.empty()) {
+      found.push_back({std::move(message), control.place.line, control.place.column});
+    }
+  }
+  std::stable_sort(found.begin(), found.end(),
+                   [](const Error& a, const Error& b) { return a.line < b.line; });
+  return found;
+}
+
+}  // namespace ressort

@@ -1,0 +1,84 @@
+// core/model: how a model is played. Parameter values and ranges, gain, voices, and the control
+// map: which notes, controllers and OSC names drive which input, and how. Names, not indices.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "core/model/network.h"
+#include "core/model/preset/budget.h"
+#include "core/result.h"
+
+namespace ressort {
+
+struct ParameterSetting {
+  std::string name;
+  double value = 0.0;
+  double minimum = 0.0;  // the range that controllers, OSC and the console keep to
+  double maximum = 0.0;
+  Place place;
+  bool operator==(const ParameterSetting&) const = default;
+};
+
+enum class ControlSource { note, controller, pressure, osc, audio };
+enum class ControlGesture { position, pluck, bow, impulse, hold, parameter };
+
+struct ControlSetting {
+  ControlSource source = ControlSource::note;
+  int number = 0;       // of the controller (0..127) or the audio channel (from 1)
+  std::string address;  // of an OSC name, such as "/finger"
+  std::string target;   // "in1", or a parameter's name
+  ControlGesture gesture = ControlGesture::position;
+  double low = 0.0;   // what 0 and 1 of the source become: a position, a force, a speed in
+  double high = 1.0;  //   units per sample at 44 100 Hz, a parameter's value
+  bool exponential = false;
+  double travel = 0.0;  // pluck: how far on either side of the string the finger rests
+  int lowest_key = 0;
+  int highest_key = 127;
+  Place place;
+  bool operator==(const ControlSetting&) const = default;
+};
+
+struct Preset {
+  std::string model;        // a file's name, beside the preset or in the models' folder
+  Place model_place{1, 1};  // of that name
+  std::string description;  // one line for a person
+  int voices = 1;
+  double gain = 1.0;                   // output per unit of position
+  double release_s = 0.0;              // 0: a voice rings out
+  bool noise = false;                  // the outputs shape white noise
+  bool keyboard = true;                // a key sets the pitch
+  int transpose = 0;                   // semitones between a key and the pitch that it sets
+  std::optional<ThirdArgument> third;  // of the model's masses, whatever the model shows
+  Budget budget;                       // of errors, for who computes it
+  std::vector<ParameterSetting> parameters;
+  std::vector<ControlSetting> controls;
+  bool operator==(const Preset&) const = default;
+};
+
+inline constexpr int max_voices = 256;
+inline constexpr std::size_t max_preset_bytes = std::size_t{64} << 10;
+inline constexpr std::size_t most_preset_errors = 100;
+
+struct ParsedPreset {
+  Preset preset;              // whole only if ok()
+  std::vector<Error> errors;  // in the order of the lines, each with its line and column
+  bool ok() const { return errors.empty(); }
+};
+
+// Reads a preset; goes on after an error, so that every problem is told at once. An unknown key, a
+// wrong type or a value out of range is an error; never a silent drop. [any thread but audio]
+ParsedPreset parse_preset(std::string_view toml);
+
+// What a model without a preset is played with: notes and the modulation wheel drive its first
+// input by the gesture that its links ask for, audio channels drive the inputs that no hand does.
+// `bare`: gain 1, audio channel n on input n, for rendering the network alone.
+Preset default_preset(const Network& network, bool bare);
+
+// Why no key plays a network with its default preset, and the line that would let one, at the place
+// of the first input; nothing where keys do play, or nothing moves.
+std::optional<Error> idle_keys(const Network& network, const Preset& preset);
+
+}  // namespace ressort

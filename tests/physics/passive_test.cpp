@@ -1,0 +1,478 @@
+// Links that cannot gain energy, one mass at a time: against closed forms, and against what the
+// published scheme makes of the same.
+#include "tests/support/passive.h"
+#include "core/kernels/centred.h"
+
+namespace ressort {
+namespace {
+
+using namespace rig;
+
+// How much of its speed a ball keeps that comes down on a wall from anywhere between two samples.
+Spread bounces(double k, double z, Passivity passive, int phases = 1000) {
+  Stepper<double> ball(
+      "@w ground 0.\n@b mass 1. 0. 0.\n@c contact @w @b " + show(k) + " " + show(z) + "\n",
+      passive);
+  Spread e;
+  for (int i = 0; i < phases; ++i) {
+    ball.place(3.0 + (i + 0.5) / phases, -1.0);
+    do {
+      ball.go();
+    } while (ball.v[0] <= 0.0 || ball.x[0] - ball.v[0] <= 0.0);
+    ball.go();
+    e.add(ball.v[0]);
+  }
+  return e;
+}
+
+// A mass on a spring to a ground, by any law; and an amplitude it starts from, at rest at sample 1.
+Stepper<double> sprung(const std::string& law, const std::string& arguments, double amplitude,
+                       double pull, Passivity passive) {
+  Stepper<double> mass("@g ground 0.\n@b mass 1. 0. 0.\n@s " + law + " @g @b " + arguments + "\n",
+                       passive);
+  mass.place(amplitude - pull / 2.0, pull / 2.0);
+  mass.go();
+  return mass;
+}
+
+// In samples, over so many of them.
+double period(Stepper<double>& mass, int periods) {
+  double first = 0.0;
+  double last = 0.0;
+  for (int n = 0, crossings = 0; crossings <= periods; ++n) {
+    const double before = mass.x[0];
+    mass.go();
+    if (before < 0.0 && mass.x[0] >= 0.0) {
+      last = n + before / (before - mass.x[0]);
+      first = crossings++ == 0 ? last : first;
+    }
+  }
+  return (last - first) / periods;
+}
+
+double cents(double ratio) {
+  return 1200.0 * std::log2(ratio);
+}
+
+// Of x'' = -k x - q x^3 from an amplitude: T = 4 K(m)/w with w^2 = k + q a^2, m = q a^2/(2 w^2),
+// and K by the arithmetic-geometric mean.
+double duffing_period(double k, double q, double a) {
+  const double w = std::sqrt(k + q * a * a);
+  double one = 1.0;
+  double other = std::sqrt(1.0 - q * a * a / (2.0 * w * w));
+  for (int i = 0; i < 8; ++i) {
+    const double mean = (one + other) / 2.0;
+    other = std::sqrt(one * other);
+    one = mean;
+  }
+  return 2.0 * std::numbers::pi / (one * w);
+}
+
+// The smallest amplitude, in thousandths, from which a spring blows up as published.
+double blows_up_at(const std::string& law, const std::string& arguments) {
+  Stepper<double> mass = sprung(law, arguments, 0.0, 0.0, Passivity::never);
+  for (double a = 0.4;; a += 1e-3) {
+    mass.place(a, 0.0);
+    for (int n = 0; n < 20000; ++n) {
+      mass.go();
+      if (!(std::fabs(mass.x[0]) < 100.0)) {
+        return a;
+      }
+    }
+  }
+}
+
+}  // namespace
+
+TEST_CASE("S08, T10: a ball leaves a wall as fast as it came, however hard that is", "[passive]") {
+  // Reference: 1, exactly. As published the speed depends on where between two samples it touches.
+  struct Row {
+    double k;
+    double lowest;
+    double highest;  // of the published scheme
+  };
+  for (const auto& [k, lowest, highest] : {Row{.01, .9988, 1.0012},
+                                           {.1, .995, 1.005},
+                                           {.5, .941, 1.062},
+                                           {1, 1, 1},
+                                           {1.5, .80, 1.25},
+                                           {2.5, .67, 1.50},
+                                           {3, .50, 2.0},
+                                           {3.9, .35, 2.90},
+                                           {10, .12, 9.0},
+                                           {40, .06, 39.0}}) {
+    CAPTURE(k);
+    const Spread published = bounces(k, 0.0, Passivity::never);
+    CHECK(published.lowest == Approx(lowest).margin(k > 1.0 ? 6e-3 : 1e-3).epsilon(1e-3));
+    CHECK(published.highest == Approx(highest).margin(k > 1.0 ? 6e-3 : 1e-3).epsilon(1e-3));
+  }
+  for (const double k : {.01, .1, .5, 1., 1.5, 2.5, 3., 3.9, 10., 40., 100., 1000.}) {
+    CAPTURE(k);
+    const Spread e = bounces(k, 0.0, Passivity::always);
+    CHECK(std::fabs(e.lowest - 1.0) < 1e-12);
+    CHECK(std::fabs(e.highest - 1.0) < 1e-12);
+  }
+}
+
+TEST_CASE("S09, T12: a damped wall takes what it should", "[passive]") {
+  // Reference: the wall lets go where it began, so e = exp(-pi xi/sqrt(1 - xi^2)).
+  const auto closed = [](double k, double z) {
+    const double xi = z / (2.0 * std::sqrt(k));
+    return std::exp(-std::numbers::pi * xi / std::sqrt(1.0 - xi * xi));
+  };
+  CHECK(closed(.1, .05) == Approx(.77947).epsilon(1e-5));
+  for (const double k : {.01, .03, .1}) {
+    for (const double xi : {.01, .03, .1}) {
+      const double z = 2.0 * xi * std::sqrt(k);
+      CAPTURE(k, xi);
+      const Spread e = bounces(k, z, Passivity::always);
+      CHECK(e.lowest > .99 * closed(k, z));
+      CHECK(e.highest < 1.01 * closed(k, z));
+      CHECK(e.highest <= 1.0);
+    }
+  }
+  // As published it may be far off, and gain.
+  const Spread hard = bounces(.5, .2, Passivity::never);
+  CHECK(hard.lowest == Approx(.502).margin(2e-3));
+  CHECK(hard.highest == Approx(.677).margin(2e-3));
+  CHECK(bounces(3.0, .02, Passivity::never).highest > 1.5);
+  CHECK(bounces(3.0, .02, Passivity::always).highest < 1.0);
+}
+
+TEST_CASE("S10, T11: a ball bounces for ever, no higher and no lower", "[passive]") {
+  // Reference: E/E0 = 1 over 10^6 samples, E = v^2/2 + g h + what is in the wall.
+  const auto energy = [](double k, double g, double x, double v) {
+    const auto wall = [=](double depth) { return depth > 0.0 ? k / 2.0 * depth * depth : 0.0; };
+    const double before = x - v;
+    return v * v / 2.0 + g * (x + before) / 2.0 + (wall(-x) + wall(-before)) / 2.0;
+  };
+  const double g = 1e-5;
+  const auto worst = [&](double k, Passivity passive) {
+    Stepper<double> ball(
+        "@w ground 0.\n@b massG 1. 1e-5 0.01 0.01\n@c contact @w @b " + show(k) + " 0.\n", passive);
+    ball.go();
+    const double start = energy(k, g, ball.x[0], ball.v[0]);
+    double drift = 0.0;
+    for (int n = 0; n < 1'000'000; ++n) {
+      ball.go();
+      drift = std::max(drift, std::fabs(energy(k, g, ball.x[0], ball.v[0]) / start - 1.0));
+    }
+    return drift;
+  };
+  CHECK(worst(.5, Passivity::never) > 10.0);
+  for (const double k : {.05, .5, 1.5, 3.}) {
+    CAPTURE(k);
+    const double drift = worst(k, Passivity::always);
+    CAPTURE(show(drift));
+    CHECK(drift < 1e-9);
+  }
+}
+
+TEST_CASE("S11: a damped ball comes to rest", "[passive]") {
+  // Reference: x = -M g/K = -2e-5, after a finite number of touches.
+  for (const Passivity passive : {Passivity::never, Passivity::always}) {
+    Stepper<double> ball("@w ground 0.\n@b massG 1. 1e-5 0.01 0.01\n@c contact @w @b 0.5 0.05\n",
+                         passive);
+    int switches = 0;
+    int last = 0;
+    bool was_in = false;
+    for (int n = 0; n < 100'000; ++n) {
+      ball.go();
+      const bool is_in = ball.x[0] < 0.0;
+      if (is_in != was_in) {
+        ++switches;
+        last = n;
+        was_in = is_in;
+      }
+    }
+    CHECK(switches < 100);
+    CHECK(last < 2000);
+    CHECK(ball.x[0] == Approx(-2e-5).epsilon(1e-9));
+  }
+}
+
+TEST_CASE("S05: a cubic spring may be bent as far as one likes", "[passive]") {
+  // Reference: bounded, by its energy. As published it blows up at these amplitudes.
+  const std::vector<std::pair<double, double>> published = {
+      {0., .771}, {.1, .806}, {1., .635}, {2., .593}};
+  for (const auto& [k, amplitude] : published) {
+    const std::string arguments = show(k) + " 1. 0.";
+    CAPTURE(k);
+    CHECK(blows_up_at("nlSpring3", arguments) == Approx(amplitude).margin(5e-3));
+    for (const double a : {1., 3., 20.}) {
+      Stepper<double> mass = sprung("nlSpring3", arguments, a, 0.0, Passivity::always);
+      const auto energy = [&, stiffness = k] {
+        const double x = mass.x[0];
+        const double before = x - mass.v[0];
+        return mass.v[0] * mass.v[0] / 2.0 + stiffness / 2.0 * x * before +
+               x * x * before * before / 4.0;
+      };
+      const double start = energy();
+      double drift = 0.0;
+      for (int n = 0; n < 100'000; ++n) {
+        mass.go();
+        drift = std::max(drift, std::fabs(energy() / start - 1.0));
+      }
+      CAPTURE(a, show(drift));
+      CHECK(drift < 1e-11);
+    }
+  }
+}
+
+TEST_CASE("S06: a quadratic spring may be bent as far as one likes", "[passive]") {
+  const std::vector<std::pair<double, double>> published = {
+      {0., 1.186}, {.1, 1.104}, {1., .564}, {2., .575}};
+  for (const auto& [k, amplitude] : published) {
+    const std::string arguments = show(k) + " 1. 0.";
+    CAPTURE(k);
+    CHECK(blows_up_at("nlSpring", arguments) == Approx(amplitude).margin(5e-3));
+    for (const double a : {1., 3., 20.}) {
+      Stepper<double> mass = sprung("nlSpring", arguments, a, 0.0, Passivity::always);
+      const auto energy = [&, stiffness = k] {
+        const double x = mass.x[0];
+        const double before = x - mass.v[0];
+        const auto third = [](double d) { return std::fabs(d * d * d) / 3.0; };
+        return mass.v[0] * mass.v[0] / 2.0 + stiffness / 2.0 * x * before +
+               (third(x) + third(before)) / 2.0;
+      };
+      const double start = energy();
+      double drift = 0.0;
+      for (int n = 0; n < 100'000; ++n) {
+        mass.go();
+        drift = std::max(drift, std::fabs(energy() / start - 1.0));
+      }
+      CAPTURE(a, show(drift));
+      CHECK(drift < 1e-11);
+    }
+  }
+}
+
+TEST_CASE("S07, T13: a Duffing oscillator keeps its period when it swings little", "[passive]") {
+  // Reference: elliptic periods. Linearly implicit, it is flat when it swings far; never unstable.
+  struct Row {
+    double amplitude;
+    double samples;
+    double published;  // cents, 0 where it blows up
+    double implicit;
+  };
+  for (const auto& [a, samples, published, implicit] : {Row{.05, 57.688455448, .85, .03},
+                                                        {.2, 31.797233168, 2.1, -11.2},
+                                                        {.5, 14.419369610, 6.6, -73.5}}) {
+    CAPTURE(a);
+    const double reference = duffing_period(.01, 1.0, a);
+    CHECK(reference == Approx(samples).epsilon(1e-9));
+    const double pull = .01 * a + a * a * a;
+    const auto off = [&](Passivity passive, double force) {
+      Stepper<double> mass = sprung("nlSpring3", "0.01 1. 0.", a, force, passive);
+      return cents(reference / period(mass, 1000));
+    };
+    const double plain = off(Passivity::never, pull);
+    const double found = off(Passivity::always, pull);
+    CAPTURE(plain, found);
+    CHECK(plain == Approx(published).margin(.1).epsilon(.03));
+    CHECK(found == Approx(implicit).margin(.1).epsilon(.03));
+  }
+  // 10^7 samples at 20, where the published scheme is gone at once.
+  Stepper<double> mass = sprung("nlSpring3", "0.01 1. 0.", 20.0, 0.0, Passivity::always);
+  const auto energy = [&] {
+    const double before = mass.x[0] - mass.v[0];
+    return mass.v[0] * mass.v[0] / 2.0 + .005 * mass.x[0] * before +
+           mass.x[0] * mass.x[0] * before * before / 4.0;
+  };
+  const double start = energy();
+  double drift = 0.0;
+  for (int n = 0; n < 10'000'000; ++n) {
+    mass.go();
+    drift = std::max(drift, std::fabs(energy() / start - 1.0));
+  }
+  CAPTURE(show(drift));
+  CHECK(drift < 3e-11);  // 2.75e-11: x += v where v is far larger; two positions keep 4e-13
+  Stepper<double> published = sprung("nlSpring3", "0.01 1. 0.", 20.0, 0.0, Passivity::never);
+  for (int n = 0; n < 20; ++n) {
+    published.go();
+  }
+  CHECK(!(std::fabs(published.x[0]) < 1e6));
+}
+
+TEST_CASE("S20: a clipped spring has no step, and gives back no more than it got", "[passive]") {
+  // s = .01, c = 10, k = .5 without damping, from .2, which is below b = sqrt((k - s)/c) = .2214.
+  const double b = std::sqrt(.49 / 10.0);
+  CHECK(clipped_spring_force(b * (1 - 1e-12), 0., .01, 10., .5, 0.) ==
+        Approx(clipped_spring_force(b * (1 + 1e-12), 0., .01, 10., .5, 0.)).epsilon(1e-10));
+  Stepper<double> mass = sprung("nlSpringDamper", "0.01 10. 0.5 0.", .2, 0.0, Passivity::always);
+  const ClippedPotential<double> potential(.01, 10., .5);
+  const auto energy = [&] {
+    return mass.v[0] * mass.v[0] / 2.0 +
+           (potential.energy(mass.x[0]) + potential.energy(mass.x[0] - mass.v[0])) / 2.0;
+  };
+  const double start = energy();
+  double drift = 0.0;
+  double most = 0.0;
+  for (int n = 0; n < 100'000; ++n) {
+    mass.go();
+    drift = std::max(drift, std::fabs(energy() / start - 1.0));
+    most = std::max(most, std::fabs(mass.x[0]));
+  }
+  CAPTURE(show(drift), most);
+  CHECK(drift < 1e-11);
+  CHECK(most < .2 * 1.06);  // at rest between two samples: a little above where both are
+  // Beyond b it is damped, so it can only lose.
+  Stepper<double> far = sprung("nlSpringDamper", "0.01 10. 0.5 0.", 5.0, 0.0, Passivity::always);
+  for (int n = 0; n < 1000; ++n) {
+    far.go();
+  }
+  CHECK(std::fabs(far.x[0]) < b * 1.1);
+}
+
+TEST_CASE("a point on a macro is hit as the mass that it lies on", "[passive]") {
+  const std::string rest = "@w ground -0.001\n@out1 posOutput ";
+  Stepper<double> masses(scenes::string("s", 9, "0.1", "0.001") +
+                             "@c contact @w @s_m4 5. 0.1\n@in1 frcInput @s_m2\n" + rest + "@s_m6\n",
+                         Passivity::always);
+  Stepper<double> macro(
+      "@s string 11 1. 0.1 0.001 0. 0. 0.\n@c contact @w [@s 0.5] 5. 0.1\n"
+      "@in1 frcInput [@s 0.3]\n" +
+          rest + "[@s 0.7]\n",
+      Passivity::always);
+  Comparison difference;
+  for (int n = 0; n < 1000; ++n) {
+    const std::vector<double> push = {n % 100 == 0 ? -.01 : 0.0};
+    difference.add(masses.step(push)[0], macro.step(push)[0]);
+  }
+  CHECK(difference.peak > 1e-3);
+  CAPTURE(show(difference.relative()));
+  CHECK(difference.relative() < 1e-11);
+}
+
+TEST_CASE("the force on a ball is what changes its speed", "[passive]") {
+  Stepper<double> ball(
+      "@w ground 0.\n@b mass 1. 0. 0.\n@c contact @w @b 3. 0.2\n@out1 frcOutput @b\n"
+      "@out2 frcOutput @w\n",
+      Passivity::always);
+  ball.place(1.3, -.4);
+  double most = 0.0;
+  for (int n = 0; n < 12; ++n) {
+    const double before = ball.v[0];
+    const std::vector<double> forces = ball.step({});
+    ball.kernel().save(0, ball.x.data(), ball.v.data());
+    CHECK(forces[0] == Approx(ball.v[0] - before).margin(1e-15));
+    CHECK(forces[1] == -forces[0]);
+    most = std::max(most, forces[0]);
+  }
+  CHECK(most > .1);
+}
+
+TEST_CASE("what is safe stays as published, and the rest is told", "[passive]") {
+  const std::string text =
+      "@k param 0.05\n@g ground 0.\n@in1 posInput 0.\n@m mass 1. 0.5 0.5\n@n mass 1. 0.5 0.5\n"
+      "@s spring @g @m 0.1\n@c1 contact @g @m k 0.01\n@c2 contact @g @n 0.25 0.01\n"
+      "@c3 contact @m @n 0.02 0.01\n@q nlSpring3 @g @n 0.01 3. 0.\n@p nlPluck @in1 @m 0.4 0.01\n"
+      "@b nlBow @in1 @n 0.2 0.01\n@out1 posOutput @m\n";
+  const Network network = network_of(text);
+  using enum Scheme;
+  const auto schemes_at = [&](double k, const Budget& budget) {
+    return choose_schemes(network, Preset{}, {.box = {{0.01}, {k}}}, budget, {});
+  };
+  const auto found = [](const Schemes& schemes) {
+    std::vector<Scheme> all;
+    for (const LinkScheme& link : schemes.links) {
+      all.push_back(link.scheme);
+    }
+    return all;
+  };
+  const Schemes needed = schemes_at(.05, {});
+  CHECK(found(needed) == std::vector{plain, plain, centred, plain, centred, plain, plain});
+  CHECK(needed.notes == std::vector<std::string>{
+                            "1 spring that grows stiffer centred: as published it could blow up "
+                            "where it is the stiffest (K/M up to 2.26)",
+                            "1 contact centred: as published it could gain 3.12 % of speed at a "
+                            "touch (K/M up to 0.25)"});
+  // What a parameter may be turned to counts, not where it is.
+  CHECK(schemes_at(.09, {}).links[1].scheme == centred);
+  CHECK(found(schemes_at(.05, {.passive = Passivity::always})) ==
+        std::vector{plain, centred, centred, centred, centred, substeps, centred});
+  const Schemes never = schemes_at(.05, {.passive = Passivity::never});
+  CHECK(found(never) == std::vector(7, plain));
+  CHECK(never.notes.back() ==
+        "1 contact as published, which could gain 3.12 % of speed at a touch (K/M up to 0.25)");
+  // A link may be asked for by its index; what is passive needs no proof any more.
+  const Schemes forced = choose_schemes(network, Preset{}, {.box = {{.05}, {.05}}},
+                                        {.passive = Passivity::never}, {3, 5});
+  CHECK(found(forced) == std::vector{plain, plain, plain, centred, plain, substeps, plain});
+  CHECK(always_felt(network, forced.links).links.size() == 5);
+  CHECK(always_felt(network, needed.links).links.size() == 6);
+  // The kernel's runs never mix them.
+  const Program program = make_program(network, 44100.0, true, needed.links);
+  std::size_t passive = 0;
+  for (const LinkRun& run : program.link_runs) {
+    passive += run.scheme == plain ? 0 : run.count;
+  }
+  CHECK(passive == 2);
+}
+
+TEST_CASE("a passive law depends on no other lane", "[passive]") {
+  // Every law in packs as in single numbers, whatever is in the lanes beside it.
+  using V = Pack<double, 16>;
+  Random random(7);
+  for (int i = 0; i < 3000; ++i) {
+    const auto any = [&](double size) { return size * random.uniform(-1.0, 1.0); };
+    const Law law =
+        static_cast<Law>(random.below(static_cast<std::size_t>(Law::clipped_contact) + 1));
+    const double profile = i % 2;
+    const double c[] = {std::fabs(any(2.)), std::fabs(any(2.)) + .01,
+                        law == Law::either_bow ? profile : std::fabs(any(2.)), std::fabs(any(.2)),
+                        any(.2)};
+    Meeting<V> both{};
+    for (std::size_t lane = 0; lane < 2; ++lane) {
+      both.now[lane] = any(1.);
+      both.speed[lane] = any(1.);
+      both.fast[lane] = both.speed[lane] + any(.5);
+      both.free[lane] = both.now[lane] + both.fast[lane];
+      both.gamma[lane] = random.uniform(0., 3.);
+    }
+    for (const Scheme scheme : {Scheme::centred, Scheme::substeps}) {
+      const Push<V> push = passive_push(law, scheme, 16, both, V{} + c[0], V{} + c[1], V{} + c[2],
+                                        V{} + c[3], V{} + c[4]);
+      for (std::size_t lane = 0; lane < 2; ++lane) {
+        const Meeting<double> one{both.now[lane], both.speed[lane], both.free[lane],
+                                  both.fast[lane], both.gamma[lane]};
+        const Push<double> alone = passive_push(law, scheme, 16, one, c[0], c[1], c[2], c[3], c[4]);
+        CAPTURE(static_cast<int>(law), lane, one.now, one.speed, one.free, one.gamma);
+        CHECK(push.x[lane] == Approx(alone.x).margin(1e-13).epsilon(1e-11));
+        CHECK(push.v[lane] == Approx(alone.v).margin(1e-13).epsilon(1e-11));
+      }
+    }
+  }
+}
+
+TEST_CASE("a bow of either profile is the one or the other, bit for bit", "[passive]") {
+  using V = Pack<double, 16>;
+  Random random(8);
+  for (int i = 0; i < 2000; ++i) {
+    const auto any = [&](double size) { return size * random.uniform(-1.0, 1.0); };
+    const V z = V{} + std::fabs(any(9.));
+    const V s = V{} + std::fabs(any(1.)) + .01;
+    const V profile = i % 2 == 0 ? V{0.0, 1.0} : V{1e-9, -0.3};
+    Meeting<V> m{V{} + any(1.), V{} + any(1.), V{}, V{} + any(1.), V{} + random.uniform(0., 3.)};
+    m.free = m.now + m.fast;
+    for (const Scheme scheme : {Scheme::centred, Scheme::substeps}) {
+      const auto push = [&](Law law) {
+        return passive_push(law, scheme, 8, m, z, s, profile, V{}, V{}).x;
+      };
+      const V either = push(Law::either_bow);
+      const V piecewise = push(Law::bow);
+      const V smooth = push(Law::smooth_bow);
+      for (std::size_t lane = 0; lane < 2; ++lane) {
+        CHECK(either[lane] == (profile[lane] > 0.0 ? smooth : piecewise)[lane]);
+      }
+    }
+    const V v = m.speed;
+    const V plain = either_bow_force(v, z, s, profile);
+    for (std::size_t lane = 0; lane < 2; ++lane) {
+      CHECK(plain[lane] ==
+            (profile[lane] > 0.0 ? smooth_bow_force(v, z, s) : bow_force(v, z, s))[lane]);
+    }
+  }
+}
+
+}  // namespace ressort

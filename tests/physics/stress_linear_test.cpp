@@ -1,0 +1,273 @@
+// The linear cases that are meant to break a network, each beside the plain scheme that does break:
+// around the limits of theory, a mass that grows light, unequal masses, and garbage of all kinds.
+// T1 and the figures of most limits are in stability_test.
+#include "app/realtime/process.h"
+#include "core/analysis/stability.h"
+#include "tests/support/player.h"
+
+namespace ressort {
+namespace {
+
+using namespace rig;
+
+constexpr double nan = std::numeric_limits<double>::quiet_NaN();
+constexpr double infinity = std::numeric_limits<double>::infinity();
+
+// How large a network gets that was kicked, with one parameter at a value: the plain scheme alone.
+double growth(const std::string& text, const std::string& name, double value, int steps) {
+  const Network network = network_of(text);
+  Program program = make_program(network, 44100.0, true);
+  for (std::size_t i = 0; i < program.moving; ++i) {
+    program.velocity[i] = std::cos(3.0 * static_cast<double>(i));
+  }
+  for (std::size_t i = 0; i < network.parameters.size(); ++i) {
+    if (network.parameters[i].name == name) {
+      program.parameters[i] = value;
+    }
+  }
+  Bare<double> bare(program);
+  double largest = 0.0;
+  for (int n = 0; n < steps && largest < 1e12; ++n) {
+    for (const double y : bare.step({})) {
+      largest = std::max(largest, std::fabs(y));
+    }
+  }
+  return largest;
+}
+
+SafeRange range_of(const std::string& text, const std::string& name) {
+  const Network network = network_of(text);
+  const std::vector<double> values = parameter_values(network);
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    if (network.parameters[i].name == name) {
+      const auto range = Stability(network, 1.0).safe_range({values, values}, i, values[i]);
+      REQUIRE(range);
+      return *range;
+    }
+  }
+  FAIL("there is no parameter " + name);
+  return {};
+}
+
+std::string with_masses(std::string text) {
+  for (std::size_t at = 0; (at = text.find("mass 1.", at)) != text.npos;) {
+    text.replace(at, 7, "mass m_M");
+  }
+  return "@m_M param 1.\n" + text;
+}
+
+// Up to the limit it stays bounded; beyond it by a ten-thousandth it does not.
+void check_around(const std::string& text, const std::string& name, double limit, bool is_upper,
+                  int steps) {
+  const SafeRange range = range_of(text, name);
+  const double found = is_upper ? range.highest : range.lowest;
+  INFO(name << ": " << show(found) << ", in theory " << show(limit));
+  CHECK(found == Approx(limit).epsilon(1e-9));
+  const double inwards = is_upper ? 1.0 - 1e-4 : 1.0 + 1e-4;
+  CHECK(growth(text, name, limit * inwards, steps) < 1e5);
+  CHECK(growth(text, name, limit / inwards, 4 * steps) > 1e10);
+}
+
+}  // namespace
+
+TEST_CASE("T2: each limit is where theory has it, and simulation beyond it diverges",
+          "[stress_linear]") {
+  const std::string triangle = scenes::triangle("0.1", "0.001") + scenes::output(1, "m_m2");
+  check_around(triangle, "m_K", 1.31568650461023, true, 100000);
+  check_around(triangle, "m_Z", 0.608843252305113, true, 100000);
+  check_around(with_masses(triangle), "m_M", 0.0889851164104615, false, 100000);
+  const std::string bowed = scenes::string("s", 150, "0.3", "0.001") + scenes::output(1, "s_m70");
+  check_around(bowed, "s_K", 0.998108222407659, true, 100000);
+  check_around(bowed, "s_Z", 0.350054111203829, true, 100000);
+  const auto top = [](double count) {
+    return 4.0 * std::pow(std::cos(std::numbers::pi / count), 2);
+  };
+  check_around("@K param 0.1\n@d mesh 20 30 1. K 0.01 0. 0.\n@out1 posOutput [@d 0. 0.]\n", "K",
+               4.0 / (top(40.0) + top(60.0)) - 0.02, true, 20000);
+}
+
+TEST_CASE("S13: a mass that grows light is kept where it is stable; the plain scheme is not",
+          "[stress_linear]") {
+  const std::string text =
+      "@M param 1.\n@o osc M 0.1 0.001 1. 1.\n@in1 frcInput @o\n" + scenes::output(1, "o");
+  constexpr std::size_t ramp = 22050;
+  std::vector<Event> events;
+  for (std::size_t n = 0; n < ramp; ++n) {
+    const double mass = 1.0 - 0.98 * static_cast<double>(n) / static_cast<double>(ramp);
+    events.push_back(parameter(static_cast<std::uint32_t>(n), 0, mass));
+  }
+  const Network network = network_of(text);
+  const Preset bare = default_preset(network, true);
+  Player plain(text, bare, {.bare = true, .force = true});
+  plain.run(ramp, events);
+  const auto loud = std::find_if(plain.y().begin(), plain.y().end(),
+                                 [](double y) { return std::fabs(y) > 10.0; });
+  CHECK(loud - plain.y().begin() == Approx(22013).margin(2));
+  // (K + 2Z)/4 = 0.0255.
+  Player kept(text, bare, {.bare = true, .reach = {{"M", 0.02}}});
+  CHECK(kept.compiled.instrument.parameters[0].minimum == 0.0255001);
+  kept.run(ramp, events);
+  kept.run(44100, {});
+  CHECK(kept.engine().parameter(0) == 0.0255001);
+  CHECK(kept.engine().meters().beyond > 100);
+  CHECK(kept.engine().meters().resets == 0);
+  CHECK(peak(kept.y()) < 10.0);
+}
+
+TEST_CASE("S22: a light mass on a heavy one may be as stiff as it is stable", "[stress_linear]") {
+  const std::string text =
+      "@k param 0.001\n@g ground 0.\n@a mass 1. 0. 0.\n@b mass 0.001 0. 0.\n"
+      "@r spring @g @a 0.01\n@l spring @a @b k\n" +
+      scenes::output(1, "b");
+  const double limit = 0.01596 / 3.994;
+  CHECK(limit == Approx(0.003995994).epsilon(1e-7));
+  CHECK(range_of(text, "k").highest == Approx(limit).epsilon(1e-9));
+  CHECK(growth(text, "k", 0.00399, 100000) < 1e4);
+  CHECK(growth(text, "k", 0.004, 100000) > 1e10);
+  // Row by row it would have been twice too careful: k (1/.001 + 1/.001) < 4.
+  const auto verdict = [&](double k) {
+    const Network network = network_of(text);
+    const auto compiled =
+        compile(network, default_preset(network, true), {.bare = true, .settings = {{"k", k}}});
+    REQUIRE(compiled);
+    return compiled->gate.verdict;
+  };
+  CHECK(verdict(0.002) == Verdict::stable);
+  CHECK(verdict(limit * (1.0 - 1e-6)) == Verdict::stable);
+  CHECK(verdict(limit * (1.0 + 1e-6)) == Verdict::unstable);
+}
+
+// --- S25: garbage -------------------------------------------------------------------------------
+
+TEST_CASE("S25: models that make no sense are told so, or are silent; none says what is no number",
+          "[stress_linear]") {
+  const auto complaints = [](const std::string& text) {
+    std::string all;
+    for (const Diagnostic& diagnostic : parse_network(text).diagnostics) {
+      all += to_string(diagnostic, "x") + "\n";
+    }
+    return all;
+  };
+  const auto has = [](const std::string& text, const std::string& part) {
+    INFO(text);
+    CHECK(text.find(part) != text.npos);
+  };
+  const std::string pair = "@g ground 0.\n@a mass 1. 0. 0.\n@b mass 1. 0. 0.\n";
+  has(complaints("@m mass 0. 0. 0.\n"), "x:1:9: error: a mass must be above 0");
+  has(complaints("@m mass -1. 0. 0.\n"), "x:1:9: error: a mass must be above 0");
+  has(complaints(""), "x:1:1: error: the model is empty");
+  has(complaints(pair + "@r spring @a @b 0.1\n@r spring @a @b 0.1\n"), "'@r' is already declared");
+  has(complaints(pair + "@r spring @a @a 0.1\n"), "x:4:");
+  has(complaints("@a mass 1. 0. 0.\n"), "output");
+  has(complaints("@a mass 1. 0. [1/0]\n"), "error");
+
+  // What is let in sounds of numbers only, whatever is done to it.
+  const std::string heard = "@in1 frcInput @a\n" + scenes::output(1, "a");
+  for (const std::string& text :
+       {"@M param 0.\n@g ground 0.\n@a mass M 0. 0.\n@r spring @g @a 0.1\n" + heard,  // no mass
+        pair + "@r spring @g @a -0.1\n" + heard,                                      // K < 0
+        pair + "@r damper @g @a -0.1\n" + heard,                                      // Z < 0
+        pair + "@r spring @a @a 0.1\n" + heard,                                       // to itself
+        pair + "@r spring @a @b 0.1\n@s spring @a @b 0.1\n" + heard,                  // twice
+        "@a mass 1. 0. 0.\n@b mass 1. 0. 0.\n@r spring @a @b 0.1\n" + heard,          // no ground
+        "@a mass 1. 0. 0.\n" + heard,                                                 // no link
+        "@g ground 0.\n" + scenes::output(1, "g")}) {                                 // no mass
+    INFO(text);
+    auto compiled = compile(network_of(text), default_preset(network_of(text), false), {});
+    if (!compiled) {
+      has(compiled.error().message, "is not above 0");
+      continue;
+    }
+    std::vector<double> out(256);
+    double* const outputs[] = {out.data()};
+    for (int n = 0; n < 400; ++n) {
+      const std::vector<Event> events = {
+          note_on(0, 60, 1.0),
+          {.frame = 1, .kind = EventKind::force, .index = 1, .value = n % 3 == 0 ? 1e300 : 1.0}};
+      compiled->engine->process(events, {}, outputs, out.size());
+      REQUIRE(std::all_of(out.begin(), out.end(), [](double y) { return std::isfinite(y); }));
+    }
+  }
+}
+
+TEST_CASE("S25: a parameter that would make an argument no number is kept from it",
+          "[stress_linear]") {
+  // 1/p, and a mass that may vanish: the ranges stop before.
+  for (const std::string& text :
+       {"@p param 0.5\n@o osc 1. 0.1/p 0. 0. 0.\n@in1 frcInput @o\n" + scenes::output(1, "o"),
+        "@p param 0.5\n@o osc p 0.1 0. 0. 0.\n@in1 frcInput @o\n" + scenes::output(1, "o")}) {
+    Preset preset = struck(1);
+    preset.parameters.push_back({"p", 0.5, 0.0, 1.0, {}});
+    Player player(text, preset, {});
+    CHECK(player.compiled.instrument.parameters[0].minimum > 0.0);
+    CHECK(player.compiled.instrument.parameters[0].is_raised);
+    player.run(5000, {note_on(0, 60), parameter(100, 0, 0.0), parameter(2000, 0, -1.0)});
+    CHECK(player.engine().parameter(0) == player.compiled.instrument.parameters[0].minimum);
+    CHECK(player.engine().meters().resets == 0);
+    CHECK(std::all_of(player.y().begin(), player.y().end(),
+                      [](double y) { return std::isfinite(y); }));
+  }
+}
+
+TEST_CASE("S25: events that are no numbers do nothing", "[stress_linear]") {
+  Player player(ringing_string(), struck(2));
+  std::vector<Event> events = {note_on(0, 60)};
+  std::uint32_t frame = 1;
+  for (int kind = 0; kind < static_cast<int>(EventKind::panic); ++kind) {
+    for (const double value : {nan, infinity, -infinity}) {
+      for (const bool second : {false, true}) {
+        events.push_back({.frame = frame++,
+                          .kind = static_cast<EventKind>(kind),
+                          .index = 1,
+                          .value = second ? 0.5 : value,
+                          .value2 = second ? value : 0.0});
+      }
+    }
+  }
+  player.run(4000, events);
+  Player alone(ringing_string(), struck(2));
+  alone.run(4000, {note_on(0, 60)});
+  Comparison error;
+  for (std::size_t n = 0; n < alone.y().size(); ++n) {
+    error.add(alone.y()[n], player.y()[n]);
+  }
+  CHECK(error.relative() < 1e-12);  // a block that is cut is added up in another order
+}
+
+TEST_CASE("S25: samples that are no numbers are silence, and what comes after is heard",
+          "[stress_linear]") {
+  const std::string text = ringing_string();
+  Preset preset = struck(1);
+  preset.controls = {{.source = ControlSource::audio, .number = 1, .target = "in1"}};
+  const auto heard = [&](float garbage, bool is_bare) {
+    auto compiled =
+        compile(network_of(text), is_bare ? default_preset(network_of(text), true) : preset,
+                {.bare = is_bare});
+    REQUIRE(compiled);
+    Process process(44100.0, false);
+    process.slot.offer(new Sounding{std::move(compiled->engine), 1});
+    std::vector<float> input(256);
+    std::vector<float> out(256);
+    std::vector<float> all;
+    const float* const inputs[] = {input.data()};
+    float* const outputs[] = {out.data()};
+    for (int n = 0; n < 100; ++n) {
+      std::fill(input.begin(), input.end(), n % 10 == 3 ? garbage : 0.0f);
+      input[5] = n % 20 == 0 ? 1e-3f : input[5];
+      process.block(std::span<const float* const>(inputs), std::span<float* const>(outputs), 256,
+                    {}, 0);
+      all.insert(all.end(), out.begin(), out.end());
+    }
+    CHECK(process.meters.resets.get() == 0);
+    return all;
+  };
+  for (const bool is_bare : {false, true}) {
+    const std::vector<float> clean = heard(0.0f, is_bare);
+    CHECK(*std::max_element(clean.begin(), clean.end()) > 1e-5f);
+    for (const double garbage : {nan, infinity, -infinity}) {
+      CHECK(heard(static_cast<float>(garbage), is_bare) == clean);
+    }
+  }
+}
+
+}  // namespace ressort

@@ -1,0 +1,81 @@
+// tests: a client of the OSC server.
+#pragma once
+
+#include <arpa/inet.h>
+#include <netinet/in.h>
+#include <poll.h>
+#include <sys/socket.h>
+#include <unistd.h>
+
+#include <optional>
+#include <vector>
+
+#include "app/control/osc_packet.h"
+#include "tests/support/catch.h"
+#include "tests/support/osc_bytes.h"
+
+namespace ressort {
+
+class Client {
+ public:
+  explicit Client(int port, std::uint32_t address = INADDR_LOOPBACK)
+      : socket_(socket(AF_INET, SOCK_DGRAM, 0)) {
+    sockaddr_in server{};
+    server.sin_family = AF_INET;
+    server.sin_port = htons(static_cast<std::uint16_t>(port));
+    server.sin_addr.s_addr = htonl(address);
+    REQUIRE(connect(socket_, reinterpret_cast<const sockaddr*>(&server), sizeof server) == 0);
+  }
+  ~Client() { close(socket_); }
+
+  void send(const Bytes& bytes) {
+    REQUIRE(::send(socket_, bytes.data(), bytes.size(), 0) == static_cast<ssize_t>(bytes.size()));
+  }
+
+  // The next answer; nothing after a wait that is far longer than any answer takes.
+  std::optional<Answer> receive(int most_ms = 20000) {
+    pollfd wait{socket_, POLLIN, 0};
+    if (poll(&wait, 1, most_ms) != 1) {
+      return std::nullopt;
+    }
+    Bytes bytes(max_osc_packet_bytes);
+    const ssize_t size = recv(socket_, bytes.data(), bytes.size(), 0);
+    if (size <= 0) {
+      return std::nullopt;
+    }
+    bytes.resize(static_cast<std::size_t>(size));
+    bytes_received += bytes.size();
+    REQUIRE(check_packet(bytes));  // we speak as strictly as we listen
+    return read_answer(bytes);
+  }
+
+  Answer ask(const Bytes& bytes) {
+    send(bytes);
+    const auto answer = receive();
+    REQUIRE(answer);
+    return *answer;
+  }
+
+  // Waits until the server has done everything that was sent; gives back what it said before.
+  std::vector<Answer> sync() {
+    std::vector<Answer> before;
+    for (int tries = 0; tries < 40; ++tries) {  // what is sent into a full buffer is lost
+      send(message("/status"));
+      while (auto answer = receive(500)) {
+        if (answer->address == "/status.reply") {
+          return before;
+        }
+        before.push_back(*std::move(answer));
+      }
+    }
+    FAIL("the server does not answer");
+    return before;
+  }
+
+  std::size_t bytes_received = 0;
+
+ private:
+  int socket_;
+};
+
+}  // namespace ressort

@@ -1,0 +1,59 @@
+// tests: a network whose links are passive, or as published, its kernel alone.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "core/compile/schemes.h"
+#include "core/model/topology.h"
+#include "tests/support/rig.h"
+
+namespace ressort::rig {
+
+// Every parameter where the text puts it.
+inline Schemes schemes_of(const Network& network, Passivity passive) {
+  const std::vector<double> values = parameter_values(network);
+  return choose_schemes(network, Preset{}, {.box = {values, values}}, {.passive = passive}, {});
+}
+
+inline Program program_of(const std::string& text, Passivity passive) {
+  const Network network = expand_macros(network_of(text));
+  return make_program(network, Network::reference_rate_hz, true,
+                      schemes_of(network, passive).links);
+}
+
+// The positions and speeds of all nodes; masses come first.
+template <class T>
+struct Stepper : Bare<T> {
+  Stepper(const std::string& text, Passivity passive, Isa isa = best_isa())
+      : Bare<T>(program_of(text, passive), 1, isa),
+        x(this->program().position.size()),
+        v(x.size()) {}
+
+  // One mass, from anywhere: the next sample is free flight.
+  void place(double x0, double v0) {
+    x = this->program().position;
+    v = this->program().velocity;
+    x[0] = x0;
+    v[0] = v0;
+    this->kernel().place(0, x.data(), v.data());
+  }
+  void go(const std::vector<double>& inputs = {}) {
+    this->step(inputs);
+    this->kernel().save(0, x.data(), v.data());
+  }
+
+  std::vector<double> x;
+  std::vector<double> v;
+};
+
+struct Spread {
+  double lowest = std::numeric_limits<double>::infinity();
+  double highest = -lowest;
+  void add(double value) {
+    lowest = std::min(lowest, value);
+    highest = std::max(highest, value);
+  }
+};
+
+}  // namespace ressort::rig

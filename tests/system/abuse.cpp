@@ -1,0 +1,232 @@
+// What nobody would do to an instrument, for as long as one likes: ressort_abuse SECONDS [SEED
+// [NAME...]]. Every parameter over its whole range and beyond, at audio rate, once where the
+// program keeps it stable and once where it is forced to do as it is told; strikes, forces and
+// hands of any size; keys, bends and controllers at random; audio inputs with noise, and with what
+// is no number. Not one sample of what comes out may be non-finite or above the limiter's ceiling.
+// The random numbers are printed by their seed, so that what was found can be found again.
+#include <cmath>
+#include <cstdio>
+#include <cstdlib>
+#include <limits>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "app/realtime/process.h"
+#include "app/session/loader.h"
+#include "core/compile/compile.h"
+#include "tests/support/random.h"
+
+namespace {
+
+using namespace ressort;
+
+constexpr double rate_hz = 44100.0;
+constexpr std::uint32_t serial = 1;
+
+using rig::Random;
+
+class Abuser {
+ public:
+  Abuser(const Instrument& instrument, std::uint64_t seed, bool force)
+      : instrument_(instrument), random_(seed), one_in_is_beyond_(force ? 3 : 50) {}
+
+  // A few events for a block; at times none at all, so that something can fade away.
+  std::vector<Event> events(std::size_t frames) {
+    if (chance(400)) {
+      calm_blocks_ = random_.below(300);
+    }
+    std::vector<Event> events;
+    if (calm_blocks_ > 0) {
+      --calm_blocks_;
+      return events;
+    }
+    const std::size_t count = random_.below(12);
+    for (std::size_t i = 0; i < count; ++i) {
+      events.push_back(event());
+      events.back().frame = static_cast<std::uint32_t>(random_.below(frames));
+    }
+    if (!instrument_.parameters.empty() && chance(4)) {
+      sweep(events, frames);
+    }
+    for (Event& event : events) {
+      event.model = serial;
+    }
+    return events;
+  }
+
+  // One channel of noise, with what is no number in it.
+  void fill(std::vector<double>& samples) {
+    static constexpr double nothings[] = {std::numeric_limits<double>::quiet_NaN(),
+                                          std::numeric_limits<double>::infinity(), -1e300, 1e38};
+    const double level = chance(3) ? 0.0 : std::pow(10.0, random_.uniform(-4.0, 2.0));
+    for (double& sample : samples) {
+      sample = chance(20'000) ? nothings[random_.below(std::size(nothings))]
+                              : random_.uniform(-level, level);
+    }
+  }
+
+ private:
+  // A parameter, sample by sample, from anywhere to anywhere.
+  void sweep(std::vector<Event>& events, std::size_t frames) {
+    const std::size_t index = random_.below(instrument_.parameters.size());
+    for (std::uint32_t n = 0; n < frames; ++n) {
+      events.push_back({.frame = n,
+                        .kind = EventKind::parameter,
+                        .index = static_cast<std::uint16_t>(index),
+                        .value = value_of(instrument_.parameters[index])});
+    }
+  }
+
+  bool chance(std::size_t one_in) { return random_.below(one_in) == 0; }
+  // Of either sign, from a millionth to a million.
+  double any_size() {
+    return (chance(2) ? 1.0 : -1.0) * std::pow(10.0, random_.uniform(-6.0, 6.0));
+  }
+
+  double value_of(const ParameterInfo& info) {
+    const double width = info.maximum - info.minimum;
+    const double beyond = chance(one_in_is_beyond_) ? 10.0 * width : 0.0;
+    return random_.uniform(info.minimum - beyond, info.maximum + beyond);
+  }
+
+  Event event() {
+    const auto key = [&] { return static_cast<std::uint16_t>(random_.below(128)); };
+    const auto input = [&] {
+      return instrument_.inputs.empty()
+                 ? std::uint16_t{1}
+                 : static_cast<std::uint16_t>(
+                       instrument_.inputs[random_.below(instrument_.inputs.size())].number);
+    };
+    switch (random_.below(12)) {
+      case 0:
+      case 1:
+        return {.kind = EventKind::note_on, .index = key(), .value = random_.uniform(0.01, 1.0)};
+      case 2:
+        return {.kind = EventKind::note_off, .index = key()};
+      case 3:
+        return {.kind = EventKind::controller, .index = key(), .value = random_.uniform(0.0, 1.0)};
+      case 4:
+        return {.kind = EventKind::bend, .value = random_.uniform(-1.0, 1.0)};
+      case 5:
+        return {.kind = EventKind::pressure, .value = random_.uniform(0.0, 1.0)};
+      case 6:
+        return {.kind = EventKind::position, .index = input(), .value = any_size()};
+      case 7:
+        return {.kind = EventKind::force,
+                .index = input(),
+                .value = any_size(),
+                .value2 = chance(2) ? 0.0 : random_.uniform(0.0, 0.1)};
+      case 8:
+        return {.kind = EventKind::pluck, .index = input(), .value = random_.uniform(0.0, 1.0)};
+      case 9:
+        return {.kind = EventKind::bow,
+                .index = input(),
+                .value = random_.uniform(-1.0, 1.0),
+                .value2 = random_.uniform(-1.0, 1.0)};
+      case 10:
+        return instrument_.custom.empty()
+                   ? Event{.kind = EventKind::key_pressure, .index = key()}
+                   : Event{.kind = EventKind::custom,
+                           .index = static_cast<std::uint16_t>(
+                               instrument_.custom[random_.below(instrument_.custom.size())].row),
+                           .value = random_.uniform(0.0, 1.0)};
+      default:
+        return chance(200) ? Event{.kind = EventKind::panic}
+                           : Event{.kind = EventKind::note_off, .index = key()};
+    }
+  }
+
+  const Instrument& instrument_;
+  Random random_;
+  std::size_t one_in_is_beyond_;
+  std::size_t calm_blocks_ = 0;
+};
+
+struct Found {
+  std::uint64_t wrong = 0;  // samples
+  double peak = 0.0;
+  std::uint64_t runaways = 0;
+};
+
+Found abuse(Compiled compiled, double seconds, std::uint64_t seed, bool force) {
+  const Instrument instrument = compiled.instrument;
+  Process process(rate_hz);
+  process.slot.offer(new Sounding{std::move(compiled.engine), serial});
+  Abuser abuser(instrument, seed, force);
+  Random lengths(seed + 1);
+  const auto channels = static_cast<std::size_t>(std::max(2, instrument.outputs));
+  std::vector<std::vector<double>> out(channels);
+  std::vector<std::vector<double>> in(static_cast<std::size_t>(instrument.audio_inputs));
+  Found found;
+  const auto total = static_cast<std::int64_t>(seconds * rate_hz);
+  for (std::int64_t at = 0; at < total;) {
+    const std::size_t frames = lengths.below(3) == 0 ? 1 + lengths.below(512) : 64;
+    std::vector<double*> outputs;
+    for (std::vector<double>& channel : out) {
+      channel.assign(frames, 0.0);
+      outputs.push_back(channel.data());
+    }
+    std::vector<const double*> inputs;
+    for (std::vector<double>& channel : in) {
+      channel.resize(frames);
+      abuser.fill(channel);
+      inputs.push_back(channel.data());
+    }
+    for (const Event& event : abuser.events(frames)) {
+      process.schedule(at + event.frame, event);
+    }
+    process.block(std::span<const double* const>(inputs), std::span<double* const>(outputs), frames,
+                  {}, 0);
+    for (const std::vector<double>& channel : out) {
+      for (const double sample : channel) {
+        found.wrong += std::fabs(sample) <= Limiter::ceiling ? 0 : 1;  // nor is NaN
+        found.peak = std::max(found.peak, std::fabs(sample));
+      }
+    }
+    at += static_cast<std::int64_t>(frames);
+  }
+  found.runaways = process.meters.resets.get();
+  return found;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  const double seconds = argc > 1 ? std::atof(argv[1]) : 0.0;
+  const std::uint64_t seed = argc > 2 ? std::strtoull(argv[2], nullptr, 10) : 1;
+  std::vector<std::string> names(argv + std::min(argc, 3), argv + argc);
+  if (!(seconds > 0.0)) {
+    std::fputs("ressort_abuse SECONDS [SEED [MODEL or PRESET...]]\n", stderr);
+    return 2;
+  }
+  if (names.empty()) {
+    names = {"IPlayTheTriangle", "PolyTriangle",      "PhysicalLFO",
+             "Resonator",        "PluckedHarmonics",  "BowedString",
+             "1000massString",   "LargeTriangleMesh", "20x30mesh"};
+  }
+  int failures = 0;
+  for (const std::string& name : names) {
+    const auto scene = load_scene(name, {});
+    if (!scene) {
+      std::fprintf(stderr, "%s\n", scene.error().message.c_str());
+      return 2;
+    }
+    for (const bool force : {false, true}) {
+      auto compiled = compile(scene->network, scene->preset, {.rate_hz = rate_hz, .force = force});
+      if (!compiled) {
+        std::fprintf(stderr, "%s: %s\n", name.c_str(), compiled.error().message.c_str());
+        return 2;
+      }
+      const Found found = abuse(*std::move(compiled), seconds, seed, force);
+      std::printf("%-20s %6g s, seed %llu%s: peak %.3f, %llu voices ran away, %llu samples wrong\n",
+                  name.c_str(), seconds, static_cast<unsigned long long>(seed),
+                  force ? ", forced" : "", found.peak,
+                  static_cast<unsigned long long>(found.runaways),
+                  static_cast<unsigned long long>(found.wrong));
+      std::fflush(stdout);
+      failures += found.wrong > 0 ? 1 : 0;
+    }
+  }
+  return failures == 0 ? 0 : 1;
+}

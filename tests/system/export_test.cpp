@@ -1,0 +1,245 @@
+// What is exported to FAUST, compiled by FAUST, sounds as what is rendered here: sample by sample,
+// for every element, law and place. Needs the faust compiler and a C++ compiler.
+#include <unistd.h>
+
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <utility>
+#include <vector>
+
+#include "tests/support/catch.h"
+#include "tests/support/rig.h"
+#include "tests/support/sound.h"
+#include "tests/system/faust_models.h"
+
+using namespace ressort;
+
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr std::size_t frames = 2000;
+constexpr std::size_t channels = 7;  // of the input; no model has more
+constexpr double tolerance = 1e-9;   // of each channel's peak
+
+// What surrounds every compiled program: `runner NAME RATE IN OUT [PARAMETER VALUE]` steps it over
+// raw interleaved doubles.
+const char* const runner_start = R"(
+#include <cmath>
+#include <cstdio>
+#include <cstdlib>
+#include <cstring>
+#include <algorithm>
+#include <map>
+#include <string>
+#include <vector>
+#define FAUSTFLOAT double
+struct Meta { void declare(const char*, const char*) {} };
+struct UI {
+  std::map<std::string, double*> sliders;
+  void openVerticalBox(const char*) {}
+  void closeBox() {}
+  void declare(double*, const char*, const char*) {}
+  void addHorizontalSlider(const char* name, double* zone, double, double, double, double) {
+    sliders[name] = zone;
+  }
+};
+struct dsp {
+  virtual ~dsp() {}
+  virtual int getNumInputs() = 0;
+  virtual int getNumOutputs() = 0;
+  virtual void init(int) = 0;
+  virtual void buildUserInterface(UI*) = 0;
+  virtual void compute(int, double**, double**) = 0;
+};
+)";
+
+const char* const runner_end = R"(
+std::vector<double> read(const char* path) {
+  std::vector<double> all;
+  if (FILE* file = std::fopen(path, "rb")) {
+    double block[4096];
+    for (std::size_t n; (n = std::fread(block, 8, 4096, file)) > 0;) all.insert(all.end(), block, block + n);
+    std::fclose(file);
+  }
+  return all;
+}
+int main(int argc, char** argv) {
+  dsp* d = make(argv[1]);
+  if (!d) return 3;
+  d->init(std::atoi(argv[2]));
+  UI ui;
+  d->buildUserInterface(&ui);
+  if (argc > 6) {
+    if (!ui.sliders.count(argv[5])) return 4;
+    *ui.sliders[argv[5]] = std::atof(argv[6]);
+  }
+  const std::vector<double> in = read(argv[3]);
+  const int frames = static_cast<int>(in.size() / CHANNELS);
+  std::vector<std::vector<double>> from(CHANNELS, std::vector<double>(frames));
+  for (int n = 0; n < frames; ++n)
+    for (int c = 0; c < CHANNELS; ++c) from[c][n] = in[n * CHANNELS + c];
+  std::vector<std::vector<double>> to(d->getNumOutputs(), std::vector<double>(frames));
+  std::vector<double*> inputs, outputs;
+  for (auto& x : from) inputs.push_back(x.data());
+  for (auto& y : to) outputs.push_back(y.data());
+  if (d->getNumInputs() > CHANNELS) return 5;
+  d->compute(frames, inputs.data(), outputs.data());
+  FILE* file = std::fopen(argv[4], "wb");
+  for (int n = 0; n < frames; ++n)
+    for (auto& y : to) std::fwrite(&y[n], 8, 1, file);
+  return std::fclose(file);
+}
+)";
+
+void run(const std::string& command) {
+  const int code = std::system(command.c_str());
+  INFO(command);
+  REQUIRE(code == 0);
+}
+
+void write(const fs::path& path, const std::string& text) {
+  std::ofstream file(path, std::ios::binary);
+  file << text;
+  REQUIRE(file.good());
+}
+
+// Slow hands on every channel, and blows: forces, positions and parameters at once.
+std::vector<double> gesture() {
+  std::vector<double> samples;
+  std::vector<rig::Motion> hands;
+  for (std::size_t c = 0; c < channels; ++c) {
+    hands.emplace_back(c + 1, 20.0, 200.0);
+  }
+  for (std::size_t n = 0; n < frames; ++n) {
+    for (std::size_t c = 0; c < channels; ++c) {
+      const double blow = n % 500 == 60 * c ? 0.1 : 0.0;
+      samples.push_back((c == 0 ? 0.01 : 0.4) * hands[c](n) + blow);
+    }
+  }
+  return samples;
+}
+
+class Stage {
+ public:
+  // Exports, compiles and builds all models at once.
+  explicit Stage(const std::vector<std::pair<std::string, std::string>>& models,
+                 const std::string& options = "")
+      : options_(options),
+        folder_(fs::temp_directory_path() / ("ressort-faust-" + std::to_string(getpid()))) {
+    fs::create_directory(folder_);
+    input_ = gesture();
+    std::ofstream raw(folder_ / "in.raw", std::ios::binary);
+    raw.write(reinterpret_cast<const char*>(input_.data()),
+              static_cast<std::streamsize>(input_.size() * sizeof(double)));
+    std::string runner = runner_start;
+    std::string make = "dsp* make(const std::string& name) {\n";
+    for (const auto& [name, text] : models) {
+      write(folder_ / (name + ".mdl"), text);
+      run(std::string(RESSORT_PROGRAM) + " export " + path(name + ".mdl") + " --to faust -o " +
+          path(name + ".dsp") + options);
+      run("faust -double -lang cpp -cn " + name + "_dsp " + path(name + ".dsp") + " -o " +
+          path(name + ".h"));
+      runner += "#include \"" + name + ".h\"\n";
+      make += "  if (name == \"" + name + "\") return new " + name + "_dsp;\n";
+    }
+    write(folder_ / "runner.cpp", "#define CHANNELS " + std::to_string(channels) + "\n" + runner +
+                                      make + "  return nullptr;\n}\n" + runner_end);
+    run(std::string(RESSORT_CXX) + " -std=c++17 -O1 -ffp-contract=off -w " + path("runner.cpp") +
+        " -o " + path("runner"));
+  }
+  ~Stage() {
+    std::error_code error;
+    fs::remove_all(folder_, error);
+  }
+
+  std::string path(const std::string& name) const { return (folder_ / name).string(); }
+
+  // The rendered model and the compiled program, as the largest difference in shares of a
+  // channel's peak.
+  double difference(const std::string& name, int rate_hz, const std::string& parameter = "",
+                    const std::string& value = "") {
+    auto wav = SoundWriter::open(path("in.wav"),
+                                 {.rate_hz = static_cast<double>(rate_hz),
+                                  .channels = static_cast<int>(channels),
+                                  .samples = SampleFormat::float64},
+                                 Existing::replace);
+    REQUIRE(wav);
+    REQUIRE(wav->write(input_.data(), frames));
+    REQUIRE(wav->close());
+    run(std::string(RESSORT_PROGRAM) + " render " + path(name + ".mdl") +
+        " -q --format double -r " + std::to_string(rate_hz) + " --frames " +
+        std::to_string(frames) + " --input " + path("in.wav") + " -o " + path("expected.wav") +
+        options_ + (parameter.empty() ? "" : " --set " + parameter + "=" + value));
+    run(path("runner") + " " + name + " " + std::to_string(rate_hz) + " " + path("in.raw") + " " +
+        path("found.raw") + " " + parameter + " " + value);
+    const auto expected = read_sound(path("expected.wav"));
+    REQUIRE(expected);
+    return compare(expected->channels);
+  }
+
+ private:
+  double compare(const std::vector<std::vector<double>>& expected) const {
+    std::vector<double> found(expected.size() * frames + 1);
+    std::ifstream raw(folder_ / "found.raw", std::ios::binary);
+    raw.read(reinterpret_cast<char*>(found.data()),
+             static_cast<std::streamsize>(found.size() * sizeof(double)));
+    REQUIRE(raw.gcount() ==
+            static_cast<std::streamsize>(expected.size() * frames * sizeof(double)));
+    double worst = 0.0;
+    double loudest = 0.0;
+    for (std::size_t c = 0; c < expected.size(); ++c) {
+      rig::Comparison channel;
+      for (std::size_t n = 0; n < frames; ++n) {
+        channel.add(expected[c][n], found[n * expected.size() + c]);
+      }
+      loudest = std::max(loudest, channel.peak);
+      worst = std::max(worst, channel.peak > 0.0 ? channel.relative() : channel.worst);
+    }
+    REQUIRE(loudest > 1e-6);
+    REQUIRE(loudest < 1e6);
+    return worst;
+  }
+
+  std::string options_;
+  fs::path folder_;
+  std::vector<double> input_;
+};
+
+}  // namespace
+
+TEST_CASE("what FAUST makes of an exported model sounds as the model does", "[export]") {
+  Stage stage(scenes::faust_models());
+  for (const auto& [name, text] : scenes::faust_models()) {
+    const double found = stage.difference(name, 44100);
+    INFO(name << " differs by " << rig::show(found));
+    CHECK(found < tolerance);
+  }
+  for (const int rate_hz : {32000, 48000, 96000}) {
+    for (const char* name :
+         {"newer_start", "older_start", "places", "driven", "clipped_spring", "bow", "smooth_bow",
+          "clipped_contact", "damped_pluck", "wiring", "raised_string", "falling"}) {
+      const double found = stage.difference(name, rate_hz);
+      INFO(name << " at " << rate_hz << " Hz differs by " << rig::show(found));
+      CHECK(found < tolerance);
+    }
+  }
+  CHECK(stage.difference("poly_triangle", 44100, "m_K", "0.2") < tolerance);
+  CHECK(stage.difference("turned_bow", 44100, "p", "1") < tolerance);
+}
+
+TEST_CASE("raw numbers are the same numbers at every rate", "[export]") {
+  std::vector<std::pair<std::string, std::string>> few;
+  for (const auto& model : scenes::faust_models()) {
+    if (model.first == "newer_start" || model.first == "bow" || model.first == "places") {
+      few.push_back(model);
+    }
+  }
+  Stage stage(few, " --no-rescale");
+  for (const auto& [name, text] : few) {
+    const double found = stage.difference(name, 96000);
+    INFO(name << " differs by " << rig::show(found));
+    CHECK(found < tolerance);
+  }
+}

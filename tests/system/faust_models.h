@@ -1,0 +1,120 @@
+// tests: one small network for each thing that FAUST shall be told, by name.
+#pragma once
+
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "tests/support/scenes.h"
+
+namespace ressort::scenes {
+
+// A mass between a wall and a link of the given law to what input 2 holds; input 1 pushes it.
+inline std::string law(const std::string& link) {
+  return "@g ground 0.\n@m mass 1.5 0. 0.\n@r springDamper @g @m 0.05 0.002\n@in2 posInput 0.\n"
+         "@l " +
+         link + "\n@in1 frcInput @m\n@out1 posOutput @m\n@out2 frcOutput @m\n";
+}
+
+// A macro that is pushed at one place and heard at another.
+inline std::string played(const std::string& macro, const std::string& from,
+                          const std::string& to) {
+  return "@s " + macro + "\n@in1 frcInput [@s " + from + "]\n@out1 posOutput [@s " + to +
+         "]\n@out2 frcOutput [@s " + to + "]\n";
+}
+
+inline const std::vector<std::pair<std::string, std::string>>& faust_models() {
+  static const std::vector<std::pair<std::string, std::string>> all{
+      {"spring", law("spring @m @in2 0.03 0.01")},
+      {"undamped_spring", law("spring @m @in2 0.03")},
+      {"damper", law("damper @m @in2 0.01")},
+      {"quadratic_spring", law("nlSpring2 @m @in2 0.01 0.05 0.002")},
+      {"cubic_spring", law("nlSpring3 @m @in2 0.01 0.05 0.002")},
+      {"clipped_spring", law("nlSpringDamper @m @in2 0.01 0.5 0.1 0.002")},
+      {"clipped_spring_flat", law("nlSpringDamper @m @in2 0.01 0. 0.1 0.002")},
+      {"clipped_spring_stiff", law("nlSpringDamper @m @in2 0.2 0.5 0.1 0.002")},
+      {"clipped_spring_softening", law("nlSpringDamper @m @in2 0.01 -0.5 0.1 0.002")},
+      {"pluck", law("nlPluck @in2 @m 0.1 0.1")},
+      {"damped_pluck", law("nlPluck @in2 @m 0.1 0.1 0.01")},
+      {"bow", law("nlBow @in2 @m 0.2 0.02")},
+      {"smooth_bow", law("nlBow @in2 @m 0.2 0.02 1")},
+      {"turned_bow", "@p param 0.\n" + law("nlBow @in2 @m 0.2 0.02 [1 - p]")},
+      {"sounding_bow", "@p audioParam @in1\n" + law("nlBow @in2 @m 0.2 0.02 p")},
+      {"contact", law("contact @m @in2 0.1 0.01 0.05")},
+      {"plain_contact", law("contact @m @in2 0.1 0.01")},
+      {"clipped_contact", law("nlContact @m @in2 0.02 5. 0.1 0.01 0.05")},
+      {"clipped_contact_flat", law("nlContact @m @in2 0.02 0. 0.1 0.01")},
+      {"clipped_contact_stiff", law("nlContact @m @in2 0.2 0.5 0.1 0.01")},
+      // Gravity and what moves at the start, in both dialects.
+      {"older_start",
+       "@g ground 0.3\n@m massG 1.2 0.002 1. 0.9\n@o osc 2. 0.1 0.01 0.5 0.45\n"
+       "@r spring @g @m 0.05 0.01\n@q spring @m @o 0.02 0.01\n@in1 posInput -0.4\n"
+       "@d damper @in1 @o 0.01\n@out1 posOutput @m\n@out2 posOutput @o\n@out3 frcOutput @g\n"},
+      {"newer_start",
+       "@g ground [0 0 0.3]\n@m mass 1.2 40. [0 0 1.] -200.\n@o osc 2. 0.1 0.01 30. [0 0 0.5] 90.\n"
+       "@h osc 1. 0.2 0.01 [0 0 0.] 50.\n@still osc 1. 0.2 0.01 [0 0 0.2] 0.\n"
+       "@r spring @g @m 0.05 0.01\n@q spring @m @o 0.02 0.01\n@in1 posInput [0 0 -0.4]\n"
+       "@d damper @in1 @o 0.01\n@out1 posOutput @m\n@out2 posOutput @o\n@out3 frcOutput @g\n"
+       "@out4 posOutput @h\n@out5 posOutput @still\n"},
+      {"falling", "@m mass 2. 20. 0. 0.\n@in1 frcInput @m\n@out1 posOutput @m\n"},
+      // Macros.
+      {"string", played("string 10 1. 0.5 0.0003 0. 0.", "0.7", "0.2")},
+      {"airy_string", played("string 20 1. 0.1 0.001 0.00005 0. 0.", "0.1", "0.9")},
+      {"raised_string", played("string 10 1.1 0.3 0.003 0.0001 0.4 30.", "0.7", "0.25")},
+      {"chain", played("chain 8 1. 0.2 0.002 0.001 0. 0.", "0", "1")},
+      {"stiff_string", played("stiffString 12 1. 0.4 0.2 0.01 0. 0.", "0.3", "0.95")},
+      {"mesh", played("mesh 4 3 1. 0.2 0.001 0.001 0. 0.", "0.3 0.5", "0.75 0.6")},
+      {"closed_mesh", played("closedMesh 5 4 1. 0.2 0.0001 0. 0.", "0.3 0.5", "0.75 0.5")},
+      {"corner_mesh", played("cornerMesh 4 5 1. 0.2 0.001 0.0002 0.1 0.", "0.3 0.5", "0.95 0.1")},
+      {"older_macro",
+       "@s string 8 1. 0.3 0.01 0.2\n@in1 posInput 1.\n@c contact @s @in1 0.1 0.01 0.2 0.4\n"
+       "@out1 posOutput @s 0.3\n@out2 frcOutput @s 0.5\n"},
+      // Places that a parameter, an expression or a channel gives.
+      {"places",
+       "@p param 0.3\n@q audioParam @in2\n@s string 9 1. 0.3 0.003 0. 0.\n"
+       "@me closedMesh 5 5 1. 0.2 0.002 0. 0.\n@in1 frcInput [@s p+0.1]\n@in3 posInput 0.\n"
+       "@pick nlPluck @in3 [@s q] 0.1 0.1\n@bridge spring [@s 1.1*p] [@me q p] 0.02 0.001\n"
+       "@tie spring [@s 0.4] [@s 0.65] 0.01 0.001\n@out1 posOutput [@s q]\n"
+       "@out2 posOutput [@me 0.5+0.4*q q]\n@out3 frcOutput [@me q 0.5]\n@out4 frcOutput @in3\n"},
+      // A channel that turns everything.
+      {"driven",
+       "@w audioParam @in2\n@T param 0.1\n@g ground 0.2\n@m mass [1.5+w] [10*w] 0.3 50.\n"
+       "@o osc [1.2+0.3*w] [0.1+0.05*w] [0.01+0.004*w] [5*w] 0.1 40.\n"
+       "@o2 osc 1. [0.1+0.02*w] 0.01 0. 0.\n@r springDamper @g @m [T+0.05*w] [0.01+0.003*w]\n"
+       "@l nlSpring3 @m @o [0.05+0.02*w] [0.1*w] 0.001\n@q spring @o @o2 0.03\n"
+       "@in1 frcInput @m\n@in3 frcInput @o\n@in2 posInput 0.\n@t spring @in2 @o2 0.01 [0.01*w*w]\n"
+       "@out1 posOutput @m\n@out2 posOutput @o\n@out3 posOutput @o2\n@out4 frcOutput @o\n"},
+      // Everything that an expression may hold; names that FAUST has for itself.
+      {"expressions",
+       "@process param 0.1\n@with param -0.02\n@in param 2\n@rest param 1e-5\n"
+       "@import ground 0.\n@mem mass [max(1,in-0.5)] 0. 0.\n@m-x mass [abs(with)*50+pow(in,0.5)] "
+       "0. 0.\n"
+       "@select2 springDamper @import @mem [process*sqrt(in/4)] [exp(with)*0.001]\n"
+       "@r springDamper @mem @m-x [-with*(process+(in-1)-0.9)] [clamp(rest*100,0.0005,0.01)]\n"
+       "@r springDamper @mem @m-x [0.01-(process-0.1)-(-0.01)] [min(rest,1)/(2*in/4)]\n"
+       "@x springDamper @import @m-x [0.05*sin(in)+0.001*cos(in)*in/in*2] [0.001]\n"
+       "@in1 frcInput @mem\n@out1 posOutput @m-x\n@out2 posOutput @mem\n"},
+      // Channels with gaps, parallel links, lines in any order, a mass without
+      // links, a link from a mass to itself, outputs of what does not move.
+      {"wiring",
+       "@out7 posOutput @b\n@in1 frcInput @a\n@in5 frcInput @b\n@l1 spring @a @b 0.05 0.001\n"
+       "@l2 spring @b @a 0.03 0.002\n@l3 spring @g @b 0.02 0.001\n@lone mass 3. 0. 0.\n"
+       "@in2 frcInput @lone\n@a mass 1. 0. 0.\n@b mass 2. 0. 0.\n@g ground 0.\n@in3 posInput 0.1\n"
+       "@l4 spring @in3 @a 0.02 0.001\n@l5 spring @a @a 0.1 0.1\n@in4 frcInput @a\n"
+       "@in7 frcInput @g\n@out1 frcOutput @g\n@out2 posOutput @in3\n@out3 frcOutput @in3\n"
+       "@out5 posOutput @lone\n@out6 frcOutput @a\n@out8 posOutput @g\n"},
+      {"nothing_moves",
+       "@in1 posInput 0.2\n@g ground 0.1\n@r spring @g @in1 0.1 0.2\n@out1 frcOutput @in1\n"
+       "@out2 posOutput @in1\n"},
+      {"long_chain", string("s", 200, "0.3", "0.002") +
+                         "@in1 frcInput @s_m20\n@in2 posInput 0.\n@p nlPluck @in2 @s_m30 0.1 0.1\n"
+                         "@out1 posOutput @s_m40\n@out2 posOutput @s_m180\n"},
+      {"triangle", iplay_the_triangle()},
+      {"poly_triangle", poly_triangle()},
+      {"resonator", resonator()},
+      {"physical_lfo", physical_lfo()},
+  };
+  return all;
+}
+
+}  // namespace ressort::scenes

@@ -1,0 +1,391 @@
+// The whole program on a real JACK server: what a musician would notice, measured.
+#include <lo/lo.h>
+
+#include <cmath>
+#include <cstdio>
+#include <fstream>
+#include <map>
+
+#include "tests/system/stage.h"
+
+using namespace ressort::stage;
+
+namespace {
+
+constexpr std::size_t spacing = 31007;  // frames; a prime, so that every place in a block occurs
+constexpr int notes = 22;
+constexpr const char* osc_port = "19777";
+
+lo_address osc() {
+  static const lo_address address = lo_address_new("127.0.0.1", osc_port);
+  return address;
+}
+
+// Waits until the program answers on OSC.
+bool answers() {
+  std::atomic<bool> heard{false};
+  const lo_server server = lo_server_new(nullptr, nullptr);
+  lo_server_add_method(
+      server, "/status.reply", nullptr,
+      [](const char*, const char*, lo_arg**, int, lo_message, void* flag) {
+        *static_cast<std::atomic<bool>*>(flag) = true;
+        return 0;
+      },
+      &heard);
+  const bool answered = eventually([&] {
+    lo_send_from(osc(), server, LO_TT_IMMEDIATE, "/status", "");
+    lo_server_recv_noblock(server, 50);
+    return heard.load();
+  });
+  lo_server_free(server);
+  return answered;
+}
+
+// Whether the console's status shows this text, just now.
+bool status_shows(Child& play, const std::string& text) {
+  play.forget();
+  play.write("status\n");
+  return play.says("events") && play.said().find(text) != std::string::npos;
+}
+
+std::vector<std::size_t> onsets(const Listener& listener, std::size_t first) {
+  std::vector<std::size_t> found;
+  for (int n = 0; n < notes; ++n) {
+    const std::size_t from = first + static_cast<std::size_t>(n) * spacing;
+    found.push_back(listener.onset(from, from + spacing / 2, 0.01f) - from);
+  }
+  return found;
+}
+
+}  // namespace
+
+TEST_CASE("MIDI notes start on their frame", "[jack_midi]") {
+  const Server server(1024);
+  Child play(program({"play", "PolyTriangle", "-a", "jack", "-i", "-u", osc_port}));
+  REQUIRE(answers());
+  constexpr std::size_t first = 20000;
+  Listener listener(first + (notes + 1) * spacing);
+  std::vector<Listener::Message> messages;
+  for (std::size_t n = 0; n < notes; ++n) {
+    messages.push_back({first + n * spacing, {0x90, 69, 100}});
+    messages.push_back({first + n * spacing + 9000, {0x80, 69, 0}});
+  }
+  listener.plan(messages);
+  listener.start("ressort:out_left", "ressort:midi_in");
+  REQUIRE(listener.wait_for(first + notes * spacing));
+  const std::vector<std::size_t> late = onsets(listener, first);
+  const auto [least, most] = std::minmax_element(late.begin(), late.end());
+  CAPTURE(*least, *most);
+  CHECK(*most < spacing / 2);
+  CHECK(*most - *least == 0);  // frames
+  std::printf("MIDI onsets: %zu frames after the event, spread %zu\n", *least, *most - *least);
+}
+
+TEST_CASE("The last of two and a half thousand messages in one block is heard", "[jack_midi]") {
+  const Server server(1024);
+  Child play(program({"play", "PolyTriangle", "-a", "jack", "-i", "-u", osc_port}));
+  REQUIRE(answers());
+  Listener listener(48000 * 20);
+  std::vector<Listener::Message> messages(2500, {20000, {0xb0, 3, 0}});
+  messages.push_back({20000, {0x90, 69, 100}});
+  listener.plan(messages);
+  listener.start("ressort:out_left", "ressort:midi_in");
+  REQUIRE(listener.wait_for(48000));
+  CHECK(listener.onset(20000, 48000, 0.01f) < 22500);
+}
+
+TEST_CASE("OSC bundles start on the frame of their time tag", "[osc_time]") {
+  const Server server(1024);
+  Child play(program({"play", "PolyTriangle", "-a", "jack", "-i", "-u", osc_port}));
+  REQUIRE(answers());
+  Listener listener(48000 + (notes + 4) * spacing);
+  listener.start("ressort:out_left", "");
+  // NTP time in units of 2^-32 s, so that the spacing is as exact as a time tag can say it.
+  lo_timetag now;
+  lo_timetag_now(&now);
+  const unsigned long long start =
+      (static_cast<unsigned long long>(now.sec) << 32 | now.frac) + (1ull << 32);
+  const auto tag = [&](int n) {
+    const long double step = std::ldexp(static_cast<long double>(spacing) / 48000.0L, 32);
+    return start + static_cast<unsigned long long>(llroundl(step * static_cast<long double>(n)));
+  };
+  std::thread sender([&] {
+    for (int n = 0; n < notes; ++n) {
+      const unsigned long long t = tag(n);
+      const lo_timetag when{static_cast<std::uint32_t>(t >> 32), static_cast<std::uint32_t>(t)};
+      const lo_bundle bundle = lo_bundle_new(when);
+      const lo_message message = lo_message_new();
+      lo_message_add_int32(message, 69);
+      lo_message_add_int32(message, 100);
+      lo_bundle_add_message(bundle, "/note/on", message);
+      lo_send_bundle(osc(), bundle);
+      lo_bundle_free_recursive(bundle);
+      std::this_thread::sleep_for(600ms);  // less than the spacing, and never a multiple of it
+    }
+  });
+  const std::size_t begin = listener.frames();
+  const bool heard = listener.wait_for(begin + 48000 + notes * spacing + 4096);
+  sender.join();
+  REQUIRE(heard);
+  const std::size_t first = listener.onset(begin, begin + 96000, 0.01f);
+  REQUIRE(first < begin + 96000);
+  std::size_t worst = 0;
+  for (int n = 0; n < notes; ++n) {
+    const std::size_t expected = first + static_cast<std::size_t>(n) * spacing;
+    const std::size_t found = listener.onset(expected - 2000, expected + spacing / 2, 0.01f);
+    worst = std::max(worst, found > expected ? found - expected : expected - found);
+  }
+  CHECK(worst == 0);  // frames
+  std::printf("OSC bundles: at most %zu frames from the exact spacing\n", worst);
+}
+
+// What is sent and asked goes through one socket and one queue: an answer comes after all before
+// it.
+TEST_CASE("Notes and panic get through a flood, with the future full", "[flood]") {
+  Child play(program({"play", "PolyTriangle", "-a", "dummy", "-m", "none", "-u", osc_port}));
+  REQUIRE(answers());
+  lo_timetag now;
+  lo_timetag_now(&now);
+  const lo_timetag ahead{now.sec + 9, now.frac};
+  for (int packet = 0; packet < 4; ++packet) {
+    const lo_bundle bundle = lo_bundle_new(ahead);
+    for (int i = 0; i < 1400; ++i) {
+      const lo_message note = lo_message_new();
+      lo_message_add_int32(note, 30 + i % 90);
+      lo_bundle_add_message(bundle, "/note/on", note);
+    }
+    lo_send_bundle(osc(), bundle);
+    lo_bundle_free_recursive(bundle);
+  }
+  // 4200 do not fit into 4096: the last two were refused, and are counted.
+  CHECK(eventually([&] { return status_shows(play, "2800 dropped"); }));
+
+  std::atomic<bool> enough{false};
+  std::thread flood([&] {
+    const lo_address own = lo_address_new("127.0.0.1", osc_port);
+    for (int i = 0; !enough; ++i) {
+      lo_send(own, i % 2 == 0 ? "/bend" : "/pressure", "f", 0.01f * static_cast<float>(i % 100));
+      if (i % 100 == 99) {
+        std::this_thread::sleep_for(1ms);  // 100 000 a second
+      }
+    }
+    lo_address_free(own);
+  });
+  play.write("noteon 60\n");
+  CHECK(eventually([&] { return status_shows(play, "voices  1 of 16"); }));
+  play.write("noteoff 60\npanic\n");
+  CHECK(eventually([&] { return status_shows(play, "voices  0 of 16"); }));
+  // By OSC too, as often as a packet is lost before the flood lets it in.
+  play.write("noteon 64\n");
+  CHECK(eventually([&] { return status_shows(play, "voices  1 of 16"); }));
+  CHECK(eventually([&] {
+    lo_send(osc(), "/panic", "");
+    return status_shows(play, "voices  0 of 16");
+  }));
+  enough = true;
+  flood.join();
+  std::this_thread::sleep_for(10s);  // the time of the bundles has come, and nobody waits for it
+  CHECK(status_shows(play, "voices  0 of 16"));
+  play.signal(SIGTERM);
+  CHECK(play.exit_code() == 0);
+}
+
+TEST_CASE("The callback allocates, locks, reads, writes and waits never", "[callback]") {
+  const std::string report = "/tmp/ressort-spy-" + std::to_string(getpid());
+  const auto counts = [&] {
+    std::map<std::string, unsigned long> found;
+    std::ifstream file(report);
+    std::string name;
+    for (unsigned long n = 0; file >> name >> n;) {
+      found[name] = n;
+    }
+    std::remove(report.c_str());
+    return found;
+  };
+  const Server server(256);
+
+  SECTION("the spy sees what is there to see") {
+    {
+      Child play(program({"play", "PolyTriangle", "-a", "jack", "-i", "-u", osc_port}),
+                 {{"LD_PRELOAD", RESSORT_SPY}, {"RTSPY_OUT", report}, {"RTSPY_PROVOKE", "1"}});
+      REQUIRE(answers());
+      std::this_thread::sleep_for(200ms);
+      play.signal(SIGTERM);
+      CHECK(play.exit_code() == 0);
+    }
+    auto found = counts();
+    CHECK(found["callbacks"] > 10);
+    CHECK(found["allocations"] >= found["callbacks"]);
+    CHECK(found["releases"] >= found["callbacks"]);
+  }
+
+  SECTION("60 s of notes, controllers, floods, sweeps and swaps") {
+    const char* const scenes[] = {"IPlayTheTriangle", "PolyTriangle",     "PluckedHarmonics",
+                                  "BowedString",      "PhysicalLFO",      "Resonator",
+                                  "20x30mesh",        "LargeTriangleMesh"};
+    {
+      Child play(program({"play", "PolyTriangle", "-a", "jack", "-u", osc_port}),
+                 {{"LD_PRELOAD", RESSORT_SPY}, {"RTSPY_OUT", report}});
+      REQUIRE(answers());
+      Listener listener(48000 * 70);
+      std::vector<Listener::Message> messages;
+      unsigned state = 1;
+      const auto random = [&](unsigned below) {
+        state = state * 1664525u + 1013904223u;
+        return static_cast<unsigned char>((state >> 16) % below);
+      };
+      for (std::size_t frame = 4800; frame < 48000 * 60; frame += 600 + random(255) * 4u) {
+        const unsigned char key = static_cast<unsigned char>(40 + random(50));
+        messages.push_back({frame, {0x90, key, static_cast<unsigned char>(1 + random(127))}});
+        messages.push_back({frame + 100, {0xb0, random(120), random(128)}});
+        messages.push_back({frame + 150, {0xe0, random(128), random(128)}});
+        messages.push_back({frame + 200, {0xd0, random(128), 0}});
+        messages.push_back({frame + 500, {0x80, key, 0}});
+      }
+      listener.plan(messages);
+      listener.start("ressort:out_left", "ressort:midi_in");
+      for (int round = 0; listener.frames() < 48000 * 60; ++round) {
+        for (int i = 0; i < 200; ++i) {
+          lo_send(osc(), "/param/*", "f", 0.05f + 0.0005f * static_cast<float>(i));
+          lo_send(osc(), "/in/1/position", "f", 0.01f * static_cast<float>(i % 10));
+          lo_send(osc(), "/in/1/force", "ff", 0.001f, 0.01f);
+          lo_send(osc(), "/nonsense", "s", "x");
+        }
+        lo_send(osc(), "/model/load", "s",
+                scenes[static_cast<std::size_t>(round) % std::size(scenes)]);
+        play.write("set m_K 0.1\nnoteon 60\npluck\nstatus\n");
+        play.forget();
+        std::this_thread::sleep_for(100ms);
+      }
+      play.signal(SIGTERM);
+      CHECK(play.exit_code() == 0);
+    }
+    auto found = counts();
+    CHECK(found["callbacks"] > 10000);
+    for (const char* kind :
+         {"allocations", "releases", "locks", "reads", "writes", "waits", "others"}) {
+      INFO(kind);
+      CHECK(found[kind] == 0);
+    }
+    std::printf("%lu callbacks, nothing forbidden in any\n", found["callbacks"]);
+  }
+}
+
+TEST_CASE("RtMidi's messages are heard, through its JACK side", "[rtmidi]") {
+  const Server server(256);
+  Child play(program({"play", "PolyTriangle", "-a", "dummy", "-m", "jack", "-u", osc_port}));
+  REQUIRE(answers());
+  Listener listener(48000 * 20);
+  std::vector<Listener::Message> messages;
+  for (std::size_t frame = 24000; frame < 48000 * 15; frame += 4800) {
+    messages.push_back({frame, {0x90, 60, 110}});
+  }
+  listener.plan(messages);
+  listener.start("", "ressort:midi_in");
+  // The dummy backend is silent; the program's own meters tell whether it played.
+  CHECK(eventually([&] { return status_shows(play, "voices  1 of 16"); }));
+}
+
+TEST_CASE("The ALSA null device runs, and plays what OSC asks for", "[alsa]") {
+  Child play(
+      program({"play", "PolyTriangle", "-a", "alsa", "-d", "null", "-m", "none", "-u", osc_port}));
+  REQUIRE(answers());
+  CHECK(play.said().find("ALSA 'null'") != std::string::npos);
+  CHECK(eventually([&] {
+    lo_send(osc(), "/note/on", "ii", 60, 110);
+    std::this_thread::sleep_for(50ms);
+    return status_shows(play, "voices  1 of 16");
+  }));
+  play.end_input();  // ends the console and nothing else
+  lo_send(osc(), "/note/off", "i", 60);
+  CHECK(answers());
+  play.signal(SIGTERM);
+  CHECK(play.exit_code() == 0);
+}
+
+TEST_CASE("The death of the server is survived, or told by the exit code", "[server_loss]") {
+  auto server = std::make_unique<Server>(256);
+
+  SECTION("waits, and plays again on the next server") {
+    Child play(program({"play", "PolyTriangle", "-a", "jack", "-i", "-u", osc_port}));
+    REQUIRE(answers());
+    server->kill();
+    REQUIRE(play.says("is gone"));
+    server.reset();
+    server = std::make_unique<Server>(512);
+    REQUIRE(play.says("playing again"));
+    Listener listener(48000 * 20);
+    listener.plan({{9600, {0x90, 60, 110}}});
+    listener.start("ressort:out_left", "ressort:midi_in");
+    REQUIRE(listener.wait_for(24000));
+    CHECK(listener.onset(9600, 24000, 0.01f) < 24000);
+    play.signal(SIGTERM);
+    CHECK(play.exit_code() == 0);
+  }
+
+  SECTION("what a person has connected is connected again, on servers of any kind") {
+    using Cable = std::pair<std::string, std::string>;
+    const std::vector<Cable> kept{{"ressort:out_left", "neighbour:left"},
+                                  {"ressort:out_right", "neighbour:left"},
+                                  {"ressort:out_right", "system:playback_2"},
+                                  {"neighbour:keys", "ressort:midi_in"},
+                                  {"neighbour:sound", "ressort:in_1"}};
+    const Cable pulled{"ressort:out_left", "neighbour:right"};
+    const Cable pulled_from_speaker{"ressort:out_left", "system:playback_1"};
+    // -j connects the speakers by itself, and has to respect what was pulled.
+    Child play(program({"play", "Resonator", "-a", "jack", "-j", "-u", osc_port}));
+    REQUIRE(answers());
+    auto neighbour = std::make_unique<Neighbour>();
+    const auto all_are_back = [&] {
+      return std::all_of(kept.begin(), kept.end(), [&](const Cable& cable) {
+        return neighbour->is_connected(cable.first, cable.second);
+      });
+    };
+    for (const auto& [from, to] : kept) {
+      REQUIRE(neighbour->connect(from, to));
+    }
+    REQUIRE(neighbour->connect(pulled.first, pulled.second));
+    REQUIRE(eventually([&] {
+      return neighbour->is_connected(pulled_from_speaker.first, pulled_from_speaker.second);
+    }));
+    std::this_thread::sleep_for(500ms);  // seen
+    neighbour->disconnect(pulled.first, pulled.second);
+    neighbour->disconnect(pulled_from_speaker.first, pulled_from_speaker.second);
+    std::this_thread::sleep_for(500ms);
+
+    struct Next {
+      int period_frames;
+      int rate_hz;
+      bool is_killed;
+    };
+    for (const Next& next : {Next{512, 48000, true}, Next{128, 44100, false}}) {
+      CAPTURE(next.period_frames, next.is_killed);
+      play.forget();
+      next.is_killed ? server->kill() : server->end();
+      REQUIRE(play.says("is gone"));
+      CHECK(eventually([&] { return status_shows(play, "audio   none; waiting for JACK"); }));
+      CHECK(play.said().find("cpu     nothing runs") != std::string::npos);
+      neighbour.reset();
+      server.reset();
+      server = std::make_unique<Server>(next.period_frames, next.rate_hz);
+      REQUIRE(play.says("playing again"));
+      std::this_thread::sleep_for(300ms);  // it comes later than we
+      neighbour = std::make_unique<Neighbour>();
+      CHECK(eventually(all_are_back));
+      std::this_thread::sleep_for(1500ms);  // longer than anybody waits before he tries again
+      CHECK(all_are_back());
+      CHECK_FALSE(neighbour->is_connected(pulled.first, pulled.second));
+      CHECK_FALSE(neighbour->is_connected(pulled_from_speaker.first, pulled_from_speaker.second));
+    }
+    play.signal(SIGTERM);
+    CHECK(play.exit_code() == 0);
+  }
+
+  SECTION("--exit-on-loss ends with 75") {
+    Child play(
+        program({"play", "PolyTriangle", "-a", "jack", "-i", "--exit-on-loss", "-u", osc_port}));
+    REQUIRE(answers());
+    server->kill();
+    CHECK(play.exit_code() == 75);
+  }
+}

@@ -1,0 +1,285 @@
+// Addresses, scores and patterns: what people ask for, and what they are told when it cannot be.
+#include "app/control/calls.h"
+
+#include "tests/support/player.h"
+
+namespace ressort {
+namespace {
+
+using namespace rig;
+
+// Input 1 is a hand that plucks, input 2 one that bows, input 3 a force.
+const Instrument& instrument() {
+  static const Instrument made = [] {
+    Preset preset;
+    preset.parameters = {{"s_K", 0.1, 0.05, 0.2}, {"s_Z", 0.001, 0.0, 0.01}};
+    preset.controls = {
+        {.target = "in1", .gesture = ControlGesture::pluck, .low = 0.1, .travel = 1.0},
+        {.target = "in2", .gesture = ControlGesture::bow},
+        {.source = ControlSource::osc, .address = "/finger", .target = "in1"},
+        {.source = ControlSource::osc,
+         .address = "/brightness",
+         .target = "s_K",
+         .gesture = ControlGesture::parameter,
+         .low = 0.05,
+         .high = 0.2},
+        {.source = ControlSource::osc, .address = "/both", .target = "in1"},
+        {.source = ControlSource::osc, .address = "/both", .target = "in2"}};
+    auto compiled = compile(network_of(scenes::string("s", 5, "0.1", "0.001") +
+                                       "@in1 posInput 0.\n@in2 posInput 0.\n@in3 frcInput @s_m0\n"
+                                       "@p nlPluck @in1 @s_m1 .1 .1\n@b nlBow @in2 @s_m2 .1 .1\n" +
+                                       scenes::output(1, "s_m0")),
+                            preset, {});
+    REQUIRE(compiled);
+    return compiled->instrument;
+  }();
+  return made;
+}
+
+// A call as it is typed.
+Call call(const std::string& text) {
+  const auto words = split_words(text);
+  Call made{words.at(0), {}};
+  for (std::size_t i = 1; i < words.size(); ++i) {
+    made.arguments.push_back(to_argument(words[i]));
+  }
+  return made;
+}
+
+Event event(const std::string& text) {
+  INFO(text);
+  CHECK(plays(call(text), instrument()));
+  const auto events = to_events(call(text), instrument(), 9);
+  INFO((events ? "" : events.error().message));
+  REQUIRE(events);
+  REQUIRE(events->size() == 1);
+  CHECK((*events)[0].frame == 0);
+  return (*events)[0];
+}
+
+void check(const Event& event, EventKind kind, int index, double value, std::uint32_t model) {
+  CHECK(event.kind == kind);
+  CHECK(event.index == index);
+  CHECK(event.value == Approx(value).margin(1e-15));
+  CHECK(event.model == model);
+}
+
+void check_error(const std::string& text, const std::string& message) {
+  const auto events = to_events(call(text), instrument(), 9);
+  INFO(text);
+  REQUIRE_FALSE(events);
+  CHECK(events.error().message == message);
+}
+
+}  // namespace
+
+TEST_CASE("every playing address becomes its event", "[calls]") {
+  check(event("/note/on 60"), EventKind::note_on, 60, 100 / 127.0, 0);
+  check(event("/note/on 60 127"), EventKind::note_on, 60, 1.0, 0);
+  check(event("/note/on 60 0"), EventKind::note_off, 60, 0.0, 0);
+  CHECK(event("/note/off 127").kind == EventKind::note_off);
+  CHECK(event("/note/off 127").index == 127);
+  check(event("/cc 1 127"), EventKind::controller, 1, 1.0, 0);
+  check(event("/pressure 0"), EventKind::pressure, 0, 0.0, 0);
+  check(event("/bend -0.5"), EventKind::bend, 0, -0.5, 0);
+  CHECK(event("/panic").kind == EventKind::panic);
+  // What names a part of the model is for this model only.
+  check(event("/param/s_K 0.15"), EventKind::parameter, 1, 0.15, 9);
+  check(event("/in/1/position -7.5"), EventKind::position, 1, -7.5, 9);
+  check(event("/in/3/force 0.1"), EventKind::force, 3, 0.1, 9);
+  CHECK(event("/in/3/force 0.1").value2 == 0.0);
+  CHECK(event("/in/3/force 0.1 2").value2 == 2.0);
+  check(event("/in/1/pluck 0.5"), EventKind::pluck, 1, 0.5, 9);
+  check(event("/in/2/bow -1"), EventKind::bow, 2, -1.0, 9);
+  CHECK(event("/in/2/bow 1").value2 < 0.0);  // the pressure stays as it is
+  CHECK(event("/in/2/bow 1 0.25").value2 == 0.25);
+  check(event("/finger 0.5"), EventKind::custom, 2, 0.5, 9);
+  const auto both = to_events(call("/both 0.25"), instrument(), 9);
+  REQUIRE(both);
+  REQUIRE(both->size() == 2);
+  check((*both)[0], EventKind::custom, 4, 0.25, 9);
+  check((*both)[1], EventKind::custom, 5, 0.25, 9);
+  check(event("/brightness 1"), EventKind::custom, 3, 1.0, 9);
+}
+
+TEST_CASE("what an input gives cannot be set", "[calls]") {
+  const auto compiled =
+      compile(network_of("@K audioParam @in2\n@Z param 0.1\n@o osc 1 K Z 0 0\n"), {}, {});
+  REQUIRE(compiled);
+  const auto one = to_events(call("/param/K 0.1"), compiled->instrument, 9);
+  REQUIRE_FALSE(one);
+  CHECK(one.error().message == "/param/K: input 2 gives it, sample by sample; it cannot be set");
+  // Among others it is left out.
+  const auto all = to_events(call("/param/* 0.1"), compiled->instrument, 9);
+  REQUIRE(all);
+  REQUIRE(all->size() == 1);
+  CHECK((*all)[0].index == 1);
+}
+
+TEST_CASE("a parameter keeps to its range, and a pattern reaches several", "[calls]") {
+  CHECK(event("/param/s_K 5").value == 0.2);
+  CHECK(event("/param/s_K -5").value == 0.05);
+  const auto events = to_events(call("/param/s_[KZ] 0.06"), instrument(), 9);
+  REQUIRE(events);
+  REQUIRE(events->size() == 2);
+  CHECK((*events)[0].value == 0.06);
+  CHECK((*events)[1].value == 0.01);
+  // Without a value it asks, and asking plays nothing.
+  CHECK_FALSE(plays(call("/param/s_K"), instrument()));
+  CHECK_FALSE(plays(call("/status"), instrument()));
+  CHECK_FALSE(plays(call("/model/load x"), instrument()));
+}
+
+TEST_CASE("what cannot be played is told, and what was expected", "[calls]") {
+  check_error("/nowhere 1", "unknown address '/nowhere'; /describe lists what there is");
+  check_error("/note/on", "/note/on: the key is missing");
+  check_error("/note/on 128", "/note/on: the key must lie between 0 and 127, found 128");
+  check_error("/note/on 60 128", "/note/on: the velocity must lie between 0 and 127, found 128");
+  check_error("/note/on sixty", "/note/on: the key must be a number, found 'sixty'");
+  check_error("/note/on 60 100 1", "/note/on: too many arguments: 3, expected 2");
+  check_error("/note/off", "/note/off: the key is missing");
+  check_error("/cc 1", "/cc: the value is missing");
+  check_error("/cc 128 1", "/cc: the number must lie between 0 and 127, found 128");
+  check_error("/pressure -1", "/pressure: the pressure must lie between 0 and 127, found -1");
+  check_error("/bend 1.5", "/bend: the bend must lie between -1 and 1, found 1.5");
+  check_error("/panic 1", "/panic: too many arguments: 1, expected 0");
+  check_error("/param/x 1", "/param/x: the model has no such parameter; it has s_M, s_K, s_Z");
+  check_error("/param/s_K loud", "/param/s_K: the value must be a number, found 'loud'");
+  check_error("/in/4/position 0", "/in/4/position: the model has the inputs 1 to 3");
+  check_error("/in/x/position 0", "/in/x/position: the model has the inputs 1 to 3");
+  check_error("/in/1/wiggle 0", "/in/1/wiggle: an input knows /position, /force, /pluck and /bow");
+  check_error("/in/1/force 1",
+              "/in/1/force: input 1 takes a position, no force: use /in/N/position");
+  check_error("/in/3/position 1",
+              "/in/3/position: input 3 takes a force, no position: use /in/N/force");
+  check_error("/in/2/pluck 1", "/in/2/pluck: input 2 has no pluck in this preset");
+  check_error("/in/1/bow 1", "/in/1/bow: input 1 has no bow in this preset");
+  check_error("/in/1/pluck 2", "/in/1/pluck: the strength must lie between 0 and 1, found 2");
+  check_error("/in/3/force 1 -1",
+              "/in/3/force: the time in seconds must lie between 0 and 3600, found -1");
+  check_error("/finger 2", "/finger: the value must lie between 0 and 1, found 2");
+  const Call infinite{"/in/1/position", {std::numeric_limits<double>::infinity()}};
+  REQUIRE_FALSE(to_events(infinite, instrument(), 9));
+  CHECK(to_events(infinite, instrument(), 9).error().message ==
+        "/in/1/position: the position must be a number");
+  REQUIRE_FALSE(to_events(call("/in/1/position 0"), Instrument{}, 1));
+}
+
+TEST_CASE("the table has every address that plays", "[calls]") {
+  for (const AddressRow& row : addresses()) {
+    std::string address(row.address);
+    for (const auto& [letters, name] : {std::pair<std::string, std::string>{"NAME", "s_K"},
+                                        std::pair<std::string, std::string>{"/N/", "/1/"}}) {
+      if (const auto at = address.find(letters); at != std::string::npos) {
+        address.replace(at, letters.size(), name);
+      }
+    }
+    CAPTURE(address);
+    CHECK(plays({address, {1.0}}, instrument()) == row.plays);
+    CHECK_FALSE(row.does.empty());
+  }
+}
+
+TEST_CASE("words are divided by blanks, and quotes hold them together", "[calls]") {
+  using Words = std::vector<std::string>;
+  CHECK(split_words("") == Words{});
+  CHECK(split_words(" \t ") == Words{});
+  CHECK(split_words("a  b\tc\r") == Words{"a", "b", "c"});
+  CHECK(split_words("load \"my model\" x") == Words{"load", "my model", "x"});
+  CHECK(split_words("\"\" \"open") == Words{"", "open"});
+  CHECK(to_argument("1e-3") == Argument{0.001});
+  CHECK(to_argument("1x") == Argument{std::string("1x")});
+  CHECK(to_argument("nan") == Argument{std::string("nan")});
+}
+
+TEST_CASE("a score is times and addresses", "[calls]") {
+  const auto score = parse_score(
+      "# a score\n"
+      "0 /note/on 60 100\n"
+      "\n"
+      "  0.25\t/param/m_K 0.12  # a comment\r\n"
+      "1e1 /model/load \"my model\"");
+  REQUIRE(score);
+  REQUIRE(score->size() == 3);
+  CHECK((*score)[0].line == 2);
+  CHECK((*score)[0].column == 3);
+  CHECK((*score)[1].column == 8);
+  CHECK((*score)[0].time_s == 0.0);
+  CHECK((*score)[0].call.address == "/note/on");
+  CHECK((*score)[0].call.arguments == std::vector<Argument>{60.0, 100.0});
+  CHECK((*score)[1].line == 4);
+  CHECK((*score)[1].time_s == 0.25);
+  CHECK((*score)[1].call.arguments == std::vector<Argument>{0.12});
+  CHECK((*score)[2].time_s == 10.0);
+  CHECK((*score)[2].call.arguments == std::vector<Argument>{std::string("my model")});
+  CHECK(parse_score("")->empty());
+
+  const auto wrong = [](const std::string& text, int line, int column, const std::string& message) {
+    const auto read = parse_score(text);
+    INFO(text);
+    REQUIRE_FALSE(read);
+    CHECK(read.error().message == message);
+    CHECK(read.error().line == line);
+    CHECK(read.error().column == column);
+  };
+  wrong("0 /panic\nsoon /panic", 2, 1,
+        "found 'soon' where a time in seconds was expected, at most a day");
+  wrong("-1 /panic", 1, 1, "found '-1' where a time in seconds was expected, at most a day");
+  wrong("0.5", 1, 5, "expected an address such as /note/on after the time");
+  wrong("\n0.5 note", 2, 5, "expected an address such as /note/on after the time");
+  wrong("  0.5\t note", 1, 8, "expected an address such as /note/on after the time");
+  wrong("\t soon", 1, 3, "found 'soon' where a time in seconds was expected, at most a day");
+}
+
+TEST_CASE("patterns fit as OSC says", "[calls]") {
+  CHECK(fits("/a/b", "/a/b"));
+  CHECK_FALSE(fits("/a/b", "/a/bc"));
+  CHECK_FALSE(fits("/a/bc", "/a/b"));
+  CHECK(fits("*", "m_K"));
+  CHECK(fits("m_*", "m_K"));
+  CHECK(fits("m_*", "m_"));
+  CHECK(fits("*_K", "string_K"));
+  CHECK(fits("*a*b*", "xxaxxbxx"));
+  CHECK_FALSE(fits("*a*b*", "xxbxxaxx"));
+  CHECK_FALSE(fits("/*", "/a/b"));  // a star stays between two slashes
+  CHECK(fits("/*/b", "/a/b"));
+  CHECK(fits("m_?", "m_K"));
+  CHECK_FALSE(fits("m_?", "m_"));
+  CHECK_FALSE(fits("a?b", "a/b"));
+  CHECK(fits("m_[A-L]", "m_K"));
+  CHECK_FALSE(fits("m_[!A-L]", "m_K"));
+  CHECK(fits("m_[!A-L]", "m_Z"));
+  CHECK(fits("m_[XYK]", "m_K"));
+  CHECK(fits("{m,s}_K", "s_K"));
+  CHECK_FALSE(fits("{m,s}_K", "t_K"));
+  CHECK(fits("m_{K,Zo,Z}", "m_Z"));
+  CHECK(fits("", ""));
+  CHECK_FALSE(fits("", "a"));
+  CHECK(fits("**", "abc"));
+}
+
+TEST_CASE("no pattern takes long or leaves its text", "[calls]") {
+  // The test's time limit is what an exponential search would break.
+  const std::string name(5000, 'a');
+  std::string stars;
+  for (int i = 0; i < 2000; ++i) {
+    stars += "*a";
+  }
+  CHECK(fits(stars, name));
+  CHECK_FALSE(fits(stars + "b", name));
+  rig::Random random(21);
+  const std::string letters = "ab/*?[]{},!-";
+  for (int i = 0; i < 50000; ++i) {
+    std::string pattern;
+    for (std::size_t k = random.below(14); k-- > 0;) {
+      pattern += letters[random.below(letters.size())];
+    }
+    const bool once = fits(pattern, "ab/a");
+    REQUIRE(fits(pattern, "ab/a") == once);
+    if (pattern.find_first_of("*?[]{}") == std::string::npos) {
+      REQUIRE(once == (pattern == "ab/a"));
+    }
+  }
+}
+
+}  // namespace ressort

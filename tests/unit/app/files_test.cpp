@@ -1,0 +1,358 @@
+// Files that are written: nothing that is read or was there is lost, whatever happens meanwhile,
+// and what is killed is still a sound.
+#include "app/session/files.h"
+
+#include <signal.h>
+#include <sys/resource.h>
+#include <sys/stat.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <chrono>
+#include <cmath>
+#include <filesystem>
+#include <fstream>
+#include <set>
+#include <sstream>
+#include <thread>
+
+#include "tests/support/catch.h"
+#include "tests/support/sound.h"
+
+namespace ressort {
+namespace {
+
+namespace fs = std::filesystem;
+
+class Folder {
+ public:
+  Folder() {
+    std::string name = (fs::temp_directory_path() / "ressort_files_XXXXXX").string();
+    REQUIRE(mkdtemp(name.data()) != nullptr);
+    path_ = name;
+  }
+  ~Folder() {
+    std::error_code error;
+    fs::remove_all(path_, error);
+  }
+  Folder(const Folder&) = delete;
+  Folder& operator=(const Folder&) = delete;
+
+  std::string file(const std::string& name) const { return (path_ / name).string(); }
+  std::string write(const std::string& name, const std::string& text) const {
+    std::ofstream(path_ / name, std::ios::binary) << text;
+    return file(name);
+  }
+  std::string text(const std::string& name) const {
+    std::ostringstream all;
+    all << std::ifstream(path_ / name, std::ios::binary).rdbuf();
+    return all.str();
+  }
+  std::set<std::string> names() const {
+    std::set<std::string> all;
+    for (const auto& entry : fs::directory_iterator(path_)) {
+      all.insert(entry.path().filename().string());
+    }
+    return all;
+  }
+
+ private:
+  fs::path path_;
+};
+
+using Names = std::set<std::string>;
+
+bool has(const std::string& text, const std::string& part) {
+  return text.find(part) != text.npos;
+}
+
+template <class T>
+std::string error_of(const Result<T>& result) {
+  REQUIRE_FALSE(result);
+  return result.error().message;
+}
+
+// A ramp that every format holds to one part in 2^15 or, where it loses something, about.
+std::vector<double> ramp(std::size_t frames) {
+  std::vector<double> samples(2 * frames);
+  for (std::size_t n = 0; n < frames; ++n) {
+    samples[2 * n] = 0.5 * std::sin(0.05 * static_cast<double>(n));
+    samples[2 * n + 1] = 0.0;
+  }
+  return samples;
+}
+
+// Files may not grow beyond so much while this lives.
+class FileLimit {
+ public:
+  explicit FileLimit(rlim_t bytes) : before_(signal(SIGXFSZ, SIG_IGN)) {
+    getrlimit(RLIMIT_FSIZE, &old_);
+    const rlimit limit{bytes, old_.rlim_max};
+    setrlimit(RLIMIT_FSIZE, &limit);
+  }
+  ~FileLimit() {
+    setrlimit(RLIMIT_FSIZE, &old_);
+    signal(SIGXFSZ, before_);
+  }
+  FileLimit(const FileLimit&) = delete;
+  FileLimit& operator=(const FileLimit&) = delete;
+
+ private:
+  rlimit old_{};
+  void (*before_)(int);
+};
+
+}  // namespace
+
+TEST_CASE("a text takes its place when it is whole", "[files]") {
+  const Folder folder;
+  const std::string path = folder.write("a.txt", "old");
+  chmod(path.c_str(), 0640);
+  {
+    auto file = NewFile::open(path, Existing::replace);
+    REQUIRE(file);
+    REQUIRE(file->write("new"));
+    CHECK(folder.text("a.txt") == "old");
+    CHECK(folder.text("a.part.txt") == "new");
+    auto second = NewFile::open(path, Existing::replace);  // two at once
+    REQUIRE(second);
+    CHECK(folder.names() == Names{"a.txt", "a.part.txt", "a.part2.txt"});
+    REQUIRE(file->keep());
+  }
+  CHECK(folder.text("a.txt") == "new");
+  CHECK(folder.names() == Names{"a.txt"});
+  struct stat now {};
+  REQUIRE(stat(path.c_str(), &now) == 0);
+  CHECK((now.st_mode & 0777) == 0640);
+}
+
+TEST_CASE("a file that is there is not written over unasked", "[files]") {
+  const Folder folder;
+  const std::string path = folder.write("a.txt", "old");
+  CHECK(has(error_of(write_text(path, "new", Existing::refuse)),
+            "a.txt' is there already; --force writes over it"));
+  CHECK(folder.text("a.txt") == "old");
+  auto file = NewFile::open(folder.file("b.txt"), Existing::refuse);
+  REQUIRE(file);
+  REQUIRE(file->write("mine"));
+  folder.write("b.txt", "came meanwhile");
+  CHECK(has(error_of(file->keep()), "File exists"));
+  CHECK(folder.text("b.txt") == "came meanwhile");
+  CHECK(has(error_of(write_text(folder.file(""), "x", Existing::replace)), "is a folder"));
+}
+
+TEST_CASE("what a link leads to is replaced, not the link", "[files]") {
+  const Folder folder;
+  folder.write("real.txt", "old");
+  fs::create_symlink("real.txt", folder.file("link.txt"));
+  fs::create_symlink("later.txt", folder.file("dangling.txt"));
+  REQUIRE(write_text(folder.file("link.txt"), "new", Existing::replace));
+  REQUIRE(write_text(folder.file("dangling.txt"), "first", Existing::refuse));
+  CHECK(fs::is_symlink(folder.file("link.txt")));
+  CHECK(folder.text("real.txt") == "new");
+  CHECK(folder.text("later.txt") == "first");
+}
+
+TEST_CASE("what is read is known under every name", "[files]") {
+  const Folder folder;
+  const std::string read[] = {"", folder.write("in.wav", "x")};
+  fs::create_symlink("in.wav", folder.file("soft.wav"));
+  fs::create_hard_link(folder.file("in.wav"), folder.file("hard.wav"));
+  fs::create_directory(folder.file("sub"));
+  for (const char* name : {"in.wav", "./in.wav", "sub/../in.wav", "soft.wav", "hard.wav"}) {
+    INFO(name);
+    CHECK(has(error_of(spare(folder.file(name), read)), "cannot be written too"));
+  }
+  CHECK(spare(folder.file("out.wav"), read));
+  CHECK(spare(folder.write("same_text.wav", "x"), read));
+}
+
+TEST_CASE("a text that finds no room leaves what was there", "[files]") {
+  const Folder folder;
+  const std::string path = folder.write("a.txt", "old");
+  {
+    const FileLimit limit(4096);
+    CHECK(has(error_of(write_text(path, std::string(5000, 'x'), Existing::replace)),
+              "File too large"));
+  }
+  CHECK(folder.text("a.txt") == "old");
+  CHECK(folder.names() == Names{"a.txt"});
+  CHECK(has(error_of(write_text("/dev/full", "x", Existing::refuse)), "No space left on device"));
+  CHECK(write_text("/dev/null", "x", Existing::refuse));
+  CHECK(fs::is_character_file("/dev/null"));
+}
+
+TEST_CASE("a byte order mark is passed over, UTF-16 is told", "[files]") {
+  const Folder folder;
+  const auto text = read_text(folder.write("a",
+                                           "\xef\xbb\xbf"
+                                           "0 /panic"),
+                              100);
+  REQUIRE(text);
+  CHECK(*text == "0 /panic");
+  for (const std::string mark : {"\xff\xfe", "\xfe\xff"}) {
+    CHECK(has(error_of(read_text(folder.write("b", mark + std::string("0\0", 2)), 100)),
+              "b' is text in UTF-16; save it as UTF-8"));
+  }
+}
+
+TEST_CASE("the ending says what a sound file is", "[files]") {
+  const Folder folder;
+  const std::vector<double> samples = ramp(4000);
+  for (const std::string_view ending : sound_endings()) {
+    INFO(ending);
+    const std::string path = folder.file("a" + std::string(ending));
+    auto file = SoundWriter::open(path, {.rate_hz = 48000.0}, Existing::refuse);
+    REQUIRE(file);
+    REQUIRE(file->write(samples.data(), 4000));
+    REQUIRE(file->close());
+    const auto read = read_sound(path);
+    REQUIRE(read);
+    CHECK(read->rate_hz == 48000.0);
+    REQUIRE(read->channels.size() == 2);
+    REQUIRE(read->channels[0].size() == 4000);
+    double worst = 0.0;
+    for (std::size_t n = 0; n < 4000; ++n) {
+      worst = std::max(worst, std::fabs(read->channels[0][n] - samples[2 * n]));
+    }
+    CHECK(worst <= (ending == ".ogg" ? 0.05 : 0x1p-23));
+  }
+  // Each has the first bytes of its kind, none those of another.
+  CHECK(folder.text("a.wav").substr(0, 4) == "RIFF");
+  CHECK(folder.text("a.flac").substr(0, 4) == "fLaC");
+  CHECK(folder.text("a.ogg").substr(0, 4) == "OggS");
+  CHECK(folder.text("a.w64").substr(0, 4) == "riff");
+  CHECK(folder.text("a.aiff").substr(0, 4) == "FORM");
+  CHECK(folder.text("a.au").substr(0, 4) == ".snd");
+  CHECK(folder.text("a.caf").substr(0, 4) == "caff");
+}
+
+TEST_CASE("what a sound file cannot be is refused", "[files]") {
+  const Folder folder;
+  const auto refusal = [&](const std::string& name, const SoundForm& form) {
+    return error_of(SoundWriter::open(folder.file(name), form, Existing::refuse));
+  };
+  for (const char* name : {"a.mp4", "a", "a.mdl", ".wav"}) {
+    INFO(name);
+    CHECK(has(refusal(name, {}), "the name of no sound file; these are written: .wav, .w64"));
+  }
+  CHECK(has(refusal("a.flac", {.samples = SampleFormat::float32}), "holds pcm24, no floats"));
+  CHECK(has(refusal("a.ogg", {.samples = SampleFormat::pcm24}), "holds no such samples"));
+  CHECK(has(refusal("a.aiff", {.frames = 1LL << 30}), "ends at 4 GB"));
+  CHECK(folder.names().empty());
+}
+
+TEST_CASE("a sound is written over sounds and nothing else", "[files]") {
+  const Folder folder;
+  const auto open = [&](const std::string& name) {
+    return SoundWriter::open(folder.file(name), {}, Existing::replace);
+  };
+  folder.write("poem.wav", "it is no sound");
+  CHECK(has(error_of(open("poem.wav")), "is no sound: it is not written over"));
+  CHECK(folder.text("poem.wav") == "it is no sound");
+  folder.write("empty.wav", "");
+  CHECK(open("empty.wav"));
+  folder.write("old.wav", "RIFF, and then it was killed");
+  {
+    auto file = open("old.wav");
+    REQUIRE(file);
+    REQUIRE(file->write(ramp(100).data(), 100));
+  }  // not closed
+  CHECK(folder.text("old.wav") == "RIFF, and then it was killed");
+  CHECK(folder.names() == Names{"poem.wav", "empty.wav", "old.wav"});
+}
+
+TEST_CASE("a WAV of unknown or great length may pass 4 GB", "[files]") {
+  const Folder folder;
+  for (const std::optional<long long> frames : {std::optional<long long>(), {1LL << 32}}) {
+    const std::string path = folder.file("a.wav");
+    auto file = SoundWriter::open(path, {.frames = frames}, Existing::replace);
+    REQUIRE(file);
+    CHECK(folder.text("a.part.wav").substr(0, 4) == "RF64");
+    REQUIRE(file->write(ramp(100).data(), 100));
+    REQUIRE(file->close());
+    CHECK(folder.text("a.wav").substr(0, 4) == "RIFF");  // in the end it did not
+    CHECK(read_sound(path)->channels[0].size() == 100);
+  }
+}
+
+TEST_CASE("a sound that finds no room says so at the write, and what came before can be kept",
+          "[files]") {
+  const Folder folder;
+  constexpr std::size_t block = 256;
+  const std::vector<double> samples = ramp(block);
+  for (const std::string_view ending : sound_endings()) {
+    INFO(ending);
+    const std::string path = folder.file("a" + std::string(ending));
+    const FileLimit limit(40960);
+    auto file = SoundWriter::open(path, {.samples = {}, .is_shown = true}, Existing::refuse);
+    REQUIRE(file);
+    std::size_t written = 0;
+    Result<Done> last = Done{};
+    for (int i = 0; i < 2000 && (last = file->write(samples.data(), block)); ++i) {
+      written += block;
+    }
+    CHECK(has(error_of(last), "failed: File too large"));
+    REQUIRE(file->salvage());
+    const auto read = read_sound(path);
+    REQUIRE(read);
+    if (ending != ".flac" && ending != ".ogg") {  // these hold some back
+      CHECK(read->channels[0].size() >= written);
+      CHECK(read->channels[0].size() < written + block);
+    }
+  }
+  auto full = SoundWriter::open("/dev/full", {}, Existing::refuse);
+  CHECK(has(error_of(full), "No space left on device"));
+}
+
+TEST_CASE("what is killed is a sound as long as it was a second before", "[files]") {
+  const Folder folder;
+  constexpr std::size_t block = 480;
+  constexpr std::size_t blocks = 60;
+  const char* const names[] = {"a.wav", "a.w64", "a.flac", "a.ogg", "a.aiff", "a.au", "a.caf"};
+  const std::vector<double> samples = ramp(block);
+  int told[2];
+  REQUIRE(pipe(told) == 0);
+  const pid_t child = fork();
+  if (child == 0) {  // writes a block every 20 ms until it is killed, and tells each
+    std::vector<SoundWriter> files;
+    for (const char* name : names) {
+      files.push_back(*SoundWriter::open(folder.file(name), {.is_shown = true}, Existing::refuse));
+    }
+    do {
+      for (SoundWriter& file : files) {
+        static_cast<void>(file.write(samples.data(), block));
+      }
+      std::this_thread::sleep_for(std::chrono::milliseconds(20));
+    } while (write(told[1], "x", 1) == 1);
+    _exit(1);
+  }
+  close(told[1]);
+  char byte = 0;
+  std::size_t count = 0;
+  while (count < blocks && read(told[0], &byte, 1) == 1) {
+    ++count;
+  }
+  kill(child, SIGKILL);
+  int status = 0;
+  waitpid(child, &status, 0);
+  close(told[0]);
+  REQUIRE(count == blocks);
+  for (const char* name : names) {
+    INFO(name);
+    const auto sound = read_sound(folder.file(name));
+    REQUIRE(sound);
+    CHECK(sound->channels[0].size() >= blocks * block / 4);
+  }
+}
+
+TEST_CASE("a sound is read from an ordinary file", "[files]") {
+  const Folder folder;
+  REQUIRE(mkfifo(folder.file("pipe.wav").c_str(), 0600) == 0);
+  CHECK(has(error_of(SoundReader::open(folder.file("pipe.wav"))), "is no ordinary file"));
+  CHECK(has(error_of(SoundReader::open(folder.file("none.wav"))), "there is no file"));
+  CHECK(has(error_of(SoundReader::open(folder.file(""))), "is no ordinary file"));
+  CHECK(has(error_of(SoundReader::open(folder.write("text.wav", "no sound"))), "is no sound file"));
+}
+
+}  // namespace ressort

@@ -1,0 +1,144 @@
+// MIDI bytes to events: every message, and everything that can be wrong with one.
+#include "app/realtime/midi.h"
+
+#include <vector>
+
+#include "tests/support/rig.h"
+
+namespace ressort {
+namespace {
+
+using Bytes = std::vector<std::uint8_t>;
+
+std::vector<Event> read(MidiReader& reader, const Bytes& bytes) {
+  std::vector<Event> events;
+  reader.read(bytes, [&](const Event& event) { events.push_back(event); });
+  return events;
+}
+std::vector<Event> read(const Bytes& bytes) {
+  MidiReader reader;
+  return read(reader, bytes);
+}
+
+void check_event(const Event& event, EventKind kind, int channel, int index, double value) {
+  CHECK(event.kind == kind);
+  CHECK(event.channel == channel);
+  CHECK(event.index == index);
+  CHECK(event.value == Approx(value).margin(1e-15));
+  CHECK(event.model == 0);
+}
+
+}  // namespace
+
+TEST_CASE("every channel message becomes its event", "[midi]") {
+  const auto events = read({0x93, 60,  127,  0x83, 61,   64, 0xa0, 62,   1,  0xbf,
+                            1,    127, 0xd2, 127,  0xe1, 0,  64,   0x90, 63, 0});
+  REQUIRE(events.size() == 7);
+  check_event(events[0], EventKind::note_on, 3, 60, 1.0);
+  check_event(events[1], EventKind::note_off, 3, 61, 64 / 127.0);
+  check_event(events[2], EventKind::key_pressure, 0, 62, 1 / 127.0);
+  check_event(events[3], EventKind::controller, 15, 1, 1.0);
+  check_event(events[4], EventKind::pressure, 2, 0, 1.0);
+  check_event(events[5], EventKind::bend, 1, 0, 0.0);
+  check_event(events[6], EventKind::note_off, 0, 63, 0.0);  // a note on of no velocity
+}
+
+TEST_CASE("the bend reaches both ends exactly", "[midi]") {
+  CHECK(read({0xe0, 0, 0})[0].value == -1.0);
+  CHECK(read({0xe0, 0x7f, 0x7f})[0].value == 1.0);
+  CHECK(read({0xe0, 0, 0x40})[0].value == 0.0);
+  CHECK(read({0xe0, 1, 0x40})[0].value == 1.0 / 8191.0);
+  CHECK(read({0xe0, 0x7f, 0x3f})[0].value == -1.0 / 8192.0);
+}
+
+TEST_CASE("running status holds within a packet and from packet to packet", "[midi]") {
+  MidiReader reader;
+  auto events = read(reader, {0x90, 60, 100, 61, 100, 62, 0});
+  REQUIRE(events.size() == 3);
+  check_event(events[1], EventKind::note_on, 0, 61, 100 / 127.0);
+  check_event(events[2], EventKind::note_off, 0, 62, 0.0);
+  events = read(reader, {63, 100});
+  REQUIRE(events.size() == 1);
+  check_event(events[0], EventKind::note_on, 0, 63, 100 / 127.0);
+  // Clocks leave it alone; system common ends it.
+  CHECK(read(reader, {0xf8, 0xfe}).empty());
+  CHECK(read(reader, {64, 100}).size() == 1);
+  CHECK(read(reader, {0xf1, 7}).empty());
+  CHECK(reader.malformed() == 0);
+  CHECK(read(reader, {65, 100}).empty());
+  CHECK(reader.malformed() > 0);
+}
+
+TEST_CASE("real-time bytes may stand anywhere", "[midi]") {
+  MidiReader reader;
+  const auto events = read(reader, {0xf8, 0x90, 0xfe, 60, 0xf8, 0xff, 100, 0xfa});
+  REQUIRE(events.size() == 1);
+  check_event(events[0], EventKind::note_on, 0, 60, 100 / 127.0);
+  CHECK(reader.malformed() == 0);
+}
+
+TEST_CASE("system exclusive is passed over, in one packet or in several", "[midi]") {
+  MidiReader reader;
+  auto events = read(reader, {0xf0, 0x7e, 60, 100, 1, 0xf7, 0x90, 60, 100});
+  CHECK(events.size() == 1);
+  CHECK(read(reader, {0xf0, 1, 2, 3}).empty());
+  CHECK(read(reader, {60, 100, 60, 0xf8, 100}).empty());
+  CHECK(read(reader, {4, 0xf7}).empty());
+  CHECK(read(reader, {0x91, 60, 100}).size() == 1);
+  CHECK(reader.malformed() == 0);
+  // Cut short by another status: the exclusive ends, the message counts.
+  CHECK(read(reader, {0xf0, 1, 2, 0x90, 60, 100}).size() == 1);
+}
+
+TEST_CASE("what is cut short or unknown makes no event and is counted", "[midi]") {
+  const std::vector<Bytes> wrong = {{0x90}, {0x90, 60}, {60},   {0xf4},
+                                    {0xf5}, {0xe0, 1},  {0xd0}, {0xf2, 1}};
+  for (const Bytes& bytes : wrong) {
+    MidiReader reader;
+    CAPTURE(bytes);
+    CHECK(read(reader, bytes).empty());
+    CHECK(reader.malformed() == 1);
+    // And the next message is read as if nothing had been.
+    CHECK(read(reader, {0x90, 60, 100}).size() == 1);
+    CHECK(reader.malformed() == 1);
+  }
+  MidiReader reader;
+  CHECK(read(reader, {0x90, 60, 0x90, 61, 100}).size() == 1);
+  CHECK(reader.malformed() == 1);
+  // A program change is a message like others, which nothing here follows.
+  CHECK(read(reader, {0xc0, 5}).empty());
+  CHECK(read(reader, {0xf6}).empty());
+  CHECK(reader.malformed() == 1);
+}
+
+TEST_CASE("random bytes in random packets only ever make events in range", "[midi]") {
+  rig::Random random(99);
+  MidiReader reader;
+  std::size_t count = 0;
+  for (std::size_t at = 0; at < 100000;) {
+    Bytes bytes(random.below(12));
+    for (std::uint8_t& byte : bytes) {
+      byte = static_cast<std::uint8_t>(random.next());
+    }
+    at += bytes.size();
+    for (const Event& event : read(reader, bytes)) {
+      ++count;
+      const bool is_bend = event.kind == EventKind::bend;
+      const bool is_known = event.kind == EventKind::note_on || event.kind == EventKind::note_off ||
+                            event.kind == EventKind::controller ||
+                            event.kind == EventKind::pressure ||
+                            event.kind == EventKind::key_pressure || is_bend;
+      REQUIRE(is_known);
+      REQUIRE(event.index <= 127);
+      REQUIRE(event.channel <= 15);
+      REQUIRE(event.value >= (is_bend ? -1.0 : 0.0));
+      REQUIRE(event.value <= 1.0);
+      REQUIRE((event.kind != EventKind::note_on || event.value > 0.0));
+    }
+  }
+  CHECK(count > 1000);
+  CHECK(reader.malformed() > 1000);
+  CHECK(read(reader, {0xf7, 0x90, 60, 100}).size() == 1);
+}
+
+}  // namespace ressort

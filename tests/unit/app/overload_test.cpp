@@ -1,0 +1,377 @@
+// More sound than there is time for: voices give way, the quietest first, by a clock that the test
+// turns by hand.
+#include <unistd.h>
+
+#include <filesystem>
+#include <fstream>
+#include <mutex>
+#include <thread>
+
+#include "app/realtime/process.h"
+#include "app/session/session.h"
+#include "app/session/timing.h"
+#include "tests/support/player.h"
+
+namespace ressort {
+namespace {
+
+using namespace rig;
+
+constexpr double rate = 44100.0;
+constexpr std::size_t block = 256;  // a span of its own: 5.8 ms
+constexpr double period_s = block / rate;
+constexpr std::size_t second = static_cast<std::size_t>(1.0 / period_s) + 1;  // in blocks
+
+constexpr int first_key = 50;
+constexpr int keys = 8;
+
+// A clock that stands still but for what a block is to take; it is read before and after each.
+struct HandClock {
+  static std::int64_t read() {
+    now_ns += ++reads % 2 == 0 ? took_ns : 0;
+    return now_ns;
+  }
+  static inline std::int64_t now_ns = 0;
+  static inline std::int64_t took_ns = 0;
+  static inline std::size_t reads = 0;
+};
+
+// A process whose blocks take what the test says, and all that it has played.
+struct Stage {
+  explicit Stage(Process::Clock clock = &HandClock::read) : process(rate, false, clock) {
+    offer(1);
+    run(1, 0.0);
+  }
+  void offer(std::uint32_t serial) {
+    auto compiled = compile(network_of(ringing_string()), struck(keys), {.method = Method::direct});
+    REQUIRE(compiled);
+    delete process.slot.offer(new Sounding{std::move(compiled->engine), serial});
+  }
+  void strike_all() {
+    for (int key = first_key; key < first_key + keys; ++key) {
+      process.from_osc.push({.event = note_on(0, key)});
+    }
+  }
+  // Shares of the period: what every block takes, and what each voice adds.
+  void run(std::size_t blocks, double fixed, double each = 0.0) {
+    for (std::size_t n = 0; n < blocks; ++n) {
+      const double share = fixed + each * process.meters.voices.get();
+      HandClock::took_ns = std::llround(share * period_s * 1e9);
+      std::vector<double> samples(block);
+      double* const outputs[] = {samples.data()};
+      const HeapWatch watch;
+      process.block(std::span<const double* const>(), outputs, block, {}, 0);
+      heap_calls += watch.calls();
+    }
+  }
+  std::vector<Report> overloads() {
+    std::vector<Report> found;
+    for (Report report; process.reports.pop(report);) {
+      if (report.kind == Report::Kind::overload) {
+        found.push_back(report);
+      }
+    }
+    return found;
+  }
+
+  Process process;
+  std::size_t heap_calls = 0;
+};
+
+// What DspLoad lets sound where a block takes `fixed` and `each` more for every voice, after so
+// many blocks; somebody plays all keys all the time.
+struct Played {
+  int least = keys;
+  int last = keys;
+  int changes = 0;
+};
+Played played(std::size_t blocks, double fixed, double each) {
+  DspLoad load;
+  Played result;
+  for (std::size_t n = 0; n < blocks; ++n) {
+    load.add((fixed + each * result.last) * period_s, period_s);
+    if (const auto voices = load.judge(result.last, keys)) {
+      ++result.changes;
+      result.last = *voices;
+      result.least = std::min(result.least, result.last);
+    }
+  }
+  return result;
+}
+
+}  // namespace
+
+// --- who gives way
+// -------------------------------------------------------------------------------
+
+TEST_CASE("an engine keeps the loudest held voices, and the newest", "[overload]") {
+  // The newest is the quietest, the loudest is let go.
+  const double velocities[keys] = {0.9, 0.3, 0.6, 1.0, 0.2, 0.5, 0.8, 0.1};
+  const auto notes = [&](const std::vector<int>& wanted) {
+    std::vector<Event> events;
+    for (const int n : wanted) {
+      events.push_back(note_on(static_cast<std::uint32_t>(256 * n), first_key + n, velocities[n]));
+    }
+    events.push_back(note_off(256 * keys, first_key + 3));
+    return events;
+  };
+  Player player(ringing_string(), struck(keys), {.method = Method::direct});
+  Player expected(ringing_string(), struck(keys), {.method = Method::direct});
+  const std::size_t start = 44100;  // a new voice counts as loud at first
+  player.run(start, notes({0, 1, 2, 3, 4, 5, 6, 7}));
+  expected.run(start, notes({0, 6, 7}));
+  CHECK(player.engine().voice_count() == keys);
+  player.engine().limit_voices(3);
+  CHECK(player.engine().meters().shed == 5);
+  CHECK(player.engine().meters().stepped == 3);
+  const std::size_t faded = start + 512;  // 5 ms are 221 frames
+  player.run(4096);
+  expected.run(4096);
+  double worst = 0.0;
+  for (std::size_t n = faded; n < player.y().size(); ++n) {
+    worst = std::max(worst, std::fabs(player.y()[n] - expected.y()[n]));
+  }
+  INFO(show(worst));
+  CHECK(worst < 1e-12 * peak(expected.y()));
+  CHECK(largest_step(std::span(player.y()).subspan(start - 1)) <
+        1.5 * largest_step(std::span(player.y()).first(start)));  // nothing clicks
+
+  // A new note takes a voice's place, until there is room for all again.
+  player.run(256, {note_on(0, 70), note_on(10, 71)});
+  CHECK(player.engine().meters().stepped == 3);
+  player.engine().limit_voices(keys);
+  player.run(1024, {note_on(0, 72), note_on(10, 73)});
+  CHECK(player.engine().meters().stepped == 5);
+  player.engine().limit_voices(0);  // one at least: the newest
+  CHECK(player.engine().meters().stepped == 1);
+  CHECK(player.heap_calls == 0);
+}
+
+// --- how many
+// ------------------------------------------------------------------------------------
+
+TEST_CASE("the mean is over a second, and what lasts is the median of five", "[overload]") {
+  DspLoad load;
+  for (std::size_t n = 0; n < second; ++n) {
+    load.add(0.5 * period_s, period_s);
+  }
+  CHECK(load.mean() == Approx(0.5 * (1.0 - std::exp(-1.0))).epsilon(0.01));
+  for (std::size_t n = 0; n < 9 * second; ++n) {
+    load.add(0.5 * period_s, period_s);
+  }
+  CHECK(load.mean() == Approx(0.5).epsilon(0.001));
+  CHECK(load.lasting() == Approx(0.5).epsilon(1e-12));
+  load.add(100.0 * period_s, period_s);
+  load.add(100.0 * period_s, period_s);
+  CHECK(load.lasting() == Approx(0.5).epsilon(1e-12));
+  load.add(100.0 * period_s, period_s);
+  CHECK(load.lasting() == Approx(100.0).epsilon(1e-12));
+  // Short blocks are taken together until they make 5 ms: 16 frames are 0.36 ms.
+  load.forget();
+  for (int n = 0; n < 14 * 6; ++n) {
+    load.add(n % 14 == 0 ? 2e-3 : 1e-4, 16.0 / rate);
+  }
+  CHECK(load.lasting() == Approx((2e-3 + 13e-4) / (14 * 16.0 / rate)).epsilon(1e-12));
+}
+
+TEST_CASE("as many voices sound as there is time for", "[overload]") {
+  // 8 cost 1.68: three leave 0.63, which stays.
+  const Played heavy = played(10 * second, 0.0, 0.21);
+  CHECK(heavy.last == 3);
+  CHECK(heavy.changes == 1);
+  // 500 ms of 5: one remains, and at 12 it is more than there is, but less than eight.
+  CHECK(played(10 * second, 0.0, 12.0).last == 1);
+  // What fits is left alone.
+  CHECK(played(10 * second, 0.0, 0.11).changes == 0);
+}
+
+TEST_CASE("voices that cost nothing are not shed in vain", "[overload]") {
+  // Full, but it fits: the first attempt, which brings nothing, is the last.
+  const Played full = played(10 * second, 0.95, 0.0);
+  CHECK(full.changes == 1);
+  CHECK(full.least == 6);
+  // Too much, whatever the voices do: they all come back, and are left alone for a while.
+  const Played fixed = played(5 * second, 1.4, 0.0);
+  CHECK(fixed.changes == 4);  // to 4, 2, 1, and back to all
+  CHECK(fixed.least == 1);
+  CHECK(fixed.last == keys);
+}
+
+TEST_CASE("what is over for a second lets more sound, by what they cost", "[overload]") {
+  DspLoad load;
+  const auto run = [&](std::size_t blocks, double share, int sounding) {
+    std::optional<int> said;
+    for (std::size_t n = 0; n < blocks; ++n) {
+      load.add(share * period_s, period_s);
+      if (const auto voices = load.judge(sounding, 64)) {
+        CHECK_FALSE(said);
+        said = voices;
+      }
+    }
+    return said;
+  };
+  CHECK(run(3, 1.5, 32) == 16);
+  CHECK_FALSE(run(second, 0.65, 16));  // neither too much nor little
+  CHECK_FALSE(run(second - 4, 0.5, 16));
+  CHECK_FALSE(run(5, 0.65, 16));
+  CHECK(run(second + 5, 0.5, 16) == 24);
+  CHECK(run(second + 5, 0.25, 24) == 64);
+  CHECK(load.limit() == 0);
+}
+
+// --- in the audio thread
+// -------------------------------------------------------------------------
+
+TEST_CASE("a process that takes too long sheds voices, tells it once, and recovers", "[overload]") {
+  Stage stage;
+  stage.strike_all();
+  stage.run(second, 0.0, 0.05);
+  const Meters& meters = stage.process.meters;
+  REQUIRE(meters.voices.get() == keys);
+  CHECK(meters.load.get() == Approx(0.4 * (1.0 - std::exp(-1.0))).epsilon(0.03));
+  CHECK(meters.load_peak.get() == Approx(0.4).epsilon(1e-6));
+  CHECK(meters.overruns.get() == 0);
+  stage.run(2, 0.0, 0.21);
+  CHECK(meters.overruns.get() == 2);
+  CHECK(stage.overloads().empty());
+  stage.run(2, 0.0, 0.21);
+  CHECK(meters.shed.get() == 5);
+  CHECK(meters.voices.get() == 3);
+  stage.strike_all();
+  stage.run(second / 2, 0.0, 0.21);
+  CHECK(meters.voices.get() == 3);
+  const auto told = stage.overloads();
+  REQUIRE(told.size() == 1);
+  CHECK(told[0].value == Approx(1.68).epsilon(1e-6));
+  CHECK(told[0].index == 3);
+  stage.run(3 * second, 0.0, 0.05);
+  stage.strike_all();
+  stage.run(4, 0.0, 0.05);
+  CHECK(meters.voices.get() == keys);
+  CHECK(meters.shed.get() == 5);
+  CHECK(stage.heap_calls == 0);
+}
+
+TEST_CASE("a machine that holds up a block or two takes no voice", "[overload]") {
+  Stage stage;
+  stage.strike_all();
+  stage.run(second, 0.1);
+  const Meters& meters = stage.process.meters;
+  for (int hiccup = 0; hiccup < 2; ++hiccup) {
+    stage.run(1, 30.0);
+    stage.run(2, 0.1);
+  }
+  stage.run(second, 0.1);
+  CHECK(meters.voices.get() == keys);
+  CHECK(meters.shed.get() == 0);
+  CHECK(meters.overruns.get() == 2);
+  CHECK(meters.load_peak.get() == Approx(30.0).epsilon(1e-6));
+  CHECK(stage.overloads().empty());
+  stage.process.meters.read.raise();
+  stage.run(2, 0.1);
+  CHECK(meters.load_peak.get() == Approx(0.1).epsilon(1e-6));
+  // Three of five are more than a hiccup.
+  stage.run(3, 30.0);
+  stage.run(2, 0.1);
+  CHECK(meters.shed.get() == keys - 1);
+}
+
+TEST_CASE("while two models fade into each other, the old one gives way", "[overload]") {
+  Stage stage;
+  stage.strike_all();
+  stage.run(second, 0.1);
+  stage.offer(2);
+  stage.strike_all();
+  stage.run(8, 1.5);
+  stage.run(second, 0.1);
+  CHECK(stage.process.meters.swaps.get() == 2);
+  CHECK(stage.process.meters.voices.get() == keys);
+  CHECK(stage.process.meters.shed.get() == 0);
+  CHECK(stage.overloads().empty());
+}
+
+TEST_CASE("without a clock nothing is measured and nobody gives way", "[overload]") {
+  const std::size_t reads = HandClock::reads;
+  Stage stage(nullptr);
+  stage.strike_all();
+  stage.run(20, 30.0);
+  CHECK(HandClock::reads == reads);
+  CHECK(stage.process.meters.voices.get() == keys);
+  CHECK(stage.process.meters.shed.get() == 0);
+  CHECK(stage.process.meters.load_peak.get() == 0.0);
+}
+
+// --- what is told
+// --------------------------------------------------------------------------------
+
+TEST_CASE("a plan that one core has no time for says how many voices fit", "[overload]") {
+  const auto plan = [](double share) {
+    Plan made;
+    made.parts.push_back({.predicted_ns = 0.25 * share * 1e9 / 48000.0});
+    made.parts.push_back({.predicted_ns = 0.75 * share * 1e9 / 48000.0});
+    return made;
+  };
+  CHECK(too_much(plan(1.75), 64, 48000.0, Precision::float64) ==
+        "all 64 voices would take about 175 % of one core: 32 fit; what makes room: -p 32, a lower "
+        "rate, --precision float");
+  CHECK(too_much(plan(1.75), 64, 48000.0, Precision::float32) ==
+        "all 64 voices would take about 175 % of one core: 32 fit; what makes room: -p 32, a lower "
+        "rate");
+  CHECK(too_much(plan(2.4), 1, 48000.0, Precision::float64) ==
+        "its one voice would take about 240 % of one core; what makes room: a smaller model, a "
+        "lower rate, --precision float");
+  CHECK(too_much(plan(2.4), 2, 48000.0, Precision::float32) ==
+        "all 2 voices would take about 240 % of one core, one alone about 120 % of one core; what "
+        "makes room: a smaller model, a lower rate");
+  CHECK(too_much(plan(0.89), 64, 48000.0, Precision::float64).empty());
+  CHECK_FALSE(too_much(plan(0.89), 64, 96000.0, Precision::float64).empty());
+}
+
+TEST_CASE("a session warns of a plan that is too much, and tells of an overload", "[overload]") {
+  const auto folder =
+      std::filesystem::temp_directory_path() / ("ressort-overload-" + std::to_string(getpid()));
+  std::filesystem::create_directories(folder);
+  // Too many masses for modes, and a law in every link: 256 of them are some seconds a second.
+  std::ofstream(folder / "m.mdl") << "@s string 1500 1. 0.1 0.0001 0. 0.\n"
+                                     "@in1 frcInput [@s 0.3]\n@out1 posOutput [@s 0.6]\n";
+  std::ofstream(folder / "m.toml") << "model = \"m.mdl\"\nvoices = 256\n";
+  Process process(48000.0);
+  std::mutex mutex;
+  std::string told;
+  {
+    Session session(process, {.compile = {.rate_hz = 48000.0}}, [&](const std::string& text) {
+      const std::lock_guard lock(mutex);
+      told += text + "\n";
+    });
+    const auto loaded = session.load_and_wait((folder / "m.toml").string());
+    REQUIRE(loaded);
+    REQUIRE((*loaded)->warnings.size() == 1);
+    CHECK((*loaded)->warnings[0].find("all 256 voices would take about ") == 0);
+    CHECK((*loaded)->warnings[0].find(" fit; what makes room: -p ") != std::string::npos);
+
+    CHECK(session.status().cpu == -1.0);  // nothing runs
+    process.meters.load.set(0.25);
+    process.meters.load_peak.set(1.5);
+    session.set_backend("a device", true);
+    CHECK(session.status().cpu == 0.25);
+    CHECK(session.status().cpu_peak == 1.5);
+    session.set_backend("none; waiting for a device", false);
+    CHECK(session.status().cpu == -1.0);
+
+    process.reports.push({Report::Kind::overload, (*loaded)->serial, 3, 1.404});
+    const auto has_told = [&] {
+      const std::lock_guard lock(mutex);
+      return !told.empty();
+    };
+    while (!has_told()) {
+      std::this_thread::yield();
+    }
+  }
+  std::filesystem::remove_all(folder);
+  CHECK(told ==
+        "the sound takes 140 % of the time there is; the quietest voices fade out, and 3 sound at "
+        "once until there is time again; what makes room: a longer period, -p 3, a lower rate, "
+        "--precision float\n");
+}
+
+}  // namespace ressort

@@ -1,0 +1,165 @@
+// Recordings, by the console's `rec`, their only door.
+#include <signal.h>
+#include <sys/resource.h>
+
+#include <chrono>
+
+#include "tests/support/console_rig.h"
+#include "tests/support/sound.h"
+
+namespace ressort {
+
+TEST_CASE("rec writes what is heard, frame by frame", "[recorder]") {
+  const Folder folder;
+  const std::string path = folder.file("take.wav");
+  Rig rig;
+  rig.say("load " + write_triangle(folder));
+  rig.say("noteon 60 127");
+  rig.loudest(4);
+  CHECK(rig.say("rec " + path) == "recording to " + path + "; 'rec stop' ends it\n");
+  CHECK(has(rig.say("status"), "recording  yes"));
+  CHECK(has(rig.say("rec " + path), "error: a recording to '" + path + "' is going on"));
+  std::vector<double> heard;
+  for (const std::size_t frames : {period, std::size_t{1}, std::size_t{100}, period}) {
+    for (const float sample : rig.play(frames)) {
+      heard.push_back(static_cast<double>(sample));
+    }
+  }
+  CHECK(rig.say("rec stop") == path + ": 0.01 s, nothing lost\n");
+  rig.play();
+
+  const auto sound = read_sound(path);
+  REQUIRE(sound);
+  CHECK(sound->rate_hz == 48000.0);
+  REQUIRE(sound->channels.size() == 2);
+  REQUIRE(sound->channels[0].size() == heard.size());
+  REQUIRE(sound->channels[1].size() == heard.size());
+  double worst = 0.0;
+  for (std::size_t i = 0; i < heard.size(); ++i) {
+    worst = std::max(worst, std::fabs(sound->channels[0][i] - heard[i]));
+  }
+  CHECK(worst <= 0x1p-23);  // one step of 24 bits
+  CHECK(has(rig.say("rec stop"), "error: nothing is being recorded"));
+}
+
+TEST_CASE("a recording begins where it is told to, with the channels there are", "[recorder]") {
+  const Folder folder;
+  Rig rig(4);
+  rig.process.is_recording.raise();  // left over in the ring
+  rig.play();
+  rig.process.is_recording.lower();
+  rig.say("rec " + folder.file("four.wav"));
+  rig.play(100);
+  CHECK(has(rig.say("rec stop"), "nothing lost"));
+  const auto sound = read_sound(folder.file("four.wav"));
+  REQUIRE(sound);
+  REQUIRE(sound->channels.size() == 4);
+  CHECK(sound->channels[3].size() == 100);
+}
+
+TEST_CASE("a recording of nothing is a valid file", "[recorder]") {
+  const Folder folder;
+  Rig rig;
+  rig.say("rec " + folder.file("nothing.wav"));
+  CHECK(has(rig.say("rec stop"), "nothing.wav: 0.00 s, nothing lost"));
+  const auto sound = read_sound(folder.file("nothing.wav"));
+  REQUIRE(sound);
+  CHECK(sound->channels.size() == 2);
+  CHECK(sound->channels[0].empty());
+}
+
+TEST_CASE("what a recording misses is told", "[recorder]") {
+  const Folder folder;
+  Rig rig;
+  rig.say("rec " + folder.file("gap.wav"));
+  rig.play();
+  rig.process.meters.record_lost.add(3);
+  CHECK(has(rig.say("rec stop"), "gap.wav: 0.01 s, 3 pieces lost"));
+}
+
+TEST_CASE("a file that cannot be written is told at once", "[recorder]") {
+  const Folder folder;
+  Rig rig;
+  CHECK(has(rig.say("rec " + folder.file("none/x.wav")), "x.wav' cannot be written"));
+  CHECK_FALSE(rig.process.is_recording.is_raised());
+  CHECK(has(rig.say("rec stop"), "error: nothing is being recorded"));
+}
+
+TEST_CASE("rec writes over a sound when it is told to, over other files never", "[recorder]") {
+  const Folder folder;
+  Rig rig;
+  const std::string path = folder.file("take.wav");
+  rig.say("rec " + path);
+  rig.play(100);
+  rig.say("rec stop");
+  CHECK(has(rig.say("rec " + path), "take.wav' is there already; --force writes over it"));
+  CHECK(has(rig.say("rec " + path + " --force"), "recording to"));
+  rig.play(50);
+  CHECK(read_sound(path)->channels[0].size() == 100);  // until the new one is whole
+  rig.say("rec stop");
+  CHECK(read_sound(path)->channels[0].size() == 50);
+  CHECK(has(rig.say("rec " + folder.write("poem.wav", "text") + " --force"), "is no sound"));
+  CHECK(has(rig.say("rec " + folder.file("take.mp4")), "the name of no sound file"));
+}
+
+TEST_CASE("rec writes what the ending says", "[recorder]") {
+  const Folder folder;
+  Rig rig;
+  for (const std::string_view ending : sound_endings()) {
+    const std::string path = folder.file("take" + std::string(ending));
+    INFO(path);
+    CHECK(has(rig.say("rec " + path), "recording to"));
+    rig.play(200);
+    CHECK(has(rig.say("rec stop"), "nothing lost"));
+    const auto sound = read_sound(path);
+    REQUIRE(sound);
+    CHECK(sound->rate_hz == 48000.0);
+    CHECK(sound->channels[0].size() == 200);
+  }
+}
+
+TEST_CASE("a recording that finds no room is told of at once, and the sound goes on",
+          "[recorder]") {
+  const Folder folder;
+  Rig rig;
+  rig.say("load " + write_triangle(folder));
+  const std::string path = folder.file("take.wav");
+  rig.say("rec " + path);
+  auto news = rig.news.get_future();
+  rlimit before{};
+  getrlimit(RLIMIT_FSIZE, &before);
+  const auto handler = signal(SIGXFSZ, SIG_IGN);
+  const rlimit limit{40960, before.rlim_max};
+  setrlimit(RLIMIT_FSIZE, &limit);
+  while (news.wait_for(std::chrono::milliseconds(1)) != std::future_status::ready) {
+    rig.play();
+  }
+  setrlimit(RLIMIT_FSIZE, &before);
+  signal(SIGXFSZ, handler);
+  const std::string told = news.get();
+  CHECK(has(told, "writing '" + path + "' failed: File too large; the recording ended after 0."));
+  rig.say("noteon 60 127");
+  CHECK(rig.loudest(20) > 0.0);
+  const auto sound = read_sound(path);
+  REQUIRE(sound);
+  CHECK(sound->channels[0].size() > 6000);  // of the 6826 that have room
+  CHECK(sound->channels[0].size() <= 6826);
+  CHECK_FALSE(has(rig.say("status"), "recording"));
+  CHECK(rig.say("rec stop") == "error: " + told + "\n");
+  CHECK(has(rig.say("rec stop"), "nothing is being recorded"));
+  CHECK(has(rig.say("rec " + folder.file("next.wav")), "recording to"));
+}
+
+TEST_CASE("a recording that is left alone ends with the console", "[recorder]") {
+  const Folder folder;
+  {
+    Rig rig;
+    rig.say("rec " + folder.file("end.wav"));
+    rig.play(100);
+  }
+  const auto sound = read_sound(folder.file("end.wav"));
+  REQUIRE(sound);
+  CHECK(sound->channels[0].size() == 100);
+}
+
+}  // namespace ressort

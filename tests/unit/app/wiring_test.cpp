@@ -1,0 +1,67 @@
+// What a device's ports are connected to: kept by name, until a person pulls it.
+#include "app/devices/wiring.h"
+
+#include <set>
+
+#include "tests/support/catch.h"
+
+namespace ressort {
+namespace {
+
+const Cable speaker{"out_left", "system:playback_1"};
+const Cable mixer{"out_left", "mixer:in"};
+const Cable keyboard{"midi_in", "keys:out"};
+
+using Ports = std::set<std::string>;
+
+void look(Wiring& wiring, const std::vector<Cable>& present, const Ports& ports) {
+  wiring.look(present, [&](const std::string& port) { return ports.count(port) > 0; });
+}
+
+const Ports all{speaker.theirs, mixer.theirs, keyboard.theirs};
+
+}  // namespace
+
+TEST_CASE("all cables are missing when the device is lost, until they are there again",
+          "[wiring]") {
+  Wiring wiring;
+  look(wiring, {speaker, mixer, keyboard}, all);
+  CHECK(wiring.missing().empty());
+  wiring.lose_all();
+  CHECK(wiring.missing() == std::vector<Cable>{speaker, mixer, keyboard});
+  look(wiring, {}, {});
+  look(wiring, {speaker}, {speaker.theirs});
+  CHECK(wiring.missing() == std::vector<Cable>{mixer, keyboard});
+  wiring.lose_all();  // once more, before all had come
+  CHECK(wiring.missing() == std::vector<Cable>{speaker, mixer, keyboard});
+}
+
+TEST_CASE("what a person pulled stays pulled, until it is plugged in again", "[wiring]") {
+  Wiring wiring;
+  look(wiring, {speaker, mixer}, all);
+  look(wiring, {speaker}, all);
+  CHECK(wiring.is_in_doubt());
+  look(wiring, {speaker}, all);
+  CHECK_FALSE(wiring.is_in_doubt());
+  wiring.lose_all();
+  CHECK(wiring.missing() == std::vector<Cable>{speaker});
+  CHECK(wiring.knows(mixer));  // so that nobody plugs it in by himself
+  CHECK_FALSE(wiring.knows(keyboard));
+  look(wiring, {speaker, mixer}, all);
+  wiring.lose_all();
+  CHECK(wiring.missing() == std::vector<Cable>{speaker, mixer});
+}
+
+TEST_CASE("a client that leaves takes its cables first, and does not pull them", "[wiring]") {
+  Wiring wiring;
+  look(wiring, {speaker, mixer}, all);
+  look(wiring, {speaker}, all);  // between its cables and its ports
+  look(wiring, {speaker}, {speaker.theirs});
+  CHECK(wiring.missing() == std::vector<Cable>{mixer});
+  look(wiring, {speaker}, all);  // it is back, not yet connected
+  CHECK(wiring.missing() == std::vector<Cable>{mixer});
+  look(wiring, {speaker, mixer}, all);
+  CHECK(wiring.missing().empty());
+}
+
+}  // namespace ressort

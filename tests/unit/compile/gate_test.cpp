@@ -1,0 +1,323 @@
+// What may be played: who is refused and why, how far parameters may be turned, and that no way of
+// turning them leaves that.
+#include "core/compile/gate.h"
+
+#include "app/session/admit.h"
+#include "core/model/topology.h"
+#include "tests/support/player.h"
+
+namespace ressort {
+namespace {
+
+using namespace rig;
+
+Preset with_range(const std::string& name, double value, double least, double most) {
+  Preset preset = struck(1);
+  preset.keyboard = false;
+  preset.parameters.push_back({name, value, least, most, {7, 3}});
+  return preset;
+}
+
+const std::string oscillator =
+    "@K param 0.5\n@o osc 1. K 0. 0. 0.\n@in1 frcInput @o\n" + scenes::output(1, "o");
+
+Scene scene_of(const std::string& text, const Preset& preset = {}) {
+  Scene scene;
+  scene.path = "here.toml";
+  scene.model_path = "there.mdl";
+  scene.network = network_of(text);
+  scene.preset = preset;
+  return scene;
+}
+
+// What the gate says to a model as it is written: "" if it lets it in, the error, or the warning.
+std::string said_to(const std::string& text, const CompileOptions& options = {}) {
+  std::vector<std::string> warnings;
+  const auto admitted = admit(scene_of(text), options, warnings);
+  REQUIRE(warnings.size() <= 1);
+  return !admitted ? admitted.error().message : warnings.empty() ? "" : warnings[0];
+}
+
+const std::string ground = "@g ground 0.\n@m mass 1. 0. 0.\n";
+
+ParameterBox box_of(const Instrument& instrument) {
+  ParameterBox box;
+  for (const ParameterInfo& info : instrument.parameters) {
+    box.lowest.push_back(info.minimum);
+    box.highest.push_back(info.maximum);
+  }
+  return box;
+}
+
+}  // namespace
+
+TEST_CASE("what is unstable as it starts is refused by name and place, or forced", "[gate]") {
+  CHECK(said_to(ground + "@r spring @g @m 3.9\n") == "");
+  const std::string stiff = ground + "@r spring @g @m 5\n";
+  CHECK(
+      said_to(stiff) ==
+      "there.mdl:3:1: error: unstable: the stiffness 5 of 'r' must stay below 4; --force plays it "
+      "all the same, fading out what runs away");
+  CHECK(said_to(stiff, {.force = true}) ==
+        "there.mdl:3:1: warning: unstable: the stiffness 5 of 'r' must stay below 4");
+  CHECK(
+      said_to(ground + "@r damper @g @m 2.5\n").find("the damping 2.5 of 'r' must stay below 2") !=
+      std::string::npos);
+  CHECK(said_to("@o osc 0.01 0.1 0. 0. 0.\n").find("there.mdl:1:1: error: unstable") == 0);
+  // A macro is one element, however many masses it has.
+  CHECK(said_to("@d string 50 1. 1.2 0. 0. 0.\n").find("'d' must stay below 1.00102") !=
+        std::string::npos);
+  // The linear part of a cubic spring is always felt.
+  CHECK(said_to(ground + "@r nlSpring3 @g @m 5 0.1 0.\n").find("'r' must stay below 4") !=
+        std::string::npos);
+  // At half the rate it is four times as stiff.
+  CHECK(said_to(ground + "@r spring @g @m 1.5\n", {.rate_hz = 22050.0})
+            .find("'r' must stay below 1, at 22050 Hz") != std::string::npos);
+  CHECK(said_to(ground + "@r spring @g @m 1.5\n", {.rate_hz = 22050.0, .rescale = false}) == "");
+}
+
+TEST_CASE("what is no number is refused by its element, place and parameters", "[gate]") {
+  const auto said = [](const std::string& text, const std::vector<Setting>& settings = {}) {
+    return said_to(text, {.bare = true, .force = true, .settings = settings});
+  };
+  CHECK(said("@P param 0\n" + ground + "@r spring @g @m 1/P\n") ==
+        "there.mdl:4:1: error: the argument 1/P of 'r' is no finite number where P = 0");
+  CHECK(said("@P param 2\n" + ground + "@r spring @g @m 1/P\n") == "");
+  CHECK(said("@P param 2\n" + ground + "@r spring @g @m 1/P\n", {{"P", 0.0}}) ==
+        "there.mdl:4:1: error: the argument 1/P of 'r' is no finite number where P = 0");
+  CHECK(said("@P param 0\n@Q param 3\n  @o osc Q*P 0.1 0 0 0\n") ==
+        "there.mdl:3:3: error: the mass Q*P of 'o' is not above 0 where P = 0 and Q = 3");
+  CHECK(said("@P param 900\n@o osc 1 0.1 exp(P) 0 0\n") ==
+        "there.mdl:2:1: error: the damping exp(P) of 'o' is no finite number where P = 900");
+  CHECK(said("@P param 0\n@s string 9 1 0.1 1/P 0 0\n") ==
+        "there.mdl:2:1: error: the damping 1/P of 's' is no finite number where P = 0");
+  CHECK(said("@P param 0\n@s string 9 1 0.1 0 0 0\n@out1 posOutput [@s 1/P]\n") ==
+        "there.mdl:3:17: error: the place 1/P is no finite number where P = 0");
+  // At a lower rate the stiffness grows; what an input gives is not known.
+  CHECK(said_to(ground + "@r spring @g @m 1e308\n", {.rate_hz = 8000.0, .force = true}) ==
+        "there.mdl:3:1: error: the argument " + std::string("1e308") +
+            " of 'r' is no finite number");
+  CHECK(compile(network_of("@K audioParam @in1\n@o osc 1 1/K 0 0 0\n"), {}, {}));
+}
+
+TEST_CASE("numbers where doubles end are told for what they are", "[gate]") {
+  CHECK(said_to(ground + "@r spring @g @m 0.1 1e308\n")
+            .find("the damping 1e308 of 'r' is too "
+                  "large to be reckoned with; ") != std::string::npos);
+  for (const char* const stiffness : {"1e150", "1e262", "1e308"}) {
+    INFO(stiffness);
+    CHECK(said_to(ground + "@r spring @g @m " + stiffness + " 0.1\n")
+              .find("of 'r' must stay below 3.8;") != std::string::npos);
+  }
+}
+
+TEST_CASE("what may never touch is no reason to refuse, nor what is not proved", "[gate]") {
+  for (const char* const link :
+       {"contact @g @m 50 0.1 0.", "nlContact @g @m 0.1 0.1 50 0.1 0.", "nlPluck @g @m 500 0.1 0.",
+        "nlBow @g @m 50 0.1", "nlBow @g @m 50 0.1 1", "nlSpringDamper @g @m 0.1 0.1 50 0.1"}) {
+    INFO(link);
+    CHECK(said_to(ground + "@s spring @g @m 0.1 0.1\n@l " + link + "\n") == "");
+  }
+  CHECK(
+      said_to(ground + "@r spring @g @m -0.1\n") ==
+      "there.mdl:3:1: warning: may be unstable: the stiffness -0.1 of 'r' is negative, and motion "
+      "may grow by itself");
+  // Too large to factor, and more than the bound allows; less than that is proved.
+  const std::string mesh = "@d mesh 201 200 1. ";
+  CHECK(said_to(mesh + "0.51 0. 0. 0.\n", {.method = Method::direct}).find(" warning: ") !=
+        std::string::npos);
+  CHECK(said_to(mesh + "0.49 0. 0. 0.\n", {.method = Method::direct}) == "");
+}
+
+TEST_CASE("a range that is too wide is narrowed and told, at its line", "[gate]") {
+  std::vector<std::string> warnings;
+  const auto low = admit(scene_of(oscillator, with_range("K", 0.5, 0.1, 5.0)), {}, warnings);
+  REQUIRE(low);
+  CHECK(warnings == std::vector<std::string>{"here.toml:7:3: warning: 'K' is kept below 3.99999; "
+                                             "above it the model is not stable"});
+  const ParameterInfo& info = low->instrument.parameters[0];
+  CHECK(info.minimum == 0.1);
+  CHECK(info.maximum == 3.99999);
+  CHECK(info.is_lowered);
+  CHECK_FALSE(info.is_raised);
+  CHECK(info.safe.lowest == 0.0);
+  CHECK(info.safe.highest == Approx(4.0).epsilon(1e-12));
+  warnings.clear();
+  const std::string heavy = "@M param 1\n@o osc M 0.1 0.001 0. 0.\n" + scenes::output(1, "o");
+  CHECK(admit(scene_of(heavy, {.parameters = {{"M", 1.0, 0.02, 1.0, {4, 1}}}}), {}, warnings));
+  CHECK(warnings == std::vector<std::string>{"here.toml:4:1: warning: 'M' is kept above 0.0255001; "
+                                             "below it the model is not stable"});
+  // Forced, it goes as far as was asked for.
+  warnings.clear();
+  const auto forced =
+      admit(scene_of(oscillator, with_range("K", 0.5, 0.1, 5.0)), {.force = true}, warnings);
+  REQUIRE(forced);
+  CHECK(warnings.empty());
+  CHECK(forced->instrument.parameters[0].maximum == 5.0);
+}
+
+TEST_CASE("ranges are safe in every corner that they have together, and no smaller than that",
+          "[gate]") {
+  // Each alone might go to 1.3 and 0.6; asked for are more than both can have.
+  Preset preset = struck(1);
+  preset.parameters.push_back({"m_K", 0.1, 0.01, 1.2, {}});
+  preset.parameters.push_back({"m_Z", 0.001, 0.0, 0.5, {}});
+  const Player player(scenes::poly_triangle(), preset);
+  const Instrument& instrument = player.compiled.instrument;
+  CHECK(player.compiled.gate.narrowed.size() == 2);
+  Stability stability(network_of(scenes::poly_triangle()), 1.0);
+  ParameterBox box = box_of(instrument);
+  CHECK(stability.prove(box) == Verdict::stable);
+  CHECK(box.highest[0] > 0.3);
+  CHECK(box.highest[1] > 0.1);
+  for (const std::size_t i : {0u, 1u}) {
+    ParameterBox wider = box;
+    wider.highest[i] *= 1.0 + 1e-4;
+    CHECK(stability.prove(wider) == Verdict::unstable);
+    // The limit that is told is where that happens.
+    CHECK(instrument.parameters[i].safe.highest == Approx(box.highest[i]).epsilon(1e-5));
+  }
+}
+
+TEST_CASE("random presets: their ranges are safe as they come out, and not told in vain",
+          "[gate]") {
+  rig::Random random(41);
+  int narrowed = 0;
+  for (int i = 0; i < 300; ++i) {
+    const auto strength = [&] { return std::pow(10.0, random.uniform(-1.5, 0.0)); };
+    const std::string text = "@a param " + show(strength()) + "\n@b param " + show(strength()) +
+                             "\n@c param " + show(0.2 * strength()) +
+                             "\n@M param 1\n@g ground 0.\n@m0 mass M 0. 0.\n@m1 mass 1. 0. 0.\n"
+                             "@s0 spring @g @m0 a c\n@s1 spring @m0 @m1 b*0.5+a*0.2\n"
+                             "@s2 spring @g @m1 b 0.01\n" +
+                             scenes::output(1, "m1");
+    const Network network = network_of(text);
+    Preset preset;
+    for (const Parameter& parameter : network.parameters) {
+      if (random.below(3) > 0) {
+        const double value = parameter.value;
+        preset.parameters.push_back({parameter.name,
+                                     value,
+                                     value * random.uniform(0.0, 1.0),
+                                     value * random.uniform(1.0, 9.0),
+                                     {}});
+      }
+    }
+    auto compiled = compile(network, preset, {.method = Method::direct});
+    INFO(text);
+    REQUIRE(compiled);
+    const Instrument& instrument = compiled->instrument;
+    if (instrument.verdict != Verdict::stable) {
+      continue;
+    }
+    Stability stability(network, 1.0);
+    REQUIRE(stability.prove(box_of(instrument)) == Verdict::stable);
+    const ParameterBox asked = preset_box(instrument.parameters, preset);
+    const bool is_safe = stability.prove(asked) == Verdict::stable;
+    REQUIRE(is_safe == compiled->gate.narrowed.empty());
+    narrowed += is_safe ? 0 : 1;
+  }
+  CHECK(narrowed > 30);
+}
+
+TEST_CASE("no controller, event or start value turns a parameter further than is stable",
+          "[gate]") {
+  Preset preset = with_range("K", 0.5, 0.1, 5.0);
+  preset.controls.push_back({.source = ControlSource::controller,
+                             .number = 20,
+                             .target = "K",
+                             .gesture = ControlGesture::parameter,
+                             .low = 0.1,
+                             .high = 5.0});
+  const Event turn{.frame = 100, .kind = EventKind::controller, .index = 20, .value = 1.0};
+  const auto play = [&](const CompileOptions& options, const Event& event) {
+    Player player(oscillator, preset, options);
+    player.run(20000, {note_on(0, 60), event});
+    CHECK(player.heap_calls == 0);
+    return std::array{player.engine().parameter(0),
+                      static_cast<double>(player.engine().meters().beyond),
+                      static_cast<double>(player.engine().meters().resets)};
+  };
+  CHECK(play({}, turn) == std::array{3.99999, 1.0, 0.0});
+  CHECK(play({}, parameter(100, 0, 4.5)) == std::array{3.99999, 1.0, 0.0});
+  CHECK(play({}, parameter(100, 0, 3.0)) == std::array{3.0, 0.0, 0.0});
+  CHECK(play({.force = true}, turn)[0] == 5.0);
+  CHECK(play({.force = true}, turn)[2] > 0.0);
+}
+
+TEST_CASE("a key that sounds high comes down before a parameter makes it unstable", "[gate]") {
+  // As written, m_K may be quadrupled, and keys may use 11.6 times the stiffness; not both.
+  Player player(scenes::poly_triangle(), struck(1));
+  const ParameterInfo& stiffness = player.compiled.instrument.parameters[0];
+  CHECK(stiffness.maximum == 0.4);
+  CHECK_FALSE(stiffness.is_lowered);
+  const auto key_hz = [](int key) { return 440.0 * std::exp2((key - 69) / 12.0); };
+  int key = 60;
+  while (key_hz(key + 1) < player.compiled.instrument.highest_frequency_hz) {
+    ++key;
+  }
+  CHECK(key_hz(key) > 2500.0);
+  player.run(44100, {note_on(0, key),
+                     parameter(5000, 0, 0.11),
+                     parameter(10000, 0, 0.25),
+                     parameter(15000, 0, 0.4),
+                     parameter(16000, 1, 0.004),
+                     note_on(20000, key + 1),
+                     {.frame = 30000, .kind = EventKind::bend, .value = 1.0}});
+  CHECK(player.engine().parameter(0) == 0.4);
+  CHECK(player.engine().meters().resets == 0);
+  CHECK(player.heap_calls == 0);
+  CHECK(peak(player.y()) < 1.0);
+}
+
+TEST_CASE("a parameter that is sound keeps to what is stable, sample by sample", "[gate]") {
+  const std::string text =
+      "@K audioParam @in2\n@o osc 1. K 0.01 0. 0.\n@in1 frcInput @o\n" + scenes::output(1, "o");
+  std::vector<double> stiffness(20000);
+  for (std::size_t n = 0; n < stiffness.size(); ++n) {
+    stiffness[n] = n < 5000 ? 0.1 : n < 10000 ? 6.0 : n < 15000 ? -1.0 : 0.1;
+  }
+  const double* const inputs[] = {nullptr, stiffness.data()};
+  Preset preset = struck(1);
+  preset.keyboard = false;
+  for (const bool force : {false, true}) {
+    Player player(text, preset, {.force = force});
+    player.run(5000, {note_on(0, 60)}, {256}, inputs);
+    CHECK(player.engine().meters().beyond == 0);
+    const double calm = peak(player.y());
+    const double* const later[] = {nullptr, stiffness.data() + 5000};
+    player.run(15000, {}, {256}, later);
+    CHECK((player.engine().meters().resets > 0) == force);
+    CHECK((player.engine().meters().beyond > 0) == !force);
+    CHECK((force || peak(player.y()) < 100.0 * calm));
+  }
+}
+
+TEST_CASE("the bare network goes where it is told, and no further than is stable", "[gate]") {
+  const Network network = network_of(oscillator);
+  const auto bare = [&](const std::vector<Setting>& settings, const std::vector<Setting>& reach) {
+    auto compiled = compile(network, default_preset(network, true),
+                            {.bare = true, .settings = settings, .reach = reach});
+    REQUIRE(compiled);
+    return *std::move(compiled);
+  };
+  constexpr double anything = std::numeric_limits<double>::max();
+  CHECK(bare({}, {}).instrument.parameters[0].maximum == anything);
+  CHECK(bare({}, {{"K", 3.9}}).instrument.parameters[0].maximum == anything);
+  CHECK(bare({}, {{"K", 4.1}}).instrument.parameters[0].maximum == 3.99999);
+  CHECK(bare({}, {{"K", 4.1}}).instrument.parameters[0].minimum == -anything);
+  CHECK(bare({{"K", 3.9}}, {}).gate.verdict == Verdict::stable);
+  CHECK(bare({{"K", 4.1}}, {}).gate.verdict == Verdict::unstable);
+}
+
+TEST_CASE("a limit is told in six digits, on its inner side", "[gate]") {
+  CHECK(inside_limit(1.31568650461023, true) == 1.31568);
+  CHECK(inside_limit(4.0, true) == 3.99999);
+  CHECK(inside_limit(1.31568, true) == 1.31567);
+  CHECK(inside_limit(0.0889851164104615, false) == 0.0889852);
+  CHECK(inside_limit(-4.0, false) == -3.99999);
+  CHECK(inside_limit(0.0, true) == 0.0);
+  CHECK(std::isinf(inside_limit(std::numeric_limits<double>::infinity(), true)));
+}
+
+}  // namespace ressort

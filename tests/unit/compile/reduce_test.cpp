@@ -1,0 +1,195 @@
+// What need not be computed: what no output hears, what nothing moves, what is as good as one.
+#include "core/analysis/linear.h"
+#include "core/compile/cull.h"
+#include "core/compile/merge.h"
+#include "core/model/topology.h"
+#include "tests/support/duel.h"
+#include "tests/support/player.h"
+#include "tests/support/random_network.h"
+
+namespace ressort {
+namespace {
+
+using rig::network_of;
+using rig::Random;
+using rig::Score;
+using rig::show;
+
+// The score as a part of the network hears it, which has some of the hands.
+Score score_for(const Program& part, const Program& whole, const Score& score) {
+  Score some = score;
+  for (std::size_t n = 0; n < score.inputs.size(); ++n) {
+    some.inputs[n].clear();
+    for (const InputSlot& slot : part.inputs) {
+      for (std::size_t i = 0; i < whole.inputs.size(); ++i) {
+        if (whole.inputs[i].hand == slot.hand) {
+          some.inputs[n].push_back(score.inputs[n][i]);
+        }
+      }
+    }
+  }
+  return some;
+}
+
+// [channel][frame], of the whole network as one or of the parts that are left.
+using Sound = std::vector<std::vector<double>>;
+
+void add(Sound& sound, const Program& program, const Score& score) {
+  const std::vector<double> heard = rig::perform_directly(program, score);
+  for (std::size_t i = 0; i < heard.size(); ++i) {
+    const OutputSlot& output = program.outputs[i % program.outputs.size()];
+    sound[output.channel][i / program.outputs.size()] += heard[i];
+  }
+}
+
+// Masses that no output hears: on a ground, on a hand, on both sides of a damper without strength.
+std::string unheard(Random& random) {
+  std::string text;
+  std::string before = random.below(2) == 0 ? "@g0" : "@in60";
+  const std::size_t count = 1 + random.below(6);
+  for (std::size_t i = 0; i < count; ++i) {
+    const std::string name = "@deaf" + std::to_string(i);
+    text +=
+        name + " mass 1. 0. 0.3\n" + name + "s springDamper " + name + " " + before + " 0.1 0.01\n";
+    before = name;
+  }
+  return text + "@in60 posInput 0.1\n@slack springDamper " + before + " @g0 0. 0.\n";
+}
+
+}  // namespace
+
+TEST_CASE("what is left out changes no bit of any output, on 200 random networks", "[reduce]") {
+  std::size_t left_out = 0;
+  for (std::uint64_t seed = 1; seed <= 200; ++seed) {
+    INFO("seed " << seed);
+    Random random(seed);
+    const std::string text = rig::NetworkWriter(seed).write().text + unheard(random);
+    const Network network = network_of(text);
+    const Program whole = make_program(network, Network::reference_rate_hz, true);
+    const Score score = rig::score_of(whole, {.frames = 400, .seed = seed, .turns = true});
+    const Machine machine = make_machine(network, Network::reference_rate_hz, true);
+    Sound all(machine.channels, std::vector<double>(400));
+    Sound some = all;
+    add(all, whole, score);
+    std::size_t masses = 0;
+    for (const Program& part : machine.parts) {
+      masses += part.moving;
+      if (!part.outputs.empty()) {
+        add(some, part, score_for(part, whole, score));
+      }
+    }
+    CHECK(some == all);
+    CHECK(masses < whole.moving);
+    left_out += whole.moving - masses;
+  }
+  CHECK(left_out > 400);
+}
+
+TEST_CASE("a mass is left out if nobody hears it or nothing moves it", "[reduce]") {
+  const auto said = [](const std::string& text) { return describe(cull(network_of(text))); };
+  const std::string pair =
+      "@g ground 0.\n@a mass 1. 0. 0.\n@b mass 1. 0. 0.\n@s springDamper @a @b .1 0.\n"
+      "@out1 posOutput @b\n";
+  CHECK(said(pair) == "2 masses that nothing moves");
+  CHECK(said(pair + "@in1 frcInput @a\n") == "");
+  CHECK(said(pair + "@in1 posInput 0.\n@t springDamper @in1 @a .1 0.\n") == "");
+  // A spring to where something stands elsewhere, or a contact that is closed at rest, moves it.
+  CHECK(said(pair + "@h ground .1\n@t springDamper @h @a .1 0.\n") == "");
+  CHECK(said(pair + "@t contact @g @a .1 0. .01\n") == "");
+  CHECK(said(pair + "@t contact @g @a .1 0. 0.\n") == "2 masses that nothing moves");
+  // What stands between is a ground, which passes nothing on...
+  const std::string heard = pair + "@in1 frcInput @a\n@c mass 1. 0. .1\n";
+  CHECK(said(heard + "@t springDamper @g @c .1 0.\n@u springDamper @g @a .1 0.\n") ==
+        "1 mass that no output hears");
+  // ...unless somebody listens to the force on it.
+  CHECK(said(heard + "@t springDamper @g @c .1 0.\n@out2 frcOutput @g\n") == "");
+  // A link without any strength ties nothing; one whose strength is a parameter does.
+  CHECK(said(heard + "@t springDamper @a @c 0. 0.\n") ==
+        "1 mass that no output hears, 1 link that exerts nothing");
+  CHECK(said(heard + "@z param 0.\n@t springDamper @a @c z 0.\n") == "");
+  CHECK(said(heard + "@t nlPluck @a @c 0. .1 0.\n") ==
+        "1 mass that no output hears, 1 link that exerts nothing");
+}
+
+TEST_CASE("springs side by side are one", "[reduce]") {
+  const std::string one =
+      "@g ground 0.\n@k param .03\n@m mass 1. .5 .5\n@out1 posOutput @m\n"
+      "@a springDamper @m @g [.05+k] .003\n";
+  const std::string three =
+      "@g ground 0.\n@k param .03\n@m mass 1. .5 .5\n@out1 posOutput @m\n"
+      "@a springDamper @m @g .05 .001\n@b springDamper @g @m [1*k] .001\n@c springDamper @m @g 0. "
+      ".001\n";
+  const auto merged = merge(network_of(three), {});
+  REQUIRE(merged);
+  CHECK(merged->parallel == 2);
+  CHECK(describe(*merged) == "2 springs beside others");
+  CHECK_FALSE(merge(network_of(one), {}));
+  const auto play = [](const std::string& text) {
+    rig::Player player(text, {}, {.method = Method::direct});
+    player.run(20'000);
+    player.run(20'000, {rig::parameter(0, 0, .06)});  // turned on the way
+    return player;
+  };
+  const rig::Player first = play(one);
+  const rig::Player second = play(three);
+  rig::Comparison comparison;
+  for (std::size_t n = 0; n < first.y().size(); ++n) {
+    comparison.add(first.y()[n], second.y()[n]);
+  }
+  CHECK(comparison.peak > 0.1);
+  CHECK(comparison.relative() < 1e-11);  // rounding, over 40 000 samples
+  CHECK(second.compiled.plan.notes == std::vector<std::string>{"merged: 2 springs beside others"});
+}
+
+// A ground, a spring, a light mass, a spring, a mass of 1: by hand. The light mass moves
+// by w = k2/(k1 + k2) of the other, which its inertia makes heavier by m w^2.
+TEST_CASE("springs without a damper are merged as well", "[reduce]") {
+  const Network network = network_of(
+      "@s stiffString 5 1. .1 .02 .01 0. 0. 0.\n@t springDamper [@s .5] [@s .5] .1 0.\n@out1 "
+      "posOutput [@s .5]\n");
+  const Network expanded = expand_macros(network);
+  Network twice = expanded;
+  twice.links.insert(twice.links.end(), expanded.links.begin(), expanded.links.end());
+  const auto merged = merge(twice, {});
+  REQUIRE(merged);
+  CHECK(merged->parallel >= expanded.links.size() - 1);
+}
+
+TEST_CASE("a light mass between springs weighs as little as is said", "[reduce]") {
+  const double k1 = .0008;
+  const double k2 = .0012;
+  const double m = 1e-3;
+  const auto text = [&](const std::string& heard) {
+    return "@g ground 0.\n@l mass " + show(m) + " 0. 0.\n@m mass 1. 0. 0.\n" +
+           "@a springDamper @g @l " + show(k1) + " 0.\n@b springDamper @l @m " + show(k2) +
+           " 0.\n@out1 posOutput @" + heard + "\n@in1 frcInput @m\n";
+  };
+  const Network network = network_of(text("m"));
+  CHECK_FALSE(merge(network, {}));                            // nobody asked
+  CHECK_FALSE(merge(network, {.cents = 0.5}));                // 1e-3 * 0.6 / 2 is 0.52 cents
+  CHECK_FALSE(merge(network_of(text("l")), {.cents = 5.0}));  // it is heard itself
+  const auto merged = merge(network, {.cents = 1.0});
+  REQUIRE(merged);
+  CHECK(merged->series == 1);
+  CHECK(describe(*merged) == "1 light mass between springs (0.52 cents at most)");
+  const double with = lowest_mode(network, {})->frequency_hz;
+  const double without = lowest_mode(merged->network, {})->frequency_hz;
+  const double w = k2 / (k1 + k2);
+  const double expected = m * w * w / 2.0;
+  CHECK((without - with) / with == Approx(expected).epsilon(0.02));
+  CHECK(1200.0 * std::log2(without / with) < merged->cents);
+}
+
+TEST_CASE("a mass too light for its springs is merged before it explodes", "[reduce]") {
+  const std::string text =
+      "@g ground 0.\n@l mass .002 0. 0.\n@m mass 1. 0. 0.\n@a springDamper @g @l .004 0.\n"
+      "@b springDamper @l @m .005 0.\n@out1 posOutput @m\n@in1 frcInput @m\n";
+  const Network network = network_of(text);
+  const auto merged = merge(network, {});
+  REQUIRE(merged);
+  CHECK(merged->series == 1);
+  CHECK(merged->cents < forced_cents);
+  CHECK(lowest_mode(merged->network, {})->stiffness == Approx(.004 * .005 / .009).epsilon(1e-12));
+}
+
+}  // namespace ressort

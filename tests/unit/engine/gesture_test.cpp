@@ -1,0 +1,292 @@
+// Hands: what moves an input, by the closed forms of each gesture; alone and through the engine.
+#include "core/engine/gesture.h"
+
+#include "tests/support/player.h"
+#include "tests/support/reference_network.h"
+
+namespace ressort {
+namespace {
+
+using namespace rig;
+
+constexpr double smoothing_pole = 0.999;  // 1 - 44.1/44100
+
+// Output 1 is the hand itself, output 2 the mass that it pulls.
+const std::string puppet =
+    "@in1 posInput 0.5\n@m mass 1. 0. 0.\n@g ground 0.\n@k param 0.01\n"
+    "@l springDamper @in1 @m k 0.01\n@r springDamper @m @g 0.01 0.01\n"
+    "@out1 posOutput @in1\n@out2 posOutput @m\n";
+
+Preset played(const ControlSetting& control) {
+  Preset preset;
+  preset.keyboard = false;
+  preset.controls.push_back(control);
+  return preset;
+}
+
+}  // namespace
+
+TEST_CASE("a hand that follows is a one-pole filter, and rests when it is there", "[gesture]") {
+  Hand hand;
+  hand.place(2.0);
+  CHECK_FALSE(hand.is_moving());
+  hand.follow(3.0, 0.9);
+  double before = 2.0;
+  for (int n = 1; n <= 100; ++n) {
+    const HandSample sample = hand.next_position();
+    CHECK(std::fabs(sample.value - (3.0 - std::pow(0.9, n))) < 1e-14);
+    CHECK(sample.velocity == sample.value - before);
+    before = sample.value;
+  }
+  for (int n = 0; n < 1000 && hand.is_moving(); ++n) {
+    hand.next_position();
+  }
+  CHECK_FALSE(hand.is_moving());
+  CHECK(hand.value() == 3.0);
+  CHECK(hand.next_position().velocity == 0.0);
+  hand.follow(-1.0, 0.0);  // pole 0 jumps
+  CHECK(hand.next_position().value == -1.0);
+}
+
+TEST_CASE("a sweep has one speed and ends exactly where told", "[gesture]") {
+  Hand hand;
+  hand.place(1.0);
+  hand.sweep(-1.0, 0.0625);
+  for (int n = 1; n <= 40; ++n) {
+    const HandSample sample = hand.next_position();
+    CHECK(sample.value == std::max(-1.0, 1.0 - 0.0625 * n));
+    CHECK(sample.velocity == (n <= 32 ? -0.0625 : 0.0));
+  }
+  CHECK_FALSE(hand.is_moving());
+  hand.sweep(-0.9, 0.0625);
+  hand.next_position();
+  CHECK(hand.next_position().value == -0.9);  // the last stride is shorter
+}
+
+TEST_CASE("a drawn bow nears its speed and keeps it clean however far it goes", "[gesture]") {
+  Hand hand;
+  hand.place(0.0);
+  hand.draw(0.001, 0.99);
+  double position = 0.0;
+  for (int n = 1; n <= 500; ++n) {
+    const HandSample sample = hand.next_position();
+    CHECK(std::fabs(sample.velocity - 0.001 * (1.0 - std::pow(0.99, n))) < 1e-17);
+    position += sample.velocity;
+    CHECK(sample.value == position);
+  }
+  hand.place(1e9);  // where a difference of positions would be worth 7 digits less
+  hand.draw(0.001, 0.0);
+  CHECK(hand.next_position().velocity == 0.001);
+  hand.draw(0.0, 0.5);
+  for (int n = 0; n < 100; ++n) {
+    hand.next_position();
+  }
+  CHECK_FALSE(hand.is_moving());
+}
+
+TEST_CASE("forces add up: a push, strikes and what is held", "[gesture]") {
+  Hand hand;
+  hand.place(0.0);
+  hand.push(0.5, 3);
+  hand.strike(1.0);
+  hand.strike(0.25);
+  CHECK(hand.next_force().value == 1.75);
+  CHECK(hand.next_force().value == 0.5);
+  CHECK(hand.next_force().value == 0.5);
+  CHECK(hand.next_force().value == 0.0);
+  CHECK_FALSE(hand.is_moving());
+}
+
+TEST_CASE("a position event moves the hand, smoothed as published", "[gesture]") {
+  Player player(puppet, played({.target = "in1"}));
+  player.run(3000, {{.frame = 101, .kind = EventKind::position, .index = 1, .value = 1.0}});
+  for (std::size_t n = 0; n < 3000; ++n) {
+    const double after = n < 101 ? 0.0 : static_cast<double>(n - 100);
+    const double expected = 1.0 - 0.5 * std::pow(smoothing_pole, after);
+    REQUIRE(std::fabs(player.out[0][n] - expected) < 1e-12);
+  }
+  // Another input's number, and a force on a position input, do nothing.
+  Player deaf(puppet, played({.target = "in1"}));
+  deaf.run(1000, {{.kind = EventKind::position, .index = 2, .value = 1.0},
+                  {.kind = EventKind::force, .index = 1, .value = 1.0}});
+  CHECK(std::all_of(deaf.out[0].begin(), deaf.out[0].end(), [](double x) { return x == 0.5; }));
+}
+
+TEST_CASE("a note holds the hand at the far end of its range until it is released", "[gesture]") {
+  Player player(
+      puppet, played({.target = "in1", .gesture = ControlGesture::hold, .low = 0.25, .high = 2.0}));
+  player.run(60000, {note_on(1000, 60), note_off(31000, 60)});
+  CHECK(player.out[0][999] == 0.25);
+  for (std::size_t n = 1000; n < 31000; ++n) {
+    const double expected = 2.0 - 1.75 * std::pow(smoothing_pole, static_cast<double>(n - 999));
+    REQUIRE(std::fabs(player.out[0][n] - expected) < 1e-11);
+  }
+  CHECK(std::fabs(player.out[0][59999] - 0.25) < 1e-11);
+}
+
+TEST_CASE("a pluck sweeps to the other side, the harder the faster", "[gesture]") {
+  const auto control = ControlSetting{.target = "in1",
+                                      .gesture = ControlGesture::pluck,
+                                      .low = 0.001,
+                                      .high = 0.003,
+                                      .travel = 0.25};
+  Player player(puppet, played(control));
+  player.run(3000, {note_on(100, 60, 0.5), note_on(1000, 60, 1.0)});
+  CHECK(player.out[0][99] == 0.25);  // 0.5 is the middle
+  for (std::size_t n = 100; n < 1000; ++n) {
+    const double expected = std::min(0.75, 0.25 + 0.002 * static_cast<double>(n - 99));
+    REQUIRE(std::fabs(player.out[0][n] - expected) < 1e-13);
+  }
+  for (std::size_t n = 1000; n < 3000; ++n) {
+    const double expected = std::max(0.25, 0.75 - 0.003 * static_cast<double>(n - 999));
+    REQUIRE(std::fabs(player.out[0][n] - expected) < 1e-13);
+  }
+  // The same displacement a second at another rate.
+  Player fast(puppet, played(control), {.rate_hz = 88200.0});
+  fast.run(1000, {note_on(0, 60, 0.5)});
+  CHECK(std::fabs(fast.out[0][99] - (0.25 + 0.001 * 100)) < 1e-13);
+}
+
+TEST_CASE("a bowed note draws until the key is released", "[gesture]") {
+  Player player(
+      puppet, played({.target = "in1", .gesture = ControlGesture::bow, .low = 0.0, .high = 1e-4}));
+  player.run(20000, {note_on(0, 60, 0.5), note_off(10000, 60)});
+  const double pole = std::exp(-1.0 / (0.005 * 44100.0));
+  for (std::size_t n = 1; n < 10000; ++n) {
+    const double speed = player.out[0][n] - player.out[0][n - 1];
+    const double expected = 0.5e-4 * (1.0 - std::pow(pole, static_cast<double>(n + 1)));
+    REQUIRE(std::fabs(speed - expected) < 1e-15);
+  }
+  CHECK(player.out[0][19999] == player.out[0][19998]);
+}
+
+TEST_CASE("controllers, pressure and OSC names move what the preset says, by its curve",
+          "[gesture]") {
+  Preset preset = played({.source = ControlSource::controller,
+                          .number = 7,
+                          .target = "k",
+                          .gesture = ControlGesture::parameter,
+                          .low = 0.01,
+                          .high = 0.05});
+  preset.controls.push_back({.source = ControlSource::pressure,
+                             .target = "k",
+                             .gesture = ControlGesture::parameter,
+                             .low = 0.01,
+                             .high = 0.04,
+                             .exponential = true});
+  preset.controls.push_back({.source = ControlSource::osc,
+                             .address = "/finger",
+                             .target = "in1",
+                             .low = -1.0,
+                             .high = 1.0});
+  Player player(puppet, preset);
+  const auto k_after = [&](Event event) {
+    player.run(300, {event});
+    return player.engine().parameter(0);
+  };
+  CHECK(k_after(controller(0, 7, 0.25)) == 0.02);
+  CHECK(k_after(controller(0, 8, 0.75)) == 0.02);
+  CHECK(k_after({.kind = EventKind::pressure, .value = 0.5}) == Approx(0.02).epsilon(1e-14));
+  CHECK(k_after({.kind = EventKind::pressure, .value = 2.0}) == Approx(0.04).epsilon(1e-14));
+  REQUIRE(player.compiled.instrument.custom.size() == 1);
+  CHECK(player.compiled.instrument.custom[0].address == "/finger");
+  const auto row = static_cast<std::uint16_t>(player.compiled.instrument.custom[0].row);
+  player.run(60000, {{.kind = EventKind::custom, .index = row, .value = 0.125}});
+  CHECK(player.out[0].back() == Approx(-0.75).epsilon(1e-11));
+}
+
+TEST_CASE("a force lasts as long as told, and means the same at every rate", "[gesture]") {
+  // A free mass: a force F over N samples leaves it with the speed F N, in units a sample.
+  const std::string free_mass = "@m mass 2. 0. 0.\n@in1 frcInput @m\n@out1 posOutput @m\n";
+  const auto at_one_second = [&](double rate_hz, double force, double seconds) {
+    Preset preset = played({.target = "in1", .gesture = ControlGesture::impulse});
+    preset.gain = 1e-5;  // so that nobody takes it for a voice that is lost
+    Player player(free_mass, preset, {.rate_hz = rate_hz});
+    player.run(static_cast<std::size_t>(rate_hz),
+               {{.kind = EventKind::force, .index = 1, .value = force, .value2 = seconds}});
+    return player.y().back() / preset.gain;
+  };
+  CHECK(at_one_second(44100.0, 0.5, 0.0) == Approx(0.25 * 44100).epsilon(1e-9));
+  CHECK(at_one_second(88200.0, 0.5, 0.0) == Approx(0.25 * 44100).epsilon(1e-9));
+  const double frames = 441.0;  // of 10 ms: F/M (N (N+1)/2 + N (1 s - N))
+  const double held = 0.25 * (frames * (frames + 1) / 2 + frames * (44100 - frames));
+  CHECK(at_one_second(44100.0, 0.5, 0.01) == Approx(held).epsilon(1e-9));
+  CHECK(at_one_second(88200.0, 0.5, 0.01) == Approx(held).epsilon(1e-4));
+}
+
+TEST_CASE("a blow on a position is one sample beside it, with the velocity of both steps",
+          "[gesture]") {
+  Hand hand;
+  hand.place(0.5);
+  hand.strike(0.25);
+  const HandSample away = hand.next_position();
+  const HandSample back = hand.next_position();
+  const HandSample rest = hand.next_position();
+  CHECK(away.value == 0.75);
+  CHECK(away.velocity == 0.25);
+  CHECK(back.value == 0.5);
+  CHECK(back.velocity == -0.25);
+  CHECK(rest.velocity == 0.0);
+  CHECK_FALSE(hand.is_moving());
+}
+
+TEST_CASE("audio moves the hand from where it is; in the bare network it is the hand",
+          "[gesture]") {
+  Preset preset = played(
+      {.source = ControlSource::audio, .number = 2, .target = "in1", .low = 0.0, .high = 0.5});
+  Player player(puppet, preset);
+  std::vector<double> audio(2000);
+  const Motion motion(9, 5.0, 500.0);
+  for (std::size_t n = 0; n < audio.size(); ++n) {
+    audio[n] = motion(n);
+  }
+  const double* const channels[] = {nullptr, audio.data()};
+  player.run(2000, {}, {97}, channels);
+  Player bare(puppet, preset, {.bare = true});
+  bare.run(2000, {}, {97}, channels);
+  const Network network = network_of(puppet);
+  auto moved = reference::make_simulation(network, parameter_values(network));
+  auto driven = reference::make_simulation(network, parameter_values(network));
+  Comparison error;
+  for (std::size_t n = 0; n < audio.size(); ++n) {
+    REQUIRE(player.out[0][n] == 0.5 + 0.5 * audio[n]);
+    REQUIRE(bare.out[0][n] == 0.5 * audio[n]);
+    // Its velocity is felt by the mass that it pulls.
+    const double from_rest[] = {0.5 + 0.5 * audio[n]};
+    const double as_it_is[] = {0.5 * audio[n]};
+    error.add(moved.simulator.step(from_rest)[1], player.out[1][n]);
+    error.add(driven.simulator.step(as_it_is)[1], bare.out[1][n]);
+  }
+  INFO(show(error.relative()));
+  CHECK(error.relative() < 1e-12);
+  CHECK(player.compiled.instrument.audio_inputs == 2);
+  // Where the channel is not connected the hand is at its place.
+  Player quiet(puppet, preset);
+  const double* const nothing[] = {nullptr, nullptr};
+  quiet.run(100, {}, {50}, nothing);
+  CHECK(quiet.out[0][99] == 0.5);
+}
+
+TEST_CASE("noise is shaped by the outputs, and the same in every run", "[gesture]") {
+  Preset preset = played({.target = "in1"});
+  Player plain(puppet, preset);
+  preset.noise = true;
+  Player noisy(puppet, preset);
+  Player again(puppet, preset);
+  for (Player* player : {&plain, &noisy, &again}) {
+    player->run(20000);
+  }
+  CHECK(noisy.out == again.out);
+  double mean = 0.0;
+  double power = 0.0;
+  for (std::size_t n = 0; n < 20000; ++n) {
+    const double white = noisy.out[0][n] / plain.out[0][n];
+    REQUIRE(std::fabs(white) <= 1.0);
+    mean += white / 20000;
+    power += white * white / 20000;
+  }
+  CHECK(std::fabs(mean) < 0.02);                // 5 standard deviations of a uniform mean
+  CHECK(std::fabs(power - 1.0 / 3.0) < 0.011);  // and of its square
+}
+
+}  // namespace ressort

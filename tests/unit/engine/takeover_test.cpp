@@ -1,0 +1,169 @@
+// One engine goes on where another of the same model is, in other forms, and nobody hears it.
+#include <unistd.h>
+
+#include <filesystem>
+#include <fstream>
+#include <set>
+
+#include "app/session/session.h"
+#include "tests/support/player.h"
+
+namespace ressort {
+namespace {
+
+using rig::Player;
+using rig::show;
+
+// A string of masses on oscillators, with gravity, a contact and two inputs: all that has to go on.
+const std::string body =
+    scenes::string("s", 12, "0.1", "0.002") +
+    "@o osc 1. 0.02 0.001 0.01 0.01\n@h springDamper @o @s_m3 s_K 0.001\n"
+    "@w massG 1. 0.0001 0. 0.\n@d springDamper @w @s_m9 s_K 0.001\n"
+    "@g ground -0.2\n@c contact @s_m5 @g 0.1 0.01 0.\n"
+    "@in1 frcInput @s_m2\n@in2 posInput 0.\n@p springDamper @in2 @s_m8 0.05 0.001\n" +
+    scenes::output(1, "s_m6");
+
+Preset played() {
+  Preset preset = rig::struck(3);
+  preset.controls.push_back({.source = ControlSource::controller,
+                             .number = 1,
+                             .target = "in2",
+                             .gesture = ControlGesture::position,
+                             .low = -0.3,
+                             .high = 0.3});
+  return preset;
+}
+
+CompileOptions in_form(Method method, Precision precision = Precision::float64) {
+  return {.rate_hz = 48000.0, .precision = precision, .method = method};
+}
+
+const std::vector<Event> beginning = {rig::note_on(0, 57), rig::note_on(700, 64),
+                                      rig::controller(1000, 1, 0.9)};
+const std::vector<Event> ending = {rig::note_on(300, 69), rig::note_off(500, 57),
+                                   rig::controller(900, 1, 0.1)};
+
+// How far the second half is from that of an engine that was not relieved.
+double difference(const std::string& text, const Preset& preset, int stiffness, Method from,
+                  Method to, Precision precision = Precision::float64) {
+  std::vector<Event> events = beginning;
+  events.push_back(rig::parameter(1950, stiffness, 0.102));
+  Player stays(text, preset, in_form(from, precision));
+  Player leaves(text, preset, in_form(from, precision));
+  Player comes(text, preset, in_form(to, precision));
+  for (Player* player : {&stays, &leaves}) {
+    player->run(2000, events, {64, 100, 17});  // in the midst of the stiffness's ramp
+  }
+  const rig::HeapWatch watch;
+  const bool goes_on = comes.engine().go_on_from(leaves.engine());
+  const std::size_t heap_calls = watch.calls();
+  REQUIRE(goes_on);
+  CHECK(heap_calls == 0);
+  stays.run(4000, ending);
+  comes.run(4000, ending);
+  double worst = 0.0;
+  for (std::size_t n = 0; n < 4000; ++n) {
+    worst = std::max(worst, std::fabs(stays.y()[2000 + n] - comes.y()[n]));
+  }
+  return worst / rig::peak({stays.y().data() + 2000, 4000});
+}
+
+// A kernel that the part does not have would be the direct one under another name.
+bool has_form(const std::string& text, Method method) {
+  Machine machine = make_machine(rig::network_of(text), 48000.0, true);
+  return make_plan(machine, {}, method).parts[0].method == method;
+}
+
+TEST_CASE("An engine goes on where another is", "[takeover]") {
+  const std::string mesh = scenes::square_mesh("mesh", 10, 8, "0.1", "0.01") +
+                           "@in1 frcInput @mesh_m2_6\n@in2 posInput 0.\n"
+                           "@p springDamper @in2 @mesh_m5_5 mesh_K mesh_Z\n" +
+                           scenes::output(1, "mesh_m7_3");
+  std::set<Method> left;
+  std::set<Method> reached;
+  for (const auto& [text, stiffness] : {std::pair{body, 1}, std::pair{mesh, 0}}) {
+    for (const Method from : all_methods) {
+      for (const Method to : all_methods) {
+        if (from == Method::modal || !has_form(text, from) || !has_form(text, to)) {
+          continue;
+        }
+        left.insert(from);
+        reached.insert(to);
+        const double off = difference(text, played(), stiffness, from, to);
+        const double off_in_float =
+            difference(text, played(), stiffness, from, to, Precision::float32);
+        INFO(method_name(from) << " to " << method_name(to) << ": " << show(off) << ", "
+                               << show(off_in_float));
+        CHECK(off < 1e-13);
+        CHECK(off_in_float < 3e-6);
+      }
+    }
+  }
+  CHECK(left.size() == std::size(all_methods) - 1);
+  CHECK(reached.size() == std::size(all_methods));
+}
+
+TEST_CASE("Modes cannot tell where all masses are", "[takeover]") {
+  Player modal(rig::ringing_string(), rig::struck(1), in_form(Method::modal));
+  Player direct(rig::ringing_string(), rig::struck(1), in_form(Method::direct));
+  modal.run(500, {rig::note_on(0, 57)});
+  CHECK_FALSE(direct.engine().go_on_from(modal.engine()));
+  direct.run(500);
+  CHECK(rig::peak(direct.y()) == 0.0);
+}
+
+// One callback of 64 frames, in which a key may be struck.
+std::vector<double> listen(Process& process, bool strikes) {
+  std::vector<double> left(64);
+  std::vector<double*> outputs{left.data()};
+  const std::uint8_t on[] = {0x90, 48, 100};
+  const MidiPacket packet{7, on};
+  process.block(std::span<const double* const>(), std::span<double* const>(outputs), 64,
+                std::span(&packet, strikes ? 1 : 0), 0);
+  return left;
+}
+
+TEST_CASE("A large mesh sounds at once, and by its modes when they are found", "[takeover]") {
+  const std::string path =
+      (std::filesystem::temp_directory_path() / ("ressort-takeover-" + std::to_string(getpid())))
+          .string() +
+      ".mdl";
+  std::ofstream(path) << scenes::mesh_20x30();
+  Process relieved(48000.0);
+  Session session(relieved, {.compile = {.rate_hz = 48000.0}}, {});
+  const auto quick = session.load_and_wait(path);
+  REQUIRE(quick);
+  std::filesystem::remove(path);
+  REQUIRE((*quick)->plan.parts[0].method != Method::modal);
+  Preset preset = default_preset(rig::network_of(scenes::mesh_20x30()), false);
+  preset.gain = (*quick)->instrument.gain;
+  auto compiled = compile(rig::network_of(scenes::mesh_20x30()), preset,
+                          {.rate_hz = 48000.0, .most_modes = quick_modes});
+  REQUIRE(compiled);
+  Process stays(48000.0);
+  stays.slot.offer(new Sounding{std::move(compiled->engine), 1});
+
+  rig::Comparison comparison;
+  const auto play = [&](std::size_t blocks) {
+    for (std::size_t n = 0; n < blocks; ++n) {
+      const auto expected = listen(stays, n == 0);
+      const auto found = listen(relieved, n == 0);
+      for (std::size_t i = 0; i < expected.size(); ++i) {
+        comparison.add(expected[i], found[i]);
+      }
+    }
+  };
+  play(50);  // it sounds already
+  for (int patience = 0; patience < 5000 && relieved.meters.swaps.get() < 2; ++patience) {
+    play(20);
+  }
+  play(500);
+  CHECK(session.current()->plan.parts[0].method == Method::modal);
+  CHECK(relieved.meters.swaps.get() == 2);
+  CHECK(comparison.peak > 0.01);
+  INFO(show(comparison.relative()));
+  CHECK(comparison.relative() < 1e-11);
+}
+
+}  // namespace
+}  // namespace ressort

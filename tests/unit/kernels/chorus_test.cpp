@@ -1,0 +1,328 @@
+// What is held in registers, and that every voice moves as it does alone.
+#include "core/kernels/chorus/chorus_form.h"
+#include "tests/support/passive.h"
+
+namespace ressort {
+namespace {
+
+using rig::Comparison;
+using rig::isas;
+using rig::program_of;
+using rig::Random;
+using rig::show;
+
+constexpr std::uint32_t none = ChorusSpring::none;
+
+Program formed(const std::string& text) {
+  Program program = program_of(text);
+  auto form = chorus_form(program);
+  REQUIRE(form.has_value());
+  program.form = std::move(*form);
+  return program;
+}
+
+// As many kernels as the voices need, each voice at its own pitch and with its own hands.
+template <class T>
+class Choir {
+ public:
+  Choir(const Program& program, std::size_t voices, Isa isa) : program_(program), voices_(voices) {
+    while (kernels_.size() * width_ < voices) {
+      kernels_.push_back(make_kernel<T>(program_, voices, isa));
+      width_ = kernels_[0]->width();
+    }
+    value_.resize(max_block_frames * program_.inputs.size() * width_);
+    velocity_.resize(value_.size());
+    outputs_.resize(max_block_frames * program_.outputs.size() * width_);
+    for (std::size_t voice = 0; voice < kernels_.size() * width_; ++voice) {
+      turn(voice, program_.parameters, false);
+    }
+  }
+
+  Kernel<T>& of(std::size_t voice) { return *kernels_[voice / width_]; }
+  std::size_t lane(std::size_t voice) const { return voice % width_; }
+
+  void turn(std::size_t voice, const std::vector<double>& parameters, bool ramped) {
+    const double pitch = 1.0 / (1.0 + 0.07 * static_cast<double>(voice));
+    auto& coefficients = of(voice).coefficients;
+    for (std::uint32_t c = 0; c < program_.coefficients.size(); ++c) {
+      coefficients.set(lane(voice), c,
+                       coefficient_value(program_, program_.coefficients[c], parameters, pitch),
+                       ramped);
+    }
+    if (ramped) {
+      coefficients.ramp(128);
+    }
+  }
+
+  // hands(frame, voice, input); gives [voice][frame][output], one voice after the other.
+  template <class Hands>
+  std::vector<double> play(std::size_t at, std::size_t frames, Hands&& hands) {
+    std::vector<double> heard;
+    for (std::size_t first = 0; first < voices_; first += width_) {
+      each_value(frames, program_.inputs.size(), [&](std::size_t n, std::size_t i, std::size_t k) {
+        const double here = hands(at + n, first + k, i);
+        const double before =
+            at + n == 0 ? hands(0, first + k, i) : hands(at + n - 1, first + k, i);
+        value_[place(n, i, k, program_.inputs.size())] = static_cast<T>(here);
+        velocity_[place(n, i, k, program_.inputs.size())] = static_cast<T>(here - before);
+      });
+      of(first).step({.frames = frames,
+                      .value = value_.data(),
+                      .velocity = velocity_.data(),
+                      .audio = nullptr,
+                      .outputs = outputs_.data()});
+      const std::size_t count = program_.outputs.size();
+      for (std::size_t k = 0; k < std::min(width_, voices_ - first); ++k) {
+        for (std::size_t n = 0; n < frames * count; ++n) {
+          heard.push_back(static_cast<double>(outputs_[n * width_ + k]));
+        }
+      }
+    }
+    return heard;
+  }
+
+ private:
+  std::size_t place(std::size_t n, std::size_t i, std::size_t k, std::size_t count) const {
+    return (n * count + i) * width_ + k;
+  }
+  template <class Use>
+  void each_value(std::size_t frames, std::size_t count, Use&& use) const {
+    for (std::size_t n = 0; n < frames; ++n) {
+      for (std::size_t i = 0; i < count; ++i) {
+        for (std::size_t k = 0; k < width_; ++k) {
+          use(n, i, k);
+        }
+      }
+    }
+  }
+
+  Program program_;
+  std::size_t voices_;
+  std::size_t width_ = 1;
+  std::vector<std::unique_ptr<Kernel<T>>> kernels_;
+  Aligned<T> value_;
+  Aligned<T> velocity_;
+  Aligned<T> outputs_;
+};
+
+struct Contest {
+  std::size_t voices = 1;
+  std::size_t frames = 2000;
+  double reach = 0.02;
+  bool turns = false;  // of the parameters, in one voice at a time
+  Isa isa = best_isa();
+};
+
+// One Comparison for each voice, against the direct kernel in double.
+template <class T>
+std::vector<Comparison> contest(const Program& program, const Contest& options) {
+  Program plain = program;
+  plain.form = Direct{};
+  Choir<double> reference(plain, options.voices, Isa::base);
+  Choir<T> found(program, options.voices, options.isa);
+  const auto hands = [&](std::size_t n, std::size_t voice, std::size_t input) {
+    const InputSlot& slot = program.inputs[input];
+    const double t = static_cast<double>(n) / 44100.0 * (slot.is_force ? 3000.0 : 90.0);
+    const double wave = std::sin(t * (1.0 + 0.1 * static_cast<double>(voice % 17)));
+    return (slot.is_force ? 0.0 : program.position[slot.node]) + options.reach * wave;
+  };
+  Random random(options.voices);
+  std::vector<Comparison> voices(options.voices);
+  std::size_t blocks = 0;
+  for (std::size_t at = 0; at < options.frames; ++blocks) {
+    if (options.turns && blocks % 5 == 4) {
+      auto parameters = program.parameters;
+      for (double& parameter : parameters) {
+        parameter *= random.uniform(0.9, 1.1);
+      }
+      const std::size_t voice = random.below(options.voices);
+      reference.turn(voice, parameters, true);
+      found.turn(voice, parameters, true);
+    }
+    const std::size_t longest = random.below(3) == 0 ? 1 + random.below(64) : 64;
+    const std::size_t frames = std::min(longest, options.frames - at);
+    const auto expected = reference.play(at, frames, hands);
+    const auto heard = found.play(at, frames, hands);
+    for (std::size_t i = 0; i < expected.size(); ++i) {
+      voices[i / (frames * program.outputs.size())].add(expected[i], heard[i]);
+    }
+    at += frames;
+  }
+  return voices;
+}
+
+template <class T>
+void check(const Program& program, Contest options, double most_relative) {
+  for (const Isa isa : isas()) {
+    for (const std::size_t voices : {1u, 3u, 5u, 16u, 64u}) {
+      options.voices = voices;
+      options.isa = isa;
+      const auto heard = contest<T>(program, options);
+      for (std::size_t voice = 0; voice < voices; ++voice) {
+        INFO(isa_name(isa) << ", " << voice << " of " << voices << " voices: residual "
+                           << show(heard[voice].relative()));
+        CHECK(heard[voice].peak > 0.0);
+        CHECK(heard[voice].relative() < most_relative);
+      }
+    }
+  }
+}
+
+std::string example(const std::string& name) {
+  for (const auto& each : scenes::nine_instruments()) {
+    if (each.name == name) {
+      return each.text;
+    }
+  }
+  return "";
+}
+
+// Masses of every kind, every pair of them held by one of the laws, or by none.
+std::string random_body(std::uint64_t seed, std::size_t masses) {
+  Random random(seed);
+  std::string text = "@k param 0.02\n@z param 0.001\n@s0 ground 0.\n@s1 ground 0.01\n";
+  for (std::size_t i = 0; i < masses; ++i) {
+    const std::string name = "@m" + std::to_string(i);
+    text += name + (random.below(3) == 0 ? " osc 1.5 0.01 0.001 0. 0.\n" : " mass 1. 0. 0.\n") +
+            name + "g springDamper @s" + std::to_string(random.below(2)) + " " + name + " k z\n";
+  }
+  const char* const laws[] = {"springDamper", "springDamper", "nlSpring3",
+                              "nlPluck",      "contact",      "nlBow"};
+  const char* const numbers[] = {" k z",         " 0.03 z",           " k 0.1 z",
+                                 " 0.001 0.5 z", " 0.01 0.001 0.001", " z 0.1"};
+  for (std::size_t i = 0; i < 2 * masses; ++i) {
+    const std::size_t a = random.below(masses);
+    const std::size_t b = random.below(masses);
+    const std::size_t law = random.below(std::size(laws));
+    if (a != b) {
+      text += "@r" + std::to_string(i) + " " + laws[law] + " @m" + std::to_string(a) + " @m" +
+              std::to_string(b) + numbers[law] + "\n";
+    }
+  }
+  return text + "@in1 frcInput @m0\n@in3 frcInput @m0\n@in2 posInput 0.\n@h springDamper @in2 @m" +
+         std::to_string(masses - 1) + " k z\n@out1 posOutput @m0\n@out2 posOutput @m" +
+         std::to_string(masses / 2) + "\n";
+}
+
+}  // namespace
+
+TEST_CASE("a triangle is held whole, its pick is walked", "[chorus]") {
+  const Program program = formed(example("IPlayTheTriangle"));
+  const auto& chorus = std::get<Chorus>(program.form);
+  const auto is_held = [](const ChorusSpring& spring) { return spring.stiffness != none; };
+  CHECK(std::count_if(chorus.pairs.begin(), chorus.pairs.begin() + 3, is_held) == 3);
+  CHECK(std::count_if(chorus.pairs.begin() + 3, chorus.pairs.end(), is_held) == 0);
+  CHECK(std::count_if(chorus.anchors.begin(), chorus.anchors.end(), is_held) == 1);
+  REQUIRE(chorus.links.size() == 1);
+  CHECK(program.link_runs[chorus.links[0].run].law == Law::pluck);
+}
+
+TEST_CASE("a second spring in the same place is no spring held, nor is any of more masses",
+          "[chorus]") {
+  const std::string twice = scenes::triangle("0.1", "0.001") +
+                            "@a springDamper @m_m0 @m_m1 0.01 0.\n@out1 posOutput @m_m0\n";
+  const auto chorus = chorus_form(program_of(twice));
+  REQUIRE(chorus.has_value());
+  CHECK(chorus->links.size() == 1);
+  const auto walked =
+      chorus_form(program_of(scenes::string("s", 5, "0.1", "0.001") + scenes::output(1, "s_m2")));
+  REQUIRE(walked.has_value());
+  CHECK(walked->links.empty());
+  CHECK(walked->pairs[0].stiffness == none);
+  CHECK_FALSE(chorus_form(program_of(scenes::string("s", 17, "0.1", "0.001"))).has_value());
+  CHECK_FALSE(chorus_form(program_of(scenes::triangle("0.1", "0.001") + "@out1 frcOutput @m_m0\n"))
+                  .has_value());
+}
+
+TEST_CASE("kernels share the voices evenly, and no pack is without any", "[chorus]") {
+  for (const char* const name : {"PolyTriangle", "PhysicalLFO"}) {
+    const Program program = formed(example(name));
+    for (const Isa isa : isas()) {
+      for (const std::size_t voices : {1u, 3u, 9u, 16u, 64u, 68u}) {
+        const std::size_t width = make_kernel<double>(program, voices, isa)->width();
+        const std::size_t kernels = (voices + width - 1) / width;
+        CAPTURE(name, isa_name(isa), voices, width);
+        CHECK(kernels * width < voices + kernels * vector_bytes(isa) / sizeof(double));
+        CHECK(kernels <= 1 + voices / 12);
+      }
+    }
+  }
+}
+
+TEST_CASE("every voice of a choir is the voice alone", "[chorus]") {
+  check<double>(formed(example("PolyTriangle")), {}, 1e-12);
+  check<float>(formed(example("PolyTriangle")), {}, 1e-5);
+  check<double>(formed(example("IPlayTheTriangle")), {}, 1e-12);
+  check<double>(formed(example("PhysicalLFO")), {}, 1e-12);
+}
+
+TEST_CASE("parameters are ramped in one voice, and the others do not hear it", "[chorus]") {
+  check<double>(formed(example("PolyTriangle")), {.turns = true}, 1e-12);
+  check<double>(formed(example("IPlayTheTriangle")), {.turns = true}, 1e-12);
+}
+
+TEST_CASE("bodies of every size, of any laws", "[chorus]") {
+  for (std::uint64_t seed = 1; seed <= 27; ++seed) {
+    const std::string text = random_body(seed, 1 + seed % 9);
+    INFO("seed " << seed << "\n" << text);
+    const auto heard = contest<double>(formed(text), {.voices = 5, .turns = true});
+    for (const Comparison& voice : heard) {
+      INFO("residual " << show(voice.relative()));
+      CHECK(voice.relative() < 1e-12);
+    }
+  }
+}
+
+TEST_CASE("hard contacts are passive in every voice", "[chorus]") {
+  // In registers and in memory; links of every scheme, some on the same mass, a hand that moves.
+  for (const int masses : {1, 2, 3, 4, 7, 16}) {
+    std::string text = "@w ground -0.01\n@g ground 0.\n@in1 posInput 0.\n@k param 0.1\n";
+    const auto at = [&](int i) { return " @m" + std::to_string(i % masses) + " "; };
+    for (int i = 0; i < masses; ++i) {
+      text += "@m" + std::to_string(i) + (i % 3 == 2 ? " osc 1.5 k 0.01" : " mass 1.") + " 0. 0.\n";
+      text += "@s" + std::to_string(i) + " springDamper" + (i == 0 ? " @g " : at(i - 1)) + at(i) +
+              "k 0.001\n";
+    }
+    text += "@in2 frcInput" + at(0) + "\n@out1 posOutput" + at(masses - 1) + "\n";
+    text += "@c1 contact @w" + at(0) + "[50 * k] 0.05\n@c2 nlContact @w" + at(1) +
+            "0.1 20. 3. 0.01 0.005\n@q nlSpring3 @g" + at(2) + "0.01 5. 0.\n@p nlPluck @in1" +
+            at(3) + "0.4 0.01\n@b nlBow @in1" + at(4) + "0.3 0.01\n@d nlSpring @g" + at(5) +
+            "0.01 2. 0.001\n";
+    Program program = program_of(text, Passivity::always);
+    auto form = chorus_form(program);
+    REQUIRE(form);
+    program.form = std::move(*form);
+    for (const Isa isa : isas()) {
+      for (const std::size_t voices : {1, 13}) {
+        CAPTURE(masses, isa_name(isa), voices);
+        const Contest options{
+            .voices = voices, .frames = 300, .reach = 0.03, .turns = true, .isa = isa};
+        for (const Comparison& voice : contest<double>(program, options)) {
+          CAPTURE(show(voice.relative()));
+          CHECK(voice.peak > 1e-3);
+          CHECK(voice.relative() < 1e-11);
+        }
+      }
+    }
+  }
+}
+
+TEST_CASE("a lane is put back, and the others play on", "[chorus]") {
+  const Program program = formed(example("PolyTriangle"));
+  Choir<double> choir(program, 16, best_isa());
+  Choir<double> other(program, 16, best_isa());
+  const auto push = [](std::size_t n, std::size_t, std::size_t) { return n < 9 ? 0.1 : 0.0; };
+  choir.play(0, 64, push);
+  other.play(0, 64, push);
+  CHECK_FALSE(choir.of(5).is_near_start(choir.lane(5), 1e-6));
+  choir.of(5).reset(choir.lane(5));
+  CHECK(choir.of(5).is_near_start(choir.lane(5), 1e-12));
+  CHECK_FALSE(choir.of(4).is_near_start(choir.lane(4), 1e-6));
+  const auto heard = choir.play(64, 64, push);
+  const auto expected = other.play(64, 64, push);
+  for (std::size_t i = 0; i < heard.size(); ++i) {
+    CHECK(heard[i] == (i / 64 == 5 ? 0.0 : expected[i]));
+  }
+}
+
+}  // namespace ressort

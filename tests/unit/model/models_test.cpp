@@ -1,0 +1,96 @@
+// The nine instruments that come with the program.
+#include <cmath>
+
+#include <set>
+#include <tuple>
+
+#include "app/session/loader.h"
+#include "core/compile/compile.h"
+#include "tests/support/catch.h"
+#include "tests/support/rig.h"
+#include "tests/support/scenes.h"
+
+using namespace ressort;
+
+namespace {
+
+struct Instrument9 {
+  const char* name;
+  std::string scene;  // as scenes.h builds it, independently, from the published numbers
+};
+
+const std::vector<Instrument9>& nine() {
+  static const std::vector<Instrument9> all{
+      {"IPlayTheTriangle", scenes::iplay_the_triangle()},
+      {"PolyTriangle", scenes::poly_triangle()},
+      {"PluckedHarmonics", scenes::plucked_harmonics()},
+      {"BowedString", scenes::bowed_string()},
+      {"LargeTriangleMesh", scenes::large_triangle_mesh()},
+      {"Resonator", scenes::resonator()},
+      {"PhysicalLFO", scenes::physical_lfo()},
+      {"20x30mesh", scenes::mesh_20x30()},
+      {"1000massString", scenes::string_1000()},
+  };
+  return all;
+}
+
+// The ends of a network's links by name: what is attached to what, whatever the lines' order.
+std::multiset<std::tuple<LinkKind, std::string, std::string>> ends(const Network& network) {
+  std::multiset<std::tuple<LinkKind, std::string, std::string>> found;
+  for (const Link& link : network.links) {
+    found.emplace(link.kind, network.masses[link.a].name, network.masses[link.b].name);
+  }
+  return found;
+}
+
+}  // namespace
+
+TEST_CASE("the models are the published networks", "[models]") {
+  for (const Instrument9& instrument : nine()) {
+    INFO(instrument.name);
+    const auto scene = load_scene(std::string(instrument.name) + ".mdl", {.bare = true});
+    REQUIRE(scene);
+    CHECK(scene->warnings.empty());
+    const Network expected = rig::network_of(instrument.scene);
+    CHECK(scene->network.masses.size() == expected.masses.size());
+    CHECK(ends(scene->network) == ends(expected));
+    CHECK(scene->network.inputs.size() == expected.inputs.size());
+    CHECK(scene->network.outputs.size() == expected.outputs.size());
+  }
+}
+
+TEST_CASE("a forte note of every preset peaks near -6 dBFS, softer ones below it", "[models]") {
+  for (const Instrument9& instrument : nine()) {
+    INFO(instrument.name);
+    const auto scene = load_scene(instrument.name, {});
+    REQUIRE(scene);
+    REQUIRE(scene->has_preset);
+    std::vector<double> levels_db;
+    for (const double velocity : {20.0, 60.0, 104.0}) {
+      auto compiled = compile(scene->network, scene->preset, {});
+      REQUIRE(compiled);
+      CHECK(compiled->instrument.stiffness_margin >= 1.0);  // in every corner of the ranges
+      const std::size_t frames = 66150;                     // a bow takes its time
+      std::vector<std::vector<double>> channels(
+          static_cast<std::size_t>(compiled->instrument.outputs), std::vector<double>(frames));
+      std::vector<double*> outputs;
+      for (auto& channel : channels) {
+        outputs.push_back(channel.data());
+      }
+      const Event note{.kind = EventKind::note_on, .index = 60, .value = velocity / 127.0};
+      compiled->engine->process({&note, 1}, {}, outputs, frames);
+      double peak = 0.0;
+      for (const auto& channel : channels) {
+        for (const double sample : channel) {
+          peak = std::max(peak, std::fabs(sample));
+        }
+      }
+      levels_db.push_back(20.0 * std::log10(peak));
+    }
+    CAPTURE(levels_db[0], levels_db[1], levels_db[2]);
+    CHECK(levels_db[0] < levels_db[1]);
+    CHECK(levels_db[1] < levels_db[2]);
+    CHECK(levels_db[2] > -9.0);
+    CHECK(levels_db[2] < -3.0);
+  }
+}

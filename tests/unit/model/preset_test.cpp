@@ -1,0 +1,416 @@
+// Presets: what is read from one, every complaint with its place, and the preset of no preset.
+#include "core/model/preset/preset.h"
+
+#include "app/control/calls.h"
+#include "core/model/preset/fit.h"
+#include "tests/support/rig.h"
+
+namespace ressort {
+namespace {
+
+using rig::network_of;
+
+struct Complaint {
+  std::string text;
+  int line;
+  int column;
+  std::string message;  // its beginning
+};
+
+void check_error(const Complaint& complaint) {
+  const auto preset = parse_preset(complaint.text);
+  INFO(complaint.text);
+  REQUIRE(preset.errors.size() == 1);
+  const Error& error = preset.errors[0];
+  INFO(error.message);
+  CHECK(error.message.starts_with(complaint.message));
+  CHECK(error.line == complaint.line);
+  CHECK(error.column == complaint.column);
+}
+
+// A preset whose only control is this; the control's keys stand in line 3.
+std::string control(const std::string& keys) {
+  return "model = \"x.mdl\"\n[[control]]\n" + keys + "\n";
+}
+
+ControlSetting control_of(const std::string& keys) {
+  const auto preset = parse_preset(control(keys));
+  INFO(keys << (preset.ok() ? "" : ": " + preset.errors[0].message));
+  REQUIRE(preset.ok());
+  REQUIRE(preset.preset.controls.size() == 1);
+  return preset.preset.controls[0];
+}
+
+}  // namespace
+
+TEST_CASE("a preset is what was written, and the rest its defaults", "[preset]") {
+  const auto parsed = parse_preset(
+      "model = \"PolyTriangle.mdl\"\n"
+      "description = \"three masses\"\n"
+      "voices = 12\n"
+      "gain = 0.5\n"
+      "release_s = 0.25\n"
+      "noise = true\n"
+      "tuning = \"fixed\"\n"
+      "transpose = -12\n"
+      "[parameters]\n"
+      "m_Z = { value = 1e-4, range = [0.00001, 0.01] }\n"
+      "m_K = { value = 0.1, range = [0.0001, 1] }\n"
+      "[[control]]\n"
+      "from = \"note\"\n"
+      "to = \"in1\"\n"
+      "how = \"impulse\"\n"
+      "range = [0.01, 0.1]\n"
+      "keys = [36, 60]\n"
+      "[[control]]\n"
+      "from = \"cc1\"\n"
+      "to = \"m_K\"\n"
+      "range = [0.01, 0.3]\n"
+      "curve = \"exponential\"\n");
+  REQUIRE(parsed.ok());
+  const Preset* const read = &parsed.preset;
+  CHECK(read->model == "PolyTriangle.mdl");
+  CHECK(read->description == "three masses");
+  CHECK(read->voices == 12);
+  CHECK(read->gain == 0.5);
+  CHECK(read->release_s == 0.25);
+  CHECK(read->noise);
+  CHECK_FALSE(read->keyboard);
+  CHECK(read->transpose == -12);
+  REQUIRE(read->parameters.size() == 2);
+  CHECK(read->parameters[0] == ParameterSetting{"m_K", 0.1, 0.0001, 1.0});
+  CHECK(read->parameters[1] == ParameterSetting{"m_Z", 1e-4, 0.00001, 0.01});
+  REQUIRE(read->controls.size() == 2);
+  CHECK(read->controls[0] == ControlSetting{.target = "in1",
+                                            .gesture = ControlGesture::impulse,
+                                            .low = 0.01,
+                                            .high = 0.1,
+                                            .lowest_key = 36,
+                                            .highest_key = 60});
+  CHECK(read->controls[1] == ControlSetting{.source = ControlSource::controller,
+                                            .number = 1,
+                                            .target = "m_K",
+                                            .gesture = ControlGesture::parameter,
+                                            .low = 0.01,
+                                            .high = 0.3,
+                                            .exponential = true});
+  const auto least = parse_preset("model = \"x.mdl\"");
+  REQUIRE(least.ok());
+  CHECK(least.preset == Preset{.model = "x.mdl"});
+}
+
+TEST_CASE("every source and every gesture has its word", "[preset]") {
+  const auto from = [](const std::string& word) {
+    return control_of("from = \"" + word + "\"\nto = \"in1\"");
+  };
+  CHECK(from("note").source == ControlSource::note);
+  CHECK(from("pressure").source == ControlSource::pressure);
+  CHECK(from("cc0").number == 0);
+  CHECK(from("cc119").source == ControlSource::controller);
+  CHECK(from("cc119").number == 119);
+  CHECK(from("audio1").source == ControlSource::audio);
+  CHECK(from("audio64").number == 64);
+  CHECK(from("/finger").source == ControlSource::osc);
+  CHECK(from("/finger").address == "/finger");
+  const auto how = [](const std::string& word) {
+    return control_of("from = \"note\"\nto = \"in1\"\ntravel = 1\nhow = \"" + word + "\"").gesture;
+  };
+  CHECK(how("position") == ControlGesture::position);
+  CHECK(how("pluck") == ControlGesture::pluck);
+  CHECK(how("bow") == ControlGesture::bow);
+  CHECK(how("impulse") == ControlGesture::impulse);
+  CHECK(how("hold") == ControlGesture::hold);
+  CHECK(how("parameter") == ControlGesture::parameter);
+  // Without a word the target tells.
+  CHECK(from("note").gesture == ControlGesture::position);
+  CHECK(control_of("from = \"cc1\"\nto = \"m_K\"").gesture == ControlGesture::parameter);
+  CHECK(control_of("from = \"cc1\"\nto = \"inner\"").gesture == ControlGesture::parameter);
+}
+
+TEST_CASE("no control has an address that the program takes for itself", "[preset]") {
+  for (const AddressRow& row : addresses()) {
+    std::string address(row.address);
+    if (const std::size_t at = address.find("NAME"); at != std::string::npos) {
+      address.replace(at, 4, "x");
+    }
+    if (const std::size_t at = address.find("/N/"); at != std::string::npos) {
+      address.replace(at, 3, "/1/");
+    }
+    check_error({control("to = \"in1\"\nfrom = \"" + address + "\""), 4, 8,
+                 "'" + address + "' is an address of the program's own"});
+  }
+  for (const std::string address : {"/a", "/note/onset", "/params/x", "/inner/1", "/a-b_c.d/2!"}) {
+    CHECK(control_of("to = \"in1\"\nfrom = \"" + address + "\"").address == address);
+  }
+  const std::string longest = "/" + std::string(254, 'a');
+  CHECK(control_of("to = \"in1\"\nfrom = \"" + longest + "\"").address == longest);
+}
+
+TEST_CASE("every fault of a preset is told with its line and column", "[preset]") {
+  const std::string m = "model = \"x.mdl\"\n";
+  const std::string to = "to = \"in1\"\n";
+  const std::vector<Complaint> complaints = {
+      {"", 1, 1, "a preset needs a model"},
+      {"voices = 2", 1, 1, "a preset needs a model"},
+      {m + "  voice = 2", 2, 11, "unknown key 'voice' in a preset; there are model, "},
+      {m + "voices = \"two\"", 2, 10, "'voices' must be a number"},
+      {m + "voices = true", 2, 10, "'voices' must be a number"},
+      {m + "voices = 0", 2, 10, "'voices' must lie between 1 and 256"},
+      {m + "voices = 257", 2, 10, "'voices' must lie between 1 and 256"},
+      {m + "voices = 1.5", 2, 10, "'voices' must be a whole number"},
+      {m + "gain = -1", 2, 8, "'gain' must lie between 0 and 1e+09"},
+      {m + "gain = nan", 2, 8, "'gain' must be a number"},
+      {m + "gain = inf", 2, 8, "'gain' must be a number"},
+      {m + "release_s = 61", 2, 13, "'release_s' must lie between 0 and 60"},
+      {m + "noise = 1", 2, 9, "'noise' must be true or false"},
+      {m + "tuning = \"odd\"", 2, 10, "'tuning' must be keyboard or fixed"},
+      {m + "transpose = 97", 2, 13, "'transpose' must lie between -96 and 96"},
+      {"model = 7", 1, 9, "'model' must be a text in quotes"},
+      {m + "parameters = 3", 2, 14, "'parameters' must be a table"},
+      {m + "[parameters]\nK = 0.1", 3, 5, "'K' must be a table: { value = 0.1, range = "},
+      {m + "[parameters]\nK = { value = 1 }", 3, 5, "'K' needs a value and a range"},
+      {m + "[parameters]\nK = { range = [0, 1] }", 3, 5, "'K' needs a value and a range"},
+      {m + "[parameters]\nK = { value = 2, range = [0, 1] }", 3, 5,
+       "the value of 'K' lies outside its range"},
+      {m + "[parameters]\nK = { value = 0.5, range = [1, 0] }", 3, 28,
+       "'range' is the wrong way round: the lower number comes first, [low, high]"},
+      {m + "[parameters]\nK = { value = 1, range = [0, 1], unit = 1 }", 3, 41,
+       "unknown key 'unit' in the parameter 'K'; there are value, range"},
+      {m + "[parameters]\nK = { value = 1, range = 3 }", 3, 26,
+       "'range' must be two numbers: [low, high]"},
+      {m + "[parameters]\nK = { value = 1, range = [0, 1, 2] }", 3, 26,
+       "'range' must be two numbers: [low, high]"},
+      {m + "[parameters]\nK = { value = 1, range = [0, \"x\"] }", 3, 30,
+       "'range' must be a number"},
+      {m + "control = 1", 2, 11, "controls are written one by one: [[control]]"},
+      {control(to + "from = \"note\"\nform = 1"), 5, 8,
+       "unknown key 'form' in a control; there are from, to"},
+      {control(to), 2, 1, "'from' must be \"note\""},
+      {control(to + "from = \"cc120\""), 4, 8, "'from' must be \"note\""},
+      {control(to + "from = \"cc-1\""), 4, 8, "'from' must be \"note\""},
+      {control(to + "from = \"audio0\""), 4, 8, "'from' must be \"note\""},
+      {control(to + "from = \"/\""), 4, 8, "an OSC name has 2 to 255 characters"},
+      {control(to + "from = \"/my finger\""), 4, 8, "an OSC name has 2 to 255 characters: '/', "},
+      {control(to + "from = \"/finger#1\""), 4, 8, "an OSC name has"},
+      {control(to + "from = \"/f[ab]\""), 4, 8, "an OSC name has"},
+      {control(to + "from = \"/f*\""), 4, 8, "an OSC name has"},
+      {control(to + "from = \"/{a,b}\""), 4, 8, "an OSC name has"},
+      {control(to + "from = \"/a,b\""), 4, 8, "an OSC name has"},
+      {control(to + "from = \"/d\u00e9\""), 4, 8, "an OSC name has"},
+      {control(to + "from = \"/" + std::string(255, 'a') + "\""), 4, 8, "an OSC name has"},
+      {control(to + "from = \"/in/1/x\""), 4, 8, "'/in/1/x' is an address of the program's own"},
+      {control(to + "from = \"/error\""), 4, 8, "'/error' is an address of the program's own"},
+      {"model = \"x\"", 1, 9, "'model' must be the name of a .mdl file"},
+      {"model = \"/etc/passwd\"", 1, 9, "'model' must be the name of a .mdl file"},
+      {control("from = \"note\""), 2, 1, "a control needs 'to'"},
+      {control(to + "from = \"note\"\nhow = \"slap\""), 5, 7,
+       "'how' must be position, pluck, bow, impulse, hold or parameter"},
+      {control(to + "from = \"note\"\nhow = \"pluck\""), 2, 1, "a pluck needs 'travel'"},
+      {control(to + "from = \"note\"\ncurve = \"round\""), 5, 9,
+       "'curve' must be linear or exponential"},
+      {control(to + "from = \"note\"\ncurve = \"exponential\""), 2, 1,
+       "an exponential curve needs a range above 0"},
+      {control(to + "from = \"note\"\ntravel = -1"), 5, 10, "'travel' must lie between 0 and"},
+      {control(to + "from = \"note\"\nkeys = [60, 36]"), 5, 8, "'keys' is the wrong way round"},
+      {control(to + "from = \"note\"\nkeys = [60, 128]"), 5, 13,
+       "'keys' must lie between 0 and 127"},
+  };
+  for (const Complaint& complaint : complaints) {
+    check_error(complaint);
+  }
+}
+
+TEST_CASE("every fault of a preset is told at once, line by line", "[preset]") {
+  const auto read = parse_preset(
+      "voices = 0\n"
+      "gian = 2\n"
+      "tuning = \"odd\"\n"
+      "[parameters]\n"
+      "K = { value = 3, range = [0, 1] }\n"
+      "A = 0.1\n"
+      "Z = { value = 1, range = [0, 2] }\n"
+      "[[control]]\n"
+      "from = \"cc120\"\n"
+      "how = \"slap\"\n"
+      "curve = \"round\"\n"
+      "[[control]]\n"
+      "from = \"note\"\n"
+      "to = \"in1\"\n");
+  const std::vector<std::pair<int, std::string>> expected = {
+      {1, "a preset needs a model"}, {1, "'voices' must lie"}, {2, "unknown key 'gian'"},
+      {3, "'tuning' must be"},       {5, "the value of 'K'"},  {6, "'A' must be a table"},
+      {8, "a control needs 'to'"},   {9, "'from' must be"},    {10, "'how' must be"},
+      {11, "'curve' must be"},
+  };
+  REQUIRE(read.errors.size() == expected.size());
+  for (std::size_t i = 0; i < expected.size(); ++i) {
+    CHECK(read.errors[i].line == expected[i].first);
+    CHECK(read.errors[i].message.starts_with(expected[i].second));
+  }
+  CHECK(read.preset.controls.size() == 1);  // what is right is there
+  std::string many = "model = \"x.mdl\"\n";
+  for (int i = 0; i < 1000; ++i) {
+    many += "k" + std::to_string(i) + " = 1\n";
+  }
+  const auto all = parse_preset(many);
+  REQUIRE(all.errors.size() == most_preset_errors + 1);
+  CHECK(all.errors.back().message == "too many problems; those after this are not told");
+}
+
+TEST_CASE("what nests deeper than a preset can is refused before it is parsed", "[preset]") {
+  const auto repeated = [](std::size_t times, const std::string& text) {
+    std::string all;
+    for (std::size_t i = 0; i < times; ++i) {
+      all += text;
+    }
+    return all;
+  };
+  const std::string message = "this is nested more than 8 deep";
+  check_error({repeated(32000, "a.") + "a = 1", 1, 18, message});
+  check_error({"model = \"x\"\n[" + repeated(30000, "a.") + "a]", 2, 19, message});
+  check_error({"a = " + repeated(60000, "["), 1, 13, message});
+  check_error({"# [[[[[[[[[[\na = " + repeated(10000, "{a="), 2, 29, message});
+  check_error(
+      {"a = '''\n" + repeated(20, "[\n") + "'''\nb = " + repeated(9, "["), 23, 13, message});
+  check_error({R"(a = "\"")"
+               "\nb = " +
+                   repeated(9, "["),
+               2, 13, message});
+  check_error({"a = \"\"\"x\"\"\"\"\"\nb = " + repeated(9, "["), 2, 13, message});
+  // What only looks so is none of it: texts, numbers, and what closes again.
+  for (const std::string& fine :
+       {"\"" + repeated(20, "[") + "\"", "'" + repeated(20, ".") + "'",
+        "\"\"\"" + repeated(20, "[\n\"\"") + "\"\"\"", "\"x\" # " + repeated(20, ".")}) {
+    const auto read = parse_preset("model = \"x.mdl\"\ndescription = " + fine);
+    INFO(fine << (read.ok() ? "" : ": " + read.errors[0].message));
+    CHECK(read.ok());
+  }
+  CHECK(parse_preset("model = \"x.mdl\"\n[parameters]\na.value = 1.5\na.range = [0.5, 2.5]").ok());
+  std::string numbers = "model = \"x.mdl\"\n[parameters]\n";
+  for (int i = 0; i < 30; ++i) {
+    numbers += "p" + std::to_string(i) + " = { value = 0.5, range = [0.25, 0.75] }\n";
+  }
+  CHECK(parse_preset(numbers).ok());
+  // Right up to the limit it is for others to complain.
+  check_error({"model = \"x.mdl\"\n" + repeated(8, "a.") + "a = 1", 2, 1, "unknown key 'a'"});
+}
+
+TEST_CASE("what is no TOML is told with its place, and nothing throws", "[preset]") {
+  for (const std::string text : {"model = ", "model = \"x", "[parameters",
+                                 "model = \"x\"\nmodel = \"y\"", "= 3", "\xff\xfe", "a = [1, 2"}) {
+    const auto preset = parse_preset(text);
+    INFO(text);
+    REQUIRE(preset.errors.size() == 1);
+    CHECK(preset.errors[0].line >= 1);
+    CHECK(preset.errors[0].column >= 1);
+    CHECK_FALSE(preset.errors[0].message.empty());
+  }
+  check_error({std::string(max_preset_bytes + 1, ' '), 1, 1, "the preset is longer than 64 KiB"});
+  const auto second = parse_preset("model = \"x\"\nvoices = = 3");
+  REQUIRE(second.errors.size() == 1);
+  CHECK(second.errors[0].line == 2);
+  // Text that no person wrote.
+  rig::Random random(12);
+  const std::string good = control("from = \"note\"\nto = \"in1\"\nrange = [0, 1]\nhow = \"hold\"");
+  for (int i = 0; i < 3000; ++i) {
+    std::string text = good;
+    for (std::size_t k = 1 + random.below(4); k-- > 0;) {
+      text[random.below(text.size())] = static_cast<char>(random.below(256));
+    }
+    for (const Error& error : parse_preset(text).errors) {
+      REQUIRE_FALSE(error.message.empty());
+    }
+  }
+}
+
+TEST_CASE("a model whose inputs no key can play says so, and which line is missing", "[preset]") {
+  const std::string triangle = "@g ground 0.\n@m0 mass 1. 0. 0.\n@l spring @g @m0 0.1\n";
+  const auto told = [&](const std::string& text) -> std::string {
+    const Network network = network_of(text);
+    const auto idle = idle_keys(network, default_preset(network, false));
+    return idle ? std::to_string(idle->line) + ": " + idle->message : "";
+  };
+  CHECK(told(triangle + "@in1 frcInput @m0\n") == "");
+  CHECK(told(triangle + "@in1 posInput 0.\n@p nlPluck @in1 @m0 0.1 0.1\n") == "");
+  CHECK(
+      told(triangle) ==
+      "1: no key plays this model: it has no input; '@in1 frcInput @m0' would let keys strike it");
+  CHECK(told(triangle + "@in1 posInput 0.\n@p spring @in1 @m0 0.1\n") ==
+        "4: no key plays this model: '@in1' moves no pluck and no bow; '@in2 frcInput @m0' would "
+        "let keys strike it");
+  CHECK(told(triangle + "@in1 frcInput @g\n@k audioParam @in2\n@o osc 1 k 0 0 0\n") ==
+        "4: no key plays this model: '@in1' pushes what never moves; '@in3 frcInput @m0' would let "
+        "keys strike it");
+  CHECK(told("@s mesh 4 4 1. 0.1 0. 0. 0.\n").find("'@in1 frcInput [@s 0.3 0.4]'") !=
+        std::string::npos);
+  CHECK(told("@g ground 0.\n@in1 frcInput @g\n") == "");  // nothing moves at all
+  // A ground is no reason to leave out what comes behind it.
+  const Preset second =
+      default_preset(network_of(triangle + "@in1 frcInput @g\n@in2 frcInput @m0\n"), false);
+  REQUIRE(second.controls.size() == 2);
+  CHECK(second.controls[1].source == ControlSource::note);
+  CHECK(second.controls[1].target == "in2");
+}
+
+TEST_CASE("all that does not fit the model is told at once", "[preset]") {
+  const auto preset = parse_preset(
+      "model = \"x.mdl\"\n[[control]]\nfrom = \"cc1\"\nto = \"Q\"\n[[control]]\n"
+      "from = \"note\"\nto = \"in2\"\n[parameters]\nP = { value = 1, range = [0, 1] }\n");
+  REQUIRE(preset.ok());
+  const auto found = misfits(network_of(scenes::poly_triangle()), preset.preset);
+  REQUIRE(found.size() == 3);
+  CHECK(found[0].line == 2);
+  CHECK(found[0].message == "the model has no parameter 'Q'; it has m_K, m_Z");
+  CHECK(found[1].line == 5);
+  CHECK(found[1].message == "the model has no input 'in2'; it has 1");
+  CHECK(found[2].line == 9);
+  CHECK(found[2].message == "the model has no parameter 'P'; it has m_K, m_Z");
+}
+
+TEST_CASE("without a preset a model is played by what its links ask for", "[preset]") {
+  const Preset struck = default_preset(network_of(scenes::poly_triangle()), false);
+  CHECK(struck.keyboard);
+  CHECK(struck.gain == 1.0);
+  REQUIRE(struck.controls.size() == 1);
+  CHECK(struck.controls[0].gesture == ControlGesture::impulse);
+  CHECK(struck.controls[0].target == "in1");
+
+  const Preset plucked = default_preset(network_of(scenes::iplay_the_triangle()), false);
+  REQUIRE(plucked.controls.size() == 2);  // keys, and the wheel for the hand
+  CHECK(plucked.controls[0].source == ControlSource::note);
+  CHECK(plucked.controls[0].gesture == ControlGesture::pluck);
+  CHECK(plucked.controls[0].travel == Approx(0.05).epsilon(1e-12));  // clear of the pluck's 0.01
+  CHECK(plucked.controls[1].source == ControlSource::controller);
+  CHECK(plucked.controls[1].number == 1);
+
+  CHECK(default_preset(network_of("@p param 0\n" + scenes::bowed_string("p")), false)
+            .controls[0]
+            .gesture == ControlGesture::bow);
+  const Preset bowed = default_preset(network_of(scenes::bowed_string()), false);
+  REQUIRE(bowed.controls.size() == 1);
+  CHECK(bowed.controls[0].gesture == ControlGesture::bow);
+  // A bow only sings between a third and all of its scale.
+  CHECK(bowed.controls[0].low > 5e-5 / 3);
+  CHECK(bowed.controls[0].high < 5e-5);
+
+  const Preset heard = default_preset(network_of(scenes::resonator()), false);
+  REQUIRE(heard.controls.size() == 1);
+  CHECK(heard.controls[0].source == ControlSource::audio);
+
+  // Every default preset is one that compiles, and the bare one has channel n on input n.
+  for (const scenes::Example& example : scenes::nine_instruments()) {
+    CAPTURE(example.name);
+    const Network network = network_of(example.text);
+    CHECK(compile(network, default_preset(network, false), {}));
+    const Preset bare = default_preset(network, true);
+    CHECK_FALSE(bare.keyboard);
+    for (const Input& input : network.inputs) {
+      CHECK(std::any_of(bare.controls.begin(), bare.controls.end(), [&](const ControlSetting& c) {
+        return c.source == ControlSource::audio && c.number == input.number && c.high == 1.0 &&
+               c.target == "in" + std::to_string(input.number);
+      }));
+    }
+  }
+}
+
+}  // namespace ressort
