@@ -45,7 +45,7 @@ std::vector<Event> events_of(const Instrument& instrument, std::size_t block) {
       {.frame = 80, .kind = EventKind::note_off, .index = 69},
   }};
   std::vector<Event> events = {
-      {.kind = EventKind::note_on, .index = block % 2 == 0 ? 69 : 40, .value = 0.8}};
+      {.kind = EventKind::note_on, .index = std::uint16_t(block % 2 == 0 ? 69 : 40), .value = 0.8}};
   events.insert(events.end(), gestures.begin(), gestures.end());
   if (!instrument.parameters.empty()) {
     const std::size_t index = block % instrument.parameters.size();
