@@ -1,11 +1,28 @@
 // One engine goes on where another of the same model is: with other kernels, in the same sample.
 #include <algorithm>
+#include <cmath>
 #include <type_traits>
 #include <utility>
 
+#include "core/engine/energy.h"
 #include "core/engine/voices.h"
 
 namespace ressort {
+
+namespace {
+
+// A mass whose own damper takes all of its velocity in one sample does not tell what it was: from
+// there nobody gets a sample back, and not with any figures from close by.
+template <class T>
+bool tells_its_velocity(const Program& program, LaneValues<T> value) {
+  constexpr double least_share = 1e-3;
+  return std::all_of(program.mass_runs.begin(), program.mass_runs.end(), [&](const MassRun& run) {
+    return !run.is_oscillator ||
+           std::fabs(1.0 - value[run.inverse_mass] * value[run.damping]) > least_share;
+  });
+}
+
+}  // namespace
 
 // A sample before where b.x and b.v are: from there, with nothing that pulls but the mass's own
 // spring, it gets there, and then its links have pulled.
@@ -84,15 +101,26 @@ void Engine::Voices::go_on(Bank<T>& b, const Bank<T>& from) {
   }
 }
 
+template <class T>
+bool Engine::Voices::can_be_left(Bank<T>& scratch, const PartBank<T>& part) const {
+  for (std::size_t lane = 0; lane < voices.size(); ++lane) {
+    const LaneValues<T> value{part.of(lane).coefficients.value.data(), part.width,
+                              lane % part.width};
+    if (voices[lane].awake && !tells_its_velocity(part.program, value)) {
+      return false;
+    }
+  }
+  return part.of(0).save(0, scratch.x.data(), scratch.v.data());
+}
+
 bool Engine::Voices::go_on_from(const Voices& from) {
   return std::visit(
       [&](auto& b) {
         using Same = std::remove_reference_t<decltype(b)>;
         const auto* const other = std::get_if<Same>(&from.bank);
         if (other == nullptr ||
-            !std::all_of(other->parts.begin(), other->parts.end(), [&](const auto& part) {
-              return part.of(0).save(0, b.x.data(), b.v.data());
-            })) {
+            !std::all_of(other->parts.begin(), other->parts.end(),
+                         [&](const auto& part) { return from.can_be_left(b, part); })) {
           return false;
         }
         static_cast<Playback&>(*this) = from;

@@ -189,6 +189,8 @@ struct Engine::Voices : Playback {
   template <class T>
   void go_on(Bank<T>& b, const Bank<T>& from);
   bool go_on_from(const Voices& from);
+  template <class T>
+  bool can_be_left(Bank<T>& scratch, const PartBank<T>& part) const;
 
   // --- sound ---
   void segment(std::span<const double* const> inputs, std::span<double* const> outputs,
