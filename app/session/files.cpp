@@ -70,9 +70,12 @@ Result<std::string> unmarked(const std::string& path, std::string text) {
   return text;
 }
 
+// Rounded up: what is a byte too large shall not seem to fit.
 std::string in_bytes(std::uintmax_t size) {
-  return size >> 20 == 0 ? std::to_string(size >> 10) + " KiB"
-                         : std::to_string(size >> 20) + " MiB";
+  const auto whole = [&](int bits) {
+    return std::to_string((size + (std::uintmax_t{1} << bits) - 1) >> bits);
+  };
+  return size >> 20 == 0 ? whole(10) + " KiB" : whole(20) + " MiB";
 }
 
 }  // namespace

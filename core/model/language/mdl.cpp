@@ -11,8 +11,8 @@ namespace ressort {
 ParsedNetwork Reader::read(std::string_view text, const ReadOptions& options) {
   if (text.size() > max_model_bytes) {
     say(Severity::error, 1, {"", 1},
-        "the model is " + std::to_string(text.size() >> 20) + " MiB long; at most " +
-            std::to_string(max_model_bytes >> 20) + " MiB are read");
+        "the model is longer than the " + std::to_string(max_model_bytes >> 20) +
+            " MiB that are read");
     return std::move(out_);
   }
   if (text.starts_with("\xef\xbb\xbf")) {

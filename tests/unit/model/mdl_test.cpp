@@ -321,7 +321,7 @@ TEST_CASE("every error tells its line, its column and what was expected", "[mdl]
        "found a zero byte: this is no text, so it is no model"},
       {std::string(1, '\0'), 1, 1, "found a zero byte: this is no text, so it is no model"},
       {std::string(max_model_bytes + 1, '\n'), 1, 1,
-       "the model is 32 MiB long; at most 32 MiB are read"},
+       "the model is longer than the 32 MiB that are read"},
   };
   for (const Complaint& complaint : complaints) {
     check_error(complaint);
