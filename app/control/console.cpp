@@ -332,7 +332,9 @@ std::vector<std::string> Console::completions(std::string_view line) const {
       words.emplace_back(row.name);
     }
   } else if (kind == "PARAMETER") {
-    for (const ParameterInfo& info : desk_->session.current()->instrument.parameters) {
+    const auto loaded =
+        desk_->session.current();  // kept while the worker puts another in its place
+    for (const ParameterInfo& info : loaded->instrument.parameters) {
       words.push_back(info.name);
     }
   } else if (kind == "MODEL" || kind == "PRESET") {
