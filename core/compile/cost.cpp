@@ -159,21 +159,6 @@ class Predictor {
                                    static_cast<double>(form.pushes.size()), load_);
   }
 
-  // Looking up costs the same in every width, the laws do not.
-  double operator()(const Sparse& form) const {
-    const double n = program_.moving;
-    const bool has_springs = form.springs != Sparse::none;
-    const double springs = has_springs ? program_.link_runs[form.springs].count : 0.0;
-    double others = 0.0;
-    for (const auto& links : form.rest) {
-      others += static_cast<double>(links.size());
-    }
-    const double half = load_.is_double ? 1.0 : 0.7;
-    const double slow = wide_ > 0.0 ? 1.0 : 1.6;
-    return load_.voices * (12.0 + 0.15 * n + (has_springs ? 0.35 * n + 0.55 * springs : 0.0) +
-                           slow * half * (others > 0.0 ? 6.0 + 0.6 * n + others : 0.0));
-  }
-
   double operator()(const Grid& form) const {
     const double slow = wide_ > 0.0 ? 1.0 : 2.3;
     const double d = load_.is_double ? 1.0 : 0.0;

@@ -51,7 +51,6 @@ struct Weigher {
   }
   std::uint64_t operator()(const Chains& form) const { return own(form.links.size()); }
   std::uint64_t operator()(const Grid& form) const { return own(form.rest_ends.size()); }
-  std::uint64_t operator()(const Sparse&) const { return own(program.ends.size()); }
   std::uint64_t operator()(const Dense&) const { return own(program.ends.size()); }
   std::uint64_t operator()(const Fourth&) const { return own(program.ends.size()); }
 };

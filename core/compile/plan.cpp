@@ -11,7 +11,6 @@
 #include "core/kernels/grid/grid_form.h"
 #include "core/kernels/modal/modal_form.h"
 #include "core/kernels/slow/slow_form.h"
-#include "core/kernels/sparse/sparse_form.h"
 
 namespace ressort {
 namespace {
@@ -37,8 +36,6 @@ std::optional<Form> form_of(const Program& program, Method method, const Workloa
       return any(grid_form(program, progress));
     case Method::chorus:
       return any(chorus_form(program));
-    case Method::sparse:
-      return any(sparse_form(program, progress));
     case Method::fourth:
       return any(fourth_form(program));
     case Method::slow:
@@ -94,9 +91,6 @@ struct Describer {
     return std::string(program.moving <= most_held_masses ? "its masses in registers"
                                                           : "mass by mass and link by link") +
            ", a voice in each lane of many packs at once";
-  }
-  std::string operator()(const Sparse&) const {
-    return "masses in vectors by how many links they have, neighbours looked up";
   }
   std::string operator()(const Fourth& form) const {
     std::size_t springs = 0;
@@ -191,11 +185,9 @@ class Chooser {
 
   void consider_identical() {
     for (const Method method : all_methods) {
-      if ((method == Method::modal && !may_be_modal()) ||
-          (method == Method::sparse && !may_be_sparse())) {
-        continue;
+      if (method != Method::modal || may_be_modal()) {
+        consider(method);
       }
-      consider(method);
     }
   }
 
@@ -239,11 +231,6 @@ class Chooser {
         worth_ns(Method::modal, least_modal_ns(program_, load_)) < candidates_[best_].ns;
     may_gain_ = may_pay && program_.moving > most_modes_;
     return may_pay && !may_gain_;
-  }
-
-  // A mass and its link take about a nanosecond; a large regular network is not sorted for nothing.
-  bool may_be_sparse() const {
-    return static_cast<double>(program_.moving) * load_.voices < candidates_[best_].ns;
   }
 
   bool consider(Method method) {
@@ -313,8 +300,6 @@ std::string_view method_name(Method method) {
       return "grid";
     case Method::chorus:
       return "chorus";
-    case Method::sparse:
-      return "sparse";
     case Method::fourth:
       return "fourth";
     case Method::slow:

@@ -14,12 +14,11 @@
 
 namespace ressort {
 
-enum class Method { direct, chains, dense, modal, grid, chorus, sparse, fourth, slow };
+enum class Method { direct, chains, dense, modal, grid, chorus, fourth, slow };
 
 // The modal form last: it is only sought where it may beat all others.
 inline constexpr Method all_methods[] = {Method::direct, Method::chains, Method::dense,
-                                         Method::grid,   Method::chorus, Method::sparse,
-                                         Method::modal};
+                                         Method::grid,   Method::chorus, Method::modal};
 
 // These are true to the continuous network instead: only for a budget that asks for it, or by name;
 // slow also for one that says what may be left out.

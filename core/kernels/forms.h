@@ -227,25 +227,6 @@ struct Chorus {
   std::vector<ChorusLink> links;
 };
 
-// A link that one of its ends computes, for both: the owner, which moves.
-struct SparseLink {
-  std::uint32_t run = 0;     // of Program::link_runs
-  std::uint32_t link = 0;    // of Program::ends
-  bool is_reversed = false;  // its second end is the owner
-};
-
-// A network without any order, one voice. Masses that have as many links are side by side in the
-// lanes; what they are linked to is looked up. Of springs that are most of the links and all alike
-// a mass sums how far y = K x + Z v of those around it is from its own; any other link is computed
-// once, in the lane of its owner, and the other end looks its force up.
-struct Sparse {
-  static constexpr std::uint32_t none = 0xffffffffu;
-
-  std::vector<std::uint32_t> order;           // nodes that move, as they lie in the lanes
-  std::uint32_t springs = none;               // of Program::link_runs: those that are most
-  std::vector<std::vector<SparseLink>> rest;  // [law that occurs] all others, each of one law
-};
-
 // A large network on several cores: shards of it (sharded.h), each in a form of its own, stepped by
 // a crew at the same time.
 struct Shard;
@@ -280,7 +261,7 @@ struct Slow {
   std::uint32_t frames = 1;
 };
 
-using Form = std::variant<Direct, Chains, Dense, Modes, Grid, Chorus, Sparse, Shards, Fourth,
-                          Compensated, Slow>;
+using Form =
+    std::variant<Direct, Chains, Dense, Modes, Grid, Chorus, Shards, Fourth, Compensated, Slow>;
 
 }  // namespace ressort

@@ -12,7 +12,6 @@
 #include "core/kernels/grid/grid.h"
 #include "core/kernels/modal/modal.h"
 #include "core/kernels/slow/slow.h"
-#include "core/kernels/sparse/sparse.h"
 
 namespace ressort {
 
@@ -113,9 +112,6 @@ std::unique_ptr<Kernel<T>> make_kernel(const Program& program, std::size_t voice
     }
     std::unique_ptr<Kernel<T>> operator()(const Chorus& chorus) const {
       return std::make_unique<ChorusKernel<T>>(program, chorus, voices, isa);
-    }
-    std::unique_ptr<Kernel<T>> operator()(const Sparse& sparse) const {
-      return std::make_unique<SparseKernel<T>>(program, sparse, isa);
     }
     std::unique_ptr<Kernel<T>> operator()(const Shards& shards) const {
       return std::make_unique<ShardedKernel<T>>(program, shards, voices, isa);

@@ -8,7 +8,6 @@
 #include "core/kernels/dense/dense_form.h"
 #include "core/kernels/grid/grid_form.h"
 #include "core/kernels/modal/modal_form.h"
-#include "core/kernels/sparse/sparse_form.h"
 #include "tests/support/agreement.h"
 #include "tests/support/duel.h"
 #include "tests/support/random_network.h"
@@ -41,7 +40,6 @@ std::vector<std::pair<Method, Form>> forms_of(const Program& program) {
   add_form(forms, Method::modal, modal_form(program));
   add_form(forms, Method::grid, grid_form(program));
   add_form(forms, Method::chorus, chorus_form(program));
-  add_form(forms, Method::sparse, sparse_form(program));
   return forms;
 }
 
@@ -195,7 +193,7 @@ TEST_CASE("a bow's profile is turned while it sounds, in every form that can hol
     CHECK(left.relative() > 0.01);
   }
   CHECK(taken == std::set{Method::direct, Method::chains, Method::dense, Method::modal,
-                          Method::grid, Method::chorus, Method::sparse});
+                          Method::grid, Method::chorus});
 }
 
 }  // namespace ressort

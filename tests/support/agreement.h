@@ -8,7 +8,7 @@
 
 namespace ressort::rig {
 
-// Of the peak, in double. Direct forms (direct, chains, grid, chorus, sparse) add up the forces
+// Of the peak, in double. Direct forms (direct, chains, grid, chorus) add up the forces
 // that are written, sample by sample, if in another order. A dense body leaps over whole blocks by
 // a matrix, and modes are another basis.
 inline double tolerance_of(Method method) {

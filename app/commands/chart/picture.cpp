@@ -26,7 +26,7 @@ std::string number(double value) {
 int mark_of(const std::string& method, bool has_budget) {
   static const std::map<std::string, int> open = {{"direct", 6}, {"chains", 4}, {"dense", 8},
                                                   {"modal", 12}, {"grid", 10},  {"fourth", 14},
-                                                  {"chorus", 1}, {"sparse", 3}, {"slow", 2}};
+                                                  {"chorus", 1}, {"slow", 2}};
   const auto known = open.find(method);
   const int mark = known == open.end() ? 14 : known->second;
   return mark >= 4 && has_budget ? mark + 1 : mark;
