@@ -18,6 +18,8 @@
 #include "app/commands/commands.h"
 #include "app/commands/export.h"
 #include "app/commands/make.h"
+#include "app/commands/reference.h"
+#include "app/version.h"
 #include "core/model/language/expression.h"
 
 namespace {
@@ -439,13 +441,27 @@ void add_export(CLI::App& app, ExportOptions& options, int& code) {
   command->callback([&options, &code] { code = export_to_faust(options); });
 }
 
+void add_reference(CLI::App& app, std::string& part, int& code) {
+  CLI::App* command = app.add_subcommand("reference", "prints a table of the manual");
+  std::vector<std::string> names;
+  std::string footer = "PART:";
+  for (const ReferencePart& known : reference_parts()) {
+    names.emplace_back(known.name);
+    footer += "\n  " + names.back() + std::string(10 - names.back().size(), ' ') +
+              std::string(known.lists);
+  }
+  command->footer(footer);
+  command->add_option("PART", part, "which")->required()->check(CLI::IsMember(names));
+  command->callback([&part, &code] { code = reference(part); });
+}
+
 int run(int argc, char** argv) {
   CLI::App app{"ressort plays networks of masses and springs, read from .mdl files."};
   app.footer(
       "Start with 'ressort play', then type 'help' at its prompt.\n"
       "'ressort COMMAND --help' tells more of each command.\n"
       "Exit codes: 0 done, 1 our failure, 2 wrong use or unreadable input, 75 no audio.");
-  app.set_version_flag("-V,--version", "ressort " RESSORT_VERSION);
+  app.set_version_flag("-V,--version", std::string("ressort ") + version + ", commit " + commit);
   app.name("ressort");
   app.require_subcommand(0, 1);
   int code = exit_code::done;
@@ -456,12 +472,14 @@ int run(int argc, char** argv) {
   MakeOptions make_options;
   ChartOptions chart_options;
   std::vector<std::uint32_t> make_sizes;
+  std::string reference_part;
   add_play(app, play_options, code);
   add_render(app, render_choice, code);
   add_check(app, check_options, code);
   add_make(app, make_options, make_sizes, code);
   add_export(app, export_options, code);
   add_chart(app, chart_options, code);
+  add_reference(app, reference_part, code);
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {

@@ -5,7 +5,6 @@
 #include <charconv>
 #include <cmath>
 #include <cstdio>
-#include <initializer_list>
 
 #include "core/model/language/tokens.h"
 #include "core/model/preset/toml_depth.h"
@@ -38,16 +37,40 @@
 namespace ressort {
 namespace {
 
-struct Choice {
-  std::string_view word;
-  ControlGesture gesture;
+// clang-format off
+constexpr PresetKey keys[] = {
+    {"", "model", "text", "the model's file, `NAME.mdl`, beside the preset or in the folder of the models; needed"},
+    {"", "description", "text", "one line for the person who loads it"},
+    {"", "voices", "1 to 256 (1)", "how many notes sound at once"},
+    {"", "gain", "0 to 1e9 (1)", "output per unit of position; a forte note should peak at -6 dBFS"},
+    {"", "release_s", "0 to 60 (0)", "how long a note fades once its key is up; 0 lets it ring out"},
+    {"", "noise", "true or false (false)", "the outputs shape white noise instead of being heard themselves"},
+    {"", "tuning", "`keyboard` or `fixed` (`keyboard`)", "whether a key sets the pitch, or every key sounds the model as it is written"},
+    {"", "transpose", "-96 to 96 (0)", "semitones between a key and the pitch that it sets"},
+    {"", "motion", "`velocity` or `delayed`", "what the last argument of a mass means, whatever the model says"},
+    {"", "budget", "text", "how exact, as `--budget` takes it: `cents=3 t60=5 silence=-60 passive=auto`"},
+    {"", "parameters", "a table", "the model's parameters by name"},
+    {"", "control", "tables, one for each `[[control]]`", "what plays the model"},
+    {"parameters", "value", "a number", "what the parameter is at first; needed"},
+    {"parameters", "range", "[low, high]", "between what it may be turned; needed"},
+    {"control", "from", "text", "`note`, `pressure`, `cc0` to `cc119`, `audio1` to `audio64`, or an OSC name such as `/finger`; needed"},
+    {"control", "to", "text", "an input, such as `in1`, or a parameter; needed"},
+    {"control", "how", "see below", "without it an input is moved and a parameter is turned"},
+    {"control", "range", "[low, high] ([0, 1])", "what the softest and the loudest become: positions, forces, a parameter's values, or speeds per sample at 44 100 Hz"},
+    {"control", "curve", "`linear` or `exponential` (`linear`)", "exponential: equal steps are equal ratios"},
+    {"control", "travel", "above 0", "of a pluck, which needs it: how far from the string the finger rests, on either side"},
+    {"control", "keys", "[low, high] ([0, 127])", "of notes: which keys"},
 };
 
-constexpr Choice gestures[] = {
-    {"position", ControlGesture::position}, {"pluck", ControlGesture::pluck},
-    {"bow", ControlGesture::bow},           {"impulse", ControlGesture::impulse},
-    {"hold", ControlGesture::hold},         {"parameter", ControlGesture::parameter},
+constexpr GestureWord gestures[] = {
+    {"position", ControlGesture::position, "goes where it is told, smoothed"},
+    {"pluck", ControlGesture::pluck, "a finger sweeps from one side of the string to the other, at a speed from `range`; the slower, the louder"},
+    {"bow", ControlGesture::bow, "a bow moves at a speed from `range` as long as the key is held"},
+    {"impulse", ControlGesture::impulse, "one sample of force, or of displacement where the input is a position"},
+    {"hold", ControlGesture::hold, "goes to the second number of `range` while the key is held, and back to the first"},
+    {"parameter", ControlGesture::parameter, "no input: the parameter that `to` names is turned"},
 };
+// clang-format on
 
 Place place_of(const toml::node& node) {
   return {static_cast<int>(node.source().begin.line), static_cast<int>(node.source().begin.column)};
@@ -60,14 +83,18 @@ class Table {
   Table(const toml::table& table, std::string name, std::vector<Error>& errors)
       : table_(table), name_(std::move(name)), errors_(errors) {}
 
-  // Every key of the table must be one of these.
-  void allow(std::initializer_list<std::string_view> keys) {
+  // Every key of the table must be one that `keys` has for it.
+  void allow(std::string_view table) {
     for (const auto& [key, value] : table_) {
-      if (std::find(keys.begin(), keys.end(), key.str()) == keys.end()) {
-        std::string expected;
-        for (const std::string_view k : keys) {
-          expected += (expected.empty() ? "" : ", ") + std::string(k);
+      bool is_known = false;
+      std::string expected;
+      for (const PresetKey& known : keys) {
+        if (known.table == table) {
+          is_known |= known.key == key.str();
+          expected += (expected.empty() ? "" : ", ") + std::string(known.key);
         }
+      }
+      if (!is_known) {
         fail(value,
              "unknown key " + quoted(key.str()) + " in " + name_ + "; there are " + expected);
       }
@@ -173,7 +200,7 @@ void read_parameter(std::string name, const toml::node& node, Preset& preset,
     return;
   }
   Table reader(*row, "the parameter " + shown, errors);
-  reader.allow({"value", "range"});
+  reader.allow("parameters");
   if (row->get("value") == nullptr || row->get("range") == nullptr) {
     reader.fail(node, shown + " needs a value and a range");
     return;
@@ -249,7 +276,7 @@ ControlGesture usual_gesture(std::string_view target) {
 void read_control(const toml::table& table, Preset& preset, std::vector<Error>& errors) {
   const std::size_t before = errors.size();
   Table reader(table, "a control", errors);
-  reader.allow({"from", "to", "how", "range", "curve", "travel", "keys"});
+  reader.allow("control");
   ControlSetting control{.place = place_of(table)};
   std::string from;
   if ((reader.text("from", from) || table.get("from") == nullptr) && !read_source(from, control)) {
@@ -273,7 +300,7 @@ void read_control(const toml::table& table, Preset& preset, std::vector<Error>& 
   control.gesture = usual_gesture(control.target);
   if (std::string how; reader.text("how", how)) {
     const auto* choice = std::find_if(std::begin(gestures), std::end(gestures),
-                                      [&](const Choice& c) { return c.word == how; });
+                                      [&](const GestureWord& c) { return c.word == how; });
     if (choice != std::end(gestures)) {
       control.gesture = choice->gesture;
     } else {
@@ -309,8 +336,7 @@ void read_control(const toml::table& table, Preset& preset, std::vector<Error>& 
 
 void read_root(const toml::table& root, Preset& preset, std::vector<Error>& errors) {
   Table reader(root, "a preset", errors);
-  reader.allow({"model", "description", "voices", "gain", "release_s", "noise", "tuning",
-                "transpose", "motion", "budget", "parameters", "control"});
+  reader.allow("");
   const toml::node* const model = root.get("model");
   if (model != nullptr) {
     preset.model_place = place_of(*model);
@@ -404,6 +430,14 @@ std::string something_to_strike(const Network& network) {
 }
 
 }  // namespace
+
+std::span<const PresetKey> preset_keys() {
+  return keys;
+}
+
+std::span<const GestureWord> gesture_words() {
+  return gestures;
+}
 
 ParsedPreset parse_preset(std::string_view text) {
   ParsedPreset read;

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <optional>
+#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -61,6 +62,23 @@ struct Preset {
 inline constexpr int max_voices = 256;
 inline constexpr std::size_t max_preset_bytes = std::size_t{64} << 10;
 inline constexpr std::size_t most_preset_errors = 100;
+
+// A key of the format and what it takes, for people. The reader knows no other list.
+struct PresetKey {
+  std::string_view table;  // "" for those of the preset itself
+  std::string_view key;
+  std::string_view value;  // what it takes, and what it is without the key
+  std::string_view does;
+};
+std::span<const PresetKey> preset_keys();
+
+// What `how` of a control may say.
+struct GestureWord {
+  std::string_view word;
+  ControlGesture gesture;
+  std::string_view does;
+};
+std::span<const GestureWord> gesture_words();
 
 struct ParsedPreset {
   Preset preset;              // whole only if ok()

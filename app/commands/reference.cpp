@@ -1,0 +1,100 @@
+#include "app/commands/reference.h"
+
+#include <algorithm>
+#include <cstdio>
+#include <string>
+#include <vector>
+
+#include "app/control/calls.h"
+#include "app/control/console.h"
+#include "app/exit_code.h"
+#include "core/model/language/keywords.h"
+#include "core/model/preset/preset.h"
+
+namespace ressort {
+namespace {
+
+using Cells = std::vector<std::string>;
+
+// As Markdown sets what is typed; nothing for nothing.
+std::string code(std::string_view text) {
+  return text.empty() ? "" : "`" + std::string(text) + "`";
+}
+
+void print_row(const Cells& cells) {
+  std::string line = "|";
+  for (const std::string& cell : cells) {
+    line += ' ';
+    for (const char c : cell) {
+      line += c == '|' ? "\\|" : std::string(1, c);
+    }
+    line += " |";
+  }
+  std::puts(line.c_str());
+}
+
+void print_head(const Cells& cells) {
+  print_row(cells);
+  print_row(Cells(cells.size(), "---"));
+}
+
+void print_keywords() {
+  print_head({"keyword", "arguments"});
+  for (const Keyword& keyword : keywords) {
+    print_row({code(keyword.word), code(keyword.arguments)});
+  }
+}
+
+void print_preset_keys() {
+  print_head({"table", "key", "value", "what it does"});
+  for (const PresetKey& key : preset_keys()) {
+    print_row({code(key.table), code(key.key), std::string(key.value), std::string(key.does)});
+  }
+}
+
+void print_gestures() {
+  print_head({"how", "what the input does"});
+  for (const GestureWord& gesture : gesture_words()) {
+    print_row({code(gesture.word), std::string(gesture.does)});
+  }
+}
+
+void print_addresses() {
+  print_head({"address", "arguments", "what it does"});
+  for (const AddressRow& row : addresses()) {
+    print_row({code(row.address), code(row.arguments), std::string(row.does)});
+  }
+}
+
+void print_commands() {
+  print_head({"command", "arguments", "what it does"});
+  for (const CommandRow& row : commands()) {
+    print_row({code(row.name), code(row.arguments), std::string(row.does)});
+  }
+}
+
+constexpr ReferencePart parts[] = {
+    {"model", "the keywords of a .mdl file", print_keywords},
+    {"preset", "the keys of a preset", print_preset_keys},
+    {"gestures", "what a preset's control may do with an input", print_gestures},
+    {"osc", "the addresses of OSC and of scores", print_addresses},
+    {"console", "the console's commands", print_commands},
+};
+
+}  // namespace
+
+std::span<const ReferencePart> reference_parts() {
+  return parts;
+}
+
+int reference(std::string_view name) {
+  const auto* const part = std::find_if(std::begin(parts), std::end(parts),
+                                        [&](const ReferencePart& p) { return p.name == name; });
+  if (part == std::end(parts)) {
+    return exit_code::wrong_use;
+  }
+  part->print();
+  return exit_code::done;
+}
+
+}  // namespace ressort
