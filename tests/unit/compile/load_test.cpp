@@ -222,7 +222,6 @@ TEST_CASE("What an engine takes is known before it is made", "[load]") {
   const auto way = GENERATE_COPY(Way{chain(8000), Method::direct, Precision::float64},
                                  Way{chain(8000), Method::direct, Precision::float32},
                                  Way{chain(8000), Method::chains, Precision::float64},
-                                 Way{tangle(3000), Method::direct, Precision::float64},
                                  Way{mesh, Method::grid, Precision::float64},
                                  Way{chain(300), Method::modal, Precision::float64},
                                  Way{chain(8000), Method::fourth, Precision::float64});
