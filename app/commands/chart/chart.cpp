@@ -3,10 +3,10 @@
 #include <unistd.h>
 
 #include <algorithm>
-#include <cmath>
 #include <csignal>
 #include <cstdio>
 #include <cstring>
+#include <ctime>
 #include <filesystem>
 #include <fstream>
 
@@ -16,6 +16,7 @@
 #include "app/realtime/lockfree.h"
 #include "app/session/files.h"
 #include "app/text.h"
+#include "app/version.h"
 
 namespace ressort {
 namespace {
@@ -38,11 +39,41 @@ std::string processor() {
   return "a processor without a name";
 }
 
+Provenance provenance() {
+  const std::time_t now = std::time(nullptr);
+  char date[16] = "";
+  std::tm local{};
+  if (localtime_r(&now, &local) != nullptr) {
+    std::strftime(date, sizeof date, "%Y-%m-%d", &local);
+  }
+#ifdef __clang__
+  const std::string compiler = std::string("clang ") + __clang_version__;
+#else
+  const std::string compiler = std::string("g++ ") + __VERSION__;
+#endif
+  return {.processor = processor(),
+          .compiler = compiler,
+          .date = date,
+          .program = std::string("ressort ") + version + " (" + commit + ")"};
+}
+
 // A way and what it plays.
 struct Heard {
   MadeWay made;
   Waves waves;
 };
+
+// Does any output move, as the published scheme has it?
+bool sounds(const ChartScene& scene, Isa isa) {
+  auto made = make_way(scene, {.name = "direct", .method = Method::direct}, heard_s, isa);
+  if (!made) {
+    return true;  // the one to say why is whoever plays it
+  }
+  const Waves waves = render_way(*made, static_cast<std::size_t>(heard_s * 44100.0));
+  return std::any_of(waves.begin(), waves.end(), [](const std::vector<double>& wave) {
+    return std::any_of(wave.begin(), wave.end(), [&](double y) { return y != wave[0]; });
+  });
+}
 
 // Bit by bit: what is no number is the same too.
 bool is_same(const Waves& a, const Waves& b) {
@@ -124,11 +155,11 @@ class ProgressLine {
 };
 
 int write_all(const ChartOptions& options, const std::vector<ChartSheet>& sheets) {
-  const std::string machine = processor();
+  const Provenance made = provenance();
   const std::filesystem::path folder = options.folder;
   for (const auto& [name, text] :
-       {std::pair(std::string("chart.csv"), chart_csv(sheets, machine)),
-        std::pair(std::string("chart.gp"), chart_script(sheets, machine))}) {
+       {std::pair(std::string("chart.csv"), chart_csv(sheets, made)),
+        std::pair(std::string("chart.gp"), chart_script(sheets, made))}) {
     if (const auto written = write_text((folder / name).string(), text, Existing::replace);
         !written) {
       complain(written.error().message);
@@ -155,8 +186,12 @@ int write_all(const ChartOptions& options, const std::vector<ChartSheet>& sheets
 
 }  // namespace
 
-Result<ChartSheet> make_sheet(const ChartScene& scene, Isa isa, double patience_s,
+Result<ChartSheet> make_sheet(const ChartScene& asked, Isa isa, double patience_s,
                               const Tells& tells) {
+  const ChartScene scene = sounds(asked, isa) ? asked : struck(asked);
+  if (!sounds(scene, isa)) {
+    return Error{scene.name + ": no output moves, even when it is struck"};
+  }
   ChartSheet sheet{.scene = scene.name, .about = scene.about, .is_linear = scene.is_linear};
   if (!tells("the truth")) {
     return sheet;
@@ -195,8 +230,10 @@ Result<ChartSheet> make_sheet(const ChartScene& scene, Isa isa, double patience_
   if (patience_s > 0.0 && tells("timing " + counted(ways.size(), "way", "ways"))) {
     const Timing timing = time_ways(ways, patience_s, [&] { return !tells("timing"); });
     sheet.timed_s = timing.seconds;
+    sheet.rounds = timing.rounds;
     for (std::size_t i = 0; i < ways.size() && timing.rounds > 0; ++i) {
       sheet.rows[i].ns = timing.ns[i];
+      sheet.rows[i].upper_ns = timing.upper_ns[i];
     }
   }
   find_fronts(sheet);

@@ -9,8 +9,9 @@
 namespace ressort {
 
 struct Timing {
-  std::vector<double> ns;  // [way] per output sample
-  double seconds = 0.0;    // of sound that it is the mean of
+  std::vector<double> ns;        // [way] per output sample
+  std::vector<double> upper_ns;  // [way] the upper quartile of the rounds
+  double seconds = 0.0;          // of sound that it is the mean of
   int rounds = 0;
 };
 

@@ -3,76 +3,106 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
-#include <limits>
 #include <map>
 #include <set>
+
+#include "app/commands/chart/labels.h"
+#include "app/text.h"
 
 namespace ressort {
 namespace {
 
 constexpr double deepest_db = -320.0;
-constexpr double least_cents = 1e-6;  // what is less is drawn here
-const char* const precision_colours[] = {"#1f4e9c", "#e07b00", "#2a8f3c", "#8a3fa0"};
-const char* const front_style = "lc rgb \"#b8b8b8\" lw 5";
-const char* const failed_style = "pt 2 ps 1.3 lw 2.2 lc rgb \"#d00000\"";
+constexpr double least_error = 1e-6;  // cents or percent; what is less is drawn here
+constexpr double page_width = 960.0;  // pixels
+constexpr double caption_height = 40.0;
+constexpr double title_height = 46.0;
+constexpr double legend_row_height = 21.0;
+const char* const front_style = "lc rgb \"#c4c4c4\" lw 6";
+const char* const floor_style = "dt 3 lw 1.4 lc rgb \"#606060\"";
+
+// A glyph is a method, or this: a way that fails.
+const char* const failed_style = "pt 2 ps 1.2 lw 2.4 lc rgb \"#b00000\"";
+
+// Told apart by lightness and by their dashes where colours are not seen.
+struct Look {
+  const char* colour;
+  const char* dashes;
+};
+const Look& look_of(Precision precision) {
+  static const Look looks[] = {{"#000000", "1"}, {"#e69f00", "2"}, {"#0072b2", "4"}};
+  return looks[precision == Precision::float64 ? 0 : precision == Precision::float32 ? 1 : 2];
+}
 
 std::string number(double value) {
   char text[40];
-  std::snprintf(text, sizeof text, "%.5g", value);
+  std::snprintf(text, sizeof text, "%.6g", value);
   return text;
 }
 
 // Open where the network is played as it is written, filled where a budget asked for more.
-int mark_of(const std::string& method, bool has_budget) {
+int glyph_of(const std::string& method, bool has_budget) {
   static const std::map<std::string, int> open = {{"direct", 6}, {"chains", 4}, {"dense", 8},
                                                   {"modal", 12}, {"grid", 10},  {"fourth", 14},
-                                                  {"chorus", 1}, {"slow", 2}};
+                                                  {"slow", 1}};
   const auto known = open.find(method);
-  const int mark = known == open.end() ? 14 : known->second;
-  return mark >= 4 && has_budget ? mark + 1 : mark;
+  const int glyph = known == open.end() ? 3 : known->second;
+  return glyph >= 4 && has_budget ? glyph + 1 : glyph;
 }
 
 std::string first_method(const ChartRow& row) {
   return row.methods.substr(0, row.methods.find('+'));
 }
 
-std::string colour_of(Precision precision) {
-  return precision_colours[static_cast<std::size_t>(precision == Precision::float64   ? 0
-                                                    : precision == Precision::float32 ? 1
-                                                                                      : 2)];
+enum class Shows { cents, t60, physical, identical };
+
+bool is_logarithmic(Shows shows) {
+  return shows == Shows::cents || shows == Shows::t60;
 }
 
-struct Point {
-  double ns = 0.0;
-  double y = 0.0;
+// Where a panel's axes are in its picture, in pixels.
+struct Frame {
+  Box box;
+  double width = page_width;  // of the whole picture
+  double height = 0.0;
+  bool has_left_title = true;
+  bool has_bottom_title = true;
+  bool has_labels = true;
+  double glyph_size = 1.2;
 };
 
 // What one panel draws, as plot elements with their data inline.
 class Panel {
  public:
-  enum class Shows { identical, physical, cents };
-
-  Panel(const ChartSheet& sheet, Shows shows, std::string name, bool is_small)
-      : sheet_(sheet), shows_(shows), name_(std::move(name)), is_small_(is_small) {
+  Panel(const ChartSheet& sheet, Shows shows, std::string name, std::string title, Frame frame)
+      : sheet_(sheet),
+        shows_(shows),
+        name_(std::move(name)),
+        title_(std::move(title)),
+        frame_(std::move(frame)) {
     find_ranges();
   }
 
   std::string script() {
     draw_front();
     draw_lines();
-    draw_marks();
-    draw_labels();
+    draw_spread();
+    draw_glyphs();
     draw_failed();
-    return data_ + axes() + plot_ + "\n";
+    if (frame_.has_labels) {
+      draw_labels();
+    }
+    return data_ + axes() + (plot_.empty() ? "plot NaN notitle" : plot_) + "\n";
   }
 
  private:
   std::size_t truth() const { return shows_ == Shows::identical ? 0 : 1; }
 
   double y_of(const ChartRow& row) const {
-    if (shows_ == Shows::cents) {
-      const double cents = row.judged.physical.cents;
-      return std::isnan(cents) ? cents : std::max(cents, least_cents);
+    if (is_logarithmic(shows_)) {
+      const Against& physical = row.judged.physical;
+      const double error = shows_ == Shows::cents ? physical.cents : physical.t60_percent;
+      return std::isnan(error) ? error : std::max(error, least_error);
     }
     return std::clamp(-sheet_.snr_db(row, truth()), deepest_db, 0.0);
   }
@@ -86,20 +116,24 @@ class Panel {
     for (const ChartRow& row : sheet_.rows) {
       if (row.ns > 0.0) {
         left_ = std::min(left_, row.ns);
-        right_ = std::max(right_, row.ns);
+        right_ = std::max(right_, std::max(row.ns, row.upper_ns));
       }
       if (is_drawn(row)) {
         low = std::min(low, y_of(row));
         high = std::max(high, y_of(row));
       }
     }
-    if (shows_ == Shows::physical && !sheet_.is_linear) {
-      low = std::min(low, -sheet_.floor_db[sheet_.window]);
+    if (has_floor()) {
+      low = std::min(low, -floor_db());
+    }
+    if (right_ <= 0.0) {  // nothing was timed
+      left_ = 1.0;
+      right_ = 1e3;
     }
     left_ *= 0.6;
     right_ *= 2.2;
-    if (shows_ == Shows::cents) {
-      bottom_ = low < HUGE_VAL ? 0.3 * low : least_cents;
+    if (is_logarithmic(shows_)) {
+      bottom_ = low < HUGE_VAL ? 0.3 * low : least_error;
       top_ = std::max(10.0, 4.0 * high);
     } else {
       top_ = 8.0;
@@ -107,33 +141,57 @@ class Panel {
     }
   }
 
-  void add(const std::string& points, const std::string& style) {
+  // How far the truth of a scene that is not linear is known.
+  bool has_floor() const { return shows_ == Shows::physical && !sheet_.is_linear; }
+  double floor_db() const { return sheet_.floor_db[sheet_.window]; }
+
+  // --- data to pixels and back ---
+  double x_share(double ns) const { return std::log(ns / left_) / std::log(right_ / left_); }
+  double y_share(double y) const {
+    return is_logarithmic(shows_) ? std::log(y / bottom_) / std::log(top_ / bottom_)
+                                  : (y - bottom_) / (top_ - bottom_);
+  }
+  LabelRequest pixel_of(const ChartRow& row) const {
+    const Box& box = frame_.box;
+    return {box.left + x_share(row.ns) * (box.right - box.left),
+            box.bottom + y_share(y_of(row)) * (box.top - box.bottom), row.way.label};
+  }
+  std::string data_at(double x, double y) const {
+    const Box& box = frame_.box;
+    const double across = (x - box.left) / (box.right - box.left);
+    const double up = (y - box.bottom) / (box.top - box.bottom);
+    return number(left_ * std::pow(right_ / left_, across)) + " " +
+           number(is_logarithmic(shows_) ? bottom_ * std::pow(top_ / bottom_, up)
+                                         : bottom_ + up * (top_ - bottom_));
+  }
+
+  void add(const std::string& points, const std::string& columns, const std::string& style) {
     const std::string block = "$" + name_ + std::to_string(count_++);
     data_ += block + " << EOD\n" + points + "EOD\n";
-    plot_ += (plot_.empty() ? "plot " : ", \\\n  ") + block + " using 1:2" + style + " notitle";
+    plot_ += (plot_.empty() ? "plot " : ", \\\n  ") + block + " using " + columns + " with " +
+             style + " notitle";
   }
   static std::string line_of(double x, double y) { return number(x) + " " + number(y) + "\n"; }
 
   void draw_front() {
-    std::vector<Point> front;
+    std::vector<std::pair<double, double>> front;
     for (const ChartRow& row : sheet_.rows) {
-      if (row.is_on_front[truth()] && is_drawn(row) && shows_ != Shows::cents) {
-        front.push_back({row.ns, y_of(row)});
+      if (row.is_on_front[truth()] && is_drawn(row) && !is_logarithmic(shows_)) {
+        front.emplace_back(row.ns, y_of(row));
       }
     }
     if (!front.empty()) {
-      std::sort(front.begin(), front.end(),
-                [](const Point& a, const Point& b) { return a.ns < b.ns; });
-      std::string points = line_of(front[0].ns, top_);
-      for (const Point& point : front) {
-        points += line_of(point.ns, point.y);
+      std::sort(front.begin(), front.end());
+      std::string points = line_of(front[0].first, top_);
+      for (const auto& [ns, y] : front) {
+        points += line_of(ns, y);
       }
-      add(points + line_of(right_, front.back().y), std::string(" with steps ") + front_style);
+      add(points + line_of(right_, front.back().second), "1:2",
+          std::string("steps ") + front_style);
     }
-    const double floor = sheet_.floor_db[sheet_.window];
-    if (shows_ == Shows::physical && !sheet_.is_linear && -floor > bottom_) {
-      add(line_of(left_, -floor) + line_of(right_, -floor),
-          " with lines dt 3 lw 1.2 lc rgb \"#606060\"");
+    if (has_floor() && -floor_db() > bottom_) {
+      add(line_of(left_, -floor_db()) + line_of(right_, -floor_db()), "1:2",
+          std::string("lines ") + floor_style);
     }
   }
 
@@ -163,33 +221,68 @@ class Panel {
       for (const ChartRow* const row : line) {
         points += line_of(row->ns, y_of(*row));
       }
-      add(points, " with lines lw 1 lc rgb \"" + colour_of(line[0]->way.precision) + "\"");
+      const Look& look = look_of(line[0]->way.precision);
+      add(points, "1:2",
+          std::string("lines lw 1 dt ") + look.dashes + " lc rgb \"" + look.colour + "\"");
     }
   }
 
-  void draw_marks() {
-    std::map<std::pair<int, std::string>, std::string> marks;  // (mark, colour) -> points
+  // From the fastest to the upper quartile of the rounds.
+  void draw_spread() {
+    std::string points;
     for (const ChartRow& row : sheet_.rows) {
-      if (is_drawn(row)) {
-        marks[{mark_of(first_method(row), !row.way.budget.empty()),
-               colour_of(row.way.precision)}] += line_of(row.ns, y_of(row));
+      if (is_drawn(row) && row.upper_ns > row.ns) {
+        points += line_of(row.ns, y_of(row)) + line_of(row.upper_ns, y_of(row)) + "\n";
       }
     }
-    for (const auto& [mark, points] : marks) {
-      add(points, " with points pt " + std::to_string(mark.first) + " ps " +
-                      (is_small_ ? "0.9" : "1.3") + " lw 1.6 lc rgb \"" + mark.second + "\"");
+    if (!points.empty()) {
+      add(points, "1:2", "lines lw 2.2 lc rgb \"#808080\"");
+    }
+  }
+
+  void draw_glyphs() {
+    std::map<std::pair<int, std::string>, std::string> glyphs;  // (glyph, colour) -> points
+    for (const ChartRow& row : sheet_.rows) {
+      if (is_drawn(row)) {
+        glyphs[{glyph_of(first_method(row), !row.way.budget.empty()),
+                look_of(row.way.precision).colour}] += line_of(row.ns, y_of(row));
+      }
+    }
+    for (const auto& [glyph, points] : glyphs) {
+      add(points, "1:2",
+          "points pt " + std::to_string(glyph.first) + " ps " + number(frame_.glyph_size) +
+              " lw 1.5 lc rgb \"" + glyph.second + "\"");
     }
   }
 
   void draw_labels() {
-    std::string points;
+    std::vector<LabelRequest> marks;
+    std::vector<LabelRequest> wanted;
     for (const ChartRow& row : sheet_.rows) {
-      if (is_drawn(row) && !row.way.label.empty() && row.way.precision == Precision::float64) {
-        points += number(row.ns) + " " + number(y_of(row)) + " \"" + row.way.label + "\"\n";
+      if (is_drawn(row)) {
+        marks.push_back(pixel_of(row));
+        if (!row.way.label.empty() && row.way.precision == Precision::float64) {
+          wanted.push_back(marks.back());
+        }
       }
     }
-    if (!points.empty() && !is_small_) {
-      add(points, ":3 with labels left offset 0.7,0.35 font \"sans,8\" tc rgb \"#505050\"");
+    std::string words;
+    std::string leads;
+    for (const PlacedLabel& label : place_labels(wanted, marks, frame_.box)) {
+      const double x = 0.5 * (label.box.left + label.box.right);
+      const double y = 0.5 * (label.box.bottom + label.box.top);
+      words += data_at(x, y) + " \"" + label.text + "\"\n";
+      if (label.is_apart) {
+        const double near_x = std::clamp(label.from_x, label.box.left, label.box.right);
+        const double near_y = std::clamp(label.from_y, label.box.bottom, label.box.top);
+        leads += data_at(label.from_x, label.from_y) + "\n" + data_at(near_x, near_y) + "\n\n";
+      }
+    }
+    if (!leads.empty()) {
+      add(leads, "1:2", "lines lw 0.6 lc rgb \"#909090\"");
+    }
+    if (!words.empty()) {
+      add(words, "1:2:3", "labels center font \"sans,8\" tc rgb \"#303030\"");
     }
   }
 
@@ -201,17 +294,8 @@ class Panel {
       }
     }
     if (!points.empty()) {
-      add(points, std::string(" with points ") + failed_style);
+      add(points, "1:2", std::string("points ") + failed_style);
     }
-  }
-
-  std::string title() const {
-    if (is_small_) {
-      return sheet_.scene;
-    }
-    return shows_ == Shows::identical  ? "beside the published scheme (T1)"
-           : shows_ == Shows::physical ? "beside the continuous network (T2)"
-                                       : "pitch beside the continuous network";
   }
 
   std::string window() const {
@@ -219,34 +303,43 @@ class Panel {
     return seconds < 1.0 ? number(1e3 * seconds) + " ms" : number(seconds) + " s";
   }
 
-  std::string axes() const {
-    std::string tics;
-    for (double voices = 1e7; voices >= 0.1; voices /= 10.0) {
-      const double ns = 1e9 / 48000.0 / voices;
-      if (ns > left_ && ns < right_) {
-        tics += (tics.empty() ? "" : ", ") + ("\"" + number(voices) + "\" " + number(ns));
-      }
+  std::string left_title() const {
+    switch (shows_) {
+      case Shows::cents:
+        return "largest error of a partial (cents)";
+      case Shows::t60:
+        return "largest error of a decay T60 (%)";
+      case Shows::physical:
+      case Shows::identical:
+        return "error below signal, first " + window() + " (dB)";
     }
-    const std::string y_label = shows_ == Shows::cents
-                                    ? "largest error of a partial, cents"
-                                    : "error below signal, first " + window() + ", dB";
-    return "set title \"" + title() + "\" noenhanced offset 0," + (is_small_ ? "-0.4" : "0.6") +
-           "\nset logscale x\nset logscale x2\nunset logscale y\nset xrange [" + number(left_) +
-           ":" + number(right_) + "]\nset x2range [" + number(left_) + ":" + number(right_) +
-           "]\nset yrange [" + number(bottom_) + ":" + number(top_) + "]\nset format y " +
-           (shows_ == Shows::cents ? "\"10^{%T}\"\nset logscale y\n" : "\"%g\"\n") +
-           "set x2tics (" + tics + ")\n" +
-           (is_small_ ? "unset x2tics\nset xlabel\nset ylabel\nset x2label\n"
-                      : "set xlabel \"ns of one core per output sample\"\n"
-                        "set x2label \"voices that one core holds at 48 kHz\" offset 0,-0.4\n"
-                        "set ylabel \"" +
-                            y_label + "\"\n");
+    return "";
+  }
+
+  std::string axes() const {
+    const Box& box = frame_.box;
+    const auto title = [](const char* axis, const std::string& text) {
+      return std::string("set ") + axis +
+             (text.empty() ? "" : " \"" + text + "\" font \"sans,10\" noenhanced") + "\n";
+    };
+    return "set lmargin at screen " + number(box.left / frame_.width) + "\nset rmargin at screen " +
+           number(box.right / frame_.width) + "\nset bmargin at screen " +
+           number(box.bottom / frame_.height) + "\nset tmargin at screen " +
+           number(box.top / frame_.height) + "\nset title \"" + title_ +
+           "\" font \"sans,11\" noenhanced offset 0,-0.5\n" +
+           "set logscale x\nunset logscale y\nset xrange [" + number(left_) + ":" + number(right_) +
+           "]\nset yrange [" + number(bottom_) + ":" + number(top_) +
+           "]\nset format x \"10^{%T}\"\nset format y " +
+           (is_logarithmic(shows_) ? "\"10^{%T}\"\nset logscale y\n" : "\"%g\"\n") +
+           title("xlabel", frame_.has_bottom_title ? "time per sample, one core (ns)" : "") +
+           title("ylabel", frame_.has_left_title ? left_title() : "");
   }
 
   const ChartSheet& sheet_;
   Shows shows_;
   std::string name_;
-  bool is_small_;
+  std::string title_;
+  Frame frame_;
   double left_ = HUGE_VAL;
   double right_ = 0.0;
   double bottom_ = 0.0;
@@ -256,10 +349,15 @@ class Panel {
   std::string plot_;
 };
 
-// The marks and colours that occur, in place of a panel.
-std::string legend(const std::vector<const ChartSheet*>& sheets) {
+struct LegendEntry {
+  std::string style;
+  std::string text;
+};
+
+// The glyphs, colours and lines that occur.
+std::vector<LegendEntry> legend_of(const std::vector<const ChartSheet*>& sheets) {
   std::set<std::string> methods;
-  std::set<int, std::greater<>> precisions;
+  std::set<Precision> precisions;
   bool has_budget = false;
   bool has_failed = false;
   bool has_floor = false;
@@ -267,130 +365,163 @@ std::string legend(const std::vector<const ChartSheet*>& sheets) {
     has_floor |= !sheet->is_linear;
     for (const ChartRow& row : sheet->rows) {
       methods.insert(first_method(row));
-      precisions.insert(static_cast<int>(row.way.precision));
+      precisions.insert(row.way.precision);
       has_budget |= !row.way.budget.empty();
       has_failed |= !row.failure.empty();
     }
   }
-  std::string plot;
-  const auto add = [&](const std::string& style, const std::string& title) {
-    plot +=
-        (plot.empty() ? "plot " : ", \\\n  ") + ("NaN with " + style + " title \"") + title + "\"";
+  const auto glyph = [](int number_of_it) {
+    return "points ps 1.2 lw 1.5 lc rgb \"black\" pt " + std::to_string(number_of_it);
   };
+  std::vector<LegendEntry> entries;
   for (const std::string& method : methods) {
-    add("points ps 1.3 lw 1.6 lc rgb \"black\" pt " + std::to_string(mark_of(method, false)),
-        method);
+    entries.push_back({glyph(glyph_of(method, false)), method});
   }
   if (has_budget) {
-    add("points ps 1.3 lw 1.6 lc rgb \"black\" pt 7", "filled: by a budget");
+    entries.push_back({glyph(7), "filled: with a budget"});
   }
-  for (const int precision : precisions) {
-    const auto kind = static_cast<Precision>(precision);
-    add("lines lw 4 lc rgb \"" + colour_of(kind) + "\"", precision_name(kind));
+  for (const Precision precision : precisions) {
+    const Look& look = look_of(precision);
+    entries.push_back(
+        {std::string("lines lw 3 dt ") + look.dashes + " lc rgb \"" + look.colour + "\"",
+         precision_name(precision)});
   }
-  add(std::string("lines ") + front_style, "Pareto front");
+  entries.push_back({std::string("lines ") + front_style, "Pareto front"});
+  entries.push_back({"lines lw 2.2 lc rgb \"#808080\"", "spread of the times"});
   if (has_floor) {
-    add("lines dt 3 lw 1.2 lc rgb \"#606060\"", "truth agrees with itself");
+    entries.push_back({std::string("lines ") + floor_style, "reference known to here"});
   }
   if (has_failed) {
-    add(std::string("points ") + failed_style, "unstable or not passive");
+    entries.push_back({std::string("points ") + failed_style, "gains energy under stress"});
   }
-  return "unset border\nunset tics\nset title\nset xlabel\nset ylabel\nset x2label\n"
-         "unset logscale\nset xrange [0:1]\nset yrange [0:1]\nunset grid\n"
-         "set key at screen LEGEND_X, screen LEGEND_Y left top reverse Left samplen 1.6 "
-         "spacing 1.25 noenhanced\n" +
-         plot + "\n";
+  return entries;
 }
 
-const char* const begin_panel =
-    "set border 31 lc rgb \"#404040\"\nset tics nomirror\nset grid xtics ytics lt 1 lc rgb "
-    "\"#e4e4e4\"\n"
-    "unset key\n";
+constexpr std::size_t legend_columns = 5;
 
-std::string margins(double left, double right, double bottom, double top) {
-  return "set lmargin at screen " + number(left) + "\nset rmargin at screen " + number(right) +
-         "\nset bmargin at screen " + number(bottom) + "\nset tmargin at screen " + number(top) +
+double height_of(const std::vector<LegendEntry>& legend) {
+  return legend_row_height * std::ceil(static_cast<double>(legend.size()) / legend_columns) + 16.0;
+}
+
+// In a band above the caption: a plot without axes.
+std::string draw(const std::vector<LegendEntry>& legend, double whole_height) {
+  std::string plot;
+  for (const LegendEntry& entry : legend) {
+    plot += (plot.empty() ? "plot " : ", \\\n  ") +
+            ("NaN with " + entry.style + " title \"" + entry.text + "\"");
+  }
+  return "unset border\nunset tics\nset title\nset xlabel\nset ylabel\nunset logscale\n"
+         "set xrange [0:1]\nset yrange [0:1]\nunset grid\nset lmargin at screen 0\n"
+         "set rmargin at screen 1\nset bmargin at screen 0\nset tmargin at screen 1\n"
+         "set key at screen 0.5, screen " +
+         number((caption_height + height_of(legend) - 12.0) / whole_height) +
+         " center top horizontal reverse Left samplen 2.2 width 1 maxcols " +
+         std::to_string(legend_columns) + " spacing 1.1 font \"sans,10\" noenhanced\n" + plot +
          "\n";
 }
 
-std::string with_place(std::string text, double x, double y) {
-  for (const auto& [word, value] : {std::pair(std::string("LEGEND_X"), x), {"LEGEND_Y", y}}) {
-    text.replace(text.find(word), word.size(), number(value));
-  }
-  return text;
-}
+const char* const begin_panel =
+    "set border 3 lc rgb \"#404040\"\nset tics nomirror font \"sans,9\"\n"
+    "set grid xtics ytics lt 1 lc rgb \"#e8e8e8\"\nunset key\n";
 
 // Both kinds of file of one picture.
-std::string twice(const std::string& name, int width, int height, const std::string& body) {
-  const std::string size = std::to_string(width) + "," + std::to_string(height);
-  return "reset\nset terminal svg size " + size + " font \"sans,12\" background \"white\"\n" +
-         "set output \"" + name + ".svg\"\n" + body + "unset multiplot\nset output\n" +
-         "reset\nset terminal pngcairo size " + size + " font \"sans,11\" background \"white\"\n" +
-         "set output \"" + name + ".png\"\n" + body + "unset multiplot\nset output\n\n";
+std::string twice(const std::string& name, double height, const std::string& body) {
+  const std::string size = number(page_width) + "," + number(height);
+  std::string script;
+  for (const auto& [terminal, ending] :
+       {std::pair("svg size " + size + " font \"sans,11\" background \"white\"", ".svg"),
+        std::pair("pngcairo size " + size + " font \"sans,10\" background \"white\"", ".png")}) {
+    script += "reset\nset terminal " + terminal + "\nset output \"" + name + ending + "\"\n" +
+              body + "unset multiplot\nset output\n";
+  }
+  return script + "\n";
 }
 
-std::string picture_of(const ChartSheet& sheet, const std::string& machine) {
-  using Shows = Panel::Shows;
-  std::vector<Shows> panels = {Shows::physical, Shows::identical};
+std::string begin_picture(const std::string& title, const std::string& caption,
+                          double whole_height) {
+  return "set multiplot title \"" + title + "\" font \"sans,12\" noenhanced\nset label 1 \"" +
+         caption + "\" at screen 0.01, screen " + number((caption_height - 12.0) / whole_height) +
+         " left font \"sans,8\" noenhanced tc rgb " + "\"#404040\"\n";
+}
+
+// The caption belongs to the picture, not to each of its panels.
+const char* const end_caption = "unset label 1\n";
+
+std::string caption_of(const Provenance& provenance, int rounds) {
+  return to_string(provenance) + ".\\nTimes: of each stretch of sound the fastest of " +
+         std::to_string(rounds) + " rounds; the grey bar ends at the rounds' upper quartile.";
+}
+
+std::string picture_of(const ChartSheet& sheet, const Provenance& provenance) {
+  std::vector<std::pair<Shows, std::string>> panels = {
+      {Shows::physical, "against the continuous network"},
+      {Shows::identical, "against the published scheme"}};
   if (sheet.is_linear) {
-    panels.insert(panels.begin() + 1, Shows::cents);
+    panels.insert(panels.begin(), {{Shows::cents, "pitch, against the continuous network"},
+                                   {Shows::t60, "decay, against the continuous network"}});
   }
-  const double width = 440.0;
-  const double legend_width = 250.0;
-  const double count = static_cast<double>(panels.size());
-  const double whole = count * width + legend_width;
-  std::string body = "set multiplot title \"" + sheet.scene + ": " + sheet.about + " (" + machine +
-                     ")\" noenhanced\n";
+  constexpr double height = 330.0;
+  constexpr double width = page_width / 2.0;
+  const std::vector<LegendEntry> legend = legend_of({&sheet});
+  const double foot = caption_height + height_of(legend);
+  const double rows = static_cast<double>((panels.size() + 1) / 2);
+  const double whole = title_height + rows * height + foot;
+  std::string body =
+      begin_picture(sheet.scene + ": " + sheet.about, caption_of(provenance, sheet.rounds), whole);
   for (std::size_t i = 0; i < panels.size(); ++i) {
-    const double left = static_cast<double>(i) * width;
+    const double left = static_cast<double>(i % 2) * width;
+    const double top = whole - title_height - static_cast<double>(i / 2) * height;
+    const Frame frame{.box = {left + 66.0, left + width - 16.0, top - height + 52.0, top - 26.0},
+                      .height = whole};
     body += begin_panel +
-            margins((left + 72.0) / whole, (left + width - 14.0) / whole, 0.12, 0.78) +
-            Panel(sheet, panels[i], "p" + std::to_string(i) + "_", false).script();
+            Panel(sheet, panels[i].first, "p" + std::to_string(i) + "_", panels[i].second, frame)
+                .script() +
+            (i == 0 ? end_caption : "");
   }
-  body += with_place(legend({&sheet}), (count * width + 10.0) / whole, 0.8);
-  return twice(sheet.scene, static_cast<int>(whole), 520, body);
+  return twice(sheet.scene, whole, body + draw(legend, whole));
 }
 
-std::string overview_of(const std::vector<ChartSheet>& sheets, const std::string& machine) {
-  constexpr std::size_t columns = 4;
-  const std::size_t rows = sheets.size() / columns + 1;  // one place for the legend
-  const double width = 370.0;
-  const double height = 280.0;
-  const double whole_width = width * static_cast<double>(std::min(columns, sheets.size() + 1));
-  const double head = 60.0;
-  const double whole_height = height * static_cast<double>(rows) + head;
-  std::string body =
-      "set multiplot title \"Error below signal beside the continuous network, dB, "
-      "over ns of one core per output sample (" +
-      machine + ")\" noenhanced\n";
+std::string overview_of(const std::vector<ChartSheet>& sheets, const Provenance& provenance) {
+  constexpr std::size_t columns = 3;
+  constexpr double width = page_width / columns;
+  constexpr double height = 250.0;
   std::vector<const ChartSheet*> all;
-  const auto corner = [&](std::size_t i) {
-    const std::size_t row = i / columns;
-    return std::pair(static_cast<double>(i % columns) * width,
-                     whole_height - head - static_cast<double>(row) * height);
-  };
-  for (std::size_t i = 0; i < sheets.size(); ++i) {
-    const auto [left, top] = corner(i);
-    all.push_back(&sheets[i]);
-    body += begin_panel +
-            margins((left + 48.0) / whole_width, (left + width - 14.0) / whole_width,
-                    (top - height + 34.0) / whole_height, (top - 26.0) / whole_height) +
-            Panel(sheets[i], Panel::Shows::physical, "o" + std::to_string(i) + "_", true).script();
+  int rounds = 0;
+  for (const ChartSheet& sheet : sheets) {
+    all.push_back(&sheet);
+    rounds = all.size() == 1 ? sheet.rounds : std::min(rounds, sheet.rounds);
   }
-  const auto [left, top] = corner(sheets.size());
-  body += with_place(legend(all), (left + 40.0) / whole_width, (top - 20.0) / whole_height);
-  return twice("overview", static_cast<int>(whole_width), static_cast<int>(whole_height), body);
+  const std::vector<LegendEntry> legend = legend_of(all);
+  const double rows = static_cast<double>((sheets.size() + columns - 1) / columns);
+  const double whole = title_height + rows * height + caption_height + height_of(legend);
+  std::string body = begin_picture("Error against the continuous network, and what it costs",
+                                   caption_of(provenance, rounds), whole);
+  for (std::size_t i = 0; i < sheets.size(); ++i) {
+    const double left = static_cast<double>(i % columns) * width;
+    const double top = whole - title_height - static_cast<double>(i / columns) * height;
+    const Frame frame{.box = {left + 64.0, left + width - 6.0, top - height + 46.0, top - 24.0},
+                      .height = whole,
+                      .has_left_title = i % columns == 0,
+                      .has_bottom_title = i + columns >= sheets.size(),
+                      .has_labels = false,
+                      .glyph_size = 0.8};
+    body += begin_panel +
+            Panel(sheets[i], Shows::physical, "o" + std::to_string(i) + "_", sheets[i].scene, frame)
+                .script() +
+            (i == 0 ? end_caption : "");
+  }
+  return twice("overview", whole, body + draw(legend, whole));
 }
 
 }  // namespace
 
-std::string chart_script(const std::vector<ChartSheet>& sheets, const std::string& machine) {
+std::string chart_script(const std::vector<ChartSheet>& sheets, const Provenance& provenance) {
   std::string script =
       "# Draws the pictures beside it: gnuplot chart.gp. The data are those of chart.csv.\n";
   for (const ChartSheet& sheet : sheets) {
-    script += picture_of(sheet, machine);
+    script += picture_of(sheet, provenance);
   }
-  return script + overview_of(sheets, machine);
+  return script + overview_of(sheets, provenance);
 }
 
 }  // namespace ressort

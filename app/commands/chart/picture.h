@@ -10,6 +10,6 @@ namespace ressort {
 
 // A script that draws, into the folder it is run in, SCENE.svg and SCENE.png for every sheet and
 // overview.svg and overview.png for all; with its data.
-std::string chart_script(const std::vector<ChartSheet>& sheets, const std::string& machine);
+std::string chart_script(const std::vector<ChartSheet>& sheets, const Provenance& provenance);
 
 }  // namespace ressort

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cctype>
 #include <cmath>
+#include <set>
 
 #include "core/analysis/continuous.h"
 #include "core/model/generate.h"
@@ -138,7 +139,7 @@ void strike(ChartScene& scene, std::uint32_t mass) {
   struck.third = scene.network.third == ThirdArgument::delayed_position
                      ? struck.position - blow
                      : struck.third + blow * rate_hz;
-  scene.about = "x[-1] = x[0] - 0.01 at one mass";
+  scene.about = "an impulse at one mass, x[-1] = x[0] - 0.01";
 }
 
 // The mass that an input pushes, or that the first link ties to it.
@@ -301,6 +302,24 @@ Result<ChartScene> chart_scene(const std::string& name) {
     return scene.error();
   }
   return scene_of(scene->name, std::move(scene->network), scene->preset);
+}
+
+ChartScene struck(const ChartScene& scene) {
+  ChartScene other = scene;
+  std::set<std::uint32_t> masses;
+  for (const Input& input : scene.network.inputs) {
+    masses.insert(struck_by(scene.network, input));
+  }
+  std::erase_if(masses, [&](std::uint32_t i) { return !moves(scene.network.masses[i]); });
+  if (masses.empty()) {
+    strike_first_mass(other);
+  }
+  for (const std::uint32_t mass : masses) {
+    strike(other, mass);
+  }
+  other.about = std::string("nothing sounds by itself, so: an impulse at ") +
+                (masses.empty() ? "the first mass" : "its inputs") + ", x[-1] = x[0] - 0.01";
+  return other;
 }
 
 ChartScene struck_harder(const ChartScene& scene) {

@@ -35,6 +35,10 @@ const std::vector<std::string>& reference_scenes();
 // 0.8 is to their preset, at the pitch that is written.
 Result<ChartScene> chart_scene(const std::string& name);
 
+// The same with an impulse besides, at the mass of every input or else at the first one that moves:
+// for networks in which nothing sounds as they are.
+ChartScene struck(const ChartScene& scene);
+
 // The same, hit ten times harder: start and hands.
 ChartScene struck_harder(const ChartScene& scene);
 

@@ -38,7 +38,10 @@ const char* const meaning =
     "ms.\n"
     "#\n"
     "# ns: of one core, per output sample at 44100 Hz, one voice, the kernels with their hands,\n"
-    "# mean over the first timed_s seconds of the sound. voices_48k: 1e9 / 48000 / ns, one after\n"
+    "# mean over the first timed_s seconds of the sound, of each stretch the fastest of all "
+    "rounds;\n"
+    "# upper_ns: the upper quartile of the rounds as they were. voices_48k: 1e9 / 48000 / ns, one "
+    "after\n"
     "# another; direct and chorus, which put voices side by side into lanes, hold more together.\n"
     "# predicted_ns: by the plan's cost model, the same on machines of one instruction set.\n"
     "# snr_T_W: dB of signal over error beside truth T in the first W of the sound, all outputs\n"
@@ -65,6 +68,7 @@ std::vector<std::string> cells_of(const ChartSheet& sheet, const ChartRow& row) 
                                     std::to_string(row.way.oversampling),
                                     quoted(row.way.budget),
                                     number(row.ns),
+                                    number(row.upper_ns),
                                     number(1e9 / 48000.0 / row.ns),
                                     number(row.predicted_ns)};
   for (const Against* const against : {&row.judged.identical, &row.judged.physical}) {
@@ -110,17 +114,22 @@ void find_fronts(ChartSheet& sheet) {
 
 const std::vector<std::string>& chart_columns() {
   static const std::vector<std::string> columns = {
-      "scene",    "way",        "precision",    "methods",    "oversampling", "budget",
-      "ns",       "voices_48k", "predicted_ns", "snr_t1_5ms", "snr_t1_50ms",  "snr_t1_1s",
-      "cents_t1", "t60_t1",     "energy_t1",    "snr_t2_5ms", "snr_t2_50ms",  "snr_t2_1s",
-      "cents_t2", "t60_t2",     "energy_t2",    "energy",     "front_t1",     "front_t2",
-      "failure",  "also"};
+      "scene",     "way",      "precision",  "methods",      "oversampling", "budget",
+      "ns",        "upper_ns", "voices_48k", "predicted_ns", "snr_t1_5ms",   "snr_t1_50ms",
+      "snr_t1_1s", "cents_t1", "t60_t1",     "energy_t1",    "snr_t2_5ms",   "snr_t2_50ms",
+      "snr_t2_1s", "cents_t2", "t60_t2",     "energy_t2",    "energy",       "front_t1",
+      "front_t2",  "failure",  "also"};
   return columns;
 }
 
-std::string chart_csv(const std::vector<ChartSheet>& sheets, const std::string& machine) {
+std::string to_string(const Provenance& provenance) {
+  return provenance.program + ", " + provenance.date + ", on " + provenance.processor +
+         ", built by " + provenance.compiler;
+}
+
+std::string chart_csv(const std::vector<ChartSheet>& sheets, const Provenance& provenance) {
   std::string text = meaning;
-  text += "#\n# machine: " + machine + "\n";
+  text += "#\n# made by: " + to_string(provenance) + "\n";
   for (const ChartSheet& sheet : sheets) {
     text += "# scene " + sheet.scene + ": " + sheet.about + "; T1 " + sheet.truth[0] + "; T2 " +
             sheet.truth[1];

@@ -16,6 +16,7 @@ struct ChartRow {
   std::string methods;
   std::vector<std::string> twins;
   double ns = 0.0;            // per output sample, one voice
+  double upper_ns = 0.0;      // the upper quartile of all rounds
   double predicted_ns = 0.0;  // by the plan's model
   Judged judged;
   std::string failure;                   // unstable or not passive, and when; empty if neither
@@ -31,6 +32,7 @@ struct ChartSheet {
   std::array<double, 3> floor_db{};  // how far T2 agrees with itself
   std::size_t window = 0;            // of the chart
   double timed_s = 0.0;
+  int rounds = 0;  // each way was timed so often
   std::vector<ChartRow> rows;
   double area[2] = {0.0, 0.0};            // dominated hypervolume, by measured times
   double predicted_area[2] = {0.0, 0.0};  // by predicted ones: the same on every machine
@@ -44,7 +46,16 @@ void find_fronts(ChartSheet& sheet);
 // The columns, for who reads them by a program.
 const std::vector<std::string>& chart_columns();
 
+// Where and by what the sheets were made, in a sentence for a picture's caption.
+struct Provenance {
+  std::string processor;
+  std::string compiler;
+  std::string date;     // ISO 8601
+  std::string program;  // its name, version and commit
+};
+std::string to_string(const Provenance& provenance);
+
 // All sheets as one table: what it means, in lines with '#'; names of columns; rows.
-std::string chart_csv(const std::vector<ChartSheet>& sheets, const std::string& machine);
+std::string chart_csv(const std::vector<ChartSheet>& sheets, const Provenance& provenance);
 
 }  // namespace ressort

@@ -8,6 +8,7 @@
 #include "app/commands/chart/judge.h"
 #include "app/commands/chart/start.h"
 #include "core/engine/truth.h"
+#include "core/model/language/mdl.h"
 #include "tests/support/catch.h"
 #include "tests/support/reference_network.h"
 #include "tests/support/rig.h"
@@ -178,6 +179,19 @@ TEST_CASE("every method is as far from the continuous network as theory has it",
     CHECK(physical_db(twice) >= fourth + (scene.name == "20x30mesh" ? 18.0 : 22.0));
     CHECK(physical_db({.name = "exact", .method = Method::modal, .budget = "cents=1"}) >= 200.0);
   }
+}
+
+TEST_CASE("what rests as it starts is struck, and the sheet says so", "[chart]") {
+  // Off the origin and still at rest: nothing pulls.
+  const ParsedNetwork parsed = parse_network(
+      "@m mass 1. 1. 0.\n@n mass 1. 1. 0.\n@r springDamper @m @n 0.1 0.001\n@out1 posOutput @m\n");
+  ChartScene scene{.name = "pair", .network = parsed.network, .is_linear = true};
+  scene.about = "as it starts";
+  scene.hands.resize(scene.network.inputs.size());
+  const auto sheet = make_sheet(scene, Isa::base, 0.0, [](const std::string&) { return true; });
+  REQUIRE(sheet);
+  CHECK_FALSE(sheet->rows.empty());
+  CHECK(sheet->about.find("an impulse at the first mass") != std::string::npos);
 }
 
 TEST_CASE("energy is watched, and a hard contact is caught gaining it", "[chart]") {
