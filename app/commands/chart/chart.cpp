@@ -10,7 +10,7 @@
 #include <filesystem>
 #include <fstream>
 
-#include "app/commands/chart/picture.h"
+#include "app/commands/chart/picture/picture.h"
 #include "app/commands/chart/start.h"
 #include "app/exit_code.h"
 #include "app/realtime/lockfree.h"

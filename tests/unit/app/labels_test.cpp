@@ -1,5 +1,5 @@
 // Words beside marks: none lies on another, on a mark or outside of its frame.
-#include "app/commands/chart/labels.h"
+#include "app/commands/chart/picture/labels.h"
 #include "tests/support/catch.h"
 #include "tests/support/random.h"
 

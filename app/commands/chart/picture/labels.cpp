@@ -1,4 +1,4 @@
-#include "app/commands/chart/labels.h"
+#include "app/commands/chart/picture/labels.h"
 
 #include <algorithm>
 #include <cmath>

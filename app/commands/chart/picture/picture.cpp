@@ -1,4 +1,4 @@
-#include "app/commands/chart/picture.h"
+#include "app/commands/chart/picture/picture.h"
 
 #include <algorithm>
 #include <cmath>
@@ -6,7 +6,7 @@
 #include <map>
 #include <set>
 
-#include "app/commands/chart/labels.h"
+#include "app/commands/chart/picture/labels.h"
 #include "app/text.h"
 
 namespace ressort {
