@@ -1,20 +1,17 @@
 #include "core/analysis/continuous.h"
 
-#include <Eigen/Eigenvalues>
-#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 #include <numbers>
 #include <utility>
 
 #include "core/analysis/places.h"
+#include "core/linear_algebra/eigen.h"
 #include "core/model/topology.h"
 
 namespace ressort {
 namespace {
 
-using Matrix = Eigen::MatrixXd;
-using Vector = Eigen::VectorXd;
 using Complex = std::complex<double>;
 
 constexpr double shared_tolerance = 1e-9;  // of the largest: is Z diagonal in the modes of K?
@@ -22,7 +19,7 @@ constexpr double zero = 1e-13;             // of the largest stiffness or dampin
 
 // A spring and damper between two sums of masses: it pulls by k (sum of share x - offset).
 struct Bar {
-  std::vector<std::pair<Eigen::Index, double>> shares;
+  std::vector<std::pair<std::size_t, double>> shares;
   double offset = 0.0;
   double k = 0.0;
   double z = 0.0;
@@ -35,11 +32,11 @@ class Body {
       : network_(network), parameters_(parameters), row_(network.masses.size(), held) {
     for (std::size_t i = 0; i < network.masses.size(); ++i) {
       if (moves(network.masses[i])) {
-        row_[i] = static_cast<Eigen::Index>(root_.size());
+        row_[i] = root_.size();
         root_.push_back(std::sqrt(value(network.masses[i].mass)));
       }
     }
-    force_ = Vector::Zero(size());
+    force_.resize(size());
     for (std::uint32_t i = 0; i < network.masses.size(); ++i) {
       const Mass& mass = network.masses[i];
       if (mass.kind == MassKind::oscillator) {
@@ -50,7 +47,7 @@ class Body {
       if (mass.gravity != no_argument && row_[i] != held) {
         force_[row_[i]] -= value(mass.gravity) /
                            (mass.gravity_per_rate ? Network::reference_rate_hz : 1.0) /
-                           root_[static_cast<std::size_t>(row_[i])];
+                           root_[row_[i]];
       }
     }
     for (const Link& link : network.links) {
@@ -67,7 +64,7 @@ class Body {
     }
   }
 
-  Eigen::Index size() const { return static_cast<Eigen::Index>(root_.size()); }
+  std::size_t size() const { return root_.size(); }
   bool has_mass() const {
     return !root_.empty() && std::all_of(root_.begin(), root_.end(), [](double root) {
       return root > 0.0 && std::isfinite(root);
@@ -76,7 +73,7 @@ class Body {
   const Vector& force() const { return force_; }
 
   Matrix matrix(double Bar::*of) const {
-    Matrix sum = Matrix::Zero(size(), size());
+    Matrix sum(size(), size());
     for (const Bar& bar : bars_) {
       for (const auto& [i, a] : bar.shares) {
         for (const auto& [j, b] : bar.shares) {
@@ -105,7 +102,7 @@ class Body {
     Vector v(size());
     for (std::size_t i = 0; i < row_.size(); ++i) {
       if (row_[i] != held) {
-        const double root = root_[static_cast<std::size_t>(row_[i])];
+        const double root = root_[row_[i]];
         x[row_[i]] = root * network_.masses[i].position;
         v[row_[i]] = root * initial_velocity(network_, network_.masses[i]);
       }
@@ -124,14 +121,14 @@ class Body {
     std::vector<double> all(row_.size(), 0.0);
     for (std::size_t i = 0; i < row_.size(); ++i) {
       if (row_[i] != held) {
-        all[i] = rows[row_[i]] / root_[static_cast<std::size_t>(row_[i])];
+        all[i] = rows[row_[i]] / root_[row_[i]];
       }
     }
     return all;
   }
 
  private:
-  static constexpr Eigen::Index held = -1;
+  static constexpr std::size_t held = static_cast<std::size_t>(-1);
 
   double value(ArgumentId id) const { return argument_value(network_, id, parameters_); }
 
@@ -140,15 +137,15 @@ class Body {
       if (row_[i] == held) {
         bar.offset -= sign * share * network_.masses[i].position;
       } else {
-        bar.shares.emplace_back(row_[i], sign * share / root_[static_cast<std::size_t>(row_[i])]);
+        bar.shares.emplace_back(row_[i], sign * share / root_[row_[i]]);
       }
     });
   }
 
   const Network& network_;
   std::span<const double> parameters_;
-  std::vector<Eigen::Index> row_;  // [mass]
-  std::vector<double> root_;       // [row] of its M
+  std::vector<std::size_t> row_;  // [mass]
+  std::vector<double> root_;      // [row] of its M
   std::vector<Bar> bars_;
   Vector force_;  // [row] with every mass at 0
 };
@@ -161,32 +158,33 @@ class Solver {
       made_.outputs.push_back({.rest = -reading_.back().offset});
     }
     std::tie(x_, v_) = body.start();
-    made_.energy = 0.5 * v_.squaredNorm();
+    made_.energy = 0.5 * dot(v_, v_);
   }
 
   std::optional<Continuous> solve() {
     const Matrix k = body_.matrix(&Bar::k);
     const Matrix z = body_.matrix(&Bar::z);
-    const double k_scale = std::max(k.cwiseAbs().maxCoeff(), 1e-300);
-    const double z_scale = std::max(z.cwiseAbs().maxCoeff(), 1e-300);
+    const double k_scale = std::max(largest(k.values), 1e-300);
+    const double z_scale = std::max(largest(z.values), 1e-300);
     // Of a mixture in odd shares: modes that K alone cannot tell apart, Z may.
-    const Matrix shapes =
-        Eigen::SelfAdjointEigenSolver<Matrix>(k / k_scale + 0.6180339887498949 / z_scale * z)
-            .eigenvectors();
+    Matrix mixture = k;
+    mixture.values = k.values / k_scale + 0.6180339887498949 / z_scale * z.values;
+    const Matrix shapes = symmetric_eigenpairs(mixture).vectors;
     const auto is_diagonal = [&](const Matrix& matrix, double scale) {
-      Matrix rest = shapes.transpose() * matrix * shapes;
-      rest.diagonal().setZero();
-      return rest.cwiseAbs().maxCoeff() <= shared_tolerance * scale;
+      Matrix rest = in_basis(matrix, shapes);
+      for (std::size_t j = 0; j < rest.rows(); ++j) {
+        rest(j, j) = 0.0;
+      }
+      return largest(rest.values) <= shared_tolerance * scale;
     };
     made_.is_proportional = is_diagonal(k, k_scale) && is_diagonal(z, z_scale);
     if (made_.is_proportional) {
-      Vector rest = Vector::Zero(body_.size());
-      for (Eigen::Index j = 0; j < shapes.cols(); ++j) {
-        add_mode(shapes.col(j), k_scale, z_scale, rest);
+      Vector rest(body_.size());
+      for (std::size_t j = 0; j < shapes.columns(); ++j) {
+        add_mode(shapes.column(j), k_scale, z_scale, rest);
       }
       made_.rest = body_.masses_of(rest);
-    } else if (body_.size() > static_cast<Eigen::Index>(most_crossed_modes) ||
-               !add_crossed_modes(k, z)) {
+    } else if (body_.size() > most_crossed_modes || !add_crossed_modes(k, z)) {
       return std::nullopt;
     }
     rank();
@@ -208,9 +206,9 @@ class Solver {
     double damping = body_.along(&Bar::z, shape);
     stiffness = stiffness < zero * k_scale ? 0.0 : stiffness;
     damping = damping < zero * z_scale ? 0.0 : damping;
-    const double force = shape.dot(body_.force());
-    const double q = shape.dot(x_);
-    const double v = shape.dot(v_);
+    const double force = dot(shape, body_.force());
+    const double q = dot(shape, x_);
+    const double v = dot(shape, v_);
     if (stiffness == 0.0) {
       add_free(shape, damping, force, q, v);
       rest += q * shape;
@@ -274,33 +272,32 @@ class Solver {
 
   // The eigenvectors of (x, v)' = (v, f - K x - Z v).
   bool add_crossed_modes(const Matrix& k, const Matrix& z) {
-    const Eigen::Index n = body_.size();
-    Matrix flow = Matrix::Zero(2 * n, 2 * n);
-    flow.topRightCorner(n, n).setIdentity();
-    flow.bottomLeftCorner(n, n) = -k;
-    flow.bottomRightCorner(n, n) = -z;
-    const Eigen::EigenSolver<Matrix> eigen(flow);
-    if (eigen.info() != Eigen::Success) {
+    const std::size_t n = body_.size();
+    Matrix flow(2 * n, 2 * n);
+    for (std::size_t j = 0; j < n; ++j) {
+      flow(j, n + j) = 1.0;
+      for (std::size_t i = 0; i < n; ++i) {
+        flow(n + i, j) = -k(i, j);
+        flow(n + i, n + j) = -z(i, j);
+      }
+    }
+    const std::optional<Vector> still = solution(k, body_.force());
+    if (!still) {
       return false;
     }
-    const Vector still = k.colPivHouseholderQr().solve(body_.force());
-    if (!((k * still - body_.force()).norm() <= 1e-9 * (1e-300 + body_.force().norm()))) {
-      return false;
-    }
-    made_.rest = body_.masses_of(still);
+    made_.rest = body_.masses_of(*still);
     Vector state(2 * n);
-    state << x_ - still, v_;
-    const Eigen::MatrixXcd vectors = eigen.eigenvectors();
-    const Eigen::PartialPivLU<Eigen::MatrixXcd> inverse(vectors);
-    const Eigen::VectorXcd share = inverse.solve(state.cast<Complex>());
-    if (!((vectors * share - state.cast<Complex>()).norm() <= 1e-9 * (1e-300 + state.norm()))) {
+    state[std::slice(0, n, 1)] = x_ - *still;
+    state[std::slice(n, n, 1)] = v_;
+    const std::optional<ComplexEigenpairs> pairs = eigenpairs_of_state(flow, state);
+    if (!pairs) {
       return false;
     }
     for (std::size_t o = 0; o < reading_.size(); ++o) {
-      made_.outputs[o].rest += read(o, still);
+      made_.outputs[o].rest += read(o, *still);
     }
-    for (Eigen::Index j = 0; j < 2 * n; ++j) {
-      const Complex pole = eigen.eigenvalues()[j];
+    for (std::size_t j = 0; j < 2 * n; ++j) {
+      const Complex pole = pairs->values[j];
       if (pole.imag() < 0.0) {
         continue;  // counted with its conjugate
       }
@@ -309,7 +306,7 @@ class Solver {
       for (std::size_t o = 0; o < reading_.size(); ++o) {
         Complex amplitude = 0.0;
         for (const auto& [row, part] : reading_[o].shares) {
-          amplitude += part * vectors(row, j) * share[j] * (swings ? 2.0 : 1.0);
+          amplitude += part * pairs->vectors[j][row] * pairs->shares[j] * (swings ? 2.0 : 1.0);
         }
         made_.outputs[o].terms.push_back({amplitude, pole});
         loud.push_back(std::abs(amplitude));
@@ -398,8 +395,7 @@ std::optional<Continuous> solve_continuous(const Network& network,
     return solve_continuous(expand_macros(network), parameters);
   }
   const Body body(network, parameters);
-  if (!is_linear(network) || !body.has_mass() ||
-      body.size() > static_cast<Eigen::Index>(most_exact_modes) ||
+  if (!is_linear(network) || !body.has_mass() || body.size() > most_exact_modes ||
       std::any_of(network.outputs.begin(), network.outputs.end(),
                   [](const Output& output) { return output.is_force; })) {
     return std::nullopt;
@@ -409,21 +405,18 @@ std::optional<Continuous> solve_continuous(const Network& network,
 
 std::vector<std::complex<double>> factors_between(const std::vector<std::vector<double>>& before,
                                                   const std::vector<std::vector<double>>& after) {
-  const auto n = static_cast<Eigen::Index>(before.size());
+  const std::size_t n = before.size();
   Matrix from(n, n);
   Matrix to(n, n);
-  for (Eigen::Index c = 0; c < n; ++c) {
-    const auto column = static_cast<std::size_t>(c);
-    from.col(c) = Eigen::Map<const Vector>(before[column].data(), n);
-    to.col(c) = Eigen::Map<const Vector>(after[column].data(), n);
+  for (std::size_t c = 0; c < n; ++c) {
+    for (std::size_t i = 0; i < n; ++i) {
+      from(i, c) = before[c][i];
+      to(i, c) = after[c][i];
+    }
   }
-  const Eigen::FullPivLU<Matrix> inverse(from);
-  const Matrix step = inverse.isInvertible() ? Matrix(to * inverse.inverse()) : Matrix();
-  if (step.size() == 0 || !step.allFinite()) {
-    return {};
-  }
-  const Eigen::VectorXcd values = Eigen::EigenSolver<Matrix>(step, false).eigenvalues();
-  return {values.data(), values.data() + n};
+  const std::optional<Matrix> step = quotient(to, from);
+  return step && std::isfinite(step->values.sum()) ? eigenvalues(*step)
+                                                   : std::vector<std::complex<double>>();
 }
 
 }  // namespace ressort

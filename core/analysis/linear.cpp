@@ -1,25 +1,18 @@
 #include "core/analysis/linear.h"
 
-#include <Spectra/MatOp/SparseSymShiftSolve.h>
-#include <Spectra/SymEigsShiftSolver.h>
-#include <Eigen/Dense>
-#include <Eigen/Sparse>
 #include <algorithm>
 #include <cmath>
 #include <numbers>
-#include <stdexcept>
 
-#include "core/analysis/cholesky.h"
+#include "core/linear_algebra/cholesky.h"
+#include "core/linear_algebra/eigen.h"
 
 namespace ressort {
 namespace {
 
-using Sparse = Cholesky::Matrix;
-using Vector = Eigen::VectorXd;
-
-constexpr int dense_size = 64;  // below this a dense solver is faster and never fails
-constexpr Eigen::Index most_general_masses = 20'000;  // their factorisation cannot be stopped
-constexpr double rigid = 1e-12;  // a smaller share of the largest stiffness is rounding
+constexpr int dense_size = 64;      // below this a dense solver is faster and never fails
+constexpr double rigid = 1e-12;     // a smaller share of the largest stiffness is rounding
+constexpr double tolerance = 1e-8;  // of the largest stiffness, that a mode's force is off
 
 // The linear part of a network: what moves, numbered anew, and what pulls at it.
 class Body {
@@ -39,32 +32,32 @@ class Body {
   }
 
   // M^(-1/2) K M^(-1/2), its lower half.
-  Sparse stiffness() const {
-    Vector diagonal = Vector::Zero(size());
-    std::vector<Eigen::Triplet<double>> entries;
-    entries.reserve(network_.links.size() + scale_.size());
+  SparseMatrix stiffness() const {
+    std::vector<double> diagonal(scale_.size());
+    std::vector<SparseMatrix::Element> elements;
+    elements.reserve(network_.links.size() + scale_.size());
     each_spring([&](int a, int b, double k, double) {
       for (const int i : {a, b}) {
         if (i != held) {
-          diagonal[i] += k * scale(i) * scale(i);
+          diagonal[static_cast<std::size_t>(i)] += k * scale(i) * scale(i);
         }
       }
       if (a != held && b != held && k != 0.0) {
-        entries.emplace_back(std::max(a, b), std::min(a, b), -k * scale(a) * scale(b));
+        elements.push_back({std::max(a, b), std::min(a, b), -k * scale(a) * scale(b)});
       }
     });
     for (int i = 0; i < size(); ++i) {
-      entries.emplace_back(i, i, diagonal[i]);
+      elements.push_back({i, i, diagonal[static_cast<std::size_t>(i)]});
     }
-    Sparse matrix(size(), size());
-    matrix.setFromTriplets(entries.begin(), entries.end());
-    return matrix;
+    return {size(), elements};
   }
 
   // The share of Z in a vector of length 1.
   double damping(const Vector& shape) const {
     double sum = 0.0;
-    const auto moved = [&](int i) { return i == held ? 0.0 : shape[i] * scale(i); };
+    const auto moved = [&](int i) {
+      return i == held ? 0.0 : shape[static_cast<std::size_t>(i)] * scale(i);
+    };
     each_spring([&](int a, int b, double, double z) {
       const double stretch = moved(a) - moved(b);
       sum += z * stretch * stretch;
@@ -102,105 +95,91 @@ class Body {
   std::vector<double> scale_;   // [moving mass] M^(-1/2)
 };
 
-// (A - shift)^-1, as Spectra wants it, for a positive A - shift: half of what a general one takes.
-class Inverse {
- public:
-  using Scalar = double;
-  Inverse(const Cholesky& factor, Eigen::Index size, const Progress& progress)
-      : factor_(factor), size_(size), progress_(progress) {}
-  Eigen::Index rows() const { return size_; }
-  Eigen::Index cols() const { return size_; }
-  void set_shift(double) {}  // it has been factored
-  void perform_op(const double* from, double* to) const {
-    std::copy_n(from, size_, to);
-    factor_.solve(to);
-    progress_.spend(static_cast<std::size_t>(4 * size_));
-  }
-
- private:
-  const Cholesky& factor_;
-  Eigen::Index size_;
-  const Progress& progress_;
-};
-
-// The same for negative stiffnesses.
-class General : public Spectra::SparseSymShiftSolve<double> {
- public:
-  General(const Sparse& lower, const Progress& progress)
-      : Spectra::SparseSymShiftSolve<double>(lower), progress_(progress) {}
-  void perform_op(const double* from, double* to) const {
-    Spectra::SparseSymShiftSolve<double>::perform_op(from, to);
-    progress_.spend(static_cast<std::size_t>(8 * rows()));
-  }
-
- private:
-  const Progress& progress_;
-};
-
-struct Pairs {
-  Eigen::VectorXd values;  // ascending
-  Eigen::MatrixXd vectors;
-};
-
-// The `count` eigenpairs nearest to `shift`, which lies a little below 0 so that free networks can
-// be factored too.
-template <class Shifted>
-bool near_zero(Shifted shifted, double shift, int count, Pairs& pairs) {
-  constexpr Eigen::Index most_numbers = 30'000'000;  // of the vectors of all rounds
-  const int vectors = std::max(12, 4 * count);
-  const Eigen::Index rounds =
-      std::clamp<Eigen::Index>(most_numbers / (vectors * shifted.rows()), 10, 200);
-  try {  // Spectra tells by exceptions what it cannot factor or iterate
-    Spectra::SymEigsShiftSolver<Shifted> solver(shifted, count, vectors, shift);
-    solver.init();
-    solver.compute(Spectra::SortRule::LargestMagn, rounds, 1e-10, Spectra::SortRule::SmallestAlge);
-    if (solver.info() != Spectra::CompInfo::Successful) {
-      return false;
+// Calls use(row, column, value) for every element on and below the diagonal.
+template <class Use>
+void each_element(const SparseMatrix& lower, Use&& use) {
+  for (std::size_t column = 0; column + 1 < lower.first.size(); ++column) {
+    for (auto i = static_cast<std::size_t>(lower.first[column]);
+         i < static_cast<std::size_t>(lower.first[column + 1]); ++i) {
+      use(static_cast<std::size_t>(lower.row[i]), column, lower.value[i]);
     }
-    pairs = {solver.eigenvalues(), solver.eigenvectors()};
-    return true;
-  } catch (const std::logic_error&) {
-    return false;
-  } catch (const std::runtime_error&) {
-    return false;
   }
 }
 
-// The lowest eigenpair above `floor`. Most often it is the first.
-bool lowest_pair(const Sparse& lower, double floor, const Progress& progress, double& value,
-                 Vector& vector) {
-  const double shift = -1e3 * floor;
-  Cholesky factor;
-  bool is_positive = false;
-  if (lower.rows() > dense_size) {
-    if (!factor.analyze(lower, progress)) {
-      return false;
+Matrix dense(const SparseMatrix& lower) {
+  const auto size = static_cast<std::size_t>(lower.size());
+  Matrix matrix(size, size);
+  each_element(lower, [&](std::size_t i, std::size_t j, double value) { matrix(i, j) = value; });
+  return matrix;
+}
+
+// Factored without a better row for a small pivot, a matrix that is not positive definite may have
+// lost its digits: whether A x is value x all the same.
+bool is_pair(const SparseMatrix& lower, double value, const Vector& vector, double most) {
+  Vector left = -value * vector;
+  each_element(lower, [&](std::size_t i, std::size_t j, double element) {
+    left[i] += element * vector[j];
+    left[j] += i == j ? 0.0 : element * vector[i];
+  });
+  return largest(left) <= most;
+}
+
+// Eigenpairs from 0 on, as many as asked for; all where the matrix is small.
+class Spectrum {
+ public:
+  // The shift lies a little below 0, so that free networks can be factored too.
+  Spectrum(const SparseMatrix& lower, double shift, const Progress& progress)
+      : lower_(lower), shift_(shift), progress_(progress) {}
+
+  std::optional<Eigenpairs> near_zero(int count) {
+    if (lower_.size() <= dense_size) {
+      return symmetric_eigenpairs(dense(lower_));
     }
-    Sparse shifted = lower;
-    for (Eigen::Index k = 0; k < lower.rows(); ++k) {
-      shifted.coeffRef(k, k) -= shift;
+    if (!is_factored_ && !factor()) {
+      return std::nullopt;
     }
-    is_positive = factor.factor(shifted, progress);
-    if (!is_positive && lower.rows() > most_general_masses) {
-      return false;
-    }
+    const auto size = static_cast<std::size_t>(lower_.size());
+    return eigenpairs_near(shift_, count, lower_.size(), [&](const double* from, double* to) {
+      std::copy_n(from, size, to);
+      factor_.solve(to);
+      progress_.spend(4 * size);
+    });
   }
-  Pairs pairs;
+
+ private:
+  bool factor() {
+    SparseMatrix shifted = lower_;
+    for (std::size_t k = 0; k + 1 < lower_.first.size(); ++k) {
+      shifted.value[static_cast<std::size_t>(lower_.first[k])] -= shift_;
+    }
+    is_factored_ = factor_.analyze(lower_, progress_) &&
+                   factor_.factor(shifted, Cholesky::Pivots::any, progress_);
+    return is_factored_;
+  }
+
+  const SparseMatrix& lower_;
+  double shift_;
+  const Progress& progress_;
+  Cholesky factor_;
+  bool is_factored_ = false;
+};
+
+// The lowest eigenpair above what is rounding. Most often it is the first.
+bool lowest_pair(const SparseMatrix& lower, double stiffest, const Progress& progress, Mode& mode,
+                 Vector& shape) {
+  const double floor = rigid * stiffest;
+  Spectrum spectrum(lower, -1e3 * floor, progress);
   for (const int count : {1, 6}) {
-    if (lower.rows() <= dense_size) {
-      const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> solver{Eigen::MatrixXd(lower)};
-      pairs = {solver.eigenvalues(), solver.eigenvectors()};
-    } else if (!(is_positive
-                     ? near_zero(Inverse(factor, lower.rows(), progress), shift, count, pairs)
-                     : near_zero(General(lower, progress), shift, count, pairs))) {
+    const std::optional<Eigenpairs> pairs = spectrum.near_zero(count);
+    if (!pairs) {
       return false;
     }
-    for (Eigen::Index i = 0; i < pairs.values.size(); ++i) {
-      if (pairs.values[i] > floor) {
-        value = pairs.values[i];
-        vector = pairs.vectors.col(i);
-        return true;
-      }
+    const auto above = std::find_if(std::begin(pairs->values), std::end(pairs->values),
+                                    [&](double value) { return value > floor; });
+    if (above != std::end(pairs->values)) {
+      mode.stiffness = *above;
+      shape = pairs->vectors.column(static_cast<std::size_t>(above - std::begin(pairs->values)));
+      return is_pair(lower, mode.stiffness, shape, tolerance * stiffest);
     }
   }
   return false;
@@ -211,20 +190,15 @@ bool lowest_pair(const Sparse& lower, double floor, const Progress& progress, do
 std::optional<Mode> lowest_mode(const Network& network, std::span<const double> parameters,
                                 const Progress& progress) {
   const Body body(network, parameters);
-  const Sparse stiffness = body.stiffness();
-  if (stiffness.rows() == 0) {
-    return std::nullopt;
-  }
-  double largest = 0.0;
-  for (int k = 0; k < stiffness.outerSize(); ++k) {
-    for (Sparse::InnerIterator entry(stiffness, k); entry; ++entry) {
-      largest = std::max(largest, std::fabs(entry.value()));
-    }
+  const SparseMatrix stiffness = body.stiffness();
+  double stiffest = 0.0;
+  for (const double value : stiffness.value) {
+    stiffest = std::max(stiffest, std::fabs(value));
   }
   Mode mode;
   Vector shape;
-  if (!std::isfinite(largest) || largest == 0.0 ||
-      !lowest_pair(stiffness, rigid * largest, progress, mode.stiffness, shape)) {
+  if (!std::isfinite(stiffest) || stiffest == 0.0 ||
+      !lowest_pair(stiffness, stiffest, progress, mode, shape)) {
     return std::nullopt;
   }
   mode.damping = body.damping(shape);

@@ -1,6 +1,5 @@
 #include "core/kernels/modal/modal_form.h"
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <complex>
@@ -9,6 +8,7 @@
 #include <utility>
 
 #include "core/kernels/modal/modal_worth.h"
+#include "core/linear_algebra/eigen.h"
 
 namespace ressort {
 namespace {
@@ -16,9 +16,6 @@ namespace {
 constexpr std::uint32_t nowhere = 0xffffffffu;
 constexpr double shared_tolerance = 1e-12;  // of a matrix' largest element: is it diagonal?
 constexpr double zero_tolerance = 1e-13;    // of the largest: is it anything?
-
-using Matrix = Eigen::MatrixXd;
-using Vector = Eigen::VectorXd;
 
 // A spring or a damper between masses a and b, or on a alone.
 struct Bar {
@@ -138,7 +135,7 @@ class ModesFinder {
 
   // All masses turn with one coefficient, or none turns.
   bool weigh_masses() {
-    root_ = Vector::Ones(count_);
+    root_ = Vector(1.0, count_);
     const std::uint32_t first = program_.mass_runs.front().inverse_mass;
     const bool together =
         std::all_of(program_.mass_runs.begin(), program_.mass_runs.end(),
@@ -152,9 +149,9 @@ class ModesFinder {
       if (is_live_[run.inverse_mass] || !(inverse > 0.0) || !std::isfinite(inverse)) {
         return false;
       }
-      root_.segment(run.first, run.count).setConstant(std::sqrt(inverse));
+      root_[std::slice(run.first, run.count, 1)] = std::sqrt(inverse);
     }
-    modes_.reach = root_.maxCoeff();
+    modes_.reach = root_.max();
     return true;
   }
 
@@ -174,7 +171,7 @@ class ModesFinder {
         return frame;
       }
     }
-    frames.push_back({.coefficient = c, .is_late = is_late, .pull = Vector::Zero(count_)});
+    frames.push_back({.coefficient = c, .is_late = is_late, .pull = Vector(count_)});
     return frames.back();
   }
 
@@ -223,24 +220,26 @@ class ModesFinder {
   // The eigenvectors of a mixture of all frames in odd shares: where frames share eigenvectors,
   // two eigenvalues of it are the same only if they are so in every frame.
   void solve() {
-    Matrix mixture = Matrix::Zero(count_, count_);
+    Matrix mixture(count_, count_);
     double share = 1.0;
     for (auto* frames : {&stiffness_, &damping_}) {
       for (const Frame& frame : *frames) {
         progress_.spend(std::size_t{count_} * count_ / 8);
         share = std::fmod(share + 0.6180339887498949, 1.0) + 0.1;
-        Matrix matrix = Matrix::Zero(count_, count_);
+        Matrix matrix(count_, count_);
         for (const Bar& bar : frame.bars) {
           add(matrix, bar);
         }
-        const double largest = matrix.cwiseAbs().maxCoeff();
-        if (largest > 0.0) {
-          mixture += share / largest * matrix;
+        const double most = largest(matrix.values);
+        if (most > 0.0) {
+          mixture.values += share / most * matrix.values;
         }
       }
     }
-    // Transposed: a mass's part in all modes is together in memory.
-    shape_ = Eigen::SelfAdjointEigenSolver<Matrix>(mixture).eigenvectors().transpose();
+    const Eigenpairs pairs = symmetric_eigenpairs(mixture);
+    for (std::uint32_t mass = 0; mass < count_; ++mass) {
+      shape_.emplace_back(pairs.vectors.values[std::slice(mass, count_, count_)]);
+    }
   }
 
   void add(Matrix& matrix, const Bar& bar) const {
@@ -259,36 +258,42 @@ class ModesFinder {
   bool measure(std::vector<Frame>& frames) {
     for (Frame& frame : frames) {
       progress_.spend((frame.bars.size() + count_) * count_ / 8);
-      frame.factor = Vector::Zero(count_);
-      Matrix image = Matrix::Zero(count_, count_);  // [mode, mass]
-      Vector stretch(count_);
-      double largest = 0.0;
+      frame.factor.resize(count_);
+      std::vector<Vector> image(count_, Vector(count_));  // [mass][mode]
       for (const Bar& bar : frame.bars) {
-        stretch = root_[bar.a] * shape_.col(bar.a);
+        Vector stretch = root_[bar.a] * shape_[bar.a];
         if (bar.b != nowhere) {
-          stretch -= root_[bar.b] * shape_.col(bar.b);
-          image.col(bar.b) -= bar.weight * root_[bar.b] * stretch;
+          stretch -= root_[bar.b] * shape_[bar.b];
+          image[bar.b] -= bar.weight * root_[bar.b] * stretch;
         }
-        image.col(bar.a) += bar.weight * root_[bar.a] * stretch;
-        frame.factor += bar.weight * stretch.cwiseAbs2();
+        image[bar.a] += bar.weight * root_[bar.a] * stretch;
+        frame.factor += bar.weight * stretch * stretch;
       }
-      largest = frame.factor.cwiseAbs().maxCoeff();
+      const double most = largest(frame.factor);
       for (std::uint32_t i = 0; i < count_; ++i) {
-        if (!((image.col(i) - frame.factor.cwiseProduct(shape_.col(i))).cwiseAbs().maxCoeff() <=
-              shared_tolerance * largest)) {
+        if (!(largest(image[i] - frame.factor * shape_[i]) <= shared_tolerance * most)) {
           return false;
         }
       }
       // A mode that moves as a whole is not held at all.
-      frame.factor = (frame.factor.array().abs() < zero_tolerance * largest)
-                         .select(Vector::Zero(count_), frame.factor);
+      for (double& factor : frame.factor) {
+        factor = std::fabs(factor) < zero_tolerance * most ? 0.0 : factor;
+      }
     }
     return true;
   }
 
-  Vector shape_of(std::uint32_t node) const { return root_[node] * shape_.col(node); }
+  Vector shape_of(std::uint32_t node) const { return root_[node] * shape_[node]; }
   // What a force on each mass does to the modes.
-  Vector modal(const Vector& force) const { return shape_ * root_.cwiseProduct(force); }
+  Vector modal(const Vector& force) const { return in_modes(root_ * force); }
+  // By mode what is by mass.
+  Vector in_modes(const Vector& masses) const {
+    Vector modes(count_);
+    for (std::uint32_t mass = 0; mass < count_; ++mass) {
+      modes += masses[mass] * shape_[mass];
+    }
+    return modes;
+  }
 
   // q is counted from where all springs are at rest, or from the start where none pulls.
   void settle() {
@@ -298,28 +303,27 @@ class ModesFinder {
       position[i] = program_.position[i] / root_[i];
       velocity[i] = program_.velocity[i] / root_[i];
     }
-    const Vector start = shape_ * position;
-    Vector pull = Vector::Zero(count_);
-    Vector hold = Vector::Zero(count_);
+    const Vector start = in_modes(position);
+    Vector pull = Vector(count_);
+    Vector hold = Vector(count_);
     for (const Frame& frame : stiffness_) {
       pull += value_[frame.coefficient] * modal(frame.pull);
       hold += value_[frame.coefficient] * frame.factor;
     }
-    const double largest = hold.cwiseAbs().maxCoeff();
+    const double most = largest(hold);
     rest_ = start;
     for (std::uint32_t i = 0; i < count_; ++i) {
-      if (std::fabs(hold[i]) > 1e-9 * largest) {
+      if (std::fabs(hold[i]) > 1e-9 * most) {
         rest_[i] = pull[i] / hold[i];
       }
     }
     q_ = start - rest_;
-    d_ = shape_ * velocity;
+    d_ = in_modes(velocity);
     for (const Frame& frame : stiffness_) {
       const Vector wanted = modal(frame.pull);
-      const Vector left = wanted - frame.factor.cwiseProduct(rest_);
-      const double all =
-          wanted.cwiseAbs().maxCoeff() + frame.factor.cwiseProduct(rest_).cwiseAbs().maxCoeff();
-      if (left.cwiseAbs().maxCoeff() > 1e-13 * all) {
+      const Vector left = wanted - frame.factor * rest_;
+      const double all = largest(wanted) + largest(frame.factor * rest_);
+      if (largest(left) > 1e-13 * all) {
         add_push({.by = frame.is_late ? ModalPush::By::late : ModalPush::By::constant,
                   .stiffness = frame.coefficient},
                  left);
@@ -340,8 +344,8 @@ class ModesFinder {
     }
     for (const MassRun& run : program_.mass_runs) {
       if (run.has_gravity && !is_nothing(run.gravity)) {
-        Vector force = Vector::Zero(count_);
-        force.segment(run.first, run.count).setConstant(-1.0);
+        Vector force = Vector(count_);
+        force[std::slice(run.first, run.count, 1)] = -1.0;
         add_push({.by = ModalPush::By::constant, .stiffness = run.gravity}, modal(force));
       }
     }
@@ -353,7 +357,7 @@ class ModesFinder {
           std::swap(a, b);
         }
         if (moves(a) && !moves(b) && hand_[b] != nowhere) {
-          forces.try_emplace(hand_[b], Vector::Zero(count_)).first->second[a] += 1.0;
+          forces.try_emplace(hand_[b], Vector(count_)).first->second[a] += 1.0;
         }
       }
       for (const auto& [input, force] : forces) {
@@ -377,7 +381,7 @@ class ModesFinder {
         for (const std::uint32_t node : {program_.ends[i].a, program_.ends[i].b}) {
           if (moves(node) && place_of.try_emplace(node, heard_.size()).second) {
             heard_.push_back(shape_of(node));
-            modes_.places.push_back({heard_.back().dot(rest_), {}});
+            modes_.places.push_back({dot(heard_.back(), rest_), {}});
           }
         }
       }
@@ -415,7 +419,7 @@ class ModesFinder {
     for (const OutputSlot& output : program_.outputs) {
       if (moves(output.node)) {
         heard_.push_back(shape_of(output.node));
-        modes_.outputs.push_back({0, true, {heard_.back().dot(rest_), {}}});
+        modes_.outputs.push_back({0, true, {dot(heard_.back(), rest_), {}}});
       } else {
         modes_.outputs.push_back({other_end(output.node), false, {}});
       }
@@ -426,7 +430,7 @@ class ModesFinder {
   void drop_idle_modes() {
     const auto matters = [](const std::vector<Vector>& rows, std::uint32_t i) {
       return std::any_of(rows.begin(), rows.end(), [&](const Vector& row) {
-        return std::fabs(row[i]) > zero_tolerance * row.cwiseAbs().maxCoeff();
+        return std::fabs(row[i]) > zero_tolerance * largest(row);
       });
     };
     std::vector<Vector> driven = pushed_;
@@ -447,7 +451,7 @@ class ModesFinder {
     modes_.d = kept(d_);
     for (const std::uint32_t i : kept_) {
       for (std::uint32_t mass = 0; mass < count_; ++mass) {
-        modes_.basis.push_back(shape_(i, mass) / root_[mass]);
+        modes_.basis.push_back(shape_[mass][i] / root_[mass]);
       }
     }
     for (std::size_t i = 0; i < pushed_.size(); ++i) {
@@ -467,7 +471,7 @@ class ModesFinder {
   // What all stiffnesses or dampings give to each mode, at the start.
   Vector sum_of(const std::vector<Frame>& frames) const {
     const double w = modes_.inverse_mass == Modes::own_mass ? 1.0 : value_[modes_.inverse_mass];
-    Vector sum = Vector::Zero(count_);
+    Vector sum = Vector(count_);
     for (const Frame& frame : frames) {
       sum += w * value_[frame.coefficient] * frame.factor;
     }
@@ -479,12 +483,12 @@ class ModesFinder {
     Vector stiffness = sum_of(stiffness_);
     Vector damping = sum_of(damping_);
     const Vector flexible = stiffness;
-    Vector root = Vector::Ones(count_);
+    Vector root(1.0, count_);
     for (std::uint32_t i = 0; modes_.is_exact && i < count_; ++i) {
       root[i] = std::sqrt(make_exact(stiffness[i], damping[i]));
     }
-    const auto kept_of = [&](const Vector& row) { return kept(row.cwiseProduct(root)); };
-    const auto start_of = [&](const Vector& row) { return kept(row.cwiseQuotient(root)); };
+    const auto kept_of = [&](const Vector& row) { return kept(row * root); };
+    const auto start_of = [&](const Vector& row) { return kept(row / root); };
     Hearing hearing{kept(stiffness), kept(damping), {}, {start_of(q_), start_of(d_)}, {}};
     for (const Vector& row : pushed_) {
       hearing.blows.push_back(kept_of(row));
@@ -515,7 +519,7 @@ class ModesFinder {
     }
     const double w = modes_.inverse_mass == Modes::own_mass ? 1.0 : value_[modes_.inverse_mass];
     modes_.give_by = stiffness_.front().coefficient;
-    const Vector nothing = Vector::Zero(count_);
+    const Vector nothing(count_);
     const auto shape_at = [&](std::uint32_t end) -> const Vector& {
       return end < modes_.places.size() ? heard_[end] : nothing;
     };
@@ -549,8 +553,8 @@ class ModesFinder {
   Vector root_;                      // [mass] of its inverse
   std::vector<Frame> stiffness_;
   std::vector<Frame> damping_;
-  Matrix shape_;  // [mode, mass] orthonormal
-  Vector rest_;   // [mode]
+  std::vector<Vector> shape_;  // [mass][mode] orthonormal
+  Vector rest_;                // [mode]
   Vector q_;
   Vector d_;
   std::vector<Vector> pushed_;                     // [push][mode]
