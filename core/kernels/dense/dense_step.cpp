@@ -377,43 +377,39 @@ struct Walk {
   }
 };
 
-template <class T, std::size_t Bytes>
-DenseSteps<T> steps_of(std::size_t packs) {
-  const auto of = []<std::size_t Count>() {
-    using W = Walk<T, Bytes, Count>;
-    return DenseSteps<T>{W::step, W::pull, leap_dense<Isa::RESSORT_ISA, T>,
-                         build_dense<Isa::RESSORT_ISA, T>};
+// The walk of so many packs, one of those that dense_packs() may ask for.
+template <class T, std::size_t Bytes, std::size_t... Counts>
+DenseSteps<T> steps_of(std::size_t packs, std::index_sequence<Counts...>) {
+  constexpr std::size_t most = most_dense_masses * sizeof(T) / Bytes;
+  DenseSteps<T> steps{};
+  const auto offer = [&]<std::size_t Count>() {
+    if constexpr (Count <= most) {
+      if (packs == Count) {
+        using W = Walk<T, Bytes, Count>;
+        steps = {W::step, W::pull, leap_dense<Isa::RESSORT_ISA, T>,
+                 build_dense<Isa::RESSORT_ISA, T>};
+      }
+    }
   };
-  if (packs == 1) {
-    return of.template operator()<1>();
-  }
-  if (packs == 2) {
-    return of.template operator()<2>();
-  }
-  if (packs == 3) {
-    return of.template operator()<3>();
-  }
-  if (packs == 4) {
-    return of.template operator()<4>();
-  }
-  return of.template operator()<most_dense_masses * sizeof(T) / Bytes>();
+  (offer.template operator()<Counts>(), ...);
+  return steps;
 }
 
 template <class T>
 DenseSteps<T> steps_for(std::size_t masses) {
   constexpr std::size_t widest = vector_bytes(Isa::RESSORT_ISA);
   const auto [bytes, packs] = dense_packs(masses, sizeof(T), Isa::RESSORT_ISA);
-  if constexpr (widest >= 64) {
-    if (bytes == 64) {
-      return steps_of<T, 64>(packs);
-    }
-  }
-  if constexpr (widest >= 32) {
+  if constexpr (widest > 32) {
     if (bytes == 32) {
-      return steps_of<T, 32>(packs);
+      return steps_of<T, 32>(packs, std::index_sequence<1>());
     }
   }
-  return steps_of<T, 16>(packs);
+  if constexpr (widest > 16) {
+    if (bytes == 16) {
+      return steps_of<T, 16>(packs, std::index_sequence<1>());
+    }
+  }
+  return steps_of<T, widest>(packs, std::index_sequence<1, 2, 3, 4, 8>());
 }
 
 }  // namespace
