@@ -14,10 +14,10 @@ Isa best_isa() {
     return Isa::v3;
   }
 #endif
-  return Isa::base;
+  return Isa::RESSORT_LEAST_ISA;
 }
 
-#if RESSORT_X86_LEVELS
+#if defined(__x86_64__)
 namespace {
 
 const bool has_wide_registers = best_isa() != Isa::base;
@@ -30,7 +30,7 @@ __attribute__((target("avx"))) void clear() {
 #endif
 
 void clear_wide_registers() {
-#if RESSORT_X86_LEVELS
+#if defined(__x86_64__)
   if (has_wide_registers) {
     clear();
   }

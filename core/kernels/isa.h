@@ -8,13 +8,18 @@
 
 namespace ressort {
 
+// What the build offers: RESSORT_LEAST_ISA, and with RESSORT_X86_LEVELS=1 all that are wider.
+#ifndef RESSORT_LEAST_ISA
+#define RESSORT_LEAST_ISA base
+#endif
+
 enum class Isa {
   base,  // every x86-64 (SSE2); every other machine, whatever it is
   v3,    // x86-64-v3: AVX2 and FMA
   v4,    // x86-64-v4: AVX-512
 };
 
-Isa best_isa();  // of this machine. [any thread]
+Isa best_isa();  // of this machine and this build. [any thread]
 std::string_view isa_name(Isa isa);
 
 // Code for narrow registers runs several times slower while the upper halves of wide ones are in
@@ -33,7 +38,7 @@ auto with_isa(Isa isa, const Make& make) {
   }
 #endif
   static_cast<void>(isa);
-  return make.template operator()<Isa::base>();
+  return make.template operator()<Isa::RESSORT_LEAST_ISA>();
 }
 
 // Of one register.

@@ -167,7 +167,7 @@ ChorusKernel<T>::ChorusKernel(const Program& program, const Chorus& chorus, std:
     : ChorusKernel(
           program, chorus,
           [&] {
-            const std::size_t bytes = lanes_for<T>(voices, isa) * sizeof(T);
+            const std::size_t bytes = chorus_lanes<T>(voices, isa) * sizeof(T);
             ChorusTable table = Filler(program, chorus).table();
             // Shared evenly by as many kernels as it takes.
             const std::size_t wanted = parts_of(voices * sizeof(T), bytes);
@@ -175,7 +175,7 @@ ChorusKernel<T>::ChorusKernel(const Program& program, const Chorus& chorus, std:
             table.packs = parts_of(wanted, parts_of(wanted, most));
             return table;
           }(),
-          lanes_for<T>(voices, isa), isa) {}
+          chorus_lanes<T>(voices, isa), isa) {}
 
 template <class T>
 ChorusKernel<T>::ChorusKernel(const Program& program, const Chorus& chorus, ChorusTable table,

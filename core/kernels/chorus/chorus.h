@@ -2,6 +2,7 @@
 // take every step of a sample in turn, so that none waits for its own last result.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <vector>
 
@@ -61,7 +62,15 @@ template <class T>
 using ChorusStep = void (*)(const Program& program, const Chorus& chorus, const ChorusTable& table,
                             ChorusState<T>& state, const Block<T>& block);
 
-// The function for packs of so many bytes.
+// Of a pack. Half of AVX2's registers would be no faster than all of them, so that nothing is
+// compiled for these; AVX-512's whole ones take two turns on many a machine.
+template <class T>
+constexpr std::size_t chorus_lanes(std::size_t voices, Isa isa) {
+  const std::size_t least = std::min<std::size_t>(32, vector_bytes(isa)) / sizeof(T);
+  return std::max(least, lanes_for<T>(voices, isa));
+}
+
+// The function for packs of so many bytes, as chorus_lanes() says.
 template <Isa isa, class T>
 ChorusStep<T> chorus_step(const ChorusTable& table, std::size_t bytes);
 

@@ -518,17 +518,13 @@ ChorusStep<Scalar<V>> step_for(const ChorusTable& table) {
 
 template <class T>
 ChorusStep<T> step_in(const ChorusTable& table, std::size_t bytes) {
-  if constexpr (vector_bytes(Isa::RESSORT_ISA) >= 64) {
-    if (bytes == 64) {
-      return step_for<Pack<T, 64>>(table);
-    }
-  }
-  if constexpr (vector_bytes(Isa::RESSORT_ISA) >= 32) {
+  constexpr std::size_t widest = vector_bytes(Isa::RESSORT_ISA);
+  if constexpr (widest > 32) {
     if (bytes == 32) {
       return step_for<Pack<T, 32>>(table);
     }
   }
-  return step_for<Pack<T, 16>>(table);
+  return step_for<Pack<T, widest>>(table);
 }
 
 }  // namespace
