@@ -1,24 +1,20 @@
 // app: the command line, turned into one of the commands.
-#include <fcntl.h>
-#include <signal.h>
-#include <unistd.h>
-
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cstdio>
 #include <iterator>
 #include <map>
-#include <new>
 #include <string>
 #include <utility>
 #include <vector>
 
-#include "app/commands/chart/chart.h"
 #include "app/commands/check.h"
 #include "app/commands/commands.h"
 #include "app/commands/export.h"
 #include "app/commands/make.h"
 #include "app/commands/reference.h"
+#include "app/commands/start_chart.h"
+#include "app/program.h"
 #include "app/version.h"
 #include "core/model/language/expression.h"
 
@@ -420,7 +416,7 @@ void add_chart(CLI::App& app, ChartOptions& options, int& code) {
   command->add_option("-t,--time", options.patience_s, "seconds to time each scene for")
       ->check(within(0.1, 3600.0))
       ->capture_default_str();
-  command->callback([&options, &code] { code = chart(options); });
+  command->callback([&options, &code] { code = start_chart(options); });
 }
 
 void add_export(CLI::App& app, ExportOptions& options, int& code) {
@@ -492,35 +488,8 @@ int run(int argc, char** argv) {
   return code;
 }
 
-// What was to be said and could not be is a failure, however well the rest went.
-int said(int code) {
-  if (std::fflush(stdout) == 0 && std::ferror(stdout) == 0) {
-    return code;
-  }
-  std::fputs("the output could not be written whole: is the disk full?\n", stderr);
-  return code == exit_code::done ? exit_code::our_failure : code;
-}
-
 }  // namespace
 
 int main(int argc, char** argv) {
-  // Without these, a file that is opened would take their place, and what is said go into it. What
-  // can only be read refuses what is said, as a closed one does.
-  for (const int descriptor : {STDIN_FILENO, STDOUT_FILENO, STDERR_FILENO}) {
-    if (fcntl(descriptor, F_GETFD) < 0) {
-      static_cast<void>(open("/dev/null", O_RDONLY));
-    }
-  }
-  signal(SIGXFSZ, SIG_IGN);  // a file that may not grow is an error like a full disk
-  try {
-    return said(run(argc, argv));
-  } catch (const std::bad_alloc&) {
-    std::fputs("there is not enough memory; a smaller model or fewer voices take less\n", stderr);
-    return exit_code::wrong_use;
-  } catch (const std::exception& error) {
-    std::fprintf(stderr, "%s\n", error.what());
-  } catch (...) {
-    std::fputs("an error without a name\n", stderr);
-  }
-  return exit_code::our_failure;
+  return run_program(run, argc, argv);
 }

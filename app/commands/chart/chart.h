@@ -7,15 +7,10 @@
 #include <vector>
 
 #include "app/commands/chart/table.h"
+#include "app/commands/start_chart.h"
 #include "core/result.h"
 
 namespace ressort {
-
-struct ChartOptions {
-  std::vector<std::string> scenes;  // none: the reference scenes
-  std::string folder;               // is made if it is not there
-  double patience_s = 5.0;          // for the timing of one scene
-};
 
 int chart(const ChartOptions& options);
 

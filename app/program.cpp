@@ -1,0 +1,50 @@
+#include "app/program.h"
+
+#include <fcntl.h>
+#include <signal.h>
+#include <unistd.h>
+
+#include <cstdio>
+#include <exception>
+#include <initializer_list>
+#include <new>
+
+#include "app/exit_code.h"
+
+namespace ressort {
+namespace {
+
+// What was to be said and could not be is a failure, however well the rest went.
+int said(int code) {
+  if (std::fflush(stdout) == 0 && std::ferror(stdout) == 0) {
+    return code;
+  }
+  std::fputs("the output could not be written whole: is the disk full?\n", stderr);
+  return code == exit_code::done ? exit_code::our_failure : code;
+}
+
+}  // namespace
+
+int run_program(int (*work)(int argc, char** argv), int argc, char** argv) {
+  // Without these, a file that is opened would take their place, and what is said go into it. What
+  // can only be read refuses what is said, as a closed one does.
+  for (const int descriptor : {STDIN_FILENO, STDOUT_FILENO, STDERR_FILENO}) {
+    if (fcntl(descriptor, F_GETFD) < 0) {
+      static_cast<void>(open("/dev/null", O_RDONLY));
+    }
+  }
+  signal(SIGXFSZ, SIG_IGN);  // a file that may not grow is an error like a full disk
+  try {
+    return said(work(argc, argv));
+  } catch (const std::bad_alloc&) {
+    std::fputs("there is not enough memory; a smaller model or fewer voices take less\n", stderr);
+    return exit_code::wrong_use;
+  } catch (const std::exception& error) {
+    std::fprintf(stderr, "%s\n", error.what());
+  } catch (...) {
+    std::fputs("an error without a name\n", stderr);
+  }
+  return exit_code::our_failure;
+}
+
+}  // namespace ressort
