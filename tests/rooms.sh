@@ -35,13 +35,15 @@ judge() {
       # Which rooms a room may see; the folders of core and app and, as "core" and "app", what is in
       # none of them.
       sees["core"] = "core"
-      sees["core/model"] = "core core/model"
-      sees["core/linear_algebra"] = "core core/linear_algebra"
-      sees["core/analysis"] = "core core/linear_algebra core/model core/analysis"
-      sees["core/kernels"] = "core/formula.h core/progress.h core/model/preset/budget.h " \
-                             "core/linear_algebra core/kernels"
-      sees["core/engine"] = "core/formula.h core/progress.h core/kernels core/engine"
-      sees["core/compile"] = "core core/linear_algebra core/model core/analysis core/kernels core/engine core/compile"
+      sees["core/laws"] = "core core/laws"
+      sees["core/model"] = "core core/laws core/model"
+      sees["core/analysis"] = "core core/laws core/model core/analysis"
+      sees["core/kernels"] = "core/lanes.h core/formula.h core/progress.h core/model/preset/budget.h " \
+                             "core/laws core/kernels"
+      sees["core/engine"] = "core/lanes.h core/formula.h core/progress.h core/laws core/kernels " \
+                            "core/engine"
+      sees["core/compile"] = "core core/laws core/model core/analysis core/kernels core/engine " \
+                             "core/compile"
       all = sees["core/compile"]
       sees["app/realtime"] = "core/engine core/kernels app app/realtime"
       sees["app/devices"] = "core/result.h core/engine core/kernels app app/realtime app/devices"
@@ -72,7 +74,7 @@ judge() {
         target = what
         if (match(target, /^(core|app)\/[^\/]*\//)) {
           target = substr(target, 1, RLENGTH - 1)
-        } else if (target ~ /^core\/(result|formula|progress)[.]h$/) {
+        } else if (target ~ /^core\/(result|formula|progress|lanes)[.]h$/) {
           target = "core"
         } else if (target ~ /^app\/[^\/]*$/) {
           target = "app"
@@ -118,7 +120,11 @@ core/engine/engine.cpp:1:#include <jack/jack.h>
 core/compile/compile.cpp:1:#include <Spectra/SymEigsSolver.h>
 core/compile/compile.cpp:1:#include <chrono>
 core/compile/compile.cpp:1:#include "tests/support/scenes.h"
-core/kernels/laws.h:1:#include LAWS
+core/laws/laws.h:1:#include LAWS
+core/laws/spring.h:1:#include "core/model/network.h"
+core/laws/laws.h:1:#include "core/kernels/program.h"
+core/laws/laws.cpp:1:#include "core/compile/cost.h"
+core/lanes.h:1:#include "core/laws/law.h"
 app/session/session.cpp:1:#include "app/commands/chart/ways.h"
 app/session/session.cpp:1:#include <atomic>
 app/session/session.cpp:1:#include <sndfile.h>

@@ -13,6 +13,7 @@
 #include "app/session/memory.h"
 #include "app/session/timing.h"
 #include "app/text.h"
+#include "core/laws/laws.h"
 #include "core/model/topology.h"
 
 namespace ressort {
@@ -38,7 +39,7 @@ bool may_gain(const Plan& plan) {
 
 bool is_straight(const Network& network) {
   return std::all_of(network.links.begin(), network.links.end(),
-                     [](const Link& link) { return link.kind == LinkKind::spring; });
+                     [](const Link& link) { return link.law == Law::spring; });
 }
 
 const char* const ending = "the program is ending";
@@ -48,26 +49,6 @@ std::string describe(const std::exception& error) {
   return dynamic_cast<const std::bad_alloc*>(&error) != nullptr
              ? "there is not enough memory; a smaller model or fewer voices (-p) take less"
              : error.what();
-}
-
-std::string_view kind_of(const Link& link) {
-  switch (link.kind) {
-    case LinkKind::spring:
-    case LinkKind::quadratic_spring:
-    case LinkKind::cubic_spring:
-    case LinkKind::clipped_spring:
-      return "spring";
-    case LinkKind::pluck:
-      return "pluck";
-    case LinkKind::bow:
-    case LinkKind::smooth_bow:
-    case LinkKind::either_bow:
-      return "bow";
-    case LinkKind::contact:
-    case LinkKind::clipped_contact:
-      return "contact";
-  }
-  return "link";
 }
 
 }  // namespace
@@ -360,7 +341,8 @@ std::string Session::calm(std::uint32_t link) {
   const Network whole =
       source_->network.macros.empty() ? source_->network : expand_macros(source_->network);
   const Link& creator = whole.links[link];
-  return "the " + std::string(kind_of(creator)) + " '" + creator.name.text() + "' (" +
+  return "the " + std::string(family_name(facts_of(creator.law).family)) + " '" +
+         creator.name.text() + "' (" +
          std::filesystem::path(current_->model_path).filename().string() + ":" +
          std::to_string(creator.place.line) + ") created energy" +
          (source_->may_gain ? ": computed passively from now on"

@@ -9,29 +9,17 @@
 namespace ressort {
 namespace {
 
-// Where the argument of a link's stiffness or damping stands.
+// Where the argument of a link's stiffness or damping stands; of two stiffnesses, the greater.
 std::size_t slot_of(const Link& link, Quantity quantity, std::span<const Range> arguments) {
-  const bool is_stiffness = quantity == Quantity::stiffness;
-  switch (link.kind) {
-    case LinkKind::spring:
-    case LinkKind::contact:
-      return is_stiffness ? 0 : 1;
-    case LinkKind::quadratic_spring:
-    case LinkKind::cubic_spring:
-    case LinkKind::pluck:
-      return is_stiffness ? 0 : 2;
-    case LinkKind::clipped_spring:
-    case LinkKind::clipped_contact: {
-      const bool starts_stiffer = range_at(arguments, link.arguments[0]).highest >
-                                  range_at(arguments, link.arguments[2]).highest;
-      return !is_stiffness ? 3 : starts_stiffer ? 0 : 2;
-    }
-    case LinkKind::bow:
-    case LinkKind::smooth_bow:
-    case LinkKind::either_bow:
-      return 0;
+  const LawFacts& law = facts_of(link.law);
+  if (quantity != Quantity::stiffness || !law.has(Role::stiffness)) {
+    return law.slot(Role::damping);
   }
-  return 0;
+  const auto highest = [&](Role role) {
+    return range_at(arguments, link.arguments[law.slot(role)]).highest;
+  };
+  const bool is_limit = law.has(Role::limit) && !(highest(Role::stiffness) > highest(Role::limit));
+  return law.slot(is_limit ? Role::limit : Role::stiffness);
 }
 
 // "the stiffness m_K = 5 of 'r1' and 2 more"

@@ -6,7 +6,7 @@
 #include <utility>
 
 #include "core/analysis/places.h"
-#include "core/linear_algebra/eigen.h"
+#include "core/laws/laws.h"
 #include "core/model/topology.h"
 
 namespace ressort {
@@ -356,7 +356,7 @@ double ContinuousMode::t60_s() const {
 
 bool is_linear(const Network& network) {
   for (const Link& link : network.links) {
-    if (link.kind != LinkKind::spring) {
+    if (link.law != Law::spring) {
       return false;
     }
   }

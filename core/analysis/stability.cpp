@@ -5,6 +5,7 @@
 #include <limits>
 
 #include "core/analysis/proofs.h"
+#include "core/laws/laws.h"
 #include "core/model/topology.h"
 
 namespace ressort {
@@ -22,7 +23,7 @@ Network always_felt(Network network) {
   });
   for (Link& link : network.links) {
     const LinearPart part = linear_part(link);
-    link.kind = LinkKind::spring;
+    link.law = Law::spring;
     link.arguments.fill(no_argument);
     link.arguments[0] = part.stiffness;
     link.arguments[1] = part.damping;

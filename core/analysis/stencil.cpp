@@ -118,6 +118,15 @@ class StencilMaker {
   std::size_t first_ = 0;           // of the entries of the term at hand
 };
 
+// One end of each argument's range.
+LawNumbers numbers(const Link& link, std::span<const Range> arguments, double Range::*end) {
+  LawNumbers values{};
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    values[i] = range_at(arguments, link.arguments[i]).*end;
+  }
+  return values;
+}
+
 }  // namespace
 
 Stencil make_stencil(const Network& network) {
@@ -140,76 +149,41 @@ Range range_at(std::span<const Range> arguments, ArgumentId argument) {
 Load highest_load(const Network& network, const Stencil::Term& term,
                   std::span<const Range> arguments, double rate_ratio) {
   const double r = rate_ratio;
-  const auto highest = [&](ArgumentId id) {
-    return term.scale * std::max(0.0, range_at(arguments, id).highest);
-  };
   if (!term.is_link) {
     const Mass& mass = network.masses[term.element];
+    const auto highest = [&](ArgumentId id) {
+      return term.scale * std::max(0.0, range_at(arguments, id).highest);
+    };
     return {.stiff = highest(mass.stiffness) * r * r, .damped = 2.0 * highest(mass.damping) * r};
   }
   const Link& link = network.links[term.element];
-  const auto value = [&](std::size_t i) { return highest(link.arguments[i]); };
-  switch (link.kind) {
-    case LinkKind::spring:
-    case LinkKind::contact:
-      return {.stiff = value(0) * r * r, .damped = 2.0 * value(1) * r};
-    case LinkKind::quadratic_spring:
-    case LinkKind::cubic_spring:
-      return {.stiff = value(0) * r * r, .damped = 2.0 * value(2) * r};
-    case LinkKind::clipped_spring: {  // beyond its bend it is damped by 0.3 k more
-      const double k = std::max(value(0), value(2));
-      return {.stiff = 1.6 * k * r * r, .damped = 2.0 * value(3) * r};
-    }
-    case LinkKind::clipped_contact: {
-      const double k = std::max(value(0), value(2));
-      return {.stiff = k * r * r, .damped = 2.0 * value(3) * r};
-    }
-    case LinkKind::pluck: {  // it pulls beyond its top; a negative one pulls below it
-      const double below = -0.9 * term.scale * range_at(arguments, link.arguments[0]).lowest;
-      return {.stiff = std::max(0.1 * value(0), below) * r * r, .damped = 2.0 * value(2) * r};
-    }
-    case LinkKind::bow:
-      return {.rubbed = 2.0 * value(0) * r * 2.0 / 3.0};
-    case LinkKind::smooth_bow:
-    case LinkKind::either_bow:  // the smooth one is the steeper
-      return {.rubbed = 2.0 * value(0) * r * 1.0387};
-  }
-  return {};
+  const LawFacts& law = facts_of(link.law);
+  constexpr double at_rest = 0.0;
+  const Slopes slopes = steepest(link.law, numbers(link, arguments, &Range::lowest),
+                                 numbers(link, arguments, &Range::highest), at_rest);
+  const double damped = 2.0 * term.scale * slopes.damping * r;
+  const bool is_friction = law.arguments[law.slot(Role::damping)].unit == Unit::friction;
+  return {.stiff = term.scale * slopes.pull * r * r,
+          .damped = is_friction ? 0.0 : damped,
+          .rubbed = is_friction ? damped : 0.0};
 }
 
 Load lowest_load(const Network& network, const Stencil::Term& term,
                  std::span<const Range> arguments, double rate_ratio) {
   const double r = rate_ratio;
-  const auto load = [&](ArgumentId k, ArgumentId z, bool is_always_felt) {
-    const double most = is_always_felt && !term.wanders ? HUGE_VAL : 0.0;
-    return Load{.stiff = term.scale * std::min(most, range_at(arguments, k).lowest) * r * r,
-                .damped = 2.0 * term.scale * std::min(most, range_at(arguments, z).lowest) * r};
+  const auto load = [&](double k, double z) {
+    const double most = term.wanders ? 0.0 : HUGE_VAL;
+    return Load{.stiff = term.scale * std::min(most, k) * r * r,
+                .damped = 2.0 * term.scale * std::min(most, z) * r};
   };
   if (!term.is_link) {
     const Mass& mass = network.masses[term.element];
-    return load(mass.stiffness, mass.damping, true);
+    return load(range_at(arguments, mass.stiffness).lowest,
+                range_at(arguments, mass.damping).lowest);
   }
   const Link& link = network.links[term.element];
-  const auto& value = link.arguments;
-  switch (link.kind) {
-    case LinkKind::spring:
-      return load(value[0], value[1], true);
-    case LinkKind::quadratic_spring:
-    case LinkKind::cubic_spring:
-      return load(value[0], value[2], true);
-    case LinkKind::clipped_spring:
-    case LinkKind::clipped_contact:
-      return load(value[2], value[3], false);
-    case LinkKind::pluck:
-      return load(no_argument, value[2], false);
-    case LinkKind::contact:
-      return load(value[0], value[1], false);
-    case LinkKind::bow:
-    case LinkKind::smooth_bow:
-    case LinkKind::either_bow:
-      return load(no_argument, value[0], false);
-  }
-  return {};
+  const Slopes slopes = gentlest(link.law, numbers(link, arguments, &Range::lowest));
+  return load(slopes.pull, slopes.damping);
 }
 
 }  // namespace ressort

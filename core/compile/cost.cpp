@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "core/kernels/domains/sharded.h"
+#include "core/laws/laws.h"
 
 namespace ressort {
 namespace {
@@ -22,32 +23,17 @@ Count links_of(const Program& program) {
     if (run.scheme != Scheme::plain) {
       continue;
     }
-    const bool is_bent = run.law == Law::quadratic_spring || run.law == Law::cubic_spring;
-    (run.law == Law::spring ? count.springs : is_bent ? count.bent : count.others) += run.count;
+    const bool only_pulls = facts_of(run.law).contains_spring;
+    (run.law == Law::spring ? count.springs : only_pulls ? count.bent : count.others) += run.count;
   }
   return count;
 }
 
 // What a link takes that is not plain, once for all lanes, or for one number: while it touches.
 double passive_ns(const LinkRun& run) {
+  const LawFacts& law = facts_of(run.law);
   const double steps = run.scheme == Scheme::substeps ? run.substeps : 1.0;
-  switch (run.law) {
-    case Law::pluck:
-      return 15.0 + 5.5 * steps;
-    case Law::bow:
-      return 15.0 + 15.0 * (steps - 1.0);
-    case Law::smooth_bow:
-      return 75.0 * steps;
-    case Law::either_bow:  // both
-      return 90.0 * steps;
-    case Law::cubic_spring:
-    case Law::spring:
-      return 16.0;
-    case Law::contact:
-      return 35.0;
-    default:
-      return 80.0;  // by Newton
-  }
+  return law.solve_ns + law.substep_ns * steps;
 }
 double passive_ns(const Program& program) {
   double sum = 0.0;

@@ -7,29 +7,6 @@
 namespace ressort {
 namespace {
 
-// How many of a link's arguments are stiffness and damping; the others say where it acts.
-std::size_t strengths(LinkKind kind) {
-  switch (kind) {
-    case LinkKind::spring:
-      return 2;
-    case LinkKind::quadratic_spring:
-    case LinkKind::cubic_spring:
-      return 3;
-    case LinkKind::clipped_spring:
-    case LinkKind::clipped_contact:
-      return 4;
-    case LinkKind::pluck:  // K, scale, Z
-      return 3;
-    case LinkKind::bow:
-    case LinkKind::smooth_bow:
-    case LinkKind::either_bow:
-      return 1;
-    case LinkKind::contact:
-      return 2;
-  }
-  return 0;
-}
-
 class Culler {
  public:
   Culler(const Network& network, const Progress& progress)
@@ -61,9 +38,9 @@ class Culler {
   }
 
   bool is_idle(const Link& link) const {
-    for (std::size_t i = 0; i < strengths(link.kind); ++i) {
-      const bool is_distance = link.kind == LinkKind::pluck && i == 1;
-      if (!is_distance && !is_zero(link.arguments[i])) {
+    const LawFacts& law = facts_of(link.law);
+    for (std::size_t i = 0; i < law.count; ++i) {
+      if (law.is_strength(i) && !is_zero(link.arguments[i])) {
         return false;
       }
     }
@@ -137,9 +114,8 @@ class Culler {
 
   // A contact may be closed where both of its ends are at 0.
   bool may_push(const Link& link) const {
-    return link.kind == LinkKind::contact           ? !is_zero(link.arguments[2])
-           : link.kind == LinkKind::clipped_contact ? !is_zero(link.arguments[4])
-                                                    : false;
+    const LawFacts& law = facts_of(link.law);
+    return law.zone == Zone::below && !is_zero(link.arguments[law.slot(Role::reach)]);
   }
 
   void decide() {

@@ -15,39 +15,6 @@ namespace {
 
 constexpr std::uint32_t nowhere = 0xffffffffu;
 
-struct LawRow {
-  Law law;
-  std::array<Unit, max_link_arguments> units;  // the rest are plain
-};
-
-// Which law a link follows, and how its arguments scale.
-LawRow law_of(LinkKind kind) {
-  using enum Unit;
-  switch (kind) {
-    case LinkKind::spring:
-      return {Law::spring, {stiffness, damping}};
-    case LinkKind::quadratic_spring:
-      return {Law::quadratic_spring, {stiffness, stiffness, damping}};
-    case LinkKind::cubic_spring:
-      return {Law::cubic_spring, {stiffness, stiffness, damping}};
-    case LinkKind::clipped_spring:
-      return {Law::clipped_spring, {stiffness, stiffness, stiffness, damping}};
-    case LinkKind::pluck:
-      return {Law::pluck, {stiffness, plain, damping}};
-    case LinkKind::bow:
-      return {Law::bow, {friction, speed}};
-    case LinkKind::smooth_bow:
-      return {Law::smooth_bow, {friction, speed}};
-    case LinkKind::either_bow:
-      return {Law::either_bow, {friction, speed}};
-    case LinkKind::contact:
-      return {Law::contact, {stiffness, damping}};
-    case LinkKind::clipped_contact:
-      return {Law::clipped_contact, {stiffness, stiffness, stiffness, damping}};
-  }
-  return {};
-}
-
 // What of a network goes into one Program, in the network's order.
 struct Share {
   std::vector<std::uint32_t> masses;
@@ -185,7 +152,7 @@ class ProgramMaker {
     std::vector<std::uint32_t> order = share_.links;
     const auto rank = [&](std::uint32_t i) {
       const Link& link = network_.links[i];
-      return std::tuple(link.kind, link.arguments, scheme_of(i));
+      return std::tuple(link.law, link.arguments, scheme_of(i));
     };
     std::stable_sort(order.begin(), order.end(),
                      [&](std::uint32_t a, std::uint32_t b) { return rank(a) < rank(b); });
@@ -198,15 +165,14 @@ class ProgramMaker {
         ++program_.link_runs.back().count;
         continue;
       }
-      const LawRow row = law_of(link.kind);
       const LinkScheme scheme = scheme_of(order[i]);
-      LinkRun run{.law = row.law,
+      LinkRun run{.law = link.law,
                   .scheme = scheme.scheme,
                   .substeps = scheme.substeps,
                   .first = i,
                   .count = 1};
-      for (std::size_t k = 0; k < max_link_arguments; ++k) {
-        run.coefficients[k] = coefficient(link.arguments[k], row.units[k]);
+      for (std::size_t k = 0; k < most_law_arguments; ++k) {
+        run.coefficients[k] = coefficient(link.arguments[k], facts_of(link.law).arguments[k].unit);
       }
       program_.link_runs.push_back(run);
     }

@@ -10,6 +10,8 @@
 #include <utility>
 #include <vector>
 
+#include "core/laws/laws.h"
+
 namespace ressort {
 namespace {
 
@@ -110,7 +112,7 @@ class Merger {
     for (std::uint32_t mass = 0; mass < source_.masses.size(); ++mass) {
       for (std::uint32_t i = first[mass]; i < first[mass + 1]; ++i) {
         const Link& link = source_.links[order[i]];
-        if (link.kind != LinkKind::spring || link.a == link.b) {
+        if (link.law != Law::spring || link.a == link.b) {
           continue;
         }
         std::uint32_t& other = seen[std::max(link.a, link.b)];
@@ -135,7 +137,7 @@ class Merger {
   }
 
   bool is_silent(const Link& link) const {
-    return zero_ && link.kind == LinkKind::spring && link.arguments[0] == *zero_ &&
+    return zero_ && link.law == Law::spring && link.arguments[0] == *zero_ &&
            link.arguments[1] == *zero_;
   }
 
@@ -185,7 +187,7 @@ class Merger {
     const Link& link = now().links[l];
     const auto k = constant(link.arguments[0]);
     const auto z = constant(link.arguments[1]);
-    if (link.kind != LinkKind::spring || !k || !z || !(*k > 0.0) || !(*z >= 0.0)) {
+    if (link.law != Law::spring || !k || !z || !(*k > 0.0) || !(*z >= 0.0)) {
       return std::nullopt;
     }
     return Spring{l, link.a == mass ? link.b : link.a, *k, *z};

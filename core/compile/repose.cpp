@@ -11,11 +11,6 @@ namespace {
 
 constexpr std::size_t most_places = 64;  // each takes a solution
 
-bool comes_and_goes(const Link& link) {
-  return link.kind == LinkKind::pluck || link.kind == LinkKind::contact ||
-         link.kind == LinkKind::clipped_contact;
-}
-
 }  // namespace
 
 std::vector<std::optional<Repose>> make_repose(const Network& network, const Machine& machine,
@@ -26,7 +21,7 @@ std::vector<std::optional<Repose>> make_repose(const Network& network, const Mac
     given[output.mass] = 0.0;
   }
   for (const Link& link : network.links) {
-    if (comes_and_goes(link)) {
+    if (facts_of(link.law).lets_go()) {
       given[link.a] = given[link.b] = 0.0;
     }
   }
@@ -63,7 +58,7 @@ std::vector<std::optional<Repose>> make_repose(const Network& network, const Mac
     }
     for (std::uint32_t i = 0; i < program.origins.size(); ++i) {
       const Link& link = network.links[program.origins[i]];
-      if (comes_and_goes(link)) {
+      if (facts_of(link.law).lets_go()) {
         const double root = std::sqrt(given[link.a]) + std::sqrt(given[link.b]);
         repose.reaches.push_back({i, root * root});
       }

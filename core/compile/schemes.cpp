@@ -9,7 +9,7 @@
 #include <string_view>
 
 #include "core/analysis/places.h"
-#include "core/kernels/centred.h"
+#include "core/laws/laws.h"
 
 namespace ressort {
 namespace {
@@ -54,41 +54,40 @@ class Judge {
 
   // Nothing where the law is linear.
   std::optional<Finding> judge(const Link& link) const {
+    if (link.law == Law::spring) {
+      return std::nullopt;
+    }
+    const LawFacts& law = facts_of(link.law);
     const double g = give(link.a) + give(link.b);
-    switch (link.kind) {
-      case LinkKind::spring:
-        return std::nullopt;
-      case LinkKind::contact:
-        return contact(stiffer_ * most(link, 0) * g, r_ * most(link, 1) * g);
-      case LinkKind::clipped_contact:
-        return contact(stiffer_ * steepest_clipped(link) * g, r_ * most(link, 3) * g);
-      case LinkKind::bow:
-      case LinkKind::smooth_bow:
-      case LinkKind::either_bow:
-        return bow(grippier_ * most(link, 0) * g);
-      case LinkKind::pluck:
-        return pluck(link, stiffer_ * most(link, 0) * g);
-      case LinkKind::clipped_spring: {
-        const bool is_bent = most(link, 1) > 0.0 && most(link, 2) > least(link, 0);
-        return spring(stiffer_ * steepest_clipped(link) * g,
-                      (r_ * most(link, 3) + (is_bent ? 0.3 * stiffer_ * most(link, 2) : 0.0)) * g);
-      }
-      case LinkKind::quadratic_spring:
-      case LinkKind::cubic_spring:
-        return spring(stiffer_ * tangent(link) * g, 0.0);
+    const LawNumbers numbers = most(link);
+    const Slopes slopes = steepest(link.law, least(link), numbers, farthest(link));
+    const double damping = numbers[law.slot(Role::damping)];
+    switch (law.family) {
+      case Family::spring:
+        return spring(
+            stiffer_ * slopes.stiffness * g,
+            law.contains_spring ? 0.0 : (r_ * damping + stiffer_ * slopes.stiff_damping) * g);
+      case Family::contact:
+        return contact(stiffer_ * slopes.stiffness * g, r_ * damping * g);
+      case Family::bow:
+        return bow(grippier_ * damping * g);
+      case Family::pluck:
+        return pluck(link, stiffer_ * numbers[law.slot(Role::stiffness)] * g);
     }
     return std::nullopt;
   }
 
  private:
-  // An argument's largest value, and its smallest; not below 0.
-  double most(const Link& link, std::size_t i) const {
-    const ArgumentId id = link.arguments[i];
-    return id == no_argument ? 0.0 : std::max(0.0, ranges_[id].highest);
-  }
-  double least(const Link& link, std::size_t i) const {
-    const ArgumentId id = link.arguments[i];
-    return id == no_argument ? 0.0 : std::max(0.0, ranges_[id].lowest);
+  // The arguments' largest values, and their smallest; not below 0.
+  LawNumbers most(const Link& link) const { return ends(link, &Range::highest); }
+  LawNumbers least(const Link& link) const { return ends(link, &Range::lowest); }
+  LawNumbers ends(const Link& link, double Range::*end) const {
+    LawNumbers values{};
+    for (std::size_t i = 0; i < values.size(); ++i) {
+      const ArgumentId id = link.arguments[i];
+      values[i] = id == no_argument ? 0.0 : std::max(0.0, ranges_[id].*end);
+    }
+    return values;
   }
 
   double inverse_mass(std::uint32_t mass) const {
@@ -112,13 +111,6 @@ class Judge {
       sum += share * share * inverse_mass(node);
     });
     return sum;
-  }
-
-  // The slope of s d + c d^3 where it is clipped at k, which is 3 k - 2 s; with c = 0 it is s.
-  double steepest_clipped(const Link& link) const {
-    const double s = most(link, 0);
-    const double k = most(link, 2);
-    return most(link, 1) > 0.0 ? std::max(s, 3.0 * k - 2.0 * least(link, 0)) : std::max(s, k);
   }
 
   // How far apart two ends may come as far as is known, and what else may set them in motion.
@@ -168,21 +160,20 @@ class Judge {
     return nullptr;
   }
 
-  // dF/dd at the farthest: where masses and hands stand, where the energy is all in the spring, or
-  // twice where the forces that last would hold it.
-  double tangent(const Link& link) const {
-    const double k = most(link, 0);
-    const double q = most(link, 1);
+  // How far a link may be stretched: to where masses and hands stand, where the energy is all in
+  // the spring, or twice to where the forces that last would hold it.
+  double farthest(const Link& link) const {
+    const LawFacts& law = facts_of(link.law);
+    const double q = law.exponent > 1 ? most(link)[law.slot(Role::bend)] : 0.0;
     if (q == 0.0) {
-      return k;
+      return 0.0;
     }
-    const bool is_cubic = link.kind == LinkKind::cubic_spring;
-    const double by_energy = is_cubic ? std::sqrt(2.0 * std::sqrt(energy_ / q))  // Q d^4/4
-                                      : std::cbrt(3.0 * energy_ / q);            // Q d^3/3
+    const double n = law.exponent;
+    const double k = most(link)[law.slot(Role::stiffness)];
+    const double by_energy = std::pow((n + 1.0) * energy_ / q, 1.0 / (n + 1.0));
     const double by_k = k > 0.0 ? std::sqrt(2.0 * energy_ / k) : by_energy;
-    const double by_force = 2.0 * (is_cubic ? std::cbrt(force_ / q) : std::sqrt(force_ / q));
-    const double d = std::max({reach_, std::min(by_energy, by_k), by_force});
-    return k + (is_cubic ? 3.0 * q * d * d : 2.0 * q * d);
+    const double by_force = 2.0 * std::pow(force_ / q, 1.0 / n);
+    return std::max({reach_, std::min(by_energy, by_k), by_force});
   }
 
   static Finding contact(double k, double z) {
@@ -204,7 +195,7 @@ class Judge {
   }
 
   Finding pluck(const Link& link, double k) const {
-    const double scale = least(link, 1);
+    const double scale = least(link)[facts_of(link.law).slot(Role::reach)];
     double speed = 0.0;
     for (const ControlSetting& control : preset_.controls) {
       const Input* const input = input_of(control);
@@ -244,35 +235,18 @@ class Judge {
   double force_ = 0.0;
 };
 
-std::string kind_name(LinkKind kind, std::size_t count) {
-  const auto of = [&](const char* one, const char* many) { return count == 1 ? one : many; };
-  switch (kind) {
-    case LinkKind::contact:
-    case LinkKind::clipped_contact:
-      return of("contact", "contacts");
-    case LinkKind::bow:
-    case LinkKind::smooth_bow:
-    case LinkKind::either_bow:
-      return of("bow", "bows");
-    case LinkKind::pluck:
-      return of("pluck", "plucks");
-    case LinkKind::spring:
-      return of("spring", "springs");
-    default:
-      return of("spring that grows stiffer", "springs that grow stiffer");
-  }
-}
-
 // All that is told in one sentence.
 struct Told {
-  LinkKind kind = LinkKind::spring;
+  Law law{};
   std::size_t count = 0;
   std::optional<Finding> worst;
   LinkScheme scheme;
 };
 
 std::string sentence(const Told& told) {
-  const std::string who = std::to_string(told.count) + " " + kind_name(told.kind, told.count);
+  const LawFacts& law = facts_of(told.law);
+  const std::string who =
+      std::to_string(told.count) + " " + std::string(told.count == 1 ? law.one : law.many);
   const bool is_bad = told.worst && told.worst->badness > 1.0;
   const std::string how = told.scheme.scheme == Scheme::plain ? " as published"
                           : told.scheme.scheme == Scheme::centred
@@ -294,7 +268,7 @@ Schemes choose_schemes(const Network& network, const Preset& preset, const Condi
                        const Progress& progress) {
   Schemes schemes;
   schemes.links.resize(network.links.size());
-  const auto is_linear = [](const Link& link) { return link.kind == LinkKind::spring; };
+  const auto is_linear = [](const Link& link) { return link.law == Law::spring; };
   if (forced.empty() && std::all_of(network.links.begin(), network.links.end(), is_linear)) {
     return schemes;
   }
@@ -305,7 +279,7 @@ Schemes choose_schemes(const Network& network, const Preset& preset, const Condi
       is_forced[link] = true;
     }
   }
-  std::map<std::pair<LinkKind, LinkScheme>, Told> tellings;
+  std::map<std::pair<Law, LinkScheme>, Told> tellings;
   for (std::size_t i = 0; i < network.links.size(); ++i) {
     const Link& link = network.links[i];
     progress.spend(4);
@@ -318,9 +292,9 @@ Schemes choose_schemes(const Network& network, const Preset& preset, const Condi
     } else if (!is_bad) {
       continue;
     }
-    Told& told = tellings[{link.kind, schemes.links[i]}];
+    Told& told = tellings[{link.law, schemes.links[i]}];
     ++told.count;
-    told.kind = link.kind;
+    told.law = link.law;
     told.scheme = schemes.links[i];
     if (!told.worst || (finding && finding->badness > told.worst->badness)) {
       told.worst = finding;
@@ -341,10 +315,10 @@ Network always_felt(const Network& network, const std::vector<LinkScheme>& links
   Network felt = network;
   felt.links.clear();
   for (std::size_t i = 0; i < network.links.size(); ++i) {
-    const LinkKind kind = network.links[i].kind;
+    const LawFacts& law = facts_of(network.links[i].law);
     // Quadratic and cubic springs count with what they are at rest, by their own K and Z.
     const bool counts = i >= links.size() || links[i].scheme == Scheme::plain ||
-                        kind == LinkKind::quadratic_spring || kind == LinkKind::cubic_spring;
+                        (law.contains_spring && law.is_curved);
     if (counts) {
       felt.links.push_back(network.links[i]);
     }

@@ -4,75 +4,18 @@
 #include <array>
 #include <cmath>
 
-#include "core/kernels/laws.h"
+#include "core/laws/laws.h"
 
 namespace ressort {
 namespace {
-
-using Numbers = std::array<double, 5>;  // of a link, in the order of laws.h
-
-// The potentials of laws.h: their slope along d is the law's force without velocity.
-double clipped_potential(double d, double s, double c, double k) {
-  const double edge = c > 0.0 ? (k - s) / c : 0.0;  // its square
-  if (d * d <= edge) {
-    return 0.5 * s * d * d + 0.25 * c * d * d * d * d;
-  }
-  return 0.5 * k * (d * d - edge) + 0.5 * s * edge + 0.25 * c * edge * edge;
-}
-
-double pluck_potential(double d, double k, double s) {
-  const double far = std::fabs(d);
-  if (far >= s) {
-    return 0.0;
-  }
-  return far < s / 10.0 ? 0.045 * k * s * s - 0.45 * k * d * d : k / 20.0 * (s - far) * (s - far);
-}
-
-double potential(Law law, const Numbers& c, double d) {
-  switch (law) {
-    case Law::spring:
-      return 0.5 * c[0] * d * d;
-    case Law::quadratic_spring:
-      return 0.5 * c[0] * d * d + c[1] / 3.0 * std::fabs(d * d * d);
-    case Law::cubic_spring:
-      return 0.5 * c[0] * d * d + 0.25 * c[1] * d * d * d * d;
-    case Law::clipped_spring:
-      return c[1] == 0.0    ? 0.5 * c[0] * d * d
-             : c[0] >= c[2] ? 0.5 * c[2] * d * d
-                            : clipped_potential(d, c[0], c[1], c[2]);
-    case Law::pluck:
-      return pluck_potential(d, c[0], c[1]);
-    case Law::bow:
-    case Law::smooth_bow:
-    case Law::either_bow:
-      return 0.0;
-    case Law::contact: {
-      const double depth = std::max(0.0, d + c[2]);
-      return 0.5 * c[0] * depth * depth;
-    }
-    case Law::clipped_contact: {
-      const double depth = std::max(0.0, d + c[4]);
-      return c[2] < c[0] || c[1] == 0.0 ? 0.5 * c[0] * depth * depth
-                                        : clipped_potential(depth, c[0], c[1], c[2]);
-    }
-  }
-  return 0.0;
-}
-
-// What of a law is straight: the share of its energy that is not in doubt.
-double straight(Law law, const Numbers& c) {
-  const bool is_spring =
-      law == Law::quadratic_spring || law == Law::cubic_spring || law == Law::clipped_spring;
-  return is_spring ? c[0] : 0.0;
-}
 
 bool may_create(const LinkRun& run) {
   return run.law != Law::spring && run.scheme != Scheme::centred;
 }
 
 template <class T>
-Numbers numbers_of(const LinkRun& run, LaneValues<T> coefficients) {
-  Numbers numbers{};
+LawNumbers numbers_of(const LinkRun& run, LaneValues<T> coefficients) {
+  LawNumbers numbers{};
   for (std::size_t i = 0; i < numbers.size(); ++i) {
     numbers[i] = coefficients[run.coefficients[i]];
   }
@@ -122,48 +65,45 @@ void add_straight(double k, double z, double d, double v, Energy& energy) {
   add(energy, -0.25 * z * v * v);
 }
 
-void add_centred(Law law, const Numbers& c, double d, double v, Energy& energy) {
+template <class ForceLaw>
+void add_centred(const ForceLaw& law, double d, double v, Energy& energy) {
   const double before = d - v;
-  if (law == Law::cubic_spring) {  // linearly implicit in its cubic part
-    add_straight(c[0], c[2], d, v, energy);
-    add(energy, 0.25 * c[1] * d * d * before * before);
-    return;
+  if constexpr (ForceLaw::facts.contains_spring) {
+    add_straight(law.k, law.z, d, v, energy);
+    add(energy, law.curved_energy(d, before));
+  } else {
+    add(energy, 0.5 * (law.potential(d) + law.potential(before)));
   }
-  if (law == Law::quadratic_spring) {  // centred in its quadratic part
-    const Numbers bent{0.0, c[1]};
-    add_straight(c[0], c[2], d, v, energy);
-    add(energy, 0.5 * (potential(law, bent, d) + potential(law, bent, before)));
-    return;
-  }
-  add(energy, 0.5 * (potential(law, c, d) + potential(law, c, before)));
 }
 
+// k is the stiffness of what of the law is straight: the share of its energy that is not in doubt.
 template <class ForceLaw>
-void add_bent(Law law, const Numbers& c, ForceLaw&& force, double d, double v, Energy& energy) {
+void add_bent(const ForceLaw& law, double k, double d, double v, Energy& energy) {
+  constexpr const LawFacts& facts = ForceLaw::facts;
   const double before = d - v;
-  const double now = force(d, 0.0);
-  const double change = now - force(before, 0.0);
-  const double here = potential(law, c, d);
-  const double there = potential(law, c, before);
-  const double damped = 0.25 * (force(d, v) - now) * v;
+  const double now = law.force(d, 0.0);
+  const double change = now - law.force(before, 0.0);
+  const double here = law.potential(d);
+  const double there = law.potential(before);
+  const double damped = 0.25 * (law.force(d, v) - now) * v;
   add(energy, 0.5 * (here + there) - 0.25 * change * v);
   add(energy, -damped);
   // Where two straight pieces meet the energy jumps; where a law is curved it wavers by no more
   // than a share of what the curve holds. A damper that comes and goes takes its part along.
-  const double k = straight(law, c);
-  const bool is_curved = law != Law::contact && law != Law::pluck;
-  energy.doubt += is_curved ? 0.5 * std::fabs(here - 0.5 * k * d * d) +
-                                  0.5 * std::fabs(there - 0.5 * k * before * before) +
-                                  0.25 * std::fabs((change - k * v) * v)
-                            : std::fabs((now - 0.5 * change) * v - (here - there));
-  energy.doubt +=
-      law == Law::quadratic_spring || law == Law::cubic_spring ? 0.0 : std::fabs(damped);
+  if constexpr (facts.is_curved) {
+    energy.doubt += 0.5 * std::fabs(here - 0.5 * k * d * d) +
+                    0.5 * std::fabs(there - 0.5 * k * before * before) +
+                    0.25 * std::fabs((change - k * v) * v);
+  } else {
+    energy.doubt += std::fabs((now - 0.5 * change) * v - (here - there));
+  }
+  energy.doubt += facts.contains_spring ? 0.0 : std::fabs(damped);
 }
 
 template <class T>
 void add_links(const Program& program, const LinkRun& run, Share share, LaneValues<T> coefficients,
                const double* x, const double* v, Energy& energy) {
-  const Numbers c = numbers_of(run, coefficients);
+  const LawNumbers c = numbers_of(run, coefficients);
   const auto each = [&](auto&& use) {
     each_of(run, share, [&](std::size_t i) {
       const auto [a, b] = program.ends[i];
@@ -172,57 +112,29 @@ void add_links(const Program& program, const LinkRun& run, Share share, LaneValu
   };
   if (run.law == Law::spring) {
     each([&](double d, double speed) { add_straight(c[0], c[1], d, speed, energy); });
-  } else if (run.scheme == Scheme::centred) {
-    each([&](double d, double speed) { add_centred(run.law, c, d, speed, energy); });
-  } else {
-    with_law<double>(run.law, c[0], c[1], c[2], c[3], c[4], [&](auto&& force) {
-      each([&](double d, double speed) { add_bent(run.law, c, force, d, speed, energy); });
-    });
+    return;
   }
+  with_law<double>(
+      run.law, [&](std::size_t i) { return c[i]; },
+      [&]<class ForceLaw>(const ForceLaw& law) {
+        constexpr const LawFacts& facts = ForceLaw::facts;
+        const double k = facts.family == Family::spring ? c[facts.slot(Role::stiffness)] : 0.0;
+        each([&](double d, double speed) {
+          if (run.scheme == Scheme::centred) {
+            add_centred(law, d, speed, energy);
+          } else {
+            add_bent(law, k, d, speed, energy);
+          }
+        });
+      });
 }
 
 // --- who made energy of nothing -----------------------------------------------------------------
 
-// The steepest slope that a law has near d; of a bow, what its damping weighs.
-double slope(Law law, const Numbers& c, double d) {
-  switch (law) {
-    case Law::spring:
-      return 0.0;
-    case Law::quadratic_spring:
-      return c[0] + 2.0 * c[1] * std::fabs(d);
-    case Law::cubic_spring:
-      return c[0] + 3.0 * c[1] * d * d;
-    case Law::clipped_spring:
-    case Law::clipped_contact:
-      return std::max(c[0], c[2]);
-    case Law::pluck:
-    case Law::bow:
-    case Law::smooth_bow:
-    case Law::either_bow:
-    case Law::contact:
-      return c[0];
-  }
-  return 0.0;
-}
-
-// How far d is from where the law begins to act; not positive where it acts.
-double gap(Law law, const Numbers& c, double d) {
-  switch (law) {
-    case Law::contact:
-      return -c[2] - d;
-    case Law::clipped_contact:
-      return -c[4] - d;
-    case Law::pluck:
-      return std::fabs(d) - c[1];
-    default:
-      return 0.0;
-  }
-}
-
-// A spring of any kind, which pulls wherever its ends are.
-bool always_pulls(Law law) {
-  return law == Law::spring || law == Law::quadratic_spring || law == Law::cubic_spring ||
-         law == Law::clipped_spring;
+// The steepest slope that a link's law has near d; of a bow, what its damping weighs.
+double steepness(Law law, const LawNumbers& c, double d) {
+  const Slopes slopes = steepest(law, c, c, std::fabs(d));
+  return std::max(slopes.stiffness, slopes.damping);
 }
 
 template <class T>
@@ -279,9 +191,9 @@ bool rests_at_zero(const Program& program, LaneValues<T> coefficients, const dou
   };
   for (const LinkRun& run : program.link_runs) {
     const auto first = program.ends.begin() + run.first;
-    if (always_pulls(run.law) && std::any_of(first, first + run.count, [&](const Ends& ends) {
-          return is_off(ends.a) || is_off(ends.b);
-        })) {
+    if (facts_of(run.law).family == Family::spring &&
+        std::any_of(first, first + run.count,
+                    [&](const Ends& ends) { return is_off(ends.a) || is_off(ends.b); })) {
       return false;
     }
   }
@@ -301,7 +213,7 @@ double distance_at_rest(const Program& program, LaneValues<T> coefficients, cons
     return node >= program.moving && node < points ? x[node] : 0.0;
   };
   const auto [a, b] = program.ends[link];
-  return gap(run->law, numbers_of(*run, coefficients), rest(a) - rest(b));
+  return facts_of(run->law).gap(numbers_of(*run, coefficients), rest(a) - rest(b));
 }
 
 bool may_create(const Program& program) {
@@ -320,14 +232,14 @@ std::uint32_t likely_creator(const Program& program, LaneValues<T> coefficients,
     if (!may_create(run)) {
       continue;
     }
-    const Numbers c = numbers_of(run, coefficients);
+    const LawNumbers c = numbers_of(run, coefficients);
     for (std::uint32_t i = run.first; i < run.first + run.count; ++i) {
       const auto [a, b] = program.ends[i];
       const double d = x[a] - x[b];
-      const double far = gap(run.law, c, d);
+      const double far = facts_of(run.law).gap(c, d);
       const bool is_near = far <= std::fabs(v[a] - v[b]) * frames;
-      const double steep = slope(run.law, c, d) * (inverse_mass(program, coefficients, a) +
-                                                   inverse_mass(program, coefficients, b));
+      const double steep = steepness(run.law, c, d) * (inverse_mass(program, coefficients, a) +
+                                                       inverse_mass(program, coefficients, b));
       const bool is_likelier = is_near ? !found_near || steep > steepest
                                        : !found_near && (found == no_link || far < nearest);
       if (is_likelier) {

@@ -4,7 +4,7 @@
 #include <array>
 #include <cmath>
 
-#include "core/kernels/laws.h"
+#include "core/laws/laws.h"
 
 namespace ressort {
 
@@ -26,59 +26,6 @@ std::vector<double> coefficients_of(const Program& program) {
 template <class T>
 std::vector<double> narrowed(const std::vector<T>& wide) {
   return {wide.begin(), wide.end()};
-}
-
-// The integral of the force from 0, its dampers at rest.
-
-double clipped_potential(double d, double s, double c, double k) {
-  const double far = std::fabs(d);
-  if (c == 0.0) {
-    return 0.5 * s * d * d;
-  }
-  if (s >= k) {
-    return 0.5 * k * d * d;
-  }
-  const double b = std::sqrt((k - s) / c);
-  const auto cubic = [&](double x) { return x * x * (0.5 * s + 0.25 * c * x * x); };
-  return far <= b ? cubic(far) : cubic(b) + 0.5 * k * (d * d - b * b);
-}
-
-double pluck_potential(double d, double k, double s) {
-  const double far = std::fabs(d);
-  if (far >= s) {
-    return 0.0;  // counted from where it lets go
-  }
-  const double inner = s / 10.0;
-  const auto beyond = [&](double x) { return 0.5 * (k / 10.0) * (s - x) * (s - x); };
-  return far >= inner ? beyond(far) : beyond(inner) + 0.45 * k * (inner * inner - d * d);
-}
-
-double potential(Law law, double d, const std::array<double, 5>& c) {
-  switch (law) {
-    case Law::spring:
-      return 0.5 * c[0] * d * d;
-    case Law::quadratic_spring:
-      return d * d * (0.5 * c[0] + c[1] * std::fabs(d) / 3.0);
-    case Law::cubic_spring:
-      return d * d * (0.5 * c[0] + 0.25 * c[1] * d * d);
-    case Law::clipped_spring:
-      return clipped_potential(d, c[0], c[1], c[2]);
-    case Law::pluck:
-      return pluck_potential(d, c[0], c[1]);
-    case Law::bow:
-    case Law::smooth_bow:
-    case Law::either_bow:
-      return 0.0;
-    case Law::contact:
-      return d > -c[2] ? 0.5 * c[0] * (d + c[2]) * (d + c[2]) : 0.0;
-    case Law::clipped_contact:
-      return d > -c[4] ? clipped_potential(d + c[4], c[0], c[1], std::max(c[0], c[2])) : 0.0;
-  }
-  return 0.0;
-}
-
-bool lets_go(Law law) {
-  return law == Law::pluck || law == Law::contact || law == Law::clipped_contact;
 }
 
 }  // namespace
@@ -138,14 +85,11 @@ void Textbook::move_places() {
 
 void Textbook::pull() {
   for (const LinkRun& run : program_.link_runs) {
-    std::array<Real, 5> c{};
-    for (std::size_t i = 0; i < c.size(); ++i) {
-      c[i] = coefficient_[run.coefficients[i]];
-    }
-    with_law<Real>(run.law, c[0], c[1], c[2], c[3], c[4], [&](auto&& law) {
+    const auto c = [&](std::size_t i) { return coefficient_[run.coefficients[i]]; };
+    with_law<Real>(run.law, c, [&](const auto& law) {
       for (std::uint32_t i = run.first; i < run.first + run.count; ++i) {
         const auto [a, b] = program_.ends[i];
-        const Real f = law(x_[a] - x_[b], v_[a] - v_[b]);
+        const Real f = law.force(x_[a] - x_[b], v_[a] - v_[b]);
         force_[a] -= f;
         force_[b] += f;
       }
@@ -212,15 +156,14 @@ StoredEnergy energy_of(const Program& program, std::span<const double> x,
     }
   }
   for (const LinkRun& run : program.link_runs) {
-    std::array<double, 5> c{};
-    for (std::size_t i = 0; i < c.size(); ++i) {
-      c[i] = coefficient[run.coefficients[i]];
-    }
-    for (std::uint32_t i = run.first; i < run.first + run.count; ++i) {
-      const double held = potential(run.law, x[program.ends[i].a] - x[program.ends[i].b], c);
-      energy.total += held;
-      energy.held += lets_go(run.law) ? held : 0.0;
-    }
+    const auto c = [&](std::size_t i) { return coefficient[run.coefficients[i]]; };
+    with_law<double>(run.law, c, [&](const auto& law) {
+      for (std::uint32_t i = run.first; i < run.first + run.count; ++i) {
+        const double held = law.potential(x[program.ends[i].a] - x[program.ends[i].b]);
+        energy.total += held;
+        energy.held += law.facts.lets_go() ? held : 0.0;
+      }
+    });
   }
   return energy;
 }

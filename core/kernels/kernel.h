@@ -8,8 +8,8 @@
 #include <vector>
 
 #include "core/kernels/isa.h"
-#include "core/kernels/lanes.h"
 #include "core/kernels/program.h"
+#include "core/lanes.h"
 
 namespace ressort {
 

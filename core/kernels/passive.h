@@ -1,5 +1,5 @@
 // core/engine: links whose force is not the plain one. A kernel moves everything without them;
-// then each looks where its ends would be, finds its force (centred.h), and both ends are moved by
+// then each looks where its ends would be, finds its force (core/laws), and both ends are moved by
 // it, which is the same as if it had been among the others. Where such links share a mass, they
 // are gone through a few times (Gauss-Seidel); where that does not end, they are solved together.
 #pragma once
@@ -7,16 +7,20 @@
 #include <algorithm>
 #include <vector>
 
-#include "core/kernels/centred.h"
+#include "core/laws/laws.h"
 
 namespace ressort {
 
+using laws::LinkState;
+using laws::Push;
+using laws::tiny_share;
+
 struct PassiveLink {
-  Law law = Law::contact;
-  Scheme scheme = Scheme::centred;
+  Law law{};
+  bool is_implicit = true;  // its force depends on where the link will be
   int substeps = 1;
   bool is_shared = false;  // another one may move what it moves
-  std::array<std::uint32_t, 5> coefficients{};
+  std::array<std::uint32_t, most_law_arguments> coefficients{};
   Ends ends;  // nodes; a kernel puts its own places instead
 };
 
@@ -76,9 +80,9 @@ static inline void remember(const std::vector<PassiveLink>& links, V* memory, co
   }
 }
 
-// What one link meets, its last push being in its row.
+// Of one link, its last push being in its row.
 template <class V, class Body>
-static inline Meeting<V> meet(const PassiveLink& link, const V* row, const Body& body) {
+static inline LinkState<V> state_of(const PassiveLink& link, const V* row, const Body& body) {
   const V gamma = body.gamma(link.ends);
   return {.now = row[0],
           .speed = row[1],
@@ -88,11 +92,11 @@ static inline Meeting<V> meet(const PassiveLink& link, const V* row, const Body&
 }
 
 template <class V, class Body>
-static inline Push<V> push_of(const PassiveLink& link, const Meeting<V>& meeting,
+static inline Push<V> push_of(const PassiveLink& link, const LinkState<V>& state,
                               const Body& body) {
   const auto c = [&](std::size_t i) { return body.coefficient(link.coefficients[i]); };
-  const Push<V> push =
-      passive_push(link.law, link.scheme, link.substeps, meeting, c(0), c(1), c(2), c(3), c(4));
+  const auto push =
+      with_law<V>(link.law, c, [&](const auto& law) { return law.passive(state, link.substeps); });
   return {push.x * body.awake(), push.v * body.awake()};
 }
 
@@ -111,7 +115,7 @@ static inline auto sweep(const std::vector<PassiveLink>& links, V* row, Body& bo
   auto changes = V{} != V{};
   for (const PassiveLink& link : links) {
     if (link.is_shared) {
-      const Push<V> push = push_of(link, meet(link, row, body), body);
+      const Push<V> push = push_of(link, state_of(link, row, body), body);
       const Push<V> more{select(live, push.x - row[2], V{}), select(live, push.v - row[3], V{})};
       push_more(link, row, more, body);
       changes = changes | (absolute(more.x) > tiny_share<V>() * absolute(row[2]));
@@ -120,6 +124,8 @@ static inline auto sweep(const std::vector<PassiveLink>& links, V* row, Body& bo
   }
   return changes;
 }
+
+namespace {
 
 // Some links at once, by Newton: hard ones on one mass would take thousands of sweeps.
 template <class V>
@@ -151,17 +157,16 @@ struct Joint {
     constexpr Scalar<V> ahead = sizeof(Scalar<V>) == 4 ? Scalar<V>(0x1p-11) : Scalar<V>(0x1p-26);
     V sum{};
     for (std::size_t i = 0; i < count; ++i) {
-      Meeting<V> m = meet(*links[i], rows[i], body);
+      LinkState<V> m = state_of(*links[i], rows[i], body);
       const Push<V> push = push_of(*links[i], m, body);
       const V far = absolute(m.now) + absolute(m.speed) + absolute(m.free);
       const V way = ahead * select(far > V{}, far, V{} + 1);
       m.free += way;
       m.fast += way;
-      const bool is_centred = links[i]->scheme == Scheme::centred && links[i]->law != Law::pluck;
       const V rise = (push_of(*links[i], m, body).x - push.x) / way;
       const V steep = select(rise * m.gamma > V{} + 1, 1 / m.gamma, rise);
       for (std::size_t k = 0; k < count; ++k) {
-        matrix[i][k] = is_centred && i != k ? steep * coupling[i][k] : V{};
+        matrix[i][k] = links[i]->is_implicit && i != k ? steep * coupling[i][k] : V{};
       }
       matrix[i][i] += 1;
       rest[i] = {push.x - rows[i][2], push.v - rows[i][3]};
@@ -222,6 +227,8 @@ struct Joint {
   }
 };
 
+}  // namespace
+
 template <class V, class Body>
 [[gnu::noinline]] static void settle(const std::vector<PassiveLink>& links, V* memory, Body& body,
                                      decltype(V{} == V{}) live) {
@@ -254,7 +261,7 @@ static inline void correct(const std::vector<PassiveLink>& links, V* memory, Bod
   for (const PassiveLink& link : links) {
     row[2] = V{};
     row[3] = V{};
-    push_more(link, row, push_of(link, meet(link, row, body), body), body);
+    push_more(link, row, push_of(link, state_of(link, row, body), body), body);
     row += passive_rows;
     is_shared = is_shared || link.is_shared;
   }

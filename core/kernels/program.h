@@ -9,39 +9,14 @@
 
 #include "core/formula.h"
 #include "core/kernels/forms.h"
+#include "core/laws/law.h"
 
 namespace ressort {
-
-// How a coefficient follows the sample rate and a voice's pitch. With r = 44100 / rate and s the
-// voice's stiffness factor, a coefficient is its formula's value times r^a s^b.
-enum class Unit : std::uint8_t {
-  plain,             // distances and thresholds: a = 0, b = 0
-  stiffness,         // K: a = 2, b = 1
-  damping,           // Z: a = 1, b = 0, so that a decay stays what it is at every pitch
-  friction,          // Z of a bow: a = 1, b = 1/2, as the string's impedance
-  speed,             // a bow's velocity scale: a = 1, b = 1/2
-  inverse_mass,      // 1/M: a = 0, b = 0
-  gravity,           // g: a = 2, b = 0
-  gravity_per_rate,  // the same, divided by 44100
-};
 
 struct Coefficient {
   std::uint32_t first = 0;  // steps [first, first + count) of Program::steps
   std::uint32_t count = 0;
   Unit unit = Unit::plain;
-};
-
-enum class Law : std::uint8_t {
-  spring,
-  quadratic_spring,
-  cubic_spring,
-  clipped_spring,
-  pluck,
-  bow,
-  smooth_bow,
-  either_bow,
-  contact,
-  clipped_contact,
 };
 
 // Consecutive nodes that share their coefficients.
@@ -65,12 +40,12 @@ enum class Scheme : std::uint8_t {
 
 // Consecutive links that share law, coefficients and scheme.
 struct LinkRun {
-  Law law = Law::spring;
+  Law law{};
   Scheme scheme = Scheme::plain;
   std::uint16_t substeps = 1;  // read only with Scheme::substeps
   std::uint32_t first = 0;
   std::uint32_t count = 0;
-  std::array<std::uint32_t, 5> coefficients{};  // in the order of laws.h
+  std::array<std::uint32_t, most_law_arguments> coefficients{};  // of the law's arguments
 };
 
 struct Ends {

@@ -177,17 +177,10 @@ double argument_value(const Network& network, ArgumentId argument,
 }
 
 LinearPart linear_part(const Link& link) {
-  switch (link.kind) {
-    case LinkKind::spring:
-      return {link.arguments[0], link.arguments[1]};
-    case LinkKind::quadratic_spring:
-    case LinkKind::cubic_spring:
-      return {link.arguments[0], link.arguments[2]};
-    case LinkKind::clipped_spring:
-      return {link.arguments[0], link.arguments[3]};
-    default:
-      return {};
-  }
+  const LawFacts& law = facts_of(link.law);
+  return law.family == Family::spring ? LinearPart{link.arguments[law.slot(Role::stiffness)],
+                                                   link.arguments[law.slot(Role::damping)]}
+                                      : LinearPart{};
 }
 
 std::vector<double> parameter_values(const Network& network) {

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "core/formula.h"
+#include "core/laws/law.h"
 #include "core/model/name.h"
 
 namespace ressort {
@@ -111,37 +112,17 @@ struct Drawing {
   bool operator==(const Drawing&) const = default;
 };
 
-enum class LinkKind : std::uint8_t {
-  spring,            // K, Z: springs, dampers and both together
-  quadratic_spring,  // K, Q, Z
-  cubic_spring,      // K, Q, Z
-  clipped_spring,    // s, c, k, Z
-  pluck,             // K, scale, Z
-  bow,               // Z, scale
-  smooth_bow,        // the same arguments, the exponential profile
-  either_bow,        // Z, scale, profile: a smooth bow while that is above 0
-  contact,           // K, Z, threshold
-  clipped_contact,   // s, c, k, Z, threshold
-};
-
-inline constexpr std::size_t max_link_arguments = 5;
-
 // Between two masses, first and second as written: a link's force f acts as F_a -= f, F_b += f.
 struct Link {
   Name name;
-  LinkKind kind = LinkKind::spring;
+  Law law{};
   std::uint32_t a = 0;  // indices into Network::masses
   std::uint32_t b = 0;
-  std::array<ArgumentId, max_link_arguments> arguments = {no_argument, no_argument, no_argument,
+  std::array<ArgumentId, most_law_arguments> arguments = {no_argument, no_argument, no_argument,
                                                           no_argument, no_argument};
   Place place;
   bool operator==(const Link&) const = default;
 };
-
-// Of any profile.
-constexpr bool is_bow(LinkKind kind) {
-  return kind == LinkKind::bow || kind == LinkKind::smooth_bow || kind == LinkKind::either_bow;
-}
 
 // What a link does near rest: its K and Z. Plucks, bows and contacts do nothing there.
 struct LinearPart {

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <chrono>
 
-#include "core/kernels/lanes.h"
+#include "core/lanes.h"
 
 #if RESSORT_X86_LEVELS
 #define RESSORT_TARGET(levels) __attribute__((target(levels)))

@@ -1,6 +1,6 @@
 // Whatever is done to a network of passive links, it never holds more energy than it was given.
 #include "core/engine/energy.h"
-#include "core/kernels/laws.h"
+#include "core/laws/laws.h"
 #include "tests/support/passive.h"
 
 namespace ressort {
@@ -142,10 +142,10 @@ class Ledger {
                                  program.parameters, 1.0);
       };
       if (run.scheme == Scheme::plain) {
-        with_law<double>(run.law, c(0), c(1), c(2), c(3), c(4), [&](auto&& law) {
+        with_law<double>(run.law, c, [&](const auto& law) {
           for (std::uint32_t i = run.first; i < run.first + run.count; ++i) {
             const auto [a, b] = program.ends[i];
-            const double f = law(body_.x[a] - body_.x[b], body_.v[a] - body_.v[b]);
+            const double f = law.force(body_.x[a] - body_.x[b], body_.v[a] - body_.v[b]);
             force_[a] -= f;
             force_[b] += f;
           }

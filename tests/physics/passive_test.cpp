@@ -1,7 +1,7 @@
 // Links that cannot gain energy, one mass at a time: against closed forms, and against what the
 // published scheme makes of the same.
 #include "tests/support/passive.h"
-#include "core/kernels/centred.h"
+#include "core/laws/laws.h"
 
 namespace ressort {
 namespace {
@@ -297,13 +297,13 @@ TEST_CASE("S07, T13: a Duffing oscillator keeps its period when it swings little
 TEST_CASE("S20: a clipped spring has no step, and gives back no more than it got", "[passive]") {
   // s = .01, c = 10, k = .5 without damping, from .2, which is below b = sqrt((k - s)/c) = .2214.
   const double b = std::sqrt(.49 / 10.0);
-  CHECK(clipped_spring_force(b * (1 - 1e-12), 0., .01, 10., .5, 0.) ==
-        Approx(clipped_spring_force(b * (1 + 1e-12), 0., .01, 10., .5, 0.)).epsilon(1e-10));
+  const laws::ClippedSpring<double> spring{.01, 10., .5, 0.};
+  CHECK(spring.force(b * (1 - 1e-12), 0.) ==
+        Approx(spring.force(b * (1 + 1e-12), 0.)).epsilon(1e-10));
   Stepper<double> mass = sprung("nlSpringDamper", "0.01 10. 0.5 0.", .2, 0.0, Passivity::always);
-  const ClippedPotential<double> potential(.01, 10., .5);
   const auto energy = [&] {
     return mass.v[0] * mass.v[0] / 2.0 +
-           (potential.energy(mass.x[0]) + potential.energy(mass.x[0] - mass.v[0])) / 2.0;
+           (spring.potential(mass.x[0]) + spring.potential(mass.x[0] - mass.v[0])) / 2.0;
   };
   const double start = energy();
   double drift = 0.0;
@@ -416,13 +416,12 @@ TEST_CASE("a passive law depends on no other lane", "[passive]") {
   Random random(7);
   for (int i = 0; i < 3000; ++i) {
     const auto any = [&](double size) { return size * random.uniform(-1.0, 1.0); };
-    const Law law =
-        static_cast<Law>(random.below(static_cast<std::size_t>(Law::clipped_contact) + 1));
+    const Law law = static_cast<Law>(random.below(law_count));
     const double profile = i % 2;
     const double c[] = {std::fabs(any(2.)), std::fabs(any(2.)) + .01,
                         law == Law::either_bow ? profile : std::fabs(any(2.)), std::fabs(any(.2)),
                         any(.2)};
-    Meeting<V> both{};
+    LinkState<V> both{};
     for (std::size_t lane = 0; lane < 2; ++lane) {
       both.now[lane] = any(1.);
       both.speed[lane] = any(1.);
@@ -430,13 +429,16 @@ TEST_CASE("a passive law depends on no other lane", "[passive]") {
       both.free[lane] = both.now[lane] + both.fast[lane];
       both.gamma[lane] = random.uniform(0., 3.);
     }
-    for (const Scheme scheme : {Scheme::centred, Scheme::substeps}) {
-      const Push<V> push = passive_push(law, scheme, 16, both, V{} + c[0], V{} + c[1], V{} + c[2],
-                                        V{} + c[3], V{} + c[4]);
+    for (const int substeps : {1, 16}) {
+      const auto push = with_law<V>(
+          law, [&](std::size_t k) { return V{} + c[k]; },
+          [&](const auto& packed) { return packed.passive(both, substeps); });
       for (std::size_t lane = 0; lane < 2; ++lane) {
-        const Meeting<double> one{both.now[lane], both.speed[lane], both.free[lane],
-                                  both.fast[lane], both.gamma[lane]};
-        const Push<double> alone = passive_push(law, scheme, 16, one, c[0], c[1], c[2], c[3], c[4]);
+        const LinkState<double> one{both.now[lane], both.speed[lane], both.free[lane],
+                                    both.fast[lane], both.gamma[lane]};
+        const auto alone = with_law<double>(
+            law, [&](std::size_t k) { return c[k]; },
+            [&](const auto& single) { return single.passive(one, substeps); });
         CAPTURE(static_cast<int>(law), lane, one.now, one.speed, one.free, one.gamma);
         CHECK(push.x[lane] == Approx(alone.x).margin(1e-13).epsilon(1e-11));
         CHECK(push.v[lane] == Approx(alone.v).margin(1e-13).epsilon(1e-11));
@@ -453,24 +455,24 @@ TEST_CASE("a bow of either profile is the one or the other, bit for bit", "[pass
     const V z = V{} + std::fabs(any(9.));
     const V s = V{} + std::fabs(any(1.)) + .01;
     const V profile = i % 2 == 0 ? V{0.0, 1.0} : V{1e-9, -0.3};
-    Meeting<V> m{V{} + any(1.), V{} + any(1.), V{}, V{} + any(1.), V{} + random.uniform(0., 3.)};
+    LinkState<V> m{V{} + any(1.), V{} + any(1.), V{}, V{} + any(1.), V{} + random.uniform(0., 3.)};
     m.free = m.now + m.fast;
-    for (const Scheme scheme : {Scheme::centred, Scheme::substeps}) {
-      const auto push = [&](Law law) {
-        return passive_push(law, scheme, 8, m, z, s, profile, V{}, V{}).x;
-      };
-      const V either = push(Law::either_bow);
-      const V piecewise = push(Law::bow);
-      const V smooth = push(Law::smooth_bow);
+    const laws::EitherBow<V> both{z, s, profile};
+    const laws::SmoothBow<V> smooth_bow{z, s};
+    const laws::Bow<V> bow(z, s);
+    for (const int substeps : {1, 8}) {
+      const V either = both.passive(m, substeps).x;
+      const V piecewise = bow.passive(m, substeps).x;
+      const V smooth = smooth_bow.passive(m, substeps).x;
       for (std::size_t lane = 0; lane < 2; ++lane) {
         CHECK(either[lane] == (profile[lane] > 0.0 ? smooth : piecewise)[lane]);
       }
     }
     const V v = m.speed;
-    const V plain = either_bow_force(v, z, s, profile);
+    const V plain = both.force(V{}, v);
     for (std::size_t lane = 0; lane < 2; ++lane) {
       CHECK(plain[lane] ==
-            (profile[lane] > 0.0 ? smooth_bow_force(v, z, s) : bow_force(v, z, s))[lane]);
+            (profile[lane] > 0.0 ? smooth_bow.force(V{}, v) : bow.force(V{}, v))[lane]);
     }
   }
 }

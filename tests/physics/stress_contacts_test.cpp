@@ -4,7 +4,7 @@
 
 #include "core/kernels/chains/chains_form.h"
 #include "core/kernels/grid/grid_form.h"
-#include "core/kernels/laws.h"
+#include "core/laws/laws.h"
 #include "tests/support/passive.h"
 
 namespace ressort {
@@ -52,7 +52,8 @@ double plucked_finely(double k, double speed) {
   runge_kutta(
       fineness,
       [&](double t, double x, double v) {
-        return pluck_force(finger_start + speed * t - x, speed - v, k, pluck_scale, 0.) -
+        return laws::Pluck<double>(k, pluck_scale, 0.)
+                   .force(finger_start + speed * t - x, speed - v) -
                pluck_k * x;
       },
       [&](std::int64_t i, double x, double v) {
@@ -122,7 +123,7 @@ Sound bowed_finely(double z) {
   runge_kutta(
       fineness,
       [&](double, double x, double v) {
-        return bow_force(bow_speed - v, z, bow_scale) - .01 * x - .0005 * v;
+        return laws::Bow<double>(z, bow_scale).force(0., bow_speed - v) - .01 * x - .0005 * v;
       },
       [&](std::int64_t i, double x, double v) {
         states.emplace_back(x, v);

@@ -7,6 +7,7 @@
 #include <complex>
 #include <vector>
 
+#include "core/laws/laws.h"
 #include "tests/support/rig.h"
 
 namespace ressort::rig {

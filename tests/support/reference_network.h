@@ -2,6 +2,7 @@
 // description and never from the model room's.
 #pragma once
 
+#include "core/laws/laws.h"
 #include "core/model/network.h"
 #include "tests/support/reference.h"
 
@@ -162,29 +163,29 @@ class Builder {
   void add_link(const Link& link) {
     Point& a = *points_[link.a];
     Point& b = *points_[link.b];
-    std::array<Number, max_link_arguments> n;
+    std::array<Number, most_law_arguments> n;
     std::transform(link.arguments.begin(), link.arguments.end(), n.begin(),
                    [&](ArgumentId id) { return number(id); });
-    switch (link.kind) {
-      case LinkKind::spring:
+    switch (link.law) {
+      case Law::spring:
         return simulator_.add_spring(a, b, n[0], n[1]);
-      case LinkKind::quadratic_spring:
+      case Law::quadratic_spring:
         return simulator_.add_nonlinear_spring(a, b, n[0], n[1], n[2], false);
-      case LinkKind::cubic_spring:
+      case Law::cubic_spring:
         return simulator_.add_nonlinear_spring(a, b, n[0], n[1], n[2], true);
-      case LinkKind::clipped_spring:
+      case Law::clipped_spring:
         return simulator_.add_clipped_spring(a, b, n[0], n[1], n[2], n[3]);
-      case LinkKind::pluck:
+      case Law::pluck:
         return simulator_.add_pluck(a, b, n[0], n[1], n[2]);
-      case LinkKind::bow:
+      case Law::bow:
         return simulator_.add_bow(a, b, n[0], n[1]);
-      case LinkKind::smooth_bow:
+      case Law::smooth_bow:
         return simulator_.add_smooth_bow(a, b, n[0], n[1]);
-      case LinkKind::either_bow:
+      case Law::either_bow:
         return simulator_.add_either_bow(a, b, n[0], n[1], n[2]);
-      case LinkKind::contact:
+      case Law::contact:
         return simulator_.add_contact(a, b, n[0], n[1], n[2]);
-      case LinkKind::clipped_contact:
+      case Law::clipped_contact:
         return simulator_.add_clipped_contact(a, b, n[0], n[1], n[2], n[3], n[4]);
     }
   }

@@ -6,6 +6,7 @@
 #include <set>
 
 #include "core/analysis/continuous.h"
+#include "core/laws/laws.h"
 #include "core/model/generate.h"
 #include "core/model/language/mdl.h"
 #include "core/model/topology.h"
@@ -81,7 +82,7 @@ Network string_on_stop() {
   };
   Mass stop{.kind = MassKind::ground, .position = -0.02, .third = -0.02};
   network.masses.push_back(stop);
-  Link touch{.kind = LinkKind::contact,
+  Link touch{.law = Law::contact,
              .a = static_cast<std::uint32_t>(network.masses.size() - 1),
              .b = mass_called(network, "s_m20")};
   touch.arguments = {number(10.0), number(0.0), number(0.0), no_argument, no_argument};
@@ -89,9 +90,9 @@ Network string_on_stop() {
   return canonical(std::move(network));
 }
 
-bool has_kind(const Network& network, LinkKind kind) {
+bool has_contacts(const Network& network) {
   return std::any_of(network.links.begin(), network.links.end(),
-                     [&](const Link& link) { return link.kind == kind; });
+                     [](const Link& link) { return facts_of(link.law).family == Family::contact; });
 }
 
 double value_of(const ControlSetting& control) {
@@ -202,8 +203,7 @@ void play_note(ChartScene& scene, const Preset& preset) {
 void excite(ChartScene& scene, const Preset& preset) {
   scene.hands.resize(scene.network.inputs.size());
   scene.is_linear = is_linear(scene.network);
-  scene.has_contacts = has_kind(scene.network, LinkKind::contact) ||
-                       has_kind(scene.network, LinkKind::clipped_contact);
+  scene.has_contacts = has_contacts(scene.network);
   if (!is_still(scene.network)) {
     scene.about = "as it starts";
   } else if (scene.is_linear) {

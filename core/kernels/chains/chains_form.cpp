@@ -4,6 +4,7 @@
 #include <array>
 
 #include "core/kernels/passive.h"
+#include "core/laws/laws.h"
 
 namespace ressort {
 namespace {

@@ -3,7 +3,7 @@
 #include <utility>
 
 #include "core/kernels/chains/chains.h"
-#include "core/kernels/laws.h"
+#include "core/laws/laws.h"
 
 namespace ressort::RESSORT_ISA {
 namespace {
@@ -319,20 +319,16 @@ struct Reach {
   T high;
 };
 
-template <class S>
+template <class ForceLaw, class S>
 Reach<typename S::Number> reach_of(const LinkRun& run, const S& s) {
   using T = typename S::Number;
   constexpr T far = std::numeric_limits<T>::infinity();
-  const auto c = [&](std::size_t i) { return s.coefficient[run.coefficients[i]]; };
-  switch (run.law) {
-    case Law::pluck:
-      return {-c(1), c(1)};
-    case Law::contact:
-      return {-c(2), far};
-    case Law::clipped_contact:
-      return {-c(4), far};
-    default:
-      return {-far, far};
+  constexpr const LawFacts& law = ForceLaw::facts;
+  if constexpr (law.lets_go()) {
+    const T reach = s.coefficient[run.coefficients[law.slot(Role::reach)]];
+    return {-reach, law.zone == Zone::near ? reach : far};
+  } else {
+    return {-far, far};
   }
 }
 
@@ -340,9 +336,9 @@ Reach<typename S::Number> reach_of(const LinkRun& run, const S& s) {
 // bodies are near enough to touch is guessed, as it seldom changes: the next sample then waits for
 // no force.
 template <class S, class ForceLaw>
-void add_forces(const LinkRun& run, S& s, ForceLaw&& law) {
+void add_forces(const LinkRun& run, S& s, const ForceLaw& law) {
   using P = Pack<typename S::Number, 16>;
-  const auto reach = reach_of(run, s);
+  const auto reach = reach_of<ForceLaw>(run, s);
   const PlacedEnds* const last = s.ends + run.first + run.count;
   for (const PlacedEnds* ends = last - run.count; ends != last; ++ends) {
     const auto* const a = s.bodies + ends->a;
@@ -351,7 +347,7 @@ void add_forces(const LinkRun& run, S& s, ForceLaw&& law) {
     if (d <= reach.low || d >= reach.high) {
       continue;
     }
-    const auto f = law(P{d}, P{a[S::lanes] - b[S::lanes]})[0];
+    const auto f = law.force(P{d}, P{a[S::lanes] - b[S::lanes]})[0];
     s.force[ends->force_a] -= f;
     s.force[ends->force_b] += f;
   }
@@ -362,8 +358,7 @@ void step_links(S& s) {
   using P = Pack<typename S::Number, 16>;
   for (const LinkRun& run : s.link_runs) {
     const auto c = [&](std::size_t i) { return all<P>(s.coefficient[run.coefficients[i]]); };
-    with_law<P>(run.law, c(0), c(1), c(2), c(3), c(4),
-                [&](auto&& law) { add_forces(run, s, law); });
+    with_law<P>(run.law, c, [&](const auto& law) { add_forces(run, s, law); });
   }
 }
 
@@ -438,8 +433,8 @@ T force_at(const Program& program, const ChainsTables& tables, const S& s, const
   for (std::uint32_t i = output.first; i < output.first + output.count; ++i) {
     const Probe& probe = tables.probes[i];
     const T* const there = s.bodies + probe.neighbour;
-    force += spring_force(there[0] - here[0], there[S::lanes] - here[S::lanes],
-                          s.coefficient[probe.stiffness], s.coefficient[probe.damping]);
+    const laws::Spring<T> spring{s.coefficient[probe.stiffness], s.coefficient[probe.damping]};
+    force += spring.force(there[0] - here[0], there[S::lanes] - here[S::lanes]);
   }
   for (const PlacedInput& input : s.forces) {
     if (input.place == output.place) {

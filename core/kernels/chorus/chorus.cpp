@@ -115,7 +115,7 @@ class Filler {
     for (const std::uint32_t coefficient : run.coefficients) {
       copy(coefficient);
     }
-    copy(run.coefficients[2]);
+    ++slots_;
   }
 
   void add_walked() {

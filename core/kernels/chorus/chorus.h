@@ -20,10 +20,10 @@ namespace ressort {
 //     of the links     as below, of each link
 //   and otherwise
 //     of the masses    1/M, K, Z and g of each run
-//     of the links     those of the law, or a PluckShape or BowShape, and its Z, of each run
+//     of the links     the arguments of the law, or what it keeps instead, of each run
 inline constexpr std::size_t chorus_node_cells = 3;
 inline constexpr std::size_t chorus_run_slots = 4;
-inline constexpr std::size_t chorus_link_slots = 6;
+inline constexpr std::size_t chorus_link_slots = most_kept_numbers;
 
 struct ChorusTable {
   struct Copy {

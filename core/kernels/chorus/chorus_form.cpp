@@ -1,4 +1,5 @@
 #include "core/kernels/chorus/chorus_form.h"
+#include "core/laws/laws.h"
 
 #include <algorithm>
 

@@ -2,7 +2,7 @@
 #include <type_traits>
 
 #include "core/kernels/chorus/chorus.h"
-#include "core/kernels/laws.h"
+#include "core/laws/laws.h"
 
 namespace ressort::RESSORT_ISA {
 namespace {
@@ -23,28 +23,20 @@ template <std::uint32_t N, std::uint32_t I = 0, class Use>
   }
 }
 
-// Calls `use` with the law as a constant: it is not chosen anew for every pack.
-template <class Use>
-[[gnu::always_inline]] inline void with_constant(Law law, Use&& use) {
-  each<static_cast<std::uint32_t>(Law::clipped_contact) + 1>([&](auto i) {
-    constexpr auto constant = static_cast<Law>(decltype(i)::value);
-    if (law == constant) {
-      use(std::integral_constant<Law, constant>{});
-    }
-  });
-}
+// A law that a kernel may keep as numbers that follow from its arguments.
+template <class ForceLaw, class V>
+concept Kept = requires(const ForceLaw& law, V* row) {
+  law.keep(row);
+};
 
-template <class V, Law law>
-[[gnu::always_inline]] inline V force_of(const V* slot, V d, V v) {
-  if constexpr (law == Law::pluck) {
-    return pluck_force(d, v, PluckShape<V>(slot), slot[5]);
-  } else if constexpr (law == Law::bow) {
-    return bow_force(v, BowShape<V>(slot));
+// The law of a link's slots.
+template <class V, class Type>
+[[gnu::always_inline]] inline auto law_in(const V* slot) {
+  using ForceLaw = typename Type::template With<V>;
+  if constexpr (Kept<ForceLaw, V>) {
+    return ForceLaw(slot);
   } else {
-    V force{};
-    with_law<V>(law, slot[0], slot[1], slot[2], slot[3], slot[4],
-                [&](auto&& exact) { force = exact(d, v); });
-    return force;
+    return law_of<Type, V>([&](std::size_t i) { return slot[i]; });
   }
 }
 
@@ -117,11 +109,11 @@ void fill_slots(const ChorusTable& table, const V* coefficients, const Packs<V>&
   for (const Law law : table.laws) {
     V* slot = slots;
     for (std::size_t pack = 0; pack < packs.count; ++pack, slot += packs.stride) {
-      if (law == Law::pluck) {
-        PluckShape<V>(slot[0], slot[1]).keep(slot);
-      } else if (law == Law::bow) {
-        BowShape<V>(slot[0], slot[1]).keep(slot);
-      }
+      with_law_type(law, [&]<class Type>(Type) {
+        if constexpr (Kept<typename Type::template With<V>, V>) {
+          law_of<Type, V>([&](std::size_t i) { return slot[i]; }).keep(slot);
+        }
+      });
     }
     slots += chorus_link_slots;
   }
@@ -160,12 +152,12 @@ void give_positions(const Program& program, const Packs<V>& packs, V* outputs) {
 }
 
 // Adds what a link exerts to the masses' forces.
-template <class V, Law law>
+template <class V, class Type>
 [[gnu::always_inline]] inline void link(const Packs<V>& packs, const V* slot, std::uint32_t a,
                                         std::uint32_t b, std::uint32_t masses) {
   for (std::size_t pack = 0; pack < packs.count; ++pack, slot += packs.stride) {
     Node<V>* const nodes = packs.nodes(pack);
-    const V force = force_of<V, law>(slot, nodes[a].x - nodes[b].x, nodes[a].v - nodes[b].v);
+    const V force = law_in<V, Type>(slot).force(nodes[a].x - nodes[b].x, nodes[a].v - nodes[b].v);
     if (a < masses) {
       nodes[a].force -= force;
     }
@@ -352,7 +344,7 @@ class Holder {
       if ((anchored & 1u << i) != 0) {
         const Node<V>& anchor = nodes[anchor_[i]];
         const V* const own = slot + anchors + 2 * i;
-        f[i] += spring_force(anchor.x - x[i], anchor.v - v[i], own[0], own[1]);
+        f[i] += laws::Spring<V>{own[0], own[1]}.force(anchor.x - x[i], anchor.v - v[i]);
       }
     });
     each<N>([&](auto b) {
@@ -360,7 +352,7 @@ class Holder {
         constexpr std::uint32_t pair = b * (b - 1) / 2 + a;
         if (is_alike || N <= 3 || (linked & 1u << pair) != 0) {
           const V* const own = slot + pairs + (is_alike ? 0 : 2 * pair);
-          const V force = spring_force(x[a] - x[b], v[a] - v[b], own[0], own[1]);
+          const V force = laws::Spring<V>{own[0], own[1]}.force(x[a] - x[b], v[a] - v[b]);
           f[a] -= force;
           f[b] += force;
         }
@@ -372,8 +364,8 @@ class Holder {
     const V* slot = packs_.slots + table_.first_link;
     const Law* law = table_.laws.data();
     for (const ChorusLink& each_link : chorus_.links) {
-      with_constant(*law, [&](auto constant) {
-        link<V, decltype(constant)::value>(packs_, slot, each_link.a, each_link.b, N);
+      with_law_type(*law, [&]<class Type>(Type) {
+        link<V, Type>(packs_, slot, each_link.a, each_link.b, N);
       });
       slot += chorus_link_slots;
       ++law;
@@ -456,10 +448,10 @@ void walk_links(const Program& program, const ChorusTable& table, const Packs<V>
     if (run.scheme != Scheme::plain) {
       continue;
     }
-    with_constant(run.law, [&](auto law) {
+    with_law_type(run.law, [&]<class Type>(Type) {
       const Ends* const ends = program.ends.data() + run.first;
       for (std::uint32_t i = 0; i < run.count; ++i) {
-        link<V, decltype(law)::value>(packs, slot, ends[i].a, ends[i].b, program.moving);
+        link<V, Type>(packs, slot, ends[i].a, ends[i].b, program.moving);
       }
     });
     slot += chorus_link_slots;

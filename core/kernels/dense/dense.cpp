@@ -10,25 +10,6 @@ namespace {
 constexpr std::size_t least_leap = 6;  // frames; fewer are walked
 constexpr std::size_t most_walk = 32;  // frames, before the next leap is tried
 
-// A port's law that is 0 nowhere makes every block a walk.
-bool acts_everywhere(Law law) {
-  switch (law) {
-    case Law::pluck:
-    case Law::bow:
-    case Law::contact:
-    case Law::clipped_contact:
-      return false;
-    case Law::spring:
-    case Law::quadratic_spring:
-    case Law::cubic_spring:
-    case Law::clipped_spring:
-    case Law::smooth_bow:
-    case Law::either_bow:
-      return true;
-  }
-  return true;
-}
-
 std::size_t round_up(std::size_t count, std::size_t to) {
   return (count + to - 1) / to * to;
 }
@@ -157,7 +138,7 @@ void DenseKernel<T>::place_links() {
   for (const DensePort& port : form_.ports) {
     const LinkRun& run = program_.link_runs[port.run];
     const auto [a, b] = program_.ends[port.link];
-    can_leap_ &= !acts_everywhere(run.law);
+    can_leap_ &= facts_of(run.law).zone != Zone::everywhere;  // else every block is a walk
     ports_.push_back({.law = run.law,
                       .coefficients = run.coefficients,
                       .a = slots_[a],

@@ -25,8 +25,8 @@ inline constexpr std::uint32_t no_hand = 0xffffffffu;
 // Slots are where a node's x and v are while walking: masses at [0, stride), others after them.
 // A mass has the same number in the state. That of the first port is 0, its other one 1.
 struct DenseLink {
-  Law law = Law::spring;
-  std::array<std::uint32_t, 5> coefficients{};
+  Law law{};
+  std::array<std::uint32_t, most_law_arguments> coefficients{};
   std::uint32_t a = 0;  // slots
   std::uint32_t b = 0;
   std::uint32_t hand_a = no_hand;  // inputs, where such an end is moved by one

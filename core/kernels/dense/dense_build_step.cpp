@@ -112,7 +112,7 @@ struct Build {
   }
 
   std::size_t entry_of(const DenseLink& port, std::uint32_t mass) const {
-    return port.law == Law::bow ? b.masses + mass : mass;
+    return facts_of(port.law).zone == Zone::slow ? b.masses + mass : mass;
   }
 
   void put_first_sample() {

@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "core/kernels/dense/dense.h"
+#include "core/laws/laws.h"
 
 namespace ressort {
 namespace {

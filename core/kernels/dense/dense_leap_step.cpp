@@ -1,6 +1,6 @@
 // The leaps of the dense kernel, compiled for each instruction set.
 #include "core/kernels/dense/dense.h"
-#include "core/kernels/laws.h"
+#include "core/laws/laws.h"
 
 namespace ressort::RESSORT_ISA {
 namespace {
@@ -224,20 +224,14 @@ struct Leap {
   // The first frame in which the port's law acts, or count.
   std::size_t first_touch(std::size_t p) {
     const DenseLink& port = b.port[p];
-    const auto zone = [&](std::size_t i) { return b.ramps.value[port.coefficients[i]]; };
-    switch (port.law) {
-      case Law::contact:
-        return first_touch<false>(p, zone(2));
-      case Law::clipped_contact:
-        return first_touch<false>(p, zone(4));
-      default:
-        return first_touch<true>(p, zone(1));
-    }
+    const LawFacts& law = facts_of(port.law);
+    const T reach = b.ramps.value[port.coefficients[law.slot(Role::reach)]];
+    return law.zone == Zone::below ? first_touch<false>(p, reach) : first_touch<true>(p, reach);
   }
   template <bool on_both_sides>
   std::size_t first_touch(std::size_t p, T zone) {
     const DenseLink& port = b.port[p];
-    const bool is_bow = port.law == Law::bow;
+    const bool is_bow = facts_of(port.law).zone == Zone::slow;
     const End a = end_of(is_bow, port.a, port.hand_a, port.a_moves);
     const End c = end_of(is_bow, port.b, port.hand_b, port.b_moves);
     if (!is_driven) {

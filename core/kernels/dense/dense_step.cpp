@@ -3,7 +3,7 @@
 #include <utility>
 
 #include "core/kernels/dense/dense.h"
-#include "core/kernels/laws.h"
+#include "core/laws/laws.h"
 
 namespace ressort::RESSORT_ISA {
 namespace {
@@ -16,7 +16,7 @@ inline void each_port(const DenseBody<T>& b, Add&& add) {
     const T d = b.x[port.a] - b.x[port.b];
     const T v = b.v[port.a] - b.v[port.b];
     const auto c = [&](std::size_t i) { return b.ramps.value[port.coefficients[i]]; };
-    with_law<T>(port.law, c(0), c(1), c(2), c(3), c(4), [&](auto&& law) { add(p, law(d, v)); });
+    with_law<T>(port.law, c, [&](const auto& law) { add(p, law.force(d, v)); });
   }
 }
 
@@ -328,7 +328,7 @@ struct Walk {
         const T lead = ports.by * reach[0] * pulled;
         const T d = ports.by * (x.pack[0][0] + next.pack[0][0] - b.x[ports.other]);
         const T speed = ports.by * (next.pack[0][0] - b.v[ports.other]);
-        force = ports.law(d + lead, speed + lead);
+        force = ports.law.force(d + lead, speed + lead);
         add(v, reach, pulled);
         add(after, b.echo, pulled);
       } else {
@@ -368,8 +368,8 @@ struct Walk {
         const std::uint32_t other = port.a_moves ? port.b : port.a;
         const T by = port.a_moves ? T(1) : T(-1);
         const auto c = [&](std::size_t i) { return b.ramps.value[port.coefficients[i]]; };
-        return with_law<T>(port.law, c(0), c(1), c(2), c(3), c(4), [&]<class F>(F&& law) {
-          walk(b, drive, at, count, OnePort<T, std::remove_reference_t<F>>{law, other, by});
+        return with_law<T>(port.law, c, [&]<class ForceLaw>(const ForceLaw& law) {
+          walk(b, drive, at, count, OnePort<T, ForceLaw>{law, other, by});
         });
       }
     }

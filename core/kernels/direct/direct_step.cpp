@@ -1,7 +1,7 @@
 // The loops of the direct kernel, compiled for each instruction set.
 #include "core/kernels/direct/direct.h"
-#include "core/kernels/laws.h"
 #include "core/kernels/passive.h"
+#include "core/laws/laws.h"
 
 namespace ressort::RESSORT_ISA {
 namespace {
@@ -129,14 +129,14 @@ void step_masses(const Program& program, S& s) {
   }
 }
 
-// The loop over one run's links, for any law of (d, v).
+// The loop over one run's links, of any law.
 template <class S, class ForceLaw>
 void add_forces(const Program& program, const LinkRun& run, S& s, ForceLaw&& law) {
   using V = typename S::V;
   const Ends* const ends = program.ends.data() + run.first;
   for (std::uint32_t i = 0; i < run.count; ++i) {
     const auto [a, b] = ends[i];
-    const V f = law(s.between(a, b), s.v[a] - s.v[b]);
+    const V f = law.force(s.between(a, b), s.v[a] - s.v[b]);
     s.force[a] -= f;
     s.force[b] += f;
   }
@@ -149,12 +149,8 @@ void step_links(const Program& program, S& s) {
     if (run.scheme != Scheme::plain) {
       continue;
     }
-    const V c0 = s.coefficient[run.coefficients[0]];
-    const V c1 = s.coefficient[run.coefficients[1]];
-    const V c2 = s.coefficient[run.coefficients[2]];
-    const V c3 = s.coefficient[run.coefficients[3]];
-    const V c4 = s.coefficient[run.coefficients[4]];
-    with_law<V>(run.law, c0, c1, c2, c3, c4, [&](auto&& law) { add_forces(program, run, s, law); });
+    const auto c = [&](std::size_t i) { return s.coefficient[run.coefficients[i]]; };
+    with_law<V>(run.law, c, [&](const auto& law) { add_forces(program, run, s, law); });
   }
 }
 

@@ -1,4 +1,5 @@
 #include "core/kernels/direct/fourth_form.h"
+#include "core/laws/laws.h"
 
 #include <algorithm>
 #include <cmath>
@@ -88,12 +89,12 @@ class Bounder {
   template <class Use>
   void each_link(const Weighing& weighing, Use&& use) const {
     for (const LinkRun& run : program_.link_runs) {
-      const bool is_bent = run.law == Law::quadratic_spring || run.law == Law::cubic_spring;
-      if (run.law != Law::spring && !is_bent) {
+      const LawFacts& law = facts_of(run.law);
+      if (!law.contains_spring) {
         continue;
       }
-      const double weight = weight_of(weighing, value_[run.coefficients[0]],
-                                      value_[run.coefficients[is_bent ? 2 : 1]]);
+      const double weight = weight_of(weighing, value_[run.coefficients[law.slot(Role::stiffness)]],
+                                      value_[run.coefficients[law.slot(Role::damping)]]);
       for (std::uint32_t link = run.first; link < run.first + run.count; ++link) {
         use(program_.ends[link], weight);
       }

@@ -1,6 +1,6 @@
 // The loops of the fourth-order kernel, compiled for each instruction set.
 #include "core/kernels/direct/fourth.h"
-#include "core/kernels/laws.h"
+#include "core/laws/laws.h"
 
 namespace ressort::RESSORT_ISA {
 namespace {
@@ -83,7 +83,7 @@ void correct_springs(const Program& program, const Fourth& form, S& s) {
     const Ends* const ends = program.ends.data() + links.first;
     for (std::uint32_t i = 0; i < links.count; ++i) {
       const auto [a, b] = ends[i];
-      const V f = spring_force(s.ahead[a] - s.ahead[b], s.faster[a] - s.faster[b], k, z);
+      const V f = laws::Spring<V>{k, z}.force(s.ahead[a] - s.ahead[b], s.faster[a] - s.faster[b]);
       s.force[a] -= f;
       s.force[b] += f;
     }
@@ -117,7 +117,7 @@ void add_forces(const Program& program, const FourthLinks& links, S& s, ForceLaw
   const Ends* const ends = program.ends.data() + links.first;
   for (std::uint32_t i = 0; i < links.count; ++i) {
     const auto [a, b] = ends[i];
-    const V f = law(s.x[a] - s.x[b], s.v[a] - s.v[b]);
+    const V f = law.force(s.x[a] - s.x[b], s.v[a] - s.v[b]);
     s.force[a] -= f;
     s.force[b] += f;
   }
@@ -129,8 +129,7 @@ void pull_others(const Program& program, const Fourth& form, S& s) {
   for (const FourthLinks& links : form.others) {
     const LinkRun& run = program.link_runs[links.run];
     const auto c = [&](std::size_t i) { return s.coefficient[run.coefficients[i]]; };
-    with_law<V>(run.law, c(0), c(1), c(2), c(3), c(4),
-                [&](auto&& law) { add_forces(program, links, s, law); });
+    with_law<V>(run.law, c, [&](const auto& law) { add_forces(program, links, s, law); });
   }
 }
 

@@ -9,14 +9,10 @@
 
 #include "core/kernels/grid/grid_places.h"
 #include "core/kernels/passive.h"
+#include "core/laws/laws.h"
 
 namespace ressort {
 namespace {
-
-// Whether f(-d, -v) = -f(d, v), so that the ends may be exchanged.
-bool is_odd(Law law) {
-  return law != Law::contact && law != Law::clipped_contact;
-}
 
 // Fits a Program's links into places. With a spring run: its links act through the sum over
 // neighbours, all others are rest. Without: the links of every run that has many, offset by offset.
@@ -107,7 +103,8 @@ class Fit {
   }
 
   Family family_of(std::uint32_t run, std::uint32_t a, std::uint32_t b) const {
-    return {run, std::max(a, b) - std::min(a, b), a > b && !is_odd(program_.link_runs[run].law)};
+    return {run, std::max(a, b) - std::min(a, b),
+            a > b && !facts_of(program_.link_runs[run].law).is_odd};
   }
 
   // The offsets that many links of a span have. Where an offset leads to nobody, the sum over

@@ -2,7 +2,7 @@
 #include <utility>
 
 #include "core/kernels/grid/grid.h"
-#include "core/kernels/laws.h"
+#include "core/laws/laws.h"
 
 namespace ressort::RESSORT_ISA {
 namespace {
@@ -162,7 +162,9 @@ void compute_links(const View<T>& s, std::size_t begin, std::size_t end) {
   const T* c = s.state.held;
   for (const GridLinks& links : s.grid.links) {
     const Law law = s.program.link_runs[links.run].law;
-    with_law<V>(law, V{} + c[0], V{} + c[1], V{} + c[2], V{} + c[3], V{} + c[4], [&](auto&& f) {
+    const auto value = [&](std::size_t i) { return V{} + c[i]; };
+    with_law<V>(law, value, [&](const auto& exact) {
+      const auto f = [exact](V d, V v) { return exact.force(d, v); };
       with_count<most_grid_offsets / 2>(links.offsets.size(), [&]<std::size_t n>() {
         if (links.is_reversed) {
           pull_links<n>(s, links, row, begin, end, [f](V d, V v) { return -f(-d, -v); });
@@ -172,7 +174,7 @@ void compute_links(const View<T>& s, std::size_t begin, std::size_t end) {
       });
     });
     row += links.offsets.size();
-    c += 5;
+    c += most_law_arguments;
   }
 }
 
@@ -348,10 +350,11 @@ template <class T>
     const LinkRun& run = s.program.link_runs[rest.run];
     const auto& k = run.coefficients;
     const T weight = rest.is_excess ? T(-1) : T(1);
-    with_law<T>(run.law, c[k[0]], c[k[1]], c[k[2]], c[k[3]], c[k[4]], [&](auto&& law) {
+    const auto value = [&](std::size_t i) { return c[k[i]]; };
+    with_law<T>(run.law, value, [&](const auto& law) {
       for (std::uint32_t i = rest.first; i < rest.first + rest.count; ++i) {
         const auto [a, b] = s.grid.rest_ends[i];
-        const T f = law(s.state.x[a] - s.state.x[b], s.state.v[a] - s.state.v[b]) * weight;
+        const T f = law.force(s.state.x[a] - s.state.x[b], s.state.v[a] - s.state.v[b]) * weight;
         s.state.force[a] -= f;
         s.state.force[b] += f;
       }

@@ -10,6 +10,7 @@
 #include <limits>
 
 #include "core/kernels/modal/modal_sweep.h"
+#include "core/laws/laws.h"
 
 namespace ressort::RESSORT_ISA {
 namespace {
@@ -74,51 +75,31 @@ T norm_of_kicks(T sum, T length) {
 template <class T>
 bool may_act(const LinkRun& run, const T* coefficients, Range<T> d) {
   const auto c = [&](std::size_t i) { return coefficients[run.coefficients[i]]; };
-  switch (run.law) {
-    case Law::pluck:
-      return (c(0) != 0 || c(2) != 0) && c(1) > d.low && d.high > -c(1);
-    case Law::contact:
-      return (c(0) != 0 || c(1) != 0) && d.high > -c(2);
-    case Law::clipped_contact:
-      return d.high > -c(4);
-    case Law::bow:
-    case Law::smooth_bow:
-    case Law::either_bow:
-      return c(0) != 0;
-    default:
-      return true;
-  }
+  return with_law_type(run.law, [&]<class Type>(Type) {
+    constexpr const LawFacts& law = Type::facts;
+    bool exerts = false;
+    for (std::size_t i = 0; i < law.count; ++i) {
+      exerts = exerts || (law.is_strength(i) && c(i) != 0);
+    }
+    if constexpr (law.lets_go()) {
+      const T reach = c(law.slot(Role::reach));
+      return exerts && d.high > -reach && (law.zone == Zone::below || reach > d.low);
+    } else {
+      return exerts;
+    }
+  });
 }
+
+inline bool lets_go(Law law) {
+  return with_law_type(law, [](auto type) { return type.facts.lets_go(); });
+}
+
 // What is left of a link's force where its ends give way, as a spring in series with it does. For
 // a curved law by the line through where it is; what only rubs is not felt by a spring.
-template <class T>
-T share_of_give(const LinkRun& run, const T* coefficients, T d, T give) {
-  const auto c = [&](std::size_t i) { return coefficients[run.coefficients[i]]; };
-  T stiffness = 0;
-  switch (run.law) {
-    case Law::quadratic_spring:
-      stiffness = c(0) + c(1) * absolute(d);
-      break;
-    case Law::cubic_spring:
-      stiffness = c(0) + c(1) * d * d;
-      break;
-    case Law::contact:
-      stiffness = c(0);
-      break;
-    case Law::clipped_spring:
-    case Law::clipped_contact:
-      stiffness = c(2);
-      break;
-    case Law::pluck:
-      stiffness = c(0) / 10;
-      break;
-    default:
-      break;
-  }
+template <class T, class ForceLaw>
+T share_of_give(const ForceLaw& law, T d, T give) {
+  const T stiffness = law.secant(d);
   return give > 0 && stiffness > 0 ? 1 / (1 + give * stiffness) : T(1);
-}
-inline bool acts_by_position(Law law) {
-  return law == Law::pluck || law == Law::contact || law == Law::clipped_contact;
 }
 
 }  // namespace

@@ -8,7 +8,7 @@
 #include <utility>
 
 #include "core/kernels/modal/modal_worth.h"
-#include "core/linear_algebra/eigen.h"
+#include "core/laws/laws.h"
 
 namespace ressort {
 namespace {

@@ -1,8 +1,8 @@
 // The modal kernel's way through a block, compiled for each instruction set.
-#include "core/kernels/laws.h"
 #include "core/kernels/modal/modal_bounds.h"
 #include "core/kernels/modal/modal_mix.h"
 #include "core/kernels/modal/modal_sleep.h"
+#include "core/laws/laws.h"
 
 namespace ressort::RESSORT_ISA {
 namespace {
@@ -376,13 +376,13 @@ struct Player : Mixer<T> {
     for (std::size_t h = 0; h < modes.holds.size(); ++h) {
       const LinkRun& run = program.link_runs[modes.holds[h].run];
       const auto c = [&](std::size_t i) { return coefficient(run.coefficients[i]); };
-      with_law<T>(run.law, c(0), c(1), c(2), c(3), c(4), [&](auto&& law) {
+      with_law<T>(run.law, c, [&](const auto& law) {
         for (std::size_t i = 0; i < s.held[h]; ++i, ++ends, ++give) {
           const auto [a, b] = *ends;
           const T d = s.x[a] - s.x[b];
-          T f = law(d, s.v[a] - s.v[b]);
+          T f = law.force(d, s.v[a] - s.v[b]);
           if (*give > 0) {
-            f *= share_of_give(run, s.ramps.value, d, *give / coefficient(modes.give_by));
+            f *= share_of_give(law, d, *give / coefficient(modes.give_by));
           }
           acts |= f != 0;
           s.force[a] -= f;
@@ -450,7 +450,7 @@ struct Player : Mixer<T> {
         if (!may_act_within(run, hold.a[i], hold.b[i], first, frames, norm)) {
           continue;
         }
-        if (!acts_by_position(run.law)) {
+        if (!lets_go(run.law)) {
           return false;
         }
         suspect(hold.a[i], rows);

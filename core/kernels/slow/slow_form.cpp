@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "core/kernels/direct/fourth_form.h"
+#include "core/laws/laws.h"
 
 namespace ressort {
 namespace {

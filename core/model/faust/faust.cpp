@@ -366,10 +366,10 @@ class Writer {
     std::string text;
     for (std::size_t i = 0; i < network_.links.size(); ++i) {
       const Link& link = network_.links[i];
-      const FaustLaw law = faust_law(link.kind);
-      used_.insert(law.name);
-      text += "  f_" + link_[i] + " = " + law.name + "(";
-      for (std::size_t k = 0; k < law.arguments; ++k) {
+      const LawFacts& law = facts_of(link.law);
+      used_.emplace(law.name);
+      text += "  f_" + link_[i] + " = " + std::string(law.name) + "(";
+      for (std::size_t k = 0; k < law.count; ++k) {
         text += value(link.arguments[k]) + ", ";
       }
       const std::string& a = mass_[link.a];
@@ -418,12 +418,13 @@ class Writer {
   }
 
   // By the model, or by what the model uses; no definition stands on more than one other.
-  bool is_used(const std::string& name) const {
+  bool is_used(std::string_view name) const {
+    const std::string call = " " + std::string(name) + "(";
     const auto definitions = faust_definitions();
-    return used_.contains(name) ||
+    return used_.contains(std::string(name)) ||
            std::any_of(definitions.begin(), definitions.end(), [&](const FaustDefinition& other) {
-             return used_.contains(other.name) &&
-                    std::string_view(other.text).find(" " + name + "(") != std::string_view::npos;
+             return used_.contains(std::string(other.name)) &&
+                    other.text.find(call) != std::string_view::npos;
            });
   }
 

@@ -15,50 +15,9 @@ bool is_word(char c) {
   return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '_';
 }
 
-// The laws of core/kernels/laws.h, with how their arguments follow the sample rate. Comparisons
-// only choose: where FAUST has to compute with them, its types take ten times as long to find.
-constexpr FaustDefinition definitions[] = {
-    {"spring", "spring(k, z, d, v) = k*r*r*d + z*r*v;\n"},
-    {"quadratic_spring",
-     "quadratic_spring(k, q, z, d, v) = spring(k, z, d, v) + q*r*r*d*abs(d);\n"},
-    {"cubic_spring", "cubic_spring(k, q, z, d, v) = spring(k, z, d, v) + q*r*r*d*d*d;\n"},
-    {"clipped_spring",
-     "clipped_spring(s, c, k, z, d, v) =\n"
-     "  select2(c == 0.0, select2(s >= k, bent, spring(k, z, d, v)), spring(s, z, d, v))\n"
-     "with {\n"
-     "  bent = select2(c > 0.0, beyond, select2(c*d*d <= k - s, beyond, within));\n"
-     "  within = spring(s, z, d, v) + c*r*r*d*d*d;\n"
-     "  beyond = spring(k, z + 0.3*k*r, d, v);\n"
-     "};\n"},
-    {"pluck",
-     "pluck(k, s, z, d, v) =\n"
-     "  select2(abs(d) < s, 0.0, select2(abs(d) < s/10.0, outer, inner)*k*r*r + z*r*v)\n"
-     "with {\n"
-     "  inner = 0.0 - 0.9*d;\n"
-     "  outer = d/10.0 - s/10.0*select2(d < 0.0, 1.0, 0.0 - 1.0);\n"
-     "};\n"},
-    {"bow",
-     "bow(z, s, d, v) =\n"
-     "  select2(abs(v) < s*r, 0.0, select2(abs(v) < s*r/3.0, slip, stick)*z*r)\n"
-     "with {\n"
-     "  stick = 2.0*v/3.0;\n"
-     "  slip = (s*r*select2(v < 0.0, 1.0, 0.0 - 1.0) - v)/3.0;\n"
-     "};\n"},
-    {"smooth_bow",
-     "smooth_bow(z, s, d, v) = 0.63*z*r*v*exp(0.5 - 4.0*ratio*ratio) with { ratio = v/(s*r); "
-     "};\n"},
-    {"either_bow",
-     "either_bow(z, s, p, d, v) = select2(p > 0.0, bow(z, s, d, v), smooth_bow(z, s, d, v));\n"},
-    {"contact", "contact(k, z, t, d, v) = select2(d > 0.0 - t, 0.0, spring(k, z, d + t, v));\n"},
-    {"clipped_contact",
-     "clipped_contact(s, c, k, z, t, d, v) =\n"
-     "  select2(d > 0.0 - t, 0.0, elastic*r*r + z*r*v)\n"
-     "with {\n"
-     "  depth = d + t;\n"
-     "  elastic = select2(k < s, select2(c == 0.0, bent, s*depth), s*depth);\n"
-     "  bent = select2(c > 0.0, k*depth, select2(c*depth*depth <= k - s, k*depth, cubic));\n"
-     "  cubic = s*depth + c*depth*depth*depth;\n"
-     "};\n"},
+// Comparisons only choose, here and in the laws: where FAUST has to compute with them, its types
+// take ten times as long to find.
+constexpr FaustDefinition helpers[] = {
     {"swing",
      "swing(m, k, z, x0, v0, f) = step ~ (_, _)\n"
      "with {\n"
@@ -245,33 +204,12 @@ std::string faust_slider(const ParameterSetting& setting) {
   return text + ")";
 }
 
-FaustLaw faust_law(LinkKind kind) {
-  switch (kind) {
-    case LinkKind::spring:
-      return {"spring", 2};
-    case LinkKind::quadratic_spring:
-      return {"quadratic_spring", 3};
-    case LinkKind::cubic_spring:
-      return {"cubic_spring", 3};
-    case LinkKind::clipped_spring:
-      return {"clipped_spring", 4};
-    case LinkKind::pluck:
-      return {"pluck", 3};
-    case LinkKind::bow:
-      return {"bow", 2};
-    case LinkKind::smooth_bow:
-      return {"smooth_bow", 2};
-    case LinkKind::either_bow:
-      return {"either_bow", 3};
-    case LinkKind::contact:
-      return {"contact", 3};
-    case LinkKind::clipped_contact:
-      return {"clipped_contact", 5};
+std::vector<FaustDefinition> faust_definitions() {
+  std::vector<FaustDefinition> definitions;
+  for (const LawFacts& law : law_table()) {
+    definitions.push_back({law.name, law.faust});
   }
-  return {"spring", 2};
-}
-
-std::span<const FaustDefinition> faust_definitions() {
+  definitions.insert(definitions.end(), std::begin(helpers), std::end(helpers));
   return definitions;
 }
 

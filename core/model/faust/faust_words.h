@@ -46,19 +46,13 @@ std::string plain(std::string_view text);
 // The slider; a number where the setting leaves it no range.
 std::string faust_slider(const ParameterSetting& setting);
 
-struct FaustLaw {
-  const char* name;       // of a definition below
-  std::size_t arguments;  // of the link, before the differences of position and velocity
-};
-FaustLaw faust_law(LinkKind kind);
-
 struct FaustDefinition {
-  const char* name;
-  const char* text;
+  std::string_view name;
+  std::string_view text;
 };
 
 // What a program holds only if it uses it: the laws, and how a driven mass moves.
-std::span<const FaustDefinition> faust_definitions();
+std::vector<FaustDefinition> faust_definitions();
 
 // What every program starts with.
 std::string faust_prelude(bool rescale);

@@ -4,6 +4,7 @@
 #include <charconv>
 #include <cmath>
 
+#include "core/laws/laws.h"
 #include "core/model/language/expression.h"
 #include "core/model/language/reader.h"
 #include "core/model/topology.h"
@@ -146,18 +147,18 @@ std::uint32_t Reader::size(const Line& line, std::size_t at, std::uint32_t least
 void Reader::add_link(Line& line) {
   Link link;
   link.name = std::string(line.label.text);
-  link.kind = line.keyword->link;
+  link.law = line.keyword->law;
   link.place = {line.number, line.label.column};
   const auto a = reference(line, 0);
   const auto b = reference(line, 1);
   for (std::size_t i = 2; i < line.rest.size(); ++i) {
-    const std::size_t slot = static_cast<std::size_t>(line.keyword->first) + i - 2;
+    const std::size_t slot = static_cast<std::size_t>(line.keyword->link->first) + i - 2;
     link.arguments[slot] = argument(line, i);
   }
-  if (link.kind == LinkKind::bow) {
+  if (link.law == Law::bow) {
     choose_profile(link);
   }
-  show_dialect(line, link.kind);
+  show_dialect(line);
   if (!a || !b) {
     return;
   }
@@ -177,26 +178,19 @@ void Reader::choose_profile(Link& link) const {
   }
   const Formula& formula = out_.network.arguments[profile];
   if (!is_constant(formula)) {
-    link.kind = LinkKind::either_bow;
+    link.law = Law::either_bow;
     return;
   }
-  link.kind = evaluate(formula, {}) > 0.0 ? LinkKind::smooth_bow : LinkKind::bow;
+  link.law = evaluate(formula, {}) > 0.0 ? Law::smooth_bow : Law::bow;
   profile = no_argument;
 }
 
-// MIMS4Max alone has the clipped laws, and counts of arguments of its own.
-void Reader::show_dialect(const Line& line, LinkKind kind) {
-  const std::size_t count = line.rest.size();
-  if (kind == LinkKind::clipped_contact) {
-    show(velocity_, line, "has 'nlContact'");
-  } else if (kind == LinkKind::clipped_spring) {
-    show(velocity_, line, "has 'nlSpringDamper'");
-  } else if (kind == LinkKind::contact && count == 4) {
-    show(velocity_, line, "gives a contact no threshold");
-  } else if (kind == LinkKind::pluck && count == 5) {
-    show(velocity_, line, "gives a pluck a damping");
-  } else if (is_bow(kind) && count == 5) {
-    show(velocity_, line, "chooses a bow's profile");
+// MIMS4Max alone has some of the laws, and counts of arguments of its own.
+void Reader::show_dialect(const Line& line) {
+  const LawWord& word = *line.keyword->link;
+  const auto count = static_cast<int>(line.rest.size()) - line.keyword->references;
+  if (word.velocity_count < 0 || (word.velocity_count > 0 && count == word.velocity_count)) {
+    show(velocity_, line, word.velocity_says);
   }
 }
 
@@ -399,7 +393,7 @@ std::optional<std::uint32_t> Reader::reference(Line& line, std::size_t at) {
   }
   std::vector<std::string_view> names;
   for (const Entry& other : entries_) {
-    if (names.size() < most_suggestions && is_mass(keywords[other.keyword].element)) {
+    if (names.size() < most_suggestions && is_mass(keywords()[other.keyword].element)) {
       names.push_back(label_of(other));
     }
   }
@@ -418,7 +412,7 @@ std::optional<std::uint32_t> Reader::tap(const Line& line, const Token& token, c
   if (!macro) {
     std::vector<std::string_view> names;
     for (const Entry& other : entries_) {
-      if (keywords[other.keyword].element == Element::macro) {
+      if (keywords()[other.keyword].element == Element::macro) {
         names.push_back(label_of(other));
       }
     }

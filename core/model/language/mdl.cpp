@@ -105,11 +105,11 @@ void Reader::read_line(std::string_view text, int number) {
                  "the line ends where a keyword was expected, such as 'mass' or 'springDamper'");
   }
   const Token& word = tokens_[1];
-  const auto* found = std::find_if(std::begin(keywords), std::end(keywords),
-                                   [&](const Keyword& k) { return k.word == word.text; });
-  if (found == std::end(keywords)) {
+  const auto found = std::find_if(keywords().begin(), keywords().end(),
+                                  [&](const Keyword& k) { return k.word == word.text; });
+  if (found == keywords().end()) {
     std::vector<std::string_view> words;
-    for (const Keyword& keyword : keywords) {
+    for (const Keyword& keyword : keywords()) {
       words.push_back(keyword.word);
     }
     return error(line, word, "unknown keyword " + quoted(word.text) + suggestion(word.text, words));
@@ -118,14 +118,14 @@ void Reader::read_line(std::string_view text, int number) {
                       .length = static_cast<std::uint32_t>(text.size()),
                       .number = number,
                       .group = groups_.empty() ? 0 : groups_.back(),
-                      .keyword = static_cast<std::uint8_t>(found - std::begin(keywords))});
+                      .keyword = static_cast<std::uint8_t>(found - keywords().begin())});
 }
 
 // The line, until the next one is opened.
 Line Reader::open(const Entry& entry) {
   split(text_.substr(entry.at, entry.length), tokens_);
   Line line{.number = entry.number,
-            .keyword = &keywords[entry.keyword],
+            .keyword = &keywords()[entry.keyword],
             .label = tokens_[0],
             .word = tokens_[1],
             .group = group_names_[entry.group],
@@ -148,14 +148,14 @@ std::uint32_t& Reader::entry_of(std::string_view label) {
 
 std::optional<std::uint32_t> Reader::mass_of(std::string_view label) {
   const std::uint32_t entry = entry_of(label);
-  return entry != IndexTable::none && is_mass(keywords[entries_[entry].keyword].element)
+  return entry != IndexTable::none && is_mass(keywords()[entries_[entry].keyword].element)
              ? std::optional(entries_[entry].element)
              : std::nullopt;
 }
 
 std::optional<std::uint32_t> Reader::macro_of(std::string_view label) {
   const std::uint32_t entry = entry_of(label);
-  return entry != IndexTable::none && keywords[entries_[entry].keyword].element == Element::macro
+  return entry != IndexTable::none && keywords()[entries_[entry].keyword].element == Element::macro
              ? std::optional(entries_[entry].element)
              : std::nullopt;
 }
@@ -195,7 +195,7 @@ void Reader::declare_all() {
   const auto count_of = [&](auto is_wanted) {
     return static_cast<std::size_t>(std::count_if(
         entries_.begin(), entries_.end(),
-        [&](const Entry& entry) { return is_wanted(keywords[entry.keyword].element); }));
+        [&](const Entry& entry) { return is_wanted(keywords()[entry.keyword].element); }));
   };
   out_.network.masses.reserve(count_of(is_mass));
   out_.network.drawings.reserve(out_.network.masses.capacity());
@@ -219,7 +219,8 @@ bool Reader::enter_label(std::uint32_t index) {
   const Entry& first = entries_[place];
   const std::string where = quoted("@" + std::string(line.label.text)) +
                             " is already declared in line " + std::to_string(first.number);
-  if (line.keyword->element != Element::link || keywords[first.keyword].element != Element::link) {
+  if (line.keyword->element != Element::link ||
+      keywords()[first.keyword].element != Element::link) {
     error(line, line.label, where);
     return false;
   }
@@ -229,7 +230,7 @@ bool Reader::enter_label(std::uint32_t index) {
 
 void Reader::declare(Entry& entry) {
   Network& network = out_.network;
-  const Keyword& keyword = keywords[entry.keyword];
+  const Keyword& keyword = keywords()[entry.keyword];
   if (is_mass(keyword.element)) {
     entry.element = static_cast<std::uint32_t>(network.masses.size());
     network.masses.emplace_back();
@@ -381,8 +382,7 @@ void Reader::look_over() {
     }
   }
   for (const Link& link : network.links) {
-    const bool is_contact =
-        link.kind == LinkKind::contact || link.kind == LinkKind::clipped_contact;
+    const bool is_contact = facts_of(link.law).family == Family::contact;
     if (is_contact && network.masses[link.a].kind == MassKind::position &&
         network.masses[link.b].kind != MassKind::position) {
       say(Severity::warning, link.place.line, {link.name, link.place.column},

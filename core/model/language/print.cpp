@@ -12,32 +12,21 @@
 namespace ressort {
 namespace {
 
-const Keyword& keyword_of(std::string_view word) {
-  return *std::find_if(std::begin(keywords), std::end(keywords),
-                       [&](const Keyword& keyword) { return keyword.word == word; });
-}
-
-// A kind has one word that is printed, whatever others are read.
-const Keyword& keyword_of(const Link& link) {
-  switch (link.kind) {
-    case LinkKind::spring:
-      return keyword_of(link.arguments[1] == no_argument   ? "spring"
-                        : link.arguments[0] == no_argument ? "damper"
-                                                           : "springDamper");
-    case LinkKind::quadratic_spring:
-      return keyword_of("nlSpring2");
-    case LinkKind::smooth_bow:
-    case LinkKind::either_bow:
-      return keyword_of("nlBow");
-    default:
-      return *std::find_if(std::begin(keywords), std::end(keywords), [&](const Keyword& keyword) {
-        return keyword.element == Element::link && keyword.link == link.kind;
-      });
-  }
+// A law may have many words: the first that needs no more arguments than the link has.
+const LawWord& word_of(const Link& link) {
+  const auto& words = facts_of(link.law).words;
+  return *std::find_if(words.begin(), words.end(), [&](const LawWord& word) {
+    bool holds_all = word.printed > 0;
+    for (int i = 0; i < static_cast<int>(most_law_arguments); ++i) {
+      const bool is_there = link.arguments[static_cast<std::size_t>(i)] != no_argument;
+      holds_all = holds_all && (!is_there || (i >= word.first && i < word.first + word.printed));
+    }
+    return holds_all;
+  });
 }
 
 const Keyword& keyword_of(const Macro& macro) {
-  return *std::find_if(std::begin(keywords), std::end(keywords), [&](const Keyword& keyword) {
+  return *std::find_if(keywords().begin(), keywords().end(), [&](const Keyword& keyword) {
     return keyword.element == Element::macro && keyword.macro == macro.kind;
   });
 }
@@ -213,23 +202,23 @@ class Printer {
     for (std::size_t i = 0; i < network_.links.size(); ++i) {
       const Link& link = network_.links[i];
       const std::string ends = " " + reference(link.a) + " " + reference(link.b);
-      const Keyword& keyword = keyword_of(link);
-      line(link.name.empty() ? unused("r" + std::to_string(i)) : link.name.text(), keyword.word,
-           ends + link_arguments(link, keyword));
+      const LawWord& word = word_of(link);
+      line(link.name.empty() ? unused("r" + std::to_string(i)) : link.name.text(), word.word,
+           ends + link_arguments(link, word));
     }
   }
 
-  // Every argument that is there, and every one that the keyword cannot do without.
-  std::string link_arguments(const Link& link, const Keyword& keyword) const {
+  // Every argument that is there, and every one that the word cannot do without.
+  std::string link_arguments(const Link& link, const LawWord& word) const {
     std::string text;
-    const auto first = static_cast<std::size_t>(keyword.first);
-    for (std::size_t i = first; i < max_link_arguments; ++i) {
-      const bool is_needed = i < first + static_cast<std::size_t>(keyword.least);
+    const auto first = static_cast<std::size_t>(word.first);
+    for (std::size_t i = first; i < most_law_arguments; ++i) {
+      const bool is_needed = i < first + static_cast<std::size_t>(word.least);
       if (is_needed || link.arguments[i] != no_argument) {
         text += argument(link.arguments[i]);
       }
     }
-    return link.kind == LinkKind::smooth_bow ? text + " 1" : text;
+    return text.append(word.tail);
   }
 
   void print_inputs() {

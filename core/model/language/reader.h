@@ -76,7 +76,7 @@ class Reader {
   std::uint32_t size(const Line& line, std::size_t at, std::uint32_t least);
   void add_link(Line& line);
   void choose_profile(Link& link) const;
-  void show_dialect(const Line& line, LinkKind kind);
+  void show_dialect(const Line& line);
   void add_input(Line& line);
   void add_output(Line& line);
 

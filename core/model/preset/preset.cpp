@@ -401,12 +401,12 @@ void read_root(const toml::table& root, Preset& preset, std::vector<Error>& erro
   }
 }
 
-bool is_linked(const Network& network, std::uint32_t mass, LinkKind kind, double& scale) {
+bool is_linked(const Network& network, std::uint32_t mass, Family family, double& scale) {
   const auto parameters = parameter_values(network);
   for (const Link& link : network.links) {
-    const bool same = link.kind == kind || (is_bow(kind) && is_bow(link.kind));
-    if (same && (link.a == mass || link.b == mass)) {
-      scale = argument_value(network, link.arguments[1], parameters);
+    const LawFacts& law = facts_of(link.law);
+    if (law.family == family && (link.a == mass || link.b == mass)) {
+      scale = argument_value(network, link.arguments[law.slot(Role::reach)], parameters);
       return true;
     }
   }
@@ -482,14 +482,14 @@ Preset default_preset(const Network& network, bool bare) {
       note.gesture = ControlGesture::impulse;
       note.low = 0.01;
       note.high = 0.1;
-    } else if (is_linked(network, input.mass, LinkKind::pluck, scale)) {
+    } else if (is_linked(network, input.mass, Family::pluck, scale)) {
       note.gesture = ControlGesture::pluck;
       note.travel = 5.0 * scale;
       // The slower the finger, the more it gives to the string before that slips away.
       note.low = 0.3 * scale;
       note.high = 0.05 * scale;
       note.exponential = true;
-    } else if (is_linked(network, input.mass, LinkKind::bow, scale)) {
+    } else if (is_linked(network, input.mass, Family::bow, scale)) {
       note.gesture = ControlGesture::bow;
       note.low = 0.35 * scale;
       note.high = 0.9 * scale;

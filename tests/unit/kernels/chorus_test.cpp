@@ -1,5 +1,6 @@
 // What is held in registers, and that every voice moves as it does alone.
 #include "core/kernels/chorus/chorus_form.h"
+#include "core/laws/laws.h"
 #include "tests/support/passive.h"
 
 namespace ressort {

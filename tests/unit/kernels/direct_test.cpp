@@ -1,7 +1,7 @@
 // The force laws by hand, and the kernel against the textbook simulator.
 #include <string_view>
 
-#include "core/kernels/laws.h"
+#include "core/laws/laws.h"
 #include "tests/support/reference_network.h"
 #include "tests/support/rig.h"
 
@@ -21,16 +21,16 @@ V lanes(double value) {
   return V{} + value;
 }
 double pluck(double d, double v, double k, double s, double z) {
-  return pluck_force(lanes(d), lanes(v), lanes(k), lanes(s), lanes(z))[0];
+  return laws::Pluck<V>(lanes(k), lanes(s), lanes(z)).force(lanes(d), lanes(v))[0];
 }
 double bow(double v, double z, double s) {
-  return bow_force(lanes(v), lanes(z), lanes(s))[0];
+  return laws::Bow<V>(lanes(z), lanes(s)).force(V{}, lanes(v))[0];
 }
 double smooth_bow(double v, double z, double s) {
-  return smooth_bow_force(lanes(v), lanes(z), lanes(s))[0];
+  return laws::SmoothBow<V>{lanes(z), lanes(s)}.force(V{}, lanes(v))[0];
 }
 double contact(double d, double v, double k, double z, double t) {
-  return contact_force(lanes(d), lanes(v), lanes(k), lanes(z), lanes(t))[0];
+  return laws::Contact<V>{lanes(k), lanes(z), lanes(t)}.force(lanes(d), lanes(v))[0];
 }
 
 // Everything that moves a scene, the same for every kernel: inputs()[i] at frame n.
@@ -86,7 +86,8 @@ TEST_CASE("the laws give what their formulas give by hand", "[direct]") {
   CHECK(std::fabs(contact(.1, -.2, 0, .5, 0) + .1) < 1e-16);
   CHECK(contact(0.0, -.2, 0, .5, 0) == 0.0);
 
-  CHECK(spring_force(lanes(.3), lanes(-.2), lanes(.1), lanes(.05))[0] == .1 * .3 + .05 * -.2);
+  CHECK(laws::Spring<V>{lanes(.1), lanes(.05)}.force(lanes(.3), lanes(-.2))[0] ==
+        .1 * .3 + .05 * -.2);
 }
 
 TEST_CASE("a bow grips hardest at a third of its speed, a smooth one at s/sqrt 8", "[direct]") {
@@ -119,7 +120,8 @@ TEST_CASE("a bow may be turned from one profile to the other", "[direct]") {
   for (int i = -30; i <= 30; ++i) {
     const double v = 0.05 * i / 20.0;
     for (const double profile : {-1.0, 0.0, 1e-9, 0.5, 1.0, 7.0}) {
-      const double found = either_bow_force(lanes(v), lanes(0.1), lanes(0.05), lanes(profile))[0];
+      const laws::EitherBow<V> either{lanes(0.1), lanes(0.05), lanes(profile)};
+      const double found = either.force(V{}, lanes(v))[0];
       CHECK(found == (profile > 0.0 ? smooth_bow(v, 0.1, 0.05) : bow(v, 0.1, 0.05)));
     }
   }
@@ -131,9 +133,8 @@ TEST_CASE("the scenes have the published sizes", "[direct]") {
     const Network network = network_of(example.text);
     CHECK(static_cast<int>(make_program(network, 44100.0, true).moving) == example.moving);
     CHECK(static_cast<int>(network.links.size()) == example.links);
-    const bool is_linear =
-        std::all_of(network.links.begin(), network.links.end(),
-                    [](const Link& link) { return link.kind == LinkKind::spring; });
+    const bool is_linear = std::all_of(network.links.begin(), network.links.end(),
+                                       [](const Link& link) { return link.law == Law::spring; });
     CHECK(is_linear == example.is_linear);
   }
 }
@@ -237,10 +238,9 @@ TEST_CASE("nonlinear springs, clipped contacts, gravity and force outputs equal 
 
 TEST_CASE("the limiting spring is continuous where it clips", "[direct]") {
   // b = sqrt((k - s)/c) = sqrt(0.49/10) = 0.2213594: the force on both sides, by hand.
-  using V = Pack<double, 16>;
   const auto force = [](double d) {
-    const V zero{};
-    return clipped_spring_force(zero + d, zero, zero + 0.01, zero + 10.0, zero + 0.5, zero)[0];
+    const laws::ClippedSpring<V> spring{lanes(0.01), lanes(10.0), lanes(0.5), V{}};
+    return spring.force(lanes(d), V{})[0];
   };
   const double b = std::sqrt(0.049);
   CHECK(force(0.2) == Approx(0.01 * 0.2 + 10.0 * 0.008).epsilon(1e-14));

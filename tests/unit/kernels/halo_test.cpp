@@ -4,6 +4,7 @@
 #include "core/compile/shards.h"
 #include "core/kernels/chains/chains_form.h"
 #include "core/kernels/grid/grid_form.h"
+#include "core/laws/laws.h"
 #include "tests/support/duel.h"
 
 using namespace ressort;

@@ -277,7 +277,7 @@ TEST_CASE("the corpus uses every keyword, and the table every file", "[corpus]")
     told.insert(model.name);
   }
   CHECK(names == told);
-  for (const Keyword& keyword : keywords) {
+  for (const Keyword& keyword : keywords()) {
     INFO(keyword.word);
     CHECK(words.contains(keyword.word));
   }

@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "core/laws/laws.h"
 #include "core/model/language/tokens.h"
 #include "tests/support/catch.h"
 #include "tests/support/rig.h"
@@ -164,7 +165,7 @@ TEST_CASE("masses, grounds and oscillators are what was written", "[mdl]") {
 TEST_CASE("links mean what the language says", "[mdl]") {
   const auto link = [](const std::string& line) { return network_of(two_masses + "@l " + line); };
   Network n = link("spring @b @a 2");
-  CHECK(n.links[0].kind == LinkKind::spring);
+  CHECK(n.links[0].law == Law::spring);
   CHECK(n.links[0].a == 1);
   CHECK(n.links[0].b == 0);
   CHECK(link_value(n, 0) == 2.0);
@@ -172,20 +173,20 @@ TEST_CASE("links mean what the language says", "[mdl]") {
   CHECK(link("springDamper @a @b 2 3") == link("spring @a @b 2 3"));
   CHECK(link("springDamperDamper @a @b 2 3") == link("springDamper @a @b 2 3"));
   n = link("damper @a @b 3");
-  CHECK(n.links[0].kind == LinkKind::spring);
+  CHECK(n.links[0].law == Law::spring);
   CHECK(link_value(n, 0) == 0.0);
   CHECK(link_value(n, 1) == 3.0);
   n = link("nlPluck @a @b 2 3");
-  CHECK(n.links[0].kind == LinkKind::pluck);
+  CHECK(n.links[0].law == Law::pluck);
   CHECK(link_value(n, 1) == 3.0);
   CHECK(link_value(n, 2) == 0.0);
   CHECK(link_value(link("nlPluck @a @b 2 3 4"), 2) == 4.0);
-  CHECK(link("nlBow @a @b 2 3").links[0].kind == LinkKind::bow);
-  CHECK(link("nlBow @a @b 2 3 0").links[0].kind == LinkKind::bow);
-  CHECK(link("nlBow @a @b 2 3 1").links[0].kind == LinkKind::smooth_bow);
-  CHECK(link("nlBow @a @b 2 3 [1]").links[0].kind == LinkKind::smooth_bow);
+  CHECK(link("nlBow @a @b 2 3").links[0].law == Law::bow);
+  CHECK(link("nlBow @a @b 2 3 0").links[0].law == Law::bow);
+  CHECK(link("nlBow @a @b 2 3 1").links[0].law == Law::smooth_bow);
+  CHECK(link("nlBow @a @b 2 3 [1]").links[0].law == Law::smooth_bow);
   n = link("contact @a @b 2 3");
-  CHECK(n.links[0].kind == LinkKind::contact);
+  CHECK(n.links[0].law == Law::contact);
   CHECK(link_value(n, 2) == 0.0);
   CHECK(link_value(link("contact @a @b 2 3 4"), 2) == 4.0);
   CHECK(link("detent @a @b 2 3 4") == link("contact @a @b 2 3 4"));

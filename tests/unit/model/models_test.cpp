@@ -35,10 +35,10 @@ const std::vector<Instrument9>& nine() {
 }
 
 // The ends of a network's links by name: what is attached to what, whatever the lines' order.
-std::multiset<std::tuple<LinkKind, std::string, std::string>> ends(const Network& network) {
-  std::multiset<std::tuple<LinkKind, std::string, std::string>> found;
+std::multiset<std::tuple<Law, std::string, std::string>> ends(const Network& network) {
+  std::multiset<std::tuple<Law, std::string, std::string>> found;
   for (const Link& link : network.links) {
-    found.emplace(link.kind, network.masses[link.a].name, network.masses[link.b].name);
+    found.emplace(link.law, network.masses[link.a].name, network.masses[link.b].name);
   }
   return found;
 }

@@ -4,6 +4,7 @@
 #include <algorithm>
 
 #include "app/session/files.h"
+#include "core/laws/laws.h"
 #include "core/model/language/expression.h"
 #include "core/model/topology.h"
 #include "tests/support/catch.h"
@@ -438,18 +439,18 @@ class Maker {
     static constexpr int least[] = {0, 3, 3, 4, 2, 2, 2, 2, 2, 4};
     static constexpr int most[] = {0, 3, 3, 4, 3, 2, 2, 2, 3, 5};
     Link link{.name = chance() ? "twice" : name()};
-    link.kind = static_cast<LinkKind>(random_.below(std::size(least)));
-    const auto kind = static_cast<std::size_t>(link.kind);
+    link.law = static_cast<Law>(random_.below(std::size(least)));
+    const auto kind = static_cast<std::size_t>(link.law);
     for (int i = 0; i < (chance() ? most : least)[kind]; ++i) {
       link.arguments[static_cast<std::size_t>(i)] = argument();
     }
-    if (link.kind == LinkKind::spring) {
+    if (link.law == Law::spring) {
       const std::size_t which = random_.below(3);
       link.arguments[0] = which < 2 ? argument() : no_argument;
       link.arguments[1] = which > 0 ? argument() : no_argument;
     }
-    if (link.kind == LinkKind::either_bow) {  // its profile is no number
-      link.kind = network_.parameters.empty() ? LinkKind::bow : link.kind;
+    if (link.law == Law::either_bow) {  // its profile is no number
+      link.law = network_.parameters.empty() ? Law::bow : link.law;
       link.arguments[2] =
           network_.parameters.empty() ? no_argument : argument({{Op::parameter, 0, 0.0}});
     }

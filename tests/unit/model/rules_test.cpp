@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "core/laws/laws.h"
 #include "core/model/language/keywords.h"
 #include "core/model/language/mdl.h"
 #include "core/model/language/tokens.h"
@@ -46,13 +47,13 @@ Network linked(const std::string& line) {
 TEST_CASE("an unknown keyword is an error that names the nearest one", "[rules]") {
   // Of every keyword: a letter lost, a letter doubled, two exchanged. What is told is no further
   // away than the word that was meant.
-  for (const Keyword& keyword : keywords) {
+  for (const Keyword& keyword : keywords()) {
     const std::string word(keyword.word);
     std::string exchanged = word;
     std::swap(exchanged[1], exchanged[2]);
     for (const std::string& typed :
          {word.substr(0, 1) + word.substr(2), word + word.back(), exchanged}) {
-      const bool is_a_word = std::any_of(std::begin(keywords), std::end(keywords),
+      const bool is_a_word = std::any_of(keywords().begin(), keywords().end(),
                                          [&](const Keyword& k) { return k.word == typed; });
       if (is_a_word) {
         continue;
@@ -122,14 +123,14 @@ TEST_CASE("what may be left out is 0", "[rules]") {
   const Network damper = linked("damper @a @b 2");
   CHECK(link_value(damper, 0) == 0.0);
   CHECK(link_value(damper, 1) == 2.0);
-  CHECK(linked("nlBow @a @b 2 3").links[0].kind == LinkKind::bow);
-  CHECK(linked("nlBow @a @b 2 3 0.0").links[0].kind == LinkKind::bow);
-  CHECK(linked("nlBow @a @b 2 3 0.5").links[0].kind == LinkKind::smooth_bow);
-  CHECK(linked("nlBow @a @b 2 3 -1").links[0].kind == LinkKind::bow);
+  CHECK(linked("nlBow @a @b 2 3").links[0].law == Law::bow);
+  CHECK(linked("nlBow @a @b 2 3 0.0").links[0].law == Law::bow);
+  CHECK(linked("nlBow @a @b 2 3 0.5").links[0].law == Law::smooth_bow);
+  CHECK(linked("nlBow @a @b 2 3 -1").links[0].law == Law::bow);
   CHECK(linked("nlBow @a @b 2 3 [2-1]") == linked("nlBow @a @b 2 3 1"));
   for (const char* const profile : {"p", "[1-p]", "[p+0*p]"}) {
     const Network turned = linked(std::string("nlBow @a @b 2 3 ") + profile);
-    CHECK(turned.links[0].kind == LinkKind::either_bow);
+    CHECK(turned.links[0].law == Law::either_bow);
     CHECK(link_value(turned, 2) == 0.5);
   }
 

@@ -1,4 +1,4 @@
-// core/engine: the one SIMD type, and memory for it. Kernels are written once over Pack<T, Bytes>
+// core: the one SIMD type, and memory for it. Kernels are written once over Pack<T, Bytes>
 // and compiled for each instruction set (see isa.h). What is `static` here has a copy in every
 // such unit: code for a wide machine can never be linked into what runs on a narrow one.
 #pragma once

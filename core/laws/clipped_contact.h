@@ -1,0 +1,96 @@
+// core/laws: a contact with a cubic spring that is clipped at k; without the clipped spring's extra
+// damping. With D = d + t, and s instead of k where k < s:
+//   d > -t: f = s D + c D^3 + Z v up to |D| = sqrt((k - s)/c), then k D + Z v; else 0
+#pragma once
+
+#include "core/laws/clipped_spring.h"
+
+namespace ressort::laws::inline RESSORT_ISA {
+
+// A clipped spring's potential on one side of 0 only.
+template <class V>
+struct ClippedWall {
+  V energy(V d) const { return select(d > V{}, inside.energy(d), V{}); }
+  V force(V d) const { return select(d > V{}, inside.force(d), V{}); }
+  V slope(V d) const { return select(d > V{}, inside.slope(d), V{}); }
+  ClippedPotential<V> inside;
+};
+
+template <class V>
+struct ClippedContact {
+  static constexpr LawFacts facts = {
+      .name = "clipped_contact",
+      .family = Family::contact,
+      .one = "contact",
+      .many = "contacts",
+      .count = 5,
+      .arguments = {{{Role::stiffness, Unit::stiffness},
+                     {Role::bend, Unit::stiffness},
+                     {Role::limit, Unit::stiffness},
+                     {Role::damping, Unit::damping},
+                     {Role::reach, Unit::plain}}},
+      .words = {{{.word = "nlContact",
+                  .least = 4,
+                  .most = 5,
+                  .arguments = "@A @B S C K Z [THRESHOLD]",
+                  .printed = 5,
+                  .velocity_count = -1,
+                  .velocity_says = "has 'nlContact'"}}},
+      .zone = Zone::below,
+      .is_odd = false,
+      .solve_ns = 80.0,  // by Newton
+      .faust =
+          "clipped_contact(s, c, k, z, t, d, v) =\n"
+          "  select2(d > 0.0 - t, 0.0, elastic*r*r + z*r*v)\n"
+          "with {\n"
+          "  depth = d + t;\n"
+          "  elastic = select2(k < s, select2(c == 0.0, bent, s*depth), s*depth);\n"
+          "  bent = select2(c > 0.0, k*depth, select2(c*depth*depth <= k - s, k*depth, cubic));\n"
+          "  cubic = s*depth + c*depth*depth*depth;\n"
+          "};\n",
+  };
+
+  V force(V d, V v) const {
+    const V depth = d + t;
+    const V cubic = s * depth + c * depth * depth * depth;
+    const V clipped = k * depth;
+    const V bent = select(c > V{}, select(c * depth * depth <= k - s, cubic, clipped), clipped);
+    const V elastic = select(k < s, s * depth, select(c == V{}, s * depth, bent));
+    return select(d > -t, elastic + z * v, V{});
+  }
+  V potential(V d) const { return wall().energy(d + t); }
+  V secant(V) const { return k; }
+
+  // The potential's discrete gradient, with a damper as far as it touches.
+  Push<V> passive(const LinkState<V>& link, int) const {
+    if (!may_touch(link, t)) {
+      return {V{}, V{}};
+    }
+    const V damping = z * share_inside(link, t);
+    return at_once(damped_force(wall(), link.before() + t, link.free + t, link.gamma, damping));
+  }
+
+  static Slopes steepest(const ClippedContact& least, const ClippedContact& most, double) {
+    const bool is_bent = least.c != 0.0 || most.c != 0.0;
+    const double stiffness = clipped_stiffness(least.s, most.s, is_bent, most.k);
+    return {.stiffness = stiffness, .damping = most.z, .pull = stiffness};
+  }
+  static Slopes gentlest(const ClippedContact& least) {
+    return {.damping = std::min(0.0, least.z), .pull = std::min(0.0, least.k)};
+  }
+
+  V s;
+  V c;
+  V k;
+  V z;
+  V t;
+
+ private:
+  ClippedWall<V> wall() const {
+    const auto is_bent = (c > V{}) & (k >= s);
+    const V straight = select((k < s) | (c == V{}), s, k);
+    return {{select(is_bent, s, straight), select(is_bent, c, V{}), select(is_bent, k, straight)}};
+  }
+};
+
+}  // namespace ressort::laws::inline RESSORT_ISA

@@ -1,0 +1,54 @@
+// core/laws: a bow whose profile may be turned while it sounds: smooth while that is above 0.
+#pragma once
+
+#include "core/laws/bow.h"
+#include "core/laws/smooth_bow.h"
+
+namespace ressort::laws::inline RESSORT_ISA {
+
+template <class V>
+struct EitherBow {
+  static constexpr LawFacts facts = {
+      .name = "either_bow",
+      .family = Family::bow,
+      .one = "bow",
+      .many = "bows",
+      .count = 3,
+      .arguments = {{{Role::damping, Unit::friction}, {Role::reach, Unit::speed}, {}}},
+      .words = {{{.word = "nlBow",
+                  .least = 2,
+                  .most = 3,
+                  .arguments = "@A @B Z SCALE [PROFILE]",
+                  .printed = 3}}},
+      .substep_ns = 90.0,  // both
+      .faust =
+          "either_bow(z, s, p, d, v) = select2(p > 0.0, bow(z, s, d, v), "
+          "smooth_bow(z, s, d, v));\n",
+  };
+
+  V force(V d, V v) const {
+    return select(profile > V{}, SmoothBow<V>{z, s}.force(d, v), Bow<V>(z, s).force(d, v));
+  }
+  V potential(V) const { return V{}; }
+  V secant(V) const { return V{}; }
+
+  Push<V> passive(const LinkState<V>& link, int substeps) const {
+    return rubbed(*this, link, substeps);
+  }
+  V grip(V wanted, V last, V half) const {
+    const V piecewise = Bow<V>(z, s).grip(wanted, last, half);
+    return select(profile > V{}, SmoothBow<V>{z, s}.grip(wanted, last, half), piecewise);
+  }
+
+  // The smooth one is the steeper.
+  static Slopes steepest(const EitherBow&, const EitherBow& most, double) {
+    return {.damping = smooth_bow_stick * most.z};
+  }
+  static Slopes gentlest(const EitherBow& least) { return {.damping = std::min(0.0, least.z)}; }
+
+  V z;
+  V s;
+  V profile;
+};
+
+}  // namespace ressort::laws::inline RESSORT_ISA

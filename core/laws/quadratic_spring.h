@@ -1,0 +1,70 @@
+// core/laws: f = K d + Q sgn(d) d^2 + Z v
+#pragma once
+
+#include "core/laws/spring.h"
+
+namespace ressort::laws::inline RESSORT_ISA {
+
+template <class V>
+struct QuadraticSpring {
+  static constexpr LawFacts facts = {
+      .name = "quadratic_spring",
+      .family = Family::spring,
+      .one = "spring that grows stiffer",
+      .many = "springs that grow stiffer",
+      .count = 3,
+      .arguments = {{{Role::stiffness, Unit::stiffness},
+                     {Role::bend, Unit::stiffness},
+                     {Role::damping, Unit::damping}}},
+      .words =
+          {{{.word = "nlSpring2", .least = 3, .most = 3, .arguments = "@A @B K Q Z", .printed = 3},
+            {.word = "nlSpring", .least = 3, .most = 3, .arguments = "@A @B K Q Z"}}},
+      .contains_spring = true,
+      .exponent = 2,
+      .solve_ns = 80.0,  // by Newton
+      .faust = "quadratic_spring(k, q, z, d, v) = spring(k, z, d, v) + q*r*r*d*abs(d);\n",
+  };
+
+  V force(V d, V v) const { return k * d + q * d * absolute(d) + z * v; }
+  V potential(V d) const { return Scalar<V>(0.5) * k * d * d + curved(d); }
+  V secant(V d) const { return k + q * absolute(d); }
+
+  // What is curved holds this from one sample to the next; the rest holds what a spring does.
+  V curved_energy(V now, V before) const { return (curved(now) + curved(before)) / 2; }
+
+  // f = K now + Z (now - before) + the discrete gradient of Q/3 |d|^3, which without any
+  // cancellation is sgn(after) Q/3 (a^2 + a b + b^2), a and b being |after| and |before|; times
+  // (a - b)/(a + b) where the signs differ.
+  Push<V> passive(const LinkState<V>& link, int) const {
+    const V linear = k * link.now + z * link.speed;
+    const V b = absolute(link.before());
+    const auto g = [&](V after) {
+      const V a = absolute(after);
+      const V square = q / 3 * (a * a + a * b + b * b);
+      const auto crosses = after * link.before() < V{};
+      const V side = select(select(crosses, after, after + link.before()) < V{}, V{} - 1, V{} + 1);
+      const V across = select(crosses, (a - b) / (a + b), V{} + 1);
+      const V f = square * across;
+      const V steep = select(crosses, (q * a * a - f) / (a + b), q / 3 * (a + a + b));
+      return Slope<V>{linear + side * f, steep};
+    };
+    return at_once(rising_force(link.free, link.gamma, g));
+  }
+
+  static Slopes steepest(const QuadraticSpring&, const QuadraticSpring& most, double within) {
+    const double k = most.k + (within > 0.0 ? 2.0 * most.q * within : 0.0);
+    return {.stiffness = k, .damping = most.z, .pull = k};
+  }
+  static Slopes gentlest(const QuadraticSpring& least) {
+    return {.damping = least.z, .pull = least.k};
+  }
+
+  V k;
+  V q;
+  V z;
+
+ private:
+  V curved(V d) const { return q / Scalar<V>(3.0) * absolute(d * d * d); }
+};
+
+}  // namespace ressort::laws::inline RESSORT_ISA

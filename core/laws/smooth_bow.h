@@ -1,0 +1,65 @@
+// core/laws: friction as a bow's, in one smooth curve: f = 0.63 Z v exp(-4 (v/s)^2 + 1/2)
+#pragma once
+
+#include <algorithm>
+
+#include "core/laws/discrete_gradient.h"
+
+namespace ressort::laws::inline RESSORT_ISA {
+
+inline constexpr double smooth_bow_stick = 1.0387;  // 0.63 exp(1/2), above it: f/(Z v) at rest
+
+template <class V>
+struct SmoothBow {
+  static constexpr LawFacts facts = {
+      .name = "smooth_bow",
+      .family = Family::bow,
+      .one = "bow",
+      .many = "bows",
+      .count = 2,
+      .arguments = {{{Role::damping, Unit::friction}, {Role::reach, Unit::speed}}},
+      .words = {{{.word = "nlBow",
+                  .least = 2,
+                  .most = 3,
+                  .arguments = "@A @B Z SCALE [PROFILE]",
+                  .printed = 2,
+                  .tail = " 1"}}},
+      .substep_ns = 75.0,
+      .faust =
+          "smooth_bow(z, s, d, v) = 0.63*z*r*v*exp(0.5 - 4.0*ratio*ratio) "
+          "with { ratio = v/(s*r); };\n",
+  };
+
+  V force(V, V v) const {
+    using T = Scalar<V>;
+    const V ratio = v / s;
+    return z * v * T(0.63) * exponential(V{} - 4 * ratio * ratio + T(0.5));
+  }
+  V potential(V) const { return V{}; }
+  V secant(V) const { return V{}; }
+
+  Push<V> passive(const LinkState<V>& link, int substeps) const {
+    return rubbed(*this, link, substeps);
+  }
+
+  // The friction f(v) at the speed v that solves v + half f(v) = wanted, from the speed `last` on.
+  V grip(V wanted, V last, V half) const {
+    const auto g = [&](V v) {
+      using T = Scalar<V>;
+      const V ratio = v / s;
+      const V grip = T(0.63) * z * exponential(T(0.5) - 4 * ratio * ratio);
+      return Slope<V>{grip * v, grip * (1 - 8 * ratio * ratio)};
+    };
+    return force_between(V{}, last, wanted, half, g);
+  }
+
+  static Slopes steepest(const SmoothBow&, const SmoothBow& most, double) {
+    return {.damping = smooth_bow_stick * most.z};
+  }
+  static Slopes gentlest(const SmoothBow& least) { return {.damping = std::min(0.0, least.z)}; }
+
+  V z;
+  V s;
+};
+
+}  // namespace ressort::laws::inline RESSORT_ISA

@@ -1,0 +1,56 @@
+// core/laws: f = K d + Z v. Springs, dampers, and both together; the only linear law.
+#pragma once
+
+#include "core/laws/discrete_gradient.h"
+
+namespace ressort::laws::inline RESSORT_ISA {
+
+template <class V>
+struct Spring {
+  static constexpr LawFacts facts = {
+      .name = "spring",
+      .family = Family::spring,
+      .one = "spring",
+      .many = "springs",
+      .count = 2,
+      .arguments = {{{Role::stiffness, Unit::stiffness}, {Role::damping, Unit::damping}}},
+      .words =
+          {{{.word = "spring", .least = 1, .most = 2, .arguments = "@A @B K [Z]", .printed = 1},
+            {.word = "damper",
+             .least = 1,
+             .most = 1,
+             .arguments = "@A @B Z",
+             .first = 1,
+             .printed = 1},
+            {.word = "springDamper",
+             .least = 1,
+             .most = 2,
+             .arguments = "@A @B K [Z]",
+             .printed = 2},
+            {.word = "springDamperDamper", .least = 1, .most = 2, .arguments = "@A @B K [Z]"}}},
+      .contains_spring = true,
+      .is_curved = false,
+      .solve_ns = 16.0,
+      .faust = "spring(k, z, d, v) = k*r*r*d + z*r*v;\n",
+  };
+
+  V force(V d, V v) const { return k * d + z * v; }
+  V potential(V d) const { return Scalar<V>(0.5) * k * d * d; }
+  V secant(V) const { return k; }
+
+  // f = K (after + before)/2 + Z (after - before)/2
+  Push<V> passive(const LinkState<V>& link, int) const {
+    const V later = (k + z) / 2;
+    return at_once((later * link.free + (k - z) / 2 * link.before()) / (1 + link.gamma * later));
+  }
+
+  static Slopes steepest(const Spring&, const Spring& most, double) {
+    return {.stiffness = most.k, .damping = most.z, .pull = most.k};
+  }
+  static Slopes gentlest(const Spring& least) { return {.damping = least.z, .pull = least.k}; }
+
+  V k;
+  V z;
+};
+
+}  // namespace ressort::laws::inline RESSORT_ISA
