@@ -68,7 +68,7 @@ void add_straight(double k, double z, double d, double v, Energy& energy) {
 template <class ForceLaw>
 void add_centred(const ForceLaw& law, double d, double v, Energy& energy) {
   const double before = d - v;
-  if constexpr (ForceLaw::facts.contains_spring) {
+  if constexpr (ForceLaw::facts.contains_spring && ForceLaw::facts.is_curved) {
     add_straight(law.k, law.z, d, v, energy);
     add(energy, law.curved_energy(d, before));
   } else {

@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <vector>
 
+#include "core/kernels/program.h"
 #include "core/laws/laws.h"
 
 namespace ressort {

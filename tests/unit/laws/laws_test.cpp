@@ -1,0 +1,311 @@
+// What every force law must hold, whatever law is added: its facts agree with its force.
+#include "core/laws/laws.h"
+
+#include <cmath>
+#include <set>
+#include <string>
+
+#include "core/analysis/stability.h"
+#include "core/model/language/mdl.h"
+#include "core/model/language/print.h"
+#include "tests/support/random.h"
+
+namespace ressort {
+namespace {
+
+constexpr int draws = 2000;  // of each law
+
+// Calls `use(type, random)` for every law.
+template <class Use>
+void each_law(Use&& use) {
+  for (std::size_t i = 0; i < law_count; ++i) {
+    with_law_type(static_cast<Law>(i), [&]<class Type>(Type type) {
+      Random random(100 + i);  // of its own: another law changes nothing here
+      INFO(type.facts.name);
+      use(type, random);
+    });
+  }
+}
+
+// Any arguments that a musician might give.
+LawNumbers any_arguments(const LawFacts& law, Random& random) {
+  LawNumbers values{};
+  for (std::size_t i = 0; i < law.count; ++i) {
+    switch (law.arguments[i].role) {
+      case Role::stiffness:
+      case Role::limit:
+        values[i] = random.uniform(0.001, 2.0);
+        break;
+      case Role::bend:
+        values[i] = random.uniform(0.0, 20.0);
+        break;
+      case Role::damping:
+        values[i] = random.uniform(0.0, 0.5);
+        break;
+      case Role::reach:
+        values[i] = random.uniform(0.05, 1.0);
+        break;
+      case Role::shape:
+        values[i] = random.uniform(-1.0, 1.0);
+        break;
+    }
+  }
+  return values;
+}
+
+template <class Type>
+auto law_with(const LawNumbers& values) {
+  return law_of<Type, double>([&](std::size_t i) { return values[i]; });
+}
+
+// What a link holds by its discrete gradient from one sample to the next.
+template <class ForceLaw>
+double held(const ForceLaw& law, double now, double before) {
+  if constexpr (ForceLaw::facts.contains_spring && ForceLaw::facts.is_curved) {
+    return law.curved_energy(now, before);
+  } else {
+    return (law.potential(now) + law.potential(before)) / 2.0;
+  }
+}
+
+}  // namespace
+
+TEST_CASE("the facts of every law are complete, and no two laws have one name", "[laws]") {
+  std::set<std::string_view> names;
+  each_law([&](auto type, Random&) {
+    const LawFacts& law = type.facts;
+    CHECK(&facts_of(type.law) == &law_table()[static_cast<std::size_t>(type.law)]);
+    CHECK(facts_of(type.law).name == law.name);
+    CHECK(names.insert(law.name).second);
+    CHECK((!law.one.empty() && !law.many.empty()));
+    CHECK(law.faust.starts_with(std::string(law.name) + "("));
+    CHECK(law.has(Role::damping));
+    CHECK((law.family == Family::bow) != law.has(Role::stiffness));
+    CHECK((law.zone == Zone::everywhere || law.has(Role::reach)));
+    CHECK(law.solve_ns + law.substep_ns > 0.0);
+    CHECK(!law.words[0].word.empty());
+  });
+}
+
+TEST_CASE("the force of every law is the slope of its potential", "[laws]") {
+  constexpr double h = 1e-5;
+  each_law([&](auto type, Random& random) {
+    for (int i = 0; i < draws; ++i) {
+      const LawNumbers values = any_arguments(type.facts, random);
+      const auto law = law_with<decltype(type)>(values);
+      const double d = random.uniform(-2.0, 2.0);
+      const double slope = (law.potential(d + h) - law.potential(d - h)) / (2.0 * h);
+      const double steep = steepest(type.law, values, values, std::fabs(d) + h).stiffness;
+      CAPTURE(d);
+      CHECK(std::fabs(slope - law.force(d, 0.0)) <= steep * h + 1e-9);
+    }
+  });
+}
+
+TEST_CASE("no law is steeper than it says, and it is as steep somewhere", "[laws]") {
+  constexpr double h = 1e-6;
+  constexpr double rounding = 1e-8;
+  each_law([&](auto type, Random& random) {
+    for (int i = 0; i < draws / 10; ++i) {
+      const LawNumbers values = any_arguments(type.facts, random);
+      const auto law = law_with<decltype(type)>(values);
+      const Slopes most = steepest(type.law, values, values, 1.0);
+      double stiffest = 0.0;
+      double most_damped = 0.0;
+      for (int k = 0; k < 500; ++k) {
+        const double d = random.uniform(-1.0, 1.0);
+        const double v = random.uniform(-1.0, 1.0);
+        const double out = d < 0.0 ? -h : h;  // away from 0
+        const double by_d = (law.force(d, 0.0) - law.force(d - out, 0.0)) / out;
+        const double by_v = (law.force(d - out, v + h) - law.force(d - out, v)) / h;
+        const double at_0 = (law.force(d - out, h) - law.force(d - out, 0.0)) / h;
+        stiffest = std::max(stiffest, std::fabs(by_d));
+        most_damped = std::max(most_damped, at_0);
+        if (!(std::fabs(by_d) <= most.stiffness + rounding &&
+              by_v <= most.damping + most.stiff_damping + rounding &&
+              by_d + 2.0 * by_v <= most.pull + 2.0 * most.damping + rounding)) {
+          CAPTURE(d, v, by_d, by_v, most.stiffness, most.damping, most.pull);
+          FAIL("steeper than it says");
+        }
+      }
+      // A clipped law is steepest at one point, which no draw meets; what it says is an upper bound
+      // where its limit is below what it starts with, or its damper not reached.
+      if (!type.facts.has(Role::limit)) {
+        CHECK(stiffest >= 0.8 * most.stiffness);
+        CHECK(most_damped >= 0.99 * most.damping - rounding);
+      }
+    }
+  });
+}
+
+TEST_CASE("a clipped law is 3 k - 2 s steep just below its bend", "[laws]") {
+  // s d + c d^3 reaches k d at b = sqrt((k - s)/c), with the slope s + 3 c b^2.
+  const double s = 0.1;
+  const double c = 7.0;
+  const double k = 1.9;
+  const double b = std::sqrt((k - s) / c);
+  const double h = 1e-7;
+  const laws::ClippedSpring<double> spring{s, c, k, 0.0};
+  const laws::ClippedContact<double> contact{s, c, k, 0.0, 0.0};
+  CHECK((spring.force(b, 0.0) - spring.force(b - h, 0.0)) / h == Approx(5.5).epsilon(1e-5));
+  CHECK((contact.force(b, 0.0) - contact.force(b - h, 0.0)) / h == Approx(5.5).epsilon(1e-5));
+  const LawNumbers values{s, c, k, 0.0, 0.0};
+  CHECK(steepest(Law::clipped_spring, values, values, 0.0).pull == Approx(5.5));
+  CHECK(steepest(Law::clipped_contact, values, values, 0.0).pull == Approx(5.5));
+  // A bend that begins late: beyond it, the extra damper weighs more.
+  const LawNumbers flat{1.8, c, k, 0.0, 0.0};
+  CHECK(steepest(Law::clipped_spring, flat, flat, 0.0).pull == Approx(1.6 * k));
+  // Without any bend it is a spring of s.
+  const LawNumbers straight{s, 0.0, k, 0.0, 0.0};
+  CHECK(steepest(Law::clipped_spring, straight, straight, 0.0).pull == s);
+  CHECK(steepest(Law::clipped_contact, straight, straight, 0.0).pull == s);
+}
+
+TEST_CASE("a mass that swings for ever at the bend of a clipped spring is not called stable",
+          "[laws]") {
+  // Damped, and yet: near the bend one sample throws it from one side to the other and back.
+  const std::string text =
+      "@g ground 0.\n@m massG 1. 0.0783 -0.042 0.\n"
+      "@l nlSpringDamper @g @m 0.1 1000. 1.9 0.001\n@out1 posOutput @m\n~motion velocity\n";
+  const laws::ClippedSpring<double> spring{0.1, 1000.0, 1.9, 0.001};
+  double x = -0.042;
+  double v = 0.0;
+  double f = 0.0;
+  double lowest = 0.0;
+  double highest = -1.0;
+  for (int n = 0; n < 200'000; ++n) {
+    v += f - 0.0783;
+    x += v;
+    f = spring.force(-x, -v);
+    if (n > 199'000) {
+      lowest = std::min(lowest, x);
+      highest = std::max(highest, x);
+    }
+  }
+  CHECK(lowest == Approx(-0.045396).margin(2e-6));
+  CHECK(highest == Approx(-0.039831).margin(2e-6));
+
+  const ParsedNetwork parsed = parse_network(text);
+  REQUIRE(parsed.ok());
+  Stability stability(parsed.network, 1.0);
+  const Certificate certificate = stability.certify({});
+  CHECK(certificate.verdict == Verdict::unstable);
+  REQUIRE(certificate.culprit);
+  CHECK(certificate.culprit->value == 1.9);
+  // 3 k - 2 s + 2 Z = 4
+  REQUIRE(certificate.culprit->limit);
+  CHECK(*certificate.culprit->limit == Approx((4.0 + 0.2 - 0.002) / 3.0).epsilon(1e-6));
+}
+
+TEST_CASE("no law exerts anything outside of its reach", "[laws]") {
+  each_law([&](auto type, Random& random) {
+    const LawFacts& facts = type.facts;
+    for (int i = 0; i < draws; ++i) {
+      LawNumbers values = any_arguments(facts, random);
+      double d = random.uniform(-2.0, 2.0);
+      double v = random.uniform(-2.0, 2.0);
+      if (facts.zone == Zone::everywhere) {
+        for (std::size_t k = 0; k < facts.count; ++k) {
+          values[k] = facts.is_strength(k) ? 0.0 : values[k];
+        }
+      } else {
+        const double reach = values[facts.slot(Role::reach)];
+        const double past = random.uniform(0.0, 1.0);
+        const double side = random.uniform(-1.0, 1.0) < 0.0 ? -1.0 : 1.0;
+        d = facts.zone == Zone::near    ? side * (reach + past)
+            : facts.zone == Zone::below ? -reach - past
+                                        : d;
+        v = facts.zone == Zone::slow ? side * (reach + past) : v;
+        CHECK(facts.gap(values, d) >= (facts.lets_go() ? past - 1e-12 : 0.0));
+      }
+      CHECK(law_with<decltype(type)>(values).force(d, v) == 0.0);
+    }
+  });
+}
+
+TEST_CASE("the ends of an odd law may be exchanged", "[laws]") {
+  each_law([&](auto type, Random& random) {
+    int differs = 0;
+    for (int i = 0; i < draws; ++i) {
+      const auto law = law_with<decltype(type)>(any_arguments(type.facts, random));
+      const double d = random.uniform(-2.0, 2.0);
+      const double v = random.uniform(-2.0, 2.0);
+      differs += law.force(-d, -v) == -law.force(d, v) ? 0 : 1;
+    }
+    CHECK((differs == 0) == type.facts.is_odd);
+  });
+}
+
+TEST_CASE("a discrete gradient gives back no more than its potential held", "[laws]") {
+  // Force times way is what the potential gains, to rounding; a damper only takes. Where all that
+  // moves is damped, what is lost is no less.
+  each_law([&](auto type, Random& random) {
+    const LawFacts& facts = type.facts;
+    for (int i = 0; facts.has_discrete_gradient && i < draws; ++i) {
+      LawNumbers values = any_arguments(facts, random);
+      const bool is_damped = facts.family == Family::bow || i % 2 == 0;
+      double& damping = values[facts.slot(Role::damping)];
+      damping = is_damped ? damping : 0.0;
+      const auto law = law_with<decltype(type)>(values);
+      laws::LinkState<double> link{.now = random.uniform(-1.0, 1.0),
+                                   .speed = random.uniform(-0.3, 0.3),
+                                   .gamma = random.uniform(0.0, 3.0)};
+      link.fast = link.speed + random.uniform(-0.1, 0.1);
+      link.free = link.now + link.fast;
+      const double f = law.passive(link, 1).v;
+      const double after = link.free - link.gamma * f;
+      double way = after - link.before();
+      double work = f * way;
+      double gained = 2.0 * (held(law, after, link.now) - held(law, link.now, link.before()));
+      if constexpr (type.facts.contains_spring && type.facts.is_curved) {
+        work -= (law.k * link.now + law.z * link.speed) * way;  // found as published
+      }
+      CAPTURE(link.now, link.speed, link.free, link.gamma, f);
+      CHECK(work >= gained - 1e-9);
+      const Slopes slopes = steepest(type.law, values, values, 0.0);
+      if (damping == 0.0 && slopes.stiff_damping == 0.0) {
+        CHECK(work == Approx(gained).margin(1e-9));
+      }
+    }
+  });
+}
+
+TEST_CASE("numbers that are kept instead of arguments make the same law", "[laws]") {
+  each_law([&](auto type, Random& random) {
+    using ForceLaw = typename decltype(type)::template With<double>;
+    if constexpr (requires(const ForceLaw& law, double* row) { law.keep(row); }) {
+      for (int i = 0; i < draws; ++i) {
+        const auto law = law_with<decltype(type)>(any_arguments(type.facts, random));
+        double row[most_kept_numbers] = {};
+        law.keep(row);
+        const double d = random.uniform(-2.0, 2.0);
+        const double v = random.uniform(-2.0, 2.0);
+        CHECK(ForceLaw(row).force(d, v) == law.force(d, v));
+      }
+    }
+  });
+}
+
+TEST_CASE("what is printed of a link of any law is read as the same", "[laws]") {
+  each_law([&](auto type, Random&) {
+    for (const LawWord& word : type.facts.words) {
+      for (int count = word.least; !word.word.empty() && count <= word.most; ++count) {
+        std::string text = "@p param 0.5\n@a mass 1 0 0\n@b mass 1 0 0\n@out1 posOutput @a\n@l " +
+                           std::string(word.word) + " @a @b";
+        for (int i = 0; i < count; ++i) {
+          text += i == 2 && type.facts.family == Family::bow ? " p" : " 0." + std::to_string(i + 1);
+        }
+        INFO(text);
+        const ParsedNetwork parsed = parse_network(text);
+        REQUIRE(parsed.ok());
+        const Link& link = parsed.network.links.at(0);
+        CHECK(facts_of(link.law).family == type.facts.family);
+        const ParsedNetwork again = parse_network(print_network(parsed.network));
+        REQUIRE(again.ok());
+        CHECK(canonical(again.network) == canonical(parsed.network));
+      }
+    }
+  });
+}
+
+}  // namespace ressort
