@@ -164,9 +164,9 @@ class Judge {
   // the spring, or twice to where the forces that last would hold it.
   double farthest(const Link& link) const {
     const LawFacts& law = facts_of(link.law);
-    const double q = law.exponent > 1 ? most(link)[law.slot(Role::bend)] : 0.0;
-    if (q == 0.0) {
-      return 0.0;
+    const double q = law.has(Role::bend) ? most(link)[law.slot(Role::bend)] : 0.0;
+    if (q == 0.0 || law.exponent == 1) {
+      return reach_;
     }
     const double n = law.exponent;
     const double k = most(link)[law.slot(Role::stiffness)];

@@ -7,6 +7,7 @@ namespace ressort {
 namespace {
 
 using namespace rig;
+using laws::LinkState;
 
 // How much of its speed a ball keeps that comes down on a wall from anywhere between two samples.
 Spread bounces(double k, double z, Passivity passive, int phases = 1000) {

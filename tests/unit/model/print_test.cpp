@@ -436,13 +436,13 @@ class Maker {
   }
 
   void add_link() {
-    static constexpr int least[] = {0, 3, 3, 4, 2, 2, 2, 2, 2, 4};
-    static constexpr int most[] = {0, 3, 3, 4, 3, 2, 2, 2, 3, 5};
     Link link{.name = chance() ? "twice" : name()};
-    link.law = static_cast<Law>(random_.below(std::size(least)));
-    const auto kind = static_cast<std::size_t>(link.law);
-    for (int i = 0; i < (chance() ? most : least)[kind]; ++i) {
-      link.arguments[static_cast<std::size_t>(i)] = argument();
+    link.law = static_cast<Law>(random_.below(law_count));
+    const LawFacts& law = facts_of(link.law);
+    const auto least = static_cast<std::size_t>(law.words[0].least);
+    const std::size_t count = chance() ? law.count : least;
+    for (std::size_t i = 0; i < count; ++i) {
+      link.arguments[i] = argument();
     }
     if (link.law == Law::spring) {
       const std::size_t which = random_.below(3);
