@@ -44,6 +44,8 @@ enum class Role : std::uint8_t {
 struct LawArgument {
   Role role = Role::shape;
   Unit unit = Unit::plain;
+  double least = -1.0;  // of a shape: between these all its curves are
+  double most = 1.0;
 };
 
 inline constexpr std::size_t most_law_arguments = 5;

@@ -48,7 +48,7 @@ LawNumbers any_arguments(const LawFacts& law, Random& random) {
         values[i] = random.uniform(0.05, 1.0);
         break;
       case Role::shape:
-        values[i] = random.uniform(-1.0, 1.0);
+        values[i] = random.uniform(law.arguments[i].least, law.arguments[i].most);
         break;
     }
   }
