@@ -40,7 +40,7 @@ void print_head(const Cells& cells) {
 
 void print_keywords() {
   print_head({"keyword", "arguments"});
-  for (const Keyword& keyword : keywords) {
+  for (const Keyword& keyword : keywords()) {
     print_row({code(keyword.word), code(keyword.arguments)});
   }
 }
