@@ -36,14 +36,15 @@ judge() {
       # none of them.
       sees["core"] = "core"
       sees["core/laws"] = "core core/laws"
+      sees["core/linear_algebra"] = "core core/linear_algebra"
       sees["core/model"] = "core core/laws core/model"
-      sees["core/analysis"] = "core core/laws core/model core/analysis"
+      sees["core/analysis"] = "core core/laws core/linear_algebra core/model core/analysis"
       sees["core/kernels"] = "core/lanes.h core/formula.h core/progress.h core/model/preset/budget.h " \
-                             "core/laws core/kernels"
+                             "core/laws core/linear_algebra core/kernels"
       sees["core/engine"] = "core/lanes.h core/formula.h core/progress.h core/laws core/kernels " \
                             "core/engine"
-      sees["core/compile"] = "core core/laws core/model core/analysis core/kernels core/engine " \
-                             "core/compile"
+      sees["core/compile"] = "core core/laws core/linear_algebra core/model core/analysis core/kernels " \
+                             "core/engine core/compile"
       all = sees["core/compile"]
       sees["app/realtime"] = "core/engine core/kernels app app/realtime"
       sees["app/devices"] = "core/result.h core/engine core/kernels app app/realtime app/devices"

@@ -9,6 +9,7 @@
 
 #include "core/kernels/modal/modal_worth.h"
 #include "core/laws/laws.h"
+#include "core/linear_algebra/eigen.h"
 
 namespace ressort {
 namespace {
