@@ -6,7 +6,6 @@
 
 #include <cstdio>
 #include <exception>
-#include <initializer_list>
 #include <new>
 
 #include "app/exit_code.h"
