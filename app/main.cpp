@@ -132,12 +132,12 @@ CLI::Option* add_choice(CLI::App& command, const std::string& name, T& target,
 void add_method(CLI::App& command, std::optional<Method>& method) {
   std::map<std::string, Method> methods;
   std::vector<std::string> words = {"auto"};
-  const auto add = [&](Method known) {
-    words.emplace_back(method_name(known));
-    methods[words.back()] = known;
-  };
-  std::for_each(std::begin(all_methods), std::end(all_methods), add);
-  std::for_each(std::begin(physical_methods), std::end(physical_methods), add);
+  for (const auto use : {KernelRow::Use::published, KernelRow::Use::physical}) {
+    for (const Method known : methods_for(use)) {
+      words.emplace_back(method_name(known));
+      methods[words.back()] = known;
+    }
+  }
   command
       .add_option_function<std::string>(
           "--method",

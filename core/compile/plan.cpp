@@ -4,120 +4,10 @@
 #include <cmath>
 
 #include "core/compile/shards.h"
-#include "core/kernels/chains/chains_form.h"
-#include "core/kernels/chorus/chorus_form.h"
-#include "core/kernels/dense/dense_form.h"
 #include "core/kernels/direct/fourth_form.h"
-#include "core/kernels/grid/grid_form.h"
-#include "core/kernels/modal/modal_form.h"
-#include "core/kernels/slow/slow_form.h"
 
 namespace ressort {
 namespace {
-
-template <class T>
-std::optional<Form> any(std::optional<T> form) {
-  return form ? std::optional<Form>(std::move(*form)) : std::nullopt;
-}
-
-std::optional<Form> form_of(const Program& program, Method method, const Workload& load,
-                            const Budget& budget, const Progress& progress) {
-  progress.spend(program.ends.size() + program.position.size());
-  switch (method) {
-    case Method::direct:
-      return Direct{};
-    case Method::chains:
-      return any(chains_form(program, progress));
-    case Method::dense:
-      return any(dense_form(program));
-    case Method::modal:
-      return any(modal_form(program, budget, progress));
-    case Method::grid:
-      return any(grid_form(program, progress));
-    case Method::chorus:
-      return any(chorus_form(program));
-    case Method::fourth:
-      return any(fourth_form(program));
-    case Method::slow:
-      return any(slow_form(program, load.highest_factor));
-  }
-  return std::nullopt;
-}
-
-std::string count_of(std::size_t count, const char* one, const char* many) {
-  return std::to_string(count) + " " + (count == 1 ? one : many);
-}
-
-std::string in_db(double share) {
-  char text[32];
-  std::snprintf(text, sizeof text, "%.0f dB", 20.0 * std::log10(std::max(share, 1e-15)));
-  return text;
-}
-
-// What the form is, of this part.
-struct Describer {
-  const Program& program;
-
-  std::string operator()(const Direct&) const {
-    return "mass by mass and link by link, as published, a voice in each lane";
-  }
-  std::string operator()(const Chains& form) const {
-    return count_of(form.chains.size(), "row of equal masses", "rows of equal masses") +
-           " folded into vectors, " + count_of(form.loose.size(), "mass", "masses") + " and " +
-           count_of(form.links.size(), "link", "links") + " one by one";
-  }
-  std::string operator()(const Dense& form) const {
-    return form.ports.empty() ? "blocks of samples by one matrix"
-                              : "blocks of samples by one matrix between contacts, " +
-                                    count_of(form.ports.size(), "link", "links") + " one by one";
-  }
-  std::string operator()(const Modes& form) const {
-    std::string text = count_of(form.modes, "mode", "modes");
-    if (form.modes < form.of) {
-      text = std::to_string(form.modes) + " of " + count_of(form.of, "mode", "modes") +
-             ", the rest at most " + in_db(form.left_out) + ",";
-    }
-    text += " in place of the masses, ";
-    if (form.is_exact) {
-      text += "true to the continuous network, ";
-    }
-    text += count_of(form.places.size(), "place", "places") + " where links hold on";
-    if (form.silence > 0.0) {
-      text += ", asleep when all that sleep are below " + in_db(form.silence);
-    }
-    return text;
-  }
-  std::string operator()(const Chorus&) const {
-    return std::string(program.moving <= most_held_masses ? "its masses in registers"
-                                                          : "mass by mass and link by link") +
-           ", a voice in each lane of many packs at once";
-  }
-  std::string operator()(const Fourth& form) const {
-    std::size_t springs = 0;
-    for (const FourthLinks& links : form.springs) {
-      springs += links.count;
-    }
-    return "to fourth order, springs and dampers twice, " +
-           count_of(program.ends.size() - springs, "link", "links") + " as published";
-  }
-  std::string operator()(const Compensated&) const {
-    return "mass by mass and link by link, as published, each position in two numbers";
-  }
-  std::string operator()(const Slow& form) const {
-    return "to fourth order once in " + std::to_string(form.frames) +
-           " samples, a cubic between; what comes in acts up to " +
-           std::to_string(2 * form.frames) + " samples later";
-  }
-  std::string operator()(const Shards& form) const {
-    return "in " + std::to_string(form.shards->size()) + " shards at once, which meet every " +
-           count_of(form.frames, "sample", "samples");
-  }
-  std::string operator()(const Grid& form) const {
-    return std::string(form.segments.empty() ? "forces" : "rows that are alike") +
-           " in vectors along the index, " + count_of(form.rest_ends.size(), "link", "links") +
-           " one by one";
-  }
-};
 
 std::string in_ns(double ns) {
   char text[32];
@@ -184,8 +74,8 @@ class Chooser {
   };
 
   void consider_identical() {
-    for (const Method method : all_methods) {
-      if (method != Method::modal || may_be_modal()) {
+    for (const Method method : methods_for(KernelRow::Use::published)) {
+      if (row_of(method).least_ns == nullptr || may_pay(row_of(method))) {
         consider(method);
       }
     }
@@ -225,16 +115,17 @@ class Chooser {
     return method == Method::modal && budget_.silence_db > -Budget::unlimited ? 0.5 * ns : ns;
   }
 
-  bool may_be_modal() {
+  bool may_pay(const KernelRow& row) {
     const bool may_pay =
         program_.moving <= patient_modes && program_.moving > 4 &&
-        worth_ns(Method::modal, least_modal_ns(program_, load_)) < candidates_[best_].ns;
+        worth_ns(row.method, row.least_ns(program_, load_)) < candidates_[best_].ns;
     may_gain_ = may_pay && program_.moving > most_modes_;
     return may_pay && !may_gain_;
   }
 
   bool consider(Method method) {
-    auto form = form_of(program_, method, load_, budget_, progress_);
+    progress_.spend(program_.ends.size() + program_.position.size());
+    auto form = row_of(method).fits({program_, load_, budget_, progress_});
     if (!form) {
       return false;
     }
@@ -252,12 +143,13 @@ class Chooser {
   }
 
   Part take(const std::string& why) {
-    Candidate& best = candidates_[best_];
+    const Candidate& best = candidates_[best_];
+    program_.form = std::move(candidates_[best_].form);
     Part part{.method = best.method,
               .masses = program_.moving,
               .links = program_.ends.size(),
               .predicted_ns = best.ns,
-              .reason = std::visit(Describer{program_}, best.form)};
+              .reason = description(program_)};
     std::string others;
     for (const Candidate& candidate : candidates_) {
       if (candidate.method != best.method) {
@@ -268,7 +160,6 @@ class Chooser {
     part.reason += "; at most about " + in_ns(best.ns) + " a sample";
     part.reason += published_;
     part.reason += !why.empty() ? ", " + why : others.empty() ? "" : ", " + others;
-    program_.form = std::move(best.form);
     return part;
   }
 
@@ -286,28 +177,6 @@ class Chooser {
 
 }  // namespace
 
-std::string_view method_name(Method method) {
-  switch (method) {
-    case Method::direct:
-      return "direct";
-    case Method::chains:
-      return "chains";
-    case Method::dense:
-      return "dense";
-    case Method::modal:
-      return "modal";
-    case Method::grid:
-      return "grid";
-    case Method::chorus:
-      return "chorus";
-    case Method::fourth:
-      return "fourth";
-    case Method::slow:
-      return "slow";
-  }
-  return "";
-}
-
 Plan make_plan(Machine& machine, const Workload& load, std::optional<Method> method,
                std::uint32_t most_modes, const Budget& budget, const Progress& progress) {
   Plan plan;
@@ -319,7 +188,7 @@ Plan make_plan(Machine& machine, const Workload& load, std::optional<Method> met
     if (auto shards = share_out(program, load, progress)) {
       program.form = *std::move(shards);
       part.predicted_ns = predicted_ns(program, load);
-      part.reason += ", " + Describer{program}(std::get<Shards>(program.form));
+      part.reason += ", " + description(program);
     }
     if (part.masses > 0) {
       plan.parts.push_back(std::move(part));

@@ -7,24 +7,12 @@
 #include <string_view>
 #include <vector>
 
-#include "core/compile/cost.h"
 #include "core/kernels/program.h"
+#include "core/kernels/registry.h"
 #include "core/model/preset/budget.h"
 #include "core/progress.h"
 
 namespace ressort {
-
-enum class Method { direct, chains, dense, modal, grid, chorus, fourth, slow };
-
-// The modal form last: it is only sought where it may beat all others.
-inline constexpr Method all_methods[] = {Method::direct, Method::chains, Method::dense,
-                                         Method::grid,   Method::chorus, Method::modal};
-
-// These are true to the continuous network instead: only for a budget that asks for it, or by name;
-// slow also for one that says what may be left out.
-inline constexpr Method physical_methods[] = {Method::fourth, Method::slow};
-
-std::string_view method_name(Method method);
 
 // For how many masses the eigenvectors may be sought; the time grows with the third power. A method
 // that is asked for by name is not held back by this.

@@ -4,7 +4,9 @@
 #include <numeric>
 
 #include "core/kernels/chains/chains_form.h"
+#include "core/kernels/domains/sharded_form.h"
 #include "core/kernels/grid/grid_form.h"
+#include "core/kernels/registry.h"
 #include "core/kernels/taps.h"
 
 namespace ressort {
@@ -477,7 +479,7 @@ std::optional<Shards> share_out(const Program& program, const Workload& load,
     Shards found{.shards = std::make_shared<std::vector<Shard>>(std::move(shards)),
                  .crew = load.crew,
                  .frames = choice.frames};
-    if (const double ns = sharded_ns(found, load); ns < best_ns) {
+    if (const double ns = predicted_ns(program, found, load); ns < best_ns) {
       best_ns = ns;
       best = std::move(found);
     }

@@ -3,8 +3,8 @@
 
 #include <optional>
 
-#include "core/compile/cost.h"
 #include "core/kernels/domains/sharded.h"
+#include "core/kernels/estimates.h"
 #include "core/progress.h"
 
 namespace ressort {

@@ -2,17 +2,6 @@
 
 #include <algorithm>
 
-#include "core/kernels/chains/chains.h"
-#include "core/kernels/chorus/chorus.h"
-#include "core/kernels/dense/dense.h"
-#include "core/kernels/direct/compensated.h"
-#include "core/kernels/direct/direct.h"
-#include "core/kernels/direct/fourth.h"
-#include "core/kernels/domains/sharded.h"
-#include "core/kernels/grid/grid.h"
-#include "core/kernels/modal/modal.h"
-#include "core/kernels/slow/slow.h"
-
 namespace ressort {
 
 template <class T>
@@ -89,51 +78,9 @@ bool Kernel<T>::mend(std::span<const std::uint32_t>, const T*, const T*) {
   return false;
 }
 
-template <class T>
-std::unique_ptr<Kernel<T>> make_kernel(const Program& program, std::size_t voices, Isa isa) {
-  struct Maker {
-    const Program& program;
-    std::size_t voices;
-    Isa isa;
-    std::unique_ptr<Kernel<T>> operator()(const Direct&) const {
-      return std::make_unique<DirectKernel<T>>(program, voices, isa);
-    }
-    std::unique_ptr<Kernel<T>> operator()(const Chains&) const {
-      return std::make_unique<ChainsKernel<T>>(program, isa);
-    }
-    std::unique_ptr<Kernel<T>> operator()(const Dense& form) const {
-      return std::make_unique<DenseKernel<T>>(program, form, isa);
-    }
-    std::unique_ptr<Kernel<T>> operator()(const Modes& modes) const {
-      return std::make_unique<ModalKernel<T>>(program, modes, isa);
-    }
-    std::unique_ptr<Kernel<T>> operator()(const Grid& grid) const {
-      return std::make_unique<GridKernel<T>>(program, grid, isa);
-    }
-    std::unique_ptr<Kernel<T>> operator()(const Chorus& chorus) const {
-      return std::make_unique<ChorusKernel<T>>(program, chorus, voices, isa);
-    }
-    std::unique_ptr<Kernel<T>> operator()(const Shards& shards) const {
-      return std::make_unique<ShardedKernel<T>>(program, shards, voices, isa);
-    }
-    std::unique_ptr<Kernel<T>> operator()(const Fourth& fourth) const {
-      return std::make_unique<FourthKernel<T>>(program, fourth, voices, isa);
-    }
-    std::unique_ptr<Kernel<T>> operator()(const Compensated&) const {
-      return std::make_unique<CompensatedKernel<T>>(program, voices, isa);
-    }
-    std::unique_ptr<Kernel<T>> operator()(const Slow& slow) const {
-      return std::make_unique<SlowKernel<T>>(program, slow, isa);
-    }
-  };
-  return std::visit(Maker{program, voices, isa}, program.form);
-}
-
 template class Coefficients<float>;
 template class Coefficients<double>;
 template class Kernel<float>;
 template class Kernel<double>;
-template std::unique_ptr<Kernel<float>> make_kernel(const Program&, std::size_t, Isa);
-template std::unique_ptr<Kernel<double>> make_kernel(const Program&, std::size_t, Isa);
 
 }  // namespace ressort

@@ -118,7 +118,7 @@ void show_progress(std::size_t done, std::size_t all, const std::string& doing) 
 // The machine in every form that it has.
 std::vector<Formed> forms_of(const Machine& machine) {
   std::vector<Formed> forms;
-  for (const Method method : all_methods) {
+  for (const Method method : methods_for(KernelRow::Use::published)) {
     Formed formed{std::string(method_name(method)), machine};
     const Plan plan = make_plan(formed.machine, {}, method);
     if (plan.parts.size() == 1 && plan.parts[0].method == method) {

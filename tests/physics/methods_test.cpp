@@ -208,7 +208,7 @@ struct Turn {
 // Every model by each of its methods, the models changing every time.
 std::vector<Turn> turns_of(const std::vector<Subject>& all) {
   std::vector<Turn> turns;
-  for (std::size_t round = 0; round < std::size(all_methods); ++round) {
+  for (std::size_t round = 0; round < methods_for(KernelRow::Use::published).size(); ++round) {
     for (const Subject& subject : all) {
       if (round < subject.methods.size()) {
         turns.push_back({&subject, *std::next(subject.methods.begin(), std::ptrdiff_t(round))});

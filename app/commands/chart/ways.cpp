@@ -85,10 +85,10 @@ const char* precision_name(Precision precision) {
 
 std::vector<Way> all_ways() {
   std::vector<Way> ways;
-  for (const Method method : all_methods) {
+  for (const Method method : methods_for(KernelRow::Use::published)) {
     add_method(ways, method);
   }
-  for (const Method method : physical_methods) {
+  for (const Method method : methods_for(KernelRow::Use::physical)) {
     add_method(ways, method);
   }
   add_truncation(ways, "modal cents=1", Method::modal, "cents=1", silences);

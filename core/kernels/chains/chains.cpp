@@ -285,10 +285,10 @@ class TablesMaker {
 }  // namespace
 
 template <class T>
-ChainsKernel<T>::ChainsKernel(const Program& program, Isa isa)
+ChainsKernel<T>::ChainsKernel(const Program& program, const Chains& form, std::size_t, Isa isa)
     : Kernel<T>(program, 1),
       program_(program),
-      lanes_(lanes_for<T>(std::get<Chains>(program.form), isa)),
+      lanes_(lanes_for<T>(form, isa)),
       tables_(TablesMaker(program, lanes_, place_).make()),
       step_(with_isa(isa, [&]<Isa level>() { return chains_step<level, T>(lanes_ * sizeof(T)); })),
       masks_(4 * lanes_ * tables_.chains.size()),

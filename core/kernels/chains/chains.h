@@ -146,7 +146,7 @@ template <class T>
 class ChainsKernel final : public Kernel<T> {
  public:
   // The Program's form is Chains.
-  ChainsKernel(const Program& program, Isa isa);
+  ChainsKernel(const Program& program, const Chains& form, std::size_t voices, Isa isa);
   void place(std::size_t lane, const double* x, const double* v) override;
   bool save(std::size_t lane, double* x, double* v) const override;
   bool read(std::span<const std::uint32_t> nodes, T* x, T* v) const override;

@@ -272,4 +272,45 @@ std::optional<Chains> chains_form(const Program& program, const Progress& progre
   return ChainFinder(program, progress).find();
 }
 
+double predicted_ns(const Program& program, const Chains& form, const Workload& load) {
+  std::uint32_t longest = 0;
+  for (const Chain& chain : form.chains) {
+    longest = std::max(longest, chain.count);
+  }
+  const bool fills_wide = is_wide(load) && longest >= (load.is_double ? 12u : 24u);
+  const double lanes = (fills_wide ? 32.0 : 16.0) / (load.is_double ? 8.0 : 4.0);
+  double sum = 6.0;
+  for (const Chain& chain : form.chains) {
+    const double stiff = chain.is_stiff ? 2.2 : 1.0;
+    sum += 3.7 + stiff * (is_wide(load) ? 0.62 : 0.9) * std::ceil(chain.count / lanes) +
+           (chain.is_stiff ? 24.0 : 0.0);
+  }
+  if (!form.links.empty()) {
+    sum += 4.0;
+  }
+  for (const std::uint32_t link : form.links) {
+    const auto run =
+        std::find_if(program.link_runs.begin(), program.link_runs.end(),
+                     [&](const LinkRun& r) { return link >= r.first && link < r.first + r.count; });
+    if (run->scheme != Scheme::plain) {
+      continue;
+    }
+    sum += run->law == Law::spring || run->law == Law::contact ? 2.3 : 5.0;
+  }
+  sum += 3.2 * static_cast<double>(form.loose.size()) +
+         0.5 * static_cast<double>(program.inputs.size() + program.outputs.size()) +
+         22.0 * static_cast<double>(program.taps.size()) + passive_ns(program);
+  return sum * load.voices;
+}
+
+std::string description(const Program&, const Chains& form) {
+  return count_of(form.chains.size(), "row of equal masses", "rows of equal masses") +
+         " folded into vectors, " + count_of(form.loose.size(), "mass", "masses") + " and " +
+         count_of(form.links.size(), "link", "links") + " one by one";
+}
+
+std::uint64_t voice_bytes(const Program& program, const Chains& form, std::uint64_t number_bytes) {
+  return bytes_with_own_links(program, form.links.size(), number_bytes);
+}
+
 }  // namespace ressort

@@ -3,6 +3,7 @@
 
 #include <optional>
 
+#include "core/kernels/estimates.h"
 #include "core/kernels/program.h"
 #include "core/progress.h"
 
@@ -16,5 +17,10 @@ inline constexpr std::uint32_t least_chain_masses = 8;  // below, folding is not
 // to the next but one belong to a chain too. Force outputs beside points on macros are refused.
 // O(nodes + links). [any thread but audio]
 std::optional<Chains> chains_form(const Program& program, const Progress& progress = {});
+
+// What the registry's row of it asks, of one voice in bytes.
+double predicted_ns(const Program& program, const Chains& form, const Workload& load);
+std::string description(const Program& program, const Chains& form);
+std::uint64_t voice_bytes(const Program& program, const Chains& form, std::uint64_t number_bytes);
 
 }  // namespace ressort

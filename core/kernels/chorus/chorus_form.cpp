@@ -53,4 +53,26 @@ std::optional<Chorus> chorus_form(const Program& program) {
   return chorus;
 }
 
+// Beyond most_held_masses everything goes through memory.
+double predicted_ns(const Program& program, const Chorus&, const Workload& load) {
+  const LinkCount links = links_of(program);
+  const double others = links.bent + links.others;
+  const double passive = 0.8 * packs_of(load) * passive_ns(program);
+  if (program.moving <= most_held_masses) {
+    return 6.0 + 3.0 * others + passive +
+           packs_of(load) * (0.6 * (program.moving + links.springs) + 2.8 * others);
+  }
+  return 6.0 + passive + (0.6 + 1.6 * packs_of(load)) * (program.moving + links.springs + others);
+}
+
+std::string description(const Program& program, const Chorus&) {
+  return std::string(program.moving <= most_held_masses ? "its masses in registers"
+                                                        : "mass by mass and link by link") +
+         ", a voice in each lane of many packs at once";
+}
+
+std::uint64_t voice_bytes(const Program& program, const Chorus&, std::uint64_t number_bytes) {
+  return bytes_with_shared_links(program, number_bytes);
+}
+
 }  // namespace ressort

@@ -3,6 +3,7 @@
 
 #include <optional>
 
+#include "core/kernels/estimates.h"
 #include "core/kernels/program.h"
 
 namespace ressort {
@@ -12,5 +13,10 @@ inline constexpr std::uint32_t most_chorus_masses = 16;  // more do not fit besi
 // Nothing where nothing moves, or where it has more than most_chorus_masses masses, or points or
 // force outputs. O(links). [any thread but audio]
 std::optional<Chorus> chorus_form(const Program& program);
+
+// What the registry's row of it asks, of one voice in bytes.
+double predicted_ns(const Program& program, const Chorus& form, const Workload& load);
+std::string description(const Program& program, const Chorus& form);
+std::uint64_t voice_bytes(const Program& program, const Chorus& form, std::uint64_t number_bytes);
 
 }  // namespace ressort

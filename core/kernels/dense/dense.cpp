@@ -83,7 +83,7 @@ void assemble(const Program& program, const Dense& form, const Layout& layout, U
 }  // namespace
 
 template <class T>
-DenseKernel<T>::DenseKernel(const Program& program, const Dense& form, Isa isa)
+DenseKernel<T>::DenseKernel(const Program& program, const Dense& form, std::size_t, Isa isa)
     : Kernel<T>(program, 1),
       program_(program),
       form_(form),

@@ -176,7 +176,7 @@ constexpr DensePacks dense_packs(std::size_t masses, std::size_t number_bytes, I
 template <class T>
 class DenseKernel final : public Kernel<T> {
  public:
-  DenseKernel(const Program& program, const Dense& form, Isa isa);
+  DenseKernel(const Program& program, const Dense& form, std::size_t voices, Isa isa);
   void place(std::size_t lane, const double* x, const double* v) override;
   bool save(std::size_t lane, double* x, double* v) const override;
   bool is_near_start(std::size_t lane, double bound) const override;

@@ -54,4 +54,29 @@ std::optional<Dense> dense_form(const Program& program) {
   return form;
 }
 
+// A force that sounds all the time costs more than the body; a body in contact is walked sample by
+// sample.
+double predicted_ns(const Program& program, const Dense& form, const Workload& load) {
+  const double n = program.moving;
+  const double slow = is_wide(load) ? 1.0 : 1.8;
+  const double half = load.is_double ? 1.0 : 0.6;
+  const double signals = static_cast<double>(program.inputs.size() * program.outputs.size());
+  if (form.ports.empty()) {
+    return load.voices * slow * (0.95 + half * 0.12 * n + 3.0 * signals);
+  }
+  const double stride = load.is_double ? 4.0 * std::ceil(n / 4.0) : 2.0 * std::ceil(n / 2.0);
+  const double one = n <= 4.0 ? 8.0 : load.is_double ? 2.8 * stride - 5.7 : 1.3 * stride + 2.0;
+  return load.voices * slow * (one + 5.0 * static_cast<double>(form.ports.size() - 1));
+}
+
+std::string description(const Program&, const Dense& form) {
+  return form.ports.empty() ? "blocks of samples by one matrix"
+                            : "blocks of samples by one matrix between contacts, " +
+                                  count_of(form.ports.size(), "link", "links") + " one by one";
+}
+
+std::uint64_t voice_bytes(const Program& program, const Dense&, std::uint64_t number_bytes) {
+  return bytes_with_own_links(program, program.ends.size(), number_bytes);
+}
+
 }  // namespace ressort

@@ -3,6 +3,7 @@
 
 #include <optional>
 
+#include "core/kernels/estimates.h"
 #include "core/kernels/program.h"
 
 namespace ressort {
@@ -10,5 +11,10 @@ namespace ressort {
 // Nothing where it has more than most_dense_masses masses, or points, force outputs, audio
 // parameters, or outputs of what is no mass. O(links). [any thread but audio]
 std::optional<Dense> dense_form(const Program& program);
+
+// What the registry's row of it asks, of one voice in bytes.
+double predicted_ns(const Program& program, const Dense& form, const Workload& load);
+std::string description(const Program& program, const Dense& form);
+std::uint64_t voice_bytes(const Program& program, const Dense& form, std::uint64_t number_bytes);
 
 }  // namespace ressort

@@ -22,7 +22,8 @@ float rest_of(T number) {
 }  // namespace
 
 template <class T>
-CompensatedKernel<T>::CompensatedKernel(const Program& program, std::size_t voices, Isa isa)
+CompensatedKernel<T>::CompensatedKernel(const Program& program, const Compensated&,
+                                        std::size_t voices, Isa isa)
     : Kernel<T>(program, lanes_for<float>(voices, isa)),
       program_(program),
       step_(with_isa(

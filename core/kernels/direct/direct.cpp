@@ -5,7 +5,7 @@
 
 namespace ressort {
 template <class T>
-DirectKernel<T>::DirectKernel(const Program& program, std::size_t voices, Isa isa)
+DirectKernel<T>::DirectKernel(const Program& program, const Direct&, std::size_t voices, Isa isa)
     : Kernel<T>(program, lanes_for<T>(voices, isa)),
       program_(program),
       step_(with_isa(

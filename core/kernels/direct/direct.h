@@ -46,7 +46,7 @@ DirectStep<float> compensated_step(std::size_t bytes);
 template <class T>
 class DirectKernel final : public Kernel<T> {
  public:
-  DirectKernel(const Program& program, std::size_t voices, Isa isa);
+  DirectKernel(const Program& program, const Direct& form, std::size_t voices, Isa isa);
   void place(std::size_t lane, const double* x, const double* v) override;
   bool save(std::size_t lane, double* x, double* v) const override;
   bool read(std::span<const std::uint32_t> nodes, T* x, T* v) const override;

@@ -6,6 +6,8 @@
 #include <limits>
 #include <map>
 
+#include "core/kernels/direct/direct_form.h"
+
 namespace ressort {
 namespace {
 
@@ -165,6 +167,24 @@ std::optional<Fourth> fourth_form(const Program& program) {
     }
   }
   return form;
+}
+
+// Twice through the springs, and two loops over the masses.
+double predicted_ns(const Program& program, const Fourth&, const Workload& load) {
+  return 2.5 * predicted_ns(program, Direct{}, load);
+}
+
+std::string description(const Program& program, const Fourth& form) {
+  std::size_t springs = 0;
+  for (const FourthLinks& links : form.springs) {
+    springs += links.count;
+  }
+  return "to fourth order, springs and dampers twice, " +
+         count_of(program.ends.size() - springs, "link", "links") + " as published";
+}
+
+std::uint64_t voice_bytes(const Program& program, const Fourth&, std::uint64_t number_bytes) {
+  return bytes_with_own_links(program, program.ends.size(), number_bytes);
 }
 
 }  // namespace ressort

@@ -4,6 +4,7 @@
 
 #include <optional>
 
+#include "core/kernels/estimates.h"
 #include "core/kernels/program.h"
 
 namespace ressort {
@@ -30,5 +31,10 @@ SchemeError fourth_error(const Steepness& steepness);
 // instead of in as soon as it does; where a link is not of the plain scheme; where a force is heard
 // beside points. What is stable as published is so in this form. O(links). [any thread but audio]
 std::optional<Fourth> fourth_form(const Program& program);
+
+// What the registry's row of it asks, of one voice in bytes.
+double predicted_ns(const Program& program, const Fourth& form, const Workload& load);
+std::string description(const Program& program, const Fourth& form);
+std::uint64_t voice_bytes(const Program& program, const Fourth& form, std::uint64_t number_bytes);
 
 }  // namespace ressort

@@ -29,7 +29,7 @@ std::uint32_t furthest_offset(const Grid& grid) {
 }  // namespace
 
 template <class T>
-GridKernel<T>::GridKernel(const Program& program, const Grid& grid, Isa isa)
+GridKernel<T>::GridKernel(const Program& program, const Grid& grid, std::size_t, Isa isa)
     : Kernel<T>(program, 1),
       program_(program),
       grid_(grid),

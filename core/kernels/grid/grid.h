@@ -55,7 +55,7 @@ GridStep<T> grid_step();
 template <class T>
 class GridKernel final : public Kernel<T> {
  public:
-  GridKernel(const Program& program, const Grid& grid, Isa isa);
+  GridKernel(const Program& program, const Grid& grid, std::size_t voices, Isa isa);
   void place(std::size_t lane, const double* x, const double* v) override;
   bool save(std::size_t lane, double* x, double* v) const override;
   bool read(std::span<const std::uint32_t> nodes, T* x, T* v) const override;

@@ -495,4 +495,32 @@ std::optional<Grid> grid_form(const Program& program, const Progress& progress) 
   return best;
 }
 
+double predicted_ns(const Program& program, const Grid& form, const Workload& load) {
+  const double slow = is_wide(load) ? 1.0 : 2.3;
+  const double d = load.is_double ? 1.0 : 0.0;
+  const double rest = static_cast<double>(form.rest_ends.size() + form.ports.size());
+  double sum = passive_ns(program) + (3.5 + 1.5 * d) * rest +
+               10.0 * static_cast<double>(program.taps.size());
+  for (const GridSegment& segment : form.segments) {
+    const double offsets = static_cast<double>(segment.offsets.size());
+    sum += 6.0 + 4.0 * d + slow * segment.count * (0.13 + 0.14 * d + (0.03 + 0.02 * d) * offsets);
+  }
+  for (const GridLinks& links : form.links) {
+    const bool is_cheap = program.link_runs[links.run].law == Law::spring;
+    sum += slow * form.count * static_cast<double>(links.offsets.size()) * (0.24 + 0.21 * d) *
+           (is_cheap ? 0.8 : 1.2);
+  }
+  return load.voices * sum;
+}
+
+std::string description(const Program&, const Grid& form) {
+  return std::string(form.segments.empty() ? "forces" : "rows that are alike") +
+         " in vectors along the index, " + count_of(form.rest_ends.size(), "link", "links") +
+         " one by one";
+}
+
+std::uint64_t voice_bytes(const Program& program, const Grid& form, std::uint64_t number_bytes) {
+  return bytes_with_own_links(program, form.rest_ends.size(), number_bytes);
+}
+
 }  // namespace ressort

@@ -143,7 +143,7 @@ class Furnisher {
 }  // namespace
 
 template <class T>
-ModalKernel<T>::ModalKernel(const Program& program, const Modes& modes, Isa isa)
+ModalKernel<T>::ModalKernel(const Program& program, const Modes& modes, std::size_t, Isa isa)
     : Kernel<T>(program, 1),
       program_(program),
       modes_(modes),

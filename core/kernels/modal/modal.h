@@ -101,7 +101,7 @@ ModalStep<T> modal_step();
 template <class T>
 class ModalKernel final : public Kernel<T> {
  public:
-  ModalKernel(const Program& program, const Modes& modes, Isa isa);
+  ModalKernel(const Program& program, const Modes& modes, std::size_t voices, Isa isa);
   void place(std::size_t lane, const double* x, const double* v) override;
   // Modes that nobody hears are left out: false.
   bool save(std::size_t lane, double* x, double* v) const override;

@@ -3,6 +3,7 @@
 
 #include <optional>
 
+#include "core/kernels/estimates.h"
 #include "core/kernels/program.h"
 #include "core/model/preset/budget.h"
 #include "core/progress.h"
@@ -19,5 +20,13 @@ inline constexpr std::size_t most_modes = 1200;  // beyond, the eigenvectors tak
 // thread but audio]
 std::optional<Modes> modal_form(const Program& program, const Budget& budget = {},
                                 const Progress& progress = {});
+
+// What it will cost at least, before it is known.
+double least_modal_ns(const Program& program, const Workload& load);
+
+// What the registry's row of it asks, of one voice in bytes.
+double predicted_ns(const Program& program, const Modes& form, const Workload& load);
+std::string description(const Program& program, const Modes& form);
+std::uint64_t voice_bytes(const Program& program, const Modes& form, std::uint64_t number_bytes);
 
 }  // namespace ressort

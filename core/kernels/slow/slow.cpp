@@ -32,7 +32,7 @@ void SlowKernel<T>::Stepper::step(const Coefficients<T>& coefficients,
 }
 
 template <class T>
-SlowKernel<T>::SlowKernel(const Program& program, const Slow& form, Isa isa)
+SlowKernel<T>::SlowKernel(const Program& program, const Slow& form, std::size_t, Isa isa)
     : Kernel<T>(program, 1),
       program_(program),
       frames_(form.frames),

@@ -15,7 +15,7 @@ template <class T>
 class SlowKernel final : public Kernel<T> {
  public:
   // The form's Programs outlive it.
-  SlowKernel(const Program& program, const Slow& form, Isa isa);
+  SlowKernel(const Program& program, const Slow& form, std::size_t voices, Isa isa);
   void place(std::size_t lane, const double* x, const double* v) override;
   bool save(std::size_t lane, double* x, double* v) const override;
   bool is_near_start(std::size_t lane, double bound) const override;

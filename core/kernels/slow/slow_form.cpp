@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "core/kernels/direct/fourth_form.h"
+#include "core/kernels/registry.h"
 #include "core/laws/laws.h"
 
 namespace ressort {
@@ -58,6 +59,24 @@ std::optional<Slow> slow_form(const Program& program, double highest_factor) {
     frames /= 2;
   }
   return frames >= least_frames ? slow_by(program, frames) : std::nullopt;
+}
+
+// A voice's outputs, and its share of a coarse step.
+double predicted_ns(const Program& program, const Slow& form, const Workload& load) {
+  Workload one = load;
+  one.voices = 1;
+  return load.voices * (4.0 + 3.0 * static_cast<double>(program.outputs.size()) +
+                        predicted_ns(*form.coarse, one) / form.frames);
+}
+
+std::string description(const Program&, const Slow& form) {
+  return "to fourth order once in " + std::to_string(form.frames) +
+         " samples, a cubic between; what comes in acts up to " + std::to_string(2 * form.frames) +
+         " samples later";
+}
+
+std::uint64_t voice_bytes(const Program&, const Slow& form, std::uint64_t number_bytes) {
+  return voice_bytes(*form.fine, number_bytes) + voice_bytes(*form.coarse, number_bytes);
 }
 
 }  // namespace ressort

@@ -3,6 +3,7 @@
 
 #include <optional>
 
+#include "core/kernels/estimates.h"
 #include "core/kernels/program.h"
 
 namespace ressort {
@@ -19,5 +20,10 @@ std::optional<Slow> slow_by(const Program& program, std::uint32_t frames);
 // By the largest power of two, up to 1024, that keeps below these figures at `highest_factor` times
 // every stiffness; nothing where that is below 4. O(links). [any thread but audio]
 std::optional<Slow> slow_form(const Program& program, double highest_factor);
+
+// What the registry's row of it asks, of one voice in bytes.
+double predicted_ns(const Program& program, const Slow& form, const Workload& load);
+std::string description(const Program& program, const Slow& form);
+std::uint64_t voice_bytes(const Program& program, const Slow& form, std::uint64_t number_bytes);
 
 }  // namespace ressort

@@ -1,0 +1,39 @@
+#include "core/kernels/direct/direct_form.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace ressort {
+
+double predicted_ns(const Program& program, const Direct&, const Workload& load) {
+  const auto widest = static_cast<double>(vector_bytes(load.isa)) / (load.is_double ? 8.0 : 4.0);
+  const LinkCount links = links_of(program);
+  return packs_of(load) *
+             (12.0 + 1.5 * passive_ns(program) +
+              1.6 * (program.moving + links.springs + links.bent) + 5.0 * links.others) +
+         10.0 * std::ceil(load.voices / widest) * std::min<double>(load.voices, widest) *
+             static_cast<double>(program.taps.size());
+}
+
+std::string description(const Program&, const Direct&) {
+  return "mass by mass and link by link, as published, a voice in each lane";
+}
+
+std::uint64_t voice_bytes(const Program& program, const Direct&, std::uint64_t number_bytes) {
+  return bytes_with_shared_links(program, number_bytes);
+}
+
+// A third more than without.
+double predicted_ns(const Program& program, const Compensated&, const Workload& load) {
+  return (is_wide(load) ? 1.3 : 4.0) * predicted_ns(program, Direct{}, load);
+}
+
+std::string description(const Program&, const Compensated&) {
+  return "mass by mass and link by link, as published, each position in two numbers";
+}
+
+std::uint64_t voice_bytes(const Program& program, const Compensated&, std::uint64_t number_bytes) {
+  return bytes_with_shared_links(program, number_bytes);
+}
+
+}  // namespace ressort

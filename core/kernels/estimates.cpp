@@ -1,0 +1,82 @@
+#include "core/kernels/estimates.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/laws/laws.h"
+
+namespace ressort {
+namespace {
+
+constexpr std::uint64_t numbers_of_node = 5;  // position, velocity, force, and a kernel's own
+constexpr std::uint64_t numbers_of_link = 1;  // for all voices of a kernel that has many
+constexpr std::uint64_t bytes_of_link = 48;   // in tables
+constexpr std::uint64_t numbers_of_coefficient = 3;
+
+double passive_ns(const LinkRun& run) {
+  const LawFacts& law = facts_of(run.law);
+  const double steps = run.scheme == Scheme::substeps ? run.substeps : 1.0;
+  return law.solve_ns + law.substep_ns * steps;
+}
+
+}  // namespace
+
+LinkCount links_of(const Program& program) {
+  LinkCount count;
+  for (const LinkRun& run : program.link_runs) {
+    if (run.scheme != Scheme::plain) {
+      continue;
+    }
+    const bool only_pulls = facts_of(run.law).contains_spring;
+    (run.law == Law::spring ? count.springs : only_pulls ? count.bent : count.others) += run.count;
+  }
+  return count;
+}
+
+double passive_ns(const Program& program) {
+  double sum = 0.0;
+  for (const LinkRun& run : program.link_runs) {
+    sum += run.scheme == Scheme::plain ? 0.0 : passive_ns(run) * run.count;
+  }
+  return sum;
+}
+
+double packs_of(const Workload& load) {
+  const double size = load.is_double ? 8.0 : 4.0;
+  const double lanes = static_cast<double>(vector_bytes(load.isa)) / size;
+  const bool is_halved = load.isa == Isa::v4 && load.voices > lanes / 2.0;
+  return std::ceil(load.voices / lanes) * (is_halved ? 2.0 : load.isa == Isa::base ? 1.1 : 1.0);
+}
+
+double worst_steps(const Program& program) {
+  constexpr double of_a_point = 10.0;
+  constexpr double of_an_audio_coefficient = 20.0;
+  constexpr double of_a_solved_link = 400.0;
+  double steps = program.moving + static_cast<double>(program.ends.size()) +
+                 of_a_point * static_cast<double>(program.taps.size()) +
+                 of_an_audio_coefficient * static_cast<double>(program.audio_coefficients.size());
+  for (const LinkRun& run : program.link_runs) {
+    steps += run.scheme == Scheme::plain ? 0.0 : of_a_solved_link * run.count;
+  }
+  return steps;
+}
+
+std::uint64_t node_bytes(const Program& program, std::uint64_t number_bytes) {
+  return number_bytes * (numbers_of_node * program.position.size() +
+                         numbers_of_coefficient * program.coefficients.size());
+}
+
+std::uint64_t bytes_with_shared_links(const Program& program, std::uint64_t number_bytes) {
+  return node_bytes(program, number_bytes) + number_bytes * numbers_of_link * program.ends.size();
+}
+
+std::uint64_t bytes_with_own_links(const Program& program, std::size_t links,
+                                   std::uint64_t number_bytes) {
+  return node_bytes(program, number_bytes) + bytes_of_link * links;
+}
+
+std::string count_of(std::size_t count, const char* one, const char* many) {
+  return std::to_string(count) + " " + (count == 1 ? one : many);
+}
+
+}  // namespace ressort

@@ -1,0 +1,161 @@
+#include "core/kernels/registry.h"
+
+#include <algorithm>
+#include <iterator>
+#include <type_traits>
+#include <utility>
+
+#include "core/kernels/chains/chains.h"
+#include "core/kernels/chains/chains_form.h"
+#include "core/kernels/chorus/chorus.h"
+#include "core/kernels/chorus/chorus_form.h"
+#include "core/kernels/dense/dense.h"
+#include "core/kernels/dense/dense_form.h"
+#include "core/kernels/direct/compensated.h"
+#include "core/kernels/direct/direct.h"
+#include "core/kernels/direct/direct_form.h"
+#include "core/kernels/direct/fourth.h"
+#include "core/kernels/direct/fourth_form.h"
+#include "core/kernels/domains/sharded.h"
+#include "core/kernels/domains/sharded_form.h"
+#include "core/kernels/grid/grid.h"
+#include "core/kernels/grid/grid_form.h"
+#include "core/kernels/modal/modal.h"
+#include "core/kernels/modal/modal_form.h"
+#include "core/kernels/slow/slow.h"
+#include "core/kernels/slow/slow_form.h"
+
+namespace ressort {
+namespace {
+
+using Request = KernelRequest;
+using Use = KernelRow::Use;
+
+template <class Tables, std::size_t i = 0>
+constexpr std::size_t index_of() {
+  if constexpr (std::is_same_v<Tables, std::variant_alternative_t<i, Form>>) {
+    return i;
+  } else {
+    return index_of<Tables, i + 1>();
+  }
+}
+
+template <class T, class Tables, template <class> class K>
+std::unique_ptr<Kernel<T>> make(const Program& program, std::size_t voices, Isa isa) {
+  return std::make_unique<K<T>>(program, std::get<Tables>(program.form), voices, isa);
+}
+
+// The kernel K of these tables, which `fits(request)` finds or not.
+template <class Tables, template <class> class K, class Fits>
+constexpr KernelRow row(Method method, std::string_view name, Use use, Fits,
+                        double (*least_ns)(const Program&, const Workload&) = nullptr) {
+  return {.form = index_of<Tables>(),
+          .method = method,
+          .name = name,
+          .use = use,
+          .fits = [](const Request& request) -> std::optional<Form> {
+            std::optional<Tables> tables = Fits()(request);
+            return tables ? std::optional<Form>(std::move(*tables)) : std::nullopt;
+          },
+          .least_ns = least_ns,
+          .predicted_ns =
+              [](const Program& program, const Workload& load) {
+                return predicted_ns(program, std::get<Tables>(program.form), load);
+              },
+          .description =
+              [](const Program& program) {
+                return description(program, std::get<Tables>(program.form));
+              },
+          .voice_bytes =
+              [](const Program& program, std::uint64_t number_bytes) {
+                return voice_bytes(program, std::get<Tables>(program.form), number_bytes);
+              },
+          .make_float = make<float, Tables, K>,
+          .make_double = make<double, Tables, K>};
+}
+
+constexpr KernelRow rows[] = {
+    row<Chains, ChainsKernel>(Method::chains, "chains", Use::published,
+                              [](const Request& r) { return chains_form(r.program, r.progress); }),
+    row<Dense, DenseKernel>(Method::dense, "dense", Use::published,
+                            [](const Request& r) { return dense_form(r.program); }),
+    row<Grid, GridKernel>(Method::grid, "grid", Use::published,
+                          [](const Request& r) { return grid_form(r.program, r.progress); }),
+    row<Chorus, ChorusKernel>(Method::chorus, "chorus", Use::published,
+                              [](const Request& r) { return chorus_form(r.program); }),
+    row<Modes, ModalKernel>(
+        Method::modal, "modal", Use::published,
+        [](const Request& r) { return modal_form(r.program, r.budget, r.progress); },
+        least_modal_ns),
+    row<Fourth, FourthKernel>(Method::fourth, "fourth", Use::physical,
+                              [](const Request& r) { return fourth_form(r.program); }),
+    row<Slow, SlowKernel>(
+        Method::slow, "slow", Use::physical,
+        [](const Request& r) { return slow_form(r.program, r.load.highest_factor); }),
+    row<Shards, ShardedKernel>(Method::direct, "shards", Use::given,
+                               [](const Request&) { return std::optional<Shards>(); }),
+    row<Compensated, CompensatedKernel>(Method::direct, "compensated", Use::given,
+                                        [](const Request&) { return Compensated(); }),
+    row<Direct, DirectKernel>(Method::direct, "direct", Use::published,
+                              [](const Request&) { return Direct(); }),
+};
+
+}  // namespace
+
+std::span<const KernelRow> kernel_rows() {
+  return rows;
+}
+
+const KernelRow& row_of(const Form& form) {
+  return *std::find_if(std::begin(rows), std::end(rows),
+                       [&](const KernelRow& row) { return row.form == form.index(); });
+}
+
+const KernelRow& row_of(Method method) {
+  return *std::find_if(std::begin(rows), std::end(rows), [&](const KernelRow& row) {
+    return row.method == method && row.use != Use::given;
+  });
+}
+
+std::string_view method_name(Method method) {
+  return row_of(method).name;
+}
+
+std::vector<Method> methods_for(KernelRow::Use use) {
+  std::vector<Method> methods;
+  for (const KernelRow& row : rows) {
+    if (row.use == use) {
+      methods.push_back(row.method);
+    }
+  }
+  if (use == Use::published) {
+    std::rotate(methods.begin(), methods.end() - 1, methods.end());
+  }
+  return methods;
+}
+
+double predicted_ns(const Program& program, const Workload& load) {
+  return row_of(program.form).predicted_ns(program, load);
+}
+
+std::string description(const Program& program) {
+  return row_of(program.form).description(program);
+}
+
+std::uint64_t voice_bytes(const Program& program, std::uint64_t number_bytes) {
+  return row_of(program.form).voice_bytes(program, number_bytes);
+}
+
+template <class T>
+std::unique_ptr<Kernel<T>> make_kernel(const Program& program, std::size_t voices, Isa isa) {
+  const KernelRow& row = row_of(program.form);
+  if constexpr (std::is_same_v<T, float>) {
+    return row.make_float(program, voices, isa);
+  } else {
+    return row.make_double(program, voices, isa);
+  }
+}
+template std::unique_ptr<Kernel<float>> make_kernel(const Program&, std::size_t, Isa);
+template std::unique_ptr<Kernel<double>> make_kernel(const Program&, std::size_t, Isa);
+
+}  // namespace ressort

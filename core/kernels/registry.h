@@ -1,0 +1,79 @@
+// core/kernels: all kernels, a row each. Whoever plans, predicts, explains, times or names them
+// reads the rows.
+//
+// A kernel is a folder: the tables that it computes from (its alternative of Form), whether a
+// Program has them and what they cost (*_form), the class that steps them, and its loops (*_step).
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "core/kernels/estimates.h"
+#include "core/kernels/kernel.h"
+#include "core/kernels/program.h"
+#include "core/model/preset/budget.h"
+#include "core/progress.h"
+
+namespace ressort {
+
+// By which name a kernel is asked for.
+enum class Method { direct, chains, dense, modal, grid, chorus, fourth, slow };
+
+// Whom a kernel is wanted for.
+struct KernelRequest {
+  const Program& program;
+  const Workload& load;
+  const Budget& budget;
+  const Progress& progress;
+};
+
+struct KernelRow {
+  enum class Use {
+    published,  // the published scheme, in other coordinates at most
+    physical,   // true to the continuous network instead: where a budget asks for it, or by name
+    given,      // comes with a precision or with several cores, never by its own name
+  };
+
+  std::size_t form;  // which alternative of Form
+  Method method;     // of a given one, what it does
+  std::string_view name;
+  Use use;
+  // The tables of a Program; nothing where the kernel cannot play it. [any thread but audio]
+  std::optional<Form> (*fits)(const KernelRequest&);
+  // What it costs at least, where fits() takes long; else null.
+  double (*least_ns)(const Program&, const Workload&);
+  // These ask for a Program in the row's own form.
+  double (*predicted_ns)(const Program&, const Workload&);
+  std::string (*description)(const Program&);
+  std::uint64_t (*voice_bytes)(const Program&, std::uint64_t number_bytes);
+  std::unique_ptr<Kernel<float>> (*make_float)(const Program&, std::size_t voices, Isa);
+  std::unique_ptr<Kernel<double>> (*make_double)(const Program&, std::size_t voices, Isa);
+};
+
+// The one that all others are compared with, and that plays everything, comes last.
+std::span<const KernelRow> kernel_rows();
+
+const KernelRow& row_of(const Form& form);
+const KernelRow& row_of(Method method);
+std::string_view method_name(Method method);
+
+// All of one use, the reference first.
+std::vector<Method> methods_for(KernelRow::Use use);
+
+// Nanoseconds a sample for all voices in the form that the Program has, everything that can touch
+// touching all the time: what a block's budget has to hold. Fitted to measurements on one machine
+// (Zen 4 at 3.7 GHz), to about a quarter; what matters is the order of the forms.
+double predicted_ns(const Program& program, const Workload& load);
+
+// What the form is, of this Program, in words.
+std::string description(const Program& program);
+
+// One voice in this form, in bytes.
+std::uint64_t voice_bytes(const Program& program, std::uint64_t number_bytes);
+
+}  // namespace ressort
