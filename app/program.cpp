@@ -6,6 +6,7 @@
 
 #include <cstdio>
 #include <exception>
+#include <initializer_list>
 #include <new>
 
 #include "app/exit_code.h"
