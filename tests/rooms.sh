@@ -23,7 +23,7 @@ judge() {
       owner["alsa/"] = "app/devices/alsa.cpp"
       owner["RtMidi.h"] = "app/devices/rtmidi.cpp"
       owner["rtmidi/"] = "app/devices/rtmidi.cpp"
-      owner["lo/"] = "app/control/osc.cpp"
+      owner["lo/"] = "app/control/osc/server.cpp"
       owner["sndfile"] = "app/session/sound_file.cpp"
       owner["histedit.h"] = "app/control/terminal.cpp"
       owner["editline/"] = "app/control/terminal.cpp"
@@ -41,14 +41,14 @@ judge() {
       sees["core/analysis"] = "core core/laws core/linear_algebra core/model core/analysis"
       sees["core/kernels"] = "core/lanes.h core/formula.h core/progress.h core/model/preset/budget.h " \
                              "core/laws core/linear_algebra core/kernels"
-      sees["core/engine"] = "core/lanes.h core/formula.h core/progress.h core/laws core/kernels " \
-                            "core/engine"
+      sees["core/engine"] = "core/lanes.h core/formula.h core/progress.h core/gesture.h " \
+                            "core/input_driver.h core/laws core/kernels core/engine"
       sees["core/compile"] = "core core/laws core/linear_algebra core/model core/analysis core/kernels " \
                              "core/engine core/compile"
       all = sees["core/compile"]
       sees["app/realtime"] = "core/engine core/kernels app app/realtime"
       sees["app/devices"] = "core/result.h core/engine core/kernels app app/realtime app/devices"
-      sees["app/session"] = all " app app/realtime app/session app/control/calls.h"
+      sees["app/session"] = all " app app/realtime app/session app/control/registry.h"
       sees["app/control"] = all " app app/realtime app/devices app/session app/control"
       sees["app/commands"] = sees["app/control"] " app/commands"
       sees["app"] = sees["app/commands"]
@@ -75,7 +75,7 @@ judge() {
         target = what
         if (match(target, /^(core|app)\/[^\/]*\//)) {
           target = substr(target, 1, RLENGTH - 1)
-        } else if (target ~ /^core\/(result|formula|progress|lanes)[.]h$/) {
+        } else if (target ~ /^core\/(result|formula|progress|lanes|gesture|input_driver)[.]h$/) {
           target = "core"
         } else if (target ~ /^app\/[^\/]*$/) {
           target = "app"
@@ -136,7 +136,7 @@ app/devices/jack.cpp:1:#include "core/compile/compile.h"
 app/devices/jack.cpp:1:#include <alsa/asoundlib.h>
 app/devices/alsa.cpp:1:#include <jack/jack.h>
 app/control/terminal.cpp:1:#include <lo/lo.h>
-app/control/osc.cpp:1:#include <histedit.h>
+app/control/osc/server.cpp:1:#include <histedit.h>
 app/realtime/midi.cpp:1:#include <RtMidi.h>'
 planted=$(printf '%s\n' "$forbidden" | wc -l)
 caught=$(printf '%s\n' "$forbidden" | judge | wc -l)

@@ -5,7 +5,7 @@
 #include <string>
 
 #include "app/commands/offline.h"
-#include "app/control/osc.h"
+#include "app/control/osc/server.h"
 #include "app/devices/audio.h"
 #include "app/exit_code.h"
 #include "app/session/session.h"

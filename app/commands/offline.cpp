@@ -4,8 +4,9 @@
 #include <cmath>
 #include <set>
 
-#include "app/realtime/crew.h"
+#include "app/control/registry.h"
 #include "app/realtime/process.h"
+#include "app/realtime/thread_pool.h"
 #include "app/session/admit.h"
 #include "app/session/files.h"
 #include "app/session/memory.h"
@@ -50,8 +51,8 @@ std::vector<Setting> reach_of(const std::vector<ScoreLine>& lines, const Network
   constexpr std::string_view prefix = "/param/";
   std::vector<Setting> reach;
   for (const ScoreLine& line : lines) {
-    const std::string_view address = line.call.address;
-    const auto& arguments = line.call.arguments;
+    const std::string_view address = line.message.address;
+    const auto& arguments = line.message.arguments;
     if (!address.starts_with(prefix) || arguments.empty() ||
         !std::holds_alternative<double>(arguments[0])) {
       continue;
@@ -74,14 +75,14 @@ Result<std::vector<ScoredEvent>> score_events(const RenderOptions& options,
   std::vector<ScoredEvent> scored;
   std::set<std::uint16_t> told;
   for (const ScoreLine& line : lines) {
-    auto events = to_events(line.call, instrument, serial);
+    auto events = to_events(line.message, instrument, serial);
     if (!events) {
       return at(options.score, {events.error().message, line.line, line.column});
     }
     for (const Event& event : *events) {
       scored.push_back(
           {line.line, line.column, std::llround(line.time_s * options.rate_hz), event});
-      const std::string news = told_limit(line.call, event, instrument);
+      const std::string news = describe_limit(line.message, event, instrument);
       if (!news.empty() && told.insert(event.index).second) {
         warnings.push_back(options.score + ":" + std::to_string(line.line) + ":" +
                            std::to_string(line.column) + ": warning: " + news);
@@ -199,7 +200,7 @@ Result<Rendered> render(const RenderOptions& options, const std::function<bool(d
     scene->warnings.push_back("--threads " + std::to_string(threads) + ": this machine runs " +
                               std::to_string(core_count()) + " at once, and so many are used");
   }
-  ThreadCrew crew(threads > 0 ? std::min(threads, core_count()) : core_count());
+  ThreadPool pool(threads > 0 ? std::min(threads, core_count()) : core_count());
   auto compiled = admit(*scene,
                         {.rate_hz = options.rate_hz,
                          .rescale = options.rescale,
@@ -208,7 +209,7 @@ Result<Rendered> render(const RenderOptions& options, const std::function<bool(d
                          .precision = options.precision,
                          .method = options.method,
                          .budget = options.budget,
-                         .crew = &crew,
+                         .crew = &pool,
                          .force = options.force,
                          .settings = options.parameters,
                          .reach = reach_of(*lines, scene->network),
@@ -233,13 +234,13 @@ Result<Rendered> render(const RenderOptions& options, const std::function<bool(d
 
   Process process(options.rate_hz, options.limit);
   for (const auto& [name, value] : options.parameters) {
-    const Call call{"/param/" + name, {value}};
-    auto events = to_events(call, instrument, serial);
+    const Message message{"/param/" + name, {value}};
+    auto events = to_events(message, instrument, serial);
     if (!events) {
       return Error{"--set " + name + "=" + print_number(value) + ": " + events.error().message};
     }
     for (const Event& event : *events) {
-      if (const std::string news = told_limit(call, event, instrument); !news.empty()) {
+      if (const std::string news = describe_limit(message, event, instrument); !news.empty()) {
         scene->warnings.push_back(news);
       } else if (event.value != value) {
         return beyond_range(*scene, instrument.parameters[event.index]);
@@ -315,7 +316,7 @@ Result<Rendered> render(const RenderOptions& options, const std::function<bool(d
   rendered.frames = frame;
   rendered.rms =
       frame > 0 ? std::sqrt(energy / static_cast<double>(frame * rendered.channels)) : 0.0;
-  rendered.resets = process.meters.resets.get();
+  rendered.resets = process.meters().resets;
   return rendered;
 }
 

@@ -6,9 +6,10 @@
 #include <string>
 #include <vector>
 
-#include "app/control/calls.h"
+#include "app/control/message.h"
 #include "app/session/loader.h"
 #include "app/session/sound_file.h"
+#include "core/compile/compile.h"
 #include "core/progress.h"
 #include "core/result.h"
 

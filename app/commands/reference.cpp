@@ -5,8 +5,8 @@
 #include <string>
 #include <vector>
 
-#include "app/control/calls.h"
-#include "app/control/console.h"
+#include "app/control/registry.h"
+#include "app/control/status.h"
 #include "app/exit_code.h"
 #include "core/model/language/keywords.h"
 #include "core/model/preset/preset.h"
@@ -54,22 +54,40 @@ void print_preset_keys() {
 
 void print_gestures() {
   print_head({"how", "what the input does"});
-  for (const GestureWord& gesture : gesture_words()) {
-    print_row({code(gesture.word), std::string(gesture.does)});
+  for (const GestureRow& gesture : gestures) {
+    if (!gesture.does.empty()) {
+      print_row({code(gesture.name), std::string(gesture.does)});
+    }
   }
 }
 
 void print_addresses() {
   print_head({"address", "arguments", "what it does"});
-  for (const AddressRow& row : addresses()) {
-    print_row({code(row.address), code(row.arguments), std::string(row.does)});
+  for (const Row* const row : addresses()) {
+    print_row({code(row->address), code(row->arguments_text()), std::string(row->does)});
   }
 }
 
 void print_commands() {
   print_head({"command", "arguments", "what it does"});
-  for (const CommandRow& row : commands()) {
-    print_row({code(row.name), code(row.arguments), std::string(row.does)});
+  for (const Row* const row : commands()) {
+    print_row({code(row->command), code(row->words), std::string(row->command_does)});
+  }
+}
+
+// Those of /status.reply in its order, then those that only the console tells.
+void print_status() {
+  std::vector<const StatusRow*> rows;
+  for (const StatusRow& row : status_rows()) {
+    rows.push_back(&row);
+  }
+  std::stable_sort(rows.begin(), rows.end(), [](const StatusRow* a, const StatusRow* b) {
+    return static_cast<unsigned>(a->place) < static_cast<unsigned>(b->place);
+  });
+  print_head({"place", "figure", "unit", "what it says"});
+  for (const StatusRow* const row : rows) {
+    print_row({row->place == not_in_reply ? "" : std::to_string(row->place + 1), code(row->name),
+               std::string(row->unit), std::string(row->does)});
   }
 }
 
@@ -79,6 +97,7 @@ constexpr ReferencePart parts[] = {
     {"gestures", "what a preset's control may do with an input", print_gestures},
     {"osc", "the addresses of OSC and of scores", print_addresses},
     {"console", "the console's commands", print_commands},
+    {"status", "the figures of /status.reply and of the console", print_status},
 };
 
 }  // namespace

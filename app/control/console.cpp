@@ -3,8 +3,7 @@
 #include <algorithm>
 #include <filesystem>
 
-#include "app/control/calls.h"
-#include "app/control/desk.h"
+#include "app/control/console_commands.h"
 #include "app/session/files.h"
 #include "app/session/sound_file.h"
 #include "app/text.h"
@@ -46,62 +45,16 @@ LineShape shape_of(std::string_view line) {
   return shape;
 }
 
-Result<Done> help(Desk& desk, Words words);
-
-constexpr CommandRow command_rows[] = {
-    {"Models", "load", "MODEL [--force]", "loads a model or a preset",
-     "MODEL is the name of a preset or a model that came with the program, or the path of a .mdl\n"
-     "or .toml file. What sounds goes on until the new model is ready and then fades into it; if\n"
-     "there is an error in the file, it simply goes on. A model that is not stable is such an\n"
-     "error; --force plays it all the same, fading out what runs away.",
-     act::load},
-    {"Models", "preset", "PRESET [--force]", "the same; Tab offers the presets only",
-     "A preset is a model with ranges for its parameters and a plan of what plays it.", act::load},
-    {"Models", "models", "", "lists what came with the program",
-     "Presets go first, each with what it is; then the models that they are made of.", act::models},
-    {"Playing", "noteon", "KEY [VELOCITY]", "starts a note; 60 is the middle C",
-     "KEY is 0 to 127, VELOCITY is 1 to 127, or 100 if it is left out.", act::note_on},
-    {"Playing", "noteoff", "KEY", "ends a note", "KEY is 0 to 127.", act::note_off},
-    {"Playing", "keys", "", "plays from the computer's keyboard",
-     "The letters are laid out as on a piano. A note lasts until the next, or a second.",
-     act::keys},
-    {"Playing", "pluck", "[INPUT] [STRENGTH]", "plucks with the finger at an input",
-     "INPUT is its number, or the first that can pluck; STRENGTH is 0 to 1, or 0.8. 'explain'\n"
-     "tells which inputs know a pluck.",
-     act::pluck},
-    {"Playing", "bow", "SPEED [PRESSURE] [INPUT]", "draws the bow at an input; speed 0 stops",
-     "SPEED is -1 to 1, PRESSURE is 0 to 1, or as it was; INPUT is its number, or the first that\n"
-     "can bow. 'explain' tells which inputs know a bow.",
-     act::bow},
-    {"Playing", "panic", "", "silence at once", "Every voice fades out.", act::panic},
-    {"Parameters", "params", "", "lists the parameters, their values and ranges", "", act::params},
-    {"Parameters", "get", "PARAMETER", "tells a parameter's value",
-     "PARAMETER may be a pattern: 'get m_*' tells all that begin so.", act::get},
-    {"Parameters", "set", "PARAMETER VALUE", "turns a parameter; it stays within its range",
-     "PARAMETER may be a pattern: 'set *_Z 0.001' sets all that end so.", act::set},
-    {"Looking", "status", "", "tells what sounds, how loud, at what cost",
-     "The peak and the limiter's deepest cut are those since the last status.", act::status},
-    {"Looking", "explain", "", "tells how the model is computed and what plays it", "",
-     act::explain},
-    {"Other", "rec", "FILE|stop [--force]", "records what is heard to a file, or ends that",
-     "The file's ending says what it is: .wav, .w64, .flac, .ogg, .aiff, .au or .caf; 24 bits a\n"
-     "sample, and the rate of the audio. Over a sound file that is there it is written by --force\n"
-     "only.",
-     act::record},
-    {"Other", "help", "[COMMAND]", "tells more", "", help},
-    {"Other", "quit", "", "ends the program", "", act::quit},
-};
-
-Result<const CommandRow*> find_command(std::string_view name) {
+Result<const Row*> find_command(std::string_view name) {
   std::vector<std::string> meant;
-  const CommandRow* found = nullptr;
-  for (const CommandRow& row : command_rows) {
-    if (row.name == name) {
-      return &row;
+  const Row* found = nullptr;
+  for (const Row* const row : commands()) {
+    if (row->command == name) {
+      return row;
     }
-    if (row.name.starts_with(name)) {
-      meant.emplace_back(row.name);
-      found = &row;
+    if (row->command.starts_with(name)) {
+      meant.emplace_back(row->command);
+      found = row;
     }
   }
   if (meant.size() == 1) {
@@ -115,23 +68,23 @@ Result<const CommandRow*> find_command(std::string_view name) {
   if (meant.size() > 1) {
     return Error{typed + " could be " + joined(meant, " or ")};
   }
-  for (const CommandRow& row : command_rows) {
-    meant.emplace_back(row.name);
+  for (const Row* const row : commands()) {
+    meant.emplace_back(row->command);
   }
   return Error{"there is no command " + typed + "; there are " + joined(meant, ", ")};
 }
 
-std::string usage(const CommandRow& row) {
-  return std::string(row.name) + (row.arguments.empty() ? "" : " ") + std::string(row.arguments);
+std::string usage(const Row& row) {
+  return std::string(row.command) + (row.words.empty() ? "" : " ") + row.words;
 }
 
 // Lines that work when pasted, with what there is.
-std::string examples(const Desk& desk) {
+std::string examples(const ConsoleContext& console) {
   std::vector<std::string> known = known_presets();
   if (known.empty()) {
     known = known_models();
   }
-  const auto current = loaded(desk);
+  const auto current = loaded(console);
   std::vector<std::vector<std::string>> lines;
   if (!known.empty()) {
     lines.push_back({"load " + known.front(), "# or any name that 'models' lists"});
@@ -148,39 +101,7 @@ std::string examples(const Desk& desk) {
   return table(lines, 2);
 }
 
-Result<Done> help(Desk& desk, Words words) {
-  if (!words.empty()) {
-    const auto found = find_command(words[0]);
-    if (!found) {
-      return found.error();
-    }
-    const CommandRow& row = **found;
-    desk.print(usage(row) + "\n  " + std::string(row.does) +
-               (row.details.empty() ? "" : "\n\n" + std::string(row.details)));
-    return Done{};
-  }
-  std::size_t width = 0;
-  for (const CommandRow& row : command_rows) {
-    width = std::max(width, usage(row).size());
-  }
-  std::string text;
-  std::string_view group;
-  for (const CommandRow& row : command_rows) {
-    if (row.group != group) {
-      group = row.group;
-      text += std::string(group) + "\n";
-    }
-    const std::string shown = usage(row);
-    text +=
-        "  " + shown + std::string(width - shown.size() + 2, ' ') + std::string(row.does) + "\n";
-  }
-  desk.print(text + "Examples\n" + examples(desk) +
-             "\nThe beginning of a command is enough: 'st' is 'status'. 'help load' tells more of "
-             "'load'.");
-  return Done{};
-}
-
-Result<Done> carry_out(Desk& desk, const Command& command) {
+Result<Done> carry_out(ConsoleContext& console, const Command& command) {
   if (command.name.empty()) {
     return Done{};
   }
@@ -188,7 +109,7 @@ Result<Done> carry_out(Desk& desk, const Command& command) {
   if (!row) {
     return row.error();
   }
-  return (*row)->act(desk, command.words);
+  return act(console, **row, command.words);
 }
 
 // Files with one of the endings whose names go on from `typed`, and folders.
@@ -218,8 +139,37 @@ std::vector<std::string> files(const std::string& typed,
 
 }  // namespace
 
-std::span<const CommandRow> commands() {
-  return command_rows;
+Result<Done> command::help(ConsoleContext& console, Words words) {
+  if (!words.empty()) {
+    const auto found = find_command(words[0]);
+    if (!found) {
+      return found.error();
+    }
+    const Row& row = **found;
+    console.print(usage(row) + "\n  " + std::string(row.command_does) +
+                  (row.details.empty() ? "" : "\n\n" + std::string(row.details)));
+    return Done{};
+  }
+  std::size_t width = 0;
+  for (const Row* const row : commands()) {
+    width = std::max(width, usage(*row).size());
+  }
+  std::string text;
+  const Row* before = nullptr;
+  for (const Row* const row : commands()) {
+    if (before == nullptr || row->group != before->group) {
+      text += std::string(heading(row->group)) + "\n";
+    }
+    before = row;
+    const std::string shown = usage(*row);
+    text += "  " + shown + std::string(width - shown.size() + 2, ' ') +
+            std::string(row->command_does) + "\n";
+  }
+  console.print(
+      text + "Examples\n" + examples(console) +
+      "\nThe beginning of a command is enough: 'st' is 'status'. 'help load' tells more of "
+      "'load'.");
+  return Done{};
 }
 
 Result<Command> parse_command(std::string_view line) {
@@ -231,9 +181,9 @@ Result<Command> parse_command(std::string_view line) {
   if (!found) {
     return found.error();
   }
-  const CommandRow& row = **found;
+  const Row& row = **found;
   words.erase(words.begin());
-  const std::vector<std::string> wanted = split_words(row.arguments);
+  const std::vector<std::string> wanted = split_words(row.words);
   const auto needed = static_cast<std::size_t>(
       std::count_if(wanted.begin(), wanted.end(),
                     [](const std::string& word) { return !word.starts_with('['); }));
@@ -244,32 +194,33 @@ Result<Command> parse_command(std::string_view line) {
   }
   if (words.size() < needed || words.size() > wanted.size() || is_other) {
     return Error{"the command is '" + usage(row) + "', found " +
-                 counted(words.size(), "word", "words") + " after '" + std::string(row.name) + "'" +
+                 counted(words.size(), "word", "words") + " after '" + std::string(row.command) +
+                 "'" +
                  ((words.size() > wanted.size() && needed > 0) || is_other
                       ? "; a word with blanks in it is written in quotes"
                       : "")};
   }
-  return Command{std::string(row.name), std::move(words)};
+  return Command{std::string(row.command), std::move(words)};
 }
 
 Console::Console(Process& process, Session& session, Print print, Print tell)
-    : desk_(new Desk{
-          process, session, std::move(print), Recorder(process, std::move(tell)), {}, false}) {}
+    : context_(new ConsoleContext{process, session, std::move(print),
+                                  Recorder(process, std::move(tell))}) {}
 
 Console::~Console() = default;
 
 bool Console::run(const Command& command) {
-  if (const auto done = carry_out(*desk_, command); !done) {
-    desk_->print("error: " + done.error().message);
+  if (const auto done = carry_out(*context_, command); !done) {
+    context_->print("error: " + done.error().message);
   }
-  return !desk_->has_quit;
+  return !context_->has_quit;
 }
 
 bool Console::run_line(std::string_view line) {
   const auto command = parse_command(line);
   if (!command) {
-    desk_->print("error: " + command.error().message);
-    return !desk_->has_quit;
+    context_->print("error: " + command.error().message);
+    return !context_->has_quit;
   }
   return run(*command);
 }
@@ -281,11 +232,12 @@ Result<Done> Console::run_script(const std::string& path) {
     return text.error();
   }
   std::string_view rest = *text;
-  for (int number = 1; !rest.empty() && !desk_->has_quit; ++number) {
+  for (int number = 1; !rest.empty() && !context_->has_quit; ++number) {
     const std::string_view line = rest.substr(0, rest.find('\n'));
     rest.remove_prefix(std::min(rest.size(), line.size() + 1));
     const auto command = parse_command(line);
-    const Result<Done> done = command ? carry_out(*desk_, *command) : Result<Done>(command.error());
+    const Result<Done> done =
+        command ? carry_out(*context_, *command) : Result<Done>(command.error());
     if (!done) {
       const std::size_t column = std::min(line.find_first_not_of(" \t"), line.size()) + 1;
       return Error{path + ":" + std::to_string(number) + ":" + std::to_string(column) +
@@ -296,11 +248,11 @@ Result<Done> Console::run_script(const std::string& path) {
 }
 
 bool Console::has_quit() const {
-  return desk_->has_quit;
+  return context_->has_quit;
 }
 
 void Console::lend_keyboard(Keyboard keyboard) {
-  desk_->keyboard = std::move(keyboard);
+  context_->keyboard = std::move(keyboard);
 }
 
 std::string_view last_word(std::string_view line) {
@@ -319,7 +271,7 @@ std::vector<std::string> Console::completions(std::string_view line) const {
   if (!before.empty()) {
     const auto found = find_command(before[0]);
     const std::vector<std::string> wanted =
-        found ? split_words((*found)->arguments) : std::vector<std::string>{};
+        found ? split_words((*found)->words) : std::vector<std::string>{};
     kind = before.size() <= wanted.size() ? wanted[before.size() - 1] : "";
   }
   constexpr std::string_view scene_endings[] = {".mdl", ".toml"};
@@ -328,12 +280,12 @@ std::vector<std::string> Console::completions(std::string_view line) const {
     words.insert(words.end(), more.begin(), more.end());
   };
   if (kind.find("COMMAND") != kind.npos) {
-    for (const CommandRow& row : command_rows) {
-      words.emplace_back(row.name);
+    for (const Row* const row : commands()) {
+      words.emplace_back(row->command);
     }
   } else if (kind == "PARAMETER") {
     const auto loaded =
-        desk_->session.current();  // kept while the worker puts another in its place
+        context_->session.current();  // kept while the worker puts another in its place
     for (const ParameterInfo& info : loaded->instrument.parameters) {
       words.push_back(info.name);
     }

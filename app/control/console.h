@@ -1,14 +1,13 @@
-// app: the small console's commands. Where they are typed is terminal.h's.
+// app: the small console: reads, completes and carries out the commands of registry.h. Where they
+// are typed is terminal.h's.
 #pragma once
 
 #include <functional>
 #include <memory>
-#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
 
-#include "app/session/recorder.h"
 #include "app/session/session.h"
 #include "core/result.h"
 
@@ -20,20 +19,7 @@ struct Command {
   std::vector<std::string> words;
 };
 
-// What the commands work on; the console's own.
-struct Desk;
-
-// One row for every command: the parser, the help and the completion read this table.
-struct CommandRow {
-  std::string_view group;  // its heading in the help
-  std::string_view name;
-  std::string_view arguments;  // [X] may be left out; MODEL, PRESET, PARAMETER, COMMAND and FILE
-                               // say what completes a word
-  std::string_view does;       // one line
-  std::string_view details;    // more lines, for `help NAME`
-  Result<Done> (*act)(Desk& desk, std::span<const std::string> words);
-};
-std::span<const CommandRow> commands();
+struct ConsoleContext;
 
 // Accepts unique beginnings of command names, "..." for a word with blanks in it, and # comments.
 // An empty line gives a command without a name. The error names what could have been meant, or
@@ -74,7 +60,7 @@ class Console {
   std::vector<std::string> completions(std::string_view line) const;
 
  private:
-  std::unique_ptr<Desk> desk_;
+  std::unique_ptr<ConsoleContext> context_;
 };
 
 }  // namespace ressort

@@ -80,7 +80,7 @@ bool Alsa::write() {
       continue;
     }
     if (wrote == -EPIPE) {
-      process.meters.xruns.add(1);
+      process.xruns.add(1);
     }
     if (snd_pcm_recover(pcm, static_cast<int>(wrote), 1) < 0) {
       return false;

@@ -59,7 +59,7 @@ int on_process(jack_nframes_t frames, void* self) {
   void* const midi = buffer(jack.midi);
   const std::size_t arrived = jack_midi_get_event_count(midi);
   const std::size_t count = std::min(arrived, jack.packets.size());
-  jack.process.meters.dropped.add(arrived - count + jack_midi_get_lost_event_count(midi));
+  jack.process.dropped.add(arrived - count + jack_midi_get_lost_event_count(midi));
   for (std::size_t i = 0; i < count; ++i) {
     jack_midi_event_t event;
     jack_midi_event_get(&event, midi, static_cast<std::uint32_t>(i));
@@ -80,7 +80,7 @@ int on_process(jack_nframes_t frames, void* self) {
 }
 
 int on_xrun(void* self) {
-  static_cast<Jack*>(self)->process.meters.xruns.add(1);
+  static_cast<Jack*>(self)->process.xruns.add(1);
   return 0;
 }
 

@@ -2,10 +2,13 @@
 // the others, and the promise that each side makes.
 #pragma once
 
+#include <array>
 #include <atomic>
 #include <cstddef>
 #include <cstdint>
+#include <cstring>
 #include <span>
+#include <type_traits>
 #include <vector>
 
 namespace ressort {
@@ -81,11 +84,11 @@ class Ring {
   alignas(64) std::atomic<std::size_t> end_{0};    // ...and put; apart, as two threads write them
 };
 
-// Places that are taken before something is handed over, and given back when it is done with: who
-// finds none knows at once.
-class Places {
+// A semaphore that nobody waits at: permits are taken before something is handed over, and given
+// back when it is done with; who finds too few knows at once.
+class Permits {
  public:
-  explicit Places(std::size_t count) : free_(count) {}
+  explicit Permits(std::size_t count) : free_(count) {}
   bool take(std::size_t count) {  // [its one taker] wait-free
     if (count > free_.load(std::memory_order_acquire)) {
       return false;
@@ -110,23 +113,6 @@ class Counter {
 
  private:
   std::atomic<std::uint64_t> count_{0};
-};
-
-// A number that one thread writes and any may read. No order is promised between two of them.
-template <class T>
-class Meter {
- public:
-  void set(T value) { value_.store(value, std::memory_order_relaxed); }
-  T get() const { return value_.load(std::memory_order_relaxed); }
-  void add(T amount) { set(get() + amount); }  // [its one writer]
-  void raise(T value) {                        // [its one writer]
-    if (value > get()) {
-      set(value);
-    }
-  }
-
- private:
-  std::atomic<T> value_{};
 };
 
 // A flag that any thread may raise and any may look at.
@@ -180,8 +166,7 @@ class Published {
   std::atomic<T*> value_{nullptr};
 };
 
-// Which frame is heard at which moment. The audio thread writes it every block and never waits;
-// a reader tries again while it is being written.
+// Which frame is heard at which moment.
 struct ClockReading {
   std::int64_t frame = 0;    // first of the newest block
   std::int64_t time_ns = 0;  // monotonic clock at its start
@@ -189,34 +174,41 @@ struct ClockReading {
   std::int64_t period = 0;   // frames of the block
 };
 
-class ClockBoard {
+// A value that one thread writes and any may read, always whole: a sequence lock. The writer never
+// waits; a reader tries again while it is being written.
+template <class T>
+class Board {
  public:
-  void write(const ClockReading& reading) {  // [audio] wait-free
+  static_assert(std::is_trivially_copyable_v<T>);
+
+  void write(const T& value) {  // [its one writer] wait-free
+    Words words{};
+    std::memcpy(words.data(), &value, sizeof value);
     version_.fetch_add(1, std::memory_order_acq_rel);
-    frame_.store(reading.frame, std::memory_order_relaxed);
-    time_ns_.store(reading.time_ns, std::memory_order_relaxed);
-    rate_hz_.store(reading.rate_hz, std::memory_order_relaxed);
-    period_.store(reading.period, std::memory_order_relaxed);
+    for (std::size_t i = 0; i < words.size(); ++i) {
+      words_[i].store(words[i], std::memory_order_release);
+    }
     version_.fetch_add(1, std::memory_order_release);
   }
-  ClockReading read() const {  // [any other thread] lock-free
+  T read() const {  // [any other thread] lock-free
     while (true) {
       const std::uint32_t before = version_.load(std::memory_order_acquire);
-      const ClockReading reading{
-          frame_.load(std::memory_order_acquire), time_ns_.load(std::memory_order_acquire),
-          rate_hz_.load(std::memory_order_acquire), period_.load(std::memory_order_acquire)};
+      Words words;
+      for (std::size_t i = 0; i < words.size(); ++i) {
+        words[i] = words_[i].load(std::memory_order_acquire);
+      }
       if (before % 2 == 0 && version_.load(std::memory_order_acquire) == before) {
-        return reading;
+        T value;
+        std::memcpy(static_cast<void*>(&value), words.data(), sizeof value);
+        return value;
       }
     }
   }
 
  private:
+  using Words = std::array<std::uint64_t, (sizeof(T) + 7) / 8>;
   std::atomic<std::uint32_t> version_{0};
-  std::atomic<std::int64_t> frame_{0};
-  std::atomic<std::int64_t> time_ns_{0};
-  std::atomic<double> rate_hz_{0.0};
-  std::atomic<std::int64_t> period_{0};
+  std::array<std::atomic<std::uint64_t>, std::tuple_size_v<Words>> words_{};
 };
 
 }  // namespace ressort

@@ -49,7 +49,6 @@ Process::Process(double rate_hz, bool limit, Clock clock_ns)
   pending_.reserve(max_ahead);
   due_.reserve(now_.capacity() + max_ahead);
   matching_.reserve(due_.capacity());
-  meters.limited.set(1.0);
   set_rate(rate_hz);
 }
 
@@ -126,25 +125,33 @@ bool Process::send(Ring<TimedEvent>& ring, std::span<const TimedEvent> events) {
   const std::size_t spare =
       (ends ? 0 : max_endings) + (&ring == &from_osc ? ahead_.free() : std::size_t{0});
   const bool has_room = ring.push_all(events, spare);
-  meters.dropped.add(has_room ? 0 : events.size());
+  dropped.add(has_room ? 0 : events.size());
   return has_room;
 }
 
 bool Process::send_ahead(std::span<const TimedEvent> events) {
   // Nobody else has taken as much of the ring as there are places ahead.
   const bool has_room = ahead_.take(events.size()) && from_osc.push_all(events);
-  meters.dropped.add(has_room ? 0 : events.size());
+  dropped.add(has_room ? 0 : events.size());
   return has_room;
 }
 
 bool Process::schedule(std::int64_t frame, const Event& event) {
   keeps_every_frame_ = true;  // nobody is waiting for the sound
   if (!ahead_.take(1)) {
-    meters.dropped.add(1);
+    dropped.add(1);
     return false;
   }
   wait(frame, event);
   return true;
+}
+
+Meters Process::meters() const {
+  Meters now = board.read();
+  now.dropped = dropped.get();
+  now.strangers = strangers.get();
+  now.xruns = xruns.get();
+  return now;
 }
 
 // Everything that has arrived becomes an event at a frame.
@@ -161,11 +168,11 @@ void Process::gather(std::size_t frames, std::span<const MidiPacket> midi, std::
       if (now_.size() - before < max_now + (ends_sound(event) ? max_endings : 0)) {
         enter(frame_ + std::min<std::int64_t>(packet.frame, last), event);
       } else {
-        meters.dropped.add(1);
+        dropped.add(1);
       }
     });
   }
-  meters.malformed.set(midi_.malformed());
+  meters_.malformed = midi_.malformed();
   const auto earlier = [](const Pending& a, const Pending& b) { return later(b, a); };
   if (!std::is_sorted(now_.begin(), now_.end(), earlier)) {
     std::sort(now_.begin(), now_.end(), earlier);
@@ -179,8 +186,8 @@ void Process::drain(Ring<TimedEvent>& ring, std::size_t frames, std::int64_t tim
     if (timed.timing == TimedEvent::When::at_frame && timed.when >= frame_) {
       wait(timed.when, timed.event);
     } else if (timed.timing == TimedEvent::When::at_frame) {
-      meters.late_s.set(static_cast<double>(frame_ - timed.when) / rate_hz_);
-      meters.late.add(1);
+      meters_.late_s = static_cast<double>(frame_ - timed.when) / rate_hz_;
+      ++meters_.late;
       ahead_.give_back(1);
       enter(frame_, timed.event);
     } else if (timed.timing == TimedEvent::When::at_time) {
@@ -268,14 +275,12 @@ void Process::swap_models() {
   if (Sounding* const next = slot.take()) {
     fading_ = current_;
     fade_left_ = fading_ == nullptr || goes_on(*next) ? 0 : fade_frames_;
-    resets_told_ = fade_left_ == 0 ? resets_told_ : 0;
-    beyond_told_ = fade_left_ == 0 ? beyond_told_ : 0;
-    shed_told_ = fade_left_ == 0 ? shed_told_ : 0;
     if (fade_left_ > 0) {
+      ended_ = meters_;
       load_.begin_anew();
     }
     current_ = next;
-    meters.swaps.add(1);
+    ++meters_.swaps;
   }
 }
 
@@ -335,15 +340,13 @@ void Process::play_models(std::size_t input_count, std::size_t output_count, std
       peak = std::max(peak, std::fabs(channel[n]));
     }
   }
-  if (meters.read.lower()) {
-    meters.load_peak.set(0.0);
-    meters.peak.set(0.0);
-    meters.limited.set(1.0);
+  if (meters_were_read.lower()) {
+    meters_.cpu_peak = 0.0;
+    meters_.peak = 0.0;
+    meters_.limited = 1.0;
   }
-  meters.peak.raise(peak);
-  if (const double reduction = limiter_.take_reduction(); reduction < meters.limited.get()) {
-    meters.limited.set(reduction);
-  }
+  meters_.peak = std::max(meters_.peak, peak);
+  meters_.limited = std::min(meters_.limited, limiter_.take_reduction());
 }
 
 // Events that name a model act in that model only; notes and controllers act in both, so that a
@@ -369,31 +372,21 @@ void Process::play(Sounding& sounding, std::size_t input_count, std::vector<doub
 
 // What others may want to know, after the sound is done.
 void Process::tell() {
-  meters.frames.set(static_cast<std::uint64_t>(frame_));
+  meters_.frames = static_cast<std::uint64_t>(frame_);
   if (current_ == nullptr) {
+    board.write(meters_);
     return;
   }
   Engine& engine = *current_->engine;
-  const EngineMeters now = engine.meters();
-  meters.voices.set(now.voices);
-  stepped_ = now.stepped;
-  meters.stolen.set(now.stolen);
-  meters.shed.add(now.shed - shed_told_);
-  shed_told_ = now.shed;
-  meters.beyond.add(now.beyond - beyond_told_);
-  beyond_told_ = now.beyond;
-  meters.saved.set(now.saved);
-  meters.modes.set(now.modes);
-  meters.modes_awake.set(now.modes_awake);
-  meters.energy.set(now.energy);
-  meters.loss.set(now.loss);
-  meters.is_driven.set(now.is_driven);
-  meters.is_whole.set(now.is_whole);
-  if (now.resets != resets_told_) {
-    meters.resets.add(now.resets - resets_told_);
-    resets_told_ = now.resets;
+  EngineMeters now = engine.meters();
+  now.resets += ended_.resets;
+  now.shed += ended_.shed;
+  now.beyond += ended_.beyond;
+  if (now.resets != meters_.resets) {
     reports.push({Report::Kind::reset, current_->serial, 0, 0.0});
   }
+  static_cast<EngineMeters&>(meters_) = now;
+  board.write(meters_);
   if (reports.size() + Engine::max_creators + Engine::max_changes > reports.capacity()) {
     return;  // nobody is listening just now: the engine keeps them
   }
@@ -409,9 +402,10 @@ void Process::tell() {
 void Process::weigh(double took_s, std::size_t frames) {
   const double sound_s = static_cast<double>(frames) / rate_hz_;
   load_.add(took_s, sound_s);
-  meters.load.set(load_.mean());
-  meters.load_peak.raise(frames > 0 ? took_s / sound_s : 0.0);
-  meters.overruns.add(took_s > sound_s ? 1 : 0);
+  meters_.load = load_.mean();
+  meters_.cpu_peak = std::max(meters_.cpu_peak, frames > 0 ? took_s / sound_s : 0.0);
+  meters_.overruns += took_s > sound_s ? 1 : 0;
+  board.write(meters_);
   if (current_ == nullptr) {
     return;
   }
@@ -422,7 +416,7 @@ void Process::weigh(double took_s, std::size_t frames) {
   }
   const double load = load_.lasting();
   const int before = load_.limit();
-  if (const auto voices = load_.judge(stepped_, current_->engine->voice_count())) {
+  if (const auto voices = load_.judge(meters_.stepped, current_->engine->voice_count())) {
     current_->engine->limit_voices(*voices);
   }
   const bool gave_way = load_.limit() > 0 && (before == 0 || load_.limit() < before);
@@ -449,7 +443,7 @@ void Process::record(std::size_t channels, std::size_t frames) {
       }
     }
     if (!recording.push(piece)) {
-      meters.record_lost.add(1);
+      ++meters_.record_lost;
     }
   }
 }

@@ -57,35 +57,23 @@ struct RecordedChunk {
   std::array<float, max_samples> samples{};  // interleaved
 };
 
-// Where others look in. Written by the audio thread, but for the flags.
-struct Meters {
-  Meter<std::uint64_t> frames;  // since the start
-  Meter<int> voices;
-  Meter<std::uint64_t> resets;  // voices that became unstable
-  Meter<std::uint64_t> stolen;
-  Meter<std::uint64_t> shed;      // voices that there was no time for
-  Meter<double> load;             // share of the time that blocks take, over about a second
-  Meter<double> load_peak;        // of one block since the last reading
-  Meter<std::uint64_t> overruns;  // blocks that took longer than they sound
-  Meter<std::uint64_t> beyond;    // times that a parameter was kept where it is stable
-  Meter<double> saved;            // share of the steps that sleep saves
-  Meter<std::uint64_t> modes;     // of the voices that sound
-  Meter<std::uint64_t> modes_awake;
-  Meter<double> energy;            // of what sounds, as EngineMeters says
-  Meter<double> loss;              // of it in a second
-  Meter<bool> is_driven;           // something comes in: the loss is not all known
-  Meter<bool> is_whole;            // all of the energy is known
-  Counter dropped;                 // events that found no room
-  Meter<std::uint64_t> late;       // events that came after their time
-  Meter<double> late_s;            // the last of them, by so much
-  Meter<std::uint64_t> malformed;  // MIDI that could not be read
-  Meter<std::uint64_t> swaps;
-  Meter<std::uint64_t> record_lost;  // chunks that the recording missed
-  Meter<double> peak;                // of the output since the last reading
-  Meter<double> limited;             // the limiter's deepest gain since the last reading
-  Meter<std::uint64_t> strangers;    // [OSC's thread] packets of who may not send
-  Meter<std::uint64_t> xruns;        // [the backend's own notification thread]
-  Flag read;                         // raised by a reader: what is since then starts anew
+// What the audio thread tells of itself after every block, and what other threads count. Resets,
+// shed voices and kept parameters are those of all engines that there were.
+struct Meters : EngineMeters {
+  std::uint64_t frames = 0;       // since the start
+  double load = 0.0;              // share of the time that blocks take, over about a second
+  double cpu_peak = 0.0;          // of one block since the last reading
+  std::uint64_t overruns = 0;     // blocks that took longer than they sound
+  std::uint64_t late = 0;         // events that came after their time
+  double late_s = 0.0;            // the last of them, by so much
+  std::uint64_t malformed = 0;    // MIDI that could not be read
+  std::uint64_t swaps = 0;        // of models
+  std::uint64_t record_lost = 0;  // chunks that the recording missed
+  double peak = 0.0;              // of the output since the last reading
+  double limited = 1.0;           // the limiter's deepest gain since the last reading
+  std::uint64_t dropped = 0;      // events that found no room
+  std::uint64_t strangers = 0;    // packets of who may not send OSC
+  std::uint64_t xruns = 0;        // as the backend says
 };
 
 struct Process {
@@ -130,6 +118,8 @@ struct Process {
   // Between two runs of a backend, when no audio thread is alive. [control]
   void set_rate(double rate_hz);
 
+  Meters meters() const;  // [any thread but audio]
+
   // --- shared with other threads --------------------------------------------------------------
   Slot<Sounding> slot;  // offered by the session's worker
   // Written through send() and send_ahead().
@@ -139,8 +129,12 @@ struct Process {
   Ring<Report> reports{4096};                         // to the session's worker
   Ring<RecordedChunk> recording{8192};
   Flag is_recording;
-  ClockBoard clock;
-  Meters meters;
+  Board<ClockReading> clock;
+  Board<Meters> board;    // read by meters()
+  Flag meters_were_read;  // raised by a reader: what is since the last reading starts anew
+  Counter dropped;        // as Meters says, counted by whoever sees it
+  Counter strangers;
+  Counter xruns;
 
  private:
   struct Pending {
@@ -178,10 +172,8 @@ struct Process {
   Sounding* fading_ = nullptr;
   std::size_t fade_left_ = 0;
   std::size_t fade_frames_ = 0;
-  std::uint64_t resets_told_ = 0;        // of the current engine
-  std::uint64_t beyond_told_ = 0;        // of the same
-  std::uint64_t shed_told_ = 0;          // of the same
-  int stepped_ = 0;                      // its voices
+  Meters meters_;
+  EngineMeters ended_;                   // what engines before the current one counted
   std::int64_t next_overload_news_ = 0;  // frame
   Limiter limiter_;
   // None of these grows.
@@ -189,7 +181,7 @@ struct Process {
   std::size_t next_now_ = 0;      // the first of them that has not acted
   std::vector<Pending> pending_;  // what waits for its frame: a heap, the earliest on top
   std::int64_t latest_ = 0;       // no frame there is later
-  Places ahead_{max_ahead};       // of it, and of what is on its way there
+  Permits ahead_{max_ahead};      // of it, and of what is on its way there
   bool keeps_every_frame_ = false;
   std::vector<Event> due_;       // of this chunk, sorted
   std::vector<Event> matching_;  // those of one engine

@@ -4,6 +4,7 @@
 #include <cctype>
 #include <filesystem>
 
+#include "app/control/registry.h"
 #include "core/model/preset/fit.h"
 
 namespace ressort {
@@ -64,7 +65,7 @@ class SceneReader {
     if (!text) {
       return fail("", "", text.error());
     }
-    ParsedPreset read = parse_preset(*text);
+    ParsedPreset read = parse_preset(*text, is_reserved);
     for (const Error& error : read.errors) {
       fail(scene_.path, *text, error);
     }

@@ -155,7 +155,7 @@ Result<Done> Recorder::start(const std::string& path, Existing existing) {
   work.failure.reset();
   work.is_stopping = false;
   work.has_failed.lower();
-  work.lost_before = work.process.meters.record_lost.get();
+  work.lost_before = work.process.meters().record_lost;
   work.process.is_recording.raise();
   work.thread = std::thread([&work] { work.work(); });
   return Done{};
@@ -180,7 +180,7 @@ Result<std::string> Recorder::stop() {
   if (work.failure) {
     return *work.failure;
   }
-  const std::uint64_t lost = work.process.meters.record_lost.get() - work.lost_before + work.unfit;
+  const std::uint64_t lost = work.process.meters().record_lost - work.lost_before + work.unfit;
   return work.path + ": " + fixed(static_cast<double>(work.frames) / work.rate_hz, 2) + " s, " +
          (lost == 0 ? "nothing lost"
                     : std::to_string(lost) + (lost == 1 ? " piece lost" : " pieces lost"));

@@ -120,11 +120,6 @@ std::optional<double> Session::parameter(const std::string& name) const {
   return std::nullopt;
 }
 
-Result<std::vector<Event>> Session::events(const Call& call) const {
-  const std::lock_guard lock(mutex_);
-  return to_events(call, current_->instrument, current_->serial);
-}
-
 void Session::remember(std::span<const TimedEvent> events) {
   const std::lock_guard lock(mutex_);
   for (const TimedEvent& timed : events) {
@@ -136,42 +131,21 @@ void Session::remember(std::span<const TimedEvent> events) {
 }
 
 Status Session::status() {
-  const Meters& meters = process_.meters;
-  const ClockReading clock = process_.clock.read();
   Status status;
+  static_cast<Meters&>(status) = process_.meters();
+  status.period_frames = process_.clock.read().period;
+  status.peak_db = to_db(status.peak);
+  status.limited_db = to_db(status.limited);
   {
     const std::lock_guard lock(mutex_);
     status.model = current_->name;
     status.load_ms = current_->load_ms;
     status.max_voices = current_->instrument.voices;
     status.backend = backend_;
-    status.cpu = runs_ ? meters.load.get() : -1.0;
+    status.cpu = runs_ ? status.load : -1.0;
     status.rate_hz = rate_hz_;
   }
-  status.period_frames = clock.period;
-  status.voices = meters.voices.get();
-  status.cpu_peak = meters.load_peak.get();
-  status.shed = meters.shed.get();
-  status.overruns = meters.overruns.get();
-  status.peak_db = to_db(meters.peak.get());
-  status.limited_db = to_db(meters.limited.get());
-  status.xruns = meters.xruns.get();
-  status.resets = meters.resets.get();
-  status.stolen = meters.stolen.get();
-  status.beyond = meters.beyond.get();
-  status.saved = meters.saved.get();
-  status.modes = meters.modes.get();
-  status.modes_awake = meters.modes_awake.get();
-  status.energy = meters.energy.get();
-  status.loss = meters.loss.get();
-  status.is_driven = meters.is_driven.get();
-  status.is_whole = meters.is_whole.get();
-  status.dropped = meters.dropped.get();
-  status.late = meters.late.get();
-  status.malformed = meters.malformed.get();
-  status.strangers = meters.strangers.get();
-  status.swaps = meters.swaps.get();
-  process_.meters.read.raise();
+  process_.meters_were_read.raise();
   return status;
 }
 
@@ -300,15 +274,14 @@ void Session::listen() {
       overloads_.add(describe_overload(report));
     }
   }
-  const Meters& meters = process_.meters;
-  if (const std::uint64_t late = meters.late.get();
-      late != late_told_ && meters.late_s.get() > least_lateness_s) {
-    lates_.add("an event came " + fixed(meters.late_s.get(), 3) + " s after its time",
-               late - std::exchange(late_told_, late));
+  const Meters now = process_.meters();
+  if (now.late != late_reported_ && now.late_s > least_lateness_s) {
+    lates_.add("an event came " + fixed(now.late_s, 3) + " s after its time",
+               now.late - std::exchange(late_reported_, now.late));
   }
-  if (const std::uint64_t dropped = meters.dropped.get(); dropped != dropped_told_) {
+  if (now.dropped != dropped_reported_) {
     drops_.add("an event found no room and was dropped: more came than can be played",
-               dropped - std::exchange(dropped_told_, dropped));
+               now.dropped - std::exchange(dropped_reported_, now.dropped));
   }
   for (RateLimit* const limit : {&resets_, &creations_, &overloads_, &lates_, &drops_}) {
     if (const auto news = limit->take(); news && tell_) {

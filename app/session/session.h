@@ -12,7 +12,6 @@
 #include <thread>
 #include <vector>
 
-#include "app/control/calls.h"
 #include "app/realtime/process.h"
 #include "app/realtime/rate_limit.h"
 #include "app/session/loader.h"
@@ -39,36 +38,17 @@ struct Loaded {
   std::vector<std::string> warnings;
 };
 
-struct Status {
+// What sounds and what it costs, at one moment.
+struct Status : Meters {
   std::string model;
+  std::string backend;
   double rate_hz = 0.0;
   std::int64_t period_frames = 0;
   double load_ms = 0.0;
-  int voices = 0;
   int max_voices = 0;
-  double saved = 0.0;       // the share of the computing that sleep saves, 0..1
   double cpu = 0.0;         // share of the time there is, over a second; -1: nothing runs
-  double cpu_peak = 0.0;    // of one block since the last asking
   double peak_db = 0.0;     // since the last asking; -inf is silence
   double limited_db = 0.0;  // the limiter's deepest cut since the last asking
-  std::uint64_t xruns = 0;
-  std::uint64_t resets = 0;
-  std::uint64_t stolen = 0;
-  std::uint64_t shed = 0;      // voices that there was no time for
-  std::uint64_t overruns = 0;  // blocks that took longer than they sound
-  std::uint64_t beyond = 0;    // times that a parameter was kept where it is stable
-  std::uint64_t modes = 0;     // of the voices that sound
-  std::uint64_t modes_awake = 0;
-  double energy = 0.0;     // of what sounds, as EngineMeters says
-  double loss = 0.0;       // of it in a second
-  bool is_driven = false;  // something comes in: the loss is not all known
-  bool is_whole = true;    // all of the energy is known
-  std::uint64_t dropped = 0;
-  std::uint64_t late = 0;
-  std::uint64_t malformed = 0;
-  std::uint64_t strangers = 0;  // packets of who may not send OSC
-  std::uint64_t swaps = 0;
-  std::string backend;
 };
 
 class Session {
@@ -102,9 +82,6 @@ class Session {
 
   // A parameter's present value; nothing where the model has none of that name.
   std::optional<double> parameter(const std::string& name) const;
-
-  // The events of a playing call, for the model that sounds now. [any thread but audio]
-  Result<std::vector<Event>> events(const Call& call) const;
 
   // What parameters these events set, once a queue has taken them. [any thread but audio]
   void remember(std::span<const TimedEvent> events);
@@ -180,8 +157,8 @@ class Session {
   RateLimit overloads_{std::chrono::seconds(10)};
   RateLimit lates_;
   RateLimit drops_;
-  std::uint64_t late_told_ = 0;
-  std::uint64_t dropped_told_ = 0;
+  std::uint64_t late_reported_ = 0;
+  std::uint64_t dropped_reported_ = 0;
   std::thread worker_;  // last, so that it ends first
 };
 

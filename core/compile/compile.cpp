@@ -31,11 +31,9 @@ constexpr double inaudible_level = 1e-6;
 Control make_control(const Network& network, const ControlSetting& setting) {
   static constexpr Source sources[] = {Source::note, Source::controller, Source::pressure,
                                        Source::custom, Source::audio};
-  static constexpr Gesture gestures[] = {Gesture::position, Gesture::pluck, Gesture::bow,
-                                         Gesture::impulse,  Gesture::hold,  Gesture::parameter};
   Control control;
   control.source = sources[static_cast<std::size_t>(setting.source)];
-  control.gesture = gestures[static_cast<std::size_t>(setting.gesture)];
+  control.gesture = setting.gesture;
   control.number = static_cast<std::uint16_t>(
       setting.source == ControlSource::audio ? setting.number - 1 : setting.number);
   control.lowest_key = static_cast<std::uint8_t>(setting.lowest_key);
@@ -126,9 +124,8 @@ InputInfo input_info(const Network& network, std::size_t index, const Playing& p
     }
   }
   for (const Control& control : playing.controls) {
-    if (control.target == index) {
-      info.can_pluck |= control.gesture == Gesture::pluck;
-      info.can_bow |= control.gesture == Gesture::bow;
+    if (control.target == index && control.gesture != Gesture::parameter) {
+      info.gestures.push_back(control.gesture);
     }
   }
   return info;

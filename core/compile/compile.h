@@ -14,6 +14,7 @@
 #include "core/compile/plan.h"
 #include "core/compile/schemes.h"
 #include "core/engine/engine.h"
+#include "core/gesture.h"
 #include "core/model/network.h"
 #include "core/model/preset/preset.h"
 #include "core/progress.h"
@@ -48,9 +49,11 @@ struct CompileOptions {
 struct InputInfo {
   int number = 1;
   bool is_force = false;
-  bool can_pluck = false;  // the preset says how
-  bool can_bow = false;
-  std::string attached_to;  // the mass that it moves or pushes
+  std::vector<Gesture> gestures;  // that the preset has controls for
+  std::string attached_to;        // the mass that it moves or pushes
+  bool knows(Gesture gesture) const {
+    return std::find(gestures.begin(), gestures.end(), gesture) != gestures.end();
+  }
 };
 
 // An OSC name that the preset gives to one of its controls.

@@ -103,7 +103,7 @@ class Gatekeeper {
         }
       }
       for (const ControlSetting& control : request_.preset.controls) {
-        if (control.gesture == ControlGesture::parameter && control.target == info.name) {
+        if (control.gesture == Gesture::parameter && control.target == info.name) {
           reach_to(i, control.low);
           reach_to(i, control.high);
         }

@@ -135,14 +135,15 @@ class Judge {
       if (input == nullptr) {
         continue;
       }
-      if (control.gesture == ControlGesture::impulse && input->is_force) {
+      const GestureRow& gesture = row_of(control.gesture);
+      if (gesture.is_blow && input->is_force) {
         energy_ += 0.5 * size * size * inverse_mass(input->mass);
       } else if (input->is_force) {
         force_ += size;
-      } else if (control.gesture == ControlGesture::pluck) {
+      } else if (gesture.extent == Extent::travel) {
         include(control.travel);
         include(-control.travel);
-      } else if (control.gesture != ControlGesture::bow) {
+      } else if (gesture.extent == Extent::range) {
         include(control.low);
         include(control.high);
       }
@@ -152,7 +153,7 @@ class Judge {
 
   const Input* input_of(const ControlSetting& control) const {
     for (const Input& input : network_.inputs) {
-      if (control.gesture != ControlGesture::parameter &&
+      if (control.gesture != Gesture::parameter &&
           control.target == "in" + std::to_string(input.number)) {
         return &input;
       }
@@ -199,7 +200,7 @@ class Judge {
     double speed = 0.0;
     for (const ControlSetting& control : preset_.controls) {
       const Input* const input = input_of(control);
-      if (input != nullptr && !input->is_force && control.gesture == ControlGesture::pluck &&
+      if (input != nullptr && !input->is_force && row_of(control.gesture).is_sweep &&
           (input->mass == link.a || input->mass == link.b)) {
         speed = std::max({speed, std::fabs(control.low) * r_, std::fabs(control.high) * r_});
       }

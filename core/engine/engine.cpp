@@ -20,73 +20,61 @@ double Engine::Voices::middle(std::size_t input) const {
   return machine.hands[input].is_force ? 0.0 : machine.hands[input].position;
 }
 
-double Engine::Voices::mapped(const Control& control, double amount) const {
-  const double a = std::clamp(amount, 0.0, 1.0);
-  return control.exponential && control.low > 0.0 && control.high > 0.0
-             ? control.low * std::pow(control.high / control.low, a)
-             : control.low + (control.high - control.low) * a;
+Stroke Engine::Voices::stroke_on(std::size_t input, const Control* control) const {
+  Stroke stroke{.is_force = machine.hands[input].is_force,
+                .middle = middle(input),
+                .rate_ratio = machine.rate_ratio,
+                .rate_hz = machine.rate_hz,
+                .bare = playing.bare};
+  if (control != nullptr) {
+    stroke.has_control = true;
+    stroke.low = control->low;
+    stroke.high = control->high;
+    stroke.exponential = control->exponential;
+    stroke.travel = control->travel;
+  }
+  return stroke;
 }
 
-double Engine::Voices::paced(double amount, std::size_t lane) const {
-  return amount * machine.rate_ratio * std::sqrt(factor_of(lane));
-}
-
-double Engine::Voices::struck(const Control& control, double amount, std::size_t lane) const {
-  return machine.hands[control.target].is_force
-             ? paced(amount, lane)
-             : amount / (machine.rate_ratio * std::sqrt(factor_of(lane)));
-}
-
-void Engine::Voices::move_to(std::size_t input, double position) {
-  rest[input] = position;
-  for (std::size_t lane = 0; lane < voices.size(); ++lane) {
-    if (voices[lane].awake || lane == last) {
-      wake(lane);
-      hand(lane, input).follow(position, pole);
+void Engine::Voices::play(const GestureRow& gesture, std::size_t input, Stroke stroke) {
+  if (gesture.goal != nullptr) {
+    rest[input] = gesture.goal(stroke);
+    for (std::size_t lane = 0; lane < voices.size(); ++lane) {
+      if (voices[lane].awake || lane == last) {
+        wake(lane);
+        driver(lane, input).follow(rest[input], stroke.pole_of_position());
+      }
     }
+    return;
+  }
+  wake(last);
+  stroke.pitch = std::sqrt(factor_of(last));
+  gesture.play(driver(last, input), stroke);
+  rest[input] = stroke.rest.value_or(rest[input]);
+  if (stroke.pressure) {
+    press(*stroke.pressure);
   }
 }
 
-void Engine::Voices::pluck(std::size_t lane, const Control& control, double strength) {
-  Hand& finger = hand(lane, control.target);
-  const double centre = middle(control.target);
-  const double side = finger.target() > centre ? -control.travel : control.travel;
-  finger.sweep(centre + side, paced(mapped(control, strength), lane));
-  rest[control.target] = centre + side;
-}
-
-void Engine::Voices::perform(const Control& control, std::size_t lane, double amount) {
-  switch (control.gesture) {
-    case Gesture::parameter:
-      set_parameter(control.target, mapped(control, amount));
-      break;
-    case Gesture::position:
-      move_to(control.target, mapped(control, amount));
-      break;
-    case Gesture::pluck:
-      wake(lane);
-      pluck(lane, control, amount);
-      break;
-    case Gesture::bow:
-      wake(lane);
-      hand(lane, control.target).draw(paced(mapped(control, amount), lane), bow_pole);
-      break;
-    case Gesture::impulse:
-      wake(lane);
-      hand(lane, control.target).strike(struck(control, mapped(control, amount), lane));
-      break;
-    case Gesture::hold:
-      wake(lane);
-      hand(lane, control.target).follow(control.high, pole);
-      break;
+void Engine::Voices::perform(const Control& control, double amount) {
+  if (control.gesture == Gesture::parameter) {
+    const Stroke turn{.amount = amount,
+                      .has_control = true,
+                      .low = control.low,
+                      .high = control.high,
+                      .exponential = control.exponential};
+    return set_parameter(control.target, turn.mapped());
   }
+  Stroke stroke = stroke_on(control.target, &control);
+  stroke.amount = amount;
+  play(row_of(control.gesture), control.target, stroke);
 }
 
 template <class Wanted>
-void Engine::Voices::perform_all(std::size_t lane, double amount, Wanted&& wanted) {
+void Engine::Voices::perform_all(double amount, Wanted&& wanted) {
   for (const Control& control : playing.controls) {
     if (wanted(control)) {
-      perform(control, lane, amount);
+      perform(control, amount);
     }
   }
 }
@@ -255,8 +243,7 @@ void Engine::Voices::note_on(const Event& event) {
   voice.held = true;
   voice.sustained = false;
   wake(last);
-  const std::size_t lane = last;
-  perform_all(lane, event.value, [&](const Control& control) {
+  perform_all(event.value, [&](const Control& control) {
     return control.source == Source::note && key >= control.lowest_key &&
            key <= control.highest_key;
   });
@@ -295,10 +282,8 @@ void Engine::Voices::release(std::size_t lane) {
         voice.key > control.highest_key) {
       continue;
     }
-    if (control.gesture == Gesture::bow) {
-      hand(lane, control.target).draw(0.0, bow_pole);
-    } else if (control.gesture == Gesture::hold) {
-      hand(lane, control.target).follow(control.low, pole);
+    if (const auto release = row_of(control.gesture).release) {
+      release(driver(lane, control.target), stroke_on(control.target, &control));
     }
   }
   if (playing.release_s > 0.0) {
@@ -331,7 +316,7 @@ void Engine::Voices::controller(const Event& event) {
     default:
       break;
   }
-  perform_all(last, event.value, [&](const Control& control) {
+  perform_all(event.value, [&](const Control& control) {
     return control.source == Source::controller && control.number == event.index;
   });
 }
@@ -355,8 +340,7 @@ const Control* Engine::Voices::control_for(int number, Gesture gesture) const {
 }
 
 void Engine::Voices::press(double amount) {
-  perform_all(last, amount,
-              [](const Control& control) { return control.source == Source::pressure; });
+  perform_all(amount, [](const Control& control) { return control.source == Source::pressure; });
 }
 
 void Engine::Voices::handle(const Event& event) {
@@ -384,55 +368,38 @@ void Engine::Voices::handle(const Event& event) {
       return;
     case EventKind::custom:
       if (event.index < playing.controls.size()) {
-        perform(playing.controls[event.index], last, event.value);
+        perform(playing.controls[event.index], event.value);
       }
       return;
     case EventKind::parameter:
       return set_parameter(event.index, event.value);
-    case EventKind::position:
-      for (std::size_t i = 0; i < machine.hands.size(); ++i) {
-        if (machine.hands[i].number == event.index && !machine.hands[i].is_force) {
-          move_to(i, event.value);
-        }
-      }
-      return;
-    case EventKind::force:
-      for (std::size_t i = 0; i < machine.hands.size(); ++i) {
-        if (machine.hands[i].number == event.index && machine.hands[i].is_force) {
-          push(i, event.value, event.value2);
-        }
-      }
-      return;
-    case EventKind::pluck:
-      if (const Control* control = control_for(event.index, Gesture::pluck)) {
-        perform(*control, last, event.value);
-      }
-      return;
-    case EventKind::bow:
-      if (const Control* control = control_for(event.index, Gesture::bow)) {
-        const double speed = std::copysign(event.value == 0.0 ? 0.0 : control->high, event.value) *
-                             std::min(1.0, std::fabs(event.value));
-        wake(last);
-        hand(last, control->target).draw(paced(speed, last), bow_pole);
-        if (event.value2 >= 0.0) {
-          press(event.value2);
-        }
-      }
-      return;
+    case EventKind::gesture:
+      return play_live(event);
     case EventKind::panic:
       return panic();
   }
 }
 
-void Engine::Voices::push(std::size_t input, double force, double seconds) {
-  wake(last);
-  const double r = machine.rate_ratio;
-  const auto frames =
-      static_cast<std::size_t>(std::llround(std::max(0.0, seconds) * machine.rate_hz));
-  if (frames == 0) {
-    hand(last, input).strike(force * r);
-  } else {
-    hand(last, input).push(force * r * r, frames);
+void Engine::Voices::play_live(const Event& event) {
+  const GestureRow& gesture = row_of(event.gesture);
+  const auto say = [&](std::size_t input, const Control* control) {
+    Stroke stroke = stroke_on(input, control);
+    stroke.is_live = true;
+    stroke.amount = event.value;
+    stroke.second = event.value2;
+    play(gesture, input, stroke);
+  };
+  if (gesture.live == Live::by_preset) {
+    if (const Control* control = control_for(event.index, event.gesture)) {
+      say(control->target, control);
+    }
+  } else if (gesture.live != Live::never) {
+    for (std::size_t i = 0; i < machine.hands.size(); ++i) {
+      if (machine.hands[i].number == event.index &&
+          machine.hands[i].is_force == (gesture.live == Live::on_forces)) {
+        say(i, nullptr);
+      }
+    }
   }
 }
 

@@ -18,15 +18,6 @@ namespace ressort {
 
 enum class Source : std::uint8_t { note, controller, pressure, custom, audio };
 
-enum class Gesture : std::uint8_t {
-  position,   // the hand goes where it is told, smoothed
-  pluck,      // the hand sweeps from one side of the string to the other
-  bow,        // the hand moves on and on while the note is held
-  impulse,    // one sample of force, or of displacement
-  hold,       // the hand is at the second end of its range while the note is held
-  parameter,  // not a hand: the parameter `target` follows
-};
-
 // One row of the control map: what drives which input or parameter, and how.
 struct Control {
   Source source = Source::note;
@@ -98,8 +89,8 @@ struct EngineMeters {
   std::uint64_t shed = 0;    // voices that had to give way to limit_voices()
   std::uint64_t beyond = 0;  // times that a parameter was kept within its limits; by audio, blocks
   double saved = 0.0;        // the share of the steps that nobody has to take, 0..1
-  std::size_t modes = 0;     // of all voices that are awake
-  std::size_t modes_awake = 0;
+  std::uint64_t modes = 0;   // of all voices that are awake
+  std::uint64_t modes_awake = 0;
   // Of all that steps, when it was last looked at, in mass * (position per sample at 44 100 Hz)^2.
   double energy = 0.0;
   double loss = 0.0;       // of it in a second

@@ -7,8 +7,6 @@
 namespace ressort {
 namespace {
 
-constexpr double smoothing_hz = 44.1;   // of a position: its one-pole's (1 - pole) * rate
-constexpr double bow_start_s = 0.005;   // a bow reaches its speed as a one-pole of this time
 constexpr double level_memory_s = 0.1;  // how long a voice's level remembers a peak
 constexpr double quiet_s = 0.5;         // longer than half a period of the slowest sound
 constexpr std::size_t most_reserve_lanes = 4;
@@ -27,8 +25,6 @@ Engine::Voices::Voices(Machine machine_in, Playing playing_in, Precision precisi
                                 progress)),
       audio_control(machine.hands.size(), nullptr),
       sound(machine.hands.size()),
-      pole(playing.bare ? 0.0 : 1.0 - std::min(1.0, smoothing_hz / machine.rate_hz)),
-      bow_pole(playing.bare ? 0.0 : std::exp(-1.0 / (bow_start_s * machine.rate_hz))),
       level_kept(
           std::exp(-static_cast<double>(max_block_frames) / (level_memory_s * machine.rate_hz))) {
   playing.limits.resize(machine.parameters.size());
@@ -44,18 +40,15 @@ Engine::Voices::Voices(Machine machine_in, Playing playing_in, Precision precisi
   held.resize(voices.size() * first_output.back());
   creators.reserve(max_creators);
   loudest = playing.bare ? runaway : std::min(runaway, runaway_level / playing.gain);
-  hands.resize(voices.size() * machine.hands.size());
+  drivers.resize(voices.size() * machine.hands.size());
   parameters = machine.parameters;
   audio_before.resize(machine.hands.size());
   for (std::size_t i = 0; i < machine.hands.size(); ++i) {
     rest.push_back(middle(i));
   }
   for (const Control& control : playing.controls) {
-    if (control.gesture == Gesture::pluck) {
-      rest[control.target] = middle(control.target) - control.travel;
-    }
-    if (control.gesture == Gesture::hold) {
-      rest[control.target] = control.low;
+    if (const auto start = row_of(control.gesture).start) {
+      rest[control.target] = start(stroke_on(control.target, &control));
     }
     if (control.source == Source::audio) {
       audio_control[control.target] = &control;
@@ -88,7 +81,7 @@ void Engine::Voices::start(std::size_t lane, double frequency_hz) {
     forget(watch(lane, p));
   }
   for (std::size_t i = 0; i < machine.hands.size(); ++i) {
-    hand(lane, i).place(rest[i]);
+    driver(lane, i).place(rest[i]);
   }
   last = lane;
 }
@@ -249,7 +242,7 @@ Engine::Voices::Pace Engine::Voices::pace_of_some(const Bank<T>& b, std::size_t 
       continue;
     }
     const auto moves = [&](const InputSlot& input) {
-      return sound[input.hand] != nullptr || hand(lane, input.hand).is_moving();
+      return sound[input.hand] != nullptr || driver(lane, input.hand).is_moving();
     };
     if (watch(lane, p).is_still &&
         std::any_of(program.inputs.begin(), program.inputs.end(), moves)) {
@@ -271,7 +264,7 @@ void Engine::Voices::fill_rest(Bank<T>& b, const PartBank<T>& part, std::size_t 
     for (std::size_t k = 0; k < width; ++k) {
       b.row[i * width + k] =
           first + k < voices.size()
-              ? static_cast<T>(hand(first + k, part.program.inputs[i].hand).value())
+              ? static_cast<T>(driver(first + k, part.program.inputs[i].hand).value())
               : T(0);
     }
   }
@@ -298,7 +291,7 @@ void Engine::Voices::fill_drive(Bank<T>& b, std::size_t p, std::size_t first, st
   for (std::size_t i = 0; i < part.program.inputs.size(); ++i) {
     const InputSlot& slot = part.program.inputs[i];
     for (std::size_t lane = first; lane < std::min(voices.size(), first + part.width); ++lane) {
-      Hand& mover = hand(lane, slot.hand);
+      InputDriver& mover = driver(lane, slot.hand);
       if (!voices[lane].awake || !mover.is_moving()) {
         continue;
       }
@@ -535,7 +528,7 @@ void Engine::Voices::settle(std::size_t lane) {
   }
   voice.quiet_frames = 0;
   for (std::size_t input = 0; input < machine.hands.size(); ++input) {
-    if (hand(lane, input).is_moving()) {
+    if (driver(lane, input).is_moving()) {
       return;
     }
   }

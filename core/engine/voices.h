@@ -13,7 +13,7 @@
 #include "core/engine/bank.h"
 #include "core/engine/energy.h"
 #include "core/engine/engine.h"
-#include "core/engine/gesture.h"
+#include "core/gesture.h"
 
 namespace ressort {
 
@@ -69,12 +69,12 @@ struct Look {
 // engine of the same model goes on by a copy of it.
 struct Playback {
   std::vector<Voice> voices;           // [lane]
-  std::vector<Hand> hands;             // [lane][input]
+  std::vector<InputDriver> drivers;    // [lane][input]
   std::vector<Watch> watches;          // [lane][part]
   std::vector<double> held;            // [lane][output of the machine] of what stands still
   std::vector<double> parameters;      // as they are now
   std::vector<std::uint16_t> changes;  // parameters, since the last take_changes()
-  std::vector<double> rest;            // [input] where a new voice's hand starts
+  std::vector<double> rest;            // [input] where a new voice's driver starts
   std::vector<double> audio_before;    // [input]
   double bend = 0.0;
   std::array<bool, 16> pedal{};
@@ -116,19 +116,16 @@ struct Engine::Voices : Playback {
 
   // --- inputs ---
   double middle(std::size_t input) const;
-  Hand& hand(std::size_t lane, std::size_t input) {
-    return hands[lane * machine.hands.size() + input];
+  InputDriver& driver(std::size_t lane, std::size_t input) {
+    return drivers[lane * machine.hands.size() + input];
   }
-  double mapped(const Control& control, double amount) const;
-  // A speed or an impulse that gives the same displacement at every rate and pitch.
-  double paced(double amount, std::size_t lane) const;
-  // A blow's force, or the displacement that gives the same blow through a spring.
-  double struck(const Control& control, double amount, std::size_t lane) const;
-  void move_to(std::size_t input, double position);
-  void pluck(std::size_t lane, const Control& control, double strength);
-  void perform(const Control& control, std::size_t lane, double amount);
+  // What a gesture is to know of an input and of the control that asks for it, if one does.
+  Stroke stroke_on(std::size_t input, const Control* control) const;
+  // In the voice that was played last, or in all.
+  void play(const GestureRow& gesture, std::size_t input, Stroke stroke);
+  void perform(const Control& control, double amount);
   template <class Wanted>
-  void perform_all(std::size_t lane, double amount, Wanted&& wanted);
+  void perform_all(double amount, Wanted&& wanted);
 
   // --- parameters ---
   // The nearest value that the parameter may have.
@@ -177,9 +174,7 @@ struct Engine::Voices : Playback {
   void panic();
   const Control* control_for(int number, Gesture gesture) const;
   void press(double amount);
-  // A force of no length is an impulse; its effect does not depend on the sample rate, nor does
-  // that of a force that lasts.
-  void push(std::size_t input, double force, double seconds);
+  void play_live(const Event& event);
 
   // --- taking over ---
   template <class T>
@@ -302,9 +297,7 @@ struct Engine::Voices : Playback {
   bool is_idle = false;        // nobody is awake
   bool has_lost = false;       // a voice its stability, in this segment
   double loudest = 0.0;        // what no output reaches
-  double pole = 0.0;
-  double bow_pole = 0.0;
-  double level_kept = 0.0;  // of a voice's level from one settling to the next
+  double level_kept = 0.0;     // of a voice's level from one settling to the next
 };
 
 }  // namespace ressort

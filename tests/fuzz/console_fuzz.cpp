@@ -3,8 +3,8 @@
 #include <unistd.h>
 #include <filesystem>
 
-#include "app/control/calls.h"
 #include "app/control/console.h"
+#include "app/control/message.h"
 #include "app/session/session.h"
 #include "tests/fuzz/stage.h"
 

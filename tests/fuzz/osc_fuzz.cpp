@@ -10,7 +10,7 @@
 #include <array>
 #include <string_view>
 
-#include "app/control/osc.h"
+#include "app/control/osc/server.h"
 #include "app/session/session.h"
 #include "tests/fuzz/stage.h"
 

@@ -9,7 +9,7 @@
 #include <cstring>
 #include <vector>
 
-#include "app/control/osc_packet.h"
+#include "app/control/osc/packet.h"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   const auto messages = ressort::check_packet({data, size});

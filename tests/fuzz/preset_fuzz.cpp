@@ -1,12 +1,14 @@
 // A libFuzzer target: whatever text comes, it is read as a preset or refused with a place and a
 // sentence; what is read is put on a model that has something of everything, and played.
 #include "core/model/preset/preset.h"
+
+#include "app/control/registry.h"
 #include "tests/fuzz/stage.h"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   using namespace ressort;
   using fuzz::require;
-  const ParsedPreset parsed = parse_preset(fuzz::text_of(data, size));
+  const ParsedPreset parsed = parse_preset(fuzz::text_of(data, size), is_reserved);
   for (const Error& error : parsed.errors) {
     require(!error.message.empty() && error.line >= 1 && error.column >= 1);
   }

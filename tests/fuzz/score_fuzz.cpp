@@ -1,6 +1,6 @@
 // A libFuzzer target: whatever text comes, it is read as a score or refused with a line and a
 // sentence; each of its calls becomes events or is refused, and they are played.
-#include "app/control/calls.h"
+#include "app/control/registry.h"
 #include "tests/fuzz/stage.h"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
@@ -17,13 +17,13 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   fuzz::Stage stage(*std::move(compiled));
   for (const ScoreLine& line : *lines) {
     require(line.time_s >= 0.0 && line.time_s <= 86400.0);
-    const auto events = to_events(line.call, stage.instrument, fuzz::Stage::serial);
+    const auto events = to_events(line.message, stage.instrument, fuzz::Stage::serial);
     if (!events) {
       require(!events.error().message.empty());
       continue;
     }
     for (const Event& event : *events) {
-      told_limit(line.call, event, stage.instrument);
+      describe_limit(line.message, event, stage.instrument);
       const auto frame = static_cast<std::int64_t>(line.time_s * fuzz::Stage::rate_hz);
       stage.process.schedule(frame % 1024, event);
     }

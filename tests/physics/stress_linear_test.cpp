@@ -181,9 +181,12 @@ TEST_CASE("S25: models that make no sense are told so, or are silent; none says 
     std::vector<double> out(256);
     double* const outputs[] = {out.data()};
     for (int n = 0; n < 400; ++n) {
-      const std::vector<Event> events = {
-          note_on(0, 60, 1.0),
-          {.frame = 1, .kind = EventKind::force, .index = 1, .value = n % 3 == 0 ? 1e300 : 1.0}};
+      const std::vector<Event> events = {note_on(0, 60, 1.0),
+                                         {.frame = 1,
+                                          .kind = EventKind::gesture,
+                                          .gesture = Gesture::force,
+                                          .index = 1,
+                                          .value = n % 3 == 0 ? 1e300 : 1.0}};
       compiled->engine->process(events, {}, outputs, out.size());
       REQUIRE(std::all_of(out.begin(), out.end(), [](double y) { return std::isfinite(y); }));
     }
@@ -258,7 +261,7 @@ TEST_CASE("S25: samples that are no numbers are silence, and what comes after is
                     {}, 0);
       all.insert(all.end(), out.begin(), out.end());
     }
-    CHECK(process.meters.resets.get() == 0);
+    CHECK(process.meters().resets == 0);
     return all;
   };
   for (const bool is_bare : {false, true}) {

@@ -10,7 +10,7 @@
 #include <optional>
 #include <vector>
 
-#include "app/control/osc_packet.h"
+#include "app/control/osc/packet.h"
 #include "tests/support/catch.h"
 #include "tests/support/osc_bytes.h"
 

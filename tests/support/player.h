@@ -39,7 +39,7 @@ inline Preset struck(int voices) {
   Preset preset;
   preset.voices = voices;
   preset.controls.push_back(
-      {.target = "in1", .gesture = ControlGesture::impulse, .low = 0.0, .high = 0.1});
+      {.target = "in1", .gesture = Gesture::impulse, .low = 0.0, .high = 0.1});
   return preset;
 }
 

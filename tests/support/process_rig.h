@@ -29,7 +29,7 @@ inline const std::string hand_text =
 inline Preset holding() {
   Preset preset;
   preset.keyboard = false;
-  preset.controls.push_back({.target = "in1", .gesture = ControlGesture::hold});
+  preset.controls.push_back({.target = "in1", .gesture = Gesture::hold});
   return preset;
 }
 
@@ -37,7 +37,7 @@ inline Preset holding() {
 inline const std::string clock_text = "@m mass 1. 0. 0.\n@in1 frcInput @m\n@out1 posOutput @m\n";
 
 inline Event push(double force = 1.0) {
-  return {.kind = EventKind::force, .index = 1, .value = force};
+  return {.kind = EventKind::gesture, .gesture = Gesture::force, .index = 1, .value = force};
 }
 
 // A process and all that it has played.

@@ -111,16 +111,24 @@ class Abuser {
       case 5:
         return {.kind = EventKind::pressure, .value = random_.uniform(0.0, 1.0)};
       case 6:
-        return {.kind = EventKind::position, .index = input(), .value = any_size()};
+        return {.kind = EventKind::gesture,
+                .gesture = Gesture::position,
+                .index = input(),
+                .value = any_size()};
       case 7:
-        return {.kind = EventKind::force,
+        return {.kind = EventKind::gesture,
+                .gesture = Gesture::force,
                 .index = input(),
                 .value = any_size(),
                 .value2 = chance(2) ? 0.0 : random_.uniform(0.0, 0.1)};
       case 8:
-        return {.kind = EventKind::pluck, .index = input(), .value = random_.uniform(0.0, 1.0)};
+        return {.kind = EventKind::gesture,
+                .gesture = Gesture::pluck,
+                .index = input(),
+                .value = random_.uniform(0.0, 1.0)};
       case 9:
-        return {.kind = EventKind::bow,
+        return {.kind = EventKind::gesture,
+                .gesture = Gesture::bow,
                 .index = input(),
                 .value = random_.uniform(-1.0, 1.0),
                 .value2 = random_.uniform(-1.0, 1.0)};
@@ -186,7 +194,7 @@ Found abuse(Compiled compiled, double seconds, std::uint64_t seed, bool force) {
     }
     at += static_cast<std::int64_t>(frames);
   }
-  found.runaways = process.meters.resets.get();
+  found.runaways = process.meters().resets;
   return found;
 }
 

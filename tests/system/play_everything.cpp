@@ -25,8 +25,8 @@
 
 #include <unistd.h>
 
-#include "app/control/calls.h"
 #include "app/control/console.h"
+#include "app/control/registry.h"
 #include "app/realtime/process.h"
 #include "app/session/session.h"
 #include "core/model/language/mdl.h"
@@ -48,7 +48,7 @@ constexpr double fade_s = 0.1;  // longer than every fade there is
 // What is done to an instrument in one block.
 struct Move {
   std::vector<std::uint8_t> midi;
-  std::optional<Call> call;
+  std::optional<Message> call;
 };
 
 std::vector<Move> moves_on(const Instrument& instrument) {
@@ -57,7 +57,7 @@ std::vector<Move> moves_on(const Instrument& instrument) {
     moves.push_back({std::move(bytes), {}});
   };
   const auto ask = [&](std::string address, std::vector<Argument> arguments) {
-    moves.push_back({{}, Call{std::move(address), std::move(arguments)}});
+    moves.push_back({{}, Message{std::move(address), std::move(arguments)}});
   };
   const auto all_controllers = [&](std::uint8_t value) {
     std::vector<std::uint8_t> bytes;
@@ -77,10 +77,10 @@ std::vector<Move> moves_on(const Instrument& instrument) {
       ask(address + "/position", {0.1});
       ask(address + "/position", {-0.1});
     }
-    if (input.can_pluck) {
+    if (input.knows(Gesture::pluck)) {
       ask(address + "/pluck", {1.0});
     }
-    if (input.can_bow) {
+    if (input.knows(Gesture::bow)) {
       ask(address + "/bow", {1.0, 1.0});
       ask(address + "/bow", {-0.5});
     }
@@ -135,7 +135,7 @@ class Stage {
   std::string play(const std::string& path, double seconds) {
     wrong_.clear();
     peak_ = 0.0;
-    const std::uint64_t resets = process_.meters.resets.get();
+    const std::uint64_t resets = process_.meters().resets;
     if (!load(path)) {
       return wrong_;
     }
@@ -151,7 +151,7 @@ class Stage {
     block({});
     expect(loudest_ == 0.0, "is not silent after panic: " + rig::show(loudest_));
     has_audio_ = true;
-    resets_ = process_.meters.resets.get() - resets;
+    resets_ = process_.meters().resets - resets;
     return wrong_;
   }
 
@@ -175,14 +175,14 @@ class Stage {
       refusal = try_to_load(path, true);
     }
     expect(refusal.empty(), refusal);
-    const std::uint64_t swaps = process_.meters.swaps.get();
+    const std::uint64_t swaps = process_.meters().swaps;
     for (int i = 0; i < 2000 && swaps == swaps_ && refusal.empty(); ++i) {
       play_on();
-      if (process_.meters.swaps.get() != swaps) {
+      if (process_.meters().swaps != swaps) {
         break;
       }
     }
-    swaps_ = process_.meters.swaps.get();
+    swaps_ = process_.meters().swaps;
     return refusal.empty();
   }
 
@@ -209,10 +209,10 @@ class Stage {
         std::any_of(parts.begin(), parts.end(), [](const Part& part) { return part.may_gain; }) &&
         std::none_of(parts.begin(), parts.end(),
                      [](const Part& part) { return part.method == Method::modal; });
-    for (int i = 0; i < 5000 && is_coming && process_.meters.swaps.get() == swaps_; ++i) {
+    for (int i = 0; i < 5000 && is_coming && process_.meters().swaps == swaps_; ++i) {
       play_on();
     }
-    swaps_ = process_.meters.swaps.get();
+    swaps_ = process_.meters().swaps;
   }
 
   void perform(double seconds) {
@@ -230,8 +230,9 @@ class Stage {
     }
   }
 
-  void ask(const Call& call) {
-    const auto events = session_.events(call);
+  void ask(const Message& call) {
+    const auto loaded = session_.current();
+    const auto events = to_events(call, loaded->instrument, loaded->serial);
     if (!events) {
       return expect(false, events.error().message);
     }

@@ -104,31 +104,26 @@ double value_of(const ControlSetting& control) {
 HandMotion motion_of(const ControlSetting& control, double middle) {
   const double value = value_of(control);
   switch (control.gesture) {
-    case ControlGesture::pluck:
+    case Gesture::pluck:
       return [=, travel = control.travel, speed = std::fabs(value) * rate_hz](double t) {
         return middle - travel + std::min(2.0 * travel, speed * t);
       };
-    case ControlGesture::bow:
+    case Gesture::bow:
       return [=](double t) {
         return middle + value * rate_hz * (t + bow_start_s * std::expm1(-t / bow_start_s));
       };
-    case ControlGesture::position:
-    case ControlGesture::hold:
-    case ControlGesture::impulse: {
-      const double there = control.gesture == ControlGesture::hold ? control.high : value;
+    default: {
+      const double there = control.gesture == Gesture::hold ? control.high : value;
       return [=](double t) { return middle - (there - middle) * std::expm1(-t / reach_s); };
     }
-    case ControlGesture::parameter:
-      break;
   }
-  return {};
 }
 
-std::string word_of(ControlGesture gesture) {
+std::string word_of(Gesture gesture) {
   switch (gesture) {
-    case ControlGesture::pluck:
+    case Gesture::pluck:
       return "plucked";
-    case ControlGesture::bow:
+    case Gesture::bow:
       return "bowed";
     default:
       return "moved";
@@ -192,7 +187,7 @@ void play_note(ChartScene& scene, const Preset& preset) {
       }
       if (input.is_force) {
         strike(scene, struck_by(scene.network, input));
-      } else if (control.gesture != ControlGesture::parameter) {
+      } else if (control.gesture != Gesture::parameter) {
         scene.hands[i] = motion_of(control, scene.network.masses[input.mass].position);
         scene.about = word_of(control.gesture) + " as by a note of velocity 0.8";
       }

@@ -23,7 +23,7 @@ std::string no_parameter(const Network& network, const std::string& name) {
 
 // What is wrong with the control; empty if nothing is.
 std::string misfit(const Network& network, const ControlSetting& control) {
-  if (control.gesture == ControlGesture::parameter) {
+  if (control.gesture == Gesture::parameter) {
     return find_parameter(network, control.target) < 0 ? no_parameter(network, control.target)
            : control.source == ControlSource::audio
                ? "an audio channel drives an input, not a parameter"
@@ -34,9 +34,8 @@ std::string misfit(const Network& network, const ControlSetting& control) {
     return "the model has no input " + quoted(control.target) + "; it has " +
            std::to_string(network.inputs.size());
   }
-  const bool wants_position =
-      control.gesture == ControlGesture::pluck || control.gesture == ControlGesture::bow;
-  return network.inputs[static_cast<std::size_t>(input)].is_force && wants_position
+  return network.inputs[static_cast<std::size_t>(input)].is_force &&
+                 row_of(control.gesture).needs_position
              ? "'" + control.target + "' is a force input, which this gesture cannot play"
              : "";
 }

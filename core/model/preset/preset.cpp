@@ -61,16 +61,21 @@ constexpr PresetKey keys[] = {
     {"control", "travel", "above 0", "of a pluck, which needs it: how far from the string the finger rests, on either side"},
     {"control", "keys", "[low, high] ([0, 127])", "of notes: which keys"},
 };
-
-constexpr GestureWord gestures[] = {
-    {"position", ControlGesture::position, "goes where it is told, smoothed"},
-    {"pluck", ControlGesture::pluck, "a finger sweeps from one side of the string to the other, at a speed from `range`; the slower, the louder"},
-    {"bow", ControlGesture::bow, "a bow moves at a speed from `range` as long as the key is held"},
-    {"impulse", ControlGesture::impulse, "one sample of force, or of displacement where the input is a position"},
-    {"hold", ControlGesture::hold, "goes to the second number of `range` while the key is held, and back to the first"},
-    {"parameter", ControlGesture::parameter, "no input: the parameter that `to` names is turned"},
-};
 // clang-format on
+
+using IsReserved = bool (*)(std::string_view address);
+
+// "position, pluck, bow, impulse, hold or parameter"
+std::string words_for_how() {
+  std::string words;
+  for (const GestureRow& row : gestures) {
+    if (!row.does.empty()) {
+      const std::string_view between = &row == std::end(gestures) - 1 ? " or " : ", ";
+      words.append(words.empty() ? "" : between).append(row.name);
+    }
+  }
+  return words;
+}
 
 Place place_of(const toml::node& node) {
   return {static_cast<int>(node.source().begin.line), static_cast<int>(node.source().begin.column)};
@@ -214,16 +219,6 @@ void read_parameter(std::string name, const toml::node& node, Preset& preset,
   preset.parameters.push_back(std::move(setting));
 }
 
-// What the program itself listens to or answers with.
-bool is_taken(std::string_view address) {
-  constexpr std::string_view whole[] = {
-      "/note/on", "/note/off", "/cc",           "/pressure",       "/bend",        "/panic",
-      "/error",   "/done",     "/model/load",   "/preset/load",    "/status",      "/describe",
-      "/fail",    "/progress", "/status.reply", "/describe.reply", "/describe.end"};
-  return address.starts_with("/param/") || address.starts_with("/in/") ||
-         std::find(std::begin(whole), std::end(whole), address) != std::end(whole);
-}
-
 // Whether a message, or a line of a score, can have this address.
 bool is_address(std::string_view text) {
   constexpr std::size_t longest = 255;
@@ -266,14 +261,15 @@ bool read_source(std::string_view text, ControlSetting& control) {
 }
 
 // Without a word the target tells: an input is moved, a parameter is turned.
-ControlGesture usual_gesture(std::string_view target) {
+Gesture usual_gesture(std::string_view target) {
   return target.starts_with("in") && target.size() > 2 &&
                  std::isdigit(static_cast<unsigned char>(target[2])) != 0
-             ? ControlGesture::position
-             : ControlGesture::parameter;
+             ? Gesture::position
+             : Gesture::parameter;
 }
 
-void read_control(const toml::table& table, Preset& preset, std::vector<Error>& errors) {
+void read_control(const toml::table& table, Preset& preset, std::vector<Error>& errors,
+                  IsReserved is_reserved) {
   const std::size_t before = errors.size();
   Table reader(table, "a control", errors);
   reader.allow("control");
@@ -289,7 +285,8 @@ void read_control(const toml::table& table, Preset& preset, std::vector<Error>& 
     reader.fail(*table.get("from"),
                 "an OSC name has 2 to 255 characters: '/', then letters, digits and signs, but no "
                 "blanks and none of # * , ? [ ] { }");
-  } else if (control.source == ControlSource::osc && is_taken(control.address)) {
+  } else if (control.source == ControlSource::osc && is_reserved != nullptr &&
+             is_reserved(control.address)) {
     reader.fail(*table.get("from"), quoted(control.address) +
                                         " is an address of the program's own; choose another, such "
                                         "as \"/finger\"");
@@ -299,13 +296,13 @@ void read_control(const toml::table& table, Preset& preset, std::vector<Error>& 
   }
   control.gesture = usual_gesture(control.target);
   if (std::string how; reader.text("how", how)) {
-    const auto* choice = std::find_if(std::begin(gestures), std::end(gestures),
-                                      [&](const GestureWord& c) { return c.word == how; });
-    if (choice != std::end(gestures)) {
-      control.gesture = choice->gesture;
+    const auto* row = std::find_if(
+        std::begin(gestures), std::end(gestures),
+        [&](const GestureRow& gesture) { return gesture.name == how && !gesture.does.empty(); });
+    if (row != std::end(gestures)) {
+      control.gesture = row->gesture;
     } else {
-      reader.fail(*table.get("how"),
-                  "'how' must be position, pluck, bow, impulse, hold or parameter");
+      reader.fail(*table.get("how"), "'how' must be " + words_for_how());
     }
   }
   const bool has_range = reader.pair("range", control.low, control.high);
@@ -325,16 +322,19 @@ void read_control(const toml::table& table, Preset& preset, std::vector<Error>& 
       !(control.low > 0.0 && control.high > 0.0)) {
     reader.fail(table, "an exponential curve needs a range above 0");
   }
-  if (control.gesture == ControlGesture::pluck && (has_travel || table.get("travel") == nullptr) &&
+  const GestureRow& gesture = row_of(control.gesture);
+  if (!gesture.needs_travel.empty() && (has_travel || table.get("travel") == nullptr) &&
       !(control.travel > 0.0)) {
-    reader.fail(table, "a pluck needs 'travel': how far from the string the finger rests");
+    reader.fail(table, "a " + std::string(gesture.name) +
+                           " needs 'travel': " + std::string(gesture.needs_travel));
   }
   if (errors.size() == before) {
     preset.controls.push_back(std::move(control));
   }
 }
 
-void read_root(const toml::table& root, Preset& preset, std::vector<Error>& errors) {
+void read_root(const toml::table& root, Preset& preset, std::vector<Error>& errors,
+               IsReserved is_reserved) {
   Table reader(root, "a preset", errors);
   reader.allow("");
   const toml::node* const model = root.get("model");
@@ -395,7 +395,7 @@ void read_root(const toml::table& root, Preset& preset, std::vector<Error>& erro
       reader.fail(*node, "controls are written one by one: [[control]]");
     } else {
       for (const toml::node& row : *rows) {
-        read_control(*row.as_table(), preset, errors);
+        read_control(*row.as_table(), preset, errors, is_reserved);
       }
     }
   }
@@ -435,11 +435,7 @@ std::span<const PresetKey> preset_keys() {
   return keys;
 }
 
-std::span<const GestureWord> gesture_words() {
-  return gestures;
-}
-
-ParsedPreset parse_preset(std::string_view text) {
+ParsedPreset parse_preset(std::string_view text, IsReserved is_reserved) {
   ParsedPreset read;
   if (text.size() > max_preset_bytes) {
     read.errors.push_back({"the preset is longer than 64 KiB", 1, 1});
@@ -456,7 +452,7 @@ ParsedPreset parse_preset(std::string_view text) {
                            static_cast<int>(begin.column)});
     return read;
   }
-  read_root(parsed.table(), read.preset, read.errors);
+  read_root(parsed.table(), read.preset, read.errors, is_reserved);
   std::sort(read.preset.parameters.begin(), read.preset.parameters.end(),
             [](const auto& a, const auto& b) { return a.name < b.name; });
   std::stable_sort(read.errors.begin(), read.errors.end(), [](const Error& a, const Error& b) {
@@ -479,18 +475,18 @@ Preset default_preset(const Network& network, bool bare) {
     double scale = 0.0;
     bool played = !input.is_force || !never_moves(network.masses[input.mass]);
     if (input.is_force) {
-      note.gesture = ControlGesture::impulse;
+      note.gesture = Gesture::impulse;
       note.low = 0.01;
       note.high = 0.1;
     } else if (is_linked(network, input.mass, Family::pluck, scale)) {
-      note.gesture = ControlGesture::pluck;
+      note.gesture = Gesture::pluck;
       note.travel = 5.0 * scale;
       // The slower the finger, the more it gives to the string before that slips away.
       note.low = 0.3 * scale;
       note.high = 0.05 * scale;
       note.exponential = true;
     } else if (is_linked(network, input.mass, Family::bow, scale)) {
-      note.gesture = ControlGesture::bow;
+      note.gesture = Gesture::bow;
       note.low = 0.35 * scale;
       note.high = 0.9 * scale;
     } else {
@@ -507,7 +503,7 @@ Preset default_preset(const Network& network, bool bare) {
                            .target = note.target,
                            .low = middle - reach,
                            .high = middle + reach};
-      if (played && note.gesture == ControlGesture::pluck) {
+      if (played && note.gesture == Gesture::pluck) {
         preset.controls.push_back(wheel);
       }
     }

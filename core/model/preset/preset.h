@@ -8,6 +8,7 @@
 #include <string_view>
 #include <vector>
 
+#include "core/gesture.h"
 #include "core/model/network.h"
 #include "core/model/preset/budget.h"
 #include "core/result.h"
@@ -24,18 +25,17 @@ struct ParameterSetting {
 };
 
 enum class ControlSource { note, controller, pressure, osc, audio };
-enum class ControlGesture { position, pluck, bow, impulse, hold, parameter };
 
 struct ControlSetting {
   ControlSource source = ControlSource::note;
   int number = 0;       // of the controller (0..127) or the audio channel (from 1)
   std::string address;  // of an OSC name, such as "/finger"
   std::string target;   // "in1", or a parameter's name
-  ControlGesture gesture = ControlGesture::position;
+  Gesture gesture = Gesture::position;
   double low = 0.0;   // what 0 and 1 of the source become: a position, a force, a speed in
   double high = 1.0;  //   units per sample at 44 100 Hz, a parameter's value
   bool exponential = false;
-  double travel = 0.0;  // pluck: how far on either side of the string the finger rests
+  double travel = 0.0;  // how far from its middle the input rests, on either side
   int lowest_key = 0;
   int highest_key = 127;
   Place place;
@@ -72,14 +72,6 @@ struct PresetKey {
 };
 std::span<const PresetKey> preset_keys();
 
-// What `how` of a control may say.
-struct GestureWord {
-  std::string_view word;
-  ControlGesture gesture;
-  std::string_view does;
-};
-std::span<const GestureWord> gesture_words();
-
 struct ParsedPreset {
   Preset preset;              // whole only if ok()
   std::vector<Error> errors;  // in the order of the lines, each with its line and column
@@ -87,8 +79,10 @@ struct ParsedPreset {
 };
 
 // Reads a preset; goes on after an error, so that every problem is told at once. An unknown key, a
-// wrong type or a value out of range is an error; never a silent drop. [any thread but audio]
-ParsedPreset parse_preset(std::string_view toml);
+// wrong type or a value out of range is an error; never a silent drop. So is an OSC name for which
+// `is_reserved` says yes. [any thread but audio]
+ParsedPreset parse_preset(std::string_view toml,
+                          bool (*is_reserved)(std::string_view address) = nullptr);
 
 // What a model without a preset is played with: notes and the modulation wheel drive its first
 // input by the gesture that its links ask for, audio channels drive the inputs that no hand does.

@@ -7,6 +7,7 @@
 #include <chrono>
 #include <future>
 
+#include "app/control/registry.h"
 #include "app/control/terminal.h"
 #include "tests/support/catch.h"
 #include "tests/support/console_rig.h"
@@ -32,10 +33,10 @@ TEST_CASE("a command is named by any unique beginning", "[console]") {
   CHECK(parse_command("st")->name == "status");
   CHECK(parse_command("  he\tlo ")->name == "help");
   CHECK(parse_command("q")->name == "quit");
-  for (const CommandRow& row : commands()) {
-    const auto help = parse_command("help " + std::string(row.name));
+  for (const Row* const row : commands()) {
+    const auto help = parse_command("help " + std::string(row->command));
     REQUIRE(help);
-    CHECK(help->words == std::vector<std::string>{std::string(row.name)});
+    CHECK(help->words == std::vector<std::string>{std::string(row->command)});
   }
 }
 
@@ -44,8 +45,8 @@ TEST_CASE("an unclear or unknown command is answered with what there is", "[cons
   CHECK(has(error_of("s"), "status"));
   const std::string unknown = error_of("jump");
   CHECK(has(unknown, "there is no command 'jump'"));
-  for (const CommandRow& row : commands()) {
-    CHECK(has(unknown, std::string(row.name)));
+  for (const Row* const row : commands()) {
+    CHECK(has(unknown, std::string(row->command)));
   }
 }
 
@@ -105,12 +106,12 @@ TEST_CASE("what is not stable is not loaded, or by force, and no parameter leave
 TEST_CASE("help names every command, and tells more of each", "[console]") {
   Rig rig;
   const std::string all = rig.say("help");
-  for (const CommandRow& row : commands()) {
-    CHECK(has(all, "  " + std::string(row.name)));
-    CHECK(has(all, std::string(row.does)));
-    const std::string one = rig.say("help " + std::string(row.name));
-    CHECK(has(one, std::string(row.does)));
-    CHECK(has(one, std::string(row.details)));
+  for (const Row* const row : commands()) {
+    CHECK(has(all, "  " + std::string(row->command)));
+    CHECK(has(all, std::string(row->command_does)));
+    const std::string one = rig.say("help " + std::string(row->command));
+    CHECK(has(one, std::string(row->command_does)));
+    CHECK(has(one, std::string(row->details)));
   }
   CHECK(has(rig.say("help jump"), "error: there is no command 'jump'"));
 }
@@ -244,7 +245,7 @@ TEST_CASE("pluck and bow go to the first input that knows them", "[console]") {
   CHECK(rig.say("pluck").empty());
   TimedEvent timed;
   REQUIRE(rig.process.from_console.pop(timed));
-  CHECK(timed.event.kind == EventKind::pluck);
+  CHECK(timed.event.gesture == Gesture::pluck);
   CHECK(timed.event.index == 1);
   CHECK(timed.event.value == 0.8);
   CHECK(rig.say("pluck 1 0.25").empty());
@@ -257,7 +258,7 @@ TEST_CASE("pluck and bow go to the first input that knows them", "[console]") {
   rig.say("load " + folder.write("bowed.mdl", scenes::bowed_string()));
   CHECK(rig.say("bow -0.5").empty());
   REQUIRE(rig.process.from_console.pop(timed));
-  CHECK(timed.event.kind == EventKind::bow);
+  CHECK(timed.event.gesture == Gesture::bow);
   CHECK(timed.event.value == -0.5);
   CHECK(timed.event.value2 == -1.0);  // the pressure stays
   CHECK(rig.say("bow 1 0.25 1").empty());

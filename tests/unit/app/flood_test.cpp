@@ -54,7 +54,7 @@ TEST_CASE("a bundle that finds no room ahead is refused whole", "[flood]") {
   stage.process.slot.offer(sounding(clock_text, faint(), 1));
   CHECK(stage.at(1000, push(), 3000));
   CHECK_FALSE(stage.at(500, push(), Process::max_ahead - 3000 + 1));
-  CHECK(stage.process.meters.dropped.get() == Process::max_ahead - 3000 + 1);
+  CHECK(stage.process.meters().dropped == Process::max_ahead - 3000 + 1);
   CHECK(stage.at(2000, push(), Process::max_ahead - 3000));
   CHECK_FALSE(stage.at(2000, push()));
   stage.run(1001, 77);
@@ -145,7 +145,7 @@ TEST_CASE("note-offs and panic act in the next block of a flood, with the future
     if (is_panic) {
       CHECK(peak(std::span(stage.y()).subspan(steal_frames)) == 0.0);
     }
-    CHECK(stage.process.meters.dropped.get() == 512);  // the last try to fill the future
+    CHECK(stage.process.meters().dropped == 512);  // the last try to fill the future
   }
 }
 
@@ -159,7 +159,7 @@ TEST_CASE("where no other event finds room, what ends sound does", "[flood]") {
       REQUIRE(++sent < 100000);
     }
     CHECK(sent >= Process::max_now);
-    CHECK(stage.process.meters.dropped.get() == 1);
+    CHECK(stage.process.meters().dropped == 1);
     CHECK(stage.now(ending));
     CHECK_FALSE(stage.now(parameter(0, 0, 0.02)));
     stage.run(period);
@@ -176,7 +176,7 @@ TEST_CASE("every event of a flood of MIDI that finds no room is counted", "[floo
     std::vector<MidiPacket> packets(Process::max_now + 700, MidiPacket{0, on});
     packets.push_back({0, off});
     stage.run(period, period, packets);
-    CHECK(stage.process.meters.dropped.get() == 700);
+    CHECK(stage.process.meters().dropped == 700);
     CHECK(stage.y()[1] < 1.0);
   }
   Held stage;
@@ -187,7 +187,7 @@ TEST_CASE("every event of a flood of MIDI that finds no room is counted", "[floo
     door.arrive(reader, on, 0);
   }
   door.arrive(reader, off, 0);
-  CHECK(stage.process.meters.dropped.get() == 700);
+  CHECK(stage.process.meters().dropped == 700);
   stage.run(period);
   CHECK(stage.y()[1] < 1.0);
 }

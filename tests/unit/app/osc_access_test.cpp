@@ -6,8 +6,9 @@
 #include <algorithm>
 #include <future>
 
-#include "app/control/osc.h"
-#include "app/control/osc_outlet.h"
+#include "app/control/osc/outlet.h"
+#include "app/control/osc/server.h"
+#include "app/control/registry.h"
 #include "app/devices/audio.h"
 #include "tests/support/catch.h"
 #include "tests/support/data_folder.h"

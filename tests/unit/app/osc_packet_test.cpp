@@ -1,4 +1,4 @@
-#include "app/control/osc_packet.h"
+#include "app/control/osc/packet.h"
 
 #include "tests/support/catch.h"
 #include "tests/support/osc_bytes.h"

@@ -1,4 +1,4 @@
-#include "app/control/osc.h"
+#include "app/control/osc/server.h"
 
 #include <algorithm>
 #include <array>
@@ -7,7 +7,8 @@
 #include <ctime>
 #include <random>
 
-#include "app/control/osc_packet.h"
+#include "app/control/osc/packet.h"
+#include "app/control/registry.h"
 #include "app/devices/audio.h"
 #include "tests/support/catch.h"
 #include "tests/support/data_folder.h"
@@ -235,7 +236,7 @@ TEST_CASE("time tags keep their distance to the frame", "[osc]") {
   CHECK(has(late, "/error", "/in/1/force", "late by 0."));
   rig.drive(2);
   CHECK(rig.onsets(0).back() == now);
-  CHECK(rig.process.meters.late.get() == 1);
+  CHECK(rig.process.meters().late == 1);
 
   CHECK(has(rig.client.ask(bundle(rig.tag(rig.time_ns(now + 11 * 48000)), {message("/panic")})),
             "/error", "/panic", "s ahead"));
@@ -336,7 +337,7 @@ TEST_CASE("a bundle that finds no room ahead is refused whole; what is to act no
     CHECK(has(rig.client.ask(bundle(ahead(), pushes)), "/error", "/in/1/force",
               "refused whole: 4096 events may wait for their time, and there is no room for 1500 "
               "events more; try again later"));
-    CHECK(rig.process.meters.dropped.get() == 1500u * (static_cast<unsigned>(i) + 1));
+    CHECK(rig.process.meters().dropped == 1500u * (static_cast<unsigned>(i) + 1));
     rig.drive(4);  // the audio thread has taken them all, and they still wait
   }
   CHECK(rig.onsets(0).empty());
@@ -454,7 +455,7 @@ TEST_CASE("ten thousand broken packets leave the server and the sound whole", "[
   for (const std::vector<float>& channel : rig.sound) {
     CHECK(std::all_of(channel.begin(), channel.end(), [](float x) { return std::isfinite(x); }));
   }
-  CHECK(rig.process.meters.frames.get() == rig.sound[0].size());
+  CHECK(rig.process.meters().frames == rig.sound[0].size());
 }
 
 }  // namespace

@@ -48,14 +48,14 @@ TEST_CASE("an event for a frame acts on it, and one that is late at once", "[pro
   stage.at(1717, push());
   stage.run(4000, 100);
   CHECK(pushed_at(stage.y()) == 1717);
-  CHECK(stage.process.meters.late.get() == 0);
+  CHECK(stage.process.meters().late == 0);
   stage.out[0].clear();
   // Twice as fast from now on; 90 frames too late.
   stage.at(3910, push());
   stage.run(100, 100);
   CHECK(stage.y()[1] - stage.y()[0] == 2.0 * faint.gain);
-  CHECK(stage.process.meters.late.get() == 1);
-  CHECK(stage.process.meters.late_s.get() == Approx(90.0 / rate).epsilon(1e-12));
+  CHECK(stage.process.meters().late == 1);
+  CHECK(stage.process.meters().late_s == Approx(90.0 / rate).epsilon(1e-12));
 }
 
 TEST_CASE("events with a time keep one latency, however they come", "[process]") {
@@ -113,7 +113,7 @@ TEST_CASE("what comes first acts first, and what finds no room is counted", "[pr
   for (std::size_t i = 0; i < Process::max_ahead + 10; ++i) {
     CHECK(stage.process.schedule(1000000, push()) == (i < Process::max_ahead));
   }
-  CHECK(stage.process.meters.dropped.get() == 10);
+  CHECK(stage.process.meters().dropped == 10);
 }
 
 // --- models that change
@@ -135,7 +135,7 @@ TEST_CASE("two models cross-fade in a straight line of 50 ms", "[process]") {
     }
     INFO("block " << block << ": " << show(worst));
     CHECK(worst < 1e-15);
-    CHECK(stage.process.meters.swaps.get() == 2);
+    CHECK(stage.process.meters().swaps == 2);
   }
 }
 
@@ -164,11 +164,19 @@ TEST_CASE("a note that began before the swap ends in the old model, a new one be
 TEST_CASE("an event for one model does not act in another", "[process]") {
   Stage stage;
   stage.process.slot.offer(sounding(clock_text, Preset{}, 7));
-  stage.now({.kind = EventKind::force, .index = 1, .model = 6, .value = 1.0});
+  stage.now({.kind = EventKind::gesture,
+             .gesture = Gesture::force,
+             .index = 1,
+             .model = 6,
+             .value = 1.0});
   stage.run(256);
   CHECK(peak(stage.y()) == 0.0);
   stage.process.slot.offer(sounding(clock_text, Preset{}, 8));
-  stage.now({.kind = EventKind::force, .index = 1, .model = 7, .value = 1.0});
+  stage.now({.kind = EventKind::gesture,
+             .gesture = Gesture::force,
+             .index = 1,
+             .model = 7,
+             .value = 1.0});
   stage.run(256);
   for (std::size_t n = 0; n < 256; ++n) {  // in the old one, which fades
     CHECK(std::fabs(stage.y()[256 + n] - old_gain(n) * static_cast<double>(n + 1)) < 1e-12);
@@ -219,7 +227,7 @@ TEST_CASE("a thousand models change under sounding notes without a step", "[proc
   CHECK(finite);
   CHECK(step <= bound);
   CHECK(step > 0.1 * own_step);  // there was sound
-  CHECK(stage.process.meters.swaps.get() == 1000);
+  CHECK(stage.process.meters().swaps == 1000);
   CHECK(collected == 999);
   CHECK(returned.size() == 999);  // each once
   CHECK(stage.heap_calls == 0);
@@ -266,7 +274,7 @@ TEST_CASE("the length of the blocks does not change what leaves the limiter", "[
     stage.run(20480, block);
     if (expected.empty()) {
       expected = stage.y();
-      CHECK(stage.process.meters.limited.get() < 1.0);  // it was loud enough
+      CHECK(stage.process.meters().limited < 1.0);  // it was loud enough
     }
     CAPTURE(block);
     CHECK(stage.y() == expected);
@@ -328,7 +336,7 @@ TEST_CASE("a recording is what was heard; a reset is told once", "[process]") {
   REQUIRE(stage.process.reports.pop(report));
   CHECK(report.kind == Report::Kind::reset);
   CHECK_FALSE(stage.process.reports.pop(report));
-  CHECK(stage.process.meters.resets.get() == 1);
+  CHECK(stage.process.meters().resets == 1);
 }
 
 }  // namespace ressort

@@ -73,7 +73,9 @@ TEST_CASE("what a recording misses is told", "[recorder]") {
   Rig rig;
   rig.say("rec " + folder.file("gap.wav"));
   rig.play();
-  rig.process.meters.record_lost.add(3);
+  Meters meters;
+  meters.record_lost = 3;
+  rig.process.board.write(meters);
   CHECK(has(rig.say("rec stop"), "gap.wav: 0.01 s, 3 pieces lost"));
 }
 

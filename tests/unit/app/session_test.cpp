@@ -1,6 +1,8 @@
 // The control side and the audio thread together: loading, swapping, and giving back.
 #include "app/session/session.h"
 
+#include "app/control/registry.h"
+
 #include <unistd.h>
 
 #include <algorithm>
@@ -177,7 +179,7 @@ TEST_CASE("A thousand swaps while notes sound neither click, leak nor break", "[
       2.0f * player.ear().peak.load() / (48000.0f * static_cast<float>(Process::fade_s));
   CHECK(player.ear().largest_step.load() <= own + slope);
   CHECK(after <= before + 4096);  // bytes; an engine has more than 20 000
-  CHECK(process.meters.swaps.get() > 100);
+  CHECK(process.meters().swaps > 100);
 }
 
 TEST_CASE("What cannot be loaded is told in full, and what sounds goes on", "[session]") {
@@ -266,7 +268,8 @@ TEST_CASE("Parameters are remembered, clamped, and followed when a controller tu
   CHECK_FALSE(session.parameter("K"));
   REQUIRE(session.load_and_wait(file));
   CHECK(session.parameter("K") == 0.1);
-  const auto events = session.events({"/param/K", {0.7}});
+  const auto loaded = session.current();
+  const auto events = to_events({"/param/K", {0.7}}, loaded->instrument, loaded->serial);
   REQUIRE(events);
   CHECK(session.parameter("K") == 0.1);  // not before it is sent
   const TimedEvent sent{.event = events->front()};
@@ -352,13 +355,13 @@ TEST_CASE("A contact that creates energy is named, and compiled anew behind the 
   REQUIRE(session.load_and_wait(file));
   Ear ear(process, 1'000'000);  // strikes nothing
   std::uint64_t n = 2;
-  for (int patience = 0; patience < 2000 && process.meters.swaps.get() < 2; ++patience) {
+  for (int patience = 0; patience < 2000 && process.meters().swaps < 2; ++patience) {
     for (const std::uint64_t end = n + 50; n < end; ++n) {
       ear.block(n);
     }
     std::this_thread::sleep_for(std::chrono::milliseconds(10));
   }
-  CHECK(process.meters.swaps.get() == 2);
+  CHECK(process.meters().swaps == 2);
   const std::lock_guard lock(mutex);
   CAPTURE(told);
   REQUIRE(told.size() == 1);

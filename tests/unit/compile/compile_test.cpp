@@ -66,8 +66,8 @@ TEST_CASE("an instrument says what can be played", "[compile]") {
 
   const Player bowed(scenes::bowed_string(),
                      default_preset(network_of(scenes::bowed_string()), false));
-  CHECK(bowed.compiled.instrument.inputs[0].can_bow);
-  CHECK_FALSE(bowed.compiled.instrument.inputs[0].can_pluck);
+  CHECK(bowed.compiled.instrument.inputs[0].knows(Gesture::bow));
+  CHECK_FALSE(bowed.compiled.instrument.inputs[0].knows(Gesture::pluck));
   CHECK(bowed.compiled.instrument.inputs[0].attached_to == "low_m133");
 }
 

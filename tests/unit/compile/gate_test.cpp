@@ -226,7 +226,7 @@ TEST_CASE("no controller, event or start value turns a parameter further than is
   preset.controls.push_back({.source = ControlSource::controller,
                              .number = 20,
                              .target = "K",
-                             .gesture = ControlGesture::parameter,
+                             .gesture = Gesture::parameter,
                              .low = 0.1,
                              .high = 5.0});
   const Event turn{.frame = 100, .kind = EventKind::controller, .index = 20, .value = 1.0};

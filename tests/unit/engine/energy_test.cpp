@@ -240,7 +240,11 @@ TEST_CASE("What only wavers, falls or is driven is not accused", "[energy]") {
   rig::Player player(ball("0.05 0.02 0."), Preset{});
   std::vector<Event> pushes;
   for (std::uint32_t frame = 0; frame < 44100; frame += 2000) {
-    pushes.push_back({.frame = frame, .kind = EventKind::force, .index = 1, .value = 1e-5 * frame});
+    pushes.push_back({.frame = frame,
+                      .kind = EventKind::gesture,
+                      .gesture = Gesture::force,
+                      .index = 1,
+                      .value = 1e-5 * frame});
   }
   player.run(44100, pushes);
   CHECK(player.engine().take_creators().empty());
@@ -314,7 +318,8 @@ Preset untuned() {
 
 Event blow(std::uint32_t frame, int input) {
   return {.frame = frame,
-          .kind = EventKind::force,
+          .kind = EventKind::gesture,
+          .gesture = Gesture::force,
           .index = static_cast<std::uint16_t>(input),
           .value = 0.1};
 }

@@ -340,7 +340,11 @@ TEST_CASE("one voice that runs away leaves the others alone", "[engine]") {
   Player player(text, struck(2));
   player.run(20000, {note_on(0, 60),
                      note_on(1000, 67, 0.0),
-                     {.frame = 2000, .kind = EventKind::force, .index = 1, .value = 1e12}});
+                     {.frame = 2000,
+                      .kind = EventKind::gesture,
+                      .gesture = Gesture::force,
+                      .index = 1,
+                      .value = 1e12}});
   CHECK(player.engine().meters().resets >= 1);
   Comparison error;
   for (std::size_t n = 3000; n < 20000; ++n) {
@@ -400,7 +404,7 @@ TEST_CASE("how the time is cut into blocks makes no difference to a single bit",
     preset.controls.push_back({.source = ControlSource::controller,
                                .number = 1,
                                .target = "s_K",
-                               .gesture = ControlGesture::parameter,
+                               .gesture = Gesture::parameter,
                                .low = 0.05,
                                .high = 0.1});
     Random random(11);
@@ -467,7 +471,7 @@ TEST_CASE("process() never calls the heap", "[engine]") {
   preset.controls.push_back({.source = ControlSource::controller,
                              .number = 1,
                              .target = "s_K",
-                             .gesture = ControlGesture::parameter,
+                             .gesture = Gesture::parameter,
                              .low = 0.05,
                              .high = 0.1});
   for (const Precision precision : {Precision::float32, Precision::float64}) {
@@ -478,7 +482,11 @@ TEST_CASE("process() never calls the heap", "[engine]") {
       events.push_back(note_on(i * 97, key));
       events.push_back(controller(i * 97 + 1, 1, static_cast<double>(i % 10) / 10.0));
       events.push_back({.frame = i * 97 + 2, .kind = EventKind::bend, .value = 0.1});
-      events.push_back({.frame = i * 97 + 3, .kind = EventKind::force, .index = 1, .value = 0.1});
+      events.push_back({.frame = i * 97 + 3,
+                        .kind = EventKind::gesture,
+                        .gesture = Gesture::force,
+                        .index = 1,
+                        .value = 0.1});
       if (i % 3 > 0) {
         events.push_back(note_off(i * 97 + 50, key));
       }

@@ -223,11 +223,14 @@ TEST_CASE("an engine plays compensated, hands and all", "[float]") {
                            scenes::output(1, "s_m5");
   Preset preset = rig::struck(3);
   preset.keyboard = true;
-  const std::vector<Event> events = {
-      rig::note_on(0, 57),
-      rig::note_on(3000, 62),
-      rig::parameter(5000, 1, 0.11),
-      {.frame = 9000, .kind = EventKind::position, .index = 2, .value = 0.3}};
+  const std::vector<Event> events = {rig::note_on(0, 57),
+                                     rig::note_on(3000, 62),
+                                     rig::parameter(5000, 1, 0.11),
+                                     {.frame = 9000,
+                                      .kind = EventKind::gesture,
+                                      .gesture = Gesture::position,
+                                      .index = 2,
+                                      .value = 0.3}};
   rig::Player exact(text, preset);
   rig::Player found(text, preset, {.precision = Precision::compensated32});
   exact.run(44100, events, {256, 37});

@@ -1,5 +1,5 @@
 // Hands: what moves an input, by the closed forms of each gesture; alone and through the engine.
-#include "core/engine/gesture.h"
+#include "core/gesture.h"
 
 #include "tests/support/player.h"
 #include "tests/support/reference_network.h"
@@ -27,79 +27,83 @@ Preset played(const ControlSetting& control) {
 }  // namespace
 
 TEST_CASE("a hand that follows is a one-pole filter, and rests when it is there", "[gesture]") {
-  Hand hand;
-  hand.place(2.0);
-  CHECK_FALSE(hand.is_moving());
-  hand.follow(3.0, 0.9);
+  InputDriver driver;
+  driver.place(2.0);
+  CHECK_FALSE(driver.is_moving());
+  driver.follow(3.0, 0.9);
   double before = 2.0;
   for (int n = 1; n <= 100; ++n) {
-    const HandSample sample = hand.next_position();
+    const InputSample sample = driver.next_position();
     CHECK(std::fabs(sample.value - (3.0 - std::pow(0.9, n))) < 1e-14);
     CHECK(sample.velocity == sample.value - before);
     before = sample.value;
   }
-  for (int n = 0; n < 1000 && hand.is_moving(); ++n) {
-    hand.next_position();
+  for (int n = 0; n < 1000 && driver.is_moving(); ++n) {
+    driver.next_position();
   }
-  CHECK_FALSE(hand.is_moving());
-  CHECK(hand.value() == 3.0);
-  CHECK(hand.next_position().velocity == 0.0);
-  hand.follow(-1.0, 0.0);  // pole 0 jumps
-  CHECK(hand.next_position().value == -1.0);
+  CHECK_FALSE(driver.is_moving());
+  CHECK(driver.value() == 3.0);
+  CHECK(driver.next_position().velocity == 0.0);
+  driver.follow(-1.0, 0.0);  // pole 0 jumps
+  CHECK(driver.next_position().value == -1.0);
 }
 
 TEST_CASE("a sweep has one speed and ends exactly where told", "[gesture]") {
-  Hand hand;
-  hand.place(1.0);
-  hand.sweep(-1.0, 0.0625);
+  InputDriver driver;
+  driver.place(1.0);
+  driver.sweep(-1.0, 0.0625);
   for (int n = 1; n <= 40; ++n) {
-    const HandSample sample = hand.next_position();
+    const InputSample sample = driver.next_position();
     CHECK(sample.value == std::max(-1.0, 1.0 - 0.0625 * n));
     CHECK(sample.velocity == (n <= 32 ? -0.0625 : 0.0));
   }
-  CHECK_FALSE(hand.is_moving());
-  hand.sweep(-0.9, 0.0625);
-  hand.next_position();
-  CHECK(hand.next_position().value == -0.9);  // the last stride is shorter
+  CHECK_FALSE(driver.is_moving());
+  driver.sweep(-0.9, 0.0625);
+  driver.next_position();
+  CHECK(driver.next_position().value == -0.9);  // the last stride is shorter
 }
 
 TEST_CASE("a drawn bow nears its speed and keeps it clean however far it goes", "[gesture]") {
-  Hand hand;
-  hand.place(0.0);
-  hand.draw(0.001, 0.99);
+  InputDriver driver;
+  driver.place(0.0);
+  driver.draw(0.001, 0.99);
   double position = 0.0;
   for (int n = 1; n <= 500; ++n) {
-    const HandSample sample = hand.next_position();
+    const InputSample sample = driver.next_position();
     CHECK(std::fabs(sample.velocity - 0.001 * (1.0 - std::pow(0.99, n))) < 1e-17);
     position += sample.velocity;
     CHECK(sample.value == position);
   }
-  hand.place(1e9);  // where a difference of positions would be worth 7 digits less
-  hand.draw(0.001, 0.0);
-  CHECK(hand.next_position().velocity == 0.001);
-  hand.draw(0.0, 0.5);
+  driver.place(1e9);  // where a difference of positions would be worth 7 digits less
+  driver.draw(0.001, 0.0);
+  CHECK(driver.next_position().velocity == 0.001);
+  driver.draw(0.0, 0.5);
   for (int n = 0; n < 100; ++n) {
-    hand.next_position();
+    driver.next_position();
   }
-  CHECK_FALSE(hand.is_moving());
+  CHECK_FALSE(driver.is_moving());
 }
 
 TEST_CASE("forces add up: a push, strikes and what is held", "[gesture]") {
-  Hand hand;
-  hand.place(0.0);
-  hand.push(0.5, 3);
-  hand.strike(1.0);
-  hand.strike(0.25);
-  CHECK(hand.next_force().value == 1.75);
-  CHECK(hand.next_force().value == 0.5);
-  CHECK(hand.next_force().value == 0.5);
-  CHECK(hand.next_force().value == 0.0);
-  CHECK_FALSE(hand.is_moving());
+  InputDriver driver;
+  driver.place(0.0);
+  driver.push(0.5, 3);
+  driver.strike(1.0);
+  driver.strike(0.25);
+  CHECK(driver.next_force().value == 1.75);
+  CHECK(driver.next_force().value == 0.5);
+  CHECK(driver.next_force().value == 0.5);
+  CHECK(driver.next_force().value == 0.0);
+  CHECK_FALSE(driver.is_moving());
 }
 
 TEST_CASE("a position event moves the hand, smoothed as published", "[gesture]") {
   Player player(puppet, played({.target = "in1"}));
-  player.run(3000, {{.frame = 101, .kind = EventKind::position, .index = 1, .value = 1.0}});
+  player.run(3000, {{.frame = 101,
+                     .kind = EventKind::gesture,
+                     .gesture = Gesture::position,
+                     .index = 1,
+                     .value = 1.0}});
   for (std::size_t n = 0; n < 3000; ++n) {
     const double after = n < 101 ? 0.0 : static_cast<double>(n - 100);
     const double expected = 1.0 - 0.5 * std::pow(smoothing_pole, after);
@@ -107,14 +111,15 @@ TEST_CASE("a position event moves the hand, smoothed as published", "[gesture]")
   }
   // Another input's number, and a force on a position input, do nothing.
   Player deaf(puppet, played({.target = "in1"}));
-  deaf.run(1000, {{.kind = EventKind::position, .index = 2, .value = 1.0},
-                  {.kind = EventKind::force, .index = 1, .value = 1.0}});
+  deaf.run(1000,
+           {{.kind = EventKind::gesture, .gesture = Gesture::position, .index = 2, .value = 1.0},
+            {.kind = EventKind::gesture, .gesture = Gesture::force, .index = 1, .value = 1.0}});
   CHECK(std::all_of(deaf.out[0].begin(), deaf.out[0].end(), [](double x) { return x == 0.5; }));
 }
 
 TEST_CASE("a note holds the hand at the far end of its range until it is released", "[gesture]") {
-  Player player(
-      puppet, played({.target = "in1", .gesture = ControlGesture::hold, .low = 0.25, .high = 2.0}));
+  Player player(puppet,
+                played({.target = "in1", .gesture = Gesture::hold, .low = 0.25, .high = 2.0}));
   player.run(60000, {note_on(1000, 60), note_off(31000, 60)});
   CHECK(player.out[0][999] == 0.25);
   for (std::size_t n = 1000; n < 31000; ++n) {
@@ -125,11 +130,8 @@ TEST_CASE("a note holds the hand at the far end of its range until it is release
 }
 
 TEST_CASE("a pluck sweeps to the other side, the harder the faster", "[gesture]") {
-  const auto control = ControlSetting{.target = "in1",
-                                      .gesture = ControlGesture::pluck,
-                                      .low = 0.001,
-                                      .high = 0.003,
-                                      .travel = 0.25};
+  const auto control = ControlSetting{
+      .target = "in1", .gesture = Gesture::pluck, .low = 0.001, .high = 0.003, .travel = 0.25};
   Player player(puppet, played(control));
   player.run(3000, {note_on(100, 60, 0.5), note_on(1000, 60, 1.0)});
   CHECK(player.out[0][99] == 0.25);  // 0.5 is the middle
@@ -148,8 +150,8 @@ TEST_CASE("a pluck sweeps to the other side, the harder the faster", "[gesture]"
 }
 
 TEST_CASE("a bowed note draws until the key is released", "[gesture]") {
-  Player player(
-      puppet, played({.target = "in1", .gesture = ControlGesture::bow, .low = 0.0, .high = 1e-4}));
+  Player player(puppet,
+                played({.target = "in1", .gesture = Gesture::bow, .low = 0.0, .high = 1e-4}));
   player.run(20000, {note_on(0, 60, 0.5), note_off(10000, 60)});
   const double pole = std::exp(-1.0 / (0.005 * 44100.0));
   for (std::size_t n = 1; n < 10000; ++n) {
@@ -165,12 +167,12 @@ TEST_CASE("controllers, pressure and OSC names move what the preset says, by its
   Preset preset = played({.source = ControlSource::controller,
                           .number = 7,
                           .target = "k",
-                          .gesture = ControlGesture::parameter,
+                          .gesture = Gesture::parameter,
                           .low = 0.01,
                           .high = 0.05});
   preset.controls.push_back({.source = ControlSource::pressure,
                              .target = "k",
-                             .gesture = ControlGesture::parameter,
+                             .gesture = Gesture::parameter,
                              .low = 0.01,
                              .high = 0.04,
                              .exponential = true});
@@ -199,11 +201,14 @@ TEST_CASE("a force lasts as long as told, and means the same at every rate", "[g
   // A free mass: a force F over N samples leaves it with the speed F N, in units a sample.
   const std::string free_mass = "@m mass 2. 0. 0.\n@in1 frcInput @m\n@out1 posOutput @m\n";
   const auto at_one_second = [&](double rate_hz, double force, double seconds) {
-    Preset preset = played({.target = "in1", .gesture = ControlGesture::impulse});
+    Preset preset = played({.target = "in1", .gesture = Gesture::impulse});
     preset.gain = 1e-5;  // so that nobody takes it for a voice that is lost
     Player player(free_mass, preset, {.rate_hz = rate_hz});
-    player.run(static_cast<std::size_t>(rate_hz),
-               {{.kind = EventKind::force, .index = 1, .value = force, .value2 = seconds}});
+    player.run(static_cast<std::size_t>(rate_hz), {{.kind = EventKind::gesture,
+                                                    .gesture = Gesture::force,
+                                                    .index = 1,
+                                                    .value = force,
+                                                    .value2 = seconds}});
     return player.y().back() / preset.gain;
   };
   CHECK(at_one_second(44100.0, 0.5, 0.0) == Approx(0.25 * 44100).epsilon(1e-9));
@@ -216,18 +221,18 @@ TEST_CASE("a force lasts as long as told, and means the same at every rate", "[g
 
 TEST_CASE("a blow on a position is one sample beside it, with the velocity of both steps",
           "[gesture]") {
-  Hand hand;
-  hand.place(0.5);
-  hand.strike(0.25);
-  const HandSample away = hand.next_position();
-  const HandSample back = hand.next_position();
-  const HandSample rest = hand.next_position();
+  InputDriver driver;
+  driver.place(0.5);
+  driver.strike(0.25);
+  const InputSample away = driver.next_position();
+  const InputSample back = driver.next_position();
+  const InputSample rest = driver.next_position();
   CHECK(away.value == 0.75);
   CHECK(away.velocity == 0.25);
   CHECK(back.value == 0.5);
   CHECK(back.velocity == -0.25);
   CHECK(rest.velocity == 0.0);
-  CHECK_FALSE(hand.is_moving());
+  CHECK_FALSE(driver.is_moving());
 }
 
 TEST_CASE("audio moves the hand from where it is; in the bare network it is the hand",

@@ -66,7 +66,8 @@ std::vector<double> struck_once(const Scene& scene, double rate_hz, double secon
                                 bool rescale = true) {
   const Preset preset = default_preset(network_of(scene.text), true);
   Player player(scene.text, preset, {.rate_hz = rate_hz, .rescale = rescale, .bare = true});
-  const Event impulse{.kind = EventKind::force, .index = 1, .value = 1.0};
+  const Event impulse{
+      .kind = EventKind::gesture, .gesture = Gesture::force, .index = 1, .value = 1.0};
   player.run(static_cast<std::size_t>(std::llround(seconds * rate_hz)), {impulse});
   return player.y();
 }

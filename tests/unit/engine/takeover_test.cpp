@@ -28,7 +28,7 @@ Preset played() {
   preset.controls.push_back({.source = ControlSource::controller,
                              .number = 1,
                              .target = "in2",
-                             .gesture = ControlGesture::position,
+                             .gesture = Gesture::position,
                              .low = -0.3,
                              .high = 0.3});
   return preset;
@@ -167,12 +167,12 @@ TEST_CASE("A large mesh sounds at once, and by its modes when they are found", "
     }
   };
   play(50);  // it sounds already
-  for (int patience = 0; patience < 5000 && relieved.meters.swaps.get() < 2; ++patience) {
+  for (int patience = 0; patience < 5000 && relieved.meters().swaps < 2; ++patience) {
     play(20);
   }
   play(500);
   CHECK(session.current()->plan.parts[0].method == Method::modal);
-  CHECK(relieved.meters.swaps.get() == 2);
+  CHECK(relieved.meters().swaps == 2);
   CHECK(comparison.peak > 0.01);
   INFO(show(comparison.relative()));
   CHECK(comparison.relative() < 1e-11);

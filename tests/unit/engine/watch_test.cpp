@@ -19,7 +19,8 @@ Player struck_mass(double stiffness, double damping, double rate_hz) {
   Player player("@o osc 1. " + show(stiffness) + " " + show(damping) +
                     " 0. 0.\n@in1 frcInput @o\n@out1 posOutput @o\n",
                 preset, {.rate_hz = rate_hz, .method = Method::direct});
-  player.run(512, {{.kind = EventKind::force, .index = 1, .value = 0.1}});
+  player.run(512,
+             {{.kind = EventKind::gesture, .gesture = Gesture::force, .index = 1, .value = 0.1}});
   return player;
 }
 
@@ -61,7 +62,11 @@ TEST_CASE("While a hand moves nobody knows what is lost", "[watch]") {
   Player player = struck_mass(0.01, 0.0, 44100.0);
   player.run(16384);
   CHECK_FALSE(player.engine().meters().is_driven);
-  player.run(16384, {{.kind = EventKind::force, .index = 1, .value = 1e-4, .value2 = 10.0}});
+  player.run(16384, {{.kind = EventKind::gesture,
+                      .gesture = Gesture::force,
+                      .index = 1,
+                      .value = 1e-4,
+                      .value2 = 10.0}});
   CHECK(player.engine().meters().is_driven);
   CHECK(player.engine().meters().loss == 0.0);
 }
@@ -105,7 +110,8 @@ TEST_CASE("A large part's energy is added up in slices", "[watch]") {
   Preset preset = rig::struck(1);
   preset.keyboard = false;
   Player player(drum, preset, {.method = Method::grid});
-  player.run(12288, {{.kind = EventKind::force, .index = 1, .value = 0.1}});
+  player.run(12288,
+             {{.kind = EventKind::gesture, .gesture = Gesture::force, .index = 1, .value = 0.1}});
   const EngineMeters now = player.engine().meters();
   INFO(show(now.energy) << " of " << show(given) << " " << show(now.loss));
   CHECK(now.is_whole);
@@ -247,7 +253,8 @@ TEST_CASE("Who sleeps is taken over asleep, and wakes the same", "[watch]") {
   preset.keyboard = false;
   const auto blow = [](std::uint32_t frame, int input) {
     return Event{.frame = frame,
-                 .kind = EventKind::force,
+                 .kind = EventKind::gesture,
+                 .gesture = Gesture::force,
                  .index = static_cast<std::uint16_t>(input),
                  .value = 0.1};
   };

@@ -1,6 +1,6 @@
 // Large networks in shards: what comes out is what the whole would have given.
-#include "app/realtime/crew.h"
 #include "app/realtime/denormals.h"
+#include "app/realtime/thread_pool.h"
 #include "core/compile/shards.h"
 #include "core/kernels/chains/chains_form.h"
 #include "core/kernels/grid/grid_form.h"
@@ -123,7 +123,7 @@ void check_same(Program program, const Cut& cut, Crew& crew, Isa isa, bool turns
 }  // namespace
 
 TEST_CASE("in the direct form shards compute the same bits", "[halo]") {
-  ThreadCrew crew(3);
+  ThreadPool crew(3);
   const bool turns = GENERATE(false, true);
   const auto check = [&](const std::string& text, const auto& all_cuts) {
     const Program program = program_of(text);
@@ -137,7 +137,7 @@ TEST_CASE("in the direct form shards compute the same bits", "[halo]") {
 }
 
 TEST_CASE("points on macros and what has no order are divided too", "[halo]") {
-  ThreadCrew crew(3);
+  ThreadPool crew(3);
   const std::string macro =
       "@k param 0.2\n@p closedMesh 45 46 1. k 0.003 0. 0.\n@in1 frcInput [@p 0.49 0.3]\n"
       "@in2 posInput 0.\n@finger contact [@p 0.503 0.8] @in2 0. 0.01 0.\n"
@@ -174,7 +174,7 @@ TEST_CASE("points on macros and what has no order are divided too", "[halo]") {
 }
 
 TEST_CASE("chains and grids in shards are held to the direct form", "[halo]") {
-  ThreadCrew crew(3);
+  ThreadPool crew(3);
   DuelOptions options{.frames = 8820, .seed = 5, .reach = 0.05};
   const auto check = [&](const std::string& text, const std::string& forces, const auto& all_cuts,
                          auto&& reform) {
@@ -207,7 +207,7 @@ TEST_CASE("chains and grids in shards are held to the direct form", "[halo]") {
 }
 
 TEST_CASE("a grid with a law on every link goes on in shards", "[halo]") {
-  ThreadCrew crew(2);
+  ThreadPool crew(2);
   const Program program = program_of(
       "@k param 0.1\n@p closedMesh 45 45 1. k 0.003 0. 0.\n@in1 frcInput [@p 0.3 0.31]\n"
       "@out1 posOutput [@p 0.7 0.1]\n@out2 posOutput [@p 0.503 0.5]\n");
@@ -226,7 +226,7 @@ TEST_CASE("a grid with a law on every link goes on in shards", "[halo]") {
 
 // With K = M a wave on a string moves as fast as anything can, a link in a sample.
 TEST_CASE("a wave goes over the cut as if it were not there", "[halo]") {
-  ThreadCrew crew(2);
+  ThreadPool crew(2);
   const Program program =
       program_of(scenes::string("s", 600, "1", "0") +
                  "@in1 frcInput @s_m200\n@out1 posOutput @s_m300\n@out2 posOutput @s_m400\n");
@@ -260,7 +260,7 @@ TEST_CASE("a wave goes over the cut as if it were not there", "[halo]") {
 
 // 10 s of a string that nothing damps: 6900 exchanges.
 TEST_CASE("shards do not drift", "[halo]") {
-  ThreadCrew crew(2);
+  ThreadPool crew(2);
   Program program = program_of(scenes::string("s", 2000, "0.3", "0") +
                                "@in1 frcInput @s_m20\n@out1 posOutput @s_m1700\n");
   Program cut = sharded(program, {2, 64}, crew, as_chains);
@@ -283,7 +283,7 @@ TEST_CASE("shards do not drift", "[halo]") {
 }
 
 TEST_CASE("a network is shared out where that pays", "[halo]") {
-  ThreadCrew crew(2);
+  ThreadPool crew(2);
   const auto planned = [&](const std::string& text, Crew* helpers, std::optional<Method> method) {
     Machine machine = make_machine(network_of(text), 44100.0, true);
     const Plan plan = make_plan(machine, {.isa = Isa::v3, .crew = helpers}, method);
@@ -307,7 +307,7 @@ TEST_CASE("a network is shared out where that pays", "[halo]") {
 }
 
 TEST_CASE("kernels in shards are placed and saved as one", "[halo]") {
-  ThreadCrew crew(2);
+  ThreadPool crew(2);
   const Program program = program_of(chain_scene());
   const Program cut = sharded(program, {2, 16}, crew, as_chains);
   const auto kernel = make_kernel<double>(cut, 1, best_isa());

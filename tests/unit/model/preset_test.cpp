@@ -1,7 +1,7 @@
 // Presets: what is read from one, every complaint with its place, and the preset of no preset.
 #include "core/model/preset/preset.h"
 
-#include "app/control/calls.h"
+#include "app/control/registry.h"
 #include "core/model/preset/fit.h"
 #include "tests/support/rig.h"
 
@@ -18,7 +18,7 @@ struct Complaint {
 };
 
 void check_error(const Complaint& complaint) {
-  const auto preset = parse_preset(complaint.text);
+  const auto preset = parse_preset(complaint.text, is_reserved);
   INFO(complaint.text);
   REQUIRE(preset.errors.size() == 1);
   const Error& error = preset.errors[0];
@@ -34,7 +34,7 @@ std::string control(const std::string& keys) {
 }
 
 ControlSetting control_of(const std::string& keys) {
-  const auto preset = parse_preset(control(keys));
+  const auto preset = parse_preset(control(keys), is_reserved);
   INFO(keys << (preset.ok() ? "" : ": " + preset.errors[0].message));
   REQUIRE(preset.ok());
   REQUIRE(preset.preset.controls.size() == 1);
@@ -82,7 +82,7 @@ TEST_CASE("a preset is what was written, and the rest its defaults", "[preset]")
   CHECK(read->parameters[1] == ParameterSetting{"m_Z", 1e-4, 0.00001, 0.01});
   REQUIRE(read->controls.size() == 2);
   CHECK(read->controls[0] == ControlSetting{.target = "in1",
-                                            .gesture = ControlGesture::impulse,
+                                            .gesture = Gesture::impulse,
                                             .low = 0.01,
                                             .high = 0.1,
                                             .lowest_key = 36,
@@ -90,7 +90,7 @@ TEST_CASE("a preset is what was written, and the rest its defaults", "[preset]")
   CHECK(read->controls[1] == ControlSetting{.source = ControlSource::controller,
                                             .number = 1,
                                             .target = "m_K",
-                                            .gesture = ControlGesture::parameter,
+                                            .gesture = Gesture::parameter,
                                             .low = 0.01,
                                             .high = 0.3,
                                             .exponential = true});
@@ -115,21 +115,21 @@ TEST_CASE("every source and every gesture has its word", "[preset]") {
   const auto how = [](const std::string& word) {
     return control_of("from = \"note\"\nto = \"in1\"\ntravel = 1\nhow = \"" + word + "\"").gesture;
   };
-  CHECK(how("position") == ControlGesture::position);
-  CHECK(how("pluck") == ControlGesture::pluck);
-  CHECK(how("bow") == ControlGesture::bow);
-  CHECK(how("impulse") == ControlGesture::impulse);
-  CHECK(how("hold") == ControlGesture::hold);
-  CHECK(how("parameter") == ControlGesture::parameter);
+  CHECK(how("position") == Gesture::position);
+  CHECK(how("pluck") == Gesture::pluck);
+  CHECK(how("bow") == Gesture::bow);
+  CHECK(how("impulse") == Gesture::impulse);
+  CHECK(how("hold") == Gesture::hold);
+  CHECK(how("parameter") == Gesture::parameter);
   // Without a word the target tells.
-  CHECK(from("note").gesture == ControlGesture::position);
-  CHECK(control_of("from = \"cc1\"\nto = \"m_K\"").gesture == ControlGesture::parameter);
-  CHECK(control_of("from = \"cc1\"\nto = \"inner\"").gesture == ControlGesture::parameter);
+  CHECK(from("note").gesture == Gesture::position);
+  CHECK(control_of("from = \"cc1\"\nto = \"m_K\"").gesture == Gesture::parameter);
+  CHECK(control_of("from = \"cc1\"\nto = \"inner\"").gesture == Gesture::parameter);
 }
 
 TEST_CASE("no control has an address that the program takes for itself", "[preset]") {
-  for (const AddressRow& row : addresses()) {
-    std::string address(row.address);
+  for (const Row* const row : addresses()) {
+    std::string address = row->address;
     if (const std::size_t at = address.find("NAME"); at != std::string::npos) {
       address.replace(at, 4, "x");
     }
@@ -372,23 +372,23 @@ TEST_CASE("without a preset a model is played by what its links ask for", "[pres
   CHECK(struck.keyboard);
   CHECK(struck.gain == 1.0);
   REQUIRE(struck.controls.size() == 1);
-  CHECK(struck.controls[0].gesture == ControlGesture::impulse);
+  CHECK(struck.controls[0].gesture == Gesture::impulse);
   CHECK(struck.controls[0].target == "in1");
 
   const Preset plucked = default_preset(network_of(scenes::iplay_the_triangle()), false);
   REQUIRE(plucked.controls.size() == 2);  // keys, and the wheel for the hand
   CHECK(plucked.controls[0].source == ControlSource::note);
-  CHECK(plucked.controls[0].gesture == ControlGesture::pluck);
+  CHECK(plucked.controls[0].gesture == Gesture::pluck);
   CHECK(plucked.controls[0].travel == Approx(0.05).epsilon(1e-12));  // clear of the pluck's 0.01
   CHECK(plucked.controls[1].source == ControlSource::controller);
   CHECK(plucked.controls[1].number == 1);
 
   CHECK(default_preset(network_of("@p param 0\n" + scenes::bowed_string("p")), false)
             .controls[0]
-            .gesture == ControlGesture::bow);
+            .gesture == Gesture::bow);
   const Preset bowed = default_preset(network_of(scenes::bowed_string()), false);
   REQUIRE(bowed.controls.size() == 1);
-  CHECK(bowed.controls[0].gesture == ControlGesture::bow);
+  CHECK(bowed.controls[0].gesture == Gesture::bow);
   // A bow only sings between a third and all of its scale.
   CHECK(bowed.controls[0].low > 5e-5 / 3);
   CHECK(bowed.controls[0].high < 5e-5);

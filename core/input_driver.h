@@ -1,5 +1,5 @@
-// core/engine: what moves an input. One hand per input and voice turns targets, strokes and
-// impulses into a position or a force for every sample.
+// core: what drives an input of a voice: turns targets, sweeps, strikes and pushes into a position
+// or a force for every sample. Its callers are the gestures of gesture.h.
 #pragma once
 
 #include <cmath>
@@ -9,17 +9,17 @@
 namespace ressort {
 
 // A position: value and its change per sample. A force: value only.
-struct HandSample {
+struct InputSample {
   double value = 0.0;
   double velocity = 0.0;
 };
 
 // Every method is wait-free. [audio]
-class Hand {
+class InputDriver {
  public:
   // At rest at `position`; for a force, exerting none.
   void place(double position) {
-    *this = Hand{};
+    *this = InputDriver{};
     value_ = target_ = position;
   }
 
@@ -59,11 +59,11 @@ class Hand {
   double value() const { return value_; }
   double target() const { return target_; }
 
-  HandSample next_position() {
+  InputSample next_position() {
     const double before = bump_;
     bump_ = pulse_;
     pulse_ = 0.0;
-    HandSample sample = move();
+    InputSample sample = move();
     sample.value += bump_;
     sample.velocity += bump_ - before;
     return sample;
@@ -77,7 +77,7 @@ class Hand {
         n = fill_approach(n, frames, step, value, velocity);
       }
       if (n < frames) {
-        const HandSample sample = next_position();
+        const InputSample sample = next_position();
         value[n * step] = static_cast<T>(sample.value);
         velocity[n * step] = static_cast<T>(sample.velocity);
         ++n;
@@ -85,7 +85,7 @@ class Hand {
     }
   }
 
-  HandSample next_force() {
+  InputSample next_force() {
     if (motion_ == Motion::follow) {
       approach();
     }
@@ -101,7 +101,7 @@ class Hand {
  private:
   enum class Motion : std::uint8_t { rest, follow, sweep, draw };
 
-  HandSample move() {
+  InputSample move() {
     const double before = value_;
     switch (motion_) {
       case Motion::rest:

@@ -1,4 +1,4 @@
-#include "app/control/time_tags.h"
+#include "app/control/osc/time_tags.h"
 
 #include <cmath>
 #include <cstdlib>

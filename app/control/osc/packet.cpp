@@ -1,4 +1,4 @@
-#include "app/control/osc_packet.h"
+#include "app/control/osc/packet.h"
 
 #include <algorithm>
 #include <cstring>

@@ -1,5 +1,7 @@
 // Addresses, scores and patterns: what people ask for, and what they are told when it cannot be.
-#include "app/control/calls.h"
+#include "app/control/registry.h"
+
+#include <set>
 
 #include "tests/support/player.h"
 
@@ -13,18 +15,17 @@ const Instrument& instrument() {
   static const Instrument made = [] {
     Preset preset;
     preset.parameters = {{"s_K", 0.1, 0.05, 0.2}, {"s_Z", 0.001, 0.0, 0.01}};
-    preset.controls = {
-        {.target = "in1", .gesture = ControlGesture::pluck, .low = 0.1, .travel = 1.0},
-        {.target = "in2", .gesture = ControlGesture::bow},
-        {.source = ControlSource::osc, .address = "/finger", .target = "in1"},
-        {.source = ControlSource::osc,
-         .address = "/brightness",
-         .target = "s_K",
-         .gesture = ControlGesture::parameter,
-         .low = 0.05,
-         .high = 0.2},
-        {.source = ControlSource::osc, .address = "/both", .target = "in1"},
-        {.source = ControlSource::osc, .address = "/both", .target = "in2"}};
+    preset.controls = {{.target = "in1", .gesture = Gesture::pluck, .low = 0.1, .travel = 1.0},
+                       {.target = "in2", .gesture = Gesture::bow},
+                       {.source = ControlSource::osc, .address = "/finger", .target = "in1"},
+                       {.source = ControlSource::osc,
+                        .address = "/brightness",
+                        .target = "s_K",
+                        .gesture = Gesture::parameter,
+                        .low = 0.05,
+                        .high = 0.2},
+                       {.source = ControlSource::osc, .address = "/both", .target = "in1"},
+                       {.source = ControlSource::osc, .address = "/both", .target = "in2"}};
     auto compiled = compile(network_of(scenes::string("s", 5, "0.1", "0.001") +
                                        "@in1 posInput 0.\n@in2 posInput 0.\n@in3 frcInput @s_m0\n"
                                        "@p nlPluck @in1 @s_m1 .1 .1\n@b nlBow @in2 @s_m2 .1 .1\n" +
@@ -37,9 +38,9 @@ const Instrument& instrument() {
 }
 
 // A call as it is typed.
-Call call(const std::string& text) {
+Message call(const std::string& text) {
   const auto words = split_words(text);
-  Call made{words.at(0), {}};
+  Message made{words.at(0), {}};
   for (std::size_t i = 1; i < words.size(); ++i) {
     made.arguments.push_back(to_argument(words[i]));
   }
@@ -48,13 +49,20 @@ Call call(const std::string& text) {
 
 Event event(const std::string& text) {
   INFO(text);
-  CHECK(plays(call(text), instrument()));
   const auto events = to_events(call(text), instrument(), 9);
   INFO((events ? "" : events.error().message));
   REQUIRE(events);
   REQUIRE(events->size() == 1);
   CHECK((*events)[0].frame == 0);
   return (*events)[0];
+}
+
+void check(const Event& event, Gesture gesture, int index, double value, std::uint32_t model) {
+  CHECK(event.kind == EventKind::gesture);
+  CHECK(event.gesture == gesture);
+  CHECK(event.index == index);
+  CHECK(event.value == Approx(value).margin(1e-15));
+  CHECK(event.model == model);
 }
 
 void check(const Event& event, EventKind kind, int index, double value, std::uint32_t model) {
@@ -73,7 +81,7 @@ void check_error(const std::string& text, const std::string& message) {
 
 }  // namespace
 
-TEST_CASE("every playing address becomes its event", "[calls]") {
+TEST_CASE("every playing address becomes its event", "[registry]") {
   check(event("/note/on 60"), EventKind::note_on, 60, 100 / 127.0, 0);
   check(event("/note/on 60 127"), EventKind::note_on, 60, 1.0, 0);
   check(event("/note/on 60 0"), EventKind::note_off, 60, 0.0, 0);
@@ -85,12 +93,12 @@ TEST_CASE("every playing address becomes its event", "[calls]") {
   CHECK(event("/panic").kind == EventKind::panic);
   // What names a part of the model is for this model only.
   check(event("/param/s_K 0.15"), EventKind::parameter, 1, 0.15, 9);
-  check(event("/in/1/position -7.5"), EventKind::position, 1, -7.5, 9);
-  check(event("/in/3/force 0.1"), EventKind::force, 3, 0.1, 9);
+  check(event("/in/1/position -7.5"), Gesture::position, 1, -7.5, 9);
+  check(event("/in/3/force 0.1"), Gesture::force, 3, 0.1, 9);
   CHECK(event("/in/3/force 0.1").value2 == 0.0);
   CHECK(event("/in/3/force 0.1 2").value2 == 2.0);
-  check(event("/in/1/pluck 0.5"), EventKind::pluck, 1, 0.5, 9);
-  check(event("/in/2/bow -1"), EventKind::bow, 2, -1.0, 9);
+  check(event("/in/1/pluck 0.5"), Gesture::pluck, 1, 0.5, 9);
+  check(event("/in/2/bow -1"), Gesture::bow, 2, -1.0, 9);
   CHECK(event("/in/2/bow 1").value2 < 0.0);  // the pressure stays as it is
   CHECK(event("/in/2/bow 1 0.25").value2 == 0.25);
   check(event("/finger 0.5"), EventKind::custom, 2, 0.5, 9);
@@ -102,7 +110,7 @@ TEST_CASE("every playing address becomes its event", "[calls]") {
   check(event("/brightness 1"), EventKind::custom, 3, 1.0, 9);
 }
 
-TEST_CASE("what an input gives cannot be set", "[calls]") {
+TEST_CASE("what an input gives cannot be set", "[registry]") {
   const auto compiled =
       compile(network_of("@K audioParam @in2\n@Z param 0.1\n@o osc 1 K Z 0 0\n"), {}, {});
   REQUIRE(compiled);
@@ -116,7 +124,7 @@ TEST_CASE("what an input gives cannot be set", "[calls]") {
   CHECK((*all)[0].index == 1);
 }
 
-TEST_CASE("a parameter keeps to its range, and a pattern reaches several", "[calls]") {
+TEST_CASE("a parameter keeps to its range, and a pattern reaches several", "[registry]") {
   CHECK(event("/param/s_K 5").value == 0.2);
   CHECK(event("/param/s_K -5").value == 0.05);
   const auto events = to_events(call("/param/s_[KZ] 0.06"), instrument(), 9);
@@ -124,13 +132,13 @@ TEST_CASE("a parameter keeps to its range, and a pattern reaches several", "[cal
   REQUIRE(events->size() == 2);
   CHECK((*events)[0].value == 0.06);
   CHECK((*events)[1].value == 0.01);
-  // Without a value it asks, and asking plays nothing.
-  CHECK_FALSE(plays(call("/param/s_K"), instrument()));
-  CHECK_FALSE(plays(call("/status"), instrument()));
-  CHECK_FALSE(plays(call("/model/load x"), instrument()));
+  // What only asks plays nothing.
+  check_error("/param/s_K", "/param/s_K: the value is missing");
+  check_error("/status", "unknown address '/status'; /describe lists what there is");
+  check_error("/model/load x", "unknown address '/model/load'; /describe lists what there is");
 }
 
-TEST_CASE("what cannot be played is told, and what was expected", "[calls]") {
+TEST_CASE("what cannot be played is told, and what was expected", "[registry]") {
   check_error("/nowhere 1", "unknown address '/nowhere'; /describe lists what there is");
   check_error("/note/on", "/note/on: the key is missing");
   check_error("/note/on 128", "/note/on: the key must lie between 0 and 127, found 128");
@@ -158,29 +166,73 @@ TEST_CASE("what cannot be played is told, and what was expected", "[calls]") {
   check_error("/in/3/force 1 -1",
               "/in/3/force: the time in seconds must lie between 0 and 3600, found -1");
   check_error("/finger 2", "/finger: the value must lie between 0 and 1, found 2");
-  const Call infinite{"/in/1/position", {std::numeric_limits<double>::infinity()}};
+  const Message infinite{"/in/1/position", {std::numeric_limits<double>::infinity()}};
   REQUIRE_FALSE(to_events(infinite, instrument(), 9));
   CHECK(to_events(infinite, instrument(), 9).error().message ==
         "/in/1/position: the position must be a number");
   REQUIRE_FALSE(to_events(call("/in/1/position 0"), Instrument{}, 1));
 }
 
-TEST_CASE("the table has every address that plays", "[calls]") {
-  for (const AddressRow& row : addresses()) {
-    std::string address(row.address);
-    for (const auto& [letters, name] : {std::pair<std::string, std::string>{"NAME", "s_K"},
-                                        std::pair<std::string, std::string>{"/N/", "/1/"}}) {
+TEST_CASE("every row is found by its address and can be said somewhere", "[registry]") {
+  std::set<std::string> seen;
+  for (const Row& row : rows()) {
+    CAPTURE(row.address, row.command);
+    CHECK(seen.insert(row.address.empty() ? std::string(row.command) : row.address).second);
+    CHECK((row.play != nullptr || row.answer != nullptr || row.act != nullptr));
+    CHECK(row.address.empty() == row.does.empty());
+    CHECK((row.command.empty() || !row.command_does.empty()));
+    CHECK((row.command.empty() || row.act != nullptr || row.play != nullptr));
+    if (row.address.empty()) {
+      continue;
+    }
+    std::string address = row.address;
+    std::string name;
+    for (const auto& [letters, typed] : {std::pair<std::string, std::string>{"/NAME", "/s_K"},
+                                         std::pair<std::string, std::string>{"/N/", "/1/"}}) {
       if (const auto at = address.find(letters); at != std::string::npos) {
-        address.replace(at, letters.size(), name);
+        address.replace(at, letters.size(), typed);
+        name = letters == "/N/" ? "1" : "s_K";
       }
     }
-    CAPTURE(address);
-    CHECK(plays({address, {1.0}}, instrument()) == row.plays);
-    CHECK_FALSE(row.does.empty());
+    CHECK(find_row(address).row == &row);
+    CHECK(find_row(address).name == name);
+    CHECK(is_reserved(address));
+    // What it says of its arguments is what it takes.
+    Message least{address, {}};
+    for (const CallArgument& argument : row.arguments) {
+      if (!argument.word.empty() && !argument.is_text) {
+        least.arguments.emplace_back(std::isfinite(argument.least) ? argument.least : 0.0);
+      }
+    }
+    const Events events = to_events(least, instrument(), 9);
+    const std::string why = events ? "" : events.error().message;
+    CAPTURE(why);
+    CHECK((row.play != nullptr || why.starts_with("unknown address")));
+    CHECK((row.play == nullptr || events || why.find(": input 1 ") != why.npos));
+    least.arguments.resize(3, 0.0);
+    CHECK_FALSE(to_events(least, instrument(), 9));
+  }
+  CHECK(find_row("/nowhere").row == nullptr);
+  CHECK(is_reserved("/done"));
+  CHECK_FALSE(is_reserved("/finger"));
+}
+
+TEST_CASE("every gesture that can be said has an address, and a preset's word is its name",
+          "[registry]") {
+  for (const GestureRow& gesture : gestures) {
+    const Row* const row = find_row("/in/1/" + std::string(gesture.name)).row;
+    REQUIRE((row != nullptr) == (gesture.live != Live::never));
+    CHECK((gesture.goal != nullptr || gesture.play != nullptr ||
+           gesture.gesture == Gesture::parameter));
+    CHECK((gesture.live != Live::never || !gesture.does.empty()));
+    if (row != nullptr) {
+      CHECK(row->gesture == gesture.gesture);
+      CHECK(row->command.empty() == gesture.command.empty());
+    }
   }
 }
 
-TEST_CASE("words are divided by blanks, and quotes hold them together", "[calls]") {
+TEST_CASE("words are divided by blanks, and quotes hold them together", "[registry]") {
   using Words = std::vector<std::string>;
   CHECK(split_words("") == Words{});
   CHECK(split_words(" \t ") == Words{});
@@ -192,7 +244,7 @@ TEST_CASE("words are divided by blanks, and quotes hold them together", "[calls]
   CHECK(to_argument("nan") == Argument{std::string("nan")});
 }
 
-TEST_CASE("a score is times and addresses", "[calls]") {
+TEST_CASE("a score is times and addresses", "[registry]") {
   const auto score = parse_score(
       "# a score\n"
       "0 /note/on 60 100\n"
@@ -205,13 +257,13 @@ TEST_CASE("a score is times and addresses", "[calls]") {
   CHECK((*score)[0].column == 3);
   CHECK((*score)[1].column == 8);
   CHECK((*score)[0].time_s == 0.0);
-  CHECK((*score)[0].call.address == "/note/on");
-  CHECK((*score)[0].call.arguments == std::vector<Argument>{60.0, 100.0});
+  CHECK((*score)[0].message.address == "/note/on");
+  CHECK((*score)[0].message.arguments == std::vector<Argument>{60.0, 100.0});
   CHECK((*score)[1].line == 4);
   CHECK((*score)[1].time_s == 0.25);
-  CHECK((*score)[1].call.arguments == std::vector<Argument>{0.12});
+  CHECK((*score)[1].message.arguments == std::vector<Argument>{0.12});
   CHECK((*score)[2].time_s == 10.0);
-  CHECK((*score)[2].call.arguments == std::vector<Argument>{std::string("my model")});
+  CHECK((*score)[2].message.arguments == std::vector<Argument>{std::string("my model")});
   CHECK(parse_score("")->empty());
 
   const auto wrong = [](const std::string& text, int line, int column, const std::string& message) {
@@ -231,7 +283,7 @@ TEST_CASE("a score is times and addresses", "[calls]") {
   wrong("\t soon", 1, 3, "found 'soon' where a time in seconds was expected, at most a day");
 }
 
-TEST_CASE("patterns fit as OSC says", "[calls]") {
+TEST_CASE("patterns fit as OSC says", "[registry]") {
   CHECK(fits("/a/b", "/a/b"));
   CHECK_FALSE(fits("/a/b", "/a/bc"));
   CHECK_FALSE(fits("/a/bc", "/a/b"));
@@ -258,7 +310,7 @@ TEST_CASE("patterns fit as OSC says", "[calls]") {
   CHECK(fits("**", "abc"));
 }
 
-TEST_CASE("no pattern takes long or leaves its text", "[calls]") {
+TEST_CASE("no pattern takes long or leaves its text", "[registry]") {
   // The test's time limit is what an exponential search would break.
   const std::string name(5000, 'a');
   std::string stars;

@@ -1,4 +1,4 @@
-#include "app/control/osc_senders.h"
+#include "app/control/osc/senders.h"
 
 #include <algorithm>
 #include <charconv>

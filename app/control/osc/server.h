@@ -6,7 +6,7 @@
 #include <memory>
 #include <string>
 
-#include "app/control/osc_socket.h"
+#include "app/control/osc/socket.h"
 #include "app/session/session.h"
 
 namespace ressort {

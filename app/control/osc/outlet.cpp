@@ -1,4 +1,4 @@
-#include "app/control/osc_outlet.h"
+#include "app/control/osc/outlet.h"
 
 #include <netinet/in.h>
 #include <sys/socket.h>

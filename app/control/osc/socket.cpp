@@ -1,4 +1,4 @@
-#include "app/control/osc_socket.h"
+#include "app/control/osc/socket.h"
 
 #include <arpa/inet.h>
 #include <netinet/in.h>

@@ -1,4 +1,4 @@
-#include "app/realtime/crew.h"
+#include "app/realtime/thread_pool.h"
 
 #include <algorithm>
 
@@ -6,18 +6,18 @@
 
 namespace ressort {
 
-ThreadCrew::ThreadCrew(std::size_t count) : start_(count), finish_(count) {
+ThreadPool::ThreadPool(std::size_t count) : start_(count), finish_(count) {
   for (std::size_t i = 1; i < count; ++i) {
     threads_.emplace_back([this, i] { serve(i); });
   }
 }
 
-ThreadCrew::~ThreadCrew() {
+ThreadPool::~ThreadPool() {
   work_ = nullptr;
   start_.wait();
 }
 
-void ThreadCrew::run(std::size_t count, const std::function<void(std::size_t)>& work) {
+void ThreadPool::run(std::size_t count, const std::function<void(std::size_t)>& work) {
   work_ = &work;
   count_ = count;
   start_.wait();
@@ -25,7 +25,7 @@ void ThreadCrew::run(std::size_t count, const std::function<void(std::size_t)>& 
   finish_.wait();
 }
 
-void ThreadCrew::serve(std::size_t i) {
+void ThreadPool::serve(std::size_t i) {
   const DenormalsFlushed flushed;
   for (start_.wait(); work_ != nullptr; start_.wait()) {
     if (i < count_) {

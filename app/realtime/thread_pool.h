@@ -9,11 +9,11 @@
 
 namespace ressort {
 
-class ThreadCrew final : public Crew {
+class ThreadPool final : public Crew {
  public:
   // With the thread that calls run(), so many; at least 1.
-  explicit ThreadCrew(std::size_t count);
-  ~ThreadCrew() override;
+  explicit ThreadPool(std::size_t count);
+  ~ThreadPool() override;
   std::size_t size() const override { return threads_.size() + 1; }
   void run(std::size_t count, const std::function<void(std::size_t)>& work) override;  // [control]
 
@@ -22,7 +22,7 @@ class ThreadCrew final : public Crew {
 
   Barrier start_;
   Barrier finish_;
-  const std::function<void(std::size_t)>* work_ = nullptr;  // null: the crew goes home
+  const std::function<void(std::size_t)>* work_ = nullptr;  // null: the threads end
   std::size_t count_ = 0;
   std::vector<std::jthread> threads_;
 };

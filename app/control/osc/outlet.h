@@ -11,7 +11,7 @@
 #include <utility>
 #include <vector>
 
-#include "app/control/osc_senders.h"
+#include "app/control/osc/senders.h"
 #include "app/realtime/rate_limit.h"
 
 namespace ressort {

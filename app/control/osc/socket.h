@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "app/control/osc_senders.h"
+#include "app/control/osc/senders.h"
 #include "core/result.h"
 
 namespace ressort {

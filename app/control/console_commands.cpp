@@ -1,4 +1,4 @@
-#include "app/control/desk.h"
+#include "app/control/console_commands.h"
 
 #include <algorithm>
 #include <array>
@@ -7,8 +7,9 @@
 #include <cstdio>
 #include <cstdlib>
 #include <filesystem>
+#include <map>
 
-#include "app/control/calls.h"
+#include "app/control/status.h"
 #include "app/session/files.h"
 #include "app/text.h"
 #include "core/model/language/expression.h"
@@ -18,8 +19,8 @@ namespace ressort {
 
 namespace fs = std::filesystem;
 
-std::shared_ptr<const Loaded> loaded(const Desk& desk) {
-  auto current = desk.session.current();
+std::shared_ptr<const Loaded> loaded(const ConsoleContext& console) {
+  auto current = console.session.current();
   return current->serial != 0 ? current : nullptr;
 }
 
@@ -31,15 +32,16 @@ const Error nothing_loaded{
     "no model is loaded yet; 'models' lists what there is, 'load NAME' "
     "loads one"};
 
-// Sends a playing call to the audio thread; all of its events act together.
-Result<std::vector<Event>> play(Desk& desk, const Call& call) {
-  if (!loaded(desk)) {
+// Sends a playing message to the audio thread; all of its events act together.
+Result<std::vector<Event>> play(ConsoleContext& console, const Message& message) {
+  if (!loaded(console)) {
     return nothing_loaded;
   }
-  auto events = desk.session.events(call);
+  const auto current = console.session.current();
+  auto events = to_events(message, current->instrument, current->serial);
   if (!events) {
     Error error = events.error();
-    if (const std::string address = call.address + ": "; error.message.starts_with(address)) {
+    if (const std::string address = message.address + ": "; error.message.starts_with(address)) {
       error.message.erase(0, address.size());
     }
     return error;
@@ -48,28 +50,17 @@ Result<std::vector<Event>> play(Desk& desk, const Call& call) {
   for (const Event& event : *events) {
     timed.push_back({.event = event});
   }
-  if (!desk.process.send(desk.process.from_console, timed)) {
+  if (!console.process.send(console.process.from_console, timed)) {
     return Error{"the audio thread is busy and took nothing; try again"};
   }
-  desk.session.remember(timed);
+  console.session.remember(timed);
   return events;
 }
 
-Result<Done> play_words(Desk& desk, std::string address, Words words) {
-  Call call{std::move(address), {}};
-  for (const std::string& word : words) {
-    call.arguments.push_back(to_argument(word));
-  }
-  if (auto played = play(desk, call); !played) {
-    return played.error();
-  }
-  return Done{};
-}
-
 // The number of the input that a gesture goes to: as typed, or the first that knows it.
-Result<std::string> input_for(const Desk& desk, bool InputInfo::*knows, const std::string& gesture,
+Result<std::string> input_for(const ConsoleContext& console, const GestureRow& gesture,
                               const std::string* word) {
-  const auto current = loaded(desk);
+  const auto current = loaded(console);
   if (!current) {
     return nothing_loaded;
   }
@@ -81,46 +72,48 @@ Result<std::string> input_for(const Desk& desk, bool InputInfo::*knows, const st
     return print_number(number);
   }
   for (const InputInfo& input : current->instrument.inputs) {
-    if (input.*knows) {
+    if (input.knows(gesture.gesture)) {
       return std::to_string(input.number);
     }
   }
-  return Error{current->name + " has no input with a " + gesture +
+  return Error{current->name + " has no input with a " + std::string(gesture.name) +
                "; 'explain' tells what it has, 'noteon 60' plays it"};
+}
+
+// A command that only plays: its words are the arguments of its address, and INPUT.
+Result<Done> play_words(ConsoleContext& console, const Row& row, Words words) {
+  std::map<std::string, const std::string*> typed;  // by what the help calls them
+  const std::vector<std::string> names = split_words(row.words);
+  for (std::size_t i = 0; i < std::min(words.size(), names.size()); ++i) {
+    typed[names[i].front() == '[' ? names[i].substr(1, names[i].size() - 2) : names[i]] = &words[i];
+  }
+  Message message{row.address, {}};
+  if (const std::size_t at = message.address.find("/N/"); at != message.address.npos) {
+    const auto input = input_for(console, row_of(row.gesture), typed["INPUT"]);
+    if (!input) {
+      return input.error();
+    }
+    message.address.replace(at + 1, 1, *input);
+  }
+  for (const CallArgument& argument : row.arguments) {
+    if (const std::string* const word = typed[std::string(argument.word)]) {
+      message.arguments.push_back(to_argument(*word));
+    } else if (argument.console_value) {
+      message.arguments.emplace_back(*argument.console_value);
+    } else {
+      break;
+    }
+  }
+  if (auto played = play(console, message); !played) {
+    return played.error();
+  }
+  return Done{};
 }
 
 }  // namespace
 
-Result<Done> act::note_on(Desk& desk, Words words) {
-  return play_words(desk, "/note/on", words);
-}
-
-Result<Done> act::note_off(Desk& desk, Words words) {
-  return play_words(desk, "/note/off", words);
-}
-
-Result<Done> act::panic(Desk& desk, Words words) {
-  return play_words(desk, "/panic", words);
-}
-
-Result<Done> act::pluck(Desk& desk, Words words) {
-  const auto input =
-      input_for(desk, &InputInfo::can_pluck, "pluck", words.empty() ? nullptr : &words[0]);
-  if (!input) {
-    return input.error();
-  }
-  const std::string strength = words.size() > 1 ? words[1] : "0.8";
-  return play_words(desk, "/in/" + *input + "/pluck", {&strength, 1});
-}
-
-Result<Done> act::bow(Desk& desk, Words words) {
-  const auto input =
-      input_for(desk, &InputInfo::can_bow, "bow", words.size() > 2 ? &words[2] : nullptr);
-  if (!input) {
-    return input.error();
-  }
-  return play_words(desk, "/in/" + *input + "/bow",
-                    words.first(std::min<std::size_t>(2, words.size())));
+Result<Done> act(ConsoleContext& console, const Row& row, Words words) {
+  return row.act != nullptr ? row.act(console, words) : play_words(console, row, words);
 }
 
 namespace {
@@ -136,19 +129,19 @@ constexpr std::string_view piano_picture =
 
 }  // namespace
 
-Result<Done> act::keys(Desk& desk, Words) {
-  if (!desk.keyboard) {
+Result<Done> command::keys(ConsoleContext& console, Words) {
+  if (!console.keyboard) {
     return Error{"'keys' needs a terminal to play from; 'noteon 60' plays without one"};
   }
-  if (!loaded(desk)) {
+  if (!loaded(console)) {
     return nothing_loaded;
   }
-  desk.print(std::string(piano_picture));
+  console.print(std::string(piano_picture));
   int octave = 4;
   double sounding = -1.0;  // a key; none below 0
   std::optional<Error> failure;
   const auto send = [&](const char* address, double key) {
-    if (auto played = play(desk, {address, {key}}); !played) {
+    if (auto played = play(console, {address, {key}}); !played) {
       failure = played.error();
     }
   };
@@ -158,7 +151,7 @@ Result<Done> act::keys(Desk& desk, Words) {
     }
     sounding = -1.0;
   };
-  desk.keyboard([&](char typed) {
+  console.keyboard([&](char typed) {
     constexpr char control_c = 3;
     constexpr char control_d = 4;
     constexpr char escape = 27;
@@ -169,7 +162,7 @@ Result<Done> act::keys(Desk& desk, Words) {
     }
     if (key == 'z' || key == 'x') {
       octave = std::clamp(octave + (key == 'x' ? 1 : -1), -1, 8);
-      desk.print("a plays key " + std::to_string(12 * (octave + 1)));
+      console.print("a plays key " + std::to_string(12 * (octave + 1)));
     } else if (const auto semitone = piano.find(key); key != 0 && semitone != piano.npos) {
       sounding = 12.0 * (octave + 1) + static_cast<double>(semitone);
       send("/note/on", sounding);
@@ -185,8 +178,8 @@ Result<Done> act::keys(Desk& desk, Words) {
 
 // --- models -------------------------------------------------------------------------------------
 
-Result<Done> act::load(Desk& desk, Words words) {
-  const auto result = desk.session.load_and_wait(words[0], words.size() > 1);
+Result<Done> command::load(ConsoleContext& console, Words words) {
+  const auto result = console.session.load_and_wait(words[0], words.size() > 1);
   if (!result) {
     return Error{"'" + words[0] + "' was not loaded\n" + result.error().message};
   }
@@ -199,7 +192,7 @@ Result<Done> act::load(Desk& desk, Words words) {
   for (const std::string& warning : now.warnings) {
     text += "\n" + warning;
   }
-  desk.print(text);
+  console.print(text);
   return Done{};
 }
 
@@ -217,36 +210,37 @@ std::string description_of(const std::string& preset_name) {
 
 }  // namespace
 
-Result<Done> act::models(Desk& desk, Words) {
+Result<Done> command::models(ConsoleContext& console, Words) {
   std::vector<std::vector<std::string>> rows;
   for (const std::string& name : known_presets()) {
     rows.push_back({name, description_of(name)});
   }
   const std::string bare = joined(known_models(), ", ");
-  desk.print(rows.empty() && bare.empty()
-                 ? "nothing in '" + models_folder() + "'; 'load FILE.mdl' loads a file of yours"
-                 : "Presets\n" + table(rows, 2) + "\nModels as they are written\n  " + bare);
+  console.print(rows.empty() && bare.empty()
+                    ? "nothing in '" + models_folder() + "'; 'load FILE.mdl' loads a file of yours"
+                    : "Presets\n" + table(rows, 2) + "\nModels as they are written\n  " + bare);
   return Done{};
 }
 
-Result<Done> act::params(Desk& desk, Words) {
-  const auto current = loaded(desk);
+Result<Done> command::params(ConsoleContext& console, Words) {
+  const auto current = loaded(console);
   if (!current) {
     return nothing_loaded;
   }
   const bool is_proved = current->instrument.verdict == Verdict::stable;
   std::vector<std::vector<std::string>> rows;
   for (const ParameterInfo& info : current->instrument.parameters) {
-    rows.push_back({info.name, print_number(desk.session.parameter(info.name).value_or(info.value)),
+    rows.push_back({info.name,
+                    print_number(console.session.parameter(info.name).value_or(info.value)),
                     print_number(info.minimum) + " .. " + print_number(info.maximum),
                     is_proved ? describe(info.safe) : ""});
   }
-  desk.print(rows.empty() ? current->name + " has no parameters" : table(rows));
+  console.print(rows.empty() ? current->name + " has no parameters" : table(rows));
   return Done{};
 }
 
-Result<Done> act::get(Desk& desk, Words words) {
-  const auto current = loaded(desk);
+Result<Done> command::get(ConsoleContext& console, Words words) {
+  const auto current = loaded(console);
   if (!current) {
     return nothing_loaded;
   }
@@ -255,7 +249,7 @@ Result<Done> act::get(Desk& desk, Words words) {
   for (const ParameterInfo& info : current->instrument.parameters) {
     names.push_back(info.name);
     if (fits(words[0], info.name)) {
-      const double value = desk.session.parameter(info.name).value_or(info.value);
+      const double value = console.session.parameter(info.name).value_or(info.value);
       found.push_back(info.name + " = " + print_number(value));
     }
   }
@@ -263,14 +257,14 @@ Result<Done> act::get(Desk& desk, Words words) {
     return Error{current->name + " has no parameter '" + words[0] + "'; it has " +
                  (names.empty() ? "none" : joined(names, ", "))};
   }
-  desk.print(joined(found, "\n"));
+  console.print(joined(found, "\n"));
   return Done{};
 }
 
-Result<Done> act::set(Desk& desk, Words words) {
-  const auto current = loaded(desk);
-  const Call call{"/param/" + words[0], {to_argument(words[1])}};
-  const auto events = play(desk, call);
+Result<Done> command::set(ConsoleContext& console, Words words) {
+  const auto current = loaded(console);
+  const Message message{"/param/" + words[0], {to_argument(words[1])}};
+  const auto events = play(console, message);
   if (!events) {
     return events.error();
   }
@@ -287,10 +281,10 @@ Result<Done> act::set(Desk& desk, Words words) {
     if (event.value != wanted) {
       line += ", the " + std::string(event.value < wanted ? "highest" : "lowest") + " it may be";
     }
-    const std::string limited = told_limit(call, event, current->instrument);
+    const std::string limited = describe_limit(message, event, current->instrument);
     lines.push_back(limited.empty() ? std::move(line) : limited);
   }
-  desk.print(joined(lines, "\n"));
+  console.print(joined(lines, "\n"));
   return Done{};
 }
 
@@ -305,97 +299,17 @@ std::string transposition(int semitones) {
                               (semitones < 0 ? " semitones lower" : " semitones higher");
 }
 
-std::string peak(double level_db) {
-  return level_db > -120.0 ? "peak " + fixed(std::min(level_db, -0.0) + 0.0, 1) + " dBFS"
-                           : std::string("silence");
-}
-
-// Three digits of it.
-std::string about(double number) {
-  std::array<char, 32> text{};
-  std::snprintf(text.data(), text.size(), "%.3g", number);
-  return text.data();
-}
-
-// What modes hold is not known, nor, while a hand moves, what is lost.
-std::string describe_energy(const Status& now) {
-  if (now.voices == 0) {
-    return "none";
-  }
-  const std::string voices = "; " + std::to_string(now.voices) + " of " +
-                             counted(static_cast<std::size_t>(now.max_voices), "voice", "voices");
-  if (!now.is_whole) {
-    return (now.energy > 0.0 ? about(now.energy) + " and that of modes" : "not known of modes") +
-           voices;
-  }
-  const std::string change = now.is_driven     ? "driven from outside"
-                             : now.loss == 0.0 ? "neither rising nor falling"
-                                               : (now.loss > 0.0 ? "falling by " : "rising by ") +
-                                                     about(std::fabs(now.loss)) + " a second";
-  return about(now.energy) + ", " + change + voices;
-}
-
-}  // namespace
-
-Result<Done> act::status(Desk& desk, Words) {
-  const Status now = desk.session.status();
-  const std::string limiter = now.limited_db > -0.05
-                                  ? "limiter idle"
-                                  : "limiter down to " + fixed(now.limited_db, 1) + " dB";
-  std::vector<std::vector<std::string>> rows = {
-      {"model",
-       now.model.empty() ? "none" : now.model + ", loaded in " + fixed(now.load_ms, 1) + " ms"},
-      {"audio", now.backend.empty() ? "no backend" : now.backend},
-      {"rate", print_number(now.rate_hz) + " Hz, " + std::to_string(now.period_frames) +
-                   " frames a period"},
-      {"cpu", now.cpu < 0.0 ? "nothing runs"
-                            : fixed(100.0 * now.cpu, 1) + " % of the time there is, at most " +
-                                  fixed(100.0 * now.cpu_peak, 1) + " since the last status"},
-      {"voices", std::to_string(now.voices) + " of " + std::to_string(now.max_voices) + ", " +
-                     std::to_string(now.stolen) + " stolen, " + std::to_string(now.shed) +
-                     " shed for want of time"},
-      {"asleep", fixed(100.0 * now.saved, 0) + " % of what all voices would take"},
-      {"energy", describe_energy(now)},
-      {"output", peak(now.peak_db) + " since the last status, " + limiter},
-      {"xruns", std::to_string(now.xruns) + "; " + counted(now.overruns, "period", "periods") +
-                    " took too long to compute"},
-      {"resets", std::to_string(now.resets) + " voices that became unstable"},
-      {"limits", std::to_string(now.beyond) + " times a parameter was kept where it is stable"},
-      {"events", std::to_string(now.late) + " late, " + std::to_string(now.dropped) + " dropped, " +
-                     std::to_string(now.malformed) + " malformed, " +
-                     std::to_string(now.strangers) + " ignored"},
-  };
-  if (now.modes > 0) {
-    const double saved =
-        100.0 * (1.0 - static_cast<double>(now.modes_awake) / static_cast<double>(now.modes));
-    rows.push_back({"modes", std::to_string(now.modes_awake) + " of " + std::to_string(now.modes) +
-                                 " awake, saves " + fixed(saved, 0) + " %"});
-  }
-  if (desk.recorder.is_running()) {
-    rows.push_back({"recording", "yes"});
-  }
-  desk.print(table(rows));
-  return Done{};
-}
-
-namespace {
-
 std::string describe(const InputInfo& input) {
-  std::vector<std::string> gestures;
-  if (input.can_pluck) {
-    gestures.emplace_back("pluck");
-  }
-  if (input.can_bow) {
-    gestures.emplace_back("bow");
+  std::vector<std::string> known;
+  for (const GestureRow& row : gestures) {
+    if (row.live == Live::by_preset && input.knows(row.gesture)) {
+      known.emplace_back(row.name);
+    }
   }
   return std::string(input.is_force ? "a force on " : "a hand at ") +
          (input.attached_to.empty() ? "nothing" : input.attached_to) +
-         (gestures.empty() ? "" : "; knows " + joined(gestures, " and "));
+         (known.empty() ? "" : "; knows " + joined(known, " and "));
 }
-
-}  // namespace
-
-namespace {
 
 std::string describe_stability(const Instrument& instrument) {
   if (instrument.verdict == Verdict::unstable) {
@@ -411,8 +325,17 @@ std::string describe_stability(const Instrument& instrument) {
 
 }  // namespace
 
-Result<Done> act::explain(Desk& desk, Words) {
-  const auto current = loaded(desk);
+Result<Done> command::status(ConsoleContext& console, Words) {
+  auto rows = status_lines(console.session.status());
+  if (console.recorder.is_running()) {
+    rows.push_back({"recording", "yes"});
+  }
+  console.print(table(rows));
+  return Done{};
+}
+
+Result<Done> command::explain(ConsoleContext& console, Words) {
+  const auto current = loaded(console);
   if (!current) {
     return nothing_loaded;
   }
@@ -434,29 +357,29 @@ Result<Done> act::explain(Desk& desk, Words) {
   rows.push_back({"outputs", std::to_string(instrument.outputs)});
   std::string text = current->name;
   text += current->description.empty() ? "\n" : ": " + current->description + "\n";
-  desk.print(text + describe(current->plan) + table(rows));
+  console.print(text + describe(current->plan) + table(rows));
   return Done{};
 }
 
-Result<Done> act::record(Desk& desk, Words words) {
+Result<Done> command::record(ConsoleContext& console, Words words) {
   if (words[0] == "stop") {
-    auto told = desk.recorder.stop();
+    auto told = console.recorder.stop();
     if (!told) {
       return told.error();
     }
-    desk.print(*told);
+    console.print(*told);
     return Done{};
   }
   const Existing existing = words.size() > 1 ? Existing::replace : Existing::refuse;
-  if (auto started = desk.recorder.start(words[0], existing); !started) {
+  if (auto started = console.recorder.start(words[0], existing); !started) {
     return started.error();
   }
-  desk.print("recording to " + words[0] + "; 'rec stop' ends it");
+  console.print("recording to " + words[0] + "; 'rec stop' ends it");
   return Done{};
 }
 
-Result<Done> act::quit(Desk& desk, Words) {
-  desk.has_quit = true;
+Result<Done> command::quit(ConsoleContext& console, Words) {
+  console.has_quit = true;
   return Done{};
 }
 

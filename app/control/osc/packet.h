@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "app/control/calls.h"
+#include "app/control/message.h"
 #include "core/result.h"
 
 namespace ressort {

@@ -1,0 +1,39 @@
+// app: a message as people write it: an address and its arguments, in OSC, in a line of a score or
+// in words. Pure text; what a message does stands in registry.h.
+#pragma once
+
+#include <string>
+#include <string_view>
+#include <variant>
+#include <vector>
+
+#include "core/result.h"
+
+namespace ressort {
+
+using Argument = std::variant<double, std::string>;
+
+struct Message {
+  std::string address;  // "/note/on"
+  std::vector<Argument> arguments;
+};
+
+// One line of a score: TIME_SECONDS ADDRESS ARG... ; blank lines and # comments have no message.
+struct ScoreLine {
+  int line = 0;    // from 1
+  int column = 1;  // of its address
+  double time_s = 0.0;
+  Message message;
+};
+Result<std::vector<ScoreLine>> parse_score(std::string_view text);
+
+// Words divided by blanks, "..." for a word with blanks in it.
+std::vector<std::string> split_words(std::string_view text);
+
+// A number where the word is one, else the word.
+Argument to_argument(const std::string& word);
+
+// Whether an OSC address pattern (* ? [a-z] {x,y}) fits an address.
+bool fits(std::string_view pattern, std::string_view address);
+
+}  // namespace ressort

@@ -1,0 +1,122 @@
+#include "app/control/osc/answers.h"
+
+#include <set>
+
+#include "app/control/osc/client.h"
+#include "app/control/status.h"
+#include "app/session/session.h"
+#include "core/model/language/expression.h"
+
+namespace ressort {
+namespace {
+
+// A row, or none, of every parameter whose name fits.
+template <class MakeRow>
+void answer_parameters(const Question& question, MakeRow&& make_row) {
+  const std::string& address = question.message.address;
+  if (!question.client.may_have_rows(address)) {
+    return;
+  }
+  const auto loaded = question.session.current();
+  std::vector<Reply> rows;
+  bool has_any = false;
+  for (const ParameterInfo& info : loaded->instrument.parameters) {
+    if (fits(question.name, info.name)) {
+      has_any = true;
+      make_row(info, rows);
+    }
+  }
+  question.client.answer_rows(rows);
+  if (!has_any) {
+    question.client.error(address, "the model has no such parameter; /param/* lists what it has");
+  }
+}
+
+}  // namespace
+
+void answer::parameters(const Question& question) {
+  answer_parameters(question, [&](const ParameterInfo& info, std::vector<Reply>& rows) {
+    // Nothing if another model came in between.
+    if (const auto value = question.session.parameter(info.name)) {
+      rows.push_back(Reply("/param/" + info.name).real(*value));
+    }
+  });
+}
+
+void answer::ranges(const Question& question) {
+  answer_parameters(question, [](const ParameterInfo& info, std::vector<Reply>& rows) {
+    rows.push_back(Reply("/param/" + info.name + "/range")
+                       .real(info.minimum)
+                       .real(info.maximum)
+                       .real(info.safe.lowest)
+                       .real(info.safe.highest));
+  });
+}
+
+void answer::load(const Question& question) {
+  const Message& message = question.message;
+  const OscClient& client = question.client;
+  if (message.arguments.empty() || message.arguments.size() > 2 ||
+      !std::holds_alternative<std::string>(message.arguments[0])) {
+    client.error(message.address, message.address + ": expected NAME [ID]");
+    return;
+  }
+  if (!client.outlet().begin_load()) {
+    client.error(message.address, "busy: enough loads are waiting, try again");
+    return;
+  }
+  const auto answer = [message, client](const Result<std::shared_ptr<const Loaded>>& result) {
+    client.outlet().end_load();
+    Reply reply(result ? "/done" : "/fail");
+    reply.text(message.address);
+    if (message.arguments.size() > 1) {
+      reply.argument(message.arguments[1]);
+    }
+    if (!result) {
+      const std::string& full = result.error().message;
+      const std::string reason = without_source(full);
+      reply.text(reason);
+      if (reason != full) {
+        client.outlet().tell_failure("OSC could not load it:\n" + full);
+      }
+    }
+    client.answer(reply);
+  };
+  question.session.load(std::get<std::string>(message.arguments[0]), answer, false,
+                        Reach::own_folders);
+}
+
+void answer::status(const Question& question) {
+  question.client.answer(status_reply(question.session.status()));
+}
+
+void answer::describe(const Question& question) {
+  if (!question.client.may_have_rows(question.message.address)) {
+    return;
+  }
+  const auto loaded = question.session.current();
+  std::vector<Reply> rows;
+  const auto row = [&](std::string_view address, std::string_view arguments,
+                       std::string_view meaning) {
+    rows.push_back(Reply("/describe.reply").text(address).text(arguments).text(meaning));
+  };
+  for (const Row* const known : addresses()) {
+    row(known->address, known->arguments_text(), known->does);
+  }
+  for (const ParameterInfo& info : loaded->instrument.parameters) {
+    row("/param/" + info.name, "f",
+        print_number(question.session.parameter(info.name).value_or(info.value)) + " " +
+            print_number(info.minimum) + " " + print_number(info.maximum) + " " +
+            print_limit(info.safe.lowest, false) + " " + print_limit(info.safe.highest, true));
+  }
+  std::set<std::string_view> customs;  // one may drive several things
+  for (const CustomInfo& custom : loaded->instrument.custom) {
+    if (customs.insert(custom.address).second) {
+      row(custom.address, "f", "a control of the preset, 0-1");
+    }
+  }
+  rows.push_back(Reply("/describe.end").whole(rows.size()));
+  question.client.answer_rows(rows);
+}
+
+}  // namespace ressort

@@ -1,0 +1,26 @@
+// app: what the questions of the registry are answered by OSC. [OSC's thread]
+#pragma once
+
+#include "app/control/registry.h"
+
+namespace ressort::answer {
+
+// /param/NAME f:value of every parameter that fits
+void parameters(const Question& question);
+
+// /param/NAME/range f:minimum f:maximum f:lowest f:highest that is stable, infinite where nothing
+// limits
+void ranges(const Question& question);
+
+// /done s:address [ID], or /fail s:address [ID] s:why; later, on the session's worker
+void load(const Question& question);
+
+// /status.reply, as status.h lists it
+void status(const Question& question);
+
+// A row /describe.reply s:address s:arguments s:meaning for everything, then /describe.end i:rows,
+// so that whoever counts knows if one was lost on the way. A parameter's meaning is its value,
+// minimum and maximum, and between what it is stable.
+void describe(const Question& question);
+
+}  // namespace ressort::answer

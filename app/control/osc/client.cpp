@@ -1,0 +1,53 @@
+#include "app/control/osc/client.h"
+
+#include <cmath>
+
+#include "core/model/language/expression.h"
+
+namespace ressort {
+
+bool OscClient::is_heard() const {
+  if (outlet_->may_answer(sender_)) {
+    return true;
+  }
+  if (const double pause_s = outlet_->tell_pause_s(sender_); pause_s > 0.0) {
+    const double ms = std::ceil(1e3 * pause_s);
+    outlet_->answer(sender_, {Reply("/error")
+                                  .text("")
+                                  .text("too much was asked: nothing is answered for " +
+                                        print_number(ms) + " ms; what is played is played")
+                                  .bytes()});
+  }
+  return false;
+}
+
+void OscClient::answer(const Reply& reply) const {
+  if (is_heard()) {
+    outlet_->answer(sender_, {reply.bytes()});
+  }
+}
+
+void OscClient::error(const std::string& about, const std::string& message) const {
+  answer(Reply("/error").text(about).text(message));
+}
+
+bool OscClient::may_have_rows(const std::string& about) const {
+  if (!is_heard()) {
+    return false;
+  }
+  if (!outlet_->has_room()) {
+    error(about, "busy: too many answers are on their way, try again");
+    return false;
+  }
+  return true;
+}
+
+void OscClient::answer_rows(const std::vector<Reply>& rows) const {
+  std::vector<OscOutlet::Bytes> bytes;
+  for (const Reply& row : rows) {
+    bytes.push_back(row.bytes());
+  }
+  outlet_->answer(sender_, std::move(bytes));
+}
+
+}  // namespace ressort

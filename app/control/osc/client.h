@@ -1,0 +1,36 @@
+// app: who has sent an OSC packet, and is answered now or, by a copy, later. [any thread but audio]
+#pragma once
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "app/control/osc/outlet.h"
+#include "app/control/osc/reply.h"
+
+namespace ressort {
+
+class OscClient {
+ public:
+  OscClient(std::shared_ptr<OscOutlet> outlet, const OscSender& sender)
+      : outlet_(std::move(outlet)), sender_(sender) {}
+
+  void answer(const Reply& reply) const;
+  void error(const std::string& about, const std::string& message) const;
+
+  // Whether an answer of many rows may begin, before anything is gathered; if not, the client has
+  // been told why. The rows are all sent or none.
+  bool may_have_rows(const std::string& about) const;
+  void answer_rows(const std::vector<Reply>& rows) const;
+
+  OscOutlet& outlet() const { return *outlet_; }
+
+ private:
+  // Whether he is answered now; if not, he is told so once.
+  bool is_heard() const;
+
+  std::shared_ptr<OscOutlet> outlet_;
+  OscSender sender_;
+};
+
+}  // namespace ressort

@@ -1,0 +1,314 @@
+#include "app/control/osc/server.h"
+
+#include <lo/lo.h>
+#include <poll.h>
+#include <sys/eventfd.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+#include <cerrno>
+#include <cmath>
+#include <cstdlib>
+#include <cstring>
+#include <map>
+#include <optional>
+#include <string_view>
+#include <system_error>
+#include <thread>
+
+#include "app/control/osc/client.h"
+#include "app/control/osc/packet.h"
+#include "app/control/osc/senders.h"
+#include "app/control/osc/time_tags.h"
+#include "app/control/registry.h"
+#include "app/devices/audio.h"
+#include "app/realtime/rate_limit.h"
+#include "app/text.h"
+#include "core/model/language/expression.h"
+
+namespace ressort {
+namespace {
+
+constexpr std::size_t max_address_bytes = 255;
+constexpr int max_malformed_answers = 10;  // in a second
+constexpr std::size_t max_bundle_events = std::min(Process::max_now, Process::max_ahead);
+constexpr std::int64_t second_ns = 1'000'000'000;
+
+// --- messages -----------------------------------------------------------------------------------
+
+using LoMessage = std::unique_ptr<void, decltype(&lo_message_free)>;
+
+// What a message says; nothing where an argument is neither a number nor a text.
+std::optional<Message> read_message(std::span<const std::uint8_t> bytes) {
+  // liblo copies the bytes before it turns them; it only lacks the const.
+  const LoMessage read(
+      lo_message_deserialise(const_cast<std::uint8_t*>(bytes.data()), bytes.size(), nullptr),
+      lo_message_free);
+  if (read == nullptr) {
+    return std::nullopt;
+  }
+  Message message{reinterpret_cast<const char*>(bytes.data()), {}};
+  const char* const types = lo_message_get_types(read.get());
+  lo_arg** const values = lo_message_get_argv(read.get());
+  const int count = lo_message_get_argc(read.get());
+  for (int i = 0; i < count; ++i) {
+    const auto type = static_cast<lo_type>(types[i]);
+    if (lo_is_numerical_type(type)) {
+      // liblo reads it: it keeps nothing aligned to 8 bytes.
+      message.arguments.emplace_back(static_cast<double>(lo_hires_val(type, values[i])));
+    } else if (lo_is_string_type(type)) {
+      message.arguments.emplace_back(std::string(reinterpret_cast<const char*>(values[i])));
+    } else if (type == LO_TRUE || type == LO_FALSE) {
+      message.arguments.emplace_back(type == LO_TRUE ? 1.0 : 0.0);
+    } else {
+      return std::nullopt;
+    }
+  }
+  return message;
+}
+
+}  // namespace
+
+// --- the server ---------------------------------------------------------------------------------
+
+struct OscServer::Server {
+  // Playing messages with one time tag.
+  struct Group {
+    std::string address;  // of the first
+    std::vector<TimedEvent> events;
+    std::vector<std::pair<std::string, std::string>> news;  // for when they act: address, message
+  };
+  using Groups = std::map<std::uint64_t, Group>;  // by time tag
+
+  Server(Process& process_in, Session& session_in, int socket_in, int wake_in,
+         std::vector<Subnet> allowed_in, OscOutlet::Tell tell)
+      : process(process_in),
+        session(session_in),
+        socket(socket_in),
+        wake(wake_in),
+        allowed(std::move(allowed_in)),
+        outlet(std::make_shared<OscOutlet>(socket_in, std::move(tell))),
+        thread([this] { run(); }) {}
+
+  ~Server() {
+    eventfd_write(wake, 1);
+    thread.join();
+    outlet->close();
+    close(wake);
+  }
+
+  void run() {
+    std::vector<std::uint8_t> buffer(max_osc_packet_bytes + 1);
+    std::array<pollfd, 2> waits{{{socket, POLLIN, 0}, {wake, POLLIN, 0}}};
+    while (true) {
+      if (poll(waits.data(), waits.size(), outlet->send_due()) < 0) {
+        continue;  // a signal
+      }
+      if (waits[1].revents != 0) {
+        return;
+      }
+      if (const auto arrived = receive_packet(socket, buffer)) {
+        count_lost(arrived->lost);
+        const OscClient client{outlet, arrived->from};
+        if (may_send(allowed, arrived->from.address)) {
+          outlet->received(arrived->from, arrived->bytes);
+          receive({buffer.data(), arrived->bytes}, client);
+        } else {
+          count_stranger(arrived->from);
+        }
+      }
+    }
+  }
+
+  void count_lost(std::uint32_t lost_in_all) {
+    // It goes around; a packet that had come before the last loss does not know of it.
+    if (const std::uint32_t more = lost_in_all - lost; more < 1u << 31) {
+      lost = lost_in_all;
+      process.dropped.add(more);
+    }
+  }
+
+  void count_stranger(const OscSender& from) {
+    const std::string address = print_address(from.address);
+    process.strangers.add(1);
+    strangers.add("OSC: a packet from " + address + " was ignored; --osc-allow " + address +
+                  " lets it in");
+    if (const auto news = strangers.take()) {
+      outlet->tell(*news);
+    }
+  }
+
+  void receive(std::span<const std::uint8_t> packet, const OscClient& client) {
+    const auto messages = check_packet(packet);
+    if (!messages) {
+      if (may_answer_malformed()) {
+        client.error("", messages.error().message);
+      }
+      return;
+    }
+    Groups groups;
+    for (const OscMessage& message : *messages) {
+      const char* const address = reinterpret_cast<const char*>(message.bytes.data());
+      if (std::strlen(address) > max_address_bytes) {
+        client.error("",
+                     "an address has at most " + std::to_string(max_address_bytes) + " characters");
+      } else if (is_answer(address)) {
+        continue;
+      } else if (const auto said = read_message(message.bytes)) {
+        // 0 is not in the standard, but some send it for "at once".
+        handle(*said, std::max<std::uint64_t>(1, message.time_tag), groups, client);
+      } else {
+        client.error(address, "arguments are numbers (i f d h T F) or texts (s S)");
+      }
+    }
+    for (auto& [time_tag, group] : groups) {
+      play(time_tag, group, client);
+    }
+  }
+
+  // Whoever sends rubbish under another's name shall not have him flooded.
+  bool may_answer_malformed() {
+    const std::int64_t second = monotonic_ns() / second_ns;
+    if (second != malformed_second) {
+      malformed_second = second;
+      malformed_answers = 0;
+    }
+    return ++malformed_answers <= max_malformed_answers;
+  }
+
+  // Playing messages join their group; the others are answered at once, whatever their time tag.
+  void handle(const Message& message, std::uint64_t time_tag, Groups& groups,
+              const OscClient& client) {
+    const auto [row, name] = find_row(message.address);
+    if (row != nullptr && row->answer != nullptr &&
+        (row->play == nullptr || message.arguments.empty())) {
+      row->answer({message, name, session, client});
+      return;
+    }
+    const auto loaded = session.current();
+    const Events events = to_events(message, loaded->instrument, loaded->serial);
+    if (!events) {
+      client.error(message.address, events.error().message);
+      return;
+    }
+    Group& group = groups.try_emplace(time_tag, Group{message.address, {}, {}}).first->second;
+    if (group.events.size() + events->size() > max_bundle_events) {
+      client.error(message.address,
+                   "a bundle may have at most " + std::to_string(max_bundle_events) + " events");
+      return;
+    }
+    for (const Event& event : *events) {
+      group.events.push_back({.event = event});
+      if (const std::string news = describe_limit(message, event, loaded->instrument);
+          !news.empty()) {
+        group.news.emplace_back(message.address, news);
+      }
+    }
+  }
+
+  void play(std::uint64_t time_tag, Group& group, const OscClient& client) {
+    double late_s = 0.0;
+    TimedEvent timed;
+    if (time_tag > 1) {
+      const ClockReading clock = process.clock.read();
+      // Blocks that ended long ago tell nothing of when the next will begin.
+      if (clock.rate_hz <= 0.0 || monotonic_ns() - clock.time_ns > second_ns) {
+        client.error(group.address, "no audio is running: a time tag cannot be kept");
+        return;
+      }
+      tags.follow_wall_clock();
+      const double ahead_s = seconds_between(tags.now(clock), time_tag);
+      if (ahead_s > tag_horizon_s) {
+        client.error(group.address, "the time tag is " + seconds_text(ahead_s) +
+                                        " s ahead; at most " + print_number(tag_horizon_s) +
+                                        " s are kept");
+        return;
+      }
+      timed.timing = TimedEvent::When::at_frame;
+      timed.when = tags.frame(time_tag, clock);
+      // The newest block has its events already; a late one begins the next, and is counted there.
+      late_s = static_cast<double>(clock.frame + clock.period - timed.when) / clock.rate_hz;
+    }
+    for (TimedEvent& event : group.events) {
+      event.timing = timed.timing;
+      event.when = timed.when;
+    }
+    const bool is_ahead = timed.timing == TimedEvent::When::at_frame;
+    if (is_ahead ? !process.send_ahead(group.events)
+                 : !process.send(process.from_osc, group.events)) {
+      const std::string events = counted(group.events.size(), "event", "events");
+      client.error(group.address,
+                   is_ahead ? "refused whole: " + std::to_string(Process::max_ahead) +
+                                  " events may wait for their time, and there is no room for " +
+                                  events + " more; try again later"
+                            : "busy: no room for " + events + ", try again");
+      return;
+    }
+    session.remember(group.events);
+    for (const auto& [address, news] : group.news) {
+      client.error(address, news);
+    }
+    if (late_s > 0.0) {
+      lates.add("late by " + seconds_text(late_s) + " s, acts now");
+      if (const auto news = lates.take()) {
+        client.error(group.address, *news);
+      }
+    }
+  }
+
+  static std::string seconds_text(double seconds) {
+    return print_number(std::round(seconds * 1e4) / 1e4);
+  }
+
+  Process& process;
+  Session& session;
+  const int socket;  // the outlet's, which closes it after the thread has ended
+  const int wake;
+  const std::vector<Subnet> allowed;
+  std::shared_ptr<OscOutlet> outlet;
+  TagClock tags;
+  RateLimit lates{std::chrono::seconds(1)};
+  std::int64_t malformed_second = 0;
+  int malformed_answers = 0;
+  std::uint32_t lost = 0;  // by the system, as it counts
+  RateLimit strangers;
+  std::thread thread;  // last, so that all else is there when it starts
+};
+
+OscServer::OscServer(std::unique_ptr<Server> server) : server_(std::move(server)) {}
+OscServer::~OscServer() = default;
+
+Result<std::unique_ptr<OscServer>> OscServer::open(const OscOptions& options, Process& process,
+                                                   Session& session, Tell tell) {
+  const auto allowed = allowed_senders(options);
+  if (!allowed) {
+    return allowed.error();
+  }
+  const auto socket = open_osc_socket(options);
+  if (!socket) {
+    return socket.error();
+  }
+  const int wake = eventfd(0, EFD_CLOEXEC);
+  if (wake < 0) {
+    const std::string reason = std::generic_category().message(errno);
+    close(*socket);
+    return Error{"OSC cannot start: " + reason};
+  }
+  return std::unique_ptr<OscServer>(new OscServer(
+      std::make_unique<Server>(process, session, *socket, wake, *allowed, std::move(tell))));
+}
+
+std::string OscServer::access() const {
+  std::string others;
+  for (const Subnet& subnet : server_->allowed) {
+    others += (others.empty() ? "" : ", ") + print_subnet(subnet);
+  }
+  return others.empty() ? "for this machine alone" : "open to this machine and " + others;
+}
+
+int OscServer::port() const {
+  return port_of(server_->socket);
+}
+
+}  // namespace ressort

@@ -1,0 +1,484 @@
+#include "app/control/registry.h"
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+
+#include "app/control/console_commands.h"
+#include "app/control/osc/answers.h"
+#include "app/text.h"
+#include "core/model/language/expression.h"
+
+namespace ressort {
+namespace {
+
+// --- what plays ---------------------------------------------------------------------------------
+
+Events one(const Event& event) {
+  return std::vector{event};
+}
+
+Events note(const Said& said, bool starts) {
+  const double velocity = said.arguments[1] / 127.0;
+  return one({.kind = starts && velocity > 0.0 ? EventKind::note_on : EventKind::note_off,
+              .index = said.whole(0),
+              .value = velocity});
+}
+
+// Of the parameters that a pattern names.
+Events set_parameters(const Said& said) {
+  std::vector<Event> events;
+  std::vector<std::string> names;
+  for (std::size_t i = 0; i < said.instrument.parameters.size(); ++i) {
+    const ParameterInfo& info = said.instrument.parameters[i];
+    names.push_back(info.name);
+    if (info.audio_input > 0 && said.name == info.name) {
+      return Error{said.message.address + ": input " + std::to_string(info.audio_input) +
+                   " gives it, sample by sample; it cannot be set"};
+    }
+    if (info.audio_input == 0 && fits(said.name, info.name)) {
+      events.push_back({.kind = EventKind::parameter,
+                        .index = static_cast<std::uint16_t>(i),
+                        .model = said.serial,
+                        .value = std::clamp(said.arguments[0], info.minimum, info.maximum)});
+    }
+  }
+  if (events.empty()) {
+    return Error{said.message.address + ": the model has no such parameter; it has " +
+                 (names.empty() ? "none" : joined(names, ", "))};
+  }
+  return events;
+}
+
+Events play_input(const Said& said, const GestureRow& gesture) {
+  const InputInfo& input = *said.input;
+  std::string misfit;
+  if (gesture.live == Live::by_preset && !input.knows(gesture.gesture)) {
+    misfit = "has no " + std::string(gesture.name) + " in this preset";
+  } else if (gesture.live != Live::by_preset &&
+             input.is_force != (gesture.live == Live::on_forces)) {
+    misfit = input.is_force ? "takes a force, no position: use /in/N/force"
+                            : "takes a position, no force: use /in/N/position";
+  }
+  if (!misfit.empty()) {
+    return Error{said.message.address + ": input " + std::to_string(input.number) + " " + misfit};
+  }
+  return one({.kind = EventKind::gesture,
+              .gesture = gesture.gesture,
+              .index = static_cast<std::uint16_t>(input.number),
+              .model = said.serial,
+              .value = said.arguments[0],
+              .value2 = said.arguments[1]});
+}
+
+// --- the rows -----------------------------------------------------------------------------------
+
+std::vector<Row> make_rows() {
+  const Row first[] = {
+      {.address = "/note/on",
+       .arguments = {{"KEY", "the key", 0, 127}, {"VELOCITY", "the velocity", 0, 127, 100}},
+       .does = "starts a note; key 0-127, velocity 1-127 (100)",
+       .play = [](const Said& said) { return note(said, true); },
+       .command = "noteon",
+       .group = CommandGroup::playing,
+       .command_does = "starts a note; 60 is the middle C",
+       .details = "KEY is 0 to 127, VELOCITY is 1 to 127, or 100 if it is left out."},
+      {.address = "/note/off",
+       .arguments = {{"KEY", "the key", 0, 127}, {"VELOCITY", "the velocity", 0, 127, 100}},
+       .does = "ends a note",
+       .play = [](const Said& said) { return note(said, false); },
+       .command = "noteoff",
+       .group = CommandGroup::playing,
+       .words = "KEY",
+       .details = "KEY is 0 to 127."},
+      {.command = "keys",
+       .group = CommandGroup::playing,
+       .command_does = "plays from the computer's keyboard",
+       .details =
+           "The letters are laid out as on a piano. A note lasts until the next, or a second.",
+       .act = command::keys},
+      {.address = "/cc",
+       .arguments = {{"NUMBER", "the number", 0, 127}, {"VALUE", "the value", 0, 127}},
+       .does = "a controller, as from a keyboard; value 0-127",
+       .play =
+           [](const Said& said) {
+             return one({.kind = EventKind::controller,
+                         .index = said.whole(0),
+                         .value = said.arguments[1] / 127.0});
+           }},
+      {.address = "/pressure",
+       .arguments = {{"VALUE", "the pressure", 0, 127}},
+       .does = "channel pressure, 0-127",
+       .play =
+           [](const Said& said) {
+             return one({.kind = EventKind::pressure, .value = said.arguments[0] / 127.0});
+           }},
+      {.address = "/bend",
+       .arguments = {{"VALUE", "the bend", -1, 1}},
+       .does = "pitch bend, -1 to 1 (two semitones)",
+       .play =
+           [](const Said& said) {
+             return one({.kind = EventKind::bend, .value = said.arguments[0]});
+           }},
+      {.command = "params",
+       .group = CommandGroup::parameters,
+       .command_does = "lists the parameters, their values and ranges",
+       .act = command::params},
+      {.command = "get",
+       .group = CommandGroup::parameters,
+       .words = "PARAMETER",
+       .command_does = "tells a parameter's value",
+       .details = "PARAMETER may be a pattern: 'get m_*' tells all that begin so.",
+       .act = command::get},
+      {.address = "/param/NAME",
+       .arguments = {{"VALUE", "the value"}},
+       .does = "a parameter: sets it, or answers its value",
+       .play = set_parameters,
+       .answer = answer::parameters,
+       .command = "set",
+       .group = CommandGroup::parameters,
+       .words = "PARAMETER VALUE",
+       .command_does = "turns a parameter; it stays within its range",
+       .details = "PARAMETER may be a pattern: 'set *_Z 0.001' sets all that end so.",
+       .act = command::set},
+      {.address = "/param/NAME/range",
+       .does = "answers its minimum and maximum, and between what it is stable",
+       .answer = answer::ranges},
+  };
+  std::vector<Row> rows(std::begin(first), std::end(first));
+  for (const GestureRow& gesture : gestures) {
+    if (gesture.live == Live::never) {
+      continue;
+    }
+    Row row{.address = "/in/N/" + std::string(gesture.name),
+            .does = gesture.live_does,
+            .play = [](const Said& said) { return play_input(said, row_of(said.gesture)); },
+            .gesture = gesture.gesture,
+            .command = gesture.command.empty() ? "" : gesture.name,
+            .group = CommandGroup::playing,
+            .words = std::string(gesture.command),
+            .command_does = gesture.command_does,
+            .details = gesture.command_details};
+    std::copy(std::begin(gesture.arguments), std::end(gesture.arguments), row.arguments);
+    rows.push_back(std::move(row));
+  }
+  const Row last[] = {
+      {.address = "/panic",
+       .does = "silence at once",
+       .play = [](const Said&) { return one({.kind = EventKind::panic}); },
+       .command = "panic",
+       .group = CommandGroup::playing,
+       .details = "Every voice fades out."},
+      {.address = "/model/load",
+       .arguments = {{.word = "NAME", .is_text = true},
+                     {.word = "ID", .otherwise = 0, .is_text = true}},
+       .does = "loads a model or preset; answers /done or /fail",
+       .answer = answer::load,
+       .command = "load",
+       .group = CommandGroup::models,
+       .words = "MODEL [--force]",
+       .command_does = "loads a model or a preset",
+       .details =
+           "MODEL is the name of a preset or a model that came with the program, or the path of a "
+           ".mdl\nor .toml file. What sounds goes on until the new model is ready and then fades "
+           "into it; if\nthere is an error in the file, it simply goes on. A model that is not "
+           "stable is such an\nerror; --force plays it all the same, fading out what runs away.",
+       .act = command::load},
+      {.address = "/preset/load",
+       .arguments = {{.word = "NAME", .is_text = true},
+                     {.word = "ID", .otherwise = 0, .is_text = true}},
+       .does = "the same for a preset",
+       .answer = answer::load,
+       .command = "preset",
+       .group = CommandGroup::models,
+       .words = "PRESET [--force]",
+       .command_does = "the same; Tab offers the presets only",
+       .details = "A preset is a model with ranges for its parameters and a plan of what plays it.",
+       .act = command::load},
+      {.command = "models",
+       .group = CommandGroup::models,
+       .command_does = "lists what came with the program",
+       .details = "Presets go first, each with what it is; then the models that they are made of.",
+       .act = command::models},
+      {.address = "/status",
+       .does = "answers voices, cpu load, xruns, resets, rate and more",
+       .answer = answer::status,
+       .command = "status",
+       .group = CommandGroup::looking,
+       .command_does = "tells what sounds, how loud, at what cost",
+       .details = "The peak and the limiter's deepest cut are those since the last status.",
+       .act = command::status},
+      {.command = "explain",
+       .group = CommandGroup::looking,
+       .command_does = "tells how the model is computed and what plays it",
+       .act = command::explain},
+      {.address = "/describe",
+       .does = "answers a row for everything that can be set or asked",
+       .answer = answer::describe},
+      {.command = "rec",
+       .words = "FILE|stop [--force]",
+       .command_does = "records what is heard to a file, or ends that",
+       .details =
+           "The file's ending says what it is: .wav, .w64, .flac, .ogg, .aiff, .au or .caf; 24 "
+           "bits a\nsample, and the rate of the audio. Over a sound file that is there it is "
+           "written by --force\nonly.",
+       .act = command::record},
+      {.command = "help", .words = "[COMMAND]", .command_does = "tells more", .act = command::help},
+      {.command = "quit", .command_does = "ends the program", .act = command::quit},
+  };
+  rows.insert(rows.end(), std::begin(last), std::end(last));
+  for (Row& row : rows) {
+    if (row.words.empty()) {
+      row.words = row.arguments_text();
+    }
+    if (row.command_does.empty()) {
+      row.command_does = row.does;
+    }
+  }
+  return rows;
+}
+
+// --- addresses ----------------------------------------------------------------------------------
+
+constexpr std::string_view answers[] = {"/error",        "/done",           "/fail",
+                                        "/status.reply", "/describe.reply", "/describe.end"};
+
+// What stands before and after N or NAME; `hole` is empty where there is none.
+struct Pattern {
+  std::string_view before;
+  std::string_view hole;
+  std::string_view after;
+};
+
+Pattern pattern_of(const Row& row) {
+  const std::string_view address = row.address;
+  for (const std::string_view hole : {"NAME", "N"}) {
+    if (const std::size_t at = address.find("/" + std::string(hole)); at != address.npos) {
+      return {address.substr(0, at + 1), hole, address.substr(at + 1 + hole.size())};
+    }
+  }
+  return {address, "", ""};
+}
+
+// Of an address that begins as those of inputs do: the input, or why there is none.
+Result<const InputInfo*> find_input(const Message& message, const Instrument& instrument,
+                                    std::string_view number_text) {
+  int number = 0;
+  const auto failure =
+      std::from_chars(number_text.data(), number_text.data() + number_text.size(), number).ec;
+  for (const InputInfo& input : instrument.inputs) {
+    if (failure == std::errc{} && input.number == number) {
+      return &input;
+    }
+  }
+  return Error{message.address + ": the model has " +
+               (instrument.inputs.empty()
+                    ? "no inputs"
+                    : "the inputs 1 to " + std::to_string(instrument.inputs.back().number))};
+}
+
+Error unknown(const Message& message, const Instrument& instrument) {
+  for (const Row& row : rows()) {
+    const Pattern pattern = pattern_of(row);
+    if (pattern.hole != "N" || !message.address.starts_with(pattern.before)) {
+      continue;
+    }
+    const auto input = find_input(message, instrument,
+                                  std::string_view(message.address).substr(pattern.before.size()));
+    if (!input) {
+      return input.error();
+    }
+    std::vector<std::string> known;
+    for (const Row& other : rows()) {
+      if (pattern_of(other).hole == "N") {
+        known.emplace_back(pattern_of(other).after);
+      }
+    }
+    const std::string last = known.back();
+    known.pop_back();
+    return Error{message.address + ": an input knows " + joined(known, ", ") + " and " + last};
+  }
+  return Error{"unknown address '" + message.address + "'; /describe lists what there is"};
+}
+
+// One address may drive several inputs and parameters.
+Events custom_events(const Said& said) {
+  std::vector<Event> events;
+  for (const CustomInfo& info : said.instrument.custom) {
+    if (info.address == said.message.address) {
+      events.push_back({.kind = EventKind::custom,
+                        .index = static_cast<std::uint16_t>(info.row),
+                        .model = said.serial,
+                        .value = said.arguments[0]});
+    }
+  }
+  return events;
+}
+
+// What a preset gives to one of its controls.
+const Row custom_row{.arguments = {{"VALUE", "the value", 0, 1}}, .play = custom_events};
+
+// Reads the arguments of a message; nothing where they are as the row wants them.
+std::optional<std::string> read_arguments(const Row& row, const Message& message,
+                                          std::array<double, 2>& values) {
+  std::size_t count = 0;
+  for (const CallArgument& wanted : row.arguments) {
+    if (wanted.word.empty()) {
+      break;
+    }
+    const std::string meaning(wanted.meaning);
+    if (count >= message.arguments.size()) {
+      if (!wanted.otherwise) {
+        return meaning + " is missing";
+      }
+      values[count++] = *wanted.otherwise;
+      continue;
+    }
+    const Argument& argument = message.arguments[count];
+    const double* const value = std::get_if<double>(&argument);
+    if (value == nullptr || !std::isfinite(*value)) {
+      return meaning + " must be a number" +
+             (value == nullptr ? ", found '" + std::get<std::string>(argument) + "'" : "");
+    }
+    if (*value < wanted.least || *value > wanted.most) {
+      return meaning + " must lie between " + print_number(wanted.least) + " and " +
+             print_number(wanted.most) + ", found " + print_number(*value);
+    }
+    values[count++] = *value;
+  }
+  if (count < message.arguments.size()) {
+    return "too many arguments: " + std::to_string(message.arguments.size()) + ", expected " +
+           std::to_string(count);
+  }
+  return std::nullopt;
+}
+
+}  // namespace
+
+std::uint16_t Said::whole(std::size_t argument) const {
+  return static_cast<std::uint16_t>(std::lround(arguments[argument]));
+}
+
+bool Row::may_omit(const CallArgument& argument) const {
+  return argument.otherwise || (play != nullptr && answer != nullptr);
+}
+
+std::string Row::arguments_text() const {
+  std::vector<std::string> texts;
+  for (const CallArgument& argument : arguments) {
+    if (!argument.word.empty()) {
+      const std::string word(argument.word);
+      texts.push_back(may_omit(argument) ? "[" + word + "]" : word);
+    }
+  }
+  return joined(texts, " ");
+}
+
+const std::vector<Row>& rows() {
+  static const std::vector<Row> made = make_rows();
+  return made;
+}
+
+std::vector<const Row*> addresses() {
+  std::vector<const Row*> found;
+  for (const Row& row : rows()) {
+    if (!row.address.empty()) {
+      found.push_back(&row);
+    }
+  }
+  return found;
+}
+
+std::vector<const Row*> commands() {
+  std::vector<const Row*> found;
+  for (const Row& row : rows()) {
+    if (!row.command.empty()) {
+      found.push_back(&row);
+    }
+  }
+  std::stable_sort(found.begin(), found.end(),
+                   [](const Row* a, const Row* b) { return a->group < b->group; });
+  return found;
+}
+
+std::string_view heading(CommandGroup group) {
+  constexpr std::string_view headings[] = {"Models", "Playing", "Parameters", "Looking", "Other"};
+  return headings[static_cast<std::size_t>(group)];
+}
+
+FoundRow find_row(std::string_view address) {
+  FoundRow found;
+  std::size_t longest = 0;  // what follows NAME; of two that fit, that of the longer is meant
+  for (const Row& row : rows()) {
+    const auto [before, hole, after] = pattern_of(row);
+    if (row.address.empty() || (hole.empty() && address != before)) {
+      continue;
+    }
+    if (hole.empty()) {
+      return {&row, ""};
+    }
+    if (address.size() >= before.size() + after.size() && address.starts_with(before) &&
+        address.ends_with(after) && (found.row == nullptr || after.size() > longest)) {
+      longest = after.size();
+      found = {&row, address.substr(before.size(), address.size() - before.size() - after.size())};
+    }
+  }
+  return found;
+}
+
+bool is_answer(std::string_view address) {
+  return std::find(std::begin(answers), std::end(answers), address) != std::end(answers);
+}
+
+bool is_reserved(std::string_view address) {
+  return is_answer(address) || address == "/progress" ||  // to come
+         std::any_of(rows().begin(), rows().end(), [&](const Row& row) {
+           const Pattern pattern = pattern_of(row);
+           return pattern.hole.empty() ? address == row.address
+                                       : address.starts_with(pattern.before);
+         });
+}
+
+Events to_events(const Message& message, const Instrument& instrument, std::uint32_t serial) {
+  auto [row, name] = find_row(message.address);
+  if (row == nullptr &&
+      std::any_of(instrument.custom.begin(), instrument.custom.end(),
+                  [&](const CustomInfo& info) { return info.address == message.address; })) {
+    row = &custom_row;
+  }
+  if (row == nullptr || row->play == nullptr) {
+    return unknown(message, instrument);
+  }
+  Said said{.message = message,
+            .instrument = instrument,
+            .serial = serial,
+            .name = name,
+            .gesture = row->gesture};
+  if (pattern_of(*row).hole == "N") {
+    const auto input = find_input(message, instrument, name);
+    if (!input) {
+      return input.error();
+    }
+    said.input = *input;
+  }
+  if (const auto wrong = read_arguments(*row, message, said.arguments)) {
+    return Error{message.address + ": " + *wrong};
+  }
+  return row->play(said);
+}
+
+std::string describe_limit(const Message& message, const Event& event,
+                           const Instrument& instrument) {
+  if (event.kind != EventKind::parameter || message.arguments.empty()) {
+    return "";
+  }
+  const double* const wanted = std::get_if<double>(message.arguments.data());
+  const ParameterInfo& info = instrument.parameters[event.index];
+  const bool is_beyond = wanted != nullptr && ((event.value < *wanted && info.is_lowered) ||
+                                               (event.value > *wanted && info.is_raised));
+  return is_beyond ? info.name + ": " + print_number(*wanted) +
+                         " is beyond what is stable, set to " + print_number(event.value)
+                   : "";
+}
+
+}  // namespace ressort

@@ -1,0 +1,226 @@
+#include "app/control/status.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdio>
+
+#include "app/text.h"
+#include "core/model/language/expression.h"
+
+namespace ressort {
+namespace {
+
+// Three digits of it.
+std::string about(double number) {
+  std::array<char, 32> text{};
+  std::snprintf(text.data(), text.size(), "%.3g", number);
+  return text.data();
+}
+
+std::string percent(double share, int digits) {
+  return fixed(100.0 * share, digits) + " %";
+}
+
+// What modes hold is not known, nor, while an input is driven, what is lost.
+std::string tell_energy(const Status& now) {
+  if (now.voices == 0) {
+    return "none";
+  }
+  const std::string voices = "; " + std::to_string(now.voices) + " of " +
+                             counted(static_cast<std::size_t>(now.max_voices), "voice", "voices");
+  if (!now.is_whole) {
+    return (now.energy > 0.0 ? about(now.energy) + " and that of modes" : "not known of modes") +
+           voices;
+  }
+  const std::string change = now.is_driven     ? "driven from outside"
+                             : now.loss == 0.0 ? "neither rising nor falling"
+                                               : (now.loss > 0.0 ? "falling by " : "rising by ") +
+                                                     about(std::fabs(now.loss)) + " a second";
+  return about(now.energy) + ", " + change + voices;
+}
+
+std::string tell_modes(const Status& now) {
+  return now.modes == 0 ? ""
+                        : std::to_string(now.modes_awake) + " of " + std::to_string(now.modes) +
+                              " awake, saves " +
+                              percent(1.0 - static_cast<double>(now.modes_awake) /
+                                                static_cast<double>(now.modes),
+                                      0);
+}
+
+// In the order of the console's lines; the places are those of OSC, which nobody may move.
+constexpr StatusRow status_table[] = {
+    {"model", "", "what sounds", &Status::model, 0, "model",
+     [](const Status& now) { return now.model.empty() ? "none" : now.model; }},
+    {"load_ms", "ms", "what reading, proving and compiling it took", &Status::load_ms, 8, "model",
+     [](const Status& now) {
+       return now.model.empty() ? "" : "loaded in " + fixed(now.load_ms, 1) + " ms";
+     }},
+    {"backend", "", "what plays it", &Status::backend, 12, "audio",
+     [](const Status& now) { return now.backend.empty() ? "no backend" : now.backend; }},
+    {"rate", "Hz", "frames in a second", &Status::rate_hz, 6, "rate",
+     [](const Status& now) { return print_number(now.rate_hz) + " Hz"; }},
+    {"period", "frames", "what the backend asks for at once", &Status::period_frames, 7, "rate",
+     [](const Status& now) { return std::to_string(now.period_frames) + " frames a period"; }},
+    {"cpu", "1", "share of the time there is, over a second; -1: nothing runs", &Status::cpu, 1,
+     "cpu",
+     [](const Status& now) {
+       return now.cpu < 0.0 ? "nothing runs" : percent(now.cpu, 1) + " of the time there is";
+     }},
+    {"cpu_peak", "1", "the highest of one period since the last status", &Status::cpu_peak, 14,
+     "cpu",
+     [](const Status& now) {
+       return now.cpu < 0.0
+                  ? ""
+                  : "at most " + fixed(100.0 * now.cpu_peak, 1) + " since the last status";
+     }},
+    {"voices", "", "how many sound", &Status::voices, 2, "voices",
+     [](const Status& now) {
+       return std::to_string(now.voices) + " of " + std::to_string(now.max_voices);
+     }},
+    {"max_voices", "", "how many may", &Status::max_voices, 3},
+    {"stolen", "", "voices that gave way to a new note", &Status::stolen, not_in_reply, "voices",
+     [](const Status& now) { return std::to_string(now.stolen) + " stolen"; }},
+    {"shed", "", "voices that there was no time for", &Status::shed, not_in_reply, "voices",
+     [](const Status& now) { return std::to_string(now.shed) + " shed for want of time"; }},
+    {"asleep", "1", "share of the computing that sleep saves", &Status::saved, not_in_reply,
+     "asleep",
+     [](const Status& now) { return percent(now.saved, 0) + " of what all voices would take"; }},
+    {"energy", "mass * (position / sample)^2", "of what sounds", &Status::energy, not_in_reply,
+     "energy", tell_energy},
+    {"loss", "energy / s", "how much of it is lost", &Status::loss},
+    {"driven", "", "something comes in: the loss is not all known", &Status::is_driven},
+    {"whole", "", "all of the energy is known", &Status::is_whole},
+    {"peak_db", "dBFS", "since the last status; -999 is silence", &Status::peak_db, 9, "output",
+     [](const Status& now) {
+       return (now.peak_db > -120.0
+                   ? "peak " + fixed(std::min(now.peak_db, -0.0) + 0.0, 1) + " dBFS"
+                   : "silence") +
+              " since the last status";
+     }},
+    {"limited_db", "dB", "the limiter's deepest cut since the last status", &Status::limited_db,
+     not_in_reply, "output",
+     [](const Status& now) {
+       return now.limited_db > -0.05 ? "limiter idle"
+                                     : "limiter down to " + fixed(now.limited_db, 1) + " dB";
+     }},
+    {"xruns", "", "gaps in the sound that the backend counted", &Status::xruns, 4, "xruns",
+     [](const Status& now) {
+       return std::to_string(now.xruns) + "; " + counted(now.overruns, "period", "periods") +
+              " took too long to compute";
+     }},
+    {"overruns", "", "periods that took longer to compute than they sound", &Status::overruns},
+    {"resets", "", "voices that became unstable", &Status::resets, 5, "resets",
+     [](const Status& now) { return std::to_string(now.resets) + " voices that became unstable"; }},
+    {"beyond", "", "times that a parameter was kept where it is stable", &Status::beyond, 13,
+     "limits",
+     [](const Status& now) {
+       return std::to_string(now.beyond) + " times a parameter was kept where it is stable";
+     }},
+    {"late", "", "events that came after their time", &Status::late, 10, "events",
+     [](const Status& now) { return std::to_string(now.late) + " late"; }},
+    {"dropped", "", "events that found no room", &Status::dropped, 11, "events",
+     [](const Status& now) { return std::to_string(now.dropped) + " dropped"; }},
+    {"malformed", "", "MIDI that could not be read", &Status::malformed, not_in_reply, "events",
+     [](const Status& now) { return std::to_string(now.malformed) + " malformed"; }},
+    {"strangers", "", "packets of who may not send OSC", &Status::strangers, not_in_reply, "events",
+     [](const Status& now) { return std::to_string(now.strangers) + " ignored"; }},
+    {"modes", "", "of the voices that sound", &Status::modes, not_in_reply, "modes", tell_modes},
+    {"modes_awake", "", "of these", &Status::modes_awake},
+};
+
+constexpr int places_in_reply() {
+  int most = not_in_reply;
+  for (const StatusRow& row : status_table) {
+    most = std::max(most, row.place);
+  }
+  return most + 1;
+}
+
+constexpr const StatusRow* row_at(int place) {
+  const StatusRow* found = nullptr;
+  for (const StatusRow& row : status_table) {
+    if (row.place == place) {
+      found = found == nullptr ? &row : nullptr;  // none where there are two
+    }
+  }
+  return found;
+}
+
+constexpr bool has_every_place() {
+  for (int place = 0; place < places_in_reply(); ++place) {
+    if (row_at(place) == nullptr) {
+      return false;
+    }
+  }
+  return true;
+}
+static_assert(has_every_place());
+
+struct Write {
+  Reply& reply;
+  bool is_precise;
+  void operator()(double value) const {
+    is_precise ? reply.precise(value) : reply.real(std::max(-999.0, value));
+  }
+  void operator()(const std::string& value) const { reply.text(value); }
+  template <class Whole>
+  void operator()(Whole value) const {
+    reply.whole(static_cast<std::uint64_t>(value));
+  }
+};
+
+std::string print(double value) {
+  return print_number(value);
+}
+std::string print(const std::string& value) {
+  return value;
+}
+template <class Whole>
+std::string print(Whole value) {
+  return std::to_string(value);
+}
+
+std::string tell(const StatusRow& row, const Status& status) {
+  if (row.tell != nullptr) {
+    return row.tell(status);
+  }
+  const std::string value =
+      std::visit([&](auto figure) { return print(status.*figure); }, row.figure);
+  return value + (row.unit.empty() ? "" : " ") + std::string(row.unit);
+}
+
+}  // namespace
+
+std::span<const StatusRow> status_rows() {
+  return status_table;
+}
+
+Reply status_reply(const Status& status) {
+  Reply reply("/status.reply");
+  for (int place = 0; place < places_in_reply(); ++place) {
+    const StatusRow& row = *row_at(place);
+    const bool is_rate = row.name == "rate";  // which a float may not hold
+    std::visit([&](auto figure) { Write{reply, is_rate}(status.*figure); }, row.figure);
+  }
+  return reply;
+}
+
+std::vector<std::vector<std::string>> status_lines(const Status& status) {
+  std::vector<std::vector<std::string>> lines;
+  for (const StatusRow& row : status_table) {
+    const std::string said = row.line.empty() ? "" : tell(row, status);
+    if (said.empty()) {
+      continue;
+    }
+    if (lines.empty() || lines.back()[0] != row.line) {
+      lines.push_back({std::string(row.line), said});
+    } else {
+      lines.back()[1] += ", " + said;
+    }
+  }
+  return lines;
+}
+
+}  // namespace ressort
