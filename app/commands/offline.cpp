@@ -73,7 +73,7 @@ Result<std::vector<ScoredEvent>> score_events(const RenderOptions& options,
                                               const Instrument& instrument, std::uint32_t serial,
                                               std::vector<std::string>& warnings) {
   std::vector<ScoredEvent> scored;
-  std::set<std::uint16_t> told;
+  std::set<std::uint16_t> warned;
   for (const ScoreLine& line : lines) {
     auto events = to_events(line.message, instrument, serial);
     if (!events) {
@@ -83,7 +83,7 @@ Result<std::vector<ScoredEvent>> score_events(const RenderOptions& options,
       scored.push_back(
           {line.line, line.column, std::llround(line.time_s * options.rate_hz), event});
       const std::string news = describe_limit(line.message, event, instrument);
-      if (!news.empty() && told.insert(event.index).second) {
+      if (!news.empty() && warned.insert(event.index).second) {
         warnings.push_back(options.score + ":" + std::to_string(line.line) + ":" +
                            std::to_string(line.column) + ": warning: " + news);
       }

@@ -363,11 +363,11 @@ Result<Done> command::explain(ConsoleContext& console, Words) {
 
 Result<Done> command::record(ConsoleContext& console, Words words) {
   if (words[0] == "stop") {
-    auto told = console.recorder.stop();
-    if (!told) {
-      return told.error();
+    auto summary = console.recorder.stop();
+    if (!summary) {
+      return summary.error();
     }
-    console.print(*told);
+    console.print(*summary);
     return Done{};
   }
   const Existing existing = words.size() > 1 ? Existing::replace : Existing::refuse;

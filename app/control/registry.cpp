@@ -455,6 +455,9 @@ Events to_events(const Message& message, const Instrument& instrument, std::uint
             .name = name,
             .gesture = row->gesture};
   if (pattern_of(*row).hole == "N") {
+    if (!std::all_of(name.begin(), name.end(), [](char c) { return c >= '0' && c <= '9'; })) {
+      return unknown(message, instrument);
+    }
     const auto input = find_input(message, instrument, name);
     if (!input) {
       return input.error();

@@ -130,65 +130,38 @@ constexpr StatusRow status_table[] = {
     {"modes_awake", "", "of these", &Status::modes_awake},
 };
 
-constexpr int places_in_reply() {
-  int most = not_in_reply;
-  for (const StatusRow& row : status_table) {
-    most = std::max(most, row.place);
-  }
-  return most + 1;
+// Null behind the last place.
+const StatusRow* row_at(int place) {
+  const auto* const row = std::find_if(std::begin(status_table), std::end(status_table),
+                                       [&](const StatusRow& r) { return r.place == place; });
+  return row != std::end(status_table) ? row : nullptr;
 }
 
-constexpr const StatusRow* row_at(int place) {
-  const StatusRow* found = nullptr;
-  for (const StatusRow& row : status_table) {
-    if (row.place == place) {
-      found = found == nullptr ? &row : nullptr;  // none where there are two
-    }
-  }
-  return found;
-}
+using Figure = std::variant<double, std::uint64_t, std::string>;
 
-constexpr bool has_every_place() {
-  for (int place = 0; place < places_in_reply(); ++place) {
-    if (row_at(place) == nullptr) {
-      return false;
-    }
-  }
-  return true;
-}
-static_assert(has_every_place());
-
-struct Write {
-  Reply& reply;
-  bool is_precise;
-  void operator()(double value) const {
-    is_precise ? reply.precise(value) : reply.real(std::max(-999.0, value));
-  }
-  void operator()(const std::string& value) const { reply.text(value); }
-  template <class Whole>
-  void operator()(Whole value) const {
-    reply.whole(static_cast<std::uint64_t>(value));
-  }
-};
-
-std::string print(double value) {
-  return print_number(value);
-}
-std::string print(const std::string& value) {
-  return value;
-}
-template <class Whole>
-std::string print(Whole value) {
-  return std::to_string(value);
+Figure figure_of(const StatusRow& row, const Status& status) {
+  return std::visit(
+      [&](auto figure) {
+        if constexpr (std::is_integral_v<std::decay_t<decltype(status.*figure)>>) {
+          return Figure(static_cast<std::uint64_t>(status.*figure));
+        } else {
+          return Figure(status.*figure);
+        }
+      },
+      row.figure);
 }
 
 std::string tell(const StatusRow& row, const Status& status) {
   if (row.tell != nullptr) {
     return row.tell(status);
   }
-  const std::string value =
-      std::visit([&](auto figure) { return print(status.*figure); }, row.figure);
-  return value + (row.unit.empty() ? "" : " ") + std::string(row.unit);
+  const Figure figure = figure_of(row, status);
+  const std::string* const text = std::get_if<std::string>(&figure);
+  const double* const real = std::get_if<double>(&figure);
+  return (text != nullptr   ? *text
+          : real != nullptr ? print_number(*real)
+                            : std::to_string(std::get<std::uint64_t>(figure))) +
+         (row.unit.empty() ? "" : " ") + std::string(row.unit);
 }
 
 }  // namespace
@@ -199,10 +172,15 @@ std::span<const StatusRow> status_rows() {
 
 Reply status_reply(const Status& status) {
   Reply reply("/status.reply");
-  for (int place = 0; place < places_in_reply(); ++place) {
-    const StatusRow& row = *row_at(place);
-    const bool is_rate = row.name == "rate";  // which a float may not hold
-    std::visit([&](auto figure) { Write{reply, is_rate}(status.*figure); }, row.figure);
+  for (const StatusRow* row = row_at(0); row != nullptr; row = row_at(row->place + 1)) {
+    const Figure figure = figure_of(*row, status);
+    if (const double* const value = std::get_if<double>(&figure)) {
+      row->name == "rate" ? reply.precise(*value) : reply.real(std::max(-999.0, *value));
+    } else if (const std::string* const text = std::get_if<std::string>(&figure)) {
+      reply.text(*text);
+    } else {
+      reply.whole(std::get<std::uint64_t>(figure));
+    }
   }
   return reply;
 }

@@ -192,12 +192,12 @@ std::string with_source(const Finding& finding) {
 
 // Every word of a source stands in quotes, or behind the ':', ';' or '?' that follows what is
 // wrong.
-std::string without_source(std::string_view told) {
+std::string without_source(std::string_view message) {
   const auto is_letter = [](std::string_view text, std::size_t at) {
     return at < text.size() && std::isalnum(static_cast<unsigned char>(text[at])) != 0;
   };
   std::string all;
-  for (std::string_view rest = told; !rest.empty();) {
+  for (std::string_view rest = message; !rest.empty();) {
     std::string_view line = rest.substr(0, rest.find('\n'));
     rest.remove_prefix(std::min(rest.size(), line.size() + 1));
     constexpr std::string_view sign = ": error: ";
@@ -224,7 +224,7 @@ std::string without_source(std::string_view told) {
     all += (all.empty() ? "" : "\n") + std::string(place.substr(place.rfind('/') + 1)) +
            std::string(sign) + message;
   }
-  return all.empty() ? std::string(told) : all;
+  return all.empty() ? std::string(message) : all;
 }
 
 Reading read_scene(const std::string& name, const SceneOptions& options) {

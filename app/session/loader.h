@@ -58,7 +58,7 @@ struct Reading {
 
 // What was told of files, for who may not read them: of what has a place in one, the file's name,
 // line and column and what is wrong, without a word of the text.
-std::string without_source(std::string_view told);
+std::string without_source(std::string_view message);
 
 // Finds and reads a model or a preset with its model; goes on after an error in the model, so that
 // every problem is told at once. Without a preset the model gets a default one, `bare` or

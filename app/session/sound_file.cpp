@@ -126,7 +126,8 @@ std::size_t SoundReader::read(double* interleaved, std::size_t frames) {
 
 namespace {
 
-// What libsndfile writes goes through our own hands, which see every error, also those at the end.
+// What libsndfile writes goes through our own callbacks, which see every error, also those at the
+// end.
 struct Tape {
   int descriptor = -1;
   int error = 0;  // the first
@@ -256,8 +257,8 @@ Result<SoundWriter> SoundWriter::open(const std::string& path, const SoundForm& 
   info.format =
       (may_grow ? SF_FORMAT_RF64 : kind->form) | (is_ogg ? SF_FORMAT_VORBIS : samples_of(samples));
   file->frame_bytes = frame_bytes;
-  SF_VIRTUAL_IO hands{Tape::length, Tape::seek, Tape::read, Tape::write, Tape::tell};
-  file->handle = sf_open_virtual(&hands, SFM_WRITE, &info, &file->tape);
+  SF_VIRTUAL_IO callbacks{Tape::length, Tape::seek, Tape::read, Tape::write, Tape::tell};
+  file->handle = sf_open_virtual(&callbacks, SFM_WRITE, &info, &file->tape);
   if (file->handle == nullptr || file->tape.error != 0) {
     return file->failure();
   }

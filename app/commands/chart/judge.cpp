@@ -82,13 +82,13 @@ class EnergyMeter {
   double held_ = -HUGE_VAL;     // at any time
 };
 
-// The hands of one part, sample by sample.
-class PartHands {
+// What drives one part, sample by sample.
+class PartInputs {
  public:
-  PartHands(const ChartScene& scene, const Machine& machine, const Program& program)
+  PartInputs(const ChartScene& scene, const Machine& machine, const Program& program)
       : value(program.inputs.size()), velocity(value.size()) {
     for (const InputSlot& input : program.inputs) {
-      motion_.push_back(scene.hands[input.hand]);
+      motion_.push_back(scene.motions[input.hand]);
       rest_.push_back(machine.hands[input.hand].position);
     }
     move_to(0.0);
@@ -104,19 +104,19 @@ class PartHands {
   std::vector<double> velocity;
 
  private:
-  std::vector<HandMotion> motion_;
+  std::vector<InputMotion> motion_;
   std::vector<double> rest_;
 };
 
 // Adds one part's sound and energy to those of the others.
-void play_textbook(const Program& program, PartHands hands, Waves& waves,
+void play_textbook(const Program& program, PartInputs inputs, Waves& waves,
                    std::vector<StoredEnergy>& energy) {
   Textbook book(program);
   std::vector<double> x;
   std::vector<double> v;
   for (std::size_t n = 0; n < waves[0].size(); ++n) {
-    hands.move_to(static_cast<double>(n + 1) / rate_hz);
-    book.step(hands.value, hands.velocity);
+    inputs.move_to(static_cast<double>(n + 1) / rate_hz);
+    book.step(inputs.value, inputs.velocity);
     const std::vector<double> outputs = book.outputs();
     for (std::size_t i = 0; i < outputs.size(); ++i) {
       waves[program.outputs[i].channel][n] += outputs[i];
@@ -142,7 +142,7 @@ Truth published(const ChartScene& scene) {
   truth.floor_db.fill(exact_db);
   std::vector<StoredEnergy> energy(frames_of(energy_s));
   for (const Program& program : machine.parts) {
-    play_textbook(program, PartHands(scene, machine, program), truth.waves, energy);
+    play_textbook(program, PartInputs(scene, machine, program), truth.waves, energy);
   }
   EnergyMeter meter;
   for (const StoredEnergy& one : energy) {
@@ -376,7 +376,7 @@ Stress::Stress(const ChartScene& scene, Isa isa) : isa_(isa) {
     cases_.push_back(
         {.name = "hit harder at the ends of the ranges", .scene = struck_harder(worst)});
   }
-  // A hand that is too fast to do much is not to blame for little more: what it usually does
+  // An input that is too fast to do much is not to blame for little more: what it usually does
   // counts.
   Case usual{.name = "", .scene = scene};
   if (scene.is_driven()) {

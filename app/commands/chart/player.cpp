@@ -9,12 +9,12 @@
 namespace ressort {
 namespace {
 
-constexpr std::size_t most_kept = std::size_t{1} << 22;  // samples of a hand
+constexpr std::size_t most_kept = std::size_t{1} << 22;  // samples of a motion
 
-// Where one hand is at every sample.
-class HandTrack {
+// Where one input is at every sample.
+class InputTrack {
  public:
-  HandTrack(HandMotion motion, double start, double rate_hz, double seconds)
+  InputTrack(InputMotion motion, double start, double rate_hz, double seconds)
       : motion_(std::move(motion)), rate_hz_(rate_hz), start_(motion_ ? motion_(0.0) : start) {
     const auto wanted = static_cast<std::size_t>(std::lround(seconds * rate_hz));
     for (std::size_t n = 0; motion_ && n < std::min(wanted, most_kept); ++n) {
@@ -28,7 +28,7 @@ class HandTrack {
   }
 
  private:
-  HandMotion motion_;
+  InputMotion motion_;
   double rate_hz_;
   double start_;
   std::vector<double> kept_;
@@ -73,12 +73,12 @@ struct PlayedPart {
 template <class T>
 class KernelPlayer final : public ChartPlayer {
  public:
-  KernelPlayer(const Machine& machine, const std::vector<HandMotion>& hands, double seconds,
+  KernelPlayer(const Machine& machine, const std::vector<InputMotion>& motions, double seconds,
                Isa isa)
       : channels_(machine.channels) {
     for (std::size_t i = 0; i < machine.hands.size(); ++i) {
-      tracks_.emplace_back(i < hands.size() ? hands[i] : HandMotion(), machine.hands[i].position,
-                           machine.rate_hz, seconds);
+      tracks_.emplace_back(i < motions.size() ? motions[i] : InputMotion(),
+                           machine.hands[i].position, machine.rate_hz, seconds);
     }
     parts_.reserve(machine.parts.size());
     for (const Program& program : machine.parts) {
@@ -148,7 +148,7 @@ class KernelPlayer final : public ChartPlayer {
     frame_ = 0;
     for (PlayedPart<T>& part : parts_) {
       for (std::size_t i = 0; i < part.program.inputs.size(); ++i) {
-        const HandTrack& track = tracks_[part.program.inputs[i].hand];
+        const InputTrack& track = tracks_[part.program.inputs[i].hand];
         part.before[i] = track.start();
         for (std::size_t n = 0; n < max_block_frames; ++n) {
           part.feed(n, i, track.start(), 0.0);
@@ -159,7 +159,7 @@ class KernelPlayer final : public ChartPlayer {
 
   void feed(PlayedPart<T>& part, std::size_t count) {
     for (std::size_t i = 0; i < part.program.inputs.size(); ++i) {
-      const HandTrack& track = tracks_[part.program.inputs[i].hand];
+      const InputTrack& track = tracks_[part.program.inputs[i].hand];
       for (std::size_t n = 0; track.moves() && n < count; ++n) {
         const double x = track.at(frame_ + n);
         part.feed(n, i, x, x - part.before[i]);
@@ -179,7 +179,7 @@ class KernelPlayer final : public ChartPlayer {
   }
 
   std::size_t channels_;
-  std::vector<HandTrack> tracks_;  // [input]
+  std::vector<InputTrack> tracks_;  // [input]
   std::vector<PlayedPart<T>> parts_;
   std::size_t frame_ = 0;
 };
@@ -187,12 +187,12 @@ class KernelPlayer final : public ChartPlayer {
 }  // namespace
 
 std::unique_ptr<ChartPlayer> make_player(const Machine& machine,
-                                         const std::vector<HandMotion>& hands, double seconds,
+                                         const std::vector<InputMotion>& motions, double seconds,
                                          Precision precision, Isa isa) {
   if (precision != Precision::float32) {  // compensated positions are heard in double
-    return std::make_unique<KernelPlayer<double>>(machine, hands, seconds, isa);
+    return std::make_unique<KernelPlayer<double>>(machine, motions, seconds, isa);
   }
-  return std::make_unique<KernelPlayer<float>>(machine, hands, seconds, isa);
+  return std::make_unique<KernelPlayer<float>>(machine, motions, seconds, isa);
 }
 
 }  // namespace ressort

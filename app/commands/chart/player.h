@@ -1,4 +1,4 @@
-// app: plays a machine's kernels alone, one voice, with hands whose motion is a function of time.
+// app: plays a machine's kernels alone, one voice, with inputs whose motion is a function of time.
 #pragma once
 
 #include <memory>
@@ -19,7 +19,7 @@ class ChartPlayer {
 
   // To where the machine starts, at time 0.
   virtual void rewind() = 0;
-  // To any other state, the hands where they start.
+  // To any other state, the inputs where they start.
   virtual void place(const States& x, const States& v) = 0;
   // The next `frames` samples of the machine's own rate; [frame][channel] to `outputs`, if it is
   // not null.
@@ -31,7 +31,7 @@ class ChartPlayer {
 // With the motion of the machine's inputs, known beforehand for `seconds`: what is played later is
 // right too, but slower.
 std::unique_ptr<ChartPlayer> make_player(const Machine& machine,
-                                         const std::vector<HandMotion>& hands, double seconds,
+                                         const std::vector<InputMotion>& motions, double seconds,
                                          Precision precision, Isa isa);
 
 }  // namespace ressort

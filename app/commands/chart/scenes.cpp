@@ -18,7 +18,7 @@ constexpr double rate_hz = Network::reference_rate_hz;
 constexpr double velocity = 0.8;      // of the note
 constexpr double blow = 0.01;         // per sample: x[-1] = x[0] - blow
 constexpr double bow_start_s = 0.01;  // a bow's speed is reached as by a one-pole filter
-constexpr double reach_s = 0.005;     // the same of a hand that goes somewhere
+constexpr double reach_s = 0.005;     // the same of an input that goes somewhere
 constexpr double harder = 10.0;
 
 Network parsed(const std::string& text) {
@@ -100,8 +100,8 @@ double value_of(const ControlSetting& control) {
                              : control.low + velocity * (control.high - control.low);
 }
 
-// What a note does to a hand that rests at `middle`.
-HandMotion motion_of(const ControlSetting& control, double middle) {
+// What a note does to an input that rests at `middle`.
+InputMotion motion_of(const ControlSetting& control, double middle) {
   const double value = value_of(control);
   switch (control.gesture) {
     case Gesture::pluck:
@@ -188,7 +188,7 @@ void play_note(ChartScene& scene, const Preset& preset) {
       if (input.is_force) {
         strike(scene, struck_by(scene.network, input));
       } else if (control.gesture != Gesture::parameter) {
-        scene.hands[i] = motion_of(control, scene.network.masses[input.mass].position);
+        scene.motions[i] = motion_of(control, scene.network.masses[input.mass].position);
         scene.about = word_of(control.gesture) + " as by a note of velocity 0.8";
       }
     }
@@ -196,7 +196,7 @@ void play_note(ChartScene& scene, const Preset& preset) {
 }
 
 void excite(ChartScene& scene, const Preset& preset) {
-  scene.hands.resize(scene.network.inputs.size());
+  scene.motions.resize(scene.network.inputs.size());
   scene.is_linear = is_linear(scene.network);
   scene.has_contacts = has_contacts(scene.network);
   if (!is_still(scene.network)) {
@@ -265,8 +265,8 @@ Result<ChartScene> scene_of(const std::string& name, Network network, const Pres
 }  // namespace
 
 bool ChartScene::is_driven() const {
-  return std::any_of(hands.begin(), hands.end(),
-                     [](const HandMotion& hand) { return hand != nullptr; });
+  return std::any_of(motions.begin(), motions.end(),
+                     [](const InputMotion& motion) { return motion != nullptr; });
 }
 
 const std::vector<std::string>& reference_scenes() {
@@ -328,9 +328,9 @@ ChartScene struck_harder(const ChartScene& scene) {
                        : harder * mass.third;
     }
   }
-  for (HandMotion& hand : hard.hands) {
-    if (hand) {
-      hand = [slow = hand](double t) { return slow(harder * t); };
+  for (InputMotion& motion : hard.motions) {
+    if (motion) {
+      motion = [slow = motion](double t) { return slow(harder * t); };
     }
   }
   return hard;

@@ -1,4 +1,5 @@
-// app: what the chart is drawn of. A scene is a network and what its hands do, told in seconds, so
+// app: what the chart is drawn of. A scene is a network and what drives its inputs,
+// told in seconds, so
 // that it is the same at every rate.
 #pragma once
 
@@ -12,19 +13,19 @@
 
 namespace ressort {
 
-// Where a hand is at a time in seconds.
-using HandMotion = std::function<double(double)>;
+// Where an input is at a time in seconds.
+using InputMotion = std::function<double(double)>;
 
 struct ChartScene {
   std::string name;
-  std::string about;              // how it is excited, for people
-  Network network;                // without macros; its parameters as the preset has them
-  std::vector<HandMotion> hands;  // [input] null where it stays, as forces do
-  bool is_linear = false;         // the continuous network is known exactly
-  bool has_contacts = false;      // what is chaotic: waveforms count for some milliseconds only
-  std::vector<double> worst;      // [parameter] at the ends of their ranges: stiff, damped, light
+  std::string about;                 // how it is excited, for people
+  Network network;                   // without macros; its parameters as the preset has them
+  std::vector<InputMotion> motions;  // [input] null where it stays, as forces do
+  bool is_linear = false;            // the continuous network is known exactly
+  bool has_contacts = false;         // what is chaotic: waveforms count for some milliseconds only
+  std::vector<double> worst;  // [parameter] at the ends of their ranges: stiff, damped, light
 
-  bool is_driven() const;  // energy comes in by a hand
+  bool is_driven() const;  // energy comes in by an input
 };
 
 // The reference scenes' names.
@@ -39,7 +40,7 @@ Result<ChartScene> chart_scene(const std::string& name);
 // for networks in which nothing sounds as they are.
 ChartScene struck(const ChartScene& scene);
 
-// The same, hit ten times harder: start and hands.
+// The same, hit ten times harder: start and motions.
 ChartScene struck_harder(const ChartScene& scene);
 
 }  // namespace ressort

@@ -152,7 +152,7 @@ Result<MadeWay> make_way(const ChartScene& scene, const Way& way, double seconds
       made.methods += (made.methods.empty() ? "" : "+") + name;
     }
   }
-  made.player = make_player(made.machine(), scene.hands, seconds, way.precision, isa);
+  made.player = make_player(made.machine(), scene.motions, seconds, way.precision, isa);
   return made;
 }
 

@@ -111,7 +111,7 @@ AnswerBudget::Account& AnswerBudget::account(const OscSender& sender, std::int64
   Account& account = accounts_.try_emplace(key, Account{.time_ns = now_ns}).first->second;
   account.bytes = saved_up(account);
   account.time_ns = now_ns;
-  account.was_told = account.was_told && account.bytes <= 0.0;
+  account.was_informed = account.was_informed && account.bytes <= 0.0;
   return account;
 }
 
@@ -130,8 +130,8 @@ void AnswerBudget::answered(const OscSender& to, std::size_t bytes, std::int64_t
 
 double AnswerBudget::tell_pause_s(const OscSender& to, std::int64_t now_ns) {
   Account& account = this->account(to, now_ns);
-  const bool tells = account.bytes <= 0.0 && !account.was_told;
-  account.was_told = account.was_told || tells;
+  const bool tells = account.bytes <= 0.0 && !account.was_informed;
+  account.was_informed = account.was_informed || tells;
   return tells ? -account.bytes / bytes_per_s : 0.0;
 }
 

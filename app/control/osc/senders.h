@@ -58,7 +58,7 @@ class AnswerBudget {
   struct Account {
     double bytes = bytes_per_s;
     std::int64_t time_ns = 0;
-    bool was_told = false;
+    bool was_informed = false;
   };
 
   Account& account(const OscSender& sender, std::int64_t now_ns);

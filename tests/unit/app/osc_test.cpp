@@ -5,10 +5,14 @@
 #include <cmath>
 #include <cstdlib>
 #include <ctime>
+#include <limits>
+#include <map>
 #include <random>
+#include <set>
 
 #include "app/control/osc/packet.h"
 #include "app/control/registry.h"
+#include "app/control/status.h"
 #include "app/devices/audio.h"
 #include "tests/support/catch.h"
 #include "tests/support/data_folder.h"
@@ -174,6 +178,39 @@ TEST_CASE("status and describe answer in full", "[osc]") {
   CHECK(rows.size() == addresses().size() + 2);
   CHECK(has(rows[0], "/describe.reply", "/note/on", "note"));
   CHECK(has(rows.back(), "/describe.reply", "/param/m_Z", "0.2 "));
+}
+
+TEST_CASE("every figure has a name, a meaning and at most one place in the reply", "[osc]") {
+  std::set<std::string_view> names;
+  std::map<int, std::string_view> places;
+  for (const StatusRow& row : status_rows()) {
+    CAPTURE(row.name);
+    CHECK(names.insert(row.name).second);
+    CHECK_FALSE(row.does.empty());
+    CHECK((row.place == not_in_reply || places.emplace(row.place, row.name).second));
+  }
+  // Clients count on these.
+  std::string order;
+  for (const auto& [place, name] : places) {
+    order += std::string(name) + " ";
+  }
+  CHECK(order ==
+        "model cpu voices max_voices xruns resets rate period load_ms peak_db late dropped backend "
+        "beyond cpu_peak ");
+  CHECK(places.rbegin()->first == 14);
+  Status status;
+  status.model = "one";
+  status.xruns = std::uint64_t{1} << 40;
+  status.peak_db = -std::numeric_limits<double>::infinity();
+  const Answer reply = read_answer(status_reply(status).bytes());
+  REQUIRE(reply.values.size() == 15);
+  CHECK(reply.text(0) == "one");
+  CHECK(std::get<std::int32_t>(reply.values[4]) == std::numeric_limits<std::int32_t>::max());
+  CHECK(std::get<float>(reply.values[9]) == -999.0f);
+  status.late = 2;
+  const auto lines = status_lines(status);
+  const std::vector<std::string> events = {"events", "2 late, 0 dropped, 0 malformed, 0 ignored"};
+  CHECK(std::find(lines.begin(), lines.end(), events) != lines.end());
 }
 
 TEST_CASE("the messages of a bundle act together", "[osc]") {

@@ -155,6 +155,10 @@ TEST_CASE("what cannot be played is told, and what was expected", "[registry]") 
   check_error("/param/s_K loud", "/param/s_K: the value must be a number, found 'loud'");
   check_error("/in/4/position 0", "/in/4/position: the model has the inputs 1 to 3");
   check_error("/in/x/position 0", "/in/x/position: the model has the inputs 1 to 3");
+  check_error("/in/1x/position 0",
+              "/in/1x/position: an input knows /position, /force, /pluck and /bow");
+  check_error("/in/1/2/position 0",
+              "/in/1/2/position: an input knows /position, /force, /pluck and /bow");
   check_error("/in/1/wiggle 0", "/in/1/wiggle: an input knows /position, /force, /pluck and /bow");
   check_error("/in/1/force 1",
               "/in/1/force: input 1 takes a position, no force: use /in/N/position");
