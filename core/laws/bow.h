@@ -8,7 +8,8 @@
 
 #include "core/laws/discrete_gradient.h"
 
-namespace ressort::laws::inline RESSORT_ISA {
+namespace ressort::laws {
+inline namespace RESSORT_ISA {
 
 template <class V>
 struct Bow {
@@ -94,4 +95,5 @@ struct Bow {
   V top;  // where the outer slopes would meet at 0
 };
 
-}  // namespace ressort::laws::inline RESSORT_ISA
+}  // namespace RESSORT_ISA
+}  // namespace ressort::laws

@@ -5,7 +5,8 @@
 
 #include "core/laws/clipped_spring.h"
 
-namespace ressort::laws::inline RESSORT_ISA {
+namespace ressort::laws {
+inline namespace RESSORT_ISA {
 
 // A clipped spring's potential on one side of 0 only.
 template <class V>
@@ -93,4 +94,5 @@ struct ClippedContact {
   }
 };
 
-}  // namespace ressort::laws::inline RESSORT_ISA
+}  // namespace RESSORT_ISA
+}  // namespace ressort::laws

@@ -11,7 +11,8 @@
 
 #include "core/laws/discrete_gradient.h"
 
-namespace ressort::laws::inline RESSORT_ISA {
+namespace ressort::laws {
+inline namespace RESSORT_ISA {
 
 // s d^2/2 + c d^4/4 up to b, where the force is that of k, then k d^2/2 and as much less as both
 // differ there, (k - s)^2/4c. A plain spring is one with c = 0 and k = s.
@@ -121,4 +122,5 @@ struct ClippedSpring {
   }
 };
 
-}  // namespace ressort::laws::inline RESSORT_ISA
+}  // namespace RESSORT_ISA
+}  // namespace ressort::laws

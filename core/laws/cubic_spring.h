@@ -3,7 +3,8 @@
 
 #include "core/laws/spring.h"
 
-namespace ressort::laws::inline RESSORT_ISA {
+namespace ressort::laws {
+inline namespace RESSORT_ISA {
 
 template <class V>
 struct CubicSpring {
@@ -57,4 +58,5 @@ struct CubicSpring {
   V z;
 };
 
-}  // namespace ressort::laws::inline RESSORT_ISA
+}  // namespace RESSORT_ISA
+}  // namespace ressort::laws

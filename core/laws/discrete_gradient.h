@@ -17,7 +17,8 @@
 #include "core/lanes.h"
 #include "core/laws/law.h"
 
-namespace ressort::laws::inline RESSORT_ISA {
+namespace ressort::laws {
+inline namespace RESSORT_ISA {
 
 // A link in one sample: distances x_a - x_b, and how they change per sample.
 template <class V>
@@ -174,4 +175,5 @@ static inline Push<V> rubbed(const Friction& bow, const LinkState<V>& link, int 
   return at_once(bow.grip((link.speed + link.fast) / 2, link.speed, link.gamma / 2));
 }
 
-}  // namespace ressort::laws::inline RESSORT_ISA
+}  // namespace RESSORT_ISA
+}  // namespace ressort::laws

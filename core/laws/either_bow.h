@@ -4,7 +4,8 @@
 #include "core/laws/bow.h"
 #include "core/laws/smooth_bow.h"
 
-namespace ressort::laws::inline RESSORT_ISA {
+namespace ressort::laws {
+inline namespace RESSORT_ISA {
 
 template <class V>
 struct EitherBow {
@@ -51,4 +52,5 @@ struct EitherBow {
   V profile;
 };
 
-}  // namespace ressort::laws::inline RESSORT_ISA
+}  // namespace RESSORT_ISA
+}  // namespace ressort::laws

@@ -9,7 +9,8 @@
 
 #include "core/laws/discrete_gradient.h"
 
-namespace ressort::laws::inline RESSORT_ISA {
+namespace ressort::laws {
+inline namespace RESSORT_ISA {
 
 template <class V>
 struct Pluck {
@@ -102,4 +103,5 @@ struct Pluck {
   V z;
 };
 
-}  // namespace ressort::laws::inline RESSORT_ISA
+}  // namespace RESSORT_ISA
+}  // namespace ressort::laws

@@ -3,7 +3,8 @@
 
 #include "core/laws/spring.h"
 
-namespace ressort::laws::inline RESSORT_ISA {
+namespace ressort::laws {
+inline namespace RESSORT_ISA {
 
 template <class V>
 struct QuadraticSpring {
@@ -67,4 +68,5 @@ struct QuadraticSpring {
   V curved(V d) const { return q / Scalar<V>(3.0) * absolute(d * d * d); }
 };
 
-}  // namespace ressort::laws::inline RESSORT_ISA
+}  // namespace RESSORT_ISA
+}  // namespace ressort::laws

@@ -5,7 +5,8 @@
 
 #include "core/laws/discrete_gradient.h"
 
-namespace ressort::laws::inline RESSORT_ISA {
+namespace ressort::laws {
+inline namespace RESSORT_ISA {
 
 inline constexpr double smooth_bow_stick = 1.0387;  // 0.63 exp(1/2), above it: f/(Z v) at rest
 
@@ -62,4 +63,5 @@ struct SmoothBow {
   V s;
 };
 
-}  // namespace ressort::laws::inline RESSORT_ISA
+}  // namespace RESSORT_ISA
+}  // namespace ressort::laws

@@ -3,7 +3,8 @@
 
 #include "core/laws/discrete_gradient.h"
 
-namespace ressort::laws::inline RESSORT_ISA {
+namespace ressort::laws {
+inline namespace RESSORT_ISA {
 
 template <class V>
 struct Spring {
@@ -53,4 +54,5 @@ struct Spring {
   V z;
 };
 
-}  // namespace ressort::laws::inline RESSORT_ISA
+}  // namespace RESSORT_ISA
+}  // namespace ressort::laws

@@ -187,7 +187,7 @@ TEST_CASE("what rests as it starts is struck, and the sheet says so", "[chart]")
       "@m mass 1. 1. 0.\n@n mass 1. 1. 0.\n@r springDamper @m @n 0.1 0.001\n@out1 posOutput @m\n");
   ChartScene scene{.name = "pair", .network = parsed.network, .is_linear = true};
   scene.about = "as it starts";
-  scene.hands.resize(scene.network.inputs.size());
+  scene.motions.resize(scene.network.inputs.size());
   const auto sheet = make_sheet(scene, Isa::base, 0.0, [](const std::string&) { return true; });
   REQUIRE(sheet);
   CHECK_FALSE(sheet->rows.empty());
