@@ -108,13 +108,13 @@ expect 0 "grey stairs" "$program" chart --help
 expect 2 "there is no model or preset 'nosuch'" "$program" chart nosuch -o drawn
 expect 0 "no pictures: gnuplot is not installed" \
   env PATH=/nowhere "$program" chart triangle -t 0.1 -o drawn
-columns=scene,way,precision,methods,oversampling,budget,ns,voices_48k,predicted_ns
+columns=scene,way,precision,methods,oversampling,budget,ns,upper_ns,voices_48k,predicted_ns
 for truth in t1 t2; do
   columns=$columns,snr_${truth}_5ms,snr_${truth}_50ms,snr_${truth}_1s,cents_$truth,t60_$truth
   columns=$columns,energy_$truth
 done
 grep -qx "$columns,energy,front_t1,front_t2,failure,also" drawn/chart.csv &&
-  grep -q '^triangle,direct,double,direct,1,,[0-9.]*,[0-9.]*,[0-9.]*,' drawn/chart.csv &&
+  grep -q '^triangle,direct,double,direct,1,,[0-9.]*,[0-9.]*,[0-9.]*,[0-9.]*,' drawn/chart.csv &&
   grep -q '^triangle,direct 8x,float,direct,8,' drawn/chart.csv &&
   grep -q '^# scene triangle: .*predicted_area_t2 [1-9]' drawn/chart.csv ||
   { echo "FAILED: the chart's table lacks something"; failures=$((failures + 1)); }
