@@ -113,9 +113,9 @@ TEST_CASE("Modes cannot tell where all masses are", "[takeover]") {
 }
 
 TEST_CASE("A damper that takes all velocity in one sample lets nobody go on", "[takeover]") {
-  const std::string text =
-      "@c osc 1. 0.5 1. 0. 0.\n@m osc 2. 0.05 0.01 0. 0.\n@l springDamper @c @m 0.02 0.\n"
-      "@in1 frcInput @m\n@out1 posOutput @c\n";
+  const std::string text = "@c osc 1. 0.5 " + std::to_string(48000.0 / 44100.0) +
+                           " 0. 0.\n@m osc 2. 0.05 0.01 0. 0.\n@l springDamper @c @m 0.02 0.\n"
+                           "@in1 frcInput @m\n@out1 posOutput @c\n";
   Player direct(text, rig::struck(1), in_form(Method::direct));
   Player modal(text, rig::struck(1), in_form(Method::modal));
   direct.run(500, {rig::note_on(0, 57)});
