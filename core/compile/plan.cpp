@@ -115,12 +115,12 @@ class Chooser {
     return method == Method::modal && budget_.silence_db > -Budget::unlimited ? 0.5 * ns : ns;
   }
 
+  // Whether a form that takes long to find is worth the search.
   bool may_pay(const KernelRow& row) {
-    const bool may_pay =
-        program_.moving <= patient_modes && program_.moving > 4 &&
-        worth_ns(row.method, row.least_ns(program_, load_)) < candidates_[best_].ns;
-    may_gain_ = may_pay && program_.moving > most_modes_;
-    return may_pay && !may_gain_;
+    const bool pays = program_.moving <= patient_modes && program_.moving > 4 &&
+                      worth_ns(row.method, row.least_ns(program_, load_)) < candidates_[best_].ns;
+    may_gain_ = pays && program_.moving > most_modes_;
+    return pays && !may_gain_;
   }
 
   bool consider(Method method) {
