@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "core/compile/shards.h"
+#include "core/kernels/domains/shards.h"
 #include "core/kernels/direct/fourth_form.h"
 
 namespace ressort {

@@ -1,4 +1,4 @@
-#include "core/compile/shards.h"
+#include "core/kernels/domains/shards.h"
 
 #include <algorithm>
 #include <numeric>
