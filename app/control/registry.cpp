@@ -252,9 +252,9 @@ struct Pattern {
 
 Pattern pattern_of(const Row& row) {
   const std::string_view address = row.address;
-  for (const std::string_view hole : {"NAME", "N"}) {
-    if (const std::size_t at = address.find("/" + std::string(hole)); at != address.npos) {
-      return {address.substr(0, at + 1), hole, address.substr(at + 1 + hole.size())};
+  for (const std::string_view hole : {"/NAME", "/N"}) {
+    if (const std::size_t at = address.find(hole); at != address.npos) {
+      return {address.substr(0, at + 1), hole.substr(1), address.substr(at + hole.size())};
     }
   }
   return {address, "", ""};
