@@ -431,8 +431,7 @@ bool is_answer(std::string_view address) {
 }
 
 bool is_reserved(std::string_view address) {
-  return is_answer(address) || address == "/progress" ||  // to come
-         std::any_of(rows().begin(), rows().end(), [&](const Row& row) {
+  return is_answer(address) || std::any_of(rows().begin(), rows().end(), [&](const Row& row) {
            const Pattern pattern = pattern_of(row);
            return pattern.hole.empty() ? address == row.address
                                        : address.starts_with(pattern.before);

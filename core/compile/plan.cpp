@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "core/kernels/domains/shards.h"
 #include "core/kernels/direct/fourth_form.h"
+#include "core/kernels/domains/shards.h"
 
 namespace ressort {
 namespace {

@@ -12,6 +12,7 @@
 
 #include "app/control/console.h"
 #include "tests/support/catch.h"
+#include "tests/support/data_folder.h"
 #include "tests/support/scenes.h"
 
 namespace ressort {
@@ -19,31 +20,6 @@ namespace ressort {
 namespace fs = std::filesystem;
 
 inline constexpr std::size_t period = 256;
-
-// A folder of its own, gone with it.
-class Folder {
- public:
-  Folder() {
-    std::string name = (fs::temp_directory_path() / "ressort_console_XXXXXX").string();
-    REQUIRE(mkdtemp(name.data()) != nullptr);
-    path_ = name;
-  }
-  ~Folder() {
-    std::error_code error;
-    fs::remove_all(path_, error);
-  }
-  Folder(const Folder&) = delete;
-  Folder& operator=(const Folder&) = delete;
-
-  std::string file(const std::string& name) const { return (path_ / name).string(); }
-  std::string write(const std::string& name, const std::string& text) const {
-    std::ofstream(path_ / name) << text;
-    return file(name);
-  }
-
- private:
-  fs::path path_;
-};
 
 // A console and all that it works on; the test is the audio thread.
 struct Rig {

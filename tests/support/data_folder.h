@@ -1,4 +1,4 @@
-// tests: a data folder of the program's, for as long as this lives, instead of its own.
+// tests: folders that are there for as long as these live.
 #pragma once
 
 #include <unistd.h>
@@ -6,11 +6,54 @@
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
+#include <set>
+#include <sstream>
 #include <string>
 #include <string_view>
+#include <system_error>
+
+#include "tests/support/catch.h"
 
 namespace ressort {
 
+// A folder of a test's own, gone with it.
+class Folder {
+ public:
+  Folder() {
+    std::string name = (std::filesystem::temp_directory_path() / "ressort_test_XXXXXX").string();
+    REQUIRE(mkdtemp(name.data()) != nullptr);
+    path_ = name;
+  }
+  ~Folder() {
+    std::error_code error;
+    std::filesystem::remove_all(path_, error);
+  }
+  Folder(const Folder&) = delete;
+  Folder& operator=(const Folder&) = delete;
+
+  std::string file(const std::string& name) const { return (path_ / name).string(); }
+  std::string write(const std::string& name, const std::string& text) const {
+    std::ofstream(path_ / name, std::ios::binary) << text;
+    return file(name);
+  }
+  std::string text(const std::string& name) const {
+    std::ostringstream all;
+    all << std::ifstream(path_ / name, std::ios::binary).rdbuf();
+    return all.str();
+  }
+  std::set<std::string> names() const {
+    std::set<std::string> all;
+    for (const auto& entry : std::filesystem::directory_iterator(path_)) {
+      all.insert(entry.path().filename().string());
+    }
+    return all;
+  }
+
+ private:
+  std::filesystem::path path_;
+};
+
+// A data folder of the program's, instead of its own.
 class DataFolder {
  public:
   DataFolder() {

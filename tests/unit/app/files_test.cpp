@@ -17,48 +17,13 @@
 #include <thread>
 
 #include "tests/support/catch.h"
+#include "tests/support/data_folder.h"
 #include "tests/support/sound.h"
 
 namespace ressort {
 namespace {
 
 namespace fs = std::filesystem;
-
-class Folder {
- public:
-  Folder() {
-    std::string name = (fs::temp_directory_path() / "ressort_files_XXXXXX").string();
-    REQUIRE(mkdtemp(name.data()) != nullptr);
-    path_ = name;
-  }
-  ~Folder() {
-    std::error_code error;
-    fs::remove_all(path_, error);
-  }
-  Folder(const Folder&) = delete;
-  Folder& operator=(const Folder&) = delete;
-
-  std::string file(const std::string& name) const { return (path_ / name).string(); }
-  std::string write(const std::string& name, const std::string& text) const {
-    std::ofstream(path_ / name, std::ios::binary) << text;
-    return file(name);
-  }
-  std::string text(const std::string& name) const {
-    std::ostringstream all;
-    all << std::ifstream(path_ / name, std::ios::binary).rdbuf();
-    return all.str();
-  }
-  std::set<std::string> names() const {
-    std::set<std::string> all;
-    for (const auto& entry : fs::directory_iterator(path_)) {
-      all.insert(entry.path().filename().string());
-    }
-    return all;
-  }
-
- private:
-  fs::path path_;
-};
 
 using Names = std::set<std::string>;
 

@@ -1,8 +1,8 @@
 // Large networks in shards: what comes out is what the whole would have given.
 #include "app/realtime/denormals.h"
 #include "app/realtime/thread_pool.h"
-#include "core/kernels/domains/shards.h"
 #include "core/kernels/chains/chains_form.h"
+#include "core/kernels/domains/shards.h"
 #include "core/kernels/grid/grid_form.h"
 #include "core/laws/laws.h"
 #include "tests/support/duel.h"
