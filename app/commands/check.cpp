@@ -124,7 +124,7 @@ json stability_json(const Proved& proved) {
            {"stiffness_factor", limit_json(proved.stiffness_factor)}};
   if (const std::optional<Culprit>& culprit = proved.certificate.culprit) {
     out["culprit"] = {{"name", culprit->name},
-                      {"line", culprit->place.line},
+                      {"line", culprit->location.line},
                       {"quantity", quantity_name(culprit->quantity)},
                       {"argument", culprit->argument},
                       {"value", limit_json(culprit->value)},
@@ -276,7 +276,7 @@ int check(const CheckOptions& options) {
   std::optional<Proved> proved;
   if (compiled && options.as != CheckAs::model) {
     proved = prove(*reading.scene, *compiled, progress);
-    if (!compiled->gate.complaint) {
+    if (!compiled->stability.complaint) {
       warn(*proved, *reading.scene, reading.findings);
     }
     warn(*reading.scene, *compiled, reading.findings);

@@ -149,8 +149,8 @@ Error beyond_range(const Scene& scene, const ParameterInfo& info) {
               " and " + print_number(info.maximum)};
   for (const ParameterSetting& setting : scene.preset.parameters) {
     if (setting.name == info.name) {
-      error.line = setting.place.line;
-      error.column = setting.place.column;
+      error.line = setting.location.line;
+      error.column = setting.location.column;
     }
   }
   return at(scene.path, error);
@@ -209,7 +209,7 @@ Result<Rendered> render(const RenderOptions& options, const std::function<bool(d
                          .precision = options.precision,
                          .method = options.method,
                          .budget = options.budget,
-                         .crew = &pool,
+                         .executor = &pool,
                          .force = options.force,
                          .settings = options.parameters,
                          .reach = reach_of(*lines, scene->network),

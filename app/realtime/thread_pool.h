@@ -9,7 +9,7 @@
 
 namespace ressort {
 
-class ThreadPool final : public Crew {
+class ThreadPool final : public Executor {
  public:
   // With the thread that calls run(), so many; at least 1.
   explicit ThreadPool(std::size_t count);

@@ -31,16 +31,16 @@ Admission ask_to_play(const Scene& scene, const CompileOptions& options) {
         at(scene.model_path, max_model_bytes, compiled.error(), Severity::error));
     return admission;
   }
-  const Gate& gate = compiled->gate;
-  if (gate.complaint) {
-    const bool is_refused = gate.verdict == Verdict::unstable && !options.force;
-    Error complaint = *gate.complaint;
+  const StabilityCheck& stability = compiled->stability;
+  if (stability.complaint) {
+    const bool is_refused = stability.verdict == Verdict::unstable && !options.force;
+    Error complaint = *stability.complaint;
     complaint.message +=
         is_refused ? "; --force plays it all the same, fading out what runs away" : "";
     admission.findings.push_back(at(scene.model_path, max_model_bytes, complaint,
                                     is_refused ? Severity::error : Severity::warning));
   }
-  for (const Error& narrowed : gate.narrowed) {
+  for (const Error& narrowed : stability.narrowed) {
     admission.findings.push_back(at(scene.path, max_preset_bytes, narrowed, Severity::warning));
   }
   admission.compiled = *std::move(compiled);

@@ -81,8 +81,9 @@ class SceneReader {
               ? "its model is none of the program's own, and OSC loads no others"
               : "the model '" + scene_.preset.model + "' is neither beside the preset nor in '" +
                     models_folder() + "'";
-      return fail(scene_.path, *text,
-                  {missing, scene_.preset.model_place.line, scene_.preset.model_place.column});
+      return fail(
+          scene_.path, *text,
+          {missing, scene_.preset.model_location.line, scene_.preset.model_location.column});
     }
     const bool is_read =
         options_.third

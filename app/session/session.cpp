@@ -317,7 +317,7 @@ std::string Session::calm(std::uint32_t link) {
   return "the " + std::string(family_name(facts_of(creator.law).family)) + " '" +
          creator.name.text() + "' (" +
          std::filesystem::path(current_->model_path).filename().string() + ":" +
-         std::to_string(creator.place.line) + ") created energy" +
+         std::to_string(creator.location.line) + ") created energy" +
          (source_->may_gain ? ": computed passively from now on"
                             : "; play it with --budget passive=always");
 }

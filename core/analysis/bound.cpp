@@ -2,9 +2,9 @@
 #include <algorithm>
 #include <map>
 
+#include "core/analysis/assembly.h"
 #include "core/analysis/places.h"
 #include "core/analysis/stability.h"
-#include "core/analysis/stencil.h"
 
 namespace ressort {
 namespace {
@@ -56,7 +56,7 @@ class Bound {
   }
 
  private:
-  Sum load(const Stencil::Term& term) const {
+  Sum load(const Assembly::Term& term) const {
     const Load load = highest_load(network_, term, arguments_, rate_ratio_);
     return {load.stiff + load.rubbed, load.damped};
   }

@@ -16,13 +16,13 @@ constexpr std::uint32_t held = std::numeric_limits<std::uint32_t>::max();
 // Which rows hang on something that does not move, by union-find.
 class Anchors {
  public:
-  explicit Anchors(const Stencil& stencil) : parent_(stencil.masses.size() + 1) {
+  explicit Anchors(const Assembly& assembly) : parent_(assembly.masses.size() + 1) {
     std::iota(parent_.begin(), parent_.end(), 0u);
   }
   // The last one stands for all that does not move.
-  void join(std::span<const Stencil::Entry> entries) {
+  void join(std::span<const Assembly::Entry> entries) {
     double sum = 0.0;
-    for (const Stencil::Entry& entry : entries) {
+    for (const Assembly::Entry& entry : entries) {
       sum += entry.share;
       parent_[find(entry.row)] = find(entries[0].row);
     }
@@ -55,31 +55,31 @@ std::optional<std::vector<double>> compliances(const Network& network, const Par
   if (static_cast<std::size_t>(moving) > most_compliant_masses) {
     return std::nullopt;
   }
-  const Stencil stencil = make_stencil(network);
-  if (!stencil.is_complete) {
+  const Assembly assembly = assemble(network);
+  if (!assembly.is_complete) {
     return std::nullopt;
   }
   const std::vector<Range> arguments = argument_ranges(network, box);
-  Anchors anchors(stencil);
+  Anchors anchors(assembly);
   std::vector<double> weights;
-  for (const Stencil::Term& term : stencil.terms) {
+  for (const Assembly::Term& term : assembly.terms) {
     const double stiff = lowest_load(network, term, arguments, rate_ratio).stiff;
     if (!(stiff >= 0.0)) {
       return std::nullopt;
     }
     if (stiff > 0.0) {
-      anchors.join(stencil.of(term));
+      anchors.join(assembly.of(term));
     }
     weights.push_back(-stiff);
   }
   // What drifts is given a hold of its own, which touches nobody else.
-  std::vector<double> diagonal(stencil.masses.size());
+  std::vector<double> diagonal(assembly.masses.size());
   std::vector<std::uint32_t> row_of(network.masses.size(), held);
   for (std::uint32_t row = 0; row < diagonal.size(); ++row) {
     diagonal[row] = anchors.holds(row) ? 0.0 : 1.0;
-    row_of[stencil.masses[row]] = row;
+    row_of[assembly.masses[row]] = row;
   }
-  Definite matrix(stencil, progress);
+  Definite matrix(assembly, progress);
   if (!matrix.is_feasible() || !matrix.factor(diagonal, weights)) {
     return std::nullopt;
   }

@@ -10,7 +10,7 @@ namespace {
 
 // Calls `use(row, column, share)` for what a term has in the lower triangle.
 template <class Use>
-void each_pair(std::span<const Stencil::Entry> entries, Use&& use) {
+void each_pair(std::span<const Assembly::Entry> entries, Use&& use) {
   for (std::size_t i = 0; i < entries.size(); ++i) {
     for (std::size_t j = 0; j <= i; ++j) {
       const auto [low, high] = std::minmax(entries[i].row, entries[j].row);
@@ -22,21 +22,21 @@ void each_pair(std::span<const Stencil::Entry> entries, Use&& use) {
 }  // namespace
 
 struct Definite::Matrix {
-  Matrix(const Stencil& stencil, const Progress& progress)
-      : sum(static_cast<int>(stencil.masses.size()), elements_of(stencil, progress)) {
+  Matrix(const Assembly& assembly, const Progress& progress)
+      : sum(static_cast<int>(assembly.masses.size()), elements_of(assembly, progress)) {
     progress.spend(sum.value.size());
     is_feasible = solver.analyze(sum, progress);
-    for (std::size_t t = 0; is_feasible && t < stencil.terms.size(); ++t) {
-      each_pair(stencil.of(stencil.terms[t]),
+    for (std::size_t t = 0; is_feasible && t < assembly.terms.size(); ++t) {
+      each_pair(assembly.of(assembly.terms[t]),
                 [&](int row, int column, double) { slots.push_back(sum.find(row, column)); });
     }
   }
 
-  static std::vector<SparseMatrix::Element> elements_of(const Stencil& stencil,
+  static std::vector<SparseMatrix::Element> elements_of(const Assembly& assembly,
                                                         const Progress& progress) {
     std::vector<SparseMatrix::Element> elements;
-    for (const Stencil::Term& term : stencil.terms) {
-      each_pair(stencil.of(term), [&](int row, int column, double) {
+    for (const Assembly::Term& term : assembly.terms) {
+      each_pair(assembly.of(term), [&](int row, int column, double) {
         elements.push_back({row, column, 0.0});
       });
       progress.spend(1);
@@ -51,13 +51,13 @@ struct Definite::Matrix {
   bool is_feasible = false;
 };
 
-Definite::Definite(const Stencil& stencil, Progress progress)
-    : stencil_(stencil), progress_(std::move(progress)) {}
+Definite::Definite(const Assembly& assembly, Progress progress)
+    : assembly_(assembly), progress_(std::move(progress)) {}
 Definite::~Definite() = default;
 
 bool Definite::is_feasible() {
   if (!matrix_) {
-    matrix_ = std::make_unique<Matrix>(stencil_, progress_);
+    matrix_ = std::make_unique<Matrix>(assembly_, progress_);
   }
   return matrix_->is_feasible;
 }
@@ -72,7 +72,7 @@ bool Definite::factor(std::span<const double> diagonal, std::span<const double> 
   }
   const std::size_t* at = matrix_->slots.data();
   for (std::size_t t = 0; t < weights.size(); ++t) {
-    each_pair(stencil_.of(stencil_.terms[t]),
+    each_pair(assembly_.of(assembly_.terms[t]),
               [&](int, int, double share) { values[*at++] -= weights[t] * share; });
   }
   progress_.spend(weights.size());

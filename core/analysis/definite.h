@@ -1,11 +1,11 @@
-// core/analysis: whether a diagonal less a stencil's sum is positive definite.
+// core/analysis: whether a diagonal less a assembly's sum is positive definite.
 #pragma once
 
 #include <memory>
 #include <span>
 #include <vector>
 
-#include "core/analysis/stencil.h"
+#include "core/analysis/assembly.h"
 #include "core/progress.h"
 
 namespace ressort {
@@ -14,7 +14,7 @@ namespace ressort {
 // at the first use and kept. O(rows) for strings, about O(rows^1.5) for meshes. Keeps a reference.
 class Definite {
  public:
-  explicit Definite(const Stencil& stencil, Progress progress = {});
+  explicit Definite(const Assembly& assembly, Progress progress = {});
   ~Definite();
 
   // Whether a factorisation takes no more than Cholesky::most_work: not where rows hang together
@@ -29,7 +29,7 @@ class Definite {
 
  private:
   struct Matrix;
-  const Stencil& stencil_;
+  const Assembly& assembly_;
   Progress progress_;
   std::unique_ptr<Matrix> matrix_;
 };

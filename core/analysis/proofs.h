@@ -5,9 +5,9 @@
 #include <span>
 #include <vector>
 
-#include "core/analysis/edge.h"
+#include "core/analysis/assembly.h"
+#include "core/analysis/boundary.h"
 #include "core/analysis/stability.h"
-#include "core/analysis/stencil.h"
 
 namespace ressort {
 
@@ -15,8 +15,8 @@ class Proofs {
  public:
   Proofs(Network network, double rate_ratio, std::size_t most_exact, Progress progress);
 
-  bool is_exact() { return edges_.is_exact(); }
-  std::size_t size() const { return stencil_.terms.size(); }
+  bool is_exact() { return boundary_.is_exact(); }
+  std::size_t size() const { return assembly_.terms.size(); }
 
   Verdict prove(const ParameterBox& box);
   Certificate certify(const ParameterBox& box);
@@ -58,14 +58,14 @@ class Proofs {
   ArgumentId argument_of(const Suspect& suspect, std::span<const Range> arguments) const;
   std::optional<double> limit(const Suspect& suspect, std::span<const Range> arguments);
   std::size_t users(const Suspect& suspect, std::span<const Range> arguments) const;
-  const Place& place_of(const Suspect& suspect) const;
+  const SourceLocation& location_of(const Suspect& suspect) const;
 
   std::vector<Macro> macros_;
   Network network_;  // without macros
   double rate_ratio_;
   Progress progress_;
-  Stencil stencil_;
-  EdgeFinder edges_;
+  Assembly assembly_;
+  BoundaryFinder boundary_;
 };
 
 }  // namespace ressort

@@ -36,28 +36,28 @@ Proofs::Proofs(Network network, double rate_ratio, std::size_t most_exact, Progr
       network_(network.macros.empty() ? std::move(network) : expand_macros(network)),
       rate_ratio_(rate_ratio),
       progress_(std::move(progress)),
-      stencil_(make_stencil(network_)),
-      edges_(stencil_, stencil_.masses.size() <= most_exact, progress_) {
-  progress_.spend(stencil_.entries.size());
+      assembly_(assemble(network_)),
+      boundary_(assembly_, assembly_.masses.size() <= most_exact, progress_) {
+  progress_.spend(assembly_.entries.size());
 }
 
 // --- weights ------------------------------------------------------------------------------------
 
 std::vector<Load> Proofs::loads(std::span<const Range> arguments) const {
-  progress_.spend(stencil_.terms.size());
+  progress_.spend(assembly_.terms.size());
   std::vector<Load> all;
-  all.reserve(stencil_.terms.size());
-  for (const Stencil::Term& term : stencil_.terms) {
+  all.reserve(assembly_.terms.size());
+  for (const Assembly::Term& term : assembly_.terms) {
     all.push_back(highest_load(network_, term, arguments, rate_ratio_));
   }
   return all;
 }
 
 std::vector<Load> Proofs::lowest_loads(std::span<const Range> arguments) const {
-  progress_.spend(stencil_.terms.size());
+  progress_.spend(assembly_.terms.size());
   std::vector<Load> all;
-  all.reserve(stencil_.terms.size());
-  for (const Stencil::Term& term : stencil_.terms) {
+  all.reserve(assembly_.terms.size());
+  for (const Assembly::Term& term : assembly_.terms) {
     all.push_back(lowest_load(network_, term, arguments, rate_ratio_));
   }
   return all;
@@ -65,7 +65,7 @@ std::vector<Load> Proofs::lowest_loads(std::span<const Range> arguments) const {
 
 Weights Proofs::weigh(std::span<const Range> arguments) {
   Weights weights;
-  for (const std::uint32_t mass : stencil_.masses) {
+  for (const std::uint32_t mass : assembly_.masses) {
     weights.masses.push_back(range_at(arguments, network_.masses[mass].mass).lowest);
   }
   for (const Load& load : loads(arguments)) {
@@ -107,7 +107,7 @@ bool Proofs::feeds(std::span<const Range> arguments) {
     damped.push_back(load.damped);
     least = std::min({least, load.stiff, load.damped});
   }
-  return least < 0.0 && !(edges_.is_exact() && is_positive(stiff) && is_positive(damped));
+  return least < 0.0 && !(boundary_.is_exact() && is_positive(stiff) && is_positive(damped));
 }
 
 bool Proofs::is_positive(std::span<const double> terms) {
@@ -120,8 +120,8 @@ bool Proofs::is_positive(std::span<const double> terms) {
     largest = std::max(largest, std::fabs(term));
     negated.push_back(-term);
   }
-  const std::vector<double> rounding(stencil_.masses.size(), 1e-12 * largest);
-  return largest == 0.0 || edges_.is_definite(rounding, negated);
+  const std::vector<double> rounding(assembly_.masses.size(), 1e-12 * largest);
+  return largest == 0.0 || boundary_.is_definite(rounding, negated);
 }
 
 // How what counts for stability goes when one parameter moves.
@@ -133,7 +133,7 @@ Proofs::Course Proofs::course_along(std::size_t parameter) const {
       is_used[id] = true;
     }
   };
-  for (const std::uint32_t i : stencil_.masses) {
+  for (const std::uint32_t i : assembly_.masses) {
     const Mass& mass = network_.masses[i];
     use(mass.mass);
     use(mass.stiffness);
@@ -165,15 +165,15 @@ Proofs::Course Proofs::course_along(std::size_t parameter) const {
 Verdict Proofs::prove(const ParameterBox& box) {
   const std::vector<Range> arguments = argument_ranges(network_, box);
   const Weights weights = weigh(arguments);
-  return edges_.holds(weights, safe_limit)     ? Verdict::stable
-         : nonsense(arguments)                 ? Verdict::unstable
-         : edges_.is_exact() && !weights.feeds ? Verdict::unstable
-                                               : Verdict::unproved;
+  return boundary_.holds(weights, safe_limit)     ? Verdict::stable
+         : nonsense(arguments)                    ? Verdict::unstable
+         : boundary_.is_exact() && !weights.feeds ? Verdict::unstable
+                                                  : Verdict::unproved;
 }
 
 Certificate Proofs::certify(const ParameterBox& box) {
   const Verdict verdict = prove(box);
-  if (verdict == Verdict::stable || !stencil_.is_complete) {
+  if (verdict == Verdict::stable || !assembly_.is_complete) {
     return {.verdict = verdict};
   }
   const std::vector<Range> arguments = argument_ranges(network_, box);
@@ -191,11 +191,11 @@ Certificate Proofs::certify(const ParameterBox& box) {
     }
     return scaled;
   };
-  const Edge edge = edges_.between(all_together, 0.0, 1.0);
-  const Suspect suspect = weakest(weights, arguments, edge.shape);
+  const Boundary boundary = boundary_.between(all_together, 0.0, 1.0);
+  const Suspect suspect = weakest(weights, arguments, boundary.shape);
   Culprit culprit = accuse(suspect, arguments);
   culprit.limit = limit(suspect, arguments);
-  return {verdict, edge.value, std::move(culprit)};
+  return {verdict, boundary.value, std::move(culprit)};
 }
 
 std::optional<SafeRange> Proofs::safe_range(const ParameterBox& box, std::size_t parameter,
@@ -209,7 +209,7 @@ std::optional<SafeRange> Proofs::safe_range(const ParameterBox& box, std::size_t
     moved.highest[parameter] = std::max(side * from, side * to);
     return weigh(argument_ranges(network_, moved));
   };
-  const auto holds = [&](double at) { return edges_.holds(between(at, at), 4.0); };
+  const auto holds = [&](double at) { return boundary_.holds(between(at, at), 4.0); };
   const double size = std::fabs(start);
   std::vector<double> tries = {size, 0.0};
   for (double far = 16.0; course != Course::flat && far < 1e8; far *= 16.0) {
@@ -231,20 +231,20 @@ std::optional<SafeRange> Proofs::safe_range(const ParameterBox& box, std::size_t
 
 SafeRange Proofs::range_around(const WeightLine& line, double anchor) {
   SafeRange range{0.0, infinity};
-  if (const auto edge = edges_.is_exact() ? std::nullopt : edges_.met(line, anchor)) {
+  if (const auto boundary = boundary_.is_exact() ? std::nullopt : boundary_.met(line, anchor)) {
     // Masses from there, stiffness up to there; the other side may have another.
-    const bool is_lowest = *edge < anchor;
-    (is_lowest ? range.lowest : range.highest) = *edge;
-    if (edges_.holds(line(is_lowest ? 1e12 * anchor : 0.0), 4.0)) {
+    const bool is_lowest = *boundary < anchor;
+    (is_lowest ? range.lowest : range.highest) = *boundary;
+    if (boundary_.holds(line(is_lowest ? 1e12 * anchor : 0.0), 4.0)) {
       return range;
     }
     range = {0.0, infinity};
   }
-  if (const auto edge = edges_.outwards(line, anchor)) {
-    range.highest = edge->value;
+  if (const auto boundary = boundary_.outwards(line, anchor)) {
+    range.highest = boundary->value;
   }
-  if (!edges_.holds(line(0.0), 4.0)) {
-    range.lowest = edges_.between(line, anchor, 0.0).value;
+  if (!boundary_.holds(line(0.0), 4.0)) {
+    range.lowest = boundary_.between(line, anchor, 0.0).value;
   }
   return range;
 }
@@ -258,7 +258,7 @@ double Proofs::share(const ParameterBox& safe, const ParameterBox& wide) {
     }
     return weigh(argument_ranges(network_, box));
   };
-  return edges_.holds(line(1.0), safe_limit) ? 1.0 : edges_.between(line, 0.0, 1.0).value;
+  return boundary_.holds(line(1.0), safe_limit) ? 1.0 : boundary_.between(line, 0.0, 1.0).value;
 }
 
 double Proofs::stiffness_factor(const ParameterBox& box) {
@@ -272,11 +272,11 @@ double Proofs::stiffness_factor(const ParameterBox& box) {
     }
     return scaled;
   };
-  if (edges_.holds(line(1.0), 4.0)) {
-    const auto edge = edges_.outwards(line, 1.0);
-    return edge ? edge->value : infinity;
+  if (boundary_.holds(line(1.0), 4.0)) {
+    const auto boundary = boundary_.outwards(line, 1.0);
+    return boundary ? boundary->value : infinity;
   }
-  return edges_.holds(line(0.0), 4.0) ? edges_.between(line, 0.0, 1.0).value : 0.0;
+  return boundary_.holds(line(0.0), 4.0) ? boundary_.between(line, 0.0, 1.0).value : 0.0;
 }
 
 // --- the door -----------------------------------------------------------------------------------

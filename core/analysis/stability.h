@@ -37,7 +37,7 @@ const char* quantity_name(Quantity quantity);
 // The element to blame, and which of its arguments.
 struct Culprit {
   std::string name;  // of the mass, link or macro
-  Place place;
+  SourceLocation location;
   Quantity quantity = Quantity::stiffness;
   std::string argument;  // as written: "m_K", "2*p", "5"
   double value = 0.0;    // what it amounts to at worst

@@ -15,7 +15,7 @@
 #include "core/compile/machine.h"
 #include "core/compile/memory.h"
 #include "core/compile/merge.h"
-#include "core/compile/repose.h"
+#include "core/compile/rest_bound.h"
 #include "core/kernels/passive.h"
 #include "core/model/preset/fit.h"
 #include "core/model/topology.h"
@@ -377,19 +377,19 @@ Result<Compiled> compile_expanded(const Network& written, const Network& network
   playing.noise = preset.noise;
   playing.transpose = preset.transpose;
   progress.stage("proving that it is stable");
-  compiled.gate = guard({.written = written,
-                         .expanded = network,
-                         .preset = preset,
-                         .rate_hz = machine.rate_hz,
-                         .rate_ratio = machine.rate_ratio,
-                         .bare = options.bare,
-                         .is_open = options.force,
-                         .settings = options.settings,
-                         .reach = options.reach,
-                         .progress = progress},
-                        instrument.parameters);
-  instrument.verdict = compiled.gate.verdict;
-  for (const Range& limit : compiled.gate.limits) {
+  compiled.stability = check_stability({.written = written,
+                                        .expanded = network,
+                                        .preset = preset,
+                                        .rate_hz = machine.rate_hz,
+                                        .rate_ratio = machine.rate_ratio,
+                                        .bare = options.bare,
+                                        .is_open = options.force,
+                                        .settings = options.settings,
+                                        .reach = options.reach,
+                                        .progress = progress},
+                                       instrument.parameters);
+  instrument.verdict = compiled.stability.verdict;
+  for (const Range& limit : compiled.stability.limits) {
     playing.limits.push_back({limit.lowest, limit.highest});
   }
   const ParameterBox proved = proved_box(instrument.parameters, preset);
@@ -402,7 +402,7 @@ Result<Compiled> compile_expanded(const Network& written, const Network& network
     leave_to_keys(margins, proved, playing);
   }
   if (!options.bare && playing.highest_factor >= 1.0) {
-    playing.repose = make_repose(network, machine, proved, progress);
+    playing.rest_bounds = make_rest_bounds(network, machine, proved, progress);
   }
   if (instrument.mode) {
     playing.tuning = Tuning::keyboard;
@@ -431,14 +431,14 @@ Result<Compiled> compile_expanded(const Network& written, const Network& network
        .voices = playing.voices,
        .highest_factor =
            playing.tuning == Tuning::keyboard ? std::max(1.0, playing.highest_factor) : 1.0,
-       .crew = options.crew},
+       .executor = options.executor},
       is_published ? Method::direct : options.method, options.most_modes, budget, progress);
   compiled.plan.notes = std::move(schemes.notes);
   if (const std::string left_out = describe(cull(network)); !left_out.empty()) {
     compiled.plan.notes.push_back("left out: " + left_out);
   }
   compiled.schemes = std::move(schemes.links);
-  if (compiled.gate.is_together) {
+  if (compiled.stability.is_together) {
     compiled.plan.notes.push_back(
         "the limits of so many parameters of so many links were not found one by one: all ranges "
         "were narrowed alike");

@@ -10,9 +10,9 @@
 
 #include "core/analysis/interval.h"
 #include "core/analysis/linear.h"
-#include "core/compile/gate.h"
 #include "core/compile/plan.h"
 #include "core/compile/schemes.h"
+#include "core/compile/stability_check.h"
 #include "core/engine/engine.h"
 #include "core/gesture.h"
 #include "core/model/network.h"
@@ -37,7 +37,7 @@ struct CompileOptions {
                                              // be found passively, whatever the budget says
   Isa isa = best_isa();                      // no wider than the machine's
   std::uint32_t most_modes = patient_modes;  // of a part, for the plan
-  Crew* crew = nullptr;           // outlives the engine, which it steps large parts of; null: none
+  Executor* executor = nullptr;   // outlives the engine, which it steps large parts of; null: none
   bool find_gain = false;         // so that a forte note peaks at -6 dBFS, instead of the preset's
   bool force = false;             // no range is narrowed to what is stable
   std::vector<Setting> settings;  // values that the bare network's parameters get at once
@@ -85,7 +85,7 @@ struct Compiled {
   std::unique_ptr<Engine> engine;
   Instrument instrument;
   Plan plan;
-  Gate gate;                        // whoever lets it sound has asked this
+  StabilityCheck stability;         // whoever lets it sound has asked this
   std::vector<LinkScheme> schemes;  // [link] of the network without macros
 };
 

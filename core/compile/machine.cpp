@@ -303,7 +303,7 @@ Machine machine_of(const Network& network, double rate_hz, bool rescale,
                   .parameters = parameter_values(network),
                   .channels = static_cast<std::uint32_t>(output_count(network))};
   for (const Input& input : network.inputs) {
-    machine.hands.push_back(
+    machine.inputs.push_back(
         {.number = input.number,
          .is_force = input.is_force,
          .position = input.is_force ? 0.0 : network.masses[input.mass].position});

@@ -37,7 +37,7 @@ struct Plan {
 };
 
 // Gives every part of the machine the form that the cost model says is the cheapest at its worst,
-// or the one of `method` where a part has it; divided among load.crew where that pays. With a
+// or the one of `method` where a part has it; divided among load.executor where that pays. With a
 // budget for pitch or decay, the cheapest of the physical methods where the published scheme misses
 // it. O(elements), and the eigenvectors of a part of up to `most_modes` masses for which the modal
 // form may pay. [any thread but audio]

@@ -178,18 +178,18 @@ class Judge {
   }
 
   static Finding contact(double k, double z) {
-    const LinkScheme centred{Scheme::centred, 1};
+    const LinkScheme passive{Scheme::discrete_gradient, 1};
     if (k / soft_contact >= z / soft_damper) {
-      return {centred, k / soft_contact,
+      return {passive, k / soft_contact,
               "could gain " + number(12.5 * k) + " % of speed at a touch (K/M up to " + number(k) +
                   ")"};
     }
-    return {centred, z / soft_damper, "would damp too hard (Z/M up to " + number(z) + ")"};
+    return {passive, z / soft_damper, "would damp too hard (Z/M up to " + number(z) + ")"};
   }
 
   static Finding bow(double z) {
     const bool is_hard = z > hard_bow;
-    return {{is_hard ? Scheme::substeps : Scheme::centred,
+    return {{is_hard ? Scheme::substeps : Scheme::discrete_gradient,
              is_hard ? static_cast<std::uint16_t>(least_substeps) : std::uint16_t{1}},
             z / soft_bow,
             "would grip a sample too late (Z/M up to " + number(z) + ")"};
@@ -217,7 +217,7 @@ class Judge {
   }
 
   static Finding spring(double k, double z) {
-    return {{Scheme::centred, 1},
+    return {{Scheme::discrete_gradient, 1},
             std::max(k / soft_tangent, z),
             "could blow up where it is the stiffest (K/M up to " + number(k) + ")"};
   }
@@ -250,8 +250,8 @@ std::string sentence(const Told& told) {
       std::to_string(told.count) + " " + std::string(told.count == 1 ? law.one : law.many);
   const bool is_bad = told.worst && told.worst->badness > 1.0;
   const std::string how = told.scheme.scheme == Scheme::plain ? " as published"
-                          : told.scheme.scheme == Scheme::centred
-                              ? " centred"
+                          : told.scheme.scheme == Scheme::discrete_gradient
+                              ? " made passive"
                               : " in " + std::to_string(told.scheme.substeps) + " steps a sample";
   if (told.scheme.scheme == Scheme::plain) {
     return who + how + ", which " + told.worst->trouble;
@@ -289,7 +289,7 @@ Schemes choose_schemes(const Network& network, const Preset& preset, const Condi
     const bool is_wanted = budget.passive == Passivity::always ||
                            (budget.passive == Passivity::where_needed && is_bad);
     if (is_forced[i] || (finding && is_wanted)) {
-      schemes.links[i] = finding ? finding->scheme : LinkScheme{Scheme::centred, 1};
+      schemes.links[i] = finding ? finding->scheme : LinkScheme{Scheme::discrete_gradient, 1};
     } else if (!is_bad) {
       continue;
     }

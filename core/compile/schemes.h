@@ -30,7 +30,7 @@ struct Conditions {
 // the inverse masses of a link's ends, as small as these masses may be:
 //   contacts  plain while K g <= 0.08: at most a percent of speed gained at each touch (K g / 8),
 //             and Z g <= 0.5
-//   bows      plain while Z g <= 0.3, centred up to 2.5, above in substeps
+//   bows      plain while Z g <= 0.3, discrete gradient up to 2.5, above in substeps
 //   plucks    plain while 0.9 K g <= 2; else substeps. Where the budget asks for the continuous
 //             network, also if a hand of the preset passes 2 scale in less than 20 samples: as
 //             published such a pluck is a lottery, but a bounded one

@@ -10,7 +10,7 @@ namespace ressort {
 namespace {
 
 bool may_create(const LinkRun& run) {
-  return run.law != Law::spring && run.scheme != Scheme::centred;
+  return run.law != Law::spring && run.scheme != Scheme::discrete_gradient;
 }
 
 template <class T>
@@ -66,7 +66,7 @@ void add_straight(double k, double z, double d, double v, Energy& energy) {
 }
 
 template <class ForceLaw>
-void add_centred(const ForceLaw& law, double d, double v, Energy& energy) {
+void add_discrete_gradient(const ForceLaw& law, double d, double v, Energy& energy) {
   const double before = d - v;
   if constexpr (ForceLaw::facts.contains_spring && ForceLaw::facts.is_curved) {
     add_straight(law.k, law.z, d, v, energy);
@@ -120,8 +120,8 @@ void add_links(const Program& program, const LinkRun& run, Share share, LaneValu
         constexpr const LawFacts& facts = ForceLaw::facts;
         const double k = facts.family == Family::spring ? c[facts.slot(Role::stiffness)] : 0.0;
         each([&](double d, double speed) {
-          if (run.scheme == Scheme::centred) {
-            add_centred(law, d, speed, energy);
+          if (run.scheme == Scheme::discrete_gradient) {
+            add_discrete_gradient(law, d, speed, energy);
           } else {
             add_bent(law, k, d, speed, energy);
           }

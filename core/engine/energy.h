@@ -5,7 +5,7 @@
 // With springs, dampers and oscillators it falls by exactly what the dampers take, to rounding, and
 // rises by exactly what forces and hands do. A bent law adds its potential, averaged over both
 // positions, less a quarter of d times the change of its force: with a straight law that is the
-// same product of two elongations. With the centred scheme nothing is subtracted.
+// same product of two elongations. With the discrete gradient nothing is subtracted.
 #pragma once
 
 #include <cstddef>

@@ -17,11 +17,11 @@ constexpr double bend_semitones = 2.0;
 }  // namespace
 
 double Engine::Voices::middle(std::size_t input) const {
-  return machine.hands[input].is_force ? 0.0 : machine.hands[input].position;
+  return machine.inputs[input].is_force ? 0.0 : machine.inputs[input].position;
 }
 
 Stroke Engine::Voices::stroke_on(std::size_t input, const Control* control) const {
-  Stroke stroke{.is_force = machine.hands[input].is_force,
+  Stroke stroke{.is_force = machine.inputs[input].is_force,
                 .middle = middle(input),
                 .rate_ratio = machine.rate_ratio,
                 .rate_hz = machine.rate_hz,
@@ -332,7 +332,7 @@ void Engine::Voices::panic() {
 
 const Control* Engine::Voices::control_for(int number, Gesture gesture) const {
   for (const Control& control : playing.controls) {
-    if (control.gesture == gesture && machine.hands[control.target].number == number) {
+    if (control.gesture == gesture && machine.inputs[control.target].number == number) {
       return &control;
     }
   }
@@ -394,9 +394,9 @@ void Engine::Voices::play_live(const Event& event) {
       say(control->target, control);
     }
   } else if (gesture.live != Live::never) {
-    for (std::size_t i = 0; i < machine.hands.size(); ++i) {
-      if (machine.hands[i].number == event.index &&
-          machine.hands[i].is_force == (gesture.live == Live::on_forces)) {
+    for (std::size_t i = 0; i < machine.inputs.size(); ++i) {
+      if (machine.inputs[i].number == event.index &&
+          machine.inputs[i].is_force == (gesture.live == Live::on_forces)) {
         say(i, nullptr);
       }
     }
@@ -427,7 +427,7 @@ void Engine::process(std::span<const Event> events, std::span<const double* cons
       at = until;
       continue;
     }
-    const std::size_t end = std::min(until, at + max_block_frames - voices_->since_settled);
+    const std::size_t end = std::min(until, at + max_block_frames - voices_->since_update);
     voices_->segment(inputs, outputs, at, end - at);
     at = end;
   }

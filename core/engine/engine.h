@@ -25,7 +25,7 @@ struct Control {
   std::uint8_t lowest_key = 0;
   std::uint8_t highest_key = 127;
   Gesture gesture = Gesture::position;
-  std::uint16_t target = 0;  // index into Machine::hands or Machine::parameters
+  std::uint16_t target = 0;  // index into Machine::inputs or Machine::parameters
   double low = 0.0;          // 0..1 becomes low..high: positions, forces, speeds per sample at
   double high = 1.0;         //   44 100 Hz, parameter values
   bool exponential = false;  // equal steps are equal ratios
@@ -46,7 +46,7 @@ struct Limits {
 // What is known of a part's stillness. With an energy E, measured from where it rests, and nothing
 // that stirs it, an output stays within sqrt(2 E c / s) for ever; c is its compliance where every
 // stiffness is as small as the box of parameters lets it be, s the voice's stiffness factor.
-struct Repose {
+struct RestBound {
   struct Reach {
     std::uint32_t link = 0;   // a contact or a pluck
     double compliance = 0.0;  // of the distance of its ends
@@ -72,7 +72,8 @@ struct Playing {
   std::vector<double> away;     // the same factor at equal steps from there to their limits
   std::vector<Control> controls;
   std::vector<Limits> limits;  // [parameter] that no event and no audio leaves; empty: none
-  std::vector<std::optional<Repose>> repose;  // [part]; nothing, or no element: never at rest
+  std::vector<std::optional<RestBound>>
+      rest_bounds;  // [part]; nothing, or no element: never at rest
 };
 
 enum class Precision : std::uint8_t {

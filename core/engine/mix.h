@@ -19,7 +19,7 @@ struct Heard {
 
 // Sound that moves one input of all lanes, on top of what it does by itself or instead of that.
 template <class T>
-struct AudioHand {
+struct AudioInput {
   const double* samples = nullptr;
   std::size_t frames = 0;
   double scale = 1.0;     // of the samples
@@ -36,7 +36,7 @@ struct Mixer {
   bool (*is_silent)(const double* samples, std::size_t frames);
   // The same row in every frame, [frame * step + i].
   void (*fill_rows)(const T* row, std::size_t step, std::size_t frames, T* value);
-  void (*add_audio)(const AudioHand<T>& hand);
+  void (*add_audio)(const AudioInput<T>& input);
   // The largest |y| of each lane; infinity where one is not below `bound`, or is no number.
   void (*find_peaks)(const Heard<T>& heard, double bound, T* peak);
   // channels[output][frame] += the sum of gain[lane] * y; what has the gain 0 may be anything.

@@ -67,29 +67,30 @@ template <class T>
 }
 
 template <class T>
-[[gnu::always_inline]] inline void add_to(const AudioHand<T>& hand, const double* added, T* rows) {
-  const T kept = hand.replaces ? T(0) : T(1);
-  if (hand.step == 1) {  // one voice and one input: the usual case, and the compiler is to know it
-    add_rows(added, kept, hand.frames, 1, 1, rows);
+[[gnu::always_inline]] inline void add_to(const AudioInput<T>& input, const double* added,
+                                          T* rows) {
+  const T kept = input.replaces ? T(0) : T(1);
+  if (input.step == 1) {  // one voice and one input: the usual case, and the compiler is to know it
+    add_rows(added, kept, input.frames, 1, 1, rows);
   } else {
-    add_rows(added, kept, hand.frames, hand.step, hand.width, rows);
+    add_rows(added, kept, input.frames, input.step, input.width, rows);
   }
 }
 
 template <class T>
-void add_audio(const AudioHand<T>& hand) {
+void add_audio(const AudioInput<T>& input) {
   double here[max_block_frames + 1];
-  here[0] = hand.before;
-  for (std::size_t n = 0; n < hand.frames; ++n) {
-    here[n + 1] = hand.scale * hand.samples[n];
+  here[0] = input.before;
+  for (std::size_t n = 0; n < input.frames; ++n) {
+    here[n + 1] = input.scale * input.samples[n];
   }
-  add_to(hand, here + 1, hand.value);
-  if (hand.velocity != nullptr) {
+  add_to(input, here + 1, input.value);
+  if (input.velocity != nullptr) {
     double change[max_block_frames];
-    for (std::size_t n = 0; n < hand.frames; ++n) {
+    for (std::size_t n = 0; n < input.frames; ++n) {
       change[n] = here[n + 1] - here[n];
     }
-    add_to(hand, change, hand.velocity);
+    add_to(input, change, input.velocity);
   }
 }
 

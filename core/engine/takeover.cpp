@@ -45,7 +45,7 @@ void Engine::Voices::place_before(Bank<T>& b, PartBank<T>& part, std::size_t lan
       b.v[node] = (b.v[node] + w * (k * b.x[node] + g)) / (1.0 - w * z);
     }
   }
-  kernel.place(lane % part.width, b.x.data(), b.v.data());
+  kernel.set_state(lane % part.width, b.x.data(), b.v.data());
 }
 
 // The voices of one kernel.

@@ -10,7 +10,7 @@ namespace {
 constexpr double level_memory_s = 0.1;  // how long a voice's level remembers a peak
 constexpr double quiet_s = 0.5;         // longer than half a period of the slowest sound
 constexpr std::size_t most_reserve_lanes = 4;
-constexpr std::size_t settlings_per_reading = 16;  // of the energy: 20 ms or so
+constexpr std::size_t updates_per_reading = 16;  // of the energy: 20 ms or so
 
 }  // namespace
 
@@ -23,13 +23,13 @@ Engine::Voices::Voices(Machine machine_in, Playing playing_in, Precision precisi
                                 progress)
                : decltype(bank)(std::in_place_type<Bank<double>>, machine, lanes_wanted(), isa,
                                 progress)),
-      audio_control(machine.hands.size(), nullptr),
-      sound(machine.hands.size()),
+      audio_control(machine.inputs.size(), nullptr),
+      sound(machine.inputs.size()),
       level_kept(
           std::exp(-static_cast<double>(max_block_frames) / (level_memory_s * machine.rate_hz))) {
   playing.limits.resize(machine.parameters.size());
   playing.home.resize(machine.parameters.size());
-  playing.repose.resize(machine.parts.size());
+  playing.rest_bounds.resize(machine.parts.size());
   voices.resize(lanes_wanted());
   first_output.push_back(0);
   for (const Program& program : machine.parts) {
@@ -40,10 +40,10 @@ Engine::Voices::Voices(Machine machine_in, Playing playing_in, Precision precisi
   held.resize(voices.size() * first_output.back());
   creators.reserve(max_creators);
   loudest = playing.bare ? runaway : std::min(runaway, runaway_level / playing.gain);
-  drivers.resize(voices.size() * machine.hands.size());
+  drivers.resize(voices.size() * machine.inputs.size());
   parameters = machine.parameters;
-  audio_before.resize(machine.hands.size());
-  for (std::size_t i = 0; i < machine.hands.size(); ++i) {
+  audio_before.resize(machine.inputs.size());
+  for (std::size_t i = 0; i < machine.inputs.size(); ++i) {
     rest.push_back(middle(i));
   }
   for (const Control& control : playing.controls) {
@@ -80,7 +80,7 @@ void Engine::Voices::start(std::size_t lane, double frequency_hz) {
   for (std::size_t p = 0; p < elements.size(); ++p) {
     forget(watch(lane, p));
   }
-  for (std::size_t i = 0; i < machine.hands.size(); ++i) {
+  for (std::size_t i = 0; i < machine.inputs.size(); ++i) {
     driver(lane, i).place(rest[i]);
   }
   last = lane;
@@ -174,10 +174,10 @@ void Engine::Voices::segment(std::span<const double* const> inputs,
     std::visit([&](auto& b) { segment_in(b, inputs, outputs, at, frames); }, bank);
   }
   remember_audio(inputs, at + frames);
-  since_settled += frames;
-  if (since_settled == max_block_frames) {
-    since_settled = 0;
-    settle_all();
+  since_update += frames;
+  if (since_update == max_block_frames) {
+    since_update = 0;
+    update_all();
   }
   if (playing.noise) {
     for (std::size_t n = at; n < at + frames; ++n) {
@@ -242,7 +242,7 @@ Engine::Voices::Pace Engine::Voices::pace_of_some(const Bank<T>& b, std::size_t 
       continue;
     }
     const auto moves = [&](const InputSlot& input) {
-      return sound[input.hand] != nullptr || driver(lane, input.hand).is_moving();
+      return sound[input.input] != nullptr || driver(lane, input.input).is_moving();
     };
     if (watch(lane, p).is_still &&
         std::any_of(program.inputs.begin(), program.inputs.end(), moves)) {
@@ -264,7 +264,7 @@ void Engine::Voices::fill_rest(Bank<T>& b, const PartBank<T>& part, std::size_t 
     for (std::size_t k = 0; k < width; ++k) {
       b.row[i * width + k] =
           first + k < voices.size()
-              ? static_cast<T>(driver(first + k, part.program.inputs[i].hand).value())
+              ? static_cast<T>(driver(first + k, part.program.inputs[i].input).value())
               : T(0);
     }
   }
@@ -291,7 +291,7 @@ void Engine::Voices::fill_drive(Bank<T>& b, std::size_t p, std::size_t first, st
   for (std::size_t i = 0; i < part.program.inputs.size(); ++i) {
     const InputSlot& slot = part.program.inputs[i];
     for (std::size_t lane = first; lane < std::min(voices.size(), first + part.width); ++lane) {
-      InputDriver& mover = driver(lane, slot.hand);
+      InputDriver& mover = driver(lane, slot.input);
       if (!voices[lane].awake || !mover.is_moving()) {
         continue;
       }
@@ -308,20 +308,20 @@ void Engine::Voices::fill_drive(Bank<T>& b, std::size_t p, std::size_t first, st
         mover.fill_positions(frames, step, value, velocity);
       }
     }
-    if (const double* const audio = sound[slot.hand]) {
+    if (const double* const audio = sound[slot.input]) {
       for (std::size_t lane = first; lane < std::min(voices.size(), first + part.width); ++lane) {
         watch(lane, p).is_stirred = true;
       }
       b.filled_part = nullptr;
-      AudioHand<T> added{.samples = audio,
-                         .frames = frames,
-                         .scale = audio_scale(slot.hand),
-                         .before = audio_before[slot.hand],
-                         .replaces = playing.bare,
-                         .value = b.value.data() + i * part.width,
-                         .velocity = nullptr,
-                         .step = step,
-                         .width = part.width};
+      AudioInput<T> added{.samples = audio,
+                          .frames = frames,
+                          .scale = audio_scale(slot.input),
+                          .before = audio_before[slot.input],
+                          .replaces = playing.bare,
+                          .value = b.value.data() + i * part.width,
+                          .velocity = nullptr,
+                          .step = step,
+                          .width = part.width};
       if (!slot.is_force) {
         b.still = 0;
         added.velocity = b.velocity.data() + i * part.width;
@@ -358,7 +358,7 @@ void Engine::Voices::fill_audio(Bank<T>& b, const PartBank<T>& part, std::size_t
 }
 
 double Engine::Voices::audio_scale(std::size_t input) const {
-  const double r = machine.hands[input].is_force ? machine.rate_ratio : 1.0;
+  const double r = machine.inputs[input].is_force ? machine.rate_ratio : 1.0;
   return audio_control[input]->high * r * r;
 }
 
@@ -371,14 +371,14 @@ bool Engine::Voices::sleeps_through(std::span<const double* const> inputs, std::
   if (playing.noise) {
     return false;  // it goes on
   }
-  for (std::size_t input = 0; input < machine.hands.size(); ++input) {
+  for (std::size_t input = 0; input < machine.inputs.size(); ++input) {
     const double* const audio = audio_for(input, inputs);
     if (audio != nullptr && !is_silent(audio + at, frames)) {
       return false;
     }
   }
   remember_audio(inputs, at + frames);
-  since_settled = (since_settled + frames) % max_block_frames;
+  since_update = (since_update + frames) % max_block_frames;
   return true;
 }
 
@@ -390,7 +390,7 @@ const double* Engine::Voices::audio_for(std::size_t input,
 
 void Engine::Voices::listen(std::span<const double* const> inputs, std::size_t at,
                             std::size_t frames) {
-  for (std::size_t input = 0; input < machine.hands.size(); ++input) {
+  for (std::size_t input = 0; input < machine.inputs.size(); ++input) {
     sound[input] = nullptr;
     const double* const audio = audio_for(input, inputs);
     if (audio == nullptr) {
@@ -407,7 +407,7 @@ void Engine::Voices::listen(std::span<const double* const> inputs, std::size_t a
 }
 
 void Engine::Voices::remember_audio(std::span<const double* const> inputs, std::size_t end) {
-  for (std::size_t input = 0; input < machine.hands.size(); ++input) {
+  for (std::size_t input = 0; input < machine.inputs.size(); ++input) {
     if (const double* const audio = audio_for(input, inputs)) {
       audio_before[input] = audio_scale(input) * audio[end - 1];
     }
@@ -493,8 +493,8 @@ void Engine::Voices::lose(Bank<T>& b, std::size_t p, std::size_t lane,
   mix_held(p, lane, outputs, at, sane, frames);
 }
 
-void Engine::Voices::settle_all() {
-  ++settled;
+void Engine::Voices::update_all() {
+  ++updates;
   if (is_idle) {
     return;
   }
@@ -502,16 +502,16 @@ void Engine::Voices::settle_all() {
   is_idle = true;
   for (std::size_t lane = 0; lane < voices.size(); ++lane) {
     if (voices[lane].awake) {
-      settle(lane);
+      update(lane);
     }
     is_idle = is_idle && !voices[lane].awake;
   }
-  if (is_idle || settled % settlings_per_reading == 0) {
+  if (is_idle || updates % updates_per_reading == 0) {
     read_energy();
   }
 }
 
-void Engine::Voices::settle(std::size_t lane) {
+void Engine::Voices::update(std::size_t lane) {
   Voice& voice = voices[lane];
   constexpr std::size_t frames = max_block_frames;
   const double peak = voice.peak * playing.gain * voice.gain;
@@ -527,7 +527,7 @@ void Engine::Voices::settle(std::size_t lane) {
     return;
   }
   voice.quiet_frames = 0;
-  for (std::size_t input = 0; input < machine.hands.size(); ++input) {
+  for (std::size_t input = 0; input < machine.inputs.size(); ++input) {
     if (driver(lane, input).is_moving()) {
       return;
     }

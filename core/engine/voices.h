@@ -36,7 +36,7 @@ struct Voice {
   double gain = 1.0;
   double gain_step = 0.0;  // per sample
   double next_gain(double now) const { return std::max(0.0, now + gain_step); }
-  double peak = 0.0;   // of the network's output since the last settling
+  double peak = 0.0;   // of the network's output since the last update
   double level = 0.0;  // peak of the output, slowly forgotten
   std::size_t quiet_frames = 0;
 };
@@ -52,7 +52,7 @@ struct Watch {
   double energy = 0.0;
   double loss = 0.0;         // of it in a sample between them, unless...
   bool is_driven = true;     // ...something came from outside then
-  std::uint64_t looked = 0;  // Playback::settled
+  std::uint64_t looked = 0;  // Playback::updates
 };
 
 // A look at one part in one voice: as it was at one time, its energy added up a slice at a time.
@@ -61,7 +61,7 @@ struct Look {
   std::size_t at = none;  // of the watches
   std::size_t done = 0;   // of its elements
   bool was_stirred = false;
-  std::uint64_t settled = 0;  // when it was
+  std::uint64_t updates = 0;  // when it was
   Energy energy;
 };
 
@@ -78,11 +78,11 @@ struct Playback {
   std::vector<double> audio_before;    // [input]
   double bend = 0.0;
   std::array<bool, 16> pedal{};
-  std::size_t last = 0;           // the lane that was played last: direct gestures act on it
-  std::size_t since_settled = 0;  // frames, below max_block_frames between two segments
-  std::uint64_t settled = 0;      // times
-  std::size_t still = 0;          // watches of what stands still
-  EngineMeters metered;           // the energy, as read_energy() found it
+  std::size_t last = 0;          // the lane that was played last: direct gestures act on it
+  std::size_t since_update = 0;  // frames, below max_block_frames between two segments
+  std::uint64_t updates = 0;     // times
+  std::size_t still = 0;         // watches of what stands still
+  EngineMeters metered;          // the energy, as read_energy() found it
   std::uint64_t resets = 0;
   std::uint64_t stolen = 0;
   std::uint64_t shed = 0;
@@ -117,7 +117,7 @@ struct Engine::Voices : Playback {
   // --- inputs ---
   double middle(std::size_t input) const;
   InputDriver& driver(std::size_t lane, std::size_t input) {
-    return drivers[lane * machine.hands.size() + input];
+    return drivers[lane * machine.inputs.size() + input];
   }
   // What a gesture is to know of an input and of the control that asks for it, if one does.
   Stroke stroke_on(std::size_t input, const Control* control) const;
@@ -267,8 +267,8 @@ struct Engine::Voices : Playback {
   // Keeps the voice's level and sends it to sleep when it has faded or come to rest. Once in
   // max_block_frames, counted from the engine's start: so what sleeps or gives way does not
   // depend on how the time is cut into blocks.
-  void settle(std::size_t lane);
-  void settle_all();
+  void update(std::size_t lane);
+  void update_all();
   // Whether nothing moves anywhere: a slow wave may still be on its way to the output.
   bool is_at_rest(std::size_t lane) const;
   // Uniform in -1..1: xorshift, from a fixed seed so that a render repeats.
@@ -293,11 +293,11 @@ struct Engine::Voices : Playback {
   std::size_t suspect = none;  // of the watches: is looked at more often, as something was created
   std::size_t looks_left = 0;  // at it
   std::size_t turn = 0;        // of the watches: the next to be looked at
-  std::size_t looks_due = 0;   // settlings, times watches: what looks are paid with
+  std::size_t looks_due = 0;   // updates, times watches: what looks are paid with
   bool is_idle = false;        // nobody is awake
   bool has_lost = false;       // a voice its stability, in this segment
   double loudest = 0.0;        // what no output reaches
-  double level_kept = 0.0;     // of a voice's level from one settling to the next
+  double level_kept = 0.0;     // of a voice's level from one update to the next
 };
 
 }  // namespace ressort

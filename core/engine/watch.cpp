@@ -9,11 +9,11 @@
 namespace ressort {
 namespace {
 
-// So many settlings are there for one look at each part of each voice. A look costs as much as some
+// So many updates are there for one look at each part of each voice. A look costs as much as some
 // five to twenty steps.
-constexpr std::size_t settlings_per_look = 4096 / max_block_frames;
+constexpr std::size_t updates_per_look = 4096 / max_block_frames;
 
-// What is added up in one settling. Looking at a larger part takes several, and who makes energy
+// What is added up in one update. Looking at a larger part takes several, and who makes energy
 // there is not sought.
 constexpr std::size_t most_elements = 16384;
 
@@ -140,7 +140,7 @@ void Engine::Voices::look_around() {
 std::size_t Engine::Voices::price_of(std::size_t at) const {
   const std::size_t p = at % elements.size();
   const std::size_t width = std::visit([&](const auto& b) { return b.parts[p].width; }, bank);
-  return settlings_per_look * std::clamp<std::size_t>(std::min(width, voices.size()) / 4, 1, 4);
+  return updates_per_look * std::clamp<std::size_t>(std::min(width, voices.size()) / 4, 1, 4);
 }
 
 void Engine::Voices::look(std::size_t at) {
@@ -156,7 +156,7 @@ void Engine::Voices::begin_look(Bank<T>& b, std::size_t at) {
     return;
   }
   looking = {
-      .at = at, .done = 0, .was_stirred = watches[at].is_stirred, .settled = settled, .energy = {}};
+      .at = at, .done = 0, .was_stirred = watches[at].is_stirred, .updates = updates, .energy = {}};
   watches[at].is_stirred =
       kernel.coefficients.ramp_frames > 0 || !part.program.audio_coefficients.empty();
   go_on_looking(b);
@@ -179,11 +179,11 @@ void Engine::Voices::go_on_looking(Bank<T>& b) {
 
 void Engine::Voices::enter(Watch& here, const Look& seen) {
   here.is_driven = seen.was_stirred || !here.is_metered;
-  const auto frames = static_cast<double>((seen.settled - here.looked) * max_block_frames);
+  const auto frames = static_cast<double>((seen.updates - here.looked) * max_block_frames);
   here.loss = here.is_driven ? 0.0 : (here.energy - seen.energy.value) / frames;
   here.is_metered = true;
   here.energy = seen.energy.value;
-  here.looked = seen.settled;
+  here.looked = seen.updates;
 }
 
 void Engine::Voices::read_energy() {
@@ -259,30 +259,31 @@ void Engine::Voices::accuse(const Program& program, LaneValues<T> values, const 
 template <class T>
 bool Engine::Voices::may_rest(const Bank<T>& b, std::size_t lane, std::size_t p,
                               double energy) const {
-  if (playing.bare || !playing.repose[p] || voices[lane].fading) {
+  if (playing.bare || !playing.rest_bounds[p] || voices[lane].fading) {
     return false;
   }
-  const Repose& repose = *playing.repose[p];
+  const RestBound& bound = *playing.rest_bounds[p];
   const PartBank<T>& part = b.parts[p];
   const double most = 2.0 * energy / voices[lane].factor;
-  for (const double compliance : repose.compliances) {
+  for (const double compliance : bound.compliances) {
     if (!(playing.gain * std::sqrt(most * compliance) < silent_level)) {
       return false;
     }
   }
   for (std::size_t i = 0; i < parameters.size(); ++i) {
     if (!part.program.depending[i].empty() &&
-        !(parameters[i] >= repose.box[i].lowest && parameters[i] <= repose.box[i].highest)) {
+        !(parameters[i] >= bound.box[i].lowest && parameters[i] <= bound.box[i].highest)) {
       return false;
     }
   }
   const LaneValues<T> values{part.of(lane).coefficients.value.data(), part.width,
                              lane % part.width};
   return rests_at_zero(part.program, values, b.x.data()) &&
-         std::all_of(repose.reaches.begin(), repose.reaches.end(), [&](const Repose::Reach& reach) {
-           return distance_at_rest(part.program, values, b.x.data(), reach.link) >
-                  std::sqrt(most * reach.compliance);
-         });
+         std::all_of(bound.reaches.begin(), bound.reaches.end(),
+                     [&](const RestBound::Reach& reach) {
+                       return distance_at_rest(part.program, values, b.x.data(), reach.link) >
+                              std::sqrt(most * reach.compliance);
+                     });
 }
 
 }  // namespace ressort

@@ -17,8 +17,8 @@ struct Workload {
   bool is_compensated = false;  // which only one form is
   Isa isa = Isa::base;
   int voices = 1;
-  double highest_factor = 1.0;  // on every stiffness, that a voice may have
-  Crew* crew = nullptr;         // that large parts may be shared out to; null: one core for all
+  double highest_factor = 1.0;   // on every stiffness, that a voice may have
+  Executor* executor = nullptr;  // that large parts may be shared out to; null: one core for all
 };
 
 // Links by what they cost: those that only pull, in a line or bent, and those that have to look

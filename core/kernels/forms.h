@@ -101,7 +101,7 @@ struct ModalOutput {
 struct ModalPush {
   enum class By : std::uint8_t {
     force,     // an input's value
-    hand,      // an input's position on springs: K (x - start) + Z v, of the tick before
+    position,  // an input's position on springs: K (x - start) + Z v, of the tick before
     constant,  // a coefficient, of now
     late,      // a coefficient, of the tick before
   };
@@ -200,16 +200,16 @@ struct Grid {
 
 inline constexpr std::size_t most_grid_offsets = 8;
 
-// A spring of a Chorus, if there is one.
-struct ChorusSpring {
+// A spring of a Batch, if there is one.
+struct BatchSpring {
   static constexpr std::uint32_t none = 0xffffffffu;
   std::uint32_t stiffness = none;  // coefficients
   std::uint32_t damping = none;
   std::uint32_t node = none;  // what has no inertia, that an anchor hangs on
 };
 
-// Any other link of a Chorus.
-struct ChorusLink {
+// Any other link of a Batch.
+struct BatchLink {
   std::uint32_t run = 0;  // of Program::link_runs
   std::uint32_t a = 0;    // nodes
   std::uint32_t b = 0;
@@ -220,21 +220,21 @@ inline constexpr std::uint32_t most_held_pairs = 6;
 
 // A small body in many voices, several packs of them as one. At most most_held_masses masses stay
 // in registers, with the springs between any two of them and one anchor each; the links that are
-// none of these follow one by one. More masses are walked through in memory, as they are written.
-struct Chorus {
-  std::array<ChorusSpring, most_held_pairs> pairs;     // masses (0, 1), (0, 2), (1, 2), (0, 3)...
-  std::array<ChorusSpring, most_held_masses> anchors;  // [mass]
-  std::vector<ChorusLink> links;
+// none of these follow one by one. More masses are stepped in memory, as they are written.
+struct Batch {
+  std::array<BatchSpring, most_held_pairs> pairs;     // masses (0, 1), (0, 2), (1, 2), (0, 3)...
+  std::array<BatchSpring, most_held_masses> anchors;  // [mass]
+  std::vector<BatchLink> links;
 };
 
 // A large network on several cores: shards of it (sharded.h), each in a form of its own, stepped by
-// a crew at the same time.
+// a executor at the same time.
 struct Shard;
-class Crew;
+class Executor;
 struct Shards {
   std::shared_ptr<const std::vector<Shard>> shards;
-  Crew* crew = nullptr;      // outlives the kernels
-  std::uint32_t frames = 1;  // samples that they go on without each other
+  Executor* executor = nullptr;  // outlives the kernels
+  std::uint32_t frames = 1;      // samples that they go on without each other
 };
 
 // Links that follow each other.
@@ -262,6 +262,6 @@ struct Slow {
 };
 
 using Form =
-    std::variant<Direct, Chains, Dense, Modes, Grid, Chorus, Shards, Fourth, Compensated, Slow>;
+    std::variant<Direct, Chains, Dense, Modes, Grid, Batch, Shards, Fourth, Compensated, Slow>;
 
 }  // namespace ressort

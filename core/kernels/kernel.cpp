@@ -74,7 +74,7 @@ bool Kernel<T>::read(std::span<const std::uint32_t>, T*, T*) const {
 }
 
 template <class T>
-bool Kernel<T>::mend(std::span<const std::uint32_t>, const T*, const T*) {
+bool Kernel<T>::write_nodes(std::span<const std::uint32_t>, const T*, const T*) {
   return false;
 }
 

@@ -16,7 +16,7 @@ namespace ressort {
 inline constexpr std::size_t max_block_frames = 64;
 
 // What a kernel is driven by and what it fills, for at most max_block_frames samples. To a kernel's
-// loops a block of none says that nodes were mended.
+// loops a block of none says that nodes were written.
 template <class T>
 struct Block {
   std::size_t frames = 0;
@@ -102,9 +102,9 @@ class Kernel {
 
   // Puts one lane to positions and velocities, [node]; its coefficients stay. Nothing pulls in the
   // next sample. [audio]
-  virtual void place(std::size_t lane, const double* x, const double* v) = 0;
+  virtual void set_state(std::size_t lane, const double* x, const double* v) = 0;
   // The same, to where the model starts.
-  void reset(std::size_t lane) { place(lane, start_.position.data(), start_.velocity.data()); }
+  void reset(std::size_t lane) { set_state(lane, start_.position.data(), start_.velocity.data()); }
   // Where every node is after the last sample, and how fast; false where the kernel does not know
   // of all. [audio]
   virtual bool save(std::size_t lane, double* x, double* v) const = 0;
@@ -113,7 +113,7 @@ class Kernel {
   // Moves some nodes between two blocks. In the next sample links pull as if these had come to be
   // there by themselves; nothing else is touched, not even the last bit. False where the kernel
   // knows of no single nodes. [audio]
-  virtual bool mend(std::span<const std::uint32_t> nodes, const T* x, const T* v);
+  virtual bool write_nodes(std::span<const std::uint32_t> nodes, const T* x, const T* v);
   // Plays the block by the published scheme, v += F/M, x += v: masses, then position inputs, then
   // links; the outputs are the new positions. Forces given act in their own sample. [audio]
   void step(const Block<T>& block) {

@@ -44,12 +44,12 @@ std::vector<PassiveLink> passive_links(const Program& program) {
   for (const LinkRun& run : program.link_runs) {
     for (std::uint32_t i = run.first; run.scheme != Scheme::plain && i < run.first + run.count;
          ++i) {
-      links.push_back(
-          {.law = run.law,
-           .is_implicit = run.scheme == Scheme::centred && facts_of(run.law).has_discrete_gradient,
-           .substeps = std::clamp<int>(run.substeps, 1, most_substeps),
-           .coefficients = run.coefficients,
-           .ends = program.ends[i]});
+      links.push_back({.law = run.law,
+                       .is_implicit = run.scheme == Scheme::discrete_gradient &&
+                                      facts_of(run.law).has_discrete_gradient,
+                       .substeps = std::clamp<int>(run.substeps, 1, most_substeps),
+                       .coefficients = run.coefficients,
+                       .ends = program.ends[i]});
     }
   }
   std::vector<std::uint32_t> holders(program.position.size(), 0);

@@ -200,7 +200,7 @@ struct Joint {
 
   // Half of a step is taken back where it made things worse. Gives whether anything changed.
   template <class Body>
-  bool settle(Body& body, decltype(V{} == V{}) live) {
+  bool solve(Body& body, decltype(V{} == V{}) live) {
     V least{};
     Push<V> last[most_joint]{};
     bool has_changed = false;
@@ -231,8 +231,8 @@ struct Joint {
 }  // namespace
 
 template <class V, class Body>
-[[gnu::noinline]] static void settle(const std::vector<PassiveLink>& links, V* memory, Body& body,
-                                     decltype(V{} == V{}) live) {
+[[gnu::noinline]] static void solve(const std::vector<PassiveLink>& links, V* memory, Body& body,
+                                    decltype(V{} == V{}) live) {
   const auto shared = std::count_if(links.begin(), links.end(),
                                     [](const PassiveLink& link) { return link.is_shared; });
   const int rounds = shared > static_cast<std::ptrdiff_t>(most_joint) ? most_rounds : 1;
@@ -247,7 +247,7 @@ template <class V, class Body>
         joint.rows[joint.count++] = row;
       }
       if (joint.count == most_joint || (i + 1 == links.size() && joint.count > 0)) {
-        goes_on = joint.settle(body, live) || goes_on;
+        goes_on = joint.solve(body, live) || goes_on;
         joint.count = 0;
       }
     }
@@ -271,7 +271,7 @@ static inline void correct(const std::vector<PassiveLink>& links, V* memory, Bod
     live = live & sweep(links, memory, body, live);
   }
   if (is_shared && any_of(live)) {
-    settle(links, memory, body, live);
+    solve(links, memory, body, live);
   }
 }
 

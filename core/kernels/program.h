@@ -33,9 +33,9 @@ struct MassRun {
 
 // How the force of a link is found.
 enum class Scheme : std::uint8_t {
-  plain,     // from where its ends are, as published
-  centred,   // from where they were and will be, so that it gains no energy
-  substeps,  // several times a sample
+  plain,              // from where its ends are, as published
+  discrete_gradient,  // from where they were and will be, so that it gains no energy
+  substeps,           // several times a sample
 };
 
 // Consecutive links that share law, coefficients and scheme.
@@ -54,7 +54,7 @@ struct Ends {
 };
 
 struct InputSlot {
-  std::uint32_t hand = 0;  // index into Machine::hands: what drives it
+  std::uint32_t input = 0;  // index into Machine::inputs: what drives it
   bool is_force = false;
   std::uint32_t node = 0;
 };
@@ -111,7 +111,7 @@ struct Program {
 bool is_plain(const Program& program);
 
 // What drives an input, wherever in the network it is.
-struct HandSlot {
+struct ModelInput {
   int number = 1;  // from 1, as in the model
   bool is_force = false;
   double position = 0.0;  // where it starts; 0 for a force
@@ -122,7 +122,7 @@ struct Machine {
   double rate_hz = 44100.0;
   double rate_ratio = 1.0;
   std::vector<double> parameters;  // [parameter] at the start
-  std::vector<HandSlot> hands;     // [input of the model]
+  std::vector<ModelInput> inputs;  // [input of the model]
   std::uint32_t channels = 0;
   std::vector<Program> parts;
 };

@@ -5,10 +5,10 @@
 #include <type_traits>
 #include <utility>
 
+#include "core/kernels/batch/batch.h"
+#include "core/kernels/batch/batch_form.h"
 #include "core/kernels/chains/chains.h"
 #include "core/kernels/chains/chains_form.h"
-#include "core/kernels/chorus/chorus.h"
-#include "core/kernels/chorus/chorus_form.h"
 #include "core/kernels/dense/dense.h"
 #include "core/kernels/dense/dense_form.h"
 #include "core/kernels/direct/compensated.h"
@@ -81,8 +81,8 @@ constexpr KernelRow rows[] = {
                             [](const Request& r) { return dense_form(r.program); }),
     row<Grid, GridKernel>(Method::grid, "grid", Use::published,
                           [](const Request& r) { return grid_form(r.program, r.progress); }),
-    row<Chorus, ChorusKernel>(Method::chorus, "chorus", Use::published,
-                              [](const Request& r) { return chorus_form(r.program); }),
+    row<Batch, BatchKernel>(Method::batch, "batch", Use::published,
+                            [](const Request& r) { return batch_form(r.program); }),
     row<Modes, ModalKernel>(
         Method::modal, "modal", Use::published,
         [](const Request& r) { return modal_form(r.program, r.budget, r.progress); },

@@ -62,7 +62,7 @@ static constexpr Scalar<V> tiny_share() {
 inline constexpr int most_newton_steps = 48;
 
 // The f = g(after) that solves after + gamma g(after) = free between `far` and `free`: Newton, and
-// by halves where that would leap too far or g falls too steeply. Lanes that have arrived stay, so
+// by halves where that would step too far or g falls too steeply. Lanes that have arrived stay, so
 // that no lane depends on another.
 template <class V, class Force>
 static inline V force_between(V far, V start, V free, V gamma, Force&& g) {
@@ -78,8 +78,9 @@ static inline V force_between(V far, V start, V free, V gamma, Force&& g) {
     low = select(over < V{}, after, low);
     high = select(over < V{}, high, after);
     const V steep = one + gamma * here.slope;
-    const V leap = after - over / steep;
-    const V next = select((leap >= low) & (leap <= high) & (steep > V{}), leap, (low + high) / 2);
+    const V newton = after - over / steep;
+    const V next =
+        select((newton >= low) & (newton <= high) & (steep > V{}), newton, (low + high) / 2);
     const auto goes_on = absolute(next - after) > tiny * (absolute(after) + absolute(free));
     after = select(live, next, after);
     live = live & goes_on;

@@ -66,7 +66,7 @@ void Reader::decide_by_dialect() {
     return;
   }
   const auto doubt = [&](const auto& element) {
-    say(Severity::warning, element.place.line, {element.name, element.place.column},
+    say(Severity::warning, element.location.line, {element.name, element.location.column},
         "its motion is read as " + out_.motion + "; but " + line_of(delayed_.line) + " " +
             std::string(delayed_.what) +
             ", which is MIMS: '~motion delayed' reads the motions as "
@@ -104,16 +104,16 @@ void Reader::decide_by_states() {
   }
   if (shows_delayed == nullptr) {
     return choose_motion(velocity,
-                         line_of(shows_velocity->place.line) + " has a rest away from 0 with 0");
+                         line_of(shows_velocity->location.line) + " has a rest away from 0 with 0");
   }
   const bool is_rest = shows_delayed->position != 0.0;
-  choose_motion(delayed, line_of(shows_delayed->place.line) +
+  choose_motion(delayed, line_of(shows_delayed->location.line) +
                              (is_rest ? " has a rest with the position itself" : " starts from 0"));
   if (shows_velocity == nullptr) {
     return;
   }
-  say(Severity::warning, shows_velocity->place.line,
-      {shows_velocity->name, shows_velocity->place.column},
+  say(Severity::warning, shows_velocity->location.line,
+      {shows_velocity->name, shows_velocity->location.column},
       "a motion of 0 is read as rest, although the motion is " + out_.motion +
           "; '~motion velocity' or '~motion delayed' ends this doubt");
   for (Mass& mass : network.masses) {

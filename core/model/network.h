@@ -14,10 +14,12 @@
 namespace ressort {
 
 // Where an element stands in its text; both count from 1.
-struct Place {
+struct SourceLocation {
   int line = 0;
   int column = 0;
-  bool operator==(const Place&) const { return true; }  // the same network, wherever it is written
+  bool operator==(const SourceLocation&) const {
+    return true;
+  }  // the same network, wherever it is written
 };
 
 // A scalar that may change while the network sounds: turned by a person, or, if `audio_input` is
@@ -26,7 +28,7 @@ struct Parameter {
   std::string name;
   double value = 0.0;
   int audio_input = 0;  // N of @inN
-  Place place;
+  SourceLocation location;
   bool operator==(const Parameter&) const = default;
 };
 
@@ -55,7 +57,7 @@ struct Mass {
   double third = 0.0;                  // the last state argument; Network::third says what it means
   std::uint32_t tap = 0;               // index into Network::taps, points only
   std::uint32_t drawing = 0;           // 1 + index into Network::drawings; 0 for none
-  Place place;
+  SourceLocation location;
   bool operator==(const Mass&) const = default;
 };
 
@@ -88,7 +90,7 @@ struct Macro {
   double position = 0.0;                 // of every node
   double third = 0.0;                    // as of Mass
   std::uint32_t drawing = 0;
-  Place place;
+  SourceLocation location;
   bool operator==(const Macro&) const = default;
 };
 
@@ -120,7 +122,7 @@ struct Link {
   std::uint32_t b = 0;
   std::array<ArgumentId, most_law_arguments> arguments = {no_argument, no_argument, no_argument,
                                                           no_argument, no_argument};
-  Place place;
+  SourceLocation location;
   bool operator==(const Link&) const = default;
 };
 
@@ -136,7 +138,7 @@ struct Input {
   int number = 1;  // N of @inN
   bool is_force = false;
   std::uint32_t mass = 0;
-  Place place;
+  SourceLocation location;
   bool operator==(const Input&) const = default;
 };
 
@@ -145,7 +147,7 @@ struct Output {
   int number = 1;
   bool is_force = false;
   std::uint32_t mass = 0;
-  Place place;
+  SourceLocation location;
   bool operator==(const Output&) const = default;
 };
 

@@ -32,7 +32,7 @@ void add_nodes(const Macro& macro, const Progress& progress, Network& network) {
   for (std::uint32_t i = 0; i < macro.length; ++i) {
     progress.spend(4 * std::size_t{macro.width});
     for (std::uint32_t j = 0; j < macro.width; ++j) {
-      Mass node{.position = macro.position, .third = macro.third, .place = macro.place};
+      Mass node{.position = macro.position, .third = macro.third, .location = macro.location};
       if (is_fixed(macro, i, j)) {
         node.kind = MassKind::ground;
       } else {
@@ -50,7 +50,7 @@ void add_nodes(const Macro& macro, const Progress& progress, Network& network) {
 void add_links(const Macro& macro, std::uint32_t first, const Progress& progress,
                Network& network) {
   const auto add = [&](std::uint32_t a, std::uint32_t b, ArgumentId stiffness, ArgumentId damping) {
-    Link link{.a = first + a, .b = first + b, .place = macro.place};
+    Link link{.a = first + a, .b = first + b, .location = macro.location};
     link.arguments[0] = stiffness;
     link.arguments[1] = damping;
     network.links.push_back(std::move(link));

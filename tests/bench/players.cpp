@@ -90,8 +90,8 @@ class KernelPlayer : public Player {
   void drive(const BenchScene& scene) {
     for (std::size_t n = 0; n < cycle_frames; ++n) {
       for (const InputSlot& input : program_.inputs) {
-        const double here = scene.hand(input.hand, n);
-        const double before = scene.hand(input.hand, (n + cycle_frames - 1) % cycle_frames);
+        const double here = scene.hand(input.input, n);
+        const double before = scene.hand(input.input, (n + cycle_frames - 1) % cycle_frames);
         value_.insert(value_.end(), width_, static_cast<T>(here));
         velocity_.insert(velocity_.end(), width_, static_cast<T>(here - before));
       }
@@ -116,16 +116,16 @@ class EnginePlayer : public Player {
   EnginePlayer(const BenchScene& scene, const Network& network, const Machine& machine,
                Precision precision, Isa isa)
       : engine_(machine, playing(scene, network, machine), precision, isa) {
-    for (std::size_t input = 0; input < machine.hands.size(); ++input) {
+    for (std::size_t input = 0; input < machine.inputs.size(); ++input) {
       for (std::size_t n = 0; n < cycle_frames; ++n) {
-        inputs_.push_back(scene.hand(input, n) - machine.hands[input].position);
+        inputs_.push_back(scene.hand(input, n) - machine.inputs[input].position);
       }
     }
     outputs_.resize(static_cast<std::size_t>(engine_.output_count()) * block_frames);
     for (std::size_t c = 0; c * block_frames < outputs_.size(); ++c) {
       output_pointers_.push_back(outputs_.data() + c * block_frames);
     }
-    input_pointers_.resize(machine.hands.size());
+    input_pointers_.resize(machine.inputs.size());
     for (std::size_t block = 0; block < cycle_blocks; ++block) {
       for (const Turn& turn : scene.turns) {
         events_.push_back({.kind = EventKind::parameter,
@@ -148,7 +148,7 @@ class EnginePlayer : public Player {
  private:
   static Playing playing(const BenchScene& scene, const Network& network, const Machine& machine) {
     Playing playing{.voices = static_cast<int>(scene.voices)};
-    for (std::uint16_t i = 0; i < machine.hands.size(); ++i) {
+    for (std::uint16_t i = 0; i < machine.inputs.size(); ++i) {
       playing.controls.push_back(
           {.source = Source::audio, .number = i, .target = i, .low = 0.0, .high = 1.0});
     }

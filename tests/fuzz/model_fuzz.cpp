@@ -112,8 +112,8 @@ void play(const Network& network, Preset preset, CompileOptions options) {
   if (!first) {
     return require(!first.error().message.empty());
   }
-  if (first->gate.verdict == Verdict::unstable) {
-    require(first->gate.complaint.has_value());
+  if (first->stability.verdict == Verdict::unstable) {
+    require(first->stability.complaint.has_value());
     options.force = true;
     first = compile(network, preset, options);
     require(static_cast<bool>(first));

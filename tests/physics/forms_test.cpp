@@ -3,8 +3,8 @@
 #include <map>
 #include <set>
 
+#include "core/kernels/batch/batch_form.h"
 #include "core/kernels/chains/chains_form.h"
-#include "core/kernels/chorus/chorus_form.h"
 #include "core/kernels/dense/dense_form.h"
 #include "core/kernels/grid/grid_form.h"
 #include "core/kernels/modal/modal_form.h"
@@ -39,7 +39,7 @@ std::vector<std::pair<Method, Form>> forms_of(const Program& program) {
   add_form(forms, Method::dense, dense_form(program));
   add_form(forms, Method::modal, modal_form(program));
   add_form(forms, Method::grid, grid_form(program));
-  add_form(forms, Method::chorus, chorus_form(program));
+  add_form(forms, Method::batch, batch_form(program));
   return forms;
 }
 
@@ -193,7 +193,7 @@ TEST_CASE("a bow's profile is turned while it sounds, in every form that can hol
     CHECK(left.relative() > 0.01);
   }
   CHECK(taken == std::set{Method::direct, Method::chains, Method::dense, Method::modal,
-                          Method::grid, Method::chorus});
+                          Method::grid, Method::batch});
 }
 
 }  // namespace ressort

@@ -15,8 +15,8 @@ double of_any_size(Random& random, double least, double most) {
 
 // Masses on springs that are stable, and bent links of every kind but plucks, far stiffer than the
 // published scheme can take, most of them sharing masses; two hands that hold bent links only, and
-// are heard for what they hold against; two forces. Bows are as strong as what is centred may be.
-// A pluck is a hill that substeps go over, and no potential to the last digit.
+// are heard for what they hold against; two forces. Bows are as strong as the discrete gradient
+// allows. A pluck is a hill that substeps go over, and no potential to the last digit.
 std::string abused(std::uint64_t seed) {
   Random random(seed);
   const std::size_t masses = 1 + random.below(6);
@@ -83,11 +83,11 @@ class Ledger {
  public:
   Ledger(const std::string& text, Passivity passive)
       : body_(text, passive),
-        centred_(program_of(text, Passivity::always)),
+        passive_(program_of(text, Passivity::always)),
         force_(body_.x.size()),
         v_(body_.v) {
-    for (const Coefficient& c : centred_.coefficients) {
-      coefficients_.push_back(coefficient_value(centred_, c, centred_.parameters, 1.0));
+    for (const Coefficient& c : passive_.coefficients) {
+      coefficients_.push_back(coefficient_value(passive_, c, passive_.parameters, 1.0));
     }
     go({0.0, 0.1, 0.0, 0.0});
     last_ = energy().value;
@@ -126,9 +126,9 @@ class Ledger {
   bool is_finite = true;
 
  private:
-  // As if all were centred.
+  // as if all were played by the discrete gradient.
   Energy energy() const {
-    return energy_of(centred_, LaneValues<double>{coefficients_.data(), 1}, body_.x.data(),
+    return energy_of(passive_, LaneValues<double>{coefficients_.data(), 1}, body_.x.data(),
                      body_.v.data());
   }
 
@@ -156,7 +156,7 @@ class Ledger {
 
   double last_ = 0.0;
   Stepper<double> body_;
-  Program centred_;
+  Program passive_;
   std::vector<double> coefficients_;  // of that
   std::vector<double> force_;         // [node]
   std::vector<double> v_;             // a sample ago

@@ -242,7 +242,7 @@ std::vector<double> struck_string(Program program, double k, int frames, Spread*
   Bare<double> string(std::move(program));
   std::vector<double> x = drawn(string.program());
   std::vector<double> v(x.size(), 0.0);
-  string.kernel().place(0, x.data(), v.data());
+  string.kernel().set_state(0, x.data(), v.data());
   std::vector<double> heard;
   double start = 0.0;
   for (int n = 0; n < frames; ++n) {
@@ -286,7 +286,8 @@ TEST_CASE("S14, T14: a pluck snaps as it should, however stiff it is or fast it 
 }
 
 TEST_CASE("S15, T15: a strong bow grips as it should", "[stress_contacts]") {
-  // Reference: Runge-Kutta at 50 steps a sample, as tabled; centred up to 2.5, above in substeps.
+  // Reference: Runge-Kutta at 50 steps a sample, as tabled; discrete gradient up to 2.5, above in
+  // substeps.
   struct Row {
     double z;
     double rms;
@@ -312,7 +313,8 @@ TEST_CASE("S15, T15: a strong bow grips as it should", "[stress_contacts]") {
   CHECK(bowed(2.9, Passivity::never).rms > 1.9 * bowed_finely(2.9).rms);
 }
 
-TEST_CASE("S16, T15: the seed's bowed string sounds the same centred", "[stress_contacts]") {
+TEST_CASE("S16, T15: the seed's bowed string sounds the same by the discrete gradient",
+          "[stress_contacts]") {
   // Reference: sixteen times the rate. As published it is as good: a weak bow is left alone.
   const std::vector<double> fine = bowed_string(16, Passivity::always);
   const double period = period_of(fine, 44100.0 / 23.068);

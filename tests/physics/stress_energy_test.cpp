@@ -18,7 +18,7 @@ class Lab {
       : bare(rig::program_of(text)), x(bare.program().position.size()), v(x.size()) {
     read();
   }
-  void place(std::vector<double> positions, std::vector<double> velocities) {
+  void set_state(std::vector<double> positions, std::vector<double> velocities) {
     std::vector<std::uint32_t> all(x.size());
     for (std::uint32_t node = 0; node < all.size(); ++node) {
       all[node] = node;
@@ -31,7 +31,7 @@ class Lab {
       wide_x[i] = x[i / lanes];
       wide_v[i] = v[i / lanes];
     }
-    REQUIRE(bare.kernel().mend(all, wide_x.data(), wide_v.data()));
+    REQUIRE(bare.kernel().write_nodes(all, wide_x.data(), wide_v.data()));
   }
   void set(double parameter, bool ramped = false) {
     bare.set_coefficients(0, {parameter}, 1.0, ramped);
@@ -76,7 +76,7 @@ TEST_CASE("S01: an oscillator at the edge of stability", "[stress_energy]") {
         Row{0.5, 1e-6, 3.277, 1e-3}}) {
     Lab lab("@m osc 1. " + digits(4.0 - 2.0 * z + beyond) + " " + digits(z) +
             " 0. 0.\n@out1 posOutput @m\n");
-    lab.place({1.0}, {0.0});
+    lab.set_state({1.0}, {0.0});
     double most = 1.0;
     double growth = 0.0;  // per sample, over the second half
     for (int n = 1; n <= 44100; ++n) {
@@ -98,7 +98,7 @@ TEST_CASE("S01: an oscillator at the edge of stability", "[stress_energy]") {
       CHECK(growth == Approx(std::log1p(root)).epsilon(z == 0.0 ? 1e-6 : 3e-2));
     }
     // The meter knows: where it can be negative nothing holds the amplitude.
-    lab.place({-1.0}, {-2.0});
+    lab.set_state({-1.0}, {-2.0});
     CHECK((lab.energy() < 0.0) == (beyond > 0.0));
   }
 }
@@ -111,7 +111,7 @@ TEST_CASE("S03: a string at the edge of stability", "[stress_energy]") {
     Lab lab(scenes::string("s", 50, digits(k), "0.") + scenes::output(1, "s_m20"));
     std::vector<double> start(50);
     start[14] = 1.0;
-    lab.place(start, {});
+    lab.set_state(start, {});
     const double energy = lab.energy();
     double most = 0.0;
     double middle = 0.0;
@@ -133,7 +133,7 @@ TEST_CASE("S03: a string at the edge of stability", "[stress_energy]") {
 TEST_CASE("S04: a damper against the ground", "[stress_energy]") {
   for (const double z : {0.1, 0.5, 1.0, 1.5, 1.999, 2.0, 2.001, 3.0}) {
     Lab lab(oscillator(0.0, z));
-    lab.place({0.0}, {1.0});
+    lab.set_state({0.0}, {1.0});
     for (int n = 1; n <= 20; ++n) {
       const double before = lab.energy();
       lab.step();
@@ -155,7 +155,7 @@ TEST_CASE("S04: a damper against the ground", "[stress_energy]") {
 TEST_CASE("S12: a jump of stiffness adds what the scheme's own formula says", "[stress_energy]") {
   const auto jumped = [](int after, double& formula) {
     Lab lab("@k param 0.1\n@m osc 1. k 0. 0. 0.\n@out1 posOutput @m\n");
-    lab.place({1.0}, {0.0});
+    lab.set_state({1.0}, {0.0});
     for (int n = 0; n < after; ++n) {
       lab.step();
     }
@@ -185,7 +185,7 @@ TEST_CASE("S12: a slow ramp of stiffness ends where the action says", "[stress_e
     most = 0.0;
     for (int phase = 0; phase < 40; ++phase) {
       Lab lab("@k param 0.1\n@m osc 1. k 0. 0. 0.\n@out1 posOutput @m\n");
-      lab.place({1.0}, {0.0});
+      lab.set_state({1.0}, {0.0});
       for (int n = 0; n < 200 + phase; ++n) {
         lab.step();
       }
@@ -241,7 +241,7 @@ TEST_CASE("S23: a stiffness turned at twice the pitch feeds it, as in nature", "
   for (const auto& [z, growth] :
        {Row{0.0, 8.00e-3}, Row{0.002, 7.00e-3}, Row{0.01, 2.96e-3}, Row{0.02, -2.19e-3}}) {
     Lab lab("@k param 0.1\n@m osc 1. k " + show(z) + " 0. 0.\n@out1 posOutput @m\n");
-    lab.place({1.0}, {0.0});
+    lab.set_state({1.0}, {0.0});
     const double w = std::acos(1.0 - 0.5 * 0.1);
     double early = 0.0;
     const int frames = 4000;
@@ -266,7 +266,7 @@ TEST_CASE("S10: a ball that bounces on a plain contact gains without end", "[str
   for (const auto& [k, least] : {Row{0.05, 1.02}, Row{0.5, 10.0}, Row{1.5, 1e3}, Row{3.0, 1e5}}) {
     Lab lab("@g ground 0.\n@m massG 1. 0.00001 0. 0.\n@c contact @g @m " + show(k) +
             " 0. 0.\n@out1 posOutput @m\n");
-    lab.place({0.01}, {0.0});
+    lab.set_state({0.01}, {0.0});
     const double start = lab.energy();
     CHECK(start == Approx(1e-7).epsilon(1e-12));
     double found = 0.0;

@@ -130,7 +130,7 @@ TEST_CASE("S22: a light mass on a heavy one may be as stiff as it is stable", "[
     const auto compiled =
         compile(network, default_preset(network, true), {.bare = true, .settings = {{"k", k}}});
     REQUIRE(compiled);
-    return compiled->gate.verdict;
+    return compiled->stability.verdict;
   };
   CHECK(verdict(0.002) == Verdict::stable);
   CHECK(verdict(limit * (1.0 - 1e-6)) == Verdict::stable);

@@ -8,7 +8,7 @@
 
 namespace ressort::rig {
 
-// Of the peak, in double. Direct forms (direct, chains, grid, chorus) add up the forces
+// Of the peak, in double. Direct forms (direct, chains, grid, batch) add up the forces
 // that are written, sample by sample, if in another order. A dense body leaps over whole blocks by
 // a matrix, and modes are another basis.
 inline double tolerance_of(Method method) {
@@ -22,7 +22,7 @@ inline double tolerance_of(Method method) {
 // from 0.
 inline double least_db(Method method, bool is_plain) {
   const bool is_of_links =
-      method == Method::direct || method == Method::chains || method == Method::chorus;
+      method == Method::direct || method == Method::chains || method == Method::batch;
   return !is_plain ? 70.0 : is_of_links ? 100.0 : 90.0;
 }
 inline constexpr double hardly_db = 6.0;

@@ -31,12 +31,12 @@ struct Stepper : Bare<T> {
         v(x.size()) {}
 
   // One mass, from anywhere: the next sample is free flight.
-  void place(double x0, double v0) {
+  void set_state(double x0, double v0) {
     x = this->program().position;
     v = this->program().velocity;
     x[0] = x0;
     v[0] = v0;
-    this->kernel().place(0, x.data(), v.data());
+    this->kernel().set_state(0, x.data(), v.data());
   }
   void go(const std::vector<double>& inputs = {}) {
     this->step(inputs);

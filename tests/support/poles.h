@@ -34,7 +34,7 @@ Eigen::MatrixXd transition(const Program& program, Isa isa = best_isa()) {
     std::fill(x.begin(), x.end(), 0.0);
     std::fill(v.begin(), v.end(), 0.0);
     (i < n ? x[static_cast<std::size_t>(i)] : v[static_cast<std::size_t>(i - n)]) = 1.0;
-    bare.kernel().place(0, x.data(), v.data());
+    bare.kernel().set_state(0, x.data(), v.data());
     bare.step(hands);
     save_to(first.col(i));
     bare.step(hands);

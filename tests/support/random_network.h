@@ -242,10 +242,10 @@ class NetworkWriter {
   // --- what acts on them and listens ---
 
   std::string hand() {
-    if (hands_ == 3 || chance(2)) {
+    if (driven_ == 3 || chance(2)) {
       return chance(2) ? "@g0" : "@g1";
     }
-    const std::string name = "@in" + std::to_string(++hands_);
+    const std::string name = "@in" + std::to_string(++driven_);
     add(name + " posInput " + (chance(2) ? "0." : number(-0.02, 0.02)));
     hand_names_.push_back(name);
     return name;
@@ -254,10 +254,10 @@ class NetworkWriter {
   void add_hands() {
     const std::size_t forces = 1 + random_.below(2);
     for (std::size_t i = 0; i < forces; ++i) {
-      add("@in" + std::to_string(++hands_) + " frcInput " + some());
+      add("@in" + std::to_string(++driven_) + " frcInput " + some());
     }
     if (chance(2)) {
-      const std::string name = "@in" + std::to_string(++hands_);
+      const std::string name = "@in" + std::to_string(++driven_);
       add(name + " posInput " + number(-0.02, 0.02));
       hand_names_.push_back(name);
       if (is_linear_ || chance(2)) {
@@ -333,7 +333,7 @@ class NetworkWriter {
   std::vector<std::string> ends_;        // what links may hold
   std::vector<std::string> hand_names_;  // position inputs
   std::size_t labels_ = 0;
-  std::size_t hands_ = 0;
+  std::size_t driven_ = 0;
   bool is_linear_ = true;
   bool is_alike_ = true;  // masses and springs, so that they share their eigenvectors
   std::string alike_mass_;

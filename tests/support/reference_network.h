@@ -44,7 +44,7 @@ class Builder {
       if (input.is_force) {
         simulator_.add_force_input(*points_[input.mass]);
       } else {
-        simulator_.add_position_input(*hands_[input.mass]);
+        simulator_.add_position_input(*driven_[input.mass]);
       }
     }
     std::vector<const Output*> channels(static_cast<std::size_t>(output_count(network_)), nullptr);
@@ -114,7 +114,7 @@ class Builder {
     }
     if (macro.kind == MacroKind::stiff_string) {
       // Every second node, counted from one before the first to one after the last: both ends hold
-      // the stencil's index, so that there the K2 goes to the neighbour.
+      // the assembly's index, so that there the K2 goes to the neighbour.
       const auto last = static_cast<std::ptrdiff_t>(grid.rows) - 1;
       for (std::ptrdiff_t middle = 0; middle <= last; ++middle) {
         const auto below = static_cast<std::size_t>(std::max<std::ptrdiff_t>(middle - 1, 0));
@@ -153,7 +153,7 @@ class Builder {
         break;
       }
     }
-    hands_.push_back(hand);
+    driven_.push_back(hand);
     if (mass.gravity != no_argument) {
       simulator_.add_gravity(*points_.back(), number(mass.gravity),
                              mass.gravity_per_rate ? Real{44100} : Real{1});
@@ -194,9 +194,9 @@ class Builder {
   Simulation made_;
   Simulator& simulator_ = made_.simulator;
   Number zero_ = nullptr;
-  std::vector<Grid> grids_;            // [macro]
-  std::vector<Point*> points_;         // [mass]
-  std::vector<PositionInput*> hands_;  // [mass] null where it is none
+  std::vector<Grid> grids_;             // [macro]
+  std::vector<Point*> points_;          // [mass]
+  std::vector<PositionInput*> driven_;  // [mass] null where it is none
 };
 
 inline Simulation make_simulation(const Network& network, std::span<const double> parameters) {

@@ -356,7 +356,7 @@ expect 0 "peak" "$program" render stiff.mdl -o stiff.wav --seconds 1 --rate 2205
 # What may never touch is no reason to refuse; the report warns of it.
 model hard.mdl '@g ground 0.\n@m osc 1. 0.1 0.001 0. 0.\n@c contact @m @g 9 0.1 0.\n@in1 frcInput @m\n@out1 posOutput @m\n'
 expect 0 "the stiffness 9 of 'c' must stay below" "$program" check hard.mdl --budget passive=never
-expect 0 "1 contact centred: as published it could gain" "$program" check hard.mdl
+expect 0 "1 contact made passive: as published it could gain" "$program" check hard.mdl
 expect 0 "peak" "$program" render hard.mdl -o hard.wav --seconds 1
 model push.score '0 /in/1/force nan\n'
 expect 2 "must be a number" "$program" render PolyTriangle -o out.wav --score push.score

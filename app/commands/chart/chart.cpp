@@ -193,23 +193,23 @@ Result<ChartSheet> make_sheet(const ChartScene& asked, Isa isa, double patience_
     return Error{scene.name + ": no output moves, even when it is struck"};
   }
   ChartSheet sheet{.scene = scene.name, .about = scene.about, .is_linear = scene.is_linear};
-  if (!tells("the truth")) {
+  if (!tells("the reference")) {
     return sheet;
   }
   const Starts starts(scene);
-  auto truths = find_truths(scene, starts.at(1), isa);
-  if (!truths) {
-    return Error{scene.name + ": " + truths.error().message};
+  auto references = find_references(scene, starts.at(1), isa);
+  if (!references) {
+    return Error{scene.name + ": " + references.error().message};
   }
-  sheet.truth[0] = truths->identical.how;
-  sheet.truth[1] = truths->physical.how;
-  sheet.is_linear = truths->continuous.has_value();
-  sheet.floor_db = truths->physical.floor_db;
-  sheet.window = truths->window;
+  sheet.reference[0] = references->identical.how;
+  sheet.reference[1] = references->physical.how;
+  sheet.is_linear = references->continuous.has_value();
+  sheet.floor_db = references->physical.floor_db;
+  sheet.window = references->window;
   std::vector<Heard> all = hear_all(starts, isa, tells);
   Poles published;
-  if (truths->continuous && !all.empty()) {
-    published = poles_of(scene, *truths->continuous, all[0].made);
+  if (references->continuous && !all.empty()) {
+    published = poles_of(scene, *references->continuous, all[0].made);
   }
   const Stress stress(scene, isa);
   std::vector<MadeWay> ways;
@@ -221,7 +221,7 @@ Result<ChartSheet> make_sheet(const ChartScene& asked, Isa isa, double patience_
                  .methods = heard.made.methods,
                  .twins = heard.made.twins,
                  .predicted_ns = heard.made.predicted_ns(),
-                 .judged = judge(scene, *truths, published, heard.made, heard.waves)};
+                 .judged = judge(scene, *references, published, heard.made, heard.waves)};
     row.failure = !row.judged.is_finite ? "out of all bounds" : stress.verdict(row.way);
     heard.waves = {};
     ways.push_back(std::move(heard.made));

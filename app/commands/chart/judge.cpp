@@ -5,7 +5,7 @@
 #include <limits>
 
 #include "core/compile/machine.h"
-#include "core/engine/truth.h"
+#include "core/engine/reference.h"
 
 namespace ressort {
 namespace {
@@ -13,7 +13,7 @@ namespace {
 constexpr double rate_hz = Network::reference_rate_hz;
 constexpr double unknown = std::numeric_limits<double>::quiet_NaN();
 constexpr double exact_db = 400.0;         // what cannot be told from exact
-constexpr double trusted_db = 60.0;        // a truth agrees with itself
+constexpr double trusted_db = 60.0;        // a reference agrees with itself
 constexpr double heard_share = 1e-6;       // of the peak: the sound has begun
 constexpr double loud_partial = 1e-3;      // 60 dB below the loudest
 constexpr std::size_t small_scene = 1000;  // masses and links, for 256 times the rate
@@ -36,7 +36,7 @@ std::size_t frames_of(double seconds) {
 }
 
 Way direct_at(unsigned times) {
-  return {.name = "truth", .method = Method::direct, .oversampling = times};
+  return {.name = "reference", .method = Method::direct, .oversampling = times};
 }
 
 double peak_of(const Waves& waves) {
@@ -49,10 +49,10 @@ double peak_of(const Waves& waves) {
   return peak;
 }
 
-std::array<double, 3> snr_of(const Waves& truth, const Waves& found, std::size_t onset) {
+std::array<double, 3> snr_of(const Waves& reference, const Waves& found, std::size_t onset) {
   std::array<double, 3> db{};
   for (std::size_t w = 0; w < db.size(); ++w) {
-    db[w] = signal_to_error_db(truth, found, onset, onset + frames_of(chart_windows_s[w]));
+    db[w] = signal_to_error_db(reference, found, onset, onset + frames_of(chart_windows_s[w]));
   }
   return db;
 }
@@ -88,8 +88,8 @@ class PartInputs {
   PartInputs(const ChartScene& scene, const Machine& machine, const Program& program)
       : value(program.inputs.size()), velocity(value.size()) {
     for (const InputSlot& input : program.inputs) {
-      motion_.push_back(scene.motions[input.hand]);
-      rest_.push_back(machine.hands[input.hand].position);
+      motion_.push_back(scene.motions[input.input]);
+      rest_.push_back(machine.inputs[input.input].position);
     }
     move_to(0.0);
   }
@@ -109,9 +109,9 @@ class PartInputs {
 };
 
 // Adds one part's sound and energy to those of the others.
-void play_textbook(const Program& program, PartInputs inputs, Waves& waves,
-                   std::vector<StoredEnergy>& energy) {
-  Textbook book(program);
+void play_reference(const Program& program, PartInputs inputs, Waves& waves,
+                    std::vector<StoredEnergy>& energy) {
+  ReferenceScheme book(program);
   std::vector<double> x;
   std::vector<double> v;
   for (std::size_t n = 0; n < waves[0].size(); ++n) {
@@ -135,41 +135,42 @@ void play_textbook(const Program& program, PartInputs inputs, Waves& waves,
   }
 }
 
-Truth published(const ChartScene& scene) {
+Reference published(const ChartScene& scene) {
   const Machine machine = make_machine(scene.network, rate_hz, true);
-  Truth truth{.waves = Waves(machine.channels, std::vector<double>(frames_of(heard_s))),
-              .how = "long double"};
-  truth.floor_db.fill(exact_db);
+  Reference reference{.waves = Waves(machine.channels, std::vector<double>(frames_of(heard_s))),
+                      .how = "long double"};
+  reference.floor_db.fill(exact_db);
   std::vector<StoredEnergy> energy(frames_of(energy_s));
   for (const Program& program : machine.parts) {
-    play_textbook(program, PartInputs(scene, machine, program), truth.waves, energy);
+    play_reference(program, PartInputs(scene, machine, program), reference.waves, energy);
   }
   EnergyMeter meter;
   for (const StoredEnergy& one : energy) {
     meter.add(one);
   }
-  truth.energy = meter.reading().highest;
-  return truth;
+  reference.energy = meter.reading().highest;
+  return reference;
 }
 
-Truth exact(const ChartScene& scene, const Continuous& continuous) {
+Reference exact(const ChartScene& scene, const Continuous& continuous) {
   const std::size_t frames = frames_of(heard_s);
-  Truth truth{.waves = Waves(static_cast<std::size_t>(output_count(scene.network)),
-                             std::vector<double>(frames)),
-              .how = "exact modes"};
-  truth.floor_db.fill(exact_db);
+  Reference reference{.waves = Waves(static_cast<std::size_t>(output_count(scene.network)),
+                                     std::vector<double>(frames)),
+                      .how = "exact modes"};
+  reference.floor_db.fill(exact_db);
   for (std::size_t o = 0; o < continuous.outputs.size(); ++o) {
-    truth.waves[static_cast<std::size_t>(scene.network.outputs[o].number - 1)] =
+    reference.waves[static_cast<std::size_t>(scene.network.outputs[o].number - 1)] =
         continuous.play(o, frames, 1.0);
   }
   const Machine machine = make_machine(scene.network, rate_hz, true);
   for (const Program& program : machine.parts) {
-    truth.energy += energy_of(program, program.position, program.velocity, program.velocity).total;
+    reference.energy +=
+        energy_of(program, program.position, program.velocity, program.velocity).total;
   }
-  return truth;
+  return reference;
 }
 
-Result<Truth> rendered(const ChartScene& scene, Isa isa) {
+Result<Reference> rendered(const ChartScene& scene, Isa isa) {
   const unsigned times =
       scene.network.masses.size() + scene.network.links.size() <= small_scene ? 256 : 64;
   auto fine = make_way(scene, direct_at(times), 0.0, isa);
@@ -180,13 +181,13 @@ Result<Truth> rendered(const ChartScene& scene, Isa isa) {
   if (!half) {
     return half.error();
   }
-  Truth truth{.waves = render_way(*fine, frames_of(heard_s)),
-              .how = "direct at " + std::to_string(times) + "x"};
-  truth.floor_db = snr_of(truth.waves, render_way(*half, frames_of(heard_s)), 0);
+  Reference reference{.waves = render_way(*fine, frames_of(heard_s)),
+                      .how = "direct at " + std::to_string(times) + "x"};
+  reference.floor_db = snr_of(reference.waves, render_way(*half, frames_of(heard_s)), 0);
   if (const auto energy = watch_energy(scene, *fine, energy_s)) {
-    truth.energy = energy->highest;
+    reference.energy = energy->highest;
   }
-  return truth;
+  return reference;
 }
 
 // The first sample that can be heard.
@@ -201,15 +202,15 @@ std::size_t onset_of(const Waves& waves) {
   return first;
 }
 
-Against beside(const ChartScene& scene, const Truth& truth, const Truths& truths,
+Against beside(const ChartScene& scene, const Reference& reference, const References& references,
                const Poles& right, const Poles& found, const Waves& waves) {
-  Against against{.snr_db = snr_of(truth.waves, waves, truths.onset),
+  Against against{.snr_db = snr_of(reference.waves, waves, references.onset),
                   .cents = unknown,
                   .t60_percent = unknown,
                   .energy = unknown};
   for (std::size_t j = 0; j < found.size() && scene.is_linear; ++j) {
-    if (truths.continuous->modes[j].loudness < loud_partial || !std::isfinite(found[j].imag()) ||
-        !std::isfinite(right[j].imag())) {
+    if (references.continuous->modes[j].loudness < loud_partial ||
+        !std::isfinite(found[j].imag()) || !std::isfinite(right[j].imag())) {
       continue;
     }
     const double cents = std::fabs(1200.0 * std::log2(found[j].imag() / right[j].imag()));
@@ -224,14 +225,14 @@ Against beside(const ChartScene& scene, const Truth& truth, const Truths& truths
 
 }  // namespace
 
-double signal_to_error_db(const Waves& truth, const Waves& found, std::size_t from,
+double signal_to_error_db(const Waves& reference, const Waves& found, std::size_t from,
                           std::size_t to) {
   double signal = 0.0;
   double error = 0.0;
-  for (std::size_t c = 0; c < truth.size(); ++c) {
-    for (std::size_t n = from; n < std::min(to, truth[c].size()); ++n) {
-      const double off = found[c][n] - truth[c][n];
-      signal += truth[c][n] * truth[c][n];
+  for (std::size_t c = 0; c < reference.size(); ++c) {
+    for (std::size_t n = from; n < std::min(to, reference[c].size()); ++n) {
+      const double off = found[c][n] - reference[c][n];
+      signal += reference[c][n] * reference[c][n];
       error += off * off;
     }
   }
@@ -307,49 +308,49 @@ std::optional<EnergyReading> watch_energy(const ChartScene& scene, MadeWay& way,
   return meter.reading();
 }
 
-Result<Truths> find_truths(const ChartScene& scene, const ChartScene& stepped, Isa isa) {
-  Truths truths{.identical = published(stepped)};
+Result<References> find_references(const ChartScene& scene, const ChartScene& stepped, Isa isa) {
+  References references{.identical = published(stepped)};
   if (scene.is_linear) {
-    truths.continuous = solve_continuous(scene.network, parameter_values(scene.network));
+    references.continuous = solve_continuous(scene.network, parameter_values(scene.network));
   }
-  if (truths.continuous) {
-    truths.physical = exact(scene, *truths.continuous);
+  if (references.continuous) {
+    references.physical = exact(scene, *references.continuous);
   } else {
     auto physical = rendered(scene, isa);
     if (!physical) {
       return physical.error();
     }
-    truths.physical = *std::move(physical);
+    references.physical = *std::move(physical);
   }
-  truths.onset = onset_of(truths.physical.waves);
+  references.onset = onset_of(references.physical.waves);
   for (std::size_t w = 1; w < chart_windows_s.size() && !scene.has_contacts; ++w) {
-    if (truths.physical.floor_db[w] >= trusted_db) {
-      truths.window = w;
+    if (references.physical.floor_db[w] >= trusted_db) {
+      references.window = w;
     }
   }
-  return truths;
+  return references;
 }
 
-Judged judge(const ChartScene& scene, const Truths& truths, const Poles& published_poles,
+Judged judge(const ChartScene& scene, const References& references, const Poles& published_poles,
              MadeWay& way, const Waves& waves) {
   Judged judged;
   judged.is_finite = peak_of(waves) < runaway;
   Poles poles;
   Poles right;
-  if (truths.continuous && judged.is_finite) {
-    poles = way.way.precision == Precision::float64 ? poles_of(scene, *truths.continuous, way)
+  if (references.continuous && judged.is_finite) {
+    poles = way.way.precision == Precision::float64 ? poles_of(scene, *references.continuous, way)
                                                     : Poles();
-    for (const ContinuousMode& mode : truths.continuous->modes) {
+    for (const ContinuousMode& mode : references.continuous->modes) {
       right.push_back(mode.pole * rate_hz);
     }
   }
-  judged.identical = beside(scene, truths.identical, truths, published_poles,
+  judged.identical = beside(scene, references.identical, references, published_poles,
                             published_poles.empty() ? Poles() : poles, waves);
-  judged.physical = beside(scene, truths.physical, truths, right, poles, waves);
+  judged.physical = beside(scene, references.physical, references, right, poles, waves);
   judged.energy_gain = unknown;
   if (const auto energy = watch_energy(scene, way, energy_s)) {
-    judged.identical.energy = energy->highest / truths.identical.energy;
-    judged.physical.energy = energy->highest / truths.physical.energy;
+    judged.identical.energy = energy->highest / references.identical.energy;
+    judged.physical.energy = energy->highest / references.physical.energy;
     if (!scene.is_driven()) {
       judged.energy_gain = energy->highest / energy->first;
     }

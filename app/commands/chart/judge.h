@@ -1,4 +1,4 @@
-// app: the two truths about a scene, and what each way is worth beside them.
+// app: the two references about a scene, and what each way is worth beside them.
 //
 // T1, "identical": the published scheme at 44 100 Hz in long double. T2, "physical": the continuous
 // network with the same M, K, Z: exact modes where the scene is linear, else the published scheme
@@ -22,28 +22,28 @@ inline constexpr double energy_s = 0.25;  // how long energy is watched
 // [channel][sample]
 using Waves = std::vector<std::vector<double>>;
 
-struct Truth {
+struct Reference {
   Waves waves;
   double energy = 0.0;             // the highest
   std::array<double, 3> floor_db;  // [window] how far it agrees with itself
   std::string how;                 // it was found
 };
 
-// The truths, and where their sound begins.
-struct Truths {
-  Truth identical;
-  Truth physical;
+// The references, and where their sound begins.
+struct References {
+  Reference identical;
+  Reference physical;
   std::optional<Continuous> continuous;  // where the scene is linear
   std::size_t onset = 0;                 // sample: the windows begin here
   std::size_t window = 0;                // that waveforms are judged in: the longest trustworthy
 };
 
-// Beside one truth. What is not known is no number.
+// Beside one reference. What is not known is no number.
 struct Against {
   std::array<double, 3> snr_db;
   double cents = 0.0;        // the largest error of a partial within 60 dB of the loudest
   double t60_percent = 0.0;  // the same
-  double energy = 0.0;       // the highest energy, in shares of the truth's
+  double energy = 0.0;       // the highest energy, in shares of the reference's
 };
 
 struct Judged {
@@ -61,7 +61,7 @@ Waves render_way(MadeWay& way, std::size_t frames);
 
 // `stepped`: the same as a scheme starts it. Blocks for seconds where the scene is not linear.
 // Fails where it is too large.
-Result<Truths> find_truths(const ChartScene& scene, const ChartScene& stepped, Isa isa);
+Result<References> find_references(const ChartScene& scene, const ChartScene& stepped, Isa isa);
 
 // The partials of a linear scene as this way has them, for each of the continuous modes.
 Poles poles_of(const ChartScene& scene, const Continuous& continuous, MadeWay& way);
@@ -74,8 +74,8 @@ struct EnergyReading {
 };
 std::optional<EnergyReading> watch_energy(const ChartScene& scene, MadeWay& way, double seconds);
 
-Judged judge(const ChartScene& scene, const Truths& truths, const Poles& published, MadeWay& way,
-             const Waves& waves);
+Judged judge(const ChartScene& scene, const References& references, const Poles& published,
+             MadeWay& way, const Waves& waves);
 
 // Whether ways can be trusted with a scene: hit ten times harder, with the parameters at the ends
 // of their ranges, and both.
@@ -99,6 +99,7 @@ class Stress {
 };
 
 // 10 log10 of signal over error in [from, to), all channels together; at most 400.
-double signal_to_error_db(const Waves& truth, const Waves& found, std::size_t from, std::size_t to);
+double signal_to_error_db(const Waves& reference, const Waves& found, std::size_t from,
+                          std::size_t to);
 
 }  // namespace ressort

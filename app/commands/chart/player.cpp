@@ -76,9 +76,9 @@ class KernelPlayer final : public ChartPlayer {
   KernelPlayer(const Machine& machine, const std::vector<InputMotion>& motions, double seconds,
                Isa isa)
       : channels_(machine.channels) {
-    for (std::size_t i = 0; i < machine.hands.size(); ++i) {
+    for (std::size_t i = 0; i < machine.inputs.size(); ++i) {
       tracks_.emplace_back(i < motions.size() ? motions[i] : InputMotion(),
-                           machine.hands[i].position, machine.rate_hz, seconds);
+                           machine.inputs[i].position, machine.rate_hz, seconds);
     }
     parts_.reserve(machine.parts.size());
     for (const Program& program : machine.parts) {
@@ -95,16 +95,16 @@ class KernelPlayer final : public ChartPlayer {
         part.kernel->reset(lane);
       }
     }
-    start_hands();
+    start_inputs();
   }
 
   void place(const States& x, const States& v) override {
     for (std::size_t i = 0; i < parts_.size(); ++i) {
       for (std::size_t lane = 0; lane < parts_[i].lanes; ++lane) {
-        parts_[i].kernel->place(lane, x[i].data(), v[i].data());
+        parts_[i].kernel->set_state(lane, x[i].data(), v[i].data());
       }
     }
-    start_hands();
+    start_inputs();
   }
 
   void play(std::size_t frames, double* outputs) override {
@@ -144,11 +144,11 @@ class KernelPlayer final : public ChartPlayer {
   }
 
  private:
-  void start_hands() {
+  void start_inputs() {
     frame_ = 0;
     for (PlayedPart<T>& part : parts_) {
       for (std::size_t i = 0; i < part.program.inputs.size(); ++i) {
-        const InputTrack& track = tracks_[part.program.inputs[i].hand];
+        const InputTrack& track = tracks_[part.program.inputs[i].input];
         part.before[i] = track.start();
         for (std::size_t n = 0; n < max_block_frames; ++n) {
           part.feed(n, i, track.start(), 0.0);
@@ -159,7 +159,7 @@ class KernelPlayer final : public ChartPlayer {
 
   void feed(PlayedPart<T>& part, std::size_t count) {
     for (std::size_t i = 0; i < part.program.inputs.size(); ++i) {
-      const InputTrack& track = tracks_[part.program.inputs[i].hand];
+      const InputTrack& track = tracks_[part.program.inputs[i].input];
       for (std::size_t n = 0; track.moves() && n < count; ++n) {
         const double x = track.at(frame_ + n);
         part.feed(n, i, x, x - part.before[i]);

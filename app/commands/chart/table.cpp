@@ -30,7 +30,8 @@ const char* const meaning =
     "# pitch that is written, as a function of seconds, so that it is the same at every rate: a\n"
     "# pluck sweeps at one speed, a bow approaches its speed in 10 ms. A hand starts at time 0.\n"
     "#\n"
-    "# Truths. T1, identical: the published scheme at 44100 Hz in long double. T2, physical: the\n"
+    "# References. T1, identical: the published scheme at 44100 Hz in long double. T2, physical: "
+    "the\n"
     "# continuous network of the same M, K, Z; exact modes where the scene is linear, else the\n"
     "# published scheme at 64 or 256 times the rate; floor_* says how far that agrees with itself "
     "at\n"
@@ -42,14 +43,15 @@ const char* const meaning =
     "rounds;\n"
     "# upper_ns: the upper quartile of the rounds as they were. voices_48k: 1e9 / 48000 / ns, one "
     "after\n"
-    "# another; direct and chorus, which put voices side by side into lanes, hold more together.\n"
+    "# another; direct and batch, which put voices side by side into lanes, hold more together.\n"
     "# predicted_ns: by the plan's cost model, the same on machines of one instruction set.\n"
-    "# snr_T_W: dB of signal over error beside truth T in the first W of the sound, all outputs\n"
+    "# snr_T_W: dB of signal over error beside reference T in the first W of the sound, all "
+    "outputs\n"
     "# together, from the first sample that can be heard. cents_T, t60_T (%): the largest error of "
     "a\n"
     "# partial within 60 dB of the loudest, from the poles of the scheme in double; empty where\n"
     "# poles say nothing. energy_T: the highest energy in the first 0.25 s in shares of the\n"
-    "# truth's; energy: in shares of that at the start, hands at rest; while nothing touches,\n"
+    "# reference's; energy: in shares of that at the start, hands at rest; while nothing touches,\n"
     "# where links can let go. Empty where a kernel does not know where its masses are.\n"
     "# failure: what becomes of it when hit ten times harder, or at the ends of the parameters'\n"
     "# ranges. front_T: no way that does not fail is cheaper and better; by SNR in the chart's\n"
@@ -90,25 +92,25 @@ std::vector<std::string> cells_of(const ChartSheet& sheet, const ChartRow& row) 
 
 }  // namespace
 
-double ChartSheet::snr_db(const ChartRow& row, std::size_t truth) const {
-  return (truth == 0 ? row.judged.identical : row.judged.physical).snr_db[window];
+double ChartSheet::snr_db(const ChartRow& row, std::size_t reference) const {
+  return (reference == 0 ? row.judged.identical : row.judged.physical).snr_db[window];
 }
 
 void find_fronts(ChartSheet& sheet) {
-  for (const std::size_t truth : {0u, 1u}) {
+  for (const std::size_t reference : {0u, 1u}) {
     std::vector<Trade> trades;
     std::vector<Trade> predicted;
     for (const ChartRow& row : sheet.rows) {
-      const double db = row.failure.empty() ? sheet.snr_db(row, truth) : -HUGE_VAL;
+      const double db = row.failure.empty() ? sheet.snr_db(row, reference) : -HUGE_VAL;
       trades.push_back({row.ns, db});
       predicted.push_back({row.predicted_ns, db});
     }
     const std::vector<bool> is_on = front_of(trades);
     for (std::size_t i = 0; i < sheet.rows.size(); ++i) {
-      sheet.rows[i].is_on_front[truth] = is_on[i];
+      sheet.rows[i].is_on_front[reference] = is_on[i];
     }
-    sheet.area[truth] = hypervolume(trades);
-    sheet.predicted_area[truth] = hypervolume(predicted);
+    sheet.area[reference] = hypervolume(trades);
+    sheet.predicted_area[reference] = hypervolume(predicted);
   }
 }
 
@@ -131,8 +133,8 @@ std::string chart_csv(const std::vector<ChartSheet>& sheets, const Provenance& p
   std::string text = meaning;
   text += "#\n# made by: " + to_string(provenance) + "\n";
   for (const ChartSheet& sheet : sheets) {
-    text += "# scene " + sheet.scene + ": " + sheet.about + "; T1 " + sheet.truth[0] + "; T2 " +
-            sheet.truth[1];
+    text += "# scene " + sheet.scene + ": " + sheet.about + "; T1 " + sheet.reference[0] + "; T2 " +
+            sheet.reference[1];
     if (!sheet.is_linear) {
       text += ", floor_5ms " + number(sheet.floor_db[0]) + " dB, floor_50ms " +
               number(sheet.floor_db[1]) + " dB, floor_1s " + number(sheet.floor_db[2]) + " dB";

@@ -20,15 +20,15 @@ struct ChartRow {
   double predicted_ns = 0.0;  // by the plan's model
   Judged judged;
   std::string failure;                   // unstable or not passive, and when; empty if neither
-  bool is_on_front[2] = {false, false};  // [truth]
+  bool is_on_front[2] = {false, false};  // [reference]
 };
 
-// One scene's rows beside both truths. The fronts and areas are those of ways that do not fail.
+// One scene's rows beside both references. The fronts and areas are those of ways that do not fail.
 struct ChartSheet {
   std::string scene;
   std::string about;
   bool is_linear = false;
-  std::string truth[2];              // how each was found
+  std::string reference[2];          // how each was found
   std::array<double, 3> floor_db{};  // how far T2 agrees with itself
   std::size_t window = 0;            // of the chart
   double timed_s = 0.0;
@@ -37,7 +37,7 @@ struct ChartSheet {
   double area[2] = {0.0, 0.0};            // dominated hypervolume, by measured times
   double predicted_area[2] = {0.0, 0.0};  // by predicted ones: the same on every machine
 
-  double snr_db(const ChartRow& row, std::size_t truth) const;  // in the chart's window
+  double snr_db(const ChartRow& row, std::size_t reference) const;  // in the chart's window
 };
 
 // Sets the fronts and areas.

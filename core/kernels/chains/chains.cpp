@@ -316,7 +316,7 @@ ChainsKernel<T>::ChainsKernel(const Program& program, const Chains& form, std::s
 }
 
 template <class T>
-void ChainsKernel<T>::place(std::size_t, const double* x, const double* v) {
+void ChainsKernel<T>::set_state(std::size_t, const double* x, const double* v) {
   std::fill(bodies_.begin(), bodies_.end(), T(0));  // empty lanes too, should they be no numbers
   for (std::size_t node = 0; node < place_.size(); ++node) {
     bodies_[place_[node]] = static_cast<T>(x[node]);
@@ -347,7 +347,7 @@ bool ChainsKernel<T>::read(std::span<const std::uint32_t> nodes, T* x, T* v) con
 }
 
 template <class T>
-bool ChainsKernel<T>::mend(std::span<const std::uint32_t> nodes, const T* x, const T* v) {
+bool ChainsKernel<T>::write_nodes(std::span<const std::uint32_t> nodes, const T* x, const T* v) {
   for (const std::uint32_t node : nodes) {
     bodies_[place_[node]] = *x++;
     bodies_[place_[node] + lanes_] = *v++;

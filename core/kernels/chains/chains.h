@@ -131,7 +131,7 @@ struct ChainsState {
   Corners<T>* corners;  // [tap] in this sample
   T* tap_pull;          // [tap] what the links of this sample do to it, for the next one
   T* memory;            // [passive link][passive_rows]
-  T* awake;             // 0 in the first sample after place(), else 1
+  T* awake;             // 0 in the first sample after set_state(), else 1
 };
 
 template <class T>
@@ -147,10 +147,10 @@ class ChainsKernel final : public Kernel<T> {
  public:
   // The Program's form is Chains.
   ChainsKernel(const Program& program, const Chains& form, std::size_t voices, Isa isa);
-  void place(std::size_t lane, const double* x, const double* v) override;
+  void set_state(std::size_t lane, const double* x, const double* v) override;
   bool save(std::size_t lane, double* x, double* v) const override;
   bool read(std::span<const std::uint32_t> nodes, T* x, T* v) const override;
-  bool mend(std::span<const std::uint32_t> nodes, const T* x, const T* v) override;
+  bool write_nodes(std::span<const std::uint32_t> nodes, const T* x, const T* v) override;
   bool is_near_start(std::size_t lane, double bound) const override;
 
  private:

@@ -72,10 +72,10 @@ struct View {
   const T* coefficient;
 };
 
-// The same after nodes were mended: of its own type, so that what is called for
+// The same after nodes were written: of its own type, so that what is called for
 // every sample remains the only one of its kind and is put in its place.
 template <class T, std::size_t Bytes>
-struct Mended : View<T, Bytes> {
+struct Rewritten : View<T, Bytes> {
   using View<T, Bytes>::View;
 };
 
@@ -490,12 +490,12 @@ struct Passive {
 // With a view of their own, as they cost step() registers.
 template <class T, std::size_t Bytes>
 [[gnu::noinline]] void remember_links(const ChainsTables& tables, ChainsState<T>& state) {
-  using S = Mended<T, Bytes>;
+  using S = Rewritten<T, Bytes>;
   remember(tables.passive, state.memory, Passive<S>{tables, state, S(tables, state)});
 }
 template <class T, std::size_t Bytes>
 [[gnu::noinline]] void correct_links(const ChainsTables& tables, ChainsState<T>& state) {
-  using S = Mended<T, Bytes>;
+  using S = Rewritten<T, Bytes>;
   Passive<S> body{tables, state, S(tables, state)};
   correct(tables.passive, state.memory, body);
   *state.awake = 1;
@@ -503,8 +503,8 @@ template <class T, std::size_t Bytes>
 
 // Not inlined, as it costs step() registers.
 template <class T, std::size_t Bytes>
-[[gnu::noinline]] void mend(const ChainsTables& tables, ChainsState<T>& state) {
-  Mended<T, Bytes> s(tables, state);
+[[gnu::noinline]] void write_nodes(const ChainsTables& tables, ChainsState<T>& state) {
+  Rewritten<T, Bytes> s(tables, state);
   pull(s);
 }
 
@@ -524,7 +524,7 @@ void step(const Program& program, const ChainsTables& tables, ChainsState<T>& st
   const std::size_t frames = block.frames;
   const bool has_passive = !tables.passive.empty();
   if (frames == 0) {
-    return mend<T, Bytes>(tables, state);
+    return write_nodes<T, Bytes>(tables, state);
   }
   for (std::size_t frame = 0; frame < frames; ++frame) {
     advance(ramps);

@@ -7,8 +7,8 @@
 namespace ressort {
 namespace {
 
-constexpr std::size_t least_leap = 6;  // frames; fewer are walked
-constexpr std::size_t most_walk = 32;  // frames, before the next leap is tried
+constexpr std::size_t least_block = 6;    // frames; fewer are stepped
+constexpr std::size_t most_samples = 32;  // frames, before the next block step is tried
 
 std::size_t round_up(std::size_t count, std::size_t to) {
   return (count + to - 1) / to * to;
@@ -105,7 +105,7 @@ DenseKernel<T>::DenseKernel(const Program& program, const Dense& form, std::size
 
 template <class T>
 void DenseKernel<T>::place_nodes() {
-  const std::uint32_t nowhere = no_hand;
+  const std::uint32_t nowhere = no_input;
   std::uint32_t next = 0;
   slots_.assign(program_.position.size(), nowhere);
   const auto place = [&](std::uint32_t node) {
@@ -127,24 +127,25 @@ void DenseKernel<T>::place_nodes() {
 
 template <class T>
 void DenseKernel<T>::place_links() {
-  const auto hand_of = [&](std::uint32_t node) {
+  const auto input_of = [&](std::uint32_t node) {
     for (std::uint32_t i = 0; i < program_.inputs.size(); ++i) {
       if (!program_.inputs[i].is_force && program_.inputs[i].node == node) {
         return i;
       }
     }
-    return no_hand;
+    return no_input;
   };
   for (const DensePort& port : form_.ports) {
     const LinkRun& run = program_.link_runs[port.run];
     const auto [a, b] = program_.ends[port.link];
-    can_leap_ &= facts_of(run.law).zone != Zone::everywhere;  // else every block is a walk
+    can_step_blocks_ &=
+        facts_of(run.law).zone != Zone::everywhere;  // else every block is sample steps
     ports_.push_back({.law = run.law,
                       .coefficients = run.coefficients,
                       .a = slots_[a],
                       .b = slots_[b],
-                      .hand_a = hand_of(a),
-                      .hand_b = hand_of(b),
+                      .input_a = input_of(a),
+                      .input_b = input_of(b),
                       .a_moves = a < program_.moving,
                       .b_moves = b < program_.moving});
   }
@@ -162,9 +163,9 @@ void DenseKernel<T>::place_links() {
 template <class T>
 void DenseKernel<T>::place_signals() {
   for (std::uint32_t i = 0; i < program_.inputs.size(); ++i) {
-    const auto [hand, is_force, node] = program_.inputs[i];
+    const auto [input, is_force, node] = program_.inputs[i];
     if (!is_force) {
-      hands_.push_back({i, slots_[node]});
+      driven_.push_back({i, slots_[node]});
     } else if (node < program_.moving) {
       pushes_.push_back({i, slots_[node]});
       signals_.push_back({DenseSignal::Kind::force, i, slots_[node]});
@@ -184,7 +185,7 @@ void DenseKernel<T>::place_signals() {
 template <class T>
 void DenseKernel<T>::allocate() {
   DenseBody<T>& b = body_;
-  b.hands = hands_.size();
+  b.driven_count = driven_.size();
   b.pushes = pushes_.size();
   b.outputs = program_.outputs.size();
   b.ports = ports_.size();
@@ -193,7 +194,7 @@ void DenseKernel<T>::allocate() {
   b.port = ports_.data();
   b.signal = signals_.data();
   b.source = sources_.data();
-  b.hand = hands_.data();
+  b.driven = driven_.data();
   b.push = pushes_.data();
   b.heard = heard_.data();
   sounding_.resize(b.signals);
@@ -246,7 +247,7 @@ void DenseKernel<T>::allocate() {
 }
 
 template <class T>
-void DenseKernel<T>::place(std::size_t, const double* x, const double* v) {
+void DenseKernel<T>::set_state(std::size_t, const double* x, const double* v) {
   for (std::uint32_t node = 0; node < program_.position.size(); ++node) {
     position_of(node) = static_cast<T>(x[node]);
     velocity_of(node) = static_cast<T>(v[node]);
@@ -258,7 +259,7 @@ void DenseKernel<T>::place(std::size_t, const double* x, const double* v) {
   std::fill_n(body_.port_force, body_.ports, T(0));
   body_.touches = false;
   body_.has_force = true;
-  is_settled_ = false;
+  is_current_ = false;
 }
 
 template <class T>
@@ -302,7 +303,7 @@ void DenseKernel<T>::play(const Block<T>& block) {
   const DenseDrive<T> drive = arrange(block);
   const std::size_t ramped = std::min(this->coefficients.ramp_frames, block.frames);
   if (ramped > 0) {
-    walk_ramp(drive, ramped);
+    ramp(drive, ramped);
     this->coefficients.finish(ramped);
   }
   if (ramped < block.frames) {
@@ -313,7 +314,7 @@ void DenseKernel<T>::play(const Block<T>& block) {
 
 // The matrices are sums of coefficients, so they move as straight as these do.
 template <class T>
-void DenseKernel<T>::walk_ramp(const DenseDrive<T>& drive, std::size_t frames) {
+void DenseKernel<T>::ramp(const DenseDrive<T>& drive, std::size_t frames) {
   const Layout layout{body_.stride, sources_, slots_};
   const Coefficients<T>& c = this->coefficients;
   refresh_force();
@@ -326,16 +327,16 @@ void DenseKernel<T>::walk_ramp(const DenseDrive<T>& drive, std::size_t frames) {
       std::any_of(form_.springs.begin(), form_.springs.end(), [&](const DenseSpring& spring) {
         return c.is_ramping[spring.damping] && c.increment[spring.damping] != T(0);
       });
-  steps_.walk(body_, drive, 0, frames, true);
+  steps_.samples(body_, drive, 0, frames, true);
   has_tables_ = false;
-  is_settled_ = false;
+  is_current_ = false;
 }
 
 template <class T>
 void DenseKernel<T>::follow_coefficients() {
   const Layout layout{body_.stride, sources_, slots_};
   const Aligned<T>& value = this->coefficients.value;
-  if (is_settled_ && std::equal(value.begin(), value.end(), known_.begin())) {
+  if (is_current_ && std::equal(value.begin(), value.end(), known_.begin())) {
     return;
   }
   refresh_force();
@@ -347,7 +348,7 @@ void DenseKernel<T>::follow_coefficients() {
     make_pace();
     has_tables_ = false;
   }
-  is_settled_ = false;
+  is_current_ = false;
 }
 
 template <class T>
@@ -392,25 +393,26 @@ void DenseKernel<T>::make_pace() {
 template <class T>
 void DenseKernel<T>::play(const DenseDrive<T>& drive, std::size_t at, std::size_t end) {
   while (at < end) {
-    const bool leaps = can_leap_ && !body_.touches && end - at >= least_leap;
-    if (leaps && is_settled_) {
+    const bool is_block = can_step_blocks_ && !body_.touches && end - at >= least_block;
+    if (is_block && is_current_) {
       if (!has_tables_) {
         steps_.build(body_);
         has_tables_ = true;
       }
-      const std::size_t leapt = steps_.leap(body_, drive, at, std::min(end - at, dense_frames));
-      body_.has_force &= leapt == 0;
-      at += leapt;
+      const std::size_t stepped = steps_.block(body_, drive, at, std::min(end - at, dense_frames));
+      body_.has_force &= stepped == 0;
+      at += stepped;
       continue;
     }
-    const std::size_t walked = std::min(end - at, leaps ? 1 : most_walk);
-    steps_.walk(body_, drive, at, walked, false);
-    is_settled_ = true;
-    at += walked;
+    const std::size_t stepped = std::min(end - at, is_block ? 1 : most_samples);
+    steps_.samples(body_, drive, at, stepped, false);
+    is_current_ = true;
+    at += stepped;
   }
 }
 
-// A leap leaves no forces behind. What acts next must still be by the matrices of its own sample.
+// A block step leaves no forces behind. What acts next must still be by the matrices of its own
+// sample.
 template <class T>
 void DenseKernel<T>::refresh_force() {
   if (!body_.has_force) {

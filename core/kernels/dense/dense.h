@@ -5,32 +5,33 @@
 // impulse responses where a force or a hand acts; then s jumps by A^dense_frames. Links of any
 // other law are ports: unless a bound shows that they stay away, their free motion over the block
 // is computed first, and if one of them comes into the zone where its law acts, the block ends
-// there ("leap"). From there on, and while coefficients move, the body goes sample by sample, with
-// the masses in the lanes ("walk").
+// there ("block step"). From there on, and while coefficients move, the body goes sample by sample,
+// with the masses in the lanes ("sample steps").
 #pragma once
 
 #include "core/kernels/kernel.h"
 
 namespace ressort {
 
-inline constexpr std::size_t dense_frames = 64;   // of a leap; at most
-inline constexpr std::size_t driven_frames = 32;  // of a leap with forces: their work is quadratic
-inline constexpr std::size_t dense_powers = 7;    // of A: 1, 2, 4 ... dense_frames
-inline constexpr std::size_t dense_pad = 8;       // numbers beyond a row that a pack may write
+inline constexpr std::size_t dense_frames = 64;  // of a block step; at most
+inline constexpr std::size_t driven_frames =
+    32;  // of a block step with forces: their work is quadratic
+inline constexpr std::size_t dense_powers = 7;  // of A: 1, 2, 4 ... dense_frames
+inline constexpr std::size_t dense_pad = 8;     // numbers beyond a row that a pack may write
 
 inline constexpr std::size_t own_vectors = 4;  // of DenseBody::matrix, before its columns
 
-inline constexpr std::uint32_t no_hand = 0xffffffffu;
+inline constexpr std::uint32_t no_input = 0xffffffffu;
 
-// Slots are where a node's x and v are while walking: masses at [0, stride), others after them.
+// Slots are where a node's x and v are in sample steps: masses at [0, stride), others after them.
 // A mass has the same number in the state. That of the first port is 0, its other one 1.
 struct DenseLink {
   Law law{};
   std::array<std::uint32_t, most_law_arguments> coefficients{};
   std::uint32_t a = 0;  // slots
   std::uint32_t b = 0;
-  std::uint32_t hand_a = no_hand;  // inputs, where such an end is moved by one
-  std::uint32_t hand_b = no_hand;
+  std::uint32_t input_a = no_input;  // inputs, where such an end is moved by one
+  std::uint32_t input_b = no_input;
   bool a_moves = false;  // is a mass
   bool b_moves = false;
 };
@@ -53,11 +54,11 @@ struct DenseSignal {
 template <class T>
 struct DenseBody {
   std::size_t masses = 0;
-  std::size_t stride = 0;   // masses, rounded up to the packs of a walk
+  std::size_t stride = 0;   // masses, rounded up to the packs of sample steps
   std::size_t columns = 0;  // of the state: x, v of each mass; and 1 if something is constant
   std::size_t rows = 0;     // columns, rounded up to the widest packs
   std::size_t fixed = 0;    // nodes that are no masses
-  std::size_t hands = 0;
+  std::size_t driven_count = 0;
   std::size_t pushes = 0;
   std::size_t outputs = 0;
   std::size_t ports = 0;
@@ -68,14 +69,14 @@ struct DenseBody {
   const DenseLink* port = nullptr;        // [port]
   const DenseSignal* signal = nullptr;    // [signal]
   const std::uint32_t* source = nullptr;  // [source] the slot of a fixed node with springs
-  const DenseInput* hand = nullptr;       // [hand] moves a slot
+  const DenseInput* driven = nullptr;     // [driven_count] an input that moves a slot
   const DenseInput* push = nullptr;       // [push] acts on a mass
   const std::uint32_t* heard = nullptr;   // [output] mass
   const T* unit = nullptr;                // [push or port][stride] what its force is to the masses
 
   Ramps<T> ramps{};
-  // Of a walk, `stride` numbers in each vector: 1/M; the own stiffness, damping and weight of each
-  // mass; then columns: -K of each mass, -(K + Z) of each mass, -K and -Z of each source.
+  // Of sample steps, `stride` numbers in each vector: 1/M; the own stiffness, damping and weight of
+  // each mass; then columns: -K of each mass, -(K + Z) of each mass, -K and -Z of each source.
   T* matrix = nullptr;
   T* slope = nullptr;  // per sample, while coefficients move; with -Z instead of -(K + Z)
   bool damping_moves = false;
@@ -89,17 +90,17 @@ struct DenseBody {
   T* force = nullptr;       // [stride] for the next sample, if has_force
   T* port_force = nullptr;  // [port] the last one
   bool has_force = false;   // else it is the springs' by `matrix`, and the ports' last ones
-  T* x = nullptr;           // [slot], of masses only while walking
+  T* x = nullptr;           // [slot], of masses only in sample steps
   T* v = nullptr;
   bool touches = false;  // a port's force waits for the next sample, or begins there
 
-  // Of a leap. The responses have zeros in front of them, as many as they are long.
+  // Of a block step. The responses have zeros in front of them, as many as they are long.
   T* heard_table = nullptr;      // [column][frame * outputs + output]
   T* port_table = nullptr;       // [port][column][frame] of the difference that the law asks for
   T* port_bound = nullptr;       // [port][row] no less than any frame of a column is
   T* jump = nullptr;             // [power][column][row] A^(2^power) - 1
   T* injection = nullptr;        // [signal][driven_frames - 1 - frame][row] the state so much later
-  const T** sounding = nullptr;  // [signal] over the present leap, or null
+  const T** sounding = nullptr;  // [signal] over the present block step, or null
   T* heard_response = nullptr;   // [signal][2 * driven_frames * outputs]
   T* port_response = nullptr;    // [signal][port][2 * driven_frames]
   T* scratch = nullptr;          // dense_scratch_size()
@@ -114,7 +115,8 @@ struct DenseDrive {
   T* outputs = nullptr;         // [frame][output]
 };
 
-// How many numbers a leap needs besides: outputs, a port's motion, the state, shifted signals.
+// How many numbers a block step needs besides: outputs, a port's motion, the state, shifted
+// signals.
 template <class T>
 std::size_t dense_scratch_size(const DenseBody<T>& body) {
   return dense_frames * body.outputs + dense_frames + body.rows + body.signals * dense_frames;
@@ -131,29 +133,29 @@ std::size_t dense_build_size(const DenseBody<T>& body) {
 template <class T>
 struct DenseSteps {
   // Frames [at, at + count) sample by sample; `moves`: coefficients are on their way.
-  void (*walk)(DenseBody<T>& body, const DenseDrive<T>& drive, std::size_t at, std::size_t count,
-               bool moves);
+  void (*samples)(DenseBody<T>& body, const DenseDrive<T>& drive, std::size_t at, std::size_t count,
+                  bool moves);
   // The forces of the last sample, where there are none.
   void (*pull)(DenseBody<T>& body);
   // At most `count` <= dense_frames frames from `at` on, up to the first contact, which makes the
   // body touch; fewer if forces act. Gives how many.
-  std::size_t (*leap)(DenseBody<T>& body, const DenseDrive<T>& drive, std::size_t at,
-                      std::size_t count);
-  // The tables of a leap from `exact`. Of the order of (2 masses)^3 dense_powers operations.
+  std::size_t (*block)(DenseBody<T>& body, const DenseDrive<T>& drive, std::size_t at,
+                       std::size_t count);
+  // The tables of a block step from `exact`. Of the order of (2 masses)^3 dense_powers operations.
   void (*build)(DenseBody<T>& body);
 };
 
 template <Isa isa, class T>
 DenseSteps<T> dense_steps(std::size_t masses);
 template <Isa isa, class T>
-std::size_t leap_dense(DenseBody<T>& body, const DenseDrive<T>& drive, std::size_t at,
-                       std::size_t count);
+std::size_t dense_block_step(DenseBody<T>& body, const DenseDrive<T>& drive, std::size_t at,
+                             std::size_t count);
 template <Isa isa, class T>
 void build_dense(DenseBody<T>& body);
 
 inline constexpr std::size_t most_dense_masses = 16;
 
-// The packs that hold a body's masses while it walks: the narrowest pack that holds them all, or
+// The packs that hold a body's masses in sample steps: the narrowest pack that holds them all, or
 // as many of the widest as it takes; above 4, as many as the largest body takes.
 struct DensePacks {
   std::size_t bytes = 16;  // of one
@@ -177,7 +179,7 @@ template <class T>
 class DenseKernel final : public Kernel<T> {
  public:
   DenseKernel(const Program& program, const Dense& form, std::size_t voices, Isa isa);
-  void place(std::size_t lane, const double* x, const double* v) override;
+  void set_state(std::size_t lane, const double* x, const double* v) override;
   bool save(std::size_t lane, double* x, double* v) const override;
   bool is_near_start(std::size_t lane, double bound) const override;
 
@@ -190,7 +192,7 @@ class DenseKernel final : public Kernel<T> {
   void place_signals();
   void allocate();
   DenseDrive<T> arrange(const Block<T>& block);
-  void walk_ramp(const DenseDrive<T>& drive, std::size_t frames);
+  void ramp(const DenseDrive<T>& drive, std::size_t frames);
   void follow_coefficients();
   void make_pace();
   void play(const DenseDrive<T>& drive, std::size_t at, std::size_t end);
@@ -204,17 +206,17 @@ class DenseKernel final : public Kernel<T> {
   std::vector<DenseSignal> signals_;
   std::vector<const T*> sounding_;
   std::vector<std::uint32_t> sources_;
-  std::vector<DenseInput> hands_;
+  std::vector<DenseInput> driven_;
   std::vector<DenseInput> pushes_;
   std::vector<std::uint32_t> slots_;  // [node]
   std::vector<std::uint32_t> heard_;
-  Aligned<T> numbers_;     // all that body_ points to
-  Aligned<double> exact_;  // and these
-  Aligned<T> known_;       // [coefficient] what the matrices were made of
-  Aligned<T> arranged_;    // [input][value, velocity][max_block_frames]
-  bool can_leap_ = true;   // no port's law acts everywhere
+  Aligned<T> numbers_;           // all that body_ points to
+  Aligned<double> exact_;        // and these
+  Aligned<T> known_;             // [coefficient] what the matrices were made of
+  Aligned<T> arranged_;          // [input][value, velocity][max_block_frames]
+  bool can_step_blocks_ = true;  // no port's law acts everywhere
   bool has_tables_ = false;
-  bool is_settled_ = false;  // the next sample's forces are by the coefficients of now
+  bool is_current_ = false;  // the next sample's forces are by the coefficients of now
 };
 
 }  // namespace ressort

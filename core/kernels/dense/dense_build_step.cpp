@@ -82,7 +82,7 @@ struct Build {
       for (std::size_t r = 0; r < n; ++r) {
         double pull = -weight[r];
         for (std::size_t i = 0; i < b.sources; ++i) {
-          if (!is_hand(b.source[i])) {
+          if (!is_driven(b.source[i])) {
             pull += vector(own_vectors + 2 * b.stride + 2 * i)[r] *
                     static_cast<double>(b.x[b.source[i]]);
             pull += vector(own_vectors + 2 * b.stride + 2 * i + 1)[r] *
@@ -94,9 +94,9 @@ struct Build {
     }
   }
 
-  bool is_hand(std::uint32_t slot) const {
-    for (std::size_t i = 0; i < b.hands; ++i) {
-      if (b.hand[i].slot == slot) {
+  bool is_driven(std::uint32_t slot) const {
+    for (std::size_t i = 0; i < b.driven_count; ++i) {
+      if (b.driven[i].slot == slot) {
         return true;
       }
     }

@@ -8,14 +8,14 @@
 namespace ressort {
 namespace {
 
-bool is_hand(const Program& program, std::uint32_t node) {
+bool is_driven(const Program& program, std::uint32_t node) {
   return std::any_of(program.inputs.begin(), program.inputs.end(),
                      [&](const InputSlot& input) { return !input.is_force && input.node == node; });
 }
 
 // Whether a spring to it pulls although everything else is at 0.
 bool pulls(const Program& program, std::uint32_t node) {
-  return node >= program.moving && !is_hand(program, node) &&
+  return node >= program.moving && !is_driven(program, node) &&
          (program.position[node] != 0.0 || program.velocity[node] != 0.0);
 }
 
@@ -54,7 +54,7 @@ std::optional<Dense> dense_form(const Program& program) {
   return form;
 }
 
-// A force that sounds all the time costs more than the body; a body in contact is walked sample by
+// A force that sounds all the time costs more than the body; a body in contact is stepped sample by
 // sample.
 double predicted_ns(const Program& program, const Dense& form, const Workload& load) {
   const double n = program.moving;

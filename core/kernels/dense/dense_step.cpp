@@ -1,4 +1,4 @@
-// The walks of the dense kernel, compiled for each instruction set.
+// The sample steps of the dense kernel, compiled for each instruction set.
 #include <type_traits>
 #include <utility>
 
@@ -39,7 +39,7 @@ inline V spread(V pack, std::index_sequence<lane...>) {
 
 // Count packs for every vector of masses. They stay in registers only where all is inlined.
 template <class T, std::size_t Bytes, std::size_t Count>
-struct Walk {
+struct SampleSteps {
   using V = Pack<T, Bytes>;
   static constexpr std::size_t lanes = Bytes / sizeof(T);
   static constexpr std::size_t stride = Count * lanes;
@@ -136,18 +136,18 @@ struct Walk {
     b.has_force = true;
   }
 
-  // What a walk reads and never writes, apart from the body: what is stored cannot mean it.
+  // What sample steps reads and never writes, apart from the body: what is stored cannot mean it.
   static DenseBody<T> constants(const DenseBody<T>& b) {
     DenseBody<T> c;
     c.masses = b.masses;
-    c.hands = b.hands;
+    c.driven_count = b.driven_count;
     c.pushes = b.pushes;
     c.outputs = b.outputs;
     c.ports = b.ports;
     c.sources = b.sources;
     c.port = b.port;
     c.source = b.source;
-    c.hand = b.hand;
+    c.driven = b.driven;
     c.push = b.push;
     c.heard = b.heard;
     c.unit = b.unit;
@@ -194,9 +194,9 @@ struct Walk {
   // Hands move their slots to sample n.
   [[gnu::always_inline]] static void hold(const DenseBody<T>& b, const DenseDrive<T>& drive,
                                           std::size_t n) {
-    for (std::size_t i = 0; i < b.hands; ++i) {
-      b.x[b.hand[i].slot] = drive.value[b.hand[i].input * max_block_frames + n];
-      b.v[b.hand[i].slot] = drive.velocity[b.hand[i].input * max_block_frames + n];
+    for (std::size_t i = 0; i < b.driven_count; ++i) {
+      b.x[b.driven[i].slot] = drive.value[b.driven[i].input * max_block_frames + n];
+      b.v[b.driven[i].slot] = drive.velocity[b.driven[i].input * max_block_frames + n];
     }
   }
   [[gnu::always_inline]] static void hear(const DenseBody<T>& b, const DenseDrive<T>& drive,
@@ -218,8 +218,8 @@ struct Walk {
 
   // K x' + Z v' = K x + (K + Z) v' with x' = x + v': only the velocities of a sample are waited
   // for before the next one.
-  static void walk_ramp(DenseBody<T>& body, const DenseDrive<T>& block, std::size_t at,
-                        std::size_t count) {
+  static void ramp(DenseBody<T>& body, const DenseDrive<T>& block, std::size_t at,
+                   std::size_t count) {
     DenseBody<T> b = constants(body);
     const DenseDrive<T> drive = block;
     begin(b);
@@ -292,8 +292,8 @@ struct Walk {
   // the velocity after that along `echo`, beside the matrices' way: so that a force waits for the
   // force before it, and the masses for the masses, but not one for the other.
   template <class Ports>
-  static void walk(DenseBody<T>& body, const DenseDrive<T>& block, std::size_t at,
-                   std::size_t count, const Ports& all_ports) {
+  static void samples(DenseBody<T>& body, const DenseDrive<T>& block, std::size_t at,
+                      std::size_t count, const Ports& all_ports) {
     constexpr bool is_one = !std::is_same_v<Ports, AnyPorts>;
     const DenseBody<T> b = constants(body);
     const DenseDrive<T> drive = block;
@@ -360,7 +360,7 @@ struct Walk {
   static void step(DenseBody<T>& b, const DenseDrive<T>& drive, std::size_t at, std::size_t count,
                    bool moves) {
     if (moves) {
-      return walk_ramp(b, drive, at, count);
+      return ramp(b, drive, at, count);
     }
     if constexpr (Count <= 2) {
       if (b.ports == 1 && b.port[0].a_moves != b.port[0].b_moves) {
@@ -369,15 +369,15 @@ struct Walk {
         const T by = port.a_moves ? T(1) : T(-1);
         const auto c = [&](std::size_t i) { return b.ramps.value[port.coefficients[i]]; };
         return with_law<T>(port.law, c, [&]<class ForceLaw>(const ForceLaw& law) {
-          walk(b, drive, at, count, OnePort<T, ForceLaw>{law, other, by});
+          samples(b, drive, at, count, OnePort<T, ForceLaw>{law, other, by});
         });
       }
     }
-    walk(b, drive, at, count, AnyPorts{});
+    samples(b, drive, at, count, AnyPorts{});
   }
 };
 
-// The walk of so many packs, one of those that dense_packs() may ask for.
+// The sample steps of so many packs, one of those that dense_packs() may ask for.
 template <class T, std::size_t Bytes, std::size_t... Counts>
 DenseSteps<T> steps_of(std::size_t packs, std::index_sequence<Counts...>) {
   constexpr std::size_t most = most_dense_masses * sizeof(T) / Bytes;
@@ -385,8 +385,8 @@ DenseSteps<T> steps_of(std::size_t packs, std::index_sequence<Counts...>) {
   const auto offer = [&]<std::size_t Count>() {
     if constexpr (Count <= most) {
       if (packs == Count) {
-        using W = Walk<T, Bytes, Count>;
-        steps = {W::step, W::pull, leap_dense<Isa::RESSORT_ISA, T>,
+        using S = SampleSteps<T, Bytes, Count>;
+        steps = {S::step, S::pull, dense_block_step<Isa::RESSORT_ISA, T>,
                  build_dense<Isa::RESSORT_ISA, T>};
       }
     }

@@ -55,7 +55,7 @@ double CompensatedKernel<T>::position(std::size_t at) const {
 }
 
 template <class T>
-void CompensatedKernel<T>::place(std::size_t lane, const double* x, const double* v) {
+void CompensatedKernel<T>::set_state(std::size_t lane, const double* x, const double* v) {
   for (std::size_t node = 0; node < program_.position.size(); ++node) {
     const std::size_t at = node * this->width() + lane;
     x_[at] = narrow(x[node]);

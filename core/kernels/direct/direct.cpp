@@ -21,7 +21,7 @@ DirectKernel<T>::DirectKernel(const Program& program, const Direct&, std::size_t
 }
 
 template <class T>
-void DirectKernel<T>::place(std::size_t lane, const double* x, const double* v) {
+void DirectKernel<T>::set_state(std::size_t lane, const double* x, const double* v) {
   for (std::size_t node = 0; node < program_.position.size(); ++node) {
     const std::size_t at = node * this->width() + lane;
     x_[at] = static_cast<T>(x[node]);
@@ -52,7 +52,7 @@ bool DirectKernel<T>::read(std::span<const std::uint32_t> nodes, T* x, T* v) con
 }
 
 template <class T>
-bool DirectKernel<T>::mend(std::span<const std::uint32_t> nodes, const T* x, const T* v) {
+bool DirectKernel<T>::write_nodes(std::span<const std::uint32_t> nodes, const T* x, const T* v) {
   const std::size_t width = this->width();
   for (std::size_t i = 0; i < nodes.size(); ++i) {
     std::copy_n(x + i * width, width, x_.data() + nodes[i] * width);

@@ -24,7 +24,7 @@ struct DirectState {
   const std::vector<PassiveLink>& passive;
   const std::uint32_t* inverse_mass;  // [moving node] coefficient, if there are passive links
   T* memory;                          // [passive link][passive_rows][lane]
-  T* awake;                           // [lane] 0 in the first sample after place(), else 1
+  T* awake;                           // [lane] 0 in the first sample after set_state(), else 1
   T* felt;  // [node][lane] what passive links did in this sample; null: nobody listens
   // Only where positions are compensated:
   T* rest = nullptr;              // [node][lane] what a position is more than x
@@ -47,10 +47,10 @@ template <class T>
 class DirectKernel final : public Kernel<T> {
  public:
   DirectKernel(const Program& program, const Direct& form, std::size_t voices, Isa isa);
-  void place(std::size_t lane, const double* x, const double* v) override;
+  void set_state(std::size_t lane, const double* x, const double* v) override;
   bool save(std::size_t lane, double* x, double* v) const override;
   bool read(std::span<const std::uint32_t> nodes, T* x, T* v) const override;
-  bool mend(std::span<const std::uint32_t> nodes, const T* x, const T* v) override;
+  bool write_nodes(std::span<const std::uint32_t> nodes, const T* x, const T* v) override;
   bool is_near_start(std::size_t lane, double bound) const override;
 
  private:

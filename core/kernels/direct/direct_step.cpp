@@ -90,10 +90,10 @@ struct Summed : View<float, Bytes> {
   V* output_rest;
 };
 
-// The same after nodes were mended: of its own type, so that what is called for
+// The same after nodes were written: of its own type, so that what is called for
 // every sample remains the only one of its kind and is put in its place.
 template <class T, std::size_t Bytes>
-struct Mended : View<T, Bytes> {
+struct Rewritten : View<T, Bytes> {
   using View<T, Bytes>::View;
 };
 
@@ -397,8 +397,8 @@ void step(const Program& program, DirectState<T>& state, const Block<T>& block) 
   const std::size_t inputs = program.inputs.size();
   const bool has_passive = !state.passive.empty();
   if (block.frames == 0) {
-    Mended<T, Bytes> mended(state);
-    pull(program, mended);
+    Rewritten<T, Bytes> rewritten(state);
+    pull(program, rewritten);
   }
   for (std::size_t frame = 0; frame < block.frames; ++frame) {
     advance(state.ramps);

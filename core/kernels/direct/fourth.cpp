@@ -26,7 +26,7 @@ FourthKernel<T>::FourthKernel(const Program& program, const Fourth& form, std::s
 }
 
 template <class T>
-void FourthKernel<T>::place(std::size_t lane, const double* x, const double* v) {
+void FourthKernel<T>::set_state(std::size_t lane, const double* x, const double* v) {
   for (std::size_t node = 0; node < program_.position.size(); ++node) {
     const std::size_t at = node * this->width() + lane;
     x_[at] = static_cast<T>(x[node]);

@@ -44,7 +44,7 @@ template <class T>
 class FourthKernel final : public Kernel<T> {
  public:
   FourthKernel(const Program& program, const Fourth& form, std::size_t voices, Isa isa);
-  void place(std::size_t lane, const double* x, const double* v) override;
+  void set_state(std::size_t lane, const double* x, const double* v) override;
   bool save(std::size_t lane, double* x, double* v) const override;
   bool is_near_start(std::size_t lane, double bound) const override;
 

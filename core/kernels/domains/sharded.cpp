@@ -33,46 +33,46 @@ ShardedKernel<T>::ShardedKernel(const Program& program, const Shards& form, Kern
     : Kernel<T>(program, kernels[0]->width()),
       program_(program),
       shards_(*form.shards),
-      crew_(*form.crew),
+      executor_(*form.executor),
       frames_(form.frames),
       kernels_(std::move(kernels)) {
   const std::size_t width = this->width();
   for (const Shard& shard : shards_) {
-    Desk& desk = desks_.emplace_back();
-    desk.value.resize(frames_ * shard.inputs.size() * width);
-    desk.velocity.resize(desk.value.size());
-    desk.outputs.resize(frames_ * shard.outputs.size() * width);
-    desk.given_x.resize(shard.given.size() * width);
-    desk.given_v.resize(desk.given_x.size());
-    desk.copied_x.resize(shard.copies.size() * width);
-    desk.copied_v.resize(desk.copied_x.size());
-    desk.x.resize(shard.nodes.size());
-    desk.v.resize(shard.nodes.size());
+    Buffers& buffers = buffers_.emplace_back();
+    buffers.value.resize(frames_ * shard.inputs.size() * width);
+    buffers.velocity.resize(buffers.value.size());
+    buffers.outputs.resize(frames_ * shard.outputs.size() * width);
+    buffers.given_x.resize(shard.given.size() * width);
+    buffers.given_v.resize(buffers.given_x.size());
+    buffers.copied_x.resize(shard.copies.size() * width);
+    buffers.copied_v.resize(buffers.copied_x.size());
+    buffers.x.resize(shard.nodes.size());
+    buffers.v.resize(shard.nodes.size());
   }
 }
 
 template <class T>
-void ShardedKernel<T>::place(std::size_t lane, const double* x, const double* v) {
+void ShardedKernel<T>::set_state(std::size_t lane, const double* x, const double* v) {
   for (std::size_t i = 0; i < shards_.size(); ++i) {
-    Desk& desk = desks_[i];
-    for (std::size_t node = 0; node < desk.x.size(); ++node) {
-      desk.x[node] = x[shards_[i].nodes[node]];
-      desk.v[node] = v[shards_[i].nodes[node]];
+    Buffers& buffers = buffers_[i];
+    for (std::size_t node = 0; node < buffers.x.size(); ++node) {
+      buffers.x[node] = x[shards_[i].nodes[node]];
+      buffers.v[node] = v[shards_[i].nodes[node]];
     }
-    kernels_[i]->place(lane, desk.x.data(), desk.v.data());
+    kernels_[i]->set_state(lane, buffers.x.data(), buffers.v.data());
   }
 }
 
 template <class T>
 bool ShardedKernel<T>::save(std::size_t lane, double* x, double* v) const {
   for (std::size_t i = 0; i < shards_.size(); ++i) {
-    Desk& desk = desks_[i];
-    if (!kernels_[i]->save(lane, desk.x.data(), desk.v.data())) {
+    Buffers& buffers = buffers_[i];
+    if (!kernels_[i]->save(lane, buffers.x.data(), buffers.v.data())) {
       return false;
     }
-    for (std::size_t node = 0; node < desk.x.size(); ++node) {
-      x[shards_[i].nodes[node]] = desk.x[node];
-      v[shards_[i].nodes[node]] = desk.v[node];
+    for (std::size_t node = 0; node < buffers.x.size(); ++node) {
+      x[shards_[i].nodes[node]] = buffers.x[node];
+      v[shards_[i].nodes[node]] = buffers.v[node];
     }
   }
   return true;
@@ -92,9 +92,9 @@ void ShardedKernel<T>::play(const Block<T>& block) {
   for (std::size_t at = 0; at < block.frames; at += frames_) {
     const std::size_t frames = std::min(frames_, block.frames - at);
     const auto step = [&](std::size_t i) { step_shard(i, block, at, frames); };
-    crew_.run(shards_.size(), std::ref(step));
-    const auto mend = [&](std::size_t i) { mend_shard(i); };
-    crew_.run(shards_.size(), std::ref(mend));
+    executor_.run(shards_.size(), std::ref(step));
+    const auto write = [&](std::size_t i) { write_copies(i); };
+    executor_.run(shards_.size(), std::ref(write));
   }
   this->coefficients = kernels_[0]->coefficients;
 }
@@ -104,7 +104,7 @@ void ShardedKernel<T>::step_shard(std::size_t i, const Block<T>& block, std::siz
                                   std::size_t frames) {
   const Shard& shard = shards_[i];
   Kernel<T>& kernel = *kernels_[i];
-  Desk& desk = desks_[i];
+  Buffers& buffers = buffers_[i];
   const std::size_t width = this->width();
   if (at == 0) {
     kernel.coefficients = this->coefficients;
@@ -113,39 +113,39 @@ void ShardedKernel<T>::step_shard(std::size_t i, const Block<T>& block, std::siz
   for (std::size_t frame = at; frame < at + frames; ++frame) {
     for (const std::uint32_t input : shard.inputs) {
       const std::size_t from = frame * program_.inputs.size() + input;
-      copy_row(block.value, from, desk.value.data(), row, width);
-      copy_row(block.velocity, from, desk.velocity.data(), row++, width);
+      copy_row(block.value, from, buffers.value.data(), row, width);
+      copy_row(block.velocity, from, buffers.velocity.data(), row++, width);
     }
   }
   const std::size_t audio = at * program_.audio_coefficients.size() * width;
   kernel.step({.frames = frames,
-               .value = desk.value.data(),
-               .velocity = desk.velocity.data(),
+               .value = buffers.value.data(),
+               .velocity = buffers.velocity.data(),
                .audio = block.audio == nullptr ? nullptr : block.audio + audio,
-               .outputs = desk.outputs.data()});
+               .outputs = buffers.outputs.data()});
   row = 0;
   for (std::size_t frame = at; frame < at + frames; ++frame) {
     for (const std::uint32_t output : shard.outputs) {
-      copy_row(desk.outputs.data(), row++, block.outputs, frame * program_.outputs.size() + output,
-               width);
+      copy_row(buffers.outputs.data(), row++, block.outputs,
+               frame * program_.outputs.size() + output, width);
     }
   }
-  kernel.read(shard.given, desk.given_x.data(), desk.given_v.data());
+  kernel.read(shard.given, buffers.given_x.data(), buffers.given_v.data());
 }
 
 template <class T>
-void ShardedKernel<T>::mend_shard(std::size_t i) {
+void ShardedKernel<T>::write_copies(std::size_t i) {
   const Shard& shard = shards_[i];
-  Desk& desk = desks_[i];
+  Buffers& buffers = buffers_[i];
   const std::size_t width = this->width();
-  T* x = desk.copied_x.data();
-  T* v = desk.copied_v.data();
+  T* x = buffers.copied_x.data();
+  T* v = buffers.copied_v.data();
   for (const ShardSource& source : shard.sources) {
-    const Desk& truth = desks_[source.shard];
-    x = std::copy_n(truth.given_x.data() + source.first * width, source.count * width, x);
-    v = std::copy_n(truth.given_v.data() + source.first * width, source.count * width, v);
+    const Buffers& owner = buffers_[source.shard];
+    x = std::copy_n(owner.given_x.data() + source.first * width, source.count * width, x);
+    v = std::copy_n(owner.given_v.data() + source.first * width, source.count * width, v);
   }
-  kernels_[i]->mend(shard.copies, desk.copied_x.data(), desk.copied_v.data());
+  kernels_[i]->write_nodes(shard.copies, buffers.copied_x.data(), buffers.copied_v.data());
 }
 
 template class ShardedKernel<float>;

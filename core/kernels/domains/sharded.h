@@ -1,8 +1,8 @@
 // core/engine: a large network stepped by several cores, a shard each. In the explicit scheme
 // nothing travels farther than one link in a sample: a shard that has a copy of every node within
 // a little more than n links of its own goes on by itself for n samples, after which only the
-// copies are wrong. They are mended from the shards whose own they are; what is a shard's own is
-// never touched, so that a shard computes what the whole would have.
+// copies are wrong. They are written anew from the shards whose own they are; what is a shard's own
+// is never touched, so that a shard computes what the whole would have.
 #pragma once
 
 #include <functional>
@@ -12,15 +12,15 @@
 namespace ressort {
 
 // Does several things at the same time.
-class Crew {
+class Executor {
  public:
-  virtual ~Crew() = default;
+  virtual ~Executor() = default;
   virtual std::size_t size() const = 0;  // how many
   // Calls work(i) for every i < count, count <= size(), and returns when all are done.
   virtual void run(std::size_t count, const std::function<void(std::size_t)>& work) = 0;
 };
 
-// Where the truth about copies is, that follow one another as what is given does.
+// Where the reference about copies is, that follow one another as what is given does.
 struct ShardSource {
   std::uint32_t shard = 0;
   std::uint32_t first = 0;  // of its `given`
@@ -42,9 +42,9 @@ struct Shard {
 template <class T>
 class ShardedKernel final : public Kernel<T> {
  public:
-  // The crew outlives it; every shard's kernel has the same width.
+  // The executor outlives it; every shard's kernel has the same width.
   ShardedKernel(const Program& program, const Shards& form, std::size_t voices, Isa isa);
-  void place(std::size_t lane, const double* x, const double* v) override;
+  void set_state(std::size_t lane, const double* x, const double* v) override;
   bool save(std::size_t lane, double* x, double* v) const override;
   bool is_near_start(std::size_t lane, double bound) const override;
 
@@ -52,24 +52,24 @@ class ShardedKernel final : public Kernel<T> {
   using Kernels = std::vector<std::unique_ptr<Kernel<T>>>;
   // What a shard's kernel is driven by and fills, as Block says; positions and velocities of the
   // nodes given, and of the copies, [i][lane].
-  struct Desk {
+  struct Buffers {
     Aligned<T> value, velocity, outputs;
     Aligned<T> given_x, given_v;
     Aligned<T> copied_x, copied_v;
-    std::vector<double> x, v;  // [node] of one lane, for place() and save()
+    std::vector<double> x, v;  // [node] of one lane, for set_state() and save()
   };
 
   ShardedKernel(const Program& program, const Shards& form, Kernels kernels);
   void play(const Block<T>& block) override;
   void step_shard(std::size_t i, const Block<T>& block, std::size_t at, std::size_t frames);
-  void mend_shard(std::size_t i);
+  void write_copies(std::size_t i);
 
   const Program& program_;
   const std::vector<Shard>& shards_;
-  Crew& crew_;
+  Executor& executor_;
   std::size_t frames_;
-  Kernels kernels_;                  // [shard]
-  mutable std::vector<Desk> desks_;  // [shard]
+  Kernels kernels_;                       // [shard]
+  mutable std::vector<Buffers> buffers_;  // [shard]
 };
 
 }  // namespace ressort

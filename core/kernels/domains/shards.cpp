@@ -450,7 +450,7 @@ std::vector<Shard> make_shards(const Program& program, std::size_t count, std::u
 std::optional<Shards> share_out(const Program& program, const Workload& load,
                                 const Progress& progress) {
   const double whole_ns = predicted_ns(program, load);
-  if (load.crew == nullptr || !is_plain(program) || load.crew->size() < 2 ||
+  if (load.executor == nullptr || !is_plain(program) || load.executor->size() < 2 ||
       whole_ns < least_shared_ns) {
     return std::nullopt;
   }
@@ -464,7 +464,7 @@ std::optional<Shards> share_out(const Program& program, const Workload& load,
   // As it is written first: rows that are alike stay so.
   for (const bool is_breadth_first : {false, true}) {
     Choice choice;
-    for (std::size_t count = load.crew->size(); count > 1; count /= 2) {
+    for (std::size_t count = load.executor->size(); count > 1; count /= 2) {
       progress.spend(4 * count * program.position.size());
       choose_frames(divider.divide(count, is_breadth_first), whole_ns / program.moving, choice);
     }
@@ -477,7 +477,7 @@ std::optional<Shards> share_out(const Program& program, const Workload& load,
       continue;
     }
     Shards found{.shards = std::make_shared<std::vector<Shard>>(std::move(shards)),
-                 .crew = load.crew,
+                 .executor = load.executor,
                  .frames = choice.frames};
     if (const double ns = predicted_ns(program, found, load); ns < best_ns) {
       best_ns = ns;

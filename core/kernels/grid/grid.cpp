@@ -89,7 +89,7 @@ void GridKernel<T>::make_stamps(std::size_t lanes) {
 }
 
 template <class T>
-void GridKernel<T>::place(std::size_t, const double* x, const double* v) {
+void GridKernel<T>::set_state(std::size_t, const double* x, const double* v) {
   for (std::size_t slot = 0; slot < grid_.slots; ++slot) {  // empty ones and all of a ground's too
     x_[slot] = static_cast<T>(grid_.position[slot]);
     v_[slot] = static_cast<T>(grid_.velocity[slot]);
@@ -129,7 +129,7 @@ bool GridKernel<T>::read(std::span<const std::uint32_t> nodes, T* x, T* v) const
 }
 
 template <class T>
-bool GridKernel<T>::mend(std::span<const std::uint32_t> nodes, const T* x, const T* v) {
+bool GridKernel<T>::write_nodes(std::span<const std::uint32_t> nodes, const T* x, const T* v) {
   const bool is_sum = !grid_.segments.empty();
   const auto coefficient = [&](std::size_t i) {
     return is_sum ? this->coefficients.value[program_.link_runs[grid_.spring_run].coefficients[i]]

@@ -42,7 +42,7 @@ struct GridState {
   Corners<T>* corners;                      // [tap] in this sample
   const std::vector<PassiveLink>& passive;  // ends: slots
   T* memory;                                // [passive link][passive_rows]
-  T* awake;                                 // 0 in the first sample after place(), else 1
+  T* awake;                                 // 0 in the first sample after set_state(), else 1
 };
 
 template <class T>
@@ -56,10 +56,10 @@ template <class T>
 class GridKernel final : public Kernel<T> {
  public:
   GridKernel(const Program& program, const Grid& grid, std::size_t voices, Isa isa);
-  void place(std::size_t lane, const double* x, const double* v) override;
+  void set_state(std::size_t lane, const double* x, const double* v) override;
   bool save(std::size_t lane, double* x, double* v) const override;
   bool read(std::span<const std::uint32_t> nodes, T* x, T* v) const override;
-  bool mend(std::span<const std::uint32_t> nodes, const T* x, const T* v) override;
+  bool write_nodes(std::span<const std::uint32_t> nodes, const T* x, const T* v) override;
   bool is_near_start(std::size_t lane, double bound) const override;
 
  private:

@@ -165,12 +165,12 @@ ModalKernel<T>::ModalKernel(const Program& program, const Modes& modes, std::siz
   state_.silence = static_cast<T>(modes.silence);
   state_.quiet = static_cast<T>(modes.quiet);
   state_.lately_kept =
-      static_cast<T>(std::pow(1e-3, static_cast<double>(nap_frames) / program.rate_hz));
+      static_cast<T>(std::pow(1e-3, static_cast<double>(check_frames) / program.rate_hz));
   this->reset(0);
 }
 
 template <class T>
-void ModalKernel<T>::place(std::size_t, const double* x, const double* v) {
+void ModalKernel<T>::set_state(std::size_t, const double* x, const double* v) {
   const std::size_t places = modes_.places.size();
   const double* basis = modes_.basis.data();
   // Where the model starts, nothing is displaced.
@@ -203,8 +203,8 @@ void ModalKernel<T>::place(std::size_t, const double* x, const double* v) {
   state_.fresh_frames = 0;
   state_.awake = modes_.modes;
   state_.swept = state_.modes;
-  state_.until_nap = nap_frames;
-  state_.is_long_nap = false;
+  state_.until_check = check_frames;
+  state_.is_long_check = false;
   std::fill_n(state_.debt, state_.modes, T(0));
   std::fill_n(state_.loudness, places + modes_.outputs.size(), T(0));
 }

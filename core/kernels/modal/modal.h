@@ -13,8 +13,8 @@
 
 namespace ressort {
 
-inline constexpr std::uint32_t nap_frames = 32;  // from one look at what may sleep to the next...
-inline constexpr std::uint32_t long_nap_frames = 128;  // ...while few are awake
+inline constexpr std::uint32_t check_frames = 32;  // from one look at what may sleep to the next...
+inline constexpr std::uint32_t long_check_frames = 128;  // ...while few are awake
 
 // Everything that one step of ModalKernel touches. Rows of modes are `stride` apart and filled up
 // with zeros to `modes`, whole packs of every kind. Ends: the places, then Modes::ends.
@@ -66,14 +66,14 @@ struct ModalState {
   T* k_step;                // [mode] per sample, if is_exact
   T* z_step;                // [mode]
   T* spread;      // [mode] square of the amplitude per that of the state; 0: does not ring
-  T* decay;       // [mode] of an amplitude in nap_frames
+  T* decay;       // [mode] of an amplitude in check_frames
   T* swing;       // [mode] amplitude
   T* debt;        // [mode] amplitude of what was dropped
   T* loudness;    // [listener] sum of all amplitudes, now or lately
   T* room;        // [listener] what may still be dropped
   T silence;      // share of `loudness` that may be dropped; 0: nothing sleeps
   T quiet;        // what may be dropped in any case
-  T lately_kept;  // of `loudness` in nap_frames
+  T lately_kept;  // of `loudness` in check_frames
   std::size_t saved_awake = 0;
   std::size_t bundled = 0;
   std::size_t bundled_modes = 0;
@@ -85,9 +85,9 @@ struct ModalState {
   std::uint32_t surprised_frames = 0;  // so long all links are computed
   T kick_norm = 0;                     // what the links added to the norm in their last block
   bool is_stale = true;                // k, z and compliance are not those of `used`
-  std::uint32_t until_nap = nap_frames;
+  std::uint32_t until_check = check_frames;
   std::uint32_t fresh_frames = 0;  // since they were placed; up to 2
-  bool is_long_nap = false;
+  bool is_long_check = false;
   bool has_bounds = false;  // the energy limits the motion
 };
 
@@ -102,7 +102,7 @@ template <class T>
 class ModalKernel final : public Kernel<T> {
  public:
   ModalKernel(const Program& program, const Modes& modes, std::size_t voices, Isa isa);
-  void place(std::size_t lane, const double* x, const double* v) override;
+  void set_state(std::size_t lane, const double* x, const double* v) override;
   // Modes that nobody hears are left out: false.
   bool save(std::size_t lane, double* x, double* v) const override;
   // By the length of the modes' displacement, which no mass exceeds: it may be late, never early.

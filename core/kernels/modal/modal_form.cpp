@@ -362,7 +362,7 @@ class ModesFinder {
         }
       }
       for (const auto& [input, force] : forces) {
-        add_push({.by = ModalPush::By::hand,
+        add_push({.by = ModalPush::By::position,
                   .input = input,
                   .stiffness = run.coefficients[0],
                   .damping = run.coefficients[1],

@@ -18,20 +18,20 @@
 namespace ressort::RESSORT_ISA {
 namespace {
 
-// r^2 to this power is r^nap_frames.
-constexpr std::size_t nap_doublings = 4;
-static_assert(std::size_t{2} << nap_doublings == nap_frames);
-constexpr std::size_t long_nap_doublings = 2;
-static_assert(nap_frames << long_nap_doublings == long_nap_frames);
+// r^2 to this power is r^check_frames.
+constexpr std::size_t check_doublings = 4;
+static_assert(std::size_t{2} << check_doublings == check_frames);
+constexpr std::size_t long_check_doublings = 2;
+static_assert(check_frames << long_check_doublings == long_check_frames);
 constexpr std::size_t few_modes = 16;
 
 constexpr double least_ringing = 1e-4;  // share of lK; nearer to the aperiodic limit nothing sleeps
 constexpr double endless = 1e15;        // the amplitude of what does not ring, for a state of 1
 
-// What is left, after a nap as long as the last, of what a short one leaves `kept` of.
+// What is left, after an interval as long as the last, of what a short one leaves `kept` of.
 template <class V, class T>
-V after_nap(const ModalState<T>& s, V kept) {
-  for (std::size_t i = 0; s.is_long_nap && i < long_nap_doublings; ++i) {
+V after_check(const ModalState<T>& s, V kept) {
+  for (std::size_t i = 0; s.is_long_check && i < long_check_doublings; ++i) {
     kept *= kept;
   }
   return kept;
@@ -58,7 +58,7 @@ void measure_ringing(ModalState<T>& s) {
     const V wider = select(before > V{}, spread / before, V{} + 1);
     packs(s.spread)[i] = select(left > V{}, spread, V{});
     V decay = select(left > V{}, left, V{});
-    for (std::size_t j = 0; j < nap_doublings; ++j) {
+    for (std::size_t j = 0; j < check_doublings; ++j) {
       decay *= decay;
     }
     packs(s.decay)[i] = decay;
@@ -102,7 +102,7 @@ void measure_room(ModalState<T>& s, std::size_t places, std::size_t listeners) {
       owed += absolute(packs(row)[i]) * packs(s.debt)[i];
     }
     const T now = total<T>(loud);
-    const T lately = after_nap(s, s.lately_kept) * s.loudness[l];
+    const T lately = after_check(s, s.lately_kept) * s.loudness[l];
     s.loudness[l] = now > lately ? now : lately;
     const T room = s.silence * s.loudness[l] + s.quiet - total<T>(owed);
     s.room[l] = room > 0 ? room : T(0);
@@ -131,9 +131,9 @@ void stay_awake(ModalState<T>& s, std::size_t modes) {
 
 // What has decayed enough falls asleep. The modes are left alone at this time.
 template <class T>
-void nap(ModalState<T>& s, std::size_t places, std::size_t listeners) {
+void check_sleep(ModalState<T>& s, std::size_t places, std::size_t listeners) {
   for (std::size_t i = 0; i < all_packs(s); ++i) {
-    packs(s.debt)[i] *= after_nap(s, packs(s.decay)[i]);
+    packs(s.debt)[i] *= after_check(s, packs(s.decay)[i]);
   }
   measure_amplitudes(s);
   measure_room(s, places, listeners);
@@ -144,7 +144,7 @@ void nap(ModalState<T>& s, std::size_t places, std::size_t listeners) {
     s.q[mode] = s.d[mode] = s.saved_q[mode] = s.saved_d[mode] = 0;
   }
   stay_awake(s, awake);
-  s.is_long_nap = awake <= few_modes;
+  s.is_long_check = awake <= few_modes;
 }
 
 }  // namespace

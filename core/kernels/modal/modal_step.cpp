@@ -39,7 +39,7 @@ struct Player : Mixer<T> {
         play_bound<true>(at, frames);
         s.is_stale = true;
       } else if (s.silence > 0) {
-        frames = frames < s.until_nap || is_held() ? frames : s.until_nap;
+        frames = frames < s.until_check || is_held() ? frames : s.until_check;
         play_steady(at, frames);
         settle(at + frames - 1, frames);
       } else {
@@ -52,21 +52,21 @@ struct Player : Mixer<T> {
   void wake() {
     if (s.awake < modes.modes) {
       stay_awake(s, modes.modes);
-      s.until_nap = nap_frames;
-      s.is_long_nap = false;
+      s.until_check = check_frames;
+      s.is_long_check = false;
     }
   }
   // Lets modes sleep that are neither pushed nor held after frame `last`.
   void settle(std::size_t last, std::size_t frames) {
-    s.until_nap -= frames < s.until_nap ? static_cast<std::uint32_t>(frames) : s.until_nap;
-    if (s.until_nap > 0) {
+    s.until_check -= frames < s.until_check ? static_cast<std::uint32_t>(frames) : s.until_check;
+    if (s.until_check > 0) {
       return;
     }
     find_pushes(last, 1);
     if (s.pushing == 0 && !is_held()) {
-      nap(s, places, places + outputs);
+      check_sleep(s, places, places + outputs);
     }
-    s.until_nap = s.is_long_nap ? long_nap_frames : nap_frames;
+    s.until_check = s.is_long_check ? long_check_frames : check_frames;
   }
 
   void play_steady(std::size_t first, std::size_t frames) {
@@ -102,7 +102,7 @@ struct Player : Mixer<T> {
         case ModalPush::By::force:
           now = value[push.input];
           break;
-        case ModalPush::By::hand:
+        case ModalPush::By::position:
           now = coefficient(push.stiffness) * (value[push.input] - static_cast<T>(push.start)) +
                 coefficient(push.damping) * velocity[push.input];
           break;
@@ -111,7 +111,7 @@ struct Player : Mixer<T> {
           now = coefficient(push.stiffness);
           break;
       }
-      const bool is_late = push.by == ModalPush::By::hand || push.by == ModalPush::By::late;
+      const bool is_late = push.by == ModalPush::By::position || push.by == ModalPush::By::late;
       s.amplitude[frame * pushes + j] = w * (is_late ? s.late[j] : now);
       s.late[j] = now;
     }

@@ -58,8 +58,8 @@ SlowKernel<T>::SlowKernel(const Program& program, const Slow& form, std::size_t,
 }
 
 template <class T>
-void SlowKernel<T>::place(std::size_t, const double* x, const double* v) {
-  fine_.kernel->place(0, x, v);
+void SlowKernel<T>::set_state(std::size_t, const double* x, const double* v) {
+  fine_.kernel->set_state(0, x, v);
   std::copy_n(x, x_.size(), rows_.begin());
   is_fine_ = true;
   since_ = 0;
@@ -140,7 +140,7 @@ void SlowKernel<T>::start_coarse() {
     speed[node] = aim_[node] - rows_[node];
   }
   for (int trial = 0; trial < most_trials; ++trial) {
-    coarse_.kernel->place(0, rows_.data(), speed.data());
+    coarse_.kernel->set_state(0, rows_.data(), speed.data());
     coarse_.step(this->coefficients, factor_);
     coarse_.kernel->save(0, x_.data(), v_.data());
     for (std::size_t node = 0; node < nodes; ++node) {

@@ -3,7 +3,7 @@
 // through the four that are around. One voice.
 //
 // What comes in acts with the next coarse step, which is up to 2 D samples later; what is wanted
-// sooner must not be played this way. After place() the first D samples are stepped one by one:
+// sooner must not be played this way. After set_state() the first D samples are stepped one by one:
 // where the coarse steps begin, and how fast, is known from them.
 #pragma once
 
@@ -16,7 +16,7 @@ class SlowKernel final : public Kernel<T> {
  public:
   // The form's Programs outlive it.
   SlowKernel(const Program& program, const Slow& form, std::size_t voices, Isa isa);
-  void place(std::size_t lane, const double* x, const double* v) override;
+  void set_state(std::size_t lane, const double* x, const double* v) override;
   bool save(std::size_t lane, double* x, double* v) const override;
   bool is_near_start(std::size_t lane, double bound) const override;
 
@@ -48,7 +48,7 @@ class SlowKernel final : public Kernel<T> {
   std::vector<T> factor_;       // [coefficient] to a coarse step
   std::vector<double> weight_;  // [sample of a step, 0..frames][point]
   bool is_fine_ = true;
-  std::size_t since_ = 0;            // samples, since place() or the last coarse step
+  std::size_t since_ = 0;            // samples, since set_state() or the last coarse step
   std::vector<double> rows_;         // [point][node] positions: one step ago, here, and two ahead
   std::vector<double> x_, v_, aim_;  // [node]
   std::vector<T> pushed_;            // [input] forces summed up, or where the hand is

@@ -22,7 +22,7 @@ void Reader::add_mass(const Line& line) {
   }
   Mass& mass = out_.network.masses[line.element];
   mass.name = std::string(line.label.text);
-  mass.place = {line.number, line.label.column};
+  mass.location = {line.number, line.label.column};
   std::size_t at = 0;
   switch (line.keyword->element) {
     case Element::ground:
@@ -91,7 +91,7 @@ void Reader::add_macro(const Line& line) {
   Macro& macro = out_.network.macros[line.element];
   macro.name = std::string(line.label.text);
   macro.kind = line.keyword->macro;
-  macro.place = {line.number, line.label.column};
+  macro.location = {line.number, line.label.column};
   std::size_t at = 0;
   macro.length = size(line, at++, macro.kind == MacroKind::stiff_string ? 3 : 2);
   macro.width = is_mesh(macro.kind) ? size(line, at++, 2) : 1;
@@ -148,7 +148,7 @@ void Reader::add_link(Line& line) {
   Link link;
   link.name = std::string(line.label.text);
   link.law = line.keyword->law;
-  link.place = {line.number, line.label.column};
+  link.location = {line.number, line.label.column};
   const auto a = reference(line, 0);
   const auto b = reference(line, 1);
   for (std::size_t i = 2; i < line.rest.size(); ++i) {
@@ -204,7 +204,7 @@ void Reader::add_input(Line& line) {
     out_.network.inputs.push_back({.number = *number,
                                    .is_force = is_force,
                                    .mass = *mass,
-                                   .place = {line.number, line.label.column}});
+                                   .location = {line.number, line.label.column}});
   }
 }
 
@@ -215,7 +215,7 @@ void Reader::add_output(Line& line) {
     out_.network.outputs.push_back({.number = *number,
                                     .is_force = line.keyword->element == Element::force_output,
                                     .mass = *mass,
-                                    .place = {line.number, line.label.column}});
+                                    .location = {line.number, line.label.column}});
   }
 }
 
@@ -449,7 +449,7 @@ std::optional<std::uint32_t> Reader::tap(const Line& line, const Token& token, c
     }
   }
   Mass point{.kind = MassKind::point, .tap = static_cast<std::uint32_t>(network.taps.size())};
-  point.place = {line.number, token.column};
+  point.location = {line.number, token.column};
   network.taps.push_back({.macro = *macro,
                           .u = expression(line, coordinates[0]),
                           .v = is_plane ? expression(line, coordinates[1]) : no_argument});

@@ -257,7 +257,7 @@ void Reader::declare_parameter(const Line& line) {
   }
   Parameter parameter{.name = std::string(line.label.text),
                       .value = 0.0,
-                      .place = {line.number, line.label.column}};
+                      .location = {line.number, line.label.column}};
   if (!check_count(line)) {
     // It has been told.
   } else if (line.keyword->element == Element::audio_parameter) {
@@ -377,7 +377,7 @@ void Reader::look_over() {
   for (std::size_t i = 0; i < network.masses.size(); ++i) {
     const Mass& mass = network.masses[i];
     if (!attached[i] && mass.kind != MassKind::oscillator && mass.kind != MassKind::point) {
-      say(Severity::warning, mass.place.line, {mass.name, mass.place.column},
+      say(Severity::warning, mass.location.line, {mass.name, mass.location.column},
           "nothing is attached to " + quoted("@" + mass.name.text()));
     }
   }
@@ -385,7 +385,7 @@ void Reader::look_over() {
     const bool is_contact = facts_of(link.law).family == Family::contact;
     if (is_contact && network.masses[link.a].kind == MassKind::position &&
         network.masses[link.b].kind != MassKind::position) {
-      say(Severity::warning, link.place.line, {link.name, link.place.column},
+      say(Severity::warning, link.location.line, {link.name, link.location.column},
           "the contact's ends look swapped: it acts while the second is below the first, here " +
               quoted("@" + network.masses[link.b].name.text()) + " below " +
               quoted("@" + network.masses[link.a].name.text()));
@@ -395,7 +395,7 @@ void Reader::look_over() {
     const Mass& pushed = network.masses[input.mass];
     if (input.is_force && (pushed.kind == MassKind::ground || pushed.kind == MassKind::position)) {
       const std::string label = "in" + std::to_string(input.number);
-      say(Severity::warning, input.place.line, {label, input.place.column},
+      say(Severity::warning, input.location.line, {label, input.location.column},
           "'@" + label + "' pushes " + quoted("@" + pushed.name.text()) + ", which " +
               (pushed.kind == MassKind::ground ? "never moves" : "moves only as its input says") +
               ": it does nothing");
@@ -404,7 +404,7 @@ void Reader::look_over() {
   std::vector<Input> heard = network.inputs;
   for (const Parameter& parameter : network.parameters) {
     if (parameter.audio_input > 0) {
-      heard.push_back({.number = parameter.audio_input, .place = parameter.place});
+      heard.push_back({.number = parameter.audio_input, .location = parameter.location});
     }
   }
   tell_gaps(heard, "in");
@@ -420,7 +420,7 @@ void Reader::look_over() {
   for (std::size_t i = 0; i < used.size(); ++i) {
     if (!used[i]) {
       const Parameter& parameter = network.parameters[i];
-      say(Severity::warning, parameter.place.line, {parameter.name, parameter.place.column},
+      say(Severity::warning, parameter.location.line, {parameter.name, parameter.location.column},
           "the parameter " + quoted(parameter.name) + " is used nowhere");
     }
   }

@@ -132,18 +132,18 @@ class Reader {
   template <class Channels>
   void tell_gaps(const Channels& channels, std::string_view name) {
     int last = 0;
-    Place place;
+    SourceLocation location;
     std::vector<int> numbers;
     for (const auto& channel : channels) {
       numbers.push_back(channel.number);
       if (channel.number > last) {
         last = channel.number;
-        place = channel.place;
+        location = channel.location;
       }
     }
     for (int number = 1; number < last; ++number) {
       if (std::find(numbers.begin(), numbers.end(), number) == numbers.end()) {
-        say(Severity::warning, place.line, {name, place.column},
+        say(Severity::warning, location.line, {name, location.column},
             "there is @" + std::string(name) + std::to_string(last) + ", but no @" +
                 std::string(name) + std::to_string(number));
       }

@@ -72,12 +72,12 @@ std::vector<Error> misfits(const Network& network, const Preset& preset) {
   for (const ParameterSetting& setting : preset.parameters) {
     if (find_parameter(network, setting.name) < 0) {
       found.push_back(
-          {no_parameter(network, setting.name), setting.place.line, setting.place.column});
+          {no_parameter(network, setting.name), setting.location.line, setting.location.column});
     }
   }
   for (const ControlSetting& control : preset.controls) {
     if (std::string message = misfit(network, control); !message.empty()) {
-      found.push_back({std::move(message), control.place.line, control.place.column});
+      found.push_back({std::move(message), control.location.line, control.location.column});
     }
   }
   std::stable_sort(found.begin(), found.end(),

@@ -77,7 +77,7 @@ std::string words_for_how() {
   return words;
 }
 
-Place place_of(const toml::node& node) {
+SourceLocation location_of(const toml::node& node) {
   return {static_cast<int>(node.source().begin.line), static_cast<int>(node.source().begin.column)};
 }
 
@@ -153,10 +153,10 @@ class Table {
 
   // Always false, for who has failed.
   bool fail(const toml::node& node, std::string message) {
-    return fail(place_of(node), std::move(message));
+    return fail(location_of(node), std::move(message));
   }
-  bool fail(Place place, std::string message) {
-    errors_.push_back({std::move(message), place.line, place.column});
+  bool fail(SourceLocation location, std::string message) {
+    errors_.push_back({std::move(message), location.line, location.column});
     return false;
   }
 
@@ -196,12 +196,12 @@ class Table {
 
 void read_parameter(std::string name, const toml::node& node, Preset& preset,
                     std::vector<Error>& errors) {
-  ParameterSetting setting{.name = std::move(name), .place = place_of(node)};
+  ParameterSetting setting{.name = std::move(name), .location = location_of(node)};
   const std::string shown = quoted(setting.name);
   const toml::table* row = node.as_table();
   if (row == nullptr) {
     errors.push_back({shown + " must be a table: { value = 0.1, range = [0.001, 0.3] }",
-                      setting.place.line, setting.place.column});
+                      setting.location.line, setting.location.column});
     return;
   }
   Table reader(*row, "the parameter " + shown, errors);
@@ -273,7 +273,7 @@ void read_control(const toml::table& table, Preset& preset, std::vector<Error>& 
   const std::size_t before = errors.size();
   Table reader(table, "a control", errors);
   reader.allow("control");
-  ControlSetting control{.place = place_of(table)};
+  ControlSetting control{.location = location_of(table)};
   std::string from;
   if ((reader.text("from", from) || table.get("from") == nullptr) && !read_source(from, control)) {
     const toml::node* node = table.get("from");
@@ -339,17 +339,17 @@ void read_root(const toml::table& root, Preset& preset, std::vector<Error>& erro
   reader.allow("");
   const toml::node* const model = root.get("model");
   if (model != nullptr) {
-    preset.model_place = place_of(*model);
+    preset.model_location = location_of(*model);
   }
   if ((reader.text("model", preset.model) || model == nullptr) && preset.model.empty()) {
-    reader.fail(preset.model_place, "a preset needs a model: model = \"PolyTriangle.mdl\"");
+    reader.fail(preset.model_location, "a preset needs a model: model = \"PolyTriangle.mdl\"");
   }
   constexpr std::size_t longest_path = 4096;
   if (preset.model.size() > longest_path) {
-    reader.fail(preset.model_place, "'model' is longer than any file's path");
+    reader.fail(preset.model_location, "'model' is longer than any file's path");
     preset.model.clear();
   } else if (!preset.model.empty() && !preset.model.ends_with(".mdl")) {
-    reader.fail(preset.model_place, "'model' must be the name of a .mdl file");
+    reader.fail(preset.model_location, "'model' must be the name of a .mdl file");
     preset.model.clear();
   }
   reader.text("description", preset.description);
@@ -540,10 +540,11 @@ std::optional<Error> idle_keys(const Network& network, const Preset& preset) {
   for (const Parameter& parameter : network.parameters) {
     next = std::max(next, parameter.audio_input + 1);
   }
-  const Place place = network.inputs.empty() ? Place{1, 1} : network.inputs[0].place;
+  const SourceLocation location =
+      network.inputs.empty() ? SourceLocation{1, 1} : network.inputs[0].location;
   return Error{"no key plays this model: " + (why.empty() ? "it has no input" : why) + "; '@in" +
                    std::to_string(next) + " frcInput " + target + "' would let keys strike it",
-               place.line, place.column};
+               location.line, location.column};
 }
 
 }  // namespace ressort

@@ -20,7 +20,7 @@ struct ParameterSetting {
   double value = 0.0;
   double minimum = 0.0;  // the range that controllers, OSC and the console keep to
   double maximum = 0.0;
-  Place place;
+  SourceLocation location;
   bool operator==(const ParameterSetting&) const = default;
 };
 
@@ -38,14 +38,14 @@ struct ControlSetting {
   double travel = 0.0;  // how far from its middle the input rests, on either side
   int lowest_key = 0;
   int highest_key = 127;
-  Place place;
+  SourceLocation location;
   bool operator==(const ControlSetting&) const = default;
 };
 
 struct Preset {
-  std::string model;        // a file's name, beside the preset or in the models' folder
-  Place model_place{1, 1};  // of that name
-  std::string description;  // one line for a person
+  std::string model;                    // a file's name, beside the preset or in the models' folder
+  SourceLocation model_location{1, 1};  // of that name
+  std::string description;              // one line for a person
   int voices = 1;
   double gain = 1.0;                   // output per unit of position
   double release_s = 0.0;              // 0: a voice rings out

@@ -127,7 +127,7 @@ TEST_CASE("the worst corner of the parameters' box counts", "[stability]") {
         Approx((limit - .08 / .5) / (.8 / .5)).epsilon(1e-14));
 }
 
-TEST_CASE("on random networks the bound is safe, and within a factor of two of the truth",
+TEST_CASE("on random networks the bound is safe, and within a factor of two of the reference",
           "[stability]") {
   rig::Random random(6);
   double loosest = 10.0;
@@ -157,15 +157,15 @@ TEST_CASE("on random networks the bound is safe, and within a factor of two of t
     }
     const Network network = network_of(text);
     const double factor = factor_of(text);
-    const double truth = 4.0 / stiffest(network);
-    INFO(text << "factor " << show(factor) << ", truth " << show(truth));
-    REQUIRE(factor <= truth * 0.98 * (1 + 1e-9));
-    REQUIRE(factor >= truth * 0.98 / 2.0);
+    const double reference = 4.0 / stiffest(network);
+    INFO(text << "factor " << show(factor) << ", reference " << show(reference));
+    REQUIRE(factor <= reference * 0.98 * (1 + 1e-9));
+    REQUIRE(factor >= reference * 0.98 / 2.0);
     REQUIRE(growth(network, factor) < 1e4);
-    REQUIRE(growth(network, truth * 1.02) > 1e10);
-    loosest = std::min(loosest, factor / truth);
+    REQUIRE(growth(network, reference * 1.02) > 1e10);
+    loosest = std::min(loosest, factor / reference);
   }
-  CHECK(loosest < 0.97);  // it is a bound and not the truth
+  CHECK(loosest < 0.97);  // it is a bound and not the reference
 }
 
 // --- the exact proof ----------------------------------------------------------------------------

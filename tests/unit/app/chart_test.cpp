@@ -1,5 +1,5 @@
-// The chart: fronts by hand, the two truths against closed forms and the textbook simulator, and
-// that the ways stay as good as they were.
+// The chart: fronts by hand, the two references against closed forms and the textbook simulator,
+// and that the ways stay as good as they were.
 #include "app/commands/chart/chart.h"
 
 #include <cmath>
@@ -7,7 +7,7 @@
 
 #include "app/commands/chart/judge.h"
 #include "app/commands/chart/start.h"
-#include "core/engine/truth.h"
+#include "core/engine/reference.h"
 #include "core/model/language/mdl.h"
 #include "tests/support/catch.h"
 #include "tests/support/reference_network.h"
@@ -120,7 +120,7 @@ TEST_CASE("the textbook steps as the textbook simulator does", "[chart]") {
     CAPTURE(example.name);
     const Network network = rig::network_of(example.text);
     const Program program = make_program(network, Network::reference_rate_hz, true);
-    Textbook book(program);
+    ReferenceScheme book(program);
     auto reference = reference::make_simulation(network, parameter_values(network));
     const rig::Motion motion(7, 20.0, 400.0);
     std::vector<double> value(program.inputs.size());
@@ -163,14 +163,14 @@ TEST_CASE("every method is as far from the continuous network as theory has it",
     CAPTURE(known.scene);
     const ChartScene scene = scene_called(known.scene);
     const Starts starts(scene);
-    const auto truths = find_truths(scene, starts.at(1), Isa::base);
-    REQUIRE(truths);
+    const auto references = find_references(scene, starts.at(1), Isa::base);
+    REQUIRE(references);
     const auto physical_db = [&](const Way& way) {
       MadeWay one = made(starts.at(way.oversampling), way);
-      return signal_to_error_db(truths->physical.waves, render_way(one, seconds), 0, seconds);
+      return signal_to_error_db(references->physical.waves, render_way(one, seconds), 0, seconds);
     };
     MadeWay way = made(starts.at(1), direct);
-    CHECK(signal_to_error_db(truths->identical.waves, render_way(way, seconds), 0, seconds) >=
+    CHECK(signal_to_error_db(references->identical.waves, render_way(way, seconds), 0, seconds) >=
           200.0);
     CHECK(physical_db(direct) == Approx(known.published_db).margin(0.5));
     const double fourth = physical_db({.name = "fourth", .method = Method::fourth});

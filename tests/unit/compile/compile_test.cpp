@@ -108,12 +108,12 @@ TEST_CASE("the plan takes the form that is cheapest at its worst", "[compile]") 
   };
   CHECK(chosen(scenes::poly_triangle()) == Method::dense);
   CHECK(chosen(scenes::iplay_the_triangle()) == Method::dense);
-  CHECK(chosen(scenes::iplay_the_triangle(), 64) == Method::chorus);
+  CHECK(chosen(scenes::iplay_the_triangle(), 64) == Method::batch);
   const std::string picked = scenes::string("s", 8, "0.1", "0.01") +
                              "@in1 posInput 0.\n@pick nlPluck @in1 @s_m3 0.05 0.01\n" +
                              scenes::output(1, "s_m6");
   CHECK(chosen(picked) == Method::dense);
-  CHECK(chosen(picked, 64) == Method::chorus);
+  CHECK(chosen(picked, 64) == Method::batch);
   CHECK(chosen(scenes::physical_lfo()) == Method::dense);
   CHECK(chosen(scenes::resonator()) == Method::chains);
   CHECK(chosen(scenes::bowed_string()) == Method::chains);
@@ -127,7 +127,7 @@ TEST_CASE("a method that is asked for is taken where it can be", "[compile]") {
   for (const Method method : methods_for(KernelRow::Use::published)) {
     const Plan plan = make_plan(machine, {}, method);
     REQUIRE(plan.parts.size() == 1);
-    const bool is_small = method == Method::dense || method == Method::chorus;
+    const bool is_small = method == Method::dense || method == Method::batch;
     const bool can = !is_small && method != Method::chains;  // it has no rows of equal masses
     CHECK(plan.parts[0].method == (can ? method : Method::direct));
   }

@@ -22,7 +22,7 @@ Score score_for(const Program& part, const Program& whole, const Score& score) {
     some.inputs[n].clear();
     for (const InputSlot& slot : part.inputs) {
       for (std::size_t i = 0; i < whole.inputs.size(); ++i) {
-        if (whole.inputs[i].hand == slot.hand) {
+        if (whole.inputs[i].input == slot.input) {
           some.inputs[n].push_back(score.inputs[n][i]);
         }
       }

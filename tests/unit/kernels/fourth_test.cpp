@@ -178,7 +178,7 @@ TEST_CASE("what is stable as published is so to fourth order", "[fourth]") {
 TEST_CASE("a force moves the fourth-order form as the continuous network", "[fourth]") {
   const std::string text = scenes::string("s", 20, "0.2", "0.002") + "@in1 frcInput @s_m4\n" +
                            scenes::output(1, "s_m11");
-  // The same at 16 times the rate is 2^16 times nearer, and so is the truth.
+  // The same at 16 times the rate is 2^16 times nearer, and so is the reference.
   constexpr std::size_t finer = 16;
   constexpr std::size_t frames = 4000;
   const auto force = [](double t) {  // smooth, and long beside a sample
@@ -197,15 +197,16 @@ TEST_CASE("a force moves the fourth-order form as the continuous network", "[fou
     }
     return out;
   };
-  const auto truth = perform(formed(make_program(network_of(text), 44100.0 * finer, true)), finer);
+  const auto reference =
+      perform(formed(make_program(network_of(text), 44100.0 * finer, true)), finer);
   const Program program = program_of(text);
   Comparison published;
   Comparison found;
   const auto plain = perform(program, 1);
   const auto corrected = perform(formed(program), 1);
   for (std::size_t n = 0; n < frames; ++n) {
-    published.add(truth[n], plain[n]);
-    found.add(truth[n], corrected[n]);
+    published.add(reference[n], plain[n]);
+    found.add(reference[n], corrected[n]);
   }
   INFO(found.snr_db() << " dB, as published " << published.snr_db());
   CHECK(found.snr_db() > published.snr_db() + 20.0);

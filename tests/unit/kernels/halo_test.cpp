@@ -21,7 +21,7 @@ const Cut mesh_cuts[] = {{2, 10}, {3, 6}};  // each shard without a good part of
 
 // In shards, each in the form that `reform` gives it.
 template <class Reform>
-Program sharded(Program program, const Cut& cut, Crew& crew, Reform&& reform) {
+Program sharded(Program program, const Cut& cut, Executor& executor, Reform&& reform) {
   auto shards = std::make_shared<std::vector<Shard>>(make_shards(program, cut.shards, cut.frames));
   REQUIRE(shards->size() == cut.shards);
   for (Shard& shard : *shards) {
@@ -29,7 +29,7 @@ Program sharded(Program program, const Cut& cut, Crew& crew, Reform&& reform) {
     REQUIRE(form);
     shard.program.form = *std::move(form);
   }
-  program.form = Shards{.shards = std::move(shards), .crew = &crew, .frames = cut.frames};
+  program.form = Shards{.shards = std::move(shards), .executor = &executor, .frames = cut.frames};
   return program;
 }
 std::optional<Chains> as_chains(const Program& program) {
@@ -72,7 +72,7 @@ std::string mesh_scene() {
 // One Comparison for each output of the two, whose forms may differ, over 3000 samples.
 template <class T>
 std::vector<Comparison> compare(const Program& whole, const Program& cut, Isa isa, bool turns) {
-  const DenormalsFlushed flushed;  // as in the crew's threads
+  const DenormalsFlushed flushed;  // as in the executor's threads
   Fighter<T> expected(whole, 1.0, isa);
   Fighter<T> found(cut, 1.0, isa);
   Random random(3);
@@ -109,11 +109,11 @@ std::vector<Comparison> compare(const Program& whole, const Program& cut, Isa is
 
 // The same bits in the direct form.
 template <class T>
-void check_same(Program program, const Cut& cut, Crew& crew, Isa isa, bool turns) {
+void check_same(Program program, const Cut& cut, Executor& executor, Isa isa, bool turns) {
   INFO(cut.shards << " shards, " << cut.frames << " frames, " << isa_name(isa));
   double peak = 0.0;
   for (const Comparison& output :
-       compare<T>(program, sharded(program, cut, crew, as_it_is), isa, turns)) {
+       compare<T>(program, sharded(program, cut, executor, as_it_is), isa, turns)) {
     CHECK(output.worst == 0.0);
     peak = std::max(peak, output.peak);
   }
@@ -123,13 +123,13 @@ void check_same(Program program, const Cut& cut, Crew& crew, Isa isa, bool turns
 }  // namespace
 
 TEST_CASE("in the direct form shards compute the same bits", "[halo]") {
-  ThreadPool crew(3);
+  ThreadPool executor(3);
   const bool turns = GENERATE(false, true);
   const auto check = [&](const std::string& text, const auto& all_cuts) {
     const Program program = program_of(text);
     for (const Cut& cut : all_cuts) {
-      check_same<double>(program, cut, crew, Isa::base, turns);
-      check_same<float>(program, cut, crew, best_isa(), turns);
+      check_same<double>(program, cut, executor, Isa::base, turns);
+      check_same<float>(program, cut, executor, best_isa(), turns);
     }
   };
   check(chain_scene() + heard_forces() + heard_holds(), cuts);
@@ -137,14 +137,14 @@ TEST_CASE("in the direct form shards compute the same bits", "[halo]") {
 }
 
 TEST_CASE("points on macros and what has no order are divided too", "[halo]") {
-  ThreadPool crew(3);
+  ThreadPool executor(3);
   const std::string macro =
       "@k param 0.2\n@p closedMesh 45 46 1. k 0.003 0. 0.\n@in1 frcInput [@p 0.49 0.3]\n"
       "@in2 posInput 0.\n@finger contact [@p 0.503 0.8] @in2 0. 0.01 0.\n"
       "@out1 posOutput [@p 0.51 0.7]\n@out2 posOutput [@p 0.1 0.1]\n@out3 frcOutput [@p 0.497 "
       "0.51]\n";
   for (const Cut& cut : mesh_cuts) {
-    check_same<double>(program_of(macro), cut, crew, Isa::base, true);
+    check_same<double>(program_of(macro), cut, executor, Isa::base, true);
   }
 
   for (const std::uint64_t seed : {1u, 2u}) {
@@ -168,13 +168,13 @@ TEST_CASE("points on macros and what has no order are divided too", "[halo]") {
         "@f contact @m1003 @in2 0.1 0.01 0.\n@out1 posOutput @m20\n@out2 posOutput @m1002\n"
         "@out3 frcOutput @g\n@out4 frcOutput @m999\n";
     for (const Cut& cut : {Cut{2, 32}, Cut{3, 16}}) {
-      check_same<double>(program_of(text), cut, crew, Isa::base, false);
+      check_same<double>(program_of(text), cut, executor, Isa::base, false);
     }
   }
 }
 
 TEST_CASE("chains and grids in shards are held to the direct form", "[halo]") {
-  ThreadPool crew(3);
+  ThreadPool executor(3);
   DuelOptions options{.frames = 8820, .seed = 5, .reach = 0.05};
   const auto check = [&](const std::string& text, const std::string& forces, const auto& all_cuts,
                          auto&& reform) {
@@ -182,13 +182,13 @@ TEST_CASE("chains and grids in shards are held to the direct form", "[halo]") {
     for (const Cut& cut : all_cuts) {
       INFO(cut.shards << " shards, " << cut.frames << " frames, " << isa_name(options.isa)
                       << (options.turns ? ", turns" : ""));
-      for (const auto& output : duel<double>(sharded(program, cut, crew, reform), options)) {
+      for (const auto& output : duel<double>(sharded(program, cut, executor, reform), options)) {
         INFO(show(output.relative()));
         CHECK(output.relative() < 1e-12);
       }
       // Forces are small differences of what the form computes: held to the same form.
       Program whole = program_of(text + forces);
-      const Program shards = sharded(whole, cut, crew, reform);
+      const Program shards = sharded(whole, cut, executor, reform);
       whole.form = *reform(whole);
       for (const auto& output : compare<double>(whole, shards, options.isa, options.turns)) {
         INFO(show(output.relative()));
@@ -207,7 +207,7 @@ TEST_CASE("chains and grids in shards are held to the direct form", "[halo]") {
 }
 
 TEST_CASE("a grid with a law on every link goes on in shards", "[halo]") {
-  ThreadPool crew(2);
+  ThreadPool executor(2);
   const Program program = program_of(
       "@k param 0.1\n@p closedMesh 45 45 1. k 0.003 0. 0.\n@in1 frcInput [@p 0.3 0.31]\n"
       "@out1 posOutput [@p 0.7 0.1]\n@out2 posOutput [@p 0.503 0.5]\n");
@@ -217,7 +217,7 @@ TEST_CASE("a grid with a law on every link goes on in shards", "[halo]") {
     run.coefficients[2] = run.coefficients[1];
     run.coefficients[1] = run.coefficients[0];
   }
-  for (const auto& output : duel<double>(sharded(cubic, {2, 10}, crew, as_grid),
+  for (const auto& output : duel<double>(sharded(cubic, {2, 10}, executor, as_grid),
                                          {.frames = 8820, .reach = 2.0, .turns = true})) {
     INFO(show(output.relative()));
     CHECK(output.relative() < 1e-12);
@@ -226,7 +226,7 @@ TEST_CASE("a grid with a law on every link goes on in shards", "[halo]") {
 
 // With K = M a wave on a string moves as fast as anything can, a link in a sample.
 TEST_CASE("a wave goes over the cut as if it were not there", "[halo]") {
-  ThreadPool crew(2);
+  ThreadPool executor(2);
   const Program program =
       program_of(scenes::string("s", 600, "1", "0") +
                  "@in1 frcInput @s_m200\n@out1 posOutput @s_m300\n@out2 posOutput @s_m400\n");
@@ -241,7 +241,7 @@ TEST_CASE("a wave goes over the cut as if it were not there", "[halo]") {
     }
     return heard;
   };
-  const std::vector<double> heard = played(sharded(program, {2, 64}, crew, as_it_is));
+  const std::vector<double> heard = played(sharded(program, {2, 64}, executor, as_it_is));
   for (std::size_t n = 0; n < 256; ++n) {
     // An impulse of 1 leaves a step of 1 at every second mass behind its front.
     const auto step = [&](std::size_t links) {
@@ -252,7 +252,7 @@ TEST_CASE("a wave goes over the cut as if it were not there", "[halo]") {
   }
 
   // With copies of what is near enough for 16 samples only, 64 are too many.
-  Program narrow = sharded(program, {2, 16}, crew, as_it_is);
+  Program narrow = sharded(program, {2, 16}, executor, as_it_is);
   CHECK(played(narrow) == heard);
   std::get<Shards>(narrow.form).frames = 64;
   CHECK(played(narrow) != heard);
@@ -260,10 +260,10 @@ TEST_CASE("a wave goes over the cut as if it were not there", "[halo]") {
 
 // 10 s of a string that nothing damps: 6900 exchanges.
 TEST_CASE("shards do not drift", "[halo]") {
-  ThreadPool crew(2);
+  ThreadPool executor(2);
   Program program = program_of(scenes::string("s", 2000, "0.3", "0") +
                                "@in1 frcInput @s_m20\n@out1 posOutput @s_m1700\n");
-  Program cut = sharded(program, {2, 64}, crew, as_chains);
+  Program cut = sharded(program, {2, 64}, executor, as_chains);
   program.form = *chains_form(program);
   Fighter<double> whole(program, 1.0, best_isa());
   Fighter<double> shards(cut, 1.0, best_isa());
@@ -283,10 +283,11 @@ TEST_CASE("shards do not drift", "[halo]") {
 }
 
 TEST_CASE("a network is shared out where that pays", "[halo]") {
-  ThreadPool crew(2);
-  const auto planned = [&](const std::string& text, Crew* helpers, std::optional<Method> method) {
+  ThreadPool executor(2);
+  const auto planned = [&](const std::string& text, Executor* helpers,
+                           std::optional<Method> method) {
     Machine machine = make_machine(network_of(text), 44100.0, true);
-    const Plan plan = make_plan(machine, {.isa = Isa::v3, .crew = helpers}, method);
+    const Plan plan = make_plan(machine, {.isa = Isa::v3, .executor = helpers}, method);
     INFO(describe(plan));
     const auto* const shards = std::get_if<Shards>(&machine.parts[0].form);
     if (shards != nullptr) {
@@ -296,20 +297,21 @@ TEST_CASE("a network is shared out where that pays", "[halo]") {
   };
   const std::string string = "@s string 30000 1. 0.1 0.001 0. 1.\n@out1 posOutput [@s 0.3]\n";
   const std::string mesh = "@s mesh 200 200 1. 0.1 0.001 0. 1.\n@out1 posOutput [@s 0.3 0.3]\n";
-  CHECK(planned(string, &crew, {}) == 2);
-  CHECK(planned(mesh, &crew, {}) == 2);
-  CHECK(planned(string, &crew, Method::direct) == 2);
+  CHECK(planned(string, &executor, {}) == 2);
+  CHECK(planned(mesh, &executor, {}) == 2);
+  CHECK(planned(string, &executor, Method::direct) == 2);
   CHECK(planned(string, nullptr, {}) == 0);
-  CHECK(planned("@s string 1000 1. 0.1 0.001 0. 1.\n@out1 posOutput [@s 0.3]\n", &crew, {}) == 0);
+  CHECK(planned("@s string 1000 1. 0.1 0.001 0. 1.\n@out1 posOutput [@s 0.3]\n", &executor, {}) ==
+        0);
   // A finger that may be put anywhere ties everything together.
-  CHECK(planned(string + "@u param 0.5\n@in1 frcInput [@s u]\n", &crew, {}) == 0);
-  CHECK(planned(string + "@in1 frcInput [@s 0.5]\n", &crew, {}) == 2);
+  CHECK(planned(string + "@u param 0.5\n@in1 frcInput [@s u]\n", &executor, {}) == 0);
+  CHECK(planned(string + "@in1 frcInput [@s 0.5]\n", &executor, {}) == 2);
 }
 
 TEST_CASE("kernels in shards are placed and saved as one", "[halo]") {
-  ThreadPool crew(2);
+  ThreadPool executor(2);
   const Program program = program_of(chain_scene());
-  const Program cut = sharded(program, {2, 16}, crew, as_chains);
+  const Program cut = sharded(program, {2, 16}, executor, as_chains);
   const auto kernel = make_kernel<double>(cut, 1, best_isa());
   CHECK(kernel->is_near_start(0, 1e-9));
   std::vector<double> x(program.position.size());
@@ -318,7 +320,7 @@ TEST_CASE("kernels in shards are placed and saved as one", "[halo]") {
     x[node] = static_cast<double>(node);
     v[node] = -0.5 * static_cast<double>(node);
   }
-  kernel->place(0, x.data(), v.data());
+  kernel->set_state(0, x.data(), v.data());
   CHECK_FALSE(kernel->is_near_start(0, 1e-9));
   std::vector<double> saved_x(x.size());
   std::vector<double> saved_v(x.size());

@@ -87,9 +87,9 @@ std::vector<double> sums_of(const Program& program, const Modes& modes,
   for (const ModalPush& push : modes.pushes) {
     double sum = 0.0;
     for (const auto& frame : inputs) {
-      sum += push.by == ModalPush::By::force  ? std::fabs(frame[push.input])
-             : push.by == ModalPush::By::hand ? 0.0
-                                              : std::fabs(value_of(program, push.stiffness));
+      sum += push.by == ModalPush::By::force      ? std::fabs(frame[push.input])
+             : push.by == ModalPush::By::position ? 0.0
+                                                  : std::fabs(value_of(program, push.stiffness));
     }
     sums.push_back(sum);
   }

@@ -158,7 +158,7 @@ Channels played(const Network& network, Step&& step) {
   return outputs;
 }
 
-Channels by_textbook(const Network& network, const Channels& driven) {
+Channels by_reference(const Network& network, const Channels& driven) {
   auto oracle = reference::make_simulation(network, parameters_at(network, driven, 0));
   return played(network, [&](std::size_t n) {
     oracle.set_parameters(network, parameters_at(network, driven, n));
@@ -241,7 +241,7 @@ TEST_CASE("every model of the corpus sounds as the textbook has it", "[corpus]")
     INFO(model.name);
     const Network network = rig::network_of(text_of(model.name));
     const Channels driven = excitation(network);
-    const Channels expected = by_textbook(network, driven);
+    const Channels expected = by_reference(network, driven);
     const bool is_steady =
         std::all_of(network.parameters.begin(), network.parameters.end(),
                     [](const Parameter& parameter) { return parameter.audio_input == 0; });

@@ -14,7 +14,7 @@ std::string exported(const std::string& model, bool rescale = true) {
   std::vector<ParameterSetting> sliders;
   for (const Parameter& parameter : network.parameters) {
     sliders.push_back(
-        {parameter.name, parameter.value, 0.0, 4.0 * parameter.value, parameter.place});
+        {parameter.name, parameter.value, 0.0, 4.0 * parameter.value, parameter.location});
   }
   auto text = faust_text(network, {.name = "one", .sliders = sliders, .rescale = rescale});
   REQUIRE(text);

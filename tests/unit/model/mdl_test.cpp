@@ -139,8 +139,8 @@ TEST_CASE("masses, grounds and oscillators are what was written", "[mdl]") {
   CHECK(m.third == 2.0);
   REQUIRE(m.drawing == 1);
   CHECK(network.drawings[0] == Drawing{"membrane", 0.25, -3.0});
-  CHECK(m.place.line == 2);
-  CHECK(m.place.column == 1);
+  CHECK(m.location.line == 2);
+  CHECK(m.location.column == 1);
   const Mass& o = network.masses[1];
   CHECK(o.kind == MassKind::oscillator);
   CHECK(value(o.mass) == 1.0);

@@ -96,7 +96,7 @@ class Panel {
   }
 
  private:
-  std::size_t truth() const { return shows_ == Shows::identical ? 0 : 1; }
+  std::size_t reference() const { return shows_ == Shows::identical ? 0 : 1; }
 
   double y_of(const ChartRow& row) const {
     if (is_logarithmic(shows_)) {
@@ -104,7 +104,7 @@ class Panel {
       const double error = shows_ == Shows::cents ? physical.cents : physical.t60_percent;
       return std::isnan(error) ? error : std::max(error, least_error);
     }
-    return std::clamp(-sheet_.snr_db(row, truth()), deepest_db, 0.0);
+    return std::clamp(-sheet_.snr_db(row, reference()), deepest_db, 0.0);
   }
   bool is_drawn(const ChartRow& row) const {
     return row.failure.empty() && std::isfinite(y_of(row)) && row.ns > 0.0;
@@ -141,7 +141,7 @@ class Panel {
     }
   }
 
-  // How far the truth of a scene that is not linear is known.
+  // How far the reference of a scene that is not linear is known.
   bool has_floor() const { return shows_ == Shows::physical && !sheet_.is_linear; }
   double floor_db() const { return sheet_.floor_db[sheet_.window]; }
 
@@ -176,7 +176,7 @@ class Panel {
   void draw_front() {
     std::vector<std::pair<double, double>> front;
     for (const ChartRow& row : sheet_.rows) {
-      if (row.is_on_front[truth()] && is_drawn(row) && !is_logarithmic(shows_)) {
+      if (row.is_on_front[reference()] && is_drawn(row) && !is_logarithmic(shows_)) {
         front.emplace_back(row.ns, y_of(row));
       }
     }

@@ -12,9 +12,9 @@ namespace ressort {
 
 // Steps one Program, link by link, by the plain scheme of every law, with the coefficients as they
 // are at the start. Without parameters that audio turns. [any thread but audio]
-class Textbook {
+class ReferenceScheme {
  public:
-  explicit Textbook(const Program& program);
+  explicit ReferenceScheme(const Program& program);
 
   // One sample. [input] positions or forces, and what the positions changed by.
   void step(std::span<const double> value, std::span<const double> velocity);

@@ -38,7 +38,7 @@ struct Setting {
   double value = 0.0;
 };
 
-struct GateRequest {
+struct StabilityRequest {
   const Network& written;   // to name what is to blame
   const Network& expanded;  // the same without macros
   const Preset& preset;
@@ -51,7 +51,7 @@ struct GateRequest {
   Progress progress = {};
 };
 
-struct Gate {
+struct StabilityCheck {
   Verdict verdict = Verdict::stable;  // of the start, by what is always felt
   std::optional<Error> complaint;     // unless stable: of the model, with its line
   std::vector<Error> narrowed;  // ranges that the preset gives and that are too wide; its lines
@@ -62,7 +62,8 @@ struct Gate {
 // Looks at the start; if that is proved, widens it to the ranges of `parameters` as far as the
 // whole of their box is proved, and writes back what it came to. A start that is not proved keeps
 // its ranges. O(links) where the edge bound says yes. [any thread but audio]
-Gate guard(const GateRequest& request, std::vector<ParameterInfo>& parameters);
+StabilityCheck check_stability(const StabilityRequest& request,
+                               std::vector<ParameterInfo>& parameters);
 
 // The first element, in the order of the network, of which an argument is no finite number with
 // these values of the parameters, or which weighs nothing; with its line. What an audio input gives

@@ -14,8 +14,9 @@ namespace ressort {
 // [part] of the machine made of this network without macros; nothing where forces are heard, where
 // something drifts, and where there is too much of it. The network has to be stable in the box.
 // [any thread but audio]
-std::vector<std::optional<Repose>> make_repose(const Network& network, const Machine& machine,
-                                               const ParameterBox& box,
-                                               const Progress& progress = {});
+std::vector<std::optional<RestBound>> make_rest_bounds(const Network& network,
+                                                       const Machine& machine,
+                                                       const ParameterBox& box,
+                                                       const Progress& progress = {});
 
 }  // namespace ressort

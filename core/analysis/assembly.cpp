@@ -1,4 +1,4 @@
-#include "core/analysis/stencil.h"
+#include "core/analysis/assembly.h"
 
 #include <algorithm>
 #include <cmath>
@@ -11,12 +11,12 @@ namespace {
 constexpr std::uint32_t held = 0xffffffffu;
 constexpr std::uint64_t most_wandering = 4'000'000;  // terms
 
-class StencilMaker {
+class Assembler {
  public:
-  explicit StencilMaker(const Network& network)
+  explicit Assembler(const Network& network)
       : network_(network), row_(network.masses.size(), held) {}
 
-  Stencil make() {
+  Assembly make() {
     for (std::uint32_t i = 0; i < network_.masses.size(); ++i) {
       if (moves(network_.masses[i])) {
         row_[i] = static_cast<std::uint32_t>(out_.masses.size());
@@ -113,7 +113,7 @@ class StencilMaker {
   }
 
   const Network& network_;
-  Stencil out_;
+  Assembly out_;
   std::vector<std::uint32_t> row_;  // [mass of the network]
   std::size_t first_ = 0;           // of the entries of the term at hand
 };
@@ -129,8 +129,8 @@ LawNumbers numbers(const Link& link, std::span<const Range> arguments, double Ra
 
 }  // namespace
 
-Stencil make_stencil(const Network& network) {
-  return StencilMaker(network).make();
+Assembly assemble(const Network& network) {
+  return Assembler(network).make();
 }
 
 std::vector<Range> argument_ranges(const Network& network, const ParameterBox& box) {
@@ -146,7 +146,7 @@ Range range_at(std::span<const Range> arguments, ArgumentId argument) {
   return argument == no_argument ? Range{} : arguments[argument];
 }
 
-Load highest_load(const Network& network, const Stencil::Term& term,
+Load highest_load(const Network& network, const Assembly::Term& term,
                   std::span<const Range> arguments, double rate_ratio) {
   const double r = rate_ratio;
   if (!term.is_link) {
@@ -168,7 +168,7 @@ Load highest_load(const Network& network, const Stencil::Term& term,
           .rubbed = is_friction ? damped : 0.0};
 }
 
-Load lowest_load(const Network& network, const Stencil::Term& term,
+Load lowest_load(const Network& network, const Assembly::Term& term,
                  std::span<const Range> arguments, double rate_ratio) {
   const double r = rate_ratio;
   const auto load = [&](double k, double z) {

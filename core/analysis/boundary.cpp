@@ -1,4 +1,4 @@
-#include "core/analysis/edge.h"
+#include "core/analysis/boundary.h"
 
 #include <algorithm>
 #include <cmath>
@@ -23,16 +23,16 @@ namespace {
 
 // Calls `use(term, its bound)`.
 template <class Use>
-void each_bound(const Stencil& stencil, const Weights& weights, Use&& use) {
-  std::vector<double> sums(stencil.masses.size(), 0.0);
-  for (std::size_t t = 0; t < stencil.terms.size(); ++t) {
-    for (const Stencil::Entry& entry : stencil.of(stencil.terms[t])) {
+void each_bound(const Assembly& assembly, const Weights& weights, Use&& use) {
+  std::vector<double> sums(assembly.masses.size(), 0.0);
+  for (std::size_t t = 0; t < assembly.terms.size(); ++t) {
+    for (const Assembly::Entry& entry : assembly.of(assembly.terms[t])) {
       sums[entry.row] += std::fabs(entry.share) * weights.terms[t];
     }
   }
-  for (std::size_t t = 0; t < stencil.terms.size(); ++t) {
+  for (std::size_t t = 0; t < assembly.terms.size(); ++t) {
     double sum = 0.0;
-    for (const Stencil::Entry& entry : stencil.of(stencil.terms[t])) {
+    for (const Assembly::Entry& entry : assembly.of(assembly.terms[t])) {
       sum += std::fabs(entry.share) * sums[entry.row] / weights.masses[entry.row];
     }
     use(t, weights.terms[t] > 0.0 ? sum : 0.0);
@@ -41,9 +41,9 @@ void each_bound(const Stencil& stencil, const Weights& weights, Use&& use) {
 
 }  // namespace
 
-Bound edge_bound(const Stencil& stencil, const Weights& weights) {
+Bound edge_bound(const Assembly& assembly, const Weights& weights) {
   Bound bound;
-  each_bound(stencil, weights, [&](std::size_t term, double value) {
+  each_bound(assembly, weights, [&](std::size_t term, double value) {
     if (value > bound.value) {
       bound = {value, term};
     }
@@ -51,28 +51,28 @@ Bound edge_bound(const Stencil& stencil, const Weights& weights) {
   return bound;
 }
 
-EdgeFinder::EdgeFinder(const Stencil& stencil, bool is_exact, Progress progress)
-    : stencil_(stencil),
-      is_exact_(is_exact && stencil.is_complete),
+BoundaryFinder::BoundaryFinder(const Assembly& assembly, bool is_exact, Progress progress)
+    : assembly_(assembly),
+      is_exact_(is_exact && assembly.is_complete),
       progress_(std::move(progress)),
-      definite_(stencil, progress_) {}
+      definite_(assembly, progress_) {}
 
-bool EdgeFinder::is_exact() {
+bool BoundaryFinder::is_exact() {
   is_exact_ = is_exact_ && definite_.is_feasible();
   return is_exact_;
 }
 
-bool EdgeFinder::holds(const Weights& weights, double limit) {
-  progress_.spend(stencil_.entries.size());
-  return stencil_.is_complete && is_usable(weights) &&
-         (edge_bound(stencil_, weights).value < limit || factors(weights, limit));
+bool BoundaryFinder::holds(const Weights& weights, double limit) {
+  progress_.spend(assembly_.entries.size());
+  return assembly_.is_complete && is_usable(weights) &&
+         (edge_bound(assembly_, weights).value < limit || factors(weights, limit));
 }
 
-bool EdgeFinder::is_definite(std::span<const double> diagonal, std::span<const double> terms) {
+bool BoundaryFinder::is_definite(std::span<const double> diagonal, std::span<const double> terms) {
   return definite_.factor(diagonal, terms);
 }
 
-bool EdgeFinder::factors(const Weights& weights, double limit) {
+bool BoundaryFinder::factors(const Weights& weights, double limit) {
   if (!is_exact_ || !is_usable(weights)) {
     return false;
   }
@@ -82,8 +82,8 @@ bool EdgeFinder::factors(const Weights& weights, double limit) {
     diagonal.push_back(limit * mass);
   }
   std::vector<double> rest = diagonal;
-  for (std::size_t t = 0; t < stencil_.terms.size(); ++t) {
-    for (const Stencil::Entry& entry : stencil_.of(stencil_.terms[t])) {
+  for (std::size_t t = 0; t < assembly_.terms.size(); ++t) {
+    for (const Assembly::Entry& entry : assembly_.of(assembly_.terms[t])) {
       rest[entry.row] -= weights.terms[t] * entry.share * entry.share;
     }
   }
@@ -92,15 +92,16 @@ bool EdgeFinder::factors(const Weights& weights, double limit) {
 }
 
 // xT (4M - K - 2Z) x, and the larger of what it is the difference of.
-EdgeFinder::Margin EdgeFinder::margin(const Weights& weights, std::span<const double> shape) const {
+BoundaryFinder::Margin BoundaryFinder::margin(const Weights& weights,
+                                              std::span<const double> shape) const {
   double inertia = 0.0;
   for (std::size_t i = 0; i < shape.size(); ++i) {
     inertia += limit_of_scheme * weights.masses[i] * shape[i] * shape[i];
   }
   double pull = 0.0;
-  for (std::size_t t = 0; t < stencil_.terms.size(); ++t) {
+  for (std::size_t t = 0; t < assembly_.terms.size(); ++t) {
     double stretch = 0.0;
-    for (const Stencil::Entry& entry : stencil_.of(stencil_.terms[t])) {
+    for (const Assembly::Entry& entry : assembly_.of(assembly_.terms[t])) {
       stretch += entry.share * shape[entry.row];
     }
     pull += weights.terms[t] * stretch * stretch;
@@ -109,8 +110,8 @@ EdgeFinder::Margin EdgeFinder::margin(const Weights& weights, std::span<const do
 }
 
 // Where the shape's margin is 0: at once if the line is straight, else by halves.
-double EdgeFinder::crossing(const WeightLine& line, std::span<const double> shape, double safe,
-                            double bad) const {
+double BoundaryFinder::crossing(const WeightLine& line, std::span<const double> shape, double safe,
+                                double bad) const {
   constexpr double rounding = 1e-14;
   const double inside = margin(line(safe), shape).rest;
   const double outside = margin(line(bad), shape).rest;
@@ -130,7 +131,7 @@ double EdgeFinder::crossing(const WeightLine& line, std::span<const double> shap
 }
 
 // Towards the motion that the last factored matrix holds back least, by inverse iteration.
-void EdgeFinder::refine(const Weights& weights, std::vector<double>& shape) const {
+void BoundaryFinder::refine(const Weights& weights, std::vector<double>& shape) const {
   for (int i = 0; i < 3; ++i) {
     double largest = 0.0;
     for (std::size_t row = 0; row < shape.size(); ++row) {
@@ -148,11 +149,11 @@ void EdgeFinder::refine(const Weights& weights, std::vector<double>& shape) cons
 
 // The bound of every term is a straight line in what the weights are straight in, or in its
 // inverse if that is a mass: two places say where the first of them meets the limit.
-std::optional<double> EdgeFinder::met(const WeightLine& line, double safe) {
+std::optional<double> BoundaryFinder::met(const WeightLine& line, double safe) {
   const double other = safe > 0.0 ? 0.5 * safe : 1.0;
   const auto bounds_at = [&](double at) {
-    std::vector<double> bounds(stencil_.terms.size());
-    each_bound(stencil_, line(at), [&](std::size_t term, double value) { bounds[term] = value; });
+    std::vector<double> bounds(assembly_.terms.size());
+    each_bound(assembly_, line(at), [&](std::size_t term, double value) { bounds[term] = value; });
     return bounds;
   };
   const std::vector<double> here = bounds_at(safe);
@@ -167,25 +168,25 @@ std::optional<double> EdgeFinder::met(const WeightLine& line, double safe) {
     return nearest;
   };
   constexpr double step = 1e-9;
-  const auto is_edge = [&](double at) {
+  const auto is_boundary = [&](double at) {
     const double outwards = at > safe ? 1.0 + step : 1.0 - step;
     return std::isfinite(at) && at > 0.0 && holds(line(at / outwards), limit_of_scheme) &&
            !holds(line(at * outwards), limit_of_scheme);
   };
-  if (const double up = first_meeting(safe, other); is_edge(up)) {
+  if (const double up = first_meeting(safe, other); is_boundary(up)) {
     return up;
   }
   if (safe > 0.0) {
-    if (const double down = 1.0 / first_meeting(1.0 / safe, 1.0 / other); is_edge(down)) {
+    if (const double down = 1.0 / first_meeting(1.0 / safe, 1.0 / other); is_boundary(down)) {
       return down;
     }
   }
   return std::nullopt;
 }
 
-Edge EdgeFinder::between(const WeightLine& line, double safe, double bad) {
+Boundary BoundaryFinder::between(const WeightLine& line, double safe, double bad) {
   const bool is_exact = this->is_exact();
-  std::vector<double> shape(is_exact ? stencil_.masses.size() : 0);
+  std::vector<double> shape(is_exact ? assembly_.masses.size() : 0);
   for (std::size_t i = 0; i < shape.size(); ++i) {
     shape[i] = std::cos(static_cast<double>(i * i));  // like no mode in particular
   }
@@ -214,7 +215,7 @@ Edge EdgeFinder::between(const WeightLine& line, double safe, double bad) {
   return {is_exact ? bad : safe, std::move(shape)};
 }
 
-std::optional<Edge> EdgeFinder::outwards(const WeightLine& line, double safe) {
+std::optional<Boundary> BoundaryFinder::outwards(const WeightLine& line, double safe) {
   const double direction = safe < 0.0 ? -1.0 : 1.0;
   const auto is_safe = [&](double at) { return holds(line(at), limit_of_scheme); };
   if (is_safe(safe + direction * 1e12 * std::max(std::fabs(safe), 1.0))) {

@@ -1,4 +1,4 @@
-#include "core/compile/repose.h"
+#include "core/compile/rest_bound.h"
 
 #include <algorithm>
 #include <cmath>
@@ -13,9 +13,11 @@ constexpr std::size_t most_places = 64;  // each takes a solution
 
 }  // namespace
 
-std::vector<std::optional<Repose>> make_repose(const Network& network, const Machine& machine,
-                                               const ParameterBox& box, const Progress& progress) {
-  std::vector<std::optional<Repose>> reposes(machine.parts.size());
+std::vector<std::optional<RestBound>> make_rest_bounds(const Network& network,
+                                                       const Machine& machine,
+                                                       const ParameterBox& box,
+                                                       const Progress& progress) {
+  std::vector<std::optional<RestBound>> bounds(machine.parts.size());
   std::map<std::uint32_t, double> given;  // mass -> its compliance
   for (const Output& output : network.outputs) {
     given[output.mass] = 0.0;
@@ -30,11 +32,11 @@ std::vector<std::optional<Repose>> make_repose(const Network& network, const Mac
     masses.push_back(mass);
   }
   if (masses.size() > most_places) {
-    return reposes;
+    return bounds;
   }
   const auto found = compliances(network, box, machine.rate_ratio, masses, progress);
   if (!found) {
-    return reposes;
+    return bounds;
   }
   for (std::size_t i = 0; i < masses.size(); ++i) {
     given[masses[i]] = (*found)[i];
@@ -43,9 +45,9 @@ std::vector<std::optional<Repose>> make_repose(const Network& network, const Mac
   for (std::size_t i = 0; i < box.lowest.size(); ++i) {
     limits.push_back({box.lowest[i], box.highest[i]});
   }
-  for (std::size_t p = 0; p < reposes.size(); ++p) {
+  for (std::size_t p = 0; p < bounds.size(); ++p) {
     const Program& program = machine.parts[p];
-    Repose repose{.compliances = {}, .reaches = {}, .box = limits};
+    RestBound bound{.compliances = {}, .reaches = {}, .box = limits};
     bool is_known = true;
     for (const OutputSlot& slot : program.outputs) {
       const auto output = std::find_if(
@@ -54,20 +56,20 @@ std::vector<std::optional<Repose>> make_repose(const Network& network, const Mac
           });
       const double compliance = given[output->mass];
       is_known = is_known && !slot.is_force && std::isfinite(compliance);
-      repose.compliances.push_back(compliance);
+      bound.compliances.push_back(compliance);
     }
     for (std::uint32_t i = 0; i < program.origins.size(); ++i) {
       const Link& link = network.links[program.origins[i]];
       if (facts_of(link.law).lets_go()) {
         const double root = std::sqrt(given[link.a]) + std::sqrt(given[link.b]);
-        repose.reaches.push_back({i, root * root});
+        bound.reaches.push_back({i, root * root});
       }
     }
     if (is_known) {
-      reposes[p] = std::move(repose);
+      bounds[p] = std::move(bound);
     }
   }
-  return reposes;
+  return bounds;
 }
 
 }  // namespace ressort

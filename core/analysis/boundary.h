@@ -1,12 +1,12 @@
-// core/analysis: where stability ends on a line through what a stencil's weights may be.
+// core/analysis: where stability ends on a line through what a assembly's weights may be.
 #pragma once
 
 #include <functional>
 #include <optional>
 #include <vector>
 
+#include "core/analysis/assembly.h"
 #include "core/analysis/definite.h"
-#include "core/analysis/stencil.h"
 
 namespace ressort {
 
@@ -20,7 +20,7 @@ struct Weights {
 // The weights along a line: where one parameter goes, for instance.
 using WeightLine = std::function<Weights(double)>;
 
-struct Edge {
+struct Boundary {
   double value = 0.0;
   std::vector<double> shape;  // of the motion that does not decay there; [row], empty where unknown
 };
@@ -32,14 +32,14 @@ struct Bound {
   double value = 0.0;
   std::size_t term = 0;
 };
-Bound edge_bound(const Stencil& stencil, const Weights& weights);
+Bound edge_bound(const Assembly& assembly, const Weights& weights);
 
-// Looks for where 4M - K - 2Z stops being positive definite. Keeps a reference to the stencil, and
+// Looks for where 4M - K - 2Z stops being positive definite. Keeps a reference to the assembly, and
 // the factorisation's pattern. [any thread but audio]
-class EdgeFinder {
+class BoundaryFinder {
  public:
   // Not exact, as wanted or because factorisations would take too long: by the edge bound alone.
-  EdgeFinder(const Stencil& stencil, bool is_exact, Progress progress = {});
+  BoundaryFinder(const Assembly& assembly, bool is_exact, Progress progress = {});
   bool is_exact();
 
   // Is it stable there? At once where the edge bound says so. A `limit` below 4 is for rounding.
@@ -47,10 +47,10 @@ class EdgeFinder {
 
   // The edge between a place that holds and one that does not: to 13 digits, with about eight
   // factorisations where the line is straight; by the bound to three, on the safe side.
-  Edge between(const WeightLine& line, double safe, double bad);
+  Boundary between(const WeightLine& line, double safe, double bad);
 
   // The first edge beyond `safe`, going away from 0, upwards if `safe` is 0; nothing up to 1e12.
-  std::optional<Edge> outwards(const WeightLine& line, double safe);
+  std::optional<Boundary> outwards(const WeightLine& line, double safe);
 
   // The edge by the bound alone, on either side of `safe` and 0 or above; at once, with six looks
   // at the line. Nothing where it has to be searched for.
@@ -70,7 +70,7 @@ class EdgeFinder {
                   double bad) const;
   void refine(const Weights& weights, std::vector<double>& shape) const;
 
-  const Stencil& stencil_;
+  const Assembly& assembly_;
   bool is_exact_;  // as far as is known yet
   Progress progress_;
   Definite definite_;

@@ -37,8 +37,8 @@ std::string described(const Culprit& culprit) {
 
 // A mass that weighs nothing, or what is no number.
 std::optional<Proofs::Suspect> Proofs::nonsense(std::span<const Range> arguments) const {
-  for (std::size_t row = 0; row < stencil_.masses.size(); ++row) {
-    const Range mass = range_at(arguments, network_.masses[stencil_.masses[row]].mass);
+  for (std::size_t row = 0; row < assembly_.masses.size(); ++row) {
+    const Range mass = range_at(arguments, network_.masses[assembly_.masses[row]].mass);
     if (!(mass.lowest > 0.0 && std::isfinite(mass.highest))) {
       return Suspect{Quantity::mass, row};
     }
@@ -63,7 +63,7 @@ Proofs::Suspect Proofs::feeder(std::span<const Range> arguments) const {
 }
 
 Proofs::Suspect Proofs::heavier_part(std::size_t term, std::span<const Range> arguments) const {
-  const Load load = highest_load(network_, stencil_.terms[term], arguments, rate_ratio_);
+  const Load load = highest_load(network_, assembly_.terms[term], arguments, rate_ratio_);
   return {load.stiff >= load.damped + load.rubbed ? Quantity::stiffness : Quantity::damping, term};
 }
 
@@ -72,7 +72,7 @@ Proofs::Suspect Proofs::heavier_part(std::size_t term, std::span<const Range> ar
 Proofs::Suspect Proofs::weakest(const Weights& weights, std::span<const Range> arguments,
                                 std::span<const double> shape) const {
   if (shape.empty()) {
-    return heavier_part(edge_bound(stencil_, weights).term, arguments);
+    return heavier_part(edge_bound(assembly_, weights).term, arguments);
   }
   double inertia = 0.0;
   double pull = 0.0;
@@ -85,9 +85,9 @@ Proofs::Suspect Proofs::weakest(const Weights& weights, std::span<const Range> a
     inertia += share_of_row[i];
     row = share_of_row[i] > share_of_row[row] ? i : row;
   }
-  for (std::size_t t = 0; t < stencil_.terms.size(); ++t) {
+  for (std::size_t t = 0; t < assembly_.terms.size(); ++t) {
     double stretch = 0.0;
-    for (const Stencil::Entry& entry : stencil_.of(stencil_.terms[t])) {
+    for (const Assembly::Entry& entry : assembly_.of(assembly_.terms[t])) {
       stretch += entry.share * shape[entry.row];
     }
     share_of_term.push_back(weights.terms[t] * stretch * stretch);
@@ -101,9 +101,9 @@ Proofs::Suspect Proofs::weakest(const Weights& weights, std::span<const Range> a
 
 ArgumentId Proofs::argument_of(const Suspect& suspect, std::span<const Range> arguments) const {
   if (suspect.quantity == Quantity::mass) {
-    return network_.masses[stencil_.masses[suspect.index]].mass;
+    return network_.masses[assembly_.masses[suspect.index]].mass;
   }
-  const Stencil::Term& term = stencil_.terms[suspect.index];
+  const Assembly::Term& term = assembly_.terms[suspect.index];
   if (term.is_link) {
     const Link& link = network_.links[term.element];
     return link.arguments[slot_of(link, suspect.quantity, arguments)];
@@ -112,28 +112,29 @@ ArgumentId Proofs::argument_of(const Suspect& suspect, std::span<const Range> ar
   return suspect.quantity == Quantity::stiffness ? mass.stiffness : mass.damping;
 }
 
-const Place& Proofs::place_of(const Suspect& suspect) const {
+const SourceLocation& Proofs::location_of(const Suspect& suspect) const {
   if (suspect.quantity == Quantity::mass) {
-    return network_.masses[stencil_.masses[suspect.index]].place;
+    return network_.masses[assembly_.masses[suspect.index]].location;
   }
-  const Stencil::Term& term = stencil_.terms[suspect.index];
-  return term.is_link ? network_.links[term.element].place : network_.masses[term.element].place;
+  const Assembly::Term& term = assembly_.terms[suspect.index];
+  return term.is_link ? network_.links[term.element].location
+                      : network_.masses[term.element].location;
 }
 
 Culprit Proofs::accuse(const Suspect& suspect, std::span<const Range> arguments) const {
   Culprit culprit;
   culprit.quantity = suspect.quantity;
-  culprit.place = place_of(suspect);
+  culprit.location = location_of(suspect);
   if (suspect.quantity == Quantity::mass) {
-    culprit.name = network_.masses[stencil_.masses[suspect.index]].name;
+    culprit.name = network_.masses[assembly_.masses[suspect.index]].name;
   } else {
-    const Stencil::Term& term = stencil_.terms[suspect.index];
+    const Assembly::Term& term = assembly_.terms[suspect.index];
     culprit.name =
         term.is_link ? network_.links[term.element].name : network_.masses[term.element].name;
   }
   for (const Macro& macro : macros_) {
-    const bool is_it =
-        macro.place.line == culprit.place.line && macro.place.column == culprit.place.column;
+    const bool is_it = macro.location.line == culprit.location.line &&
+                       macro.location.column == culprit.location.column;
     culprit.name = is_it && culprit.name.empty() ? macro.name : culprit.name;
   }
   const ArgumentId argument = argument_of(suspect, arguments);
@@ -155,12 +156,12 @@ Culprit Proofs::accuse(const Suspect& suspect, std::span<const Range> arguments)
 std::size_t Proofs::users(const Suspect& suspect, std::span<const Range> arguments) const {
   const ArgumentId argument = argument_of(suspect, arguments);
   const std::size_t count =
-      suspect.quantity == Quantity::mass ? stencil_.masses.size() : stencil_.terms.size();
+      suspect.quantity == Quantity::mass ? assembly_.masses.size() : assembly_.terms.size();
   std::set<std::pair<int, int>> places;
   for (std::size_t i = 0; i < count; ++i) {
     const Suspect other{suspect.quantity, i};
     if (argument_of(other, arguments) == argument) {
-      places.insert({place_of(other).line, place_of(other).column});
+      places.insert({location_of(other).line, location_of(other).column});
     }
   }
   return places.size();
@@ -176,20 +177,20 @@ std::optional<double> Proofs::limit(const Suspect& suspect, std::span<const Rang
     return weigh(arguments, {suspect.quantity, argument, value});
   };
   if (suspect.quantity != Quantity::mass) {
-    if (!edges_.holds(line(0.0), 4.0)) {
+    if (!boundary_.holds(line(0.0), 4.0)) {
       return std::nullopt;
     }
     // No nearer to where doubles end than need be: there nothing can be halved often enough.
     double bad = arguments[argument].highest;
-    while (bad > 1e6 && !edges_.holds(line(std::sqrt(bad)), 4.0)) {
+    while (bad > 1e6 && !boundary_.holds(line(std::sqrt(bad)), 4.0)) {
       bad = std::sqrt(bad);
     }
-    return edges_.between(line, 0.0, bad).value;
+    return boundary_.between(line, 0.0, bad).value;
   }
   const double lightest = arguments[argument].lowest;
   for (double factor = 16.0; factor < 1e12; factor *= 16.0) {
-    if (edges_.holds(line(factor * lightest), 4.0)) {
-      return edges_.between(line, factor * lightest, lightest).value;
+    if (boundary_.holds(line(factor * lightest), 4.0)) {
+      return boundary_.between(line, factor * lightest, lightest).value;
     }
   }
   return std::nullopt;
@@ -252,7 +253,7 @@ Error complaint(const Certificate& certificate) {
   } else {
     text += " is too large to be reckoned with";
   }
-  return {std::move(text), culprit.place.line, culprit.place.column};
+  return {std::move(text), culprit.location.line, culprit.location.column};
 }
 
 }  // namespace ressort

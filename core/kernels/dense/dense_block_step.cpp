@@ -1,4 +1,4 @@
-// The leaps of the dense kernel, compiled for each instruction set.
+// The block steps of the dense kernel, compiled for each instruction set.
 #include "core/kernels/dense/dense.h"
 #include "core/laws/laws.h"
 
@@ -126,9 +126,9 @@ V distance(V d, T zone) {
   return (on_both_sides ? absolute(d) : V{} - d) - zone;
 }
 
-// What one leap works on.
+// What one block step works on.
 template <class T>
-struct Leap {
+struct BlockStep {
   using V = Wide<T>;
   static constexpr std::size_t lanes = wide_lanes<T>;
 
@@ -157,7 +157,7 @@ struct Leap {
     return n == count && !(least_of<T>(least) < T(0));
   }
 
-  // The signals over the leap, or nothing where one is silent.
+  // The signals over the block step, or nothing where one is silent.
   void listen() {
     for (std::size_t s = 0; s < b.signals; ++s) {
       const DenseSignal& slot = b.signal[s];
@@ -167,8 +167,8 @@ struct Leap {
       const T* u = input;
       if (slot.kind != DenseSignal::Kind::force) {
         T* const late = shifted + s * dense_frames;
-        const std::uint32_t hand = b.source[slot.at];
-        late[0] = is_velocity ? b.v[hand] : b.x[hand];
+        const std::uint32_t end = b.source[slot.at];
+        late[0] = is_velocity ? b.v[end] : b.x[end];
         for (std::size_t n = 1; n < count; ++n) {
           late[n] = input[n - 1];
         }
@@ -187,14 +187,14 @@ struct Leap {
     T still = T(0);
     const T* moved = nullptr;  // [frame]
   };
-  End end_of(bool is_bow, std::uint32_t slot, std::uint32_t hand, bool is_mass) const {
+  End end_of(bool is_bow, std::uint32_t slot, std::uint32_t input, bool is_mass) const {
     if (is_mass) {
       return {};
     }
-    if (hand == no_hand) {
+    if (input == no_input) {
       return {is_bow ? b.v[slot] : b.x[slot]};
     }
-    return {T(0), (is_bow ? drive.velocity : drive.value) + hand * max_block_frames + at};
+    return {T(0), (is_bow ? drive.velocity : drive.value) + input * max_block_frames + at};
   }
 
   struct Range {
@@ -232,8 +232,8 @@ struct Leap {
   std::size_t first_touch(std::size_t p, T zone) {
     const DenseLink& port = b.port[p];
     const bool is_bow = facts_of(port.law).zone == Zone::slow;
-    const End a = end_of(is_bow, port.a, port.hand_a, port.a_moves);
-    const End c = end_of(is_bow, port.b, port.hand_b, port.b_moves);
+    const End a = end_of(is_bow, port.a, port.input_a, port.a_moves);
+    const End c = end_of(is_bow, port.b, port.input_b, port.b_moves);
     if (!is_driven) {
       const Range of_a = range_of(a);
       const Range of_c = range_of(c);
@@ -254,7 +254,7 @@ struct Leap {
     return first_within<on_both_sides>(a, c, zone);
   }
 
-  // No less than the port's masses move from 0 in a leap without forces.
+  // No less than the port's masses move from 0 in a block step without forces.
   T farthest(std::size_t p) const {
     V sum{};
     for (std::size_t i = 0; i < b.rows; i += lanes) {
@@ -331,17 +331,18 @@ struct Leap {
         add_next();
       }
     }
-    for (std::size_t i = 0; i < b.hands; ++i) {
-      const std::size_t last = b.hand[i].input * max_block_frames + at + count - 1;
-      b.x[b.hand[i].slot] = drive.value[last];
-      b.v[b.hand[i].slot] = drive.velocity[last];
+    for (std::size_t i = 0; i < b.driven_count; ++i) {
+      const std::size_t last = b.driven[i].input * max_block_frames + at + count - 1;
+      b.x[b.driven[i].slot] = drive.value[last];
+      b.v[b.driven[i].slot] = drive.velocity[last];
     }
   }
 };
 
 template <class T>
-std::size_t leap(DenseBody<T>& b, const DenseDrive<T>& drive, std::size_t at, std::size_t count) {
-  Leap<T> l{b, drive, at, count};
+std::size_t block_step(DenseBody<T>& b, const DenseDrive<T>& drive, std::size_t at,
+                       std::size_t count) {
+  BlockStep<T> l{b, drive, at, count};
   l.listen();
   for (std::size_t p = 0; p < b.ports; ++p) {
     const std::size_t free = l.first_touch(p);
@@ -361,17 +362,17 @@ std::size_t leap(DenseBody<T>& b, const DenseDrive<T>& drive, std::size_t at, st
 namespace ressort {
 
 template <>
-std::size_t leap_dense<Isa::RESSORT_ISA, float>(DenseBody<float>& body,
-                                                const DenseDrive<float>& drive, std::size_t at,
-                                                std::size_t count) {
-  return RESSORT_ISA::leap(body, drive, at, count);
+std::size_t dense_block_step<Isa::RESSORT_ISA, float>(DenseBody<float>& body,
+                                                      const DenseDrive<float>& drive,
+                                                      std::size_t at, std::size_t count) {
+  return RESSORT_ISA::block_step(body, drive, at, count);
 }
 
 template <>
-std::size_t leap_dense<Isa::RESSORT_ISA, double>(DenseBody<double>& body,
-                                                 const DenseDrive<double>& drive, std::size_t at,
-                                                 std::size_t count) {
-  return RESSORT_ISA::leap(body, drive, at, count);
+std::size_t dense_block_step<Isa::RESSORT_ISA, double>(DenseBody<double>& body,
+                                                       const DenseDrive<double>& drive,
+                                                       std::size_t at, std::size_t count) {
+  return RESSORT_ISA::block_step(body, drive, at, count);
 }
 
 }  // namespace ressort

@@ -1,4 +1,4 @@
-#include "core/compile/gate.h"
+#include "core/compile/stability_check.h"
 
 #include <algorithm>
 #include <cmath>
@@ -17,27 +17,27 @@ double finite(double value) {
   return std::clamp(value, -anywhere, anywhere);
 }
 
-class Gatekeeper {
+class StabilityChecker {
  public:
-  Gatekeeper(const GateRequest& request, std::vector<ParameterInfo>& parameters)
+  StabilityChecker(const StabilityRequest& request, std::vector<ParameterInfo>& parameters)
       : request_(request),
         parameters_(parameters),
         stability_(always_felt(request.expanded), request.rate_ratio, most_quick_masses,
                    request.progress) {
-    gate_.is_together = parameters.size() * stability_.size() > most_quick_work;
+    result_.is_together = parameters.size() * stability_.size() > most_quick_work;
   }
 
-  Gate run() {
-    gate_.limits.assign(parameters_.size(), {-infinity, infinity});
+  StabilityCheck run() {
+    result_.limits.assign(parameters_.size(), {-infinity, infinity});
     find_start();
     box_ = {start_, start_};
-    gate_.verdict = prove_start();
-    if (gate_.verdict != Verdict::stable) {
-      gate_.complaint = complain();
-      return std::move(gate_);
+    result_.verdict = prove_start();
+    if (result_.verdict != Verdict::stable) {
+      result_.complaint = complain();
+      return std::move(result_);
     }
     if (request_.is_open) {
-      return std::move(gate_);
+      return std::move(result_);
     }
     ask();
     widen([&](std::size_t i) { return place_[i].has_value() && !is_audio(i); });
@@ -46,7 +46,7 @@ class Gatekeeper {
     for (std::size_t i = 0; i < parameters_.size(); ++i) {
       settle(i);
     }
-    return std::move(gate_);
+    return std::move(result_);
   }
 
  private:
@@ -99,7 +99,7 @@ class Gatekeeper {
       }
       for (const ParameterSetting& setting : request_.preset.parameters) {
         if (setting.name == info.name) {
-          place_[i] = setting.place;
+          place_[i] = setting.location;
         }
       }
       for (const ControlSetting& control : request_.preset.controls) {
@@ -140,10 +140,10 @@ class Gatekeeper {
       box_ = std::move(wide);
       return;
     }
-    for (std::size_t i = 0; !gate_.is_together && i < which.size(); ++i) {
+    for (std::size_t i = 0; !result_.is_together && i < which.size(); ++i) {
       stretch(which[i], box_, wide);
     }
-    if (!gate_.is_together && stability_.prove(wide) == Verdict::stable) {
+    if (!result_.is_together && stability_.prove(wide) == Verdict::stable) {
       box_ = std::move(wide);
       return;
     }
@@ -157,7 +157,7 @@ class Gatekeeper {
     if (stability_.prove(shared) != Verdict::stable) {
       return;
     }
-    for (std::size_t k = 0; !gate_.is_together && k < which.size(); ++k) {
+    for (std::size_t k = 0; !result_.is_together && k < which.size(); ++k) {
       const std::size_t i = which[k];
       ParameterBox wider = shared;
       stretch(i, shared, wider);
@@ -198,14 +198,14 @@ class Gatekeeper {
       return;  // nothing is proved of it; sound that cannot move would be of no use
     }
     // Nobody reads it of the bare network.
-    if (const auto safe = request_.bare || gate_.is_together
+    if (const auto safe = request_.bare || result_.is_together
                               ? std::nullopt
                               : stability_.safe_range(box_, i, start_[i])) {
       info.safe = *safe;
     }
     info.is_raised = box_.lowest[i] > asked_.lowest[i];
     info.is_lowered = box_.highest[i] < asked_.highest[i];
-    Range& limit = gate_.limits[i];
+    Range& limit = result_.limits[i];
     // Where nothing limits, the range is a matter of taste.
     if (info.is_raised || (!request_.bare && std::isfinite(info.safe.lowest))) {
       limit.lowest = box_.lowest[i];
@@ -225,19 +225,20 @@ class Gatekeeper {
                                                   print_number(info.maximum) + "; beyond them"
           : info.is_raised ? "above " + print_number(info.minimum) + "; below it"
                            : "below " + print_number(info.maximum) + "; above it";
-      gate_.narrowed.push_back({"'" + info.name + "' is kept " + kept + " the model is not stable",
-                                place_[i]->line, place_[i]->column});
+      result_.narrowed.push_back(
+          {"'" + info.name + "' is kept " + kept + " the model is not stable", place_[i]->line,
+           place_[i]->column});
     }
   }
 
-  const GateRequest& request_;
+  const StabilityRequest& request_;
   std::vector<ParameterInfo>& parameters_;
   Stability stability_;
-  Gate gate_;
+  StabilityCheck result_;
   std::vector<double> start_;
   ParameterBox asked_;
-  ParameterBox box_;                         // proved
-  std::vector<std::optional<Place>> place_;  // in the preset, of what it has ranges for
+  ParameterBox box_;                                  // proved
+  std::vector<std::optional<SourceLocation>> place_;  // in the preset, of what it has ranges for
 };
 
 // Looks at the arguments of one element after the other, for no_number().
@@ -298,7 +299,7 @@ class NumberCheck {
       if (is_wrong || (asked.quantity == "mass" && is_nothing_[asked.argument])) {
         error_ = {told(asked, std::string(element.name),
                        is_wrong ? " is no finite number" : " is not above 0"),
-                  element.place.line, element.place.column};
+                  element.location.line, element.location.column};
       }
     }
   }
@@ -348,8 +349,9 @@ double inside_limit(double limit, bool is_upper) {
   return value;
 }
 
-Gate guard(const GateRequest& request, std::vector<ParameterInfo>& parameters) {
-  return Gatekeeper(request, parameters).run();
+StabilityCheck check_stability(const StabilityRequest& request,
+                               std::vector<ParameterInfo>& parameters) {
+  return StabilityChecker(request, parameters).run();
 }
 
 }  // namespace ressort

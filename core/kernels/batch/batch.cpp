@@ -1,4 +1,4 @@
-#include "core/kernels/chorus/chorus.h"
+#include "core/kernels/batch/batch.h"
 
 #include <algorithm>
 #include <cmath>
@@ -17,19 +17,19 @@ constexpr std::size_t parts_of(std::size_t whole, std::size_t part) {
 // Fills the table slot by slot.
 class Filler {
  public:
-  Filler(const Program& program, const Chorus& chorus) : program_(program), chorus_(chorus) {
+  Filler(const Program& program, const Batch& batch) : program_(program), batch_(batch) {
     table_.nodes = static_cast<std::uint32_t>(program.position.size());
     if (program.moving <= most_held_masses) {
       table_.held = program.moving;
       add_held();
       note_touched();
     } else {
-      add_walked();
+      add_in_memory();
     }
-    table_.cells = chorus_node_cells * table_.nodes + slots_;
+    table_.cells = batch_node_cells * table_.nodes + slots_;
   }
 
-  ChorusTable table() && { return std::move(table_); }
+  BatchTable table() && { return std::move(table_); }
 
  private:
   void copy(std::uint32_t coefficient) {
@@ -46,10 +46,10 @@ class Filler {
       table_.is_pulled |= run.is_oscillator || run.has_gravity;
     }
     for (std::uint32_t pair = 0; pair < pairs(); ++pair) {
-      add_alike([&] { add_spring(chorus_.pairs[pair], 1u << pair, table_.linked); }, 2, pair == 0);
+      add_alike([&] { add_spring(batch_.pairs[pair], 1u << pair, table_.linked); }, 2, pair == 0);
     }
     for (std::uint32_t mass = 0; mass < table_.held; ++mass) {
-      add_spring(chorus_.anchors[mass], 1u << mass, table_.anchored);
+      add_spring(batch_.anchors[mass], 1u << mass, table_.anchored);
     }
     for (const MassRun& run : program_.mass_runs) {
       for (std::uint32_t i = 0; i < run.count && table_.is_pulled; ++i) {
@@ -57,7 +57,7 @@ class Filler {
       }
     }
     table_.first_link = slots_;
-    for (const ChorusLink& link : chorus_.links) {
+    for (const BatchLink& link : batch_.links) {
       add_link(program_.link_runs[link.run]);
     }
   }
@@ -65,15 +65,14 @@ class Filler {
   std::uint32_t pairs() const { return table_.held * (table_.held - 1) / 2; }
 
   bool is_alike() const {
-    const auto differs = [&](const ChorusSpring& pair) {
-      return pair.stiffness != chorus_.pairs[0].stiffness ||
-             pair.damping != chorus_.pairs[0].damping;
+    const auto differs = [&](const BatchSpring& pair) {
+      return pair.stiffness != batch_.pairs[0].stiffness || pair.damping != batch_.pairs[0].damping;
     };
     const auto is_other = [&](const MassRun& run) {
       return run.inverse_mass != program_.mass_runs[0].inverse_mass;
     };
     return std::none_of(program_.mass_runs.begin(), program_.mass_runs.end(), is_other) &&
-           std::none_of(chorus_.pairs.begin(), chorus_.pairs.begin() + pairs(), differs);
+           std::none_of(batch_.pairs.begin(), batch_.pairs.begin() + pairs(), differs);
   }
 
   // Slots that nobody looks at, where all are alike and these are not the first.
@@ -86,8 +85,8 @@ class Filler {
     }
   }
 
-  void add_spring(const ChorusSpring& spring, std::uint32_t bit, std::uint32_t& bits) {
-    if (spring.stiffness == ChorusSpring::none) {
+  void add_spring(const BatchSpring& spring, std::uint32_t bit, std::uint32_t& bits) {
+    if (spring.stiffness == BatchSpring::none) {
       slots_ += 2;
       return;
     }
@@ -118,7 +117,7 @@ class Filler {
     ++slots_;
   }
 
-  void add_walked() {
+  void add_in_memory() {
     for (const MassRun& run : program_.mass_runs) {
       copy(run.inverse_mass);
       add_pull(run);
@@ -135,12 +134,12 @@ class Filler {
     const auto touch = [&](std::uint32_t node) {
       table_.touched |= node < table_.held ? 1u << node : 0;
     };
-    for (const ChorusLink& link : chorus_.links) {
+    for (const BatchLink& link : batch_.links) {
       touch(link.a);
       touch(link.b);
     }
     for (std::uint32_t i = 0; i < program_.inputs.size(); ++i) {
-      const auto [hand, is_force, node] = program_.inputs[i];
+      const auto [input, is_force, node] = program_.inputs[i];
       if (!is_force || node >= table_.held) {
         continue;
       }
@@ -154,39 +153,38 @@ class Filler {
   }
 
   const Program& program_;
-  const Chorus& chorus_;
-  ChorusTable table_;
+  const Batch& batch_;
+  BatchTable table_;
   std::size_t slots_ = 0;
 };
 
 }  // namespace
 
 template <class T>
-ChorusKernel<T>::ChorusKernel(const Program& program, const Chorus& chorus, std::size_t voices,
-                              Isa isa)
-    : ChorusKernel(
-          program, chorus,
+BatchKernel<T>::BatchKernel(const Program& program, const Batch& batch, std::size_t voices, Isa isa)
+    : BatchKernel(
+          program, batch,
           [&] {
-            const std::size_t bytes = chorus_lanes<T>(voices, isa) * sizeof(T);
-            ChorusTable table = Filler(program, chorus).table();
+            const std::size_t bytes = batch_lanes<T>(voices, isa) * sizeof(T);
+            BatchTable table = Filler(program, batch).table();
             // Shared evenly by as many kernels as it takes.
             const std::size_t wanted = parts_of(voices * sizeof(T), bytes);
             const std::size_t most = std::max<std::size_t>(1, most_bytes / (table.cells * bytes));
             table.packs = parts_of(wanted, parts_of(wanted, most));
             return table;
           }(),
-          chorus_lanes<T>(voices, isa), isa) {}
+          batch_lanes<T>(voices, isa), isa) {}
 
 template <class T>
-ChorusKernel<T>::ChorusKernel(const Program& program, const Chorus& chorus, ChorusTable table,
-                              std::size_t lanes, Isa isa)
+BatchKernel<T>::BatchKernel(const Program& program, const Batch& batch, BatchTable table,
+                            std::size_t lanes, Isa isa)
     : Kernel<T>(program, lanes * table.packs),
       program_(program),
-      chorus_(chorus),
+      batch_(batch),
       lanes_(lanes),
       table_(std::move(table)),
       step_(with_isa(
-          isa, [&]<Isa level>() { return chorus_step<level, T>(table_, lanes_ * sizeof(T)); })),
+          isa, [&]<Isa level>() { return batch_step<level, T>(table_, lanes_ * sizeof(T)); })),
       cells_(table_.cells * this->width()),
       passive_(program, this->width()) {
   for (std::size_t lane = 0; lane < this->width(); ++lane) {
@@ -195,7 +193,7 @@ ChorusKernel<T>::ChorusKernel(const Program& program, const Chorus& chorus, Chor
 }
 
 template <class T>
-void ChorusKernel<T>::place(std::size_t lane, const double* x, const double* v) {
+void BatchKernel<T>::set_state(std::size_t lane, const double* x, const double* v) {
   for (std::size_t node = 0; node < table_.nodes; ++node) {
     T* const cell = cells_.data() + at(node, lane);
     cell[0] = static_cast<T>(x[node]);
@@ -206,7 +204,7 @@ void ChorusKernel<T>::place(std::size_t lane, const double* x, const double* v) 
 }
 
 template <class T>
-bool ChorusKernel<T>::save(std::size_t lane, double* x, double* v) const {
+bool BatchKernel<T>::save(std::size_t lane, double* x, double* v) const {
   for (std::size_t node = 0; node < table_.nodes; ++node) {
     const T* const cell = cells_.data() + at(node, lane);
     x[node] = static_cast<double>(cell[0]);
@@ -216,19 +214,19 @@ bool ChorusKernel<T>::save(std::size_t lane, double* x, double* v) const {
 }
 
 template <class T>
-void ChorusKernel<T>::play(const Block<T>& block) {
-  ChorusState<T> state{.ramps = ramps_of(this->coefficients),
-                       .cells = cells_.data(),
-                       .passive = passive_.links,
-                       .inverse_mass = passive_.inverse_mass.data(),
-                       .memory = passive_.memory.data(),
-                       .awake = passive_.awake.data()};
-  step_(program_, chorus_, table_, state, block);
+void BatchKernel<T>::play(const Block<T>& block) {
+  BatchState<T> state{.ramps = ramps_of(this->coefficients),
+                      .cells = cells_.data(),
+                      .passive = passive_.links,
+                      .inverse_mass = passive_.inverse_mass.data(),
+                      .memory = passive_.memory.data(),
+                      .awake = passive_.awake.data()};
+  step_(program_, batch_, table_, state, block);
   this->coefficients.finish(block.frames);
 }
 
 template <class T>
-bool ChorusKernel<T>::is_near_start(std::size_t lane, double bound) const {
+bool BatchKernel<T>::is_near_start(std::size_t lane, double bound) const {
   for (std::size_t node = 0; node < program_.moving; ++node) {
     const auto x = static_cast<double>(cells_[at(node, lane)]);
     if (!(std::fabs(x - program_.position[node]) < bound)) {
@@ -238,7 +236,7 @@ bool ChorusKernel<T>::is_near_start(std::size_t lane, double bound) const {
   return true;
 }
 
-template class ChorusKernel<float>;
-template class ChorusKernel<double>;
+template class BatchKernel<float>;
+template class BatchKernel<double>;
 
 }  // namespace ressort

@@ -24,7 +24,7 @@ struct Load {
   double total() const { return stiff + damped + rubbed; }
 };
 
-struct Stencil {
+struct Assembly {
   struct Entry {
     std::uint32_t row = 0;  // which of the masses that move
     double share = 0.0;
@@ -50,7 +50,7 @@ struct Stencil {
 // Of a network without macros. A place on a macro counts with the nodes around it; one whose
 // coordinates are live counts at all nodes at once, which is on the safe side.
 // O(masses + links), and a term for every node under a live place, up to 4 million.
-Stencil make_stencil(const Network& network);
+Assembly assemble(const Network& network);
 
 // What every argument can amount to in the box. [argument]
 std::vector<Range> argument_ranges(const Network& network, const ParameterBox& box);
@@ -60,12 +60,12 @@ Range range_at(std::span<const Range> arguments, ArgumentId argument);
 
 // The largest load of a term in these ranges; `rate_ratio` is 44100 / rate. Quadratic and cubic
 // springs count as they are at rest: how steep they become depends on the amplitude.
-Load highest_load(const Network& network, const Stencil::Term& term,
+Load highest_load(const Network& network, const Assembly::Term& term,
                   std::span<const Range> arguments, double rate_ratio);
 
 // The least stiffness and damping that a term surely has: at rest plucks, bows and contacts have
 // none, but may still have a negative one.
-Load lowest_load(const Network& network, const Stencil::Term& term,
+Load lowest_load(const Network& network, const Assembly::Term& term,
                  std::span<const Range> arguments, double rate_ratio);
 
 }  // namespace ressort

@@ -1,7 +1,7 @@
-// The loops of the chorus kernel, compiled for each instruction set.
+// The loops of the batch kernel, compiled for each instruction set.
 #include <type_traits>
 
-#include "core/kernels/chorus/chorus.h"
+#include "core/kernels/batch/batch.h"
 #include "core/laws/laws.h"
 
 namespace ressort::RESSORT_ISA {
@@ -43,11 +43,11 @@ template <class V, class Type>
 // All packs, for what is done to each of them in turn.
 template <class V>
 struct Packs {
-  Packs(const ChorusTable& table, void* memory)
+  Packs(const BatchTable& table, void* memory)
       : count(table.packs),
         stride(table.cells),
         cells(static_cast<V*>(memory)),
-        slots(cells + chorus_node_cells * table.nodes) {}
+        slots(cells + batch_node_cells * table.nodes) {}
 
   Node<V>* nodes(std::size_t pack) const {
     return reinterpret_cast<Node<V>*>(cells + pack * stride);
@@ -62,7 +62,7 @@ struct Packs {
 // Where a block is in the rows of all voices.
 template <class V>
 struct Rows {
-  Rows(const Program& program, const ChorusTable& table, const auto& block)
+  Rows(const Program& program, const BatchTable& table, const auto& block)
       : value(reinterpret_cast<const V*>(block.value)),
         velocity(reinterpret_cast<const V*>(block.velocity)),
         outputs(reinterpret_cast<V*>(block.outputs)),
@@ -97,8 +97,8 @@ bool move_coefficients(const Program& program, Ramps<T>& ramps, const T*& audio)
 
 // Copies what the coefficients are now, and what of the laws follows from them alone.
 template <class V>
-void fill_slots(const ChorusTable& table, const V* coefficients, const Packs<V>& packs) {
-  for (const ChorusTable::Copy copy : table.copies) {
+void fill_slots(const BatchTable& table, const V* coefficients, const Packs<V>& packs) {
+  for (const BatchTable::Copy copy : table.copies) {
     const V* const from = coefficients + copy.coefficient * packs.count;
     V* to = packs.slots + copy.slot;
     for (std::size_t pack = 0; pack < packs.count; ++pack, to += packs.stride) {
@@ -115,7 +115,7 @@ void fill_slots(const ChorusTable& table, const V* coefficients, const Packs<V>&
         }
       });
     }
-    slots += chorus_link_slots;
+    slots += batch_link_slots;
   }
 }
 
@@ -204,7 +204,7 @@ struct Passive {
 template <class V, class T>
 class PassiveLinks {
  public:
-  PassiveLinks(const Program& program, const Packs<V>& packs, ChorusState<T>& state)
+  PassiveLinks(const Program& program, const Packs<V>& packs, BatchState<T>& state)
       : program_(program), packs_(packs), state_(state), is_any_(!state.passive.empty()) {}
 
   void remember() const {
@@ -246,7 +246,7 @@ class PassiveLinks {
 
   const Program& program_;
   const Packs<V>& packs_;
-  ChorusState<T>& state_;
+  BatchState<T>& state_;
   bool is_any_;
 };
 
@@ -260,11 +260,10 @@ enum class Half { move, exert, exert_and_move };
 template <class V, std::uint32_t N, bool is_alike>
 class Holder {
  public:
-  Holder(const Program& program, const Chorus& chorus, const ChorusTable& table,
-         const Packs<V>& packs)
-      : program_(program), chorus_(chorus), table_(table), packs_(packs) {
+  Holder(const Program& program, const Batch& batch, const BatchTable& table, const Packs<V>& packs)
+      : program_(program), batch_(batch), table_(table), packs_(packs) {
     each<N>([&](auto i) {
-      anchor_[i] = chorus.anchors[i].node;
+      anchor_[i] = batch.anchors[i].node;
       pusher_[i] = table.pusher[i] * packs.count;
     });
   }
@@ -363,11 +362,11 @@ class Holder {
   void exert_links() const {
     const V* slot = packs_.slots + table_.first_link;
     const Law* law = table_.laws.data();
-    for (const ChorusLink& each_link : chorus_.links) {
+    for (const BatchLink& each_link : batch_.links) {
       with_law_type(*law, [&]<class Type>(Type) {
         link<V, Type>(packs_, slot, each_link.a, each_link.b, N);
       });
-      slot += chorus_link_slots;
+      slot += batch_link_slots;
       ++law;
     }
   }
@@ -384,18 +383,18 @@ class Holder {
   }
 
   const Program& program_;
-  const Chorus& chorus_;
-  const ChorusTable& table_;
+  const Batch& batch_;
+  const BatchTable& table_;
   const Packs<V>& packs_;
   std::size_t anchor_[N];
   std::size_t pusher_[N];
 };
 
 template <class V, std::uint32_t N, bool is_alike>
-void hold(const Program& program, const Chorus& chorus, const ChorusTable& table,
-          ChorusState<Scalar<V>>& state, const Block<Scalar<V>>& block) {
+void hold(const Program& program, const Batch& batch, const BatchTable& table,
+          BatchState<Scalar<V>>& state, const Block<Scalar<V>>& block) {
   const Packs<V> packs(table, state.cells);
-  const Holder<V, N, is_alike> holder(program, chorus, table, packs);
+  const Holder<V, N, is_alike> holder(program, batch, table, packs);
   const PassiveLinks passive(program, packs, state);
   Rows<V> rows(program, table, block);
   const auto* audio = block.audio;
@@ -423,7 +422,7 @@ void hold(const Program& program, const Chorus& chorus, const ChorusTable& table
 // --- masses in memory ----------------------------------------------------------------------------
 
 template <class V>
-void walk_masses(const Program& program, const Packs<V>& packs) {
+void step_masses(const Program& program, const Packs<V>& packs) {
   const V* slots = packs.slots;
   for (const MassRun& run : program.mass_runs) {
     for (std::uint32_t i = run.first; i < run.first + run.count; ++i) {
@@ -437,12 +436,12 @@ void walk_masses(const Program& program, const Packs<V>& packs) {
         node.force = V{};
       }
     }
-    slots += chorus_run_slots;
+    slots += batch_run_slots;
   }
 }
 
 template <class V>
-void walk_links(const Program& program, const ChorusTable& table, const Packs<V>& packs) {
+void step_links(const Program& program, const BatchTable& table, const Packs<V>& packs) {
   const V* slot = packs.slots + table.first_link;
   for (const LinkRun& run : program.link_runs) {
     if (run.scheme != Scheme::plain) {
@@ -454,13 +453,13 @@ void walk_links(const Program& program, const ChorusTable& table, const Packs<V>
         link<V, Type>(packs, slot, ends[i].a, ends[i].b, program.moving);
       }
     });
-    slot += chorus_link_slots;
+    slot += batch_link_slots;
   }
 }
 
 template <class V>
-void walk(const Program& program, const Chorus&, const ChorusTable& table,
-          ChorusState<Scalar<V>>& state, const Block<Scalar<V>>& block) {
+void step_in_memory(const Program& program, const Batch&, const BatchTable& table,
+                    BatchState<Scalar<V>>& state, const Block<Scalar<V>>& block) {
   const Packs<V> packs(table, state.cells);
   const PassiveLinks passive(program, packs, state);
   Rows<V> rows(program, table, block);
@@ -475,10 +474,10 @@ void walk(const Program& program, const Chorus&, const ChorusTable& table,
       }
     }
     passive.remember();
-    walk_masses(program, packs);
+    step_masses(program, packs);
     take_positions(program, packs, rows);
     passive.correct();
-    walk_links(program, table, packs);
+    step_links(program, table, packs);
     give_positions(program, packs, rows.outputs);
     rows.advance();
   }
@@ -487,7 +486,7 @@ void walk(const Program& program, const Chorus&, const ChorusTable& table,
 // --- which ---------------------------------------------------------------------------------------
 
 template <class V, bool is_alike>
-ChorusStep<Scalar<V>> hold_for(std::uint32_t held) {
+BatchStep<Scalar<V>> hold_for(std::uint32_t held) {
   switch (held) {
     case 1:
       return hold<V, 1, is_alike>;
@@ -501,15 +500,15 @@ ChorusStep<Scalar<V>> hold_for(std::uint32_t held) {
 }
 
 template <class V>
-ChorusStep<Scalar<V>> step_for(const ChorusTable& table) {
+BatchStep<Scalar<V>> step_for(const BatchTable& table) {
   if (table.held == 0) {
-    return walk<V>;
+    return step_in_memory<V>;
   }
   return table.is_alike ? hold_for<V, true>(table.held) : hold_for<V, false>(table.held);
 }
 
 template <class T>
-ChorusStep<T> step_in(const ChorusTable& table, std::size_t bytes) {
+BatchStep<T> step_in(const BatchTable& table, std::size_t bytes) {
   constexpr std::size_t widest = vector_bytes(Isa::RESSORT_ISA);
   if constexpr (widest > 32) {
     if (bytes == 32) {
@@ -525,14 +524,12 @@ ChorusStep<T> step_in(const ChorusTable& table, std::size_t bytes) {
 namespace ressort {
 
 template <>
-ChorusStep<float> chorus_step<Isa::RESSORT_ISA, float>(const ChorusTable& table,
-                                                       std::size_t bytes) {
+BatchStep<float> batch_step<Isa::RESSORT_ISA, float>(const BatchTable& table, std::size_t bytes) {
   return RESSORT_ISA::step_in<float>(table, bytes);
 }
 
 template <>
-ChorusStep<double> chorus_step<Isa::RESSORT_ISA, double>(const ChorusTable& table,
-                                                         std::size_t bytes) {
+BatchStep<double> batch_step<Isa::RESSORT_ISA, double>(const BatchTable& table, std::size_t bytes) {
   return RESSORT_ISA::step_in<double>(table, bytes);
 }
 

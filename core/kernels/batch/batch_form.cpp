@@ -1,4 +1,4 @@
-#include "core/kernels/chorus/chorus_form.h"
+#include "core/kernels/batch/batch_form.h"
 #include "core/laws/laws.h"
 
 #include <algorithm>
@@ -7,23 +7,23 @@ namespace ressort {
 namespace {
 
 // Whether the link is one of the springs held; it is then put there.
-bool hold_spring(const Program& program, const LinkRun& run, Ends ends, Chorus& chorus) {
+bool hold_spring(const Program& program, const LinkRun& run, Ends ends, Batch& batch) {
   const auto [a, b] = std::minmax(ends.a, ends.b);
   if (run.law != Law::spring || a >= program.moving || a == b) {
     return false;
   }
   const bool is_pair = b < program.moving;
-  ChorusSpring& place = is_pair ? chorus.pairs[b * (b - 1) / 2 + a] : chorus.anchors[a];
-  if (place.stiffness != ChorusSpring::none) {
+  BatchSpring& place = is_pair ? batch.pairs[b * (b - 1) / 2 + a] : batch.anchors[a];
+  if (place.stiffness != BatchSpring::none) {
     return false;
   }
   place = {.stiffness = run.coefficients[0],
            .damping = run.coefficients[1],
-           .node = is_pair ? ChorusSpring::none : b};
+           .node = is_pair ? BatchSpring::none : b};
   return true;
 }
 
-void hold_links(const Program& program, Chorus& chorus) {
+void hold_links(const Program& program, Batch& batch) {
   for (std::uint32_t run = 0; run < program.link_runs.size(); ++run) {
     const LinkRun& links = program.link_runs[run];
     if (links.scheme != Scheme::plain) {
@@ -31,8 +31,8 @@ void hold_links(const Program& program, Chorus& chorus) {
     }
     for (std::uint32_t i = links.first; i < links.first + links.count; ++i) {
       const Ends ends = program.ends[i];
-      if (!hold_spring(program, links, ends, chorus)) {
-        chorus.links.push_back({run, ends.a, ends.b});
+      if (!hold_spring(program, links, ends, batch)) {
+        batch.links.push_back({run, ends.a, ends.b});
       }
     }
   }
@@ -40,21 +40,21 @@ void hold_links(const Program& program, Chorus& chorus) {
 
 }  // namespace
 
-std::optional<Chorus> chorus_form(const Program& program) {
+std::optional<Batch> batch_form(const Program& program) {
   const auto is_force = [](const OutputSlot& output) { return output.is_force; };
-  if (program.moving == 0 || program.moving > most_chorus_masses || !program.taps.empty() ||
+  if (program.moving == 0 || program.moving > most_batch_masses || !program.taps.empty() ||
       std::any_of(program.outputs.begin(), program.outputs.end(), is_force)) {
     return std::nullopt;
   }
-  Chorus chorus;
+  Batch batch;
   if (program.moving <= most_held_masses) {
-    hold_links(program, chorus);
+    hold_links(program, batch);
   }
-  return chorus;
+  return batch;
 }
 
 // Beyond most_held_masses everything goes through memory.
-double predicted_ns(const Program& program, const Chorus&, const Workload& load) {
+double predicted_ns(const Program& program, const Batch&, const Workload& load) {
   const LinkCount links = links_of(program);
   const double others = links.bent + links.others;
   const double passive = 0.8 * packs_of(load) * passive_ns(program);
@@ -65,13 +65,13 @@ double predicted_ns(const Program& program, const Chorus&, const Workload& load)
   return 6.0 + passive + (0.6 + 1.6 * packs_of(load)) * (program.moving + links.springs + others);
 }
 
-std::string description(const Program& program, const Chorus&) {
+std::string description(const Program& program, const Batch&) {
   return std::string(program.moving <= most_held_masses ? "its masses in registers"
                                                         : "mass by mass and link by link") +
          ", a voice in each lane of many packs at once";
 }
 
-std::uint64_t voice_bytes(const Program& program, const Chorus&, std::uint64_t number_bytes) {
+std::uint64_t voice_bytes(const Program& program, const Batch&, std::uint64_t number_bytes) {
   return bytes_with_shared_links(program, number_bytes);
 }
 

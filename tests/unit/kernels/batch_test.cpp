@@ -1,5 +1,5 @@
 // What is held in registers, and that every voice moves as it does alone.
-#include "core/kernels/chorus/chorus_form.h"
+#include "core/kernels/batch/batch_form.h"
 #include "core/laws/laws.h"
 #include "tests/support/passive.h"
 
@@ -12,11 +12,11 @@ using rig::program_of;
 using rig::Random;
 using rig::show;
 
-constexpr std::uint32_t none = ChorusSpring::none;
+constexpr std::uint32_t none = BatchSpring::none;
 
 Program formed(const std::string& text) {
   Program program = program_of(text);
-  auto form = chorus_form(program);
+  auto form = batch_form(program);
   REQUIRE(form.has_value());
   program.form = std::move(*form);
   return program;
@@ -207,35 +207,35 @@ std::string random_body(std::uint64_t seed, std::size_t masses) {
 
 }  // namespace
 
-TEST_CASE("a triangle is held whole, its pick is walked", "[chorus]") {
+TEST_CASE("a triangle is held whole, its pick is walked", "[batch]") {
   const Program program = formed(example("IPlayTheTriangle"));
-  const auto& chorus = std::get<Chorus>(program.form);
-  const auto is_held = [](const ChorusSpring& spring) { return spring.stiffness != none; };
-  CHECK(std::count_if(chorus.pairs.begin(), chorus.pairs.begin() + 3, is_held) == 3);
-  CHECK(std::count_if(chorus.pairs.begin() + 3, chorus.pairs.end(), is_held) == 0);
-  CHECK(std::count_if(chorus.anchors.begin(), chorus.anchors.end(), is_held) == 1);
-  REQUIRE(chorus.links.size() == 1);
-  CHECK(program.link_runs[chorus.links[0].run].law == Law::pluck);
+  const auto& batch = std::get<Batch>(program.form);
+  const auto is_held = [](const BatchSpring& spring) { return spring.stiffness != none; };
+  CHECK(std::count_if(batch.pairs.begin(), batch.pairs.begin() + 3, is_held) == 3);
+  CHECK(std::count_if(batch.pairs.begin() + 3, batch.pairs.end(), is_held) == 0);
+  CHECK(std::count_if(batch.anchors.begin(), batch.anchors.end(), is_held) == 1);
+  REQUIRE(batch.links.size() == 1);
+  CHECK(program.link_runs[batch.links[0].run].law == Law::pluck);
 }
 
 TEST_CASE("a second spring in the same place is no spring held, nor is any of more masses",
-          "[chorus]") {
+          "[batch]") {
   const std::string twice = scenes::triangle("0.1", "0.001") +
                             "@a springDamper @m_m0 @m_m1 0.01 0.\n@out1 posOutput @m_m0\n";
-  const auto chorus = chorus_form(program_of(twice));
-  REQUIRE(chorus.has_value());
-  CHECK(chorus->links.size() == 1);
+  const auto batch = batch_form(program_of(twice));
+  REQUIRE(batch.has_value());
+  CHECK(batch->links.size() == 1);
   const auto walked =
-      chorus_form(program_of(scenes::string("s", 5, "0.1", "0.001") + scenes::output(1, "s_m2")));
+      batch_form(program_of(scenes::string("s", 5, "0.1", "0.001") + scenes::output(1, "s_m2")));
   REQUIRE(walked.has_value());
   CHECK(walked->links.empty());
   CHECK(walked->pairs[0].stiffness == none);
-  CHECK_FALSE(chorus_form(program_of(scenes::string("s", 17, "0.1", "0.001"))).has_value());
-  CHECK_FALSE(chorus_form(program_of(scenes::triangle("0.1", "0.001") + "@out1 frcOutput @m_m0\n"))
+  CHECK_FALSE(batch_form(program_of(scenes::string("s", 17, "0.1", "0.001"))).has_value());
+  CHECK_FALSE(batch_form(program_of(scenes::triangle("0.1", "0.001") + "@out1 frcOutput @m_m0\n"))
                   .has_value());
 }
 
-TEST_CASE("kernels share the voices evenly, and no pack is without any", "[chorus]") {
+TEST_CASE("kernels share the voices evenly, and no pack is without any", "[batch]") {
   for (const char* const name : {"PolyTriangle", "PhysicalLFO"}) {
     const Program program = formed(example(name));
     for (const Isa isa : isas()) {
@@ -250,19 +250,19 @@ TEST_CASE("kernels share the voices evenly, and no pack is without any", "[choru
   }
 }
 
-TEST_CASE("every voice of a choir is the voice alone", "[chorus]") {
+TEST_CASE("every voice of a choir is the voice alone", "[batch]") {
   check<double>(formed(example("PolyTriangle")), {}, 1e-12);
   check<float>(formed(example("PolyTriangle")), {}, 1e-5);
   check<double>(formed(example("IPlayTheTriangle")), {}, 1e-12);
   check<double>(formed(example("PhysicalLFO")), {}, 1e-12);
 }
 
-TEST_CASE("parameters are ramped in one voice, and the others do not hear it", "[chorus]") {
+TEST_CASE("parameters are ramped in one voice, and the others do not hear it", "[batch]") {
   check<double>(formed(example("PolyTriangle")), {.turns = true}, 1e-12);
   check<double>(formed(example("IPlayTheTriangle")), {.turns = true}, 1e-12);
 }
 
-TEST_CASE("bodies of every size, of any laws", "[chorus]") {
+TEST_CASE("bodies of every size, of any laws", "[batch]") {
   for (std::uint64_t seed = 1; seed <= 27; ++seed) {
     const std::string text = random_body(seed, 1 + seed % 9);
     INFO("seed " << seed << "\n" << text);
@@ -274,7 +274,7 @@ TEST_CASE("bodies of every size, of any laws", "[chorus]") {
   }
 }
 
-TEST_CASE("hard contacts are passive in every voice", "[chorus]") {
+TEST_CASE("hard contacts are passive in every voice", "[batch]") {
   // In registers and in memory; links of every scheme, some on the same mass, a hand that moves.
   for (const int masses : {1, 2, 3, 4, 7, 16}) {
     std::string text = "@w ground -0.01\n@g ground 0.\n@in1 posInput 0.\n@k param 0.1\n";
@@ -290,7 +290,7 @@ TEST_CASE("hard contacts are passive in every voice", "[chorus]") {
             at(3) + "0.4 0.01\n@b nlBow @in1" + at(4) + "0.3 0.01\n@d nlSpring @g" + at(5) +
             "0.01 2. 0.001\n";
     Program program = program_of(text, Passivity::always);
-    auto form = chorus_form(program);
+    auto form = batch_form(program);
     REQUIRE(form);
     program.form = std::move(*form);
     for (const Isa isa : isas()) {
@@ -308,7 +308,7 @@ TEST_CASE("hard contacts are passive in every voice", "[chorus]") {
   }
 }
 
-TEST_CASE("a lane is put back, and the others play on", "[chorus]") {
+TEST_CASE("a lane is put back, and the others play on", "[batch]") {
   const Program program = formed(example("PolyTriangle"));
   Choir<double> choir(program, 16, best_isa());
   Choir<double> other(program, 16, best_isa());

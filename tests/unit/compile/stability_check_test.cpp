@@ -1,6 +1,6 @@
 // What may be played: who is refused and why, how far parameters may be turned, and that no way of
 // turning them leaves that.
-#include "core/compile/gate.h"
+#include "core/compile/stability_check.h"
 
 #include "app/session/admit.h"
 #include "core/model/topology.h"
@@ -164,7 +164,7 @@ TEST_CASE("ranges are safe in every corner that they have together, and no small
   preset.parameters.push_back({"m_Z", 0.001, 0.0, 0.5, {}});
   const Player player(scenes::poly_triangle(), preset);
   const Instrument& instrument = player.compiled.instrument;
-  CHECK(player.compiled.gate.narrowed.size() == 2);
+  CHECK(player.compiled.stability.narrowed.size() == 2);
   Stability stability(network_of(scenes::poly_triangle()), 1.0);
   ParameterBox box = box_of(instrument);
   CHECK(stability.prove(box) == Verdict::stable);
@@ -214,7 +214,7 @@ TEST_CASE("random presets: their ranges are safe as they come out, and not told 
     REQUIRE(stability.prove(box_of(instrument)) == Verdict::stable);
     const ParameterBox asked = preset_box(instrument.parameters, preset);
     const bool is_safe = stability.prove(asked) == Verdict::stable;
-    REQUIRE(is_safe == compiled->gate.narrowed.empty());
+    REQUIRE(is_safe == compiled->stability.narrowed.empty());
     narrowed += is_safe ? 0 : 1;
   }
   CHECK(narrowed > 30);
@@ -306,8 +306,8 @@ TEST_CASE("the bare network goes where it is told, and no further than is stable
   CHECK(bare({}, {{"K", 3.9}}).instrument.parameters[0].maximum == anything);
   CHECK(bare({}, {{"K", 4.1}}).instrument.parameters[0].maximum == 3.99999);
   CHECK(bare({}, {{"K", 4.1}}).instrument.parameters[0].minimum == -anything);
-  CHECK(bare({{"K", 3.9}}, {}).gate.verdict == Verdict::stable);
-  CHECK(bare({{"K", 4.1}}, {}).gate.verdict == Verdict::unstable);
+  CHECK(bare({{"K", 3.9}}, {}).stability.verdict == Verdict::stable);
+  CHECK(bare({{"K", 4.1}}, {}).stability.verdict == Verdict::unstable);
 }
 
 TEST_CASE("a limit is told in six digits, on its inner side", "[gate]") {

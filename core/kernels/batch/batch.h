@@ -1,4 +1,4 @@
-// core/engine: a small network in many voices (Chorus): one voice in each lane of many packs, which
+// core/engine: a small network in many voices (Batch): one voice in each lane of many packs, which
 // take every step of a sample in turn, so that none waits for its own last result.
 #pragma once
 
@@ -21,11 +21,11 @@ namespace ressort {
 //   and otherwise
 //     of the masses    1/M, K, Z and g of each run
 //     of the links     the arguments of the law, or what it keeps instead, of each run
-inline constexpr std::size_t chorus_node_cells = 3;
-inline constexpr std::size_t chorus_run_slots = 4;
-inline constexpr std::size_t chorus_link_slots = most_kept_numbers;
+inline constexpr std::size_t batch_node_cells = 3;
+inline constexpr std::size_t batch_run_slots = 4;
+inline constexpr std::size_t batch_link_slots = most_kept_numbers;
 
-struct ChorusTable {
+struct BatchTable {
   struct Copy {
     std::uint32_t slot = 0;
     std::uint32_t coefficient = 0;
@@ -47,55 +47,55 @@ struct ChorusTable {
   std::vector<Law> laws;       // of the links
 };
 
-// Everything that one step of ChorusKernel touches.
+// Everything that one step of BatchKernel touches.
 template <class T>
-struct ChorusState {
+struct BatchState {
   Ramps<T> ramps;
   T* cells;  // [pack][cell][lane]
   const std::vector<PassiveLink>& passive;
   const std::uint32_t* inverse_mass;  // [moving node] coefficient, if there are passive links
   T* memory;                          // [pack][passive link][passive_rows][lane]
-  T* awake;                           // [pack][lane] 0 in the first sample after place(), else 1
+  T* awake;  // [pack][lane] 0 in the first sample after set_state(), else 1
 };
 
 template <class T>
-using ChorusStep = void (*)(const Program& program, const Chorus& chorus, const ChorusTable& table,
-                            ChorusState<T>& state, const Block<T>& block);
+using BatchStep = void (*)(const Program& program, const Batch& batch, const BatchTable& table,
+                           BatchState<T>& state, const Block<T>& block);
 
 // Of a pack. Half of AVX2's registers would be no faster than all of them, so that nothing is
 // compiled for these; AVX-512's whole ones take two turns on many a machine.
 template <class T>
-constexpr std::size_t chorus_lanes(std::size_t voices, Isa isa) {
+constexpr std::size_t batch_lanes(std::size_t voices, Isa isa) {
   const std::size_t least = std::min<std::size_t>(32, vector_bytes(isa)) / sizeof(T);
   return std::max(least, lanes_for<T>(voices, isa));
 }
 
-// The function for packs of so many bytes, as chorus_lanes() says.
+// The function for packs of so many bytes, as batch_lanes() says.
 template <Isa isa, class T>
-ChorusStep<T> chorus_step(const ChorusTable& table, std::size_t bytes);
+BatchStep<T> batch_step(const BatchTable& table, std::size_t bytes);
 
 template <class T>
-class ChorusKernel final : public Kernel<T> {
+class BatchKernel final : public Kernel<T> {
  public:
-  ChorusKernel(const Program& program, const Chorus& chorus, std::size_t voices, Isa isa);
-  void place(std::size_t lane, const double* x, const double* v) override;
+  BatchKernel(const Program& program, const Batch& batch, std::size_t voices, Isa isa);
+  void set_state(std::size_t lane, const double* x, const double* v) override;
   bool save(std::size_t lane, double* x, double* v) const override;
   bool is_near_start(std::size_t lane, double bound) const override;
 
  private:
-  ChorusKernel(const Program& program, const Chorus& chorus, ChorusTable table, std::size_t lanes,
-               Isa isa);
+  BatchKernel(const Program& program, const Batch& batch, BatchTable table, std::size_t lanes,
+              Isa isa);
   void play(const Block<T>& block) override;
   // Where a node's position is; its velocity and its force are one and two packs after it.
   std::size_t at(std::size_t node, std::size_t lane) const {
-    const std::size_t cell = lane / lanes_ * table_.cells + chorus_node_cells * node;
+    const std::size_t cell = lane / lanes_ * table_.cells + batch_node_cells * node;
     return cell * lanes_ + lane % lanes_;
   }
   const Program& program_;
-  const Chorus& chorus_;
+  const Batch& batch_;
   std::size_t lanes_;  // of a pack
-  ChorusTable table_;
-  ChorusStep<T> step_;
+  BatchTable table_;
+  BatchStep<T> step_;
   Aligned<T> cells_;
   PassiveRoom<T> passive_;
 };

@@ -1,4 +1,4 @@
-#include "core/engine/truth.h"
+#include "core/engine/reference.h"
 
 #include <algorithm>
 #include <array>
@@ -30,7 +30,7 @@ std::vector<double> narrowed(const std::vector<T>& wide) {
 
 }  // namespace
 
-Textbook::Textbook(const Program& program)
+ReferenceScheme::ReferenceScheme(const Program& program)
     : program_(program),
       x_(program.position.begin(), program.position.end()),
       v_(program.velocity.begin(), program.velocity.end()),
@@ -46,7 +46,7 @@ Textbook::Textbook(const Program& program)
 
 // What a node stands for: itself, or the nodes around it.
 template <class Use>
-void Textbook::behind(std::uint32_t node, Use&& use) const {
+void ReferenceScheme::behind(std::uint32_t node, Use&& use) const {
   if (program_.taps.empty() || node < program_.taps[0].node) {
     return use(node, Real(1));
   }
@@ -54,14 +54,14 @@ void Textbook::behind(std::uint32_t node, Use&& use) const {
               [&](std::uint32_t at, Real weight) { use(program_.tap_nodes[at], weight); });
 }
 
-void Textbook::push(std::uint32_t node, Real force) {
+void ReferenceScheme::push(std::uint32_t node, Real force) {
   behind(node, [&](std::uint32_t at, Real weight) {
     force_[at] += weight * force;
     pushed_[at] += weight * force;
   });
 }
 
-void Textbook::move_masses() {
+void ReferenceScheme::move_masses() {
   for (const MassRun& run : program_.mass_runs) {
     const Real k = run.is_oscillator ? coefficient_[run.stiffness] : 0;
     const Real z = run.is_oscillator ? coefficient_[run.damping] : 0;
@@ -74,7 +74,7 @@ void Textbook::move_masses() {
   std::fill(force_.begin(), force_.end(), Real(0));
 }
 
-void Textbook::move_places() {
+void ReferenceScheme::move_places() {
   for (const TapSlot& tap : program_.taps) {
     Real position = 0;
     behind(tap.node, [&](std::uint32_t at, Real weight) { position += weight * x_[at]; });
@@ -83,7 +83,7 @@ void Textbook::move_places() {
   }
 }
 
-void Textbook::pull() {
+void ReferenceScheme::pull() {
   for (const LinkRun& run : program_.link_runs) {
     const auto c = [&](std::size_t i) { return coefficient_[run.coefficients[i]]; };
     with_law<Real>(run.law, c, [&](const auto& law) {
@@ -102,7 +102,7 @@ void Textbook::pull() {
   }
 }
 
-void Textbook::step(std::span<const double> value, std::span<const double> velocity) {
+void ReferenceScheme::step(std::span<const double> value, std::span<const double> velocity) {
   std::fill(pushed_.begin(), pushed_.end(), Real(0));
   for (std::size_t i = 0; i < program_.inputs.size(); ++i) {
     if (program_.inputs[i].is_force) {
@@ -120,7 +120,7 @@ void Textbook::step(std::span<const double> value, std::span<const double> veloc
   pull();
 }
 
-std::vector<double> Textbook::outputs() const {
+std::vector<double> ReferenceScheme::outputs() const {
   std::vector<double> values;
   const Real unit = Real{program_.rate_ratio} * program_.rate_ratio;
   for (const OutputSlot& output : program_.outputs) {
@@ -136,10 +136,10 @@ std::vector<double> Textbook::outputs() const {
   return values;
 }
 
-std::vector<double> Textbook::positions() const {
+std::vector<double> ReferenceScheme::positions() const {
   return narrowed(x_);
 }
-std::vector<double> Textbook::velocities() const {
+std::vector<double> ReferenceScheme::velocities() const {
   return narrowed(v_);
 }
 
