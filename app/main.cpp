@@ -65,10 +65,11 @@ const char* const check_examples =
     "  ressort check old.mdl --print > new.mdl\n";
 
 const char* const chart_examples =
-    "How much computing buys how much reference: for each scene every method, precision and "
+    "How much computing buys how much accuracy: for each scene every method, precision and "
     "budget,\n"
     "and the direct method at 2, 4 and 8 times the rate, is timed (one core, all in turns, the\n"
-    "fastest of several) and held against two references: the published scheme in long double, and "
+    "fastest of several) and held against two reference solutions: the published scheme in long "
+    "double, and "
     "the\n"
     "continuous network with the same M, K and Z. A mark nearer to the lower left corner is "
     "better;\n"

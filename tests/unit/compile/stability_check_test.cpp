@@ -51,7 +51,8 @@ ParameterBox box_of(const Instrument& instrument) {
 
 }  // namespace
 
-TEST_CASE("what is unstable as it starts is refused by name and place, or forced", "[gate]") {
+TEST_CASE("what is unstable as it starts is refused by name and place, or forced",
+          "[stability_check]") {
   CHECK(said_to(ground + "@r spring @g @m 3.9\n") == "");
   const std::string stiff = ground + "@r spring @g @m 5\n";
   CHECK(
@@ -76,7 +77,8 @@ TEST_CASE("what is unstable as it starts is refused by name and place, or forced
   CHECK(said_to(ground + "@r spring @g @m 1.5\n", {.rate_hz = 22050.0, .rescale = false}) == "");
 }
 
-TEST_CASE("what is no number is refused by its element, place and parameters", "[gate]") {
+TEST_CASE("what is no number is refused by its element, place and parameters",
+          "[stability_check]") {
   const auto said = [](const std::string& text, const std::vector<Setting>& settings = {}) {
     return said_to(text, {.bare = true, .force = true, .settings = settings});
   };
@@ -100,7 +102,7 @@ TEST_CASE("what is no number is refused by its element, place and parameters", "
   CHECK(compile(network_of("@K audioParam @in1\n@o osc 1 1/K 0 0 0\n"), {}, {}));
 }
 
-TEST_CASE("numbers where doubles end are told for what they are", "[gate]") {
+TEST_CASE("numbers where doubles end are told for what they are", "[stability_check]") {
   CHECK(said_to(ground + "@r spring @g @m 0.1 1e308\n")
             .find("the damping 1e308 of 'r' is too "
                   "large to be reckoned with; ") != std::string::npos);
@@ -111,7 +113,8 @@ TEST_CASE("numbers where doubles end are told for what they are", "[gate]") {
   }
 }
 
-TEST_CASE("what may never touch is no reason to refuse, nor what is not proved", "[gate]") {
+TEST_CASE("what may never touch is no reason to refuse, nor what is not proved",
+          "[stability_check]") {
   for (const char* const link :
        {"contact @g @m 50 0.1 0.", "nlContact @g @m 0.1 0.1 50 0.1 0.", "nlPluck @g @m 500 0.1 0.",
         "nlBow @g @m 50 0.1", "nlBow @g @m 50 0.1 1", "nlSpringDamper @g @m 0.1 0.1 50 0.1"}) {
@@ -129,7 +132,7 @@ TEST_CASE("what may never touch is no reason to refuse, nor what is not proved",
   CHECK(said_to(mesh + "0.49 0. 0. 0.\n", {.method = Method::direct}) == "");
 }
 
-TEST_CASE("a range that is too wide is narrowed and told, at its line", "[gate]") {
+TEST_CASE("a range that is too wide is narrowed and told, at its line", "[stability_check]") {
   std::vector<std::string> warnings;
   const auto low = admit(scene_of(oscillator, with_range("K", 0.5, 0.1, 5.0)), {}, warnings);
   REQUIRE(low);
@@ -157,7 +160,7 @@ TEST_CASE("a range that is too wide is narrowed and told, at its line", "[gate]"
 }
 
 TEST_CASE("ranges are safe in every corner that they have together, and no smaller than that",
-          "[gate]") {
+          "[stability_check]") {
   // Each alone might go to 1.3 and 0.6; asked for are more than both can have.
   Preset preset = struck(1);
   preset.parameters.push_back({"m_K", 0.1, 0.01, 1.2, {}});
@@ -180,7 +183,7 @@ TEST_CASE("ranges are safe in every corner that they have together, and no small
 }
 
 TEST_CASE("random presets: their ranges are safe as they come out, and not told in vain",
-          "[gate]") {
+          "[stability_check]") {
   rig::Random random(41);
   int narrowed = 0;
   for (int i = 0; i < 300; ++i) {
@@ -221,7 +224,7 @@ TEST_CASE("random presets: their ranges are safe as they come out, and not told 
 }
 
 TEST_CASE("no controller, event or start value turns a parameter further than is stable",
-          "[gate]") {
+          "[stability_check]") {
   Preset preset = with_range("K", 0.5, 0.1, 5.0);
   preset.controls.push_back({.source = ControlSource::controller,
                              .number = 20,
@@ -245,7 +248,8 @@ TEST_CASE("no controller, event or start value turns a parameter further than is
   CHECK(play({.force = true}, turn)[2] > 0.0);
 }
 
-TEST_CASE("a key that sounds high comes down before a parameter makes it unstable", "[gate]") {
+TEST_CASE("a key that sounds high comes down before a parameter makes it unstable",
+          "[stability_check]") {
   // As written, m_K may be quadrupled, and keys may use 11.6 times the stiffness; not both.
   Player player(scenes::poly_triangle(), struck(1));
   const ParameterInfo& stiffness = player.compiled.instrument.parameters[0];
@@ -270,7 +274,8 @@ TEST_CASE("a key that sounds high comes down before a parameter makes it unstabl
   CHECK(peak(player.y()) < 1.0);
 }
 
-TEST_CASE("a parameter that is sound keeps to what is stable, sample by sample", "[gate]") {
+TEST_CASE("a parameter that is sound keeps to what is stable, sample by sample",
+          "[stability_check]") {
   const std::string text =
       "@K audioParam @in2\n@o osc 1. K 0.01 0. 0.\n@in1 frcInput @o\n" + scenes::output(1, "o");
   std::vector<double> stiffness(20000);
@@ -293,7 +298,8 @@ TEST_CASE("a parameter that is sound keeps to what is stable, sample by sample",
   }
 }
 
-TEST_CASE("the bare network goes where it is told, and no further than is stable", "[gate]") {
+TEST_CASE("the bare network goes where it is told, and no further than is stable",
+          "[stability_check]") {
   const Network network = network_of(oscillator);
   const auto bare = [&](const std::vector<Setting>& settings, const std::vector<Setting>& reach) {
     auto compiled = compile(network, default_preset(network, true),
@@ -310,7 +316,7 @@ TEST_CASE("the bare network goes where it is told, and no further than is stable
   CHECK(bare({{"K", 4.1}}, {}).stability.verdict == Verdict::unstable);
 }
 
-TEST_CASE("a limit is told in six digits, on its inner side", "[gate]") {
+TEST_CASE("a limit is told in six digits, on its inner side", "[stability_check]") {
   CHECK(inside_limit(1.31568650461023, true) == 1.31568);
   CHECK(inside_limit(4.0, true) == 3.99999);
   CHECK(inside_limit(1.31568, true) == 1.31567);
