@@ -33,7 +33,7 @@ struct SmoothBow {
 
   V force(V, V v) const {
     using T = Scalar<V>;
-    const V ratio = v / s;
+    const V ratio = slip(v);
     return z * v * T(0.63) * exponential(V{} - 4 * ratio * ratio + T(0.5));
   }
   V potential(V) const { return V{}; }
@@ -47,7 +47,7 @@ struct SmoothBow {
   V grip(V wanted, V last, V half) const {
     const auto g = [&](V v) {
       using T = Scalar<V>;
-      const V ratio = v / s;
+      const V ratio = slip(v);
       const V grip = T(0.63) * z * exponential(T(0.5) - 4 * ratio * ratio);
       return Slope<V>{grip * v, grip * (1 - 8 * ratio * ratio)};
     };
@@ -58,6 +58,13 @@ struct SmoothBow {
     return {.damping = smooth_bow_stick * most.z};
   }
   static Slopes gentlest(const SmoothBow& least) { return {.damping = std::min(0.0, least.z)}; }
+
+  // The speed in scales; so far that nothing is left, where there is no scale.
+  V slip(V v) const {
+    const V most = V{} + 1000;
+    const V ratio = absolute(v / s);
+    return select(ratio < most, ratio, most);
+  }
 
   V z;
   V s;

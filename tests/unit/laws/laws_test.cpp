@@ -272,6 +272,35 @@ TEST_CASE("a discrete gradient gives back no more than its potential held", "[la
   });
 }
 
+TEST_CASE("a law has a force whichever of its arguments are 0, at rest and at any speed",
+          "[laws]") {
+  constexpr double motions[] = {0.0, 1e-9, 1e-3, 1.0, 1e6};
+  each_law([&](auto type, Random& random) {
+    const LawFacts& law = type.facts;
+    for (std::size_t zeros = 0; zeros < (std::size_t{1} << law.count); ++zeros) {
+      LawNumbers values = any_arguments(law, random);
+      for (std::size_t i = 0; i < law.count; ++i) {
+        const bool may_be_0 = law.arguments[i].role != Role::shape || law.arguments[i].least <= 0.0;
+        values[i] = (zeros >> i & 1) != 0 && may_be_0 ? 0.0 : values[i];
+      }
+      const auto with = law_with<decltype(type)>(values);
+      for (const double d : motions) {
+        for (const double v : motions) {
+          CAPTURE(zeros, d, v);
+          CHECK(std::isfinite(with.force(d, v)));
+          CHECK(std::isfinite(with.force(-d, -v)));
+          if constexpr (requires(laws::LinkState<double> link) { with.passive(link, 1); }) {
+            const laws::LinkState<double> link{
+                .now = d, .speed = v, .free = d + v, .fast = v, .gamma = 1.0};
+            const auto push = with.passive(link, 1);
+            CHECK(std::isfinite(push.x + push.v));
+          }
+        }
+      }
+    }
+  });
+}
+
 TEST_CASE("numbers that are kept instead of arguments make the same law", "[laws]") {
   each_law([&](auto type, Random& random) {
     using ForceLaw = typename decltype(type)::template With<double>;
