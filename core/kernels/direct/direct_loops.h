@@ -81,9 +81,11 @@ void step_masses(const Program& program, S& s) {
   rest_others(program, s);
 }
 
-// The loop over links: `force_of(a, b)` is what pulls at a, and back at b.
+// The loop over links: `force_of(a, b)` is what pulls at a, and back at b. Inlined like all that
+// leads to it: there are often fewer links of a law than a call would cost.
 template <class S, class ForceOf>
-void exert(const Ends* ends, std::uint32_t count, S& s, ForceOf&& force_of) {
+[[gnu::always_inline]] inline void exert(const Ends* ends, std::uint32_t count, S& s,
+                                         ForceOf&& force_of) {
   using V = typename S::V;
   for (std::uint32_t i = 0; i < count; ++i) {
     const auto [a, b] = ends[i];
@@ -95,19 +97,22 @@ void exert(const Ends* ends, std::uint32_t count, S& s, ForceOf&& force_of) {
 
 // Some links of a run, of whatever law, as published.
 template <class S>
-void exert_law(const Program& program, const LinkRun& run, std::uint32_t first, std::uint32_t count,
-               S& s) {
+[[gnu::always_inline]] inline void exert_law(const Program& program, const LinkRun& run,
+                                             std::uint32_t first, std::uint32_t count, S& s) {
   using V = typename S::V;
   const auto c = [&](std::size_t i) { return s.coefficient[run.coefficients[i]]; };
-  with_law<V>(run.law, c, [&](const auto& law) {
-    exert(program.ends.data() + first, count, s, [&](std::uint32_t a, std::uint32_t b) {
-      return law.force(s.between(a, b), s.v[a] - s.v[b]);
-    });
-  });
+  with_law_type(
+      run.law, [&]<class Type>(Type) __attribute__((always_inline)) {
+        const auto law = law_of<Type, V>(c);
+        const auto force = [&](std::uint32_t a, std::uint32_t b) __attribute__((always_inline)) {
+          return law.force(s.between(a, b), s.v[a] - s.v[b]);
+        };
+        exert(program.ends.data() + first, count, s, force);
+      });
 }
 
 template <class S>
-void step_links(const Program& program, S& s) {
+[[gnu::always_inline]] inline void step_links(const Program& program, S& s) {
   for (const LinkRun& run : program.link_runs) {
     if (run.scheme == Scheme::plain) {
       exert_law(program, run, run.first, run.count, s);
@@ -326,7 +331,7 @@ template <class S>
 
 // What acts in the next sample.
 template <class S>
-void pull(const Program& program, S& s) {
+[[gnu::always_inline]] inline void pull(const Program& program, S& s) {
   step_links(program, s);
   spread_taps(program, s);
 }
@@ -401,10 +406,8 @@ void step(const Program& program, DirectState<T>& state, const Block<T>& block) 
   }
 }
 
-// Flat, so that for step() the loops over links remain the only ones of their kind and are put in
-// their place.
 template <class S, class T>
-[[gnu::flatten]] void pull_alone(const Program& program, DirectState<T>& state) {
+void pull_alone(const Program& program, DirectState<T>& state) {
   S s(state);
   pull(program, s);
 }
