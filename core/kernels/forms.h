@@ -244,7 +244,7 @@ struct FourthLinks {
   std::uint32_t count = 0;
 };
 
-// The continuous network to fourth order in time (fourth.h), link by link; one voice in each lane.
+// The continuous network to fourth order in time (direct.h), link by link; one voice in each lane.
 struct Fourth {
   std::vector<FourthLinks> springs;  // linear, between nodes that are no points
   std::vector<FourthLinks> others;   // all others, each added as it is written

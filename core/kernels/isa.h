@@ -46,6 +46,18 @@ constexpr std::size_t vector_bytes(Isa isa) {
   return isa == Isa::v4 ? 64 : isa == Isa::v3 ? 32 : 16;
 }
 
+// What `make.operator()<bytes>()` gives, called with the width of packs: one that such a file is
+// compiled for, from the `widest` by halves to the `least`.
+template <std::size_t widest, std::size_t least = 16, class Make>
+static inline auto with_bytes(std::size_t bytes, const Make& make) {
+  if constexpr (widest > least) {
+    if (bytes != widest) {
+      return with_bytes<widest / 2, least>(bytes, make);
+    }
+  }
+  return make.template operator()<widest>();
+}
+
 // Of the narrowest register that holds the voices, or of the widest that there is.
 template <class T>
 constexpr std::size_t lanes_for(std::size_t voices, Isa isa) {

@@ -15,8 +15,7 @@ namespace ressort {
 
 inline constexpr std::size_t max_block_frames = 64;
 
-// What a kernel is driven by and what it fills, for at most max_block_frames samples. To a kernel's
-// loops a block of none says that nodes were written.
+// What a kernel is driven by and what it fills, for at most max_block_frames samples.
 template <class T>
 struct Block {
   std::size_t frames = 0;

@@ -14,7 +14,6 @@
 #include "core/kernels/direct/compensated.h"
 #include "core/kernels/direct/direct.h"
 #include "core/kernels/direct/direct_form.h"
-#include "core/kernels/direct/fourth.h"
 #include "core/kernels/direct/fourth_form.h"
 #include "core/kernels/domains/sharded.h"
 #include "core/kernels/domains/sharded_form.h"
@@ -87,7 +86,7 @@ constexpr KernelRow rows[] = {
         Method::modal, "modal", Use::published,
         [](const Request& r) { return modal_form(r.program, r.budget, r.progress); },
         least_modal_ns),
-    row<Fourth, FourthKernel>(Method::fourth, "fourth", Use::physical,
+    row<Fourth, DirectKernel>(Method::fourth, "fourth", Use::physical,
                               [](const Request& r) { return fourth_form(r.program); }),
     row<Slow, SlowKernel>(
         Method::slow, "slow", Use::physical,

@@ -1,7 +1,6 @@
 #include "core/kernels/batch/batch.h"
 
 #include <algorithm>
-#include <cmath>
 #include <utility>
 
 namespace ressort {
@@ -158,6 +157,20 @@ class Filler {
   std::size_t slots_ = 0;
 };
 
+// Pack by pack, a node's numbers in cells that follow each other.
+NodeLayout layout_of(const BatchTable& table, std::size_t lanes) {
+  NodeLayout layout{
+      .row = lanes, .rows = batch_node_cells, .size = table.cells * table.packs * lanes};
+  for (std::size_t node = 0; node < table.nodes; ++node) {
+    layout.node.push_back(static_cast<std::uint32_t>(batch_node_cells * node * lanes));
+  }
+  for (std::size_t lane = 0; lane < table.packs * lanes; ++lane) {
+    const std::size_t pack = lane / lanes;
+    layout.lane.push_back(static_cast<std::uint32_t>(pack * table.cells * lanes + lane % lanes));
+  }
+  return layout;
+}
+
 }  // namespace
 
 template <class T>
@@ -178,62 +191,25 @@ BatchKernel<T>::BatchKernel(const Program& program, const Batch& batch, std::siz
 template <class T>
 BatchKernel<T>::BatchKernel(const Program& program, const Batch& batch, BatchTable table,
                             std::size_t lanes, Isa isa)
-    : Kernel<T>(program, lanes * table.packs),
-      program_(program),
+    : NodeKernel<T>(program, layout_of(table, lanes)),
       batch_(batch),
-      lanes_(lanes),
       table_(std::move(table)),
       step_(with_isa(
-          isa, [&]<Isa level>() { return batch_step<level, T>(table_, lanes_ * sizeof(T)); })),
-      cells_(table_.cells * this->width()),
-      passive_(program, this->width()) {
-  for (std::size_t lane = 0; lane < this->width(); ++lane) {
-    this->reset(lane);
-  }
-}
-
-template <class T>
-void BatchKernel<T>::set_state(std::size_t lane, const double* x, const double* v) {
-  for (std::size_t node = 0; node < table_.nodes; ++node) {
-    T* const cell = cells_.data() + at(node, lane);
-    cell[0] = static_cast<T>(x[node]);
-    cell[lanes_] = static_cast<T>(v[node]);
-    cell[2 * lanes_] = T(0);
-  }
-  passive_.awake[lane] = T(0);
-}
-
-template <class T>
-bool BatchKernel<T>::save(std::size_t lane, double* x, double* v) const {
-  for (std::size_t node = 0; node < table_.nodes; ++node) {
-    const T* const cell = cells_.data() + at(node, lane);
-    x[node] = static_cast<double>(cell[0]);
-    v[node] = static_cast<double>(cell[lanes_]);
-  }
-  return true;
+          isa, [&]<Isa level>() { return batch_step<level, T>(table_, lanes * sizeof(T)); })) {
+  this->reset_lanes();
 }
 
 template <class T>
 void BatchKernel<T>::play(const Block<T>& block) {
+  auto& passive = this->nodes_.passive;
   BatchState<T> state{.ramps = ramps_of(this->coefficients),
-                      .cells = cells_.data(),
-                      .passive = passive_.links,
-                      .inverse_mass = passive_.inverse_mass.data(),
-                      .memory = passive_.memory.data(),
-                      .awake = passive_.awake.data()};
-  step_(program_, batch_, table_, state, block);
+                      .cells = this->nodes_.numbers.data(),
+                      .passive = passive.links,
+                      .inverse_mass = passive.inverse_mass.data(),
+                      .memory = passive.memory.data(),
+                      .awake = passive.awake.data()};
+  step_(this->program_, batch_, table_, state, block);
   this->coefficients.finish(block.frames);
-}
-
-template <class T>
-bool BatchKernel<T>::is_near_start(std::size_t lane, double bound) const {
-  for (std::size_t node = 0; node < program_.moving; ++node) {
-    const auto x = static_cast<double>(cells_[at(node, lane)]);
-    if (!(std::fabs(x - program_.position[node]) < bound)) {
-      return false;
-    }
-  }
-  return true;
 }
 
 template class BatchKernel<float>;

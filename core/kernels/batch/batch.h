@@ -6,8 +6,7 @@
 #include <array>
 #include <vector>
 
-#include "core/kernels/kernel.h"
-#include "core/kernels/passive.h"
+#include "core/kernels/nodes.h"
 
 namespace ressort {
 
@@ -75,29 +74,19 @@ template <Isa isa, class T>
 BatchStep<T> batch_step(const BatchTable& table, std::size_t bytes);
 
 template <class T>
-class BatchKernel final : public Kernel<T> {
+class BatchKernel final : public NodeKernel<T> {
  public:
   BatchKernel(const Program& program, const Batch& batch, std::size_t voices, Isa isa);
-  void set_state(std::size_t lane, const double* x, const double* v) override;
-  bool save(std::size_t lane, double* x, double* v) const override;
-  bool is_near_start(std::size_t lane, double bound) const override;
 
  private:
+  // Of packs of so many lanes.
   BatchKernel(const Program& program, const Batch& batch, BatchTable table, std::size_t lanes,
               Isa isa);
   void play(const Block<T>& block) override;
-  // Where a node's position is; its velocity and its force are one and two packs after it.
-  std::size_t at(std::size_t node, std::size_t lane) const {
-    const std::size_t cell = lane / lanes_ * table_.cells + batch_node_cells * node;
-    return cell * lanes_ + lane % lanes_;
-  }
-  const Program& program_;
+
   const Batch& batch_;
-  std::size_t lanes_;  // of a pack
   BatchTable table_;
   BatchStep<T> step_;
-  Aligned<T> cells_;
-  PassiveRoom<T> passive_;
 };
 
 }  // namespace ressort

@@ -510,12 +510,8 @@ BatchStep<Scalar<V>> step_for(const BatchTable& table) {
 template <class T>
 BatchStep<T> step_in(const BatchTable& table, std::size_t bytes) {
   constexpr std::size_t widest = vector_bytes(Isa::RESSORT_ISA);
-  if constexpr (widest > 32) {
-    if (bytes == 32) {
-      return step_for<Pack<T, 32>>(table);
-    }
-  }
-  return step_for<Pack<T, widest>>(table);
+  return with_bytes<widest, std::min<std::size_t>(32, widest)>(
+      bytes, [&]<std::size_t pack>() { return step_for<Pack<T, pack>>(table); });
 }
 
 }  // namespace

@@ -1,7 +1,6 @@
 #include "core/kernels/chains/chains.h"
 
 #include <algorithm>
-#include <cmath>
 
 namespace ressort {
 namespace {
@@ -25,11 +24,11 @@ std::size_t lanes_for(const Chains& form, Isa isa) {
 // Puts nodes in their places, and everything that names nodes into tables that name places.
 class TablesMaker {
  public:
-  TablesMaker(const Program& program, std::size_t lanes, std::vector<ChainPlace>& place)
+  TablesMaker(const Program& program, const Chains& form, std::size_t lanes)
       : program_(program),
-        form_(std::get<Chains>(program.form)),
+        form_(form),
         lanes_(static_cast<std::uint32_t>(lanes)),
-        place_(place),
+        place_(tables_.place),
         site_mass_(program.position.size(), nowhere),
         force_(program.position.size(), nowhere) {
     place_.assign(program.position.size(), nowhere);
@@ -190,28 +189,13 @@ class TablesMaker {
   }
 
   void place_passive() {
-    std::vector<std::uint32_t> end(program_.position.size(), nowhere);
-    const auto add = [&](std::uint32_t node) {
-      if (end[node] != nowhere) {
-        return end[node];
-      }
-      const bool is_chained = site_mass_[node] != nowhere;
-      end[node] = static_cast<std::uint32_t>(tables_.passive_ends.size());
+    const std::vector<std::uint32_t> inverse_mass = inverse_masses(program_);
+    for (std::uint32_t node = 0; node < place_.size() && !is_plain(program_); ++node) {
       tables_.passive_ends.push_back(
           {.place = place_[node],
-           .unit = is_chained ? site_of(node).unit : nowhere,
-           .inverse_mass = node < program_.moving ? mass_run_of(node).inverse_mass : nowhere});
-      return end[node];
-    };
-    tables_.passive = passive_links(program_);
-    for (PassiveLink& link : tables_.passive) {
-      link.ends = {add(link.ends.a), add(link.ends.b)};
+           .unit = site_mass_[node] != nowhere ? site_of(node).unit : nowhere,
+           .inverse_mass = node < program_.moving ? inverse_mass[node] : nowhere});
     }
-  }
-
-  const MassRun& mass_run_of(std::uint32_t node) const {
-    return *std::find_if(program_.mass_runs.begin(), program_.mass_runs.end(),
-                         [&](const MassRun& run) { return node < run.first + run.count; });
   }
 
   void make_outputs() {
@@ -276,113 +260,87 @@ class TablesMaker {
   const Program& program_;
   const Chains& form_;
   std::uint32_t lanes_;
-  std::vector<ChainPlace>& place_;        // [node]
+  ChainsTables tables_;
+  std::vector<ChainPlace>& place_;
   std::vector<std::uint32_t> site_mass_;  // [node] coefficient, if it is in a chain
   std::vector<std::uint32_t> force_;      // [node]
-  ChainsTables tables_;
 };
 
 }  // namespace
 
 template <class T>
 ChainsKernel<T>::ChainsKernel(const Program& program, const Chains& form, std::size_t, Isa isa)
-    : Kernel<T>(program, 1),
-      program_(program),
-      lanes_(lanes_for<T>(form, isa)),
-      tables_(TablesMaker(program, lanes_, place_).make()),
-      step_(with_isa(isa, [&]<Isa level>() { return chains_step<level, T>(lanes_ * sizeof(T)); })),
-      masks_(4 * lanes_ * tables_.chains.size()),
-      units_(lanes_ * lanes_),
-      bodies_(2 * lanes_ * tables_.pairs),
+    : ChainsKernel(program, form, TablesMaker(program, form, lanes_for<T>(form, isa)).make(),
+                   lanes_for<T>(form, isa), isa) {}
+
+template <class T>
+ChainsKernel<T>::ChainsKernel(const Program& program, const Chains& form, ChainsTables tables,
+                              std::size_t lanes, Isa isa)
+    : NodeKernel<T>(program, {.node = tables.place,
+                              .lane = {0},
+                              .row = lanes,
+                              .rows = 2,
+                              .size = 2 * lanes * tables.pairs}),
+      tables_(std::move(tables)),
+      loops_(with_isa(isa, [&]<Isa level>() { return chains_loops<level, T>(lanes * sizeof(T)); })),
+      masks_(4 * lanes * tables_.chains.size()),
+      units_(lanes * lanes),
       held_(4 * tables_.chains.size()),
       force_(tables_.force_count),
-      corners_(program.taps.size()),
-      tap_pull_(program.taps.size()),
-      memory_(tables_.passive.size() * passive_rows) {
-  const auto& chains = std::get<Chains>(program.form).chains;
-  for (std::size_t i = 0; i < chains.size(); ++i) {
+      tap_pull_(program.taps.size()) {
+  for (std::size_t i = 0; i < form.chains.size(); ++i) {
     const std::uint32_t packs = tables_.chains[i].packs;
-    const std::size_t last_lane = (chains[i].count - 1) / packs;
-    T* const masks = masks_.data() + 4 * lanes_ * i;
+    const std::size_t last_lane = (form.chains[i].count - 1) / packs;
+    T* const masks = masks_.data() + 4 * lanes * i;
     std::fill_n(masks, last_lane + 1, T(1));
-    std::fill_n(masks + lanes_, last_lane, T(1));
-    masks[2 * lanes_ + last_lane] = T(1);
-    masks[3 * lanes_ + (chains[i].count - 2) / packs] = T(1);
+    std::fill_n(masks + lanes, last_lane, T(1));
+    masks[2 * lanes + last_lane] = T(1);
+    masks[3 * lanes + (form.chains[i].count - 2) / packs] = T(1);
   }
-  for (std::size_t lane = 0; lane < lanes_; ++lane) {
-    units_[lane * lanes_ + lane] = T(1);
+  for (std::size_t lane = 0; lane < lanes; ++lane) {
+    units_[lane * lanes + lane] = T(1);
   }
-  this->reset(0);
+  this->reset_lanes();
 }
 
 template <class T>
-void ChainsKernel<T>::set_state(std::size_t, const double* x, const double* v) {
-  std::fill(bodies_.begin(), bodies_.end(), T(0));  // empty lanes too, should they be no numbers
-  for (std::size_t node = 0; node < place_.size(); ++node) {
-    bodies_[place_[node]] = static_cast<T>(x[node]);
-    bodies_[place_[node] + lanes_] = static_cast<T>(v[node]);
+void ChainsKernel<T>::clear(std::size_t) {
+  // Empty places of packs too, should they be no numbers.
+  for (auto* zero : {&this->nodes_.numbers, &held_, &force_, &tap_pull_}) {
+    std::fill(zero->begin(), zero->end(), T(0));
   }
-  std::fill(held_.begin(), held_.end(), T(0));
-  std::fill(force_.begin(), force_.end(), T(0));
-  std::fill(tap_pull_.begin(), tap_pull_.end(), T(0));
-  awake_ = T(0);
-}
-
-template <class T>
-bool ChainsKernel<T>::save(std::size_t, double* x, double* v) const {
-  for (std::size_t node = 0; node < place_.size(); ++node) {
-    x[node] = static_cast<double>(bodies_[place_[node]]);
-    v[node] = static_cast<double>(bodies_[place_[node] + lanes_]);
-  }
-  return true;
-}
-
-template <class T>
-bool ChainsKernel<T>::read(std::span<const std::uint32_t> nodes, T* x, T* v) const {
-  for (const std::uint32_t node : nodes) {
-    *x++ = bodies_[place_[node]];
-    *v++ = bodies_[place_[node] + lanes_];
-  }
-  return true;
 }
 
 template <class T>
 bool ChainsKernel<T>::write_nodes(std::span<const std::uint32_t> nodes, const T* x, const T* v) {
-  for (const std::uint32_t node : nodes) {
-    bodies_[place_[node]] = *x++;
-    bodies_[place_[node] + lanes_] = *v++;
-  }
+  this->write(nodes, x, v);
   std::fill(force_.begin(), force_.end(), T(0));
-  awake_ = T(1);
-  this->step({});
+  ChainsState<T> written = state();
+  loops_.pull(tables_, written);
+  clear_wide_registers();
   return true;
+}
+
+template <class T>
+ChainsState<T> ChainsKernel<T>::state() {
+  return {.ramps = ramps_of(this->coefficients),
+          .masks = masks_.data(),
+          .units = units_.data(),
+          .bodies = this->nodes_.numbers.data(),
+          .held = held_.data(),
+          .force = force_.data(),
+          .corners = this->nodes_.corners.data(),
+          .tap_pull = tap_pull_.data(),
+          .passive = this->nodes_.passive.links,
+          .memory = this->nodes_.passive.memory.data(),
+          .awake = this->nodes_.passive.awake.data()};
 }
 
 template <class T>
 void ChainsKernel<T>::play(const Block<T>& block) {
-  ChainsState<T> state{.ramps = ramps_of(this->coefficients),
-                       .masks = masks_.data(),
-                       .units = units_.data(),
-                       .bodies = bodies_.data(),
-                       .held = held_.data(),
-                       .force = force_.data(),
-                       .corners = corners_.data(),
-                       .tap_pull = tap_pull_.data(),
-                       .memory = memory_.data(),
-                       .awake = &awake_};
-  step_(program_, tables_, state, block);
+  ChainsState<T> played = state();
+  loops_.step(this->program_, tables_, played, block);
   this->coefficients.finish(block.frames);
-}
-
-template <class T>
-bool ChainsKernel<T>::is_near_start(std::size_t, double bound) const {
-  for (std::size_t node = 0; node < program_.moving; ++node) {
-    const auto x = static_cast<double>(bodies_[place_[node]]);
-    if (!(std::fabs(x - program_.position[node]) < bound)) {
-      return false;
-    }
-  }
-  return true;
 }
 
 template class ChainsKernel<float>;

@@ -6,9 +6,7 @@
 // after the pass, to v and to x, which is the same as if it had been in the sum.
 #pragma once
 
-#include "core/kernels/kernel.h"
-#include "core/kernels/passive.h"
-#include "core/kernels/taps.h"
+#include "core/kernels/nodes.h"
 
 namespace ressort {
 
@@ -89,7 +87,7 @@ struct PlacedTap {
   std::uint32_t force = 0;
 };
 
-// A node that a link holds whose force is not the plain one.
+// A node, for links whose force is not the plain one.
 struct PassiveEnd {
   ChainPlace place = 0;
   std::uint32_t unit = nowhere;          // if it is in a chain, as ChainSite says
@@ -98,6 +96,7 @@ struct PassiveEnd {
 
 // What a kernel makes of a Program and its lanes, once.
 struct ChainsTables {
+  std::vector<ChainPlace> place;  // [node]
   std::vector<FoldedChain> chains;
   std::vector<ChainSite> sites;  // [force], the first of them
   std::vector<LoosePlaces> loose_runs;
@@ -111,10 +110,9 @@ struct ChainsTables {
   std::vector<HeardForce> heard_forces;
   std::vector<Probe> probes;
   std::vector<PlacedTap> taps;
-  std::vector<PlacedNode> tap_nodes;  // those of the Program
-  std::vector<PassiveLink> passive;   // ends: of the next
-  std::vector<PassiveEnd> passive_ends;
-  std::size_t force_count = 0;  // sites, loose masses, listened, points, those never read
+  std::vector<PlacedNode> tap_nodes;     // those of the Program
+  std::vector<PassiveEnd> passive_ends;  // [node], if there are passive links
+  std::size_t force_count = 0;           // sites, loose masses, listened, points, those never read
   std::size_t pairs = 0;
 };
 
@@ -130,45 +128,44 @@ struct ChainsState {
   T* force;        // [force] summed by the links, used by the next sample
   Corners<T>* corners;  // [tap] in this sample
   T* tap_pull;          // [tap] what the links of this sample do to it, for the next one
-  T* memory;            // [passive link][passive_rows]
-  T* awake;             // 0 in the first sample after set_state(), else 1
+  const std::vector<PassiveLink>& passive;
+  T* memory;  // [passive link][passive_rows]
+  T* awake;   // 0 in the first sample after set_state(), else 1
 };
 
 template <class T>
-using ChainsStep = void (*)(const Program& program, const ChainsTables& tables,
-                            ChainsState<T>& state, const Block<T>& block);
+struct ChainsLoops {
+  void (*step)(const Program& program, const ChainsTables& tables, ChainsState<T>& state,
+               const Block<T>& block);
+  // The forces that links exert where all is now, added to those that there are.
+  void (*pull)(const ChainsTables& tables, ChainsState<T>& state);
+};
 
-// The function for packs of so many bytes.
+// The functions for packs of so many bytes.
 template <Isa isa, class T>
-ChainsStep<T> chains_step(std::size_t bytes);
+ChainsLoops<T> chains_loops(std::size_t bytes);
 
 template <class T>
-class ChainsKernel final : public Kernel<T> {
+class ChainsKernel final : public NodeKernel<T> {
  public:
-  // The Program's form is Chains.
   ChainsKernel(const Program& program, const Chains& form, std::size_t voices, Isa isa);
-  void set_state(std::size_t lane, const double* x, const double* v) override;
-  bool save(std::size_t lane, double* x, double* v) const override;
-  bool read(std::span<const std::uint32_t> nodes, T* x, T* v) const override;
   bool write_nodes(std::span<const std::uint32_t> nodes, const T* x, const T* v) override;
-  bool is_near_start(std::size_t lane, double bound) const override;
 
  private:
+  // Of packs of so many lanes.
+  ChainsKernel(const Program& program, const Chains& form, ChainsTables tables, std::size_t lanes,
+               Isa isa);
+  void clear(std::size_t lane) override;
   void play(const Block<T>& block) override;
-  const Program& program_;
-  std::size_t lanes_;              // of a pack
-  std::vector<ChainPlace> place_;  // [node]
+  ChainsState<T> state();
+
   ChainsTables tables_;
-  ChainsStep<T> step_;
+  ChainsLoops<T> loops_;
   Aligned<T> masks_;
   Aligned<T> units_;
-  Aligned<T> bodies_;
   Aligned<T> held_;
   Aligned<T> force_;
-  std::vector<Corners<T>> corners_;
   Aligned<T> tap_pull_;
-  Aligned<T> memory_;
-  T awake_ = T(0);
 };
 
 }  // namespace ressort

@@ -72,13 +72,6 @@ struct View {
   const T* coefficient;
 };
 
-// The same after nodes were written: of its own type, so that what is called for
-// every sample remains the only one of its kind and is put in its place.
-template <class T, std::size_t Bytes>
-struct Rewritten : View<T, Bytes> {
-  using View<T, Bytes>::View;
-};
-
 // The same number in every lane. Not V{} + x, which is not x if x is -0.
 template <class V>
 V all(Scalar<V> x) {
@@ -488,30 +481,20 @@ struct Passive {
 };
 
 // With a view of their own, as they cost step() registers.
-template <class T, std::size_t Bytes>
+template <class S, class T>
 [[gnu::noinline]] void remember_links(const ChainsTables& tables, ChainsState<T>& state) {
-  using S = Rewritten<T, Bytes>;
-  remember(tables.passive, state.memory, Passive<S>{tables, state, S(tables, state)});
+  remember(state.passive, state.memory, Passive<S>{tables, state, S(tables, state)});
 }
-template <class T, std::size_t Bytes>
+template <class S, class T>
 [[gnu::noinline]] void correct_links(const ChainsTables& tables, ChainsState<T>& state) {
-  using S = Rewritten<T, Bytes>;
   Passive<S> body{tables, state, S(tables, state)};
-  correct(tables.passive, state.memory, body);
+  correct(state.passive, state.memory, body);
   *state.awake = 1;
 }
 
-// Not inlined, as it costs step() registers.
-template <class T, std::size_t Bytes>
-[[gnu::noinline]] void write_nodes(const ChainsTables& tables, ChainsState<T>& state) {
-  Rewritten<T, Bytes> s(tables, state);
-  pull(s);
-}
-
-template <class T, std::size_t Bytes>
+template <class S, class T>
 void step(const Program& program, const ChainsTables& tables, ChainsState<T>& state,
           const Block<T>& block) {
-  using S = View<T, Bytes>;
   S s(tables, state);
   Ramps<T> ramps = state.ramps;
   const Table<std::uint32_t> audio_coefficients(program.audio_coefficients);
@@ -522,17 +505,14 @@ void step(const Program& program, const ChainsTables& tables, ChainsState<T>& st
   const std::size_t inputs = program.inputs.size();
   const std::size_t output_count = program.outputs.size();
   const std::size_t frames = block.frames;
-  const bool has_passive = !tables.passive.empty();
-  if (frames == 0) {
-    return write_nodes<T, Bytes>(tables, state);
-  }
+  const bool has_passive = !state.passive.empty();
   for (std::size_t frame = 0; frame < frames; ++frame) {
     advance(ramps);
     for (const std::uint32_t c : audio_coefficients) {
       ramps.value[c] = *audio++;
     }
     if (has_passive) {
-      remember_links<T, Bytes>(tables, state);
+      remember_links<S>(tables, state);
     }
     for (const PlacedInput& input : s.forces) {
       s.force[input.force] += value[input.index];
@@ -546,7 +526,7 @@ void step(const Program& program, const ChainsTables& tables, ChainsState<T>& st
       s.bodies[input.place + S::lanes] = velocity[input.index];
     }
     if (has_passive) {
-      correct_links<T, Bytes>(tables, state);
+      correct_links<S>(tables, state);
     }
     move_taps(s);
     for (const std::uint32_t i : s.listened) {
@@ -565,14 +545,20 @@ void step(const Program& program, const ChainsTables& tables, ChainsState<T>& st
   }
 }
 
+// Flat, so that for step() the loops over links remain the only ones of their kind and are put in
+// their place.
+template <class S, class T>
+[[gnu::flatten]] void pull_alone(const ChainsTables& tables, ChainsState<T>& state) {
+  S s(tables, state);
+  pull(s);
+}
+
 template <class T>
-ChainsStep<T> step_in(std::size_t bytes) {
-  if constexpr (vector_bytes(Isa::RESSORT_ISA) >= 32) {
-    if (bytes == 32) {
-      return step<T, 32>;
-    }
-  }
-  return step<T, 16>;
+ChainsLoops<T> loops_for(std::size_t bytes) {
+  return with_bytes<std::min<std::size_t>(32, vector_bytes(Isa::RESSORT_ISA))>(
+      bytes, []<std::size_t pack>() {
+        return ChainsLoops<T>{step<View<T, pack>, T>, pull_alone<View<T, pack>, T>};
+      });
 }
 
 }  // namespace
@@ -581,13 +567,13 @@ ChainsStep<T> step_in(std::size_t bytes) {
 namespace ressort {
 
 template <>
-ChainsStep<float> chains_step<Isa::RESSORT_ISA, float>(std::size_t bytes) {
-  return RESSORT_ISA::step_in<float>(bytes);
+ChainsLoops<float> chains_loops<Isa::RESSORT_ISA, float>(std::size_t bytes) {
+  return RESSORT_ISA::loops_for<float>(bytes);
 }
 
 template <>
-ChainsStep<double> chains_step<Isa::RESSORT_ISA, double>(std::size_t bytes) {
-  return RESSORT_ISA::step_in<double>(bytes);
+ChainsLoops<double> chains_loops<Isa::RESSORT_ISA, double>(std::size_t bytes) {
+  return RESSORT_ISA::loops_for<double>(bytes);
 }
 
 }  // namespace ressort

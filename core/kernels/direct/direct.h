@@ -1,24 +1,50 @@
-// core/engine: the published scheme, mass by mass and link by link, one voice in each lane. Runs
+// core/kernels: the published scheme, mass by mass and link by link, one voice in each lane. Runs
 // every Program; the reference for all other kernels.
 //
 // In (position, velocity) form it is the same maths as 2x[n] - x[n-1], and keeps 10 to 80 dB more
 // in single precision: the velocity is a small number of its own instead of the difference of two
 // large ones.
+//
+// To fourth order in time it follows the continuous network, where the published scheme has second
+// order, and first in the dampers. Between two samples a mass is not where it was and not as fast.
+// With a = F/M, all that acts on it by the published laws, springs and dampers pull as if it were
+// at x + a_s/12 with velocity v + a/2,
+//   F = -K (x + a_s/12) - Z (v + a/2),  v += F/M, x += v,
+// a_s being without the dampers' share: v is the velocity half a sample ago, and 1/12 is what the
+// second difference of a motion has too much. So there is a second pass over the linear links.
+// What other links and force inputs exert is as published itself, and counts in a: a force f that
+// lasts moves the network as far as (I - K/12M) f moves the scheme, which is where the continuous
+// network goes. Position inputs count as they are given.
 #pragma once
 
-#include "core/kernels/kernel.h"
-#include "core/kernels/passive.h"
-#include "core/kernels/taps.h"
+#include "core/kernels/nodes.h"
 
 namespace ressort {
 
-// Everything that one step of DirectKernel touches.
+// Everything that one step touches. Rows are [node][lane].
 template <class T>
 struct DirectState {
+  DirectState(Ramps<T> ramps_in, Nodes<T>& nodes)
+      : ramps(ramps_in),
+        x(nodes.row(0)),
+        v(nodes.row(1)),
+        force(nodes.row(2)),
+        row(nodes.layout.row),
+        corners(nodes.corners.data()),
+        nodes(nodes.layout.node.size()),
+        passive(nodes.passive.links),
+        inverse_mass(nodes.passive.inverse_mass.data()),
+        memory(nodes.passive.memory.data()),
+        awake(nodes.passive.awake.data()),
+        felt(nodes.passive.felt_or_null()) {}
+  // A row of a view's own, the first being 0.
+  T* own(std::size_t i) const { return force + (1 + i) * row; }
+
   Ramps<T> ramps;
-  T* x;                 // [node][lane] position
-  T* v;                 // [node][lane] change of position per sample
-  T* force;             // [node][lane] summed by the links, used by the next sample
+  T* x;      // position
+  T* v;      // change of position per sample
+  T* force;  // summed by the links, used by the next sample
+  std::size_t row;
   Corners<T>* corners;  // [tap][lane] in this sample
   std::size_t nodes;
   const std::vector<PassiveLink>& passive;
@@ -26,42 +52,44 @@ struct DirectState {
   T* memory;                          // [passive link][passive_rows][lane]
   T* awake;                           // [lane] 0 in the first sample after set_state(), else 1
   T* felt;  // [node][lane] what passive links did in this sample; null: nobody listens
-  // Only where positions are compensated:
-  T* rest = nullptr;              // [node][lane] what a position is more than x
-  const T* value_rest = nullptr;  // [frame][input][lane] the same of the position inputs
-  T* output_rest = nullptr;       // [frame][output][lane] and of the outputs
+  const Fourth* fourth = nullptr;
+  // Only where positions are compensated, what they are more than one number:
+  const T* value_rest = nullptr;  // [frame][input][lane]
+  T* output_rest = nullptr;       // [frame][output][lane]
 };
 
 template <class T>
-using DirectStep = void (*)(const Program& program, DirectState<T>& state, const Block<T>& block);
+struct DirectLoops {
+  void (*step)(const Program& program, DirectState<T>& state, const Block<T>& block);
+  // The forces that links exert where all is now, added to those that there are; or null.
+  void (*pull)(const Program& program, DirectState<T>& state);
+};
 
-// The function for lanes that fill so many bytes.
+// The functions for lanes that fill so many bytes: as published, and to fourth order.
 template <Isa isa, class T>
-DirectStep<T> direct_step(std::size_t bytes);
-
-// The same with compensated positions.
+DirectLoops<T> direct_loops(std::size_t bytes);
+template <Isa isa, class T>
+DirectLoops<T> fourth_loops(std::size_t bytes);
+// As published with compensated positions.
 template <Isa isa>
-DirectStep<float> compensated_step(std::size_t bytes);
+DirectLoops<float> compensated_loops(std::size_t bytes);
+
+inline constexpr std::size_t compensated_rows = 4;  // of the nodes: the last is a position's rest
+inline constexpr std::size_t fourth_rows = 6;  // ...the dampers' share of the force, a_s/12 and a/2
 
 template <class T>
-class DirectKernel final : public Kernel<T> {
+class DirectKernel final : public NodeKernel<T> {
  public:
   DirectKernel(const Program& program, const Direct& form, std::size_t voices, Isa isa);
-  void set_state(std::size_t lane, const double* x, const double* v) override;
-  bool save(std::size_t lane, double* x, double* v) const override;
-  bool read(std::span<const std::uint32_t> nodes, T* x, T* v) const override;
+  DirectKernel(const Program& program, const Fourth& form, std::size_t voices, Isa isa);
   bool write_nodes(std::span<const std::uint32_t> nodes, const T* x, const T* v) override;
-  bool is_near_start(std::size_t lane, double bound) const override;
 
  private:
   void play(const Block<T>& block) override;
-  const Program& program_;
-  DirectStep<T> step_;
-  Aligned<T> x_;
-  Aligned<T> v_;
-  Aligned<T> force_;
-  std::vector<Corners<T>> corners_;
-  PassiveRoom<T> passive_;
+  DirectState<T> state();
+
+  DirectLoops<T> loops_;
+  const Fourth* fourth_ = nullptr;
 };
 
 }  // namespace ressort

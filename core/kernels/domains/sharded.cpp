@@ -86,9 +86,6 @@ bool ShardedKernel<T>::is_near_start(std::size_t lane, double bound) const {
 
 template <class T>
 void ShardedKernel<T>::play(const Block<T>& block) {
-  if (block.frames == 0) {
-    return;
-  }
   for (std::size_t at = 0; at < block.frames; at += frames_) {
     const std::size_t frames = std::min(frames_, block.frames - at);
     const auto step = [&](std::size_t i) { step_shard(i, block, at, frames); };

@@ -1,9 +1,7 @@
 // core/engine: a regular network (Grid), its slots side by side in the lanes. One voice.
 #pragma once
 
-#include "core/kernels/kernel.h"
-#include "core/kernels/passive.h"
-#include "core/kernels/taps.h"
+#include "core/kernels/nodes.h"
 
 namespace ressort {
 
@@ -46,32 +44,30 @@ struct GridState {
 };
 
 template <class T>
-using GridStep = void (*)(const Program& program, const Grid& grid, GridState<T>& state,
-                          const Block<T>& block);
+struct GridLoops {
+  void (*step)(const Program& program, const Grid& grid, GridState<T>& state,
+               const Block<T>& block);
+  // The forces that links exert where all is now, added to those that there are.
+  void (*pull)(const Program& program, const Grid& grid, GridState<T>& state);
+};
 
 template <Isa isa, class T>
-GridStep<T> grid_step();
+GridLoops<T> grid_loops();
 
 template <class T>
-class GridKernel final : public Kernel<T> {
+class GridKernel final : public NodeKernel<T> {
  public:
   GridKernel(const Program& program, const Grid& grid, std::size_t voices, Isa isa);
-  void set_state(std::size_t lane, const double* x, const double* v) override;
-  bool save(std::size_t lane, double* x, double* v) const override;
-  bool read(std::span<const std::uint32_t> nodes, T* x, T* v) const override;
   bool write_nodes(std::span<const std::uint32_t> nodes, const T* x, const T* v) override;
-  bool is_near_start(std::size_t lane, double bound) const override;
 
  private:
+  void clear(std::size_t lane) override;
   void play(const Block<T>& block) override;
+  GridState<T> state();
   void make_stamps(std::size_t lanes);
 
-  const Program& program_;
   const Grid& grid_;
-  GridStep<T> step_;
-  Aligned<T> x_;
-  Aligned<T> v_;
-  Aligned<T> force_;
+  GridLoops<T> loops_;
   Aligned<T> y_;
   Aligned<T> link_force_;
   Aligned<T> held_;
@@ -82,12 +78,8 @@ class GridKernel final : public Kernel<T> {
   std::vector<std::uint32_t> inverse_mass_;
   std::vector<std::uint32_t> pushed_;
   std::size_t pushes_ = 0;
-  std::vector<Corners<T>> corners_;
   bool is_forward_ = true;
   bool is_fresh_ = true;
-  std::vector<PassiveLink> passive_;
-  Aligned<T> memory_;
-  T awake_ = T(0);
 };
 
 }  // namespace ressort

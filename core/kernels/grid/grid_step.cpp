@@ -413,10 +413,6 @@ void step(const Program& program, const Grid& grid, GridState<T>& state, const B
   const T* audio = block.audio;
   T* outputs = block.outputs;
   const std::size_t inputs = program.inputs.size();
-  if (block.frames == 0) {
-    hold(s);
-    pull(s);
-  }
   for (std::size_t frame = 0; frame < block.frames; ++frame) {
     advance(state.ramps);
     for (const std::uint32_t c : program.audio_coefficients) {
@@ -460,19 +456,26 @@ void step(const Program& program, const Grid& grid, GridState<T>& state, const B
   }
 }
 
+template <class T>
+void pull_alone(const Program& program, const Grid& grid, GridState<T>& state) {
+  const View<T> s{program, grid, state};
+  hold(s);
+  pull(s);
+}
+
 }  // namespace
 }  // namespace ressort::RESSORT_ISA
 
 namespace ressort {
 
 template <>
-GridStep<float> grid_step<Isa::RESSORT_ISA, float>() {
-  return RESSORT_ISA::step<float>;
+GridLoops<float> grid_loops<Isa::RESSORT_ISA, float>() {
+  return {RESSORT_ISA::step<float>, RESSORT_ISA::pull_alone<float>};
 }
 
 template <>
-GridStep<double> grid_step<Isa::RESSORT_ISA, double>() {
-  return RESSORT_ISA::step<double>;
+GridLoops<double> grid_loops<Isa::RESSORT_ISA, double>() {
+  return {RESSORT_ISA::step<double>, RESSORT_ISA::pull_alone<double>};
 }
 
 }  // namespace ressort

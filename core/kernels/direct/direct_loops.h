@@ -1,0 +1,416 @@
+// The loops of the direct form, for views of DirectState in packs: as published, with compensated
+// positions, to fourth order. A part of *_step.cpp, which are compiled for each instruction set.
+#pragma once
+
+#include "core/kernels/direct/direct.h"
+#include "core/laws/laws.h"
+
+namespace ressort::RESSORT_ISA {
+namespace {
+
+// DirectState, seen in packs.
+template <class T, std::size_t Bytes>
+struct View {
+  using V = Pack<T, Bytes>;
+  static constexpr std::size_t lanes = Bytes / sizeof(T);
+  static constexpr bool takes_passive = true;  // links that are not plain
+
+  explicit View(DirectState<T>& state_in)
+      : state(state_in),
+        x(reinterpret_cast<V*>(state.x)),
+        v(reinterpret_cast<V*>(state.v)),
+        force(reinterpret_cast<V*>(state.force)),
+        coefficient(reinterpret_cast<const V*>(state.ramps.value)) {}
+
+  DirectState<T>& state;
+  // Where a node is from another.
+  V between(std::size_t a, std::size_t b) const { return x[a] - x[b]; }
+  void move(std::size_t node) { shift(node, v[node]); }
+  void shift(std::size_t node, V way) { x[node] += way; }
+  // One lane's position, `at` being its number in [node][lane].
+  T exact(std::size_t at) const { return state.x[at]; }
+  void move_to(std::size_t at, T position) {
+    state.v[at] = position - state.x[at];
+    state.x[at] = position;
+  }
+  // What the position inputs and the outputs of a frame leave out.
+  void take_rests(const Program&) {}
+  void give_rests(const Program&) {}
+
+  V* x;
+  V* v;
+  V* force;
+  const V* coefficient;
+};
+
+// The loop over one run's masses; `pull` is what acts on one besides its links.
+template <class S, class Pull>
+void move_masses(const MassRun& run, S& s, Pull&& pull) {
+  using V = typename S::V;
+  const V inverse_mass = s.coefficient[run.inverse_mass];
+  for (std::uint32_t i = run.first; i < run.first + run.count; ++i) {
+    s.v[i] += (s.force[i] - pull(s.x[i], s.v[i])) * inverse_mass;
+    s.move(i);
+    s.force[i] = V{};
+  }
+}
+
+// Nothing moves a node without inertia.
+template <class S>
+void rest_others(const Program& program, S& s) {
+  for (std::size_t i = program.moving; i < s.state.nodes; ++i) {
+    s.force[i] = typename S::V{};
+  }
+}
+
+template <class S>
+void step_masses(const Program& program, S& s) {
+  using V = typename S::V;
+  for (const MassRun& run : program.mass_runs) {
+    const V k = s.coefficient[run.stiffness];
+    const V z = s.coefficient[run.damping];
+    const V g = run.has_gravity ? s.coefficient[run.gravity] : V{};
+    if (run.is_oscillator) {
+      move_masses(run, s, [=](V x, V v) { return k * x + z * v + g; });
+    } else if (run.has_gravity) {
+      move_masses(run, s, [=](V, V) { return g; });
+    } else {
+      move_masses(run, s, [](V, V) { return V{}; });
+    }
+  }
+  rest_others(program, s);
+}
+
+// The loop over links: `force_of(a, b)` is what pulls at a, and back at b. Inlined like all that
+// leads to it: there are often fewer links of a law than a call would cost.
+template <class S, class ForceOf>
+[[gnu::always_inline]] inline void exert(const Ends* ends, std::uint32_t count, S& s,
+                                         ForceOf&& force_of) {
+  using V = typename S::V;
+  for (std::uint32_t i = 0; i < count; ++i) {
+    const auto [a, b] = ends[i];
+    const V f = force_of(a, b);
+    s.force[a] -= f;
+    s.force[b] += f;
+  }
+}
+
+// Some links of a run, of whatever law, as published.
+template <class S>
+[[gnu::always_inline]] inline void exert_law(const Program& program, const LinkRun& run,
+                                             std::uint32_t first, std::uint32_t count, S& s) {
+  using V = typename S::V;
+  const auto c = [&](std::size_t i) { return s.coefficient[run.coefficients[i]]; };
+  with_law_type(
+      run.law, [&]<class Type>(Type) __attribute__((always_inline)) {
+        const auto law = law_of<Type, V>(c);
+        const auto force = [&](std::uint32_t a, std::uint32_t b) __attribute__((always_inline)) {
+          return law.force(s.between(a, b), s.v[a] - s.v[b]);
+        };
+        exert(program.ends.data() + first, count, s, force);
+      });
+}
+
+template <class S>
+[[gnu::always_inline]] inline void step_links(const Program& program, S& s) {
+  for (const LinkRun& run : program.link_runs) {
+    if (run.scheme == Scheme::plain) {
+      exert_law(program, run, run.first, run.count, s);
+    }
+  }
+}
+
+// Calls `use(at, weight)` for the up to four nodes around a tap's place in one lane; `at` is the
+// node's own number in [node][lane].
+template <class S, class Use>
+void around(const Program& program, const S& s, std::size_t tap, std::size_t lane, Use&& use) {
+  each_corner(s.state.corners[tap * S::lanes + lane], [&](std::uint32_t node, auto weight) {
+    use(program.tap_nodes[node] * S::lanes + lane, weight);
+  });
+}
+
+template <class S>
+void place_taps(const Program& program, S& s) {
+  const auto* const c = s.state.ramps.value;
+  for (std::size_t i = 0; i < program.taps.size(); ++i) {
+    const TapSlot& tap = program.taps[i];
+    for (std::size_t lane = 0; lane < S::lanes; ++lane) {
+      s.state.corners[i * S::lanes + lane] =
+          corners_at(tap, c[tap.u * S::lanes + lane], c[tap.v * S::lanes + lane]);
+    }
+  }
+}
+
+// A point moves with the nodes around it, and along them when its coordinate changes.
+template <class S>
+void move_taps(const Program& program, S& s) {
+  for (std::size_t i = 0; i < program.taps.size(); ++i) {
+    for (std::size_t lane = 0; lane < S::lanes; ++lane) {
+      const std::size_t node = program.taps[i].node * S::lanes + lane;
+      decltype(s.exact(node)) position = 0;
+      around(program, s, i, lane,
+             [&](std::size_t at, auto weight) { position += weight * s.exact(at); });
+      s.move_to(node, position);
+    }
+  }
+}
+
+// What acts on the points goes to the nodes around them.
+template <class S>
+void spread_taps(const Program& program, S& s) {
+  using V = typename S::V;
+  using T = Scalar<V>;
+  for (std::size_t i = 0; i < program.taps.size(); ++i) {
+    const std::uint32_t node = program.taps[i].node;
+    const V force = s.force[node];
+    s.force[node] = V{};
+    for (std::size_t lane = 0; lane < S::lanes; ++lane) {
+      around(program, s, i, lane,
+             [&](std::size_t at, T weight) { s.state.force[at] += weight * force[lane]; });
+    }
+  }
+}
+
+// Whether a node is a place on a macro; it is then taps[node - taps[0].node].
+bool is_place(const Program& program, std::uint32_t node) {
+  return !program.taps.empty() && node >= program.taps[0].node;
+}
+
+// Calls `use(at, weight)` for what a node stands for in one lane: itself, or what is around it.
+template <class S, class Use>
+void behind(const Program& program, const S& s, std::uint32_t node, std::size_t lane, Use&& use) {
+  if (!is_place(program, node)) {
+    return use(node * S::lanes + lane, Scalar<typename S::V>(1));
+  }
+  around(program, s, node - program.taps[0].node, lane, use);
+}
+
+// The links' force at a node; at a place that of the nodes around it, interpolated.
+template <class S>
+typename S::V force_at(const Program& program, const S& s, std::uint32_t node) {
+  using V = typename S::V;
+  using T = Scalar<V>;
+  V force{};
+  for (std::size_t lane = 0; lane < S::lanes; ++lane) {
+    behind(program, s, node, lane, [&](std::size_t at, T weight) {
+      force[lane] += weight * s.state.force[at];
+      force[lane] += s.state.felt == nullptr ? T(0) : weight * s.state.felt[at];
+    });
+  }
+  return force;
+}
+
+// How much of what pushes one node is felt at another: all of it where they are one, and between
+// two places the product of their weights on every node that both have around them.
+template <class S>
+typename S::V share(const Program& program, const S& s, std::uint32_t from, std::uint32_t at) {
+  using V = typename S::V;
+  using T = Scalar<V>;
+  V sum{};
+  for (std::size_t lane = 0; lane < S::lanes; ++lane) {
+    behind(program, s, from, lane, [&](std::size_t pushed, T weight) {
+      behind(program, s, at, lane,
+             [&](std::size_t felt, T part) { sum[lane] += pushed == felt ? weight * part : T(0); });
+    });
+  }
+  return sum;
+}
+
+// Links that are not plain see nodes and places alike.
+template <class S>
+struct Passive {
+  using V = typename S::V;
+  using T = Scalar<V>;
+
+  V coefficient(std::uint32_t c) const { return s.coefficient[c]; }
+  V awake() const { return *reinterpret_cast<const V*>(s.state.awake); }
+  V distance_now(Ends ends) const { return s.between(ends.a, ends.b); }
+  V speed_now(Ends ends) const { return s.v[ends.a] - s.v[ends.b]; }
+  V distance(Ends ends) const {
+    return is_place(program, ends.a) || is_place(program, ends.b)
+               ? position(ends.a) - position(ends.b)
+               : s.between(ends.a, ends.b);
+  }
+  V speed(Ends ends) const { return speed(ends.a) - speed(ends.b); }
+  V gamma(Ends ends) const {
+    const auto [a, b] = ends;
+    const bool may_meet = a == b || is_place(program, a) || is_place(program, b);
+    return give(a, a) + give(b, b) - (may_meet ? 2 * give(a, b) : V{});
+  }
+  void push(Ends ends, V x, V v) {
+    push_node(ends.a, -x, -v);
+    push_node(ends.b, x, v);
+  }
+
+ private:
+  V position(std::uint32_t node) const {
+    if (!is_place(program, node)) {
+      return s.x[node];
+    }
+    V position{};
+    for (std::size_t lane = 0; lane < S::lanes; ++lane) {
+      behind(program, s, node, lane,
+             [&](std::size_t at, T weight) { position[lane] += weight * s.state.x[at]; });
+    }
+    return position;
+  }
+
+  V speed(std::uint32_t node) const {
+    return is_place(program, node) ? position(node) - s.x[node] : s.v[node];
+  }
+
+  // How far one node is moved by a force of 1 at another.
+  V give(std::uint32_t from, std::uint32_t at) const {
+    if (from == at && !is_place(program, at)) {
+      return at < program.moving ? s.coefficient[s.state.inverse_mass[at]] : V{};
+    }
+    V sum{};
+    for (std::size_t lane = 0; lane < S::lanes; ++lane) {
+      behind(program, s, from, lane, [&](std::size_t pushed, T weight) {
+        behind(program, s, at, lane, [&](std::size_t felt, T part) {
+          sum[lane] += pushed == felt ? weight * part * inverse_mass(pushed, lane) : T(0);
+        });
+      });
+    }
+    return sum;
+  }
+
+  T inverse_mass(std::size_t at, std::size_t lane) const {
+    const std::size_t node = at / S::lanes;
+    return node < program.moving ? s.state.ramps.value[s.state.inverse_mass[node] * S::lanes + lane]
+                                 : T(0);
+  }
+
+  void push_node(std::uint32_t node, V x, V v) {
+    if (!is_place(program, node)) {
+      if (node < program.moving) {
+        const V inverse_mass = s.coefficient[s.state.inverse_mass[node]];
+        s.shift(node, inverse_mass * x);
+        s.v[node] += inverse_mass * v;
+      }
+      if (s.state.felt != nullptr) {
+        reinterpret_cast<V*>(s.state.felt)[node] += v;
+      }
+      return;
+    }
+    for (std::size_t lane = 0; lane < S::lanes; ++lane) {
+      behind(program, s, node, lane, [&](std::size_t at, T weight) {
+        const T part = weight * inverse_mass(at, lane);
+        s.state.x[at] += part * x[lane];
+        s.state.v[at] += part * v[lane];
+        if (s.state.felt != nullptr) {
+          s.state.felt[at] += weight * v[lane];
+        }
+      });
+    }
+  }
+
+ public:
+  const Program& program;
+  S& s;
+};
+
+template <class S>
+[[gnu::noinline]] void remember_links(const Program& program, S& s) {
+  using V = typename S::V;
+  remember(s.state.passive, reinterpret_cast<V*>(s.state.memory), Passive<S>{program, s});
+}
+
+template <class S>
+[[gnu::noinline]] void correct_links(const Program& program, S& s) {
+  using V = typename S::V;
+  if (s.state.felt != nullptr) {
+    for (std::size_t i = 0; i < s.state.nodes * S::lanes; ++i) {
+      s.state.felt[i] = 0;
+    }
+  }
+  Passive<S> body{program, s};
+  correct(s.state.passive, reinterpret_cast<V*>(s.state.memory), body);
+  *reinterpret_cast<V*>(s.state.awake) = V{} + 1;
+}
+
+// What acts in the next sample.
+template <class S>
+[[gnu::always_inline]] inline void pull(const Program& program, S& s) {
+  step_links(program, s);
+  spread_taps(program, s);
+}
+
+template <class S>
+typename S::V read_output(const Program& program, const S& s, const typename S::V* value,
+                          const OutputSlot& output) {
+  if (!output.is_force) {
+    return s.x[output.node];
+  }
+  auto force = force_at(program, s, output.node);
+  for (std::size_t i = 0; i < program.inputs.size(); ++i) {
+    if (program.inputs[i].is_force) {
+      force += share(program, s, program.inputs[i].node, output.node) * value[i];
+    }
+  }
+  return force / static_cast<Scalar<typename S::V>>(program.rate_ratio * program.rate_ratio);
+}
+
+// A view may have a step_masses() and a pull() of its own.
+template <class S, class T>
+void step(const Program& program, DirectState<T>& state, const Block<T>& block) {
+  using V = typename S::V;
+  S s(state);
+  const auto* value = reinterpret_cast<const V*>(block.value);
+  const auto* velocity = reinterpret_cast<const V*>(block.velocity);
+  const auto* audio = reinterpret_cast<const V*>(block.audio);
+  auto* coefficient = reinterpret_cast<V*>(state.ramps.value);
+  auto* outputs = reinterpret_cast<V*>(block.outputs);
+  const std::size_t inputs = program.inputs.size();
+  const bool has_passive = !state.passive.empty();
+  for (std::size_t frame = 0; frame < block.frames; ++frame) {
+    advance(state.ramps);
+    for (const std::uint32_t c : program.audio_coefficients) {
+      coefficient[c] = *audio++;
+    }
+    if constexpr (S::takes_passive) {
+      if (has_passive) {
+        remember_links(program, s);
+      }
+    }
+    for (std::size_t i = 0; i < inputs; ++i) {
+      if (program.inputs[i].is_force) {
+        s.force[program.inputs[i].node] += value[i];
+      }
+    }
+    if (!program.taps.empty()) {
+      place_taps(program, s);
+      spread_taps(program, s);
+    }
+    step_masses(program, s);
+    for (std::size_t i = 0; i < inputs; ++i) {
+      if (!program.inputs[i].is_force) {
+        s.x[program.inputs[i].node] = value[i];
+        s.v[program.inputs[i].node] = velocity[i];
+      }
+    }
+    s.take_rests(program);
+    if constexpr (S::takes_passive) {
+      if (has_passive) {
+        correct_links(program, s);
+      }
+    }
+    move_taps(program, s);
+    pull(program, s);
+    for (const OutputSlot& output : program.outputs) {
+      *outputs++ = read_output(program, s, value, output);
+    }
+    s.give_rests(program);
+    value += inputs;
+    velocity += inputs;
+  }
+}
+
+template <class S, class T>
+void pull_alone(const Program& program, DirectState<T>& state) {
+  S s(state);
+  pull(program, s);
+}
+
+}  // namespace
+}  // namespace ressort::RESSORT_ISA

@@ -1,0 +1,146 @@
+#include "core/kernels/nodes.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+
+namespace ressort {
+
+template <class T>
+NodeLayout layout_in_rows(std::span<const std::uint32_t> slot, std::size_t slots, std::size_t width,
+                          std::size_t rows) {
+  constexpr std::size_t line = widest_bytes / sizeof(T);
+  NodeLayout layout;
+  for (const std::uint32_t at : slot) {
+    layout.node.push_back(at < slots ? static_cast<std::uint32_t>(at * width)
+                                     : NodeLayout::nowhere);
+  }
+  layout.lane.resize(width);
+  std::iota(layout.lane.begin(), layout.lane.end(), 0u);
+  // With a line between two rows, as processors take addresses for the same that are 4096 apart.
+  layout.row = (slots * width + line - 1) / line * line + line;
+  layout.rows = rows;
+  layout.size = rows * layout.row;
+  return layout;
+}
+
+template <class T>
+NodeLayout layout_in_rows(const Program& program, std::size_t width, std::size_t rows) {
+  std::vector<std::uint32_t> slot(program.position.size());
+  std::iota(slot.begin(), slot.end(), 0u);
+  return layout_in_rows<T>(slot, slot.size(), width, rows);
+}
+
+template <class T>
+Nodes<T>::Nodes(const Program& program, NodeLayout layout_in)
+    : layout(std::move(layout_in)),
+      numbers(layout.size),
+      corners(program.taps.size() * width()),
+      passive(program, width()) {}
+
+template <class T>
+double Nodes<T>::position(std::size_t node, std::size_t lane) const {
+  if (!is_somewhere(node)) {
+    return 0.0;
+  }
+  const auto x = static_cast<double>(numbers[at(node, lane)]);
+  return layout.rest == 0
+             ? x
+             : x + static_cast<double>(numbers[at(node, lane) + layout.rest * layout.row]);
+}
+
+template <class T>
+double Nodes<T>::velocity(std::size_t node, std::size_t lane) const {
+  return is_somewhere(node) ? static_cast<double>(numbers[at(node, lane) + layout.row]) : 0.0;
+}
+
+template <class T>
+void Nodes<T>::put(std::size_t node, std::size_t lane, double x, double v) {
+  if (!is_somewhere(node)) {
+    return;
+  }
+  T* const number = numbers.data() + at(node, lane);
+  *number = static_cast<T>(x);
+  number[layout.row] = static_cast<T>(v);
+  if (layout.rest > 0) {
+    number[layout.rest * layout.row] = static_cast<T>(x - static_cast<double>(*number));
+  }
+}
+
+template <class T>
+void Nodes<T>::set(std::size_t lane, const double* x, const double* v) {
+  for (std::size_t node = 0; node < layout.node.size(); ++node) {
+    for (std::size_t row = 2; is_somewhere(node) && row < layout.rows; ++row) {
+      numbers[at(node, lane) + row * layout.row] = T(0);
+    }
+    put(node, lane, x[node], v[node]);
+  }
+  passive.awake[lane] = T(0);
+}
+
+template <class T, class Number>
+void NodeKernel<T, Number>::reset_lanes() {
+  for (std::size_t lane = 0; lane < this->width(); ++lane) {
+    this->reset(lane);
+  }
+}
+
+template <class T, class Number>
+void NodeKernel<T, Number>::set_state(std::size_t lane, const double* x, const double* v) {
+  clear(lane);
+  nodes_.set(lane, x, v);
+}
+
+template <class T, class Number>
+bool NodeKernel<T, Number>::save(std::size_t lane, double* x, double* v) const {
+  for (std::size_t node = 0; node < program_.position.size(); ++node) {
+    x[node] = nodes_.position(node, lane);
+    v[node] = nodes_.velocity(node, lane);
+  }
+  return true;
+}
+
+template <class T, class Number>
+bool NodeKernel<T, Number>::read(std::span<const std::uint32_t> nodes, T* x, T* v) const {
+  for (const std::uint32_t node : nodes) {
+    for (std::size_t lane = 0; lane < this->width(); ++lane) {
+      *x++ = static_cast<T>(nodes_.position(node, lane));
+      *v++ = static_cast<T>(nodes_.velocity(node, lane));
+    }
+  }
+  return true;
+}
+
+template <class T, class Number>
+void NodeKernel<T, Number>::write(std::span<const std::uint32_t> nodes, const T* x, const T* v) {
+  for (const std::uint32_t node : nodes) {
+    for (std::size_t lane = 0; lane < this->width(); ++lane) {
+      nodes_.put(node, lane, static_cast<double>(*x++), static_cast<double>(*v++));
+    }
+  }
+  std::fill(nodes_.passive.awake.begin(), nodes_.passive.awake.end(), Number(1));
+}
+
+template <class T, class Number>
+bool NodeKernel<T, Number>::is_near_start(std::size_t lane, double bound) const {
+  for (std::size_t node = 0; node < program_.moving; ++node) {
+    if (!(std::fabs(nodes_.position(node, lane) - program_.position[node]) < bound)) {
+      return false;
+    }
+  }
+  return true;
+}
+
+template NodeLayout layout_in_rows<float>(std::span<const std::uint32_t>, std::size_t, std::size_t,
+                                          std::size_t);
+template NodeLayout layout_in_rows<double>(std::span<const std::uint32_t>, std::size_t, std::size_t,
+                                           std::size_t);
+template NodeLayout layout_in_rows<float>(const Program&, std::size_t, std::size_t);
+template NodeLayout layout_in_rows<double>(const Program&, std::size_t, std::size_t);
+template struct Nodes<float>;
+template struct Nodes<double>;
+template class NodeKernel<float>;
+template class NodeKernel<double>;
+template class NodeKernel<double, float>;
+
+}  // namespace ressort

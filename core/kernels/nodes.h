@@ -1,0 +1,86 @@
+// core/kernels: the store of a kernel that keeps a position and a velocity of every node, in
+// whatever order its loops need them.
+#pragma once
+
+#include "core/kernels/kernel.h"
+#include "core/kernels/passive.h"
+#include "core/kernels/taps.h"
+
+namespace ressort {
+
+// Where positions are among a kernel's numbers: node[i] + lane[j]. What else there is of a node
+// follows, `row` numbers further each: its velocity, then its force and the kernel's own.
+struct NodeLayout {
+  static constexpr std::uint32_t nowhere = 0xffffffffu;
+
+  std::vector<std::uint32_t> node;  // [node], or nowhere: it is at 0 and stays there
+  std::vector<std::uint32_t> lane;  // [lane]
+  std::size_t row = 0;              // numbers
+  std::size_t rows = 3;
+  std::size_t size = 0;  // of all numbers
+  std::size_t rest = 0;  // which row holds what a position is more than one number; 0: none does
+};
+
+// One row after the other: [slot][lane], `slot` being where each node is in a row of `slots`.
+template <class T>
+NodeLayout layout_in_rows(std::span<const std::uint32_t> slot, std::size_t slots, std::size_t width,
+                          std::size_t rows);
+
+// The same, node by node.
+template <class T>
+NodeLayout layout_in_rows(const Program& program, std::size_t width, std::size_t rows);
+
+template <class T>
+struct Nodes {
+  Nodes(const Program& program, NodeLayout layout);
+
+  std::size_t width() const { return layout.lane.size(); }
+  T* row(std::size_t i) { return numbers.data() + i * layout.row; }
+  void fill_row(std::size_t i, T value) { std::fill_n(row(i), layout.row, value); }
+
+  double position(std::size_t node, std::size_t lane) const;
+  double velocity(std::size_t node, std::size_t lane) const;
+  void put(std::size_t node, std::size_t lane, double x, double v);
+  // A lane's nodes, with 0 in all other rows.
+  void set(std::size_t lane, const double* x, const double* v);
+
+  NodeLayout layout;
+  Aligned<T> numbers;
+  std::vector<Corners<T>> corners;  // [tap][lane] in the last sample
+  PassiveRoom<T> passive;
+
+ private:
+  bool is_somewhere(std::size_t node) const { return layout.node[node] != NodeLayout::nowhere; }
+  std::size_t at(std::size_t node, std::size_t lane) const {
+    return layout.node[node] + layout.lane[lane];
+  }
+};
+
+// What such a kernel says of its nodes. T is what it is driven by, Number what it computes with.
+template <class T, class Number = T>
+class NodeKernel : public Kernel<T> {
+ public:
+  void set_state(std::size_t lane, const double* x, const double* v) final;
+  bool save(std::size_t lane, double* x, double* v) const final;
+  bool read(std::span<const std::uint32_t> nodes, T* x, T* v) const final;
+  bool is_near_start(std::size_t lane, double bound) const final;
+
+ protected:
+  NodeKernel(const Program& program, NodeLayout layout)
+      : Kernel<T>(program, layout.lane.size()),
+        program_(program),
+        nodes_(program, std::move(layout)) {}
+  // All lanes to where the model starts: the last thing that a constructor does.
+  void reset_lanes();
+  // What write_nodes() does where a kernel has it, but for the forces that links exert then.
+  void write(std::span<const std::uint32_t> nodes, const T* x, const T* v);
+
+  const Program& program_;
+  Nodes<Number> nodes_;
+
+ private:
+  // Whatever a lane has besides its nodes, as at the start.
+  virtual void clear(std::size_t) {}
+};
+
+}  // namespace ressort
