@@ -27,7 +27,8 @@ ParameterBox at(double value) {
 
 TEST_CASE("without a preset a parameter may be turned to four times its value", "[stages]") {
   const Network network = network_of(
-      "@a param 0.3\n@b param -2\n@c param 0\n@M param 8\n@o osc M a b c 0.\n@out1 posOutput @o\n");
+      "@a param 0.3\n@b param -2\n@c param 0\n@M param 8\n@g ground 0.\n@o osc M a b 0. 0.\n@s "
+      "spring @g @o c\n@out1 posOutput @o\n");
   const auto asked = asked_ranges(network, Preset{}, false);
   const auto range = [&](std::size_t i) { return std::pair(asked[i].minimum, asked[i].maximum); };
   CHECK(range(0) == std::pair(0.0, 1.2));
