@@ -17,8 +17,8 @@
 #include "app/text.h"
 #include "core/analysis/stability.h"
 #include "core/compile/compile.h"
+#include "core/compile/schemes.h"
 #include "core/model/language/print.h"
-#include "core/model/topology.h"
 
 namespace ressort {
 namespace {
@@ -66,10 +66,8 @@ Proved prove(const Scene& scene, const Compiled& compiled, const Progress& progr
     as_written.highest.push_back(info.value);
   }
   // What is computed passively is stable whatever its numbers are.
-  Stability stability(all_plain(compiled.schemes)
-                          ? scene.network
-                          : always_felt(expand_macros(scene.network), compiled.schemes),
-                      1.0, Stability::most_exact_masses, progress);
+  Stability stability(without_passive(scene.network, compiled.schemes), 1.0,
+                      Stability::most_exact_masses, progress);
   progress.stage("proving that it is stable in all ranges");
   Proved proved{.certificate = stability.certify(box),
                 .stiffness_factor = stability.stiffness_factor(box)};

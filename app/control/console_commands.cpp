@@ -345,10 +345,10 @@ Result<Done> command::explain(ConsoleContext& console, Words) {
       {"lowest mode", instrument.mode
                           ? fixed(instrument.mode->frequency_hz, 2) + " Hz as it is written"
                           : "none that keys could tune"},
-      {"keys", instrument.is_tuned ? "set the pitch" + transposition(instrument.transpose) +
-                                         ", up to " + fixed(instrument.highest_frequency_hz, 1) +
-                                         " Hz; higher ones are folded down by octaves"
-                                   : "all sound as the model is written"},
+      {"keys", instrument.mode ? "set the pitch" + transposition(instrument.transpose) +
+                                     ", up to " + fixed(instrument.highest_frequency_hz, 1) +
+                                     " Hz; higher ones are folded down by octaves"
+                               : "all sound as the model is written"},
       {"stability", describe_stability(instrument)},
   };
   for (const InputInfo& input : instrument.inputs) {

@@ -311,8 +311,7 @@ std::string Session::calm(std::uint32_t link) {
   }
   passive.push_back(link);
   source_->may_gain = can_be_relieved(current_->plan);
-  const Network whole =
-      source_->network.macros.empty() ? source_->network : expand_macros(source_->network);
+  const Network whole = expand_macros(source_->network);
   const Link& creator = whole.links[link];
   return "the " + std::string(family_name(facts_of(creator.law).family)) + " '" +
          creator.name.text() + "' (" +

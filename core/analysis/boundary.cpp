@@ -17,10 +17,6 @@ bool is_usable(const Weights& weights) {
   }) && std::all_of(weights.terms.begin(), weights.terms.end(), finite);
 }
 
-}  // namespace
-
-namespace {
-
 // Calls `use(term, its bound)`.
 template <class Use>
 void each_bound(const Assembly& assembly, const Weights& weights, Use&& use) {

@@ -187,6 +187,12 @@ bool lowest_pair(const SparseMatrix& lower, double stiffest, const Progress& pro
 
 }  // namespace
 
+double scheme_frequency_hz(double stiffness, double damping, double rate_hz) {
+  const double z = std::clamp(damping, 0.0, 0.999);
+  const double cosine = (2.0 - stiffness - z) / (2.0 * std::sqrt(1.0 - z));
+  return rate_hz / (2.0 * std::numbers::pi) * std::acos(std::clamp(cosine, -1.0, 1.0));
+}
+
 std::optional<Mode> lowest_mode(const Network& network, std::span<const double> parameters,
                                 const Progress& progress) {
   const Body body(network, parameters);
@@ -202,10 +208,7 @@ std::optional<Mode> lowest_mode(const Network& network, std::span<const double> 
     return std::nullopt;
   }
   mode.damping = body.damping(shape);
-  const double z = std::clamp(mode.damping, 0.0, 0.999);
-  const double cosine = (2.0 - mode.stiffness - z) / (2.0 * std::sqrt(1.0 - z));
-  mode.frequency_hz = Network::reference_rate_hz / (2.0 * std::numbers::pi) *
-                      std::acos(std::clamp(cosine, -1.0, 1.0));
+  mode.frequency_hz = scheme_frequency_hz(mode.stiffness, mode.damping, Network::reference_rate_hz);
   return mode;
 }
 

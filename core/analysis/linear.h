@@ -16,6 +16,10 @@ struct Mode {
   double frequency_hz = 0.0;  // as the explicit scheme sounds it at 44 100 Hz
 };
 
+// At what frequency the explicit scheme sounds a mode of k/m and z/m per sample at rate_hz:
+// cos(theta) = (2 - k - z) / (2 sqrt(1 - z)). [any thread]
+double scheme_frequency_hz(double stiffness, double damping, double rate_hz);
+
 // The slowest mode that is no rigid motion, with springs, dampers and oscillators only: plucks,
 // bows and contacts are open, position inputs are held. Its damping is the modal share of Z.
 // Nothing where no mass is sprung, and where it would take too long: where masses hang together at

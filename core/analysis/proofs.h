@@ -48,7 +48,7 @@ class Proofs {
   Course course_along(std::size_t parameter) const;
   SafeRange range_around(const WeightLine& line, double anchor);
 
-  // blame.cpp
+  // culprit.cpp
   std::optional<Suspect> nonsense(std::span<const Range> arguments) const;
   Suspect feeder(std::span<const Range> arguments) const;
   Suspect weakest(const Weights& weights, std::span<const Range> arguments,

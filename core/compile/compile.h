@@ -5,16 +5,13 @@
 #include <limits>
 #include <memory>
 #include <optional>
-#include <string>
 #include <vector>
 
-#include "core/analysis/interval.h"
-#include "core/analysis/linear.h"
+#include "core/compile/instrument.h"
+#include "core/compile/machine.h"
 #include "core/compile/plan.h"
-#include "core/compile/schemes.h"
 #include "core/compile/stability_check.h"
 #include "core/engine/engine.h"
-#include "core/gesture.h"
 #include "core/model/network.h"
 #include "core/model/preset/preset.h"
 #include "core/progress.h"
@@ -46,41 +43,6 @@ struct CompileOptions {
   std::uint64_t most_bytes = std::numeric_limits<std::uint64_t>::max();  // that the engine may take
 };
 
-struct InputInfo {
-  int number = 1;
-  bool is_force = false;
-  std::vector<Gesture> gestures;  // that the preset has controls for
-  std::string attached_to;        // the mass that it moves or pushes
-  bool knows(Gesture gesture) const {
-    return std::find(gestures.begin(), gestures.end(), gesture) != gestures.end();
-  }
-};
-
-// An OSC name that the preset gives to one of its controls.
-struct CustomInfo {
-  std::string address;
-  int row = 0;  // Event::index of EventKind::custom
-};
-
-// What a running engine is called from outside; indices are those of Event.
-struct Instrument {
-  std::vector<ParameterInfo> parameters;  // [parameter]
-  std::vector<InputInfo> inputs;
-  std::vector<CustomInfo> custom;
-  int outputs = 0;
-  int audio_inputs = 0;  // the highest audio channel that a control listens to
-  int voices = 1;
-  double gain = 1.0;       // output per position unit: the preset's, or what was found
-  std::size_t masses = 0;  // that move
-  std::size_t links = 0;
-  bool is_tuned = false;              // keys set the pitch
-  int transpose = 0;                  // semitones from a key to its pitch
-  std::optional<Mode> mode;           // the lowest
-  double highest_frequency_hz = 0.0;  // of a key, before it is folded down; 0: not tuned
-  double stiffness_margin = 0.0;      // every stiffness may grow by this factor; below 1: unproved
-  Verdict verdict = Verdict::stable;  // of what is always felt, in all ranges
-};
-
 struct Compiled {
   std::unique_ptr<Engine> engine;
   Instrument instrument;
@@ -89,12 +51,9 @@ struct Compiled {
   std::vector<LinkScheme> schemes;  // [link] of the network without macros
 };
 
-// Where the preset lets the parameters be turned to; those that it does not name stay. As it says,
-// not as it was narrowed.
-ParameterBox preset_box(const std::vector<ParameterInfo>& parameters, const Preset& preset);
-
-// Fails, with the preset's line, where the preset does not fit (see misfits()); and with the
-// model's line where an argument of the model is no finite number as it starts.
+// One stage after the other, each a function from what is known to what it finds. Fails, with the
+// preset's line, where the preset does not fit (see misfits()); with the model's line where an
+// argument of the model is no finite number as it starts; and where memory is short.
 // [any thread but audio]
 Result<Compiled> compile(const Network& network, const Preset& preset,
                          const CompileOptions& options);

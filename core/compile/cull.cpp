@@ -2,8 +2,6 @@
 
 #include <algorithm>
 
-#include "core/compile/groups.h"
-
 namespace ressort {
 namespace {
 
@@ -57,18 +55,8 @@ class Culler {
         groups_.join(link.a, link.b);
       }
     });
-    std::vector<bool> is_joined(network_.masses.size(), false);  // [first node] of a macro
-    for (std::uint32_t i = 0; i < network_.masses.size(); ++i) {
-      if (network_.masses[i].kind == MassKind::point) {
-        const Tap& tap = network_.taps[network_.masses[i].tap];
-        groups_.join(i, tap.first);
-        progress_.spend(is_joined[tap.first] ? 1 : tap.length * tap.width);
-        for (std::uint32_t k = 1; !is_joined[tap.first] && k < tap.length * tap.width; ++k) {
-          groups_.join(i, tap.first + k);
-        }
-        is_joined[tap.first] = true;
-      }
-    }
+    join_places(
+        network_, groups_, progress_, [](std::uint32_t) { return true; }, [](std::uint32_t) {});
   }
 
   // Who hears a force at a ground or at a hand hears what pulls there.

@@ -2,6 +2,8 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
+#include <numeric>
 #include <string>
 #include <vector>
 
@@ -9,6 +11,46 @@
 #include "core/progress.h"
 
 namespace ressort {
+
+// Who hangs together, by union-find.
+class Groups {
+ public:
+  explicit Groups(std::size_t count) : parent_(count) {
+    std::iota(parent_.begin(), parent_.end(), 0u);
+  }
+  // Who stands for the whole group.
+  std::uint32_t find(std::uint32_t i) {
+    while (parent_[i] != i) {
+      i = parent_[i] = parent_[parent_[i]];
+    }
+    return i;
+  }
+  void join(std::uint32_t a, std::uint32_t b) { parent_[find(a)] = find(b); }
+
+ private:
+  std::vector<std::uint32_t> parent_;
+};
+
+// Joins every place on a macro that counts with all of the macro's nodes; `meet` hears of each
+// once.
+template <class Counts, class Meet>
+void join_places(const Network& network, Groups& groups, const Progress& progress, Counts&& counts,
+                 Meet&& meet) {
+  std::vector<bool> is_joined(network.masses.size(), false);  // [first node] of a macro
+  for (std::uint32_t i = 0; i < network.masses.size(); ++i) {
+    if (network.masses[i].kind != MassKind::point || !counts(i)) {
+      continue;
+    }
+    const Tap& tap = network.taps[network.masses[i].tap];
+    groups.join(i, tap.first);
+    progress.spend(is_joined[tap.first] ? 1 : tap.length * tap.width);
+    for (std::uint32_t k = 0; !is_joined[tap.first] && k < tap.length * tap.width; ++k) {
+      meet(tap.first + k);
+      groups.join(i, tap.first + k);
+    }
+    is_joined[tap.first] = true;
+  }
+}
 
 // What can be left out. Grounds and position inputs pass nothing on, so that what hangs together
 // is what moves and is linked. Of that, whatever no output can hear is left out, and whatever

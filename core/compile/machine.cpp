@@ -6,8 +6,6 @@
 #include <numeric>
 #include <tuple>
 
-#include "core/compile/cull.h"
-#include "core/compile/groups.h"
 #include "core/model/topology.h"
 
 namespace ressort {
@@ -27,7 +25,7 @@ class ProgramMaker {
                std::span<const LinkScheme> schemes)
       : network_(network), share_(share), schemes_(schemes) {
     program_.rate_hz = rate_hz;
-    program_.rate_ratio = rescale ? Network::reference_rate_hz / rate_hz : 1.0;
+    program_.rate_ratio = rate_ratio_of(rate_hz, rescale);
     program_.parameters = parameter_values(network);
     program_.depending.resize(network.parameters.size());
   }
@@ -194,9 +192,9 @@ class ProgramMaker {
 // together, unless somebody listens to the ground.
 class Divider {
  public:
-  Divider(const Network& network, const Progress& progress)
+  Divider(const Network& network, const Culled& culled, const Progress& progress)
       : network_(network),
-        culled_(cull(network, progress)),
+        culled_(culled),
         groups_(network.masses.size()),
         binds_(network.masses.size()) {
     for (std::size_t i = 0; i < binds_.size(); ++i) {
@@ -211,19 +209,9 @@ class Divider {
         groups_.join(link.a, link.b);
       }
     }
-    std::vector<bool> is_joined(binds_.size(), false);  // [first node] of a macro
-    for (std::uint32_t i = 0; i < binds_.size(); ++i) {
-      if (binds_[i] && network.masses[i].kind == MassKind::point) {
-        const Tap& tap = network.taps[network.masses[i].tap];
-        groups_.join(i, tap.first);
-        progress.spend(is_joined[tap.first] ? 1 : tap.length * tap.width);
-        for (std::uint32_t k = 0; !is_joined[tap.first] && k < tap.length * tap.width; ++k) {
-          binds_[tap.first + k] = true;
-          groups_.join(i, tap.first + k);
-        }
-        is_joined[tap.first] = true;
-      }
-    }
+    join_places(
+        network, groups_, progress, [&](std::uint32_t place) { return binds_[place]; },
+        [&](std::uint32_t node) { binds_[node] = true; });
   }
 
   std::vector<Share> divide() {
@@ -289,18 +277,21 @@ class Divider {
   }
 
   const Network& network_;
-  Culled culled_;
+  const Culled& culled_;
   Groups groups_;
   std::vector<bool> binds_;          // [mass]
   std::vector<std::uint32_t> part_;  // [root]
   std::size_t parts_ = 0;
 };
 
-Machine machine_of(const Network& network, double rate_hz, bool rescale,
-                   std::span<const LinkScheme> schemes, const Progress& progress) {
+}  // namespace
+
+Machine tabulate(const Network& network, const Culled& culled, std::span<const LinkScheme> schemes,
+                 std::span<const double> start, double rate_hz, bool rescale,
+                 const Progress& progress) {
   Machine machine{.rate_hz = rate_hz,
-                  .rate_ratio = rescale ? Network::reference_rate_hz / rate_hz : 1.0,
-                  .parameters = parameter_values(network),
+                  .rate_ratio = rate_ratio_of(rate_hz, rescale),
+                  .parameters = {start.begin(), start.end()},
                   .channels = static_cast<std::uint32_t>(output_count(network))};
   for (const Input& input : network.inputs) {
     machine.inputs.push_back(
@@ -308,36 +299,27 @@ Machine machine_of(const Network& network, double rate_hz, bool rescale,
          .is_force = input.is_force,
          .position = input.is_force ? 0.0 : network.masses[input.mass].position});
   }
-  for (const Share& share : Divider(network, progress).divide()) {
+  for (const Share& share : Divider(network, culled, progress).divide()) {
     progress.spend(16 * (share.masses.size() + share.links.size()));
     machine.parts.push_back(ProgramMaker(network, share, rate_hz, rescale, schemes).make());
   }
   return machine;
 }
 
-Program program_of(const Network& network, double rate_hz, bool rescale,
-                   std::span<const LinkScheme> schemes) {
-  Share everything;
-  everything.masses.resize(network.masses.size());
-  everything.links.resize(network.links.size());
-  std::iota(everything.masses.begin(), everything.masses.end(), 0u);
-  std::iota(everything.links.begin(), everything.links.end(), 0u);
-  return ProgramMaker(network, everything, rate_hz, rescale, schemes).make();
-}
-
-}  // namespace
-
-Machine make_machine(const Network& network, double rate_hz, bool rescale,
-                     std::span<const LinkScheme> schemes, const Progress& progress) {
-  return network.macros.empty()
-             ? machine_of(network, rate_hz, rescale, schemes, progress)
-             : machine_of(expand_macros(network), rate_hz, rescale, {}, progress);
+Machine make_machine(const Network& network, double rate_hz, bool rescale) {
+  const Network whole = expand_macros(network);
+  return tabulate(whole, cull(whole), {}, parameter_values(whole), rate_hz, rescale);
 }
 
 Program make_program(const Network& network, double rate_hz, bool rescale,
                      std::span<const LinkScheme> schemes) {
-  return network.macros.empty() ? program_of(network, rate_hz, rescale, schemes)
-                                : program_of(expand_macros(network), rate_hz, rescale, {});
+  const Network whole = expand_macros(network);
+  Share everything;
+  everything.masses.resize(whole.masses.size());
+  everything.links.resize(whole.links.size());
+  std::iota(everything.masses.begin(), everything.masses.end(), 0u);
+  std::iota(everything.links.begin(), everything.links.end(), 0u);
+  return ProgramMaker(whole, everything, rate_hz, rescale, schemes).make();
 }
 
 }  // namespace ressort

@@ -177,9 +177,9 @@ class Chooser {
 
 }  // namespace
 
-Plan make_plan(Machine& machine, const Workload& load, std::optional<Method> method,
-               std::uint32_t most_modes, const Budget& budget, const Progress& progress) {
-  Plan plan;
+Planned make_plan(Machine machine, const Workload& load, std::optional<Method> method,
+                  std::uint32_t most_modes, const Budget& budget, const Progress& progress) {
+  std::vector<Part> parts;
   for (Program& program : machine.parts) {
     Chooser chooser(program, load, most_modes, budget, progress);
     Part part = load.is_compensated ? chooser.compensate()
@@ -191,21 +191,25 @@ Plan make_plan(Machine& machine, const Workload& load, std::optional<Method> met
       part.reason += ", " + description(program);
     }
     if (part.masses > 0) {
-      plan.parts.push_back(std::move(part));
+      parts.push_back(std::move(part));
     }
   }
-  return plan;
+  return {std::move(machine), std::move(parts)};
 }
 
-std::string describe(const Plan& plan) {
+std::string describe(const std::vector<Part>& parts) {
   std::string text;
-  for (const Part& part : plan.parts) {
+  for (const Part& part : parts) {
     text += std::string(method_name(part.method)) + ": " + count_of(part.masses, "mass", "masses") +
             ", " + count_of(part.links, "link", "links") + " (" + part.reason +
             (part.measured_ns > 0.0 ? "; measured at rest: " + in_ns(part.measured_ns) : "") +
             ")\n";
   }
-  text = text.empty() ? "nothing moves\n" : text;
+  return text.empty() ? "nothing moves\n" : text;
+}
+
+std::string describe(const Plan& plan) {
+  std::string text = describe(plan.parts);
   for (const std::string& note : plan.notes) {
     text += note + "\n";
   }

@@ -36,16 +36,23 @@ struct Plan {
   std::vector<std::string> notes;  // on what is not computed as it is written, or not at all
 };
 
+// A machine in the forms that its plan says.
+struct Planned {
+  Machine machine;
+  std::vector<Part> parts;
+};
+
 // Gives every part of the machine the form that the cost model says is the cheapest at its worst,
 // or the one of `method` where a part has it; divided among load.executor where that pays. With a
 // budget for pitch or decay, the cheapest of the physical methods where the published scheme misses
 // it. O(elements), and the eigenvectors of a part of up to `most_modes` masses for which the modal
 // form may pay. [any thread but audio]
-Plan make_plan(Machine& machine, const Workload& load, std::optional<Method> method = {},
-               std::uint32_t most_modes = patient_modes, const Budget& budget = {},
-               const Progress& progress = {});
+Planned make_plan(Machine machine, const Workload& load, std::optional<Method> method = {},
+                  std::uint32_t most_modes = patient_modes, const Budget& budget = {},
+                  const Progress& progress = {});
 
 // One line a part, and one a note.
+std::string describe(const std::vector<Part>& parts);
 std::string describe(const Plan& plan);
 
 }  // namespace ressort

@@ -8,8 +8,10 @@
 #include <optional>
 #include <string_view>
 
+#include "core/analysis/assembly.h"
 #include "core/analysis/places.h"
 #include "core/laws/laws.h"
+#include "core/model/topology.h"
 
 namespace ressort {
 namespace {
@@ -45,10 +47,8 @@ class Judge {
         is_physical_(is_physical),
         r_(conditions.rate_ratio),
         stiffer_(r_ * r_ * conditions.stiffness_factor),
-        grippier_(r_ * std::sqrt(conditions.stiffness_factor)) {
-    for (const Formula& formula : network.arguments) {
-      ranges_.push_back(formula_range(formula, conditions.box));
-    }
+        grippier_(r_ * std::sqrt(conditions.stiffness_factor)),
+        ranges_(argument_ranges(network, conditions.box)) {
     find_reach();
   }
 
@@ -84,8 +84,7 @@ class Judge {
   LawNumbers ends(const Link& link, double Range::*end) const {
     LawNumbers values{};
     for (std::size_t i = 0; i < values.size(); ++i) {
-      const ArgumentId id = link.arguments[i];
-      values[i] = id == no_argument ? 0.0 : std::max(0.0, ranges_[id].*end);
+      values[i] = std::max(0.0, range_at(ranges_, link.arguments[i]).*end);
     }
     return values;
   }
@@ -307,23 +306,21 @@ Schemes choose_schemes(const Network& network, const Preset& preset, const Condi
   return schemes;
 }
 
-bool all_plain(const std::vector<LinkScheme>& links) {
-  return std::all_of(links.begin(), links.end(),
-                     [](const LinkScheme& link) { return link.scheme == Scheme::plain; });
-}
-
-Network always_felt(const Network& network, const std::vector<LinkScheme>& links) {
-  Network felt = network;
-  felt.links.clear();
-  for (std::size_t i = 0; i < network.links.size(); ++i) {
-    const LawFacts& law = facts_of(network.links[i].law);
+Network without_passive(const Network& network, std::span<const LinkScheme> schemes) {
+  const auto is_plain = [](const LinkScheme& link) { return link.scheme == Scheme::plain; };
+  if (std::all_of(schemes.begin(), schemes.end(), is_plain)) {
+    return network;
+  }
+  Network felt = expand_macros(network);
+  std::vector<Link> links;
+  for (std::size_t i = 0; i < felt.links.size(); ++i) {
+    const LawFacts& law = facts_of(felt.links[i].law);
     // Quadratic and cubic springs count with what they are at rest, by their own K and Z.
-    const bool counts = i >= links.size() || links[i].scheme == Scheme::plain ||
-                        (law.contains_spring && law.is_curved);
-    if (counts) {
-      felt.links.push_back(network.links[i]);
+    if (i >= schemes.size() || is_plain(schemes[i]) || (law.contains_spring && law.is_curved)) {
+      links.push_back(std::move(felt.links[i]));
     }
   }
+  felt.links = std::move(links);
   return felt;
 }
 

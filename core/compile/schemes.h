@@ -1,6 +1,7 @@
 // core/compile: which links are computed by a scheme that cannot gain energy, and why.
 #pragma once
 
+#include <span>
 #include <string>
 #include <vector>
 
@@ -41,10 +42,9 @@ Schemes choose_schemes(const Network& network, const Preset& preset, const Condi
                        const Budget& budget, const std::vector<std::uint32_t>& forced,
                        const Progress& progress = {});
 
-bool all_plain(const std::vector<LinkScheme>& links);
-
 // The network without the links that their scheme keeps stable whatever their numbers are: what
-// remains is what a proof of stability has to be about. Springs keep their K and Z.
-Network always_felt(const Network& network, const std::vector<LinkScheme>& links);
+// remains is what a proof of stability has to be about. Springs keep their K and Z. Macros are
+// written out only where a link goes. O(n). [any thread but audio]
+Network without_passive(const Network& network, std::span<const LinkScheme> schemes);
 
 }  // namespace ressort

@@ -2,9 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
-#include <initializer_list>
 
+#include "core/compile/schemes.h"
 #include "core/model/language/expression.h"
+#include "core/model/preset/fit.h"
 
 namespace ressort {
 namespace {
@@ -12,6 +13,7 @@ namespace {
 constexpr double infinity = std::numeric_limits<double>::infinity();
 constexpr std::size_t most_quick_work = 10'000'000;  // parameters times links
 constexpr double anywhere = 1e12;  // what counts as no limit where one has to reckon with it
+constexpr double to_spare = 0.98;  // of the stiffness that keys may use: higher, modes hardly decay
 
 double finite(double value) {
   return std::clamp(value, -anywhere, anywhere);
@@ -19,17 +21,17 @@ double finite(double value) {
 
 class StabilityChecker {
  public:
-  StabilityChecker(const StabilityRequest& request, std::vector<ParameterInfo>& parameters)
+  explicit StabilityChecker(const StabilityRequest& request)
       : request_(request),
-        parameters_(parameters),
+        start_(request.start.begin(), request.start.end()),
         stability_(always_felt(request.expanded), request.rate_ratio, most_quick_masses,
                    request.progress) {
-    result_.is_together = parameters.size() * stability_.size() > most_quick_work;
+    result_.parameters = request.parameters;
+    result_.is_together = start_.size() * stability_.size() > most_quick_work;
   }
 
   StabilityCheck run() {
-    result_.limits.assign(parameters_.size(), {-infinity, infinity});
-    find_start();
+    result_.limits.resize(start_.size());
     box_ = {start_, start_};
     result_.verdict = prove_start();
     if (result_.verdict != Verdict::stable) {
@@ -43,7 +45,7 @@ class StabilityChecker {
     widen([&](std::size_t i) { return place_[i].has_value() && !is_audio(i); });
     widen([&](std::size_t i) { return is_audio(i); });
     widen([&](std::size_t i) { return !place_[i] && !is_audio(i); });
-    for (std::size_t i = 0; i < parameters_.size(); ++i) {
+    for (std::size_t i = 0; i < start_.size(); ++i) {
       settle(i);
     }
     return std::move(result_);
@@ -51,17 +53,6 @@ class StabilityChecker {
 
  private:
   bool is_audio(std::size_t i) const { return request_.expanded.parameters[i].audio_input > 0; }
-
-  void find_start() {
-    for (const ParameterInfo& info : parameters_) {
-      start_.push_back(info.value);
-      for (const Setting& setting : request_.settings) {
-        if (request_.bare && setting.parameter == info.name) {
-          start_.back() = std::clamp(setting.value, info.minimum, info.maximum);
-        }
-      }
-    }
-  }
 
   Verdict prove_start() {
     const Verdict verdict = stability_.prove(box_);
@@ -87,9 +78,9 @@ class StabilityChecker {
   // Where the parameters are to be turned to, and which of that the preset says.
   void ask() {
     asked_ = {start_, start_};
-    place_.resize(parameters_.size());
-    for (std::size_t i = 0; i < parameters_.size(); ++i) {
-      const ParameterInfo& info = parameters_[i];
+    place_.resize(start_.size());
+    for (std::size_t i = 0; i < start_.size(); ++i) {
+      const ParameterInfo& info = request_.parameters[i];
       if (is_audio(i)) {
         reach_to(i, -anywhere);
         reach_to(i, anywhere);
@@ -126,7 +117,7 @@ class StabilityChecker {
   void widen(Wanted&& wanted) {
     std::vector<std::size_t> which;
     ParameterBox wide = box_;
-    for (std::size_t i = 0; i < parameters_.size(); ++i) {
+    for (std::size_t i = 0; i < start_.size(); ++i) {
       if (wanted(i)) {
         which.push_back(i);
         wide.lowest[i] = asked_.lowest[i];
@@ -191,9 +182,9 @@ class StabilityChecker {
                            : std::min(start, inside_limit(value, false));
   }
 
-  // Writes back what one parameter came to.
+  // What one parameter came to.
   void settle(std::size_t i) {
-    ParameterInfo& info = parameters_[i];
+    ParameterInfo& info = result_.parameters[i];
     if (is_audio(i) && box_.lowest[i] == box_.highest[i]) {
       return;  // nothing is proved of it; sound that cannot move would be of no use
     }
@@ -205,7 +196,7 @@ class StabilityChecker {
     }
     info.is_raised = box_.lowest[i] > asked_.lowest[i];
     info.is_lowered = box_.highest[i] < asked_.highest[i];
-    Range& limit = result_.limits[i];
+    Limits& limit = result_.limits[i];
     // Where nothing limits, the range is a matter of taste.
     if (info.is_raised || (!request_.bare && std::isfinite(info.safe.lowest))) {
       limit.lowest = box_.lowest[i];
@@ -232,111 +223,45 @@ class StabilityChecker {
   }
 
   const StabilityRequest& request_;
-  std::vector<ParameterInfo>& parameters_;
+  std::vector<double> start_;
   Stability stability_;
   StabilityCheck result_;
-  std::vector<double> start_;
   ParameterBox asked_;
   ParameterBox box_;                                  // proved
   std::vector<std::optional<SourceLocation>> place_;  // in the preset, of what it has ranges for
 };
 
-// Looks at the arguments of one element after the other, for no_number().
-class NumberCheck {
+class MarginFinder {
  public:
-  NumberCheck(const Network& network, std::span<const double> parameters, double rate_ratio)
-      : network_(network), parameters_(parameters) {
-    const double grown = std::max(1.0, rate_ratio * rate_ratio);
-    for (const Formula& formula : network.arguments) {
-      const double value = evaluate(formula, parameters);
-      const bool is_live = std::any_of(formula.begin(), formula.end(), [&](const Step& step) {
-        return step.op == Op::parameter && network.parameters[step.index].audio_input > 0;
-      });
-      is_wrong_.push_back(!is_live && !std::isfinite(grown * value));
-      is_nothing_.push_back(!is_live && !std::isfinite(1.0 / value));
+  MarginFinder(const Network& network, double rate_ratio, const Progress& progress)
+      : network_(network), rate_ratio_(rate_ratio), progress_(progress) {
+    if (network.masses.size() <= most_quick_masses) {
+      stability_.emplace(network, rate_ratio, most_quick_masses, progress);
     }
   }
 
-  std::optional<Error> run() {
-    for (const Mass& mass : network_.masses) {
-      look(mass, {{"mass", mass.mass},
-                  {"stiffness", mass.stiffness},
-                  {"damping", mass.damping},
-                  {"gravity", mass.gravity}});
-      if (mass.kind == MassKind::point) {
-        const Tap& tap = network_.taps[mass.tap];
-        look(mass, {{"place", tap.u}, {"place", tap.v}});
-      }
-    }
-    for (const Macro& macro : network_.macros) {
-      look(macro, {{"mass", macro.mass},
-                   {"stiffness", macro.stiffness},
-                   {"stiffness", macro.second_stiffness},
-                   {"damping", macro.damping},
-                   {"damping", macro.air_damping}});
-    }
-    for (const Link& link : network_.links) {
-      for (const ArgumentId argument : link.arguments) {
-        look(link, {{"argument", argument}});
-      }
-    }
-    return std::move(error_);
+  struct Factors {
+    double whole = 0.0;
+    double keys = 0.0;
+  };
+  Factors at(const ParameterBox& box) {
+    progress_.spend(4 * network_.links.size());
+    const double bound = highest_stiffness_factor(network_, box, rate_ratio_);
+    const double whole = bound >= most_bounded || !stability_
+                             ? bound
+                             : std::min(most_bounded, stability_->stiffness_factor(box));
+    return {whole,
+            std::max(bound, to_spare * whole)};  // the bound has something to spare by itself
   }
 
  private:
-  struct Asked {
-    std::string_view quantity;
-    ArgumentId argument;
-  };
-
-  template <class Element>
-  void look(const Element& element, std::initializer_list<Asked> all) {
-    for (const Asked& asked : all) {
-      if (error_ || asked.argument == no_argument) {
-        continue;
-      }
-      const bool is_wrong = is_wrong_[asked.argument];
-      if (is_wrong || (asked.quantity == "mass" && is_nothing_[asked.argument])) {
-        error_ = {told(asked, std::string(element.name),
-                       is_wrong ? " is no finite number" : " is not above 0"),
-                  element.location.line, element.location.column};
-      }
-    }
-  }
-
-  // "the argument 1/P of 'r' is no finite number where P = 0"
-  std::string told(const Asked& asked, const std::string& name, std::string_view what) const {
-    const Formula& formula = network_.arguments[asked.argument];
-    std::vector<std::string> names;
-    for (const Parameter& parameter : network_.parameters) {
-      names.push_back(parameter.name);
-    }
-    std::string values;
-    for (std::size_t i = 0; i < names.size(); ++i) {
-      if (std::any_of(formula.begin(), formula.end(), [&](const Step& step) {
-            return step.op == Op::parameter && step.index == i;
-          })) {
-        values += (values.empty() ? " where " : " and ") + names[i] + " = " +
-                  print_number(parameters_[i]);
-      }
-    }
-    return "the " + std::string(asked.quantity) + " " + print_expression(formula, names) +
-           (name.empty() ? "" : " of '" + name + "'") + std::string(what) + values;
-  }
-
   const Network& network_;
-  std::span<const double> parameters_;
-  std::vector<bool> is_wrong_;    // [argument]
-  std::vector<bool> is_nothing_;  // [argument] if it is a mass
-  std::optional<Error> error_;
+  double rate_ratio_;
+  const Progress& progress_;
+  std::optional<Stability> stability_;
 };
 
 }  // namespace
-
-std::optional<Error> no_number(const Network& network, std::span<const double> parameters,
-                               double rate_ratio) {
-  return NumberCheck(network, parameters, rate_ratio).run();
-}
 
 double inside_limit(double limit, bool is_upper) {
   constexpr double room = 1e-8;  // more than the proof leaves for rounding
@@ -349,9 +274,108 @@ double inside_limit(double limit, bool is_upper) {
   return value;
 }
 
-StabilityCheck check_stability(const StabilityRequest& request,
-                               std::vector<ParameterInfo>& parameters) {
-  return StabilityChecker(request, parameters).run();
+std::vector<ParameterInfo> asked_ranges(const Network& network, const Preset& preset, bool bare) {
+  std::vector<ParameterInfo> infos;
+  for (const Parameter& parameter : network.parameters) {
+    const double reach = bare                     ? std::numeric_limits<double>::max()
+                         : parameter.value == 0.0 ? 1.0
+                                                  : 4.0 * std::fabs(parameter.value);
+    const double least = bare || parameter.value < 0.0 ? -reach : 0.0;
+    infos.push_back({.name = parameter.name,
+                     .value = parameter.value,
+                     .minimum = least,
+                     .maximum = reach,
+                     .audio_input = parameter.audio_input});
+  }
+  if (bare) {
+    return infos;
+  }
+  for (const Mass& mass : network.masses) {
+    if (mass.mass != no_argument && network.arguments[mass.mass].size() == 1 &&
+        network.arguments[mass.mass][0].op == Op::parameter) {
+      ParameterInfo& info = infos[network.arguments[mass.mass][0].index];
+      info.minimum = 0.25 * info.value;  // nothing may become weightless
+    }
+  }
+  for (const ParameterSetting& setting : preset.parameters) {
+    ParameterInfo& info = infos[static_cast<std::size_t>(find_parameter(network, setting.name))];
+    info.value = setting.value;
+    info.minimum = setting.minimum;
+    info.maximum = setting.maximum;
+  }
+  return infos;
+}
+
+std::vector<double> start_values(const std::vector<ParameterInfo>& parameters,
+                                 const std::vector<Setting>& settings, bool bare) {
+  std::vector<double> values;
+  for (const ParameterInfo& info : parameters) {
+    values.push_back(info.value);
+    for (const Setting& setting : settings) {
+      if (bare && setting.parameter == info.name) {
+        values.back() = std::clamp(setting.value, info.minimum, info.maximum);
+      }
+    }
+  }
+  return values;
+}
+
+ParameterBox preset_box(const std::vector<ParameterInfo>& parameters, const Preset& preset) {
+  ParameterBox box;
+  for (const ParameterInfo& info : parameters) {
+    const auto given =
+        std::find_if(preset.parameters.begin(), preset.parameters.end(),
+                     [&](const ParameterSetting& setting) { return setting.name == info.name; });
+    const bool is_given = given != preset.parameters.end();
+    box.lowest.push_back(is_given ? given->minimum : info.value);
+    box.highest.push_back(is_given ? given->maximum : info.value);
+  }
+  return box;
+}
+
+StabilityCheck check_stability(const StabilityRequest& request) {
+  return StabilityChecker(request).run();
+}
+
+ParameterBox proved_box(const StabilityCheck& check, const Preset& preset) {
+  ParameterBox box = preset_box(check.parameters, preset);
+  for (std::size_t i = 0; i < check.parameters.size(); ++i) {
+    box.lowest[i] = std::max(box.lowest[i], check.parameters[i].minimum);
+    box.highest[i] = std::min(box.highest[i], check.parameters[i].maximum);
+  }
+  return box;
+}
+
+Margins find_margins(const Network& network, std::span<const LinkScheme> schemes,
+                     const ParameterBox& box, std::span<const Limits> limits, double rate_ratio,
+                     const Progress& progress) {
+  const Network felt = without_passive(network, schemes);
+  MarginFinder finder(felt, rate_ratio, progress);
+  const auto [whole, keys] = finder.at(box);
+  Margins margins{.whole = whole, .keys = keys, .home = {}, .away = {}};
+  ParameterBox far = box;
+  bool may_leave = false;
+  for (std::size_t i = 0; i < limits.size(); ++i) {
+    const auto [lowest, highest] = limits[i];
+    far.lowest[i] = std::isfinite(lowest) ? std::min(lowest, box.lowest[i]) : box.lowest[i];
+    far.highest[i] = std::isfinite(highest) ? std::max(highest, box.highest[i]) : box.highest[i];
+    Limits home;
+    home.lowest = far.lowest[i] < box.lowest[i] ? box.lowest[i] : home.lowest;
+    home.highest = far.highest[i] > box.highest[i] ? box.highest[i] : home.highest;
+    may_leave |= std::isfinite(home.lowest) || std::isfinite(home.highest);
+    margins.home.push_back(home);
+  }
+  constexpr int steps = 8;
+  for (int step = 1; may_leave && step <= steps; ++step) {
+    const double way = static_cast<double>(step) / steps;
+    ParameterBox between = box;
+    for (std::size_t i = 0; i < box.lowest.size(); ++i) {
+      between.lowest[i] = std::lerp(box.lowest[i], far.lowest[i], way);
+      between.highest[i] = std::lerp(box.highest[i], far.highest[i], way);
+    }
+    margins.away.push_back(finder.at(between).keys);
+  }
+  return margins;
 }
 
 }  // namespace ressort

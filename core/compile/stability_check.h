@@ -1,15 +1,16 @@
-// core/compile: what may be played. Proves the part of a network that is always felt, and narrows
-// the parameters' ranges to where it stays proved.
+// core/compile: what may be played. Proves the part of a network that is always felt, narrows the
+// parameters' ranges to where it stays proved, and finds what is left of the stiffness for keys.
 #pragma once
 
 #include <limits>
 #include <optional>
 #include <span>
 #include <string>
-#include <utility>
 #include <vector>
 
 #include "core/analysis/stability.h"
+#include "core/compile/machine.h"
+#include "core/engine/engine.h"
 #include "core/model/network.h"
 #include "core/model/preset/preset.h"
 #include "core/progress.h"
@@ -38,38 +39,64 @@ struct Setting {
   double value = 0.0;
 };
 
+// What the parameters may be turned to: the preset's ranges; without one, a generous one. The bare
+// network is research: there anything goes. Of a preset that fits and a network without macros.
+std::vector<ParameterInfo> asked_ranges(const Network& network, const Preset& preset, bool bare);
+
+// Where they start, the bare network's at the settings.
+std::vector<double> start_values(const std::vector<ParameterInfo>& parameters,
+                                 const std::vector<Setting>& settings, bool bare);
+
+// Where the preset lets the parameters be turned to; those that it does not name stay. As it says,
+// not as it was narrowed.
+ParameterBox preset_box(const std::vector<ParameterInfo>& parameters, const Preset& preset);
+
 struct StabilityRequest {
   const Network& written;   // to name what is to blame
   const Network& expanded;  // the same without macros
   const Preset& preset;
+  const std::vector<ParameterInfo>& parameters;  // as asked_ranges() says
+  std::span<const double> start;                 // [parameter] as start_values() says
   double rate_hz = 44100.0;
   double rate_ratio = 1.0;
-  bool bare = false;                     // parameters go where `reach` says and nowhere else
-  bool is_open = false;                  // whatever comes of it
-  const std::vector<Setting>& settings;  // of the bare network's start, instead of its own
-  const std::vector<Setting>& reach;     // values that parameters will be given later
+  bool bare = false;                  // parameters go where `reach` says and nowhere else
+  bool is_open = false;               // whatever comes of it
+  const std::vector<Setting>& reach;  // values that parameters will be given later
   Progress progress = {};
 };
 
 struct StabilityCheck {
-  Verdict verdict = Verdict::stable;  // of the start, by what is always felt
-  std::optional<Error> complaint;     // unless stable: of the model, with its line
+  Verdict verdict = Verdict::stable;      // of the start, by what is always felt
+  std::optional<Error> complaint;         // unless stable: of the model, with its line
+  std::vector<ParameterInfo> parameters;  // in the ranges that are left to them
   std::vector<Error> narrowed;  // ranges that the preset gives and that are too wide; its lines
-  std::vector<Range> limits;    // [parameter] that nothing may leave; infinite where unknown
+  std::vector<Limits> limits;   // [parameter] that nothing may leave; infinite where unknown
   bool is_together = false;     // too many parameters for a limit of each: all were narrowed alike
 };
 
-// Looks at the start; if that is proved, widens it to the ranges of `parameters` as far as the
-// whole of their box is proved, and writes back what it came to. A start that is not proved keeps
-// its ranges. O(links) where the edge bound says yes. [any thread but audio]
-StabilityCheck check_stability(const StabilityRequest& request,
-                               std::vector<ParameterInfo>& parameters);
+// Looks at the start; if that is proved, widens it to the ranges of the parameters as far as the
+// whole of their box is proved. A start that is not proved keeps its ranges. O(links) where the
+// edge bound says yes. [any thread but audio]
+StabilityCheck check_stability(const StabilityRequest& request);
 
-// The first element, in the order of the network, of which an argument is no finite number with
-// these values of the parameters, or which weighs nothing; with its line. What an audio input gives
-// is not looked at. [any thread but audio]
-std::optional<Error> no_number(const Network& network, std::span<const double> parameters,
-                               double rate_ratio);
+// Where the preset lets the parameters be turned to, within the ranges that are left to them.
+ParameterBox proved_box(const StabilityCheck& check, const Preset& preset);
+
+// Factors on every stiffness up to which all that there is stays stable, plucks, bows and contacts
+// as if always felt.
+struct Margins {
+  double whole = 0.0;        // with the parameters anywhere in the box; below 1: unproved
+  double keys = 0.0;         // what keys may use of that: the same with something to spare
+  std::vector<Limits> home;  // [parameter] the box, on sides on which limits lie beyond it
+  std::vector<double> away;  // the keys' factor at equal steps from the box to the limits
+};
+
+// `away` up to where `limits` are; where nothing limits the parameters it does not depend on them.
+// No limits: nothing beyond the box. Exact where that is quick, else by the edge bound. O(links)
+// then, nine times. [any thread but audio]
+Margins find_margins(const Network& network, std::span<const LinkScheme> schemes,
+                     const ParameterBox& box, std::span<const Limits> limits, double rate_ratio,
+                     const Progress& progress = {});
 
 // The nearest value in six digits that is surely inside the limit.
 double inside_limit(double limit, bool is_upper);

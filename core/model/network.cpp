@@ -209,6 +209,11 @@ bool rests_at_zero(const Network& network) {
          std::all_of(network.macros.begin(), network.macros.end(), rests);
 }
 
+std::size_t moving_count(const Network& network) {
+  return static_cast<std::size_t>(
+      std::count_if(network.masses.begin(), network.masses.end(), moves));
+}
+
 int input_count(const Network& network) {
   int count = 0;
   for (const Input& input : network.inputs) {

@@ -194,6 +194,9 @@ double initial_velocity(const Network& network, const Mass& mass);
 // Does everything that moves start with two zeros? Then the third argument's meanings agree.
 bool rests_at_zero(const Network& network);
 
+// How many masses move, macros apart.
+std::size_t moving_count(const Network& network);
+
 // The highest channel number in use; 0 for none.
 int input_count(const Network& network);
 int output_count(const Network& network);

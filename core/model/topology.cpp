@@ -91,6 +91,9 @@ std::uint64_t node_count(const Macro& macro) {
 
 Network expand_macros(const Network& network, const Progress& progress) {
   Network expanded = network;
+  if (network.macros.empty()) {
+    return expanded;
+  }
   expanded.macros.clear();
   std::size_t nodes = network.masses.size();
   std::size_t links = network.links.size();

@@ -119,10 +119,9 @@ void show_progress(std::size_t done, std::size_t all, const std::string& doing) 
 std::vector<Formed> forms_of(const Machine& machine) {
   std::vector<Formed> forms;
   for (const Method method : methods_for(KernelRow::Use::published)) {
-    Formed formed{std::string(method_name(method)), machine};
-    const Plan plan = make_plan(formed.machine, {}, method);
-    if (plan.parts.size() == 1 && plan.parts[0].method == method) {
-      forms.push_back(std::move(formed));
+    Planned planned = make_plan(machine, {}, method);
+    if (planned.parts.size() == 1 && planned.parts[0].method == method) {
+      forms.push_back({std::string(method_name(method)), std::move(planned.machine)});
     }
   }
   return forms;
@@ -139,11 +138,12 @@ void add_ours(const BenchScene& scene, const Network& network, const std::vector
     kernels.back().calibrate();
   }
   const Precision precision = is_double ? Precision::float64 : Precision::float32;
-  Machine planned = forms.front().machine;
-  const Plan plan = make_plan(
-      planned, {.is_double = is_double, .isa = isa, .voices = static_cast<int>(scene.voices)});
-  all.emplace_back("ressort", is_double, play_engine(scene, network, planned, precision, isa));
-  all.back().form = method_name(plan.parts.front().method);
+  const Planned planned =
+      make_plan(forms.front().machine,
+                {.is_double = is_double, .isa = isa, .voices = static_cast<int>(scene.voices)});
+  all.emplace_back("ressort", is_double,
+                   play_engine(scene, network, planned.machine, precision, isa));
+  all.back().form = method_name(planned.parts.front().method);
   all.back().calibrate();
   std::move(kernels.begin(), kernels.end(), std::back_inserter(all));
 }

@@ -402,8 +402,8 @@ TEST_CASE("what is safe stays as published, and the rest is told", "[passive]") 
   const Schemes forced = choose_schemes(network, Preset{}, {.box = {{.05}, {.05}}},
                                         {.passive = Passivity::never}, {3, 5});
   CHECK(found(forced) == std::vector{plain, plain, plain, gradient, plain, substeps, plain});
-  CHECK(always_felt(network, forced.links).links.size() == 5);
-  CHECK(always_felt(network, needed.links).links.size() == 6);
+  CHECK(without_passive(network, forced.links).links.size() == 5);
+  CHECK(without_passive(network, needed.links).links.size() == 6);
   // The kernel's runs never mix them.
   const Program program = make_program(network, 44100.0, true, needed.links);
   std::size_t passive = 0;

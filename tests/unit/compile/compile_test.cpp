@@ -54,7 +54,6 @@ TEST_CASE("an instrument says what can be played", "[compile]") {
   CHECK(instrument.voices == 7);
   CHECK(instrument.masses == 3);
   CHECK(instrument.links == 4);
-  CHECK(instrument.is_tuned);
   CHECK(player.compiled.engine->parameter(0) == 0.2);
   // The margin is that of the worst corner of the ranges: m_K = .25, m_Z as it is.
   // The worst motion is that of m0 against m1 and m2 together: with s the factor,
@@ -72,13 +71,13 @@ TEST_CASE("an instrument says what can be played", "[compile]") {
 }
 
 TEST_CASE("the plan counts the parts that hang together and says how they run", "[compile]") {
-  Machine machine = make_machine(
+  const Machine machine = make_machine(
       network_of(scenes::string("a", 5, ".1", ".1") + scenes::string("b", 3, ".1", ".1") +
                  "@p nlPluck @a_m1 @a_m3 1 1\n@free mass 1. 0. 1.\n@out1 posOutput @a_m1\n"
                  "@out2 posOutput @b_m1\n@lone osc 1 .1 0 0 1\n@in1 frcInput @a_m2\n"
                  "@in2 frcInput @b_m2\n@out3 posOutput @free\n@out4 posOutput @lone\n"),
       44100.0, true);
-  const Plan plan = make_plan(machine, {}, Method::direct);
+  const Planned plan = make_plan(machine, {}, Method::direct);
   REQUIRE(plan.parts.size() == 3);  // the largest first; what is too small, together
   CHECK(plan.parts[0].masses == 5);
   CHECK(plan.parts[0].links == 7);
@@ -90,20 +89,20 @@ TEST_CASE("the plan counts the parts that hang together and says how they run", 
     CHECK(part.method == Method::direct);
     CHECK(part.predicted_ns > 0.0);
   }
-  CHECK(describe(plan).find("5 masses, 7 links") != std::string::npos);
-  Machine still = make_machine(network_of("@g ground 0."), 44100.0, true);
-  CHECK(describe(make_plan(still, {})) == "nothing moves\n");
+  CHECK(describe(plan.parts).find("5 masses, 7 links") != std::string::npos);
+  const Machine still = make_machine(network_of("@g ground 0."), 44100.0, true);
+  CHECK(describe(make_plan(still, {}).parts) == "nothing moves\n");
 }
 
 TEST_CASE("the plan takes the form that is cheapest at its worst", "[compile]") {
   const auto chosen = [](const std::string& text, int voices = 1) {
-    Machine machine = make_machine(network_of(text), 44100.0, true);
-    const Plan plan = make_plan(machine, {.isa = Isa::v3, .voices = voices});
+    const Planned plan = make_plan(make_machine(network_of(text), 44100.0, true),
+                                   {.isa = Isa::v3, .voices = voices});
     REQUIRE(plan.parts.size() == 1);
     CHECK(plan.parts[0].predicted_ns > 0.0);
-    INFO(describe(plan));
+    INFO(describe(plan.parts));
     // What was chosen is what will run.
-    CHECK(machine.parts[0].form.index() == static_cast<std::size_t>(plan.parts[0].method));
+    CHECK(plan.machine.parts[0].form.index() == static_cast<std::size_t>(plan.parts[0].method));
     return plan.parts[0].method;
   };
   CHECK(chosen(scenes::poly_triangle()) == Method::dense);
@@ -123,9 +122,9 @@ TEST_CASE("the plan takes the form that is cheapest at its worst", "[compile]") 
 }
 
 TEST_CASE("a method that is asked for is taken where it can be", "[compile]") {
-  Machine machine = make_machine(network_of(scenes::mesh_20x30()), 44100.0, true);
+  const Machine machine = make_machine(network_of(scenes::mesh_20x30()), 44100.0, true);
   for (const Method method : methods_for(KernelRow::Use::published)) {
-    const Plan plan = make_plan(machine, {}, method);
+    const Planned plan = make_plan(machine, {}, method);
     REQUIRE(plan.parts.size() == 1);
     const bool is_small = method == Method::dense || method == Method::batch;
     const bool can = !is_small && method != Method::chains;  // it has no rows of equal masses

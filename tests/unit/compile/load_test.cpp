@@ -10,7 +10,7 @@
 #include "app/session/load_news.h"
 #include "core/analysis/linear.h"
 #include "core/analysis/stability.h"
-#include "core/compile/memory.h"
+#include "core/compile/make_engine.h"
 #include "core/progress.h"
 #include "tests/support/catch.h"
 #include "tests/support/heap.h"

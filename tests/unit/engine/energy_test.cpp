@@ -121,8 +121,9 @@ class Books {
 template <class T>
 double unexplained(const std::string& text, Method method, std::uint64_t seed) {
   const Network network = rig::network_of(text);
-  Machine machine = make_machine(network, 44100.0, true);
-  make_plan(machine, {.is_double = sizeof(T) == sizeof(double)}, method);
+  const Machine machine = make_plan(make_machine(network, 44100.0, true),
+                                    {.is_double = sizeof(T) == sizeof(double)}, method)
+                              .machine;
   double worst = 0.0;
   for (const Program& program : machine.parts) {
     Books<T> books(program);

@@ -70,7 +70,7 @@ double difference(const std::string& text, const Preset& preset, int stiffness, 
 
 // A kernel that the part does not have would be the direct one under another name.
 bool has_form(const std::string& text, Method method) {
-  Machine machine = make_machine(rig::network_of(text), 48000.0, true);
+  const Machine machine = make_machine(rig::network_of(text), 48000.0, true);
   return make_plan(machine, {}, method).parts[0].method == method;
 }
 

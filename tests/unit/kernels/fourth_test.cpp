@@ -310,7 +310,7 @@ TEST_CASE("voices side by side are of fourth order each", "[fourth]") {
 
 TEST_CASE("a budget for pitch or decay gets the fourth-order form where it is needed", "[fourth]") {
   const auto method_for = [](const std::string& text, const Budget& budget) {
-    Machine machine = make_machine(network_of(text), Network::reference_rate_hz, true);
+    const Machine machine = make_machine(network_of(text), Network::reference_rate_hz, true);
     return make_plan(machine, {}, {}, 0, budget).parts.at(0).method;
   };
   const std::string touched =

@@ -286,12 +286,12 @@ TEST_CASE("a network is shared out where that pays", "[halo]") {
   ThreadPool executor(2);
   const auto planned = [&](const std::string& text, Executor* helpers,
                            std::optional<Method> method) {
-    Machine machine = make_machine(network_of(text), 44100.0, true);
-    const Plan plan = make_plan(machine, {.isa = Isa::v3, .executor = helpers}, method);
-    INFO(describe(plan));
+    const auto [machine, parts] = make_plan(make_machine(network_of(text), 44100.0, true),
+                                            {.isa = Isa::v3, .executor = helpers}, method);
+    INFO(describe(parts));
     const auto* const shards = std::get_if<Shards>(&machine.parts[0].form);
     if (shards != nullptr) {
-      CHECK(describe(plan).find("2 shards") != std::string::npos);
+      CHECK(describe(parts).find("2 shards") != std::string::npos);
     }
     return shards == nullptr ? 0 : static_cast<int>(shards->shards->size());
   };

@@ -244,13 +244,13 @@ TEST_CASE("Exact modes follow a stiffness that is turned", "[modes_exact]") {
 
 TEST_CASE("The plan takes exact modes where the published scheme is too far off", "[modes_exact]") {
   const auto plan_for = [](const std::string& stiffness, const Budget& budget) {
-    Machine machine = make_machine(network_of(scenes::string("s", 50, stiffness, "0.0001") +
-                                              "@in1 frcInput @s_m4\n" + scenes::output(1, "s_m9")),
-                                   44100.0, true);
-    const Plan plan = make_plan(machine, {}, {}, patient_modes, budget);
+    const Network network = network_of(scenes::string("s", 50, stiffness, "0.0001") +
+                                       "@in1 frcInput @s_m4\n" + scenes::output(1, "s_m9"));
+    const auto [machine, parts] =
+        make_plan(make_machine(network, 44100.0, true), {}, {}, patient_modes, budget);
     const Modes* const modes = std::get_if<Modes>(&machine.parts[0].form);
-    INFO(describe(plan));
-    return std::pair{modes != nullptr && modes->is_exact, describe(plan)};
+    INFO(describe(parts));
+    return std::pair{modes != nullptr && modes->is_exact, describe(parts)};
   };
   CHECK(plan_for("0.1", {.cents = 3.0}).first);
   CHECK(plan_for("0.1", {.cents = 3.0}).second.find("continuous network") != std::string::npos);

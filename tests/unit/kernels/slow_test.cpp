@@ -169,7 +169,7 @@ TEST_CASE("only a budget makes a part slow", "[slow]") {
   const std::string text =
       scenes::physical_lfo() + scenes::string("s", 20, "0.1", "0.001") + scenes::output(2, "s_m9");
   const auto methods_for = [&](const Budget& budget) {
-    Machine machine = make_machine(rig::network_of(text), Network::reference_rate_hz, true);
+    const Machine machine = make_machine(rig::network_of(text), Network::reference_rate_hz, true);
     std::vector<Method> methods;
     for (const Part& part : make_plan(machine, {}, {}, patient_modes, budget).parts) {
       methods.push_back(part.method);

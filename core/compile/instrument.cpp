@@ -1,0 +1,128 @@
+#include "core/compile/instrument.h"
+
+#include <cmath>
+
+#include "core/model/preset/fit.h"
+
+namespace ressort {
+namespace {
+
+// Of what fits the network.
+Control make_control(const Network& network, const ControlSetting& setting) {
+  static constexpr Source sources[] = {Source::note, Source::controller, Source::pressure,
+                                       Source::custom, Source::audio};
+  Control control;
+  control.source = sources[static_cast<std::size_t>(setting.source)];
+  control.gesture = setting.gesture;
+  control.number = static_cast<std::uint16_t>(
+      setting.source == ControlSource::audio ? setting.number - 1 : setting.number);
+  control.lowest_key = static_cast<std::uint8_t>(setting.lowest_key);
+  control.highest_key = static_cast<std::uint8_t>(setting.highest_key);
+  control.low = setting.low;
+  control.high = setting.high;
+  control.exponential = setting.exponential;
+  control.travel = setting.travel;
+  control.target = static_cast<std::uint16_t>(control.gesture == Gesture::parameter
+                                                  ? find_parameter(network, setting.target)
+                                                  : find_input(network, setting.target));
+  return control;
+}
+
+std::vector<Control> make_controls(const Network& network, const Preset& preset) {
+  std::vector<Control> controls;
+  for (const ControlSetting& setting : preset.controls) {
+    controls.push_back(make_control(network, setting));
+  }
+  return controls;
+}
+
+InputInfo input_info(const Network& network, std::size_t index,
+                     const std::vector<Control>& controls) {
+  const Input& input = network.inputs[index];
+  InputInfo info{.number = input.number, .is_force = input.is_force};
+  if (input.is_force) {
+    info.attached_to = network.masses[input.mass].name;
+  }
+  for (const Link& link : network.links) {
+    if (!input.is_force && (link.a == input.mass || link.b == input.mass)) {
+      info.attached_to = network.masses[link.a == input.mass ? link.b : link.a].name;
+      break;
+    }
+  }
+  for (const Control& control : controls) {
+    if (control.target == index && control.gesture != Gesture::parameter) {
+      info.gestures.push_back(control.gesture);
+    }
+  }
+  return info;
+}
+
+// The highest audio channel that a control or a parameter listens to.
+int audio_input_count(const Network& network, const Preset& preset) {
+  int count = 0;
+  for (const ControlSetting& setting : preset.controls) {
+    count = std::max(count, setting.source == ControlSource::audio ? setting.number : 0);
+  }
+  for (const Parameter& parameter : network.parameters) {
+    count = std::max(count, parameter.audio_input);
+  }
+  return count;
+}
+
+}  // namespace
+
+Playing make_playing(const Network& network, const Preset& preset, const Analysis& analysis,
+                     double rate_ratio, bool bare, int voices, double gain) {
+  const Mode mode = analysis.mode.value_or(Mode{});
+  return {.voices = voices,
+          .gain = gain,
+          .bare = bare,
+          .release_s = preset.release_s,
+          .noise = preset.noise,
+          .tuning = analysis.mode ? Tuning::keyboard : Tuning::fixed,
+          .transpose = preset.transpose,
+          .mode_stiffness = mode.stiffness * rate_ratio * rate_ratio,
+          .mode_damping = mode.damping * rate_ratio,
+          .highest_factor = analysis.margins.keys,
+          .home = analysis.margins.home,
+          .away = analysis.margins.away,
+          .controls = make_controls(network, preset),
+          .limits = analysis.stability.limits,
+          .rest_bounds = analysis.rest_bounds};
+}
+
+Instrument make_instrument(const Network& network, const Preset& preset, const Analysis& analysis,
+                           double rate_hz, double rate_ratio, int voices, double gain) {
+  const std::vector<Control> controls = make_controls(network, preset);
+  std::vector<InputInfo> inputs;
+  for (std::size_t i = 0; i < network.inputs.size(); ++i) {
+    inputs.push_back(input_info(network, i, controls));
+  }
+  std::vector<CustomInfo> custom;
+  for (std::size_t i = 0; i < preset.controls.size(); ++i) {
+    if (preset.controls[i].source == ControlSource::osc) {
+      custom.push_back({preset.controls[i].address, static_cast<int>(i)});
+    }
+  }
+  const Mode mode = analysis.mode.value_or(Mode{});
+  const double most = std::max(1.0, analysis.margins.keys);  // of a mode's stiffness
+  return {.parameters = analysis.stability.parameters,
+          .inputs = std::move(inputs),
+          .custom = std::move(custom),
+          .outputs = output_count(network),
+          .audio_inputs = audio_input_count(network, preset),
+          .voices = voices,
+          .gain = gain,
+          .masses = moving_count(network),
+          .links = network.links.size(),
+          .transpose = preset.transpose,
+          .mode = analysis.mode,
+          .highest_frequency_hz =
+              analysis.mode ? scheme_frequency_hz(mode.stiffness * rate_ratio * rate_ratio * most,
+                                                  mode.damping * rate_ratio, rate_hz)
+                            : 0.0,
+          .stiffness_margin = analysis.margins.whole,
+          .verdict = analysis.stability.verdict};
+}
+
+}  // namespace ressort

@@ -1,0 +1,67 @@
+// core/compile: how an engine is played, and what it is called from outside.
+#pragma once
+
+#include <algorithm>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "core/analysis/linear.h"
+#include "core/compile/stability_check.h"
+#include "core/engine/engine.h"
+#include "core/gesture.h"
+#include "core/model/network.h"
+#include "core/model/preset/preset.h"
+
+namespace ressort {
+
+struct InputInfo {
+  int number = 1;
+  bool is_force = false;
+  std::vector<Gesture> gestures;  // that the preset has controls for
+  std::string attached_to;        // the mass that it moves or pushes
+  bool knows(Gesture gesture) const {
+    return std::find(gestures.begin(), gestures.end(), gesture) != gestures.end();
+  }
+};
+
+// An OSC name that the preset gives to one of its controls.
+struct CustomInfo {
+  std::string address;
+  int row = 0;  // Event::index of EventKind::custom
+};
+
+// What a running engine is called from outside; indices are those of Event.
+struct Instrument {
+  std::vector<ParameterInfo> parameters;  // [parameter]
+  std::vector<InputInfo> inputs;
+  std::vector<CustomInfo> custom;
+  int outputs = 0;
+  int audio_inputs = 0;  // the highest audio channel that a control listens to
+  int voices = 1;
+  double gain = 1.0;       // output per position unit: the preset's, or what was found
+  std::size_t masses = 0;  // that move
+  std::size_t links = 0;
+  int transpose = 0;                  // semitones from a key to its pitch
+  std::optional<Mode> mode;           // the lowest, by which keys set the pitch; else they do not
+  double highest_frequency_hz = 0.0;  // of a key, before it is folded down; 0: not tuned
+  double stiffness_margin = 0.0;      // every stiffness may grow by this factor; below 1: unproved
+  Verdict verdict = Verdict::stable;  // of what is always felt, in all ranges
+};
+
+// All that is known of a network before it sounds.
+struct Analysis {
+  std::optional<Mode> mode;  // the lowest, where keys set the pitch by it
+  StabilityCheck stability;
+  Margins margins;
+  std::vector<std::optional<RestBound>> rest_bounds;  // [part]
+};
+
+// Of a preset that fits the network; `voices` and `gain` instead of its own. O(inputs * links).
+// [any thread but audio]
+Playing make_playing(const Network& network, const Preset& preset, const Analysis& analysis,
+                     double rate_ratio, bool bare, int voices, double gain);
+Instrument make_instrument(const Network& network, const Preset& preset, const Analysis& analysis,
+                           double rate_hz, double rate_ratio, int voices, double gain);
+
+}  // namespace ressort

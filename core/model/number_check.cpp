@@ -1,0 +1,112 @@
+#include "core/model/number_check.h"
+
+#include <algorithm>
+#include <cmath>
+#include <initializer_list>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "core/model/language/expression.h"
+
+namespace ressort {
+namespace {
+
+// Looks at the arguments of one element after the other, for no_number().
+class NumberCheck {
+ public:
+  NumberCheck(const Network& network, std::span<const double> parameters, double rate_ratio)
+      : network_(network), parameters_(parameters) {
+    const double grown = std::max(1.0, rate_ratio * rate_ratio);
+    for (const Formula& formula : network.arguments) {
+      const double value = evaluate(formula, parameters);
+      const bool is_live = std::any_of(formula.begin(), formula.end(), [&](const Step& step) {
+        return step.op == Op::parameter && network.parameters[step.index].audio_input > 0;
+      });
+      is_wrong_.push_back(!is_live && !std::isfinite(grown * value));
+      is_nothing_.push_back(!is_live && !std::isfinite(1.0 / value));
+    }
+  }
+
+  std::optional<Error> run() {
+    for (const Mass& mass : network_.masses) {
+      look(mass, {{"mass", mass.mass},
+                  {"stiffness", mass.stiffness},
+                  {"damping", mass.damping},
+                  {"gravity", mass.gravity}});
+      if (mass.kind == MassKind::point) {
+        const Tap& tap = network_.taps[mass.tap];
+        look(mass, {{"place", tap.u}, {"place", tap.v}});
+      }
+    }
+    for (const Macro& macro : network_.macros) {
+      look(macro, {{"mass", macro.mass},
+                   {"stiffness", macro.stiffness},
+                   {"stiffness", macro.second_stiffness},
+                   {"damping", macro.damping},
+                   {"damping", macro.air_damping}});
+    }
+    for (const Link& link : network_.links) {
+      for (const ArgumentId argument : link.arguments) {
+        look(link, {{"argument", argument}});
+      }
+    }
+    return std::move(error_);
+  }
+
+ private:
+  struct Asked {
+    std::string_view quantity;
+    ArgumentId argument;
+  };
+
+  template <class Element>
+  void look(const Element& element, std::initializer_list<Asked> all) {
+    for (const Asked& asked : all) {
+      if (error_ || asked.argument == no_argument) {
+        continue;
+      }
+      const bool is_wrong = is_wrong_[asked.argument];
+      if (is_wrong || (asked.quantity == "mass" && is_nothing_[asked.argument])) {
+        error_ = {told(asked, std::string(element.name),
+                       is_wrong ? " is no finite number" : " is not above 0"),
+                  element.location.line, element.location.column};
+      }
+    }
+  }
+
+  // "the argument 1/P of 'r' is no finite number where P = 0"
+  std::string told(const Asked& asked, const std::string& name, std::string_view what) const {
+    const Formula& formula = network_.arguments[asked.argument];
+    std::vector<std::string> names;
+    for (const Parameter& parameter : network_.parameters) {
+      names.push_back(parameter.name);
+    }
+    std::string values;
+    for (std::size_t i = 0; i < names.size(); ++i) {
+      if (std::any_of(formula.begin(), formula.end(), [&](const Step& step) {
+            return step.op == Op::parameter && step.index == i;
+          })) {
+        values += (values.empty() ? " where " : " and ") + names[i] + " = " +
+                  print_number(parameters_[i]);
+      }
+    }
+    return "the " + std::string(asked.quantity) + " " + print_expression(formula, names) +
+           (name.empty() ? "" : " of '" + name + "'") + std::string(what) + values;
+  }
+
+  const Network& network_;
+  std::span<const double> parameters_;
+  std::vector<bool> is_wrong_;    // [argument]
+  std::vector<bool> is_nothing_;  // [argument] if it is a mass
+  std::optional<Error> error_;
+};
+
+}  // namespace
+
+std::optional<Error> no_number(const Network& network, std::span<const double> parameters,
+                               double rate_ratio) {
+  return NumberCheck(network, parameters, rate_ratio).run();
+}
+
+}  // namespace ressort

@@ -1,0 +1,172 @@
+// The stages of compiling, each by itself, on networks small enough to be solved by hand.
+#include "core/analysis/linear.h"
+#include "core/compile/instrument.h"
+#include "core/compile/make_engine.h"
+#include "core/compile/rest_bound.h"
+#include "core/compile/schemes.h"
+#include "core/model/number_check.h"
+#include "tests/support/player.h"
+
+namespace ressort {
+namespace {
+
+using namespace rig;
+
+constexpr double infinity = std::numeric_limits<double>::infinity();
+
+// M = 2 on a spring of K to a ground: stable while 4M - K - 2Z > 0.
+const std::string held_mass =
+    "@K param 0.5\n@g ground 0.\n@m mass 2. 0. 0.\n@s springDamper @g @m K 0.1\n"
+    "@in1 frcInput @m\n@out1 posOutput @m\n";
+
+ParameterBox at(double value) {
+  return {{value}, {value}};
+}
+
+}  // namespace
+
+TEST_CASE("without a preset a parameter may be turned to four times its value", "[stages]") {
+  const Network network = network_of(
+      "@a param 0.3\n@b param -2\n@c param 0\n@M param 8\n@g ground 0.\n@o osc M a b 0. 0.\n@s "
+      "spring @g @o c\n@out1 posOutput @o\n");
+  const auto asked = asked_ranges(network, Preset{}, false);
+  const auto range = [&](std::size_t i) { return std::pair(asked[i].minimum, asked[i].maximum); };
+  CHECK(range(0) == std::pair(0.0, 1.2));
+  CHECK(range(1) == std::pair(-8.0, 8.0));
+  CHECK(range(2) == std::pair(0.0, 1.0));
+  CHECK(range(3) == std::pair(2.0, 32.0));  // nothing may become weightless
+  CHECK(start_values(asked, {{"b", 7.0}}, false) == std::vector{0.3, -2.0, 0.0, 8.0});
+  CHECK(start_values(asked, {{"b", 7.0}}, true) == std::vector{0.3, 7.0, 0.0, 8.0});
+}
+
+TEST_CASE("a formula that is no number is told where it stands", "[stages]") {
+  const Network network = network_of("@P param 1\n@o osc 1. 1/P 0. 0. 0.\n@out1 posOutput @o\n");
+  CHECK_FALSE(no_number(network, std::vector{1.0}, 1.0));
+  const auto error = no_number(network, std::vector{0.0}, 1.0);
+  REQUIRE(error);
+  CHECK(error->message == "the stiffness 1/P of 'o' is no finite number where P = 0");
+  CHECK(error->line == 2);
+  // At half the rate stiffness is four times as large.
+  CHECK_FALSE(no_number(network, std::vector{1e-308}, 1.0));
+  CHECK(no_number(network, std::vector{1e-308}, 2.0));
+}
+
+TEST_CASE("tables leave out what was culled and start where they are told to", "[stages]") {
+  const Network network = network_of(held_mass + "@lost mass 1. 0. 1.\n");
+  const Machine machine = tabulate(network, cull(network), {}, std::vector{0.7}, 88200.0, true);
+  CHECK(machine.rate_ratio == 0.5);
+  CHECK(machine.parameters == std::vector{0.7});
+  CHECK(machine.channels == 1);
+  REQUIRE(machine.parts.size() == 1);
+  const Program& program = machine.parts[0];
+  CHECK(program.moving == 1);
+  REQUIRE(program.link_runs.size() == 1);
+  // Per sample at twice the rate: K/4, Z/2.
+  const auto value = [&](std::size_t argument) {
+    return coefficient_value(program,
+                             program.coefficients[program.link_runs[0].coefficients[argument]],
+                             machine.parameters, 1.0);
+  };
+  CHECK(value(0) == Approx(0.175).epsilon(1e-15));
+  CHECK(value(1) == Approx(0.05).epsilon(1e-15));
+}
+
+TEST_CASE("a range is narrowed to what is stable, and nobody else's", "[stages]") {
+  const Network network = network_of(held_mass);
+  Preset preset = struck(1);
+  preset.parameters.push_back({"K", 0.5, 0.1, 9.0, {7, 3}});
+  const auto asked = asked_ranges(network, preset, false);
+  const StabilityCheck check = check_stability({.written = network,
+                                                .expanded = network,
+                                                .preset = preset,
+                                                .parameters = asked,
+                                                .start = std::vector{0.5},
+                                                .reach = {}});
+  CHECK(check.verdict == Verdict::stable);
+  // 4M - 2Z = 7.8, told in six digits from within.
+  CHECK(check.parameters[0].maximum == 7.79999);
+  CHECK(check.parameters[0].minimum == 0.1);
+  CHECK(check.limits[0].highest == 7.79999);
+  REQUIRE(check.narrowed.size() == 1);
+  CHECK(check.narrowed[0].line == 7);
+  CHECK(asked[0].maximum == 9.0);
+  CHECK(proved_box(check, preset).highest[0] == 7.79999);
+  CHECK(preset_box(asked, preset).highest[0] == 9.0);
+}
+
+TEST_CASE("what keys may use of the stiffness shrinks on the way to the limits", "[stages]") {
+  const Network network = network_of(held_mass);
+  const std::vector<Limits> limits = {{-infinity, 1.0}};
+  const Margins margins = find_margins(network, {}, at(0.5), limits, 1.0);
+  CHECK(margins.whole == Approx(7.8 / 0.5).epsilon(1e-12));
+  CHECK(margins.keys == Approx(0.98 * 7.8 / 0.5).epsilon(1e-12));
+  REQUIRE(margins.home.size() == 1);
+  CHECK(margins.home[0].lowest == -infinity);
+  CHECK(margins.home[0].highest == 0.5);
+  REQUIRE(margins.away.size() == 8);
+  CHECK(margins.away[3] == Approx(0.98 * 7.8 / 0.75).epsilon(1e-12));
+  CHECK(margins.away[7] == Approx(0.98 * 7.8 / 1.0).epsilon(1e-12));
+  // At half the rate K counts four times, Z twice.
+  CHECK(find_margins(network, {}, at(0.5), {}, 2.0).whole == Approx(7.6 / 2.0).epsilon(1e-12));
+  CHECK(find_margins(network, {}, at(0.5), {}, 1.0).away.empty());
+  // What is passive limits nothing.
+  const Network floor = network_of("@g ground 0.\n@m mass 1. 0. 1.\n@c contact @g @m 3. 0.\n");
+  const std::vector<LinkScheme> passive = {{Scheme::discrete_gradient, 1}};
+  CHECK(find_margins(floor, {}, {}, {}, 1.0).whole == Approx(4.0 / 3.0).epsilon(1e-12));
+  CHECK(find_margins(floor, passive, {}, {}, 1.0).whole == most_bounded);
+}
+
+TEST_CASE("a part that nothing stirs is bound by how far its springs give way", "[stages]") {
+  const Network network = network_of(
+      "@g ground 0.\n@m mass 1. 0. 1.\n@n mass 1. 0. 0.\n@a spring @g @m 0.5\n"
+      "@b spring @m @n 0.25\n@out1 posOutput @m\n@out2 posOutput @n\n@out3 frcOutput @g\n");
+  const auto bounds = [&](Network heard) {
+    return make_rest_bounds(heard, make_machine(heard, 44100.0, true), {});
+  };
+  CHECK_FALSE(bounds(network)[0]);  // a force is heard
+  Network silent = network;
+  silent.outputs.pop_back();
+  const auto bound = bounds(silent)[0];
+  REQUIRE(bound);
+  // In series: 1/0.5, and 1/0.5 + 1/0.25.
+  REQUIRE(bound->compliances.size() == 2);
+  CHECK(bound->compliances[0] == Approx(2.0).epsilon(1e-12));
+  CHECK(bound->compliances[1] == Approx(6.0).epsilon(1e-12));
+}
+
+TEST_CASE("keys know the lowest mode in samples of the engine's own rate", "[stages]") {
+  const Network network = network_of(held_mass);
+  Analysis analysis{.mode = lowest_mode(network, std::vector{0.5}),
+                    .stability = {},
+                    .margins = {.whole = 15.6, .keys = 4.0, .home = {}, .away = {}},
+                    .rest_bounds = {}};
+  const Playing playing = make_playing(network, struck(1), analysis, 0.5, false, 3, 0.25);
+  CHECK(playing.voices == 3);
+  CHECK(playing.gain == 0.25);
+  CHECK(playing.tuning == Tuning::keyboard);
+  CHECK(playing.mode_stiffness == Approx(0.25 / 4.0).epsilon(1e-12));  // K/M r^2
+  CHECK(playing.mode_damping == Approx(0.05 / 2.0).epsilon(1e-12));    // Z/M r
+  REQUIRE(playing.controls.size() == 1);
+  CHECK(playing.controls[0].gesture == Gesture::impulse);
+  const Instrument instrument =
+      make_instrument(network, struck(1), analysis, 88200.0, 0.5, 3, 0.25);
+  // cos(theta) = (2 - 4 * 0.0625 - 0.025) / (2 sqrt(1 - 0.025))
+  CHECK(instrument.highest_frequency_hz ==
+        Approx(88200.0 / (2.0 * std::numbers::pi) * std::acos(1.725 / (2.0 * std::sqrt(0.975))))
+            .epsilon(1e-12));
+  analysis.mode.reset();
+  CHECK(make_playing(network, struck(1), analysis, 0.5, false, 3, 0.25).tuning == Tuning::fixed);
+}
+
+TEST_CASE("the gain of a blow on one mass is what its height asks for", "[stages]") {
+  // K = 2 M: x[n+1] = -x[n-1]. A blow of 0.1 of a force, at velocity 0.8, moves M = 1 by 0.08.
+  const Network network =
+      network_of("@o osc 1. 2. 0. 0. 0.\n@in1 frcInput @o\n@out1 posOutput @o\n");
+  const Machine machine = make_machine(network, 44100.0, true);
+  const Playing playing = make_playing(network, struck(1), {}, 1.0, false, 1, 1.0);
+  const auto gain = find_gain(machine, playing, Precision::float64, best_isa(), {});
+  REQUIRE(gain);
+  CHECK(*gain == Approx(0.5 / 0.08).epsilon(1e-12));
+}
+
+}  // namespace ressort
