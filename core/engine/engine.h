@@ -148,8 +148,8 @@ class Engine {
   EngineMeters meters() const;  // [audio]
 
  private:
-  struct Voices;
-  std::unique_ptr<Voices> voices_;
+  struct Player;
+  std::unique_ptr<Player> player_;
 };
 
 // The stiffness factor that brings a mode with k/m and z/m (per sample) to frequency_hz in the

@@ -8,7 +8,7 @@
 #include <memory>
 #include <vector>
 
-#include "core/engine/mix.h"
+#include "core/engine/mixing/mix.h"
 #include "core/kernels/kernel.h"
 #include "core/progress.h"
 
@@ -76,7 +76,7 @@ struct Bank {
   Aligned<T> audio;
   Aligned<T> outputs;
 
-  // Hands that rest give every frame the same row, [input][lane], and no velocity. Of what the
+  // Drivers that rest give every frame the same row, [input][lane], and no velocity. Of what the
   // buffers hold, `filled` is in so many frames of `filled_part`, and so many velocities are 0.
   Aligned<T> row;
   Aligned<T> filled;
@@ -87,7 +87,7 @@ struct Bank {
   Mixer<T> mixer;
   Aligned<T> peak;        // [lane]
   Aligned<double> gain;   // [lane]
-  std::vector<double> x;  // [node] of a voice that is taken over
+  std::vector<double> x;  // [node] of a voice that is looked at, or taken over
   std::vector<double> v;
   std::vector<double*> heard;  // [output] where it is to be added
 };

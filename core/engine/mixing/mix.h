@@ -31,9 +31,11 @@ struct AudioInput {
   std::size_t width = 1;  // lanes
 };
 
+using IsSilent = bool (*)(const double* samples, std::size_t frames);
+
 template <class T>
 struct Mixer {
-  bool (*is_silent)(const double* samples, std::size_t frames);
+  IsSilent is_silent;
   // The same row in every frame, [frame * step + i].
   void (*fill_rows)(const T* row, std::size_t step, std::size_t frames, T* value);
   void (*add_audio)(const AudioInput<T>& input);
