@@ -93,7 +93,7 @@ void EnergyWatch::lay_still(const T* row, std::size_t width, std::size_t lane, s
 template <class T>
 void EnergyWatch::lose(PartBank<T>& part, const T* row, std::size_t lane, std::size_t p,
                        Voices& voices) {
-  voices.lose(lane);
+  voices.lose(voices[lane]);
   lay_still(row, part.width, lane, p);
   part.of(lane).reset(lane % part.width);  // nothing is to be slow for numbers that are none
 }
@@ -164,15 +164,6 @@ void EnergyWatch::go_on_looking(Bank<T>& bank, Voices& voices, std::span<const d
   }
 }
 
-void EnergyWatch::enter(Part& here, const Look& seen) const {
-  here.is_driven = seen.was_stirred || !here.is_metered;
-  const auto frames = static_cast<double>((seen.updates - here.looked) * max_block_frames);
-  here.loss = here.is_driven ? 0.0 : (here.energy - seen.energy.value) / frames;
-  here.is_metered = true;
-  here.energy = seen.energy.value;
-  here.looked = seen.updates;
-}
-
 void EnergyWatch::read_energy(const Voices& voices) {
   if (!voices.is_idle() && updates_ % updates_per_reading != 0) {
     return;
@@ -225,7 +216,12 @@ void EnergyWatch::judge(const Look& seen, Bank<T>& bank, Voices& voices,
   }
   const double slack = rounding<T> * energy.scale + least_energy;
   const bool is_free = here.is_judged && !seen.was_stirred;
-  enter(here, seen);
+  const auto frames = static_cast<double>((seen.updates - here.looked) * max_block_frames);
+  here.is_driven = seen.was_stirred || !here.is_metered;
+  here.loss = here.is_driven ? 0.0 : (here.energy - energy.value) / frames;
+  here.is_metered = true;
+  here.energy = energy.value;
+  here.looked = seen.updates;
   if (is_free && energy.value - energy.doubt > here.most + slack) {
     accuse(seen.at, part, values, bank);
     here.is_judged = false;

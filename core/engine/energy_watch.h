@@ -29,6 +29,15 @@ class EnergyWatch {
   const double* held(std::size_t lane, std::size_t p) const {  // [output]
     return held_.data() + lane * first_output_.back() + first_output_[p];
   }
+  // Whether there is somebody to step.
+  bool steps(const VoiceGroup& group, const Voices& voices) const {
+    for (std::size_t lane = group.first; lane < group.end; ++lane) {
+      if (voices[lane].awake && !is_still(lane, group.part)) {
+        return true;
+      }
+    }
+    return false;
+  }
   // Something comes to a part from outside.
   void stir(const Voice& voice, std::size_t lane, std::size_t p) {
     Part& here = part_of(lane, p);
@@ -94,7 +103,6 @@ class EnergyWatch {
   void go_on_looking(Bank<T>& bank, Voices& voices, std::span<const double> parameters);
   template <class T>
   void judge(const Look& seen, Bank<T>& bank, Voices& voices, std::span<const double> parameters);
-  void enter(Part& here, const Look& seen) const;
   template <class T>
   void accuse(std::size_t at, const PartBank<T>& part, LaneValues<T> values, const Bank<T>& bank);
   template <class T>

@@ -68,13 +68,8 @@ struct Engine::Player {
   void play(Bank<T>& b, const Segment& segment);
   template <class T>
   void apply_changes(Bank<T>& b);
-  // What there is to do for the kernel of a part that begins with voice `first`. What is moved
-  // from outside is not still any more.
-  struct Pace {
-    bool steps = false;   // there is somebody to step
-    bool stands = false;  // and somebody who stands still
-  };
-  Pace pace_of(const Program& program, std::size_t p, std::size_t first, std::size_t width);
+  // What is moved from outside does not stand still any more.
+  void stir_moved(const Program& program, const VoiceGroup& group);
   // Once in max_block_frames, counted from the engine's start: so what sleeps or gives way does not
   // depend on how the time is cut into blocks.
   template <class T>
@@ -101,7 +96,7 @@ void Engine::Player::release(Wanted&& wanted) {
   for (std::size_t lane = 0; lane < voices.size(); ++lane) {
     if (wanted(voices[lane])) {
       gestures.release(lane);
-      voices.release(lane);
+      voices.release(voices[lane]);
     }
   }
 }
@@ -116,7 +111,7 @@ void Engine::Player::handle(const Event& event) {
       if (voices.press_key(event.index, event.channel, parameters.highest_factor())) {
         gestures.place(voices.last());
       }
-      return gestures.press_key(event.index, event.value);
+      return gestures.perform(Source::note, event.index, event.value);
     case EventKind::note_off:
       return release(
           [&](Voice& voice) { return voices.lift_key(voice, event.index, event.channel); });
@@ -124,11 +119,14 @@ void Engine::Player::handle(const Event& event) {
       return turn_controller(event);
     case EventKind::pressure:
     case EventKind::key_pressure:
-      return gestures.press(event.value);
+      return gestures.perform(Source::pressure, 0, event.value);
     case EventKind::bend:
       return voices.bend(event.value);
     case EventKind::custom:
-      return gestures.perform_control(event.index, event.value);
+      if (event.index < playing.controls.size()) {
+        gestures.perform(playing.controls[event.index], event.value);
+      }
+      return;
     case EventKind::parameter:
       return parameters.set(event.index, event.value);
     case EventKind::gesture:
@@ -155,13 +153,13 @@ void Engine::Player::turn_controller(const Event& event) {
   } else if (event.index == all_notes_off) {
     release([&](const Voice& voice) { return voice.held && voice.channel == channel; });
   }
-  gestures.turn_controller(event.index, event.value);
+  gestures.perform(Source::controller, event.index, event.value);
 }
 
 // --- sound --------------------------------------------------------------------------------------
 
 std::size_t Engine::Player::play(Segment segment) {
-  if (voices.is_idle() && !playing.noise && audio.are_silent(segment)) {
+  if (voices.is_idle() && !playing.noise && !audio.listen(segment)) {
     audio.remember(segment);
     since_update = (since_update + segment.frames) % max_block_frames;
     return segment.end();
@@ -181,26 +179,24 @@ std::size_t Engine::Player::play(Segment segment) {
 template <class T>
 void Engine::Player::play(Bank<T>& b, const Segment& segment) {
   apply_changes(b);
-  for (std::size_t p = 0; p < b.parts.size() && !voices.is_idle(); ++p) {
-    PartBank<T>& part = b.parts[p];
-    for (std::size_t first = 0; first < voices.size(); first += part.width) {
-      const Pace pace = pace_of(part.program, p, first, part.width);
-      if (pace.stands) {
-        mixing.add_still(part.program, p, first, part.width, segment, voices, watch);
-      }
-      if (pace.steps) {
-        gestures.fill(b, p, first, segment.frames, watch);
-        audio.add(b, p, first, segment.frames, voices, watch);
-        parameters.fill_audio(b, part, first, segment, voices);
-        part.of(first).step({.frames = segment.frames,
-                             .value = b.value.data(),
-                             .velocity = b.velocity.data(),
-                             .audio = b.audio.data(),
-                             .outputs = b.outputs.data()});
-        mixing.add(b, p, first, segment, voices, watch);
-      }
+  b.each_group([&](PartBank<T>& part, const VoiceGroup& group) {
+    if (watch.has_still()) {
+      stir_moved(part.program, group);
+      mixing.add_still(part.program, group, segment, voices, watch);
     }
-  }
+    if (watch.steps(group, voices)) {
+      gestures.fill(b, group, segment.frames, watch);
+      audio.add(b, group, segment.frames, voices, watch);
+      parameters.fill_audio(b, group, segment, voices);
+      part.of(group.first)
+          .step({.frames = segment.frames,
+                 .value = b.value.data(),
+                 .velocity = b.velocity.data(),
+                 .audio = b.audio.data(),
+                 .outputs = b.outputs.data()});
+      mixing.add(b, group, segment, voices, watch);
+    }
+  });
   voices.advance_fades(segment.frames);
   since_update += segment.frames;
   if (since_update == max_block_frames) {
@@ -218,28 +214,16 @@ void Engine::Player::apply_changes(Bank<T>& b) {
   }
 }
 
-Engine::Player::Pace Engine::Player::pace_of(const Program& program, std::size_t p,
-                                             std::size_t first, std::size_t width) {
-  Pace pace;
-  for (std::size_t lane = first; lane < voices.pack_end(first, width); ++lane) {
-    if (!voices[lane].awake) {
-      continue;
-    }
-    const auto moves = [&](const InputSlot& input) {
+void Engine::Player::stir_moved(const Program& program, const VoiceGroup& group) {
+  for (std::size_t lane = group.first; lane < group.end; ++lane) {
+    const auto is_moved = [&](const InputSlot& input) {
       return audio.moves(input.input) || gestures.is_moving(lane, input.input);
     };
-    if (watch.is_still(lane, p) &&
-        std::any_of(program.inputs.begin(), program.inputs.end(), moves)) {
-      watch.stir(voices[lane], lane, p);
-    }
-    const bool is_still = watch.is_still(lane, p);
-    pace.steps |= !is_still;
-    pace.stands |= is_still;
-    if (!watch.has_still()) {
-      break;
+    if (voices[lane].awake && watch.is_still(lane, group.part) &&
+        std::any_of(program.inputs.begin(), program.inputs.end(), is_moved)) {
+      watch.stir(voices[lane], lane, group.part);
     }
   }
-  return pace;
 }
 
 template <class T>
@@ -250,17 +234,16 @@ void Engine::Player::update(Bank<T>& b) {
   watch.look_around(b, voices, parameters.values());
   const double bound = quiet_level / std::max(1e-30, playing.gain);
   for (std::size_t lane = 0; lane < voices.size(); ++lane) {
-    if (!voices[lane].awake) {
-      continue;
-    }
-    // Nothing moves anywhere: a slow wave may still be on its way to the output.
-    if (voices.update(lane) && !gestures.is_moving(lane) &&
+    Voice& voice = voices[lane];
+    const bool was_awake = voice.awake;
+    // Where nothing moves anywhere: a slow wave may still be on its way to the output.
+    if (was_awake && voices.update(voice) && !gestures.is_moving(lane) &&
         std::all_of(b.parts.begin(), b.parts.end(), [&](const PartBank<T>& part) {
           return part.of(lane).is_near_start(lane % part.width, bound);
         })) {
-      voices.sleep(lane);
+      voices.sleep(voice);
     }
-    if (!voices[lane].awake) {
+    if (was_awake && !voice.awake) {
       watch.forget(lane);
     }
   }

@@ -6,8 +6,20 @@
 namespace ressort {
 namespace {
 
-bool is_of_key(const Control& control, int key) {
-  return control.source == Source::note && key >= control.lowest_key && key <= control.highest_key;
+bool is_asked(const Control& control, Source source, int number) {
+  const bool is_in_range = number >= control.lowest_key && number <= control.highest_key;
+  return control.source == source && (source == Source::note         ? is_in_range
+                                      : source == Source::controller ? number == control.number
+                                                                     : true);
+}
+
+Stroke stroke_of(const Control& control, double amount = 1.0) {
+  return {.amount = amount,
+          .has_control = true,
+          .low = control.low,
+          .high = control.high,
+          .exponential = control.exponential,
+          .travel = control.travel};
 }
 
 }  // namespace
@@ -24,7 +36,7 @@ Gestures::Gestures(const Machine& machine, const Playing& playing, Voices& voice
   }
   for (const Control& control : playing.controls) {
     if (const auto start = row_of(control.gesture).start) {
-      starts_[control.target] = start(stroke_on(control.target, &control));
+      starts_[control.target] = start(on_input(control.target, stroke_of(control)));
     }
   }
 }
@@ -55,24 +67,18 @@ bool Gestures::is_moving(std::size_t lane) const {
   return false;
 }
 
-Stroke Gestures::stroke_on(std::size_t input, const Control* control) const {
-  Stroke stroke{.is_force = machine_.inputs[input].is_force,
-                .middle = machine_.inputs[input].position,
-                .rate_ratio = machine_.rate_ratio,
-                .rate_hz = machine_.rate_hz,
-                .bare = playing_.bare};
-  if (control != nullptr) {
-    stroke.has_control = true;
-    stroke.low = control->low;
-    stroke.high = control->high;
-    stroke.exponential = control->exponential;
-    stroke.travel = control->travel;
-  }
+Stroke Gestures::on_input(std::size_t input, Stroke stroke) const {
+  stroke.is_force = machine_.inputs[input].is_force;
+  stroke.middle = machine_.inputs[input].position;
+  stroke.rate_ratio = machine_.rate_ratio;
+  stroke.rate_hz = machine_.rate_hz;
+  stroke.bare = playing_.bare;
   return stroke;
 }
 
 void Gestures::play(const GestureRow& gesture, std::size_t input, Stroke stroke) {
   const std::size_t last = voices_.last();
+  stroke = on_input(input, stroke);
   if (gesture.goal != nullptr) {
     starts_[input] = gesture.goal(stroke);
     for (std::size_t lane = 0; lane < voices_.size(); ++lane) {
@@ -88,75 +94,47 @@ void Gestures::play(const GestureRow& gesture, std::size_t input, Stroke stroke)
   gesture.play(driver(last, input), stroke);
   starts_[input] = stroke.rest.value_or(starts_[input]);
   if (stroke.pressure) {
-    press(*stroke.pressure);
+    perform(Source::pressure, 0, *stroke.pressure);
   }
 }
 
 void Gestures::perform(const Control& control, double amount) {
+  const Stroke stroke = stroke_of(control, amount);
   if (control.gesture == Gesture::parameter) {
-    const Stroke turn{.amount = amount,
-                      .has_control = true,
-                      .low = control.low,
-                      .high = control.high,
-                      .exponential = control.exponential};
-    return parameters_.set(control.target, turn.mapped());
+    return parameters_.set(control.target, stroke.mapped());
   }
-  Stroke stroke = stroke_on(control.target, &control);
-  stroke.amount = amount;
   play(row_of(control.gesture), control.target, stroke);
 }
 
-template <class Wanted>
-void Gestures::perform_all(double amount, Wanted&& wanted) {
+void Gestures::perform(Source source, int number, double amount) {
   for (const Control& control : playing_.controls) {
-    if (wanted(control)) {
+    if (is_asked(control, source, number)) {
       perform(control, amount);
     }
   }
 }
 
-void Gestures::press_key(int key, double velocity) {
-  perform_all(velocity, [&](const Control& control) { return is_of_key(control, key); });
-}
-
-void Gestures::turn_controller(int number, double amount) {
-  perform_all(amount, [&](const Control& control) {
-    return control.source == Source::controller && control.number == number;
-  });
-}
-
-void Gestures::press(double amount) {
-  perform_all(amount, [](const Control& control) { return control.source == Source::pressure; });
-}
-
-void Gestures::perform_control(std::size_t row, double amount) {
-  if (row < playing_.controls.size()) {
-    perform(playing_.controls[row], amount);
-  }
-}
-
 void Gestures::perform_live(const Event& event) {
   const GestureRow& gesture = row_of(event.gesture);
-  const auto say = [&](std::size_t input, const Control* control) {
-    Stroke stroke = stroke_on(input, control);
+  const auto play_it = [&](std::size_t input, Stroke stroke) {
     stroke.is_live = true;
     stroke.amount = event.value;
     stroke.second = event.value2;
     play(gesture, input, stroke);
   };
+  const std::vector<Control>& controls = playing_.controls;
   if (gesture.live == Live::by_preset) {
-    const auto control =
-        std::find_if(playing_.controls.begin(), playing_.controls.end(), [&](const Control& row) {
-          return row.gesture == event.gesture && machine_.inputs[row.target].number == event.index;
-        });
-    if (control != playing_.controls.end()) {
-      say(control->target, &*control);
+    const auto control = std::find_if(controls.begin(), controls.end(), [&](const Control& row) {
+      return row.gesture == event.gesture && machine_.inputs[row.target].number == event.index;
+    });
+    if (control != controls.end()) {
+      play_it(control->target, stroke_of(*control));
     }
   } else if (gesture.live != Live::never) {
     for (std::size_t i = 0; i < machine_.inputs.size(); ++i) {
       if (machine_.inputs[i].number == event.index &&
           machine_.inputs[i].is_force == (gesture.live == Live::on_forces)) {
-        say(i, nullptr);
+        play_it(i, Stroke{});
       }
     }
   }
@@ -165,24 +143,21 @@ void Gestures::perform_live(const Event& event) {
 void Gestures::release(std::size_t lane) {
   for (const Control& control : playing_.controls) {
     const auto release = row_of(control.gesture).release;
-    if (release != nullptr && is_of_key(control, voices_[lane].key)) {
-      release(driver(lane, control.target), stroke_on(control.target, &control));
+    if (release != nullptr && is_asked(control, Source::note, voices_[lane].key)) {
+      release(driver(lane, control.target), on_input(control.target, stroke_of(control)));
     }
   }
 }
 
 // Drivers that rest give every frame the same row.
 template <class T>
-void Gestures::fill_rest(Bank<T>& bank, const PartBank<T>& part, std::size_t first,
-                         std::size_t frames) {
-  const std::size_t width = part.width;
-  const std::size_t step = part.program.inputs.size() * width;
-  for (std::size_t i = 0; i < part.program.inputs.size(); ++i) {
-    for (std::size_t k = 0; k < width; ++k) {
-      bank.row[i * width + k] =
-          first + k < voices_.size()
-              ? static_cast<T>(driver(first + k, part.program.inputs[i].input).value())
-              : T(0);
+void Gestures::fill_rest(Bank<T>& bank, const VoiceGroup& group, std::size_t frames) {
+  const PartBank<T>& part = bank.parts[group.part];
+  const std::size_t step = part.program.inputs.size() * part.width;
+  T* row = bank.row.data();
+  for (const InputSlot& slot : part.program.inputs) {
+    for (std::size_t lane = group.first; lane < group.first + part.width; ++lane) {
+      *row++ = lane < group.end ? static_cast<T>(driver(lane, slot.input).value()) : T(0);
     }
   }
   if (bank.still < frames * step) {
@@ -201,22 +176,22 @@ void Gestures::fill_rest(Bank<T>& bank, const PartBank<T>& part, std::size_t fir
 }
 
 template <class T>
-void Gestures::fill(Bank<T>& bank, std::size_t p, std::size_t first, std::size_t frames,
+void Gestures::fill(Bank<T>& bank, const VoiceGroup& group, std::size_t frames,
                     EnergyWatch& watch) {
-  const PartBank<T>& part = bank.parts[p];
-  fill_rest(bank, part, first, frames);
+  fill_rest(bank, group, frames);
+  const PartBank<T>& part = bank.parts[group.part];
   const std::size_t step = part.program.inputs.size() * part.width;  // from frame to frame
   for (std::size_t i = 0; i < part.program.inputs.size(); ++i) {
     const InputSlot& slot = part.program.inputs[i];
-    for (std::size_t lane = first; lane < voices_.pack_end(first, part.width); ++lane) {
+    for (std::size_t lane = group.first; lane < group.end; ++lane) {
       InputDriver& mover = driver(lane, slot.input);
       if (!voices_[lane].awake || !mover.is_moving()) {
         continue;
       }
-      watch.stir(voices_[lane], lane, p);
+      watch.stir(voices_[lane], lane, group.part);
       bank.filled_part = nullptr;
-      T* value = bank.value.data() + i * part.width + lane - first;
-      T* velocity = bank.velocity.data() + i * part.width + lane - first;
+      T* value = bank.value.data() + i * part.width + lane - group.first;
+      T* velocity = bank.velocity.data() + i * part.width + lane - group.first;
       if (slot.is_force) {
         for (std::size_t n = 0; n < frames; ++n) {
           value[n * step] = static_cast<T>(mover.next_force().value);
@@ -229,7 +204,7 @@ void Gestures::fill(Bank<T>& bank, std::size_t p, std::size_t first, std::size_t
   }
 }
 
-template void Gestures::fill(Bank<float>&, std::size_t, std::size_t, std::size_t, EnergyWatch&);
-template void Gestures::fill(Bank<double>&, std::size_t, std::size_t, std::size_t, EnergyWatch&);
+template void Gestures::fill(Bank<float>&, const VoiceGroup&, std::size_t, EnergyWatch&);
+template void Gestures::fill(Bank<double>&, const VoiceGroup&, std::size_t, EnergyWatch&);
 
 }  // namespace ressort

@@ -30,34 +30,29 @@ class Gestures {
   }
   bool is_moving(std::size_t lane) const;
 
-  // What the controls of this source do in the voice that was played last; 0..1. O(controls)
-  void press_key(int key, double velocity);
-  void turn_controller(int number, double amount);
-  void press(double amount);
-  void perform_control(std::size_t row, double amount);
+  // What the controls of this source, of this key or of this controller's number, do in the voice
+  // that was played last, for 0..1. O(controls)
+  void perform(Source source, int number, double amount);
+  void perform(const Control& control, double amount);
   // Of EventKind::gesture.
   void perform_live(const Event& event);
   // What a key does when it is released, in its voice.
   void release(std::size_t lane);
 
-  // Where the drivers of part `p`, of the kernel that begins with voice `first`, are in each frame.
+  // Where the drivers are in each frame.
   template <class T>
-  void fill(Bank<T>& bank, std::size_t p, std::size_t first, std::size_t frames,
-            EnergyWatch& watch);
+  void fill(Bank<T>& bank, const VoiceGroup& group, std::size_t frames, EnergyWatch& watch);
 
  private:
   InputDriver& driver(std::size_t lane, std::size_t input) {
     return drivers_[lane * machine_.inputs.size() + input];
   }
-  template <class Wanted>
-  void perform_all(double amount, Wanted&& wanted);
-  void perform(const Control& control, double amount);
-  // What a gesture is to know of an input and of the control that asks for it, if one does.
-  Stroke stroke_on(std::size_t input, const Control* control) const;
+  // With what a gesture is to know of the input.
+  Stroke on_input(std::size_t input, Stroke stroke) const;
   // In the voice that was played last, or in all.
   void play(const GestureRow& gesture, std::size_t input, Stroke stroke);
   template <class T>
-  void fill_rest(Bank<T>& bank, const PartBank<T>& part, std::size_t first, std::size_t frames);
+  void fill_rest(Bank<T>& bank, const VoiceGroup& group, std::size_t frames);
 
   const Machine& machine_;
   const Playing& playing_;

@@ -81,18 +81,43 @@ std::span<const std::uint16_t> Parameters::take_changes() {
 }
 
 template <class T>
-void Parameters::set_coefficient(PartBank<T>& part, std::size_t lane, std::uint32_t c,
-                                 const Voice& voice, bool ramped) const {
-  const double value =
-      coefficient_value(part.program, part.program.coefficients[c], values_, voice.factor);
-  part.of(lane).coefficients.set(lane % part.width, c, value, ramped);
-}
-
-template <class T>
 void Parameters::apply(Bank<T>& bank, const Voices& voices, EnergyWatch& watch) {
-  for (std::size_t p = 0; p < bank.parts.size(); ++p) {
-    apply(bank.parts[p], p, voices, watch);
-  }
+  bank.each_group([&](PartBank<T>& part, const VoiceGroup& group) {
+    const auto& depending = part.program.depending;
+    const bool has_turned = std::any_of(turned_.begin(), turned_.end(), [&](std::uint16_t index) {
+      return !depending[index].empty();
+    });
+    Kernel<T>& kernel = part.of(group.first);
+    bool ramps = false;
+    for (std::size_t lane = group.first; lane < group.end; ++lane) {
+      const Voice& voice = voices[lane];
+      const bool is_tuned = voice.is_new || voice.is_retuned;
+      if (!voice.awake || !(has_turned || is_tuned)) {
+        continue;
+      }
+      if (voice.is_new) {
+        watch.forget(lane, group.part);
+        kernel.reset(lane - group.first);
+      }
+      watch.stir(voice, lane, group.part);
+      const bool ramped = !voice.is_new && !playing_.bare;
+      const auto set = [&](std::uint32_t c) {
+        const double value =
+            coefficient_value(part.program, part.program.coefficients[c], values_, voice.factor);
+        kernel.coefficients.set(lane - group.first, c, value, ramped);
+      };
+      for (std::uint32_t c = 0; is_tuned && c < part.program.coefficients.size(); ++c) {
+        set(c);
+      }
+      for (std::size_t i = 0; !is_tuned && i < turned_.size(); ++i) {
+        std::for_each(depending[turned_[i]].begin(), depending[turned_[i]].end(), set);
+      }
+      ramps |= ramped;
+    }
+    if (ramps) {
+      kernel.coefficients.ramp(ramp_frames);
+    }
+  });
   for (const std::uint16_t index : turned_) {
     is_turned_[index] = false;
   }
@@ -100,45 +125,9 @@ void Parameters::apply(Bank<T>& bank, const Voices& voices, EnergyWatch& watch) 
 }
 
 template <class T>
-void Parameters::apply(PartBank<T>& part, std::size_t p, const Voices& voices,
-                       EnergyWatch& watch) const {
-  const auto& depending = part.program.depending;
-  const bool has_turned = std::any_of(turned_.begin(), turned_.end(), [&](std::uint16_t index) {
-    return !depending[index].empty();
-  });
-  for (std::size_t first = 0; first < voices.size(); first += part.width) {
-    bool ramps = false;
-    for (std::size_t lane = first; lane < voices.pack_end(first, part.width); ++lane) {
-      const Voice& voice = voices[lane];
-      const bool is_tuned = voice.is_new || voice.is_retuned;
-      if (!voice.awake || !(has_turned || is_tuned)) {
-        continue;
-      }
-      if (voice.is_new) {
-        watch.forget(lane, p);
-        part.of(lane).reset(lane % part.width);
-      }
-      watch.stir(voice, lane, p);
-      const bool ramped = !voice.is_new && !playing_.bare;
-      for (std::uint32_t c = 0; is_tuned && c < part.program.coefficients.size(); ++c) {
-        set_coefficient(part, lane, c, voice, ramped);
-      }
-      for (std::size_t i = 0; !is_tuned && i < turned_.size(); ++i) {
-        for (const std::uint32_t c : depending[turned_[i]]) {
-          set_coefficient(part, lane, c, voice, ramped);
-        }
-      }
-      ramps |= ramped;
-    }
-    if (ramps) {
-      part.of(first).coefficients.ramp(ramp_frames);
-    }
-  }
-}
-
-template <class T>
-void Parameters::fill_audio(Bank<T>& bank, const PartBank<T>& part, std::size_t first,
-                            const Segment& segment, const Voices& voices) {
+void Parameters::fill_audio(Bank<T>& bank, const VoiceGroup& group, const Segment& segment,
+                            const Voices& voices) {
+  const PartBank<T>& part = bank.parts[group.part];
   const Program& program = part.program;
   T* value = bank.audio.data();
   bool is_beyond = false;
@@ -151,10 +140,10 @@ void Parameters::fill_audio(Bank<T>& bank, const PartBank<T>& part, std::size_t 
       is_beyond |= values_[audio.parameter] != wanted;
     }
     for (const std::uint32_t c : program.audio_coefficients) {
-      for (std::size_t lane = first; lane < first + part.width; ++lane) {
+      for (std::size_t lane = group.first; lane < group.first + part.width; ++lane) {
+        const double factor = lane < group.end ? voices[lane].factor : 1.0;
         *value++ =
-            static_cast<T>(coefficient_value(program, program.coefficients[c], values_,
-                                             lane < voices.size() ? voices[lane].factor : 1.0));
+            static_cast<T>(coefficient_value(program, program.coefficients[c], values_, factor));
       }
     }
   }
@@ -163,9 +152,9 @@ void Parameters::fill_audio(Bank<T>& bank, const PartBank<T>& part, std::size_t 
 
 template void Parameters::apply(Bank<float>&, const Voices&, EnergyWatch&);
 template void Parameters::apply(Bank<double>&, const Voices&, EnergyWatch&);
-template void Parameters::fill_audio(Bank<float>&, const PartBank<float>&, std::size_t,
-                                     const Segment&, const Voices&);
-template void Parameters::fill_audio(Bank<double>&, const PartBank<double>&, std::size_t,
-                                     const Segment&, const Voices&);
+template void Parameters::fill_audio(Bank<float>&, const VoiceGroup&, const Segment&,
+                                     const Voices&);
+template void Parameters::fill_audio(Bank<double>&, const VoiceGroup&, const Segment&,
+                                     const Voices&);
 
 }  // namespace ressort

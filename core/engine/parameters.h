@@ -9,7 +9,6 @@
 
 #include "core/engine/energy_watch.h"
 #include "core/engine/mixing/bank.h"
-#include "core/engine/mixing/segment.h"
 #include "core/engine/voices.h"
 
 namespace ressort {
@@ -35,10 +34,9 @@ class Parameters {
   // voices that are new to the start, and all that depends on what has changed.
   template <class T>
   void apply(Bank<T>& bank, const Voices& voices, EnergyWatch& watch);
-  // What depends on a parameter that audio gives, for every sample, of the kernel that begins with
-  // voice `first`.
+  // What depends on a parameter that audio gives, for every sample.
   template <class T>
-  void fill_audio(Bank<T>& bank, const PartBank<T>& part, std::size_t first, const Segment& segment,
+  void fill_audio(Bank<T>& bank, const VoiceGroup& group, const Segment& segment,
                   const Voices& voices);
 
   // As Engine::take_changes says.
@@ -47,11 +45,6 @@ class Parameters {
 
  private:
   double within_limits(std::size_t index, double value) const;
-  template <class T>
-  void apply(PartBank<T>& part, std::size_t p, const Voices& voices, EnergyWatch& watch) const;
-  template <class T>
-  void set_coefficient(PartBank<T>& part, std::size_t lane, std::uint32_t c, const Voice& voice,
-                       bool ramped) const;
 
   const Playing& playing_;
   std::vector<double> values_;

@@ -59,13 +59,13 @@ void place_before(Bank<T>& bank, PartBank<T>& part, std::size_t lane) {
 
 // The voices of one kernel.
 template <class T>
-void take_over(Bank<T>& bank, PartBank<T>& part, const PartBank<T>& from, std::size_t first,
+void take_over(Bank<T>& bank, PartBank<T>& part, const PartBank<T>& from, const VoiceGroup& group,
                const Voices& voices) {
   const Program& program = part.program;
-  Kernel<T>& kernel = part.of(first);
+  Kernel<T>& kernel = part.of(group.first);
   Coefficients<T>& coefficients = kernel.coefficients;
   bool any = false;
-  for (std::size_t lane = first; lane < voices.pack_end(first, part.width); ++lane) {
+  for (std::size_t lane = group.first; lane < group.end; ++lane) {
     if (!voices[lane].awake) {
       continue;
     }
@@ -74,7 +74,7 @@ void take_over(Bank<T>& bank, PartBank<T>& part, const PartBank<T>& from, std::s
     coefficients.go_on(lane % part.width, from.of(lane).coefficients, lane % from.width);
     for (std::size_t i = 0; i < program.inputs.size(); ++i) {
       const InputSlot& input = program.inputs[i];
-      const std::size_t at = i * part.width + lane - first;
+      const std::size_t at = i * part.width + lane - group.first;
       bank.value[at] = input.is_force ? T(0) : static_cast<T>(bank.x[input.node]);
       bank.velocity[at] = input.is_force ? T(0) : static_cast<T>(bank.v[input.node]);
     }
@@ -94,7 +94,7 @@ void take_over(Bank<T>& bank, PartBank<T>& part, const PartBank<T>& from, std::s
                .velocity = bank.velocity.data(),
                .audio = bank.audio.data(),
                .outputs = bank.outputs.data()});
-  std::copy_n(bank.outputs.data(), part.row(), part.last_of(first));
+  std::copy_n(bank.outputs.data(), part.row(), part.last_of(group.first));
   coefficients.ramp_frames = ramp_frames;
 }
 
@@ -108,12 +108,9 @@ bool take_over(Bank<T>& bank, const Bank<T>& from, const Voices& voices) {
   }
   bank.filled_part = nullptr;
   bank.still = 0;
-  for (std::size_t p = 0; p < bank.parts.size(); ++p) {
-    PartBank<T>& part = bank.parts[p];
-    for (std::size_t first = 0; first < voices.size(); first += part.width) {
-      take_over(bank, part, from.parts[p], first, voices);
-    }
-  }
+  bank.each_group([&](PartBank<T>& part, const VoiceGroup& group) {
+    take_over(bank, part, from.parts[group.part], group, voices);
+  });
   return true;
 }
 

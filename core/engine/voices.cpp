@@ -62,14 +62,14 @@ bool Voices::wake(std::size_t lane) {
 bool Voices::press_key(int key, std::uint8_t channel, double highest_factor) {
   // As it is written there is one instrument: a key is only a way to excite it.
   const bool is_one = playing_.tuning == Tuning::fixed;
-  const std::size_t lane = is_one && !voices_[last_].fading ? last_ : lane_for(key, channel);
-  const bool sounds_key = is_one || (voices_[lane].key == key && voices_[lane].frequency_hz != 0.0);
-  const bool starts = !is_live(lane) || !sounds_key;
+  const bool stays = is_one && !voices_[last_].fading;
+  Voice& voice = stays ? voices_[last_] : voice_for(key, channel);
+  last_ = static_cast<std::size_t>(&voice - voices_.data());
+  const bool sounds_key = is_one || (voice.key == key && voice.frequency_hz != 0.0);
+  const bool starts = !voice.is_live() || !sounds_key;
   if (starts) {
-    start(lane, is_one ? 0.0 : playable_hz(key, highest_factor));
+    start(last_, is_one ? 0.0 : playable_hz(key, highest_factor));
   }
-  last_ = lane;
-  Voice& voice = voices_[lane];
   voice.key = static_cast<std::uint8_t>(key);
   voice.channel = channel;
   voice.held = true;
@@ -87,15 +87,14 @@ bool Voices::lift_key(Voice& voice, int key, std::uint8_t channel) const {
   return !voice.sustained;
 }
 
-void Voices::release(std::size_t lane) {
-  voices_[lane].held = voices_[lane].sustained = false;
+void Voices::release(Voice& voice) const {
+  voice.held = voice.sustained = false;
   if (playing_.release_s > 0.0) {
-    fade(lane, playing_.release_s);
+    fade(voice, playing_.release_s);
   }
 }
 
-void Voices::fade(std::size_t lane, double seconds) {
-  Voice& voice = voices_[lane];
+void Voices::fade(Voice& voice, double seconds) const {
   const double step = -1.0 / std::max(1.0, seconds * rate_hz_);
   voice.gain_step = std::min(voice.gain_step, step);
   voice.fading = true;
@@ -103,17 +102,17 @@ void Voices::fade(std::size_t lane, double seconds) {
 }
 
 void Voices::panic() {
-  for (std::size_t lane = 0; lane < voices_.size(); ++lane) {
-    if (voices_[lane].awake) {
-      fade(lane, steal_fade_s);
+  for (Voice& voice : voices_) {
+    if (voice.awake) {
+      fade(voice, steal_fade_s);
     }
   }
   pedal_is_down_.fill(false);
 }
 
-void Voices::lose(std::size_t lane) {
-  resets_ += voices_[lane].lost ? 0 : 1;
-  voices_[lane].lost = has_lost_ = true;
+void Voices::lose(Voice& voice) {
+  resets_ += voice.lost ? 0 : 1;
+  voice.lost = true;
 }
 
 void Voices::advance_fades(std::size_t frames) {
@@ -121,22 +120,18 @@ void Voices::advance_fades(std::size_t frames) {
     for (std::size_t n = 0; n < frames && voice.gain_step != 0.0; ++n) {
       voice.gain = voice.next_gain(voice.gain);
     }
-  }
-  for (std::size_t lane = 0; has_lost_ && lane < voices_.size(); ++lane) {
-    if (voices_[lane].lost && !voices_[lane].fading) {
-      fade(lane, steal_fade_s);
+    if (voice.lost && !voice.fading) {
+      fade(voice, steal_fade_s);
     }
   }
-  has_lost_ = false;
 }
 
-bool Voices::update(std::size_t lane) {
-  Voice& voice = voices_[lane];
+bool Voices::update(Voice& voice) {
   const double peak = voice.peak * playing_.gain * voice.gain;
   voice.peak = 0.0;
   voice.level = std::max(peak, voice.level * level_kept_);
   if (voice.fading && voice.gain == 0.0) {
-    end(lane);
+    end(voice);
     return false;
   }
   voice.quiet_frames = peak < quiet_level ? voice.quiet_frames + max_block_frames : 0;
@@ -148,21 +143,21 @@ bool Voices::update(std::size_t lane) {
   return true;
 }
 
-void Voices::sleep(std::size_t lane) {
-  const double frequency_hz = voices_[lane].frequency_hz;
-  end(lane);
-  voices_[lane].frequency_hz = frequency_hz;
+void Voices::sleep(Voice& voice) {
+  const double frequency_hz = voice.frequency_hz;
+  end(voice);
+  voice.frequency_hz = frequency_hz;
 }
 
-void Voices::end(std::size_t lane) {
-  voices_[lane] = Voice{};
+void Voices::end(Voice& voice) {
+  voice = Voice{};
   --awake_;
 }
 
 void Voices::add_to(EngineMeters& meters) const {
-  for (std::size_t lane = 0; lane < voices_.size(); ++lane) {
-    meters.voices += is_live(lane) && voices_[lane].level > quiet_level ? 1 : 0;
-    meters.stepped += is_live(lane) ? 1 : 0;
+  for (const Voice& voice : voices_) {
+    meters.voices += voice.is_live() && voice.level > quiet_level ? 1 : 0;
+    meters.stepped += voice.is_live() ? 1 : 0;
   }
   meters.resets = resets_;
   meters.stolen = stolen_;
@@ -171,68 +166,66 @@ void Voices::add_to(EngineMeters& meters) const {
 
 // --- who gives way ------------------------------------------------------------------------------
 
-std::size_t Voices::most_live() const {
-  return std::min(most_voices(playing_), limit_);
+template <class May, class Less>
+Voice* Voices::least_of(May&& may, Less&& less) {
+  Voice* least = nullptr;
+  for (Voice& voice : voices_) {
+    if (may(voice) && (least == nullptr || less(voice, *least))) {
+      least = &voice;
+    }
+  }
+  return least;
+}
+
+// How many voices are to give way before no more sound than may, and `more`.
+std::size_t Voices::too_many(std::size_t more) const {
+  const auto live = static_cast<std::size_t>(std::count_if(
+      voices_.begin(), voices_.end(), [](const Voice& voice) { return voice.is_live(); }));
+  const std::size_t most = std::min(most_voices(playing_), limit_);
+  return live + more - std::min(live + more, most);
 }
 
 void Voices::limit(std::size_t most) {
   limit_ = std::max<std::size_t>(1, most);
-  std::size_t live = 0;
-  for (std::size_t lane = 0; lane < voices_.size(); ++lane) {
-    live += is_live(lane) ? 1 : 0;
-  }
+  const auto may_go = [&](const Voice& voice) {
+    return voice.is_live() && !(&voice == &voices_[last_] && voice.held);
+  };
   const auto is_heard_less = [](const Voice& a, const Voice& b) {
     const bool a_is_up = !a.held && !a.sustained;
     const bool b_is_up = !b.held && !b.sustained;
     return a_is_up != b_is_up ? a_is_up : a.level < b.level;
   };
-  for (; live > most_live(); --live) {
-    std::size_t least = voices_.size();
-    for (std::size_t lane = 0; lane < voices_.size(); ++lane) {
-      const bool may_go = is_live(lane) && !(lane == last_ && voices_[lane].held);
-      if (may_go && (least == voices_.size() || is_heard_less(voices_[lane], voices_[least]))) {
-        least = lane;
-      }
-    }
-    shed_ += voices_[least].level > quiet_level ? 1 : 0;
+  for (std::size_t left = too_many(0); left > 0; --left) {
+    Voice& least = *least_of(may_go, is_heard_less);
+    shed_ += least.level > quiet_level ? 1 : 0;
     fade(least, steal_fade_s);
   }
 }
 
 // The same key's, a free one, or the quietest's place.
-std::size_t Voices::lane_for(int key, std::uint8_t channel) {
-  std::size_t live = 0;
-  std::size_t quietest = voices_.size();
-  for (std::size_t lane = 0; lane < voices_.size(); ++lane) {
-    if (!is_live(lane)) {
-      continue;
-    }
-    const Voice& voice = voices_[lane];
-    if (voice.frequency_hz > 0.0 && voice.key == key && voice.channel == channel) {
-      return lane;
-    }
-    ++live;
-    if (quietest == voices_.size() || voice.level < voices_[quietest].level) {
-      quietest = lane;
-    }
+Voice& Voices::voice_for(int key, std::uint8_t channel) {
+  const auto is_live = [](const Voice& voice) { return voice.is_live(); };
+  const auto sounds_key = [&](const Voice& voice) {
+    return is_live(voice) && voice.frequency_hz > 0.0 && voice.key == key &&
+           voice.channel == channel;
+  };
+  const auto any = [](const Voice&, const Voice&) { return false; };
+  if (Voice* const same = least_of(sounds_key, any)) {
+    return *same;
   }
-  if (live >= most_live()) {
-    stolen_ += voices_[quietest].level > quiet_level ? 1 : 0;
+  if (too_many(1) > 0) {
+    Voice& quietest =
+        *least_of(is_live, [](const Voice& a, const Voice& b) { return a.level < b.level; });
+    stolen_ += quietest.level > quiet_level ? 1 : 0;
     fade(quietest, steal_fade_s);
   }
   // A reserve lane is free unless several voices were stolen within one fade; then the one
   // that has faded most goes at once.
-  std::size_t faintest = voices_.size();
-  for (std::size_t lane = 0; lane < voices_.size(); ++lane) {
-    if (!voices_[lane].awake) {
-      return lane;
-    }
-    if (voices_[lane].fading &&
-        (faintest == voices_.size() || voices_[lane].gain < voices_[faintest].gain)) {
-      faintest = lane;
-    }
+  if (Voice* const free = least_of([](const Voice& voice) { return !voice.awake; }, any)) {
+    return *free;
   }
-  return faintest;
+  return *least_of([](const Voice& voice) { return voice.fading; },
+                   [](const Voice& a, const Voice& b) { return a.gain < b.gain; });
 }
 
 // --- tuning -------------------------------------------------------------------------------------

@@ -16,6 +16,8 @@ namespace ressort {
 inline constexpr double quiet_level = 1e-5;  // -100 dBFS
 
 struct Voice {
+  bool is_live() const { return awake && !fading; }
+
   bool awake = false;       // steps and is heard
   bool lost = false;        // its stability: it fades from where it was
   bool fading = false;      // gives way; its lane is free when the fade ends
@@ -46,11 +48,6 @@ class Voices {
   std::size_t size() const { return voices_.size(); }
   Voice& operator[](std::size_t lane) { return voices_[lane]; }
   const Voice& operator[](std::size_t lane) const { return voices_[lane]; }
-  // The lanes of the kernel that begins with `first` end there.
-  std::size_t pack_end(std::size_t first, std::size_t width) const {
-    return std::min(voices_.size(), first + width);
-  }
-  bool is_live(std::size_t lane) const { return voices_[lane].awake && !voices_[lane].fading; }
   bool is_idle() const { return awake_ == 0; }  // nobody is awake
   // The lane that was played last: what names no key acts on it.
   std::size_t last() const { return last_; }
@@ -64,7 +61,7 @@ class Voices {
   // A key goes up: whether that releases this voice.
   bool lift_key(Voice& voice, int key, std::uint8_t channel) const;
   void set_pedal(std::uint8_t channel, bool is_down) { pedal_is_down_[channel] = is_down; }
-  void release(std::size_t lane);
+  void release(Voice& voice) const;
   void limit(std::size_t most);
   void panic();
 
@@ -79,22 +76,25 @@ class Voices {
   void forget_changes();
 
   // The output has left its bounds: the voice fades as soon as the segment is over.
-  void lose(std::size_t lane);
+  void lose(Voice& voice);
   // The gains of voices that fade, after a segment.
   void advance_fades(std::size_t frames);
   // Of one that is awake, once in max_block_frames: keeps its level, and ends it where it has
   // faded. True if it has been quiet for so long that it may sleep unless something moves it.
-  bool update(std::size_t lane);
+  bool update(Voice& voice);
   // From here it wakes at the same pitch.
-  void sleep(std::size_t lane);
+  void sleep(Voice& voice);
 
   void add_to(EngineMeters& meters) const;
 
  private:
-  void fade(std::size_t lane, double seconds);
-  void end(std::size_t lane);
-  std::size_t most_live() const;
-  std::size_t lane_for(int key, std::uint8_t channel);
+  void fade(Voice& voice, double seconds) const;
+  // The least of the voices for which `may` says so; null where there is none.
+  template <class May, class Less>
+  Voice* least_of(May&& may, Less&& less);
+  void end(Voice& voice);
+  std::size_t too_many(std::size_t more) const;
+  Voice& voice_for(int key, std::uint8_t channel);
   double playable_hz(int key, double highest_factor) const;
   double factor_for(const Voice& voice, double highest_factor) const;
   double factor_at(double frequency_hz) const;
@@ -108,7 +108,6 @@ class Voices {
   std::array<bool, 16> pedal_is_down_{};
   double bend_ = 0.0;
   bool has_changed_ = false;
-  bool has_lost_ = false;  // a voice its stability, in this segment
   std::size_t limit_ = std::numeric_limits<std::size_t>::max();
   std::uint64_t resets_ = 0;
   std::uint64_t stolen_ = 0;

@@ -1,7 +1,5 @@
 #include "core/engine/mixing/audio_inputs.h"
 
-#include <algorithm>
-
 namespace ressort {
 
 AudioInputs::AudioInputs(const Machine& machine, const Playing& playing, IsSilent is_silent)
@@ -29,13 +27,6 @@ const double* AudioInputs::channel_of(const Driven& input, const Segment& segmen
              : nullptr;
 }
 
-bool AudioInputs::are_silent(const Segment& segment) const {
-  return std::all_of(inputs_.begin(), inputs_.end(), [&](const Driven& input) {
-    const double* const channel = channel_of(input, segment);
-    return channel == nullptr || is_silent_(channel + segment.at, segment.frames);
-  });
-}
-
 bool AudioInputs::listen(const Segment& segment) {
   bool any = false;
   for (Driven& input : inputs_) {
@@ -60,17 +51,17 @@ void AudioInputs::remember(const Segment& segment) {
 }
 
 template <class T>
-void AudioInputs::add(Bank<T>& bank, std::size_t p, std::size_t first, std::size_t frames,
+void AudioInputs::add(Bank<T>& bank, const VoiceGroup& group, std::size_t frames,
                       const Voices& voices, EnergyWatch& watch) const {
-  const PartBank<T>& part = bank.parts[p];
+  const PartBank<T>& part = bank.parts[group.part];
   for (std::size_t i = 0; i < part.program.inputs.size(); ++i) {
     const InputSlot& slot = part.program.inputs[i];
     const Driven& input = inputs_[slot.input];
     if (input.samples == nullptr) {
       continue;
     }
-    for (std::size_t lane = first; lane < voices.pack_end(first, part.width); ++lane) {
-      watch.stir(voices[lane], lane, p);
+    for (std::size_t lane = group.first; lane < group.end; ++lane) {
+      watch.stir(voices[lane], lane, group.part);
     }
     bank.filled_part = nullptr;
     AudioInput<T> added{.samples = input.samples,
@@ -90,9 +81,9 @@ void AudioInputs::add(Bank<T>& bank, std::size_t p, std::size_t first, std::size
   }
 }
 
-template void AudioInputs::add(Bank<float>&, std::size_t, std::size_t, std::size_t, const Voices&,
+template void AudioInputs::add(Bank<float>&, const VoiceGroup&, std::size_t, const Voices&,
                                EnergyWatch&) const;
-template void AudioInputs::add(Bank<double>&, std::size_t, std::size_t, std::size_t, const Voices&,
+template void AudioInputs::add(Bank<double>&, const VoiceGroup&, std::size_t, const Voices&,
                                EnergyWatch&) const;
 
 }  // namespace ressort

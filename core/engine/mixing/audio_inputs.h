@@ -6,7 +6,6 @@
 
 #include "core/engine/energy_watch.h"
 #include "core/engine/mixing/bank.h"
-#include "core/engine/mixing/segment.h"
 
 namespace ressort {
 
@@ -16,10 +15,7 @@ class AudioInputs {
   AudioInputs(const Machine& machine, const Playing& playing, IsSilent is_silent);
   void go_on_from(const AudioInputs& from);
 
-  // Whether no sound comes in.
-  bool are_silent(const Segment& segment) const;
-  // Before a segment; silence after silence is not looked at again. Whether some sound comes in:
-  // it wakes the voice that it drives.
+  // Before a segment: whether some sound comes in. Silence after silence is not looked at again.
   bool listen(const Segment& segment);
   // After a segment: where it ended is needed for the velocity of the next one's first sample.
   void remember(const Segment& segment);
@@ -27,8 +23,8 @@ class AudioInputs {
   bool moves(std::size_t input) const { return inputs_[input].samples != nullptr; }
   // On top of where the drivers are; in the bare network instead of that.
   template <class T>
-  void add(Bank<T>& bank, std::size_t p, std::size_t first, std::size_t frames,
-           const Voices& voices, EnergyWatch& watch) const;
+  void add(Bank<T>& bank, const VoiceGroup& group, std::size_t frames, const Voices& voices,
+           EnergyWatch& watch) const;
 
  private:
   struct Driven {

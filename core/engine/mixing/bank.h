@@ -39,8 +39,9 @@ struct PartBank {
 
 template <class T>
 struct Bank {
-  Bank(const Machine& machine, std::size_t voices, Isa isa, const Progress& progress)
-      : mixer(with_isa(isa, []<Isa level>() { return make_mixer<level, T>(); })) {
+  Bank(const Machine& machine, std::size_t voices_in, Isa isa, const Progress& progress)
+      : voices(voices_in),
+        mixer(with_isa(isa, []<Isa level>() { return make_mixer<level, T>(); })) {
     std::size_t inputs = 0;
     std::size_t audio_coefficients = 0;
     std::size_t channels = 0;
@@ -69,6 +70,17 @@ struct Bank {
     v.resize(nodes);
   }
 
+  // Calls `use(part, group)` for every kernel.
+  template <class Use>
+  void each_group(Use&& use) {
+    for (std::size_t p = 0; p < parts.size(); ++p) {
+      for (std::size_t first = 0; first < voices; first += parts[p].width) {
+        use(parts[p], VoiceGroup{p, first, std::min(voices, first + parts[p].width)});
+      }
+    }
+  }
+
+  std::size_t voices;
   std::vector<PartBank<T>> parts;
   // As Block says; each part in turn.
   Aligned<T> value;
