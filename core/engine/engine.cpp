@@ -52,30 +52,209 @@ struct Engine::Player {
     voices[0].level = 0.0;  // no note: the first one may take its place
   }
 
-  bool go_on_from(const Player& from);
-
   // --- events ---
-  void handle(const Event& event);
-  void turn_controller(const Event& event);
+
   // Releases the voices for which `wanted` says so.
   template <class Wanted>
-  void release(Wanted&& wanted);
+  void release(Wanted&& wanted) {
+    for (std::size_t lane = 0; lane < voices.size(); ++lane) {
+      if (wanted(voices[lane])) {
+        gestures.release(lane);
+        voices.release(voices[lane]);
+      }
+    }
+  }
+
+  void handle(const Event& event) {
+    const bool is_number = std::isfinite(event.value) && std::isfinite(event.value2);
+    if (!is_number && event.kind != EventKind::panic) {
+      return;
+    }
+    switch (event.kind) {
+      case EventKind::note_on:
+        if (voices.press_key(event.index, event.channel, parameters.highest_factor())) {
+          gestures.place(voices.last());
+        }
+        return gestures.perform(Source::note, event.index, event.value);
+      case EventKind::note_off:
+        return release(
+            [&](Voice& voice) { return voices.lift_key(voice, event.index, event.channel); });
+      case EventKind::controller:
+        return turn_controller(event);
+      case EventKind::pressure:
+      case EventKind::key_pressure:
+        return gestures.perform(Source::pressure, 0, event.value);
+      case EventKind::bend:
+        return voices.bend(event.value);
+      case EventKind::custom:
+        if (event.index < playing.controls.size()) {
+          gestures.perform(playing.controls[event.index], event.value);
+        }
+        return;
+      case EventKind::parameter:
+        return parameters.set(event.index, event.value);
+      case EventKind::gesture:
+        return gestures.perform_live(event);
+      case EventKind::panic:
+        return voices.panic();
+    }
+  }
+
+  // Three controllers mean the same everywhere; all of them may be in the preset.
+  void turn_controller(const Event& event) {
+    constexpr int sustain_pedal = 64;
+    constexpr int all_sound_off = 120;
+    constexpr int all_notes_off = 123;
+    const std::uint8_t channel = event.channel & 15;
+    if (event.index == sustain_pedal) {
+      const bool is_down = event.value >= 0.5;
+      voices.set_pedal(channel, is_down);
+      release([&](const Voice& voice) {
+        return !is_down && voice.sustained && voice.channel == channel;
+      });
+    } else if (event.index == all_sound_off) {
+      voices.panic();
+    } else if (event.index == all_notes_off) {
+      release([&](const Voice& voice) { return voice.held && voice.channel == channel; });
+    }
+    gestures.perform(Source::controller, event.index, event.value);
+  }
 
   // --- sound ---
+
   // As much of the segment as can be computed in one go; returns its end.
-  std::size_t play(Segment segment);
+  std::size_t play(Segment segment) {
+    if (voices.is_idle() && !playing.noise && !audio.listen(segment)) {
+      audio.remember(segment);
+      since_update = (since_update + segment.frames) % max_block_frames;
+      return segment.end();
+    }
+    segment.frames = std::min(segment.frames, max_block_frames - since_update);
+    if (audio.listen(segment)) {
+      gestures.wake(voices.last());
+    }
+    std::visit([&](auto& b) { play(b, segment); }, bank);
+    audio.remember(segment);
+    if (playing.noise) {
+      mixing.make_noise(segment);
+    }
+    return segment.end();
+  }
+
   template <class T>
-  void play(Bank<T>& b, const Segment& segment);
+  void play(Bank<T>& b, const Segment& segment) {
+    apply_changes(b);
+    b.each_group([&](PartBank<T>& part, const VoiceGroup& group) {
+      if (watch.has_still()) {
+        stir_moved(part.program, group);
+        mixing.add_still(part.program, group, segment, voices, watch);
+      }
+      if (watch.steps(group, voices)) {
+        gestures.fill(b, group, segment.frames, watch);
+        audio.add(b, group, segment.frames, voices, watch);
+        parameters.fill_audio(b, group, segment, voices);
+        part.of(group.first)
+            .step({.frames = segment.frames,
+                   .value = b.value.data(),
+                   .velocity = b.velocity.data(),
+                   .audio = b.audio.data(),
+                   .outputs = b.outputs.data()});
+        mixing.add(b, group, segment, voices, watch);
+      }
+    });
+    voices.advance_fades(segment.frames);
+    since_update += segment.frames;
+    if (since_update == max_block_frames) {
+      since_update = 0;
+      update(b);
+    }
+  }
+
   template <class T>
-  void apply_changes(Bank<T>& b);
+  void apply_changes(Bank<T>& b) {
+    if (voices.has_changed() || parameters.has_changed()) {
+      voices.retune(parameters.has_changed_highest_factor(), parameters.highest_factor());
+      parameters.apply(b, voices, watch);
+      voices.forget_changes();
+    }
+  }
+
   // What is moved from outside does not stand still any more.
-  void stir_moved(const Program& program, const VoiceGroup& group);
+  void stir_moved(const Program& program, const VoiceGroup& group) {
+    for (std::size_t lane = group.first; lane < group.end; ++lane) {
+      const auto is_moved = [&](const InputSlot& input) {
+        return audio.moves(input.input) || gestures.is_moving(lane, input.input);
+      };
+      if (voices[lane].awake && watch.is_still(lane, group.part) &&
+          std::any_of(program.inputs.begin(), program.inputs.end(), is_moved)) {
+        watch.stir(voices[lane], lane, group.part);
+      }
+    }
+  }
+
   // Once in max_block_frames, counted from the engine's start: so what sleeps or gives way does not
   // depend on how the time is cut into blocks.
   template <class T>
-  void update(Bank<T>& b);
+  void update(Bank<T>& b) {
+    if (voices.is_idle()) {
+      return;
+    }
+    watch.look_around(b, voices, parameters.values());
+    const double bound = quiet_level / std::max(1e-30, playing.gain);
+    for (std::size_t lane = 0; lane < voices.size(); ++lane) {
+      Voice& voice = voices[lane];
+      const bool was_awake = voice.awake;
+      // Where nothing moves anywhere: a slow wave may still be on its way to the output.
+      if (was_awake && voices.update(voice) && !gestures.is_moving(lane) &&
+          std::all_of(b.parts.begin(), b.parts.end(), [&](const PartBank<T>& part) {
+            return part.of(lane).is_near_start(lane % part.width, bound);
+          })) {
+        voices.sleep(voice);
+      }
+      if (was_awake && !voice.awake) {
+        watch.forget(lane);
+      }
+    }
+    watch.read_energy(voices);
+  }
 
-  EngineMeters meters() const;
+  EngineMeters meters() const {
+    EngineMeters meters = watch.meters(voices);
+    voices.add_to(meters);
+    meters.beyond = parameters.beyond();
+    const auto count_modes = [&](const auto& part) {
+      for (std::size_t lane = 0; lane < voices.size(); ++lane) {
+        if (voices[lane].awake) {
+          const Awake awake = part.of(lane).awake();
+          meters.modes += awake.of;
+          meters.modes_awake += awake.modes;
+        }
+      }
+    };
+    std::visit([&](const auto& b) { std::for_each(b.parts.begin(), b.parts.end(), count_modes); },
+               bank);
+    return meters;
+  }
+
+  bool go_on_from(const Player& from) {
+    const bool goes_on = std::visit(
+        [&](auto& b) {
+          using Same = std::remove_reference_t<decltype(b)>;
+          const auto* const other = std::get_if<Same>(&from.bank);
+          return other != nullptr && take_over(b, *other, from.voices);
+        },
+        bank);
+    if (goes_on) {
+      voices.go_on_from(from.voices);
+      parameters.go_on_from(from.parameters);
+      gestures.go_on_from(from.gestures);
+      audio.go_on_from(from.audio);
+      watch.go_on_from(from.watch);
+      mixing.go_on_from(from.mixing);
+      since_update = from.since_update;
+    }
+    return goes_on;
+  }
 
   const Machine machine;
   const Playing playing;
@@ -88,205 +267,6 @@ struct Engine::Player {
   Mixing mixing;
   std::size_t since_update = 0;  // frames, below max_block_frames between two segments
 };
-
-// --- events -------------------------------------------------------------------------------------
-
-template <class Wanted>
-void Engine::Player::release(Wanted&& wanted) {
-  for (std::size_t lane = 0; lane < voices.size(); ++lane) {
-    if (wanted(voices[lane])) {
-      gestures.release(lane);
-      voices.release(voices[lane]);
-    }
-  }
-}
-
-void Engine::Player::handle(const Event& event) {
-  const bool is_number = std::isfinite(event.value) && std::isfinite(event.value2);
-  if (!is_number && event.kind != EventKind::panic) {
-    return;
-  }
-  switch (event.kind) {
-    case EventKind::note_on:
-      if (voices.press_key(event.index, event.channel, parameters.highest_factor())) {
-        gestures.place(voices.last());
-      }
-      return gestures.perform(Source::note, event.index, event.value);
-    case EventKind::note_off:
-      return release(
-          [&](Voice& voice) { return voices.lift_key(voice, event.index, event.channel); });
-    case EventKind::controller:
-      return turn_controller(event);
-    case EventKind::pressure:
-    case EventKind::key_pressure:
-      return gestures.perform(Source::pressure, 0, event.value);
-    case EventKind::bend:
-      return voices.bend(event.value);
-    case EventKind::custom:
-      if (event.index < playing.controls.size()) {
-        gestures.perform(playing.controls[event.index], event.value);
-      }
-      return;
-    case EventKind::parameter:
-      return parameters.set(event.index, event.value);
-    case EventKind::gesture:
-      return gestures.perform_live(event);
-    case EventKind::panic:
-      return voices.panic();
-  }
-}
-
-// Three controllers mean the same everywhere; all of them may be in the preset.
-void Engine::Player::turn_controller(const Event& event) {
-  constexpr int sustain_pedal = 64;
-  constexpr int all_sound_off = 120;
-  constexpr int all_notes_off = 123;
-  const std::uint8_t channel = event.channel & 15;
-  if (event.index == sustain_pedal) {
-    const bool is_down = event.value >= 0.5;
-    voices.set_pedal(channel, is_down);
-    release([&](const Voice& voice) {
-      return !is_down && voice.sustained && voice.channel == channel;
-    });
-  } else if (event.index == all_sound_off) {
-    voices.panic();
-  } else if (event.index == all_notes_off) {
-    release([&](const Voice& voice) { return voice.held && voice.channel == channel; });
-  }
-  gestures.perform(Source::controller, event.index, event.value);
-}
-
-// --- sound --------------------------------------------------------------------------------------
-
-std::size_t Engine::Player::play(Segment segment) {
-  if (voices.is_idle() && !playing.noise && !audio.listen(segment)) {
-    audio.remember(segment);
-    since_update = (since_update + segment.frames) % max_block_frames;
-    return segment.end();
-  }
-  segment.frames = std::min(segment.frames, max_block_frames - since_update);
-  if (audio.listen(segment)) {
-    gestures.wake(voices.last());
-  }
-  std::visit([&](auto& b) { play(b, segment); }, bank);
-  audio.remember(segment);
-  if (playing.noise) {
-    mixing.make_noise(segment);
-  }
-  return segment.end();
-}
-
-template <class T>
-void Engine::Player::play(Bank<T>& b, const Segment& segment) {
-  apply_changes(b);
-  b.each_group([&](PartBank<T>& part, const VoiceGroup& group) {
-    if (watch.has_still()) {
-      stir_moved(part.program, group);
-      mixing.add_still(part.program, group, segment, voices, watch);
-    }
-    if (watch.steps(group, voices)) {
-      gestures.fill(b, group, segment.frames, watch);
-      audio.add(b, group, segment.frames, voices, watch);
-      parameters.fill_audio(b, group, segment, voices);
-      part.of(group.first)
-          .step({.frames = segment.frames,
-                 .value = b.value.data(),
-                 .velocity = b.velocity.data(),
-                 .audio = b.audio.data(),
-                 .outputs = b.outputs.data()});
-      mixing.add(b, group, segment, voices, watch);
-    }
-  });
-  voices.advance_fades(segment.frames);
-  since_update += segment.frames;
-  if (since_update == max_block_frames) {
-    since_update = 0;
-    update(b);
-  }
-}
-
-template <class T>
-void Engine::Player::apply_changes(Bank<T>& b) {
-  if (voices.has_changed() || parameters.has_changed()) {
-    voices.retune(parameters.has_changed_highest_factor(), parameters.highest_factor());
-    parameters.apply(b, voices, watch);
-    voices.forget_changes();
-  }
-}
-
-void Engine::Player::stir_moved(const Program& program, const VoiceGroup& group) {
-  for (std::size_t lane = group.first; lane < group.end; ++lane) {
-    const auto is_moved = [&](const InputSlot& input) {
-      return audio.moves(input.input) || gestures.is_moving(lane, input.input);
-    };
-    if (voices[lane].awake && watch.is_still(lane, group.part) &&
-        std::any_of(program.inputs.begin(), program.inputs.end(), is_moved)) {
-      watch.stir(voices[lane], lane, group.part);
-    }
-  }
-}
-
-template <class T>
-void Engine::Player::update(Bank<T>& b) {
-  if (voices.is_idle()) {
-    return;
-  }
-  watch.look_around(b, voices, parameters.values());
-  const double bound = quiet_level / std::max(1e-30, playing.gain);
-  for (std::size_t lane = 0; lane < voices.size(); ++lane) {
-    Voice& voice = voices[lane];
-    const bool was_awake = voice.awake;
-    // Where nothing moves anywhere: a slow wave may still be on its way to the output.
-    if (was_awake && voices.update(voice) && !gestures.is_moving(lane) &&
-        std::all_of(b.parts.begin(), b.parts.end(), [&](const PartBank<T>& part) {
-          return part.of(lane).is_near_start(lane % part.width, bound);
-        })) {
-      voices.sleep(voice);
-    }
-    if (was_awake && !voice.awake) {
-      watch.forget(lane);
-    }
-  }
-  watch.read_energy(voices);
-}
-
-EngineMeters Engine::Player::meters() const {
-  EngineMeters meters = watch.meters(voices);
-  voices.add_to(meters);
-  meters.beyond = parameters.beyond();
-  const auto count_modes = [&](const auto& part) {
-    for (std::size_t lane = 0; lane < voices.size(); ++lane) {
-      if (voices[lane].awake) {
-        const Awake awake = part.of(lane).awake();
-        meters.modes += awake.of;
-        meters.modes_awake += awake.modes;
-      }
-    }
-  };
-  std::visit([&](const auto& b) { std::for_each(b.parts.begin(), b.parts.end(), count_modes); },
-             bank);
-  return meters;
-}
-
-bool Engine::Player::go_on_from(const Player& from) {
-  const bool goes_on = std::visit(
-      [&](auto& b) {
-        using Same = std::remove_reference_t<decltype(b)>;
-        const auto* const other = std::get_if<Same>(&from.bank);
-        return other != nullptr && take_over(b, *other, from.voices);
-      },
-      bank);
-  if (goes_on) {
-    voices.go_on_from(from.voices);
-    parameters.go_on_from(from.parameters);
-    gestures.go_on_from(from.gestures);
-    audio.go_on_from(from.audio);
-    watch.go_on_from(from.watch);
-    mixing.go_on_from(from.mixing);
-    since_update = from.since_update;
-  }
-  return goes_on;
-}
 
 // --- the engine ---------------------------------------------------------------------------------
 
@@ -344,10 +324,6 @@ const Machine& Engine::machine() const {
 
 int Engine::output_count() const {
   return static_cast<int>(player_->machine.channels);
-}
-
-double Engine::rate_hz() const {
-  return player_->machine.rate_hz;
 }
 
 EngineMeters Engine::meters() const {

@@ -1,4 +1,4 @@
-// core/engine: one instrument that sounds. Voices, gestures, parameters, smoothing, the guard.
+// core/engine: one instrument that sounds: voices, parameters, gestures, the mix, the energy watch.
 #pragma once
 
 #include <array>
@@ -144,7 +144,6 @@ class Engine {
 
   const Machine& machine() const;  // [any thread], as long as the engine lives
   int output_count() const;        // [any thread], as long as the engine lives
-  double rate_hz() const;
   EngineMeters meters() const;  // [audio]
 
  private:
