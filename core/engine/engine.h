@@ -144,7 +144,7 @@ class Engine {
 
   const Machine& machine() const;  // [any thread], as long as the engine lives
   int output_count() const;        // [any thread], as long as the engine lives
-  EngineMeters meters() const;  // [audio]
+  EngineMeters meters() const;     // [audio]
 
  private:
   struct Player;
