@@ -11,7 +11,7 @@
 #include "app/realtime/lockfree.h"
 #include "app/realtime/midi.h"
 #include "core/engine/engine.h"
-#include "core/engine/limiter.h"
+#include "core/engine/mixing/limiter.h"
 
 namespace ressort {
 

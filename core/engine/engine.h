@@ -1,4 +1,4 @@
-// core/engine: one instrument that sounds. Voices, gestures, parameters, smoothing, the guard.
+// core/engine: one instrument that sounds: voices, parameters, gestures, the mix, the energy watch.
 #pragma once
 
 #include <array>
@@ -144,12 +144,11 @@ class Engine {
 
   const Machine& machine() const;  // [any thread], as long as the engine lives
   int output_count() const;        // [any thread], as long as the engine lives
-  double rate_hz() const;
-  EngineMeters meters() const;  // [audio]
+  EngineMeters meters() const;     // [audio]
 
  private:
-  struct Voices;
-  std::unique_ptr<Voices> voices_;
+  struct Player;
+  std::unique_ptr<Player> player_;
 };
 
 // The stiffness factor that brings a mode with k/m and z/m (per sample) to frequency_hz in the

@@ -1,11 +1,10 @@
-// One engine goes on where another of the same model is: with other kernels, in the same sample.
+#include "core/engine/takeover.h"
+
 #include <algorithm>
 #include <cmath>
-#include <type_traits>
 #include <utility>
 
 #include "core/engine/energy.h"
-#include "core/engine/voices.h"
 
 namespace ressort {
 
@@ -22,87 +21,8 @@ bool tells_its_velocity(const Program& program, LaneValues<T> value) {
   });
 }
 
-}  // namespace
-
-// A sample before where b.x and b.v are: from there, with nothing that pulls but the mass's own
-// spring, it gets there, and then its links have pulled.
 template <class T>
-void Engine::Voices::place_before(Bank<T>& b, PartBank<T>& part, std::size_t lane) const {
-  const Program& program = part.program;
-  Kernel<T>& kernel = part.of(lane);
-  const auto coefficient = [&](std::uint32_t c) {
-    return static_cast<double>(kernel.coefficients.value[c * part.width + lane % part.width]);
-  };
-  for (std::size_t node = 0; node < program.position.size(); ++node) {
-    b.x[node] -= b.v[node];
-  }
-  for (const MassRun& run : program.mass_runs) {
-    const double w = coefficient(run.inverse_mass);
-    const double k = run.is_oscillator ? coefficient(run.stiffness) : 0.0;
-    const double z = run.is_oscillator ? coefficient(run.damping) : 0.0;
-    const double g = run.has_gravity ? coefficient(run.gravity) : 0.0;
-    for (std::uint32_t node = run.first; node < run.first + run.count; ++node) {
-      b.v[node] = (b.v[node] + w * (k * b.x[node] + g)) / (1.0 - w * z);
-    }
-  }
-  kernel.set_state(lane % part.width, b.x.data(), b.v.data());
-}
-
-// The voices of one kernel.
-template <class T>
-void Engine::Voices::go_on(Bank<T>& b, PartBank<T>& part, const PartBank<T>& from,
-                           std::size_t first) {
-  const Program& program = part.program;
-  Kernel<T>& kernel = part.of(first);
-  Coefficients<T>& coefficients = kernel.coefficients;
-  for (std::size_t lane = first; lane < std::min(voices.size(), first + part.width); ++lane) {
-    if (!voices[lane].awake) {
-      continue;
-    }
-    from.of(lane).save(lane % from.width, b.x.data(), b.v.data());
-    coefficients.go_on(lane % part.width, from.of(lane).coefficients, lane % from.width);
-    for (std::size_t i = 0; i < program.inputs.size(); ++i) {
-      const InputSlot& input = program.inputs[i];
-      const std::size_t at = i * part.width + lane - first;
-      b.value[at] = input.is_force ? T(0) : static_cast<T>(b.x[input.node]);
-      b.velocity[at] = input.is_force ? T(0) : static_cast<T>(b.v[input.node]);
-    }
-    place_before(b, part, lane);
-  }
-  T* audio = b.audio.data();
-  for (const std::uint32_t c : program.audio_coefficients) {
-    audio = std::copy_n(coefficients.value.begin() + static_cast<std::ptrdiff_t>(c * part.width),
-                        part.width, audio);
-  }
-  const std::size_t ramp_frames = std::exchange(coefficients.ramp_frames, 0);
-  kernel.step({.frames = 1,
-               .value = b.value.data(),
-               .velocity = b.velocity.data(),
-               .audio = b.audio.data(),
-               .outputs = b.outputs.data()});
-  std::copy_n(b.outputs.data(), part.row(), part.last_of(first));
-  coefficients.ramp_frames = ramp_frames;
-}
-
-template <class T>
-void Engine::Voices::go_on(Bank<T>& b, const Bank<T>& from) {
-  b.filled_part = nullptr;
-  b.still = 0;
-  for (std::size_t p = 0; p < b.parts.size(); ++p) {
-    PartBank<T>& part = b.parts[p];
-    for (std::size_t first = 0; first < voices.size(); first += part.width) {
-      const auto begin = voices.begin() + static_cast<std::ptrdiff_t>(first);
-      const auto end =
-          voices.begin() + static_cast<std::ptrdiff_t>(std::min(voices.size(), first + part.width));
-      if (std::any_of(begin, end, [](const Voice& voice) { return voice.awake; })) {
-        go_on(b, part, from.parts[p], first);
-      }
-    }
-  }
-}
-
-template <class T>
-bool Engine::Voices::can_be_left(Bank<T>& scratch, const PartBank<T>& part) const {
+bool can_be_left(const PartBank<T>& part, const Voices& voices, Bank<T>& scratch) {
   for (std::size_t lane = 0; lane < voices.size(); ++lane) {
     const LaneValues<T> value{part.of(lane).coefficients.value.data(), part.width,
                               lane % part.width};
@@ -113,30 +33,88 @@ bool Engine::Voices::can_be_left(Bank<T>& scratch, const PartBank<T>& part) cons
   return part.of(0).save(0, scratch.x.data(), scratch.v.data());
 }
 
-bool Engine::Voices::go_on_from(const Voices& from) {
-  return std::visit(
-      [&](auto& b) {
-        using Same = std::remove_reference_t<decltype(b)>;
-        const auto* const other = std::get_if<Same>(&from.bank);
-        if (other == nullptr ||
-            !std::all_of(other->parts.begin(), other->parts.end(),
-                         [&](const auto& part) { return from.can_be_left(b, part); })) {
-          return false;
-        }
-        static_cast<Playback&>(*this) = from;
-        is_idle = false;
-        looking = Look{};
-        for (Watch& here : watches) {
-          here.is_judged = false;
-        }
-        go_on(b, *other);
-        return true;
-      },
-      bank);
+// A sample before where bank.x and bank.v are: from there, with nothing that pulls but the mass's
+// own spring, it gets there, and then its links have pulled.
+template <class T>
+void place_before(Bank<T>& bank, PartBank<T>& part, std::size_t lane) {
+  const Program& program = part.program;
+  Kernel<T>& kernel = part.of(lane);
+  const auto coefficient = [&](std::uint32_t c) {
+    return static_cast<double>(kernel.coefficients.value[c * part.width + lane % part.width]);
+  };
+  for (std::size_t node = 0; node < program.position.size(); ++node) {
+    bank.x[node] -= bank.v[node];
+  }
+  for (const MassRun& run : program.mass_runs) {
+    const double w = coefficient(run.inverse_mass);
+    const double k = run.is_oscillator ? coefficient(run.stiffness) : 0.0;
+    const double z = run.is_oscillator ? coefficient(run.damping) : 0.0;
+    const double g = run.has_gravity ? coefficient(run.gravity) : 0.0;
+    for (std::uint32_t node = run.first; node < run.first + run.count; ++node) {
+      bank.v[node] = (bank.v[node] + w * (k * bank.x[node] + g)) / (1.0 - w * z);
+    }
+  }
+  kernel.set_state(lane % part.width, bank.x.data(), bank.v.data());
 }
 
-bool Engine::go_on_from(const Engine& from) {
-  return voices_->go_on_from(*from.voices_);
+// The voices of one kernel.
+template <class T>
+void take_over(Bank<T>& bank, PartBank<T>& part, const PartBank<T>& from, const VoiceGroup& group,
+               const Voices& voices) {
+  const Program& program = part.program;
+  Kernel<T>& kernel = part.of(group.first);
+  Coefficients<T>& coefficients = kernel.coefficients;
+  bool any = false;
+  for (std::size_t lane = group.first; lane < group.end; ++lane) {
+    if (!voices[lane].awake) {
+      continue;
+    }
+    any = true;
+    from.of(lane).save(lane % from.width, bank.x.data(), bank.v.data());
+    coefficients.go_on(lane % part.width, from.of(lane).coefficients, lane % from.width);
+    for (std::size_t i = 0; i < program.inputs.size(); ++i) {
+      const InputSlot& input = program.inputs[i];
+      const std::size_t at = i * part.width + lane - group.first;
+      bank.value[at] = input.is_force ? T(0) : static_cast<T>(bank.x[input.node]);
+      bank.velocity[at] = input.is_force ? T(0) : static_cast<T>(bank.v[input.node]);
+    }
+    place_before(bank, part, lane);
+  }
+  if (!any) {
+    return;
+  }
+  T* audio = bank.audio.data();
+  for (const std::uint32_t c : program.audio_coefficients) {
+    audio = std::copy_n(coefficients.value.begin() + static_cast<std::ptrdiff_t>(c * part.width),
+                        part.width, audio);
+  }
+  const std::size_t ramp_frames = std::exchange(coefficients.ramp_frames, 0);
+  kernel.step({.frames = 1,
+               .value = bank.value.data(),
+               .velocity = bank.velocity.data(),
+               .audio = bank.audio.data(),
+               .outputs = bank.outputs.data()});
+  std::copy_n(bank.outputs.data(), part.row(), part.last_of(group.first));
+  coefficients.ramp_frames = ramp_frames;
 }
+
+}  // namespace
+
+template <class T>
+bool take_over(Bank<T>& bank, const Bank<T>& from, const Voices& voices) {
+  if (!std::all_of(from.parts.begin(), from.parts.end(),
+                   [&](const PartBank<T>& part) { return can_be_left(part, voices, bank); })) {
+    return false;
+  }
+  bank.filled_part = nullptr;
+  bank.still = 0;
+  bank.each_group([&](PartBank<T>& part, const VoiceGroup& group) {
+    take_over(bank, part, from.parts[group.part], group, voices);
+  });
+  return true;
+}
+
+template bool take_over(Bank<float>&, const Bank<float>&, const Voices&);
+template bool take_over(Bank<double>&, const Bank<double>&, const Voices&);
 
 }  // namespace ressort

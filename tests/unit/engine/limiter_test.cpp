@@ -1,5 +1,5 @@
 // The limiter: nothing passes the ceiling, nothing is touched below it.
-#include "core/engine/limiter.h"
+#include "core/engine/mixing/limiter.h"
 
 #include "tests/support/player.h"
 

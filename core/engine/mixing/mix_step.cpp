@@ -1,5 +1,5 @@
 // The loops over the voices of one kernel, compiled for each instruction set.
-#include "core/engine/mix.h"
+#include "core/engine/mixing/mix.h"
 
 #include "core/kernels/kernel.h"
 

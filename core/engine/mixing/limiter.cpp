@@ -1,4 +1,4 @@
-#include "core/engine/limiter.h"
+#include "core/engine/mixing/limiter.h"
 
 #include <algorithm>
 #include <cmath>

@@ -3,10 +3,28 @@
 #pragma once
 
 #include <cstddef>
+#include <span>
 
 #include "core/kernels/isa.h"
 
 namespace ressort {
+
+// What lies between two cuts: nothing happens within it, and all voices can be computed in one go.
+// Frames [at, at + frames) of a block's channels.
+struct Segment {
+  std::span<const double* const> inputs;  // null where there is none
+  std::span<double* const> outputs;
+  std::size_t at = 0;
+  std::size_t frames = 0;
+  std::size_t end() const { return at + frames; }
+};
+
+// The voices of one kernel of a part: lanes [first, end).
+struct VoiceGroup {
+  std::size_t part = 0;
+  std::size_t first = 0;
+  std::size_t end = 0;
+};
 
 // [frame][output][lane]
 template <class T>
@@ -31,9 +49,11 @@ struct AudioInput {
   std::size_t width = 1;  // lanes
 };
 
+using IsSilent = bool (*)(const double* samples, std::size_t frames);
+
 template <class T>
 struct Mixer {
-  bool (*is_silent)(const double* samples, std::size_t frames);
+  IsSilent is_silent;
   // The same row in every frame, [frame * step + i].
   void (*fill_rows)(const T* row, std::size_t step, std::size_t frames, T* value);
   void (*add_audio)(const AudioInput<T>& input);

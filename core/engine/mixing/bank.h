@@ -8,7 +8,7 @@
 #include <memory>
 #include <vector>
 
-#include "core/engine/mix.h"
+#include "core/engine/mixing/mix.h"
 #include "core/kernels/kernel.h"
 #include "core/progress.h"
 
@@ -39,8 +39,9 @@ struct PartBank {
 
 template <class T>
 struct Bank {
-  Bank(const Machine& machine, std::size_t voices, Isa isa, const Progress& progress)
-      : mixer(with_isa(isa, []<Isa level>() { return make_mixer<level, T>(); })) {
+  Bank(const Machine& machine, std::size_t voices_in, Isa isa, const Progress& progress)
+      : voices(voices_in),
+        mixer(with_isa(isa, []<Isa level>() { return make_mixer<level, T>(); })) {
     std::size_t inputs = 0;
     std::size_t audio_coefficients = 0;
     std::size_t channels = 0;
@@ -69,6 +70,17 @@ struct Bank {
     v.resize(nodes);
   }
 
+  // Calls `use(part, group)` for every kernel.
+  template <class Use>
+  void each_group(Use&& use) {
+    for (std::size_t p = 0; p < parts.size(); ++p) {
+      for (std::size_t first = 0; first < voices; first += parts[p].width) {
+        use(parts[p], VoiceGroup{p, first, std::min(voices, first + parts[p].width)});
+      }
+    }
+  }
+
+  std::size_t voices;
   std::vector<PartBank<T>> parts;
   // As Block says; each part in turn.
   Aligned<T> value;
@@ -76,7 +88,7 @@ struct Bank {
   Aligned<T> audio;
   Aligned<T> outputs;
 
-  // Hands that rest give every frame the same row, [input][lane], and no velocity. Of what the
+  // Drivers that rest give every frame the same row, [input][lane], and no velocity. Of what the
   // buffers hold, `filled` is in so many frames of `filled_part`, and so many velocities are 0.
   Aligned<T> row;
   Aligned<T> filled;
@@ -87,7 +99,7 @@ struct Bank {
   Mixer<T> mixer;
   Aligned<T> peak;        // [lane]
   Aligned<double> gain;   // [lane]
-  std::vector<double> x;  // [node] of a voice that is taken over
+  std::vector<double> x;  // [node] of a voice that is looked at, or taken over
   std::vector<double> v;
   std::vector<double*> heard;  // [output] where it is to be added
 };

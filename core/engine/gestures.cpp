@@ -1,0 +1,210 @@
+#include "core/engine/gestures.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace ressort {
+namespace {
+
+bool is_asked(const Control& control, Source source, int number) {
+  const bool is_in_range = number >= control.lowest_key && number <= control.highest_key;
+  return control.source == source && (source == Source::note         ? is_in_range
+                                      : source == Source::controller ? number == control.number
+                                                                     : true);
+}
+
+Stroke stroke_of(const Control& control, double amount = 1.0) {
+  return {.amount = amount,
+          .has_control = true,
+          .low = control.low,
+          .high = control.high,
+          .exponential = control.exponential,
+          .travel = control.travel};
+}
+
+}  // namespace
+
+Gestures::Gestures(const Machine& machine, const Playing& playing, Voices& voices,
+                   Parameters& parameters)
+    : machine_(machine),
+      playing_(playing),
+      voices_(voices),
+      parameters_(parameters),
+      drivers_(voices.size() * machine.inputs.size()) {
+  for (const ModelInput& input : machine.inputs) {
+    starts_.push_back(input.position);
+  }
+  for (const Control& control : playing.controls) {
+    if (const auto start = row_of(control.gesture).start) {
+      starts_[control.target] = start(on_input(control.target, stroke_of(control)));
+    }
+  }
+}
+
+void Gestures::go_on_from(const Gestures& from) {
+  drivers_ = from.drivers_;
+  starts_ = from.starts_;
+}
+
+void Gestures::place(std::size_t lane) {
+  for (std::size_t input = 0; input < starts_.size(); ++input) {
+    driver(lane, input).place(starts_[input]);
+  }
+}
+
+void Gestures::wake(std::size_t lane) {
+  if (voices_.wake(lane)) {
+    place(lane);
+  }
+}
+
+bool Gestures::is_moving(std::size_t lane) const {
+  for (std::size_t input = 0; input < starts_.size(); ++input) {
+    if (is_moving(lane, input)) {
+      return true;
+    }
+  }
+  return false;
+}
+
+Stroke Gestures::on_input(std::size_t input, Stroke stroke) const {
+  stroke.is_force = machine_.inputs[input].is_force;
+  stroke.middle = machine_.inputs[input].position;
+  stroke.rate_ratio = machine_.rate_ratio;
+  stroke.rate_hz = machine_.rate_hz;
+  stroke.bare = playing_.bare;
+  return stroke;
+}
+
+void Gestures::play(const GestureRow& gesture, std::size_t input, Stroke stroke) {
+  const std::size_t last = voices_.last();
+  stroke = on_input(input, stroke);
+  if (gesture.goal != nullptr) {
+    starts_[input] = gesture.goal(stroke);
+    for (std::size_t lane = 0; lane < voices_.size(); ++lane) {
+      if (voices_[lane].awake || lane == last) {
+        wake(lane);
+        driver(lane, input).follow(starts_[input], stroke.pole_of_position());
+      }
+    }
+    return;
+  }
+  wake(last);
+  stroke.pitch = std::sqrt(voices_.factor_of(last, parameters_.highest_factor()));
+  gesture.play(driver(last, input), stroke);
+  starts_[input] = stroke.rest.value_or(starts_[input]);
+  if (stroke.pressure) {
+    perform(Source::pressure, 0, *stroke.pressure);
+  }
+}
+
+void Gestures::perform(const Control& control, double amount) {
+  const Stroke stroke = stroke_of(control, amount);
+  if (control.gesture == Gesture::parameter) {
+    return parameters_.set(control.target, stroke.mapped());
+  }
+  play(row_of(control.gesture), control.target, stroke);
+}
+
+void Gestures::perform(Source source, int number, double amount) {
+  for (const Control& control : playing_.controls) {
+    if (is_asked(control, source, number)) {
+      perform(control, amount);
+    }
+  }
+}
+
+void Gestures::perform_live(const Event& event) {
+  const GestureRow& gesture = row_of(event.gesture);
+  const auto play_it = [&](std::size_t input, Stroke stroke) {
+    stroke.is_live = true;
+    stroke.amount = event.value;
+    stroke.second = event.value2;
+    play(gesture, input, stroke);
+  };
+  const std::vector<Control>& controls = playing_.controls;
+  if (gesture.live == Live::by_preset) {
+    const auto control = std::find_if(controls.begin(), controls.end(), [&](const Control& row) {
+      return row.gesture == event.gesture && machine_.inputs[row.target].number == event.index;
+    });
+    if (control != controls.end()) {
+      play_it(control->target, stroke_of(*control));
+    }
+  } else if (gesture.live != Live::never) {
+    for (std::size_t i = 0; i < machine_.inputs.size(); ++i) {
+      if (machine_.inputs[i].number == event.index &&
+          machine_.inputs[i].is_force == (gesture.live == Live::on_forces)) {
+        play_it(i, Stroke{});
+      }
+    }
+  }
+}
+
+void Gestures::release(std::size_t lane) {
+  for (const Control& control : playing_.controls) {
+    const auto release = row_of(control.gesture).release;
+    if (release != nullptr && is_asked(control, Source::note, voices_[lane].key)) {
+      release(driver(lane, control.target), on_input(control.target, stroke_of(control)));
+    }
+  }
+}
+
+// Drivers that rest give every frame the same row.
+template <class T>
+void Gestures::fill_rest(Bank<T>& bank, const VoiceGroup& group, std::size_t frames) {
+  const PartBank<T>& part = bank.parts[group.part];
+  const std::size_t step = part.program.inputs.size() * part.width;
+  T* row = bank.row.data();
+  for (const InputSlot& slot : part.program.inputs) {
+    for (std::size_t lane = group.first; lane < group.first + part.width; ++lane) {
+      *row++ = lane < group.end ? static_cast<T>(driver(lane, slot.input).value()) : T(0);
+    }
+  }
+  if (bank.still < frames * step) {
+    std::fill_n(bank.velocity.begin(), frames * step, T(0));
+    bank.still = frames * step;
+  }
+  const auto end = bank.row.begin() + static_cast<std::ptrdiff_t>(step);
+  if (bank.filled_part == &part && bank.filled_frames >= frames &&
+      std::equal(bank.row.begin(), end, bank.filled.begin())) {
+    return;
+  }
+  bank.mixer.fill_rows(bank.row.data(), step, frames, bank.value.data());
+  std::copy(bank.row.begin(), end, bank.filled.begin());
+  bank.filled_part = &part;
+  bank.filled_frames = frames;
+}
+
+template <class T>
+void Gestures::fill(Bank<T>& bank, const VoiceGroup& group, std::size_t frames,
+                    EnergyWatch& watch) {
+  fill_rest(bank, group, frames);
+  const PartBank<T>& part = bank.parts[group.part];
+  const std::size_t step = part.program.inputs.size() * part.width;  // from frame to frame
+  for (std::size_t i = 0; i < part.program.inputs.size(); ++i) {
+    const InputSlot& slot = part.program.inputs[i];
+    for (std::size_t lane = group.first; lane < group.end; ++lane) {
+      InputDriver& mover = driver(lane, slot.input);
+      if (!voices_[lane].awake || !mover.is_moving()) {
+        continue;
+      }
+      watch.stir(voices_[lane], lane, group.part);
+      bank.filled_part = nullptr;
+      T* value = bank.value.data() + i * part.width + lane - group.first;
+      T* velocity = bank.velocity.data() + i * part.width + lane - group.first;
+      if (slot.is_force) {
+        for (std::size_t n = 0; n < frames; ++n) {
+          value[n * step] = static_cast<T>(mover.next_force().value);
+        }
+      } else {
+        bank.still = 0;
+        mover.fill_positions(frames, step, value, velocity);
+      }
+    }
+  }
+}
+
+template void Gestures::fill(Bank<float>&, const VoiceGroup&, std::size_t, EnergyWatch&);
+template void Gestures::fill(Bank<double>&, const VoiceGroup&, std::size_t, EnergyWatch&);
+
+}  // namespace ressort

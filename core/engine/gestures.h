@@ -1,0 +1,65 @@
+// core/engine: the gestures: what drives the inputs of every voice, and what the preset's controls
+// and live calls make of it.
+#pragma once
+
+#include <cstddef>
+#include <vector>
+
+#include "core/engine/energy_watch.h"
+#include "core/engine/event.h"
+#include "core/engine/mixing/bank.h"
+#include "core/engine/parameters.h"
+#include "core/engine/voices.h"
+#include "core/gesture.h"
+
+namespace ressort {
+
+// A gesture wakes the voices that it plays, and may turn parameters. All functions but the
+// constructor: [audio] wait-free.
+class Gestures {
+ public:
+  Gestures(const Machine& machine, const Playing& playing, Voices& voices, Parameters& parameters);
+  void go_on_from(const Gestures& from);
+
+  // The drivers of a voice that starts: to where gestures begin.
+  void place(std::size_t lane);
+  // A voice that slept starts.
+  void wake(std::size_t lane);
+  bool is_moving(std::size_t lane, std::size_t input) const {
+    return drivers_[lane * machine_.inputs.size() + input].is_moving();
+  }
+  bool is_moving(std::size_t lane) const;
+
+  // What the controls of this source, of this key or of this controller's number, do in the voice
+  // that was played last, for 0..1. O(controls)
+  void perform(Source source, int number, double amount);
+  void perform(const Control& control, double amount);
+  // Of EventKind::gesture.
+  void perform_live(const Event& event);
+  // What a key does when it is released, in its voice.
+  void release(std::size_t lane);
+
+  // Where the drivers are in each frame.
+  template <class T>
+  void fill(Bank<T>& bank, const VoiceGroup& group, std::size_t frames, EnergyWatch& watch);
+
+ private:
+  InputDriver& driver(std::size_t lane, std::size_t input) {
+    return drivers_[lane * machine_.inputs.size() + input];
+  }
+  // With what a gesture is to know of the input.
+  Stroke on_input(std::size_t input, Stroke stroke) const;
+  // In the voice that was played last, or in all.
+  void play(const GestureRow& gesture, std::size_t input, Stroke stroke);
+  template <class T>
+  void fill_rest(Bank<T>& bank, const VoiceGroup& group, std::size_t frames);
+
+  const Machine& machine_;
+  const Playing& playing_;
+  Voices& voices_;
+  Parameters& parameters_;
+  std::vector<InputDriver> drivers_;  // [lane][input]
+  std::vector<double> starts_;        // [input] where a new voice's driver is
+};
+
+}  // namespace ressort

@@ -1,0 +1,89 @@
+#include "core/engine/mixing/audio_inputs.h"
+
+namespace ressort {
+
+AudioInputs::AudioInputs(const Machine& machine, const Playing& playing, IsSilent is_silent)
+    : is_silent_(is_silent), bare_(playing.bare), inputs_(machine.inputs.size()) {
+  for (const Control& control : playing.controls) {
+    if (control.source == Source::audio) {
+      const ModelInput& input = machine.inputs[control.target];
+      const double r = input.is_force ? machine.rate_ratio : 1.0;
+      inputs_[control.target] = {.control = &control,
+                                 .scale = control.high * r * r,
+                                 .before = playing.bare ? input.position : 0.0};
+    }
+  }
+}
+
+void AudioInputs::go_on_from(const AudioInputs& from) {
+  for (std::size_t input = 0; input < inputs_.size(); ++input) {
+    inputs_[input].before = from.inputs_[input].before;
+  }
+}
+
+const double* AudioInputs::channel_of(const Driven& input, const Segment& segment) {
+  return input.control != nullptr && input.control->number < segment.inputs.size()
+             ? segment.inputs[input.control->number]
+             : nullptr;
+}
+
+bool AudioInputs::listen(const Segment& segment) {
+  bool any = false;
+  for (Driven& input : inputs_) {
+    input.samples = nullptr;
+    if (const double* const channel = channel_of(input, segment)) {
+      const bool sounds = !is_silent_(channel + segment.at, segment.frames);
+      any |= sounds;
+      if (sounds || input.before != 0.0 || bare_) {
+        input.samples = channel + segment.at;
+      }
+    }
+  }
+  return any;
+}
+
+void AudioInputs::remember(const Segment& segment) {
+  for (Driven& input : inputs_) {
+    if (const double* const channel = channel_of(input, segment)) {
+      input.before = input.scale * channel[segment.end() - 1];
+    }
+  }
+}
+
+template <class T>
+void AudioInputs::add(Bank<T>& bank, const VoiceGroup& group, std::size_t frames,
+                      const Voices& voices, EnergyWatch& watch) const {
+  const PartBank<T>& part = bank.parts[group.part];
+  for (std::size_t i = 0; i < part.program.inputs.size(); ++i) {
+    const InputSlot& slot = part.program.inputs[i];
+    const Driven& input = inputs_[slot.input];
+    if (input.samples == nullptr) {
+      continue;
+    }
+    for (std::size_t lane = group.first; lane < group.end; ++lane) {
+      watch.stir(voices[lane], lane, group.part);
+    }
+    bank.filled_part = nullptr;
+    AudioInput<T> added{.samples = input.samples,
+                        .frames = frames,
+                        .scale = input.scale,
+                        .before = input.before,
+                        .replaces = bare_,
+                        .value = bank.value.data() + i * part.width,
+                        .velocity = nullptr,
+                        .step = part.program.inputs.size() * part.width,
+                        .width = part.width};
+    if (!slot.is_force) {
+      bank.still = 0;
+      added.velocity = bank.velocity.data() + i * part.width;
+    }
+    bank.mixer.add_audio(added);
+  }
+}
+
+template void AudioInputs::add(Bank<float>&, const VoiceGroup&, std::size_t, const Voices&,
+                               EnergyWatch&) const;
+template void AudioInputs::add(Bank<double>&, const VoiceGroup&, std::size_t, const Voices&,
+                               EnergyWatch&) const;
+
+}  // namespace ressort

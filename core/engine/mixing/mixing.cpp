@@ -1,0 +1,119 @@
+#include "core/engine/mixing/mixing.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace ressort {
+
+Mixing::Mixing(const Playing& playing)
+    : gain_(playing.gain),
+      loudest_(playing.bare ? runaway : std::min(runaway, runaway_level / playing.gain)) {}
+
+template <class T>
+void Mixing::add(Bank<T>& bank, const VoiceGroup& group, const Segment& segment, Voices& voices,
+                 EnergyWatch& watch) const {
+  PartBank<T>& part = bank.parts[group.part];
+  const std::size_t count = part.program.outputs.size();
+  const Heard<T> heard{.outputs = bank.outputs.data(),
+                       .frames = segment.frames,
+                       .count = count,
+                       .width = part.width};
+  bank.mixer.find_peaks(heard, loudest_, bank.peak.data());
+  std::fill(bank.gain.begin(), bank.gain.end(), 0.0);
+  for (std::size_t lane = group.first; lane < group.end; ++lane) {
+    Voice& voice = voices[lane];
+    if (!voice.awake || watch.is_still(lane, group.part)) {
+      continue;
+    }
+    const auto peak = static_cast<double>(bank.peak[lane - group.first]);
+    const auto sample = [&](std::size_t n, std::size_t output) {
+      return static_cast<double>(
+          bank.outputs[(n * count + output) * part.width + lane - group.first]);
+    };
+    if (!(peak < loudest_)) {
+      const std::size_t sane = sane_frames(segment.frames, count, sample);
+      add_one(part.program, voice, segment, 0, sane, sample);
+      watch.lose(part,
+                 sane > 0 ? bank.outputs.data() + (sane - 1) * part.row() : part.last_of(lane),
+                 lane, group.part, voices);
+      add_held(part.program, voice, segment, sane, watch.held(lane, group.part));
+      continue;
+    }
+    voice.peak = std::max(voice.peak, peak);
+    if (voice.gain_step != 0.0) {
+      add_one(part.program, voice, segment, 0, segment.frames, sample);
+    } else {
+      bank.gain[lane - group.first] = gain_ * voice.gain;
+    }
+  }
+  std::copy_n(bank.outputs.data() + (segment.frames - 1) * part.row(), part.row(),
+              part.last_of(group.first));
+  for (std::size_t output = 0; output < count; ++output) {
+    bank.heard[output] = segment.outputs[part.program.outputs[output].channel] + segment.at;
+  }
+  bank.mixer.add_voices(heard, bank.gain.data(), bank.heard.data());
+  clear_wide_registers();
+}
+
+// How many frames there are before one that is beyond what any output reaches.
+template <class Sample>
+std::size_t Mixing::sane_frames(std::size_t frames, std::size_t outputs, Sample&& sample) const {
+  for (std::size_t n = 0; n < frames; ++n) {
+    for (std::size_t output = 0; output < outputs; ++output) {
+      if (!(std::fabs(sample(n, output)) < loudest_)) {
+        return n;
+      }
+    }
+  }
+  return frames;
+}
+
+// One voice by itself: its `sample(n, output)` in frames [from, to) of the segment.
+template <class Sample>
+void Mixing::add_one(const Program& program, const Voice& voice, const Segment& segment,
+                     std::size_t from, std::size_t to, Sample&& sample) const {
+  double faded = voice.gain;
+  for (std::size_t n = 0; n < to; ++n) {
+    faded = voice.next_gain(faded);
+    for (std::size_t output = 0; n >= from && output < program.outputs.size(); ++output) {
+      segment.outputs[program.outputs[output].channel][segment.at + n] +=
+          gain_ * faded * sample(n, output);
+    }
+  }
+}
+
+void Mixing::add_held(const Program& program, const Voice& voice, const Segment& segment,
+                      std::size_t from, const double* held) const {
+  add_one(program, voice, segment, from, segment.frames,
+          [&](std::size_t, std::size_t output) { return held[output]; });
+}
+
+void Mixing::add_still(const Program& program, const VoiceGroup& group, const Segment& segment,
+                       const Voices& voices, const EnergyWatch& watch) const {
+  for (std::size_t lane = group.first; lane < group.end; ++lane) {
+    const double* const held = watch.held(lane, group.part);
+    if (voices[lane].awake && watch.is_still(lane, group.part) &&
+        std::any_of(held, held + program.outputs.size(), [](double y) { return y != 0.0; })) {
+      add_held(program, voices[lane], segment, 0, held);
+    }
+  }
+}
+
+// Uniform in -1..1: xorshift, from a fixed seed so that a render repeats.
+void Mixing::make_noise(const Segment& segment) {
+  for (std::size_t n = segment.at; n < segment.end(); ++n) {
+    for (double* const output : segment.outputs) {
+      noise_ ^= noise_ << 13;
+      noise_ ^= noise_ >> 7;
+      noise_ ^= noise_ << 17;
+      output[n] *= static_cast<double>(static_cast<std::int64_t>(noise_)) * 0x1p-63;
+    }
+  }
+}
+
+template void Mixing::add(Bank<float>&, const VoiceGroup&, const Segment&, Voices&,
+                          EnergyWatch&) const;
+template void Mixing::add(Bank<double>&, const VoiceGroup&, const Segment&, Voices&,
+                          EnergyWatch&) const;
+
+}  // namespace ressort

@@ -1,0 +1,160 @@
+#include "core/engine/parameters.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace ressort {
+namespace {
+
+constexpr std::size_t ramp_frames = 128;  // of a parameter; a shorter ramp is heard as a click
+
+}  // namespace
+
+Parameters::Parameters(const Machine& machine, const Playing& playing)
+    : playing_(playing), values_(machine.parameters), is_turned_(values_.size()) {
+  turned_.reserve(values_.size());
+  changes_.reserve(Engine::max_changes);
+  taken_.reserve(Engine::max_changes);
+}
+
+void Parameters::go_on_from(const Parameters& from) {
+  values_ = from.values_;
+  changes_ = from.changes_;
+  beyond_ = from.beyond_;
+}
+
+double Parameters::within_limits(std::size_t index, double value) const {
+  const Limits& limits = playing_.limits[index];
+  return std::max(limits.lowest, std::min(value, limits.highest));
+}
+
+double Parameters::highest_factor() const {
+  double way = 0.0;
+  for (std::size_t i = 0; i < values_.size(); ++i) {
+    const Limits& home = playing_.home[i];
+    const Limits& limits = playing_.limits[i];
+    if (values_[i] > home.highest) {
+      way = std::max(way, (values_[i] - home.highest) / (limits.highest - home.highest));
+    } else if (values_[i] < home.lowest) {
+      way = std::max(way, (home.lowest - values_[i]) / (home.lowest - limits.lowest));
+    }
+  }
+  if (way == 0.0 || playing_.away.empty()) {
+    return std::max(1.0, playing_.highest_factor);
+  }
+  const double steps = static_cast<double>(playing_.away.size());
+  return std::max(1.0, playing_.away[static_cast<std::size_t>(std::ceil(way * steps)) - 1]);
+}
+
+bool Parameters::has_changed_highest_factor() const {
+  return has_changed() && highest_factor() != highest_before_;
+}
+
+void Parameters::set(std::size_t index, double wanted) {
+  if (index >= values_.size()) {
+    return;
+  }
+  const double value = within_limits(index, wanted);
+  beyond_ += value == wanted ? 0 : 1;
+  if (values_[index] == value) {
+    return;
+  }
+  if (!has_changed()) {
+    highest_before_ = highest_factor();
+  }
+  const auto parameter = static_cast<std::uint16_t>(index);
+  if (!is_turned_[index]) {
+    is_turned_[index] = true;
+    turned_.push_back(parameter);
+  }
+  values_[index] = value;
+  if (changes_.size() < Engine::max_changes &&
+      std::find(changes_.begin(), changes_.end(), parameter) == changes_.end()) {
+    changes_.push_back(parameter);
+  }
+}
+
+std::span<const std::uint16_t> Parameters::take_changes() {
+  taken_.swap(changes_);
+  changes_.clear();
+  return taken_;
+}
+
+template <class T>
+void Parameters::apply(Bank<T>& bank, const Voices& voices, EnergyWatch& watch) {
+  bank.each_group([&](PartBank<T>& part, const VoiceGroup& group) {
+    const auto& depending = part.program.depending;
+    const bool has_turned = std::any_of(turned_.begin(), turned_.end(), [&](std::uint16_t index) {
+      return !depending[index].empty();
+    });
+    Kernel<T>& kernel = part.of(group.first);
+    bool ramps = false;
+    for (std::size_t lane = group.first; lane < group.end; ++lane) {
+      const Voice& voice = voices[lane];
+      const bool is_tuned = voice.is_new || voice.is_retuned;
+      if (!voice.awake || !(has_turned || is_tuned)) {
+        continue;
+      }
+      if (voice.is_new) {
+        watch.forget(lane, group.part);
+        kernel.reset(lane - group.first);
+      }
+      watch.stir(voice, lane, group.part);
+      const bool ramped = !voice.is_new && !playing_.bare;
+      const auto set = [&](std::uint32_t c) {
+        const double value =
+            coefficient_value(part.program, part.program.coefficients[c], values_, voice.factor);
+        kernel.coefficients.set(lane - group.first, c, value, ramped);
+      };
+      for (std::uint32_t c = 0; is_tuned && c < part.program.coefficients.size(); ++c) {
+        set(c);
+      }
+      for (std::size_t i = 0; !is_tuned && i < turned_.size(); ++i) {
+        std::for_each(depending[turned_[i]].begin(), depending[turned_[i]].end(), set);
+      }
+      ramps |= ramped;
+    }
+    if (ramps) {
+      kernel.coefficients.ramp(ramp_frames);
+    }
+  });
+  for (const std::uint16_t index : turned_) {
+    is_turned_[index] = false;
+  }
+  turned_.clear();
+}
+
+template <class T>
+void Parameters::fill_audio(Bank<T>& bank, const VoiceGroup& group, const Segment& segment,
+                            const Voices& voices) {
+  const PartBank<T>& part = bank.parts[group.part];
+  const Program& program = part.program;
+  T* value = bank.audio.data();
+  bool is_beyond = false;
+  for (std::size_t n = segment.at; n < segment.end() && !program.audio_coefficients.empty(); ++n) {
+    for (const AudioParameter& audio : program.audio_parameters) {
+      const auto channel = static_cast<std::size_t>(audio.channel);
+      const bool is_there = channel < segment.inputs.size() && segment.inputs[channel] != nullptr;
+      const double wanted = is_there ? segment.inputs[channel][n] : 0.0;
+      values_[audio.parameter] = within_limits(audio.parameter, wanted);
+      is_beyond |= values_[audio.parameter] != wanted;
+    }
+    for (const std::uint32_t c : program.audio_coefficients) {
+      for (std::size_t lane = group.first; lane < group.first + part.width; ++lane) {
+        const double factor = lane < group.end ? voices[lane].factor : 1.0;
+        *value++ =
+            static_cast<T>(coefficient_value(program, program.coefficients[c], values_, factor));
+      }
+    }
+  }
+  beyond_ += is_beyond ? 1 : 0;
+}
+
+template void Parameters::apply(Bank<float>&, const Voices&, EnergyWatch&);
+template void Parameters::apply(Bank<double>&, const Voices&, EnergyWatch&);
+template void Parameters::fill_audio(Bank<float>&, const VoiceGroup&, const Segment&,
+                                     const Voices&);
+template void Parameters::fill_audio(Bank<double>&, const VoiceGroup&, const Segment&,
+                                     const Voices&);
+
+}  // namespace ressort
