@@ -113,8 +113,8 @@ struct Recorder::Work {
       if (failure) {
         process.is_recording.lower();
         end();
+        has_failed.raise();  // first: who is told may ask
         tell(failure->message);
-        has_failed.raise();
         return;
       }
       lock.lock();
