@@ -11,7 +11,7 @@
 #include "tests/support/catch.h"
 #include "tests/support/heap.h"
 
-namespace ressort::rig {
+namespace ressort::support {
 namespace {
 thread_local bool is_watched = false;
 thread_local std::size_t calls_counted = 0;
@@ -33,13 +33,13 @@ std::size_t HeapWatch::calls() const {
   return calls_counted;
 }
 
-}  // namespace ressort::rig
+}  // namespace ressort::support
 
 #ifndef RESSORT_OTHER_HEAP
 namespace {
 
 void* allocate(std::size_t size, std::size_t alignment) {
-  using namespace ressort::rig;
+  using namespace ressort::support;
   calls_counted += is_watched ? 1 : 0;
   const std::size_t rounded = (std::max<std::size_t>(size, 1) + alignment - 1) / alignment;
   void* const memory = alignment <= alignof(std::max_align_t)
@@ -53,7 +53,7 @@ void* allocate(std::size_t size, std::size_t alignment) {
 }
 
 void release(void* memory) {
-  using namespace ressort::rig;
+  using namespace ressort::support;
   calls_counted += is_watched && memory != nullptr ? 1 : 0;
   bytes_held -= malloc_usable_size(memory);
   std::free(memory);

@@ -6,7 +6,7 @@
 #include "app/control/console.h"
 #include "app/control/message.h"
 #include "app/session/session.h"
-#include "tests/fuzz/stage.h"
+#include "tests/fuzz/player.h"
 
 namespace {
 
@@ -31,11 +31,11 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   using namespace ressort;
   using fuzz::require;
   static const Folder folder;
-  fuzz::Stage stage;
-  Session session(stage.process, {.compile = {.rate_hz = fuzz::Stage::rate_hz}, .third = {}},
+  fuzz::Harness harness;
+  Session session(harness.process, {.compile = {.rate_hz = fuzz::Harness::rate_hz}, .third = {}},
                   [](const std::string&) {});
   const auto print = [](const std::string& text) { require(!text.empty()); };
-  Console console(stage.process, session, print, print);
+  Console console(harness.process, session, print, print);
   std::string_view text = fuzz::text_of(data, size);
   for (int i = 0; i < 20 && !text.empty() && !console.has_quit(); ++i) {
     const std::string_view line = text.substr(0, text.find('\n'));
@@ -48,7 +48,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     const auto command = parse_command(line);
     require(command || !command.error().message.empty());
     console.run_line(line);
-    stage.block(256);
+    harness.block(256);
   }
   return 0;
 }

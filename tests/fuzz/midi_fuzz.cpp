@@ -1,19 +1,19 @@
 // A libFuzzer target: whatever bytes a keyboard sends, cut into whatever packets, they are played
 // or counted. A byte gives the length of the packet after it, its highest bit the way in.
 #include "app/devices/midi_input.h"
-#include "tests/fuzz/stage.h"
+#include "tests/fuzz/player.h"
 #include "tests/system/every_control.h"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   using namespace ressort;
   using fuzz::require;
   static const auto preset =
-      parse_preset(rig::PresetWriter(fuzz::network(), "fuzz.mdl", 0).write());
+      parse_preset(support::PresetWriter(fuzz::network(), "fuzz.mdl", 0).write());
   require(preset.ok());
-  auto compiled = compile(fuzz::network(), preset.preset, {.rate_hz = fuzz::Stage::rate_hz});
+  auto compiled = compile(fuzz::network(), preset.preset, {.rate_hz = fuzz::Harness::rate_hz});
   require(static_cast<bool>(compiled));
-  fuzz::Stage stage(*std::move(compiled));
-  MidiDoor door(stage.process);
+  fuzz::Harness harness(*std::move(compiled));
+  MidiDoor door(harness.process);
   MidiReader reader;
   std::vector<MidiPacket> packets;
   std::span<const std::uint8_t> rest(data, size);
@@ -22,12 +22,12 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     const auto packet = rest.subspan(1, std::min<std::size_t>(rest.size() - 1, head & 0x7f));
     rest = rest.subspan(1 + packet.size());
     if ((head & 0x80) != 0) {
-      door.arrive(reader, packet, stage.time_ns + head);
+      door.arrive(reader, packet, harness.time_ns + head);
     } else {
       packets.push_back({static_cast<std::uint32_t>(packets.size()), packet});
     }
   }
-  stage.block(512, packets);
-  stage.block(512);
+  harness.block(512, packets);
+  harness.block(512);
   return 0;
 }

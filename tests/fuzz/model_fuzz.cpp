@@ -4,7 +4,7 @@
 #include "core/model/faust/faust.h"
 #include "core/model/language/print.h"
 #include "core/model/topology.h"
-#include "tests/fuzz/stage.h"
+#include "tests/fuzz/player.h"
 #include "tests/system/every_control.h"
 
 namespace ressort::fuzz {
@@ -134,7 +134,7 @@ void play(const Network& network) {
        {.rate_hz = 48000.0, .most_modes = quick_modes, .find_gain = true});
   play(network, default_preset(network, true), {.rate_hz = 44100.0, .bare = true});
   const std::size_t turn = network.links.size() + 7 * network.masses.size();
-  const auto preset = parse_preset(rig::PresetWriter(network, "fuzz.mdl", turn).write());
+  const auto preset = parse_preset(support::PresetWriter(network, "fuzz.mdl", turn).write());
   if (preset.ok()) {  // a name may be no TOML, a range too wide
     play(network, preset.preset, {.rate_hz = 48000.0, .most_modes = quick_modes});
   }

@@ -12,7 +12,7 @@
 
 #include "app/control/osc/server.h"
 #include "app/session/session.h"
-#include "tests/fuzz/stage.h"
+#include "tests/fuzz/player.h"
 
 namespace {
 
@@ -63,12 +63,12 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   using namespace ressort;
   using fuzz::require;
   const auto ignore = [](const std::string&) {};
-  fuzz::Stage stage;
-  Session session(stage.process, {.compile = {.rate_hz = fuzz::Stage::rate_hz}, .third = {}},
+  fuzz::Harness harness;
+  Session session(harness.process, {.compile = {.rate_hz = fuzz::Harness::rate_hz}, .third = {}},
                   ignore);
   require(static_cast<bool>(session.load_and_wait("IPlayTheTriangle")));
-  stage.block(256);
-  const auto server = OscServer::open({.port = 0, .allow = ""}, stage.process, session, ignore);
+  harness.block(256);
+  const auto server = OscServer::open({.port = 0, .allow = ""}, harness.process, session, ignore);
   require(static_cast<bool>(server));
   std::span<const std::uint8_t> rest(data, size);
   Sender sender((*server)->port());
@@ -76,10 +76,10 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     const std::size_t length = (rest[0] & 0x80) != 0 ? 4 * (rest[0] & 0x7f) : rest[0];
     sender.send(rest.subspan(1, std::min(rest.size() - 1, length)));
     rest = rest.subspan(std::min(rest.size(), 1 + length));
-    stage.block(64);
+    harness.block(64);
   }
   require(sender.is_answered());
-  stage.block(512);
-  stage.block(512);
+  harness.block(512);
+  harness.block(512);
   return 0;
 }

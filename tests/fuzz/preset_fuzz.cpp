@@ -3,7 +3,7 @@
 #include "core/model/preset/preset.h"
 
 #include "app/control/registry.h"
-#include "tests/fuzz/stage.h"
+#include "tests/fuzz/player.h"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   using namespace ressort;
@@ -17,24 +17,25 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   }
   const Preset& preset = parsed.preset;
   require(preset.voices >= 1 && preset.voices <= max_voices);
-  auto compiled = compile(fuzz::network(), preset,
-                          {.rate_hz = fuzz::Stage::rate_hz, .voices = std::min(preset.voices, 3)});
+  auto compiled =
+      compile(fuzz::network(), preset,
+              {.rate_hz = fuzz::Harness::rate_hz, .voices = std::min(preset.voices, 3)});
   if (!compiled) {
     require(!compiled.error().message.empty() && compiled.error().line >= 1);
     return 0;
   }
-  fuzz::Stage stage(*std::move(compiled));
+  fuzz::Harness harness(*std::move(compiled));
   std::vector<std::uint8_t> bytes = {0x90, 60, 100, 0xd0, 90, 0xe0, 0, 0};
   for (std::uint8_t number = 0; number < 120; ++number) {
     bytes.insert(bytes.end(), {0xb0, number, static_cast<std::uint8_t>(127 - number)});
   }
   const MidiPacket packet{3, bytes};
-  stage.block(512, std::span(&packet, 1));
-  for (const CustomInfo& custom : stage.instrument.custom) {
+  harness.block(512, std::span(&packet, 1));
+  for (const CustomInfo& custom : harness.instrument.custom) {
     const auto row = static_cast<std::uint16_t>(custom.row);
     const TimedEvent event{{.kind = EventKind::custom, .index = row, .value = 1.0}};
-    stage.process.send(stage.process.from_osc, {&event, 1});
+    harness.process.send(harness.process.from_osc, {&event, 1});
   }
-  stage.block(512);
+  harness.block(512);
   return 0;
 }

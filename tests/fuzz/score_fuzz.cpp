@@ -1,7 +1,7 @@
 // A libFuzzer target: whatever text comes, it is read as a score or refused with a line and a
 // sentence; each of its calls becomes events or is refused, and they are played.
 #include "app/control/registry.h"
-#include "tests/fuzz/stage.h"
+#include "tests/fuzz/player.h"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   using namespace ressort;
@@ -12,24 +12,24 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     return 0;
   }
   auto compiled = compile(fuzz::network(), default_preset(fuzz::network(), false),
-                          {.rate_hz = fuzz::Stage::rate_hz});
+                          {.rate_hz = fuzz::Harness::rate_hz});
   require(static_cast<bool>(compiled));
-  fuzz::Stage stage(*std::move(compiled));
+  fuzz::Harness harness(*std::move(compiled));
   for (const ScoreLine& line : *lines) {
     require(line.time_s >= 0.0 && line.time_s <= 86400.0);
-    const auto events = to_events(line.message, stage.instrument, fuzz::Stage::serial);
+    const auto events = to_events(line.message, harness.instrument, fuzz::Harness::serial);
     if (!events) {
       require(!events.error().message.empty());
       continue;
     }
     for (const Event& event : *events) {
-      describe_limit(line.message, event, stage.instrument);
-      const auto frame = static_cast<std::int64_t>(line.time_s * fuzz::Stage::rate_hz);
-      stage.process.schedule(frame % 1024, event);
+      describe_limit(line.message, event, harness.instrument);
+      const auto frame = static_cast<std::int64_t>(line.time_s * fuzz::Harness::rate_hz);
+      harness.process.schedule(frame % 1024, event);
     }
   }
-  stage.block(1000);
-  stage.block(24);
-  stage.block(512);
+  harness.block(1000);
+  harness.block(24);
+  harness.block(512);
   return 0;
 }

@@ -9,20 +9,20 @@
 #include "core/kernels/grid/grid_form.h"
 #include "core/kernels/modal/modal_form.h"
 #include "tests/support/agreement.h"
-#include "tests/support/duel.h"
+#include "tests/support/comparison.h"
 #include "tests/support/random_network.h"
 #include "tests/support/reference_network.h"
 
 namespace ressort {
 namespace {
 
-using rig::Comparison;
-using rig::DuelOptions;
-using rig::network_of;
-using rig::Random;
-using rig::RandomNetwork;
-using rig::Score;
-using rig::show;
+using support::Comparison;
+using support::ComparisonOptions;
+using support::network_of;
+using support::Random;
+using support::RandomNetwork;
+using support::Score;
+using support::show;
 
 template <class Table>
 void add_form(std::vector<std::pair<Method, Form>>& forms, Method method,
@@ -66,11 +66,11 @@ void check_not_chaotic(const std::vector<Comparison>& direct) {
 
 void check_forms(Program program, const Score& score, const std::vector<Isa>& isas, bool is_plain,
                  std::set<Method>& taken) {
-  const std::vector<double> expected = rig::perform_directly(program, score);
+  const std::vector<double> expected = support::perform_directly(program, score);
   const auto against = [&](const std::vector<double>& found) {
-    return rig::compare(program.outputs.size(), expected, found);
+    return support::compare(program.outputs.size(), expected, found);
   };
-  const double loudest = rig::compare(1, expected, expected)[0].peak;
+  const double loudest = support::compare(1, expected, expected)[0].peak;
   REQUIRE(loudest < 1e4);
   const auto forms = forms_of(program);
   for (const Isa isa : isas) {
@@ -78,13 +78,13 @@ void check_forms(Program program, const Score& score, const std::vector<Isa>& is
     for (const auto& [method, form] : forms) {
       INFO(method_name(method) << " on " << isa_name(isa));
       program.form = form;
-      rig::check_double(method, against(rig::perform<double>(program, score, isa)));
-      const auto in_float = against(rig::perform<float>(program, score, isa));
+      support::check_double(method, against(support::perform<double>(program, score, isa)));
+      const auto in_float = against(support::perform<float>(program, score, isa));
       if (method == Method::direct) {
         direct = in_float;
         check_not_chaotic(direct);
       }
-      rig::check_float(method, in_float, direct, is_plain);
+      support::check_float(method, in_float, direct, is_plain);
       if (loudest > 0.0) {
         taken.insert(method);
       }
@@ -95,7 +95,7 @@ void check_forms(Program program, const Score& score, const std::vector<Isa>& is
 // A bow's force steps when its profile is turned: on the same sample for everybody. The turns take
 // 128 samples, as everywhere, and none passes 0 on a sample.
 Score turned_score(const Program& program) {
-  Score score = rig::score_of(
+  Score score = support::score_of(
       program, {.frames = 12000, .reach = 0.02, .lowest_hz = 2.0, .highest_hz = 40.0});
   constexpr double profiles[] = {1.0, 0.0, 0.4, -0.7, 0.6};
   for (std::size_t block = 20, turn = 0; block < score.blocks.size(); block += 20, ++turn) {
@@ -135,10 +135,10 @@ void check_networks(const std::vector<Isa>& isas) {
   constexpr std::uint64_t networks = 208;
   std::map<Method, std::size_t> taken;
   for (std::uint64_t seed = 1; seed <= networks; ++seed) {
-    const RandomNetwork network = rig::random_network(seed);
+    const RandomNetwork network = support::random_network(seed);
     INFO("seed " << seed << ", " << network.family << ":\n" << network.text);
     Random random(seed);
-    DuelOptions options{
+    ComparisonOptions options{
         .frames = seed % 8 == 0 && !network.may_drift ? 44100 : 1500 + random.below(2000),
         .seed = seed,
         .reach = network.is_linear ? 0.1 : 0.02,
@@ -151,7 +151,7 @@ void check_networks(const std::vector<Isa>& isas) {
       for (const bool turns : {false, true}) {
         options.turns = turns;
         INFO((turns ? "turning" : "steady") << " at pitch " << options.pitch);
-        check_forms(program, rig::score_of(program, options), isas,
+        check_forms(program, support::score_of(program, options), isas,
                     network.is_linear && !network.may_drift, here);
       }
     }
@@ -172,7 +172,7 @@ TEST_CASE("every form of a random network moves as it is written", "[forms]") {
 }
 
 TEST_CASE("and on every instruction set", "[.][forms_everywhere]") {
-  check_networks(rig::isas());
+  check_networks(support::isas());
 }
 
 TEST_CASE("a bow's profile is turned while it sounds, in every form that can hold it", "[forms]") {
@@ -184,10 +184,10 @@ TEST_CASE("a bow's profile is turned while it sounds, in every form that can hol
                                        bowed + " 0.02 0.001 [2*p]\n" + scenes::output(1, heard));
     const Program program = make_program(network, Network::reference_rate_hz, true);
     const Score score = turned_score(program);
-    check_forms(program, score, rig::isas(), false, taken);
-    const std::vector<double> direct = rig::perform_directly(program, score);
-    const Comparison turned = rig::compare(1, by_the_book(network, score, true), direct)[0];
-    const Comparison left = rig::compare(1, by_the_book(network, score, false), direct)[0];
+    check_forms(program, score, support::isas(), false, taken);
+    const std::vector<double> direct = support::perform_directly(program, score);
+    const Comparison turned = support::compare(1, by_the_book(network, score, true), direct)[0];
+    const Comparison left = support::compare(1, by_the_book(network, score, false), direct)[0];
     INFO(bowed << ": " << show(turned.relative()) << ", not turned " << show(left.relative()));
     CHECK(turned.relative() < 1e-11);
     CHECK(left.relative() > 0.01);

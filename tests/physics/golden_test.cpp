@@ -6,10 +6,10 @@
 namespace ressort {
 namespace {
 
-using rig::Bare;
-using rig::Pole;
-using rig::program_of;
-using rig::show;
+using support::Bare;
+using support::Pole;
+using support::program_of;
+using support::show;
 
 constexpr double rate_hz = Network::reference_rate_hz;
 
@@ -30,7 +30,7 @@ std::string string50() {
 // A mode's pole in the published scheme.
 Pole published(double stiffness, double damping) {
   const double cosine = (2.0 - stiffness - damping) / (2.0 * std::sqrt(1.0 - damping));
-  return rig::pole_of(std::polar(std::sqrt(1.0 - damping), std::acos(cosine)));
+  return support::pole_of(std::polar(std::sqrt(1.0 - damping), std::acos(cosine)));
 }
 
 struct Spectrum {
@@ -40,7 +40,7 @@ struct Spectrum {
 
 // Where dampers are in proportion and masses alike; the slowest first.
 Spectrum modes_of(const Program& program) {
-  const rig::Matrices matrices = rig::matrices_of(program);
+  const support::Matrices matrices = support::matrices_of(program);
   const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> solver(matrices.stiffness);
   const Eigen::MatrixXd& shapes = solver.eigenvectors();
   return {
@@ -69,7 +69,8 @@ struct Sample {
 }  // namespace
 
 TEST_CASE("golden: an oscillator", "[golden]") {
-  const Pole pole = rig::poles_of(rig::transition(program_of(oscillator("0.1", "0.001")))).at(0);
+  const Pole pole =
+      support::poles_of(support::transition(program_of(oscillator("0.1", "0.001")))).at(0);
   check(pole.z.real(), 0.9495, 1e-12);
   check(pole.z.imag(), 0.31216942515243225, 1e-12);
   check(std::abs(pole.z), 0.99949987493746091, 1e-12);
@@ -90,14 +91,15 @@ TEST_CASE("golden: an oscillator", "[golden]") {
   for (const auto& other : others) {
     INFO("K = " << other.stiffness << ", Z = " << other.damping);
     const Program program = program_of(oscillator(other.stiffness, other.damping));
-    check(rig::poles_of(rig::transition(program)).at(0).hertz, other.hertz, 1e-11);
-    check(rig::continuous_poles(rig::matrices_of(program)).at(0).hertz, other.continuous_hz, 1e-11);
+    check(support::poles_of(support::transition(program)).at(0).hertz, other.hertz, 1e-11);
+    check(support::continuous_poles(support::matrices_of(program)).at(0).hertz, other.continuous_hz,
+          1e-11);
   }
 }
 
 TEST_CASE("golden: the triangle", "[golden]") {
   const Program program = program_of(scenes::triangle("0.1", "0.001") + scenes::output(1, "m_m2"));
-  const auto poles = rig::poles_of(rig::transition(program));
+  const auto poles = support::poles_of(support::transition(program));
   REQUIRE(poles.size() == 3);
   const struct {
     double real, imaginary, hertz, t60_s;
@@ -111,7 +113,7 @@ TEST_CASE("golden: the triangle", "[golden]") {
     check(poles[i].hertz, golden[i].hertz, 1e-12);
     check(poles[i].t60_s, golden[i].t60_s, 1e-11);
   }
-  const auto continuous = rig::continuous_poles(rig::matrices_of(program));
+  const auto continuous = support::continuous_poles(support::matrices_of(program));
   REQUIRE(continuous.size() == 3);
   const double continuous_hz[] = {857.3469979368184, 3844.30396770083, 4062.585604505056};
   const double continuous_t60_s[] = {.11716233357043, .10442562780018, .030338267322174};
@@ -146,8 +148,8 @@ TEST_CASE("golden: a string of 50", "[golden]") {
   } golden[] = {{1, 136.70267890413, 136.700388536816},   {2, 273.289403833959, 273.27110459234},
                 {3, 409.644225529081, 409.582598720605},  {10, 1347.89921816541, 1345.7051694068},
                 {25, 3117.21221285319, 3090.15651280543}, {50, 4519.00407452929, 4436.90899643589}};
-  const auto poles = rig::poles_of(rig::transition(program));
-  const auto continuous = rig::continuous_poles(rig::matrices_of(program));
+  const auto poles = support::poles_of(support::transition(program));
+  const auto continuous = support::continuous_poles(support::matrices_of(program));
   REQUIRE(poles.size() == 50);
   REQUIRE(continuous.size() == 50);
   for (const auto& row : golden) {
@@ -160,7 +162,7 @@ TEST_CASE("golden: a string of 50", "[golden]") {
   }
   check(published(modes.stiffness(0), modes.damping(0)).t60_s, 82.58581636, 1e-9);
   check(published(modes.stiffness(9), modes.damping(9)).t60_s, 0.8520512431, 1e-9);
-  const auto lowest = lowest_mode(rig::network_of(string50()), program.parameters);
+  const auto lowest = lowest_mode(support::network_of(string50()), program.parameters);
   REQUIRE(lowest);
   check(lowest->frequency_hz, 136.70267890413, 1e-10);
 

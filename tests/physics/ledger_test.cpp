@@ -6,7 +6,7 @@
 namespace ressort {
 namespace {
 
-using namespace rig;
+using namespace support;
 
 // Of any size within so many decades.
 double of_any_size(Random& random, double least, double most) {

@@ -9,7 +9,7 @@
 namespace ressort {
 namespace {
 
-using namespace rig;
+using namespace support;
 
 constexpr std::size_t second = 44100;
 

@@ -6,7 +6,7 @@
 namespace ressort {
 namespace {
 
-using namespace rig;
+using namespace support;
 using laws::LinkState;
 
 // How much of its speed a ball keeps that comes down on a wall from anywhere between two samples.

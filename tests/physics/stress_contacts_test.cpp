@@ -10,7 +10,7 @@
 namespace ressort {
 namespace {
 
-using namespace rig;
+using namespace support;
 
 // x'' = a(t, x, x'), by steps of 1/fineness samples; `use` sees every one until it returns false.
 template <class Acceleration, class Use>

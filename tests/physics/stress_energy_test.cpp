@@ -4,18 +4,18 @@
 #include <numbers>
 
 #include "core/engine/energy.h"
-#include "tests/support/rig.h"
+#include "tests/support/harness.h"
 
 namespace ressort {
 namespace {
 
-using rig::show;
+using support::show;
 
 // One voice of the published scheme, placed by hand.
 class Lab {
  public:
   explicit Lab(const std::string& text)
-      : bare(rig::program_of(text)), x(bare.program().position.size()), v(x.size()) {
+      : bare(support::program_of(text)), x(bare.program().position.size()), v(x.size()) {
     read();
   }
   void set_state(std::vector<double> positions, std::vector<double> velocities) {
@@ -45,7 +45,7 @@ class Lab {
     return energy_of(bare.program(), values, x.data(), v.data()).value;
   }
 
-  rig::Bare<double> bare;
+  support::Bare<double> bare;
   std::vector<double> x, v;
 
  private:

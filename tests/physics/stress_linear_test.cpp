@@ -8,7 +8,7 @@
 namespace ressort {
 namespace {
 
-using namespace rig;
+using namespace support;
 
 constexpr double nan = std::numeric_limits<double>::quiet_NaN();
 constexpr double infinity = std::numeric_limits<double>::infinity();

@@ -4,9 +4,9 @@
 #include <algorithm>
 
 #include "core/compile/plan.h"
-#include "tests/support/rig.h"
+#include "tests/support/harness.h"
 
-namespace ressort::rig {
+namespace ressort::support {
 
 // Of the peak, in double. Direct forms (direct, chains, grid, batch) add up the forces
 // that are written, sample by sample, if in another order. A dense body leaps over whole blocks by
@@ -45,4 +45,4 @@ inline void check_float(Method method, const std::vector<Comparison>& outputs,
   }
 }
 
-}  // namespace ressort::rig
+}  // namespace ressort::support

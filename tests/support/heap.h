@@ -12,7 +12,7 @@
 #endif
 #endif
 
-namespace ressort::rig {
+namespace ressort::support {
 
 #ifdef RESSORT_OTHER_HEAP
 inline constexpr bool heap_is_counted = false;
@@ -35,4 +35,4 @@ class HeapWatch {
 // own figure counts what it keeps for each thread's next use as well.
 std::size_t heap_bytes();
 
-}  // namespace ressort::rig
+}  // namespace ressort::support

@@ -6,9 +6,9 @@
 
 #include "core/compile/schemes.h"
 #include "core/model/topology.h"
-#include "tests/support/rig.h"
+#include "tests/support/harness.h"
 
-namespace ressort::rig {
+namespace ressort::support {
 
 // Every parameter where the text puts it.
 inline Schemes schemes_of(const Network& network, Passivity passive) {
@@ -56,4 +56,4 @@ struct Spread {
   }
 };
 
-}  // namespace ressort::rig
+}  // namespace ressort::support

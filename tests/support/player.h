@@ -7,10 +7,10 @@
 
 #include "core/compile/compile.h"
 #include "core/engine/engine.h"
+#include "tests/support/harness.h"
 #include "tests/support/heap.h"
-#include "tests/support/rig.h"
 
-namespace ressort::rig {
+namespace ressort::support {
 
 inline Event note_on(std::uint32_t frame, int key, double velocity = 1.0) {
   return {.frame = frame,
@@ -113,4 +113,4 @@ inline double largest_step(std::span<const double> y) {
   return most;
 }
 
-}  // namespace ressort::rig
+}  // namespace ressort::support

@@ -8,9 +8,9 @@
 #include <vector>
 
 #include "core/laws/laws.h"
-#include "tests/support/rig.h"
+#include "tests/support/harness.h"
 
-namespace ressort::rig {
+namespace ressort::support {
 
 // (x, v) of the moving nodes after a sample, from those before it. Found by letting the kernel step
 // from each of them alone: links pull from the second sample on.
@@ -182,4 +182,4 @@ class Continuous {
   std::vector<std::complex<double>> start_;  // [mode]
 };
 
-}  // namespace ressort::rig
+}  // namespace ressort::support

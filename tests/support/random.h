@@ -6,7 +6,7 @@
 #include <cstdio>
 #include <string>
 
-namespace ressort::rig {
+namespace ressort::support {
 
 // The same numbers on every machine (splitmix64).
 class Random {
@@ -34,4 +34,4 @@ inline std::string show(double value) {
   return text;
 }
 
-}  // namespace ressort::rig
+}  // namespace ressort::support

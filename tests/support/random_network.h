@@ -19,7 +19,7 @@
 
 #include "tests/support/random.h"
 
-namespace ressort::rig {
+namespace ressort::support {
 
 struct RandomNetwork {
   std::string family;
@@ -346,4 +346,4 @@ inline RandomNetwork random_network(std::uint64_t seed) {
   return NetworkWriter(seed).write();
 }
 
-}  // namespace ressort::rig
+}  // namespace ressort::support

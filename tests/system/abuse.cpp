@@ -24,7 +24,7 @@ using namespace ressort;
 constexpr double rate_hz = 44100.0;
 constexpr std::uint32_t serial = 1;
 
-using rig::Random;
+using support::Random;
 
 class Abuser {
  public:

@@ -11,7 +11,7 @@
 #include "core/model/network.h"
 #include "tests/support/random.h"
 
-namespace ressort::rig {
+namespace ressort::support {
 
 // Every input is driven by every source, with a gesture of its own from each; every parameter by
 // all sources that may turn one. Which source has which gesture, and all else that a preset says,
@@ -114,4 +114,4 @@ class PresetWriter {
   std::string text_;
 };
 
-}  // namespace ressort::rig
+}  // namespace ressort::support

@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "tests/support/catch.h"
-#include "tests/support/rig.h"
+#include "tests/support/harness.h"
 #include "tests/support/sound.h"
 #include "tests/system/faust_models.h"
 
@@ -108,7 +108,7 @@ void write(const fs::path& path, const std::string& text) {
 // Slow hands on every channel, and blows: forces, positions and parameters at once.
 std::vector<double> gesture() {
   std::vector<double> samples;
-  std::vector<rig::Motion> hands;
+  std::vector<support::Motion> hands;
   for (std::size_t c = 0; c < channels; ++c) {
     hands.emplace_back(c + 1, 20.0, 200.0);
   }
@@ -121,11 +121,11 @@ std::vector<double> gesture() {
   return samples;
 }
 
-class Stage {
+class Harness {
  public:
   // Exports, compiles and builds all models at once.
-  explicit Stage(const std::vector<std::pair<std::string, std::string>>& models,
-                 const std::string& options = "")
+  explicit Harness(const std::vector<std::pair<std::string, std::string>>& models,
+                   const std::string& options = "")
       : options_(options),
         folder_(fs::temp_directory_path() / ("ressort-faust-" + std::to_string(getpid()))) {
     fs::create_directory(folder_);
@@ -149,7 +149,7 @@ class Stage {
     run(std::string(RESSORT_CXX) + " -std=c++17 -O1 -ffp-contract=off -w " + path("runner.cpp") +
         " -o " + path("runner"));
   }
-  ~Stage() {
+  ~Harness() {
     std::error_code error;
     fs::remove_all(folder_, error);
   }
@@ -190,7 +190,7 @@ class Stage {
     double worst = 0.0;
     double loudest = 0.0;
     for (std::size_t c = 0; c < expected.size(); ++c) {
-      rig::Comparison channel;
+      support::Comparison channel;
       for (std::size_t n = 0; n < frames; ++n) {
         channel.add(expected[c][n], found[n * expected.size() + c]);
       }
@@ -210,23 +210,23 @@ class Stage {
 }  // namespace
 
 TEST_CASE("what FAUST makes of an exported model sounds as the model does", "[export]") {
-  Stage stage(scenes::faust_models());
+  Harness harness(scenes::faust_models());
   for (const auto& [name, text] : scenes::faust_models()) {
-    const double found = stage.difference(name, 44100);
-    INFO(name << " differs by " << rig::show(found));
+    const double found = harness.difference(name, 44100);
+    INFO(name << " differs by " << support::show(found));
     CHECK(found < tolerance);
   }
   for (const int rate_hz : {32000, 48000, 96000}) {
     for (const char* name :
          {"newer_start", "older_start", "places", "driven", "clipped_spring", "bow", "smooth_bow",
           "clipped_contact", "damped_pluck", "wiring", "raised_string", "falling"}) {
-      const double found = stage.difference(name, rate_hz);
-      INFO(name << " at " << rate_hz << " Hz differs by " << rig::show(found));
+      const double found = harness.difference(name, rate_hz);
+      INFO(name << " at " << rate_hz << " Hz differs by " << support::show(found));
       CHECK(found < tolerance);
     }
   }
-  CHECK(stage.difference("poly_triangle", 44100, "m_K", "0.2") < tolerance);
-  CHECK(stage.difference("turned_bow", 44100, "p", "1") < tolerance);
+  CHECK(harness.difference("poly_triangle", 44100, "m_K", "0.2") < tolerance);
+  CHECK(harness.difference("turned_bow", 44100, "p", "1") < tolerance);
 }
 
 TEST_CASE("raw numbers are the same numbers at every rate", "[export]") {
@@ -236,10 +236,10 @@ TEST_CASE("raw numbers are the same numbers at every rate", "[export]") {
       few.push_back(model);
     }
   }
-  Stage stage(few, " --no-rescale");
+  Harness harness(few, " --no-rescale");
   for (const auto& [name, text] : few) {
-    const double found = stage.difference(name, 96000);
-    INFO(name << " differs by " << rig::show(found));
+    const double found = harness.difference(name, 96000);
+    INFO(name << " differs by " << support::show(found));
     CHECK(found < tolerance);
   }
 }

@@ -4,25 +4,25 @@ add_library(rtspy MODULE system/rtspy.cpp)
 target_compile_options(rtspy PRIVATE -Wno-conversion -Wno-nonnull-compare)
 target_link_libraries(rtspy PRIVATE PkgConfig::JACK ${CMAKE_DL_LIBS})
 
-add_ressort_tests(ressort_stage_tests system/stage_test.cpp)
-target_link_libraries(ressort_stage_tests PRIVATE PkgConfig::JACK PkgConfig::LIBLO Threads::Threads)
-target_compile_definitions(ressort_stage_tests PRIVATE
+add_ressort_tests(ressort_server_tests system/server_test.cpp)
+target_link_libraries(ressort_server_tests PRIVATE PkgConfig::JACK PkgConfig::LIBLO Threads::Threads)
+target_compile_definitions(ressort_server_tests PRIVATE
   RESSORT_PROGRAM="$<TARGET_FILE:ressort>" RESSORT_SPY="$<TARGET_FILE:rtspy>")
-add_dependencies(ressort_stage_tests ressort rtspy)
+add_dependencies(ressort_server_tests ressort rtspy)
 
 # A sanitizer brings its own malloc, which the spy cannot stand in for.
-set(stage_tags jack_midi osc_time flood rtmidi alsa server_loss)
+set(server_tags jack_midi osc_time flood rtmidi alsa server_loss)
 if(NOT RESSORT_ADDRESS_SANITIZER AND NOT RESSORT_THREAD_SANITIZER)
-  list(APPEND stage_tags callback)
+  list(APPEND server_tags callback)
 endif()
-foreach(tag IN LISTS stage_tags)
-  add_test(NAME stage_${tag} COMMAND ressort_stage_tests "[${tag}]")
-  set_tests_properties(stage_${tag} PROPERTIES TIMEOUT 240 LABELS stage RUN_SERIAL TRUE)
+foreach(tag IN LISTS server_tags)
+  add_test(NAME server_${tag} COMMAND ressort_server_tests "[${tag}]")
+  set_tests_properties(server_${tag} PROPERTIES TIMEOUT 240 LABELS servers RUN_SERIAL TRUE)
 endforeach()
 
 add_test(NAME command_line COMMAND ${CMAKE_CURRENT_SOURCE_DIR}/system/command_line.sh
   $<TARGET_FILE:ressort> ${CMAKE_SOURCE_DIR})
-set_tests_properties(command_line PROPERTIES TIMEOUT 240 LABELS stage RUN_SERIAL TRUE)
+set_tests_properties(command_line PROPERTIES TIMEOUT 240 LABELS servers RUN_SERIAL TRUE)
 
 # What is exported to FAUST, through the faust compiler and this C++ compiler.
 add_ressort_tests(ressort_export_tests system/export_test.cpp)

@@ -113,9 +113,9 @@ std::int64_t late_ns() {
   return now_ns += 10'000'000;
 }
 
-class Stage {
+class Harness {
  public:
-  Stage(Precision precision, Process::Clock clock_ns)
+  Harness(Precision precision, Process::Clock clock_ns)
       : process_(rate_hz, true, clock_ns),
         session_(process_,
                  {.compile = {.rate_hz = rate_hz, .precision = precision}, .third = std::nullopt},
@@ -149,7 +149,7 @@ class Stage {
     rest(fade_s);
     loudest_ = 0.0;
     block({});
-    expect(loudest_ == 0.0, "is not silent after panic: " + rig::show(loudest_));
+    expect(loudest_ == 0.0, "is not silent after panic: " + support::show(loudest_));
     has_audio_ = true;
     resets_ = process_.meters().resets - resets;
     return wrong_;
@@ -287,7 +287,8 @@ class Stage {
     for (const std::vector<double>& channel : sound_) {
       for (std::size_t n = 0; n < frames; ++n) {
         loudest_ = std::max(loudest_, std::fabs(channel[n]));
-        expect(std::fabs(channel[n]) <= Limiter::ceiling, "comes out as " + rig::show(channel[n]));
+        expect(std::fabs(channel[n]) <= Limiter::ceiling,
+               "comes out as " + support::show(channel[n]));
       }
     }
     peak_ = std::max(peak_, loudest_);
@@ -300,7 +301,7 @@ class Stage {
   std::atomic<int> audio_inputs_{0};
   bool has_audio_ = true;
   bool is_forced_ = false;
-  rig::Random random_{1};
+  support::Random random_{1};
   std::array<double, longest_block> noise_{};
   std::array<std::vector<double>, 2> sound_;
   std::array<double*, 2> outputs_{};
@@ -333,22 +334,22 @@ class Everything {
     const std::string preset = "preset" + std::to_string(turn_) + ".toml";
     std::ofstream(folder_ / model) << text;
     std::ofstream(folder_ / preset)
-        << rig::PresetWriter(parse_network(text).network, model, turn_).write();
+        << support::PresetWriter(parse_network(text).network, model, turn_).write();
     play(shown, {folder_ / model, folder_ / preset});
   }
 
-  // One after the other on one stage, so that each fades into the next.
+  // One after the other on one harness, so that each fades into the next.
   void play(const std::string& shown, const std::vector<fs::path>& scenes) {
     const std::size_t turn = turn_++;
-    Stage stage(turn % 4 == 3 ? Precision::float32 : Precision::float64,
-                turn % 4 == 2 ? late_ns : nullptr);
+    Harness harness(turn % 4 == 3 ? Precision::float32 : Precision::float64,
+                    turn % 4 == 2 ? late_ns : nullptr);
     for (const fs::path& scene : scenes) {
       std::printf("%s, %s", shown.c_str(), scene.extension().c_str());
       std::fflush(stdout);  // before anything can crash
-      const std::string wrong = stage.play(scene.string(), seconds_);
-      std::printf(": peak %.3g, %llu voices ran away%s\n", stage.peak(),
-                  static_cast<unsigned long long>(stage.resets()),
-                  stage.was_forced() ? ", by force" : "");
+      const std::string wrong = harness.play(scene.string(), seconds_);
+      std::printf(": peak %.3g, %llu voices ran away%s\n", harness.peak(),
+                  static_cast<unsigned long long>(harness.resets()),
+                  harness.was_forced() ? ", by force" : "");
       if (!wrong.empty()) {
         std::printf("  WRONG: %s\n", wrong.c_str());
         ++failures_;
@@ -407,7 +408,7 @@ int main(int argc, char** argv) {
     }
   }
   for (std::uint64_t i = seed; i < seed + networks; ++i) {
-    everything.play_model("random network " + std::to_string(i), rig::random_network(i).text);
+    everything.play_model("random network " + std::to_string(i), support::random_network(i).text);
   }
   std::printf("%zu played, %zu of them wrong\n", everything.played(), everything.failures());
   return everything.failures() == 0 ? 0 : 1;

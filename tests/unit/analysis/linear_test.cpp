@@ -2,13 +2,13 @@
 #include "core/analysis/linear.h"
 #include "core/model/topology.h"
 
-#include "tests/support/rig.h"
+#include "tests/support/harness.h"
 
 namespace ressort {
 namespace {
 
-using rig::network_of;
-using rig::show;
+using support::network_of;
+using support::show;
 
 std::optional<Mode> mode_of(const std::string& text) {
   const Network network = network_of(text);
@@ -128,7 +128,7 @@ TEST_CASE("the parameters as they are set count, not as they are written", "[lin
 
 TEST_CASE("a matrix that cannot be factored has no lowest mode", "[linear]") {
   // A chain of 98 with a mass that a parameter makes negative: every stiffness is below 0.
-  const Network network = rig::network_of(
+  const Network network = support::network_of(
       "@m param -2\n@s chain 98 m 0.001 0.1 0\n@c cornerMesh 5 41 0.08 0.002 0 0\n"
       "@out1 posOutput [@s 0]\n");
   CHECK_FALSE(lowest_mode(expand_macros(network), parameter_values(network)));

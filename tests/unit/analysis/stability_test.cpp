@@ -6,13 +6,13 @@
 
 #include "core/model/language/expression.h"
 #include "core/model/topology.h"
-#include "tests/support/rig.h"
+#include "tests/support/harness.h"
 
 namespace ressort {
 namespace {
 
-using rig::network_of;
-using rig::show;
+using support::network_of;
+using support::show;
 
 constexpr double limit = 3.92;  // 4, and two percent to spare
 
@@ -64,7 +64,7 @@ double growth(const Network& network, double factor) {
   for (std::size_t i = 0; i < program.moving; ++i) {
     program.velocity[i] = std::cos(3.0 * static_cast<double>(i));
   }
-  rig::Bare<double> bare(program);
+  support::Bare<double> bare(program);
   bare.set_coefficients(0, program.parameters, factor, false);
   double largest = 0.0;
   for (int n = 0; n < 20000 && largest < 1e12; ++n) {
@@ -129,7 +129,7 @@ TEST_CASE("the worst corner of the parameters' box counts", "[stability]") {
 
 TEST_CASE("on random networks the bound is safe, and within a factor of two of the reference",
           "[stability]") {
-  rig::Random random(6);
+  support::Random random(6);
   double loosest = 10.0;
   for (int i = 0; i < 100; ++i) {
     // Masses hang on a tree with some more springs across, one of them on a ground.
@@ -138,11 +138,11 @@ TEST_CASE("on random networks the bound is safe, and within a factor of two of t
     int links = 0;
     const auto link = [&](int a, int b, double z) {
       text += scenes::at("s", links++) + " spring " + scenes::at("m", a) + " " +
-              scenes::at("m", b) + " " + rig::show(random.uniform(0.01, 1.0)) + " " + rig::show(z) +
-              "\n";
+              scenes::at("m", b) + " " + support::show(random.uniform(0.01, 1.0)) + " " +
+              support::show(z) + "\n";
     };
     for (int m = 0; m < count; ++m) {
-      text += scenes::at("m", m) + " mass " + rig::show(random.uniform(0.5, 4.0)) + " 0. 0.\n" +
+      text += scenes::at("m", m) + " mass " + support::show(random.uniform(0.5, 4.0)) + " 0. 0.\n" +
               scenes::output(m + 1, "m" + std::to_string(m));
       if (m > 0) {
         link(m, static_cast<int>(random.below(static_cast<std::size_t>(m))), 0.0);
@@ -214,7 +214,7 @@ struct Wiring {
 };
 
 // Masses on a tree that hangs on a ground, with springs across; dampers of their own strengths.
-Wiring random_wiring(rig::Random& random) {
+Wiring random_wiring(support::Random& random) {
   Wiring wiring;
   const int count = 2 + static_cast<int>(random.below(9));
   const auto strength = [&] { return std::pow(10.0, random.uniform(-2.0, 0.0)); };
@@ -310,7 +310,7 @@ TEST_CASE("a parameter that starts at 0 may go to both sides", "[stability]") {
 
 TEST_CASE("every unstable root is a negative eigenvalue of 4M - K - 2Z, and the proof says so",
           "[stability]") {
-  rig::Random random(11);
+  support::Random random(11);
   int unstable = 0;
   for (int i = 0; i < 10000; ++i) {
     Wiring wiring = random_wiring(random);
@@ -343,7 +343,7 @@ TEST_CASE("every unstable root is a negative eigenvalue of 4M - K - 2Z, and the 
 
 TEST_CASE("the exact factor on every stiffness is where the lowest eigenvalue is 0",
           "[stability]") {
-  rig::Random random(12);
+  support::Random random(12);
   int found = 0;
   for (int i = 0; i < 200; ++i) {
     const Wiring wiring = random_wiring(random);

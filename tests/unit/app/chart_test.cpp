@@ -10,8 +10,8 @@
 #include "core/engine/reference.h"
 #include "core/model/language/mdl.h"
 #include "tests/support/catch.h"
+#include "tests/support/harness.h"
 #include "tests/support/reference_network.h"
-#include "tests/support/rig.h"
 
 namespace ressort {
 namespace {
@@ -118,11 +118,11 @@ TEST_CASE("the textbook steps as the textbook simulator does", "[chart]") {
       continue;
     }
     CAPTURE(example.name);
-    const Network network = rig::network_of(example.text);
+    const Network network = support::network_of(example.text);
     const Program program = make_program(network, Network::reference_rate_hz, true);
     ReferenceScheme book(program);
     auto reference = reference::make_simulation(network, parameter_values(network));
-    const rig::Motion motion(7, 20.0, 400.0);
+    const support::Motion motion(7, 20.0, 400.0);
     std::vector<double> value(program.inputs.size());
     std::vector<double> velocity(value.size());
     for (std::size_t i = 0; i < value.size(); ++i) {

@@ -10,7 +10,7 @@
 #include "app/control/registry.h"
 #include "app/control/terminal.h"
 #include "tests/support/catch.h"
-#include "tests/support/console_rig.h"
+#include "tests/support/console_harness.h"
 
 namespace ressort {
 namespace {
@@ -76,51 +76,51 @@ TEST_CASE("a wrong number of words is told with the command's form", "[console]"
 TEST_CASE("what is not stable is not loaded, or by force, and no parameter leaves what is",
           "[console]") {
   const Folder folder;
-  Rig rig;
+  Harness harness;
   const std::string wild = folder.write(
       "wild.mdl", "@g ground 0.\n@m mass 1. 1. 1.\n@r spring @g @m 5.\n@out1 posOutput @m\n");
   folder.write("stiff.mdl", "@K param 1.\n@o osc 1. K 0. 0. 0.\n@out1 posOutput @o\n");
   const std::string wide = folder.write(
       "wide.toml", "model = \"stiff.mdl\"\n[parameters]\nK = { value = 1, range = [0, 9] }\n");
   // K/M at 48 kHz is (44100/48000)^2 of what it is written as.
-  CHECK(has(rig.say("load " + wide),
+  CHECK(has(harness.say("load " + wide),
             "wide.toml:3:5: warning: 'K' is kept below 4.73876; above it the model is not stable"));
-  CHECK(rig.say("set K 2") == "K = 2\n");
-  CHECK(rig.say("set K 6") == "K: 6 is beyond what is stable, set to 4.73876\n");
-  CHECK(rig.say("set K -1") == "K = 0, the lowest it may be\n");
-  const std::string params = rig.say("params");
+  CHECK(harness.say("set K 2") == "K = 2\n");
+  CHECK(harness.say("set K 6") == "K: 6 is beyond what is stable, set to 4.73876\n");
+  CHECK(harness.say("set K -1") == "K = 0, the lowest it may be\n");
+  const std::string params = harness.say("params");
   INFO(params);
   CHECK(has(params, "0 .. 4.73876  stable below 4.73876"));
-  CHECK(has(rig.say("explain"), "proved; every stiffness may grow 1.00 times"));
-  CHECK(has(rig.say("status"), "limits  0 times"));
-  const std::string refused = rig.say("load " + wild);
+  CHECK(has(harness.say("explain"), "proved; every stiffness may grow 1.00 times"));
+  CHECK(has(harness.say("status"), "limits  0 times"));
+  const std::string refused = harness.say("load " + wild);
   CHECK(has(refused, "was not loaded\n" + wild + ":3:1: error: unstable: the stiffness 5 of 'r'"));
   CHECK(has(refused, "below 4.73876, at 48000 Hz; --force"));
-  CHECK(rig.session.current()->name == "wide");
-  CHECK(has(rig.say("load " + wild + " --force"), "warning: unstable: the stiffness 5 of 'r'"));
-  CHECK(rig.session.current()->name == "wild");
-  CHECK(has(rig.say("explain"), "by force"));
+  CHECK(harness.session.current()->name == "wide");
+  CHECK(has(harness.say("load " + wild + " --force"), "warning: unstable: the stiffness 5 of 'r'"));
+  CHECK(harness.session.current()->name == "wild");
+  CHECK(has(harness.say("explain"), "by force"));
   CHECK(has(error_of("load wild --farce"), "load MODEL [--force]"));
 }
 
 TEST_CASE("help names every command, and tells more of each", "[console]") {
-  Rig rig;
-  const std::string all = rig.say("help");
+  Harness harness;
+  const std::string all = harness.say("help");
   for (const Row* const row : commands()) {
     CHECK(has(all, "  " + std::string(row->command)));
     CHECK(has(all, std::string(row->command_does)));
-    const std::string one = rig.say("help " + std::string(row->command));
+    const std::string one = harness.say("help " + std::string(row->command));
     CHECK(has(one, std::string(row->command_does)));
     CHECK(has(one, std::string(row->details)));
   }
-  CHECK(has(rig.say("help jump"), "error: there is no command 'jump'"));
+  CHECK(has(harness.say("help jump"), "error: there is no command 'jump'"));
 }
 
 TEST_CASE("the examples of help are commands that work", "[console]") {
   const Folder folder;
-  Rig rig;
-  rig.say("load " + write_triangle(folder));
-  const std::string all = rig.say("help");
+  Harness harness;
+  harness.say("load " + write_triangle(folder));
+  const std::string all = harness.say("help");
   std::string_view rest = std::string_view(all).substr(all.find("Examples\n") + 9);
   int tried = 0;
   while (rest.starts_with("  ")) {
@@ -129,7 +129,7 @@ TEST_CASE("the examples of help are commands that work", "[console]") {
     INFO(line);
     CHECK(parse_command(line));
     if (!has(line, "load ") && !has(line, "rec ")) {  // those need files
-      CHECK_FALSE(has(rig.say(line), "error"));
+      CHECK_FALSE(has(harness.say(line), "error"));
       ++tried;
     }
   }
@@ -138,19 +138,19 @@ TEST_CASE("the examples of help are commands that work", "[console]") {
 
 TEST_CASE("the last word of a line is completed by what may stand there", "[console]") {
   const Folder folder;
-  Rig rig;
-  rig.say("load " + write_triangle(folder));
+  Harness harness;
+  harness.say("load " + write_triangle(folder));
   using Words = std::vector<std::string>;
-  CHECK(rig.console.completions("").size() == commands().size());
-  CHECK(rig.console.completions("note") == Words{"noteoff", "noteon"});
-  CHECK(rig.console.completions("help pa") == Words{"panic", "params"});
-  CHECK(rig.console.completions("set ") == Words{"m_K", "m_Z"});
-  CHECK(rig.console.completions("get m_K") == Words{"m_K"});
-  CHECK(rig.console.completions("set m_K ").empty());
-  CHECK(rig.console.completions("noteon 6").empty());
-  CHECK(rig.console.completions("jump ").empty());
-  CHECK(rig.console.completions("set # m").empty());
-  CHECK(contains(rig.console.completions("rec "), "stop"));
+  CHECK(harness.console.completions("").size() == commands().size());
+  CHECK(harness.console.completions("note") == Words{"noteoff", "noteon"});
+  CHECK(harness.console.completions("help pa") == Words{"panic", "params"});
+  CHECK(harness.console.completions("set ") == Words{"m_K", "m_Z"});
+  CHECK(harness.console.completions("get m_K") == Words{"m_K"});
+  CHECK(harness.console.completions("set m_K ").empty());
+  CHECK(harness.console.completions("noteon 6").empty());
+  CHECK(harness.console.completions("jump ").empty());
+  CHECK(harness.console.completions("set # m").empty());
+  CHECK(contains(harness.console.completions("rec "), "stop"));
 }
 
 TEST_CASE("files are completed, with folders and blanks", "[console]") {
@@ -161,191 +161,191 @@ TEST_CASE("files are completed, with folders and blanks", "[console]") {
   folder.write("take.wav", "");
   folder.write(".hidden.mdl", "");
   fs::create_directory(folder.file("more"));
-  Rig rig;
+  Harness harness;
   using Words = std::vector<std::string>;
   const std::string here = folder.file("");
-  CHECK(rig.console.completions("load " + here) ==
+  CHECK(harness.console.completions("load " + here) ==
         Words{here + "more/", here + "my model.mdl", here + "tri.toml", here + "triangle.mdl"});
-  CHECK(rig.console.completions("load \"" + here + "my m") == Words{here + "my model.mdl"});
-  CHECK(rig.console.completions("rec " + here + "t") == Words{here + "take.wav"});
-  CHECK(rig.console.completions("load " + here + "none/").empty());
+  CHECK(harness.console.completions("load \"" + here + "my m") == Words{here + "my model.mdl"});
+  CHECK(harness.console.completions("rec " + here + "t") == Words{here + "take.wav"});
+  CHECK(harness.console.completions("load " + here + "none/").empty());
 }
 
 TEST_CASE("load tells what was loaded, with its warnings", "[console]") {
   const Folder folder;
-  Rig rig;
-  const std::string told = rig.say("load " + write_triangle(folder));
+  Harness harness;
+  const std::string told = harness.say("load " + write_triangle(folder));
   CHECK(has(told, "tri: 3 masses, 4 links, 4 voices, loaded in "));
   CHECK(has(told, folder.file("triangle.mdl") + ":10:1: warning: "));
 }
 
 TEST_CASE("a file with an error is told with its place, and the sound goes on", "[console]") {
   const Folder folder;
-  Rig rig;
-  rig.say("load " + write_triangle(folder));
+  Harness harness;
+  harness.say("load " + write_triangle(folder));
   const std::string bad = folder.write("bad.mdl", "@a mass 1. 0. 0.\n@b springg @a @a 0.1 0.\n");
-  const std::string told = rig.say("load " + bad);
+  const std::string told = harness.say("load " + bad);
   CHECK(has(told, "error: '" + bad + "' was not loaded\n" + bad + ":2:4: error: "));
-  CHECK(rig.session.current()->name == "tri");
-  CHECK(has(rig.say("load " + folder.file("none.mdl")), "there is no model or preset"));
+  CHECK(harness.session.current()->name == "tri");
+  CHECK(has(harness.say("load " + folder.file("none.mdl")), "there is no model or preset"));
 }
 
 TEST_CASE("set turns a parameter within its range, get tells it", "[console]") {
   const Folder folder;
-  Rig rig;
-  rig.say("load " + write_triangle(folder));
-  CHECK(rig.say("get m_K") == "m_K = 0.1\n");
-  CHECK(rig.say("set m_K 0.05") == "m_K = 0.05\n");
-  CHECK(rig.process.from_console.size() == 1);
-  rig.play();
-  CHECK(rig.process.from_console.size() == 0);
-  CHECK(rig.say("get m_K") == "m_K = 0.05\n");
-  CHECK(rig.say("set m_K 5") == "m_K = 0.2, the highest it may be\n");
-  CHECK(rig.say("set m_K -1") == "m_K = 0.01, the lowest it may be\n");
-  const std::string params = rig.say("params");
+  Harness harness;
+  harness.say("load " + write_triangle(folder));
+  CHECK(harness.say("get m_K") == "m_K = 0.1\n");
+  CHECK(harness.say("set m_K 0.05") == "m_K = 0.05\n");
+  CHECK(harness.process.from_console.size() == 1);
+  harness.play();
+  CHECK(harness.process.from_console.size() == 0);
+  CHECK(harness.say("get m_K") == "m_K = 0.05\n");
+  CHECK(harness.say("set m_K 5") == "m_K = 0.2, the highest it may be\n");
+  CHECK(harness.say("set m_K -1") == "m_K = 0.01, the lowest it may be\n");
+  const std::string params = harness.say("params");
   INFO(params);
   CHECK(has(params, "m_K  0.01   0.01 .. 0.2  stable below 1.55485\n"));
-  CHECK(rig.say("get m_*") == "m_K = 0.01\nm_Z = 0.001\n");
-  CHECK(rig.say("get x") == "error: tri has no parameter 'x'; it has m_K, m_Z\n");
-  CHECK(has(rig.say("set x 1"), "m_K, m_Z"));
-  CHECK(has(rig.say("set m_K loud"), "error: the value must be a number, found 'loud'"));
+  CHECK(harness.say("get m_*") == "m_K = 0.01\nm_Z = 0.001\n");
+  CHECK(harness.say("get x") == "error: tri has no parameter 'x'; it has m_K, m_Z\n");
+  CHECK(has(harness.say("set x 1"), "m_K, m_Z"));
+  CHECK(has(harness.say("set m_K loud"), "error: the value must be a number, found 'loud'"));
 }
 
 TEST_CASE("a pattern sets several parameters in one block", "[console]") {
   const Folder folder;
-  Rig rig;
-  rig.say("load " + write_triangle(folder));
-  rig.play();
-  rig.say("set m_* 0.002");
+  Harness harness;
+  harness.say("load " + write_triangle(folder));
+  harness.play();
+  harness.say("set m_* 0.002");
   TimedEvent first;
   TimedEvent second;
-  REQUIRE(rig.process.from_console.pop(first));
-  REQUIRE(rig.process.from_console.pop(second));
+  REQUIRE(harness.process.from_console.pop(first));
+  REQUIRE(harness.process.from_console.pop(second));
   CHECK(first.timing == TimedEvent::When::now);
 }
 
 TEST_CASE("noteon sounds and panic silences", "[console]") {
   const Folder folder;
-  Rig rig;
-  rig.say("load " + write_triangle(folder));
-  CHECK(rig.loudest(4) == 0.0);
-  CHECK(rig.say("noteon 72 127").empty());
-  CHECK(rig.loudest(4) > 0.01);
-  CHECK(has(rig.say("status"), "1 of 4"));
-  CHECK(rig.say("panic").empty());
-  rig.loudest(8);  // the fade
-  CHECK(rig.loudest(4) < 1e-6);
-  CHECK(has(rig.say("noteon 128"), "error: the key must lie between 0 and 127"));
+  Harness harness;
+  harness.say("load " + write_triangle(folder));
+  CHECK(harness.loudest(4) == 0.0);
+  CHECK(harness.say("noteon 72 127").empty());
+  CHECK(harness.loudest(4) > 0.01);
+  CHECK(has(harness.say("status"), "1 of 4"));
+  CHECK(harness.say("panic").empty());
+  harness.loudest(8);  // the fade
+  CHECK(harness.loudest(4) < 1e-6);
+  CHECK(has(harness.say("noteon 128"), "error: the key must lie between 0 and 127"));
 }
 
 TEST_CASE("pluck and bow go to the first input that knows them", "[console]") {
   const Folder folder;
-  Rig rig;
-  rig.say("load " + folder.write("pluck.mdl", scenes::plucked_harmonics()));
-  CHECK(rig.say("pluck").empty());
+  Harness harness;
+  harness.say("load " + folder.write("pluck.mdl", scenes::plucked_harmonics()));
+  CHECK(harness.say("pluck").empty());
   TimedEvent timed;
-  REQUIRE(rig.process.from_console.pop(timed));
+  REQUIRE(harness.process.from_console.pop(timed));
   CHECK(timed.event.gesture == Gesture::pluck);
   CHECK(timed.event.index == 1);
   CHECK(timed.event.value == 0.8);
-  CHECK(rig.say("pluck 1 0.25").empty());
-  REQUIRE(rig.process.from_console.pop(timed));
+  CHECK(harness.say("pluck 1 0.25").empty());
+  REQUIRE(harness.process.from_console.pop(timed));
   CHECK(timed.event.value == 0.25);
-  CHECK(has(rig.say("pluck 2"), "error: input 2 has no pluck in this preset"));
-  CHECK(has(rig.say("pluck 1.5"), "a whole number from 1, found '1.5'"));
-  CHECK(has(rig.say("bow 0.5"), "error: pluck has no input with a bow"));
+  CHECK(has(harness.say("pluck 2"), "error: input 2 has no pluck in this preset"));
+  CHECK(has(harness.say("pluck 1.5"), "a whole number from 1, found '1.5'"));
+  CHECK(has(harness.say("bow 0.5"), "error: pluck has no input with a bow"));
 
-  rig.say("load " + folder.write("bowed.mdl", scenes::bowed_string()));
-  CHECK(rig.say("bow -0.5").empty());
-  REQUIRE(rig.process.from_console.pop(timed));
+  harness.say("load " + folder.write("bowed.mdl", scenes::bowed_string()));
+  CHECK(harness.say("bow -0.5").empty());
+  REQUIRE(harness.process.from_console.pop(timed));
   CHECK(timed.event.gesture == Gesture::bow);
   CHECK(timed.event.value == -0.5);
   CHECK(timed.event.value2 == -1.0);  // the pressure stays
-  CHECK(rig.say("bow 1 0.25 1").empty());
-  REQUIRE(rig.process.from_console.pop(timed));
+  CHECK(harness.say("bow 1 0.25 1").empty());
+  REQUIRE(harness.process.from_console.pop(timed));
   CHECK(timed.event.value2 == 0.25);
 }
 
 TEST_CASE("a full ring is told, not waited for", "[console]") {
   const Folder folder;
-  Rig rig;
-  rig.say("load " + write_triangle(folder));
+  Harness harness;
+  harness.say("load " + write_triangle(folder));
   bool was_told = false;
   for (std::size_t i = 0; i <= Process::max_now && !was_told; ++i) {
-    was_told = has(rig.say("noteon 60"), "busy");
+    was_told = has(harness.say("noteon 60"), "busy");
   }
   CHECK(was_told);
-  rig.play();
-  CHECK(rig.say("noteon 60").empty());
+  harness.play();
+  CHECK(harness.say("noteon 60").empty());
 }
 
 TEST_CASE("without a model the commands say how to get one", "[console]") {
-  Rig rig;
+  Harness harness;
   for (const char* line :
        {"noteon 60", "pluck", "bow 1", "params", "get x", "set x 1", "explain"}) {
     INFO(line);
-    CHECK(has(rig.say(line), "error: no model is loaded yet"));
+    CHECK(has(harness.say(line), "error: no model is loaded yet"));
   }
-  CHECK(has(rig.say("status"), "model   none"));
+  CHECK(has(harness.say("status"), "model   none"));
 }
 
 TEST_CASE("explain tells what is computed and what plays it", "[console]") {
   const Folder folder;
-  Rig rig;
-  rig.say("load " + write_triangle(folder));
-  const std::string told = rig.say("explain");
+  Harness harness;
+  harness.say("load " + write_triangle(folder));
+  const std::string told = harness.say("explain");
   CHECK(has(told, "tri: three masses, struck\n"));
-  CHECK(has(told, describe(rig.session.current()->plan)));
+  CHECK(has(told, describe(harness.session.current()->plan)));
   CHECK(has(told, "input 1      a force on m_m1\n"));
   CHECK(has(told, "outputs      1\n"));
 }
 
 TEST_CASE("a script runs line by line and stops at the first error", "[console]") {
   const Folder folder;
-  Rig rig;
+  Harness harness;
   const std::string preset = write_triangle(folder);
   const std::string good =
       folder.write("good", "# a start\nload \"" + preset + "\"\n\nset m_K 0.05\nget m_K");
-  CHECK(rig.console.run_script(good));
-  CHECK(has(rig.said, "m_K = 0.05\nm_K = 0.05\n"));
+  CHECK(harness.console.run_script(good));
+  CHECK(has(harness.said, "m_K = 0.05\nm_K = 0.05\n"));
 
   const std::string bad = folder.write("bad", "get m_K\n  jump\nset m_K 0.1\n");
-  const auto failed = rig.console.run_script(bad);
+  const auto failed = harness.console.run_script(bad);
   REQUIRE_FALSE(failed);
   CHECK(has(failed.error().message, bad + ":2:3: error: there is no command 'jump'"));
-  CHECK(rig.session.parameter("m_K") == 0.05);
-  CHECK_FALSE(rig.console.run_script(folder.file("none")));
+  CHECK(harness.session.parameter("m_K") == 0.05);
+  CHECK_FALSE(harness.console.run_script(folder.file("none")));
 
-  CHECK_FALSE(rig.console.has_quit());
-  CHECK(rig.console.run_script(folder.write("end", "quit\nset m_K 0.1\n")));
-  CHECK(rig.console.has_quit());
-  CHECK(rig.session.parameter("m_K") == 0.05);
+  CHECK_FALSE(harness.console.has_quit());
+  CHECK(harness.console.run_script(folder.write("end", "quit\nset m_K 0.1\n")));
+  CHECK(harness.console.has_quit());
+  CHECK(harness.session.parameter("m_K") == 0.05);
 }
 
 TEST_CASE("quit ends, other commands do not", "[console]") {
-  Rig rig;
-  CHECK(rig.console.run_line("status"));
-  CHECK(rig.console.run_line("jump"));
-  CHECK_FALSE(rig.console.run_line("quit"));
+  Harness harness;
+  CHECK(harness.console.run_line("status"));
+  CHECK(harness.console.run_line("jump"));
+  CHECK_FALSE(harness.console.run_line("quit"));
 }
 
 TEST_CASE("the keys play notes as on a piano", "[console]") {
   const Folder folder;
-  Rig rig;
-  CHECK(has(rig.say("keys"), "needs a terminal"));
-  rig.say("load " + write_triangle(folder));
+  Harness harness;
+  CHECK(has(harness.say("keys"), "needs a terminal"));
+  harness.say("load " + write_triangle(folder));
   std::string typed = "awzsxKq";
   typed.insert(2, 1, '\0');  // a second without a key
   std::size_t given = 0;
-  rig.console.lend_keyboard([&](const auto& on_key) {
+  harness.console.lend_keyboard([&](const auto& on_key) {
     while (given < typed.size() && on_key(typed[given++])) {
     }
   });
-  CHECK(has(rig.say("keys"), "q: back to the commands"));
+  CHECK(has(harness.say("keys"), "q: back to the commands"));
   CHECK(given == typed.size());
   std::vector<int> played;  // below 0: off
   TimedEvent timed;
-  while (rig.process.from_console.pop(timed)) {
+  while (harness.process.from_console.pop(timed)) {
     const int key = timed.event.index;
     played.push_back(timed.event.kind == EventKind::note_on ? key : -key);
   }
@@ -392,26 +392,28 @@ constexpr std::chrono::seconds patience{30};
 }  // namespace
 
 TEST_CASE("without a terminal, lines are read until quit", "[console]") {
-  Rig rig;
+  Harness harness;
   TypedInput input;
   std::promise<void> promise;
   {
-    Terminal terminal(rig.console, [&] { promise.set_value(); });
+    Terminal terminal(harness.console, [&] { promise.set_value(); });
     input.type("sta");
     input.type("tus\n\nnoteon 60\nquit\nstatus\n");
     REQUIRE(promise.get_future().wait_for(patience) == std::future_status::ready);
   }
-  CHECK(has(rig.said, "model   none"));
-  CHECK(has(rig.said, "no model is loaded yet"));
-  CHECK(rig.said.find("model   none") == rig.said.rfind("model   none"));  // nothing after quit
+  CHECK(has(harness.said, "model   none"));
+  CHECK(has(harness.said, "no model is loaded yet"));
+  CHECK(harness.said.find("model   none") ==
+        harness.said.rfind("model   none"));  // nothing after quit
 }
 
 TEST_CASE("the end of the input ends only the console", "[console]") {
-  Rig rig;
+  Harness harness;
   TypedInput input;
   bool has_quit = false;
   std::promise<void> promise;
-  Console console(rig.process, rig.session, [&](const std::string&) { promise.set_value(); }, {});
+  Console console(harness.process, harness.session,
+                  [&](const std::string&) { promise.set_value(); }, {});
   {
     Terminal terminal(console, [&] { has_quit = true; });
     input.type("status");  // without its line end
@@ -422,15 +424,15 @@ TEST_CASE("the end of the input ends only the console", "[console]") {
 }
 
 TEST_CASE("a terminal that waits for a line is interrupted", "[console]") {
-  Rig rig;
+  Harness harness;
   TypedInput input;
   bool has_quit = false;
   {
-    const Terminal terminal(rig.console, [&] { has_quit = true; });
+    const Terminal terminal(harness.console, [&] { has_quit = true; });
     input.type("half a line");
   }
   CHECK_FALSE(has_quit);
-  CHECK(rig.said.empty());
+  CHECK(harness.said.empty());
 }
 
 }  // namespace ressort

@@ -1,11 +1,11 @@
 // More events than anybody can play, and a future that is full: what is to be heard is heard in the
 // next block, what is refused is counted, and a block's work is bounded.
 #include "app/devices/midi_input.h"
-#include "tests/support/process_rig.h"
+#include "tests/support/process_harness.h"
 
 namespace ressort {
 
-using namespace rig;
+using namespace support;
 
 namespace {
 
@@ -22,24 +22,24 @@ Preset faint() {
 }
 
 // Everything but what starts or ends sound.
-void pour(Stage& stage, std::size_t count = flood) {
+void pour(Harness& harness, std::size_t count = flood) {
   for (std::size_t i = 0; i < count; ++i) {
     const double way = static_cast<double>(i % 100) / 100.0;
     const Event events[] = {{.kind = EventKind::bend, .value = way},
                             {.kind = EventKind::pressure, .value = way},
                             parameter(0, 0, 0.005 + 0.01 * way),
                             controller(0, 1, way)};
-    stage.now(events[i % 4]);
+    harness.now(events[i % 4]);
   }
 }
 
-void fill_future(Stage& stage) {
-  while (stage.at(far, note_on(0, 70), 512)) {
+void fill_future(Harness& harness) {
+  while (harness.at(far, note_on(0, 70), 512)) {
   }
 }
 
 // Its hand is at 1 while a key is held; it sounds at full from the second block on.
-struct Held : Stage {
+struct Held : Harness {
   Held() {
     process.slot.offer(sounding(hand_text, holding(), 1));
     now(note_on(0, 60));
@@ -50,120 +50,120 @@ struct Held : Stage {
 }  // namespace
 
 TEST_CASE("a bundle that finds no room ahead is refused whole", "[flood]") {
-  Stage stage;
-  stage.process.slot.offer(sounding(clock_text, faint(), 1));
-  CHECK(stage.at(1000, push(), 3000));
-  CHECK_FALSE(stage.at(500, push(), Process::max_ahead - 3000 + 1));
-  CHECK(stage.process.meters().dropped == Process::max_ahead - 3000 + 1);
-  CHECK(stage.at(2000, push(), Process::max_ahead - 3000));
-  CHECK_FALSE(stage.at(2000, push()));
-  stage.run(1001, 77);
-  CHECK(pushed_at(stage.y()) == 1000);  // nothing of the refused one acted
-  CHECK(stage.y()[1000] == 3000.0 * faint().gain);
+  Harness harness;
+  harness.process.slot.offer(sounding(clock_text, faint(), 1));
+  CHECK(harness.at(1000, push(), 3000));
+  CHECK_FALSE(harness.at(500, push(), Process::max_ahead - 3000 + 1));
+  CHECK(harness.process.meters().dropped == Process::max_ahead - 3000 + 1);
+  CHECK(harness.at(2000, push(), Process::max_ahead - 3000));
+  CHECK_FALSE(harness.at(2000, push()));
+  harness.run(1001, 77);
+  CHECK(pushed_at(harness.y()) == 1000);  // nothing of the refused one acted
+  CHECK(harness.y()[1000] == 3000.0 * faint().gain);
   // What has acted leaves its room to others; what waits keeps its own.
-  CHECK_FALSE(stage.at(3000, push(), 3001));
-  CHECK(stage.at(3000, push(), 3000));
+  CHECK_FALSE(harness.at(3000, push(), 3001));
+  CHECK(harness.at(3000, push(), 3000));
 }
 
 TEST_CASE("no future silences what is to act now", "[flood]") {
-  Stage stage;
-  stage.process.slot.offer(sounding(ringing_string(), struck(4), 1));
-  fill_future(stage);
-  stage.run(period);
+  Harness harness;
+  harness.process.slot.offer(sounding(ringing_string(), struck(4), 1));
+  fill_future(harness);
+  harness.run(period);
   for (std::size_t i = 0; i < 3; ++i) {
-    fill_future(stage);
-    stage.out[0].clear();
+    fill_future(harness);
+    harness.out[0].clear();
     const std::uint8_t on[] = {0x90, 60, 100};
     const bool is_midi = i == 0;
     if (!is_midi) {
       const TimedEvent note{.event = note_on(0, 60)};
-      CHECK(stage.process.send(i == 1 ? stage.process.from_osc : stage.process.from_console,
-                               {&note, 1}));
+      CHECK(harness.process.send(i == 1 ? harness.process.from_osc : harness.process.from_console,
+                                 {&note, 1}));
     }
-    stage.run(period, period,
-              is_midi ? std::vector<MidiPacket>{{0, on}} : std::vector<MidiPacket>{});
-    CHECK(peak(stage.y()) > 1e-4);
+    harness.run(period, period,
+                is_midi ? std::vector<MidiPacket>{{0, on}} : std::vector<MidiPacket>{});
+    CHECK(peak(harness.y()) > 1e-4);
     // And panic within the next one.
-    stage.now({.kind = EventKind::panic});
-    stage.run(2 * period);
-    CHECK(peak(std::span(stage.y()).subspan(period + steal_frames)) == 0.0);
+    harness.now({.kind = EventKind::panic});
+    harness.run(2 * period);
+    CHECK(peak(std::span(harness.y()).subspan(period + steal_frames)) == 0.0);
   }
 }
 
 TEST_CASE("panic forgets what waits for its time, and nothing that comes after it", "[flood]") {
   for (const bool is_controller : {false, true}) {
-    Stage stage;
-    stage.process.slot.offer(sounding(clock_text, faint(), 1));
-    CHECK(stage.at(1000, push(), Process::max_ahead));
-    stage.run(period);
+    Harness harness;
+    harness.process.slot.offer(sounding(clock_text, faint(), 1));
+    CHECK(harness.at(1000, push(), Process::max_ahead));
+    harness.run(period);
     const std::uint8_t all_sound_off[] = {0xb0, 120, 0};
     if (is_controller) {
-      stage.run(period, period, {{0, all_sound_off}});
+      harness.run(period, period, {{0, all_sound_off}});
     } else {
-      stage.now({.kind = EventKind::panic});
-      CHECK(stage.at(2000, push()) == false);  // still full
-      stage.run(period);
+      harness.now({.kind = EventKind::panic});
+      CHECK(harness.at(2000, push()) == false);  // still full
+      harness.run(period);
     }
-    CHECK(stage.at(2000, push(), Process::max_ahead));  // all of its room is free again
-    stage.run(2000);
-    CHECK(pushed_at(stage.y()) == 2000);
+    CHECK(harness.at(2000, push(), Process::max_ahead));  // all of its room is free again
+    harness.run(2000);
+    CHECK(pushed_at(harness.y()) == 2000);
   }
   // In one block: a bundle, panic, another bundle.
-  Stage stage;
-  stage.process.slot.offer(sounding(clock_text, faint(), 1));
-  stage.at(500, push());
-  stage.now({.kind = EventKind::panic});
-  stage.at(600, push());
-  stage.run(1000);
-  CHECK(pushed_at(stage.y()) == 600);
+  Harness harness;
+  harness.process.slot.offer(sounding(clock_text, faint(), 1));
+  harness.at(500, push());
+  harness.now({.kind = EventKind::panic});
+  harness.at(600, push());
+  harness.run(1000);
+  CHECK(pushed_at(harness.y()) == 600);
   // One with a time of its own forgets what would come after it, once it is there.
-  stage.at(3000, push());
-  stage.at(2000, {.kind = EventKind::panic});
-  stage.at(1500, push());
-  stage.out[0].clear();
-  stage.run(2500);
-  CHECK(stage.y()[500] > stage.y()[499] + 1.5 * (stage.y()[499] - stage.y()[498]));
-  CHECK(peak(std::span(stage.y()).subspan(1000 + steal_frames)) == 0.0);
+  harness.at(3000, push());
+  harness.at(2000, {.kind = EventKind::panic});
+  harness.at(1500, push());
+  harness.out[0].clear();
+  harness.run(2500);
+  CHECK(harness.y()[500] > harness.y()[499] + 1.5 * (harness.y()[499] - harness.y()[498]));
+  CHECK(peak(std::span(harness.y()).subspan(1000 + steal_frames)) == 0.0);
 }
 
 TEST_CASE("note-offs and panic act in the next block of a flood, with the future full", "[flood]") {
   for (const bool is_panic : {false, true}) {
-    Held stage;
-    fill_future(stage);
+    Held harness;
+    fill_future(harness);
     for (int i = 0; i < 20; ++i) {
-      pour(stage);
-      stage.run(period);
+      pour(harness);
+      harness.run(period);
     }
-    const double before = stage.y().back();
-    stage.out[0].clear();
+    const double before = harness.y().back();
+    harness.out[0].clear();
     CHECK(before == Approx(1.0).epsilon(1e-3));
-    pour(stage);
-    stage.now(is_panic ? Event{.kind = EventKind::panic} : note_off(0, 60));
-    pour(stage);
-    stage.run(period);
-    CHECK(stage.y()[0] < before);  // from its first frame on
+    pour(harness);
+    harness.now(is_panic ? Event{.kind = EventKind::panic} : note_off(0, 60));
+    pour(harness);
+    harness.run(period);
+    CHECK(harness.y()[0] < before);  // from its first frame on
     if (is_panic) {
-      CHECK(peak(std::span(stage.y()).subspan(steal_frames)) == 0.0);
+      CHECK(peak(std::span(harness.y()).subspan(steal_frames)) == 0.0);
     }
-    CHECK(stage.process.meters().dropped == 512);  // the last try to fill the future
+    CHECK(harness.process.meters().dropped == 512);  // the last try to fill the future
   }
 }
 
 TEST_CASE("where no other event finds room, what ends sound does", "[flood]") {
   for (const Event& ending : {note_off(0, 60), Event{.kind = EventKind::panic},
                               controller(0, 120, 0.0), controller(0, 123, 0.0)}) {
-    Held stage;
-    stage.out[0].clear();
+    Held harness;
+    harness.out[0].clear();
     std::size_t sent = 0;
-    while (stage.now(parameter(0, 0, 0.02))) {
+    while (harness.now(parameter(0, 0, 0.02))) {
       REQUIRE(++sent < 100000);
     }
     CHECK(sent >= Process::max_now);
-    CHECK(stage.process.meters().dropped == 1);
-    CHECK(stage.now(ending));
-    CHECK_FALSE(stage.now(parameter(0, 0, 0.02)));
-    stage.run(period);
-    CHECK(stage.y()[0] < 1.0 - 1e-4);
+    CHECK(harness.process.meters().dropped == 1);
+    CHECK(harness.now(ending));
+    CHECK_FALSE(harness.now(parameter(0, 0, 0.02)));
+    harness.run(period);
+    CHECK(harness.y()[0] < 1.0 - 1e-4);
   }
 }
 
@@ -171,59 +171,59 @@ TEST_CASE("every event of a flood of MIDI that finds no room is counted", "[floo
   const std::vector<std::uint8_t> on = {0x90, 60, 100};
   const std::vector<std::uint8_t> off = {0x80, 60, 0};
   {
-    Held stage;
-    stage.out[0].clear();
+    Held harness;
+    harness.out[0].clear();
     std::vector<MidiPacket> packets(Process::max_now + 700, MidiPacket{0, on});
     packets.push_back({0, off});
-    stage.run(period, period, packets);
-    CHECK(stage.process.meters().dropped == 700);
-    CHECK(stage.y()[1] < 1.0);
+    harness.run(period, period, packets);
+    CHECK(harness.process.meters().dropped == 700);
+    CHECK(harness.y()[1] < 1.0);
   }
-  Held stage;
-  stage.out[0].clear();
-  MidiDoor door(stage.process);
+  Held harness;
+  harness.out[0].clear();
+  MidiDoor door(harness.process);
   MidiReader reader;
   for (std::size_t i = 0; i < Process::max_now + 700; ++i) {
     door.arrive(reader, on, 0);
   }
   door.arrive(reader, off, 0);
-  CHECK(stage.process.meters().dropped == 700);
-  stage.run(period);
-  CHECK(stage.y()[1] < 1.0);
+  CHECK(harness.process.meters().dropped == 700);
+  harness.run(period);
+  CHECK(harness.y()[1] < 1.0);
 }
 
 TEST_CASE("a block acts at a bounded number of moments, early but in order", "[flood]") {
   // A push on every frame: the first of them exactly, the others with the last of these.
   for (const auto& [block, moments] : {std::pair<std::size_t, std::size_t>{64, 16}, {256, 32}}) {
-    Stage stage;
-    stage.process.slot.offer(sounding(clock_text, faint(), 1));
+    Harness harness;
+    harness.process.slot.offer(sounding(clock_text, faint(), 1));
     std::vector<Event> expected;
     for (std::uint32_t n = 0; n < block; ++n) {
-      stage.at(n, push());
+      harness.at(n, push());
       expected.push_back(push());
       expected.back().frame = std::min(n, static_cast<std::uint32_t>(moments - 1));
     }
-    stage.run(2 * block, block);
+    harness.run(2 * block, block);
     Player player(clock_text, faint(), {.method = Method::direct});
     player.run(2 * block, expected, {block});
     CAPTURE(block);
-    CHECK(stage.y() == player.y());
+    CHECK(harness.y() == player.y());
   }
 }
 
 TEST_CASE("offline every event acts on its own frame, however many there are", "[flood]") {
-  Stage stage;
-  stage.process.slot.offer(sounding(clock_text, faint(), 1));
+  Harness harness;
+  harness.process.slot.offer(sounding(clock_text, faint(), 1));
   std::vector<Event> events;
   for (std::uint32_t n = 0; n < period; ++n) {
-    stage.process.schedule(n, push());
+    harness.process.schedule(n, push());
     events.push_back(push());
     events.back().frame = n;
   }
-  stage.run(2 * period);
+  harness.run(2 * period);
   Player player(clock_text, faint(), {.method = Method::direct});
   player.run(2 * period, events);
-  CHECK(stage.y() == player.y());
+  CHECK(harness.y() == player.y());
 }
 
 TEST_CASE("what acts in one sample is computed once, from what all of it leaves", "[flood]") {
@@ -238,14 +238,14 @@ TEST_CASE("what acts in one sample is computed once, from what all of it leaves"
 }
 
 TEST_CASE("the audio thread allocates nothing in a flood", "[flood]") {
-  Held stage;
+  Held harness;
   for (int i = 0; i < 4; ++i) {
-    fill_future(stage);
-    pour(stage, 6000);
-    stage.now({.kind = EventKind::panic});
-    stage.run(period);
+    fill_future(harness);
+    pour(harness, 6000);
+    harness.now({.kind = EventKind::panic});
+    harness.run(period);
   }
-  CHECK(stage.heap_calls == 0);
+  CHECK(harness.heap_calls == 0);
 }
 
 }  // namespace ressort

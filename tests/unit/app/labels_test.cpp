@@ -23,7 +23,7 @@ TEST_CASE("A lone label stands to the right of its mark", "[labels]") {
 }
 
 TEST_CASE("Labels of crowded marks touch nothing", "[labels]") {
-  rig::Random random(7);
+  support::Random random(7);
   for (int round = 0; round < 50; ++round) {
     std::vector<LabelRequest> marks;
     for (int i = 0; i < 30; ++i) {

@@ -7,7 +7,7 @@
 #include <thread>
 #include <vector>
 
-#include "tests/support/rig.h"
+#include "tests/support/harness.h"
 
 namespace ressort {
 namespace {

@@ -3,7 +3,7 @@
 
 #include <vector>
 
-#include "tests/support/rig.h"
+#include "tests/support/harness.h"
 
 namespace ressort {
 namespace {
@@ -112,7 +112,7 @@ TEST_CASE("what is cut short or unknown makes no event and is counted", "[midi]"
 }
 
 TEST_CASE("random bytes in random packets only ever make events in range", "[midi]") {
-  rig::Random random(99);
+  support::Random random(99);
   MidiReader reader;
   std::size_t count = 0;
   for (std::size_t at = 0; at < 100000;) {

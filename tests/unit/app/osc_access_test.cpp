@@ -37,7 +37,7 @@ bool contains(const std::string& text, std::string_view part) {
 }
 
 // A session that plays `whole`, and a server.
-struct Rig {
+struct Harness {
   DataFolder data;
   Process process{48000.0, false};
   Session session{process, {.compile = {.rate_hz = 48000.0}}, {}};
@@ -46,7 +46,7 @@ struct Rig {
   std::unique_ptr<OscServer> server = open({.port = 0});
   Client client{server->port()};
 
-  Rig() { REQUIRE(is_loaded); }
+  Harness() { REQUIRE(is_loaded); }
 
   bool load(const std::string& name, std::string_view text) {
     data.write("models/" + name + ".mdl", text);
@@ -108,11 +108,10 @@ TEST_CASE("the network is let in for those who are named, and no others", "[osc_
   CHECK(contains(refusal({.allow = "10.0.0.0/8"}), "needs -B too"));
   CHECK(contains(refusal({.bind_address = "0.0.0.0", .allow = "everybody"}), "'everybody'"));
   CHECK(contains(refusal({.bind_address = "0.0.0.0/0"}), "no address to bind OSC to"));
-  Rig rig;
-  CHECK(rig.server->access() == "for this machine alone");
-  CHECK(
-      rig.open({.bind_address = "0.0.0.0", .port = 0, .allow = "10.0.0.0/8,10.1.2.3"})->access() ==
-      "open to this machine and 10.0.0.0/8, 10.1.2.3");
+  Harness harness;
+  CHECK(harness.server->access() == "for this machine alone");
+  CHECK(harness.open({.bind_address = "0.0.0.0", .port = 0, .allow = "10.0.0.0/8,10.1.2.3"})
+            ->access() == "open to this machine and 10.0.0.0/8, 10.1.2.3");
 }
 
 TEST_CASE("packets of others are counted and told, not heard", "[osc_access]") {
@@ -133,24 +132,25 @@ TEST_CASE("packets of others are counted and told, not heard", "[osc_access]") {
     WARN("no network: nobody else can send");
     return;
   }
-  Rig rig;
+  Harness harness;
   const std::string other = own == address_of("10.9.8.7") ? "10.9.8.6" : "10.9.8.7";
-  auto closed = rig.open({.bind_address = "0.0.0.0", .port = 0, .allow = other});
+  auto closed = harness.open({.bind_address = "0.0.0.0", .port = 0, .allow = other});
   Client stranger(closed->port(), own);
   for (int i = 0; i < 3; ++i) {
     stranger.send(message("/bend", {0.5f}));
   }
   stranger.send(message("/status"));
   CHECK_FALSE(stranger.receive(500));
-  CHECK(rig.process.from_osc.size() == 0);
-  CHECK(rig.session.status().strangers == 4);
+  CHECK(harness.process.from_osc.size() == 0);
+  CHECK(harness.session.status().strangers == 4);
   Client local(closed->port());
   CHECK(local.ask(message("/status")).address == "/status.reply");
   closed.reset();
-  REQUIRE(rig.news.size() == 1);
-  CHECK(contains(rig.news[0], "--osc-allow " + print_address(own) + " lets it in"));
+  REQUIRE(harness.news.size() == 1);
+  CHECK(contains(harness.news[0], "--osc-allow " + print_address(own) + " lets it in"));
 
-  const auto open = rig.open({.bind_address = "0.0.0.0", .port = 0, .allow = print_address(own)});
+  const auto open =
+      harness.open({.bind_address = "0.0.0.0", .port = 0, .allow = print_address(own)});
   Client guest(open->port(), own);
   CHECK(guest.ask(message("/status")).address == "/status.reply");
 }
@@ -270,19 +270,19 @@ TEST_CASE("an answer of many rows goes in portions", "[osc_access]") {
 }
 
 TEST_CASE("a description of a thousand parameters comes whole and in order", "[osc_access]") {
-  Rig rig;
+  Harness harness;
   std::string text;
   const std::string stem = "p" + std::string(60, '_');
   for (int i = 0; i < 1000; ++i) {
     text += "@" + stem + std::to_string(1000 + i) + " param 0.1\n";
   }
-  REQUIRE(rig.load("many", text + whole));
-  rig.client.send(message("/describe"));
-  rig.client.send(message("/bend", {0.5f}));
-  rig.client.send(message("/nowhere"));
+  REQUIRE(harness.load("many", text + whole));
+  harness.client.send(message("/describe"));
+  harness.client.send(message("/bend", {0.5f}));
+  harness.client.send(message("/nowhere"));
   std::vector<Answer> rows;
   while (rows.empty() || rows.back().address != "/describe.end") {
-    auto row = rig.client.receive();
+    auto row = harness.client.receive();
     REQUIRE(row);
     rows.push_back(*std::move(row));
   }
@@ -293,48 +293,48 @@ TEST_CASE("a description of a thousand parameters comes whole and in order", "[o
     CHECK(rows[addresses().size() + i].text(0) == "/param/" + stem + std::to_string(1000 + i));
   }
   // More was answered than was asked for: nothing else for a while, and that is said.
-  const auto pause = rig.client.receive();
+  const auto pause = harness.client.receive();
   REQUIRE(pause);
   CHECK(pause->address == "/error");
   CHECK(contains(pause->text(1), "what is played is played"));
-  CHECK(rig.process.from_osc.size() == 1);
+  CHECK(harness.process.from_osc.size() == 1);
 }
 
 TEST_CASE("a flood of questions is not answered with a larger one", "[osc_access]") {
-  Rig rig;
+  Harness harness;
   const std::int64_t start_ns = monotonic_ns();
   const Bytes question = message("/describe");
   constexpr std::size_t count = 5000;
   for (std::size_t i = 0; i < count; ++i) {
-    rig.client.send(question);
+    harness.client.send(question);
   }
-  rig.client.sync();
+  harness.client.sync();
   const double seconds = 1e-9 * static_cast<double>(monotonic_ns() - start_ns);
   constexpr double one_answer = 4000.0;
-  CHECK(static_cast<double>(rig.client.bytes_received) <=
+  CHECK(static_cast<double>(harness.client.bytes_received) <=
         static_cast<double>(count * question.size()) + (seconds + 1.0) * AnswerBudget::bytes_per_s +
             one_answer);
   // Another is answered all the same.
-  CHECK(Client(rig.server->port()).ask(message("/status")).address == "/status.reply");
+  CHECK(Client(harness.server->port()).ask(message("/status")).address == "/status.reply");
 }
 
 TEST_CASE("packets that the system lost are counted", "[osc_access]") {
-  Rig rig;
+  Harness harness;
   const Bytes packet =
       bundle(1, {message("/bend", {0.5f}), message("/done", {std::string(8000, 'x')})});
   // Faster than anybody reads, until the socket's room has run over.
   std::size_t sent = 0;
   std::size_t heard = 0;
-  for (int round = 0; round < 100 && rig.session.status().dropped == 0; ++round) {
+  for (int round = 0; round < 100 && harness.session.status().dropped == 0; ++round) {
     for (std::size_t i = 0; i < 2000; ++i, ++sent) {
-      rig.client.send(packet);
+      harness.client.send(packet);
     }
-    CHECK(Client(rig.server->port()).sync().empty());
-    for (TimedEvent event; rig.process.from_osc.pop(event);) {
+    CHECK(Client(harness.server->port()).sync().empty());
+    for (TimedEvent event; harness.process.from_osc.pop(event);) {
       ++heard;
     }
   }
-  const std::size_t lost = rig.session.status().dropped;
+  const std::size_t lost = harness.session.status().dropped;
   CHECK(heard > 0);
   CHECK(lost > 0);
   CHECK(heard + lost >= sent);
@@ -344,8 +344,8 @@ TEST_CASE("packets that the system lost are counted", "[osc_access]") {
 
 TEST_CASE("packets load what is below the program's folders", "[osc_access]") {
   namespace fs = std::filesystem;
-  Rig rig;
-  const fs::path outside = rig.data.path().string() + "_outside";
+  Harness harness;
+  const fs::path outside = harness.data.path().string() + "_outside";
   fs::create_directories(outside);
   const auto write = [](const fs::path& path, std::string_view text) {
     std::ofstream(path) << text;
@@ -353,8 +353,8 @@ TEST_CASE("packets load what is below the program's folders", "[osc_access]") {
   write(outside / "secret.mdl", whole);
   write(outside / "secret.toml", "model = \"secret.mdl\"\n");
   write(outside / "secret", "root:x:0:0");
-  const fs::path models = rig.data.path("models");
-  const fs::path presets = rig.data.path("presets");
+  const fs::path models = harness.data.path("models");
+  const fs::path presets = harness.data.path("presets");
   fs::create_directories(models / "sub");
   write(models / "sub/inner.mdl", whole);
   write(models / "plain.txt", whole);
@@ -374,7 +374,7 @@ TEST_CASE("packets load what is below the program's folders", "[osc_access]") {
   for (const char* const name : {"one", "one.mdl", "sub/inner", "within", "good", "good.toml",
                                  "../models/one", "sub/../one.mdl", "../presets/good"}) {
     INFO(name);
-    CHECK(rig.load_by_osc(name) == "done");
+    CHECK(harness.load_by_osc(name) == "done");
   }
   const std::string up = "../../" + outside.filename().string();
   for (const std::string& name : {std::string("../../etc/passwd"),
@@ -398,22 +398,24 @@ TEST_CASE("packets load what is below the program's folders", "[osc_access]") {
                                   std::string("."),
                                   std::string("..")}) {
     INFO(name);
-    CHECK(contains(rig.load_by_osc(name), "OSC loads no others"));
+    CHECK(contains(harness.load_by_osc(name), "OSC loads no others"));
   }
   for (const char* const name : {"up", "absolute", "linked"}) {
     INFO(name);
-    CHECK(rig.load_by_osc(name) == name + std::string(".toml:1:9: error: its model is none of the "
-                                                      "program's own, and OSC loads no others"));
-    CHECK(rig.session.load_and_wait(presets / (name + std::string(".toml"))));  // who sits here may
+    CHECK(harness.load_by_osc(name) ==
+          name + std::string(".toml:1:9: error: its model is none of the "
+                             "program's own, and OSC loads no others"));
+    CHECK(harness.session.load_and_wait(presets /
+                                        (name + std::string(".toml"))));  // who sits here may
   }
-  CHECK(contains(rig.load_by_osc("password"), "password.toml:1:9: error: "));
+  CHECK(contains(harness.load_by_osc("password"), "password.toml:1:9: error: "));
   // And what was loaded from here is still what sounds.
-  CHECK(rig.session.load_and_wait(outside / "secret.mdl"));
+  CHECK(harness.session.load_and_wait(outside / "secret.mdl"));
   fs::remove_all(outside);
 }
 
 TEST_CASE("no word of a file is in an answer", "[osc_access]") {
-  Rig rig;
+  Harness harness;
   const std::string rest = "@out1 posOutput @m\n";
   const std::string mass = "@m mass 1. 0. 0.\n";
   const std::vector<std::string> models = {
@@ -460,20 +462,20 @@ TEST_CASE("no word of a file is in an answer", "[osc_access]") {
       "model = \"hunter2\"\n",
       "model = \"hunter2.mdl\"\n",
   };
-  rig.data.write("models/named.mdl", "@hunter2 param 0.1\n" + mass + rest);
+  harness.data.write("models/named.mdl", "@hunter2 param 0.1\n" + mass + rest);
   std::size_t quoting = 0;
   const auto check = [&](const std::string& file, const std::string& text) {
-    rig.data.write(file, text);
+    harness.data.write(file, text);
     const std::string name = std::filesystem::path(file).filename().string();
-    const std::string told = rig.load_by_osc(name);
-    const auto here = rig.session.load_and_wait(rig.data.path(file));
+    const std::string told = harness.load_by_osc(name);
+    const auto here = harness.session.load_and_wait(harness.data.path(file));
     INFO(text << told);
     REQUIRE_FALSE(here);
     INFO(here.error().message);
     quoting += contains(here.error().message, "hunter2") ? 1 : 0;
     CHECK(told.starts_with(name + ":"));
     CHECK_FALSE(contains(told, "hunter"));
-    CHECK_FALSE(contains(told, rig.data.path().string()));
+    CHECK_FALSE(contains(told, harness.data.path().string()));
   };
   for (const std::string& text : models) {
     check("models/secret.mdl", text + rest);
@@ -482,9 +484,9 @@ TEST_CASE("no word of a file is in an answer", "[osc_access]") {
     check("presets/secret.toml", text);
   }
   CHECK(quoting > models.size());  // whoever sits here is told the words
-  rig.server.reset();
-  REQUIRE_FALSE(rig.news.empty());
-  CHECK(contains(rig.news[0], "secret.mdl:1:"));
+  harness.server.reset();
+  REQUIRE_FALSE(harness.news.empty());
+  CHECK(contains(harness.news[0], "secret.mdl:1:"));
   CHECK(without_source("a.mdl:1:3: error: unknown keyword 'x'; did you mean 'y'?") ==
         "a.mdl:1:3: error: unknown keyword '...'");
   CHECK(without_source("/b/a.mdl:2:1: warning: 'x'\n/b/a.mdl:2:3: error: found 'x' where a "

@@ -33,7 +33,7 @@ std::unique_ptr<OscServer> open_server(Process& process, Session& session) {
 }
 
 // Two masses that a push moves at once and that are still again long before the next.
-struct Rig {
+struct Harness {
   DataFolder data;
   Process process{rate_hz, false};
   Session session{process, {.compile = {.rate_hz = rate_hz, .bare = true}}, {}};
@@ -59,7 +59,7 @@ struct Rig {
   std::int64_t start_ns = monotonic_ns() + 3600'000'000'000;
   std::array<std::vector<float>, 2> sound;
 
-  Rig() { REQUIRE(is_loaded); }
+  Harness() { REQUIRE(is_loaded); }
 
   std::int64_t time_ns(std::int64_t frame) const { return start_ns + frame * 62500 / 3; }
 
@@ -112,8 +112,8 @@ bool has(const Answer& answer, std::string_view address, std::string_view about,
 // --- the server ---------------------------------------------------------------------------------
 
 TEST_CASE("a parameter is set and asked for over OSC", "[osc]") {
-  Rig rig;
-  Client& client = rig.client;
+  Harness harness;
+  Client& client = harness.client;
   CHECK(std::get<float>(client.ask(message("/param/m_K")).values.at(0)) == 0.02f);
   client.send(message("/param/m_K", {0.03}));
   const Answer one = client.ask(message("/param/m_K"));
@@ -159,9 +159,9 @@ TEST_CASE("what is beyond what is stable is told over OSC, and where that ends",
 }
 
 TEST_CASE("status and describe answer in full", "[osc]") {
-  Rig rig;
-  rig.drive(1);
-  const Answer status = rig.client.ask(message("/status"));
+  Harness harness;
+  harness.drive(1);
+  const Answer status = harness.client.ask(message("/status"));
   CHECK(status.address == "/status.reply");
   REQUIRE(status.values.size() == 15);
   CHECK(status.text(0) == "two");
@@ -169,8 +169,8 @@ TEST_CASE("status and describe answer in full", "[osc]") {
   CHECK(std::get<std::int32_t>(status.values[7]) == static_cast<std::int32_t>(period));
   CHECK(std::get<float>(status.values[9]) == -999.0f);
 
-  rig.client.send(message("/describe"));
-  auto rows = rig.client.sync();
+  harness.client.send(message("/describe"));
+  auto rows = harness.client.sync();
   REQUIRE_FALSE(rows.empty());
   CHECK(rows.back().address == "/describe.end");
   CHECK(std::get<std::int32_t>(rows.back().values.at(0)) == static_cast<int>(rows.size()) - 1);
@@ -214,22 +214,22 @@ TEST_CASE("every figure has a name, a meaning and at most one place in the reply
 }
 
 TEST_CASE("the messages of a bundle act together", "[osc]") {
-  Rig rig;
-  rig.drive(1);
-  rig.client.send(bundle(1, {message("/in/1/force", {0.1}), message("/in/2/force", {0.1})}));
-  rig.client.sync();
-  rig.drive(4);
-  REQUIRE(rig.onsets(0).size() == 1);
-  CHECK(rig.onsets(0) == rig.onsets(1));
+  Harness harness;
+  harness.drive(1);
+  harness.client.send(bundle(1, {message("/in/1/force", {0.1}), message("/in/2/force", {0.1})}));
+  harness.client.sync();
+  harness.drive(4);
+  REQUIRE(harness.onsets(0).size() == 1);
+  CHECK(harness.onsets(0) == harness.onsets(1));
 
-  const auto tag = rig.tag(rig.time_ns(48000));
-  rig.client.send(bundle(
+  const auto tag = harness.tag(harness.time_ns(48000));
+  harness.client.send(bundle(
       tag, {message("/note/on", {60, 100}), bundle(tag, {message("/note/on", {64.0, 90.0f})})}));
-  rig.client.sync();
+  harness.client.sync();
   TimedEvent first;
   TimedEvent second;
-  REQUIRE(rig.process.from_osc.pop(first));
-  REQUIRE(rig.process.from_osc.pop(second));
+  REQUIRE(harness.process.from_osc.pop(first));
+  REQUIRE(harness.process.from_osc.pop(second));
   CHECK(first.event.index == 60);
   CHECK(second.event.index == 64);
   CHECK(first.timing == TimedEvent::When::at_frame);
@@ -239,27 +239,27 @@ TEST_CASE("the messages of a bundle act together", "[osc]") {
 }
 
 TEST_CASE("time tags keep their distance to the frame", "[osc]") {
-  Rig rig;
-  CHECK(has(rig.client.ask(bundle(rig.tag(rig.time_ns(0)), {message("/panic")})), "/error",
-            "/panic", "no audio"));
+  Harness harness;
+  CHECK(has(harness.client.ask(bundle(harness.tag(harness.time_ns(0)), {message("/panic")})),
+            "/error", "/panic", "no audio"));
 
   // The distance is no whole number of blocks, and the audio thread is never quite in time.
   constexpr std::int64_t distance = 31007;
   constexpr std::uint64_t count = 24;
-  const std::uint64_t first_tag = rig.tag(rig.time_ns(9600) + 7777);
+  const std::uint64_t first_tag = harness.tag(harness.time_ns(9600) + 7777);
   std::mt19937 random(1);
   std::uniform_int_distribution<std::int64_t> jitter_ns(-2'000'000, 2'000'000);
   for (std::uint64_t k = 0; k < count; ++k) {
     const std::uint64_t offset = (k * distance << 32) / 48000;  // to the last bit of a tag
-    while (static_cast<std::int64_t>(rig.sound[0].size()) <
+    while (static_cast<std::int64_t>(harness.sound[0].size()) <
            static_cast<std::int64_t>(k) * distance + 1) {
-      rig.drive(1, jitter_ns(random));
+      harness.drive(1, jitter_ns(random));
     }
-    rig.client.send(bundle(first_tag + offset, {message("/in/1/force", {0.1})}));
-    CHECK(rig.client.sync().empty());
+    harness.client.send(bundle(first_tag + offset, {message("/in/1/force", {0.1})}));
+    CHECK(harness.client.sync().empty());
   }
-  rig.drive(100);
-  const auto onsets = rig.onsets(0);
+  harness.drive(100);
+  const auto onsets = harness.onsets(0);
   REQUIRE(onsets.size() == count);
   CHECK(std::abs(onsets[0] - 9600) < 150);  // as exact as the first block's clock reading
   for (std::size_t k = 1; k < count; ++k) {
@@ -267,138 +267,142 @@ TEST_CASE("time tags keep their distance to the frame", "[osc]") {
   }
 
   // A time that has passed acts at once, and whoever asked for it hears of it.
-  const auto now = static_cast<std::int64_t>(rig.sound[0].size());
-  const auto late =
-      rig.client.ask(bundle(rig.tag(rig.time_ns(now - 24000)), {message("/in/1/force", {0.1})}));
+  const auto now = static_cast<std::int64_t>(harness.sound[0].size());
+  const auto late = harness.client.ask(
+      bundle(harness.tag(harness.time_ns(now - 24000)), {message("/in/1/force", {0.1})}));
   CHECK(has(late, "/error", "/in/1/force", "late by 0."));
-  rig.drive(2);
-  CHECK(rig.onsets(0).back() == now);
-  CHECK(rig.process.meters().late == 1);
+  harness.drive(2);
+  CHECK(harness.onsets(0).back() == now);
+  CHECK(harness.process.meters().late == 1);
 
-  CHECK(has(rig.client.ask(bundle(rig.tag(rig.time_ns(now + 11 * 48000)), {message("/panic")})),
+  CHECK(has(harness.client.ask(
+                bundle(harness.tag(harness.time_ns(now + 11 * 48000)), {message("/panic")})),
             "/error", "/panic", "s ahead"));
 }
 
 TEST_CASE("time tags follow the clock when the audio has stood still", "[osc]") {
-  Rig rig;
-  rig.drive(1);
-  rig.client.send(bundle(rig.tag(rig.time_ns(9600)), {message("/in/1/force", {0.1})}));
-  CHECK(rig.client.sync().empty());
-  rig.drive(50);
+  Harness harness;
+  harness.drive(1);
+  harness.client.send(bundle(harness.tag(harness.time_ns(9600)), {message("/in/1/force", {0.1})}));
+  CHECK(harness.client.sync().empty());
+  harness.drive(50);
   // Every block is 50 ms later than the frames before it say: 2400 frames fewer until a tag.
-  rig.drive(1, 50'000'000);
-  rig.client.send(bundle(rig.tag(rig.time_ns(24000)), {message("/in/1/force", {0.1})}));
-  CHECK(rig.client.sync().empty());
-  rig.drive(50, 50'000'000);
-  const auto onsets = rig.onsets(0);
+  harness.drive(1, 50'000'000);
+  harness.client.send(bundle(harness.tag(harness.time_ns(24000)), {message("/in/1/force", {0.1})}));
+  CHECK(harness.client.sync().empty());
+  harness.drive(50, 50'000'000);
+  const auto onsets = harness.onsets(0);
   REQUIRE(onsets.size() == 2);
   CHECK(std::abs(onsets[0] - 9600) < 48);
   CHECK(std::abs(onsets[1] - 21600) < 48);
 }
 
 TEST_CASE("a taken port and a wrong address are told apart", "[osc]") {
-  Rig rig;
-  const auto second = OscServer::open({.port = rig.server->port()}, rig.process, rig.session, {});
+  Harness harness;
+  const auto second =
+      OscServer::open({.port = harness.server->port()}, harness.process, harness.session, {});
   REQUIRE_FALSE(second);
   CHECK(second.error().message.find("is taken") != std::string::npos);
   CHECK(second.error().message.find("choose another with -u") != std::string::npos);
-  const auto nowhere = OscServer::open({.bind_address = "nowhere"}, rig.process, rig.session, {});
+  const auto nowhere =
+      OscServer::open({.bind_address = "nowhere"}, harness.process, harness.session, {});
   REQUIRE_FALSE(nowhere);
   CHECK(nowhere.error().message.find("'nowhere'") != std::string::npos);
   const auto foreign =
       OscServer::open({.bind_address = "192.0.2.1", .port = 0, .allow = "192.0.2.0/24"},
-                      rig.process, rig.session, {});
+                      harness.process, harness.session, {});
   REQUIRE_FALSE(foreign);
   CHECK(foreign.error().message.find("192.0.2.1") != std::string::npos);
-  CHECK_FALSE(OscServer::open({.port = 65536}, rig.process, rig.session, {}));
+  CHECK_FALSE(OscServer::open({.port = 65536}, harness.process, harness.session, {}));
 
-  const int port = rig.server->port();
-  rig.server.reset();
-  CHECK(OscServer::open({.port = port}, rig.process, rig.session, {}));
+  const int port = harness.server->port();
+  harness.server.reset();
+  CHECK(OscServer::open({.port = port}, harness.process, harness.session, {}));
 }
 
 TEST_CASE("loading answers done or fail, with the asker's number", "[osc]") {
-  Rig rig;
-  const Answer done = rig.client.ask(message("/model/load", {"two", 7}));
+  Harness harness;
+  const Answer done = harness.client.ask(message("/model/load", {"two", 7}));
   CHECK(done.address == "/done");
   REQUIRE(done.values.size() == 2);
   CHECK(done.text(0) == "/model/load");
   CHECK(std::get<std::int32_t>(done.values[1]) == 7);
 
-  const Answer fail = rig.client.ask(message("/preset/load", {"nosuch", "mine"}));
+  const Answer fail = harness.client.ask(message("/preset/load", {"nosuch", "mine"}));
   CHECK(has(fail, "/fail", "/preset/load", "there is no model or preset 'nosuch'"));
   REQUIRE(fail.values.size() == 3);
   CHECK(fail.text(1) == "mine");
-  CHECK(rig.client.ask(message("/model/load", {"two"})).values.size() == 1);
-  CHECK(has(rig.client.ask(message("/model/load")), "/error", "/model/load", "NAME"));
+  CHECK(harness.client.ask(message("/model/load", {"two"})).values.size() == 1);
+  CHECK(has(harness.client.ask(message("/model/load")), "/error", "/model/load", "NAME"));
 
-  CHECK(has(rig.client.ask(message("/model/load", {""})), "/fail", "/model/load",
+  CHECK(has(harness.client.ask(message("/model/load", {""})), "/fail", "/model/load",
             "expected the name of a model or a preset"));
 
   // The server may end while a load is under way.
   for (int i = 0; i < 8; ++i) {
-    rig.client.send(message("/model/load", {"two", i}));
+    harness.client.send(message("/model/load", {"two", i}));
   }
-  rig.server.reset();
-  CHECK(rig.session.load_and_wait("two"));
+  harness.server.reset();
+  CHECK(harness.session.load_and_wait("two"));
 }
 
 TEST_CASE("a full queue refuses, and takes again when there is room", "[osc]") {
-  Rig rig;
+  Harness harness;
   const Bytes many = bundle(1, std::vector<Bytes>(1500, message("/bend", {0.5f})));
   bool was_refused = false;
-  rig.drive(1);
+  harness.drive(1);
   for (int i = 0; i < 8 && !was_refused; ++i) {
-    rig.client.send(many);
-    for (const Answer& answer : rig.client.sync()) {
+    harness.client.send(many);
+    for (const Answer& answer : harness.client.sync()) {
       CHECK(has(answer, "/error", "/bend", "busy"));
       was_refused = true;
     }
   }
   CHECK(was_refused);
-  rig.drive(8);
-  rig.client.send(many);
-  CHECK(rig.client.sync().empty());
+  harness.drive(8);
+  harness.client.send(many);
+  CHECK(harness.client.sync().empty());
 }
 
 TEST_CASE("a bundle that finds no room ahead is refused whole; what is to act now is taken",
           "[osc]") {
-  Rig rig;
-  rig.drive(1);
+  Harness harness;
+  harness.drive(1);
   const std::vector<Bytes> pushes(1500, message("/in/1/force", {0.1}));
-  const auto ahead = [&] { return rig.tag(rig.time_ns(48000 * 49 / 5)); };
-  rig.client.send(bundle(ahead(), pushes));
-  rig.client.send(bundle(ahead(), pushes));
-  CHECK(rig.client.sync().empty());
+  const auto ahead = [&] { return harness.tag(harness.time_ns(48000 * 49 / 5)); };
+  harness.client.send(bundle(ahead(), pushes));
+  harness.client.send(bundle(ahead(), pushes));
+  CHECK(harness.client.sync().empty());
   for (int i = 0; i < 2; ++i) {
-    CHECK(has(rig.client.ask(bundle(ahead(), pushes)), "/error", "/in/1/force",
+    CHECK(has(harness.client.ask(bundle(ahead(), pushes)), "/error", "/in/1/force",
               "refused whole: 4096 events may wait for their time, and there is no room for 1500 "
               "events more; try again later"));
-    CHECK(rig.process.meters().dropped == 1500u * (static_cast<unsigned>(i) + 1));
-    rig.drive(4);  // the audio thread has taken them all, and they still wait
+    CHECK(harness.process.meters().dropped == 1500u * (static_cast<unsigned>(i) + 1));
+    harness.drive(4);  // the audio thread has taken them all, and they still wait
   }
-  CHECK(rig.onsets(0).empty());
-  rig.client.send(message("/in/1/force", {0.1}));
-  CHECK(rig.client.sync().empty());
-  const auto now = static_cast<std::int64_t>(rig.sound[0].size());
-  rig.drive(2);
-  CHECK(rig.onsets(0) == std::vector<std::int64_t>{now});
-  rig.client.send(message("/panic"));
-  CHECK(rig.client.sync().empty());
-  rig.drive(1);
-  rig.client.send(bundle(ahead(), pushes));
-  CHECK(rig.client.sync().empty());
+  CHECK(harness.onsets(0).empty());
+  harness.client.send(message("/in/1/force", {0.1}));
+  CHECK(harness.client.sync().empty());
+  const auto now = static_cast<std::int64_t>(harness.sound[0].size());
+  harness.drive(2);
+  CHECK(harness.onsets(0) == std::vector<std::int64_t>{now});
+  harness.client.send(message("/panic"));
+  CHECK(harness.client.sync().empty());
+  harness.drive(1);
+  harness.client.send(bundle(ahead(), pushes));
+  CHECK(harness.client.sync().empty());
 }
 
 TEST_CASE("lateness is answered once in a while, with how often it was", "[osc]") {
-  Rig rig;
-  rig.drive(200);
+  Harness harness;
+  harness.drive(200);
   const std::int64_t start_ns = monotonic_ns();
   std::int64_t answers = 0;
   for (int i = 0; i < 738; ++i) {
-    rig.client.send(bundle(rig.tag(rig.time_ns(24000)), {message("/in/1/force", {0.1})}));
+    harness.client.send(
+        bundle(harness.tag(harness.time_ns(24000)), {message("/in/1/force", {0.1})}));
     if (i % 50 == 49) {
-      for (const Answer& answer : rig.client.sync()) {
+      for (const Answer& answer : harness.client.sync()) {
         CHECK(has(answer, "/error", "/in/1/force", "late by 0."));
         ++answers;
       }
@@ -409,17 +413,17 @@ TEST_CASE("lateness is answered once in a while, with how often it was", "[osc]"
 }
 
 TEST_CASE("answers are not answered, and rubbish seldom", "[osc]") {
-  Rig rig;
-  rig.client.send(message("/error", {"/a", "b"}));
-  rig.client.send(bundle(1, {message("/done"), message("/status.reply")}));
-  CHECK(rig.client.sync().empty());
+  Harness harness;
+  harness.client.send(message("/error", {"/a", "b"}));
+  harness.client.send(bundle(1, {message("/done"), message("/status.reply")}));
+  CHECK(harness.client.sync().empty());
 
   const std::int64_t start_ns = monotonic_ns();
   std::int64_t answers = 0;
   for (int i = 0; i < 200; ++i) {
-    rig.client.send(RAW("rubbish"));
+    harness.client.send(RAW("rubbish"));
   }
-  for (const Answer& answer : rig.client.sync()) {
+  for (const Answer& answer : harness.client.sync()) {
     CHECK(has(answer, "/error", "", ""));
     ++answers;
   }
@@ -428,8 +432,8 @@ TEST_CASE("answers are not answered, and rubbish seldom", "[osc]") {
 }
 
 TEST_CASE("ten thousand broken packets leave the server and the sound whole", "[osc]") {
-  Rig rig;
-  rig.drive(1);
+  Harness harness;
+  harness.drive(1);
   const std::vector<Bytes> seeds = {
       message("/note/on", {60, 100}),
       message("/note/off", {60}),
@@ -444,9 +448,9 @@ TEST_CASE("ten thousand broken packets leave the server and the sound whole", "[
       message("/preset/load", {"none"}),
       message("/describe"),
       bundle(1, {message("/note/on", {60, 100}), message("/in/1/force", {0.5})}),
-      bundle(rig.tag(rig.time_ns(9600)),
+      bundle(harness.tag(harness.time_ns(9600)),
              {bundle(1, {message("/panic")}), message("/in/1/force", {0.5})})};
-  Client other(rig.server->port());  // who is answered while the first has asked too much
+  Client other(harness.server->port());  // who is answered while the first has asked too much
   std::mt19937 random(20240607);
   const auto below = [&](std::size_t limit) {
     return std::uniform_int_distribution<std::size_t>(0, limit - 1)(random);
@@ -481,18 +485,18 @@ TEST_CASE("ten thousand broken packets leave the server and the sound whole", "[
           break;
       }
     }
-    rig.client.send(packet);
+    harness.client.send(packet);
     if (i % 50 == 49) {
       other.sync();
-      rig.drive(2);
+      harness.drive(2);
     }
   }
-  CHECK(Client(rig.server->port()).ask(message("/status")).address == "/status.reply");
-  rig.drive(20);
-  for (const std::vector<float>& channel : rig.sound) {
+  CHECK(Client(harness.server->port()).ask(message("/status")).address == "/status.reply");
+  harness.drive(20);
+  for (const std::vector<float>& channel : harness.sound) {
     CHECK(std::all_of(channel.begin(), channel.end(), [](float x) { return std::isfinite(x); }));
   }
-  CHECK(rig.process.meters().frames == rig.sound[0].size());
+  CHECK(harness.process.meters().frames == harness.sound[0].size());
 }
 
 }  // namespace

@@ -15,7 +15,7 @@
 namespace ressort {
 namespace {
 
-using namespace rig;
+using namespace support;
 
 constexpr double rate = 44100.0;
 constexpr std::size_t block = 256;  // a span of its own: 5.8 ms
@@ -37,8 +37,8 @@ struct HandClock {
 };
 
 // A process whose blocks take what the test says, and all that it has played.
-struct Stage {
-  explicit Stage(Process::Clock clock = &HandClock::read) : process(rate, false, clock) {
+struct Harness {
+  explicit Harness(Process::Clock clock = &HandClock::read) : process(rate, false, clock) {
     offer(1);
     run(1, 0.0);
   }
@@ -223,82 +223,82 @@ TEST_CASE("what is over for a second lets more sound, by what they cost", "[over
 // -------------------------------------------------------------------------
 
 TEST_CASE("a process that takes too long sheds voices, tells it once, and recovers", "[overload]") {
-  Stage stage;
-  stage.strike_all();
-  stage.run(second, 0.0, 0.05);
-  const auto meters = [&] { return stage.process.meters(); };
+  Harness harness;
+  harness.strike_all();
+  harness.run(second, 0.0, 0.05);
+  const auto meters = [&] { return harness.process.meters(); };
   REQUIRE(meters().voices == keys);
   CHECK(meters().load == Approx(0.4 * (1.0 - std::exp(-1.0))).epsilon(0.03));
   CHECK(meters().cpu_peak == Approx(0.4).epsilon(1e-6));
   CHECK(meters().overruns == 0);
-  stage.run(2, 0.0, 0.21);
+  harness.run(2, 0.0, 0.21);
   CHECK(meters().overruns == 2);
-  CHECK(stage.overloads().empty());
-  stage.run(2, 0.0, 0.21);
+  CHECK(harness.overloads().empty());
+  harness.run(2, 0.0, 0.21);
   CHECK(meters().shed == 5);
   CHECK(meters().voices == 3);
-  stage.strike_all();
-  stage.run(second / 2, 0.0, 0.21);
+  harness.strike_all();
+  harness.run(second / 2, 0.0, 0.21);
   CHECK(meters().voices == 3);
-  const auto told = stage.overloads();
+  const auto told = harness.overloads();
   REQUIRE(told.size() == 1);
   CHECK(told[0].value == Approx(1.68).epsilon(1e-6));
   CHECK(told[0].index == 3);
-  stage.run(3 * second, 0.0, 0.05);
-  stage.strike_all();
-  stage.run(4, 0.0, 0.05);
+  harness.run(3 * second, 0.0, 0.05);
+  harness.strike_all();
+  harness.run(4, 0.0, 0.05);
   CHECK(meters().voices == keys);
   CHECK(meters().shed == 5);
-  CHECK(stage.heap_calls == 0);
+  CHECK(harness.heap_calls == 0);
 }
 
 TEST_CASE("a machine that holds up a block or two takes no voice", "[overload]") {
-  Stage stage;
-  stage.strike_all();
-  stage.run(second, 0.1);
-  const auto meters = [&] { return stage.process.meters(); };
+  Harness harness;
+  harness.strike_all();
+  harness.run(second, 0.1);
+  const auto meters = [&] { return harness.process.meters(); };
   for (int hiccup = 0; hiccup < 2; ++hiccup) {
-    stage.run(1, 30.0);
-    stage.run(2, 0.1);
+    harness.run(1, 30.0);
+    harness.run(2, 0.1);
   }
-  stage.run(second, 0.1);
+  harness.run(second, 0.1);
   CHECK(meters().voices == keys);
   CHECK(meters().shed == 0);
   CHECK(meters().overruns == 2);
   CHECK(meters().cpu_peak == Approx(30.0).epsilon(1e-6));
-  CHECK(stage.overloads().empty());
-  stage.process.meters_were_read.raise();
-  stage.run(2, 0.1);
+  CHECK(harness.overloads().empty());
+  harness.process.meters_were_read.raise();
+  harness.run(2, 0.1);
   CHECK(meters().cpu_peak == Approx(0.1).epsilon(1e-6));
   // Three of five are more than a hiccup.
-  stage.run(3, 30.0);
-  stage.run(2, 0.1);
+  harness.run(3, 30.0);
+  harness.run(2, 0.1);
   CHECK(meters().shed == keys - 1);
 }
 
 TEST_CASE("while two models fade into each other, the old one gives way", "[overload]") {
-  Stage stage;
-  stage.strike_all();
-  stage.run(second, 0.1);
-  stage.offer(2);
-  stage.strike_all();
-  stage.run(8, 1.5);
-  stage.run(second, 0.1);
-  CHECK(stage.process.meters().swaps == 2);
-  CHECK(stage.process.meters().voices == keys);
-  CHECK(stage.process.meters().shed == 0);
-  CHECK(stage.overloads().empty());
+  Harness harness;
+  harness.strike_all();
+  harness.run(second, 0.1);
+  harness.offer(2);
+  harness.strike_all();
+  harness.run(8, 1.5);
+  harness.run(second, 0.1);
+  CHECK(harness.process.meters().swaps == 2);
+  CHECK(harness.process.meters().voices == keys);
+  CHECK(harness.process.meters().shed == 0);
+  CHECK(harness.overloads().empty());
 }
 
 TEST_CASE("without a clock nothing is measured and nobody gives way", "[overload]") {
   const std::size_t reads = HandClock::reads;
-  Stage stage(nullptr);
-  stage.strike_all();
-  stage.run(20, 30.0);
+  Harness harness(nullptr);
+  harness.strike_all();
+  harness.run(20, 30.0);
   CHECK(HandClock::reads == reads);
-  CHECK(stage.process.meters().voices == keys);
-  CHECK(stage.process.meters().shed == 0);
-  CHECK(stage.process.meters().cpu_peak == 0.0);
+  CHECK(harness.process.meters().voices == keys);
+  CHECK(harness.process.meters().shed == 0);
+  CHECK(harness.process.meters().cpu_peak == 0.0);
 }
 
 // --- what is told

@@ -1,12 +1,12 @@
 // The audio thread's whole: events on their frames, models that change while they sound.
 #include <set>
 
-#include "tests/support/process_rig.h"
+#include "tests/support/process_harness.h"
 
 namespace ressort {
 namespace {
 
-using namespace rig;
+using namespace support;
 
 double old_gain(std::size_t n) {
   return n < fade_frames ? 1.0 - static_cast<double>(n) / fade_frames : 0.0;
@@ -18,102 +18,102 @@ double old_gain(std::size_t n) {
 // ---------------------------------------------------------------------------------------
 
 TEST_CASE("without a model there is silence", "[process]") {
-  Stage stage(true, 2);
-  stage.run(1000, 100);
-  CHECK(peak(stage.out[0]) == 0.0);
-  CHECK(peak(stage.out[1]) == 0.0);
+  Harness harness(true, 2);
+  harness.run(1000, 100);
+  CHECK(peak(harness.out[0]) == 0.0);
+  CHECK(peak(harness.out[1]) == 0.0);
 }
 
 TEST_CASE("MIDI acts on its exact frame, whatever the block", "[process]") {
   const std::uint8_t on[] = {0x90, 69, 127};
   for (const std::size_t block : {64u, 333u, 512u, 2000u}) {
     for (const std::uint32_t frame : {0u, 1u, 33u, 63u}) {
-      Stage stage;
-      stage.process.slot.offer(sounding(scenes::poly_triangle(), struck(1), 1));
-      stage.run(2000, block, {{.frame = frame, .bytes = on}});
+      Harness harness;
+      harness.process.slot.offer(sounding(scenes::poly_triangle(), struck(1), 1));
+      harness.run(2000, block, {{.frame = frame, .bytes = on}});
       Player player(scenes::poly_triangle(), struck(1), {.method = Method::direct});
       player.run(2000, {note_on(frame, 69)});
       CAPTURE(block, frame);
-      CHECK(stage.y() == player.y());
-      CHECK(peak(stage.y()) > 0.01);
+      CHECK(harness.y() == player.y());
+      CHECK(peak(harness.y()) > 0.01);
     }
   }
 }
 
 TEST_CASE("an event for a frame acts on it, and one that is late at once", "[process]") {
-  Stage stage;
+  Harness harness;
   Preset faint;  // what drifts this far would be taken for a voice that lost its stability
   faint.gain = 0x1p-10;
-  stage.process.slot.offer(sounding(clock_text, faint, 1));
-  stage.at(1717, push());
-  stage.run(4000, 100);
-  CHECK(pushed_at(stage.y()) == 1717);
-  CHECK(stage.process.meters().late == 0);
-  stage.out[0].clear();
+  harness.process.slot.offer(sounding(clock_text, faint, 1));
+  harness.at(1717, push());
+  harness.run(4000, 100);
+  CHECK(pushed_at(harness.y()) == 1717);
+  CHECK(harness.process.meters().late == 0);
+  harness.out[0].clear();
   // Twice as fast from now on; 90 frames too late.
-  stage.at(3910, push());
-  stage.run(100, 100);
-  CHECK(stage.y()[1] - stage.y()[0] == 2.0 * faint.gain);
-  CHECK(stage.process.meters().late == 1);
-  CHECK(stage.process.meters().late_s == Approx(90.0 / rate).epsilon(1e-12));
+  harness.at(3910, push());
+  harness.run(100, 100);
+  CHECK(harness.y()[1] - harness.y()[0] == 2.0 * faint.gain);
+  CHECK(harness.process.meters().late == 1);
+  CHECK(harness.process.meters().late_s == Approx(90.0 / rate).epsilon(1e-12));
 }
 
 TEST_CASE("events with a time keep one latency, however they come", "[process]") {
   Random random(5);
   for (int i = 0; i < 50; ++i) {
-    Stage stage;
-    stage.process.slot.offer(sounding(clock_text, Preset{}, 1));
-    stage.run(256 * 4, 256);
+    Harness harness;
+    harness.process.slot.offer(sounding(clock_text, Preset{}, 1));
+    harness.run(256 * 4, 256);
     // Played on a key during the last period, read at the start of this one.
     const std::size_t frame = 256 * 3 + random.below(256);
     const auto when = static_cast<std::int64_t>(static_cast<double>(frame) / rate * 1e9);
-    stage.process.from_midi.push(
+    harness.process.from_midi.push(
         {.event = push(), .timing = TimedEvent::When::at_time, .when = when});
-    stage.run(1024, 256);
+    harness.run(1024, 256);
     CAPTURE(frame);
-    CHECK(pushed_at(stage.y()) == frame + 256);
+    CHECK(pushed_at(harness.y()) == frame + 256);
   }
   // From before the last period: the first frame there is. From the future: within this block.
   for (const std::int64_t when : {std::int64_t{0}, std::int64_t{1000000000}}) {
-    Stage stage;
-    stage.process.slot.offer(sounding(clock_text, Preset{}, 1));
-    stage.run(1024, 256);
-    stage.process.from_midi.push(
+    Harness harness;
+    harness.process.slot.offer(sounding(clock_text, Preset{}, 1));
+    harness.run(1024, 256);
+    harness.process.from_midi.push(
         {.event = push(), .timing = TimedEvent::When::at_time, .when = when});
-    stage.run(1024, 256);
-    CHECK(pushed_at(stage.y()) == (when == 0 ? 1024 : 1279));
+    harness.run(1024, 256);
+    CHECK(pushed_at(harness.y()) == (when == 0 ? 1024 : 1279));
   }
 }
 
 TEST_CASE("the events of a bundle act in one frame", "[process]") {
-  Stage stage;
-  stage.process.slot.offer(sounding(clock_text, Preset{}, 1));
-  stage.run(256);
-  CHECK(stage.now(push(), 3));
-  stage.run(256);
-  CHECK(pushed_at(stage.y()) == 256);
-  CHECK(stage.y()[256] == 3.0);
-  CHECK(stage.y()[257] == 6.0);
+  Harness harness;
+  harness.process.slot.offer(sounding(clock_text, Preset{}, 1));
+  harness.run(256);
+  CHECK(harness.now(push(), 3));
+  harness.run(256);
+  CHECK(pushed_at(harness.y()) == 256);
+  CHECK(harness.y()[256] == 3.0);
+  CHECK(harness.y()[257] == 6.0);
 }
 
 TEST_CASE("what comes first acts first, and what finds no room is counted", "[process]") {
-  Stage stage;
-  stage.process.slot.offer(sounding(hand_text, holding(), 1));
+  Harness harness;
+  harness.process.slot.offer(sounding(hand_text, holding(), 1));
   for (const double target : {0.03, 0.04, 0.02}) {
-    stage.at(300, parameter(0, 0, target));
+    harness.at(300, parameter(0, 0, target));
   }
-  stage.run(1000);
+  harness.run(1000);
   Report report;
-  REQUIRE(stage.process.reports.pop(report));
+  REQUIRE(harness.process.reports.pop(report));
   CHECK(report.kind == Report::Kind::parameter);
   CHECK(report.model == 1);
   CHECK(report.value == 0.02);
-  CHECK_FALSE(stage.process.reports.pop(report));
+  CHECK_FALSE(harness.process.reports.pop(report));
 
   for (std::size_t i = 0; i < Process::max_ahead + 10; ++i) {
-    CHECK(stage.process.schedule(1000000, push()) == (i < Process::max_ahead));
+    CHECK(harness.process.schedule(1000000, push()) == (i < Process::max_ahead));
   }
-  CHECK(stage.process.meters().dropped == 10);
+  CHECK(harness.process.meters().dropped == 10);
 }
 
 // --- models that change
@@ -121,40 +121,40 @@ TEST_CASE("what comes first acts first, and what finds no room is counted", "[pr
 
 TEST_CASE("two models cross-fade in a straight line of 50 ms", "[process]") {
   for (const std::size_t block : {32u, 441u, 512u, 3000u}) {
-    Stage stage;
-    stage.process.slot.offer(constant("0.75"));
-    stage.run(block, block);
-    CHECK(stage.y()[0] == 0.75);  // the first one is there at once
-    stage.out[0].clear();
-    stage.process.slot.offer(constant("-0.25", 2));
-    stage.run(4000, block);
+    Harness harness;
+    harness.process.slot.offer(constant("0.75"));
+    harness.run(block, block);
+    CHECK(harness.y()[0] == 0.75);  // the first one is there at once
+    harness.out[0].clear();
+    harness.process.slot.offer(constant("-0.25", 2));
+    harness.run(4000, block);
     double worst = 0.0;
     for (std::size_t n = 0; n < 4000; ++n) {
       const double expected = 0.75 * old_gain(n) - 0.25 * (1.0 - old_gain(n));
-      worst = std::max(worst, std::fabs(stage.y()[n] - expected));
+      worst = std::max(worst, std::fabs(harness.y()[n] - expected));
     }
     INFO("block " << block << ": " << show(worst));
     CHECK(worst < 1e-15);
-    CHECK(stage.process.meters().swaps == 2);
+    CHECK(harness.process.meters().swaps == 2);
   }
 }
 
 TEST_CASE("a note that began before the swap ends in the old model, a new one begins in the new",
           "[process]") {
-  Stage stage;
-  stage.process.slot.offer(sounding(hand_text, holding(), 1));
-  stage.now(note_on(0, 60));
-  stage.run(10240);  // the hand has come to 1
-  stage.out[0].clear();
-  stage.process.slot.offer(constant("0.", 2));
-  stage.at(10240 + 500, note_off(0, 60));
-  stage.at(10240 + 1500, note_on(0, 60));
-  stage.run(2000);
+  Harness harness;
+  harness.process.slot.offer(sounding(hand_text, holding(), 1));
+  harness.now(note_on(0, 60));
+  harness.run(10240);  // the hand has come to 1
+  harness.out[0].clear();
+  harness.process.slot.offer(constant("0.", 2));
+  harness.at(10240 + 500, note_off(0, 60));
+  harness.at(10240 + 1500, note_on(0, 60));
+  harness.run(2000);
   Player player(hand_text, holding());
   player.run(12240, {note_on(0, 60), note_off(10740, 60)});
   double worst = 0.0;
   for (std::size_t n = 0; n < 2000; ++n) {
-    worst = std::max(worst, std::fabs(stage.y()[n] - old_gain(n) * player.y()[10240 + n]));
+    worst = std::max(worst, std::fabs(harness.y()[n] - old_gain(n) * player.y()[10240 + n]));
   }
   INFO(show(worst));
   CHECK(worst < 1e-15);
@@ -162,24 +162,24 @@ TEST_CASE("a note that began before the swap ends in the old model, a new one be
 }
 
 TEST_CASE("an event for one model does not act in another", "[process]") {
-  Stage stage;
-  stage.process.slot.offer(sounding(clock_text, Preset{}, 7));
-  stage.now({.kind = EventKind::gesture,
-             .gesture = Gesture::force,
-             .index = 1,
-             .model = 6,
-             .value = 1.0});
-  stage.run(256);
-  CHECK(peak(stage.y()) == 0.0);
-  stage.process.slot.offer(sounding(clock_text, Preset{}, 8));
-  stage.now({.kind = EventKind::gesture,
-             .gesture = Gesture::force,
-             .index = 1,
-             .model = 7,
-             .value = 1.0});
-  stage.run(256);
+  Harness harness;
+  harness.process.slot.offer(sounding(clock_text, Preset{}, 7));
+  harness.now({.kind = EventKind::gesture,
+               .gesture = Gesture::force,
+               .index = 1,
+               .model = 6,
+               .value = 1.0});
+  harness.run(256);
+  CHECK(peak(harness.y()) == 0.0);
+  harness.process.slot.offer(sounding(clock_text, Preset{}, 8));
+  harness.now({.kind = EventKind::gesture,
+               .gesture = Gesture::force,
+               .index = 1,
+               .model = 7,
+               .value = 1.0});
+  harness.run(256);
   for (std::size_t n = 0; n < 256; ++n) {  // in the old one, which fades
-    CHECK(std::fabs(stage.y()[256 + n] - old_gain(n) * static_cast<double>(n + 1)) < 1e-12);
+    CHECK(std::fabs(harness.y()[256 + n] - old_gain(n) * static_cast<double>(n + 1)) < 1e-12);
   }
 }
 
@@ -196,7 +196,7 @@ TEST_CASE("a thousand models change under sounding notes without a step", "[proc
   }
   const double bound = own_step + 2.0 * own_peak / static_cast<double>(fade_frames);
 
-  Stage stage;
+  Harness harness;
   std::set<std::uint32_t> returned;  // serials
   int collected = 0;
   double step = 0.0;
@@ -204,20 +204,20 @@ TEST_CASE("a thousand models change under sounding notes without a step", "[proc
   bool finite = true;
   for (std::uint32_t i = 0; i < 1000; ++i) {
     Sounding* const next = sounding(texts[i % 2], struck(2), i + 1);
-    Sounding* const refused = stage.process.slot.offer(next);
+    Sounding* const refused = harness.process.slot.offer(next);
     REQUIRE(refused == nullptr);
-    const auto start = static_cast<std::int64_t>(stage.played);
+    const auto start = static_cast<std::int64_t>(harness.played);
     for (const Event& note : {note_on(0, 57), note_on(900, 64)}) {
-      stage.process.schedule(start + note.frame, note);
+      harness.process.schedule(start + note.frame, note);
     }
-    stage.out[0].clear();
-    stage.run(fade_frames + 600, 128 + i % 200);
-    for (const double y : stage.y()) {
+    harness.out[0].clear();
+    harness.run(fade_frames + 600, 128 + i % 200);
+    for (const double y : harness.y()) {
       step = std::max(step, std::fabs(y - before));
       before = y;
       finite = finite && std::isfinite(y);
     }
-    if (Sounding* const old = stage.process.slot.collect()) {
+    if (Sounding* const old = harness.process.slot.collect()) {
       returned.insert(old->serial);
       ++collected;
       delete old;
@@ -227,34 +227,34 @@ TEST_CASE("a thousand models change under sounding notes without a step", "[proc
   CHECK(finite);
   CHECK(step <= bound);
   CHECK(step > 0.1 * own_step);  // there was sound
-  CHECK(stage.process.meters().swaps == 1000);
+  CHECK(harness.process.meters().swaps == 1000);
   CHECK(collected == 999);
   CHECK(returned.size() == 999);  // each once
-  CHECK(stage.heap_calls == 0);
+  CHECK(harness.heap_calls == 0);
 }
 
 TEST_CASE("an offer that comes too soon waits, and one that is replaced comes back", "[process]") {
-  Stage stage;
+  Harness harness;
   Sounding* const first = constant("1.", 1);
   Sounding* const second = constant("2.", 2);
   Sounding* const third = constant("3.", 3);
   Sounding* const fourth = constant("4.", 4);
-  stage.process.slot.offer(first);
-  stage.run(256);
-  CHECK(stage.process.slot.offer(second) == nullptr);
-  stage.run(256);
-  CHECK(stage.process.slot.offer(third) == nullptr);
-  stage.run(256);
-  CHECK(stage.process.slot.offer(fourth) == third);
+  harness.process.slot.offer(first);
+  harness.run(256);
+  CHECK(harness.process.slot.offer(second) == nullptr);
+  harness.run(256);
+  CHECK(harness.process.slot.offer(third) == nullptr);
+  harness.run(256);
+  CHECK(harness.process.slot.offer(fourth) == third);
   delete third;
-  CHECK(stage.process.slot.collect() == nullptr);
-  stage.run(10000);
-  CHECK(stage.y().back() == 4.0);
+  CHECK(harness.process.slot.collect() == nullptr);
+  harness.run(10000);
+  CHECK(harness.y().back() == 4.0);
   // One place to put what has sounded: the second goes when the first was collected.
-  CHECK(stage.process.slot.collect() == first);
+  CHECK(harness.process.slot.collect() == first);
   delete first;
-  stage.run(256);
-  CHECK(stage.process.slot.collect() == second);
+  harness.run(256);
+  CHECK(harness.process.slot.collect() == second);
   delete second;
 }
 
@@ -266,29 +266,29 @@ TEST_CASE("the length of the blocks does not change what leaves the limiter", "[
   loud.gain = 50.0;
   std::vector<double> expected;
   for (const std::size_t block : {512u, 64u, 100u, 4096u}) {
-    Stage stage(true);
-    stage.process.slot.offer(sounding(ringing_string(), loud, 1));
+    Harness harness(true);
+    harness.process.slot.offer(sounding(ringing_string(), loud, 1));
     for (std::uint32_t i = 0; i < 20; ++i) {
-      stage.process.schedule(i * 777 + 1, note_on(0, 50 + static_cast<int>(i % 12)));
+      harness.process.schedule(i * 777 + 1, note_on(0, 50 + static_cast<int>(i % 12)));
     }
-    stage.run(20480, block);
+    harness.run(20480, block);
     if (expected.empty()) {
-      expected = stage.y();
-      CHECK(stage.process.meters().limited < 1.0);  // it was loud enough
+      expected = harness.y();
+      CHECK(harness.process.meters().limited < 1.0);  // it was loud enough
     }
     CAPTURE(block);
-    CHECK(stage.y() == expected);
-    CHECK(peak(stage.y()) <= Limiter::ceiling);
+    CHECK(harness.y() == expected);
+    CHECK(peak(harness.y()) <= Limiter::ceiling);
   }
 }
 
 TEST_CASE("one output is heard on every channel, and too many are folded", "[process]") {
-  Stage stage(false, 2);
-  stage.process.slot.offer(constant("0.5"));
-  stage.run(10);
-  CHECK(stage.out[0][9] == 0.5);
-  CHECK(stage.out[1][9] == 0.5);
-  Stage folded(false, 2);
+  Harness harness(false, 2);
+  harness.process.slot.offer(constant("0.5"));
+  harness.run(10);
+  CHECK(harness.out[0][9] == 0.5);
+  CHECK(harness.out[1][9] == 0.5);
+  Harness folded(false, 2);
   folded.process.slot.offer(
       sounding("@a ground 1.\n@b ground 2.\n@c ground 4.\n@out1 posOutput "
                "@a\n@out2 posOutput @b\n@out3 posOutput @c\n",
@@ -299,44 +299,44 @@ TEST_CASE("one output is heard on every channel, and too many are folded", "[pro
 }
 
 TEST_CASE("single and double precision buffers carry the same", "[process]") {
-  Stage stage;
+  Harness harness;
   Process process(rate, false);
-  stage.process.slot.offer(sounding(ringing_string(), struck(1), 1));
+  harness.process.slot.offer(sounding(ringing_string(), struck(1), 1));
   process.slot.offer(sounding(ringing_string(), struck(1), 1));
-  stage.process.schedule(3, note_on(0, 60));
+  harness.process.schedule(3, note_on(0, 60));
   process.schedule(3, note_on(0, 60));
-  stage.run(512);
+  harness.run(512);
   std::vector<float> left(512);
   float* const outputs[] = {left.data()};
   process.block(std::span<const float* const>(), outputs, 512, {}, 0);
   for (std::size_t n = 0; n < 512; ++n) {
-    CHECK(left[n] == static_cast<float>(stage.y()[n]));
+    CHECK(left[n] == static_cast<float>(harness.y()[n]));
   }
 }
 
 TEST_CASE("a recording is what was heard; a reset is told once", "[process]") {
-  Stage stage(false, 2);
-  stage.process.slot.offer(sounding(ringing_string(), struck(1), 1));
-  stage.process.is_recording.raise();
-  stage.process.schedule(3, note_on(0, 60));
-  stage.run(2000, 333);
+  Harness harness(false, 2);
+  harness.process.slot.offer(sounding(ringing_string(), struck(1), 1));
+  harness.process.is_recording.raise();
+  harness.process.schedule(3, note_on(0, 60));
+  harness.run(2000, 333);
   std::vector<float> heard;
   RecordedChunk chunk;
-  while (stage.process.recording.pop(chunk)) {
+  while (harness.process.recording.pop(chunk)) {
     CHECK(chunk.channels == 2);
     heard.insert(heard.end(), chunk.samples.begin(), chunk.samples.begin() + 2 * chunk.frames);
   }
   REQUIRE(heard.size() == 4000);
   for (std::size_t n = 0; n < 2000; ++n) {
-    CHECK(heard[2 * n] == static_cast<float>(stage.y()[n]));
+    CHECK(heard[2 * n] == static_cast<float>(harness.y()[n]));
   }
-  stage.process.schedule(2000, push(1e12));
-  stage.run(1000);
+  harness.process.schedule(2000, push(1e12));
+  harness.run(1000);
   Report report;
-  REQUIRE(stage.process.reports.pop(report));
+  REQUIRE(harness.process.reports.pop(report));
   CHECK(report.kind == Report::Kind::reset);
-  CHECK_FALSE(stage.process.reports.pop(report));
-  CHECK(stage.process.meters().resets == 1);
+  CHECK_FALSE(harness.process.reports.pop(report));
+  CHECK(harness.process.meters().resets == 1);
 }
 
 }  // namespace ressort

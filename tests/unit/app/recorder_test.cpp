@@ -4,7 +4,7 @@
 
 #include <chrono>
 
-#include "tests/support/console_rig.h"
+#include "tests/support/console_harness.h"
 #include "tests/support/sound.h"
 
 namespace ressort {
@@ -12,21 +12,21 @@ namespace ressort {
 TEST_CASE("rec writes what is heard, frame by frame", "[recorder]") {
   const Folder folder;
   const std::string path = folder.file("take.wav");
-  Rig rig;
-  rig.say("load " + write_triangle(folder));
-  rig.say("noteon 60 127");
-  rig.loudest(4);
-  CHECK(rig.say("rec " + path) == "recording to " + path + "; 'rec stop' ends it\n");
-  CHECK(has(rig.say("status"), "recording  yes"));
-  CHECK(has(rig.say("rec " + path), "error: a recording to '" + path + "' is going on"));
+  Harness harness;
+  harness.say("load " + write_triangle(folder));
+  harness.say("noteon 60 127");
+  harness.loudest(4);
+  CHECK(harness.say("rec " + path) == "recording to " + path + "; 'rec stop' ends it\n");
+  CHECK(has(harness.say("status"), "recording  yes"));
+  CHECK(has(harness.say("rec " + path), "error: a recording to '" + path + "' is going on"));
   std::vector<double> heard;
   for (const std::size_t frames : {period, std::size_t{1}, std::size_t{100}, period}) {
-    for (const float sample : rig.play(frames)) {
+    for (const float sample : harness.play(frames)) {
       heard.push_back(static_cast<double>(sample));
     }
   }
-  CHECK(rig.say("rec stop") == path + ": 0.01 s, nothing lost\n");
-  rig.play();
+  CHECK(harness.say("rec stop") == path + ": 0.01 s, nothing lost\n");
+  harness.play();
 
   const auto sound = read_sound(path);
   REQUIRE(sound);
@@ -39,18 +39,18 @@ TEST_CASE("rec writes what is heard, frame by frame", "[recorder]") {
     worst = std::max(worst, std::fabs(sound->channels[0][i] - heard[i]));
   }
   CHECK(worst <= 0x1p-23);  // one step of 24 bits
-  CHECK(has(rig.say("rec stop"), "error: nothing is being recorded"));
+  CHECK(has(harness.say("rec stop"), "error: nothing is being recorded"));
 }
 
 TEST_CASE("a recording begins where it is told to, with the channels there are", "[recorder]") {
   const Folder folder;
-  Rig rig(4);
-  rig.process.is_recording.raise();  // left over in the ring
-  rig.play();
-  rig.process.is_recording.lower();
-  rig.say("rec " + folder.file("four.wav"));
-  rig.play(100);
-  CHECK(has(rig.say("rec stop"), "nothing lost"));
+  Harness harness(4);
+  harness.process.is_recording.raise();  // left over in the ring
+  harness.play();
+  harness.process.is_recording.lower();
+  harness.say("rec " + folder.file("four.wav"));
+  harness.play(100);
+  CHECK(has(harness.say("rec stop"), "nothing lost"));
   const auto sound = read_sound(folder.file("four.wav"));
   REQUIRE(sound);
   REQUIRE(sound->channels.size() == 4);
@@ -59,9 +59,9 @@ TEST_CASE("a recording begins where it is told to, with the channels there are",
 
 TEST_CASE("a recording of nothing is a valid file", "[recorder]") {
   const Folder folder;
-  Rig rig;
-  rig.say("rec " + folder.file("nothing.wav"));
-  CHECK(has(rig.say("rec stop"), "nothing.wav: 0.00 s, nothing lost"));
+  Harness harness;
+  harness.say("rec " + folder.file("nothing.wav"));
+  CHECK(has(harness.say("rec stop"), "nothing.wav: 0.00 s, nothing lost"));
   const auto sound = read_sound(folder.file("nothing.wav"));
   REQUIRE(sound);
   CHECK(sound->channels.size() == 2);
@@ -70,49 +70,49 @@ TEST_CASE("a recording of nothing is a valid file", "[recorder]") {
 
 TEST_CASE("what a recording misses is told", "[recorder]") {
   const Folder folder;
-  Rig rig;
-  rig.say("rec " + folder.file("gap.wav"));
-  rig.play();
+  Harness harness;
+  harness.say("rec " + folder.file("gap.wav"));
+  harness.play();
   Meters meters;
   meters.record_lost = 3;
-  rig.process.board.write(meters);
-  CHECK(has(rig.say("rec stop"), "gap.wav: 0.01 s, 3 pieces lost"));
+  harness.process.board.write(meters);
+  CHECK(has(harness.say("rec stop"), "gap.wav: 0.01 s, 3 pieces lost"));
 }
 
 TEST_CASE("a file that cannot be written is told at once", "[recorder]") {
   const Folder folder;
-  Rig rig;
-  CHECK(has(rig.say("rec " + folder.file("none/x.wav")), "x.wav' cannot be written"));
-  CHECK_FALSE(rig.process.is_recording.is_raised());
-  CHECK(has(rig.say("rec stop"), "error: nothing is being recorded"));
+  Harness harness;
+  CHECK(has(harness.say("rec " + folder.file("none/x.wav")), "x.wav' cannot be written"));
+  CHECK_FALSE(harness.process.is_recording.is_raised());
+  CHECK(has(harness.say("rec stop"), "error: nothing is being recorded"));
 }
 
 TEST_CASE("rec writes over a sound when it is told to, over other files never", "[recorder]") {
   const Folder folder;
-  Rig rig;
+  Harness harness;
   const std::string path = folder.file("take.wav");
-  rig.say("rec " + path);
-  rig.play(100);
-  rig.say("rec stop");
-  CHECK(has(rig.say("rec " + path), "take.wav' is there already; --force writes over it"));
-  CHECK(has(rig.say("rec " + path + " --force"), "recording to"));
-  rig.play(50);
+  harness.say("rec " + path);
+  harness.play(100);
+  harness.say("rec stop");
+  CHECK(has(harness.say("rec " + path), "take.wav' is there already; --force writes over it"));
+  CHECK(has(harness.say("rec " + path + " --force"), "recording to"));
+  harness.play(50);
   CHECK(read_sound(path)->channels[0].size() == 100);  // until the new one is whole
-  rig.say("rec stop");
+  harness.say("rec stop");
   CHECK(read_sound(path)->channels[0].size() == 50);
-  CHECK(has(rig.say("rec " + folder.write("poem.wav", "text") + " --force"), "is no sound"));
-  CHECK(has(rig.say("rec " + folder.file("take.mp4")), "the name of no sound file"));
+  CHECK(has(harness.say("rec " + folder.write("poem.wav", "text") + " --force"), "is no sound"));
+  CHECK(has(harness.say("rec " + folder.file("take.mp4")), "the name of no sound file"));
 }
 
 TEST_CASE("rec writes what the ending says", "[recorder]") {
   const Folder folder;
-  Rig rig;
+  Harness harness;
   for (const std::string_view ending : sound_endings()) {
     const std::string path = folder.file("take" + std::string(ending));
     INFO(path);
-    CHECK(has(rig.say("rec " + path), "recording to"));
-    rig.play(200);
-    CHECK(has(rig.say("rec stop"), "nothing lost"));
+    CHECK(has(harness.say("rec " + path), "recording to"));
+    harness.play(200);
+    CHECK(has(harness.say("rec stop"), "nothing lost"));
     const auto sound = read_sound(path);
     REQUIRE(sound);
     CHECK(sound->rate_hz == 48000.0);
@@ -123,41 +123,41 @@ TEST_CASE("rec writes what the ending says", "[recorder]") {
 TEST_CASE("a recording that finds no room is told of at once, and the sound goes on",
           "[recorder]") {
   const Folder folder;
-  Rig rig;
-  rig.say("load " + write_triangle(folder));
+  Harness harness;
+  harness.say("load " + write_triangle(folder));
   const std::string path = folder.file("take.wav");
-  rig.say("rec " + path);
-  auto news = rig.news.get_future();
+  harness.say("rec " + path);
+  auto news = harness.news.get_future();
   rlimit before{};
   getrlimit(RLIMIT_FSIZE, &before);
   const auto handler = signal(SIGXFSZ, SIG_IGN);
   const rlimit limit{40960, before.rlim_max};
   setrlimit(RLIMIT_FSIZE, &limit);
   while (news.wait_for(std::chrono::milliseconds(1)) != std::future_status::ready) {
-    rig.play();
+    harness.play();
   }
   setrlimit(RLIMIT_FSIZE, &before);
   signal(SIGXFSZ, handler);
   const std::string told = news.get();
   CHECK(has(told, "writing '" + path + "' failed: File too large; the recording ended after 0."));
-  rig.say("noteon 60 127");
-  CHECK(rig.loudest(20) > 0.0);
+  harness.say("noteon 60 127");
+  CHECK(harness.loudest(20) > 0.0);
   const auto sound = read_sound(path);
   REQUIRE(sound);
   CHECK(sound->channels[0].size() > 6000);  // of the 6826 that have room
   CHECK(sound->channels[0].size() <= 6826);
-  CHECK_FALSE(has(rig.say("status"), "recording"));
-  CHECK(rig.say("rec stop") == "error: " + told + "\n");
-  CHECK(has(rig.say("rec stop"), "nothing is being recorded"));
-  CHECK(has(rig.say("rec " + folder.file("next.wav")), "recording to"));
+  CHECK_FALSE(has(harness.say("status"), "recording"));
+  CHECK(harness.say("rec stop") == "error: " + told + "\n");
+  CHECK(has(harness.say("rec stop"), "nothing is being recorded"));
+  CHECK(has(harness.say("rec " + folder.file("next.wav")), "recording to"));
 }
 
 TEST_CASE("a recording that is left alone ends with the console", "[recorder]") {
   const Folder folder;
   {
-    Rig rig;
-    rig.say("rec " + folder.file("end.wav"));
-    rig.play(100);
+    Harness harness;
+    harness.say("rec " + folder.file("end.wav"));
+    harness.play(100);
   }
   const auto sound = read_sound(folder.file("end.wav"));
   REQUIRE(sound);

@@ -8,7 +8,7 @@
 namespace ressort {
 namespace {
 
-using namespace rig;
+using namespace support;
 
 // Input 1 is a hand that plucks, input 2 one that bows, input 3 a force.
 const Instrument& instrument() {
@@ -323,7 +323,7 @@ TEST_CASE("no pattern takes long or leaves its text", "[registry]") {
   }
   CHECK(fits(stars, name));
   CHECK_FALSE(fits(stars + "b", name));
-  rig::Random random(21);
+  support::Random random(21);
   const std::string letters = "ab/*?[]{},!-";
   for (int i = 0; i < 50000; ++i) {
     std::string pattern;

@@ -160,17 +160,17 @@ TEST_CASE("A thousand swaps while notes sound neither click, leak nor break", "[
   }
   wait_for_blocks(player, 400);
   std::this_thread::sleep_for(std::chrono::milliseconds(100));  // the worker has timed the last one
-  const std::size_t before = rig::heap_bytes();
+  const std::size_t before = support::heap_bytes();
   for (int n = 0; n < 1000; ++n) {
     REQUIRE(session.load_and_wait(n % 2 == 0 ? hard : soft));
     wait_for_blocks(player, n % 50);  // some wait for the fade's end, some come in its midst
   }
   // The last engine to fade has to be collected by the worker before memory is counted.
-  std::size_t after = rig::heap_bytes();
+  std::size_t after = support::heap_bytes();
   for (int patience = 0; patience < 400 && after > before + 4096; ++patience) {
     wait_for_blocks(player, 50);
     std::this_thread::sleep_for(std::chrono::milliseconds(10));
-    after = rig::heap_bytes();
+    after = support::heap_bytes();
   }
   CAPTURE(own, player.ear().largest_step.load(), before, after);
   CHECK(player.ear().is_finite.load());

@@ -6,7 +6,7 @@
 namespace ressort {
 namespace {
 
-using namespace rig;
+using namespace support;
 
 Error error_of(const std::string& model, const std::string& toml) {
   const auto preset = parse_preset("model = \"x.mdl\"\n" + toml);

@@ -13,9 +13,9 @@
 #include "core/compile/make_engine.h"
 #include "core/progress.h"
 #include "tests/support/catch.h"
+#include "tests/support/harness.h"
 #include "tests/support/heap.h"
 #include "tests/support/random.h"
-#include "tests/support/rig.h"
 
 using namespace ressort;
 
@@ -59,7 +59,7 @@ std::string star(int n) {
 std::string hub(int n) {
   std::string text = chain(n);
   for (int i = 2; i < n; ++i) {
-    text += spring(n + i, 0, i, rig::show(1e-6 + 1e-9 * i));
+    text += spring(n + i, 0, i, support::show(1e-6 + 1e-9 * i));
   }
   return text;
 }
@@ -77,7 +77,7 @@ std::string comb(int n) {
 
 std::string tangle(int n) {
   std::string text = masses(n);
-  rig::Random random(1);
+  support::Random random(1);
   for (int i = 0; i < 3 * n; ++i) {
     const auto end = [&] { return static_cast<int>(random.below(static_cast<std::size_t>(n))); };
     const int a = end();
@@ -141,7 +141,7 @@ TEST_CASE("Nothing of a load grows much faster than the model", "[load]") {
 
 TEST_CASE("What hangs together at random is judged by the bound, and has no lowest mode",
           "[load]") {
-  const Network network = rig::network_of(tangle(4000));
+  const Network network = support::network_of(tangle(4000));
   const std::vector<double> values = {0.01};
   const Progress progress([](std::string_view) { return true; });
   CHECK_FALSE(lowest_mode(network, values, progress));
@@ -149,7 +149,7 @@ TEST_CASE("What hangs together at random is judged by the bound, and has no lowe
   CHECK_FALSE(stability.is_exact());
   CHECK(stability.prove({values, values}) == Verdict::stable);
   // A chain of as many is nothing.
-  const Network straight = rig::network_of(chain(4000));
+  const Network straight = support::network_of(chain(4000));
   CHECK(lowest_mode(straight, values, progress));
   CHECK(Stability(straight, 1.0).is_exact());
 }
@@ -200,15 +200,15 @@ TEST_CASE("A load can be stopped wherever it is, and nothing of it stays", "[loa
   REQUIRE(all > 100);
   REQUIRE(all < 2000);
   load(all / 2);  // what a first time allocates for good
-  const std::size_t before = rig::heap_bytes();
+  const std::size_t before = support::heap_bytes();
   for (std::size_t most = 0; most < all; ++most) {
     CHECK(load(most) == most + 1);
   }
-  CHECK(rig::heap_bytes() == before);
+  CHECK(support::heap_bytes() == before);
 }
 
 TEST_CASE("What an engine takes is known before it is made", "[load]") {
-  if (!rig::heap_is_counted) {
+  if (!support::heap_is_counted) {
     return;
   }
   struct Way {
@@ -226,19 +226,19 @@ TEST_CASE("What an engine takes is known before it is made", "[load]") {
                                  Way{chain(300), Method::modal, Precision::float64},
                                  Way{chain(8000), Method::fourth, Precision::float64});
   const int voices = GENERATE(1, 16);
-  const Network network = rig::network_of(way.text);
+  const Network network = support::network_of(way.text);
   const auto compiled =
       compile(network, default_preset(network, true),
               {.voices = voices, .precision = way.precision, .method = way.method});
   REQUIRE(compiled);
   REQUIRE(compiled->plan.parts.at(0).method == way.method);
   const Machine& machine = compiled->engine->machine();
-  const std::size_t before = rig::heap_bytes();
+  const std::size_t before = support::heap_bytes();
   const Engine again(machine, {.voices = voices}, way.precision);
   Machine copy = machine;
-  const std::size_t held = rig::heap_bytes();
+  const std::size_t held = support::heap_bytes();
   { const Machine gone = std::move(copy); }
-  const auto of_machine = static_cast<double>(held - rig::heap_bytes());
+  const auto of_machine = static_cast<double>(held - support::heap_bytes());
   const double taken = static_cast<double>(held - before) - 2.0 * of_machine;
   const auto predicted = static_cast<double>(engine_bytes(machine, voices, way.precision));
   CAPTURE(method_name(way.method), voices, taken, predicted);
@@ -247,7 +247,7 @@ TEST_CASE("What an engine takes is known before it is made", "[load]") {
 }
 
 TEST_CASE("Voices that do not fit into memory are refused with what would fit", "[load]") {
-  const Network network = rig::network_of(chain(8000));
+  const Network network = support::network_of(chain(8000));
   const Preset preset = default_preset(network, true);
   const auto compiled_in = [&](std::uint64_t most_bytes) {
     return compile(network, preset,

@@ -3,17 +3,17 @@
 #include "core/compile/cull.h"
 #include "core/compile/merge.h"
 #include "core/model/topology.h"
-#include "tests/support/duel.h"
+#include "tests/support/comparison.h"
 #include "tests/support/player.h"
 #include "tests/support/random_network.h"
 
 namespace ressort {
 namespace {
 
-using rig::network_of;
-using rig::Random;
-using rig::Score;
-using rig::show;
+using support::network_of;
+using support::Random;
+using support::Score;
+using support::show;
 
 // The score as a part of the network hears it, which has some of the hands.
 Score score_for(const Program& part, const Program& whole, const Score& score) {
@@ -35,7 +35,7 @@ Score score_for(const Program& part, const Program& whole, const Score& score) {
 using Sound = std::vector<std::vector<double>>;
 
 void add(Sound& sound, const Program& program, const Score& score) {
-  const std::vector<double> heard = rig::perform_directly(program, score);
+  const std::vector<double> heard = support::perform_directly(program, score);
   for (std::size_t i = 0; i < heard.size(); ++i) {
     const OutputSlot& output = program.outputs[i % program.outputs.size()];
     sound[output.channel][i / program.outputs.size()] += heard[i];
@@ -63,10 +63,10 @@ TEST_CASE("what is left out changes no bit of any output, on 200 random networks
   for (std::uint64_t seed = 1; seed <= 200; ++seed) {
     INFO("seed " << seed);
     Random random(seed);
-    const std::string text = rig::NetworkWriter(seed).write().text + unheard(random);
+    const std::string text = support::NetworkWriter(seed).write().text + unheard(random);
     const Network network = network_of(text);
     const Program whole = make_program(network, Network::reference_rate_hz, true);
-    const Score score = rig::score_of(whole, {.frames = 400, .seed = seed, .turns = true});
+    const Score score = support::score_of(whole, {.frames = 400, .seed = seed, .turns = true});
     const Machine machine = make_machine(network, Network::reference_rate_hz, true);
     Sound all(machine.channels, std::vector<double>(400));
     Sound some = all;
@@ -125,14 +125,14 @@ TEST_CASE("springs side by side are one", "[reduce]") {
   CHECK(describe(*merged) == "2 springs beside others");
   CHECK_FALSE(merge(network_of(one), {}));
   const auto play = [](const std::string& text) {
-    rig::Player player(text, {}, {.method = Method::direct});
+    support::Player player(text, {}, {.method = Method::direct});
     player.run(20'000);
-    player.run(20'000, {rig::parameter(0, 0, .06)});  // turned on the way
+    player.run(20'000, {support::parameter(0, 0, .06)});  // turned on the way
     return player;
   };
-  const rig::Player first = play(one);
-  const rig::Player second = play(three);
-  rig::Comparison comparison;
+  const support::Player first = play(one);
+  const support::Player second = play(three);
+  support::Comparison comparison;
   for (std::size_t n = 0; n < first.y().size(); ++n) {
     comparison.add(first.y()[n], second.y()[n]);
   }

@@ -9,7 +9,7 @@
 namespace ressort {
 namespace {
 
-using namespace rig;
+using namespace support;
 
 Preset with_range(const std::string& name, double value, double least, double most) {
   Preset preset = struck(1);
@@ -184,7 +184,7 @@ TEST_CASE("ranges are safe in every corner that they have together, and no small
 
 TEST_CASE("random presets: their ranges are safe as they come out, and not told in vain",
           "[stability_check]") {
-  rig::Random random(41);
+  support::Random random(41);
   int narrowed = 0;
   for (int i = 0; i < 300; ++i) {
     const auto strength = [&] { return std::pow(10.0, random.uniform(-1.5, 0.0)); };

@@ -10,7 +10,7 @@
 namespace ressort {
 namespace {
 
-using namespace rig;
+using namespace support;
 
 constexpr double infinity = std::numeric_limits<double>::infinity();
 

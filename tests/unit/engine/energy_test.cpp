@@ -8,7 +8,7 @@
 namespace ressort {
 namespace {
 
-using rig::show;
+using support::show;
 
 // A kernel whose energy can be asked for, and what each step should have done to it.
 template <class T>
@@ -71,7 +71,7 @@ class Books {
     scale = std::max(scale, energy().scale);
   }
 
-  rig::Bare<T> bare;
+  support::Bare<T> bare;
   std::vector<double> inputs;
   std::vector<double> x, v;
   double expected = 0.0;
@@ -120,15 +120,15 @@ class Books {
 // In float it is the sum of ever so many roundings, a share of all that went through.
 template <class T>
 double unexplained(const std::string& text, Method method, std::uint64_t seed) {
-  const Network network = rig::network_of(text);
+  const Network network = support::network_of(text);
   const Machine machine = make_plan(make_machine(network, 44100.0, true),
                                     {.is_double = sizeof(T) == sizeof(double)}, method)
                               .machine;
   double worst = 0.0;
   for (const Program& program : machine.parts) {
     Books<T> books(program);
-    rig::Random random(seed);
-    std::vector<rig::Motion> motions;
+    support::Random random(seed);
+    std::vector<support::Motion> motions;
     for (std::size_t i = 0; i < books.inputs.size(); ++i) {
       motions.emplace_back(seed + i, 20.0, 2000.0);
     }
@@ -162,8 +162,8 @@ TEST_CASE("Every step's energy is what came less what the dampers took", "[energ
   CHECK(unexplained<double>(scenes::triangle("0.1", "0.001") + hit, Method::direct, 1) < 1e-12);
   CHECK(unexplained<float>(scenes::triangle("0.1", "0.001") + hit, Method::direct, 1) < 1e-6);
   for (const Method method : {Method::direct, Method::chains}) {
-    const double in_double = unexplained<double>(rig::ringing_string(), method, 2);
-    const double in_float = unexplained<float>(rig::ringing_string(), method, 2);
+    const double in_double = unexplained<double>(support::ringing_string(), method, 2);
+    const double in_float = unexplained<float>(support::ringing_string(), method, 2);
     INFO(method_name(method) << " " << show(in_double) << " " << show(in_float));
     CHECK(in_double < 1e-12);
     CHECK(in_float < 1e-6);
@@ -173,7 +173,7 @@ TEST_CASE("Every step's energy is what came less what the dampers took", "[energ
 TEST_CASE("Of networks that nobody wrote too", "[energy]") {
   int seen = 0;
   for (std::uint64_t seed = 1; seen < 24; ++seed) {
-    const rig::RandomNetwork network = rig::random_network(seed);
+    const support::RandomNetwork network = support::random_network(seed);
     if (!network.is_linear || network.may_drift ||
         network.text.find("audioParam") != std::string::npos) {
       continue;
@@ -201,12 +201,12 @@ std::string ball(const std::string& floor) {
 
 std::vector<std::string> creators(const std::string& text, const CompileOptions& options,
                                   std::size_t frames = 4 * 44100) {
-  rig::Player player(text, Preset{}, options);
+  support::Player player(text, Preset{}, options);
   player.run(frames);
   CHECK(player.heap_calls == 0);
   std::vector<std::string> names;
   for (const std::uint32_t link : player.engine().take_creators()) {
-    names.push_back(rig::network_of(text).links[link].name.text());
+    names.push_back(support::network_of(text).links[link].name.text());
   }
   CHECK(player.engine().take_creators().empty());
   return names;
@@ -238,7 +238,7 @@ TEST_CASE("What only wavers, falls or is driven is not accused", "[energy]") {
     }
   }
   // Whoever moves a ball by hand gives it energy.
-  rig::Player player(ball("0.05 0.02 0."), Preset{});
+  support::Player player(ball("0.05 0.02 0."), Preset{});
   std::vector<Event> pushes;
   for (std::uint32_t frame = 0; frame < 44100; frame += 2000) {
     pushes.push_back({.frame = frame,
@@ -258,17 +258,17 @@ TEST_CASE("A voice that runs away fades from where it was, and nobody else notic
   const std::string text =
       "@g ground 0.\n@m osc 1. 0.05 0.0001 0. 0.\n@c nlSpring3 @m @g 0. 1. 0.\n"
       "@in1 frcInput @m\n@out1 posOutput @m\n";
-  Preset preset = rig::struck(3);
+  Preset preset = support::struck(3);
   preset.controls[0].high = 100.0;
   for (const Precision precision : {Precision::float64, Precision::float32}) {
     const CompileOptions options{.precision = precision,
                                  .method = Method::direct,
                                  .budget = Budget{.passive = Passivity::never}};
-    rig::Player calm(text, preset, options);
-    rig::Player both(text, preset, options);
+    support::Player calm(text, preset, options);
+    support::Player both(text, preset, options);
     constexpr std::uint32_t strike = 1001;
-    calm.run(20000, {rig::note_on(0, 60, 0.005)});
-    both.run(20000, {rig::note_on(0, 60, 0.005), rig::note_on(strike, 55, 1.0)});
+    calm.run(20000, {support::note_on(0, 60, 0.005)});
+    both.run(20000, {support::note_on(0, 60, 0.005), support::note_on(strike, 55, 1.0)});
     CHECK(calm.engine().meters().resets == 0);
     CHECK(both.engine().meters().resets == 1);
     std::size_t last = 0;  // frame on which the lost one is heard
@@ -312,7 +312,7 @@ std::string quiet_string(const std::string& p, int output) {
 }
 
 Preset untuned() {
-  Preset preset = rig::struck(1);
+  Preset preset = support::struck(1);
   preset.keyboard = false;
   return preset;
 }
@@ -329,8 +329,8 @@ Event blow(std::uint32_t frame, int input) {
 
 TEST_CASE("What sleeps would never have been heard", "[energy]") {
   const std::string text = quiet_string("s", 1);
-  rig::Player player(text, untuned(), {.method = Method::direct});
-  rig::Bare<double> never(rig::program_of(text));
+  support::Player player(text, untuned(), {.method = Method::direct});
+  support::Bare<double> never(support::program_of(text));
   CHECK(player.engine().meters().saved == 0.0);
   std::size_t slept = 0;
   double loudest = 0.0;  // of what was slept over
@@ -353,10 +353,10 @@ TEST_CASE("What sleeps would never have been heard", "[energy]") {
 TEST_CASE("What sleeps wakes on the very sample, part by part", "[energy]") {
   const std::string text = quiet_string("s", 1) + quiet_string("t", 2);
   const CompileOptions options{.method = Method::direct};
-  rig::Player fresh(text, untuned(), options);
+  support::Player fresh(text, untuned(), options);
   fresh.run(3000, {blow(0, 1), blow(0, 2)});
   for (const std::size_t input : {1u, 2u}) {
-    rig::Player player(text, untuned(), options);
+    support::Player player(text, untuned(), options);
     player.run(16384 + 37);
     CHECK(player.engine().meters().saved == 1.0);
     constexpr std::uint32_t frame = 1003;
@@ -368,10 +368,10 @@ TEST_CASE("What sleeps wakes on the very sample, part by part", "[energy]") {
     }
   }
   // So does what a parameter is turned for.
-  rig::Player turned(text, untuned(), options);
+  support::Player turned(text, untuned(), options);
   turned.run(16384);
   CHECK(turned.engine().meters().saved == 1.0);
-  turned.run(256, {rig::parameter(0, 1, 0.12)});
+  turned.run(256, {support::parameter(0, 1, 0.12)});
   CHECK(turned.engine().meters().saved == 0.5);
 }
 
@@ -379,7 +379,7 @@ TEST_CASE("What could still touch something, or drift, is not put to sleep", "[e
   const std::string string =
       scenes::string("s", 10, "0.1", "0.01") + "@in1 frcInput @s_m2\n" + scenes::output(1, "s_m6");
   const auto saved = [](const std::string& text) {
-    rig::Player player(text, untuned(), {.method = Method::direct});
+    support::Player player(text, untuned(), {.method = Method::direct});
     player.run(16384);
     return player.engine().meters().saved;
   };

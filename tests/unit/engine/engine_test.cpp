@@ -7,7 +7,7 @@
 namespace ressort {
 namespace {
 
-using namespace rig;
+using namespace support;
 
 // The frequency where the spectrum under a Hann window is largest, near a guess. A decaying sine
 // has its peak at its own frequency, and the window keeps the others out of the way.

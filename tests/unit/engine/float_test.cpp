@@ -5,12 +5,12 @@
 namespace ressort {
 namespace {
 
-using rig::Bare;
-using rig::Comparison;
-using rig::isas;
-using rig::network_of;
-using rig::program_of;
-using rig::show;
+using support::Bare;
+using support::Comparison;
+using support::isas;
+using support::network_of;
+using support::program_of;
+using support::show;
 
 Program compensated(Program program) {
   program.form = Compensated{};
@@ -122,8 +122,8 @@ TEST_CASE("an undamped string at K = M comes back to the last bit", "[float]") {
       }
     }
     CHECK(differing == 0);
-    CHECK(rig::peak(first) > 0x1p-7);
-    CHECK(rig::largest_step(first) > 0.0);
+    CHECK(support::peak(first) > 0x1p-7);
+    CHECK(support::largest_step(first) > 0.0);
   }
 }
 
@@ -221,18 +221,18 @@ TEST_CASE("an engine plays compensated, hands and all", "[float]") {
                            "@in1 frcInput @s_m3\n@in2 posInput 0.\n"
                            "@h springDamper @in2 @s_m8 s_K 0.001\n" +
                            scenes::output(1, "s_m5");
-  Preset preset = rig::struck(3);
+  Preset preset = support::struck(3);
   preset.keyboard = true;
-  const std::vector<Event> events = {rig::note_on(0, 57),
-                                     rig::note_on(3000, 62),
-                                     rig::parameter(5000, 1, 0.11),
+  const std::vector<Event> events = {support::note_on(0, 57),
+                                     support::note_on(3000, 62),
+                                     support::parameter(5000, 1, 0.11),
                                      {.frame = 9000,
                                       .kind = EventKind::gesture,
                                       .gesture = Gesture::position,
                                       .index = 2,
                                       .value = 0.3}};
-  rig::Player exact(text, preset);
-  rig::Player found(text, preset, {.precision = Precision::compensated32});
+  support::Player exact(text, preset);
+  support::Player found(text, preset, {.precision = Precision::compensated32});
   exact.run(44100, events, {256, 37});
   found.run(44100, events, {256, 37});
   Comparison comparison;

@@ -7,7 +7,7 @@
 namespace ressort {
 namespace {
 
-using namespace rig;
+using namespace support;
 
 constexpr double smoothing_pole = 0.999;  // 1 - 44.1/44100
 

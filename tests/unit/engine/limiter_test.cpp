@@ -6,7 +6,7 @@
 namespace ressort {
 namespace {
 
-using namespace rig;
+using namespace support;
 
 constexpr std::size_t late = Limiter::lookahead_frames;
 constexpr double nan = std::numeric_limits<double>::quiet_NaN();

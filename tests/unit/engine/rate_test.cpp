@@ -12,7 +12,7 @@
 namespace ressort {
 namespace {
 
-using namespace rig;
+using namespace support;
 using std::numbers::pi;
 
 constexpr double reference_hz = 44100.0;

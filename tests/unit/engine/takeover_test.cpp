@@ -11,8 +11,8 @@
 namespace ressort {
 namespace {
 
-using rig::Player;
-using rig::show;
+using support::Player;
+using support::show;
 
 // A string of masses on oscillators, with gravity, a contact and two inputs: all that has to go on.
 const std::string body =
@@ -24,7 +24,7 @@ const std::string body =
     scenes::output(1, "s_m6");
 
 Preset played() {
-  Preset preset = rig::struck(3);
+  Preset preset = support::struck(3);
   preset.controls.push_back({.source = ControlSource::controller,
                              .number = 1,
                              .target = "in2",
@@ -38,23 +38,23 @@ CompileOptions in_form(Method method, Precision precision = Precision::float64) 
   return {.rate_hz = 48000.0, .precision = precision, .method = method};
 }
 
-const std::vector<Event> beginning = {rig::note_on(0, 57), rig::note_on(700, 64),
-                                      rig::controller(1000, 1, 0.9)};
-const std::vector<Event> ending = {rig::note_on(300, 69), rig::note_off(500, 57),
-                                   rig::controller(900, 1, 0.1)};
+const std::vector<Event> beginning = {support::note_on(0, 57), support::note_on(700, 64),
+                                      support::controller(1000, 1, 0.9)};
+const std::vector<Event> ending = {support::note_on(300, 69), support::note_off(500, 57),
+                                   support::controller(900, 1, 0.1)};
 
 // How far the second half is from that of an engine that was not relieved.
 double difference(const std::string& text, const Preset& preset, int stiffness, Method from,
                   Method to, Precision precision = Precision::float64) {
   std::vector<Event> events = beginning;
-  events.push_back(rig::parameter(1950, stiffness, 0.102));
+  events.push_back(support::parameter(1950, stiffness, 0.102));
   Player stays(text, preset, in_form(from, precision));
   Player leaves(text, preset, in_form(from, precision));
   Player comes(text, preset, in_form(to, precision));
   for (Player* player : {&stays, &leaves}) {
     player->run(2000, events, {64, 100, 17});  // in the midst of the stiffness's ramp
   }
-  const rig::HeapWatch watch;
+  const support::HeapWatch watch;
   const bool goes_on = comes.engine().go_on_from(leaves.engine());
   const std::size_t heap_calls = watch.calls();
   REQUIRE(goes_on);
@@ -65,12 +65,12 @@ double difference(const std::string& text, const Preset& preset, int stiffness, 
   for (std::size_t n = 0; n < 4000; ++n) {
     worst = std::max(worst, std::fabs(stays.y()[2000 + n] - comes.y()[n]));
   }
-  return worst / rig::peak({stays.y().data() + 2000, 4000});
+  return worst / support::peak({stays.y().data() + 2000, 4000});
 }
 
 // A kernel that the part does not have would be the direct one under another name.
 bool has_form(const std::string& text, Method method) {
-  const Machine machine = make_machine(rig::network_of(text), 48000.0, true);
+  const Machine machine = make_machine(support::network_of(text), 48000.0, true);
   return make_plan(machine, {}, method).parts[0].method == method;
 }
 
@@ -104,25 +104,25 @@ TEST_CASE("An engine goes on where another is", "[takeover]") {
 }
 
 TEST_CASE("Modes cannot tell where all masses are", "[takeover]") {
-  Player modal(rig::ringing_string(), rig::struck(1), in_form(Method::modal));
-  Player direct(rig::ringing_string(), rig::struck(1), in_form(Method::direct));
-  modal.run(500, {rig::note_on(0, 57)});
+  Player modal(support::ringing_string(), support::struck(1), in_form(Method::modal));
+  Player direct(support::ringing_string(), support::struck(1), in_form(Method::direct));
+  modal.run(500, {support::note_on(0, 57)});
   CHECK_FALSE(direct.engine().go_on_from(modal.engine()));
   direct.run(500);
-  CHECK(rig::peak(direct.y()) == 0.0);
+  CHECK(support::peak(direct.y()) == 0.0);
 }
 
 TEST_CASE("A damper that takes all velocity in one sample lets nobody go on", "[takeover]") {
   const std::string text = "@c osc 1. 0.5 " + std::to_string(48000.0 / 44100.0) +
                            " 0. 0.\n@m osc 2. 0.05 0.01 0. 0.\n@l springDamper @c @m 0.02 0.\n"
                            "@in1 frcInput @m\n@out1 posOutput @c\n";
-  Player direct(text, rig::struck(1), in_form(Method::direct));
-  Player modal(text, rig::struck(1), in_form(Method::modal));
-  direct.run(500, {rig::note_on(0, 57)});
+  Player direct(text, support::struck(1), in_form(Method::direct));
+  Player modal(text, support::struck(1), in_form(Method::modal));
+  direct.run(500, {support::note_on(0, 57)});
   CHECK_FALSE(modal.engine().go_on_from(direct.engine()));
-  modal.run(500, {rig::note_on(0, 57)});
-  CHECK(std::isfinite(rig::peak(modal.y())));
-  CHECK(rig::peak(modal.y()) > 0.0);
+  modal.run(500, {support::note_on(0, 57)});
+  CHECK(std::isfinite(support::peak(modal.y())));
+  CHECK(support::peak(modal.y()) > 0.0);
 }
 
 // One callback of 64 frames, in which a key may be struck.
@@ -148,15 +148,15 @@ TEST_CASE("A large mesh sounds at once, and by its modes when they are found", "
   REQUIRE(quick);
   std::filesystem::remove(path);
   REQUIRE((*quick)->plan.parts[0].method != Method::modal);
-  Preset preset = default_preset(rig::network_of(scenes::mesh_20x30()), false);
+  Preset preset = default_preset(support::network_of(scenes::mesh_20x30()), false);
   preset.gain = (*quick)->instrument.gain;
-  auto compiled = compile(rig::network_of(scenes::mesh_20x30()), preset,
+  auto compiled = compile(support::network_of(scenes::mesh_20x30()), preset,
                           {.rate_hz = 48000.0, .most_modes = quick_modes});
   REQUIRE(compiled);
   Process stays(48000.0);
   stays.slot.offer(new Sounding{std::move(compiled->engine), 1});
 
-  rig::Comparison comparison;
+  support::Comparison comparison;
   const auto play = [&](std::size_t blocks) {
     for (std::size_t n = 0; n < blocks; ++n) {
       const auto expected = listen(stays, n == 0);

@@ -9,12 +9,12 @@
 namespace ressort {
 namespace {
 
-using rig::Player;
-using rig::show;
+using support::Player;
+using support::show;
 
 // A mass on a spring, struck once at the start.
 Player struck_mass(double stiffness, double damping, double rate_hz) {
-  Preset preset = rig::struck(1);
+  Preset preset = support::struck(1);
   preset.keyboard = false;
   Player player("@o osc 1. " + show(stiffness) + " " + show(damping) +
                     " 0. 0.\n@in1 frcInput @o\n@out1 posOutput @o\n",
@@ -72,15 +72,15 @@ TEST_CASE("While a hand moves nobody knows what is lost", "[watch]") {
 }
 
 TEST_CASE("A large part's energy is added up in slices", "[watch]") {
-  const Program program = rig::program_of(scenes::square_mesh("m", 100, 100, "0.1", "0.001") +
-                                          scenes::output(1, "m_m7_3"));
+  const Program program = support::program_of(scenes::square_mesh("m", 100, 100, "0.1", "0.001") +
+                                              scenes::output(1, "m_m7_3"));
   const auto kernel = make_kernel<double>(program, 1, best_isa());
   for (std::uint32_t c = 0; c < program.coefficients.size(); ++c) {
     kernel->coefficients.set(
         0, c, coefficient_value(program, program.coefficients[c], program.parameters, 1.0), false);
   }
   const LaneValues<double> values{kernel->coefficients.value.data(), kernel->width()};
-  rig::Random random(1);
+  support::Random random(1);
   std::vector<double> x, v;
   for (std::size_t node = 0; node < program.position.size(); ++node) {
     x.push_back(random.uniform(-1.0, 1.0));
@@ -99,7 +99,7 @@ TEST_CASE("A large part's energy is added up in slices", "[watch]") {
   // And an engine does so in blocks that go on meanwhile: without dampers nothing is lost.
   const std::string drum = scenes::square_mesh("m", 100, 100, "0.1", "0.") +
                            "@in1 frcInput @m_m20_30\n" + scenes::output(1, "m_m7_3");
-  rig::Bare<double> bare(rig::program_of(drum));
+  support::Bare<double> bare(support::program_of(drum));
   bare.step({0.1});
   REQUIRE(bare.kernel().save(0, x.data(), v.data()));
   const double given =
@@ -107,7 +107,7 @@ TEST_CASE("A large part's energy is added up in slices", "[watch]") {
                 LaneValues<double>{bare.kernel().coefficients.value.data(), bare.kernel().width()},
                 x.data(), v.data())
           .value;
-  Preset preset = rig::struck(1);
+  Preset preset = support::struck(1);
   preset.keyboard = false;
   Player player(drum, preset, {.method = Method::grid});
   player.run(12288,
@@ -124,7 +124,7 @@ TEST_CASE("A large part's energy is added up in slices", "[watch]") {
 
 TEST_CASE("When sleep ends does not depend on how time is cut", "[watch]") {
   const bool has_noise = GENERATE(false, true);
-  Preset preset = rig::struck(1);
+  Preset preset = support::struck(1);
   preset.noise = has_noise;
   preset.controls.push_back(
       {.source = ControlSource::audio, .number = 1, .target = "in1", .low = 0.0, .high = 0.1});
@@ -134,17 +134,17 @@ TEST_CASE("When sleep ends does not depend on how time is cut", "[watch]") {
   std::vector<double> audio(frames);
   audio[100037] = audio[150129] = 1.0;
   const std::vector<const double*> inputs = {audio.data()};
-  const std::vector<Event> events = {rig::note_on(3, 57), rig::note_off(2000, 57)};
+  const std::vector<Event> events = {support::note_on(3, 57), support::note_off(2000, 57)};
   Player whole(text, preset, {.method = Method::direct});  // to the last bit
   Player cut(text, preset, {.method = Method::direct});
   whole.run(90000, events, {4096}, inputs);
   CHECK(whole.engine().meters().saved == 1.0);
   cut.run(90000, events, {64, 100, 17, 1}, inputs);
   const std::vector<const double*> later = {audio.data() + 90000};
-  const std::vector<Event> again = {rig::note_on(30077, 60)};
+  const std::vector<Event> again = {support::note_on(30077, 60)};
   whole.run(110000, again, {4096}, later);
   cut.run(110000, again, {64, 100, 17, 1}, later);
-  CHECK(rig::peak({whole.y().data() + 100037, 1000}) > 1e-4);
+  CHECK(support::peak({whole.y().data() + 100037, 1000}) > 1e-4);
   std::size_t off = 0;
   while (off < frames && whole.y()[off] == cut.y()[off]) {
     ++off;
@@ -180,21 +180,22 @@ TEST_CASE("What has no bound at rest is played", "[watch]") {
        "@out1 posOutput @a\n"},
   };
   for (const Case& one : cases) {
-    const Network network = rig::network_of(one.text);
+    const Network network = support::network_of(one.text);
     for (const Precision precision : {Precision::float32, Precision::float64}) {
       Player player(one.text, default_preset(network, false),
                     {.voices = 2, .precision = precision, .find_gain = true});
       INFO(one.name);
-      player.run(30000, {rig::note_on(0, 60), rig::note_on(20000, 67)});
+      player.run(30000, {support::note_on(0, 60), support::note_on(20000, 67)});
       for (const double value : {0.0, 0.05, 0.1, 0.2}) {
-        player.run(20000, {rig::parameter(3, 0, value), rig::note_on(5000, 64)});
+        player.run(20000, {support::parameter(3, 0, value), support::note_on(5000, 64)});
       }
-      player.run(300000, {rig::note_off(0, 60), rig::note_off(0, 67), rig::note_off(0, 64)});
+      player.run(300000,
+                 {support::note_off(0, 60), support::note_off(0, 67), support::note_off(0, 64)});
       for (const auto& channel : player.out) {
         CHECK(
             std::all_of(channel.begin(), channel.end(), [](double y) { return std::isfinite(y); }));
       }
-      CHECK(rig::peak(player.y()) > 0.0);
+      CHECK(support::peak(player.y()) > 0.0);
       CHECK(player.heap_calls == 0);
       const EngineMeters meters = player.engine().meters();
       CHECK(meters.resets == 0);
@@ -225,12 +226,12 @@ TEST_CASE("Nobody in the instruments creates energy or runs away", "[watch]") {
       for (std::size_t block = 0; block < 500; ++block) {
         std::vector<Event> events;
         if (const std::size_t key = block / 50; block % 50 == 0 && key < keys.size()) {
-          events.push_back(rig::note_on(0, keys[key], 0.5 + 0.05 * static_cast<double>(key)));
+          events.push_back(support::note_on(0, keys[key], 0.5 + 0.05 * static_cast<double>(key)));
         } else if (block % 50 == 45 && key < keys.size()) {
-          events.push_back(rig::note_off(0, keys[key]));
+          events.push_back(support::note_off(0, keys[key]));
         }
         if (block < 300) {
-          events.push_back(rig::controller(0, 1, 0.5 + 0.4 * std::sin(0.1 * double(block))));
+          events.push_back(support::controller(0, 1, 0.5 + 0.4 * std::sin(0.1 * double(block))));
         }
         engine.process(events, {}, outputs, 441);
       }
@@ -249,7 +250,7 @@ TEST_CASE("Who sleeps is taken over asleep, and wakes the same", "[watch]") {
            p + "_m2\n" + scenes::output(output, p + "_m6");
   };
   const std::string text = string("s", 1) + string("t", 2);
-  Preset preset = rig::struck(1);
+  Preset preset = support::struck(1);
   preset.keyboard = false;
   const auto blow = [](std::uint32_t frame, int input) {
     return Event{.frame = frame,
@@ -291,7 +292,7 @@ TEST_CASE("Who sleeps is taken over asleep, and wakes the same", "[watch]") {
                                             comes.out[channel][begun + n]));
         }
       }
-      const double loudest = rig::peak({stays.out[1].data() + begun_there, 3000});
+      const double loudest = support::peak({stays.out[1].data() + begun_there, 3000});
       INFO(method_name(to) << " " << show(worst) << " of " << show(loudest));
       CHECK(loudest > 0.01);
       CHECK(worst < 1e-13 * loudest);

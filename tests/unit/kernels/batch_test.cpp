@@ -6,11 +6,11 @@
 namespace ressort {
 namespace {
 
-using rig::Comparison;
-using rig::isas;
-using rig::program_of;
-using rig::Random;
-using rig::show;
+using support::Comparison;
+using support::isas;
+using support::program_of;
+using support::Random;
+using support::show;
 
 constexpr std::uint32_t none = BatchSpring::none;
 

@@ -2,17 +2,17 @@
 #include <utility>
 
 #include "core/kernels/chains/chains_form.h"
-#include "tests/support/duel.h"
+#include "tests/support/comparison.h"
 
 namespace ressort {
 namespace {
 
-using rig::Comparison;
-using rig::DuelOptions;
-using rig::isas;
-using rig::program_of;
-using rig::Random;
-using rig::show;
+using support::Comparison;
+using support::ComparisonOptions;
+using support::isas;
+using support::program_of;
+using support::Random;
+using support::show;
 
 // The same in the form of chains, of which there must be some.
 Program formed(const std::string& text) {
@@ -24,11 +24,11 @@ Program formed(const std::string& text) {
 }
 
 template <class T>
-void check_duel(const Program& program, DuelOptions options, double most_relative,
+void check_same(const Program& program, ComparisonOptions options, double most_relative,
                 double least_snr_db) {
   for (const Isa isa : isas()) {
     options.isa = isa;
-    for (const Comparison& output : rig::duel<T>(program, options)) {
+    for (const Comparison& output : support::compare_kernels<T>(program, options)) {
       INFO("on " << isa_name(isa) << ", seed " << options.seed << ": " << show(output.relative())
                  << " of the peak, " << output.snr_db() << " dB");
       CHECK(output.worst <= most_relative * output.peak);
@@ -38,20 +38,21 @@ void check_duel(const Program& program, DuelOptions options, double most_relativ
 }
 
 // In double and, where rounding is not blown up by a contact, in float.
-void check_both(const Program& program, const DuelOptions& options, double most_relative = 1e-12) {
-  check_duel<double>(program, options, most_relative, 200.0);
-  check_duel<float>(program, options, 1e-4, 100.0);
+void check_both(const Program& program, const ComparisonOptions& options,
+                double most_relative = 1e-12) {
+  check_same<double>(program, options, most_relative, 200.0);
+  check_same<float>(program, options, 1e-4, 100.0);
 }
 
 // A force is a difference of positions and keeps less in float, and so does a faint sound behind
 // loud ones; in the direct form as well.
-void check_float(const Program& program, DuelOptions options) {
+void check_float(const Program& program, ComparisonOptions options) {
   Program plain = program;
   plain.form = Direct{};
-  const std::vector<Comparison> direct = rig::duel<float>(plain, options);
+  const std::vector<Comparison> direct = support::compare_kernels<float>(plain, options);
   for (const Isa isa : isas()) {
     options.isa = isa;
-    const std::vector<Comparison> chains = rig::duel<float>(program, options);
+    const std::vector<Comparison> chains = support::compare_kernels<float>(program, options);
     for (std::size_t i = 0; i < chains.size(); ++i) {
       INFO(isa_name(isa) << ", seed " << options.seed << ", output " << i << ": "
                          << chains[i].snr_db() << " dB, direct " << direct[i].snr_db());
@@ -175,11 +176,11 @@ TEST_CASE("the instruments' strings move as they are written", "[chains]") {
     check_both(formed(scenes::resonator()), {.reach = 1.0, .turns = turns});
     check_both(formed(scenes::physical_lfo()), {.reach = 0.1, .turns = turns, .pitch = 1.3});
     // Nearly constant bowing: in float a bow slips a sample earlier or later.
-    check_duel<double>(formed(scenes::bowed_string()),
+    check_same<double>(formed(scenes::bowed_string()),
                        {.frames = 8000, .reach = 2e-3, .turns = turns}, 1e-9, 180.0);
-    check_duel<double>(formed(scenes::plucked_harmonics()),
+    check_same<double>(formed(scenes::plucked_harmonics()),
                        {.frames = 22050, .reach = 0.03, .turns = turns}, 1e-9, 180.0);
-    check_duel<double>(formed(scenes::string_1000()),
+    check_same<double>(formed(scenes::string_1000()),
                        {.frames = 22050, .reach = 0.03, .turns = turns, .pitch = 0.7}, 1e-9, 180.0);
   }
 }
@@ -199,7 +200,7 @@ TEST_CASE("strings of every length fold into every pack", "[chains]") {
         text += "@f springDamper @in2 " + scenes::at("a_m", count - 1) + " 0.2 0.01\n";
       }
       text += scenes::output(1, "a_m0") + scenes::output(2, scenes::at("a_m", count - 1).substr(1));
-      check_duel<double>(formed(text), {.frames = 600, .reach = 0.1}, 1e-12, 200.0);
+      check_same<double>(formed(text), {.frames = 600, .reach = 0.1}, 1e-12, 200.0);
     }
   }
 }
@@ -217,8 +218,8 @@ TEST_CASE("stiff strings are found in any order of their lines", "[chains]") {
     CHECK(form.chains[0].is_stiff);
     CHECK(form.loose.empty());
     CHECK(form.links.empty());
-    const DuelOptions options{.frames = 10000, .seed = seed, .turns = true, .pitch = 0.9};
-    check_duel<double>(program, options, 1e-12, 200.0);
+    const ComparisonOptions options{.frames = 10000, .seed = seed, .turns = true, .pitch = 0.9};
+    check_same<double>(program, options, 1e-12, 200.0);
     check_float(program, options);
   }
   // The same from the macro, whose ends are grounds, with places on it.
@@ -280,7 +281,7 @@ TEST_CASE("stiff strings of every length and every end fold into every pack", "[
       const Program program = formed(text);
       CHECK(std::get<Chains>(program.form).chains.at(0).is_stiff);
       CHECK(std::get<Chains>(program.form).links.empty());
-      check_duel<double>(program, {.frames = 300, .reach = 0.1}, 1e-12, 200.0);
+      check_same<double>(program, {.frames = 300, .reach = 0.1}, 1e-12, 200.0);
     }
   }
 }
@@ -306,9 +307,9 @@ TEST_CASE("everything beside a string acts on it", "[chains]") {
     const Program program = formed(shuffled(text, seed));
     CHECK(std::get<Chains>(program.form).chains.size() == 2);
     CHECK(std::get<Chains>(program.form).loose.size() == 3);
-    const DuelOptions options{
+    const ComparisonOptions options{
         .frames = 15000, .seed = seed, .reach = 0.05, .turns = seed > 1, .pitch = 0.9};
-    check_duel<double>(program, options, 1e-12, 200.0);
+    check_same<double>(program, options, 1e-12, 200.0);
     check_float(program, options);
   }
 }
@@ -321,7 +322,7 @@ TEST_CASE("what touches a string acts while it does", "[chains]") {
              "@c2 contact @a_m22 @in2 0.05 0.02 -0.02\n"
              "@c3 nlContact @a_m30 @in2 0.02 0.5 0.1 0.01 0.03\n"
              "@out1 posOutput @a_m39\n");
-  check_duel<double>(program, {.frames = 8000, .reach = 0.2, .lowest_hz = 5.0, .highest_hz = 50.0},
+  check_same<double>(program, {.frames = 8000, .reach = 0.2, .lowest_hz = 5.0, .highest_hz = 50.0},
                      1e-11, 200.0);
 }
 
@@ -349,8 +350,8 @@ TEST_CASE("random strings tied to each other move as they are written", "[chains
     Program program = program_of(shuffled(text, seed));
     if (auto form = chains_form(program)) {
       program.form = std::move(*form);
-      const DuelOptions options{.frames = 6000, .seed = seed, .turns = true};
-      check_duel<double>(program, options, 1e-12, 200.0);
+      const ComparisonOptions options{.frames = 6000, .seed = seed, .turns = true};
+      check_same<double>(program, options, 1e-12, 200.0);
       check_float(program, options);
     }
   }
@@ -376,13 +377,13 @@ TEST_CASE("a stiffness that audio gives acts sample by sample", "[chains]") {
   const Program program = formed("@k audioParam @in2\n" + row("a", 20, "mass 1.", "k 0.01") +
                                  "@in1 frcInput @a_m4\n@out1 posOutput @a_m16\n");
   REQUIRE(program.audio_coefficients.size() == 1);
-  check_duel<double>(program, {.frames = 2560}, 1e-12, 200.0);
+  check_same<double>(program, {.frames = 2560}, 1e-12, 200.0);
 }
 
 TEST_CASE("a reset string starts over, whatever became of it", "[chains]") {
   const Program program = formed(scenes::resonator());
-  rig::Bare<float> used(program);
-  rig::Bare<float> fresh(program);
+  support::Bare<float> used(program);
+  support::Bare<float> fresh(program);
   CHECK(used.kernel().is_near_start(0, 1e-9));
   used.step({std::numeric_limits<double>::quiet_NaN()});
   for (int n = 0; n < 100; ++n) {

@@ -3,18 +3,18 @@
 
 #include "core/kernels/dense/dense.h"
 #include "core/kernels/dense/dense_form.h"
-#include "tests/support/duel.h"
+#include "tests/support/comparison.h"
 
 namespace ressort {
 namespace {
 
-using rig::Comparison;
-using rig::duel;
-using rig::DuelOptions;
-using rig::Fighter;
-using rig::program_of;
-using rig::Random;
-using rig::show;
+using support::compare_kernels;
+using support::Comparison;
+using support::ComparisonOptions;
+using support::Fighter;
+using support::program_of;
+using support::Random;
+using support::show;
 
 constexpr std::size_t second = 44100;  // frames
 
@@ -31,7 +31,7 @@ Program dense(const std::string& text) {
 }
 
 void each_isa(const std::function<void(Isa)>& use) {
-  for (const Isa isa : rig::isas()) {
+  for (const Isa isa : support::isas()) {
     INFO(isa_name(isa));
     use(isa);
   }
@@ -42,15 +42,15 @@ struct Tolerance {
   double snr_db = 100.0;    // in float
 };
 
-void agree(const Program& program, DuelOptions options, const Tolerance& tolerance = {}) {
+void agree(const Program& program, ComparisonOptions options, const Tolerance& tolerance = {}) {
   each_isa([&](Isa isa) {
     options.isa = isa;
-    for (const Comparison& output : duel<double>(program, options)) {
+    for (const Comparison& output : compare_kernels<double>(program, options)) {
       CAPTURE(show(output.relative()));
       CHECK(output.peak > 0.0);
       CHECK(output.relative() < tolerance.relative);
     }
-    for (const Comparison& output : duel<float>(program, options)) {
+    for (const Comparison& output : compare_kernels<float>(program, options)) {
       CHECK(output.snr_db() > tolerance.snr_db);
     }
   });

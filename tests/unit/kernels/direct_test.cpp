@@ -2,17 +2,17 @@
 #include <string_view>
 
 #include "core/laws/laws.h"
+#include "tests/support/harness.h"
 #include "tests/support/reference_network.h"
-#include "tests/support/rig.h"
 
 namespace ressort {
 namespace {
 
-using rig::Bare;
-using rig::Comparison;
-using rig::network_of;
-using rig::show;
 using scenes::Example;
+using support::Bare;
+using support::Comparison;
+using support::network_of;
+using support::show;
 using V = Pack<double, 16>;
 
 constexpr std::size_t second = 44100;  // frames
@@ -58,7 +58,7 @@ class Hands {
 
  private:
   const Example& example_;
-  std::vector<rig::Motion> motions_;
+  std::vector<support::Motion> motions_;
   std::vector<double> position_;
 };
 
@@ -175,8 +175,8 @@ TEST_CASE("so it is for every law and every start that the nine do not have", "[
   REQUIRE(network.third == ThirdArgument::velocity_per_second);
   auto oracle = reference::make_simulation(network, parameter_values(network));
   Bare<double> bare(make_program(network, 44100.0, true));
-  const rig::Motion hand(41, 0.5, 30.0);
-  const rig::Motion force(42, 20.0, 2000.0);
+  const support::Motion hand(41, 0.5, 30.0);
+  const support::Motion force(42, 20.0, 2000.0);
   std::vector<Comparison> channels(5);
   for (std::size_t n = 0; n < second; ++n) {
     const std::vector<double> inputs = {0.5 + 0.5 * hand(n), 0.1 * force(n)};
@@ -216,8 +216,8 @@ TEST_CASE("nonlinear springs, clipped contacts, gravity and force outputs equal 
     const Network network = network_of(text);
     auto oracle = reference::make_simulation(network, parameter_values(network));
     Bare<double> bare(make_program(network, 44100.0, true));
-    const rig::Motion hand(51, 0.5, 30.0);
-    const rig::Motion force(52, 20.0, 2000.0);
+    const support::Motion hand(51, 0.5, 30.0);
+    const support::Motion force(52, 20.0, 2000.0);
     std::vector<Comparison> channels(5);
     for (std::size_t n = 0; n < 2000; ++n) {  // impacts are chaotic: later even doubles differ
       const double rest = network.masses[1].position;

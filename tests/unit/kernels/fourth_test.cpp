@@ -3,19 +3,19 @@
 
 #include "core/compile/plan.h"
 #include "core/kernels/direct/fourth_form.h"
-#include "tests/support/duel.h"
+#include "tests/support/comparison.h"
 #include "tests/support/poles.h"
 
 namespace ressort {
 namespace {
 
-using rig::Bare;
-using rig::Comparison;
-using rig::Continuous;
-using rig::isas;
-using rig::network_of;
-using rig::program_of;
-using rig::show;
+using support::Bare;
+using support::Comparison;
+using support::Continuous;
+using support::isas;
+using support::network_of;
+using support::program_of;
+using support::show;
 
 Program formed(Program program) {
   auto form = fourth_form(program);
@@ -100,14 +100,15 @@ TEST_CASE("halving the time step gains 24 dB", "[fourth]") {
 }
 
 TEST_CASE("dampers that are not in proportion to the springs are as near", "[fourth]") {
-  const Program program = rig::program_of(scenes::triangle("0.1", "0.001"));
-  const auto expected = rig::continuous_poles(rig::matrices_of(program));
-  const auto published = rig::poles_of(rig::transition(program));
-  const auto found = rig::poles_of(rig::transition(fourth(scenes::triangle("0.1", "0.001"))));
+  const Program program = support::program_of(scenes::triangle("0.1", "0.001"));
+  const auto expected = support::continuous_poles(support::matrices_of(program));
+  const auto published = support::poles_of(support::transition(program));
+  const auto found =
+      support::poles_of(support::transition(fourth(scenes::triangle("0.1", "0.001"))));
   REQUIRE(expected.size() == 3);
   REQUIRE(found.size() == 3);
   for (std::size_t i = 0; i < 3; ++i) {
-    const auto cents = [&](const rig::Pole& pole) {
+    const auto cents = [&](const support::Pole& pole) {
       return std::fabs(1200.0 * std::log2(pole.hertz / expected[i].hertz));
     };
     INFO("mode " << i << ": " << cents(found[i]) << " cents, as published " << cents(published[i]));
@@ -127,14 +128,14 @@ TEST_CASE("fourth order is stable up to K + 6Z = 12M, and no farther", "[fourth]
       INFO("K = " << k << ", Z = " << z);
       CHECK(fourth_form(program).has_value() == (beyond < 0.0));
       program.form = Fourth{.springs = {{.run = 0, .first = 0, .count = 1}}, .others = {}};
-      const double radius = rig::spectral_radius(rig::transition(program));
+      const double radius = support::spectral_radius(support::transition(program));
       CHECK((beyond < 0.0 ? radius <= 1.0 + 1e-12 : radius > 1.0 + 1e-6));
     }
   }
 }
 
 // Five masses, every two of them linked by a spring and damper of their own.
-std::string knot(rig::Random& random, double scale) {
+std::string knot(support::Random& random, double scale) {
   std::string text = "@g ground 0.\n";
   for (int i = 0; i < 5; ++i) {
     text += scenes::at("m", i) + " mass " + show(random.uniform(0.2, 2.0)) + " 0. 0.\n";
@@ -152,8 +153,8 @@ std::string knot(rig::Random& random, double scale) {
 TEST_CASE("what is stable as published is so to fourth order", "[fourth]") {
   for (std::uint64_t seed = 1; seed <= 100; ++seed) {
     const auto steepest = [&](double scale) {
-      rig::Random random(seed);
-      const auto matrices = rig::matrices_of(program_of(knot(random, scale)));
+      support::Random random(seed);
+      const auto matrices = support::matrices_of(program_of(knot(random, scale)));
       const Eigen::VectorXd root = matrices.mass.cwiseSqrt().cwiseInverse();
       const Eigen::MatrixXd both = matrices.stiffness + 2.0 * matrices.damping;
       return Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>(root.asDiagonal() * both *
@@ -161,16 +162,16 @@ TEST_CASE("what is stable as published is so to fourth order", "[fourth]") {
           .eigenvalues()
           .maxCoeff();
     };
-    rig::Random random(seed);
+    support::Random random(seed);
     Program program = program_of(knot(random, 3.999 / steepest(1.0)));
     INFO("seed " << seed);
-    CHECK(rig::spectral_radius(rig::transition(program)) < 1.0);
+    CHECK(support::spectral_radius(support::transition(program)) < 1.0);
     Fourth form;
     for (std::uint32_t run = 0; run < program.link_runs.size(); ++run) {
       form.springs.push_back({run, program.link_runs[run].first, program.link_runs[run].count});
     }
     program.form = form;
-    CHECK(rig::spectral_radius(rig::transition(program)) < 1.0);
+    CHECK(support::spectral_radius(support::transition(program)) < 1.0);
   }
 }
 
@@ -235,27 +236,27 @@ TEST_CASE("the fourth-order form follows what is turned and touched", "[fourth]"
   const Program program = program_of(text);
   for (const bool turns : {false, true}) {
     for (const double pitch : {1.0, 0.6}) {
-      const rig::DuelOptions options{.frames = 8000,
-                                     .push = 0.001,
-                                     .lowest_hz = 5.0,
-                                     .highest_hz = 60.0,
-                                     .turns = turns,
-                                     .pitch = pitch};
-      const rig::Score score = rig::score_of(program, options);
-      const auto expected = rig::perform<double>(formed(program), score, Isa::base);
-      const auto published = rig::perform_directly(program, score);
+      const support::ComparisonOptions options{.frames = 8000,
+                                               .push = 0.001,
+                                               .lowest_hz = 5.0,
+                                               .highest_hz = 60.0,
+                                               .turns = turns,
+                                               .pitch = pitch};
+      const support::Score score = support::score_of(program, options);
+      const auto expected = support::perform<double>(formed(program), score, Isa::base);
+      const auto published = support::perform_directly(program, score);
       for (const Isa isa : isas()) {
         INFO(isa_name(isa) << (turns ? ", turning" : ", steady") << " at pitch " << pitch);
         for (const Comparison& output :
-             rig::compare(2, expected, rig::perform<double>(formed(program), score, isa))) {
+             support::compare(2, expected, support::perform<double>(formed(program), score, isa))) {
           CHECK(output.relative() < 1e-12);
         }
         for (const Comparison& output :
-             rig::compare(2, expected, rig::perform<float>(formed(program), score, isa))) {
+             support::compare(2, expected, support::perform<float>(formed(program), score, isa))) {
           CHECK(output.snr_db() > 85.0);
         }
       }
-      for (const Comparison& output : rig::compare(2, expected, published)) {
+      for (const Comparison& output : support::compare(2, expected, published)) {
         INFO("published: " << output.snr_db() << " dB");
         CHECK(output.peak > 1e-4);
         CHECK(output.snr_db() < 60.0);  // another scheme indeed
@@ -272,11 +273,12 @@ TEST_CASE("points on macros are held in the fourth-order form", "[fourth]") {
       "@in1 frcInput [@s u]\n@j springDamper [@s 0.8] [@t 1-u] 0.03 0.001\n"
       "@out1 posOutput [@t u]\n";
   const Program program = program_of(text);
-  const rig::Score score = rig::score_of(program, {.frames = 4000, .push = 0.001, .turns = true});
-  const auto expected = rig::perform_directly(program, score);
+  const support::Score score =
+      support::score_of(program, {.frames = 4000, .push = 0.001, .turns = true});
+  const auto expected = support::perform_directly(program, score);
   for (const Isa isa : isas()) {
-    const auto found = rig::perform<double>(formed(program), score, isa);
-    const Comparison output = rig::compare(1, expected, found)[0];
+    const auto found = support::perform<double>(formed(program), score, isa);
+    const Comparison output = support::compare(1, expected, found)[0];
     INFO(output.snr_db() << " dB from the published scheme");
     CHECK(output.snr_db() > 10.0);
     CHECK(output.snr_db() < 60.0);

@@ -4,17 +4,17 @@
 #include <vector>
 
 #include "core/kernels/grid/grid_form.h"
-#include "tests/support/duel.h"
+#include "tests/support/comparison.h"
 
 namespace ressort {
 namespace {
 
-using rig::Comparison;
-using rig::DuelOptions;
-using rig::program_of;
-using rig::Random;
-using rig::same_as_direct;
-using rig::show;
+using support::Comparison;
+using support::ComparisonOptions;
+using support::program_of;
+using support::Random;
+using support::same_as_direct;
+using support::show;
 
 Program formed(const std::string& text) {
   Program program = program_of(text);
@@ -91,7 +91,7 @@ TEST_CASE("A square mesh is one segment with four neighbours", "[grid]") {
 
 TEST_CASE("Instruments are grids, and sound the same", "[grid]") {
   const auto options = [](double reach, std::size_t frames) {
-    return DuelOptions{.frames = frames, .reach = reach, .turns = true, .pitch = 0.8};
+    return ComparisonOptions{.frames = frames, .reach = reach, .turns = true, .pitch = 0.8};
   };
   SECTION("20x30mesh") {
     same_as_direct(formed(scenes::mesh_20x30()), options(0.1, 44100), 1e-12, 100.0);
@@ -269,7 +269,7 @@ TEST_CASE("A grid begins again as it began", "[grid]") {
     const Program program =
         formed(with_law(scenes::mesh_20x30(), keyword,
                         keyword == "nlSpring3" ? "mesh_K 0.05 mesh_Z" : "mesh_K mesh_Z"));
-    rig::Bare<double> bare(program);
+    support::Bare<double> bare(program);
     std::vector<std::vector<double>> first;
     for (int n = 0; n < 101; ++n) {
       first.push_back(bare.step({n == 0 ? 1.0 : 0.0}));

@@ -5,10 +5,10 @@
 #include "core/kernels/domains/shards.h"
 #include "core/kernels/grid/grid_form.h"
 #include "core/laws/laws.h"
-#include "tests/support/duel.h"
+#include "tests/support/comparison.h"
 
 using namespace ressort;
-using namespace ressort::rig;
+using namespace ressort::support;
 
 namespace {
 
@@ -175,14 +175,15 @@ TEST_CASE("points on macros and what has no order are divided too", "[halo]") {
 
 TEST_CASE("chains and grids in shards are held to the direct form", "[halo]") {
   ThreadPool executor(3);
-  DuelOptions options{.frames = 8820, .seed = 5, .reach = 0.05};
+  ComparisonOptions options{.frames = 8820, .seed = 5, .reach = 0.05};
   const auto check = [&](const std::string& text, const std::string& forces, const auto& all_cuts,
                          auto&& reform) {
     const Program program = program_of(text);
     for (const Cut& cut : all_cuts) {
       INFO(cut.shards << " shards, " << cut.frames << " frames, " << isa_name(options.isa)
                       << (options.turns ? ", turns" : ""));
-      for (const auto& output : duel<double>(sharded(program, cut, executor, reform), options)) {
+      for (const auto& output :
+           compare_kernels<double>(sharded(program, cut, executor, reform), options)) {
         INFO(show(output.relative()));
         CHECK(output.relative() < 1e-12);
       }
@@ -217,8 +218,9 @@ TEST_CASE("a grid with a law on every link goes on in shards", "[halo]") {
     run.coefficients[2] = run.coefficients[1];
     run.coefficients[1] = run.coefficients[0];
   }
-  for (const auto& output : duel<double>(sharded(cubic, {2, 10}, executor, as_grid),
-                                         {.frames = 8820, .reach = 2.0, .turns = true})) {
+  for (const auto& output :
+       compare_kernels<double>(sharded(cubic, {2, 10}, executor, as_grid),
+                               {.frames = 8820, .reach = 2.0, .turns = true})) {
     INFO(show(output.relative()));
     CHECK(output.relative() < 1e-12);
   }

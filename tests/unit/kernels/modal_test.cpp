@@ -1,17 +1,17 @@
 // The modal kernel against the direct one, and the eigenvectors against what is known of them.
 #include "core/kernels/modal/modal_form.h"
-#include "tests/support/duel.h"
+#include "tests/support/comparison.h"
 
 namespace ressort {
 namespace {
 
-using rig::Comparison;
-using rig::duel;
-using rig::DuelOptions;
-using rig::isas;
-using rig::network_of;
-using rig::Random;
-using rig::show;
+using support::compare_kernels;
+using support::Comparison;
+using support::ComparisonOptions;
+using support::isas;
+using support::network_of;
+using support::Random;
+using support::show;
 
 Program modal_program(const std::string& text, double rate_hz = 44100.0) {
   Program program = make_program(network_of(text), rate_hz, true);
@@ -24,12 +24,12 @@ const Modes& modes_of(const Program& program) {
   return std::get<Modes>(program.form);
 }
 bool has_modes(const std::string& text) {
-  return modal_form(rig::program_of(text)).has_value();
+  return modal_form(support::program_of(text)).has_value();
 }
 
 template <class T>
-void check_duel(const Program& program, const DuelOptions& options, double tolerance) {
-  for (const Comparison& output : duel<T>(program, options)) {
+void check_same(const Program& program, const ComparisonOptions& options, double tolerance) {
+  for (const Comparison& output : compare_kernels<T>(program, options)) {
     INFO("peak " << show(output.peak) << ", off by " << show(output.relative()) << ", "
                  << show(output.snr_db()) << " dB, " << isa_name(options.isa)
                  << (options.turns ? ", turning" : "") << ", seed " << options.seed);
@@ -80,23 +80,24 @@ TEST_CASE("What does not share its eigenvectors is refused", "[modal]") {
 TEST_CASE("A mesh in its modes sounds as mass by mass", "[modal]") {
   const Program program = modal_program(scenes::mesh_20x30());
   for (const bool turns : {false, true}) {
-    check_duel<double>(program, {.turns = turns, .pitch = 0.7}, 1e-9);
-    for (const Comparison& output : duel<float>(program, {.turns = turns, .pitch = 0.7})) {
+    check_same<double>(program, {.turns = turns, .pitch = 0.7}, 1e-9);
+    for (const Comparison& output :
+         compare_kernels<float>(program, {.turns = turns, .pitch = 0.7})) {
       INFO(show(output.snr_db()));
       CHECK(output.snr_db() > 100.0);
     }
   }
   for (const Isa isa : isas()) {
-    check_duel<double>(program, {.frames = 3000, .turns = true, .isa = isa}, 1e-11);
-    check_duel<float>(program, {.frames = 3000, .turns = true, .isa = isa}, 1e-5);
+    check_same<double>(program, {.frames = 3000, .turns = true, .isa = isa}, 1e-11);
+    check_same<float>(program, {.frames = 3000, .turns = true, .isa = isa}, 1e-5);
   }
 }
 
 TEST_CASE("A hand on springs shakes the modes", "[modal]") {
   const Program program = modal_program(scenes::resonator());
   for (const bool turns : {false, true}) {
-    check_duel<double>(program, {.reach = 1.0, .turns = turns}, 1e-9);
-    check_duel<float>(program, {.reach = 1.0, .turns = turns}, 1e-4);
+    check_same<double>(program, {.reach = 1.0, .turns = turns}, 1e-9);
+    check_same<float>(program, {.reach = 1.0, .turns = turns}, 1e-4);
   }
 }
 
@@ -123,7 +124,7 @@ TEST_CASE("Masses, grounds, gravity and offsets are where they were", "[modal]")
     INFO(scene);
     const Program program = modal_program(scene, 48000.0);
     for (const bool turns : {false, true}) {
-      check_duel<double>(program, {.frames = 10000, .turns = turns, .pitch = 1.3}, 1e-10);
+      check_same<double>(program, {.frames = 10000, .turns = turns, .pitch = 1.3}, 1e-10);
     }
   }
 }
@@ -142,7 +143,7 @@ TEST_CASE("Nonlinear links act on the modes as on the masses", "[modal]") {
   for (const bool turns : {false, true}) {
     for (const double reach : {0.02, 0.06, 0.2}) {
       for (const Isa isa : isas()) {
-        check_duel<double>(
+        check_same<double>(
             program,
             {.frames = 6000, .reach = reach, .highest_hz = 30.0, .turns = turns, .isa = isa}, 1e-9);
       }
@@ -161,7 +162,7 @@ TEST_CASE("A blow is felt far away within the block that it falls in", "[modal]"
       "@out1 posOutput @b\n@out2 posOutput @c\n";
   const Program program = modal_program(text);
   for (const std::uint64_t seed : {4u, 5u, 6u, 7u, 8u}) {
-    check_duel<double>(program, {.frames = 2000, .seed = seed, .reach = 1.0, .highest_hz = 100.0},
+    check_same<double>(program, {.frames = 2000, .seed = seed, .reach = 1.0, .highest_hz = 100.0},
                        1e-9);
   }
 }
@@ -170,11 +171,11 @@ TEST_CASE("Where the energy promises nothing, links are looked at all the same",
   const Program program = modal_program(
       "@g ground 0.\n@in1 posInput 0.01\n@a mass 1. 0.01 0.\n@h spring @g @a 3.98\n"
       "@t contact @a @in1 0.001 0. 0.\n@out1 posOutput @a\n");
-  check_duel<double>(program, {.frames = 2000, .reach = 0.1, .highest_hz = 100.0}, 1e-9);
+  check_same<double>(program, {.frames = 2000, .reach = 0.1, .highest_hz = 100.0}, 1e-9);
 }
 
 TEST_CASE("A voice in its modes starts again as it started", "[modal]") {
-  rig::Bare<double> bare(modal_program(touched_mesh()));
+  support::Bare<double> bare(modal_program(touched_mesh()));
   const auto play = [&] {
     std::vector<double> heard;
     for (std::size_t n = 0; n < 500; ++n) {
@@ -209,15 +210,15 @@ TEST_CASE("More links than one sweep takes along", "[modal]") {
   }
   const Program program = modal_program(text);
   for (const bool turns : {false, true}) {
-    check_duel<double>(program, {.frames = 10000, .turns = turns}, 1e-9);
-    check_duel<float>(program, {.frames = 10000, .turns = turns}, 1e-3);
+    check_same<double>(program, {.frames = 10000, .turns = turns}, 1e-9);
+    check_same<float>(program, {.frames = 10000, .turns = turns}, 1e-3);
   }
 }
 
 TEST_CASE("The large mesh is plucked and touched in its modes", "[modal]") {
   const Program program = modal_program(scenes::large_triangle_mesh());
   CHECK(modes_of(program).places.size() == 7);
-  check_duel<double>(program, {.frames = 3000, .reach = 0.06}, 1e-9);
+  check_same<double>(program, {.frames = 3000, .reach = 0.06}, 1e-9);
 }
 
 }  // namespace

@@ -4,15 +4,15 @@
 
 #include "core/kernels/modal/modal.h"
 #include "core/kernels/modal/modal_form.h"
-#include "tests/support/duel.h"
+#include "tests/support/comparison.h"
 
 namespace ressort {
 namespace {
 
-using rig::Fighter;
-using rig::isas;
-using rig::network_of;
-using rig::show;
+using support::Fighter;
+using support::isas;
+using support::network_of;
+using support::show;
 
 std::string model(const std::string& name) {
   std::ifstream file(std::string(RESSORT_SOURCE) + "/models/" + name);
@@ -273,7 +273,7 @@ TEST_CASE("Without a budget nothing sleeps", "[modes_asleep]") {
 }
 
 TEST_CASE("A voice that starts again has forgotten who slept", "[modes_asleep]") {
-  rig::Bare<double> bare(in_modes(model("20x30mesh.mdl"), -60.0));
+  support::Bare<double> bare(in_modes(model("20x30mesh.mdl"), -60.0));
   const auto play = [&] {
     std::vector<double> heard;
     for (std::size_t n = 0; n < 5000; ++n) {

@@ -4,16 +4,16 @@
 #include "core/compile/plan.h"
 #include "core/kernels/direct/fourth_form.h"
 #include "core/kernels/modal/modal_form.h"
-#include "tests/support/duel.h"
+#include "tests/support/comparison.h"
 
 namespace ressort {
 namespace {
 
-using rig::Comparison;
-using rig::Fighter;
-using rig::isas;
-using rig::network_of;
-using rig::show;
+using support::Comparison;
+using support::Fighter;
+using support::isas;
+using support::network_of;
+using support::show;
 
 constexpr Budget physical{.cents = 1e-6};
 constexpr double pi = std::numbers::pi;
@@ -94,7 +94,7 @@ TEST_CASE("One oscillator is in tune and dies when it should", "[modes_exact]") 
 // Every mass of a fixed string starts somewhere, at some speed.
 std::string thrown_string(int count, double k, double z) {
   std::string text = "@K param " + show(k) + "\n@Z param " + show(z) + "\n@l ground 0.\n";
-  rig::Random random(7);
+  support::Random random(7);
   for (int i = 0; i < count; ++i) {
     const double x = random.uniform(-1.0, 1.0);
     text += scenes::at("m", i) + " mass 1. " + show(x) + " " + show(x - random.uniform(-0.1, 0.1)) +
@@ -261,8 +261,8 @@ TEST_CASE("The plan takes exact modes where the published scheme is too far off"
 
 TEST_CASE("How far off the published scheme is", "[modes_exact]") {
   const auto of = [](const std::string& stiffness, const std::string& damping) {
-    return published_error(steepness_of(
-        rig::program_of(scenes::string("s", 50, stiffness, damping) + scenes::output(1, "s_m9"))));
+    return published_error(steepness_of(support::program_of(
+        scenes::string("s", 50, stiffness, damping) + scenes::output(1, "s_m9"))));
   };
   // The highest mode of such a string is 31.7 cents and 0.2 % off.
   CHECK(of("0.1", "0.001").cents > 31.7);

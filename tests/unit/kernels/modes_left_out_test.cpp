@@ -2,17 +2,17 @@
 // to what is left feel nearly what they felt.
 #include "core/kernels/modal/modal.h"
 #include "core/kernels/modal/modal_form.h"
-#include "tests/support/duel.h"
+#include "tests/support/comparison.h"
 #include "tests/support/random_network.h"
 
 namespace ressort {
 namespace {
 
-using rig::Fighter;
-using rig::network_of;
-using rig::Random;
-using rig::RandomNetwork;
-using rig::show;
+using support::Fighter;
+using support::network_of;
+using support::Random;
+using support::RandomNetwork;
+using support::show;
 
 double value_of(const Program& program, std::uint32_t c) {
   return coefficient_value(program, program.coefficients[c], program.parameters, 1.0);
@@ -161,7 +161,7 @@ TEST_CASE("What is left out of a random network is never more than told", "[mode
   Tally tally;
   for (std::uint64_t seed = 1; tally.networks < 200; ++seed) {
     REQUIRE(seed < 3000);
-    const RandomNetwork network = rig::random_network(seed);
+    const RandomNetwork network = support::random_network(seed);
     if (!network.is_linear || network.text.find("@a audioParam") != std::string::npos) {
       continue;
     }
@@ -256,7 +256,7 @@ TEST_CASE("A contact feels the modes that are left out give way", "[modes_left_o
   const auto wanted = heard_of(full, 220);
   const auto snr = [&](std::uint32_t count, bool gives) {
     const auto found = heard_of(shortened(full, count, gives), 220);
-    return rig::compare(1, wanted, found)[0].snr_db();
+    return support::compare(1, wanted, found)[0].snr_db();
   };
   for (const std::uint32_t count : {10u, 25u}) {
     INFO(count << " of 50 modes: " << snr(count, false) << " dB, giving way " << snr(count, true)

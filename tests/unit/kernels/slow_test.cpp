@@ -7,11 +7,11 @@
 namespace ressort {
 namespace {
 
-using rig::Bare;
-using rig::Comparison;
-using rig::Continuous;
-using rig::isas;
-using rig::program_of;
+using support::Bare;
+using support::Comparison;
+using support::Continuous;
+using support::isas;
+using support::program_of;
 
 Program lfo() {
   return program_of(scenes::physical_lfo());
@@ -88,7 +88,7 @@ TEST_CASE("how seldom follows from the fastest mode", "[slow]") {
 TEST_CASE("what is slow feels what comes in within two steps", "[slow]") {
   constexpr std::uint32_t frames = 64;
   constexpr std::size_t samples = 100'000;
-  const rig::Motion hand(7, 0.2, 3.0);
+  const support::Motion hand(7, 0.2, 3.0);
   const auto perform = [&](const Program& program, std::size_t late) {
     Bare<double> bare(program);
     std::vector<double> out;
@@ -169,7 +169,8 @@ TEST_CASE("only a budget makes a part slow", "[slow]") {
   const std::string text =
       scenes::physical_lfo() + scenes::string("s", 20, "0.1", "0.001") + scenes::output(2, "s_m9");
   const auto methods_for = [&](const Budget& budget) {
-    const Machine machine = make_machine(rig::network_of(text), Network::reference_rate_hz, true);
+    const Machine machine =
+        make_machine(support::network_of(text), Network::reference_rate_hz, true);
     std::vector<Method> methods;
     for (const Part& part : make_plan(machine, {}, {}, patient_modes, budget).parts) {
       methods.push_back(part.method);
@@ -183,12 +184,12 @@ TEST_CASE("only a budget makes a part slow", "[slow]") {
   CHECK(count(methods_for({.silence_db = -60.0})) == 1);
   CHECK(count(methods_for({.cents = 1.0})) == 1);
 
-  Preset preset = rig::struck(2);
-  rig::Player plain(text, preset, {.budget = Budget{}});
-  rig::Player slow(text, preset, {.method = Method::slow});
+  Preset preset = support::struck(2);
+  support::Player plain(text, preset, {.budget = Budget{}});
+  support::Player slow(text, preset, {.method = Method::slow});
   Comparison lfo_output;
   Comparison string_output;
-  const std::vector<Event> events = {rig::note_on(100, 60), rig::note_on(30'000, 64)};
+  const std::vector<Event> events = {support::note_on(100, 60), support::note_on(30'000, 64)};
   plain.run(132'300, events, {256, 37});
   slow.run(132'300, events, {256, 37});
   for (std::size_t n = 0; n < 132'300; ++n) {

@@ -13,7 +13,7 @@
 namespace ressort {
 namespace {
 
-using rig::Random;
+using support::Random;
 
 constexpr int draws = 2000;  // of each law
 

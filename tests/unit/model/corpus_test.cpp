@@ -8,13 +8,13 @@
 
 #include "core/model/language/keywords.h"
 #include "core/model/language/tokens.h"
+#include "tests/support/harness.h"
 #include "tests/support/reference_network.h"
-#include "tests/support/rig.h"
 
 namespace ressort {
 namespace {
 
-using rig::show;
+using support::show;
 
 constexpr std::size_t frames = 3000;
 constexpr auto delayed = ThirdArgument::delayed_position;
@@ -116,7 +116,7 @@ std::vector<std::vector<double>> excitation(const Network& network) {
         highest_hz = input.is_force ? 3000.0 : 100.0;
       }
     }
-    const rig::Motion motion(c + 7, 20.0, highest_hz);
+    const support::Motion motion(c + 7, 20.0, highest_hz);
     for (std::size_t n = 0; n < frames; ++n) {
       channels[c][n] = middle + reach * motion(n);
     }
@@ -167,7 +167,7 @@ Channels by_reference(const Network& network, const Channels& driven) {
 }
 
 Channels by_kernel(const Network& network, const Channels& driven) {
-  rig::Bare<double> bare(make_program(network, 44100.0, true));
+  support::Bare<double> bare(make_program(network, 44100.0, true));
   return played(network, [&](std::size_t n) { return bare.step(inputs_at(network, driven, n)); });
 }
 
@@ -195,7 +195,7 @@ bool is_heard(const Network& network, std::size_t channel) {
 
 void check_same(const Network& network, const Channels& expected, const Channels& found) {
   for (std::size_t c = 0; c < expected.size(); ++c) {
-    rig::Comparison comparison;
+    support::Comparison comparison;
     for (std::size_t n = 0; n < frames; ++n) {
       comparison.add(expected[c][n], found[c][n]);
     }
@@ -239,7 +239,7 @@ TEST_CASE("every model of the corpus is read as what it says", "[corpus]") {
 TEST_CASE("every model of the corpus sounds as the textbook has it", "[corpus]") {
   for (const Model& model : models) {
     INFO(model.name);
-    const Network network = rig::network_of(text_of(model.name));
+    const Network network = support::network_of(text_of(model.name));
     const Channels driven = excitation(network);
     const Channels expected = by_reference(network, driven);
     const bool is_steady =

@@ -4,7 +4,7 @@
 #include <limits>
 #include <vector>
 
-#include "tests/support/rig.h"
+#include "tests/support/harness.h"
 
 namespace ressort {
 namespace {
@@ -138,7 +138,7 @@ TEST_CASE("numbers are read and written free of the locale, and come back the sa
     CHECK_FALSE(parse_number(text, number));
     CHECK(number == -77);
   }
-  rig::Random random(2);
+  support::Random random(2);
   for (int i = 0; i < 2000; ++i) {
     const double number = random.uniform(-1, 1) * std::pow(10.0, random.uniform(-300, 300));
     double again = 0.0;
@@ -154,7 +154,7 @@ TEST_CASE("numbers are read and written free of the locale, and come back the sa
 
 TEST_CASE("a formula as text and its value agree with the same sum written here", "[expression]") {
   // Random trees, printed with all their parentheses and reckoned on the way.
-  rig::Random random(8);
+  support::Random random(8);
   struct Tree {
     std::string text;
     double value = 0.0;

@@ -3,14 +3,14 @@
 #include "core/model/faust/faust.h"
 
 #include "tests/support/catch.h"
-#include "tests/support/rig.h"
+#include "tests/support/harness.h"
 
 using namespace ressort;
 
 namespace {
 
 std::string exported(const std::string& model, bool rescale = true) {
-  const Network network = rig::network_of(model);
+  const Network network = support::network_of(model);
   std::vector<ParameterSetting> sliders;
   for (const Parameter& parameter : network.parameters) {
     sliders.push_back(
@@ -146,7 +146,7 @@ TEST_CASE("names are FAUST's, and different", "[faust]") {
 
 TEST_CASE("a parameter that has nowhere to go is a number, one of a channel the channel",
           "[faust]") {
-  const Network network = rig::network_of(
+  const Network network = support::network_of(
       "@K param 0.1\n@w audioParam @in2\n@a osc 1. K w 0. 0.\n@out1 posOutput @a\n");
   const std::vector<ParameterSetting> sliders = {{"K", 0.1, 0.1, 0.1, {}},
                                                  {"w", 0.0, 0.0, 1.0, {}}};
@@ -158,11 +158,11 @@ TEST_CASE("a parameter that has nowhere to go is a number, one of a channel the 
 }
 
 TEST_CASE("FAUST has no program without an output", "[faust]") {
-  const auto text = faust_text(rig::network_of("@a mass 1. 0. 0.\n"), {.name = "mute"});
+  const auto text = faust_text(support::network_of("@a mass 1. 0. 0.\n"), {.name = "mute"});
   REQUIRE(!text);
   CHECK(text.error().message.find("has no output") != std::string::npos);
 }
 
 TEST_CASE("macros count as what they stand for", "[faust]") {
-  CHECK(faust_elements(rig::network_of("@s string 5 1. 0.1 0.01 0. 0.\n")) == 5 + 4);
+  CHECK(faust_elements(support::network_of("@s string 5 1. 0.1 0.01 0. 0.\n")) == 5 + 4);
 }

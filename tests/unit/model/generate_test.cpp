@@ -9,8 +9,8 @@
 #include "core/model/language/print.h"
 #include "core/model/topology.h"
 #include "tests/support/catch.h"
+#include "tests/support/harness.h"
 #include "tests/support/reference_network.h"
-#include "tests/support/rig.h"
 
 namespace ressort {
 namespace {
@@ -162,9 +162,9 @@ TEST_CASE("a shape written out is its macro", "[generate]") {
       shape.as_macro = true;
       const Network macro = made(shape);
       CHECK(macro.macros.size() == 1);
-      rig::Bare<double> engine(make_program(macro, 44100.0, true));
+      support::Bare<double> engine(make_program(macro, 44100.0, true));
       const std::vector<double> expected = by_the_book(written, 500);
-      rig::Comparison comparison;
+      support::Comparison comparison;
       for (std::size_t n = 0; n < 500; ++n) {
         comparison.add(expected[n], engine.step(std::vector{n == 0 ? 1.0 : 0.0})[0]);
       }

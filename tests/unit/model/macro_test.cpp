@@ -3,15 +3,15 @@
 #include <cmath>
 
 #include "core/model/topology.h"
-#include "tests/support/rig.h"
-#include "tests/support/told.h"
+#include "tests/support/harness.h"
+#include "tests/support/messages.h"
 
 namespace ressort {
 namespace {
 
-using namespace rig;
-using told::check_error;
-using told::check_warning;
+using namespace support;
+using messages::check_error;
+using messages::check_warning;
 
 constexpr auto delayed = ThirdArgument::delayed_position;
 constexpr auto velocity = ThirdArgument::velocity_per_second;
@@ -308,12 +308,12 @@ TEST_CASE("a place beyond a macro's end is taken at the end, with a warning", "[
   check_warning(models + "@out1 posOutput [@s 1.5]", 3, 21, beyond + "'1.5' is taken as 1");
   check_warning(models + "@out1 posOutput [@q 1 -0.1]", 3, 23, beyond + "'-0.1' is taken as 0");
   check_warning(models + "@out1 posOutput @s 2", 3, 20, beyond + "'2' is taken as 1");
-  told::check_told(models + "@out1 posOutput [@q 0 1]", {});
+  messages::check_told(models + "@out1 posOutput [@q 0 1]", {});
 }
 
 TEST_CASE("places, grounds and hands start at rest where they are", "[macro]") {
   // Dampers alone: at the first tick nothing has moved, so nothing is felt.
-  rig::Bare<double> bare(
+  support::Bare<double> bare(
       make_program(network_of("@in1 posInput 3\n@g ground -2\n@s chain 5 1 0.1 0 [0 0 1.5] 0\n"
                               "@q closedMesh 4 4 1 0.1 0 [0 0 0.5] [0 0 0]\n"
                               "@k damper [@s 0.3] @in1 1\n@l damper [@s 0.6] @g 1\n"
@@ -338,7 +338,7 @@ TEST_CASE("places, grounds and hands start at rest where they are", "[macro]") {
 TEST_CASE("the force at a place is that of the nodes around it, inputs included", "[macro]") {
   // 3 nodes: 0.25 is between the first two. A push there is felt at half of that on each, so half
   // of it is felt where it acts, and a quarter at 0.125, which is nearer to the first: 3/4 and 1/4.
-  rig::Bare<double> bare(
+  support::Bare<double> bare(
       make_program(network_of("@s chain 3 1 0 0 0 0\n@in1 frcInput [@s 0.25]\n"
                               "@out1 frcOutput [@s 0.25]\n@out2 frcOutput [@s 0.125]\n"
                               "@out3 frcOutput [@s 1]\n@out4 posOutput [@s 0.25]"),

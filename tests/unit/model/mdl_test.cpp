@@ -7,12 +7,12 @@
 #include "core/laws/laws.h"
 #include "core/model/language/tokens.h"
 #include "tests/support/catch.h"
-#include "tests/support/rig.h"
+#include "tests/support/harness.h"
 
 namespace ressort {
 namespace {
 
-using rig::network_of;
+using support::network_of;
 
 const std::string two_masses = "@a mass 1. 0. 0.\n@b mass 1. 0. 0.\n";
 
@@ -352,7 +352,7 @@ TEST_CASE("a file of nothing but errors is given up after a hundred", "[mdl]") {
 }
 
 TEST_CASE("text that no person wrote does no harm", "[mdl]") {
-  rig::Random random(3);
+  support::Random random(3);
   const std::string letters = "@@@@  \t\n\n\r#[]'+-*/().,0129eabmassosc_\x80\xff~";
   for (int i = 0; i < 3000; ++i) {
     std::string text = scenes::iplay_the_triangle();

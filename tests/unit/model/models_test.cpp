@@ -7,7 +7,7 @@
 #include "app/session/loader.h"
 #include "core/compile/compile.h"
 #include "tests/support/catch.h"
-#include "tests/support/rig.h"
+#include "tests/support/harness.h"
 #include "tests/support/scenes.h"
 
 using namespace ressort;
@@ -51,7 +51,7 @@ TEST_CASE("the models are the published networks", "[models]") {
     const auto scene = load_scene(std::string(instrument.name) + ".mdl", {.bare = true});
     REQUIRE(scene);
     CHECK(scene->warnings.empty());
-    const Network expected = rig::network_of(instrument.scene);
+    const Network expected = support::network_of(instrument.scene);
     CHECK(scene->network.masses.size() == expected.masses.size());
     CHECK(ends(scene->network) == ends(expected));
     CHECK(scene->network.inputs.size() == expected.inputs.size());

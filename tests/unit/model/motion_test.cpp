@@ -3,7 +3,7 @@
 
 #include "core/model/language/mdl.h"
 #include "tests/support/catch.h"
-#include "tests/support/rig.h"
+#include "tests/support/harness.h"
 
 namespace ressort {
 namespace {
@@ -102,7 +102,7 @@ TEST_CASE("who asks for a meaning gets it, whatever the text says", "[motion]") 
 
 TEST_CASE("the same state starts as fast as its meaning says", "[motion]") {
   const auto speed = [](const std::string& text) {
-    const Network network = rig::network_of(text);
+    const Network network = support::network_of(text);
     return initial_velocity(network, network.masses[0]);
   };
   CHECK(speed("~motion velocity\n@a mass 1 1 441") == 0.01);
@@ -110,7 +110,7 @@ TEST_CASE("the same state starts as fast as its meaning says", "[motion]") {
   CHECK(speed("~motion delayed\n@a mass 1 1 0") == 1.0);  // as it is written: a jump
   // A macro that has no motion rests in both meanings.
   for (const std::string word : {"velocity", "delayed"}) {
-    const Network network = rig::network_of("~motion " + word + "\n@s chain 5 1 1 0 3");
+    const Network network = support::network_of("~motion " + word + "\n@s chain 5 1 1 0 3");
     const Macro& macro = network.macros[0];
     CHECK(macro.third == (network.third == velocity ? 0.0 : macro.position));
   }

@@ -3,12 +3,12 @@
 
 #include "app/control/registry.h"
 #include "core/model/preset/fit.h"
-#include "tests/support/rig.h"
+#include "tests/support/harness.h"
 
 namespace ressort {
 namespace {
 
-using rig::network_of;
+using support::network_of;
 
 struct Complaint {
   std::string text;
@@ -310,7 +310,7 @@ TEST_CASE("what is no TOML is told with its place, and nothing throws", "[preset
   REQUIRE(second.errors.size() == 1);
   CHECK(second.errors[0].line == 2);
   // Text that no person wrote.
-  rig::Random random(12);
+  support::Random random(12);
   const std::string good = control("from = \"note\"\nto = \"in1\"\nrange = [0, 1]\nhow = \"hold\"");
   for (int i = 0; i < 3000; ++i) {
     std::string text = good;

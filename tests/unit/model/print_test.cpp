@@ -8,13 +8,13 @@
 #include "core/model/language/expression.h"
 #include "core/model/topology.h"
 #include "tests/support/catch.h"
-#include "tests/support/rig.h"
+#include "tests/support/harness.h"
 
 namespace ressort {
 namespace {
 
-using rig::network_of;
-using rig::Random;
+using support::network_of;
+using support::Random;
 
 void check_round_trip(const Network& network) {
   const std::string text = print_network(network);

@@ -10,16 +10,16 @@
 #include "core/model/language/mdl.h"
 #include "core/model/language/tokens.h"
 #include "tests/support/catch.h"
-#include "tests/support/rig.h"
-#include "tests/support/told.h"
+#include "tests/support/harness.h"
+#include "tests/support/messages.h"
 
 namespace ressort {
 namespace {
 
-using rig::network_of;
-using told::check_error;
-using told::check_told;
-using told::check_warning;
+using messages::check_error;
+using messages::check_told;
+using messages::check_warning;
+using support::network_of;
 
 constexpr auto delayed = ThirdArgument::delayed_position;
 constexpr auto velocity = ThirdArgument::velocity_per_second;
@@ -435,7 +435,7 @@ TEST_CASE("a channel that is left out is told at the one behind it", "[rules]") 
 TEST_CASE("gravity is divided by the reference rate in MIMS4Max, and not in MIMS", "[rules]") {
   // One step from rest: v = -g/M, g as the dialect means it.
   const auto first_step = [](const std::string& mass, double rate_hz, bool rescale) {
-    rig::Bare<double> bare(
+    support::Bare<double> bare(
         make_program(network_of(mass + "\n@out1 posOutput @m"), rate_hz, rescale));
     return bare.step({})[0];
   };
@@ -473,14 +473,14 @@ TEST_CASE("numbers follow the rate unless they are taken raw", "[rules]") {
 }
 
 TEST_CASE("a force and a hand act in the tick in which they come", "[rules]") {
-  rig::Bare<double> struck(
+  support::Bare<double> struck(
       make_program(network_of("@m mass 2 0 0\n@in1 frcInput @m\n@in2 frcInput @m\n"
                               "@out1 posOutput @m\n@out2 frcOutput @m"),
                    44100.0, true));
   CHECK(struck.step({1.0, 0.5}) == std::vector{0.75, 1.5});
   CHECK(struck.step({0.0, 0.0}) == std::vector{1.5, 0.0});
   // A hand's place is heard at once, what it pulls moves one tick later, and it feels the pull.
-  rig::Bare<double> pulled(
+  support::Bare<double> pulled(
       make_program(network_of("@m mass 2 0 0\n@in1 posInput 0\n@l spring @in1 @m 0.5\n"
                               "@out1 posOutput @in1\n@out2 posOutput @m\n@out3 frcOutput @in1\n"
                               "@out4 frcOutput @m"),
@@ -514,7 +514,7 @@ TEST_CASE("what is no element, comment or block is passed over with a warning", 
 TEST_CASE("the laws are the current ones", "[rules]") {
   // f on the second end after one tick, with the first pushed d away and coming at v per sample.
   const auto force = [](const std::string& link, double d, double v) {
-    rig::Bare<double> bare(make_program(
+    support::Bare<double> bare(make_program(
         network_of("@in1 posInput 0\n@g ground 0\n@l " + link + "\n@out1 frcOutput @g"), 44100.0,
         true));
     bare.step({d - v});

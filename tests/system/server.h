@@ -24,7 +24,7 @@
 
 #include "tests/support/catch.h"
 
-namespace ressort::stage {
+namespace ressort::servers {
 
 using namespace std::chrono_literals;
 
@@ -305,4 +305,4 @@ class Neighbour {
   jack_client_t* client_ = nullptr;
 };
 
-}  // namespace ressort::stage
+}  // namespace ressort::servers

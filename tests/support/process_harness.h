@@ -4,7 +4,7 @@
 #include "app/realtime/process.h"
 #include "tests/support/player.h"
 
-namespace ressort::rig {
+namespace ressort::support {
 
 inline constexpr double rate = 44100.0;
 inline constexpr std::size_t fade_frames = 2205;  // 50 ms
@@ -41,8 +41,8 @@ inline Event push(double force = 1.0) {
 }
 
 // A process and all that it has played.
-struct Stage {
-  explicit Stage(bool limit = false, std::size_t channels = 1)
+struct Harness {
+  explicit Harness(bool limit = false, std::size_t channels = 1)
       : process(rate, limit), out(channels) {}
 
   void run(std::size_t frames, std::size_t block = 256, const std::vector<MidiPacket>& midi = {}) {
@@ -87,4 +87,4 @@ inline std::size_t pushed_at(const std::vector<double>& y) {
   return n;
 }
 
-}  // namespace ressort::rig
+}  // namespace ressort::support

@@ -18,7 +18,7 @@
 #include "tests/support/random.h"
 #include "tests/support/scenes.h"
 
-namespace ressort::rig {
+namespace ressort::support {
 
 inline Network network_of(const std::string& text) {
   ParsedNetwork parsed = parse_network(text);
@@ -171,4 +171,4 @@ struct Comparison {
   double snr_db() const { return 10.0 * std::log10(signal / noise); }
 };
 
-}  // namespace ressort::rig
+}  // namespace ressort::support

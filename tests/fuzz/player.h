@@ -43,18 +43,18 @@ inline const Network& network() {
 
 // A process without a device; blocks of any length, some noise at its inputs. What comes out is a
 // number below full scale.
-class Stage {
+class Harness {
  public:
   static constexpr double rate_hz = 48000.0;
   static constexpr std::size_t longest_block = 1024;
   static constexpr std::uint32_t serial = 1;
 
-  Stage() {
+  Harness() {
     for (std::size_t n = 0; n < longest_block; ++n) {
       noise_[n] = static_cast<float>(0.1 * std::sin(0.3 * static_cast<double>(n * n)));
     }
   }
-  explicit Stage(Compiled compiled) : Stage() { offer(std::move(compiled)); }
+  explicit Harness(Compiled compiled) : Harness() { offer(std::move(compiled)); }
 
   void offer(Compiled compiled) {
     instrument = std::move(compiled.instrument);

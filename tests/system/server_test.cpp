@@ -6,9 +6,9 @@
 #include <fstream>
 #include <map>
 
-#include "tests/system/stage.h"
+#include "tests/system/server.h"
 
-using namespace ressort::stage;
+using namespace ressort::servers;
 
 namespace {
 

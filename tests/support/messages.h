@@ -7,7 +7,7 @@
 #include "core/model/language/mdl.h"
 #include "tests/support/catch.h"
 
-namespace ressort::told {
+namespace ressort::messages {
 
 // Exactly these, in this order; their lengths are not looked at.
 inline void check_told(const std::string& text, const std::vector<Diagnostic>& expected) {
@@ -36,4 +36,4 @@ inline void check_warning(const std::string& text, int line, int column,
   check_told(text, {{Severity::warning, line, column, 1, message}});
 }
 
-}  // namespace ressort::told
+}  // namespace ressort::messages

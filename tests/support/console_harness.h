@@ -22,8 +22,8 @@ namespace fs = std::filesystem;
 inline constexpr std::size_t period = 256;
 
 // A console and all that it works on; the test is the audio thread.
-struct Rig {
-  explicit Rig(std::size_t channels = 2) : buffers(channels, std::vector<float>(period)) {}
+struct Harness {
+  explicit Harness(std::size_t channels = 2) : buffers(channels, std::vector<float>(period)) {}
 
   Process process{48000.0};
   Session session{process, {.compile = {.rate_hz = 48000.0}}, {}};

@@ -3,11 +3,11 @@
 
 #include <span>
 
-#include "tests/support/rig.h"
+#include "tests/support/harness.h"
 
-namespace ressort::rig {
+namespace ressort::support {
 
-struct DuelOptions {
+struct ComparisonOptions {
   std::size_t frames = 44100;
   std::uint64_t seed = 1;
   double reach = 0.1;      // of the inputs' motion, in positions or forces
@@ -19,7 +19,7 @@ struct DuelOptions {
   Isa isa = best_isa();
 };
 
-// All that happens in a duel. Blocks are of uneven lengths, as a host's events cut them.
+// All that happens in a comparison. Blocks are of uneven lengths, as a host's events cut them.
 struct Score {
   struct Block {
     std::size_t frames = 0;
@@ -31,7 +31,7 @@ struct Score {
   std::vector<std::vector<double>> audio;   // [frame][audio parameter]
 };
 
-inline Score score_of(const Program& program, const DuelOptions& options) {
+inline Score score_of(const Program& program, const ComparisonOptions& options) {
   std::vector<Motion> motions;
   for (std::size_t i = 0; i < program.inputs.size(); ++i) {
     const bool is_force = program.inputs[i].is_force;
@@ -200,28 +200,28 @@ inline std::vector<Comparison> compare(std::size_t outputs, std::span<const doub
 
 // How far `formed` in precision T is from the same Program in the direct form in double.
 template <class T>
-std::vector<Comparison> duel(const Program& formed, const DuelOptions& options) {
+std::vector<Comparison> compare_kernels(const Program& formed, const ComparisonOptions& options) {
   const Score score = score_of(formed, options);
   return compare(formed.outputs.size(), perform_directly(formed, score),
                  perform<T>(formed, score, options.isa));
 }
 
 // Every output in every instruction set: double within `relative`, float above `db`.
-inline void same_as_direct(const Program& program, DuelOptions options, double relative,
+inline void same_as_direct(const Program& program, ComparisonOptions options, double relative,
                            double db) {
   for (const Isa isa : isas()) {
     options.isa = isa;
     INFO(isa_name(isa));
-    for (const Comparison& output : duel<double>(program, options)) {
+    for (const Comparison& output : compare_kernels<double>(program, options)) {
       INFO("double is off by " << show(output.relative()));
       CHECK(output.peak > 0.0);
       CHECK(output.relative() < relative);
     }
-    for (const Comparison& output : duel<float>(program, options)) {
+    for (const Comparison& output : compare_kernels<float>(program, options)) {
       INFO("float has " << output.snr_db() << " dB");
       CHECK(output.snr_db() > db);
     }
   }
 }
 
-}  // namespace ressort::rig
+}  // namespace ressort::support
