@@ -154,7 +154,11 @@ std::vector<std::string> make_notes(const Schemes& schemes, const Culled& culled
 }
 
 Result<Compiled> compile_by_stages(const Request& request) {
-  const auto& [written, preset, options, budget, rate_ratio, voices] = request;
+  const Network& written = request.written;
+  const Preset& preset = request.preset;
+  const CompileOptions& options = request.options;
+  const double rate_ratio = request.rate_ratio;
+  const int voices = request.voices;
   const Progress& progress = options.progress;
   progress.stage("putting it together");
   if (auto wrong = misfits(written, preset); !wrong.empty()) {
