@@ -5,8 +5,8 @@
 
 #include <cerrno>
 #include <cstdio>
-#include <cstring>
 #include <filesystem>
+#include <system_error>
 
 #include "app/exit_code.h"
 #include "core/model/language/expression.h"
@@ -24,7 +24,8 @@ void become(std::vector<std::string> words) {
   }
   arguments.push_back(nullptr);
   execvp(arguments[0], arguments.data());
-  std::fprintf(stderr, "%s cannot be started: %s\n", arguments[0], std::strerror(errno));
+  const std::string why = std::error_code(errno, std::generic_category()).message();
+  std::fprintf(stderr, "%s cannot be started: %s\n", arguments[0], why.c_str());
 }
 
 // What it says goes where progress belongs.

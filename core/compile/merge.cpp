@@ -170,8 +170,9 @@ class Merger {
     for (const Tap& tap : now().taps) {
       progress_.spend(1);
       if (!is_marked[tap.first]) {
-        progress_.spend(tap.length * tap.width);
-        std::fill_n(is_used_.begin() + tap.first, tap.length * tap.width, true);
+        const std::size_t nodes = std::size_t{tap.length} * tap.width;
+        progress_.spend(nodes);
+        std::fill_n(is_used_.begin() + tap.first, nodes, true);
         is_marked[tap.first] = true;
       }
     }

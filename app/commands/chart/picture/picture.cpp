@@ -464,13 +464,14 @@ std::string picture_of(const ChartSheet& sheet, const Provenance& provenance) {
   constexpr double width = page_width / 2.0;
   const std::vector<LegendEntry> legend = legend_of({&sheet});
   const double foot = caption_height + height_of(legend);
-  const double rows = static_cast<double>((panels.size() + 1) / 2);
-  const double whole = title_height + rows * height + foot;
+  const std::size_t rows = (panels.size() + 1) / 2;
+  const double whole = title_height + static_cast<double>(rows) * height + foot;
   std::string body =
       begin_picture(sheet.scene + ": " + sheet.about, caption_of(provenance, sheet.rounds), whole);
   for (std::size_t i = 0; i < panels.size(); ++i) {
+    const std::size_t row = i / 2;
     const double left = static_cast<double>(i % 2) * width;
-    const double top = whole - title_height - static_cast<double>(i / 2) * height;
+    const double top = whole - title_height - static_cast<double>(row) * height;
     const Frame frame{.box = {left + 66.0, left + width - 16.0, top - height + 52.0, top - 26.0},
                       .height = whole};
     body += begin_panel +
@@ -492,13 +493,15 @@ std::string overview_of(const std::vector<ChartSheet>& sheets, const Provenance&
     rounds = all.size() == 1 ? sheet.rounds : std::min(rounds, sheet.rounds);
   }
   const std::vector<LegendEntry> legend = legend_of(all);
-  const double rows = static_cast<double>((sheets.size() + columns - 1) / columns);
-  const double whole = title_height + rows * height + caption_height + height_of(legend);
+  const std::size_t rows = (sheets.size() + columns - 1) / columns;
+  const double whole =
+      title_height + static_cast<double>(rows) * height + caption_height + height_of(legend);
   std::string body = begin_picture("Error against the continuous network, and what it costs",
                                    caption_of(provenance, rounds), whole);
   for (std::size_t i = 0; i < sheets.size(); ++i) {
+    const std::size_t row = i / columns;
     const double left = static_cast<double>(i % columns) * width;
-    const double top = whole - title_height - static_cast<double>(i / columns) * height;
+    const double top = whole - title_height - static_cast<double>(row) * height;
     const Frame frame{.box = {left + 64.0, left + width - 6.0, top - height + 46.0, top - 24.0},
                       .height = whole,
                       .has_left_title = i % columns == 0,
