@@ -397,7 +397,7 @@ std::vector<LegendEntry> legend_of(const std::vector<const ChartSheet*>& sheets)
   return entries;
 }
 
-constexpr std::size_t legend_columns = 5;
+constexpr std::size_t legend_columns = 3;  // as many as the longest entry leaves room for
 
 double height_of(const std::vector<LegendEntry>& legend) {
   return legend_row_height * std::ceil(static_cast<double>(legend.size()) / legend_columns) + 16.0;
