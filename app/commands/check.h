@@ -1,4 +1,4 @@
-// app: says what is in a model or a preset. The exit code comes back.
+// app/commands: says what is in a model or a preset. The exit code comes back.
 #pragma once
 
 #include <optional>

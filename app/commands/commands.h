@@ -1,4 +1,5 @@
-// app: what the program does, one function for each of its commands. The exit code comes back.
+// app/commands: what the program does, one function for each of its commands. The exit code comes
+// back.
 #pragma once
 
 #include <optional>

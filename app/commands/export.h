@@ -1,4 +1,4 @@
-// app: a model in another program's language.
+// app/commands: a model in another program's language.
 #pragma once
 
 #include <optional>

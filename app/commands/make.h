@@ -1,4 +1,4 @@
-// app: writes the models that have a regular shape. The exit code comes back.
+// app/commands: writes the models that have a regular shape. The exit code comes back.
 #pragma once
 
 #include <string>

@@ -1,4 +1,4 @@
-// app: renders to a file, through the same block function as the live backends.
+// app/commands: renders to a file, through the same block function as the live backends.
 #pragma once
 
 #include <functional>

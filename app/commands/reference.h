@@ -1,5 +1,5 @@
-// app: prints the tables of the manual from those that the program itself reads. The exit code
-// comes back.
+// app/commands: prints the tables of the manual from those that the program itself reads. The exit
+// code comes back.
 #pragma once
 
 #include <span>

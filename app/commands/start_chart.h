@@ -1,5 +1,5 @@
-// app: charts are drawn by a program of their own, ressort-chart: it is a third of all the code,
-// and nobody who plays needs it.
+// app/commands: charts are drawn by a program of their own, ressort-chart: it is a third of all the
+// code, and nobody who plays needs it.
 #pragma once
 
 #include <string>

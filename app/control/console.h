@@ -1,5 +1,5 @@
-// app: the small console: reads, completes and carries out the commands of registry.h. Where they
-// are typed is terminal.h's.
+// app/control: the small console: reads, completes and carries out the commands of registry.h.
+// Where they are typed is terminal.h's.
 #pragma once
 
 #include <functional>

@@ -1,4 +1,4 @@
-// app: what the console's commands do; the rows of registry.h name them. [console thread]
+// app/control: what the console's commands do; the rows of registry.h name them. [console thread]
 #pragma once
 
 #include <memory>

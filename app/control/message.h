@@ -1,5 +1,5 @@
-// app: a message as people write it: an address and its arguments, in OSC, in a line of a score or
-// in words. Pure text; what a message does stands in registry.h.
+// app/control: a message as people write it: an address and its arguments, in OSC, in a line of a
+// score or in words. Pure text; what a message does stands in registry.h.
 #pragma once
 
 #include <string>

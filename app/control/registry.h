@@ -1,6 +1,7 @@
-// app: all that can be said to the program. A row is an address of OSC and of scores, a command of
-// the console, or both, with its arguments, its help and what it does. OSC, scores, the console,
-// its completion and help, /describe, presets and documents read these rows and act through them.
+// app/control: all that can be said to the program. A row is an address of OSC and of scores, a
+// command of the console, or both, with its arguments, its help and what it does. OSC, scores, the
+// console, its completion and help, /describe, presets and documents read these rows and act
+// through them.
 #pragma once
 
 #include <array>

@@ -1,5 +1,5 @@
-// app: what is told of the program while it plays. One row a figure: the console's `status`,
-// /status.reply and the documents read these rows.
+// app/control: what is told of the program while it plays. One row a figure: the console's
+// `status`, /status.reply and the documents read these rows.
 #pragma once
 
 #include <span>

@@ -1,4 +1,4 @@
-// app: the terminal that commands are typed at, on a thread of its own.
+// app/control: the terminal that commands are typed at, on a thread of its own.
 #pragma once
 
 #include <functional>

@@ -1,5 +1,5 @@
-// app: what the program needs from an audio backend: a list of functions. jack.cpp, alsa.cpp and
-// dummy.cpp each open one; the process is all that they know of the rest.
+// app/devices: what the program needs from an audio backend: a list of functions. jack.cpp,
+// alsa.cpp and dummy.cpp each open one; the process is all that they know of the rest.
 #pragma once
 
 #include <functional>

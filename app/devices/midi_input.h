@@ -1,4 +1,4 @@
-// app: MIDI from outside JACK. A door that any thread may knock at, and RtMidi behind it.
+// app/devices: MIDI from outside JACK. A door that any thread may knock at, and RtMidi behind it.
 #pragma once
 
 #include <memory>

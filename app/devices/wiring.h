@@ -1,4 +1,4 @@
-// app: what a device's ports are connected to, by name, so that it can be connected again.
+// app/devices: what a device's ports are connected to, by name, so that it can be connected again.
 #pragma once
 
 #include <functional>

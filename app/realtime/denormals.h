@@ -1,4 +1,4 @@
-// app: what a thread that computes sound does about numbers too small to hear.
+// app/realtime: what a thread that computes sound does about numbers too small to hear.
 #pragma once
 
 #include <cstdint>

@@ -1,4 +1,4 @@
-// app: what share of its time the callback takes, and how many voices there is time for.
+// app/realtime: what share of its time the callback takes, and how many voices there is time for.
 #pragma once
 
 #include <array>

@@ -1,5 +1,5 @@
-// app: every atomic of the program, and nothing else. What passes between the audio thread and
-// the others, and the promise that each side makes.
+// app/realtime: every atomic of the program, and nothing else. What passes between the audio thread
+// and the others, and the promise that each side makes.
 #pragma once
 
 #include <array>

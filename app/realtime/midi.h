@@ -1,4 +1,4 @@
-// app: MIDI bytes to events. Pure: no thread, no device, no heap.
+// app/realtime: MIDI bytes to events. Pure: no thread, no device, no heap.
 #pragma once
 
 #include <cstdint>

@@ -1,4 +1,4 @@
-// app: the audio thread, whole. Everything that it touches is in this struct.
+// app/realtime: the audio thread, whole. Everything that it touches is in this struct.
 #pragma once
 
 #include <array>

@@ -1,4 +1,4 @@
-// app: what happens again and again is told once in a while, and how often it was.
+// app/realtime: what happens again and again is told once in a while, and how often it was.
 #pragma once
 
 #include <chrono>

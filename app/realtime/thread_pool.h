@@ -1,4 +1,5 @@
-// app: threads that step the shards of large networks, where time does not matter: rendering.
+// app/realtime: threads that step the shards of large networks, where time does not matter:
+// rendering.
 #pragma once
 
 #include <thread>

@@ -1,4 +1,4 @@
-// app: compiles what was read, and decides in one place whether it may sound.
+// app/session: compiles what was read, and decides in one place whether it may sound.
 #pragma once
 
 #include <optional>

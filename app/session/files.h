@@ -1,4 +1,4 @@
-// app: texts, read and written, and where the models and presets are.
+// app/session: texts, read and written, and where the models and presets are.
 #pragma once
 
 #include <optional>

@@ -1,4 +1,4 @@
-// app: what a person hears of a load that takes long.
+// app/session: what a person hears of a load that takes long.
 #pragma once
 
 #include <chrono>

@@ -1,4 +1,4 @@
-// app: from a name to what can be compiled: finds the files, reads the texts.
+// app/session: from a name to what can be compiled: finds the files, reads the texts.
 #pragma once
 
 #include <optional>

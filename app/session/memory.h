@@ -1,4 +1,4 @@
-// app: how much memory there is to take.
+// app/session: how much memory there is to take.
 #pragma once
 
 #include <cstdint>

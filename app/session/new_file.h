@@ -1,5 +1,5 @@
-// app: files that are written. One takes its place when it is whole; until then, and if it never
-// is, what was there before stays as it was.
+// app/session: files that are written. One takes its place when it is whole; until then, and if it
+// never is, what was there before stays as it was.
 #pragma once
 
 #include <span>

@@ -1,4 +1,4 @@
-// app: writes what sounds to a sound file, from a thread of its own.
+// app/session: writes what sounds to a sound file, from a thread of its own.
 #pragma once
 
 #include <functional>

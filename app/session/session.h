@@ -1,5 +1,5 @@
-// app: the control side. Owns what is loaded and the worker thread that loads, compiles, offers,
-// and destroys what has sounded.
+// app/session: the control side. Owns what is loaded and the worker thread that loads, compiles,
+// offers, and destroys what has sounded.
 #pragma once
 
 #include <chrono>

@@ -1,4 +1,4 @@
-// app: sound files, read and written block by block.
+// app/session: sound files, read and written block by block.
 #pragma once
 
 #include <memory>

@@ -1,4 +1,4 @@
-// app: what a kernel costs on this machine, now, and what a plan costs at most.
+// app/session: what a kernel costs on this machine, now, and what a plan costs at most.
 #pragma once
 
 #include <string>

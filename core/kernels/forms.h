@@ -1,4 +1,4 @@
-// core/engine: the forms in which a Program may be computed, each the tables of one kernel beside
+// core/kernels: the forms in which a Program may be computed, each the tables of one kernel beside
 // the Program's own. Pure data, made by the compile room, shared by all voices.
 #pragma once
 

@@ -1,4 +1,4 @@
-// core/engine: which instructions this machine has. Files named *_step.cpp are compiled once for
+// core/kernels: which instructions this machine has. Files named *_step.cpp are compiled once for
 // each of these, into a namespace of that name; everything else is compiled for the base. What such
 // a file offers is a function template over Isa, which the file specialises for its own.
 #pragma once

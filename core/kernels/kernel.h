@@ -1,4 +1,4 @@
-// core/engine: one way of stepping a Program, for as many voices at once as it has lanes.
+// core/kernels: one way of stepping a Program, for as many voices at once as it has lanes.
 #pragma once
 
 #include <cstddef>

@@ -1,4 +1,4 @@
-// core/engine: links whose force is not the plain one. A kernel moves everything without them;
+// core/kernels: links whose force is not the plain one. A kernel moves everything without them;
 // then each looks where its ends would be, finds its force (core/laws), and both ends are moved by
 // it, which is the same as if it had been among the others. Where such links share a mass, they
 // are gone through a few times (Gauss-Seidel); where that does not end, they are solved together.

@@ -1,4 +1,4 @@
-// core/engine: what runs. A Program is constant and shared by all voices; what changes is in the
+// core/kernels: what runs. A Program is constant and shared by all voices; what changes is in the
 // kernels. Indices and numbers only; the compile room knows the names.
 #pragma once
 

@@ -1,4 +1,4 @@
-// core/engine: where points on macros are. Their kernels' loops share this; `static`, since these
+// core/kernels: where points on macros are. Their kernels' loops share this; `static`, since these
 // are compiled for each instruction set.
 #pragma once
 

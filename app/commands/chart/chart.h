@@ -1,5 +1,5 @@
-// app: draws what every way of computing a scene costs beside how right it is. The exit code comes
-// back.
+// app/commands: draws what every way of computing a scene costs beside how right it is. The exit
+// code comes back.
 #pragma once
 
 #include <functional>

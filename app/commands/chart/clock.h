@@ -1,4 +1,4 @@
-// app: how long the ways of the chart take, in turns.
+// app/commands: how long the ways of the chart take, in turns.
 #pragma once
 
 #include <functional>

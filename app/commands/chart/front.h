@@ -1,4 +1,4 @@
-// app: which of many ways are worth having, and how far they come together. Pure.
+// app/commands: which of many ways are worth having, and how far they come together. Pure.
 #pragma once
 
 #include <cstddef>

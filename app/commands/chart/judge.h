@@ -1,4 +1,4 @@
-// app: the two references about a scene, and what each way is worth beside them.
+// app/commands: the two references about a scene, and what each way is worth beside them.
 //
 // T1, "identical": the published scheme at 44 100 Hz in long double. T2, "physical": the continuous
 // network with the same M, K, Z: exact modes where the scene is linear, else the published scheme

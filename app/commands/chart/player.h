@@ -1,4 +1,5 @@
-// app: plays a machine's kernels alone, one voice, with inputs whose motion is a function of time.
+// app/commands: plays a machine's kernels alone, one voice, with inputs whose motion is a function
+// of time.
 #pragma once
 
 #include <memory>

@@ -1,4 +1,4 @@
-// app: what the chart is drawn of. A scene is a network and what drives its inputs,
+// app/commands: what the chart is drawn of. A scene is a network and what drives its inputs,
 // told in seconds, so
 // that it is the same at every rate.
 #pragma once

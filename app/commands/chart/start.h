@@ -1,4 +1,4 @@
-// app: how a scheme has to start to be on the continuous network's course.
+// app/commands: how a scheme has to start to be on the continuous network's course.
 #pragma once
 
 #include <array>

@@ -1,4 +1,4 @@
-// app: what the chart knows of a scene, and how it is written down.
+// app/commands: what the chart knows of a scene, and how it is written down.
 #pragma once
 
 #include <string>

@@ -1,5 +1,5 @@
-// app: the ways of computing a scene that the chart compares. A new method, precision or budget
-// comes in by a row of the tables in chart_ways.cpp.
+// app/commands: the ways of computing a scene that the chart compares. A new method, precision or
+// budget comes in by a row of the tables in chart_ways.cpp.
 #pragma once
 
 #include <memory>

@@ -1,4 +1,4 @@
-// app: what the questions of the registry are answered by OSC. [OSC's thread]
+// app/control: what the questions of the registry are answered by OSC. [OSC's thread]
 #pragma once
 
 #include "app/control/registry.h"

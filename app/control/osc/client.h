@@ -1,4 +1,5 @@
-// app: who has sent an OSC packet, and is answered now or, by a copy, later. [any thread but audio]
+// app/control: who has sent an OSC packet, and is answered now or, by a copy, later. [any thread
+// but audio]
 #pragma once
 
 #include <memory>

@@ -1,5 +1,5 @@
-// app: the way back of OSC. Lives as long as somebody may have something to answer: a load may end
-// after the server has.
+// app/control: the way back of OSC. Lives as long as somebody may have something to answer: a load
+// may end after the server has.
 #pragma once
 
 #include <cstdint>

@@ -1,4 +1,4 @@
-// app: the strict check that stands between the network and liblo. Pure.
+// app/control: the strict check that stands between the network and liblo. Pure.
 #pragma once
 
 #include <cstdint>

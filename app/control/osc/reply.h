@@ -1,4 +1,4 @@
-// app: an OSC message as it is written: big-endian, everything padded to four bytes. Pure.
+// app/control: an OSC message as it is written: big-endian, everything padded to four bytes. Pure.
 #pragma once
 
 #include <algorithm>

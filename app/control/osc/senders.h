@@ -1,4 +1,5 @@
-// app: who may send OSC, and how much is answered to whom. Pure: addresses, sizes and times in.
+// app/control: who may send OSC, and how much is answered to whom. Pure: addresses, sizes and times
+// in.
 #pragma once
 
 #include <cstddef>

@@ -1,5 +1,5 @@
-// app: OSC over UDP. Its own socket, bound to one address; a strict check of every packet before
-// liblo may see it; a thread of its own. Whoever may not send is not answered.
+// app/control: OSC over UDP. Its own socket, bound to one address; a strict check of every packet
+// before liblo may see it; a thread of its own. Whoever may not send is not answered.
 #pragma once
 
 #include <functional>

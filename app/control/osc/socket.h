@@ -1,4 +1,4 @@
-// app: the UDP socket of OSC, and who may send to it.
+// app/control: the UDP socket of OSC, and who may send to it.
 #pragma once
 
 #include <cstdint>

@@ -1,4 +1,4 @@
-// app: from OSC's time tags to frames of the audio.
+// app/control: from OSC's time tags to frames of the audio.
 #pragma once
 
 #include <cstdint>

@@ -1,4 +1,4 @@
-// core/engine: a small network in many voices (Batch): one voice in each lane of many packs, which
+// core/kernels: a small network in many voices (Batch): one voice in each lane of many packs, which
 // take every step of a sample in turn, so that none waits for its own last result.
 #pragma once
 

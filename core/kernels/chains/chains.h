@@ -1,4 +1,4 @@
-// core/engine: strings. The masses of a chain lie in lanes so that each one's neighbours are in
+// core/kernels: strings. The masses of a chain lie in lanes so that each one's neighbours are in
 // the packs before and after its own, and one pass over memory does it all:
 //   y = K x + Z v,  v += (y[i-1] - 2 y[i] + y[i+1])/M,  x += v
 // A stiff one has a second y, from two masses before and behind.

@@ -1,4 +1,4 @@
-// core/compile: finds the strings in a Program.
+// core/kernels: finds the strings in a Program.
 #pragma once
 
 #include <optional>

@@ -1,4 +1,4 @@
-// core/engine: a small body in one voice, by dense matrices.
+// core/kernels: a small body in one voice, by dense matrices.
 //
 // Between contacts the body is linear: with its state s (positions and velocities), what is heard
 // for the next dense_frames samples is a product of s with rows C A^k, time in the lanes, plus

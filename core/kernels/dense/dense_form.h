@@ -1,4 +1,4 @@
-// core/compile: whether a Program is a small body for the dense kernel, and its tables.
+// core/kernels: whether a Program is a small body for the dense kernel, and its tables.
 #pragma once
 
 #include <optional>

@@ -1,4 +1,4 @@
-// core/compile: whether a Program may be stepped to fourth order, and how far each scheme is from
+// core/kernels: whether a Program may be stepped to fourth order, and how far each scheme is from
 // the continuous network.
 #pragma once
 

@@ -1,4 +1,4 @@
-// core/engine: a large network stepped by several cores, a shard each. In the explicit scheme
+// core/kernels: a large network stepped by several cores, a shard each. In the explicit scheme
 // nothing travels farther than one link in a sample: a shard that has a copy of every node within
 // a little more than n links of its own goes on by itself for n samples, after which only the
 // copies are wrong. They are written anew from the shards whose own they are; what is a shard's own

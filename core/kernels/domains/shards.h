@@ -1,4 +1,4 @@
-// core/compile: divides a large Program among several cores.
+// core/kernels: divides a large Program among several cores.
 #pragma once
 
 #include <optional>

@@ -1,4 +1,4 @@
-// core/engine: a regular network (Grid), its slots side by side in the lanes. One voice.
+// core/kernels: a regular network (Grid), its slots side by side in the lanes. One voice.
 #pragma once
 
 #include "core/kernels/nodes.h"

@@ -1,4 +1,4 @@
-// core/compile: whether a Program is a regular network, and its tables if it is.
+// core/kernels: whether a Program is a regular network, and its tables if it is.
 #pragma once
 
 #include <optional>

@@ -1,4 +1,4 @@
-// core/compile: where the rows of a regular network lie among the slots of a Grid.
+// core/kernels: where the rows of a regular network lie among the slots of a Grid.
 #pragma once
 
 #include <cstddef>

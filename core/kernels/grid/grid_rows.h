@@ -1,4 +1,4 @@
-// core/compile: the rows of a regular network, in whatever order it was written.
+// core/kernels: the rows of a regular network, in whatever order it was written.
 #pragma once
 
 #include <cstdint>

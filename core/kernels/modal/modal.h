@@ -1,4 +1,4 @@
-// core/engine: a Program in the eigenvectors of its linear links, one voice.
+// core/kernels: a Program in the eigenvectors of its linear links, one voice.
 //
 // Each mode is an oscillator of its own: d -= lK q + lZ d, q += d, which is the published scheme in
 // another basis, not an approximation. Two ways through a block give the same:

@@ -1,4 +1,4 @@
-// core/engine: how far the energy lets the modes of a ModalState move, and whether a link can act
+// core/kernels: how far the energy lets the modes of a ModalState move, and whether a link can act
 // there; a part of modal_step.cpp, which alone includes it.
 //
 // The energy of a mode, m d^2 + lK (q - d/2)^2 with m = 1 - lZ/2 - lK/4, never grows by itself, and

@@ -1,4 +1,4 @@
-// core/engine: the modes true to the continuous network (Modes::is_exact); a part of
+// core/kernels: the modes true to the continuous network (Modes::is_exact); a part of
 // modal_step.cpp, which alone includes it.
 //
 // q'' + Z q' + K q = F, sampled, is again a mode of the published scheme, with r = e^(-Z/2) and

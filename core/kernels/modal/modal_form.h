@@ -1,4 +1,4 @@
-// core/compile: finds the eigenvectors of a Program's linear links.
+// core/kernels: finds the eigenvectors of a Program's linear links.
 #pragma once
 
 #include <optional>

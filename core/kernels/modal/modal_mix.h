@@ -1,4 +1,4 @@
-// core/engine: what the coefficients make of the modes of a ModalState; a part of modal_step.cpp,
+// core/kernels: what the coefficients make of the modes of a ModalState; a part of modal_step.cpp,
 // which alone includes it.
 #pragma once
 

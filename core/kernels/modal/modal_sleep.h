@@ -1,4 +1,4 @@
-// core/engine: modes that are no longer heard; a part of modal_step.cpp, which alone includes it.
+// core/kernels: modes that are no longer heard; a part of modal_step.cpp, which alone includes it.
 //
 // A mode that is left alone rings as q = A r^n cos(...), with r^2 = 1 - lZ and
 //   A^2 = (lK q^2 + (lZ - lK) q d + (1 - lZ) d^2) (1 - lZ) / (lK - (lK + lZ)^2 / 4),

@@ -1,4 +1,4 @@
-// core/engine: the sweeps over the modes of a ModalState; the inner part of modal_step.cpp, which
+// core/kernels: the sweeps over the modes of a ModalState; the inner part of modal_step.cpp, which
 // alone includes it.
 #pragma once
 

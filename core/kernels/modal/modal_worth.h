@@ -1,4 +1,4 @@
-// core/compile: which modes a budget lets a part do without, and how long the others are heard.
+// core/kernels: which modes a budget lets a part do without, and how long the others are heard.
 #pragma once
 
 #include <cstdint>

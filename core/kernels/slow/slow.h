@@ -1,4 +1,4 @@
-// core/engine: what moves so slowly that a few points of it say it all, such as an LFO. It is
+// core/kernels: what moves so slowly that a few points of it say it all, such as an LFO. It is
 // stepped to fourth order once in D samples, two steps ahead, and between the steps a cubic goes
 // through the four that are around. One voice.
 //

@@ -1,4 +1,4 @@
-// core/compile: whether a Program moves so slowly that few points of it are enough, and its tables.
+// core/kernels: whether a Program moves so slowly that few points of it are enough, and its tables.
 #pragma once
 
 #include <optional>

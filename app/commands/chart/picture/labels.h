@@ -1,4 +1,4 @@
-// app: where the words beside marks stand in a picture, so that none lies on another.
+// app/commands: where the words beside marks stand in a picture, so that none lies on another.
 #pragma once
 
 #include <string>

@@ -1,4 +1,4 @@
-// app: the chart as gnuplot draws it.
+// app/commands: the chart as gnuplot draws it.
 #pragma once
 
 #include <string>
