@@ -12,7 +12,6 @@ constexpr double steal_fade_s = 0.005;  // a voice that gives way takes this lon
 constexpr double level_memory_s = 0.1;  // how long a voice's level remembers a peak
 constexpr double quiet_s = 0.5;         // longer than half a period of the slowest sound
 constexpr double bend_semitones = 2.0;
-constexpr std::size_t most_reserve_lanes = 4;
 
 std::size_t most_voices(const Playing& playing) {
   return static_cast<std::size_t>(std::max(1, playing.voices));
@@ -24,7 +23,7 @@ Voices::Voices(const Playing& playing, double rate_hz)
     : playing_(playing),
       rate_hz_(rate_hz),
       level_kept_(std::exp(-static_cast<double>(max_block_frames) / (level_memory_s * rate_hz))),
-      voices_(most_voices(playing) + std::min(most_voices(playing), most_reserve_lanes)) {}
+      voices_(lane_count(playing.voices)) {}
 
 void Voices::go_on_from(const Voices& from) {
   voices_ = from.voices_;

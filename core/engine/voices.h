@@ -15,6 +15,13 @@ namespace ressort {
 
 inline constexpr double quiet_level = 1e-5;  // -100 dBFS
 
+// Of an engine with so many voices: some more, for those that fade.
+inline std::size_t lane_count(int voices) {
+  constexpr std::size_t most_in_reserve = 4;
+  const auto wanted = static_cast<std::size_t>(std::max(1, voices));
+  return wanted + std::min(wanted, most_in_reserve);
+}
+
 struct Voice {
   bool is_live() const { return awake && !fading; }
 
