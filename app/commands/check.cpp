@@ -66,7 +66,7 @@ Proved prove(const Scene& scene, const Compiled& compiled, const Progress& progr
     as_written.highest.push_back(info.value);
   }
   // What is computed passively is stable whatever its numbers are.
-  Stability stability(without_passive(scene.network, compiled.schemes), 1.0,
+  Stability stability(without_passive(scene.network, compiled.schemes.links), 1.0,
                       Stability::most_exact_masses, progress);
   progress.stage("proving that it is stable in all ranges");
   Proved proved{.certificate = stability.certify(box),
@@ -104,7 +104,9 @@ json limit_json(double value) {
 json parameter_json(const ParameterInfo& info, int input, const std::optional<SafeRange>& safe) {
   json out{{"name", info.name}};
   if (input > 0) {
-    out["input"] = input;
+    out.update({{"input", input},
+                {"minimum", limit_json(info.minimum)},
+                {"maximum", limit_json(info.maximum)}});
   } else {
     out.update({{"value", info.value}, {"minimum", info.minimum}, {"maximum", info.maximum}});
   }
@@ -235,8 +237,8 @@ void print_report(const Scene& scene, const Compiled& compiled, const Proved& pr
     const ParameterInfo& info = instrument.parameters[i];
     const std::string safe = describe(proved.safe[i]);
     if (const int input = scene.network.parameters[i].audio_input; input > 0) {
-      std::printf("  %-12s is input %d, sample by sample; %s\n", info.name.c_str(), input,
-                  safe.c_str());
+      std::printf("  %-12s is input %d, sample by sample, from %g to %g; %s\n", info.name.c_str(),
+                  input, info.minimum, info.maximum, safe.c_str());
     } else {
       std::printf("  %-12s %-10g from %g to %g; %s\n", info.name.c_str(), info.value, info.minimum,
                   info.maximum, safe.c_str());

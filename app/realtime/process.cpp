@@ -387,11 +387,8 @@ void Process::tell() {
   }
   static_cast<EngineMeters&>(meters_) = now;
   board.write(meters_);
-  if (reports.size() + Engine::max_creators + Engine::max_changes > reports.capacity()) {
+  if (reports.size() + Engine::max_changes > reports.capacity()) {
     return;  // nobody is listening just now: the engine keeps them
-  }
-  for (const std::uint32_t link : engine.take_creators()) {
-    reports.push({Report::Kind::created, current_->serial, 0, static_cast<double>(link)});
   }
   for (const std::uint16_t index : engine.take_changes()) {
     reports.push({Report::Kind::parameter, current_->serial, index, engine.parameter(index)});

@@ -42,11 +42,11 @@ struct MidiPacket {
 
 // What the audio thread has to tell.
 struct Report {
-  enum class Kind : std::uint8_t { parameter, reset, created, overload };
+  enum class Kind : std::uint8_t { parameter, reset, overload };
   Kind kind = Kind::reset;
   std::uint32_t model = 0;  // serial
   std::uint16_t index = 0;  // parameter; the most voices there is time for, or 0
-  double value = 0.0;       // of the parameter; the link that created energy; the load
+  double value = 0.0;       // of the parameter; the load
 };
 
 // A piece of the output on its way to a recording.

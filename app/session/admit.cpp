@@ -43,6 +43,10 @@ Admission ask_to_play(const Scene& scene, const CompileOptions& options) {
   for (const Error& narrowed : stability.narrowed) {
     admission.findings.push_back(at(scene.path, max_preset_bytes, narrowed, Severity::warning));
   }
+  if (compiled->schemes.hazard) {
+    admission.findings.push_back(
+        at(scene.model_path, max_model_bytes, *compiled->schemes.hazard, Severity::warning));
+  }
   admission.compiled = *std::move(compiled);
   return admission;
 }

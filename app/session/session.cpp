@@ -25,21 +25,13 @@ double to_db(double factor) {
   return 20.0 * std::log10(factor);
 }
 
-// Modes leave out what nobody hears, so that nothing can go on from them.
-bool can_be_relieved(const Plan& plan) {
-  return std::none_of(plan.parts.begin(), plan.parts.end(),
-                      [](const Part& part) { return part.method == Method::modal; });
-}
-
+// Not from modes, which leave out what nobody hears: nothing can go on from them.
 bool may_gain(const Plan& plan) {
-  return std::any_of(plan.parts.begin(), plan.parts.end(),
-                     [](const Part& part) { return part.may_gain; }) &&
-         can_be_relieved(plan);
-}
-
-bool is_straight(const Network& network) {
-  return std::all_of(network.links.begin(), network.links.end(),
-                     [](const Link& link) { return link.law == Law::spring; });
+  const auto any = [&](auto&& is_so) {
+    return std::any_of(plan.parts.begin(), plan.parts.end(), is_so);
+  };
+  return any([](const Part& part) { return part.may_gain; }) &&
+         !any([](const Part& part) { return part.method == Method::modal; });
 }
 
 const char* const ending = "the program is ending";
@@ -188,7 +180,7 @@ void Session::work() {
         do_load(jobs.front());
       } else if (wants_again) {
         do_again();
-      } else if (source_ && source_->may_gain) {
+      } else if (source_) {
         improve();
       }
     } catch (const std::exception& error) {
@@ -212,21 +204,23 @@ bool Session::is_outdated(bool is_load) const {
 // The same model by other forms, of which some took too long to find while somebody waited; it goes
 // on where the other is.
 void Session::improve() {
-  source_->may_gain = false;
+  const Source source = *std::exchange(source_, std::nullopt);
   bool was_outdated = false;
-  CompileOptions options = source_->options;
+  CompileOptions options = source.options;
   options.progress = Progress([&](std::string_view) {
     was_outdated = is_outdated(false);
     return !was_outdated;
   });
   options.most_bytes = free_memory_bytes();
-  auto compiled = compile(source_->network, source_->preset, options);
+  auto compiled = compile(source.network, source.preset, options);
   if (!compiled) {
-    source_->may_gain = was_outdated;  // another time, if it still sounds
+    if (was_outdated) {
+      source_ = source;  // another time, if it still sounds
+    }
     return;
   }
   const std::string news = too_much(compiled->plan, compiled->instrument.voices,
-                                    source_->options.rate_hz, source_->options.precision);
+                                    source.options.rate_hz, source.options.precision);
   {
     const std::lock_guard lock(mutex_);
     auto loaded = std::make_shared<Loaded>(*current_);
@@ -266,10 +260,6 @@ void Session::listen() {
       resets_.add((is_current ? current_->name : std::string("the last model")) +
                   ": a voice became unstable and was faded out; lower its stiffness or "
                   "damping, or raise its mass");
-    } else if (report.kind == Report::Kind::created && is_current) {
-      if (std::string news = calm(static_cast<std::uint32_t>(report.value)); !news.empty()) {
-        creations_.add(std::move(news));
-      }
     } else if (report.kind == Report::Kind::overload && is_current) {
       overloads_.add(describe_overload(report));
     }
@@ -283,7 +273,7 @@ void Session::listen() {
     drops_.add("an event found no room and was dropped: more came than can be played",
                now.dropped - std::exchange(dropped_reported_, now.dropped));
   }
-  for (RateLimit* const limit : {&resets_, &creations_, &overloads_, &lates_, &drops_}) {
+  for (RateLimit* const limit : {&resets_, &overloads_, &lates_, &drops_}) {
     if (const auto news = limit->take(); news && tell_) {
       tell_(*news);
     }
@@ -299,26 +289,6 @@ std::string Session::describe_overload(const Report& report) const {
                     counted(report.index, "sounds", "sound at once") + " until there is time again"
               : "") +
          "; what makes room: a longer period, " + ways;
-}
-
-std::string Session::calm(std::uint32_t link) {
-  if (!source_) {
-    return {};
-  }
-  auto& passive = source_->options.passive_links;
-  if (std::find(passive.begin(), passive.end(), link) != passive.end()) {
-    return {};
-  }
-  passive.push_back(link);
-  source_->may_gain = can_be_relieved(current_->plan);
-  const Network whole = expand_macros(source_->network);
-  const Link& creator = whole.links[link];
-  return "the " + std::string(family_name(facts_of(creator.law).family)) + " '" +
-         creator.name.text() + "' (" +
-         std::filesystem::path(current_->model_path).filename().string() + ":" +
-         std::to_string(creator.location.line) + ") created energy" +
-         (source_->may_gain ? ": computed passively from now on"
-                            : "; play it with --budget passive=always");
 }
 
 void Session::do_load(const Job& job) {
@@ -442,13 +412,12 @@ Result<std::shared_ptr<const Loaded>> Session::build_now(const Wish& wish,
   }
   offer(std::move(compiled->engine));
   source_.reset();
-  if (may_gain(loaded->plan) || !is_straight(scene->network)) {
+  if (may_gain(loaded->plan)) {
     options.find_gain = false;
     scene->preset.gain = loaded->instrument.gain;
     options.most_modes = patient_modes;
     options.progress = {};
-    source_ = {std::move(scene->network), std::move(scene->preset), options,
-               may_gain(loaded->plan)};
+    source_ = {std::move(scene->network), std::move(scene->preset), options};
   }
   return std::shared_ptr<const Loaded>(std::move(loaded));
 }

@@ -107,12 +107,11 @@ class Session {
     Answer answer;
   };
 
-  // What sounds, to be compiled once more: with more patience, or with links found passively.
+  // What sounds, to be compiled once more with more patience.
   struct Source {
     Network network;
     Preset preset;
     CompileOptions options;
-    bool may_gain = false;
   };
 
   void work();
@@ -130,7 +129,6 @@ class Session {
   void listen();
   std::string describe_overload(const Report& report) const;
   // A link of what sounds made energy of nothing: what there is to say of it, once.
-  std::string calm(std::uint32_t link);
 
   Process& process_;
   SessionOptions options_;
@@ -153,7 +151,6 @@ class Session {
   const Engine* offered_ = nullptr;  // [worker] until the next is offered
   std::optional<Source> source_;     // [worker] of what may be improved
   RateLimit resets_;                 // [worker] all of these
-  RateLimit creations_;
   RateLimit overloads_{std::chrono::seconds(10)};
   RateLimit lates_;
   RateLimit drops_;

@@ -8,7 +8,6 @@
 #include "core/compile/make_engine.h"
 #include "core/compile/merge.h"
 #include "core/compile/rest_bound.h"
-#include "core/compile/schemes.h"
 #include "core/model/number_check.h"
 #include "core/model/preset/fit.h"
 #include "core/model/topology.h"
@@ -52,30 +51,6 @@ std::optional<Mode> find_mode(const Request& request, const Network& network,
   }
   request.options.progress.stage("finding its lowest mode");
   return lowest_mode(network, values, request.options.progress);
-}
-
-// By what the parameters may be turned to, and by the stiffness of the highest key there is.
-Schemes find_schemes(const Request& request, const Network& network,
-                     const std::vector<ParameterInfo>& asked, const std::optional<Mode>& mode) {
-  constexpr double highest_key_hz = 4186.0;
-  const Preset& preset = request.preset;
-  const CompileOptions& options = request.options;
-  Conditions conditions{.box = {}, .rate_ratio = request.rate_ratio};
-  for (const ParameterInfo& info : asked) {
-    conditions.box.lowest.push_back(options.bare ? info.value : info.minimum);
-    conditions.box.highest.push_back(options.bare ? info.value : info.maximum);
-  }
-  if (mode && !options.bare) {
-    const double octaves = highest_key_hz / mode->frequency_hz;
-    const double most =
-        highest_stiffness_factor(network, preset_box(asked, preset), request.rate_ratio);
-    conditions.stiffness_factor =
-        std::max(1.0, std::min(most, octaves * octaves * std::exp2(preset.transpose / 6.0)));
-  }
-  const bool is_asked = options.budget || !options.bare;
-  return choose_schemes(network, preset, conditions,
-                        is_asked ? request.budget : Budget{.passive = Passivity::never},
-                        options.passive_links, options.progress);
 }
 
 // Where it is stable: at the start, in all ranges, for keys; and what of it comes to rest.
@@ -174,7 +149,10 @@ Result<Compiled> compile_by_stages(const Request& request) {
   }
   const std::optional<Mode> mode = find_mode(request, network, values);
   progress.stage("dividing it into parts");
-  const Schemes schemes = find_schemes(request, network, asked, mode);
+  // The bare network is the published scheme, unless somebody asks.
+  const bool is_published = options.bare && !options.budget;
+  const Schemes schemes = choose_schemes(
+      network, is_published ? Budget{.passive = Passivity::never} : request.budget, progress);
   const Culled culled = cull(network, progress);
   Machine machine =
       tabulate(network, culled, schemes.links, values, options.rate_hz, options.rescale, progress);
@@ -203,7 +181,7 @@ Result<Compiled> compile_by_stages(const Request& request) {
       .plan = {std::move(planned.parts),
                make_notes(schemes, culled, analysis, misses_mode, !factor, reduced.merged)},
       .stability = analysis.stability,
-      .schemes = schemes.links};
+      .schemes = schemes};
 }
 
 }  // namespace

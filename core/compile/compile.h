@@ -10,6 +10,7 @@
 #include "core/compile/instrument.h"
 #include "core/compile/machine.h"
 #include "core/compile/plan.h"
+#include "core/compile/schemes.h"
 #include "core/compile/stability_check.h"
 #include "core/engine/engine.h"
 #include "core/model/network.h"
@@ -30,9 +31,7 @@ struct CompileOptions {
   Precision precision = Precision::float64;
   std::optional<Method> method;  // instead of the plan's choice, or the bare network's direct form
   std::optional<Budget> budget;  // instead of the preset's
-  std::vector<std::uint32_t> passive_links;  // of Network::links with its macros written out: to
-                                             // be found passively, whatever the budget says
-  Isa isa = best_isa();                      // no wider than the machine's
+  Isa isa = best_isa();          // no wider than the machine's
   std::uint32_t most_modes = patient_modes;  // of a part, for the plan
   Executor* executor = nullptr;   // outlives the engine, which it steps large parts of; null: none
   bool find_gain = false;         // so that a forte note peaks at -6 dBFS, instead of the preset's
@@ -47,8 +46,8 @@ struct Compiled {
   std::unique_ptr<Engine> engine;
   Instrument instrument;
   Plan plan;
-  StabilityCheck stability;         // whoever lets it sound has asked this
-  std::vector<LinkScheme> schemes;  // [link] of the network without macros
+  StabilityCheck stability;  // whoever lets it sound has asked this
+  Schemes schemes;
 };
 
 // One stage after the other, each a function from what is known to what it finds. Fails, with the

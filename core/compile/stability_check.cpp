@@ -2,8 +2,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
+#include <set>
 
 #include "core/compile/schemes.h"
+#include "core/laws/laws.h"
 #include "core/model/language/expression.h"
 #include "core/model/preset/fit.h"
 
@@ -42,9 +45,11 @@ class StabilityChecker {
       return std::move(result_);
     }
     ask();
+    // Knobs first: sound gets what they leave.
     widen([&](std::size_t i) { return place_[i].has_value() && !is_audio(i); });
-    widen([&](std::size_t i) { return is_audio(i); });
     widen([&](std::size_t i) { return !place_[i] && !is_audio(i); });
+    make_room_for_audio();
+    widen([&](std::size_t i) { return is_audio(i); });
     for (std::size_t i = 0; i < start_.size(); ++i) {
       settle(i);
     }
@@ -159,6 +164,78 @@ class StabilityChecker {
     box_ = std::move(shared);
   }
 
+  // Knobs that reach the limit leave nothing to sound, so they stay a little below it. And sound
+  // may make no stiffness, damping or mass negative that is not so at the start.
+  void make_room_for_audio() {
+    constexpr double knobs_share = 0.9;
+    std::vector<std::size_t> audio;
+    bool is_full = false;
+    for (std::size_t i = 0; i < start_.size(); ++i) {
+      if (is_audio(i)) {
+        audio.push_back(i);
+      } else {
+        is_full |= box_.lowest[i] > asked_.lowest[i] || box_.highest[i] < asked_.highest[i];
+      }
+    }
+    for (std::size_t i = 0; is_full && !audio.empty() && i < start_.size(); ++i) {
+      box_.lowest[i] = towards(start_[i], std::lerp(start_[i], box_.lowest[i], knobs_share));
+      box_.highest[i] = towards(start_[i], std::lerp(start_[i], box_.highest[i], knobs_share));
+    }
+    for (const std::size_t i : audio) {
+      each_strength([&](ArgumentId argument) { keep_positive(argument, i); });
+    }
+  }
+
+  // Calls `use` with what must not be negative.
+  template <class Use>
+  void each_strength(Use&& use) const {
+    std::set<ArgumentId> all;
+    for (const Mass& mass : request_.expanded.masses) {
+      all.insert({mass.mass, mass.stiffness, mass.damping});
+    }
+    for (const Link& link : request_.expanded.links) {
+      const LawFacts& law = facts_of(link.law);
+      for (std::size_t i = 0; i < law.count; ++i) {
+        if (law.is_strength(i)) {
+          all.insert(link.arguments[i]);
+        }
+      }
+    }
+    all.erase(no_argument);
+    std::for_each(all.begin(), all.end(), use);
+  }
+
+  // Asks of sound no more than keeps this argument from falling below 0.
+  void keep_positive(ArgumentId argument, std::size_t i) {
+    const Formula& formula = request_.expanded.arguments[argument];
+    const auto uses = [&](const Step& step) { return step.op == Op::parameter && step.index == i; };
+    if (std::none_of(formula.begin(), formula.end(), uses)) {
+      return;
+    }
+    ParameterBox box = box_;
+    const auto is_positive = [&](double value) {
+      box.lowest[i] = std::min(start_[i], value);
+      box.highest[i] = std::max(start_[i], value);
+      return formula_range(formula, box).lowest >= 0.0;
+    };
+    if (!is_positive(start_[i])) {
+      return;
+    }
+    for (double* const wanted : {&asked_.lowest[i], &asked_.highest[i]}) {
+      double inside = start_[i];
+      double outside = *wanted;
+      if (is_positive(outside)) {
+        continue;
+      }
+      constexpr int halvings = 120;  // from 1e12 to the last digit of what is small
+      for (int n = 0; n < halvings; ++n) {
+        const double middle = std::midpoint(inside, outside);
+        (is_positive(middle) ? inside : outside) = middle;
+      }
+      *wanted = towards(start_[i], inside);
+    }
+  }
+
   // One parameter as far as it may go alone, with the others in `from`.
   void stretch(std::size_t i, const ParameterBox& from, ParameterBox& box) {
     if (const auto safe = stability_.safe_range(from, i, start_[i])) {
@@ -193,6 +270,15 @@ class StabilityChecker {
                               ? std::nullopt
                               : stability_.safe_range(box_, i, start_[i])) {
       info.safe = *safe;
+    }
+    if (is_audio(i)) {
+      const auto or_none = [](double value) {
+        return std::fabs(value) < anywhere ? value : std::copysign(infinity, value);
+      };
+      result_.limits[i] = {or_none(box_.lowest[i]), or_none(box_.highest[i])};
+      info.minimum = result_.limits[i].lowest;
+      info.maximum = result_.limits[i].highest;
+      return;
     }
     info.is_raised = box_.lowest[i] > asked_.lowest[i];
     info.is_lowered = box_.highest[i] < asked_.highest[i];

@@ -9,10 +9,6 @@
 namespace ressort {
 namespace {
 
-bool may_create(const LinkRun& run) {
-  return run.law != Law::spring && run.scheme != Scheme::discrete_gradient;
-}
-
 template <class T>
 LawNumbers numbers_of(const LinkRun& run, LaneValues<T> coefficients) {
   LawNumbers numbers{};
@@ -129,29 +125,6 @@ void add_links(const Program& program, const LinkRun& run, Share share, LaneValu
       });
 }
 
-// --- who made energy of nothing -----------------------------------------------------------------
-
-// The steepest slope that a link's law has near d; of a bow, what its damping weighs.
-double steepness(Law law, const LawNumbers& c, double d) {
-  const Slopes slopes = steepest(law, c, c, std::fabs(d));
-  return std::max(slopes.stiffness, slopes.damping);
-}
-
-template <class T>
-double inverse_mass(const Program& program, LaneValues<T> coefficients, std::uint32_t node) {
-  for (const TapSlot& tap : program.taps) {
-    if (tap.node == node) {  // all nodes of a macro weigh the same
-      return inverse_mass(program, coefficients, program.tap_nodes[tap.first + tap.length / 2]);
-    }
-  }
-  for (const MassRun& run : program.mass_runs) {
-    if (node >= run.first && node < run.first + run.count) {
-      return coefficients[run.inverse_mass];
-    }
-  }
-  return 0.0;
-}
-
 }  // namespace
 
 template <class T>
@@ -216,43 +189,6 @@ double distance_at_rest(const Program& program, LaneValues<T> coefficients, cons
   return facts_of(run->law).gap(numbers_of(*run, coefficients), rest(a) - rest(b));
 }
 
-bool may_create(const Program& program) {
-  return std::any_of(program.link_runs.begin(), program.link_runs.end(),
-                     [](const LinkRun& run) { return may_create(run); });
-}
-
-template <class T>
-std::uint32_t likely_creator(const Program& program, LaneValues<T> coefficients, const double* x,
-                             const double* v, double frames) {
-  std::uint32_t found = no_link;
-  bool found_near = false;
-  double steepest = 0.0;
-  double nearest = 0.0;
-  for (const LinkRun& run : program.link_runs) {
-    if (!may_create(run)) {
-      continue;
-    }
-    const LawNumbers c = numbers_of(run, coefficients);
-    for (std::uint32_t i = run.first; i < run.first + run.count; ++i) {
-      const auto [a, b] = program.ends[i];
-      const double d = x[a] - x[b];
-      const double far = facts_of(run.law).gap(c, d);
-      const bool is_near = far <= std::fabs(v[a] - v[b]) * frames;
-      const double steep = steepness(run.law, c, d) * (inverse_mass(program, coefficients, a) +
-                                                       inverse_mass(program, coefficients, b));
-      const bool is_likelier = is_near ? !found_near || steep > steepest
-                                       : !found_near && (found == no_link || far < nearest);
-      if (is_likelier) {
-        found = i;
-        found_near = is_near;
-        steepest = steep;
-        nearest = far;
-      }
-    }
-  }
-  return found;
-}
-
 template Energy energy_of(const Program&, LaneValues<float>, const double*, const double*);
 template Energy energy_of(const Program&, LaneValues<double>, const double*, const double*);
 template void add_energy(const Program&, LaneValues<float>, const double*, const double*,
@@ -263,9 +199,4 @@ template bool rests_at_zero(const Program&, LaneValues<float>, const double*);
 template bool rests_at_zero(const Program&, LaneValues<double>, const double*);
 template double distance_at_rest(const Program&, LaneValues<float>, const double*, std::uint32_t);
 template double distance_at_rest(const Program&, LaneValues<double>, const double*, std::uint32_t);
-template std::uint32_t likely_creator(const Program&, LaneValues<float>, const double*,
-                                      const double*, double);
-template std::uint32_t likely_creator(const Program&, LaneValues<double>, const double*,
-                                      const double*, double);
-
 }  // namespace ressort

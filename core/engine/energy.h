@@ -43,9 +43,6 @@ template <class T>
 void add_energy(const Program& program, LaneValues<T> coefficients, const double* x,
                 const double* v, std::size_t first, std::size_t end, Energy& energy);
 
-// May a link of the Program make energy of nothing? [any thread] O(link runs)
-bool may_create(const Program& program);
-
 // Does everything that moves come to rest at 0, but for what contacts, plucks and bows may do? Not
 // with gravity, nor where something that stands elsewhere pulls. [audio] wait-free, O(links)
 template <class T>
@@ -56,15 +53,5 @@ bool rests_at_zero(const Program& program, LaneValues<T> coefficients, const dou
 template <class T>
 double distance_at_rest(const Program& program, LaneValues<T> coefficients, const double* x,
                         std::uint32_t link);
-
-inline constexpr std::uint32_t no_link = std::numeric_limits<std::uint32_t>::max();
-
-// The link that is the likeliest to have made energy of nothing within the last `frames` samples:
-// of the bent ones of the plain scheme that were within reach at the present speed the one that is
-// the steepest for its masses, K (1/m_a + 1/m_b); where none was, the nearest. no_link where there
-// is none. [audio] wait-free, O(links)
-template <class T>
-std::uint32_t likely_creator(const Program& program, LaneValues<T> coefficients, const double* x,
-                             const double* v, double frames);
 
 }  // namespace ressort

@@ -23,8 +23,6 @@ constexpr std::size_t most_elements = 16384;
 template <class T>
 constexpr double rounding = sizeof(T) == sizeof(float) ? 1e-4 : 1e-6;
 
-constexpr std::size_t most_looks = 1500;  // at a suspect, one in max_block_frames: two seconds
-
 constexpr double least_energy = 1e-30;  // below this there is nothing to be told of
 
 template <class T>
@@ -41,7 +39,6 @@ EnergyWatch::EnergyWatch(const Machine& machine, const Playing& playing, std::si
     first_output_.push_back(first_output_.back() + program.outputs.size());
   }
   held_.resize(lanes * first_output_.back());
-  creators_.reserve(Engine::max_creators);
 }
 
 void EnergyWatch::go_on_from(const EnergyWatch& from) {
@@ -54,11 +51,6 @@ void EnergyWatch::go_on_from(const EnergyWatch& from) {
   updates_ = from.updates_;
   read_ = from.read_;
   looking_ = Look{};
-}
-
-std::span<const std::uint32_t> EnergyWatch::take_creators() {
-  const std::size_t first = std::exchange(creators_told_, creators_.size());
-  return std::span(creators_).subspan(first);
 }
 
 // --- what stands still --------------------------------------------------------------------------
@@ -110,11 +102,6 @@ void EnergyWatch::look_around(Bank<T>& bank, Voices& voices, std::span<const dou
     go_on_looking(bank, voices, parameters);
     return;
   }
-  if (suspect_ != none && steps(suspect_, voices)) {
-    look(suspect_, bank, voices, parameters);
-    looks_left_ -= looks_left_ > 0 ? 1 : 0;
-  }
-  suspect_ = looks_left_ > 0 ? suspect_ : none;
   looks_due_ += parts_.size();
   for (std::size_t price = price_of(turn_, bank); looks_due_ >= price && looking_.at == none;
        price = price_of(turn_, bank)) {
@@ -223,7 +210,6 @@ void EnergyWatch::judge(const Look& seen, Bank<T>& bank, Voices& voices,
   here.energy = energy.value;
   here.looked = seen.updates;
   if (is_free && energy.value - energy.doubt > here.most + slack) {
-    accuse(seen.at, part, values, bank);
     here.is_judged = false;
   } else if (is_free && may_rest(p, values, bank, std::max(0.0, energy.value) + energy.doubt,
                                  voices[lane], parameters)) {
@@ -232,28 +218,6 @@ void EnergyWatch::judge(const Look& seen, Bank<T>& bank, Voices& voices,
   const double most = energy.value + energy.doubt;
   here.most = is_free && here.is_judged ? std::min(here.most, most) : most;
   here.is_judged = !seen.was_stirred;
-}
-
-// Who it was is seen from near by: the first time the part is only looked at more often.
-template <class T>
-void EnergyWatch::accuse(std::size_t at, const PartBank<T>& part, LaneValues<T> values,
-                         const Bank<T>& bank) {
-  const Program& program = part.program;
-  if (suspect_ != at) {
-    if (suspect_ == none && creators_.size() < Engine::max_creators && may_create(program) &&
-        elements_[at % elements_.size()] <= most_elements) {
-      suspect_ = at;
-      looks_left_ = most_looks;
-    }
-    return;
-  }
-  suspect_ = none;
-  const std::uint32_t link =
-      likely_creator(program, values, bank.x.data(), bank.v.data(), 2.0 * max_block_frames);
-  if (link != no_link &&
-      std::find(creators_.begin(), creators_.end(), program.origins[link]) == creators_.end()) {
-    creators_.push_back(program.origins[link]);
-  }
 }
 
 // Nothing that this energy can do is heard, nor does it bring anything within reach.

@@ -64,8 +64,6 @@ class EnergyWatch {
 
   // The energy, as it was read, and the share of the steps that nobody has to take.
   EngineMeters meters(const Voices& voices) const;
-  // As Engine::take_creators says.
-  std::span<const std::uint32_t> take_creators();
 
  private:
   // One part in one voice.
@@ -104,8 +102,6 @@ class EnergyWatch {
   template <class T>
   void judge(const Look& seen, Bank<T>& bank, Voices& voices, std::span<const double> parameters);
   template <class T>
-  void accuse(std::size_t at, const PartBank<T>& part, LaneValues<T> values, const Bank<T>& bank);
-  template <class T>
   bool may_rest(std::size_t p, LaneValues<T> values, const Bank<T>& bank, double energy,
                 const Voice& voice, std::span<const double> parameters) const;
 
@@ -118,13 +114,9 @@ class EnergyWatch {
   std::size_t still_count_ = 0;
   std::uint64_t updates_ = 0;  // times that it has looked around
   EngineMeters read_;
-  Look looking_;                         // the bank's x and v are its own until it is done
-  std::size_t suspect_ = none;           // is looked at more often, as something was created there
-  std::size_t looks_left_ = 0;           // at it
-  std::size_t turn_ = 0;                 // of the parts_: the next to be looked at
-  std::size_t looks_due_ = 0;            // updates, times parts_: what looks are paid with
-  std::vector<std::uint32_t> creators_;  // links that made energy of nothing, by origin
-  std::size_t creators_told_ = 0;
+  Look looking_;               // the bank's x and v are its own until it is done
+  std::size_t turn_ = 0;       // of the parts_: the next to be looked at
+  std::size_t looks_due_ = 0;  // updates, times parts_: what looks are paid with
 };
 
 }  // namespace ressort

@@ -310,10 +310,6 @@ std::span<const std::uint16_t> Engine::take_changes() {
   return player_->parameters.take_changes();
 }
 
-std::span<const std::uint32_t> Engine::take_creators() {
-  return player_->watch.take_creators();
-}
-
 double Engine::parameter(std::uint16_t index) const {
   return player_->parameters.values()[index];
 }

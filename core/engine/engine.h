@@ -136,12 +136,6 @@ class Engine {
   double parameter(std::uint16_t index) const;  // [audio]
   static constexpr std::size_t max_changes = 64;
 
-  // The links, by Program::origins, that have made energy of nothing since the last call: while no
-  // hand moved, no sound came in and no parameter turned. None is told twice, and at most
-  // max_creators are. [audio] wait-free
-  std::span<const std::uint32_t> take_creators();
-  static constexpr std::size_t max_creators = 16;
-
   const Machine& machine() const;  // [any thread], as long as the engine lives
   int output_count() const;        // [any thread], as long as the engine lives
   EngineMeters meters() const;     // [audio]

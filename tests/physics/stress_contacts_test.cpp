@@ -153,10 +153,7 @@ std::vector<double> bowed_string(int times, Passivity passive) {
   const Network network = network_of(scenes::string("low", 150, "0.1", "0.001") +
                                      "@in1 posInput 0.\n@bow nlBow @in1 @low_m133 0.08 0.00005\n" +
                                      scenes::output(1, "low_m10"));
-  const std::vector<double> values = parameter_values(network);
-  const Schemes schemes =
-      choose_schemes(network, Preset{}, {.box = {values, values}, .rate_ratio = 1.0 / times},
-                     {.passive = passive}, {});
+  const Schemes schemes = schemes_of(network, passive);
   Bare<double> string(make_program(network, 44100.0 * times, true, schemes.links));
   std::vector<double> heard;
   double hand = 0.0;

@@ -10,10 +10,8 @@
 
 namespace ressort::support {
 
-// Every parameter where the text puts it.
 inline Schemes schemes_of(const Network& network, Passivity passive) {
-  const std::vector<double> values = parameter_values(network);
-  return choose_schemes(network, Preset{}, {.box = {values, values}}, {.passive = passive}, {});
+  return choose_schemes(network, {.passive = passive});
 }
 
 inline Program program_of(const std::string& text, Passivity passive) {

@@ -10,7 +10,7 @@ namespace ressort {
 namespace {
 
 constexpr std::array<std::pair<Passivity, std::string_view>, 3> passivities{{
-    {Passivity::where_needed, "auto"},
+    {Passivity::always, "auto"},
     {Passivity::always, "always"},
     {Passivity::never, "never"},
 }};
@@ -86,10 +86,8 @@ std::string print_budget(const Budget& budget) {
       add(figure.word, print_number(budget.*figure.value));
     }
   }
-  for (const auto& [passivity, name] : passivities) {
-    if (budget.passive == passivity && passivity != Passivity::where_needed) {
-      add("passive", name);
-    }
+  if (budget.passive == Passivity::never) {
+    add("passive", "never");
   }
   return text;
 }

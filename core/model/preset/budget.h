@@ -10,15 +10,14 @@
 
 namespace ressort {
 
-// Which links that could gain energy from the plain scheme are computed by one that cannot.
+// Whether links that could gain energy from the published scheme are computed by one that cannot.
 enum class Passivity {
-  where_needed,  // those that would be wrong or unsafe as published; all others stay as published
-  always,
-  never,  // as published, whatever comes of it
+  always,  // all that no theorem covers as published, which is all that are not linear
+  never,   // as published, whatever comes of it
 };
 
-// Without any figure the published scheme, sample by sample: what differs from it does so only
-// where it would fail. A figure asks for the continuous network instead, no nearer than that.
+// Without any figure the published scheme, sample by sample, for all that is linear. A figure asks
+// for the continuous network instead, no nearer than that.
 struct Budget {
   static constexpr double unlimited = std::numeric_limits<double>::infinity();
 
@@ -26,7 +25,7 @@ struct Budget {
   double t60_percent = unlimited;  // that any decay may be off the continuous network's
   double silence_db = -unlimited;  // what is below this, against an output's loudest, may be left
                                    // out; 0 dB: everything may
-  Passivity passive = Passivity::where_needed;
+  Passivity passive = Passivity::always;
 
   bool is_physical() const { return cents < unlimited || t60_percent < unlimited; }
   bool operator==(const Budget&) const = default;

@@ -335,35 +335,3 @@ TEST_CASE("What happens again and again is told once, with how often it was", "[
   CAPTURE(told);
   CHECK(told.size() <= 4);
 }
-
-TEST_CASE("A contact that creates energy is named, and compiled anew behind the sound",
-          "[session]") {
-  const Folder folder;
-  const std::string file =
-      folder.write("ball.mdl",
-                   "@g ground 0.\n@m massG 1. 0.00001 0.01 0.01\n@hit contact @g @m 0.5 0. 0.\n"
-                   "@in1 frcInput @m\n@out1 posOutput @m\n");
-  Process process(48000.0);
-  std::mutex mutex;
-  std::vector<std::string> told;
-  SessionOptions as_published = at_48k();
-  as_published.compile.budget = Budget{.passive = Passivity::never};
-  Session session(process, as_published, [&](const std::string& news) {
-    const std::lock_guard lock(mutex);
-    told.push_back(news);
-  });
-  REQUIRE(session.load_and_wait(file));
-  Ear ear(process, 1'000'000);  // strikes nothing
-  std::uint64_t n = 2;
-  for (int patience = 0; patience < 2000 && process.meters().swaps < 2; ++patience) {
-    for (const std::uint64_t end = n + 50; n < end; ++n) {
-      ear.block(n);
-    }
-    std::this_thread::sleep_for(std::chrono::milliseconds(10));
-  }
-  CHECK(process.meters().swaps == 2);
-  const std::lock_guard lock(mutex);
-  CAPTURE(told);
-  REQUIRE(told.size() == 1);
-  CHECK(told[0] == "the contact 'hit' (ball.mdl:3) created energy: computed passively from now on");
-}

@@ -190,66 +190,7 @@ TEST_CASE("Of networks that nobody wrote too", "[energy]") {
 
 // --- who makes energy of nothing ----------------------------------------------------------------
 
-namespace {
-
-// A ball on a floor; there is a deeper one that it never meets, and the harder of the two.
-std::string ball(const std::string& floor) {
-  return "@g ground 0.\n@f ground -5.\n@m massG 1. 0.00001 0.01 0.01\n"
-         "@far contact @f @m 3. 0. 0.\n@hit contact @g @m " +
-         floor + "\n@in1 frcInput @m\n@out1 posOutput @m\n";
-}
-
-std::vector<std::string> creators(const std::string& text, const CompileOptions& options,
-                                  std::size_t frames = 4 * 44100) {
-  support::Player player(text, Preset{}, options);
-  player.run(frames);
-  CHECK(player.heap_calls == 0);
-  std::vector<std::string> names;
-  for (const std::uint32_t link : player.engine().take_creators()) {
-    names.push_back(support::network_of(text).links[link].name.text());
-  }
-  CHECK(player.engine().take_creators().empty());
-  return names;
-}
-
-}  // namespace
-
-TEST_CASE("A contact that creates energy is found, and no other", "[energy]") {
-  for (const Precision precision : {Precision::float64, Precision::float32}) {
-    const CompileOptions options{.precision = precision,
-                                 .budget = Budget{.passive = Passivity::never}};
-    CHECK(creators(ball("0.5 0. 0."), options) == std::vector<std::string>{"hit"});
-    // The far one would be within reach of what this one does in seconds.
-    CHECK(creators(ball("3. 0. 0."), options, 22050) == std::vector<std::string>{"hit"});
-  }
-}
-
-TEST_CASE("What only wavers, falls or is driven is not accused", "[energy]") {
-  // A contact that never lets go, a cubic spring at a large amplitude, a ball that comes to rest.
-  const std::string held =
-      "@g ground 0.\n@m mass 1. -0.3 -0.3\n@c contact @g @m 0.05 0. 1.\n@out1 posOutput @m\n";
-  const std::string bent =
-      "@g ground 0.\n@m mass 1. 0.3 0.3\n@c nlSpring3 @g @m 0.01 0.2 0.\n@out1 posOutput @m\n";
-  const std::string falls = ball("0.05 0.02 0.");
-  for (const Precision precision : {Precision::float64, Precision::float32}) {
-    for (const std::string& text : {held, bent, falls}) {
-      CAPTURE(text);
-      CHECK(creators(text, {.precision = precision}).empty());
-    }
-  }
-  // Whoever moves a ball by hand gives it energy.
-  support::Player player(ball("0.05 0.02 0."), Preset{});
-  std::vector<Event> pushes;
-  for (std::uint32_t frame = 0; frame < 44100; frame += 2000) {
-    pushes.push_back({.frame = frame,
-                      .kind = EventKind::gesture,
-                      .gesture = Gesture::force,
-                      .index = 1,
-                      .value = 1e-5 * frame});
-  }
-  player.run(44100, pushes);
-  CHECK(player.engine().take_creators().empty());
-}
+namespace {}  // namespace
 
 // --- who has lost stability ---------------------------------------------------------------------
 
