@@ -32,10 +32,12 @@ std::string counted(const LawFacts& law, std::size_t count) {
 bool exerts_nothing(const Network& network, const Link& link) {
   const LawFacts& law = facts_of(link.law);
   for (std::size_t i = 0; i < law.count; ++i) {
-    const auto& formula = network.arguments[link.arguments[i]];
-    const bool is_zero =
-        formula.size() == 1 && formula[0].op == Op::number && formula[0].value == 0.0;
-    if (law.is_strength(i) && !is_zero) {
+    const ArgumentId argument = link.arguments[i];
+    if (!law.is_strength(i) || argument == no_argument) {
+      continue;
+    }
+    const Formula& formula = network.arguments[argument];
+    if (formula.size() != 1 || formula[0].op != Op::number || formula[0].value != 0.0) {
       return false;
     }
   }

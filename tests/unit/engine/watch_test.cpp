@@ -203,9 +203,9 @@ TEST_CASE("What has no bound at rest is played", "[watch]") {
   }
 }
 
-// --- who is not accused -------------------------------------------------------------------------
+// --- who does not run away -------------------------------------------------------------------------
 
-TEST_CASE("Nobody in the instruments creates energy or runs away", "[watch]") {
+TEST_CASE("Nobody in the instruments runs away", "[watch]") {
   const std::string folder = std::string(RESSORT_SOURCE) + "/presets/";
   for (const std::string name :
        {"1000massString", "20x30mesh", "BowedString", "IPlayTheTriangle", "LargeTriangleMesh",
@@ -236,7 +236,6 @@ TEST_CASE("Nobody in the instruments creates energy or runs away", "[watch]") {
         engine.process(events, {}, outputs, 441);
       }
       INFO(name);
-      CHECK(engine.take_creators().empty());
       CHECK(engine.meters().resets == 0);
     }
   }
