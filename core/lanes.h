@@ -85,6 +85,19 @@ static inline V exponential(V x) {
   }
 }
 
+// x^y of an x that is not below 0; 0^0 is 1.
+template <class V>
+static inline V power(V x, V y) {
+  if constexpr (sizeof(V) == sizeof(Scalar<V>)) {
+    return std::pow(x, y);
+  } else {
+    for (std::size_t i = 0; i < sizeof(V) / sizeof(Scalar<V>); ++i) {
+      x[i] = std::pow(x[i], y[i]);
+    }
+    return x;
+  }
+}
+
 template <class V>
 static inline V square_root(V x) {
   if constexpr (sizeof(V) == sizeof(Scalar<V>)) {

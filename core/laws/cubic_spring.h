@@ -23,7 +23,6 @@ struct CubicSpring {
                   .arguments = "@A @B K Q Z",
                   .printed = 3}}},
       .contains_spring = true,
-      .exponent = 3,
       .solve_ns = 16.0,
       .faust = "cubic_spring(k, q, z, d, v) = spring(k, z, d, v) + q*r*r*d*d*d;\n",
   };

@@ -96,7 +96,6 @@ struct LawFacts {
   bool contains_spring = false;
   bool is_curved = true;              // in d; else it is made of straight pieces
   bool has_discrete_gradient = true;  // not if its potential is a hill: then it takes substeps
-  int exponent = 1;                   // n of the d^n that it grows with far away
   double solve_ns = 0.0;              // measured: one discrete gradient takes so long...
   double substep_ns = 0.0;            // ...and every substep
   std::string_view faust;             // its definition

@@ -12,6 +12,7 @@
 #include "core/laws/cubic_spring.h"
 #include "core/laws/either_bow.h"
 #include "core/laws/pluck.h"
+#include "core/laws/power_contact.h"
 #include "core/laws/quadratic_spring.h"
 #include "core/laws/smooth_bow.h"
 #include "core/laws/spring.h"
@@ -29,6 +30,7 @@ enum class Law : std::uint8_t {
   either_bow,
   contact,
   clipped_contact,
+  power_contact,
 };
 
 // A law as a type: With<V> is the law of a link whose arguments are Vs; of it
@@ -56,7 +58,8 @@ using Laws = std::tuple<LawType<Law::spring, laws::Spring>,                     
                         LawType<Law::smooth_bow, laws::SmoothBow>,              //
                         LawType<Law::either_bow, laws::EitherBow>,              //
                         LawType<Law::contact, laws::Contact>,                   //
-                        LawType<Law::clipped_contact, laws::ClippedContact>>;
+                        LawType<Law::clipped_contact, laws::ClippedContact>,    //
+                        LawType<Law::power_contact, laws::PowerContact>>;
 inline constexpr std::size_t most_kept_numbers = 6;
 inline constexpr std::size_t law_count = std::tuple_size_v<Laws>;
 

@@ -21,7 +21,6 @@ struct QuadraticSpring {
           {{{.word = "nlSpring2", .least = 3, .most = 3, .arguments = "@A @B K Q Z", .printed = 3},
             {.word = "nlSpring", .least = 3, .most = 3, .arguments = "@A @B K Q Z"}}},
       .contains_spring = true,
-      .exponent = 2,
       .solve_ns = 80.0,  // by Newton
       .faust = "quadratic_spring(k, q, z, d, v) = spring(k, z, d, v) + q*r*r*d*abs(d);\n",
   };

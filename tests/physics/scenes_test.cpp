@@ -42,7 +42,7 @@ struct Push {
   std::size_t until = 0;
 };
 
-struct Scene {
+struct NonlinearScene {
   std::vector<SceneMass> masses;
   std::vector<double> grounds;
   std::vector<SceneLink> links;
@@ -187,9 +187,9 @@ Kind any_kind(Random& random) {
 
 // 1 to 40 masses on linear springs that are stable, and 1 to 200 other links between any of them
 // and two grounds, in parallel too.
-Scene random_scene(std::uint64_t seed) {
+NonlinearScene random_scene(std::uint64_t seed) {
   Random random(seed);
-  Scene scene;
+  NonlinearScene scene;
   const auto masses = static_cast<std::size_t>(of_any_size(random, 1.0, 40.99));
   const bool is_heavy = random.below(3) == 0;
   for (std::size_t i = 0; i < masses; ++i) {
@@ -251,7 +251,7 @@ Scene random_scene(std::uint64_t seed) {
   return scene;
 }
 
-std::string text_of(const Scene& scene) {
+std::string text_of(const NonlinearScene& scene) {
   std::string text = "~motion delayed\n";
   const auto name = [&](std::size_t node) -> std::string {
     return node < scene.masses.size() ? "@m" + std::to_string(node)
@@ -295,7 +295,7 @@ std::string text_of(const Scene& scene) {
 // Positions of all nodes, three samples of them, and what is booked.
 class Judge {
  public:
-  explicit Judge(const Scene& scene) : scene_(scene) {
+  explicit Judge(const NonlinearScene& scene) : scene_(scene) {
     for (auto& x : x_) {
       x.assign(scene.nodes(), 0.0);
     }
@@ -320,6 +320,9 @@ class Judge {
     }
     is_finite = is_finite && std::all_of(positions.begin(), positions.end(),
                                          [](double x) { return std::isfinite(x); });
+    for (const double x : positions) {
+      farthest = std::max(farthest, std::fabs(x));
+    }
     double work = 0.0;
     const auto half_way = [&](std::size_t node) { return .5 * (next[node] - x_[0][node]); };
     const auto put_in = [&](double force, std::size_t node) {
@@ -339,7 +342,11 @@ class Judge {
     }
     for (const SceneLink& link : scene_.links) {
       const double change = half_way(link.a) - half_way(link.b);
-      work -= linear_of(link)[1] * change * change;
+      const auto [k, z] = linear_of(link);
+      work -= z * change * change;
+      // As published, linear links exert nothing in the first sample: as if something held them.
+      work +=
+          n > 0 ? 0.0 : (k * stretch(1, link) + z * (stretch(1, link) - stretch(0, link))) * change;
     }
     std::rotate(x_.begin(), x_.begin() + 1, x_.end());
     balance_ += work;
@@ -351,6 +358,7 @@ class Judge {
   }
 
   double excess = 0.0;  // the most that there was beyond what was put in, of all that went through
+  double farthest = 0.0;
   bool is_finite = true;
 
  private:
@@ -398,7 +406,7 @@ class Judge {
       const auto [k, z] = linear_of(link);
       const bool is_a = link.a == mass;
       const bool is_of_hand = link.a + 1 == scene_.nodes() || link.b + 1 == scene_.nodes();
-      if ((is_a || link.b == mass) && !is_of_hand) {
+      if ((is_a || link.b == mass) && !is_of_hand && n > 0) {
         const double f = k * stretch(1, link) + z * (stretch(1, link) - stretch(0, link));
         force += is_a ? f : -f;
       }
@@ -409,7 +417,7 @@ class Judge {
     return force;
   }
 
-  const Scene& scene_;
+  const NonlinearScene& scene_;
   std::array<std::vector<double>, 3> x_;  // the last sample but one, the last, the next
   double energy_ = 0.0;
   double start_ = 0.0;
@@ -418,14 +426,18 @@ class Judge {
   double noise_ = 0.0;
 };
 
-struct Verdict {
+struct Outcome {
   double excess = 0.0;
   bool is_finite = true;
-  std::uint64_t resets = 0;
+  bool is_lost = false;  // it fell silent, though it was not thrown out of sight
 };
 
-Verdict play(const Scene& scene, Passivity passive, std::size_t frames) {
-  Player player(text_of(scene), Preset{}, {.bare = true, .budget = Budget{.passive = passive}});
+constexpr double far_away = 1e8;  // beyond ten times this no voice is followed
+
+Outcome play(const NonlinearScene& scene, Passivity passive, std::size_t frames) {
+  const std::string text = text_of(scene);
+  Player player(text, default_preset(network_of(text), true),
+                {.bare = true, .budget = Budget{.passive = passive}});
   Judge judge(scene);
   constexpr std::size_t block = 256;
   const std::size_t inputs = scene.pushes.size() + 1;
@@ -435,7 +447,8 @@ Verdict play(const Scene& scene, Passivity passive, std::size_t frames) {
     pointers.push_back(channel.data());
   }
   std::vector<double> positions(scene.masses.size());
-  for (std::size_t at = 0; at < frames && judge.is_finite; at += block) {
+  for (std::size_t at = 0; at < frames && judge.is_finite && judge.farthest < far_away;
+       at += block) {
     for (std::size_t n = 0; n < block; ++n) {
       in[0][n] = scene.has_hand ? scene.hand_at(at + n) : 0.0;
       for (std::size_t i = 0; i < scene.pushes.size(); ++i) {
@@ -452,7 +465,8 @@ Verdict play(const Scene& scene, Passivity passive, std::size_t frames) {
       judge.hear(positions, at + n);
     }
   }
-  return {judge.excess, judge.is_finite, player.engine().meters().resets};
+  return {judge.excess, judge.is_finite,
+          judge.farthest < far_away && player.engine().meters().resets > 0};
 }
 
 }  // namespace
@@ -468,16 +482,15 @@ TEST_CASE("no scene makes energy as it is played", "[scenes]") {
   double worst = 0.0;
   unsigned long long failed = 0;
   for (unsigned long long seed = first; seed < first + count; ++seed) {
-    const Scene scene = random_scene(seed);
-    const Verdict verdict = play(scene, Passivity::always, frames);
-    const bool holds = verdict.is_finite && verdict.resets == 0 && verdict.excess < 1e-9;
-    worst = std::max(worst, verdict.excess);
+    const NonlinearScene scene = random_scene(seed);
+    const Outcome outcome = play(scene, Passivity::always, frames);
+    const bool holds = outcome.is_finite && !outcome.is_lost && outcome.excess < 1e-9;
+    worst = std::max(worst, outcome.excess);
     failed += holds ? 0 : 1;
     if (!holds) {
-      std::printf("seed %llu: %zu masses, %zu links, excess %g, resets %llu%s\n", seed,
-                  scene.masses.size(), scene.links.size(), verdict.excess,
-                  static_cast<unsigned long long>(verdict.resets),
-                  verdict.is_finite ? "" : ", not finite");
+      std::printf("seed %llu: %zu masses, %zu links, excess %g%s%s\n", seed, scene.masses.size(),
+                  scene.links.size(), outcome.excess, outcome.is_lost ? ", lost" : "",
+                  outcome.is_finite ? "" : ", not finite");
     }
   }
   std::printf("%llu scenes from seed %llu, %llu failed, the worst %g\n", count, first, failed,
@@ -488,8 +501,8 @@ TEST_CASE("no scene makes energy as it is played", "[scenes]") {
 TEST_CASE("as published, many of the same scenes do", "[scenes]") {
   int failed = 0;
   for (std::uint64_t seed = 1; seed <= 60; ++seed) {
-    const Verdict verdict = play(random_scene(seed), Passivity::never, 1024);
-    failed += verdict.is_finite && verdict.resets == 0 && verdict.excess < 1e-9 ? 0 : 1;
+    const Outcome outcome = play(random_scene(seed), Passivity::never, 1024);
+    failed += outcome.is_finite && !outcome.is_lost && outcome.excess < 1e-9 ? 0 : 1;
   }
   CAPTURE(failed);
   CHECK(failed > 40);

@@ -249,6 +249,22 @@ class ClippedContact : public Interaction {
   Number threshold_;
 };
 
+class PowerContact : public Interaction {
+ public:
+  PowerContact(Point& a, Point& b, Number k, Number p, Number z, Number threshold)
+      : Interaction(a, b), k_(k), p_(p), z_(z), threshold_(threshold) {}
+
+ private:
+  Real force(Real delta, Real nu) const override {
+    const Real depth = delta + *threshold_;
+    return depth > 0 ? (*k_ + *z_ * nu) * std::pow(depth, *p_) : 0;
+  }
+  Number k_;
+  Number p_;
+  Number z_;
+  Number threshold_;
+};
+
 class Pluck : public Interaction {
  public:
   Pluck(Point& a, Point& b, Number k, Number s, Number z)
@@ -382,6 +398,9 @@ class Simulator {
   void add_clipped_contact(Point& a, Point& b, Number s, Number c, Number k, Number z,
                            Number threshold) {
     add<ClippedContact>(a, b, s, c, k, z, threshold);
+  }
+  void add_power_contact(Point& a, Point& b, Number k, Number p, Number z, Number threshold) {
+    add<PowerContact>(a, b, k, p, z, threshold);
   }
 
   // A force of -g / divisor at every tick.

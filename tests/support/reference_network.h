@@ -187,6 +187,8 @@ class Builder {
         return simulator_.add_contact(a, b, n[0], n[1], n[2]);
       case Law::clipped_contact:
         return simulator_.add_clipped_contact(a, b, n[0], n[1], n[2], n[3], n[4]);
+      case Law::power_contact:
+        return simulator_.add_power_contact(a, b, n[0], n[1], n[2], n[3]);
     }
   }
 

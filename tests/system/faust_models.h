@@ -44,6 +44,7 @@ inline const std::vector<std::pair<std::string, std::string>>& faust_models() {
       {"plain_contact", law("contact @m @in2 0.1 0.01")},
       {"clipped_contact", law("nlContact @m @in2 0.02 5. 0.1 0.01 0.05")},
       {"clipped_contact_flat", law("nlContact @m @in2 0.02 0. 0.1 0.01")},
+      {"power_contact", law("powerContact @m @in2 0.1 1.5 0.05 0.05")},
       {"clipped_contact_stiff", law("nlContact @m @in2 0.2 0.5 0.1 0.01")},
       // Gravity and what moves at the start, in both dialects.
       {"older_start",

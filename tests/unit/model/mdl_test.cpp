@@ -81,6 +81,7 @@ TEST_CASE("every keyword takes its numbers of arguments and no other", "[mdl]") 
       {"@l nlSpring3 @a @b", "nlSpring3", {3}, 2},
       {"@l nlSpringDamper @a @b", "nlSpringDamper", {4}, 2},
       {"@l nlContact @a @b", "nlContact", {4, 5}, 2},
+      {"@l powerContact @a @b", "powerContact", {2, 3, 4}, 2},
       {"@l nlPluck @a @b", "nlPluck", {2, 3}, 2},
       {"@l nlBow @a @b", "nlBow", {2, 3}, 2},
       {"@l contact @a @b", "contact", {2, 3}, 2},

@@ -532,6 +532,7 @@ TEST_CASE("the laws are the current ones", "[rules]") {
   CHECK(force("nlSpringDamper @in1 @g 1 1 5 0.5", 2.5, 0.25) == Approx(12.5 + 2.0 * 0.25));
   CHECK(force("nlContact @in1 @g 1 1 5 0.5", 2.5, 0.25) == Approx(12.5 + 0.125));
   CHECK(force("nlContact @in1 @g 1 1 5 0.5 2", -1.0, 0.25) == Approx(1.0 + 1.0 + 0.125));
+  CHECK(force("powerContact @in1 @g 2 1.5 0.5 1", -0.75, 0.25) == Approx(2.125 * 0.125));
   // It may pull on the way out, as written.
   CHECK(force("contact @in1 @g 0.5 1", 0.5, -0.5) == Approx(0.25 - 0.5));
   CHECK(force("contact @in1 @g 0.5 1 1", -1.0, -0.5) == 0.0);

@@ -1,0 +1,93 @@
+// core/laws: a felt, a rubber or a ball (Hunt and Crossley, J. Appl. Mech. 42, 1975): harder the
+// deeper, and with a damper that sets in with the depth, so that it neither knocks as it touches
+// nor sticks. With D = d + t and an exponent P of 1 or more (below, 1):
+//   d > -t: f = (K + Z v) D^P, else 0
+// Steel and wood have P = 1.5, by Hertz; a piano's hammers 2.3 to 3.5.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/laws/discrete_gradient.h"
+
+namespace ressort::laws {
+inline namespace RESSORT_ISA {
+
+// K/(P + 1) D^(P + 1).
+template <class V>
+struct PowerWall {
+  V energy(V d) const { return k / (p + 1) * power(depth(d), p + 1); }
+  V force(V d) const { return k * power(depth(d), p); }
+  V slope(V d) const { return select(d > V{}, k * p * power(depth(d), p - 1), V{}); }
+  static V depth(V d) { return select(d > V{}, d, V{}); }
+  V k;
+  V p;
+};
+
+template <class V>
+struct PowerContact {
+  static constexpr LawFacts facts = {
+      .name = "power_contact",
+      .family = Family::contact,
+      .one = "contact by a power",
+      .many = "contacts by a power",
+      .count = 4,
+      .arguments = {{{Role::stiffness, Unit::stiffness},
+                     {.role = Role::shape, .unit = Unit::plain, .least = 1.0, .most = 5.0},
+                     {Role::damping, Unit::damping},
+                     {Role::reach, Unit::plain}}},
+      .words = {{{.word = "powerContact",
+                  .least = 2,
+                  .most = 4,
+                  .arguments = "@A @B K P [Z [THRESHOLD]]",
+                  .printed = 4}}},
+      .zone = Zone::below,
+      .is_odd = false,
+      .solve_ns = 250.0,  // by Newton, with powers lane by lane
+      .faust =
+          "power_contact(k, p, z, t, d, v) =\n"
+          "  (k*r*r + z*r*v)*select2(d > 0.0 - t, 0.0, pow(max(d + t, 1e-300), max(p, 1.0)));\n",
+  };
+
+  V force(V d, V v) const {
+    return select(d > -t, (k + z * v) * power(wall().depth(d + t), exponent()), V{});
+  }
+  V potential(V d) const { return wall().energy(d + t); }
+  V secant(V d) const { return k * power(wall().depth(d + t), exponent() - 1); }
+
+  // The potential's discrete gradient, and the damper of now.
+  Push<V> passive(const LinkState<V>& link, int) const {
+    if (!may_touch(link, t)) {
+      return {V{}, V{}};
+    }
+    const V grip = power(wall().depth(link.now + t), exponent());
+    return at_once(damped_force(wall(), link.before() + t, link.free + t, link.gamma, z * grip));
+  }
+
+  // It grows without bound, as a curved spring.
+  static Slopes steepest(const PowerContact& least, const PowerContact& most, double within) {
+    const double depth = std::max(0.0, within + most.t);
+    // P D^(P - 1) has its summit over P at -1/ln D where D is below 1, and rises beyond.
+    const double low = std::max(1.0, least.p);
+    const double high = std::max(1.0, most.p);
+    const double p = depth < 1.0 ? std::clamp(-1.0 / std::log(depth), low, high) : high;
+    const double steep = p * std::pow(depth, p - 1.0);
+    const double damping = most.z * std::max(std::pow(depth, low), std::pow(depth, high));
+    return {.stiffness = most.k * steep, .damping = damping, .pull = most.k * steep};
+  }
+  static Slopes gentlest(const PowerContact& least) {
+    return {.damping = std::min(0.0, least.z), .pull = std::min(0.0, least.k)};
+  }
+
+  V k;
+  V p;
+  V z;
+  V t;
+
+ private:
+  V exponent() const { return select(p > V{} + 1, p, V{} + 1); }
+  PowerWall<V> wall() const { return {k, exponent()}; }
+};
+
+}  // namespace RESSORT_ISA
+}  // namespace ressort::laws

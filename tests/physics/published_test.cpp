@@ -1,0 +1,153 @@
+// What papers say of sounding networks, each case with its equation or figure.
+#include <numbers>
+
+#include "tests/support/passive.h"
+
+namespace ressort {
+namespace {
+
+using namespace support;
+constexpr double pi = std::numbers::pi;
+
+// A ball that flies at a wall: mass 1, at -1 with the speed `v`; f = (K + Z v) D^P behind 0.
+struct Impact {
+  double out = 0.0;      // its speed when it is away again
+  double depth = 0.0;    // how deep it was
+  double samples = 0.0;  // how long it touched
+  double gain = 0.0;     // the most energy that it ever had, against that of before
+};
+
+Impact fly(double v, double k, double p, double z, Passivity passive = Passivity::always) {
+  Stepper<double> ball("@g ground 0.\n@m mass 1. -1. -1.\n@c powerContact @m @g " + show(k) + " " +
+                           show(p) + " " + show(z) + "\n",
+                       passive);
+  ball.set_state(-20.3 * v, v);
+  Impact impact;
+  double last = -1.0;
+  for (int n = 0; n < 400'000; ++n) {
+    last = ball.x[0];
+    ball.go();
+    const double x = ball.x[0];
+    const double wall = [&](double d) {
+      return d > 0.0 ? k / (p + 1.0) * std::pow(d, p + 1.0) : 0.0;
+    }(x);
+    const double before = last > 0.0 ? k / (p + 1.0) * std::pow(last, p + 1.0) : 0.0;
+    const double energy = .5 * ball.v[0] * ball.v[0] + .5 * (wall + before);
+    impact.gain = std::max(impact.gain, energy / (.5 * v * v));
+    impact.depth = std::max(impact.depth, x);
+    // The time inside, the samples of the crossings by their share.
+    impact.samples += x > 0.0 && last > 0.0 ? 1.0
+                      : x > 0.0             ? x / (x - last)
+                      : last > 0.0          ? last / (last - x)
+                                            : 0.0;
+    if (x < 0.0 && last < 0.0 && ball.v[0] < 0.0) {
+      break;
+    }
+  }
+  impact.out = -ball.v[0];
+  return impact;
+}
+
+}  // namespace
+
+TEST_CASE("a ball is on a wall as long as its power law says", "[published]") {
+  // 1/2 v^2 = K/(P+1) D^(P+1), and 2 D/v times the integral of du/sqrt(1 - u^(P+1)) from 0 to 1: a
+  // half period for P = 1; 2.94328 D/v for P = 1.5 (Hertz 1882). Without losses it leaves as fast as
+  // it came, whatever the stiffness (Chatziioannou and van Walstijn 2015).
+  for (const double p : {1.0, 1.5, 2.3}) {
+    const double v = 1e-3;
+    const double n = p + 1.0;
+    const double wanted = 300.0;  // samples
+    const double integral = std::sqrt(pi) * std::tgamma(1.0 + 1.0 / n) / std::tgamma(.5 + 1.0 / n);
+    const double depth = wanted * v / (2.0 * integral);
+    const double k = .5 * v * v * n / std::pow(depth, n);
+    const Impact impact = fly(v, k, p, 0.0);
+    CAPTURE(p);
+    CHECK(2.0 * integral == Approx(p == 1.0   ? pi
+                                   : p == 1.5 ? 2.9432
+                                              : 2.0 * integral)
+                                .epsilon(2e-6));
+    CHECK(impact.depth == Approx(depth).epsilon(1e-4));
+    CHECK(impact.samples == Approx(wanted).epsilon(1e-3));
+    CHECK(impact.out == Approx(v).epsilon(1e-12));
+  }
+}
+
+TEST_CASE("no power law gains anything at any stiffness", "[published]") {
+  // Bilbao, Torin and Chatziioannou 2015: the energy stays to rounding, from soft to rigid.
+  for (const double p : {1.0, 1.3, 1.5, 2.3, 3.5}) {
+    for (double k = 1e-3; k < 1e9; k *= 10.0) {
+      for (const double v : {1e-5, 1e-2, 0.3}) {
+        const Impact impact = fly(v, k, p, 0.0);
+        CAPTURE(p, k, v);
+        CHECK(impact.gain < 1.0 + 1e-11);
+        CHECK(impact.out == Approx(v).epsilon(1e-9));
+      }
+    }
+  }
+  // The plain scheme does, so that this test can fail.
+  CHECK(fly(0.3, 1e4, 1.5, 0.0, Passivity::never).gain > 2.0);
+}
+
+TEST_CASE("a damped contact gives back what Hunt and Crossley find", "[published]") {
+  // With L = Z/K the speeds in and out obey the same integral of v dv/(K +- Z v), whatever P
+  // (Hunt and Crossley 1975): v/L - ln(1 + L v)/L^2 in, -w/L - ln(1 - L w)/L^2 out.
+  for (const double p : {1.0, 1.5, 2.3}) {
+    for (const double damped : {.05, .3, 1.0, 4.0}) {  // L v
+      const double v = 1e-3;
+      const double depth = .1;
+      const double k = .5 * v * v * (p + 1.0) / std::pow(depth, p + 1.0);
+      const double in = damped - std::log1p(damped);
+      double low = 0.0;
+      double high = std::min(damped, 1.0 - 1e-12);
+      for (int i = 0; i < 200; ++i) {
+        const double w = .5 * (low + high);
+        (-w - std::log1p(-w) < in ? low : high) = w;
+      }
+      const Impact impact = fly(v, k, p, damped * k / v);
+      CAPTURE(p, damped);
+      CHECK(impact.out / v == Approx(low / damped).epsilon(2e-3));
+      CHECK(impact.gain <= 1.0 + 1e-12);
+    }
+  }
+}
+
+TEST_CASE("a string that swings against a point in its middle sounds a fourth higher",
+          "[published]") {
+  // Half of the period it swings as a whole, which takes 1/2 T; then as two halves, each for a
+  // period of its own of 1/2 T / 2: 3/4 T in all (Cabannes 1984; Issanchou et al. 2017). On equal
+  // masses with K = M waves travel undispersed: T = 2 (N + 1) samples.
+  constexpr int masses = 199;
+  constexpr int period = 2 * (masses + 1);
+  std::string text = "@g ground 0.\n@w ground 0.\n";
+  for (int i = 1; i <= masses; ++i) {
+    const double shape = .1 * std::sin(pi * i / (masses + 1.0));
+    text += "@m" + std::to_string(i) + " mass 1. " + show(shape) + " " + show(shape) + "\n@s" +
+            std::to_string(i) + " spring @m" + std::to_string(i) + " " +
+            (i == 1 ? "@g" : "@m" + std::to_string(i - 1)) + " 1.\n";
+  }
+  text += "@e spring @m199 @g 1.\n@c contact @m100 @w 1000. 0.\n";
+  // The lower body is the string: it may not rise... so it starts above and the wall is below it.
+  text.replace(text.find("contact @m100 @w"), 16, "contact @w @m100");
+  Stepper<double> string(text, Passivity::always);
+  std::vector<double> heard;
+  for (int n = 0; n < 12 * period; ++n) {
+    string.go();
+    heard.push_back(string.x[49]);
+  }
+  // The lag at which it is most like itself.
+  const auto likeness = [&](int lag) {
+    double sum = 0.0;
+    for (int n = 0; n < 6 * period; ++n) {
+      sum += heard[static_cast<std::size_t>(n)] * heard[static_cast<std::size_t>(n + lag)];
+    }
+    return sum;
+  };
+  int best = period / 4;
+  for (int lag = period / 4; lag < 5 * period / 4; ++lag) {
+    best = likeness(lag) > likeness(best) ? lag : best;
+  }
+  CHECK(best == Approx(.75 * period).margin(2.0));
+}
+
+}  // namespace ressort
