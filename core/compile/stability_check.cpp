@@ -48,8 +48,7 @@ class StabilityChecker {
     // Knobs first: sound gets what they leave.
     widen([&](std::size_t i) { return place_[i].has_value() && !is_audio(i); });
     widen([&](std::size_t i) { return !place_[i] && !is_audio(i); });
-    make_room_for_audio();
-    widen([&](std::size_t i) { return is_audio(i); });
+    widen_sound();
     for (std::size_t i = 0; i < start_.size(); ++i) {
       settle(i);
     }
@@ -164,25 +163,45 @@ class StabilityChecker {
     box_ = std::move(shared);
   }
 
-  // Knobs that reach the limit leave nothing to sound, so they stay a little below it. And sound
-  // may make no stiffness, damping or mass negative that is not so at the start.
-  void make_room_for_audio() {
+  // Sound gets what knobs leave; where they went to the limit that is next to nothing, and they
+  // step back a little. It may make no stiffness, damping or mass negative that is not so at the
+  // start.
+  void widen_sound() {
     constexpr double knobs_share = 0.9;
-    std::vector<std::size_t> audio;
-    bool is_full = false;
+    constexpr double much_more = 10.0;
+    ParameterBox back = box_;
+    bool has_sound = false;
     for (std::size_t i = 0; i < start_.size(); ++i) {
-      if (is_audio(i)) {
-        audio.push_back(i);
-      } else {
-        is_full |= box_.lowest[i] > asked_.lowest[i] || box_.highest[i] < asked_.highest[i];
+      has_sound |= is_audio(i);
+      if (box_.lowest[i] > asked_.lowest[i]) {
+        back.lowest[i] = towards(start_[i], std::lerp(start_[i], box_.lowest[i], knobs_share));
+      }
+      if (box_.highest[i] < asked_.highest[i]) {
+        back.highest[i] = towards(start_[i], std::lerp(start_[i], box_.highest[i], knobs_share));
       }
     }
-    for (std::size_t i = 0; is_full && !audio.empty() && i < start_.size(); ++i) {
-      box_.lowest[i] = towards(start_[i], std::lerp(start_[i], box_.lowest[i], knobs_share));
-      box_.highest[i] = towards(start_[i], std::lerp(start_[i], box_.highest[i], knobs_share));
+    if (!has_sound) {
+      return;
     }
-    for (const std::size_t i : audio) {
-      each_strength([&](ArgumentId argument) { keep_positive(argument, i); });
+    const auto is_sound = [&](std::size_t i) { return is_audio(i); };
+    for (std::size_t i = 0; i < start_.size(); ++i) {
+      if (is_audio(i)) {
+        each_strength([&](ArgumentId argument) { keep_positive(argument, i); });
+      }
+    }
+    widen(is_sound);
+    const ParameterBox beside = std::exchange(box_, std::move(back));
+    widen(is_sound);
+    const auto gains = [&](std::size_t i) {
+      return is_audio(i) &&
+             box_.highest[i] - box_.lowest[i] > much_more * (beside.highest[i] - beside.lowest[i]);
+    };
+    bool is_better = false;
+    for (std::size_t i = 0; i < start_.size(); ++i) {
+      is_better |= gains(i);
+    }
+    if (!is_better) {
+      box_ = beside;
     }
   }
 

@@ -298,6 +298,80 @@ TEST_CASE("a parameter that is sound keeps to what is stable, sample by sample",
   }
 }
 
+namespace {
+
+// A few masses on springs whose numbers are knobs, and one of which is sound.
+std::string sounding_network(Random& random) {
+  const auto number = [&](double least, double most) { return show(random.uniform(least, most)); };
+  std::string text = "@pK param " + number(.01, .2) + "\n@pZ param " + number(1e-4, .01) +
+                     "\n@pM param " + number(.8, 3.) + "\n@qa audioParam @in1\n@g ground 0.\n";
+  const std::size_t masses = 2 + random.below(7);
+  for (std::size_t i = 0; i < masses; ++i) {
+    const std::string here = "@q" + std::to_string(i);
+    const std::string there = i == 0 ? "@g" : "@q" + std::to_string(random.below(i));
+    const std::string m = random.below(2) == 0 ? "pM" : number(.8, 4.);
+    const std::string k = random.below(2) == 0 ? "[pK*0.5+0.01]" : number(.01, .1);
+    text += here +
+            (random.below(3) == 0 ? " osc " + m + " " + number(1e-3, .05) + " 0.004 0. 0."
+                                  : " mass " + m + " 0. 0.") +
+            "\n@l" + std::to_string(i) + " springDamper " + there + " " + here + " " +
+            (i == 0 ? "[qa*" + number(.02, .2) + "+" + number(.01, .05) + "]" : k) + " pZ\n";
+  }
+  return text + "@out1 posOutput @q0\n";
+}
+
+}  // namespace
+
+TEST_CASE("sound that turns a parameter takes no knob's range, and makes no stiffness negative",
+          "[stability_check]") {
+  int crowded = 0;
+  for (std::uint64_t seed = 1; seed <= 200; ++seed) {
+    Random random(seed);
+    const std::string text = sounding_network(random);
+    const Network network = network_of(text);
+    auto made = compile(network, {}, {});
+    REQUIRE(made);
+    INFO("seed " << seed << "\n" << text);
+    const std::vector<double> start = parameter_values(network);
+    // The same with a knob that stays in place of the sound.
+    std::string silent = text;
+    silent.replace(silent.find("audioParam @in1"), 15, "param 0.");
+    auto alone = compile(network_of(silent), {}, {});
+    REQUIRE(alone);
+    // Where knobs to four times their values and masses to a quarter were unstable together, they
+    // leave each other room, and a tenth of that to sound.
+    bool is_crowded = false;
+    for (std::size_t i = 0; i < 3; ++i) {
+      const ParameterInfo& info = made->instrument.parameters[i];
+      const ParameterInfo& wanted = alone->instrument.parameters[i];
+      is_crowded |= wanted.is_raised || wanted.is_lowered;
+      CAPTURE(info.name);
+      CHECK(info.minimum - start[i] <= .9 * (wanted.minimum - start[i]) + 1e-12);
+      CHECK(info.maximum - start[i] >= .9 * (wanted.maximum - start[i]) - 1e-12);
+    }
+    for (std::size_t i = 0; i < 3 && !is_crowded; ++i) {
+      CHECK(made->instrument.parameters[i].minimum <= .25 * start[i]);
+      CHECK(made->instrument.parameters[i].maximum >= 4.0 * start[i]);
+    }
+    crowded += is_crowded ? 1 : 0;
+    // What it may do to the stiffness that it turns.
+    const ParameterInfo& sound = made->instrument.parameters[3];
+    const Link& turned = network.links[0];
+    for (const double value : {sound.minimum, sound.maximum}) {
+      std::vector<double> values = start;
+      values[3] = value;
+      const double k = evaluate(network.arguments[turned.arguments[0]], values);
+      CAPTURE(value);
+      CHECK(k >= -1e-12);
+      CHECK(std::isfinite(k));
+      CHECK(Stability(network, 1.0).prove({values, values}) == Verdict::stable);
+    }
+    CHECK(sound.maximum > 1.0);
+    CHECK(sound.minimum < 0.0);
+  }
+  CHECK(crowded < 20);
+}
+
 TEST_CASE("the bare network goes where it is told, and no further than is stable",
           "[stability_check]") {
   const Network network = network_of(oscillator);
