@@ -5,7 +5,7 @@ set(RESSORT_TURN 0 CACHE STRING "Which of the deep tests comes first")
 set(ressort_fuzzers model preset score midi console osc osc_packet)
 list(TRANSFORM ressort_fuzzers PREPEND fuzz_ OUTPUT_VARIABLE ressort_deep_tests)
 list(APPEND ressort_deep_tests arm everything_sanitized everything_more forms_everywhere lint
-  abuse_long)
+  scenes_more abuse_long)
 list(LENGTH ressort_deep_tests ressort_deep_count)
 
 # SECONDS is about what it needs on two cores.
@@ -32,6 +32,10 @@ add_deep_test(arm 60 ${CMAKE_CURRENT_SOURCE_DIR}/arm.sh ${CMAKE_SOURCE_DIR})
 
 # All random networks in all forms on all instruction sets.
 add_deep_test(forms_everywhere 240 $<TARGET_FILE:ressort_tests> "[forms_everywhere]")
+
+# Two thousand random nonlinear scenes; a person may ask for others: FIRST,COUNT,FRAMES.
+add_deep_test(scenes_more 200 ${CMAKE_COMMAND} -E env RESSORT_SCENES=1001,2000,1024
+  $<TARGET_FILE:ressort_tests> "[scenes]")
 
 # A minute of it for each instrument.
 add_deep_test(abuse_long 300 $<TARGET_FILE:ressort_abuse> 60 2)
