@@ -75,7 +75,8 @@ struct Engine::Player {
         if (voices.press_key(event.index, event.channel, parameters.highest_factor())) {
           gestures.place(voices.last());
         }
-        return gestures.perform(Source::note, event.index, event.value);
+        return gestures.perform(Source::note, event.index,
+                                event.value * voices.softness(event.channel));
       case EventKind::note_off:
         return release(
             [&](Voice& voice) { return voices.lift_key(voice, event.index, event.channel); });
@@ -85,7 +86,7 @@ struct Engine::Player {
       case EventKind::key_pressure:
         return gestures.perform(Source::pressure, 0, event.value);
       case EventKind::bend:
-        return voices.bend(event.value);
+        return voices.bend(event.channel & 15, event.value);
       case EventKind::custom:
         if (event.index < playing.controls.size()) {
           gestures.perform(playing.controls[event.index], event.value);
@@ -100,22 +101,25 @@ struct Engine::Player {
     }
   }
 
-  // Three controllers mean the same everywhere; all of them may be in the preset.
+  // What means the same everywhere; all of it may be in the preset too.
   void turn_controller(const Event& event) {
-    constexpr int sustain_pedal = 64;
     constexpr int all_sound_off = 120;
-    constexpr int all_notes_off = 123;
+    constexpr int reset_all_controllers = 121;
+    constexpr int all_notes_off = 123;  // and the modes from there on, which imply it
     const std::uint8_t channel = event.channel & 15;
-    if (event.index == sustain_pedal) {
-      const bool is_down = event.value >= 0.5;
-      voices.set_pedal(channel, is_down);
-      release([&](const Voice& voice) {
-        return !is_down && voice.sustained && voice.channel == channel;
-      });
-    } else if (event.index == all_sound_off) {
-      voices.panic();
-    } else if (event.index == all_notes_off) {
-      release([&](const Voice& voice) { return voice.held && voice.channel == channel; });
+    const auto let_go = [&] {
+      release([&](Voice& voice) { return voices.is_let_go(voice, channel); });
+    };
+    if (event.index == all_sound_off) {
+      voices.silence(channel);
+    } else if (event.index == reset_all_controllers) {
+      voices.reset_controllers(channel);
+      let_go();
+    } else if (event.index >= all_notes_off) {
+      release([&](Voice& voice) { return voices.lift_key(voice, voice.key, channel); });
+    } else if (const auto change = voices.turn(channel, event.index, event.value);
+               change == Channels::Change::sustain || change == Channels::Change::sostenuto) {
+      let_go();
     }
     gestures.perform(Source::controller, event.index, event.value);
   }
@@ -162,7 +166,7 @@ struct Engine::Player {
         mixing.add(b, group, segment, voices, watch);
       }
     });
-    voices.advance_fades(segment.frames);
+    voices.advance_gains(segment.frames);
     since_update += segment.frames;
     if (since_update == max_block_frames) {
       since_update = 0;

@@ -11,7 +11,7 @@ namespace {
 constexpr double steal_fade_s = 0.005;  // a voice that gives way takes this long to vanish
 constexpr double level_memory_s = 0.1;  // how long a voice's level remembers a peak
 constexpr double quiet_s = 0.5;         // longer than half a period of the slowest sound
-constexpr double bend_semitones = 2.0;
+constexpr double level_s = 0.02;        // in which a voice follows its channel's level
 
 std::size_t most_voices(const Playing& playing) {
   return static_cast<std::size_t>(std::max(1, playing.voices));
@@ -29,8 +29,7 @@ void Voices::go_on_from(const Voices& from) {
   voices_ = from.voices_;
   awake_ = from.awake_;
   last_ = from.last_;
-  pedal_is_down_ = from.pedal_is_down_;
-  bend_ = from.bend_;
+  channels_ = from.channels_;
   limit_ = from.limit_;
   resets_ = from.resets_;
   stolen_ = from.stolen_;
@@ -72,7 +71,11 @@ bool Voices::press_key(int key, std::uint8_t channel, double highest_factor) {
   voice.key = static_cast<std::uint8_t>(key);
   voice.channel = channel;
   voice.held = true;
-  voice.sustained = false;
+  voice.sustained = voice.latched = false;
+  if (starts) {
+    voice.volume = channels_.level(channel);
+    voice.volume_frames = 0;
+  }
   voice.quiet_frames = 0;
   return starts;
 }
@@ -82,12 +85,77 @@ bool Voices::lift_key(Voice& voice, int key, std::uint8_t channel) const {
     return false;
   }
   voice.held = false;
-  voice.sustained = pedal_is_down_[channel & 15];
+  voice.sustained = voice.latched || channels_.sustains(channel);
   return !voice.sustained;
 }
 
+// --- channels -----------------------------------------------------------------------------------
+
+Channels::Change Voices::turn(std::uint8_t channel, int number, double value) {
+  const bool held = channels_.holds(channel);
+  const Channels::Change change = channels_.turn(channel, number, value);
+  switch (change) {
+    case Channels::Change::pitch:
+      retune(channel);
+      break;
+    case Channels::Change::level:
+      follow_level(channel);
+      break;
+    case Channels::Change::sostenuto:
+      for (Voice& voice : voices_) {
+        if (voice.channel == channel && channels_.holds(channel) != held) {
+          voice.latched = !held && voice.held;
+        }
+      }
+      break;
+    case Channels::Change::sustain:
+    case Channels::Change::nothing:
+      break;
+  }
+  return change;
+}
+
+void Voices::bend(std::uint8_t channel, double amount) {
+  channels_.bend(channel, std::clamp(amount, -1.0, 1.0));
+  retune(channel);
+}
+
+void Voices::reset_controllers(std::uint8_t channel) {
+  channels_.reset(channel);
+  for (Voice& voice : voices_) {
+    voice.latched &= voice.channel != channel;
+  }
+  retune(channel);
+  follow_level(channel);
+}
+
+bool Voices::is_let_go(Voice& voice, std::uint8_t channel) const {
+  return voice.sustained && voice.channel == channel && !voice.latched &&
+         !channels_.sustains(channel);
+}
+
+void Voices::retune(std::uint8_t channel) {
+  for (Voice& voice : voices_) {
+    const bool is_bent = voice.awake && voice.channel == channel;
+    voice.is_retuned |= is_bent;
+    has_changed_ |= is_bent;
+  }
+}
+
+void Voices::follow_level(std::uint8_t channel) {
+  const auto frames = static_cast<std::size_t>(std::max(1.0, level_s * rate_hz_));
+  for (Voice& voice : voices_) {
+    if (voice.awake && voice.channel == channel) {
+      voice.volume_step = (channels_.level(channel) - voice.volume) / static_cast<double>(frames);
+      voice.volume_frames = frames;
+    }
+  }
+}
+
+// --- how it ends --------------------------------------------------------------------------------
+
 void Voices::release(Voice& voice) const {
-  voice.held = voice.sustained = false;
+  voice.held = voice.sustained = voice.latched = false;
   if (playing_.release_s > 0.0) {
     fade(voice, playing_.release_s);
   }
@@ -97,7 +165,7 @@ void Voices::fade(Voice& voice, double seconds) const {
   const double step = -1.0 / std::max(1.0, seconds * rate_hz_);
   voice.gain_step = std::min(voice.gain_step, step);
   voice.fading = true;
-  voice.held = voice.sustained = false;
+  voice.held = voice.sustained = voice.latched = false;
 }
 
 void Voices::panic() {
@@ -106,7 +174,15 @@ void Voices::panic() {
       fade(voice, steal_fade_s);
     }
   }
-  pedal_is_down_.fill(false);
+  channels_.lift_pedals();
+}
+
+void Voices::silence(std::uint8_t channel) {
+  for (Voice& voice : voices_) {
+    if (voice.awake && voice.channel == channel) {
+      fade(voice, steal_fade_s);
+    }
+  }
 }
 
 void Voices::lose(Voice& voice) {
@@ -114,8 +190,11 @@ void Voices::lose(Voice& voice) {
   voice.lost = true;
 }
 
-void Voices::advance_fades(std::size_t frames) {
+void Voices::advance_gains(std::size_t frames) {
   for (Voice& voice : voices_) {
+    const std::size_t follows = std::min(frames, voice.volume_frames);
+    voice.volume += voice.volume_step * static_cast<double>(follows);
+    voice.volume_frames -= follows;
     for (std::size_t n = 0; n < frames && voice.gain_step != 0.0; ++n) {
       voice.gain = voice.next_gain(voice.gain);
     }
@@ -126,7 +205,7 @@ void Voices::advance_fades(std::size_t frames) {
 }
 
 bool Voices::update(Voice& voice) {
-  const double peak = voice.peak * playing_.gain * voice.gain;
+  const double peak = voice.peak * playing_.gain * voice.gain * voice.volume;
   voice.peak = 0.0;
   voice.level = std::max(peak, voice.level * level_kept_);
   if (voice.fading && voice.gain == 0.0) {
@@ -254,7 +333,7 @@ double Voices::playable_hz(int key, double highest_factor) const {
 }
 
 double Voices::factor_for(const Voice& voice, double highest_factor) const {
-  const double bent = std::exp2(bend_ * bend_semitones / 12.0);
+  const double bent = std::exp2(channels_.semitones(voice.channel) / 12.0);
   const double factor =
       voice.frequency_hz > 0.0 ? factor_at(voice.frequency_hz * bent) : bent * bent;
   return std::min(factor, highest_factor);
@@ -263,14 +342,6 @@ double Voices::factor_for(const Voice& voice, double highest_factor) const {
 double Voices::factor_of(std::size_t lane, double highest_factor) const {
   const Voice& voice = voices_[lane];
   return voice.is_new || voice.is_retuned ? factor_for(voice, highest_factor) : voice.factor;
-}
-
-void Voices::bend(double amount) {
-  bend_ = std::clamp(amount, -1.0, 1.0);
-  for (Voice& voice : voices_) {
-    voice.is_retuned |= voice.awake;
-    has_changed_ |= voice.awake;
-  }
 }
 
 void Voices::retune(bool all, double highest_factor) {

@@ -3,12 +3,12 @@
 #pragma once
 
 #include <algorithm>
-#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <limits>
 #include <vector>
 
+#include "core/engine/channels.h"
 #include "core/engine/engine.h"
 
 namespace ressort {
@@ -29,7 +29,8 @@ struct Voice {
   bool lost = false;        // its stability: it fades from where it was
   bool fading = false;      // gives way; its lane is free when the fade ends
   bool held = false;        // by a key
-  bool sustained = false;   // by the pedal, its key being up
+  bool sustained = false;   // by a pedal, its key being up
+  bool latched = false;     // by the sostenuto pedal, which went down while the key was
   bool is_new = false;      // its kernels are to be put to the start,
   bool is_retuned = false;  // or to its factor, before they step
   std::uint8_t key = 0;
@@ -39,6 +40,10 @@ struct Voice {
   double gain = 1.0;
   double gain_step = 0.0;  // per sample
   double next_gain(double now) const { return std::max(0.0, now + gain_step); }
+  double volume = 1.0;  // of its channel, which it follows in equal steps
+  double volume_step = 0.0;
+  std::size_t volume_frames = 0;  // until it is there
+  bool is_steady() const { return gain_step == 0.0 && volume_frames == 0; }
   double peak = 0.0;   // of the network's output since the last update
   double level = 0.0;  // peak of the output, slowly forgotten
   std::size_t quiet_frames = 0;
@@ -67,13 +72,19 @@ class Voices {
   bool press_key(int key, std::uint8_t channel, double highest_factor);
   // A key goes up: whether that releases this voice.
   bool lift_key(Voice& voice, int key, std::uint8_t channel) const;
-  void set_pedal(std::uint8_t channel, bool is_down) { pedal_is_down_[channel] = is_down; }
+  // What a controller says to its channel, or what its bend is; `sustain` and `sostenuto` may let
+  // voices go, which is the caller's.
+  Channels::Change turn(std::uint8_t channel, int number, double value);
+  void bend(std::uint8_t channel, double amount);
+  void reset_controllers(std::uint8_t channel);
+  // Whether a pedal that went up lets this voice go.
+  bool is_let_go(Voice& voice, std::uint8_t channel) const;
+  double softness(std::uint8_t channel) const { return channels_.softness(channel); }
   void release(Voice& voice) const;
   void limit(std::size_t most);
   void panic();
+  void silence(std::uint8_t channel);
 
-  // To -1..1 of the bend range.
-  void bend(double amount);
   // The voice's factor on every stiffness, even if its kernels have yet to know.
   double factor_of(std::size_t lane, double highest_factor) const;
   // Whether kernels have to be told of a voice that is new or retuned. Those are tuned by
@@ -84,8 +95,8 @@ class Voices {
 
   // The output has left its bounds: the voice fades as soon as the segment is over.
   void lose(Voice& voice);
-  // The gains of voices that fade, after a segment.
-  void advance_fades(std::size_t frames);
+  // The gains of voices that fade or follow their channel, after a segment.
+  void advance_gains(std::size_t frames);
   // Of one that is awake, once in max_block_frames: keeps its level, and ends it where it has
   // faded. True if it has been quiet for so long that it may sleep unless something moves it.
   bool update(Voice& voice);
@@ -96,6 +107,8 @@ class Voices {
 
  private:
   void fade(Voice& voice, double seconds) const;
+  void retune(std::uint8_t channel);
+  void follow_level(std::uint8_t channel);
   // The least of the voices for which `may` says so; null where there is none.
   template <class May, class Less>
   Voice* least_of(May&& may, Less&& less);
@@ -112,8 +125,7 @@ class Voices {
   std::vector<Voice> voices_;
   std::size_t awake_ = 0;
   std::size_t last_ = 0;
-  std::array<bool, 16> pedal_is_down_{};
-  double bend_ = 0.0;
+  Channels channels_;
   bool has_changed_ = false;
   std::size_t limit_ = std::numeric_limits<std::size_t>::max();
   std::uint64_t resets_ = 0;

@@ -165,7 +165,7 @@ TEST_CASE("a bowed note draws until the key is released", "[gesture]") {
 TEST_CASE("controllers, pressure and OSC names move what the preset says, by its curve",
           "[gesture]") {
   Preset preset = played({.source = ControlSource::controller,
-                          .number = 7,
+                          .number = 20,
                           .target = "k",
                           .gesture = Gesture::parameter,
                           .low = 0.01,
@@ -186,8 +186,8 @@ TEST_CASE("controllers, pressure and OSC names move what the preset says, by its
     player.run(300, {event});
     return player.engine().parameter(0);
   };
-  CHECK(k_after(controller(0, 7, 0.25)) == 0.02);
-  CHECK(k_after(controller(0, 8, 0.75)) == 0.02);
+  CHECK(k_after(controller(0, 20, 0.25)) == 0.02);
+  CHECK(k_after(controller(0, 21, 0.75)) == 0.02);
   CHECK(k_after({.kind = EventKind::pressure, .value = 0.5}) == Approx(0.02).epsilon(1e-14));
   CHECK(k_after({.kind = EventKind::pressure, .value = 2.0}) == Approx(0.04).epsilon(1e-14));
   REQUIRE(player.compiled.instrument.custom.size() == 1);

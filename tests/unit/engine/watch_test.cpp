@@ -203,7 +203,8 @@ TEST_CASE("What has no bound at rest is played", "[watch]") {
   }
 }
 
-// --- who does not run away -------------------------------------------------------------------------
+// --- who does not run away
+// -------------------------------------------------------------------------
 
 TEST_CASE("Nobody in the instruments runs away", "[watch]") {
   const std::string folder = std::string(RESSORT_SOURCE) + "/presets/";

@@ -1,0 +1,198 @@
+// What controllers mean on every channel, whatever the preset: by MIDI 1.0 and General MIDI 2.
+#include "core/engine/channels.h"
+
+#include "tests/support/pitch.h"
+#include "tests/support/player.h"
+
+namespace ressort {
+namespace {
+
+using namespace support;
+
+constexpr double rate_hz = 44100.0;
+
+Event on(int channel, Event event) {
+  event.channel = static_cast<std::uint8_t>(channel);
+  return event;
+}
+Event bend(int channel, std::uint32_t frame, double value) {
+  return on(channel, {.frame = frame, .kind = EventKind::bend, .value = value});
+}
+Event turned(int channel, std::uint32_t frame, int number, int value) {
+  return on(channel, controller(frame, number, value / 127.0));
+}
+
+// A registered parameter, its data coarse and fine.
+std::vector<Event> registered(int channel, int parameter, int coarse, int fine) {
+  return {turned(channel, 0, 101, 0), turned(channel, 0, 100, parameter),
+          turned(channel, 0, 6, coarse), turned(channel, 0, 38, fine)};
+}
+
+std::vector<double> heard(const std::vector<Event>& events, std::size_t frames = 20000,
+                          double release_s = 0.0) {
+  Preset preset = struck(4);
+  preset.release_s = release_s;
+  Player player(ringing_string(), preset);
+  player.run(frames, events);
+  CHECK(player.heap_calls == 0);
+  return player.y();
+}
+
+// The largest difference.
+double apart(const std::vector<double>& a, const std::vector<double>& b) {
+  double most = 0.0;
+  for (std::size_t n = 0; n < a.size(); ++n) {
+    most = std::max(most, std::fabs(a[n] - b[n]));
+  }
+  return most;
+}
+
+// How far what the events bend is from where it should be, in cents.
+double off_by(std::vector<Event> events, double semitones) {
+  events.push_back(note_on(0, 69));
+  Player bent(scenes::poly_triangle(), struck(1));
+  bent.run(8192, events);
+  const double wanted_hz = 440.0 * std::exp2(semitones / 12.0);
+  return 1200.0 * std::log2(measured_hz(bent.y(), rate_hz, wanted_hz) / wanted_hz);
+}
+
+}  // namespace
+
+TEST_CASE("a bend bends its own channel, as far as the range says", "[channels]") {
+  // Another channel's bend changes nothing.
+  const std::vector<double> plain = heard({note_on(0, 60)});
+  CHECK(apart(heard({bend(3, 0, 1.0), note_on(0, 60), bend(3, 5000, -1.0)}), plain) < 1e-12);
+  CHECK(apart(heard({note_on(0, 60), bend(0, 5000, .5)}), plain) > .01);
+
+  Channels channels;
+  const auto enter = [&](int parameter, int coarse, int fine) {
+    for (const Event& event : registered(0, parameter, coarse, fine)) {
+      channels.turn(0, event.index, event.value);
+    }
+  };
+  channels.bend(0, 1.0);
+  CHECK(channels.semitones(0) == 2.0);
+  enter(0, 12, 0);
+  CHECK(channels.semitones(0) == 12.0);
+  enter(0, 1, 50);
+  CHECK(channels.semitones(0) == 1.5);
+  channels.turn(0, 96, 1.0);  // a cent more
+  CHECK(channels.semitones(0) == Approx(1.51));
+  channels.bend(0, 0.0);
+  enter(1, 96, 0);  // half a semitone up, by 8192
+  CHECK(channels.semitones(0) == .5);
+  enter(2, 61, 0);
+  CHECK(channels.semitones(0) == -2.5);
+  // No parameter is chosen any more: data goes nowhere. Nor does that of others.
+  channels.turn(0, 101, 1.0);
+  channels.turn(0, 100, 1.0);
+  channels.turn(0, 6, 1.0);
+  channels.turn(0, 99, 0.0);
+  channels.turn(0, 98, 0.0);
+  channels.turn(0, 6, 1.0);
+  CHECK(channels.semitones(0) == -2.5);
+  CHECK(channels.semitones(1) == 0.0);
+}
+
+TEST_CASE("bend range and tuning are heard", "[channels]") {
+  std::vector<Event> far = registered(0, 0, 7, 0);
+  far.push_back(bend(0, 0, 1.0));
+  CHECK(std::fabs(off_by(far, 7.0)) < 2.0);
+  CHECK(std::fabs(off_by(registered(0, 1, 0, 0), -1.0)) < 2.0);
+  CHECK(std::fabs(off_by(registered(0, 2, 69, 0), 5.0)) < 2.0);
+  // The measure tells a semitone from two.
+  CHECK(std::fabs(off_by(registered(0, 2, 69, 0), 4.8)) > 2.0);
+}
+
+TEST_CASE("volume and expression follow 40 dB a decade, without a step", "[channels]") {
+  const std::vector<double> plain = heard({note_on(0, 60)});
+  CHECK(heard({turned(0, 0, 7, 100), note_on(0, 60)}) == plain);
+  CHECK(apart(heard({turned(2, 0, 7, 0), note_on(0, 60), turned(2, 500, 11, 0)}), plain) < 1e-12);
+  for (const auto& [number, value, gain] : {std::tuple{7, 50, .25}, std::tuple{7, 127, 1.6129},
+                                            std::tuple{11, 127, 1.0}, std::tuple{11, 0, 0.0}}) {
+    const std::vector<double> found = heard({note_on(0, 60), turned(0, 5000, number, value)});
+    const double start = plain[100];
+    REQUIRE(start != 0.0);
+    double worst = 0.0;
+    for (std::size_t n = 0; n < found.size(); ++n) {
+      // On a straight line for 20 ms.
+      const double way = std::clamp((static_cast<double>(n) - 4999.0) / 882.0, 0.0, 1.0);
+      const double wanted = plain[n] * (1.0 + way * (gain - 1.0));
+      worst = std::max(worst, std::fabs(found[n] - wanted));
+    }
+    CAPTURE(number, value);
+    CHECK(worst < 1e-12);
+  }
+}
+
+TEST_CASE("the sostenuto pedal holds what was down when it went down", "[channels]") {
+  const auto ends = [](const std::vector<Event>& events) {
+    const std::vector<double> y = heard(events, 20000, .01);
+    std::size_t last = 0;
+    for (std::size_t n = 0; n < y.size(); ++n) {
+      last = y[n] != 0.0 ? n : last;
+    }
+    return last;
+  };
+  const int pedal = 66;
+  CHECK(ends({note_on(0, 60), turned(0, 1000, pedal, 127), note_off(2000, 60),
+              turned(0, 9000, pedal, 0)}) == Approx(9000 + 441).margin(2));
+  // Not what came later, nor another channel's.
+  CHECK(ends({turned(0, 0, pedal, 127), note_on(100, 60), note_off(2000, 60)}) ==
+        Approx(2441).margin(2));
+  CHECK(ends({note_on(0, 60), turned(5, 1000, pedal, 127), note_off(2000, 60)}) ==
+        Approx(2441).margin(2));
+  // Both pedals: the last that goes up lets go.
+  CHECK(ends({note_on(0, 60), turned(0, 1000, pedal, 127), turned(0, 1500, 64, 127),
+              note_off(2000, 60), turned(0, 5000, pedal, 0), turned(0, 8000, 64, 0)}) ==
+        Approx(8441).margin(2));
+  CHECK(ends({note_on(0, 60), turned(0, 1000, pedal, 127), turned(0, 1500, 64, 127),
+              note_off(2000, 60), turned(0, 5000, 64, 0), turned(0, 8000, pedal, 0)}) ==
+        Approx(8441).margin(2));
+  // A key that is still down stays.
+  CHECK(ends({note_on(0, 60), turned(0, 1000, pedal, 127), turned(0, 5000, pedal, 0),
+              note_off(7000, 60)}) == Approx(7441).margin(2));
+}
+
+TEST_CASE("channel modes end and reset their own channel, by the standard", "[channels]") {
+  const auto other = on(1, note_on(0, 64));
+  const std::vector<double> alone = heard({other});
+  const auto equal_from = [&](const std::vector<double>& y, std::size_t from) {
+    return std::equal(y.begin() + static_cast<std::ptrdiff_t>(from), y.end(),
+                      alone.begin() + static_cast<std::ptrdiff_t>(from),
+                      [](double a, double b) { return std::fabs(a - b) < 1e-12; });
+  };
+  // 120: at once, whatever the pedal.
+  CHECK(equal_from(heard({note_on(0, 60), other, turned(0, 500, 64, 127), turned(0, 3000, 120, 0)}),
+                   3000 + 221));
+  // 123 lets keys go, as fingers would: the pedal still holds.
+  CHECK(equal_from(heard({note_on(0, 60), other, turned(0, 3000, 123, 0)}, 20000, .01), 3442));
+  CHECK(!equal_from(
+      heard({note_on(0, 60), other, turned(0, 500, 64, 127), turned(0, 3000, 123, 0)}, 20000, .01),
+      19000));
+  CHECK(equal_from(heard({note_on(0, 60), other, turned(0, 500, 64, 127), turned(0, 3000, 123, 0),
+                          turned(0, 6000, 64, 0)},
+                         20000, .01),
+                   6442));
+  // 121: bend, expression and pedals; not the volume.
+  CHECK(equal_from(heard({note_on(0, 60), other, turned(0, 500, 64, 127), note_off(1000, 60),
+                          turned(0, 3000, 121, 0)},
+                         20000, .01),
+                   3442));
+  Channels channels;
+  channels.turn(0, 7, 50 / 127.0);
+  channels.turn(0, 11, .5);
+  channels.bend(0, 1.0);
+  channels.reset(0);
+  CHECK(channels.level(0) == Approx(.25));
+  CHECK(channels.semitones(0) == 0.0);
+}
+
+TEST_CASE("the soft pedal softens what is struck while it is down", "[channels]") {
+  const std::vector<double> plain = heard({note_on(0, 60)});
+  const std::vector<double> soft = heard({turned(0, 0, 67, 127), note_on(0, 60)});
+  CHECK(peak(soft) == Approx(.6 * peak(plain)).epsilon(1e-9));
+  CHECK(heard({turned(4, 0, 67, 127), note_on(0, 60)}) == plain);
+}
+
+}  // namespace ressort
