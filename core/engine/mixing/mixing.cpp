@@ -48,6 +48,14 @@ void Mixing::add(Bank<T>& bank, const VoiceGroup& group, const Segment& segment,
   }
   std::copy_n(bank.outputs.data() + (segment.frames - 1) * part.row(), part.row(),
               part.last_of(group.first));
+  // What has left its bounds is no last sample: the next voice in that lane might stand still on
+  // it.
+  for (std::size_t lane = group.first; lane < group.end; ++lane) {
+    for (std::size_t output = 0; voices[lane].lost && output < count; ++output) {
+      part.last_of(lane)[output * part.width + lane % part.width] =
+          static_cast<T>(watch.held(lane, group.part)[output]);
+    }
+  }
   for (std::size_t output = 0; output < count; ++output) {
     bank.heard[output] = segment.outputs[part.program.outputs[output].channel] + segment.at;
   }

@@ -194,6 +194,24 @@ namespace {}  // namespace
 
 // --- who has lost stability ---------------------------------------------------------------------
 
+TEST_CASE("What starts beyond all bounds is silent at every note, never a number that is none",
+          "[energy]") {
+  const std::string text =
+      "@g ground 5.\n@m mass 2. 0.5 0.5\n@n mass 1. 1e300 -0.25\n@a spring @g @m 1020.\n"
+      "@b spring @m @n 0.03 0.002\n@in1 frcInput @m\n@out1 posOutput @m\n@out2 posOutput @n\n";
+  for (const bool bare : {false, true}) {
+    support::Player player(text, support::struck(2), {.bare = bare, .force = true});
+    std::vector<Event> notes;
+    for (std::uint32_t frame = 0; frame < 20000; frame += 1000) {
+      notes.push_back(support::note_on(frame, 60 + static_cast<int>(frame / 1000 % 7)));
+    }
+    player.run(20000, notes);
+    for (const auto& channel : player.out) {
+      CHECK(std::all_of(channel.begin(), channel.end(), [](double y) { return std::isfinite(y); }));
+    }
+  }
+}
+
 TEST_CASE("A voice that runs away fades from where it was, and nobody else notices", "[energy]") {
   // A cubic spring, which holds what is struck gently and throws what is struck hard.
   const std::string text =
