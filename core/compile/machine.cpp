@@ -166,7 +166,6 @@ class ProgramMaker {
       const LinkScheme scheme = scheme_of(order[i]);
       LinkRun run{.law = link.law,
                   .scheme = scheme.scheme,
-                  .substeps = scheme.substeps,
                   .first = i,
                   .count = 1};
       for (std::size_t k = 0; k < most_law_arguments; ++k) {

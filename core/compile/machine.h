@@ -16,7 +16,6 @@ inline constexpr std::size_t least_part_masses = 3;  // below, a part is not wor
 // How a link's force is found; as LinkRun says.
 struct LinkScheme {
   Scheme scheme = Scheme::plain;
-  std::uint16_t substeps = 1;
   auto operator<=>(const LinkScheme&) const = default;
 };
 

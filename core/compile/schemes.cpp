@@ -60,9 +60,7 @@ Schemes choose_schemes(const Network& network, const Budget& budget, const Progr
     first = first == nullptr ? &link : first;
     ++counts[static_cast<std::size_t>(link.law)];
     if (budget.passive == Passivity::always) {
-      schemes.links[i] = facts_of(link.law).has_discrete_gradient
-                             ? LinkScheme{Scheme::discrete_gradient, 1}
-                             : LinkScheme{Scheme::substeps, most_substeps};
+      schemes.links[i] = LinkScheme{Scheme::discrete_gradient};
     }
   }
   std::string all;

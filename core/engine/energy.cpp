@@ -66,7 +66,7 @@ void add_discrete_gradient(const ForceLaw& law, double d, double v, Energy& ener
   const double before = d - v;
   if constexpr (ForceLaw::facts.contains_spring && ForceLaw::facts.is_curved) {
     add_straight(law.k, law.z, d, v, energy);
-    add(energy, law.curved_energy(d, before));
+    add(energy, 0.5 * (law.curved(d) + law.curved(before)));
   } else {
     add(energy, 0.5 * (law.potential(d) + law.potential(before)));
   }

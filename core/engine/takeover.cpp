@@ -55,6 +55,7 @@ void place_before(Bank<T>& bank, PartBank<T>& part, std::size_t lane) {
     }
   }
   kernel.set_state(lane % part.width, bank.x.data(), bank.v.data());
+  kernel.let_go(lane % part.width);
 }
 
 // The voices of one kernel.

@@ -13,12 +13,6 @@ constexpr std::uint64_t numbers_of_link = 1;  // for all voices of a kernel that
 constexpr std::uint64_t bytes_of_link = 48;   // in tables
 constexpr std::uint64_t numbers_of_coefficient = 3;
 
-double passive_ns(const LinkRun& run) {
-  const LawFacts& law = facts_of(run.law);
-  const double steps = run.scheme == Scheme::substeps ? run.substeps : 1.0;
-  return law.solve_ns + law.substep_ns * steps;
-}
-
 }  // namespace
 
 LinkCount links_of(const Program& program) {
@@ -34,10 +28,29 @@ LinkCount links_of(const Program& program) {
 }
 
 double passive_ns(const Program& program) {
+  constexpr double of_a_shared_link = 120.0;  // measured: some three rounds of Newton's
+  std::vector<std::uint8_t> holders(program.position.size(), 0);
+  const auto each = [&](auto&& use) {
+    for (const LinkRun& run : program.link_runs) {
+      for (std::uint32_t i = run.first; run.scheme != Scheme::plain && i < run.first + run.count;
+           ++i) {
+        use(run, program.ends[i]);
+      }
+    }
+  };
+  const auto moves = [&](std::uint32_t node) {
+    return node < program.moving || (!program.taps.empty() && node >= program.taps[0].node);
+  };
+  each([&](const LinkRun&, Ends ends) {
+    for (const std::uint32_t end : {ends.a, ends.b}) {
+      holders[end] = static_cast<std::uint8_t>(std::min(2, holders[end] + (moves(end) ? 1 : 0)));
+    }
+  });
   double sum = 0.0;
-  for (const LinkRun& run : program.link_runs) {
-    sum += run.scheme == Scheme::plain ? 0.0 : passive_ns(run) * run.count;
-  }
+  each([&](const LinkRun& run, Ends ends) {
+    const bool is_shared = std::max(holders[ends.a], holders[ends.b]) > 1;
+    sum += facts_of(run.law).solve_ns + (is_shared ? of_a_shared_link : 0.0);
+  });
   return sum;
 }
 

@@ -102,6 +102,9 @@ class Kernel {
   // Puts one lane to positions and velocities, [node]; its coefficients stay. Nothing pulls in the
   // next sample. [audio]
   virtual void set_state(std::size_t lane, const double* x, const double* v) = 0;
+  // After it: nor do passive links hold anything in that sample, which only leads to where another
+  // kernel was. [audio]
+  virtual void let_go(std::size_t) {}
   // The same, to where the model starts.
   void reset(std::size_t lane) { set_state(lane, start_.position.data(), start_.velocity.data()); }
   // Where every node is after the last sample, and how fast; false where the kernel does not know

@@ -61,6 +61,7 @@ template <class T, class Number = T>
 class NodeKernel : public Kernel<T> {
  public:
   void set_state(std::size_t lane, const double* x, const double* v) final;
+  void let_go(std::size_t lane) final { nodes_.passive.awake[lane] = Number(-1); }
   bool save(std::size_t lane, double* x, double* v) const final;
   bool read(std::span<const std::uint32_t> nodes, T* x, T* v) const final;
   bool is_near_start(std::size_t lane, double bound) const final;

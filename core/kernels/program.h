@@ -35,14 +35,12 @@ struct MassRun {
 enum class Scheme : std::uint8_t {
   plain,              // from where its ends are, as published
   discrete_gradient,  // from where they were and will be, so that it gains no energy
-  substeps,           // several times a sample
 };
 
 // Consecutive links that share law, coefficients and scheme.
 struct LinkRun {
   Law law{};
   Scheme scheme = Scheme::plain;
-  std::uint16_t substeps = 1;  // read only with Scheme::substeps
   std::uint32_t first = 0;
   std::uint32_t count = 0;
   std::array<std::uint32_t, most_law_arguments> coefficients{};  // of the law's arguments

@@ -29,7 +29,8 @@ struct Bow {
                   .velocity_says = "chooses a bow's profile"}}},
       .zone = Zone::slow,
       .is_curved = false,
-      .substep_ns = 15.0,
+      .is_convex = false,
+      .solve_ns = 15.0,
       .faust =
           "bow(z, s, d, v) =\n"
           "  select2(abs(v) < s*r, 0.0, select2(abs(v) < s*r/3.0, slip, stick)*z*r)\n"
@@ -61,8 +62,13 @@ struct Bow {
   V potential(V) const { return V{}; }
   V secant(V) const { return V{}; }
 
-  Push<V> passive(const LinkState<V>& link, int substeps) const {
-    return rubbed(*this, link, substeps);
+  V passive(const LinkState<V>& link) const { return rubbed(*this, link); }
+  Steady<V> steady(const LinkState<V>&) const { return {V{}, V{}}; }
+  Slope<V> gradient(V, V step) const { return rubbing(*this, step); }
+
+  Slope<V> friction(V v) const {
+    const V fast = absolute(v);
+    return {force(V{}, v), select(fast < outer, select(fast < inner, stick, -slip), V{})};
   }
 
   // The friction f(v) at the speed v that solves v + half f(v) = wanted, in closed form. For

@@ -63,13 +63,16 @@ struct ClippedContact {
   V secant(V) const { return k; }
 
   // The potential's discrete gradient, with a damper as far as it touches.
-  Push<V> passive(const LinkState<V>& link, int) const {
+  V passive(const LinkState<V>& link) const {
     if (!may_touch(link, t)) {
-      return {V{}, V{}};
+      return V{};
     }
-    const V damping = z * share_inside(link, t);
-    return at_once(damped_force(wall(), link.before() + t, link.free + t, link.gamma, damping));
+    return damped_force(wall(), link.before() + t, link.free + t, link.gamma, steady(link).damping);
   }
+  Steady<V> steady(const LinkState<V>& link) const {
+    return {V{}, may_touch(link, t) ? z / 2 * share_inside(link, t) : V{}};
+  }
+  Slope<V> gradient(V before, V step) const { return discrete_gradient(wall(), before + t, step); }
 
   static Slopes steepest(const ClippedContact& least, const ClippedContact& most, double) {
     const bool is_bent = least.c != 0.0 || most.c != 0.0;

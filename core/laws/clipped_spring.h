@@ -89,12 +89,15 @@ struct ClippedSpring {
   V secant(V) const { return k; }
 
   // The potential's discrete gradient, and the damper of now.
-  Push<V> passive(const LinkState<V>& link, int) const {
+  V passive(const LinkState<V>& link) const {
+    return damped_force(elastic(), link.before(), link.free, link.gamma, steady(link).damping);
+  }
+  Steady<V> steady(const LinkState<V>& link) const {
     const V beyond = z + Scalar<V>(0.3) * k;
     const V bent = select(c * link.now * link.now <= k - s, z, beyond);
-    const V damping = select(c == V{}, z, select(s >= k, z, select(c > V{}, bent, beyond)));
-    return at_once(damped_force(elastic(), link.before(), link.free, link.gamma, damping));
+    return {V{}, select(c == V{}, z, select(s >= k, z, select(c > V{}, bent, beyond))) / 2};
   }
+  Slope<V> gradient(V before, V step) const { return discrete_gradient(elastic(), before, step); }
 
   static Slopes steepest(const ClippedSpring& least, const ClippedSpring& most, double) {
     const bool is_bent = least.c != 0.0 || most.c != 0.0;

@@ -53,13 +53,13 @@ struct Contact {
   //   in and in:   (m + h) s = a - 2 h u
   //   leaving:     m s^2 - a s - h u^2 = 0, s < 0
   //   entering:    (m + h) p^2 - (a + 2 m u) p + u (a + m u) = 0, p = u + s > 0
-  Push<V> passive(const LinkState<V>& link, int) const {
+  V passive(const LinkState<V>& link) const {
     if (!may_touch(link, t)) {
-      return {V{}, V{}};
+      return V{};
     }
     const V u = link.before() + t;
     const V a = link.free - link.before();
-    const V damper = z / 2 * share_inside(link, t);
+    const V damper = steady(link).damping;
     const V h = link.gamma * k / 2;
     const V m = 1 + link.gamma * damper;
     const V in = (a - 2 * h * u) / (m + h);
@@ -74,9 +74,30 @@ struct Contact {
     const auto stays = was_in & (u + in >= V{});
     const auto enters = past > V{};
     const V step = select(was_in, select(stays, in, out), select(enters, p - u, a / m));
-    const V elastic = select(was_in, select(stays, k * (u + in / 2), -k * u * u / (2 * out)),
-                             select(enters, k * p * p / (2 * (p - u)), V{}));
-    return at_once(elastic + damper * step);
+    // What is too small to be squared goes no way at all.
+    const auto over = [](V square, V way) {
+      return square / (2 * select(way == V{}, V{} + 1, way));
+    };
+    const V elastic = select(was_in, select(stays, k * (u + in / 2), over(-k * u * u, out)),
+                             select(enters, over(k * p * p, p - u), V{}));
+    return elastic + damper * step;
+  }
+  Steady<V> steady(const LinkState<V>& link) const {
+    return {V{}, may_touch(link, t) ? z / 2 * share_inside(link, t) : V{}};
+  }
+  // With what is inside after and before, p and b, and their shares of the way, x and y, that is
+  // K/2 (p + b)(x - y); both inside, x - y = 1.
+  Slope<V> gradient(V before, V step) const {
+    const V u = before + t;
+    const V p = select(u + step > V{}, u + step, V{});
+    const V b = select(u > V{}, u, V{});
+    const auto is_in = (p > V{}) & (b > V{});
+    const V wide = select(is_in | (step == V{}), V{} + 1, step);
+    const V x = p / wide;
+    const V y = b / wide;
+    const V one = V{} + 1;
+    return {k / 2 * (p + b) * select(is_in, one, x - y),
+            k / 2 * select(is_in, one, 2 * x - x * x + y * y)};
   }
 
   static Slopes steepest(const Contact&, const Contact& most, double) {

@@ -23,7 +23,7 @@ struct CubicSpring {
                   .arguments = "@A @B K Q Z",
                   .printed = 3}}},
       .contains_spring = true,
-      .solve_ns = 16.0,
+      .solve_ns = 30.0,
       .faust = "cubic_spring(k, q, z, d, v) = spring(k, z, d, v) + q*r*r*d*d*d;\n",
   };
 
@@ -34,16 +34,37 @@ struct CubicSpring {
   }
   V secant(V d) const { return k + q * d * d; }
 
-  // What is curved holds this from one sample to the next; the rest holds what a spring does.
-  V curved_energy(V now, V before) const {
-    return Scalar<V>(0.25) * q * now * now * before * before;
-  }
+  // Of what is curved; the rest holds what a spring does.
+  V curved(V d) const { return Scalar<V>(0.25) * q * d * d * d * d; }
 
-  // f = K now + Z (now - before) + Q now^2 (after + before)/2: linearly implicit.
-  Push<V> passive(const LinkState<V>& link, int) const {
-    const V bent = q * link.now * link.now / 2;
-    const V linear = k * link.now + z * link.speed;
-    return at_once((linear + bent * (link.free + link.before())) / (1 + link.gamma * bent));
+  // f = K now + Z (now - before) + the discrete gradient of Q/4 d^4, which without any cancellation
+  // is Q/4 (after + before) (after^2 + before^2). By Newton from where Q now^2 (after + before)/2
+  // in its place would lead; as that function of `after` bends once, where it is b^3 2/3 steep, he
+  // oversteps no more than once.
+  V passive(const LinkState<V>& link) const {
+    const Steady<V> linear = steady(link);
+    const V b = link.before();
+    const V square = b * b;
+    const V free = link.free - link.gamma * linear.force;
+    const V bent = link.gamma * q * link.now * link.now / 2;
+    const V g = link.gamma * q / 4;
+    V a = (free - bent * b) / (1 + bent);
+    auto live = a == a;
+    for (int i = 0; i < most_newton_steps && any_of(live); ++i) {
+      const V over = a - free + g * (a + b) * (a * a + square);
+      const V way = over / (1 + g * (3 * a * a + 2 * a * b + square));
+      a = select(live, a - way, a);
+      live = live & (absolute(way) > Scalar<V>(0x1p-18) * (absolute(a) + absolute(b)));
+    }
+    const Slope<V> bend = gradient(b, a - b);
+    const V over = a - free + link.gamma * bend.value;
+    return linear.force + bend.value - bend.slope * over / (1 + link.gamma * bend.slope);
+  }
+  Steady<V> steady(const LinkState<V>& link) const { return {k * link.now + z * link.speed, V{}}; }
+  Slope<V> gradient(V b, V step) const {
+    const V a = b + step;
+    const V square = b * b;
+    return {q / 4 * (a + b) * (a * a + square), q / 4 * (3 * a * a + 2 * a * b + square)};
   }
 
   static Slopes steepest(const CubicSpring&, const CubicSpring& most, double within) {

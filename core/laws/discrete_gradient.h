@@ -6,8 +6,7 @@
 // A potential P gives f = (P(after) - P(before))/(after - before), its discrete gradient: then
 // 1/2 v^2/gamma + (P(now) + P(after))/2 is kept from sample to sample, whatever the stiffness
 // (Gonzalez 1996; Chatziioannou and van Walstijn, J. Sound Vib. 339, 2015; Bilbao, Torin and
-// Chatziioannou, Acta Acustica 101, 2015). Dampers and friction act on (after - before)/2. What has
-// no such potential, as a pluck, goes through the sample in substeps.
+// Chatziioannou, Acta Acustica 101, 2015). Dampers and friction act on (after - before)/2.
 //
 // Laws and their tools are compiled for every instruction set in a namespace of its own,
 // RESSORT_ISA (elsewhere a namespace of that very name): what is built for a wide machine is never
@@ -32,14 +31,6 @@ struct LinkState {
   V before() const { return now - speed; }
 };
 
-// What a link did in one sample: the impulse, and how far it has moved its ends by then, both for
-// masses of 1.
-template <class V>
-struct Push {
-  V x;
-  V v;
-};
-
 // A value and its derivative.
 template <class V>
 struct Slope {
@@ -47,11 +38,13 @@ struct Slope {
   V slope;
 };
 
-// Where the force acts all at once, at the sample's beginning.
+// What a link exerts wherever it will be, and what it adds for every unit that it goes in two
+// samples: what does not depend on the solution.
 template <class V>
-static inline Push<V> at_once(V f) {
-  return {f, f};
-}
+struct Steady {
+  V force;
+  V damping;
+};
 
 // Four roundings.
 template <class V>
@@ -96,27 +89,29 @@ static inline V rising_force(V free, V gamma, Force&& g) {
   return force_between(free - gamma * g(free).value, free, free, gamma, g);
 }
 
-// (P(after) - P(before))/(after - before), and its slope; near before, where the difference would
-// be noise, the force in the middle.
+// (P(after) - P(before))/step, after being before + step, and its slope; near before, where the
+// difference would be noise, the force in the middle; so too where squares vanish.
 template <class V, class Potential>
-static inline Slope<V> discrete_gradient(const Potential& potential, V before, V after) {
+static inline Slope<V> discrete_gradient(const Potential& potential, V before, V step) {
   using T = Scalar<V>;
   constexpr T near = sizeof(T) == 4 ? T(4e-3) : T(4e-6);
-  const V step = after - before;
-  const V middle = (before + after) / 2;
-  const auto is_near = absolute(step) <= near * (absolute(before) + absolute(after));
+  constexpr T nothing = sizeof(T) == 4 ? T(1e-18) : T(1e-150);
+  const V after = before + step;
+  const V middle = before + step / 2;
+  const V far = absolute(before) + absolute(after);
+  const auto is_near = (absolute(step) <= near * far) | (far < nothing);
   const V wide = select(is_near, V{} + 1, step);
   const V quotient = (potential.energy(after) - potential.energy(before)) / wide;
   return {select(is_near, potential.force(middle), quotient),
           select(is_near, potential.slope(middle) / 2, (potential.force(after) - quotient) / wide)};
 }
 
-// g of a potential and a damper.
+// g of a potential and a damper, which adds `damping` for every unit of the way.
 template <class V, class Potential>
 static inline V damped_force(const Potential& potential, V before, V free, V gamma, V damping) {
   return rising_force(free, gamma, [&](V after) {
-    const Slope<V> elastic = discrete_gradient(potential, before, after);
-    return Slope<V>{elastic.value + damping / 2 * (after - before), elastic.slope + damping / 2};
+    const Slope<V> elastic = discrete_gradient(potential, before, after - before);
+    return Slope<V>{elastic.value + damping * (after - before), elastic.slope + damping};
   });
 }
 
@@ -143,37 +138,19 @@ static inline bool may_touch(const LinkState<V>& m, V t) {
   return any_of((m.before() > -t) | (m.now > -t) | (m.free > -t));
 }
 
-// Goes through the sample in `count` steps of 1/count: half a way, a kick, half a way. Without the
-// link it would go from now on evenly accelerated, so that `speed` and `fast` are those of the
-// middles of the sample before and of this one. `kick` gives the force for the distance,
-// the speed before it, what is added to that anyway, and gamma/count.
-template <class V, class Kick>
-static inline Push<V> substep(const LinkState<V>& m, int count, Kick&& kick) {
-  const auto dt = 1 / static_cast<Scalar<V>>(count);
-  const V more = (m.fast - m.speed) * dt;
-  V speed = (m.speed + m.fast) / 2;
-  V d = m.now;
-  Push<V> push{V{}, V{}};
-  for (int i = 0; i < count; ++i) {
-    d += speed * (dt / 2);
-    const V f = kick(d, speed, more, m.gamma * dt);
-    speed += more - m.gamma * dt * f;
-    d += speed * (dt / 2);
-    push.v += f * dt;
-    push.x += f * dt * (1 - (static_cast<Scalar<V>>(i) + Scalar<V>(0.5)) * dt);
-  }
-  return push;
+// Of a bow or what is like it, by its `grip(wanted, last, half)`: the friction f(v) at the speed v
+// that solves v + half f(v) = wanted, if it was at the speed `last`. Whichever of several speeds
+// that is, friction only takes.
+template <class V, class Friction>
+static inline V rubbed(const Friction& bow, const LinkState<V>& link) {
+  return bow.grip((link.speed + link.fast) / 2, link.speed, link.gamma / 2);
 }
 
-// Of a bow or what is like it, by its `grip(wanted, last, half)`: the friction f(v) at the speed v
-// that solves v + half f(v) = wanted, if it was at the speed `last`.
+// The friction after so long a way in two samples, and how much more there is of it for every unit.
 template <class V, class Friction>
-static inline Push<V> rubbed(const Friction& bow, const LinkState<V>& link, int substeps) {
-  if (substeps > 1) {
-    return substep(link, substeps,
-                   [&](V, V v, V more, V gamma) { return bow.grip(v + more / 2, v, gamma / 2); });
-  }
-  return at_once(bow.grip((link.speed + link.fast) / 2, link.speed, link.gamma / 2));
+static inline Slope<V> rubbing(const Friction& bow, V step) {
+  const Slope<V> friction = bow.friction(step / 2);
+  return {friction.value, friction.slope / 2};
 }
 
 }  // namespace RESSORT_ISA

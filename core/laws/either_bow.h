@@ -21,7 +21,8 @@ struct EitherBow {
                   .most = 3,
                   .arguments = "@A @B Z SCALE [PROFILE]",
                   .printed = 3}}},
-      .substep_ns = 90.0,  // both
+      .is_convex = false,
+      .solve_ns = 90.0,  // both
       .faust =
           "either_bow(z, s, p, d, v) = select2(p > 0.0, bow(z, s, d, v), "
           "smooth_bow(z, s, d, v));\n",
@@ -33,8 +34,15 @@ struct EitherBow {
   V potential(V) const { return V{}; }
   V secant(V) const { return V{}; }
 
-  Push<V> passive(const LinkState<V>& link, int substeps) const {
-    return rubbed(*this, link, substeps);
+  V passive(const LinkState<V>& link) const { return rubbed(*this, link); }
+  Steady<V> steady(const LinkState<V>&) const { return {V{}, V{}}; }
+  Slope<V> gradient(V, V step) const { return rubbing(*this, step); }
+
+  Slope<V> friction(V v) const {
+    const Slope<V> smooth = SmoothBow<V>{z, s}.friction(v);
+    const Slope<V> piecewise = Bow<V>(z, s).friction(v);
+    return {select(profile > V{}, smooth.value, piecewise.value),
+            select(profile > V{}, smooth.slope, piecewise.slope)};
   }
   V grip(V wanted, V last, V half) const {
     const V piecewise = Bow<V>(z, s).grip(wanted, last, half);

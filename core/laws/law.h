@@ -94,11 +94,10 @@ struct LawFacts {
   // published even where the rest is found by its discrete gradient: what is always felt is the
   // matter of the stability proof, and the pitch of small vibrations stays what it was.
   bool contains_spring = false;
-  bool is_curved = true;              // in d; else it is made of straight pieces
-  bool has_discrete_gradient = true;  // not if its potential is a hill: then it takes substeps
-  double solve_ns = 0.0;              // measured: one discrete gradient takes so long...
-  double substep_ns = 0.0;            // ...and every substep
-  std::string_view faust;             // its definition
+  bool is_curved = true;   // in d; else it is made of straight pieces
+  bool is_convex = true;   // its force never falls; not a hill's, nor friction that slips
+  double solve_ns = 0.0;   // measured: one discrete gradient takes so long
+  std::string_view faust;  // its definition
 
   // Which argument has a role: the first, or `count` if none has.
   constexpr std::size_t slot(Role role) const {
@@ -130,10 +129,6 @@ struct Slopes {
   double stiff_damping = 0.0;  // dF/dv that scales as a stiffness
   double pull = 0.0;           // dF/dd + 2 stiff_damping at one place: what stability weighs
 };
-
-// A law's discrete gradient and its substeps; see discrete_gradient.h.
-inline constexpr int least_substeps = 16;
-inline constexpr int most_substeps = 32;
 
 // [Law]
 std::span<const LawFacts> law_table();

@@ -37,7 +37,10 @@ enum class Law : std::uint8_t {
 //   V force(d, v)
 //   V potential(d)                        its slope is force(d, 0)
 //   V secant(d)                           a stiffness: force over distance, near d
-//   Push<V> passive(LinkState, substeps)  what cannot gain energy; one substep is all at once
+//   V passive(LinkState)                  the force that cannot gain energy, if it acts alone
+//   Steady<V> steady(LinkState)           of that what does not depend on where it will be,
+//   Slope<V> gradient(before, step)       and the rest, if it goes so far in two samples
+//   V curved(d)                           if it contains a spring: the potential of the rest
 //   Slopes steepest(least, most, within), gentlest(least)  as in law.h, of laws of doubles
 // and where a kernel had better keep other numbers than the arguments, void keep(row) and a
 // constructor that reads the row, of most_kept_numbers at most.

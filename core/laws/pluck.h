@@ -32,9 +32,8 @@ struct Pluck {
                   .velocity_says = "gives a pluck a damping"}}},
       .zone = Zone::near,
       .is_curved = false,
-      .has_discrete_gradient = false,
-      .solve_ns = 15.0,
-      .substep_ns = 5.5,
+      .is_convex = false,
+      .solve_ns = 100.0,
       .faust =
           "pluck(k, s, z, d, v) =\n"
           "  select2(abs(d) < s, 0.0, select2(abs(d) < s/10.0, outer, inner)*k*r*r + z*r*v)\n"
@@ -73,19 +72,64 @@ struct Pluck {
   }
   V secant(V) const { return fall; }
 
-  // Its force falls as steeply as it wants to snap, and a finger may pass in a sample: always in
-  // substeps.
-  Push<V> passive(const LinkState<V>& link, int substeps) const {
-    const V curve = absolute(link.fast - link.speed);
-    const V now = absolute(link.now);
-    const V free = absolute(link.free);
-    const auto may_touch =
-        (select(now < free, now, free) < outer + curve) | (link.now * link.free < V{});
-    if (!any_of(may_touch)) {
-      return {V{}, V{}};
+  // Where it wants to snap, or where what is fast passes it in a sample, several ways s keep the
+  // energy, m s^2 - free s + gamma (P(before + s) - P(before)) = 0 with m = 1 + gamma Z/2: it goes
+  // the first of them, as a motion would come there that goes on without leaps. The hill being made
+  // of five pieces that are at most squares, that is the first root of five quadratic equations
+  // that lies on its own piece.
+  V passive(const LinkState<V>& link) const {
+    const V before = link.before();
+    const V ahead = link.free - before;
+    const V reach = outer + absolute(ahead) + absolute(link.now - before);
+    if (!any_of(absolute(link.now) < reach)) {
+      return V{};
     }
-    return substep(link, substeps, [&](V d, V v, V, V) { return force(d, v); });
+    const V one = V{} + 1;
+    const V damping = steady(link).damping;
+    const V m = one + link.gamma * damping;
+    const V side = select(ahead < link.gamma * force(before, V{}), -one, one);
+    const V b = side * before;
+    const V free = side * ahead;
+    const V height = potential(b);
+    const V summit = potential(V{});
+    V s = free / m;
+    const auto no = V{} != V{};
+    auto is_found = b > outer;  // it never comes there
+    const auto try_piece = [&](V from, V to, V level, V bend, V middle) {
+      const V there = b - middle;
+      const V square = m + link.gamma * bend / 2;
+      const V linear = link.gamma * bend * there - free;
+      const V rest = link.gamma * (level + bend / 2 * there * there - height);
+      const V inside = linear * linear - 4 * square * select((b >= from) & (b < to), V{}, rest);
+      const V root = square_root(select(inside > V{}, inside, V{}));
+      const auto falls = linear < V{};
+      const V bottom = select(falls, 2 * square, linear + root);
+      const V way = select(falls, root - linear, -2 * rest) / select(bottom == V{}, one, bottom);
+      const V slack = 8 * tiny_share<V>() * (outer + absolute(b) + way);
+      const auto is_here = (inside >= V{}) & (bottom != V{}) & (way >= V{}) & (b < to) &
+                           (b + way <= to + slack) & (b + way >= from - slack);
+      s = select(is_here & (is_found == no), way, s);
+      is_found = is_found | is_here;
+    };
+    const V endless = V{} + Scalar<V>(1e30);
+    try_piece(-endless, -outer, V{}, V{}, V{});
+    try_piece(-outer, -inner, V{}, fall, -outer);
+    try_piece(-inner, inner, summit, -rise, V{});
+    try_piece(inner, outer, V{}, fall, outer);
+    try_piece(outer, endless, V{}, V{}, V{});
+    s *= side;
+    Slope<V> here = gradient(before, s);
+    const V steep = m + link.gamma * here.slope;
+    const V over = m * s - ahead + link.gamma * here.value;
+    const V more =
+        select(absolute(steep) > Scalar<V>(1e-3), over / select(steep == V{}, one, steep), V{});
+    return here.value + damping * s - (here.slope + damping) * more;
   }
+  Steady<V> steady(const LinkState<V>& link) const {
+    const V touches = select(absolute(link.now) < outer, V{} + 1, V{});
+    return {V{}, z / 2 * touches};
+  }
+  Slope<V> gradient(V before, V step) const { return discrete_gradient(Hill{*this}, before, step); }
 
   // It pulls beyond its top; a negative one pulls below it.
   static Slopes steepest(const Pluck& least, const Pluck& most, double) {
@@ -101,6 +145,17 @@ struct Pluck {
   V outer;
   V top;  // where the outer slopes would meet at 0
   V z;
+
+ private:
+  struct Hill {
+    V energy(V d) const { return law.potential(d); }
+    V force(V d) const { return law.force(d, V{}); }
+    V slope(V d) const {
+      const V far = absolute(d);
+      return select(far < law.outer, select(far < law.inner, -law.rise, law.fall), V{});
+    }
+    const Pluck& law;
+  };
 };
 
 }  // namespace RESSORT_ISA

@@ -56,13 +56,16 @@ struct PowerContact {
   V secant(V d) const { return k * power(wall().depth(d + t), exponent() - 1); }
 
   // The potential's discrete gradient, and the damper of now.
-  Push<V> passive(const LinkState<V>& link, int) const {
+  V passive(const LinkState<V>& link) const {
     if (!may_touch(link, t)) {
-      return {V{}, V{}};
+      return V{};
     }
-    const V grip = power(wall().depth(link.now + t), exponent());
-    return at_once(damped_force(wall(), link.before() + t, link.free + t, link.gamma, z * grip));
+    return damped_force(wall(), link.before() + t, link.free + t, link.gamma, steady(link).damping);
   }
+  Steady<V> steady(const LinkState<V>& link) const {
+    return {V{}, may_touch(link, t) ? z / 2 * power(wall().depth(link.now + t), exponent()) : V{}};
+  }
+  Slope<V> gradient(V before, V step) const { return discrete_gradient(wall(), before + t, step); }
 
   // It grows without bound, as a curved spring.
   static Slopes steepest(const PowerContact& least, const PowerContact& most, double within) {

@@ -29,26 +29,29 @@ struct QuadraticSpring {
   V potential(V d) const { return Scalar<V>(0.5) * k * d * d + curved(d); }
   V secant(V d) const { return k + q * absolute(d); }
 
-  // What is curved holds this from one sample to the next; the rest holds what a spring does.
-  V curved_energy(V now, V before) const { return (curved(now) + curved(before)) / 2; }
+  // Of what is curved; the rest holds what a spring does.
+  V curved(V d) const { return q / Scalar<V>(3.0) * absolute(d * d * d); }
 
   // f = K now + Z (now - before) + the discrete gradient of Q/3 |d|^3, which without any
   // cancellation is sgn(after) Q/3 (a^2 + a b + b^2), a and b being |after| and |before|; times
   // (a - b)/(a + b) where the signs differ.
-  Push<V> passive(const LinkState<V>& link, int) const {
-    const V linear = k * link.now + z * link.speed;
-    const V b = absolute(link.before());
-    const auto g = [&](V after) {
-      const V a = absolute(after);
-      const V square = q / 3 * (a * a + a * b + b * b);
-      const auto crosses = after * link.before() < V{};
-      const V side = select(select(crosses, after, after + link.before()) < V{}, V{} - 1, V{} + 1);
-      const V across = select(crosses, (a - b) / (a + b), V{} + 1);
-      const V f = square * across;
-      const V steep = select(crosses, (q * a * a - f) / (a + b), q / 3 * (a + a + b));
-      return Slope<V>{linear + side * f, steep};
-    };
-    return at_once(rising_force(link.free, link.gamma, g));
+  V passive(const LinkState<V>& link) const {
+    const V linear = steady(link).force;
+    const V before = link.before();
+    return linear + rising_force(link.free - link.gamma * linear, link.gamma,
+                                 [&](V after) { return gradient(before, after - before); });
+  }
+  Steady<V> steady(const LinkState<V>& link) const { return {k * link.now + z * link.speed, V{}}; }
+  Slope<V> gradient(V before, V step) const {
+    const V after = before + step;
+    const V a = absolute(after);
+    const V b = absolute(before);
+    const V square = q / 3 * (a * a + a * b + b * b);
+    const auto crosses = after * before < V{};
+    const V side = select(select(crosses, after, after + before) < V{}, V{} - 1, V{} + 1);
+    const V both = select(crosses, a + b, V{} + 1);
+    const V f = square * select(crosses, (a - b) / both, V{} + 1);
+    return {side * f, select(crosses, (q * a * a - f) / both, q / 3 * (a + a + b))};
   }
 
   static Slopes steepest(const QuadraticSpring&, const QuadraticSpring& most, double within) {
@@ -62,9 +65,6 @@ struct QuadraticSpring {
   V k;
   V q;
   V z;
-
- private:
-  V curved(V d) const { return q / Scalar<V>(3.0) * absolute(d * d * d); }
 };
 
 }  // namespace RESSORT_ISA

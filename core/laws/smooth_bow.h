@@ -25,7 +25,8 @@ struct SmoothBow {
                   .arguments = "@A @B Z SCALE [PROFILE]",
                   .printed = 2,
                   .tail = " 1"}}},
-      .substep_ns = 75.0,
+      .is_convex = false,
+      .solve_ns = 75.0,
       .faust =
           "smooth_bow(z, s, d, v) = 0.63*z*r*v*exp(0.5 - 4.0*ratio*ratio) "
           "with { ratio = v/(s*r); };\n",
@@ -39,19 +40,20 @@ struct SmoothBow {
   V potential(V) const { return V{}; }
   V secant(V) const { return V{}; }
 
-  Push<V> passive(const LinkState<V>& link, int substeps) const {
-    return rubbed(*this, link, substeps);
+  V passive(const LinkState<V>& link) const { return rubbed(*this, link); }
+  Steady<V> steady(const LinkState<V>&) const { return {V{}, V{}}; }
+  Slope<V> gradient(V, V step) const { return rubbing(*this, step); }
+
+  Slope<V> friction(V v) const {
+    using T = Scalar<V>;
+    const V ratio = slip(v);
+    const V grip = T(0.63) * z * exponential(T(0.5) - 4 * ratio * ratio);
+    return {grip * v, grip * (1 - 8 * ratio * ratio)};
   }
 
   // The friction f(v) at the speed v that solves v + half f(v) = wanted, from the speed `last` on.
   V grip(V wanted, V last, V half) const {
-    const auto g = [&](V v) {
-      using T = Scalar<V>;
-      const V ratio = slip(v);
-      const V grip = T(0.63) * z * exponential(T(0.5) - 4 * ratio * ratio);
-      return Slope<V>{grip * v, grip * (1 - 8 * ratio * ratio)};
-    };
-    return force_between(V{}, last, wanted, half, g);
+    return force_between(V{}, last, wanted, half, [&](V v) { return friction(v); });
   }
 
   static Slopes steepest(const SmoothBow&, const SmoothBow& most, double) {

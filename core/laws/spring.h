@@ -40,10 +40,12 @@ struct Spring {
   V secant(V) const { return k; }
 
   // f = K (after + before)/2 + Z (after - before)/2
-  Push<V> passive(const LinkState<V>& link, int) const {
+  V passive(const LinkState<V>& link) const {
     const V later = (k + z) / 2;
-    return at_once((later * link.free + (k - z) / 2 * link.before()) / (1 + link.gamma * later));
+    return (later * link.free + (k - z) / 2 * link.before()) / (1 + link.gamma * later);
   }
+  Steady<V> steady(const LinkState<V>&) const { return {V{}, z / 2}; }
+  Slope<V> gradient(V before, V step) const { return {k * (before + step / 2), k / 2}; }
 
   static Slopes steepest(const Spring&, const Spring& most, double) {
     return {.stiffness = most.k, .damping = most.z, .pull = most.k};

@@ -16,7 +16,7 @@ double of_any_size(Random& random, double least, double most) {
 // Masses on springs that are stable, and bent links of every kind but plucks, far stiffer than the
 // published scheme can take, most of them sharing masses; two hands that hold bent links only, and
 // are heard for what they hold against; two forces. Bows are as strong as the discrete gradient
-// allows. A pluck is a hill that substeps go over, and no potential to the last digit.
+// allows.
 std::string abused(std::uint64_t seed) {
   Random random(seed);
   const std::size_t masses = 1 + random.below(6);

@@ -26,12 +26,13 @@ Spread bounces(double k, double z, Passivity passive, int phases = 1000) {
   return e;
 }
 
-// A mass on a spring to a ground, by any law; and an amplitude it starts from, at rest at sample 1.
+// A mass on a spring to a ground, by any law; and an amplitude it starts from, at rest at sample 0
+// but for the half of what pulls it back from there.
 Stepper<double> sprung(const std::string& law, const std::string& arguments, double amplitude,
                        double pull, Passivity passive) {
   Stepper<double> mass("@g ground 0.\n@b mass 1. 0. 0.\n@s " + law + " @g @b " + arguments + "\n",
                        passive);
-  mass.set_state(amplitude - pull / 2.0, pull / 2.0);
+  mass.set_state(amplitude, -pull / 2.0);
   mass.go();
   return mass;
 }
@@ -206,7 +207,7 @@ TEST_CASE("S05: a cubic spring may be bent as far as one likes", "[passive]") {
         const double x = mass.x[0];
         const double before = x - mass.v[0];
         return mass.v[0] * mass.v[0] / 2.0 + stiffness / 2.0 * x * before +
-               x * x * before * before / 4.0;
+               (x * x * x * x + before * before * before * before) / 8.0;
       };
       const double start = energy();
       double drift = 0.0;
@@ -215,7 +216,7 @@ TEST_CASE("S05: a cubic spring may be bent as far as one likes", "[passive]") {
         drift = std::max(drift, std::fabs(energy() / start - 1.0));
       }
       CAPTURE(a, show(drift));
-      CHECK(drift < 1e-11);
+      CHECK(drift < 3e-11);
     }
   }
 }
@@ -249,16 +250,17 @@ TEST_CASE("S06: a quadratic spring may be bent as far as one likes", "[passive]"
 }
 
 TEST_CASE("S07, T13: a Duffing oscillator keeps its period when it swings little", "[passive]") {
-  // Reference: elliptic periods. Linearly implicit, it is flat when it swings far; never unstable.
+  // Reference: elliptic periods. By its discrete gradient it is flat when it swings far; never
+  // unstable.
   struct Row {
     double amplitude;
     double samples;
     double published;  // cents, 0 where it blows up
-    double implicit;
+    double passive;
   };
-  for (const auto& [a, samples, published, implicit] : {Row{.05, 57.688455448, .85, .03},
-                                                        {.2, 31.797233168, 2.1, -11.2},
-                                                        {.5, 14.419369610, 6.6, -73.5}}) {
+  for (const auto& [a, samples, published, passive] : {Row{.05, 57.688455448, .85, -1.0},
+                                                       {.2, 31.797233168, 2.1, -26.0},
+                                                       {.5, 14.419369610, 6.6, -145.0}}) {
     CAPTURE(a);
     const double reference = duffing_period(.01, 1.0, a);
     CHECK(reference == Approx(samples).epsilon(1e-9));
@@ -271,14 +273,14 @@ TEST_CASE("S07, T13: a Duffing oscillator keeps its period when it swings little
     const double found = off(Passivity::always, pull);
     CAPTURE(plain, found);
     CHECK(plain == Approx(published).margin(.1).epsilon(.03));
-    CHECK(found == Approx(implicit).margin(.1).epsilon(.03));
+    CHECK(found == Approx(passive).margin(.1).epsilon(.04));
   }
   // 10^7 samples at 20, where the published scheme is gone at once.
   Stepper<double> mass = sprung("nlSpring3", "0.01 1. 0.", 20.0, 0.0, Passivity::always);
   const auto energy = [&] {
     const double before = mass.x[0] - mass.v[0];
     return mass.v[0] * mass.v[0] / 2.0 + .005 * mass.x[0] * before +
-           mass.x[0] * mass.x[0] * before * before / 4.0;
+           (std::pow(mass.x[0], 4) + std::pow(before, 4)) / 8.0;
   };
   const double start = energy();
   double drift = 0.0;
@@ -363,6 +365,35 @@ TEST_CASE("the force on a ball is what changes its speed", "[passive]") {
   CHECK(most > .1);
 }
 
+TEST_CASE("what is next to nothing is a number for every law", "[passive]") {
+  // Waves set in with numbers whose squares vanish; with a stiffness of 0 too.
+  Random random(3);
+  for (std::size_t i = 0; i < law_count; ++i) {
+    with_law_type(static_cast<Law>(i), [&]<class Type>(Type) {
+      for (int draw = 0; draw < 20'000; ++draw) {
+        std::array<float, most_law_arguments> c{};
+        for (float& value : c) {
+          value = random.below(3) == 0 ? 0.f : static_cast<float>(random.uniform(0.0, 1.0));
+        }
+        const auto law = law_of<Type, float>([&](std::size_t k) { return c[k]; });
+        const auto tiny = [&] {
+          const double size = std::pow(10.0, random.uniform(-46.0, -18.0));
+          return random.below(5) == 0 ? 0.f
+                                      : static_cast<float>(random.below(2) == 0 ? size : -size);
+        };
+        laws::LinkState<float> state{
+            .now = tiny(), .speed = tiny(), .free = 0.f, .fast = tiny(), .gamma = 1.f};
+        state.free = state.now + state.fast;
+        const float force = law.passive(state);
+        if (!std::isfinite(force)) {
+          CAPTURE(Type::facts.name, state.now, state.speed, state.fast, c[0], c[1], c[2]);
+          FAIL("no number");
+        }
+      }
+    });
+  }
+}
+
 TEST_CASE("all that no theorem covers is made passive, and told", "[passive]") {
   const std::string text =
       "@k param 0.05\n@g ground 0.\n@in1 posInput 0.\n@m mass 1. 0.5 0.5\n@n mass 1. 0.5 0.5\n"
@@ -427,20 +458,17 @@ TEST_CASE("a passive law depends on no other lane", "[passive]") {
       both.free[lane] = both.now[lane] + both.fast[lane];
       both.gamma[lane] = random.uniform(0., 3.);
     }
-    for (const int substeps : {1, 16}) {
-      const auto push = with_law<V>(
-          law, [&](std::size_t k) { return V{} + c[k]; },
-          [&](const auto& packed) { return packed.passive(both, substeps); });
-      for (std::size_t lane = 0; lane < 2; ++lane) {
-        const LinkState<double> one{both.now[lane], both.speed[lane], both.free[lane],
-                                    both.fast[lane], both.gamma[lane]};
-        const auto alone = with_law<double>(
-            law, [&](std::size_t k) { return c[k]; },
-            [&](const auto& single) { return single.passive(one, substeps); });
-        CAPTURE(static_cast<int>(law), lane, one.now, one.speed, one.free, one.gamma);
-        CHECK(push.x[lane] == Approx(alone.x).margin(1e-13).epsilon(1e-11));
-        CHECK(push.v[lane] == Approx(alone.v).margin(1e-13).epsilon(1e-11));
-      }
+    const V force = with_law<V>(
+        law, [&](std::size_t k) { return V{} + c[k]; },
+        [&](const auto& packed) { return packed.passive(both); });
+    for (std::size_t lane = 0; lane < 2; ++lane) {
+      const LinkState<double> one{both.now[lane], both.speed[lane], both.free[lane],
+                                  both.fast[lane], both.gamma[lane]};
+      const double alone = with_law<double>(
+          law, [&](std::size_t k) { return c[k]; },
+          [&](const auto& single) { return single.passive(one); });
+      CAPTURE(static_cast<int>(law), lane, one.now, one.speed, one.free, one.gamma);
+      CHECK(force[lane] == Approx(alone).margin(1e-13).epsilon(1e-11));
     }
   }
 }
@@ -458,13 +486,11 @@ TEST_CASE("a bow of either profile is the one or the other, bit for bit", "[pass
     const laws::EitherBow<V> both{z, s, profile};
     const laws::SmoothBow<V> smooth_bow{z, s};
     const laws::Bow<V> bow(z, s);
-    for (const int substeps : {1, 8}) {
-      const V either = both.passive(m, substeps).x;
-      const V piecewise = bow.passive(m, substeps).x;
-      const V smooth = smooth_bow.passive(m, substeps).x;
-      for (std::size_t lane = 0; lane < 2; ++lane) {
-        CHECK(either[lane] == (profile[lane] > 0.0 ? smooth : piecewise)[lane]);
-      }
+    const V either = both.passive(m);
+    const V piecewise = bow.passive(m);
+    const V smooth = smooth_bow.passive(m);
+    for (std::size_t lane = 0; lane < 2; ++lane) {
+      CHECK(either[lane] == (profile[lane] > 0.0 ? smooth : piecewise)[lane]);
     }
     const V v = m.speed;
     const V plain = both.force(V{}, v);

@@ -95,7 +95,7 @@ double stored(const SceneLink& link, double e, double next) {
     case Kind::quadratic:
       return mean([&](double d) { return c[1] / 3.0 * std::fabs(d * d * d); });
     case Kind::cubic:
-      return .25 * c[1] * e * e * next * next;
+      return mean([&](double d) { return .25 * c[1] * d * d * d * d; });
     case Kind::clipped:
       return mean([&](double d) { return clipped_energy(c[0], c[1], c[2], d); });
     case Kind::contact:
@@ -293,9 +293,9 @@ std::string text_of(const NonlinearScene& scene) {
 // --- the judge ----------------------------------------------------------------------------------
 
 // Positions of all nodes, three samples of them, and what is booked.
-class Judge {
+class EnergyJudge {
  public:
-  explicit Judge(const NonlinearScene& scene) : scene_(scene) {
+  explicit EnergyJudge(const NonlinearScene& scene) : scene_(scene) {
     for (auto& x : x_) {
       x.assign(scene.nodes(), 0.0);
     }
@@ -351,6 +351,12 @@ class Judge {
     std::rotate(x_.begin(), x_.begin() + 1, x_.end());
     balance_ += work;
     const double now = energy();
+    if (n == 0) {
+      // A text says where everything starts and where it was a sample before; both are taken for
+      // given, whichever holds more.
+      start_ = std::max(start_ + balance_, now);
+      balance_ = 0.0;
+    }
     passed_ += std::fabs(now - energy_);
     energy_ = now;
     excess = std::max(excess, (energy_ - start_ - balance_ - noise_) / passed_);
@@ -438,7 +444,7 @@ Outcome play(const NonlinearScene& scene, Passivity passive, std::size_t frames)
   const std::string text = text_of(scene);
   Player player(text, default_preset(network_of(text), true),
                 {.bare = true, .budget = Budget{.passive = passive}});
-  Judge judge(scene);
+  EnergyJudge judge(scene);
   constexpr std::size_t block = 256;
   const std::size_t inputs = scene.pushes.size() + 1;
   std::vector<std::vector<double>> in(inputs, std::vector<double>(block));

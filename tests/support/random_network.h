@@ -288,7 +288,6 @@ class NetworkWriter {
         {"contact", "0.001 0.003 1."},  // never lets go
         {"nlContact", "0.005 0.1 0.02 0. 0.003"},
         {"nlContact", "0.001 0.00001 0.002 0.003 1."},
-        {"powerContact", "0.02 1.5 0.01 0.003"},
         {"nlPluck", "0.01 0.02"},
         {"nlPluck", "0.5*l 0.1"},
         {"nlPluck", "0.001 1. 0.002"},  // never lets go

@@ -204,9 +204,10 @@ void BatchKernel<T>::play(const Block<T>& block) {
   auto& passive = this->nodes_.passive;
   BatchState<T> state{.ramps = ramps_of(this->coefficients),
                       .cells = this->nodes_.numbers.data(),
-                      .passive = passive.links,
+                      .passive = passive.tables,
                       .inverse_mass = passive.inverse_mass.data(),
                       .memory = passive.memory.data(),
+                      .solver = passive.numbers.data(),
                       .awake = passive.awake.data()};
   step_(this->program_, batch_, table_, state, block);
   this->coefficients.finish(block.frames);

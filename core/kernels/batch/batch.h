@@ -51,9 +51,10 @@ template <class T>
 struct BatchState {
   Ramps<T> ramps;
   T* cells;  // [pack][cell][lane]
-  const std::vector<PassiveLink>& passive;
+  const PassiveTables& passive;
   const std::uint32_t* inverse_mass;  // [moving node] coefficient, if there are passive links
   T* memory;                          // [pack][passive link][passive_rows][lane]
+  T* solver;                          // PassiveRoom::numbers
   T* awake;  // [pack][lane] 0 in the first sample after set_state(), else 1
 };
 

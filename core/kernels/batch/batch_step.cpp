@@ -179,17 +179,17 @@ struct Passive {
   V distance(Ends ends) const { return distance_now(ends); }
   V speed(Ends ends) const { return speed_now(ends); }
   V gamma(Ends ends) const { return ends.a == ends.b ? V{} : give(ends.a) + give(ends.b); }
-  void push(Ends ends, V x, V v) {
-    push_node(ends.a, -x, -v);
-    push_node(ends.b, x, v);
+  void push(Ends ends, V force) {
+    push_node(ends.a, -force);
+    push_node(ends.b, force);
   }
 
   V give(std::uint32_t node) const { return node < masses ? coefficient(inverse_mass[node]) : V{}; }
-  void push_node(std::uint32_t node, V x, V v) {
+  void push_node(std::uint32_t node, V force) {
     if (node < masses) {
-      const V way = give(node);
-      nodes[node].x += way * x;
-      nodes[node].v += way * v;
+      const V way = give(node) * force;
+      nodes[node].x += way;
+      nodes[node].v += way;
     }
   }
 
@@ -205,7 +205,7 @@ template <class V, class T>
 class PassiveLinks {
  public:
   PassiveLinks(const Program& program, const Packs<V>& packs, BatchState<T>& state)
-      : program_(program), packs_(packs), state_(state), is_any_(!state.passive.empty()) {}
+      : program_(program), packs_(packs), state_(state), is_any_(!state.passive.links.empty()) {}
 
   void remember() const {
     if (is_any_) {
@@ -228,7 +228,7 @@ class PassiveLinks {
             .is_awake = reinterpret_cast<const V*>(state_.awake)[pack]};
   }
   V* memory(std::size_t pack) const {
-    return reinterpret_cast<V*>(state_.memory) + pack * passive_rows * state_.passive.size();
+    return reinterpret_cast<V*>(state_.memory) + pack * passive_rows * state_.passive.links.size();
   }
 
   [[gnu::noinline]] void remember_all() const {
@@ -239,7 +239,7 @@ class PassiveLinks {
   [[gnu::noinline]] void correct_all() const {
     for (std::size_t pack = 0; pack < packs_.count; ++pack) {
       Passive<V> own = body(pack);
-      ressort::correct(state_.passive, memory(pack), own);
+      ressort::correct(state_.passive, memory(pack), reinterpret_cast<V*>(state_.solver), own);
       reinterpret_cast<V*>(state_.awake)[pack] = V{} + 1;
     }
   }

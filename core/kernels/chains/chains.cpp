@@ -331,8 +331,9 @@ ChainsState<T> ChainsKernel<T>::state() {
           .force = force_.data(),
           .corners = this->nodes_.corners.data(),
           .tap_pull = tap_pull_.data(),
-          .passive = this->nodes_.passive.links,
+          .passive = this->nodes_.passive.tables,
           .memory = this->nodes_.passive.memory.data(),
+          .solver = this->nodes_.passive.numbers.data(),
           .awake = this->nodes_.passive.awake.data()};
 }
 

@@ -128,8 +128,9 @@ struct ChainsState {
   T* force;        // [force] summed by the links, used by the next sample
   Corners<T>* corners;  // [tap] in this sample
   T* tap_pull;          // [tap] what the links of this sample do to it, for the next one
-  const std::vector<PassiveLink>& passive;
+  const PassiveTables& passive;
   T* memory;  // [passive link][passive_rows]
+  T* solver;  // PassiveRoom::numbers
   T* awake;   // 0 in the first sample after set_state(), else 1
 };
 

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <array>
 
-#include "core/kernels/passive.h"
+#include "core/kernels/clusters.h"
 #include "core/laws/laws.h"
 
 namespace ressort {

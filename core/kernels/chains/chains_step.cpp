@@ -450,9 +450,9 @@ struct Passive {
   T distance(Ends ends) const { return distance_now(ends); }
   T speed(Ends ends) const { return speed_now(ends); }
   T gamma(Ends ends) const { return ends.a == ends.b ? T(0) : give(ends.a) + give(ends.b); }
-  void push(Ends ends, T x, T v) {
-    push_end(ends.a, -x, -v);
-    push_end(ends.b, x, v);
+  void push(Ends ends, T force) {
+    push_end(ends.a, -force);
+    push_end(ends.b, force);
   }
 
   const T* body(std::uint32_t end) const { return s.bodies + tables.passive_ends[end].place; }
@@ -461,18 +461,18 @@ struct Passive {
     return mass == nowhere ? T(0) : s.coefficient[mass];
   }
   // In whole packs where a chain is, as push() above.
-  void push_end(std::uint32_t index, T x, T v) {
+  void push_end(std::uint32_t index, T force) {
     const PassiveEnd& end = tables.passive_ends[index];
-    const T inverse_mass = give(index);
+    const T way = give(index) * force;
     if (end.unit == nowhere) {
-      s.bodies[end.place] += inverse_mass * x;
-      s.bodies[end.place + S::lanes] += inverse_mass * v;
+      s.bodies[end.place] += way;
+      s.bodies[end.place + S::lanes] += way;
       return;
     }
     const V unit = pack_at<V>(s.units + end.unit);
     V* const pair = &pack_at<V>(s.bodies + (end.place - end.unit / S::lanes));
-    pair[0] += all<V>(inverse_mass * x) * unit;
-    pair[1] += all<V>(inverse_mass * v) * unit;
+    pair[0] += all<V>(way) * unit;
+    pair[1] += all<V>(way) * unit;
   }
 
   const ChainsTables& tables;
@@ -488,7 +488,7 @@ template <class S, class T>
 template <class S, class T>
 [[gnu::noinline]] void correct_links(const ChainsTables& tables, ChainsState<T>& state) {
   Passive<S> body{tables, state, S(tables, state)};
-  correct(state.passive, state.memory, body);
+  correct(state.passive, state.memory, state.solver, body);
   *state.awake = 1;
 }
 
@@ -505,7 +505,7 @@ void step(const Program& program, const ChainsTables& tables, ChainsState<T>& st
   const std::size_t inputs = program.inputs.size();
   const std::size_t output_count = program.outputs.size();
   const std::size_t frames = block.frames;
-  const bool has_passive = !state.passive.empty();
+  const bool has_passive = !state.passive.links.empty();
   for (std::size_t frame = 0; frame < frames; ++frame) {
     advance(ramps);
     for (const std::uint32_t c : audio_coefficients) {

@@ -32,9 +32,10 @@ struct DirectState {
         row(nodes.layout.row),
         corners(nodes.corners.data()),
         nodes(nodes.layout.node.size()),
-        passive(nodes.passive.links),
+        passive(nodes.passive.tables),
         inverse_mass(nodes.passive.inverse_mass.data()),
         memory(nodes.passive.memory.data()),
+        solver(nodes.passive.numbers.data()),
         awake(nodes.passive.awake.data()),
         felt(nodes.passive.felt_or_null()) {}
   // A row of a view's own, the first being 0.
@@ -47,9 +48,10 @@ struct DirectState {
   std::size_t row;
   Corners<T>* corners;  // [tap][lane] in this sample
   std::size_t nodes;
-  const std::vector<PassiveLink>& passive;
+  const PassiveTables& passive;
   const std::uint32_t* inverse_mass;  // [moving node] coefficient, if there are passive links
   T* memory;                          // [passive link][passive_rows][lane]
+  T* solver;                          // PassiveRoom::numbers
   T* awake;                           // [lane] 0 in the first sample after set_state(), else 1
   T* felt;  // [node][lane] what passive links did in this sample; null: nobody listens
   const Fourth* fourth = nullptr;

@@ -237,9 +237,9 @@ struct Passive {
     const bool may_meet = a == b || is_place(program, a) || is_place(program, b);
     return give(a, a) + give(b, b) - (may_meet ? 2 * give(a, b) : V{});
   }
-  void push(Ends ends, V x, V v) {
-    push_node(ends.a, -x, -v);
-    push_node(ends.b, x, v);
+  void push(Ends ends, V force) {
+    push_node(ends.a, -force);
+    push_node(ends.b, force);
   }
 
  private:
@@ -281,25 +281,25 @@ struct Passive {
                                  : T(0);
   }
 
-  void push_node(std::uint32_t node, V x, V v) {
+  void push_node(std::uint32_t node, V force) {
     if (!is_place(program, node)) {
       if (node < program.moving) {
-        const V inverse_mass = s.coefficient[s.state.inverse_mass[node]];
-        s.shift(node, inverse_mass * x);
-        s.v[node] += inverse_mass * v;
+        const V way = s.coefficient[s.state.inverse_mass[node]] * force;
+        s.shift(node, way);
+        s.v[node] += way;
       }
       if (s.state.felt != nullptr) {
-        reinterpret_cast<V*>(s.state.felt)[node] += v;
+        reinterpret_cast<V*>(s.state.felt)[node] += force;
       }
       return;
     }
     for (std::size_t lane = 0; lane < S::lanes; ++lane) {
       behind(program, s, node, lane, [&](std::size_t at, T weight) {
         const T part = weight * inverse_mass(at, lane);
-        s.state.x[at] += part * x[lane];
-        s.state.v[at] += part * v[lane];
+        s.state.x[at] += part * force[lane];
+        s.state.v[at] += part * force[lane];
         if (s.state.felt != nullptr) {
-          s.state.felt[at] += weight * v[lane];
+          s.state.felt[at] += weight * force[lane];
         }
       });
     }
@@ -325,7 +325,8 @@ template <class S>
     }
   }
   Passive<S> body{program, s};
-  correct(s.state.passive, reinterpret_cast<V*>(s.state.memory), body);
+  correct(s.state.passive, reinterpret_cast<V*>(s.state.memory),
+          reinterpret_cast<V*>(s.state.solver), body);
   *reinterpret_cast<V*>(s.state.awake) = V{} + 1;
 }
 
@@ -362,7 +363,7 @@ void step(const Program& program, DirectState<T>& state, const Block<T>& block) 
   auto* coefficient = reinterpret_cast<V*>(state.ramps.value);
   auto* outputs = reinterpret_cast<V*>(block.outputs);
   const std::size_t inputs = program.inputs.size();
-  const bool has_passive = !state.passive.empty();
+  const bool has_passive = !state.passive.links.empty();
   for (std::size_t frame = 0; frame < block.frames; ++frame) {
     advance(state.ramps);
     for (const std::uint32_t c : program.audio_coefficients) {

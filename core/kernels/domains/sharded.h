@@ -45,6 +45,11 @@ class ShardedKernel final : public Kernel<T> {
   // The executor outlives it; every shard's kernel has the same width.
   ShardedKernel(const Program& program, const Shards& form, std::size_t voices, Isa isa);
   void set_state(std::size_t lane, const double* x, const double* v) override;
+  void let_go(std::size_t lane) override {
+    for (const auto& kernel : kernels_) {
+      kernel->let_go(lane);
+    }
+  }
   bool save(std::size_t lane, double* x, double* v) const override;
   bool is_near_start(std::size_t lane, double bound) const override;
 

@@ -37,7 +37,7 @@ GridKernel<T>::GridKernel(const Program& program, const Grid& grid, std::size_t,
       shift_((furthest_offset(grid) + grid_line - 1) / grid_line * grid_line),
       inverse_mass_(grid.slots, grid_fixed),
       pushed_(program.taps.size() * grid_pushes) {
-  for (PassiveLink& link : this->nodes_.passive.links) {
+  for (PassiveLink& link : this->nodes_.passive.tables.links) {
     link.ends = {grid.slot[link.ends.a], grid.slot[link.ends.b]};
   }
   for (const MassRun& run : program.mass_runs) {
@@ -141,8 +141,9 @@ GridState<T> GridKernel<T>::state() {
           .pushed = pushed_.data(),
           .pushes = pushes_,
           .corners = nodes.corners.data(),
-          .passive = nodes.passive.links,
+          .passive = nodes.passive.tables,
           .memory = nodes.passive.memory.data(),
+          .solver = nodes.passive.numbers.data(),
           .awake = nodes.passive.awake.data()};
 }
 

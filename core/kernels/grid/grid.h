@@ -37,10 +37,11 @@ struct GridState {
   const std::uint32_t* inverse_mass;  // [slot] coefficient, or grid_fixed
   std::uint32_t* pushed;              // slots that points push in the next sample
   std::size_t pushes;
-  Corners<T>* corners;                      // [tap] in this sample
-  const std::vector<PassiveLink>& passive;  // ends: slots
-  T* memory;                                // [passive link][passive_rows]
-  T* awake;                                 // 0 in the first sample after set_state(), else 1
+  Corners<T>* corners;           // [tap] in this sample
+  const PassiveTables& passive;  // ends: slots
+  T* memory;                     // [passive link][passive_rows]
+  T* solver;                     // PassiveRoom::numbers
+  T* awake;                      // 0 in the first sample after set_state(), else 1
 };
 
 template <class T>

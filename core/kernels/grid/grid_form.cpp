@@ -8,7 +8,7 @@
 #include <utility>
 
 #include "core/kernels/grid/grid_places.h"
-#include "core/kernels/passive.h"
+#include "core/kernels/clusters.h"
 #include "core/laws/laws.h"
 
 namespace ressort {

@@ -372,9 +372,11 @@ struct Passive {
   T distance(Ends ends) const { return distance_now(ends); }
   T speed(Ends ends) const { return speed_now(ends); }
   T gamma(Ends ends) const { return ends.a == ends.b ? T(0) : give(ends.a) + give(ends.b); }
-  void push(Ends ends, T x, T v) {
-    move(s, ends.a, -x * give(ends.a), -v * give(ends.a));
-    move(s, ends.b, x * give(ends.b), v * give(ends.b));
+  void push(Ends ends, T force) {
+    const T back = -force * give(ends.a);
+    const T on = force * give(ends.b);
+    move(s, ends.a, back, back);
+    move(s, ends.b, on, on);
   }
   T give(std::uint32_t slot) const {
     const std::uint32_t inverse_mass = s.state.inverse_mass[slot];
@@ -392,7 +394,7 @@ template <class T>
 template <class T>
 [[gnu::noinline]] void correct_links(const View<T>& s) {
   Passive<T> body{s};
-  correct(s.state.passive, s.state.memory, body);
+  correct(s.state.passive, s.state.memory, s.state.solver, body);
   *s.state.awake = 1;
 }
 
@@ -418,7 +420,7 @@ void step(const Program& program, const Grid& grid, GridState<T>& state, const B
     for (const std::uint32_t c : program.audio_coefficients) {
       state.ramps.value[c] = *audio++;
     }
-    if (!state.passive.empty()) {
+    if (!state.passive.links.empty()) {
       remember_links(s);
     }
     for (std::size_t i = 0; i < inputs; ++i) {
@@ -439,7 +441,7 @@ void step(const Program& program, const Grid& grid, GridState<T>& state, const B
         state.v[grid.slot[program.inputs[i].node]] = velocity[i];
       }
     }
-    if (!state.passive.empty()) {
+    if (!state.passive.links.empty()) {
       correct_links(s);
     }
     move_taps(s);

@@ -72,6 +72,7 @@ constexpr Model models[] = {
     {"mims_display_triples",                       5,  4, 0, 0, 1, 1, 1, delayed,  0},
     {"mims_expressions_without_blanks",            3,  2, 0, 0, 3, 1, 1, delayed,  0},
     {"mims_massG",                                 3,  2, 0, 0, 0, 0, 2, delayed,  0},
+    {"power_contact_all_counts",                   4,  5, 0, 0, 1, 1, 2, delayed,  0},
     {"mims_meshes_and_trailing_places",            0,  2, 3, 8, 1, 1, 3, delayed,  0},
     {"mims_nlBow_two_arguments",                   5,  4, 0, 0, 0, 1, 1, delayed,  0},
     {"mims_nlPluck_two_arguments",                 6,  5, 0, 0, 0, 1, 2, delayed,  0},

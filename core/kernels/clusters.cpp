@@ -1,0 +1,261 @@
+#include "core/kernels/clusters.h"
+
+#include <algorithm>
+#include <map>
+#include <numeric>
+#include <set>
+
+namespace ressort {
+namespace {
+
+// Calls `use(node)` for every node that a link's end may move.
+template <class Use>
+void each_moved(const Program& program, std::uint32_t end, Use&& use) {
+  if (end < program.moving) {
+    use(end);
+  }
+  for (const TapSlot& tap : program.taps) {
+    for (std::uint32_t i = 0; tap.node == end && i < tap.length * tap.width; ++i) {
+      const std::uint32_t node = program.tap_nodes[tap.first + i];
+      if (node < program.moving) {
+        use(node);
+      }
+    }
+  }
+}
+
+bool is_place(const Program& program, std::uint32_t node) {
+  return !program.taps.empty() && node >= program.taps[0].node;
+}
+
+std::vector<PassiveLink> links_of(const Program& program) {
+  std::vector<PassiveLink> links;
+  for (const LinkRun& run : program.link_runs) {
+    for (std::uint32_t i = run.first; run.scheme != Scheme::plain && i < run.first + run.count;
+         ++i) {
+      links.push_back({.law = run.law, .coefficients = run.coefficients, .ends = program.ends[i]});
+    }
+  }
+  return links;
+}
+
+// Which links move each other, by the masses that they move.
+class Groups {
+ public:
+  explicit Groups(std::size_t count) : parent_(count) {
+    std::iota(parent_.begin(), parent_.end(), 0u);
+  }
+  std::uint32_t of(std::uint32_t node) {
+    while (parent_[node] != node) {
+      node = parent_[node] = parent_[parent_[node]];
+    }
+    return node;
+  }
+  void unite(std::uint32_t a, std::uint32_t b) { parent_[of(a)] = of(b); }
+
+ private:
+  std::vector<std::uint32_t> parent_;
+};
+
+// Eliminates the mass with the fewest neighbours first, and lets its neighbours know each other.
+class Eliminator {
+ public:
+  explicit Eliminator(std::size_t masses) : neighbours_(masses) {}
+
+  void meet(std::uint32_t a, std::uint32_t b) {
+    if (a != b) {
+      neighbours_[a].insert(b);
+      neighbours_[b].insert(a);
+    }
+  }
+
+  // [mass] when it is eliminated; nothing if that fills in more than a sample has time for.
+  std::vector<std::uint32_t> order() {
+    constexpr std::size_t most_products = std::size_t{1} << 21;
+    std::size_t products = 0;
+    std::set<std::pair<std::size_t, std::uint32_t>> waiting;
+    for (std::uint32_t mass = 0; mass < neighbours_.size(); ++mass) {
+      waiting.insert({neighbours_[mass].size(), mass});
+    }
+    std::vector<std::uint32_t> place(neighbours_.size());
+    std::vector<std::vector<std::uint32_t>> columns;
+    while (!waiting.empty()) {
+      const std::uint32_t mass = waiting.begin()->second;
+      waiting.erase(waiting.begin());
+      place[mass] = static_cast<std::uint32_t>(columns.size());
+      const std::set<std::uint32_t>& near = neighbours_[mass];
+      products += near.size() * (near.size() + 1) / 2;
+      if (products > most_products) {
+        return {};
+      }
+      columns.emplace_back(near.begin(), near.end());
+      for (const std::uint32_t one : near) {
+        waiting.erase({neighbours_[one].size(), one});
+        neighbours_[one].erase(mass);
+        for (const std::uint32_t other : near) {
+          if (other != one) {
+            neighbours_[one].insert(other);
+          }
+        }
+        waiting.insert({neighbours_[one].size(), one});
+      }
+    }
+    tabulate(columns, place);
+    return place;
+  }
+
+  const Elimination& elimination() const { return elimination_; }
+  std::uint32_t entry(std::uint32_t a, std::uint32_t b) const {
+    return a == b ? a : entries_.at({std::min(a, b), std::max(a, b)});
+  }
+
+ private:
+  void tabulate(std::vector<std::vector<std::uint32_t>>& columns,
+                const std::vector<std::uint32_t>& place) {
+    const auto masses = static_cast<std::uint32_t>(columns.size());
+    elimination_.first.push_back(0);
+    for (std::uint32_t column = 0; column < masses; ++column) {
+      for (std::uint32_t& mass : columns[column]) {
+        mass = place[mass];
+      }
+      std::sort(columns[column].begin(), columns[column].end());
+      for (const std::uint32_t row : columns[column]) {
+        entries_[{column, row}] = masses + static_cast<std::uint32_t>(elimination_.row.size());
+        elimination_.row.push_back(row);
+      }
+      elimination_.first.push_back(static_cast<std::uint32_t>(elimination_.row.size()));
+    }
+    for (const std::vector<std::uint32_t>& column : columns) {
+      for (std::size_t i = 0; i < column.size(); ++i) {
+        for (std::size_t k = 0; k <= i; ++k) {
+          elimination_.target.push_back(entry(column[k], column[i]));
+        }
+      }
+    }
+  }
+
+  std::vector<std::set<std::uint32_t>> neighbours_;
+  std::map<std::pair<std::uint32_t, std::uint32_t>, std::uint32_t> entries_;
+  Elimination elimination_;
+};
+
+// By its masses, if it has no places.
+void find_elimination(const Program& program, std::vector<PassiveLink>& links, Cluster& cluster) {
+  const auto first = links.begin() + cluster.first;
+  const auto end = first + cluster.count;
+  std::map<std::uint32_t, std::uint32_t> masses;
+  for (auto link = first; link != end; ++link) {
+    for (const std::uint32_t node : {link->ends.a, link->ends.b}) {
+      if (is_place(program, node)) {
+        return;
+      }
+      if (node < program.moving) {
+        masses.try_emplace(node, static_cast<std::uint32_t>(masses.size()));
+      }
+    }
+  }
+  const auto mass_of = [&](std::uint32_t node) {
+    return node < program.moving ? masses.at(node) : no_mass;
+  };
+  Eliminator eliminator(masses.size());
+  for (auto link = first; link != end; ++link) {
+    link->mass_a = mass_of(link->ends.a);
+    link->mass_b = mass_of(link->ends.b);
+    if (link->mass_a != no_mass && link->mass_b != no_mass) {
+      eliminator.meet(link->mass_a, link->mass_b);
+    }
+  }
+  std::vector<std::uint32_t> place = eliminator.order();
+  const bool is_factorised = !place.empty();
+  if (!is_factorised) {
+    place.resize(masses.size());
+    std::iota(place.begin(), place.end(), 0u);
+  }
+  for (auto link = first; link != end; ++link) {
+    for (std::uint32_t* mass : {&link->mass_a, &link->mass_b}) {
+      *mass = *mass == no_mass ? no_mass : place[*mass];
+    }
+    if (is_factorised && link->mass_a != no_mass && link->mass_b != no_mass &&
+        link->mass_a != link->mass_b) {
+      link->entry = eliminator.entry(link->mass_a, link->mass_b);
+    }
+  }
+  cluster.elimination = eliminator.elimination();
+  cluster.inverse_mass.resize(masses.size());
+  const std::vector<std::uint32_t> inverse_mass = inverse_masses(program);
+  for (const auto& [node, mass] : masses) {
+    cluster.inverse_mass[place[mass]] = inverse_mass[node];
+  }
+}
+
+}  // namespace
+
+std::size_t Cluster::numbers() const {
+  const std::size_t own = joint_numbers * count;
+  return inverse_mass.empty() ? own + 2 * count * count + 5 * count
+                              : own + 7 * inverse_mass.size() + elimination.row.size();
+}
+
+bool holds_places(const Program& program) {
+  if (program.taps.empty()) {
+    return false;
+  }
+  const std::vector<PassiveLink> links = links_of(program);
+  return std::any_of(links.begin(), links.end(), [&](const PassiveLink& link) {
+    return is_place(program, link.ends.a) || is_place(program, link.ends.b);
+  });
+}
+
+std::vector<std::uint32_t> inverse_masses(const Program& program) {
+  std::vector<std::uint32_t> coefficients(program.moving);
+  for (const MassRun& run : program.mass_runs) {
+    std::fill_n(coefficients.begin() + run.first, run.count, run.inverse_mass);
+  }
+  return coefficients;
+}
+
+PassiveTables passive_tables(const Program& program, bool by_links) {
+  std::vector<PassiveLink> links = links_of(program);
+  Groups groups(program.moving);
+  std::vector<std::uint32_t> any(links.size(), no_mass);  // [link] a mass that it moves
+  for (std::size_t i = 0; i < links.size(); ++i) {
+    for (const std::uint32_t end : {links[i].ends.a, links[i].ends.b}) {
+      each_moved(program, end, [&](std::uint32_t node) {
+        any[i] = any[i] == no_mass ? node : any[i];
+        groups.unite(any[i], node);
+      });
+    }
+  }
+  std::map<std::uint32_t, std::vector<std::size_t>> of_group;
+  PassiveTables tables;
+  for (std::size_t i = 0; i < links.size(); ++i) {
+    if (by_links) {
+      of_group[0].push_back(i);
+    } else if (any[i] == no_mass) {
+      tables.links.push_back(links[i]);
+    } else {
+      of_group[groups.of(any[i])].push_back(i);
+    }
+  }
+  for (const auto& [group, members] : of_group) {
+    if (members.size() == 1) {
+      tables.links.push_back(links[members[0]]);
+    }
+  }
+  tables.alone = tables.links.size();
+  for (const auto& [group, members] : of_group) {
+    if (members.size() > 1) {
+      tables.clusters.push_back({.first = static_cast<std::uint32_t>(tables.links.size()),
+                                 .count = static_cast<std::uint32_t>(members.size())});
+      for (const std::size_t i : members) {
+        tables.links.push_back(links[i]);
+      }
+      if (!by_links) {
+        find_elimination(program, tables.links, tables.clusters.back());
+      }
+    }
+  }
+  return tables;
+}
+
+}  // namespace ressort

@@ -1,0 +1,357 @@
+// core/kernels: passive links that share masses, all at once. With s_l being how far a link's ends
+// go from the sample before to the one after, and f_l(s_l) what its law then exerts (core/laws),
+//
+//   s = free - C f,  f_l = f_l(s_l),  C = B^T M^-1 B
+//
+// B being which masses a link pulls at. Where every f_l rises, as that of a convex potential does,
+// this is the only minimum of 1/2 |u|^2_M + the sum of what f_l is the slope of. It is found by
+// Newton's method with a line search; his steps are by a sparse factor of M + B S B^T over the
+// masses, or by a dense one of I + S^1/2 C S^1/2 over the links, S >= 0 being the laws' slopes.
+//
+// A link makes as much energy as (f_l(s_l) - f_l) s_l, where f_l is what it does exert. Whatever
+// is left of that when time is up is taken out: every link then exerts f_l(0) + c s_l, and c is
+// raised until nothing is made. With c endless nothing moves, so that this ends.
+#pragma once
+
+#include <algorithm>
+
+#include "core/kernels/joint_space.h"
+#include "core/laws/laws.h"
+
+namespace ressort {
+
+using laws::LinkState;
+using laws::Slope;
+using laws::Steady;
+
+inline constexpr std::size_t passive_rows = 3;  // of memory for each link, one number a lane
+inline constexpr int free_newtons = 10;         // without looking whether they go too far
+inline constexpr int most_newtons = 32;
+inline constexpr int most_stiffenings = 24;
+
+namespace {
+
+// In a lane's first sample nothing pulls, as nothing is known of where it came from. But what would
+// then stand higher than where it starts, or than a sample before by its speed, whichever is the
+// lower, is held by as much as takes that difference out of its motion. `step` is from the sample
+// before as it would have been.
+template <class V, class ForceLaw>
+static inline Slope<V> first_gradient(const ForceLaw& law, V before, V speed, V step) {
+  const auto falls = law.gradient(before, speed).value * speed < V{};
+  const V lead = select(falls, speed, V{});
+  const V way = step - lead;
+  const Slope<V> at = law.gradient(before + lead, way);
+  const auto rises = (at.value * way > V{}) & ((falls == (V{} != V{})) | (way * speed > V{}));
+  const V wide = select(falls & rises, step, V{} + 1);
+  const V share = select(falls, at.value * way / wide, at.value);
+  const V slope = select(falls, (at.value + at.slope * way - share) / wide, at.slope);
+  return {select(rises, share, V{}), select(rises, slope, V{})};
+}
+
+// The links of a cluster in one sample. `memory` is theirs, [link][passive_rows].
+template <class V, class Body, class Space>
+class Joint {
+ public:
+  using Lanes = decltype(V{} == V{});
+
+  Joint(const PassiveLink* links, std::size_t count, V* memory, Joined<V>* joined, Space& space,
+        Body& body)
+      : links_(links),
+        count_(count),
+        memory_(memory),
+        joined_(joined),
+        space_(space),
+        body_(body),
+        is_first_(body.awake() == V{}) {}
+
+  void solve() {
+    set_out();
+    Lanes live = evaluate(V{} == V{});
+    if (any_of(live & is_lost_)) {
+      set_out_again(live & is_lost_);
+    }
+    if (any_of(live)) {
+      live = go_by_newton(live);
+    }
+    if (any_of(is_first_)) {
+      live = live | (is_first_ & makes_energy());
+    }
+    if (any_of(live)) {
+      stiffen(live);
+    }
+    for (std::size_t i = 0; i < count_; ++i) {
+      const V force = joined_[i].force;
+      memory_[i * passive_rows + 2] = force - joined_[i].steady;
+      body_.push(links_[i].ends, force);
+    }
+  }
+
+ private:
+  static constexpr Scalar<V> share_of_rounding = tiny_share<V>() * 2;
+  // From so near one more step of Newton's is as exact as numbers are, and falls on either side of
+  // the solution; what stopped before would make, or take, a little in every sample.
+  static constexpr auto nearness =
+      static_cast<Scalar<V>>(sizeof(Scalar<V>) == 4 ? 0x1p-14 : 0x1p-34);
+
+  LinkState<V> state_of(std::size_t i) const {
+    const Ends ends = links_[i].ends;
+    const V* const row = memory_ + i * passive_rows;
+    return {.now = row[0],
+            .speed = row[1],
+            .free = body_.distance(ends),
+            .fast = body_.speed(ends),
+            .gamma = body_.gamma(ends)};
+  }
+
+  template <class Use>
+  auto with_law_of(std::size_t i, Use&& use) const {
+    const auto c = [&](std::size_t k) { return body_.coefficient(links_[i].coefficients[k]); };
+    return with_law<V>(links_[i].law, c, use);
+  }
+
+  // From the forces of the sample before, but for what is known of this one's. What exerted
+  // nothing, or may hold in several ways, starts as it would go on alone.
+  void set_out() {
+    for (std::size_t i = 0; i < count_; ++i) {
+      const LinkState<V> state = state_of(i);
+      Joined<V>& link = joined_[i];
+      link.before = state.before();
+      link.speed = state.speed;
+      const bool rubs = facts_of(links_[i].law).family == Family::bow;
+      link.free = rubs ? state.speed + state.fast : state.free - state.before();
+      const Steady<V> steady = with_law_of(i, [&](const auto& law) { return law.steady(state); });
+      link.steady = select(is_first_, V{}, steady.force);
+      link.damping = select(is_first_, V{}, positive(steady.damping));
+      link.force = V{};
+    }
+    space_.rest();
+    for (std::size_t i = 0; i < count_; ++i) {
+      if (facts_of(links_[i].law).is_convex) {
+        exert(i, select(is_first_, V{}, joined_[i].steady + memory_[i * passive_rows + 2]));
+      }
+    }
+    for (std::size_t i = 0; i < count_; ++i) {
+      const auto is_known = (joined_[i].force != V{}) | is_first_;
+      if (any_of(is_known == (V{} != V{}))) {
+        exert(i, select(is_known, V{}, alone(i)));
+      }
+    }
+    find_steps();
+  }
+  void exert(std::size_t i, V force) {
+    joined_[i].force += force;
+    if (any_of(force != V{})) {
+      space_.pull(i, force);
+    }
+  }
+  void find_steps() {
+    for (std::size_t i = 0; i < count_; ++i) {
+      joined_[i].step = joined_[i].free + space_.pulled(i);
+    }
+  }
+  // What a link would exert if the others went on exerting what they do.
+  V alone(std::size_t i) const {
+    LinkState<V> state = state_of(i);
+    state.free += space_.pulled(i);
+    state.fast += space_.pulled(i);
+    return with_law_of(i, [&](const auto& law) { return law.passive(state); });
+  }
+
+  // What every link should exert. Gives those of the lanes in which what it does exert makes more
+  // energy than rounding may.
+  Lanes evaluate(Lanes live) {
+    V error{};
+    V scale{};
+    V power{};
+    along_ = V{};
+    bend_ = V{};
+    for (std::size_t i = 0; i < count_; ++i) {
+      Joined<V>& link = joined_[i];
+      const Slope<V> at =
+          with_law_of(i, [&](const auto& law) { return law.gradient(link.before, link.step); });
+      link.value = link.steady + link.damping * link.step + at.value;
+      link.slope = positive(link.damping + at.slope);
+      if (any_of(is_first_)) {
+        const Slope<V> first = with_law_of(i, [&](const auto& law) {
+          return first_gradient(law, link.before, link.speed, link.step);
+        });
+        link.value = select(is_first_, first.value, link.value);
+        link.slope = select(is_first_, positive(first.slope), link.slope);
+      }
+      const V off = link.value - link.force;
+      error += absolute(off * link.step);
+      power += (absolute(link.value) + absolute(link.force)) * absolute(link.step);
+      scale += (absolute(link.value) + absolute(link.force)) *
+               (absolute(link.before) + absolute(link.step));
+      along_ += link.way * off;
+      bend_ += link.way * link.way * link.slope;
+    }
+    is_lost_ = error > power / 4;
+    is_far_ = error > nearness * power + share_of_rounding * scale;
+    return live & (error > share_of_rounding * scale);
+  }
+
+  // Where that leads astray, as a hard blow's force does in the sample after it: from nothing, one
+  // link after the other doing what it would alone, which leads downhill at every step.
+  void set_out_again(Lanes lost) {
+    space_.rest();
+    for (std::size_t i = 0; i < count_; ++i) {
+      const V force = select(is_first_, V{}, alone(i));
+      joined_[i].force = select(lost, force, joined_[i].force);
+      space_.pull(i, force);
+    }
+    move();
+    evaluate(lost);
+  }
+
+  // Everything to where the forces bring it: not by what they change, lest rounding adds up.
+  void move() {
+    space_.rest();
+    for (std::size_t i = 0; i < count_; ++i) {
+      if (any_of(joined_[i].force != V{})) {
+        space_.pull(i, joined_[i].force);
+      }
+    }
+    find_steps();
+  }
+
+  // Gives the lanes that have not arrived.
+  Lanes go_by_newton(Lanes live) {
+    const V one = V{} + 1;
+    const Lanes none = one != one;
+    const Lanes all = one == one;
+    const V steepest = V{} - Scalar<V>(1e30);
+    V last = steepest;  // how the objective fell at first along the way
+    V share = one;      // of the way that has been gone
+    V inertia{};        // how the objective bends along the way, but for the laws
+    for (int round = 0; round < most_newtons && any_of(live); ++round) {
+      space_.solve(joined_, round > free_newtons);
+      // Mostly that does it. If not, as much is taken back of the last way as brings the end of it
+      // near to where the objective is the lowest on it.
+      const auto is_beyond =
+          (along_ > Scalar<V>(-0.5) * last) & (round > free_newtons ? all : none);
+      const V back = along_ / (inertia + bend_);
+      const V most = Scalar<V>(0.9) * share;
+      const V go = select(is_beyond, V{} - select(back < most, back, most), one);
+      auto moves = V{} != V{};
+      V falls{};
+      V bends{};
+      for (std::size_t i = 0; i < count_; ++i) {
+        Joined<V>& link = joined_[i];
+        link.way = select(is_beyond, link.way, link.newton_way);
+        link.push = select(is_beyond, link.push, link.newton_push);
+        falls += link.way * (link.value - link.force);
+        bends += link.way * link.way * link.slope;
+        moves = moves | go_on(link, live, go);
+      }
+      last = select(is_beyond, last, falls);
+      share = select(is_beyond, share + go, one);
+      inertia = select(is_beyond, inertia, V{} - falls - bends);
+      move();
+      live = live & is_far_ & (moves | is_beyond);
+      if (any_of(live)) {
+        live = evaluate(live);
+      }
+    }
+    return live;
+  }
+
+  // Goes a share of its way. Gives the lanes in which that changes more than the last digit.
+  Lanes go_on(Joined<V>& link, Lanes live, V share) {
+    link.force = select(live, link.force + share * link.push, link.force);
+    return absolute(link.way) > tiny_share<V>() / 2 * (absolute(link.before) + absolute(link.step));
+  }
+
+  // Every link then exerts what it would where it was, in proportion to its step what brought it to
+  // where it is, and the more against its step the longer energy is made: that is solved at once.
+  // Held without end nothing moves; in the first sample, from where it starts.
+  void stiffen(Lanes live) {
+    for (std::size_t i = 0; i < count_; ++i) {
+      memory_[i * passive_rows + 2] = joined_[i].force;
+    }
+    auto hold = static_cast<Scalar<V>>(0x1p-30);
+    for (int round = 0; round < most_stiffenings && any_of(live); ++round, hold *= 8) {
+      for (std::size_t i = 0; i < count_; ++i) {
+        Joined<V>& link = joined_[i];
+        const V rest = exerted(i, V{});
+        const V wide = select(link.step == V{}, V{} + 1, link.step);
+        const V secant = positive((exerted(i, link.step) - rest) / wide);
+        const V give = body_.gamma(links_[i].ends);
+        const V held = hold / select(give > V{}, give, V{} + 1);
+        link.slope = select(is_first_, held, secant + held);
+        link.value = select(is_first_, memory_[i * passive_rows + 2] + held * from_start(link),
+                            rest + link.slope * link.step);
+      }
+      space_.solve(joined_, true);
+      for (std::size_t i = 0; i < count_; ++i) {
+        joined_[i].way = joined_[i].newton_way;
+        joined_[i].push = joined_[i].newton_push;
+        go_on(joined_[i], live, V{} + 1);
+      }
+      move();
+      live = live & makes_energy();
+    }
+  }
+
+  V exerted(std::size_t i, V step) const {
+    const Joined<V>& link = joined_[i];
+    const V at =
+        with_law_of(i, [&](const auto& law) { return law.gradient(link.before, step).value; });
+    return link.steady + link.damping * step + at;
+  }
+
+  // In the first sample a potential has risen only from where it starts.
+  V from_start(const Joined<V>& link) const {
+    return link.step - select(is_first_, link.speed, V{});
+  }
+  Lanes makes_energy() const {
+    V made{};
+    V scale{};
+    for (std::size_t i = 0; i < count_; ++i) {
+      const Joined<V>& link = joined_[i];
+      const V way = from_start(link);
+      const V at = with_law_of(i, [&](const auto& law) {
+        return law.gradient(link.before + (link.step - way), way).value;
+      });
+      const V value = select(is_first_, V{}, link.steady + link.damping * link.step);
+      made += at * way + (value - link.force) * link.step;
+      scale += (absolute(at) + absolute(value) + absolute(link.force)) *
+               (absolute(link.before) + absolute(link.step));
+    }
+    return made > share_of_rounding * scale;
+  }
+
+  const PassiveLink* links_;
+  std::size_t count_;
+  V* memory_;
+  Joined<V>* joined_;
+  Space& space_;
+  Body& body_;
+  Lanes is_first_;
+  V along_{};  // how the objective rises, where it is now, along the last way
+  V bend_{};   // and how the laws bend it
+  Lanes is_far_{};
+  Lanes is_lost_{};  // where most of what links exert is not what they should
+};
+
+}  // namespace
+
+// Solves one cluster and pushes its links' ends. `memory` is of its links, [link][passive_rows];
+// `numbers` are Cluster::numbers() packs, left as they like.
+template <class V, class Body>
+[[gnu::noinline]] static void solve_cluster(const std::vector<PassiveLink>& links,
+                                            const Cluster& cluster, V* memory, V* numbers,
+                                            Body& body) {
+  const PassiveLink* const first = links.data() + cluster.first;
+  auto* const joined = reinterpret_cast<Joined<V>*>(numbers);
+  V* const rest = numbers + joint_numbers * cluster.count;
+  if (cluster.inverse_mass.empty()) {
+    ByLinks<V, Body> space(first, cluster, rest, body);
+    Joint<V, Body, ByLinks<V, Body>>(first, cluster.count, memory, joined, space, body).solve();
+  } else {
+    ByMasses<V> space(first, cluster, rest, body);
+    Joint<V, Body, ByMasses<V>>(first, cluster.count, memory, joined, space, body).solve();
+  }
+}
+
+}  // namespace ressort

@@ -1,0 +1,384 @@
+// core/kernels: Newton's steps for a cluster of passive links (joint.h), by a sparse factor of
+// M + B S B^T over the masses or by a dense one of I + S^1/2 C S^1/2 over the links, S >= 0 being
+// the slopes of what they exert.
+#pragma once
+
+#include <algorithm>
+
+#include "core/kernels/clusters.h"
+#include "core/laws/laws.h"
+
+namespace ressort {
+
+using laws::tiny_share;
+
+inline constexpr int most_gradients = 60;
+
+// A link of a cluster in one sample.
+template <class V>
+struct Joined {
+  V before;  // the distance a sample ago
+  V speed;   // from there to now
+  V free;    // and to the next sample if none of the cluster acted
+  V step;    // as they do
+  V force;   // that it exerts
+  V steady;  // the share of it that does not depend on the step
+  V damping;
+  V value;  // what it should exert, after this step
+  V slope;  // and how that grows with it, or is taken to
+  V way;    // which way the solution is sought, and what more the link exerts at its end
+  V push;
+  V newton_way;  // the same as Newton found it last
+  V newton_push;
+};
+static_assert(sizeof(Joined<double>) == joint_numbers * sizeof(double));
+
+namespace {
+
+template <class V>
+static inline V positive(V x) {
+  return select(x > V{}, x, V{});
+}
+
+// How far a force of 1 along one link brings the ends of another.
+template <class V, class Body>
+static inline V coupling_of(const Body& body, Ends one, Ends other) {
+  const auto [a, b] = one;
+  const auto [c, d] = other;
+  return (body.gamma({a, d}) + body.gamma({b, c}) - body.gamma({a, c}) - body.gamma({b, d})) / 2;
+}
+
+// Steps of a cluster's links, by its masses.
+template <class V>
+class ByMasses {
+ public:
+  template <class Body>
+  ByMasses(const PassiveLink* links, const Cluster& cluster, V* numbers, const Body& body)
+      : links_(links),
+        cluster_(cluster),
+        count_(cluster.inverse_mass.size()),
+        give_(numbers),
+        mass_(give_ + count_),
+        x_(mass_ + count_),
+        matrix_(x_ + count_) {
+    constexpr Scalar<V> least = Scalar<V>(1e-30);
+    for (std::size_t i = 0; i < count_; ++i) {
+      const V give = body.coefficient(cluster.inverse_mass[i]);
+      give_[i] = select(give > least, give, V{} + least);
+      mass_[i] = 1 / give_[i];
+      x_[i] = V{};
+    }
+  }
+
+  // From here on, what forces do to the ways of all links.
+  void rest() { std::fill_n(x_, count_, V{}); }
+  void pull(std::size_t link, V force) {
+    const auto [a, b] = ends(link);
+    if (a != no_mass) {
+      x_[a] -= give_[a] * force;
+    }
+    if (b != no_mass) {
+      x_[b] += give_[b] * force;
+    }
+  }
+  V pulled(std::size_t link) const {
+    const auto [a, b] = ends(link);
+    return (a == no_mass ? V{} : x_[a]) - (b == no_mass ? V{} : x_[b]);
+  }
+
+  // Newton's way from forces that are `value - force` off.
+  void solve(Joined<V>* joined, bool is_exact) {
+    if (cluster_.has_factor() && (is_exact || !cluster_.is_large())) {
+      fill(joined);
+      factorise();
+      substitute();
+    } else {
+      approach(joined);
+    }
+    for (std::size_t i = 0; i < cluster_.count; ++i) {
+      Joined<V>& link = joined[i];
+      link.newton_way = pulled(i);
+      link.newton_push = link.value - link.force + link.slope * link.newton_way;
+    }
+  }
+
+ private:
+  Ends ends(std::size_t link) const { return {links_[link].mass_a, links_[link].mass_b}; }
+
+  void fill(const Joined<V>* joined) {
+    const std::size_t size = count_ + cluster_.elimination.row.size();
+    for (std::size_t i = 0; i < count_; ++i) {
+      matrix_[i] = mass_[i];
+      x_[i] = V{};
+    }
+    for (std::size_t i = count_; i < size; ++i) {
+      matrix_[i] = V{};
+    }
+    for (std::size_t i = 0; i < cluster_.count; ++i) {
+      const auto [a, b] = ends(i);
+      if (a == b) {
+        continue;
+      }
+      const V off = joined[i].value - joined[i].force;
+      if (a != no_mass) {
+        matrix_[a] += joined[i].slope;
+        x_[a] -= off;
+      }
+      if (b != no_mass) {
+        matrix_[b] += joined[i].slope;
+        x_[b] += off;
+      }
+      if (links_[i].entry != no_mass) {
+        matrix_[links_[i].entry] -= joined[i].slope;
+      }
+    }
+  }
+
+  // The same by conjugate gradients, with the diagonal taken out: O(links) a round, and few rounds
+  // where links are not far harder than what they move is heavy. As near as Newton's next step,
+  // which starts from there, can make use of.
+  void approach(const Joined<V>* joined) {
+    V* const rest = matrix_;
+    V* const to = rest + count_;
+    V* const pull = to + count_;
+    V* const diagonal = pull + count_;
+    const auto along = [&](const V* way, std::size_t link) {
+      const auto [a, b] = ends(link);
+      return (a == no_mass ? V{} : way[a]) - (b == no_mass ? V{} : way[b]);
+    };
+    const auto add = [&](V* sum, std::size_t link, V force) {
+      const auto [a, b] = ends(link);
+      if (a != no_mass) {
+        sum[a] += force;
+      }
+      if (b != no_mass) {
+        sum[b] -= force;
+      }
+    };
+    std::copy_n(mass_, count_, diagonal);
+    std::fill_n(rest, count_, V{});
+    std::fill_n(x_, count_, V{});
+    for (std::size_t i = 0; i < cluster_.count; ++i) {
+      const auto [a, b] = ends(i);
+      if (a != b) {
+        add(rest, i, joined[i].force - joined[i].value);
+        diagonal[a == no_mass ? b : a] += joined[i].slope;
+        diagonal[b == no_mass ? a : b] += a == no_mass || b == no_mass ? V{} : joined[i].slope;
+      }
+    }
+    V last{};
+    for (std::size_t i = 0; i < count_; ++i) {
+      to[i] = rest[i] / diagonal[i];
+      last += rest[i] * to[i];
+    }
+    const V enough = nearness * last;
+    for (int round = 0; round < most_gradients && any_of(last > enough); ++round) {
+      const auto live = last > enough;
+      for (std::size_t i = 0; i < count_; ++i) {
+        pull[i] = mass_[i] * to[i];
+      }
+      for (std::size_t i = 0; i < cluster_.count; ++i) {
+        add(pull, i, joined[i].slope * along(to, i));
+      }
+      V bends{};
+      for (std::size_t i = 0; i < count_; ++i) {
+        bends += to[i] * pull[i];
+      }
+      const V far = select(live, last / select(live, bends, V{} + 1), V{});
+      V next{};
+      for (std::size_t i = 0; i < count_; ++i) {
+        x_[i] += far * to[i];
+        rest[i] -= far * pull[i];
+        next += rest[i] * rest[i] / diagonal[i];
+      }
+      const V keep = select(live, next / select(live, last, V{} + 1), V{});
+      for (std::size_t i = 0; i < count_; ++i) {
+        to[i] = rest[i] / diagonal[i] + keep * to[i];
+      }
+      last = select(live, next, last);
+    }
+  }
+  static constexpr auto nearness = static_cast<Scalar<V>>(1e-12);
+
+  void factorise() {
+    const Elimination& plan = cluster_.elimination;
+    const std::uint32_t* target = plan.target.data();
+    for (std::size_t column = 0; column < count_; ++column) {
+      V* const below = matrix_ + count_ + plan.first[column];
+      const std::size_t entries = plan.first[column + 1] - plan.first[column];
+      const V inverse = 1 / matrix_[column];
+      matrix_[column] = inverse;
+      for (std::size_t i = 0; i < entries; ++i) {
+        const V share = below[i] * inverse;
+        for (std::size_t k = 0; k <= i; ++k) {
+          matrix_[*target++] -= share * below[k];
+        }
+      }
+      for (std::size_t i = 0; i < entries; ++i) {
+        below[i] *= inverse;
+      }
+    }
+  }
+
+  void substitute() {
+    const Elimination& plan = cluster_.elimination;
+    const V* const entries = matrix_ + count_;
+    for (std::size_t column = 0; column < count_; ++column) {
+      for (std::size_t i = plan.first[column]; i < plan.first[column + 1]; ++i) {
+        x_[plan.row[i]] -= entries[i] * x_[column];
+      }
+      x_[column] *= matrix_[column];
+    }
+    for (std::size_t column = count_; column-- > 0;) {
+      for (std::size_t i = plan.first[column]; i < plan.first[column + 1]; ++i) {
+        x_[column] -= entries[i] * x_[plan.row[i]];
+      }
+    }
+  }
+
+  const PassiveLink* links_;
+  const Cluster& cluster_;
+  std::size_t count_;
+  V* give_;
+  V* mass_;
+  V* x_;
+  V* matrix_;
+};
+
+// The same by the links, of those alone that exert anything or may.
+template <class V, class Body>
+class ByLinks {
+ public:
+  ByLinks(const PassiveLink* links, const Cluster& cluster, V* numbers, const Body& body)
+      : links_(links),
+        count_(cluster.count),
+        coupling_(numbers),
+        matrix_(coupling_ + count_ * count_),
+        root_(matrix_ + count_ * count_),
+        x_(root_ + count_),
+        pulled_(x_ + count_),
+        index_(reinterpret_cast<std::size_t*>(pulled_ + count_)),
+        body_(body) {}
+
+  void rest() { std::fill_n(pulled_, count_, V{}); }
+  void pull(std::size_t link, V force) {
+    const V* const row = couple(find(link));
+    for (std::size_t i = 0; i < count_; ++i) {
+      pulled_[i] -= row[i] * force;
+    }
+  }
+  V pulled(std::size_t link) const { return pulled_[link]; }
+
+  // With h = C (value - force) and T = S^1/2, and T z = y: (I + T C T) y = T h, push = off - T y,
+  // way = -C push.
+  void solve(Joined<V>* joined, bool) {
+    for (std::size_t i = 0; i < count_; ++i) {
+      const Joined<V>& link = joined[i];
+      if (any_of((link.value != link.force) | (link.slope > V{}))) {
+        couple(find(i));
+      }
+    }
+    fill(joined);
+    factorise();
+    substitute();
+    for (std::size_t i = 0; i < count_; ++i) {
+      joined[i].newton_way = V{};
+      joined[i].newton_push = V{};
+    }
+    for (std::size_t k = 0; k < active_; ++k) {
+      Joined<V>& link = joined[index_[k]];
+      link.newton_push = link.value - link.force - root_[k] * x_[k];
+      const V* const row = coupling_ + k * count_;
+      for (std::size_t i = 0; i < count_; ++i) {
+        joined[i].newton_way -= row[i] * link.newton_push;
+      }
+    }
+  }
+
+ private:
+  // Which of the active links it is, from now on.
+  std::size_t find(std::size_t link) {
+    std::size_t k = 0;
+    while (k < active_ && index_[k] != link) {
+      ++k;
+    }
+    return k < active_ ? k : (index_[active_] = link, is_new_ = true, active_++);
+  }
+  // [link] of an active one.
+  const V* couple(std::size_t k) {
+    V* const row = coupling_ + k * count_;
+    for (std::size_t i = 0; is_new_ && i < count_; ++i) {
+      row[i] = coupling_of<V>(body_, links_[index_[k]].ends, links_[i].ends);
+    }
+    is_new_ = false;
+    return row;
+  }
+
+  void fill(const Joined<V>* joined) {
+    for (std::size_t k = 0; k < active_; ++k) {
+      root_[k] = square_root(joined[index_[k]].slope);
+      x_[k] = V{};
+    }
+    for (std::size_t k = 0; k < active_; ++k) {
+      const Joined<V>& link = joined[index_[k]];
+      const V off = link.value - link.force;
+      const V* const row = coupling_ + k * count_;
+      for (std::size_t i = 0; i < active_; ++i) {
+        x_[i] += row[index_[i]] * off;
+      }
+      for (std::size_t i = k; i < active_; ++i) {
+        matrix_[i * count_ + k] = root_[k] * row[index_[i]] * root_[i];
+      }
+      matrix_[k * count_ + k] += 1;
+    }
+    for (std::size_t k = 0; k < active_; ++k) {
+      x_[k] *= root_[k];
+    }
+  }
+
+  void factorise() {
+    for (std::size_t k = 0; k < active_; ++k) {
+      const V inverse = 1 / matrix_[k * count_ + k];
+      matrix_[k * count_ + k] = inverse;
+      for (std::size_t i = k + 1; i < active_; ++i) {
+        const V share = matrix_[i * count_ + k] * inverse;
+        for (std::size_t j = k + 1; j <= i; ++j) {
+          matrix_[i * count_ + j] -= share * matrix_[j * count_ + k];
+        }
+      }
+      for (std::size_t i = k + 1; i < active_; ++i) {
+        matrix_[i * count_ + k] *= inverse;
+      }
+    }
+  }
+
+  void substitute() {
+    for (std::size_t k = 0; k < active_; ++k) {
+      for (std::size_t i = k + 1; i < active_; ++i) {
+        x_[i] -= matrix_[i * count_ + k] * x_[k];
+      }
+      x_[k] *= matrix_[k * count_ + k];
+    }
+    for (std::size_t k = active_; k-- > 0;) {
+      for (std::size_t i = k + 1; i < active_; ++i) {
+        x_[k] -= matrix_[i * count_ + k] * x_[i];
+      }
+    }
+  }
+
+  const PassiveLink* links_;
+  std::size_t count_;
+  std::size_t active_ = 0;
+  bool is_new_ = false;
+  V* coupling_;  // [active][link]
+  V* matrix_;    // [active][active], below the diagonal
+  V* root_;
+  V* x_;
+  V* pulled_;
+  std::size_t* index_;  // [active] link
+  const Body& body_;
+};
+
+}  // namespace
+
+}  // namespace ressort
