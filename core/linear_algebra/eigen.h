@@ -36,12 +36,18 @@ std::vector<std::complex<double>> eigenvalues(const Matrix& matrix);
 struct ComplexEigenpairs {
   ComplexVector values;  // complex ones in conjugate pairs
   std::vector<ComplexVector> vectors;
-  ComplexVector shares;  // [pair] how much of each is in the state
+  ComplexVector shares;  // [pair] how much of each is in the state, if one is given
 };
+
+// Of any square matrix, each of length 1. Nothing where they cannot be found. O(size^3)
+std::optional<ComplexEigenpairs> eigenpairs(const Matrix& matrix);
 
 // Of any square matrix, and a state as the sum of shares * vectors. Nothing where the vectors do
 // not span it to 1e-9. O(size^3)
 std::optional<ComplexEigenpairs> eigenpairs_of_state(const Matrix& matrix, const Vector& state);
+
+// A B
+Matrix product(const Matrix& a, const Matrix& b);
 
 // BT A B
 Matrix in_basis(const Matrix& matrix, const Matrix& basis);

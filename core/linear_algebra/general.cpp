@@ -34,24 +34,42 @@ std::vector<std::complex<double>> eigenvalues(const Matrix& matrix) {
   return {solver.eigenvalues().begin(), solver.eigenvalues().end()};
 }
 
-std::optional<ComplexEigenpairs> eigenpairs_of_state(const Matrix& matrix, const Vector& state) {
+std::optional<ComplexEigenpairs> eigenpairs(const Matrix& matrix) {
   const Eigen::EigenSolver<Eigen::MatrixXd> solver(map_of(matrix));
   if (solver.info() != Eigen::Success) {
     return std::nullopt;
   }
   const Eigen::MatrixXcd vectors = solver.eigenvectors();
+  const std::size_t size = matrix.rows();
+  ComplexEigenpairs pairs{ComplexVector(solver.eigenvalues().data(), size), {}, {}};
+  for (std::size_t j = 0; j < size; ++j) {
+    pairs.vectors.emplace_back(vectors.data() + j * size, size);
+  }
+  return pairs;
+}
+
+std::optional<ComplexEigenpairs> eigenpairs_of_state(const Matrix& matrix, const Vector& state) {
+  std::optional<ComplexEigenpairs> pairs = eigenpairs(matrix);
+  if (!pairs) {
+    return std::nullopt;
+  }
+  const auto size = static_cast<Eigen::Index>(matrix.rows());
+  Eigen::MatrixXcd vectors(size, size);
+  for (Eigen::Index j = 0; j < size; ++j) {
+    std::copy_n(std::begin(pairs->vectors[static_cast<std::size_t>(j)]), size,
+                vectors.col(j).data());
+  }
   const Eigen::VectorXcd wanted = map_of(state).cast<std::complex<double>>();
   const Eigen::VectorXcd shares = Eigen::PartialPivLU<Eigen::MatrixXcd>(vectors).solve(wanted);
   if (!((vectors * shares - wanted).norm() <= tolerance * (1e-300 + wanted.norm()))) {
     return std::nullopt;
   }
-  const std::size_t size = matrix.rows();
-  ComplexEigenpairs pairs{
-      ComplexVector(solver.eigenvalues().data(), size), {}, ComplexVector(shares.data(), size)};
-  for (std::size_t j = 0; j < size; ++j) {
-    pairs.vectors.emplace_back(vectors.data() + j * size, size);
-  }
+  pairs->shares = ComplexVector(shares.data(), matrix.rows());
   return pairs;
+}
+
+Matrix product(const Matrix& a, const Matrix& b) {
+  return matrix_of(map_of(a) * map_of(b));
 }
 
 Matrix in_basis(const Matrix& matrix, const Matrix& basis) {

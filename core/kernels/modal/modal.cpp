@@ -1,6 +1,7 @@
 #include "core/kernels/modal/modal.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 namespace ressort {
@@ -37,6 +38,19 @@ std::size_t link_count(const Modes& modes) {
   return count;
 }
 
+// Those of its holds that are not plain; their ends are the form's.
+std::vector<PassiveLink> passive_links(const Program& program, const Modes& modes) {
+  std::vector<PassiveLink> links;
+  for (const ModalHold& hold : modes.holds) {
+    const LinkRun& run = program.link_runs[hold.run];
+    for (std::size_t i = 0; run.scheme != Scheme::plain && i < hold.a.size(); ++i) {
+      links.push_back(
+          {.law = run.law, .coefficients = run.coefficients, .ends = {hold.a[i], hold.b[i]}});
+    }
+  }
+  return links;
+}
+
 template <class T>
 T norm_of(const std::vector<double>& shape) {
   double sum = 0.0;
@@ -50,10 +64,13 @@ T norm_of(const std::vector<double>& shape) {
 template <class T>
 class Furnisher {
  public:
-  Furnisher(const Modes& modes, Isa isa, T* memory)
-      : modes_(modes),
+  Furnisher(const Program& program, const Modes& modes, std::size_t passives, Isa isa, T* memory)
+      : program_(program),
+        modes_(modes),
+        passives_(passives),
         padded_(round_up(std::max(modes.modes, 1u), 2 * vector_bytes(isa) / sizeof(T))),
         stride_(round_up(padded_, widest_bytes / sizeof(T))),
+        row_(modes.is_crossed ? 2 * stride_ : stride_),
         arena_(memory) {}
 
   std::size_t furnish(ModalState<T>& state) {
@@ -62,10 +79,12 @@ class Furnisher {
     const std::size_t observed = places + modes_.outputs.size();
     state.modes = padded_;
     state.stride = stride_;
-    for (T** row : {&state.q, &state.d, &state.k, &state.z, &state.load, &state.saved_q,
-                    &state.saved_d, &state.spread, &state.decay, &state.swing, &state.debt}) {
+    state.row = row_;
+    for (T** row : {&state.q, &state.d, &state.k, &state.z, &state.saved_q, &state.saved_d,
+                    &state.spread, &state.decay, &state.swing, &state.debt}) {
       *row = arena_.take(stride_);
     }
+    state.load = arena_.take(row_);
     state.held_give = arena_.take(link_count(modes_));
     state.loudness = arena_.take(observed);
     state.room = arena_.take(observed);
@@ -79,7 +98,7 @@ class Furnisher {
         modes_.places, [](auto& place) -> auto& { return place.shape; });
     state.outputs = rows(
         modes_.outputs, [](auto& output) -> auto& { return output.place.shape; });
-    if (modes_.is_exact) {
+    if (modes_.is_exact && !modes_.is_crossed) {
       for (T** row : {&state.root, &state.k_step, &state.z_step}) {
         *row = arena_.take(stride_);
       }
@@ -89,6 +108,12 @@ class Furnisher {
         std::copy_n(state.pushes, count, shape);
       }
       state.shape = shape;
+    }
+    if (modes_.is_crossed) {
+      state.speeds = rows(
+          modes_.places, [](auto& place) -> auto& { return place.speed; });
+      state.pole = rows(
+          std::array{&modes_.pole}, [](auto& pole) -> auto& { return *pole; });
     }
     state.push_norm = norms(
         modes_.pushes, [](auto& push) -> auto& { return push.shape; });
@@ -106,22 +131,57 @@ class Furnisher {
     state.kick = arena_.take(most_rows + places + modes_.pushes.size());
     state.speed = arena_.take(most_rows + places + modes_.pushes.size());
     state.heard = arena_.take(most_rows + modes_.outputs.size());
-    state.bundle = arena_.take(most_rows * stride_);
+    state.bundle = arena_.take(most_rows * row_);
     state.seen = arena_.take(max_block_frames * observed);
+    state.forces = static_cast<std::size_t>(
+        std::count_if(modes_.outputs.begin(), modes_.outputs.end(),
+                      [](const ModalOutput& output) { return output.is_force; }));
+    state.felt = arena_.take(2 * state.forces * stride_);
+    state.felt_still = arena_.take(state.forces);
+    state.exerted = arena_.take(ends);
+    state.saved_x = arena_.take(ends);
+    state.saved_v = arena_.take(ends);
+    state.shove = arena_.take(places);
+    state.passives = passives_;
+    state.reply = arena_.take(observed * passives_);
+    state.gamma = arena_.take(passives_ * passives_);
+    state.memory = arena_.take(passive_rows * passives_);
+    const Cluster all{.count = static_cast<std::uint32_t>(passives_)};
+    state.numbers = arena_.take(all.numbers());
+    state.pushed = arena_.take(passives_);
+    state.give = gives();
+    for (T** row : {&state.opening, &state.rush, &state.slack, &state.yield, &state.yield_step,
+                    &state.saved_yield, &state.saved_yield_step}) {
+      *row = arena_.take(passives_);
+    }
     return arena_.used();
   }
 
  private:
+  const T* gives() {
+    T* const first = arena_.take(passives_);
+    T* next = first;
+    for (const ModalHold& hold : modes_.holds) {
+      if (first != nullptr && program_.link_runs[hold.run].scheme != Scheme::plain) {
+        next = std::transform(hold.give.begin(), hold.give.end(), next,
+                              [](double give) { return static_cast<T>(give); });
+      }
+    }
+    return first;
+  }
   std::size_t shape_count() const {
     return modes_.pushes.size() + modes_.places.size() + modes_.outputs.size();
   }
+  // A shape of crossed modes has two parts.
   template <class Items, class ShapeOf>
   T* rows(const Items& items, ShapeOf&& shape_of) {
-    T* const first = arena_.take(items.size() * stride_);
+    T* const first = arena_.take(items.size() * row_);
     for (std::size_t i = 0; first != nullptr && i < items.size(); ++i) {
       const std::vector<double>& shape = shape_of(items[i]);
-      std::transform(shape.begin(), shape.end(), first + i * stride_,
-                     [](double s) { return static_cast<T>(s); });
+      for (std::size_t n = 0; n < shape.size(); ++n) {
+        const std::size_t part = n / modes_.modes;
+        first[i * row_ + part * stride_ + n % modes_.modes] = static_cast<T>(shape[n]);
+      }
     }
     return first;
   }
@@ -134,9 +194,12 @@ class Furnisher {
     return first;
   }
 
+  const Program& program_;
   const Modes& modes_;
+  std::size_t passives_;
   std::size_t padded_;
   std::size_t stride_;
+  std::size_t row_;
   Arena<T> arena_;
 };
 
@@ -147,14 +210,20 @@ ModalKernel<T>::ModalKernel(const Program& program, const Modes& modes, std::siz
     : Kernel<T>(program, 1),
       program_(program),
       modes_(modes),
-      step_(with_isa(isa, [&]<Isa level>() { return modal_step<level, T>(); })),
+      step_(with_isa(isa, [&]<Isa level>() { return modal_step<level, T>(modes.is_crossed); })),
       rows_(modes.places.size() + modes.pushes.size() + modes.outputs.size() + most_rows),
       bundled_rows_(rows_.size()),
       indices_(modes.pushes.size() + 2 * modes.places.size() + modes.holds.size()),
       held_ends_(link_count(modes)),
+      passive_(passive_links(program, modes)),
       state_{} {
-  numbers_.resize(Furnisher<T>(modes, isa, nullptr).furnish(state_));
-  Furnisher<T>(modes, isa, numbers_.data()).furnish(state_);
+  const std::size_t passives = passive_.size();
+  active_.links.reserve(passives);
+  active_.clusters.resize(1);
+  numbers_.resize(Furnisher<T>(program, modes, passives, isa, nullptr).furnish(state_));
+  Furnisher<T>(program, modes, passives, isa, numbers_.data()).furnish(state_);
+  state_.passive = passive_.data();
+  state_.active = &active_;
   state_.rows = rows_.data();
   state_.bundled_rows = bundled_rows_.data();
   state_.push_of = indices_.data();
@@ -163,7 +232,6 @@ ModalKernel<T>::ModalKernel(const Program& program, const Modes& modes, std::siz
   state_.held = state_.place_of + modes.places.size();
   state_.held_ends = held_ends_.data();
   state_.silence = static_cast<T>(modes.silence);
-  state_.quiet = static_cast<T>(modes.quiet);
   state_.lately_kept =
       static_cast<T>(std::pow(1e-3, static_cast<double>(check_frames) / program.rate_hz));
   this->reset(0);
@@ -172,31 +240,49 @@ ModalKernel<T>::ModalKernel(const Program& program, const Modes& modes, std::siz
 template <class T>
 void ModalKernel<T>::set_state(std::size_t, const double* x, const double* v) {
   const std::size_t places = modes_.places.size();
-  const double* basis = modes_.basis.data();
   // Where the model starts, nothing is displaced.
   const bool is_start = x == program_.position.data() && v == program_.velocity.data();
+  const std::size_t block = std::size_t{modes_.modes} * program_.moving;
   for (std::size_t i = 0; i < modes_.modes; ++i) {
     double q = modes_.q[i];
     double d = modes_.d[i];
+    const double* basis = modes_.basis.data() + i * program_.moving;
     for (std::size_t node = 0; !is_start && node < program_.moving; ++node, ++basis) {
-      q += *basis * (x[node] - program_.position[node]);
-      d += *basis * (v[node] - program_.velocity[node]);
+      const double moved = x[node] - program_.position[node];
+      const double faster = v[node] - program_.velocity[node];
+      q += basis[0] * moved + (modes_.is_crossed ? basis[2 * block] * faster : 0.0);
+      d += modes_.is_crossed ? basis[block] * moved + basis[3 * block] * faster : basis[0] * faster;
     }
     state_.q[i] = static_cast<T>(q);
     state_.d[i] = static_cast<T>(d);
   }
   for (std::size_t i = 0; i < modes_.ends.size(); ++i) {
     state_.x[places + i] = static_cast<T>(x[modes_.ends[i].node]);
-    state_.v[places + i] = T(0);
+    state_.v[places + i] = static_cast<T>(v[modes_.ends[i].node]);
+  }
+  for (std::size_t p = 0; modes_.is_crossed && p < places; ++p) {
+    double position = modes_.places[p].offset;
+    double velocity = 0.0;
+    for (const ModalPlace::Mass& mass : modes_.places[p].masses) {
+      position += mass.weight * x[mass.node];
+      velocity += mass.weight * v[mass.node];
+    }
+    state_.x[p] = static_cast<T>(position);
+    state_.v[p] = static_cast<T>(velocity);
   }
   // No link has computed anything yet: in the first sample there is nothing to feel.
   std::fill_n(state_.used, modes_.stiffness.size() + modes_.damping.size() + 1, T(0));
   std::fill_n(state_.late, modes_.pushes.size(), T(0));
   std::fill_n(state_.force, places + modes_.ends.size(), T(0));
+  std::fill_n(state_.pushed, passive_.size(), T(0));
+  std::fill_n(state_.yield, passive_.size(), T(0));
+  std::fill_n(state_.yield_step, passive_.size(), T(0));
+  state_.pulls = false;
+  state_.is_pushed = false;
   state_.touched_frames = 0;
   state_.surprised_frames = 0;
   state_.kick_norm = T(0);
-  if (modes_.is_exact) {
+  if (state_.root != nullptr) {
     std::fill_n(state_.root, state_.modes, T(1));
   }
   state_.is_stale = true;
@@ -217,8 +303,8 @@ Awake ModalKernel<T>::awake() const {
 template <class T>
 double ModalKernel<T>::owed(std::size_t listener) const {
   const std::size_t places = modes_.places.size();
-  const T* const row = listener < places ? state_.places + listener * state_.stride
-                                         : state_.outputs + (listener - places) * state_.stride;
+  const T* const row = listener < places ? state_.places + listener * state_.row
+                                         : state_.outputs + (listener - places) * state_.row;
   double sum = 0.0;
   for (std::size_t i = 0; i < modes_.modes; ++i) {
     sum += std::fabs(static_cast<double>(row[i])) * static_cast<double>(state_.debt[i]);
@@ -235,16 +321,34 @@ template <class T>
 void ModalKernel<T>::play(const Block<T>& block) {
   state_.ramps = ramps_of(this->coefficients);
   step_(program_, modes_, state_, block);
+  if (state_.silence > 0) {
+    remember_peaks(block);
+  }
   this->coefficients.finish(block.frames);
+}
+
+// Of each output as it is heard and of how far it is from its rest the lesser.
+template <class T>
+void ModalKernel<T>::remember_peaks(const Block<T>& block) {
+  const std::size_t outputs = modes_.outputs.size();
+  for (std::size_t o = 0; o < outputs; ++o) {
+    const auto rest = static_cast<T>(modes_.outputs[o].place.rest);
+    T& loudness = state_.loudness[modes_.places.size() + o];
+    for (std::size_t n = 0; n < block.frames; ++n) {
+      const T y = block.outputs[n * outputs + o];
+      loudness = std::max(loudness, std::min(std::abs(y), std::abs(y - rest)));
+    }
+  }
 }
 
 template <class T>
 bool ModalKernel<T>::is_near_start(std::size_t, double bound) const {
   double sum = 0.0;
   for (std::size_t i = 0; i < modes_.modes; ++i) {
-    const double root = modes_.is_exact ? static_cast<double>(state_.root[i]) : 1.0;
+    const double root = state_.root != nullptr ? static_cast<double>(state_.root[i]) : 1.0;
     const double moved = root * static_cast<double>(state_.q[i]) - modes_.q[i];
-    sum += moved * moved;
+    const double turned = modes_.is_crossed ? static_cast<double>(state_.d[i]) - modes_.d[i] : 0.0;
+    sum += moved * moved + turned * turned;
   }
   return modes_.reach * std::sqrt(sum) < bound;
 }

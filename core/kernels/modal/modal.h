@@ -10,6 +10,7 @@
 #pragma once
 
 #include "core/kernels/kernel.h"
+#include "core/kernels/passive.h"
 
 namespace ressort {
 
@@ -17,19 +18,27 @@ inline constexpr std::uint32_t check_frames = 32;  // from one look at what may 
 inline constexpr std::uint32_t long_check_frames = 128;  // ...while few are awake
 
 // Everything that one step of ModalKernel touches. Rows of modes are `stride` apart and filled up
-// with zeros to `modes`, whole packs of every kind. Ends: the places, then Modes::ends.
+// with zeros to `modes`, whole packs of every kind. Ends: the places, then Modes::ends. Listeners:
+// the places, then the outputs.
 template <class T>
 struct ModalState {
   Ramps<T> ramps;
   std::size_t modes;
   std::size_t stride;
+  std::size_t row;      // numbers from one shape to the next: crossed modes have two parts of each
   std::size_t awake;    // the first so many modes are
   std::size_t swept;    // the same in whole pairs of packs
   const T* stiffness;   // [share][mode] factors
   const T* damping;     // [share][mode]
   T* pushes;            // [push][mode] shapes, and without a gap
   T* places;            // [place][mode]
+  T* speeds;            // [place][mode] of crossed modes: how fast it is
+  const T* pole;        // [part][mode] of crossed modes, less 1
   T* outputs;           // [output][mode]
+  std::size_t forces;   // outputs that are
+  T* felt;              // [output that is a force][row of q, row of d][mode]
+  T* felt_still;        // [output that is a force] with q and d at 0
+  T* exerted;           // [end] by passive links, in this sample
   const T* push_norm;   // [push] length of the shape
   const T* place_norm;  // [place]
   T* q;                 // [mode]
@@ -61,26 +70,51 @@ struct ModalState {
   std::uint32_t* held;      // [hold] how many of its links are computed
   Ends* held_ends;          // [link that is computed]
   T* held_give;             // [link that is computed]
-  const T* shape;           // [push, place, output][mode] as they are written, if is_exact
-  T* root;                  // [mode] of the gain that all of these have, if is_exact
-  T* k_step;                // [mode] per sample, if is_exact
-  T* z_step;                // [mode]
-  T* spread;      // [mode] square of the amplitude per that of the state; 0: does not ring
-  T* decay;       // [mode] of an amplitude in check_frames
-  T* swing;       // [mode] amplitude
-  T* debt;        // [mode] amplitude of what was dropped
-  T* loudness;    // [listener] sum of all amplitudes, now or lately
-  T* room;        // [listener] what may still be dropped
-  T silence;      // share of `loudness` that may be dropped; 0: nothing sleeps
-  T quiet;        // what may be dropped in any case
-  T lately_kept;  // of `loudness` in check_frames
+  T* saved_x;               // [end] at the start of a block
+  T* saved_v;               // [end]
+  // Passive links: those of the holds that are not plain, in their order, and which of them are
+  // computed (`active`, whose ends are {which passive link, nobody}).
+  std::size_t passives;
+  const PassiveLink* passive;  // [passive link]
+  PassiveTables* active;       // never more than there are passive links
+  T* reply;        // [listener][passive link] how far a push of 1 between its ends moves it, by w
+  T* gamma;        // [passive link][passive link] how far a push of 1 closes another, by w
+  T* opening;      // [passive link] the distance of its ends, once all has moved
+  T* rush;         // [passive link] and its change per sample
+  T* memory;       // [active][passive_rows]
+  T* numbers;      // that solving them needs
+  T* pushed;       // [passive link] what it exerts
+  const T* give;   // [passive link] as ModalHold::give
+  T* slack;        // [passive link] the same, by the coefficients of now
+  T* yield;        // [passive link] how far it has given way by what is left out
+  T* yield_step;   // [passive link] and in the last sample
+  T* saved_yield;  // [passive link]
+  T* saved_yield_step;  // [passive link]
+  T* shove;             // [row] what passive links add to q and d along the row of a place
+  const T* shape;       // [push, place, output][mode] as they are written, if is_exact
+  T* root;              // [mode] of the gain that all of these have, if is_exact
+  T* k_step;            // [mode] per sample, if is_exact
+  T* z_step;            // [mode]
+  T* spread;            // [mode] square of the amplitude per that of the state; 0: does not ring
+  T* decay;             // [mode] of an amplitude in check_frames
+  T* swing;             // [mode] amplitude
+  T* debt;              // [mode] amplitude of what was dropped
+  T* loudness;          // [listener] as modal_sleep.h says, now or lately
+  T* room;              // [listener] what may still be dropped
+  T silence;            // share of `loudness` that may be dropped; 0: nothing sleeps
+  T lately_kept;        // of `loudness` in check_frames
   std::size_t saved_awake = 0;
   std::size_t bundled = 0;
   std::size_t bundled_modes = 0;
   std::size_t pushing = 0;
   std::uint32_t held_places = 0;
-  std::size_t held_links = 0;
+  std::size_t held_links = 0;  // of both kinds
   std::size_t links = 0;
+  bool is_first = false;  // the first sample of crossed modes
+  bool pulls = false;     // passive links do so from the second sample on
+  bool saved_pulls = false;
+  bool is_pushed = false;  // a passive link has pushed in the last sample
+  bool is_reply_stale = true;
   std::uint32_t touched_frames = 0;    // so long no block is tried as a free one
   std::uint32_t surprised_frames = 0;  // so long all links are computed
   T kick_norm = 0;                     // what the links added to the norm in their last block
@@ -96,7 +130,7 @@ using ModalStep = void (*)(const Program& program, const Modes& modes, ModalStat
                            const Block<T>& block);
 
 template <Isa isa, class T>
-ModalStep<T> modal_step();
+ModalStep<T> modal_step(bool is_crossed);
 
 template <class T>
 class ModalKernel final : public Kernel<T> {
@@ -113,6 +147,7 @@ class ModalKernel final : public Kernel<T> {
 
  private:
   void play(const Block<T>& block) override;
+  void remember_peaks(const Block<T>& block);
   const Program& program_;
   const Modes& modes_;
   ModalStep<T> step_;
@@ -121,6 +156,8 @@ class ModalKernel final : public Kernel<T> {
   std::vector<const T*> bundled_rows_;
   std::vector<std::uint32_t> indices_;
   std::vector<Ends> held_ends_;
+  std::vector<PassiveLink> passive_;
+  PassiveTables active_;
   ModalState<T> state_;
 };
 

@@ -23,6 +23,11 @@ template <class T>
 struct Range {
   T low;
   T high;
+
+  void take(T x) {
+    low = low > x ? x : low;
+    high = x > high ? x : high;
+  }
 };
 
 // The greatest square of each place's displacement for an energy of 1. False where the modes may
@@ -41,7 +46,7 @@ bool measure_compliance(ModalState<T>& s, std::size_t places) {
     const T drift = T(drift_frames) * (1 + 1 / m);
     const T square = T(least_stiffness) > k ? drift * drift : 1 / k + 1 / (4 * m);
     for (std::size_t p = 0; p < places; ++p) {
-      const T shape = s.places[p * s.stride + i];
+      const T shape = s.places[p * s.row + i];
       s.compliance[p] += shape * shape * square;
     }
   }

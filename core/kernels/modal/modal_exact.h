@@ -92,6 +92,7 @@ void make_exact(ModalState<T>& s, std::size_t shapes, T* k, T* z) {
     }
   }
   s.bundled_modes = 0;
+  s.is_reply_stale = true;
 }
 
 }  // namespace

@@ -7,6 +7,8 @@
 #include <map>
 #include <utility>
 
+#include "core/kernels/modal/modal_body.h"
+#include "core/kernels/modal/modal_crossed.h"
 #include "core/kernels/modal/modal_worth.h"
 #include "core/laws/laws.h"
 #include "core/linear_algebra/eigen.h"
@@ -14,25 +16,8 @@
 namespace ressort {
 namespace {
 
-constexpr std::uint32_t nowhere = 0xffffffffu;
 constexpr double shared_tolerance = 1e-12;  // of a matrix' largest element: is it diagonal?
 constexpr double zero_tolerance = 1e-13;    // of the largest: is it anything?
-
-// A spring or a damper between masses a and b, or on a alone.
-struct Bar {
-  std::uint32_t a = nowhere;
-  std::uint32_t b = nowhere;
-  double weight = 1.0;
-};
-
-// All bars that one coefficient stiffens.
-struct Frame {
-  std::uint32_t coefficient = 0;
-  bool is_late = false;
-  std::vector<Bar> bars;
-  Vector pull;    // [mass] the force on the masses at 0, for a coefficient of 1
-  Vector factor;  // [mode]
-};
 
 // The published scheme's lK and lZ that are the continuous K and Z, sampled; gives the force's gain
 // (core/kernels/modal/modal_exact.h).
@@ -47,41 +32,44 @@ double make_exact(double& k, double& z) {
   return gain;
 }
 
-constexpr double left_out_share = 0.02;  // of the budget
-// Each takes a matrix of all masses, or a vector; with so many the form is of no use.
-constexpr std::size_t most_frames = 256;
-constexpr std::size_t most_runs = 65'536;
-
+constexpr std::size_t most_passive = 32;  // links: each pulls at all others
+constexpr double left_out_share = 0.02;   // of the budget
 class ModesFinder {
  public:
-  ModesFinder(const Program& program, const Budget& budget, const Progress& progress)
-      : program_(program), progress_(progress), count_(program.moving) {
+  ModesFinder(const Program& program, const LinearBody& body, const Budget& budget,
+              const Progress& progress, bool is_untuned)
+      : program_(program),
+        is_untuned_(is_untuned),
+        progress_(progress),
+        body_(body),
+        count_(body.count),
+        stiffness_(body.stiffness),
+        damping_(body.damping) {
+    modes_.inverse_mass = body.inverse_mass;
+    modes_.reach = body.root.max();
     modes_.is_exact = budget.is_physical();
     modes_.silence = std::pow(10.0, budget.silence_db / 20.0);
   }
 
   std::optional<Modes> find() {
-    if (count_ == 0 || count_ > most_modes || !program_.taps.empty() ||
-        !program_.audio_coefficients.empty() || has_force_output() || has_other_schemes()) {
-      return std::nullopt;
-    }
-    look_at_parameters();
-    if (has_sliding_ground() || !weigh_masses()) {
-      return std::nullopt;
-    }
-    if (!sort_links() || program_.link_runs.size() > most_runs) {
+    if (!program_.audio_coefficients.empty() || has_many_passive()) {
       return std::nullopt;
     }
     progress_.spend(program_.ends.size());
     solve();
     progress_.spend(std::size_t{count_} * count_);
-    if (!measure(stiffness_) || !measure(damping_)) {
+    if (measure(stiffness_) && measure(damping_)) {
+      settle();
+    } else if (!cross()) {
       return std::nullopt;
     }
-    settle();
     place_pushes();
     place_holds();
     place_outputs();
+    if (modes_.is_crossed) {
+      keep_crossed();
+      return std::move(modes_);
+    }
     drop_idle_modes();
     for (auto* frames : {&stiffness_, &damping_}) {
       for (const Frame& frame : *frames) {
@@ -98,124 +86,13 @@ class ModesFinder {
                        [](const OutputSlot& output) { return output.is_force; });
   }
 
-  bool has_other_schemes() const {
-    return std::any_of(program_.link_runs.begin(), program_.link_runs.end(),
-                       [](const LinkRun& run) { return run.scheme != Scheme::plain; });
-  }
-
-  void look_at_parameters() {
-    is_live_.assign(program_.coefficients.size(), false);
-    for (const auto& depending : program_.depending) {
-      for (const std::uint32_t c : depending) {
-        is_live_[c] = true;
-      }
-    }
-    for (const Coefficient& coefficient : program_.coefficients) {
-      value_.push_back(coefficient_value(program_, coefficient, program_.parameters, 1.0));
-    }
-    hand_.assign(program_.position.size(), nowhere);
-    for (std::uint32_t i = 0; i < program_.inputs.size(); ++i) {
-      if (!program_.inputs[i].is_force) {
-        hand_[program_.inputs[i].node] = i;
-      }
-    }
-  }
-
-  // A ground that stays but claims to have a velocity is left to the direct form.
-  bool has_sliding_ground() const {
-    for (std::uint32_t node = count_; node < program_.velocity.size(); ++node) {
-      if (hand_[node] == nowhere && program_.velocity[node] != 0.0) {
-        return true;
-      }
-    }
-    return false;
-  }
-
-  bool moves(std::uint32_t node) const { return node < count_; }
-  bool is_nothing(std::uint32_t c) const { return !is_live_[c] && value_[c] == 0.0; }
-
-  // All masses turn with one coefficient, or none turns.
-  bool weigh_masses() {
-    root_ = Vector(1.0, count_);
-    const std::uint32_t first = program_.mass_runs.front().inverse_mass;
-    const bool together =
-        std::all_of(program_.mass_runs.begin(), program_.mass_runs.end(),
-                    [&](const MassRun& run) { return run.inverse_mass == first; });
-    if (together) {
-      modes_.inverse_mass = first;
-      return true;
-    }
-    for (const MassRun& run : program_.mass_runs) {
-      const double inverse = value_[run.inverse_mass];
-      if (is_live_[run.inverse_mass] || !(inverse > 0.0) || !std::isfinite(inverse)) {
-        return false;
-      }
-      root_[std::slice(run.first, run.count, 1)] = std::sqrt(inverse);
-    }
-    modes_.reach = root_.max();
-    return true;
-  }
-
-  // The frame of a coefficient. Constants are one frame, as nothing but a voice's pitch moves
-  // them: then the coefficient is that of the first, and the weight is relative to it.
-  Frame& frame_of(std::vector<Frame>& frames, std::uint32_t c, bool is_late, double& weight) {
-    weight = 1.0;
-    for (Frame& frame : frames) {
-      if (frame.is_late != is_late) {
-        continue;
-      }
-      if (frame.coefficient == c) {
-        return frame;
-      }
-      if (!is_live_[c] && !is_live_[frame.coefficient]) {
-        weight = value_[c] / value_[frame.coefficient];
-        return frame;
-      }
-    }
-    frames.push_back({.coefficient = c, .is_late = is_late, .pull = Vector(count_)});
-    return frames.back();
-  }
-
-  void add_bar(std::vector<Frame>& frames, std::uint32_t c, bool is_late, Bar bar,
-               double position) {
-    if (is_nothing(c)) {
-      return;
-    }
-    Frame& frame = frame_of(frames, c, is_late, bar.weight);
-    frame.bars.push_back(bar);
-    frame.pull[bar.a] += bar.weight * position;
-  }
-
-  // Linear links and oscillators become frames, all others holds. False if there are too many.
-  bool sort_links() {
-    for (const MassRun& run : program_.mass_runs) {
-      for (std::uint32_t i = run.first; run.is_oscillator && i < run.first + run.count; ++i) {
-        add_bar(stiffness_, run.stiffness, false, {i}, 0.0);
-        add_bar(damping_, run.damping, false, {i}, 0.0);
-      }
-    }
+  // Through the modes each pulls at all others: they are solved together.
+  bool has_many_passive() const {
+    std::size_t count = 0;
     for (const LinkRun& run : program_.link_runs) {
-      for (std::uint32_t i = run.first; run.law == Law::spring && i < run.first + run.count; ++i) {
-        Bar bar{program_.ends[i].a, program_.ends[i].b};
-        if (!moves(bar.a)) {
-          std::swap(bar.a, bar.b);
-        }
-        if (!moves(bar.a) || bar.a == bar.b) {
-          continue;
-        }
-        double position = 0.0;
-        if (!moves(bar.b)) {
-          position = program_.position[bar.b];
-          bar.b = nowhere;
-        }
-        add_bar(stiffness_, run.coefficients[0], true, bar, position);
-        add_bar(damping_, run.coefficients[1], true, bar, 0.0);
-      }
-      if (stiffness_.size() + damping_.size() > most_frames) {
-        return false;
-      }
+      count += run.scheme == Scheme::plain ? 0 : run.count;
     }
-    return true;
+    return count > most_passive;
   }
 
   // The eigenvectors of a mixture of all frames in odd shares: where frames share eigenvectors,
@@ -244,13 +121,10 @@ class ModesFinder {
   }
 
   void add(Matrix& matrix, const Bar& bar) const {
-    const double ra = root_[bar.a];
-    matrix(bar.a, bar.a) += bar.weight * ra * ra;
-    if (bar.b != nowhere) {
-      const double rb = root_[bar.b];
-      matrix(bar.b, bar.b) += bar.weight * rb * rb;
-      matrix(bar.a, bar.b) -= bar.weight * ra * rb;
-      matrix(bar.b, bar.a) -= bar.weight * ra * rb;
+    for (const auto& [a, share] : bar.shares) {
+      for (const auto& [b, other] : bar.shares) {
+        matrix(a, b) += bar.weight * share * body_.root[a] * other * body_.root[b];
+      }
     }
   }
 
@@ -262,12 +136,10 @@ class ModesFinder {
       frame.factor.resize(count_);
       std::vector<Vector> image(count_, Vector(count_));  // [mass][mode]
       for (const Bar& bar : frame.bars) {
-        Vector stretch = root_[bar.a] * shape_[bar.a];
-        if (bar.b != nowhere) {
-          stretch -= root_[bar.b] * shape_[bar.b];
-          image[bar.b] -= bar.weight * root_[bar.b] * stretch;
+        const Vector stretch = row_of(bar.shares);
+        for (const auto& [mass, share] : bar.shares) {
+          image[mass] += bar.weight * share * body_.root[mass] * stretch;
         }
-        image[bar.a] += bar.weight * root_[bar.a] * stretch;
         frame.factor += bar.weight * stretch * stretch;
       }
       const double most = largest(frame.factor);
@@ -284,9 +156,54 @@ class ModesFinder {
     return true;
   }
 
-  Vector shape_of(std::uint32_t node) const { return root_[node] * shape_[node]; }
+  // How the modes move a sum of masses.
+  Vector row_of(const std::vector<MassShare>& shares) const {
+    if (modes_.is_crossed) {
+      return sum_of(crossed_.shape, shares);
+    }
+    Vector row(count_);
+    for (const auto& [mass, share] : shares) {
+      row += share * body_.root[mass] * shape_[mass];
+    }
+    return row;
+  }
+  Vector sum_of(const std::vector<Vector>& rows, const std::vector<MassShare>& shares) const {
+    Vector sum(rows[0].size());
+    for (const auto& [mass, share] : shares) {
+      sum += share * rows[mass];
+    }
+    return sum;
+  }
+  Vector shape_of(std::uint32_t node) const { return row_of(body_.reading[node].shares); }
+  ModalPlace place_of(std::uint32_t node, const Vector& shape) const {
+    ModalPlace place{.rest = body_.reading[node].offset};
+    if (!modes_.is_crossed) {
+      place.rest += dot(shape, rest_);
+      return place;
+    }
+    place.offset = place.rest;
+    for (const auto& [mass, share] : body_.reading[node].shares) {
+      place.rest += share * crossed_.rest[mass];
+      place.masses.push_back({mass, share});
+    }
+    place.shape = numbers_of(shape);
+    place.speed = numbers_of(sum_of(crossed_.speed, body_.reading[node].shares));
+    return place;
+  }
+  static std::vector<double> numbers_of(const Vector& row) {
+    return {std::begin(row), std::end(row)};
+  }
   // What a force on each mass does to the modes.
-  Vector modal(const Vector& force) const { return in_modes(root_ * force); }
+  Vector modal(const Vector& force) const {
+    if (modes_.is_crossed) {
+      Vector row(crossed_.push[0].size());
+      for (std::uint32_t mass = 0; mass < count_; ++mass) {
+        row += force[mass] * crossed_.push[mass];
+      }
+      return row;
+    }
+    return in_modes(body_.root * force);
+  }
   // By mode what is by mass.
   Vector in_modes(const Vector& masses) const {
     Vector modes(count_);
@@ -301,15 +218,15 @@ class ModesFinder {
     Vector position(count_);
     Vector velocity(count_);
     for (std::uint32_t i = 0; i < count_; ++i) {
-      position[i] = program_.position[i] / root_[i];
-      velocity[i] = program_.velocity[i] / root_[i];
+      position[i] = program_.position[i] / body_.root[i];
+      velocity[i] = program_.velocity[i] / body_.root[i];
     }
     const Vector start = in_modes(position);
     Vector pull = Vector(count_);
     Vector hold = Vector(count_);
     for (const Frame& frame : stiffness_) {
-      pull += value_[frame.coefficient] * modal(frame.pull);
-      hold += value_[frame.coefficient] * frame.factor;
+      pull += body_.value[frame.coefficient] * modal(frame.pull);
+      hold += body_.value[frame.coefficient] * frame.factor;
     }
     const double most = largest(hold);
     rest_ = start;
@@ -332,6 +249,50 @@ class ModesFinder {
     }
   }
 
+  // Where damping crosses the eigenvectors, and nothing turns them: not even keys.
+  bool cross() {
+    if (!is_untuned_) {
+      return false;
+    }
+    progress_.spend(std::size_t{8} * count_ * count_);
+    auto crossed = crossed_modes(program_, body_, modes_.is_exact, !is_plain(program_));
+    if (!crossed) {
+      return false;
+    }
+    crossed_ = *std::move(crossed);
+    modes_.is_crossed = true;
+    modes_.silence = 0.0;  // they are no oscillators whose amplitudes could be told
+    return true;
+  }
+
+  void keep_crossed() {
+    const std::size_t count = crossed_.count;
+    modes_.modes = static_cast<std::uint32_t>(count);
+    modes_.pole = numbers_of(crossed_.pole);
+    modes_.q = numbers_of(crossed_.start[std::slice(0, count, 1)]);
+    modes_.d = numbers_of(crossed_.start[std::slice(count, count, 1)]);
+    for (const auto* rows : {&crossed_.from_position, &crossed_.from_velocity}) {
+      for (std::size_t i = 0; i < 2 * count; ++i) {
+        for (const Vector& row : *rows) {
+          modes_.basis.push_back(row[i]);
+        }
+      }
+    }
+    modes_.reach = 0.0;
+    for (const Vector& row : crossed_.shape) {
+      modes_.reach = std::max(modes_.reach, std::sqrt(dot(row, row)));
+    }
+    for (std::size_t i = 0; i < pushed_.size(); ++i) {
+      modes_.pushes[i].shape = numbers_of(pushed_[i]);
+    }
+    std::size_t part = 0;
+    for (ModalOutput& output : modes_.outputs) {
+      for (ModalForce::Part& felt : output.force.parts) {
+        felt.shape = numbers_of(felt_[part++]);
+      }
+    }
+  }
+
   void add_push(ModalPush push, Vector shape) {
     modes_.pushes.push_back(std::move(push));
     pushed_.push_back(std::move(shape));
@@ -339,12 +300,13 @@ class ModesFinder {
 
   void place_pushes() {
     for (std::uint32_t i = 0; i < program_.inputs.size(); ++i) {
-      if (program_.inputs[i].is_force && moves(program_.inputs[i].node)) {
-        add_push({.by = ModalPush::By::force, .input = i}, shape_of(program_.inputs[i].node));
+      if (program_.inputs[i].is_force && body_.moves(program_.inputs[i].node)) {
+        add_push({.by = ModalPush::By::force, .input = i},
+                 modal(body_.force_at(program_.inputs[i].node)));
       }
     }
     for (const MassRun& run : program_.mass_runs) {
-      if (run.has_gravity && !is_nothing(run.gravity)) {
+      if (run.has_gravity && !body_.is_nothing(run.gravity)) {
         Vector force = Vector(count_);
         force[std::slice(run.first, run.count, 1)] = -1.0;
         add_push({.by = ModalPush::By::constant, .stiffness = run.gravity}, modal(force));
@@ -354,11 +316,11 @@ class ModesFinder {
       std::map<std::uint32_t, Vector> forces;  // [input] on the masses that it holds
       for (std::uint32_t i = run.first; run.law == Law::spring && i < run.first + run.count; ++i) {
         auto [a, b] = program_.ends[i];
-        if (!moves(a)) {
+        if (!body_.moves(a)) {
           std::swap(a, b);
         }
-        if (moves(a) && !moves(b) && hand_[b] != nowhere) {
-          forces.try_emplace(hand_[b], Vector(count_)).first->second[a] += 1.0;
+        if (body_.moves(a) && !body_.moves(b) && body_.input[b] != LinearBody::nowhere) {
+          forces.try_emplace(body_.input[b], Vector(count_)).first->second += body_.force_at(a);
         }
       }
       for (const auto& [input, force] : forces) {
@@ -373,29 +335,31 @@ class ModesFinder {
   }
 
   void place_holds() {
-    std::map<std::uint32_t, std::uint32_t> place_of;
+    std::map<std::uint32_t, std::uint32_t> number;
     for (const LinkRun& run : program_.link_runs) {
       if (run.law == Law::spring) {
         continue;
       }
       for (std::uint32_t i = run.first; i < run.first + run.count; ++i) {
         for (const std::uint32_t node : {program_.ends[i].a, program_.ends[i].b}) {
-          if (moves(node) && place_of.try_emplace(node, heard_.size()).second) {
+          if (body_.moves(node) && number.try_emplace(node, heard_.size()).second) {
             heard_.push_back(shape_of(node));
-            modes_.places.push_back({dot(heard_.back(), rest_), {}});
+            modes_.places.push_back(place_of(node, heard_.back()));
           }
         }
       }
     }
     const auto end_of = [&](std::uint32_t node) {
-      return moves(node) ? place_of.at(node) : other_end(node);
+      const std::uint32_t end = body_.moves(node) ? number.at(node) : other_end(node);
+      held_.emplace(node, end);
+      return end;
     };
     for (std::uint32_t r = 0; r < program_.link_runs.size(); ++r) {
       const LinkRun& run = program_.link_runs[r];
       ModalHold hold{.run = r, .a = {}, .b = {}};
       for (std::uint32_t i = run.first; run.law != Law::spring && i < run.first + run.count; ++i) {
         const auto [a, b] = program_.ends[i];
-        if (moves(a) || moves(b)) {
+        if (body_.moves(a) || body_.moves(b) || has_force_output()) {
           hold.a.push_back(end_of(a));
           hold.b.push_back(end_of(b));
         }
@@ -410,21 +374,40 @@ class ModesFinder {
     const auto next = static_cast<std::uint32_t>(modes_.places.size() + modes_.ends.size());
     const auto [entry, is_new] = end_of_.try_emplace(node, next);
     if (is_new) {
-      const bool follows = hand_[node] != nowhere;
-      modes_.ends.push_back({follows, follows ? hand_[node] : 0, node});
+      const bool follows = body_.input[node] != LinearBody::nowhere;
+      modes_.ends.push_back({follows, follows ? body_.input[node] : 0, node});
     }
     return entry->second;
   }
 
   void place_outputs() {
     for (const OutputSlot& output : program_.outputs) {
-      if (moves(output.node)) {
+      if (output.is_force) {
+        FeltForce felt = force_felt(program_, body_, output.node, rest_of_masses(), held_);
+        for (std::size_t i = 0; i < felt.shares.size(); ++i) {
+          const bool is_speed = modes_.is_crossed && felt.force.parts[i].is_damping;
+          felt_.push_back(is_speed ? sum_of(crossed_.speed, felt.shares[i])
+                                   : row_of(felt.shares[i]));
+        }
+        modes_.outputs.push_back({.is_force = true, .force = std::move(felt.force)});
+      } else if (body_.moves(output.node)) {
         heard_.push_back(shape_of(output.node));
-        modes_.outputs.push_back({0, true, {dot(heard_.back(), rest_), {}}});
+        modes_.outputs.push_back({.is_place = true, .place = place_of(output.node, heard_.back())});
       } else {
-        modes_.outputs.push_back({other_end(output.node), false, {}});
+        modes_.outputs.push_back({.end = other_end(output.node)});
       }
     }
+  }
+
+  Vector rest_of_masses() const {
+    if (modes_.is_crossed) {
+      return crossed_.rest;
+    }
+    Vector rest(count_);
+    for (std::uint32_t mass = 0; mass < count_; ++mass) {
+      rest[mass] = body_.root[mass] * dot(shape_[mass], rest_);
+    }
+    return rest;
   }
 
   // Modes that nothing hears, and modes that nothing sets moving, are as good as not there.
@@ -440,9 +423,12 @@ class ModesFinder {
     driven.push_back(q_);
     driven.push_back(d_);
     for (std::uint32_t i = 0; i < count_; ++i) {
-      if (matters(heard_, i) && matters(driven, i)) {
+      if ((matters(heard_, i) || matters(felt_, i)) && matters(driven, i)) {
         kept_.push_back(i);
       }
+    }
+    if (has_force_output()) {
+      modes_.silence = 0.0;  // there is no bound for what a force swings by
     }
     if (modes_.silence > 0.0) {
       leave_out();
@@ -452,7 +438,7 @@ class ModesFinder {
     modes_.d = kept(d_);
     for (const std::uint32_t i : kept_) {
       for (std::uint32_t mass = 0; mass < count_; ++mass) {
-        modes_.basis.push_back(shape_[mass][i] / root_[mass]);
+        modes_.basis.push_back(shape_[mass][i] / body_.root[mass]);
       }
     }
     for (std::size_t i = 0; i < pushed_.size(); ++i) {
@@ -462,19 +448,23 @@ class ModesFinder {
     for (ModalPlace& place : modes_.places) {
       place.shape = kept(heard_[row++]);
     }
+    std::size_t part = 0;
     for (ModalOutput& output : modes_.outputs) {
       if (output.is_place) {
         output.place.shape = kept(heard_[row++]);
+      }
+      for (ModalForce::Part& felt : output.force.parts) {
+        felt.shape = kept(felt_[part++]);
       }
     }
   }
 
   // What all stiffnesses or dampings give to each mode, at the start.
   Vector sum_of(const std::vector<Frame>& frames) const {
-    const double w = modes_.inverse_mass == Modes::own_mass ? 1.0 : value_[modes_.inverse_mass];
+    const double w = body_.weight();
     Vector sum = Vector(count_);
     for (const Frame& frame : frames) {
-      sum += w * value_[frame.coefficient] * frame.factor;
+      sum += w * body_.value[frame.coefficient] * frame.factor;
     }
     return sum;
   }
@@ -518,7 +508,7 @@ class ModesFinder {
     if (left_out.empty() || stiffness_.empty()) {
       return;
     }
-    const double w = modes_.inverse_mass == Modes::own_mass ? 1.0 : value_[modes_.inverse_mass];
+    const double w = body_.weight();
     modes_.give_by = stiffness_.front().coefficient;
     const Vector nothing(count_);
     const auto shape_at = [&](std::uint32_t end) -> const Vector& {
@@ -531,7 +521,7 @@ class ModesFinder {
         for (const std::uint32_t i : left_out) {
           give += w * apart[all[i]] * apart[all[i]] / stiffness[all[i]];
         }
-        hold.give.push_back(give * value_[modes_.give_by]);
+        hold.give.push_back(give * body_.value[modes_.give_by]);
       }
     }
   }
@@ -545,13 +535,11 @@ class ModesFinder {
   }
 
   const Program& program_;
+  const bool is_untuned_;
   const Progress& progress_;
+  const LinearBody& body_;
   const std::uint32_t count_;
   Modes modes_;
-  std::vector<bool> is_live_;        // [coefficient] does a parameter move it?
-  std::vector<double> value_;        // [coefficient] at the start
-  std::vector<std::uint32_t> hand_;  // [node] the input that moves it, or nowhere
-  Vector root_;                      // [mass] of its inverse
   std::vector<Frame> stiffness_;
   std::vector<Frame> damping_;
   std::vector<Vector> shape_;  // [mass][mode] orthonormal
@@ -560,15 +548,22 @@ class ModesFinder {
   Vector d_;
   std::vector<Vector> pushed_;                     // [push][mode]
   std::vector<Vector> heard_;                      // [place, then output][mode]
+  std::vector<Vector> felt_;                       // [part of a force][mode]
   std::map<std::uint32_t, std::uint32_t> end_of_;  // [node] that is no mass
+  std::map<std::uint32_t, std::uint32_t> held_;    // [node] that nonlinear links hold: its end
   std::vector<std::uint32_t> kept_;                // modes
+  CrossedModes crossed_;
 };
 
 }  // namespace
 
 std::optional<Modes> modal_form(const Program& program, const Budget& budget,
-                                const Progress& progress) {
-  return is_plain(program) ? ModesFinder(program, budget, progress).find() : std::nullopt;
+                                const Progress& progress, bool is_untuned) {
+  if (program.moving > most_modes) {
+    return std::nullopt;
+  }
+  const std::optional<LinearBody> body = linear_body(program);
+  return body ? ModesFinder(program, *body, budget, progress, is_untuned).find() : std::nullopt;
 }
 
 }  // namespace ressort

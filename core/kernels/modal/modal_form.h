@@ -12,14 +12,16 @@ namespace ressort {
 
 inline constexpr std::size_t most_modes = 1200;  // beyond, the eigenvectors take too long to find
 
-// The modal form, where all linear links share their eigenvectors whatever the parameters become.
-// Nothing where they do not, where parameters turn the masses one by one, for points on macros,
-// force outputs, audio parameters, and more than most_modes masses. O(n^3): about 20 ms for 300
-// masses, 0.1 s for 600. With a budget of cents or decays true to the continuous network; with one
-// of silence without the modes that are never heard, the others sorted and told to sleep. [any
-// thread but audio]
+// The modal form, where all linear links share their eigenvectors whatever the parameters become;
+// where they do not, but nothing turns them, crossed modes (modal_crossed.h): `is_untuned` says
+// that no key and no bend will. Nothing for what has neither, where parameters turn the masses one
+// by one or move places on macros, for audio parameters, more passive links than can be solved
+// together, and more than most_modes masses. O(n^3): about 20 ms for 300 masses, 0.1 s for 600.
+// With a budget of cents or decays true to the continuous network; with one of silence without the
+// modes that are never heard, the others sorted and told to sleep, unless they are crossed or a
+// force is heard. [any thread but audio]
 std::optional<Modes> modal_form(const Program& program, const Budget& budget = {},
-                                const Progress& progress = {});
+                                const Progress& progress = {}, bool is_untuned = false);
 
 // What it will cost at least, before it is known.
 double least_modal_ns(const Program& program, const Workload& load);

@@ -7,8 +7,9 @@
 namespace ressort::RESSORT_ISA {
 namespace {
 
-template <class T>
+template <class T, bool Crossed>
 struct Mixer {
+  static constexpr bool is_crossed = Crossed;
   const Modes& modes;
   ModalState<T>& s;
 
@@ -49,6 +50,17 @@ struct Mixer {
   void mix(std::size_t ahead, T* k, T* z) {
     const T w =
         modes.inverse_mass == Modes::own_mass ? T(1) : coefficient(modes.inverse_mass, ahead);
+    if constexpr (Crossed) {
+      // Placed a sample ahead, in the first one nothing moves them but what pushes.
+      s.is_first = *s.used == 0;
+      const T here = s.is_first ? T(0) : T(1);
+      for (std::size_t i = 0; i < all_packs(s); ++i) {
+        packs(k)[i] = here * packs(s.pole)[i];
+        packs(z)[i] = here * packs(s.pole + s.stride)[i];
+      }
+      *s.used = w;
+      return;
+    }
     T* used = mix(modes.stiffness, s.stiffness, ahead, w, k, s.used);
     used = mix(modes.damping, s.damping, ahead, w, z, used);
     *used = w;
@@ -72,6 +84,31 @@ struct Mixer {
       }
     }
     return used;
+  }
+
+  // The rows by which forces are felt, with the coefficients of now.
+  void mix_forces() {
+    std::size_t force = 0;
+    for (const ModalOutput& output : modes.outputs) {
+      if (!output.is_force) {
+        continue;
+      }
+      T* const rows = s.felt + 2 * force * s.stride;
+      std::fill_n(rows, 2 * s.stride, T(0));
+      T still = 0;
+      for (const ModalForce::Part& part : output.force.parts) {
+        const T c = coefficient(part.coefficient);
+        // Of crossed modes both rows are the two parts of one, dampers by the speed's own shape.
+        for (std::size_t i = 0; i < part.shape.size(); ++i) {
+          const std::size_t mode = i % modes.modes;
+          const bool is_second = Crossed ? i >= modes.modes : part.is_damping;
+          const T root = modes.is_exact && !Crossed ? s.root[mode] : T(1);
+          rows[(is_second ? s.stride : 0) + mode] += c * root * static_cast<T>(part.shape[i]);
+        }
+        still += c * static_cast<T>(part.constant);
+      }
+      s.felt_still[force++] = still;
+    }
   }
 
   // Between here and some samples on exact coefficients move in a straight line: gives how many.

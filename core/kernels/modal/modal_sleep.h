@@ -3,8 +3,10 @@
 // A mode that is left alone rings as q = A r^n cos(...), with r^2 = 1 - lZ and
 //   A^2 = (lK q^2 + (lZ - lK) q d + (1 - lZ) d^2) (1 - lZ) / (lK - (lK + lZ)^2 / 4),
 // so that it never again moves a listener, an output or a place that links hold, by more than
-// |shape| A. The loudness of a listener is the sum of these, how far all modes together could swing
-// it, now or lately: it is forgotten as a room forgets in which a sound dies away in a second.
+// |shape| A. The loudness of an output is its peak, as it was heard until now. That of a place,
+// which nobody hears, is what so many modes give it in the mean, the root of the sum of half the
+// squares, now or lately. Both are forgotten as a room forgets in which a sound dies away in a
+// second.
 //
 // Once in a while the modes are looked at from the one that dies first. As long as all that
 // sleep can move no listener by more than the share `silence` of its loudness, the next one falls
@@ -39,7 +41,7 @@ V after_check(const ModalState<T>& s, V kept) {
 
 template <class T>
 const T* listener(const ModalState<T>& s, std::size_t places, std::size_t l) {
-  return l < places ? s.places + l * s.stride : s.outputs + (l - places) * s.stride;
+  return l < places ? s.places + l * s.row : s.outputs + (l - places) * s.row;
 }
 
 // How the modes ring, with the coefficients of now. Where a stiffness has fallen, what is owed
@@ -93,18 +95,20 @@ void measure_room(ModalState<T>& s, std::size_t places, std::size_t listeners) {
   for (std::size_t l = 0; l < listeners; ++l) {
     const T* const row = listener(s, places, l);
     V loud{};
-    for (std::size_t i = 0; i < pack_count(s); ++i) {
-      const V part = absolute(packs(row)[i]) * packs(s.swing)[i];
-      loud += select(packs(s.spread)[i] > V{}, part, V{});
+    for (std::size_t i = 0; l < places && i < pack_count(s); ++i) {
+      const V part = packs(row)[i] * packs(s.swing)[i];
+      loud += select(packs(s.spread)[i] > V{}, part * part, V{});
     }
     V owed{};
     for (std::size_t i = 0; i < all_packs(s); ++i) {
       owed += absolute(packs(row)[i]) * packs(s.debt)[i];
     }
-    const T now = total<T>(loud);
+    const T now = std::sqrt(total<T>(loud) / 2);
     const T lately = after_check(s, s.lately_kept) * s.loudness[l];
     s.loudness[l] = now > lately ? now : lately;
-    const T room = s.silence * s.loudness[l] + s.quiet - total<T>(owed);
+    // The peak without what sleeps may be less by what is missing.
+    const T share = s.silence * (1 - s.silence);
+    const T room = share * s.loudness[l] - total<T>(owed);
     s.room[l] = room > 0 ? room : T(0);
   }
 }

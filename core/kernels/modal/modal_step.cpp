@@ -1,28 +1,34 @@
 // The modal kernel's way through a block, compiled for each instruction set.
-#include "core/kernels/modal/modal_bounds.h"
-#include "core/kernels/modal/modal_mix.h"
-#include "core/kernels/modal/modal_sleep.h"
-#include "core/laws/laws.h"
+#include "core/kernels/modal/modal_passive.h"
 
 namespace ressort::RESSORT_ISA {
 namespace {
 
-constexpr std::uint32_t frames_after_touch = 256;  // until a free motion is tried again
-constexpr std::uint32_t nowhere = 0xffffffffu;
-
-template <class T>
-struct Player : Mixer<T> {
-  using Mixer<T>::modes;
-  using Mixer<T>::s;
-  using Mixer<T>::coefficient;
-  using Mixer<T>::inverse_mass;
-  using Mixer<T>::mix;
-  const Program& program;
-  const Block<T>& block;
-  const std::size_t places = modes.places.size();
-  const std::size_t pushes = modes.pushes.size();
-  const std::size_t outputs = modes.outputs.size();
-  const std::size_t inputs = program.inputs.size();
+template <class T, bool Crossed>
+struct Player : Presser<T, Crossed> {
+  using Base = Presser<T, Crossed>;
+  using Base::block;
+  using Base::coefficient;
+  using Base::greatest_norm;
+  using Base::hold_all;
+  using Base::hold_some;
+  using Base::inputs;
+  using Base::inverse_mass;
+  using Base::is_held;
+  using Base::may_act_within;
+  using Base::mix;
+  using Base::modes;
+  using Base::move_ends;
+  using Base::outputs;
+  using Base::places;
+  using Base::position_of;
+  using Base::presses;
+  using Base::program;
+  using Base::pushes;
+  using Base::restore;
+  using Base::s;
+  using Base::save;
+  using Base::wake;
 
   // Parts in which every sample moves the coefficients, or none does.
   void play() {
@@ -32,7 +38,7 @@ struct Player : Mixer<T> {
       std::size_t frames = moving > 0 && moving < left ? moving : left;
       if (moving > 0) {
         wake();
-        if (modes.is_exact) {
+        if (modes.is_exact && !Crossed) {
           frames = this->begin_exact(frames);
         }
         hold_all();
@@ -49,13 +55,6 @@ struct Player : Mixer<T> {
     }
   }
 
-  void wake() {
-    if (s.awake < modes.modes) {
-      stay_awake(s, modes.modes);
-      s.until_check = check_frames;
-      s.is_long_check = false;
-    }
-  }
   // Lets modes sleep that are neither pushed nor held after frame `last`.
   void settle(std::size_t last, std::size_t frames) {
     s.until_check -= frames < s.until_check ? static_cast<std::uint32_t>(frames) : s.until_check;
@@ -72,7 +71,8 @@ struct Player : Mixer<T> {
   void play_steady(std::size_t first, std::size_t frames) {
     if (s.is_stale) {
       mix(0, s.k, s.z);
-      s.has_bounds = measure_compliance(s, places);
+      this->mix_forces();
+      s.has_bounds = !Crossed && measure_compliance(s, places);
       if (s.silence > 0) {
         measure_ringing(s);
       }
@@ -133,51 +133,6 @@ struct Player : Mixer<T> {
     }
   }
 
-  // --- where things can be --------------------------------------------------------------------
-
-  T position_of(std::uint32_t end, std::size_t n) const {
-    const ModalEnd& other = modes.ends[end - places];
-    return other.follows ? block.value[n * inputs + other.input]
-                         : static_cast<T>(program.position[other.node]);
-  }
-
-  // The norm that the modes have at most in this block, without what links do.
-  T greatest_norm(std::size_t first, std::size_t frames) const {
-    T norm = std::sqrt(energy(s));
-    for (std::size_t j = 0; j < pushes; ++j) {
-      T sum = 0;
-      for (std::size_t n = first; n < first + frames; ++n) {
-        sum += absolute(s.amplitude[n * pushes + j]);
-      }
-      norm += norm_of_kicks(sum, s.push_norm[j]);
-    }
-    return norm;
-  }
-
-  Range<T> range_of(std::uint32_t end, std::size_t first, std::size_t frames, T norm) const {
-    if (end < places) {
-      const T reach = T(1.001) * norm * std::sqrt(s.compliance[end]);
-      const T rest = static_cast<T>(modes.places[end].rest);
-      return {rest - reach, rest + reach};
-    }
-    Range<T> range{position_of(end, first), position_of(end, first)};
-    for (std::size_t n = first + 1; n < first + frames && modes.ends[end - places].follows; ++n) {
-      const T x = position_of(end, n);
-      range.low = range.low > x ? x : range.low;
-      range.high = x > range.high ? x : range.high;
-    }
-    return range;
-  }
-  bool may_act_within(const LinkRun& run, std::uint32_t a, std::uint32_t b, std::size_t first,
-                      std::size_t frames, T norm) const {
-    if (!s.has_bounds) {
-      return true;
-    }
-    const Range<T> at = range_of(a, first, frames, norm);
-    const Range<T> to = range_of(b, first, frames, norm);
-    return may_act<T>(run, s.ramps.value, {at.low - to.high, at.high - to.low});
-  }
-
   // --- sample by sample -----------------------------------------------------------------------
 
   // Only the links that can act with twice the norm are looked at, what links bring in being as in
@@ -204,80 +159,38 @@ struct Player : Mixer<T> {
       play_bound<false>(first, frames);
     }
   }
-  void save() {
-    s.saved_awake = s.awake;
-    keep(s, s.saved_q, s.q);
-    keep(s, s.saved_d, s.d);
-    for (std::size_t p = 0; p < places; ++p) {
-      s.saved_force[p] = s.force[p];
-    }
-  }
-  void restore() {
-    keep(s, s.q, s.saved_q);
-    keep(s, s.d, s.saved_d);
-    stay_awake(s, s.saved_awake);
-    for (std::size_t p = 0; p < places; ++p) {
-      s.force[p] = s.saved_force[p];
-    }
-  }
-
-  void hold_all() {
-    hold_if([](const LinkRun&, std::uint32_t, std::uint32_t) { return true; });
-  }
-  void hold_some(std::size_t first, std::size_t frames, T norm) {
-    hold_if([&](const LinkRun& run, std::uint32_t a, std::uint32_t b) {
-      return (a < places && s.force[a] != 0) || (b < places && s.force[b] != 0) ||
-             may_act_within(run, a, b, first, frames, norm);
-    });
-  }
-  // Chooses the links that are computed and the places that they need.
-  template <class Condition>
-  void hold_if(Condition&& condition) {
-    for (std::size_t p = 0; p < places; ++p) {
-      s.row_of[p] = nowhere;
-    }
-    s.held_links = 0;
-    s.links = 0;
-    s.held_places = 0;
-    for (std::size_t h = 0; h < modes.holds.size(); ++h) {
-      const ModalHold& hold = modes.holds[h];
-      s.held[h] = 0;
-      for (std::size_t i = 0; i < hold.a.size(); ++i, ++s.links) {
-        if (condition(program.link_runs[hold.run], hold.a[i], hold.b[i])) {
-          s.held_give[s.held_links] = hold.give.empty() ? T(0) : static_cast<T>(hold.give[i]);
-          s.held_ends[s.held_links++] = {hold.a[i], hold.b[i]};
-          ++s.held[h];
-          hold_place(hold.a[i]);
-          hold_place(hold.b[i]);
-        }
-      }
-    }
-  }
-  void hold_place(std::uint32_t end) {
-    if (end < places && s.row_of[end] == nowhere) {
-      s.row_of[end] = s.held_places;
-      s.place_of[s.held_places++] = end;
-    }
-  }
-
   template <bool Moving>
   void play_bound(std::size_t first, std::size_t frames) {
     locate_places();
     choose_rows<Moving>();
+    if (presses()) {
+      this->measure_passive();
+    }
     bool acts = false;
     for (std::size_t n = first; n < first + frames; ++n) {
       if constexpr (Moving) {
         advance(s.ramps);
-        if (modes.is_exact) {
+        if (modes.is_exact && !Crossed) {
           this->advance_exact();
         } else {
           mix(0, s.k, s.z);
         }
+        this->mix_forces();
         fill_amplitudes(n);
+        if (presses()) {
+          this->measure_passive();
+        }
       }
+      if (presses()) {
+        this->remember_passive();
+      }
+      std::fill_n(s.exerted, places + modes.ends.size(), T(0));
+      std::fill_n(s.force + places, modes.ends.size(), T(0));
       move_modes(n);
+      move_places();
       move_ends(n);
-      acts |= act();
+      s.is_pushed = presses() && this->press();
+      acts |= act() || s.is_pushed;
       hear(n);
     }
     s.kick_norm = 0;
@@ -291,11 +204,25 @@ struct Player : Mixer<T> {
   }
 
   void locate_places() {
-    for (std::size_t p = 0; p < places; ++p) {
+    for (std::uint32_t p = 0; p < places; ++p) {
       s.kicked[p] = 0;
       if (s.row_of[p] != nowhere) {
-        s.x[p] = static_cast<T>(modes.places[p].rest) + along(s, s.places + p * s.stride, s.q);
+        locate_at_first(p);
       }
+    }
+  }
+
+  // Crossed modes are placed a sample ahead: until then a place is where it was put.
+  void locate_at_first(std::uint32_t p) {
+    if (!Crossed || *s.used != 0) {
+      locate(p);
+    }
+  }
+  void locate(std::uint32_t p) {
+    const std::size_t at = p * s.row;
+    s.x[p] = static_cast<T>(modes.places[p].rest) + read<Crossed>(s, s.places + at);
+    if (Crossed || s.passives > 0) {
+      s.v[p] = Crossed ? read<Crossed>(s, s.speeds + at) : along(s, s.places + at, s.d);
     }
   }
 
@@ -309,16 +236,16 @@ struct Player : Mixer<T> {
     }
     std::size_t rows = 0;
     for (std::size_t r = 0; r < s.held_places; ++r) {
-      s.rows[rows++] = s.places + s.place_of[r] * s.stride;
+      s.rows[rows++] = s.places + s.place_of[r] * s.row;
     }
     for (std::size_t r = 0; r < s.pushing; ++r) {
-      s.rows[rows++] = s.pushes + s.push_of[r] * s.stride;
+      s.rows[rows++] = s.pushes + s.push_of[r] * s.row;
     }
     for (std::size_t o = 0; o < outputs; ++o) {
-      s.rows[rows++] = s.outputs + o * s.stride;
+      s.rows[rows++] = s.outputs + o * s.row;
     }
     if (s.held_places + s.pushing <= most_kicked) {
-      bundle(s, s.held_places + s.pushing + heard_along());
+      bundle<Crossed>(s, s.held_places + s.pushing + heard_along());
     }
   }
   // How many outputs a sweep takes along; the others have sweeps of their own.
@@ -340,40 +267,40 @@ struct Player : Mixer<T> {
     if (acts && s.awake < modes.modes) {
       wake();
       if (kicked <= most_kicked) {
-        bundle(s, s.bundled);
+        bundle<Crossed>(s, s.bundled);
       }
     }
     if (kicked > most_kicked) {
-      sweep_rows(s, kicked, outputs);
+      sweep_rows<Crossed>(s, kicked, outputs);
       return;
     }
-    sweep_sample(s, kicked, heard_along());
+    sweep_sample<Crossed>(s, kicked, heard_along());
     for (std::size_t o = heard_along(); o < outputs; ++o) {
-      s.heard[o] = along(s, s.outputs + o * s.stride, s.q);
+      s.heard[o] = read<Crossed>(s, s.outputs + o * s.row);
     }
   }
 
-  void move_ends(std::size_t n) {
+  void move_places() {
     for (std::size_t r = 0; r < s.held_places; ++r) {
       const std::uint32_t p = s.place_of[r];
       s.v[p] = s.speed[r];
-      s.x[p] += s.v[p];
-      s.force[p] = 0;
-    }
-    for (std::size_t i = 0; i < modes.ends.size(); ++i) {
-      if (modes.ends[i].follows) {
-        s.x[places + i] = block.value[n * inputs + modes.ends[i].input];
-        s.v[places + i] = block.velocity[n * inputs + modes.ends[i].input];
+      s.x[p] += s.speed[r];
+      if (Crossed && s.is_first) {
+        locate(p);
       }
+      s.force[p] = 0;
     }
   }
 
-  // The nonlinear links; whether any acts.
+  // The plain links that are not linear; whether any acts.
   bool act() {
     bool acts = false;
     const Ends* ends = s.held_ends;
     const T* give = s.held_give;
     for (std::size_t h = 0; h < modes.holds.size(); ++h) {
+      if (s.held[h] == 0) {
+        continue;
+      }
       const LinkRun& run = program.link_runs[modes.holds[h].run];
       const auto c = [&](std::size_t i) { return coefficient(run.coefficients[i]); };
       with_law<T>(run.law, c, [&](const auto& law) {
@@ -394,36 +321,53 @@ struct Player : Mixer<T> {
   }
 
   void hear(std::size_t n) {
+    std::size_t force = 0;
     for (std::size_t o = 0; o < outputs; ++o) {
       const ModalOutput& output = modes.outputs[o];
+      if (output.is_force) {
+        block.outputs[n * outputs + o] = force_of(output.force, force++, n);
+        continue;
+      }
       block.outputs[n * outputs + o] = output.is_place
                                            ? static_cast<T>(output.place.rest) + s.heard[o]
                                            : position_of(output.end, n);
     }
   }
 
-  // --- as long as nothing touches -------------------------------------------------------------
-
-  bool is_held() const {
-    for (std::size_t p = 0; p < places; ++p) {
-      if (s.force[p] != 0) {
-        return true;
-      }
+  // What links and inputs exert at a node, once all has moved and pulled.
+  T force_of(const ModalForce& force, std::size_t number, std::size_t n) const {
+    const T* const row = s.felt + 2 * number * s.stride;
+    T sum = s.felt_still[number] +
+            (Crossed ? read<Crossed>(s, row) : along(s, row, s.q) + along(s, row + s.stride, s.d));
+    const T* const value = block.value + n * inputs;
+    const T* const velocity = block.velocity + n * inputs;
+    for (const ModalForce::Hand& hand : force.hands) {
+      sum += static_cast<T>(hand.weight) *
+             (coefficient(hand.stiffness) * (value[hand.input] - static_cast<T>(hand.start)) +
+              coefficient(hand.damping) * velocity[hand.input]);
     }
-    return false;
+    for (const ModalForce::Weight& input : force.inputs) {
+      sum += static_cast<T>(input.weight) * value[input.of];
+    }
+    for (const ModalForce::Weight& end : force.ends) {
+      sum += static_cast<T>(end.weight) * (s.force[end.of] + s.exerted[end.of]);
+    }
+    return static_cast<T>(force.scale) * sum;
   }
+
+  // --- as long as nothing touches -------------------------------------------------------------
 
   // The whole block, a few samples at a time, if no link acts in it; else nothing has happened.
   bool play_free(std::size_t first, std::size_t frames) {
     std::size_t rows = 0;
     for (std::size_t o = 0; o < outputs; ++o) {
       if (modes.outputs[o].is_place) {
-        s.rows[rows++] = s.outputs + o * s.stride;
+        s.rows[rows++] = s.outputs + o * s.row;
       }
     }
     const std::size_t heard = rows;
-    if (s.pushing > 2 || (!modes.holds.empty() && !find_suspects(first, frames, rows)) ||
-        rows > most_heard) {
+    if (s.forces > 0 || s.pushing > 2 ||
+        (!modes.holds.empty() && !find_suspects(first, frames, rows)) || rows > most_heard) {
       return false;
     }
     if (rows > heard) {
@@ -435,6 +379,8 @@ struct Player : Mixer<T> {
       return false;
     }
     write_outputs(first, frames);
+    move_ends(first + frames - 1);
+    s.pulls = true;
     return true;
   }
 
@@ -462,7 +408,8 @@ struct Player : Mixer<T> {
   void suspect(std::uint32_t end, std::size_t& rows) {
     if (end < places && s.row_of[end] == nowhere) {
       s.row_of[end] = static_cast<std::uint32_t>(rows);
-      s.rows[rows++] = s.places + end * s.stride;
+      s.rows[rows++] = s.places + end * s.row;
+      locate_at_first(end);
     }
   }
 
@@ -483,13 +430,18 @@ struct Player : Mixer<T> {
         if (!is_seen(a) || !is_seen(b)) {
           continue;
         }
-        Range<T> d{std::numeric_limits<T>::infinity(), -std::numeric_limits<T>::infinity()};
-        for (std::size_t n = 0; n < frames; ++n) {
-          const T apart = position(a, n) - position(b, n);
-          d.low = d.low > apart ? apart : d.low;
-          d.high = apart > d.high ? apart : d.high;
+        const LinkRun& run = program.link_runs[hold.run];
+        const T first_apart = position(a, 0) - position(b, 0);
+        Range<T> d{first_apart, first_apart};
+        if (run.scheme != Scheme::plain) {
+          const T now = s.x[a] - s.x[b];
+          d.take(now);
+          d.take(now - (s.v[a] - s.v[b]));
         }
-        if (may_act<T>(program.link_runs[hold.run], s.ramps.value, d)) {
+        for (std::size_t n = 1; n < frames; ++n) {
+          d.take(position(a, n) - position(b, n));
+        }
+        if (may_act<T>(run, s.ramps.value, d)) {
           return false;
         }
       }
@@ -526,9 +478,9 @@ struct Player : Mixer<T> {
       s.rows[Kicked + r] = r < rows ? s.rows[r] : nullptr;
     }
     for (std::size_t r = 0; r < Kicked; ++r) {
-      s.rows[r] = s.pushes + s.push_of[r] * s.stride;
+      s.rows[r] = s.pushes + s.push_of[r] * s.row;
     }
-    bundle(s, Kicked + Heard);
+    bundle<Crossed>(s, Kicked + Heard);
     std::size_t n = 0;
     for (; n + Samples <= frames; n += Samples) {
       run_samples<Samples, Kicked, Heard>(first, n, rows);
@@ -544,7 +496,7 @@ struct Player : Mixer<T> {
         s.kick[m * Kicked + r] = s.amplitude[(first + n + m) * pushes + s.push_of[r]];
       }
     }
-    sweep<Samples, Kicked, false, Heard>(s);
+    sweep<Samples, Kicked, false, Heard, Crossed>(s);
     for (std::size_t m = 0; m < Samples; ++m) {
       for (std::size_t r = 0; r < rows; ++r) {
         s.seen[r * max_block_frames + n + m] = s.heard[m * Heard + r];
@@ -567,9 +519,9 @@ struct Player : Mixer<T> {
   }
 };
 
-template <class T>
+template <class T, bool Crossed>
 void step(const Program& program, const Modes& modes, ModalState<T>& state, const Block<T>& block) {
-  Player<T>{{modes, state}, program, block}.play();
+  Player<T, Crossed>{{{{modes, state}, program, block}}}.play();
 }
 
 }  // namespace
@@ -578,13 +530,13 @@ void step(const Program& program, const Modes& modes, ModalState<T>& state, cons
 namespace ressort {
 
 template <>
-ModalStep<float> modal_step<Isa::RESSORT_ISA, float>() {
-  return RESSORT_ISA::step<float>;
+ModalStep<float> modal_step<Isa::RESSORT_ISA, float>(bool is_crossed) {
+  return is_crossed ? RESSORT_ISA::step<float, true> : RESSORT_ISA::step<float, false>;
 }
 
 template <>
-ModalStep<double> modal_step<Isa::RESSORT_ISA, double>() {
-  return RESSORT_ISA::step<double>;
+ModalStep<double> modal_step<Isa::RESSORT_ISA, double>(bool is_crossed) {
+  return is_crossed ? RESSORT_ISA::step<double, true> : RESSORT_ISA::step<double, false>;
 }
 
 }  // namespace ressort

@@ -9,6 +9,10 @@ namespace {
 
 constexpr std::size_t most_kicked = 8;  // rows that one sweep takes along
 constexpr std::size_t most_heard = 8;
+constexpr std::size_t most_shoved = 4;
+
+template <bool Crossed>
+constexpr std::size_t parts = Crossed ? 2 : 1;  // of each number of a shape
 
 template <class T>
 using ModePack = Pack<T, vector_bytes(Isa::RESSORT_ISA)>;
@@ -56,6 +60,26 @@ T along(const ModalState<T>& s, const T* row, const T* numbers) {
   return total<T>(even + odd);
 }
 
+// Where a row's place is, or what moves like one: of crossed modes the real part of a product.
+template <bool Crossed, class T>
+T read(const ModalState<T>& s, const T* row) {
+  const T even = along(s, row, s.q);
+  return Crossed ? even - along(s, row + s.stride, s.d) : even;
+}
+
+// How far a push of 1 along one row moves what another reads.
+template <bool Crossed, class T>
+T reply(const ModalState<T>& s, const T* one, const T* other) {
+  ModePack<T> sum{};
+  for (std::size_t i = 0; i < all_packs(s); ++i) {
+    sum += packs(one)[i] * packs(other)[i];
+    if constexpr (Crossed) {
+      sum -= packs(one + s.stride)[i] * packs(other + s.stride)[i];
+    }
+  }
+  return total<T>(sum);
+}
+
 template <class T>
 void keep(const ModalState<T>& s, T* to, const T* from) {
   for (std::size_t i = 0; i < pack_count(s); ++i) {
@@ -63,8 +87,9 @@ void keep(const ModalState<T>& s, T* to, const T* from) {
   }
 }
 
-// Lays the rows that a sweep needs side by side, pack by pack; null is a row of zeros.
-template <class T>
+// Lays the rows that a sweep needs side by side, pack by pack and part by part; null is a row of
+// zeros.
+template <bool Crossed, class T>
 void bundle(ModalState<T>& s, std::size_t rows) {
   bool is_same = rows == s.bundled && s.swept <= s.bundled_modes;
   for (std::size_t r = 0; r < rows && is_same; ++r) {
@@ -77,8 +102,12 @@ void bundle(ModalState<T>& s, std::size_t rows) {
   s.bundled_modes = s.swept;
   for (std::size_t r = 0; r < rows; ++r) {
     s.bundled_rows[r] = s.rows[r];
-    for (std::size_t i = 0; i < pack_count(s); ++i) {
-      packs(s.bundle)[i * rows + r] = s.rows[r] == nullptr ? ModePack<T>{} : packs(s.rows[r])[i];
+    for (std::size_t part = 0; part < parts<Crossed>; ++part) {
+      const T* const row = s.rows[r] == nullptr ? nullptr : s.rows[r] + part * s.stride;
+      for (std::size_t i = 0; i < pack_count(s); ++i) {
+        packs(s.bundle)[(i * rows + r) * parts<Crossed> + part] =
+            row == nullptr ? ModePack<T>{} : packs(row)[i];
+      }
     }
   }
 }
@@ -86,9 +115,11 @@ void bundle(ModalState<T>& s, std::size_t rows) {
 // All modes through a few samples. Of the bundled rows the first are kicked by s.kick [sample][row]
 // and, if Felt, give their speed to s.speed [row], of one sample; the others give their position
 // to s.heard [sample][row].
-template <std::size_t Samples, std::size_t Kicked, bool Felt, std::size_t Heard, class T>
+template <std::size_t Samples, std::size_t Kicked, bool Felt, std::size_t Heard, bool Crossed,
+          class T>
 void sweep(ModalState<T>& s) {
   using V = ModePack<T>;
+  constexpr std::size_t width = parts<Crossed>;
   V* const q = packs(s.q);
   V* const d = packs(s.d);
   const V* const k = packs(s.k);
@@ -117,30 +148,50 @@ void sweep(ModalState<T>& s) {
     const V zi = z[i];
 #pragma GCC unroll 16
     for (std::size_t n = 0; n < Samples; ++n) {
-      // The kicks in two sums, which wait for nothing; q and d wait for each other.
+      // The kicks in two sums, which wait for nothing; q and d wait for each other. Those of
+      // crossed modes are of their two parts.
       V f[2] = {};
 #pragma GCC unroll 16
       for (std::size_t r = 0; r < Kicked; ++r) {
-        f[r % 2] += kick[n * Kicked + r] * row[r];
+        if constexpr (Crossed) {
+          f[0] += kick[n * Kicked + r] * row[width * r];
+          f[1] += kick[n * Kicked + r] * row[width * r + 1];
+        } else {
+          f[r % 2] += kick[n * Kicked + r] * row[r];
+        }
       }
-      di -= zi * di;
-      di -= ki * qi;
-      if constexpr (Kicked > 0) {
-        di += Kicked > 1 ? f[0] + f[1] : f[0];
+      if constexpr (Crossed) {
+        f[0] += ki * qi - zi * di;
+        f[1] += ki * di + zi * qi;
+        qi += f[0];
+        di += f[1];
+      } else {
+        di -= zi * di;
+        di -= ki * qi;
+        if constexpr (Kicked > 0) {
+          di += Kicked > 1 ? f[0] + f[1] : f[0];
+        }
+        qi += di;
       }
-      qi += di;
 #pragma GCC unroll 16
       for (std::size_t r = 0; r < Kicked && Felt; ++r) {
-        speed[r] += row[r] * di;
+        if constexpr (Crossed) {
+          speed[r] += row[width * r] * f[0] - row[width * r + 1] * f[1];
+        } else {
+          speed[r] += row[r] * di;
+        }
       }
 #pragma GCC unroll 16
       for (std::size_t r = 0; r < Heard; ++r) {
-        heard[n * Heard + r] += row[Kicked + r] * qi;
+        heard[n * Heard + r] += row[width * (Kicked + r)] * qi;
+        if constexpr (Crossed) {
+          heard[n * Heard + r] -= row[width * (Kicked + r) + 1] * di;
+        }
       }
     }
     q[i] = qi;
     d[i] = di;
-    row += Kicked + Heard;
+    row += width * (Kicked + Heard);
   }
 #pragma GCC unroll 16
   for (std::size_t r = 0; r < Kicked && Felt; ++r) {
@@ -153,65 +204,117 @@ void sweep(ModalState<T>& s) {
 }
 
 // One sample, for up to most_kicked rows that are kicked and felt, and two that are heard.
-template <std::size_t Heard, class T>
+template <std::size_t Heard, bool Crossed, class T>
 void sweep_sample(ModalState<T>& s, std::size_t kicked) {
   switch (kicked) {
     case 0:
-      return sweep<1, 0, true, Heard>(s);
+      return sweep<1, 0, true, Heard, Crossed>(s);
     case 1:
-      return sweep<1, 1, true, Heard>(s);
+      return sweep<1, 1, true, Heard, Crossed>(s);
     case 2:
-      return sweep<1, 2, true, Heard>(s);
+      return sweep<1, 2, true, Heard, Crossed>(s);
     case 3:
-      return sweep<1, 3, true, Heard>(s);
+      return sweep<1, 3, true, Heard, Crossed>(s);
     case 4:
-      return sweep<1, 4, true, Heard>(s);
+      return sweep<1, 4, true, Heard, Crossed>(s);
     case 5:
-      return sweep<1, 5, true, Heard>(s);
+      return sweep<1, 5, true, Heard, Crossed>(s);
     case 6:
-      return sweep<1, 6, true, Heard>(s);
+      return sweep<1, 6, true, Heard, Crossed>(s);
     case 7:
-      return sweep<1, 7, true, Heard>(s);
+      return sweep<1, 7, true, Heard, Crossed>(s);
     default:
-      return sweep<1, most_kicked, true, Heard>(s);
+      return sweep<1, most_kicked, true, Heard, Crossed>(s);
   }
 }
-template <class T>
+template <bool Crossed, class T>
 void sweep_sample(ModalState<T>& s, std::size_t kicked, std::size_t heard) {
   switch (heard) {
     case 0:
-      return sweep_sample<0>(s, kicked);
+      return sweep_sample<0, Crossed>(s, kicked);
     case 1:
-      return sweep_sample<1>(s, kicked);
+      return sweep_sample<1, Crossed>(s, kicked);
     default:
-      return sweep_sample<2>(s, kicked);
+      return sweep_sample<2, Crossed>(s, kicked);
   }
 }
 
 // The same for any number of rows, one by one.
 template <class T>
-void kick_row(ModalState<T>& s, const T* row, T kick) {
+void kick_row(const ModalState<T>& s, T* load, const T* row, T kick) {
   for (std::size_t i = 0; kick != 0 && i < pack_count(s); ++i) {
-    packs(s.load)[i] += kick * packs(row)[i];
+    packs(load)[i] += kick * packs(row)[i];
   }
 }
-template <class T>
+// Adds s.shove along some rows of places to the modes; what is beyond the last adds nothing.
+template <bool Crossed, std::size_t Rows, class T>
+void shove_some(ModalState<T>& s, std::size_t first) {
+  using V = ModePack<T>;
+  const T* row[Rows];
+  V shove[Rows];
+#pragma GCC unroll 16
+  for (std::size_t r = 0; r < Rows; ++r) {
+    const bool is_there = first + r < s.held_places;
+    row[r] = s.rows[is_there ? first + r : first];
+    shove[r] = V{} + (is_there ? s.shove[first + r] : T(0));
+  }
+  for (std::size_t i = 0; i < pack_count(s); ++i) {
+    V q{};
+    V d{};
+#pragma GCC unroll 16
+    for (std::size_t r = 0; r < Rows; ++r) {
+      q += shove[r] * packs(row[r])[i];
+      if constexpr (Crossed) {
+        d += shove[r] * packs(row[r] + s.stride)[i];
+      }
+    }
+    packs(s.q)[i] += q;
+    packs(s.d)[i] += Crossed ? d : q;
+  }
+}
+template <bool Crossed, class T>
+void shove_rows(ModalState<T>& s) {
+  for (std::size_t row = 0; row < s.held_places; row += most_shoved) {
+    if (row + 1 == s.held_places) {
+      shove_some<Crossed, 1>(s, row);
+    } else {
+      shove_some<Crossed, most_shoved>(s, row);
+    }
+  }
+}
+template <bool Crossed, class T>
 void sweep_rows(ModalState<T>& s, std::size_t kicked, std::size_t heard) {
+  T* const load[2] = {s.load, s.load + s.stride};
   for (std::size_t i = 0; i < pack_count(s); ++i) {
-    packs(s.load)[i] = -(packs(s.k)[i] * packs(s.q)[i] + packs(s.z)[i] * packs(s.d)[i]);
+    const auto k = packs(s.k)[i];
+    const auto z = packs(s.z)[i];
+    const auto q = packs(s.q)[i];
+    const auto d = packs(s.d)[i];
+    packs(load[0])[i] = Crossed ? k * q - z * d : -(k * q + z * d);
+    if constexpr (Crossed) {
+      packs(load[1])[i] = k * d + z * q;
+    }
   }
   for (std::size_t r = 0; r < kicked; ++r) {
-    kick_row(s, s.rows[r], s.kick[r]);
+    for (std::size_t part = 0; part < parts<Crossed>; ++part) {
+      kick_row(s, load[part], s.rows[r] + part * s.stride, s.kick[r]);
+    }
   }
   for (std::size_t i = 0; i < pack_count(s); ++i) {
-    packs(s.d)[i] += packs(s.load)[i];
-    packs(s.q)[i] += packs(s.d)[i];
+    if constexpr (Crossed) {
+      packs(s.q)[i] += packs(load[0])[i];
+      packs(s.d)[i] += packs(load[1])[i];
+    } else {
+      packs(s.d)[i] += packs(load[0])[i];
+      packs(s.q)[i] += packs(s.d)[i];
+    }
   }
   for (std::size_t r = 0; r < kicked; ++r) {
-    s.speed[r] = along(s, s.rows[r], s.d);
+    s.speed[r] = Crossed ? along(s, s.rows[r], load[0]) - along(s, s.rows[r] + s.stride, load[1])
+                         : along(s, s.rows[r], s.d);
   }
   for (std::size_t r = 0; r < heard; ++r) {
-    s.heard[r] = along(s, s.rows[kicked + r], s.q);
+    s.heard[r] = read<Crossed>(s, s.rows[kicked + r]);
   }
 }
 

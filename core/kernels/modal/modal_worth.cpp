@@ -10,6 +10,9 @@ namespace {
 
 constexpr double least_ringing = 1e-4;  // share of lK: nearer to the aperiodic limit
 constexpr double never = std::numeric_limits<double>::infinity();
+constexpr double most_work = 1e7;  // to find peaks
+constexpr std::size_t least_samples = 128;
+constexpr std::size_t most_samples = 4096;
 
 using Row = std::vector<double>;
 
@@ -29,6 +32,24 @@ Ring ring_of(double k, double z) {
   return {true, std::sqrt((1.0 - z) / depth), std::sqrt(1.0 - z)};
 }
 
+// What `steps` samples make of a mode's q and d.
+struct Advance {
+  static Advance of(double k, double z, std::size_t steps) {
+    Advance power{1.0, 0.0, 0.0, 1.0};
+    for (Advance square{1.0 - k, 1.0 - z, -k, 1.0 - z}; steps > 0; steps /= 2) {
+      power = steps % 2 == 1 ? power * square : power;
+      square = square * square;
+    }
+    return power;
+  }
+  Advance operator*(const Advance& b) const {
+    return {qq * b.qq + qd * b.dq, qq * b.qd + qd * b.dd, dq * b.qq + dd * b.dq,
+            dq * b.qd + dd * b.dd};
+  }
+
+  double qq, qd, dq, dd;
+};
+
 class Scales {
  public:
   Scales(const Hearing& hearing, double most) : hearing_(hearing), most_(most) {
@@ -36,12 +57,16 @@ class Scales {
       rings_.push_back(ring_of(hearing.stiffness[i], hearing.damping[i]));
     }
     for (const Row& blow : hearing.blows) {
-      weigh_source([&](std::size_t i) { return rings_[i].swing * std::fabs(blow[i]); });
-      weigh_source([&](std::size_t i) {
-        return rings_[i].swing * std::fabs(blow[i]) / (1.0 - rings_[i].kept);
-      });
+      const Row peaks = peaks_of(blow, blow);  // as it is a sample later
+      weigh_source([&](std::size_t i) { return rings_[i].swing * std::fabs(blow[i]); }, peaks);
+      weigh_source(
+          [&](std::size_t i) {
+            return rings_[i].swing * std::fabs(blow[i]) / (1.0 - rings_[i].kept);
+          },
+          {});
     }
-    weigh_source([&](std::size_t i) { return swing_at_start(i); });
+    weigh_source([&](std::size_t i) { return swing_at_start(i); },
+                 peaks_of(hearing.starts[0], hearing.starts[1]));
   }
 
   Worth weigh() {
@@ -73,16 +98,72 @@ class Scales {
     return rings_[i].swing * std::sqrt(std::max(square, 0.0));
   }
 
-  // A source at every listener: each mode's share of all that ring. Undamped modes ring for ever:
-  // where there are any, the sum over time is of no use.
+  // How far the modes, let go with this q and d, have moved each listener at most in some samples:
+  // the first ones, then some as far apart as is needed for half a period of the slowest.
+  Row peaks_of(Row q, Row d) const {
+    const std::size_t modes = rings_.size();
+    Row peaks(hearing_.listeners.size(), 0.0);
+    Row ringing_peaks = peaks;  // without what drifts away
+    const auto listen = [&] {
+      for (std::size_t l = 0; l < peaks.size(); ++l) {
+        double heard = 0.0;
+        double ringing = 0.0;
+        for (std::size_t i = 0; i < modes; ++i) {
+          const double part = hearing_.listeners[l][i] * q[i];
+          heard += part;
+          ringing += rings_[i].rings ? part : 0.0;
+        }
+        peaks[l] = std::max(peaks[l], std::fabs(heard));
+        ringing_peaks[l] = std::max(ringing_peaks[l], std::fabs(ringing));
+      }
+    };
+    const double per_sample =
+        static_cast<double>(modes * (peaks.size() + 2) * (hearing_.blows.size() + 1));
+    const auto samples = static_cast<std::size_t>(std::clamp(most_work / std::max(per_sample, 1.0),
+                                                             static_cast<double>(least_samples),
+                                                             static_cast<double>(most_samples)));
+    double slowest = 1.0;
+    for (std::size_t i = 0; i < modes; ++i) {
+      slowest = rings_[i].rings ? std::min(slowest, hearing_.stiffness[i]) : slowest;
+    }
+    const double half_period = std::min(4.0 / std::sqrt(std::max(slowest, 1e-16)), 1e8);
+    const auto apart =
+        static_cast<std::size_t>(std::ceil(2.0 * half_period / static_cast<double>(samples)));
+    listen();
+    for (const std::size_t steps : {std::size_t{1}, std::max<std::size_t>(apart, 1)}) {
+      std::vector<Advance> advance;
+      for (std::size_t i = 0; i < modes; ++i) {
+        advance.push_back(Advance::of(hearing_.stiffness[i], hearing_.damping[i], steps));
+      }
+      for (std::size_t n = 0; n < samples / 2; ++n) {
+        for (std::size_t i = 0; i < modes; ++i) {
+          const double now = q[i];
+          q[i] = advance[i].qq * now + advance[i].qd * d[i];
+          d[i] = advance[i].dq * now + advance[i].dd * d[i];
+        }
+        listen();
+      }
+    }
+    for (std::size_t l = 0; l < peaks.size(); ++l) {
+      peaks[l] = std::min(peaks[l], ringing_peaks[l]);
+    }
+    return peaks;
+  }
+
+  // A source at every listener: each mode's share of its peak there, or without one of all that
+  // ring. Undamped modes ring for ever: where there are any, the sum over time is of no use.
   template <class Swing>
-  void weigh_source(Swing&& swing) {
-    for (const Row& listener : hearing_.listeners) {
+  void weigh_source(Swing&& swing, const Row& peaks) {
+    for (std::size_t l = 0; l < hearing_.listeners.size(); ++l) {
+      const Row& listener = hearing_.listeners[l];
       Row share(rings_.size(), 0.0);
       double all = 0.0;
       for (std::size_t i = 0; i < share.size(); ++i) {
         share[i] = rings_[i].rings && listener[i] != 0.0 ? swing(i) * std::fabs(listener[i]) : 0.0;
         all += share[i];
+      }
+      if (all > 0.0 && !peaks.empty()) {
+        all = std::min(all, std::max(peaks[l], 1e-30 * all));
       }
       if (all > 0.0 && std::isfinite(all)) {
         for (double& s : share) {

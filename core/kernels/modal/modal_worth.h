@@ -18,13 +18,16 @@ struct Hearing {
 struct Worth {
   std::vector<std::uint32_t> kept;  // modes, those first that are heard the longest
   std::vector<std::uint32_t> left_out;
-  // Left out modes move a listener by no more than this share of how far all modes together could:
-  // for one blow, for any number of them at any time, and from the start.
+  // Left out modes move a listener by no more than this share of how far all modes together do: of
+  // the peak that one blow brings, or the start. Of blows in any number at any time, of how far all
+  // could.
   double share = 0.0;
 };
 
 // Leaves out modes while that share, of every pair of a source and a listener, is at most `most`.
-// Modes that do not ring stay. O(sources * listeners * modes + modes log modes).
+// Modes that do not ring stay. A peak is looked for in samples of the motion itself, so that it is
+// never taken for more than it is. O(sources * listeners * modes + modes log modes), and at most
+// some 1e7 for the peaks.
 Worth weigh(const Hearing& hearing, double most);
 
 }  // namespace ressort

@@ -74,7 +74,6 @@ TEST_CASE("What does not share its eigenvectors is refused", "[modal]") {
   CHECK(has_modes(two + "@r spring @g @a 0.1\n@s spring @a @b 0.2\n"));
   CHECK_FALSE(has_modes(two + "@r spring @g @a K\n@s spring @a @b L\n"));
   CHECK_FALSE(has_modes(two + "@r spring @g @a K\n@s spring @a @b 0.2\n"));
-  CHECK_FALSE(has_modes(two + "@r spring @g @a K\n@out2 frcOutput @a\n"));
 }
 
 TEST_CASE("A mesh in its modes sounds as mass by mass", "[modal]") {

@@ -126,7 +126,7 @@ double reach_of_a_blow(const std::string& text) {
   return most;
 }
 
-TEST_CASE("A struck mesh needs ten modes of six hundred", "[modes_asleep]") {
+TEST_CASE("A struck mesh needs twelve modes of six hundred", "[modes_asleep]") {
   const std::string struck = model("20x30mesh.mdl");
   const double reach = reach_of_a_blow(struck);
   for (const Isa isa : isas()) {
@@ -138,7 +138,7 @@ TEST_CASE("A struck mesh needs ten modes of six hundred", "[modes_asleep]") {
                  << " of " << show(mesh.peak()) << ", at most " << show(mesh.most_owed()) << ", "
                  << isa_name(isa));
     CHECK(mesh.form().of > 590);
-    CHECK(mesh.mean_awake() <= 10.0);
+    CHECK(mesh.mean_awake() <= 12.0);
     CHECK(mesh.excess() < 1e-12);
     CHECK(mesh.worst() > 0.0);
     CHECK(mesh.most_owed() + mesh.form().left_out * reach <= 1e-3 * reach);
@@ -230,7 +230,7 @@ TEST_CASE("In float as in double", "[modes_asleep]") {
   Pair<float> mesh(model("20x30mesh.mdl"), -60.0);
   mesh.play({{1.0}});
   mesh.rest(44099);
-  CHECK(mesh.mean_awake() <= 10.0);
+  CHECK(mesh.mean_awake() <= 12.0);
   CHECK(mesh.excess() < 1e-6 * mesh.peak());
 }
 
@@ -261,7 +261,7 @@ TEST_CASE("Exact modes sleep as well", "[modes_asleep]") {
     }
     sum += 60.0 * static_cast<double>(kernel.awake().modes);
   }
-  CHECK(sum / 44100.0 < 12.0);
+  CHECK(sum / 44100.0 < 14.0);
 }
 
 TEST_CASE("Without a budget nothing sleeps", "[modes_asleep]") {

@@ -1,0 +1,266 @@
+#include "core/kernels/modal/modal_body.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "core/kernels/taps.h"
+#include "core/laws/laws.h"
+
+namespace ressort {
+namespace {
+
+// Each takes a matrix of all masses, or a vector; with so many the form is of no use.
+constexpr std::size_t most_frames = 256;
+constexpr std::size_t most_runs = 65'536;
+
+void add_share(std::vector<MassShare>& shares, std::uint32_t mass, double weight) {
+  for (MassShare& share : shares) {
+    if (share.mass == mass) {
+      share.weight += weight;
+      return;
+    }
+  }
+  shares.push_back({mass, weight});
+}
+
+class BodyMaker {
+ public:
+  explicit BodyMaker(const Program& program) : program_(program) { body_.count = program.moving; }
+
+  std::optional<LinearBody> make() {
+    look_at_parameters();
+    if (program_.link_runs.size() > most_runs || has_sliding_ground() || has_moving_place() ||
+        !weigh_masses()) {
+      return std::nullopt;
+    }
+    read_nodes();
+    if (!sort_links()) {
+      return std::nullopt;
+    }
+    return std::move(body_);
+  }
+
+ private:
+  void look_at_parameters() {
+    body_.is_live.assign(program_.coefficients.size(), false);
+    for (const auto& depending : program_.depending) {
+      for (const std::uint32_t c : depending) {
+        body_.is_live[c] = true;
+      }
+    }
+    for (const Coefficient& coefficient : program_.coefficients) {
+      body_.value.push_back(coefficient_value(program_, coefficient, program_.parameters, 1.0));
+    }
+    body_.input.assign(program_.position.size(), LinearBody::nowhere);
+    for (std::uint32_t i = 0; i < program_.inputs.size(); ++i) {
+      if (!program_.inputs[i].is_force) {
+        body_.input[program_.inputs[i].node] = i;
+      }
+    }
+  }
+
+  std::size_t first_place() const {
+    return program_.taps.empty() ? program_.position.size() : program_.taps[0].node;
+  }
+
+  // A ground that stays but claims to have a velocity is left to the direct form.
+  bool has_sliding_ground() const {
+    for (std::uint32_t node = body_.count; node < first_place(); ++node) {
+      if (body_.input[node] == LinearBody::nowhere && program_.velocity[node] != 0.0) {
+        return true;
+      }
+    }
+    return false;
+  }
+  bool has_moving_place() const {
+    return std::any_of(program_.taps.begin(), program_.taps.end(), [&](const TapSlot& tap) {
+      return body_.is_live[tap.u] || body_.is_live[tap.v];
+    });
+  }
+
+  // All masses turn with one coefficient, or none turns.
+  bool weigh_masses() {
+    body_.root = Vector(1.0, body_.count);
+    const std::uint32_t first = program_.mass_runs.front().inverse_mass;
+    const bool together =
+        std::all_of(program_.mass_runs.begin(), program_.mass_runs.end(),
+                    [&](const MassRun& run) { return run.inverse_mass == first; });
+    body_.inverse_mass = together ? first : Modes::own_mass;
+    for (const MassRun& run : program_.mass_runs) {
+      const double inverse = body_.value[run.inverse_mass];
+      if (!together &&
+          (body_.is_live[run.inverse_mass] || !(inverse > 0.0) || !std::isfinite(inverse))) {
+        return false;
+      }
+      body_.root[std::slice(run.first, run.count, 1)] = together ? 1.0 : std::sqrt(inverse);
+    }
+    return true;
+  }
+
+  void read_nodes() {
+    for (std::uint32_t node = 0; node < program_.position.size(); ++node) {
+      std::vector<MassShare> around;
+      if (node < first_place()) {
+        around.push_back({node, 1.0});
+      } else {
+        const TapSlot& tap = program_.taps[node - first_place()];
+        const auto corners = corners_at(tap, body_.value[tap.u], body_.value[tap.v]);
+        each_corner(corners, [&](std::uint32_t corner, double weight) {
+          add_share(around, program_.tap_nodes[corner], weight);
+        });
+      }
+      Reading reading;
+      for (const MassShare& share : around) {
+        if (share.mass < body_.count) {
+          reading.shares.push_back(share);
+        } else {
+          reading.offset += share.weight * program_.position[share.mass];
+        }
+      }
+      body_.reading.push_back(std::move(reading));
+      body_.around.push_back(std::move(around));
+    }
+  }
+
+  // The frame of a coefficient. Constants are one frame, as nothing but a voice's pitch moves
+  // them: then the coefficient is that of the first, and the weight is relative to it.
+  Frame& frame_of(std::vector<Frame>& frames, std::uint32_t c, bool is_late, double& weight) {
+    weight = 1.0;
+    for (Frame& frame : frames) {
+      if (frame.is_late != is_late) {
+        continue;
+      }
+      if (frame.coefficient == c) {
+        return frame;
+      }
+      if (!body_.is_live[c] && !body_.is_live[frame.coefficient]) {
+        weight = body_.value[c] / body_.value[frame.coefficient];
+        return frame;
+      }
+    }
+    frames.push_back({.coefficient = c, .is_late = is_late, .pull = Vector(body_.count)});
+    return frames.back();
+  }
+
+  void add_bar(std::vector<Frame>& frames, std::uint32_t c, bool is_late, Bar bar) {
+    if (body_.is_nothing(c) || bar.shares.empty()) {
+      return;
+    }
+    Frame& frame = frame_of(frames, c, is_late, bar.weight);
+    for (const auto& [mass, weight] : bar.shares) {
+      frame.pull[mass] += bar.weight * weight * bar.position;
+    }
+    frame.bars.push_back(std::move(bar));
+  }
+
+  Bar bar_between(Ends ends) const {
+    Bar bar{.shares = body_.reading[ends.a].shares};
+    for (const auto& [mass, weight] : body_.reading[ends.b].shares) {
+      add_share(bar.shares, mass, -weight);
+    }
+    std::erase_if(bar.shares, [](const MassShare& share) { return share.weight == 0.0; });
+    bar.position = body_.reading[ends.b].offset - body_.reading[ends.a].offset;
+    return bar;
+  }
+
+  // Linear links and oscillators become frames. False if there are too many.
+  bool sort_links() {
+    for (const MassRun& run : program_.mass_runs) {
+      for (std::uint32_t i = run.first; run.is_oscillator && i < run.first + run.count; ++i) {
+        add_bar(body_.stiffness, run.stiffness, false, {.shares = {{i, 1.0}}});
+        add_bar(body_.damping, run.damping, false, {.shares = {{i, 1.0}}});
+      }
+    }
+    for (const LinkRun& run : program_.link_runs) {
+      for (std::uint32_t i = run.first; run.law == Law::spring && i < run.first + run.count; ++i) {
+        Bar bar = bar_between(program_.ends[i]);
+        add_bar(body_.stiffness, run.coefficients[0], true, bar);
+        bar.position = 0.0;
+        add_bar(body_.damping, run.coefficients[1], true, std::move(bar));
+      }
+      if (body_.stiffness.size() + body_.damping.size() > most_frames) {
+        return false;
+      }
+    }
+    return true;
+  }
+
+  const Program& program_;
+  LinearBody body_;
+};
+
+// How much of what acts on one node is felt at another, grounds and inputs among them.
+double share_felt(const LinearBody& body, std::uint32_t from, std::uint32_t at) {
+  double sum = 0.0;
+  for (const MassShare& pushed : body.around[from]) {
+    for (const MassShare& felt : body.around[at]) {
+      sum += pushed.mass == felt.mass ? pushed.weight * felt.weight : 0.0;
+    }
+  }
+  return sum;
+}
+
+}  // namespace
+
+Vector LinearBody::force_at(std::uint32_t node) const {
+  Vector force(count);
+  for (const auto& [mass, weight] : reading[node].shares) {
+    force[mass] += weight;
+  }
+  return force;
+}
+
+FeltForce force_felt(const Program& program, const LinearBody& body, std::uint32_t node,
+                     const Vector& rest, const std::map<std::uint32_t, std::uint32_t>& held) {
+  FeltForce felt{.force = {.scale = 1.0 / (program.rate_ratio * program.rate_ratio)}};
+  for (const LinkRun& run : program.link_runs) {
+    std::vector<MassShare> shares;
+    double constant = 0.0;
+    for (std::uint32_t i = run.first; run.law == Law::spring && i < run.first + run.count; ++i) {
+      const auto [a, b] = program.ends[i];
+      const double share = share_felt(body, b, node) - share_felt(body, a, node);
+      if (share == 0.0) {
+        continue;
+      }
+      for (const std::uint32_t end : {a, b}) {
+        const double weight = end == a ? share : -share;
+        constant += weight * body.reading[end].offset;
+        for (const auto& [mass, part] : body.reading[end].shares) {
+          add_share(shares, mass, weight * part);
+          constant += weight * part * rest[mass];
+        }
+        if (body.input[end] != LinearBody::nowhere) {
+          felt.force.hands.push_back({.input = body.input[end],
+                                      .stiffness = run.coefficients[0],
+                                      .damping = run.coefficients[1],
+                                      .start = program.position[end],
+                                      .weight = weight});
+        }
+      }
+    }
+    if (!shares.empty() || constant != 0.0) {
+      felt.force.parts.push_back({run.coefficients[0], false, constant, {}});
+      felt.force.parts.push_back({run.coefficients[1], true, 0.0, {}});
+      felt.shares.insert(felt.shares.end(), 2, shares);
+    }
+  }
+  for (std::uint32_t i = 0; i < program.inputs.size(); ++i) {
+    const double share = share_felt(body, program.inputs[i].node, node);
+    if (program.inputs[i].is_force && share != 0.0) {
+      felt.force.inputs.push_back({i, share});
+    }
+  }
+  for (const auto& [at, end] : held) {
+    if (const double share = share_felt(body, at, node); share != 0.0) {
+      felt.force.ends.push_back({end, share});
+    }
+  }
+  return felt;
+}
+
+std::optional<LinearBody> linear_body(const Program& program) {
+  return program.moving == 0 ? std::nullopt : BodyMaker(program).make();
+}
+
+}  // namespace ressort

@@ -1,0 +1,93 @@
+// Several steps a sample: the same as the network at so many times the rate, every so many samples.
+#include "core/kernels/oversampled/oversampled_form.h"
+#include "tests/support/harness.h"
+
+namespace ressort {
+namespace {
+
+using support::Bare;
+using support::isas;
+using support::Motion;
+using support::network_of;
+using support::show;
+
+constexpr std::uint32_t times = 4;
+
+// Springs, gravity, a hand, a contact that it makes, a force, and one that is heard.
+std::string touched() {
+  return scenes::string("s", 9, "0.1", "0.002") +
+         "@h mass 1.5 0.001 0.\n@k springDamper @h @s_m4 0.05 0.001\n"
+         "@o osc 2. 0.02 0.003 0.01 0.\n@j springDamper @o @s_m2 0.03 0.\n"
+         "@in1 posInput 0.3\n@c contact @in1 @s_m6 0.05 0.001 0.\n@in2 frcInput @s_m1\n" +
+         scenes::output(1, "s_m3") + scenes::output(2, "o") + "@out3 frcOutput @s_m6\n";
+}
+
+TEST_CASE("several steps a sample are as many samples at a finer rate", "[oversampled]") {
+  const Program coarse = make_program(network_of(touched()), 44100.0, true);
+  for (const Isa isa : isas()) {
+    Program program = coarse;
+    program.form = oversampled_form(oversampled_program(coarse, times), times);
+    Bare<double> found(program, 1, isa);
+    Bare<double> wanted(make_program(network_of(touched()), 44100.0 * times, true), 1, isa);
+    const Motion hand(7, 20.0, 200.0);
+    double before = 0.3;
+    double peak = 0.0;
+    double worst = 0.0;
+    bool has_touched = false;
+    for (std::size_t n = 0; n < 4000; ++n) {
+      const double at = 0.3 - 0.6 * std::fabs(hand(n));
+      const double force = n % 500 < 3 ? 0.02 : 0.0;
+      const auto heard = found.step({at, force});
+      std::vector<double> fine;
+      for (std::uint32_t i = 1; i <= times; ++i) {
+        fine = wanted.step({before + (at - before) * i / times, force / (times * times)});
+      }
+      for (std::size_t o = 0; o < 3; ++o) {
+        peak = std::max(peak, std::fabs(fine[o]));
+        worst = std::max(worst, std::fabs(heard[o] - fine[o]));
+      }
+      has_touched = has_touched || at < 0.0;
+      before = at;
+    }
+    INFO("off by " << show(worst) << " of " << show(peak));
+    CHECK(has_touched);
+    CHECK(peak > 0.01);
+    // The hand's way is added up in another order.
+    CHECK(worst < 1e-11 * peak);
+  }
+}
+
+TEST_CASE("coefficients on their way and states go through to the finer steps", "[oversampled]") {
+  Program program = make_program(network_of(touched()), 44100.0, true);
+  program.form = oversampled_form(oversampled_program(program, times), times);
+  Bare<double> one(program);
+  Bare<double> other(program);
+  std::vector<double> x(program.position.size());
+  std::vector<double> v(x.size());
+  for (std::size_t n = 0; n < 100; ++n) {
+    one.step({0.3, n == 0 ? 0.1 : 0.0});
+  }
+  // What was saved is where another goes on, but for what links felt in that sample.
+  REQUIRE(one.kernel().save(0, x.data(), v.data()));
+  other.kernel().set_state(0, x.data(), v.data());
+  std::vector<double> y(x.size());
+  std::vector<double> w(x.size());
+  REQUIRE(other.kernel().save(0, y.data(), w.data()));
+  CHECK(x == y);
+  CHECK(v == w);
+  // A spring that is turned stiffer within 64 samples is where it was turned to.
+  std::vector<double> turned = program.parameters;
+  turned[1] *= 1.5;
+  one.set_coefficients(0, turned, 1.0, true);
+  one.kernel().coefficients.ramp(64);
+  for (std::size_t n = 0; n < 64; ++n) {
+    one.step({0.3, 0.0});
+  }
+  for (std::uint32_t c = 0; c < program.coefficients.size(); ++c) {
+    const double wanted = coefficient_value(program, program.coefficients[c], turned, 1.0);
+    CHECK(one.kernel().coefficients.value[c * one.lanes()] == Approx(wanted).epsilon(1e-12));
+  }
+}
+
+}  // namespace
+}  // namespace ressort
