@@ -168,9 +168,18 @@ void add_budget(CLI::App& command, std::optional<Budget>& budget) {
           },
           "how far the sound may be from the continuous network, and what may be left out:\n"
           "'cents=3 t60=5 silence=-60 passive=auto'; cents of pitch, % of decay, dB below the\n"
-          "loudest, and whether contacts may not gain energy: auto, always, never. Without it\n"
-          "what the preset says, else the published scheme where that is safe")
+          "peak of the unreduced output over its whole life, and whether contacts may not gain\n"
+          "energy: auto, always, never. Without it what the preset says, else the published\n"
+          "scheme for all that is linear. Cents and % that cannot be kept are told, with how far\n"
+          "off it is")
       ->type_name("TEXT");
+}
+
+void add_strict(CLI::App& command, bool& is_strict) {
+  command.add_flag(
+      "--strict", is_strict,
+      "a budget of cents or t60 that is not kept, or of which nobody knows whether it\n"
+      "is, is an error: exit code 2 instead of a warning");
 }
 
 // How the network is computed, for every command that computes it.
@@ -317,6 +326,7 @@ void add_render(CLI::App& app, RenderChoice& choice, int& code) {
   add_numbers(*command, options.precision, options.rescale);
   add_method(*command, options.method);
   add_budget(*command, options.budget);
+  add_strict(*command, options.is_strict);
   add_motion(*command, options.third);
   add_force(*command, options.force);
   command->add_option("-p,--voices", options.voices, "how many notes sound at once")
@@ -406,6 +416,7 @@ void add_check(CLI::App& app, CheckOptions& options, int& code) {
   add_motion(*command, options.third);
   add_method(*command, options.method);
   add_budget(*command, options.budget);
+  add_strict(*command, options.is_strict);
   command->callback([&options, &code] { code = check(options); });
 }
 

@@ -4,8 +4,8 @@
 set(RESSORT_TURN 0 CACHE STRING "Which of the deep tests comes first")
 set(ressort_fuzzers model preset score midi console osc osc_packet)
 list(TRANSFORM ressort_fuzzers PREPEND fuzz_ OUTPUT_VARIABLE ressort_deep_tests)
-list(APPEND ressort_deep_tests arm everything_sanitized everything_more forms_everywhere lint
-  scenes_more abuse_long)
+list(APPEND ressort_deep_tests arm everything_sanitized everything_more forms_everywhere
+  accuracy_everywhere silence_everywhere lint scenes_more abuse_long)
 list(LENGTH ressort_deep_tests ressort_deep_count)
 
 # SECONDS is about what it needs on two cores.
@@ -36,6 +36,12 @@ add_deep_test(forms_everywhere 240 $<TARGET_FILE:ressort_tests> "[forms_everywhe
 # Two thousand random nonlinear scenes; a person may ask for others: FIRST,COUNT,FRAMES.
 add_deep_test(scenes_more 200 ${CMAKE_COMMAND} -E env RESSORT_SCENES=1001,2000,1024
   $<TARGET_FILE:ressort_tests> "[scenes]")
+
+# Budgets of pitch and decay on 300 random networks.
+add_deep_test(accuracy_everywhere 120 $<TARGET_FILE:ressort_tests> "[accuracy_everywhere]")
+
+# What silence= leaves out of 200 of them.
+add_deep_test(silence_everywhere 120 $<TARGET_FILE:ressort_tests> "[silence_everywhere]")
 
 # A minute of it for each instrument.
 add_deep_test(abuse_long 300 $<TARGET_FILE:ressort_abuse> 60 2)

@@ -133,6 +133,22 @@ json stability_json(const Proved& proved) {
   return out;
 }
 
+// How far off it is told to be, with what there is no number for as null.
+json accuracy_json(const Accuracy& accuracy) {
+  const auto figure = [&](double value) { return accuracy.is_known ? limit_json(value) : json(); };
+  return {{"cents", figure(accuracy.cents)},
+          {"t60_percent", figure(accuracy.t60_percent)},
+          {"is_bound", accuracy.is_bound}};
+}
+
+// Of a budget for pitch or decay; whether it is kept is null where that is not known.
+json budget_json(const Plan& plan) {
+  json out = accuracy_json(*plan.accuracy);
+  out["asked"] = print_budget(plan.budget);
+  out["kept"] = plan.accuracy->is_known ? json(plan.accuracy->meets(plan.budget)) : json();
+  return out;
+}
+
 json scene_json(const Scene& scene, const Compiled& compiled, const Proved& proved) {
   const Instrument& instrument = compiled.instrument;
   json parameters = json::array();
@@ -147,6 +163,9 @@ json scene_json(const Scene& scene, const Compiled& compiled, const Proved& prov
                     {"links", part.links},
                     {"predicted_ns", part.predicted_ns},
                     {"reason", part.reason}});
+    if (part.accuracy) {
+      plan.back()["off"] = accuracy_json(*part.accuracy);
+    }
   }
   const char* const motion = !scene.third                                         ? "either"
                              : *scene.third == ThirdArgument::velocity_per_second ? "velocity"
@@ -163,6 +182,9 @@ json scene_json(const Scene& scene, const Compiled& compiled, const Proved& prov
            {"plan", plan},
            {"stability", stability_json(proved)},
            {"stiffness_margin", instrument.stiffness_margin}};
+  if (compiled.plan.accuracy) {
+    out["budget"] = budget_json(compiled.plan);
+  }
   if (instrument.mode) {
     out["lowest_mode_hz"] = instrument.mode->frequency_hz;
   }
@@ -266,10 +288,12 @@ int check(const CheckOptions& options) {
   Reading reading = read_scene(options.name, {.third = options.third, .progress = progress});
   Admission admission;
   if (reading.scene) {
-    admission = ask_to_play(*reading.scene, {.method = options.method,
-                                             .budget = options.budget,
-                                             .progress = progress,
-                                             .most_bytes = free_memory_bytes()});
+    admission = ask_to_play(*reading.scene,
+                            {.method = options.method,
+                             .budget = options.budget,
+                             .progress = progress,
+                             .most_bytes = free_memory_bytes()},
+                            options.is_strict);
   }
   const std::optional<Compiled>& compiled = admission.compiled;
   const bool is_ok = compiled && admission.is_granted();

@@ -215,7 +215,7 @@ Result<Rendered> render(const RenderOptions& options, const std::function<bool(d
                          .reach = reach_of(*lines, scene->network),
                          .progress = options.loading,
                          .most_bytes = free_memory_bytes()},
-                        scene->warnings);
+                        scene->warnings, options.is_strict);
   if (!compiled) {
     return compiled.error();
   }

@@ -29,6 +29,7 @@ struct RenderOptions {
   bool rescale = true;
   std::optional<Method> method;        // without one, the plan's choice
   std::optional<Budget> budget;        // instead of the preset's
+  bool is_strict = false;              // a budget that is not kept is an error
   std::optional<ThirdArgument> third;  // whatever the model shows
   bool limit = false;
   bool force = false;  // even if it is not stable

@@ -22,7 +22,7 @@ bool Admission::is_granted() const {
   });
 }
 
-Admission ask_to_play(const Scene& scene, const CompileOptions& options) {
+Admission ask_to_play(const Scene& scene, const CompileOptions& options, bool is_strict) {
   Admission admission;
   auto compiled = compile(scene.network, scene.preset, options);
   if (!compiled) {
@@ -47,13 +47,21 @@ Admission ask_to_play(const Scene& scene, const CompileOptions& options) {
     admission.findings.push_back(
         at(scene.model_path, max_model_bytes, *compiled->schemes.hazard, Severity::warning));
   }
+  const std::vector<Part>& parts = compiled->plan.parts;
+  const auto broken = broken_promise(compiled->plan);
+  if (broken &&
+      std::none_of(parts.begin(), parts.end(), [](const Part& part) { return part.may_gain; })) {
+    Finding finding = finding_of(scene.path, "", Error{*broken});
+    finding.diagnostic.severity = is_strict ? Severity::error : Severity::warning;
+    admission.findings.push_back(std::move(finding));
+  }
   admission.compiled = *std::move(compiled);
   return admission;
 }
 
 Result<Compiled> admit(const Scene& scene, const CompileOptions& options,
-                       std::vector<std::string>& warnings) {
-  Admission admission = ask_to_play(scene, options);
+                       std::vector<std::string>& warnings, bool is_strict) {
+  Admission admission = ask_to_play(scene, options, is_strict);
   std::string errors;
   for (const Finding& finding : admission.findings) {
     if (finding.diagnostic.severity == Severity::error) {

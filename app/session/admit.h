@@ -18,13 +18,14 @@ struct Admission {
 };
 
 // Refuses, with file, line and column, where compile() fails, and where the model is not stable as
-// it starts unless the options say to force it. Tells what is narrowed, forced or not proved.
-// [any thread but audio]
-Admission ask_to_play(const Scene& scene, const CompileOptions& options);
+// it starts unless the options say to force it. Tells what is narrowed, forced or not proved, and
+// what a budget promises and is not kept, which `is_strict` refuses; not while a better form is yet
+// to be looked for. [any thread but audio]
+Admission ask_to_play(const Scene& scene, const CompileOptions& options, bool is_strict = false);
 
 // The same for who wants to play or nothing: warnings are added to `warnings`, an error's message
 // is all errors, one a line.
 Result<Compiled> admit(const Scene& scene, const CompileOptions& options,
-                       std::vector<std::string>& warnings);
+                       std::vector<std::string>& warnings, bool is_strict = false);
 
 }  // namespace ressort

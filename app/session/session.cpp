@@ -221,6 +221,7 @@ void Session::improve() {
   }
   const std::string news = too_much(compiled->plan, compiled->instrument.voices,
                                     source.options.rate_hz, source.options.precision);
+  const auto broken = broken_promise(compiled->plan);
   {
     const std::lock_guard lock(mutex_);
     auto loaded = std::make_shared<Loaded>(*current_);
@@ -230,6 +231,9 @@ void Session::improve() {
   offer(std::move(compiled->engine));
   if (!news.empty() && tell_) {
     tell_(news);
+  }
+  if (broken && tell_) {
+    tell_(*broken);
   }
   time_parts();
 }

@@ -1,9 +1,13 @@
 #include "core/analysis/linear.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <numbers>
+#include <tuple>
+#include <utility>
 
+#include "core/analysis/places.h"
 #include "core/linear_algebra/cholesky.h"
 #include "core/linear_algebra/eigen.h"
 
@@ -13,12 +17,15 @@ namespace {
 constexpr int dense_size = 64;      // below this a dense solver is faster and never fails
 constexpr double rigid = 1e-12;     // a smaller share of the largest stiffness is rounding
 constexpr double tolerance = 1e-8;  // of the largest stiffness, that a mode's force is off
+constexpr double same = 1e-9;       // by how much modes may differ that are as low
+constexpr std::size_t most_shapes = 12;
+constexpr std::size_t most_given = 3;
 
 // The linear part of a network: what moves, numbered anew, and what pulls at it.
 class Body {
  public:
   Body(const Network& network, std::span<const double> parameters)
-      : network_(network), index_(network.masses.size(), held) {
+      : network_(network), parameters_(parameters), index_(network.masses.size(), held) {
     for (const Formula& formula : network.arguments) {
       values_.push_back(evaluate(formula, parameters));
     }
@@ -31,19 +38,24 @@ class Body {
     }
   }
 
+  int size() const { return static_cast<int>(scale_.size()); }
+
   // M^(-1/2) K M^(-1/2), its lower half.
   SparseMatrix stiffness() const {
     std::vector<double> diagonal(scale_.size());
     std::vector<SparseMatrix::Element> elements;
     elements.reserve(network_.links.size() + scale_.size());
-    each_spring([&](int a, int b, double k, double) {
-      for (const int i : {a, b}) {
-        if (i != held) {
-          diagonal[static_cast<std::size_t>(i)] += k * scale(i) * scale(i);
+    each_spring([&](const Shares& shares, double k, double) {
+      for (std::size_t p = 0; p < shares.count; ++p) {
+        for (std::size_t q = 0; q <= p; ++q) {
+          const auto [i, a] = shares.of[p];
+          const auto [j, b] = shares.of[q];
+          if (i == j) {
+            diagonal[static_cast<std::size_t>(i)] += (p == q ? 1.0 : 2.0) * k * a * b;
+          } else if (k != 0.0) {
+            elements.push_back({std::max(i, j), std::min(i, j), k * a * b});
+          }
         }
-      }
-      if (a != held && b != held && k != 0.0) {
-        elements.push_back({std::max(a, b), std::min(a, b), -k * scale(a) * scale(b)});
       }
     });
     for (int i = 0; i < size(); ++i) {
@@ -52,44 +64,91 @@ class Body {
     return {size(), elements};
   }
 
-  // The share of Z in a vector of length 1.
-  double damping(const Vector& shape) const {
-    double sum = 0.0;
-    const auto moved = [&](int i) {
-      return i == held ? 0.0 : shape[static_cast<std::size_t>(i)] * scale(i);
-    };
-    each_spring([&](int a, int b, double, double z) {
-      const double stretch = moved(a) - moved(b);
-      sum += z * stretch * stretch;
+  // M^(-1/2) Z M^(-1/2) of a vector.
+  Vector damped(const Vector& vector) const {
+    Vector sum(vector.size());
+    each_spring([&](const Shares& shares, double, double z) {
+      const double force = z * shares.along(vector);
+      for (std::size_t p = 0; p < shares.count; ++p) {
+        sum[static_cast<std::size_t>(shares.of[p].first)] += force * shares.of[p].second;
+      }
     });
     return sum;
+  }
+
+  // K and Z between some vectors.
+  std::pair<Matrix, Matrix> between(const std::vector<Vector>& vectors) const {
+    const std::size_t count = vectors.size();
+    Matrix stiffness(count, count);
+    Matrix damping(count, count);
+    std::vector<double> stretch(count);
+    each_spring([&](const Shares& shares, double k, double z) {
+      for (std::size_t i = 0; i < count; ++i) {
+        stretch[i] = shares.along(vectors[i]);
+        for (std::size_t j = 0; j <= i; ++j) {
+          stiffness(i, j) = stiffness(j, i) += k * stretch[i] * stretch[j];
+          damping(i, j) = damping(j, i) += z * stretch[i] * stretch[j];
+        }
+      }
+    });
+    return {std::move(stiffness), std::move(damping)};
   }
 
  private:
   static constexpr int held = -1;
 
-  int size() const { return static_cast<int>(scale_.size()); }
-  double scale(int i) const { return scale_[static_cast<std::size_t>(i)]; }
+  // What a link's distance is, as a sum over rows: two masses, or up to four around either place.
+  struct Shares {
+    double along(const Vector& vector) const {
+      double sum = 0.0;
+      for (std::size_t p = 0; p < count; ++p) {
+        sum += of[p].second * vector[static_cast<std::size_t>(of[p].first)];
+      }
+      return sum;
+    }
+
+    std::array<std::pair<int, double>, 8> of;
+    std::size_t count = 0;
+  };
+
   double value(ArgumentId id) const { return id == no_argument ? 0.0 : values_[id]; }
 
-  // Calls use(one end, the other, k, z).
+  void hang(Shares& shares, std::uint32_t mass, double sign) const {
+    each_share(
+        network_, mass,
+        [&](std::uint32_t i, double share) {
+          if (index_[i] != held) {
+            shares.of[shares.count++] = {
+                index_[i], sign * share * scale_[static_cast<std::size_t>(index_[i])]};
+          }
+        },
+        parameters_);
+  }
+
+  // Calls use(shares, k, z).
   template <class Use>
   void each_spring(Use&& use) const {
-    for (std::size_t i = 0; i < index_.size(); ++i) {
+    for (std::uint32_t i = 0; i < index_.size(); ++i) {
       const Mass& mass = network_.masses[i];
       if (mass.kind == MassKind::oscillator) {
-        use(index_[i], held, value(mass.stiffness), value(mass.damping));
+        Shares shares;
+        hang(shares, i, 1.0);
+        use(shares, value(mass.stiffness), value(mass.damping));
       }
     }
     for (const Link& link : network_.links) {
       if (link.a != link.b) {
         const LinearPart part = linear_part(link);
-        use(index_[link.a], index_[link.b], value(part.stiffness), value(part.damping));
+        Shares shares;
+        hang(shares, link.a, 1.0);
+        hang(shares, link.b, -1.0);
+        use(shares, value(part.stiffness), value(part.damping));
       }
     }
   }
 
   const Network& network_;
+  std::span<const double> parameters_;
   std::vector<double> values_;  // [argument]
   std::vector<int> index_;      // [mass] among those that move, or held
   std::vector<double> scale_;   // [moving mass] M^(-1/2)
@@ -127,13 +186,15 @@ bool is_pair(const SparseMatrix& lower, double value, const Vector& vector, doub
 // Eigenpairs from 0 on, as many as asked for; all where the matrix is small.
 class Spectrum {
  public:
-  // The shift lies a little below 0, so that free networks can be factored too.
   Spectrum(const SparseMatrix& lower, double shift, const Progress& progress)
       : lower_(lower), shift_(shift), progress_(progress) {}
 
   std::optional<Eigenpairs> near_zero(int count) {
     if (lower_.size() <= dense_size) {
-      return symmetric_eigenpairs(dense(lower_));
+      if (!all_) {
+        all_ = symmetric_eigenpairs(dense(lower_));
+      }
+      return all_;
     }
     if (!is_factored_ && !factor()) {
       return std::nullopt;
@@ -144,6 +205,23 @@ class Spectrum {
       factor_.solve(to);
       progress_.spend(4 * size);
     });
+  }
+
+  // (A - shift)^-1 of a vector, once pairs were found.
+  std::optional<Vector> inverse(Vector vector) {
+    if (all_) {
+      Vector sum(vector.size());
+      for (std::size_t i = 0; i < vector.size(); ++i) {
+        const Vector shape = all_->vectors.column(i);
+        sum += dot(shape, vector) / (all_->values[i] - shift_) * shape;
+      }
+      return sum;
+    }
+    if (!is_factored_) {
+      return std::nullopt;
+    }
+    factor_.solve(std::begin(vector));
+    return vector;
   }
 
  private:
@@ -160,29 +238,81 @@ class Spectrum {
   const SparseMatrix& lower_;
   double shift_;
   const Progress& progress_;
+  std::optional<Eigenpairs> all_;  // of a small matrix
   Cholesky factor_;
   bool is_factored_ = false;
 };
 
-// The lowest eigenpair above what is rounding. Most often it is the first.
-bool lowest_pair(const SparseMatrix& lower, double stiffest, const Progress& progress, Mode& mode,
-                 Vector& shape) {
+// The lowest eigenpairs, and which is the first above what is rounding.
+struct Lowest {
+  Eigenpairs pairs;
+  std::size_t first = 0;
+};
+
+// In so many pairs as are asked for at first it is most often found; else in a few.
+std::optional<Lowest> lowest_pairs(Spectrum& spectrum, const SparseMatrix& lower, double stiffest,
+                                   int wanted) {
   const double floor = rigid * stiffest;
-  Spectrum spectrum(lower, -1e3 * floor, progress);
-  for (const int count : {1, 6}) {
-    const std::optional<Eigenpairs> pairs = spectrum.near_zero(count);
+  for (const int count : {wanted, 1, 6}) {
+    const std::optional<Eigenpairs> pairs = spectrum.near_zero(std::min(count, lower.size() - 1));
     if (!pairs) {
-      return false;
+      continue;
     }
     const auto above = std::find_if(std::begin(pairs->values), std::end(pairs->values),
                                     [&](double value) { return value > floor; });
     if (above != std::end(pairs->values)) {
-      mode.stiffness = *above;
-      shape = pairs->vectors.column(static_cast<std::size_t>(above - std::begin(pairs->values)));
-      return is_pair(lower, mode.stiffness, shape, tolerance * stiffest);
+      const auto first = static_cast<std::size_t>(above - std::begin(pairs->values));
+      return is_pair(lower, *above, pairs->vectors.column(first), tolerance * stiffest)
+                 ? std::optional(Lowest{*pairs, first})
+                 : std::nullopt;
     }
   }
-  return false;
+  return std::nullopt;
+}
+
+// Without what others have of a vector, and of length 1; nothing where nothing is left.
+std::optional<Vector> apart_from(const std::vector<Vector>& others, Vector vector) {
+  const double before = std::sqrt(dot(vector, vector));
+  for (int round = 0; round < 2; ++round) {  // the second takes what rounding left
+    for (const Vector& other : others) {
+      vector -= dot(other, vector) * other;
+    }
+  }
+  const double length = std::sqrt(dot(vector, vector));
+  return length > 1e-9 * before ? std::optional<Vector>(vector / length) : std::nullopt;
+}
+
+// The lowest modes, of those that are as low as the first that which is damped the least first; and
+// how the network gives way to the first one's dampers.
+std::vector<Vector> shapes_of(const Body& body, const Lowest& lowest, Spectrum& spectrum) {
+  const auto& [pairs, first] = lowest;
+  const std::size_t count = std::min(pairs.vectors.columns(), most_shapes);
+  std::vector<Vector> alike;
+  std::vector<Vector> others;
+  for (std::size_t i = 0; i < std::max(count, first + 1); ++i) {
+    const bool is_alike = i >= first && pairs.values[i] < pairs.values[first] * (1.0 + same);
+    (is_alike ? alike : others).push_back(pairs.vectors.column(i));
+  }
+  const Matrix turn = symmetric_eigenpairs(body.between(alike).second).vectors;
+  std::vector<Vector> shapes;
+  for (std::size_t i = 0; i < alike.size(); ++i) {
+    shapes.emplace_back(alike[0].size());
+    for (std::size_t j = 0; j < alike.size(); ++j) {
+      shapes.back() += turn(j, i) * alike[j];
+    }
+  }
+  shapes.insert(shapes.end(), others.begin(), others.end());
+  Vector shape = shapes.front();
+  for (std::size_t i = 0; i < most_given && shapes.size() < alike[0].size(); ++i) {
+    const std::optional<Vector> given = spectrum.inverse(body.damped(shape));
+    const auto apart = given ? apart_from(shapes, *given) : std::nullopt;
+    if (!apart) {
+      break;
+    }
+    shape = *apart;
+    shapes.push_back(*apart);
+  }
+  return shapes;
 }
 
 }  // namespace
@@ -193,23 +323,38 @@ double scheme_frequency_hz(double stiffness, double damping, double rate_hz) {
   return rate_hz / (2.0 * std::numbers::pi) * std::acos(std::clamp(cosine, -1.0, 1.0));
 }
 
-std::optional<Mode> lowest_mode(const Network& network, std::span<const double> parameters,
-                                const Progress& progress) {
+std::optional<LowestShapes> lowest_shapes(const Network& network,
+                                          std::span<const double> parameters,
+                                          const Progress& progress) {
   const Body body(network, parameters);
   const SparseMatrix stiffness = body.stiffness();
   double stiffest = 0.0;
   for (const double value : stiffness.value) {
     stiffest = std::max(stiffest, std::fabs(value));
   }
-  Mode mode;
-  Vector shape;
-  if (!std::isfinite(stiffest) || stiffest == 0.0 ||
-      !lowest_pair(stiffness, stiffest, progress, mode, shape)) {
+  if (!std::isfinite(stiffest) || stiffest == 0.0) {
     return std::nullopt;
   }
-  mode.damping = body.damping(shape);
-  mode.frequency_hz = scheme_frequency_hz(mode.stiffness, mode.damping, Network::reference_rate_hz);
-  return mode;
+  // The shift lies a little below 0, so that free networks can be factored too.
+  Spectrum spectrum(stiffness, -1e3 * rigid * stiffest, progress);
+  const std::optional<Lowest> lowest =
+      lowest_pairs(spectrum, stiffness, stiffest, static_cast<int>(most_shapes));
+  if (!lowest) {
+    return std::nullopt;
+  }
+  LowestShapes found;
+  std::tie(found.stiffness, found.damping) = body.between(shapes_of(body, *lowest, spectrum));
+  found.mode.stiffness = lowest->pairs.values[lowest->first];
+  found.mode.damping = found.damping(0, 0);
+  found.mode.frequency_hz =
+      scheme_frequency_hz(found.mode.stiffness, found.mode.damping, Network::reference_rate_hz);
+  return found;
+}
+
+std::optional<Mode> lowest_mode(const Network& network, std::span<const double> parameters,
+                                const Progress& progress) {
+  const auto found = lowest_shapes(network, parameters, progress);
+  return found ? std::optional(found->mode) : std::nullopt;
 }
 
 }  // namespace ressort

@@ -4,6 +4,7 @@
 #include <optional>
 #include <span>
 
+#include "core/linear_algebra/matrix.h"
 #include "core/model/network.h"
 #include "core/progress.h"
 
@@ -27,5 +28,19 @@ double scheme_frequency_hz(double stiffness, double damping, double rate_hz);
 // masses. [any thread but audio]
 std::optional<Mode> lowest_mode(const Network& network, std::span<const double> parameters,
                                 const Progress& progress = {});
+
+// The network, reduced to the shapes that its lowest mode is made of, whatever the dampers make of
+// it: that mode without dampers first, some more of the lowest, and how the others give way to its
+// dampers. M is 1.
+struct LowestShapes {
+  Mode mode;
+  Matrix stiffness;  // [shape, shape]
+  Matrix damping;
+};
+
+// The same modes, in the same cases and the same time. [any thread but audio]
+std::optional<LowestShapes> lowest_shapes(const Network& network,
+                                          std::span<const double> parameters,
+                                          const Progress& progress = {});
 
 }  // namespace ressort

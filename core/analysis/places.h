@@ -19,10 +19,11 @@ inline bool is_live_place(const Network& network, std::uint32_t mass) {
   return is_live(tap.u) || is_live(tap.v);
 }
 
-// Calls `use(mass, share)` for the mass itself, or for those around a place that is not live, by
-// the kernels' weights.
+// Calls `use(mass, share)` for the mass itself, or for those around a place, by the kernels'
+// weights. A place that is not live asks for no parameters.
 template <class Use>
-void each_share(const Network& network, std::uint32_t mass, Use&& use) {
+void each_share(const Network& network, std::uint32_t mass, Use&& use,
+                std::span<const double> parameters = {}) {
   if (network.masses[mass].kind != MassKind::point) {
     use(mass, 1.0);
     return;
@@ -33,7 +34,7 @@ void each_share(const Network& network, std::uint32_t mass, Use&& use) {
     double beyond = 0.0;
   };
   const auto side = [&](ArgumentId coordinate, std::uint32_t nodes) {
-    const double value = argument_value(network, coordinate, {});
+    const double value = argument_value(network, coordinate, parameters);
     const double p = (value > 0.0 ? std::min(value, 1.0) : 0.0) * static_cast<double>(nodes - 1);
     const auto below = static_cast<std::uint32_t>(p);
     return Side{below, p - below};

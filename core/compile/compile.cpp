@@ -4,6 +4,7 @@
 #include <cmath>
 #include <string>
 
+#include "core/compile/accuracy/pitches.h"
 #include "core/compile/cull.h"
 #include "core/compile/make_engine.h"
 #include "core/compile/merge.h"
@@ -28,6 +29,7 @@ struct Request {
 struct Reduced {
   Network network;     // without macros
   std::string merged;  // what was merged, in words; empty: nothing
+  double cents = 0.0;  // that partials are off for that, at most
 };
 
 // The bare network is computed as it is written, unless somebody says how far off it may be. O(n).
@@ -37,20 +39,20 @@ Reduced reduce(const Request& request) {
   options.progress.spend(8 * whole.links.size());
   if (!options.bare || request.budget != Budget{}) {
     if (auto merged = merge(whole, request.budget, options.progress)) {
-      return {std::move(merged->network), describe(*merged)};
+      return {std::move(merged->network), describe(*merged), merged->cents};
     }
   }
   return {std::move(whole), {}};
 }
 
 // The lowest mode, by which keys find their pitch; nothing where they are not to.
-std::optional<Mode> find_mode(const Request& request, const Network& network,
-                              std::span<const double> values) {
+std::optional<LowestShapes> find_shapes(const Request& request, const Network& network,
+                                        std::span<const double> values) {
   if (!request.preset.keyboard || moving_count(network) > most_tuned_masses) {
     return std::nullopt;
   }
   request.options.progress.stage("finding its lowest mode");
-  return lowest_mode(network, values, request.options.progress);
+  return lowest_shapes(network, values, request.options.progress);
 }
 
 // Where it is stable: at the start, in all ranges, for keys; and what of it comes to rest.
@@ -79,11 +81,52 @@ Analysis prove(const Request& request, const Reduced& reduced, const Machine& ma
   auto rest_bounds = !options.bare && margins.keys >= 1.0
                          ? make_rest_bounds(network, machine, box, options.progress)
                          : std::vector<std::optional<RestBound>>();
-  return {mode, std::move(stability), std::move(margins), std::move(rest_bounds)};
+  return {mode, {}, std::move(stability), std::move(margins), std::move(rest_bounds)};
+}
+
+// How far merging has brought partials off: by their poles, or where there are too many masses as
+// merge() says, of a decay as of a pitch by the share of mass that a neighbour lacks.
+Accuracy spent_on_merging(const Request& request, const Reduced& reduced, const Machine& machine) {
+  if (!(reduced.cents > 0.0)) {
+    return {};
+  }
+  const CompileOptions& options = request.options;
+  const Network whole = expand_macros(request.written, options.progress);
+  const Machine written = tabulate(whole, cull(whole, options.progress), {}, machine.parameters,
+                                   options.rate_hz, options.rescale, options.progress);
+  const Accuracy found = merging_accuracy(written, machine, options.most_modes, options.progress);
+  return found.is_known ? found
+                        : Accuracy{.cents = reduced.cents,
+                                   .t60_percent = 100.0 * (std::exp2(reduced.cents / 600.0) - 1.0),
+                                   .is_bound = true};
+}
+
+// A budget of pitch and decay holds in the ranges of the parameters and for every key; of the bare
+// network, at the values that parameters are to get.
+Promise make_promise(const Request& request, const Reduced& reduced, const Machine& machine,
+                     const Analysis& analysis, std::span<const double> start) {
+  if (!request.budget.is_physical()) {
+    return {};
+  }
+  Promise promise{.highest_factor = analysis.mode ? std::max(1.0, analysis.margins.keys) : 1.0,
+                  .merged = spent_on_merging(request, reduced, machine)};
+  for (std::size_t i = 0; i < start.size(); ++i) {
+    const ParameterInfo& info = analysis.stability.parameters[i];
+    promise.lowest.push_back(request.options.bare ? start[i] : info.minimum);
+    promise.highest.push_back(request.options.bare ? start[i] : info.maximum);
+    for (const Setting& setting : request.options.reach) {
+      if (request.options.bare && setting.parameter == info.name) {
+        promise.lowest[i] = std::min(promise.lowest[i], setting.value);
+        promise.highest[i] = std::max(promise.highest[i], setting.value);
+      }
+    }
+  }
+  return promise;
 }
 
 // Unless something is asked for, the bare network is the published scheme to the bit.
-Planned find_forms(const Request& request, Machine machine, const Analysis& analysis) {
+Planned find_forms(const Request& request, Machine machine, const Analysis& analysis,
+                   const Promise& promise) {
   const CompileOptions& options = request.options;
   const Budget& budget = request.budget;
   const bool is_published = options.bare && !options.method && !budget.is_physical() &&
@@ -95,9 +138,10 @@ Planned find_forms(const Request& request, Machine machine, const Analysis& anal
                     .isa = options.isa,
                     .voices = request.voices,
                     .highest_factor = analysis.mode ? std::max(1.0, analysis.margins.keys) : 1.0,
+                    .is_untuned = options.bare,
                     .executor = options.executor},
                    is_published ? Method::direct : options.method, options.most_modes, budget,
-                   options.progress);
+                   options.progress, promise);
 }
 
 // What a person should know of how it is computed, beside how its parts are.
@@ -147,7 +191,8 @@ Result<Compiled> compile_by_stages(const Request& request) {
   if (auto error = no_number(written, start, rate_ratio)) {
     return *std::move(error);
   }
-  const std::optional<Mode> mode = find_mode(request, network, values);
+  const std::optional<LowestShapes> shapes = find_shapes(request, network, values);
+  const std::optional<Mode> mode = shapes ? std::optional(shapes->mode) : std::nullopt;
   progress.stage("dividing it into parts");
   // The bare network is the published scheme, unless somebody asks.
   const bool is_published = options.bare && !options.budget;
@@ -156,13 +201,18 @@ Result<Compiled> compile_by_stages(const Request& request) {
   const Culled culled = cull(network, progress);
   Machine machine =
       tabulate(network, culled, schemes.links, values, options.rate_hz, options.rescale, progress);
-  const Analysis analysis = prove(request, reduced, machine, schemes, asked, start, mode);
-  Planned planned = find_forms(request, std::move(machine), analysis);
+  Analysis analysis = prove(request, reduced, machine, schemes, asked, start, mode);
+  const Promise promise = make_promise(request, reduced, machine, analysis, start);
+  Planned planned = find_forms(request, std::move(machine), analysis, promise);
+  if (shapes) {
+    analysis.pitches = make_pitches(*shapes, stepping_of_lowest(planned.machine, *mode),
+                                    options.rate_hz, rate_ratio);
+  }
   if (auto error = shortage(planned.machine, voices, options.precision, options.most_bytes)) {
     return *std::move(error);
   }
   const auto played_by = [&](int count, double gain) {
-    return make_playing(network, preset, analysis, rate_ratio, options.bare, count, gain);
+    return make_playing(network, preset, analysis, options.bare, count, gain);
   };
   std::optional<double> factor = 1.0;
   if (options.find_gain) {
@@ -173,15 +223,16 @@ Result<Compiled> compile_by_stages(const Request& request) {
   const double gain = preset.gain * factor.value_or(1.0);
   const bool misses_mode = preset.keyboard && !mode && moving_count(network) > most_quick_masses;
   progress.stage("making its voices");
-  return Compiled{
-      .engine = make_engine(std::move(planned.machine), played_by(voices, gain), options.precision,
-                            options.isa, progress),
-      .instrument =
-          make_instrument(network, preset, analysis, options.rate_hz, rate_ratio, voices, gain),
-      .plan = {std::move(planned.parts),
-               make_notes(schemes, culled, analysis, misses_mode, !factor, reduced.merged)},
-      .stability = analysis.stability,
-      .schemes = schemes};
+  return Compiled{.engine = make_engine(std::move(planned.machine), played_by(voices, gain),
+                                        options.precision, options.isa, progress),
+                  .instrument = make_instrument(network, preset, analysis, voices, gain),
+                  .plan = {.parts = planned.parts,
+                           .budget = request.budget,
+                           .accuracy = accuracy_of(planned.parts),
+                           .notes = make_notes(schemes, culled, analysis, misses_mode, !factor,
+                                               reduced.merged)},
+                  .stability = analysis.stability,
+                  .schemes = schemes};
 }
 
 }  // namespace

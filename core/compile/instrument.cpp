@@ -72,8 +72,7 @@ int audio_input_count(const Network& network, const Preset& preset) {
 }  // namespace
 
 Playing make_playing(const Network& network, const Preset& preset, const Analysis& analysis,
-                     double rate_ratio, bool bare, int voices, double gain) {
-  const Mode mode = analysis.mode.value_or(Mode{});
+                     bool bare, int voices, double gain) {
   return {.voices = voices,
           .gain = gain,
           .bare = bare,
@@ -81,8 +80,7 @@ Playing make_playing(const Network& network, const Preset& preset, const Analysi
           .noise = preset.noise,
           .tuning = analysis.mode ? Tuning::keyboard : Tuning::fixed,
           .transpose = preset.transpose,
-          .mode_stiffness = mode.stiffness * rate_ratio * rate_ratio,
-          .mode_damping = mode.damping * rate_ratio,
+          .pitches = analysis.pitches,
           .highest_factor = analysis.margins.keys,
           .home = analysis.margins.home,
           .away = analysis.margins.away,
@@ -92,7 +90,7 @@ Playing make_playing(const Network& network, const Preset& preset, const Analysi
 }
 
 Instrument make_instrument(const Network& network, const Preset& preset, const Analysis& analysis,
-                           double rate_hz, double rate_ratio, int voices, double gain) {
+                           int voices, double gain) {
   const std::vector<Control> controls = make_controls(network, preset);
   std::vector<InputInfo> inputs;
   for (std::size_t i = 0; i < network.inputs.size(); ++i) {
@@ -104,7 +102,10 @@ Instrument make_instrument(const Network& network, const Preset& preset, const A
       custom.push_back({preset.controls[i].address, static_cast<int>(i)});
     }
   }
-  const Mode mode = analysis.mode.value_or(Mode{});
+  std::optional<Mode> mode = analysis.mode;
+  if (mode) {
+    mode->frequency_hz = analysis.pitches.frequency_at(1.0);
+  }
   const double most = std::max(1.0, analysis.margins.keys);  // of a mode's stiffness
   return {.parameters = analysis.stability.parameters,
           .inputs = std::move(inputs),
@@ -116,11 +117,8 @@ Instrument make_instrument(const Network& network, const Preset& preset, const A
           .masses = moving_count(network),
           .links = network.links.size(),
           .transpose = preset.transpose,
-          .mode = analysis.mode,
-          .highest_frequency_hz =
-              analysis.mode ? scheme_frequency_hz(mode.stiffness * rate_ratio * rate_ratio * most,
-                                                  mode.damping * rate_ratio, rate_hz)
-                            : 0.0,
+          .mode = mode,
+          .highest_frequency_hz = mode ? analysis.pitches.frequency_at(most) : 0.0,
           .stiffness_margin = analysis.margins.whole,
           .verdict = analysis.stability.verdict};
 }

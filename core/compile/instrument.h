@@ -42,8 +42,9 @@ struct Instrument {
   double gain = 1.0;       // output per position unit: the preset's, or what was found
   std::size_t masses = 0;  // that move
   std::size_t links = 0;
-  int transpose = 0;                  // semitones from a key to its pitch
-  std::optional<Mode> mode;           // the lowest, by which keys set the pitch; else they do not
+  int transpose = 0;         // semitones from a key to its pitch
+  std::optional<Mode> mode;  // the lowest, by which keys set the pitch; else they do not; its
+                             // frequency is that which sounds
   double highest_frequency_hz = 0.0;  // of a key, before it is folded down; 0: not tuned
   double stiffness_margin = 0.0;      // every stiffness may grow by this factor; below 1: unproved
   Verdict verdict = Verdict::stable;  // of what is always felt, in all ranges
@@ -52,6 +53,7 @@ struct Instrument {
 // All that is known of a network before it sounds.
 struct Analysis {
   std::optional<Mode> mode;  // the lowest, where keys set the pitch by it
+  Pitches pitches;           // of keys, by that mode as it will be played
   StabilityCheck stability;
   Margins margins;
   std::vector<std::optional<RestBound>> rest_bounds;  // [part]
@@ -60,8 +62,8 @@ struct Analysis {
 // Of a preset that fits the network; `voices` and `gain` instead of its own. O(inputs * links).
 // [any thread but audio]
 Playing make_playing(const Network& network, const Preset& preset, const Analysis& analysis,
-                     double rate_ratio, bool bare, int voices, double gain);
+                     bool bare, int voices, double gain);
 Instrument make_instrument(const Network& network, const Preset& preset, const Analysis& analysis,
-                           double rate_hz, double rate_ratio, int voices, double gain);
+                           int voices, double gain);
 
 }  // namespace ressort

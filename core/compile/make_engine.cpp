@@ -7,14 +7,11 @@
 #include <vector>
 
 #include "core/engine/voices.h"
-#include "core/kernels/passive.h"
+#include "core/kernels/clusters.h"
 #include "core/kernels/registry.h"
 
 namespace ressort {
 namespace {
-
-// What may sleep whatever else sounds: -120 dBFS.
-constexpr double inaudible_level = 1e-6;
 
 std::string in_bytes(std::uint64_t bytes) {
   char text[32];
@@ -70,8 +67,8 @@ std::optional<double> find_gain(const Machine& machine, const Playing& playing, 
   for (const Program& program : machine.parts) {
     at_worst += worst_steps(program);
     steps += program.moving;
-    for (const PassiveLink& link : passive_links(program)) {
-      steps += link.is_shared ? steps_of_shared_link : 1.0;
+    for (const Cluster& cluster : passive_tables(program).clusters) {
+      steps += steps_of_shared_link * cluster.count;
     }
   }
   const double least = 0.05 * machine.rate_hz;
@@ -104,11 +101,6 @@ std::optional<double> find_gain(const Machine& machine, const Playing& playing, 
 
 std::unique_ptr<Engine> make_engine(Machine machine, Playing playing, Precision precision, Isa isa,
                                     const Progress& progress) {
-  for (Program& program : machine.parts) {
-    if (Modes* const modes = std::get_if<Modes>(&program.form)) {
-      modes->quiet = inaudible_level / std::max(1e-30, playing.gain);
-    }
-  }
   return std::make_unique<Engine>(std::move(machine), std::move(playing), precision, isa, progress);
 }
 

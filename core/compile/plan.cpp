@@ -5,6 +5,7 @@
 
 #include "core/kernels/direct/fourth_form.h"
 #include "core/kernels/domains/shards.h"
+#include "core/kernels/oversampled/oversampled_form.h"
 
 namespace ressort {
 namespace {
@@ -21,6 +22,17 @@ std::string rounded(double value) {
   return text;
 }
 
+std::string describe(const Accuracy& accuracy) {
+  if (!accuracy.is_known) {
+    return "nobody knows how far off the continuous network";
+  }
+  if (!std::isfinite(accuracy.cents)) {
+    return "without a partial of the continuous network";
+  }
+  return std::string(accuracy.is_bound ? "at most " : "") + rounded(accuracy.cents) +
+         " cents and " + rounded(accuracy.t60_percent) + " % of a decay off the continuous network";
+}
+
 class Chooser {
  public:
   Chooser(Program& program, const Workload& load, std::uint32_t most_modes, const Budget& budget,
@@ -30,20 +42,32 @@ class Chooser {
         progress_(progress),
         most_modes_(most_modes),
         budget_(budget),
-        is_asked_(budget.is_physical() || budget.silence_db > -Budget::unlimited) {
-    if (budget.is_physical()) {
-      judge();
+        is_asked_(budget.is_physical() || budget.silence_db > -Budget::unlimited) {}
+
+  // Keeps what is left of a budget of pitch and decay.
+  Part choose(Judge& judge, const Accuracy& spent) {
+    spent_ = spent;
+    judge_ = &judge;
+    const Accuracy published = sum_of(judge.of(Direct{}), spent_);
+    if (published.meets(budget_)) {
+      budget_.cents = budget_.t60_percent = Budget::unlimited;
+      judge_ = nullptr;
+    } else {
+      published_ = ", as published " + describe(published);
     }
+    Part part = choose();
+    part.accuracy = judge_ == nullptr ? published : accuracy_;
+    return part;
   }
 
   Part choose() {
-    if (is_asked_) {
+    // What comes in acts later in it, which is silent in no sense.
+    if (is_asked_ && budget_.silence_db == -Budget::unlimited) {
       consider(Method::slow);
     }
-    if (!published_.empty()) {
+    if (judge_ != nullptr) {
       consider_physical();
-    }
-    if (published_.empty() || candidates_.empty()) {
+    } else {
       consider_identical();
     }
     Part part = take("");
@@ -71,6 +95,7 @@ class Chooser {
     Method method;
     Form form;
     double ns;
+    Accuracy accuracy;
   };
 
   void consider_identical() {
@@ -81,33 +106,62 @@ class Chooser {
     }
   }
 
-  // What is nearer to the continuous network than the published scheme: modes, which are exact, or
-  // the fourth order where that is near enough or there are no modes.
+  // What is nearer to the continuous network than the published scheme: modes, which are exact, the
+  // fourth order, or either scheme several times a sample; of more steps than are needed none.
   void consider_physical() {
-    bool has_modes = false;
     if (program_.moving <= most_modes_) {
-      has_modes = consider(Method::modal);
+      consider(Method::modal);
     } else {
       may_gain_ = program_.moving <= patient_modes;
     }
-    if (!has_modes || meets(fourth_error(steepness_of(program_)))) {
-      consider(Method::fourth);
-    }
-  }
-
-  bool meets(const SchemeError& error) const {
-    return error.cents <= budget_.cents && error.t60_percent <= budget_.t60_percent;
-  }
-
-  // Where the published scheme is near enough, no other is needed.
-  void judge() {
-    const SchemeError error = published_error(steepness_of(program_));
-    if (meets(error)) {
-      budget_.cents = budget_.t60_percent = Budget::unlimited;
+    consider(Method::fourth);
+    consider(Method::direct);
+    if (program_.moving == 0) {
       return;
     }
-    published_ = ", as published up to " + rounded(error.cents) + " cents and " +
-                 rounded(error.t60_percent) + " % of a decay off the continuous network";
+    bool is_fourth_enough = has_fitting(Method::fourth);
+    bool is_published_enough = false;
+    for (std::uint32_t times = 2; times <= most_oversampling; times *= 2) {
+      if (!is_fourth_enough) {
+        is_fourth_enough = consider_steps(times, true);
+      }
+      if (!is_published_enough && !is_fourth_enough) {
+        is_published_enough = consider_steps(times, false);
+      }
+      if (is_published_enough || is_fourth_enough) {
+        return;
+      }
+    }
+  }
+
+  bool has_fitting(Method method) const {
+    return std::any_of(candidates_.begin(), candidates_.end(), [&](const Candidate& candidate) {
+      return candidate.method == method && candidate.accuracy.meets(budget_);
+    });
+  }
+
+  // Whether so many steps a sample are enough, to fourth order or in the cheapest of the published
+  // forms. What is not known to be is not tried.
+  bool consider_steps(std::uint32_t times, bool is_fourth) {
+    Program fine = oversampled_program(program_, times);
+    if (is_fourth) {
+      auto form = fourth_form(fine);
+      if (!form) {
+        return false;
+      }
+      fine.form = *std::move(form);
+    }
+    const Accuracy accuracy = judge_->of(oversampled_form(fine, times));
+    if (!accuracy.is_known) {
+      return false;
+    }
+    if (!is_fourth) {
+      Chooser chooser(fine, load_, 0, {}, progress_);
+      chooser.choose();
+    }
+    progress_.spend(program_.ends.size() + program_.position.size());
+    add(Method::oversampled, oversampled_form(std::move(fine), times));
+    return candidates_.back().accuracy.meets(budget_);
   }
 
   // Of modes most sleep most of the time, where they may.
@@ -133,11 +187,32 @@ class Chooser {
     return true;
   }
 
+  // Of those that keep the budget the cheapest, else the nearest to it; what nobody knows comes
+  // last, and of that what is as published.
+  bool is_better(const Candidate& a, const Candidate& b) const {
+    const auto cost = [&](const Candidate& c) { return worth_ns(c.method, c.ns); };
+    if (judge_ == nullptr) {
+      return cost(a) < cost(b);
+    }
+    const auto excess = [&](const Candidate& c) {
+      return !c.accuracy.is_known ? Budget::unlimited
+                                  : std::max({1.0, c.accuracy.cents / budget_.cents,
+                                              c.accuracy.t60_percent / budget_.t60_percent});
+    };
+    const bool is_published = a.method == Method::direct;
+    if (!a.accuracy.is_known && !b.accuracy.is_known &&
+        is_published != (b.method == Method::direct)) {
+      return !is_published;
+    }
+    return excess(a) != excess(b) ? excess(a) < excess(b) : cost(a) < cost(b);
+  }
+
   void add(Method method, Form form) {
+    const Accuracy accuracy = judge_ == nullptr ? Accuracy{} : sum_of(judge_->of(form), spent_);
     program_.form = std::move(form);
     const double ns = predicted_ns(program_, load_);
-    candidates_.push_back({method, std::move(program_.form), ns});
-    if (worth_ns(method, ns) < worth_ns(candidates_[best_].method, candidates_[best_].ns)) {
+    candidates_.push_back({method, std::move(program_.form), ns, accuracy});
+    if (is_better(candidates_.back(), candidates_[best_])) {
       best_ = candidates_.size() - 1;
     }
   }
@@ -145,6 +220,7 @@ class Chooser {
   Part take(const std::string& why) {
     const Candidate& best = candidates_[best_];
     program_.form = std::move(candidates_[best_].form);
+    accuracy_ = best.accuracy;
     Part part{.method = best.method,
               .masses = program_.moving,
               .links = program_.ends.size(),
@@ -158,6 +234,7 @@ class Chooser {
       }
     }
     part.reason += "; at most about " + in_ns(best.ns) + " a sample";
+    part.reason += judge_ != nullptr ? ", " + describe(accuracy_) : "";
     part.reason += published_;
     part.reason += !why.empty() ? ", " + why : others.empty() ? "" : ", " + others;
     return part;
@@ -169,6 +246,9 @@ class Chooser {
   std::uint32_t most_modes_;
   Budget budget_;  // without what the published scheme meets
   bool is_asked_;
+  Judge* judge_ = nullptr;  // null: whatever is as published is near enough
+  Accuracy spent_;
+  Accuracy accuracy_;      // of what was taken
   std::string published_;  // how far off it would be, where that is too far
   bool may_gain_ = false;
   std::vector<Candidate> candidates_;
@@ -178,13 +258,25 @@ class Chooser {
 }  // namespace
 
 Planned make_plan(Machine machine, const Workload& load, std::optional<Method> method,
-                  std::uint32_t most_modes, const Budget& budget, const Progress& progress) {
+                  std::uint32_t most_modes, const Budget& budget, const Progress& progress,
+                  const Promise& promise) {
   std::vector<Part> parts;
   for (Program& program : machine.parts) {
     Chooser chooser(program, load, most_modes, budget, progress);
+    std::optional<Judge> judge;
+    if (budget.is_physical() && program.moving > 0) {
+      judge.emplace(program,
+                    corners_of(program, machine.parameters, promise.lowest, promise.highest,
+                               promise.highest_factor),
+                    most_modes, progress);
+    }
     Part part = load.is_compensated ? chooser.compensate()
                 : method            ? chooser.obey(*method)
+                : judge             ? chooser.choose(*judge, promise.merged)
                                     : chooser.choose();
+    if (judge && !part.accuracy) {
+      part.accuracy = sum_of(judge->of(program.form), promise.merged);
+    }
     if (auto shards = share_out(program, load, progress)) {
       program.form = *std::move(shards);
       part.predicted_ns = predicted_ns(program, load);
@@ -195,6 +287,42 @@ Planned make_plan(Machine machine, const Workload& load, std::optional<Method> m
     }
   }
   return {std::move(machine), std::move(parts)};
+}
+
+std::optional<Accuracy> accuracy_of(const std::vector<Part>& parts) {
+  std::optional<Accuracy> worst;
+  for (const Part& part : parts) {
+    if (part.accuracy) {
+      worst = worst ? worse_of(*worst, *part.accuracy) : *part.accuracy;
+    }
+  }
+  return worst;
+}
+
+std::optional<std::string> broken_promise(const Plan& plan) {
+  if (!plan.accuracy || plan.accuracy->meets(plan.budget)) {
+    return std::nullopt;
+  }
+  const Accuracy& accuracy = *plan.accuracy;
+  std::string promised;
+  std::string found;
+  const auto add = [&](const char* word, double asked, double is, const char* unit) {
+    if (asked < Budget::unlimited && !(accuracy.is_known && is <= asked)) {
+      promised += (promised.empty() ? "" : " and ") + std::string(word) + rounded(asked);
+      found += (found.empty() ? "" : " and ") + rounded(is) + unit;
+    }
+  };
+  add("cents=", plan.budget.cents, accuracy.cents, " cents");
+  add("t60=", plan.budget.t60_percent, accuracy.t60_percent, " % of a decay");
+  if (accuracy.is_known && !std::isfinite(accuracy.cents)) {
+    return "the budget " + promised +
+           " is not kept: a partial of the continuous network is missing";
+  }
+  return accuracy.is_known
+             ? "the budget " + promised + " is not kept: a partial may be " +
+                   (accuracy.is_bound ? "up to " : "") + found + " off"
+             : "whether the budget " + promised + " is kept is not known: the poles of so many " +
+                   "masses would take too long to find";
 }
 
 std::string describe(const std::vector<Part>& parts) {

@@ -7,6 +7,7 @@
 #include <string_view>
 #include <vector>
 
+#include "core/compile/accuracy/accuracy.h"
 #include "core/kernels/program.h"
 #include "core/kernels/registry.h"
 #include "core/model/preset/budget.h"
@@ -28,12 +29,15 @@ struct Part {
   double predicted_ns = 0.0;  // a sample, of all voices, with everything touching all the time
   double measured_ns = 0.0;   // the same at rest, by who has tried it; 0: nobody
   bool may_gain = false;      // by its modes, had it more patience
+  std::optional<Accuracy> accuracy;  // where a budget asks for pitch or decay
   std::string reason;
 };
 
 struct Plan {
   std::vector<Part> parts;
-  std::vector<std::string> notes;  // on what is not computed as it is written, or not at all
+  Budget budget;                     // that it was made for
+  std::optional<Accuracy> accuracy;  // the worst of the parts, and what was merged
+  std::vector<std::string> notes;    // on what is not computed as it is written, or not at all
 };
 
 // A machine in the forms that its plan says.
@@ -42,14 +46,30 @@ struct Planned {
   std::vector<Part> parts;
 };
 
+// Where a budget of pitch and decay has to hold, beside the start, and what is spent of it already.
+struct Promise {
+  std::vector<double> lowest;  // [parameter]; empty: none is turned
+  std::vector<double> highest;
+  double highest_factor = 1.0;  // of the highest key
+  Accuracy merged;
+};
+
 // Gives every part of the machine the form that the cost model says is the cheapest at its worst,
 // or the one of `method` where a part has it; divided among load.executor where that pays. With a
-// budget for pitch or decay, the cheapest of the physical methods where the published scheme misses
-// it. O(elements), and the eigenvectors of a part of up to `most_modes` masses for which the modal
-// form may pay. [any thread but audio]
+// budget for pitch or decay, the cheapest whose poles keep it at all corners (accuracy.h), of the
+// published scheme, exact modes, fourth order and several steps a sample; where none does or
+// nobody knows, the nearest. O(elements), the eigenvectors of a part of up to `most_modes` masses
+// for which the modal form may pay, and what a Judge takes. [any thread but audio]
 Planned make_plan(Machine machine, const Workload& load, std::optional<Method> method = {},
                   std::uint32_t most_modes = patient_modes, const Budget& budget = {},
-                  const Progress& progress = {});
+                  const Progress& progress = {}, const Promise& promise = {});
+
+// The worst of some parts, with what was merged; nothing without a budget of pitch or decay.
+std::optional<Accuracy> accuracy_of(const std::vector<Part>& parts);
+
+// What a plan does not keep of its budget of pitch and decay, in a sentence; nothing where it keeps
+// it all.
+std::optional<std::string> broken_promise(const Plan& plan);
 
 // One line a part, and one a note.
 std::string describe(const std::vector<Part>& parts);

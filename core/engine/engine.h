@@ -56,6 +56,16 @@ struct RestBound {
   std::vector<Limits> box;  // [parameter]
 };
 
+// By which factor on every stiffness a voice sounds at a frequency: one for each semitone from the
+// lowest on, on the grid of 440 Hz; a cubic of logarithms between them. [any thread]
+struct Pitches {
+  double factor_at(double frequency_hz) const;  // 1 where there are none
+  double frequency_at(double factor) const;     // by halves, to rounding
+
+  double lowest_hz = 440.0 / 4096.0;
+  std::vector<double> factors;  // ascending; empty: no mode is known
+};
+
 // How a Machine is played. Plain data, made by the compile room.
 struct Playing {
   int voices = 1;
@@ -65,8 +75,7 @@ struct Playing {
   bool noise = false;      // the outputs shape white noise instead of being heard themselves
   Tuning tuning = Tuning::fixed;
   int transpose = 0;            // semitones
-  double mode_stiffness = 0.0;  // k/m of the lowest mode, at Machine::rate_hz; 0: none known
-  double mode_damping = 0.0;    // z/m of the same
+  Pitches pitches;              // of the lowest mode
   double highest_factor = 1.0;  // the stiffness factor up to which the model is proved stable
   std::vector<Limits> home;     // [parameter] while they are there; empty: wherever they are
   std::vector<double> away;     // the same factor at equal steps from there to their limits
@@ -144,10 +153,5 @@ class Engine {
   struct Player;
   std::unique_ptr<Player> player_;
 };
-
-// The stiffness factor that brings a mode with k/m and z/m (per sample) to frequency_hz in the
-// explicit scheme: cos(theta) = (2 - s k - z) / (2 sqrt(1 - z)). [any thread]
-double stiffness_factor(double mode_stiffness, double mode_damping, double frequency_hz,
-                        double rate_hz);
 
 }  // namespace ressort

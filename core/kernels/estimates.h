@@ -18,6 +18,7 @@ struct Workload {
   Isa isa = Isa::base;
   int voices = 1;
   double highest_factor = 1.0;   // on every stiffness, that a voice may have
+  bool is_untuned = false;       // no voice ever has another one than 1
   Executor* executor = nullptr;  // that large parts may be shared out to; null: one core for all
 };
 
@@ -31,6 +32,7 @@ struct LinkCount {
 LinkCount links_of(const Program& program);
 
 // What the links take that are not plain, once for all lanes, or for one number: while they touch.
+// O(links + nodes)
 double passive_ns(const Program& program);
 
 // How many packs the voices fill, each counted as often as it is dearer than one of AVX2: the

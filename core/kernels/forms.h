@@ -72,6 +72,15 @@ struct ModalShare {
 struct ModalPlace {
   double rest = 0.0;
   std::vector<double> shape;  // [mode]
+  // Of crossed modes only, which are placed a sample ahead: where it is with its masses at 0 and
+  // what they add, to begin with, and
+  struct Mass {
+    std::uint32_t node = 0;
+    double weight = 1.0;
+  };
+  double offset = 0.0;
+  std::vector<Mass> masses;
+  std::vector<double> speed;  // [mode] its change in the last sample
 };
 
 // Nonlinear links of one law. Their ends are places, numbered first, or Modes::ends.
@@ -91,10 +100,42 @@ struct ModalEnd {
   std::uint32_t node = 0;
 };
 
+// What links and inputs exert at a node, as far as it is linear in what moves: times `scale`, the
+// sum of all of these.
+struct ModalForce {
+  // Springs or dampers of one coefficient: it times (constant + sum of shape * q, or d)
+  struct Part {
+    std::uint32_t coefficient = 0;
+    bool is_damping = false;
+    double constant = 0.0;
+    std::vector<double> shape;  // [mode]; of crossed modes a damper's is of speeds
+  };
+  // A position input on springs: weight * (K (x - start) + Z v)
+  struct Hand {
+    std::uint32_t input = 0;
+    std::uint32_t stiffness = 0;  // coefficients
+    std::uint32_t damping = 0;
+    double start = 0.0;
+    double weight = 0.0;
+  };
+  // What a force input pushes with, or what nonlinear links do at an end as in ModalHold.
+  struct Weight {
+    std::uint32_t of = 0;
+    double weight = 0.0;
+  };
+  double scale = 1.0;
+  std::vector<Part> parts;
+  std::vector<Hand> hands;
+  std::vector<Weight> inputs;
+  std::vector<Weight> ends;
+};
+
 struct ModalOutput {
   std::uint32_t end = 0;  // as in ModalHold, if it is no mass
   bool is_place = false;  // else:
   ModalPlace place;
+  bool is_force = false;  // or neither, but:
+  ModalForce force;
 };
 
 // A force that does not depend on the masses, spread by `shape` over the modes.
@@ -116,6 +157,9 @@ struct ModalPush {
 // The linear links and the masses in their common eigenvectors, everything else holds on to places
 // of them; one voice. With masses of 1/w times the relative mass of each,
 //   d += w (push - sum of coefficient * factor * q - the same of damping * d);  q += d
+// Crossed modes are those of a body whose damping does not share the eigenvectors of its stiffness:
+// q and d are the real and the imaginary part of a number y each, y += pole y + w push, and a place
+// is at the real part of the sum of shape * y. Their rows are [part][mode], and nothing turns them.
 struct Modes {
   static constexpr std::uint32_t own_mass = 0xffffffffu;
   std::uint32_t modes = 0;
@@ -124,13 +168,16 @@ struct Modes {
   bool is_exact = false;      // true to the continuous network instead of the published scheme
   std::uint32_t of = 0;       // modes before some were left out; 0: none were to be
   std::uint32_t give_by = 0;  // the coefficient that ModalHold::give is divided by
-  // Shares of how far all modes together could swing an output or a place:
-  double left_out = 0.0;  // by those that are not here, at most
+  // Shares of an output's peak, or of a place's:
+  double left_out = 0.0;  // by those that are not here, at most, of a blow or the start
   double silence = 0.0;   // by those that sleep, at most; 0: none sleeps
-  double quiet = 0.0;     // and by how much in any case, in positions
   std::vector<double> q;  // [mode] at the start
   std::vector<double> d;
-  std::vector<double> basis;  // [mode][mass] what a mass's displacement or velocity is to a mode's
+  // [mode][mass] what a mass's displacement or velocity is to a mode's; of crossed modes
+  // [displacement, velocity][part][mode][mass], a sample later
+  std::vector<double> basis;
+  bool is_crossed = false;
+  std::vector<double> pole;  // [part][mode] less 1, of crossed modes
   std::vector<ModalShare> stiffness;
   std::vector<ModalShare> damping;
   std::vector<ModalPush> pushes;
@@ -261,7 +308,13 @@ struct Slow {
   std::uint32_t frames = 1;
 };
 
-using Form =
-    std::variant<Direct, Chains, Dense, Modes, Grid, Batch, Shards, Fourth, Compensated, Slow>;
+// Stepped `times` times a sample at a finer rate (oversampled.h), in the form that it has there.
+struct Oversampled {
+  std::shared_ptr<const Program> fine;  // the same at `times` the rate
+  std::uint32_t times = 1;
+};
+
+using Form = std::variant<Direct, Chains, Dense, Modes, Grid, Batch, Shards, Fourth, Compensated,
+                          Slow, Oversampled>;
 
 }  // namespace ressort

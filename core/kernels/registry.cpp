@@ -21,6 +21,8 @@
 #include "core/kernels/grid/grid_form.h"
 #include "core/kernels/modal/modal.h"
 #include "core/kernels/modal/modal_form.h"
+#include "core/kernels/oversampled/oversampled.h"
+#include "core/kernels/oversampled/oversampled_form.h"
 #include "core/kernels/slow/slow.h"
 #include "core/kernels/slow/slow_form.h"
 
@@ -84,13 +86,21 @@ constexpr KernelRow rows[] = {
                             [](const Request& r) { return batch_form(r.program); }),
     row<Modes, ModalKernel>(
         Method::modal, "modal", Use::published,
-        [](const Request& r) { return modal_form(r.program, r.budget, r.progress); },
+        [](const Request& r) { return modal_form(r.program, r.budget, r.progress, r.load.is_untuned); },
         least_modal_ns),
     row<Fourth, DirectKernel>(Method::fourth, "fourth", Use::physical,
                               [](const Request& r) { return fourth_form(r.program); }),
     row<Slow, SlowKernel>(
         Method::slow, "slow", Use::physical,
         [](const Request& r) { return slow_form(r.program, r.load.highest_factor); }),
+    row<Oversampled, OversampledKernel>(
+        Method::oversampled, "oversampled", Use::physical,
+        [](const Request& r) {
+          constexpr std::uint32_t times = 4;  // where it is asked for by name
+          return r.program.moving > 0
+                     ? std::optional(oversampled_form(oversampled_program(r.program, times), times))
+                     : std::nullopt;
+        }),
     row<Shards, ShardedKernel>(Method::direct, "shards", Use::given,
                                [](const Request&) { return std::optional<Shards>(); }),
     row<Compensated, CompensatedKernel>(Method::direct, "compensated", Use::given,

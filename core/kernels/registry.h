@@ -22,7 +22,7 @@
 namespace ressort {
 
 // By which name a kernel is asked for.
-enum class Method { direct, chains, dense, modal, grid, batch, fourth, slow };
+enum class Method { direct, chains, dense, modal, grid, batch, fourth, slow, oversampled };
 
 // Whom a kernel is wanted for.
 struct KernelRequest {

@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "core/analysis/linear.h"
+#include "core/compile/accuracy/pitches.h"
 #include "tests/support/reference_network.h"
 
 namespace ressort::bench {
@@ -152,11 +153,11 @@ class EnginePlayer : public Player {
       playing.controls.push_back(
           {.source = Source::audio, .number = i, .target = i, .low = 0.0, .high = 1.0});
     }
-    if (const auto mode =
-            scene.voices > 1 ? lowest_mode(network, machine.parameters) : std::optional<Mode>()) {
+    if (const auto shapes = scene.voices > 1 ? lowest_shapes(network, machine.parameters)
+                                             : std::optional<LowestShapes>()) {
       playing.tuning = Tuning::keyboard;
-      playing.mode_stiffness = mode->stiffness;
-      playing.mode_damping = mode->damping;
+      playing.pitches = make_pitches(*shapes, stepping_of_lowest(machine, shapes->mode),
+                                     machine.rate_hz, machine.rate_ratio);
       playing.highest_factor = 4.0;
     }
     return playing;

@@ -20,7 +20,8 @@ struct PoleErrors {
 
 // Of a string, at so many times the rate.
 PoleErrors errors_at(int times, const std::string& z, bool is_fourth) {
-  Program program = make_program(network_of(scenes::string("s", 6, "0.05", z)), 44100.0 * times, true);
+  Program program =
+      make_program(network_of(scenes::string("s", 6, "0.05", z)), 44100.0 * times, true);
   if (is_fourth) {
     program.form = *fourth_form(program);
   }
@@ -37,9 +38,9 @@ PoleErrors errors_at(int times, const std::string& z, bool is_fourth) {
 
 // Where a mass is that a smooth push of 80 samples throws at `link`, 160 samples after it began.
 double place_at(int times, const std::string& link) {
-  const Network network = network_of(
-      "@g ground 0.\n@in1 posInput 0.\n@in2 frcInput @m\n@m osc 1. 0.002 0. 0. 0.\n" + link +
-      "\n@out1 posOutput @m\n");
+  const Network network =
+      network_of("@g ground 0.\n@in1 posInput 0.\n@in2 frcInput @m\n@m osc 1. 0.002 0. 0. 0.\n" +
+                 link + "\n@out1 posOutput @m\n");
   Bare<double> bare(
       make_program(network, 44100.0 * times, true, schemes_of(network, Passivity::always).links));
   double place = 0.0;

@@ -356,6 +356,19 @@ expect 0 "peak" "$program" render stiff.mdl -o stiff.wav --seconds 1 --rate 2205
 # What may never touch is no reason to refuse; the report warns of it.
 model hard.mdl '@g ground 0.\n@m osc 1. 0.1 0.001 0. 0.\n@c contact @m @g 9 0.1 0.\n@in1 frcInput @m\n@out1 posOutput @m\n'
 expect 0 "the stiffness 9 of 'c' must stay below" "$program" check hard.mdl --budget passive=never
+
+# A budget of pitch and decay is kept, or it is said that it is not: a warning, with --strict an error.
+model damped.mdl '@g ground 0.\n@a mass 1. 0. 0.\n@b mass 1. 0. 0.\n@l springDamper @g @a 0.9 0.3
+@k springDamper @a @b 0.6 0.25\n@in1 frcInput @a\n@out1 posOutput @b\n'
+expect 0 '"kept": true' "$program" check damped.mdl --budget cents=3 --json --strict
+expect 0 '"kept": false' "$program" check damped.mdl --budget cents=0.0001 --json
+expect 0 "the budget cents=0.0001 is not kept" "$program" check damped.mdl --budget cents=0.0001
+expect 2 "the budget cents=0.0001 is not kept" \
+  "$program" check damped.mdl --budget cents=0.0001 --strict
+expect 0 "the budget cents=0.0001 is not kept" \
+  "$program" render damped.mdl -o damped.wav --budget cents=0.0001 --seconds 1
+expect 2 "the budget cents=0.0001 is not kept" \
+  "$program" render damped.mdl -o damped.wav --budget cents=0.0001 --seconds 1 --strict
 expect 0 "1 contact made passive: as published it could gain" "$program" check hard.mdl
 expect 0 "peak" "$program" render hard.mdl -o hard.wav --seconds 1
 model push.score '0 /in/1/force nan\n'

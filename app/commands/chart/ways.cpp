@@ -158,7 +158,7 @@ Result<MadeWay> make_way(const ChartScene& scene, const Way& way, double seconds
 
 bool same_kind(const Machine& a, const Machine& b) {
   const auto runs = [](const LinkRun& x, const LinkRun& y) {
-    return x.law == y.law && x.scheme == y.scheme && x.substeps == y.substeps;
+    return x.law == y.law && x.scheme == y.scheme;
   };
   const auto parts = [&](const Program& x, const Program& y) {
     return x.form.index() == y.form.index() &&

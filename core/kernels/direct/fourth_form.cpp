@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <map>
 
 #include "core/kernels/direct/direct_form.h"
@@ -19,9 +18,9 @@ struct Weighing {
 
 class Bounder {
  public:
-  explicit Bounder(const Program& program) : program_(program) {
+  Bounder(const Program& program, std::span<const double> parameters) : program_(program) {
     for (const Coefficient& coefficient : program.coefficients) {
-      value_.push_back(coefficient_value(program, coefficient, program.parameters, 1.0));
+      value_.push_back(coefficient_value(program, coefficient, parameters, 1.0));
     }
   }
 
@@ -107,20 +106,6 @@ class Bounder {
   std::vector<double> value_;  // [coefficient]
 };
 
-// How far a recurrence with these numbers is from the continuous mode: z^2 - (2 - k - d) z + 1 - d.
-SchemeError error_of(const Steepness& steepness, double k, double d) {
-  const double sigma = 0.5 * steepness.damping;
-  const double omega_squared = steepness.stiffness - sigma * sigma;
-  const double cosine = (2.0 - k - d) / (2.0 * std::sqrt(1.0 - d));
-  if (!(std::fabs(cosine) < 1.0) || omega_squared <= 0.0) {
-    constexpr double all = std::numeric_limits<double>::infinity();
-    return steepness.stiffness > 0.0 ? SchemeError{all, all} : SchemeError{};
-  }
-  const double found_sigma = -0.5 * std::log1p(-d);
-  return {.cents = std::fabs(1200.0 * std::log2(std::acos(cosine) / std::sqrt(omega_squared))),
-          .t60_percent = sigma > 0.0 ? std::fabs(100.0 * (sigma / found_sigma - 1.0)) : 0.0};
-}
-
 bool touches_point(const Program& program, Ends ends) {
   return !program.taps.empty() && std::max(ends.a, ends.b) >= program.taps[0].node;
 }
@@ -136,18 +121,12 @@ void add(std::vector<FourthLinks>& all, std::uint32_t run, std::uint32_t link) {
 }  // namespace
 
 Steepness steepness_of(const Program& program) {
-  const Bounder bound(program);
+  return steepness_of(program, program.parameters);
+}
+
+Steepness steepness_of(const Program& program, std::span<const double> parameters) {
+  const Bounder bound(program, parameters);
   return {.stiffness = bound({1.0, 0.0}), .damping = bound({0.0, 1.0}), .both = bound({1.0, 6.0})};
-}
-
-SchemeError published_error(const Steepness& steepness) {
-  return error_of(steepness, steepness.stiffness, steepness.damping);
-}
-
-SchemeError fourth_error(const Steepness& steepness) {
-  const double k = steepness.stiffness;
-  const double d = steepness.damping;
-  return error_of(steepness, k * (1.0 - k / 12.0 - d / 2.0), d * (1.0 - d / 2.0));
 }
 
 std::optional<Fourth> fourth_form(const Program& program) {

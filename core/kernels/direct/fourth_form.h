@@ -1,8 +1,8 @@
-// core/kernels: whether a Program may be stepped to fourth order, and how far each scheme is from
-// the continuous network.
+// core/kernels: whether a Program may be stepped to fourth order.
 #pragma once
 
 #include <optional>
+#include <span>
 
 #include "core/kernels/estimates.h"
 #include "core/kernels/program.h"
@@ -10,22 +10,14 @@
 namespace ressort {
 
 // The largest stiffness and damping that a mode can have, per sample and mass, by the edge bound;
-// every link counts by its spring and damper, with the parameters as they start.
+// every link counts by its spring and damper, with the parameters as they start or as given.
 struct Steepness {
   double stiffness = 0.0;  // K/M
   double damping = 0.0;    // Z/M
   double both = 0.0;       // (K + 6Z)/M
 };
 Steepness steepness_of(const Program& program);
-
-// A scheme's error at one mode: cents of pitch and percent of its decay, without their signs.
-struct SchemeError {
-  double cents = 0.0;
-  double t60_percent = 0.0;
-};
-// What the steepest mode may be off the continuous network's.
-SchemeError published_error(const Steepness& steepness);
-SchemeError fourth_error(const Steepness& steepness);
+Steepness steepness_of(const Program& program, std::span<const double> parameters);
 
 // Nothing where nothing moves; where K + 6Z reaches 12M by the edge bound: a mode is pushed out
 // instead of in as soon as it does; where a link is not of the plain scheme; where a force is heard

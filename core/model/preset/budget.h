@@ -23,8 +23,8 @@ struct Budget {
 
   double cents = unlimited;        // that any partial may be off the continuous network's pitch
   double t60_percent = unlimited;  // that any decay may be off the continuous network's
-  double silence_db = -unlimited;  // what is below this, against an output's loudest, may be left
-                                   // out; 0 dB: everything may
+  double silence_db = -unlimited;  // what is below this may be left out, against the peak of the
+                                   // unreduced output over its whole life; 0 dB: everything may
   Passivity passive = Passivity::always;
 
   bool is_physical() const { return cents < unlimited || t60_percent < unlimited; }

@@ -1,0 +1,193 @@
+#include "core/compile/accuracy/springs.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/kernels/taps.h"
+#include "core/laws/laws.h"
+#include "core/linear_algebra/eigen.h"
+
+namespace ressort {
+namespace {
+
+constexpr double shared_tolerance = 1e-9;  // of the largest: is Z diagonal in the modes of K?
+constexpr double zero_tolerance = 1e-13;   // of the largest: none
+constexpr double alike = 1e-12;            // two numbers
+
+bool is_place(const Program& program, std::uint32_t node) {
+  return !program.taps.empty() && node >= program.taps[0].node;
+}
+
+// A spring with its damper, felt by a sum of masses.
+struct Bar {
+  std::vector<std::pair<std::uint32_t, double>> shares;  // node, weight
+  double stiffness = 0.0;
+  double damping = 0.0;
+  bool is_relayed = false;
+};
+
+// Calls use(bar) for every oscillator's own and every link's spring.
+template <class Use>
+void each_bar(const Program& program, const std::vector<double>& value, Use&& use) {
+  for (const MassRun& run : program.mass_runs) {
+    for (std::uint32_t i = run.first; run.is_oscillator && i < run.first + run.count; ++i) {
+      use(Bar{{{i, 1.0}}, value[run.stiffness], value[run.damping], false});
+    }
+  }
+  std::vector<Corners<double>> corners;
+  for (const TapSlot& tap : program.taps) {
+    corners.push_back(corners_at(tap, value[tap.u], value[tap.v]));
+  }
+  for (const LinkRun& run : program.link_runs) {
+    const LawFacts& law = facts_of(run.law);
+    if (!law.contains_spring) {
+      continue;
+    }
+    for (std::uint32_t i = run.first; i < run.first + run.count; ++i) {
+      Bar bar{{},
+              value[run.coefficients[law.slot(Role::stiffness)]],
+              value[run.coefficients[law.slot(Role::damping)]],
+              run.law != Law::spring};
+      const auto hang = [&](std::uint32_t node, double sign) {
+        if (!is_place(program, node)) {
+          if (node < program.moving) {
+            bar.shares.emplace_back(node, sign);
+          }
+          return;
+        }
+        bar.is_relayed = true;
+        each_corner(corners[node - program.taps[0].node], [&](std::uint32_t at, double weight) {
+          if (program.tap_nodes[at] < program.moving) {
+            bar.shares.emplace_back(program.tap_nodes[at], sign * weight);
+          }
+        });
+      };
+      hang(program.ends[i].a, 1.0);
+      hang(program.ends[i].b, -1.0);
+      use(bar);
+    }
+  }
+}
+
+std::vector<double> values_of(const Program& program, std::span<const double> parameters,
+                              double stiffness_factor) {
+  std::vector<double> values;
+  for (const Coefficient& coefficient : program.coefficients) {
+    values.push_back(coefficient_value(program, coefficient, parameters, stiffness_factor));
+  }
+  return values;
+}
+
+// [node that moves] of its inverse mass, the root.
+Vector roots_of(const Program& program, const std::vector<double>& value) {
+  Vector root(program.moving);
+  for (const MassRun& run : program.mass_runs) {
+    root[std::slice(run.first, run.count, 1)] = std::sqrt(value[run.inverse_mass]);
+  }
+  return root;
+}
+
+}  // namespace
+
+Springs springs_of(const Program& program, std::span<const double> parameters,
+                   double stiffness_factor) {
+  const std::size_t n = program.moving;
+  Springs springs{Matrix(n, n), Matrix(n, n), Matrix(n, n), Matrix(n, n)};
+  const std::vector<double> value = values_of(program, parameters, stiffness_factor);
+  const Vector root = roots_of(program, value);
+  each_bar(program, value, [&](const Bar& bar) {
+    for (const auto& [i, a] : bar.shares) {
+      for (const auto& [j, b] : bar.shares) {
+        const double share = a * b * root[i] * root[j];
+        springs.stiffness(i, j) += share * bar.stiffness;
+        springs.damping(i, j) += share * bar.damping;
+        if (bar.is_relayed) {
+          springs.relayed_stiffness(i, j) += share * bar.stiffness;
+          springs.relayed_damping(i, j) += share * bar.damping;
+        }
+      }
+    }
+  });
+  springs.is_sound = std::all_of(std::begin(root), std::end(root),
+                                 [](double r) { return r > 0.0 && std::isfinite(r); }) &&
+                     std::isfinite(springs.stiffness.values.sum()) &&
+                     std::isfinite(springs.damping.values.sum());
+  return springs;
+}
+
+bool has_relayed_springs(const Program& program) {
+  const auto touches_place = [&](const LinkRun& run) {
+    return std::any_of(
+        program.ends.begin() + run.first, program.ends.begin() + run.first + run.count,
+        [&](Ends ends) { return is_place(program, ends.a) || is_place(program, ends.b); });
+  };
+  return contains_bent_springs(program) ||
+         std::any_of(program.link_runs.begin(), program.link_runs.end(), [&](const LinkRun& run) {
+           return run.law == Law::spring && touches_place(run);
+         });
+}
+
+bool contains_bent_springs(const Program& program) {
+  return std::any_of(program.link_runs.begin(), program.link_runs.end(), [](const LinkRun& run) {
+    return run.law != Law::spring && facts_of(run.law).contains_spring;
+  });
+}
+
+std::optional<std::vector<std::pair<double, double>>> modes_of(const Springs& springs) {
+  const double most_k = std::max(largest(springs.stiffness.values), 1e-300);
+  const double most_z = std::max(largest(springs.damping.values), 1e-300);
+  // Of a mixture in odd shares: modes that K alone cannot tell apart, Z may.
+  Matrix mixture = springs.stiffness;
+  mixture.values =
+      springs.stiffness.values / most_k + 0.6180339887498949 / most_z * springs.damping.values;
+  const Matrix shapes = symmetric_eigenpairs(mixture).vectors;
+  const Matrix k = in_basis(springs.stiffness, shapes);
+  const Matrix z = in_basis(springs.damping, shapes);
+  std::vector<std::pair<double, double>> modes;
+  for (std::size_t j = 0; j < k.columns(); ++j) {
+    for (std::size_t i = 0; i < k.rows(); ++i) {
+      if (i != j && !(std::fabs(k(i, j)) <= shared_tolerance * most_k &&
+                      std::fabs(z(i, j)) <= shared_tolerance * most_z)) {
+        return std::nullopt;
+      }
+    }
+    modes.emplace_back(k(j, j) < zero_tolerance * most_k ? 0.0 : k(j, j),
+                       z(j, j) < zero_tolerance * most_z ? 0.0 : z(j, j));
+  }
+  return modes;
+}
+
+std::optional<Rayleigh> rayleigh_of(const Program& program, std::span<const double> parameters,
+                                    double stiffness_factor) {
+  const std::vector<double> value = values_of(program, parameters, stiffness_factor);
+  std::optional<double> by_stiffness;
+  bool is_alike = true;
+  for (const LinkRun& run : program.link_runs) {
+    const LawFacts& law = facts_of(run.law);
+    if (!law.contains_spring) {
+      continue;
+    }
+    const double k = value[run.coefficients[law.slot(Role::stiffness)]];
+    const double z = value[run.coefficients[law.slot(Role::damping)]];
+    if (k == 0.0 && z == 0.0) {
+      continue;
+    }
+    by_stiffness = by_stiffness.value_or(z / k);
+    is_alike = is_alike && k > 0.0 && std::fabs(z - *by_stiffness * k) <= alike * z;
+  }
+  std::optional<double> by_mass;
+  for (const MassRun& run : program.mass_runs) {
+    const double beside =
+        run.is_oscillator ? value[run.damping] - by_stiffness.value_or(0.0) * value[run.stiffness]
+                          : 0.0;
+    const double rate = beside * value[run.inverse_mass];
+    by_mass = by_mass.value_or(rate);
+    is_alike = is_alike && std::fabs(rate - *by_mass) <= alike * (std::fabs(rate) + 1e-300);
+  }
+  const Rayleigh found{by_mass.value_or(0.0), by_stiffness.value_or(0.0)};
+  return is_alike && found.by_mass >= 0.0 && std::isfinite(found.by_stiffness)
+             ? std::optional(found)
+             : std::nullopt;
+}
+
+}  // namespace ressort

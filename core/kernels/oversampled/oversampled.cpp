@@ -1,0 +1,122 @@
+#include "core/kernels/oversampled/oversampled.h"
+
+#include <algorithm>
+
+#include "core/kernels/oversampled/oversampled_form.h"
+
+namespace ressort {
+
+static_assert(most_oversampling <= max_block_frames);
+
+template <class T>
+OversampledKernel<T>::OversampledKernel(const Program& program, const Oversampled& form,
+                                        std::size_t voices, Isa isa)
+    : OversampledKernel(program, form, make_kernel<T>(*form.fine, voices, isa)) {}
+
+template <class T>
+OversampledKernel<T>::OversampledKernel(const Program& program, const Oversampled& form,
+                                        std::unique_ptr<Kernel<T>> fine)
+    : Kernel<T>(program, fine->width()),
+      program_(program),
+      times_(form.times),
+      fine_(std::move(fine)),
+      value_(times_ * program.inputs.size() * this->width()),
+      velocity_(value_.size()),
+      audio_(times_ * program.audio_coefficients.size() * this->width()),
+      outputs_(times_ * program.outputs.size() * this->width()),
+      speed_(program.position.size()) {
+  for (const Coefficient& coefficient : program.coefficients) {
+    factor_.push_back(
+        static_cast<T>(rate_factor(coefficient.unit, 1.0 / static_cast<double>(times_))));
+  }
+  for (std::size_t lane = 0; lane < this->width(); ++lane) {
+    this->reset(lane);
+  }
+}
+
+template <class T>
+void OversampledKernel<T>::set_state(std::size_t lane, const double* x, const double* v) {
+  for (std::size_t node = 0; node < speed_.size(); ++node) {
+    speed_[node] = v[node] / static_cast<double>(times_);
+  }
+  fine_->set_state(lane, x, speed_.data());
+}
+
+template <class T>
+bool OversampledKernel<T>::save(std::size_t lane, double* x, double* v) const {
+  if (!fine_->save(lane, x, v)) {
+    return false;
+  }
+  for (std::size_t node = 0; node < speed_.size(); ++node) {
+    v[node] *= static_cast<double>(times_);
+  }
+  return true;
+}
+
+template <class T>
+void OversampledKernel<T>::refine_coefficients() {
+  const std::size_t width = this->width();
+  for (std::size_t c = 0; c < factor_.size(); ++c) {
+    for (std::size_t lane = 0; lane < width; ++lane) {
+      fine_->coefficients.value[c * width + lane] =
+          this->coefficients.value[c * width + lane] * factor_[c];
+    }
+  }
+}
+
+template <class T>
+void OversampledKernel<T>::step_finely(const T* value, const T* velocity, const T* audio) {
+  const std::size_t width = this->width();
+  const T part = T(1) / static_cast<T>(times_);
+  for (std::size_t i = 0; i < program_.inputs.size() * width; ++i) {
+    const bool is_force = program_.inputs[i / width].is_force;
+    for (std::size_t step = 0; step < times_; ++step) {
+      const std::size_t at = step * program_.inputs.size() * width + i;
+      const T left = static_cast<T>(times_ - 1 - step) * part;
+      value_[at] = is_force ? value[i] * part * part : value[i] - left * velocity[i];
+      velocity_[at] = velocity[i] * part;
+    }
+  }
+  const auto& turned = program_.audio_coefficients;
+  for (std::size_t i = 0; i < turned.size() * width; ++i) {
+    for (std::size_t step = 0; step < times_; ++step) {
+      audio_[step * turned.size() * width + i] = audio[i] * factor_[turned[i / width]];
+    }
+  }
+  fine_->step({.frames = times_,
+               .value = value_.data(),
+               .velocity = velocity_.data(),
+               .audio = turned.empty() ? nullptr : audio_.data(),
+               .outputs = outputs_.data()});
+}
+
+template <class T>
+void OversampledKernel<T>::play(const Block<T>& block) {
+  Ramps<T> ramps = ramps_of(this->coefficients);
+  const std::size_t width = this->width();
+  const std::size_t inputs = program_.inputs.size() * width;
+  const std::size_t outputs = program_.outputs.size() * width;
+  const std::size_t turned = program_.audio_coefficients.size() * width;
+  refine_coefficients();
+  for (std::size_t frame = 0; frame < block.frames; ++frame) {
+    if (ramps.frames > 0) {
+      advance(ramps);
+      refine_coefficients();
+    }
+    step_finely(block.value + frame * inputs, block.velocity + frame * inputs,
+                block.audio + frame * turned);
+    std::copy_n(outputs_.end() - static_cast<std::ptrdiff_t>(outputs), outputs,
+                block.outputs + frame * outputs);
+  }
+  this->coefficients.finish(block.frames);
+}
+
+template <class T>
+bool OversampledKernel<T>::is_near_start(std::size_t lane, double bound) const {
+  return fine_->is_near_start(lane, bound);
+}
+
+template class OversampledKernel<float>;
+template class OversampledKernel<double>;
+
+}  // namespace ressort

@@ -1,0 +1,37 @@
+// core/kernels: a Program stepped several times a sample by another kernel, at a finer rate. Forces
+// last for the whole sample, hands go straight to where they will be, and outputs are heard as the
+// last step leaves them: nothing may swing faster than half the coarse rate.
+#pragma once
+
+#include "core/kernels/kernel.h"
+
+namespace ressort {
+
+template <class T>
+class OversampledKernel final : public Kernel<T> {
+ public:
+  // The form's Program outlives it.
+  OversampledKernel(const Program& program, const Oversampled& form, std::size_t voices, Isa isa);
+  void set_state(std::size_t lane, const double* x, const double* v) override;
+  bool save(std::size_t lane, double* x, double* v) const override;
+  bool is_near_start(std::size_t lane, double bound) const override;
+  Awake awake() const override { return fine_->awake(); }
+
+ private:
+  OversampledKernel(const Program& program, const Oversampled& form,
+                    std::unique_ptr<Kernel<T>> fine);
+  void play(const Block<T>& block) override;
+  void refine_coefficients();
+  void step_finely(const T* value, const T* velocity, const T* audio);
+
+  const Program& program_;
+  std::size_t times_;
+  std::unique_ptr<Kernel<T>> fine_;
+  std::vector<T> factor_;        // [coefficient] from a sample to a step
+  Aligned<T> value_, velocity_;  // [step][input][lane]
+  Aligned<T> audio_;             // [step][audio coefficient][lane]
+  Aligned<T> outputs_;           // [step][output][lane]
+  std::vector<double> speed_;    // [node]
+};
+
+}  // namespace ressort

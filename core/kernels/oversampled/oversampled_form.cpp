@@ -1,0 +1,38 @@
+#include "core/kernels/oversampled/oversampled_form.h"
+
+#include <utility>
+
+#include "core/kernels/registry.h"
+
+namespace ressort {
+
+Program oversampled_program(const Program& program, std::uint32_t times) {
+  Program fine = program;
+  fine.form = Direct{};
+  fine.rate_hz *= times;
+  fine.rate_ratio /= times;
+  for (double& velocity : fine.velocity) {
+    velocity /= times;
+  }
+  return fine;
+}
+
+Oversampled oversampled_form(Program fine, std::uint32_t times) {
+  return {.fine = std::make_shared<const Program>(std::move(fine)), .times = times};
+}
+
+double predicted_ns(const Program& program, const Oversampled& form, const Workload& load) {
+  const double driven = static_cast<double>(program.inputs.size() + program.outputs.size());
+  return form.times * (predicted_ns(*form.fine, load) + 1.0 + 0.5 * driven * packs_of(load));
+}
+
+std::string description(const Program&, const Oversampled& form) {
+  return std::to_string(form.times) + " steps a sample, each " + description(*form.fine);
+}
+
+std::uint64_t voice_bytes(const Program& program, const Oversampled& form,
+                          std::uint64_t number_bytes) {
+  return voice_bytes(*form.fine, number_bytes) + node_bytes(program, number_bytes);
+}
+
+}  // namespace ressort

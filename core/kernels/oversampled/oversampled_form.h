@@ -1,0 +1,26 @@
+// core/kernels: a Program stepped several times a sample, and its tables.
+#pragma once
+
+#include <optional>
+
+#include "core/kernels/estimates.h"
+#include "core/kernels/program.h"
+
+namespace ressort {
+
+inline constexpr std::uint32_t most_oversampling = 32;
+
+// The same numbers at `times` the rate, in the direct form.
+Program oversampled_program(const Program& program, std::uint32_t times);
+
+// Stepped so many times a sample in the form that the finer Program has: published, in any
+// coordinates, or to fourth order.
+Oversampled oversampled_form(Program fine, std::uint32_t times);
+
+// What the registry's row of it asks, of one voice in bytes.
+double predicted_ns(const Program& program, const Oversampled& form, const Workload& load);
+std::string description(const Program& program, const Oversampled& form);
+std::uint64_t voice_bytes(const Program& program, const Oversampled& form,
+                          std::uint64_t number_bytes);
+
+}  // namespace ressort
