@@ -185,7 +185,7 @@ class StabilityChecker {
     }
     const auto is_sound = [&](std::size_t i) { return is_audio(i); };
     for (std::size_t i = 0; i < start_.size(); ++i) {
-      if (is_audio(i)) {
+      if (is_audio(i) && !request_.bare) {  // which is what it is
         each_strength([&](ArgumentId argument) { keep_positive(argument, i); });
       }
     }

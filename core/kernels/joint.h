@@ -76,6 +76,7 @@ class Joint {
     if (any_of(is_first_)) {
       live = live | (is_first_ & makes_energy());
     }
+    live = live | forget_what_is_lost();
     if (any_of(live)) {
       stiffen(live);
     }
@@ -260,6 +261,25 @@ class Joint {
   Lanes go_on(Joined<V>& link, Lanes live, V share) {
     link.force = select(live, link.force + share * link.push, link.force);
     return absolute(link.way) > tiny_share<V>() / 2 * (absolute(link.before) + absolute(link.step));
+  }
+
+  // Where it went so far that numbers end: from nothing once more. Gives those lanes.
+  Lanes forget_what_is_lost() {
+    constexpr Scalar<V> endless = sizeof(Scalar<V>) == 4 ? Scalar<V>(1e30) : Scalar<V>(1e150);
+    const Lanes all = V{} == V{};
+    Lanes is_sane = all;
+    for (std::size_t i = 0; i < count_; ++i) {
+      is_sane =
+          is_sane & (absolute(joined_[i].force) < endless) & (absolute(joined_[i].step) < endless);
+    }
+    const Lanes lost = is_sane == (V{} != V{});
+    if (any_of(lost)) {
+      for (std::size_t i = 0; i < count_; ++i) {
+        joined_[i].force = select(lost, V{}, joined_[i].force);
+      }
+      move();
+    }
+    return lost;
   }
 
   // Every link then exerts what it would where it was, in proportion to its step what brought it to

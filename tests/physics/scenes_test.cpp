@@ -464,7 +464,7 @@ Outcome play(const NonlinearScene& scene, Passivity passive, std::size_t frames)
     }
     player.out.assign(player.out.size(), {});
     player.run(block, {}, {block}, pointers);
-    for (std::size_t n = 0; n < block; ++n) {
+    for (std::size_t n = 0; n < block && judge.farthest < far_away; ++n) {
       for (std::size_t i = 0; i < positions.size(); ++i) {
         positions[i] = player.out[i][n];
       }
