@@ -164,10 +164,7 @@ class ProgramMaker {
         continue;
       }
       const LinkScheme scheme = scheme_of(order[i]);
-      LinkRun run{.law = link.law,
-                  .scheme = scheme.scheme,
-                  .first = i,
-                  .count = 1};
+      LinkRun run{.law = link.law, .scheme = scheme.scheme, .first = i, .count = 1};
       for (std::size_t k = 0; k < most_law_arguments; ++k) {
         run.coefficients[k] = coefficient(link.arguments[k], facts_of(link.law).arguments[k].unit);
       }

@@ -49,7 +49,8 @@ struct PassiveRoom {
 //   V gamma(ends)                          how far they give way to a force of 1
 //   void push(ends, V force)               a by -force and b by force, times their inverse masses
 //   V coefficient(c)
-//   V awake()                              0 in the first sample after set_state(), -1 if it was let
+//   V awake()                              0 in the first sample after set_state(), -1 if it was
+//   let
 //                                          go, else 1
 
 // Before anything moves. `memory` is [link][passive_rows] packs.

@@ -86,7 +86,9 @@ constexpr KernelRow rows[] = {
                             [](const Request& r) { return batch_form(r.program); }),
     row<Modes, ModalKernel>(
         Method::modal, "modal", Use::published,
-        [](const Request& r) { return modal_form(r.program, r.budget, r.progress, r.load.is_untuned); },
+        [](const Request& r) {
+          return modal_form(r.program, r.budget, r.progress, r.load.is_untuned);
+        },
         least_modal_ns),
     row<Fourth, DirectKernel>(Method::fourth, "fourth", Use::physical,
                               [](const Request& r) { return fourth_form(r.program); }),

@@ -7,8 +7,8 @@
 #include <tuple>
 #include <utility>
 
-#include "core/kernels/grid/grid_places.h"
 #include "core/kernels/clusters.h"
+#include "core/kernels/grid/grid_places.h"
 #include "core/laws/laws.h"
 
 namespace ressort {

@@ -110,15 +110,15 @@ class BodyMaker {
           add_share(around, program_.tap_nodes[corner], weight);
         });
       }
-      Reading reading;
+      Readout readout;
       for (const MassShare& share : around) {
         if (share.mass < body_.count) {
-          reading.shares.push_back(share);
+          readout.shares.push_back(share);
         } else {
-          reading.offset += share.weight * program_.position[share.mass];
+          readout.offset += share.weight * program_.position[share.mass];
         }
       }
-      body_.reading.push_back(std::move(reading));
+      body_.readout.push_back(std::move(readout));
       body_.around.push_back(std::move(around));
     }
   }
@@ -155,12 +155,12 @@ class BodyMaker {
   }
 
   Bar bar_between(Ends ends) const {
-    Bar bar{.shares = body_.reading[ends.a].shares};
-    for (const auto& [mass, weight] : body_.reading[ends.b].shares) {
+    Bar bar{.shares = body_.readout[ends.a].shares};
+    for (const auto& [mass, weight] : body_.readout[ends.b].shares) {
       add_share(bar.shares, mass, -weight);
     }
     std::erase_if(bar.shares, [](const MassShare& share) { return share.weight == 0.0; });
-    bar.position = body_.reading[ends.b].offset - body_.reading[ends.a].offset;
+    bar.position = body_.readout[ends.b].offset - body_.readout[ends.a].offset;
     return bar;
   }
 
@@ -205,7 +205,7 @@ double share_felt(const LinearBody& body, std::uint32_t from, std::uint32_t at) 
 
 Vector LinearBody::force_at(std::uint32_t node) const {
   Vector force(count);
-  for (const auto& [mass, weight] : reading[node].shares) {
+  for (const auto& [mass, weight] : readout[node].shares) {
     force[mass] += weight;
   }
   return force;
@@ -225,8 +225,8 @@ FeltForce force_felt(const Program& program, const LinearBody& body, std::uint32
       }
       for (const std::uint32_t end : {a, b}) {
         const double weight = end == a ? share : -share;
-        constant += weight * body.reading[end].offset;
-        for (const auto& [mass, part] : body.reading[end].shares) {
+        constant += weight * body.readout[end].offset;
+        for (const auto& [mass, part] : body.readout[end].shares) {
           add_share(shares, mass, weight * part);
           constant += weight * part * rest[mass];
         }

@@ -18,7 +18,7 @@ struct MassShare {
 };
 
 // Where a node is: the sum of weight * x over masses, and of what does not move.
-struct Reading {
+struct Readout {
   std::vector<MassShare> shares;  // each mass once; none: it does not move
   double offset = 0.0;
 };
@@ -46,14 +46,14 @@ struct LinearBody {
   std::vector<bool> is_live;                   // [coefficient] does a parameter move it?
   std::vector<double> value;                   // [coefficient] at the start
   std::vector<std::uint32_t> input;            // [node] that moves it, or nowhere
-  std::vector<Reading> reading;                // [node]
+  std::vector<Readout> readout;                // [node]
   std::vector<std::vector<MassShare>> around;  // [node] itself, or the nodes around a place
   std::uint32_t inverse_mass = 0;              // the coefficient that all share, or Modes::own_mass
   Vector root;  // [mass] of its inverse, relative to that coefficient
   std::vector<Frame> stiffness;
   std::vector<Frame> damping;
 
-  bool moves(std::uint32_t node) const { return !reading[node].shares.empty(); }
+  bool moves(std::uint32_t node) const { return !readout[node].shares.empty(); }
   bool is_nothing(std::uint32_t c) const { return !is_live[c] && value[c] == 0.0; }
   // The inverse mass that roots are relative to, at the start.
   double weight() const { return inverse_mass == 0xffffffffu ? 1.0 : value[inverse_mass]; }

@@ -174,20 +174,20 @@ class ModesFinder {
     }
     return sum;
   }
-  Vector shape_of(std::uint32_t node) const { return row_of(body_.reading[node].shares); }
+  Vector shape_of(std::uint32_t node) const { return row_of(body_.readout[node].shares); }
   ModalPlace place_of(std::uint32_t node, const Vector& shape) const {
-    ModalPlace place{.rest = body_.reading[node].offset};
+    ModalPlace place{.rest = body_.readout[node].offset};
     if (!modes_.is_crossed) {
       place.rest += dot(shape, rest_);
       return place;
     }
     place.offset = place.rest;
-    for (const auto& [mass, share] : body_.reading[node].shares) {
+    for (const auto& [mass, share] : body_.readout[node].shares) {
       place.rest += share * crossed_.rest[mass];
       place.masses.push_back({mass, share});
     }
     place.shape = numbers_of(shape);
-    place.speed = numbers_of(sum_of(crossed_.speed, body_.reading[node].shares));
+    place.speed = numbers_of(sum_of(crossed_.speed, body_.readout[node].shares));
     return place;
   }
   static std::vector<double> numbers_of(const Vector& row) {
