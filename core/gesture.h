@@ -16,7 +16,7 @@
 
 namespace ressort {
 
-enum class Gesture : std::uint8_t { position, force, pluck, bow, impulse, hold, parameter };
+enum class Gesture : std::uint8_t { position, force, pluck, bow, impulse, hold, touch, parameter };
 
 // One performance of a gesture: what is asked, and of which input of which voice.
 struct Stroke {
@@ -29,6 +29,11 @@ struct Stroke {
   double high = 1.0;
   bool exponential = false;
   double travel = 0.0;
+  bool has_level = false;
+  double low_db = 0.0;
+  double high_db = 0.0;
+  double longest_s = 0.0;
+  double shortest_s = 0.0;
   // Of the input and the voice.
   bool is_force = false;
   double middle = 0.0;      // the input's position in the model; 0 of a force
@@ -39,12 +44,26 @@ struct Stroke {
   // Set by the gesture.
   std::optional<double> rest;      // where a new voice's driver starts from now on
   std::optional<double> pressure;  // what the channel is pressed with, too
+  std::optional<double> loudness;  // a factor on its loudest level, if the amount does not say it
 
   double mapped() const {
     const double a = std::clamp(amount, 0.0, 1.0);
     return !has_control                             ? amount
            : exponential && low > 0.0 && high > 0.0 ? low * std::pow(high / low, a)
                                                     : low + (high - low) * a;
+  }
+  // The voice's level, as a factor.
+  double level() const {
+    const double part = loudness ? 1.0 : std::clamp(amount, 0.0, 1.0);
+    return std::pow(10.0, (low_db + (high_db - low_db) * part) / 20.0) * loudness.value_or(1.0);
+  }
+  // How long a blow lasts: from soft to hard in equal ratios.
+  std::size_t pulse_frames() const {
+    const double a = std::clamp(amount, 0.0, 1.0);
+    const double s = longest_s > 0.0 && shortest_s > 0.0
+                         ? longest_s * std::pow(shortest_s / longest_s, a)
+                         : longest_s + (shortest_s - longest_s) * a;
+    return static_cast<std::size_t>(std::llround(s * rate_hz));
   }
   // A speed or an impulse that gives the same displacement at every rate and pitch.
   double paced(double value) const { return value * rate_ratio * pitch; }
@@ -171,10 +190,15 @@ inline constexpr GestureRow gestures[] = {
      .extent = Extent::endless,
      .play =
          [](InputDriver& driver, Stroke& stroke) {
-           const double signed_speed =
-               std::copysign(stroke.amount == 0.0 ? 0.0 : stroke.high, stroke.amount) *
-               std::min(1.0, std::fabs(stroke.amount));
-           driver.draw(stroke.paced(stroke.is_live ? signed_speed : stroke.mapped()),
+           // Friction knows no size: a bow whose speed and scale grow together moves the string so
+           // much more, and in no other way. So where there is a level, live speed is that.
+           const double share = std::min(1.0, std::fabs(stroke.amount));
+           if (stroke.is_live && stroke.has_level) {
+             stroke.loudness = share;
+           }
+           const double live = std::copysign(
+               stroke.high * (stroke.has_level && share > 0.0 ? 1.0 : share), stroke.amount);
+           driver.draw(stroke.paced(stroke.is_live ? live : stroke.mapped()),
                        stroke.pole_of_speed());
            if (stroke.is_live && stroke.second >= 0.0) {
              stroke.pressure = stroke.second;
@@ -193,10 +217,13 @@ inline constexpr GestureRow gestures[] = {
                         "can bow. 'explain' tells which inputs know a bow."},
     {.gesture = Gesture::impulse,
      .name = "impulse",
-     .does = "one sample of force, or of displacement where the input is a position",
+     .does = "a blow: one sample of force, or a pulse as long as `length_ms` says; of displacement "
+             "where the input is a position",
      .is_blow = true,
-     .play = [](InputDriver& driver,
-                Stroke& stroke) { driver.strike(stroke.struck(stroke.mapped())); }},
+     .play =
+         [](InputDriver& driver, Stroke& stroke) {
+           driver.strike(stroke.struck(stroke.mapped()), stroke.pulse_frames());
+         }},
     {.gesture = Gesture::hold,
      .name = "hold",
      .does = "goes to the second number of `range` while the key is held, and back to the first",
@@ -205,6 +232,13 @@ inline constexpr GestureRow gestures[] = {
                 Stroke& stroke) { driver.follow(stroke.high, stroke.pole_of_position()); },
      .release = [](InputDriver& driver,
                    const Stroke& stroke) { driver.follow(stroke.low, stroke.pole_of_position()); }},
+    {.gesture = Gesture::touch,
+     .name = "touch",
+     .does = "a finger: off the string at the first number of `range`, where it rests, and laid on "
+             "as far as the second",
+     .needs_position = true,
+     .start = [](const Stroke& control) { return control.low; },
+     .goal = [](const Stroke& stroke) { return stroke.mapped(); }},
     // No driver: the parameter that `to` names is turned.
     {.gesture = Gesture::parameter,
      .name = "parameter",

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <numbers>
 
 namespace ressort {
 
@@ -44,8 +45,16 @@ class InputDriver {
     pole_ = pole;
   }
 
-  // One sample of force or of displacement, on top of whatever else goes on.
-  void strike(double force) { pulse_ += force; }
+  // A force or a displacement on top of whatever else goes on: one sample, or a raised cosine of
+  // `frames` samples with the same sum.
+  void strike(double force, std::size_t frames = 1) {
+    if (frames < 2) {
+      pulse_ += force;
+    } else {
+      blow_ = force;
+      blow_frames_ = blow_left_ = frames;
+    }
+  }
 
   // A constant force for `frames` samples.
   void push(double force, std::size_t frames) {
@@ -54,15 +63,14 @@ class InputDriver {
   }
 
   bool is_moving() const {
-    return motion_ != Motion::rest || pulse_ != 0.0 || bump_ != 0.0 || held_frames_ > 0;
+    return motion_ != Motion::rest || is_struck() || bump_ != 0.0 || held_frames_ > 0;
   }
   double value() const { return value_; }
   double target() const { return target_; }
 
   InputSample next_position() {
     const double before = bump_;
-    bump_ = pulse_;
-    pulse_ = 0.0;
+    bump_ = next_pulse();
     InputSample sample = move();
     sample.value += bump_;
     sample.velocity += bump_ - before;
@@ -73,7 +81,7 @@ class InputDriver {
   template <class T>
   void fill_positions(std::size_t frames, std::size_t step, T* value, T* velocity) {
     for (std::size_t n = 0; n < frames;) {
-      if (motion_ == Motion::follow && pulse_ == 0.0 && bump_ == 0.0) {
+      if (motion_ == Motion::follow && !is_struck() && bump_ == 0.0) {
         n = fill_approach(n, frames, step, value, velocity);
       }
       if (n < frames) {
@@ -89,8 +97,7 @@ class InputDriver {
     if (motion_ == Motion::follow) {
       approach();
     }
-    double force = value_ + pulse_;
-    pulse_ = 0.0;
+    double force = value_ + next_pulse();
     if (held_frames_ > 0) {
       force += held_;
       --held_frames_;
@@ -100,6 +107,20 @@ class InputDriver {
 
  private:
   enum class Motion : std::uint8_t { rest, follow, sweep, draw };
+
+  bool is_struck() const { return pulse_ != 0.0 || blow_left_ > 0; }
+
+  double next_pulse() {
+    double pulse = pulse_;
+    pulse_ = 0.0;
+    if (blow_left_ > 0) {
+      const double frames = static_cast<double>(blow_frames_);
+      const double turn = (static_cast<double>(blow_left_) - 0.5) / frames;
+      pulse += blow_ / frames * (1.0 - std::cos(2.0 * std::numbers::pi * turn));
+      --blow_left_;
+    }
+    return pulse;
+  }
 
   InputSample move() {
     const double before = value_;
@@ -170,6 +191,9 @@ class InputDriver {
   double pole_ = 0.0;
   double pulse_ = 0.0;
   double bump_ = 0.0;  // of a position, in this sample
+  double blow_ = 0.0;  // the sum of a pulse
+  std::size_t blow_frames_ = 0;
+  std::size_t blow_left_ = 0;
   double held_ = 0.0;
   std::size_t held_frames_ = 0;
   Motion motion_ = Motion::rest;

@@ -20,9 +20,10 @@ Events one(const Event& event) {
 
 Events note(const Said& said, bool starts) {
   const double velocity = said.arguments[1] / 127.0;
-  return one({.kind = starts && velocity > 0.0 ? EventKind::note_on : EventKind::note_off,
+  const bool sounds = starts && velocity > 0.0;
+  return one({.kind = sounds ? EventKind::note_on : EventKind::note_off,
               .index = said.whole(0),
-              .value = velocity});
+              .value = sounds ? velocity : usual_release_velocity});
 }
 
 // Of the parameters that a pattern names.

@@ -57,6 +57,7 @@ bool MidiReader::finish(Event& event) {
   switch (status_ & 0xf0) {
     case 0x90:
       event.kind = data_[1] > 0 ? EventKind::note_on : EventKind::note_off;
+      event.value = data_[1] > 0 ? event.value : usual_release_velocity;
       return true;
     case 0x80:
       event.kind = EventKind::note_off;

@@ -39,6 +39,7 @@ Process::Process(double rate_hz, bool limit, Clock clock_ns)
     : rate_hz_(rate_hz),
       limit_(limit),
       clock_ns_(clock_ns),
+      dc_blocker_(rate_hz),
       limiter_(rate_hz),
       input_(max_channels * chunk_frames),
       sound_(max_channels * chunk_frames),
@@ -62,6 +63,7 @@ Process::~Process() {
 void Process::set_rate(double rate_hz) {
   rate_hz_ = rate_hz;
   load_.forget();
+  dc_blocker_ = DcBlocker(rate_hz);
   limiter_ = Limiter(rate_hz);
   fade_frames_ = static_cast<std::size_t>(fade_s * rate_hz);
 }
@@ -332,6 +334,7 @@ void Process::play_models(std::size_t input_count, std::size_t output_count, std
   }
   fade_left_ -= std::min(fade_left_, frames);
   if (limit_) {
+    dc_blocker_.process(out, frames);
     limiter_.process(out, frames);
   }
   double peak = 0.0;

@@ -11,6 +11,7 @@
 #include "app/realtime/lockfree.h"
 #include "app/realtime/midi.h"
 #include "core/engine/engine.h"
+#include "core/engine/mixing/dc_blocker.h"
 #include "core/engine/mixing/limiter.h"
 
 namespace ressort {
@@ -175,6 +176,7 @@ struct Process {
   Meters meters_;
   EngineMeters ended_;                   // what engines before the current one counted
   std::int64_t next_overload_news_ = 0;  // frame
+  DcBlocker dc_blocker_;
   Limiter limiter_;
   // None of these grows.
   std::vector<Pending> now_;      // of this block, sorted

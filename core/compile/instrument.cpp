@@ -22,6 +22,11 @@ Control make_control(const Network& network, const ControlSetting& setting) {
   control.high = setting.high;
   control.exponential = setting.exponential;
   control.travel = setting.travel;
+  control.has_level = setting.has_level;
+  control.low_db = setting.low_db;
+  control.high_db = setting.high_db;
+  control.longest_s = setting.longest_ms / 1e3;
+  control.shortest_s = setting.shortest_ms / 1e3;
   control.target = static_cast<std::uint16_t>(control.gesture == Gesture::parameter
                                                   ? find_parameter(network, setting.target)
                                                   : find_input(network, setting.target));
@@ -76,7 +81,7 @@ Playing make_playing(const Network& network, const Preset& preset, const Analysi
   return {.voices = voices,
           .gain = gain,
           .bare = bare,
-          .release_s = preset.release_s,
+          .damper_s = preset.damper_s,
           .noise = preset.noise,
           .tuning = analysis.mode ? Tuning::keyboard : Tuning::fixed,
           .transpose = preset.transpose,

@@ -42,7 +42,7 @@ Channels::Change Channels::turn(std::uint8_t index, int number, double value) {
       channel.expression = value;
       return Change::level;
     case sustain_pedal:
-      channel.sustain = is_down;
+      channel.sustain = value;
       return Change::sustain;
     case sostenuto_pedal:
       channel.sostenuto = is_down;
@@ -99,14 +99,16 @@ void Channels::reset(std::uint8_t index) {
   Channel& channel = of(index);
   channel.bend = 0.0;
   channel.expression = 1.0;
-  channel.sustain = channel.sostenuto = false;
+  channel.sustain = 0.0;
+  channel.sostenuto = false;
   channel.soft = 0.0;
   channel.parameter = no_parameter;
 }
 
 void Channels::lift_pedals() {
   for (Channel& channel : channels_) {
-    channel.sustain = channel.sostenuto = false;
+    channel.sustain = 0.0;
+    channel.sostenuto = false;
     channel.soft = 0.0;
   }
 }
@@ -120,6 +122,12 @@ double Channels::level(std::uint8_t channel) const {
   const Channel& c = of(channel);
   const double volume = c.volume * 127.0 / 100.0;
   return volume * volume * c.expression * c.expression;
+}
+
+double Channels::damper(std::uint8_t channel) const {
+  // A lightly laid damper takes little: what it takes goes with the square of how far it lies.
+  const double lies = std::clamp(1.5 - 2.0 * of(channel).sustain, 0.0, 1.0);
+  return lies * lies;
 }
 
 double Channels::softness(std::uint8_t channel) const {

@@ -28,7 +28,10 @@ class Channels {
   double semitones(std::uint8_t channel) const;
   // 1 for a volume of 100 and an expression of 127, and 40 dB a decade of either.
   double level(std::uint8_t channel) const;
-  bool sustains(std::uint8_t channel) const { return of(channel).sustain; }
+  bool sustains(std::uint8_t channel) const { return of(channel).sustain >= 0.5; }
+  // The share of the dampers that lies on the strings: all of it up to a quarter of the sustain
+  // pedal's way, nothing from three quarters on.
+  double damper(std::uint8_t channel) const;
   bool holds(std::uint8_t channel) const { return of(channel).sostenuto; }
   // What a key's velocity is multiplied by.
   double softness(std::uint8_t channel) const;
@@ -43,7 +46,7 @@ class Channels {
     double coarse = 0.0;
     double volume = 100.0 / 127.0;
     double expression = 1.0;
-    bool sustain = false;
+    double sustain = 0.0;
     bool sostenuto = false;
     double soft = 0.0;
     int parameter = no_parameter;  // registered, that data entry is for

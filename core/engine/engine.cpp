@@ -78,8 +78,9 @@ struct Engine::Player {
         return gestures.perform(Source::note, event.index,
                                 event.value * voices.softness(event.channel));
       case EventKind::note_off:
-        return release(
-            [&](Voice& voice) { return voices.lift_key(voice, event.index, event.channel); });
+        return release([&](Voice& voice) {
+          return voices.lift_key(voice, event.index, event.channel, event.value);
+        });
       case EventKind::controller:
         return turn_controller(event);
       case EventKind::pressure:
@@ -116,7 +117,9 @@ struct Engine::Player {
       voices.reset_controllers(channel);
       let_go();
     } else if (event.index >= all_notes_off) {
-      release([&](Voice& voice) { return voices.lift_key(voice, voice.key, channel); });
+      release([&](Voice& voice) {
+        return voices.lift_key(voice, voice.key, channel, usual_release_velocity);
+      });
     } else if (const auto change = voices.turn(channel, event.index, event.value);
                change == Channels::Change::sustain || change == Channels::Change::sostenuto) {
       let_go();

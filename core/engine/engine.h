@@ -30,6 +30,11 @@ struct Control {
   double high = 1.0;         //   44 100 Hz, parameter values
   bool exponential = false;  // equal steps are equal ratios
   double travel = 0.0;       // pluck: how far from its middle the hand rests, on either side
+  bool has_level = false;    // 0..1 is the voice's level too:
+  double low_db = 0.0;
+  double high_db = 0.0;
+  double longest_s = 0.0;  // impulse: how long the softest pulse lasts; 0: one sample
+  double shortest_s = 0.0;
 };
 
 enum class Tuning : std::uint8_t {
@@ -69,10 +74,10 @@ struct Pitches {
 // How a Machine is played. Plain data, made by the compile room.
 struct Playing {
   int voices = 1;
-  double gain = 1.0;       // output per position unit
-  bool bare = false;       // the network alone: no ramps, no smoothing, no sleep
-  double release_s = 0.0;  // after its key is released a voice fades this long; 0: rings out
-  bool noise = false;      // the outputs shape white noise instead of being heard themselves
+  double gain = 1.0;      // output per position unit
+  bool bare = false;      // the network alone: no ramps, no smoothing, no sleep
+  double damper_s = 0.0;  // T60 of a voice whose key is up; 0: it rings out
+  bool noise = false;     // the outputs shape white noise instead of being heard themselves
   Tuning tuning = Tuning::fixed;
   int transpose = 0;            // semitones
   Pitches pitches;              // of the lowest mode

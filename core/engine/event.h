@@ -10,7 +10,7 @@ namespace ressort {
 
 enum class EventKind : std::uint8_t {
   note_on,       // index: key 0..127, value: velocity 0..1 (above 0), may be fractional
-  note_off,      // index: key
+  note_off,      // index: key, value: how fast it goes up, 0..1
   controller,    // index: MIDI controller number, value: 0..1
   pressure,      // of the whole channel, value: 0..1
   key_pressure,  // index: key, value: 0..1
@@ -20,6 +20,9 @@ enum class EventKind : std::uint8_t {
   gesture,       // index: input number, value and value2: the gesture's arguments
   panic,         // everything fades to silence at once
 };
+
+// Of a key that goes up and does not say how fast.
+inline constexpr double usual_release_velocity = 0.5;
 
 struct Event {
   std::uint32_t frame = 0;  // within the block that it is given with

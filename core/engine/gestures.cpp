@@ -19,7 +19,12 @@ Stroke stroke_of(const Control& control, double amount = 1.0) {
           .low = control.low,
           .high = control.high,
           .exponential = control.exponential,
-          .travel = control.travel};
+          .travel = control.travel,
+          .has_level = control.has_level,
+          .low_db = control.low_db,
+          .high_db = control.high_db,
+          .longest_s = control.longest_s,
+          .shortest_s = control.shortest_s};
 }
 
 }  // namespace
@@ -92,6 +97,9 @@ void Gestures::play(const GestureRow& gesture, std::size_t input, Stroke stroke)
   wake(last);
   stroke.pitch = std::sqrt(voices_.factor_of(last, parameters_.highest_factor()));
   gesture.play(driver(last, input), stroke);
+  if (stroke.has_level && stroke.amount != 0.0) {
+    voices_.set_strength(last, stroke.level());
+  }
   starts_[input] = stroke.rest.value_or(starts_[input]);
   if (stroke.pressure) {
     perform(Source::pressure, 0, *stroke.pressure);

@@ -12,6 +12,16 @@ constexpr double steal_fade_s = 0.005;  // a voice that gives way takes this lon
 constexpr double level_memory_s = 0.1;  // how long a voice's level remembers a peak
 constexpr double quiet_s = 0.5;         // longer than half a period of the slowest sound
 constexpr double level_s = 0.02;        // in which a voice follows its channel's level
+constexpr double damper_on_s = 0.005;   // the time constant with which a damper comes on
+constexpr double damped_away = 1e-6;    // of the gain: nothing is heard any more
+constexpr double release_reach = 4.0;   // by which a key of velocity 0 or 1 is slower or faster
+
+// Who gives way first: whose key is up, then who is quieter.
+bool is_heard_less(const Voice& a, const Voice& b) {
+  const bool a_is_up = !a.held && !a.sustained;
+  const bool b_is_up = !b.held && !b.sustained;
+  return a_is_up != b_is_up ? a_is_up : a.level < b.level;
+}
 
 std::size_t most_voices(const Playing& playing) {
   return static_cast<std::size_t>(std::max(1, playing.voices));
@@ -23,6 +33,10 @@ Voices::Voices(const Playing& playing, double rate_hz)
     : playing_(playing),
       rate_hz_(rate_hz),
       level_kept_(std::exp(-static_cast<double>(max_block_frames) / (level_memory_s * rate_hz))),
+      restrikes_(std::none_of(playing.controls.begin(), playing.controls.end(),
+                              [](const Control& control) {
+                                return control.source == Source::note && control.has_level;
+                              })),
       voices_(lane_count(playing.voices)) {}
 
 void Voices::go_on_from(const Voices& from) {
@@ -43,6 +57,8 @@ void Voices::start(std::size_t lane, double frequency_hz) {
   voices_[lane] = {.awake = true,
                    .is_new = true,
                    .frequency_hz = frequency_hz,
+                   .decay = {.pole = std::exp(-1.0 / (damper_on_s * rate_hz_))},
+                   .release_s = playing_.damper_s,
                    .level = 1.0};  // not yet heard: not yet the quietest
   has_changed_ = true;
   last_ = lane;
@@ -60,33 +76,48 @@ bool Voices::wake(std::size_t lane) {
 bool Voices::press_key(int key, std::uint8_t channel, double highest_factor) {
   // As it is written there is one instrument: a key is only a way to excite it.
   const bool is_one = playing_.tuning == Tuning::fixed;
-  const bool stays = is_one && !voices_[last_].fading;
+  const bool stays = is_one && !voices_[last_].fading && voices_[last_].is_whole();
   Voice& voice = stays ? voices_[last_] : voice_for(key, channel);
   last_ = static_cast<std::size_t>(&voice - voices_.data());
-  const bool sounds_key = is_one || (voice.key == key && voice.frequency_hz != 0.0);
-  const bool starts = !voice.is_live() || !sounds_key;
+  const bool starts = is_one ? !voice.is_live() : !sounds(voice, key, channel);
   if (starts) {
     start(last_, is_one ? 0.0 : playable_hz(key, highest_factor));
   }
   voice.key = static_cast<std::uint8_t>(key);
   voice.channel = channel;
   voice.held = true;
-  voice.sustained = voice.latched = false;
+  voice.sustained = voice.latched = voice.is_released = false;
   if (starts) {
     voice.volume = channels_.level(channel);
     voice.volume_frames = 0;
   }
+  damp(voice);
   voice.quiet_frames = 0;
   return starts;
 }
 
-bool Voices::lift_key(Voice& voice, int key, std::uint8_t channel) const {
+bool Voices::lift_key(Voice& voice, int key, std::uint8_t channel, double velocity) const {
   if (!voice.held || voice.key != key || voice.channel != channel) {
     return false;
   }
   voice.held = false;
+  voice.is_released = true;
+  voice.release_s =
+      playing_.damper_s * std::pow(release_reach, 2.0 * (usual_release_velocity - velocity));
   voice.sustained = voice.latched || channels_.sustains(channel);
+  damp(voice);
   return !voice.sustained;
+}
+
+void Voices::set_strength(std::size_t lane, double strength) {
+  Voice& voice = voices_[lane];
+  voice.strength = strength;
+  if (voice.is_new) {
+    voice.volume = strength * channels_.level(voice.channel);
+    voice.volume_frames = 0;
+  } else {
+    follow_level(voice);
+  }
 }
 
 // --- channels -----------------------------------------------------------------------------------
@@ -107,8 +138,11 @@ Channels::Change Voices::turn(std::uint8_t channel, int number, double value) {
           voice.latched = !held && voice.held;
         }
       }
+      damp(channel);
       break;
     case Channels::Change::sustain:
+      damp(channel);
+      break;
     case Channels::Change::nothing:
       break;
   }
@@ -127,6 +161,7 @@ void Voices::reset_controllers(std::uint8_t channel) {
   }
   retune(channel);
   follow_level(channel);
+  damp(channel);
 }
 
 bool Voices::is_let_go(Voice& voice, std::uint8_t channel) const {
@@ -143,27 +178,45 @@ void Voices::retune(std::uint8_t channel) {
 }
 
 void Voices::follow_level(std::uint8_t channel) {
-  const auto frames = static_cast<std::size_t>(std::max(1.0, level_s * rate_hz_));
   for (Voice& voice : voices_) {
     if (voice.awake && voice.channel == channel) {
-      voice.volume_step = (channels_.level(channel) - voice.volume) / static_cast<double>(frames);
-      voice.volume_frames = frames;
+      follow_level(voice);
     }
   }
+}
+
+void Voices::follow_level(Voice& voice) const {
+  const auto frames = static_cast<std::size_t>(std::max(1.0, level_s * rate_hz_));
+  const double goal = voice.strength * channels_.level(voice.channel);
+  voice.volume_step = (goal - voice.volume) / static_cast<double>(frames);
+  voice.volume_frames = frames;
+}
+
+void Voices::damp(std::uint8_t channel) {
+  for (Voice& voice : voices_) {
+    if (voice.awake && voice.channel == channel) {
+      damp(voice);
+    }
+  }
+}
+
+void Voices::damp(Voice& voice) const {
+  constexpr double decades_of_t60 = 3.0;
+  const bool may_lie = voice.is_released && !voice.latched && playing_.damper_s > 0.0;
+  const double share = may_lie ? channels_.damper(voice.channel) : 0.0;
+  voice.decay.kept_goal =
+      std::pow(10.0, -decades_of_t60 * share / (std::max(1e-3, voice.release_s) * rate_hz_));
 }
 
 // --- how it ends --------------------------------------------------------------------------------
 
 void Voices::release(Voice& voice) const {
   voice.held = voice.sustained = voice.latched = false;
-  if (playing_.release_s > 0.0) {
-    fade(voice, playing_.release_s);
-  }
+  damp(voice);
 }
 
 void Voices::fade(Voice& voice, double seconds) const {
-  const double step = -1.0 / std::max(1.0, seconds * rate_hz_);
-  voice.gain_step = std::min(voice.gain_step, step);
+  voice.decay.fade_step = std::max(voice.decay.fade_step, 1.0 / std::max(1.0, seconds * rate_hz_));
   voice.fading = true;
   voice.held = voice.sustained = voice.latched = false;
 }
@@ -195,8 +248,11 @@ void Voices::advance_gains(std::size_t frames) {
     const std::size_t follows = std::min(frames, voice.volume_frames);
     voice.volume += voice.volume_step * static_cast<double>(follows);
     voice.volume_frames -= follows;
-    for (std::size_t n = 0; n < frames && voice.gain_step != 0.0; ++n) {
-      voice.gain = voice.next_gain(voice.gain);
+    if (!voice.decay.is_steady()) {
+      for (std::size_t n = 0; n < frames; ++n) {
+        voice.decay.advance();
+      }
+      voice.decay.settle();
     }
     if (voice.lost && !voice.fading) {
       fade(voice, steal_fade_s);
@@ -205,10 +261,11 @@ void Voices::advance_gains(std::size_t frames) {
 }
 
 bool Voices::update(Voice& voice) {
-  const double peak = voice.peak * playing_.gain * voice.gain * voice.volume;
+  const double peak = voice.peak * playing_.gain * voice.decay.gain * voice.volume;
   voice.peak = 0.0;
   voice.level = std::max(peak, voice.level * level_kept_);
-  if (voice.fading && voice.gain == 0.0) {
+  const double gain = voice.decay.gain;
+  if ((voice.fading && gain == 0.0) || gain < damped_away) {
     end(voice);
     return false;
   }
@@ -268,11 +325,6 @@ void Voices::limit(std::size_t most) {
   const auto may_go = [&](const Voice& voice) {
     return voice.is_live() && !(&voice == &voices_[last_] && voice.held);
   };
-  const auto is_heard_less = [](const Voice& a, const Voice& b) {
-    const bool a_is_up = !a.held && !a.sustained;
-    const bool b_is_up = !b.held && !b.sustained;
-    return a_is_up != b_is_up ? a_is_up : a.level < b.level;
-  };
   for (std::size_t left = too_many(0); left > 0; --left) {
     Voice& least = *least_of(may_go, is_heard_less);
     shed_ += least.level > quiet_level ? 1 : 0;
@@ -280,20 +332,15 @@ void Voices::limit(std::size_t most) {
   }
 }
 
-// The same key's, a free one, or the quietest's place.
+// The same key's, a free one, or the place of who gives way first.
 Voice& Voices::voice_for(int key, std::uint8_t channel) {
-  const auto is_live = [](const Voice& voice) { return voice.is_live(); };
-  const auto sounds_key = [&](const Voice& voice) {
-    return is_live(voice) && voice.frequency_hz > 0.0 && voice.key == key &&
-           voice.channel == channel;
-  };
   const auto any = [](const Voice&, const Voice&) { return false; };
+  const auto sounds_key = [&](const Voice& voice) { return sounds(voice, key, channel); };
   if (Voice* const same = least_of(sounds_key, any)) {
     return *same;
   }
   if (too_many(1) > 0) {
-    Voice& quietest =
-        *least_of(is_live, [](const Voice& a, const Voice& b) { return a.level < b.level; });
+    Voice& quietest = *least_of([](const Voice& voice) { return voice.is_live(); }, is_heard_less);
     stolen_ += quietest.level > quiet_level ? 1 : 0;
     fade(quietest, steal_fade_s);
   }
@@ -303,7 +350,14 @@ Voice& Voices::voice_for(int key, std::uint8_t channel) {
     return *free;
   }
   return *least_of([](const Voice& voice) { return voice.fading; },
-                   [](const Voice& a, const Voice& b) { return a.gain < b.gain; });
+                   [](const Voice& a, const Voice& b) { return a.decay.gain < b.decay.gain; });
+}
+
+// Whether a key that is pressed goes on with this voice: what a damper has touched, and what is
+// as loud as its key was pressed, is left to ring out beside the new one.
+bool Voices::sounds(const Voice& voice, int key, std::uint8_t channel) const {
+  return restrikes_ && voice.is_live() && voice.is_whole() && voice.frequency_hz > 0.0 &&
+         voice.key == key && voice.channel == channel;
 }
 
 // --- tuning -------------------------------------------------------------------------------------

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <algorithm>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <limits>
@@ -22,8 +23,32 @@ inline std::size_t lane_count(int voices) {
   return wanted + std::min(wanted, most_in_reserve);
 }
 
+// What is left of a voice's output, from sample to sample, by what ends it. A damper that takes its
+// share of every velocity makes every motion of a linear network decay by one and the same factor,
+// and moves no pitch: so it is a gain, and costs nothing elsewhere.
+struct Decay {
+  double gain = 1.0;
+  double fade_step = 0.0;  // taken off the gain in each sample, of a voice that gives way
+  double kept = 1.0;       // of the gain by the damper, from one sample to the next,
+  double kept_goal = 1.0;  // which comes on and goes off without a step
+  double pole = 0.0;       // by this much of the difference in each sample
+
+  bool is_steady() const { return fade_step == 0.0 && kept == 1.0 && kept_goal == 1.0; }
+  void advance() {
+    kept = kept_goal + pole * (kept - kept_goal);
+    gain = std::max(0.0, gain * kept - fade_step);
+  }
+  // Near enough is there: a filter of its own would take for ever.
+  void settle() {
+    constexpr double nothing = 1e-12;
+    kept = std::fabs(kept - kept_goal) < nothing ? kept_goal : kept;
+  }
+};
+
 struct Voice {
   bool is_live() const { return awake && !fading; }
+  // Nothing has taken anything off it yet.
+  bool is_whole() const { return decay.gain > 0.99; }
 
   bool awake = false;       // steps and is heard
   bool lost = false;        // its stability: it fades from where it was
@@ -37,13 +62,14 @@ struct Voice {
   std::uint8_t channel = 0;
   double frequency_hz = 0.0;  // without bend; 0: as the model is written
   double factor = 1.0;        // on every stiffness
-  double gain = 1.0;
-  double gain_step = 0.0;  // per sample
-  double next_gain(double now) const { return std::max(0.0, now + gain_step); }
-  double volume = 1.0;  // of its channel, which it follows in equal steps
+  Decay decay;
+  bool is_released = false;  // its key has been up since it was pressed
+  double release_s = 0.0;    // T60 that its damper wants, by how fast the key went up
+  double strength = 1.0;     // of the output, by how hard the key was pressed
+  double volume = 1.0;  // its strength and its channel's level, which it follows in equal steps
   double volume_step = 0.0;
   std::size_t volume_frames = 0;  // until it is there
-  bool is_steady() const { return gain_step == 0.0 && volume_frames == 0; }
+  bool is_steady() const { return decay.is_steady() && volume_frames == 0; }
   double peak = 0.0;   // of the network's output since the last update
   double level = 0.0;  // peak of the output, slowly forgotten
   std::size_t quiet_frames = 0;
@@ -70,8 +96,8 @@ class Voices {
   bool wake(std::size_t lane);
   // A key goes down: whether the voice that is the last from now on starts.
   bool press_key(int key, std::uint8_t channel, double highest_factor);
-  // A key goes up: whether that releases this voice.
-  bool lift_key(Voice& voice, int key, std::uint8_t channel) const;
+  // A key goes up, this fast of 0..1: whether that releases this voice.
+  bool lift_key(Voice& voice, int key, std::uint8_t channel, double velocity) const;
   // What a controller says to its channel, or what its bend is; `sustain` and `sostenuto` may let
   // voices go, which is the caller's.
   Channels::Change turn(std::uint8_t channel, int number, double value);
@@ -80,6 +106,8 @@ class Voices {
   // Whether a pedal that went up lets this voice go.
   bool is_let_go(Voice& voice, std::uint8_t channel) const;
   double softness(std::uint8_t channel) const { return channels_.softness(channel); }
+  // How loud the voice is, beside its channel's level: at once where it starts, else in 20 ms.
+  void set_strength(std::size_t lane, double strength);
   void release(Voice& voice) const;
   void limit(std::size_t most);
   void panic();
@@ -107,13 +135,18 @@ class Voices {
 
  private:
   void fade(Voice& voice, double seconds) const;
+  // Lays the damper on, or lifts it, as its key and pedals say.
+  void damp(Voice& voice) const;
+  void damp(std::uint8_t channel);
   void retune(std::uint8_t channel);
+  void follow_level(Voice& voice) const;
   void follow_level(std::uint8_t channel);
   // The least of the voices for which `may` says so; null where there is none.
   template <class May, class Less>
   Voice* least_of(May&& may, Less&& less);
   void end(Voice& voice);
   std::size_t too_many(std::size_t more) const;
+  bool sounds(const Voice& voice, int key, std::uint8_t channel) const;
   Voice& voice_for(int key, std::uint8_t channel);
   double playable_hz(int key, double highest_factor) const;
   double factor_for(const Voice& voice, double highest_factor) const;
@@ -122,6 +155,7 @@ class Voices {
   const Playing& playing_;
   double rate_hz_;
   double level_kept_;  // from one update to the next
+  bool restrikes_;     // a key that is pressed again goes on with its voice
   std::vector<Voice> voices_;
   std::size_t awake_ = 0;
   std::size_t last_ = 0;

@@ -24,7 +24,7 @@ class PresetWriter {
                                                    "silence=-50"};
     text_ = "model = \"" + std::move(model) + "\"\nvoices = " + std::to_string(1 + 2 * (turn % 3)) +
             "\ngain = " + (turn % 2 == 0 ? "0.5" : "20.0") +
-            "\nrelease_s = " + (turn % 3 == 0 ? "0.0" : "0.05") +
+            "\ndamper_s = " + (turn % 3 == 0 ? "0.0" : "0.05") +
             "\nnoise = " + (turn % 7 == 6 ? "true" : "false") + "\ntuning = \"" +
             (turn % 5 == 4 ? "fixed" : "keyboard") +
             "\"\ntranspose = " + std::to_string(static_cast<int>(turn % 25) - 12) +

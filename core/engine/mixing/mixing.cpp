@@ -43,7 +43,7 @@ void Mixing::add(Bank<T>& bank, const VoiceGroup& group, const Segment& segment,
     if (!voice.is_steady()) {
       add_one(part.program, voice, segment, 0, segment.frames, sample);
     } else {
-      bank.gain[lane - group.first] = gain_ * voice.gain * voice.volume;
+      bank.gain[lane - group.first] = gain_ * voice.decay.gain * voice.volume;
     }
   }
   std::copy_n(bank.outputs.data() + (segment.frames - 1) * part.row(), part.row(),
@@ -80,14 +80,14 @@ std::size_t Mixing::sane_frames(std::size_t frames, std::size_t outputs, Sample&
 template <class Sample>
 void Mixing::add_one(const Program& program, const Voice& voice, const Segment& segment,
                      std::size_t from, std::size_t to, Sample&& sample) const {
-  double faded = voice.gain;
+  Decay decay = voice.decay;
   double volume = voice.volume;
   for (std::size_t n = 0; n < to; ++n) {
-    faded = voice.next_gain(faded);
+    decay.advance();
     volume += n < voice.volume_frames ? voice.volume_step : 0.0;
     for (std::size_t output = 0; n >= from && output < program.outputs.size(); ++output) {
       segment.outputs[program.outputs[output].channel][segment.at + n] +=
-          gain_ * faded * volume * sample(n, output);
+          gain_ * decay.gain * volume * sample(n, output);
     }
   }
 }

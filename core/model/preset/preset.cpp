@@ -43,7 +43,7 @@ constexpr PresetKey keys[] = {
     {"", "description", "text", "one line for the person who loads it"},
     {"", "voices", "1 to 256 (1)", "how many notes sound at once"},
     {"", "gain", "0 to 1e9 (1)", "output per unit of position; a forte note should peak at -6 dBFS"},
-    {"", "release_s", "0 to 60 (0)", "how long a note fades once its key is up; 0 lets it ring out"},
+    {"", "damper_s", "0 to 60 (0)", "T60 of a note once its key is up: in how many seconds a damper takes 60 dB off it; 0 lets it ring out"},
     {"", "noise", "true or false (false)", "the outputs shape white noise instead of being heard themselves"},
     {"", "tuning", "`keyboard` or `fixed` (`keyboard`)", "whether a key sets the pitch, or every key sounds the model as it is written"},
     {"", "transpose", "-96 to 96 (0)", "semitones between a key and the pitch that it sets"},
@@ -59,6 +59,8 @@ constexpr PresetKey keys[] = {
     {"control", "range", "[low, high] ([0, 1])", "what the softest and the loudest become: positions, forces, a parameter's values, or speeds per sample at 44 100 Hz"},
     {"control", "curve", "`linear` or `exponential` (`linear`)", "exponential: equal steps are equal ratios"},
     {"control", "travel", "above 0", "of a pluck, which needs it: how far from the string the finger rests, on either side"},
+    {"control", "level_db", "[low, high]", "how loud the softest and the loudest are beside `gain`; exact for plucks, bows and blows, whose sound does not depend on how large it is. Without it the level is what `range` makes of it"},
+    {"control", "length_ms", "[longest, shortest] (one sample)", "of an impulse: how long the softest and the hardest blow last; the shorter, the brighter"},
     {"control", "keys", "[low, high] ([0, 127])", "of notes: which keys"},
 };
 // clang-format on
@@ -307,6 +309,14 @@ void read_control(const toml::table& table, Preset& preset, std::vector<Error>& 
   }
   const bool has_range = reader.pair("range", control.low, control.high);
   const bool has_travel = reader.number("travel", control.travel, 0.0, 1e12);
+  control.has_level = reader.pair("level_db", control.low_db, control.high_db, -120.0, 40.0);
+  if (control.has_level && control.gesture == Gesture::parameter) {
+    reader.fail(*table.get("level_db"), "'level_db' is for what plays an input, not a parameter");
+  }
+  if (reader.pair("length_ms", control.longest_ms, control.shortest_ms, 0.0, 1e3) &&
+      control.gesture != Gesture::impulse) {
+    reader.fail(*table.get("length_ms"), "'length_ms' is for an impulse");
+  }
   double lowest = 0.0;
   double highest = 127.0;
   if (reader.range("keys", lowest, highest, 0.0, 127.0)) {
@@ -355,7 +365,7 @@ void read_root(const toml::table& root, Preset& preset, std::vector<Error>& erro
   reader.text("description", preset.description);
   reader.integer("voices", preset.voices, 1, max_voices);
   reader.number("gain", preset.gain, 0.0, 1e9);
-  reader.number("release_s", preset.release_s, 0.0, 60.0);
+  reader.number("damper_s", preset.damper_s, 0.0, 60.0);
   reader.flag("noise", preset.noise);
   reader.integer("transpose", preset.transpose, -96, 96);
   if (std::string budget; reader.text("budget", budget)) {

@@ -35,7 +35,12 @@ struct ControlSetting {
   double low = 0.0;   // what 0 and 1 of the source become: a position, a force, a speed in
   double high = 1.0;  //   units per sample at 44 100 Hz, a parameter's value
   bool exponential = false;
-  double travel = 0.0;  // how far from its middle the input rests, on either side
+  double travel = 0.0;     // how far from its middle the input rests, on either side
+  bool has_level = false;  // 0 and 1 of the source are levels of the voice, too
+  double low_db = 0.0;
+  double high_db = 0.0;
+  double longest_ms = 0.0;  // how long an impulse lasts for 0 and for 1; 0: one sample
+  double shortest_ms = 0.0;
   int lowest_key = 0;
   int highest_key = 127;
   SourceLocation location;
@@ -48,7 +53,7 @@ struct Preset {
   std::string description;              // one line for a person
   int voices = 1;
   double gain = 1.0;                   // output per unit of position
-  double release_s = 0.0;              // 0: a voice rings out
+  double damper_s = 0.0;               // T60 of a voice whose key is up; 0: it rings out
   bool noise = false;                  // the outputs shape white noise
   bool keyboard = true;                // a key sets the pitch
   int transpose = 0;                   // semitones between a key and the pitch that it sets

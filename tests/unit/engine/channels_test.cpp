@@ -29,9 +29,9 @@ std::vector<Event> registered(int channel, int parameter, int coarse, int fine) 
 }
 
 std::vector<double> heard(const std::vector<Event>& events, std::size_t frames = 20000,
-                          double release_s = 0.0) {
+                          double damper_s = 0.0) {
   Preset preset = struck(4);
-  preset.release_s = release_s;
+  preset.damper_s = damper_s;
   Player player(ringing_string(), preset);
   player.run(frames, events);
   CHECK(player.heap_calls == 0);

@@ -193,7 +193,7 @@ TEST_CASE("far more notes than voices are taken in order", "[engine]") {
 
 TEST_CASE("a released key fades in the preset's time, the pedal holds it", "[engine]") {
   Preset preset = struck(2);
-  preset.release_s = 0.1;  // 4410 frames
+  preset.damper_s = 0.1;  // 4410 frames
   const std::string text = ringing_string();
   const auto held = alone(text, preset, 20000, {note_on(0, 60)});
   Player released(text, preset);
@@ -219,7 +219,7 @@ TEST_CASE("panic and all-notes-off end what sounds", "[engine]") {
   CHECK(peak(y.first(2000)) > 0.01);
   CHECK(peak(y.subspan(2000 + 221)) == 0.0);
   Preset preset = struck(4);
-  preset.release_s = 0.01;
+  preset.damper_s = 0.01;
   Player off(ringing_string(), preset);
   off.run(5000, {note_on(0, 60), note_on(0, 64), controller(2000, 123, 0.0)});
   CHECK(peak(std::span<const double>(off.y()).subspan(2000 + 442)) == 0.0);
@@ -371,7 +371,7 @@ TEST_CASE("how the time is cut into blocks makes no difference to a single bit",
     const std::string text = scenes::string("s", 10, "0.1", damping) + "@in1 frcInput @s_m2\n" +
                              scenes::output(1, "s_m6");
     Preset preset = struck(3);
-    preset.release_s = 0.05;
+    preset.damper_s = 0.05;
     preset.controls.push_back({.source = ControlSource::controller,
                                .number = 1,
                                .target = "s_K",
@@ -437,7 +437,7 @@ TEST_CASE("a voice that has come to rest sleeps, and wakes with the next note", 
 
 TEST_CASE("process() never calls the heap", "[engine]") {
   Preset preset = struck(2);
-  preset.release_s = 0.02;
+  preset.damper_s = 0.02;
   preset.noise = true;
   preset.controls.push_back({.source = ControlSource::controller,
                              .number = 1,

@@ -49,7 +49,7 @@ TEST_CASE("a preset is what was written, and the rest its defaults", "[preset]")
       "description = \"three masses\"\n"
       "voices = 12\n"
       "gain = 0.5\n"
-      "release_s = 0.25\n"
+      "damper_s = 0.25\n"
       "noise = true\n"
       "tuning = \"fixed\"\n"
       "transpose = -12\n"
@@ -73,7 +73,7 @@ TEST_CASE("a preset is what was written, and the rest its defaults", "[preset]")
   CHECK(read->description == "three masses");
   CHECK(read->voices == 12);
   CHECK(read->gain == 0.5);
-  CHECK(read->release_s == 0.25);
+  CHECK(read->damper_s == 0.25);
   CHECK(read->noise);
   CHECK_FALSE(read->keyboard);
   CHECK(read->transpose == -12);
@@ -161,7 +161,7 @@ TEST_CASE("every fault of a preset is told with its line and column", "[preset]"
       {m + "gain = -1", 2, 8, "'gain' must lie between 0 and 1e+09"},
       {m + "gain = nan", 2, 8, "'gain' must be a number"},
       {m + "gain = inf", 2, 8, "'gain' must be a number"},
-      {m + "release_s = 61", 2, 13, "'release_s' must lie between 0 and 60"},
+      {m + "damper_s = 61", 2, 13, "'damper_s' must lie between 0 and 60"},
       {m + "noise = 1", 2, 9, "'noise' must be true or false"},
       {m + "tuning = \"odd\"", 2, 10, "'tuning' must be keyboard or fixed"},
       {m + "transpose = 97", 2, 13, "'transpose' must lie between -96 and 96"},
