@@ -347,7 +347,7 @@ Result<Done> command::explain(ConsoleContext& console, Words) {
                           : "none that keys could tune"},
       {"keys", instrument.mode ? "set the pitch" + transposition(instrument.transpose) +
                                      ", up to " + fixed(instrument.highest_frequency_hz, 1) +
-                                     " Hz; higher ones are folded down by octaves"
+                                     " Hz; higher ones are silent"
                                : "all sound as the model is written"},
       {"stability", describe_stability(instrument)},
   };

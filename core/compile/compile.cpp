@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 #include <string>
 
 #include "core/compile/accuracy/pitches.h"
@@ -124,6 +125,29 @@ Promise make_promise(const Request& request, const Reduced& reduced, const Machi
   return promise;
 }
 
+// By how much keys would have every stiffness grow: as exact modes need it, if the published scheme
+// cannot do the highest of them; else what that bears.
+double wanted_factor(const Request& request, const Analysis& analysis) {
+  constexpr int highest_of_a_piano = 108;
+  constexpr double highest_share = 0.45;  // of the rate: what is higher is no tone any more
+  const double borne = analysis.mode ? std::max(1.0, analysis.margins.keys) : 1.0;
+  if (!analysis.mode || request.options.bare || analysis.margins.keys <= 0.0) {
+    return borne;
+  }
+  int highest = 0;
+  for (const ControlSetting& control : request.preset.controls) {
+    if (control.source == ControlSource::note) {
+      highest = std::max(highest, std::min(control.highest_key, highest_of_a_piano));
+    }
+  }
+  const double hz = 440.0 * std::exp2((highest + request.preset.transpose - 69) / 12.0);
+  const double angle =
+      2.0 * std::numbers::pi * std::min(hz / request.options.rate_hz, highest_share);
+  const double stiffness = analysis.mode->stiffness * request.rate_ratio * request.rate_ratio;
+  const double swing = 2.0 * std::sin(0.5 * angle);
+  return swing * swing / stiffness <= borne ? borne : angle * angle / stiffness;
+}
+
 // Unless something is asked for, the bare network is the published scheme to the bit.
 Planned find_forms(const Request& request, Machine machine, const Analysis& analysis,
                    const Promise& promise) {
@@ -138,10 +162,23 @@ Planned find_forms(const Request& request, Machine machine, const Analysis& anal
                     .isa = options.isa,
                     .voices = request.voices,
                     .highest_factor = analysis.mode ? std::max(1.0, analysis.margins.keys) : 1.0,
+                    .wanted_factor = wanted_factor(request, analysis),
                     .is_untuned = options.bare,
                     .executor = options.executor},
                    is_published ? Method::direct : options.method, options.most_modes, budget,
                    options.progress, promise);
+}
+
+// What keys may use of the stiffness, once it is known what plays them: what rings above 0.456 of
+// the rate is no tone any more.
+void reach(Analysis& analysis, double more, double rate_hz) {
+  if (more > 1.0) {
+    const double highest = analysis.pitches.factor_at(0.456 * rate_hz);
+    analysis.margins.keys = std::min(more * analysis.margins.keys, highest);
+    for (double& factor : analysis.margins.away) {
+      factor = std::min(more * factor, highest);
+    }
+  }
 }
 
 // What a person should know of how it is computed, beside how its parts are.
@@ -207,6 +244,7 @@ Result<Compiled> compile_by_stages(const Request& request) {
   if (shapes) {
     analysis.pitches = make_pitches(*shapes, stepping_of_lowest(planned.machine, *mode),
                                     options.rate_hz, rate_ratio);
+    reach(analysis, planned.more, options.rate_hz);
   }
   if (auto error = shortage(planned.machine, voices, options.precision, options.most_bytes)) {
     return *std::move(error);

@@ -45,7 +45,7 @@ struct Instrument {
   int transpose = 0;         // semitones from a key to its pitch
   std::optional<Mode> mode;  // the lowest, by which keys set the pitch; else they do not; its
                              // frequency is that which sounds
-  double highest_frequency_hz = 0.0;  // of a key, before it is folded down; 0: not tuned
+  double highest_frequency_hz = 0.0;  // of a key, beyond which it is silent; 0: not tuned
   double stiffness_margin = 0.0;      // every stiffness may grow by this factor; below 1: unproved
   Verdict verdict = Verdict::stable;  // of what is always felt, in all ranges
 };

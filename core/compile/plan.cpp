@@ -10,6 +10,8 @@
 namespace ressort {
 namespace {
 
+constexpr std::uint32_t most_steps_to_reach = 8;
+
 std::string in_ns(double ns) {
   char text[32];
   std::snprintf(text, sizeof text, ns < 9.95 ? "%.1f ns" : "%.0f ns", ns);
@@ -75,6 +77,30 @@ class Chooser {
     return part;
   }
 
+  // Exact modes, which bear any stiffness, or so many steps a sample that they bear what keys ask
+  // for; nothing where neither is to be had.
+  std::optional<Part> reach(Judge* judge, const Accuracy& spent) {
+    spent_ = spent;
+    judge_ = judge;
+    if (program_.moving <= most_modes_) {
+      consider(Method::modal);
+    }
+    may_gain_ = program_.moving > most_modes_ && program_.moving <= patient_modes;
+    const std::uint32_t times = steps_to_reach();
+    if (times <= most_steps_to_reach && !may_gain_) {
+      Program fine = oversampled_program(program_, times);
+      Chooser chooser(fine, load_at_steps(), 0, {}, progress_);
+      chooser.choose();
+      progress_.spend(program_.ends.size() + program_.position.size());
+      add(Method::oversampled, oversampled_form(std::move(fine), times));
+    }
+    if (candidates_.empty() || candidates_[best_].ns > 0.5e9 / program_.rate_hz) {
+      return std::nullopt;
+    }
+    return take("for its highest keys");
+  }
+  bool may_gain() const { return may_gain_; }
+
   // In single precision with compensated positions there is one form for all.
   Part compensate() {
     add(Method::direct, Compensated{});
@@ -97,6 +123,20 @@ class Chooser {
     double ns;
     Accuracy accuracy;
   };
+
+  std::uint32_t steps_to_reach() const {
+    std::uint32_t times = 1;
+    while (load_.highest_factor * times * times < load_.wanted_factor &&
+           times <= most_steps_to_reach) {
+      times *= 2;
+    }
+    return times;
+  }
+  Workload load_at_steps() const {
+    Workload load = load_;
+    load.highest_factor = load.wanted_factor = 1.0;
+    return load;
+  }
 
   void consider_identical() {
     for (const Method method : methods_for(KernelRow::Use::published)) {
@@ -255,12 +295,51 @@ class Chooser {
   std::size_t best_ = 0;
 };
 
+// All parts in forms that bear what keys ask for; nothing where one has none.
+std::optional<Planned> reach(const Machine& machine, const Workload& load, std::uint32_t most_modes,
+                             const Budget& budget, const Progress& progress, const Promise& promise,
+                             bool& may_gain) {
+  Planned planned{machine, {}, Budget::unlimited};
+  for (Program& program : planned.machine.parts) {
+    if (program.moving == 0) {
+      continue;
+    }
+    Chooser chooser(program, load, most_modes, budget, progress);
+    std::optional<Judge> judge;
+    if (budget.is_physical()) {
+      judge.emplace(program,
+                    corners_of(program, machine.parameters, promise.lowest, promise.highest,
+                               load.wanted_factor),
+                    most_modes, progress);
+    }
+    std::optional<Part> part = chooser.reach(judge ? &*judge : nullptr, promise.merged);
+    may_gain |= chooser.may_gain();
+    if (!part) {
+      return std::nullopt;
+    }
+    if (judge) {
+      part->accuracy = sum_of(judge->of(program.form), promise.merged);
+    }
+    if (const auto* steps = std::get_if<Oversampled>(&program.form)) {
+      planned.more = std::min(planned.more, static_cast<double>(steps->times * steps->times));
+    }
+    planned.parts.push_back(*std::move(part));
+  }
+  return planned;
+}
+
 }  // namespace
 
 Planned make_plan(Machine machine, const Workload& load, std::optional<Method> method,
                   std::uint32_t most_modes, const Budget& budget, const Progress& progress,
                   const Promise& promise) {
   std::vector<Part> parts;
+  bool may_gain = false;
+  if (load.reaches_beyond() && !method && !load.is_compensated) {
+    if (auto planned = reach(machine, load, most_modes, budget, progress, promise, may_gain)) {
+      return *std::move(planned);
+    }
+  }
   for (Program& program : machine.parts) {
     Chooser chooser(program, load, most_modes, budget, progress);
     std::optional<Judge> judge;
@@ -282,6 +361,7 @@ Planned make_plan(Machine machine, const Workload& load, std::optional<Method> m
       part.predicted_ns = predicted_ns(program, load);
       part.reason += ", " + description(program);
     }
+    part.may_gain |= may_gain;
     if (part.masses > 0) {
       parts.push_back(std::move(part));
     }

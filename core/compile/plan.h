@@ -44,6 +44,9 @@ struct Plan {
 struct Planned {
   Machine machine;
   std::vector<Part> parts;
+  // On every stiffness: what the parts bear beside the published scheme's share of
+  // load.highest_factor; infinite for exact modes.
+  double more = 1.0;
 };
 
 // Where a budget of pitch and decay has to hold, beside the start, and what is spent of it already.
@@ -58,8 +61,10 @@ struct Promise {
 // or the one of `method` where a part has it; divided among load.executor where that pays. With a
 // budget for pitch or decay, the cheapest whose poles keep it at all corners (accuracy.h), of the
 // published scheme, exact modes, fourth order and several steps a sample; where none does or
-// nobody knows, the nearest. O(elements), the eigenvectors of a part of up to `most_modes` masses
-// for which the modal form may pay, and what a Judge takes. [any thread but audio]
+// nobody knows, the nearest. Where keys ask for more stiffness than the published scheme bears
+// (load.wanted_factor) all parts get exact modes or several steps a sample, if each can and half a
+// core is enough; else none does. O(elements), the eigenvectors of a part of up to `most_modes`
+// masses for which the modal form may pay, and what a Judge takes. [any thread but audio]
 Planned make_plan(Machine machine, const Workload& load, std::optional<Method> method = {},
                   std::uint32_t most_modes = patient_modes, const Budget& budget = {},
                   const Progress& progress = {}, const Promise& promise = {});

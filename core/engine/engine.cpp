@@ -72,7 +72,10 @@ struct Engine::Player {
     }
     switch (event.kind) {
       case EventKind::note_on:
-        if (voices.press_key(event.index, event.channel, parameters.highest_factor())) {
+        if (!voices.plays(event.index, parameters.highest_factor())) {
+          return;
+        }
+        if (voices.press_key(event.index, event.channel)) {
           gestures.place(voices.last());
         }
         return gestures.perform(Source::note, event.index,

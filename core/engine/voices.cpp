@@ -73,7 +73,7 @@ bool Voices::wake(std::size_t lane) {
   return starts;
 }
 
-bool Voices::press_key(int key, std::uint8_t channel, double highest_factor) {
+bool Voices::press_key(int key, std::uint8_t channel) {
   // As it is written there is one instrument: a key is only a way to excite it.
   const bool is_one = playing_.tuning == Tuning::fixed;
   const bool stays = is_one && !voices_[last_].fading && voices_[last_].is_whole();
@@ -81,7 +81,7 @@ bool Voices::press_key(int key, std::uint8_t channel, double highest_factor) {
   last_ = static_cast<std::size_t>(&voice - voices_.data());
   const bool starts = is_one ? !voice.is_live() : !sounds(voice, key, channel);
   if (starts) {
-    start(last_, is_one ? 0.0 : playable_hz(key, highest_factor));
+    start(last_, is_one ? 0.0 : frequency_of(key));
   }
   voice.key = static_cast<std::uint8_t>(key);
   voice.channel = channel;
@@ -252,7 +252,6 @@ void Voices::advance_gains(std::size_t frames) {
       for (std::size_t n = 0; n < frames; ++n) {
         voice.decay.advance();
       }
-      voice.decay.settle();
     }
     if (voice.lost && !voice.fading) {
       fade(voice, steal_fade_s);
@@ -261,6 +260,7 @@ void Voices::advance_gains(std::size_t frames) {
 }
 
 bool Voices::update(Voice& voice) {
+  voice.decay.settle();
   const double peak = voice.peak * playing_.gain * voice.decay.gain * voice.volume;
   voice.peak = 0.0;
   voice.level = std::max(peak, voice.level * level_kept_);
@@ -396,23 +396,21 @@ double Pitches::frequency_at(double factor) const {
   return low;
 }
 
-double Voices::factor_at(double frequency_hz) const {
-  return playing_.pitches.factor_at(frequency_hz);
+double Voices::frequency_of(int key) const {
+  return 440.0 * std::exp2((key + playing_.transpose - 69) / 12.0);
 }
 
-// The key's frequency, brought by octaves to where the model is stable.
-double Voices::playable_hz(int key, double highest_factor) const {
-  double hz = 440.0 * std::exp2((key + playing_.transpose - 69) / 12.0);
-  while (hz > 1.0 && (hz >= 0.5 * rate_hz_ || factor_at(hz) > highest_factor)) {
-    hz *= 0.5;
-  }
-  return hz;
+bool Voices::plays(int key, double highest_factor) const {
+  const double hz = frequency_of(key);
+  return playing_.tuning == Tuning::fixed ||
+         (hz < 0.5 * rate_hz_ && playing_.pitches.factor_at(hz) <= highest_factor);
 }
 
 double Voices::factor_for(const Voice& voice, double highest_factor) const {
   const double bent = std::exp2(channels_.semitones(voice.channel) / 12.0);
-  const double factor =
-      voice.frequency_hz > 0.0 ? factor_at(voice.frequency_hz * bent) : bent * bent;
+  const double factor = voice.frequency_hz > 0.0
+                            ? playing_.pitches.factor_at(voice.frequency_hz * bent)
+                            : bent * bent;
   return std::min(factor, highest_factor);
 }
 

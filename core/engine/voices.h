@@ -94,8 +94,10 @@ class Voices {
   void start(std::size_t lane, double frequency_hz);
   // Whether the voice slept, and starts.
   bool wake(std::size_t lane);
-  // A key goes down: whether the voice that is the last from now on starts.
-  bool press_key(int key, std::uint8_t channel, double highest_factor);
+  // Whether a key has a pitch that can be played; else it is silent.
+  bool plays(int key, double highest_factor) const;
+  // Such a key goes down: whether the voice that is the last from now on starts.
+  bool press_key(int key, std::uint8_t channel);
   // A key goes up, this fast of 0..1: whether that releases this voice.
   bool lift_key(Voice& voice, int key, std::uint8_t channel, double velocity) const;
   // What a controller says to its channel, or what its bend is; `sustain` and `sostenuto` may let
@@ -148,9 +150,8 @@ class Voices {
   std::size_t too_many(std::size_t more) const;
   bool sounds(const Voice& voice, int key, std::uint8_t channel) const;
   Voice& voice_for(int key, std::uint8_t channel);
-  double playable_hz(int key, double highest_factor) const;
   double factor_for(const Voice& voice, double highest_factor) const;
-  double factor_at(double frequency_hz) const;
+  double frequency_of(int key) const;
 
   const Playing& playing_;
   double rate_hz_;

@@ -17,9 +17,11 @@ struct Workload {
   bool is_compensated = false;  // which only one form is
   Isa isa = Isa::base;
   int voices = 1;
-  double highest_factor = 1.0;   // on every stiffness, that a voice may have
+  double highest_factor = 1.0;   // on every stiffness, that the published scheme bears
+  double wanted_factor = 1.0;    // that keys ask for
   bool is_untuned = false;       // no voice ever has another one than 1
   Executor* executor = nullptr;  // that large parts may be shared out to; null: one core for all
+  bool reaches_beyond() const { return wanted_factor > highest_factor; }
 };
 
 // Links by what they cost: those that only pull, in a line or bent, and those that have to look

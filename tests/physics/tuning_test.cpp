@@ -115,7 +115,7 @@ void check_preset(const std::string& name, double rate_hz, int step) {
   for (int key = 24; key <= 108; key += step) {
     const double hz = hz_of(key, scene->preset.transpose);
     if (hz > compiled->instrument.highest_frequency_hz) {
-      break;  // it comes down by octaves, to a key that was here
+      break;  // it is silent
     }
     const double factor = pitches.factor_at(hz);
     const Matrices springs = matrices_of(machine, machine.parts[0], factor);

@@ -18,6 +18,8 @@ namespace {
 
 constexpr double shared_tolerance = 1e-12;  // of a matrix' largest element: is it diagonal?
 constexpr double zero_tolerance = 1e-13;    // of the largest: is it anything?
+constexpr double highest_ring = 8.2;        // w^2 from which on a mode is left out,
+constexpr double nyquist = 9.8;             // and by which it is
 
 // The published scheme's lK and lZ that are the continuous K and Z, sampled; gives the force's gain
 // (core/kernels/modal/modal_exact.h).
@@ -25,10 +27,13 @@ double make_exact(double& k, double& z) {
   const std::complex<double> pole =
       std::exp(std::complex<double>(-0.5 * z) + std::sqrt(std::complex<double>(0.25 * z * z - k)));
   const double r = std::exp(-0.5 * z);
-  const double stiffness = 1.0 + r * r - (pole + r * r / pole).real();
+  const double ring = 1.0 + r * r - (pole + r * r / pole).real();
+  const double over = (k - 0.25 * z * z - highest_ring) / (nyquist - highest_ring);
+  const double left_out = std::clamp(over, 0.0, 1.0);
+  const double stiffness = ring + left_out * (1.0 - ring);
   const double gain = k > 0.0 ? stiffness / k : 1.0;
   k = stiffness;
-  z = 1.0 - r * r;
+  z = 1.0 - r * r + left_out * r * r;
   return gain;
 }
 
@@ -37,7 +42,7 @@ constexpr double left_out_share = 0.02;   // of the budget
 class ModesFinder {
  public:
   ModesFinder(const Program& program, const LinearBody& body, const Budget& budget,
-              const Progress& progress, bool is_untuned)
+              const Progress& progress, bool is_untuned, bool is_exact)
       : program_(program),
         is_untuned_(is_untuned),
         progress_(progress),
@@ -47,7 +52,7 @@ class ModesFinder {
         damping_(body.damping) {
     modes_.inverse_mass = body.inverse_mass;
     modes_.reach = body.root.max();
-    modes_.is_exact = budget.is_physical();
+    modes_.is_exact = is_exact;
     modes_.silence = std::pow(10.0, budget.silence_db / 20.0);
   }
 
@@ -558,12 +563,15 @@ class ModesFinder {
 }  // namespace
 
 std::optional<Modes> modal_form(const Program& program, const Budget& budget,
-                                const Progress& progress, bool is_untuned) {
+                                const Progress& progress, bool is_untuned, bool is_exact) {
   if (program.moving > most_modes) {
     return std::nullopt;
   }
   const std::optional<LinearBody> body = linear_body(program);
-  return body ? ModesFinder(program, *body, budget, progress, is_untuned).find() : std::nullopt;
+  return body ? ModesFinder(program, *body, budget, progress, is_untuned,
+                            is_exact || budget.is_physical())
+                    .find()
+              : std::nullopt;
 }
 
 }  // namespace ressort

@@ -17,11 +17,13 @@ inline constexpr std::size_t most_modes = 1200;  // beyond, the eigenvectors tak
 // that no key and no bend will. Nothing for what has neither, where parameters turn the masses one
 // by one or move places on macros, for audio parameters, more passive links than can be solved
 // together, and more than most_modes masses. O(n^3): about 20 ms for 300 masses, 0.1 s for 600.
-// With a budget of cents or decays true to the continuous network; with one of silence without the
+// With a budget of cents or decays, or if `is_exact` says so, true to the continuous network, and
+// without what would ring above 0.45 of the rate; with one of silence without the
 // modes that are never heard, the others sorted and told to sleep, unless they are crossed or a
 // force is heard. [any thread but audio]
 std::optional<Modes> modal_form(const Program& program, const Budget& budget = {},
-                                const Progress& progress = {}, bool is_untuned = false);
+                                const Progress& progress = {}, bool is_untuned = false,
+                                bool is_exact = false);
 
 // What it will cost at least, before it is known.
 double least_modal_ns(const Program& program, const Workload& load);

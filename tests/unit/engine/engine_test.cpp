@@ -79,22 +79,26 @@ TEST_CASE("a key sounds at its frequency within two cents, at any rate", "[engin
   }
 }
 
-TEST_CASE("keys above the stable range come down by octaves", "[engine]") {
-  Player tuned(scenes::poly_triangle(), struck(1));
-  const double highest_hz = tuned.compiled.instrument.highest_frequency_hz;
-  // The stiffness may grow 11.876 times (see compile_test), less 2 %; f1 grows by its root.
+TEST_CASE("a key out of reach is silent, and the others never an octave down", "[engine]") {
+  // As published the stiffness may grow 11.876 times (see compile_test), less 2 %; f1 grows by its
+  // root.
+  Player published(scenes::poly_triangle(), struck(1), {.method = Method::direct});
+  const double highest_hz = published.compiled.instrument.highest_frequency_hz;
   CHECK(highest_hz == Approx(858.456 * std::sqrt(0.98 * 11.876)).epsilon(0.02));
-  for (const int key : {97, 100, 103, 108, 115, 120, 127}) {
-    Player player(scenes::poly_triangle(), struck(1));
-    player.run(8192, {note_on(0, key)});
-    double expected_hz = key_hz(key);
-    while (expected_hz > highest_hz) {
-      expected_hz /= 2.0;
+  for (const int key : {96, 97, 98, 100, 108, 127}) {
+    for (const bool is_published : {true, false}) {
+      CompileOptions options;
+      options.method = is_published ? std::optional(Method::direct) : std::nullopt;
+      Player player(scenes::poly_triangle(), struck(1), options);
+      player.run(8192, {note_on(0, key)});
+      INFO("key " << key << (is_published ? ", as published" : ""));
+      CHECK(player.engine().meters().resets == 0);
+      if (is_published && key_hz(key) > highest_hz) {
+        CHECK(peak(player.y()) == 0.0);
+      } else {
+        CHECK(std::fabs(cents(measured_hz(player.y(), 44100.0, key_hz(key)), key_hz(key))) < 2.0);
+      }
     }
-    const double off = cents(measured_hz(player.y(), 44100.0, expected_hz), expected_hz);
-    INFO("key " << key << ": " << show(off) << " cents");
-    CHECK(std::fabs(off) < 2.0);
-    CHECK(player.engine().meters().resets == 0);
   }
 }
 
@@ -191,7 +195,7 @@ TEST_CASE("far more notes than voices are taken in order", "[engine]") {
       std::all_of(player.y().begin(), player.y().end(), [](double y) { return std::isfinite(y); }));
 }
 
-TEST_CASE("a released key fades in the preset's time, the pedal holds it", "[engine]") {
+TEST_CASE("a damper takes 60 dB in its time, the pedal holds it", "[engine]") {
   Preset preset = struck(2);
   preset.damper_s = 0.1;  // 4410 frames
   const std::string text = ringing_string();
@@ -202,11 +206,17 @@ TEST_CASE("a released key fades in the preset's time, the pedal holds it", "[eng
   pedalled.run(20000, {note_on(0, 60), controller(100, 64, 1.0), note_off(5000, 60),
                        controller(10000, 64, 0.0)});
   for (std::size_t n = 0; n < 20000; ++n) {
+    // A thousandth of it after 4410 samples, once it has come on with a time constant of 5 ms,
+    // which costs it that much time: and at -120 dB it ends.
     const auto gain = [&](std::size_t from) {
-      return n < from ? 1.0 : std::max(0.0, 1.0 - static_cast<double>(n - from + 1) / 4410.0);
+      const double since = static_cast<double>(n) - static_cast<double>(from) + 1.0;
+      const double way = 0.005 * 44100.0;
+      return since <= 0.0
+                 ? 1.0
+                 : std::pow(10.0, -3.0 / 4410.0 * (since - way * (1.0 - std::exp(-since / way))));
     };
-    REQUIRE(std::fabs(released.y()[n] - held[n] * gain(5000)) < 1e-12);
-    REQUIRE(std::fabs(pedalled.y()[n] - held[n] * gain(10000)) < 1e-12);
+    REQUIRE(std::fabs(released.y()[n] - held[n] * gain(5000)) < 1e-3 * peak(held));
+    REQUIRE(std::fabs(pedalled.y()[n] - held[n] * gain(10000)) < 1e-3 * peak(held));
   }
   CHECK(peak(held) > 0.1);
   CHECK(released.engine().meters().voices == 0);
@@ -222,7 +232,8 @@ TEST_CASE("panic and all-notes-off end what sounds", "[engine]") {
   preset.damper_s = 0.01;
   Player off(ringing_string(), preset);
   off.run(5000, {note_on(0, 60), note_on(0, 64), controller(2000, 123, 0.0)});
-  CHECK(peak(std::span<const double>(off.y()).subspan(2000 + 442)) == 0.0);
+  // -120 dB of 0.01 s a 60 dB, 5 ms of coming on, and the end of a block.
+  CHECK(peak(std::span<const double>(off.y()).subspan(2000 + 882 + 221 + 64)) == 0.0);
 }
 
 // --- parameters
