@@ -16,7 +16,17 @@
 
 namespace ressort {
 
-enum class Gesture : std::uint8_t { position, force, pluck, bow, impulse, hold, touch, parameter };
+enum class Gesture : std::uint8_t {
+  position,
+  force,
+  pluck,
+  bow,
+  impulse,
+  swing,
+  hold,
+  touch,
+  parameter
+};
 
 // One performance of a gesture: what is asked, and of which input of which voice.
 struct Stroke {
@@ -223,6 +233,23 @@ inline constexpr GestureRow gestures[] = {
      .play =
          [](InputDriver& driver, Stroke& stroke) {
            driver.strike(stroke.struck(stroke.mapped()), stroke.pulse_frames());
+         }},
+    {.gesture = Gesture::swing,
+     .name = "swing",
+     .does = "a mallet: rests `travel` away, swings in as far as `range` says, and back, in "
+             "`length_ms`; `range` below 0: from above",
+     .needs_position = true,
+     .needs_travel = "how far from the string the mallet rests",
+     .start =
+         [](const Stroke& control) {
+           return control.middle - std::copysign(control.travel, control.high);
+         },
+     .play =
+         [](InputDriver& driver, Stroke& stroke) {
+           const double depth = stroke.mapped();
+           const auto frames = std::max<std::size_t>(2, stroke.pulse_frames());
+           const double way = depth + std::copysign(stroke.travel, stroke.high);
+           driver.strike(0.5 * way * static_cast<double>(frames), frames);
          }},
     {.gesture = Gesture::hold,
      .name = "hold",

@@ -18,8 +18,11 @@ inline Event note_on(std::uint32_t frame, int key, double velocity = 1.0) {
           .index = static_cast<std::uint16_t>(key),
           .value = velocity};
 }
-inline Event note_off(std::uint32_t frame, int key) {
-  return {.frame = frame, .kind = EventKind::note_off, .index = static_cast<std::uint16_t>(key)};
+inline Event note_off(std::uint32_t frame, int key, double velocity = usual_release_velocity) {
+  return {.frame = frame,
+          .kind = EventKind::note_off,
+          .index = static_cast<std::uint16_t>(key),
+          .value = velocity};
 }
 inline Event controller(std::uint32_t frame, int number, double value) {
   return {.frame = frame,

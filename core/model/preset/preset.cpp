@@ -60,7 +60,7 @@ constexpr PresetKey keys[] = {
     {"control", "curve", "`linear` or `exponential` (`linear`)", "exponential: equal steps are equal ratios"},
     {"control", "travel", "above 0", "of a pluck, which needs it: how far from the string the finger rests, on either side"},
     {"control", "level_db", "[low, high]", "how loud the softest and the loudest are beside `gain`; exact for plucks, bows and blows, whose sound does not depend on how large it is. Without it the level is what `range` makes of it"},
-    {"control", "length_ms", "[longest, shortest] (one sample)", "of an impulse: how long the softest and the hardest blow last; the shorter, the brighter"},
+    {"control", "length_ms", "[longest, shortest] (one sample)", "of an impulse or a swing: how long the softest and the hardest blow last; the shorter, the brighter"},
     {"control", "keys", "[low, high] ([0, 127])", "of notes: which keys"},
 };
 // clang-format on
@@ -314,8 +314,8 @@ void read_control(const toml::table& table, Preset& preset, std::vector<Error>& 
     reader.fail(*table.get("level_db"), "'level_db' is for what plays an input, not a parameter");
   }
   if (reader.pair("length_ms", control.longest_ms, control.shortest_ms, 0.0, 1e3) &&
-      control.gesture != Gesture::impulse) {
-    reader.fail(*table.get("length_ms"), "'length_ms' is for an impulse");
+      control.gesture != Gesture::impulse && control.gesture != Gesture::swing) {
+    reader.fail(*table.get("length_ms"), "'length_ms' is for an impulse or a swing");
   }
   double lowest = 0.0;
   double highest = 127.0;
@@ -411,20 +411,77 @@ void read_root(const toml::table& root, Preset& preset, std::vector<Error>& erro
   }
 }
 
-bool is_linked(const Network& network, std::uint32_t mass, Family family, double& scale) {
-  const auto parameters = parameter_values(network);
-  for (const Link& link : network.links) {
-    const LawFacts& law = facts_of(link.law);
-    if (law.family == family && (link.a == mass || link.b == mass)) {
-      scale = argument_value(network, link.arguments[law.slot(Role::reach)], parameters);
-      return true;
-    }
-  }
-  return false;
-}
-
 bool never_moves(const Mass& mass) {
   return mass.kind == MassKind::ground || mass.kind == MassKind::position;
+}
+
+// The first link of a family at a mass; null where there is none.
+const Link* find_link(const Network& network, std::uint32_t mass, Family family) {
+  const auto at_mass = [&](const Link& link) {
+    return facts_of(link.law).family == family && (link.a == mass || link.b == mass);
+  };
+  const auto found = std::find_if(network.links.begin(), network.links.end(), at_mass);
+  return found == network.links.end() ? nullptr : &*found;
+}
+
+double reach_of(const Network& network, const Link& link) {
+  return argument_value(network, link.arguments[facts_of(link.law).slot(Role::reach)],
+                        parameter_values(network));
+}
+
+// How a key plays an input: struck, plucked, bowed or hit as its links ask for; nothing where
+// none does. Loudness is the level's, so that every velocity sounds as the law does best; only
+// blows get brighter as they get harder.
+std::optional<ControlSetting> played_by_key(const Network& network, const Input& input) {
+  constexpr double softest_db = -26.0;
+  ControlSetting note{.target = "in" + std::to_string(input.number)};
+  if (input.is_force) {
+    if (never_moves(network.masses[input.mass])) {
+      return std::nullopt;
+    }
+    note.gesture = Gesture::impulse;
+    note.low = 0.005;
+    note.high = 0.1;
+    note.exponential = true;
+    note.longest_ms = 4.0;
+    note.shortest_ms = 0.5;
+    return note;
+  }
+  note.has_level = true;
+  note.low_db = softest_db;
+  if (const Link* const pluck = find_link(network, input.mass, Family::pluck)) {
+    const double scale = reach_of(network, *pluck);
+    note.gesture = Gesture::pluck;
+    note.travel = 5.0 * scale;
+    // The slower the finger, the more it gives to the string before that slips away.
+    note.low = 0.15 * scale;
+    note.high = 0.05 * scale;
+    note.exponential = true;
+  } else if (const Link* const bow = find_link(network, input.mass, Family::bow)) {
+    const double scale = reach_of(network, *bow);
+    note.gesture = Gesture::bow;
+    note.low = 0.5 * scale;
+    note.high = 0.7 * scale;
+  } else if (const Link* const contact = find_link(network, input.mass, Family::contact)) {
+    // The first end is the lower one: the mallet swings from its own side.
+    const double side = contact->a == input.mass ? 1.0 : -1.0;
+    note.gesture = Gesture::swing;
+    note.travel = 0.1 + std::fabs(reach_of(network, *contact));
+    note.low = side * 0.1;
+    note.high = side * 0.5;
+    note.longest_ms = 12.0;
+    note.shortest_ms = 4.0;
+  } else {
+    return std::nullopt;
+  }
+  return note;
+}
+
+// As many as a core should bear of so many masses.
+int usual_voices(const Network& network) {
+  constexpr std::size_t most_masses = 2000;
+  return std::clamp(static_cast<int>(most_masses / std::max<std::size_t>(1, moving_count(network))),
+                    1, 8);
 }
 
 // What a force could strike, as a line refers to it; empty where nothing moves.
@@ -478,49 +535,28 @@ ParsedPreset parse_preset(std::string_view text, IsReserved is_reserved) {
 Preset default_preset(const Network& network, bool bare) {
   Preset preset;
   preset.keyboard = !bare;
+  preset.voices = bare ? 1 : usual_voices(network);
+  preset.damper_s = bare ? 0.0 : 0.3;
   bool first = true;
   for (const Input& input : network.inputs) {
-    ControlSetting note{.target = "in" + std::to_string(input.number)};
-    const double middle = network.masses[input.mass].position;
-    double scale = 0.0;
-    bool played = !input.is_force || !never_moves(network.masses[input.mass]);
-    if (input.is_force) {
-      note.gesture = Gesture::impulse;
-      note.low = 0.01;
-      note.high = 0.1;
-    } else if (is_linked(network, input.mass, Family::pluck, scale)) {
-      note.gesture = Gesture::pluck;
-      note.travel = 5.0 * scale;
-      // The slower the finger, the more it gives to the string before that slips away.
-      note.low = 0.3 * scale;
-      note.high = 0.05 * scale;
-      note.exponential = true;
-    } else if (is_linked(network, input.mass, Family::bow, scale)) {
-      note.gesture = Gesture::bow;
-      note.low = 0.35 * scale;
-      note.high = 0.9 * scale;
-    } else {
-      played = false;
-    }
-    if (played && (first || bare)) {
-      preset.controls.push_back(note);
+    const auto note = played_by_key(network, input);
+    const bool is_played = note && (bare ? note->gesture != Gesture::swing : first);
+    if (is_played) {
+      preset.controls.push_back(*note);
       first = false;
     }
-    if (!input.is_force && !bare) {
-      const double reach = note.travel > 0.0 ? note.travel : 1.0;
-      ControlSetting wheel{.source = ControlSource::controller,
-                           .number = 1,
-                           .target = note.target,
-                           .low = middle - reach,
-                           .high = middle + reach};
-      if (played && note.gesture == Gesture::pluck) {
-        preset.controls.push_back(wheel);
-      }
+    if (note && note->gesture == Gesture::pluck && !bare) {
+      const double middle = network.masses[input.mass].position;
+      preset.controls.push_back({.source = ControlSource::controller,
+                                 .number = 1,
+                                 .target = note->target,
+                                 .low = middle - note->travel,
+                                 .high = middle + note->travel});
     }
-    if (bare || !played) {
+    if (bare || !note || (note->gesture == Gesture::swing && !is_played)) {
       preset.controls.push_back({.source = ControlSource::audio,
                                  .number = input.number,
-                                 .target = note.target,
+                                 .target = "in" + std::to_string(input.number),
                                  .low = 0.0,
                                  .high = 1.0});
     }
@@ -540,8 +576,9 @@ std::optional<Error> idle_keys(const Network& network, const Preset& preset) {
   std::string why;
   for (std::size_t i = 0; i < std::min(most_told, network.inputs.size()); ++i) {
     const Input& input = network.inputs[i];
-    why += (i == 0 ? "" : ", ") + ("'@in" + std::to_string(input.number)) +
-           (input.is_force ? "' pushes what never moves" : "' moves no pluck and no bow");
+    why +=
+        (i == 0 ? "" : ", ") + ("'@in" + std::to_string(input.number)) +
+        (input.is_force ? "' pushes what never moves" : "' moves no pluck, no bow and no contact");
   }
   if (network.inputs.size() > most_told) {
     why += ", nor do " + std::to_string(network.inputs.size() - most_told) + " more";

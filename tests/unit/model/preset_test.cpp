@@ -204,7 +204,7 @@ TEST_CASE("every fault of a preset is told with its line and column", "[preset]"
       {"model = \"/etc/passwd\"", 1, 9, "'model' must be the name of a .mdl file"},
       {control("from = \"note\""), 2, 1, "a control needs 'to'"},
       {control(to + "from = \"note\"\nhow = \"slap\""), 5, 7,
-       "'how' must be position, pluck, bow, impulse, hold, touch or parameter"},
+       "'how' must be position, pluck, bow, impulse, swing, hold, touch or parameter"},
       {control(to + "from = \"note\"\nhow = \"pluck\""), 2, 1, "a pluck needs 'travel'"},
       {control(to + "from = \"note\"\ncurve = \"round\""), 5, 9,
        "'curve' must be linear or exponential"},
@@ -336,7 +336,7 @@ TEST_CASE("a model whose inputs no key can play says so, and which line is missi
       told(triangle) ==
       "1: no key plays this model: it has no input; '@in1 frcInput @m0' would let keys strike it");
   CHECK(told(triangle + "@in1 posInput 0.\n@p spring @in1 @m0 0.1\n") ==
-        "4: no key plays this model: '@in1' moves no pluck and no bow; '@in2 frcInput @m0' would "
+        "4: no key plays this model: '@in1' moves no pluck, no bow and no contact; '@in2 frcInput @m0' would "
         "let keys strike it");
   CHECK(told(triangle + "@in1 frcInput @g\n@k audioParam @in2\n@o osc 1 k 0 0 0\n") ==
         "4: no key plays this model: '@in1' pushes what never moves; '@in3 frcInput @m0' would let "

@@ -1,0 +1,185 @@
+// What a key says beside its pitch: how loud and how bright, and how its damper comes on.
+#include <cmath>
+#include <numbers>
+
+#include "core/engine/mixing/dc_blocker.h"
+#include "tests/support/catch.h"
+#include "tests/support/player.h"
+#include "tests/support/sound.h"
+
+namespace ressort {
+namespace {
+
+using support::controller;
+using support::note_off;
+using support::note_on;
+using support::Player;
+using support::ringing_string;
+using support::struck;
+
+// How many seconds 60 dB take, by what is left of a note from one time to a later one.
+double t60_s(const Player& player, const Player& held, std::size_t from, std::size_t to) {
+  const auto left = [&](std::size_t at) {
+    double released = 0.0;
+    double whole = 0.0;
+    for (std::size_t n = at; n < at + 400; ++n) {
+      released += player.y()[n] * player.y()[n];
+      whole += held.y()[n] * held.y()[n];
+    }
+    return std::sqrt(released / whole);
+  };
+  return 3.0 * static_cast<double>(to - from) / 44100.0 / std::log10(left(from) / left(to));
+}
+
+Preset damped(double seconds, int voices = 1) {
+  Preset preset = struck(voices);
+  preset.damper_s = seconds;
+  return preset;
+}
+
+TEST_CASE("a key that goes up fast damps fast", "[dampers]") {
+  Player held(ringing_string(), damped(0.4));
+  held.run(30000, {note_on(0, 60)});
+  for (const auto& [velocity, factor] :
+       {std::pair(0.0, 4.0), std::pair(0.5, 1.0), std::pair(1.0, 0.25)}) {
+    Player player(ringing_string(), damped(0.4));
+    player.run(30000, {note_on(0, 60), note_off(2000, 60, velocity)});
+    CHECK(t60_s(player, held, 4000, 6000) == Approx(0.4 * factor).epsilon(1e-3));
+  }
+}
+
+TEST_CASE("a half pedal lets dampers lie lightly", "[dampers]") {
+  Player held(ringing_string(), damped(0.2));
+  held.run(30000, {note_on(0, 60)});
+  // Up to a quarter they lie, from three quarters on they are off, between with the square.
+  for (const auto& [pedal, share] : {std::pair(0.0, 1.0), std::pair(0.25, 1.0),
+                                     std::pair(0.5, 0.25), std::pair(0.625, 0.0625)}) {
+    Player player(ringing_string(), damped(0.2));
+    player.run(30000, {note_on(0, 60), controller(500, 64, pedal), note_off(2000, 60)});
+    INFO(pedal);
+    CHECK(t60_s(player, held, 4000, 6000) == Approx(0.2 / share).epsilon(1e-3));
+  }
+  Player off(ringing_string(), damped(0.2));
+  off.run(30000, {note_on(0, 60), controller(500, 64, 0.75), note_off(2000, 60)});
+  CHECK(off.y() == held.y());
+  // And a pedal that goes down late catches what is left, which rings on.
+  Player caught(ringing_string(), damped(0.2));
+  caught.run(30000, {note_on(0, 60), note_off(2000, 60), controller(5000, 64, 1.0)});
+  const double left = caught.y()[20000] / held.y()[20000];
+  CHECK(left < 0.2);
+  CHECK(left > 0.02);
+  CHECK(caught.y()[29000] == Approx(left * held.y()[29000]).epsilon(1e-9));
+}
+
+TEST_CASE("a key that is damped starts anew beside what is left", "[dampers]") {
+  Player first(ringing_string(), damped(0.2, 2));
+  first.run(20000, {note_on(0, 60), note_off(2000, 60)});
+  Player fresh(ringing_string(), damped(0.2, 2));
+  fresh.run(10000, {note_on(0, 60)});
+  Player both(ringing_string(), damped(0.2, 2));
+  both.run(20000, {note_on(0, 60), note_off(2000, 60), note_on(10000, 60)});
+  for (std::size_t n = 0; n < 10000; ++n) {
+    REQUIRE(std::fabs(both.y()[10000 + n] - first.y()[10000 + n] - fresh.y()[n]) < 1e-12);
+  }
+  // Under the pedal nothing was damped: the same string is struck again.
+  Player again(ringing_string(), damped(0.2, 2));
+  again.run(20000,
+            {note_on(0, 60), controller(10, 64, 1.0), note_off(2000, 60), note_on(10000, 60)});
+  CHECK(again.engine().meters().voices == 1);
+}
+
+TEST_CASE("a note that is damped away ends", "[dampers]") {
+  Player player(ringing_string(), damped(0.1, 4));
+  player.run(44100, {note_on(0, 60), note_on(0, 64), note_off(100, 60), note_off(100, 64)});
+  CHECK(player.engine().meters().stepped == 0);
+}
+
+TEST_CASE("level_db makes a note louder and nothing else", "[dampers]") {
+  // 20 dB from the softest to the loudest, in equal steps of dB.
+  const auto with_level = [](double velocity) {
+    Preset preset = struck(1);
+    preset.controls[0].low = 0.1;
+    preset.controls[0].has_level = true;
+    preset.controls[0].low_db = -20.0;
+    Player player(ringing_string(), preset);
+    player.run(5000, {note_on(0, 60, velocity)});
+    return player.y();
+  };
+  const auto loudest = with_level(1.0);
+  const auto middle = with_level(0.5);
+  REQUIRE(support::peak(loudest) > 0.01);
+  for (std::size_t n = 0; n < loudest.size(); ++n) {
+    REQUIRE(std::fabs(middle[n] - loudest[n] * std::pow(10.0, -0.5)) < 1e-12);
+  }
+}
+
+TEST_CASE("a long blow gives as much momentum as a short one", "[dampers]") {
+  // A free mass of 1: after the blow it moves at F / M a sample, which its position shows.
+  const std::string text = "@m mass 1 0 0\n@in1 frcInput @m\n@out1 posOutput @m\n";
+  for (const double length_ms : {0.0, 0.5, 4.0}) {
+    Preset preset = struck(1);
+    preset.keyboard = false;
+    preset.controls[0].longest_ms = preset.controls[0].shortest_ms = length_ms;
+    Player player(text, preset);
+    player.run(1000, {note_on(0, 60)});
+    CHECK(player.y()[999] - player.y()[998] == Approx(0.1).epsilon(1e-9));
+  }
+  // And is duller: what a raised cosine of 4 ms leaves of 2 kHz is below a hundredth.
+  const auto at_2khz = [&](double length_ms) {
+    Preset preset = struck(1);
+    preset.keyboard = false;
+    preset.controls[0].longest_ms = preset.controls[0].shortest_ms = length_ms;
+    const double k = 2.0 - 2.0 * std::cos(2.0 * std::numbers::pi * 2000.0 / 44100.0);
+    Player player("@g ground 0\n@m mass 1 0 0\n@s springDamper @m @g " + std::to_string(k) +
+                      " 0\n@in1 frcInput @m\n@out1 posOutput @m\n",
+                  preset);
+    player.run(2000, {note_on(0, 60)});
+    return support::peak(std::span<const double>(player.y()).subspan(1000));
+  };
+  CHECK(at_2khz(4.0) < 0.01 * at_2khz(0.0));
+  CHECK(at_2khz(0.25) > 0.8 * at_2khz(0.0));
+}
+
+TEST_CASE("a finger rests off the string and is laid on by a lever", "[dampers]") {
+  Preset preset;
+  preset.keyboard = false;
+  preset.controls.push_back({.source = ControlSource::controller,
+                             .number = 16,
+                             .target = "in1",
+                             .gesture = Gesture::touch,
+                             .low = -3.0,
+                             .high = 1.0});
+  Player player(
+      "@m mass 1 0 0\n@in1 posInput 0\n@s springDamper @m @in1 0.1 0\n"
+      "@out1 posOutput @in1\n",
+      preset);
+  player.run(20000, {controller(100, 16, 0.5)});
+  CHECK(player.y()[0] == -3.0);
+  CHECK(player.y()[19999] == Approx(-1.0).epsilon(1e-9));
+}
+
+TEST_CASE("DC is blocked at 5 Hz, and nothing above 60 Hz is touched", "[dampers]") {
+  constexpr double rate_hz = 48000.0;
+  const auto response = [&](double hz) {
+    DcBlocker blocker(rate_hz);
+    std::vector<double> y(static_cast<std::size_t>(4 * rate_hz));
+    for (std::size_t n = 0; n < y.size(); ++n) {
+      y[n] = std::cos(2.0 * std::numbers::pi * hz * static_cast<double>(n) / rate_hz);
+    }
+    double* const channel = y.data();
+    blocker.process({&channel, 1}, y.size());
+    return support::peak(std::span<const double>(y).subspan(y.size() / 2));
+  };
+  CHECK(response(0.0) < 1e-12);
+  CHECK(response(5.0) == Approx(std::numbers::sqrt2 / 2.0).epsilon(1e-3));
+  CHECK(20.0 * std::log10(response(60.0)) > -0.05);
+  // A step is 60 dB down within a second.
+  DcBlocker blocker(rate_hz);
+  std::vector<double> step(48001, 1.0);
+  double* const channel = step.data();
+  blocker.process({&channel, 1}, step.size());
+  CHECK(std::fabs(step.back()) < 1e-3);
+}
+
+}  // namespace
+}  // namespace ressort
