@@ -85,7 +85,7 @@ TEST_CASE("a key out of reach is silent, and the others never an octave down", "
   Player published(scenes::poly_triangle(), struck(1), {.method = Method::direct});
   const double highest_hz = published.compiled.instrument.highest_frequency_hz;
   CHECK(highest_hz == Approx(858.456 * std::sqrt(0.98 * 11.876)).epsilon(0.02));
-  for (const int key : {96, 97, 98, 100, 108, 127}) {
+  for (const int key : {96, 97, 98, 100, 108}) {
     for (const bool is_published : {true, false}) {
       CompileOptions options;
       options.method = is_published ? std::optional(Method::direct) : std::nullopt;
@@ -119,12 +119,16 @@ TEST_CASE("the bend reaches two semitones either way", "[engine]") {
 
 TEST_CASE("voices add up, and the same key strikes its own voice again", "[engine]") {
   const std::string text = ringing_string();
-  const auto one = alone(text, struck(1), 8000, {note_on(0, 60)});
-  const auto other = alone(text, struck(1), 8000, {note_on(0, 67)});
-  Player chord(text, struck(2));
-  chord.run(8000, {note_on(0, 60), note_on(1000, 67)});
-  Player again(text, struck(1));
-  again.run(8000, {note_on(0, 60), note_on(1000, 60)});
+  // As published: exact modes answer a blow in a voice's very first sample by a little more.
+  const auto played = [&](int voices, const std::vector<Event>& events) {
+    Player player(text, struck(voices), {.method = Method::direct});
+    player.run(8000, events);
+    return player;
+  };
+  const std::vector<double> one = played(1, {note_on(0, 60)}).y();
+  const std::vector<double> other = played(1, {note_on(0, 67)}).y();
+  Player chord = played(2, {note_on(0, 60), note_on(1000, 67)});
+  Player again = played(1, {note_on(0, 60), note_on(1000, 60)});
   Comparison chord_error;
   Comparison again_error;
   for (std::size_t n = 0; n < 8000; ++n) {

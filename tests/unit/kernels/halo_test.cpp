@@ -288,8 +288,8 @@ TEST_CASE("a network is shared out where that pays", "[halo]") {
   ThreadPool executor(2);
   const auto planned = [&](const std::string& text, Executor* helpers,
                            std::optional<Method> method) {
-    const auto [machine, parts] = make_plan(make_machine(network_of(text), 44100.0, true),
-                                            {.isa = Isa::v3, .executor = helpers}, method);
+    const auto [machine, parts, more] = make_plan(make_machine(network_of(text), 44100.0, true),
+                                                  {.isa = Isa::v3, .executor = helpers}, method);
     INFO(describe(parts));
     const auto* const shards = std::get_if<Shards>(&machine.parts[0].form);
     if (shards != nullptr) {

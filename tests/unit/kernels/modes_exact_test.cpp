@@ -245,7 +245,7 @@ TEST_CASE("The plan takes exact modes where the published scheme is too far off"
   const auto plan_for = [](const std::string& stiffness, const Budget& budget) {
     const Network network = network_of(scenes::string("s", 50, stiffness, "0.0001") +
                                        "@in1 frcInput @s_m4\n" + scenes::output(1, "s_m9"));
-    const auto [machine, parts] =
+    const auto [machine, parts, more] =
         make_plan(make_machine(network, 44100.0, true), {}, {}, patient_modes, budget);
     const Modes* const modes = std::get_if<Modes>(&machine.parts[0].form);
     INFO(describe(parts));
