@@ -340,8 +340,10 @@ Planned make_plan(Machine machine, const Workload& load, std::optional<Method> m
       return *std::move(planned);
     }
   }
+  Workload published = load;
+  published.wanted_factor = load.highest_factor;
   for (Program& program : machine.parts) {
-    Chooser chooser(program, load, most_modes, budget, progress);
+    Chooser chooser(program, published, most_modes, budget, progress);
     std::optional<Judge> judge;
     if (budget.is_physical() && program.moving > 0) {
       judge.emplace(program,

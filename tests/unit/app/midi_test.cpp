@@ -40,7 +40,8 @@ TEST_CASE("every channel message becomes its event", "[midi]") {
   check_event(events[3], EventKind::controller, 15, 1, 1.0);
   check_event(events[4], EventKind::pressure, 2, 0, 1.0);
   check_event(events[5], EventKind::bend, 1, 0, 0.0);
-  check_event(events[6], EventKind::note_off, 0, 63, 0.0);  // a note on of no velocity
+  check_event(events[6], EventKind::note_off, 0, 63,
+              usual_release_velocity);  // a note on of no velocity
 }
 
 TEST_CASE("the bend reaches both ends exactly", "[midi]") {
@@ -56,7 +57,7 @@ TEST_CASE("running status holds within a packet and from packet to packet", "[mi
   auto events = read(reader, {0x90, 60, 100, 61, 100, 62, 0});
   REQUIRE(events.size() == 3);
   check_event(events[1], EventKind::note_on, 0, 61, 100 / 127.0);
-  check_event(events[2], EventKind::note_off, 0, 62, 0.0);
+  check_event(events[2], EventKind::note_off, 0, 62, usual_release_velocity);
   events = read(reader, {63, 100});
   REQUIRE(events.size() == 1);
   check_event(events[0], EventKind::note_on, 0, 63, 100 / 127.0);

@@ -231,7 +231,7 @@ TEST_CASE("an engine plays compensated, hands and all", "[float]") {
                                       .gesture = Gesture::position,
                                       .index = 2,
                                       .value = 0.3}};
-  support::Player exact(text, preset);
+  support::Player exact(text, preset, {.method = Method::direct});
   support::Player found(text, preset, {.precision = Precision::compensated32});
   exact.run(44100, events, {256, 37});
   found.run(44100, events, {256, 37});

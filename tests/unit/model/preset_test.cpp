@@ -336,7 +336,8 @@ TEST_CASE("a model whose inputs no key can play says so, and which line is missi
       told(triangle) ==
       "1: no key plays this model: it has no input; '@in1 frcInput @m0' would let keys strike it");
   CHECK(told(triangle + "@in1 posInput 0.\n@p spring @in1 @m0 0.1\n") ==
-        "4: no key plays this model: '@in1' moves no pluck, no bow and no contact; '@in2 frcInput @m0' would "
+        "4: no key plays this model: '@in1' moves no pluck, no bow and no contact; '@in2 frcInput "
+        "@m0' would "
         "let keys strike it");
   CHECK(told(triangle + "@in1 frcInput @g\n@k audioParam @in2\n@o osc 1 k 0 0 0\n") ==
         "4: no key plays this model: '@in1' pushes what never moves; '@in3 frcInput @m0' would let "
