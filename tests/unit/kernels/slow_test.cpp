@@ -185,7 +185,7 @@ TEST_CASE("only a budget makes a part slow", "[slow]") {
   CHECK(count(methods_for({.cents = 1.0})) == 1);
 
   Preset preset = support::struck(2);
-  preset.transpose = -12;  // where both can play the keys
+  preset.transpose = -72;  // where both can play the keys
   support::Player plain(text, preset, {.method = Method::direct});
   support::Player slow(text, preset, {.method = Method::slow});
   Comparison lfo_output;
