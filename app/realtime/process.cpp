@@ -30,7 +30,7 @@ bool is_panic(const Event& event) {
 
 bool ends_sound(const Event& event) {
   return is_panic(event) || event.kind == EventKind::note_off || is_controller(event, 64) ||
-         is_controller(event, 123);
+         is_controller(event, 66) || is_controller(event, 121) || is_controller(event, 123);
 }
 
 }  // namespace
@@ -241,6 +241,7 @@ void Process::collect_due(std::size_t frames) {
       event.frame = ++moments <= most_moments ? event.frame : due_.back().frame;
     }
     due_.push_back(event);
+    follow_program(event);
   };
   const auto is_due = [&](const Pending& next) { return next.frame < end; };
   while (true) {
@@ -263,6 +264,22 @@ void Process::collect_due(std::size_t frames) {
   }
 }
 
+// Banks are counted here, as models come and go; who loads is told which program is wanted.
+void Process::follow_program(const Event& event) {
+  constexpr int bank_coarse = 0;
+  constexpr int bank_fine = 32;
+  int& bank = banks_[event.channel % banks_.size()];
+  const auto bits = static_cast<int>(std::lround(127.0 * std::clamp(event.value, 0.0, 1.0)));
+  if (is_controller(event, bank_coarse)) {
+    bank = bits << 7 | (bank & 0x7f);
+  } else if (is_controller(event, bank_fine)) {
+    bank = (bank & 0x3f80) | bits;
+  } else if (event.kind == EventKind::program && current_ != nullptr &&
+             current_->engine->listens_to(event.channel)) {
+    reports.push({Report::Kind::program, current_->serial, 0, 128.0 * bank + event.index});
+  }
+}
+
 // A new model is taken at the edge of a chunk, once the last fade is over and its engine is on its
 // way out.
 void Process::swap_models() {
@@ -274,6 +291,9 @@ void Process::swap_models() {
   }
   if (Sounding* const next = slot.take()) {
     fading_ = current_;
+    if (fading_ != nullptr && next->serial != fading_->serial) {
+      next->engine->adopt_channels(*fading_->engine);
+    }
     fade_left_ = fading_ == nullptr || goes_on(*next) ? 0 : fade_frames_;
     if (fade_left_ > 0) {
       ended_ = meters_;

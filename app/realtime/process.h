@@ -42,11 +42,11 @@ struct MidiPacket {
 
 // What the audio thread has to tell.
 struct Report {
-  enum class Kind : std::uint8_t { parameter, reset, overload };
+  enum class Kind : std::uint8_t { parameter, reset, overload, program };
   Kind kind = Kind::reset;
   std::uint32_t model = 0;  // serial
   std::uint16_t index = 0;  // parameter; the most voices there is time for, or 0
-  double value = 0.0;       // of the parameter; the load
+  double value = 0.0;       // of the parameter; the load; 128 * bank + program
 };
 
 // A piece of the output on its way to a recording.
@@ -156,6 +156,7 @@ struct Process {
   void play(Sounding& sounding, std::size_t input_count, std::vector<double>& samples,
             std::size_t frames);
   void swap_models();
+  void follow_program(const Event& event);
   bool goes_on(const Sounding& next) const;
   void tell();
   void weigh(double took_s, std::size_t frames);
@@ -173,6 +174,7 @@ struct Process {
   std::size_t fade_left_ = 0;
   std::size_t fade_frames_ = 0;
   Meters meters_;
+  std::array<int, 16> banks_{};          // [MIDI channel] as 14 bits
   EngineMeters ended_;                   // what engines before the current one counted
   std::int64_t next_overload_news_ = 0;  // frame
   Limiter limiter_;

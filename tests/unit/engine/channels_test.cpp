@@ -1,5 +1,5 @@
 // What controllers mean on every channel, whatever the preset: by MIDI 1.0 and General MIDI 2.
-#include "core/engine/channels.h"
+#include "core/engine/midi/channels.h"
 
 #include "tests/support/pitch.h"
 #include "tests/support/player.h"
