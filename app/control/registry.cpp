@@ -218,6 +218,14 @@ std::vector<Row> make_rows() {
       {.address = "/describe",
        .does = "answers a row for everything that can be set or asked",
        .answer = answer::describe},
+      {.command = "tuning",
+       .group = CommandGroup::playing,
+       .words = "TUNING|off [TUNING]",
+       .command_does = "tunes all keys by Scala files, or as the preset has them",
+       .details =
+           "TUNING is a scale, NAME.scl, or a keyboard map, NAME.kbm, or both. What sounds is "
+           "tuned at once;\nmodels that are loaded later keep it.",
+       .act = command::tuning},
       {.command = "rec",
        .words = "FILE|stop [--force]",
        .command_does = "records what is heard to a file, or ends that",

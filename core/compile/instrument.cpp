@@ -134,6 +134,7 @@ Instrument make_instrument(const Network& network, const Preset& preset, const A
           .masses = moving_count(network),
           .links = network.links.size(),
           .transpose = preset.transpose,
+          .a4_hz = preset.a4_hz,
           .channel = static_cast<std::uint8_t>(std::countr_zero(preset.channels)),
           .mode = mode,
           .highest_frequency_hz = mode ? analysis.pitches.frequency_at(most) : 0.0,

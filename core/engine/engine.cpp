@@ -117,6 +117,9 @@ struct Engine::Player {
 
   void press_key(const Event& event) {
     const std::uint8_t channel = event.channel % Channels::count;
+    if (event.index >= key_count) {
+      return;
+    }
     const double velocity = playing.velocity(event.value) * voices.softness(channel);
     const Press press =
         voices.press_key(event.index, velocity, channel, parameters.highest_factor());
@@ -175,10 +178,10 @@ struct Engine::Player {
       let_go();
     } else if (change == Channels::Change::zones) {
       lift_all(voices.rezoned());
-      let_go();
       for (std::uint8_t other = 0; other < Channels::count; ++other) {
         if (has_channel(voices.rezoned(), other)) {
           voices.reset_controllers(other);
+          release([&](Voice& voice) { return voices.is_let_go(voice, other); });
         }
       }
     }

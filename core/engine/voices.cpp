@@ -191,9 +191,16 @@ void Voices::forget_keys(ChannelMask channels) {
   }
 }
 
+// Those without a key too. What a member of an MPE zone says is for its own note only; where keys
+// set no pitch there is one instrument, and everybody plays it.
+bool Voices::is_for_all(const Scope& scope) const {
+  return playing_.tuning == Tuning::fixed ||
+         (scope.key == Scope::every_key && (scope.channels & ~channels_.members()) != 0);
+}
+
 bool Voices::hears(const Voice& voice, const Scope& scope) const {
   if (!voice.awake || !voice.has_key || playing_.tuning == Tuning::fixed) {
-    return voice.awake && scope.key == Scope::every_key;
+    return voice.awake && is_for_all(scope);
   }
   const bool was_let_go = channels_.is_member(voice.channel) && !voice.held && !voice.sustained;
   const std::uint8_t by = was_let_go ? channels_.master_of(voice.channel) : voice.channel;
@@ -201,7 +208,7 @@ bool Voices::hears(const Voice& voice, const Scope& scope) const {
 }
 
 std::optional<std::size_t> Voices::last_of(const Scope& scope) const {
-  if (hears(voices_[last_], scope) || (!voices_[last_].awake && scope.key == Scope::every_key)) {
+  if (hears(voices_[last_], scope) || (!voices_[last_].awake && is_for_all(scope))) {
     return last_;
   }
   std::optional<std::size_t> last;

@@ -159,6 +159,7 @@ class Voices {
   void retune(std::uint8_t channel);
   void follow_level(std::uint8_t channel);
   SideGains level_of(std::uint8_t channel) const;
+  bool is_for_all(const Scope& scope) const;
   static bool is_on(const Voice& voice, ChannelMask channels) {
     return has_channel(channels, voice.channel);
   }

@@ -185,6 +185,14 @@ ChannelMask Channels::reach(std::uint8_t index) const {
   return static_cast<ChannelMask>(mask);
 }
 
+ChannelMask Channels::members() const {
+  unsigned mask = 0;
+  for (std::uint8_t channel = 0; channel < count; ++channel) {
+    mask |= is_member(channel) ? channel_bit(channel) : 0U;
+  }
+  return static_cast<ChannelMask>(mask);
+}
+
 void Channels::reset(std::uint8_t index) {
   Channel& channel = of(index);
   channel.bend = 0.0;

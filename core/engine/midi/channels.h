@@ -47,6 +47,7 @@ class Channels {
   bool is_member(std::uint8_t channel) const { return master_of(channel) != channel; }
   // Those whose zone the last Change::zones has made or ended: nothing is known of them any more.
   ChannelMask rezoned() const { return rezoned_; }
+  ChannelMask members() const;  // of both zones
   // The channel itself where it is no member.
   std::uint8_t master_of(std::uint8_t channel) const;
 
