@@ -114,7 +114,7 @@ TEST_CASE("a million messages leave no note that is stuck", "[midi_storm]") {
       for (std::uint16_t key = 0; key < 128; ++key) {
         end.push_back({.kind = EventKind::note_off, .channel = channel, .index = key, .value = .5});
       }
-      for (const std::uint16_t pedal : {64, 66, 67}) {
+      for (const std::uint16_t pedal : std::initializer_list<std::uint16_t>{64, 66, 67}) {
         end.push_back({.kind = EventKind::controller, .channel = channel, .index = pedal});
       }
       end.push_back({.kind = EventKind::controller, .channel = channel, .index = 123});

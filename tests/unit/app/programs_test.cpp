@@ -1,0 +1,137 @@
+// Program changes: from the bytes of a keyboard to the preset that sounds.
+#include <chrono>
+#include <mutex>
+#include <thread>
+
+#include "app/session/files.h"
+#include "app/session/session.h"
+#include "tests/support/data_folder.h"
+#include "tests/support/process_harness.h"
+
+namespace ressort {
+namespace {
+
+using namespace support;
+using namespace std::chrono_literals;
+
+const std::string model =
+    "@s ground 0.\n@m mass 1. 0. 0.\n@r0 springDamper @s @m 0.01 0.0001\n"
+    "@in1 frcInput @m\n@out1 posOutput @m\n";
+
+std::string preset(const std::string& name) {
+  return "model = \"m.mdl\"\ndescription = \"" + name +
+         "\"\n[[control]]\nfrom = \"note\"\nto = \"in1\"\nhow = \"impulse\"\nrange = [0.0, 0.1]\n";
+}
+
+std::vector<Report> reports_of(const std::vector<std::vector<std::uint8_t>>& packets,
+                               unsigned channels = 0xffff) {
+  Preset played = struck(1);
+  played.channels = channels;
+  support::Harness harness;
+  harness.process.slot.offer(sounding(ringing_string(), played, 1));
+  harness.run(256);
+  for (const auto& bytes : packets) {
+    harness.run(256, 256, {{.frame = 3, .bytes = bytes}});
+  }
+  CHECK(harness.heap_calls == 0);
+  std::vector<Report> found;
+  Report report;
+  while (harness.process.reports.pop(report)) {
+    found.push_back(report);
+  }
+  return found;
+}
+
+}  // namespace
+
+TEST_CASE("a program is counted from its channel's bank on", "[programs]") {
+  const auto found = reports_of({{0xc0, 5},
+                                 {0xb1, 0, 1},
+                                 {0xb1, 32, 2},
+                                 {0xc1, 3},
+                                 {0xc0, 127},
+                                 {0xb1, 0, 0, 32, 0},
+                                 {0xc1, 0}});
+  REQUIRE(found.size() == 4);
+  CHECK(found[0].value == 5.0);
+  CHECK(found[1].value == 128.0 * 130.0 + 3.0);
+  CHECK(found[2].value == 127.0);
+  CHECK(found[3].value == 0.0);
+  for (const Report& report : found) {
+    CHECK(report.kind == Report::Kind::program);
+  }
+  CHECK(reports_of({{0xc4, 5}}, 0x000f).empty());  // a channel that nobody listens to
+}
+
+TEST_CASE("what channels have been told holds for the next model", "[programs]") {
+  const auto loudness = [](const std::vector<std::uint8_t>& bytes) {
+    support::Harness harness;
+    harness.process.slot.offer(sounding(ringing_string(), struck(2), 1));
+    harness.run(256);
+    harness.run(256, 256, {{.frame = 0, .bytes = bytes}});
+    harness.process.slot.offer(sounding(ringing_string(), struck(2), 2));
+    harness.run(256 * 20);
+    harness.out[0].clear();
+    harness.run(2560, 256, {{.frame = 0, .bytes = std::vector<std::uint8_t>{0x90, 60, 127}}});
+    CHECK(harness.heap_calls == 0);
+    return peak(harness.y());
+  };
+  const double full = loudness({});
+  CHECK(full > 1e-3);
+  CHECK(loudness({0xb0, 7, 50}) == Approx(0.25 * full));
+  CHECK(loudness({0xb1, 7, 50}) == Approx(full));
+}
+
+TEST_CASE("a program change loads the preset of its place, and unknown ones are told once",
+          "[programs]") {
+  DataFolder data;
+  data.write("models/m.mdl", model);
+  for (const char* const name : {"Alpha", "Beta", "Gamma"}) {
+    data.write("presets/" + std::string(name) + ".toml", preset(name));
+  }
+  REQUIRE(known_presets() == std::vector<std::string>{"Alpha", "Beta", "Gamma"});
+  std::mutex mutex;
+  std::vector<std::string> told;
+  Process process(48000.0);
+  Session session(process, {.compile = {.rate_hz = 48000.0}}, [&](const std::string& text) {
+    const std::lock_guard lock(mutex);
+    told.push_back(text);
+  });
+  REQUIRE(session.load_and_wait("Alpha"));
+  std::vector<float> left(64);
+  std::vector<float*> outputs = {left.data()};
+  const auto play = [&](const std::vector<std::uint8_t>& bytes) {
+    const MidiPacket packet{0, bytes};
+    process.block(std::span<const float* const>(), std::span<float* const>(outputs), 64,
+                  {&packet, 1}, 0);
+  };
+  const auto wait_for = [&](auto&& is_so) {
+    for (int i = 0; i < 2000 && !is_so(); ++i) {
+      play({});
+      std::this_thread::sleep_for(5ms);
+    }
+    return is_so();
+  };
+  const auto count = [&] {
+    const std::lock_guard lock(mutex);
+    return told.size();
+  };
+  play({0x90, 60, 100});
+  play({0xc0, 2});
+  CHECK(wait_for([&] { return session.current()->name == "Gamma"; }));
+  play({0xc9, 1});
+  CHECK(wait_for([&] { return session.current()->name == "Beta"; }));
+  CHECK(wait_for([&] { return count() == 2; }));
+  play({0xc0, 3});
+  CHECK(wait_for([&] { return count() == 3; }));
+  play({0xc0, 3});
+  play({0xb0, 0, 1, 0xc0, 0});
+  CHECK(wait_for([&] { return count() == 4; }));
+  const std::lock_guard lock(mutex);
+  CHECK(told[0] == "program 3: Gamma");
+  CHECK(told[2] == "there is no program 4 in bank 0; there are 3 presets");
+  CHECK(told[3] == "there is no program 1 in bank 128; there are 3 presets");
+  CHECK(session.current()->name == "Beta");
+}
+
+}  // namespace ressort
