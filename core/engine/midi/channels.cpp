@@ -229,9 +229,11 @@ SideGains Channels::balance(std::uint8_t channel) const {
   if (place == 0.0) {
     return {1.0, 1.0};
   }
-  const double angle = 0.25 * std::numbers::pi * (1.0 + place);
-  return {std::numbers::sqrt2 * std::max(0.0, std::cos(angle)),
-          std::numbers::sqrt2 * std::sin(angle)};
+  // The cosine of one angle is the sine of the other, and exactly 0 at its end.
+  const auto gain = [](double share) {
+    return std::numbers::sqrt2 * std::sin(0.25 * std::numbers::pi * share);
+  };
+  return {gain(1.0 - place), gain(1.0 + place)};
 }
 
 double Channels::softness(std::uint8_t channel) const {
