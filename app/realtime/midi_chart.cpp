@@ -13,7 +13,7 @@ constexpr MidiChartRow rows[] = {
     {"channel pressure", "0 to 127", true, "the same, in all voices of the channel"},
     {"pitch bend", "14 bits", true, "its channel's voices, as far as RPN 0 says: 2 semitones, 48 on members of an MPE zone"},
     {"bank select", "CC 0, 32", true, "128 programs more for each; 0 at first"},
-    {"program change", "0 to 127", true, "loads the preset of that place in the list that `models` prints; it fades in, and what rings goes on until it has"},
+    {"program change", "0 to 127", true, "loads the preset of that place in the list that `models` prints; what rings goes on until it is quiet, or the next is loaded"},
     {"portamento time", "CC 5", true, "instead of the preset's `glide_s`: 4 s times the square of the share of 127"},
     {"data entry", "CC 6, 38", true, "of the registered parameter"},
     {"volume", "CC 7", true, "40 dB a decade, 100 at first; in 20 ms, without a step"},

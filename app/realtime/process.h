@@ -20,6 +20,7 @@ namespace ressort {
 struct Sounding {
   std::unique_ptr<Engine> engine;
   std::uint32_t serial = 0;
+  bool lets_ring = false;  // what sounded before it ends by itself, without new notes
 };
 
 // An event on its way to the audio thread, and when it is to act.
@@ -83,6 +84,7 @@ struct Process {
   static constexpr std::size_t max_endings = 1024;  // ...and so many more that end sound
   static constexpr std::size_t max_ahead = 4096;    // events that wait for their frame
   static constexpr double fade_s = 0.05;            // between two models
+  static constexpr double longest_ring_s = 60.0;    // of what the next model lets ring
 
   // A monotonic clock, in ns, that makes no system call.
   using Clock = std::int64_t (*)();
@@ -156,6 +158,7 @@ struct Process {
   void play(Sounding& sounding, std::size_t input_count, std::vector<double>& samples,
             std::size_t frames);
   void swap_models();
+  bool rings_on() const;
   void follow_program(const Event& event);
   bool goes_on(const Sounding& next) const;
   void tell();
@@ -171,7 +174,11 @@ struct Process {
   MidiReader midi_;
   Sounding* current_ = nullptr;
   Sounding* fading_ = nullptr;
+  Sounding* waiting_ = nullptr;  // until what rings has faded
   std::size_t fade_left_ = 0;
+  bool rings_ = false;            // the fading one does not fade yet
+  std::int64_t rings_until_ = 0;  // frame
+  bool is_alone_ = false;         // the current one came in at its full level
   std::size_t fade_frames_ = 0;
   Meters meters_;
   std::array<int, 16> banks_{};          // [MIDI channel] as 14 bits

@@ -238,9 +238,9 @@ void Session::improve() {
   time_parts();
 }
 
-void Session::offer(std::unique_ptr<Engine> engine) {
+void Session::offer(std::unique_ptr<Engine> engine, bool lets_ring) {
   offered_ = engine.get();
-  delete process_.slot.offer(new Sounding{std::move(engine), serial_});
+  delete process_.slot.offer(new Sounding{std::move(engine), serial_, lets_ring});
 }
 
 // Only the worker destroys engines, and not before another one has been offered.
@@ -303,7 +303,9 @@ void Session::change_program(int number) {
         tell_(result.error().message);
       }
     };
-    load(presets[index], answer, false, Reach::own_folders);
+    const std::lock_guard lock(mutex_);
+    jobs_.push_back(
+        {{.name = presets[index], .reach = Reach::own_folders, .lets_ring = true}, answer});
   } else if (unknown_programs_.insert(number).second && tell_) {
     tell_("there is no program " + std::to_string(number % 128 + 1) + " in bank " +
           std::to_string(number / 128) + "; there are " +
@@ -326,6 +328,7 @@ void Session::do_load(const Job& job) {
   const auto result = build(job.wish);
   if (result) {
     scene_ = job.wish;
+    scene_->lets_ring = false;  // not when it is compiled anew
   }
   if (job.answer) {
     job.answer(result);
@@ -442,7 +445,7 @@ Result<std::shared_ptr<const Loaded>> Session::build_now(const Wish& wish,
     values_ = std::move(values);
     built_rate_hz_ = options.rate_hz;
   }
-  offer(std::move(compiled->engine));
+  offer(std::move(compiled->engine), wish.lets_ring);
   source_.reset();
   if (may_gain(loaded->plan)) {
     options.find_gain = false;

@@ -102,6 +102,7 @@ class Session {
     std::string name;
     bool force = false;
     Reach reach = Reach::any_file;
+    bool lets_ring = false;  // what sounds until it ends by itself
   };
 
   struct Job {
@@ -126,7 +127,7 @@ class Session {
   bool is_outdated(bool is_load) const;
   bool has_new_rate() const;  // under the lock
   // Hands the engine over; its parts are timed when nobody waits any more.
-  void offer(std::unique_ptr<Engine> engine);
+  void offer(std::unique_ptr<Engine> engine, bool lets_ring = false);
   void time_parts();
   void listen();
   void change_program(int number);

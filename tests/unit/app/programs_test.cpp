@@ -97,6 +97,52 @@ TEST_CASE("what channels have been told holds for the next model", "[programs]")
   CHECK(loudness({0xb1, 7, 50}) == Approx(full));
 }
 
+TEST_CASE("what rings goes on as if nothing had been loaded, until the next but one",
+          "[programs]") {
+  const std::vector<std::uint8_t> strike = {0x90, 60, 127};
+  const auto played = [&](std::vector<std::size_t> swaps, bool lets_ring) {
+    support::Harness harness;
+    harness.process.slot.offer(sounding(ringing_string(), struck(2), 1));
+    play(harness, 256, strike);
+    std::uint32_t serial = 1;
+    for (const std::size_t at : swaps) {
+      play(harness, at - harness.y().size());
+      Sounding* const next = sounding(ringing_string(), struck(2), ++serial);
+      next->lets_ring = lets_ring;
+      delete harness.process.slot.offer(next);
+    }
+    CHECK(play(harness, 25600 - harness.y().size()) == 0);
+    CHECK(harness.process.meters().swaps == 1 + swaps.size());
+    return harness.y();
+  };
+  const std::vector<double> alone = played({}, false);
+  CHECK(peak(std::span(alone).subspan(20000)) > 1e-3);
+  CHECK(played({2560}, true) == alone);
+  // A load fades it in 50 ms; so does a second change, from its own frame on.
+  const auto faded = played({2560}, false);
+  CHECK(peak(std::span(faded).subspan(2560 + fade_frames)) == 0.0);
+  const auto twice = played({2560, 12800}, true);
+  CHECK(std::equal(twice.begin(), twice.begin() + 12800, alone.begin()));
+  for (std::size_t n = 0; n < fade_frames; ++n) {
+    const double way = static_cast<double>(n) / static_cast<double>(fade_frames);
+    REQUIRE(twice[12800 + n] == Approx((1.0 - way) * alone[12800 + n]).margin(1e-12));
+  }
+  CHECK(peak(std::span(twice).subspan(12800 + fade_frames)) == 0.0);
+}
+
+TEST_CASE("a note that is held ends by its key in the model that it began in", "[programs]") {
+  support::Harness harness;
+  harness.process.slot.offer(sounding(hand_text, holding(), 1));
+  play(harness, 2560, {0x90, 60, 127});
+  Sounding* const next = sounding(hand_text, holding(), 2);
+  next->lets_ring = true;
+  harness.process.slot.offer(next);
+  play(harness, 25600);
+  CHECK(harness.y().back() == Approx(1.0));
+  play(harness, 25600, {0x80, 60, 0});
+  CHECK(harness.y().back() == Approx(0.0).margin(1e-6));
+}
+
 TEST_CASE("a program change loads the preset of its place, and unknown ones are told once",
           "[programs]") {
   DataFolder data;
