@@ -195,6 +195,18 @@ void add_numbers(CLI::App& command, Precision& precision, bool& rescale) {
       "take the model's numbers raw at rates other than 44100 Hz");
 }
 
+// What is said of keys, instead of what the preset says.
+void add_keys(CLI::App& command, KeyOptions& keys) {
+  command.add_option("--tuning", keys.scale, "a Scala file, NAME.scl: the steps between keys");
+  command.add_option("--keyboard-map", keys.keyboard_map,
+                     "a Scala keyboard map, NAME.kbm: which key plays which step, at what pitch");
+  command
+      .add_option_function<double>(
+          "--a4", [&keys](const double& hz) { keys.a4_hz = hz; },
+          "the pitch of the A above the middle C, to which all is tuned (440)")
+      ->check(within(220.0, 880.0));
+}
+
 void add_force(CLI::App& command, bool& force) {
   command.add_flag("--force", force,
                    "play a model that is not stable all the same; what runs away fades out");
@@ -247,6 +259,20 @@ void add_play(CLI::App& app, PlayOptions& options, int& code) {
       ->check(within(-120.0, 60.0));
   command->add_option("-p,--voices", options.voices, "how many notes sound at once")
       ->check(within(1, max_voices));
+  add_keys(*command, options.keys);
+  command
+      ->add_option_function<std::vector<int>>(
+          "--channel",
+          [&options](const std::vector<int>& channels) {
+            unsigned mask = 0;
+            for (const int channel : channels) {
+              mask |= 1U << (channel - 1);
+            }
+            options.keys.channels = mask;
+          },
+          "the MIDI channels to listen to, divided by commas, whatever the preset says")
+      ->delimiter(',')
+      ->check(within(1, 16));
   command->add_option("-r,--rate", options.device.rate_hz, "Hz; JACK has its own")
       ->check(within(8000.0, 384000.0))
       ->capture_default_str();
@@ -331,6 +357,7 @@ void add_render(CLI::App& app, RenderChoice& choice, int& code) {
   add_force(*command, options.force);
   command->add_option("-p,--voices", options.voices, "how many notes sound at once")
       ->check(within(1, max_voices));
+  add_keys(*command, options.keys);
   command->add_option("--threads", options.threads, "for large networks; without it, all cores")
       ->check(within(1, 1024));
   command->add_flag("--limit", options.limit, "keep below full scale, 1 ms late");

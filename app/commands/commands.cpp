@@ -124,7 +124,8 @@ class Player {
       news.at(stage);
       return !is_called_off(0ms);
     });
-    const auto scene = load_scene(options_.name, {.third = options_.third, .progress = progress});
+    const auto scene = load_scene(
+        options_.name, {.third = options_.third, .keys = options_.keys, .progress = progress});
     if (is_called_off(0ms)) {
       return exit_code::done;
     }
@@ -145,7 +146,8 @@ class Player {
                                                              .method = options_.method,
                                                              .budget = options_.budget},
                                                  .gain = std::pow(10.0, options_.gain_db / 20.0),
-                                                 .third = options_.third},
+                                                 .third = options_.third,
+                                                 .keys = options_.keys},
                                   [this](const std::string& news) { voice_.say(news); });
     connect_session();
     std::promise<Result<std::shared_ptr<const Loaded>>> promise;

@@ -25,6 +25,7 @@ struct PlayOptions {
   std::optional<Method> method;        // without one, the plan's choice
   std::optional<Budget> budget;        // instead of the preset's
   std::optional<ThirdArgument> third;  // whatever the models show
+  KeyOptions keys;                     // instead of every preset's
   bool force = false;                  // play the first model even if it is not stable
   bool no_console = false;
   std::string script;

@@ -181,8 +181,9 @@ std::string default_phrase() {
 }
 
 Result<Rendered> render(const RenderOptions& options, const std::function<bool(double)>& progress) {
-  auto scene =
-      load_scene(options.name, {.bare = true, .third = options.third, .progress = options.loading});
+  auto scene = load_scene(
+      options.name,
+      {.bare = true, .third = options.third, .keys = options.keys, .progress = options.loading});
   if (!scene) {
     return scene.error();
   }

@@ -31,6 +31,7 @@ struct RenderOptions {
   std::optional<Budget> budget;        // instead of the preset's
   bool is_strict = false;              // a budget that is not kept is an error
   std::optional<ThirdArgument> third;  // whatever the model shows
+  KeyOptions keys;                     // instead of the preset's
   bool limit = false;
   bool force = false;  // even if it is not stable
   int voices = 0;

@@ -8,6 +8,7 @@
 #include "app/control/registry.h"
 #include "app/control/status.h"
 #include "app/exit_code.h"
+#include "app/realtime/midi_chart.h"
 #include "core/model/language/keywords.h"
 #include "core/model/preset/preset.h"
 
@@ -91,10 +92,19 @@ void print_status() {
   }
 }
 
+void print_midi() {
+  print_head({"message", "number", "received", "what it does"});
+  for (const MidiChartRow& row : midi_chart()) {
+    print_row({std::string(row.message), std::string(row.number), row.is_received ? "yes" : "no",
+               std::string(row.does)});
+  }
+}
+
 constexpr ReferencePart parts[] = {
     {"model", "the keywords of a .mdl file", print_keywords},
     {"preset", "the keys of a preset", print_preset_keys},
     {"gestures", "what a preset's control may do with an input", print_gestures},
+    {"midi", "the MIDI implementation chart", print_midi},
     {"osc", "the addresses of OSC and of scores", print_addresses},
     {"console", "the console's commands", print_commands},
     {"status", "the figures of /status.reply and of the console", print_status},

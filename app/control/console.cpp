@@ -293,6 +293,12 @@ std::vector<std::string> Console::completions(std::string_view line) const {
     add(known_presets());
     add(kind == "MODEL" ? known_models() : std::vector<std::string>{});
     add(files(typed, scene_endings));
+  } else if (kind.find("TUNING") != kind.npos) {
+    constexpr std::string_view tuning_endings[] = {".scl", ".kbm"};
+    if (before.size() == 1) {
+      words.emplace_back("off");
+    }
+    add(files(typed, tuning_endings));
   } else if (kind == "FILE|stop") {
     words.emplace_back("stop");
     add(files(typed, sound_endings()));

@@ -361,6 +361,43 @@ Result<Done> command::explain(ConsoleContext& console, Words) {
   return Done{};
 }
 
+Result<Done> command::tuning(ConsoleContext& console, Words words) {
+  const auto current = loaded(console);
+  if (!current) {
+    return nothing_loaded;
+  }
+  std::vector<TimedEvent> events;
+  if (words[0] == "off" && words.size() == 1) {
+    events.push_back({.event = {.kind = EventKind::tuning_reset}});
+  } else {
+    std::string scale;
+    std::string map;
+    for (const std::string& word : words) {
+      std::string& path = word.ends_with(".kbm") ? map : scale;
+      if (!path.empty() || !(word.ends_with(".scl") || word.ends_with(".kbm"))) {
+        return Error{"expected a scale, NAME.scl, a keyboard map, NAME.kbm, or off; found '" +
+                     word + "'"};
+      }
+      path = word;
+    }
+    const TuningReading tuning = read_tuning(scale, map);
+    if (tuning.failure) {
+      return Error{to_string(*tuning.failure)};
+    }
+    const double ratio = current->instrument.a4_hz / usual_a4_hz;
+    for (std::size_t key = 0; key < tuning.keys_hz.size(); ++key) {
+      events.push_back({.event = {.kind = EventKind::key_tuning,
+                                  .index = static_cast<std::uint16_t>(key),
+                                  .value = ratio * tuning.keys_hz[key],
+                                  .value2 = 1.0}});
+    }
+  }
+  if (!console.process.send(console.process.from_console, events)) {
+    return Error{"the audio thread is busy and took nothing; try again"};
+  }
+  return Done{};
+}
+
 Result<Done> command::record(ConsoleContext& console, Words words) {
   if (words[0] == "stop") {
     auto summary = console.recorder.stop();

@@ -34,6 +34,7 @@ Result<Done> get(ConsoleContext& console, Words words);
 Result<Done> set(ConsoleContext& console, Words words);
 Result<Done> status(ConsoleContext& console, Words words);
 Result<Done> explain(ConsoleContext& console, Words words);
+Result<Done> tuning(ConsoleContext& console, Words words);
 Result<Done> record(ConsoleContext& console, Words words);
 Result<Done> help(ConsoleContext& console, Words words);
 Result<Done> quit(ConsoleContext& console, Words words);

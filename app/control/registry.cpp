@@ -14,16 +14,18 @@ namespace {
 
 // --- what plays ---------------------------------------------------------------------------------
 
-Events one(const Event& event) {
+// On the channel that the instrument listens to.
+Events one(const Said& said, Event event) {
+  event.channel = said.instrument.channel;
   return std::vector{event};
 }
 
 Events note(const Said& said, bool starts) {
   const double velocity = said.arguments[1] / 127.0;
-  const bool sounds = starts && velocity > 0.0;
-  return one({.kind = sounds ? EventKind::note_on : EventKind::note_off,
-              .index = said.whole(0),
-              .value = sounds ? velocity : usual_release_velocity});
+  const bool is_on = starts && velocity > 0.0;
+  return one(said, {.kind = is_on ? EventKind::note_on : EventKind::note_off,
+                    .index = said.whole(0),
+                    .value = is_on || !starts ? velocity : usual_release_velocity});
 }
 
 // Of the parameters that a pattern names.
@@ -64,12 +66,12 @@ Events play_input(const Said& said, const GestureRow& gesture) {
   if (!misfit.empty()) {
     return Error{said.message.address + ": input " + std::to_string(input.number) + " " + misfit};
   }
-  return one({.kind = EventKind::gesture,
-              .gesture = gesture.gesture,
-              .index = static_cast<std::uint16_t>(input.number),
-              .model = said.serial,
-              .value = said.arguments[0],
-              .value2 = said.arguments[1]});
+  return one(said, {.kind = EventKind::gesture,
+                    .gesture = gesture.gesture,
+                    .index = static_cast<std::uint16_t>(input.number),
+                    .model = said.serial,
+                    .value = said.arguments[0],
+                    .value2 = said.arguments[1]});
 }
 
 // --- the rows -----------------------------------------------------------------------------------
@@ -85,8 +87,8 @@ std::vector<Row> make_rows() {
        .command_does = "starts a note; 60 is the middle C",
        .details = "KEY is 0 to 127, VELOCITY is 1 to 127, or 100 if it is left out."},
       {.address = "/note/off",
-       .arguments = {{"KEY", "the key", 0, 127}, {"VELOCITY", "the velocity", 0, 127, 100}},
-       .does = "ends a note",
+       .arguments = {{"KEY", "the key", 0, 127}, {"VELOCITY", "the velocity", 0, 127, 63.5}},
+       .does = "ends a note; the velocity is that of the release",
        .play = [](const Said& said) { return note(said, false); },
        .command = "noteoff",
        .group = CommandGroup::playing,
@@ -103,23 +105,23 @@ std::vector<Row> make_rows() {
        .does = "a controller, as from a keyboard; value 0-127",
        .play =
            [](const Said& said) {
-             return one({.kind = EventKind::controller,
-                         .index = said.whole(0),
-                         .value = said.arguments[1] / 127.0});
+             return one(said, {.kind = EventKind::controller,
+                               .index = said.whole(0),
+                               .value = said.arguments[1] / 127.0});
            }},
       {.address = "/pressure",
        .arguments = {{"VALUE", "the pressure", 0, 127}},
        .does = "channel pressure, 0-127",
        .play =
            [](const Said& said) {
-             return one({.kind = EventKind::pressure, .value = said.arguments[0] / 127.0});
+             return one(said, {.kind = EventKind::pressure, .value = said.arguments[0] / 127.0});
            }},
       {.address = "/bend",
        .arguments = {{"VALUE", "the bend", -1, 1}},
        .does = "pitch bend, -1 to 1 (two semitones)",
        .play =
            [](const Said& said) {
-             return one({.kind = EventKind::bend, .value = said.arguments[0]});
+             return one(said, {.kind = EventKind::bend, .value = said.arguments[0]});
            }},
       {.command = "params",
        .group = CommandGroup::parameters,
@@ -166,7 +168,7 @@ std::vector<Row> make_rows() {
   const Row last[] = {
       {.address = "/panic",
        .does = "silence at once",
-       .play = [](const Said&) { return one({.kind = EventKind::panic}); },
+       .play = [](const Said& said) { return one(said, {.kind = EventKind::panic}); },
        .command = "panic",
        .group = CommandGroup::playing,
        .details = "Every voice fades out."},
@@ -216,6 +218,14 @@ std::vector<Row> make_rows() {
       {.address = "/describe",
        .does = "answers a row for everything that can be set or asked",
        .answer = answer::describe},
+      {.command = "tuning",
+       .group = CommandGroup::playing,
+       .words = "TUNING|off [TUNING]",
+       .command_does = "tunes all keys by Scala files, or as the preset has them",
+       .details =
+           "TUNING is a scale, NAME.scl, or a keyboard map, NAME.kbm, or both. What sounds is "
+           "tuned at once;\nmodels that are loaded later keep it.",
+       .act = command::tuning},
       {.command = "rec",
        .words = "FILE|stop [--force]",
        .command_does = "records what is heard to a file, or ends that",

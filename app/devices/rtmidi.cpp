@@ -14,7 +14,7 @@ struct Keyboard {
   Keyboard(RtMidi::Api api, const std::string& client, MidiDoor& door_in)
       : door(door_in), input(api, client) {
     input.setCallback(arrived, this);
-    input.ignoreTypes(true, true, true);
+    input.ignoreTypes(false, true, true);  // tunings are system exclusive
   }
 
   // RtMidi's thread: it notes the time and passes on, no more. RtMidi's own time is that between

@@ -29,6 +29,13 @@ class Slot {
                : offered_.exchange(nullptr, std::memory_order_acq_rel);
   }
 
+  bool is_offered() const {  // [audio] wait-free
+    return offered_.load(std::memory_order_relaxed) != nullptr;
+  }
+
+  // Whether retire() will succeed: nobody else gives any back. [audio] wait-free
+  bool has_room() const { return retired_.load(std::memory_order_acquire) == nullptr; }
+
   // Gives one back. False when the other side is behind: keep it and try in the next block.
   // [audio] wait-free
   bool retire(T* old) {

@@ -1,7 +1,13 @@
 #include "app/realtime/midi.h"
 
+#include <cmath>
+#include <functional>
+#include <numeric>
+
 namespace ressort {
 namespace {
+
+constexpr std::size_t dump_head = 21;  // bytes before the keys of a bulk dump of a tuning
 
 // Data bytes after a status byte; 0 for those that carry none or are passed over.
 int data_bytes(std::uint8_t status) {
@@ -23,6 +29,10 @@ bool MidiReader::take(std::uint8_t byte, Event& event) {
     return false;  // clock, active sensing, reset: not for us, and no part of any message
   }
   if (byte >= 0x80) {
+    if (in_exclusive_ && byte == 0xf7) {
+      end_exclusive();
+    }
+    exclusive_size_ = 0;
     malformed_ += is_begun_ ? 1 : 0;
     in_exclusive_ = byte == 0xf0;
     // 0xf4, 0xf5 are not defined; 0xf7 ends an exclusive.
@@ -34,6 +44,10 @@ bool MidiReader::take(std::uint8_t byte, Event& event) {
     return false;
   }
   if (in_exclusive_) {
+    if (exclusive_size_ < exclusive_.size()) {
+      exclusive_[exclusive_size_] = byte;
+    }
+    ++exclusive_size_;
     return false;
   }
   if (status_ == 0 || need_ == 0) {
@@ -68,6 +82,10 @@ bool MidiReader::finish(Event& event) {
     case 0xb0:
       event.kind = EventKind::controller;
       return true;
+    case 0xc0:
+      event.kind = EventKind::program;
+      event.value = 0.0;
+      return true;
     case 0xd0:
       event.kind = EventKind::pressure;
       event.index = 0;
@@ -84,8 +102,62 @@ bool MidiReader::finish(Event& event) {
       status_ = 0;
       return false;  // system common has no running status
     default:
-      return false;  // program change
+      return false;
   }
+}
+
+// A tuning of the MIDI Tuning Standard, for any device and of any number: there is one here.
+//   7f device 08 02 program count (key semitone fraction fraction)...     what sounds, too
+//   7e device 08 01 program name[16] (semitone fraction fraction)[128] sum
+void MidiReader::end_exclusive() {
+  constexpr std::size_t change_head = 6;
+  constexpr std::size_t dump_size = dump_head + 3 * 128 + 1;
+  const auto& bytes = exclusive_;
+  const std::size_t size = exclusive_size_;
+  const auto begins = [&](std::uint8_t kind, std::uint8_t what) {
+    return size >= change_head && bytes[0] == kind && bytes[2] == 0x08 && bytes[3] == what;
+  };
+  const bool is_change = begins(0x7f, 0x02);
+  is_dump_ = begins(0x7e, 0x01);
+  bool is_right = size <= longest_exclusive;
+  if (is_change) {
+    is_right = is_right && size == change_head + 4U * bytes[5];
+    tuned_next_ = change_head;
+    tuned_end_ = size;
+  } else if (is_dump_) {
+    // Of all that comes before it, as the standard says.
+    const auto sum = [&] {
+      return std::accumulate(bytes.begin(), bytes.begin() + dump_size - 1, std::uint8_t{0},
+                             std::bit_xor<>());
+    };
+    is_right = is_right && size == dump_size && (sum() & 0x7f) == bytes[dump_size - 1];
+    tuned_next_ = dump_head;
+    tuned_end_ = dump_size - 1;
+  }
+  if (!(is_change || is_dump_) || !is_right) {
+    malformed_ += (is_change || is_dump_) && !is_right ? 1 : 0;
+    tuned_next_ = tuned_end_ = 0;
+  }
+}
+
+// Semitones of equal temperament and 14 bits of one; all ones: as it was.
+bool MidiReader::next_tuned_key(Event& event) {
+  while (tuned_next_ < tuned_end_) {
+    const std::size_t row = is_dump_ ? (tuned_next_ - dump_head) / 3 : 0;
+    const auto key = static_cast<std::uint16_t>(is_dump_ ? row : exclusive_[tuned_next_++]);
+    const int semitone = exclusive_[tuned_next_];
+    const int fraction = exclusive_[tuned_next_ + 1] << 7 | exclusive_[tuned_next_ + 2];
+    tuned_next_ += 3;
+    if (semitone == 0x7f && fraction == 0x3fff) {
+      continue;
+    }
+    event = {.kind = EventKind::key_tuning,
+             .index = key,
+             .value = 440.0 * std::exp2((semitone - 69 + fraction / 16384.0) / 12.0),
+             .value2 = is_dump_ ? 0.0 : 1.0};
+    return true;
+  }
+  return false;
 }
 
 void MidiReader::end_packet() {

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "app/realtime/denormals.h"
 
@@ -30,7 +31,7 @@ bool is_panic(const Event& event) {
 
 bool ends_sound(const Event& event) {
   return is_panic(event) || event.kind == EventKind::note_off || is_controller(event, 64) ||
-         is_controller(event, 123);
+         is_controller(event, 66) || is_controller(event, 121) || is_controller(event, 123);
 }
 
 }  // namespace
@@ -56,6 +57,7 @@ Process::Process(double rate_hz, bool limit, Clock clock_ns)
 Process::~Process() {
   delete current_;
   delete fading_;
+  delete waiting_;
   delete slot.offer(nullptr);
   delete slot.collect();
 }
@@ -243,6 +245,7 @@ void Process::collect_due(std::size_t frames) {
       event.frame = ++moments <= most_moments ? event.frame : due_.back().frame;
     }
     due_.push_back(event);
+    follow_program(event);
   };
   const auto is_due = [&](const Pending& next) { return next.frame < end; };
   while (true) {
@@ -265,25 +268,68 @@ void Process::collect_due(std::size_t frames) {
   }
 }
 
+// Banks are counted here, as models come and go; who loads is told which program is wanted.
+void Process::follow_program(const Event& event) {
+  constexpr int bank_coarse = 0;
+  constexpr int bank_fine = 32;
+  int& bank = banks_[event.channel % banks_.size()];
+  const auto bits = static_cast<int>(std::lround(127.0 * std::clamp(event.value, 0.0, 1.0)));
+  if (is_controller(event, bank_coarse)) {
+    bank = bits << 7 | (bank & 0x7f);
+  } else if (is_controller(event, bank_fine)) {
+    bank = (bank & 0x3f80) | bits;
+  } else if (event.kind == EventKind::program && current_ != nullptr &&
+             current_->engine->listens_to(event.channel)) {
+    reports.push({Report::Kind::program, current_->serial, 0, 128.0 * bank + event.index});
+  }
+}
+
 // A new model is taken at the edge of a chunk, once the last fade is over and its engine is on its
-// way out.
+// way out. What rings gives way to the next model but one, though not to other forms of this one.
 void Process::swap_models() {
-  if (fading_ != nullptr && fade_left_ == 0 && slot.retire(fading_)) {
+  if (rings_ && !rings_on()) {
+    rings_ = false;
+    fade_left_ = fade_frames_;
+  }
+  if (fading_ != nullptr && !rings_ && fade_left_ == 0 && slot.retire(fading_)) {
     fading_ = nullptr;
+  }
+  if (rings_ && slot.is_offered() && slot.has_room()) {
+    Sounding* const next = slot.take();
+    if (goes_on(*next)) {
+      slot.retire(std::exchange(current_, next));
+      ++meters_.swaps;
+    } else {
+      waiting_ = next;
+      rings_ = false;
+      fade_left_ = fade_frames_;
+    }
   }
   if (fading_ != nullptr) {
     return;
   }
-  if (Sounding* const next = slot.take()) {
-    fading_ = current_;
-    fade_left_ = fading_ == nullptr || goes_on(*next) ? 0 : fade_frames_;
-    if (fade_left_ > 0) {
-      ended_ = meters_;
-      load_.begin_anew();
-    }
-    current_ = next;
-    ++meters_.swaps;
+  Sounding* const next = waiting_ != nullptr ? std::exchange(waiting_, nullptr) : slot.take();
+  if (next == nullptr) {
+    return;
   }
+  fading_ = current_;
+  const bool is_first = fading_ == nullptr;
+  const bool is_same = !is_first && goes_on(*next);
+  if (!is_first && !is_same) {
+    next->engine->adopt_channels(*fading_->engine);
+    ended_ = meters_;
+    load_.begin_anew();
+  }
+  is_alone_ = next->lets_ring;
+  rings_ = is_alone_ && !is_first && !is_same;
+  rings_until_ = frame_ + static_cast<std::int64_t>(longest_ring_s * rate_hz_);
+  fade_left_ = is_first || is_same || rings_ ? 0 : fade_frames_;
+  current_ = next;
+  ++meters_.swaps;
+}
+
+bool Process::rings_on() const {
+  return fading_->engine->meters().voices > 0 && frame_ < rings_until_;
 }
 
 bool Process::goes_on(const Sounding& next) const {
@@ -316,9 +362,9 @@ void Process::play_models(std::size_t input_count, std::size_t output_count, std
   };
   const double length = static_cast<double>(std::max<std::size_t>(1, fade_frames_));
   const auto old_gain = [&](std::size_t n) {
-    return n < fade_left_ ? static_cast<double>(fade_left_ - n) / length : 0.0;
+    return rings_ ? 1.0 : n < fade_left_ ? static_cast<double>(fade_left_ - n) / length : 0.0;
   };
-  const bool is_fading = fading_ != nullptr && fade_left_ > 0;
+  const bool is_fading = fading_ != nullptr && (rings_ || fade_left_ > 0);
   if (is_fading) {
     play(*fading_, input_count, fade_sound_, frames);
     add(fade_sound_, fading_->engine->output_count(), old_gain);
@@ -326,7 +372,7 @@ void Process::play_models(std::size_t input_count, std::size_t output_count, std
   if (current_ != nullptr) {
     play(*current_, input_count, sound_, frames);
     const int count = current_->engine->output_count();
-    if (is_fading) {
+    if (is_fading && !is_alone_) {
       add(sound_, count, [&](std::size_t n) { return 1.0 - old_gain(n); });
     } else {
       add(sound_, count, [](std::size_t) { return 1.0; });
@@ -409,8 +455,10 @@ void Process::weigh(double took_s, std::size_t frames) {
   if (current_ == nullptr) {
     return;
   }
-  if (load_.is_over() && fade_left_ > 0) {
+  if (load_.is_over() && (rings_ || fade_left_ > 0)) {
     fading_->engine->limit_voices(1);
+    fade_left_ = rings_ ? fade_frames_ : fade_left_;
+    rings_ = false;
     load_.forget();
     return;
   }

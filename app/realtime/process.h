@@ -21,6 +21,7 @@ namespace ressort {
 struct Sounding {
   std::unique_ptr<Engine> engine;
   std::uint32_t serial = 0;
+  bool lets_ring = false;  // what sounded before it ends by itself, without new notes
 };
 
 // An event on its way to the audio thread, and when it is to act.
@@ -43,11 +44,11 @@ struct MidiPacket {
 
 // What the audio thread has to tell.
 struct Report {
-  enum class Kind : std::uint8_t { parameter, reset, overload };
+  enum class Kind : std::uint8_t { parameter, reset, overload, program };
   Kind kind = Kind::reset;
   std::uint32_t model = 0;  // serial
   std::uint16_t index = 0;  // parameter; the most voices there is time for, or 0
-  double value = 0.0;       // of the parameter; the load
+  double value = 0.0;       // of the parameter; the load; 128 * bank + program
 };
 
 // A piece of the output on its way to a recording.
@@ -84,6 +85,7 @@ struct Process {
   static constexpr std::size_t max_endings = 1024;  // ...and so many more that end sound
   static constexpr std::size_t max_ahead = 4096;    // events that wait for their frame
   static constexpr double fade_s = 0.05;            // between two models
+  static constexpr double longest_ring_s = 60.0;    // of what the next model lets ring
 
   // A monotonic clock, in ns, that makes no system call.
   using Clock = std::int64_t (*)();
@@ -157,6 +159,8 @@ struct Process {
   void play(Sounding& sounding, std::size_t input_count, std::vector<double>& samples,
             std::size_t frames);
   void swap_models();
+  bool rings_on() const;
+  void follow_program(const Event& event);
   bool goes_on(const Sounding& next) const;
   void tell();
   void weigh(double took_s, std::size_t frames);
@@ -171,9 +175,14 @@ struct Process {
   MidiReader midi_;
   Sounding* current_ = nullptr;
   Sounding* fading_ = nullptr;
+  Sounding* waiting_ = nullptr;  // until what rings has faded
   std::size_t fade_left_ = 0;
+  bool rings_ = false;            // the fading one does not fade yet
+  std::int64_t rings_until_ = 0;  // frame
+  bool is_alone_ = false;         // the current one came in at its full level
   std::size_t fade_frames_ = 0;
   Meters meters_;
+  std::array<int, 16> banks_{};          // [MIDI channel] as 14 bits
   EngineMeters ended_;                   // what engines before the current one counted
   std::int64_t next_overload_news_ = 0;  // frame
   DcBlocker dc_blocker_;

@@ -169,8 +169,9 @@ Result<std::string> find_scene(const std::string& name, Reach reach) {
 std::optional<std::string> own_file(const std::string& path) {
   std::error_code error;
   const fs::path found = fs::canonical(path, error);
+  const fs::path endings[] = {".mdl", ".toml", ".scl", ".kbm"};
   if (error || !fs::is_regular_file(found, error) ||
-      (found.extension() != ".mdl" && found.extension() != ".toml")) {
+      std::find(std::begin(endings), std::end(endings), found.extension()) == std::end(endings)) {
     return std::nullopt;
   }
   for (const char* const name : {"models", "presets"}) {

@@ -28,8 +28,8 @@ enum class Reach { any_file, own_folders };
 // preset or a model that came with the program. Presets go before models.
 Result<std::string> find_scene(const std::string& name, Reach reach);
 
-// The path without links and "..", where it is that of an ordinary file, a .mdl or a .toml below
-// the program's own folders.
+// The path without links and "..", where it is that of an ordinary file, a model, a preset or a
+// tuning below the program's own folders.
 std::optional<std::string> own_file(const std::string& path);
 
 // All presets and models that came with the program, by name, sorted.

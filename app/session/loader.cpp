@@ -6,6 +6,7 @@
 
 #include "app/control/registry.h"
 #include "core/model/preset/fit.h"
+#include "core/model/tuning/scala.h"
 
 namespace ressort {
 namespace {
@@ -46,9 +47,11 @@ class SceneReader {
     }
     scene_.path = *path;
     scene_.name = fs::path(*path).stem().string();
-    if (path->ends_with(".toml")
+    const bool is_read =
+        path->ends_with(".toml")
             ? read_preset()
-            : read_model(*path, {.third = options_.third, .progress = options_.progress})) {
+            : read_model(*path, {.third = options_.third, .progress = options_.progress});
+    if (tune() && is_read) {
       out_.scene = std::move(scene_);
     }
     return std::move(out_);
@@ -99,6 +102,35 @@ class SceneReader {
       fail(scene_.path, *text, error);
     }
     return read.errors.empty() && unfit.empty();
+  }
+
+  // The keys: as the options say, else as the preset does.
+  bool tune() {
+    Preset& preset = scene_.preset;
+    const fs::path folder = fs::path(scene_.path).parent_path();
+    const auto path_of = [&](const std::string& said, const std::string& name) {
+      return !said.empty() || name.empty() ? said : (folder / name).string();
+    };
+    const std::string scale = path_of(options_.keys.scale, preset.scale);
+    const std::string map = path_of(options_.keys.keyboard_map, preset.keyboard_map);
+    preset.a4_hz = options_.keys.a4_hz.value_or(preset.a4_hz);
+    preset.channels = options_.keys.channels.value_or(preset.channels);
+    if (scale.empty() && map.empty()) {
+      return true;
+    }
+    for (const std::string& path : {scale, map}) {
+      if (options_.reach == Reach::own_folders && !path.empty() && !own_file(path)) {
+        return fail("", "",
+                    Error{"its tuning is none of the program's own, and OSC loads no others"});
+      }
+    }
+    TuningReading tuning = read_tuning(scale, map);
+    if (tuning.failure) {
+      out_.findings.push_back(*std::move(tuning.failure));
+      return false;
+    }
+    preset.keys_hz = std::move(tuning.keys_hz);
+    return true;
   }
 
   bool read_model(const std::string& path, const ReadOptions& options) {
@@ -226,6 +258,41 @@ std::string without_source(std::string_view message) {
            std::string(sign) + message;
   }
   return all.empty() ? std::string(message) : all;
+}
+
+TuningReading read_tuning(const std::string& scale_path, const std::string& map_path) {
+  TuningReading out;
+  const auto read = [&](const std::string& path, auto parse, auto& target) {
+    if (path.empty()) {
+      return true;
+    }
+    const auto text = read_text(path, max_tuning_bytes);
+    if (!text) {
+      out.failure = finding_of("", "", text.error());
+      return false;
+    }
+    auto parsed = parse(*text);
+    if (!parsed) {
+      out.failure = finding_of(path, *text, parsed.error());
+      return false;
+    }
+    target = *std::move(parsed);
+    return true;
+  };
+  Scale scale;
+  for (int step = 1; step <= 12; ++step) {
+    scale.cents.push_back(100.0 * step);
+  }
+  KeyboardMap map;
+  if (read(scale_path, parse_scale, scale) && read(map_path, parse_keyboard_map, map)) {
+    auto keys = key_frequencies(scale, map);
+    if (keys) {
+      out.keys_hz = *std::move(keys);
+    } else {
+      out.failure = finding_of("", "", Error{map_path + ": " + keys.error().message});
+    }
+  }
+  return out;
 }
 
 Reading read_scene(const std::string& name, const SceneOptions& options) {

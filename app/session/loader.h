@@ -31,11 +31,30 @@ std::string to_string(const Finding& finding);
 // The same, and under it the line with the place marked, for a terminal.
 std::string with_source(const Finding& finding);
 
+// What is said of keys goes before what the preset says.
+struct KeyOptions {
+  std::string scale;                 // a Scala file's path; empty: the preset's
+  std::string keyboard_map;          // the same
+  std::optional<double> a4_hz;       // to which all is tuned
+  std::optional<unsigned> channels;  // a bit for each MIDI channel that is listened to
+};
+
+// The frequencies of all keys, or what is wrong with a file.
+struct TuningReading {
+  std::vector<double> keys_hz;  // [key]
+  std::optional<Finding> failure;
+};
+
+// Of a scale and a keyboard map; the path of one of them may be empty: twelve equal semitones, or
+// every key a step from the middle C on. Blocks on the disk. [any thread but audio]
+TuningReading read_tuning(const std::string& scale, const std::string& keyboard_map);
+
 struct SceneOptions {
   bool bare = false;                   // the model without a preset: the network alone
   std::optional<ThirdArgument> third;  // whatever preset and model say
   Reach reach = Reach::any_file;       // of the name, and of the preset's model
-  Progress progress = {};              // a reading that it stops fails with `stopped`
+  KeyOptions keys = {};
+  Progress progress = {};  // a reading that it stops fails with `stopped`
 };
 
 struct Scene {

@@ -238,9 +238,9 @@ void Session::improve() {
   time_parts();
 }
 
-void Session::offer(std::unique_ptr<Engine> engine) {
+void Session::offer(std::unique_ptr<Engine> engine, bool lets_ring) {
   offered_ = engine.get();
-  delete process_.slot.offer(new Sounding{std::move(engine), serial_});
+  delete process_.slot.offer(new Sounding{std::move(engine), serial_, lets_ring});
 }
 
 // Only the worker destroys engines, and not before another one has been offered.
@@ -255,6 +255,7 @@ void Session::time_parts() {
 void Session::listen() {
   delete process_.slot.collect();
   Report report;
+  std::optional<int> program;  // the last of those that were asked for meanwhile
   while (process_.reports.pop(report)) {
     const std::lock_guard lock(mutex_);
     const bool is_current = report.model == current_->serial;
@@ -266,7 +267,12 @@ void Session::listen() {
                   "damping, or raise its mass");
     } else if (report.kind == Report::Kind::overload && is_current) {
       overloads_.add(describe_overload(report));
+    } else if (report.kind == Report::Kind::program) {
+      program = static_cast<int>(report.value);
     }
+  }
+  if (program) {
+    change_program(*program);
   }
   const Meters now = process_.meters();
   if (now.late != late_reported_ && now.late_s > least_lateness_s) {
@@ -281,6 +287,29 @@ void Session::listen() {
     if (const auto news = limit->take(); news && tell_) {
       tell_(*news);
     }
+  }
+}
+
+// Programs are the presets in the order in which they are listed, from bank 0 on.
+void Session::change_program(int number) {
+  const std::vector<std::string> presets = known_presets();
+  const auto index = static_cast<std::size_t>(number);
+  if (index < presets.size()) {
+    const auto answer = [this, name = presets[index], number](const auto& result) {
+      if (result && tell_) {
+        tell_("program " + std::to_string(number % 128 + 1) + ": " + name);
+      } else if (!result && tell_ && result.error().message != replaced &&
+                 result.error().message != ending) {
+        tell_(result.error().message);
+      }
+    };
+    const std::lock_guard lock(mutex_);
+    jobs_.push_back(
+        {{.name = presets[index], .reach = Reach::own_folders, .lets_ring = true}, answer});
+  } else if (unknown_programs_.insert(number).second && tell_) {
+    tell_("there is no program " + std::to_string(number % 128 + 1) + " in bank " +
+          std::to_string(number / 128) + "; there are " +
+          counted(presets.size(), "preset", "presets"));
   }
 }
 
@@ -299,6 +328,7 @@ void Session::do_load(const Job& job) {
   const auto result = build(job.wish);
   if (result) {
     scene_ = job.wish;
+    scene_->lets_ring = false;  // not when it is compiled anew
   }
   if (job.answer) {
     job.answer(result);
@@ -368,6 +398,7 @@ Result<std::shared_ptr<const Loaded>> Session::build_now(const Wish& wish,
   auto scene = load_scene(wish.name, {.bare = options_.compile.bare,
                                       .third = options_.third,
                                       .reach = wish.reach,
+                                      .keys = options_.keys,
                                       .progress = progress});
   if (!scene) {
     return scene.error();
@@ -414,7 +445,7 @@ Result<std::shared_ptr<const Loaded>> Session::build_now(const Wish& wish,
     values_ = std::move(values);
     built_rate_hz_ = options.rate_hz;
   }
-  offer(std::move(compiled->engine));
+  offer(std::move(compiled->engine), wish.lets_ring);
   source_.reset();
   if (may_gain(loaded->plan)) {
     options.find_gain = false;

@@ -8,6 +8,7 @@
 #include <functional>
 #include <memory>
 #include <mutex>
+#include <set>
 #include <string>
 #include <thread>
 #include <vector>
@@ -23,6 +24,7 @@ struct SessionOptions {
   CompileOptions compile;              // its rate is the backend's
   double gain = 1.0;                   // on top of every preset's
   std::optional<ThirdArgument> third;  // of every model, whatever it shows
+  KeyOptions keys;                     // instead of every preset's
 };
 
 // What sounds now, as people see it. Never changes once published.
@@ -100,6 +102,7 @@ class Session {
     std::string name;
     bool force = false;
     Reach reach = Reach::any_file;
+    bool lets_ring = false;  // what sounds until it ends by itself
   };
 
   struct Job {
@@ -124,12 +127,11 @@ class Session {
   bool is_outdated(bool is_load) const;
   bool has_new_rate() const;  // under the lock
   // Hands the engine over; its parts are timed when nobody waits any more.
-  void offer(std::unique_ptr<Engine> engine);
+  void offer(std::unique_ptr<Engine> engine, bool lets_ring = false);
   void time_parts();
   void listen();
+  void change_program(int number);
   std::string describe_overload(const Report& report) const;
-  // A link of what sounds made energy of nothing: what there is to say of it, once.
-
   Process& process_;
   SessionOptions options_;
   Tell tell_;
@@ -150,6 +152,7 @@ class Session {
   std::optional<Wish> scene_;        // [worker] what was loaded last
   const Engine* offered_ = nullptr;  // [worker] until the next is offered
   std::optional<Source> source_;     // [worker] of what may be improved
+  std::set<int> unknown_programs_;   // [worker] that were told
   RateLimit resets_;                 // [worker] all of these
   RateLimit overloads_{std::chrono::seconds(10)};
   RateLimit lates_;

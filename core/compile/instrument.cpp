@@ -1,5 +1,6 @@
 #include "core/compile/instrument.h"
 
+#include <bit>
 #include <cmath>
 
 #include "core/model/preset/fit.h"
@@ -41,6 +42,15 @@ std::vector<Control> make_controls(const Network& network, const Preset& preset)
   return controls;
 }
 
+KeyFrequencies make_keys(const Preset& preset) {
+  KeyFrequencies keys = equal_temperament(preset.a4_hz, preset.transpose);
+  const double ratio = preset.a4_hz / usual_a4_hz * std::exp2(preset.transpose / 12.0);
+  for (std::size_t key = 0; key < std::min(keys.size(), preset.keys_hz.size()); ++key) {
+    keys[key] = ratio * preset.keys_hz[key];
+  }
+  return keys;
+}
+
 InputInfo input_info(const Network& network, std::size_t index,
                      const std::vector<Control>& controls) {
   const Input& input = network.inputs[index];
@@ -78,20 +88,27 @@ int audio_input_count(const Network& network, const Preset& preset) {
 
 Playing make_playing(const Network& network, const Preset& preset, const Analysis& analysis,
                      bool bare, int voices, double gain) {
-  return {.voices = voices,
-          .gain = gain,
-          .bare = bare,
-          .damper_s = preset.damper_s,
-          .noise = preset.noise,
-          .tuning = analysis.mode ? Tuning::keyboard : Tuning::fixed,
-          .transpose = preset.transpose,
-          .pitches = analysis.pitches,
-          .highest_factor = analysis.margins.keys,
-          .home = analysis.margins.home,
-          .away = analysis.margins.away,
-          .controls = make_controls(network, preset),
-          .limits = analysis.stability.limits,
-          .rest_bounds = analysis.rest_bounds};
+  return {
+      .voices = voices,
+      .gain = gain,
+      .bare = bare,
+      .damper_s = preset.damper_s,
+      .noise = preset.noise,
+      .tuning = analysis.mode ? Tuning::keyboard : Tuning::fixed,
+      .transpose = static_cast<double>(preset.transpose),
+      .keys_hz = make_keys(preset),
+      .velocity = {.points = preset.velocity_points, .exponent = std::exp2(-2.0 * preset.velocity)},
+      .channels = static_cast<ChannelMask>(preset.channels),
+      .mono = preset.mono,
+      .legato = preset.legato,
+      .glide_s = preset.glide_s,
+      .pitches = analysis.pitches,
+      .highest_factor = analysis.margins.keys,
+      .home = analysis.margins.home,
+      .away = analysis.margins.away,
+      .controls = make_controls(network, preset),
+      .limits = analysis.stability.limits,
+      .rest_bounds = analysis.rest_bounds};
 }
 
 Instrument make_instrument(const Network& network, const Preset& preset, const Analysis& analysis,
@@ -122,6 +139,8 @@ Instrument make_instrument(const Network& network, const Preset& preset, const A
           .masses = moving_count(network),
           .links = network.links.size(),
           .transpose = preset.transpose,
+          .a4_hz = preset.a4_hz,
+          .channel = static_cast<std::uint8_t>(std::countr_zero(preset.channels)),
           .mode = mode,
           .highest_frequency_hz = mode ? analysis.pitches.frequency_at(most) : 0.0,
           .stiffness_margin = analysis.margins.whole,

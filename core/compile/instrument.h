@@ -43,6 +43,8 @@ struct Instrument {
   std::size_t masses = 0;  // that move
   std::size_t links = 0;
   int transpose = 0;         // semitones from a key to its pitch
+  double a4_hz = 440.0;      // to which its keys are tuned
+  std::uint8_t channel = 0;  // the first MIDI channel that it listens to, for who names none
   std::optional<Mode> mode;  // the lowest, by which keys set the pitch; else they do not; its
                              // frequency is that which sounds
   double highest_frequency_hz = 0.0;  // of a key, beyond which it is silent; 0: not tuned

@@ -36,7 +36,7 @@ struct Engine::Player {
          const Progress& progress)
       : machine(std::move(machine_in)),
         playing(completed(std::move(playing_in), machine)),
-        voices(playing, machine.rate_hz),
+        voices(playing, machine.rate_hz, machine.channels),
         bank(
             precision == Precision::float32
                 ? AnyBank(std::in_place_type<Bank<float>>, machine, voices.size(), isa, progress)
@@ -70,27 +70,35 @@ struct Engine::Player {
     if (!is_number && event.kind != EventKind::panic) {
       return;
     }
+    const std::uint8_t channel = event.channel % Channels::count;
     switch (event.kind) {
       case EventKind::note_on:
-        if (!voices.plays(event.index, parameters.highest_factor())) {
-          return;
-        }
-        if (voices.press_key(event.index, event.channel)) {
-          gestures.place(voices.last());
-        }
-        return gestures.perform(Source::note, event.index,
-                                event.value * voices.softness(event.channel));
+        return listens_to(channel) ? press_key(event) : void();
       case EventKind::note_off:
-        return release([&](Voice& voice) {
-          return voices.lift_key(voice, event.index, event.channel, event.value);
-        });
+        return listens_to(channel) ? lift_key(event) : void();
       case EventKind::controller:
-        return turn_controller(event);
+        return listens_to(channel) ? turn_controller(event) : void();
+      case EventKind::program:
+        return;
       case EventKind::pressure:
+        return listens_to(channel) ? gestures.perform(Source::pressure, 0, event.value,
+                                                      {.channels = voices.reach(channel)})
+                                   : void();
       case EventKind::key_pressure:
-        return gestures.perform(Source::pressure, 0, event.value);
+        return listens_to(channel)
+                   ? gestures.perform(Source::pressure, 0, event.value,
+                                      {.channels = voices.reach(channel), .key = event.index})
+                   : void();
       case EventKind::bend:
-        return voices.bend(event.channel & 15, event.value);
+        return listens_to(channel) ? voices.bend(channel, event.value) : void();
+      case EventKind::key_tuning:
+        if (event.index < key_count && event.value >= 0.0) {
+          voices.retune_key(event.index, event.value, event.value2 != 0.0,
+                            parameters.highest_factor());
+        }
+        return;
+      case EventKind::tuning_reset:
+        return voices.reset_tuning(parameters.highest_factor());
       case EventKind::custom:
         if (event.index < playing.controls.size()) {
           gestures.perform(playing.controls[event.index], event.value);
@@ -105,29 +113,80 @@ struct Engine::Player {
     }
   }
 
+  bool listens_to(std::uint8_t channel) const { return has_channel(playing.channels, channel); }
+
+  void press_key(const Event& event) {
+    const std::uint8_t channel = event.channel % Channels::count;
+    if (event.index >= key_count) {
+      return;
+    }
+    const double velocity = playing.velocity(event.value) * voices.softness(channel);
+    const Press press =
+        voices.press_key(event.index, velocity, channel, parameters.highest_factor());
+    if (press == Press::silent || press == Press::moves) {
+      return;
+    }
+    if (press == Press::starts) {
+      gestures.place(voices.last());
+    }
+    gestures.perform(Source::note, event.index, velocity, gestures.of_last());
+  }
+
+  void lift_key(const Event& event) {
+    const std::uint8_t channel = event.channel % Channels::count;
+    if (const auto earlier = voices.go_back(event.index, channel, parameters.highest_factor())) {
+      if (!voices.is_legato(channel)) {
+        gestures.perform(Source::note, earlier->key, earlier->velocity, gestures.of_last());
+      }
+      return;
+    }
+    release(
+        [&](Voice& voice) { return voices.lift_key(voice, event.index, channel, event.value); });
+  }
+
   // What means the same everywhere; all of it may be in the preset too.
   void turn_controller(const Event& event) {
     constexpr int all_sound_off = 120;
     constexpr int reset_all_controllers = 121;
     constexpr int all_notes_off = 123;  // and the modes from there on, which imply it
-    const std::uint8_t channel = event.channel & 15;
+    constexpr int mono_on = 126;
+    constexpr int poly_on = 127;
+    const std::uint8_t channel = event.channel % Channels::count;
+    const ChannelMask reached = voices.reach(channel);
     const auto let_go = [&] {
       release([&](Voice& voice) { return voices.is_let_go(voice, channel); });
     };
+    const auto lift_all = [&](ChannelMask channels) {
+      voices.forget_keys(channels);
+      release([&](Voice& voice) {
+        return has_channel(channels, voice.channel) &&
+               voices.lift_key(voice, voice.key, voice.channel, usual_release_velocity);
+      });
+    };
     if (event.index == all_sound_off) {
       voices.silence(channel);
+      voices.forget_keys(reached);
     } else if (event.index == reset_all_controllers) {
       voices.reset_controllers(channel);
       let_go();
     } else if (event.index >= all_notes_off) {
-      release([&](Voice& voice) {
-        return voices.lift_key(voice, voice.key, channel, usual_release_velocity);
-      });
+      lift_all(reached);
+      if (event.index == mono_on || event.index == poly_on) {
+        voices.set_mono(channel, event.index == mono_on);
+      }
     } else if (const auto change = voices.turn(channel, event.index, event.value);
                change == Channels::Change::sustain || change == Channels::Change::sostenuto) {
       let_go();
+    } else if (change == Channels::Change::zones) {
+      lift_all(voices.rezoned());
+      for (std::uint8_t other = 0; other < Channels::count; ++other) {
+        if (has_channel(voices.rezoned(), other)) {
+          voices.reset_controllers(other);
+          release([&](Voice& voice) { return voices.is_let_go(voice, other); });
+        }
+      }
     }
-    gestures.perform(Source::controller, event.index, event.value);
+    gestures.perform(Source::controller, event.index, event.value, {.channels = reached});
   }
 
   // --- sound ---
@@ -209,6 +268,7 @@ struct Engine::Player {
     if (voices.is_idle()) {
       return;
     }
+    voices.glide_on();
     watch.look_around(b, voices, parameters.values());
     const double bound = quiet_level / std::max(1e-30, playing.gain);
     for (std::size_t lane = 0; lane < voices.size(); ++lane) {
@@ -306,6 +366,14 @@ void Engine::process(std::span<const Event> events, std::span<const double* cons
 
 bool Engine::go_on_from(const Engine& from) {
   return player_->go_on_from(*from.player_);
+}
+
+void Engine::adopt_channels(const Engine& from) {
+  player_->voices.adopt_channels(from.player_->voices);
+}
+
+bool Engine::listens_to(std::uint8_t channel) const {
+  return player_->listens_to(channel);
 }
 
 void Engine::limit_voices(int most) {

@@ -10,6 +10,9 @@
 #include <vector>
 
 #include "core/engine/event.h"
+#include "core/engine/midi/channels.h"
+#include "core/engine/midi/key_tuning.h"
+#include "core/engine/midi/velocity_curve.h"
 #include "core/kernels/isa.h"
 #include "core/kernels/program.h"
 #include "core/progress.h"
@@ -79,7 +82,13 @@ struct Playing {
   double damper_s = 0.0;  // T60 of a voice whose key is up; 0: it rings out
   bool noise = false;     // the outputs shape white noise instead of being heard themselves
   Tuning tuning = Tuning::fixed;
-  int transpose = 0;            // semitones
+  double transpose = 0.0;  // semitones, that the keys' frequencies have already
+  KeyFrequencies keys_hz = equal_temperament(440.0, 0.0);
+  VelocityCurve velocity;
+  ChannelMask channels = all_channels;  // that it listens to
+  bool mono = false;            // one voice a channel plays the last of the keys that are down
+  bool legato = false;          // and is not struck again while one is
+  double glide_s = 0.0;         // from the pitch before, in equal steps of cents
   Pitches pitches;              // of the lowest mode
   double highest_factor = 1.0;  // the stiffness factor up to which the model is proved stable
   std::vector<Limits> home;     // [parameter] while they are there; empty: wherever they are
@@ -137,6 +146,11 @@ class Engine {
   // what that of `from` would be. False, and nothing is changed, if a kernel there does not
   // know where all of its masses are. [audio] wait-free, O(awake voices * (nodes + modes * masses))
   bool go_on_from(const Engine& from);
+
+  // Hears from now on what controllers and tuning messages have said to `from`, an engine of
+  // another model that sounded until now. [audio] wait-free
+  void adopt_channels(const Engine& from);
+  bool listens_to(std::uint8_t channel) const;  // [any thread], as long as the engine lives
 
   // So many voices sound at once from now on, at least one and at most what Playing says. Those
   // that are too many fade as stolen ones do: first whose key is up, then who is quietest, and

@@ -12,11 +12,14 @@ enum class EventKind : std::uint8_t {
   note_on,       // index: key 0..127, value: velocity 0..1 (above 0), may be fractional
   note_off,      // index: key, value: how fast it goes up, 0..1
   controller,    // index: MIDI controller number, value: 0..1
+  program,       // index: MIDI program number; for whoever loads, no engine takes it
   pressure,      // of the whole channel, value: 0..1
   key_pressure,  // index: key, value: 0..1
   bend,          // value: -1..1 of the bend range
   custom,        // index: row of the control map (an OSC address of the preset), value: 0..1
   parameter,     // index: parameter, value: as in the model
+  key_tuning,  // index: key, value: Hz before transposition, 0: silent; value2: 1: what sounds, too
+  tuning_reset,  // every key as the preset has it, what sounds, too
   gesture,       // index: input number, value and value2: the gesture's arguments
   panic,         // everything fades to silence at once
 };

@@ -1,6 +1,7 @@
 #include "core/engine/gestures.h"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 
 namespace ressort {
@@ -36,12 +37,13 @@ Gestures::Gestures(const Machine& machine, const Playing& playing, Voices& voice
       voices_(voices),
       parameters_(parameters),
       drivers_(voices.size() * machine.inputs.size()) {
-  for (const ModelInput& input : machine.inputs) {
-    starts_.push_back(input.position);
+  starts_.resize(Channels::count * machine.inputs.size());
+  for (std::size_t input = 0; input < machine.inputs.size(); ++input) {
+    set_starts(all_channels, input, machine.inputs[input].position);
   }
   for (const Control& control : playing.controls) {
     if (const auto start = row_of(control.gesture).start) {
-      starts_[control.target] = start(on_input(control.target, stroke_of(control)));
+      set_starts(all_channels, control.target, start(on_input(control.target, stroke_of(control))));
     }
   }
 }
@@ -52,19 +54,32 @@ void Gestures::go_on_from(const Gestures& from) {
 }
 
 void Gestures::place(std::size_t lane) {
-  for (std::size_t input = 0; input < starts_.size(); ++input) {
-    driver(lane, input).place(starts_[input]);
+  const std::size_t inputs = machine_.inputs.size();
+  for (std::size_t input = 0; input < inputs; ++input) {
+    driver(lane, input).place(starts_[voices_[lane].channel * inputs + input]);
   }
 }
 
-void Gestures::wake(std::size_t lane) {
+void Gestures::set_starts(ChannelMask channels, std::size_t input, double start) {
+  const std::size_t inputs = machine_.inputs.size();
+  if (playing_.tuning == Tuning::fixed) {
+    channels = all_channels;  // there is one instrument
+  }
+  for (unsigned channel = 0; channel < Channels::count; ++channel) {
+    double& here = starts_[channel * inputs + input];
+    here = has_channel(channels, channel) ? start : here;
+  }
+}
+
+void Gestures::wake(std::size_t lane, std::uint8_t channel) {
   if (voices_.wake(lane)) {
+    voices_[lane].channel = channel;
     place(lane);
   }
 }
 
 bool Gestures::is_moving(std::size_t lane) const {
-  for (std::size_t input = 0; input < starts_.size(); ++input) {
+  for (std::size_t input = 0; input < machine_.inputs.size(); ++input) {
     if (is_moving(lane, input)) {
       return true;
     }
@@ -81,43 +96,53 @@ Stroke Gestures::on_input(std::size_t input, Stroke stroke) const {
   return stroke;
 }
 
-void Gestures::play(const GestureRow& gesture, std::size_t input, Stroke stroke) {
-  const std::size_t last = voices_.last();
+void Gestures::play(const GestureRow& gesture, std::size_t input, Stroke stroke,
+                    const Scope& scope) {
+  const std::optional<std::size_t> last = voices_.last_of(scope);
+  const auto first_channel = static_cast<std::uint8_t>(std::countr_zero(scope.channels));
   stroke = on_input(input, stroke);
   if (gesture.goal != nullptr) {
-    starts_[input] = gesture.goal(stroke);
+    const double goal = gesture.goal(stroke);
+    if (scope.key == Scope::every_key) {
+      set_starts(scope.channels, input, goal);
+    }
     for (std::size_t lane = 0; lane < voices_.size(); ++lane) {
-      if (voices_[lane].awake || lane == last) {
-        wake(lane);
-        driver(lane, input).follow(starts_[input], stroke.pole_of_position());
+      if (voices_.hears(voices_[lane], scope) || lane == last) {
+        wake(lane, first_channel);
+        driver(lane, input).follow(goal, stroke.pole_of_position());
       }
     }
     return;
   }
-  wake(last);
-  stroke.pitch = std::sqrt(voices_.factor_of(last, parameters_.highest_factor()));
-  gesture.play(driver(last, input), stroke);
-  if (stroke.has_level && stroke.amount != 0.0) {
-    voices_.set_strength(last, stroke.level());
+  if (!last) {
+    return;
   }
-  starts_[input] = stroke.rest.value_or(starts_[input]);
+  wake(*last, first_channel);
+  stroke.pitch = std::sqrt(voices_.factor_of(*last, parameters_.highest_factor()));
+  gesture.play(driver(*last, input), stroke);
+  if (stroke.has_level && stroke.amount != 0.0) {
+    voices_.set_strength(*last, stroke.level());
+  }
+  if (stroke.rest) {
+    set_starts(scope.channels, input, *stroke.rest);
+  }
   if (stroke.pressure) {
-    perform(Source::pressure, 0, *stroke.pressure);
+    perform(Source::pressure, 0, *stroke.pressure, scope);
   }
 }
 
-void Gestures::perform(const Control& control, double amount) {
+void Gestures::perform(const Control& control, double amount, const Scope& scope) {
   const Stroke stroke = stroke_of(control, amount);
   if (control.gesture == Gesture::parameter) {
     return parameters_.set(control.target, stroke.mapped());
   }
-  play(row_of(control.gesture), control.target, stroke);
+  play(row_of(control.gesture), control.target, stroke, scope);
 }
 
-void Gestures::perform(Source source, int number, double amount) {
+void Gestures::perform(Source source, int number, double amount, const Scope& scope) {
   for (const Control& control : playing_.controls) {
     if (is_asked(control, source, number)) {
-      perform(control, amount);
+      perform(control, amount, scope);
     }
   }
 }
@@ -128,7 +153,7 @@ void Gestures::perform_live(const Event& event) {
     stroke.is_live = true;
     stroke.amount = event.value;
     stroke.second = event.value2;
-    play(gesture, input, stroke);
+    play(gesture, input, stroke, Scope{});
   };
   const std::vector<Control>& controls = playing_.controls;
   if (gesture.live == Live::by_preset) {

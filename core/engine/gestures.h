@@ -23,17 +23,19 @@ class Gestures {
 
   // The drivers of a voice that starts: to where gestures begin.
   void place(std::size_t lane);
-  // A voice that slept starts.
-  void wake(std::size_t lane);
+  // A voice that slept starts, with its hands where this channel has them.
+  void wake(std::size_t lane, std::uint8_t channel = 0);
   bool is_moving(std::size_t lane, std::size_t input) const {
     return drivers_[lane * machine_.inputs.size() + input].is_moving();
   }
   bool is_moving(std::size_t lane) const;
 
-  // What the controls of this source, of this key or of this controller's number, do in the voice
-  // that was played last, for 0..1. O(controls)
-  void perform(Source source, int number, double amount);
-  void perform(const Control& control, double amount);
+  // What the controls of this source, of this key or of this controller's number, do for 0..1. What
+  // has a goal moves in all voices that are meant, all else in the last of them; parameters are
+  // turned for everybody. O(controls * voices)
+  void perform(Source source, int number, double amount, const Scope& scope = {});
+  void perform(const Control& control, double amount, const Scope& scope = {});
+  Scope of_last() const { return {.channels = channel_bit(voices_[voices_.last()].channel)}; }
   // Of EventKind::gesture.
   void perform_live(const Event& event);
   // What a key does when it is released, in its voice.
@@ -49,8 +51,9 @@ class Gestures {
   }
   // With what a gesture is to know of the input.
   Stroke on_input(std::size_t input, Stroke stroke) const;
-  // In the voice that was played last, or in all.
-  void play(const GestureRow& gesture, std::size_t input, Stroke stroke);
+  void play(const GestureRow& gesture, std::size_t input, Stroke stroke, const Scope& scope);
+  // Where the drivers of new voices on these channels start.
+  void set_starts(ChannelMask channels, std::size_t input, double start);
   template <class T>
   void fill_rest(Bank<T>& bank, const VoiceGroup& group, std::size_t frames);
 
@@ -59,7 +62,7 @@ class Gestures {
   Voices& voices_;
   Parameters& parameters_;
   std::vector<InputDriver> drivers_;  // [lane][input]
-  std::vector<double> starts_;        // [input] where a new voice's driver is
+  std::vector<double> starts_;        // [channel][input] where a new voice's driver is
 };
 
 }  // namespace ressort

@@ -29,7 +29,7 @@ std::size_t most_voices(const Playing& playing) {
 
 }  // namespace
 
-Voices::Voices(const Playing& playing, double rate_hz)
+Voices::Voices(const Playing& playing, double rate_hz, std::size_t outputs)
     : playing_(playing),
       rate_hz_(rate_hz),
       level_kept_(std::exp(-static_cast<double>(max_block_frames) / (level_memory_s * rate_hz))),
@@ -37,13 +37,19 @@ Voices::Voices(const Playing& playing, double rate_hz)
                               [](const Control& control) {
                                 return control.source == Source::note && control.has_level;
                               })),
-      voices_(lane_count(playing.voices)) {}
+      voices_(lane_count(playing.voices)),
+      tuning_(playing.keys_hz, playing.transpose),
+      is_stereo_(outputs > 1) {}
 
 void Voices::go_on_from(const Voices& from) {
   voices_ = from.voices_;
   awake_ = from.awake_;
   last_ = from.last_;
   channels_ = from.channels_;
+  tuning_ = from.tuning_;
+  held_keys_ = from.held_keys_;
+  last_hz_ = from.last_hz_;
+  turns_ = from.turns_;
   limit_ = from.limit_;
   resets_ = from.resets_;
   stolen_ = from.stolen_;
@@ -57,6 +63,7 @@ void Voices::start(std::size_t lane, double frequency_hz) {
   voices_[lane] = {.awake = true,
                    .is_new = true,
                    .frequency_hz = frequency_hz,
+                   .semitones = channels_.semitones(0),
                    .decay = {.pole = std::exp(-1.0 / (damper_on_s * rate_hz_))},
                    .release_s = playing_.damper_s,
                    .level = 1.0};  // not yet heard: not yet the quietest
@@ -73,27 +80,162 @@ bool Voices::wake(std::size_t lane) {
   return starts;
 }
 
-bool Voices::press_key(int key, std::uint8_t channel) {
+Press Voices::press_key(int key, double velocity, std::uint8_t channel, double highest_factor) {
   // As it is written there is one instrument: a key is only a way to excite it.
   const bool is_one = playing_.tuning == Tuning::fixed;
+  const double hz = is_one ? 0.0 : playable_hz(key, highest_factor);
+  if (!is_one && hz == 0.0) {
+    return Press::silent;
+  }
+  HeldKeys& held = held_keys_[channel % Channels::count];
+  const bool overlaps = !held.is_empty();
+  const bool glides = overlaps || !is_legato(channel);
+  held.press(key, velocity);
+  Voice* const alone = channels_.is_mono(channel, playing_.mono) ? voice_on(channel) : nullptr;
+  if (alone != nullptr && !is_one && alone->is_whole()) {
+    last_ = static_cast<std::size_t>(alone - voices_.data());
+    const bool is_struck = !overlaps || !is_legato(channel);
+    attach(*alone, key, channel);
+    move_to_key(*alone, key, glides, highest_factor);
+    return is_struck ? Press::strikes : Press::moves;
+  }
   const bool stays = is_one && !voices_[last_].fading && voices_[last_].is_whole();
   Voice& voice = stays ? voices_[last_] : voice_for(key, channel);
   last_ = static_cast<std::size_t>(&voice - voices_.data());
   const bool starts = is_one ? !voice.is_live() : !sounds(voice, key, channel);
   if (starts) {
-    start(last_, is_one ? 0.0 : frequency_of(key));
+    start(last_, hz);
+    voice.key_hz = is_one ? 0.0 : tuning_.frequency_hz(static_cast<std::size_t>(key));
+    voice.volume = level_of(channel);
   }
+  attach(voice, key, channel);
+  if (!starts && !is_one) {
+    move_to_key(voice, key, false, highest_factor);
+  }
+  double& before_hz = last_hz_[channel % Channels::count];
+  if (starts && glides && before_hz > 0.0 && !is_one) {
+    glide_from(voice, before_hz);
+  }
+  before_hz = hz;
+  return starts ? Press::starts : Press::strikes;
+}
+
+// By a key of this channel it is held from now on.
+void Voices::attach(Voice& voice, int key, std::uint8_t channel) {
+  voice.has_key = true;
   voice.key = static_cast<std::uint8_t>(key);
   voice.channel = channel;
+  voice.turn = ++turns_;
   voice.held = true;
   voice.sustained = voice.latched = voice.is_released = false;
-  if (starts) {
-    voice.volume = channels_.level(channel);
-    voice.volume_frames = 0;
-  }
   damp(voice);
   voice.quiet_frames = 0;
-  return starts;
+  if (voice.semitones != channels_.semitones(channel)) {
+    voice.semitones = channels_.semitones(channel);
+    voice.is_retuned = has_changed_ = true;
+  }
+}
+
+// The pitch of a voice that sounds becomes that of a key, unless it is that already.
+void Voices::move_to_key(Voice& voice, int key, bool glides, double highest_factor) {
+  const double key_hz = tuning_.frequency_hz(static_cast<std::size_t>(key));
+  const double hz = playable_hz(key, highest_factor);
+  if (key_hz == voice.key_hz || hz == 0.0) {
+    return;
+  }
+  const double before_hz = voice.frequency_hz * std::exp2(voice.glide / 12.0);
+  voice.key_hz = key_hz;
+  voice.frequency_hz = hz;
+  voice.glide = 0.0;
+  voice.is_retuned = has_changed_ = true;
+  if (glides) {
+    glide_from(voice, before_hz);
+  }
+  last_hz_[voice.channel % Channels::count] = voice.frequency_hz;
+}
+
+void Voices::glide_from(Voice& voice, double frequency_hz) {
+  const double seconds = channels_.glide_s(voice.channel, playing_.glide_s);
+  if (seconds <= 0.0 || playing_.bare) {
+    return;
+  }
+  const double steps = std::max(1.0, seconds * rate_hz_ / static_cast<double>(max_block_frames));
+  voice.glide = 12.0 * std::log2(frequency_hz / voice.frequency_hz);
+  voice.glide_step = std::fabs(voice.glide) / steps;
+}
+
+void Voices::glide_on() {
+  for (Voice& voice : voices_) {
+    if (voice.awake && voice.glide != 0.0) {
+      const double left = std::max(0.0, std::fabs(voice.glide) - voice.glide_step);
+      voice.glide = std::copysign(left, voice.glide);
+      voice.is_retuned = has_changed_ = true;
+    }
+  }
+}
+
+std::optional<HeldKey> Voices::go_back(int key, std::uint8_t channel, double highest_factor) {
+  HeldKeys& held = held_keys_[channel % Channels::count];
+  held.lift(key);
+  Voice* const voice = voice_on(channel);
+  const bool is_alone =
+      playing_.tuning == Tuning::keyboard && channels_.is_mono(channel, playing_.mono);
+  const std::optional<HeldKey> earlier = held.last();
+  if (!is_alone || !earlier || voice == nullptr || !voice->held || voice->key != key) {
+    return std::nullopt;
+  }
+  last_ = static_cast<std::size_t>(voice - voices_.data());
+  attach(*voice, earlier->key, channel);
+  move_to_key(*voice, earlier->key, true, highest_factor);
+  return earlier;
+}
+
+// The one of this channel that was played last.
+Voice* Voices::voice_on(std::uint8_t channel) {
+  return least_of(
+      [&](const Voice& voice) {
+        return voice.is_live() && voice.has_key && voice.channel == channel;
+      },
+      [](const Voice& a, const Voice& b) { return a.turn > b.turn; });
+}
+
+void Voices::forget_keys(ChannelMask channels) {
+  for (unsigned channel = 0; channel < held_keys_.size(); ++channel) {
+    if (has_channel(channels, channel)) {
+      held_keys_[channel].clear();
+      last_hz_[channel] = 0.0;
+    }
+  }
+}
+
+// Those without a key too. What a member of an MPE zone says is for its own note only; where keys
+// set no pitch there is one instrument, and everybody plays it.
+bool Voices::is_for_all(const Scope& scope) const {
+  return playing_.tuning == Tuning::fixed ||
+         (scope.key == Scope::every_key && (scope.channels & ~channels_.members()) != 0);
+}
+
+bool Voices::hears(const Voice& voice, const Scope& scope) const {
+  if (!voice.awake || !voice.has_key || playing_.tuning == Tuning::fixed) {
+    return voice.awake && is_for_all(scope);
+  }
+  const bool was_let_go = channels_.is_member(voice.channel) && !voice.held && !voice.sustained;
+  const std::uint8_t by = was_let_go ? channels_.master_of(voice.channel) : voice.channel;
+  return has_channel(scope.channels, by) && (scope.key < 0 || scope.key == voice.key);
+}
+
+std::optional<std::size_t> Voices::last_of(const Scope& scope) const {
+  if (hears(voices_[last_], scope) || (!voices_[last_].awake && is_for_all(scope))) {
+    return last_;
+  }
+  std::optional<std::size_t> last;
+  for (std::size_t lane = 0; lane < voices_.size(); ++lane) {
+    if (voices_[lane].is_live() && hears(voices_[lane], scope) &&
+        (!last || voices_[lane].turn > voices_[*last].turn)) {
+      last = lane;
+    }
+  }
+  return last;
 }
 
 bool Voices::lift_key(Voice& voice, int key, std::uint8_t channel, double velocity) const {
@@ -113,7 +255,8 @@ void Voices::set_strength(std::size_t lane, double strength) {
   Voice& voice = voices_[lane];
   voice.strength = strength;
   if (voice.is_new) {
-    voice.volume = strength * channels_.level(voice.channel);
+    const SideGains level = level_of(voice.channel);
+    voice.volume = {strength * level[0], strength * level[1]};
     voice.volume_frames = 0;
   } else {
     follow_level(voice);
@@ -124,6 +267,7 @@ void Voices::set_strength(std::size_t lane, double strength) {
 
 Channels::Change Voices::turn(std::uint8_t channel, int number, double value) {
   const bool held = channels_.holds(channel);
+  const ChannelMask reached = channels_.reach(channel);
   const Channels::Change change = channels_.turn(channel, number, value);
   switch (change) {
     case Channels::Change::pitch:
@@ -134,12 +278,13 @@ Channels::Change Voices::turn(std::uint8_t channel, int number, double value) {
       break;
     case Channels::Change::sostenuto:
       for (Voice& voice : voices_) {
-        if (voice.channel == channel && channels_.holds(channel) != held) {
+        if (is_on(voice, reached) && channels_.holds(channel) != held) {
           voice.latched = !held && voice.held;
         }
       }
       damp(channel);
       break;
+    case Channels::Change::zones:
     case Channels::Change::sustain:
       damp(channel);
       break;
@@ -157,7 +302,7 @@ void Voices::bend(std::uint8_t channel, double amount) {
 void Voices::reset_controllers(std::uint8_t channel) {
   channels_.reset(channel);
   for (Voice& voice : voices_) {
-    voice.latched &= voice.channel != channel;
+    voice.latched &= !is_on(voice, channels_.reach(channel));
   }
   retune(channel);
   follow_level(channel);
@@ -165,21 +310,29 @@ void Voices::reset_controllers(std::uint8_t channel) {
 }
 
 bool Voices::is_let_go(Voice& voice, std::uint8_t channel) const {
-  return voice.sustained && voice.channel == channel && !voice.latched &&
-         !channels_.sustains(channel);
+  return voice.sustained && is_on(voice, channels_.reach(channel)) && !voice.latched &&
+         !channels_.sustains(voice.channel);
 }
 
 void Voices::retune(std::uint8_t channel) {
+  // What is said to one member may be for all of them, such as the range of bends.
+  const ChannelMask zone = channels_.reach(channels_.master_of(channel));
   for (Voice& voice : voices_) {
-    const bool is_bent = voice.awake && voice.channel == channel;
-    voice.is_retuned |= is_bent;
-    has_changed_ |= is_bent;
+    if (!voice.awake || !is_on(voice, zone)) {
+      continue;
+    }
+    const bool follows = hears(voice, {.channels = channel_bit(voice.channel)});
+    const double semitones = follows ? channels_.semitones(voice.channel) : voice.semitones;
+    if (semitones != voice.semitones || is_on(voice, channels_.reach(channel))) {
+      voice.semitones = semitones;
+      voice.is_retuned = has_changed_ = true;
+    }
   }
 }
 
 void Voices::follow_level(std::uint8_t channel) {
   for (Voice& voice : voices_) {
-    if (voice.awake && voice.channel == channel) {
+    if (voice.awake && is_on(voice, channels_.reach(channel))) {
       follow_level(voice);
     }
   }
@@ -187,14 +340,17 @@ void Voices::follow_level(std::uint8_t channel) {
 
 void Voices::follow_level(Voice& voice) const {
   const auto frames = static_cast<std::size_t>(std::max(1.0, level_s * rate_hz_));
-  const double goal = voice.strength * channels_.level(voice.channel);
-  voice.volume_step = (goal - voice.volume) / static_cast<double>(frames);
+  const SideGains goal = level_of(voice.channel);
+  for (std::size_t side = 0; side < goal.size(); ++side) {
+    voice.volume_step[side] =
+        (voice.strength * goal[side] - voice.volume[side]) / static_cast<double>(frames);
+  }
   voice.volume_frames = frames;
 }
 
 void Voices::damp(std::uint8_t channel) {
   for (Voice& voice : voices_) {
-    if (voice.awake && voice.channel == channel) {
+    if (voice.awake && is_on(voice, channels_.reach(channel))) {
       damp(voice);
     }
   }
@@ -206,6 +362,42 @@ void Voices::damp(Voice& voice) const {
   const double share = may_lie ? channels_.damper(voice.channel) : 0.0;
   voice.decay.kept_goal =
       std::pow(10.0, -decades_of_t60 * share / (std::max(1e-3, voice.release_s) * rate_hz_));
+}
+
+SideGains Voices::level_of(std::uint8_t channel) const {
+  const double level = channels_.level(channel);
+  const SideGains balance = is_stereo_ ? channels_.balance(channel) : SideGains{1.0, 1.0};
+  return {level * balance[0], level * balance[1]};
+}
+
+void Voices::adopt_channels(const Voices& from) {
+  channels_ = from.channels_;
+  tuning_.adopt(from.tuning_);
+  for (std::uint8_t channel = 0; channel < Channels::count; ++channel) {
+    retune(channel);
+    follow_level(channel);
+    damp(channel);
+  }
+}
+
+void Voices::retune_key(std::size_t key, double frequency_hz, bool is_now, double highest_factor) {
+  tuning_.retune(key, frequency_hz);
+  for (Voice& voice : voices_) {
+    if (is_now && voice.awake && voice.has_key && voice.key == key && voice.frequency_hz > 0.0 &&
+        frequency_hz > 0.0) {
+      move_to_key(voice, static_cast<int>(key), false, highest_factor);
+    }
+  }
+}
+
+void Voices::reset_tuning(double highest_factor) {
+  tuning_.reset();
+  for (Voice& voice : voices_) {
+    if (voice.awake && voice.has_key && voice.frequency_hz > 0.0 &&
+        tuning_.frequency_hz(voice.key) > 0.0) {
+      move_to_key(voice, voice.key, false, highest_factor);
+    }
+  }
 }
 
 // --- how it ends --------------------------------------------------------------------------------
@@ -228,11 +420,12 @@ void Voices::panic() {
     }
   }
   channels_.lift_pedals();
+  forget_keys(all_channels);
 }
 
 void Voices::silence(std::uint8_t channel) {
   for (Voice& voice : voices_) {
-    if (voice.awake && voice.channel == channel) {
+    if (voice.awake && is_on(voice, channels_.reach(channel))) {
       fade(voice, steal_fade_s);
     }
   }
@@ -246,7 +439,9 @@ void Voices::lose(Voice& voice) {
 void Voices::advance_gains(std::size_t frames) {
   for (Voice& voice : voices_) {
     const std::size_t follows = std::min(frames, voice.volume_frames);
-    voice.volume += voice.volume_step * static_cast<double>(follows);
+    for (std::size_t side = 0; side < voice.volume.size(); ++side) {
+      voice.volume[side] += voice.volume_step[side] * static_cast<double>(follows);
+    }
     voice.volume_frames -= follows;
     if (!voice.decay.is_steady()) {
       for (std::size_t n = 0; n < frames; ++n) {
@@ -261,7 +456,8 @@ void Voices::advance_gains(std::size_t frames) {
 
 bool Voices::update(Voice& voice) {
   voice.decay.settle();
-  const double peak = voice.peak * playing_.gain * voice.decay.gain * voice.volume;
+  const double peak =
+      voice.peak * playing_.gain * voice.decay.gain * std::max(voice.volume[0], voice.volume[1]);
   voice.peak = 0.0;
   voice.level = std::max(peak, voice.level * level_kept_);
   const double gain = voice.decay.gain;
@@ -356,8 +552,8 @@ Voice& Voices::voice_for(int key, std::uint8_t channel) {
 // Whether a key that is pressed goes on with this voice: what a damper has touched, and what is
 // as loud as its key was pressed, is left to ring out beside the new one.
 bool Voices::sounds(const Voice& voice, int key, std::uint8_t channel) const {
-  return restrikes_ && voice.is_live() && voice.is_whole() && voice.frequency_hz > 0.0 &&
-         voice.key == key && voice.channel == channel;
+  return restrikes_ && voice.is_live() && voice.is_whole() && voice.has_key && voice.key == key &&
+         voice.channel == channel;
 }
 
 // --- tuning -------------------------------------------------------------------------------------
@@ -396,18 +592,15 @@ double Pitches::frequency_at(double factor) const {
   return low;
 }
 
-double Voices::frequency_of(int key) const {
-  return 440.0 * std::exp2((key + playing_.transpose - 69) / 12.0);
-}
-
-bool Voices::plays(int key, double highest_factor) const {
-  const double hz = frequency_of(key);
-  return playing_.tuning == Tuning::fixed ||
-         (hz < 0.5 * rate_hz_ && playing_.pitches.factor_at(hz) <= highest_factor);
+// The key's frequency; 0 where it has none, or none that can be played.
+double Voices::playable_hz(int key, double highest_factor) const {
+  const double hz = tuning_.frequency_hz(static_cast<std::size_t>(key));
+  return hz < 0.5 * rate_hz_ && playing_.pitches.factor_at(hz) <= highest_factor ? hz : 0.0;
 }
 
 double Voices::factor_for(const Voice& voice, double highest_factor) const {
-  const double bent = std::exp2(channels_.semitones(voice.channel) / 12.0);
+  const double bent =
+      std::exp2((voice.semitones + channels_.zone_semitones(voice.channel) + voice.glide) / 12.0);
   const double factor = voice.frequency_hz > 0.0
                             ? playing_.pitches.factor_at(voice.frequency_hz * bent)
                             : bent * bent;

@@ -3,14 +3,18 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <limits>
+#include <optional>
 #include <vector>
 
-#include "core/engine/channels.h"
 #include "core/engine/engine.h"
+#include "core/engine/midi/channels.h"
+#include "core/engine/midi/held_keys.h"
+#include "core/engine/midi/key_tuning.h"
 
 namespace ressort {
 
@@ -45,6 +49,21 @@ struct Decay {
   }
 };
 
+// Who is meant by what is said to a channel: the voices on these channels, of one key or of all.
+struct Scope {
+  static constexpr int every_key = -1;
+  ChannelMask channels = all_channels;
+  int key = every_key;
+};
+
+// What a key that goes down does to the voice that is the last from now on.
+enum class Press : std::uint8_t {
+  silent,   // nothing: the key has no pitch, or none that can be played
+  starts,   // it begins
+  strikes,  // it sounds already, and is excited again
+  moves,    // it only goes to another pitch
+};
+
 struct Voice {
   bool is_live() const { return awake && !fading; }
   // Nothing has taken anything off it yet.
@@ -58,18 +77,28 @@ struct Voice {
   bool latched = false;     // by the sostenuto pedal, which went down while the key was
   bool is_new = false;      // its kernels are to be put to the start,
   bool is_retuned = false;  // or to its factor, before they step
+  bool has_key = false;     // if not, it belongs to every channel
   std::uint8_t key = 0;
   std::uint8_t channel = 0;
+  std::uint64_t turn = 0;     // so many keys went down before its own
   double frequency_hz = 0.0;  // without bend; 0: as the model is written
+  double key_hz = 0.0;        // the same before it was brought to where the model is stable
+  double semitones = 0.0;     // of its own channel's bend and tuning
+  double glide = 0.0;         // semitones that it is still away from its pitch,
+  double glide_step = 0.0;    // and how many it goes in max_block_frames
   double factor = 1.0;        // on every stiffness
   Decay decay;
   bool is_released = false;  // its key has been up since it was pressed
   double release_s = 0.0;    // T60 that its damper wants, by how fast the key went up
   double strength = 1.0;     // of the output, by how hard the key was pressed
-  double volume = 1.0;  // its strength and its channel's level, which it follows in equal steps
-  double volume_step = 0.0;
+  // Its strength and its channel's level, which it follows in equal steps.
+  SideGains volume = {1.0, 1.0};
+  SideGains volume_step = {};
   std::size_t volume_frames = 0;  // until it is there
-  bool is_steady() const { return decay.is_steady() && volume_frames == 0; }
+  // All outputs have the same gain, throughout.
+  bool is_steady() const {
+    return decay.is_steady() && volume_frames == 0 && volume[0] == volume[1];
+  }
   double peak = 0.0;   // of the network's output since the last update
   double level = 0.0;  // peak of the output, slowly forgotten
   std::size_t quiet_frames = 0;
@@ -79,7 +108,8 @@ struct Voice {
 // wait-free, O(voices). A `highest_factor` is what Parameters say.
 class Voices {
  public:
-  Voices(const Playing& playing, double rate_hz);
+  // `outputs` are the channels of sound that there are: of one the pan moves nothing.
+  Voices(const Playing& playing, double rate_hz, std::size_t outputs);
   // What another engine's voices are in the midst of.
   void go_on_from(const Voices& from);
 
@@ -89,15 +119,24 @@ class Voices {
   bool is_idle() const { return awake_ == 0; }  // nobody is awake
   // The lane that was played last: what names no key acts on it.
   std::size_t last() const { return last_; }
+  // The same among those that are meant; nothing where nobody is.
+  std::optional<std::size_t> last_of(const Scope& scope) const;
+  // Whether the voice is awake and meant. A member of an MPE zone that was let go hears its master
+  // only: its channel may be another note's by now.
+  bool hears(const Voice& voice, const Scope& scope) const;
+  ChannelMask reach(std::uint8_t channel) const { return channels_.reach(channel); }
 
   // To the model's start, at this pitch; 0 Hz: as the model is written.
   void start(std::size_t lane, double frequency_hz);
   // Whether the voice slept, and starts.
   bool wake(std::size_t lane);
-  // Whether a key has a pitch that can be played; else it is silent.
-  bool plays(int key, double highest_factor) const;
-  // Such a key goes down: whether the voice that is the last from now on starts.
-  bool press_key(int key, std::uint8_t channel);
+  Press press_key(int key, double velocity, std::uint8_t channel, double highest_factor);
+  // A key goes up. Where one voice plays the last of those that are down, it goes back to the one
+  // before: that key, and nothing is to be released.
+  std::optional<HeldKey> go_back(int key, std::uint8_t channel, double highest_factor);
+  bool is_legato(std::uint8_t channel) const {
+    return playing_.legato || channels_.is_legato(channel);
+  }
   // A key goes up, this fast of 0..1: whether that releases this voice.
   bool lift_key(Voice& voice, int key, std::uint8_t channel, double velocity) const;
   // What a controller says to its channel, or what its bend is; `sustain` and `sostenuto` may let
@@ -105,6 +144,15 @@ class Voices {
   Channels::Change turn(std::uint8_t channel, int number, double value);
   void bend(std::uint8_t channel, double amount);
   void reset_controllers(std::uint8_t channel);
+  void set_mono(std::uint8_t channel, bool is_mono) { channels_.set_mono(channel, is_mono); }
+  ChannelMask rezoned() const { return channels_.rezoned(); }
+  void forget_keys(ChannelMask channels);  // as if none were down
+  // Of EventKind::key_tuning and tuning_reset.
+  void retune_key(std::size_t key, double frequency_hz, bool is_now, double highest_factor);
+  void reset_tuning(double highest_factor);
+  void adopt_channels(const Voices& from);
+  // Once in max_block_frames.
+  void glide_on();
   // Whether a pedal that went up lets this voice go.
   bool is_let_go(Voice& voice, std::uint8_t channel) const;
   double softness(std::uint8_t channel) const { return channels_.softness(channel); }
@@ -143,15 +191,24 @@ class Voices {
   void retune(std::uint8_t channel);
   void follow_level(Voice& voice) const;
   void follow_level(std::uint8_t channel);
+  SideGains level_of(std::uint8_t channel) const;
+  bool is_for_all(const Scope& scope) const;
+  static bool is_on(const Voice& voice, ChannelMask channels) {
+    return has_channel(channels, voice.channel);
+  }
+  void attach(Voice& voice, int key, std::uint8_t channel);
+  void move_to_key(Voice& voice, int key, bool glides, double highest_factor);
+  void glide_from(Voice& voice, double frequency_hz);
+  Voice* voice_on(std::uint8_t channel);
   // The least of the voices for which `may` says so; null where there is none.
   template <class May, class Less>
   Voice* least_of(May&& may, Less&& less);
   void end(Voice& voice);
   std::size_t too_many(std::size_t more) const;
   bool sounds(const Voice& voice, int key, std::uint8_t channel) const;
+  double playable_hz(int key, double highest_factor) const;
   Voice& voice_for(int key, std::uint8_t channel);
   double factor_for(const Voice& voice, double highest_factor) const;
-  double frequency_of(int key) const;
 
   const Playing& playing_;
   double rate_hz_;
@@ -161,6 +218,11 @@ class Voices {
   std::size_t awake_ = 0;
   std::size_t last_ = 0;
   Channels channels_;
+  KeyTuning tuning_;
+  bool is_stereo_;
+  std::array<HeldKeys, Channels::count> held_keys_;  // [channel]
+  std::array<double, Channels::count> last_hz_{};    // [channel] of its last key; 0: none
+  std::uint64_t turns_ = 0;
   bool has_changed_ = false;
   std::size_t limit_ = std::numeric_limits<std::size_t>::max();
   std::uint64_t resets_ = 0;

@@ -43,7 +43,7 @@ void Mixing::add(Bank<T>& bank, const VoiceGroup& group, const Segment& segment,
     if (!voice.is_steady()) {
       add_one(part.program, voice, segment, 0, segment.frames, sample);
     } else {
-      bank.gain[lane - group.first] = gain_ * voice.decay.gain * voice.volume;
+      bank.gain[lane - group.first] = gain_ * voice.decay.gain * voice.volume[0];
     }
   }
   std::copy_n(bank.outputs.data() + (segment.frames - 1) * part.row(), part.row(),
@@ -81,13 +81,16 @@ template <class Sample>
 void Mixing::add_one(const Program& program, const Voice& voice, const Segment& segment,
                      std::size_t from, std::size_t to, Sample&& sample) const {
   Decay decay = voice.decay;
-  double volume = voice.volume;
+  SideGains volume = voice.volume;
   for (std::size_t n = 0; n < to; ++n) {
     decay.advance();
-    volume += n < voice.volume_frames ? voice.volume_step : 0.0;
+    for (std::size_t side = 0; side < volume.size() && n < voice.volume_frames; ++side) {
+      volume[side] += voice.volume_step[side];
+    }
     for (std::size_t output = 0; n >= from && output < program.outputs.size(); ++output) {
-      segment.outputs[program.outputs[output].channel][segment.at + n] +=
-          gain_ * decay.gain * volume * sample(n, output);
+      const std::size_t channel = program.outputs[output].channel;
+      segment.outputs[channel][segment.at + n] +=
+          gain_ * decay.gain * volume[channel % volume.size()] * sample(n, output);
     }
   }
 }

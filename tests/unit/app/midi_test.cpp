@@ -1,6 +1,8 @@
 // MIDI bytes to events: every message, and everything that can be wrong with one.
 #include "app/realtime/midi.h"
 
+#include <algorithm>
+#include <cmath>
 #include <vector>
 
 #include "tests/support/harness.h"
@@ -91,6 +93,91 @@ TEST_CASE("system exclusive is passed over, in one packet or in several", "[midi
   CHECK(read(reader, {0xf0, 1, 2, 0x90, 60, 100}).size() == 1);
 }
 
+namespace {
+
+// Hz, from the standard's own words: a semitone of equal temperament, and 1/16384 of one.
+double tuned_hz(int semitone, int fraction) {
+  return 440.0 * std::pow(2.0, (semitone - 69.0 + fraction / 16384.0) / 12.0);
+}
+
+Bytes dump_of_all_keys() {
+  Bytes bytes = {0x7e, 0x7f, 0x08, 0x01, 0};
+  bytes.insert(bytes.end(), 16, 'x');
+  for (int key = 0; key < 128; ++key) {
+    const bool stays = key == 61;
+    bytes.insert(bytes.end(), {static_cast<std::uint8_t>(stays ? 0x7f : key),
+                               static_cast<std::uint8_t>(stays ? 0x7f : 64),
+                               static_cast<std::uint8_t>(stays ? 0x7f : 3)});
+  }
+  std::uint8_t sum = 0;
+  for (const std::uint8_t byte : bytes) {
+    sum ^= byte;
+  }
+  bytes.push_back(sum);
+  bytes.insert(bytes.begin(), 0xf0);
+  bytes.push_back(0xf7);
+  return bytes;
+}
+
+}  // namespace
+
+TEST_CASE("tunings of keys are read, in one packet or in several", "[midi]") {
+  const Bytes change = {0xf0, 0x7f, 0x10, 0x08, 0x02, 5,  3,    60,   60,   64,
+                        0,    61,   0x7f, 0x7f, 0x7f, 62, 0x7f, 0x7f, 0x7e, 0xf7};
+  for (const std::size_t cut : {std::size_t{1}, std::size_t{7}, change.size()}) {
+    MidiReader reader;
+    std::vector<Event> events;
+    for (std::size_t at = 0; at < change.size(); at += cut) {
+      const auto begin = change.begin() + static_cast<std::ptrdiff_t>(at);
+      const auto count = static_cast<std::ptrdiff_t>(std::min(cut, change.size() - at));
+      for (const Event& event : read(reader, Bytes(begin, begin + count))) {
+        events.push_back(event);
+      }
+      read(reader, {0xf8});
+    }
+    REQUIRE(events.size() == 2);  // all ones: as it was
+    check_event(events[0], EventKind::key_tuning, 0, 60, tuned_hz(60, 8192));
+    check_event(events[1], EventKind::key_tuning, 0, 62, tuned_hz(127, 16382));
+    CHECK(events[0].value2 == 1.0);
+    CHECK(reader.malformed() == 0);
+  }
+  MidiReader reader;
+  const auto dump = read(reader, dump_of_all_keys());
+  REQUIRE(dump.size() == 127);
+  check_event(dump[60], EventKind::key_tuning, 0, 60, tuned_hz(60, 64 * 128 + 3));
+  check_event(dump[61], EventKind::key_tuning, 0, 62, tuned_hz(62, 64 * 128 + 3));
+  CHECK(dump[60].value2 == 0.0);
+  CHECK(reader.malformed() == 0);
+}
+
+TEST_CASE("a tuning that is cut short, too long or altered is refused whole", "[midi]") {
+  Bytes altered = dump_of_all_keys();
+  altered[100] ^= 1;
+  Bytes shorter = dump_of_all_keys();
+  shorter.erase(shorter.begin() + 50);
+  Bytes longer = dump_of_all_keys();
+  longer.insert(longer.end() - 1, 5000, 1);
+  const std::vector<Bytes> wrong = {altered,
+                                    shorter,
+                                    longer,
+                                    {0xf0, 0x7f, 0, 8, 2, 0, 2, 60, 60, 0, 0, 0xf7},
+                                    {0xf0, 0x7f, 0, 8, 2, 0, 0, 60, 60, 0, 0, 0xf7}};
+  for (const Bytes& bytes : wrong) {
+    MidiReader reader;
+    CHECK(read(reader, bytes).empty());
+    CHECK(reader.malformed() == 1);
+    CHECK(read(reader, {0x90, 60, 100}).size() == 1);
+  }
+  // Ended by another status, or of a kind that nothing here knows, however long.
+  MidiReader reader;
+  CHECK(read(reader, {0xf0, 0x7f, 0, 8, 2, 0, 1, 60, 60, 0, 0, 0x90, 60, 100}).size() == 1);
+  Bytes unknown(100'000, 0x11);
+  unknown.front() = 0xf0;
+  unknown.back() = 0xf7;
+  CHECK(read(reader, unknown).empty());
+  CHECK(reader.malformed() == 0);
+}
+
 TEST_CASE("what is cut short or unknown makes no event and is counted", "[midi]") {
   const std::vector<Bytes> wrong = {{0x90}, {0x90, 60}, {60},   {0xf4},
                                     {0xf5}, {0xe0, 1},  {0xd0}, {0xf2, 1}};
@@ -106,8 +193,7 @@ TEST_CASE("what is cut short or unknown makes no event and is counted", "[midi]"
   MidiReader reader;
   CHECK(read(reader, {0x90, 60, 0x90, 61, 100}).size() == 1);
   CHECK(reader.malformed() == 1);
-  // A program change is a message like others, which nothing here follows.
-  CHECK(read(reader, {0xc0, 5}).empty());
+  check_event(read(reader, {0xc3, 5}).at(0), EventKind::program, 3, 5, 0.0);
   CHECK(read(reader, {0xf6}).empty());
   CHECK(reader.malformed() == 1);
 }
@@ -125,10 +211,10 @@ TEST_CASE("random bytes in random packets only ever make events in range", "[mid
     for (const Event& event : read(reader, bytes)) {
       ++count;
       const bool is_bend = event.kind == EventKind::bend;
-      const bool is_known = event.kind == EventKind::note_on || event.kind == EventKind::note_off ||
-                            event.kind == EventKind::controller ||
-                            event.kind == EventKind::pressure ||
-                            event.kind == EventKind::key_pressure || is_bend;
+      const bool is_known =
+          event.kind == EventKind::note_on || event.kind == EventKind::note_off ||
+          event.kind == EventKind::controller || event.kind == EventKind::pressure ||
+          event.kind == EventKind::key_pressure || event.kind == EventKind::program || is_bend;
       REQUIRE(is_known);
       REQUIRE(event.index <= 127);
       REQUIRE(event.channel <= 15);

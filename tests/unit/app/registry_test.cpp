@@ -84,9 +84,9 @@ void check_error(const std::string& text, const std::string& message) {
 TEST_CASE("every playing address becomes its event", "[registry]") {
   check(event("/note/on 60"), EventKind::note_on, 60, 100 / 127.0, 0);
   check(event("/note/on 60 127"), EventKind::note_on, 60, 1.0, 0);
-  check(event("/note/on 60 0"), EventKind::note_off, 60, usual_release_velocity, 0);
-  CHECK(event("/note/off 127").kind == EventKind::note_off);
-  CHECK(event("/note/off 127").index == 127);
+  check(event("/note/on 60 0"), EventKind::note_off, 60, 0.5, 0);
+  check(event("/note/off 127"), EventKind::note_off, 127, 0.5, 0);
+  check(event("/note/off 127 0"), EventKind::note_off, 127, 0.0, 0);
   check(event("/cc 1 127"), EventKind::controller, 1, 1.0, 0);
   check(event("/pressure 0"), EventKind::pressure, 0, 0.0, 0);
   check(event("/bend -0.5"), EventKind::bend, 0, -0.5, 0);

@@ -1,5 +1,5 @@
 // What controllers mean on every channel, whatever the preset: by MIDI 1.0 and General MIDI 2.
-#include "core/engine/channels.h"
+#include "core/engine/midi/channels.h"
 
 #include "tests/support/pitch.h"
 #include "tests/support/player.h"
@@ -128,6 +128,52 @@ TEST_CASE("volume and expression follow 40 dB a decade, without a step", "[chann
 // A damper of 10 ms takes 120 dB in 882 samples, and 221 to come on; then a voice ends with its
 // block of 64.
 constexpr double damped_after = 882 + 221 + 32;
+TEST_CASE("a pan balances left and right at equal power, without a step", "[channels]") {
+  // Both outputs hear the same mass; the third is heard on the left.
+  const std::string stereo = ringing_string() + scenes::output(2, "s_m6") +
+                             scenes::output(3, "s_m6") + scenes::output(4, "s_m6");
+  const auto outputs = [&](const std::string& text, const std::vector<Event>& events) {
+    Player player(text, struck(4));
+    player.run(20000, events);
+    CHECK(player.heap_calls == 0);
+    return player.out;
+  };
+  const auto plain = outputs(stereo, {note_on(0, 60)});
+  CHECK(outputs(stereo, {turned(0, 0, 10, 64), note_on(0, 60)}) == plain);
+  // General MIDI 2: 1 is hard left, 127 hard right, by cos and sin of a quarter turn.
+  const double eighth = std::sin(0.125 * std::numbers::pi);
+  const double other = std::cos(0.125 * std::numbers::pi);
+  const double root = std::numbers::sqrt2;
+  struct Row {
+    double value;
+    double left;
+    double right;
+  };
+  for (const auto& [value, left, right] :
+       {Row{1.0 / 127.0, root, 0.0}, Row{0.0, root, 0.0}, Row{1.0, 0.0, root},
+        Row{32.5 / 127.0, root * other, root * eighth}}) {
+    const auto found = outputs(stereo, {note_on(0, 60), on(0, controller(5000, 10, value))});
+    double worst = 0.0;
+    for (std::size_t n = 0; n < plain[0].size(); ++n) {
+      const double way = std::clamp((static_cast<double>(n) - 4999.0) / 882.0, 0.0, 1.0);
+      for (std::size_t channel = 0; channel < 4; ++channel) {
+        const double gain = channel % 2 == 0 ? left : right;
+        const double wanted = plain[channel][n] * (1.0 + way * (gain - 1.0));
+        worst = std::max(worst, std::fabs(found[channel][n] - wanted));
+      }
+    }
+    CAPTURE(value);
+    CHECK(worst < 1e-12);
+    CHECK(left * left + right * right == Approx(2.0));
+  }
+  // Of its own channel's notes, new ones too; one output alone stays as it is.
+  CHECK(outputs(stereo, {turned(1, 0, 10, 0), note_on(0, 60)}) == plain);
+  const auto right = outputs(stereo, {turned(0, 0, 10, 127), note_on(0, 60)});
+  CHECK(peak(right[0]) == 0.0);
+  CHECK(peak(right[1]) == Approx(root * peak(plain[1])));
+  CHECK(outputs(ringing_string(), {turned(0, 0, 10, 0), note_on(0, 60)})[0] ==
+        outputs(ringing_string(), {note_on(0, 60)})[0]);
+}
 
 TEST_CASE("the sostenuto pedal holds what was down when it went down", "[channels]") {
   const auto ends = [](const std::vector<Event>& events) {
@@ -186,8 +232,16 @@ TEST_CASE("channel modes end and reset their own channel, by the standard", "[ch
   Channels channels;
   channels.turn(0, 7, 50 / 127.0);
   channels.turn(0, 11, .5);
+  channels.turn(0, 10, 1.0);
+  channels.turn(0, 67, 1.0);
+  channels.turn(0, 65, 1.0);
+  channels.turn(0, 5, 1.0);
   channels.bend(0, 1.0);
+  CHECK(channels.glide_s(0, 0.0) == 4.0);
   channels.reset(0);
+  CHECK(channels.balance(0)[0] == Approx(0.0).margin(1e-12));  // RP-015: nor the pan
+  CHECK(channels.softness(0) == 1.0);
+  CHECK(channels.glide_s(0, 0.0) == 0.0);
   CHECK(channels.level(0) == Approx(.25));
   CHECK(channels.semitones(0) == 0.0);
 }

@@ -99,6 +99,37 @@ TEST_CASE("a preset is what was written, and the rest its defaults", "[preset]")
   CHECK(least.preset == Preset{.model = "x.mdl"});
 }
 
+TEST_CASE("a preset says how its keys are tuned and played", "[preset]") {
+  const auto parsed = parse_preset(
+      "model = \"x.mdl\"\na4_hz = 442.5\nscale = \"a.scl\"\nkeyboard_map = \"a.kbm\"\n"
+      "channels = [1, 3, 16]\nvelocity = -0.5\nplay = \"legato\"\nglide_s = 0.25\n");
+  REQUIRE(parsed.ok());
+  const Preset& read = parsed.preset;
+  CHECK(read.a4_hz == 442.5);
+  CHECK((read.scale == "a.scl" && read.keyboard_map == "a.kbm"));
+  CHECK(read.channels == 0x8005);
+  CHECK(read.velocity == -0.5);
+  CHECK((read.mono && read.legato));
+  CHECK(read.glide_s == 0.25);
+  const auto points =
+      parse_preset("model = \"x.mdl\"\nvelocity = [[0, 0], [63.5, 127]]\nplay = \"mono\"\n");
+  REQUIRE(points.ok());
+  CHECK(points.preset.velocity_points ==
+        std::vector<std::array<double, 2>>{{0.0, 0.0}, {0.5, 1.0}});
+  CHECK((points.preset.mono && !points.preset.legato));
+  for (const char* const wrong :
+       {"a4_hz = 100", "scale = \"a.kbm\"", "scale = \"b/a.scl\"", "keyboard_map = 3",
+        "channels = []", "channels = [0]", "channels = [17]", "channels = [1.5]", "channels = 1",
+        "velocity = 2", "velocity = [[0, 0]]", "velocity = [[0, 0], [0, 1]]",
+        "velocity = [[0, 1], [127, 0]]", "velocity = [[0, 0], [128, 1]]", "velocity = [0, 1]",
+        "velocity = [[0, 0], [true, 1]]", "play = \"solo\"", "glide_s = -1"}) {
+    CAPTURE(wrong);
+    const auto read_wrong = parse_preset("model = \"x.mdl\"\n" + std::string(wrong) + "\n");
+    REQUIRE(read_wrong.errors.size() == 1);
+    CHECK(read_wrong.errors[0].line == 2);
+  }
+}
+
 TEST_CASE("every source and every gesture has its word", "[preset]") {
   const auto from = [](const std::string& word) {
     return control_of("from = \"" + word + "\"\nto = \"in1\"");

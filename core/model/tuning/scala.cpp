@@ -1,0 +1,218 @@
+#include "core/model/tuning/scala.h"
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <string>
+
+namespace ressort {
+namespace {
+
+constexpr std::string_view blanks = " \t\v\f";
+constexpr std::size_t longest_shown = 32;  // of what was found instead
+
+// The lines that are no comments, one by one.
+class ScalaLines {
+ public:
+  explicit ScalaLines(std::string_view text) : rest_(text) {}
+
+  // Whether there was one more; it is line() from now on.
+  bool next() {
+    while (!rest_.empty()) {
+      const std::size_t end = std::min(rest_.find('\n'), rest_.size());
+      line_ = rest_.substr(0, end);
+      rest_.remove_prefix(std::min(rest_.size(), end + 1));
+      ++number_;
+      if (line_.ends_with('\r')) {
+        line_.remove_suffix(1);
+      }
+      if (!line_.starts_with('!')) {
+        return true;
+      }
+    }
+    line_ = {};
+    ++number_;
+    return false;
+  }
+
+  // What stands first in it; what comes behind is for people.
+  std::string_view word() const {
+    const std::size_t start = std::min(line_.find_first_not_of(blanks), line_.size());
+    const std::string_view rest = line_.substr(start);
+    return rest.substr(0, std::min(rest.find_first_of(blanks), rest.size()));
+  }
+  int number() const { return number_; }
+
+  Error expected(const std::string& what) const {
+    const std::string_view found = word();
+    const std::size_t start = std::min(line_.find_first_not_of(blanks), line_.size());
+    return {
+        "expected " + what + ", found " +
+            (found.empty() ? "nothing" : "'" + std::string(found.substr(0, longest_shown)) + "'"),
+        number_, static_cast<int>(start) + 1};
+  }
+
+ private:
+  std::string_view rest_;
+  std::string_view line_;
+  int number_ = 0;
+};
+
+// The whole of it is a number.
+template <class Number>
+std::optional<Number> number_of(std::string_view text) {
+  Number number{};
+  const char* const end = text.data() + text.size();
+  const auto [last, failure] = std::from_chars(text.data(), end, number);
+  return failure == std::errc{} && last == end && !text.empty() ? std::optional(number)
+                                                                : std::nullopt;
+}
+
+// A pitch with a point is cents; without one it is a ratio, or a whole number over 1.
+std::optional<double> cents_of(std::string_view word) {
+  constexpr double most_cents = 120'000.0;  // a hundred octaves
+  if (word.find('.') != word.npos) {
+    const auto cents = number_of<double>(word);
+    return cents && std::fabs(*cents) <= most_cents ? cents : std::nullopt;
+  }
+  const std::size_t slash = word.find('/');
+  const auto above = number_of<long long>(word.substr(0, slash));
+  const auto below =
+      slash == word.npos ? std::optional(1LL) : number_of<long long>(word.substr(slash + 1));
+  if (!above || !below || *above <= 0 || *below <= 0) {
+    return std::nullopt;
+  }
+  return 1200.0 * std::log2(static_cast<double>(*above) / static_cast<double>(*below));
+}
+
+}  // namespace
+
+Result<Scale> parse_scale(std::string_view text) {
+  ScalaLines lines(text);
+  if (text.size() > max_tuning_bytes) {
+    return Error{"the scale is longer than 64 KiB", 1, 1};
+  }
+  if (!lines.next()) {
+    return lines.expected("a line that describes the scale");
+  }
+  lines.next();
+  const auto count = number_of<int>(lines.word());
+  if (!count || *count < 1 || *count > max_scale_notes) {
+    return lines.expected("how many notes the scale has, 1 to " + std::to_string(max_scale_notes));
+  }
+  Scale scale;
+  for (int note = 1; note <= *count; ++note) {
+    lines.next();
+    const auto cents = cents_of(lines.word());
+    if (!cents) {
+      return lines.expected("note " + std::to_string(note) + " of " + std::to_string(*count) +
+                            ", as cents with a point (701.955) or as a ratio (3/2)");
+    }
+    scale.cents.push_back(*cents);
+  }
+  if (scale.cents.back() <= 0.0) {
+    return lines.expected("a last note above the first: the scale begins anew there");
+  }
+  return scale;
+}
+
+Result<KeyboardMap> parse_keyboard_map(std::string_view text) {
+  ScalaLines lines(text);
+  if (text.size() > max_tuning_bytes) {
+    return Error{"the keyboard map is longer than 64 KiB", 1, 1};
+  }
+  KeyboardMap map;
+  int size = 0;
+  const struct {
+    int& value;
+    int most;
+    const char* what;
+  } heads[] = {{size, max_mapped_keys, "how many keys the map has"},
+               {map.first_key, 127, "the first key that is retuned"},
+               {map.last_key, 127, "the last key that is retuned"},
+               {map.middle_key, 127, "the key that plays step 0"},
+               {map.reference_key, 127, "the key of which the frequency is given"}};
+  for (const auto& head : heads) {
+    lines.next();
+    const auto value = number_of<int>(lines.word());
+    if (!value || *value < 0 || *value > head.most) {
+      return lines.expected(std::string(head.what) + ", 0 to " + std::to_string(head.most));
+    }
+    head.value = *value;
+  }
+  lines.next();
+  const auto hz = number_of<double>(lines.word());
+  if (!hz || !(*hz >= 1.0 && *hz <= 20'000.0)) {
+    return lines.expected("that key's frequency, 1 to 20000 Hz");
+  }
+  map.reference_hz = *hz;
+  lines.next();
+  const auto octave = number_of<int>(lines.word());
+  if (!octave || *octave < 0 || *octave > max_mapped_keys) {
+    return lines.expected("the step at which the map begins anew, 0 to " +
+                          std::to_string(max_mapped_keys));
+  }
+  map.octave_steps = *octave;
+  // Those at the end may be left out: they are silent.
+  map.steps.resize(static_cast<std::size_t>(size));
+  for (int key = 0; key < size && lines.next(); ++key) {
+    const std::string_view word = lines.word();
+    if (word.empty()) {
+      continue;  // a last line without anything
+    }
+    const auto step = number_of<int>(word);
+    const bool is_silent = word == "x" || word == "X";
+    if (!is_silent && (!step || *step < 0 || *step > max_mapped_keys)) {
+      return lines.expected("the step of key " + std::to_string(key) + " of the map, 0 to " +
+                            std::to_string(max_mapped_keys) + ", or x for none");
+    }
+    map.steps[static_cast<std::size_t>(key)] = step;
+  }
+  return map;
+}
+
+Result<std::vector<double>> key_frequencies(const Scale& scale, const KeyboardMap& map) {
+  const auto notes = static_cast<int>(scale.cents.size());
+  const auto floor_divided = [](int a, int b) { return a / b - (a % b < 0 ? 1 : 0); };
+  const auto cents_of_step = [&](int step) {
+    const int period = floor_divided(step, notes);
+    const int note = step - period * notes;
+    return period * scale.cents.back() +
+           (note == 0 ? 0.0 : scale.cents[static_cast<std::size_t>(note) - 1]);
+  };
+  const auto cents_of_key = [&](int key) -> std::optional<double> {
+    const int away = key - map.middle_key;
+    if (map.steps.empty()) {
+      return cents_of_step(away);
+    }
+    const auto size = static_cast<int>(map.steps.size());
+    const int turn = floor_divided(away, size);
+    const auto step = map.steps[static_cast<std::size_t>(away - turn * size)];
+    const int octave = map.octave_steps == 0 ? notes : map.octave_steps;
+    return step ? std::optional(cents_of_step(*step) + turn * cents_of_step(octave)) : std::nullopt;
+  };
+  const auto reference = cents_of_key(map.reference_key);
+  if (!reference) {
+    return Error{"the keyboard map gives the frequency of key " +
+                 std::to_string(map.reference_key) + ", which it leaves silent"};
+  }
+  std::vector<double> frequencies;
+  for (int key = 0; key < 128; ++key) {
+    const auto cents = cents_of_key(key);
+    const bool is_mapped = key >= map.first_key && key <= map.last_key;
+    const double hz = !is_mapped ? 440.0 * std::exp2((key - 69) / 12.0)
+                      : cents    ? map.reference_hz * std::exp2((*cents - *reference) / 1200.0)
+                                 : 0.0;
+    constexpr double lowest_hz = 1e-3;
+    constexpr double highest_hz = 1e6;
+    if (hz != 0.0 && !(hz >= lowest_hz && hz <= highest_hz)) {
+      // Nobody hears it; what a far step of a wide scale gives is no fault.
+      frequencies.push_back(0.0);
+      continue;
+    }
+    frequencies.push_back(hz);
+  }
+  return frequencies;
+}
+
+}  // namespace ressort

@@ -1,0 +1,331 @@
+// Which voice plays which key: one a key, one for all, legato, pedals, glides. The cases are those
+// that a voice manager is asked for.
+#include "core/engine/voices.h"
+#include "tests/support/pitch.h"
+#include "tests/support/player.h"
+
+namespace ressort {
+namespace {
+
+using namespace support;
+
+constexpr double rate_hz = 44100.0;
+constexpr double highest = 1e9;
+
+// Voices and what an engine does with them when keys and pedals move; what is let go rings on.
+struct Keys {
+  explicit Keys(int count, bool mono = false, bool legato = false, double glide_s = 0.0) {
+    playing.tuning = Tuning::keyboard;
+    playing.voices = count;
+    playing.mono = mono;
+    playing.legato = legato;
+    playing.glide_s = glide_s;
+    voices.emplace(playing, rate_hz, std::size_t{2});
+  }
+  Press on(int key, int channel = 0) {
+    return voices->press_key(key, 0.8, static_cast<std::uint8_t>(channel), highest);
+  }
+  // The key that it goes back to.
+  std::optional<int> off(int key, int channel = 0) {
+    if (const auto earlier = voices->go_back(key, static_cast<std::uint8_t>(channel), highest)) {
+      return earlier->key;
+    }
+    for (std::size_t lane = 0; lane < voices->size(); ++lane) {
+      Voice& voice = (*voices)[lane];
+      if (voices->lift_key(voice, key, static_cast<std::uint8_t>(channel))) {
+        voices->release(voice);
+      }
+    }
+    return std::nullopt;
+  }
+  void pedal(bool is_down, int channel = 0) {
+    voices->turn(static_cast<std::uint8_t>(channel), 64, is_down ? 1.0 : 0.0);
+    for (std::size_t lane = 0; lane < voices->size(); ++lane) {
+      if (voices->is_let_go((*voices)[lane], static_cast<std::uint8_t>(channel))) {
+        voices->release((*voices)[lane]);
+      }
+    }
+  }
+  template <class Wanted>
+  int count(Wanted&& wanted) const {
+    int found = 0;
+    for (std::size_t lane = 0; lane < voices->size(); ++lane) {
+      const Voice& voice = (*voices)[lane];
+      found += voice.is_live() && voice.has_key && wanted(voice) ? 1 : 0;
+    }
+    return found;
+  }
+  int live() const {
+    return count([](const Voice&) { return true; });
+  }
+  int gated() const {
+    return count([](const Voice& voice) { return voice.held; });
+  }
+  int sounding() const {
+    return count([](const Voice& voice) { return voice.held || voice.sustained; });
+  }
+  int on_key(int key) const {
+    return count([&](const Voice& voice) { return voice.key == key; });
+  }
+
+  Playing playing;
+  std::optional<Voices> voices;
+};
+
+}  // namespace
+
+TEST_CASE("each key has a voice, and channels have their own", "[play_modes]") {
+  Keys keys(8);
+  CHECK(keys.on(60) == Press::starts);
+  CHECK(keys.on(64) == Press::starts);
+  CHECK((keys.live() == 2 && keys.gated() == 2));
+  CHECK(keys.on(60, 1) == Press::starts);
+  CHECK((keys.live() == 3 && keys.on_key(60) == 2));
+  keys.off(60, 1);
+  CHECK(keys.gated() == 2);
+  keys.off(60, 5);  // nobody's
+  keys.off(61);
+  CHECK(keys.gated() == 2);
+  keys.off(60);
+  keys.off(64);
+  CHECK((keys.gated() == 0 && keys.live() == 3));  // and all ring on
+}
+
+TEST_CASE("a key that sounds is struck again in its own voice", "[play_modes]") {
+  Keys keys(4);
+  for (const int key : {60, 61, 62, 63}) {
+    keys.on(key);
+  }
+  keys.off(60);
+  CHECK((keys.live() == 4 && keys.gated() == 3));
+  // In a full house too: nobody gives way.
+  CHECK(keys.on(60) == Press::strikes);
+  CHECK((keys.live() == 4 && keys.gated() == 4));
+  for (const int key : {60, 61, 62, 63}) {
+    CHECK(keys.on_key(key) == 1);
+  }
+  // A new key takes one place, no more.
+  CHECK(keys.on(64) == Press::starts);
+  CHECK((keys.live() == 4 && keys.on_key(64) == 1));
+}
+
+TEST_CASE("the sustain pedal holds notes, struck again or not, until it goes up", "[play_modes]") {
+  Keys keys(8);
+  keys.on(60);
+  keys.on(64);
+  keys.pedal(true);
+  keys.off(60);
+  CHECK((keys.gated() == 1 && keys.sounding() == 2));
+  keys.pedal(false);
+  CHECK(keys.sounding() == 1);  // 64 is still down
+  keys.off(64);
+  CHECK(keys.sounding() == 0);
+  // Struck again under the pedal, and released under it...
+  keys.pedal(true);
+  keys.on(60);
+  keys.off(60);
+  CHECK(keys.on(60) == Press::strikes);
+  keys.off(60);
+  CHECK((keys.sounding() == 1 && keys.on_key(60) == 1));
+  keys.pedal(false);
+  CHECK(keys.sounding() == 0);
+  // ...or after it.
+  keys.pedal(true);
+  keys.on(60);
+  keys.off(60);
+  keys.on(60);
+  keys.pedal(false);
+  CHECK(keys.sounding() == 1);
+  keys.off(60);
+  CHECK(keys.sounding() == 0);
+  // Another channel's pedal is none of its business.
+  keys.pedal(true, 3);
+  keys.on(60);
+  keys.off(60);
+  CHECK(keys.sounding() == 0);
+}
+
+TEST_CASE("mono plays the last of the keys that are down, in one voice", "[play_modes]") {
+  Keys keys(8, true);
+  CHECK(keys.on(60) == Press::starts);
+  CHECK(keys.on(64) == Press::strikes);
+  CHECK((keys.live() == 1 && keys.on_key(64) == 1));
+  CHECK(keys.on(67) == Press::strikes);
+  CHECK(keys.off(64) == std::nullopt);  // not the one that sounds
+  CHECK((keys.gated() == 1 && keys.on_key(67) == 1));
+  CHECK(keys.off(67) == 60);
+  CHECK((keys.gated() == 1 && keys.on_key(60) == 1));
+  CHECK(keys.off(60) == std::nullopt);
+  CHECK(keys.gated() == 0);
+  // What rings is taken up again.
+  CHECK(keys.on(62) == Press::strikes);
+  CHECK(keys.live() == 1);
+  // A channel each.
+  CHECK(keys.on(62, 1) == Press::starts);
+  CHECK(keys.live() == 2);
+  CHECK(keys.off(62, 1) == std::nullopt);
+  CHECK(keys.gated() == 1);
+  // Of the same key twice one release is enough.
+  keys.on(62);
+  keys.on(62);
+  keys.off(62);
+  CHECK(keys.gated() == 0);
+}
+
+TEST_CASE("in mono a pedal holds what sounds, and keys say what that is", "[play_modes]") {
+  Keys keys(8, true);
+  keys.pedal(true);
+  keys.on(60);
+  keys.on(64);
+  CHECK(keys.off(64) == 60);
+  keys.off(60);
+  CHECK((keys.live() == 1 && keys.sounding() == 1 && keys.on_key(60) == 1));
+  keys.on(67);
+  CHECK((keys.live() == 1 && keys.on_key(67) == 1));
+  keys.off(67);
+  keys.pedal(false);
+  CHECK(keys.sounding() == 0);
+}
+
+TEST_CASE("legato moves without a new blow while a key is down", "[play_modes]") {
+  Keys keys(8, true, true);
+  CHECK(keys.on(60) == Press::starts);
+  CHECK(keys.on(62) == Press::moves);
+  CHECK((keys.live() == 1 && keys.on_key(62) == 1));
+  CHECK(keys.off(60) == std::nullopt);
+  CHECK(keys.gated() == 1);
+  CHECK(keys.off(62) == std::nullopt);
+  CHECK(keys.gated() == 0);
+  CHECK(keys.on(64) == Press::strikes);  // the voice that rings, struck anew
+  CHECK(keys.live() == 1);
+  CHECK(keys.on(65) == Press::moves);
+  CHECK(keys.off(65) == 64);
+  CHECK(keys.off(64) == std::nullopt);
+  // By the switch, of a channel that plays mono; each for itself.
+  Keys switched(8, true);
+  switched.voices->turn(0, 68, 1.0);
+  switched.on(60);
+  CHECK(switched.on(62) == Press::moves);
+  switched.on(60, 1);
+  CHECK(switched.on(62, 1) == Press::strikes);
+}
+
+TEST_CASE("channel modes say mono and poly whatever the preset says", "[play_modes]") {
+  Keys keys(8);
+  keys.voices->set_mono(2, true);
+  keys.on(60, 2);
+  CHECK(keys.on(64, 2) == Press::strikes);
+  CHECK(keys.live() == 1);
+  keys.on(60);
+  CHECK(keys.on(64) == Press::starts);
+  Keys mono(8, true);
+  mono.voices->set_mono(0, false);
+  mono.on(60);
+  CHECK(mono.on(64) == Press::starts);
+}
+
+TEST_CASE("a glide takes its time and ends on the pitch", "[play_modes]") {
+  constexpr double glide_s = 0.1;
+  const auto updates = static_cast<int>(glide_s * rate_hz / max_block_frames);
+  Keys keys(8, true, true, glide_s);
+  keys.on(60);
+  keys.on(72);
+  const Voice& voice = (*keys.voices)[keys.voices->last()];
+  CHECK(voice.glide == Approx(-12.0).epsilon(1e-12));
+  for (int i = 0; i < updates / 2; ++i) {
+    keys.voices->glide_on();
+  }
+  CHECK(voice.glide == Approx(-6.0).margin(12.0 / updates));
+  // Back from the midst of it.
+  keys.off(72);
+  CHECK(voice.glide == Approx(6.0).margin(12.0 / updates));
+  for (int i = 0; i <= updates; ++i) {
+    keys.voices->glide_on();
+  }
+  CHECK(voice.glide == 0.0);
+  CHECK(voice.frequency_hz == Approx(261.6255653005986).epsilon(1e-12));
+  // Legato glides where keys overlap only; poly from the key before, on its own channel.
+  keys.off(60);
+  keys.on(67);
+  CHECK((*keys.voices)[keys.voices->last()].glide == 0.0);
+  Keys poly(8, false, false, glide_s);
+  poly.on(60);
+  CHECK((*poly.voices)[poly.voices->last()].glide == 0.0);
+  poly.on(67);
+  CHECK((*poly.voices)[poly.voices->last()].glide == Approx(-7.0));
+  poly.on(67, 1);
+  CHECK((*poly.voices)[poly.voices->last()].glide == 0.0);
+  // Controller 65 ends it, 5 says how long: a quarter of 4 s for half of 127.
+  poly.voices->turn(0, 65, 0.0);
+  poly.on(70);
+  CHECK((*poly.voices)[poly.voices->last()].glide == 0.0);
+  poly.voices->turn(0, 65, 1.0);
+  poly.voices->turn(0, 5, 0.5);
+  poly.on(71);
+  const Voice& slow = (*poly.voices)[poly.voices->last()];
+  CHECK(slow.glide_step == Approx(1.0 * max_block_frames / rate_hz).epsilon(1e-9));
+}
+
+TEST_CASE("a glide is heard, and one voice is struck again or moved", "[play_modes]") {
+  const auto played = [](bool legato, double glide_s) {
+    Preset preset = struck(4);
+    preset.mono = true;
+    preset.legato = legato;
+    preset.glide_s = glide_s;
+    Player player(scenes::poly_triangle(), preset);
+    player.run(16384, {note_on(0, 69), note_on(4096, 72), note_off(4100, 69)});
+    CHECK(player.heap_calls == 0);
+    return player.y();
+  };
+  const auto later = [](const std::vector<double>& y) {
+    return std::vector<double>(y.begin() + 8192, y.end());
+  };
+  const double c_hz = 440.0 * std::exp2(3.0 / 12.0);
+  for (const double glide_s : {0.0, 0.05}) {
+    const auto struck_again = played(false, glide_s);
+    const auto moved = played(true, glide_s);
+    CHECK(std::fabs(1200.0 * std::log2(measured_hz(later(moved), rate_hz, c_hz) / c_hz)) < 2.0);
+    CHECK(peak(later(struck_again)) > 2.0 * peak(later(moved)));
+  }
+}
+
+TEST_CASE("channels that a preset does not listen to play nothing", "[play_modes]") {
+  const auto played = [](int channel, unsigned channels) {
+    Preset preset = struck(4);
+    preset.channels = channels;
+    Player player(ringing_string(), preset);
+    Event note = note_on(100, 60);
+    note.channel = static_cast<std::uint8_t>(channel);
+    player.run(3000, {note});
+    return peak(player.y());
+  };
+  CHECK(played(3, 0xffff) > 1e-3);
+  CHECK(played(3, 0x0008) > 1e-3);
+  CHECK(played(3, 0x0007) == 0.0);
+  CHECK(played(0, 0x0008) == 0.0);
+}
+
+TEST_CASE("a velocity curve bends the touch and keeps its ends", "[play_modes]") {
+  const auto loudness = [](double curve, double velocity,
+                           std::vector<std::array<double, 2>> points = {}) {
+    Preset preset = struck(4);
+    preset.velocity = curve;
+    preset.velocity_points = std::move(points);
+    Player player(ringing_string(), preset);
+    player.run(3000, {note_on(0, 60, velocity)});
+    return peak(player.y());
+  };
+  const double full = loudness(0.0, 1.0);
+  // The blow is in proportion to what the curve gives: v, its square root, its square.
+  CHECK(loudness(0.0, 0.25) == Approx(0.25 * full));
+  CHECK(loudness(0.5, 0.25) == Approx(0.5 * full));
+  CHECK(loudness(-0.5, 0.25) == Approx(0.0625 * full));
+  CHECK(loudness(1.0, 1.0) == Approx(full));
+  CHECK(loudness(-1.0, 1.0) == Approx(full));
+  const std::vector<std::array<double, 2>> points = {{0.0, 0.2}, {0.5, 0.4}, {1.0, 0.8}};
+  CHECK(loudness(0.0, 0.25, points) == Approx(0.3 * full));
+  CHECK(loudness(0.0, 0.75, points) == Approx(0.6 * full));
+  CHECK(loudness(0.0, 1.0, points) == Approx(0.8 * full));
+}
+
+}  // namespace ressort
