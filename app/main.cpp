@@ -39,7 +39,8 @@ const char* const render_examples =
     "smoothing, one channel for each output.\n"
     "Examples:\n"
     "  ressort render PolyTriangle -o out.wav\n"
-    "  ressort render my.mdl -o out.wav --input gesture.wav --format double\n";
+    "  ressort render my.mdl -o out.wav --input gesture.wav --format double\n"
+    "  ressort render --all-presets -o sounds      then look at sounds/index.html\n";
 
 const char* const make_examples =
     "KIND, and the points along each side, the fixed ones included:\n"
@@ -283,6 +284,7 @@ void add_play(CLI::App& app, PlayOptions& options, int& code) {
 struct RenderChoice {
   RenderOptions options;
   std::vector<std::string> settings;
+  bool all_presets = false;
   double seconds = 0.0;
   long long frames = 0;
   bool is_quiet = false;
@@ -292,7 +294,8 @@ void add_render(CLI::App& app, RenderChoice& choice, int& code) {
   RenderOptions& options = choice.options;
   CLI::App* command = app.add_subcommand("render", "renders a model or a preset to a sound file");
   command->footer(render_examples);
-  command->add_option("MODEL", options.name, "a preset's or a model's name, or a file")->required();
+  CLI::Option* model =
+      command->add_option("MODEL", options.name, "a preset's or a model's name, or a file");
   std::string endings;
   for (const std::string_view ending : sound_endings()) {
     endings += (endings.empty() ? "" : " ") + std::string(ending);
@@ -334,8 +337,28 @@ void add_render(CLI::App& app, RenderChoice& choice, int& code) {
   command->add_option("--threads", options.threads, "for large networks; without it, all cores")
       ->check(within(1, 1024));
   command->add_flag("--limit", options.limit, "keep below full scale, 1 ms late");
+  CLI::Option* all =
+      command
+          ->add_flag("--all-presets", choice.all_presets,
+                     "every preset, a phrase and a note of each, into the folder -o; index.html\n"
+                     "there shows their envelopes, spectrograms and figures, spectra.svg is a\n"
+                     "picture of all")
+          ->excludes(model);
+  for (CLI::Option* other : command->get_options()) {
+    const std::string name = other->get_single_name();
+    if (other != all && name != "help" && name != "output" && name != "rate") {
+      all->excludes(other);
+    }
+  }
   command->add_flag("-q,--quiet", choice.is_quiet, "say nothing unless something is wrong");
-  command->callback([&choice, seconds, frames, &code] {
+  command->callback([&choice, model, seconds, frames, &code] {
+    if (choice.all_presets) {
+      code = gallery_command({choice.options.output, choice.options.rate_hz, choice.is_quiet});
+      return;
+    }
+    if (model->count() == 0) {
+      throw CLI::RequiredError("MODEL");
+    }
     if (seconds->count() > 0) {
       choice.options.seconds = choice.seconds;
     }

@@ -1,6 +1,5 @@
 #include "app/commands/commands.h"
 
-#include <poll.h>
 #include <signal.h>
 #include <unistd.h>
 
@@ -16,6 +15,7 @@
 #include <utility>
 #include <vector>
 
+#include "app/commands/progress_bar.h"
 #include "app/control/terminal.h"
 #include "app/devices/midi_input.h"
 #include "app/say.h"
@@ -412,19 +412,10 @@ void ignore_signals_no_more() {
   }
 }
 
-// How far it is, where somebody looks and the terminal takes it.
-void show_progress(const std::string& output, int percent) {
-  pollfd ready{STDERR_FILENO, POLLOUT, 0};
-  if (poll(&ready, 1, 0) > 0) {
-    std::fprintf(stderr, "\r%s: %3d %%", output.c_str(), percent);
-  }
-}
-
 }  // namespace
 
 int render_command(const RenderOptions& options, bool is_quiet) {
-  const bool shows = !is_quiet && isatty(STDERR_FILENO) != 0;
-  int shown = -1;
+  std::optional<ProgressBar> bar(!is_quiet);
   RenderOptions watched = options;
   LoadNews news(options.name, is_quiet ? LoadNews::Tell() : complain);
   watched.loading = Progress([&](std::string_view stage) {
@@ -436,16 +427,11 @@ int render_command(const RenderOptions& options, bool is_quiet) {
     if (!std::exchange(is_watched, true)) {
       watch_signals();
     }
-    if (const int percent = static_cast<int>(100.0 * share); shows && percent != shown) {
-      shown = percent;
-      show_progress(options.output, percent);
-    }
+    bar->show(share, options.output);
     return !interrupted.is_raised();
   });
   ignore_signals_no_more();
-  if (shows && shown >= 0) {
-    std::fprintf(stderr, "\r\033[K");
-  }
+  bar.reset();
   const auto complain = [](const std::string& text) { std::fprintf(stderr, "%s\n", text.c_str()); };
   if (!rendered) {
     const bool was_stopped = interrupted.is_raised();
@@ -479,6 +465,11 @@ int render_command(const RenderOptions& options, bool is_quiet) {
              " became unstable and faded out; the sound is not to be trusted");
   }
   return rendered->was_interrupted ? exit_code::our_failure : exit_code::done;
+}
+
+int gallery_command(const GalleryOptions& options) {
+  watch_signals();
+  return gallery(options, [] { return !interrupted.is_raised(); });
 }
 
 }  // namespace ressort

@@ -5,6 +5,7 @@
 #include <optional>
 #include <string>
 
+#include "app/commands/gallery/gallery.h"
 #include "app/commands/offline.h"
 #include "app/control/osc/server.h"
 #include "app/devices/audio.h"
@@ -34,5 +35,6 @@ struct PlayOptions {
 
 int play(const PlayOptions& options);
 int render_command(const RenderOptions& options, bool is_quiet);
+int gallery_command(const GalleryOptions& options);
 
 }  // namespace ressort

@@ -1,5 +1,7 @@
 #include "app/commands/offline.h"
 
+#include <time.h>
+
 #include <algorithm>
 #include <cmath>
 #include <set>
@@ -36,7 +38,9 @@ Error at(const std::string& path, const Error& error) {
 // the score's line.
 Result<std::vector<ScoreLine>> read_score(const RenderOptions& options, bool is_bare) {
   if (options.score.empty()) {
-    return parse_score(is_bare || !options.input.empty() ? "" : default_phrase());
+    return parse_score(!options.phrase.empty()             ? options.phrase
+                       : is_bare || !options.input.empty() ? ""
+                                                           : to_score(default_phrase()));
   }
   auto text = read_text(options.score, max_score_bytes);
   if (!text) {
@@ -143,6 +147,13 @@ Result<std::optional<SoundReader>> open_input(const RenderOptions& options) {
   return std::optional<SoundReader>(*std::move(sound));
 }
 
+// What this thread has computed so far.
+double thread_cpu_s() {
+  timespec time{};
+  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &time);
+  return static_cast<double>(time.tv_sec) + 1e-9 * static_cast<double>(time.tv_nsec);
+}
+
 // A value that the preset does not allow, at the line that says so.
 Error beyond_range(const Scene& scene, const ParameterInfo& info) {
   Error error{"the preset keeps '" + info.name + "' between " + print_number(info.minimum) +
@@ -171,13 +182,22 @@ long long length_in_frames(const RenderOptions& options, const std::vector<Score
 
 }  // namespace
 
-std::string default_phrase() {
-  return "0.00 /note/on 57 100\n0.45 /note/off 57\n"
-         "0.50 /note/on 60 90\n0.95 /note/off 60\n"
-         "1.00 /note/on 64 100\n1.45 /note/off 64\n"
-         "1.50 /note/on 69 110\n1.95 /note/off 69\n"
-         "2.00 /note/on 57 80\n2.00 /note/on 64 70\n2.00 /note/on 72 70\n"
-         "3.20 /note/off 57\n3.20 /note/off 64\n3.20 /note/off 72\n";
+const std::vector<PhraseNote>& default_phrase() {
+  static const std::vector<PhraseNote> notes = {
+      {0.0, 0.45, 57, 100}, {0.5, 0.95, 60, 90}, {1.0, 1.45, 64, 100}, {1.5, 1.95, 69, 110},
+      {2.0, 3.2, 57, 80},   {2.0, 3.2, 64, 70},  {2.0, 3.2, 72, 70},
+  };
+  return notes;
+}
+
+std::string to_score(const std::vector<PhraseNote>& notes) {
+  std::string text;
+  for (const PhraseNote& note : notes) {
+    const std::string key = std::to_string(note.key);
+    text += print_number(note.start_s) + " /note/on " + key + " " + std::to_string(note.velocity) +
+            "\n" + print_number(note.end_s) + " /note/off " + key + "\n";
+  }
+  return text;
 }
 
 Result<Rendered> render(const RenderOptions& options, const std::function<bool(double)>& progress) {
@@ -291,7 +311,10 @@ Result<Rendered> render(const RenderOptions& options, const std::function<bool(d
       }
       ++next;
     }
-    process.block(inputs.next(count), std::span<double* const>(outputs), count, {}, 0);
+    const auto heard = inputs.next(count);
+    const double before_s = thread_cpu_s();
+    process.block(heard, std::span<double* const>(outputs), count, {}, 0);
+    rendered.cpu_s += thread_cpu_s() - before_s;
     for (std::size_t n = 0; n < count; ++n) {
       for (std::size_t c = 0; c < channels; ++c) {
         const double y = outputs[c][n];

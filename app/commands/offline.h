@@ -23,6 +23,7 @@ struct RenderOptions {
   std::optional<long long> frames;     //   input last, and two seconds to ring out
   std::string input;                   // a sound file; channel n drives input n
   std::string score;                   // a file of calls
+  std::string phrase;                  // a score itself, instead of the default phrase
   std::vector<Setting> parameters;     // set before the first sample
   std::optional<SampleFormat> format;  // without one, the best that the file can hold
   Precision precision = Precision::float64;
@@ -44,6 +45,7 @@ struct Rendered {
   int channels = 0;
   double peak = 0.0;
   double rms = 0.0;
+  double cpu_s = 0.0;  // of this thread, for the sound alone
   std::uint64_t resets = 0;
   bool was_interrupted = false;
   std::vector<std::string> warnings;
@@ -54,7 +56,16 @@ struct Rendered {
 // is there by then is kept. [control]
 Result<Rendered> render(const RenderOptions& options, const std::function<bool(double)>& progress);
 
-// The short phrase that a preset plays when nobody says what to play.
-std::string default_phrase();
+struct PhraseNote {
+  double start_s = 0.0;
+  double end_s = 0.0;
+  int key = 0;
+  int velocity = 0;
+};
+
+// The short phrase that a preset plays when nobody says what to play; its end is that of its last
+// note. And notes as a score.
+const std::vector<PhraseNote>& default_phrase();
+std::string to_score(const std::vector<PhraseNote>& notes);
 
 }  // namespace ressort
