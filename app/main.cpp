@@ -13,6 +13,7 @@
 #include "app/commands/export.h"
 #include "app/commands/make.h"
 #include "app/commands/reference.h"
+#include "app/commands/smf/midi_file.h"
 #include "app/commands/start_chart.h"
 #include "app/program.h"
 #include "app/version.h"
@@ -26,6 +27,7 @@ const char* const play_examples =
     "Examples:\n"
     "  ressort play                              the triangle, on JACK, else ALSA, else silent\n"
     "  ressort play PolyTriangle -j              connected to the speakers and every keyboard\n"
+    "  ressort play Resonator --midi song.mid    or, by the triangle: ressort play song.mid\n"
     "  ressort play my.mdl -a alsa -d hw:1       a model of your own on one sound card\n"
     "  ressort play -B 0.0.0.0 --osc-allow 192.168.1.23   played by OSC from a tablet, say\n"
     "  oscsend localhost 9777 /note/on ii 69 100 a note by OSC, from another terminal\n";
@@ -39,6 +41,7 @@ const char* const render_examples =
     "smoothing, one channel for each output.\n"
     "Examples:\n"
     "  ressort render PolyTriangle -o out.wav\n"
+    "  ressort render 20x30mesh --midi song.mid -o song.flac\n"
     "  ressort render my.mdl -o out.wav --input gesture.wav --format double\n"
     "  ressort render --all-presets -o sounds      then look at sounds/index.html\n";
 
@@ -223,15 +226,28 @@ void add_motion(CLI::App& command, std::optional<ThirdArgument>& third) {
 void add_play(CLI::App& app, PlayOptions& options, int& code) {
   CLI::App* command = app.add_subcommand("play", "plays a model or a preset");
   command->footer(play_examples);
-  command->add_option("MODEL", options.name, "a preset's or a model's name, or a file")
+  command
+      ->add_option("MODEL", options.name,
+                   "a preset's or a model's name, or a file; or a .mid file, which is played")
       ->capture_default_str();
   command->add_option("-a,--audio", options.audio, "where the sound goes")
       ->check(CLI::IsMember({"auto", "jack", "alsa", "dummy"}))
       ->capture_default_str();
   command->add_option("-d,--device", options.device.device, "the ALSA device")
       ->capture_default_str();
-  command->add_option("-m,--midi", options.midi, "where keyboards come from")
-      ->check(CLI::IsMember({"auto", "jack", "alsa", "none"}))
+  command
+      ->add_option("-m,--midi", options.midi,
+                   "where keyboards come from: auto, jack, alsa or none; or a .mid file, which is\n"
+                   "played beside them. With -i the program ends when that has fallen silent")
+      ->check(CLI::Validator(
+          [](std::string& word) {
+            const bool is_known =
+                word == "auto" || word == "jack" || word == "alsa" || word == "none";
+            return is_known || names_midi_file(word)
+                       ? std::string()
+                       : "must be auto, jack, alsa, none or a .mid file, found " + word;
+          },
+          "WORD"))
       ->capture_default_str();
   command->add_flag("-j,--connect", options.device.connect,
                     "connect to the speakers and to every keyboard (JACK)");
@@ -314,6 +330,8 @@ void add_render(CLI::App& app, RenderChoice& choice, int& code) {
       ->capture_default_str();
   command->add_option("--input", options.input, "a sound file; its channel n drives input n");
   command->add_option("--score", options.score, "a file of events");
+  command->add_option("--midi", options.midi,
+                      "a Standard MIDI File, type 0 or 1; it ends when it has fallen silent");
   command->add_option("--set", choice.settings, "NAME=VALUE, a parameter from the start");
   command
       ->add_option_function<std::string>(

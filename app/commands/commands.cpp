@@ -16,6 +16,7 @@
 #include <vector>
 
 #include "app/commands/progress_bar.h"
+#include "app/commands/smf/midi_player.h"
 #include "app/control/terminal.h"
 #include "app/devices/midi_input.h"
 #include "app/say.h"
@@ -119,6 +120,19 @@ class Player {
       complain(allowed.error().message);
       return exit_code::wrong_use;
     }
+    if (names_midi_file(options_.name)) {  // the first argument may be the song
+      options_.midi = std::exchange(options_.name, PlayOptions().name);
+    }
+    std::optional<MidiFile> song;
+    if (names_midi_file(options_.midi)) {
+      auto read = read_midi_file(options_.midi);
+      if (!read) {
+        complain(read.error().message);
+        return exit_code::wrong_use;
+      }
+      song = *std::move(read);
+      options_.midi = PlayOptions().midi;
+    }
     LoadNews news(options_.name, [this](const std::string& text) { voice_.say(text); });
     const Progress progress([&](std::string_view stage) {
       news.at(stage);
@@ -164,6 +178,11 @@ class Player {
     greet(**loaded);
     open_osc();
     open_midi();
+    if (song) {
+      voice_.say("playing " + counted(song->messages.size(), "message", "messages") + " of MIDI, " +
+                 fixed(song->length_s, 1) + " s");
+      player_.emplace(*std::move(song), door_);
+    }
     return converse();
   }
 
@@ -175,6 +194,7 @@ class Player {
     terminal_.reset();
     console_.reset();
     osc_.reset();
+    player_.reset();
     midi_.reset();
     if (device_.close) {
       fade_out();
@@ -319,6 +339,9 @@ class Player {
           return exit_code::done;
         }
       }
+      if (options_.no_console && player_ && player_->is_over() && has_fallen_silent()) {
+        return exit_code::done;
+      }
       device_.tick();
       if (std::chrono::steady_clock::now() >= next_tick) {
         next_tick += 1s;
@@ -328,6 +351,17 @@ class Player {
       }
     }
     return exit_code::done;
+  }
+
+  // After a song: whether nothing has been heard for half a second, or something for a minute.
+  bool has_fallen_silent() {
+    constexpr double quiet_db = -80.0;
+    const auto now = std::chrono::steady_clock::now();
+    song_ended_ = song_ended_.value_or(now);
+    if (session_->status().peak_db > quiet_db || !quiet_since_) {
+      quiet_since_ = now;
+    }
+    return now - *quiet_since_ > 500ms || now - *song_ended_ > 60s;
   }
 
   // Waits for the same backend to come back; false if the user loses patience first.
@@ -382,6 +416,9 @@ class Player {
   std::unique_ptr<Session> session_;
   std::unique_ptr<OscServer> osc_;
   std::unique_ptr<MidiInput> midi_;
+  std::optional<MidiPlayer> player_;
+  std::optional<std::chrono::steady_clock::time_point> song_ended_;
+  std::optional<std::chrono::steady_clock::time_point> quiet_since_;
   std::unique_ptr<Console> console_;
   std::unique_ptr<Terminal> terminal_;
 };
@@ -455,7 +492,8 @@ int render_command(const RenderOptions& options, bool is_quiet) {
     if (rendered->peak > 1.0) {
       complain("the peak passes full scale; --limit keeps it below");
     }
-    const bool was_asked = !options.score.empty() || !options.input.empty();
+    const bool was_asked =
+        !options.score.empty() || !options.input.empty() || !options.midi.empty();
     if (rendered->peak == 0.0 && rendered->frames > 0 && !was_asked) {
       complain("nothing excites the model: give it a --score or an --input");
     }

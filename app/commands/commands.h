@@ -15,9 +15,9 @@
 namespace ressort {
 
 struct PlayOptions {
-  std::string name = "IPlayTheTriangle";
-  std::string audio = "auto";  // jack, alsa, dummy, auto
-  std::string midi = "auto";   // auto, alsa, jack, none
+  std::string name = "IPlayTheTriangle";  // or a MIDI file, which this one plays
+  std::string audio = "auto";             // jack, alsa, dummy, auto
+  std::string midi = "auto";              // auto, alsa, jack, none, or a MIDI file, and then auto
   AudioOptions device;
   double gain_db = 0.0;
   int voices = 0;

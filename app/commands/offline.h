@@ -20,9 +20,11 @@ struct RenderOptions {
   std::string output;  // a sound file; its ending says which
   double rate_hz = 44100.0;
   std::optional<double> seconds;       // at most one of these; without both: as long as score and
-  std::optional<long long> frames;     //   input last, and two seconds to ring out
+  std::optional<long long> frames;     //   input last, and two seconds to ring out, or as a MIDI
+                                       //   file lasts, and until it is silent, a minute at most
   std::string input;                   // a sound file; channel n drives input n
   std::string score;                   // a file of calls
+  std::string midi;                    // a Standard MIDI File, beside the score or instead of one
   std::string phrase;                  // a score itself, instead of the default phrase
   std::vector<Setting> parameters;     // set before the first sample
   std::optional<SampleFormat> format;  // without one, the best that the file can hold

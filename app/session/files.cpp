@@ -80,7 +80,7 @@ std::string in_bytes(std::uintmax_t size) {
 
 }  // namespace
 
-Result<std::string> read_text(const std::string& path, std::size_t max_bytes) {
+Result<std::string> read_bytes(const std::string& path, std::size_t max_bytes) {
   std::error_code error;
   const fs::file_status status = fs::status(path, error);
   if (!fs::exists(status)) {
@@ -102,7 +102,12 @@ Result<std::string> read_text(const std::string& path, std::size_t max_bytes) {
   if (!file || !file.read(text.data(), static_cast<std::streamsize>(text.size()))) {
     return Error{"'" + path + "' cannot be read: " + std::generic_category().message(errno)};
   }
-  return unmarked(path, std::move(text));
+  return text;
+}
+
+Result<std::string> read_text(const std::string& path, std::size_t max_bytes) {
+  auto text = read_bytes(path, max_bytes);
+  return text ? unmarked(path, *std::move(text)) : std::move(text);
 }
 
 Result<Done> write_text(const std::string& path, const std::string& text, Existing existing) {

@@ -14,6 +14,9 @@ namespace ressort {
 // error says what is in the way: missing, a directory, too large, unreadable, UTF-16.
 Result<std::string> read_text(const std::string& path, std::size_t max_bytes);
 
+// A whole file of at most `max_bytes`, as it is; errors as of read_text().
+Result<std::string> read_bytes(const std::string& path, std::size_t max_bytes);
+
 // All or nothing: what was there stays until the text is whole.
 Result<Done> write_text(const std::string& path, const std::string& text, Existing existing);
 

@@ -77,22 +77,6 @@ double fundamental_hz(const Preset& preset, int key) {
   return preset.keyboard ? 440.0 * std::exp2((key + preset.transpose - 69) / 12.0) : 0.0;
 }
 
-Result<Sound> read_sound(const std::string& path) {
-  auto file = SoundReader::open(path);
-  if (!file) {
-    return file.error();
-  }
-  Sound sound{.rate_hz = file->rate_hz(), .channels = {}};
-  sound.channels.resize(file->channels());
-  std::vector<double> block(file->channels() * 4096);
-  while (const std::size_t got = file->read(block.data(), 4096)) {
-    for (std::size_t i = 0; i < got * sound.channels.size(); ++i) {
-      sound.channels[i % sound.channels.size()].push_back(block[i]);
-    }
-  }
-  return sound;
-}
-
 struct Take {
   Rendered rendered;
   Sound sound;

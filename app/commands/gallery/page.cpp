@@ -146,7 +146,7 @@ std::string draw_scale(const Area& area) {
 
 // A second, or so many that the labels have room.
 double time_step_s(double length_s, double width) {
-  for (const double step_s : {0.5, 1.0, 2.0, 5.0, 10.0, 20.0}) {
+  for (const double step_s : {1.0, 2.0, 5.0, 10.0, 20.0}) {
     if (width * step_s / length_s >= 45.0) {
       return step_s;
     }
@@ -162,8 +162,7 @@ std::string draw_time_axis(const Spectrogram& shown, const Area& area, const std
     const double x = area.x_of(time_s, shown);
     const bool is_last = time_s + step_s > shown.to_s;
     svg += line(x, bottom, x, bottom + 4.0, ink) +
-           label(x, bottom + 16.0, fixed(time_s, step_s < 1.0 ? 1 : 0) + (is_last ? unit : ""),
-                 "middle");
+           label(x, bottom + 16.0, fixed(time_s, 0) + (is_last ? unit : ""), "middle");
   }
   return svg;
 }

@@ -1,20 +1,15 @@
-// app/commands: a sound as numbers, and the figures that people compare sounds by. Each is taken
-// from the samples alone: nothing here knows how they were made. Pure.
+// app/commands: the figures that people compare sounds by. Each is taken from the samples alone:
+// nothing here knows how they were made. Pure.
 #pragma once
 
 #include <cstddef>
 #include <optional>
 #include <vector>
 
+#include "app/session/sound_file.h"
 #include "core/result.h"
 
 namespace ressort {
-
-struct Sound {
-  double rate_hz = 44100.0;
-  std::vector<std::vector<double>> channels;  // one or more, of one length; 1 is full scale
-  std::size_t frames() const { return channels.empty() ? 0 : channels[0].size(); }
-};
 
 // A stretch of a sound; what lies outside of the sound is left out.
 struct Stretch {
