@@ -70,6 +70,7 @@ class SceneReader {
       fail(scene_.path, *text, error);
     }
     scene_.preset = std::move(read.preset);
+    scene_.preset_text = *text;
     scene_.has_preset = true;
     if (scene_.preset.model.empty()) {
       return false;
@@ -133,8 +134,12 @@ class SceneReader {
   std::optional<std::string> find_model(const std::string& model) const {
     std::error_code error;
     const fs::path folder = fs::path(scene_.path).parent_path();
-    for (const fs::path& path :
-         {folder / model, folder / ".." / "models" / model, fs::path(models_folder()) / model}) {
+    std::vector<fs::path> tried = {folder / model, folder / ".." / "models" / model,
+                                   fs::path(models_folder()) / model};
+    if (const std::string user = user_folder(); !user.empty()) {
+      tried.insert(tried.end() - 1, fs::path(user) / "models" / model);
+    }
+    for (const fs::path& path : tried) {
       if (options_.reach == Reach::own_folders) {
         if (const auto own = own_file(path.string())) {
           return own;

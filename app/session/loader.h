@@ -44,6 +44,7 @@ struct Scene {
   std::string model_path;
   Network network;
   Preset preset;
+  std::string preset_text;             // what it was read from; empty: it was made up
   bool has_preset = false;             // read from a file, not made up
   std::optional<ThirdArgument> third;  // what the third state argument means, if that matters
   std::string motion;                  // the same for a person, and why
