@@ -1,9 +1,9 @@
 #include "core/model/preset/edit.h"
 
-#include <toml++/toml.h>
 #include <algorithm>
 
 #include "core/model/language/expression.h"
+#include "core/model/preset/toml.h"
 
 namespace ressort {
 namespace {
@@ -155,7 +155,8 @@ bool is_replaced(const toml::node& row, const std::vector<ControlSetting>& learn
 }
 
 std::string edit(std::string_view text, const PresetChanges& changes) {
-  const toml::table root = toml::parse(text);
+  const toml::parse_result parsed = toml::parse(text);
+  const toml::table& root = parsed.table();
   Editor editor(text);
   const toml::node* const model = root.get("model");
   editor.replace(*model, in_quotes(changes.model));
