@@ -1,5 +1,7 @@
 #include "app/session/files.h"
 
+#include <unistd.h>
+
 #include <algorithm>
 #include <cerrno>
 #include <cstdio>
@@ -172,6 +174,8 @@ Result<Done> write_text(const std::string& path, const std::string& text, Existi
     return file.error();
   }
   const auto written = file->write(text);
+  // Its name shall lead to all of it even if the power goes.
+  static_cast<void>(fsync(file->descriptor()));
   return written ? file->keep() : written;
 }
 

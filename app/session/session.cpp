@@ -19,6 +19,7 @@
 namespace ressort {
 namespace {
 
+constexpr int channel_modes = 120;         // from this controller on they are none
 constexpr double least_lateness_s = 0.05;  // to be told of: what is less is hardly heard
 
 double to_db(double factor) {
@@ -114,6 +115,14 @@ std::optional<double> Session::parameter(const std::string& name) const {
 
 void Session::remember(std::span<const TimedEvent> events) {
   const std::lock_guard lock(mutex_);
+  std::vector<std::string> names;
+  for (const TimedEvent& timed : events) {
+    const Event& event = timed.event;
+    if (event.kind == EventKind::parameter && event.model == current_->serial) {
+      names.push_back(current_->instrument.parameters[event.index].name);
+    }
+  }
+  begin_change(names);
   for (const TimedEvent& timed : events) {
     const Event& event = timed.event;
     if (event.kind == EventKind::parameter && event.model == current_->serial) {
@@ -259,6 +268,7 @@ void Session::listen() {
     const std::lock_guard lock(mutex_);
     const bool is_current = report.model == current_->serial;
     if (report.kind == Report::Kind::parameter && is_current) {
+      begin_change({current_->instrument.parameters[report.index].name});
       values_[report.index] = report.value;
     } else if (report.kind == Report::Kind::reset) {
       resets_.add((is_current ? current_->name : std::string("the last model")) +
@@ -269,6 +279,7 @@ void Session::listen() {
     }
   }
   const Meters now = process_.meters();
+  hear_turns(now);
   if (now.late != late_reported_ && now.late_s > least_lateness_s) {
     lates_.add("an event came " + fixed(now.late_s, 3) + " s after its time",
                now.late - std::exchange(late_reported_, now.late));
@@ -296,9 +307,19 @@ std::string Session::describe_overload(const Report& report) const {
 }
 
 void Session::do_load(const Job& job) {
+  LastChange change;
+  {
+    const std::lock_guard lock(mutex_);
+    change.scene = current_->path;
+    for (std::size_t i = 0; i < values_.size(); ++i) {
+      change.values.emplace_back(current_->instrument.parameters[i].name, values_[i]);
+    }
+  }
   const auto result = build(job.wish);
   if (result) {
     scene_ = job.wish;
+    const std::lock_guard lock(mutex_);
+    last_change_ = change.scene->empty() ? std::nullopt : std::optional(std::move(change));
   }
   if (job.answer) {
     job.answer(result);
@@ -397,6 +418,8 @@ Result<std::shared_ptr<const Loaded>> Session::build_now(const Wish& wish,
   loaded->path = scene->path;
   loaded->model_path = scene->model_path;
   loaded->description = scene->preset.description;
+  loaded->preset = scene->preset;
+  loaded->preset_text = scene->preset_text;
   loaded->instrument = std::move(compiled->instrument);
   loaded->plan = std::move(compiled->plan);
   loaded->load_ms = took.count();
@@ -410,8 +433,16 @@ Result<std::shared_ptr<const Loaded>> Session::build_now(const Wish& wish,
   }
   {
     const std::lock_guard lock(mutex_);
+    const bool is_same = current_->path == loaded->path;
     current_ = loaded;
     values_ = std::move(values);
+    pupil_.reset();
+    std::erase_if(learned_, [&](const LearnedRow& row) {
+      return !is_same || control_of(row.target).model == 0;
+    });
+    for (const LearnedRow& row : learned_) {
+      teach(row, true);
+    }
     built_rate_hz_ = options.rate_hz;
   }
   offer(std::move(compiled->engine));
