@@ -230,6 +230,13 @@ class Player {
     if (!device_.note.empty()) {
       voice_.say(device_.note);
     }
+    if (device_.kind != "dummy" && !may_raise_priority()) {
+      voice_.say(
+          "without permission for real-time priority the sound may break up; to have it, type\n"
+          "  echo '@audio - rtprio 95' | sudo tee /etc/security/limits.d/ressort.conf\n"
+          "  sudo usermod -aG audio $USER\n"
+          "and log in anew");
+    }
     voice_.say(loaded.name + ": " + counted(loaded.instrument.masses, "mass", "masses") + ", " +
                counted(loaded.instrument.links, "link", "links") + ", " +
                counted(static_cast<std::size_t>(loaded.instrument.voices), "voice", "voices") +

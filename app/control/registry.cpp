@@ -45,7 +45,7 @@ Events set_parameters(const Said& said) {
   }
   if (events.empty()) {
     return Error{said.message.address + ": the model has no such parameter; it has " +
-                 (names.empty() ? "none" : joined(names, ", "))};
+                 (names.empty() ? "none" : joined(names, ", ")) + did_you_mean(said.name, names)};
   }
   return events;
 }
@@ -141,6 +141,25 @@ std::vector<Row> make_rows() {
        .command_does = "turns a parameter; it stays within its range",
        .details = "PARAMETER may be a pattern: 'set *_Z 0.001' sets all that end so.",
        .act = command::set},
+      {.command = "learn",
+       .group = CommandGroup::parameters,
+       .words = "PARAMETER",
+       .command_does = "lets the knob that you move next turn a parameter",
+       .details =
+           "PARAMETER may be an OSC name of the preset's, such as /finger, too. The knob does "
+           "nothing else\nmeanwhile. 'save NAME' keeps it.",
+       .act = command::learn},
+      {.command = "unlearn",
+       .group = CommandGroup::parameters,
+       .words = "[PARAMETER]",
+       .command_does = "lets a knob, or all, do again what the preset says",
+       .act = command::unlearn},
+      {.command = "undo",
+       .group = CommandGroup::parameters,
+       .command_does = "takes back the last change of a parameter, or the last load",
+       .details = "Whoever made it: knob, OSC or console. Turns within a second are one change. A "
+                  "second 'undo'\ntakes back the first.",
+       .act = command::undo},
       {.address = "/param/NAME/range",
        .does = "answers its minimum and maximum, and between what it is stable",
        .answer = answer::ranges},
@@ -195,9 +214,28 @@ std::vector<Row> make_rows() {
        .command_does = "the same; Tab offers the presets only",
        .details = "A preset is a model with ranges for its parameters and a plan of what plays it.",
        .act = command::load},
+      {.address = "/preset/save",
+       .arguments = {{.word = "NAME", .is_text = true}},
+       .does = "saves what sounds, as it is now, among the user's presets, never over one that is "
+               "there; answers /done or /fail",
+       .answer = answer::save,
+       .command = "save",
+       .group = CommandGroup::models,
+       .words = "NAME [--force]",
+       .command_does = "keeps what sounds, as it is now, as a preset of yours",
+       .details =
+           "The values of the parameters, and what controllers have learnt, go to NAME.toml among "
+           "your own\npresets, in $XDG_DATA_HOME/ressort/presets or "
+           "~/.local/share/ressort/presets; "
+           "'load NAME'\nbrings it back. --force writes over one that is there.",
+       .act = command::save},
+      {.command = "presets",
+       .group = CommandGroup::models,
+       .command_does = "lists the presets, yours among them, each with a line",
+       .act = command::presets},
       {.command = "models",
        .group = CommandGroup::models,
-       .command_does = "lists what came with the program",
+       .command_does = "lists the presets and the models, yours among them",
        .details = "Presets go first, each with what it is; then the models that they are made of.",
        .act = command::models},
       {.address = "/status",
@@ -223,6 +261,10 @@ std::vector<Row> make_rows() {
            "bits a\nsample, and the rate of the audio. Over a sound file that is there it is "
            "written by --force\nonly.",
        .act = command::record},
+      {.command = "wait",
+       .words = "SECONDS",
+       .command_does = "waits, for scripts and pipes: noteon 60, wait 0.5, noteoff 60",
+       .act = command::wait},
       {.command = "help", .words = "[COMMAND]", .command_does = "tells more", .act = command::help},
       {.command = "quit", .command_does = "ends the program", .act = command::quit},
   };

@@ -89,6 +89,11 @@ Result<std::shared_ptr<const Loaded>> Session::load_and_wait(const std::string& 
   return promise.get_future().get();
 }
 
+bool Session::wait(std::chrono::duration<double> time) {
+  std::unique_lock lock(mutex_);
+  return !wake_.wait_for(lock, time, [this] { return stop_; });
+}
+
 void Session::set_rate(double rate_hz) {
   {
     const std::lock_guard lock(mutex_);

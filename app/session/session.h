@@ -91,6 +91,10 @@ class Session {
   // [any thread but audio]
   void end();
 
+  // Returns when so much time has passed: true; or, at once, when the program is ending.
+  // [any thread but audio]
+  bool wait(std::chrono::duration<double> time);
+
   // Never null; before the first load it has no name and no parameters.
   std::shared_ptr<const Loaded> current() const;
 

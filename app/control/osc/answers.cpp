@@ -86,6 +86,22 @@ void answer::load(const Question& question) {
                         Reach::own_folders);
 }
 
+// Never over what is there: whoever sends a packet has not seen it.
+void answer::save(const Question& question) {
+  const Message& message = question.message;
+  if (message.arguments.size() != 1 || !std::holds_alternative<std::string>(message.arguments[0])) {
+    question.client.error(message.address, message.address + ": expected NAME");
+    return;
+  }
+  const auto& name = std::get<std::string>(message.arguments[0]);
+  const auto path = question.session.save(name, Existing::refuse);
+  Reply reply(path ? "/done" : "/fail");
+  reply.text(message.address).text(path ? name : path.error().message);
+  question.client.answer(reply);
+  question.client.outlet().tell(
+      path ? "OSC saved " + *path : "OSC could not save '" + name + "': " + path.error().message);
+}
+
 void answer::status(const Question& question) {
   question.client.answer(status_reply(question.session.status()));
 }

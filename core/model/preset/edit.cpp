@@ -6,6 +6,23 @@
 #include "core/model/preset/toml.h"
 
 namespace ressort {
+
+std::string source_name(const ControlSetting& control) {
+  switch (control.source) {
+    case ControlSource::note:
+      return "note";
+    case ControlSource::controller:
+      return "cc" + std::to_string(control.number);
+    case ControlSource::pressure:
+      return "pressure";
+    case ControlSource::osc:
+      return control.address;
+    case ControlSource::audio:
+      return "audio" + std::to_string(control.number);
+  }
+  return "";
+}
+
 namespace {
 
 std::string in_quotes(std::string_view text) {
@@ -31,25 +48,9 @@ std::string print_parameter(const ParameterSetting& setting) {
          ", range = " + pair(setting.minimum, setting.maximum) + " }\n";
 }
 
-std::string source_of(const ControlSetting& control) {
-  switch (control.source) {
-    case ControlSource::note:
-      return "note";
-    case ControlSource::controller:
-      return "cc" + std::to_string(control.number);
-    case ControlSource::pressure:
-      return "pressure";
-    case ControlSource::osc:
-      return control.address;
-    case ControlSource::audio:
-      return "audio" + std::to_string(control.number);
-  }
-  return "";
-}
-
 std::string print_control(const ControlSetting& control) {
   const ControlSetting usual;
-  std::string text = "\n[[control]]\nfrom = " + in_quotes(source_of(control)) +
+  std::string text = "\n[[control]]\nfrom = " + in_quotes(source_name(control)) +
                      "\nto = " + in_quotes(control.target) + "\n";
   if (control.gesture != Gesture::parameter) {
     text += "how = " + in_quotes(row_of(control.gesture).name) + "\n";
@@ -150,7 +151,7 @@ bool is_replaced(const toml::node& row, const std::vector<ControlSetting>& learn
       row.as_table() != nullptr ? row.as_table()->get_as<std::string>("from") : nullptr;
   return from != nullptr &&
          std::any_of(learned.begin(), learned.end(), [&](const ControlSetting& control) {
-           return from->get() == source_of(control);
+           return from->get() == source_name(control);
          });
 }
 

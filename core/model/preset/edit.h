@@ -26,4 +26,7 @@ Result<std::string> edit_preset(std::string_view toml, const PresetChanges& chan
 // audio]
 std::string print_preset(const Preset& preset);
 
+// What drives a control, as a preset says it: "note", "cc71", "/finger".
+std::string source_name(const ControlSetting& control);
+
 }  // namespace ressort
