@@ -208,15 +208,10 @@ Result<Done> command::load(ConsoleContext& console, Words words) {
 
 namespace {
 
-std::string description_of(const std::string& preset_name) {
-  const auto text = read_text(preset_path(preset_name), max_preset_bytes);
-  return text ? parse_preset(*text).preset.description : "";
-}
-
 std::string preset_table() {
   std::vector<std::vector<std::string>> rows;
   for (const std::string& name : known_presets()) {
-    rows.push_back({name, description_of(name)});
+    rows.push_back({name, preset_description(name)});
   }
   return table(rows, 2);
 }

@@ -6,6 +6,7 @@
 
 #include "app/control/console_commands.h"
 #include "app/control/osc/answers.h"
+#include "app/control/osc/subscribers.h"
 #include "app/text.h"
 #include "core/model/language/expression.h"
 
@@ -18,8 +19,16 @@ Events one(const Event& event) {
   return std::vector{event};
 }
 
+// OSC's floats up to 1 are shares of the loudest; whole numbers, and what is typed, are MIDI's.
+double velocity_of(const Said& said) {
+  const std::string& types = said.message.types;
+  const bool is_share =
+      types.size() > 1 && (types[1] == 'f' || types[1] == 'd') && said.arguments[1] <= 1.0;
+  return is_share ? said.arguments[1] : said.arguments[1] / 127.0;
+}
+
 Events note(const Said& said, bool starts) {
-  const double velocity = said.arguments[1] / 127.0;
+  const double velocity = velocity_of(said);
   return one({.kind = starts && velocity > 0.0 ? EventKind::note_on : EventKind::note_off,
               .index = said.whole(0),
               .value = velocity});
@@ -77,7 +86,9 @@ std::vector<Row> make_rows() {
   const Row first[] = {
       {.address = "/note/on",
        .arguments = {{"KEY", "the key", 0, 127}, {"VELOCITY", "the velocity", 0, 127, 100}},
-       .does = "starts a note; key 0-127, velocity 1-127 (100)",
+       .does =
+           "starts a note; key 0-127, velocity 1-127 (100), or as a float up to 1 a share of the "
+           "loudest",
        .play = [](const Said& said) { return note(said, true); },
        .command = "noteon",
        .group = CommandGroup::playing,
@@ -250,6 +261,19 @@ std::vector<Row> make_rows() {
        .group = CommandGroup::looking,
        .command_does = "tells how the model is computed and what plays it",
        .act = command::explain},
+      {.address = "/subscribe",
+       .arguments = {{"SECONDS", "the seconds", 0, Subscribers::longest_lease_s, 10}},
+       .does =
+           "sends every change, whoever makes it, for so long, at most 60 s (10): first all that "
+           "is, then /loaded and /param/NAME; again renews it",
+       .answer = answer::subscribe},
+      {.address = "/unsubscribe", .does = "ends that", .answer = answer::unsubscribe},
+      {.address = "/models",
+       .does = "answers the name of each model, then their number",
+       .answer = answer::models},
+      {.address = "/presets",
+       .does = "answers the name and the line of each preset, then their number",
+       .answer = answer::presets},
       {.address = "/describe",
        .does = "answers a row for everything that can be set or asked",
        .answer = answer::describe},
@@ -283,7 +307,9 @@ std::vector<Row> make_rows() {
 // --- addresses ----------------------------------------------------------------------------------
 
 constexpr std::string_view answers[] = {"/error",        "/done",           "/fail",
-                                        "/status.reply", "/describe.reply", "/describe.end"};
+                                        "/status.reply", "/describe.reply", "/describe.end",
+                                        "/models.reply", "/models.end",     "/presets.reply",
+                                        "/presets.end",  "/loaded",         "/subscribe.reply"};
 
 // What stands before and after N or NAME; `hole` is empty where there is none.
 struct Pattern {

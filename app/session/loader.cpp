@@ -233,6 +233,11 @@ std::string without_source(std::string_view message) {
   return all.empty() ? std::string(message) : all;
 }
 
+std::string preset_description(const std::string& name) {
+  const auto text = read_text(preset_path(name), max_preset_bytes);
+  return text ? parse_preset(*text).preset.description : "";
+}
+
 Reading read_scene(const std::string& name, const SceneOptions& options) {
   return SceneReader(options).read(name);
 }

@@ -61,6 +61,9 @@ struct Reading {
 // line and column and what is wrong, without a word of the text.
 std::string without_source(std::string_view message);
 
+// The line that a known preset says of itself; empty where it cannot be read.
+std::string preset_description(const std::string& name);
+
 // Finds and reads a model or a preset with its model; goes on after an error in the model, so that
 // every problem is told at once. Without a preset the model gets a default one, `bare` or
 // playable. Blocks on the disk. [any thread but audio]

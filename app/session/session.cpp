@@ -107,6 +107,11 @@ std::shared_ptr<const Loaded> Session::current() const {
   return current_;
 }
 
+Session::Present Session::present() const {
+  const std::lock_guard lock(mutex_);
+  return {current_, values_};
+}
+
 std::optional<double> Session::parameter(const std::string& name) const {
   const std::lock_guard lock(mutex_);
   const auto& parameters = current_->instrument.parameters;

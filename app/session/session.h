@@ -98,6 +98,13 @@ class Session {
   // Never null; before the first load it has no name and no parameters.
   std::shared_ptr<const Loaded> current() const;
 
+  // What sounds and all its parameters' values, at one moment.
+  struct Present {
+    std::shared_ptr<const Loaded> loaded;
+    std::vector<double> values;  // [parameter]
+  };
+  Present present() const;
+
   // A parameter's present value; nothing where the model has none of that name.
   std::optional<double> parameter(const std::string& name) const;
 

@@ -173,7 +173,7 @@ TEST_CASE("lines are broken at blanks, under their column", "[keeping]") {
   CHECK(wrapped("one two three", 20) == "one two three");
   CHECK(wrapped("one two three", 8) == "one two\nthree");
   CHECK(wrapped("a   one two three", 11) == "a   one two\n    three");
-  CHECK(wrapped("  a  \u00e9\u00e9 \u00e9\u00e9 \u00e9\u00e9\nb", 10) ==
+  CHECK(wrapped("  a  \u00e9\u00e9 \u00e9\u00e9 \u00e9\u00e9\nb", 11) ==
         "  a  \u00e9\u00e9 \u00e9\u00e9\n     \u00e9\u00e9\nb");
   CHECK(wrapped("unbreakable", 4) == "unbreakable");
   CHECK(wrapped("", 4).empty());
