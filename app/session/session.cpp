@@ -19,7 +19,6 @@
 namespace ressort {
 namespace {
 
-constexpr int channel_modes = 120;         // from this controller on they are none
 constexpr double least_lateness_s = 0.05;  // to be told of: what is less is hardly heard
 
 double to_db(double factor) {
