@@ -115,9 +115,9 @@ class Session {
   // here. Turns of the same parameters within a second are one. [any thread but audio]
   std::optional<LastChange> take_last_change();
 
-  // The next controller that moves turns the parameter, or the control of that OSC name, from then
-  // on, whatever the preset says; `tell` hears which it is. Lasts until another scene is loaded.
-  // [any thread but audio]
+  // The next knob that moves, a controller but for pedals, banks and the like, turns the parameter,
+  // or the control of that OSC name, from then on, whatever the preset says; `tell` hears which it
+  // is. Lasts until another scene is loaded. [any thread but audio]
   Result<Done> learn(const std::string& target);
   // Forgets what has learnt to turn it; of all, where there is no target. How many that were.
   std::size_t unlearn(const std::string& target);

@@ -35,6 +35,19 @@ std::string escaped(const std::string& text) {
   return safe;
 }
 
+// A file's name as a link has it.
+std::string link_to(const std::string& file) {
+  std::string link;
+  for (const char c : file) {
+    const bool is_plain = (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') ||
+                          (c >= '0' && c <= '9') || c == '-' || c == '.' || c == '_';
+    constexpr char digits[] = "0123456789ABCDEF";
+    const auto byte = static_cast<unsigned char>(c);
+    link += is_plain ? std::string(1, c) : std::string{'%', digits[byte >> 4], digits[byte & 15]};
+  }
+  return link;
+}
+
 std::string label(double x, double y, const std::string& text, const char* anchor = "end") {
   return "<text x=\"" + px(x) + "\" y=\"" + px(y) + "\" text-anchor=\"" + anchor + "\">" +
          escaped(text) + "</text>\n";
@@ -281,7 +294,7 @@ std::string table_of_all(const std::vector<ShownPreset>& presets) {
   html += "</tr>\n";
   for (const ShownPreset& preset : presets) {
     html +=
-        "<tr><td><a href=\"#" + escaped(preset.name) + "\">" + escaped(preset.name) + "</a></td>";
+        "<tr><td><a href=\"#" + link_to(preset.name) + "\">" + escaped(preset.name) + "</a></td>";
     for (const FigureColumn& column : figure_columns) {
       html += "<td>" + (preset.failure.empty() ? column.cell(preset.figures) : "") + "</td>";
     }
@@ -304,7 +317,7 @@ std::string section_of(const ShownPreset& preset) {
   html += "</table>\n";
   for (const char* const file : {".wav", "-note.wav"}) {
     html +=
-        "<audio controls preload=\"none\" src=\"" + escaped(preset.name) + file + "\"></audio>\n";
+        "<audio controls preload=\"none\" src=\"" + link_to(preset.name + file) + "\"></audio>\n";
   }
   return html + "</div></div></section>\n";
 }

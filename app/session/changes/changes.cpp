@@ -11,7 +11,13 @@
 namespace ressort {
 namespace {
 
-constexpr int channel_modes = 120;  // from this controller on they are none
+// What a keyboard moves besides its knobs, and what MIDI has for its own ends: banks, parameters'
+// numbers and data, pedals, and from 120 on channel modes.
+bool is_knob(int controller) {
+  constexpr int others[] = {0, 6, 32, 38, 64, 66, 67, 96, 97, 98, 99, 100, 101};
+  return controller < 120 &&
+         std::find(std::begin(others), std::end(others), controller) == std::end(others);
+}
 
 }  // namespace
 
@@ -120,7 +126,7 @@ void Session::hear_turns(const Meters& now) {
   std::string news;
   {
     const std::lock_guard lock(mutex_);
-    if (!pupil_ || now.turns == turns_ || now.last_controller >= channel_modes) {
+    if (!pupil_ || now.turns == turns_ || !is_knob(now.last_controller)) {
       return;
     }
     const LearnedRow row{now.last_controller, *std::exchange(pupil_, std::nullopt)};
@@ -208,7 +214,7 @@ Result<std::string> Session::save(const std::string& name, Existing existing) {
   if (!text) {
     return text.error();
   }
-  const auto written = write_text(*path, *text, Existing::replace);
+  const auto written = write_text(*path, *text, existing);
   return written ? Result<std::string>(*path) : written.error();
 }
 
