@@ -4,6 +4,7 @@
 #include <cstdio>
 #include <iterator>
 #include <map>
+#include <set>
 #include <string>
 #include <utility>
 #include <vector>
@@ -355,22 +356,20 @@ void add_render(CLI::App& app, RenderChoice& choice, int& code) {
   command->add_option("--threads", options.threads, "for large networks; without it, all cores")
       ->check(within(1, 1024));
   command->add_flag("--limit", options.limit, "keep below full scale, 1 ms late");
-  CLI::Option* all =
-      command
-          ->add_flag("--all-presets", choice.all_presets,
-                     "every preset, a phrase and a note of each, into the folder -o; index.html\n"
-                     "there shows their envelopes, spectrograms and figures, spectra.svg is a\n"
-                     "picture of all")
-          ->excludes(model);
-  for (CLI::Option* other : command->get_options()) {
-    const std::string name = other->get_single_name();
-    if (other != all && name != "help" && name != "output" && name != "rate") {
-      all->excludes(other);
-    }
-  }
+  command->add_flag(
+      "--all-presets", choice.all_presets,
+      "every preset, a phrase and a note of each, into the folder -o; index.html there\n"
+      "shows their envelopes, spectrograms and figures, spectra.svg is a picture of\n"
+      "all; of the other options it takes -r and -q");
   command->add_flag("-q,--quiet", choice.is_quiet, "say nothing unless something is wrong");
-  command->callback([&choice, model, seconds, frames, &code] {
+  command->callback([&choice, command, model, seconds, frames, &code] {
     if (choice.all_presets) {
+      const std::set<std::string> taken = {"all-presets", "output", "rate", "quiet"};
+      for (const CLI::Option* option : command->get_options()) {
+        if (option->count() > 0 && !taken.contains(option->get_single_name())) {
+          throw CLI::ExcludesError("--all-presets", option->get_name());
+        }
+      }
       code = gallery_command({choice.options.output, choice.options.rate_hz, choice.is_quiet});
       return;
     }
