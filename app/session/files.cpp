@@ -59,19 +59,25 @@ std::string names_of_presets() {
   return names;
 }
 
-// By name, of all folders.
+// The program's by name, then those that the user alone has: places in the list stay.
 std::vector<std::string> names_in(const char* kind, const char* ending) {
-  std::set<std::string> names;
-  for (const fs::path& folder : known_folders()) {
+  std::vector<std::string> all;
+  std::vector<fs::path> folders = known_folders();
+  std::reverse(folders.begin(), folders.end());
+  for (const fs::path& folder : folders) {
+    std::set<std::string> names;
     std::error_code error;
     fs::directory_iterator entry(folder / kind, error);
     for (; !error && entry != fs::directory_iterator(); entry.increment(error)) {
-      if (entry->path().extension() == ending) {
-        names.insert(entry->path().stem().string());
+      const std::string name = entry->path().stem().string();
+      if (entry->path().extension() == ending &&
+          std::find(all.begin(), all.end(), name) == all.end()) {
+        names.insert(name);
       }
     }
+    all.insert(all.end(), names.begin(), names.end());
   }
-  return {names.begin(), names.end()};
+  return all;
 }
 
 std::string known_path(const char* kind, const std::string& file) {

@@ -36,7 +36,7 @@ Result<std::string> find_scene(const std::string& name, Reach reach);
 // the program's or the user's own folders.
 std::optional<std::string> own_file(const std::string& path);
 
-// All presets and models of the program's and the user's, by name, sorted.
+// All presets and models by name: the program's, sorted, then what the user alone has, sorted.
 std::vector<std::string> known_presets();
 std::vector<std::string> known_models();
 
