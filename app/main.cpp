@@ -4,6 +4,7 @@
 #include <cstdio>
 #include <iterator>
 #include <map>
+#include <set>
 #include <string>
 #include <utility>
 #include <vector>
@@ -13,6 +14,7 @@
 #include "app/commands/export.h"
 #include "app/commands/make.h"
 #include "app/commands/reference.h"
+#include "app/commands/smf/midi_file.h"
 #include "app/commands/start_chart.h"
 #include "app/program.h"
 #include "app/version.h"
@@ -26,6 +28,7 @@ const char* const play_examples =
     "Examples:\n"
     "  ressort play                              the triangle, on JACK, else ALSA, else silent\n"
     "  ressort play PolyTriangle -j              connected to the speakers and every keyboard\n"
+    "  ressort play Resonator --midi song.mid    or, by the triangle: ressort play song.mid\n"
     "  ressort play my.mdl -a alsa -d hw:1       a model of your own on one sound card\n"
     "  ressort play -B 0.0.0.0 --osc-allow 192.168.1.23   played by OSC from a tablet, say\n"
     "  oscsend localhost 9777 /note/on ii 69 100 a note by OSC, from another terminal\n";
@@ -39,7 +42,9 @@ const char* const render_examples =
     "smoothing, one channel for each output.\n"
     "Examples:\n"
     "  ressort render PolyTriangle -o out.wav\n"
-    "  ressort render my.mdl -o out.wav --input gesture.wav --format double\n";
+    "  ressort render 20x30mesh --midi song.mid -o song.flac\n"
+    "  ressort render my.mdl -o out.wav --input gesture.wav --format double\n"
+    "  ressort render --all-presets -o sounds      then look at sounds/index.html\n";
 
 const char* const make_examples =
     "KIND, and the points along each side, the fixed ones included:\n"
@@ -234,15 +239,28 @@ void add_motion(CLI::App& command, std::optional<ThirdArgument>& third) {
 void add_play(CLI::App& app, PlayOptions& options, int& code) {
   CLI::App* command = app.add_subcommand("play", "plays a model or a preset");
   command->footer(play_examples);
-  command->add_option("MODEL", options.name, "a preset's or a model's name, or a file")
+  command
+      ->add_option("MODEL", options.name,
+                   "a preset's or a model's name, or a file; or a .mid file, which is played")
       ->capture_default_str();
   command->add_option("-a,--audio", options.audio, "where the sound goes")
       ->check(CLI::IsMember({"auto", "jack", "alsa", "dummy"}))
       ->capture_default_str();
   command->add_option("-d,--device", options.device.device, "the ALSA device")
       ->capture_default_str();
-  command->add_option("-m,--midi", options.midi, "where keyboards come from")
-      ->check(CLI::IsMember({"auto", "jack", "alsa", "none"}))
+  command
+      ->add_option("-m,--midi", options.midi,
+                   "where keyboards come from: auto, jack, alsa or none; or a .mid file, which is\n"
+                   "played beside them. With -i the program ends when that has fallen silent")
+      ->check(CLI::Validator(
+          [](std::string& word) {
+            const bool is_known =
+                word == "auto" || word == "jack" || word == "alsa" || word == "none";
+            return is_known || names_midi_file(word)
+                       ? std::string()
+                       : "must be auto, jack, alsa, none or a .mid file, found " + word;
+          },
+          "WORD"))
       ->capture_default_str();
   command->add_flag("-j,--connect", options.device.connect,
                     "connect to the speakers and to every keyboard (JACK)");
@@ -309,6 +327,7 @@ void add_play(CLI::App& app, PlayOptions& options, int& code) {
 struct RenderChoice {
   RenderOptions options;
   std::vector<std::string> settings;
+  bool all_presets = false;
   double seconds = 0.0;
   long long frames = 0;
   bool is_quiet = false;
@@ -318,7 +337,8 @@ void add_render(CLI::App& app, RenderChoice& choice, int& code) {
   RenderOptions& options = choice.options;
   CLI::App* command = app.add_subcommand("render", "renders a model or a preset to a sound file");
   command->footer(render_examples);
-  command->add_option("MODEL", options.name, "a preset's or a model's name, or a file")->required();
+  CLI::Option* model =
+      command->add_option("MODEL", options.name, "a preset's or a model's name, or a file");
   std::string endings;
   for (const std::string_view ending : sound_endings()) {
     endings += (endings.empty() ? "" : " ") + std::string(ending);
@@ -337,6 +357,8 @@ void add_render(CLI::App& app, RenderChoice& choice, int& code) {
       ->capture_default_str();
   command->add_option("--input", options.input, "a sound file; its channel n drives input n");
   command->add_option("--score", options.score, "a file of events");
+  command->add_option("--midi", options.midi,
+                      "a Standard MIDI File, type 0 or 1; it ends when it has fallen silent");
   command->add_option("--set", choice.settings, "NAME=VALUE, a parameter from the start");
   command
       ->add_option_function<std::string>(
@@ -361,8 +383,26 @@ void add_render(CLI::App& app, RenderChoice& choice, int& code) {
   command->add_option("--threads", options.threads, "for large networks; without it, all cores")
       ->check(within(1, 1024));
   command->add_flag("--limit", options.limit, "keep below full scale, 1 ms late");
+  command->add_flag(
+      "--all-presets", choice.all_presets,
+      "every preset, a phrase and a note of each, into the folder -o; index.html there\n"
+      "shows their envelopes, spectrograms and figures, spectra.svg is a picture of\n"
+      "all; of the other options it takes -r and -q");
   command->add_flag("-q,--quiet", choice.is_quiet, "say nothing unless something is wrong");
-  command->callback([&choice, seconds, frames, &code] {
+  command->callback([&choice, command, model, seconds, frames, &code] {
+    if (choice.all_presets) {
+      const std::set<std::string> taken = {"all-presets", "output", "rate", "quiet"};
+      for (const CLI::Option* option : command->get_options()) {
+        if (option->count() > 0 && !taken.contains(option->get_single_name())) {
+          throw CLI::ExcludesError("--all-presets", option->get_name());
+        }
+      }
+      code = gallery_command({choice.options.output, choice.options.rate_hz, choice.is_quiet});
+      return;
+    }
+    if (model->count() == 0) {
+      throw CLI::RequiredError("MODEL");
+    }
     if (seconds->count() > 0) {
       choice.options.seconds = choice.seconds;
     }

@@ -1,14 +1,17 @@
 #include "app/say.h"
 
 #include <poll.h>
+#include <sys/ioctl.h>
 #include <unistd.h>
 
 #include <algorithm>
 #include <cerrno>
 #include <chrono>
 #include <condition_variable>
+#include <cstdlib>
 #include <deque>
 #include <mutex>
+#include <string_view>
 #include <thread>
 #include <utility>
 
@@ -107,10 +110,50 @@ Mouth& mouth() {
   return *one;
 }
 
+// A descriptor's columns; 0: it is no terminal, or nobody knows.
+std::size_t columns_of(int descriptor) {
+  winsize size{};
+  return isatty(descriptor) != 0 && ioctl(descriptor, TIOCGWINSZ, &size) == 0 ? size.ws_col : 0;
+}
+
+// https://no-color.org
+bool has_colour(int descriptor) {
+  const char* const no_color = std::getenv("NO_COLOR");
+  const char* const kind = std::getenv("TERM");
+  return isatty(descriptor) != 0 && (no_color == nullptr || *no_color == '\0') && kind != nullptr &&
+         std::string_view(kind) != "dumb";
+}
+
+// The word, where it stands at the beginning of a line or after a place in a file.
+void colour(std::string& text, std::string_view word, std::string_view code) {
+  for (std::size_t at = 0; (at = text.find(word, at)) != text.npos;) {
+    const bool is_first = at == 0 || text[at - 1] == '\n';
+    const bool is_after_place = at >= 2 && text.compare(at - 2, 2, ": ") == 0;
+    if (is_first || is_after_place) {
+      const std::string shown = std::string(code) + std::string(word) + "\033[0m";
+      text.replace(at, word.size(), shown);
+      at += shown.size();
+    } else {
+      at += word.size();
+    }
+  }
+}
+
 }  // namespace
 
+std::string for_terminal(const std::string& text) {
+  constexpr std::size_t narrowest = 20;
+  const std::size_t columns = columns_of(STDOUT_FILENO);
+  std::string shown = columns >= narrowest ? wrapped(text, columns) : text;
+  if (has_colour(STDOUT_FILENO)) {
+    colour(shown, "error:", "\033[1;31m");
+    colour(shown, "warning:", "\033[1;33m");
+  }
+  return shown;
+}
+
 void say(const std::string& line) {
-  mouth().put(STDOUT_FILENO, line);
+  mouth().put(STDOUT_FILENO, for_terminal(line));
 }
 void complain(const std::string& line) {
   mouth().put(STDERR_FILENO, line);

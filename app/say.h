@@ -10,6 +10,10 @@ namespace ressort {
 void say(const std::string& line);
 void complain(const std::string& line);
 
+// The text as `say` puts it on a terminal: lines broken at its width, and the words error and
+// warning in colour unless NO_COLOR is set; elsewhere as it is.
+std::string for_terminal(const std::string& text);
+
 // Until all of it is out: true; or false, a fifth of a second later, if nobody reads it.
 bool wait_until_said();
 

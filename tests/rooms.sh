@@ -27,6 +27,8 @@ judge() {
       owner["sndfile"] = "app/session/sound_file.cpp"
       owner["histedit.h"] = "app/control/terminal.cpp"
       owner["editline/"] = "app/control/terminal.cpp"
+      owner["ebur128.h"] = "app/commands/gallery/loudness.cpp"
+      owner["png.h"] = "app/commands/gallery/png.cpp"
       owner["atomic"] = "app/realtime/lockfree.h"
       owner["toml++/"] = "core/model/"
       owner["Eigen/"] = "core/linear_algebra/"

@@ -268,9 +268,8 @@ void print_report(const Scene& scene, const Compiled& compiled, const Proved& pr
   }
   std::printf("runs as\n  %s", describe(compiled.plan).c_str());
   if (instrument.mode) {
-    std::printf(
-        "lowest mode %.3f Hz; keys are in tune up to %.0f Hz, higher ones are silent\n",
-        instrument.mode->frequency_hz, instrument.highest_frequency_hz);
+    std::printf("lowest mode %.3f Hz; keys are in tune up to %.0f Hz, higher ones are silent\n",
+                instrument.mode->frequency_hz, instrument.highest_frequency_hz);
   }
   std::printf("%s\n", conclusion(scene, proved).c_str());
 }

@@ -1,6 +1,5 @@
 #include "app/commands/commands.h"
 
-#include <poll.h>
 #include <signal.h>
 #include <unistd.h>
 
@@ -16,6 +15,8 @@
 #include <utility>
 #include <vector>
 
+#include "app/commands/progress_bar.h"
+#include "app/commands/smf/midi_player.h"
 #include "app/control/terminal.h"
 #include "app/devices/midi_input.h"
 #include "app/say.h"
@@ -119,6 +120,19 @@ class Player {
       complain(allowed.error().message);
       return exit_code::wrong_use;
     }
+    if (names_midi_file(options_.name)) {  // the first argument may be the song
+      options_.midi = std::exchange(options_.name, PlayOptions().name);
+    }
+    std::optional<MidiFile> song;
+    if (names_midi_file(options_.midi)) {
+      auto read = read_midi_file(options_.midi);
+      if (!read) {
+        complain(read.error().message);
+        return exit_code::wrong_use;
+      }
+      song = *std::move(read);
+      options_.midi = PlayOptions().midi;
+    }
     LoadNews news(options_.name, [this](const std::string& text) { voice_.say(text); });
     const Progress progress([&](std::string_view stage) {
       news.at(stage);
@@ -166,6 +180,11 @@ class Player {
     greet(**loaded);
     open_osc();
     open_midi();
+    if (song) {
+      voice_.say("playing " + counted(song->messages.size(), "message", "messages") + " of MIDI, " +
+                 fixed(song->length_s, 1) + " s");
+      player_.emplace(*std::move(song), door_);
+    }
     return converse();
   }
 
@@ -177,6 +196,7 @@ class Player {
     terminal_.reset();
     console_.reset();
     osc_.reset();
+    player_.reset();
     midi_.reset();
     if (device_.close) {
       fade_out();
@@ -211,6 +231,13 @@ class Player {
   void greet(const Loaded& loaded) {
     if (!device_.note.empty()) {
       voice_.say(device_.note);
+    }
+    if (device_.kind != "dummy" && !may_raise_priority()) {
+      voice_.say(
+          "without permission for real-time priority the sound may break up; to have it, type\n"
+          "  echo '@audio - rtprio 95' | sudo tee /etc/security/limits.d/ressort.conf\n"
+          "  sudo usermod -aG audio $USER\n"
+          "and log in anew");
     }
     voice_.say(loaded.name + ": " + counted(loaded.instrument.masses, "mass", "masses") + ", " +
                counted(loaded.instrument.links, "link", "links") + ", " +
@@ -321,6 +348,9 @@ class Player {
           return exit_code::done;
         }
       }
+      if (options_.no_console && player_ && player_->is_over() && has_fallen_silent()) {
+        return exit_code::done;
+      }
       device_.tick();
       if (std::chrono::steady_clock::now() >= next_tick) {
         next_tick += 1s;
@@ -330,6 +360,17 @@ class Player {
       }
     }
     return exit_code::done;
+  }
+
+  // After a song: whether nothing has been heard for half a second, or something for a minute.
+  bool has_fallen_silent() {
+    constexpr double quiet_db = -80.0;
+    const auto now = std::chrono::steady_clock::now();
+    song_ended_ = song_ended_.value_or(now);
+    if (session_->status().peak_db > quiet_db || !quiet_since_) {
+      quiet_since_ = now;
+    }
+    return now - *quiet_since_ > 500ms || now - *song_ended_ > 60s;
   }
 
   // Waits for the same backend to come back; false if the user loses patience first.
@@ -384,6 +425,9 @@ class Player {
   std::unique_ptr<Session> session_;
   std::unique_ptr<OscServer> osc_;
   std::unique_ptr<MidiInput> midi_;
+  std::optional<MidiPlayer> player_;
+  std::optional<std::chrono::steady_clock::time_point> song_ended_;
+  std::optional<std::chrono::steady_clock::time_point> quiet_since_;
   std::unique_ptr<Console> console_;
   std::unique_ptr<Terminal> terminal_;
 };
@@ -414,19 +458,10 @@ void ignore_signals_no_more() {
   }
 }
 
-// How far it is, where somebody looks and the terminal takes it.
-void show_progress(const std::string& output, int percent) {
-  pollfd ready{STDERR_FILENO, POLLOUT, 0};
-  if (poll(&ready, 1, 0) > 0) {
-    std::fprintf(stderr, "\r%s: %3d %%", output.c_str(), percent);
-  }
-}
-
 }  // namespace
 
 int render_command(const RenderOptions& options, bool is_quiet) {
-  const bool shows = !is_quiet && isatty(STDERR_FILENO) != 0;
-  int shown = -1;
+  std::optional<ProgressBar> bar(!is_quiet);
   RenderOptions watched = options;
   LoadNews news(options.name, is_quiet ? LoadNews::Tell() : complain);
   watched.loading = Progress([&](std::string_view stage) {
@@ -438,16 +473,11 @@ int render_command(const RenderOptions& options, bool is_quiet) {
     if (!std::exchange(is_watched, true)) {
       watch_signals();
     }
-    if (const int percent = static_cast<int>(100.0 * share); shows && percent != shown) {
-      shown = percent;
-      show_progress(options.output, percent);
-    }
+    bar->show(share, options.output);
     return !interrupted.is_raised();
   });
   ignore_signals_no_more();
-  if (shows && shown >= 0) {
-    std::fprintf(stderr, "\r\033[K");
-  }
+  bar.reset();
   const auto complain = [](const std::string& text) { std::fprintf(stderr, "%s\n", text.c_str()); };
   if (!rendered) {
     const bool was_stopped = interrupted.is_raised();
@@ -471,7 +501,8 @@ int render_command(const RenderOptions& options, bool is_quiet) {
     if (rendered->peak > 1.0) {
       complain("the peak passes full scale; --limit keeps it below");
     }
-    const bool was_asked = !options.score.empty() || !options.input.empty();
+    const bool was_asked =
+        !options.score.empty() || !options.input.empty() || !options.midi.empty();
     if (rendered->peak == 0.0 && rendered->frames > 0 && !was_asked) {
       complain("nothing excites the model: give it a --score or an --input");
     }
@@ -481,6 +512,11 @@ int render_command(const RenderOptions& options, bool is_quiet) {
              " became unstable and faded out; the sound is not to be trusted");
   }
   return rendered->was_interrupted ? exit_code::our_failure : exit_code::done;
+}
+
+int gallery_command(const GalleryOptions& options) {
+  watch_signals();
+  return gallery(options, [] { return !interrupted.is_raised(); });
 }
 
 }  // namespace ressort

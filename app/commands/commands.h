@@ -5,6 +5,7 @@
 #include <optional>
 #include <string>
 
+#include "app/commands/gallery/gallery.h"
 #include "app/commands/offline.h"
 #include "app/control/osc/server.h"
 #include "app/devices/audio.h"
@@ -14,9 +15,9 @@
 namespace ressort {
 
 struct PlayOptions {
-  std::string name = "IPlayTheTriangle";
-  std::string audio = "auto";  // jack, alsa, dummy, auto
-  std::string midi = "auto";   // auto, alsa, jack, none
+  std::string name = "IPlayTheTriangle";  // or a MIDI file, which this one plays
+  std::string audio = "auto";             // jack, alsa, dummy, auto
+  std::string midi = "auto";              // auto, alsa, jack, none, or a MIDI file, and then auto
   AudioOptions device;
   double gain_db = 0.0;
   int voices = 0;
@@ -35,5 +36,6 @@ struct PlayOptions {
 
 int play(const PlayOptions& options);
 int render_command(const RenderOptions& options, bool is_quiet);
+int gallery_command(const GalleryOptions& options);
 
 }  // namespace ressort

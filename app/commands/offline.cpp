@@ -1,9 +1,12 @@
 #include "app/commands/offline.h"
 
+#include <time.h>
+
 #include <algorithm>
 #include <cmath>
 #include <set>
 
+#include "app/commands/smf/midi_file.h"
 #include "app/control/registry.h"
 #include "app/realtime/process.h"
 #include "app/realtime/thread_pool.h"
@@ -19,6 +22,9 @@ namespace {
 constexpr std::size_t block_frames = 256;
 constexpr std::size_t max_score_bytes = std::size_t{64} << 20;
 constexpr double ring_out_s = 2.0;
+constexpr double longest_ring_s = 60.0;  // after a MIDI file: by then it is silent, or never
+constexpr double silent_for_s = 0.5;
+constexpr double silent_peak = 1e-4;  // -80 dBFS
 constexpr double longest_s = 24.0 * 3600.0;
 
 struct ScoredEvent {
@@ -36,7 +42,10 @@ Error at(const std::string& path, const Error& error) {
 // the score's line.
 Result<std::vector<ScoreLine>> read_score(const RenderOptions& options, bool is_bare) {
   if (options.score.empty()) {
-    return parse_score(is_bare || !options.input.empty() ? "" : default_phrase());
+    return parse_score(!options.phrase.empty() ? options.phrase
+                       : is_bare || !options.input.empty() || !options.midi.empty()
+                           ? ""
+                           : to_score(default_phrase()));
   }
   auto text = read_text(options.score, max_score_bytes);
   if (!text) {
@@ -143,6 +152,13 @@ Result<std::optional<SoundReader>> open_input(const RenderOptions& options) {
   return std::optional<SoundReader>(*std::move(sound));
 }
 
+// What this thread has computed so far.
+double thread_cpu_s() {
+  timespec time{};
+  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &time);
+  return static_cast<double>(time.tv_sec) + 1e-9 * static_cast<double>(time.tv_nsec);
+}
+
 // A value that the preset does not allow, at the line that says so.
 Error beyond_range(const Scene& scene, const ParameterInfo& info) {
   Error error{"the preset keeps '" + info.name + "' between " + print_number(info.minimum) +
@@ -157,7 +173,7 @@ Error beyond_range(const Scene& scene, const ParameterInfo& info) {
 }
 
 long long length_in_frames(const RenderOptions& options, const std::vector<ScoredEvent>& score,
-                           const Inputs& inputs) {
+                           const Inputs& inputs, const MidiFile& midi) {
   if (options.frames) {
     return *options.frames;
   }
@@ -166,35 +182,79 @@ long long length_in_frames(const RenderOptions& options, const std::vector<Score
   }
   const long long last =
       std::max(score.empty() ? 0 : score.back().frame, inputs.file ? inputs.file->frames() : 0);
-  return last + std::llround(ring_out_s * options.rate_hz);
+  const double midi_s = options.midi.empty() ? 0.0 : midi.length_s + longest_ring_s;
+  return std::max(last + std::llround(ring_out_s * options.rate_hz),
+                  std::llround(midi_s * options.rate_hz));
 }
+
+// The messages of a MIDI file, block by block.
+class MidiPackets {
+ public:
+  MidiPackets(const MidiFile& file, double rate_hz) : file_(file), rate_hz_(rate_hz) {}
+
+  // Those of the frames from `first` on. They hold until the next call.
+  std::span<const MidiPacket> next(long long first, std::size_t count) {
+    packets_.clear();
+    for (; next_ < file_.messages.size(); ++next_) {
+      const MidiFile::Message& message = file_.messages[next_];
+      const long long frame = std::llround(message.time_s * rate_hz_) - first;
+      if (frame >= static_cast<long long>(count)) {
+        break;
+      }
+      packets_.push_back({static_cast<std::uint32_t>(frame), file_.bytes_of(message)});
+    }
+    return packets_;
+  }
+
+ private:
+  const MidiFile& file_;
+  double rate_hz_;
+  std::size_t next_ = 0;
+  std::vector<MidiPacket> packets_;
+};
 
 }  // namespace
 
-std::string default_phrase() {
-  return "0.00 /note/on 57 100\n0.45 /note/off 57\n"
-         "0.50 /note/on 60 90\n0.95 /note/off 60\n"
-         "1.00 /note/on 64 100\n1.45 /note/off 64\n"
-         "1.50 /note/on 69 110\n1.95 /note/off 69\n"
-         "2.00 /note/on 57 80\n2.00 /note/on 64 70\n2.00 /note/on 72 70\n"
-         "3.20 /note/off 57\n3.20 /note/off 64\n3.20 /note/off 72\n";
+const std::vector<PhraseNote>& default_phrase() {
+  static const std::vector<PhraseNote> notes = {
+      {0.0, 0.45, 57, 100}, {0.5, 0.95, 60, 90}, {1.0, 1.45, 64, 100}, {1.5, 1.95, 69, 110},
+      {2.0, 3.2, 57, 80},   {2.0, 3.2, 64, 70},  {2.0, 3.2, 72, 70},
+  };
+  return notes;
+}
+
+std::string to_score(const std::vector<PhraseNote>& notes) {
+  std::string text;
+  for (const PhraseNote& note : notes) {
+    const std::string key = std::to_string(note.key);
+    text += print_number(note.start_s) + " /note/on " + key + " " + std::to_string(note.velocity) +
+            "\n" + print_number(note.end_s) + " /note/off " + key + "\n";
+  }
+  return text;
 }
 
 Result<Rendered> render(const RenderOptions& options, const std::function<bool(double)>& progress) {
-  auto scene = load_scene(
-      options.name,
-      {.bare = true, .third = options.third, .keys = options.keys, .progress = options.loading});
+  // Keys play a model with its default preset; what is bare has none.
+  auto scene = load_scene(options.name, {.bare = options.midi.empty(),
+                                         .third = options.third,
+                                         .keys = options.keys,
+                                         .progress = options.loading});
   if (!scene) {
     return scene.error();
   }
-  const std::string read[] = {scene->path, scene->model_path, options.score, options.input};
+  const std::string read[] = {scene->path, scene->model_path, options.score, options.input,
+                              options.midi};
   if (auto spared = spare(options.output, read); !spared) {
     return spared.error();
   }
-  const bool is_bare = !scene->has_preset;
+  const bool is_bare = !scene->has_preset && options.midi.empty();
   const auto lines = read_score(options, is_bare);
   if (!lines) {
     return lines.error();
+  }
+  auto midi = options.midi.empty() ? Result<MidiFile>(MidiFile()) : read_midi_file(options.midi);
+  if (!midi) {
+    return midi.error();
   }
   const auto threads = static_cast<std::size_t>(options.threads);
   if (threads > core_count()) {
@@ -211,6 +271,7 @@ Result<Rendered> render(const RenderOptions& options, const std::function<bool(d
                          .method = options.method,
                          .budget = options.budget,
                          .executor = &pool,
+                         .find_gain = !scene->has_preset && !is_bare,
                          .force = options.force,
                          .settings = options.parameters,
                          .reach = reach_of(*lines, scene->network),
@@ -252,7 +313,7 @@ Result<Rendered> render(const RenderOptions& options, const std::function<bool(d
   process.slot.offer(new Sounding{std::move(compiled->engine), serial});
 
   Rendered rendered{.name = scene->name,
-                    .frames = length_in_frames(options, *score, inputs),
+                    .frames = length_in_frames(options, *score, inputs, *midi),
                     .channels = std::max(is_bare ? 1 : 2, instrument.outputs),
                     .warnings = scene->warnings};
   if (static_cast<double>(rendered.frames) > longest_s * options.rate_hz) {
@@ -262,12 +323,16 @@ Result<Rendered> render(const RenderOptions& options, const std::function<bool(d
   if (progress && !progress(0.0)) {
     return Error{"interrupted before the first sample"};
   }
-  auto file = SoundWriter::open(options.output,
-                                {.rate_hz = options.rate_hz,
-                                 .channels = rendered.channels,
-                                 .samples = options.format,
-                                 .frames = rendered.frames},
-                                Existing::replace);
+  const bool ends_by_itself = !options.midi.empty() && !options.frames && !options.seconds;
+  const long long may_end = std::llround(midi->length_s * options.rate_hz);
+  const auto expected = static_cast<double>(ends_by_itself ? may_end : rendered.frames);
+  auto file =
+      SoundWriter::open(options.output,
+                        {.rate_hz = options.rate_hz,
+                         .channels = rendered.channels,
+                         .samples = options.format,
+                         .frames = ends_by_itself ? std::nullopt : std::optional(rendered.frames)},
+                        Existing::replace);
   if (!file) {
     return file.error();
   }
@@ -277,9 +342,11 @@ Result<Rendered> render(const RenderOptions& options, const std::function<bool(d
   for (std::size_t c = 0; c < channels; ++c) {
     outputs.push_back(samples.data() + c * block_frames);
   }
+  MidiPackets packets(*midi, options.rate_hz);
   std::size_t next = 0;
   double energy = 0.0;
   long long frame = 0;
+  long long loud_until = may_end;
   while (frame < rendered.frames && !rendered.was_interrupted) {
     const auto count =
         static_cast<std::size_t>(std::min<long long>(block_frames, rendered.frames - frame));
@@ -292,22 +359,34 @@ Result<Rendered> render(const RenderOptions& options, const std::function<bool(d
       }
       ++next;
     }
-    process.block(inputs.next(count), std::span<double* const>(outputs), count, {}, 0);
+    const auto heard = inputs.next(count);
+    const double before_s = thread_cpu_s();
+    process.block(heard, std::span<double* const>(outputs), count, packets.next(frame, count), 0);
+    rendered.cpu_s += thread_cpu_s() - before_s;
+    double peak = 0.0;
     for (std::size_t n = 0; n < count; ++n) {
       for (std::size_t c = 0; c < channels; ++c) {
         const double y = outputs[c][n];
         interleaved[n * channels + c] = y;
-        rendered.peak = std::max(rendered.peak, std::fabs(y));
+        peak = std::max(peak, std::fabs(y));
         energy += y * y;
       }
+    }
+    rendered.peak = std::max(rendered.peak, peak);
+    if (peak > silent_peak) {
+      loud_until = std::max(loud_until, end);
     }
     if (auto wrote = file->write(interleaved.data(), count); !wrote) {
       rendered.failure = wrote.error();
       return rendered;
     }
     frame = end;
-    if (progress && !progress(static_cast<double>(frame) / static_cast<double>(rendered.frames))) {
+    if (progress && !progress(std::min(1.0, static_cast<double>(frame) / expected))) {
       rendered.was_interrupted = true;
+    }
+    if (ends_by_itself &&
+        static_cast<double>(frame - loud_until) > silent_for_s * options.rate_hz) {
+      break;
     }
   }
   if (auto closed = file->close(); !closed) {

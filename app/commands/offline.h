@@ -20,9 +20,12 @@ struct RenderOptions {
   std::string output;  // a sound file; its ending says which
   double rate_hz = 44100.0;
   std::optional<double> seconds;       // at most one of these; without both: as long as score and
-  std::optional<long long> frames;     //   input last, and two seconds to ring out
+  std::optional<long long> frames;     //   input last, and two seconds to ring out, or as a MIDI
+                                       //   file lasts, and until it is silent, a minute at most
   std::string input;                   // a sound file; channel n drives input n
   std::string score;                   // a file of calls
+  std::string midi;                    // a Standard MIDI File, beside the score or instead of one
+  std::string phrase;                  // a score itself, instead of the default phrase
   std::vector<Setting> parameters;     // set before the first sample
   std::optional<SampleFormat> format;  // without one, the best that the file can hold
   Precision precision = Precision::float64;
@@ -45,6 +48,7 @@ struct Rendered {
   int channels = 0;
   double peak = 0.0;
   double rms = 0.0;
+  double cpu_s = 0.0;  // of this thread, for the sound alone
   std::uint64_t resets = 0;
   bool was_interrupted = false;
   std::vector<std::string> warnings;
@@ -55,7 +59,16 @@ struct Rendered {
 // is there by then is kept. [control]
 Result<Rendered> render(const RenderOptions& options, const std::function<bool(double)>& progress);
 
-// The short phrase that a preset plays when nobody says what to play.
-std::string default_phrase();
+struct PhraseNote {
+  double start_s = 0.0;
+  double end_s = 0.0;
+  int key = 0;
+  int velocity = 0;
+};
+
+// The short phrase that a preset plays when nobody says what to play; its end is that of its last
+// note. And notes as a score.
+const std::vector<PhraseNote>& default_phrase();
+std::string to_score(const std::vector<PhraseNote>& notes);
 
 }  // namespace ressort

@@ -49,10 +49,10 @@ Result<const Row*> find_command(std::string_view name) {
   std::vector<std::string> meant;
   const Row* found = nullptr;
   for (const Row* const row : commands()) {
-    if (row->command == name) {
+    if (same_but_case(row->command, name)) {
       return row;
     }
-    if (row->command.starts_with(name)) {
+    if (same_but_case(row->command.substr(0, name.size()), name)) {
       meant.emplace_back(row->command);
       found = row;
     }
@@ -71,7 +71,8 @@ Result<const Row*> find_command(std::string_view name) {
   for (const Row* const row : commands()) {
     meant.emplace_back(row->command);
   }
-  return Error{"there is no command " + typed + "; there are " + joined(meant, ", ")};
+  return Error{"there is no command " + typed + "; there are " + joined(meant, ", ") +
+               did_you_mean(name, meant)};
 }
 
 std::string usage(const Row& row) {
@@ -283,7 +284,7 @@ std::vector<std::string> Console::completions(std::string_view line) const {
     for (const Row* const row : commands()) {
       words.emplace_back(row->command);
     }
-  } else if (kind == "PARAMETER") {
+  } else if (kind.find("PARAMETER") != kind.npos) {
     const auto loaded =
         context_->session.current();  // kept while the worker puts another in its place
     for (const ParameterInfo& info : loaded->instrument.parameters) {

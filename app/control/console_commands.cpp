@@ -13,7 +13,7 @@
 #include "app/session/files.h"
 #include "app/text.h"
 #include "core/model/language/expression.h"
-#include "core/model/preset/preset.h"
+#include "core/model/preset/edit.h"
 
 namespace ressort {
 
@@ -24,15 +24,12 @@ std::shared_ptr<const Loaded> loaded(const ConsoleContext& console) {
   return current->serial != 0 ? current : nullptr;
 }
 
-namespace {
-
 // --- playing ------------------------------------------------------------------------------------
 
 const Error nothing_loaded{
     "no model is loaded yet; 'models' lists what there is, 'load NAME' "
     "loads one"};
 
-// Sends a playing message to the audio thread; all of its events act together.
 Result<std::vector<Event>> play(ConsoleContext& console, const Message& message) {
   if (!loaded(console)) {
     return nothing_loaded;
@@ -56,6 +53,19 @@ Result<std::vector<Event>> play(ConsoleContext& console, const Message& message)
   console.session.remember(timed);
   return events;
 }
+
+std::string meant_parameter(const Instrument& instrument, const std::string& word) {
+  const auto& known = instrument.parameters;
+  const auto is = [&](bool in_any_case) {
+    return std::find_if(known.begin(), known.end(), [&](const ParameterInfo& info) {
+      return in_any_case ? same_but_case(info.name, word) : info.name == word;
+    });
+  };
+  const auto found = is(false) != known.end() ? is(false) : is(true);
+  return found != known.end() ? found->name : word;
+}
+
+namespace {
 
 // The number of the input that a gesture goes to: as typed, or the first that knows it.
 Result<std::string> input_for(const ConsoleContext& console, const GestureRow& gesture,
@@ -198,27 +208,28 @@ Result<Done> command::load(ConsoleContext& console, Words words) {
 
 namespace {
 
-std::string description_of(const std::string& preset_name) {
-  const fs::path path =
-      fs::path(models_folder()).parent_path() / "presets" / (preset_name + ".toml");
-  const auto text = read_text(path.string(), max_preset_bytes);
-  if (!text) {
-    return "";
+std::string preset_table() {
+  std::vector<std::vector<std::string>> rows;
+  for (const std::string& name : known_presets()) {
+    rows.push_back({name, preset_description(name)});
   }
-  return parse_preset(*text).preset.description;
+  return table(rows, 2);
 }
 
 }  // namespace
 
 Result<Done> command::models(ConsoleContext& console, Words) {
-  std::vector<std::vector<std::string>> rows;
-  for (const std::string& name : known_presets()) {
-    rows.push_back({name, description_of(name)});
-  }
+  const std::string presets = preset_table();
   const std::string bare = joined(known_models(), ", ");
-  console.print(rows.empty() && bare.empty()
+  console.print(presets.empty() && bare.empty()
                     ? "nothing in '" + models_folder() + "'; 'load FILE.mdl' loads a file of yours"
-                    : "Presets\n" + table(rows, 2) + "\nModels as they are written\n  " + bare);
+                    : "Presets\n" + presets + "\nModels as they are written\n  " + bare);
+  return Done{};
+}
+
+Result<Done> command::presets(ConsoleContext& console, Words) {
+  const std::string all = preset_table();
+  console.print(all.empty() ? "there are no presets; 'save NAME' makes one of what sounds" : all);
   return Done{};
 }
 
@@ -246,16 +257,17 @@ Result<Done> command::get(ConsoleContext& console, Words words) {
   }
   std::vector<std::string> found;
   std::vector<std::string> names;
+  const std::string meant = meant_parameter(current->instrument, words[0]);
   for (const ParameterInfo& info : current->instrument.parameters) {
     names.push_back(info.name);
-    if (fits(words[0], info.name)) {
+    if (fits(meant, info.name)) {
       const double value = console.session.parameter(info.name).value_or(info.value);
       found.push_back(info.name + " = " + print_number(value));
     }
   }
   if (found.empty()) {
     return Error{current->name + " has no parameter '" + words[0] + "'; it has " +
-                 (names.empty() ? "none" : joined(names, ", "))};
+                 (names.empty() ? "none" : joined(names, ", ")) + did_you_mean(words[0], names)};
   }
   console.print(joined(found, "\n"));
   return Done{};
@@ -263,7 +275,11 @@ Result<Done> command::get(ConsoleContext& console, Words words) {
 
 Result<Done> command::set(ConsoleContext& console, Words words) {
   const auto current = loaded(console);
-  const Message message{"/param/" + words[0], {to_argument(words[1])}};
+  if (!current) {
+    return nothing_loaded;
+  }
+  const std::string meant = meant_parameter(current->instrument, words[0]);
+  const Message message{"/param/" + meant, {to_argument(words[1])}};
   const auto events = play(console, message);
   if (!events) {
     return events.error();
@@ -323,6 +339,38 @@ std::string describe_stability(const Instrument& instrument) {
                                fixed(std::max(0.0, margin), 2) + " of the stiffness";
 }
 
+// "cc71 (learnt)" and what it does, for every control and controller.
+std::vector<std::vector<std::string>> control_rows(const ConsoleContext& console,
+                                                   const Loaded& current) {
+  std::vector<std::vector<std::string>> rows;
+  const auto now = [&](const std::string& name) {
+    const auto value = console.session.parameter(name);
+    return value ? "; now " + print_number(*value) : "";
+  };
+  const std::vector<LearnedRow> learned = console.session.learned();
+  for (const LearnedRow& row : learned) {
+    rows.push_back({"cc" + std::to_string(row.controller),
+                    "turns " + row.target + ", as it has learnt" + now(row.target)});
+  }
+  for (const ControlSetting& control : current.preset.controls) {
+    const bool is_replaced =
+        control.source == ControlSource::controller &&
+        std::any_of(learned.begin(), learned.end(),
+                    [&](const LearnedRow& row) { return row.controller == control.number; });
+    if (is_replaced) {
+      continue;
+    }
+    const bool turns = control.gesture == Gesture::parameter;
+    const std::string range = print_number(control.low) + " to " + print_number(control.high);
+    rows.push_back({source_name(control),
+                    (turns ? "turns " + control.target
+                           : std::string(row_of(control.gesture).name) + " at " + control.target) +
+                        ", " + range + (control.exponential ? ", exponential" : "") +
+                        (turns ? now(control.target) : "")});
+  }
+  return rows;
+}
+
 }  // namespace
 
 Result<Done> command::status(ConsoleContext& console, Words) {
@@ -345,16 +393,19 @@ Result<Done> command::explain(ConsoleContext& console, Words) {
       {"lowest mode", instrument.mode
                           ? fixed(instrument.mode->frequency_hz, 2) + " Hz as it is written"
                           : "none that keys could tune"},
-      {"keys", instrument.mode ? "set the pitch" + transposition(instrument.transpose) +
-                                     ", up to " + fixed(instrument.highest_frequency_hz, 1) +
-                                     " Hz; higher ones are silent"
-                               : "all sound as the model is written"},
+      {"keys", instrument.mode
+                   ? "set the pitch" + transposition(instrument.transpose) + ", up to " +
+                         fixed(instrument.highest_frequency_hz, 1) + " Hz; higher ones are silent"
+                   : "all sound as the model is written"},
       {"stability", describe_stability(instrument)},
   };
   for (const InputInfo& input : instrument.inputs) {
     rows.push_back({"input " + std::to_string(input.number), describe(input)});
   }
   rows.push_back({"outputs", std::to_string(instrument.outputs)});
+  for (std::vector<std::string>& row : control_rows(console, *current)) {
+    rows.push_back(std::move(row));
+  }
   std::string text = current->name;
   text += current->description.empty() ? "\n" : ": " + current->description + "\n";
   console.print(text + describe(current->plan) + table(rows));

@@ -22,6 +22,14 @@ struct ConsoleContext {
 // What sounds; null before anything was loaded.
 std::shared_ptr<const Loaded> loaded(const ConsoleContext& console);
 
+extern const Error nothing_loaded;
+
+// Sends a playing message to the audio thread; all of its events act together.
+Result<std::vector<Event>> play(ConsoleContext& console, const Message& message);
+
+// The name of the parameter that a person means by a word: as it is, or in another case.
+std::string meant_parameter(const Instrument& instrument, const std::string& word);
+
 // Carries out a command; the words have been counted.
 Result<Done> act(ConsoleContext& console, const Row& row, Words words);
 
@@ -29,6 +37,12 @@ namespace command {
 Result<Done> keys(ConsoleContext& console, Words words);
 Result<Done> load(ConsoleContext& console, Words words);
 Result<Done> models(ConsoleContext& console, Words words);
+Result<Done> presets(ConsoleContext& console, Words words);
+Result<Done> save(ConsoleContext& console, Words words);
+Result<Done> learn(ConsoleContext& console, Words words);
+Result<Done> unlearn(ConsoleContext& console, Words words);
+Result<Done> undo(ConsoleContext& console, Words words);
+Result<Done> wait(ConsoleContext& console, Words words);
 Result<Done> params(ConsoleContext& console, Words words);
 Result<Done> get(ConsoleContext& console, Words words);
 Result<Done> set(ConsoleContext& console, Words words);

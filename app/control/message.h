@@ -16,6 +16,7 @@ using Argument = std::variant<double, std::string>;
 struct Message {
   std::string address;  // "/note/on"
   std::vector<Argument> arguments;
+  std::string types = {};  // of the arguments, as OSC has them; empty: of a line of text
 };
 
 // One line of a score: TIME_SECONDS ADDRESS ARG... ; blank lines and # comments have no message.

@@ -6,6 +6,7 @@
 
 #include "app/control/console_commands.h"
 #include "app/control/osc/answers.h"
+#include "app/control/osc/subscribers.h"
 #include "app/text.h"
 #include "core/model/language/expression.h"
 
@@ -20,8 +21,16 @@ Events one(const Said& said, Event event) {
   return std::vector{event};
 }
 
+// OSC's floats up to 1 are shares of the loudest; whole numbers, and what is typed, are MIDI's.
+double velocity_of(const Said& said) {
+  const std::string& types = said.message.types;
+  const bool is_share =
+      types.size() > 1 && (types[1] == 'f' || types[1] == 'd') && said.arguments[1] <= 1.0;
+  return is_share ? said.arguments[1] : said.arguments[1] / 127.0;
+}
+
 Events note(const Said& said, bool starts) {
-  const double velocity = said.arguments[1] / 127.0;
+  const double velocity = velocity_of(said);
   const bool is_on = starts && velocity > 0.0;
   return one(said, {.kind = is_on ? EventKind::note_on : EventKind::note_off,
                     .index = said.whole(0),
@@ -48,7 +57,7 @@ Events set_parameters(const Said& said) {
   }
   if (events.empty()) {
     return Error{said.message.address + ": the model has no such parameter; it has " +
-                 (names.empty() ? "none" : joined(names, ", "))};
+                 (names.empty() ? "none" : joined(names, ", ")) + did_you_mean(said.name, names)};
   }
   return events;
 }
@@ -80,7 +89,9 @@ std::vector<Row> make_rows() {
   const Row first[] = {
       {.address = "/note/on",
        .arguments = {{"KEY", "the key", 0, 127}, {"VELOCITY", "the velocity", 0, 127, 100}},
-       .does = "starts a note; key 0-127, velocity 1-127 (100)",
+       .does =
+           "starts a note; key 0-127, velocity 1-127 (100), or as a float up to 1 a share of the "
+           "loudest",
        .play = [](const Said& said) { return note(said, true); },
        .command = "noteon",
        .group = CommandGroup::playing,
@@ -144,6 +155,25 @@ std::vector<Row> make_rows() {
        .command_does = "turns a parameter; it stays within its range",
        .details = "PARAMETER may be a pattern: 'set *_Z 0.001' sets all that end so.",
        .act = command::set},
+      {.command = "learn",
+       .group = CommandGroup::parameters,
+       .words = "PARAMETER",
+       .command_does = "lets the knob that you move next turn a parameter",
+       .details =
+           "PARAMETER may be an OSC name of the preset's, such as /finger, too. The knob does "
+           "nothing else\nmeanwhile. 'save NAME' keeps it.",
+       .act = command::learn},
+      {.command = "unlearn",
+       .group = CommandGroup::parameters,
+       .words = "[PARAMETER]",
+       .command_does = "lets a knob, or all, do again what the preset says",
+       .act = command::unlearn},
+      {.command = "undo",
+       .group = CommandGroup::parameters,
+       .command_does = "takes back the last change of a parameter, or the last load",
+       .details = "Whoever made it: knob, OSC or console. Turns within a second are one change. A "
+                  "second 'undo'\ntakes back the first.",
+       .act = command::undo},
       {.address = "/param/NAME/range",
        .does = "answers its minimum and maximum, and between what it is stable",
        .answer = answer::ranges},
@@ -198,9 +228,28 @@ std::vector<Row> make_rows() {
        .command_does = "the same; Tab offers the presets only",
        .details = "A preset is a model with ranges for its parameters and a plan of what plays it.",
        .act = command::load},
+      {.address = "/preset/save",
+       .arguments = {{.word = "NAME", .is_text = true}},
+       .does = "saves what sounds, as it is now, among the user's presets, never over one that is "
+               "there; answers /done or /fail",
+       .answer = answer::save,
+       .command = "save",
+       .group = CommandGroup::models,
+       .words = "NAME [--force]",
+       .command_does = "keeps what sounds, as it is now, as a preset of yours",
+       .details =
+           "The values of the parameters, and what controllers have learnt, go to NAME.toml among "
+           "your own\npresets, in $XDG_DATA_HOME/ressort/presets or "
+           "~/.local/share/ressort/presets; "
+           "'load NAME'\nbrings it back. --force writes over one that is there.",
+       .act = command::save},
+      {.command = "presets",
+       .group = CommandGroup::models,
+       .command_does = "lists the presets, yours among them, each with a line",
+       .act = command::presets},
       {.command = "models",
        .group = CommandGroup::models,
-       .command_does = "lists what came with the program",
+       .command_does = "lists the presets and the models, yours among them",
        .details = "Presets go first, each with what it is; then the models that they are made of.",
        .act = command::models},
       {.address = "/status",
@@ -215,6 +264,19 @@ std::vector<Row> make_rows() {
        .group = CommandGroup::looking,
        .command_does = "tells how the model is computed and what plays it",
        .act = command::explain},
+      {.address = "/subscribe",
+       .arguments = {{"SECONDS", "the seconds", 0, Subscribers::longest_lease_s, 10}},
+       .does =
+           "sends every change, whoever makes it, for so long, at most 60 s (10): first all that "
+           "is, then /loaded and /param/NAME; again renews it",
+       .answer = answer::subscribe},
+      {.address = "/unsubscribe", .does = "ends that", .answer = answer::unsubscribe},
+      {.address = "/models",
+       .does = "answers the name of each model, then their number",
+       .answer = answer::models},
+      {.address = "/presets",
+       .does = "answers the name and the line of each preset, then their number",
+       .answer = answer::presets},
       {.address = "/describe",
        .does = "answers a row for everything that can be set or asked",
        .answer = answer::describe},
@@ -234,6 +296,10 @@ std::vector<Row> make_rows() {
            "bits a\nsample, and the rate of the audio. Over a sound file that is there it is "
            "written by --force\nonly.",
        .act = command::record},
+      {.command = "wait",
+       .words = "SECONDS",
+       .command_does = "waits, for scripts and pipes: noteon 60, wait 0.5, noteoff 60",
+       .act = command::wait},
       {.command = "help", .words = "[COMMAND]", .command_does = "tells more", .act = command::help},
       {.command = "quit", .command_does = "ends the program", .act = command::quit},
   };
@@ -252,7 +318,9 @@ std::vector<Row> make_rows() {
 // --- addresses ----------------------------------------------------------------------------------
 
 constexpr std::string_view answers[] = {"/error",        "/done",           "/fail",
-                                        "/status.reply", "/describe.reply", "/describe.end"};
+                                        "/status.reply", "/describe.reply", "/describe.end",
+                                        "/models.reply", "/models.end",     "/presets.reply",
+                                        "/presets.end",  "/loaded",         "/subscribe.reply"};
 
 // What stands before and after N or NAME; `hole` is empty where there is none.
 struct Pattern {

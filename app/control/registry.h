@@ -21,6 +21,7 @@ namespace ressort {
 struct ConsoleContext;
 class OscClient;
 class Session;
+class Subscribers;
 
 using Words = std::span<const std::string>;
 
@@ -44,6 +45,7 @@ struct Question {
   std::string_view name;  // what stands for NAME in the address
   Session& session;
   const OscClient& client;
+  Subscribers& subscribers;
 };
 
 enum class CommandGroup : std::uint8_t { models, playing, parameters, looking, other };

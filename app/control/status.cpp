@@ -49,6 +49,27 @@ std::string tell_modes(const Status& now) {
                                       0);
 }
 
+// A bar of 3 dB a step, from -60 dBFS to full scale.
+std::string level_meter(double peak_db) {
+  constexpr int steps = 20;
+  const int filled = std::clamp(static_cast<int>(std::ceil((peak_db + 60.0) / 3.0)), 0, steps);
+  return "[" + std::string(static_cast<std::size_t>(filled), '#') +
+         std::string(static_cast<std::size_t>(steps - filled), '-') + "]";
+}
+
+// "A3 (100)": the middle C is C4.
+std::string tell_notes(const Status& now) {
+  constexpr const char* names[] = {"C", "C#", "D", "D#", "E", "F", "F#", "G", "G#", "A", "A#", "B"};
+  std::string text;
+  const std::uint64_t places = now.last_notes.size();
+  for (std::uint64_t i = now.notes - std::min(now.notes, places); i < now.notes; ++i) {
+    const PlayedNote& note = now.last_notes[i % places];
+    text += (text.empty() ? "" : ", ") + std::string(names[note.key % 12]) +
+            std::to_string(note.key / 12 - 1) + " (" + std::to_string(note.velocity) + ")";
+  }
+  return text.empty() ? "none yet" : "last " + text;
+}
+
 // In the order of the console's lines; the places are those of OSC, which nobody may move.
 constexpr StatusRow status_table[] = {
     {"model", "", "what sounds", &Status::model, 0, "model",
@@ -84,6 +105,8 @@ constexpr StatusRow status_table[] = {
      [](const Status& now) { return std::to_string(now.stolen) + " stolen"; }},
     {"shed", "", "voices that there was no time for", &Status::shed, not_in_reply, "voices",
      [](const Status& now) { return std::to_string(now.shed) + " shed for want of time"; }},
+    {"notes", "", "that began, and the last of them with their velocities", &Status::notes,
+     not_in_reply, "notes", tell_notes},
     {"asleep", "1", "share of the computing that sleep saves", &Status::saved, not_in_reply,
      "asleep",
      [](const Status& now) { return percent(now.saved, 0) + " of what all voices would take"; }},
@@ -94,7 +117,8 @@ constexpr StatusRow status_table[] = {
     {"whole", "", "all of the energy is known", &Status::is_whole},
     {"peak_db", "dBFS", "since the last status; -999 is silence", &Status::peak_db, 9, "output",
      [](const Status& now) {
-       return (now.peak_db > -120.0
+       return level_meter(now.peak_db) + " " +
+              (now.peak_db > -120.0
                    ? "peak " + fixed(std::min(now.peak_db, -0.0) + 0.0, 1) + " dBFS"
                    : "silence") +
               " since the last status";

@@ -212,7 +212,7 @@ struct Terminal::Input {
         news = is_editing ? std::exchange(unsaid, {}) : "";
       }
       if (!news.empty()) {
-        put("\r\x1b[K" + news);
+        put("\r\x1b[K" + for_terminal(news));
         el_set(editor, EL_REFRESH);
       }
       pollfd both[] = {{STDIN_FILENO, POLLIN, 0}, {wake[0], POLLIN, 0}};

@@ -5,6 +5,7 @@
 
 #include <cerrno>
 #include <chrono>
+#include <thread>
 
 namespace ressort {
 
@@ -31,10 +32,24 @@ Result<AudioDevice> open_audio(const std::string& wanted, Process& process,
   return Error{std::move(note)};
 }
 
-void raise_priority() {
+namespace {
+
+bool ask_for_priority() {
   sched_param priority{};
   priority.sched_priority = 70;  // above desktops, below the kernel's own audio threads
-  pthread_setschedparam(pthread_self(), SCHED_FIFO, &priority);
+  return pthread_setschedparam(pthread_self(), SCHED_FIFO, &priority) == 0;
+}
+
+}  // namespace
+
+void raise_priority() {
+  static_cast<void>(ask_for_priority());
+}
+
+bool may_raise_priority() {
+  bool may = false;
+  std::thread([&] { may = ask_for_priority(); }).join();
+  return may;
 }
 
 void sleep_until(std::int64_t time_ns) {

@@ -71,6 +71,9 @@ Result<AudioDevice> open_audio(const std::string& wanted, Process& process,
 // Asks for real-time priority for the calling thread; without the right to it, it stays as it is.
 void raise_priority();
 
+// Whether that would be granted. [control]
+bool may_raise_priority();
+
 // Sleeps until the monotonic clock reads this.
 void sleep_until(std::int64_t time_ns);
 

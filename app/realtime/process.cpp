@@ -88,6 +88,7 @@ void Process::run(std::span<const Sample* const> inputs, std::span<Sample* const
   const std::int64_t start_ns = clock_ns_ != nullptr ? clock_ns_() : 0;
   const DenormalsFlushed flushed;
   clock.write({frame_, time_ns, rate_hz_, static_cast<std::int64_t>(frames)});
+  learn();
   if (frames > 0) {
     gather(frames, midi, time_ns);
   }
@@ -244,6 +245,8 @@ void Process::collect_due(std::size_t frames) {
       // The rest of a flood acts with its last moment: early, but all of it and in its order.
       event.frame = ++moments <= most_moments ? event.frame : due_.back().frame;
     }
+    note(event);
+    translate(event);
     due_.push_back(event);
     follow_program(event);
   };
@@ -281,6 +284,46 @@ void Process::follow_program(const Event& event) {
   } else if (event.kind == EventKind::program && current_ != nullptr &&
              current_->engine->listens_to(event.channel)) {
     reports.push({Report::Kind::program, current_->serial, 0, 128.0 * bank + event.index});
+  }
+}
+
+// For who looks at what is played.
+void Process::note(const Event& event) {
+  if (event.kind == EventKind::note_on) {
+    meters_.last_notes[meters_.notes++ % meters_.last_notes.size()] = {
+        static_cast<std::uint8_t>(event.index),
+        static_cast<std::uint8_t>(std::clamp(std::lround(127.0 * event.value), 1L, 127L))};
+  } else if (event.kind == EventKind::controller) {
+    ++meters_.turns;
+    meters_.last_controller = static_cast<std::uint8_t>(event.index);
+  }
+}
+
+void Process::learn() {
+  Lesson lesson;
+  for (std::size_t left = lessons.size(); left > 0 && lessons.pop(lesson); --left) {
+    learned_[lesson.controller % learned_.size()] = lesson.control;
+  }
+}
+
+// A controller becomes what it has learnt, where that is of the model that sounds.
+void Process::translate(Event& event) {
+  if (event.kind != EventKind::controller || current_ == nullptr) {
+    return;
+  }
+  const LearnedControl& control = learned_[event.index % learned_.size()];
+  if (control.model == 0 || control.model != current_->serial) {
+    return;
+  }
+  const double turned = control.exponential
+                            ? control.low * std::pow(control.high / control.low, event.value)
+                            : control.low + event.value * (control.high - control.low);
+  event.kind = control.kind;
+  event.index = control.index;
+  event.model = control.model;
+  event.value = turned;
+  if (event.kind == EventKind::parameter) {
+    reports.push({Report::Kind::parameter, event.model, event.index, turned});
   }
 }
 

@@ -51,6 +51,27 @@ struct Report {
   double value = 0.0;       // of the parameter; the load; 128 * bank + program
 };
 
+// What a controller turns instead of what the preset says, while the model of this serial plays.
+struct LearnedControl {
+  EventKind kind = EventKind::parameter;  // or custom
+  std::uint16_t index = 0;
+  std::uint32_t model = 0;  // 0: nothing is learnt
+  double low = 0.0;         // what 0 and 1 of the controller become
+  double high = 1.0;
+  bool exponential = false;  // equal turns are equal ratios
+};
+
+// On its way to the audio thread.
+struct Lesson {
+  std::uint8_t controller = 0;
+  LearnedControl control;
+};
+
+struct PlayedNote {
+  std::uint8_t key = 0;
+  std::uint8_t velocity = 0;  // 1..127
+};
+
 // A piece of the output on its way to a recording.
 struct RecordedChunk {
   static constexpr std::size_t max_samples = 128;
@@ -76,6 +97,10 @@ struct Meters : EngineMeters {
   std::uint64_t dropped = 0;      // events that found no room
   std::uint64_t strangers = 0;    // packets of who may not send OSC
   std::uint64_t xruns = 0;        // as the backend says
+  std::uint64_t notes = 0;        // that began, from any side
+  std::array<PlayedNote, 4> last_notes{};  // of them; the next takes the place `notes` modulo 4
+  std::uint64_t turns = 0;                 // controllers that came
+  std::uint8_t last_controller = 0;        // the last of them
 };
 
 struct Process {
@@ -129,6 +154,7 @@ struct Process {
   Ring<TimedEvent> from_osc{max_now + max_endings + max_ahead};
   Ring<TimedEvent> from_console{max_now + max_endings};
   Ring<TimedEvent> from_midi{max_now + max_endings};  // RtMidi's thread
+  Ring<Lesson> lessons{256};                          // from the session, under its lock
   Ring<Report> reports{4096};                         // to the session's worker
   Ring<RecordedChunk> recording{8192};
   Flag is_recording;
@@ -155,6 +181,9 @@ struct Process {
   void wait(std::int64_t frame, const Event& event);
   void forget_after(std::int64_t frame);
   void collect_due(std::size_t frames);
+  void note(const Event& event);
+  void learn();
+  void translate(Event& event);
   void play_models(std::size_t input_count, std::size_t output_count, std::size_t frames);
   void play(Sounding& sounding, std::size_t input_count, std::vector<double>& samples,
             std::size_t frames);
@@ -194,8 +223,9 @@ struct Process {
   std::int64_t latest_ = 0;       // no frame there is later
   Permits ahead_{max_ahead};      // of it, and of what is on its way there
   bool keeps_every_frame_ = false;
-  std::vector<Event> due_;       // of this chunk, sorted
-  std::vector<Event> matching_;  // those of one engine
+  std::array<LearnedControl, 128> learned_{};  // [controller]
+  std::vector<Event> due_;                     // of this chunk, sorted
+  std::vector<Event> matching_;                // those of one engine
   std::array<const double*, max_channels> input_pointers_{};
   std::vector<double> input_;       // [channel][chunk_frames]
   std::vector<double> sound_;       // [channel][chunk_frames] of the current engine

@@ -1,5 +1,7 @@
 #include "app/session/files.h"
 
+#include <unistd.h>
+
 #include <algorithm>
 #include <cerrno>
 #include <cstdio>
@@ -10,6 +12,7 @@
 #include <system_error>
 
 #include "app/exit_code.h"
+#include "app/text.h"
 
 namespace ressort {
 namespace {
@@ -34,6 +37,15 @@ fs::path data_folder() {
   return fs::current_path(error);
 }
 
+// Where models and presets are looked for, one folder after the other.
+std::vector<fs::path> known_folders() {
+  std::vector<fs::path> folders = {data_folder()};
+  if (const std::string user = user_folder(); !user.empty()) {
+    folders.insert(folders.begin(), user);
+  }
+  return folders;
+}
+
 bool is_below(const fs::path& path, const fs::path& folder) {
   return std::mismatch(folder.begin(), folder.end(), path.begin(), path.end()).first ==
          folder.end();
@@ -47,16 +59,68 @@ std::string names_of_presets() {
   return names;
 }
 
-std::vector<std::string> names_in(const fs::path& folder, const char* ending) {
-  std::set<std::string> names;
+// The program's by name, then those that the user alone has: places in the list stay.
+std::vector<std::string> names_in(const char* kind, const char* ending) {
+  std::vector<std::string> all;
+  std::vector<fs::path> folders = known_folders();
+  std::reverse(folders.begin(), folders.end());
+  for (const fs::path& folder : folders) {
+    std::set<std::string> names;
+    std::error_code error;
+    fs::directory_iterator entry(folder / kind, error);
+    for (; !error && entry != fs::directory_iterator(); entry.increment(error)) {
+      const std::string name = entry->path().stem().string();
+      if (entry->path().extension() == ending &&
+          std::find(all.begin(), all.end(), name) == all.end()) {
+        names.insert(name);
+      }
+    }
+    all.insert(all.end(), names.begin(), names.end());
+  }
+  return all;
+}
+
+std::string known_path(const char* kind, const std::string& file) {
   std::error_code error;
-  fs::directory_iterator entry(folder, error);
-  for (; !error && entry != fs::directory_iterator(); entry.increment(error)) {
-    if (entry->path().extension() == ending) {
-      names.insert(entry->path().stem().string());
+  for (const fs::path& folder : known_folders()) {
+    if (const fs::path path = folder / kind / file; fs::is_regular_file(path, error)) {
+      return path.string();
     }
   }
-  return {names.begin(), names.end()};
+  return "";
+}
+
+std::string in_any_case(const std::string& name, const std::vector<std::string>& known) {
+  const auto found = std::find_if(known.begin(), known.end(), [&](const std::string& candidate) {
+    return same_but_case(candidate, name);
+  });
+  return found == known.end() ? "" : *found;
+}
+
+// A preset or a model by its name, with or without its ending, in this case or another.
+std::string known_scene(const std::string& name) {
+  for (const auto& [kind, ending] :
+       {std::pair("presets", std::string(".toml")), std::pair("models", std::string(".mdl"))}) {
+    for (const std::string& file : {name + ending, name}) {
+      if (std::string path = known_path(kind, file); !path.empty()) {
+        return path;
+      }
+    }
+  }
+  for (const bool is_preset : {true, false}) {
+    const std::string meant = in_any_case(name, is_preset ? known_presets() : known_models());
+    if (!meant.empty()) {
+      return is_preset ? preset_path(meant) : model_path(meant);
+    }
+  }
+  return "";
+}
+
+std::string meant_by(const std::string& name) {
+  std::vector<std::string> known = known_presets();
+  const std::vector<std::string> models = known_models();
+  known.insert(known.end(), models.begin(), models.end());
+  return did_you_mean(name, known);
 }
 
 // A text without the mark that some editors put before it.
@@ -80,7 +144,7 @@ std::string in_bytes(std::uintmax_t size) {
 
 }  // namespace
 
-Result<std::string> read_text(const std::string& path, std::size_t max_bytes) {
+Result<std::string> read_bytes(const std::string& path, std::size_t max_bytes) {
   std::error_code error;
   const fs::file_status status = fs::status(path, error);
   if (!fs::exists(status)) {
@@ -102,7 +166,12 @@ Result<std::string> read_text(const std::string& path, std::size_t max_bytes) {
   if (!file || !file.read(text.data(), static_cast<std::streamsize>(text.size()))) {
     return Error{"'" + path + "' cannot be read: " + std::generic_category().message(errno)};
   }
-  return unmarked(path, std::move(text));
+  return text;
+}
+
+Result<std::string> read_text(const std::string& path, std::size_t max_bytes) {
+  auto text = read_bytes(path, max_bytes);
+  return text ? unmarked(path, *std::move(text)) : std::move(text);
 }
 
 Result<Done> write_text(const std::string& path, const std::string& text, Existing existing) {
@@ -111,6 +180,8 @@ Result<Done> write_text(const std::string& path, const std::string& text, Existi
     return file.error();
   }
   const auto written = file->write(text);
+  // Its name shall lead to all of it even if the power goes.
+  static_cast<void>(fsync(file->descriptor()));
   return written ? file->keep() : written;
 }
 
@@ -133,37 +204,30 @@ Result<std::string> find_scene(const std::string& name, Reach reach) {
     return Error{"expected the name of a model or a preset"};
   }
   std::error_code error;
-  const fs::path data = data_folder();
-  const std::vector<fs::path> own = {data / "presets" / (name + ".toml"), data / "presets" / name,
-                                     data / "models" / (name + ".mdl"), data / "models" / name};
+  const std::string presets = names_of_presets();
   if (reach == Reach::own_folders) {
-    for (const fs::path& path : own) {
-      if (const auto found = own_file(path.string()); found && fs::path(name).is_relative()) {
-        return *found;
-      }
+    const std::string path = fs::path(name).is_relative() ? known_scene(name) : "";
+    if (const auto found = own_file(path)) {
+      return *found;
     }
-    const std::string presets = names_of_presets();
     return Error{"there is no model or preset '" + name +
                  "' in the program's own folders, and OSC loads no others; there are " +
-                 (presets.empty() ? "none" : presets)};
+                 (presets.empty() ? "none" : presets) + meant_by(name)};
   }
   for (const fs::path& path : {fs::path(name), fs::path(name + ".toml"), fs::path(name + ".mdl")}) {
     if (fs::exists(path, error) && !fs::is_directory(path, error)) {
       return path.string();
     }
   }
-  for (const fs::path& path : own) {
-    if (fs::exists(path, error) && !fs::is_directory(path, error)) {
-      return path.string();
-    }
+  if (std::string path = known_scene(name); !path.empty()) {
+    return path;
   }
   if (fs::is_directory(name, error)) {
     return Error{"'" + name + "' is a folder; expected a .mdl model or a .toml preset"};
   }
-  const std::string presets = names_of_presets();
   return Error{"there is no model or preset '" + name + "'; there are " +
-               (presets.empty() ? "none in '" + data.string() + "'" : presets) +
-               ", or give the path of a .mdl or .toml file"};
+               (presets.empty() ? "none in '" + data_folder().string() + "'" : presets) +
+               ", or give the path of a .mdl or .toml file" + meant_by(name)};
 }
 
 std::optional<std::string> own_file(const std::string& path) {
@@ -174,23 +238,65 @@ std::optional<std::string> own_file(const std::string& path) {
       std::find(std::begin(endings), std::end(endings), found.extension()) == std::end(endings)) {
     return std::nullopt;
   }
-  for (const char* const name : {"models", "presets"}) {
-    const fs::path folder = fs::canonical(data_folder() / name, error);
-    if (!error && is_below(found, folder)) {
-      return found.string();
+  for (const fs::path& known : known_folders()) {
+    for (const char* const name : {"models", "presets"}) {
+      const fs::path folder = fs::canonical(known / name, error);
+      if (!error && is_below(found, folder)) {
+        return found.string();
+      }
     }
   }
   return std::nullopt;
 }
 
 std::vector<std::string> known_presets() {
-  return names_in(data_folder() / "presets", ".toml");
+  return names_in("presets", ".toml");
 }
 std::vector<std::string> known_models() {
-  return names_in(data_folder() / "models", ".mdl");
+  return names_in("models", ".mdl");
+}
+std::string preset_path(const std::string& name) {
+  return known_path("presets", name + ".toml");
+}
+std::string model_path(const std::string& name) {
+  return known_path("models", name + ".mdl");
 }
 std::string models_folder() {
   return (data_folder() / "models").string();
+}
+
+std::string user_folder() {
+  if (const char* given = std::getenv("XDG_DATA_HOME"); given != nullptr && *given == '/') {
+    return (fs::path(given) / "ressort").string();
+  }
+  if (const char* home = std::getenv("HOME"); home != nullptr && *home == '/') {
+    return (fs::path(home) / ".local" / "share" / "ressort").string();
+  }
+  return "";
+}
+
+Result<std::string> path_to_save(const std::string& name) {
+  constexpr std::size_t longest = 64;
+  const bool is_name =
+      !name.empty() && name.size() <= longest && name[0] != '.' && name[0] != ' ' &&
+      name.back() != ' ' && std::all_of(name.begin(), name.end(), [](char c) {
+        return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') ||
+               c == ' ' || c == '.' || c == '_' || c == '-';
+      });
+  if (!is_name) {
+    return Error{"a preset's name has 1 to 64 letters, digits, blanks and ._-, and no . first"};
+  }
+  const fs::path folder = user_folder();
+  if (folder.empty()) {
+    return Error{"there is no folder to save to: neither XDG_DATA_HOME nor HOME is set"};
+  }
+  std::error_code error;
+  fs::create_directories(folder / "presets", error);
+  if (error) {
+    return Error{"the folder '" + (folder / "presets").string() +
+                 "' cannot be made: " + error.message()};
+  }
+  return (folder / "presets" / (name + ".toml")).string();
 }
 
 }  // namespace ressort

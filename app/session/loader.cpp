@@ -73,6 +73,7 @@ class SceneReader {
       fail(scene_.path, *text, error);
     }
     scene_.preset = std::move(read.preset);
+    scene_.preset_text = *text;
     scene_.has_preset = true;
     if (scene_.preset.model.empty()) {
       return false;
@@ -165,8 +166,12 @@ class SceneReader {
   std::optional<std::string> find_model(const std::string& model) const {
     std::error_code error;
     const fs::path folder = fs::path(scene_.path).parent_path();
-    for (const fs::path& path :
-         {folder / model, folder / ".." / "models" / model, fs::path(models_folder()) / model}) {
+    std::vector<fs::path> tried = {folder / model, folder / ".." / "models" / model,
+                                   fs::path(models_folder()) / model};
+    if (const std::string user = user_folder(); !user.empty()) {
+      tried.insert(tried.end() - 1, fs::path(user) / "models" / model);
+    }
+    for (const fs::path& path : tried) {
       if (options_.reach == Reach::own_folders) {
         if (const auto own = own_file(path.string())) {
           return own;
@@ -293,6 +298,11 @@ TuningReading read_tuning(const std::string& scale_path, const std::string& map_
     }
   }
   return out;
+}
+
+std::string preset_description(const std::string& name) {
+  const auto text = read_text(preset_path(name), max_preset_bytes);
+  return text ? parse_preset(*text).preset.description : "";
 }
 
 Reading read_scene(const std::string& name, const SceneOptions& options) {

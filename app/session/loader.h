@@ -63,6 +63,7 @@ struct Scene {
   std::string model_path;
   Network network;
   Preset preset;
+  std::string preset_text;             // what it was read from; empty: it was made up
   bool has_preset = false;             // read from a file, not made up
   std::optional<ThirdArgument> third;  // what the third state argument means, if that matters
   std::string motion;                  // the same for a person, and why
@@ -78,6 +79,9 @@ struct Reading {
 // What was told of files, for who may not read them: of what has a place in one, the file's name,
 // line and column and what is wrong, without a word of the text.
 std::string without_source(std::string_view message);
+
+// The line that a known preset says of itself; empty where it cannot be read.
+std::string preset_description(const std::string& name);
 
 // Finds and reads a model or a preset with its model; goes on after an error in the model, so that
 // every problem is told at once. Without a preset the model gets a default one, `bare` or

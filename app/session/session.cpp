@@ -88,6 +88,11 @@ Result<std::shared_ptr<const Loaded>> Session::load_and_wait(const std::string& 
   return promise.get_future().get();
 }
 
+bool Session::wait(std::chrono::duration<double> time) {
+  std::unique_lock lock(mutex_);
+  return !wake_.wait_for(lock, time, [this] { return stop_; });
+}
+
 void Session::set_rate(double rate_hz) {
   {
     const std::lock_guard lock(mutex_);
@@ -99,6 +104,11 @@ void Session::set_rate(double rate_hz) {
 std::shared_ptr<const Loaded> Session::current() const {
   const std::lock_guard lock(mutex_);
   return current_;
+}
+
+Session::Present Session::present() const {
+  const std::lock_guard lock(mutex_);
+  return {current_, values_};
 }
 
 std::optional<double> Session::parameter(const std::string& name) const {
@@ -114,6 +124,14 @@ std::optional<double> Session::parameter(const std::string& name) const {
 
 void Session::remember(std::span<const TimedEvent> events) {
   const std::lock_guard lock(mutex_);
+  std::vector<std::string> names;
+  for (const TimedEvent& timed : events) {
+    const Event& event = timed.event;
+    if (event.kind == EventKind::parameter && event.model == current_->serial) {
+      names.push_back(current_->instrument.parameters[event.index].name);
+    }
+  }
+  begin_change(names);
   for (const TimedEvent& timed : events) {
     const Event& event = timed.event;
     if (event.kind == EventKind::parameter && event.model == current_->serial) {
@@ -260,6 +278,7 @@ void Session::listen() {
     const std::lock_guard lock(mutex_);
     const bool is_current = report.model == current_->serial;
     if (report.kind == Report::Kind::parameter && is_current) {
+      begin_change({current_->instrument.parameters[report.index].name});
       values_[report.index] = report.value;
     } else if (report.kind == Report::Kind::reset) {
       resets_.add((is_current ? current_->name : std::string("the last model")) +
@@ -275,6 +294,7 @@ void Session::listen() {
     change_program(*program);
   }
   const Meters now = process_.meters();
+  hear_turns(now);
   if (now.late != late_reported_ && now.late_s > least_lateness_s) {
     lates_.add("an event came " + fixed(now.late_s, 3) + " s after its time",
                now.late - std::exchange(late_reported_, now.late));
@@ -325,10 +345,20 @@ std::string Session::describe_overload(const Report& report) const {
 }
 
 void Session::do_load(const Job& job) {
+  LastChange change;
+  {
+    const std::lock_guard lock(mutex_);
+    change.scene = current_->path;
+    for (std::size_t i = 0; i < values_.size(); ++i) {
+      change.values.emplace_back(current_->instrument.parameters[i].name, values_[i]);
+    }
+  }
   const auto result = build(job.wish);
   if (result) {
     scene_ = job.wish;
     scene_->lets_ring = false;  // not when it is compiled anew
+    const std::lock_guard lock(mutex_);
+    last_change_ = change.scene->empty() ? std::nullopt : std::optional(std::move(change));
   }
   if (job.answer) {
     job.answer(result);
@@ -428,6 +458,8 @@ Result<std::shared_ptr<const Loaded>> Session::build_now(const Wish& wish,
   loaded->path = scene->path;
   loaded->model_path = scene->model_path;
   loaded->description = scene->preset.description;
+  loaded->preset = scene->preset;
+  loaded->preset_text = scene->preset_text;
   loaded->instrument = std::move(compiled->instrument);
   loaded->plan = std::move(compiled->plan);
   loaded->load_ms = took.count();
@@ -441,8 +473,16 @@ Result<std::shared_ptr<const Loaded>> Session::build_now(const Wish& wish,
   }
   {
     const std::lock_guard lock(mutex_);
+    const bool is_same = current_->path == loaded->path;
     current_ = loaded;
     values_ = std::move(values);
+    pupil_.reset();
+    std::erase_if(learned_, [&](const LearnedRow& row) {
+      return !is_same || control_of(row.target).model == 0;
+    });
+    for (const LearnedRow& row : learned_) {
+      teach(row, true);
+    }
     built_rate_hz_ = options.rate_hz;
   }
   offer(std::move(compiled->engine), wish.lets_ring);

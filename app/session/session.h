@@ -34,6 +34,8 @@ struct Loaded {
   std::string path;
   std::string model_path;
   std::string description;
+  Preset preset;
+  std::string preset_text;  // what it was read from; empty: it was made up
   Instrument instrument;
   Plan plan;
   double load_ms = 0.0;  // read, parse, compile
@@ -51,6 +53,18 @@ struct Status : Meters {
   double cpu = 0.0;         // share of the time there is, over a second; -1: nothing runs
   double peak_db = 0.0;     // since the last asking; -inf is silence
   double limited_db = 0.0;  // the limiter's deepest cut since the last asking
+};
+
+// A controller and what it was taught to turn: a parameter, or a control's OSC name.
+struct LearnedRow {
+  int controller = 0;
+  std::string target;
+};
+
+// What can be taken back: parameters as they were before, and before that what was loaded.
+struct LastChange {
+  std::optional<std::string> scene;
+  std::vector<std::pair<std::string, double>> values;
 };
 
 class Session {
@@ -79,14 +93,42 @@ class Session {
   // [any thread but audio]
   void end();
 
+  // Returns when so much time has passed: true; or, at once, when the program is ending.
+  // [any thread but audio]
+  bool wait(std::chrono::duration<double> time);
+
   // Never null; before the first load it has no name and no parameters.
   std::shared_ptr<const Loaded> current() const;
+
+  // What sounds and all its parameters' values, at one moment.
+  struct Present {
+    std::shared_ptr<const Loaded> loaded;
+    std::vector<double> values;  // [parameter]
+  };
+  Present present() const;
 
   // A parameter's present value; nothing where the model has none of that name.
   std::optional<double> parameter(const std::string& name) const;
 
   // What parameters these events set, once a queue has taken them. [any thread but audio]
   void remember(std::span<const TimedEvent> events);
+
+  // The change of parameters, by whomever, or of the scene that was last made; it is forgotten
+  // here. Turns of the same parameters within a second are one. [any thread but audio]
+  std::optional<LastChange> take_last_change();
+
+  // The next knob that moves, a controller but for pedals, banks and the like, turns the parameter,
+  // or the control of that OSC name, from then on, whatever the preset says; `tell` hears which it
+  // is. Lasts until another scene is loaded. [any thread but audio]
+  Result<Done> learn(const std::string& target);
+  // Forgets what has learnt to turn it; of all, where there is no target. How many that were.
+  std::size_t unlearn(const std::string& target);
+  std::vector<LearnedRow> learned() const;
+
+  // Writes what sounds, as it is now, to a preset of the user's; its path. See path_to_save(). A
+  // name that is there already, the program's own included, needs Existing::replace. [any thread
+  // but audio]
+  Result<std::string> save(const std::string& name, Existing existing);
 
   Status status();
 
@@ -131,6 +173,11 @@ class Session {
   void time_parts();
   void listen();
   void change_program(int number);
+  void hear_turns(const Meters& now);
+  // All of these under the lock.
+  void teach(const LearnedRow& row, bool is_on);
+  void begin_change(const std::vector<std::string>& names);
+  LearnedControl control_of(const std::string& target) const;
   std::string describe_overload(const Report& report) const;
   Process& process_;
   SessionOptions options_;
@@ -144,6 +191,11 @@ class Session {
   double built_rate_hz_;  // what sounds was made for, or was tried to be
   std::shared_ptr<const Loaded> current_;
   std::vector<double> values_;  // of the current parameters
+  std::vector<LearnedRow> learned_;
+  std::optional<std::string> pupil_;  // waits for a controller to move
+  std::uint64_t turns_ = 0;           // of controllers, that there were before
+  std::optional<LastChange> last_change_;
+  std::chrono::steady_clock::time_point changed_;
   std::string backend_;
   bool runs_ = false;  // the backend
   std::function<void(int)> prepare_inputs_;

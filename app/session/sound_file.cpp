@@ -289,4 +289,22 @@ Result<Done> SoundWriter::salvage() {
   return file_->file.keep();
 }
 
+Result<Sound> read_sound(const std::string& path) {
+  auto file = SoundReader::open(path);
+  if (!file) {
+    return file.error();
+  }
+  constexpr std::size_t block_frames = 4096;
+  const std::size_t channels = file->channels();
+  Sound sound{.rate_hz = file->rate_hz(), .channels = {}};
+  sound.channels.resize(channels);
+  std::vector<double> block(channels * block_frames);
+  while (const std::size_t got = file->read(block.data(), block_frames)) {
+    for (std::size_t i = 0; i < got * channels; ++i) {
+      sound.channels[i % channels].push_back(block[i]);
+    }
+  }
+  return sound;
+}
+
 }  // namespace ressort

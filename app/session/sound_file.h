@@ -37,6 +37,14 @@ class SoundReader {
   std::unique_ptr<File> file_;
 };
 
+// A whole sound in memory: channels of one length; 1 is full scale.
+struct Sound {
+  double rate_hz = 44100.0;
+  std::vector<std::vector<double>> channels;
+  std::size_t frames() const { return channels.empty() ? 0 : channels[0].size(); }
+};
+Result<Sound> read_sound(const std::string& path);
+
 struct SoundForm {
   double rate_hz = 44100.0;
   int channels = 2;

@@ -60,9 +60,11 @@ class DataFolder {
     std::filesystem::create_directories(path_ / "models");
     std::filesystem::create_directories(path_ / "presets");
     setenv("RESSORT_DATA", path_.c_str(), 1);
+    setenv("XDG_DATA_HOME", (path_ / "home").c_str(), 1);
   }
   ~DataFolder() {
     unsetenv("RESSORT_DATA");
+    unsetenv("XDG_DATA_HOME");
     std::filesystem::remove_all(path_);
   }
   DataFolder(const DataFolder&) = delete;

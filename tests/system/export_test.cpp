@@ -10,7 +10,7 @@
 
 #include "tests/support/catch.h"
 #include "tests/support/harness.h"
-#include "tests/support/sound.h"
+#include "app/session/sound_file.h"
 #include "tests/system/faust_models.h"
 
 using namespace ressort;

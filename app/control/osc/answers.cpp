@@ -3,7 +3,11 @@
 #include <set>
 
 #include "app/control/osc/client.h"
+#include "app/control/osc/subscribers.h"
 #include "app/control/status.h"
+#include "app/devices/audio.h"
+#include "app/session/files.h"
+#include "app/session/loader.h"
 #include "app/session/session.h"
 #include "core/model/language/expression.h"
 
@@ -86,6 +90,22 @@ void answer::load(const Question& question) {
                         Reach::own_folders);
 }
 
+// Never over what is there: whoever sends a packet has not seen it.
+void answer::save(const Question& question) {
+  const Message& message = question.message;
+  if (message.arguments.size() != 1 || !std::holds_alternative<std::string>(message.arguments[0])) {
+    question.client.error(message.address, message.address + ": expected NAME");
+    return;
+  }
+  const auto& name = std::get<std::string>(message.arguments[0]);
+  const auto path = question.session.save(name, Existing::refuse);
+  Reply reply(path ? "/done" : "/fail");
+  reply.text(message.address).text(path ? name : path.error().message);
+  question.client.answer(reply);
+  question.client.outlet().tell(
+      path ? "OSC saved " + *path : "OSC could not save '" + name + "': " + path.error().message);
+}
+
 void answer::status(const Question& question) {
   question.client.answer(status_reply(question.session.status()));
 }
@@ -104,10 +124,13 @@ void answer::describe(const Question& question) {
     row(known->address, known->arguments_text(), known->does);
   }
   for (const ParameterInfo& info : loaded->instrument.parameters) {
-    row("/param/" + info.name, "f",
-        print_number(question.session.parameter(info.name).value_or(info.value)) + " " +
-            print_number(info.minimum) + " " + print_number(info.maximum) + " " +
-            print_limit(info.safe.lowest, false) + " " + print_limit(info.safe.highest, true));
+    row("/param/" + info.name, "f", "a parameter of the model");
+    rows.back()
+        .real(question.session.parameter(info.name).value_or(info.value))
+        .real(info.minimum)
+        .real(info.maximum)
+        .real(info.safe.lowest)
+        .real(info.safe.highest);
   }
   std::set<std::string_view> customs;  // one may drive several things
   for (const CustomInfo& custom : loaded->instrument.custom) {
@@ -117,6 +140,55 @@ void answer::describe(const Question& question) {
   }
   rows.push_back(Reply("/describe.end").whole(rows.size()));
   question.client.answer_rows(rows);
+}
+
+void answer::models(const Question& question) {
+  if (!question.client.may_have_rows(question.message.address)) {
+    return;
+  }
+  std::vector<Reply> rows;
+  for (const std::string& name : known_models()) {
+    rows.push_back(Reply("/models.reply").text(name));
+  }
+  rows.push_back(Reply("/models.end").whole(rows.size()));
+  question.client.answer_rows(rows);
+}
+
+void answer::presets(const Question& question) {
+  if (!question.client.may_have_rows(question.message.address)) {
+    return;
+  }
+  std::vector<Reply> rows;
+  for (const std::string& name : known_presets()) {
+    rows.push_back(Reply("/presets.reply").text(name).text(preset_description(name)));
+  }
+  rows.push_back(Reply("/presets.end").whole(rows.size()));
+  question.client.answer_rows(rows);
+}
+
+void answer::subscribe(const Question& question) {
+  constexpr double usual_s = 10.0;
+  const auto& arguments = question.message.arguments;
+  const double* const asked = arguments.empty() ? &usual_s : std::get_if<double>(arguments.data());
+  if (asked == nullptr || arguments.size() > 1 ||
+      !(*asked > 0.0 && *asked <= Subscribers::longest_lease_s)) {
+    question.client.error(question.message.address, "expected SECONDS, above 0 and at most " +
+                                                        print_number(Subscribers::longest_lease_s));
+    return;
+  }
+  if (auto added = question.subscribers.add(question.client, *asked, monotonic_ns()); !added) {
+    question.client.error(question.message.address, added.error().message);
+    return;
+  }
+  question.client.answer(Reply("/subscribe.reply").real(*asked));
+}
+
+void answer::unsubscribe(const Question& question) {
+  if (question.subscribers.remove(question.client)) {
+    question.client.answer(Reply("/done").text(question.message.address));
+  } else {
+    question.client.error(question.message.address, "there was no subscription");
+  }
 }
 
 }  // namespace ressort

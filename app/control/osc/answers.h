@@ -14,13 +14,23 @@ void ranges(const Question& question);
 
 // /done s:address [ID], or /fail s:address [ID] s:why; later, on the session's worker
 void load(const Question& question);
+void save(const Question& question);
 
 // /status.reply, as status.h lists it
 void status(const Question& question);
 
 // A row /describe.reply s:address s:arguments s:meaning for everything, then /describe.end i:rows,
-// so that whoever counts knows if one was lost on the way. A parameter's meaning is its value,
-// minimum and maximum, and between what it is stable.
+// so that whoever counts knows if one was lost on the way. A parameter's row has floats after its
+// meaning: its value, minimum and maximum, and between what it is stable.
 void describe(const Question& question);
+
+// A row /models.reply s:name or /presets.reply s:name s:line for each, then /models.end i:rows or
+// /presets.end i:rows
+void models(const Question& question);
+void presets(const Question& question);
+
+// /subscribe.reply f:seconds and, in time, what Subscribers tells; /done s:address or an error
+void subscribe(const Question& question);
+void unsubscribe(const Question& question);
 
 }  // namespace ressort::answer

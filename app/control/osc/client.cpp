@@ -29,6 +29,7 @@ void OscClient::answer(const Reply& reply) const {
 
 void OscClient::error(const std::string& about, const std::string& message) const {
   answer(Reply("/error").text(about).text(message));
+  outlet_->tell_failure("OSC: " + (message.starts_with(about) ? "" : about + ": ") + message);
 }
 
 bool OscClient::may_have_rows(const std::string& about) const {

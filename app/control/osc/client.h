@@ -17,12 +17,17 @@ class OscClient {
       : outlet_(std::move(outlet)), sender_(sender) {}
 
   void answer(const Reply& reply) const;
+  // The person at this machine hears it too, once in a while.
   void error(const std::string& about, const std::string& message) const;
 
   // Whether an answer of many rows may begin, before anything is gathered; if not, the client has
   // been told why. The rows are all sent or none.
   bool may_have_rows(const std::string& about) const;
   void answer_rows(const std::vector<Reply>& rows) const;
+
+  bool is_same(const OscClient& other) const {
+    return sender_.address == other.sender_.address && sender_.port == other.sender_.port;
+  }
 
   OscOutlet& outlet() const { return *outlet_; }
 

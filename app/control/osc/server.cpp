@@ -20,6 +20,7 @@
 #include "app/control/osc/client.h"
 #include "app/control/osc/packet.h"
 #include "app/control/osc/senders.h"
+#include "app/control/osc/subscribers.h"
 #include "app/control/osc/time_tags.h"
 #include "app/control/registry.h"
 #include "app/devices/audio.h"
@@ -54,6 +55,7 @@ std::optional<Message> read_message(std::span<const std::uint8_t> bytes) {
   const int count = lo_message_get_argc(read.get());
   for (int i = 0; i < count; ++i) {
     const auto type = static_cast<lo_type>(types[i]);
+    message.types += types[i];
     if (lo_is_numerical_type(type)) {
       // liblo reads it: it keeps nothing aligned to 8 bytes.
       message.arguments.emplace_back(static_cast<double>(lo_hires_val(type, values[i])));
@@ -102,7 +104,11 @@ struct OscServer::Server {
     std::vector<std::uint8_t> buffer(max_osc_packet_bytes + 1);
     std::array<pollfd, 2> waits{{{socket, POLLIN, 0}, {wake, POLLIN, 0}}};
     while (true) {
-      if (poll(waits.data(), waits.size(), outlet->send_due()) < 0) {
+      const int due_ms = outlet->send_due();
+      const int changes_ms = subscribers.tell(session, monotonic_ns());
+      const int wait_ms =
+          due_ms < 0 || (changes_ms >= 0 && changes_ms < due_ms) ? changes_ms : due_ms;
+      if (poll(waits.data(), waits.size(), wait_ms) < 0) {
         continue;  // a signal
       }
       if (waits[1].revents != 0) {
@@ -183,7 +189,7 @@ struct OscServer::Server {
     const auto [row, name] = find_row(message.address);
     if (row != nullptr && row->answer != nullptr &&
         (row->play == nullptr || message.arguments.empty())) {
-      row->answer({message, name, session, client});
+      row->answer({message, name, session, client, subscribers});
       return;
     }
     const auto loaded = session.current();
@@ -268,6 +274,7 @@ struct OscServer::Server {
   const std::vector<Subnet> allowed;
   std::shared_ptr<OscOutlet> outlet;
   TagClock tags;
+  Subscribers subscribers;
   RateLimit lates{std::chrono::seconds(1)};
   std::int64_t malformed_second = 0;
   int malformed_answers = 0;

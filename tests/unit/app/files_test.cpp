@@ -18,7 +18,7 @@
 
 #include "tests/support/catch.h"
 #include "tests/support/data_folder.h"
-#include "tests/support/sound.h"
+#include "app/session/sound_file.h"
 
 namespace ressort {
 namespace {

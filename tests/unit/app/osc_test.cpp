@@ -177,7 +177,12 @@ TEST_CASE("status and describe answer in full", "[osc]") {
   rows.pop_back();
   CHECK(rows.size() == addresses().size() + 2);
   CHECK(has(rows[0], "/describe.reply", "/note/on", "note"));
-  CHECK(has(rows.back(), "/describe.reply", "/param/m_Z", "0.2 "));
+  // Its value, its range and where it is stable are numbers.
+  const Answer& parameter = rows.back();
+  CHECK(parameter.text(0) == "/param/m_Z");
+  CHECK(parameter.text(1) == "f");
+  REQUIRE(parameter.values.size() == 8);
+  CHECK(std::get<float>(parameter.values[3]) == 0.2f);
 }
 
 TEST_CASE("every figure has a name, a meaning and at most one place in the reply", "[osc]") {

@@ -5,7 +5,7 @@
 #include <chrono>
 
 #include "tests/support/console_harness.h"
-#include "tests/support/sound.h"
+#include "app/session/sound_file.h"
 
 namespace ressort {
 

@@ -1,0 +1,313 @@
+#include "app/commands/gallery/gallery.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <ctime>
+#include <filesystem>
+#include <mutex>
+#include <thread>
+
+#include "app/commands/gallery/page.h"
+#include "app/commands/progress_bar.h"
+#include "app/exit_code.h"
+#include "app/realtime/thread_pool.h"
+#include "app/session/files.h"
+#include "app/session/loader.h"
+#include "app/session/sound_file.h"
+#include "app/text.h"
+#include "app/version.h"
+
+namespace ressort {
+namespace {
+
+constexpr std::size_t spectrogram_rows = 217;  // two for each semitone of nine octaves, and one
+constexpr std::size_t spectrogram_columns = 400;
+constexpr std::size_t envelope_steps = 620;
+constexpr double ring_out_s = 2.15;
+constexpr double margin_s = 0.15;  // at the end, where windows of a spectrogram would reach out
+constexpr double note_length_s = 6.0;
+constexpr int note_key = 57;
+
+// How a preset's phrase differs from that of all: it lies among the keys that sound, and is played
+// slower where a bow or a finger has to stay.
+struct Register {
+  int shift = 0;         // semitones, whole octaves
+  double stretch = 1.0;  // of time
+};
+
+Register register_of(const Preset& preset) {
+  Register found;
+  int lowest = 127;
+  int highest = 0;
+  bool has_notes = false;
+  for (const ControlSetting& control : preset.controls) {
+    if (control.source == ControlSource::note) {
+      has_notes = true;
+      lowest = std::min(lowest, control.lowest_key);
+      highest = std::max(highest, control.highest_key);
+      if (control.gesture == Gesture::bow || control.gesture == Gesture::hold) {
+        found.stretch = 3.0;
+      }
+    }
+  }
+  const auto [low, high] =
+      std::minmax_element(default_phrase().begin(), default_phrase().end(),
+                          [](const auto& a, const auto& b) { return a.key < b.key; });
+  while (has_notes && high->key + found.shift > highest && low->key + found.shift - 12 >= lowest) {
+    found.shift -= 12;
+  }
+  while (has_notes && low->key + found.shift < lowest && high->key + found.shift + 12 <= highest) {
+    found.shift += 12;
+  }
+  return found;
+}
+
+std::vector<PhraseNote> phrase_of(const Register& where) {
+  std::vector<PhraseNote> notes = default_phrase();
+  for (PhraseNote& note : notes) {
+    note.key += where.shift;
+    note.start_s *= where.stretch;
+    note.end_s *= where.stretch;
+  }
+  return notes;
+}
+
+double fundamental_hz(const Preset& preset, int key) {
+  return preset.keyboard ? 440.0 * std::exp2((key + preset.transpose - 69) / 12.0) : 0.0;
+}
+
+struct Take {
+  Rendered rendered;
+  Sound sound;
+};
+
+using GoesOn = std::function<bool()>;
+
+// Renders notes to a file and reads that.
+Result<Take> play_notes(const GalleryOptions& options, const std::string& preset,
+                        const std::string& file, const std::vector<PhraseNote>& notes,
+                        double length_s, int voices, const GoesOn& goes_on) {
+  const std::string path = (std::filesystem::path(options.folder) / file).string();
+  auto rendered = render({.name = preset,
+                          .output = path,
+                          .rate_hz = options.rate_hz,
+                          .seconds = length_s,
+                          .phrase = to_score(notes),
+                          .voices = voices,
+                          .threads = 1},
+                         [&](double) { return goes_on(); });
+  if (!rendered) {
+    return rendered.error();
+  }
+  if (rendered->failure || rendered->was_interrupted) {
+    return rendered->failure.value_or(Error{"interrupted"});
+  }
+  auto sound = read_sound(path);
+  if (!sound) {
+    return sound.error();
+  }
+  return Take{*std::move(rendered), *std::move(sound)};
+}
+
+// What of a note its pitch is taken from: after the attack, until it stays 40 dB softer than its
+// loudest, at least for 0.1 s.
+Stretch steady_stretch(const Sound& sound) {
+  constexpr double step_s = 0.01;
+  constexpr double from_s = 0.02;
+  constexpr double fall_db = 40.0;
+  constexpr double shortest_s = 0.1;
+  const std::vector<double> levels = levels_db(sound, {from_s, held_s}, step_s);
+  const double least_db = *std::max_element(levels.begin(), levels.end()) - fall_db;
+  const auto last =
+      std::find_if(levels.rbegin(), levels.rend(), [&](double db) { return db >= least_db; });
+  const auto steps = static_cast<double>(levels.rend() - last);
+  return {from_s, from_s + std::max(shortest_s, step_s * steps)};
+}
+
+// Of the partials from the lowest row on, the loudest between two times.
+std::optional<Partial> loudest_partial(const Sound& sound, Stretch stretch) {
+  constexpr std::size_t columns = 20;
+  const Spectrogram rough = find_spectrogram(sound, stretch, spectrogram_rows, columns);
+  std::size_t best = 0;
+  double most = 0.0;
+  for (std::size_t row = 0; row < rough.rows; ++row) {
+    double power = 0.0;
+    for (std::size_t column = 0; column < columns; ++column) {
+      power += std::pow(10.0, 0.1 * rough.at(row, column));
+    }
+    if (power > most) {
+      most = power;
+      best = row;
+    }
+  }
+  constexpr double reach_cents = 100.0;
+  return partial_near(sound, stretch, rough.frequency_hz(best), reach_cents);
+}
+
+PresetFigures measure_sounds(const Take& phrase, const Take& note, double key_hz) {
+  const Sound& heard = phrase.sound;
+  const double length_s = static_cast<double>(heard.frames()) / heard.rate_hz;
+  const auto loudness = loudness_lufs(heard);
+  PresetFigures figures{.peak_dbfs = peak_dbfs(heard),
+                        .loudness_lufs = loudness ? *loudness : silence_db,
+                        .dc_dbfs = dc_dbfs(heard, {length_s - 1.0, length_s}),
+                        .stereo = stereo_image(heard),
+                        .attack_ms = attack_ms(note.sound, {0.0, held_s}),
+                        .held_t60_s = t60_s(note.sound, {0.0, held_s}),
+                        .released_t60_s = t60_s(note.sound, {held_s, note_length_s}),
+                        .cpu_share = note.rendered.cpu_s * note.sound.rate_hz /
+                                     static_cast<double>(std::max(1LL, note.rendered.frames))};
+  if (key_hz > 0.0) {
+    constexpr double semitone = 100.0;
+    const Stretch steady = steady_stretch(note.sound);
+    if (const auto partial = partial_near(note.sound, steady, key_hz, semitone)) {
+      figures.pitch_cents = cents_between(key_hz, partial->frequency_hz);
+    }
+    if (const auto partial =
+            loudest_partial(note.sound, {steady.from_s, std::min(1.0, steady.to_s)})) {
+      figures.loudest_cents = cents_between(key_hz, partial->frequency_hz);
+    }
+  }
+  return figures;
+}
+
+std::vector<double> peaks_of(const Sound& sound, Stretch from_start, std::size_t steps) {
+  std::vector<double> peaks(steps, 0.0);
+  const auto frames =
+      std::min(sound.frames(), static_cast<std::size_t>(from_start.to_s * sound.rate_hz));
+  for (const std::vector<double>& channel : sound.channels) {
+    for (std::size_t n = 0; n < frames; ++n) {
+      double& peak = peaks[n * steps / frames];
+      peak = std::max(peak, std::fabs(channel[n]));
+    }
+  }
+  std::transform(peaks.begin(), peaks.end(), peaks.begin(), to_dbfs);
+  return peaks;
+}
+
+ShownPreset show(const GalleryOptions& options, const std::string& name, const GoesOn& goes_on) {
+  ShownPreset shown{.name = name};
+  const auto scene = load_scene(name, {});
+  if (!scene) {
+    shown.failure = scene.error().message;
+    return shown;
+  }
+  shown.description = scene->preset.description;
+  const Register where = register_of(scene->preset);
+  const std::vector<PhraseNote> notes = phrase_of(where);
+  const double length_s = notes.back().end_s + ring_out_s;
+  const int key = note_key + where.shift;
+  const auto phrase = play_notes(options, name, name + ".wav", notes, length_s, 0, goes_on);
+  const auto note = phrase
+                        ? play_notes(options, name, name + "-note.wav",
+                                     {{0.0, held_s, key, note_velocity}}, note_length_s, 1, goes_on)
+                        : phrase;
+  if (!note) {
+    shown.failure = note.error().message;
+    return shown;
+  }
+  for (const PhraseNote& played : notes) {
+    shown.notes.push_back({played, fundamental_hz(scene->preset, played.key)});
+  }
+  const Stretch whole{0.0, length_s - margin_s};
+  shown.peaks_dbfs = peaks_of(phrase->sound, whole, envelope_steps);
+  shown.levels_dbfs = levels_db(phrase->sound, whole, whole.to_s / envelope_steps);
+  shown.spectrogram = find_spectrogram(phrase->sound, whole, spectrogram_rows, spectrogram_columns);
+  shown.figures = measure_sounds(*phrase, *note, fundamental_hz(scene->preset, key));
+  return shown;
+}
+
+std::string today() {
+  const std::time_t now = std::time(nullptr);
+  char date[16] = "";
+  std::tm local{};
+  if (localtime_r(&now, &local) != nullptr) {
+    std::strftime(date, sizeof date, "%Y-%m-%d", &local);
+  }
+  return date;
+}
+
+// All of them, by as many threads as the machine runs at once.
+std::vector<ShownPreset> show_all(const GalleryOptions& options,
+                                  const std::vector<std::string>& names, const GoesOn& goes_on) {
+  std::vector<ShownPreset> shown(names.size());
+  ProgressBar bar(!options.is_quiet);
+  std::mutex mutex;  // of the next two, and of the bar
+  std::size_t next = 0;
+  std::size_t done = 0;
+  const auto work = [&] {
+    while (true) {
+      std::size_t mine = 0;
+      {
+        const std::lock_guard lock(mutex);
+        if (next == names.size() || !goes_on()) {
+          return;
+        }
+        mine = next++;
+        bar.show(static_cast<double>(done) / static_cast<double>(names.size()), names[mine]);
+      }
+      ShownPreset made = show(options, names[mine], goes_on);
+      const std::lock_guard lock(mutex);
+      ++done;
+      shown[mine] = std::move(made);
+    }
+  };
+  std::vector<std::thread> threads;
+  for (std::size_t i = 1; i < std::min(core_count(), names.size()); ++i) {
+    threads.emplace_back(work);
+  }
+  work();
+  for (std::thread& thread : threads) {
+    thread.join();
+  }
+  return shown;
+}
+
+}  // namespace
+
+int gallery(const GalleryOptions& options, const GoesOn& goes_on) {
+  const auto complain = [](const std::string& text) { std::fprintf(stderr, "%s\n", text.c_str()); };
+  const std::vector<std::string> names = known_presets();
+  if (names.empty()) {
+    complain("there are no presets beside '" + models_folder() + "'");
+    return exit_code::wrong_use;
+  }
+  std::error_code error;
+  std::filesystem::create_directories(options.folder, error);
+  if (error) {
+    complain("the folder '" + options.folder + "' cannot be made: " + error.message());
+    return exit_code::wrong_use;
+  }
+  const std::vector<ShownPreset> shown = show_all(options, names, goes_on);
+  if (!goes_on()) {
+    complain("interrupted; there is no page");
+    return exit_code::our_failure;
+  }
+  const std::string made = std::string("ressort ") + version + " (" + commit + "), " + today() +
+                           ", " + fixed(options.rate_hz, 0) + " Hz";
+  const std::filesystem::path folder = options.folder;
+  for (const auto& [name, text] : {std::pair(std::string("index.html"), gallery_page(shown, made)),
+                                   std::pair(std::string("spectra.svg"), gallery_picture(shown))}) {
+    if (const auto written = write_text((folder / name).string(), text, Existing::replace);
+        !written) {
+      complain(written.error().message);
+      return exit_code::our_failure;
+    }
+  }
+  int code = exit_code::done;
+  for (const ShownPreset& preset : shown) {
+    if (!preset.failure.empty()) {
+      complain(preset.name + " could not be played:\n" + preset.failure);
+      code = exit_code::our_failure;
+    }
+  }
+  if (!options.is_quiet) {
+    std::printf("%s\n\n%s: %s\n", table(gallery_table(shown)).c_str(),
+                (folder / "index.html").c_str(),
+                counted(shown.size(), "preset", "presets").c_str());
+  }
+  return code;
+}
+
+}  // namespace ressort

@@ -1,0 +1,118 @@
+#include "app/commands/gallery/spectrogram.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "app/commands/gallery/png.h"
+
+namespace ressort {
+namespace {
+
+constexpr double periods = 34.0;
+constexpr double shortest_s = 0.012;
+constexpr double longest_s = 0.3;
+
+struct Wavelet {
+  std::vector<double> re;
+  std::vector<double> im;
+};
+
+Wavelet make_wavelet(double frequency_hz, double rate_hz) {
+  const double length_s = std::clamp(periods / frequency_hz, shortest_s, longest_s);
+  const auto count = static_cast<std::size_t>(length_s * rate_hz) | 1U;
+  Wavelet made{std::vector<double>(count), std::vector<double>(count)};
+  for (std::size_t n = 0; n < count; ++n) {
+    const double middle = static_cast<double>(n) - 0.5 * static_cast<double>(count - 1);
+    const double phase = 2.0 * std::numbers::pi * frequency_hz / rate_hz * middle;
+    // The windows' sum is half their length: a sinusoid of amplitude 1 gives 1.
+    const double weight =
+        2.0 / static_cast<double>(count) *
+        (1.0 + std::cos(2.0 * std::numbers::pi * middle / static_cast<double>(count)));
+    made.re[n] = weight * std::cos(phase);
+    made.im[n] = weight * std::sin(phase);
+  }
+  return made;
+}
+
+double power_at(const std::vector<double>& samples, const Wavelet& wavelet, long long middle) {
+  const auto count = static_cast<long long>(wavelet.re.size());
+  const long long first = middle - count / 2;
+  const long long begin = std::max(0LL, -first);
+  const long long end = std::min(count, static_cast<long long>(samples.size()) - first);
+  double re = 0.0;
+  double im = 0.0;
+  for (long long n = begin; n < end; ++n) {
+    const double y = samples[static_cast<std::size_t>(first + n)];
+    re += y * wavelet.re[static_cast<std::size_t>(n)];
+    im += y * wavelet.im[static_cast<std::size_t>(n)];
+  }
+  return re * re + im * im;
+}
+
+}  // namespace
+
+double Spectrogram::frequency_hz(std::size_t row) const {
+  return lowest_hz *
+         std::pow(highest_hz / lowest_hz, static_cast<double>(row) / static_cast<double>(rows - 1));
+}
+
+Spectrogram find_spectrogram(const Sound& sound, Stretch stretch, std::size_t rows,
+                             std::size_t columns) {
+  Spectrogram made{
+      .from_s = stretch.from_s, .to_s = stretch.to_s, .rows = rows, .columns = columns};
+  made.dbfs.assign(rows * columns, silence_db);
+  std::vector<const std::vector<double>*> heard;  // a channel that repeats the first adds nothing
+  for (const std::vector<double>& channel : sound.channels) {
+    if (heard.empty() || channel != *heard[0]) {
+      heard.push_back(&channel);
+    }
+  }
+  for (std::size_t row = 0; row < rows; ++row) {
+    if (made.frequency_hz(row) >= 0.5 * sound.rate_hz) {
+      break;
+    }
+    const Wavelet wavelet = make_wavelet(made.frequency_hz(row), sound.rate_hz);
+    for (std::size_t column = 0; column < columns; ++column) {
+      const double share = (static_cast<double>(column) + 0.5) / static_cast<double>(columns);
+      const double time_s = made.from_s + share * (made.to_s - made.from_s);
+      double power = 0.0;
+      for (const std::vector<double>* const channel : heard) {
+        power += power_at(*channel, wavelet, std::llround(time_s * sound.rate_hz));
+      }
+      made.dbfs[row * columns + column] =
+          to_dbfs(std::sqrt(power / static_cast<double>(heard.size())));
+    }
+  }
+  return made;
+}
+
+Spectrogram made_smaller(const Spectrogram& from, std::size_t rows, std::size_t columns) {
+  Spectrogram made = from;
+  made.rows = rows;
+  made.columns = columns;
+  made.dbfs.assign(rows * columns, silence_db);
+  for (std::size_t row = 0; row < from.rows; ++row) {
+    for (std::size_t column = 0; column < from.columns; ++column) {
+      double& cell = made.dbfs[row * rows / from.rows * columns + column * columns / from.columns];
+      cell = std::max(cell, from.at(row, column));
+    }
+  }
+  return made;
+}
+
+std::string to_data_url(const Spectrogram& spectrogram, double lightest_dbfs, double darkest_dbfs) {
+  constexpr double steps = 48.0;
+  std::vector<std::uint8_t> pixels;
+  for (std::size_t row = spectrogram.rows; row-- > 0;) {
+    for (std::size_t column = 0; column < spectrogram.columns; ++column) {
+      const double share =
+          (spectrogram.at(row, column) - lightest_dbfs) / (darkest_dbfs - lightest_dbfs);
+      const double step = std::round(steps * std::clamp(share, 0.0, 1.0)) / steps;
+      pixels.push_back(static_cast<std::uint8_t>(std::lround(255.0 * (1.0 - step))));
+    }
+  }
+  return png_data_url(pixels, spectrogram.columns, spectrogram.rows);
+}
+
+}  // namespace ressort

@@ -1,0 +1,306 @@
+#include "app/commands/smf/midi_file.h"
+
+#include <algorithm>
+#include <cctype>
+#include <optional>
+
+#include "app/session/files.h"
+
+namespace ressort {
+namespace {
+
+using Bytes = std::span<const std::uint8_t>;
+
+constexpr double longest_s = 24.0 * 3600.0;
+
+// What an event is for the reader; a tempo's `count` is the microseconds of a quarter note.
+struct TrackEvent {
+  enum class Kind : std::uint8_t { message, tempo, end };
+  std::uint64_t tick = 0;
+  Kind kind = Kind::message;
+  std::uint32_t first = 0;
+  std::uint32_t count = 0;
+};
+
+// Reads on, and knows where it is. After the first failure everything reads 0.
+class Reader {
+ public:
+  Reader(Bytes file, std::size_t at, std::size_t end) : file_(file), at_(at), end_(end) {}
+
+  std::size_t at() const { return at_; }
+  bool is_at_end() const { return at_ == end_; }
+  std::size_t left() const { return end_ - at_; }
+  const std::optional<Error>& failure() const { return failure_; }
+
+  void fail(std::size_t at, const std::string& what) {
+    if (!failure_) {
+      failure_ = Error{"byte " + std::to_string(at) + ": " + what};
+    }
+  }
+
+  std::uint8_t peek() const { return at_ < end_ ? file_[at_] : std::uint8_t{0}; }
+
+  Bytes take(std::size_t count, const char* what) {
+    if (count > left()) {
+      fail(end_, std::string("it ends within ") + what);
+      at_ = end_;
+      return {};
+    }
+    at_ += count;
+    return file_.subspan(at_ - count, count);
+  }
+
+  // Big-endian.
+  std::uint32_t number(std::size_t count, const char* what) {
+    std::uint32_t value = 0;
+    for (const std::uint8_t byte : take(count, what)) {
+      value = value << 8 | byte;
+    }
+    return value;
+  }
+
+  // Of variable length: seven bits a byte, at most four bytes.
+  std::uint32_t quantity(const char* what) {
+    const std::size_t start = at_;
+    std::uint32_t value = 0;
+    for (int i = 0; i < 4; ++i) {
+      const std::uint32_t byte = number(1, what);
+      value = value << 7 | (byte & 0x7fU);
+      if (byte < 0x80) {
+        return value;
+      }
+    }
+    fail(start, std::string(what) + " has more than four bytes");
+    return 0;
+  }
+
+ private:
+  Bytes file_;
+  std::size_t at_;
+  std::size_t end_;
+  std::optional<Error> failure_;
+};
+
+class Track {
+ public:
+  Track(Reader& reader, std::vector<TrackEvent>& events, std::vector<std::uint8_t>& bytes)
+      : reader_(reader), events_(events), bytes_(bytes) {}
+
+  void read() {
+    bool goes_on = true;
+    while (goes_on && !reader_.is_at_end() && !reader_.failure()) {
+      tick_ += reader_.quantity("the time before an event");
+      goes_on = read_event();
+    }
+    add(TrackEvent::Kind::end, 0, 0);
+  }
+
+ private:
+  void add(TrackEvent::Kind kind, std::size_t first, std::size_t count) {
+    events_.push_back(
+        {tick_, kind, static_cast<std::uint32_t>(first), static_cast<std::uint32_t>(count)});
+  }
+
+  // A message: its status, if there is one, and bytes of the file.
+  void add_message(int status, Bytes data) {
+    const std::size_t first = bytes_.size();
+    if (status != 0) {
+      bytes_.push_back(static_cast<std::uint8_t>(status));
+    }
+    bytes_.insert(bytes_.end(), data.begin(), data.end());
+    add(TrackEvent::Kind::message, first, bytes_.size() - first);
+  }
+
+  // False: the track has ended.
+  bool read_event() {
+    const std::size_t start = reader_.at();
+    if (reader_.peek() < 0x80) {
+      if (running_ == 0 && reader_.left() > 0) {
+        reader_.fail(start, "a data byte where an event was expected, and no status before it");
+      }
+      read_channel_message();
+      return true;
+    }
+    const std::uint32_t status = reader_.number(1, "an event");
+    if (status < 0xf0) {
+      running_ = static_cast<int>(status);
+      read_channel_message();
+    } else if (status == 0xf0 || status == 0xf7) {
+      const std::uint32_t count = reader_.quantity("the length of a SysEx");
+      const Bytes data = reader_.take(count, "a SysEx");
+      if (status == 0xf0 || !data.empty()) {
+        add_message(status == 0xf0 ? 0xf0 : 0, data);
+      }
+    } else if (status == 0xff) {
+      return read_meta(start);
+    } else {
+      reader_.fail(start, "a status that no file may hold");
+    }
+    return true;
+  }
+
+  void read_channel_message() {
+    const int kind = running_ & 0xf0;
+    const std::size_t start = reader_.at();
+    const Bytes data = reader_.take(kind == 0xc0 || kind == 0xd0 ? 1 : 2, "a channel message");
+    for (std::size_t i = 0; i < data.size(); ++i) {
+      if (data[i] >= 0x80) {
+        reader_.fail(start + i, "a status where a data byte was expected");
+      }
+    }
+    if (!reader_.failure()) {
+      add_message(running_, data);
+    }
+  }
+
+  bool read_meta(std::size_t start) {
+    const std::uint32_t type = reader_.number(1, "a meta event");
+    const std::uint32_t count = reader_.quantity("the length of a meta event");
+    const Bytes data = reader_.take(count, "a meta event");
+    constexpr std::uint32_t end_of_track = 0x2f;
+    constexpr std::uint32_t set_tempo = 0x51;
+    if (type == set_tempo && !reader_.failure()) {
+      const std::uint32_t quarter_us = data.size() == 3
+                                           ? static_cast<std::uint32_t>(data[0]) << 16 |
+                                                 static_cast<std::uint32_t>(data[1]) << 8 | data[2]
+                                           : 0;
+      if (quarter_us == 0) {
+        reader_.fail(start, "a tempo has three bytes, and is not 0");
+      }
+      add(TrackEvent::Kind::tempo, 0, quarter_us);
+    }
+    return type != end_of_track;
+  }
+
+  Reader& reader_;
+  std::vector<TrackEvent>& events_;
+  std::vector<std::uint8_t>& bytes_;
+  std::uint64_t tick_ = 0;
+  int running_ = 0;  // the last channel message's status
+};
+
+// Seconds of a tick: of a quarter note's share, which tempo changes, or of an SMPTE frame's.
+struct Division {
+  double ticks_per_quarter = 0.0;  // 0: ticks are shares of frames
+  double tick_s = 0.0;             // of frames
+};
+
+Division read_division(Reader& reader) {
+  const std::size_t start = reader.at();
+  const std::uint32_t division = reader.number(2, "the header");
+  if (division < 0x8000) {
+    if (division == 0) {
+      reader.fail(start, "no ticks in a quarter note");
+    }
+    return {.ticks_per_quarter = static_cast<double>(division)};
+  }
+  const std::uint32_t frames = 256 - (division >> 8);
+  const std::uint32_t ticks = division & 0xffU;
+  const bool is_known = frames == 24 || frames == 25 || frames == 29 || frames == 30;
+  if (!is_known || ticks == 0) {
+    reader.fail(start, "expected 24, 25, 29 or 30 SMPTE frames a second, each of some ticks");
+    return {};
+  }
+  const double frames_per_s = frames == 29 ? 30000.0 / 1001.0 : frames;  // 29: 30 drop frame
+  return {.tick_s = 1.0 / (frames_per_s * ticks)};
+}
+
+bool is_chunk(Bytes type, std::string_view name) {
+  return std::equal(type.begin(), type.end(), name.begin(), name.end());
+}
+
+}  // namespace
+
+Result<MidiFile> parse_midi_file(Bytes file) {
+  Reader reader(file, 0, file.size());
+  if (!is_chunk(reader.take(4, "the header"), "MThd")) {
+    return Error{"byte 0: expected MThd, with which a MIDI file begins"};
+  }
+  const std::uint32_t header_bytes = reader.number(4, "the header");
+  const std::size_t header = reader.at();
+  const std::uint32_t type = reader.number(2, "the header");
+  const std::uint32_t tracks = reader.number(2, "the header");
+  if (!reader.failure() && (header_bytes < 6 || type > 1)) {
+    reader.fail(header, header_bytes < 6
+                            ? "the header has fewer than 6 bytes"
+                            : "type " + std::to_string(type) + "; files of type 0 and 1 are read");
+  }
+  const Division division = read_division(reader);
+  reader.take(header_bytes < 6 ? 0 : header_bytes - 6, "the header");
+  if (reader.failure()) {
+    return *reader.failure();
+  }
+
+  MidiFile midi;
+  std::vector<TrackEvent> events;
+  for (std::uint32_t track = 0; track < tracks;) {
+    if (reader.is_at_end()) {
+      return Error{"byte " + std::to_string(reader.at()) + ": it ends before track " +
+                   std::to_string(track + 1) + " of " + std::to_string(tracks)};
+    }
+    const Bytes name = reader.take(4, "the head of a chunk");
+    const std::uint32_t count = reader.number(4, "the head of a chunk");
+    const std::size_t first = reader.at();
+    reader.take(count, "a chunk");
+    if (reader.failure()) {
+      return *reader.failure();
+    }
+    if (is_chunk(name, "MTrk")) {
+      Reader inside(file, first, first + count);
+      Track(inside, events, midi.bytes).read();
+      if (inside.failure()) {
+        return *inside.failure();
+      }
+      ++track;
+    }
+  }
+
+  std::stable_sort(events.begin(), events.end(),
+                   [](const TrackEvent& a, const TrackEvent& b) { return a.tick < b.tick; });
+  constexpr double default_quarter_s = 0.5;  // 120 quarter notes a minute
+  double tick_s =
+      division.tick_s > 0.0 ? division.tick_s : default_quarter_s / division.ticks_per_quarter;
+  std::uint64_t tick = 0;
+  for (const TrackEvent& event : events) {
+    midi.length_s += static_cast<double>(event.tick - tick) * tick_s;
+    tick = event.tick;
+    if (midi.length_s > longest_s) {
+      return Error{"it lasts longer than a day"};
+    }
+    switch (event.kind) {
+      case TrackEvent::Kind::message:
+        midi.messages.push_back({midi.length_s, event.first, event.count});
+        break;
+      case TrackEvent::Kind::tempo:
+        if (division.tick_s == 0.0) {
+          tick_s = 1e-6 * event.count / division.ticks_per_quarter;
+        }
+        break;
+      case TrackEvent::Kind::end:
+        break;
+    }
+  }
+  return midi;
+}
+
+Result<MidiFile> read_midi_file(const std::string& path) {
+  const auto bytes = read_bytes(path, max_midi_file_bytes);
+  if (!bytes) {
+    return bytes.error();
+  }
+  auto midi = parse_midi_file(
+      std::span(reinterpret_cast<const std::uint8_t*>(bytes->data()), bytes->size()));
+  if (!midi) {
+    return Error{"'" + path + "' is no MIDI file that can be read: " + midi.error().message};
+  }
+  return midi;
+}
+
+bool names_midi_file(std::string_view path) {
+  std::string lower(path);
+  std::transform(lower.begin(), lower.end(), lower.begin(),
+                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  return lower.ends_with(".mid") || lower.ends_with(".midi");
+}
+
+}  // namespace ressort

@@ -1,0 +1,92 @@
+// The console's commands that keep, teach and take back what a player changes, and that wait.
+#include <filesystem>
+
+#include "app/control/console_commands.h"
+#include "app/text.h"
+#include "core/model/language/expression.h"
+
+namespace ressort {
+
+Result<Done> command::save(ConsoleContext& console, Words words) {
+  if (!loaded(console)) {
+    return nothing_loaded;
+  }
+  const Existing existing = words.size() > 1 ? Existing::replace : Existing::refuse;
+  const auto path = console.session.save(words[0], existing);
+  if (!path) {
+    return path.error();
+  }
+  console.print("saved to " + *path + "; 'load " +
+                (words[0].find(' ') == std::string::npos ? words[0] : "\"" + words[0] + "\"") +
+                "' brings it back");
+  return Done{};
+}
+
+Result<Done> command::learn(ConsoleContext& console, Words words) {
+  const auto current = loaded(console);
+  if (!current) {
+    return nothing_loaded;
+  }
+  const std::string target = meant_parameter(current->instrument, words[0]);
+  if (auto begun = console.session.learn(target); !begun) {
+    return begun.error();
+  }
+  console.print("move the knob that shall turn " + target);
+  return Done{};
+}
+
+Result<Done> command::unlearn(ConsoleContext& console, Words words) {
+  const auto current = loaded(console);
+  if (!current) {
+    return nothing_loaded;
+  }
+  const std::string target = words.empty() ? "" : meant_parameter(current->instrument, words[0]);
+  const std::size_t count = console.session.unlearn(target);
+  if (count == 0 && !target.empty()) {
+    return Error{"no controller has learnt to turn '" + target + "'"};
+  }
+  console.print(counted(count, "controller does", "controllers do") +
+                " again what the preset says");
+  return Done{};
+}
+
+// Loads and sets as anybody does, so that it can be taken back too.
+Result<Done> command::undo(ConsoleContext& console, Words) {
+  const auto change = console.session.take_last_change();
+  if (!change) {
+    return Error{"there is nothing to take back"};
+  }
+  if (change->scene) {
+    if (auto back = console.session.load_and_wait(*change->scene); !back) {
+      return back.error();
+    }
+    const std::string stem = std::filesystem::path(*change->scene).stem().string();
+    console.print(stem + " is back" + (change->values.empty() ? "" : ", as it was"));
+  }
+  std::vector<std::string> lines;
+  for (const auto& [name, value] : change->values) {
+    if (console.session.parameter(name) == value) {
+      continue;
+    }
+    if (auto set = play(console, {"/param/" + name, {value}}); !set) {
+      return set.error();
+    }
+    lines.push_back(name + " = " + print_number(value));
+  }
+  if (!lines.empty()) {
+    console.print(joined(lines, "\n"));
+  }
+  return Done{};
+}
+
+Result<Done> command::wait(ConsoleContext& console, Words words) {
+  constexpr double longest_s = 3600.0;
+  double time_s = 0.0;
+  if (!parse_number(words[0], time_s) || !(time_s >= 0.0 && time_s <= longest_s)) {
+    return Error{"expected seconds, 0 to 3600, found '" + words[0] + "'"};
+  }
+  console.session.wait(std::chrono::duration<double>(time_s));
+  return Done{};
+}
+
+}  // namespace ressort

@@ -1,0 +1,221 @@
+// What a player changes of what sounds: what can be taken back, learnt and kept.
+#include <algorithm>
+#include <filesystem>
+#include <utility>
+
+#include "app/session/files.h"
+#include "app/session/session.h"
+#include "app/text.h"
+#include "core/model/preset/edit.h"
+
+namespace ressort {
+namespace {
+
+// What a keyboard moves besides its knobs, and what MIDI has for its own ends: banks, parameters'
+// numbers and data, pedals, and from 120 on channel modes.
+bool is_knob(int controller) {
+  constexpr int others[] = {0, 6, 32, 38, 64, 66, 67, 96, 97, 98, 99, 100, 101};
+  return controller < 120 &&
+         std::find(std::begin(others), std::end(others), controller) == std::end(others);
+}
+
+}  // namespace
+
+// What the parameters are before they change; a sweep is one change.
+void Session::begin_change(const std::vector<std::string>& names) {
+  using namespace std::chrono_literals;
+  if (names.empty()) {
+    return;
+  }
+  const auto now = std::chrono::steady_clock::now();
+  LastChange change;
+  for (const std::string& name : names) {
+    const auto& parameters = current_->instrument.parameters;
+    for (std::size_t i = 0; i < parameters.size(); ++i) {
+      if (parameters[i].name == name) {
+        change.values.emplace_back(name, values_[i]);
+      }
+    }
+  }
+  const bool goes_on = last_change_ && !last_change_->scene &&
+                       now - std::exchange(changed_, now) < 1s &&
+                       std::equal(change.values.begin(), change.values.end(),
+                                  last_change_->values.begin(), last_change_->values.end(),
+                                  [](const auto& a, const auto& b) { return a.first == b.first; });
+  changed_ = now;
+  if (!goes_on) {
+    last_change_ = std::move(change);
+  }
+}
+
+std::optional<LastChange> Session::take_last_change() {
+  const std::lock_guard lock(mutex_);
+  return std::exchange(last_change_, std::nullopt);
+}
+
+// By its name among the parameters and the preset's OSC names; of no model where there is none.
+LearnedControl Session::control_of(const std::string& target) const {
+  constexpr double wide = 10.0;  // from here on equal turns are equal ratios
+  const Instrument& instrument = current_->instrument;
+  for (std::size_t i = 0; i < instrument.parameters.size(); ++i) {
+    const ParameterInfo& info = instrument.parameters[i];
+    if (info.name == target && info.audio_input == 0) {
+      return {.kind = EventKind::parameter,
+              .index = static_cast<std::uint16_t>(i),
+              .model = current_->serial,
+              .low = info.minimum,
+              .high = info.maximum,
+              .exponential = info.minimum > 0.0 && info.maximum >= wide * info.minimum};
+    }
+  }
+  for (const CustomInfo& info : instrument.custom) {
+    if (info.address == target) {
+      return {.kind = EventKind::custom,
+              .index = static_cast<std::uint16_t>(info.row),
+              .model = current_->serial};
+    }
+  }
+  return {};
+}
+
+void Session::teach(const LearnedRow& row, bool is_on) {
+  process_.lessons.push({static_cast<std::uint8_t>(row.controller),
+                         is_on ? control_of(row.target) : LearnedControl{}});
+}
+
+Result<Done> Session::learn(const std::string& target) {
+  const std::uint64_t turns = process_.meters().turns;
+  const std::lock_guard lock(mutex_);
+  if (control_of(target).model == 0) {
+    std::vector<std::string> known;
+    for (const ParameterInfo& info : current_->instrument.parameters) {
+      known.push_back(info.name);
+    }
+    for (const CustomInfo& info : current_->instrument.custom) {
+      known.push_back(info.address);
+    }
+    return Error{"there is nothing called '" + target + "' to turn; there are " +
+                 (known.empty() ? "none" : joined(known, ", ")) + did_you_mean(target, known)};
+  }
+  pupil_ = target;
+  turns_ = turns;
+  return Done{};
+}
+
+std::size_t Session::unlearn(const std::string& target) {
+  const std::lock_guard lock(mutex_);
+  pupil_.reset();
+  const auto forgets = [&](const LearnedRow& row) {
+    return target.empty() || row.target == target;
+  };
+  for (const LearnedRow& row : learned_) {
+    if (forgets(row)) {
+      teach(row, false);
+    }
+  }
+  return std::erase_if(learned_, forgets);
+}
+
+std::vector<LearnedRow> Session::learned() const {
+  const std::lock_guard lock(mutex_);
+  return learned_;
+}
+
+// Whether the knob has moved that somebody waits for.
+void Session::hear_turns(const Meters& now) {
+  std::string news;
+  {
+    const std::lock_guard lock(mutex_);
+    if (!pupil_ || now.turns == turns_ || !is_knob(now.last_controller)) {
+      return;
+    }
+    const LearnedRow row{now.last_controller, *std::exchange(pupil_, std::nullopt)};
+    for (const LearnedRow& before : learned_) {
+      if (before.target == row.target) {
+        teach(before, false);
+      }
+    }
+    std::erase_if(learned_, [&](const LearnedRow& before) {
+      return before.target == row.target || before.controller == row.controller;
+    });
+    learned_.push_back(row);
+    teach(row, true);
+    news = "controller " + std::to_string(row.controller) + " turns " + row.target +
+           " from now on; 'unlearn " + row.target + "' ends that, 'save NAME' keeps it";
+  }
+  if (tell_) {
+    tell_(news);
+  }
+}
+
+Result<std::string> Session::save(const std::string& name, Existing existing) {
+  const auto path = path_to_save(name);
+  if (!path) {
+    return path.error();
+  }
+  std::error_code error;
+  if (const std::string there = preset_path(name); existing == Existing::refuse && !there.empty()) {
+    return Error{there == *path ? "'" + name + "' is there already; --force writes over it"
+                                : "'" + name +
+                                      "' is a preset that came with the program; --force saves one "
+                                      "of yours that is loaded instead"};
+  }
+  std::shared_ptr<const Loaded> now;
+  PresetChanges changes;
+  {
+    const std::lock_guard lock(mutex_);
+    now = current_;
+    if (now->serial == 0) {
+      return Error{"nothing is loaded that could be saved"};
+    }
+    for (std::size_t i = 0; i < values_.size(); ++i) {
+      const ParameterInfo& info = now->instrument.parameters[i];
+      const bool is_in_preset =
+          std::any_of(now->preset.parameters.begin(), now->preset.parameters.end(),
+                      [&](const ParameterSetting& setting) { return setting.name == info.name; });
+      if (info.audio_input == 0 && (is_in_preset || values_[i] != info.value)) {
+        constexpr double most = 1e12;  // that a preset may say
+        changes.parameters.push_back(
+            {info.name, values_[i], std::max(info.minimum, -most), std::min(info.maximum, most)});
+      }
+    }
+    for (const LearnedRow& row : learned_) {
+      const LearnedControl control = control_of(row.target);
+      for (const ControlSetting& setting : now->preset.controls) {
+        if (setting.source == ControlSource::osc && setting.address == row.target) {
+          ControlSetting same = setting;
+          same.source = ControlSource::controller;
+          same.number = row.controller;
+          changes.learned.push_back(std::move(same));
+        }
+      }
+      if (control.kind == EventKind::parameter) {
+        changes.learned.push_back({.source = ControlSource::controller,
+                                   .number = row.controller,
+                                   .target = row.target,
+                                   .gesture = Gesture::parameter,
+                                   .low = control.low,
+                                   .high = control.high,
+                                   .exponential = control.exponential});
+      }
+    }
+  }
+  // By its name where that leads to it from there too.
+  const std::filesystem::path model = now->model_path;
+  const std::string known = model_path(model.stem().string());
+  changes.model = !known.empty() && std::filesystem::equivalent(known, model, error)
+                      ? model.filename().string()
+                      : std::filesystem::absolute(model, error).lexically_normal().string();
+  changes.gain = now->instrument.gain / options_.gain;
+  Preset made_up = now->preset;
+  made_up.model = changes.model;
+  const auto text =
+      edit_preset(now->preset_text.empty() ? print_preset(made_up) : now->preset_text, changes);
+  if (!text) {
+    return text.error();
+  }
+  const auto written = write_text(*path, *text, existing);
+  return written ? Result<std::string>(*path) : written.error();
+}
+
+}  // namespace ressort

@@ -1,0 +1,179 @@
+// Standard MIDI Files, byte by byte; times are worked out by hand.
+#include "app/commands/smf/midi_file.h"
+
+#include <cmath>
+
+#include "app/commands/offline.h"
+#include "app/session/sound_file.h"
+#include "tests/support/data_folder.h"
+
+namespace ressort {
+namespace {
+
+using Bytes = std::vector<std::uint8_t>;
+
+Bytes operator+(Bytes a, const Bytes& b) {
+  a.insert(a.end(), b.begin(), b.end());
+  return a;
+}
+
+Bytes header(int type, int tracks, int division) {
+  const auto byte = [](int value) { return static_cast<std::uint8_t>(value & 0xff); };
+  return {
+      'M',           'T', 'h', 'd', 0, 0, 0, 6, 0, byte(type), 0, byte(tracks), byte(division >> 8),
+      byte(division)};
+}
+
+Bytes track(const Bytes& events) {
+  const auto size = static_cast<std::uint8_t>(events.size());
+  return Bytes{'M', 'T', 'r', 'k', 0, 0, 0, size} + events;
+}
+
+const Bytes end = {0, 0xff, 0x2f, 0};
+
+MidiFile read(const Bytes& bytes) {
+  auto midi = parse_midi_file(bytes);
+  INFO((midi ? "" : midi.error().message));
+  REQUIRE(midi);
+  return *std::move(midi);
+}
+
+void check(const MidiFile& midi, std::size_t i, double time_s, const Bytes& bytes) {
+  INFO(i);
+  REQUIRE(i < midi.messages.size());
+  CHECK(std::fabs(midi.messages[i].time_s - time_s) < 1e-12);
+  const auto found = midi.bytes_of(midi.messages[i]);
+  CHECK(Bytes(found.begin(), found.end()) == bytes);
+}
+
+std::string failure(const Bytes& bytes) {
+  const auto midi = parse_midi_file(bytes);
+  return midi ? "" : midi.error().message;
+}
+
+bool contains(const std::string& text, const std::string& part) {
+  return text.find(part) != text.npos;
+}
+
+}  // namespace
+
+TEST_CASE("running status, a tempo change and long times", "[midi_file]") {
+  // 96 ticks a quarter note: 48 ticks are 0.25 s at 120, and 0.5 s at 60 quarter notes a minute.
+  const MidiFile midi =
+      read(header(0, 1, 96) + track(Bytes{0,    0x93, 60,   100, 48,   60,   0,  // running status
+                                          0,    0xff, 0x51, 3,   0x0f, 0x42, 0x40,  // 1 000 000 us
+                                          48,   0x93, 62,   1,                      //
+                                          0x81, 0x40, 0xc3, 5,                      // 192 ticks
+                                          0,    7} +                                // and once more
+                                    end));
+  REQUIRE(midi.messages.size() == 5);
+  check(midi, 0, 0.0, {0x93, 60, 100});
+  check(midi, 1, 0.25, {0x93, 60, 0});
+  check(midi, 2, 0.75, {0x93, 62, 1});
+  check(midi, 3, 2.75, {0xc3, 5});
+  check(midi, 4, 2.75, {0xc3, 7});
+  CHECK(std::fabs(midi.length_s - 2.75) < 1e-12);
+}
+
+TEST_CASE("the tracks of type 1 play together, and one's tempo is that of all", "[midi_file]") {
+  const MidiFile midi =
+      read(header(1, 2, 480) +
+           // After a quarter note twice as fast: 250 000 us.
+           track(Bytes{0x83, 0x60, 0xff, 0x51, 3, 0x03, 0xd0, 0x90} + end) +
+           Bytes{'X', 'F', 'I', 'H', 0, 0, 0, 2, 1, 2} +  // a chunk of another kind
+           track(Bytes{0, 0x90, 60, 1, 0x87, 0x40, 0x80, 60, 64, 0x83, 0x60, 0xff, 0x2f, 0}) +
+           Bytes{1, 2, 3});
+  REQUIRE(midi.messages.size() == 2);
+  check(midi, 0, 0.0, {0x90, 60, 1});
+  check(midi, 1, 0.75, {0x80, 60, 64});  // 480 ticks in 0.5 s and 480 in 0.25 s
+  CHECK(std::fabs(midi.length_s - 1.0) < 1e-12);
+}
+
+TEST_CASE("frames of SMPTE do not ask for the tempo", "[midi_file]") {
+  // 25 frames of 40 ticks are a second; 29 stands for 30 drop frame, 30000 / 1001 a second.
+  const Bytes events = track(Bytes{0, 0xff, 0x51, 3, 1, 0, 0, 0x87, 0x68, 0x90, 1, 1} + end);
+  check(read(header(0, 1, (256 - 25) << 8 | 40) + events), 0, 1.0, {0x90, 1, 1});
+  check(read(header(0, 1, (256 - 29) << 8 | 40) + events), 0, 25.0 * 1001.0 / 30000.0,
+        {0x90, 1, 1});
+}
+
+TEST_CASE("SysEx is passed on, whole, in parts and as it is", "[midi_file]") {
+  const MidiFile midi = read(
+      header(0, 1, 96) + track(Bytes{0,  0xf0, 4, 0x7e, 0x7f, 9,    0xf7,       // whole
+                                     0,  0xf0, 2, 0x43, 0x12,                   // begins
+                                     96, 0xf7, 2, 0x01, 0xf7,                   // goes on and ends
+                                     0,  0xf7, 1, 0xf8, 0,    0x80, 1,    2} +  // a clock, escaped
+                               end));
+  REQUIRE(midi.messages.size() == 5);
+  check(midi, 0, 0.0, {0xf0, 0x7e, 0x7f, 9, 0xf7});
+  check(midi, 1, 0.0, {0xf0, 0x43, 0x12});
+  check(midi, 2, 0.5, {0x01, 0xf7});
+  check(midi, 3, 0.5, {0xf8});
+  check(midi, 4, 0.5, {0x80, 1, 2});
+}
+
+TEST_CASE("a broken MIDI file is told with its byte", "[midi_file]") {
+  CHECK(contains(failure({}), "MThd"));
+  CHECK(contains(failure({'R', 'I', 'F', 'F', 0, 0, 0, 0}), "byte 0"));
+  CHECK(contains(failure({'M', 'T', 'h', 'd', 0, 0}), "byte 6: it ends"));
+  CHECK(contains(failure(header(2, 1, 96)), "type 2"));
+  CHECK(contains(failure(header(0, 1, 0)), "byte 12"));
+  CHECK(contains(failure(header(0, 1, 0xe000)), "SMPTE"));
+  CHECK(contains(failure(header(0, 1, (256 - 25) << 8)), "SMPTE"));
+  CHECK(contains(failure(header(0, 1, 96)), "byte 14: it ends before track 1 of 1"));
+  const Bytes head = header(0, 1, 96);  // 14 bytes, the track's events begin at 22
+  CHECK(
+      contains(failure(head + Bytes{'M', 'T', 'r', 'k', 0, 0, 0, 9, 0}), "it ends within a chunk"));
+  CHECK(contains(failure(head + track({0, 60, 1})), "byte 23: a data byte"));
+  CHECK(contains(failure(head + track({0, 0x90, 60, 0x90})), "byte 25: a status"));
+  CHECK(
+      contains(failure(head + track({0, 0x90, 60})), "byte 25: it ends within a channel message"));
+  CHECK(contains(failure(head + track({0, 0xf4})), "byte 23: a status that no file"));
+  CHECK(contains(failure(head + track({0x81, 0x82, 0x83, 0x84, 0})), "byte 22: the time"));
+  CHECK(contains(failure(head + track({0, 0xff, 0x51, 2, 1, 1})), "byte 23: a tempo"));
+  CHECK(contains(failure(head + track({0, 0xff, 0x51, 3, 0, 0, 0})), "byte 23: a tempo"));
+  CHECK(contains(failure(head + track({0, 0xf0, 0x7f, 1})), "it ends within a SysEx"));
+  // 2^28 - 1 ticks of a second each.
+  CHECK(contains(failure(header(0, 1, 1) + track({0, 0xff, 0x51, 3, 0xff, 0xff, 0xff,  //
+                                                  0xff, 0xff, 0xff, 0x7f, 0x90, 1, 1})),
+                 "longer than a day"));
+}
+
+TEST_CASE("a track may end without saying so", "[midi_file]") {
+  CHECK(read(header(0, 1, 96) + track({0, 0x90, 60, 1})).messages.size() == 1);
+  CHECK(read(header(0, 1, 96) + track({})).messages.empty());
+}
+
+TEST_CASE("a MIDI file is known by its ending in any case", "[midi_file]") {
+  CHECK(names_midi_file("a/song.mid"));
+  CHECK(names_midi_file("SONG.MIDI"));
+  CHECK_FALSE(names_midi_file("song.mdl"));
+  CHECK_FALSE(names_midi_file("mid"));
+}
+
+TEST_CASE("a rendered song begins at its frame and ends when it is silent", "[midi_file]") {
+  const Folder folder;
+  // A note at 0.5 s, its end a second later, no pedal.
+  const Bytes bytes =
+      header(0, 1, 480) + track(Bytes{0x83, 0x60, 0x90, 69, 100, 0x87, 0x40, 0x80, 69, 64} + end);
+  const std::string song = folder.write("song.mid", std::string(bytes.begin(), bytes.end()));
+  const std::string output = folder.file("song.wav");
+  const auto rendered =
+      render({.name = "PolyTriangle", .output = output, .rate_hz = 48000.0, .midi = song}, {});
+  INFO((rendered ? "" : rendered.error().message));
+  REQUIRE(rendered);
+  const auto sound = read_sound(output);
+  REQUIRE(sound);
+  const std::vector<double>& left = sound->channels[0];
+  const auto frame =
+      std::find_if(left.begin(), left.end(), [](double y) { return y != 0.0; }) - left.begin();
+  // Struck in frame 24000, the wave needs a frame for each link on its way to the output, and the
+  // limiter is off.
+  CHECK(frame >= 24000);
+  CHECK(frame < 24010);
+  // The file lasts 1.5 s; what rings on is gone long before the minute that is waited at most.
+  CHECK(static_cast<double>(rendered->frames) >= 1.5 * 48000.0);
+  CHECK(static_cast<double>(rendered->frames) < 20.0 * 48000.0);
+}
+
+}  // namespace ressort

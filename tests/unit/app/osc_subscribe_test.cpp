@@ -1,0 +1,163 @@
+// What OSC tells by itself, lists and keeps; and how loud its notes are.
+#include <functional>
+
+#include "app/control/osc/server.h"
+#include "app/control/registry.h"
+#include "tests/support/console_harness.h"
+#include "tests/support/osc_client.h"
+
+namespace ressort {
+namespace {
+
+struct OscHarness {
+  DataFolder data;
+  std::string news;
+  std::mutex mutex;
+  Harness harness;
+  std::unique_ptr<OscServer> server;
+
+  OscHarness() {
+    data.write("models/triangle.mdl", scenes::poly_triangle());
+    data.write("presets/tri.toml", triangle_preset);
+    REQUIRE(has(harness.say("load tri"), "tri: 3 masses"));
+    harness.play();
+    auto opened = OscServer::open({.port = 0}, harness.process, harness.session,
+                                  [this](const std::string& text) {
+                                    const std::lock_guard lock(mutex);
+                                    news += text + "\n";
+                                  });
+    REQUIRE(opened);
+    server = *std::move(opened);
+  }
+};
+
+// The next message at the address; what comes before it is passed over.
+Answer next(Client& client, const std::string& address) {
+  for (int i = 0; i < 100; ++i) {
+    auto answer = client.receive();
+    REQUIRE(answer);
+    if (answer->address == address) {
+      return *answer;
+    }
+  }
+  FAIL("nothing comes from " << address);
+  return {};
+}
+
+float value(const Answer& answer) {
+  return std::get<float>(answer.values.at(0));
+}
+
+}  // namespace
+
+TEST_CASE("who has subscribed hears of every change, whoever makes it", "[osc_subscribe]") {
+  OscHarness osc;
+  Harness& h = osc.harness;
+  Client listener(osc.server->port());
+  Client other(osc.server->port());
+  const Answer lease = listener.ask(message("/subscribe", {30}));
+  CHECK(lease.address == "/subscribe.reply");
+  CHECK(value(lease) == 30.0f);
+  CHECK(next(listener, "/loaded").text(0) == "tri");  // all that is, to begin with
+  CHECK(value(next(listener, "/param/m_K")) == 0.1f);
+
+  h.say("set m_K 0.15");  // by the console
+  CHECK(value(next(listener, "/param/m_K")) == 0.15f);
+  h.play();
+  other.send(message("/param/m_K", {0.125f}));  // by somebody else
+  CHECK(value(next(listener, "/param/m_K")) == 0.125f);
+  h.play();
+  h.say("learn m_K");  // by a knob
+  const auto turn = [&](double value) {
+    const TimedEvent event{{.kind = EventKind::controller, .index = 7, .value = value}};
+    REQUIRE(h.process.send(h.process.from_midi, {&event, 1}));
+    h.play();
+  };
+  turn(0.5);
+  while (h.session.learned().empty()) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(5));
+  }
+  turn(1.0);
+  CHECK(value(next(listener, "/param/m_K")) == 0.2f);
+  h.say("load triangle");  // and another scene
+  CHECK(next(listener, "/loaded").text(0) == "triangle");
+
+  listener.send(message("/unsubscribe"));
+  CHECK(next(listener, "/done").text(0) == "/unsubscribe");
+  h.say("load tri");
+  other.sync();
+  CHECK_FALSE(listener.receive(200));
+  CHECK(listener.ask(message("/unsubscribe")).address == "/error");
+}
+
+TEST_CASE("a subscription ends with its lease", "[osc_subscribe]") {
+  OscHarness osc;
+  Client listener(osc.server->port());
+  CHECK(listener.ask(message("/subscribe", {0.05})).address == "/subscribe.reply");
+  std::this_thread::sleep_for(std::chrono::milliseconds(200));
+  while (listener.receive(100)) {
+  }
+  osc.harness.say("set m_K 0.15");
+  CHECK_FALSE(listener.receive(200));
+  for (const Bytes& bytes :
+       {message("/subscribe", {0}), message("/subscribe", {61}), message("/subscribe", {"long"})}) {
+    CHECK(listener.ask(bytes).address == "/error");
+  }
+  std::vector<std::unique_ptr<Client>> crowd;
+  for (int i = 0; i < 16; ++i) {
+    crowd.push_back(std::make_unique<Client>(osc.server->port()));
+    CHECK(crowd.back()->ask(message("/subscribe")).address == "/subscribe.reply");
+  }
+  CHECK(listener.ask(message("/subscribe")).address == "/error");
+  CHECK(next(*crowd[0], "/param/m_K").values.size() == 1);
+}
+
+TEST_CASE("models and presets are listed over OSC, and saved", "[osc_subscribe]") {
+  OscHarness osc;
+  Client client(osc.server->port());
+  client.send(message("/presets"));
+  const Answer preset = next(client, "/presets.reply");
+  CHECK(preset.text(0) == "tri");
+  CHECK(preset.text(1) == "three masses, struck");
+  CHECK(std::get<std::int32_t>(next(client, "/presets.end").values.at(0)) == 1);
+  client.send(message("/models"));
+  CHECK(next(client, "/models.reply").text(0) == "triangle");
+  CHECK(std::get<std::int32_t>(next(client, "/models.end").values.at(0)) == 1);
+
+  CHECK(client.ask(message("/preset/save", {"mine"})).address == "/done");
+  CHECK(client.ask(message("/preset/save", {"mine"})).address == "/fail");  // never over one
+  CHECK(client.ask(message("/preset/save", {"tri"})).address == "/fail");
+  CHECK(client.ask(message("/preset/save", {"../../mine"})).address == "/fail");
+  CHECK(client.ask(message("/preset/save", {"/tmp/mine"})).address == "/fail");
+  CHECK(client.ask(message("/preset/save", {1})).address == "/error");
+  CHECK(std::filesystem::exists(osc.data.path("home/ressort/presets/mine.toml")));
+  const std::lock_guard lock(osc.mutex);
+  CHECK(has(osc.news, "OSC saved"));
+}
+
+TEST_CASE("an error of OSC is told at the machine, too", "[osc_subscribe]") {
+  OscHarness osc;
+  Client client(osc.server->port());
+  CHECK(client.ask(message("/nowhere")).address == "/error");
+  client.sync();
+  const std::lock_guard lock(osc.mutex);
+  CHECK(has(osc.news, "OSC: /nowhere: unknown address"));
+}
+
+TEST_CASE("a velocity is MIDI's as a whole number, a share as a float", "[osc_subscribe]") {
+  OscHarness osc;
+  const auto current = osc.harness.session.current();
+  const auto velocity = [&](double number, const std::string& types) {
+    const auto events =
+        to_events({"/note/on", {60.0, number}, types}, current->instrument, current->serial);
+    REQUIRE(events);
+    return events->at(0).value;
+  };
+  CHECK(velocity(1.0, "ii") == 1.0 / 127.0);
+  CHECK(velocity(1.0, "if") == 1.0);
+  CHECK(velocity(0.5, "id") == 0.5);
+  CHECK(velocity(100.0, "if") == 100.0 / 127.0);  // no share: above 1
+  CHECK(velocity(1.0, "") == 1.0 / 127.0);        // of a score
+}
+
+}  // namespace ressort

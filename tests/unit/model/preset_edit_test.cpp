@@ -1,0 +1,135 @@
+// Presets that are written: what was changed is, all else stays as it was typed.
+#include "core/model/preset/edit.h"
+
+#include "tests/support/catch.h"
+
+namespace ressort {
+namespace {
+
+const std::string text =
+    "# mine\n"
+    "model = \"a.mdl\"   # beside\n"
+    "description = \"gr\u00f6\u00dfer\"\n"
+    "gain = 2.0\n"
+    "voices = 3\n"
+    "\n"
+    "[parameters]\n"
+    "K = { value = 0.1, range = [0.01, 0.2] } # \u00e4\n"
+    "\"Z\u00fc\" = { range = [0, 1], value = 0 }\n"
+    "\n"
+    "[[control]]\n"
+    "from = \"cc1\"\n"
+    "to = \"K\"\n"
+    "range = [\n  0.01, 0.2]\n"
+    "\n"
+    "[[control]]\n"
+    "from = \"note\"\n"
+    "to = \"in1\"\n"
+    "how = \"impulse\"";
+
+std::string edited(const PresetChanges& changes) {
+  const auto result = edit_preset(text, changes);
+  INFO((result ? "" : result.error().message));
+  REQUIRE(result);
+  return *result;
+}
+
+std::string replaced(std::string all, const std::string& what, const std::string& by) {
+  const std::size_t at = all.find(what);
+  REQUIRE(at != all.npos);
+  return all.replace(at, what.size(), by);
+}
+
+}  // namespace
+
+TEST_CASE("what did not change stays to the byte", "[preset_edit]") {
+  CHECK(edited({.model = "a.mdl", .gain = 2.0}) == text);
+}
+
+TEST_CASE("values take the place of values, comments stay", "[preset_edit]") {
+  const std::string all =
+      edited({.model = "/tmp/\"b\".mdl",
+              .gain = 3.5,
+              .parameters = {{"K", 0.15, 0.01, 0.2}, {"Z\u00fc", 0.5, 0.0, 1.0}}});
+  std::string wanted = replaced(text, "\"a.mdl\"", "\"/tmp/\\\"b\\\".mdl\"");
+  wanted = replaced(wanted, "gain = 2.0", "gain = 3.5");
+  wanted = replaced(wanted, "value = 0.1,", "value = 0.15,");
+  CHECK(all == replaced(wanted, "value = 0 }", "value = 0.5 }"));
+}
+
+TEST_CASE("a parameter that was not there comes under the others", "[preset_edit]") {
+  const std::string all =
+      edited({.model = "a.mdl", .gain = 2.0, .parameters = {{"M", 1.0, 0.5, 2.0}}});
+  CHECK(all == replaced(text, "[parameters]\n",
+                        "[parameters]\nM = { value = 1.0, range = [0.5, 2.0] }\n"));
+}
+
+TEST_CASE("what a controller has learnt takes the place of what it did", "[preset_edit]") {
+  const ControlSetting learned{.source = ControlSource::controller,
+                               .number = 1,
+                               .target = "Z\u00fc",
+                               .gesture = Gesture::parameter,
+                               .low = 0.25,
+                               .high = 1.0,
+                               .exponential = true};
+  const auto parsed = parse_preset(edited({.model = "a.mdl", .gain = 2.0, .learned = {learned}}));
+  REQUIRE(parsed.ok());
+  REQUIRE(parsed.preset.controls.size() == 2);
+  CHECK(parsed.preset.controls[0].source == ControlSource::note);
+  ControlSetting read = parsed.preset.controls[1];
+  read.location = learned.location;
+  CHECK(read == learned);
+}
+
+TEST_CASE("a preset without a gain gets one, and what is no preset is refused", "[preset_edit]") {
+  const auto short_one = edit_preset("model = \"a.mdl\"", {.model = "a.mdl", .gain = 0.5});
+  REQUIRE(short_one);
+  CHECK(*short_one == "model = \"a.mdl\"\ngain = 0.5\n");
+  CHECK_FALSE(edit_preset("model = 1", {.model = "a.mdl"}));
+  CHECK_FALSE(edit_preset("[[", {.model = "a.mdl"}));
+}
+
+TEST_CASE("a printed preset reads as what it is", "[preset_edit]") {
+  Preset preset{.model = "b.mdl", .description = "a \"b\" \\", .voices = 4, .gain = 12.0, .damper_s = 0.3};
+  preset.transpose = -12;
+  preset.parameters = {{"K", 0.1, 0.01, 0.2}};
+  preset.controls = {{.source = ControlSource::note,
+                      .target = "in1",
+                      .gesture = Gesture::pluck,
+                      .low = 0.3,
+                      .high = 0.05,
+                      .travel = 2.0,
+                      .has_level = true,
+                      .low_db = -26.0,
+                      .high_db = 1.5,
+                      .lowest_key = 20,
+                      .highest_key = 90},
+                     {.source = ControlSource::note,
+                      .target = "in2",
+                      .gesture = Gesture::impulse,
+                      .longest_ms = 4.0,
+                      .shortest_ms = 0.5},
+                     {.source = ControlSource::audio, .number = 2, .target = "in2"},
+                     {.source = ControlSource::osc,
+                      .address = "/f",
+                      .target = "K",
+                      .gesture = Gesture::parameter,
+                      .low = 0.01,
+                      .high = 0.2,
+                      .exponential = true}};
+  ParsedPreset read = parse_preset(print_preset(preset));
+  REQUIRE(read.ok());
+  for (ControlSetting& control : read.preset.controls) {
+    control.location = {};
+  }
+  for (ParameterSetting& parameter : read.preset.parameters) {
+    parameter.location = {};
+  }
+  for (ControlSetting& control : preset.controls) {
+    control.location = {};
+  }
+  preset.parameters[0].location = {};
+  CHECK(read.preset == preset);
+}
+
+}  // namespace ressort
