@@ -60,7 +60,7 @@ constexpr PresetKey keys[] = {
     {"control", "curve", "`linear` or `exponential` (`linear`)", "exponential: equal steps are equal ratios"},
     {"control", "travel", "above 0", "of a pluck, which needs it: how far from the string the finger rests, on either side"},
     {"control", "level_db", "[low, high]", "how loud the softest and the loudest are beside `gain`; exact for plucks, bows and blows, whose sound does not depend on how large it is. Without it the level is what `range` makes of it"},
-    {"control", "length_ms", "[longest, shortest] (one sample)", "of an impulse or a swing: how long the softest and the hardest blow last; the shorter, the brighter"},
+    {"control", "length_ms", "[longest, shortest] (one sample)", "of an impulse or a swing: how long the softest and the hardest blow last at the model's own pitch, on higher keys less; the shorter, the brighter"},
     {"control", "keys", "[low, high] ([0, 127])", "of notes: which keys"},
 };
 // clang-format on
