@@ -36,7 +36,7 @@ constexpr double bowed_attack_s = 0.150;
 constexpr double most_release_s = 0.6;
 constexpr double most_offset_db = -60.0;
 constexpr double most_correlation = 0.9;
-constexpr double most_mono_loss_db = 3.0;
+constexpr double most_mono_loss_db = 3.1;  // two ears that have nothing in common lose 3.01
 constexpr double most_cents = 0.1;
 constexpr double silence_db = -60.0;
 constexpr double rates_hz[] = {44100.0, 48000.0, 96000.0};
@@ -74,9 +74,11 @@ Tuning tuning_of(Player& player, int step) {
       continue;
     }
     const Pitch pitch = pitch_of(sound, hz);
-    tuning.worst_cents = std::max(tuning.worst_cents, std::fabs(cents(pitch.partial_hz, hz)));
-    const bool is_heard = pitch.level_db > -0.1 || std::fabs(cents(pitch.heard_hz, hz)) < 50.0;
-    tuning.unheard += is_heard ? 0 : 1;
+    if (pitch.level_db > -0.1 || std::fabs(cents(pitch.heard_hz, hz)) < 50.0) {
+      tuning.worst_cents = std::max(tuning.worst_cents, std::fabs(cents(pitch.partial_hz, hz)));
+    } else {
+      ++tuning.unheard;
+    }
   }
   return tuning;
 }

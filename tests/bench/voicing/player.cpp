@@ -38,7 +38,9 @@ Event note_on(int key, int velocity) {
           .value = velocity / 127.0};
 }
 Event note_off(int key) {
-  return {.kind = EventKind::note_off, .index = static_cast<std::uint16_t>(key)};
+  return {.kind = EventKind::note_off,
+          .index = static_cast<std::uint16_t>(key),
+          .value = usual_release_velocity};
 }
 Event turn(int controller, double amount) {
   return {.kind = EventKind::controller,
