@@ -52,7 +52,10 @@ Event press(double amount) {
 }
 
 Player::Player(const std::string& name, double rate_hz)
-    : scene_(scene_of(name)), compiled_(compiled_of(scene_, rate_hz)), rate_hz_(rate_hz) {}
+    : scene_(scene_of(name)),
+      compiled_(compiled_of(scene_, rate_hz)),
+      rate_hz_(rate_hz),
+      blocker_(rate_hz) {}
 
 void Player::reset() {
   std::vector<TimedEvent> events;
@@ -103,6 +106,7 @@ void Player::run(const std::vector<TimedEvent>& events, double seconds, Stereo* 
       now.back().frame = static_cast<std::uint32_t>(frame > at ? frame - at : 0);
     }
     compiled_.engine->process(now, inputs, outputs, block_frames);
+    blocker_.process(outputs, block_frames);
     if (sound != nullptr) {
       for (std::size_t c = 0; c < 2; ++c) {
         const std::vector<double>& from = block[std::min(c, count - 1)];

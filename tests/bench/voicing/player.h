@@ -7,6 +7,7 @@
 
 #include "app/session/loader.h"
 #include "core/compile/compile.h"
+#include "core/engine/mixing/dc_blocker.h"
 #include "tests/bench/voicing/sound.h"
 
 namespace ressort::voicing {
@@ -41,6 +42,7 @@ class Player {
   Scene scene_;
   Compiled compiled_;
   double rate_hz_;
+  DcBlocker blocker_;
 };
 
 }  // namespace ressort::voicing
