@@ -42,7 +42,7 @@ constexpr PresetKey keys[] = {
     {"", "model", "text", "the model's file, `NAME.mdl`, beside the preset or in the folder of the models; needed"},
     {"", "description", "text", "one line for the person who loads it"},
     {"", "voices", "1 to 256 (1)", "how many notes sound at once"},
-    {"", "gain", "0 to 1e9 (1)", "output per unit of position; a forte note should peak at -6 dBFS"},
+    {"", "gain", "0 to 1e9 (1)", "output per unit of position; a forte note should peak near -12 dBFS"},
     {"", "damper_s", "0 to 60 (0)", "T60 of a note once its key is up: in how many seconds a damper takes 60 dB off it; 0 lets it ring out"},
     {"", "noise", "true or false (false)", "the outputs shape white noise instead of being heard themselves"},
     {"", "tuning", "`keyboard` or `fixed` (`keyboard`)", "whether a key sets the pitch, or every key sounds the model as it is written"},
