@@ -165,7 +165,7 @@ expect 2 "at most 64 KiB are read" "$program" check big.toml
 expect 2 "--to" "$program" export PolyTriangle
 expect 2 "--to" "$program" export PolyTriangle --to max
 expect 0 "faust2" "$program" export --help
-expect 0 'hslider("m_K", 0.1, 0.001, 0.2,' "$program" export PolyTriangle --to faust
+expect 0 'hslider("m_K", 0.015, 0.001, 0.2,' "$program" export PolyTriangle --to faust
 model mute.mdl '@m mass 1. 0. 0.\n'
 expect 2 "mute.mdl:1:1: error: the model has no output" "$program" export mute.mdl --to faust
 model plate.mdl '@s string 2000 1. 0.1 0.01 0. 0.\n@out1 posOutput [@s 0.5]\n'

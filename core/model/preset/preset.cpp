@@ -19,7 +19,7 @@ constexpr PresetKey keys[] = {
     {"", "model", "text", "the model's file, `NAME.mdl`, beside the preset or in the folder of the models; needed"},
     {"", "description", "text", "one line for the person who loads it"},
     {"", "voices", "1 to 256 (1)", "how many notes sound at once"},
-    {"", "gain", "0 to 1e9 (1)", "output per unit of position; a forte note should peak at -6 dBFS"},
+    {"", "gain", "0 to 1e9 (1)", "output per unit of position; a forte note should peak near -12 dBFS"},
     {"", "damper_s", "0 to 60 (0)", "T60 of a note once its key is up: in how many seconds a damper takes 60 dB off it; 0 lets it ring out"},
     {"", "noise", "true or false (false)", "the outputs shape white noise instead of being heard themselves"},
     {"", "tuning", "`keyboard` or `fixed` (`keyboard`)", "whether a key sets the pitch, or every key sounds the model as it is written"},
@@ -44,7 +44,7 @@ constexpr PresetKey keys[] = {
     {"control", "curve", "`linear` or `exponential` (`linear`)", "exponential: equal steps are equal ratios"},
     {"control", "travel", "above 0", "of a pluck, which needs it: how far from the string the finger rests, on either side"},
     {"control", "level_db", "[low, high]", "how loud the softest and the loudest are beside `gain`; exact for plucks, bows and blows, whose sound does not depend on how large it is. Without it the level is what `range` makes of it"},
-    {"control", "length_ms", "[longest, shortest] (one sample)", "of an impulse or a swing: how long the softest and the hardest blow last; the shorter, the brighter"},
+    {"control", "length_ms", "[longest, shortest] (one sample)", "of an impulse or a swing: how long the softest and the hardest blow last at the model's own pitch, on higher keys less; the shorter, the brighter"},
     {"control", "keys", "[low, high] ([0, 127])", "of notes: which keys"},
 };
 // clang-format on

@@ -1,0 +1,380 @@
+// What every preset sounds like, in numbers:
+//
+//   ressort_voicing [--keys STEP] [PRESET...]               a row each, ! at what is out of bounds
+//   ressort_voicing --random N [--seed S] [PRESET...]       N random settings of all controls each
+//
+// Without names all presets that there are. STEP is how many keys lie between two whose pitch is
+// measured, from 21 to 108 (12). The table is Markdown. Sound is measured before the limiter.
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <cstdlib>
+#include <map>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include "app/commands/offline.h"
+#include "app/control/registry.h"
+#include "app/session/files.h"
+#include "tests/bench/voicing/player.h"
+#include "tests/bench/voicing/sound.h"
+#include "tests/support/random.h"
+
+namespace ressort::voicing {
+namespace {
+
+// What a player must find.
+constexpr double forte_peak_db = -12.0;
+constexpr double forte_tolerance_db = 2.0;
+constexpr double least_dynamics_db = 20.0;
+constexpr double most_dynamics_db = 30.0;
+constexpr double keyboard_db = 6.0;
+constexpr double loudness_tolerance_db = 1.5;
+constexpr double struck_attack_s = 0.020;
+constexpr double bowed_attack_s = 0.150;
+constexpr double most_release_s = 0.6;
+constexpr double most_offset_db = -60.0;
+constexpr double most_correlation = 0.9;
+constexpr double most_mono_loss_db = 3.1;  // two ears that have nothing in common lose 3.01
+constexpr double most_cents = 0.1;
+constexpr double silence_db = -60.0;
+constexpr double rates_hz[] = {44100.0, 48000.0, 96000.0};
+
+std::string number(double value, int digits, bool is_within) {
+  char text[32];
+  std::snprintf(text, sizeof text, "%.*f%s", digits, value, is_within ? "" : " !");
+  return text;
+}
+
+bool is_bowed(const Preset& preset) {
+  return std::any_of(preset.controls.begin(), preset.controls.end(), [](const auto& control) {
+    return control.source == ControlSource::note && control.gesture == Gesture::bow;
+  });
+}
+
+double wanted_hz(const Player& player, int key) {
+  return 440.0 * std::exp2((key + player.instrument().transpose - 69) / 12.0);
+}
+
+struct Tuning {
+  double worst_cents = 0.0;
+  int unheard = 0;  // keys whose loudest partial, or family of partials, is another
+  int silent = 0;
+};
+
+Tuning tuning_of(Player& player, int step) {
+  Tuning tuning;
+  for (int key = 21; key <= 108; key += step) {
+    const double hz = wanted_hz(player, key);
+    const double longer = std::max(0.5, 30.0 / hz);
+    const Stereo sound = player.play({{0.0, note_on(key, 100)}}, 0.1 + longer).part(0.1, 9.0);
+    if (decibels(peak_of(sound)) < silence_db) {
+      ++tuning.silent;
+      continue;
+    }
+    const Pitch pitch = pitch_of(sound, hz);
+    if (pitch.level_db > -0.1 || std::fabs(cents(pitch.heard_hz, hz)) < 50.0) {
+      tuning.worst_cents = std::max(tuning.worst_cents, std::fabs(cents(pitch.partial_hz, hz)));
+    } else {
+      ++tuning.unheard;
+    }
+  }
+  return tuning;
+}
+
+Stereo phrase(Player& player) {
+  std::vector<TimedEvent> events;
+  const auto lines = parse_score(default_phrase());
+  for (const ScoreLine& line : *lines) {
+    const auto calls = to_events(line.message, player.instrument(), 0);
+    for (const Event& event : *calls) {
+      events.push_back({line.time_s, event});
+    }
+  }
+  return player.play(events, 5.2);
+}
+
+// Any lever half up and fully up, with no key.
+double worst_offset(Player& player) {
+  double worst = offset_of(player.play({{0.0, note_on(60, 127)}}, 2.0).part(1.0, 2.0));
+  for (const ControlSetting& control : player.scene().preset.controls) {
+    if (control.source == ControlSource::controller) {
+      for (const double amount : {64.0 / 127.0, 1.0}) {
+        const Stereo sound = player.play({{0.0, turn(control.number, amount)}}, 2.0);
+        worst = std::max(worst, offset_of(sound.part(1.0, 2.0)));
+      }
+    }
+  }
+  return worst;
+}
+
+struct Row {
+  std::vector<std::string> cells;
+  double lufs = 0.0;
+};
+
+Row measure(const std::string& name, int step) {
+  Player player(name, 48000.0);
+  const bool bowed = is_bowed(player.scene().preset);
+  Row row{.cells = {name}};
+  const auto cell = [&](double value, int digits, bool is_within) {
+    row.cells.push_back(number(value, digits, is_within));
+  };
+  std::map<int, double> peaks_db;
+  std::map<int, double> centroids;
+  double attack = 0.0;
+  for (const int velocity : {20, 64, 100, 127}) {
+    const Stereo sound = player.play({{0.0, note_on(60, velocity)}}, 1.5);
+    peaks_db[velocity] = decibels(peak_of(sound));
+    centroids[velocity] = centroid_hz(sound.part(0.0, bowed ? 1.5 : 0.5));
+    if (velocity == 64) {
+      attack = attack_s(sound, bowed);
+    }
+  }
+  const double dynamics = peaks_db[127] - peaks_db[20];
+  cell(peaks_db[20], 1, dynamics >= least_dynamics_db && dynamics <= most_dynamics_db);
+  cell(peaks_db[64], 1, peaks_db[64] > peaks_db[20]);
+  cell(peaks_db[100], 1,
+       peaks_db[100] > peaks_db[64] &&
+           std::fabs(peaks_db[100] - forte_peak_db) <= forte_tolerance_db);
+  cell(peaks_db[127], 1, peaks_db[127] > peaks_db[100]);
+
+  double least_db = 1e9;
+  double most_db = -1e9;
+  for (int key = 36; key <= 96; key += 6) {
+    const double level = decibels(peak_of(player.play({{0.0, note_on(key, 100)}}, 0.7)));
+    if (level > silence_db) {
+      least_db = std::min(least_db, level);
+      most_db = std::max(most_db, level);
+    }
+  }
+  cell(most_db - least_db, 1, most_db - least_db <= keyboard_db);
+
+  const Stereo played = phrase(player);
+  row.lufs = loudness_lufs(played);
+  cell(row.lufs, 1, true);
+  cell(1000.0 * attack, 0, attack <= (bowed ? bowed_attack_s : struck_attack_s));
+  const double held = t60_s(player.play({{0.0, note_on(60, 100)}}, 9.0));
+  cell(held, 2, true);
+  const double released =
+      t60_s(player.play({{0.0, note_on(60, 100)}, {0.5, note_off(60)}}, 4.0).part(0.52, 4.0));
+  cell(released, 2, released <= most_release_s);
+  for (const int velocity : {20, 64, 127}) {
+    const int before = velocity == 127 ? 64 : 20;
+    cell(centroids[velocity], 0, velocity == 20 || centroids[velocity] > centroids[before]);
+  }
+  const bool is_tuned = player.scene().preset.keyboard && player.instrument().mode;
+  std::string unheard = "-";
+  for (const double rate_hz : rates_hz) {
+    if (!is_tuned) {
+      row.cells.push_back("-");
+      continue;
+    }
+    Player other(name, rate_hz);
+    const Tuning tuning = tuning_of(other, step);
+    cell(tuning.worst_cents, 2, tuning.worst_cents <= most_cents);
+    unheard = std::to_string(tuning.unheard) + "/" + std::to_string(tuning.silent) +
+              (tuning.unheard + tuning.silent > 0 ? " !" : "");
+  }
+  row.cells.push_back(unheard);
+  const double offset_db = decibels(worst_offset(player));
+  cell(offset_db, 0, offset_db <= most_offset_db);
+  cell(correlation_of(played), 2, correlation_of(played) < most_correlation);
+  cell(mono_loss_db(played), 1, mono_loss_db(played) <= most_mono_loss_db);
+  std::vector<TimedEvent> chord;
+  for (const int key : {48, 52, 55, 60, 64, 67, 72, 76, 79, 84}) {
+    chord.push_back({0.0, note_on(key, 127)});
+  }
+  const double chord_db = decibels(peak_of(player.play(chord, 1.5)));
+  cell(chord_db, 1, chord_db < 0.0);
+  const double cost = player.real_time_share(0.5);
+  cell(100.0 * cost / player.instrument().voices, 2, cost < 0.7);
+  return row;
+}
+
+void print(const std::vector<std::string>& cells) {
+  for (const std::string& cell : cells) {
+    std::printf("| %s ", cell.c_str());
+  }
+  std::printf("|\n");
+  std::fflush(stdout);
+}
+
+int print_table(const std::vector<std::string>& names, int step) {
+  const std::vector<std::string> head = {
+      "preset",         "peak 20", "64",          "100",     "127",    "keys dB", "LUFS", "ms",
+      "T60 s",          "let go",  "centroid 20", "64",      "127",    "c 44.1",  "c 48", "c 96",
+      "unheard/silent", "DC dB",   "corr",        "mono dB", "ten dB", "CPU %"};
+  print(head);
+  print(std::vector<std::string>(head.size(), "---"));
+  std::vector<double> loudness;
+  int failures = 0;
+  for (const std::string& name : names) {
+    try {
+      const Row row = measure(name, step);
+      loudness.push_back(row.lufs);
+      failures +=
+          static_cast<int>(std::count_if(row.cells.begin(), row.cells.end(),
+                                         [](const auto& cell) { return cell.ends_with('!'); }));
+      print(row.cells);
+    } catch (const std::runtime_error& error) {
+      std::fprintf(stderr, "%s\n", error.what());
+      ++failures;
+    }
+  }
+  std::sort(loudness.begin(), loudness.end());
+  if (!loudness.empty()) {
+    const double median = loudness[loudness.size() / 2];
+    const auto off = std::count_if(loudness.begin(), loudness.end(), [&](double lufs) {
+      return std::fabs(lufs - median) > loudness_tolerance_db;
+    });
+    std::printf(
+        "\nloudness %.1f to %.1f LUFS, median %.1f, %d presets further than %.1f dB from it; "
+        "%d marks\n",
+        loudness.front(), loudness.back(), median, static_cast<int>(off), loudness_tolerance_db,
+        failures);
+  }
+  return failures;
+}
+
+// How much the second difference at a turn stands out of what is around it.
+double step_at(const Stereo& sound, double time_s) {
+  const auto largest = [&](double from_s, double to_s) {
+    const Stereo piece = sound.part(from_s, to_s);
+    double most = 0.0;
+    for (const std::vector<double>& channel : piece.channels) {
+      for (std::size_t n = 2; n < channel.size(); ++n) {
+        most = std::max(most, std::fabs(channel[n] - 2.0 * channel[n - 1] + channel[n - 2]));
+      }
+    }
+    return most;
+  };
+  const double around =
+      std::max(largest(time_s - 0.06, time_s - 0.001), largest(time_s + 0.006, time_s + 0.06));
+  return std::max(0.0, largest(time_s - 0.001, time_s + 0.005) - around);
+}
+
+int play_randomly(const std::string& name, int count, std::uint64_t seed) {
+  Player player(name, 48000.0);
+  support::Random random(seed);
+  std::map<std::string, int> wrong;
+  double quietest_db = 1e9;
+  double loudest_db = -1e9;
+  const std::vector<ControlSetting>& controls = player.scene().preset.controls;
+  for (int turn_number = 0; turn_number < count; ++turn_number) {
+    constexpr double turn_s = 0.5;
+    std::vector<TimedEvent> before;
+    std::vector<TimedEvent> meanwhile;
+    std::string said;
+    int custom = 0;
+    for (std::size_t row = 0; row < controls.size(); ++row) {
+      const ControlSetting& control = controls[row];
+      const auto event = [&](double amount) {
+        return control.source == ControlSource::controller ? turn(control.number, amount)
+               : control.source == ControlSource::pressure
+                   ? press(amount)
+                   : Event{.kind = EventKind::custom,
+                           .index = static_cast<std::uint16_t>(row),
+                           .value = amount};
+      };
+      if (control.source == ControlSource::controller ||
+          control.source == ControlSource::pressure || control.source == ControlSource::osc) {
+        const double amount = random.uniform(0.0, 1.0);
+        before.push_back({0.0, event(amount)});
+        said += " " +
+                (control.source == ControlSource::controller ? "cc" + std::to_string(control.number)
+                                                             : std::string("pressure")) +
+                "=" + number(amount, 2, true);
+        if (meanwhile.empty() && random.below(controls.size()) == 0) {
+          meanwhile.push_back({turn_s, event(random.uniform(0.0, 1.0))});
+        }
+        ++custom;
+      }
+    }
+    const int key = 36 + static_cast<int>(random.below(61));
+    const int velocity = 20 + static_cast<int>(random.below(108));
+    std::vector<TimedEvent> events = before;
+    events.push_back({0.2, note_on(key, velocity)});
+    events.insert(events.end(), meanwhile.begin(), meanwhile.end());
+    events.push_back({1.0, note_off(key)});
+    const Stereo sound = player.play(events, 3.0);
+    const double peak = peak_of(sound.part(0.2, 3.0));
+    quietest_db = std::min(quietest_db, decibels(peak));
+    loudest_db = std::max(loudest_db, decibels(peak));
+    said += " key " + std::to_string(key) + " velocity " + std::to_string(velocity) + " peak " +
+            number(decibels(peak), 1, true);
+    const auto expect = [&](bool holds, const char* what) {
+      if (!holds && ++wrong[what] <= 3) {
+        std::printf("  %s: %s:%s\n", name.c_str(), what, said.c_str());
+      }
+    };
+    expect(is_finite(sound), "not finite");
+    expect(decibels(peak) <= 0.0, "too loud");
+    expect(decibels(peak) >= -40.0, "too soft");
+    expect(decibels(offset_of(sound.part(2.0, 3.0))) <= most_offset_db, "DC");
+    expect(decibels(peak_of(sound.part(2.8, 3.0)) / std::max(peak, 1e-9)) <= -40.0, "does not end");
+    if (!meanwhile.empty()) {
+      expect(decibels(step_at(sound, turn_s) / std::max(peak, 1e-9)) <= -60.0, "a step");
+    }
+  }
+  std::printf("%s: %d settings, peaks %.1f to %.1f dBFS", name.c_str(), count, quietest_db,
+              loudest_db);
+  int failures = 0;
+  for (const auto& [what, times] : wrong) {
+    std::printf(", %s %d", what.c_str(), times);
+    failures += times;
+  }
+  std::printf("%s\n", failures == 0 ? ", all of it music" : "");
+  std::fflush(stdout);
+  return failures;
+}
+
+int run(int argc, char** argv) {
+  std::vector<std::string> names;
+  int step = 12;
+  int random = 0;
+  std::uint64_t seed = 1;
+  for (int i = 1; i < argc; ++i) {
+    const std::string word = argv[i];
+    if (word.starts_with("--") && i + 1 == argc) {
+      std::fprintf(stderr, "%s needs a number\n", word.c_str());
+      return 2;
+    }
+    if (word == "--keys") {
+      step = std::max(1, std::atoi(argv[++i]));
+    } else if (word == "--random") {
+      random = std::max(1, std::atoi(argv[++i]));
+    } else if (word == "--seed") {
+      seed = std::strtoull(argv[++i], nullptr, 10);
+    } else if (word.starts_with("--")) {
+      std::fprintf(stderr, "unknown option %s\n", word.c_str());
+      return 2;
+    } else {
+      names.push_back(word);
+    }
+  }
+  if (names.empty()) {
+    names = known_presets();
+  }
+  if (random == 0) {
+    return print_table(names, step) == 0 ? 0 : 1;
+  }
+  int failures = 0;
+  for (const std::string& name : names) {
+    try {
+      failures += play_randomly(name, random, seed);
+    } catch (const std::runtime_error& error) {
+      std::fprintf(stderr, "%s\n", error.what());
+      ++failures;
+    }
+  }
+  return failures == 0 ? 0 : 1;
+}
+
+}  // namespace
+}  // namespace ressort::voicing
+
+int main(int argc, char** argv) {
+  return ressort::voicing::run(argc, argv);
+}
