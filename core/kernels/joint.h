@@ -25,8 +25,8 @@ using laws::Slope;
 using laws::Steady;
 
 inline constexpr std::size_t passive_rows = 3;  // of memory for each link, one number a lane
-inline constexpr int free_newtons = 10;         // without looking whether they go too far
-inline constexpr int most_newtons = 32;
+inline constexpr int free_newtons = 10;         // without looking whether they go a little too far
+inline constexpr int most_newtons = 64;
 inline constexpr int most_stiffenings = 24;
 
 namespace {
@@ -72,6 +72,7 @@ class Joint {
     }
     if (any_of(live)) {
       live = go_by_newton(live);
+      move();
     }
     if (any_of(is_first_)) {
       live = live | (is_first_ & makes_energy());
@@ -89,10 +90,15 @@ class Joint {
 
  private:
   static constexpr Scalar<V> share_of_rounding = tiny_share<V>() * 2;
-  // From so near one more step of Newton's is as exact as numbers are, and falls on either side of
-  // the solution; what stopped before would make, or take, a little in every sample.
+  // From so near, each link by its own measure, one more step of Newton's is as exact as numbers
+  // are, and falls on either side of the solution; what stopped before would make, or take, a
+  // little in every sample.
   static constexpr auto nearness =
       static_cast<Scalar<V>>(sizeof(Scalar<V>) == 4 ? 0x1p-14 : 0x1p-34);
+  static constexpr Scalar<V> endless = sizeof(Scalar<V>) == 4 ? Scalar<V>(1e30) : Scalar<V>(1e150);
+
+  // Where a condition does not hold: what is no number fulfils none.
+  static Lanes fails(Lanes holds) { return holds == (V{} != V{}); }
 
   LinkState<V> state_of(std::size_t i) const {
     const Ends ends = links_[i].ends;
@@ -164,6 +170,7 @@ class Joint {
     V error{};
     V scale{};
     V power{};
+    V far{};
     along_ = V{};
     bend_ = V{};
     for (std::size_t i = 0; i < count_; ++i) {
@@ -179,17 +186,20 @@ class Joint {
         link.value = select(is_first_, first.value, link.value);
         link.slope = select(is_first_, positive(first.slope), link.slope);
       }
-      const V off = link.value - link.force;
-      error += absolute(off * link.step);
-      power += (absolute(link.value) + absolute(link.force)) * absolute(link.step);
+      const V off = absolute(link.value - link.force) * absolute(link.step);
+      const V own = (absolute(link.value) + absolute(link.force)) * absolute(link.step);
+      error += off;
+      power += own;
+      far += positive(off - nearness * own);
       scale += (absolute(link.value) + absolute(link.force)) *
                (absolute(link.before) + absolute(link.step));
-      along_ += link.way * off;
+      along_ += link.way * link.value;
       bend_ += link.way * link.way * link.slope;
     }
-    is_lost_ = error > power / 4;
-    is_far_ = error > nearness * power + share_of_rounding * scale;
-    return live & (error > share_of_rounding * scale);
+    along_ += space_.inertia_along(joined_);
+    is_lost_ = fails(error <= power / 4);
+    is_far_ = fails(far <= share_of_rounding * scale);
+    return live & fails((error <= share_of_rounding * scale) & (scale < endless));
   }
 
   // Where that leads astray, as a hard blow's force does in the sample after it: from nothing, one
@@ -219,8 +229,6 @@ class Joint {
   // Gives the lanes that have not arrived.
   Lanes go_by_newton(Lanes live) {
     const V one = V{} + 1;
-    const Lanes none = one != one;
-    const Lanes all = one == one;
     const V steepest = V{} - Scalar<V>(1e30);
     V last = steepest;  // how the objective fell at first along the way
     V share = one;      // of the way that has been gone
@@ -228,11 +236,15 @@ class Joint {
     for (int round = 0; round < most_newtons && any_of(live); ++round) {
       space_.solve(joined_, round > free_newtons);
       // Mostly that does it. If not, as much is taken back of the last way as brings the end of it
-      // near to where the objective is the lowest on it.
-      const auto is_beyond =
-          (along_ > Scalar<V>(-0.5) * last) & (round > free_newtons ? all : none);
-      const V back = along_ / (inertia + bend_);
-      const V most = Scalar<V>(0.9) * share;
+      // near to where the objective is the lowest on it: by Newton, or as far as where what rises
+      // with the fourth power of the way would be.
+      const Scalar<V> most_rise = round > free_newtons ? Scalar<V>(0.5) : Scalar<V>(16);
+      const auto is_beyond = fails(along_ <= V{} - most_rise * last);
+      const V rise = select(along_ > V{} - last, along_, V{} - last);
+      const V far = one - square_root(square_root((V{} - last) / rise));
+      const V most = Scalar<V>(0.9999) * share;
+      V back = along_ / (inertia + bend_);
+      back = select(back > far * share, back, far * share);
       const V go = select(is_beyond, V{} - select(back < most, back, most), one);
       auto moves = V{} != V{};
       V falls{};
@@ -241,14 +253,17 @@ class Joint {
         Joined<V>& link = joined_[i];
         link.way = select(is_beyond, link.way, link.newton_way);
         link.push = select(is_beyond, link.push, link.newton_push);
-        falls += link.way * (link.value - link.force);
+        falls += link.way * link.value;
         bends += link.way * link.way * link.slope;
         moves = moves | go_on(link, live, go);
       }
+      space_.turn(is_beyond);
+      falls += space_.inertia_along(joined_);
       last = select(is_beyond, last, falls);
       share = select(is_beyond, share + go, one);
       inertia = select(is_beyond, inertia, V{} - falls - bends);
-      move();
+      space_.go(joined_, select(live, go, V{}));
+      find_steps();
       live = live & is_far_ & (moves | is_beyond);
       if (any_of(live)) {
         live = evaluate(live);
@@ -265,14 +280,12 @@ class Joint {
 
   // Where it went so far that numbers end: from nothing once more. Gives those lanes.
   Lanes forget_what_is_lost() {
-    constexpr Scalar<V> endless = sizeof(Scalar<V>) == 4 ? Scalar<V>(1e30) : Scalar<V>(1e150);
-    const Lanes all = V{} == V{};
-    Lanes is_sane = all;
+    Lanes is_sane = V{} == V{};
     for (std::size_t i = 0; i < count_; ++i) {
       is_sane =
           is_sane & (absolute(joined_[i].force) < endless) & (absolute(joined_[i].step) < endless);
     }
-    const Lanes lost = is_sane == (V{} != V{});
+    const Lanes lost = fails(is_sane);
     if (any_of(lost)) {
       for (std::size_t i = 0; i < count_; ++i) {
         joined_[i].force = select(lost, V{}, joined_[i].force);
@@ -338,7 +351,7 @@ class Joint {
       scale += (absolute(at) + absolute(value) + absolute(link.force)) *
                (absolute(link.before) + absolute(link.step));
     }
-    return made > share_of_rounding * scale;
+    return fails((made <= share_of_rounding * scale) & (scale < endless));
   }
 
   const PassiveLink* links_;
