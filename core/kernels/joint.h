@@ -67,25 +67,28 @@ class Joint {
   void solve() {
     set_out();
     Lanes live = evaluate(V{} == V{});
-    if (any_of(live & is_lost_)) {
-      set_out_again(live & is_lost_);
+    const Lanes lost = live & is_lost_;
+    if (any_of(lost)) {
+      set_out_again(lost);
+      evaluate(lost);
+      is_far_ = is_far_ | lost;  // though what does not move makes no energy
     }
     if (any_of(live)) {
       live = go_by_newton(live);
-      move();
     }
     if (any_of(is_first_)) {
       live = live | (is_first_ & makes_energy());
     }
-    live = live | forget_what_is_lost();
+    if (any_of(live & is_lost_)) {
+      set_out_again(live & is_lost_);
+    }
     if (any_of(live)) {
       stiffen(live);
     }
     for (std::size_t i = 0; i < count_; ++i) {
-      const V force = joined_[i].force;
-      memory_[i * passive_rows + 2] = force - joined_[i].steady;
-      body_.push(links_[i].ends, force);
+      memory_[i * passive_rows + 2] = joined_[i].force - joined_[i].steady;
     }
+    space_.push(joined_, body_);
   }
 
  private:
@@ -131,7 +134,7 @@ class Joint {
       link.damping = select(is_first_, V{}, positive(steady.damping));
       link.force = V{};
     }
-    space_.rest();
+    space_.rest(V{} == V{});
     for (std::size_t i = 0; i < count_; ++i) {
       if (facts_of(links_[i].law).is_convex) {
         exert(i, select(is_first_, V{}, joined_[i].steady + memory_[i * passive_rows + 2]));
@@ -202,27 +205,42 @@ class Joint {
     return live & fails((error <= share_of_rounding * scale) & (scale < endless));
   }
 
-  // Where that leads astray, as a hard blow's force does in the sample after it: from nothing, one
-  // link after the other doing what it would alone, which leads downhill at every step.
+  // Where that leads astray, as a hard blow's force does in the sample after it: from where hardly
+  // anything moves, every link being held alike. What they exert there is not so large that nothing
+  // would be left of the masses beside it.
   void set_out_again(Lanes lost) {
-    space_.rest();
+    constexpr auto hold = static_cast<Scalar<V>>(sizeof(Scalar<V>) == 4 ? 0x1p10 : 0x1p24);
     for (std::size_t i = 0; i < count_; ++i) {
-      const V force = select(is_first_, V{}, alone(i));
-      joined_[i].force = select(lost, force, joined_[i].force);
-      space_.pull(i, force);
+      Joined<V>& link = joined_[i];
+      link.force = select(lost, V{}, link.force);
     }
-    move();
-    evaluate(lost);
+    move(lost);
+    for (std::size_t i = 0; i < count_; ++i) {
+      Joined<V>& link = joined_[i];
+      link.slope = hold * stiffness_to_hold(i);
+      link.value = link.slope * link.step;
+    }
+    go_at_once(lost);
+  }
+  // That of a link which gives way by what its ends do.
+  V stiffness_to_hold(std::size_t i) const {
+    const V give = body_.gamma(links_[i].ends);
+    return 1 / select(give > V{}, give, V{} + 1);
+  }
+  // To where links are that exert `value` and `slope` more for all of the way.
+  void go_at_once(Lanes live) {
+    space_.solve(joined_, true);
+    for (std::size_t i = 0; i < count_; ++i) {
+      joined_[i].way = joined_[i].newton_way;
+      joined_[i].push = joined_[i].newton_push;
+      go_on(joined_[i], live, V{} + 1);
+    }
+    move(live);
   }
 
-  // Everything to where the forces bring it: not by what they change, lest rounding adds up.
-  void move() {
-    space_.rest();
-    for (std::size_t i = 0; i < count_; ++i) {
-      if (any_of(joined_[i].force != V{})) {
-        space_.pull(i, joined_[i].force);
-      }
-    }
+  // To where the forces bring it: not by what they change, lest rounding adds up.
+  void move(Lanes live) {
+    space_.follow(joined_, live);
     find_steps();
   }
 
@@ -234,7 +252,6 @@ class Joint {
     V share = one;      // of the way that has been gone
     V inertia{};        // how the objective bends along the way, but for the laws
     for (int round = 0; round < most_newtons && any_of(live); ++round) {
-      space_.solve(joined_, round > free_newtons);
       // Mostly that does it. If not, as much is taken back of the last way as brings the end of it
       // near to where the objective is the lowest on it: by Newton, or as far as where what rises
       // with the fourth power of the way would be.
@@ -246,6 +263,9 @@ class Joint {
       V back = along_ / (inertia + bend_);
       back = select(back > far * share, back, far * share);
       const V go = select(is_beyond, V{} - select(back < most, back, most), one);
+      if (any_of(live & fails(is_beyond))) {
+        space_.solve(joined_, round > free_newtons);
+      }
       auto moves = V{} != V{};
       V falls{};
       V bends{};
@@ -262,7 +282,7 @@ class Joint {
       last = select(is_beyond, last, falls);
       share = select(is_beyond, share + go, one);
       inertia = select(is_beyond, inertia, V{} - falls - bends);
-      space_.go(joined_, select(live, go, V{}));
+      space_.go(joined_, live, go);
       find_steps();
       live = live & is_far_ & (moves | is_beyond);
       if (any_of(live)) {
@@ -276,23 +296,6 @@ class Joint {
   Lanes go_on(Joined<V>& link, Lanes live, V share) {
     link.force = select(live, link.force + share * link.push, link.force);
     return absolute(link.way) > tiny_share<V>() / 2 * (absolute(link.before) + absolute(link.step));
-  }
-
-  // Where it went so far that numbers end: from nothing once more. Gives those lanes.
-  Lanes forget_what_is_lost() {
-    Lanes is_sane = V{} == V{};
-    for (std::size_t i = 0; i < count_; ++i) {
-      is_sane =
-          is_sane & (absolute(joined_[i].force) < endless) & (absolute(joined_[i].step) < endless);
-    }
-    const Lanes lost = fails(is_sane);
-    if (any_of(lost)) {
-      for (std::size_t i = 0; i < count_; ++i) {
-        joined_[i].force = select(lost, V{}, joined_[i].force);
-      }
-      move();
-    }
-    return lost;
   }
 
   // Every link then exerts what it would where it was, in proportion to its step what brought it to
@@ -309,19 +312,12 @@ class Joint {
         const V rest = exerted(i, V{});
         const V wide = select(link.step == V{}, V{} + 1, link.step);
         const V secant = positive((exerted(i, link.step) - rest) / wide);
-        const V give = body_.gamma(links_[i].ends);
-        const V held = hold / select(give > V{}, give, V{} + 1);
+        const V held = hold * stiffness_to_hold(i);
         link.slope = select(is_first_, held, secant + held);
         link.value = select(is_first_, memory_[i * passive_rows + 2] + held * from_start(link),
                             rest + link.slope * link.step);
       }
-      space_.solve(joined_, true);
-      for (std::size_t i = 0; i < count_; ++i) {
-        joined_[i].way = joined_[i].newton_way;
-        joined_[i].push = joined_[i].newton_push;
-        go_on(joined_[i], live, V{} + 1);
-      }
-      move();
+      go_at_once(live);
       live = live & makes_energy();
     }
   }
@@ -378,13 +374,15 @@ template <class V, class Body>
   const PassiveLink* const first = links.data() + cluster.first;
   auto* const joined = reinterpret_cast<Joined<V>*>(numbers);
   V* const rest = numbers + joint_numbers * cluster.count;
-  if (cluster.inverse_mass.empty()) {
-    ByLinks<V, Body> space(first, cluster, rest, body);
-    Joint<V, Body, ByLinks<V, Body>>(first, cluster.count, memory, joined, space, body).solve();
-  } else {
-    ByMasses<V> space(first, cluster, rest, body);
-    Joint<V, Body, ByMasses<V>>(first, cluster.count, memory, joined, space, body).solve();
+  if constexpr (requires { body.shift(0u, V{}); }) {
+    if (!cluster.inverse_mass.empty()) {
+      ByMasses<V> space(first, cluster, rest, body);
+      Joint<V, Body, ByMasses<V>>(first, cluster.count, memory, joined, space, body).solve();
+      return;
+    }
   }
+  ByLinks<V, Body> space(first, cluster, rest, body);
+  Joint<V, Body, ByLinks<V, Body>>(first, cluster.count, memory, joined, space, body).solve();
 }
 
 }  // namespace ressort

@@ -74,7 +74,12 @@ class ByMasses {
   }
 
   // From here on, what forces do to the ways of all links.
-  void rest() { std::fill_n(at_, count_, V{}); }
+  template <class Lanes>
+  void rest(Lanes live) {
+    for (std::size_t i = 0; i < count_; ++i) {
+      at_[i] = select(live, V{}, at_[i]);
+    }
+  }
   void pull(std::size_t link, V force) {
     const auto [a, b] = ends(link);
     if (a != no_mass) {
@@ -110,9 +115,34 @@ class ByMasses {
       way_[i] = select(keeps, way_[i], x_[i]);
     }
   }
-  void go(const Joined<V>*, V share) {
+  template <class Lanes>
+  void go(const Joined<V>*, Lanes live, V share) {
     for (std::size_t i = 0; i < count_; ++i) {
-      at_[i] += share * way_[i];
+      at_[i] = select(live, at_[i] + share * way_[i], at_[i]);
+    }
+  }
+  // To where their forces bring them.
+  template <class Lanes>
+  void follow(const Joined<V>* joined, Lanes live) {
+    rest(live);
+    for (std::size_t i = 0; i < cluster_.count; ++i) {
+      pull(i, select(live, joined[i].force, V{}));
+    }
+  }
+  // Each mass by all that it has moved, as links that are much harder than it is heavy push it to
+  // and fro. Only once.
+  template <class Body>
+  void push(const Joined<V>* joined, Body& body) {
+    const auto shift = [&](std::uint32_t node, std::uint32_t mass) {
+      if (mass != no_mass) {
+        body.shift(node, at_[mass]);
+        at_[mass] = V{};
+      }
+    };
+    for (std::size_t i = 0; i < cluster_.count; ++i) {
+      shift(links_[i].ends.a, links_[i].mass_a);
+      shift(links_[i].ends.b, links_[i].mass_b);
+      body.feel(links_[i].ends, joined[i].force);
     }
   }
   // How 1/2 |u|^2_M rises along the way.
@@ -276,7 +306,7 @@ class ByMasses {
 template <class V, class Body>
 class ByLinks {
  public:
-  ByLinks(const PassiveLink* links, const Cluster& cluster, V* numbers, const Body& body)
+  ByLinks(const PassiveLink* links, const Cluster& cluster, V* numbers, Body& body)
       : links_(links),
         count_(cluster.count),
         coupling_(numbers),
@@ -287,7 +317,12 @@ class ByLinks {
         index_(reinterpret_cast<std::size_t*>(pulled_ + count_)),
         body_(body) {}
 
-  void rest() { std::fill_n(pulled_, count_, V{}); }
+  template <class Lanes>
+  void rest(Lanes live) {
+    for (std::size_t i = 0; i < count_; ++i) {
+      pulled_[i] = select(live, V{}, pulled_[i]);
+    }
+  }
   void pull(std::size_t link, V force) {
     const V* const row = couple(find(link));
     for (std::size_t i = 0; i < count_; ++i) {
@@ -325,12 +360,23 @@ class ByLinks {
   template <class Lanes>
   void turn(Lanes) {}
   // Not by what the forces change, lest rounding adds up.
-  void go(const Joined<V>* joined, V) {
-    rest();
+  template <class Lanes>
+  void go(const Joined<V>* joined, Lanes live, V) {
+    follow(joined, live);
+  }
+  template <class Lanes>
+  void follow(const Joined<V>* joined, Lanes live) {
+    rest(live);
     for (std::size_t i = 0; i < count_; ++i) {
-      if (any_of(joined[i].force != V{})) {
-        pull(i, joined[i].force);
+      const V force = select(live, joined[i].force, V{});
+      if (any_of(force != V{})) {
+        pull(i, force);
       }
+    }
+  }
+  void push(const Joined<V>* joined, Body& body) {
+    for (std::size_t i = 0; i < count_; ++i) {
+      body.push(links_[i].ends, joined[i].force);
     }
   }
   V inertia_along(const Joined<V>* joined) const {
@@ -422,7 +468,7 @@ class ByLinks {
   V* x_;
   V* pulled_;
   std::size_t* index_;  // [active] link
-  const Body& body_;
+  Body& body_;
 };
 
 }  // namespace
