@@ -69,18 +69,24 @@ class Joint {
     Lanes live = evaluate(V{} == V{});
     const Lanes lost = live & is_lost_;
     if (any_of(lost)) {
-      set_out_again(lost);
+      set_out_one_by_one(lost);
       evaluate(lost);
-      is_far_ = is_far_ | lost;  // though what does not move makes no energy
     }
     if (any_of(live)) {
       live = go_by_newton(live);
+    }
+    const Lanes astray = live & fails(is_first_);
+    if (any_of(astray)) {
+      set_out_from_rest(astray);
+      evaluate(astray);
+      is_far_ = is_far_ | astray;  // though what does not move makes no energy
+      live = (live & is_first_) | go_by_newton(astray);
     }
     if (any_of(is_first_)) {
       live = live | (is_first_ & makes_energy());
     }
     if (any_of(live & is_lost_)) {
-      set_out_again(live & is_lost_);
+      set_out_from_rest(live & is_lost_);
     }
     if (any_of(live)) {
       stiffen(live);
@@ -133,6 +139,7 @@ class Joint {
       link.steady = select(is_first_, V{}, steady.force);
       link.damping = select(is_first_, V{}, positive(steady.damping));
       link.force = V{};
+      link.way = V{};
     }
     space_.rest(V{} == V{});
     for (std::size_t i = 0; i < count_; ++i) {
@@ -205,10 +212,22 @@ class Joint {
     return live & fails((error <= share_of_rounding * scale) & (scale < endless));
   }
 
-  // Where that leads astray, as a hard blow's force does in the sample after it: from where hardly
+  // Where that leads astray, as a hard blow's force does in the sample after it: from nothing, one
+  // link after the other doing what it would alone, which leads downhill at every step.
+  void set_out_one_by_one(Lanes lost) {
+    space_.rest(lost);
+    for (std::size_t i = 0; i < count_; ++i) {
+      const V force = select(lost & fails(is_first_), alone(i), V{});
+      joined_[i].force = select(lost, force, joined_[i].force);
+      space_.pull(i, force);
+    }
+    find_steps();
+  }
+
+  // Where no way leads on from there, as after a blow that is too hard: from where hardly
   // anything moves, every link being held alike. What they exert there is not so large that nothing
   // would be left of the masses beside it.
-  void set_out_again(Lanes lost) {
+  void set_out_from_rest(Lanes lost) {
     constexpr auto hold = static_cast<Scalar<V>>(sizeof(Scalar<V>) == 4 ? 0x1p10 : 0x1p24);
     for (std::size_t i = 0; i < count_; ++i) {
       Joined<V>& link = joined_[i];
