@@ -294,10 +294,12 @@ class Joint {
         link.push = select(is_beyond, link.push, link.newton_push);
         falls += link.way * link.value;
         bends += link.way * link.way * link.slope;
-        moves = moves | go_on(link, live, go);
       }
       space_.turn(is_beyond);
       falls += space_.inertia_along(joined_);
+      for (std::size_t i = 0; i < count_; ++i) {
+        moves = moves | go_on(joined_[i], live, go);
+      }
       last = select(is_beyond, last, falls);
       share = select(is_beyond, share + go, one);
       inertia = select(is_beyond, inertia, V{} - falls - bends);
