@@ -193,7 +193,7 @@ void find_elimination(const Program& program, std::vector<PassiveLink>& links, C
 std::size_t Cluster::numbers() const {
   const std::size_t own = joint_numbers * count;
   return inverse_mass.empty() ? own + 2 * count * count + 5 * count
-                              : own + 7 * inverse_mass.size() + elimination.row.size();
+                              : own + 9 * inverse_mass.size() + elimination.row.size();
 }
 
 bool holds_places(const Program& program) {

@@ -25,8 +25,8 @@ using laws::Slope;
 using laws::Steady;
 
 inline constexpr std::size_t passive_rows = 3;  // of memory for each link, one number a lane
-inline constexpr int free_newtons = 10;         // without looking whether they go too far
-inline constexpr int most_newtons = 32;
+inline constexpr int free_newtons = 10;         // without looking whether they go a little too far
+inline constexpr int most_newtons = 64;
 inline constexpr int most_stiffenings = 24;
 
 namespace {
@@ -67,32 +67,47 @@ class Joint {
   void solve() {
     set_out();
     Lanes live = evaluate(V{} == V{});
-    if (any_of(live & is_lost_)) {
-      set_out_again(live & is_lost_);
+    const Lanes lost = live & is_lost_;
+    if (any_of(lost)) {
+      set_out_one_by_one(lost);
+      evaluate(lost);
     }
     if (any_of(live)) {
       live = go_by_newton(live);
     }
+    const Lanes astray = live & fails(is_first_);
+    if (any_of(astray)) {
+      set_out_from_rest(astray);
+      evaluate(astray);
+      is_far_ = is_far_ | astray;  // though what does not move makes no energy
+      live = (live & is_first_) | go_by_newton(astray);
+    }
     if (any_of(is_first_)) {
       live = live | (is_first_ & makes_energy());
     }
-    live = live | forget_what_is_lost();
+    if (any_of(live & is_lost_)) {
+      set_out_from_rest(live & is_lost_);
+    }
     if (any_of(live)) {
       stiffen(live);
     }
     for (std::size_t i = 0; i < count_; ++i) {
-      const V force = joined_[i].force;
-      memory_[i * passive_rows + 2] = force - joined_[i].steady;
-      body_.push(links_[i].ends, force);
+      memory_[i * passive_rows + 2] = joined_[i].force - joined_[i].steady;
     }
+    space_.push(joined_, body_);
   }
 
  private:
   static constexpr Scalar<V> share_of_rounding = tiny_share<V>() * 2;
-  // From so near one more step of Newton's is as exact as numbers are, and falls on either side of
-  // the solution; what stopped before would make, or take, a little in every sample.
+  // From so near, each link by its own measure, one more step of Newton's is as exact as numbers
+  // are, and falls on either side of the solution; what stopped before would make, or take, a
+  // little in every sample.
   static constexpr auto nearness =
       static_cast<Scalar<V>>(sizeof(Scalar<V>) == 4 ? 0x1p-14 : 0x1p-34);
+  static constexpr Scalar<V> endless = sizeof(Scalar<V>) == 4 ? Scalar<V>(1e30) : Scalar<V>(1e150);
+
+  // Where a condition does not hold: what is no number fulfils none.
+  static Lanes fails(Lanes holds) { return holds == (V{} != V{}); }
 
   LinkState<V> state_of(std::size_t i) const {
     const Ends ends = links_[i].ends;
@@ -124,8 +139,9 @@ class Joint {
       link.steady = select(is_first_, V{}, steady.force);
       link.damping = select(is_first_, V{}, positive(steady.damping));
       link.force = V{};
+      link.way = V{};
     }
-    space_.rest();
+    space_.rest(V{} == V{});
     for (std::size_t i = 0; i < count_; ++i) {
       if (facts_of(links_[i].law).is_convex) {
         exert(i, select(is_first_, V{}, joined_[i].steady + memory_[i * passive_rows + 2]));
@@ -164,6 +180,7 @@ class Joint {
     V error{};
     V scale{};
     V power{};
+    V far{};
     along_ = V{};
     bend_ = V{};
     for (std::size_t i = 0; i < count_; ++i) {
@@ -179,61 +196,95 @@ class Joint {
         link.value = select(is_first_, first.value, link.value);
         link.slope = select(is_first_, positive(first.slope), link.slope);
       }
-      const V off = link.value - link.force;
-      error += absolute(off * link.step);
-      power += (absolute(link.value) + absolute(link.force)) * absolute(link.step);
+      const V off = absolute(link.value - link.force) * absolute(link.step);
+      const V own = (absolute(link.value) + absolute(link.force)) * absolute(link.step);
+      error += off;
+      power += own;
+      far += positive(off - nearness * own);
       scale += (absolute(link.value) + absolute(link.force)) *
                (absolute(link.before) + absolute(link.step));
-      along_ += link.way * off;
+      along_ += link.way * link.value;
       bend_ += link.way * link.way * link.slope;
     }
-    is_lost_ = error > power / 4;
-    is_far_ = error > nearness * power + share_of_rounding * scale;
-    return live & (error > share_of_rounding * scale);
+    along_ += space_.inertia_along(joined_);
+    is_lost_ = fails(error <= power / 4);
+    is_far_ = fails(far <= share_of_rounding * scale);
+    return live & fails((error <= share_of_rounding * scale) & (scale < endless));
   }
 
   // Where that leads astray, as a hard blow's force does in the sample after it: from nothing, one
   // link after the other doing what it would alone, which leads downhill at every step.
-  void set_out_again(Lanes lost) {
-    space_.rest();
+  void set_out_one_by_one(Lanes lost) {
+    space_.rest(lost);
     for (std::size_t i = 0; i < count_; ++i) {
-      const V force = select(is_first_, V{}, alone(i));
+      const V force = select(lost & fails(is_first_), alone(i), V{});
       joined_[i].force = select(lost, force, joined_[i].force);
       space_.pull(i, force);
     }
-    move();
-    evaluate(lost);
+    find_steps();
   }
 
-  // Everything to where the forces bring it: not by what they change, lest rounding adds up.
-  void move() {
-    space_.rest();
+  // Where no way leads on from there, as after a blow that is too hard: from where hardly
+  // anything moves, every link being held alike. What they exert there is not so large that nothing
+  // would be left of the masses beside it.
+  void set_out_from_rest(Lanes lost) {
+    constexpr auto hold = static_cast<Scalar<V>>(sizeof(Scalar<V>) == 4 ? 0x1p10 : 0x1p24);
     for (std::size_t i = 0; i < count_; ++i) {
-      if (any_of(joined_[i].force != V{})) {
-        space_.pull(i, joined_[i].force);
-      }
+      Joined<V>& link = joined_[i];
+      link.force = select(lost, V{}, link.force);
     }
+    move(lost);
+    for (std::size_t i = 0; i < count_; ++i) {
+      Joined<V>& link = joined_[i];
+      link.slope = hold * stiffness_to_hold(i);
+      link.value = link.slope * link.step;
+    }
+    go_at_once(lost);
+  }
+  // That of a link which gives way by what its ends do.
+  V stiffness_to_hold(std::size_t i) const {
+    const V give = body_.gamma(links_[i].ends);
+    return 1 / select(give > V{}, give, V{} + 1);
+  }
+  // To where links are that exert `value` and `slope` more for all of the way.
+  void go_at_once(Lanes live) {
+    space_.solve(joined_, true);
+    for (std::size_t i = 0; i < count_; ++i) {
+      joined_[i].way = joined_[i].newton_way;
+      joined_[i].push = joined_[i].newton_push;
+      go_on(joined_[i], live, V{} + 1);
+    }
+    move(live);
+  }
+
+  // To where the forces bring it: not by what they change, lest rounding adds up.
+  void move(Lanes live) {
+    space_.follow(joined_, live);
     find_steps();
   }
 
   // Gives the lanes that have not arrived.
   Lanes go_by_newton(Lanes live) {
     const V one = V{} + 1;
-    const Lanes none = one != one;
-    const Lanes all = one == one;
     const V steepest = V{} - Scalar<V>(1e30);
     V last = steepest;  // how the objective fell at first along the way
     V share = one;      // of the way that has been gone
     V inertia{};        // how the objective bends along the way, but for the laws
     for (int round = 0; round < most_newtons && any_of(live); ++round) {
-      space_.solve(joined_, round > free_newtons);
       // Mostly that does it. If not, as much is taken back of the last way as brings the end of it
-      // near to where the objective is the lowest on it.
-      const auto is_beyond =
-          (along_ > Scalar<V>(-0.5) * last) & (round > free_newtons ? all : none);
-      const V back = along_ / (inertia + bend_);
-      const V most = Scalar<V>(0.9) * share;
+      // near to where the objective is the lowest on it: by Newton, or as far as where what rises
+      // with the fourth power of the way would be.
+      const Scalar<V> most_rise = round > free_newtons ? Scalar<V>(0.5) : Scalar<V>(16);
+      const auto is_beyond = fails(along_ <= V{} - most_rise * last);
+      const V rise = select(along_ > V{} - last, along_, V{} - last);
+      const V far = one - square_root(square_root((V{} - last) / rise));
+      const V most = Scalar<V>(0.9999) * share;
+      V back = along_ / (inertia + bend_);
+      back = select(back > far * share, back, far * share);
       const V go = select(is_beyond, V{} - select(back < most, back, most), one);
+      if (any_of(live & fails(is_beyond))) {
+        space_.solve(joined_, round > free_newtons);
+      }
       auto moves = V{} != V{};
       V falls{};
       V bends{};
@@ -241,14 +292,19 @@ class Joint {
         Joined<V>& link = joined_[i];
         link.way = select(is_beyond, link.way, link.newton_way);
         link.push = select(is_beyond, link.push, link.newton_push);
-        falls += link.way * (link.value - link.force);
+        falls += link.way * link.value;
         bends += link.way * link.way * link.slope;
-        moves = moves | go_on(link, live, go);
+      }
+      space_.turn(is_beyond);
+      falls += space_.inertia_along(joined_);
+      for (std::size_t i = 0; i < count_; ++i) {
+        moves = moves | go_on(joined_[i], live, go);
       }
       last = select(is_beyond, last, falls);
       share = select(is_beyond, share + go, one);
       inertia = select(is_beyond, inertia, V{} - falls - bends);
-      move();
+      space_.go(joined_, live, go);
+      find_steps();
       live = live & is_far_ & (moves | is_beyond);
       if (any_of(live)) {
         live = evaluate(live);
@@ -261,25 +317,6 @@ class Joint {
   Lanes go_on(Joined<V>& link, Lanes live, V share) {
     link.force = select(live, link.force + share * link.push, link.force);
     return absolute(link.way) > tiny_share<V>() / 2 * (absolute(link.before) + absolute(link.step));
-  }
-
-  // Where it went so far that numbers end: from nothing once more. Gives those lanes.
-  Lanes forget_what_is_lost() {
-    constexpr Scalar<V> endless = sizeof(Scalar<V>) == 4 ? Scalar<V>(1e30) : Scalar<V>(1e150);
-    const Lanes all = V{} == V{};
-    Lanes is_sane = all;
-    for (std::size_t i = 0; i < count_; ++i) {
-      is_sane =
-          is_sane & (absolute(joined_[i].force) < endless) & (absolute(joined_[i].step) < endless);
-    }
-    const Lanes lost = is_sane == (V{} != V{});
-    if (any_of(lost)) {
-      for (std::size_t i = 0; i < count_; ++i) {
-        joined_[i].force = select(lost, V{}, joined_[i].force);
-      }
-      move();
-    }
-    return lost;
   }
 
   // Every link then exerts what it would where it was, in proportion to its step what brought it to
@@ -296,19 +333,12 @@ class Joint {
         const V rest = exerted(i, V{});
         const V wide = select(link.step == V{}, V{} + 1, link.step);
         const V secant = positive((exerted(i, link.step) - rest) / wide);
-        const V give = body_.gamma(links_[i].ends);
-        const V held = hold / select(give > V{}, give, V{} + 1);
+        const V held = hold * stiffness_to_hold(i);
         link.slope = select(is_first_, held, secant + held);
         link.value = select(is_first_, memory_[i * passive_rows + 2] + held * from_start(link),
                             rest + link.slope * link.step);
       }
-      space_.solve(joined_, true);
-      for (std::size_t i = 0; i < count_; ++i) {
-        joined_[i].way = joined_[i].newton_way;
-        joined_[i].push = joined_[i].newton_push;
-        go_on(joined_[i], live, V{} + 1);
-      }
-      move();
+      go_at_once(live);
       live = live & makes_energy();
     }
   }
@@ -338,7 +368,7 @@ class Joint {
       scale += (absolute(at) + absolute(value) + absolute(link.force)) *
                (absolute(link.before) + absolute(link.step));
     }
-    return made > share_of_rounding * scale;
+    return fails((made <= share_of_rounding * scale) & (scale < endless));
   }
 
   const PassiveLink* links_;
@@ -365,13 +395,15 @@ template <class V, class Body>
   const PassiveLink* const first = links.data() + cluster.first;
   auto* const joined = reinterpret_cast<Joined<V>*>(numbers);
   V* const rest = numbers + joint_numbers * cluster.count;
-  if (cluster.inverse_mass.empty()) {
-    ByLinks<V, Body> space(first, cluster, rest, body);
-    Joint<V, Body, ByLinks<V, Body>>(first, cluster.count, memory, joined, space, body).solve();
-  } else {
-    ByMasses<V> space(first, cluster, rest, body);
-    Joint<V, Body, ByMasses<V>>(first, cluster.count, memory, joined, space, body).solve();
+  if constexpr (requires { body.shift(0u, V{}); }) {
+    if (!cluster.inverse_mass.empty()) {
+      ByMasses<V> space(first, cluster, rest, body);
+      Joint<V, Body, ByMasses<V>>(first, cluster.count, memory, joined, space, body).solve();
+      return;
+    }
   }
+  ByLinks<V, Body> space(first, cluster, rest, body);
+  Joint<V, Body, ByLinks<V, Body>>(first, cluster.count, memory, joined, space, body).solve();
 }
 
 }  // namespace ressort

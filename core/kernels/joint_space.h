@@ -59,34 +59,40 @@ class ByMasses {
         count_(cluster.inverse_mass.size()),
         give_(numbers),
         mass_(give_ + count_),
-        x_(mass_ + count_),
+        at_(mass_ + count_),
+        way_(at_ + count_),
+        x_(way_ + count_),
         matrix_(x_ + count_) {
     constexpr Scalar<V> least = Scalar<V>(1e-30);
     for (std::size_t i = 0; i < count_; ++i) {
       const V give = body.coefficient(cluster.inverse_mass[i]);
       give_[i] = select(give > least, give, V{} + least);
       mass_[i] = 1 / give_[i];
-      x_[i] = V{};
+      at_[i] = V{};
+      way_[i] = V{};
     }
   }
 
   // From here on, what forces do to the ways of all links.
-  void rest() { std::fill_n(x_, count_, V{}); }
+  template <class Lanes>
+  void rest(Lanes live) {
+    for (std::size_t i = 0; i < count_; ++i) {
+      at_[i] = select(live, V{}, at_[i]);
+    }
+  }
   void pull(std::size_t link, V force) {
     const auto [a, b] = ends(link);
     if (a != no_mass) {
-      x_[a] -= give_[a] * force;
+      at_[a] -= give_[a] * force;
     }
     if (b != no_mass) {
-      x_[b] += give_[b] * force;
+      at_[b] += give_[b] * force;
     }
   }
-  V pulled(std::size_t link) const {
-    const auto [a, b] = ends(link);
-    return (a == no_mass ? V{} : x_[a]) - (b == no_mass ? V{} : x_[b]);
-  }
+  V pulled(std::size_t link) const { return between(at_, link); }
 
-  // Newton's way from forces that are `value - force` off.
+  // Newton's way from where the masses are, which may be where forces are so large that nothing is
+  // left of what they add up to.
   void solve(Joined<V>* joined, bool is_exact) {
     if (cluster_.has_factor() && (is_exact || !cluster_.is_large())) {
       fill(joined);
@@ -97,19 +103,69 @@ class ByMasses {
     }
     for (std::size_t i = 0; i < cluster_.count; ++i) {
       Joined<V>& link = joined[i];
-      link.newton_way = pulled(i);
+      link.newton_way = between(x_, i);
       link.newton_push = link.value - link.force + link.slope * link.newton_way;
     }
   }
 
+  // That is the way from now on, but for lanes that keep theirs.
+  template <class Lanes>
+  void turn(Lanes keeps) {
+    for (std::size_t i = 0; i < count_; ++i) {
+      way_[i] = select(keeps, way_[i], x_[i]);
+    }
+  }
+  template <class Lanes>
+  void go(const Joined<V>*, Lanes live, V share) {
+    for (std::size_t i = 0; i < count_; ++i) {
+      at_[i] = select(live, at_[i] + share * way_[i], at_[i]);
+    }
+  }
+  // To where their forces bring them.
+  template <class Lanes>
+  void follow(const Joined<V>* joined, Lanes live) {
+    rest(live);
+    for (std::size_t i = 0; i < cluster_.count; ++i) {
+      pull(i, select(live, joined[i].force, V{}));
+    }
+  }
+  // Each mass by all that it has moved, as links that are much harder than it is heavy push it to
+  // and fro. Only once.
+  template <class Body>
+  void push(const Joined<V>* joined, Body& body) {
+    const auto shift = [&](std::uint32_t node, std::uint32_t mass) {
+      if (mass != no_mass) {
+        body.shift(node, at_[mass]);
+        at_[mass] = V{};
+      }
+    };
+    for (std::size_t i = 0; i < cluster_.count; ++i) {
+      shift(links_[i].ends.a, links_[i].mass_a);
+      shift(links_[i].ends.b, links_[i].mass_b);
+      body.feel(links_[i].ends, joined[i].force);
+    }
+  }
+  // How 1/2 |u|^2_M rises along the way.
+  V inertia_along(const Joined<V>*) const {
+    V sum{};
+    for (std::size_t i = 0; i < count_; ++i) {
+      sum += way_[i] * mass_[i] * at_[i];
+    }
+    return sum;
+  }
+
  private:
   Ends ends(std::size_t link) const { return {links_[link].mass_a, links_[link].mass_b}; }
+  V between(const V* x, std::size_t link) const {
+    const auto [a, b] = ends(link);
+    return (a == no_mass ? V{} : x[a]) - (b == no_mass ? V{} : x[b]);
+  }
 
   void fill(const Joined<V>* joined) {
     const std::size_t size = count_ + cluster_.elimination.row.size();
     for (std::size_t i = 0; i < count_; ++i) {
       matrix_[i] = mass_[i];
-      x_[i] = V{};
+      x_[i] = V{} - mass_[i] * at_[i];
     }
     for (std::size_t i = count_; i < size; ++i) {
       matrix_[i] = V{};
@@ -119,14 +175,13 @@ class ByMasses {
       if (a == b) {
         continue;
       }
-      const V off = joined[i].value - joined[i].force;
       if (a != no_mass) {
         matrix_[a] += joined[i].slope;
-        x_[a] -= off;
+        x_[a] -= joined[i].value;
       }
       if (b != no_mass) {
         matrix_[b] += joined[i].slope;
-        x_[b] += off;
+        x_[b] += joined[i].value;
       }
       if (links_[i].entry != no_mass) {
         matrix_[links_[i].entry] -= joined[i].slope;
@@ -142,10 +197,6 @@ class ByMasses {
     V* const to = rest + count_;
     V* const pull = to + count_;
     V* const diagonal = pull + count_;
-    const auto along = [&](const V* way, std::size_t link) {
-      const auto [a, b] = ends(link);
-      return (a == no_mass ? V{} : way[a]) - (b == no_mass ? V{} : way[b]);
-    };
     const auto add = [&](V* sum, std::size_t link, V force) {
       const auto [a, b] = ends(link);
       if (a != no_mass) {
@@ -156,12 +207,14 @@ class ByMasses {
       }
     };
     std::copy_n(mass_, count_, diagonal);
-    std::fill_n(rest, count_, V{});
-    std::fill_n(x_, count_, V{});
+    for (std::size_t i = 0; i < count_; ++i) {
+      rest[i] = V{} - mass_[i] * at_[i];
+      x_[i] = V{};
+    }
     for (std::size_t i = 0; i < cluster_.count; ++i) {
       const auto [a, b] = ends(i);
       if (a != b) {
-        add(rest, i, joined[i].force - joined[i].value);
+        add(rest, i, V{} - joined[i].value);
         diagonal[a == no_mass ? b : a] += joined[i].slope;
         diagonal[b == no_mass ? a : b] += a == no_mass || b == no_mass ? V{} : joined[i].slope;
       }
@@ -178,7 +231,7 @@ class ByMasses {
         pull[i] = mass_[i] * to[i];
       }
       for (std::size_t i = 0; i < cluster_.count; ++i) {
-        add(pull, i, joined[i].slope * along(to, i));
+        add(pull, i, joined[i].slope * between(to, i));
       }
       V bends{};
       for (std::size_t i = 0; i < count_; ++i) {
@@ -206,7 +259,9 @@ class ByMasses {
     for (std::size_t column = 0; column < count_; ++column) {
       V* const below = matrix_ + count_ + plan.first[column];
       const std::size_t entries = plan.first[column + 1] - plan.first[column];
-      const V inverse = 1 / matrix_[column];
+      // What a mass alone has is the least; rounding may have taken it where links are very stiff.
+      const V pivot = matrix_[column];
+      const V inverse = 1 / select(pivot > mass_[column], pivot, mass_[column]);
       matrix_[column] = inverse;
       for (std::size_t i = 0; i < entries; ++i) {
         const V share = below[i] * inverse;
@@ -241,6 +296,8 @@ class ByMasses {
   std::size_t count_;
   V* give_;
   V* mass_;
+  V* at_;   // how far forces have brought each mass
+  V* way_;  // and where it goes from there
   V* x_;
   V* matrix_;
 };
@@ -249,7 +306,7 @@ class ByMasses {
 template <class V, class Body>
 class ByLinks {
  public:
-  ByLinks(const PassiveLink* links, const Cluster& cluster, V* numbers, const Body& body)
+  ByLinks(const PassiveLink* links, const Cluster& cluster, V* numbers, Body& body)
       : links_(links),
         count_(cluster.count),
         coupling_(numbers),
@@ -260,7 +317,12 @@ class ByLinks {
         index_(reinterpret_cast<std::size_t*>(pulled_ + count_)),
         body_(body) {}
 
-  void rest() { std::fill_n(pulled_, count_, V{}); }
+  template <class Lanes>
+  void rest(Lanes live) {
+    for (std::size_t i = 0; i < count_; ++i) {
+      pulled_[i] = select(live, V{}, pulled_[i]);
+    }
+  }
   void pull(std::size_t link, V force) {
     const V* const row = couple(find(link));
     for (std::size_t i = 0; i < count_; ++i) {
@@ -293,6 +355,36 @@ class ByLinks {
         joined[i].newton_way -= row[i] * link.newton_push;
       }
     }
+  }
+
+  template <class Lanes>
+  void turn(Lanes) {}
+  // Not by what the forces change, lest rounding adds up.
+  template <class Lanes>
+  void go(const Joined<V>* joined, Lanes live, V) {
+    follow(joined, live);
+  }
+  template <class Lanes>
+  void follow(const Joined<V>* joined, Lanes live) {
+    rest(live);
+    for (std::size_t i = 0; i < count_; ++i) {
+      const V force = select(live, joined[i].force, V{});
+      if (any_of(force != V{})) {
+        pull(i, force);
+      }
+    }
+  }
+  void push(const Joined<V>* joined, Body& body) {
+    for (std::size_t i = 0; i < count_; ++i) {
+      body.push(links_[i].ends, joined[i].force);
+    }
+  }
+  V inertia_along(const Joined<V>* joined) const {
+    V sum{};
+    for (std::size_t i = 0; i < count_; ++i) {
+      sum -= joined[i].way * joined[i].force;
+    }
+    return sum;
   }
 
  private:
@@ -376,7 +468,7 @@ class ByLinks {
   V* x_;
   V* pulled_;
   std::size_t* index_;  // [active] link
-  const Body& body_;
+  Body& body_;
 };
 
 }  // namespace

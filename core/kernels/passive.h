@@ -48,9 +48,10 @@ struct PassiveRoom {
 //   V distance(ends), speed(ends)          the same once all has moved, points too
 //   V gamma(ends)                          how far they give way to a force of 1
 //   void push(ends, V force)               a by -force and b by force, times their inverse masses
-//   V coefficient(c)
-//   V awake()                              0 in the first sample after set_state(), -1 if it was
-//   let
+//   void shift(node, V way)                the same of one mass, where masses are nodes of their
+//   own void feel(ends, V force)               and what an output of force hears of it V
+//   coefficient(c) V awake()                              0 in the first sample after set_state(),
+//   -1 if it was let
 //                                          go, else 1
 
 // Before anything moves. `memory` is [link][passive_rows] packs.
@@ -75,11 +76,15 @@ template <class V, class Body>
                                        const Body& body) {
   const auto c = [&](std::size_t i) { return body.coefficient(link.coefficients[i]); };
   const V free = state.free - state.before();
-  return with_law<V>(link.law, c, [&](const auto& law) {
+  const V force = with_law<V>(link.law, c, [&](const auto& law) {
     return laws::force_between(V{}, free, free, state.gamma, [&](V step) {
       return first_gradient(law, state.before(), state.speed, step);
     });
   });
+  // What starts on a slope may be held by less than all that would pull there: it stays where it
+  // was, and is not thrown back.
+  const auto is_thrown = absolute(force) * state.gamma > absolute(free);
+  return select(is_thrown, free / select(is_thrown, state.gamma, V{} + 1), force);
 }
 
 // After masses and position inputs have moved, before points do. `numbers` are the room's.

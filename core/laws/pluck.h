@@ -129,7 +129,22 @@ struct Pluck {
     const V touches = select(absolute(link.now) < outer, V{} + 1, V{});
     return {V{}, z / 2 * touches};
   }
-  Slope<V> gradient(V before, V step) const { return discrete_gradient(Hill{*this}, before, step); }
+  // Its force is made of four ramps, as is that at the mirror's other side: f(d) = fall (r(d +
+  // outer)
+  // - r(d - outer)) - K (r(d + inner) - r(d - inner)), r(x) being max(0, x). So is its discrete
+  // gradient, and what is between two corners is exact, however short the step.
+  Slope<V> gradient(V before, V step) const {
+    const V side = select(before + step / 2 > V{}, V{} - 1, V{} + 1);
+    const V b = side * before;
+    const V s = side * step;
+    const Slope<V> foot = ramp(b + outer, s);
+    const Slope<V> other_foot = ramp(b - outer, s);
+    const Slope<V> top = ramp(b + inner, s);
+    const Slope<V> other_top = ramp(b - inner, s);
+    const V k = rise + fall;
+    return {side * (fall * (foot.value - other_foot.value) - k * (top.value - other_top.value)),
+            fall * (foot.slope - other_foot.slope) - k * (top.slope - other_top.slope)};
+  }
 
   // It pulls beyond its top; a negative one pulls below it.
   static Slopes steepest(const Pluck& least, const Pluck& most, double) {
@@ -147,15 +162,16 @@ struct Pluck {
   V z;
 
  private:
-  struct Hill {
-    V energy(V d) const { return law.potential(d); }
-    V force(V d) const { return law.force(d, V{}); }
-    V slope(V d) const {
-      const V far = absolute(d);
-      return select(far < law.outer, select(far < law.inner, -law.rise, law.fall), V{});
-    }
-    const Pluck& law;
-  };
+  // The discrete gradient of max(0, x)^2/2, from x on.
+  static Slope<V> ramp(V x, V step) {
+    const V before = select(x > V{}, x, V{});
+    const V after = select(x + step > V{}, x + step, V{});
+    const auto is_up = (before > V{}) & (after > V{});
+    const V share = (after - before) / select(step == V{}, V{} + 1, step);
+    const V square = share * share / 2;
+    return {(after + before) / 2 * select(is_up, V{} + 1, share),
+            select(is_up, V{} + Scalar<V>(0.5), select(before > V{}, square, share - square))};
+  }
 };
 
 }  // namespace RESSORT_ISA

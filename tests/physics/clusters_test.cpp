@@ -1,5 +1,7 @@
 // Passive links that share masses, however many: judged by where everything is alone, with
 // potentials written down here and not by what the laws say of themselves.
+#include <numeric>
+
 #include "core/laws/laws.h"
 #include "tests/support/passive.h"
 
@@ -247,10 +249,12 @@ EnergyJudge tried(std::uint64_t seed, Passivity passive, int frames) {
 
 TEST_CASE("no cluster of links has more energy than was put in", "[clusters]") {
   int exploded = 0;
-  for (std::uint64_t seed = 1; seed <= 120; ++seed) {
-    if (seed == 87) {
-      continue;  // below
-    }
+  std::vector<std::uint64_t> seeds(120);
+  std::iota(seeds.begin(), seeds.end(), 1);
+  // Of 3000, those that once made some: what starts at rest on a slope; links that push a mass to
+  // and fro far harder than it is heavy; a blow after which forces are 1e16 times what they add to.
+  seeds.insert(seeds.end(), {399, 834, 907, 1275, 2026, 2120, 2136});
+  for (const std::uint64_t seed : seeds) {
     INFO("seed " << seed << "\n" << any_cluster(seed));
     const EnergyJudge judge = tried(seed, Passivity::always, 300);
     CHECK(judge.is_finite);
@@ -259,11 +263,6 @@ TEST_CASE("no cluster of links has more energy than was put in", "[clusters]") {
     exploded += published.is_finite && published.excess < 1.0 ? 0 : 1;
   }
   CHECK(exploded > 60);
-}
-
-// Not held yet: once 1.3 % of what went through is made.
-TEST_CASE("a cluster that still makes energy", "[clusters][!mayfail]") {
-  CHECK(tried(87, Passivity::always, 300).excess < 1e-12);
 }
 
 TEST_CASE("what loses nothing keeps all of its energy, however many links share it", "[clusters]") {

@@ -332,6 +332,10 @@ class EnergyJudge {
     for (const Push& push : scene_.pushes) {
       if (n >= push.from && n < push.until) {
         put_in(push.force, push.mass);
+        // What is held against a force is pushed back from where that alone would bring it: so
+        // finely its place can be known.
+        const double free = push.force / scene_.masses[push.mass].m;
+        worked_noise_ += 4e-16 * std::fabs(push.force * free);
       }
     }
     for (std::size_t i = 0; i < scene_.masses.size(); ++i) {
@@ -359,7 +363,7 @@ class EnergyJudge {
     }
     passed_ += std::fabs(now - energy_);
     energy_ = now;
-    excess = std::max(excess, (energy_ - start_ - balance_ - noise_) / passed_);
+    excess = std::max(excess, (energy_ - start_ - balance_ - noise_ - worked_noise_) / passed_);
     is_finite = is_finite && std::isfinite(now);
   }
 
@@ -430,6 +434,7 @@ class EnergyJudge {
   double balance_ = 0.0;  // work put in, less what linear dampers took
   double passed_ = 0.0;
   double noise_ = 0.0;
+  double worked_noise_ = 0.0;
 };
 
 struct Outcome {
@@ -502,6 +507,19 @@ TEST_CASE("no scene makes energy as it is played", "[scenes]") {
   std::printf("%llu scenes from seed %llu, %llu failed, the worst %g\n", count, first, failed,
               worst);
   CHECK(failed == 0);
+}
+
+TEST_CASE("no scene that once made energy, or lost its voice, does so again", "[scenes]") {
+  // Of 40,000. A force of 1e5 that meets a cubic spring of K/M = 1e6; a pluck of 1e6 whose edge a
+  // mass comes to rest at; 181 bows on one mass.
+  for (const std::uint64_t seed :
+       {269, 14880, 17910, 21096, 24147, 28608, 40866, 41933, 45108, 56846, 58139}) {
+    CAPTURE(seed);
+    const Outcome outcome = play(random_scene(seed), Passivity::always, 512);
+    CHECK(outcome.is_finite);
+    CHECK(!outcome.is_lost);
+    CHECK(outcome.excess < 1e-9);
+  }
 }
 
 TEST_CASE("as published, many of the same scenes do", "[scenes]") {

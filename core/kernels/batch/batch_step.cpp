@@ -183,13 +183,16 @@ struct Passive {
     push_node(ends.a, -force);
     push_node(ends.b, force);
   }
+  void shift(std::uint32_t node, V way) {
+    nodes[node].x += way;
+    nodes[node].v += way;
+  }
+  void feel(Ends, V) {}
 
   V give(std::uint32_t node) const { return node < masses ? coefficient(inverse_mass[node]) : V{}; }
   void push_node(std::uint32_t node, V force) {
     if (node < masses) {
-      const V way = give(node) * force;
-      nodes[node].x += way;
-      nodes[node].v += way;
+      shift(node, give(node) * force);
     }
   }
 

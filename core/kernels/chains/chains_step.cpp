@@ -451,9 +451,10 @@ struct Passive {
   T speed(Ends ends) const { return speed_now(ends); }
   T gamma(Ends ends) const { return ends.a == ends.b ? T(0) : give(ends.a) + give(ends.b); }
   void push(Ends ends, T force) {
-    push_end(ends.a, -force);
-    push_end(ends.b, force);
+    shift(ends.a, give(ends.a) * -force);
+    shift(ends.b, give(ends.b) * force);
   }
+  void feel(Ends, T) {}
 
   const T* body(std::uint32_t end) const { return s.bodies + tables.passive_ends[end].place; }
   T give(std::uint32_t end) const {
@@ -461,9 +462,8 @@ struct Passive {
     return mass == nowhere ? T(0) : s.coefficient[mass];
   }
   // In whole packs where a chain is, as push() above.
-  void push_end(std::uint32_t index, T force) {
+  void shift(std::uint32_t index, T way) {
     const PassiveEnd& end = tables.passive_ends[index];
-    const T way = give(index) * force;
     if (end.unit == nowhere) {
       s.bodies[end.place] += way;
       s.bodies[end.place + S::lanes] += way;

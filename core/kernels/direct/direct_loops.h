@@ -241,6 +241,16 @@ struct Passive {
     push_node(ends.a, -force);
     push_node(ends.b, force);
   }
+  void shift(std::uint32_t node, V way) {
+    s.shift(node, way);
+    s.v[node] += way;
+  }
+  void feel(Ends ends, V force) {
+    if (s.state.felt != nullptr) {
+      reinterpret_cast<V*>(s.state.felt)[ends.a] -= force;
+      reinterpret_cast<V*>(s.state.felt)[ends.b] += force;
+    }
+  }
 
  private:
   V position(std::uint32_t node) const {
@@ -284,9 +294,7 @@ struct Passive {
   void push_node(std::uint32_t node, V force) {
     if (!is_place(program, node)) {
       if (node < program.moving) {
-        const V way = s.coefficient[s.state.inverse_mass[node]] * force;
-        s.shift(node, way);
-        s.v[node] += way;
+        shift(node, s.coefficient[s.state.inverse_mass[node]] * force);
       }
       if (s.state.felt != nullptr) {
         reinterpret_cast<V*>(s.state.felt)[node] += force;

@@ -373,11 +373,11 @@ struct Passive {
   T speed(Ends ends) const { return speed_now(ends); }
   T gamma(Ends ends) const { return ends.a == ends.b ? T(0) : give(ends.a) + give(ends.b); }
   void push(Ends ends, T force) {
-    const T back = -force * give(ends.a);
-    const T on = force * give(ends.b);
-    move(s, ends.a, back, back);
-    move(s, ends.b, on, on);
+    shift(ends.a, -force * give(ends.a));
+    shift(ends.b, force * give(ends.b));
   }
+  void shift(std::uint32_t slot, T way) { move(s, slot, way, way); }
+  void feel(Ends, T) {}
   T give(std::uint32_t slot) const {
     const std::uint32_t inverse_mass = s.state.inverse_mass[slot];
     return inverse_mass == grid_fixed ? T(0) : coefficient(inverse_mass);

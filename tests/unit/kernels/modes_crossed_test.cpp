@@ -1,15 +1,12 @@
 // Modes of bodies whose damping does not share the eigenvectors of their stiffness.
 #include <complex>
 
-#include "core/kernels/modal/modal_form.h"
-#include "tests/support/comparison.h"
-#include "tests/support/passive.h"
+#include "tests/support/modes.h"
 
 namespace ressort {
 namespace {
 
-using support::compare_kernels;
-using support::Comparison;
+using support::check_same;
 using support::ComparisonOptions;
 using support::isas;
 using support::Random;
@@ -22,25 +19,9 @@ std::optional<Modes> crossed_form(const Program& program, const Budget& budget =
   return modal_form(program, budget, {}, true);
 }
 
-Program in_modes(const std::string& text, const Budget& budget = {},
-                 Passivity passive = Passivity::never) {
-  Program program = support::program_of(text, passive);
-  std::optional<Modes> modes = crossed_form(program, budget);
-  INFO(text);
-  REQUIRE(modes);
-  REQUIRE(modes->is_crossed);
-  program.form = std::move(*modes);
-  return program;
-}
-
-template <class T>
-void check_same(const Program& program, const ComparisonOptions& options, double tolerance) {
-  for (const Comparison& output : compare_kernels<T>(program, options)) {
-    INFO("peak " << show(output.peak) << ", off by " << show(output.relative()) << ", "
-                 << isa_name(options.isa));
-    CHECK(output.peak > 0.0);
-    CHECK(output.relative() < tolerance);
-  }
+Program in_crossed_modes(const std::string& text, Passivity passive = Passivity::never,
+                         const Budget& budget = {}) {
+  return support::in_modes(text, passive, budget, true);
 }
 
 // The triangle on its ground: springs and dampers of other shares there than at its sides.
@@ -56,7 +37,7 @@ TEST_CASE("The triangle's poles are those that are known", "[modes_crossed]") {
     double hz, t60_s;
   };
   const auto check = [](const Budget& budget, const std::vector<Pole>& known) {
-    const Program program = in_modes(triangle(), budget);
+    const Program program = in_crossed_modes(triangle(), Passivity::never, budget);
     const Modes& modes = std::get<Modes>(program.form);
     REQUIRE(modes.modes == known.size());
     for (const auto& [hz, t60_s] : known) {
@@ -137,7 +118,7 @@ TEST_CASE("Crossed modes of random bodies sound as mass by mass", "[modes_crosse
 }
 
 TEST_CASE("A start from anywhere and from rest", "[modes_crossed]") {
-  const Program program = in_modes(random_body(4, 12));
+  const Program program = in_crossed_modes(random_body(4, 12));
   Program plain = program;
   plain.form = Direct{};
   support::Bare<double> one(program);
@@ -268,7 +249,7 @@ TEST_CASE("Exact crossed modes are the matrix exponential of the network", "[mod
       chain.damping.push_back(random.below(2) == 0 ? 0.0 : number(0.0, 0.3));
     }
     chain.damping[0] = 0.02;
-    const Program program = in_modes(chain.text(), physical);
+    const Program program = in_crossed_modes(chain.text(), Passivity::never, physical);
     REQUIRE(std::get<Modes>(program.form).is_exact);
     support::Bare<double> bare(program);
     const Square step = exponential_of(chain.flow());
@@ -300,7 +281,7 @@ TEST_CASE("Passive links hold on to crossed modes as to masses", "[modes_crossed
     text += "@c contact @m0 @in3 0.5 0.02 0.\n@n nlSpring3 @m1 @m0 0.01 2. 0.001\n";
     const bool is_bowed = seed % 3 == 0;
     text += is_bowed ? "@b nlBow @in1 @m1 0.02 0.01\n" : "@p nlPluck @in1 @m1 0.02 0.05\n";
-    const Program program = in_modes(text, {}, Passivity::always);
+    const Program program = in_crossed_modes(text, Passivity::always);
     INFO(text);
     // Links are solved together until no energy is made but by rounding: of a weak bow that says
     // less than of the others.
@@ -312,9 +293,10 @@ TEST_CASE("Forces are heard through crossed modes", "[modes_crossed]") {
   for (std::uint64_t seed = 1; seed <= 10; ++seed) {
     std::string text = random_body(seed, 9);
     text += "@out3 frcOutput @m0\n@out4 frcOutput @g\n@out5 frcOutput @in1\n";
-    check_same<double>(in_modes(text), {.frames = 8820, .seed = seed}, 1e-9);
+    check_same<double>(in_crossed_modes(text), {.frames = 8820, .seed = seed}, 1e-9);
     text += "@in3 posInput 0.3\n@c contact @m0 @in3 0.5 0.02 0.\n";
-    check_same<double>(in_modes(text, {}, Passivity::always), {.frames = 8820, .seed = seed}, 1e-9);
+    check_same<double>(in_crossed_modes(text, Passivity::always), {.frames = 8820, .seed = seed},
+                       1e-9);
   }
 }
 
@@ -348,7 +330,7 @@ TEST_CASE("What is alike, overdamped or held by dampers alone has crossed modes 
       }
     }
     INFO(text);
-    check_same<double>(in_modes(text), {.frames = 8820}, 1e-9);
+    check_same<double>(in_crossed_modes(text), {.frames = 8820}, 1e-9);
   }
 }
 
@@ -370,7 +352,7 @@ TEST_CASE("Crossed modes at hard contacts only lose energy", "[modes_crossed]") 
             " contact @floor " + at + " " + show(hard) + " 0. 0.\n" +
             scenes::output(int(i) + 1, at.substr(1));
   }
-  support::Bare<double> bare(in_modes(text, {}, Passivity::always));
+  support::Bare<double> bare(in_crossed_modes(text, Passivity::always));
   const auto energy = [&](const std::vector<double>& now, const std::vector<double>& next) {
     double sum = 0.0;
     for (std::size_t i = 0; i < mass.size(); ++i) {

@@ -1,39 +1,18 @@
 // Passive links on modes: as on masses, and without making energy.
-#include "core/kernels/modal/modal_form.h"
-#include "tests/support/comparison.h"
 #include "tests/support/heap.h"
-#include "tests/support/passive.h"
+#include "tests/support/modes.h"
 
 namespace ressort {
 namespace {
 
-using support::compare_kernels;
-using support::Comparison;
+using support::check_same;
 using support::ComparisonOptions;
 using support::Fighter;
+using support::in_modes;
 using support::isas;
 using support::show;
 
 constexpr double pi = std::numbers::pi;
-
-Program in_modes(const std::string& text, const Budget& budget = {}) {
-  Program program = support::program_of(text, Passivity::always);
-  std::optional<Modes> modes = modal_form(program, budget);
-  REQUIRE(modes);
-  program.form = std::move(*modes);
-  return program;
-}
-
-template <class T>
-void check_same(const Program& program, const ComparisonOptions& options, double tolerance) {
-  for (const Comparison& output : compare_kernels<T>(program, options)) {
-    INFO("peak " << show(output.peak) << ", off by " << show(output.relative()) << ", "
-                 << isa_name(options.isa) << (options.turns ? ", turning" : "") << ", reach "
-                 << options.reach << ", seed " << options.seed);
-    CHECK(output.peak > 0.0);
-    CHECK(output.relative() < tolerance);
-  }
-}
 
 // Fingers that come down on a mesh, leave it and come back, and a soft pick.
 std::string touched_mesh() {
@@ -45,7 +24,7 @@ std::string touched_mesh() {
 }
 
 TEST_CASE("Passive links act on the modes as on the masses", "[modes_passive]") {
-  const Program program = in_modes(touched_mesh());
+  const Program program = in_modes(touched_mesh(), Passivity::always);
   REQUIRE(!is_plain(program));
   for (const bool turns : {false, true}) {
     for (const double reach : {0.02, 0.06, 0.2}) {
@@ -69,7 +48,7 @@ std::string busy_string() {
 }
 
 TEST_CASE("Passive links of all laws share a body", "[modes_passive]") {
-  const Program program = in_modes(busy_string());
+  const Program program = in_modes(busy_string(), Passivity::always);
   for (const bool turns : {false, true}) {
     for (const std::uint64_t seed : {1u, 2u, 3u}) {
       check_same<double>(program, {.frames = 8820, .seed = seed, .push = 0.05, .turns = turns},
@@ -136,7 +115,7 @@ struct Lossless {
 
 TEST_CASE("Hard contacts on modes make no energy in a million samples", "[modes_passive]") {
   for (const Budget& budget : {Budget{}, Budget{.cents = 1e-6}}) {
-    const Program program = in_modes(Lossless().text(), budget);
+    const Program program = in_modes(Lossless().text(), Passivity::always, budget);
     const bool is_exact = std::get<Modes>(program.form).is_exact;
     Fighter<double> fighter(program, 1.0, best_isa());
     const std::vector<std::vector<double>> nobody(64);
@@ -170,7 +149,7 @@ TEST_CASE("Hard contacts on modes make no energy in a million samples", "[modes_
 }
 
 TEST_CASE("The contacts on modes are those on masses, for 5 ms", "[modes_passive]") {
-  check_same<double>(in_modes(Lossless().text()), {.frames = 220}, 1e-11);
+  check_same<double>(in_modes(Lossless().text(), Passivity::always), {.frames = 220}, 1e-11);
 }
 
 TEST_CASE("Modes sleep while no passive link touches, and wake as one does", "[modes_passive]") {
@@ -178,7 +157,7 @@ TEST_CASE("Modes sleep while no passive link touches, and wake as one does", "[m
                            "@in1 posInput 1.\n@t1 contact @m_m2_3 @in1 0.5 0.01 0.\n"
                            "@in2 frcInput @m_m6_2\n" +
                            scenes::output(1, "m_m3_3") + scenes::output(2, "m_m7_1");
-  const Program sleepy = in_modes(text, {.silence_db = -60.0});
+  const Program sleepy = in_modes(text, Passivity::always, {.silence_db = -60.0});
   Program awake = sleepy;
   std::get<Modes>(awake.form).silence = 0.0;
   Fighter<double> one(sleepy, 1.0, best_isa());
@@ -209,7 +188,7 @@ TEST_CASE("Modes sleep while no passive link touches, and wake as one does", "[m
 }
 
 TEST_CASE("Passive links on modes never ask for memory", "[modes_passive]") {
-  Program program = in_modes(busy_string());
+  Program program = in_modes(busy_string(), Passivity::always);
   support::Bare<double> bare(program);
   std::vector<double> value(64 * program.inputs.size());
   std::vector<double> velocity(value.size());
@@ -260,7 +239,7 @@ TEST_CASE("Modes that are left out give way to passive links as well", "[modes_p
   }
   text += "@c contact @m17 @in1 5. 0.01 0.\n" + scenes::output(1, "m17");
   const auto pressed = [&](double silence_db, bool gives) {
-    Program program = in_modes(text, {.silence_db = silence_db});
+    Program program = in_modes(text, Passivity::always, {.silence_db = silence_db});
     auto& modes = std::get<Modes>(program.form);
     modes.silence = 0.0;
     for (ModalHold& hold : modes.holds) {

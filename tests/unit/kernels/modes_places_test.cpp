@@ -1,34 +1,14 @@
 // Places on macros in the modes: sums of masses, as the direct kernel has them.
-#include "core/kernels/modal/modal_form.h"
-#include "tests/support/comparison.h"
-#include "tests/support/passive.h"
+#include "tests/support/modes.h"
 
 namespace ressort {
 namespace {
 
-using support::compare_kernels;
-using support::Comparison;
+using support::check_same;
 using support::ComparisonOptions;
+using support::in_modes;
 using support::isas;
 using support::show;
-
-Program in_modes(const std::string& text, Passivity passive = Passivity::never) {
-  Program program = support::program_of(text, passive);
-  std::optional<Modes> modes = modal_form(program);
-  REQUIRE(modes);
-  program.form = std::move(*modes);
-  return program;
-}
-
-template <class T>
-void check_same(const Program& program, const ComparisonOptions& options, double tolerance) {
-  for (const Comparison& output : compare_kernels<T>(program, options)) {
-    INFO("peak " << show(output.peak) << ", off by " << show(output.relative()) << ", "
-                 << isa_name(options.isa) << (options.turns ? ", turning" : ""));
-    CHECK(output.peak > 0.0);
-    CHECK(output.relative() < tolerance);
-  }
-}
 
 TEST_CASE("A string driven and heard at places has its modes", "[modes_places]") {
   const Program program = in_modes(
