@@ -67,8 +67,8 @@ struct Stroke {
     const double part = loudness ? 1.0 : std::clamp(amount, 0.0, 1.0);
     return std::pow(10.0, (low_db + (high_db - low_db) * part) / 20.0) * loudness.value_or(1.0);
   }
-  // How long a blow lasts: from soft to hard in equal ratios; on a higher key as much shorter as its
-  // periods are, so that all keys sound alike.
+  // How long a blow lasts: from soft to hard in equal ratios; on a higher key as much shorter as
+  // its periods are, so that all keys sound alike.
   std::size_t pulse_frames() const {
     const double a = std::clamp(amount, 0.0, 1.0);
     const double s = longest_s > 0.0 && shortest_s > 0.0
