@@ -31,6 +31,7 @@ constexpr MidiChartRow rows[] = {
     {"RPN fine tuning", "1", true, "of the channel, a semitone down to one up"},
     {"RPN coarse tuning", "2", true, "of the channel, in semitones from 64"},
     {"RPN tuning program, bank", "3, 4", false, "there is one tuning, which the tuning messages of every number change"},
+    {"RPN modulation depth range", "5", false, "what the wheel does is the preset's"},
     {"RPN MPE configuration", "6", true, "on channel 1 or 16: how many members the lower or the upper zone has, 0 ends it; of two that overlap the newer one has the channels. All notes there end"},
     {"other controllers", "CC 1 to 119", true, "what the preset has `from = \"cc1\"` and so on; parameters are turned for all voices, inputs move in those of the channel"},
     {"all sound off", "CC 120", true, "silence on the channel at once"},

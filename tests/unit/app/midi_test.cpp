@@ -3,8 +3,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <string>
 #include <vector>
 
+#include "app/realtime/midi_chart.h"
+#include "core/engine/midi/channels.h"
 #include "tests/support/harness.h"
 
 namespace ressort {
@@ -196,6 +199,39 @@ TEST_CASE("what is cut short or unknown makes no event and is counted", "[midi]"
   check_event(read(reader, {0xc3, 5}).at(0), EventKind::program, 3, 5, 0.0);
   CHECK(read(reader, {0xf6}).empty());
   CHECK(reader.malformed() == 1);
+}
+
+TEST_CASE("the chart has every controller that means something by itself", "[midi]") {
+  const auto state = [](const Channels& channels) {
+    return std::vector<double>{channels.level(0),
+                               channels.balance(0)[0],
+                               channels.softness(0),
+                               channels.glide_s(0, 1.0),
+                               channels.sustains(0) ? 1.0 : 0.0,
+                               channels.holds(0) ? 1.0 : 0.0,
+                               channels.is_legato(0) ? 1.0 : 0.0,
+                               channels.semitones(0)};
+  };
+  int found = 0;
+  for (int number = 0; number < 120; ++number) {
+    Channels channels;
+    channels.bend(0, 1.0);
+    channels.turn(0, 101, 0.0);  // the range of bends, for who enters data
+    channels.turn(0, 100, 0.0);
+    const auto before = state(channels);
+    channels.turn(0, number, 0.6);
+    if (state(channels) == before) {
+      continue;
+    }
+    ++found;
+    CAPTURE(number);
+    CHECK(std::any_of(midi_chart().begin(), midi_chart().end(), [&](const MidiChartRow& row) {
+      const std::string words = " " + std::string(row.number) + ",";
+      return row.is_received && row.number.starts_with("CC") &&
+             words.find(" " + std::to_string(number) + ",") != words.npos;
+    }));
+  }
+  CHECK(found >= 11);
 }
 
 TEST_CASE("random bytes in random packets only ever make events in range", "[midi]") {

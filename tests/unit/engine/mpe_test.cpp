@@ -316,7 +316,8 @@ TEST_CASE("a new zone lets the notes of its channels go, and nobody else's", "[m
   Preset preset = struck(4);
   preset.damper_s = 0.01;
   const auto other = on(9, note_on(0, 67));
-  std::vector<Event> events = {on(1, note_on(0, 60)), turned(1, 0, 64, 127), other};
+  std::vector<Event> events = {on(1, note_on(0, 60)), turned(1, 0, 64, 127), turned(1, 0, 66, 127),
+                               other};
   for (Event event : zone(0, 4)) {
     event.frame = 3000;
     events.push_back(event);

@@ -125,10 +125,11 @@ std::vector<std::vector<double>> excitation(const Network& network) {
   return channels;
 }
 
-using Channels = std::vector<std::vector<double>>;  // [channel][frame]
+using ChannelSamples = std::vector<std::vector<double>>;  // [channel][frame]
 
 // One tick's values of the model's inputs.
-std::vector<double> inputs_at(const Network& network, const Channels& channels, std::size_t n) {
+std::vector<double> inputs_at(const Network& network, const ChannelSamples& channels,
+                              std::size_t n) {
   std::vector<double> values;
   for (const Input& input : network.inputs) {
     values.push_back(channels[static_cast<std::size_t>(input.number - 1)][n]);
@@ -137,7 +138,8 @@ std::vector<double> inputs_at(const Network& network, const Channels& channels, 
 }
 
 // One tick's values of its parameters.
-std::vector<double> parameters_at(const Network& network, const Channels& channels, std::size_t n) {
+std::vector<double> parameters_at(const Network& network, const ChannelSamples& channels,
+                                  std::size_t n) {
   std::vector<double> values = parameter_values(network);
   for (std::size_t i = 0; i < values.size(); ++i) {
     const int input = network.parameters[i].audio_input;
@@ -148,8 +150,8 @@ std::vector<double> parameters_at(const Network& network, const Channels& channe
 
 // Adds what `step(n)` gives for every channel to `outputs`.
 template <class Step>
-Channels played(const Network& network, Step&& step) {
-  Channels outputs(static_cast<std::size_t>(output_count(network)));
+ChannelSamples played(const Network& network, Step&& step) {
+  ChannelSamples outputs(static_cast<std::size_t>(output_count(network)));
   for (std::size_t n = 0; n < frames; ++n) {
     const std::vector<double> values = step(n);
     for (std::size_t c = 0; c < outputs.size(); ++c) {
@@ -159,7 +161,7 @@ Channels played(const Network& network, Step&& step) {
   return outputs;
 }
 
-Channels by_reference(const Network& network, const Channels& driven) {
+ChannelSamples by_reference(const Network& network, const ChannelSamples& driven) {
   auto oracle = reference::make_simulation(network, parameters_at(network, driven, 0));
   return played(network, [&](std::size_t n) {
     oracle.set_parameters(network, parameters_at(network, driven, n));
@@ -167,15 +169,16 @@ Channels by_reference(const Network& network, const Channels& driven) {
   });
 }
 
-Channels by_kernel(const Network& network, const Channels& driven) {
+ChannelSamples by_kernel(const Network& network, const ChannelSamples& driven) {
   support::Bare<double> bare(make_program(network, 44100.0, true));
   return played(network, [&](std::size_t n) { return bare.step(inputs_at(network, driven, n)); });
 }
 
-Channels by_engine(const Network& network, const Channels& driven) {
+ChannelSamples by_engine(const Network& network, const ChannelSamples& driven) {
   auto compiled = compile(network, default_preset(network, true), {.bare = true});
   REQUIRE(compiled);
-  Channels outputs(static_cast<std::size_t>(output_count(network)), std::vector<double>(frames));
+  ChannelSamples outputs(static_cast<std::size_t>(output_count(network)),
+                         std::vector<double>(frames));
   std::vector<double*> to;
   std::vector<const double*> from;
   for (auto& channel : outputs) {
@@ -194,7 +197,8 @@ bool is_heard(const Network& network, std::size_t channel) {
   });
 }
 
-void check_same(const Network& network, const Channels& expected, const Channels& found) {
+void check_same(const Network& network, const ChannelSamples& expected,
+                const ChannelSamples& found) {
   for (std::size_t c = 0; c < expected.size(); ++c) {
     support::Comparison comparison;
     for (std::size_t n = 0; n < frames; ++n) {
@@ -241,8 +245,8 @@ TEST_CASE("every model of the corpus sounds as the textbook has it", "[corpus]")
   for (const Model& model : models) {
     INFO(model.name);
     const Network network = support::network_of(text_of(model.name));
-    const Channels driven = excitation(network);
-    const Channels expected = by_reference(network, driven);
+    const ChannelSamples driven = excitation(network);
+    const ChannelSamples expected = by_reference(network, driven);
     const bool is_steady =
         std::all_of(network.parameters.begin(), network.parameters.end(),
                     [](const Parameter& parameter) { return parameter.audio_input == 0; });
