@@ -65,7 +65,8 @@ TEST_CASE("the models are the published networks", "[models]") {
   }
 }
 
-TEST_CASE("every preset has two ears, a forte between -20 and -9 dBFS, and 14 to 34 dB of velocity", "[models]") {
+TEST_CASE("every preset has two ears, a forte between -20 and -9 dBFS, and 14 to 34 dB of velocity",
+          "[models]") {
   const std::vector<std::string> names = known_presets();
   CHECK(names.size() >= 24);
   for (const std::string& name : names) {
@@ -79,7 +80,7 @@ TEST_CASE("every preset has two ears, a forte between -20 and -9 dBFS, and 14 to
       REQUIRE(compiled);
       CHECK(compiled->instrument.stiffness_margin >= 1.0);  // in every corner of the ranges
       CHECK(compiled->instrument.outputs == 2);
-      const std::size_t frames = 66150;                     // a bow takes its time
+      const std::size_t frames = 66150;  // a bow takes its time
       std::vector<std::vector<double>> channels(
           static_cast<std::size_t>(compiled->instrument.outputs), std::vector<double>(frames));
       std::vector<double*> outputs;
