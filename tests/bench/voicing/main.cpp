@@ -85,7 +85,7 @@ Tuning tuning_of(Player& player, int step) {
 
 Stereo phrase(Player& player) {
   std::vector<TimedEvent> events;
-  const auto lines = parse_score(default_phrase());
+  const auto lines = parse_score(to_score(default_phrase()));
   for (const ScoreLine& line : *lines) {
     const auto calls = to_events(line.message, player.instrument(), 0);
     for (const Event& event : *calls) {

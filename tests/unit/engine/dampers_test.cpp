@@ -5,7 +5,6 @@
 #include "core/engine/mixing/dc_blocker.h"
 #include "tests/support/catch.h"
 #include "tests/support/player.h"
-#include "tests/support/sound.h"
 
 namespace ressort {
 namespace {

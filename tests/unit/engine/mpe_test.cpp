@@ -276,7 +276,8 @@ TEST_CASE("the master's pedals, levels and modes are for the whole zone", "[mpe]
   int held = 0;
   for (std::size_t lane = 0; lane < voices.size(); ++lane) {
     Voice& voice = voices[lane];
-    const bool ends = voice.held && voices.lift_key(voice, voice.key, voice.channel);
+    const bool ends =
+        voice.held && voices.lift_key(voice, voice.key, voice.channel, usual_release_velocity);
     CHECK((!voice.has_key || ends == (voice.channel == 9)));
     held += voice.sustained ? 1 : 0;
   }

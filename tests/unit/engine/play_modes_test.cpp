@@ -32,7 +32,8 @@ struct Keys {
     }
     for (std::size_t lane = 0; lane < voices->size(); ++lane) {
       Voice& voice = (*voices)[lane];
-      if (voices->lift_key(voice, key, static_cast<std::uint8_t>(channel))) {
+      if (voices->lift_key(voice, key, static_cast<std::uint8_t>(channel),
+                           usual_release_velocity)) {
         voices->release(voice);
       }
     }
