@@ -123,6 +123,7 @@ struct GestureRow {
   Extent extent = Extent::range;
   bool is_blow = false;   // its range is the size of a blow, not of a lasting force
   bool is_sweep = false;  // its range is the speed at which it passes what it touches
+  bool is_touch = false;  // it moves nothing by itself: who is silent stays so
   // Where a new voice's driver starts; null: in the middle.
   double (*start)(const Stroke& control) = nullptr;
   // Where it drives the input in all voices, new ones too. [audio]
@@ -265,6 +266,7 @@ inline constexpr GestureRow gestures[] = {
      .does = "a finger: off the string at the first number of `range`, where it rests, and laid on "
              "as far as the second",
      .needs_position = true,
+     .is_touch = true,
      .start = [](const Stroke& control) { return control.low; },
      .goal = [](const Stroke& stroke) { return stroke.mapped(); }},
     // No driver: the parameter that `to` names is turned.

@@ -107,7 +107,8 @@ void Gestures::play(const GestureRow& gesture, std::size_t input, Stroke stroke,
       set_starts(scope.channels, input, goal);
     }
     for (std::size_t lane = 0; lane < voices_.size(); ++lane) {
-      if (voices_.hears(voices_[lane], scope) || lane == last) {
+      const bool is_meant = voices_.hears(voices_[lane], scope) || lane == last;
+      if (is_meant && (voices_[lane].awake || !gesture.is_touch)) {
         wake(lane, first_channel);
         driver(lane, input).follow(goal, stroke.pole_of_position());
       }

@@ -155,6 +155,15 @@ TEST_CASE("a finger rests off the string and is laid on by a lever", "[dampers]"
       preset);
   player.run(20000, {controller(100, 16, 0.5)});
   CHECK(player.y()[0] == -3.0);
+  // Where nothing sounds it wakes nobody.
+  Player silent(
+      "@m mass 1 0 0\n@in1 posInput 0\n@t contact @in1 @m 0.1 0 0\n"
+      "@s springDamper @m @g 0.1 0.01\n@g ground 0\n@out1 posOutput @m\n",
+      preset);
+  silent.run(100000);
+  CHECK(silent.engine().meters().stepped == 0);
+  silent.run(5000, {controller(100, 16, 0.5)});
+  CHECK(silent.engine().meters().stepped == 0);
   CHECK(player.y()[19999] == Approx(-1.0).epsilon(1e-8));
 }
 
