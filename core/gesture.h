@@ -58,9 +58,9 @@ struct Stroke {
 
   double mapped() const {
     const double a = std::clamp(amount, 0.0, 1.0);
-    return !has_control                             ? amount
-           : exponential && low > 0.0 && high > 0.0 ? low * std::pow(high / low, a)
-                                                    : low + (high - low) * a;
+    return !has_control                      ? amount
+           : exponential && low * high > 0.0 ? low * std::pow(high / low, a)
+                                             : low + (high - low) * a;
   }
   // The voice's level, as a factor.
   double level() const {

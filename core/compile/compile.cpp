@@ -140,7 +140,8 @@ double wanted_factor(const Request& request, const Analysis& analysis) {
       highest = std::max(highest, std::min(control.highest_key, highest_of_a_piano));
     }
   }
-  const double hz = 440.0 * std::exp2((highest + request.preset.transpose - 69) / 12.0);
+  const double hz =
+      request.preset.a4_hz * std::exp2((highest + request.preset.transpose - 69) / 12.0);
   const double angle =
       2.0 * std::numbers::pi * std::min(hz / request.options.rate_hz, highest_share);
   const double stiffness = analysis.mode->stiffness * request.rate_ratio * request.rate_ratio;
@@ -244,6 +245,7 @@ Result<Compiled> compile_by_stages(const Request& request) {
   if (shapes) {
     analysis.pitches = make_pitches(*shapes, stepping_of_lowest(planned.machine, *mode),
                                     options.rate_hz, rate_ratio);
+    analysis.pitches.lowest_hz *= std::exp2(-preset.flattening_cents / 1200.0);
     reach(analysis, planned.more, options.rate_hz);
   }
   if (auto error = shortage(planned.machine, voices, options.precision, options.most_bytes)) {

@@ -12,13 +12,15 @@ namespace ressort {
 
 // A high-pass filter of first order at 5 Hz for every channel:
 //   y[n] = x[n] - x[n-1] + pole y[n-1]
+// Once nothing comes in at all its memory fades in milliseconds, so that a panic is silent at once.
 class DcBlocker {
  public:
   static constexpr double corner_hz = 5.0;
   static constexpr std::size_t max_channels = 64;
 
   explicit DcBlocker(double rate_hz)
-      : pole_(std::exp(-2.0 * std::numbers::pi * corner_hz / rate_hz)) {}
+      : pole_(std::exp(-2.0 * std::numbers::pi * corner_hz / rate_hz)),
+        quick_pole_(std::exp(-1.0 / (0.0005 * rate_hz))) {}
 
   // In place. [audio] wait-free, O(frames * channels)
   void process(std::span<double* const> channels, std::size_t frames) {
@@ -26,7 +28,9 @@ class DcBlocker {
       State state = states_[c];
       for (std::size_t n = 0; n < frames; ++n) {
         const double x = channels[c][n];
-        state.out = x - state.in + pole_ * state.out;
+        const bool is_silent = x == 0.0 && state.in == 0.0;
+        state.out = x - state.in + (is_silent ? quick_pole_ : pole_) * state.out;
+        state.out = is_silent && std::fabs(state.out) < nothing ? 0.0 : state.out;
         state.in = x;
         channels[c][n] = state.out;
       }
@@ -35,11 +39,13 @@ class DcBlocker {
   }
 
  private:
+  static constexpr double nothing = 1e-7;  // of full scale
   struct State {
     double in = 0.0;
     double out = 0.0;
   };
   double pole_;
+  double quick_pole_;
   std::array<State, max_channels> states_{};
 };
 

@@ -23,6 +23,7 @@ constexpr PresetKey keys[] = {
     {"", "damper_s", "0 to 60 (0)", "T60 of a note once its key is up: in how many seconds a damper takes 60 dB off it; 0 lets it ring out"},
     {"", "noise", "true or false (false)", "the outputs shape white noise instead of being heard themselves"},
     {"", "tuning", "`keyboard` or `fixed` (`keyboard`)", "whether a key sets the pitch, or every key sounds the model as it is written"},
+    {"", "flattening_cents", "-100 to 100 (0)", "by how much the sound is flat of its lowest mode, as under a bow, which keys make up for"},
     {"", "transpose", "-96 to 96 (0)", "semitones between a key and the pitch that it sets"},
     {"", "a4_hz", "220 to 880 (440)", "the pitch of the A above the middle C, to which all keys are tuned"},
     {"", "scale", "text", "a Scala file beside the preset, `NAME.scl`: the steps between keys; `tuning = \"fixed\"` has none"},
@@ -196,8 +197,8 @@ void read_control(const toml::table& table, Preset& preset, std::vector<Error>& 
   }
   control.exponential = curve == "exponential";
   if (control.exponential && (has_range || table.get("range") == nullptr) &&
-      !(control.low > 0.0 && control.high > 0.0)) {
-    reader.fail(table, "an exponential curve needs a range above 0");
+      !(control.low * control.high > 0.0)) {
+    reader.fail(table, "an exponential curve needs a range on one side of 0");
   }
   const GestureRow& gesture = row_of(control.gesture);
   if (!gesture.needs_travel.empty() && (has_travel || table.get("travel") == nullptr) &&
@@ -319,6 +320,7 @@ void read_root(const toml::table& root, Preset& preset, std::vector<Error>& erro
   reader.number("damper_s", preset.damper_s, 0.0, 60.0);
   reader.flag("noise", preset.noise);
   reader.integer("transpose", preset.transpose, -96, 96);
+  reader.number("flattening_cents", preset.flattening_cents, -100.0, 100.0);
   read_keys(root, reader, preset);
   if (std::string budget; reader.text("budget", budget)) {
     if (const auto parsed = parse_budget(budget)) {

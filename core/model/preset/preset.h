@@ -55,14 +55,15 @@ struct Preset {
   SourceLocation model_location{1, 1};  // of that name
   std::string description;              // one line for a person
   int voices = 1;
-  double gain = 1.0;           // output per unit of position
-  double damper_s = 0.0;       // T60 of a voice whose key is up; 0: it rings out
-  bool noise = false;          // the outputs shape white noise
-  bool keyboard = true;        // a key sets the pitch
-  int transpose = 0;           // semitones between a key and the pitch that it sets
-  double a4_hz = usual_a4_hz;  // to which everything is tuned
-  std::string scale;           // a Scala file beside the preset; empty: 12 equal semitones
-  std::string keyboard_map;    // which keys play it
+  double gain = 1.0;              // output per unit of position
+  double damper_s = 0.0;          // T60 of a voice whose key is up; 0: it rings out
+  bool noise = false;             // the outputs shape white noise
+  bool keyboard = true;           // a key sets the pitch
+  int transpose = 0;              // semitones between a key and the pitch that it sets
+  double flattening_cents = 0.0;  // of the sound below its lowest mode, to be made up for
+  double a4_hz = usual_a4_hz;     // to which everything is tuned
+  std::string scale;              // a Scala file beside the preset; empty: 12 equal semitones
+  std::string keyboard_map;       // which keys play it
   SourceLocation scale_location;
   SourceLocation keyboard_map_location;
   std::vector<double> keys_hz;  // [key] of both, as whoever reads files has found; empty: without

@@ -2,6 +2,7 @@
 //
 //   ressort_voicing [--keys STEP] [PRESET...]               a row each, ! at what is out of bounds
 //   ressort_voicing --random N [--seed S] [PRESET...]       N random settings of all controls each
+//   ressort_voicing --bows N [PRESET...]                    bows: N speeds and N pressures, 24 keys
 //
 // Without names all presets that there are. STEP is how many keys lie between two whose pitch is
 // measured, from 21 to 108 (12). The table is Markdown. Sound is measured before the limiter.
@@ -330,10 +331,56 @@ int play_randomly(const std::string& name, int count, std::uint64_t seed) {
   return failures;
 }
 
+// Whether a bow speaks wherever a hand may put it, from 65 Hz on: at its key's pitch, within its
+// time, and the louder the faster.
+int bow(const std::string& name, int count) {
+  Player player(name, 48000.0);
+  if (!is_bowed(player.scene().preset)) {
+    return 0;
+  }
+  int notes = 0;
+  std::map<std::string, int> wrong;
+  double slowest_s = 0.0;
+  const int lowest_key = 36 - player.instrument().transpose;
+  for (int key = lowest_key; key < lowest_key + 48; key += 2) {
+    const double hz = wanted_hz(player, key);
+    for (int pressed = 0; pressed < count; ++pressed) {
+      double before_db = -1e9;
+      for (int fast = 0; fast < count; ++fast) {
+        const double pressure = static_cast<double>(pressed) / std::max(1, count - 1);
+        const int velocity = 20 + 107 * fast / std::max(1, count - 1);
+        const Stereo sound =
+            player.play({{0.0, press(pressure)}, {0.0, note_on(key, velocity)}}, 1.0);
+        const Stereo steady = sound.part(0.5, 1.0);
+        const Pitch pitch = pitch_of(steady, hz);
+        const double attack = attack_s(sound, true);
+        const double level_db = decibels(peak_of(steady));
+        slowest_s = std::max(slowest_s, attack);
+        const bool is_late = attack > bowed_attack_s;
+        const bool is_off = std::fabs(cents(pitch.heard_hz, hz)) > 50.0;
+        wrong["late"] += is_late ? 1 : 0;
+        wrong["off its pitch"] += is_off ? 1 : 0;
+        wrong["late or off"] += is_late || is_off ? 1 : 0;
+        wrong["no louder"] += level_db <= before_db ? 1 : 0;
+        before_db = level_db;
+        ++notes;
+      }
+    }
+  }
+  std::printf("%s: %d notes, the slowest speaks in %.0f ms", name.c_str(), notes, 1e3 * slowest_s);
+  for (const auto& [what, times] : wrong) {
+    std::printf(", %s %d", what.c_str(), times);
+  }
+  std::printf("\n");
+  std::fflush(stdout);
+  return wrong["late or off"] > notes / 20 || wrong["no louder"] > 0 ? 1 : 0;
+}
+
 int run(int argc, char** argv) {
   std::vector<std::string> names;
   int step = 12;
   int random = 0;
+  int bows = 0;
   std::uint64_t seed = 1;
   for (int i = 1; i < argc; ++i) {
     const std::string word = argv[i];
@@ -345,6 +392,8 @@ int run(int argc, char** argv) {
       step = std::max(1, std::atoi(argv[++i]));
     } else if (word == "--random") {
       random = std::max(1, std::atoi(argv[++i]));
+    } else if (word == "--bows") {
+      bows = std::max(1, std::atoi(argv[++i]));
     } else if (word == "--seed") {
       seed = std::strtoull(argv[++i], nullptr, 10);
     } else if (word.starts_with("--")) {
@@ -357,13 +406,13 @@ int run(int argc, char** argv) {
   if (names.empty()) {
     names = known_presets();
   }
-  if (random == 0) {
+  if (random == 0 && bows == 0) {
     return print_table(names, step) == 0 ? 0 : 1;
   }
   int failures = 0;
   for (const std::string& name : names) {
     try {
-      failures += play_randomly(name, random, seed);
+      failures += bows > 0 ? bow(name, bows) : play_randomly(name, random, seed);
     } catch (const std::runtime_error& error) {
       std::fprintf(stderr, "%s\n", error.what());
       ++failures;

@@ -90,7 +90,8 @@ TEST_CASE("a preset without a gain gets one, and what is no preset is refused", 
 }
 
 TEST_CASE("a printed preset reads as what it is", "[preset_edit]") {
-  Preset preset{.model = "b.mdl", .description = "a \"b\" \\", .voices = 4, .gain = 12.0, .damper_s = 0.3};
+  Preset preset{
+      .model = "b.mdl", .description = "a \"b\" \\", .voices = 4, .gain = 12.0, .damper_s = 0.3};
   preset.transpose = -12;
   preset.parameters = {{"K", 0.1, 0.01, 0.2}};
   preset.controls = {{.source = ControlSource::note,

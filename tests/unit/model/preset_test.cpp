@@ -240,7 +240,7 @@ TEST_CASE("every fault of a preset is told with its line and column", "[preset]"
       {control(to + "from = \"note\"\ncurve = \"round\""), 5, 9,
        "'curve' must be linear or exponential"},
       {control(to + "from = \"note\"\ncurve = \"exponential\""), 2, 1,
-       "an exponential curve needs a range above 0"},
+       "an exponential curve needs a range on one side of 0"},
       {control(to + "from = \"note\"\ntravel = -1"), 5, 10, "'travel' must lie between 0 and"},
       {control(to + "from = \"note\"\nkeys = [60, 36]"), 5, 8, "'keys' is the wrong way round"},
       {control(to + "from = \"note\"\nkeys = [60, 128]"), 5, 13,
