@@ -6,7 +6,6 @@
 #include <cmath>
 
 #include "core/model/language/tokens.h"
-#include "core/model/preset/toml.h"
 #include "core/model/preset/toml_depth.h"
 #include "core/model/preset/toml_table.h"
 #include "core/model/topology.h"
