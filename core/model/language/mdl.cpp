@@ -364,6 +364,9 @@ void Reader::look_over() {
   if (!out_.ok()) {
     return;
   }
+  const auto called = [](const Mass& mass) {
+    return mass.kind == MassKind::point ? "the place" : quoted("@" + mass.name.text());
+  };
   if (network.masses.empty() && network.macros.empty()) {
     return say(Severity::error, 1, {"", 1}, "the model has no masses: nothing can sound");
   }
@@ -387,8 +390,7 @@ void Reader::look_over() {
         network.masses[link.b].kind != MassKind::position) {
       say(Severity::warning, link.location.line, {link.name, link.location.column},
           "the contact's ends look swapped: it acts while the second is below the first, here " +
-              quoted("@" + network.masses[link.b].name.text()) + " below " +
-              quoted("@" + network.masses[link.a].name.text()));
+              called(network.masses[link.b]) + " below " + called(network.masses[link.a]));
     }
   }
   for (const Input& input : network.inputs) {
