@@ -14,6 +14,7 @@ constexpr double quiet_s = 0.5;         // longer than half a period of the slow
 constexpr double level_s = 0.02;        // in which a voice follows its channel's level
 constexpr double damper_on_s = 0.005;   // the time constant with which a damper comes on
 constexpr double damped_away = 1e-6;    // of the gain: nothing is heard any more
+constexpr double replaced_s = 0.2;      // T60 of what rings by a key that is pressed again
 constexpr double release_reach = 4.0;   // by which a key of velocity 0 or 1 is slower or faster
 
 // Who gives way first: whose key is up, then who is quieter.
@@ -99,6 +100,9 @@ Press Voices::press_key(int key, double velocity, std::uint8_t channel, double h
     move_to_key(*alone, key, glides, highest_factor);
     return is_struck ? Press::strikes : Press::moves;
   }
+  if (!is_one && !restrikes_) {
+    damp_earlier(key, channel);
+  }
   const bool stays = is_one && !voices_[last_].fading && voices_[last_].is_whole();
   Voice& voice = stays ? voices_[last_] : voice_for(key, channel);
   last_ = static_cast<std::size_t>(&voice - voices_.data());
@@ -133,44 +137,6 @@ void Voices::attach(Voice& voice, int key, std::uint8_t channel) {
   if (voice.semitones != channels_.semitones(channel)) {
     voice.semitones = channels_.semitones(channel);
     voice.is_retuned = has_changed_ = true;
-  }
-}
-
-// The pitch of a voice that sounds becomes that of a key, unless it is that already.
-void Voices::move_to_key(Voice& voice, int key, bool glides, double highest_factor) {
-  const double key_hz = tuning_.frequency_hz(static_cast<std::size_t>(key));
-  const double hz = playable_hz(key, highest_factor);
-  if (key_hz == voice.key_hz || hz == 0.0) {
-    return;
-  }
-  const double before_hz = voice.frequency_hz * std::exp2(voice.glide / 12.0);
-  voice.key_hz = key_hz;
-  voice.frequency_hz = hz;
-  voice.glide = 0.0;
-  voice.is_retuned = has_changed_ = true;
-  if (glides) {
-    glide_from(voice, before_hz);
-  }
-  last_hz_[voice.channel % Channels::count] = voice.frequency_hz;
-}
-
-void Voices::glide_from(Voice& voice, double frequency_hz) {
-  const double seconds = channels_.glide_s(voice.channel, playing_.glide_s);
-  if (seconds <= 0.0 || playing_.bare) {
-    return;
-  }
-  const double steps = std::max(1.0, seconds * rate_hz_ / static_cast<double>(max_block_frames));
-  voice.glide = 12.0 * std::log2(frequency_hz / voice.frequency_hz);
-  voice.glide_step = std::fabs(voice.glide) / steps;
-}
-
-void Voices::glide_on() {
-  for (Voice& voice : voices_) {
-    if (voice.awake && voice.glide != 0.0) {
-      const double left = std::max(0.0, std::fabs(voice.glide) - voice.glide_step);
-      voice.glide = std::copysign(left, voice.glide);
-      voice.is_retuned = has_changed_ = true;
-    }
   }
 }
 
@@ -314,22 +280,6 @@ bool Voices::is_let_go(Voice& voice, std::uint8_t channel) const {
          !channels_.sustains(voice.channel);
 }
 
-void Voices::retune(std::uint8_t channel) {
-  // What is said to one member may be for all of them, such as the range of bends.
-  const ChannelMask zone = channels_.reach(channels_.master_of(channel));
-  for (Voice& voice : voices_) {
-    if (!voice.awake || !is_on(voice, zone)) {
-      continue;
-    }
-    const bool follows = hears(voice, {.channels = channel_bit(voice.channel)});
-    const double semitones = follows ? channels_.semitones(voice.channel) : voice.semitones;
-    if (semitones != voice.semitones || is_on(voice, channels_.reach(channel))) {
-      voice.semitones = semitones;
-      voice.is_retuned = has_changed_ = true;
-    }
-  }
-}
-
 void Voices::follow_level(std::uint8_t channel) {
   for (Voice& voice : voices_) {
     if (voice.awake && is_on(voice, channels_.reach(channel))) {
@@ -356,10 +306,23 @@ void Voices::damp(std::uint8_t channel) {
   }
 }
 
+// A key that is pressed again and starts a voice of its own stops what still rings by it, as a hand
+// does that meets its string.
+void Voices::damp_earlier(int key, std::uint8_t channel) {
+  for (Voice& voice : voices_) {
+    if (voice.is_live() && voice.has_key && voice.key == key && voice.channel == channel) {
+      voice.held = voice.sustained = voice.latched = false;
+      voice.is_released = voice.is_replaced = true;
+      voice.release_s = replaced_s;
+      damp(voice);
+    }
+  }
+}
+
 void Voices::damp(Voice& voice) const {
   constexpr double decades_of_t60 = 3.0;
   const bool may_lie = voice.is_released && !voice.latched && playing_.damper_s > 0.0;
-  const double share = may_lie ? channels_.damper(voice.channel) : 0.0;
+  const double share = voice.is_replaced ? 1.0 : may_lie ? channels_.damper(voice.channel) : 0.0;
   voice.decay.kept_goal =
       std::pow(10.0, -decades_of_t60 * share / (std::max(1e-3, voice.release_s) * rate_hz_));
 }
@@ -377,26 +340,6 @@ void Voices::adopt_channels(const Voices& from) {
     retune(channel);
     follow_level(channel);
     damp(channel);
-  }
-}
-
-void Voices::retune_key(std::size_t key, double frequency_hz, bool is_now, double highest_factor) {
-  tuning_.retune(key, frequency_hz);
-  for (Voice& voice : voices_) {
-    if (is_now && voice.awake && voice.has_key && voice.key == key && voice.frequency_hz > 0.0 &&
-        frequency_hz > 0.0) {
-      move_to_key(voice, static_cast<int>(key), false, highest_factor);
-    }
-  }
-}
-
-void Voices::reset_tuning(double highest_factor) {
-  tuning_.reset();
-  for (Voice& voice : voices_) {
-    if (voice.awake && voice.has_key && voice.frequency_hz > 0.0 &&
-        tuning_.frequency_hz(voice.key) > 0.0) {
-      move_to_key(voice, voice.key, false, highest_factor);
-    }
   }
 }
 
@@ -554,45 +497,6 @@ Voice& Voices::voice_for(int key, std::uint8_t channel) {
 bool Voices::sounds(const Voice& voice, int key, std::uint8_t channel) const {
   return restrikes_ && voice.is_live() && voice.is_whole() && voice.has_key && voice.key == key &&
          voice.channel == channel;
-}
-
-// --- tuning -------------------------------------------------------------------------------------
-
-// The key's frequency; 0 where it has none, or none that can be played.
-double Voices::playable_hz(int key, double highest_factor) const {
-  const double hz = tuning_.frequency_hz(static_cast<std::size_t>(key));
-  return hz < 0.5 * rate_hz_ && playing_.pitches.factor_at(hz) <= highest_factor ? hz : 0.0;
-}
-
-double Voices::factor_for(const Voice& voice, double highest_factor) const {
-  const double bent =
-      std::exp2((voice.semitones + channels_.zone_semitones(voice.channel) + voice.glide) / 12.0);
-  const double factor = voice.frequency_hz > 0.0
-                            ? playing_.pitches.factor_at(voice.frequency_hz * bent)
-                            : bent * bent;
-  return std::min(factor, highest_factor);
-}
-
-double Voices::factor_of(std::size_t lane, double highest_factor) const {
-  const Voice& voice = voices_[lane];
-  return voice.is_new || voice.is_retuned ? factor_for(voice, highest_factor) : voice.factor;
-}
-
-void Voices::retune(bool all, double highest_factor) {
-  for (Voice& voice : voices_) {
-    if (voice.awake && (all || voice.is_new || voice.is_retuned)) {
-      const double factor = factor_for(voice, highest_factor);
-      voice.is_retuned |= factor != voice.factor;
-      voice.factor = factor;
-    }
-  }
-}
-
-void Voices::forget_changes() {
-  for (Voice& voice : voices_) {
-    voice.is_new = voice.is_retuned = false;
-  }
-  has_changed_ = false;
 }
 
 }  // namespace ressort

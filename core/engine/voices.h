@@ -89,6 +89,7 @@ struct Voice {
   double factor = 1.0;        // on every stiffness
   Decay decay;
   bool is_released = false;  // its key has been up since it was pressed
+  bool is_replaced = false;  // by another voice of its key
   double release_s = 0.0;    // T60 that its damper wants, by how fast the key went up
   double strength = 1.0;     // of the output, by how hard the key was pressed
   // Its strength and its channel's level, which it follows in equal steps.
@@ -188,6 +189,7 @@ class Voices {
   // Lays the damper on, or lifts it, as its key and pedals say.
   void damp(Voice& voice) const;
   void damp(std::uint8_t channel);
+  void damp_earlier(int key, std::uint8_t channel);
   void retune(std::uint8_t channel);
   void follow_level(Voice& voice) const;
   void follow_level(std::uint8_t channel);

@@ -3,6 +3,7 @@
 
 #include <cmath>
 #include <cstdio>
+#include <filesystem>
 #include <fstream>
 #include <map>
 
@@ -19,6 +20,23 @@ constexpr const char* osc_port = "19777";
 lo_address osc() {
   static const lo_address address = lo_address_new("127.0.0.1", osc_port);
   return address;
+}
+
+// A preset whose every note is the same click and gone 60 dB down in 1400 frames: whoever listens
+// for the next one hears nothing else.
+const char* click() {
+  static const std::string path = [] {
+    const std::string name = "ressort-click-" + std::to_string(getpid());
+    const std::string there = (std::filesystem::temp_directory_path() / name).string();
+    std::ofstream(there + ".mdl") << "@g ground 0\n@m mass 1 0 0\n@s springDamper @m @g 0.02 0.01\n"
+                                     "@in1 frcInput @m\n@out1 posOutput @m\n";
+    std::ofstream(there + ".toml")
+        << "model = \"" << name
+        << ".mdl\"\nvoices = 16\ntuning = \"fixed\"\n[[control]]\n"
+           "from = \"note\"\nto = \"in1\"\nhow = \"impulse\"\nrange = [0.01, 0.1]\n";
+    return there + ".toml";
+  }();
+  return path.c_str();
 }
 
 // Waits until the program answers on OSC.
@@ -61,7 +79,7 @@ std::vector<std::size_t> onsets(const Listener& listener, std::size_t first) {
 
 TEST_CASE("MIDI notes start on their frame", "[jack_midi]") {
   const Server server(1024);
-  Child play(program({"play", "PolyTriangle", "-a", "jack", "-i", "-u", osc_port}));
+  Child play(program({"play", click(), "-a", "jack", "-i", "-u", osc_port}));
   REQUIRE(answers());
   constexpr std::size_t first = 20000;
   Listener listener(first + (notes + 1) * spacing);
@@ -83,7 +101,7 @@ TEST_CASE("MIDI notes start on their frame", "[jack_midi]") {
 
 TEST_CASE("The last of two and a half thousand messages in one block is heard", "[jack_midi]") {
   const Server server(1024);
-  Child play(program({"play", "PolyTriangle", "-a", "jack", "-i", "-u", osc_port}));
+  Child play(program({"play", click(), "-a", "jack", "-i", "-u", osc_port}));
   REQUIRE(answers());
   Listener listener(48000 * 20);
   std::vector<Listener::Message> messages(2500, {20000, {0xb0, 3, 0}});
@@ -96,7 +114,7 @@ TEST_CASE("The last of two and a half thousand messages in one block is heard", 
 
 TEST_CASE("OSC bundles start on the frame of their time tag", "[osc_time]") {
   const Server server(1024);
-  Child play(program({"play", "PolyTriangle", "-a", "jack", "-i", "-u", osc_port}));
+  Child play(program({"play", click(), "-a", "jack", "-i", "-u", osc_port}));
   REQUIRE(answers());
   Listener listener(48000 + (notes + 4) * spacing);
   listener.start("ressort:out_left", "");
@@ -275,7 +293,7 @@ TEST_CASE("The callback allocates, locks, reads, writes and waits never", "[call
 
 TEST_CASE("RtMidi's messages are heard, through its JACK side", "[rtmidi]") {
   const Server server(256);
-  Child play(program({"play", "PolyTriangle", "-a", "dummy", "-m", "jack", "-u", osc_port}));
+  Child play(program({"play", click(), "-a", "dummy", "-m", "jack", "-u", osc_port}));
   REQUIRE(answers());
   Listener listener(48000 * 20);
   std::vector<Listener::Message> messages;

@@ -113,6 +113,22 @@ TEST_CASE("level_db makes a note louder and nothing else", "[dampers]") {
   }
 }
 
+TEST_CASE("a key that is pressed again stops what rings by it", "[dampers]") {
+  Preset preset = struck(8);
+  preset.controls[0].has_level = true;
+  Player player(ringing_string(), preset);
+  std::vector<Event> events;
+  for (std::uint32_t n = 0; n < 10; ++n) {
+    events.push_back(note_on(4410 * n, 60));
+  }
+  player.run(4410 * 10, events);
+  CHECK(player.engine().meters().stolen == 0);
+  // T60 of 0.2 s: four others are less than 120 dB down; half a second later none is.
+  CHECK(player.engine().meters().stepped <= 5);
+  player.run(22050);
+  CHECK(player.engine().meters().stepped == 1);
+}
+
 TEST_CASE("a long blow gives as much momentum as a short one", "[dampers]") {
   // A free mass of 1: after the blow it moves at F / M a sample, which its position shows.
   const std::string text = "@m mass 1 0 0\n@in1 frcInput @m\n@out1 posOutput @m\n";
