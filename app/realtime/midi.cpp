@@ -111,7 +111,7 @@ bool MidiReader::finish(Event& event) {
 //   7e device 08 01 program name[16] (semitone fraction fraction)[128] sum
 void MidiReader::end_exclusive() {
   constexpr std::size_t change_head = 6;
-  constexpr std::size_t dump_size = dump_head + 3 * 128 + 1;
+  constexpr std::size_t dump_size = dump_head + std::size_t{3} * 128 + 1;
   const auto& bytes = exclusive_;
   const std::size_t size = exclusive_size_;
   const auto begins = [&](std::uint8_t kind, std::uint8_t what) {
@@ -121,7 +121,7 @@ void MidiReader::end_exclusive() {
   is_dump_ = begins(0x7e, 0x01);
   bool is_right = size <= longest_exclusive;
   if (is_change) {
-    is_right = is_right && size == change_head + 4U * bytes[5];
+    is_right = is_right && size == change_head + std::size_t{4} * bytes[5];
     tuned_next_ = change_head;
     tuned_end_ = size;
   } else if (is_dump_) {

@@ -192,7 +192,7 @@ void find_elimination(const Program& program, std::vector<PassiveLink>& links, C
 
 std::size_t Cluster::numbers() const {
   const std::size_t own = joint_numbers * count;
-  return inverse_mass.empty() ? own + 2 * count * count + 5 * count
+  return inverse_mass.empty() ? own + std::size_t{2} * count * count + std::size_t{5} * count
                               : own + 9 * inverse_mass.size() + elimination.row.size();
 }
 

@@ -8,9 +8,9 @@
 #include <utility>
 #include <vector>
 
+#include "app/session/sound_file.h"
 #include "tests/support/catch.h"
 #include "tests/support/harness.h"
-#include "app/session/sound_file.h"
 #include "tests/system/faust_models.h"
 
 using namespace ressort;

@@ -363,8 +363,9 @@ std::string gallery_picture(const std::vector<ShownPreset>& presets) {
       svg_head(left + across * width + 4.0, static_cast<double>(down) * height + 8.0, 9.0) +
       "<rect width=\"100%\" height=\"100%\" fill=\"#fff\"/>\n";
   for (std::size_t i = 0; i < shown.size(); ++i) {
+    const std::size_t row = i / across;
     const Area area{left + static_cast<double>(i % across) * width,
-                    20.0 + static_cast<double>(i / across) * height, width - 14.0, height - 40.0};
+                    20.0 + static_cast<double>(row) * height, width - 14.0, height - 40.0};
     const Spectrogram& all = shown[i]->spectrogram;
     const Spectrogram small = made_smaller(all, (all.rows + 1) / 2, all.columns / 2);
     svg += "<text x=\"" + px(area.x) + "\" y=\"" + px(area.y - 6.0) +

@@ -16,9 +16,9 @@
 #include <sstream>
 #include <thread>
 
+#include "app/session/sound_file.h"
 #include "tests/support/catch.h"
 #include "tests/support/data_folder.h"
-#include "app/session/sound_file.h"
 
 namespace ressort {
 namespace {

@@ -4,8 +4,8 @@
 
 #include <chrono>
 
-#include "tests/support/console_harness.h"
 #include "app/session/sound_file.h"
+#include "tests/support/console_harness.h"
 
 namespace ressort {
 
