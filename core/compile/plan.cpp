@@ -89,7 +89,9 @@ class Chooser {
     const std::uint32_t times = steps_to_reach();
     if (times <= most_steps_to_reach && !may_gain_) {
       Program fine = oversampled_program(program_, times);
-      Chooser chooser(fine, load_at_steps(), 0, {}, progress_);
+      const Workload load = load_at_steps();
+      const Budget none;
+      Chooser chooser(fine, load, 0, none, progress_);
       chooser.choose();
       progress_.spend(program_.ends.size() + program_.position.size());
       add(Method::oversampled, oversampled_form(std::move(fine), times));
