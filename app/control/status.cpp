@@ -51,10 +51,11 @@ std::string tell_modes(const Status& now) {
 
 // A bar of 3 dB a step, from -60 dBFS to full scale.
 std::string level_meter(double peak_db) {
-  constexpr int steps = 20;
-  const int filled = std::clamp(static_cast<int>(std::ceil((peak_db + 60.0) / 3.0)), 0, steps);
-  return "[" + std::string(static_cast<std::size_t>(filled), '#') +
-         std::string(static_cast<std::size_t>(steps - filled), '-') + "]";
+  constexpr std::size_t steps = 20;
+  // Silence is minus infinity of them.
+  const double step = std::clamp(std::ceil((peak_db + 60.0) / 3.0), 0.0, double{steps});
+  const auto filled = static_cast<std::size_t>(step);
+  return "[" + std::string(filled, '#') + std::string(steps - filled, '-') + "]";
 }
 
 // "A3 (100)": the middle C is C4.
