@@ -90,8 +90,7 @@ class Chooser {
     if (times <= most_steps_to_reach && !may_gain_) {
       Program fine = oversampled_program(program_, times);
       const Workload load = load_at_steps();
-      const Budget none;
-      Chooser chooser(fine, load, 0, none, progress_);
+      Chooser chooser(fine, load, 0, {}, progress_);
       chooser.choose();
       progress_.spend(program_.ends.size() + program_.position.size());
       add(Method::oversampled, oversampled_form(std::move(fine), times));
