@@ -39,13 +39,15 @@ struct Step {
 
 using Formula = std::vector<Step>;
 
-// The deepest stack that a formula may need; the reader refuses a deeper one.
+// The deepest stack that a formula as written may need; the reader refuses a deeper one. What is
+// made of several formulas needs some more.
 inline constexpr std::size_t max_formula_depth = 32;
+inline constexpr std::size_t formula_stack = max_formula_depth + 4;
 inline constexpr std::size_t max_formula_steps = 256;
 
 // The formula's value. Wait-free: bounded by its length, which the reader bounds. [any thread]
 inline double evaluate(std::span<const Step> formula, std::span<const double> parameters) {
-  std::array<double, max_formula_depth> stack{};
+  std::array<double, formula_stack> stack{};
   std::size_t top = 0;
   for (const Step& step : formula) {
     switch (step.op) {

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "core/analysis/places.h"
+#include "core/sampled_mode.h"
 
 namespace ressort {
 namespace {
@@ -60,20 +61,38 @@ class Assembler {
         continue;
       }
       const Tap& tap = network_.taps[network_.masses[end].tap];
-      for (std::uint32_t node = tap.first; node < tap.first + tap.length * tap.width; ++node) {
-        add_end(node, 1.0);
+      for (std::uint32_t at = 0; at < terms_under(tap); ++at) {
+        if (tap.places > 0) {
+          add_shape(tap, at);
+        } else {
+          add_end(tap.first + at, 1.0);
+        }
         close(index, true, scale);
       }
     }
   }
 
-  // How many terms an end at a place that moves takes.
+  // How many entries an end at a place that moves takes.
   std::uint64_t nodes_under(std::uint32_t mass) const {
     if (!is_live_place(network_, mass)) {
       return 0;
     }
     const Tap& tap = network_.taps[network_.masses[mass].tap];
-    return std::uint64_t{tap.length} * tap.width;
+    return std::uint64_t{tap.length} * (tap.places > 0 ? tap.places : tap.width);
+  }
+
+  // A place that moves is between nodes, or on a body between places.
+  static std::uint32_t terms_under(const Tap& tap) {
+    return tap.places > 0 ? tap.places : tap.length * tap.width;
+  }
+
+  void add_shape(const Tap& tap, std::uint32_t place) {
+    const auto shape = shape_at(network_, tap, place);
+    for (std::uint32_t mode = 0; mode < tap.length; ++mode) {
+      if (shape[mode] != 0.0) {
+        add(row_[tap.first + mode], shape[mode]);
+      }
+    }
   }
 
   bool is_held(std::uint32_t mass) const {
@@ -89,12 +108,16 @@ class Assembler {
     if (row == held) {
       return;
     }
-    for (std::size_t i = first_; i < out_.entries.size(); ++i) {
-      if (out_.entries[i].row == row) {
-        out_.entries[i].share += share;
-        return;
-      }
+    if (entry_.size() <= row) {
+      entry_.resize(row_.size(), held);
     }
+    std::uint32_t& entry = entry_[row];
+    if (entry != held && entry >= first_ && entry < out_.entries.size() &&
+        out_.entries[entry].row == row) {
+      out_.entries[entry].share += share;
+      return;
+    }
+    entry = static_cast<std::uint32_t>(out_.entries.size());
     out_.entries.push_back({row, share});
   }
 
@@ -114,8 +137,9 @@ class Assembler {
 
   const Network& network_;
   Assembly out_;
-  std::vector<std::uint32_t> row_;  // [mass of the network]
-  std::size_t first_ = 0;           // of the entries of the term at hand
+  std::vector<std::uint32_t> row_;    // [mass of the network]
+  std::vector<std::uint32_t> entry_;  // [row] where it was entered last
+  std::size_t first_ = 0;             // of the entries of the term at hand
 };
 
 // One end of each argument's range.
@@ -125,6 +149,37 @@ LawNumbers numbers(const Link& link, std::span<const Range> arguments, double Ra
     values[i] = range_at(arguments, link.arguments[i]).*end;
   }
   return values;
+}
+
+// The largest or the smallest load of a body's mode, for its smallest mass. With a parameter in
+// the T60 its stiffness turns with both: between so many samples of the damping it changes by no
+// more than its steepest slope allows.
+Load load_of_mode(const Mass& mass, std::span<const Range> arguments, double rate_ratio,
+                  bool is_highest) {
+  constexpr int samples = 64;
+  constexpr double steepest = 2.4;  // of 1 + r^2 - 2 r cos w over Z/M
+  const Range m = range_at(arguments, mass.mass);
+  const Range stiffness = range_at(arguments, mass.stiffness);
+  const Range damping = range_at(arguments, mass.damping);
+  const double least = std::max(m.lowest, 1e-300);
+  const double most = std::max(m.highest, least);
+  // K and Z hold M as a factor: their share of it is sure where M is one number.
+  const double r = rate_ratio;
+  const double k = r * r * (is_highest ? stiffness.highest / least : stiffness.lowest / most);
+  const double z_low = r * std::max(0.0, damping.lowest / most);
+  const double z_high = r * std::max(0.0, damping.highest / least);
+  const int count = z_high > z_low ? samples : 1;
+  double pull = is_highest ? 0.0 : HUGE_VAL;
+  for (int i = 0; i < count; ++i) {
+    const double z = z_low + (z_high - z_low) * i / std::max(1, count - 1);
+    const SampledMode sampled = sampled_mode(1.0, k, z);
+    const double here = sampled.stiffness / sampled.mass;
+    pull = is_highest ? std::max(pull, here) : std::min(pull, here);
+  }
+  const double margin = count > 1 ? steepest * 0.5 * (z_high - z_low) / (count - 1) : 0.0;
+  const double rubbed = -std::expm1(-(is_highest ? z_high : z_low));
+  return {.stiff = least * std::max(0.0, is_highest ? pull + margin : pull - margin),
+          .damped = 2.0 * least * rubbed};
 }
 
 }  // namespace
@@ -149,6 +204,9 @@ Range range_at(std::span<const Range> arguments, ArgumentId argument) {
 Load highest_load(const Network& network, const Assembly::Term& term,
                   std::span<const Range> arguments, double rate_ratio) {
   const double r = rate_ratio;
+  if (!term.is_link && network.masses[term.element].is_mode) {
+    return load_of_mode(network.masses[term.element], arguments, rate_ratio, true);
+  }
   if (!term.is_link) {
     const Mass& mass = network.masses[term.element];
     const auto highest = [&](ArgumentId id) {
@@ -176,6 +234,9 @@ Load lowest_load(const Network& network, const Assembly::Term& term,
     return Load{.stiff = term.scale * std::min(most, k) * r * r,
                 .damped = 2.0 * term.scale * std::min(most, z) * r};
   };
+  if (!term.is_link && network.masses[term.element].is_mode) {
+    return load_of_mode(network.masses[term.element], arguments, rate_ratio, false);
+  }
   if (!term.is_link) {
     const Mass& mass = network.masses[term.element];
     return load(range_at(arguments, mass.stiffness).lowest,

@@ -1,6 +1,8 @@
 // The edge bound on the stiffness factor: linear in time and memory whatever the network.
 #include <algorithm>
+#include <cmath>
 #include <map>
+#include <utility>
 
 #include "core/analysis/assembly.h"
 #include "core/analysis/places.h"
@@ -38,9 +40,12 @@ class Bound {
       }
     }
     for (std::uint32_t i = 0; i < network_.links.size(); ++i) {
-      const Sum link = load({.element = i});
-      add(network_.links[i].a, link);
-      add(network_.links[i].b, link);
+      const auto [a, b] = std::pair(network_.links[i].a, network_.links[i].b);
+      const double way = std::max({1.0, way_of(a), way_of(b)});
+      Sum link;
+      link.add(load({.element = i}), way * way);
+      add(a, link);
+      add(b, link);
     }
     settle_live_places();
     divide_by_masses();
@@ -66,8 +71,30 @@ class Bound {
       live_[network_.masses[end].tap].add(link, 1.0);
       return;
     }
-    each_share(network_, end,
-               [&](std::uint32_t mass, double share) { sums_[mass].add(link, share); });
+    const double way = std::max(way_of(end), 1e-300);
+    each_share(network_, end, [&](std::uint32_t mass, double share) {
+      sums_[mass].add(link, std::fabs(share) / way);
+    });
+  }
+
+  // How far a place goes if no node around it goes farther than 1: on a body more than that, or
+  // less. A link on such a place is at most as stiff as one that much more on a place that is
+  // between its nodes.
+  double way_of(std::uint32_t end) const {
+    const Mass& mass = network_.masses[end];
+    if (mass.kind != MassKind::point || network_.taps[mass.tap].places == 0) {
+      return 1.0;
+    }
+    const Tap& tap = network_.taps[mass.tap];
+    double most = 0.0;
+    for (std::uint32_t place = 0; place < tap.places; ++place) {
+      double sum = 0.0;
+      for (const double displacement : shape_at(network_, tap, place)) {
+        sum += std::fabs(displacement);
+      }
+      most = std::max(most, sum);
+    }
+    return most;
   }
 
   // What holds on to a live place may hold on to any of its nodes, all of one macro's at once.
@@ -106,8 +133,10 @@ class Bound {
       return worst_.at(network_.taps[network_.masses[end].tap].first);
     }
     Sum sum;
-    each_share(network_, end,
-               [&](std::uint32_t mass, double share) { sum.add(sums_[mass], share); });
+    const double way = std::max(way_of(end), 1e-300);
+    each_share(network_, end, [&](std::uint32_t mass, double share) {
+      sum.add(sums_[mass], std::fabs(share) / way);
+    });
     return sum;
   }
 

@@ -112,7 +112,7 @@ bool is_unary(Op op) {
 // Runs the formula on a stack of anything, as evaluate() does on numbers.
 template <class Value, class Number, class Parameter, class One, class Two>
 Value run(std::span<const Step> formula, Number number, Parameter parameter, One one, Two two) {
-  std::array<Value, max_formula_depth> stack{};
+  std::array<Value, formula_stack> stack{};
   std::size_t top = 0;
   for (const Step& step : formula) {
     if (step.op == Op::number) {

@@ -1,7 +1,6 @@
 #include "core/analysis/linear.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <numbers>
 #include <tuple>
@@ -40,13 +39,25 @@ class Body {
 
   int size() const { return static_cast<int>(scale_.size()); }
 
+  // How much of a shape's motion is that of bodies' modes, 0..1.
+  double share_of_modes(const Vector& shape) const {
+    double sum = 0.0;
+    for (std::size_t i = 0; i < index_.size(); ++i) {
+      if (network_.masses[i].is_mode) {
+        const double part = shape[static_cast<std::size_t>(index_[i])];
+        sum += part * part;
+      }
+    }
+    return sum / dot(shape, shape);
+  }
+
   // M^(-1/2) K M^(-1/2), its lower half.
   SparseMatrix stiffness() const {
     std::vector<double> diagonal(scale_.size());
     std::vector<SparseMatrix::Element> elements;
     elements.reserve(network_.links.size() + scale_.size());
     each_spring([&](const Shares& shares, double k, double) {
-      for (std::size_t p = 0; p < shares.count; ++p) {
+      for (std::size_t p = 0; p < shares.of.size(); ++p) {
         for (std::size_t q = 0; q <= p; ++q) {
           const auto [i, a] = shares.of[p];
           const auto [j, b] = shares.of[q];
@@ -69,8 +80,8 @@ class Body {
     Vector sum(vector.size());
     each_spring([&](const Shares& shares, double, double z) {
       const double force = z * shares.along(vector);
-      for (std::size_t p = 0; p < shares.count; ++p) {
-        sum[static_cast<std::size_t>(shares.of[p].first)] += force * shares.of[p].second;
+      for (const auto& [row, share] : shares.of) {
+        sum[static_cast<std::size_t>(row)] += force * share;
       }
     });
     return sum;
@@ -97,18 +108,17 @@ class Body {
  private:
   static constexpr int held = -1;
 
-  // What a link's distance is, as a sum over rows: two masses, or up to four around either place.
+  // What a link's distance is, as a sum over rows: two masses, those around a place, or a body's.
   struct Shares {
     double along(const Vector& vector) const {
       double sum = 0.0;
-      for (std::size_t p = 0; p < count; ++p) {
-        sum += of[p].second * vector[static_cast<std::size_t>(of[p].first)];
+      for (const auto& [row, share] : of) {
+        sum += share * vector[static_cast<std::size_t>(row)];
       }
       return sum;
     }
 
-    std::array<std::pair<int, double>, 8> of;
-    std::size_t count = 0;
+    std::vector<std::pair<int, double>> of;
   };
 
   double value(ArgumentId id) const { return id == no_argument ? 0.0 : values_[id]; }
@@ -118,8 +128,8 @@ class Body {
         network_, mass,
         [&](std::uint32_t i, double share) {
           if (index_[i] != held) {
-            shares.of[shares.count++] = {
-                index_[i], sign * share * scale_[static_cast<std::size_t>(index_[i])]};
+            shares.of.emplace_back(index_[i],
+                                   sign * share * scale_[static_cast<std::size_t>(index_[i])]);
           }
         },
         parameters_);
@@ -128,10 +138,11 @@ class Body {
   // Calls use(shares, k, z).
   template <class Use>
   void each_spring(Use&& use) const {
+    Shares shares;
     for (std::uint32_t i = 0; i < index_.size(); ++i) {
       const Mass& mass = network_.masses[i];
       if (mass.kind == MassKind::oscillator) {
-        Shares shares;
+        shares.of.clear();
         hang(shares, i, 1.0);
         use(shares, value(mass.stiffness), value(mass.damping));
       }
@@ -139,7 +150,7 @@ class Body {
     for (const Link& link : network_.links) {
       if (link.a != link.b) {
         const LinearPart part = linear_part(link);
-        Shares shares;
+        shares.of.clear();
         hang(shares, link.a, 1.0);
         hang(shares, link.b, -1.0);
         use(shares, value(part.stiffness), value(part.damping));
@@ -343,7 +354,9 @@ std::optional<LowestShapes> lowest_shapes(const Network& network,
     return std::nullopt;
   }
   LowestShapes found;
-  std::tie(found.stiffness, found.damping) = body.between(shapes_of(body, *lowest, spectrum));
+  const std::vector<Vector> shapes = shapes_of(body, *lowest, spectrum);
+  found.share_of_modes = body.share_of_modes(shapes.front());
+  std::tie(found.stiffness, found.damping) = body.between(shapes);
   found.mode.stiffness = lowest->pairs.values[lowest->first];
   found.mode.damping = found.damping(0, 0);
   found.mode.frequency_hz =

@@ -36,6 +36,7 @@ struct LowestShapes {
   Mode mode;
   Matrix stiffness;  // [shape, shape]
   Matrix damping;
+  double share_of_modes = 0.0;  // of bodies in the lowest one's motion, 0..1
 };
 
 // The same modes, in the same cases and the same time. [any thread but audio]

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <algorithm>
+#include <span>
 
 #include "core/model/network.h"
 
@@ -19,8 +20,26 @@ inline bool is_live_place(const Network& network, std::uint32_t mass) {
   return is_live(tap.u) || is_live(tap.v);
 }
 
+// Where between which two of so many nodes, or of a body's places, a coordinate is.
+struct Between {
+  std::uint32_t below = 0;
+  double beyond = 0.0;
+};
+inline Between between(double coordinate, std::uint32_t count) {
+  const double p =
+      (coordinate > 0.0 ? std::min(coordinate, 1.0) : 0.0) * static_cast<double>(count - 1);
+  const auto below = static_cast<std::uint32_t>(p);
+  return {below, p - below};
+}
+
+// How far one of a body's places moves by its modes: one of Network::shapes for each.
+inline std::span<const double> shape_at(const Network& network, const Tap& tap,
+                                        std::uint32_t place) {
+  return std::span(network.shapes).subspan(tap.shape + std::size_t{place} * tap.length, tap.length);
+}
+
 // Calls `use(mass, share)` for the mass itself, or for those around a place, by the kernels'
-// weights. A place that is not live asks for no parameters.
+// weights. A place that is not live asks for no parameters. Shares add up to 1, but on a body.
 template <class Use>
 void each_share(const Network& network, std::uint32_t mass, Use&& use,
                 std::span<const double> parameters = {}) {
@@ -29,18 +48,21 @@ void each_share(const Network& network, std::uint32_t mass, Use&& use,
     return;
   }
   const Tap& tap = network.taps[network.masses[mass].tap];
-  struct Side {
-    std::uint32_t below = 0;
-    double beyond = 0.0;
-  };
-  const auto side = [&](ArgumentId coordinate, std::uint32_t nodes) {
-    const double value = argument_value(network, coordinate, parameters);
-    const double p = (value > 0.0 ? std::min(value, 1.0) : 0.0) * static_cast<double>(nodes - 1);
-    const auto below = static_cast<std::uint32_t>(p);
-    return Side{below, p - below};
-  };
-  const Side u = side(tap.u, tap.length);
-  const Side v = side(tap.v, tap.width);
+  const double along = argument_value(network, tap.u, parameters);
+  if (tap.places > 0) {
+    const Between u = between(along, tap.places);
+    const auto near = shape_at(network, tap, u.below);
+    const auto far = shape_at(network, tap, u.below + (u.beyond > 0.0 ? 1 : 0));
+    for (std::uint32_t mode = 0; mode < tap.length; ++mode) {
+      const double share = (1.0 - u.beyond) * near[mode] + u.beyond * far[mode];
+      if (share != 0.0) {
+        use(tap.first + mode, share);
+      }
+    }
+    return;
+  }
+  const Between u = between(along, tap.length);
+  const Between v = between(argument_value(network, tap.v, parameters), tap.width);
   for (std::uint32_t i = 0; i < 2; ++i) {
     for (std::uint32_t j = 0; j < 2; ++j) {
       const double share =

@@ -243,7 +243,7 @@ Result<Compiled> compile_by_stages(const Request& request) {
   const Promise promise = make_promise(request, reduced, machine, analysis, start);
   Planned planned = find_forms(request, std::move(machine), analysis, promise);
   if (shapes) {
-    analysis.pitches = make_pitches(*shapes, stepping_of_lowest(planned.machine, *mode),
+    analysis.pitches = make_pitches(*shapes, stepping_of_lowest(planned.machine, *shapes),
                                     options.rate_hz, rate_ratio);
     analysis.pitches.lowest_hz *= std::exp2(-preset.flattening_cents / 1200.0);
     reach(analysis, planned.more, options.rate_hz);

@@ -33,6 +33,7 @@ class ProgramMaker {
   Program make() {
     place_masses();
     place_links();
+    program_.shapes = network_.shapes;
     for (std::uint32_t i = 0; i < network_.inputs.size(); ++i) {
       const Input& input = network_.inputs[i];
       if (node_[input.mass] != nowhere) {
@@ -66,23 +67,58 @@ class ProgramMaker {
   std::uint32_t coefficient(ArgumentId argument, Unit unit) {
     const auto next = static_cast<std::uint32_t>(program_.coefficients.size());
     const auto [entry, is_new] = known_.try_emplace({argument, unit}, next);
-    if (!is_new) {
-      return entry->second;
-    }
+    return is_new ? add_coefficient(argument, unit) : entry->second;
+  }
+
+  std::uint32_t add_coefficient(ArgumentId argument, Unit unit) {
+    const auto next = static_cast<std::uint32_t>(program_.coefficients.size());
+    const Formula& formula = formula_of(argument);
+    program_.coefficients.push_back({.first = static_cast<std::uint32_t>(program_.steps.size()),
+                                     .count = static_cast<std::uint32_t>(formula.size()),
+                                     .unit = unit});
+    program_.steps.insert(program_.steps.end(), formula.begin(), formula.end());
+    depend(next, formula);
+    return next;
+  }
+
+  const Formula& formula_of(ArgumentId argument) const {
     static const Formula nothing = {{Op::number, 0, 0.0}};
-    const Formula& formula = argument == no_argument ? nothing : network_.arguments[argument];
-    program_.coefficients.push_back({static_cast<std::uint32_t>(program_.steps.size()),
-                                     static_cast<std::uint32_t>(formula.size()), unit});
+    return argument == no_argument ? nothing : network_.arguments[argument];
+  }
+
+  void depend(std::uint32_t coefficient, const Formula& formula) {
     for (const Step& step : formula) {
-      program_.steps.push_back(step);
       if (step.op == Op::parameter) {
         auto& depending = program_.depending[step.index];
-        if (depending.empty() || depending.back() != next) {
-          depending.push_back(next);
+        if (depending.empty() || depending.back() != coefficient) {
+          depending.push_back(coefficient);
         }
       }
     }
-    return next;
+  }
+
+  // A run of one mode of a body, whose three coefficients depend on each other's formulas.
+  void add_mode(std::uint32_t node, const Mass& mass) {
+    const auto mode = static_cast<std::uint32_t>(program_.modes.size());
+    const auto add = [&](ArgumentId argument, Unit unit) {
+      const std::uint32_t next = add_coefficient(argument, unit);
+      program_.coefficients[next].mode = mode;
+      for (const ArgumentId other : {mass.mass, mass.stiffness, mass.damping}) {
+        depend(next, formula_of(other));
+      }
+      return next;
+    };
+    const SampledCoefficients coefficients{.inverse_mass = add(mass.mass, Unit::inverse_mass),
+                                           .stiffness = add(mass.stiffness, Unit::stiffness),
+                                           .damping = add(mass.damping, Unit::damping)};
+    program_.modes.push_back(coefficients);
+    program_.mass_runs.push_back({.first = node,
+                                  .count = 1,
+                                  .inverse_mass = coefficients.inverse_mass,
+                                  .stiffness = coefficients.stiffness,
+                                  .damping = coefficients.damping,
+                                  .gravity = coefficient(no_argument, Unit::gravity),
+                                  .is_oscillator = true});
   }
 
   void place_masses() {
@@ -91,7 +127,7 @@ class ProgramMaker {
     const auto rank = [&](std::uint32_t i) {
       const Mass& m = masses[i];
       const int group = moves(m) ? 0 : m.kind == MassKind::ground ? 1 : 2;
-      return std::tuple(group, m.kind, m.mass, m.stiffness, m.damping, m.gravity,
+      return std::tuple(group, m.is_mode, m.kind, m.mass, m.stiffness, m.damping, m.gravity,
                         m.gravity_per_rate);
     };
     std::stable_sort(order.begin(), order.end(),
@@ -108,6 +144,10 @@ class ProgramMaker {
         continue;
       }
       ++program_.moving;
+      if (mass.is_mode) {
+        add_mode(node, mass);
+        continue;
+      }
       if (node > 0 && rank(order[node]) == rank(order[node - 1])) {
         ++program_.mass_runs.back().count;
         continue;
@@ -141,7 +181,9 @@ class ProgramMaker {
                                .length = tap.length,
                                .width = tap.width,
                                .u = coefficient(tap.u, Unit::plain),
-                               .v = coefficient(tap.v, Unit::plain)});
+                               .v = coefficient(tap.v, Unit::plain),
+                               .places = tap.places,
+                               .shape = tap.shape});
       program_.position[node_[i]] = network_.masses[tap.first].position;
     }
   }

@@ -5,6 +5,7 @@
 
 #include "core/kernels/direct/fourth_form.h"
 #include "core/kernels/domains/shards.h"
+#include "core/kernels/modal/modal_form.h"
 #include "core/kernels/oversampled/oversampled_form.h"
 
 namespace ressort {
@@ -43,6 +44,7 @@ class Chooser {
         load_(load),
         progress_(progress),
         most_modes_(most_modes),
+        eigenvectors_of_(most_tied_masses(program)),
         budget_(budget),
         is_asked_(budget.is_physical() || budget.silence_db > -Budget::unlimited) {}
 
@@ -82,12 +84,12 @@ class Chooser {
   std::optional<Part> reach(Judge* judge, const Accuracy& spent) {
     spent_ = spent;
     judge_ = judge;
-    if (program_.moving <= most_modes_) {
+    if (eigenvectors_of_ <= most_modes_) {
       consider(Method::modal);
     }
-    may_gain_ = program_.moving > most_modes_ && program_.moving <= patient_modes;
+    may_gain_ = eigenvectors_of_ > most_modes_ && eigenvectors_of_ <= patient_modes;
     const std::uint32_t times = steps_to_reach();
-    if (times <= most_steps_to_reach && !may_gain_) {
+    if (program_.modes.empty() && times <= most_steps_to_reach && !may_gain_) {
       Program fine = oversampled_program(program_, times);
       const Workload load = load_at_steps();
       Chooser chooser(fine, load, 0, {}, progress_);
@@ -150,15 +152,15 @@ class Chooser {
   // What is nearer to the continuous network than the published scheme: modes, which are exact, the
   // fourth order, or either scheme several times a sample; of more steps than are needed none.
   void consider_physical() {
-    if (program_.moving <= most_modes_) {
+    if (eigenvectors_of_ <= most_modes_) {
       consider(Method::modal);
     } else {
-      may_gain_ = program_.moving <= patient_modes;
+      may_gain_ = eigenvectors_of_ <= patient_modes;
     }
     consider(Method::fourth);
     consider(Method::direct);
-    if (program_.moving == 0) {
-      return;
+    if (program_.moving == 0 || !program_.modes.empty()) {
+      return;  // more steps bring a body's modes nowhere nearer
     }
     bool is_fourth_enough = has_fitting(Method::fourth);
     bool is_published_enough = false;
@@ -212,9 +214,9 @@ class Chooser {
 
   // Whether a form that takes long to find is worth the search.
   bool may_pay(const KernelRow& row) {
-    const bool pays = program_.moving <= patient_modes && program_.moving > 4 &&
+    const bool pays = eigenvectors_of_ <= patient_modes && program_.moving > 4 &&
                       worth_ns(row.method, row.least_ns(program_, load_)) < candidates_[best_].ns;
-    may_gain_ = pays && program_.moving > most_modes_;
+    may_gain_ = pays && eigenvectors_of_ > most_modes_;
     return pays && !may_gain_;
   }
 
@@ -285,7 +287,8 @@ class Chooser {
   const Workload& load_;
   const Progress& progress_;
   std::uint32_t most_modes_;
-  Budget budget_;  // without what the published scheme meets
+  std::uint32_t eigenvectors_of_;  // masses that hang together
+  Budget budget_;                  // without what the published scheme meets
   bool is_asked_;
   Judge* judge_ = nullptr;  // null: whatever is as published is near enough
   Accuracy spent_;

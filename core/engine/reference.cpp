@@ -50,8 +50,8 @@ void ReferenceScheme::behind(std::uint32_t node, Use&& use) const {
   if (program_.taps.empty() || node < program_.taps[0].node) {
     return use(node, Real(1));
   }
-  each_corner(corners_[node - program_.taps[0].node],
-              [&](std::uint32_t at, Real weight) { use(program_.tap_nodes[at], weight); });
+  const std::size_t tap = node - program_.taps[0].node;
+  each_behind(program_, program_.taps[tap], corners_[tap], use);
 }
 
 void ReferenceScheme::push(std::uint32_t node, Real force) {

@@ -99,11 +99,25 @@ void take_over(Bank<T>& bank, PartBank<T>& part, const PartBank<T>& from, const 
   coefficients.ramp_frames = ramp_frames;
 }
 
+// Coefficients mean the same to both: those of bodies' modes are other numbers where one form is
+// true to the continuous network and one is not.
+template <class T>
+bool share_numbers(const Bank<T>& bank, const Bank<T>& from) {
+  for (std::size_t i = 0; i < bank.parts.size(); ++i) {
+    const Program& to = bank.parts[i].program;
+    if (!to.modes.empty() && is_continuous(to.form) != is_continuous(from.parts[i].program.form)) {
+      return false;
+    }
+  }
+  return true;
+}
+
 }  // namespace
 
 template <class T>
 bool take_over(Bank<T>& bank, const Bank<T>& from, const Voices& voices) {
-  if (!std::all_of(from.parts.begin(), from.parts.end(),
+  if (!share_numbers(bank, from) ||
+      !std::all_of(from.parts.begin(), from.parts.end(),
                    [&](const PartBank<T>& part) { return can_be_left(part, voices, bank); })) {
     return false;
   }

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/sampled_mode.h"
+
 namespace ressort {
 namespace {
 
@@ -32,8 +34,8 @@ double rate_factor(Unit unit, double r) {
   return 1.0;
 }
 
-double coefficient_value(const Program& program, const Coefficient& coefficient,
-                         std::span<const double> parameters, double stiffness_factor) {
+double continuous_value(const Program& program, const Coefficient& coefficient,
+                        std::span<const double> parameters, double stiffness_factor) {
   const double value =
       evaluate(std::span(program.steps).subspan(coefficient.first, coefficient.count), parameters);
   const double scaled = value * rate_factor(coefficient.unit, program.rate_ratio);
@@ -53,6 +55,35 @@ double coefficient_value(const Program& program, const Coefficient& coefficient,
       return scaled;
   }
   return scaled;
+}
+
+double sampled_value(const Program& program, const Coefficient& coefficient,
+                     std::span<const double> parameters, double stiffness_factor) {
+  if (coefficient.mode == no_mode) {
+    return continuous_value(program, coefficient, parameters, stiffness_factor);
+  }
+  const SampledCoefficients& mode = program.modes[coefficient.mode];
+  const auto value = [&](std::uint32_t c) {
+    return continuous_value(program, program.coefficients[c], parameters, stiffness_factor);
+  };
+  const double inverse = value(mode.inverse_mass);
+  const SampledMode sampled =
+      sampled_mode(1.0 / inverse, inverse * value(mode.stiffness), inverse * value(mode.damping));
+  return coefficient.unit == Unit::inverse_mass ? 1.0 / sampled.mass
+         : coefficient.unit == Unit::stiffness  ? sampled.stiffness
+                                                : sampled.damping;
+}
+
+double coefficient_value(const Program& program, const Coefficient& coefficient,
+                         std::span<const double> parameters, double stiffness_factor) {
+  return is_continuous(program.form)
+             ? continuous_value(program, coefficient, parameters, stiffness_factor)
+             : sampled_value(program, coefficient, parameters, stiffness_factor);
+}
+
+bool is_continuous(const Form& form) {
+  const auto* modes = std::get_if<Modes>(&form);
+  return modes != nullptr && modes->is_exact;
 }
 
 }  // namespace ressort

@@ -13,10 +13,21 @@
 
 namespace ressort {
 
+inline constexpr std::uint32_t no_mode = 0xffffffffu;
+
 struct Coefficient {
   std::uint32_t first = 0;  // steps [first, first + count) of Program::steps
   std::uint32_t count = 0;
   Unit unit = Unit::plain;
+  std::uint32_t mode = no_mode;  // index into Program::modes: of the continuous network
+};
+
+// A mode of a body: the coefficients of its oscillator, which as a form of the published scheme
+// steps them are three other numbers (core/sampled_mode.h).
+struct SampledCoefficients {
+  std::uint32_t inverse_mass = 0;
+  std::uint32_t stiffness = 0;
+  std::uint32_t damping = 0;
 };
 
 // Consecutive nodes that share their coefficients.
@@ -70,7 +81,8 @@ struct AudioParameter {
 };
 
 // A place on a rectangle of length * width nodes, by coordinates 0..1. It has no inertia: its
-// position is interpolated, and what acts on it acts on the nodes around it.
+// position is interpolated, and what acts on it acts on the nodes around it. On a body it is
+// between two of `places`, at each of which all of its modes, the nodes, have a weight.
 struct TapSlot {
   std::uint32_t node = 0;   // its own
   std::uint32_t first = 0;  // of its nodes in Program::tap_nodes, row by row
@@ -78,6 +90,9 @@ struct TapSlot {
   std::uint32_t width = 1;
   std::uint32_t u = 0;  // coefficients
   std::uint32_t v = 0;
+  std::uint32_t places = 0;  // 0: no body
+  std::uint32_t shape = 0;   // Program::shapes from here on, [place][mode]
+  bool is_on_body() const { return places > 0; }
 };
 
 // A part of a network, which no other part touches. Nodes are numbered: masses that move, run by
@@ -96,6 +111,8 @@ struct Program {
   std::vector<InputSlot> inputs;
   std::vector<TapSlot> taps;
   std::vector<std::uint32_t> tap_nodes;  // nodes
+  std::vector<double> shapes;            // of bodies
+  std::vector<SampledCoefficients> modes;
   std::vector<OutputSlot> outputs;
   std::vector<AudioParameter> audio_parameters;
   std::vector<std::uint32_t> audio_coefficients;  // those that depend on an audio parameter
@@ -128,8 +145,16 @@ struct Machine {
 // How much larger a coefficient is at a rate lower by r: r^a above.
 double rate_factor(Unit unit, double r);
 
-// A coefficient's value for a voice. [any thread] wait-free
+// A coefficient's value for a voice: of a body's mode as the Program's form steps it, or of the
+// continuous network. [any thread] wait-free
 double coefficient_value(const Program& program, const Coefficient& coefficient,
                          std::span<const double> parameters, double stiffness_factor);
+double continuous_value(const Program& program, const Coefficient& coefficient,
+                        std::span<const double> parameters, double stiffness_factor);
+double sampled_value(const Program& program, const Coefficient& coefficient,
+                     std::span<const double> parameters, double stiffness_factor);
+
+// Whether a form's numbers are those of the continuous network.
+bool is_continuous(const Form& form);
 
 }  // namespace ressort

@@ -100,7 +100,7 @@ constexpr KernelRow rows[] = {
         Method::oversampled, "oversampled", Use::physical,
         [](const Request& r) {
           constexpr std::uint32_t times = 4;  // where it is asked for by name
-          return r.program.moving > 0
+          return r.program.moving > 0 && r.program.modes.empty()
                      ? std::optional(oversampled_form(oversampled_program(r.program, times), times))
                      : std::nullopt;
         }),

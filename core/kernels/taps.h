@@ -8,7 +8,8 @@ namespace ressort {
 
 inline constexpr std::size_t tap_corners = 4;
 
-// The nodes around a point, of Program::tap_nodes, and their weights.
+// The nodes around a point, of Program::tap_nodes, and their weights; of a place on a body the
+// places around it, and theirs.
 template <class T>
 struct Corners {
   std::uint32_t node[tap_corners] = {};
@@ -27,6 +28,10 @@ static inline Corners<T> corners_at(const TapSlot& slot, T u, T v) {
   };
   std::uint32_t row = 0;
   std::uint32_t column = 0;
+  if (slot.is_on_body()) {
+    const T beyond = split(u, slot.places, row);
+    return {{row, row + 1}, {1 - beyond, beyond}};
+  }
   const T alpha = split(u, slot.length, row);
   const T beta = split(v, slot.width, column);
   const std::uint32_t node = slot.first + row * slot.width + column;
@@ -42,6 +47,32 @@ static inline void each_corner(const Corners<T>& corners, Use&& use) {
       use(corners.node[i], corners.weight[i]);
     }
   }
+}
+
+// Calls use(node, weight) for every node that a point stands for.
+template <class T, class Use>
+static inline void each_behind(const Program& program, const TapSlot& slot,
+                               const Corners<T>& corners, Use&& use) {
+  if (!slot.is_on_body()) {
+    return each_corner(corners,
+                       [&](std::uint32_t at, T weight) { use(program.tap_nodes[at], weight); });
+  }
+  const double* const near = program.shapes.data() + slot.shape + corners.node[0] * slot.length;
+  const double* const far = corners.weight[1] > 0 ? near + slot.length : near;
+  for (std::uint32_t mode = 0; mode < slot.length; ++mode) {
+    use(program.tap_nodes[slot.first + mode], corners.weight[0] * static_cast<T>(near[mode]) +
+                                                  corners.weight[1] * static_cast<T>(far[mode]));
+  }
+}
+
+// Whether a Program has places on bodies, which only some kernels know.
+static inline bool has_bodies(const Program& program) {
+  for (const TapSlot& slot : program.taps) {
+    if (slot.is_on_body()) {
+      return true;
+    }
+  }
+  return false;
 }
 
 }  // namespace ressort

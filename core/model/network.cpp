@@ -53,6 +53,13 @@ class Renumbering {
       macro.drawing = drawing(macro.drawing);
     }
     new_.macros = std::move(old_.macros);
+    std::stable_sort(old_.modes.begin(), old_.modes.end(), by_body);
+    for (BodyMode& mode : old_.modes) {
+      mode.frequency_hz = argument(mode.frequency_hz);
+      mode.t60_s = argument(mode.t60_s);
+    }
+    new_.modes = std::move(old_.modes);
+    new_.shapes = std::move(old_.shapes);
     place_points();
     for (Link& link : old_.links) {
       for (ArgumentId& id : link.arguments) {

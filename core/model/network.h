@@ -56,7 +56,10 @@ struct Mass {
   double position = 0.0;               // x0
   double third = 0.0;                  // the last state argument; Network::third says what it means
   std::uint32_t tap = 0;               // index into Network::taps, points only
-  std::uint32_t drawing = 0;           // 1 + index into Network::drawings; 0 for none
+  // An oscillator that is a mode of a body: K and Z are those of the continuous network, and its
+  // frequency and decay are theirs at any rate (core/sampled_mode.h).
+  bool is_mode = false;
+  std::uint32_t drawing = 0;  // 1 + index into Network::drawings; 0 for none
   SourceLocation location;
   bool operator==(const Mass&) const = default;
 };
@@ -73,6 +76,7 @@ enum class MacroKind : std::uint8_t {
   mesh,          // a rectangle, neighbours linked by K, Z
   closed_mesh,   // with its border fixed
   corner_mesh,   // with its corners fixed
+  body,          // modes, which are its nodes, and named places on it (see BodyMode)
 };
 
 // Many masses in one line. Nodes are numbered row by row; every one that moves has mass M, and
@@ -80,13 +84,14 @@ enum class MacroKind : std::uint8_t {
 struct Macro {
   std::string name;
   MacroKind kind = MacroKind::string;
-  std::uint32_t length = 2;  // nodes, fixed ones included; rows of a mesh
+  std::uint32_t length = 2;  // nodes, fixed ones included; rows of a mesh; modes of a body
   std::uint32_t width = 1;   // nodes in a row
   ArgumentId mass = no_argument;
   ArgumentId stiffness = no_argument;
   ArgumentId second_stiffness = no_argument;  // K2
   ArgumentId damping = no_argument;
   ArgumentId air_damping = no_argument;  // Zo
+  std::vector<std::string> places;       // names, of a body only
   double position = 0.0;                 // of every node
   double third = 0.0;                    // as of Mass
   std::uint32_t drawing = 0;
@@ -94,15 +99,34 @@ struct Macro {
   bool operator==(const Macro&) const = default;
 };
 
-// A place on a macro by coordinates 0..1, interpolated between the nodes around it.
+// A mode of a body: an oscillator of the body's mass, and how far each place moves when it moves
+// by 1.
+struct BodyMode {
+  Name name;
+  std::uint32_t macro = 0;
+  ArgumentId frequency_hz = no_argument;
+  ArgumentId t60_s = no_argument;
+  std::vector<double> shape;  // [place]
+  SourceLocation location;
+  bool operator==(const BodyMode&) const = default;
+};
+inline bool by_body(const BodyMode& a, const BodyMode& b) {
+  return a.macro < b.macro;
+}
+
+// A place on a macro by coordinates 0..1, interpolated between the nodes around it; on a body,
+// between the shapes at the two places around it.
 struct Tap {
   std::uint32_t macro = 0;
-  ArgumentId u = no_argument;  // along the length
+  ArgumentId u = no_argument;  // along the length, or from a body's first place to its last
   ArgumentId v = no_argument;  // along the width
   // Where the macro's nodes are, once it is expanded: masses [first, first + length * width).
   std::uint32_t first = 0;
   std::uint32_t length = 0;
   std::uint32_t width = 0;
+  // And the shapes of a body's places: Network::shapes from here on, [place][mode].
+  std::uint32_t places = 0;  // 0: no body
+  std::uint32_t shape = 0;
   bool operator==(const Tap&) const = default;
 };
 
@@ -164,7 +188,9 @@ struct Network {
   std::vector<Drawing> drawings;
   std::vector<Mass> masses;  // grounds and position inputs too, as declared
   std::vector<Macro> macros;
+  std::vector<BodyMode> modes;  // by body
   std::vector<Tap> taps;
+  std::vector<double> shapes;  // of expanded bodies, see Tap
   std::vector<Link> links;
   std::vector<Input> inputs;    // sorted by number
   std::vector<Output> outputs;  // sorted by number

@@ -46,6 +46,10 @@ class NumberCheck {
                    {"damping", macro.damping},
                    {"damping", macro.air_damping}});
     }
+    for (const BodyMode& mode : network_.modes) {
+      look(mode, {{"frequency", mode.frequency_hz}, {"T60", mode.t60_s}});
+      look_above_zero(mode);
+    }
     for (const Link& link : network_.links) {
       for (const ArgumentId argument : link.arguments) {
         look(link, {{"argument", argument}});
@@ -71,6 +75,16 @@ class NumberCheck {
         error_ = {told(asked, std::string(element.name),
                        is_wrong ? " is no finite number" : " is not above 0"),
                   element.location.line, element.location.column};
+      }
+    }
+  }
+
+  // A mode that does not swing, or never ends, is none.
+  void look_above_zero(const BodyMode& mode) {
+    for (const Asked& asked : {Asked{"frequency", mode.frequency_hz}, Asked{"T60", mode.t60_s}}) {
+      if (!error_ && !(argument_value(network_, asked.argument, parameters_) > 0.0)) {
+        error_ = {told(asked, std::string(mode.name), " is not above 0"), mode.location.line,
+                  mode.location.column};
       }
     }
   }

@@ -1,5 +1,8 @@
 #include "core/model/topology.h"
 
+#include <algorithm>
+#include <numbers>
+
 namespace ressort {
 namespace {
 
@@ -16,12 +19,16 @@ bool is_fixed(const Macro& macro, std::uint32_t i, std::uint32_t j) {
       return row_end && column_end;
     case MacroKind::chain:
     case MacroKind::mesh:
+    case MacroKind::body:
       return false;
   }
   return false;
 }
 
 std::size_t link_count(const Macro& macro) {
+  if (macro.kind == MacroKind::body) {
+    return 0;
+  }
   const std::size_t rows = macro.length;
   const std::size_t columns = macro.width;
   const std::size_t near = rows * (columns - 1) + (rows - 1) * columns;
@@ -78,6 +85,68 @@ void add_links(const Macro& macro, std::uint32_t first, const Progress& progress
   }
 }
 
+void append(Formula& formula, const Formula& part) {
+  formula.insert(formula.end(), part.begin(), part.end());
+}
+
+// A formula that is a number is written as one.
+Formula folded(Formula formula) {
+  return is_constant(formula) ? Formula{{Op::number, 0, evaluate(formula, {})}} : formula;
+}
+
+// M ((2 pi f)^2 + (ln 1000 / T60)^2), per sample.
+Formula mode_stiffness(const Formula& mass, const Formula& frequency_hz, const Formula& t60_s) {
+  constexpr double turn = 2.0 * std::numbers::pi / Network::reference_rate_hz;
+  constexpr double decay = 3.0 * std::numbers::ln10 / Network::reference_rate_hz;
+  Formula formula = mass;
+  append(formula, frequency_hz);
+  append(formula, {{Op::number, 0, turn}, {Op::multiply}, {Op::number, 0, 2.0}, {Op::power}});
+  append(formula, {{Op::number, 0, decay}});
+  append(formula, t60_s);
+  append(formula, {{Op::divide}, {Op::number, 0, 2.0}, {Op::power}, {Op::add}, {Op::multiply}});
+  return folded(std::move(formula));
+}
+
+// 2 M ln 1000 / T60, per sample.
+Formula mode_damping(const Formula& mass, const Formula& t60_s) {
+  Formula formula = mass;
+  append(formula, {{Op::number, 0, 6.0 * std::numbers::ln10 / Network::reference_rate_hz}});
+  append(formula, t60_s);
+  append(formula, {{Op::divide}, {Op::multiply}});
+  return folded(std::move(formula));
+}
+
+// A body's modes as oscillators, and its shapes.
+void add_modes(const Network& network, std::uint32_t body, const Progress& progress,
+               Network& expanded) {
+  const Macro& macro = network.macros[body];
+  const auto first = expanded.shapes.size();
+  expanded.shapes.resize(first + macro.places.size() * macro.length);
+  const auto of_body = std::equal_range(network.modes.begin(), network.modes.end(),
+                                        BodyMode{.macro = body}, by_body);
+  std::size_t at = 0;
+  for (auto mode = of_body.first; mode != of_body.second; ++mode) {
+    progress.spend(16);
+    const auto add = [&](Formula formula) {
+      expanded.arguments.push_back(std::move(formula));
+      return static_cast<ArgumentId>(expanded.arguments.size() - 1);
+    };
+    const Formula& mass = network.arguments[macro.mass];
+    const Formula& t60_s = network.arguments[mode->t60_s];
+    expanded.masses.push_back(
+        {.kind = MassKind::oscillator,
+         .mass = macro.mass,
+         .stiffness = add(mode_stiffness(mass, network.arguments[mode->frequency_hz], t60_s)),
+         .damping = add(mode_damping(mass, t60_s)),
+         .is_mode = true,
+         .location = mode->location});
+    for (std::size_t place = 0; place < macro.places.size(); ++place) {
+      expanded.shapes[first + place * macro.length + at] = mode->shape[place];
+    }
+    ++at;
+  }
+}
+
 }  // namespace
 
 bool is_mesh(MacroKind kind) {
@@ -95,6 +164,7 @@ Network expand_macros(const Network& network, const Progress& progress) {
     return expanded;
   }
   expanded.macros.clear();
+  expanded.modes.clear();
   std::size_t nodes = network.masses.size();
   std::size_t links = network.links.size();
   for (const Macro& macro : network.macros) {
@@ -103,9 +173,15 @@ Network expand_macros(const Network& network, const Progress& progress) {
   }
   expanded.masses.reserve(nodes);
   expanded.links.reserve(links);
-  std::vector<std::uint32_t> first;
+  std::vector<std::uint32_t> first;  // [macro]
+  std::vector<std::uint32_t> shape;
   for (const Macro& macro : network.macros) {
     first.push_back(static_cast<std::uint32_t>(expanded.masses.size()));
+    shape.push_back(static_cast<std::uint32_t>(expanded.shapes.size()));
+    if (macro.kind == MacroKind::body) {
+      add_modes(network, static_cast<std::uint32_t>(first.size() - 1), progress, expanded);
+      continue;
+    }
     add_nodes(macro, progress, expanded);
     add_links(macro, first.back(), progress, expanded);
   }
@@ -114,6 +190,8 @@ Network expand_macros(const Network& network, const Progress& progress) {
     tap.first = first[tap.macro];
     tap.length = macro.length;
     tap.width = macro.width;
+    tap.places = static_cast<std::uint32_t>(macro.places.size());
+    tap.shape = shape[tap.macro];
   }
   return expanded;
 }

@@ -80,6 +80,23 @@ class Oscillator : public Point {
   Number z_;
 };
 
+// X[n+1] = 2 r cos w X[n] - r^2 X[n-1] + F/M, with w and r from a frequency and a T60.
+class Resonator : public Point {
+ public:
+  Resonator(Number m, Number frequency_hz, Number t60_s)
+      : Point(0, 0), m_(m), frequency_hz_(frequency_hz), t60_s_(t60_s) {}
+  void step() override {
+    const Real r = std::pow(Real{10}, -3 / (44100 * *t60_s_));
+    const Real w = 2 * std::acos(Real{-1}) * *frequency_hz_ / 44100;
+    move_to(2 * r * std::cos(w) * x_ - r * r * x_before_ + force_ / *m_);
+  }
+
+ private:
+  Number m_;
+  Number frequency_hz_;
+  Number t60_s_;
+};
+
 // X[n] = x0
 class Ground : public Point {
  public:
@@ -102,8 +119,16 @@ class PositionInput : public Point {
 // w_i = max(0, 1 - |p - i|), p being the coordinate in nodes: X = sum w_i x_i, F_i += w_i F.
 class MacroPoint : public Point {
  public:
-  MacroPoint(std::vector<Point*> nodes, std::size_t rows, std::size_t columns, Number u, Number v)
-      : Point(0, 0), nodes_(std::move(nodes)), rows_(rows), columns_(columns), u_(u), v_(v) {
+  // Of a body, `rows` places, at each of which every mode has a displacement, [place][mode].
+  MacroPoint(std::vector<Point*> nodes, std::size_t rows, std::size_t columns, Number u, Number v,
+             std::vector<Real> shapes = {})
+      : Point(0, 0),
+        nodes_(std::move(nodes)),
+        rows_(rows),
+        columns_(columns),
+        u_(u),
+        v_(v),
+        shapes_(std::move(shapes)) {
     x_ = x_before_ = sum([](const Point& node) { return node.position(); });
   }
   void step() override {
@@ -130,6 +155,13 @@ class MacroPoint : public Point {
     return std::max<Real>(0, 1 - std::fabs(p - static_cast<Real>(i)));
   }
   Real weight(std::size_t i) const {
+    if (!shapes_.empty()) {
+      Real sum = 0;
+      for (std::size_t place = 0; place < rows_; ++place) {
+        sum += hat(*u_, rows_, place) * shapes_[place * nodes_.size() + i];
+      }
+      return sum;
+    }
     return hat(*u_, rows_, i / columns_) * hat(*v_, columns_, i % columns_);
   }
   template <class Of>
@@ -145,6 +177,7 @@ class MacroPoint : public Point {
   std::size_t columns_;
   Number u_;
   Number v_;
+  std::vector<Real> shapes_;
 };
 
 // --- what exerts a force: F_a -= f, F_b += f --------------------------------------------------
@@ -371,9 +404,13 @@ class Simulator {
     points_in_order_.pop_back();
     return point;
   }
+  Point& add_resonator(Number m, Number frequency_hz, Number t60_s) {
+    return add_point<Resonator>(m, frequency_hz, t60_s);
+  }
   Point& add_macro_point(std::vector<Point*> nodes, std::size_t rows, std::size_t columns, Number u,
-                         Number v) {
-    auto point = std::make_unique<MacroPoint>(std::move(nodes), rows, columns, u, v);
+                         Number v, std::vector<Real> shapes = {}) {
+    auto point =
+        std::make_unique<MacroPoint>(std::move(nodes), rows, columns, u, v, std::move(shapes));
     macro_points_.push_back(point.get());
     points_.push_back(std::move(point));
     return *points_.back();

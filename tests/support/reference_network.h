@@ -63,6 +63,7 @@ class Builder {
     std::size_t rows = 1;
     std::size_t columns = 1;
     std::vector<Point*> nodes;  // row by row
+    std::vector<Real> shapes;   // of a body, [place][mode]
   };
 
   Number number(ArgumentId id) const { return id == no_argument ? zero_ : made_.arguments[id]; }
@@ -79,6 +80,7 @@ class Builder {
     switch (macro.kind) {
       case MacroKind::chain:
       case MacroKind::mesh:
+      case MacroKind::body:
         return false;
       case MacroKind::string:
       case MacroKind::stiff_string:
@@ -91,7 +93,28 @@ class Builder {
     return false;
   }
 
+  void add_body(std::size_t index, const Macro& macro) {
+    Grid grid{macro.places.size(), 1, {}, {}};
+    std::vector<const BodyMode*> modes;
+    for (const BodyMode& mode : network_.modes) {
+      if (mode.macro == index) {
+        modes.push_back(&mode);
+        grid.nodes.push_back(&simulator_.add_resonator(
+            number(macro.mass), number(mode.frequency_hz), number(mode.t60_s)));
+      }
+    }
+    for (std::size_t place = 0; place < macro.places.size(); ++place) {
+      for (const BodyMode* const mode : modes) {
+        grid.shapes.push_back(mode->shape[place]);
+      }
+    }
+    grids_.push_back(std::move(grid));
+  }
+
   void add_macro(const Macro& macro) {
+    if (macro.kind == MacroKind::body) {
+      return add_body(grids_.size(), macro);
+    }
     Grid grid{macro.length, macro.width, {}};
     for (std::size_t i = 0; i < grid.rows; ++i) {
       for (std::size_t j = 0; j < grid.columns; ++j) {
@@ -149,7 +172,7 @@ class Builder {
         const Tap& tap = network_.taps[mass.tap];
         const Grid& grid = grids_[tap.macro];
         points_.push_back(&simulator_.add_macro_point(grid.nodes, grid.rows, grid.columns,
-                                                      number(tap.u), number(tap.v)));
+                                                      number(tap.u), number(tap.v), grid.shapes));
         break;
       }
     }

@@ -251,6 +251,9 @@ Accuracy Judge::at(std::size_t corner, const Stepping& stepping) {
     return worst;
   };
   const Corner& numbers = corners_[corner];
+  if (!program.modes.empty()) {
+    return of_bodies(corner, stepping);
+  }
   const bool has_relayed =
       stepping.scheme == Stepping::Scheme::fourth && has_relayed_springs(program);
   if (program.moving > most_masses_ && program.moving > most_coupled_masses) {
@@ -294,6 +297,29 @@ Accuracy Judge::at(std::size_t corner, const Stepping& stepping) {
   return compare(wanted, expected,
                  stepping.poles(springs_of(program, numbers.parameters, numbers.stiffness_factor)),
                  rate_hz, 0);
+}
+
+// Bodies' modes are exact as published; what ties them together is not.
+Accuracy Judge::of_bodies(std::size_t corner, const Stepping& stepping) {
+  if (!has_linear_springs(program_)) {
+    return {};
+  }
+  const Course& course = this->course(corner);
+  const Corner& numbers = corners_[corner];
+  if (!course.is_known || program_.moving > most_coupled_masses) {
+    return unknown();
+  }
+  Poles wanted = course.poles;
+  for (const Mode& mode : course.modes) {
+    if (const auto pole = continuous_pole(mode.stiffness, mode.damping)) {
+      wanted.push_back(*pole);
+    }
+  }
+  progress_.spend(8 * program_.moving * program_.moving * program_.moving);
+  return compare(
+      wanted, wanted,
+      stepping.poles(springs_of(program_, numbers.parameters, numbers.stiffness_factor, true)),
+      program_.rate_hz, 0);
 }
 
 Accuracy merging_accuracy(const Machine& written, const Machine& merged, std::size_t most_masses,

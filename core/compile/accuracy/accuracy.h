@@ -80,6 +80,7 @@ class Judge {
     std::vector<std::complex<double>> poles;  // of those that swing
   };
   const Course& course(std::size_t corner);
+  Accuracy of_bodies(std::size_t corner, const Stepping& stepping);
   Accuracy at(std::size_t corner, const Stepping& stepping);
 
   const Program& program_;

@@ -145,10 +145,14 @@ Pitches make_pitches(const LowestShapes& shapes, const Stepping& stepping, doubl
   return pitches;
 }
 
-Stepping stepping_of_lowest(const Machine& machine, const Mode& mode) {
+Stepping stepping_of_lowest(const Machine& machine, const LowestShapes& shapes) {
+  constexpr double alone = 0.999;  // what ties it to other masses hardly matters
+  if (shapes.share_of_modes > alone) {
+    return {Stepping::Scheme::exact};
+  }
   const Program* best = nullptr;
   double nearest = std::numeric_limits<double>::infinity();
-  const double wanted = mode.stiffness * machine.rate_ratio * machine.rate_ratio;
+  const double wanted = shapes.mode.stiffness * machine.rate_ratio * machine.rate_ratio;
   for (const Program& program : machine.parts) {
     if (program.moving == 0) {
       continue;

@@ -14,7 +14,7 @@ namespace ressort {
 Pitches make_pitches(const LowestShapes& shapes, const Stepping& stepping, double rate_hz,
                      double rate_ratio);
 
-// How the part of a machine steps that the lowest mode is in.
-Stepping stepping_of_lowest(const Machine& machine, const Mode& mode);
+// How the part of a machine steps that the lowest mode is in; that of a body is exact everywhere.
+Stepping stepping_of_lowest(const Machine& machine, const LowestShapes& shapes);
 
 }  // namespace ressort

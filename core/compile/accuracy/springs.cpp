@@ -56,9 +56,10 @@ void each_bar(const Program& program, const std::vector<double>& value, Use&& us
           return;
         }
         bar.is_relayed = true;
-        each_corner(corners[node - program.taps[0].node], [&](std::uint32_t at, double weight) {
-          if (program.tap_nodes[at] < program.moving) {
-            bar.shares.emplace_back(program.tap_nodes[at], sign * weight);
+        const std::size_t tap = node - program.taps[0].node;
+        each_behind(program, program.taps[tap], corners[tap], [&](std::uint32_t at, double weight) {
+          if (at < program.moving && weight != 0.0) {
+            bar.shares.emplace_back(at, sign * weight);
           }
         });
       };
@@ -70,10 +71,11 @@ void each_bar(const Program& program, const std::vector<double>& value, Use&& us
 }
 
 std::vector<double> values_of(const Program& program, std::span<const double> parameters,
-                              double stiffness_factor) {
+                              double stiffness_factor, bool is_sampled = false) {
+  const auto value = is_sampled ? sampled_value : continuous_value;
   std::vector<double> values;
   for (const Coefficient& coefficient : program.coefficients) {
-    values.push_back(coefficient_value(program, coefficient, parameters, stiffness_factor));
+    values.push_back(value(program, coefficient, parameters, stiffness_factor));
   }
   return values;
 }
@@ -90,10 +92,10 @@ Vector roots_of(const Program& program, const std::vector<double>& value) {
 }  // namespace
 
 Springs springs_of(const Program& program, std::span<const double> parameters,
-                   double stiffness_factor) {
+                   double stiffness_factor, bool is_sampled) {
   const std::size_t n = program.moving;
   Springs springs{Matrix(n, n), Matrix(n, n), Matrix(n, n), Matrix(n, n)};
-  const std::vector<double> value = values_of(program, parameters, stiffness_factor);
+  const std::vector<double> value = values_of(program, parameters, stiffness_factor, is_sampled);
   const Vector root = roots_of(program, value);
   each_bar(program, value, [&](const Bar& bar) {
     for (const auto& [i, a] : bar.shares) {
@@ -113,6 +115,11 @@ Springs springs_of(const Program& program, std::span<const double> parameters,
                      std::isfinite(springs.stiffness.values.sum()) &&
                      std::isfinite(springs.damping.values.sum());
   return springs;
+}
+
+bool has_linear_springs(const Program& program) {
+  return std::any_of(program.link_runs.begin(), program.link_runs.end(),
+                     [](const LinkRun& run) { return facts_of(run.law).contains_spring; });
 }
 
 bool has_relayed_springs(const Program& program) {

@@ -23,10 +23,13 @@ struct Springs {
   bool is_sound = true;  // every mass is above 0 and every number finite
 };
 
-// With places where the parameters put them. O(masses^2 + links)
+// With places where the parameters put them; bodies' modes as the published scheme steps them if
+// `is_sampled`. O(masses^2 + links)
 Springs springs_of(const Program& program, std::span<const double> parameters,
-                   double stiffness_factor);
+                   double stiffness_factor, bool is_sampled = false);
 
+// Whether any link is a spring, or contains one.
+bool has_linear_springs(const Program& program);
 // Whether there is anything in the relayed matrices.
 bool has_relayed_springs(const Program& program);
 // The same of what is a part of something bent.

@@ -4,6 +4,7 @@
 #include <array>
 
 #include "core/kernels/clusters.h"
+#include "core/kernels/taps.h"
 #include "core/laws/laws.h"
 
 namespace ressort {
@@ -265,7 +266,7 @@ std::optional<Chains> chains_form(const Program& program, const Progress& progre
       std::any_of(program.outputs.begin(), program.outputs.end(), is_force)) {
     return std::nullopt;  // what a point or a passive link does to a node is never summed
   }
-  if (holds_places(program)) {
+  if (holds_places(program) || has_bodies(program)) {
     return std::nullopt;
   }
   progress.spend(4 * program.ends.size());

@@ -120,13 +120,12 @@ template <class S>
   }
 }
 
-// Calls `use(at, weight)` for the up to four nodes around a tap's place in one lane; `at` is the
-// node's own number in [node][lane].
+// Calls `use(at, weight)` for the up to four nodes around a tap's place in one lane, or for all
+// modes of a body; `at` is the node's own number in [node][lane].
 template <class S, class Use>
 void around(const Program& program, const S& s, std::size_t tap, std::size_t lane, Use&& use) {
-  each_corner(s.state.corners[tap * S::lanes + lane], [&](std::uint32_t node, auto weight) {
-    use(program.tap_nodes[node] * S::lanes + lane, weight);
-  });
+  each_behind(program, program.taps[tap], s.state.corners[tap * S::lanes + lane],
+              [&](std::uint32_t node, auto weight) { use(node * S::lanes + lane, weight); });
 }
 
 template <class S>
@@ -185,6 +184,49 @@ void behind(const Program& program, const S& s, std::uint32_t node, std::size_t 
   around(program, s, node - program.taps[0].node, lane, use);
 }
 
+// Calls `use(at, weight, part)` for what two nodes both stand for in one lane.
+template <class S, class Use>
+void shared(const Program& program, const S& s, std::uint32_t from, std::uint32_t at,
+            std::size_t lane, Use&& use) {
+  if (!is_place(program, from) || !is_place(program, at)) {
+    return behind(program, s, from, lane, [&](std::size_t pushed, auto weight) {
+      behind(program, s, at, lane, [&](std::size_t felt, auto part) {
+        if (pushed == felt) {
+          use(felt, weight, part);
+        }
+      });
+    });
+  }
+  const std::uint32_t first = program.taps[0].node;
+  const TapSlot& one = program.taps[from - first];
+  const TapSlot& other = program.taps[at - first];
+  if (one.first != other.first) {
+    return;  // on two macros
+  }
+  const auto& near = s.state.corners[(from - first) * S::lanes + lane];
+  const auto& far = s.state.corners[(at - first) * S::lanes + lane];
+  if (!one.is_on_body()) {
+    return each_corner(near, [&](std::uint32_t pushed, auto weight) {
+      each_corner(far, [&](std::uint32_t felt, auto part) {
+        if (pushed == felt) {
+          use(program.tap_nodes[felt] * S::lanes + lane, weight, part);
+        }
+      });
+    });
+  }
+  using T = Scalar<typename S::V>;
+  const auto weight_at = [&](const TapSlot& slot, const auto& between, std::uint32_t mode) {
+    const double* const shape =
+        program.shapes.data() + slot.shape + between.node[0] * slot.length + mode;
+    return between.weight[0] * static_cast<T>(shape[0]) +
+           (between.weight[1] > 0 ? between.weight[1] * static_cast<T>(shape[slot.length]) : T(0));
+  };
+  for (std::uint32_t mode = 0; mode < one.length; ++mode) {
+    use(program.tap_nodes[one.first + mode] * S::lanes + lane, weight_at(one, near, mode),
+        weight_at(other, far, mode));
+  }
+}
+
 // The links' force at a node; at a place that of the nodes around it, interpolated.
 template <class S>
 typename S::V force_at(const Program& program, const S& s, std::uint32_t node) {
@@ -208,10 +250,8 @@ typename S::V share(const Program& program, const S& s, std::uint32_t from, std:
   using T = Scalar<V>;
   V sum{};
   for (std::size_t lane = 0; lane < S::lanes; ++lane) {
-    behind(program, s, from, lane, [&](std::size_t pushed, T weight) {
-      behind(program, s, at, lane,
-             [&](std::size_t felt, T part) { sum[lane] += pushed == felt ? weight * part : T(0); });
-    });
+    shared(program, s, from, at, lane,
+           [&](std::size_t, T weight, T part) { sum[lane] += weight * part; });
   }
   return sum;
 }
@@ -276,10 +316,8 @@ struct Passive {
     }
     V sum{};
     for (std::size_t lane = 0; lane < S::lanes; ++lane) {
-      behind(program, s, from, lane, [&](std::size_t pushed, T weight) {
-        behind(program, s, at, lane, [&](std::size_t felt, T part) {
-          sum[lane] += pushed == felt ? weight * part * inverse_mass(pushed, lane) : T(0);
-        });
+      shared(program, s, from, at, lane, [&](std::size_t node, T weight, T part) {
+        sum[lane] += weight * part * inverse_mass(node, lane);
       });
     }
     return sum;

@@ -131,7 +131,7 @@ Steepness steepness_of(const Program& program, std::span<const double> parameter
 
 std::optional<Fourth> fourth_form(const Program& program) {
   const auto is_force = [](const OutputSlot& output) { return output.is_force; };
-  if (program.moving == 0 ||
+  if (program.moving == 0 || !program.modes.empty() ||
       (!program.taps.empty() &&
        std::any_of(program.outputs.begin(), program.outputs.end(), is_force)) ||
       !is_plain(program) || !(steepness_of(program).both < 12.0)) {

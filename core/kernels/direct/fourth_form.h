@@ -21,7 +21,8 @@ Steepness steepness_of(const Program& program, std::span<const double> parameter
 
 // Nothing where nothing moves; where K + 6Z reaches 12M by the edge bound: a mode is pushed out
 // instead of in as soon as it does; where a link is not of the plain scheme; where a force is heard
-// beside points. What is stable as published is so in this form. O(links). [any thread but audio]
+// beside points; with bodies, whose modes need no order. What is stable as published is so in this
+// form. O(links). [any thread but audio]
 std::optional<Fourth> fourth_form(const Program& program);
 
 // What the registry's row of it asks, of one voice in bytes.

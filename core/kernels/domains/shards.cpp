@@ -30,7 +30,7 @@ std::optional<std::vector<std::vector<std::uint32_t>>> corners_of(const Program&
   }
   std::vector<std::vector<std::uint32_t>> corners;
   for (const TapSlot& tap : program.taps) {
-    if (wanders[tap.u] || wanders[tap.v]) {
+    if (wanders[tap.u] || wanders[tap.v] || tap.is_on_body()) {
       return std::nullopt;
     }
     auto& nodes = corners.emplace_back();

@@ -9,6 +9,7 @@
 
 #include "core/kernels/clusters.h"
 #include "core/kernels/grid/grid_places.h"
+#include "core/kernels/taps.h"
 #include "core/laws/laws.h"
 
 namespace ressort {
@@ -460,7 +461,8 @@ std::optional<Grid> grid_form(const Program& program, const Progress& progress) 
   const bool has_force_output =
       std::any_of(program.outputs.begin(), program.outputs.end(),
                   [](const OutputSlot& output) { return output.is_force; });
-  if (program.moving < least_grid_masses || has_force_output || holds_places(program)) {
+  if (program.moving < least_grid_masses || has_force_output || holds_places(program) ||
+      has_bodies(program)) {
     return std::nullopt;
   }
   const std::uint32_t mass_run = largest_mass_run(program);

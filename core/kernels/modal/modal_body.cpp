@@ -26,7 +26,9 @@ void add_share(std::vector<MassShare>& shares, std::uint32_t mass, double weight
 
 class BodyMaker {
  public:
-  explicit BodyMaker(const Program& program) : program_(program) { body_.count = program.moving; }
+  BodyMaker(const Program& program, bool is_exact) : program_(program), is_exact_(is_exact) {
+    body_.count = program.moving;
+  }
 
   std::optional<LinearBody> make() {
     look_at_parameters();
@@ -50,7 +52,8 @@ class BodyMaker {
       }
     }
     for (const Coefficient& coefficient : program_.coefficients) {
-      body_.value.push_back(coefficient_value(program_, coefficient, program_.parameters, 1.0));
+      const auto value = is_exact_ ? continuous_value : sampled_value;
+      body_.value.push_back(value(program_, coefficient, program_.parameters, 1.0));
     }
     body_.input.assign(program_.position.size(), LinearBody::nowhere);
     for (std::uint32_t i = 0; i < program_.inputs.size(); ++i) {
@@ -106,8 +109,10 @@ class BodyMaker {
       } else {
         const TapSlot& tap = program_.taps[node - first_place()];
         const auto corners = corners_at(tap, body_.value[tap.u], body_.value[tap.v]);
-        each_corner(corners, [&](std::uint32_t corner, double weight) {
-          add_share(around, program_.tap_nodes[corner], weight);
+        each_behind(program_, tap, corners, [&](std::uint32_t at, double weight) {
+          if (weight != 0.0) {
+            around.push_back({at, weight});
+          }
         });
       }
       Readout readout;
@@ -187,6 +192,7 @@ class BodyMaker {
   }
 
   const Program& program_;
+  const bool is_exact_;
   LinearBody body_;
 };
 
@@ -259,8 +265,8 @@ FeltForce force_felt(const Program& program, const LinearBody& body, std::uint32
   return felt;
 }
 
-std::optional<LinearBody> linear_body(const Program& program) {
-  return program.moving == 0 ? std::nullopt : BodyMaker(program).make();
+std::optional<LinearBody> linear_body(const Program& program, bool is_exact) {
+  return program.moving == 0 ? std::nullopt : BodyMaker(program, is_exact).make();
 }
 
 }  // namespace ressort

@@ -72,7 +72,8 @@ FeltForce force_felt(const Program& program, const LinearBody& body, std::uint32
 
 // Nothing where no modes can tell how a Program moves: parameters turn its masses one by one or
 // move a place on a macro, a ground claims a velocity, there are too many frames of one coefficient
-// each. O(links).
-std::optional<LinearBody> linear_body(const Program& program);
+// each. Of a body's modes the numbers are those of the continuous network if the modes are to be
+// exact, else those that the published scheme steps. O(links).
+std::optional<LinearBody> linear_body(const Program& program, bool is_exact);
 
 }  // namespace ressort

@@ -9,13 +9,11 @@
 #pragma once
 
 #include "core/kernels/modal/modal_sweep.h"
+#include "core/sampled_mode.h"
 
 namespace ressort::RESSORT_ISA {
 namespace {
 
-constexpr double highest_ring = 8.2;  // w^2 of 0.456 of the rate: what is higher decays the
-constexpr double nyquist = 9.8;       // faster, until it rings no more but gives way as it would
-                                      // at rest, a sample later: lK = lZ = 1
 constexpr double most_damping = 8.0;  // Z beyond which a mode is gone in a sample anyway
 constexpr double least_share = 1e-6;  // K per Z^2 below which the mode only creeps
 
@@ -59,11 +57,11 @@ V make_exact(V& k, V& z) {
   const V half = quarter * (2 - quarter);
   const V lost = half * (2 - half);
   const V creep = -damping * damping / 4;
-  const V ring = lesser(k + creep, nyquist);
+  const V ring = lesser(k + creep, nyquist_ring);
   const V stiffness = (1 - half) * (ring * ripple(ring) - creep * ripple(creep));
   const V creeping = select(damping > V{}, lost / damping, V{} + 1);
   const auto rings = k > T(least_share) * damping * damping;
-  const V over = (ring - T(highest_ring)) / T(nyquist - highest_ring);
+  const V over = (ring - T(highest_ring)) / T(nyquist_ring - highest_ring);
   const V left_out = select(over > V{}, over, V{});
   const V felt = stiffness + left_out * (1 - stiffness);
   const V gain = select(rings, felt / k, creeping);

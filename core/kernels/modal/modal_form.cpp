@@ -2,9 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <complex>
 #include <limits>
 #include <map>
+#include <numeric>
 #include <utility>
 
 #include "core/kernels/modal/modal_body.h"
@@ -12,31 +12,26 @@
 #include "core/kernels/modal/modal_worth.h"
 #include "core/laws/laws.h"
 #include "core/linear_algebra/eigen.h"
+#include "core/sampled_mode.h"
 
 namespace ressort {
 namespace {
 
 constexpr double shared_tolerance = 1e-12;  // of a matrix' largest element: is it diagonal?
 constexpr double zero_tolerance = 1e-13;    // of the largest: is it anything?
-constexpr double highest_ring = 8.2;        // w^2 from which on a mode is left out,
-constexpr double nyquist = 9.8;             // and by which it is
 
 // The published scheme's lK and lZ that are the continuous K and Z, sampled; gives the force's gain
 // (core/kernels/modal/modal_exact.h).
 double make_exact(double& k, double& z) {
-  const std::complex<double> pole =
-      std::exp(std::complex<double>(-0.5 * z) + std::sqrt(std::complex<double>(0.25 * z * z - k)));
-  const double r = std::exp(-0.5 * z);
-  const double ring = 1.0 + r * r - (pole + r * r / pole).real();
-  const double over = (k - 0.25 * z * z - highest_ring) / (nyquist - highest_ring);
-  const double left_out = std::clamp(over, 0.0, 1.0);
-  const double stiffness = ring + left_out * (1.0 - ring);
+  const SampledMode sampled = sampled_mode(1.0, k, z);
+  const double stiffness = sampled.stiffness / sampled.mass;
   const double gain = k > 0.0 ? stiffness / k : 1.0;
   k = stiffness;
-  z = 1.0 - r * r + left_out * r * r;
+  z = sampled.damping / sampled.mass;
   return gain;
 }
 
+constexpr std::uint32_t nowhere = 0xffffffffu;
 constexpr std::size_t most_passive = 32;  // links: each pulls at all others
 constexpr double left_out_share = 0.02;   // of the budget
 class ModesFinder {
@@ -119,10 +114,55 @@ class ModesFinder {
         }
       }
     }
-    const Eigenpairs pairs = symmetric_eigenpairs(mixture);
-    for (std::uint32_t mass = 0; mass < count_; ++mass) {
-      shape_.emplace_back(pairs.vectors.values[std::slice(mass, count_, count_)]);
+    shape_.assign(count_, Vector(count_));
+    std::uint32_t mode = 0;
+    for (const std::vector<std::uint32_t>& masses : tied_together()) {
+      const std::size_t size = masses.size();
+      progress_.spend(size * size * size / 8);
+      Matrix part(size, size);
+      for (std::size_t i = 0; i < size; ++i) {
+        for (std::size_t j = 0; j < size; ++j) {
+          part(i, j) = mixture(masses[i], masses[j]);
+        }
+      }
+      const Eigenpairs pairs = symmetric_eigenpairs(part);
+      for (std::size_t j = 0; j < size; ++j, ++mode) {
+        for (std::size_t i = 0; i < size; ++i) {
+          shape_[masses[i]][mode] = pairs.vectors(i, j);
+        }
+      }
     }
+  }
+
+  // Masses that no linear link ties to each other have modes of their own: those of a body are its
+  // modes already.
+  std::vector<std::vector<std::uint32_t>> tied_together() const {
+    std::vector<std::uint32_t> of(count_);
+    std::iota(of.begin(), of.end(), 0u);
+    const auto find = [&](std::uint32_t i) {
+      while (of[i] != i) {
+        i = of[i] = of[of[i]];
+      }
+      return i;
+    };
+    for (const auto* frames : {&stiffness_, &damping_}) {
+      for (const Frame& frame : *frames) {
+        for (const Bar& bar : frame.bars) {
+          for (const MassShare& share : bar.shares) {
+            of[find(share.mass)] = find(bar.shares[0].mass);
+          }
+        }
+      }
+    }
+    std::map<std::uint32_t, std::vector<std::uint32_t>> groups;
+    for (std::uint32_t mass = 0; mass < count_; ++mass) {
+      groups[find(mass)].push_back(mass);
+    }
+    std::vector<std::vector<std::uint32_t>> parts;
+    for (auto& [root, masses] : groups) {
+      parts.push_back(std::move(masses));
+    }
+    return parts;
   }
 
   void add(Matrix& matrix, const Bar& bar) const {
@@ -562,15 +602,53 @@ class ModesFinder {
 
 }  // namespace
 
+std::uint32_t most_tied_masses(const Program& program) {
+  if (program.modes.empty()) {
+    return program.moving;
+  }
+  std::vector<std::uint32_t> of(program.moving);
+  std::iota(of.begin(), of.end(), 0u);
+  const auto find = [&](std::uint32_t i) {
+    while (of[i] != i) {
+      i = of[i] = of[of[i]];
+    }
+    return i;
+  };
+  for (const LinkRun& run : program.link_runs) {
+    for (std::uint32_t i = run.first; run.law == Law::spring && i < run.first + run.count; ++i) {
+      std::uint32_t first = nowhere;
+      const auto tie = [&](std::uint32_t node) {
+        if (node < program.moving) {
+          first = first == nowhere ? node : first;
+          of[find(node)] = find(first);
+        }
+      };
+      for (const std::uint32_t end : {program.ends[i].a, program.ends[i].b}) {
+        tie(end);
+        for (const TapSlot& tap : program.taps) {
+          for (std::uint32_t k = 0; tap.node == end && k < tap.length * tap.width; ++k) {
+            tie(program.tap_nodes[tap.first + k]);
+          }
+        }
+      }
+    }
+  }
+  std::vector<std::uint32_t> count(program.moving);
+  std::uint32_t most = 0;
+  for (std::uint32_t i = 0; i < program.moving; ++i) {
+    most = std::max(most, ++count[find(i)]);
+  }
+  return most;
+}
+
 std::optional<Modes> modal_form(const Program& program, const Budget& budget,
                                 const Progress& progress, bool is_untuned, bool is_exact) {
-  if (program.moving > most_modes) {
+  if (program.moving > most_modes || most_tied_masses(program) > most_tied_modes) {
     return std::nullopt;
   }
-  const std::optional<LinearBody> body = linear_body(program);
-  return body ? ModesFinder(program, *body, budget, progress, is_untuned,
-                            is_exact || budget.is_physical())
-                    .find()
+  const bool is_continuous = is_exact || budget.is_physical();
+  const std::optional<LinearBody> body = linear_body(program, is_continuous);
+  return body ? ModesFinder(program, *body, budget, progress, is_untuned, is_continuous).find()
               : std::nullopt;
 }
 

@@ -119,14 +119,24 @@ class Writer {
                                    : faust_formula(network_.arguments[argument], parameter_);
   }
   // Terms of a force as terms of what it does to the mass's velocity.
-  Words divided(Words force, const Mass& mass) const {
+  Words divided(Words force, const Mass& mass) {
     const Formula& formula = network_.arguments[mass.mass];
+    if (mass.is_mode && !force.empty()) {
+      return {"+ (" + faust_sum(std::move(force)) + ")/" + of_mode(mass, "_, !, !")};
+    }
     if (force.empty() || (is_constant(formula) && evaluate(formula, {}) == 1.0)) {
       return force;
     }
     const std::string over = "/" + faust_formula(formula, parameter_, Tightness::atom);
     return force.size() == 1 ? Words{force[0] + over}
                              : Words{"+ (" + faust_sum(std::move(force)) + ")" + over};
+  }
+
+  // One of M, K and Z of a body's mode: those of the continuous network, sampled.
+  std::string of_mode(const Mass& mass, const std::string& which) {
+    used_.insert("sampled");
+    return "(sampled(" + value(mass.mass) + ", " + value(mass.stiffness) + ", " +
+           value(mass.damping) + ") : " + which + ")";
   }
 
   bool is_audio(ArgumentId argument) const {
@@ -194,8 +204,36 @@ class Writer {
     return factors;
   }
 
+  // By a body's shapes at its places.
+  std::vector<Share> shares_of_modes(const Tap& tap, const std::string& name) const {
+    const Words places = side(tap.u, tap.places, "row_" + name);
+    std::vector<Share> all;
+    for (std::uint32_t mode = 0; mode < tap.length; ++mode) {
+      Words terms;
+      double sum = 0.0;  // where the place stays
+      for (std::uint32_t place = 0; place < tap.places; ++place) {
+        const double shape = network_.shapes[tap.shape + place * tap.length + mode];
+        if (places[place] == "0" || shape == 0.0) {
+          continue;
+        }
+        terms.push_back("+ " + places[place] + faust_number(shape));
+        if (is_fixed(tap.u)) {
+          sum += shape * (places[place].empty() ? 1.0 : std::stod(places[place]));
+        }
+      }
+      if (!terms.empty() && (!is_fixed(tap.u) || sum != 0.0)) {
+        all.push_back({tap.first + mode,
+                       (is_fixed(tap.u) ? faust_number(sum) : "(" + faust_sum(terms) + ")") + "*"});
+      }
+    }
+    return all;
+  }
+
   std::vector<Share> shares(std::size_t point) const {
     const Tap& tap = network_.taps[network_.masses[point].tap];
+    if (tap.places > 0) {
+      return shares_of_modes(tap, mass_[point]);
+    }
     const Words rows = side(tap.u, tap.length, "row_" + mass_[point]);
     const Words columns = side(tap.v, tap.width, "column_" + mass_[point]);
     std::vector<Share> all;
@@ -252,7 +290,8 @@ class Writer {
       used_.insert({"along", "hat"});
     }
     if (!is_fixed(tap.u)) {
-      line += "row_" + name + " = along(" + faust_number(tap.length) + ", " + value(tap.u) + ");  ";
+      line += "row_" + name + " = along(" + faust_number(tap.places > 0 ? tap.places : tap.length) +
+              ", " + value(tap.u) + ");  ";
     }
     if (!is_fixed(tap.v)) {
       line +=
@@ -283,7 +322,8 @@ class Writer {
   // Its own M, K or Z are another number at the next tick, when its force acts: so it feeds back
   // the force, not what becomes of it.
   bool drives_itself(const Mass& mass) const {
-    return is_audio(mass.mass) || is_audio(mass.stiffness) || is_audio(mass.damping);
+    return !mass.is_mode &&
+           (is_audio(mass.mass) || is_audio(mass.stiffness) || is_audio(mass.damping));
   }
 
   // Terms of what acts on it besides its links, at once.
@@ -340,6 +380,10 @@ class Writer {
 
   // An oscillator's own spring and damper.
   std::string held(const Mass& mass, const std::string& x, const std::string& v) {
+    if (mass.is_mode) {
+      return "(" + of_mode(mass, "!, _, !") + "*" + x + " + " + of_mode(mass, "!, !, _") + "*" + v +
+             ")";
+    }
     used_.insert("spring");
     return "spring(" + value(mass.stiffness) + ", " + value(mass.damping) + ", " + x + ", " + v +
            ")";

@@ -27,6 +27,23 @@ constexpr FaustDefinition helpers[] = {
      "    now = speed + (f - spring(k, z, before, speed))/m;\n"
      "  };\n"
      "};\n"},
+    // M, K and Z of a body's mode as they are stepped (core/sampled_mode.h)
+    {"sampled",
+     "sampled(m, k, z) = mass, mass*(ring + out*(1.0 - ring)), mass*(lost + out*(1.0 - lost))\n"
+     "with {\n"
+     "  stiff = k/m*r*r;\n"
+     "  half = 0.5*z/m*r;\n"
+     "  square = stiff - half*half;\n"
+     "  root = 0.5*sqrt(abs(square));\n"
+     "  decay = exp(0.0 - half);\n"
+     "  sine = sin(root);\n"
+     "  creep = exp(root) - exp(0.0 - root);\n"
+     "  swing = select2(square > 0.0, 0.0 - 0.5*creep*creep, 2.0*sine*sine);\n"
+     "  ring = (1.0 - decay)*(1.0 - decay) + 2.0*decay*swing;\n"
+     "  lost = 1.0 - decay*decay;\n"
+     "  out = max(0.0, min(1.0, (square - 8.2)/1.6));\n"
+     "  mass = m*(1.0 + out*(stiff - 1.0));\n"
+     "};\n"},
     {"hat", "hat(i, p) = max(0.0, 1.0 - abs(p - i));\n"},
     {"along", "along(n, u) = (n - 1.0)*max(0.0, min(1.0, u));\n"},
 };

@@ -92,6 +92,9 @@ void Reader::add_macro(const Line& line) {
   macro.name = std::string(line.label.text);
   macro.kind = line.keyword->macro;
   macro.location = {line.number, line.label.column};
+  if (macro.kind == MacroKind::body) {
+    return add_body(line, macro);
+  }
   std::size_t at = 0;
   macro.length = size(line, at++, macro.kind == MacroKind::stiff_string ? 3 : 2);
   macro.width = is_mesh(macro.kind) ? size(line, at++, 2) : 1;
@@ -127,6 +130,118 @@ void Reader::add_macro(const Line& line) {
     out_.network.drawings.push_back({.group = std::string(line.group), .x = x, .y = y});
     macro.drawing = static_cast<std::uint32_t>(out_.network.drawings.size());
   }
+}
+
+// A body's places are known before any line that may name them is read.
+void Reader::name_places(const Line& line, Macro& body) {
+  body.kind = line.keyword->macro;
+  if (body.kind != MacroKind::body) {
+    return;
+  }
+  body.length = 0;  // its modes are counted as they come
+  for (std::size_t i = 1; i < line.rest.size(); ++i) {
+    const Token& place = line.rest[i];
+    if (!is_identifier(place.text)) {
+      error(line, place,
+            quoted(place.text) +
+                " is no name of a place: it has letters, digits and '_' only, "
+                "and starts with no digit");
+    } else if (std::find(body.places.begin(), body.places.end(), place.text) != body.places.end()) {
+      error(line, place, "the body has two places called " + quoted(place.text));
+    }
+    body.places.emplace_back(place.text);
+  }
+}
+
+void Reader::add_body(const Line& line, Macro& body) {
+  body.mass = argument(line, 0);
+  check_mass(line, 0, body.mass);
+  if (!line.group.empty()) {
+    out_.network.drawings.push_back({.group = std::string(line.group)});
+    body.drawing = static_cast<std::uint32_t>(out_.network.drawings.size());
+  }
+}
+
+void Reader::add_mode(const Line& line) {
+  const Token& label = line.rest[0];
+  const std::string_view name = label.text.substr(label.text[0] == '@' ? 1 : 0);
+  const auto index = macro_of(name);
+  if (label.text[0] != '@' || !index || macro_keywords_.at(*index)->macro != MacroKind::body) {
+    std::vector<std::string_view> names;
+    for (const Entry& other : entries_) {
+      if (keywords()[other.keyword].macro == MacroKind::body &&
+          keywords()[other.keyword].element == Element::macro) {
+        names.push_back(label_of(other));
+      }
+    }
+    return error(line, label,
+                 "found " + quoted(label.text) +
+                     " where '@' and the label of a body were expected" +
+                     suggestion(name, names, "@"));
+  }
+  Macro& body = out_.network.macros[*index];
+  const std::size_t given = line.rest.size() - 3;
+  if (given != body.places.size()) {
+    std::string places;
+    for (const std::string& place : body.places) {
+      places += (places.empty() ? "" : " ") + place;
+    }
+    return error(line, line.rest[std::min(line.rest.size() - 1, 3 + body.places.size())],
+                 "the body " + quoted(label.text) + " has " + std::to_string(body.places.size()) +
+                     (body.places.size() == 1 ? " place (" : " places (") + places +
+                     "), so a mode has as many displacements; found " + std::to_string(given));
+  }
+  if (++nodes_ > max_macro_nodes) {
+    return error(
+        line, line.label,
+        "the macros have more than " + std::to_string(max_macro_nodes) + " nodes together");
+  }
+  BodyMode mode{.name = std::string(line.label.text), .macro = *index};
+  mode.location = {line.number, line.label.column};
+  mode.frequency_hz = positive(line, 1, "a mode's frequency in Hz");
+  mode.t60_s = positive(line, 2, "a mode's T60 in seconds");
+  for (std::size_t i = 3; i < line.rest.size(); ++i) {
+    mode.shape.push_back(displacement(line, i));
+  }
+  ++body.length;
+  out_.network.modes.push_back(std::move(mode));
+}
+
+// An argument that must be above 0; one that a parameter gives is looked at where it is played.
+ArgumentId Reader::positive(const Line& line, std::size_t at, const std::string& what) {
+  const ArgumentId id = argument(line, at);
+  if (id != no_argument && is_constant(out_.network.arguments[id]) &&
+      !(argument_value(out_.network, id, {}) > 0.0)) {
+    error(line, line.rest[at], what + " must be above 0, found " + quoted(line.rest[at].text));
+  }
+  return id;
+}
+
+// A number, as it is or as an expression without parameters.
+double Reader::displacement(const Line& line, std::size_t at) {
+  const Token token = unwrapped(line.rest[at]);
+  double number = 0.0;
+  if (parse_number(token.text, number)) {
+    return number;
+  }
+  const auto parsed = parse_expression(token.text, {});
+  if (parsed && std::isfinite(evaluate(*parsed, {}))) {
+    return evaluate(*parsed, {});
+  }
+  error(line, line.rest[at],
+        "found " + quoted(token.text) +
+            " where a displacement, a number without parameters, was expected");
+  return 0.0;
+}
+
+// The coordinate of a place by its name.
+std::optional<double> Reader::place_called(const Macro& body, const Token& token) const {
+  const auto place = std::find(body.places.begin(), body.places.end(), token.text);
+  if (place == body.places.end()) {
+    return std::nullopt;
+  }
+  const double last = static_cast<double>(std::max<std::size_t>(body.places.size(), 2) - 1);
+  return static_cast<double>(place - body.places.begin()) / last;
 }
 
 // A count of nodes: no parameter, and no more than there may be in all.
@@ -425,6 +540,8 @@ std::optional<std::uint32_t> Reader::tap(const Line& line, const Token& token, c
   }
   const Keyword& keyword = *macro_keywords_.at(*macro);
   const bool is_plane = is_mesh(keyword.macro);
+  const bool is_body = keyword.macro == MacroKind::body;
+  const std::vector<std::string>& places = out_.network.macros[*macro].places;
   const std::size_t wanted = is_plane ? 2 : 1;
   if (!is_plane && coordinates.size() > 1 && token.text[0] == '[') {
     const char* const start = coordinates.front().text.data();
@@ -435,11 +552,15 @@ std::optional<std::uint32_t> Reader::tap(const Line& line, const Token& token, c
   if (coordinates.size() != wanted) {
     error(line, token,
           quoted(label.text) + " is a " + std::string(keyword.word) + ": a place on it needs " +
-              (is_plane ? "two coordinates, [@m u v]" : "one coordinate, [@s u]") +
-              ", each from 0 to 1");
+              (is_plane  ? "two coordinates, [@m u v], each from 0 to 1"
+               : is_body ? "its name, [" + std::string(label.text) + " " +
+                               (places.empty() ? "place" : places.front()) + "]"
+                         : "one coordinate, [@s u], from 0 to 1"));
     return std::nullopt;
   }
-  Network& network = out_.network;
+  if (is_body && is_identifier(coordinates[0].text)) {
+    return named_place(line, token, *macro, coordinates[0]);
+  }
   for (const Token& coordinate : coordinates) {
     double number = 0.0;
     if (parse_number(coordinate.text, number) && (number < 0.0 || number > 1.0)) {
@@ -448,11 +569,45 @@ std::optional<std::uint32_t> Reader::tap(const Line& line, const Token& token, c
                   (number < 0.0 ? "0" : "1"));
     }
   }
+  return add_point(line, token,
+                   {.macro = *macro,
+                    .u = expression(line, coordinates[0]),
+                    .v = is_plane ? expression(line, coordinates[1]) : no_argument});
+}
+
+// By the name of a place, or of a parameter that moves along them.
+std::optional<std::uint32_t> Reader::named_place(const Line& line, const Token& token,
+                                                 std::uint32_t macro, const Token& name) {
+  Network& network = out_.network;
+  const Macro& body = network.macros[macro];
+  const auto place = place_called(body, name);
+  if (!place && std::find(parameter_names_.begin(), parameter_names_.end(), name.text) ==
+                    parameter_names_.end()) {
+    const std::vector<std::string_view> names(body.places.begin(), body.places.end());
+    std::string all;
+    for (const std::string& other : body.places) {
+      all += (all.empty() ? "" : ", ") + other;
+    }
+    error(line, name,
+          "the body '@" + body.name + "' has no place called " + quoted(name.text) + " (it has " +
+              all + ")" + suggestion(name.text, names));
+    return std::nullopt;
+  }
+  ArgumentId u = no_argument;
+  if (place) {
+    u = static_cast<ArgumentId>(network.arguments.size());
+    network.arguments.push_back({{Op::number, 0, *place}});
+  } else {
+    u = expression(line, name);
+  }
+  return add_point(line, token, {.macro = macro, .u = u});
+}
+
+std::uint32_t Reader::add_point(const Line& line, const Token& token, Tap tap) {
+  Network& network = out_.network;
   Mass point{.kind = MassKind::point, .tap = static_cast<std::uint32_t>(network.taps.size())};
   point.location = {line.number, token.column};
-  network.taps.push_back({.macro = *macro,
-                          .u = expression(line, coordinates[0]),
-                          .v = is_plane ? expression(line, coordinates[1]) : no_argument});
+  network.taps.push_back(tap);
   network.masses.push_back(std::move(point));
   return static_cast<std::uint32_t>(network.masses.size() - 1);
 }

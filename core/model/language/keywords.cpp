@@ -22,6 +22,8 @@ constexpr Keyword fixed[] = {
     {"mesh",               Element::macro,           0, 6, 8, false, "LENGTH WIDTH M K Z [ZO] POSITION [MOTION]", MacroKind::mesh},
     {"closedMesh",         Element::macro,           0, 6, 8, false, "LENGTH WIDTH M K Z [ZO] POSITION [MOTION]", MacroKind::closed_mesh},
     {"cornerMesh",         Element::macro,           0, 6, 8, false, "LENGTH WIDTH M K Z [ZO] POSITION [MOTION]", MacroKind::corner_mesh},
+    {"body",               Element::macro,           0, 2, 1 + most_body_places, false, "M PLACE...", MacroKind::body},
+    {"mode",               Element::body_mode,       0, 4, 3 + most_body_places, false, "@BODY HZ T60 DISPLACEMENT..."},
     {"posInput",           Element::position_input,  0, 1, 1, true,  "POSITION"},
     {"frcInput",           Element::force_input,     1, 0, 0, false, "@MASS"},
     {"forceInput",         Element::force_input,     1, 0, 0, false, "@MASS"},

@@ -15,6 +15,7 @@ enum class Element {
   mass,
   oscillator,
   macro,
+  body_mode,
   position_input,
   force_input,
   position_output,
@@ -29,6 +30,8 @@ inline bool is_mass(Element element) {
 inline bool is_parameter(Element element) {
   return element == Element::parameter || element == Element::audio_parameter;
 }
+
+inline constexpr int most_body_places = 256;
 
 // Everything that tells one keyword from another. The reader, its messages and its suggestions
 // have no other list.

@@ -241,7 +241,7 @@ void Reader::declare(Entry& entry) {
     }
     entry.element = static_cast<std::uint32_t>(network.macros.size());
     macro_keywords_.push_back(&keyword);
-    network.macros.emplace_back();
+    name_places(line, network.macros.emplace_back());
   } else if (is_parameter(keyword.element)) {
     declare_parameter(open(entry));
   }
@@ -299,6 +299,8 @@ void Reader::build(Line& line) {
       return add_link(line);
     case Element::macro:
       return add_macro(line);
+    case Element::body_mode:
+      return add_mode(line);
     case Element::position_output:
     case Element::force_output:
       return add_output(line);
@@ -401,6 +403,13 @@ void Reader::look_over() {
           "'@" + label + "' pushes " + quoted("@" + pushed.name.text()) + ", which " +
               (pushed.kind == MassKind::ground ? "never moves" : "moves only as its input says") +
               ": it does nothing");
+    }
+  }
+  for (const Macro& macro : network.macros) {
+    if (macro.kind == MacroKind::body && macro.length == 0) {
+      say(Severity::error, macro.location.line, {macro.name, macro.location.column},
+          "the body " + quoted("@" + macro.name) + " has no modes: each is a line like '@" +
+              macro.name + "_1 mode @" + macro.name + " 440. 2. 1.'");
     }
   }
   std::vector<Input> heard = network.inputs;

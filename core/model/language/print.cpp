@@ -59,6 +59,9 @@ class Printer {
     for (const Macro& macro : network_.macros) {
       used_.insert(macro.name);
     }
+    for (const BodyMode& mode : network_.modes) {
+      used_.insert(mode.name.text());
+    }
     for (const Link& link : network_.links) {
       used_.insert(link.name.text());
     }
@@ -179,6 +182,10 @@ class Printer {
     }
     for (const Macro& macro : network_.macros) {
       const std::string start = position(macro.position, macro.drawing);
+      if (macro.kind == MacroKind::body) {
+        print_body(macro);
+        continue;
+      }
       std::string rest = " " + std::to_string(macro.length);
       if (is_mesh(macro.kind)) {
         rest += " " + std::to_string(macro.width);
@@ -192,6 +199,26 @@ class Printer {
         rest += argument(macro.air_damping);
       }
       line(macro.name, keyword_of(macro).word, rest + start + " " + print_number(macro.third));
+    }
+  }
+
+  void print_body(const Macro& body) {
+    std::string rest = argument(body.mass);
+    for (const std::string& place : body.places) {
+      rest += " " + place;
+    }
+    line(body.name, keyword_of(body).word, rest);
+    const auto index = static_cast<std::uint32_t>(&body - network_.macros.data());
+    const auto modes = std::equal_range(network_.modes.begin(), network_.modes.end(),
+                                        BodyMode{.macro = index}, by_body);
+    for (auto mode = modes.first; mode != modes.second; ++mode) {
+      rest = " @" + body.name + arguments({mode->frequency_hz, mode->t60_s});
+      for (const double displacement : mode->shape) {
+        rest += " " + print_number(displacement);
+      }
+      line(mode->name.empty() ? unused(body.name + "_" + std::to_string(mode - modes.first + 1))
+                              : mode->name.text(),
+           "mode", rest);
     }
   }
 
@@ -256,8 +283,25 @@ class Printer {
     if (tap.length > 0) {
       return "@" + masses_[nearest_node(tap)];
     }
+    if (const Macro& macro = network_.macros[tap.macro]; macro.kind == MacroKind::body) {
+      return "[@" + macro.name + " " + place_on(macro, tap.u) + "]";
+    }
     return "[@" + network_.macros[tap.macro].name + coordinate(tap.u) +
            (tap.v == no_argument ? "" : coordinate(tap.v)) + "]";
+  }
+
+  // By its name, where it is at one.
+  std::string place_on(const Macro& body, ArgumentId u) const {
+    const Formula& formula = network_.arguments[u];
+    if (is_constant(formula)) {
+      const double last = static_cast<double>(std::max<std::size_t>(body.places.size(), 2) - 1);
+      for (std::size_t place = 0; place < body.places.size(); ++place) {
+        if (evaluate(formula, {}) == static_cast<double>(place) / last) {
+          return body.places[place];
+        }
+      }
+    }
+    return print_expression(formula, parameters_);
   }
 
   std::string coordinate(ArgumentId id) const {

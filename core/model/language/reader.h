@@ -73,6 +73,11 @@ class Reader {
 
   void add_mass(const Line& line);
   void add_macro(const Line& line);
+  void name_places(const Line& line, Macro& body);
+  void add_body(const Line& line, Macro& body);
+  void add_mode(const Line& line);
+  double displacement(const Line& line, std::size_t at);
+  std::optional<double> place_called(const Macro& body, const Token& token) const;
   std::uint32_t size(const Line& line, std::size_t at, std::uint32_t least);
   void add_link(Line& line);
   void choose_profile(Link& link) const;
@@ -93,6 +98,10 @@ class Reader {
   std::optional<std::uint32_t> reference(Line& line, std::size_t at);
   std::optional<std::uint32_t> tap(const Line& line, const Token& token, const Token& label,
                                    std::vector<Token> coordinates);
+  std::optional<std::uint32_t> named_place(const Line& line, const Token& token,
+                                           std::uint32_t macro, const Token& name);
+  std::uint32_t add_point(const Line& line, const Token& token, Tap tap);
+  ArgumentId positive(const Line& line, std::size_t at, const std::string& what);
   ArgumentId expression(const Line& line, const Token& token);
   std::optional<int> channel(const Line& line, std::string_view prefix);
   void read_motion(const Line& line, const std::vector<Token>& tokens);
