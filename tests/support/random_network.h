@@ -54,6 +54,9 @@ class NetworkWriter {
     for (std::size_t part = 0; part < parts; ++part) {
       add_structure(parts == 1 ? family : families[random_.below(std::size(families) - 1)]);
     }
+    if (seed_ % 5 == 2) {
+      add_modal_body();
+    }
     add_hands();
     for (std::size_t i = 0; !is_linear_ && i < 1 + random_.below(4); ++i) {
       add_bent(chance(2) ? "@g0" : chance(2) ? "@g1" : some());
@@ -237,6 +240,34 @@ class NetworkWriter {
                       (is_mesh ? std::string(" ") + places[random_.below(5)] : "") + "]");
     }
     anchor(ends_.back());
+  }
+
+  // A body of modes, tied to what is there; from numbers of its own.
+  void add_modal_body() {
+    Random random(seed_ ^ 0x5deece66du);
+    const auto any = [&](double low, double high) { return show(random.uniform(low, high)); };
+    const std::string name = label();
+    const std::size_t places = 1 + random.below(3);
+    const std::size_t modes = 1 + random.below(6);
+    std::string body = name + " body " + (random.below(3) == 0 ? "m" : any(1.0, 30.0));
+    for (std::size_t place = 0; place < places; ++place) {
+      body += " p" + std::to_string(place);
+    }
+    add(body);
+    for (std::size_t mode = 0; mode < modes; ++mode) {
+      std::string line = label() + " mode " + name + " " + any(40.0, 9000.0) +
+                         (random.below(4) == 0 ? "*u " : " ") + any(0.02, 3.0);
+      for (std::size_t place = 0; place < places; ++place) {
+        line += " " + any(-1.0, 1.0);
+      }
+      add(line);
+    }
+    const std::string held = some();
+    ends_.push_back("[" + name + " p" + std::to_string(random.below(places)) + "]");
+    ends_.push_back("[" + name + " " + (random.below(3) == 0 ? "u" : any(0.0, 1.0)) + "]");
+    if (random.below(3) != 0) {
+      add_spring(held, ends_.back(), any(0.001, 0.05) + " " + any(0.0, 0.01));
+    }
   }
 
   // --- what acts on them and listens ---
