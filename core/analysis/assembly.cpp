@@ -36,7 +36,8 @@ class Assembler {
     }
     out_.is_complete = wandering <= most_wandering;
     for (std::uint32_t i = 0; i < network_.links.size() && out_.is_complete; ++i) {
-      if (network_.links[i].a != network_.links[i].b) {
+      const Link& link = network_.links[i];
+      if (link.a != link.b && !is_junction(link.a) && !is_junction(link.b)) {
         place(i);
       }
     }
@@ -93,6 +94,10 @@ class Assembler {
         add(row_[tap.first + mode], shape[mode]);
       }
     }
+  }
+
+  bool is_junction(std::uint32_t mass) const {
+    return network_.masses[mass].kind == MassKind::junction;
   }
 
   bool is_held(std::uint32_t mass) const {

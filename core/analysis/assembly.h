@@ -3,7 +3,8 @@
 //   K + 2Z = sum over terms of w g gT
 //
 // A term is what one link, or an oscillator's own spring, adds; g says which masses it joins, and w
-// is its k + 2z where it is steepest.
+// is its k + 2z where it is steepest. What holds a waveguide is no part of it: such a link takes no
+// more than it gives, whatever its numbers are (core/compile/schemes.h).
 #pragma once
 
 #include <cstdint>

@@ -6,6 +6,7 @@
 #include <string>
 
 #include "core/compile/accuracy/pitches.h"
+#include "core/compile/accuracy/waveguide_pitch.h"
 #include "core/compile/cull.h"
 #include "core/compile/make_engine.h"
 #include "core/compile/merge.h"
@@ -53,6 +54,9 @@ std::optional<LowestShapes> find_shapes(const Request& request, const Network& n
     return std::nullopt;
   }
   request.options.progress.stage("finding its lowest mode");
+  if (!network.waveguides.empty()) {
+    return waveguide_shapes(network, values);
+  }
   return lowest_shapes(network, values, request.options.progress);
 }
 
@@ -79,7 +83,11 @@ Analysis prove(const Request& request, const Reduced& reduced, const Machine& ma
   Margins margins = find_margins(network, schemes.links, box,
                                  options.bare ? std::span<const Limits>() : stability.limits,
                                  request.rate_ratio, options.progress);
-  auto rest_bounds = !options.bare && margins.keys >= 1.0
+  margins.keys = std::min(margins.keys, highest_waveguide_factor(network, box, options.rate_hz));
+  for (double& factor : margins.away) {
+    factor = std::min(factor, margins.keys);
+  }
+  auto rest_bounds = !options.bare && margins.keys >= 1.0 && network.waveguides.empty()
                          ? make_rest_bounds(network, machine, box, options.progress)
                          : std::vector<std::optional<RestBound>>();
   return {mode, {}, std::move(stability), std::move(margins), std::move(rest_bounds)};
@@ -127,11 +135,11 @@ Promise make_promise(const Request& request, const Reduced& reduced, const Machi
 
 // By how much keys would have every stiffness grow: as exact modes need it, if the published scheme
 // cannot do the highest of them; else what that bears.
-double wanted_factor(const Request& request, const Analysis& analysis) {
+double wanted_factor(const Request& request, const Analysis& analysis, bool has_waveguides) {
   constexpr int highest_of_a_piano = 108;
   constexpr double highest_share = 0.45;  // of the rate: what is higher is no tone any more
   const double borne = analysis.mode ? std::max(1.0, analysis.margins.keys) : 1.0;
-  if (!analysis.mode || request.options.bare || analysis.margins.keys <= 0.0) {
+  if (!analysis.mode || request.options.bare || analysis.margins.keys <= 0.0 || has_waveguides) {
     return borne;
   }
   int highest = 0;
@@ -156,6 +164,9 @@ Planned find_forms(const Request& request, Machine machine, const Analysis& anal
   const Budget& budget = request.budget;
   const bool is_published = options.bare && !options.method && !budget.is_physical() &&
                             budget.silence_db == -Budget::unlimited;
+  const bool has_waveguides =
+      std::any_of(machine.parts.begin(), machine.parts.end(),
+                  [](const Program& program) { return !program.waveguides.empty(); });
   options.progress.stage("finding the fastest way to compute it");
   return make_plan(std::move(machine),
                    {.is_double = options.precision == Precision::float64,
@@ -163,7 +174,7 @@ Planned find_forms(const Request& request, Machine machine, const Analysis& anal
                     .isa = options.isa,
                     .voices = request.voices,
                     .highest_factor = analysis.mode ? std::max(1.0, analysis.margins.keys) : 1.0,
-                    .wanted_factor = wanted_factor(request, analysis),
+                    .wanted_factor = wanted_factor(request, analysis, has_waveguides),
                     .is_untuned = options.bare,
                     .executor = options.executor},
                    is_published ? Method::direct : options.method, options.most_modes, budget,
@@ -229,6 +240,9 @@ Result<Compiled> compile_by_stages(const Request& request) {
   if (auto error = no_number(written, start, rate_ratio)) {
     return *std::move(error);
   }
+  if (auto error = waveguide_too_high(network, start, options.rate_hz)) {
+    return *std::move(error);
+  }
   const std::optional<LowestShapes> shapes = find_shapes(request, network, values);
   const std::optional<Mode> mode = shapes ? std::optional(shapes->mode) : std::nullopt;
   progress.stage("dividing it into parts");
@@ -243,8 +257,10 @@ Result<Compiled> compile_by_stages(const Request& request) {
   const Promise promise = make_promise(request, reduced, machine, analysis, start);
   Planned planned = find_forms(request, std::move(machine), analysis, promise);
   if (shapes) {
-    analysis.pitches = make_pitches(*shapes, stepping_of_lowest(planned.machine, *shapes),
-                                    options.rate_hz, rate_ratio);
+    const Stepping stepping = network.waveguides.empty()
+                                  ? stepping_of_lowest(planned.machine, *shapes)
+                                  : Stepping{.scheme = Stepping::Scheme::exact};
+    analysis.pitches = make_pitches(*shapes, stepping, options.rate_hz, rate_ratio);
     analysis.pitches.lowest_hz *= std::exp2(-preset.flattening_cents / 1200.0);
     reach(analysis, planned.more, options.rate_hz);
   }

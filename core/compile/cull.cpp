@@ -46,7 +46,8 @@ class Culler {
   }
 
   bool carries(std::uint32_t mass) const {
-    return moves(network_.masses[mass]) || network_.masses[mass].kind == MassKind::point;
+    const MassKind kind = network_.masses[mass].kind;
+    return moves(network_.masses[mass]) || kind == MassKind::point || kind == MassKind::junction;
   }
 
   void join() {

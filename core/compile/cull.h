@@ -31,13 +31,19 @@ class Groups {
   std::vector<std::uint32_t> parent_;
 };
 
-// Joins every place on a macro that counts with all of the macro's nodes; `meet` hears of each
-// once.
+// Joins every place on a macro that counts with all of the macro's nodes, and places on a waveguide
+// with each other; `meet` hears of each node once.
 template <class Counts, class Meet>
 void join_places(const Network& network, Groups& groups, const Progress& progress, Counts&& counts,
                  Meet&& meet) {
   std::vector<bool> is_joined(network.masses.size(), false);  // [first node] of a macro
+  std::vector<std::uint32_t> first(network.waveguides.size(), no_argument);  // of their places
   for (std::uint32_t i = 0; i < network.masses.size(); ++i) {
+    if (network.masses[i].kind == MassKind::junction && counts(i)) {
+      std::uint32_t& other = first[network.taps[network.masses[i].tap].macro];
+      other = other == no_argument ? i : other;
+      groups.join(i, other);
+    }
     if (network.masses[i].kind != MassKind::point || !counts(i)) {
       continue;
     }

@@ -41,6 +41,7 @@ class ProgramMaker {
       }
     }
     place_taps();
+    place_junctions();
     for (const Output& output : network_.outputs) {
       if (node_[output.mass] != nowhere) {
         program_.outputs.push_back(
@@ -126,7 +127,10 @@ class ProgramMaker {
     std::vector<std::uint32_t> order = share_.masses;
     const auto rank = [&](std::uint32_t i) {
       const Mass& m = masses[i];
-      const int group = moves(m) ? 0 : m.kind == MassKind::ground ? 1 : 2;
+      const int group = moves(m)                       ? 0
+                        : m.kind == MassKind::junction ? 1
+                        : m.kind == MassKind::ground   ? 2
+                                                       : 3;
       return std::tuple(group, m.is_mode, m.kind, m.mass, m.stiffness, m.damping, m.gravity,
                         m.gravity_per_rate);
     };
@@ -140,7 +144,8 @@ class ProgramMaker {
       node_[order[node]] = node;
       program_.position.push_back(mass.position);
       program_.velocity.push_back(initial_velocity(network_, mass) * program_.rate_ratio);
-      if (!moves(mass)) {
+      const bool is_junction = mass.kind == MassKind::junction;
+      if (!moves(mass) && !is_junction) {
         continue;
       }
       ++program_.moving;
@@ -153,14 +158,17 @@ class ProgramMaker {
         continue;
       }
       const Unit gravity_unit = mass.gravity_per_rate ? Unit::gravity_per_rate : Unit::gravity;
-      program_.mass_runs.push_back({.first = node,
-                                    .count = 1,
-                                    .inverse_mass = coefficient(mass.mass, Unit::inverse_mass),
-                                    .stiffness = coefficient(mass.stiffness, Unit::stiffness),
-                                    .damping = coefficient(mass.damping, Unit::damping),
-                                    .gravity = coefficient(mass.gravity, gravity_unit),
-                                    .is_oscillator = mass.kind == MassKind::oscillator,
-                                    .has_gravity = mass.gravity != no_argument});
+      program_.mass_runs.push_back(
+          {.first = node,
+           .count = 1,
+           .inverse_mass =
+               coefficient(mass.mass, is_junction ? Unit::inverse_impedance : Unit::inverse_mass),
+           .stiffness = coefficient(mass.stiffness, Unit::stiffness),
+           .damping = coefficient(mass.damping, Unit::damping),
+           .gravity = coefficient(mass.gravity, gravity_unit),
+           .is_oscillator = mass.kind == MassKind::oscillator,
+           .has_gravity = mass.gravity != no_argument,
+           .is_junction = is_junction});
     }
   }
 
@@ -185,6 +193,30 @@ class ProgramMaker {
                                .places = tap.places,
                                .shape = tap.shape});
       program_.position[node_[i]] = network_.masses[tap.first].position;
+    }
+  }
+
+  void place_junctions() {
+    std::map<std::uint32_t, std::vector<std::uint32_t>> places;  // waveguide -> masses
+    for (const std::uint32_t i : share_.masses) {
+      if (network_.masses[i].kind == MassKind::junction) {
+        places[network_.taps[network_.masses[i].tap].macro].push_back(i);
+      }
+    }
+    for (const auto& [waveguide, masses] : places) {
+      const Macro& guide = network_.waveguides[waveguide];
+      program_.waveguides.push_back(
+          {.is_open = guide.kind == MacroKind::open_waveguide,
+           .inverse_impedance = coefficient(guide.impedance, Unit::inverse_impedance),
+           .frequency = coefficient(guide.frequency_hz, Unit::frequency),
+           .t60 = coefficient(guide.t60_s, Unit::plain),
+           .brightness = coefficient(guide.brightness, Unit::plain),
+           .first = static_cast<std::uint32_t>(program_.junctions.size()),
+           .count = static_cast<std::uint32_t>(masses.size())});
+      for (const std::uint32_t i : masses) {
+        program_.junctions.push_back(
+            {node_[i], coefficient(network_.taps[network_.masses[i].tap].u, Unit::plain)});
+      }
     }
   }
 
@@ -293,7 +325,9 @@ class Divider {
     std::vector<std::uint32_t> count(binds_.size(), 0);
     std::vector<std::uint32_t> roots;
     for (std::uint32_t i = 0; i < binds_.size(); ++i) {
-      if (binds_[i] && moves(network_.masses[i]) && count[groups_.find(i)]++ == 0) {
+      const bool counts =
+          moves(network_.masses[i]) || network_.masses[i].kind == MassKind::junction;
+      if (binds_[i] && counts && count[groups_.find(i)]++ == 0) {
         roots.push_back(groups_.find(i));
       }
     }

@@ -106,7 +106,8 @@ class Chooser {
 
   // In single precision with compensated positions there is one form for all.
   Part compensate() {
-    add(Method::direct, Compensated{});
+    program_.waveguides.empty() ? add(Method::direct, Compensated{})
+                                : add(Method::direct, Direct{});
     return take("in the precision asked for");
   }
 
@@ -349,7 +350,7 @@ Planned make_plan(Machine machine, const Workload& load, std::optional<Method> m
   for (Program& program : machine.parts) {
     Chooser chooser(program, published, most_modes, budget, progress);
     std::optional<Judge> judge;
-    if (budget.is_physical() && program.moving > 0) {
+    if (budget.is_physical() && program.moving > 0 && program.waveguides.empty()) {
       judge.emplace(program,
                     corners_of(program, machine.parameters, promise.lowest, promise.highest,
                                promise.highest_factor),

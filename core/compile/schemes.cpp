@@ -54,7 +54,17 @@ Schemes choose_schemes(const Network& network, const Budget& budget, const Progr
   progress.spend(network.links.size());
   for (std::size_t i = 0; i < network.links.size(); ++i) {
     const Link& link = network.links[i];
-    if (link.law == Law::spring || exerts_nothing(network, link)) {
+    const auto is_junction = [&](std::uint32_t mass) {
+      return network.masses[mass].kind == MassKind::junction;
+    };
+    if (exerts_nothing(network, link)) {
+      continue;
+    }
+    if (is_junction(link.a) || is_junction(link.b)) {
+      schemes.links[i] = LinkScheme{Scheme::discrete_gradient};
+      continue;
+    }
+    if (link.law == Law::spring) {
       continue;
     }
     first = first == nullptr ? &link : first;

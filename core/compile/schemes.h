@@ -27,7 +27,9 @@ struct Schemes {
 // it: a soft contact may gain at each touch, a spring that stiffens may be swung up by its own
 // change of stiffness, a bow or a pluck may grip a sample too late, and what each of them does
 // alone says nothing about several on one mass. So every link that is not linear is made passive,
-// unless the budget says never; or it exerts nothing as all its strengths are 0 for good.
+// unless the budget says never; or it exerts nothing as all its strengths are 0 for good. Whatever
+// holds a place on a waveguide is made passive in any case, springs too: no explicit form of it is
+// stable there.
 // For a network without macros. O(links). [any thread but audio]
 Schemes choose_schemes(const Network& network, const Budget& budget, const Progress& progress = {});
 

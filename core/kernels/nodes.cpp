@@ -93,6 +93,9 @@ void NodeKernel<T, Number>::set_state(std::size_t lane, const double* x, const d
 
 template <class T, class Number>
 bool NodeKernel<T, Number>::save(std::size_t lane, double* x, double* v) const {
+  if (!program_.waveguides.empty()) {
+    return false;  // nodes are not all that there is
+  }
   for (std::size_t node = 0; node < program_.position.size(); ++node) {
     x[node] = nodes_.position(node, lane);
     v[node] = nodes_.velocity(node, lane);
@@ -128,7 +131,7 @@ bool NodeKernel<T, Number>::is_near_start(std::size_t lane, double bound) const 
       return false;
     }
   }
-  return true;
+  return is_quiet(lane, bound);
 }
 
 template NodeLayout layout_in_rows<float>(std::span<const std::uint32_t>, std::size_t, std::size_t,

@@ -82,6 +82,8 @@ class NodeKernel : public Kernel<T> {
  private:
   // Whatever a lane has besides its nodes, as at the start.
   virtual void clear(std::size_t) {}
+  // Whether that moves by less than `bound` a sample.
+  virtual bool is_quiet(std::size_t, double) const { return true; }
 };
 
 }  // namespace ressort

@@ -27,8 +27,11 @@ double rate_factor(Unit unit, double r) {
     case Unit::friction:
     case Unit::speed:
       return r;
+    case Unit::inverse_impedance:
+      return 1.0 / r;
     case Unit::plain:
     case Unit::inverse_mass:
+    case Unit::frequency:
       return 1.0;
   }
   return 1.0;
@@ -44,9 +47,13 @@ double continuous_value(const Program& program, const Coefficient& coefficient,
       return scaled * stiffness_factor;
     case Unit::friction:
     case Unit::speed:
+    case Unit::frequency:
       return scaled * std::sqrt(stiffness_factor);
     case Unit::inverse_mass:
       return 1.0 / value;
+    case Unit::inverse_impedance:
+      return rate_factor(coefficient.unit, program.rate_ratio) /
+             (value * std::sqrt(stiffness_factor));
     case Unit::gravity_per_rate:
       return scaled / reference_rate_hz;
     case Unit::plain:

@@ -40,6 +40,7 @@ struct MassRun {
   std::uint32_t gravity = 0;  // read only if has_gravity
   bool is_oscillator = false;
   bool has_gravity = false;
+  bool is_junction = false;  // places on waveguides
 };
 
 // How the force of a link is found.
@@ -95,13 +96,31 @@ struct TapSlot {
   bool is_on_body() const { return places > 0; }
 };
 
+// A string or a tube as two waves (core/kernels/waveguides).
+struct WaveguideSlot {
+  bool is_open = false;                 // free at its ends; else held
+  std::uint32_t inverse_impedance = 0;  // coefficients
+  std::uint32_t frequency = 0;          // Hz
+  std::uint32_t t60 = 0;                // seconds
+  std::uint32_t brightness = 0;
+  std::uint32_t first = 0;  // its places in Program::junctions
+  std::uint32_t count = 0;
+};
+
+// A place on a waveguide: a node with an inverse mass, which waves move and not step_masses().
+struct JunctionSlot {
+  std::uint32_t node = 0;
+  std::uint32_t u = 0;  // coefficient: where between its ends, 0..1
+};
+
 // A part of a network, which no other part touches. Nodes are numbered: masses that move, run by
-// run; then grounds; then position inputs; then places on macros, in the order of `taps`.
+// run, and then places on waveguides; then grounds; then position inputs; then places on macros, in
+// the order of `taps`.
 struct Program {
   Form form;
   double rate_hz = 44100.0;
   double rate_ratio = 1.0;       // r above; 1 where numbers are taken raw
-  std::uint32_t moving = 0;      // nodes [0, moving) have inertia
+  std::uint32_t moving = 0;      // nodes [0, moving) have inertia, or give way as if they had
   std::vector<double> position;  // [node] at the start
   std::vector<double> velocity;  // [node] per sample of rate_hz
   std::vector<MassRun> mass_runs;
@@ -113,6 +132,8 @@ struct Program {
   std::vector<std::uint32_t> tap_nodes;  // nodes
   std::vector<double> shapes;            // of bodies
   std::vector<SampledCoefficients> modes;
+  std::vector<WaveguideSlot> waveguides;
+  std::vector<JunctionSlot> junctions;
   std::vector<OutputSlot> outputs;
   std::vector<AudioParameter> audio_parameters;
   std::vector<std::uint32_t> audio_coefficients;  // those that depend on an audio parameter

@@ -55,6 +55,9 @@ constexpr KernelRow row(Method method, std::string_view name, Use use, Fits,
           .name = name,
           .use = use,
           .fits = [](const Request& request) -> std::optional<Form> {
+            if (!request.program.waveguides.empty() && !std::is_same_v<Tables, Direct>) {
+              return std::nullopt;  // whose waves no other kernel has
+            }
             std::optional<Tables> tables = Fits()(request);
             return tables ? std::optional<Form>(std::move(*tables)) : std::nullopt;
           },

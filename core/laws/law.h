@@ -21,14 +21,16 @@ enum class Law : std::uint8_t;  // its list is in laws.h; the first is the sprin
 // How a number follows the sample rate and a voice's pitch. With r = 44100 / rate and s the
 // voice's stiffness factor, a coefficient is its formula's value times r^a s^b.
 enum class Unit : std::uint8_t {
-  plain,             // distances and thresholds: a = 0, b = 0
-  stiffness,         // K: a = 2, b = 1
-  damping,           // Z: a = 1, b = 0, so that a decay stays what it is at every pitch
-  friction,          // Z of a bow: a = 1, b = 1/2, as the string's impedance
-  speed,             // a bow's velocity scale: a = 1, b = 1/2
-  inverse_mass,      // 1/M: a = 0, b = 0
-  gravity,           // g: a = 2, b = 0
-  gravity_per_rate,  // the same, divided by 44100
+  plain,              // distances and thresholds: a = 0, b = 0
+  stiffness,          // K: a = 2, b = 1
+  damping,            // Z: a = 1, b = 0, so that a decay stays what it is at every pitch
+  friction,           // Z of a bow: a = 1, b = 1/2, as the string's impedance
+  speed,              // a bow's velocity scale: a = 1, b = 1/2
+  inverse_mass,       // 1/M: a = 0, b = 0
+  inverse_impedance,  // 1/R of a waveguide: a = -1, b = -1/2
+  frequency,          // in Hz: a = 0, b = 1/2
+  gravity,            // g: a = 2, b = 0
+  gravity_per_rate,   // the same, divided by 44100
 };
 
 // What an argument does. Where all but `reach` and `shape` are 0, the law exerts nothing.

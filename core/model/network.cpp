@@ -47,7 +47,8 @@ class Renumbering {
     place_masses();
     for (Macro& macro : old_.macros) {
       for (ArgumentId* const id : {&macro.mass, &macro.stiffness, &macro.second_stiffness,
-                                   &macro.damping, &macro.air_damping}) {
+                                   &macro.damping, &macro.air_damping, &macro.impedance,
+                                   &macro.frequency_hz, &macro.t60_s, &macro.brightness}) {
         *id = argument(*id);
       }
       macro.drawing = drawing(macro.drawing);
@@ -200,7 +201,8 @@ std::vector<double> parameter_values(const Network& network) {
 }
 
 double initial_velocity(const Network& network, const Mass& mass) {
-  if (mass.kind == MassKind::ground || mass.kind == MassKind::position) {
+  if (mass.kind == MassKind::ground || mass.kind == MassKind::position ||
+      mass.kind == MassKind::junction) {
     return 0.0;
   }
   return network.third == ThirdArgument::delayed_position ? mass.position - mass.third

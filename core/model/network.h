@@ -43,6 +43,7 @@ enum class MassKind : std::uint8_t {
   ground,      // never moves
   position,    // follows an input; has no inertia
   point,       // a place on a macro, between its nodes (see Tap); has no inertia
+  junction,    // a place on a waveguide of an expanded network; its M is the impedance
 };
 
 struct Mass {
@@ -70,13 +71,15 @@ inline bool moves(const Mass& mass) {
 }
 
 enum class MacroKind : std::uint8_t {
-  string,        // both ends fixed; neighbours linked by K, Z
-  chain,         // the same without fixed ends
-  stiff_string,  // a string with undamped K2 between every second node, clamped at both ends
-  mesh,          // a rectangle, neighbours linked by K, Z
-  closed_mesh,   // with its border fixed
-  corner_mesh,   // with its corners fixed
-  body,          // modes, which are its nodes, and named places on it (see BodyMode)
+  string,          // both ends fixed; neighbours linked by K, Z
+  chain,           // the same without fixed ends
+  stiff_string,    // a string with undamped K2 between every second node, clamped at both ends
+  mesh,            // a rectangle, neighbours linked by K, Z
+  closed_mesh,     // with its border fixed
+  corner_mesh,     // with its corners fixed
+  body,            // modes, which are its nodes, and named places on it (see BodyMode)
+  waveguide,       // a string as two waves, held at both ends
+  open_waveguide,  // the same with free ends
 };
 
 // Many masses in one line. Nodes are numbered row by row; every one that moves has mass M, and
@@ -91,9 +94,14 @@ struct Macro {
   ArgumentId second_stiffness = no_argument;  // K2
   ArgumentId damping = no_argument;
   ArgumentId air_damping = no_argument;  // Zo
-  std::vector<std::string> places;       // names, of a body only
-  double position = 0.0;                 // of every node
-  double third = 0.0;                    // as of Mass
+  // Of waveguides, which have no nodes:
+  ArgumentId impedance = no_argument;     // R, force per velocity
+  ArgumentId frequency_hz = no_argument;  // of the lowest partial
+  ArgumentId t60_s = no_argument;         // the same
+  ArgumentId brightness = no_argument;    // 0..1
+  std::vector<std::string> places;        // names, of a body only
+  double position = 0.0;                  // of every node
+  double third = 0.0;                     // as of Mass
   std::uint32_t drawing = 0;
   SourceLocation location;
   bool operator==(const Macro&) const = default;
@@ -188,7 +196,8 @@ struct Network {
   std::vector<Drawing> drawings;
   std::vector<Mass> masses;  // grounds and position inputs too, as declared
   std::vector<Macro> macros;
-  std::vector<BodyMode> modes;  // by body
+  std::vector<BodyMode> modes;    // by body
+  std::vector<Macro> waveguides;  // of an expanded network, as nothing can be written out for them
   std::vector<Tap> taps;
   std::vector<double> shapes;  // of expanded bodies, see Tap
   std::vector<Link> links;

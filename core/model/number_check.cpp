@@ -44,7 +44,11 @@ class NumberCheck {
                    {"stiffness", macro.stiffness},
                    {"stiffness", macro.second_stiffness},
                    {"damping", macro.damping},
-                   {"damping", macro.air_damping}});
+                   {"damping", macro.air_damping},
+                   {"mass", macro.impedance},
+                   {"frequency", macro.frequency_hz},
+                   {"T60", macro.t60_s},
+                   {"brightness", macro.brightness}});
     }
     for (const BodyMode& mode : network_.modes) {
       look(mode, {{"frequency", mode.frequency_hz}, {"T60", mode.t60_s}});

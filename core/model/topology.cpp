@@ -1,7 +1,11 @@
 #include "core/model/topology.h"
 
 #include <algorithm>
+#include <map>
 #include <numbers>
+#include <utility>
+
+#include "core/laws/laws.h"
 
 namespace ressort {
 namespace {
@@ -20,13 +24,15 @@ bool is_fixed(const Macro& macro, std::uint32_t i, std::uint32_t j) {
     case MacroKind::chain:
     case MacroKind::mesh:
     case MacroKind::body:
+    case MacroKind::waveguide:
+    case MacroKind::open_waveguide:
       return false;
   }
   return false;
 }
 
 std::size_t link_count(const Macro& macro) {
-  if (macro.kind == MacroKind::body) {
+  if (macro.kind == MacroKind::body || is_waveguide(macro.kind)) {
     return 0;
   }
   const std::size_t rows = macro.length;
@@ -147,7 +153,69 @@ void add_modes(const Network& network, std::uint32_t body, const Progress& progr
   }
 }
 
+// A place on a waveguide is a node of its own, one for all ends that name the same.
+void add_junctions(const Network& network, Network& expanded) {
+  std::vector<std::uint32_t> waveguide;  // [macro] which of the waveguides it is
+  for (const Macro& macro : network.macros) {
+    waveguide.push_back(static_cast<std::uint32_t>(expanded.waveguides.size()));
+    if (is_waveguide(macro.kind)) {
+      expanded.waveguides.push_back(macro);
+    }
+  }
+  std::map<std::pair<std::uint32_t, ArgumentId>, std::uint32_t> known;
+  std::vector<std::uint32_t> same(expanded.masses.size());  // [mass] which one stands for it
+  for (std::uint32_t i = 0; i < same.size(); ++i) {
+    Mass& mass = expanded.masses[i];
+    same[i] = i;
+    if (mass.kind != MassKind::point ||
+        !is_waveguide(network.macros[expanded.taps[mass.tap].macro].kind)) {
+      continue;
+    }
+    Tap& tap = expanded.taps[mass.tap];
+    const Macro& macro = network.macros[tap.macro];
+    same[i] = known.try_emplace({tap.macro, tap.u}, i).first->second;
+    tap.macro = waveguide[tap.macro];
+    mass.kind = same[i] == i ? MassKind::junction : MassKind::ground;  // that nobody holds
+    mass.mass = same[i] == i ? macro.impedance : no_argument;
+    mass.position = macro.position;
+  }
+  for (Link& link : expanded.links) {
+    link.a = same[link.a];
+    link.b = same[link.b];
+  }
+  for (Input& input : expanded.inputs) {
+    input.mass = same[input.mass];
+  }
+  for (Output& output : expanded.outputs) {
+    output.mass = same[output.mass];
+  }
+}
+
+// What is straight of a spring that bends is a link of its own at a waveguide: there each is found
+// by its discrete gradient, and in a spring that bends that part is not (core/laws/law.h).
+void split_springs(Network& network) {
+  const auto is_junction = [&](std::uint32_t mass) {
+    return network.masses[mass].kind == MassKind::junction;
+  };
+  const std::size_t count = network.links.size();
+  for (std::size_t i = 0; i < count; ++i) {
+    Link& link = network.links[i];
+    const LawFacts& law = facts_of(link.law);
+    if (!law.contains_spring || !law.is_curved || !(is_junction(link.a) || is_junction(link.b))) {
+      continue;
+    }
+    Link straight{.name = link.name, .a = link.a, .b = link.b, .location = link.location};
+    straight.arguments[0] = std::exchange(link.arguments[law.slot(Role::stiffness)], no_argument);
+    straight.arguments[1] = std::exchange(link.arguments[law.slot(Role::damping)], no_argument);
+    network.links.push_back(std::move(straight));
+  }
+}
+
 }  // namespace
+
+bool is_waveguide(MacroKind kind) {
+  return kind == MacroKind::waveguide || kind == MacroKind::open_waveguide;
+}
 
 bool is_mesh(MacroKind kind) {
   return kind == MacroKind::mesh || kind == MacroKind::closed_mesh ||
@@ -155,7 +223,7 @@ bool is_mesh(MacroKind kind) {
 }
 
 std::uint64_t node_count(const Macro& macro) {
-  return std::uint64_t{macro.length} * macro.width;
+  return is_waveguide(macro.kind) ? 0 : std::uint64_t{macro.length} * macro.width;
 }
 
 Network expand_macros(const Network& network, const Progress& progress) {
@@ -171,6 +239,7 @@ Network expand_macros(const Network& network, const Progress& progress) {
     nodes += node_count(macro);
     links += link_count(macro);
   }
+  add_junctions(network, expanded);
   expanded.masses.reserve(nodes);
   expanded.links.reserve(links);
   std::vector<std::uint32_t> first;  // [macro]
@@ -182,17 +251,25 @@ Network expand_macros(const Network& network, const Progress& progress) {
       add_modes(network, static_cast<std::uint32_t>(first.size() - 1), progress, expanded);
       continue;
     }
+    if (is_waveguide(macro.kind)) {
+      continue;
+    }
     add_nodes(macro, progress, expanded);
     add_links(macro, first.back(), progress, expanded);
   }
-  for (Tap& tap : expanded.taps) {
-    const Macro& macro = network.macros[tap.macro];
+  for (std::size_t i = 0; i < expanded.taps.size(); ++i) {
+    Tap& tap = expanded.taps[i];
+    const Macro& macro = network.macros[network.taps[i].macro];
+    if (is_waveguide(macro.kind)) {
+      continue;
+    }
     tap.first = first[tap.macro];
     tap.length = macro.length;
     tap.width = macro.width;
     tap.places = static_cast<std::uint32_t>(macro.places.size());
     tap.shape = shape[tap.macro];
   }
+  split_springs(expanded);
   return expanded;
 }
 

@@ -8,7 +8,8 @@ template <class T>
 DirectKernel<T>::DirectKernel(const Program& program, const Direct&, std::size_t voices, Isa isa)
     : NodeKernel<T>(program, layout_in_rows<T>(program, lanes_for<T>(voices, isa), 3)),
       loops_(with_isa(
-          isa, [&]<Isa level>() { return direct_loops<level, T>(this->width() * sizeof(T)); })) {
+          isa, [&]<Isa level>() { return direct_loops<level, T>(this->width() * sizeof(T)); })),
+      rails_(program, this->width()) {
   this->reset_lanes();
 }
 
@@ -18,6 +19,7 @@ DirectKernel<T>::DirectKernel(const Program& program, const Fourth& form, std::s
     : NodeKernel<T>(program, layout_in_rows<T>(program, lanes_for<T>(voices, isa), fourth_rows)),
       loops_(with_isa(
           isa, [&]<Isa level>() { return fourth_loops<level, T>(this->width() * sizeof(T)); })),
+      rails_(program, this->width()),
       fourth_(&form) {
   this->reset_lanes();
 }
@@ -26,6 +28,7 @@ template <class T>
 DirectState<T> DirectKernel<T>::state() {
   DirectState<T> state(ramps_of(this->coefficients), this->nodes_);
   state.fourth = fourth_;
+  state.rails = rails_.is_empty() ? nullptr : &rails_;
   return state;
 }
 
@@ -44,6 +47,7 @@ bool DirectKernel<T>::write_nodes(std::span<const std::uint32_t> nodes, const T*
 
 template <class T>
 void DirectKernel<T>::play(const Block<T>& block) {
+  rails_.prepare(this->coefficients.value.data());
   DirectState<T> played = state();
   loops_.step(this->program_, played, block);
   this->coefficients.finish(block.frames);

@@ -18,6 +18,7 @@
 #pragma once
 
 #include "core/kernels/nodes.h"
+#include "core/kernels/waveguides/rails.h"
 
 namespace ressort {
 
@@ -55,6 +56,7 @@ struct DirectState {
   T* awake;                           // [lane] 0 in the first sample after set_state(), else 1
   T* felt;  // [node][lane] what passive links did in this sample; null: nobody listens
   const Fourth* fourth = nullptr;
+  Rails<T>* rails = nullptr;  // only if there are waveguides
   // Only where positions are compensated, what they are more than one number:
   const T* value_rest = nullptr;  // [frame][input][lane]
   T* output_rest = nullptr;       // [frame][output][lane]
@@ -85,12 +87,19 @@ class DirectKernel final : public NodeKernel<T> {
   DirectKernel(const Program& program, const Direct& form, std::size_t voices, Isa isa);
   DirectKernel(const Program& program, const Fourth& form, std::size_t voices, Isa isa);
   bool write_nodes(std::span<const std::uint32_t> nodes, const T* x, const T* v) override;
+  // Of what masses and waves hold: the books of energy of a test.
+  const Rails<T>& rails() const { return rails_; }
 
  private:
   void play(const Block<T>& block) override;
+  void clear(std::size_t lane) override { rails_.clear(lane); }
+  bool is_quiet(std::size_t lane, double bound) const override {
+    return rails_.is_quiet(lane, bound);
+  }
   DirectState<T> state();
 
   DirectLoops<T> loops_;
+  Rails<T> rails_;
   const Fourth* fourth_ = nullptr;
 };
 

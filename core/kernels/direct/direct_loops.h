@@ -67,6 +67,9 @@ template <class S>
 void step_masses(const Program& program, S& s) {
   using V = typename S::V;
   for (const MassRun& run : program.mass_runs) {
+    if (run.is_junction) {
+      continue;  // waves move these
+    }
     const V k = s.coefficient[run.stiffness];
     const V z = s.coefficient[run.damping];
     const V g = run.has_gravity ? s.coefficient[run.gravity] : V{};
@@ -168,6 +171,12 @@ void spread_taps(const Program& program, S& s) {
              [&](std::size_t at, T weight) { s.state.force[at] += weight * force[lane]; });
     }
   }
+}
+
+// Whether a node is a place on a waveguide: the last of those that give way.
+bool is_junction(const Program& program, std::uint32_t node) {
+  const std::size_t places = program.junctions.size();
+  return node < program.moving && node >= program.moving - places;
 }
 
 // Whether a node is a place on a macro; it is then taps[node - taps[0].node].
@@ -387,7 +396,9 @@ template <class S>
 typename S::V read_output(const Program& program, const S& s, const typename S::V* value,
                           const OutputSlot& output) {
   if (!output.is_force) {
-    return s.x[output.node];
+    // Even and odd samples at a place on a waveguide are two motions: their mean is heard.
+    return is_junction(program, output.node) ? s.x[output.node] - s.v[output.node] / 2
+                                             : s.x[output.node];
   }
   auto force = force_at(program, s, output.node);
   for (std::size_t i = 0; i < program.inputs.size(); ++i) {
@@ -430,6 +441,9 @@ void step(const Program& program, DirectState<T>& state, const Block<T>& block) 
       spread_taps(program, s);
     }
     step_masses(program, s);
+    if (state.rails != nullptr) {
+      RailLoops<V, T>::move_places(program, *state.rails, s);
+    }
     for (std::size_t i = 0; i < inputs; ++i) {
       if (!program.inputs[i].is_force) {
         s.x[program.inputs[i].node] = value[i];
@@ -441,6 +455,9 @@ void step(const Program& program, DirectState<T>& state, const Block<T>& block) 
       if (has_passive) {
         correct_links(program, s);
       }
+    }
+    if (state.rails != nullptr) {
+      RailLoops<V, T>::go_on(program, *state.rails, s);
     }
     move_taps(program, s);
     pull(program, s);

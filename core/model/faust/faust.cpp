@@ -282,6 +282,7 @@ class Writer {
       case MassKind::position:
         return "x_" + name + " = " + channel_of(i) + ";  " + moved(i, mass.position);
       case MassKind::point:
+      case MassKind::junction:  // refused before
         break;
     }
     const Tap& tap = network_.taps[mass.tap];
@@ -537,6 +538,14 @@ class Writer {
 Result<std::string> faust_text(const Network& network, const FaustOptions& options) {
   if (network.outputs.empty()) {
     return Error{"the model has no output; FAUST takes no program without one", 1, 1};
+  }
+  for (const Macro& macro : network.macros) {
+    if (is_waveguide(macro.kind)) {
+      return Error{"the waveguide '" + macro.name +
+                       "' is not written in FAUST: the links that hold one are solved together, "
+                       "sample by sample; a 'string' is",
+                   macro.location.line, macro.location.column};
+    }
   }
   return Writer(network, options).text();
 }

@@ -24,6 +24,8 @@ constexpr Keyword fixed[] = {
     {"cornerMesh",         Element::macro,           0, 6, 8, false, "LENGTH WIDTH M K Z [ZO] POSITION [MOTION]", MacroKind::corner_mesh},
     {"body",               Element::macro,           0, 2, 1 + most_body_places, false, "M PLACE...", MacroKind::body},
     {"mode",               Element::body_mode,       0, 4, 3 + most_body_places, false, "@BODY HZ T60 DISPLACEMENT..."},
+    {"waveguide",          Element::macro,           0, 5, 5, false, "R HZ T60 BRIGHTNESS POSITION", MacroKind::waveguide},
+    {"openWaveguide",      Element::macro,           0, 5, 5, false, "R HZ T60 BRIGHTNESS POSITION", MacroKind::open_waveguide},
     {"posInput",           Element::position_input,  0, 1, 1, true,  "POSITION"},
     {"frcInput",           Element::force_input,     1, 0, 0, false, "@MASS"},
     {"forceInput",         Element::force_input,     1, 0, 0, false, "@MASS"},

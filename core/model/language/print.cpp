@@ -186,6 +186,12 @@ class Printer {
         print_body(macro);
         continue;
       }
+      if (is_waveguide(macro.kind)) {
+        line(macro.name, keyword_of(macro).word,
+             arguments({macro.impedance, macro.frequency_hz, macro.t60_s, macro.brightness}) +
+                 start);
+        continue;
+      }
       std::string rest = " " + std::to_string(macro.length);
       if (is_mesh(macro.kind)) {
         rest += " " + std::to_string(macro.width);

@@ -1,4 +1,4 @@
-// core/model: the reader behind parse_network, for mdl.cpp, elements.cpp and motion.cpp only.
+// core/model: the reader behind parse_network, for mdl.cpp, elements.cpp, macros.cpp and motion.cpp only.
 #pragma once
 
 #include <cstdint>
@@ -78,6 +78,7 @@ class Reader {
   void add_mode(const Line& line);
   double displacement(const Line& line, std::size_t at);
   std::optional<double> place_called(const Macro& body, const Token& token) const;
+  void add_waveguide(const Line& line, Macro& guide);
   std::uint32_t size(const Line& line, std::size_t at, std::uint32_t least);
   void add_link(Line& line);
   void choose_profile(Link& link) const;

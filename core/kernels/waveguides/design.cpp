@@ -1,0 +1,156 @@
+#include "core/kernels/waveguides/design.h"
+
+#include <algorithm>
+#include <cmath>
+#include <complex>
+#include <numbers>
+
+namespace ressort {
+namespace {
+
+using Complex = std::complex<double>;
+
+constexpr double turn = 2.0 * std::numbers::pi;
+constexpr double most_allpass_delay = 1.5;  // samples; the least is one less
+constexpr int most_halvings = 40;
+constexpr int most_newton_steps = 12;
+
+// What is no number becomes the lowest.
+double within(double value, double lowest, double highest) {
+  return value > lowest ? std::min(value, highest) : lowest;
+}
+
+// The loop with a delay of any length in place of N and the allpass, at the pole e^(decay) 1/back.
+struct Line {
+  double gain;
+  double decay;  // per sample
+  double theta;  // the pole's angle
+
+  Complex denominator(double pole) const {
+    return 1.0 - pole * std::polar(std::exp(decay), -theta);
+  }
+  // So long that the phase is right.
+  double delay(double pole) const { return (turn - std::arg(denominator(pole))) / theta; }
+  // By how much it is then too loud: falls from a pole of 0 on.
+  double over(double pole) const {
+    return std::log(gain * (1.0 - pole) / std::abs(denominator(pole))) + decay * delay(pole);
+  }
+};
+
+// Where it is right as well. By halves of the logarithm of 1 - pole, as that may be small.
+double pole_of(const Line& line) {
+  double low = -60.0;
+  double high = 0.0;
+  if (!(line.over(0.0) > 0.0)) {
+    return 0.0;
+  }
+  for (int i = 0; i < most_halvings; ++i) {
+    const double middle = 0.5 * (low + high);
+    (line.over(-std::expm1(middle)) > 0.0 ? high : low) = middle;
+  }
+  return -std::expm1(0.5 * (low + high));
+}
+
+struct Loop {
+  double gain;
+  Complex back;  // 1/z at the pole
+  double samples;
+
+  // ln L(z), and how it grows with the loss's pole and the allpass.
+  Complex log(double pole, double allpass) const {
+    return std::log(gain * (1.0 - pole)) - std::log(1.0 - pole * back) +
+           std::log((allpass + back) / (1.0 + allpass * back)) + samples * std::log(back);
+  }
+  // By the logarithm of 1 - pole.
+  Complex by_pole(double pole) const { return (1.0 - back) / (1.0 - pole * back); }
+  Complex by_allpass(double allpass) const {
+    return 1.0 / (allpass + back) - back / (1.0 + allpass * back);
+  }
+};
+
+// From a delay of any length to N samples and an allpass.
+void refine(const Loop& loop, WaveguideDesign& design) {
+  double room = std::log1p(-design.pole);
+  double c = design.allpass;
+  for (int i = 0; i < most_newton_steps; ++i) {
+    const double a = -std::expm1(room);
+    const Complex log = loop.log(a, c);
+    const Complex off(log.real(), std::remainder(log.imag(), turn));
+    const Complex by_a = loop.by_pole(a);
+    const Complex by_c = loop.by_allpass(c);
+    const double determinant = by_a.real() * by_c.imag() - by_a.imag() * by_c.real();
+    const double step_a = (off.real() * by_c.imag() - off.imag() * by_c.real()) / determinant;
+    const double step_c = (by_a.real() * off.imag() - by_a.imag() * off.real()) / determinant;
+    if (!std::isfinite(step_a) || !std::isfinite(step_c)) {
+      return;
+    }
+    room -= step_a;
+    c -= step_c;
+    if (!(std::fabs(c) < 1.0)) {
+      return;
+    }
+    if (std::fabs(step_a) < 1e-14 && std::fabs(step_c) < 1e-14) {
+      break;
+    }
+  }
+  if (room <= 0.0) {  // else it would raise the highest frequencies
+    design.pole = -std::expm1(room);
+    design.allpass = c;
+  }
+}
+
+// The same where all partials decay alike, so that the gain is what is sought.
+void refine_flat(const Loop& loop, WaveguideDesign& design) {
+  for (int i = 0; i < most_newton_steps; ++i) {
+    const double off = std::remainder(loop.log(0.0, design.allpass).imag(), turn);
+    const double step = off / loop.by_allpass(design.allpass).imag();
+    if (!(std::fabs(design.allpass - step) < 1.0)) {
+      return;
+    }
+    design.allpass -= step;
+    if (std::fabs(step) < 1e-15) {
+      break;
+    }
+  }
+  design.gain = std::min(1.0, design.gain * std::exp(-loop.log(0.0, design.allpass).real()));
+}
+
+}  // namespace
+
+double highest_waveguide_hz(std::uint32_t least_samples, double rate_hz) {
+  return rate_hz / (least_samples + most_allpass_delay);
+}
+
+WaveguideDesign design_waveguide(const WaveguideNumbers& numbers, std::uint32_t least_samples,
+                                 std::uint32_t most_samples, double rate_hz) {
+  const double hz =
+      within(numbers.frequency_hz, rate_hz / (most_samples + most_allpass_delay - 1.0),
+             highest_waveguide_hz(least_samples, rate_hz));
+  const double t60 = std::max(within(numbers.t60_s, 0.0, HUGE_VAL), least_t60_periods / hz);
+  const double brightness = within(numbers.brightness, 0.0, 1.0);
+  const double theta = turn * hz / rate_hz;
+  const double decay = 3.0 * std::numbers::ln10 / (t60 * rate_hz);  // per sample
+  const double loss = decay * rate_hz / hz;                         // per period
+
+  Line line{std::exp(-loss * brightness), decay, theta};
+  double pole = brightness < 1.0 ? pole_of(line) : 0.0;
+  // The loss takes its time as well; where it would take all that there is, it takes none.
+  if (line.delay(pole) < least_samples + most_allpass_delay - 1.0) {
+    pole = 0.0;
+    line.gain = std::exp(-loss);
+  }
+  const double delay = line.delay(pole);
+  WaveguideDesign design{.samples = static_cast<std::uint32_t>(
+                             std::clamp(std::floor(delay - most_allpass_delay + 1.0),
+                                        double(least_samples), double(most_samples))),
+                         .period = rate_hz / hz,
+                         .pole = pole,
+                         .gain = line.gain};
+  const double rest = (delay - design.samples) * theta;  // for the allpass, an angle
+  design.allpass = std::sin(0.5 * (theta - rest)) / std::sin(0.5 * (theta + rest));
+  const Loop loop{design.gain, std::polar(std::exp(decay), -theta), double(design.samples)};
+  pole > 0.0 ? refine(loop, design) : refine_flat(loop, design);
+  return design;
+}
+
+}  // namespace ressort

@@ -1,0 +1,190 @@
+#include "core/kernels/waveguides/rails.h"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <limits>
+#include <numeric>
+
+namespace ressort {
+namespace {
+
+constexpr std::size_t numbers_of_guide = 3;  // frequency, T60, brightness
+
+}  // namespace
+
+template <class T>
+Rails<T>::Rails(const Program& program, std::size_t width_in) : width(width_in), program_(program) {
+  const auto slots = std::bit_ceil(static_cast<std::uint32_t>(
+      program.rate_hz / lowest_waveguide_hz + 4.0 * static_cast<double>(program.junctions.size())));
+  std::size_t most_places = 0;
+  for (const WaveguideSlot& slot : program.waveguides) {
+    guides.push_back({.slot = &slot,
+                      .ring = guides.size() * slots * width,
+                      .mask = slots - 1,
+                      .row = guides.size() * width,
+                      .place_row = slot.first * width,
+                      .fading = 0});
+    most_places = std::max<std::size_t>(most_places, slot.count);
+  }
+  const std::size_t rows = guides.size() * width;
+  const std::size_t places = program.junctions.size() * width;
+  ring.resize(guides.size() * slots * width);
+  for (auto* const delays : {&end, &next_end}) {
+    delays->resize(rows);
+  }
+  for (auto* const numbers : {&allpass, &pole, &gain, &next_allpass, &next_pole, &next_gain,
+                              &allpass_state, &pole_state}) {
+    numbers->resize(rows);
+  }
+  for (auto* const delays : {&right, &left, &next_right, &next_left}) {
+    delays->resize(places);
+  }
+  unforced.resize(places);
+  designed_.resize(numbers_of_guide * rows + places);
+  order_.resize(most_places);
+  at_.resize(most_places);
+  for (std::size_t lane = 0; lane < width; ++lane) {
+    clear(lane);
+  }
+}
+
+template <class T>
+void Rails<T>::clear(std::size_t lane) {
+  for (std::size_t i = lane; i < ring.size(); i += width) {
+    ring[i] = T(0);
+  }
+  for (const Guide& guide : guides) {
+    allpass_state[guide.row + lane] = pole_state[guide.row + lane] = T(0);
+    designed_[guide.row + lane] = std::numeric_limits<T>::quiet_NaN();
+  }
+}
+
+template <class T>
+bool Rails<T>::is_new(const Guide& guide, std::size_t lane, const T* coefficients) const {
+  const auto differs = [&](std::size_t row, std::uint32_t c) {
+    return !(designed_[row + lane] == coefficients[c * width + lane]);
+  };
+  const std::size_t rows = guides.size() * width;
+  bool any = differs(guide.row, guide.slot->frequency) ||
+             differs(rows + guide.row, guide.slot->t60) ||
+             differs(2 * rows + guide.row, guide.slot->brightness);
+  for (std::uint32_t i = 0; !any && i < guide.slot->count; ++i) {
+    any = differs(numbers_of_guide * rows + guide.place_row + i * width,
+                  program_.junctions[guide.slot->first + i].u);
+  }
+  return any;
+}
+
+template <class T>
+void Rails<T>::prepare(const T* coefficients) {
+  for (Guide& guide : guides) {
+    bool fades = false;  // all lanes together, those that stay to where they are
+    for (std::size_t lane = 0; lane < width; ++lane) {
+      const bool is_silent = std::isnan(designed_[guide.row + lane]);
+      if (is_silent || (guide.fading == 0 && is_new(guide, lane, coefficients))) {
+        design(guide, lane, coefficients);
+        is_silent ? settle(guide, lane) : void(fades = true);
+      }
+    }
+    guide.fading = fades ? waveguide_fade_frames : guide.fading;
+  }
+}
+
+template <class T>
+void Rails<T>::design(Guide& guide, std::size_t lane, const T* coefficients) {
+  const WaveguideSlot& slot = *guide.slot;
+  const std::size_t rows = guides.size() * width;
+  const auto number = [&](std::size_t row, std::uint32_t c) {
+    designed_[row + lane] = coefficients[c * width + lane];
+    // What is no number is not designed again and again.
+    designed_[row + lane] = std::isnan(designed_[row + lane]) ? T(0) : designed_[row + lane];
+    return static_cast<double>(designed_[row + lane]);
+  };
+  const WaveguideNumbers numbers{.frequency_hz = number(guide.row, slot.frequency),
+                                 .t60_s = number(rows + guide.row, slot.t60),
+                                 .brightness = number(2 * rows + guide.row, slot.brightness)};
+  const WaveguideDesign found =
+      design_waveguide(numbers, least_waveguide_samples(slot.count), guide.mask, program_.rate_hz);
+  const std::size_t at = guide.row + lane;
+  next_end[at] = found.samples;
+  next_allpass[at] = static_cast<T>(found.allpass);
+  next_pole[at] = static_cast<T>(found.pole);
+  next_gain[at] = static_cast<T>(found.gain);
+  // Places go to the nearest sample that is theirs alone.
+  const std::uint32_t middle = found.samples / 2;  // the left end
+  std::iota(order_.begin(), order_.begin() + slot.count, 0u);
+  for (std::uint32_t i = 0; i < slot.count; ++i) {
+    const double u = number(numbers_of_guide * rows + guide.place_row + i * width,
+                            program_.junctions[slot.first + i].u);
+    const double samples = (u > 0.0 ? std::min(u, 1.0) : 0.0) * 0.5 * found.period;
+    at_[i] = static_cast<std::uint32_t>(std::lround(samples));
+    for (std::uint32_t k = i; k > 0 && at_[order_[k]] < at_[order_[k - 1]]; --k) {
+      std::swap(order_[k], order_[k - 1]);
+    }
+  }
+  std::uint32_t least = 1;
+  for (std::uint32_t k = 0; k < slot.count; ++k) {
+    at_[order_[k]] = std::max(at_[order_[k]], least);
+    least = at_[order_[k]] + 1;
+  }
+  std::uint32_t most = middle - 1;
+  for (std::uint32_t k = slot.count; k-- > 0;) {
+    at_[order_[k]] = std::min(at_[order_[k]], most);
+    most = at_[order_[k]] - 1;
+  }
+  for (std::uint32_t i = 0; i < slot.count; ++i) {
+    next_right[guide.place_row + i * width + lane] = middle + at_[i];
+    next_left[guide.place_row + i * width + lane] = middle - at_[i];
+  }
+}
+
+// At once, as nothing sounds yet.
+template <class T>
+void Rails<T>::settle(Guide& guide, std::size_t lane) {
+  const std::size_t at = guide.row + lane;
+  end[at] = next_end[at];
+  allpass[at] = next_allpass[at];
+  pole[at] = next_pole[at];
+  gain[at] = next_gain[at];
+  for (std::size_t i = guide.place_row + lane; i < guide.place_row + guide.slot->count * width;
+       i += width) {
+    right[i] = next_right[i];
+    left[i] = next_left[i];
+  }
+}
+
+template <class T>
+bool Rails<T>::is_quiet(std::size_t lane, double bound) const {
+  for (const Guide& guide : guides) {
+    for (std::uint32_t delay = 1; delay <= end[guide.row + lane]; ++delay) {
+      const T wave = ring[guide.ring + ((now - delay) & guide.mask) * width + lane];
+      if (!(std::fabs(wave) < bound)) {
+        return false;
+      }
+    }
+  }
+  return true;
+}
+
+template <class T>
+double Rails<T>::energy(std::size_t lane, const T* coefficients) const {
+  double sum = 0.0;
+  for (const Guide& guide : guides) {
+    double waves = 0.0;
+    const std::size_t at = guide.row + lane;
+    for (std::uint32_t delay = 1; delay <= end[at]; ++delay) {
+      const double wave = ring[guide.ring + ((now - delay) & guide.mask) * width + lane];
+      waves += wave * wave;
+    }
+    const double c = allpass[at];
+    waves += static_cast<double>(allpass_state[at]) * allpass_state[at] / (1.0 - c * c);
+    sum += waves / coefficients[guide.slot->inverse_impedance * width + lane];
+  }
+  return sum;
+}
+
+template class Rails<float>;
+template class Rails<double>;
+
+}  // namespace ressort

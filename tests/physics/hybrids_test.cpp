@@ -1,0 +1,271 @@
+// Masses, places on strings of masses and places on waveguides, held to each other by everything
+// that holds: the books of energy, with potentials written down here.
+#include "core/kernels/direct/direct.h"
+#include "core/laws/laws.h"
+#include "tests/support/passive.h"
+
+namespace ressort {
+namespace {
+
+using namespace support;
+
+std::string number(double value) {
+  char text[32];
+  std::snprintf(text, sizeof text, "%.17g", value);
+  return text;
+}
+
+// What a link made passive holds at a distance, its arguments in the order of the text.
+double held(Law law, const LawNumbers& c, double d) {
+  const double far = std::fabs(d);
+  switch (law) {
+    case Law::spring:
+      return c[0] / 2.0 * d * d;
+    case Law::cubic_spring:
+      return c[1] / 4.0 * d * d * d * d;
+    case Law::contact:
+      return d > -c[2] ? c[0] / 2.0 * (d + c[2]) * (d + c[2]) : 0.0;
+    case Law::power_contact:
+      return d > -c[3] ? c[0] / (c[1] + 1.0) * std::pow(d + c[3], c[1] + 1.0) : 0.0;
+    case Law::pluck: {
+      const double slope = c[1] - std::clamp(far, c[1] / 10.0, c[1]);
+      const double hill = std::max(0.0, c[1] * c[1] / 100.0 - d * d);
+      return c[0] / 20.0 * slope * slope + 0.45 * c[0] * hill;
+    }
+    default:
+      return 0.0;  // bows hold nothing
+  }
+}
+
+double friction(const LawNumbers& c, double v) {
+  const double fast = std::fabs(v);
+  const double side = v < 0.0 ? -1.0 : 1.0;
+  return fast < c[1] / 3.0 ? c[0] * 2.0 / 3.0 * v
+         : fast < c[1]     ? side * c[0] / 3.0 * (c[1] - fast)
+                           : 0.0;
+}
+
+// Everything is known of a network that rests: the text says what moves.
+class Books {
+ public:
+  explicit Books(const std::string& text, bool is_published = false)
+      : Books(expand_macros(network_of(text)), is_published) {}
+
+  void go(const std::vector<double>& inputs) {
+    bare_.step(inputs);
+    const std::size_t lanes = bare_.lanes();
+    std::vector<double> all_x(nodes_.size() * lanes);
+    std::vector<double> all_v(all_x.size());
+    bare_.kernel().read(nodes_, all_x.data(), all_v.data());
+    std::vector<double> x(nodes_.size());
+    std::vector<double> v(nodes_.size());
+    for (std::size_t i = 0; i < x.size(); ++i) {
+      x[i] = all_x[i * lanes];
+      v[i] = all_v[i * lanes];
+    }
+    const Program& program = bare_.program();
+    // Of forces and frictions: how far their ends went in two samples.
+    for (std::size_t i = 0; i < program.inputs.size(); ++i) {
+      const std::uint32_t node = program.inputs[i].node;
+      work += inputs[i] * (v[node] + v_[node]) / 2.0;
+    }
+    energy = waves();
+    for (const MassRun& run : program.mass_runs) {
+      for (std::uint32_t i = run.first; !run.is_junction && i < run.first + run.count; ++i) {
+        energy += 0.5 / value(run.inverse_mass) * v[i] * v[i];
+      }
+    }
+    for (const LinkRun& run : program.link_runs) {
+      LawNumbers c{};
+      for (std::size_t i = 0; i < facts_of(run.law).count; ++i) {
+        c[i] = value(run.coefficients[i]);
+      }
+      for (std::uint32_t i = run.first; i < run.first + run.count; ++i) {
+        const auto [a, b] = program.ends[i];
+        const double d = x[a] - x[b];
+        const double speed = v[a] - v[b];
+        if (run.scheme == Scheme::plain) {
+          energy += 0.5 * c[0] * d * (d - speed);  // springs
+          continue;
+        }
+        energy += 0.5 * (held(run.law, c, d) + held(run.law, c, d - speed));
+        if (facts_of(run.law).contains_spring && facts_of(run.law).is_curved) {
+          energy += 0.5 * c[0] * d * (d - speed);
+        }
+        const double mean = (speed + v_[a] - v_[b]) / 2.0;
+        rubbed += run.law == Law::bow ? friction(c, mean) * mean : 0.0;
+      }
+    }
+    v_ = v;
+    scale = std::max(scale, energy);
+  }
+
+  double energy = 0.0;
+  double work = 0.0;    // that forces did
+  double rubbed = 0.0;  // that friction took
+  double scale = 0.0;
+
+ private:
+  Books(const Network& network, bool is_published)
+      : bare_(make_program(
+            network, Network::reference_rate_hz, true,
+            is_published ? std::vector<LinkScheme>() : choose_schemes(network, {}).links)) {
+    for (std::uint32_t i = 0; i < bare_.program().position.size(); ++i) {
+      nodes_.push_back(i);
+    }
+    v_ = bare_.program().velocity;
+  }
+  double value(std::uint32_t c) const {
+    return coefficient_value(bare_.program(), bare_.program().coefficients[c],
+                             bare_.program().parameters, 1.0);
+  }
+  double waves() {
+    const auto& kernel = dynamic_cast<const DirectKernel<double>&>(bare_.kernel());
+    return kernel.rails().energy(0, kernel.coefficients.value.data());
+  }
+
+  Bare<double> bare_;
+  std::vector<std::uint32_t> nodes_;
+  std::vector<double> v_;
+};
+
+struct End {
+  const char* name;
+  const char* text;  // what it stands on; # is a letter
+  const char* place;
+};
+
+constexpr End ends[] = {
+    {"mass", "@m# mass 2. 0. 0.\n", "@m#"},
+    {"place", "@c# string 12 0.7 0.3 0. 0.\n", "[@c# 0.43]"},
+    {"waveguide", "@w# waveguide 0.8 613. 1e30 1. 0.\n", "[@w# 0.31]"},
+    {"open waveguide", "@w# openWaveguide 1.7 431. 1e30 1. 0.\n", "[@w# 0.62]"},
+};
+
+std::string of(const char* text, char letter) {
+  std::string out = text;
+  std::replace(out.begin(), out.end(), '#', letter);
+  return out;
+}
+
+// The largest share of all energy that the books are off, once the forces of the first samples are
+// over; K of the link by the softest of what it holds, which is about 1.
+double off_books(const std::string& text) {
+  Books books(text);
+  double off = 0.0;
+  double start = 0.0;
+  for (int n = 0; n < 6000; ++n) {
+    const double push = n < 40 ? 0.01 * std::sin(std::numbers::pi * n / 20.0) : 0.0;
+    books.go({push, -0.7 * push});
+    if (n == 45) {
+      start = books.energy + books.rubbed;
+    }
+    if (n > 45) {
+      off = std::max(off, std::fabs(books.energy + books.rubbed - start) / books.scale);
+    }
+  }
+  return off;
+}
+
+}  // namespace
+
+TEST_CASE("what holds masses, places and waveguides together keeps the books of energy",
+          "[hybrids]") {
+  double worst = 0.0;
+  for (const End& a : ends) {
+    for (const End& b : ends) {
+      const bool has_waveguide = a.text[1] == 'w' || b.text[1] == 'w';
+      for (const std::string law : {"spring", "cubic", "contact", "hertz", "pluck", "bow"}) {
+        for (const double k : {0.01, 0.1, 1.0, 10.0, 100.0, 1000.0}) {
+          const bool has_plain = law == "spring" || law == "cubic";
+          if (has_plain && !has_waveguide) {
+            continue;  // whose springs are as published, and limited
+          }
+          const std::string between = of(a.place, 'a') + " " + of(b.place, 'b');
+          const std::string link =
+              law == "spring"  ? "@k spring " + between + " " + number(k)
+              : law == "cubic" ? "@k nlSpring3 " + between + " " + number(k / 10.0) + " " +
+                                     number(100.0 * k) + " 0."
+              : law == "contact" ? "@k contact " + between + " " + number(k) + " 0. 0.01"
+              : law == "hertz"   ? "@k powerContact " + between + " " + number(k) + " 1.5 0. 0.01"
+              : law == "pluck"   ? "@k nlPluck " + between + " " + number(k) + " 0.05"
+                                 : "@k nlBow " + between + " " + number(k) + " 0.003";
+          const std::string text = of(a.text, 'a') + of(b.text, 'b') + link + "\n@in1 frcInput " +
+                                   of(a.place, 'a') + "\n@in2 frcInput " + of(b.place, 'b') +
+                                   "\n@out1 posOutput " + of(a.place, 'a') + "\n";
+          INFO(a.name << " and " << b.name << ", " << law << ", K " << k);
+          const double off = off_books(text);
+          worst = std::max(worst, off);
+          CHECK(off < 1e-12);
+        }
+      }
+    }
+  }
+  CAPTURE(worst);
+}
+
+TEST_CASE("several links at a place on a waveguide are solved together", "[hybrids]") {
+  for (const double k : {0.01, 1.0, 100.0}) {
+    const std::string text =
+        "@a waveguide 0.6 517. 1e30 1. 0.\n@b openWaveguide 1.9 389. 1e30 1. 0.\n"
+        "@c string 9 1.3 0.4 0. 0.\n"
+        "@h1 mass 3. 0. 0.\n@h2 mass 0.4 0. 0.\n"
+        "@k1 powerContact [@a 0.3] @h1 " +
+        number(k) +
+        " 1.5 0. 0.002\n"
+        "@k2 powerContact [@a 0.3] @h2 " +
+        number(3.0 * k) +
+        " 2.3 0. 0.002\n"
+        "@k3 contact [@c 0.37] [@a 0.3] " +
+        number(2.0 * k) +
+        " 0. 0.001\n"
+        "@k4 spring [@a 0.3] [@b 0.7] " +
+        number(k) +
+        "\n"
+        "@k5 nlSpring3 [@a 0.81] [@b 0.7] " +
+        number(k / 5.0) + " " + number(30.0 * k) +
+        " 0.\n"
+        "@in1 frcInput @h1\n@in2 frcInput @h2\n@out1 posOutput [@a 0.3]\n";
+    INFO("K " << k);
+    CHECK(off_books(text) < 1e-12);
+  }
+}
+
+TEST_CASE("the published laws make energy at a waveguide, the engine's do not", "[hybrids]") {
+  for (const std::string link : {"@k spring [@w 0.31] @m 2.", "@k contact [@w 0.31] @m 2. 0. 0.01",
+                                 "@k nlSpring3 [@w 0.31] @m 0.5 300. 0."}) {
+    const std::string text = "@w waveguide 0.8 613. 1e30 1. 0.\n@m mass 2. 0. 0.\n" + link +
+                             "\n@in1 frcInput [@w 0.31]\n@in2 frcInput @m\n"
+                             "@out1 posOutput [@w 0.31]\n";
+    INFO(link);
+    CHECK(off_books(text) < 1e-12);
+    Books published(text, true);
+    double start = 0.0;
+    for (int n = 0; n < 6000 && published.energy < 1e6; ++n) {
+      const double push = n < 40 ? 0.01 * std::sin(std::numbers::pi * n / 20.0) : 0.0;
+      published.go({push, -0.7 * push});
+      start = n == 45 ? published.energy : start;
+    }
+    CHECK(published.energy > 10.0 * start);
+  }
+}
+
+TEST_CASE("a damper between waveguides takes what it rubs, and no more", "[hybrids]") {
+  Books books(
+      "@a waveguide 0.6 517. 1e30 1. 0.\n@b waveguide 1.9 389. 1e30 1. 0.\n"
+      "@z damper [@a 0.3] [@b 0.7] 0.8\n"
+      "@in1 frcInput [@a 0.3]\n@out1 posOutput [@b 0.7]\n");
+  double last = 0.0;
+  double most = 0.0;
+  for (int n = 0; n < 20000; ++n) {
+    books.go({n < 20 ? 0.01 : 0.0});
+    most = std::max(most, books.energy);
+    if (n > 20) {
+      REQUIRE(books.energy <= last + 1e-15 * most);
+    }
+    last = books.energy;
+  }
+  CHECK(last < 0.5 * most);
+}
+
+}  // namespace ressort

@@ -1,0 +1,294 @@
+// One waveguide, judged from what it renders: its pitch and decay by an estimator of their own, its
+// junctions by closed forms and by a string of masses that is the same in other coordinates.
+#include <complex>
+
+#include "core/kernels/waveguides/design.h"
+#include "tests/support/passive.h"
+
+namespace ressort {
+namespace {
+
+using namespace support;
+using Complex = std::complex<double>;
+
+constexpr double turn = 2.0 * std::numbers::pi;
+
+std::string number(double value) {
+  char text[32];
+  std::snprintf(text, sizeof text, "%.17g", value);
+  return text;
+}
+
+Program program_at(const std::string& text, double rate_hz) {
+  const Network network = expand_macros(network_of(text));
+  return make_program(network, rate_hz, true, schemes_of(network, Passivity::always).links);
+}
+
+struct Partial {
+  double hz = 0.0;
+  double t60_s = 0.0;
+};
+
+// The partial near a guess: the same window, a little earlier and a little later, sees it turned by
+// its angle and shrunk by its decay; a Blackman-Harris window keeps all others 92 dB away.
+Partial partial_of(std::span<const double> y, double rate_hz, double guess_hz, std::size_t window,
+                   std::size_t later) {
+  const auto seen = [&](std::size_t from) {
+    Complex sum = 0.0;
+    for (std::size_t n = 0; n < window; ++n) {
+      const double t = turn * (static_cast<double>(n) + 0.5) / static_cast<double>(window);
+      const double weight = 0.35875 - 0.48829 * std::cos(t) + 0.14128 * std::cos(2.0 * t) -
+                            0.01168 * std::cos(3.0 * t);
+      sum += weight * y[from + n] *
+             std::polar(1.0, -turn * guess_hz / rate_hz * static_cast<double>(n));
+    }
+    return sum;
+  };
+  const Complex ratio = seen(later) / seen(0) *
+                        std::polar(1.0, -turn * guess_hz / rate_hz * static_cast<double>(later));
+  const double samples = static_cast<double>(later);
+  return {guess_hz + std::arg(ratio) / turn * rate_hz / samples,
+          -3.0 * std::numbers::ln10 * samples / rate_hz / std::log(std::abs(ratio))};
+}
+
+// What a place does after a tap on another.
+std::vector<double> rendered(const std::string& line, double rate_hz, std::size_t frames) {
+  Bare<double> bare(
+      program_at("@s " + line + "\n@in1 frcInput [@s 0.37]\n@out1 posOutput [@s 0.23]\n", rate_hz));
+  std::vector<double> y;
+  for (std::size_t n = 0; n < frames; ++n) {
+    y.push_back(bare.step({n == 0 ? 1.0 : 0.0})[0]);
+  }
+  return y;
+}
+
+double key_hz(int key) {
+  return 440.0 * std::exp2((key - 69) / 12.0);
+}
+
+// A kernel whose nodes are looked at as they are; those that move come first.
+struct Watched : Bare<double> {
+  explicit Watched(const std::string& text, double rate_hz = Network::reference_rate_hz)
+      : Bare(program_at(text, rate_hz)) {}
+  std::pair<double, double> node(std::uint32_t index) {
+    std::vector<double> x(lanes());
+    std::vector<double> v(lanes());
+    const std::uint32_t one[] = {index};
+    kernel().read(one, x.data(), v.data());
+    return {x[0], v[0]};
+  }
+};
+
+}  // namespace
+
+TEST_CASE("88 keys of waveguides are in tune and ring as long as asked for", "[waveguides]") {
+  double worst_cents = 0.0;
+  double worst_t60 = 0.0;
+  int row = 0;
+  for (const double rate : {44100.0, 48000.0, 96000.0}) {
+    for (int key = 21; key <= 108; ++key) {
+      const double hz = key_hz(key);
+      const double t60 = std::array{0.4, 2.0, 8.0}[static_cast<std::size_t>(row % 3)];
+      const double brightness = std::array{0.0, 0.3, 0.7, 1.0}[static_cast<std::size_t>(row % 4)];
+      const bool is_open = row % 5 == 0;
+      ++row;
+      const auto window = static_cast<std::size_t>(rate * std::max(0.25, 14.0 / hz));
+      const auto later = static_cast<std::size_t>(rate * std::max(0.3 * t60, 8.0 / hz));
+      const auto y = rendered((is_open ? "openWaveguide 1.3 " : "waveguide 1.3 ") + number(hz) +
+                                  " " + number(t60) + " " + number(brightness) + " 0.",
+                              rate, window + later);
+      // An open one drifts by a step, which a difference takes away.
+      std::vector<double> speed(y.size());
+      std::adjacent_difference(y.begin(), y.end(), speed.begin());
+      const Partial found = partial_of(speed, rate, hz, window, later);
+      const double cents = std::fabs(1200.0 * std::log2(found.hz / hz));
+      const double off = std::fabs(found.t60_s / t60 - 1.0);
+      worst_cents = std::max(worst_cents, cents);
+      worst_t60 = std::max(worst_t60, off);
+      INFO("key " << key << " at " << rate << " Hz, T60 " << t60 << ", brightness " << brightness
+                  << ": " << cents << " cents, T60 " << 100.0 * off << " %");
+      CHECK(cents < 0.02);
+      CHECK(off < 0.005);
+    }
+  }
+}
+
+TEST_CASE("a waveguide's loop never gains, and keeps to its room", "[waveguides]") {
+  Random random(14);
+  for (int i = 0; i < 4000; ++i) {
+    const double rate = std::array{44100.0, 48000.0, 96000.0, 192000.0}[random.below(4)];
+    const WaveguideNumbers numbers{.frequency_hz = std::exp(random.uniform(0.0, 10.5)),
+                                   .t60_s = std::exp(random.uniform(-9.0, 9.0)),
+                                   .brightness = random.uniform(-0.2, 1.2)};
+    const auto least = static_cast<std::uint32_t>(4 + 2 * random.below(20));
+    const WaveguideDesign found = design_waveguide(numbers, least, 16383, rate);
+    REQUIRE(found.samples >= least);
+    REQUIRE(found.samples <= 16383);
+    REQUIRE(std::fabs(found.allpass) < 1.0);
+    double most = 0.0;
+    for (int k = 0; k <= 4096; ++k) {
+      const Complex back = std::polar(1.0, -std::numbers::pi * k / 4096.0);
+      most = std::max(most, std::abs(found.gain * (1.0 - found.pole) / (1.0 - found.pole * back)));
+    }
+    REQUIRE(most <= 1.0 + 1e-15);
+    // The loop's own pole, where the numbers ask for nothing out of reach.
+    if (numbers.frequency_hz < 20.0 || numbers.frequency_hz > highest_waveguide_hz(least, rate) ||
+        numbers.t60_s * numbers.frequency_hz < least_t60_periods) {
+      continue;
+    }
+    const Complex back = std::polar(std::exp(3.0 * std::numbers::ln10 / (numbers.t60_s * rate)),
+                                    -turn * numbers.frequency_hz / rate);
+    const Complex loop = std::pow(back, static_cast<double>(found.samples)) *
+                         (found.allpass + back) / (1.0 + found.allpass * back) * found.gain *
+                         (1.0 - found.pole) / (1.0 - found.pole * back);
+    INFO(numbers.frequency_hz << " Hz, T60 " << numbers.t60_s << ", brightness "
+                              << numbers.brightness << ", rate " << rate);
+    CHECK(std::abs(loop - 1.0) < 1e-8);
+  }
+}
+
+TEST_CASE("a waveguide is a string of masses with K = M", "[waveguides]") {
+  // 41 nodes, 40 samples from end to end; a place at 0.3 is the thirteenth node.
+  const std::string hammer =
+      "@h mass 3. -0.02 0.001\n@k powerContact @h #1 2. 1.8 0.01 0.\n@in1 frcInput #2\n"
+      "@out1 posOutput #3\n";
+  const auto with_places = [&](std::string text, const char* a, const char* b, const char* c) {
+    text.replace(text.find("#1"), 2, a);
+    text.replace(text.find("#2"), 2, b);
+    return text.replace(text.find("#3"), 2, c);
+  };
+  Watched string("~motion velocity\n@s string 41 1.7 1.7 0. 0.\n" +
+                 with_places(hammer, "[@s 0.3]", "[@s 0.7]", "[@s 0.55]"));
+  Watched guide("~motion velocity\n@s waveguide 1.7 " + number(44100.0 / 80.0) + " 1e30 1. 0.\n" +
+                with_places(hammer, "[@s 0.3]", "[@s 0.7]", "[@s 0.55]"));
+  Random random(3);
+  double before = 0.0;
+  double most = 0.0;
+  for (int n = 0; n < 5000; ++n) {
+    const double force = n < 300 ? random.uniform(-1e-3, 1e-3) : 0.0;
+    const double masses = string.step({force})[0];
+    const double waves = guide.step({force})[0];
+    REQUIRE(waves == Approx(0.5 * (masses + before)).margin(1e-12));
+    before = masses;
+    most = std::max(most, std::fabs(waves));
+  }
+  CHECK(most > 1e-3);
+}
+
+TEST_CASE("a mass on a spring reflects waves as its impedance says", "[waveguides]") {
+  constexpr double rate = 192000.0;
+  constexpr double r = Network::reference_rate_hz / rate;
+  constexpr double impedance = 2.0 * r;
+  constexpr double mass = 0.5;
+  constexpr double stiffness = 5.0 * r * r;
+  // 6,000 samples from end to end: what is seen at 0.35 comes from the place at 0.5 alone.
+  Watched guide(
+      "@s waveguide 2. 16. 1e30 1. 0.\n@m mass 0.5 0. 0.\n@k spring [@s 0.5] @m 5.\n"
+      "@in1 frcInput [@s 0.25]\n@out1 posOutput [@s 0.35]\n",
+      rate);
+  const std::uint32_t seen = guide.program().outputs[0].node;
+  std::vector<double> v;
+  double before = 0.0;
+  for (int n = 0; n < 3000; ++n) {
+    guide.step({n == 0 ? 1.0 : 0.0});
+    const double now = guide.node(seen).second;
+    v.push_back(0.5 * (now + before));
+    before = now;
+  }
+  // The pulse passes 600 samples after it was made, and comes back by twice 900 later.
+  const auto spectrum = [&](int first, int last, double theta) {
+    Complex sum = 0.0;
+    for (int n = first; n < last; ++n) {
+      sum += v[static_cast<std::size_t>(n)] * std::polar(1.0, -theta * n);
+    }
+    return sum;
+  };
+  for (const double theta : {0.003, 0.01, 0.03, 0.07, 0.2, 0.5, 1.1, 2.3}) {
+    const Complex z = std::polar(1.0, theta);
+    const Complex spring = stiffness * 0.5 * (z + 1.0 / z);
+    const Complex inertia = mass * (z - 2.0 + 1.0 / z);
+    const Complex load = 2.0 / (z - 1.0 / z) / (1.0 / spring + 1.0 / inertia);
+    const Complex wanted = -load / (2.0 * impedance + load);
+    const Complex found =
+        spectrum(2300, 3000, theta) / spectrum(500, 700, theta) * std::polar(1.0, theta * 1800.0);
+    INFO("angle " << theta << ": " << found << " instead of " << wanted);
+    CHECK(std::abs(found - wanted) < 1e-6);
+  }
+}
+
+TEST_CASE("even and odd samples stay together", "[waveguides]") {
+  Bare<double> guide(program_at(
+      "@s waveguide 1. 196. 5. 0.4 0.\n@h mass 4. 0. 0.\n@g ground 0.\n@z spring @g @h 0.001 0.01\n"
+      "@k powerContact [@s 0.13] @h 0.5 1.5 0. 0.\n@b spring [@s 0.97] @g 0.3 0.01\n"
+      "@in1 frcInput @h\n@out1 posOutput [@s 0.4]\n",
+      44100.0));
+  double peak = 0.0;
+  double y = 0.0;
+  double odd = 0.0;
+  for (int n = 0; n < 60 * 44100; ++n) {
+    y = guide.step({n < 50 ? -0.01 : 0.0})[0];
+    peak = std::max(peak, std::fabs(y));
+    if (n >= 60 * 44100 - 4096) {
+      odd += (n % 2 == 0 ? y : -y) / 4096.0;
+    }
+  }
+  CHECK(peak > 1e-3);
+  CHECK(std::fabs(odd) < 1e-5 * peak);
+}
+
+TEST_CASE("voices of all lengths sound in lanes as they do alone", "[waveguides]") {
+  const std::string text =
+      "@f param 220.\n@u param 0.3\n@s waveguide 1. f 3. 0.5 0.\n@h mass 2. 0. 0.\n"
+      "@k contact @h [@s u] 0.3 0.01\n@in1 frcInput @h\n@out1 posOutput [@s 0.8]\n";
+  Bare<double> many(program_at(text, 48000.0), 4);
+  for (std::size_t lane = 0; lane < many.lanes(); ++lane) {
+    Bare<double> one(program_at(text, 48000.0));
+    const std::vector<double> numbers = {110.0 + 97.3 * static_cast<double>(lane),
+                                         0.2 + 0.1 * static_cast<double>(lane)};
+    many.set_coefficients(lane, numbers, 1.0, false);
+    one.set_coefficients(0, numbers, 1.0, false);
+    many.kernel().reset(lane);
+    for (std::size_t other = 0; other < many.lanes(); ++other) {
+      many.kernel().reset(other);
+    }
+    for (int n = 0; n < 3000; ++n) {
+      const double force = n < 60 ? 0.003 : 0.0;
+      many.step({force});
+      REQUIRE(many.outputs(lane) == one.step({force}));
+    }
+  }
+}
+
+TEST_CASE("a glide arrives at its pitch and makes no noise of its own", "[waveguides]") {
+  Bare<double> guide(
+      program_at("@f param 220.\n@s waveguide 1. f 8. 0.2 0.\n@in1 frcInput [@s 0.41]\n"
+                 "@out1 posOutput [@s 0.3]\n",
+                 48000.0));
+  std::vector<double> y;
+  double most = 0.0;
+  double before = 0.0;
+  for (int n = 0; n < 72000; ++n) {
+    if (n >= 4000 && n < 30000 && n % 64 == 0) {  // a fifth in half a second
+      const double way = static_cast<double>(n - 4000) / 26000.0;
+      guide.set_coefficients(0, {220.0 * std::pow(1.5, way)}, 1.0, false);
+    }
+    if (n == 30016) {
+      guide.set_coefficients(0, {330.0}, 1.0, false);
+    }
+    const double now = guide.step({n < 100 ? 1e-2 * std::sin(0.03 * n) : 0.0})[0];
+    if (n > 200 && n < 4000) {
+      most = std::max(most, std::fabs(now - before));
+    }
+    if (n >= 4000) {
+      REQUIRE(std::fabs(now - before) < 1.2 * most);
+    }
+    before = now;
+    if (n > 31000) {
+      y.push_back(now);
+    }
+  }
+  const Partial found = partial_of(y, 48000.0, 330.0, 20000, 20000);
+  CHECK(std::fabs(1200.0 * std::log2(found.hz / 330.0)) < 0.02);
+}
+
+}  // namespace ressort
