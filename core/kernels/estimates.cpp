@@ -68,6 +68,7 @@ double worst_steps(const Program& program) {
   double steps = program.moving + static_cast<double>(program.ends.size()) +
                  of_a_point * static_cast<double>(program.taps.size()) +
                  of_an_audio_coefficient * static_cast<double>(program.audio_coefficients.size());
+  steps += of_a_point * static_cast<double>(program.waveguides.size() + program.junctions.size());
   for (const LinkRun& run : program.link_runs) {
     steps += run.scheme == Scheme::plain ? 0.0 : of_a_solved_link * run.count;
   }

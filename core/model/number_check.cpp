@@ -45,7 +45,7 @@ class NumberCheck {
                    {"stiffness", macro.second_stiffness},
                    {"damping", macro.damping},
                    {"damping", macro.air_damping},
-                   {"mass", macro.impedance},
+                   {"impedance", macro.impedance},
                    {"frequency", macro.frequency_hz},
                    {"T60", macro.t60_s},
                    {"brightness", macro.brightness}});
@@ -75,7 +75,8 @@ class NumberCheck {
         continue;
       }
       const bool is_wrong = is_wrong_[asked.argument];
-      if (is_wrong || (asked.quantity == "mass" && is_nothing_[asked.argument])) {
+      const bool divides = asked.quantity == "mass" || asked.quantity == "impedance";
+      if (is_wrong || (divides && is_nothing_[asked.argument])) {
         error_ = {told(asked, std::string(element.name),
                        is_wrong ? " is no finite number" : " is not above 0"),
                   element.location.line, element.location.column};

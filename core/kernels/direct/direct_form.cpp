@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/kernels/waveguides/rails.h"
+
 namespace ressort {
 
 double predicted_ns(const Program& program, const Direct&, const Workload& load) {
@@ -11,8 +13,9 @@ double predicted_ns(const Program& program, const Direct&, const Workload& load)
   return packs_of(load) *
              (12.0 + 1.5 * passive_ns(program) +
               1.6 * (program.moving + links.springs + links.bent) + 5.0 * links.others) +
-         10.0 * std::ceil(load.voices / widest) * std::min<double>(load.voices, widest) *
-             static_cast<double>(program.taps.size());
+         std::ceil(load.voices / widest) * std::min<double>(load.voices, widest) *
+             (10.0 * static_cast<double>(program.taps.size()) +
+              3.0 * static_cast<double>(program.waveguides.size() + program.junctions.size()));
 }
 
 std::string description(const Program&, const Direct&) {
@@ -20,7 +23,8 @@ std::string description(const Program&, const Direct&) {
 }
 
 std::uint64_t voice_bytes(const Program& program, const Direct&, std::uint64_t number_bytes) {
-  return bytes_with_shared_links(program, number_bytes);
+  return bytes_with_shared_links(program, number_bytes) +
+         number_bytes * waveguide_slots(program) * program.waveguides.size();
 }
 
 // A third more than without.

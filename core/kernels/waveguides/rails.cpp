@@ -13,10 +13,16 @@ constexpr std::size_t numbers_of_guide = 3;  // frequency, T60, brightness
 
 }  // namespace
 
+std::uint32_t waveguide_slots(const Program& program) {
+  const double places = static_cast<double>(least_waveguide_samples(
+      static_cast<std::uint32_t>(program.junctions.size())));
+  return std::bit_ceil(
+      static_cast<std::uint32_t>(program.rate_hz / lowest_waveguide_hz + 2.0 * places));
+}
+
 template <class T>
 Rails<T>::Rails(const Program& program, std::size_t width_in) : width(width_in), program_(program) {
-  const auto slots = std::bit_ceil(static_cast<std::uint32_t>(
-      program.rate_hz / lowest_waveguide_hz + 4.0 * static_cast<double>(program.junctions.size())));
+  const std::uint32_t slots = waveguide_slots(program);
   std::size_t most_places = 0;
   for (const WaveguideSlot& slot : program.waveguides) {
     guides.push_back({.slot = &slot,

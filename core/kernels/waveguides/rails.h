@@ -28,6 +28,9 @@ constexpr std::uint32_t least_waveguide_samples(std::uint32_t places) {
   return 2 * (places + 1);
 }
 
+// Of each ring: a power of two.
+std::uint32_t waveguide_slots(const Program& program);
+
 template <class T>
 class Rails {
  public:
