@@ -60,8 +60,8 @@ TEST_CASE("chords of waveguides are the sum of their notes", "[play_waveguides]"
 
 TEST_CASE("springs to a waveguide need no proof, those among masses do", "[play_waveguides]") {
   const std::string held = string + "@a mass 1. 0. 0.\n@b mass 1. 0. 0.\n@k spring [@s 0.5] @a ";
-  CHECK(compile(network_of(held + "1000.\n@l spring @a @b 1.9\n"), struck(1)));
-  const auto made = compile(network_of(held + "0.1\n@l spring @a @b 2.1\n"), struck(1));
+  CHECK(compile(network_of(held + "1000.\n@l spring @a @b 1.9\n"), struck(1), {}));
+  const auto made = compile(network_of(held + "0.1\n@l spring @a @b 2.1\n"), struck(1), {});
   CHECK((!made || made->stability.verdict == Verdict::unstable));
 }
 

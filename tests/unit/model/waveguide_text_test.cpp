@@ -1,4 +1,5 @@
 // Waveguides in the language: read, refused in plain words, printed, and what they become.
+#include "core/laws/laws.h"
 #include "core/model/faust/faust.h"
 #include "core/model/language/print.h"
 #include "core/model/topology.h"
