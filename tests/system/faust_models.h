@@ -46,6 +46,12 @@ inline const std::vector<std::pair<std::string, std::string>>& faust_models() {
       {"clipped_contact_flat", law("nlContact @m @in2 0.02 0. 0.1 0.01")},
       {"power_contact", law("powerContact @m @in2 0.1 1.5 0.05 0.05")},
       {"clipped_contact_stiff", law("nlContact @m @in2 0.2 0.5 0.1 0.01")},
+      {"body",
+       "@p param 0.4\n@b body 3. x y z\n@b1 mode @b 210. 0.8 1. -0.4 0.3\n"
+       "@b2 mode @b [900*p] 0.2*p -0.5 0.7 0.2\n@b3 mode @b 21000. 0.1 0.2 0.3 0.4\n"
+       "@b4 mode @b 5. 0.002 0.2 0.1 -0.4\n@m mass 1. 0. 0.\n@in1 frcInput [@b x]\n"
+       "@in2 posInput 0.\n@l contact [@b y] @in2 0.1 0.01\n@r spring [@b p] @m 0.05 0.01\n"
+       "@out1 posOutput [@b z]\n@out2 frcOutput [@b 0.3]\n"},
       // Gravity and what moves at the start, in both dialects.
       {"older_start",
        "@g ground 0.3\n@m massG 1.2 0.002 1. 0.9\n@o osc 2. 0.1 0.01 0.5 0.45\n"

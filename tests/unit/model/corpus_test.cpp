@@ -38,6 +38,7 @@ struct Model {
 // clang-format off
 constexpr Model models[] = {
     // name, masses, links, macros, points, parameters, inputs, outputs, third argument, warnings
+    {"bodies",                                     1,  3, 2, 9, 2, 2, 3, velocity, 0},
     {"common_at_rest_x_0",                         3,  2, 0, 0, 0, 0, 2, velocity, 0},
     {"common_at_rest_x_x",                         3,  2, 0, 0, 0, 0, 2, delayed,  0},
     {"common_parallel_and_self_links",             3,  5, 0, 0, 0, 1, 1, delayed,  1},
