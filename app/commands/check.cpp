@@ -196,9 +196,7 @@ void warn(const Proved& proved, const Scene& scene, std::vector<Finding>& findin
   if (!proved.certificate.culprit) {
     return;
   }
-  const auto text = read_text(scene.model_path, max_model_bytes);
-  Finding finding = finding_of(scene.model_path, text ? std::string_view(*text) : "",
-                               complaint(proved.certificate));
+  Finding finding = finding_in_model(scene, complaint(proved.certificate));
   finding.diagnostic.severity = Severity::warning;
   findings.push_back(std::move(finding));
 }

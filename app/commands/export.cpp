@@ -26,7 +26,7 @@ Result<std::string> to_faust(const Scene& scene, bool rescale, const Progress& p
   auto text =
       faust_text(scene.network, {.name = scene.name, .sliders = sliders, .rescale = rescale});
   if (!text) {
-    return Error{to_string(finding_of(scene.model_path, "", text.error()))};
+    return Error{to_string(finding_in_model(scene, text.error()))};
   }
   return text;
 }

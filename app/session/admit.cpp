@@ -7,10 +7,16 @@
 namespace ressort {
 namespace {
 
-Finding at(const std::string& path, std::size_t most_bytes, const Error& error, Severity severity) {
-  const auto text = read_text(path, most_bytes);
-  Finding finding = finding_of(path, text ? std::string_view(*text) : "", error);
+Finding in_model(const Scene& scene, const Error& error, Severity severity) {
+  Finding finding = finding_in_model(scene, error);
   finding.diagnostic.severity = severity;
+  return finding;
+}
+
+Finding in_preset(const Scene& scene, const Error& error) {
+  const auto text = read_text(scene.path, max_preset_bytes);
+  Finding finding = finding_of(scene.path, text ? std::string_view(*text) : "", error);
+  finding.diagnostic.severity = Severity::warning;
   return finding;
 }
 
@@ -27,8 +33,7 @@ Admission ask_to_play(const Scene& scene, const CompileOptions& options, bool is
   auto compiled = compile(scene.network, scene.preset, options);
   if (!compiled) {
     // What does not fit the preset was not read, so this is the model's.
-    admission.findings.push_back(
-        at(scene.model_path, max_model_bytes, compiled.error(), Severity::error));
+    admission.findings.push_back(in_model(scene, compiled.error(), Severity::error));
     return admission;
   }
   const StabilityCheck& stability = compiled->stability;
@@ -37,15 +42,14 @@ Admission ask_to_play(const Scene& scene, const CompileOptions& options, bool is
     Error complaint = *stability.complaint;
     complaint.message +=
         is_refused ? "; --force plays it all the same, fading out what runs away" : "";
-    admission.findings.push_back(at(scene.model_path, max_model_bytes, complaint,
-                                    is_refused ? Severity::error : Severity::warning));
+    admission.findings.push_back(
+        in_model(scene, complaint, is_refused ? Severity::error : Severity::warning));
   }
   for (const Error& narrowed : stability.narrowed) {
-    admission.findings.push_back(at(scene.path, max_preset_bytes, narrowed, Severity::warning));
+    admission.findings.push_back(in_preset(scene, narrowed));
   }
   if (compiled->schemes.hazard) {
-    admission.findings.push_back(
-        at(scene.model_path, max_model_bytes, *compiled->schemes.hazard, Severity::warning));
+    admission.findings.push_back(in_model(scene, *compiled->schemes.hazard, Severity::warning));
   }
   const std::vector<Part>& parts = compiled->plan.parts;
   const auto broken = broken_promise(compiled->plan);

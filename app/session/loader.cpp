@@ -35,6 +35,27 @@ class Lines {
   int line_ = 1;
 };
 
+// How many lines end in a text, as Lines counts them.
+int lines_of(std::string_view text) {
+  int lines = 0;
+  for (std::size_t i = 0; i < text.size(); ++i) {
+    const bool pair = text[i] == '\r' && i + 1 < text.size() && text[i + 1] == '\n';
+    lines += text[i] == '\n' || (text[i] == '\r' && !pair) ? 1 : 0;
+  }
+  return lines;
+}
+
+// Which file a line of the model's whole text comes from.
+const ModelText& text_at(const Scene& scene, int line) {
+  const ModelText* found = &scene.texts.front();
+  for (const ModelText& text : scene.texts) {
+    if (text.first_line <= line) {
+      found = &text;
+    }
+  }
+  return *found;
+}
+
 class SceneReader {
  public:
   explicit SceneReader(const SceneOptions& options) : options_(options) {}
@@ -50,7 +71,7 @@ class SceneReader {
     const bool is_read =
         path->ends_with(".toml")
             ? read_preset()
-            : read_model(*path, {.third = options_.third, .progress = options_.progress});
+            : read_model({*path}, {.third = options_.third, .progress = options_.progress});
     if (tune() && is_read) {
       out_.scene = std::move(scene_);
     }
@@ -78,23 +99,28 @@ class SceneReader {
     if (scene_.preset.model.empty()) {
       return false;
     }
-    const auto model = find_model(scene_.preset.model);
-    if (!model) {
-      const std::string missing =
-          options_.reach == Reach::own_folders
-              ? "its model is none of the program's own, and OSC loads no others"
-              : "the model '" + scene_.preset.model + "' is neither beside the preset nor in '" +
-                    models_folder() + "'";
-      return fail(
-          scene_.path, *text,
-          {missing, scene_.preset.model_location.line, scene_.preset.model_location.column});
+    std::vector<std::string> names = scene_.preset.with;
+    names.insert(names.begin(), scene_.preset.model);
+    std::vector<std::string> paths;
+    for (const std::string& name : names) {
+      const auto model = find_model(name);
+      if (!model) {
+        const std::string missing =
+            options_.reach == Reach::own_folders
+                ? "its model is none of the program's own, and OSC loads no others"
+                : "the model '" + name + "' is neither beside the preset nor in '" +
+                      models_folder() + "'";
+        return fail(
+            scene_.path, *text,
+            {missing, scene_.preset.model_location.line, scene_.preset.model_location.column});
+      }
+      paths.push_back(*model);
     }
     const bool is_read =
-        options_.third
-            ? read_model(*model, {.third = options_.third, .progress = options_.progress})
-            : read_model(*model, {.third = scene_.preset.third,
-                                  .third_by = "the preset says",
-                                  .progress = options_.progress});
+        options_.third ? read_model(paths, {.third = options_.third, .progress = options_.progress})
+                       : read_model(paths, {.third = scene_.preset.third,
+                                            .third_by = "the preset says",
+                                            .progress = options_.progress});
     if (!is_read) {
       return false;
     }
@@ -134,12 +160,23 @@ class SceneReader {
     return true;
   }
 
-  bool read_model(const std::string& path, const ReadOptions& options) {
-    auto text = read_text(path, max_model_bytes);
-    if (!text) {
-      return fail("", "", text.error());
+  // Several files are one text, one behind the other.
+  bool read_model(const std::vector<std::string>& paths, const ReadOptions& options) {
+    std::string text;
+    int line = 1;
+    for (const std::string& path : paths) {
+      auto more = read_text(path, max_model_bytes);
+      if (!more) {
+        return fail("", "", more.error());
+      }
+      if (!text.empty() && !text.ends_with('\n')) {
+        text += '\n';
+      }
+      scene_.texts.push_back({path, line});
+      text += *more;
+      line = 1 + lines_of(text);
     }
-    ParsedNetwork parsed = parse_network(*text, options);
+    ParsedNetwork parsed = parse_network(text, options);
     if (parsed.ok() && !scene_.has_preset) {
       scene_.preset = default_preset(parsed.network, options_.bare);
       if (const auto idle = idle_keys(parsed.network, scene_.preset); idle && !options_.bare) {
@@ -147,14 +184,17 @@ class SceneReader {
             {Severity::warning, idle->line, idle->column, 1, idle->message});
       }
     }
-    Lines lines(*text);
-    for (const Diagnostic& diagnostic : parsed.diagnostics) {
-      out_.findings.push_back({path, diagnostic, lines.at(diagnostic.line)});
+    Lines lines(text);
+    for (Diagnostic& diagnostic : parsed.diagnostics) {
+      const std::string source = lines.at(diagnostic.line);
+      const ModelText& file = text_at(scene_, diagnostic.line);
+      diagnostic.line -= file.first_line - 1;
+      out_.findings.push_back({file.path, diagnostic, source});
       if (diagnostic.severity == Severity::warning) {
         scene_.warnings.push_back(to_string(out_.findings.back()));
       }
     }
-    scene_.model_path = path;
+    scene_.model_path = paths.front();
     scene_.third = parsed.third;
     scene_.motion = std::move(parsed.motion);
     const bool ok = parsed.ok();
@@ -198,6 +238,14 @@ Finding finding_of(const std::string& file, std::string_view text, const Error& 
   finding.diagnostic.message = error.message;
   finding.source = error.line > 0 ? Lines(text).at(error.line) : "";
   return finding;
+}
+
+Finding finding_in_model(const Scene& scene, const Error& error) {
+  const ModelText& file = text_at(scene, error.line);
+  Error there = error;
+  there.line -= error.line > 0 ? file.first_line - 1 : 0;
+  const auto text = read_text(file.path, max_model_bytes);
+  return finding_of(file.path, text ? std::string_view(*text) : "", there);
 }
 
 std::string to_string(const Finding& finding) {

@@ -22,8 +22,13 @@ struct Finding {
   std::string source;     // the line itself; empty where there is none
 };
 
+struct Scene;
+
 // An error at a place of the text that is all of `file`.
 Finding finding_of(const std::string& file, std::string_view text, const Error& error);
+
+// An error in the model, at its line of the file that it comes from. Blocks on the disk.
+Finding finding_in_model(const Scene& scene, const Error& error);
 
 // "file:line:column: error: message".
 std::string to_string(const Finding& finding);
@@ -57,10 +62,17 @@ struct SceneOptions {
   Progress progress = {};  // a reading that it stops fails with `stopped`
 };
 
+// Where a file's lines stand in the text that its model was read from.
+struct ModelText {
+  std::string path;
+  int first_line = 1;
+};
+
 struct Scene {
   std::string name;  // "PolyTriangle", for people
   std::string path;  // of the file that was asked for
   std::string model_path;
+  std::vector<ModelText> texts;  // the model's, and those that its preset reads with it
   Network network;
   Preset preset;
   std::string preset_text;             // what it was read from; empty: it was made up

@@ -61,12 +61,25 @@ double packs_of(const Workload& load) {
   return std::ceil(load.voices / lanes) * (is_halved ? 2.0 : load.isa == Isa::base ? 1.1 : 1.0);
 }
 
+namespace {
+
+double modes_under_places(const Program& program) {
+  double modes = 0.0;
+  for (const TapSlot& tap : program.taps) {
+    modes += tap.is_on_body() ? 2.0 * tap.length : 0.0;
+  }
+  return modes;
+}
+
+}  // namespace
+
 double worst_steps(const Program& program) {
   constexpr double of_a_point = 10.0;
   constexpr double of_an_audio_coefficient = 20.0;
   constexpr double of_a_solved_link = 400.0;
   double steps = program.moving + static_cast<double>(program.ends.size()) +
                  of_a_point * static_cast<double>(program.taps.size()) +
+                 modes_under_places(program) +
                  of_an_audio_coefficient * static_cast<double>(program.audio_coefficients.size());
   steps += of_a_point * static_cast<double>(program.waveguides.size() + program.junctions.size());
   for (const LinkRun& run : program.link_runs) {

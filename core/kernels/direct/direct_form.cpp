@@ -7,6 +7,19 @@
 
 namespace ressort {
 
+namespace {
+
+// Places are moved and spread lane by lane; on a body by all of its modes.
+double taps_ns(const Program& program) {
+  double ns = 0.0;
+  for (const TapSlot& tap : program.taps) {
+    ns += tap.is_on_body() ? 4.5 * tap.length : 10.0;
+  }
+  return ns;
+}
+
+}  // namespace
+
 double predicted_ns(const Program& program, const Direct&, const Workload& load) {
   const auto widest = static_cast<double>(vector_bytes(load.isa)) / (load.is_double ? 8.0 : 4.0);
   const LinkCount links = links_of(program);
@@ -14,7 +27,7 @@ double predicted_ns(const Program& program, const Direct&, const Workload& load)
              (12.0 + 1.5 * passive_ns(program) +
               1.6 * (program.moving + links.springs + links.bent) + 5.0 * links.others) +
          std::ceil(load.voices / widest) * std::min<double>(load.voices, widest) *
-             (10.0 * static_cast<double>(program.taps.size()) +
+             (taps_ns(program) +
               3.0 * static_cast<double>(program.waveguides.size() + program.junctions.size()));
 }
 

@@ -16,6 +16,7 @@ namespace {
 // clang-format off
 constexpr PresetKey keys[] = {
     {"", "model", "text", "the model's file, `NAME.mdl`, beside the preset or in the folder of the models; needed"},
+    {"", "with", "[\"NAME.mdl\", ...]", "up to 16 more models that are read as one text with it: a guitar's box behind its string, say"},
     {"", "description", "text", "one line for the person who loads it"},
     {"", "voices", "1 to 256 (1)", "how many notes sound at once"},
     {"", "gain", "0 to 1e9 (1)", "output per unit of position; a forte note should peak near -12 dBFS"},
@@ -294,6 +295,29 @@ void read_keys(const toml::table& root, TomlTable& reader, Preset& preset) {
   }
 }
 
+bool is_model_name(const std::string& name) {
+  constexpr std::size_t longest_path = 4096;
+  return name.size() <= longest_path && name.ends_with(".mdl");
+}
+
+// "with = ["Box.mdl"]"
+void read_with(const toml::node& node, TomlTable& reader, Preset& preset) {
+  constexpr std::size_t most = 16;
+  const toml::array* const names = node.as_array();
+  if (names == nullptr || names->size() > most) {
+    reader.fail(node, "'with' must be up to 16 names of .mdl files: [\"Box.mdl\"]");
+    return;
+  }
+  for (const toml::node& name : *names) {
+    const auto text = name.value<std::string>();
+    if (!text || !is_model_name(*text)) {
+      reader.fail(name, "'with' must be names of .mdl files: [\"Box.mdl\"]");
+      return;
+    }
+    preset.with.push_back(*text);
+  }
+}
+
 void read_root(const toml::table& root, Preset& preset, std::vector<Error>& errors,
                IsReserved is_reserved) {
   TomlTable reader(root, "a preset", errors);
@@ -312,6 +336,9 @@ void read_root(const toml::table& root, Preset& preset, std::vector<Error>& erro
   } else if (!preset.model.empty() && !preset.model.ends_with(".mdl")) {
     reader.fail(preset.model_location, "'model' must be the name of a .mdl file");
     preset.model.clear();
+  }
+  if (const toml::node* const with = root.get("with")) {
+    read_with(*with, reader, preset);
   }
   reader.text("description", preset.description);
   reader.integer("voices", preset.voices, 1, max_voices);
