@@ -187,27 +187,8 @@ Load load_of_mode(const Mass& mass, std::span<const Range> arguments, double rat
           .damped = 2.0 * least * rubbed};
 }
 
-}  // namespace
-
-Assembly assemble(const Network& network) {
-  return Assembler(network).make();
-}
-
-std::vector<Range> argument_ranges(const Network& network, const ParameterBox& box) {
-  std::vector<Range> ranges;
-  ranges.reserve(network.arguments.size());
-  for (const Formula& formula : network.arguments) {
-    ranges.push_back(formula_range(formula, box));
-  }
-  return ranges;
-}
-
-Range range_at(std::span<const Range> arguments, ArgumentId argument) {
-  return argument == no_argument ? Range{} : arguments[argument];
-}
-
-Load highest_load(const Network& network, const Assembly::Term& term,
-                  std::span<const Range> arguments, double rate_ratio) {
+Load load_as_keys_have_it(const Network& network, const Assembly::Term& term,
+                          std::span<const Range> arguments, double rate_ratio) {
   const double r = rate_ratio;
   if (!term.is_link && network.masses[term.element].is_mode) {
     return load_of_mode(network.masses[term.element], arguments, rate_ratio, true);
@@ -229,6 +210,33 @@ Load highest_load(const Network& network, const Assembly::Term& term,
   return {.stiff = term.scale * slopes.pull * r * r,
           .damped = is_friction ? 0.0 : damped,
           .rubbed = is_friction ? damped : 0.0};
+}
+
+}  // namespace
+
+Assembly assemble(const Network& network) {
+  return Assembler(network).make();
+}
+
+std::vector<Range> argument_ranges(const Network& network, const ParameterBox& box) {
+  std::vector<Range> ranges;
+  ranges.reserve(network.arguments.size());
+  for (const Formula& formula : network.arguments) {
+    ranges.push_back(formula_range(formula, box));
+  }
+  return ranges;
+}
+
+Range range_at(std::span<const Range> arguments, ArgumentId argument) {
+  return argument == no_argument ? Range{} : arguments[argument];
+}
+
+Load highest_load(const Network& network, const Assembly::Term& term,
+                  std::span<const Range> arguments, double rate_ratio) {
+  const Load load = load_as_keys_have_it(network, term, arguments, rate_ratio);
+  const bool is_fixed =
+      term.is_link ? network.links[term.element].is_fixed : network.masses[term.element].is_fixed;
+  return is_fixed ? Load{.damped = load.total()} : load;  // no key makes it stiffer
 }
 
 Load lowest_load(const Network& network, const Assembly::Term& term,

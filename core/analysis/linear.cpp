@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
-#include <tuple>
 #include <utility>
 
 #include "core/analysis/places.h"
@@ -19,6 +18,7 @@ constexpr double tolerance = 1e-8;  // of the largest stiffness, that a mode's f
 constexpr double same = 1e-9;       // by how much modes may differ that are as low
 constexpr std::size_t most_shapes = 12;
 constexpr std::size_t most_given = 3;
+constexpr std::size_t most_fixed_shapes = 64;
 
 // The linear part of a network: what moves, numbered anew, and what pulls at it.
 class Body {
@@ -39,6 +39,28 @@ class Body {
 
   int size() const { return static_cast<int>(scale_.size()); }
 
+  // A shape of what moves while all that is fixed is held, as one of the whole.
+  Vector lifted(const Body& held, const Vector& shape) const {
+    Vector all(scale_.size());
+    for (std::size_t i = 0; i < index_.size(); ++i) {
+      if (held.index_[i] != Body::held) {
+        all[static_cast<std::size_t>(index_[i])] = shape[static_cast<std::size_t>(held.index_[i])];
+      }
+    }
+    return all;
+  }
+  // The masses that are fixed, each as a shape of its own; so many at most.
+  std::vector<Vector> fixed_shapes(std::size_t most) const {
+    std::vector<Vector> shapes;
+    for (std::size_t i = 0; i < index_.size() && shapes.size() < most; ++i) {
+      if (index_[i] != held && network_.masses[i].is_fixed) {
+        shapes.emplace_back(scale_.size());
+        shapes.back()[static_cast<std::size_t>(index_[i])] = 1.0;
+      }
+    }
+    return shapes;
+  }
+
   // How much of a shape's motion is that of bodies' modes, 0..1.
   double share_of_modes(const Vector& shape) const {
     double sum = 0.0;
@@ -56,7 +78,7 @@ class Body {
     std::vector<double> diagonal(scale_.size());
     std::vector<SparseMatrix::Element> elements;
     elements.reserve(network_.links.size() + scale_.size());
-    each_spring([&](const Shares& shares, double k, double) {
+    each_spring([&](const Shares& shares, double k, double, bool) {
       for (std::size_t p = 0; p < shares.of.size(); ++p) {
         for (std::size_t q = 0; q <= p; ++q) {
           const auto [i, a] = shares.of[p];
@@ -78,7 +100,7 @@ class Body {
   // M^(-1/2) Z M^(-1/2) of a vector.
   Vector damped(const Vector& vector) const {
     Vector sum(vector.size());
-    each_spring([&](const Shares& shares, double, double z) {
+    each_spring([&](const Shares& shares, double, double z, bool) {
       const double force = z * shares.along(vector);
       for (const auto& [row, share] : shares.of) {
         sum[static_cast<std::size_t>(row)] += force * share;
@@ -87,13 +109,19 @@ class Body {
     return sum;
   }
 
-  // K and Z between some vectors.
-  std::pair<Matrix, Matrix> between(const std::vector<Vector>& vectors) const {
+  // K that keys move, Z, and K that they do not, between some vectors.
+  struct Between {
+    Matrix stiffness;
+    Matrix damping;
+    Matrix fixed;
+  };
+  Between between(const std::vector<Vector>& vectors) const {
     const std::size_t count = vectors.size();
-    Matrix stiffness(count, count);
-    Matrix damping(count, count);
+    Between all{Matrix(count, count), Matrix(count, count), Matrix(count, count)};
     std::vector<double> stretch(count);
-    each_spring([&](const Shares& shares, double k, double z) {
+    each_spring([&](const Shares& shares, double k, double z, bool is_fixed) {
+      Matrix& stiffness = is_fixed ? all.fixed : all.stiffness;
+      Matrix& damping = all.damping;
       for (std::size_t i = 0; i < count; ++i) {
         stretch[i] = shares.along(vectors[i]);
         for (std::size_t j = 0; j <= i; ++j) {
@@ -102,7 +130,7 @@ class Body {
         }
       }
     });
-    return {std::move(stiffness), std::move(damping)};
+    return all;
   }
 
  private:
@@ -135,7 +163,7 @@ class Body {
         parameters_);
   }
 
-  // Calls use(shares, k, z).
+  // Calls use(shares, k, z, is_fixed).
   template <class Use>
   void each_spring(Use&& use) const {
     Shares shares;
@@ -144,7 +172,7 @@ class Body {
       if (mass.kind == MassKind::oscillator) {
         shares.of.clear();
         hang(shares, i, 1.0);
-        use(shares, value(mass.stiffness), value(mass.damping));
+        use(shares, value(mass.stiffness), value(mass.damping), mass.is_fixed);
       }
     }
     for (const Link& link : network_.links) {
@@ -153,7 +181,7 @@ class Body {
         shares.of.clear();
         hang(shares, link.a, 1.0);
         hang(shares, link.b, -1.0);
-        use(shares, value(part.stiffness), value(part.damping));
+        use(shares, value(part.stiffness), value(part.damping), link.is_fixed);
       }
     }
   }
@@ -304,7 +332,7 @@ std::vector<Vector> shapes_of(const Body& body, const Lowest& lowest, Spectrum& 
     const bool is_alike = i >= first && pairs.values[i] < pairs.values[first] * (1.0 + same);
     (is_alike ? alike : others).push_back(pairs.vectors.column(i));
   }
-  const Matrix turn = symmetric_eigenpairs(body.between(alike).second).vectors;
+  const Matrix turn = symmetric_eigenpairs(body.between(alike).damping).vectors;
   std::vector<Vector> shapes;
   for (std::size_t i = 0; i < alike.size(); ++i) {
     shapes.emplace_back(alike[0].size());
@@ -326,6 +354,23 @@ std::vector<Vector> shapes_of(const Body& body, const Lowest& lowest, Spectrum& 
   return shapes;
 }
 
+// The network with everything that keys leave as it is held where it is: what is left has the mode
+// that keys tune. Nothing where nothing is fixed.
+std::optional<Network> fixed_held(const Network& network) {
+  if (std::none_of(network.masses.begin(), network.masses.end(),
+                   [](const Mass& mass) { return mass.is_fixed && moves(mass); })) {
+    return std::nullopt;
+  }
+  Network held = network;
+  for (Mass& mass : held.masses) {
+    if (mass.is_fixed && moves(mass)) {
+      mass.kind = MassKind::ground;
+      mass.is_mode = false;
+    }
+  }
+  return held;
+}
+
 }  // namespace
 
 double scheme_frequency_hz(double stiffness, double damping, double rate_hz) {
@@ -337,7 +382,9 @@ double scheme_frequency_hz(double stiffness, double damping, double rate_hz) {
 std::optional<LowestShapes> lowest_shapes(const Network& network,
                                           std::span<const double> parameters,
                                           const Progress& progress) {
-  const Body body(network, parameters);
+  const Body whole(network, parameters);
+  const std::optional<Network> still = fixed_held(network);
+  const Body body(still ? *still : network, parameters);
   const SparseMatrix stiffness = body.stiffness();
   double stiffest = 0.0;
   for (const double value : stiffness.value) {
@@ -354,9 +401,19 @@ std::optional<LowestShapes> lowest_shapes(const Network& network,
     return std::nullopt;
   }
   LowestShapes found;
-  const std::vector<Vector> shapes = shapes_of(body, *lowest, spectrum);
+  std::vector<Vector> shapes = shapes_of(body, *lowest, spectrum);
   found.share_of_modes = body.share_of_modes(shapes.front());
-  std::tie(found.stiffness, found.damping) = body.between(shapes);
+  if (still) {
+    for (Vector& shape : shapes) {
+      shape = whole.lifted(body, shape);
+    }
+    const std::vector<Vector> fixed = whole.fixed_shapes(most_fixed_shapes);
+    shapes.insert(shapes.end(), fixed.begin(), fixed.end());
+  }
+  Body::Between between = whole.between(shapes);
+  found.stiffness = std::move(between.stiffness);
+  found.damping = std::move(between.damping);
+  found.fixed = std::move(between.fixed);
   found.mode.stiffness = lowest->pairs.values[lowest->first];
   found.mode.damping = found.damping(0, 0);
   found.mode.frequency_hz =

@@ -34,8 +34,9 @@ std::optional<Mode> lowest_mode(const Network& network, std::span<const double> 
 // dampers. M is 1.
 struct LowestShapes {
   Mode mode;
-  Matrix stiffness;  // [shape, shape]
+  Matrix stiffness;  // [shape, shape] what keys move
   Matrix damping;
+  Matrix fixed;                 // the stiffness that keys leave as it is, which the first has not
   double share_of_modes = 0.0;  // of bodies in the lowest one's motion, 0..1
 };
 

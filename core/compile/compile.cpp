@@ -296,7 +296,8 @@ Result<Compiled> compile_by_stages(const Request& request) {
 Result<Compiled> compile(const Network& network, const Preset& preset,
                          const CompileOptions& options) {
   try {
-    return compile_by_stages({network, preset, options});
+    return preset.fixed.empty() ? compile_by_stages({network, preset, options})
+                                : compile_by_stages({with_fixed(network, preset), preset, options});
   } catch (const Stopped&) {
     return Error{stopped};
   }

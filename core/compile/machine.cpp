@@ -65,18 +65,19 @@ class ProgramMaker {
 
  private:
   // One coefficient for every distinct pair of argument and unit.
-  std::uint32_t coefficient(ArgumentId argument, Unit unit) {
+  std::uint32_t coefficient(ArgumentId argument, Unit unit, bool is_fixed = false) {
     const auto next = static_cast<std::uint32_t>(program_.coefficients.size());
-    const auto [entry, is_new] = known_.try_emplace({argument, unit}, next);
-    return is_new ? add_coefficient(argument, unit) : entry->second;
+    const auto [entry, is_new] = known_.try_emplace({argument, unit, is_fixed}, next);
+    return is_new ? add_coefficient(argument, unit, is_fixed) : entry->second;
   }
 
-  std::uint32_t add_coefficient(ArgumentId argument, Unit unit) {
+  std::uint32_t add_coefficient(ArgumentId argument, Unit unit, bool is_fixed) {
     const auto next = static_cast<std::uint32_t>(program_.coefficients.size());
     const Formula& formula = formula_of(argument);
     program_.coefficients.push_back({.first = static_cast<std::uint32_t>(program_.steps.size()),
                                      .count = static_cast<std::uint32_t>(formula.size()),
-                                     .unit = unit});
+                                     .unit = unit,
+                                     .is_fixed = is_fixed});
     program_.steps.insert(program_.steps.end(), formula.begin(), formula.end());
     depend(next, formula);
     return next;
@@ -102,7 +103,7 @@ class ProgramMaker {
   void add_mode(std::uint32_t node, const Mass& mass) {
     const auto mode = static_cast<std::uint32_t>(program_.modes.size());
     const auto add = [&](ArgumentId argument, Unit unit) {
-      const std::uint32_t next = add_coefficient(argument, unit);
+      const std::uint32_t next = add_coefficient(argument, unit, mass.is_fixed);
       program_.coefficients[next].mode = mode;
       for (const ArgumentId other : {mass.mass, mass.stiffness, mass.damping}) {
         depend(next, formula_of(other));
@@ -131,8 +132,8 @@ class ProgramMaker {
                         : m.kind == MassKind::junction ? 1
                         : m.kind == MassKind::ground   ? 2
                                                        : 3;
-      return std::tuple(group, m.is_mode, m.kind, m.mass, m.stiffness, m.damping, m.gravity,
-                        m.gravity_per_rate);
+      return std::tuple(group, m.is_mode, m.is_fixed, m.kind, m.mass, m.stiffness, m.damping,
+                        m.gravity, m.gravity_per_rate);
     };
     std::stable_sort(order.begin(), order.end(),
                      [&](std::uint32_t a, std::uint32_t b) { return rank(a) < rank(b); });
@@ -162,8 +163,9 @@ class ProgramMaker {
           {.first = node,
            .count = 1,
            .inverse_mass =
-               coefficient(mass.mass, is_junction ? Unit::inverse_impedance : Unit::inverse_mass),
-           .stiffness = coefficient(mass.stiffness, Unit::stiffness),
+               coefficient(mass.mass, is_junction ? Unit::inverse_impedance : Unit::inverse_mass,
+                           mass.is_fixed),
+           .stiffness = coefficient(mass.stiffness, Unit::stiffness, mass.is_fixed),
            .damping = coefficient(mass.damping, Unit::damping),
            .gravity = coefficient(mass.gravity, gravity_unit),
            .is_oscillator = mass.kind == MassKind::oscillator,
@@ -207,8 +209,9 @@ class ProgramMaker {
       const Macro& guide = network_.waveguides[waveguide];
       program_.waveguides.push_back(
           {.is_open = guide.kind == MacroKind::open_waveguide,
-           .inverse_impedance = coefficient(guide.impedance, Unit::inverse_impedance),
-           .frequency = coefficient(guide.frequency_hz, Unit::frequency),
+           .inverse_impedance =
+               coefficient(guide.impedance, Unit::inverse_impedance, guide.is_fixed),
+           .frequency = coefficient(guide.frequency_hz, Unit::frequency, guide.is_fixed),
            .t60 = coefficient(guide.t60_s, Unit::plain),
            .brightness = coefficient(guide.brightness, Unit::plain),
            .first = static_cast<std::uint32_t>(program_.junctions.size()),
@@ -224,7 +227,7 @@ class ProgramMaker {
     std::vector<std::uint32_t> order = share_.links;
     const auto rank = [&](std::uint32_t i) {
       const Link& link = network_.links[i];
-      return std::tuple(link.law, link.arguments, scheme_of(i));
+      return std::tuple(link.law, link.arguments, link.is_fixed, scheme_of(i));
     };
     std::stable_sort(order.begin(), order.end(),
                      [&](std::uint32_t a, std::uint32_t b) { return rank(a) < rank(b); });
@@ -240,7 +243,8 @@ class ProgramMaker {
       const LinkScheme scheme = scheme_of(order[i]);
       LinkRun run{.law = link.law, .scheme = scheme.scheme, .first = i, .count = 1};
       for (std::size_t k = 0; k < most_law_arguments; ++k) {
-        run.coefficients[k] = coefficient(link.arguments[k], facts_of(link.law).arguments[k].unit);
+        run.coefficients[k] =
+            coefficient(link.arguments[k], facts_of(link.law).arguments[k].unit, link.is_fixed);
       }
       program_.link_runs.push_back(run);
     }
@@ -255,7 +259,7 @@ class ProgramMaker {
   std::span<const LinkScheme> schemes_;  // [link of the network]
   Program program_;
   std::vector<std::uint32_t> node_;  // [mass of the network] node, or nowhere
-  std::map<std::pair<ArgumentId, Unit>, std::uint32_t> known_;
+  std::map<std::tuple<ArgumentId, Unit, bool>, std::uint32_t> known_;
 };
 
 // Divides what is left of a network without macros. What is held by a ground alone holds nothing

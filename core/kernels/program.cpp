@@ -38,7 +38,8 @@ double rate_factor(Unit unit, double r) {
 }
 
 double continuous_value(const Program& program, const Coefficient& coefficient,
-                        std::span<const double> parameters, double stiffness_factor) {
+                        std::span<const double> parameters, double of_key) {
+  const double stiffness_factor = coefficient.is_fixed ? 1.0 : of_key;
   const double value =
       evaluate(std::span(program.steps).subspan(coefficient.first, coefficient.count), parameters);
   const double scaled = value * rate_factor(coefficient.unit, program.rate_ratio);

@@ -19,6 +19,7 @@ struct Coefficient {
   std::uint32_t first = 0;  // steps [first, first + count) of Program::steps
   std::uint32_t count = 0;
   Unit unit = Unit::plain;
+  bool is_fixed = false;         // whatever the key
   std::uint32_t mode = no_mode;  // index into Program::modes: of the continuous network
 };
 

@@ -60,6 +60,7 @@ struct Mass {
   // An oscillator that is a mode of a body: K and Z are those of the continuous network, and its
   // frequency and decay are theirs at any rate (core/sampled_mode.h).
   bool is_mode = false;
+  bool is_fixed = false;      // a key leaves its stiffness as it is
   std::uint32_t drawing = 0;  // 1 + index into Network::drawings; 0 for none
   SourceLocation location;
   bool operator==(const Mass&) const = default;
@@ -103,6 +104,7 @@ struct Macro {
   double position = 0.0;                  // of every node
   double third = 0.0;                     // as of Mass
   std::uint32_t drawing = 0;
+  bool is_fixed = false;  // a key leaves all of its stiffness as it is
   SourceLocation location;
   bool operator==(const Macro&) const = default;
 };
@@ -154,6 +156,7 @@ struct Link {
   std::uint32_t b = 0;
   std::array<ArgumentId, most_law_arguments> arguments = {no_argument, no_argument, no_argument,
                                                           no_argument, no_argument};
+  bool is_fixed = false;  // a key leaves its stiffness as it is
   SourceLocation location;
   bool operator==(const Link&) const = default;
 };

@@ -45,7 +45,10 @@ void add_nodes(const Macro& macro, const Progress& progress, Network& network) {
   for (std::uint32_t i = 0; i < macro.length; ++i) {
     progress.spend(4 * std::size_t{macro.width});
     for (std::uint32_t j = 0; j < macro.width; ++j) {
-      Mass node{.position = macro.position, .third = macro.third, .location = macro.location};
+      Mass node{.position = macro.position,
+                .third = macro.third,
+                .is_fixed = macro.is_fixed,
+                .location = macro.location};
       if (is_fixed(macro, i, j)) {
         node.kind = MassKind::ground;
       } else {
@@ -63,7 +66,8 @@ void add_nodes(const Macro& macro, const Progress& progress, Network& network) {
 void add_links(const Macro& macro, std::uint32_t first, const Progress& progress,
                Network& network) {
   const auto add = [&](std::uint32_t a, std::uint32_t b, ArgumentId stiffness, ArgumentId damping) {
-    Link link{.a = first + a, .b = first + b, .location = macro.location};
+    Link link{
+        .a = first + a, .b = first + b, .is_fixed = macro.is_fixed, .location = macro.location};
     link.arguments[0] = stiffness;
     link.arguments[1] = damping;
     network.links.push_back(std::move(link));
@@ -145,6 +149,7 @@ void add_modes(const Network& network, std::uint32_t body, const Progress& progr
          .stiffness = add(mode_stiffness(mass, network.arguments[mode->frequency_hz], t60_s)),
          .damping = add(mode_damping(mass, t60_s)),
          .is_mode = true,
+         .is_fixed = macro.is_fixed,
          .location = mode->location});
     for (std::size_t place = 0; place < macro.places.size(); ++place) {
       expanded.shapes[first + place * macro.length + at] = mode->shape[place];
@@ -178,6 +183,7 @@ void add_junctions(const Network& network, Network& expanded) {
     mass.kind = same[i] == i ? MassKind::junction : MassKind::ground;  // that nobody holds
     mass.mass = same[i] == i ? macro.impedance : no_argument;
     mass.position = macro.position;
+    mass.is_fixed = macro.is_fixed;
   }
   for (Link& link : expanded.links) {
     link.a = same[link.a];
@@ -204,7 +210,11 @@ void split_springs(Network& network) {
     if (!law.contains_spring || !law.is_curved || !(is_junction(link.a) || is_junction(link.b))) {
       continue;
     }
-    Link straight{.name = link.name, .a = link.a, .b = link.b, .location = link.location};
+    Link straight{.name = link.name,
+                  .a = link.a,
+                  .b = link.b,
+                  .is_fixed = link.is_fixed,
+                  .location = link.location};
     straight.arguments[0] = std::exchange(link.arguments[law.slot(Role::stiffness)], no_argument);
     straight.arguments[1] = std::exchange(link.arguments[law.slot(Role::damping)], no_argument);
     network.links.push_back(std::move(straight));

@@ -45,6 +45,8 @@ class Tuner {
     springs_ = {shapes.stiffness, shapes.damping, Matrix(n, n), Matrix(n, n)};
     springs_.stiffness.values *= rate_ratio * rate_ratio;
     springs_.damping.values *= rate_ratio;
+    fixed_ = shapes.fixed.rows() == n ? shapes.fixed : Matrix(n, n);
+    fixed_.values *= rate_ratio * rate_ratio;
   }
 
   // The factor and the decay at which the pole's angle is `theta` a sample; from where they are as
@@ -100,6 +102,7 @@ class Tuner {
     const Complex pole(-decay, theta);
     Springs stiffer = springs_;
     stiffer.stiffness.values *= std::exp(log_factor);
+    stiffer.stiffness.values += fixed_.values;
     const bool is_exact = stepping_.scheme == Stepping::Scheme::exact;
     const auto [k, z] =
         is_exact ? std::pair(stiffer.stiffness, stiffer.damping) : stepping_.as_published(stiffer);
@@ -119,6 +122,7 @@ class Tuner {
   }
 
   Springs springs_;
+  Matrix fixed_;  // stiffness that no key moves
   Stepping stepping_;
 };
 

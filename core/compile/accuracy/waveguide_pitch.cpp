@@ -34,7 +34,8 @@ std::vector<double> highest_of(const Network& network, double rate_hz) {
 LowestShapes waveguide_shapes(const Network& network, std::span<const double> parameters) {
   double hz = std::numeric_limits<double>::infinity();
   for (const Macro& guide : network.waveguides) {
-    hz = std::min(hz, argument_value(network, guide.frequency_hz, parameters));
+    const double own = argument_value(network, guide.frequency_hz, parameters);
+    hz = guide.is_fixed ? hz : std::min(hz, own);
   }
   const double angle = 2.0 * std::numbers::pi * hz / Network::reference_rate_hz;
   LowestShapes shapes{
@@ -76,6 +77,9 @@ double highest_waveguide_factor(const Network& network, const ParameterBox& box,
   const std::vector<double> highest = highest_of(network, rate_hz);
   const std::vector<Range> arguments = argument_ranges(network, box);
   for (std::size_t i = 0; i < highest.size(); ++i) {
+    if (network.waveguides[i].is_fixed) {
+      continue;
+    }
     const double hz = range_at(arguments, network.waveguides[i].frequency_hz).highest;
     factor = std::min(factor, (highest[i] / hz) * (highest[i] / hz));
   }

@@ -128,8 +128,8 @@ class BodyMaker {
     }
   }
 
-  // The frame of a coefficient. Constants are one frame, as nothing but a voice's pitch moves
-  // them: then the coefficient is that of the first, and the weight is relative to it.
+  // The frame of a coefficient. Constants that keys move alike are one frame: then the coefficient
+  // is that of the first, and the weight is relative to it.
   Frame& frame_of(std::vector<Frame>& frames, std::uint32_t c, bool is_late, double& weight) {
     weight = 1.0;
     for (Frame& frame : frames) {
@@ -139,7 +139,9 @@ class BodyMaker {
       if (frame.coefficient == c) {
         return frame;
       }
-      if (!body_.is_live[c] && !body_.is_live[frame.coefficient]) {
+      const bool is_alike =
+          program_.coefficients[c].is_fixed == program_.coefficients[frame.coefficient].is_fixed;
+      if (!body_.is_live[c] && !body_.is_live[frame.coefficient] && is_alike) {
         weight = body_.value[c] / body_.value[frame.coefficient];
         return frame;
       }

@@ -228,6 +228,11 @@ std::string print_preset(const Preset& preset) {
   text += preset.damper_s != usual.damper_s ? "damper_s = " + in_toml(preset.damper_s) + "\n" : "";
   text += preset.noise ? "noise = true\n" : "";
   text += preset.keyboard ? "" : "tuning = \"fixed\"\n";
+  std::string fixed;
+  for (const std::string& label : preset.fixed) {
+    fixed += (fixed.empty() ? "" : ", ") + in_quotes(label);
+  }
+  text += fixed.empty() ? "" : "fixed = [" + fixed + "]\n";
   text += preset.flattening_cents != 0.0
               ? "flattening_cents = " + in_toml(preset.flattening_cents) + "\n"
               : "";

@@ -40,6 +40,22 @@ std::string misfit(const Network& network, const ControlSetting& control) {
              : "";
 }
 
+// Marks all that carry a label; false if none does.
+bool fix(Network& network, const std::string& label) {
+  bool is_there = false;
+  const auto mark = [&](auto& elements) {
+    for (auto& element : elements) {
+      const bool is_meant = std::string_view(element.name) == label;
+      element.is_fixed = element.is_fixed || is_meant;
+      is_there = is_there || is_meant;
+    }
+  };
+  mark(network.masses);
+  mark(network.macros);
+  mark(network.links);
+  return is_there;
+}
+
 }  // namespace
 
 int find_input(const Network& network, std::string_view target) {
@@ -67,8 +83,22 @@ int find_parameter(const Network& network, std::string_view name) {
   return -1;
 }
 
+Network with_fixed(Network network, const Preset& preset) {
+  for (const std::string& label : preset.fixed) {
+    fix(network, label);
+  }
+  return network;
+}
+
 std::vector<Error> misfits(const Network& network, const Preset& preset) {
   std::vector<Error> found;
+  Network marked = preset.fixed.empty() ? Network() : network;
+  for (const std::string& label : preset.fixed) {
+    if (!fix(marked, label)) {
+      found.push_back({"the model has nothing labelled " + quoted(label) + " that keys could leave",
+                       preset.model_location.line, preset.model_location.column});
+    }
+  }
   for (const ParameterSetting& setting : preset.parameters) {
     if (find_parameter(network, setting.name) < 0) {
       found.push_back(

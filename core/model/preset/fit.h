@@ -19,4 +19,7 @@ int find_parameter(const Network& network, std::string_view name);
 // preset's lines. [any thread but audio]
 std::vector<Error> misfits(const Network& network, const Preset& preset);
 
+// The network with what the preset says is fixed marked so. O(elements) [any thread but audio]
+Network with_fixed(Network network, const Preset& preset);
+
 }  // namespace ressort

@@ -23,6 +23,7 @@ constexpr PresetKey keys[] = {
     {"", "damper_s", "0 to 60 (0)", "T60 of a note once its key is up: in how many seconds a damper takes 60 dB off it; 0 lets it ring out"},
     {"", "noise", "true or false (false)", "the outputs shape white noise instead of being heard themselves"},
     {"", "tuning", "`keyboard` or `fixed` (`keyboard`)", "whether a key sets the pitch, or every key sounds the model as it is written"},
+    {"", "fixed", "[\"LABEL\", ...]", "what keys leave as stiff as it is: a guitar's box, whose modes stay where they are while the string follows the key. Labels of bodies, waveguides, macros, oscillators and links"},
     {"", "flattening_cents", "-100 to 100 (0)", "by how much the sound is flat of its lowest mode, as under a bow, which keys make up for"},
     {"", "transpose", "-96 to 96 (0)", "semitones between a key and the pitch that it sets"},
     {"", "a4_hz", "220 to 880 (440)", "the pitch of the A above the middle C, to which all keys are tuned"},
@@ -318,6 +319,24 @@ void read_with(const toml::node& node, TomlTable& reader, Preset& preset) {
   }
 }
 
+// "fixed = ["box"]"
+void read_fixed(const toml::node& node, TomlTable& reader, Preset& preset) {
+  constexpr std::size_t most = 1024;
+  const toml::array* const labels = node.as_array();
+  if (labels == nullptr || labels->size() > most) {
+    reader.fail(node, "'fixed' must be labels of the model without '@': [\"box\"]");
+    return;
+  }
+  for (const toml::node& label : *labels) {
+    const auto text = label.value<std::string>();
+    if (!text || text->empty() || text->front() == '@') {
+      reader.fail(label, "'fixed' must be labels of the model without '@': [\"box\"]");
+      return;
+    }
+    preset.fixed.push_back(*text);
+  }
+}
+
 void read_root(const toml::table& root, Preset& preset, std::vector<Error>& errors,
                IsReserved is_reserved) {
   TomlTable reader(root, "a preset", errors);
@@ -336,6 +355,9 @@ void read_root(const toml::table& root, Preset& preset, std::vector<Error>& erro
   } else if (!preset.model.empty() && !preset.model.ends_with(".mdl")) {
     reader.fail(preset.model_location, "'model' must be the name of a .mdl file");
     preset.model.clear();
+  }
+  if (const toml::node* const fixed = root.get("fixed")) {
+    read_fixed(*fixed, reader, preset);
   }
   if (const toml::node* const with = root.get("with")) {
     read_with(*with, reader, preset);

@@ -54,6 +54,7 @@ struct Preset {
   std::string model;                    // a file's name, beside the preset or in the models' folder
   SourceLocation model_location{1, 1};  // of that name
   std::vector<std::string> with;        // more models, read as one text with it
+  std::vector<std::string> fixed;       // labels of what keys leave as stiff as it is
   std::string description;              // one line for a person
   int voices = 1;
   double gain = 1.0;              // output per unit of position
