@@ -13,6 +13,7 @@
 #include "app/commands/commands.h"
 #include "app/commands/export.h"
 #include "app/commands/make.h"
+#include "app/commands/modes/modes.h"
 #include "app/commands/reference.h"
 #include "app/commands/smf/midi_file.h"
 #include "app/commands/start_chart.h"
@@ -89,6 +90,17 @@ const char* const chart_examples =
     "Examples:\n"
     "  ressort chart -o chart                      some minutes\n"
     "  ressort chart string50 my.mdl -o chart      two scenes\n";
+
+const char* const modes_examples =
+    "Levels are in dB below the loudest mode from that input at that output; with --json they are\n"
+    "amplitudes at the time of an impulse, levels[input][output]: a force of 1 for one sample at\n"
+    "44100 Hz, or a position of 1 for one sample. What bows, plucks or touches is open.\n"
+    "Examples:\n"
+    "  ressort modes BowedString --modes 12\n"
+    "  ressort modes 20x30mesh --modes 24 -o shapes.svg\n"
+    "  ressort modes PolyTriangle --json | jq '.modes[0].frequency_hz'\n"
+    "  ressort modes my.mdl --tune 220,440,660 -o tuned.mdl\n"
+    "  ressort modes my.mdl --decay 100:6,3000:0.8 -o wood.mdl\n";
 
 const char* const export_examples =
     "FAUST (faust.grame.fr) makes plugins, web pages and programs for boards of it. A slider for\n"
@@ -487,6 +499,58 @@ void add_check(CLI::App& app, CheckOptions& options, int& code) {
   command->callback([&options, &code] { code = check(options); });
 }
 
+// "HZ:S", both numbers.
+DecayPoint decay_point(const std::string& text) {
+  const std::size_t colon = text.find(':');
+  DecayPoint point;
+  if (colon == std::string::npos || !parse_number(text.substr(0, colon), point.frequency_hz) ||
+      !parse_number(text.substr(colon + 1), point.t60_s)) {
+    throw CLI::ValidationError("--decay", "expected HZ:SECONDS, found '" + text + "'");
+  }
+  return point;
+}
+
+void add_modes(CLI::App& app, ModesOptions& options, int& code) {
+  CLI::App* command = app.add_subcommand(
+      "modes", "tells what a model can sound: frequency, decay, level and shape of its modes");
+  command->footer(modes_examples);
+  command->add_option("MODEL", options.name, "a preset's or a model's name, or a file")->required();
+  command
+      ->add_option("--modes", options.count,
+                   "how many of the lowest; without it all of a small model")
+      ->check(CLI::Range(1, 10000));
+  command->add_option("--rate", options.rate_hz, "the sample rate that they are played at, in Hz")
+      ->check(within(8000.0, 768000.0))
+      ->capture_default_str();
+  command->add_flag(
+      "--exact", options.is_continuous,
+      "of the continuous network, which presets with a budget are true to, instead of\n"
+      "the published scheme");
+  command->add_flag("--json", options.as_json, "for machines");
+  command->add_option("-o,--output", options.output,
+                      "an .svg of their shapes; with --tune or --decay the tuned .mdl");
+  command
+      ->add_option(
+          "--tune", options.frequencies_hz,
+          "frequencies in Hz for the lowest modes: springs are changed, each by itself and\n"
+          "all together as little as will do")
+      ->delimiter(',');
+  command
+      ->add_option_function<std::vector<std::string>>(
+          "--decay",
+          [&options](const std::vector<std::string>& texts) {
+            for (const std::string& text : texts) {
+              options.decay.push_back(decay_point(text));
+            }
+          },
+          "T60 at one or more frequencies, HZ:SECONDS: dampers are put on all that moves, so that\n"
+          "modes decay by a + b f^2, whatever their shape")
+      ->delimiter(',');
+  add_overwrite(*command, options.force);
+  add_motion(*command, options.third);
+  command->callback([&options, &code] { code = modes_command(options); });
+}
+
 void add_chart(CLI::App& app, ChartOptions& options, int& code) {
   CLI::App* command =
       app.add_subcommand("chart", "draws what every way of computing costs and how right it is");
@@ -545,6 +609,7 @@ int run(int argc, char** argv) {
   RenderChoice render_choice;
   CheckOptions check_options;
   ExportOptions export_options;
+  ModesOptions modes_options;
   MakeOptions make_options;
   ChartOptions chart_options;
   std::vector<std::uint32_t> make_sizes;
@@ -554,6 +619,7 @@ int run(int argc, char** argv) {
   add_check(app, check_options, code);
   add_make(app, make_options, make_sizes, code);
   add_export(app, export_options, code);
+  add_modes(app, modes_options, code);
   add_chart(app, chart_options, code);
   add_reference(app, reference_part, code);
   try {

@@ -4,7 +4,7 @@
 #include <cmath>
 
 #include "core/analysis/assembly.h"
-#include "core/analysis/continuous.h"
+#include "core/analysis/linear.h"
 #include "core/analysis/places.h"
 
 namespace ressort {
@@ -14,8 +14,8 @@ constexpr std::uint32_t held = 0xffffffffu;
 
 class SystemMaker {
  public:
-  explicit SystemMaker(const Network& network)
-      : network_(network), row_(network.masses.size(), held) {}
+  SystemMaker(const Network& network, double step)
+      : network_(network), step_(step), row_(network.masses.size(), held) {}
 
   LinearSystem make() {
     const Assembly assembly = assemble(network_);
@@ -48,13 +48,17 @@ class SystemMaker {
  private:
   double value(ArgumentId id) const { return argument_value(network_, id, {}); }
 
+  std::pair<double, double> per_step(ArgumentId stiffness, ArgumentId damping) const {
+    return {value(stiffness) * step_ * step_, value(damping) * step_};
+  }
+
   std::pair<double, double> numbers_of(const Assembly::Term& term) const {
     if (term.is_link) {
       const LinearPart part = linear_part(network_.links[term.element]);
-      return {value(part.stiffness), value(part.damping)};
+      return per_step(part.stiffness, part.damping);
     }
     const Mass& mass = network_.masses[term.element];
-    return {value(mass.stiffness), value(mass.damping)};
+    return per_step(mass.stiffness, mass.damping);
   }
 
   void add(ModalPort::Shares& shares, std::uint32_t mass, double factor) const {
@@ -73,15 +77,15 @@ class SystemMaker {
     return part;
   }
 
-  // The force of every link at a node, as what its ends do to it. `sign` is 1 for the force and,
-  // as an input that holds the node, 1 as well: what a link pulls with there it is pulled with.
+  // The force of every link at a node, by what its ends do: also what a hand there does to them.
   void feel(ModalPort& port, std::uint32_t node, double weight) const {
     for (const Link& link : network_.links) {
       const double at = link.a == link.b ? 0.0 : part_of(link.a, node) - part_of(link.b, node);
       if (at != 0.0) {
         const LinearPart part = linear_part(link);
-        const double k = -weight * at * value(part.stiffness);
-        const double z = -weight * at * value(part.damping);
+        const auto [pull, rub] = per_step(part.stiffness, part.damping);
+        const double k = -weight * at * pull;
+        const double z = -weight * at * rub;
         add(port.stiff, link.a, k);
         add(port.stiff, link.b, -k);
         add(port.damped, link.a, z);
@@ -94,7 +98,7 @@ class SystemMaker {
     for (const Input& input : network_.inputs) {
       ModalPort& port = made_.inputs.emplace_back();
       if (input.is_force) {
-        add(port.direct, input.mass, 1.0);
+        add(port.direct, input.mass, step_);  // the same momentum at every rate
       } else {
         feel(port, input.mass, 1.0);  // K between the hand and the rows, which is symmetric
       }
@@ -102,8 +106,9 @@ class SystemMaker {
     for (const Output& output : network_.outputs) {
       ModalPort& port = made_.outputs.emplace_back();
       if (output.is_force) {
-        each_share(network_, output.mass,
-                   [&](std::uint32_t node, double share) { feel(port, node, share); });
+        each_share(network_, output.mass, [&](std::uint32_t node, double share) {
+          feel(port, node, share / (step_ * step_));
+        });
       } else {
         add(port.direct, output.mass, 1.0);
       }
@@ -111,6 +116,7 @@ class SystemMaker {
   }
 
   const Network& network_;
+  double step_;
   std::vector<std::uint32_t> row_;  // [mass]
   LinearSystem made_;
 };
@@ -158,8 +164,8 @@ Network settled(const Network& network, std::span<const double> parameters) {
   return out;
 }
 
-LinearSystem make_linear_system(const Network& network) {
-  return SystemMaker(network).make();
+LinearSystem make_linear_system(const Network& network, double step) {
+  return SystemMaker(network, step).make();
 }
 
 Vector product(const SparseMatrix& lower, const Vector& x) {

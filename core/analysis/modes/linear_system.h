@@ -12,7 +12,7 @@
 namespace ressort {
 
 // What an input pushes, or an output hears: shares of rows. Those of `stiff` act with a position,
-// those of `damped` with its change in time.
+// those of `damped` with its change in a step.
 struct ModalPort {
   using Shares = std::vector<std::pair<std::uint32_t, double>>;  // row, share
   Shares direct;
@@ -30,7 +30,7 @@ struct ModalSpring {
   double damping = 0.0;
 };
 
-// Row i is a mass that moves, times the root of its M. K and Z are per sample at 44 100 Hz.
+// Row i is a mass that moves, times the root of its M. K and Z are per step.
 struct LinearSystem {
   std::size_t size() const { return masses.size(); }
   std::span<const std::pair<std::uint32_t, double>> of(const ModalSpring& spring) const {
@@ -54,9 +54,9 @@ struct LinearSystem {
 // The same network with every argument a number, as these parameters make it: places stay.
 Network settled(const Network& network, std::span<const double> parameters);
 
-// Of a network without macros whose arguments are numbers. O(masses + links).
-// [any thread but audio]
-LinearSystem make_linear_system(const Network& network);
+// Of a network without macros whose arguments are numbers, for steps that are `step` samples at
+// 44 100 Hz long. O(masses + links). [any thread but audio]
+LinearSystem make_linear_system(const Network& network, double step);
 
 // y = A x.
 Vector product(const SparseMatrix& lower, const Vector& x);

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "core/analysis/modes/linear_system.h"
+#include "core/analysis/modes/quadratic.h"
 #include "core/linear_algebra/matrix.h"
 #include "core/model/network.h"
 #include "core/progress.h"
@@ -33,7 +34,7 @@ struct NetworkMode {
 struct NetworkModes {
   std::vector<NetworkMode> modes;  // by their frequency
   Network network;                 // without macros, every argument a number
-  LinearSystem system;             // of it, per sample at 44 100 Hz
+  LinearSystem system;             // of it, per step
   std::size_t inputs = 0;
   std::size_t outputs = 0;
   ModeScheme scheme = ModeScheme::published;
@@ -54,12 +55,32 @@ struct ModeOptions {
   ModeScheme scheme = ModeScheme::published;
   std::size_t count =
       0;  // of the lowest; 0: all up to most_listed_modes masses, else default_modes
-  Progress progress = {};  // a search that it stops throws Stopped
+  Progress progress = {};  // a search that it stops fails with `stopped`
 };
 
 inline constexpr std::size_t most_listed_modes = 2000;   // masses whose modes are all found
 inline constexpr std::size_t most_crossing_modes = 300;  // where damping is not proportional
 inline constexpr std::size_t default_modes = 100;        // of larger networks
+
+// What swings in a system, made for the scheme's step, whose springs have these factors on their K
+// and Z, by frequency.
+struct FoundSwings {
+  Swings swings;
+  SparseMatrix stiffness;
+  SparseMatrix damping;
+  bool is_all = true;
+};
+Result<FoundSwings> find_swings(const LinearSystem& system, const ModeOptions& options,
+                                std::span<const double> stiffness_factors = {},
+                                std::span<const double> damping_factors = {});
+
+// 1 for the published scheme, 0 for the continuous network: the e of quadratic.h; and how many
+// times longer a step is than a sample at 44 100 Hz.
+double scheme_e(ModeScheme scheme);
+double scheme_step(const ModeOptions& options);
+
+// The logarithm of what a motion grows by in a sample.
+std::complex<double> pole_of(std::complex<double> mu, ModeScheme scheme);
 
 // Of springs, dampers and oscillators; what else there is is open, and springs that stiffen are as
 // they are at rest. Motions that do not swing (rigid, or damped beyond swinging) are left out.

@@ -55,11 +55,11 @@ class Quadratic {
         stiffest_(largest(stiffness.values)),
         size_(stiffness.rows()) {}
 
-  std::optional<Swings> solve() {
+  std::optional<Swings> solve(bool may_cross) {
     if (auto found = in_shared_vectors()) {
       return Swings{*std::move(found), true};
     }
-    auto found = crossed();
+    auto found = may_cross ? crossed() : std::nullopt;
     return found ? std::optional(Swings{*std::move(found), false}) : std::nullopt;
   }
 
@@ -209,8 +209,8 @@ class Quadratic {
 }  // namespace
 
 std::optional<Swings> swings_of(const Matrix& stiffness, const Matrix& damping, double e,
-                                double rigid) {
-  return Quadratic(stiffness, damping, e, rigid).solve();
+                                double rigid, bool may_cross) {
+  return Quadratic(stiffness, damping, e, rigid).solve(may_cross);
 }
 
 }  // namespace ressort

@@ -27,8 +27,9 @@ struct Swings {
 };
 
 // What swings of symmetric K and Z, in no order; `rigid`: a k below which nothing is sprung.
-// Nothing where the eigenvalues cannot be found. O(rows^3)
+// Nothing where the eigenvalues cannot be found, or damping is not proportional and nobody wants to
+// wait for what `may_cross`. O(rows^3)
 std::optional<Swings> swings_of(const Matrix& stiffness, const Matrix& damping, double e,
-                                double rigid);
+                                double rigid, bool may_cross = true);
 
 }  // namespace ressort
