@@ -10,10 +10,11 @@
 #include <vector>
 
 #include "app/commands/check.h"
+#include "app/commands/command_line.h"
 #include "app/commands/commands.h"
 #include "app/commands/export.h"
 #include "app/commands/make.h"
-#include "app/commands/modes/modes.h"
+#include "app/commands/modes/modes_line.h"
 #include "app/commands/reference.h"
 #include "app/commands/smf/midi_file.h"
 #include "app/commands/start_chart.h"
@@ -91,17 +92,6 @@ const char* const chart_examples =
     "  ressort chart -o chart                      some minutes\n"
     "  ressort chart string50 my.mdl -o chart      two scenes\n";
 
-const char* const modes_examples =
-    "Levels are in dB below the loudest mode from that input at that output; with --json they are\n"
-    "amplitudes at the time of an impulse, levels[input][output]: a force of 1 for one sample at\n"
-    "44100 Hz, or a position of 1 for one sample. What bows, plucks or touches is open.\n"
-    "Examples:\n"
-    "  ressort modes BowedString --modes 12\n"
-    "  ressort modes 20x30mesh --modes 24 -o shapes.svg\n"
-    "  ressort modes PolyTriangle --json | jq '.modes[0].frequency_hz'\n"
-    "  ressort modes my.mdl --tune 220,440,660 -o tuned.mdl\n"
-    "  ressort modes my.mdl --decay 100:6,3000:0.8 -o wood.mdl\n";
-
 const char* const export_examples =
     "FAUST (faust.grame.fr) makes plugins, web pages and programs for boards of it. A slider for\n"
     "each parameter, the preset's range where there is one; input and output N of the model are\n"
@@ -110,18 +100,6 @@ const char* const export_examples =
     "Examples:\n"
     "  ressort export PolyTriangle --to faust -o triangle.dsp\n"
     "  faust2jaqt triangle.dsp && ./triangle\n";
-
-// A number within a range; what is no number is in none.
-CLI::Validator within(double least, double most) {
-  const std::string range = print_number(least) + " to " + print_number(most);
-  return {[=](std::string& text) {
-            double number = 0.0;
-            return parse_number(text, number) && number >= least && number <= most
-                       ? std::string()
-                       : "must be " + range + ", found " + text;
-          },
-          range};
-}
 
 // One of a few words.
 template <class T>
@@ -227,25 +205,6 @@ void add_keys(CLI::App& command, KeyOptions& keys) {
 void add_force(CLI::App& command, bool& force) {
   command.add_flag("--force", force,
                    "play a model that is not stable all the same; what runs away fades out");
-}
-
-void add_overwrite(CLI::App& command, bool& force) {
-  command.add_flag("--force", force, "write over a file that is there");
-}
-
-// What the last argument of a mass means, for every command that reads a model.
-void add_motion(CLI::App& command, std::optional<ThirdArgument>& third) {
-  command
-      .add_option_function<std::string>(
-          "--motion",
-          [&third](const std::string& word) {
-            third = word == "velocity" ? ThirdArgument::velocity_per_second
-                                       : ThirdArgument::delayed_position;
-          },
-          "what the last argument of a mass means: velocity, in units per second, or delayed, the\n"
-          "position one sample before; without it, what the preset or the model says or shows")
-      ->check(CLI::IsMember({"velocity", "delayed"}))
-      ->type_name("WORD");
 }
 
 void add_play(CLI::App& app, PlayOptions& options, int& code) {
@@ -497,58 +456,6 @@ void add_check(CLI::App& app, CheckOptions& options, int& code) {
   add_budget(*command, options.budget);
   add_strict(*command, options.is_strict);
   command->callback([&options, &code] { code = check(options); });
-}
-
-// "HZ:S", both numbers.
-DecayPoint decay_point(const std::string& text) {
-  const std::size_t colon = text.find(':');
-  DecayPoint point;
-  if (colon == std::string::npos || !parse_number(text.substr(0, colon), point.frequency_hz) ||
-      !parse_number(text.substr(colon + 1), point.t60_s)) {
-    throw CLI::ValidationError("--decay", "expected HZ:SECONDS, found '" + text + "'");
-  }
-  return point;
-}
-
-void add_modes(CLI::App& app, ModesOptions& options, int& code) {
-  CLI::App* command = app.add_subcommand(
-      "modes", "tells what a model can sound: frequency, decay, level and shape of its modes");
-  command->footer(modes_examples);
-  command->add_option("MODEL", options.name, "a preset's or a model's name, or a file")->required();
-  command
-      ->add_option("--modes", options.count,
-                   "how many of the lowest; without it all of a small model")
-      ->check(CLI::Range(1, 10000));
-  command->add_option("--rate", options.rate_hz, "the sample rate that they are played at, in Hz")
-      ->check(within(8000.0, 768000.0))
-      ->capture_default_str();
-  command->add_flag(
-      "--exact", options.is_continuous,
-      "of the continuous network, which presets with a budget are true to, instead of\n"
-      "the published scheme");
-  command->add_flag("--json", options.as_json, "for machines");
-  command->add_option("-o,--output", options.output,
-                      "an .svg of their shapes; with --tune or --decay the tuned .mdl");
-  command
-      ->add_option(
-          "--tune", options.frequencies_hz,
-          "frequencies in Hz for the lowest modes: springs are changed, each by itself and\n"
-          "all together as little as will do")
-      ->delimiter(',');
-  command
-      ->add_option_function<std::vector<std::string>>(
-          "--decay",
-          [&options](const std::vector<std::string>& texts) {
-            for (const std::string& text : texts) {
-              options.decay.push_back(decay_point(text));
-            }
-          },
-          "T60 at one or more frequencies, HZ:SECONDS: dampers are put on all that moves, so that\n"
-          "modes decay by a + b f^2, whatever their shape")
-      ->delimiter(',');
-  add_overwrite(*command, options.force);
-  add_motion(*command, options.third);
-  command->callback([&options, &code] { code = modes_command(options); });
 }
 
 void add_chart(CLI::App& app, ChartOptions& options, int& code) {

@@ -6,9 +6,9 @@
 #include <utility>
 #include <vector>
 
+#include "app/commands/modes/layout.h"
 #include "app/session/modes/known_modes.h"
 #include "app/text.h"
-#include "core/model/topology.h"
 
 namespace ressort {
 namespace {
@@ -20,74 +20,11 @@ constexpr double margin = 14.0;
 constexpr std::size_t columns = 4;
 constexpr std::size_t most_dots = 900;  // of a panel
 
-struct Point {
-  double x = 0.0;
-  double y = 0.0;
-  std::uint32_t mass = 0;  // of the network without macros
-};
-
-// Where a network's masses are: in the plane, or in rows that follow each other.
-struct Layout {
-  bool is_plane = false;
-  std::vector<std::vector<Point>> rows;
-};
-
 std::string number(double value) {
   char text[32];
   std::snprintf(text, sizeof text, "%.1f", value);
   return text;
 }
-
-class LayoutMaker {
- public:
-  explicit LayoutMaker(const Network& network) : network_(network) {}
-
-  Layout make() {
-    Layout layout;
-    std::vector<Point> loose;
-    bool are_drawn = true;
-    for (std::uint32_t i = 0; i < network_.masses.size(); ++i) {
-      const Mass& mass = network_.masses[i];
-      if (mass.kind == MassKind::point || mass.kind == MassKind::position) {
-        continue;
-      }
-      are_drawn = are_drawn && mass.drawing > 0;
-      const double order = static_cast<double>(loose.size());
-      loose.push_back(mass.drawing > 0 ? Point{network_.drawings[mass.drawing - 1].x,
-                                               network_.drawings[mass.drawing - 1].y, i}
-                                       : Point{order, 0.0, i});
-    }
-    const bool has_mesh = std::any_of(network_.macros.begin(), network_.macros.end(),
-                                      [](const Macro& macro) { return is_mesh(macro.kind); });
-    layout.is_plane = has_mesh || (!loose.empty() && are_drawn && network_.macros.empty());
-    if (!layout.is_plane) {
-      for (std::size_t i = 0; i < loose.size(); ++i) {
-        loose[i].x = static_cast<double>(i);
-        loose[i].y = 0.0;
-      }
-    }
-    if (!loose.empty()) {
-      layout.rows.push_back(std::move(loose));
-    }
-    auto first = static_cast<std::uint32_t>(network_.masses.size());
-    double top = 0.0;
-    for (const Macro& macro : network_.macros) {
-      std::vector<Point>& row = layout.rows.emplace_back();
-      for (std::uint32_t i = 0; i < macro.length; ++i) {
-        for (std::uint32_t j = 0; j < macro.width; ++j) {
-          row.push_back(
-              {static_cast<double>(i), top + static_cast<double>(j), first + i * macro.width + j});
-        }
-      }
-      first += macro.length * macro.width;
-      top += static_cast<double>(macro.width) + 1.0;
-    }
-    return layout;
-  }
-
- private:
-  const Network& network_;
-};
 
 // Of one panel.
 class PanelDrawer {
@@ -95,7 +32,7 @@ class PanelDrawer {
   PanelDrawer(const Layout& layout, const std::vector<double>& displacement)
       : layout_(layout), displacement_(displacement) {
     for (const auto& row : layout.rows) {
-      for (const Point& point : row) {
+      for (const LayoutPoint& point : row) {
         left_ = std::min(left_, point.x);
         right_ = std::max(right_, point.x);
         low_ = std::min(low_, point.y);
@@ -109,7 +46,7 @@ class PanelDrawer {
   std::string draw() const { return layout_.is_plane ? plane() : lines(); }
 
  private:
-  double share(const Point& point) const {
+  double share(const LayoutPoint& point) const {
     return most_ > 0.0 ? displacement_[point.mass] / most_ : 0.0;
   }
 
@@ -124,7 +61,7 @@ class PanelDrawer {
     const double largest = std::clamp(0.6 * std::sqrt(area), 2.0, 9.0);
     std::string svg;
     for (const auto& row : layout_.rows) {
-      for (const Point& point : row) {
+      for (const LayoutPoint& point : row) {
         const bool is_shown = every == 1 || (static_cast<std::size_t>(point.x) % every == 0 &&
                                              static_cast<std::size_t>(point.y) % every == 0);
         if (!is_shown) {
@@ -151,7 +88,7 @@ class PanelDrawer {
     const double height = (panel_height - caption - margin) / rows;
     std::string svg;
     for (std::size_t r = 0; r < layout_.rows.size(); ++r) {
-      const std::vector<Point>& row = layout_.rows[r];
+      const std::vector<LayoutPoint>& row = layout_.rows[r];
       const double middle = 8.0 + height * (static_cast<double>(r) + 0.5);
       const double step =
           (panel_width - 2.0 * margin) / std::max(1.0, static_cast<double>(row.size() - 1));
@@ -197,7 +134,7 @@ std::string escaped(const std::string& text) {
 
 std::string shapes_svg(const NetworkModes& modes, const Network& network,
                        const std::string& title) {
-  const Layout layout = LayoutMaker(network).make();
+  const Layout layout = layout_of(network);
   const std::size_t count = std::min(modes.modes.size(), most_drawn_modes);
   const std::size_t rows = (count + columns - 1) / columns;
   constexpr double head = 34.0;

@@ -3,14 +3,13 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
-#include <cstdint>
-#include <cstdio>
 #include <filesystem>
 #include <limits>
 #include <nlohmann/json.hpp>
 #include <optional>
 
 #include "app/session/files.h"
+#include "app/session/modes/tuned_files.h"
 #include "app/text.h"
 #include "app/version.h"
 #include "core/model/language/expression.h"
@@ -24,20 +23,6 @@ using nlohmann::json;
 constexpr double worth_keeping_s = 0.2;
 constexpr std::size_t most_kept_bytes = std::size_t{64} << 20;
 constexpr double endless = std::numeric_limits<double>::infinity();
-
-// FNV-1a
-std::string digest(const std::string& text) {
-  std::string out;
-  for (std::uint64_t hash : {0xcbf29ce484222325u, 0x9ae16a3b2f90404fu}) {
-    for (const char c : text) {
-      hash = (hash ^ static_cast<unsigned char>(c)) * 0x100000001b3u;
-    }
-    char digits[20];
-    std::snprintf(digits, sizeof digits, "%016llx", static_cast<unsigned long long>(hash));
-    out += digits;
-  }
-  return out;
-}
 
 // Where the modes of this very network are kept, if anywhere.
 std::string place_of(const Scene& scene, const std::vector<double>& parameters,
@@ -186,6 +171,27 @@ std::string note_name(double frequency_hz) {
   const auto cents = static_cast<int>(std::lround(100.0 * (key - nearest)));
   return std::string(names[(nearest % 12 + 12) % 12]) + std::to_string(nearest / 12 - 1) +
          (cents < 0 ? " -" : " +") + std::to_string(std::abs(cents));
+}
+
+std::optional<double> frequency_of(const std::string& text) {
+  constexpr std::string_view letters = "C D EF G A B";  // by their semitones
+  double hertz = 0.0;
+  if (parse_number(text, hertz)) {
+    return hertz > 0.0 ? std::optional(hertz) : std::nullopt;
+  }
+  const std::size_t letter =
+      text.empty() || text[0] == ' ' ? std::string_view::npos : letters.find(text[0] & ~0x20);
+  std::size_t at = 1;
+  double semitone = static_cast<double>(letter);
+  for (; at < text.size() && (text[at] == '#' || text[at] == 'b'); ++at) {
+    semitone += text[at] == '#' ? 1.0 : -1.0;
+  }
+  double octave = 0.0;
+  if (letter == std::string_view::npos || !parse_number(text.substr(at), octave) ||
+      octave != std::rint(octave)) {
+    return std::nullopt;
+  }
+  return 440.0 * std::exp2((semitone - 9.0) / 12.0 + octave - 4.0);
 }
 
 std::string to_table(const KnownModes& modes) {

@@ -1,6 +1,7 @@
 // app/session: the modes of a scene as people and programs read them, kept for the next time.
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -50,5 +51,8 @@ std::string to_table(const KnownModes& modes);
 
 // "A4 +3": the nearest note of A4 = 440 Hz and how many cents it is from there.
 std::string note_name(double frequency_hz);
+
+// Of "A4", "Bb2", "C#5" or a number of Hz above 0; nothing for any other text.
+std::optional<double> frequency_of(const std::string& text);
 
 }  // namespace ressort
