@@ -64,7 +64,7 @@ const std::string two_strings =
 std::vector<double> played(const PlacedModes& modes, std::size_t from, std::size_t to,
                            std::size_t frames, double rate_hz) {
   std::vector<double> sound(frames, 0.0);
-  for (const BodyMode& mode : modes.modes) {
+  for (const PlacedMode& mode : modes.modes) {
     const double r = std::pow(10.0, -3.0 / (rate_hz * mode.t60_s));
     const double turn = 2.0 * r * std::cos(2.0 * std::numbers::pi * mode.frequency_hz / rate_hz);
     long double before = 0.0L;
@@ -253,7 +253,7 @@ TEST_CASE("a chain answers at its first mass as a place of a body does", "[tune_
     const NetworkModes found = modes_of(network);
     REQUIRE(found.modes.size() == count);
     std::sort(body.modes.begin(), body.modes.end(),
-              [](const BodyMode& a, const BodyMode& b) { return a.frequency_hz < b.frequency_hz; });
+              [](const PlacedMode& a, const PlacedMode& b) { return a.frequency_hz < b.frequency_hz; });
     for (std::size_t i = 0; i < count; ++i) {
       INFO("mode " << i << ": " << body.modes[i].frequency_hz << " Hz");
       CHECK(std::fabs(found.modes[i].frequency_hz - body.modes[i].frequency_hz) < 1e-6);

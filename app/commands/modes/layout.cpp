@@ -32,8 +32,8 @@ class LayoutMaker {
  public:
   explicit LayoutMaker(const Network& network) : network_(network) {}
 
-  Layout make() {
-    Layout layout;
+  MassLayout make() {
+    MassLayout layout;
     std::vector<LayoutPoint> loose;
     bool are_drawn = network_.macros.empty();
     for (std::uint32_t i = 0; i < network_.masses.size(); ++i) {
@@ -127,8 +127,9 @@ class LayoutMaker {
     const double unit = std::sqrt(static_cast<double>(size));
     for (LayoutPoint& point : points) {
       const auto at = static_cast<std::size_t>(row[point.mass]);
-      point.x = unit * along[at] / largest(along);
-      point.y = unit * scale * beside[at] / largest(beside);
+      // Of a mesh the vectors are cosines; its masses are as far apart everywhere.
+      point.x = unit * std::asin(along[at] / largest(along));
+      point.y = unit * scale * std::asin(beside[at] / largest(beside));
     }
     return true;
   }
@@ -156,7 +157,7 @@ class LayoutMaker {
 
 }  // namespace
 
-Layout layout_of(const Network& network) {
+MassLayout layout_of(const Network& network) {
   return LayoutMaker(network).make();
 }
 

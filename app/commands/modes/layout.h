@@ -15,7 +15,7 @@ struct LayoutPoint {
 };
 
 // In the plane, or in rows that follow each other.
-struct Layout {
+struct MassLayout {
   bool is_plane = false;
   std::vector<std::vector<LayoutPoint>> rows;
 };
@@ -23,6 +23,6 @@ struct Layout {
 // As the model draws its masses, and its meshes as rectangles; where nothing is drawn, as the links
 // pull them apart: by the two lowest vectors of the graph's Laplacian; a chain as a row, and what
 // is none of these in the order of its lines. Of a network as it is written. [any thread but audio]
-Layout layout_of(const Network& network);
+MassLayout layout_of(const Network& network);
 
 }  // namespace ressort

@@ -37,6 +37,11 @@ Result<Done> tune(Scene& scene, const std::vector<double>& parameters, const Mod
     if (!tuned) {
       return tuned.error();
     }
+    if (!scene.network.macros.empty() && tuned->macros.empty() && !scene.network.taps.empty()) {
+      std::fprintf(stderr,
+                   "strings and meshes are written out mass by mass; inputs and outputs "
+                   "between their masses are at the nearest one\n");
+    }
     scene.network = *std::move(tuned);
   }
   return Done{};

@@ -29,7 +29,7 @@ std::string number(double value) {
 // Of one panel.
 class PanelDrawer {
  public:
-  PanelDrawer(const Layout& layout, const std::vector<double>& displacement)
+  PanelDrawer(const MassLayout& layout, const std::vector<double>& displacement)
       : layout_(layout), displacement_(displacement) {
     for (const auto& row : layout.rows) {
       for (const LayoutPoint& point : row) {
@@ -52,7 +52,7 @@ class PanelDrawer {
 
   std::string plane() const {
     const double width = panel_width - 2.0 * margin;
-    const double height = panel_height - caption - margin;
+    const double height = panel_height - caption - 2.0 * margin;
     const double scale =
         std::min(width / std::max(1.0, right_ - left_), height / std::max(1.0, high_ - low_));
     const std::size_t every =
@@ -68,7 +68,7 @@ class PanelDrawer {
           continue;
         }
         const double x = margin + 0.5 * width + (point.x - 0.5 * (left_ + right_)) * scale;
-        const double y = 0.5 * height + 8.0 + (point.y - 0.5 * (low_ + high_)) * scale;
+        const double y = 0.5 * height + margin + (point.y - 0.5 * (low_ + high_)) * scale;
         const double part = share(point);
         const double size = std::max(0.8, largest * std::sqrt(std::fabs(part)));
         svg += "<circle cx='" + number(x) + "' cy='" + number(y) + "' r='" + number(size) +
@@ -112,7 +112,7 @@ class PanelDrawer {
     return svg;
   }
 
-  const Layout& layout_;
+  const MassLayout& layout_;
   const std::vector<double>& displacement_;  // [mass]
   double left_ = 1e300;
   double right_ = -1e300;
@@ -134,7 +134,7 @@ std::string escaped(const std::string& text) {
 
 std::string shapes_svg(const NetworkModes& modes, const Network& network,
                        const std::string& title) {
-  const Layout layout = layout_of(network);
+  const MassLayout layout = layout_of(network);
   const std::size_t count = std::min(modes.modes.size(), most_drawn_modes);
   const std::size_t rows = (count + columns - 1) / columns;
   constexpr double head = 34.0;

@@ -22,7 +22,7 @@ double rate_of(const NetworkModes& modes) {
 }
 
 // Springs and dampers in a mode that swings alone, so that it has its pole in the published scheme.
-struct Pair {
+struct PolePair {
   double k = 0.0;
   double z = 0.0;
 };
@@ -41,13 +41,13 @@ double stiffness_of(double angle, double z) {
 }
 
 // The line z = a + b k nearest to all, by the share that each is off; neither below 0.
-Pair nearest_line(const std::vector<Pair>& pairs) {
+PolePair nearest_line(const std::vector<PolePair>& pairs) {
   double ww = 0.0;
   double wk = 0.0;
   double kk = 0.0;
   double wz = 0.0;
   double kz = 0.0;
-  for (const Pair& pair : pairs) {
+  for (const PolePair& pair : pairs) {
     const double w = pair.z > 0.0 ? 1.0 / (pair.z * pair.z) : 0.0;
     ww += w;
     wk += w * pair.k;
@@ -59,7 +59,7 @@ Pair nearest_line(const std::vector<Pair>& pairs) {
   if (!(ww > 0.0)) {
     return {};
   }
-  Pair line{.k = 0.0, .z = wz / ww};
+  PolePair line{.k = 0.0, .z = wz / ww};
   if (area > 1e-12 * ww * kk) {
     line = {.k = (ww * kz - wk * wz) / area, .z = (kk * wz - wk * kz) / area};
     if (line.k < 0.0) {
@@ -172,7 +172,7 @@ PlacedModes placed_modes(const NetworkModes& modes) {
     if (mode.frequency_hz > highest_share * rate_of(modes)) {
       continue;
     }
-    BodyMode& placed = out.modes.emplace_back(BodyMode{mode.frequency_hz, mode.t60_s, {}});
+    PlacedMode& placed = out.modes.emplace_back(PlacedMode{mode.frequency_hz, mode.t60_s, {}});
     for (const std::uint32_t mass : masses) {
       std::complex<double> sum;
       each_share(network, mass, [&](std::uint32_t node, double share) {
@@ -185,7 +185,7 @@ PlacedModes placed_modes(const NetworkModes& modes) {
       out.left_out = std::max(out.left_out, std::fabs(sum.imag()) / (1e-300 + std::abs(sum)));
     }
   }
-  std::erase_if(out.modes, [&](const BodyMode& mode) {
+  std::erase_if(out.modes, [&](const PlacedMode& mode) {
     return std::all_of(mode.displacement.begin(), mode.displacement.end(),
                        [&](double d) { return std::fabs(d) <= faint * largest; });
   });
@@ -199,7 +199,7 @@ std::string body_text(const PlacedModes& modes) {
   }
   text += "\n";
   for (std::size_t i = 0; i < modes.modes.size(); ++i) {
-    const BodyMode& mode = modes.modes[i];
+    const PlacedMode& mode = modes.modes[i];
     text += "@" + modes.name + std::to_string(i + 1) + " mode @" + modes.name + " " +
             print_number(mode.frequency_hz) + " " +
             print_number(std::min(mode.t60_s, endless_t60_s));
@@ -211,7 +211,7 @@ std::string body_text(const PlacedModes& modes) {
   return text;
 }
 
-Result<Chain> chain_of(const PlacedModes& modes, std::string_view place) {
+Result<ModalChain> chain_of(const PlacedModes& modes, std::string_view place) {
   constexpr double rate_hz = Network::reference_rate_hz;
   const auto at = std::find(modes.places.begin(), modes.places.end(), place);
   if (at == modes.places.end()) {
@@ -223,11 +223,11 @@ Result<Chain> chain_of(const PlacedModes& modes, std::string_view place) {
   }
   const auto column = static_cast<std::size_t>(at - modes.places.begin());
   double most = 0.0;
-  for (const BodyMode& mode : modes.modes) {
+  for (const PlacedMode& mode : modes.modes) {
     most = std::max(most, std::fabs(mode.displacement[column]));
   }
-  std::vector<const BodyMode*> heard;
-  for (const BodyMode& mode : modes.modes) {
+  std::vector<const PlacedMode*> heard;
+  for (const PlacedMode& mode : modes.modes) {
     if (std::fabs(mode.displacement[column]) > faint * most) {
       if (!(mode.frequency_hz > 0.0 && mode.frequency_hz < 0.5 * rate_hz)) {
         return Error{"a mode of " + print_number(mode.frequency_hz) +
@@ -239,19 +239,19 @@ Result<Chain> chain_of(const PlacedModes& modes, std::string_view place) {
   if (heard.empty()) {
     return Error{"no mode moves the place '" + std::string(place) + "'"};
   }
-  const auto angle = [](const BodyMode& mode) {
+  const auto angle = [](const PlacedMode& mode) {
     return 2.0 * std::numbers::pi * mode.frequency_hz / rate_hz;
   };
-  std::vector<Pair> pairs;
-  for (const BodyMode* const mode : heard) {
+  std::vector<PolePair> pairs;
+  for (const PlacedMode* const mode : heard) {
     const double z = damping_of(mode->t60_s, rate_hz);
     pairs.push_back({stiffness_of(angle(*mode), z), z});
   }
-  const Pair line = nearest_line(pairs);
+  const PolePair line = nearest_line(pairs);
   // The stiffness with which the damper that there will be gives the frequency that there was.
   Vector values(heard.size());
   Vector start(heard.size());
-  Chain chain;
+  ModalChain chain;
   for (std::size_t i = 0; i < heard.size(); ++i) {
     double z = pairs[i].z;
     double k = pairs[i].k;

@@ -14,7 +14,7 @@ namespace ressort {
 
 // Modes as a `body` of the language has them: each swings alone as a mass of `mass` that all places
 // push and hear by their displacements.
-struct BodyMode {
+struct PlacedMode {
   double frequency_hz = 0.0;         // of the damped pole
   double t60_s = 0.0;                // infinity: nothing damps it
   std::vector<double> displacement;  // [place]
@@ -24,7 +24,7 @@ struct PlacedModes {
   std::string name = "body";
   double mass = 1.0;
   std::vector<std::string> places;
-  std::vector<BodyMode> modes;
+  std::vector<PlacedMode> modes;
   // The largest imaginary share of a displacement that had to be left out: where damping is not
   // proportional places swing at different times, and a mode of a body cannot.
   double left_out = 0.0;
@@ -40,7 +40,7 @@ std::string body_text(const PlacedModes& modes);
 
 // A chain whose first mass answers as the place does: `network` has masses NAME_m0, NAME_m1...,
 // springs between neighbours and one from the first to a ground, at rest.
-struct Chain {
+struct ModalChain {
   Network network;
   double worst_t60_percent = 0.0;  // of all modes
 };
@@ -50,6 +50,6 @@ struct Chain {
 // neighbours, the nearest to the modes' decays. Modes that the place does not move are left out.
 // Fails where it moves none, where two that it moves have one frequency, or a frequency is none of
 // the scheme's.
-Result<Chain> chain_of(const PlacedModes& modes, std::string_view place);
+Result<ModalChain> chain_of(const PlacedModes& modes, std::string_view place);
 
 }  // namespace ressort

@@ -25,10 +25,10 @@ std::string hertz(double frequency_hz) {
 }
 
 // The modes of one network while its lines' factors change.
-class Tuner {
+class ModeTuner {
  public:
-  Tuner(const Network& network, std::span<const double> parameters, std::string_view part,
-        const ModeOptions& options)
+  ModeTuner(const Network& network, std::span<const double> parameters, std::string_view part,
+            const ModeOptions& options)
       : options_(options),
         e_(scheme_e(options.scheme)),
         rate_hz_(Network::reference_rate_hz / scheme_step(options)) {
@@ -138,7 +138,7 @@ double likeness(const ComplexVector& a, const ComplexVector& b) {
 
 Result<Tuned> tune_mode(const Network& network, std::span<const double> parameters,
                         const TuneTarget& target, const ModeOptions& options) {
-  Tuner tuner(network, parameters, target.part, options);
+  ModeTuner tuner(network, parameters, target.part, options);
   if (tuner.failure()) {
     return *tuner.failure();
   }
@@ -165,7 +165,7 @@ Result<Tuned> tune_mode(const Network& network, std::span<const double> paramete
     }
     Complex by_k;
     Complex by_z;
-    const Tuner::Slopes slopes = tuner.slopes(swing);
+    const ModeTuner::Slopes slopes = tuner.slopes(swing);
     for (std::size_t i = 0; i < tuner.lines().size(); ++i) {
       by_k += slopes.stiffness[i];
       by_z += slopes.damping[i];
@@ -211,6 +211,16 @@ Result<Network> tune_modes(const Network& network, std::span<const double> param
   const std::size_t count = frequencies_hz.size();
   const auto lines = spring_lines(network);
   if (lines->size() < count && !network.macros.empty()) {
+    const auto is_place = [&](std::uint32_t mass) {
+      return network.masses[mass].kind == MassKind::point;
+    };
+    if (std::any_of(network.links.begin(), network.links.end(),
+                    [&](const Link& link) { return is_place(link.a) || is_place(link.b); })) {
+      return Error{"the model has " + std::to_string(lines->size()) + " lines of springs for " +
+                   std::to_string(count) +
+                   " frequencies, and its strings and meshes cannot be written out mass by mass, "
+                   "as links hold them between their masses"};
+    }
     return tune_modes(canonical(expand_macros(network)), parameters, frequencies_hz, options);
   }
   if (!std::is_sorted(frequencies_hz.begin(), frequencies_hz.end()) ||
@@ -218,7 +228,7 @@ Result<Network> tune_modes(const Network& network, std::span<const double> param
                   [](double hz) { return !(hz > 0.0); })) {
     return Error{"expected frequencies above 0 Hz, the lowest first"};
   }
-  Tuner tuner(network, parameters, "", options);
+  ModeTuner tuner(network, parameters, "", options);
   if (tuner.failure()) {
     return *tuner.failure();
   }
@@ -248,7 +258,7 @@ Result<Network> tune_modes(const Network& network, std::span<const double> param
     }
     Matrix slopes(count, springs);
     for (std::size_t i = 0; i < count; ++i) {
-      const Tuner::Slopes of = tuner.slopes(tuner.swings[i]);
+      const ModeTuner::Slopes of = tuner.slopes(tuner.swings[i]);
       const double angle = tuner.pole(tuner.swings[i]).imag();
       for (std::size_t j = 0; j < springs; ++j) {
         slopes(i, j) = of.stiffness[j].imag() / angle;

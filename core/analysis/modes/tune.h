@@ -35,7 +35,8 @@ Result<Tuned> tune_mode(const Network& network, std::span<const double> paramete
 
 // The network with other springs, so that its lowest modes have these frequencies in Hz, ascending:
 // each line's springs get a factor of their own, those nearest to 1 that do it. Where a model has
-// fewer lines than frequencies its macros are written out first. Gauss-Newton: a frequency grows
+// fewer lines than frequencies its macros are written out first, where no link
+// holds them by a place. Gauss-Newton: a frequency grows
 // with a spring's stiffness as the square of what the mode stretches it by. Dampers stay. Fails
 // where that does not lead there. [any thread but audio]
 Result<Network> tune_modes(const Network& network, std::span<const double> parameters,
