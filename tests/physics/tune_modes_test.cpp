@@ -153,8 +153,8 @@ TEST_CASE("springs are found for a list of frequencies", "[tune_modes]") {
 }
 
 TEST_CASE("a harmonic series from a string that is one line", "[tune_modes]") {
-  const Network network =
-      network_of("@s string 12 1. 0.05 0.0001 0. 0.\n@in1 frcInput @s\n@out1 posOutput @s\n");
+  const Network network = network_of(
+      "@s string 12 1. 0.05 0.0001 0. 0.\n@in1 frcInput [@s 0.3]\n@out1 posOutput [@s 0.6]\n");
   const std::vector<double> wanted = {220.0, 440.0, 660.0};
   const auto tuned = tune_modes(network, {}, wanted, {});
   INFO((tuned ? "" : tuned.error().message));
@@ -252,8 +252,9 @@ TEST_CASE("a chain answers at its first mass as a place of a body does", "[tune_
     network.outputs = {{.number = 1, .mass = 0}};
     const NetworkModes found = modes_of(network);
     REQUIRE(found.modes.size() == count);
-    std::sort(body.modes.begin(), body.modes.end(),
-              [](const PlacedMode& a, const PlacedMode& b) { return a.frequency_hz < b.frequency_hz; });
+    std::sort(body.modes.begin(), body.modes.end(), [](const PlacedMode& a, const PlacedMode& b) {
+      return a.frequency_hz < b.frequency_hz;
+    });
     for (std::size_t i = 0; i < count; ++i) {
       INFO("mode " << i << ": " << body.modes[i].frequency_hz << " Hz");
       CHECK(std::fabs(found.modes[i].frequency_hz - body.modes[i].frequency_hz) < 1e-6);

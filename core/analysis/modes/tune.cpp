@@ -16,7 +16,8 @@ namespace {
 using Complex = std::complex<double>;
 
 constexpr double near_enough = 1e-9;  // of a frequency, and of a decay
-constexpr int most_steps = 200;
+constexpr int most_steps = 300;
+constexpr int most_stalls = 12;
 
 std::string hertz(double frequency_hz) {
   char text[40];
@@ -252,6 +253,7 @@ Result<Network> tune_modes(const Network& network, std::span<const double> param
   if (!distance) {
     return Error{"the model has fewer than " + std::to_string(count) + " modes"};
   }
+  int stalls = 0;
   for (int step = 0; step < most_steps; ++step) {
     if (largest(*distance) < near_enough) {
       return scaled(network, tuner.lines(), tuner.stiffness, tuner.damping);
@@ -302,7 +304,18 @@ Result<Network> tune_modes(const Network& network, std::span<const double> param
       }
     }
     if (!better) {
-      break;
+      // Two modes that are nearly one turn into each other: from a little aside they do not.
+      if (++stalls > most_stalls) {
+        break;
+      }
+      for (std::size_t s = 0; s < springs; ++s) {
+        logarithms[s] =
+            before[s] + 0.01 * stalls * std::sin(12.9898 * static_cast<double>(s + 1) * stalls);
+      }
+      better = off();
+      if (!better) {
+        break;
+      }
     }
     distance = std::move(better);
   }

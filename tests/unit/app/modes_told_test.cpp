@@ -48,7 +48,7 @@ TEST_CASE("a mode is tuned, taken back and kept", "[modes_told]") {
   const CachedData folder;
   Harness harness;
   const std::string path = folder.written("mine.mdl", string_text);
-  CHECK(harness.say("modes").find("nothing") != std::string::npos);
+  CHECK(harness.say("modes").find("no model is loaded") != std::string::npos);
   harness.say("load " + path);
   const std::string before = harness.say("modes 3");
   CHECK(before.find("178.7") != std::string::npos);
