@@ -15,7 +15,7 @@ namespace {
 
 using Complex = std::complex<double>;
 
-constexpr int most_rounds = 8;
+constexpr int most_rounds = 20;
 
 ComplexVector product_of(const SparseMatrix& lower, const ComplexVector& x) {
   Vector re(x.size());
@@ -219,7 +219,8 @@ class LowestSwings {
           correct(left);
         }
       }
-      if (is_right || round == most_rounds || basis_.size() == rows) {
+      if (is_right || round == most_rounds || basis_.size() == rows ||
+          basis_.size() > 8 * count + 400) {
         return *std::move(swings);
       }
     }
