@@ -10,9 +10,11 @@
 #include <vector>
 
 #include "app/commands/check.h"
+#include "app/commands/command_line.h"
 #include "app/commands/commands.h"
 #include "app/commands/export.h"
 #include "app/commands/make.h"
+#include "app/commands/modes/modes_line.h"
 #include "app/commands/reference.h"
 #include "app/commands/smf/midi_file.h"
 #include "app/commands/start_chart.h"
@@ -98,18 +100,6 @@ const char* const export_examples =
     "Examples:\n"
     "  ressort export PolyTriangle --to faust -o triangle.dsp\n"
     "  faust2jaqt triangle.dsp && ./triangle\n";
-
-// A number within a range; what is no number is in none.
-CLI::Validator within(double least, double most) {
-  const std::string range = print_number(least) + " to " + print_number(most);
-  return {[=](std::string& text) {
-            double number = 0.0;
-            return parse_number(text, number) && number >= least && number <= most
-                       ? std::string()
-                       : "must be " + range + ", found " + text;
-          },
-          range};
-}
 
 // One of a few words.
 template <class T>
@@ -215,25 +205,6 @@ void add_keys(CLI::App& command, KeyOptions& keys) {
 void add_force(CLI::App& command, bool& force) {
   command.add_flag("--force", force,
                    "play a model that is not stable all the same; what runs away fades out");
-}
-
-void add_overwrite(CLI::App& command, bool& force) {
-  command.add_flag("--force", force, "write over a file that is there");
-}
-
-// What the last argument of a mass means, for every command that reads a model.
-void add_motion(CLI::App& command, std::optional<ThirdArgument>& third) {
-  command
-      .add_option_function<std::string>(
-          "--motion",
-          [&third](const std::string& word) {
-            third = word == "velocity" ? ThirdArgument::velocity_per_second
-                                       : ThirdArgument::delayed_position;
-          },
-          "what the last argument of a mass means: velocity, in units per second, or delayed, the\n"
-          "position one sample before; without it, what the preset or the model says or shows")
-      ->check(CLI::IsMember({"velocity", "delayed"}))
-      ->type_name("WORD");
 }
 
 void add_play(CLI::App& app, PlayOptions& options, int& code) {
@@ -545,6 +516,7 @@ int run(int argc, char** argv) {
   RenderChoice render_choice;
   CheckOptions check_options;
   ExportOptions export_options;
+  ModesOptions modes_options;
   MakeOptions make_options;
   ChartOptions chart_options;
   std::vector<std::uint32_t> make_sizes;
@@ -554,6 +526,7 @@ int run(int argc, char** argv) {
   add_check(app, check_options, code);
   add_make(app, make_options, make_sizes, code);
   add_export(app, export_options, code);
+  add_modes(app, modes_options, code);
   add_chart(app, chart_options, code);
   add_reference(app, reference_part, code);
   try {

@@ -5,7 +5,7 @@ set(RESSORT_TURN 0 CACHE STRING "Which of the deep tests comes first")
 set(ressort_fuzzers model preset score midi smf scala console osc osc_packet)
 list(TRANSFORM ressort_fuzzers PREPEND fuzz_ OUTPUT_VARIABLE ressort_deep_tests)
 list(APPEND ressort_deep_tests arm everything_sanitized everything_more forms_everywhere
-  accuracy_everywhere silence_everywhere lint scenes_more abuse_long bows)
+  accuracy_everywhere silence_everywhere lint modes_everywhere scenes_more abuse_long bows)
 list(LENGTH ressort_deep_tests ressort_deep_count)
 
 # SECONDS is about what it needs on two cores.
@@ -36,6 +36,9 @@ add_deep_test(forms_everywhere 240 $<TARGET_FILE:ressort_tests> "[forms_everywhe
 # Two thousand random nonlinear scenes; a person may ask for others: FIRST,COUNT,FRAMES.
 add_deep_test(scenes_more 200 ${CMAKE_COMMAND} -E env RESSORT_SCENES=1001,2000,1024
   $<TARGET_FILE:ressort_tests> "[scenes]")
+
+# The modes of 208 random networks against their sound, and the lowest of a hundred thousand masses.
+add_deep_test(modes_everywhere 60 $<TARGET_FILE:ressort_tests> "[modes_everywhere]")
 
 # Budgets of pitch and decay on 300 random networks.
 add_deep_test(accuracy_everywhere 120 $<TARGET_FILE:ressort_tests> "[accuracy_everywhere]")

@@ -33,6 +33,10 @@ std::string meant_parameter(const Instrument& instrument, const std::string& wor
 // Carries out a command; the words have been counted.
 Result<Done> act(ConsoleContext& console, const Row& row, Words words);
 
+// What is said of modes at the console and by OSC: how many; MODE NOTE|HZ [T60] [PART].
+Result<std::size_t> mode_count(const Argument& argument);
+Result<TuneTarget> tune_target(std::span<const Argument> arguments);
+
 namespace command {
 Result<Done> keys(ConsoleContext& console, Words words);
 Result<Done> load(ConsoleContext& console, Words words);
@@ -48,6 +52,8 @@ Result<Done> get(ConsoleContext& console, Words words);
 Result<Done> set(ConsoleContext& console, Words words);
 Result<Done> status(ConsoleContext& console, Words words);
 Result<Done> explain(ConsoleContext& console, Words words);
+Result<Done> modes(ConsoleContext& console, Words words);
+Result<Done> tune(ConsoleContext& console, Words words);
 Result<Done> tuning(ConsoleContext& console, Words words);
 Result<Done> record(ConsoleContext& console, Words words);
 Result<Done> help(ConsoleContext& console, Words words);

@@ -264,6 +264,29 @@ std::vector<Row> make_rows() {
        .group = CommandGroup::looking,
        .command_does = "tells how the model is computed and what plays it",
        .act = command::explain},
+      {.address = "/modes",
+       .arguments = {{"COUNT", "how many modes", 1, 10000, 32}},
+       .does = "answers number, frequency, T60 and levels of the lowest modes, then their number",
+       .answer = answer::modes,
+       .command = "modes",
+       .group = CommandGroup::looking,
+       .words = "[COUNT]",
+       .command_does = "lists the lowest modes: frequency, note, T60 and level",
+       .details = "Levels are in dB below the loudest. Of the model as its parameters are now, at "
+                  "the pitch that it\nis written with.",
+       .act = command::modes},
+      {.address = "/tune",
+       .arguments = {{"MODE", "the mode", 1, 10000},
+                     {.word = "NOTE|HZ [T60] [PART]", .is_text = true}},
+       .does = "brings a mode to a pitch and a decay; answers /done or /fail",
+       .answer = answer::tune,
+       .command = "tune",
+       .group = CommandGroup::parameters,
+       .words = "MODE NOTE|HZ [T60] [PART]",
+       .details = "Stiffness, and with a T60 in seconds damping, is scaled in all of the model, or "
+                  "in what hangs\ntogether with a mass, string, mesh or link by its name. 'modes' "
+                  "lists the modes; 'undo' takes\nit back, 'save NAME' keeps it.",
+       .act = command::tune},
       {.address = "/subscribe",
        .arguments = {{"SECONDS", "the seconds", 0, Subscribers::longest_lease_s, 10}},
        .does =
@@ -320,7 +343,8 @@ std::vector<Row> make_rows() {
 constexpr std::string_view answers[] = {"/error",        "/done",           "/fail",
                                         "/status.reply", "/describe.reply", "/describe.end",
                                         "/models.reply", "/models.end",     "/presets.reply",
-                                        "/presets.end",  "/loaded",         "/subscribe.reply"};
+                                        "/presets.end",  "/loaded",         "/subscribe.reply",
+                                        "/modes.reply",  "/modes.end"};
 
 // What stands before and after N or NAME; `hole` is empty where there is none.
 struct Pattern {

@@ -265,14 +265,26 @@ std::string models_folder() {
   return (data_folder() / "models").string();
 }
 
-std::string user_folder() {
-  if (const char* given = std::getenv("XDG_DATA_HOME"); given != nullptr && *given == '/') {
+namespace {
+
+std::string folder_of(const char* variable, const fs::path& below_home) {
+  if (const char* given = std::getenv(variable); given != nullptr && *given == '/') {
     return (fs::path(given) / "ressort").string();
   }
   if (const char* home = std::getenv("HOME"); home != nullptr && *home == '/') {
-    return (fs::path(home) / ".local" / "share" / "ressort").string();
+    return (fs::path(home) / below_home / "ressort").string();
   }
   return "";
+}
+
+}  // namespace
+
+std::string user_folder() {
+  return folder_of("XDG_DATA_HOME", fs::path(".local") / "share");
+}
+
+std::string cache_folder() {
+  return folder_of("XDG_CACHE_HOME", ".cache");
 }
 
 Result<std::string> path_to_save(const std::string& name) {

@@ -51,6 +51,10 @@ std::string models_folder();
 // yet: with models and presets in it. Empty: nobody's home is known.
 std::string user_folder();
 
+// What can be computed again: ressort in $XDG_CACHE_HOME or in ~/.cache, which may not be there
+// yet. Empty: nobody's home is known.
+std::string cache_folder();
+
 // Where a preset of this name is to be saved, below the user's folder, which is made. The error
 // says why that cannot be, as for a name that is none: letters, digits, blanks and ._- but no . at
 // its beginning, 1 to 64 of them.

@@ -71,7 +71,8 @@ void Session::load(std::string name, Answer answer, bool force, Reach reach) {
   {
     const std::lock_guard lock(mutex_);
     if (!stop_) {
-      jobs_.push_back({Wish{std::move(name), force, reach}, std::move(answer)});
+      jobs_.push_back(
+          {Wish{.name = std::move(name), .force = force, .reach = reach}, std::move(answer)});
       wake_.notify_all();
       return;
     }
@@ -174,12 +175,19 @@ void Session::work() {
   using namespace std::chrono_literals;
   while (true) {
     std::deque<Job> jobs;
+    std::optional<ModesJob> modes_job;
     bool is_ending = false;
     bool wants_again = false;
     {
       std::unique_lock lock(mutex_);
-      wake_.wait_for(lock, 20ms, [this] { return stop_ || !jobs_.empty() || has_new_rate(); });
+      wake_.wait_for(lock, 20ms, [this] {
+        return stop_ || !jobs_.empty() || !modes_jobs_.empty() || has_new_rate();
+      });
       jobs.swap(jobs_);
+      if (jobs.empty() && !modes_jobs_.empty()) {
+        modes_job = std::move(modes_jobs_.front());
+        modes_jobs_.pop_front();
+      }
       is_ending = stop_;
       wants_again = has_new_rate();
     }
@@ -190,12 +198,18 @@ void Session::work() {
       jobs.pop_front();
     }
     if (is_ending) {
+      const std::lock_guard lock(mutex_);
+      for (const ModesJob& job : modes_jobs_) {
+        job.answer(Error{ending});
+      }
       return;
     }
     try {
       listen();
       if (!jobs.empty()) {
         do_load(jobs.front());
+      } else if (modes_job) {
+        do_modes(*modes_job);
       } else if (wants_again) {
         do_again();
       } else if (source_) {
@@ -353,9 +367,10 @@ void Session::do_load(const Job& job) {
       change.values.emplace_back(current_->instrument.parameters[i].name, values_[i]);
     }
   }
-  const auto result = build(job.wish);
+  const auto wish = job.wish.target ? write_tuned(*job.wish.target) : job.wish;
+  const auto result = wish ? build(*wish) : wish.error();
   if (result) {
-    scene_ = job.wish;
+    scene_ = *wish;
     scene_->lets_ring = false;  // not when it is compiled anew
     const std::lock_guard lock(mutex_);
     last_change_ = change.scene->empty() ? std::nullopt : std::optional(std::move(change));

@@ -16,6 +16,8 @@
 #include "app/realtime/process.h"
 #include "app/realtime/rate_limit.h"
 #include "app/session/loader.h"
+#include "app/session/modes/known_modes.h"
+#include "core/analysis/modes/tune.h"
 #include "core/compile/compile.h"
 
 namespace ressort {
@@ -86,6 +88,16 @@ class Session {
   // The same, waiting for it.
   Result<std::shared_ptr<const Loaded>> load_and_wait(const std::string& name, bool force = false);
 
+  // Brings a mode of what sounds to a frequency and a decay, and loads what came of it: a model of
+  // its own in the user's cache, and the preset as it is now. Taken back as a load is; save() keeps
+  // the model too. The same promises as load(). [any thread but audio]
+  void tune(TuneTarget target, Answer answer);
+
+  // Finds the lowest modes of what sounds, as it is now, in the worker, where `answer` is called;
+  // gives way to a load. [any thread but audio]
+  using ModesAnswer = std::function<void(const Result<KnownModes>&)>;
+  void find_modes(std::size_t count, ModesAnswer answer);
+
   // The backend runs at another rate: what sounds is compiled anew.
   void set_rate(double rate_hz);
 
@@ -144,12 +156,18 @@ class Session {
     std::string name;
     bool force = false;
     Reach reach = Reach::any_file;
-    bool lets_ring = false;  // what sounds until it ends by itself
+    bool lets_ring = false;            // what sounds until it ends by itself
+    std::optional<TuneTarget> target;  // of what sounds, which is loaded anew with it
   };
 
   struct Job {
     Wish wish;
     Answer answer;
+  };
+
+  struct ModesJob {
+    std::size_t count = 0;
+    ModesAnswer answer;
   };
 
   // What sounds, to be compiled once more with more patience.
@@ -162,6 +180,10 @@ class Session {
   void work();
   void do_load(const Job& job);
   void do_again();
+  void do_modes(const ModesJob& job);
+  Result<Wish> write_tuned(const TuneTarget& target);
+  // The preset of what sounds as it is now, with its model by another name.
+  Result<std::string> preset_text(const std::string& model) const;
   Result<std::shared_ptr<const Loaded>> build(const Wish& wish);
   Result<std::shared_ptr<const Loaded>> build_now(const Wish& wish, const Progress& progress);
   void improve();
@@ -186,6 +208,7 @@ class Session {
   mutable std::mutex mutex_;  // everything below; never near the audio thread
   std::condition_variable wake_;
   std::deque<Job> jobs_;
+  std::deque<ModesJob> modes_jobs_;
   bool stop_ = false;
   double rate_hz_;
   double built_rate_hz_;  // what sounds was made for, or was tried to be

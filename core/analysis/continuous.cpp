@@ -5,6 +5,7 @@
 #include <numbers>
 #include <utility>
 
+#include "core/analysis/linear.h"
 #include "core/analysis/places.h"
 #include "core/laws/laws.h"
 #include "core/linear_algebra/eigen.h"
@@ -353,20 +354,6 @@ double ContinuousMode::frequency_hz() const {
 
 double ContinuousMode::t60_s() const {
   return 3.0 * std::numbers::ln10 / -pole.real() / Network::reference_rate_hz;
-}
-
-bool is_linear(const Network& network) {
-  for (const Link& link : network.links) {
-    if (link.law != Law::spring) {
-      return false;
-    }
-  }
-  for (std::uint32_t i = 0; i < network.masses.size(); ++i) {
-    if (is_live_place(network, i)) {
-      return false;
-    }
-  }
-  return true;
 }
 
 std::vector<double> Continuous::play(std::size_t output, std::size_t frames, double step) const {

@@ -11,9 +11,6 @@
 
 namespace ressort {
 
-// Springs, dampers and oscillators only, at places that stay.
-bool is_linear(const Network& network);
-
 // A partial: e^(pole t).
 struct ContinuousMode {
   std::complex<double> pole;  // its imaginary part is not below 0

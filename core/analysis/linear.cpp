@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "core/analysis/places.h"
+#include "core/laws/laws.h"
 #include "core/linear_algebra/cholesky.h"
 #include "core/linear_algebra/eigen.h"
 
@@ -372,6 +373,20 @@ std::optional<Network> fixed_held(const Network& network) {
 }
 
 }  // namespace
+
+bool is_linear(const Network& network) {
+  for (const Link& link : network.links) {
+    if (link.law != Law::spring) {
+      return false;
+    }
+  }
+  for (std::uint32_t i = 0; i < network.masses.size(); ++i) {
+    if (is_live_place(network, i)) {
+      return false;
+    }
+  }
+  return true;
+}
 
 double scheme_frequency_hz(double stiffness, double damping, double rate_hz) {
   const double z = std::clamp(damping, 0.0, 0.999);

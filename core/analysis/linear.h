@@ -10,6 +10,9 @@
 
 namespace ressort {
 
+// Springs, dampers and oscillators only, at places that stay.
+bool is_linear(const Network& network);
+
 // One mode, in the network's own numbers: per sample at 44 100 Hz.
 struct Mode {
   double stiffness = 0.0;     // k/m

@@ -141,6 +141,10 @@ bool Cholesky::factor(const SparseMatrix& lower, Pivots pivots, const Progress& 
   return true;
 }
 
+std::size_t Cholesky::negative_pivots() const {
+  return static_cast<std::size_t>(std::count(sign_.begin(), sign_.end(), -1.0));
+}
+
 void Cholesky::solve(double* x) const {
   const std::size_t size = order_.size();
   std::vector<double> y(size);

@@ -31,6 +31,9 @@ class Cholesky {
   // Of a matrix with the same pattern; false where a pivot is not as it is asked for.
   bool factor(const SparseMatrix& lower, Pivots pivots, const Progress& progress);
 
+  // How many eigenvalues of the last matrix are below 0 (Sylvester). O(rows)
+  std::size_t negative_pivots() const;
+
   // Solves A x = b in place, by the last matrix that could be factored.
   void solve(double* x) const;
 

@@ -6,6 +6,7 @@
 #include <set>
 
 #include "core/analysis/continuous.h"
+#include "core/analysis/linear.h"
 #include "core/laws/laws.h"
 #include "core/model/generate.h"
 #include "core/model/language/mdl.h"

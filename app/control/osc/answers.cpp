@@ -2,6 +2,7 @@
 
 #include <set>
 
+#include "app/control/console_commands.h"
 #include "app/control/osc/client.h"
 #include "app/control/osc/subscribers.h"
 #include "app/control/status.h"
@@ -164,6 +165,61 @@ void answer::presets(const Question& question) {
   }
   rows.push_back(Reply("/presets.end").whole(rows.size()));
   question.client.answer_rows(rows);
+}
+
+void answer::modes(const Question& question) {
+  const Message& message = question.message;
+  const OscClient& client = question.client;
+  const auto count = mode_count(message.arguments.empty() ? Argument(32.0) : message.arguments[0]);
+  if (!count || message.arguments.size() > 1) {
+    client.error(message.address, "expected how many modes, 1 to 10000");
+    return;
+  }
+  if (!client.may_have_rows(message.address)) {
+    return;
+  }
+  question.session.find_modes(*count, [message, client](const Result<KnownModes>& modes) {
+    if (!modes) {
+      client.error(message.address, without_source(modes.error().message));
+      return;
+    }
+    std::vector<Reply> rows;
+    for (const KnownMode& mode : modes->modes) {
+      Reply& row = rows.emplace_back("/modes.reply");
+      row.whole(rows.size()).real(mode.frequency_hz).real(mode.t60_s);
+      for (const auto& levels : mode.levels) {
+        for (const double level : levels) {
+          row.real(level);
+        }
+      }
+    }
+    rows.push_back(Reply("/modes.end").whole(rows.size()));
+    client.answer_rows(rows);
+  });
+}
+
+void answer::tune(const Question& question) {
+  const Message& message = question.message;
+  const OscClient& client = question.client;
+  const auto target = tune_target(message.arguments);
+  if (!target) {
+    client.error(message.address, target.error().message);
+    return;
+  }
+  if (!client.outlet().begin_load()) {
+    client.error(message.address, "busy: enough loads are waiting, try again");
+    return;
+  }
+  question.session.tune(*target,
+                        [message, client](const Result<std::shared_ptr<const Loaded>>& result) {
+                          client.outlet().end_load();
+                          Reply reply(result ? "/done" : "/fail");
+                          reply.text(message.address);
+                          if (!result) {
+                            reply.text(without_source(result.error().message));
+                          }
+                          client.answer(reply);
+                        });
 }
 
 void answer::subscribe(const Question& question) {

@@ -29,6 +29,12 @@ void describe(const Question& question);
 void models(const Question& question);
 void presets(const Question& question);
 
+// A row /modes.reply i:number f:frequency f:t60 f:level... for each, levels input by input, then
+// /modes.end i:rows; later, on the session's worker
+void modes(const Question& question);
+// /done s:address, or /fail s:address s:why; later, on the session's worker
+void tune(const Question& question);
+
 // /subscribe.reply f:seconds and, in time, what Subscribers tells; /done s:address or an error
 void subscribe(const Question& question);
 void unsubscribe(const Question& question);

@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "app/session/files.h"
+#include "app/session/modes/tuned_files.h"
 #include "app/session/session.h"
 #include "app/text.h"
 #include "core/model/preset/edit.h"
@@ -148,20 +149,9 @@ void Session::hear_turns(const Meters& now) {
   }
 }
 
-Result<std::string> Session::save(const std::string& name, Existing existing) {
-  const auto path = path_to_save(name);
-  if (!path) {
-    return path.error();
-  }
-  std::error_code error;
-  if (const std::string there = preset_path(name); existing == Existing::refuse && !there.empty()) {
-    return Error{there == *path ? "'" + name + "' is there already; --force writes over it"
-                                : "'" + name +
-                                      "' is a preset that came with the program; --force saves one "
-                                      "of yours that is loaded instead"};
-  }
-  std::shared_ptr<const Loaded> now;
+Result<std::string> Session::preset_text(const std::string& model) const {
   PresetChanges changes;
+  std::shared_ptr<const Loaded> now;
   {
     const std::lock_guard lock(mutex_);
     now = current_;
@@ -200,17 +190,40 @@ Result<std::string> Session::save(const std::string& name, Existing existing) {
       }
     }
   }
-  // By its name where that leads to it from there too.
-  const std::filesystem::path model = now->model_path;
-  const std::string known = model_path(model.stem().string());
-  changes.model = !known.empty() && std::filesystem::equivalent(known, model, error)
-                      ? model.filename().string()
-                      : std::filesystem::absolute(model, error).lexically_normal().string();
+  changes.model = model;
   changes.gain = now->instrument.gain / options_.gain;
   Preset made_up = now->preset;
   made_up.model = changes.model;
+  return edit_preset(now->preset_text.empty() ? print_preset(made_up) : now->preset_text, changes);
+}
+
+Result<std::string> Session::save(const std::string& name, Existing existing) {
+  const auto path = path_to_save(name);
+  if (!path) {
+    return path.error();
+  }
+  std::error_code error;
+  if (const std::string there = preset_path(name); existing == Existing::refuse && !there.empty()) {
+    return Error{there == *path ? "'" + name + "' is there already; --force writes over it"
+                                : "'" + name +
+                                      "' is a preset that came with the program; --force saves one "
+                                      "of yours that is loaded instead"};
+  }
+  const std::shared_ptr<const Loaded> now = current();
+  std::string model = now->model_path;
+  if (is_tuned(model)) {  // it would be lost with the cache
+    const auto kept = keep_tuned(model, name, existing);
+    if (!kept) {
+      return kept.error();
+    }
+    model = *kept;
+  }
+  // By its name where that leads to it from there too.
+  const std::string known = model_path(std::filesystem::path(model).stem().string());
+  const bool is_known = !known.empty() && std::filesystem::equivalent(known, model, error);
   const auto text =
-      edit_preset(now->preset_text.empty() ? print_preset(made_up) : now->preset_text, changes);
+      preset_text(is_known ? std::filesystem::path(model).filename().string()
+                           : std::filesystem::absolute(model, error).lexically_normal().string());
   if (!text) {
     return text.error();
   }

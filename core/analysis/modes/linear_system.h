@@ -1,0 +1,64 @@
+// core/analysis/modes: a network near rest as matrices, for masses of 1.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <utility>
+#include <vector>
+
+#include "core/linear_algebra/matrix.h"
+#include "core/model/network.h"
+
+namespace ressort {
+
+// What an input pushes, or an output hears: shares of rows. Those of `stiff` act with a position,
+// those of `damped` with its change in a step.
+struct ModalPort {
+  using Shares = std::vector<std::pair<std::uint32_t, double>>;  // row, share
+  Shares direct;
+  Shares stiff;
+  Shares damped;
+};
+
+// A spring and damper between rows: it pulls with k d + z d', d being the sum of share * row.
+struct ModalSpring {
+  std::uint32_t first = 0;  // of LinearSystem::shares
+  std::uint32_t count = 0;
+  std::uint32_t element = 0;  // index into Network::links, or Network::masses
+  bool is_link = true;
+  double stiffness = 0.0;
+  double damping = 0.0;
+};
+
+// Row i is a mass that moves, times the root of its M. K and Z are per step.
+struct LinearSystem {
+  std::size_t size() const { return masses.size(); }
+  std::span<const std::pair<std::uint32_t, double>> of(const ModalSpring& spring) const {
+    return std::span(shares).subspan(spring.first, spring.count);
+  }
+  // K and Z of springs that are changed: those of `springs` times these factors; [spring], empty
+  // for 1.
+  SparseMatrix stiffness(std::span<const double> factors = {}) const;
+  SparseMatrix damping(std::span<const double> factors = {}) const;
+
+  std::vector<std::uint32_t> masses;  // [row] index into Network::masses
+  std::vector<double> root;           // [row] of M
+  std::vector<ModalSpring> springs;
+  std::vector<std::pair<std::uint32_t, double>> shares;
+  std::vector<ModalPort> inputs;   // [input of the network]
+  std::vector<ModalPort> outputs;  // [output of the network]
+  bool is_linear = true;  // else bows, plucks and contacts are open, and springs as at rest
+  bool is_sound = true;   // every mass is above 0 and every number finite
+};
+
+// The same network with every argument a number, as these parameters make it: places stay.
+Network settled(const Network& network, std::span<const double> parameters);
+
+// Of a network without macros whose arguments are numbers, for steps that are `step` samples at
+// 44 100 Hz long. O(masses + links). [any thread but audio]
+LinearSystem make_linear_system(const Network& network, double step);
+
+// y = A x.
+Vector product(const SparseMatrix& lower, const Vector& x);
+
+}  // namespace ressort

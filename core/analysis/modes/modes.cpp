@@ -1,0 +1,183 @@
+#include "core/analysis/modes/modes.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <optional>
+#include <utility>
+
+#include "core/analysis/modes/lowest_swings.h"
+#include "core/analysis/modes/quadratic.h"
+#include "core/model/topology.h"
+
+namespace ressort {
+namespace {
+
+using Complex = std::complex<double>;
+
+constexpr double rigid = 1e-13;  // of the largest stiffness: what is below is rounding
+
+Matrix dense(const SparseMatrix& lower) {
+  const auto size = static_cast<std::size_t>(lower.size());
+  Matrix matrix(size, size);
+  for (std::size_t j = 0; j < size; ++j) {
+    for (auto i = static_cast<std::size_t>(lower.first[j]);
+         i < static_cast<std::size_t>(lower.first[j + 1]); ++i) {
+      const auto row = static_cast<std::size_t>(lower.row[i]);
+      matrix(row, j) = matrix(j, row) = lower.value[i];
+    }
+  }
+  return matrix;
+}
+
+// What is heard and pushed of swings.
+class ModeTeller {
+ public:
+  ModeTeller(const NetworkModes& made, const ModeOptions& options)
+      : made_(made), e_(scheme_e(options.scheme)), step_(scheme_step(options)) {}
+
+  NetworkMode mode_of(Swing swing) const {
+    const Complex at = pole_of(swing.mu, made_.scheme);
+    const double rate_hz = Network::reference_rate_hz / step_;
+    NetworkMode mode;
+    mode.frequency_hz = at.imag() * rate_hz / (2.0 * std::numbers::pi);
+    mode.t60_s = at.real() == 0.0 ? std::numeric_limits<double>::infinity()
+                                  : -3.0 * std::numbers::ln10 / (at.real() * rate_hz);
+    std::vector<Complex> heard;
+    for (const ModalPort& port : made_.system.outputs) {
+      heard.push_back(along(port, swing));
+    }
+    for (const ModalPort& port : made_.system.inputs) {
+      const Complex pushed = along(port, swing);
+      for (const Complex& out : heard) {
+        mode.levels.push_back(std::abs(pushed * out) / swing.mu.imag());
+      }
+    }
+    mode.mu = swing.mu;
+    mode.shape = std::move(swing.shape);
+    return mode;
+  }
+
+ private:
+  Complex along(const ModalPort& port, const Swing& swing) const {
+    const auto sum = [&](const ModalPort::Shares& shares) {
+      Complex total;
+      for (const auto& [row, share] : shares) {
+        total += share * swing.shape[row];
+      }
+      return total;
+    };
+    const Complex speed = swing.mu / (1.0 + e_ * swing.mu);
+    return sum(port.direct) + sum(port.stiff) + speed * sum(port.damped);
+  }
+
+  const NetworkModes& made_;
+  double e_;
+  double step_;
+};
+
+}  // namespace
+
+double scheme_e(ModeScheme scheme) {
+  return scheme == ModeScheme::published ? 1.0 : 0.0;
+}
+
+double scheme_step(const ModeOptions& options) {
+  return options.scheme == ModeScheme::published ? Network::reference_rate_hz / options.rate_hz
+                                                 : 1.0;
+}
+
+Complex pole_of(Complex mu, ModeScheme scheme) {
+  return scheme == ModeScheme::continuous
+             ? mu
+             : Complex(0.5 * std::log1p(2.0 * mu.real() + std::norm(mu)),
+                       std::atan2(mu.imag(), 1.0 + mu.real()));
+}
+
+namespace {
+
+Result<FoundSwings> find(const LinearSystem& system, const ModeOptions& options,
+                         std::span<const double> stiffness_factors,
+                         std::span<const double> damping_factors) {
+  const double e = scheme_e(options.scheme);
+  FoundSwings found{.swings = {},
+                    .stiffness = system.stiffness(stiffness_factors),
+                    .damping = system.damping(damping_factors)};
+  double least = 0.0;
+  for (const double value : found.stiffness.value) {
+    least = std::max(least, rigid * std::fabs(value));
+  }
+  const std::size_t size = system.size();
+  if (size == 0 || least == 0.0) {
+    return found;
+  }
+  std::size_t count = options.count;
+  std::optional<Swings> swings;
+  const bool is_small = size <= most_crossing_modes;
+  if (is_small || (count == 0 && size <= most_listed_modes)) {
+    options.progress.stage("finding the modes");
+    swings = swings_of(dense(found.stiffness), dense(found.damping), e, least, is_small);
+    if (!swings && is_small) {
+      return Error{"the modes were not found: the iteration does not converge"};
+    }
+  }
+  if (!swings) {
+    count = std::min(count == 0 ? default_modes : count, size - 1);
+    auto lowest = lowest_swings(found.stiffness, found.damping, e, least, count, options.progress);
+    if (!lowest) {
+      return lowest.error();
+    }
+    swings = *std::move(lowest);
+    found.is_all = false;
+  }
+  const auto angle = [&](const Swing& swing) { return pole_of(swing.mu, options.scheme).imag(); };
+  std::sort(swings->all.begin(), swings->all.end(),
+            [&](const Swing& a, const Swing& b) { return angle(a) < angle(b); });
+  if (count > 0 && swings->all.size() > count) {
+    swings->all.resize(count);
+    found.is_all = false;
+  }
+  found.swings = *std::move(swings);
+  return found;
+}
+
+}  // namespace
+
+Result<FoundSwings> find_swings(const LinearSystem& system, const ModeOptions& options,
+                                std::span<const double> stiffness_factors,
+                                std::span<const double> damping_factors) {
+  try {
+    return find(system, options, stiffness_factors, damping_factors);
+  } catch (const Stopped&) {
+    return Error{stopped};
+  }
+}
+
+Result<NetworkModes> find_modes(const Network& network, std::span<const double> parameters,
+                                const ModeOptions& options) {
+  NetworkModes made;
+  made.network = settled(expand_macros(network), parameters);
+  made.system = make_linear_system(made.network, scheme_step(options));
+  made.inputs = network.inputs.size();
+  made.outputs = network.outputs.size();
+  made.scheme = options.scheme;
+  made.rate_hz = options.rate_hz;
+  if (!made.system.is_sound) {
+    return Error{"a mass is not above 0, or a stiffness or damping is no finite number"};
+  }
+  auto found = find_swings(made.system, options);
+  if (!found) {
+    return found.error();
+  }
+  made.is_all = found->is_all;
+  made.is_proportional = found->swings.is_proportional;
+  const ModeTeller teller(made, options);
+  for (Swing& swing : found->swings.all) {
+    made.residual = std::max(
+        made.residual, residual(found->stiffness, found->damping, scheme_e(options.scheme), swing));
+    made.modes.push_back(teller.mode_of(std::move(swing)));
+  }
+  return made;
+}
+
+}  // namespace ressort

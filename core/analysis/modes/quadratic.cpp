@@ -1,0 +1,216 @@
+#include "core/analysis/modes/quadratic.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "core/linear_algebra/eigen.h"
+
+namespace ressort {
+namespace {
+
+using Complex = std::complex<double>;
+
+constexpr double shared = 1e-12;  // of the largest: is it diagonal in the same vectors?
+constexpr double alike = 1e-9;    // by how much poles differ that are one
+
+Complex form(const ComplexVector& a, const Matrix& matrix, const ComplexVector& b) {
+  Complex sum;
+  for (std::size_t column = 0; column < b.size(); ++column) {
+    Complex along;
+    for (std::size_t row = 0; row < a.size(); ++row) {
+      along += matrix(row, column) * a[row];
+    }
+    sum += along * b[column];
+  }
+  return sum;
+}
+
+double length(const ComplexVector& a) {
+  double sum = 0.0;
+  for (const Complex& value : a) {
+    sum += std::norm(value);
+  }
+  return std::sqrt(sum);
+}
+
+// The largest off the diagonal.
+double astray(const Matrix& matrix) {
+  double most = 0.0;
+  for (std::size_t j = 0; j < matrix.columns(); ++j) {
+    for (std::size_t i = 0; i < matrix.rows(); ++i) {
+      most = i == j ? most : std::max(most, std::fabs(matrix(i, j)));
+    }
+  }
+  return most;
+}
+
+class Quadratic {
+ public:
+  Quadratic(const Matrix& stiffness, const Matrix& damping, double e, double rigid)
+      : stiffness_(stiffness),
+        damping_(damping),
+        e_(e),
+        rigid_(rigid),
+        stiffest_(largest(stiffness.values)),
+        size_(stiffness.rows()) {}
+
+  std::optional<Swings> solve(bool may_cross) {
+    if (auto found = in_shared_vectors()) {
+      return Swings{*std::move(found), true};
+    }
+    auto found = may_cross ? crossed() : std::nullopt;
+    return found ? std::optional(Swings{*std::move(found), false}) : std::nullopt;
+  }
+
+ private:
+  // mu of k and z alone, if it swings.
+  std::optional<Complex> root(double k, double z) const {
+    const double p = 0.5 * (z + e_ * k);
+    const double rest = k - p * p;
+    return k > rigid_ && rest > 0.0 ? std::optional(Complex(-p, std::sqrt(rest))) : std::nullopt;
+  }
+
+  // Where K and Z have the same eigenvectors, those of a sum of both are theirs, whatever else is
+  // alike.
+  std::optional<std::vector<Swing>> in_shared_vectors() const {
+    const double damped = largest(damping_.values);
+    Matrix both = stiffness_;
+    if (damped > 0.0) {
+      both.values += 0.7346 * (stiffest_ > 0.0 ? stiffest_ / damped : 1.0) * damping_.values;
+    }
+    const Eigenpairs pairs = symmetric_eigenpairs(both);
+    const Matrix k = in_basis(stiffness_, pairs.vectors);
+    const Matrix z = in_basis(damping_, pairs.vectors);
+    if (astray(k) > shared * stiffest_ || astray(z) > shared * damped) {
+      return std::nullopt;
+    }
+    std::vector<Swing> swings;
+    for (std::size_t i = 0; i < size_; ++i) {
+      if (const auto mu = root(k(i, i), z(i, i))) {
+        Swing& swing = swings.emplace_back(Swing{*mu, ComplexVector(size_)});
+        for (std::size_t row = 0; row < size_; ++row) {
+          swing.shape[row] = pairs.vectors(row, i);
+        }
+      }
+    }
+    return swings;
+  }
+
+  // The motions of (x, v), which cross over into each other.
+  std::optional<std::vector<Swing>> crossed() const {
+    Matrix step(2 * size_, 2 * size_);
+    for (std::size_t j = 0; j < size_; ++j) {
+      for (std::size_t i = 0; i < size_; ++i) {
+        const double one = i == j ? 1.0 : 0.0;
+        step(i, j) = -e_ * stiffness_(i, j);
+        step(i, size_ + j) = one - e_ * damping_(i, j);
+        step(size_ + i, j) = -stiffness_(i, j);
+        step(size_ + i, size_ + j) = -damping_(i, j);
+      }
+    }
+    const auto pairs = eigenpairs(step);
+    if (!pairs) {
+      return std::nullopt;
+    }
+    std::vector<Swing> swings;
+    for (std::size_t i = 0; i < pairs->values.size(); ++i) {
+      const Complex mu = pairs->values[i];
+      if (mu.imag() > 0.0 && std::norm(mu) > rigid_) {
+        ComplexVector shape = pairs->vectors[i][std::slice(0, size_, 1)];
+        swings.push_back({mu, ComplexVector(shape / Complex(length(shape)))});
+      }
+    }
+    part_alike(swings);
+    return swings;
+  }
+
+  // shapeT (2 mu + e K + Z) shape between two.
+  Complex product(Complex mu, const ComplexVector& a, const ComplexVector& b) const {
+    return 2.0 * mu * Complex((a * b).sum()) + e_ * form(a, stiffness_, b) + form(a, damping_, b);
+  }
+
+  // Of shapes that swing alike any mixture does too: those which have nothing of each other. Then
+  // each is scaled, and its mu made better by what the shape says.
+  void part_alike(std::vector<Swing>& swings) const {
+    std::sort(swings.begin(), swings.end(),
+              [](const Swing& a, const Swing& b) { return a.mu.imag() < b.mu.imag(); });
+    for (std::size_t first = 0; first < swings.size();) {
+      std::size_t end = first + 1;
+      while (end < swings.size() &&
+             std::abs(swings[end].mu - swings[first].mu) < alike * std::abs(swings[first].mu)) {
+        ++end;
+      }
+      for (std::size_t i = first; i < end; ++i) {
+        bring_forward(swings, i, end);
+        refine(swings[i]);
+        scale(swings[i]);
+        for (std::size_t j = i + 1; j < end; ++j) {
+          const Complex mu = swings[i].mu;
+          const Complex of = product(mu, swings[i].shape, swings[i].shape);
+          swings[j].shape -= product(mu, swings[i].shape, swings[j].shape) / of * swings[i].shape;
+        }
+      }
+      first = end;
+    }
+  }
+
+  // The shape that is the least at odds with itself; a sum of two where every one is.
+  void bring_forward(std::vector<Swing>& swings, std::size_t i, std::size_t end) const {
+    if (i + 1 == end) {
+      return;
+    }
+    const auto own = [&](const Swing& swing) {
+      const double size = length(swing.shape);
+      return std::abs(product(swing.mu, swing.shape, swing.shape)) / (size * size);
+    };
+    const auto at = static_cast<std::ptrdiff_t>(i);
+    const auto best =
+        std::max_element(swings.begin() + at, swings.begin() + static_cast<std::ptrdiff_t>(end),
+                         [&](const Swing& a, const Swing& b) { return own(a) < own(b); });
+    std::iter_swap(swings.begin() + at, best);
+    for (std::size_t j = i + 1; j < end; ++j) {
+      Swing sum{swings[i].mu, ComplexVector(swings[i].shape + swings[j].shape)};
+      if (own(sum) > 1e3 * own(swings[i])) {
+        swings[i].shape = sum.shape;
+      }
+    }
+  }
+
+  // mu^2 a + mu (z + e k) + k = 0 in the shape itself, of which it is an extreme.
+  void refine(Swing& swing) const {
+    const Complex a = (swing.shape * swing.shape).sum();
+    const Complex k = form(swing.shape, stiffness_, swing.shape);
+    const Complex z = form(swing.shape, damping_, swing.shape);
+    for (int i = 0; i < 2; ++i) {
+      const Complex slope = 2.0 * swing.mu * a + z + e_ * k;
+      const Complex off = swing.mu * swing.mu * a + swing.mu * (z + e_ * k) + k;
+      const Complex better = swing.mu - off / slope;
+      if (!(std::abs(better - swing.mu) < 1e-6 * std::abs(swing.mu))) {
+        return;  // nearly critical: the shape says too little
+      }
+      swing.mu = better;
+    }
+  }
+
+  void scale(Swing& swing) const {
+    const Complex is = product(swing.mu, swing.shape, swing.shape);
+    swing.shape *= std::sqrt(Complex(0.0, 2.0 * swing.mu.imag()) / is);
+  }
+
+  const Matrix& stiffness_;
+  const Matrix& damping_;
+  double e_;
+  double rigid_;
+  double stiffest_;
+  std::size_t size_;
+};
+
+}  // namespace
+
+std::optional<Swings> swings_of(const Matrix& stiffness, const Matrix& damping, double e,
+                                double rigid, bool may_cross) {
+  return Quadratic(stiffness, damping, e, rigid).solve(may_cross);
+}
+
+}  // namespace ressort
