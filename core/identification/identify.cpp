@@ -1,0 +1,445 @@
+#include "core/identification/identify.h"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <cstdio>
+#include <numbers>
+
+#include "core/identification/fit.h"
+#include "core/identification/poles.h"
+#include "core/identification/spectrum.h"
+
+namespace ressort {
+namespace {
+
+constexpr double pi = std::numbers::pi;
+constexpr double ln_1000 = 6.907755278982137;
+constexpr double band_hz = 690.0;         // the lower rate of the first search
+constexpr double twin = 0.15;             // nearer than this share of the damping is the same pole
+constexpr double chance = 21.0;           // squared amplitude over twice its variance: no accident
+constexpr double deepest_db = -110.0;     // below the mode with most energy
+constexpr std::size_t most_fitted = 450;  // at once
+constexpr double lowest_hz = 15.0;
+constexpr double least_quality = 0.5;
+constexpr double sure = 3.0;  // standard deviations
+
+std::string number(const char* form, double value) {
+  char text[48];
+  std::snprintf(text, sizeof text, form, value);
+  return text;
+}
+
+// How noisy the rest is around a mode while it rings.
+class Noise {
+ public:
+  explicit Noise(const std::vector<std::vector<double>>& rest) : channels_(rest.size()) {
+    for (std::size_t frames = rest[0].size(); frames >= 256; frames /= 4) {
+      powers_.emplace_back(rest, frames);
+    }
+    if (powers_.empty()) {
+      powers_.emplace_back(rest, rest[0].size());
+    }
+  }
+  // The variance of white noise that would be as loud there, of one channel.
+  double variance(Complex log_z) const {
+    const double alpha = -log_z.real();
+    const double omega = log_z.imag();
+    std::size_t i = 0;
+    while (i + 1 < powers_.size() && static_cast<double>(powers_[i + 1].frames()) * alpha > 4.0) {
+      ++i;
+    }
+    const double half_width = std::max({8.0 * pi / static_cast<double>(powers_[i].frames()),
+                                        2.0 * alpha, 0.02 * omega, 0.002});
+    return powers_[i].density(omega, half_width) / static_cast<double>(channels_);
+  }
+
+ private:
+  std::vector<Power> powers_;  // of ever shorter beginnings
+  std::size_t channels_;
+};
+
+// The sum of the squares of all samples of the mode, if it rang for ever, nearly.
+double energy_of(const DampedMode& mode, std::size_t frames) {
+  double square = 0.0;
+  for (const Complex c : mode.c) {
+    square += std::norm(c);
+  }
+  const double alpha = std::max(-mode.log_z.real(), 0.5 / static_cast<double>(frames));
+  return square / (4.0 * alpha);
+}
+
+bool are_twins(Complex a, Complex b, double share, std::size_t frames) {
+  const double near = std::max(share * std::min(-a.real(), -b.real()),
+                               0.02 / static_cast<double>(frames));
+  return std::abs(a - b) < near;
+}
+
+// Fits all numbers of a growing set of modes.
+class Search {
+ public:
+  Search(const std::vector<std::vector<double>>& sound, const Progress& progress)
+      : sound_(sound), progress_(progress), fit_(sound) {
+    fit_.set_poles({});  // the constant alone
+  }
+
+  DampedFit& fit() { return fit_; }
+
+  // What this search finds in the first so many samples of the rest joins the others.
+  void look(const PoleSearch& search, std::size_t frames) {
+    if (frames < shortest_for(search)) {
+      return;
+    }
+    std::vector<std::vector<double>> start;
+    for (const std::vector<double>& channel : fit_.rest()) {
+      start.emplace_back(channel.begin(), channel.begin() + static_cast<std::ptrdiff_t>(frames));
+    }
+    progress_.stage("searching for modes");
+    std::vector<Complex> found = find_poles(start, search, progress_);
+    if (found.empty()) {
+      return;
+    }
+    progress_.stage("fitting the modes to the sound");
+    add(strongest(std::move(found), start));
+    drop_accidents();
+    fit_.refine(6, progress_);
+    drop_accidents();
+  }
+
+  void finish() {
+    progress_.stage("fitting the modes to the sound");
+    fit_.refine(20, progress_);
+    if (drop_accidents()) {
+      fit_.refine(20, progress_);
+    }
+  }
+
+  std::size_t frames() const { return sound_[0].size(); }
+
+ private:
+  // Of many poles those that alone would explain most.
+  std::vector<Complex> strongest(std::vector<Complex> found,
+                                 const std::vector<std::vector<double>>& start) const {
+    const std::size_t room = most_fitted - std::min(most_fitted, fit_.modes().size());
+    if (found.size() <= room) {
+      return found;
+    }
+    std::vector<std::pair<double, Complex>> ranked;
+    for (const Complex log_z : found) {
+      double square = 0.0;
+      for (const std::vector<double>& channel : start) {
+        square += std::norm(moments_of(channel, log_z).zeroth);
+      }
+      ranked.emplace_back(-square * -log_z.real(), log_z);
+    }
+    std::sort(ranked.begin(), ranked.end(),
+              [](const auto& a, const auto& b) { return a.first < b.first; });
+    found.clear();
+    for (std::size_t i = 0; i < room; ++i) {
+      found.push_back(ranked[i].second);
+    }
+    return found;
+  }
+
+  void add(const std::vector<Complex>& found) {
+    std::vector<Complex> known;
+    for (const DampedMode& mode : fit_.modes()) {
+      known.push_back(mode.log_z);
+    }
+    for (double share = twin; share < 20.0; share *= 4.0) {
+      std::vector<Complex> all = known;
+      for (const Complex log_z : found) {
+        if (std::none_of(all.begin(), all.end(), [&](Complex other) {
+              return are_twins(log_z, other, share, frames());
+            })) {
+          all.push_back(log_z);
+        }
+      }
+      if (fit_.set_poles(all)) {
+        return;
+      }
+    }
+    fit_.set_poles(known);
+  }
+
+  // Takes back what noise would do as well, the least likely modes first. Whether there were any.
+  bool drop_accidents() {
+    bool has_dropped = false;
+    for (int round = 0; round < 12 && !fit_.modes().empty(); ++round) {
+      const std::vector<DampedMode>& modes = fit_.modes();
+      const std::vector<DampedDeviation> deviations = fit_.deviations(false);
+      const Noise noise(fit_.rest());
+      double loudest = 0.0;
+      for (const DampedMode& mode : modes) {
+        loudest = std::max(loudest, energy_of(mode, frames()));
+      }
+      const double least = loudest * std::pow(10.0, deepest_db / 10.0);
+      std::vector<std::pair<double, Complex>> likelihoods;
+      for (std::size_t k = 0; k < modes.size(); ++k) {
+        double likelihood = 0.0;
+        for (std::size_t c = 0; c < modes[k].c.size(); ++c) {
+          const double deviation = deviations[k].c[c];
+          likelihood += std::norm(modes[k].c[c]) /
+                        (1e-300 + 2.0 * deviation * deviation * noise.variance(modes[k].log_z));
+        }
+        likelihood = energy_of(modes[k], frames()) < least ? 0.0 : likelihood;
+        likelihoods.emplace_back(likelihood, modes[k].log_z);
+      }
+      std::sort(likelihoods.begin(), likelihoods.end(),
+                [](const auto& a, const auto& b) { return a.first < b.first; });
+      const double wanted = chance + static_cast<double>(sound_.size() - 1);
+      const auto accidents = static_cast<std::size_t>(
+          std::count_if(likelihoods.begin(), likelihoods.end(),
+                        [&](const auto& likely) { return !(likely.first >= wanted); }));
+      if (accidents == 0) {
+        break;
+      }
+      const auto sure_accidents = static_cast<std::size_t>(
+          std::count_if(likelihoods.begin(), likelihoods.end(),
+                        [](const auto& likely) { return !(likely.first >= 1.0); }));
+      const std::size_t dropped = std::max(sure_accidents, (accidents + 1) / 2);
+      std::vector<Complex> kept;
+      for (std::size_t i = dropped; i < likelihoods.size(); ++i) {
+        kept.push_back(likelihoods[i].second);
+      }
+      fit_.set_poles(kept);
+      has_dropped = true;
+    }
+    return has_dropped;
+  }
+
+  const std::vector<std::vector<double>>& sound_;
+  const Progress& progress_;
+  DampedFit fit_;
+};
+
+void search_all(Search& search, double rate_hz) {
+  const double highest = 2.0 * pi * std::min(0.45, highest_mode_hz / rate_hz);
+  const auto decimation = std::size_t{1}
+                          << static_cast<unsigned>(std::max(
+                                 1.0, std::round(std::log2(rate_hz / band_hz))));
+  const auto within = [&](double seconds) {
+    return std::min(search.frames(), static_cast<std::size_t>(seconds * rate_hz));
+  };
+  search.look({decimation, highest}, search.frames());
+  search.look({std::max<std::size_t>(2, decimation / 4), highest}, within(0.7));
+  search.look({std::max<std::size_t>(2, decimation / 16), highest}, within(0.12));
+  search.look({decimation, highest}, search.frames());
+  search.finish();
+}
+
+// A mode of the fit with what is known of how uncertain it is.
+struct Found {
+  DampedMode mode;
+  DampedDeviation deviation;  // with the noise around it
+};
+
+enum class Fate { kept, steady, unfit };
+
+Fate fate_of(const Found& found, double rate_hz) {
+  const double alpha = -found.mode.log_z.real();
+  const double omega = found.mode.log_z.imag();
+  if (!(alpha > sure * found.deviation.alpha) || alpha * rate_hz < 0.05) {
+    return Fate::steady;
+  }
+  const bool rings = omega > 2.0 * pi * lowest_hz / rate_hz && omega < 0.999 * pi &&
+                     omega > 2.0 * least_quality * alpha &&
+                     omega <= 2.0 * pi * highest_mode_hz / rate_hz;
+  return rings ? Fate::kept : Fate::unfit;
+}
+
+std::vector<Found> all_found(const DampedFit& fit) {
+  std::vector<Found> all;
+  const Noise noise(fit.rest());
+  const std::vector<DampedDeviation> deviations = fit.deviations(true);
+  for (std::size_t k = 0; k < fit.modes().size(); ++k) {
+    all.push_back({fit.modes()[k], deviations[k]});
+    const double scale = std::sqrt(noise.variance(fit.modes()[k].log_z));
+    all.back().deviation.alpha *= scale;
+    all.back().deviation.omega *= scale;
+    for (double& c : all.back().deviation.c) {
+      c *= scale;
+    }
+  }
+  return all;
+}
+
+// When, in samples from the onset, a body that one impulse sets going from rest would have been
+// struck to swing most like this: there every mode passes 0.
+double time_of_impulse(const std::vector<Found>& all, double rate_hz) {
+  const double reach = 0.001 * rate_hz;
+  double best = 0.0;
+  double most = -1.0;
+  for (double t = -reach; t <= 0.5 * reach; t += 0.0625) {
+    double sum = 0.0;
+    double weight = 1e-300;
+    for (const Found& found : all) {
+      for (const Complex c : found.mode.c) {
+        // The amplitude counts, not its square, so that it is not the loudest mode alone.
+        const double sine = std::arg(c) + found.mode.log_z.imag() * t + 0.5 * pi;
+        sum += std::abs(c) * std::cos(sine) * std::cos(sine);
+        weight += std::abs(c);
+      }
+    }
+    const double match = sum / weight - 0.1 * std::fabs(t) / reach;
+    if (match > most) {
+      most = match;
+      best = t;
+    }
+  }
+  return best;
+}
+
+IdentifiedMode measured(const Found& found, double rate_hz, double time_zero) {
+  const double alpha = -found.mode.log_z.real();
+  IdentifiedMode mode;
+  mode.frequency_hz = {found.mode.log_z.imag() * rate_hz / (2.0 * pi),
+                       found.deviation.omega * rate_hz / (2.0 * pi)};
+  mode.t60_s = {ln_1000 / (alpha * rate_hz),
+                ln_1000 / (alpha * rate_hz) * found.deviation.alpha / alpha};
+  for (std::size_t c = 0; c < found.mode.c.size(); ++c) {
+    const Complex start = found.mode.c[c] * std::exp(found.mode.log_z * time_zero);
+    const double scale = std::exp(-alpha * time_zero);
+    const double size = std::abs(start);
+    mode.amplitude.push_back({size, found.deviation.c[c] * scale});
+    mode.phase_rad.push_back(
+        {std::arg(start), std::min(pi, size > 0.0 ? found.deviation.c[c] * scale / size : pi)});
+  }
+  return mode;
+}
+
+double decibels(double power) {
+  return 10.0 * std::log10(std::max(power, 1e-40));
+}
+
+std::vector<OctaveResidual> by_octave(const std::vector<std::vector<double>>& sound,
+                                      const std::vector<std::vector<double>>& residual,
+                                      double rate_hz) {
+  const Power whole(sound, sound[0].size());
+  const Power left(residual, sound[0].size());
+  const double all = whole.between(0.0, pi);
+  std::vector<OctaveResidual> octaves;
+  for (double centre_hz = 31.25; centre_hz < 0.45 * rate_hz && centre_hz < 20000.0;
+       centre_hz *= 2.0) {
+    OctaveResidual octave{.low_hz = centre_hz / std::numbers::sqrt2,
+                          .high_hz = std::min(centre_hz * std::numbers::sqrt2, 0.5 * rate_hz)};
+    const double low = 2.0 * pi * octave.low_hz / rate_hz;
+    const double high = 2.0 * pi * octave.high_hz / rate_hz;
+    const double there = whole.between(low, high);
+    octave.level_db = decibels(there / all);
+    octave.residual_db = decibels(left.between(low, high) / std::max(there, 1e-300));
+    octaves.push_back(octave);
+  }
+  return octaves;
+}
+
+void warn_of_recording(const Blow& blow, Identification& found) {
+  const double rings_s = found.analysed_s;
+  if (blow.clipped > 0) {
+    found.warnings.push_back(std::to_string(blow.clipped) +
+                             " samples are clipped: modes that are none, and amplitudes that are "
+                             "too small, come of that");
+  }
+  if (blow.offset > 0.01) {
+    found.warnings.push_back("it has an offset (DC) of " + number("%.0f", 100.0 * blow.offset) +
+                             " % of its peak, which is left out");
+  }
+  if (blow.length_s > longest_ring_s + 0.001 && rings_s > longest_ring_s - 0.001) {
+    found.warnings.push_back("only the first " + number("%.0f", longest_ring_s) +
+                             " s after the blow, at " + number("%.3g", found.onset_s) +
+                             " s, are looked at");
+  }
+}
+
+}  // namespace
+
+Result<Identification> identify(const Recording& recording, const IdentifyOptions& options,
+                                const Progress& progress) try {
+  progress.stage("looking for the blow");
+  auto blow = find_blow(recording);
+  if (!blow) {
+    return blow.error();
+  }
+  const double rate_hz = recording.rate_hz;
+  const std::size_t frames = blow->channels[0].size();
+  Identification made{.rate_hz = rate_hz,
+                      .onset_s = static_cast<double>(blow->first) / rate_hz,
+                      .analysed_s = static_cast<double>(frames) / rate_hz};
+  warn_of_recording(*blow, made);
+  made.sound = std::move(blow->channels);
+  Search search(made.sound, progress);
+  search_all(search, rate_hz);
+
+  std::vector<Found> kept;
+  double steady_hz = 0.0;
+  double steady_energy = 0.0;
+  std::size_t steady = 0;
+  for (Found& found : all_found(search.fit())) {
+    const Fate fate = fate_of(found, rate_hz);
+    if (fate == Fate::kept) {
+      kept.push_back(std::move(found));
+    } else if (fate == Fate::steady) {
+      ++steady;
+      if (energy_of(found.mode, frames) > steady_energy) {
+        steady_energy = energy_of(found.mode, frames);
+        steady_hz = found.mode.log_z.imag() * rate_hz / (2.0 * pi);
+      }
+    }
+  }
+  std::sort(kept.begin(), kept.end(), [&](const Found& a, const Found& b) {
+    return energy_of(a.mode, frames) > energy_of(b.mode, frames);
+  });
+  std::size_t count = 0;
+  while (count < std::min(kept.size(), options.most_modes) &&
+         energy_of(kept[count].mode, frames) >=
+             energy_of(kept[0].mode, frames) * std::pow(10.0, options.floor_db / 10.0)) {
+    ++count;
+  }
+  kept.resize(count);
+  if (steady > 0) {
+    made.warnings.push_back((steady == 1 ? "a tone" : std::to_string(steady) + " tones") +
+                            std::string(" that cannot be seen to decay ") +
+                            (steady == 1 ? "is" : "are") + " left out, " +
+                            (steady == 1 ? "" : "the loudest ") + "at " +
+                            number("%.1f Hz", steady_hz));
+  }
+  if (kept.empty()) {
+    return Error{"nothing in it rings: no decaying tone rises out of its noise"};
+  }
+  std::sort(kept.begin(), kept.end(), [](const Found& a, const Found& b) {
+    return a.mode.log_z.imag() < b.mode.log_z.imag();
+  });
+
+  const double time_zero = time_of_impulse(kept, rate_hz);
+  made.time_zero_s = made.onset_s + time_zero / rate_hz;
+  std::vector<DampedMode> modes;
+  for (const Found& found : kept) {
+    made.modes.push_back(measured(found, rate_hz, time_zero));
+    modes.push_back(found.mode);
+  }
+  search.fit().set_modes(std::move(modes));
+  made.residual = search.fit().rest();
+  for (std::size_t c = 0; c < made.sound.size(); ++c) {
+    for (double& x : made.sound[c]) {
+      x -= search.fit().constant()[c];
+    }
+  }
+  double all = 0.0;
+  for (const std::vector<double>& channel : made.sound) {
+    for (const double x : channel) {
+      all += x * x;
+    }
+  }
+  made.residual_db = decibels(search.fit().rest_energy() / std::max(all, 1e-300));
+  made.octaves = by_octave(made.sound, made.residual, rate_hz);
+  if (made.residual_db > -6.0) {
+    made.warnings.push_back("the modes explain only " +
+                            number("%.0f", 100.0 * (1.0 - std::pow(10.0, made.residual_db / 10.0))) +
+                            " % of its energy: this is not the ringing of one blow");
+  }
+  return made;
+} catch (const Stopped&) {
+  return Error{stopped};
+}
+
+}  // namespace ressort
