@@ -16,11 +16,12 @@ constexpr Complex i_unit{0.0, 1.0};
 // The sums over all samples of products of two columns Re(f n^p z^n), Re(g n^q w^n): what the pair
 // of poles has to say to all of them.
 struct PairSums {
-  PairSums(Complex log_z, Complex log_w, std::size_t frames)
-      : straight(power_sums(log_z + log_w, frames)),
-        turned(power_sums(log_z + std::conj(log_w), frames)) {}
+  PairSums(const Powers& z, const Powers& w, std::size_t frames)
+      : straight(power_sums(z * w, frames)), turned(power_sums(z * w.conjugate(), frames)) {}
   double product(Complex f, Complex g, int power) const {
-    return 0.5 * (f * g * straight.of_power[power] + f * std::conj(g) * turned.of_power[power]).real();
+    return 0.5 * times(f, times(g, straight.of_power[power]) +
+                              times(std::conj(g), turned.of_power[power]))
+                     .real();
   }
 
   PowerSums straight;
@@ -39,24 +40,32 @@ struct Normal {
     if (with_poles) {
       mixed.assign(channels, Matrix(2 * count + 1, 2 * count));
     }
-    for (std::size_t j = 0; j <= count; ++j) {  // the last one is the constant
-      const Complex log_j = j < count ? modes[j].log_z : Complex();
-      for (std::size_t k = 0; k <= count; ++k) {
-        if (k < j && !with_poles) {
-          continue;
-        }
-        const PairSums sums(log_j, k < count ? modes[k].log_z : Complex(), frames);
+    std::vector<Powers> powers;
+    for (const DampedMode& mode : modes) {
+      powers.emplace_back(mode.log_z, frames);
+    }
+    powers.emplace_back(Complex(), frames);  // the constant's
+    for (std::size_t j = 0; j <= count; ++j) {
+      for (std::size_t k = j; k <= count; ++k) {
+        const PairSums sums(powers[j], powers[k], frames);
         for (std::size_t a = 0; a < (j < count ? 2 : 1); ++a) {
           for (std::size_t b = 0; b < (k < count ? 2 : 1); ++b) {
-            const double product = sums.product(factor[a], factor[b], 0);
-            linear(2 * j + a, 2 * k + b) = product;
-            linear(2 * k + b, 2 * j + a) = product;
-            for (std::size_t c = 0; c < mixed.size() && k < count; ++c) {
-              const Complex moved = factor[b] * modes[k].c[c];
-              mixed[c](2 * j + a, 2 * k + b) = sums.product(factor[a], moved, 1);
-              if (j < count) {
-                poles(2 * j + a, 2 * k + b) +=
-                    sums.product(factor[a] * modes[j].c[c], moved, 2);
+            const std::size_t row = 2 * j + a;
+            const std::size_t column = 2 * k + b;
+            const double both = sums.product(factor[a], factor[b], 0);
+            linear(row, column) = both;
+            linear(column, row) = both;
+            for (std::size_t c = 0; c < mixed.size(); ++c) {
+              const Complex moved_j = j < count ? times(factor[a], modes[j].c[c]) : Complex();
+              const Complex moved_k = k < count ? times(factor[b], modes[k].c[c]) : Complex();
+              if (k < count) {
+                mixed[c](row, column) = sums.product(factor[a], moved_k, 1);
+                const double of_poles = sums.product(moved_j, moved_k, 2);
+                poles(row, column) += of_poles;
+                poles(column, row) += j == k ? 0.0 : of_poles;
+              }
+              if (j < count && j != k) {
+                mixed[c](column, row) = sums.product(moved_j, factor[b], 1);
               }
             }
           }

@@ -20,6 +20,7 @@ constexpr double twin = 0.15;             // nearer than this share of the dampi
 constexpr double chance = 21.0;           // squared amplitude over twice its variance: no accident
 constexpr double deepest_db = -110.0;     // below the mode with most energy
 constexpr std::size_t most_fitted = 450;  // at once
+constexpr double rounding = 1e-24;        // of the sound's energy: nothing is left to find
 constexpr double lowest_hz = 15.0;
 constexpr double least_quality = 0.5;
 constexpr double sure = 3.0;  // standard deviations
@@ -46,7 +47,7 @@ class Noise {
     const double alpha = -log_z.real();
     const double omega = log_z.imag();
     std::size_t i = 0;
-    while (i + 1 < powers_.size() && static_cast<double>(powers_[i + 1].frames()) * alpha > 4.0) {
+    while (i + 1 < powers_.size() && static_cast<double>(powers_[i + 1].frames()) * alpha > 2.0) {
       ++i;
     }
     const double half_width = std::max({8.0 * pi / static_cast<double>(powers_[i].frames()),
@@ -81,13 +82,14 @@ class Search {
   Search(const std::vector<std::vector<double>>& sound, const Progress& progress)
       : sound_(sound), progress_(progress), fit_(sound) {
     fit_.set_poles({});  // the constant alone
+    sound_energy_ = fit_.rest_energy();
   }
 
   DampedFit& fit() { return fit_; }
 
   // What this search finds in the first so many samples of the rest joins the others.
   void look(const PoleSearch& search, std::size_t frames) {
-    if (frames < shortest_for(search)) {
+    if (frames < shortest_for(search) || fit_.rest_energy() < rounding * sound_energy_) {
       return;
     }
     std::vector<std::vector<double>> start;
@@ -102,16 +104,12 @@ class Search {
     progress_.stage("fitting the modes to the sound");
     add(strongest(std::move(found), start));
     drop_accidents();
-    fit_.refine(6, progress_);
-    drop_accidents();
+    settle(4);
   }
 
   void finish() {
     progress_.stage("fitting the modes to the sound");
-    fit_.refine(20, progress_);
-    if (drop_accidents()) {
-      fit_.refine(20, progress_);
-    }
+    settle(20);
   }
 
   std::size_t frames() const { return sound_[0].size(); }
@@ -162,55 +160,78 @@ class Search {
     fit_.set_poles(known);
   }
 
-  // Takes back what noise would do as well, the least likely modes first. Whether there were any.
-  bool drop_accidents() {
-    bool has_dropped = false;
-    for (int round = 0; round < 12 && !fit_.modes().empty(); ++round) {
-      const std::vector<DampedMode>& modes = fit_.modes();
-      const std::vector<DampedDeviation> deviations = fit_.deviations(false);
-      const Noise noise(fit_.rest());
-      double loudest = 0.0;
-      for (const DampedMode& mode : modes) {
-        loudest = std::max(loudest, energy_of(mode, frames()));
-      }
-      const double least = loudest * std::pow(10.0, deepest_db / 10.0);
-      std::vector<std::pair<double, Complex>> likelihoods;
-      for (std::size_t k = 0; k < modes.size(); ++k) {
-        double likelihood = 0.0;
-        for (std::size_t c = 0; c < modes[k].c.size(); ++c) {
-          const double deviation = deviations[k].c[c];
-          likelihood += std::norm(modes[k].c[c]) /
-                        (1e-300 + 2.0 * deviation * deviation * noise.variance(modes[k].log_z));
-        }
-        likelihood = energy_of(modes[k], frames()) < least ? 0.0 : likelihood;
-        likelihoods.emplace_back(likelihood, modes[k].log_z);
-      }
-      std::sort(likelihoods.begin(), likelihoods.end(),
-                [](const auto& a, const auto& b) { return a.first < b.first; });
-      const double wanted = chance + static_cast<double>(sound_.size() - 1);
-      const auto accidents = static_cast<std::size_t>(
-          std::count_if(likelihoods.begin(), likelihoods.end(),
-                        [&](const auto& likely) { return !(likely.first >= wanted); }));
-      if (accidents == 0) {
-        break;
-      }
-      const auto sure_accidents = static_cast<std::size_t>(
-          std::count_if(likelihoods.begin(), likelihoods.end(),
-                        [](const auto& likely) { return !(likely.first >= 1.0); }));
-      const std::size_t dropped = std::max(sure_accidents, (accidents + 1) / 2);
-      std::vector<Complex> kept;
-      for (std::size_t i = dropped; i < likelihoods.size(); ++i) {
-        kept.push_back(likelihoods[i].second);
-      }
-      fit_.set_poles(kept);
-      has_dropped = true;
+  // Refines until every mode is more than noise, and more than a part of its neighbour.
+  void settle(int steps) {
+    fit_.refine(steps, progress_);
+    for (int round = 0; round < 6 && drop_unlikely(true); ++round) {
+      fit_.refine(steps, progress_);
     }
-    return has_dropped;
+  }
+
+  // Takes back what noise would do as well, the least likely modes first.
+  void drop_accidents() {
+    for (int round = 0; round < 12 && drop_unlikely(false); ++round) {
+    }
+  }
+
+  // Drops some of the modes that are unlikely where the poles are certain or, `with_poles`, are not,
+  // but of neighbours, which may all be unlikely beside each other, one. Whether there were any.
+  bool drop_unlikely(bool with_poles) {
+    const std::vector<DampedMode>& modes = fit_.modes();
+    if (modes.empty()) {
+      return false;
+    }
+    const std::vector<DampedDeviation> deviations = fit_.deviations(with_poles);
+    const Noise noise(fit_.rest());
+    double loudest = 0.0;
+    for (const DampedMode& mode : modes) {
+      loudest = std::max(loudest, energy_of(mode, frames()));
+    }
+    const double least = loudest * std::pow(10.0, deepest_db / 10.0);
+    const double wanted = chance + static_cast<double>(sound_.size() - 1);
+    std::vector<std::pair<double, Complex>> unlikely;
+    std::vector<Complex> kept;
+    for (std::size_t k = 0; k < modes.size(); ++k) {
+      double likelihood = 0.0;
+      for (std::size_t c = 0; c < modes[k].c.size(); ++c) {
+        const double deviation = deviations[k].c[c];
+        likelihood += std::norm(modes[k].c[c]) /
+                      (1e-300 + 2.0 * deviation * deviation * noise.variance(modes[k].log_z));
+      }
+      if (energy_of(modes[k], frames()) < least || !(likelihood >= wanted)) {
+        unlikely.emplace_back(energy_of(modes[k], frames()) < least ? 0.0 : likelihood,
+                              modes[k].log_z);
+      } else {
+        kept.push_back(modes[k].log_z);
+      }
+    }
+    if (unlikely.empty()) {
+      return false;
+    }
+    std::sort(unlikely.begin(), unlikely.end(),
+              [](const auto& a, const auto& b) { return a.first < b.first; });
+    std::vector<Complex> dropped;
+    for (std::size_t i = 0; i < unlikely.size(); ++i) {
+      const Complex log_z = unlikely[i].second;
+      const bool has_gone_beside =
+          std::any_of(dropped.begin(), dropped.end(), [&](Complex other) {
+            return std::fabs(log_z.imag() - other.imag()) <
+                   4.0 * std::max(-log_z.real(), -other.real()) + 8.0 / static_cast<double>(frames());
+          });
+      if (unlikely[i].first >= 1.0 && has_gone_beside) {
+        kept.push_back(log_z);
+      } else {
+        dropped.push_back(log_z);
+      }
+    }
+    fit_.set_poles(kept);
+    return true;
   }
 
   const std::vector<std::vector<double>>& sound_;
   const Progress& progress_;
   DampedFit fit_;
+  double sound_energy_ = 0.0;
 };
 
 void search_all(Search& search, double rate_hz) {

@@ -15,11 +15,13 @@ constexpr std::size_t taps_per_step = 14;  // of the filter, for each sample tha
 constexpr double kaiser_beta = 12.0;       // 118 dB between pass and stop
 constexpr double cutoff = 0.4;             // of the lower rate; what is kept is within 0.25
 constexpr std::size_t longest_window = 128;
-constexpr std::size_t least_frames = 48;   // of a band
+constexpr std::size_t least_window = 32;
+constexpr std::size_t least_frames = 96;   // of a band
 constexpr std::size_t energy_frames = 16;  // whose energy says whether it still rings
 constexpr std::size_t most_poles = 40;     // of a band
 constexpr double above_median = 25.0;      // the eigenvalue of what is no noise
 constexpr double leak = 3e-12;             // of the loudest band's largest: what filters let through
+constexpr double most_lost = 4.0;      // nepers of a pole while the filter fills
 constexpr double lowest_omega = 0.0005;
 constexpr double peaked = 8.0;             // largest eigenvalue over the mean: else it is noise
 
@@ -118,7 +120,8 @@ std::size_t ringing_frames(const Band& band) {
   while (last > 0 && energies[last - 1] < 4.0 * noise) {
     --last;
   }
-  return std::clamp(last * energy_frames, std::min(all, 3 * longest_window), all);
+  // Where nothing stands out, what is weak and long may still be in all of it.
+  return last == 0 ? all : std::clamp(last * energy_frames * 5 / 4, std::min(all, least_window * 3), all);
 }
 
 // The mean over all windows of x[i] conj(x[j]), i and j within a window: each diagonal from its
@@ -131,12 +134,13 @@ ComplexMatrix covariance(const Band& band, std::size_t frames, std::size_t windo
     for (std::size_t lag = 0; lag < window; ++lag) {
       Complex sum;
       for (std::size_t n = 0; n < windows; ++n) {
-        sum += x[n + lag] * std::conj(x[n]);
+        sum += times(x[n + lag], std::conj(x[n]));
       }
       for (std::size_t j = 0; j + lag < window; ++j) {
         made(j + lag, j) += share * sum;
         if (j + lag + 1 < window) {
-          sum += x[windows + j + lag] * std::conj(x[windows + j]) - x[j + lag] * std::conj(x[j]);
+          sum += times(x[windows + j + lag], std::conj(x[windows + j])) -
+                 times(x[j + lag], std::conj(x[j]));
         }
       }
     }
@@ -162,7 +166,7 @@ double largest_eigenvalue(const ComplexMatrix& lower) {
     std::vector<Complex> to(size);
     for (std::size_t j = 0; j < size; ++j) {
       for (std::size_t i = 0; i < size; ++i) {
-        to[i] += whole(i, j) * from[j];
+        to[i] += times(whole(i, j), from[j]);
       }
     }
     double square = 0.0;
@@ -215,7 +219,7 @@ void find_in(const Candidate& candidate, double loudest, std::size_t decimation,
     const Complex log_z = std::log(z) / steps;
     const double omega = candidate.centre + log_z.imag();
     const bool is_kept = std::fabs(log_z.imag()) * steps <= 1.02 * 0.5 * pi &&
-                         -log_z.real() * steps > -0.02 && -log_z.real() * steps < 2.0 &&
+                         -log_z.real() * steps > -1.0 / static_cast<double>(candidate.frames) && -log_z.real() * steps < most_lost / static_cast<double>(taps_per_step) &&
                          omega > lowest_omega && omega < highest;
     if (is_kept) {
       poles.emplace_back(log_z.real(), omega);
