@@ -14,6 +14,7 @@ constexpr double audible = 1e-5;     // of the peak: where nothing was before
 constexpr double noise_factor = 5.0;  // above what was before
 constexpr double gap_s = 0.001;      // nothing for so long, and the blow has not begun
 constexpr double frame_s = 0.01;
+constexpr double least_s = 0.3;  // of what is looked at, where there is so much
 constexpr std::size_t clipped_run = 3;  // so many samples in a row at the peak
 
 std::string seconds(double s) {
@@ -74,7 +75,7 @@ std::size_t find_length(const std::vector<double>& loudness, std::size_t onset, 
     while (last > 0 && energies[last - 1] < 1.5 * *middle) {
       --last;
     }
-    ringing = std::max(2 * last * frame, static_cast<std::size_t>(rate_hz));
+    ringing = std::max(2 * last * frame, static_cast<std::size_t>(least_s * rate_hz));
   }
   return std::min({all, ringing, static_cast<std::size_t>(longest_ring_s * rate_hz)});
 }

@@ -87,11 +87,16 @@ class Search {
 
   DampedFit& fit() { return fit_; }
 
-  // What this search finds in the first so many samples of the rest joins the others.
-  void look(const PoleSearch& search, std::size_t frames) {
+  // What this search finds in the first so many samples of the rest joins the others. Those that are
+  // damped more than `most_alpha` were not for the searches before: they are looked for anew.
+  void look(const PoleSearch& search, std::size_t frames, double most_alpha) {
     if (frames < shortest_for(search) || fit_.rest_energy() < rounding * sound_energy_) {
       return;
     }
+    const std::vector<DampedMode> before = fit_.modes();
+    std::vector<DampedMode> kept = before;
+    std::erase_if(kept, [&](const DampedMode& mode) { return -mode.log_z.real() > most_alpha; });
+    fit_.set_modes(kept);
     std::vector<std::vector<double>> start;
     for (const std::vector<double>& channel : fit_.rest()) {
       start.emplace_back(channel.begin(), channel.begin() + static_cast<std::ptrdiff_t>(frames));
@@ -99,6 +104,7 @@ class Search {
     progress_.stage("searching for modes");
     std::vector<Complex> found = find_poles(start, search, progress_);
     if (found.empty()) {
+      fit_.set_modes(before);
       return;
     }
     progress_.stage("fitting the modes to the sound");
@@ -218,7 +224,7 @@ class Search {
             return std::fabs(log_z.imag() - other.imag()) <
                    4.0 * std::max(-log_z.real(), -other.real()) + 8.0 / static_cast<double>(frames());
           });
-      if (unlikely[i].first >= 1.0 && has_gone_beside) {
+      if ((with_poles || unlikely[i].first >= 1.0) && has_gone_beside) {
         kept.push_back(log_z);
       } else {
         dropped.push_back(log_z);
@@ -239,13 +245,22 @@ void search_all(Search& search, double rate_hz) {
   const auto decimation = std::size_t{1}
                           << static_cast<unsigned>(std::max(
                                  1.0, std::round(std::log2(rate_hz / band_hz))));
-  const auto within = [&](double seconds) {
-    return std::min(search.frames(), static_cast<std::size_t>(seconds * rate_hz));
+  struct Stage {
+    std::size_t decimation;
+    double length_s;
+    double most_alpha;  // times the samples that the search before has lost
   };
-  search.look({decimation, highest}, search.frames());
-  search.look({std::max<std::size_t>(2, decimation / 4), highest}, within(0.7));
-  search.look({std::max<std::size_t>(2, decimation / 16), highest}, within(0.12));
-  search.look({decimation, highest}, search.frames());
+  const Stage stages[] = {{decimation, longest_ring_s, HUGE_VAL},
+                          {std::max<std::size_t>(2, decimation / 4), 0.7, 1.5},
+                          {std::max<std::size_t>(2, decimation / 16), 0.12, 1.5},
+                          {decimation, longest_ring_s, HUGE_VAL}};
+  std::size_t lost = 1;
+  for (const Stage& stage : stages) {
+    const PoleSearch wanted{stage.decimation, highest};
+    search.look(wanted, std::min(search.frames(), static_cast<std::size_t>(stage.length_s * rate_hz)),
+                stage.most_alpha / static_cast<double>(lost));
+    lost = frames_lost(wanted);
+  }
   search.finish();
 }
 

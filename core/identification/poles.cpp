@@ -229,8 +229,12 @@ void find_in(const Candidate& candidate, double loudest, std::size_t decimation,
 
 }  // namespace
 
+std::size_t frames_lost(const PoleSearch& search) {
+  return taps_per_step * search.decimation;
+}
+
 std::size_t shortest_for(const PoleSearch& search) {
-  return (taps_per_step + least_frames) * search.decimation + 1;
+  return frames_lost(search) + least_frames * search.decimation + 1;
 }
 
 std::vector<Complex> find_poles(std::span<const std::vector<double>> channels,

@@ -20,6 +20,9 @@ struct PoleSearch {
   double highest_omega = 3.0;   // per sample
 };
 
+// How many samples pass before its filter is full.
+std::size_t frames_lost(const PoleSearch& search);
+
 // The shortest sound that such a search can do anything with, in samples.
 std::size_t shortest_for(const PoleSearch& search);
 
