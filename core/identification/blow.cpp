@@ -16,6 +16,7 @@ constexpr double gap_s = 0.001;      // nothing for so long, and the blow has no
 constexpr double frame_s = 0.01;
 constexpr double least_s = 0.3;  // of what is looked at, where there is so much
 constexpr std::size_t clipped_run = 3;  // so many samples in a row at the peak
+constexpr double most_skipped = 0.25;   // of what follows the blow, because of that
 
 std::string seconds(double s) {
   char text[32];
@@ -80,20 +81,26 @@ std::size_t find_length(const std::vector<double>& loudness, std::size_t onset, 
   return std::min({all, ringing, static_cast<std::size_t>(longest_ring_s * rate_hz)});
 }
 
-std::size_t count_clipped(const Recording& recording, double peak) {
+struct Clipped {
   std::size_t count = 0;
+  std::size_t end = 0;  // behind the last of them
+};
+
+Clipped find_clipped(const Recording& recording, double peak) {
+  Clipped clipped;
   for (const std::vector<double>& channel : recording.channels) {
     std::size_t run = 0;
     for (std::size_t n = 0; n <= channel.size(); ++n) {
       const bool is_at_peak = n < channel.size() && std::fabs(channel[n]) >= peak * (1.0 - 1e-9);
       const bool goes_on = is_at_peak && (run == 0 || channel[n] == channel[n - 1]);
-      if (!goes_on) {
-        count += run >= clipped_run ? run : 0;
+      if (!goes_on && run >= clipped_run) {
+        clipped.count += run;
+        clipped.end = std::max(clipped.end, n);
       }
       run = goes_on ? run + 1 : is_at_peak ? 1 : 0;
     }
   }
-  return count;
+  return clipped;
 }
 
 }  // namespace
@@ -137,13 +144,19 @@ Result<Blow> find_blow(const Recording& recording) {
     return Error{"it ends " + seconds(blow.length_s) + " after the blow; at least " +
                  seconds(shortest_ring_s) + " of ringing are needed"};
   }
-  const std::size_t length = find_length(loudness, blow.first, recording.rate_hz);
+  const Clipped clipped = find_clipped(recording, largest);
+  blow.clipped = clipped.count;
+  const auto latest = static_cast<std::size_t>(most_skipped * static_cast<double>(left));
+  if (clipped.end > blow.first && clipped.end - blow.first <= latest) {
+    blow.skipped = clipped.end - blow.first;
+  }
+  const std::size_t first = blow.first + blow.skipped;
+  const std::size_t length = find_length(loudness, first, recording.rate_hz);
   for (std::size_t c = 0; c < channels.size(); ++c) {
-    const auto from = channels[c].begin() + static_cast<std::ptrdiff_t>(blow.first);
+    const auto from = channels[c].begin() + static_cast<std::ptrdiff_t>(first);
     blow.channels.emplace_back(from, from + static_cast<std::ptrdiff_t>(length));
     blow.offset = std::max(blow.offset, std::fabs(means[c]) / peak);
   }
-  blow.clipped = count_clipped(recording, largest);
   return blow;
 }
 

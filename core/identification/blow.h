@@ -21,9 +21,10 @@ inline constexpr double shortest_ring_s = 0.02;  // with less there is nothing t
 
 struct Blow {
   std::size_t first = 0;                      // sample of the recording
-  std::vector<std::vector<double>> channels;  // from there on, as long as it rings, and some noise
+  std::size_t skipped = 0;                    // after it: they are clipped, or between such
+  std::vector<std::vector<double>> channels;  // then, as long as it rings, and some noise
   double offset = 0.0;                        // largest mean of a channel, of the peak
-  std::size_t clipped = 0;                    // samples that stand at the peak beside others
+  std::size_t clipped = 0;                    // samples that stand at the peak beside others, in all
   double length_s = 0.0;                      // from the blow to the recording's end
 };
 

@@ -35,7 +35,7 @@ std::string number(const char* form, double value) {
 class Noise {
  public:
   explicit Noise(const std::vector<std::vector<double>>& rest) : channels_(rest.size()) {
-    for (std::size_t frames = rest[0].size(); frames >= 256; frames /= 4) {
+    for (std::size_t frames = std::bit_floor(rest[0].size()); frames >= 256; frames /= 4) {
       powers_.emplace_back(rest, frames);
     }
     if (powers_.empty()) {
@@ -272,13 +272,25 @@ struct Found {
 
 enum class Fate { kept, steady, unfit };
 
+// The same at an earlier time.
+void go_back(Found& found, double samples) {
+  for (std::size_t c = 0; c < found.mode.c.size(); ++c) {
+    found.mode.c[c] *= std::exp(-found.mode.log_z * samples);
+    // Where its start was not seen, the pole's deviation adds to it.
+    found.deviation.c[c] =
+        std::hypot(found.deviation.c[c] * std::exp(-found.mode.log_z.real() * samples),
+                   std::abs(found.mode.c[c]) * found.deviation.alpha * samples);
+  }
+}
+
 Fate fate_of(const Found& found, double rate_hz) {
   const double alpha = -found.mode.log_z.real();
   const double omega = found.mode.log_z.imag();
   if (!(alpha > sure * found.deviation.alpha) || alpha * rate_hz < 0.05) {
     return Fate::steady;
   }
-  const bool rings = omega > 2.0 * pi * lowest_hz / rate_hz && omega < 0.999 * pi &&
+  const bool is_known = found.deviation.alpha < 0.5 * alpha;
+  const bool rings = is_known && omega > 2.0 * pi * lowest_hz / rate_hz && omega < 0.999 * pi &&
                      omega > 2.0 * least_quality * alpha &&
                      omega <= 2.0 * pi * highest_mode_hz / rate_hz;
   return rings ? Fate::kept : Fate::unfit;
@@ -372,9 +384,13 @@ std::vector<OctaveResidual> by_octave(const std::vector<std::vector<double>>& so
 void warn_of_recording(const Blow& blow, Identification& found) {
   const double rings_s = found.analysed_s;
   if (blow.clipped > 0) {
-    found.warnings.push_back(std::to_string(blow.clipped) +
-                             " samples are clipped: modes that are none, and amplitudes that are "
-                             "too small, come of that");
+    found.warnings.push_back(
+        std::to_string(blow.clipped) + " samples are clipped: " +
+        (blow.skipped > 0 ? "the first " + number("%.3g", 1e3 * static_cast<double>(blow.skipped) /
+                                                              found.rate_hz) +
+                                " ms are concluded from what follows"
+                          : "modes that are none, and amplitudes that are too small, may come of "
+                            "that"));
   }
   if (blow.offset > 0.01) {
     found.warnings.push_back("it has an offset (DC) of " + number("%.0f", 100.0 * blow.offset) +
@@ -400,6 +416,7 @@ Result<Identification> identify(const Recording& recording, const IdentifyOption
   const std::size_t frames = blow->channels[0].size();
   Identification made{.rate_hz = rate_hz,
                       .onset_s = static_cast<double>(blow->first) / rate_hz,
+                      .skipped_s = static_cast<double>(blow->skipped) / rate_hz,
                       .analysed_s = static_cast<double>(frames) / rate_hz};
   warn_of_recording(*blow, made);
   made.sound = std::move(blow->channels);
@@ -410,8 +427,10 @@ Result<Identification> identify(const Recording& recording, const IdentifyOption
   double steady_hz = 0.0;
   double steady_energy = 0.0;
   std::size_t steady = 0;
+  const auto skipped = static_cast<double>(blow->skipped);
   for (Found& found : all_found(search.fit())) {
     const Fate fate = fate_of(found, rate_hz);
+    go_back(found, skipped);
     if (fate == Fate::kept) {
       kept.push_back(std::move(found));
     } else if (fate == Fate::steady) {
@@ -452,6 +471,9 @@ Result<Identification> identify(const Recording& recording, const IdentifyOption
   for (const Found& found : kept) {
     made.modes.push_back(measured(found, rate_hz, time_zero));
     modes.push_back(found.mode);
+    for (Complex& c : modes.back().c) {
+      c *= std::exp(found.mode.log_z * skipped);
+    }
   }
   search.fit().set_modes(std::move(modes));
   made.residual = search.fit().rest();

@@ -45,12 +45,13 @@ struct Identification {
   double rate_hz = 0.0;
   double onset_s = 0.0;     // the blow, from the recording's start
   double time_zero_s = 0.0;  // when one impulse would have had to come, so that all swing from 0
-  double analysed_s = 0.0;  // after the onset
+  double skipped_s = 0.0;   // after the onset, because it is clipped
+  double analysed_s = 0.0;  // then
   std::vector<IdentifiedMode> modes;  // by frequency
   double residual_db = 0.0;           // of what the modes leave of the whole sound, constants aside
   std::vector<OctaveResidual> octaves;
   std::vector<std::string> warnings;  // of the recording, and of what was found
-  std::vector<std::vector<double>> sound;     // what was looked at: from the onset on
+  std::vector<std::vector<double>> sound;     // what was looked at: from there on
   std::vector<std::vector<double>> residual;  // that, without the modes
 };
 
