@@ -9,12 +9,12 @@ namespace {
 
 constexpr std::size_t most_channels = 16;
 constexpr double lowest_rate_hz = 4000.0;
-constexpr double loud = 0.02;        // of the peak: the blow has begun
-constexpr double audible = 1e-5;     // of the peak: where nothing was before
+constexpr double loud = 0.02;         // of the peak: the blow has begun
+constexpr double audible = 1e-5;      // of the peak: where nothing was before
 constexpr double noise_factor = 5.0;  // above what was before
-constexpr double gap_s = 0.001;      // nothing for so long, and the blow has not begun
+constexpr double gap_s = 0.001;       // nothing for so long, and the blow has not begun
 constexpr double frame_s = 0.01;
-constexpr double least_s = 0.3;  // of what is looked at, where there is so much
+constexpr double least_s = 0.3;         // of what is looked at, where there is so much
 constexpr std::size_t clipped_run = 3;  // so many samples in a row at the peak
 constexpr double most_skipped = 0.25;   // of what follows the blow, because of that
 

@@ -24,8 +24,8 @@ struct Blow {
   std::size_t skipped = 0;                    // after it: they are clipped, or between such
   std::vector<std::vector<double>> channels;  // then, as long as it rings, and some noise
   double offset = 0.0;                        // largest mean of a channel, of the peak
-  std::size_t clipped = 0;                    // samples that stand at the peak beside others, in all
-  double length_s = 0.0;                      // from the blow to the recording's end
+  std::size_t clipped = 0;  // samples that stand at the peak beside others, in all
+  double length_s = 0.0;    // from the blow to the recording's end
 };
 
 // The error says why there is none: no samples, no numbers, silence, too short.

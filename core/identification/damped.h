@@ -41,8 +41,8 @@ struct Powers {
   Complex last;
 };
 
-// The sums over n < count of n^p z^n for p = 0, 1, 2. In closed form, or where z is so near to 1 that
-// this would lose digits, by doubling: O(log count).
+// The sums over n < count of n^p z^n for p = 0, 1, 2. In closed form, or where z is so near to 1
+// that this would lose digits, by doubling: O(log count).
 struct PowerSums {
   Complex of_power[3];
 };

@@ -28,8 +28,9 @@ struct PairSums {
   PowerSums turned;
 };
 
-// The normal equations. Linear columns: of each mode Re(z^n) and Re(i z^n), then the constant. Those
-// of the poles, per channel: of each mode Re(n c z^n), by -alpha, and Re(i n c z^n), by omega.
+// The normal equations. Linear columns: of each mode Re(z^n) and Re(i z^n), then the constant.
+// Those of the poles, per channel: of each mode Re(n c z^n), by -alpha, and Re(i n c z^n), by
+// omega.
 struct Normal {
   Normal(const std::vector<DampedMode>& modes, std::size_t channels, std::size_t frames,
          bool with_poles)
@@ -178,7 +179,8 @@ void DampedFit::refine(int steps, const Progress& progress) {
     const Normal normal(modes_, channels, frames, true);
     Matrix schur = normal.poles;
     Matrix wanted(2 * count, 1);
-    std::vector<Matrix> solved;  // [channel] by linear: what each pole's column brings, and the rest
+    std::vector<Matrix>
+        solved;  // [channel] by linear: what each pole's column brings, and the rest
     for (std::size_t c = 0; c < channels; ++c) {
       const Gradient gradient(rest_[c], modes_, c);
       auto both = positive_solution(normal.linear, beside(normal.mixed[c], gradient.linear));
@@ -219,12 +221,13 @@ void DampedFit::refine(int steps, const Progress& progress) {
           constant_[c] = constant_before[c] + linear(2 * count);
         }
         for (std::size_t k = 0; k < count; ++k) {
-          modes_[k].log_z =
-              before[k].log_z + Complex((*step)(2 * k, 0), (*step)(2 * k + 1, 0));
+          modes_[k].log_z = before[k].log_z + Complex((*step)(2 * k, 0), (*step)(2 * k + 1, 0));
         }
-        const bool is_sound = std::all_of(modes_.begin(), modes_.end(), [&](const DampedMode& mode) {
-          return mode.log_z.real() * static_cast<double>(frames) < 1.0 && mode.log_z.real() > -3.0;
-        });
+        const bool is_sound =
+            std::all_of(modes_.begin(), modes_.end(), [&](const DampedMode& mode) {
+              return mode.log_z.real() * static_cast<double>(frames) < 1.0 &&
+                     mode.log_z.real() > -3.0;
+            });
         if (is_sound) {
           find_rest();
           is_better = rest_energy() < energy;
@@ -250,8 +253,8 @@ void DampedFit::refine(int steps, const Progress& progress) {
 std::vector<DampedDeviation> DampedFit::deviations(bool with_poles) const {
   const std::size_t count = modes_.size();
   const std::size_t channels = sound_.size();
-  std::vector<DampedDeviation> all(
-      count, {HUGE_VAL, HUGE_VAL, std::vector<double>(channels, HUGE_VAL)});
+  std::vector<DampedDeviation> all(count,
+                                   {HUGE_VAL, HUGE_VAL, std::vector<double>(channels, HUGE_VAL)});
   if (count == 0) {
     return all;
   }
@@ -266,8 +269,7 @@ std::vector<DampedDeviation> DampedFit::deviations(bool with_poles) const {
     return all;
   }
   for (std::size_t k = 0; k < count; ++k) {
-    const double variance =
-        0.5 * ((*inverse)(2 * k, 2 * k) + (*inverse)(2 * k + 1, 2 * k + 1));
+    const double variance = 0.5 * ((*inverse)(2 * k, 2 * k) + (*inverse)(2 * k + 1, 2 * k + 1));
     all[k] = {0.0, 0.0, std::vector<double>(channels, std::sqrt(std::max(0.0, variance)))};
   }
   if (!with_poles) {

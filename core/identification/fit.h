@@ -1,5 +1,5 @@
-// core/identification: the damped sinusoids whose sum is nearest to a sound, all of their numbers at
-// once (Gauss-Newton with Levenberg's damping), and how uncertain each number is (the Cramer-Rao
+// core/identification: the damped sinusoids whose sum is nearest to a sound, all of their numbers
+// at once (Gauss-Newton with Levenberg's damping), and how uncertain each number is (the Cramer-Rao
 // bound at the noise that is left over). [any thread but audio]
 #pragma once
 
@@ -41,7 +41,7 @@ class DampedFit {
   void refine(int steps, const Progress& progress);
 
   const std::vector<DampedMode>& modes() const { return modes_; }
-  const std::vector<double>& constant() const { return constant_; }        // [channel]
+  const std::vector<double>& constant() const { return constant_; }       // [channel]
   const std::vector<std::vector<double>>& rest() const { return rest_; }  // [channel][sample]
   double rest_energy() const;
 

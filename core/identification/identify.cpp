@@ -50,8 +50,8 @@ class Noise {
     while (i + 1 < powers_.size() && static_cast<double>(powers_[i + 1].frames()) * alpha > 2.0) {
       ++i;
     }
-    const double half_width = std::max({8.0 * pi / static_cast<double>(powers_[i].frames()),
-                                        2.0 * alpha, 0.02 * omega, 0.002});
+    const double half_width = std::max(
+        {8.0 * pi / static_cast<double>(powers_[i].frames()), 2.0 * alpha, 0.02 * omega, 0.002});
     return powers_[i].density(omega, half_width) / static_cast<double>(channels_);
   }
 
@@ -71,8 +71,8 @@ double energy_of(const DampedMode& mode, std::size_t frames) {
 }
 
 bool are_twins(Complex a, Complex b, double share, std::size_t frames) {
-  const double near = std::max(share * std::min(-a.real(), -b.real()),
-                               0.02 / static_cast<double>(frames));
+  const double near =
+      std::max(share * std::min(-a.real(), -b.real()), 0.02 / static_cast<double>(frames));
   return std::abs(a - b) < near;
 }
 
@@ -87,8 +87,8 @@ class Search {
 
   DampedFit& fit() { return fit_; }
 
-  // What this search finds in the first so many samples of the rest joins the others. Those that are
-  // damped more than `most_alpha` were not for the searches before: they are looked for anew.
+  // What this search finds in the first so many samples of the rest joins the others. Those that
+  // are damped more than `most_alpha` were not for the searches before: they are looked for anew.
   void look(const PoleSearch& search, std::size_t frames, double most_alpha) {
     if (frames < shortest_for(search) || fit_.rest_energy() < rounding * sound_energy_) {
       return;
@@ -153,9 +153,8 @@ class Search {
     for (double share = twin; share < 20.0; share *= 4.0) {
       std::vector<Complex> all = known;
       for (const Complex log_z : found) {
-        if (std::none_of(all.begin(), all.end(), [&](Complex other) {
-              return are_twins(log_z, other, share, frames());
-            })) {
+        if (std::none_of(all.begin(), all.end(),
+                         [&](Complex other) { return are_twins(log_z, other, share, frames()); })) {
           all.push_back(log_z);
         }
       }
@@ -180,8 +179,9 @@ class Search {
     }
   }
 
-  // Drops some of the modes that are unlikely where the poles are certain or, `with_poles`, are not,
-  // but of neighbours, which may all be unlikely beside each other, one. Whether there were any.
+  // Drops some of the modes that are unlikely where the poles are certain or, `with_poles`, are
+  // not, but of neighbours, which may all be unlikely beside each other, one. Whether there were
+  // any.
   bool drop_unlikely(bool with_poles) {
     const std::vector<DampedMode>& modes = fit_.modes();
     if (modes.empty()) {
@@ -219,11 +219,10 @@ class Search {
     std::vector<Complex> dropped;
     for (std::size_t i = 0; i < unlikely.size(); ++i) {
       const Complex log_z = unlikely[i].second;
-      const bool has_gone_beside =
-          std::any_of(dropped.begin(), dropped.end(), [&](Complex other) {
-            return std::fabs(log_z.imag() - other.imag()) <
-                   4.0 * std::max(-log_z.real(), -other.real()) + 8.0 / static_cast<double>(frames());
-          });
+      const bool has_gone_beside = std::any_of(dropped.begin(), dropped.end(), [&](Complex other) {
+        return std::fabs(log_z.imag() - other.imag()) <
+               4.0 * std::max(-log_z.real(), -other.real()) + 8.0 / static_cast<double>(frames());
+      });
       if ((with_poles || unlikely[i].first >= 1.0) && has_gone_beside) {
         kept.push_back(log_z);
       } else {
@@ -242,9 +241,8 @@ class Search {
 
 void search_all(Search& search, double rate_hz) {
   const double highest = 2.0 * pi * std::min(0.45, highest_mode_hz / rate_hz);
-  const auto decimation = std::size_t{1}
-                          << static_cast<unsigned>(std::max(
-                                 1.0, std::round(std::log2(rate_hz / band_hz))));
+  const auto decimation = std::size_t{1} << static_cast<unsigned>(
+                              std::max(1.0, std::round(std::log2(rate_hz / band_hz))));
   struct Stage {
     std::size_t decimation;
     double length_s;
@@ -257,7 +255,8 @@ void search_all(Search& search, double rate_hz) {
   std::size_t lost = 1;
   for (const Stage& stage : stages) {
     const PoleSearch wanted{stage.decimation, highest};
-    search.look(wanted, std::min(search.frames(), static_cast<std::size_t>(stage.length_s * rate_hz)),
+    search.look(wanted,
+                std::min(search.frames(), static_cast<std::size_t>(stage.length_s * rate_hz)),
                 stage.most_alpha / static_cast<double>(lost));
     lost = frames_lost(wanted);
   }
@@ -386,11 +385,12 @@ void warn_of_recording(const Blow& blow, Identification& found) {
   if (blow.clipped > 0) {
     found.warnings.push_back(
         std::to_string(blow.clipped) + " samples are clipped: " +
-        (blow.skipped > 0 ? "the first " + number("%.3g", 1e3 * static_cast<double>(blow.skipped) /
-                                                              found.rate_hz) +
-                                " ms are concluded from what follows"
-                          : "modes that are none, and amplitudes that are too small, may come of "
-                            "that"));
+        (blow.skipped > 0
+             ? "the first " +
+                   number("%.3g", 1e3 * static_cast<double>(blow.skipped) / found.rate_hz) +
+                   " ms are concluded from what follows"
+             : "modes that are none, and amplitudes that are too small, may come of "
+               "that"));
   }
   if (blow.offset > 0.01) {
     found.warnings.push_back("it has an offset (DC) of " + number("%.0f", 100.0 * blow.offset) +
@@ -452,11 +452,10 @@ Result<Identification> identify(const Recording& recording, const IdentifyOption
   }
   kept.resize(count);
   if (steady > 0) {
-    made.warnings.push_back((steady == 1 ? "a tone" : std::to_string(steady) + " tones") +
-                            std::string(" that cannot be seen to decay ") +
-                            (steady == 1 ? "is" : "are") + " left out, " +
-                            (steady == 1 ? "" : "the loudest ") + "at " +
-                            number("%.1f Hz", steady_hz));
+    made.warnings.push_back(
+        (steady == 1 ? "a tone" : std::to_string(steady) + " tones") +
+        std::string(" that cannot be seen to decay ") + (steady == 1 ? "is" : "are") +
+        " left out, " + (steady == 1 ? "" : "the loudest ") + "at " + number("%.1f Hz", steady_hz));
   }
   if (kept.empty()) {
     return Error{"nothing in it rings: no decaying tone rises out of its noise"};
@@ -491,9 +490,10 @@ Result<Identification> identify(const Recording& recording, const IdentifyOption
   made.residual_db = decibels(search.fit().rest_energy() / std::max(all, 1e-300));
   made.octaves = by_octave(made.sound, made.residual, rate_hz);
   if (made.residual_db > -6.0) {
-    made.warnings.push_back("the modes explain only " +
-                            number("%.0f", 100.0 * (1.0 - std::pow(10.0, made.residual_db / 10.0))) +
-                            " % of its energy: this is not the ringing of one blow");
+    made.warnings.push_back(
+        "the modes explain only " +
+        number("%.0f", 100.0 * (1.0 - std::pow(10.0, made.residual_db / 10.0))) +
+        " % of its energy: this is not the ringing of one blow");
   }
   return made;
 } catch (const Stopped&) {

@@ -1,8 +1,9 @@
 // core/identification: the modes of a thing that was struck once, from a recording of how it rings.
 //
-// Poles by ESPRIT in sub-bands, first for what rings long, then in what is left of the first moments
-// for what is damped strongly, and once more in what is left of all; after each search every number
-// is fitted anew to the whole sound. What does not rise out of the noise around it is taken back.
+// Poles by ESPRIT in sub-bands, first for what rings long, then in what is left of the first
+// moments for what is damped strongly, and once more in what is left of all; after each search
+// every number is fitted anew to the whole sound. What does not rise out of the noise around it is
+// taken back.
 #pragma once
 
 #include <cstddef>
@@ -43,14 +44,14 @@ struct IdentifyOptions {
 
 struct Identification {
   double rate_hz = 0.0;
-  double onset_s = 0.0;     // the blow, from the recording's start
+  double onset_s = 0.0;      // the blow, from the recording's start
   double time_zero_s = 0.0;  // when one impulse would have had to come, so that all swing from 0
-  double skipped_s = 0.0;   // after the onset, because it is clipped
-  double analysed_s = 0.0;  // then
+  double skipped_s = 0.0;    // after the onset, because it is clipped
+  double analysed_s = 0.0;   // then
   std::vector<IdentifiedMode> modes;  // by frequency
   double residual_db = 0.0;           // of what the modes leave of the whole sound, constants aside
   std::vector<OctaveResidual> octaves;
-  std::vector<std::string> warnings;  // of the recording, and of what was found
+  std::vector<std::string> warnings;          // of the recording, and of what was found
   std::vector<std::vector<double>> sound;     // what was looked at: from there on
   std::vector<std::vector<double>> residual;  // that, without the modes
 };

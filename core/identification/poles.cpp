@@ -20,10 +20,10 @@ constexpr std::size_t least_frames = 96;   // of a band
 constexpr std::size_t energy_frames = 16;  // whose energy says whether it still rings
 constexpr std::size_t most_poles = 40;     // of a band
 constexpr double above_median = 25.0;      // the eigenvalue of what is no noise
-constexpr double leak = 3e-12;             // of the loudest band's largest: what filters let through
-constexpr double most_lost = 4.0;      // nepers of a pole while the filter fills
+constexpr double leak = 3e-12;     // of the loudest band's largest: what filters let through
+constexpr double most_lost = 4.0;  // nepers of a pole while the filter fills
 constexpr double lowest_omega = 0.0005;
-constexpr double peaked = 8.0;             // largest eigenvalue over the mean: else it is noise
+constexpr double peaked = 8.0;  // largest eigenvalue over the mean: else it is noise
 
 using Band = std::vector<std::vector<Complex>>;  // [channel][frame] at the lower rate
 
@@ -121,7 +121,8 @@ std::size_t ringing_frames(const Band& band) {
     --last;
   }
   // Where nothing stands out, what is weak and long may still be in all of it.
-  return last == 0 ? all : std::clamp(last * energy_frames * 5 / 4, std::min(all, least_window * 3), all);
+  return last == 0 ? all
+                   : std::clamp(last * energy_frames * 5 / 4, std::min(all, least_window * 3), all);
 }
 
 // The mean over all windows of x[i] conj(x[j]), i and j within a window: each diagonal from its
@@ -219,7 +220,8 @@ void find_in(const Candidate& candidate, double loudest, std::size_t decimation,
     const Complex log_z = std::log(z) / steps;
     const double omega = candidate.centre + log_z.imag();
     const bool is_kept = std::fabs(log_z.imag()) * steps <= 1.02 * 0.5 * pi &&
-                         -log_z.real() * steps > -1.0 / static_cast<double>(candidate.frames) && -log_z.real() * steps < most_lost / static_cast<double>(taps_per_step) &&
+                         -log_z.real() * steps > -1.0 / static_cast<double>(candidate.frames) &&
+                         -log_z.real() * steps < most_lost / static_cast<double>(taps_per_step) &&
                          omega > lowest_omega && omega < highest;
     if (is_kept) {
       poles.emplace_back(log_z.real(), omega);

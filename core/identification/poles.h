@@ -1,9 +1,9 @@
 // core/identification: where the poles of a sound are that rings freely: ESPRIT in sub-bands.
 //
-// Each band is shifted to 0, filtered and taken at a lower rate, so that few poles are in it and the
-// noise within it is flat. What follows one another by a sample in a sum of damped sinusoids spans
-// one subspace; how that subspace turns is a small matrix, and its eigenvalues are the poles. Roy
-// and Kailath 1989, "ESPRIT"; Laroche 1993, in sub-bands. [any thread but audio]
+// Each band is shifted to 0, filtered and taken at a lower rate, so that few poles are in it and
+// the noise within it is flat. What follows one another by a sample in a sum of damped sinusoids
+// spans one subspace; how that subspace turns is a small matrix, and its eigenvalues are the poles.
+// Roy and Kailath 1989, "ESPRIT"; Laroche 1993, in sub-bands. [any thread but audio]
 #pragma once
 
 #include <cstddef>

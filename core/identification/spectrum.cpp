@@ -22,8 +22,8 @@ void transform(std::vector<Complex>& values) {
   }
   std::vector<Complex> turns(size / 2);
   for (std::size_t k = 0; k < turns.size(); ++k) {
-    turns[k] = std::polar(1.0, -2.0 * std::numbers::pi * static_cast<double>(k) /
-                                   static_cast<double>(size));
+    turns[k] = std::polar(
+        1.0, -2.0 * std::numbers::pi * static_cast<double>(k) / static_cast<double>(size));
   }
   for (std::size_t half = 1; half < size; half *= 2) {
     const std::size_t step = size / (2 * half);
@@ -41,8 +41,7 @@ void transform(std::vector<Complex>& values) {
   }
 }
 
-Power::Power(std::span<const std::vector<double>> channels, std::size_t frames)
-    : frames_(frames) {
+Power::Power(std::span<const std::vector<double>> channels, std::size_t frames) : frames_(frames) {
   const std::size_t size = std::bit_ceil(std::max<std::size_t>(frames, 2));
   std::vector<double> power(size / 2 + 1);
   for (const std::vector<double>& channel : channels) {
