@@ -46,16 +46,27 @@ class Noise {
   double variance(Complex log_z) const {
     const double alpha = -log_z.real();
     const double omega = log_z.imag();
+    const Power& power = power_of(alpha);
+    const double half_width = std::max(
+        {8.0 * pi / static_cast<double>(power.frames()), 2.0 * alpha, 0.02 * omega, 0.002});
+    return power.density(omega, half_width) / static_cast<double>(channels_);
+  }
+  // The same of what is between the peaks of the rest.
+  double floor(Complex log_z) const {
+    const Power& power = power_of(-log_z.real());
+    return power.floor(log_z.imag(), std::max({-4.0 * log_z.real(), 0.05 * log_z.imag(), 0.01})) /
+           static_cast<double>(channels_);
+  }
+
+ private:
+  const Power& power_of(double alpha) const {
     std::size_t i = 0;
     while (i + 1 < powers_.size() && static_cast<double>(powers_[i + 1].frames()) * alpha > 2.0) {
       ++i;
     }
-    const double half_width = std::max(
-        {8.0 * pi / static_cast<double>(powers_[i].frames()), 2.0 * alpha, 0.02 * omega, 0.002});
-    return powers_[i].density(omega, half_width) / static_cast<double>(channels_);
+    return powers_[i];
   }
 
- private:
   std::vector<Power> powers_;  // of ever shorter beginnings
   std::size_t channels_;
 };
@@ -168,14 +179,14 @@ class Search {
   // Refines until every mode is more than noise, and more than a part of its neighbour.
   void settle(int steps) {
     fit_.refine(steps, progress_);
-    for (int round = 0; round < 6 && drop_unlikely(true); ++round) {
+    for (int round = 0; round < 10 && drop_unlikely(true); ++round) {
       fit_.refine(steps, progress_);
     }
   }
 
   // Takes back what noise would do as well, the least likely modes first.
   void drop_accidents() {
-    for (int round = 0; round < 12 && drop_unlikely(false); ++round) {
+    for (int round = 0; round < 40 && drop_unlikely(false); ++round) {
     }
   }
 
@@ -197,12 +208,23 @@ class Search {
     const double wanted = chance + static_cast<double>(sound_.size() - 1);
     std::vector<std::pair<double, Complex>> unlikely;
     std::vector<Complex> kept;
+    const double resolved = 8.0 * pi / static_cast<double>(frames());
+    const auto are_neighbours = [&](Complex a, Complex b) {
+      return std::fabs(a.imag() - b.imag()) < 4.0 * std::max(-a.real(), -b.real()) + resolved;
+    };
     for (std::size_t k = 0; k < modes.size(); ++k) {
+      // A peak may be no damped sinusoid and leave much, but a peak it is. What else is beside it
+      // has to be more than what it leaves.
+      const bool is_peak = std::none_of(modes.begin(), modes.end(), [&](const DampedMode& other) {
+        return are_neighbours(other.log_z, modes[k].log_z) &&
+               energy_of(other, frames()) > energy_of(modes[k], frames());
+      });
+      const double variance =
+          is_peak ? noise.floor(modes[k].log_z) : noise.variance(modes[k].log_z);
       double likelihood = 0.0;
       for (std::size_t c = 0; c < modes[k].c.size(); ++c) {
         const double deviation = deviations[k].c[c];
-        likelihood += std::norm(modes[k].c[c]) /
-                      (1e-300 + 2.0 * deviation * deviation * noise.variance(modes[k].log_z));
+        likelihood += std::norm(modes[k].c[c]) / (1e-300 + 2.0 * deviation * deviation * variance);
       }
       if (energy_of(modes[k], frames()) < least || !(likelihood >= wanted)) {
         unlikely.emplace_back(energy_of(modes[k], frames()) < least ? 0.0 : likelihood,
@@ -217,17 +239,11 @@ class Search {
     std::sort(unlikely.begin(), unlikely.end(),
               [](const auto& a, const auto& b) { return a.first < b.first; });
     std::vector<Complex> dropped;
-    for (std::size_t i = 0; i < unlikely.size(); ++i) {
-      const Complex log_z = unlikely[i].second;
-      const bool has_gone_beside = std::any_of(dropped.begin(), dropped.end(), [&](Complex other) {
-        return std::fabs(log_z.imag() - other.imag()) <
-               4.0 * std::max(-log_z.real(), -other.real()) + 8.0 / static_cast<double>(frames());
-      });
-      if ((with_poles || unlikely[i].first >= 1.0) && has_gone_beside) {
-        kept.push_back(log_z);
-      } else {
-        dropped.push_back(log_z);
-      }
+    for (const auto& [likelihood, log_z] : unlikely) {
+      const Complex here = log_z;
+      const bool has_gone_beside = std::any_of(
+          dropped.begin(), dropped.end(), [&](Complex gone) { return are_neighbours(here, gone); });
+      (has_gone_beside ? kept : dropped).push_back(here);
     }
     fit_.set_poles(kept);
     return true;
@@ -282,13 +298,14 @@ void go_back(Found& found, double samples) {
   }
 }
 
-Fate fate_of(const Found& found, double rate_hz) {
+Fate fate_of(const Found& found, double rate_hz, std::size_t frames) {
   const double alpha = -found.mode.log_z.real();
   const double omega = found.mode.log_z.imag();
-  if (!(alpha > sure * found.deviation.alpha) || alpha * rate_hz < 0.05) {
+  const bool is_seen_to_decay = alpha > sure * found.deviation.alpha;
+  if ((!is_seen_to_decay && alpha * static_cast<double>(frames) < 1.0) || alpha * rate_hz < 0.05) {
     return Fate::steady;
   }
-  const bool is_known = found.deviation.alpha < 0.5 * alpha;
+  const bool is_known = found.deviation.alpha < alpha;
   const bool rings = is_known && omega > 2.0 * pi * lowest_hz / rate_hz && omega < 0.999 * pi &&
                      omega > 2.0 * least_quality * alpha &&
                      omega <= 2.0 * pi * highest_mode_hz / rate_hz;
@@ -429,7 +446,7 @@ Result<Identification> identify(const Recording& recording, const IdentifyOption
   std::size_t steady = 0;
   const auto skipped = static_cast<double>(blow->skipped);
   for (Found& found : all_found(search.fit())) {
-    const Fate fate = fate_of(found, rate_hz);
+    const Fate fate = fate_of(found, rate_hz, frames);
     go_back(found, skipped);
     if (fate == Fate::kept) {
       kept.push_back(std::move(found));

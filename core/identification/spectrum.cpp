@@ -76,4 +76,19 @@ double Power::density(double omega, double half_width) const {
   return between(low, low + 2.0 * half) * std::numbers::pi / (2.0 * half);
 }
 
+double Power::floor(double omega, double half_width) const {
+  const std::size_t bins = sums_.size() - 1;
+  const double per_omega = static_cast<double>(bins - 1) / std::numbers::pi;
+  const auto half = static_cast<std::size_t>(std::max(16.0, half_width * per_omega));
+  const auto middle =
+      static_cast<std::size_t>(std::clamp(omega, 0.0, std::numbers::pi) * per_omega);
+  std::vector<double> around;
+  for (std::size_t k = middle - std::min(middle, half); k < std::min(bins, middle + half); ++k) {
+    around.push_back(sums_[k + 1] - sums_[k]);
+  }
+  const auto median = around.begin() + static_cast<std::ptrdiff_t>(around.size() / 2);
+  std::nth_element(around.begin(), median, around.end());
+  return *median / std::numbers::ln2 * static_cast<double>(bins - 1);
+}
+
 }  // namespace ressort

@@ -21,6 +21,8 @@ class Power {
   double between(double low_omega, double high_omega) const;
   // Of one sample and bin, so that white noise gives its variance; over a few bins around.
   double density(double omega, double half_width) const;
+  // The same, not of what stands out there but of what is between: by the median.
+  double floor(double omega, double half_width) const;
   std::size_t frames() const { return frames_; }
 
  private:
