@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstdio>
 #include <numbers>
+#include <optional>
 
 #include "core/identification/fit.h"
 #include "core/identification/poles.h"
@@ -71,6 +72,16 @@ class Noise {
   std::size_t channels_;
 };
 
+double energy_in(const std::vector<std::vector<double>>& channels) {
+  double sum = 0.0;
+  for (const std::vector<double>& channel : channels) {
+    for (const double x : channel) {
+      sum += x * x;
+    }
+  }
+  return sum;
+}
+
 // The sum of the squares of all samples of the mode, if it rang for ever, nearly.
 double energy_of(const DampedMode& mode, std::size_t frames) {
   double square = 0.0;
@@ -123,6 +134,9 @@ class Search {
     drop_accidents();
     settle(4);
   }
+
+  // Begins with these instead of a search.
+  void start(const std::vector<Complex>& poles) { fit_.set_poles(poles); }
 
   void finish() {
     progress_.stage("fitting the modes to the sound");
@@ -279,6 +293,38 @@ void search_all(Search& search, double rate_hz) {
   search.finish();
 }
 
+// How many samples of the beginning are no free ringing but the blow itself: so much more is left
+// of them than of what follows.
+std::size_t blow_frames(const std::vector<std::vector<double>>& rest, double rate_hz) {
+  constexpr double frame_s = 0.001;
+  constexpr double longest_s = 0.03;
+  constexpr double much_more = 10.0;
+  const auto frame = static_cast<std::size_t>(frame_s * rate_hz);
+  std::vector<double> energies;
+  for (std::size_t from = 0; from + frame <= rest[0].size(); from += frame) {
+    double energy = 0.0;
+    for (const std::vector<double>& channel : rest) {
+      for (std::size_t n = from; n < from + frame; ++n) {
+        energy += channel[n] * channel[n];
+      }
+    }
+    energies.push_back(energy);
+  }
+  const auto most = static_cast<std::size_t>(longest_s / frame_s);
+  if (energies.size() < 4 * most) {
+    return 0;
+  }
+  std::vector<double> following(energies.begin() + static_cast<std::ptrdiff_t>(most),
+                                energies.begin() + static_cast<std::ptrdiff_t>(4 * most));
+  const auto middle = following.begin() + static_cast<std::ptrdiff_t>(following.size() / 2);
+  std::nth_element(following.begin(), middle, following.end());
+  std::size_t frames = most;
+  while (frames > 0 && energies[frames - 1] <= much_more * *middle) {
+    --frames;
+  }
+  return frames * frame;
+}
+
 // A mode of the fit with what is known of how uncertain it is.
 struct Found {
   DampedMode mode;
@@ -334,7 +380,7 @@ double time_of_impulse(const std::vector<Found>& all, double rate_hz) {
   const double reach = 0.001 * rate_hz;
   double best = 0.0;
   double most = -1.0;
-  for (double t = -reach; t <= 0.5 * reach; t += 0.0625) {
+  for (double t = -std::ceil(reach); t <= 0.5 * reach; t += 0.0625) {
     double sum = 0.0;
     double weight = 1e-300;
     for (const Found& found : all) {
@@ -430,22 +476,39 @@ Result<Identification> identify(const Recording& recording, const IdentifyOption
     return blow.error();
   }
   const double rate_hz = recording.rate_hz;
-  const std::size_t frames = blow->channels[0].size();
   Identification made{.rate_hz = rate_hz,
                       .onset_s = static_cast<double>(blow->first) / rate_hz,
-                      .skipped_s = static_cast<double>(blow->skipped) / rate_hz,
-                      .analysed_s = static_cast<double>(frames) / rate_hz};
+                      .analysed_s = static_cast<double>(blow->channels[0].size()) / rate_hz};
   warn_of_recording(*blow, made);
   made.sound = std::move(blow->channels);
-  Search search(made.sound, progress);
-  search_all(search, rate_hz);
+  std::optional<Search> search(std::in_place, made.sound, progress);
+  search_all(*search, rate_hz);
+  // Rounding is no blow.
+  const double rest_share = search->fit().rest_energy() / std::max(energy_in(made.sound), 1e-300);
+  if (const std::size_t head = blow_frames(search->fit().rest(), rate_hz);
+      head > 0 && rest_share > rounding) {
+    std::vector<Complex> poles;
+    for (const DampedMode& mode : search->fit().modes()) {
+      poles.push_back(mode.log_z);
+    }
+    for (std::vector<double>& channel : made.sound) {
+      channel.erase(channel.begin(), channel.begin() + static_cast<std::ptrdiff_t>(head));
+    }
+    blow->skipped += head;
+    search.emplace(made.sound, progress);
+    search->start(poles);
+    search->finish();
+  }
 
   std::vector<Found> kept;
   double steady_hz = 0.0;
   double steady_energy = 0.0;
   std::size_t steady = 0;
+  const std::size_t frames = made.sound[0].size();
   const auto skipped = static_cast<double>(blow->skipped);
-  for (Found& found : all_found(search.fit())) {
+  made.skipped_s = skipped / rate_hz;
+  made.analysed_s = static_cast<double>(frames) / rate_hz;
+  for (Found& found : all_found(search->fit())) {
     const Fate fate = fate_of(found, rate_hz, frames);
     go_back(found, skipped);
     if (fate == Fate::kept) {
@@ -491,20 +554,15 @@ Result<Identification> identify(const Recording& recording, const IdentifyOption
       c *= std::exp(found.mode.log_z * skipped);
     }
   }
-  search.fit().set_modes(std::move(modes));
-  made.residual = search.fit().rest();
+  search->fit().set_modes(std::move(modes));
+  made.residual = search->fit().rest();
   for (std::size_t c = 0; c < made.sound.size(); ++c) {
     for (double& x : made.sound[c]) {
-      x -= search.fit().constant()[c];
+      x -= search->fit().constant()[c];
     }
   }
-  double all = 0.0;
-  for (const std::vector<double>& channel : made.sound) {
-    for (const double x : channel) {
-      all += x * x;
-    }
-  }
-  made.residual_db = decibels(search.fit().rest_energy() / std::max(all, 1e-300));
+  made.residual_db =
+      decibels(search->fit().rest_energy() / std::max(energy_in(made.sound), 1e-300));
   made.octaves = by_octave(made.sound, made.residual, rate_hz);
   if (made.residual_db > -6.0) {
     made.warnings.push_back(

@@ -46,7 +46,7 @@ struct Identification {
   double rate_hz = 0.0;
   double onset_s = 0.0;      // the blow, from the recording's start
   double time_zero_s = 0.0;  // when one impulse would have had to come, so that all swing from 0
-  double skipped_s = 0.0;    // after the onset, because it is clipped
+  double skipped_s = 0.0;    // after the onset: what is clipped, and the blow itself
   double analysed_s = 0.0;   // then
   std::vector<IdentifiedMode> modes;  // by frequency
   double residual_db = 0.0;           // of what the modes leave of the whole sound, constants aside
