@@ -101,10 +101,13 @@ int recording_body(const BodyOptions& options) {
   } else if (options.output.empty()) {
     std::fputs(model.c_str(), stdout);
   } else {
-    std::printf("%s: %s from %s to %s Hz, %s dB not explained by them\n", options.output.c_str(),
-                counted(found->modes.size(), "mode", "modes").c_str(),
-                fixed(found->modes.front().frequency_hz.value, 1).c_str(),
-                fixed(found->modes.back().frequency_hz.value, 1).c_str(),
+    const double lowest_hz = found->modes.front().frequency_hz.value;
+    const double highest_hz = found->modes.back().frequency_hz.value;
+    const std::string where = found->modes.size() == 1
+                                  ? "at " + fixed(lowest_hz, 1)
+                                  : "from " + fixed(lowest_hz, 1) + " to " + fixed(highest_hz, 1);
+    std::printf("%s: %s %s Hz, %s dB not explained\n", options.output.c_str(),
+                counted(found->modes.size(), "mode", "modes").c_str(), where.c_str(),
                 fixed(found->residual_db, 1).c_str());
   }
   return exit_code::done;

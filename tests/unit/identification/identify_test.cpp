@@ -238,7 +238,7 @@ TEST_CASE("Hum and an offset are left out, and said", "[identify]") {
 TEST_CASE("What is clipped is concluded from what follows", "[identify]") {
   const std::vector<KnownMode> known = thirty(82);
   std::vector<double> sound = ringing(known, 3.0);
-  const double most = 0.5 * peak_of(sound);
+  const double most = 0.25 * peak_of(sound);
   for (double& x : sound) {
     x = std::clamp(x, -most, most);
   }
@@ -253,8 +253,8 @@ TEST_CASE("A blow that lasts does not change what rings", "[identify]") {
   // A hammer that stays 2 ms: half a sine, with noise.
   const std::vector<KnownMode> known = {{230.0, 3.0, 0.5, 0.0},
                                         {641.0, 2.0, 0.4, 0.0},
-                                        {1257.0, 1.4, 0.3, 0.0},
-                                        {2071.0, 0.8, 0.3, 0.0}};
+                                        {1007.0, 1.4, 0.3, 0.0},
+                                        {2011.0, 0.8, 0.3, 0.0}};
   std::vector<KnownMode> sines = known;
   for (KnownMode& mode : sines) {
     mode.phase_rad = -0.5 * std::numbers::pi;
@@ -286,7 +286,7 @@ TEST_CASE("What each number is said to be uncertain by is what it is off", "[ide
   const std::vector<double> clean = ringing(known, 1.0);
   Random random(84);
   double sum[4] = {};
-  constexpr int rounds = 24;
+  constexpr int rounds = 16;
   for (int round = 0; round < rounds; ++round) {
     const Identification found = identified({with_noise(clean, 1e-3 * peak_of(clean), random)});
     REQUIRE(found.modes.size() == known.size());
@@ -303,7 +303,7 @@ TEST_CASE("What each number is said to be uncertain by is what it is off", "[ide
       }
     }
   }
-  // The mean of 144 squares of standard deviation 1: 1, give or take 0.12.
+  // The mean of 96 squares of standard deviation 1: 1, give or take 0.15.
   for (const double mean : sum) {
     CHECK(mean > 0.6);
     CHECK(mean < 1.5);
@@ -328,7 +328,7 @@ TEST_CASE("Fewer modes are those with most energy, and none below the floor", "[
   CHECK(two.residual_db == Approx(-20.4).margin(0.1));
   for (const OctaveResidual& octave : two.octaves) {
     if (octave.low_hz < 800.0 && octave.high_hz > 800.0) {
-      CHECK(octave.residual_db > -1.5);
+      CHECK(octave.residual_db > -3.0);
     }
   }
 }
