@@ -6,16 +6,21 @@
 namespace ressort {
 namespace {
 
-constexpr std::size_t block_frames = 128;
+constexpr std::size_t block_frames = 256;
 constexpr double gone = 46.0;  // nepers, 400 dB
 
-// z^n for n below a block's length.
+// z^n for n below a block's length, by doubling.
 struct PowerTable {
   explicit PowerTable(Complex log_z) {
-    for (std::size_t n = 0; n < block_frames; ++n) {
-      const Complex power = std::exp(log_z * static_cast<double>(n));
-      re[n] = power.real();
-      im[n] = power.imag();
+    re[0] = 1.0;
+    im[0] = 0.0;
+    for (std::size_t known = 1; known < block_frames; known *= 2) {
+      const Complex step = std::exp(log_z * static_cast<double>(known));
+      for (std::size_t n = 0; n < known; ++n) {
+        const Complex power = times(step, {re[n], im[n]});
+        re[known + n] = power.real();
+        im[known + n] = power.imag();
+      }
     }
   }
   std::array<double, block_frames> re;

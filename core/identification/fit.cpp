@@ -10,7 +10,8 @@
 namespace ressort {
 namespace {
 
-constexpr double ridge = 1e-13;  // of a diagonal: what keeps twins from being infinitely large
+constexpr double ridge = 1e-13;   // of a diagonal: what keeps twins from being infinitely large
+constexpr double settled = 1e-7;  // of the rest's energy: steps that gain less are none
 constexpr Complex i_unit{0.0, 1.0};
 
 // The sums over all samples of products of two columns Re(f n^p z^n), Re(g n^q w^n): what the pair
@@ -164,6 +165,59 @@ bool DampedFit::set_poles(const std::vector<Complex>& log_z) {
   return true;
 }
 
+void DampedFit::remove(const std::vector<bool>& is_removed) {
+  constexpr double unmoved = 1e-7;  // of an amplitude: not worth going through all samples
+  const Normal normal(modes_, 0, sound_[0].size(), false);
+  std::vector<std::size_t> kept;  // columns
+  std::vector<std::size_t> gone;
+  for (std::size_t k = 0; k < modes_.size(); ++k) {
+    std::vector<std::size_t>& where = is_removed[k] ? gone : kept;
+    where.insert(where.end(), {2 * k, 2 * k + 1});
+  }
+  kept.push_back(2 * modes_.size());
+  Matrix left(kept.size(), kept.size());
+  for (std::size_t j = 0; j < kept.size(); ++j) {
+    for (std::size_t i = 0; i < kept.size(); ++i) {
+      left(i, j) = normal.linear(kept[i], kept[j]);
+    }
+  }
+  Matrix moved(kept.size(), sound_.size());
+  for (std::size_t c = 0; c < sound_.size(); ++c) {
+    for (const std::size_t column : gone) {
+      const Complex amplitude = modes_[column / 2].c[c];
+      const double share = column % 2 == 0 ? amplitude.real() : amplitude.imag();
+      for (std::size_t i = 0; i < kept.size(); ++i) {
+        moved(i, c) += normal.linear(kept[i], column) * share;
+      }
+    }
+  }
+  const auto step = positive_solution(left, moved);
+  for (std::size_t c = 0; c < sound_.size(); ++c) {
+    for (std::size_t k = 0; k < modes_.size(); ++k) {
+      if (is_removed[k]) {
+        add_damped(rest_[c], modes_[k].c[c], modes_[k].log_z);
+      }
+    }
+    for (std::size_t i = 0; step && i + 1 < kept.size(); i += 2) {
+      DampedMode& mode = modes_[kept[i] / 2];
+      const Complex change((*step)(i, c), (*step)(i + 1, c));
+      if (std::abs(change) > unmoved * std::abs(mode.c[c])) {
+        mode.c[c] += change;
+        add_damped(rest_[c], -change, mode.log_z);
+      }
+    }
+    if (step) {
+      const double change = (*step)(kept.size() - 1, c);
+      constant_[c] += change;
+      for (double& x : rest_[c]) {
+        x -= change;
+      }
+    }
+  }
+  std::size_t k = 0;
+  std::erase_if(modes_, [&](const DampedMode&) { return is_removed[k++]; });
+}
+
 void DampedFit::set_modes(std::vector<DampedMode> modes) {
   modes_ = std::move(modes);
   find_rest();
@@ -173,6 +227,7 @@ void DampedFit::refine(int steps, const Progress& progress) {
   const std::size_t count = modes_.size();
   const std::size_t channels = sound_.size();
   const std::size_t frames = sound_[0].size();
+  find_rest();
   double energy = rest_energy();
   double damping = 1e-4;
   for (int done = 0; done < steps && count > 0; ++done) {
@@ -242,7 +297,7 @@ void DampedFit::refine(int steps, const Progress& progress) {
       return;
     }
     const double now = rest_energy();
-    const bool is_done = energy - now < 1e-9 * now;
+    const bool is_done = energy - now < settled * now;
     energy = now;
     if (is_done) {
       return;

@@ -33,6 +33,9 @@ class DampedFit {
 
   // The amplitudes that suit these poles best; false where they cannot be told apart.
   bool set_poles(const std::vector<Complex>& log_z);
+  // Without these modes; the amplitudes of the others move so that the rest is least again, which
+  // it has to be before. O(modes^3 + samples of those that move)
+  void remove(const std::vector<bool>& is_removed);
   // Takes these modes as they are.
   void set_modes(std::vector<DampedMode> modes);
 

@@ -132,7 +132,7 @@ class Search {
     progress_.stage("fitting the modes to the sound");
     add(strongest(std::move(found), start));
     drop_accidents();
-    settle(4);
+    settle(3, 3);
   }
 
   // Begins with these instead of a search.
@@ -140,7 +140,7 @@ class Search {
 
   void finish() {
     progress_.stage("fitting the modes to the sound");
-    settle(20);
+    settle(20, 10);
   }
 
   std::size_t frames() const { return sound_[0].size(); }
@@ -191,11 +191,12 @@ class Search {
   }
 
   // Refines until every mode is more than noise, and more than a part of its neighbour.
-  void settle(int steps) {
+  void settle(int steps, int rounds) {
     fit_.refine(steps, progress_);
-    for (int round = 0; round < 10 && drop_unlikely(true); ++round) {
-      fit_.refine(steps, progress_);
+    for (int round = 0; round < rounds && drop_unlikely(true); ++round) {
+      fit_.refine(3, progress_);
     }
+    fit_.refine(steps, progress_);
   }
 
   // Takes back what noise would do as well, the least likely modes first.
@@ -220,8 +221,7 @@ class Search {
     }
     const double least = loudest * std::pow(10.0, deepest_db / 10.0);
     const double wanted = chance + static_cast<double>(sound_.size() - 1);
-    std::vector<std::pair<double, Complex>> unlikely;
-    std::vector<Complex> kept;
+    std::vector<std::pair<double, std::size_t>> unlikely;  // and which
     const double resolved = 8.0 * pi / static_cast<double>(frames());
     const auto are_neighbours = [&](Complex a, Complex b) {
       return std::fabs(a.imag() - b.imag()) < 4.0 * std::max(-a.real(), -b.real()) + resolved;
@@ -240,26 +240,26 @@ class Search {
         const double deviation = deviations[k].c[c];
         likelihood += std::norm(modes[k].c[c]) / (1e-300 + 2.0 * deviation * deviation * variance);
       }
-      if (energy_of(modes[k], frames()) < least || !(likelihood >= wanted)) {
-        unlikely.emplace_back(energy_of(modes[k], frames()) < least ? 0.0 : likelihood,
-                              modes[k].log_z);
-      } else {
-        kept.push_back(modes[k].log_z);
+      likelihood = energy_of(modes[k], frames()) < least ? 0.0 : likelihood;
+      if (!(likelihood >= wanted)) {
+        unlikely.emplace_back(likelihood, k);
       }
     }
     if (unlikely.empty()) {
       return false;
     }
-    std::sort(unlikely.begin(), unlikely.end(),
-              [](const auto& a, const auto& b) { return a.first < b.first; });
-    std::vector<Complex> dropped;
-    for (const auto& [likelihood, log_z] : unlikely) {
-      const Complex here = log_z;
-      const bool has_gone_beside = std::any_of(
-          dropped.begin(), dropped.end(), [&](Complex gone) { return are_neighbours(here, gone); });
-      (has_gone_beside ? kept : dropped).push_back(here);
+    std::sort(unlikely.begin(), unlikely.end());
+    std::vector<bool> is_dropped(modes.size());
+    for (const auto& row : unlikely) {
+      const std::size_t k = row.second;
+      bool has_gone_beside = false;
+      for (std::size_t j = 0; j < modes.size(); ++j) {
+        has_gone_beside =
+            has_gone_beside || (is_dropped[j] && are_neighbours(modes[j].log_z, modes[k].log_z));
+      }
+      is_dropped[k] = !has_gone_beside;
     }
-    fit_.set_poles(kept);
+    fit_.remove(is_dropped);
     return true;
   }
 
