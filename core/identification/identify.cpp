@@ -401,19 +401,25 @@ double time_of_impulse(const std::vector<Found>& all, double rate_hz) {
 }
 
 IdentifiedMode measured(const Found& found, double rate_hz, double time_zero) {
+  constexpr double last_digit = 2.3e-16;
   const double alpha = -found.mode.log_z.real();
+  const double omega = found.mode.log_z.imag();
+  const double hertz = rate_hz / (2.0 * pi);
   IdentifiedMode mode;
-  mode.frequency_hz = {found.mode.log_z.imag() * rate_hz / (2.0 * pi),
-                       found.deviation.omega * rate_hz / (2.0 * pi)};
-  mode.t60_s = {ln_1000 / (alpha * rate_hz),
-                ln_1000 / (alpha * rate_hz) * found.deviation.alpha / alpha};
+  mode.frequency_hz = {omega * hertz,
+                       hertz * std::hypot(found.deviation.omega, last_digit * omega)};
+  mode.t60_s.value = ln_1000 / (alpha * rate_hz);
+  mode.t60_s.deviation = mode.t60_s.value * std::hypot(found.deviation.alpha / alpha, last_digit);
   for (std::size_t c = 0; c < found.mode.c.size(); ++c) {
     const Complex start = found.mode.c[c] * std::exp(found.mode.log_z * time_zero);
-    const double scale = std::exp(-alpha * time_zero);
     const double size = std::abs(start);
-    mode.amplitude.push_back({size, found.deviation.c[c] * scale});
+    const double seen = found.deviation.c[c] * std::exp(-alpha * time_zero);
+    const auto deviation = [&](double of_pole) {
+      return std::hypot(seen, size * of_pole * time_zero);
+    };
+    mode.amplitude.push_back({size, deviation(found.deviation.alpha)});
     mode.phase_rad.push_back(
-        {std::arg(start), std::min(pi, size > 0.0 ? found.deviation.c[c] * scale / size : pi)});
+        {std::arg(start), size > 0.0 ? std::min(pi, deviation(found.deviation.omega) / size) : pi});
   }
   return mode;
 }
