@@ -41,6 +41,7 @@ judge() {
       sees["core/linear_algebra"] = "core core/linear_algebra"
       sees["core/model"] = "core core/laws core/model"
       sees["core/analysis"] = "core core/laws core/linear_algebra core/model core/analysis"
+      sees["core/identification"] = "core core/linear_algebra core/identification"
       sees["core/kernels"] = "core/lanes.h core/formula.h core/progress.h core/model/preset/budget.h " \
                              "core/laws core/linear_algebra core/kernels"
       sees["core/engine"] = "core/lanes.h core/formula.h core/progress.h core/gesture.h " \
@@ -52,7 +53,7 @@ judge() {
       sees["app/devices"] = "core/result.h core/engine core/kernels app app/realtime app/devices"
       sees["app/session"] = all " app app/realtime app/session app/control/registry.h"
       sees["app/control"] = all " app app/realtime app/devices app/session app/control"
-      sees["app/commands"] = sees["app/control"] " app/commands"
+      sees["app/commands"] = sees["app/control"] " core/identification app/commands"
       sees["app"] = sees["app/commands"]
     }
     {
@@ -128,6 +129,8 @@ core/laws/spring.h:1:#include "core/model/network.h"
 core/laws/laws.h:1:#include "core/kernels/program.h"
 core/laws/laws.cpp:1:#include "core/compile/cost.h"
 core/lanes.h:1:#include "core/laws/law.h"
+core/identification/fit.cpp:1:#include "core/model/network.h"
+core/identification/poles.cpp:1:#include <Eigen/Dense>
 app/session/session.cpp:1:#include "app/commands/chart/ways.h"
 app/session/session.cpp:1:#include <atomic>
 app/session/session.cpp:1:#include <sndfile.h>

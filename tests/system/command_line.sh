@@ -49,6 +49,26 @@ expect 2 "this is no text" "$program" check binary.mdl
 head -c 52428800 /dev/zero > large.mdl
 expect 2 "at most 32 MiB" "$program" check large.mdl
 
+# Recordings.
+expect 2 "there is no file 'nosuch.wav'" "$program" body nosuch.wav
+expect 2 "'binary.mdl': bodies are made of recordings" "$program" body binary.mdl
+model text.wav 'no sound at all'
+expect 2 "'text.wav' is no sound file that can be read" "$program" body text.wav
+printf '0 /note/on 60 100\n' > blow.txt
+expect 0 "blow.flac" "$program" render Marimba --score blow.txt -s 2 -o blow.flac
+expect 0 "@blow body 40 hit left right" "$program" body blow.flac
+expect 0 "modes from 26" "$program" body blow.flac -o rings.mdl --picture rings.svg
+expect 0 "@out2 posOutput [@rings right]" cat rings.mdl
+expect 0 "</svg>" cat rings.svg
+expect 0 "stable" "$program" check rings.mdl
+expect 0 '"frequency_deviation_hz"' "$program" body blow.flac --json
+expect 0 "rings.mdl: 1 mode at 26" "$program" body blow.flac --modes 1 -o rings.mdl --force
+expect 2 "rings.mdl" "$program" body blow.flac -o rings.mdl
+expect 2 "'blow.flac' is read: it cannot be written too" "$program" body blow.flac -o blow.flac
+expect 2 "ends in .svg" "$program" body blow.flac --picture rings.png
+expect 0 "rings.wav" "$program" render Marimba -s 0 -o rings.wav
+expect 2 "'rings.wav': " "$program" body rings.wav
+
 # Texts, with file, line and column.
 model word.mdl '@m mass 1. 0. 0.\n@r sprnig @m @m 0.1 0.1\n'
 expect 2 "word.mdl:2:4: error: unknown keyword 'sprnig'; did you mean 'spring'?" \

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "app/commands/svg.h"
 #include "app/text.h"
 
 namespace ressort {
@@ -12,28 +13,8 @@ namespace {
 constexpr double lightest_dbfs = -96.0;
 constexpr double darkest_dbfs = -16.0;
 constexpr double envelope_floor_dbfs = -72.0;
-const char* const ink = "#222";
-const char* const grid_ink = "#bbb";
 const char* const key_ink =
     "#c8402f";  // as dark as the middle of the scale, where colours are lost
-
-// Rounded to a tenth of a pixel.
-std::string px(double pixels) {
-  std::string text = fixed(pixels, 1);
-  return text.ends_with(".0") ? text.substr(0, text.size() - 2) : text;
-}
-
-std::string escaped(const std::string& text) {
-  std::string safe;
-  for (const char c : text) {
-    safe += c == '&'   ? "&amp;"
-            : c == '<' ? "&lt;"
-            : c == '>' ? "&gt;"
-            : c == '"' ? "&quot;"
-                       : std::string(1, c);
-  }
-  return safe;
-}
 
 // A file's name as a link has it.
 std::string link_to(const std::string& file) {
@@ -46,26 +27,6 @@ std::string link_to(const std::string& file) {
     link += is_plain ? std::string(1, c) : std::string{'%', digits[byte >> 4], digits[byte & 15]};
   }
   return link;
-}
-
-std::string label(double x, double y, const std::string& text, const char* anchor = "end") {
-  return "<text x=\"" + px(x) + "\" y=\"" + px(y) + "\" text-anchor=\"" + anchor + "\">" +
-         escaped(text) + "</text>\n";
-}
-
-std::string line(double x1, double y1, double x2, double y2, const char* colour,
-                 const char* width = "0.7") {
-  return "<path d=\"M" + px(x1) + " " + px(y1) + "L" + px(x2) + " " + px(y2) + "\" stroke=\"" +
-         colour + "\" stroke-width=\"" + width + "\" fill=\"none\"/>\n";
-}
-
-std::string box(double x, double y, double width, double height) {
-  return "<rect x=\"" + px(x) + "\" y=\"" + px(y) + "\" width=\"" + px(width) + "\" height=\"" +
-         px(height) + "\" fill=\"none\" stroke=\"" + ink + "\" stroke-width=\"0.8\"/>\n";
-}
-
-std::string hertz(double frequency_hz) {
-  return frequency_hz < 1000.0 ? fixed(frequency_hz, 0) : fixed(frequency_hz / 1000.0, 0) + "k";
 }
 
 std::string key_name(int key) {
@@ -189,13 +150,6 @@ std::string draw_frequency_axis(const Spectrogram& shown, const Area& area,
         line(area.x - 4.0, y, area.x, y, ink) + label(area.x - 6.0, y + 3.5, hertz(frequency_hz));
   }
   return svg;
-}
-
-std::string svg_head(double width, double height, double font_px) {
-  return "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 " + px(width) + " " + px(height) +
-         "\" width=\"" + px(width) + "\" height=\"" + px(height) +
-         "\" font-family=\"Helvetica, Arial, sans-serif\" font-size=\"" + px(font_px) +
-         "\" fill=\"" + ink + "\">\n";
 }
 
 std::string draw_preset(const ShownPreset& preset) {

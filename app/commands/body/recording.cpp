@@ -1,0 +1,116 @@
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+
+#include "app/commands/body/body.h"
+#include "app/commands/body/recording_picture.h"
+#include "app/commands/body/recording_text.h"
+#include "app/exit_code.h"
+#include "app/session/files.h"
+#include "app/session/load_news.h"
+#include "app/session/sound_file.h"
+#include "app/text.h"
+#include "core/identification/identify.h"
+
+namespace ressort {
+namespace {
+
+constexpr double longest_read_s = 60.0;
+
+// The recording's beginning; `was_longer` if there was more.
+Result<Recording> read_recording(const std::string& path, bool& was_longer) {
+  auto file = SoundReader::open(path);
+  if (!file) {
+    return file.error();
+  }
+  constexpr std::size_t block_frames = 4096;
+  const std::size_t channels = file->channels();
+  Recording recording{.rate_hz = file->rate_hz(), .channels = {}};
+  recording.channels.resize(channels);
+  const auto most = static_cast<std::size_t>(longest_read_s * recording.rate_hz);
+  std::vector<double> block(channels * block_frames);
+  while (const std::size_t got = file->read(block.data(), block_frames)) {
+    const std::size_t room = most - recording.channels[0].size();
+    was_longer = got > room;
+    for (std::size_t i = 0; i < std::min(got, room) * channels; ++i) {
+      recording.channels[i % channels].push_back(block[i]);
+    }
+    if (was_longer) {
+      break;
+    }
+  }
+  return recording;
+}
+
+int complain_of(const std::string& text) {
+  std::fprintf(stderr, "%s\n", text.c_str());
+  return exit_code::wrong_use;
+}
+
+}  // namespace
+
+int recording_body(const BodyOptions& options) {
+  const std::string read[] = {options.input};
+  for (const std::string& written : {options.output, options.picture}) {
+    if (auto spared = spare(written, read); !spared) {
+      return complain_of(spared.error().message);
+    }
+  }
+  if (!options.picture.empty() && !options.picture.ends_with(".svg")) {
+    return complain_of("'" + options.picture + "' is no name of a picture; it ends in .svg");
+  }
+  LoadNews news(options.input,
+                [](const std::string& text) { std::fprintf(stderr, "%s\n", text.c_str()); });
+  const Progress progress([&](std::string_view stage) {
+    news.at(stage);
+    return true;  // Ctrl-C ends it at once
+  });
+  bool was_longer = false;
+  const auto recording = read_recording(options.input, was_longer);
+  if (!recording) {
+    return complain_of(recording.error().message);
+  }
+  auto found = identify(*recording,
+                        {.most_modes = options.most_modes, .floor_db = options.floor_db}, progress);
+  if (!found) {
+    return complain_of("'" + options.input + "': " + found.error().message +
+                       (was_longer ? " in its first " + fixed(longest_read_s, 0) + " s" : ""));
+  }
+  if (was_longer) {
+    found->warnings.push_back("only its first " + fixed(longest_read_s, 0) + " s were read");
+  }
+  for (const std::string& warning : found->warnings) {
+    std::fprintf(stderr, "%s: warning: %s\n", options.input.c_str(), warning.c_str());
+  }
+  const std::string source = options.input.substr(options.input.rfind('/') + 1);
+  if (!options.picture.empty()) {
+    if (const int code =
+            put_text(options.picture, recording_picture(*found, source), options.force)) {
+      return code;
+    }
+  }
+  const std::string label = label_of_file(options.output.empty() ? options.input : options.output);
+  const std::string model = body_model(*found, label, source, options.mass);
+  if (!options.output.empty()) {
+    if (const int code = put_text(options.output, model, options.force)) {
+      return code;
+    }
+  }
+  if (options.as_json) {
+    std::fputs(identification_json(*found, options.mass).c_str(), stdout);
+  } else if (options.output.empty()) {
+    std::fputs(model.c_str(), stdout);
+  } else {
+    const double lowest_hz = found->modes.front().frequency_hz.value;
+    const double highest_hz = found->modes.back().frequency_hz.value;
+    const std::string where = found->modes.size() == 1
+                                  ? "at " + fixed(lowest_hz, 1)
+                                  : "from " + fixed(lowest_hz, 1) + " to " + fixed(highest_hz, 1);
+    std::printf("%s: %s %s Hz, %s dB not explained\n", options.output.c_str(),
+                counted(found->modes.size(), "mode", "modes").c_str(), where.c_str(),
+                fixed(found->residual_db, 1).c_str());
+  }
+  return exit_code::done;
+}
+
+}  // namespace ressort

@@ -1,0 +1,163 @@
+#include "core/identification/blow.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+
+namespace ressort {
+namespace {
+
+constexpr std::size_t most_channels = 16;
+constexpr double lowest_rate_hz = 4000.0;
+constexpr double loud = 0.02;         // of the peak: the blow has begun
+constexpr double audible = 1e-5;      // of the peak: where nothing was before
+constexpr double noise_factor = 5.0;  // above what was before
+constexpr double gap_s = 0.001;       // nothing for so long, and the blow has not begun
+constexpr double frame_s = 0.01;
+constexpr double least_s = 0.3;         // of what is looked at, where there is so much
+constexpr std::size_t clipped_run = 3;  // so many samples in a row at the peak
+constexpr double most_skipped = 0.25;   // of what follows the blow, because of that
+
+std::string seconds(double s) {
+  char text[32];
+  std::snprintf(text, sizeof text, "%.3g s", s);
+  return text;
+}
+
+// How loud each sample is, in the channel where it is loudest, without the channels' means.
+std::vector<double> magnitudes(const Recording& recording, const std::vector<double>& means) {
+  std::vector<double> all(recording.channels[0].size());
+  for (std::size_t c = 0; c < means.size(); ++c) {
+    for (std::size_t n = 0; n < all.size(); ++n) {
+      all[n] = std::max(all[n], std::fabs(recording.channels[c][n] - means[c]));
+    }
+  }
+  return all;
+}
+
+std::size_t find_onset(const std::vector<double>& loudness, double peak, double rate_hz) {
+  const auto gap = static_cast<std::size_t>(gap_s * rate_hz) + 1;
+  std::size_t onset = 0;
+  while (loudness[onset] <= loud * peak) {
+    ++onset;
+  }
+  const std::size_t quiet = onset > gap ? onset - gap : 0;
+  double square = 0.0;
+  for (std::size_t n = 0; n < quiet; ++n) {
+    square += loudness[n] * loudness[n];
+  }
+  const double noise = quiet > gap ? std::sqrt(square / static_cast<double>(quiet)) : 0.0;
+  const double threshold = std::max(audible * peak, noise_factor * noise);
+  for (std::size_t n = onset; n-- > 0 && onset - n <= gap;) {
+    onset = loudness[n] > threshold ? n : onset;
+  }
+  return onset;
+}
+
+// How many samples from the onset on are worth it: twice as many as are above the end's noise.
+std::size_t find_length(const std::vector<double>& loudness, std::size_t onset, double rate_hz) {
+  const std::size_t all = loudness.size() - onset;
+  const auto frame = static_cast<std::size_t>(frame_s * rate_hz);
+  std::vector<double> energies;
+  for (std::size_t from = onset; from + frame <= loudness.size(); from += frame) {
+    double energy = 0.0;
+    for (std::size_t n = from; n < from + frame; ++n) {
+      energy += loudness[n] * loudness[n];
+    }
+    energies.push_back(energy);
+  }
+  std::size_t ringing = all;
+  if (energies.size() >= 16) {
+    std::vector<double> tail(energies.end() - static_cast<std::ptrdiff_t>(energies.size() / 4),
+                             energies.end());
+    const auto middle = tail.begin() + static_cast<std::ptrdiff_t>(tail.size() / 2);
+    std::nth_element(tail.begin(), middle, tail.end());
+    std::size_t last = energies.size();
+    while (last > 0 && energies[last - 1] < 1.5 * *middle) {
+      --last;
+    }
+    ringing = std::max(2 * last * frame, static_cast<std::size_t>(least_s * rate_hz));
+  }
+  return std::min({all, ringing, static_cast<std::size_t>(longest_ring_s * rate_hz)});
+}
+
+struct Clipped {
+  std::size_t count = 0;
+  std::size_t end = 0;  // behind the last of them
+};
+
+Clipped find_clipped(const Recording& recording, double peak) {
+  Clipped clipped;
+  for (const std::vector<double>& channel : recording.channels) {
+    std::size_t run = 0;
+    for (std::size_t n = 0; n <= channel.size(); ++n) {
+      const bool is_at_peak = n < channel.size() && std::fabs(channel[n]) >= peak * (1.0 - 1e-9);
+      const bool goes_on = is_at_peak && (run == 0 || channel[n] == channel[n - 1]);
+      if (!goes_on && run >= clipped_run) {
+        clipped.count += run;
+        clipped.end = std::max(clipped.end, n);
+      }
+      run = goes_on ? run + 1 : is_at_peak ? 1 : 0;
+    }
+  }
+  return clipped;
+}
+
+}  // namespace
+
+Result<Blow> find_blow(const Recording& recording) {
+  const std::vector<std::vector<double>>& channels = recording.channels;
+  if (channels.empty() || channels[0].empty()) {
+    return Error{"there are no samples in it"};
+  }
+  if (channels.size() > most_channels) {
+    return Error{"it has " + std::to_string(channels.size()) + " channels; at most " +
+                 std::to_string(most_channels) + " are looked at"};
+  }
+  if (!(recording.rate_hz >= lowest_rate_hz)) {
+    return Error{"its sample rate is below 4000 Hz"};
+  }
+  const std::size_t frames = channels[0].size();
+  std::vector<double> means;
+  double largest = 0.0;
+  for (std::size_t c = 0; c < channels.size(); ++c) {
+    double sum = 0.0;
+    for (std::size_t n = 0; n < frames; ++n) {
+      if (!std::isfinite(channels[c][n])) {
+        return Error{"what stands at " + seconds(static_cast<double>(n) / recording.rate_hz) +
+                     " in channel " + std::to_string(c + 1) + " is no number"};
+      }
+      sum += channels[c][n];
+      largest = std::max(largest, std::fabs(channels[c][n]));
+    }
+    means.push_back(sum / static_cast<double>(frames));
+  }
+  const std::vector<double> loudness = magnitudes(recording, means);
+  const double peak = *std::max_element(loudness.begin(), loudness.end());
+  if (!(peak > 1e-12 * largest) || peak < 1e-30) {
+    return Error{"it is silent: every sample is the same"};
+  }
+  Blow blow{.first = find_onset(loudness, peak, recording.rate_hz)};
+  const std::size_t left = frames - blow.first;
+  blow.length_s = static_cast<double>(left) / recording.rate_hz;
+  if (blow.length_s < shortest_ring_s) {
+    return Error{"it ends " + seconds(blow.length_s) + " after the blow; at least " +
+                 seconds(shortest_ring_s) + " of ringing are needed"};
+  }
+  const Clipped clipped = find_clipped(recording, largest);
+  blow.clipped = clipped.count;
+  const auto latest = static_cast<std::size_t>(most_skipped * static_cast<double>(left));
+  if (clipped.end > blow.first && clipped.end - blow.first <= latest) {
+    blow.skipped = clipped.end - blow.first;
+  }
+  const std::size_t first = blow.first + blow.skipped;
+  const std::size_t length = find_length(loudness, first, recording.rate_hz);
+  for (std::size_t c = 0; c < channels.size(); ++c) {
+    const auto from = channels[c].begin() + static_cast<std::ptrdiff_t>(first);
+    blow.channels.emplace_back(from, from + static_cast<std::ptrdiff_t>(length));
+    blow.offset = std::max(blow.offset, std::fabs(means[c]) / peak);
+  }
+  return blow;
+}
+
+}  // namespace ressort

@@ -1,0 +1,137 @@
+#include "core/identification/damped.h"
+
+#include <algorithm>
+#include <array>
+
+namespace ressort {
+namespace {
+
+constexpr std::size_t block_frames = 256;
+constexpr double gone = 46.0;  // nepers, 400 dB
+
+// z^n for n below a block's length, by doubling.
+struct PowerTable {
+  explicit PowerTable(Complex log_z) {
+    re[0] = 1.0;
+    im[0] = 0.0;
+    for (std::size_t known = 1; known < block_frames; known *= 2) {
+      const Complex step = std::exp(log_z * static_cast<double>(known));
+      for (std::size_t n = 0; n < known; ++n) {
+        const Complex power = times(step, {re[n], im[n]});
+        re[known + n] = power.real();
+        im[known + n] = power.imag();
+      }
+    }
+  }
+  std::array<double, block_frames> re;
+  std::array<double, block_frames> im;
+};
+
+std::size_t length_of(std::size_t frames, Complex log_z) {
+  const double alpha = -log_z.real();
+  return alpha * static_cast<double>(frames) > gone
+             ? std::min(frames, static_cast<std::size_t>(gone / alpha) + 1)
+             : frames;
+}
+
+}  // namespace
+
+void add_damped(std::span<double> samples, Complex c, Complex log_z) {
+  const PowerTable table(log_z);
+  const std::size_t frames = length_of(samples.size(), log_z);
+  for (std::size_t from = 0; from < frames; from += block_frames) {
+    const Complex start = c * std::exp(log_z * static_cast<double>(from));
+    const double re = start.real();
+    const double im = start.imag();
+    double* const block = samples.data() + from;
+    const std::size_t count = std::min(block_frames, frames - from);
+    for (std::size_t n = 0; n < count; ++n) {
+      block[n] += re * table.re[n] - im * table.im[n];
+    }
+  }
+}
+
+Moments moments_of(std::span<const double> samples, Complex log_z) {
+  constexpr std::size_t lanes = 4;  // sums that the compiler may keep in one vector
+  const PowerTable table(log_z);
+  const std::size_t frames = length_of(samples.size(), log_z);
+  Moments sums{};
+  for (std::size_t from = 0; from < frames; from += block_frames) {
+    std::array<double, lanes> re{};
+    std::array<double, lanes> im{};
+    std::array<double, lanes> n_re{};
+    std::array<double, lanes> n_im{};
+    const double* const block = samples.data() + from;
+    const std::size_t count = std::min(block_frames, frames - from);
+    std::size_t n = 0;
+    for (; n + lanes <= count; n += lanes) {
+      for (std::size_t lane = 0; lane < lanes; ++lane) {
+        const double x_re = block[n + lane] * table.re[n + lane];
+        const double x_im = block[n + lane] * table.im[n + lane];
+        const auto place = static_cast<double>(n + lane);
+        re[lane] += x_re;
+        im[lane] += x_im;
+        n_re[lane] += place * x_re;
+        n_im[lane] += place * x_im;
+      }
+    }
+    for (; n < count; ++n) {
+      const auto place = static_cast<double>(n);
+      re[0] += block[n] * table.re[n];
+      im[0] += block[n] * table.im[n];
+      n_re[0] += place * block[n] * table.re[n];
+      n_im[0] += place * block[n] * table.im[n];
+    }
+    const Complex zeroth((re[0] + re[1]) + (re[2] + re[3]), (im[0] + im[1]) + (im[2] + im[3]));
+    const Complex first((n_re[0] + n_re[1]) + (n_re[2] + n_re[3]),
+                        (n_im[0] + n_im[1]) + (n_im[2] + n_im[3]));
+    const auto before = static_cast<double>(from);
+    const Complex power = std::exp(log_z * before);
+    sums.zeroth += power * zeroth;
+    sums.first += power * (first + before * zeroth);
+  }
+  return sums;
+}
+
+PowerSums power_sums(const Powers& powers, std::size_t count) {
+  constexpr double far = 20.0;  // the closed form loses 1e4 of 1e16 here
+  const auto all = static_cast<double>(count);
+  const Complex z = powers.z;
+  const Complex away = 1.0 - z;
+  if (std::norm(away) * all * all > far * far) {
+    const Complex inverse = std::conj(away) / std::norm(away);
+    const Complex end = powers.last;
+    const Complex s0 = times(1.0 - end, inverse);
+    const Complex s1 = times(times(z, s0) - all * end, inverse);
+    // From (1 - z) S2 = z S0 + 2 z S1 - N^2 z^N.
+    const Complex s2 = times(times(z, s0 + 2.0 * s1) - all * all * end, inverse);
+    return {s0, s1, s2};
+  }
+  PowerSums sums{};
+  auto& [s0, s1, s2] = sums.of_power;
+  std::size_t done = 0;
+  Complex power = 1.0;  // z^done
+  int bit = 0;
+  while (count >> (bit + 1) != 0) {
+    ++bit;
+  }
+  for (; bit >= 0; --bit) {
+    const auto m = static_cast<double>(done);
+    s2 += times(power, s2 + 2.0 * m * s1 + m * m * s0);
+    s1 += times(power, s1 + m * s0);
+    s0 += times(power, s0);
+    power = times(power, power);
+    done *= 2;
+    if ((count >> bit & 1U) != 0) {
+      const auto n = static_cast<double>(done);
+      s0 += power;
+      s1 += n * power;
+      s2 += n * n * power;
+      power = times(power, z);
+      ++done;
+    }
+  }
+  return sums;
+}
+
+}  // namespace ressort

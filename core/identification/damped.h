@@ -1,0 +1,51 @@
+// core/identification: sums of damped sinusoids, Re(c z^n), and the few things that a fit asks of
+// them. Everything is per sample: log z = -alpha + i omega, with alpha = ln(1000) / (rate T60) and
+// omega = 2 pi f / rate. [any thread but audio]
+#pragma once
+
+#include <complex>
+#include <cstddef>
+#include <span>
+#include <vector>
+
+namespace ressort {
+
+using Complex = std::complex<double>;
+
+// a b, without the library's care for what is infinite.
+inline Complex times(Complex a, Complex b) {
+  return {a.real() * b.real() - a.imag() * b.imag(), a.real() * b.imag() + a.imag() * b.real()};
+}
+
+// Adds Re(c z^n) to sample n. O(samples until it has died away)
+void add_damped(std::span<double> samples, Complex c, Complex log_z);
+
+// The sums over all n of x[n] z^n and of n x[n] z^n.
+struct Moments {
+  Complex zeroth;
+  Complex first;
+};
+Moments moments_of(std::span<const double> samples, Complex log_z);
+
+// z, and z^count.
+struct Powers {
+  Powers(Complex log_z, std::size_t count)
+      : z(std::exp(log_z)), last(std::exp(log_z * static_cast<double>(count))) {}
+  Powers(Complex first_power, Complex last_power) : z(first_power), last(last_power) {}
+  Powers operator*(const Powers& other) const {
+    return {times(z, other.z), times(last, other.last)};
+  }
+  Powers conjugate() const { return {std::conj(z), std::conj(last)}; }
+
+  Complex z;
+  Complex last;
+};
+
+// The sums over n < count of n^p z^n for p = 0, 1, 2. In closed form, or where z is so near to 1
+// that this would lose digits, by doubling: O(log count).
+struct PowerSums {
+  Complex of_power[3];
+};
+PowerSums power_sums(const Powers& powers, std::size_t count);
+
+}  // namespace ressort

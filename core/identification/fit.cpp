@@ -1,0 +1,364 @@
+#include "core/identification/fit.h"
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+
+#include "core/linear_algebra/complex.h"
+#include "core/linear_algebra/eigen.h"
+
+namespace ressort {
+namespace {
+
+constexpr double ridge = 1e-13;   // of a diagonal: what keeps twins from being infinitely large
+constexpr double settled = 1e-7;  // of the rest's energy: steps that gain less are none
+constexpr Complex i_unit{0.0, 1.0};
+
+// The sums over all samples of products of two columns Re(f n^p z^n), Re(g n^q w^n): what the pair
+// of poles has to say to all of them.
+struct PairSums {
+  PairSums(const Powers& z, const Powers& w, std::size_t frames)
+      : straight(power_sums(z * w, frames)), turned(power_sums(z * w.conjugate(), frames)) {}
+  double product(Complex f, Complex g, int power) const {
+    return 0.5 * times(f, times(g, straight.of_power[power]) +
+                              times(std::conj(g), turned.of_power[power]))
+                     .real();
+  }
+
+  PowerSums straight;
+  PowerSums turned;
+};
+
+// The normal equations. Linear columns: of each mode Re(z^n) and Re(i z^n), then the constant.
+// Those of the poles, per channel: of each mode Re(n c z^n), by -alpha, and Re(i n c z^n), by
+// omega.
+struct Normal {
+  Normal(const std::vector<DampedMode>& modes, std::size_t channels, std::size_t frames,
+         bool with_poles)
+      : linear(2 * modes.size() + 1, 2 * modes.size() + 1),
+        poles(2 * modes.size(), 2 * modes.size()) {
+    const std::size_t count = modes.size();
+    constexpr Complex factor[] = {1.0, i_unit};
+    if (with_poles) {
+      mixed.assign(channels, Matrix(2 * count + 1, 2 * count));
+    }
+    std::vector<Powers> powers;
+    for (const DampedMode& mode : modes) {
+      powers.emplace_back(mode.log_z, frames);
+    }
+    powers.emplace_back(Complex(), frames);  // the constant's
+    for (std::size_t j = 0; j <= count; ++j) {
+      for (std::size_t k = j; k <= count; ++k) {
+        const PairSums sums(powers[j], powers[k], frames);
+        for (std::size_t a = 0; a < (j < count ? 2 : 1); ++a) {
+          for (std::size_t b = 0; b < (k < count ? 2 : 1); ++b) {
+            const std::size_t row = 2 * j + a;
+            const std::size_t column = 2 * k + b;
+            const double both = sums.product(factor[a], factor[b], 0);
+            linear(row, column) = both;
+            linear(column, row) = both;
+            for (std::size_t c = 0; c < mixed.size(); ++c) {
+              const Complex moved_j = j < count ? times(factor[a], modes[j].c[c]) : Complex();
+              const Complex moved_k = k < count ? times(factor[b], modes[k].c[c]) : Complex();
+              if (k < count) {
+                mixed[c](row, column) = sums.product(factor[a], moved_k, 1);
+                const double of_poles = sums.product(moved_j, moved_k, 2);
+                poles(row, column) += of_poles;
+                poles(column, row) += j == k ? 0.0 : of_poles;
+              }
+              if (j < count && j != k) {
+                mixed[c](column, row) = sums.product(moved_j, factor[b], 1);
+              }
+            }
+          }
+        }
+      }
+    }
+    for (std::size_t i = 0; i < linear.rows(); ++i) {
+      linear(i, i) *= 1.0 + ridge;
+    }
+  }
+
+  Matrix linear;
+  Matrix poles;               // all channels together
+  std::vector<Matrix> mixed;  // [channel][linear column, pole's column]
+};
+
+// Of one channel's rest: its products with all columns.
+struct Gradient {
+  Gradient(const std::vector<double>& rest, const std::vector<DampedMode>& modes,
+           std::size_t channel)
+      : linear(2 * modes.size() + 1, 1), poles(2 * modes.size()) {
+    for (std::size_t k = 0; k < modes.size(); ++k) {
+      const Moments moments = moments_of(rest, modes[k].log_z);
+      linear(2 * k, 0) = moments.zeroth.real();
+      linear(2 * k + 1, 0) = -moments.zeroth.imag();
+      const Complex moved = modes[k].c[channel] * moments.first;
+      poles[2 * k] = moved.real();
+      poles[2 * k + 1] = -moved.imag();
+    }
+    for (const double x : rest) {
+      linear(2 * modes.size(), 0) += x;
+    }
+  }
+
+  Matrix linear;
+  Vector poles;
+};
+
+Matrix beside(const Matrix& a, const Matrix& b) {
+  Matrix both(a.rows(), a.columns() + b.columns());
+  std::copy(std::begin(a.values), std::end(a.values), std::begin(both.values));
+  std::copy(std::begin(b.values), std::end(b.values), std::begin(both.values) + a.values.size());
+  return both;
+}
+
+}  // namespace
+
+DampedFit::DampedFit(std::span<const std::vector<double>> sound)
+    : sound_(sound), constant_(sound.size()), rest_(sound.begin(), sound.end()) {}
+
+void DampedFit::find_rest() {
+  for (std::size_t c = 0; c < sound_.size(); ++c) {
+    rest_[c] = sound_[c];
+    for (double& x : rest_[c]) {
+      x -= constant_[c];
+    }
+    for (const DampedMode& mode : modes_) {
+      add_damped(rest_[c], -mode.c[c], mode.log_z);
+    }
+  }
+}
+
+double DampedFit::rest_energy() const {
+  double sum = 0.0;
+  for (const std::vector<double>& channel : rest_) {
+    for (const double x : channel) {
+      sum += x * x;
+    }
+  }
+  return sum;
+}
+
+bool DampedFit::set_poles(const std::vector<Complex>& log_z) {
+  const std::size_t channels = sound_.size();
+  modes_.clear();
+  for (const Complex pole : log_z) {
+    modes_.push_back({pole, std::vector<Complex>(channels)});
+  }
+  constant_.assign(channels, 0.0);
+  find_rest();
+  const Normal normal(modes_, channels, sound_[0].size(), false);
+  for (int round = 0; round < 2; ++round) {  // the second mends what rounding has left
+    for (std::size_t c = 0; c < channels; ++c) {
+      const auto step = positive_solution(normal.linear, Gradient(rest_[c], modes_, c).linear);
+      if (!step) {
+        return false;
+      }
+      for (std::size_t k = 0; k < modes_.size(); ++k) {
+        modes_[k].c[c] += Complex((*step)(2 * k, 0), (*step)(2 * k + 1, 0));
+      }
+      constant_[c] += (*step)(2 * modes_.size(), 0);
+    }
+    find_rest();
+  }
+  return true;
+}
+
+void DampedFit::remove(const std::vector<bool>& is_removed) {
+  constexpr double unmoved = 1e-7;  // of an amplitude: not worth going through all samples
+  const Normal normal(modes_, 0, sound_[0].size(), false);
+  std::vector<std::size_t> kept;  // columns
+  std::vector<std::size_t> gone;
+  for (std::size_t k = 0; k < modes_.size(); ++k) {
+    std::vector<std::size_t>& where = is_removed[k] ? gone : kept;
+    where.insert(where.end(), {2 * k, 2 * k + 1});
+  }
+  kept.push_back(2 * modes_.size());
+  Matrix left(kept.size(), kept.size());
+  for (std::size_t j = 0; j < kept.size(); ++j) {
+    for (std::size_t i = 0; i < kept.size(); ++i) {
+      left(i, j) = normal.linear(kept[i], kept[j]);
+    }
+  }
+  Matrix moved(kept.size(), sound_.size());
+  for (std::size_t c = 0; c < sound_.size(); ++c) {
+    for (const std::size_t column : gone) {
+      const Complex amplitude = modes_[column / 2].c[c];
+      const double share = column % 2 == 0 ? amplitude.real() : amplitude.imag();
+      for (std::size_t i = 0; i < kept.size(); ++i) {
+        moved(i, c) += normal.linear(kept[i], column) * share;
+      }
+    }
+  }
+  const auto step = positive_solution(left, moved);
+  for (std::size_t c = 0; c < sound_.size(); ++c) {
+    for (std::size_t k = 0; k < modes_.size(); ++k) {
+      if (is_removed[k]) {
+        add_damped(rest_[c], modes_[k].c[c], modes_[k].log_z);
+      }
+    }
+    for (std::size_t i = 0; step && i + 1 < kept.size(); i += 2) {
+      DampedMode& mode = modes_[kept[i] / 2];
+      const Complex change((*step)(i, c), (*step)(i + 1, c));
+      if (std::abs(change) > unmoved * std::abs(mode.c[c])) {
+        mode.c[c] += change;
+        add_damped(rest_[c], -change, mode.log_z);
+      }
+    }
+    if (step) {
+      const double change = (*step)(kept.size() - 1, c);
+      constant_[c] += change;
+      for (double& x : rest_[c]) {
+        x -= change;
+      }
+    }
+  }
+  std::size_t k = 0;
+  std::erase_if(modes_, [&](const DampedMode&) { return is_removed[k++]; });
+}
+
+void DampedFit::set_modes(std::vector<DampedMode> modes) {
+  modes_ = std::move(modes);
+  find_rest();
+}
+
+void DampedFit::refine(int steps, const Progress& progress) {
+  const std::size_t count = modes_.size();
+  const std::size_t channels = sound_.size();
+  const std::size_t frames = sound_[0].size();
+  find_rest();
+  double energy = rest_energy();
+  double damping = 1e-4;
+  for (int done = 0; done < steps && count > 0; ++done) {
+    const Normal normal(modes_, channels, frames, true);
+    Matrix schur = normal.poles;
+    Matrix wanted(2 * count, 1);
+    std::vector<Matrix>
+        solved;  // [channel] by linear: what each pole's column brings, and the rest
+    for (std::size_t c = 0; c < channels; ++c) {
+      const Gradient gradient(rest_[c], modes_, c);
+      auto both = positive_solution(normal.linear, beside(normal.mixed[c], gradient.linear));
+      if (!both) {
+        return;
+      }
+      const Matrix taken = transposed_product(normal.mixed[c], *both);
+      for (std::size_t j = 0; j < 2 * count; ++j) {
+        for (std::size_t i = 0; i < 2 * count; ++i) {
+          schur(i, j) -= taken(i, j);
+        }
+        wanted(j, 0) += gradient.poles[j] - taken(j, 2 * count);
+      }
+      solved.push_back(*std::move(both));
+      progress.spend(count * frames + 16 * count * count * count);
+    }
+    const std::vector<DampedMode> before = modes_;
+    const std::vector<double> constant_before = constant_;
+    bool is_better = false;
+    for (int attempt = 0; attempt < 6 && !is_better; ++attempt) {
+      Matrix damped = schur;
+      for (std::size_t i = 0; i < 2 * count; ++i) {
+        damped(i, i) += (damping + ridge) * normal.poles(i, i) + 1e-300;
+      }
+      const auto step = positive_solution(damped, wanted);
+      if (step) {
+        for (std::size_t c = 0; c < channels; ++c) {
+          const auto linear = [&](std::size_t row) {
+            double sum = solved[c](row, 2 * count);
+            for (std::size_t j = 0; j < 2 * count; ++j) {
+              sum -= solved[c](row, j) * (*step)(j, 0);
+            }
+            return sum;
+          };
+          for (std::size_t k = 0; k < count; ++k) {
+            modes_[k].c[c] = before[k].c[c] + Complex(linear(2 * k), linear(2 * k + 1));
+          }
+          constant_[c] = constant_before[c] + linear(2 * count);
+        }
+        for (std::size_t k = 0; k < count; ++k) {
+          modes_[k].log_z = before[k].log_z + Complex((*step)(2 * k, 0), (*step)(2 * k + 1, 0));
+        }
+        const bool is_sound =
+            std::all_of(modes_.begin(), modes_.end(), [&](const DampedMode& mode) {
+              return mode.log_z.real() * static_cast<double>(frames) < 1.0 &&
+                     mode.log_z.real() > -3.0;
+            });
+        if (is_sound) {
+          find_rest();
+          is_better = rest_energy() < energy;
+        }
+      }
+      damping = is_better ? 0.03 * damping : std::max(10.0 * damping, 1e-6);
+    }
+    if (!is_better) {
+      modes_ = before;
+      constant_ = constant_before;
+      find_rest();
+      return;
+    }
+    const double now = rest_energy();
+    const bool is_done = energy - now < settled * now;
+    energy = now;
+    if (is_done) {
+      return;
+    }
+  }
+}
+
+std::vector<DampedDeviation> DampedFit::deviations(bool with_poles) const {
+  const std::size_t count = modes_.size();
+  const std::size_t channels = sound_.size();
+  std::vector<DampedDeviation> all(count,
+                                   {HUGE_VAL, HUGE_VAL, std::vector<double>(channels, HUGE_VAL)});
+  if (count == 0) {
+    return all;
+  }
+  const Normal normal(modes_, channels, sound_[0].size(), with_poles);
+  const std::size_t columns = 2 * count + 1;
+  Matrix unit(columns, columns);
+  for (std::size_t i = 0; i < columns; ++i) {
+    unit(i, i) = 1.0;
+  }
+  const auto inverse = positive_solution(normal.linear, unit);
+  if (!inverse) {
+    return all;
+  }
+  for (std::size_t k = 0; k < count; ++k) {
+    const double variance = 0.5 * ((*inverse)(2 * k, 2 * k) + (*inverse)(2 * k + 1, 2 * k + 1));
+    all[k] = {0.0, 0.0, std::vector<double>(channels, std::sqrt(std::max(0.0, variance)))};
+  }
+  if (!with_poles) {
+    return all;
+  }
+  Matrix schur = normal.poles;
+  std::vector<Matrix> moved;  // [channel] how the amplitudes follow the poles
+  for (std::size_t c = 0; c < channels; ++c) {
+    moved.push_back(product(*inverse, normal.mixed[c]));
+    schur.values -= transposed_product(normal.mixed[c], moved[c]).values;
+  }
+  Matrix pole_unit(2 * count, 2 * count);
+  for (std::size_t i = 0; i < 2 * count; ++i) {
+    pole_unit(i, i) = 1.0;
+    schur(i, i) += ridge * normal.poles(i, i) + 1e-300;
+  }
+  const auto covariance = positive_solution(schur, pole_unit);
+  for (std::size_t k = 0; k < count; ++k) {
+    all[k].alpha = covariance ? std::sqrt((*covariance)(2 * k, 2 * k)) : HUGE_VAL;
+    all[k].omega = covariance ? std::sqrt((*covariance)(2 * k + 1, 2 * k + 1)) : HUGE_VAL;
+  }
+  for (std::size_t c = 0; c < channels && covariance; ++c) {
+    const Matrix spread = product(moved[c], *covariance);
+    for (std::size_t k = 0; k < count; ++k) {
+      double variance = 0.0;
+      for (std::size_t row = 2 * k; row < 2 * k + 2; ++row) {
+        for (std::size_t j = 0; j < 2 * count; ++j) {
+          variance += 0.5 * spread(row, j) * moved[c](row, j);
+        }
+      }
+      all[k].c[c] = std::hypot(all[k].c[c], std::sqrt(std::max(0.0, variance)));
+    }
+  }
+  return all;
+}
+
+}  // namespace ressort

@@ -1,0 +1,584 @@
+#include "core/identification/identify.h"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <cstdio>
+#include <numbers>
+#include <optional>
+
+#include "core/identification/fit.h"
+#include "core/identification/poles.h"
+#include "core/identification/spectrum.h"
+
+namespace ressort {
+namespace {
+
+constexpr double pi = std::numbers::pi;
+constexpr double ln_1000 = 6.907755278982137;
+constexpr double band_hz = 690.0;         // the lower rate of the first search
+constexpr double twin = 0.15;             // nearer than this share of the damping is the same pole
+constexpr double chance = 21.0;           // squared amplitude over twice its variance: no accident
+constexpr double deepest_db = -110.0;     // below the mode with most energy
+constexpr std::size_t most_fitted = 450;  // at once
+constexpr double rounding = 1e-24;        // of the sound's energy: nothing is left to find
+constexpr double lowest_hz = 15.0;
+constexpr double least_quality = 0.5;
+constexpr double sure = 3.0;  // standard deviations
+
+std::string number(const char* form, double value) {
+  char text[48];
+  std::snprintf(text, sizeof text, form, value);
+  return text;
+}
+
+// How noisy the rest is around a mode while it rings.
+class Noise {
+ public:
+  explicit Noise(const std::vector<std::vector<double>>& rest) : channels_(rest.size()) {
+    for (std::size_t frames = std::bit_floor(rest[0].size()); frames >= 256; frames /= 4) {
+      powers_.emplace_back(rest, frames);
+    }
+    if (powers_.empty()) {
+      powers_.emplace_back(rest, rest[0].size());
+    }
+  }
+  // The variance of white noise that would be as loud there, of one channel.
+  double variance(Complex log_z) const {
+    const double alpha = -log_z.real();
+    const double omega = log_z.imag();
+    const Power& power = power_of(alpha);
+    const double half_width = std::max(
+        {8.0 * pi / static_cast<double>(power.frames()), 2.0 * alpha, 0.02 * omega, 0.002});
+    return power.density(omega, half_width) / static_cast<double>(channels_);
+  }
+  // The same of what is between the peaks of the rest.
+  double floor(Complex log_z) const {
+    const Power& power = power_of(-log_z.real());
+    return power.floor(log_z.imag(), std::max({-4.0 * log_z.real(), 0.05 * log_z.imag(), 0.01})) /
+           static_cast<double>(channels_);
+  }
+
+ private:
+  const Power& power_of(double alpha) const {
+    std::size_t i = 0;
+    while (i + 1 < powers_.size() && static_cast<double>(powers_[i + 1].frames()) * alpha > 2.0) {
+      ++i;
+    }
+    return powers_[i];
+  }
+
+  std::vector<Power> powers_;  // of ever shorter beginnings
+  std::size_t channels_;
+};
+
+double energy_in(const std::vector<std::vector<double>>& channels) {
+  double sum = 0.0;
+  for (const std::vector<double>& channel : channels) {
+    for (const double x : channel) {
+      sum += x * x;
+    }
+  }
+  return sum;
+}
+
+// The sum of the squares of all samples of the mode, if it rang for ever, nearly.
+double energy_of(const DampedMode& mode, std::size_t frames) {
+  double square = 0.0;
+  for (const Complex c : mode.c) {
+    square += std::norm(c);
+  }
+  const double alpha = std::max(-mode.log_z.real(), 0.5 / static_cast<double>(frames));
+  return square / (4.0 * alpha);
+}
+
+bool are_twins(Complex a, Complex b, double share, std::size_t frames) {
+  const double near =
+      std::max(share * std::min(-a.real(), -b.real()), 0.02 / static_cast<double>(frames));
+  return std::abs(a - b) < near;
+}
+
+// Fits all numbers of a growing set of modes.
+class Search {
+ public:
+  Search(const std::vector<std::vector<double>>& sound, const Progress& progress)
+      : sound_(sound), progress_(progress), fit_(sound) {
+    fit_.set_poles({});  // the constant alone
+    sound_energy_ = fit_.rest_energy();
+  }
+
+  DampedFit& fit() { return fit_; }
+
+  // What this search finds in the first so many samples of the rest joins the others. Those that
+  // are damped more than `most_alpha` were not for the searches before: they are looked for anew.
+  void look(const PoleSearch& search, std::size_t frames, double most_alpha) {
+    if (frames < shortest_for(search) || fit_.rest_energy() < rounding * sound_energy_) {
+      return;
+    }
+    const std::vector<DampedMode> before = fit_.modes();
+    std::vector<DampedMode> kept = before;
+    std::erase_if(kept, [&](const DampedMode& mode) { return -mode.log_z.real() > most_alpha; });
+    fit_.set_modes(kept);
+    std::vector<std::vector<double>> start;
+    for (const std::vector<double>& channel : fit_.rest()) {
+      start.emplace_back(channel.begin(), channel.begin() + static_cast<std::ptrdiff_t>(frames));
+    }
+    progress_.stage("searching for modes");
+    std::vector<Complex> found = find_poles(start, search, progress_);
+    if (found.empty()) {
+      fit_.set_modes(before);
+      return;
+    }
+    progress_.stage("fitting the modes to the sound");
+    add(strongest(std::move(found), start));
+    drop_accidents();
+    settle(3, 3);
+  }
+
+  // Begins with these instead of a search.
+  void start(const std::vector<Complex>& poles) { fit_.set_poles(poles); }
+
+  void finish() {
+    progress_.stage("fitting the modes to the sound");
+    settle(20, 10);
+  }
+
+  std::size_t frames() const { return sound_[0].size(); }
+
+ private:
+  // Of many poles those that alone would explain most.
+  std::vector<Complex> strongest(std::vector<Complex> found,
+                                 const std::vector<std::vector<double>>& start) const {
+    const std::size_t room = most_fitted - std::min(most_fitted, fit_.modes().size());
+    if (found.size() <= room) {
+      return found;
+    }
+    std::vector<std::pair<double, Complex>> ranked;
+    for (const Complex log_z : found) {
+      double square = 0.0;
+      for (const std::vector<double>& channel : start) {
+        square += std::norm(moments_of(channel, log_z).zeroth);
+      }
+      ranked.emplace_back(-square * -log_z.real(), log_z);
+    }
+    std::sort(ranked.begin(), ranked.end(),
+              [](const auto& a, const auto& b) { return a.first < b.first; });
+    found.clear();
+    for (std::size_t i = 0; i < room; ++i) {
+      found.push_back(ranked[i].second);
+    }
+    return found;
+  }
+
+  void add(const std::vector<Complex>& found) {
+    std::vector<Complex> known;
+    for (const DampedMode& mode : fit_.modes()) {
+      known.push_back(mode.log_z);
+    }
+    for (double share = twin; share < 20.0; share *= 4.0) {
+      std::vector<Complex> all = known;
+      for (const Complex log_z : found) {
+        if (std::none_of(all.begin(), all.end(),
+                         [&](Complex other) { return are_twins(log_z, other, share, frames()); })) {
+          all.push_back(log_z);
+        }
+      }
+      if (fit_.set_poles(all)) {
+        return;
+      }
+    }
+    fit_.set_poles(known);
+  }
+
+  // Refines until every mode is more than noise, and more than a part of its neighbour.
+  void settle(int steps, int rounds) {
+    fit_.refine(steps, progress_);
+    for (int round = 0; round < rounds && drop_unlikely(true); ++round) {
+      fit_.refine(3, progress_);
+    }
+    fit_.refine(steps, progress_);
+  }
+
+  // Takes back what noise would do as well, the least likely modes first.
+  void drop_accidents() {
+    for (int round = 0; round < 40 && drop_unlikely(false); ++round) {
+    }
+  }
+
+  // Drops some of the modes that are unlikely where the poles are certain or, `with_poles`, are
+  // not, but of neighbours, which may all be unlikely beside each other, one. Whether there were
+  // any.
+  bool drop_unlikely(bool with_poles) {
+    const std::vector<DampedMode>& modes = fit_.modes();
+    if (modes.empty()) {
+      return false;
+    }
+    const std::vector<DampedDeviation> deviations = fit_.deviations(with_poles);
+    const Noise noise(fit_.rest());
+    double loudest = 0.0;
+    for (const DampedMode& mode : modes) {
+      loudest = std::max(loudest, energy_of(mode, frames()));
+    }
+    const double least = loudest * std::pow(10.0, deepest_db / 10.0);
+    const double wanted = chance + static_cast<double>(sound_.size() - 1);
+    std::vector<std::pair<double, std::size_t>> unlikely;  // and which
+    const double resolved = 8.0 * pi / static_cast<double>(frames());
+    const auto are_neighbours = [&](Complex a, Complex b) {
+      return std::fabs(a.imag() - b.imag()) < 4.0 * std::max(-a.real(), -b.real()) + resolved;
+    };
+    for (std::size_t k = 0; k < modes.size(); ++k) {
+      // A peak may be no damped sinusoid and leave much, but a peak it is. What else is beside it
+      // has to be more than what it leaves.
+      const bool is_peak = std::none_of(modes.begin(), modes.end(), [&](const DampedMode& other) {
+        return are_neighbours(other.log_z, modes[k].log_z) &&
+               energy_of(other, frames()) > energy_of(modes[k], frames());
+      });
+      const double variance =
+          is_peak ? noise.floor(modes[k].log_z) : noise.variance(modes[k].log_z);
+      double likelihood = 0.0;
+      for (std::size_t c = 0; c < modes[k].c.size(); ++c) {
+        const double deviation = deviations[k].c[c];
+        likelihood += std::norm(modes[k].c[c]) / (1e-300 + 2.0 * deviation * deviation * variance);
+      }
+      likelihood = energy_of(modes[k], frames()) < least ? 0.0 : likelihood;
+      if (!(likelihood >= wanted)) {
+        unlikely.emplace_back(likelihood, k);
+      }
+    }
+    if (unlikely.empty()) {
+      return false;
+    }
+    std::sort(unlikely.begin(), unlikely.end());
+    std::vector<bool> is_dropped(modes.size());
+    for (const auto& row : unlikely) {
+      const std::size_t k = row.second;
+      bool has_gone_beside = false;
+      for (std::size_t j = 0; j < modes.size(); ++j) {
+        has_gone_beside =
+            has_gone_beside || (is_dropped[j] && are_neighbours(modes[j].log_z, modes[k].log_z));
+      }
+      is_dropped[k] = !has_gone_beside;
+    }
+    fit_.remove(is_dropped);
+    return true;
+  }
+
+  const std::vector<std::vector<double>>& sound_;
+  const Progress& progress_;
+  DampedFit fit_;
+  double sound_energy_ = 0.0;
+};
+
+void search_all(Search& search, double rate_hz) {
+  const double highest = 2.0 * pi * std::min(0.45, highest_mode_hz / rate_hz);
+  const auto decimation = std::size_t{1} << static_cast<unsigned>(
+                              std::max(1.0, std::round(std::log2(rate_hz / band_hz))));
+  struct Stage {
+    std::size_t decimation;
+    double length_s;
+    double most_alpha;  // times the samples that the search before has lost
+  };
+  const Stage stages[] = {{decimation, longest_ring_s, HUGE_VAL},
+                          {std::max<std::size_t>(2, decimation / 4), 0.7, 1.5},
+                          {std::max<std::size_t>(2, decimation / 16), 0.12, 1.5},
+                          {decimation, longest_ring_s, HUGE_VAL}};
+  std::size_t lost = 1;
+  for (const Stage& stage : stages) {
+    const PoleSearch wanted{stage.decimation, highest};
+    search.look(wanted,
+                std::min(search.frames(), static_cast<std::size_t>(stage.length_s * rate_hz)),
+                stage.most_alpha / static_cast<double>(lost));
+    lost = frames_lost(wanted);
+  }
+  search.finish();
+}
+
+// How many samples of the beginning are no free ringing but the blow itself: so much more is left
+// of them than of what follows.
+std::size_t blow_frames(const std::vector<std::vector<double>>& rest, double rate_hz) {
+  constexpr double frame_s = 0.001;
+  constexpr double longest_s = 0.03;
+  constexpr double much_more = 10.0;
+  const auto frame = static_cast<std::size_t>(frame_s * rate_hz);
+  std::vector<double> energies;
+  for (std::size_t from = 0; from + frame <= rest[0].size(); from += frame) {
+    double energy = 0.0;
+    for (const std::vector<double>& channel : rest) {
+      for (std::size_t n = from; n < from + frame; ++n) {
+        energy += channel[n] * channel[n];
+      }
+    }
+    energies.push_back(energy);
+  }
+  const auto most = static_cast<std::size_t>(longest_s / frame_s);
+  if (energies.size() < 4 * most) {
+    return 0;
+  }
+  std::vector<double> following(energies.begin() + static_cast<std::ptrdiff_t>(most),
+                                energies.begin() + static_cast<std::ptrdiff_t>(4 * most));
+  const auto middle = following.begin() + static_cast<std::ptrdiff_t>(following.size() / 2);
+  std::nth_element(following.begin(), middle, following.end());
+  std::size_t frames = most;
+  while (frames > 0 && energies[frames - 1] <= much_more * *middle) {
+    --frames;
+  }
+  return frames * frame;
+}
+
+// A mode of the fit with what is known of how uncertain it is.
+struct Found {
+  DampedMode mode;
+  DampedDeviation deviation;  // with the noise around it
+};
+
+enum class Fate { kept, steady, unfit };
+
+// The same at an earlier time.
+void go_back(Found& found, double samples) {
+  for (std::size_t c = 0; c < found.mode.c.size(); ++c) {
+    found.mode.c[c] *= std::exp(-found.mode.log_z * samples);
+    // Where its start was not seen, the pole's deviation adds to it.
+    found.deviation.c[c] =
+        std::hypot(found.deviation.c[c] * std::exp(-found.mode.log_z.real() * samples),
+                   std::abs(found.mode.c[c]) * found.deviation.alpha * samples);
+  }
+}
+
+Fate fate_of(const Found& found, double rate_hz, std::size_t frames) {
+  const double alpha = -found.mode.log_z.real();
+  const double omega = found.mode.log_z.imag();
+  const bool is_seen_to_decay = alpha > sure * found.deviation.alpha;
+  if ((!is_seen_to_decay && alpha * static_cast<double>(frames) < 1.0) || alpha * rate_hz < 0.05) {
+    return Fate::steady;
+  }
+  const bool is_known = found.deviation.alpha < alpha;
+  const bool rings = is_known && omega > 2.0 * pi * lowest_hz / rate_hz && omega < 0.999 * pi &&
+                     omega > 2.0 * least_quality * alpha &&
+                     omega <= 2.0 * pi * highest_mode_hz / rate_hz;
+  return rings ? Fate::kept : Fate::unfit;
+}
+
+std::vector<Found> all_found(const DampedFit& fit) {
+  std::vector<Found> all;
+  const Noise noise(fit.rest());
+  const std::vector<DampedDeviation> deviations = fit.deviations(true);
+  for (std::size_t k = 0; k < fit.modes().size(); ++k) {
+    all.push_back({fit.modes()[k], deviations[k]});
+    const double scale = std::sqrt(noise.variance(fit.modes()[k].log_z));
+    all.back().deviation.alpha *= scale;
+    all.back().deviation.omega *= scale;
+    for (double& c : all.back().deviation.c) {
+      c *= scale;
+    }
+  }
+  return all;
+}
+
+// When, in samples from the onset, a body that one impulse sets going from rest would have been
+// struck to swing most like this: there every mode passes 0.
+double time_of_impulse(const std::vector<Found>& all, double rate_hz) {
+  const double reach = 0.001 * rate_hz;
+  double best = 0.0;
+  double most = -1.0;
+  for (double t = -std::ceil(reach); t <= 0.5 * reach; t += 0.0625) {
+    double sum = 0.0;
+    double weight = 1e-300;
+    for (const Found& found : all) {
+      for (const Complex c : found.mode.c) {
+        // The amplitude counts, not its square, so that it is not the loudest mode alone.
+        const double sine = std::arg(c) + found.mode.log_z.imag() * t + 0.5 * pi;
+        sum += std::abs(c) * std::cos(sine) * std::cos(sine);
+        weight += std::abs(c);
+      }
+    }
+    const double match = sum / weight - 0.1 * std::fabs(t) / reach;
+    if (match > most) {
+      most = match;
+      best = t;
+    }
+  }
+  return best;
+}
+
+IdentifiedMode measured(const Found& found, double rate_hz, double time_zero) {
+  constexpr double last_digit = 2.3e-16;
+  const double alpha = -found.mode.log_z.real();
+  const double omega = found.mode.log_z.imag();
+  const double hertz = rate_hz / (2.0 * pi);
+  IdentifiedMode mode;
+  mode.frequency_hz = {omega * hertz,
+                       hertz * std::hypot(found.deviation.omega, last_digit * omega)};
+  mode.t60_s.value = ln_1000 / (alpha * rate_hz);
+  mode.t60_s.deviation = mode.t60_s.value * std::hypot(found.deviation.alpha / alpha, last_digit);
+  for (std::size_t c = 0; c < found.mode.c.size(); ++c) {
+    const Complex start = found.mode.c[c] * std::exp(found.mode.log_z * time_zero);
+    const double size = std::abs(start);
+    const double seen = found.deviation.c[c] * std::exp(-alpha * time_zero);
+    const auto deviation = [&](double of_pole) {
+      return std::hypot(seen, size * of_pole * time_zero);
+    };
+    mode.amplitude.push_back({size, deviation(found.deviation.alpha)});
+    mode.phase_rad.push_back(
+        {std::arg(start), size > 0.0 ? std::min(pi, deviation(found.deviation.omega) / size) : pi});
+  }
+  return mode;
+}
+
+double decibels(double power) {
+  return 10.0 * std::log10(std::max(power, 1e-40));
+}
+
+std::vector<OctaveResidual> by_octave(const std::vector<std::vector<double>>& sound,
+                                      const std::vector<std::vector<double>>& residual,
+                                      double rate_hz) {
+  const Power whole(sound, sound[0].size());
+  const Power left(residual, sound[0].size());
+  const double all = whole.between(0.0, pi);
+  std::vector<OctaveResidual> octaves;
+  for (double centre_hz = 31.25; centre_hz < 0.45 * rate_hz && centre_hz < 20000.0;
+       centre_hz *= 2.0) {
+    OctaveResidual octave{.low_hz = centre_hz / std::numbers::sqrt2,
+                          .high_hz = std::min(centre_hz * std::numbers::sqrt2, 0.5 * rate_hz)};
+    const double low = 2.0 * pi * octave.low_hz / rate_hz;
+    const double high = 2.0 * pi * octave.high_hz / rate_hz;
+    const double there = whole.between(low, high);
+    octave.level_db = decibels(there / all);
+    octave.residual_db = decibels(left.between(low, high) / std::max(there, 1e-300));
+    octaves.push_back(octave);
+  }
+  return octaves;
+}
+
+void warn_of_recording(const Blow& blow, Identification& found) {
+  const double rings_s = found.analysed_s;
+  if (blow.clipped > 0) {
+    found.warnings.push_back(
+        std::to_string(blow.clipped) + " samples are clipped: " +
+        (blow.skipped > 0
+             ? "the first " +
+                   number("%.3g", 1e3 * static_cast<double>(blow.skipped) / found.rate_hz) +
+                   " ms are concluded from what follows"
+             : "modes that are none, and amplitudes that are too small, may come of "
+               "that"));
+  }
+  if (blow.offset > 0.01) {
+    found.warnings.push_back("it has an offset (DC) of " + number("%.0f", 100.0 * blow.offset) +
+                             " % of its peak, which is left out");
+  }
+  if (blow.length_s > longest_ring_s + 0.001 && rings_s > longest_ring_s - 0.001) {
+    found.warnings.push_back("only the first " + number("%.0f", longest_ring_s) +
+                             " s after the blow, at " + number("%.3g", found.onset_s) +
+                             " s, are looked at");
+  }
+}
+
+}  // namespace
+
+Result<Identification> identify(const Recording& recording, const IdentifyOptions& options,
+                                const Progress& progress) try {
+  progress.stage("looking for the blow");
+  auto blow = find_blow(recording);
+  if (!blow) {
+    return blow.error();
+  }
+  const double rate_hz = recording.rate_hz;
+  Identification made{.rate_hz = rate_hz,
+                      .onset_s = static_cast<double>(blow->first) / rate_hz,
+                      .analysed_s = static_cast<double>(blow->channels[0].size()) / rate_hz};
+  warn_of_recording(*blow, made);
+  made.sound = std::move(blow->channels);
+  std::optional<Search> search(std::in_place, made.sound, progress);
+  search_all(*search, rate_hz);
+  // Rounding is no blow.
+  const double rest_share = search->fit().rest_energy() / std::max(energy_in(made.sound), 1e-300);
+  if (const std::size_t head = blow_frames(search->fit().rest(), rate_hz);
+      head > 0 && rest_share > rounding) {
+    std::vector<Complex> poles;
+    for (const DampedMode& mode : search->fit().modes()) {
+      poles.push_back(mode.log_z);
+    }
+    for (std::vector<double>& channel : made.sound) {
+      channel.erase(channel.begin(), channel.begin() + static_cast<std::ptrdiff_t>(head));
+    }
+    blow->skipped += head;
+    search.emplace(made.sound, progress);
+    search->start(poles);
+    search->finish();
+  }
+
+  std::vector<Found> kept;
+  double steady_hz = 0.0;
+  double steady_energy = 0.0;
+  std::size_t steady = 0;
+  const std::size_t frames = made.sound[0].size();
+  const auto skipped = static_cast<double>(blow->skipped);
+  made.skipped_s = skipped / rate_hz;
+  made.analysed_s = static_cast<double>(frames) / rate_hz;
+  for (Found& found : all_found(search->fit())) {
+    const Fate fate = fate_of(found, rate_hz, frames);
+    go_back(found, skipped);
+    if (fate == Fate::kept) {
+      kept.push_back(std::move(found));
+    } else if (fate == Fate::steady) {
+      ++steady;
+      if (energy_of(found.mode, frames) > steady_energy) {
+        steady_energy = energy_of(found.mode, frames);
+        steady_hz = found.mode.log_z.imag() * rate_hz / (2.0 * pi);
+      }
+    }
+  }
+  std::sort(kept.begin(), kept.end(), [&](const Found& a, const Found& b) {
+    return energy_of(a.mode, frames) > energy_of(b.mode, frames);
+  });
+  std::size_t count = 0;
+  while (count < std::min(kept.size(), options.most_modes) &&
+         energy_of(kept[count].mode, frames) >=
+             energy_of(kept[0].mode, frames) * std::pow(10.0, options.floor_db / 10.0)) {
+    ++count;
+  }
+  kept.resize(count);
+  if (steady > 0) {
+    made.warnings.push_back(
+        (steady == 1 ? "a tone" : std::to_string(steady) + " tones") +
+        std::string(" that cannot be seen to decay ") + (steady == 1 ? "is" : "are") +
+        " left out, " + (steady == 1 ? "" : "the loudest ") + "at " + number("%.1f Hz", steady_hz));
+  }
+  if (kept.empty()) {
+    return Error{"nothing in it rings: no decaying tone rises out of its noise"};
+  }
+  std::sort(kept.begin(), kept.end(), [](const Found& a, const Found& b) {
+    return a.mode.log_z.imag() < b.mode.log_z.imag();
+  });
+
+  const double time_zero = time_of_impulse(kept, rate_hz);
+  made.time_zero_s = made.onset_s + time_zero / rate_hz;
+  std::vector<DampedMode> modes;
+  for (const Found& found : kept) {
+    made.modes.push_back(measured(found, rate_hz, time_zero));
+    modes.push_back(found.mode);
+    for (Complex& c : modes.back().c) {
+      c *= std::exp(found.mode.log_z * skipped);
+    }
+  }
+  search->fit().set_modes(std::move(modes));
+  made.residual = search->fit().rest();
+  for (std::size_t c = 0; c < made.sound.size(); ++c) {
+    for (double& x : made.sound[c]) {
+      x -= search->fit().constant()[c];
+    }
+  }
+  made.residual_db =
+      decibels(search->fit().rest_energy() / std::max(energy_in(made.sound), 1e-300));
+  made.octaves = by_octave(made.sound, made.residual, rate_hz);
+  if (made.residual_db > -6.0) {
+    made.warnings.push_back(
+        "the modes explain only " +
+        number("%.0f", 100.0 * (1.0 - std::pow(10.0, made.residual_db / 10.0))) +
+        " % of its energy: this is not the ringing of one blow");
+  }
+  return made;
+} catch (const Stopped&) {
+  return Error{stopped};
+}
+
+}  // namespace ressort

@@ -1,0 +1,294 @@
+#include "core/identification/poles.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <numbers>
+
+#include "core/linear_algebra/complex.h"
+
+namespace ressort {
+namespace {
+
+constexpr double pi = std::numbers::pi;
+constexpr std::size_t taps_per_step = 14;  // of the filter, for each sample that is kept
+constexpr double kaiser_beta = 12.0;       // 118 dB between pass and stop
+constexpr double cutoff = 0.4;             // of the lower rate; what is kept is within 0.25
+constexpr std::size_t longest_window = 128;
+constexpr std::size_t least_window = 32;
+constexpr std::size_t least_frames = 96;   // of a band
+constexpr std::size_t energy_frames = 16;  // whose energy says whether it still rings
+constexpr std::size_t most_poles = 40;     // of a band
+constexpr double above_median = 25.0;      // the eigenvalue of what is no noise
+constexpr double leak = 3e-12;     // of the loudest band's largest: what filters let through
+constexpr double most_lost = 4.0;  // nepers of a pole while the filter fills
+constexpr double lowest_omega = 0.0005;
+constexpr double peaked = 8.0;  // largest eigenvalue over the mean: else it is noise
+
+using Band = std::vector<std::vector<Complex>>;  // [channel][frame] at the lower rate
+
+// I0, the modified Bessel function.
+double bessel(double x) {
+  double term = 1.0;
+  double sum = 1.0;
+  for (int k = 1; term > 1e-17 * sum; ++k) {
+    term *= 0.25 * x * x / (k * k);
+    sum += term;
+  }
+  return sum;
+}
+
+// A windowed sinc, its sum 1.
+std::vector<double> lowpass(std::size_t decimation) {
+  const std::size_t count = taps_per_step * decimation + 1;
+  const double middle = 0.5 * static_cast<double>(count - 1);
+  std::vector<double> taps(count);
+  double sum = 0.0;
+  for (std::size_t n = 0; n < count; ++n) {
+    const double t = static_cast<double>(n) - middle;
+    const double x = 2.0 * pi * cutoff / static_cast<double>(decimation) * t;
+    const double share = t / middle;
+    taps[n] = (t == 0.0 ? 1.0 : std::sin(x) / x) *
+              bessel(kaiser_beta * std::sqrt(std::max(0.0, 1.0 - share * share)));
+    sum += taps[n];
+  }
+  for (double& tap : taps) {
+    tap /= sum;
+  }
+  return taps;
+}
+
+// The band around `centre`, where the whole filter lies within the sound.
+std::vector<Complex> band_of(const std::vector<double>& sound, const std::vector<double>& taps,
+                             std::size_t decimation, double centre) {
+  constexpr std::size_t lanes = 8;
+  std::vector<double> re(taps.size());
+  std::vector<double> im(taps.size());
+  for (std::size_t n = 0; n < taps.size(); ++n) {
+    re[n] = taps[n] * std::cos(centre * static_cast<double>(n));
+    im[n] = -taps[n] * std::sin(centre * static_cast<double>(n));
+  }
+  std::vector<Complex> band;
+  for (std::size_t from = 0; from + taps.size() <= sound.size(); from += decimation) {
+    std::array<double, lanes> sum_re{};
+    std::array<double, lanes> sum_im{};
+    const double* const x = sound.data() + from;
+    std::size_t n = 0;
+    for (; n + lanes <= taps.size(); n += lanes) {
+      for (std::size_t lane = 0; lane < lanes; ++lane) {
+        sum_re[lane] += x[n + lane] * re[n + lane];
+        sum_im[lane] += x[n + lane] * im[n + lane];
+      }
+    }
+    for (; n < taps.size(); ++n) {
+      sum_re[0] += x[n] * re[n];
+      sum_im[0] += x[n] * im[n];
+    }
+    Complex sum;
+    for (std::size_t lane = 0; lane < lanes; ++lane) {
+      sum += Complex(sum_re[lane], sum_im[lane]);
+    }
+    // The filter turned with the sound; back to the band's own zero.
+    band.push_back(sum * std::polar(1.0, -std::fmod(centre * static_cast<double>(from), 2.0 * pi)));
+  }
+  return band;
+}
+
+double energy_of(const Band& band, std::size_t from, std::size_t to) {
+  double sum = 0.0;
+  for (const std::vector<Complex>& channel : band) {
+    for (std::size_t n = from; n < to; ++n) {
+      sum += std::norm(channel[n]);
+    }
+  }
+  return sum;
+}
+
+// How many frames there are until only the noise of the end is left.
+std::size_t ringing_frames(const Band& band) {
+  const std::size_t all = band[0].size();
+  std::vector<double> energies;
+  for (std::size_t from = 0; from + energy_frames <= all; from += energy_frames) {
+    energies.push_back(energy_of(band, from, from + energy_frames));
+  }
+  std::vector<double> tail(energies.end() - static_cast<std::ptrdiff_t>((energies.size() + 3) / 4),
+                           energies.end());
+  std::nth_element(tail.begin(), tail.begin() + static_cast<std::ptrdiff_t>(tail.size() / 2),
+                   tail.end());
+  const double noise = tail[tail.size() / 2];
+  std::size_t last = energies.size();
+  while (last > 0 && energies[last - 1] < 4.0 * noise) {
+    --last;
+  }
+  // Where nothing stands out, what is weak and long may still be in all of it.
+  return last == 0 ? all
+                   : std::clamp(last * energy_frames * 5 / 4, std::min(all, least_window * 3), all);
+}
+
+// The mean over all windows of x[i] conj(x[j]), i and j within a window: each diagonal from its
+// first element on.
+ComplexMatrix covariance(const Band& band, std::size_t frames, std::size_t window) {
+  ComplexMatrix made(window, window);
+  const std::size_t windows = frames - window + 1;
+  const double share = 1.0 / static_cast<double>(windows);
+  for (const std::vector<Complex>& x : band) {
+    for (std::size_t lag = 0; lag < window; ++lag) {
+      Complex sum;
+      for (std::size_t n = 0; n < windows; ++n) {
+        sum += times(x[n + lag], std::conj(x[n]));
+      }
+      for (std::size_t j = 0; j + lag < window; ++j) {
+        made(j + lag, j) += share * sum;
+        if (j + lag + 1 < window) {
+          sum += times(x[windows + j + lag], std::conj(x[windows + j])) -
+                 times(x[j + lag], std::conj(x[j]));
+        }
+      }
+    }
+  }
+  return made;
+}
+
+// Nearly, by a few powers.
+double largest_eigenvalue(const ComplexMatrix& lower) {
+  const std::size_t size = lower.rows;
+  ComplexMatrix whole = lower;
+  for (std::size_t j = 0; j < size; ++j) {
+    for (std::size_t i = 0; i < j; ++i) {
+      whole(i, j) = std::conj(whole(j, i));
+    }
+  }
+  std::vector<Complex> from(size);
+  for (std::size_t i = 0; i < size; ++i) {
+    from[i] = std::polar(1.0, static_cast<double>(i * i));  // no direction is left out
+  }
+  double length = 0.0;
+  for (int round = 0; round < 12; ++round) {
+    std::vector<Complex> to(size);
+    for (std::size_t j = 0; j < size; ++j) {
+      for (std::size_t i = 0; i < size; ++i) {
+        to[i] += times(whole(i, j), from[j]);
+      }
+    }
+    double square = 0.0;
+    for (const Complex& x : to) {
+      square += std::norm(x);
+    }
+    length = std::sqrt(square);
+    if (length == 0.0) {
+      return 0.0;
+    }
+    for (std::size_t i = 0; i < size; ++i) {
+      from[i] = to[i] / length;
+    }
+  }
+  return length;
+}
+
+struct Candidate {
+  Band band;
+  double centre = 0.0;  // omega at the full rate
+  double energy = 0.0;
+  std::size_t frames = 0;
+  std::size_t window = 0;
+  ComplexMatrix covariance{0, 0};
+  double largest = 0.0;
+};
+
+void find_in(const Candidate& candidate, double loudest, std::size_t decimation, double highest,
+             std::vector<Complex>& poles) {
+  const std::size_t window = candidate.window;
+  const HermitianEigenpairs pairs = hermitian_eigenpairs(candidate.covariance);
+  const double median = pairs.values[window / 2];
+  const double floor =
+      std::max({above_median * median, 1e-15 * pairs.values[window - 1], leak * loudest});
+  std::size_t order = 0;
+  while (order < std::min(most_poles, window / 2) && pairs.values[window - 1 - order] > floor) {
+    ++order;
+  }
+  if (order == 0) {
+    return;
+  }
+  ComplexMatrix basis(window, order);
+  for (std::size_t j = 0; j < order; ++j) {
+    for (std::size_t i = 0; i < window; ++i) {
+      basis(i, j) = pairs.vectors(i, window - 1 - j);
+    }
+  }
+  const auto steps = static_cast<double>(decimation);
+  for (const Complex z : shift_eigenvalues(basis)) {
+    const Complex log_z = std::log(z) / steps;
+    const double omega = candidate.centre + log_z.imag();
+    const bool is_kept = std::fabs(log_z.imag()) * steps <= 1.02 * 0.5 * pi &&
+                         -log_z.real() * steps > -1.0 / static_cast<double>(candidate.frames) &&
+                         -log_z.real() * steps < most_lost / static_cast<double>(taps_per_step) &&
+                         omega > lowest_omega && omega < highest;
+    if (is_kept) {
+      poles.emplace_back(log_z.real(), omega);
+    }
+  }
+}
+
+}  // namespace
+
+std::size_t frames_lost(const PoleSearch& search) {
+  return taps_per_step * search.decimation;
+}
+
+std::size_t shortest_for(const PoleSearch& search) {
+  return frames_lost(search) + least_frames * search.decimation + 1;
+}
+
+std::vector<Complex> find_poles(std::span<const std::vector<double>> channels,
+                                const PoleSearch& search, const Progress& progress) {
+  std::vector<Complex> poles;
+  const std::size_t decimation = search.decimation;
+  if (channels.empty() || channels[0].size() < shortest_for(search)) {
+    return poles;
+  }
+  const std::vector<double> taps = lowpass(decimation);
+  std::vector<Candidate> candidates;
+  double loudest_energy = 0.0;
+  for (std::size_t b = 0; b < decimation; ++b) {
+    const double spacing = pi / static_cast<double>(decimation);
+    const double centre = (static_cast<double>(b) + 0.5) * spacing;
+    if (centre - 0.5 * spacing >= search.highest_omega) {
+      break;
+    }
+    Candidate candidate{.band = {}, .centre = centre};
+    for (const std::vector<double>& channel : channels) {
+      candidate.band.push_back(band_of(channel, taps, decimation, centre));
+      progress.spend(channel.size() * 3);
+    }
+    candidate.energy = energy_of(candidate.band, 0, candidate.band[0].size());
+    loudest_energy = std::max(loudest_energy, candidate.energy);
+    candidates.push_back(std::move(candidate));
+  }
+  double loudest = 0.0;
+  for (Candidate& candidate : candidates) {
+    if (candidate.energy <= 1e-14 * loudest_energy) {
+      continue;
+    }
+    candidate.frames = ringing_frames(candidate.band);
+    candidate.window = std::min(candidate.frames / 3, longest_window);
+    candidate.covariance = covariance(candidate.band, candidate.frames, candidate.window);
+    candidate.largest = largest_eigenvalue(candidate.covariance);
+    loudest = std::max(loudest, candidate.largest);
+    progress.spend(candidate.window * candidate.frames);
+  }
+  for (const Candidate& candidate : candidates) {
+    double trace = 0.0;
+    for (std::size_t i = 0; i < candidate.window; ++i) {
+      trace += candidate.covariance(i, i).real();
+    }
+    if (candidate.largest > leak * loudest &&
+        candidate.largest > std::min(peaked, 0.3 * static_cast<double>(candidate.window)) * trace /
+                                static_cast<double>(candidate.window)) {
+      find_in(candidate, loudest, decimation, search.highest_omega, poles);
+      progress.spend(candidate.window * candidate.window * candidate.window);
+    }
+  }
+  return poles;
+}
+
+}  // namespace ressort
