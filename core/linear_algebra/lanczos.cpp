@@ -1,0 +1,123 @@
+#include "core/linear_algebra/lanczos.h"
+
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+
+namespace ressort {
+namespace {
+
+using Dense = Eigen::MatrixXd;
+using Index = Eigen::Index;
+
+constexpr double tolerance = 1e-10;  // of a pair's residual, against its own size
+constexpr double lost = 1e-13;       // what a direction may be left with and still be one
+
+Dense times(const Multiply& multiply, const Dense& x) {
+  Matrix columns(static_cast<std::size_t>(x.rows()), static_cast<std::size_t>(x.cols()));
+  std::copy_n(x.data(), x.size(), std::begin(columns.values));
+  multiply(columns);
+  return Eigen::Map<const Dense>(std::begin(columns.values), x.rows(), x.cols());
+}
+
+// The same numbers on every machine (splitmix64), between -1 and 1.
+Dense scattered(Index rows, Index columns) {
+  Dense x(rows, columns);
+  std::uint64_t state = 0;
+  for (Index i = 0; i < x.size(); ++i) {
+    std::uint64_t z = (state += 0x9e3779b97f4a7c15U);
+    z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9U;
+    z = (z ^ (z >> 27)) * 0x94d049bb133111ebU;
+    x.data()[i] = static_cast<double>((z ^ (z >> 31)) >> 11) * 0x1p-52 - 1.0;
+  }
+  return x;
+}
+
+// W = Q R with Q'BQ = I; Q has fewer columns where those of W depend on each other.
+struct Orthogonal {
+  Dense q;
+  Dense r;
+};
+Orthogonal orthogonal(const Dense& w, const Multiply& b) {
+  const Dense gram = w.transpose() * times(b, w);
+  const Eigen::SelfAdjointEigenSolver<Dense> solver(gram);
+  const double most = std::max(solver.eigenvalues().maxCoeff(), 0.0);
+  const Index width = (solver.eigenvalues().array() > lost * most).count();
+  const Dense vectors = solver.eigenvectors().rightCols(width);
+  const Eigen::VectorXd length = solver.eigenvalues().tail(width).cwiseSqrt();
+  return {w * vectors * length.cwiseInverse().asDiagonal(),
+          length.asDiagonal() * vectors.transpose()};
+}
+
+}  // namespace
+
+std::optional<Eigenpairs> lowest_pairs(double shift, int count, int size, const Multiply& inverse,
+                                       const Multiply& b, const Progress& progress) {
+  const Index n = size;
+  const Index width = std::min<Index>(lanczos_block, n);
+  const Index most = std::min<Index>(n, 6 * Index{count} + 20 * width);
+  if (count < 1 || count > n) {
+    return std::nullopt;
+  }
+  Dense v(n, most);
+  Dense t = Dense::Zero(most, most);
+  Dense block = orthogonal(times(inverse, times(b, scattered(n, width))), b).q;
+  block = orthogonal(block, b).q;
+  Index used = 0;
+  for (;;) {
+    const Index now = block.cols();
+    v.middleCols(used, now) = block;
+    const auto known = v.leftCols(used + now);
+    Dense next = times(inverse, times(b, block));
+    Dense shares = Dense::Zero(used + now, now);
+    for (int twice = 0; twice < 2; ++twice) {
+      const Dense share = known.transpose() * times(b, next);
+      next.noalias() -= known * share;
+      shares += share;
+    }
+    t.block(0, used, used + now, now) = shares;
+    t.block(used, 0, now, used + now) = shares.transpose();
+    used += now;
+    progress.spend(static_cast<std::size_t>(n * now * (used + 64)) / 4);
+    Orthogonal rest = orthogonal(next, b);
+    // Twice: the columns of the block differ in size by what they were mixed from.
+    const Orthogonal again = orthogonal(rest.q, b);
+    rest = {again.q, again.r * rest.r};
+    const bool is_whole = used == n || rest.q.cols() == 0;
+    const bool is_full = used + rest.q.cols() > most;
+    if (used >= count && (is_whole || is_full || used >= count + count / 2 + 2 * width)) {
+      const Dense top = t.topLeftCorner(used, used);
+      const Eigen::SelfAdjointEigenSolver<Dense> solver(top);
+      const Eigen::VectorXd theta = solver.eigenvalues().tail(count);
+      const Dense ritz = solver.eigenvectors().rightCols(count);
+      double residual = 0.0;
+      for (Index i = 0; i < count && !is_whole; ++i) {
+        residual =
+            std::max(residual, (rest.r * ritz.col(i).tail(now)).norm() / std::abs(theta(i)));
+      }
+      if (residual <= tolerance && theta(0) > 0.0) {
+        // One more inverse takes out what is left of the highest eigenvectors.
+        const Dense found = v.leftCols(used) * ritz;
+        const Dense cleaned = times(inverse, times(b, found));
+        Eigenpairs pairs{Vector(static_cast<std::size_t>(count)),
+                         Matrix(static_cast<std::size_t>(n), static_cast<std::size_t>(count))};
+        const Eigen::VectorXd length =
+            (cleaned.cwiseProduct(times(b, cleaned))).colwise().sum().cwiseSqrt();
+        for (Index i = 0; i < count; ++i) {  // the largest theta is the lowest eigenvalue
+          const Index from = count - 1 - i;
+          pairs.values[static_cast<std::size_t>(i)] = shift + 1.0 / theta(from);
+          const Eigen::VectorXd vector = cleaned.col(from) / length(from);
+          std::copy_n(vector.data(), n, std::begin(pairs.vectors.values) + i * n);
+        }
+        return pairs;
+      }
+    }
+    if (is_whole || is_full) {
+      return std::nullopt;
+    }
+    block = rest.q;
+  }
+}
+
+}  // namespace ressort
