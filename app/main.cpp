@@ -9,6 +9,7 @@
 #include <utility>
 #include <vector>
 
+#include "app/commands/body/solid.h"
 #include "app/commands/check.h"
 #include "app/commands/commands.h"
 #include "app/commands/export.h"
@@ -17,6 +18,7 @@
 #include "app/commands/smf/midi_file.h"
 #include "app/commands/start_chart.h"
 #include "app/program.h"
+#include "app/text.h"
 #include "app/version.h"
 #include "core/model/language/expression.h"
 
@@ -98,6 +100,15 @@ const char* const export_examples =
     "Examples:\n"
     "  ressort export PolyTriangle --to faust -o triangle.dsp\n"
     "  faust2jaqt triangle.dsp && ./triangle\n";
+
+const char* const body_examples =
+    "FILE is a solid, STL or OBJ: a closed surface. Its modes are found by finite elements. Boxes\n"
+    "are cut up by ressort itself, all else by gmsh or tetgen, whichever is installed.\n"
+    "Examples:\n"
+    "  ressort body bell.stl --material bronze --scale 0.001 -o bell.mdl\n"
+    "  ressort body bar.obj --young 11e9 --poisson 0.25 --density 750 --loss 0.01 -o bar.mdl\n"
+    "  ressort body bell.stl --material bronze --place rim=0.15,0,0 --picture bell.svg -o "
+    "bell.mdl\n";
 
 // A number within a range; what is no number is in none.
 CLI::Validator within(double least, double most) {
@@ -421,6 +432,78 @@ void add_render(CLI::App& app, RenderChoice& choice, int& code) {
   });
 }
 
+// Places, clamps: text that one function reads.
+template <class T>
+void add_parsed(CLI::App& command, const std::string& name, std::vector<T>& target,
+                Result<T> (*parse)(const std::string&), const std::string& help) {
+  command
+      .add_option_function<std::vector<std::string>>(
+          name,
+          [&target, parse, name](const std::vector<std::string>& texts) {
+            for (const std::string& text : texts) {
+              auto parsed = parse(text);
+              if (!parsed) {
+                throw CLI::ValidationError(name, parsed.error().message);
+              }
+              target.push_back(*parsed);
+            }
+          },
+          help)
+      ->type_name("TEXT")
+      ->take_all()
+      ->allow_extra_args(false);
+}
+
+void add_body(CLI::App& app, SolidBodyOptions& options, int& code) {
+  CLI::App* command = app.add_subcommand("body", "makes a body that can be struck of a solid");
+  std::vector<std::string> materials;
+  for (const SolidMaterial& material : solid_materials()) {
+    materials.emplace_back(material.name);
+  }
+  command->footer(body_examples);
+  command->add_option("FILE", options.input, "a solid: .stl or .obj")->required();
+  command->add_option("-o,--output", options.output, "the model; without it, to stdout");
+  command->add_option("--material", options.material, "what it is of: " + joined(materials, ", "));
+  command->add_option("--young", options.young, "Young's modulus in Pa, instead of the material's");
+  command->add_option("--poisson", options.poisson, "Poisson's ratio");
+  command->add_option("--density", options.density, "kg/m^3");
+  CLI::Option* loss =
+      command->add_option("--loss", options.loss, "loss factor: T60 is 2.2/(LOSS * frequency)");
+  command
+      ->add_option("--rayleigh", options.rayleigh,
+                   "A,B in 1/s and s: T60 is 13.8/(A + B (2 pi frequency)^2)")
+      ->delimiter(',')
+      ->excludes(loss);
+  command
+      ->add_option("--scale", options.scale, "metres per unit of the file; 0.001 for millimetres")
+      ->check(within(1e-9, 1e9))
+      ->capture_default_str();
+  command->add_option("--modes", options.modes, "how many, from the lowest")
+      ->check(within(1, 1000))
+      ->capture_default_str();
+  add_parsed(*command, "--place", options.places, parse_place,
+             "NAME=X,Y,Z in the file's unit: the nearest point of the surface, touched along its\n"
+             "normal, or along NAME=X,Y,Z,DX,DY,DZ; may stand several times. Without it p1 to p4,\n"
+             "far from each other");
+  add_parsed(*command, "--clamp", options.clamps, parse_clamp,
+             "X,Y,Z,R in the file's unit: what lies in this ball is held; may stand several times");
+  command->add_option("--picture", options.picture, "an SVG of its lowest modes");
+  add_choice<Mesher>(*command, "--mesher", options.mesh.mesher,
+                     {{"auto", Mesher::automatic},
+                      {"own", Mesher::own},
+                      {"gmsh", Mesher::gmsh},
+                      {"tetgen", Mesher::tetgen}},
+                     "what fills it with tetrahedra");
+  command
+      ->add_option("--unknowns", options.mesh.unknowns,
+                   "about how many; more are nearer to the solid and take longer")
+      ->check(within(200, 1'000'000))
+      ->capture_default_str();
+  add_overwrite(*command, options.force);
+  command->add_flag("-q,--quiet", options.is_quiet, "say nothing unless something is wrong");
+  command->callback([&options, &code] { code = solid_body(options); });
+}
+
 void add_make(CLI::App& app, MakeOptions& options, std::vector<std::uint32_t>& sizes, int& code) {
   Shape& shape = options.shape;
   CLI::App* command = app.add_subcommand("make", "writes a model: a string, a mesh, a triangle...");
@@ -546,6 +629,7 @@ int run(int argc, char** argv) {
   CheckOptions check_options;
   ExportOptions export_options;
   MakeOptions make_options;
+  SolidBodyOptions body_options;
   ChartOptions chart_options;
   std::vector<std::uint32_t> make_sizes;
   std::string reference_part;
@@ -553,6 +637,7 @@ int run(int argc, char** argv) {
   add_render(app, render_choice, code);
   add_check(app, check_options, code);
   add_make(app, make_options, make_sizes, code);
+  add_body(app, body_options, code);
   add_export(app, export_options, code);
   add_chart(app, chart_options, code);
   add_reference(app, reference_part, code);

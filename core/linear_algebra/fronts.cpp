@@ -43,10 +43,11 @@ FrontalCholesky::FrontalCholesky(const SparseMatrix& pattern,
   progress.spend(8 * pattern.row.size());
 }
 
-// Halves them by a plane across their longest side, and takes out of one half what touches the other:
-// both halves are eliminated before that.
+// Halves them by a plane across their longest side, and takes out of one half what touches the
+// other: both halves are eliminated before that.
 void FrontalCholesky::dissect(std::span<int> nodes) {
-  std::size_t parted = 0;  // the first so many are of one half, then the other, then what parts them
+  std::size_t parted =
+      0;  // the first so many are of one half, then the other, then what parts them
   std::size_t parting = 0;
   if (nodes.size() > leaf_nodes) {
     std::array<double, 3> low = places_[at(nodes[0])];
@@ -210,7 +211,8 @@ bool FrontalCholesky::factor(const SparseMatrix& pattern, std::span<const NodeBl
     }
     for (const std::size_t child : children[f]) {
       Dense& given = left[child];
-      const std::span<const int> border = std::span(fronts_[child].nodes).subspan(fronts_[child].own);
+      const std::span<const int> border =
+          std::span(fronts_[child].nodes).subspan(fronts_[child].own);
       for (std::size_t c = 0; c < border.size(); ++c) {  // both in the order of elimination
         for (int b = 0; b < 3; ++b) {
           const int column = place[at(border[c])] + b;

@@ -19,8 +19,8 @@ using NodeBlock = std::array<double, 9>;
 // A = L LT, of nodes with three unknowns each, 3 node + axis.
 class FrontalCholesky {
  public:
-  // `pattern` has a row and a column for each node, and its lower triangle; its values are not read.
-  // Finds an order and what fills up. O(n log n)
+  // `pattern` has a row and a column for each node, and its lower triangle; its values are not
+  // read. Finds an order and what fills up. O(n log n)
   FrontalCholesky(const SparseMatrix& pattern, std::span<const std::array<double, 3>> places,
                   const Progress& progress);
 

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <utility>
 
 namespace ressort {
 namespace {
@@ -37,17 +38,24 @@ Dense scattered(Index rows, Index columns) {
 // W = Q R with Q'BQ = I; Q has fewer columns where those of W depend on each other.
 struct Orthogonal {
   Dense q;
+  Dense bq;
   Dense r;
 };
 Orthogonal orthogonal(const Dense& w, const Multiply& b) {
-  const Dense gram = w.transpose() * times(b, w);
-  const Eigen::SelfAdjointEigenSolver<Dense> solver(gram);
-  const double most = std::max(solver.eigenvalues().maxCoeff(), 0.0);
-  const Index width = (solver.eigenvalues().array() > lost * most).count();
-  const Dense vectors = solver.eigenvectors().rightCols(width);
-  const Eigen::VectorXd length = solver.eigenvalues().tail(width).cwiseSqrt();
-  return {w * vectors * length.cwiseInverse().asDiagonal(),
-          length.asDiagonal() * vectors.transpose()};
+  Orthogonal found{w, times(b, w), Dense::Identity(w.cols(), w.cols())};
+  // Twice: columns that were nearly the same come out of the first with what rounding left.
+  for (int pass = 0; pass < 2; ++pass) {
+    const Dense gram = found.q.transpose() * found.bq;
+    const Eigen::SelfAdjointEigenSolver<Dense> solver(gram);
+    const double most = std::max(solver.eigenvalues().maxCoeff(), 0.0);
+    const Index width = (solver.eigenvalues().array() > lost * most).count();
+    const Dense vectors = solver.eigenvectors().rightCols(width);
+    const Eigen::VectorXd size = solver.eigenvalues().tail(width).cwiseSqrt();
+    found.q = found.q * vectors * size.cwiseInverse().asDiagonal();
+    found.bq = times(b, found.q);
+    found.r = size.asDiagonal() * vectors.transpose() * found.r;
+  }
+  return found;
 }
 
 }  // namespace
@@ -61,19 +69,19 @@ std::optional<Eigenpairs> lowest_pairs(double shift, int count, int size, const 
     return std::nullopt;
   }
   Dense v(n, most);
+  Dense bv(n, most);
   Dense t = Dense::Zero(most, most);
-  Dense block = orthogonal(times(inverse, times(b, scattered(n, width))), b).q;
-  block = orthogonal(block, b).q;
+  Orthogonal block = orthogonal(times(inverse, times(b, scattered(n, width))), b);
   Index used = 0;
   for (;;) {
-    const Index now = block.cols();
-    v.middleCols(used, now) = block;
-    const auto known = v.leftCols(used + now);
-    Dense next = times(inverse, times(b, block));
+    const Index now = block.q.cols();
+    v.middleCols(used, now) = block.q;
+    bv.middleCols(used, now) = block.bq;
+    Dense next = times(inverse, block.bq);
     Dense shares = Dense::Zero(used + now, now);
     for (int twice = 0; twice < 2; ++twice) {
-      const Dense share = known.transpose() * times(b, next);
-      next.noalias() -= known * share;
+      const Dense share = bv.leftCols(used + now).transpose() * next;
+      next.noalias() -= v.leftCols(used + now) * share;
       shares += share;
     }
     t.block(0, used, used + now, now) = shares;
@@ -81,9 +89,6 @@ std::optional<Eigenpairs> lowest_pairs(double shift, int count, int size, const 
     used += now;
     progress.spend(static_cast<std::size_t>(n * now * (used + 64)) / 4);
     Orthogonal rest = orthogonal(next, b);
-    // Twice: the columns of the block differ in size by what they were mixed from.
-    const Orthogonal again = orthogonal(rest.q, b);
-    rest = {again.q, again.r * rest.r};
     const bool is_whole = used == n || rest.q.cols() == 0;
     const bool is_full = used + rest.q.cols() > most;
     if (used >= count && (is_whole || is_full || used >= count + count / 2 + 2 * width)) {
@@ -93,13 +98,11 @@ std::optional<Eigenpairs> lowest_pairs(double shift, int count, int size, const 
       const Dense ritz = solver.eigenvectors().rightCols(count);
       double residual = 0.0;
       for (Index i = 0; i < count && !is_whole; ++i) {
-        residual =
-            std::max(residual, (rest.r * ritz.col(i).tail(now)).norm() / std::abs(theta(i)));
+        residual = std::max(residual, (rest.r * ritz.col(i).tail(now)).norm() / std::abs(theta(i)));
       }
       if (residual <= tolerance && theta(0) > 0.0) {
         // One more inverse takes out what is left of the highest eigenvectors.
-        const Dense found = v.leftCols(used) * ritz;
-        const Dense cleaned = times(inverse, times(b, found));
+        const Dense cleaned = times(inverse, bv.leftCols(used) * ritz);
         Eigenpairs pairs{Vector(static_cast<std::size_t>(count)),
                          Matrix(static_cast<std::size_t>(n), static_cast<std::size_t>(count))};
         const Eigen::VectorXd length =
@@ -116,7 +119,7 @@ std::optional<Eigenpairs> lowest_pairs(double shift, int count, int size, const 
     if (is_whole || is_full) {
       return std::nullopt;
     }
-    block = rest.q;
+    block = std::move(rest);
   }
 }
 

@@ -58,8 +58,8 @@ class Numbers {
   }
 
   Error error(const char* expected) const {
-    const auto line = 1 + std::count(text_.begin(), text_.begin() + static_cast<std::ptrdiff_t>(at_),
-                                     '\n');
+    const auto line =
+        1 + std::count(text_.begin(), text_.begin() + static_cast<std::ptrdiff_t>(at_), '\n');
     return {std::string("expected ") + expected, static_cast<int>(line)};
   }
 
@@ -196,7 +196,7 @@ Result<TetrahedronMesh> read_gmsh(std::string_view text) {
     const auto number = numbers.count(most_rows);
     const auto kind = numbers.count(100);
     const auto tags = numbers.count(100);
-    const std::size_t corners = !kind        ? 0
+    const std::size_t corners = !kind         ? 0
                                 : *kind == 15 ? 1
                                 : *kind == 1  ? 2
                                 : *kind == 2  ? 3

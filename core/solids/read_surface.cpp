@@ -60,7 +60,8 @@ class Words {
 
   Error error(const std::string& expected, std::string_view found) const {
     constexpr std::size_t shown = 40;
-    const std::string cut = std::string(found.substr(0, shown)) + (found.size() > shown ? "..." : "");
+    const std::string cut =
+        std::string(found.substr(0, shown)) + (found.size() > shown ? "..." : "");
     std::string clean;
     for (const char c : cut) {
       clean += static_cast<unsigned char>(c) < 0x20 || c == 0x7f ? '?' : c;
@@ -91,8 +92,8 @@ std::optional<double> number_of(std::string_view word) {
   double number = 0.0;
   const auto [end, failure] = std::from_chars(word.data(), word.data() + word.size(), number);
   const bool is_tiny = failure == std::errc::result_out_of_range && std::abs(number) < 1.0;
-  if (end != word.data() + word.size() || word.empty() ||
-      (failure != std::errc() && !is_tiny) || !(std::abs(number) <= largest_coordinate)) {
+  if (end != word.data() + word.size() || word.empty() || (failure != std::errc() && !is_tiny) ||
+      !(std::abs(number) <= largest_coordinate)) {
     return std::nullopt;
   }
   return number;
@@ -139,7 +140,8 @@ Result<Surface> read_ascii_stl(std::string_view text) {
       return too_many();
     }
     // Normals are made anew from the corners: what stands there is often wrong.
-    const auto wants = [&](std::string_view first, std::string_view second) -> std::optional<Error> {
+    const auto wants = [&](std::string_view first,
+                           std::string_view second) -> std::optional<Error> {
       if (!words.next_line()) {
         return Error{"expected '" + std::string(first) + "', found the end of the file",
                      words.line()};
@@ -233,9 +235,10 @@ Result<Surface> read_stl(std::string_view bytes) {
                  std::to_string(count) + " triangles of a binary STL, found " +
                  std::to_string(bytes.size()) + " bytes"};
   }
-  return Error{has_binary_size ? "it has no triangles"
-                               : "expected an STL: 'solid' at the beginning, or 84 bytes and 50 for "
-                                 "each triangle"};
+  return Error{has_binary_size
+                   ? "it has no triangles"
+                   : "expected an STL: 'solid' at the beginning, or 84 bytes and 50 for "
+                     "each triangle"};
 }
 
 Result<Surface> read_obj(std::string_view text) {

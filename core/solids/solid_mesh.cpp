@@ -93,8 +93,7 @@ Result<SolidMesh> quadratic(const TetrahedronMesh& mesh) {
   for (std::size_t i = 0; i < middles.size(); ++i) {
     const Middle& middle = middles[i];
     if (i == 0 || middle.low != middles[i - 1].low || middle.high != middles[i - 1].high) {
-      solid.points.push_back(
-          0.5 * (solid.points[at(middle.low)] + solid.points[at(middle.high)]));
+      solid.points.push_back(0.5 * (solid.points[at(middle.low)] + solid.points[at(middle.high)]));
     }
     solid.elements[middle.place / 6][4 + middle.place % 6] =
         static_cast<int>(solid.points.size()) - 1;
@@ -118,8 +117,8 @@ TetrahedronMesh box_mesh(const Point3& sides, const std::array<int, 3>& cells) {
   for (int z = 0; z <= cells[2]; ++z) {
     for (int y = 0; y <= cells[1]; ++y) {
       for (int x = 0; x <= cells[0]; ++x) {
-        mesh.points.push_back({sides[0] * x / cells[0], sides[1] * y / cells[1],
-                               sides[2] * z / cells[2]});
+        mesh.points.push_back(
+            {sides[0] * x / cells[0], sides[1] * y / cells[1], sides[2] * z / cells[2]});
       }
     }
   }
@@ -145,12 +144,10 @@ TetrahedronMesh box_mesh(const Point3& sides, const std::array<int, 3>& cells) {
 }
 
 TetrahedronMesh ball_mesh(double radius, int shells) {
-  TetrahedronMesh mesh =
-      box_mesh({2.0, 2.0, 2.0}, {2 * shells, 2 * shells, 2 * shells});
+  TetrahedronMesh mesh = box_mesh({2.0, 2.0, 2.0}, {2 * shells, 2 * shells, 2 * shells});
   for (Point3& point : mesh.points) {
     point = point - Point3{1.0, 1.0, 1.0};
-    const double reach =
-        std::max({std::abs(point[0]), std::abs(point[1]), std::abs(point[2])});
+    const double reach = std::max({std::abs(point[0]), std::abs(point[1]), std::abs(point[2])});
     // Equal angles on the cube's faces, so that cells are of one size.
     Point3 direction{};
     for (std::size_t axis = 0; axis < 3; ++axis) {
@@ -248,8 +245,8 @@ TetrahedronMesh lying_box_mesh(const LyingBox& box, double unknowns) {
   }
   TetrahedronMesh mesh = box_mesh({1.0, 1.0, 1.0}, cells_of(cell));
   for (Point3& point : mesh.points) {
-    point = box.corner + point[0] * box.sides[0] + point[1] * box.sides[1] +
-            point[2] * box.sides[2];
+    point =
+        box.corner + point[0] * box.sides[0] + point[1] * box.sides[1] + point[2] * box.sides[2];
   }
   return mesh;
 }

@@ -50,15 +50,16 @@ struct LyingBox {
 };
 std::optional<LyingBox> as_box(const ClosedSurface& closed);
 
-// A mesh of this box with about so many unknowns, its cells as near to cubes as whole numbers allow.
+// A mesh of this box with about so many unknowns, its cells as near to cubes as whole numbers
+// allow.
 TetrahedronMesh lying_box_mesh(const LyingBox& box, double unknowns);
 
 // How far apart nodes are to be so that a solid of this volume has about so many unknowns. m
 double edge_length(double volume, double unknowns);
 
 // What meshing programs read and write. Errors with the line where there is one.
-std::string as_stl(const ClosedSurface& closed);  // ASCII, a solid for each shell
-std::string as_smesh(const ClosedSurface& closed);  // TetGen's, with a point in every hollow
+std::string as_stl(const ClosedSurface& closed);           // ASCII, a solid for each shell
+std::string as_smesh(const ClosedSurface& closed);         // TetGen's, with a point in every hollow
 Result<TetrahedronMesh> read_gmsh(std::string_view text);  // .msh, format 2, ASCII
 Result<TetrahedronMesh> read_tetgen(std::string_view nodes, std::string_view elements);
 

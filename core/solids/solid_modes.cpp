@@ -17,25 +17,43 @@ std::size_t at(int index) {
   return static_cast<std::size_t>(index);
 }
 
-// y = M x, on three axes at once.
+// y = M x, on three axes and all columns at once: they lie side by side while it works.
 void times_mass(const SparseMatrix& mass, Matrix& columns) {
   const std::size_t rows = columns.rows();
-  Vector y(columns.values.size());
-  for (std::size_t c = 0; c < columns.columns(); ++c) {
-    const double* const x = &columns.values[c * rows];
-    double* const to = &y[c * rows];
-    for (int column = 0; column < mass.size(); ++column) {
-      for (int i = mass.first[at(column)]; i < mass.first[at(column) + 1]; ++i) {
-        const std::size_t row = 3 * at(mass.row[at(i)]);
-        const double m = mass.value[at(i)];
-        for (std::size_t axis = 0; axis < 3; ++axis) {
-          to[row + axis] += m * x[3 * at(column) + axis];
-          to[3 * at(column) + axis] += row == 3 * at(column) ? 0.0 : m * x[row + axis];
-        }
+  const std::size_t count = columns.columns();
+  const std::size_t width = 3 * count;
+  std::vector<double> x(columns.values.size());
+  std::vector<double> y(columns.values.size());
+  const auto place = [&](std::size_t row, std::size_t column) {
+    return row / 3 * width + 3 * column + row % 3;
+  };
+  for (std::size_t c = 0; c < count; ++c) {
+    for (std::size_t row = 0; row < rows; ++row) {
+      x[place(row, c)] = columns.values[row + c * rows];
+    }
+  }
+  for (int column = 0; column < mass.size(); ++column) {
+    const double* const from = &x[at(column) * width];
+    double* const to = &y[at(column) * width];
+    const int first = mass.first[at(column)];
+    for (std::size_t k = 0; k < width; ++k) {
+      to[k] += mass.value[at(first)] * from[k];
+    }
+    for (int i = first + 1; i < mass.first[at(column) + 1]; ++i) {
+      const double m = mass.value[at(i)];
+      const double* const below = &x[at(mass.row[at(i)]) * width];
+      double* const to_below = &y[at(mass.row[at(i)]) * width];
+      for (std::size_t k = 0; k < width; ++k) {
+        to[k] += m * below[k];
+        to_below[k] += m * from[k];
       }
     }
   }
-  columns.values = std::move(y);
+  for (std::size_t c = 0; c < count; ++c) {
+    for (std::size_t row = 0; row < rows; ++row) {
+      columns.values[row + c * rows] = y[place(row, c)];
+    }
+  }
 }
 
 void times_stiffness(const SolidMatrices& matrices, Matrix& columns) {
@@ -52,8 +70,7 @@ void times_stiffness(const SolidMatrices& matrices, Matrix& columns) {
         for (std::size_t b = 0; b < 3; ++b) {
           for (std::size_t a = 0; a < 3; ++a) {
             to[row + a] += block[a + 3 * b] * x[3 * at(column) + b];
-            to[3 * at(column) + b] +=
-                row == 3 * at(column) ? 0.0 : block[a + 3 * b] * x[row + a];
+            to[3 * at(column) + b] += row == 3 * at(column) ? 0.0 : block[a + 3 * b] * x[row + a];
           }
         }
       }
@@ -90,8 +107,8 @@ double mass_share(std::size_t a, std::size_t b) {
   if (a < 4 || b < 4) {
     return (touches(std::max(a, b) - 4, std::min(a, b)) ? -4.0 : -6.0) / 420.0;
   }
-  const int common = (touches(a - 4, edges[b - 4][0]) ? 1 : 0) +
-                     (touches(a - 4, edges[b - 4][1]) ? 1 : 0);
+  const int common =
+      (touches(a - 4, edges[b - 4][0]) ? 1 : 0) + (touches(a - 4, edges[b - 4][1]) ? 1 : 0);
   return (common == 2 ? 32.0 : common == 1 ? 16.0 : 8.0) / 420.0;
 }
 
@@ -128,8 +145,8 @@ SparseMatrix pattern_of(const SolidMesh& mesh, const std::vector<int>& row_of, i
 
 // Below all modes of a solid of this size: a twentieth of the time that sound takes through it.
 double shift_of(const SolidMesh& mesh, const SolidMaterial& material) {
-  const double omega = 0.05 * std::sqrt(material.young / material.density) /
-                       box_around(mesh.points).diagonal();
+  const double omega =
+      0.05 * std::sqrt(material.young / material.density) / box_around(mesh.points).diagonal();
   return -omega * omega;
 }
 
@@ -183,8 +200,8 @@ SolidMatrices solid_matrices(const SolidMesh& mesh, const SolidMaterial& materia
   }
   SolidMatrices matrices{pattern_of(mesh, row_of, static_cast<int>(node.size())), {}, node};
   matrices.stiffness.assign(matrices.mass.row.size(), NodeBlock{});
-  const double lambda =
-      material.young * material.poisson / ((1.0 + material.poisson) * (1.0 - 2.0 * material.poisson));
+  const double lambda = material.young * material.poisson /
+                        ((1.0 + material.poisson) * (1.0 - 2.0 * material.poisson));
   const double mu = material.young / (2.0 * (1.0 + material.poisson));
   for (const QuadraticTetrahedron& element : mesh.elements) {
     progress.spend(2000);
@@ -224,8 +241,9 @@ SolidMatrices solid_matrices(const SolidMesh& mesh, const SolidMaterial& materia
           const double shear = mu * inner(ga, gb);
           for (std::size_t y = 0; y < 3; ++y) {
             for (std::size_t x = 0; x < 3; ++x) {
-              block[x + 3 * y] += 0.25 * volume * (lambda * ga[x] * gb[y] + mu * ga[y] * gb[x] +
-                                                   (x == y ? shear : 0.0));
+              block[x + 3 * y] +=
+                  0.25 * volume *
+                  (lambda * ga[x] * gb[y] + mu * ga[y] * gb[x] + (x == y ? shear : 0.0));
             }
           }
         }
@@ -252,7 +270,8 @@ Result<SolidModes> find_solid_modes(const SolidMesh& mesh, const SolidMaterial& 
   FrontalCholesky factor(matrices.mass, places, progress);
   if (factor.size() > most_factor_elements) {
     return Error{std::to_string(3 * rows) + " unknowns are too many to be solved for: " +
-                 std::to_string(std::lround(factor.size() * 8e-9)) + " GB; a coarser mesh has fewer"};
+                 std::to_string(std::lround(factor.size() * 8e-9)) +
+                 " GB; a coarser mesh has fewer"};
   }
   progress.stage("factoring its stiffness");
   const double shift = shift_of(mesh, material);
@@ -263,8 +282,9 @@ Result<SolidModes> find_solid_modes(const SolidMesh& mesh, const SolidMaterial& 
     }
   }
   if (!factor.factor(matrices.mass, shifted, progress)) {
-    return Error{"its stiffness is not positive: a tetrahedron may be nearly flat, or Poisson's "
-                 "ratio too near to 0.5"};
+    return Error{
+        "its stiffness is not positive: a tetrahedron may be nearly flat, or Poisson's "
+        "ratio too near to 0.5"};
   }
   progress.stage("finding its modes");
   const bool is_free = at(rows) == mesh.points.size();
@@ -276,19 +296,19 @@ Result<SolidModes> find_solid_modes(const SolidMesh& mesh, const SolidMaterial& 
     return Error{"its modes could not be found: the iteration does not converge"};
   }
   SolidModes modes;
-  modes.rigid = static_cast<int>(std::count_if(
-      std::begin(pairs->values), std::end(pairs->values),
-      [&](double value) { return std::abs(value) < rigid_share * std::abs(shift); }));
+  modes.rigid = static_cast<int>(
+      std::count_if(std::begin(pairs->values), std::end(pairs->values),
+                    [&](double value) { return std::abs(value) < rigid_share * std::abs(shift); }));
   if (modes.rigid != 0 && modes.rigid != rigid_motions) {
     // Clamped at one node or along a line it can still turn.
     modes.rigid = std::min(modes.rigid, rigid_motions);
   }
   for (const QuadraticTetrahedron& element : mesh.elements) {
     const Point3& origin = mesh.points[at(element[0])];
-    modes.mass += material.density / 6.0 *
-                  inner(mesh.points[at(element[1])] - origin,
-                        cross(mesh.points[at(element[2])] - origin,
-                              mesh.points[at(element[3])] - origin));
+    modes.mass +=
+        material.density / 6.0 *
+        inner(mesh.points[at(element[1])] - origin,
+              cross(mesh.points[at(element[2])] - origin, mesh.points[at(element[3])] - origin));
   }
   const std::size_t found = pairs->values.size() - at(modes.rigid);
   const std::size_t kept = std::min(found, at(count));

@@ -64,8 +64,8 @@ struct SolidModes {
 // What the solver is asked not to exceed: eight bytes each.
 inline constexpr double most_factor_elements = 1e9;
 
-// The lowest `count` modes that bend it; fewer where it has fewer. Errors: more elements than can be
-// held, a solid that is held at all nodes, no convergence.
+// The lowest `count` modes that bend it; fewer where it has fewer. Errors: more elements than can
+// be held, a solid that is held at all nodes, no convergence.
 Result<SolidModes> find_solid_modes(const SolidMesh& mesh, const SolidMaterial& material,
                                     std::span<const SolidClamp> clamps, int count,
                                     const Progress& progress);

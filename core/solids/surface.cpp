@@ -98,8 +98,8 @@ std::string open_edges(const Surface& surface, const std::vector<EdgeUse>& edges
     if (uses != 2) {
       std::size_t& count = uses < 2 ? open_count : crowded_count;
       if (++count <= shown_edges) {
-        (uses < 2 ? open : crowded) += "\n  " + to_string(surface.points[at(edges[i].low)]) + " to " +
-                                       to_string(surface.points[at(edges[i].high)]) +
+        (uses < 2 ? open : crowded) += "\n  " + to_string(surface.points[at(edges[i].low)]) +
+                                       " to " + to_string(surface.points[at(edges[i].high)]) +
                                        (uses < 2 ? "" : ": " + std::to_string(uses) + " triangles");
       }
     }
@@ -145,8 +145,7 @@ bool turn_alike(std::vector<Triangle>& triangles, const std::vector<EdgeUse>& ed
       const int triangle = waiting.back();
       waiting.pop_back();
       for (const Neighbour& next : beside[at(triangle)]) {
-        const char wanted =
-            static_cast<char>(is_turned[at(triangle)] ^ (next.is_alike ? 0 : 1));
+        const char wanted = static_cast<char>(is_turned[at(triangle)] ^ (next.is_alike ? 0 : 1));
         if (closed.shell[at(next.triangle)] < 0) {
           closed.shell[at(next.triangle)] = closed.shells;
           is_turned[at(next.triangle)] = wanted;
@@ -207,8 +206,8 @@ Result<Done> sort_shells(ClosedSurface& closed, const Progress& progress) {
     const Triangle& triangle = closed.surface.triangles[t];
     const Point3& a = closed.surface.points[at(triangle[0])];
     const std::size_t shell = at(closed.shell[t]);
-    volume[shell] += inner(a, cross(closed.surface.points[at(triangle[1])],
-                                    closed.surface.points[at(triangle[2])]));
+    volume[shell] += inner(
+        a, cross(closed.surface.points[at(triangle[1])], closed.surface.points[at(triangle[2])]));
     corner[shell] = a;
   }
   for (int shell = 0; shell < closed.shells; ++shell) {
@@ -336,7 +335,8 @@ Result<ClosedSurface> close_surface(const Surface& surface, const Progress& prog
     closed.turned += given[t] != closed.surface.triangles[t] ? 1 : 0;
   }
   closed.volume = six_volumes(closed.surface) / 6.0;
-  const Point3 sides = box_around(closed.surface.points).high - box_around(closed.surface.points).low;
+  const Point3 sides =
+      box_around(closed.surface.points).high - box_around(closed.surface.points).low;
   if (!(closed.volume > 1e-9 * size * size * size) ||
       *std::min_element(sides.begin(), sides.end()) <= 0.0) {
     return Error{"the surface holds nothing in: its volume is " + std::to_string(closed.volume) +

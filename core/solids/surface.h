@@ -50,12 +50,12 @@ Result<Surface> read_obj(std::string_view text);
 // What holds a body in: its shells, each closed.
 struct ClosedSurface {
   Surface surface;
-  std::vector<int> shell;      // [triangle] from 0; 0 is the outer one, the others are hollows
+  std::vector<int> shell;  // [triangle] from 0; 0 is the outer one, the others are hollows
   int shells = 1;
-  std::size_t welded = 0;      // points that were one with another
-  std::size_t turned = 0;      // triangles that looked inwards
-  std::size_t left_out = 0;    // triangles without an area
-  double volume = 0.0;         // m^3
+  std::size_t welded = 0;    // points that were one with another
+  std::size_t turned = 0;    // triangles that looked inwards
+  std::size_t left_out = 0;  // triangles without an area
+  double volume = 0.0;       // m^3
 };
 
 // Welds points that lie within 1e-6 of the solid's size, and turns triangles outwards. The error
