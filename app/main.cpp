@@ -103,7 +103,7 @@ const char* const export_examples =
 
 const char* const body_examples =
     "FILE is a solid, STL or OBJ: a closed surface. Its modes are found by finite elements. Boxes\n"
-    "are cut up by ressort itself, all else by gmsh or tetgen, whichever is installed.\n"
+    "and balls are cut up by ressort itself, all else by gmsh or tetgen, whichever is installed.\n"
     "Examples:\n"
     "  ressort body bell.stl --material bronze --scale 0.001 -o bell.mdl\n"
     "  ressort body bar.obj --young 11e9 --poisson 0.25 --density 750 --loss 0.01 -o bar.mdl\n"

@@ -232,15 +232,17 @@ bool FrontalCholesky::factor(const SparseMatrix& pattern, std::span<const NodeBl
       }
       given.resize(0, 0);
     }
-    Eigen::Ref<Dense> corner = mine.topRows(own);
-    const Eigen::LLT<Eigen::Ref<Dense>> llt(corner);  // in place
-    if (llt.info() != Eigen::Success) {
-      return false;
-    }
-    if (all > own) {
-      auto below = mine.bottomRows(all - own);
-      corner.triangularView<Eigen::Lower>().transpose().solveInPlace<Eigen::OnTheRight>(below);
-      rest.selfadjointView<Eigen::Lower>().rankUpdate(below, -1.0);
+    if (own > 0) {  // halves that do not touch have nothing between them
+      Eigen::Ref<Dense> corner = mine.topRows(own);
+      const Eigen::LLT<Eigen::Ref<Dense>> llt(corner);  // in place
+      if (llt.info() != Eigen::Success) {
+        return false;
+      }
+      if (all > own) {
+        auto below = mine.bottomRows(all - own);
+        corner.triangularView<Eigen::Lower>().transpose().solveInPlace<Eigen::OnTheRight>(below);
+        rest.selfadjointView<Eigen::Lower>().rankUpdate(below, -1.0);
+      }
     }
     left[f] = std::move(rest);
     progress.spend(static_cast<std::size_t>(all * all) * static_cast<std::size_t>(own) / 32 + 1);
@@ -268,6 +270,9 @@ void FrontalCholesky::solve(Matrix& columns) const {
   for (const Front& front : fronts_) {
     const Eigen::Index all = eigen(3 * front.nodes.size());
     const Eigen::Index own = eigen(3 * front.own);
+    if (own == 0) {
+      continue;
+    }
     const Eigen::Map<const Dense> l(front.values.data(), all, own);
     gather(front);
     auto mine = part.topRows(own);
@@ -278,6 +283,9 @@ void FrontalCholesky::solve(Matrix& columns) const {
   for (auto front = fronts_.rbegin(); front != fronts_.rend(); ++front) {
     const Eigen::Index all = eigen(3 * front->nodes.size());
     const Eigen::Index own = eigen(3 * front->own);
+    if (own == 0) {
+      continue;
+    }
     const Eigen::Map<const Dense> l(front->values.data(), all, own);
     gather(*front);
     auto mine = part.topRows(own);

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 #include <utility>
 
 namespace ressort {
@@ -224,6 +225,50 @@ std::optional<LyingBox> as_box(const ClosedSurface& closed) {
     }
   }
   return std::nullopt;
+}
+
+std::optional<LyingBall> as_ball(const ClosedSurface& closed) {
+  constexpr double tolerance = 1e-5;  // of its radius
+  constexpr double round = 0.9;       // of the ball's volume
+  if (closed.shells != 1 || closed.surface.points.size() < 42) {
+    return std::nullopt;
+  }
+  // The middle of a box along the axes would be that of the ball only where it has points there:
+  // through four points goes one sphere.
+  const auto& points = closed.surface.points;
+  const Point3& first = points.front();
+  const auto farthest = [&](auto&& measure) {
+    return *std::max_element(points.begin(), points.end(), [&](const Point3& a, const Point3& b) {
+      return measure(a) < measure(b);
+    });
+  };
+  const Point3 a = farthest([&](const Point3& p) { return length(p - first); }) - first;
+  const Point3 b = farthest([&](const Point3& p) { return length(cross(p - first, a)); }) - first;
+  const Point3 c =
+      farthest([&](const Point3& p) { return std::abs(inner(p - first, cross(a, b))); }) - first;
+  const double volume = inner(a, cross(b, c));
+  if (!(std::abs(volume) > 1e-3 * length(a) * length(a) * length(a))) {
+    return std::nullopt;
+  }
+  const Point3 offset =
+      0.5 / volume *
+      (inner(a, a) * cross(b, c) + inner(b, b) * cross(c, a) + inner(c, c) * cross(a, b));
+  const LyingBall ball{first + offset, length(offset)};
+  const bool fits = std::all_of(points.begin(), points.end(), [&](const Point3& p) {
+    return std::abs(length(p - ball.middle) - ball.radius) < tolerance * ball.radius;
+  });
+  const double whole = 4.0 / 3.0 * std::numbers::pi * ball.radius * ball.radius * ball.radius;
+  return fits && closed.volume > round * whole ? std::optional(ball) : std::nullopt;
+}
+
+TetrahedronMesh lying_ball_mesh(const LyingBall& ball, double unknowns) {
+  // (4 shells + 1)^3 nodes.
+  const int shells = std::max(2, static_cast<int>((std::cbrt(unknowns / 3.0) - 1.0) / 4.0));
+  TetrahedronMesh mesh = ball_mesh(ball.radius, shells);
+  for (Point3& point : mesh.points) {
+    point = ball.middle + point;
+  }
+  return mesh;
 }
 
 TetrahedronMesh lying_box_mesh(const LyingBox& box, double unknowns) {

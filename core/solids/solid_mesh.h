@@ -50,6 +50,17 @@ struct LyingBox {
 };
 std::optional<LyingBox> as_box(const ClosedSurface& closed);
 
+// The ball that the surface is drawn onto, if all of its points lie on one and it is round: its
+// volume is at least nine tenths of the ball's.
+struct LyingBall {
+  Point3 middle{};
+  double radius = 0.0;
+};
+std::optional<LyingBall> as_ball(const ClosedSurface& closed);
+
+// A mesh of this ball with about so many unknowns.
+TetrahedronMesh lying_ball_mesh(const LyingBall& ball, double unknowns);
+
 // A mesh of this box with about so many unknowns, its cells as near to cubes as whole numbers
 // allow.
 TetrahedronMesh lying_box_mesh(const LyingBox& box, double unknowns);

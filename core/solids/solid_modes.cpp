@@ -253,11 +253,8 @@ SolidMatrices solid_matrices(const SolidMesh& mesh, const SolidMaterial& materia
   return matrices;
 }
 
-Result<SolidModes> find_solid_modes(const SolidMesh& mesh, const SolidMaterial& material,
-                                    std::span<const SolidClamp> clamps, int count,
-                                    const Progress& progress) {
-  progress.stage("putting its elements together");
-  const SolidMatrices matrices = solid_matrices(mesh, material, clamps, progress);
+Result<Eigenpairs> lowest_solid_pairs(const SolidMesh& mesh, const SolidMatrices& matrices,
+                                      double shift, int count, const Progress& progress) {
   const int rows = matrices.mass.size();
   if (rows == 0) {
     return Error{"all of its nodes are clamped"};
@@ -274,7 +271,6 @@ Result<SolidModes> find_solid_modes(const SolidMesh& mesh, const SolidMaterial& 
                  " GB; a coarser mesh has fewer"};
   }
   progress.stage("factoring its stiffness");
-  const double shift = shift_of(mesh, material);
   std::vector<NodeBlock> shifted = matrices.stiffness;
   for (std::size_t i = 0; i < shifted.size(); ++i) {
     for (std::size_t axis = 0; axis < 3; ++axis) {
@@ -287,22 +283,31 @@ Result<SolidModes> find_solid_modes(const SolidMesh& mesh, const SolidMaterial& 
         "ratio too near to 0.5"};
   }
   progress.stage("finding its modes");
-  const bool is_free = at(rows) == mesh.points.size();
-  const int wanted = std::min(count + (is_free ? rigid_motions : 0), 3 * rows);
-  const auto pairs = lowest_pairs(
-      shift, wanted, 3 * rows, [&](Matrix& x) { factor.solve(x); },
+  auto pairs = lowest_pairs(
+      shift, std::min(count, 3 * rows), 3 * rows, [&](Matrix& x) { factor.solve(x); },
       [&](Matrix& x) { times_mass(matrices.mass, x); }, progress);
   if (!pairs) {
     return Error{"its modes could not be found: the iteration does not converge"};
+  }
+  return *std::move(pairs);
+}
+
+Result<SolidModes> find_solid_modes(const SolidMesh& mesh, const SolidMaterial& material,
+                                    std::span<const SolidClamp> clamps, int count,
+                                    const Progress& progress) {
+  progress.stage("putting its elements together");
+  const SolidMatrices matrices = solid_matrices(mesh, material, clamps, progress);
+  const double shift = shift_of(mesh, material);
+  const bool is_free = matrices.node.size() == mesh.points.size();
+  const auto pairs =
+      lowest_solid_pairs(mesh, matrices, shift, count + (is_free ? rigid_motions : 0), progress);
+  if (!pairs) {
+    return pairs.error();
   }
   SolidModes modes;
   modes.rigid = static_cast<int>(
       std::count_if(std::begin(pairs->values), std::end(pairs->values),
                     [&](double value) { return std::abs(value) < rigid_share * std::abs(shift); }));
-  if (modes.rigid != 0 && modes.rigid != rigid_motions) {
-    // Clamped at one node or along a line it can still turn.
-    modes.rigid = std::min(modes.rigid, rigid_motions);
-  }
   for (const QuadraticTetrahedron& element : mesh.elements) {
     const Point3& origin = mesh.points[at(element[0])];
     modes.mass +=

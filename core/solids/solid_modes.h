@@ -7,6 +7,7 @@
 #include <string_view>
 #include <vector>
 
+#include "core/linear_algebra/eigen.h"
 #include "core/linear_algebra/fronts.h"
 #include "core/linear_algebra/matrix.h"
 #include "core/progress.h"
@@ -51,6 +52,11 @@ struct SolidMatrices {
 };
 SolidMatrices solid_matrices(const SolidMesh& mesh, const SolidMaterial& material,
                              std::span<const SolidClamp> clamps, const Progress& progress);
+
+// The lowest eigenpairs of K x = omega^2 M x, omega^2 above `shift`, with the motions as a whole; x
+// has an element for each axis of each row, x' M x = 1.
+Result<Eigenpairs> lowest_solid_pairs(const SolidMesh& mesh, const SolidMatrices& matrices,
+                                      double shift, int count, const Progress& progress);
 
 struct SolidModes {
   std::vector<double> frequency_hz;  // ascending

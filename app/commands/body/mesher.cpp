@@ -252,7 +252,12 @@ Result<Meshed> fill_with_tetrahedra(const ClosedSurface& closed, const MeshOrder
                                     const std::function<bool()>& goes_on) {
   if (order.mesher == Mesher::automatic || order.mesher == Mesher::own) {
     if (const auto box = as_box(closed)) {
-      return Meshed{lying_box_mesh(*box, order.unknowns), "ressort's own boxes"};
+      return Meshed{lying_box_mesh(*box, order.unknowns), "ressort, for boxes"};
+    }
+    if (const auto ball = as_ball(closed)) {
+      Meshed meshed{lying_ball_mesh(*ball, order.unknowns), "ressort, for balls"};
+      restore_volume(meshed.mesh, closed);
+      return meshed;
     }
     if (order.mesher == Mesher::own) {
       return Error{
@@ -294,7 +299,7 @@ Result<Meshed> fill_with_tetrahedra(const ClosedSurface& closed, const MeshOrder
           ? failures
           : "to fill it with tetrahedra needs gmsh or tetgen, and " +
                 std::string(order.mesher == Mesher::automatic ? "neither is" : "it is not") +
-                " installed: apt install gmsh; boxes need neither"};
+                " installed: apt install gmsh; boxes and balls need neither"};
 }
 
 }  // namespace ressort

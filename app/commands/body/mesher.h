@@ -1,5 +1,5 @@
 // app/commands: fills a surface with tetrahedra by a program that does that for a living, started
-// as a process of its own, or by ourselves where the solid is a box.
+// as a process of its own, or by ourselves where the solid is a box or a ball.
 #pragma once
 
 #include <functional>
@@ -12,7 +12,7 @@ namespace ressort {
 
 enum class Mesher {
   automatic,  // what fits of the others, the first first
-  own,        // boxes alone
+  own,        // boxes and balls alone
   gmsh,       // makes the surface anew, as fine as it is to be
   tetgen,     // keeps the surface and makes it finer where needed
 };

@@ -15,7 +15,7 @@ constexpr std::size_t most_triangles = 60'000;  // of the whole picture
 constexpr std::size_t columns = 4;
 constexpr double cell = 240.0;    // of one mode, in pixels
 constexpr double caption = 26.0;  // below it
-constexpr double bend = 0.12;     // of the solid's size: the farthest that it is drawn bent
+constexpr double bend = 0.09;     // of the solid's size: the farthest that it is drawn bent
 constexpr double filled = 0.86;   // of the cell
 
 std::size_t at(int index) {
@@ -75,14 +75,18 @@ std::string shapes_picture(const SolidMesh& mesh, const SolidModes& modes,
   const Point3 middle = 0.5 * (box.low + box.high);
   // One scale for all: the largest reach from the middle of what is seen, bent.
   double reach = 0.0;
+  double rise = 0.0;
   for (const Point3& point : mesh.points) {
-    reach = std::max({reach, std::abs(inner(view.right, point - middle)),
-                      std::abs(inner(view.up, point - middle))});
+    reach = std::max(reach, std::abs(inner(view.right, point - middle)));
+    rise = std::max(rise, std::abs(inner(view.up, point - middle)));
   }
-  const double scale = 0.5 * filled * cell / (reach + 0.5 * bend * size);
+  reach += 0.7 * bend * size;
+  rise += 0.7 * bend * size;
+  const double scale = 0.5 * filled * cell / std::max(reach, rise);
+  const double cell_height = 2.0 * scale * rise;
   const std::size_t rows = (count + columns - 1) / columns;
   const double width = cell * static_cast<double>(std::min(count, columns));
-  const double height = 34.0 + static_cast<double>(rows) * (cell + caption);
+  const double height = 34.0 + static_cast<double>(rows) * (cell_height + caption);
   std::string svg = "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 " + fixed(width, 0) +
                     " " + fixed(height, 0) + "\" font-family=\"sans-serif\" font-size=\"13\">\n" +
                     "<rect width=\"100%\" height=\"100%\" fill=\"white\"/>\n" +
@@ -103,7 +107,8 @@ std::string shapes_picture(const SolidMesh& mesh, const SolidModes& modes,
       moved[i] = mesh.points[i] - middle + bend * size / most * moved[i];
     }
     const double x0 = cell * (static_cast<double>(k % columns) + 0.5);
-    const double y0 = 34.0 + static_cast<double>(k / columns) * (cell + caption) + 0.5 * cell;
+    const double y0 =
+        34.0 + static_cast<double>(k / columns) * (cell_height + caption) + 0.5 * cell_height;
     const auto on_paper = [&](const Point3& point) {
       return std::array<double, 2>{x0 + scale * inner(view.right, point),
                                    y0 - scale * inner(view.up, point)};
@@ -148,7 +153,7 @@ std::string shapes_picture(const SolidMesh& mesh, const SolidModes& modes,
     }
     const double hz = modes.frequency_hz[k];
     svg += "<text text-anchor=\"middle\" x=\"" + fixed(x0, 0) + "\" y=\"" +
-           fixed(y0 + 0.5 * cell + 12.0, 0) + "\">" + std::to_string(k + 1) + ": " +
+           fixed(y0 + 0.5 * cell_height + 14.0, 0) + "\">" + std::to_string(k + 1) + ": " +
            fixed(hz, hz < 1000.0 ? 1 : 0) + " Hz</text>\n";
   }
   return svg + "</svg>\n";

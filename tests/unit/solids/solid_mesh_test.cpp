@@ -97,6 +97,36 @@ TEST_CASE("a box is known however it lies, and nothing else is", "[solid_mesh]")
   CHECK_FALSE(as_box(*closed));
 }
 
+TEST_CASE("a ball is known wherever it lies, and nothing else is", "[solid_mesh]") {
+  Surface ball = icosphere(2, 0.7, false);
+  for (Point3& point : ball.points) {
+    point = point + Point3{10.0, -3.0, 2.0};
+  }
+  auto closed = close_surface(ball, Progress());
+  REQUIRE(closed);
+  const auto found = as_ball(*closed);
+  REQUIRE(found);
+  CHECK(found->radius == Approx(0.7).epsilon(1e-9));
+  CHECK(length(found->middle - Point3{10.0, -3.0, 2.0}) < 1e-9);
+  const auto mesh = quadratic(lying_ball_mesh(*found, 10000.0));
+  REQUIRE(mesh);
+  CHECK(mesh->unknowns() < 10000);
+  // One point moved; what is cut off; a long one; a box, whose corners lie on a sphere, too.
+  ball.points[7] = ball.points[7] + Point3{0.01, 0.0, 0.0};
+  closed = close_surface(ball, Progress());
+  REQUIRE(closed);
+  CHECK_FALSE(as_ball(*closed));
+  for (const Surface& other :
+       {box_surface({1.0, 1.0, 1.0}),
+        revolved({{{0.0, -1.0}, {1.0, -1.0}, {1.0, 1.0}, {0.0, 1.0}}}, 40),
+        revolved({{{0.0, -0.5}, {std::sqrt(0.75), -0.5}, {std::sqrt(0.75), 0.5}, {0.0, 0.5}}},
+                 40)}) {
+    closed = close_surface(other, Progress());
+    REQUIRE(closed);
+    CHECK_FALSE(as_ball(*closed));
+  }
+}
+
 TEST_CASE("flat, missing and no tetrahedra are told", "[solid_mesh]") {
   CHECK_FALSE(quadratic({}));
   CHECK_FALSE(quadratic({{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {1, 1, 0}}, {{0, 1, 2, 3}}}));
