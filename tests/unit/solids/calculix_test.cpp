@@ -38,12 +38,11 @@ TetrahedronMesh random_solid(Random& random, bool is_fine) {
       p = p + Point3{0.5, 0.5, 0.5};
     }
   } else {
-    const double longest = std::max({sides[0], sides[1], sides[2]});
+    const double cell = std::cbrt(sides[0] * sides[1] * sides[2] / 400.0);
     std::array<int, 3> cells{};
     for (std::size_t axis = 0; axis < 3; ++axis) {
-      cells[axis] = is_fine
-                        ? std::max(2, static_cast<int>(std::lround(14.0 * sides[axis] / longest)))
-                        : 1 + static_cast<int>(random.below(axis == 0 ? 8 : 3));
+      cells[axis] = is_fine ? std::max(3, static_cast<int>(std::lround(sides[axis] / cell)))
+                            : 1 + static_cast<int>(random.below(axis == 0 ? 8 : 3));
     }
     mesh = box_mesh({1.0, 1.0, 1.0}, cells);
     if (kind == 1 && cells[0] > 2 && cells[1] > 2) {  // a hole through the middle
