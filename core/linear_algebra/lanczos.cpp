@@ -12,8 +12,8 @@ namespace {
 using Dense = Eigen::MatrixXd;
 using Index = Eigen::Index;
 
-constexpr double tolerance = 1e-10;  // of a pair's residual, against its own size
-constexpr double lost = 1e-13;       // what a direction may be left with and still be one
+constexpr double tolerance = 1e-9;  // of a pair's residual, against its own size
+constexpr double lost = 1e-13;      // what a direction may be left with and still be one
 
 Dense times(const Multiply& multiply, const Dense& x) {
   Matrix columns(static_cast<std::size_t>(x.rows()), static_cast<std::size_t>(x.cols()));
@@ -91,7 +91,7 @@ std::optional<Eigenpairs> lowest_pairs(double shift, int count, int size, const 
     Orthogonal rest = orthogonal(next, b);
     const bool is_whole = used == n || rest.q.cols() == 0;
     const bool is_full = used + rest.q.cols() > most;
-    if (used >= count && (is_whole || is_full || used >= count + count / 2 + 2 * width)) {
+    if (used >= count && (is_whole || is_full || used >= count + width)) {
       const Dense top = t.topLeftCorner(used, used);
       const Eigen::SelfAdjointEigenSolver<Dense> solver(top);
       const Eigen::VectorXd theta = solver.eigenvalues().tail(count);

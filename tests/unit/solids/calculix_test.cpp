@@ -28,12 +28,13 @@ bool has_calculix() {
 
 // Bars, blocks, plates, rings and balls, bent, tapered, twisted and bulged.
 TetrahedronMesh random_solid(Random& random, bool is_fine) {
-  const Point3 sides{random.uniform(0.1, 0.4), random.uniform(0.03, 0.2),
-                     random.uniform(0.01, 0.1)};
+  Point3 sides{random.uniform(0.1, 0.4), random.uniform(0.03, 0.2), random.uniform(0.01, 0.1)};
   TetrahedronMesh mesh;
   const std::size_t kind = random.below(4);
   if (kind == 0) {
-    mesh = ball_mesh(0.5, is_fine ? 3 : 2);
+    mesh = ball_mesh(0.5, is_fine ? 4 : 2);
+    sides[1] = random.uniform(0.5, 1.0) * sides[0];
+    sides[2] = random.uniform(0.5, 1.0) * sides[0];
     for (Point3& p : mesh.points) {
       p = p + Point3{0.5, 0.5, 0.5};
     }
