@@ -19,7 +19,7 @@ enum class Mesher {
 
 struct MeshOrder {
   Mesher mesher = Mesher::automatic;
-  double unknowns = 20000.0;  // about so many; three a node
+  double unknowns = 40000.0;  // about so many; three a node
   double limit_s = 300.0;     // a program that takes longer is ended
 };
 
