@@ -299,15 +299,20 @@ Result<SolidModes> find_solid_modes(const SolidMesh& mesh, const SolidMaterial& 
   const SolidMatrices matrices = solid_matrices(mesh, material, clamps, progress);
   const double shift = shift_of(mesh, material);
   const bool is_free = matrices.node.size() == mesh.points.size();
-  const auto pairs =
-      lowest_solid_pairs(mesh, matrices, shift, count + (is_free ? rigid_motions : 0), progress);
+  // What is clamped at a point or along a line can turn as a whole, too.
+  const auto pairs = lowest_solid_pairs(mesh, matrices, shift, count + rigid_motions, progress);
   if (!pairs) {
     return pairs.error();
   }
   SolidModes modes;
-  modes.rigid = static_cast<int>(
-      std::count_if(std::begin(pairs->values), std::end(pairs->values),
+  modes.rigid =
+      is_free ? rigid_motions
+              : static_cast<int>(std::count_if(
+                    std::begin(pairs->values), std::end(pairs->values),
                     [&](double value) { return std::abs(value) < rigid_share * std::abs(shift); }));
+  if (at(modes.rigid) >= pairs->values.size()) {
+    return Error{"nothing of it can bend"};
+  }
   for (const QuadraticTetrahedron& element : mesh.elements) {
     const Point3& origin = mesh.points[at(element[0])];
     modes.mass +=

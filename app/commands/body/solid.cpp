@@ -52,7 +52,8 @@ std::string body_name(const std::string& file) {
     name += is_plain ? c : '_';
   }
   const bool has_letter = !name.empty() && std::isalpha(static_cast<unsigned char>(name[0])) != 0;
-  return has_letter ? name : "body" + (name.empty() ? "" : "_" + name);
+  const bool is_taken = name == "in1" || name == "out1" || name == "out2";
+  return has_letter && !is_taken ? name : "body" + (name.empty() ? "" : "_" + name);
 }
 
 bool is_place_name(const std::string& name) {

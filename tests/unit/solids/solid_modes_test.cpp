@@ -245,6 +245,8 @@ TEST_CASE("a clamped bar swings as a cantilever", "[solid_modes]") {
   CHECK(modes_of(box_mesh({0.1, 0.05, 0.05}, {2, 1, 1}), steel, 4,
                  {{{}, 1e-6}, {{0.0, 0.0, 0.025}, 1e-6}, {{0.0, 0.0, 0.05}, 1e-6}})
             .rigid == 1);
+  CHECK(modes_of(box_mesh({0.1, 0.05, 0.05}, {2, 1, 1}), steel, 1, {{{}, 1e-6}})
+            .frequency_hz.size() == 1);
 }
 
 TEST_CASE("size, stiffness and density scale frequencies exactly", "[solid_modes]") {
@@ -318,6 +320,10 @@ TEST_CASE("all modes of a small solid are those of its dense matrices", "[solid_
   const SolidModes modes = modes_of(mesh, material, static_cast<int>(size) - 6);
   CHECK(total == Approx(3.0 * modes.mass).epsilon(1e-12));
   CHECK(modes.frequency_hz.size() == size - 6);
+  // ME-T6: exactly six motions as a whole.
+  const auto all = lowest_solid_pairs(solid, matrices, -0.01, 8, Progress());
+  REQUIRE(all);
+  CHECK(std::abs(all->values[5]) < 1e-9 * all->values[6]);
   Matrix unit(size, size);
   for (std::size_t i = 0; i < size; ++i) {
     unit(i, i) = 1.0;
