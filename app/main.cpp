@@ -9,12 +9,12 @@
 #include <utility>
 #include <vector>
 
-#include "app/commands/body/body.h"
 #include "app/commands/check.h"
 #include "app/commands/command_line.h"
 #include "app/commands/commands.h"
 #include "app/commands/export.h"
 #include "app/commands/make.h"
+#include "app/commands/body/body_line.h"
 #include "app/commands/modes/modes_line.h"
 #include "app/commands/reference.h"
 #include "app/commands/smf/midi_file.h"
@@ -101,58 +101,6 @@ const char* const export_examples =
     "Examples:\n"
     "  ressort export PolyTriangle --to faust -o triangle.dsp\n"
     "  faust2jaqt triangle.dsp && ./triangle\n";
-
-const char* const body_examples =
-    "FILE is a recording of one thing that was struck once: .wav, .flac, .ogg, .aiff and others, "
-    "up\n"
-    "to 16 channels. What rings in it is found as modes, each with a frequency, a T60 and a "
-    "level,\n"
-    "and with how uncertain these are. The body has the place `hit` and one for each channel: "
-    "`mic`,\n"
-    "`left` and `right`, or `mic1` and so on. Only the product of what is hit and what is heard "
-    "is\n"
-    "known: --mass says how heavy it is where it is hit, and it sounds as loud whatever that is.\n"
-    "Examples:\n"
-    "  ressort body bowl.wav -o bowl.mdl           then: ressort play bowl.mdl\n"
-    "  ressort body bowl.wav -o bowl.mdl --modes 20 --picture bowl.svg\n"
-    "  ressort body bowl.wav --json                all numbers, for programs\n";
-
-// A number within a range; what is no number is in none.
-CLI::Validator within(double least, double most) {
-  const std::string range = print_number(least) + " to " + print_number(most);
-  return {[=](std::string& text) {
-            double number = 0.0;
-            return parse_number(text, number) && number >= least && number <= most
-                       ? std::string()
-                       : "must be " + range + ", found " + text;
-          },
-          range};
-}
-
-// One of a few words.
-template <class T>
-CLI::Option* add_choice(CLI::App& command, const std::string& name, T& target,
-                        const std::vector<std::pair<std::string, T>>& choices,
-                        const std::string& help) {
-  std::string words;
-  for (const auto& [word, value] : choices) {
-    words += (words.empty() ? "" : ", ") + word;
-  }
-  return command
-      .add_option_function<std::string>(
-          name,
-          [&target, choices, name, words](const std::string& text) {
-            for (const auto& [word, value] : choices) {
-              if (word == text) {
-                target = value;
-                return;
-              }
-            }
-            throw CLI::ValidationError(name, "must be one of " + words + ", found " + text);
-          },
-          help + ": " + words + " (" + choices.front().first + ")")
-      ->type_name("WORD");
-}
 
 void add_method(CLI::App& command, std::optional<Method>& method) {
   std::map<std::string, Method> methods;
@@ -467,29 +415,6 @@ void add_make(CLI::App& app, MakeOptions& options, std::vector<std::uint32_t>& s
   });
 }
 
-void add_body(CLI::App& app, BodyOptions& options, int& code) {
-  CLI::App* command = app.add_subcommand("body", "makes a body to be struck of a recording");
-  command->footer(body_examples);
-  command->add_option("FILE", options.input, "the recording")->required();
-  command->add_option("-o,--output", options.output, "the model; without it, the screen");
-  command->add_option("--picture", options.picture,
-                      "an .svg: the spectrum with the modes, their T60, what they leave");
-  command->add_option("--modes", options.most_modes, "at most so many, those with most energy")
-      ->check(CLI::Range(1, 2000))
-      ->capture_default_str();
-  command
-      ->add_option("--floor", options.floor_db,
-                   "dB: modes whose energy is so far below the first's are left out")
-      ->check(within(-200.0, 0.0))
-      ->capture_default_str();
-  command->add_option("-M,--mass", options.mass, "of every mode, above 0")
-      ->check(within(1e-9, 1e9))
-      ->capture_default_str();
-  command->add_flag("--json", options.as_json, "all that was found, for machines");
-  add_overwrite(*command, options.force);
-  command->callback([&options, &code] { code = body_command(options); });
-}
-
 void add_check(CLI::App& app, CheckOptions& options, int& code) {
   CLI::App* command =
       app.add_subcommand("check", "reads a model or a preset and says what it found");
@@ -567,9 +492,9 @@ int run(int argc, char** argv) {
   RenderChoice render_choice;
   CheckOptions check_options;
   ExportOptions export_options;
+  BodyRequest body_request;
   ModesOptions modes_options;
   MakeOptions make_options;
-  BodyOptions body_options;
   ChartOptions chart_options;
   std::vector<std::uint32_t> make_sizes;
   std::string reference_part;
@@ -577,9 +502,9 @@ int run(int argc, char** argv) {
   add_render(app, render_choice, code);
   add_check(app, check_options, code);
   add_make(app, make_options, make_sizes, code);
-  add_body(app, body_options, code);
   add_export(app, export_options, code);
   add_modes(app, modes_options, code);
+  add_body(app, body_request, code);
   add_chart(app, chart_options, code);
   add_reference(app, reference_part, code);
   try {

@@ -5,7 +5,8 @@ set(RESSORT_TURN 0 CACHE STRING "Which of the deep tests comes first")
 set(ressort_fuzzers model preset score midi smf scala console osc osc_packet)
 list(TRANSFORM ressort_fuzzers PREPEND fuzz_ OUTPUT_VARIABLE ressort_deep_tests)
 list(APPEND ressort_deep_tests arm everything_sanitized everything_more forms_everywhere
-  accuracy_everywhere silence_everywhere lint modes_everywhere scenes_more abuse_long bows)
+  accuracy_everywhere silence_everywhere modes_everywhere calculix_everywhere bodies_everywhere
+  lint scenes_more abuse_long bows)
 list(LENGTH ressort_deep_tests ressort_deep_count)
 
 # SECONDS is about what it needs on two cores.
@@ -38,6 +39,9 @@ add_deep_test(scenes_more 200 ${CMAKE_COMMAND} -E env RESSORT_SCENES=1001,2000,1
   $<TARGET_FILE:ressort_tests> "[scenes]")
 
 # The modes of 208 random networks against their sound, and the lowest of a hundred thousand masses.
+# Masses and bodies a hundredth this side of the border of stability and beyond.
+add_deep_test(bodies_everywhere 60 $<TARGET_FILE:ressort_tests> "[bodies_everywhere]")
+
 add_deep_test(modes_everywhere 60 $<TARGET_FILE:ressort_tests> "[modes_everywhere]")
 
 # Budgets of pitch and decay on 300 random networks.
@@ -45,6 +49,9 @@ add_deep_test(accuracy_everywhere 120 $<TARGET_FILE:ressort_tests> "[accuracy_ev
 
 # What silence= leaves out of 200 of them.
 add_deep_test(silence_everywhere 120 $<TARGET_FILE:ressort_tests> "[silence_everywhere]")
+
+# Forty random solids against CalculiX.
+add_deep_test(calculix_everywhere 240 $<TARGET_FILE:ressort_tests> "[calculix_everywhere]")
 
 # Every bow at every speed and pressure on 24 keys.
 add_deep_test(bows 60 $<TARGET_FILE:ressort_voicing> --bows 8 Violin Cello DoubleBass)

@@ -42,6 +42,7 @@ judge() {
       sees["core/model"] = "core core/laws core/model"
       sees["core/analysis"] = "core core/laws core/linear_algebra core/model core/analysis"
       sees["core/identification"] = "core core/linear_algebra core/identification"
+      sees["core/solids"] = "core core/linear_algebra core/solids"
       sees["core/kernels"] = "core/lanes.h core/formula.h core/progress.h core/model/preset/budget.h " \
                              "core/laws core/linear_algebra core/kernels"
       sees["core/engine"] = "core/lanes.h core/formula.h core/progress.h core/gesture.h " \
@@ -53,7 +54,7 @@ judge() {
       sees["app/devices"] = "core/result.h core/engine core/kernels app app/realtime app/devices"
       sees["app/session"] = all " app app/realtime app/session app/control/registry.h"
       sees["app/control"] = all " app app/realtime app/devices app/session app/control"
-      sees["app/commands"] = sees["app/control"] " core/identification app/commands"
+      sees["app/commands"] = sees["app/control"] " core/identification core/solids app/commands"
       sees["app"] = sees["app/commands"]
     }
     {
@@ -112,6 +113,9 @@ core/model/language/mdl.cpp:1:#include <iostream>
 core/model/language/mdl.cpp:1:#include <Eigen/Dense>
 core/model/language/mdl.cpp:1:#include "app/session/files.h"
 core/analysis/linear.cpp:1:#include "core/kernels/program.h"
+core/solids/surface.cpp:1:#include "core/model/network.h"
+core/compile/compile.cpp:1:#include "core/solids/surface.h"
+app/session/session.cpp:1:#include "core/solids/surface.h"
 core/analysis/linear.cpp:1:#include <toml++/toml.h>
 core/analysis/linear.cpp:1:#include <Eigen/Dense>
 core/linear_algebra/general.cpp:1:#include "core/model/network.h"

@@ -3,8 +3,12 @@
 
 #include <CLI/CLI.hpp>
 #include <optional>
+#include <string>
+#include <utility>
+#include <vector>
 
 #include "core/model/network.h"
+#include "core/result.h"
 
 namespace ressort {
 
@@ -16,5 +20,52 @@ void add_overwrite(CLI::App& command, bool& force);
 
 // What the last argument of a mass means, for every command that reads a model.
 void add_motion(CLI::App& command, std::optional<ThirdArgument>& third);
+
+// One of a few words.
+template <class T>
+CLI::Option* add_choice(CLI::App& command, const std::string& name, T& target,
+                        const std::vector<std::pair<std::string, T>>& choices,
+                        const std::string& help) {
+  std::string words;
+  for (const auto& [word, value] : choices) {
+    words += (words.empty() ? "" : ", ") + word;
+  }
+  return command
+      .add_option_function<std::string>(
+          name,
+          [&target, choices, name, words](const std::string& text) {
+            for (const auto& [word, value] : choices) {
+              if (word == text) {
+                target = value;
+                return;
+              }
+            }
+            throw CLI::ValidationError(name, "must be one of " + words + ", found " + text);
+          },
+          help + ": " + words + " (" + choices.front().first + ")")
+      ->type_name("WORD");
+}
+
+// Texts that one function reads, one for each time that the option stands.
+template <class T>
+void add_parsed(CLI::App& command, const std::string& name, std::vector<T>& target,
+                Result<T> (*parse)(const std::string&), const std::string& help) {
+  command
+      .add_option_function<std::vector<std::string>>(
+          name,
+          [&target, parse, name](const std::vector<std::string>& texts) {
+            for (const std::string& text : texts) {
+              auto parsed = parse(text);
+              if (!parsed) {
+                throw CLI::ValidationError(name, parsed.error().message);
+              }
+              target.push_back(*parsed);
+            }
+          },
+          help)
+      ->type_name("TEXT")
+      ->take_all()
+      ->allow_extra_args(false);
+}
 
 }  // namespace ressort

@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "app/commands/body/solid.h"
 #include "app/control/registry.h"
 #include "app/control/status.h"
 #include "app/exit_code.h"
@@ -100,6 +101,14 @@ void print_midi() {
   }
 }
 
+void print_materials() {
+  const std::vector<Cells> rows = material_table();
+  print_head(rows.front());
+  for (std::size_t i = 1; i < rows.size(); ++i) {
+    print_row(rows[i]);
+  }
+}
+
 constexpr ReferencePart parts[] = {
     {"model", "the keywords of a .mdl file", print_keywords},
     {"preset", "the keys of a preset", print_preset_keys},
@@ -108,6 +117,7 @@ constexpr ReferencePart parts[] = {
     {"osc", "the addresses of OSC and of scores", print_addresses},
     {"console", "the console's commands", print_commands},
     {"status", "the figures of /status.reply and of the console", print_status},
+    {"materials", "what a solid may be of", print_materials},
 };
 
 }  // namespace

@@ -1,22 +1,38 @@
 #include "app/commands/body/body.h"
 
-#include <algorithm>
 #include <cstdio>
-#include <filesystem>
 
 #include "app/exit_code.h"
 
 namespace ressort {
 
-int body_command(const BodyOptions& options) {
-  std::string ending = std::filesystem::path(options.input).extension().string();
-  std::transform(ending.begin(), ending.end(), ending.begin(),
-                 [](char c) { return c >= 'A' && c <= 'Z' ? static_cast<char>(c + 32) : c; });
-  if (ending == ".stl" || ending == ".obj" || ending == ".mdl") {
-    std::fprintf(stderr, "'%s': bodies are made of recordings only, not of a %s\n",
-                 options.input.c_str(), ending.c_str());
+int body_command(const BodyRequest& request) {
+  const bool is_model = request.input.ends_with(".mdl") || request.input.ends_with(".toml");
+  if (!is_model && !request.network.chain.empty()) {
+    std::fprintf(stderr, "--chain is for models: make the body first, then its chain\n");
     return exit_code::wrong_use;
   }
+  const auto common = [&](auto options) {
+    options.input = request.input;
+    options.output = request.output;
+    options.force = request.force;
+    return options;
+  };
+  if (is_model) {
+    NetworkBodyOptions options = common(request.network);
+    options.modes = static_cast<std::size_t>(request.modes.value_or(0));
+    return network_body(options);
+  }
+  if (names_solid(request.input)) {
+    SolidBodyOptions options = common(request.solid);
+    options.picture = request.picture;
+    options.modes = request.modes.value_or(options.modes);
+    return solid_body(options);
+  }
+  BodyOptions options = common(request.recording);
+  options.picture = request.picture;
+  options.most_modes = request.modes ? static_cast<std::size_t>(*request.modes)
+                                     : options.most_modes;
   return recording_body(options);
 }
 

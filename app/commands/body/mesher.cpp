@@ -1,0 +1,305 @@
+#include "app/commands/body/mesher.h"
+
+#include <fcntl.h>
+#include <signal.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <chrono>
+#include <cmath>
+#include <cstdlib>
+#include <filesystem>
+#include <system_error>
+#include <thread>
+#include <vector>
+
+#include "app/session/files.h"
+#include "core/model/language/expression.h"
+#include "core/progress.h"
+
+namespace ressort {
+namespace {
+
+namespace fs = std::filesystem;
+using Clock = std::chrono::steady_clock;
+using std::chrono::milliseconds;
+
+constexpr std::size_t max_mesh_bytes = std::size_t{1} << 31;
+constexpr double far_off = 1.4;  // a mesh that is so much finer or coarser than asked is made anew
+
+bool is_installed(const std::string& program) {
+  const char* const path = std::getenv("PATH");
+  std::string folders = path != nullptr ? path : "/usr/local/bin:/usr/bin:/bin";
+  for (std::size_t from = 0; from <= folders.size();) {
+    const std::size_t end = std::min(folders.find(':', from), folders.size());
+    const std::string file = folders.substr(from, end - from) + "/" + program;
+    if (access(file.c_str(), X_OK) == 0) {
+      return true;
+    }
+    from = end + 1;
+  }
+  return false;
+}
+
+// A folder of our own for what the programs read and write, gone in the end.
+class WorkFolder {
+ public:
+  static Result<WorkFolder> make() {
+    std::error_code error;
+    std::string name = (fs::temp_directory_path(error) / "ressort-XXXXXX").string();
+    if (error || mkdtemp(name.data()) == nullptr) {
+      return Error{"no folder for the mesh can be made: " +
+                   std::error_code(errno, std::generic_category()).message()};
+    }
+    return WorkFolder(name);
+  }
+  WorkFolder(WorkFolder&& other) noexcept : name_(std::exchange(other.name_, {})) {}
+  WorkFolder& operator=(WorkFolder&&) = delete;
+  ~WorkFolder() {
+    std::error_code error;
+    if (!name_.empty()) {
+      fs::remove_all(name_, error);
+    }
+  }
+  std::string file(const std::string& name) const { return name_ + "/" + name; }
+  const std::string& name() const { return name_; }
+
+ private:
+  explicit WorkFolder(std::string name) : name_(std::move(name)) {}
+  std::string name_;
+};
+
+// The last lines of what a program said.
+std::string last_words(const std::string& log) {
+  constexpr std::size_t most = 600;
+  std::string text = read_bytes(log, max_mesh_bytes) ? *read_bytes(log, max_mesh_bytes) : "";
+  while (!text.empty() && (text.back() == '\n' || text.back() == ' ')) {
+    text.pop_back();
+  }
+  if (text.size() > most) {
+    text = text.substr(text.find('\n', text.size() - most) + 1);
+  }
+  for (char& c : text) {
+    c = static_cast<unsigned char>(c) < 0x20 && c != '\n' ? ' ' : c;
+  }
+  return text.empty() ? "it said nothing" : "it said:\n" + text;
+}
+
+// Runs a program in the folder, what it says goes into the file "log" there.
+Result<Done> run(std::vector<std::string> words, const WorkFolder& folder, double limit_s,
+                 const std::function<bool()>& goes_on) {
+  std::vector<char*> arguments;
+  for (std::string& word : words) {
+    arguments.push_back(word.data());
+  }
+  arguments.push_back(nullptr);
+  const std::string log = folder.file("log");
+  const pid_t child = fork();
+  if (child < 0) {
+    return Error{words[0] + " cannot be started: " +
+                 std::error_code(errno, std::generic_category()).message()};
+  }
+  if (child == 0) {
+    setpgid(0, 0);  // Ctrl-C comes to us, and we end it
+    const int out = open(log.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0600);
+    const int in = open("/dev/null", O_RDONLY | O_CLOEXEC);
+    if (out >= 0 && in >= 0 && chdir(folder.name().c_str()) == 0) {
+      dup2(in, STDIN_FILENO);
+      dup2(out, STDOUT_FILENO);
+      dup2(out, STDERR_FILENO);
+      execvp(arguments[0], arguments.data());
+    }
+    _exit(127);
+  }
+  const auto end = Clock::now() + milliseconds(static_cast<std::int64_t>(1000.0 * limit_s));
+  int status = 0;
+  for (;;) {
+    const pid_t ended = waitpid(child, &status, WNOHANG);
+    if (ended == child) {
+      break;
+    }
+    if (ended < 0 && errno != EINTR) {
+      return Error{words[0] + " was lost"};
+    }
+    const bool is_late = Clock::now() > end;
+    if (is_late || !goes_on()) {
+      kill(-child, SIGKILL);
+      kill(child, SIGKILL);
+      while (waitpid(child, &status, 0) < 0 && errno == EINTR) {
+      }
+      return Error{is_late ? words[0] + " took longer than " + print_number(limit_s) +
+                                 " s and was ended; a coarser mesh takes less"
+                           : stopped};
+    }
+    std::this_thread::sleep_for(milliseconds(5));
+  }
+  if (!WIFEXITED(status) || WEXITSTATUS(status) != 0) {
+    return Error{words[0] + " failed (" +
+                 (WIFEXITED(status) ? "exit code " + std::to_string(WEXITSTATUS(status))
+                                    : "signal " + std::to_string(WTERMSIG(status))) +
+                 "); " + last_words(log)};
+  }
+  return Done{};
+}
+
+// With the surface made anew in triangles of this size; without, on the triangles as they are.
+std::string gmsh_script(double edge, bool makes_surface_anew) {
+  return std::string("General.Terminal = 1;\nMerge \"surface.stl\";\n") +
+         (makes_surface_anew ? "ClassifySurfaces{40 * Pi / 180, 1, 1, Pi};\nCreateGeometry;\n"
+                             : "") +
+         "Surface Loop(1) = Surface{:};\nVolume(1) = {1};\n"
+         "Mesh.MeshSizeFromPoints = 0;\nMesh.MeshSizeExtendFromBoundary = 1;\n"
+         "Mesh.MeshSizeMax = " +
+         print_number(edge) +
+         ";\nMesh.Optimize = 1;\nMesh.MshFileVersion = 2.2;\n"
+         "Mesh.Binary = 0;\nMesh.SaveAll = 1;\n";
+}
+
+using Fill = std::function<Result<TetrahedronMesh>(double edge)>;
+
+Result<TetrahedronMesh> by_gmsh(const ClosedSurface& closed, double edge, const WorkFolder& folder,
+                                const MeshOrder& order, const std::function<bool()>& goes_on) {
+  Error first;
+  for (const bool anew : {true, false}) {
+    for (const auto& [name, text] : {std::pair("surface.stl", as_stl(closed)),
+                                     std::pair("body.geo", gmsh_script(edge, anew))}) {
+      if (auto written = write_text(folder.file(name), text, Existing::replace); !written) {
+        return written.error();
+      }
+    }
+    const auto ran = run({"gmsh", "-3", "body.geo", "-o", "body.msh", "-v", "2", "-nt", "1"},
+                         folder, order.limit_s, goes_on);
+    if (ran) {
+      const auto text = read_bytes(folder.file("body.msh"), max_mesh_bytes);
+      auto mesh = text ? read_gmsh(*text) : Result<TetrahedronMesh>(text.error());
+      if (mesh && !mesh->tetrahedra.empty()) {
+        return mesh;
+      }
+      first = anew || mesh ? Error{"gmsh made no tetrahedra; " + last_words(folder.file("log"))}
+                           : mesh.error();
+    } else if (ran.error().message == stopped) {
+      return ran.error();
+    } else if (anew || first.message.empty()) {
+      first = ran.error();
+    }
+  }
+  return first;
+}
+
+Result<TetrahedronMesh> by_tetgen(const ClosedSurface& closed, double edge,
+                                  const WorkFolder& folder, const MeshOrder& order,
+                                  const std::function<bool()>& goes_on) {
+  if (auto written = write_text(folder.file("body.smesh"), as_smesh(closed), Existing::replace);
+      !written) {
+    return written.error();
+  }
+  char switches[64];  // TetGen reads no exponents there
+  std::snprintf(switches, sizeof switches, "-pq1.4a%.24fQ", edge * edge * edge / 8.5);
+  if (auto ran = run({"tetgen", switches, "body.smesh"}, folder, order.limit_s, goes_on); !ran) {
+    return ran.error();
+  }
+  const auto nodes = read_bytes(folder.file("body.1.node"), max_mesh_bytes);
+  const auto elements = read_bytes(folder.file("body.1.ele"), max_mesh_bytes);
+  if (!nodes || !elements) {
+    return Error{"tetgen made no tetrahedra; " + last_words(folder.file("log"))};
+  }
+  return read_tetgen(*nodes, *elements);
+}
+
+std::size_t unknowns_of(const TetrahedronMesh& mesh) {
+  const auto solid = quadratic(mesh);
+  return solid ? solid->unknowns() : 0;
+}
+
+// Once more with another size where the first is far from what was asked for.
+Result<TetrahedronMesh> fitted(double edge, double unknowns, const Fill& fill) {
+  auto mesh = fill(edge);
+  if (!mesh) {
+    return mesh;
+  }
+  const double ratio = static_cast<double>(unknowns_of(*mesh)) / unknowns;
+  if (ratio > 0.0 && (ratio > far_off || ratio < 1.0 / far_off)) {
+    auto again = fill(edge * std::cbrt(ratio));
+    if (again || again.error().message == stopped) {
+      return again;
+    }
+  }
+  return mesh;
+}
+
+// To the volume that the surface has: what is round loses some where it is cut into straight edges.
+void restore_volume(TetrahedronMesh& mesh, const ClosedSurface& closed) {
+  double six = 0.0;
+  for (const Tetrahedron& t : mesh.tetrahedra) {
+    const auto point = [&](std::size_t i) { return mesh.points[static_cast<std::size_t>(t[i])]; };
+    six += std::abs(inner(point(1) - point(0), cross(point(2) - point(0), point(3) - point(0))));
+  }
+  const double factor = std::cbrt(6.0 * closed.volume / six);
+  if (factor > 0.9 && factor < 1.1) {
+    const Box3 box = box_around(closed.surface.points);
+    const Point3 middle = 0.5 * (box.low + box.high);
+    for (Point3& point : mesh.points) {
+      point = middle + factor * (point - middle);
+    }
+  }
+}
+
+}  // namespace
+
+Result<Meshed> fill_with_tetrahedra(const ClosedSurface& closed, const MeshOrder& order,
+                                    const std::function<bool()>& goes_on) {
+  if (order.mesher == Mesher::automatic || order.mesher == Mesher::own) {
+    if (const auto box = as_box(closed)) {
+      return Meshed{lying_box_mesh(*box, order.unknowns), "ressort, for boxes"};
+    }
+    if (const auto ball = as_ball(closed)) {
+      Meshed meshed{lying_ball_mesh(*ball, order.unknowns), "ressort, for balls"};
+      restore_volume(meshed.mesh, closed);
+      return meshed;
+    }
+    if (order.mesher == Mesher::own) {
+      return Error{
+          "it is no box, which is all that is filled without a program; --mesher gmsh or "
+          "tetgen takes any solid"};
+    }
+  }
+  const double edge = edge_length(closed.volume, order.unknowns);
+  struct Program {
+    Mesher mesher;
+    const char* name;
+  };
+  std::string failures;
+  for (const Program& program :
+       {Program{Mesher::gmsh, "gmsh"}, Program{Mesher::tetgen, "tetgen"}}) {
+    if ((order.mesher != Mesher::automatic && order.mesher != program.mesher) ||
+        !is_installed(program.name)) {
+      continue;
+    }
+    const auto folder = WorkFolder::make();
+    if (!folder) {
+      return folder.error();
+    }
+    auto mesh = fitted(edge, order.unknowns, [&](double size) {
+      return program.mesher == Mesher::gmsh ? by_gmsh(closed, size, *folder, order, goes_on)
+                                            : by_tetgen(closed, size, *folder, order, goes_on);
+    });
+    if (mesh) {
+      restore_volume(*mesh, closed);
+      return Meshed{*std::move(mesh), program.name};
+    }
+    if (mesh.error().message == stopped) {
+      return mesh.error();
+    }
+    failures += (failures.empty() ? "" : "\n") + mesh.error().message;
+  }
+  return Error{
+      !failures.empty()
+          ? failures
+          : "to fill it with tetrahedra needs gmsh or tetgen, and " +
+                std::string(order.mesher == Mesher::automatic ? "neither is" : "it is not") +
+                " installed: apt install gmsh; boxes and balls need neither"};
+}
+
+}  // namespace ressort

@@ -1,0 +1,380 @@
+#include "app/commands/body/solid.h"
+
+#include <signal.h>
+
+#include <algorithm>
+#include <cctype>
+#include <cmath>
+#include <cstdio>
+#include <filesystem>
+
+#include "app/commands/body/shapes.h"
+#include "app/commands/progress_bar.h"
+#include "app/exit_code.h"
+#include "app/realtime/lockfree.h"
+#include "app/session/files.h"
+#include "app/text.h"
+#include "core/model/language/expression.h"
+
+namespace ressort {
+namespace {
+
+constexpr std::size_t max_solid_bytes = std::size_t{256} << 20;
+// Of the numbers in a model: 44100 steps a second, micrometres and newtons. What is struck by hand
+// then moves by about 1, and a kilogram is an M of 1944.81.
+constexpr double m_per_kg = 44100.0 * 44100.0 * 1e-6;
+constexpr int places_of_our_own = 4;
+constexpr double very_large = 20.0;  // m, of a thing that is struck
+
+Flag called_off;  // by Ctrl-C, once: the second ends the program at once
+
+void watch_for_interrupt() {
+  struct sigaction once {};
+  once.sa_handler = [](int) { called_off.raise(); };
+  once.sa_flags = static_cast<int>(SA_RESETHAND);
+  sigaction(SIGINT, &once, nullptr);
+  sigaction(SIGTERM, &once, nullptr);
+}
+
+std::string lower(std::string text) {
+  for (char& c : text) {
+    c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+  }
+  return text;
+}
+
+// A name of the language made of a file's.
+std::string body_name(const std::string& file) {
+  std::string name;
+  for (const char c : std::filesystem::path(file).stem().string()) {
+    const bool is_plain =
+        (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9');
+    name += is_plain ? c : '_';
+  }
+  const bool has_letter = !name.empty() && std::isalpha(static_cast<unsigned char>(name[0])) != 0;
+  const bool is_taken = name == "in1" || name == "out1" || name == "out2";
+  return has_letter && !is_taken ? name : "body" + (name.empty() ? "" : "_" + name);
+}
+
+bool is_place_name(const std::string& name) {
+  return !name.empty() && std::isalpha(static_cast<unsigned char>(name[0])) != 0 &&
+         std::all_of(name.begin(), name.end(), [](char c) {
+           return std::isalnum(static_cast<unsigned char>(c)) != 0 || c == '_';
+         });
+}
+
+// So many numbers, divided by commas.
+std::optional<std::vector<double>> numbers_of(const std::string& text) {
+  std::vector<double> numbers;
+  for (std::size_t from = 0; from <= text.size();) {
+    const std::size_t end = std::min(text.find(',', from), text.size());
+    double number = 0.0;
+    if (!parse_number(text.substr(from, end - from), number)) {
+      return std::nullopt;
+    }
+    numbers.push_back(number);
+    from = end + 1;
+  }
+  return numbers;
+}
+
+std::string digits(double number, int significant) {
+  char text[40];
+  std::snprintf(text, sizeof text, "%.*g", significant, number);
+  return text;
+}
+
+struct MaterialChoice {
+  SolidMaterial material;
+  SolidDamping damping;
+};
+
+Result<MaterialChoice> choose_material(const SolidBodyOptions& options) {
+  SolidMaterial material{};
+  material.loss = 1e-3;
+  if (!options.material.empty()) {
+    const auto known = solid_material(lower(options.material));
+    if (!known) {
+      std::vector<std::string> names;
+      for (const SolidMaterial& row : solid_materials()) {
+        names.emplace_back(row.name);
+      }
+      return Error{"there is no material '" + options.material + "'" +
+                   did_you_mean(options.material, names) + "; there are " + joined(names, ", ")};
+    }
+    material = *known;
+  } else if (!options.young || !options.poisson || !options.density) {
+    return Error{"of what is it? --material NAME, or --young, --poisson and --density"};
+  }
+  material.young = options.young.value_or(material.young);
+  material.poisson = options.poisson.value_or(material.poisson);
+  material.density = options.density.value_or(material.density);
+  if (!(material.young > 0.0) || !(material.density > 0.0) || !(material.poisson > -1.0) ||
+      !(material.poisson < 0.5)) {
+    return Error{"--young and --density must be above 0, and --poisson above -1 and below 0.5"};
+  }
+  SolidDamping damping{.loss = options.loss.value_or(material.loss)};
+  if (options.rayleigh) {
+    damping = {(*options.rayleigh)[0], (*options.rayleigh)[1], 0.0};
+  }
+  if (damping.a < 0.0 || damping.b < 0.0 || damping.loss < 0.0 ||
+      damping.a + damping.b + damping.loss <= 0.0) {
+    return Error{
+        "--loss must be above 0; the numbers of --rayleigh not below, and one of them above"};
+  }
+  return MaterialChoice{material, damping};
+}
+
+Result<ClosedSurface> read_solid(const SolidBodyOptions& options, const Progress& progress) {
+  const auto bytes = read_bytes(options.input, max_solid_bytes);
+  if (!bytes) {
+    return bytes.error();
+  }
+  progress.stage("reading it");
+  const bool is_obj = lower(options.input).ends_with(".obj");
+  const auto surface = is_obj ? read_obj(*bytes) : read_stl(*bytes);
+  const auto located = [&](const Error& error) {
+    return Error{options.input +
+                 (error.line > 0 ? ":" + std::to_string(error.line) : std::string()) +
+                 ": error: " + error.message};
+  };
+  if (!surface) {
+    return located(surface.error());
+  }
+  auto closed = close_surface(scaled(*surface, options.scale), progress);
+  if (!closed) {
+    return located(closed.error());
+  }
+  return closed;
+}
+
+Result<std::vector<SolidPlace>> choose_places(const SolidBodyOptions& options,
+                                              const SolidMesh& mesh) {
+  const std::vector<Point3> normals = surface_normals(mesh);
+  std::vector<SolidPlace> places;
+  for (const PickedPlace& picked : options.places) {
+    const int node = nearest_on_surface(mesh, options.scale * picked.point);
+    const Point3 direction = picked.direction.value_or(normals[static_cast<std::size_t>(node)]);
+    if (!(length(direction) > 0.0)) {
+      return Error{"--place " + picked.name + ": the direction must not be 0"};
+    }
+    const bool is_taken = std::any_of(places.begin(), places.end(), [&](const SolidPlace& other) {
+      return other.name == picked.name;
+    });
+    if (is_taken) {
+      return Error{"--place " + picked.name + " is there twice"};
+    }
+    places.push_back({picked.name, node, 1.0 / length(direction) * direction});
+  }
+  if (places.empty()) {
+    for (const int node : spread_on_surface(mesh, places_of_our_own)) {
+      places.push_back(
+          {"p" + std::to_string(places.size() + 1), node, normals[static_cast<std::size_t>(node)]});
+    }
+  }
+  return places;
+}
+
+// In the language. M of all modes is the body's mass; a place moves by 1 where the body as a whole
+// moves by 1.
+std::string body_text(const std::string& name, const std::string& story, const SolidMesh& mesh,
+                      const SolidModes& modes, const std::vector<SolidPlace>& places,
+                      const SolidDamping& damping) {
+  std::string text = story;
+  for (const SolidPlace& place : places) {
+    text += "# " + place.name + " is at " +
+            to_string(mesh.points[static_cast<std::size_t>(place.node)]) + " m and moves along " +
+            to_string(place.direction) + ".\n";
+  }
+  text += "@" + name + " body " + digits(modes.mass * m_per_kg, 9);
+  for (const SolidPlace& place : places) {
+    text += " " + place.name;
+  }
+  text += "\n";
+  for (std::size_t k = 0; k < modes.frequency_hz.size(); ++k) {
+    std::vector<double> weights;
+    double most = 0.0;
+    for (const SolidPlace& place : places) {
+      weights.push_back(std::sqrt(modes.mass) * shape_at(modes, place, k));
+      most = std::abs(weights.back()) > std::abs(most) ? weights.back() : most;
+    }
+    text += "@" + name + "_" + std::to_string(k + 1) + " mode @" + name + " " +
+            digits(modes.frequency_hz[k], 8) + " " +
+            digits(damping.t60_s(modes.frequency_hz[k]), 6);
+    for (const double weight : weights) {
+      text += " " + digits(most < 0.0 ? -weight : weight, 6);
+    }
+    text += "\n";
+  }
+  text += "@in1 frcInput [@" + name + " " + places.front().name + "]\n";
+  for (std::size_t i = 0; i < 2; ++i) {
+    text += "@out" + std::to_string(i + 1) + " posOutput [@" + name + " " +
+            places[std::min(i, places.size() - 1)].name + "]\n";
+  }
+  return text;
+}
+
+std::string story_of(const SolidBodyOptions& options, const MaterialChoice& choice,
+                     const SolidMesh& mesh, const SolidModes& modes, const std::string& by) {
+  const SolidMaterial& material = choice.material;
+  const std::string what = material.name.empty() ? "" : std::string(material.name) + ", ";
+  const std::string loss = options.rayleigh ? "Rayleigh damping " + digits(choice.damping.a, 4) +
+                                                  " 1/s, " + digits(choice.damping.b, 4) + " s"
+                                            : "loss factor " + digits(choice.damping.loss, 4);
+  return "# " + std::filesystem::path(options.input).filename().string() + ": " +
+         digits(modes.mass, 4) + " kg of " + what + digits(material.young, 4) + " Pa, " +
+         digits(material.poisson, 4) + ", " + digits(material.density, 4) + " kg/m^3; " + loss +
+         "; " + (options.clamps.empty() ? "free" : "clamped") +
+         ".\n# Finite elements: " + std::to_string(mesh.elements.size()) +
+         " quadratic tetrahedra by " + by + ", " + std::to_string(mesh.unknowns()) +
+         " unknowns, residual " + digits(modes.residual, 2) +
+         ".\n# Positions are in micrometres and forces in newtons: M is kilograms times 1e-6 "
+         "(44100/s)^2, "
+         "and a\n# spring's K newtons per micrometre. A mode: its frequency in Hz, its T60 in "
+         "seconds, "
+         "and how far each\n# place moves, which is 1 where the body moves by 1 as a whole.\n";
+}
+
+}  // namespace
+
+bool names_solid(const std::string& file) {
+  const std::string name = lower(file);
+  return name.ends_with(".stl") || name.ends_with(".obj");
+}
+
+Result<PickedPlace> parse_place(const std::string& text) {
+  const std::size_t equals = text.find('=');
+  const auto numbers =
+      equals == std::string::npos ? std::nullopt : numbers_of(text.substr(equals + 1));
+  if (!numbers || (numbers->size() != 3 && numbers->size() != 6) ||
+      !is_place_name(text.substr(0, equals))) {
+    return Error{"expected NAME=X,Y,Z, or with a direction NAME=X,Y,Z,DX,DY,DZ, found '" + text +
+                 "'"};
+  }
+  const std::vector<double>& n = *numbers;
+  PickedPlace place{text.substr(0, equals), {n[0], n[1], n[2]}, std::nullopt};
+  if (n.size() == 6) {
+    place.direction = Point3{n[3], n[4], n[5]};
+  }
+  return place;
+}
+
+Result<SolidClamp> parse_clamp(const std::string& text) {
+  const auto numbers = numbers_of(text);
+  if (!numbers || numbers->size() != 4 || (*numbers)[3] < 0.0) {
+    return Error{"expected X,Y,Z,R: the middle of a ball and its radius, found '" + text + "'"};
+  }
+  return SolidClamp{{(*numbers)[0], (*numbers)[1], (*numbers)[2]}, (*numbers)[3]};
+}
+
+std::vector<std::vector<std::string>> material_table() {
+  std::vector<std::vector<std::string>> rows = {
+      {"material", "E, GPa", "nu", "density, kg/m^3", "loss factor"}};
+  for (const SolidMaterial& row : solid_materials()) {
+    rows.push_back({std::string(row.name), digits(row.young * 1e-9, 4), digits(row.poisson, 4),
+                    digits(row.density, 5), digits(row.loss, 3)});
+  }
+  return rows;
+}
+
+int solid_body(const SolidBodyOptions& options) {
+  const auto complain = [](const std::string& text) {
+    std::fprintf(stderr, "%s\n", text.c_str());
+    return exit_code::wrong_use;
+  };
+  const auto choice = choose_material(options);
+  if (!choice) {
+    return complain(choice.error().message);
+  }
+  for (const std::string& written : {options.output, options.picture}) {
+    const std::string read[] = {options.input};
+    if (const auto spared = spare(written, read); !spared) {
+      return complain(spared.error().message);
+    }
+  }
+  watch_for_interrupt();
+  ProgressBar bar(!options.is_quiet);
+  double share = 0.0;
+  const auto goes_on = [&](std::string_view stage) {
+    bar.show(share, std::string(stage));
+    return !called_off.is_raised();
+  };
+  const Progress progress([&](std::string_view stage) {
+    share = stage == "finding its modes" ? 0.6 : stage == "reading it" ? 0.0 : 0.3;
+    return goes_on(stage);
+  });
+  // What went wrong, or that it was called off: then nothing was written.
+  const auto failed = [&](const Error& error) {
+    if (error.message == stopped) {
+      std::fprintf(stderr, "%s: interrupted\n", options.input.c_str());
+      return exit_code::our_failure;
+    }
+    return complain(error.message);
+  };
+  try {
+    const auto closed = read_solid(options, progress);
+    if (!closed) {
+      return failed(closed.error());
+    }
+    const Box3 box = box_around(closed->surface.points);
+    if (box.diagonal() > very_large) {
+      complain("warning: it is " + digits(box.diagonal(), 3) +
+               " m large; if the file is in millimetres, say --scale 0.001");
+    }
+    share = 0.1;
+    const auto meshed = fill_with_tetrahedra(*closed, options.mesh,
+                                             [&] { return goes_on("filling it with tetrahedra"); });
+    if (!meshed) {
+      return failed(Error{meshed.error().message == stopped
+                              ? stopped
+                              : options.input + ": error: " + meshed.error().message});
+    }
+    const auto mesh = quadratic(meshed->mesh);
+    if (!mesh) {
+      return failed(Error{options.input + ": error: " + mesh.error().message});
+    }
+    const auto places = choose_places(options, *mesh);
+    if (!places) {
+      return failed(places.error());
+    }
+    std::vector<SolidClamp> clamps;
+    for (const SolidClamp& clamp : options.clamps) {
+      clamps.push_back({options.scale * clamp.centre, options.scale * clamp.radius});
+    }
+    const auto modes = find_solid_modes(*mesh, choice->material, clamps, options.modes, progress);
+    if (!modes) {
+      return failed(Error{options.input + ": error: " + modes.error().message});
+    }
+    const std::string story = story_of(options, *choice, *mesh, *modes, meshed->by);
+    const std::string text =
+        body_text(body_name(options.input), story, *mesh, *modes, *places, choice->damping);
+    if (!options.picture.empty()) {
+      const std::string title = std::filesystem::path(options.input).filename().string() + ", " +
+                                digits(modes->mass, 4) + " kg";
+      if (const int failure = put_text(
+              options.picture, shapes_picture(*mesh, *modes, *places, title), options.force)) {
+        return failure;
+      }
+    }
+    if (options.output.empty()) {
+      std::fwrite(text.data(), 1, text.size(), stdout);
+      return exit_code::done;
+    }
+    if (const int failure = put_text(options.output, text, options.force)) {
+      return failure;
+    }
+    if (!options.is_quiet) {
+      std::printf("%s: %s from %s to %s Hz, %s kg, %zu unknowns, residual %s\n",
+                  options.output.c_str(),
+                  counted(modes->frequency_hz.size(), "mode", "modes").c_str(),
+                  digits(modes->frequency_hz.front(), 6).c_str(),
+                  digits(modes->frequency_hz.back(), 6).c_str(), digits(modes->mass, 4).c_str(),
+                  mesh->unknowns(), digits(modes->residual, 2).c_str());
+    }
+    return exit_code::done;
+  } catch (const Stopped&) {
+    return failed(Error{stopped});
+  }
+}
+
+}  // namespace ressort

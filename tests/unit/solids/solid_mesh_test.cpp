@@ -1,0 +1,181 @@
+#include "core/solids/solid_mesh.h"
+
+#include <cmath>
+#include <numbers>
+
+#include "tests/support/catch.h"
+#include "tests/support/random.h"
+#include "tests/support/solids.h"
+
+namespace ressort {
+namespace {
+
+using namespace support;
+
+double volume_of(const SolidMesh& solid) {
+  double six = 0.0;
+  for (const QuadraticTetrahedron& e : solid.elements) {
+    const auto point = [&](std::size_t i) { return solid.points[static_cast<std::size_t>(e[i])]; };
+    six += inner(point(1) - point(0), cross(point(2) - point(0), point(3) - point(0)));
+  }
+  return six / 6.0;
+}
+
+TEST_CASE("boxes and balls are filled and closed", "[solid_mesh]") {
+  const auto box = quadratic(box_mesh({3.0, 2.0, 1.0}, {3, 2, 2}));
+  REQUIRE(box);
+  CHECK(box->points.size() == 7 * 5 * 5);  // twice as many along each side, less one
+  CHECK(box->elements.size() == 72);
+  CHECK(volume_of(*box) == Approx(6.0).epsilon(1e-12));
+  const auto closed = close_surface({.points = box->points, .triangles = box->surface}, Progress());
+  REQUIRE(closed);
+  CHECK(closed->turned == 0);
+  CHECK(closed->volume == Approx(6.0).epsilon(1e-12));
+  CHECK(closed->surface.triangles.size() == 2 * 2 * (3 * 2 + 2 * 2 + 3 * 2));
+
+  const auto ball = quadratic(ball_mesh(2.0, 4));
+  REQUIRE(ball);
+  const double round = 4.0 / 3.0 * std::numbers::pi * 8.0;
+  CHECK(volume_of(*ball) < round);
+  CHECK(volume_of(*ball) == Approx(round).epsilon(0.04));  // its edges are straight
+  for (const Triangle& triangle : ball->surface) {
+    for (const int corner : triangle) {
+      CHECK(length(ball->points[static_cast<std::size_t>(corner)]) == Approx(2.0).epsilon(1e-12));
+    }
+  }
+}
+
+TEST_CASE("a box is known however it lies, and nothing else is", "[solid_mesh]") {
+  Random random(5);
+  for (int round = 0; round < 20; ++round) {
+    Surface box = box_surface({random.uniform(0.1, 2.0), random.uniform(0.1, 2.0), 1.0});
+    // Turned by two angles and moved.
+    const double a = random.uniform(0.0, 6.0);
+    const double b = random.uniform(0.0, 6.0);
+    for (Point3& p : box.points) {
+      p = {std::cos(a) * p[0] - std::sin(a) * p[1], std::sin(a) * p[0] + std::cos(a) * p[1], p[2]};
+      p = {p[0], std::cos(b) * p[1] - std::sin(b) * p[2], std::sin(b) * p[1] + std::cos(b) * p[2]};
+      p = p + Point3{3.0, -2.0, 1.0};
+    }
+    auto closed = close_surface(box, Progress());
+    REQUIRE(closed);
+    const auto found = as_box(*closed);
+    REQUIRE(found);
+    const auto mesh = quadratic(lying_box_mesh(*found, 3000.0));
+    REQUIRE(mesh);
+    CHECK(volume_of(*mesh) == Approx(closed->volume).epsilon(1e-9));
+    CHECK(mesh->unknowns() < 3300);
+    CHECK(mesh->unknowns() > 1500);
+    for (const Point3& corner : box.points) {
+      double distance = 1.0;
+      for (const Point3& point : mesh->points) {
+        distance = std::min(distance, length(point - corner));
+      }
+      CHECK(distance < 1e-9);
+    }
+    // With one corner moved it is none.
+    box.points[random.below(8)][random.below(3)] += 0.05;
+    closed = close_surface(box, Progress());
+    REQUIRE(closed);
+    CHECK_FALSE(as_box(*closed));
+  }
+  for (const Surface& other : {icosphere(1, 1.0, false), icosphere(0, 1.0, false),
+                               revolved({{{0.0, 0.0}, {1.0, 0.0}, {1.0, 1.0}, {0.0, 1.0}}}, 8)}) {
+    const auto closed = close_surface(other, Progress());
+    REQUIRE(closed);
+    CHECK_FALSE(as_box(*closed));
+  }
+  // A box with a notch in one side has the eight corners and more.
+  Surface notched = box_surface({1.0, 1.0, 1.0});
+  notched.points.push_back({0.5, 0.5, 0.5});
+  const Triangle top = notched.triangles[2];
+  notched.triangles.erase(notched.triangles.begin() + 2);
+  notched.triangles.insert(notched.triangles.end(),
+                           {{top[0], top[1], 8}, {top[1], top[2], 8}, {top[2], top[0], 8}});
+  const auto closed = close_surface(notched, Progress());
+  REQUIRE(closed);
+  CHECK_FALSE(as_box(*closed));
+}
+
+TEST_CASE("a ball is known wherever it lies, and nothing else is", "[solid_mesh]") {
+  Surface ball = icosphere(2, 0.7, false);
+  for (Point3& point : ball.points) {
+    point = point + Point3{10.0, -3.0, 2.0};
+  }
+  auto closed = close_surface(ball, Progress());
+  REQUIRE(closed);
+  const auto found = as_ball(*closed);
+  REQUIRE(found);
+  CHECK(found->radius == Approx(0.7).epsilon(1e-9));
+  CHECK(length(found->middle - Point3{10.0, -3.0, 2.0}) < 1e-9);
+  const auto mesh = quadratic(lying_ball_mesh(*found, 10000.0));
+  REQUIRE(mesh);
+  CHECK(mesh->unknowns() < 10000);
+  // One point moved; what is cut off; a long one; a box, whose corners lie on a sphere, too.
+  ball.points[7] = ball.points[7] + Point3{0.01, 0.0, 0.0};
+  closed = close_surface(ball, Progress());
+  REQUIRE(closed);
+  CHECK_FALSE(as_ball(*closed));
+  for (const Surface& other :
+       {box_surface({1.0, 1.0, 1.0}),
+        revolved({{{0.0, -1.0}, {1.0, -1.0}, {1.0, 1.0}, {0.0, 1.0}}}, 40),
+        revolved({{{0.0, -0.5}, {std::sqrt(0.75), -0.5}, {std::sqrt(0.75), 0.5}, {0.0, 0.5}}},
+                 40)}) {
+    closed = close_surface(other, Progress());
+    REQUIRE(closed);
+    CHECK_FALSE(as_ball(*closed));
+  }
+}
+
+TEST_CASE("flat, missing and no tetrahedra are told", "[solid_mesh]") {
+  CHECK_FALSE(quadratic({}));
+  CHECK_FALSE(quadratic({{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {1, 1, 0}}, {{0, 1, 2, 3}}}));
+  CHECK_FALSE(quadratic({{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}}, {{0, 1, 2, 3}}}));
+  // One that is turned inside out is turned back; a point that belongs to none is left out.
+  const auto turned =
+      quadratic({{{5, 5, 5}, {0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}}, {{1, 3, 2, 4}}});
+  REQUIRE(turned);
+  CHECK(turned->points.size() == 10);
+  CHECK(volume_of(*turned) == Approx(1.0 / 6.0).epsilon(1e-12));
+}
+
+TEST_CASE("what meshing programs write is read, and what they do not is told", "[solid_mesh]") {
+  const std::string gmsh =
+      "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$Nodes\n4\n1 0 0 0\n2 1 0 0\n7 0 1 0\n4 0 0 1\n"
+      "$EndNodes\n$Elements\n3\n1 15 2 0 1 1\n2 2 2 0 1 1 2 7\n3 4 2 0 1 1 2 7 4\n$EndElements\n";
+  const auto mesh = read_gmsh(gmsh);
+  REQUIRE(mesh);
+  CHECK(mesh->points.size() == 4);
+  REQUIRE(mesh->tetrahedra.size() == 1);
+  CHECK(mesh->tetrahedra[0] == Tetrahedron{0, 1, 2, 3});
+  const std::string nodes = "4 3 0 0\n 1 0 0 0\n 2 1 0 0\n 3 0 1 0\n 4 0 0 1\n# by tetgen\n";
+  const std::string elements = "1  4  0\n    1    1 2 3 4\n";
+  const auto same = read_tetgen(nodes, elements);
+  REQUIRE(same);
+  CHECK(same->tetrahedra == mesh->tetrahedra);
+  // However it is cut off or changed, there is an answer.
+  Random random(9);
+  for (int round = 0; round < 2000; ++round) {
+    std::string broken = gmsh;
+    std::string broken_nodes = nodes;
+    std::string broken_elements = elements;
+    for (std::string* text : {&broken, &broken_nodes, &broken_elements}) {
+      const std::size_t place = random.below(text->size());
+      if (random.below(2) == 0) {
+        text->resize(place);
+      } else {
+        (*text)[place] = static_cast<char>(random.below(256));
+      }
+    }
+    for (const auto& read : {read_gmsh(broken), read_tetgen(broken_nodes, broken_elements)}) {
+      if (read) {
+        static_cast<void>(quadratic(*read));
+      } else {
+        CHECK_FALSE(read.error().message.empty());
+      }
+    }
+  }
+}
+
+}  // namespace
+}  // namespace ressort

@@ -1,0 +1,250 @@
+#include "core/solids/surface.h"
+
+#include "tests/support/catch.h"
+#include "tests/support/random.h"
+#include "tests/support/solids.h"
+
+namespace ressort {
+namespace {
+
+using namespace support;
+
+Result<ClosedSurface> closed(const Surface& surface) {
+  return close_surface(surface, Progress());
+}
+
+TEST_CASE("a solid is the same from ASCII, binary and OBJ", "[surface]") {
+  const Surface ball = icosphere(2, 0.5, true);
+  const auto ascii = read_stl(ascii_stl(ball));
+  const auto binary = read_stl(binary_stl(ball));  // its header begins with "solid"
+  const auto faces = read_obj(obj(ball));
+  REQUIRE(ascii);
+  REQUIRE(binary);
+  REQUIRE(faces);
+  for (const auto& read : {*ascii, *binary, *faces}) {
+    const auto solid = closed(read);
+    REQUIRE(solid);
+    CHECK(solid->surface.points.size() == 162);
+    CHECK(solid->surface.triangles.size() == 320);
+    CHECK(solid->shells == 1);
+    CHECK(solid->turned == 0);
+    // The sphere's own volume, to what floats hold.
+    CHECK(solid->volume == Approx(std::numbers::pi / 6.0).epsilon(1e-6));
+  }
+}
+
+TEST_CASE("faces of OBJ with many corners and numbers from behind are read", "[surface]") {
+  const auto cube = read_obj(
+      "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv 0 0 1\nv 1 0 1\nv 1 1 1\nv 0 1 1\n"
+      "usemtl steel\nvn 0 0 1\nf 4 3 2 1\nf -4 -3 -2 -1\r\n"
+      "f 1 2 6 5\nf 2 3 7 6\nf 3 4 8 7\nf 4 1 5 8\n");
+  REQUIRE(cube);
+  const auto solid = closed(*cube);
+  REQUIRE(solid);
+  CHECK(solid->surface.triangles.size() == 12);
+  CHECK(solid->volume == Approx(1.0).epsilon(1e-12));
+}
+
+TEST_CASE("what cannot be read is told with its line", "[surface]") {
+  struct Case {
+    std::string text;
+    int line;
+    std::string said;
+    bool is_obj = false;
+  };
+  const std::vector<Case> cases = {
+      {"", 0, "expected an STL"},
+      {"solid x\nendsolid x\n", 2, "no 'facet'"},
+      {"solid x\nfacet normal 0 0 1\nouter loop\nvertex 0 0 zero\n", 4,
+       "expected three coordinates of at most 1e9, found 'zero'"},
+      {"solid x\nfacet normal 0 0 1\nouter loop\nvertex 0 0\n", 4, "found the end of the line"},
+      {"solid x\nfacet normal 0 0 1\nouter loop\nvertex 0 0 1\n", 4, "end of the file"},
+      {"solid x\nfacet\nouter ring\n", 3, "expected 'loop', found 'ring'"},
+      {"solid x\nhello\n", 2, "expected 'facet' or 'endsolid', found 'hello'"},
+      {"solid x\nfacet\nouter loop\nvertex 0 0 1e10\n", 4, "found '1e10'"},
+      {"solid x\nfacet\nouter loop\nvertex nan 0 0\n", 4, "found 'nan'"},
+      {std::string(80, 'x') + std::string("\x02\0\0\0", 4), 0, "184 bytes for 2 triangles"},
+      {"v 0 0 0\nv 1 0 0\nf 1 2 3\n", 3, "from 1 to 2, found '3'", true},
+      {"v 0 0 0\nf 1 1\n", 2, "three corners or more", true},
+      {"v 0 0 0\nf 0 1 1\n", 2, "found '0'", true},
+      {"v 0 0 0\nf 1 1 x\n", 2, "found 'x'", true},
+      {"v 0 0 0\n", 1, "no face", true},
+      {"v 0 0\n", 1, "found the end of the line", true},
+  };
+  for (const Case& one : cases) {
+    const auto read = one.is_obj ? read_obj(one.text) : read_stl(one.text);
+    INFO(one.text);
+    REQUIRE_FALSE(read);
+    INFO(read.error().message);
+    CHECK(read.error().line == one.line);
+    CHECK(read.error().message.find(one.said) != std::string::npos);
+  }
+}
+
+TEST_CASE("an open surface names its edges", "[surface]") {
+  Surface box = box_surface({1.0, 2.0, 3.0});
+  box.triangles.pop_back();  // of the side x = 1: corners 1, 7, 5
+  const auto open = closed(box);
+  REQUIRE_FALSE(open);
+  const std::string& said = open.error().message;
+  INFO(said);
+  CHECK(said.find("not closed: 3 edges with a triangle on one side only") != std::string::npos);
+  CHECK(said.find("(1, 0, 0) to (1, 0, 3)") != std::string::npos);
+  CHECK(said.find("(1, 0, 3) to (1, 2, 3)") != std::string::npos);
+  CHECK(said.find("(1, 0, 0) to (1, 2, 3)") != std::string::npos);
+
+  // Two boxes that share an edge: four triangles there.
+  Surface touching = box_surface({1.0, 1.0, 1.0});
+  append(touching, box_surface({1.0, 1.0, 1.0}, {1.0, 1.0, 0.0}));
+  const auto crowded = closed(touching);
+  REQUIRE_FALSE(crowded);
+  INFO(crowded.error().message);
+  CHECK(crowded.error().message.find("1 edge with more than two triangles") != std::string::npos);
+  CHECK(crowded.error().message.find("(1, 1, 0) to (1, 1, 1): 4 triangles") != std::string::npos);
+
+  // A thousand open edges are counted, and a dozen named.
+  Surface torn = icosphere(3, 1.0, false);
+  torn.triangles.resize(400);
+  const auto many = closed(torn);
+  REQUIRE_FALSE(many);
+  CHECK(std::count(many.error().message.begin(), many.error().message.end(), '\n') == 13);
+  CHECK(many.error().message.find(" more") != std::string::npos);
+}
+
+TEST_CASE("triangles are turned outwards, and points that are one are welded", "[surface]") {
+  Surface box = box_surface({1.0, 2.0, 3.0});
+  Random random(3);
+  std::size_t turned = 0;
+  for (Triangle& triangle : box.triangles) {
+    if (random.below(2) == 0) {
+      std::swap(triangle[0], triangle[1]);
+      ++turned;
+    }
+  }
+  const auto solid = closed(box);
+  REQUIRE(solid);
+  CHECK(solid->volume == Approx(6.0).epsilon(1e-12));
+  CHECK(solid->turned == turned);
+
+  auto loose = read_stl(ascii_stl(box));  // three points to each triangle
+  REQUIRE(loose);
+  for (Point3& point : loose->points) {
+    point[0] += random.uniform(-1e-7, 1e-7);
+  }
+  const auto welded = closed(*loose);
+  REQUIRE(welded);
+  CHECK(welded->surface.points.size() == 8);
+  CHECK(welded->welded == 28);
+
+  // A triangle that is a line adds nothing.
+  Surface sliver = box_surface({1.0, 1.0, 1.0});
+  sliver.triangles.push_back({0, 1, 1});
+  const auto thinned = closed(sliver);
+  REQUIRE(thinned);
+  CHECK(thinned->left_out == 1);
+}
+
+TEST_CASE("hollows look inwards, and two bodies are refused", "[surface]") {
+  Surface shell = icosphere(2, 1.0, true);
+  append(shell, icosphere(2, 0.5, true));  // both outwards, the inner one last
+  const auto hollow = closed(shell);
+  REQUIRE(hollow);
+  CHECK(hollow->shells == 2);
+  CHECK(hollow->shell.front() == 0);
+  CHECK(hollow->volume == Approx(4.0 / 3.0 * std::numbers::pi * 0.875).epsilon(1e-9));
+
+  Surface inside_first = icosphere(2, 0.5, true);
+  append(inside_first, icosphere(2, 1.0, true));
+  const auto same = closed(inside_first);
+  REQUIRE(same);
+  CHECK(same->shell.back() == 0);
+  CHECK(same->volume == Approx(hollow->volume).epsilon(1e-12));
+
+  Surface apart = icosphere(1, 1.0, true);
+  append(apart, box_surface({1.0, 1.0, 1.0}, {3.0, 0.0, 0.0}));
+  const auto two = closed(apart);
+  REQUIRE_FALSE(two);
+  CHECK(two.error().message.find("more than one body") != std::string::npos);
+
+  // A ball within the hollow hangs on nothing.
+  append(shell, icosphere(1, 0.2, true));
+  const auto rattle = closed(shell);
+  REQUIRE_FALSE(rattle);
+  CHECK(rattle.error().message.find("more than one body") != std::string::npos);
+}
+
+TEST_CASE("a surface with one side and one without an inside are refused", "[surface]") {
+  // A projective plane: the six points of half an icosahedron, every two joined. Every edge has two
+  // triangles, and no way of turning them fits.
+  Surface plane;
+  plane.points = {{0, 0, 1},      {1, 0, 0},       {0.3, 0.9, 0},
+                  {-0.8, 0.6, 0}, {-0.8, -0.6, 0}, {0.3, -0.9, 0}};
+  plane.triangles = {{0, 1, 2}, {0, 2, 3}, {0, 3, 4}, {0, 4, 5}, {0, 5, 1},
+                     {1, 2, 4}, {2, 3, 5}, {3, 4, 1}, {4, 5, 2}, {5, 1, 3}};
+  const auto one_side = closed(plane);
+  REQUIRE_FALSE(one_side);
+  INFO(one_side.error().message);
+  CHECK(one_side.error().message.find("one side") != std::string::npos);
+
+  Surface flat = box_surface({1.0, 1.0, 0.0});
+  const auto nothing = closed(flat);
+  REQUIRE_FALSE(nothing);
+}
+
+TEST_CASE("no bytes break the readers", "[surface]") {
+  const Surface ball = icosphere(1, 1.0, false);
+  const std::vector<std::string> seeds = {ascii_stl(ball), binary_stl(ball), obj(ball)};
+  Random random(20261122);
+  std::size_t read = 0;
+  std::size_t whole = 0;
+  for (int round = 0; round < 3000; ++round) {
+    std::string bytes = seeds[static_cast<std::size_t>(round) % 3];
+    const std::size_t changes = random.below(6);
+    for (std::size_t i = 0; i < changes && !bytes.empty(); ++i) {
+      const std::size_t place = random.below(bytes.size());
+      const std::size_t other = random.below(bytes.size());
+      switch (random.below(5)) {
+        case 0:
+          bytes[place] = static_cast<char>(random.below(256));
+          break;
+        case 1:
+          bytes.erase(place, random.below(40));
+          break;
+        case 2:
+          bytes.insert(place, bytes.substr(other, random.below(80)));
+          break;
+        case 3:
+          bytes.resize(place);
+          break;
+        case 4:
+          bytes.insert(place, "-999999999999999999999 1e400 nan -inf f v solid ");
+          break;
+      }
+    }
+    for (const auto& surface : {read_stl(bytes), read_obj(bytes)}) {
+      if (!surface) {
+        CHECK_FALSE(surface.error().message.empty());
+        continue;
+      }
+      ++read;
+      for (const Triangle& triangle : surface->triangles) {
+        for (const int point : triangle) {
+          REQUIRE(point >= 0);
+          REQUIRE(static_cast<std::size_t>(point) < surface->points.size());
+        }
+      }
+      const auto solid = closed(*surface);
+      whole += solid ? 1 : 0;
+      if (solid) {
+        CHECK(solid->volume > 0.0);
+      } else {
+        CHECK_FALSE(solid.error().message.empty());
+      }
+    }
+  }
+  CHECK(read > 500);  // so that not all were refused at their first byte
+  CHECK(whole > 200);
+}
+
+}  // namespace
+}  // namespace ressort
