@@ -9,12 +9,12 @@
 #include <utility>
 #include <vector>
 
+#include "app/commands/body/body_line.h"
 #include "app/commands/check.h"
 #include "app/commands/command_line.h"
 #include "app/commands/commands.h"
 #include "app/commands/export.h"
 #include "app/commands/make.h"
-#include "app/commands/body/body_line.h"
 #include "app/commands/modes/modes_line.h"
 #include "app/commands/reference.h"
 #include "app/commands/smf/midi_file.h"

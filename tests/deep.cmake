@@ -38,10 +38,10 @@ add_deep_test(forms_everywhere 240 $<TARGET_FILE:ressort_tests> "[forms_everywhe
 add_deep_test(scenes_more 200 ${CMAKE_COMMAND} -E env RESSORT_SCENES=1001,2000,1024
   $<TARGET_FILE:ressort_tests> "[scenes]")
 
-# The modes of 208 random networks against their sound, and the lowest of a hundred thousand masses.
 # Masses and bodies a hundredth this side of the border of stability and beyond.
 add_deep_test(bodies_everywhere 60 $<TARGET_FILE:ressort_tests> "[bodies_everywhere]")
 
+# The modes of 208 random networks against their sound, and the lowest of a hundred thousand masses.
 add_deep_test(modes_everywhere 60 $<TARGET_FILE:ressort_tests> "[modes_everywhere]")
 
 # Budgets of pitch and decay on 300 random networks.

@@ -31,8 +31,8 @@ int body_command(const BodyRequest& request) {
   }
   BodyOptions options = common(request.recording);
   options.picture = request.picture;
-  options.most_modes = request.modes ? static_cast<std::size_t>(*request.modes)
-                                     : options.most_modes;
+  options.most_modes =
+      request.modes ? static_cast<std::size_t>(*request.modes) : options.most_modes;
   return recording_body(options);
 }
 

@@ -63,7 +63,8 @@ int network_body(const NetworkBodyOptions& options) {
   if (options.modes > 0 && body.modes.size() > options.modes) {
     body.modes.resize(options.modes);
   }
-  std::string text = "# The modes of " + scene->name + " as the published scheme plays them, at its "
+  std::string text = "# The modes of " + scene->name +
+                     " as the published scheme plays them, at its "
                      "inputs and outputs.\n";
   if (!options.chain.empty()) {
     const auto chain = chain_of(body, options.chain);

@@ -6,6 +6,7 @@
 #include "core/analysis/assembly.h"
 #include "core/analysis/linear.h"
 #include "core/analysis/places.h"
+#include "core/sampled_mode.h"
 
 namespace ressort {
 namespace {
@@ -14,8 +15,11 @@ constexpr std::uint32_t held = 0xffffffffu;
 
 class SystemMaker {
  public:
-  SystemMaker(const Network& network, double step)
-      : network_(network), step_(step), row_(network.masses.size(), held) {}
+  SystemMaker(const Network& network, double step, bool is_sampled)
+      : network_(network),
+        step_(step),
+        is_sampled_(is_sampled),
+        row_(network.masses.size(), held) {}
 
   LinearSystem make() {
     const Assembly assembly = assemble(network_);
@@ -58,7 +62,13 @@ class SystemMaker {
       return per_step(part.stiffness, part.damping);
     }
     const Mass& mass = network_.masses[term.element];
-    return per_step(mass.stiffness, mass.damping);
+    const auto [k, z] = per_step(mass.stiffness, mass.damping);
+    if (!mass.is_mode || !is_sampled_) {
+      return {k, z};
+    }
+    const double m = value(mass.mass);
+    const SampledMode sampled = sampled_mode(1.0, k / m, z / m);
+    return {m * sampled.stiffness / sampled.mass, m * sampled.damping / sampled.mass};
   }
 
   void add(ModalPort::Shares& shares, std::uint32_t mass, double factor) const {
@@ -117,6 +127,7 @@ class SystemMaker {
 
   const Network& network_;
   double step_;
+  bool is_sampled_;
   std::vector<std::uint32_t> row_;  // [mass]
   LinearSystem made_;
 };
@@ -164,8 +175,8 @@ Network settled(const Network& network, std::span<const double> parameters) {
   return out;
 }
 
-LinearSystem make_linear_system(const Network& network, double step) {
-  return SystemMaker(network, step).make();
+LinearSystem make_linear_system(const Network& network, double step, bool is_sampled) {
+  return SystemMaker(network, step, is_sampled).make();
 }
 
 Vector product(const SparseMatrix& lower, const Vector& x) {

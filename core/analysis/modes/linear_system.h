@@ -55,8 +55,9 @@ struct LinearSystem {
 Network settled(const Network& network, std::span<const double> parameters);
 
 // Of a network without macros whose arguments are numbers, for steps that are `step` samples at
-// 44 100 Hz long. O(masses + links). [any thread but audio]
-LinearSystem make_linear_system(const Network& network, double step);
+// 44 100 Hz long; bodies' modes as the published scheme steps them if `is_sampled`, else as those
+// of the continuous network. O(masses + links). [any thread but audio]
+LinearSystem make_linear_system(const Network& network, double step, bool is_sampled);
 
 // y = A x.
 Vector product(const SparseMatrix& lower, const Vector& x);

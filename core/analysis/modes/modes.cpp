@@ -34,7 +34,9 @@ Matrix dense(const SparseMatrix& lower) {
 class ModeTeller {
  public:
   ModeTeller(const NetworkModes& made, const ModeOptions& options)
-      : made_(made), e_(scheme_e(options.scheme)), step_(scheme_step(options)) {}
+      : made_(made),
+        e_(scheme_e(options.scheme)),
+        step_(scheme_step(options), options.scheme == ModeScheme::published) {}
 
   NetworkMode mode_of(Swing swing) const {
     const Complex at = pole_of(swing.mu, made_.scheme);
