@@ -34,9 +34,7 @@ Matrix dense(const SparseMatrix& lower) {
 class ModeTeller {
  public:
   ModeTeller(const NetworkModes& made, const ModeOptions& options)
-      : made_(made),
-        e_(scheme_e(options.scheme)),
-        step_(scheme_step(options), options.scheme == ModeScheme::published) {}
+      : made_(made), e_(scheme_e(options.scheme)), step_(scheme_step(options)) {}
 
   NetworkMode mode_of(Swing swing) const {
     const Complex at = pole_of(swing.mu, made_.scheme);
@@ -159,7 +157,8 @@ Result<NetworkModes> find_modes(const Network& network, std::span<const double> 
                                 const ModeOptions& options) {
   NetworkModes made;
   made.network = settled(expand_macros(network), parameters);
-  made.system = make_linear_system(made.network, scheme_step(options));
+  made.system = make_linear_system(made.network, scheme_step(options),
+                                   options.scheme == ModeScheme::published);
   made.inputs = network.inputs.size();
   made.outputs = network.outputs.size();
   made.scheme = options.scheme;

@@ -41,7 +41,8 @@ class ModeTuner {
     }
     lines_ = *std::move(lines);
     const Network expanded = settled(expand_macros(network), parameters);
-    system_ = make_linear_system(expanded, scheme_step(options));
+    system_ =
+        make_linear_system(expanded, scheme_step(options), options.scheme == ModeScheme::published);
     of_ = lines_of(network, expanded, system_, lines_);
     if (!system_.is_sound) {
       failure_ = Error{"a mass is not above 0, or a stiffness or damping is no finite number"};
