@@ -7,7 +7,7 @@ namespace ressort {
 namespace {
 
 constexpr std::size_t block_frames = 256;
-constexpr double gone = 46.0;  // nepers, 400 dB
+constexpr double gone = 34.0;  // nepers, 295 dB
 
 // z^n for n below a block's length, by doubling.
 struct PowerTable {
@@ -52,8 +52,14 @@ void add_damped(std::span<double> samples, Complex c, Complex log_z) {
 }
 
 Moments moments_of(std::span<const double> samples, Complex log_z) {
-  constexpr std::size_t lanes = 4;  // sums that the compiler may keep in one vector
+  constexpr std::size_t lanes = 4;  // sums that the compiler may keep in vectors
   const PowerTable table(log_z);
+  std::array<double, block_frames> place_re;
+  std::array<double, block_frames> place_im;
+  for (std::size_t n = 0; n < block_frames; ++n) {
+    place_re[n] = static_cast<double>(n) * table.re[n];
+    place_im[n] = static_cast<double>(n) * table.im[n];
+  }
   const std::size_t frames = length_of(samples.size(), log_z);
   Moments sums{};
   for (std::size_t from = 0; from < frames; from += block_frames) {
@@ -66,29 +72,25 @@ Moments moments_of(std::span<const double> samples, Complex log_z) {
     std::size_t n = 0;
     for (; n + lanes <= count; n += lanes) {
       for (std::size_t lane = 0; lane < lanes; ++lane) {
-        const double x_re = block[n + lane] * table.re[n + lane];
-        const double x_im = block[n + lane] * table.im[n + lane];
-        const auto place = static_cast<double>(n + lane);
-        re[lane] += x_re;
-        im[lane] += x_im;
-        n_re[lane] += place * x_re;
-        n_im[lane] += place * x_im;
+        re[lane] += block[n + lane] * table.re[n + lane];
+        im[lane] += block[n + lane] * table.im[n + lane];
+        n_re[lane] += block[n + lane] * place_re[n + lane];
+        n_im[lane] += block[n + lane] * place_im[n + lane];
       }
     }
     for (; n < count; ++n) {
-      const auto place = static_cast<double>(n);
       re[0] += block[n] * table.re[n];
       im[0] += block[n] * table.im[n];
-      n_re[0] += place * block[n] * table.re[n];
-      n_im[0] += place * block[n] * table.im[n];
+      n_re[0] += block[n] * place_re[n];
+      n_im[0] += block[n] * place_im[n];
     }
     const Complex zeroth((re[0] + re[1]) + (re[2] + re[3]), (im[0] + im[1]) + (im[2] + im[3]));
     const Complex first((n_re[0] + n_re[1]) + (n_re[2] + n_re[3]),
                         (n_im[0] + n_im[1]) + (n_im[2] + n_im[3]));
     const auto before = static_cast<double>(from);
     const Complex power = std::exp(log_z * before);
-    sums.zeroth += power * zeroth;
-    sums.first += power * (first + before * zeroth);
+    sums.zeroth += times(power, zeroth);
+    sums.first += times(power, first + before * zeroth);
   }
   return sums;
 }

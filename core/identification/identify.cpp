@@ -132,7 +132,7 @@ class Search {
     progress_.stage("fitting the modes to the sound");
     add(strongest(std::move(found), start));
     drop_accidents();
-    settle(3, 3);
+    settle(2, 3);
   }
 
   // Begins with these instead of a search.
@@ -193,28 +193,39 @@ class Search {
   // Refines until every mode is more than noise, and more than a part of its neighbour.
   void settle(int steps, int rounds) {
     fit_.refine(steps, progress_);
-    for (int round = 0; round < rounds && drop_unlikely(true); ++round) {
-      fit_.refine(3, progress_);
+    int dropped = 0;
+    while (dropped < rounds && drop_unlikely(true, Noise(fit_.rest()))) {
+      fit_.refine(2, progress_);
+      ++dropped;
     }
-    fit_.refine(steps, progress_);
+    if (dropped > 0) {
+      fit_.refine(steps, progress_);
+    }
   }
 
   // Takes back what noise would do as well, the least likely modes first.
   void drop_accidents() {
-    for (int round = 0; round < 40 && drop_unlikely(false); ++round) {
+    for (int round = 0; round < 12; ++round) {
+      const Noise noise(fit_.rest());
+      int drops = 0;
+      while (drops < 4 && drop_unlikely(false, noise)) {
+        ++drops;
+      }
+      if (drops == 0) {
+        return;
+      }
     }
   }
 
   // Drops some of the modes that are unlikely where the poles are certain or, `with_poles`, are
   // not, but of neighbours, which may all be unlikely beside each other, one. Whether there were
   // any.
-  bool drop_unlikely(bool with_poles) {
+  bool drop_unlikely(bool with_poles, const Noise& noise) {
     const std::vector<DampedMode>& modes = fit_.modes();
     if (modes.empty()) {
       return false;
     }
     const std::vector<DampedDeviation> deviations = fit_.deviations(with_poles);
-    const Noise noise(fit_.rest());
     double loudest = 0.0;
     for (const DampedMode& mode : modes) {
       loudest = std::max(loudest, energy_of(mode, frames()));
