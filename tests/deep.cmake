@@ -51,7 +51,7 @@ add_deep_test(accuracy_everywhere 120 $<TARGET_FILE:ressort_tests> "[accuracy_ev
 add_deep_test(silence_everywhere 120 $<TARGET_FILE:ressort_tests> "[silence_everywhere]")
 
 # Forty random solids against CalculiX.
-add_deep_test(calculix_everywhere 240 $<TARGET_FILE:ressort_tests> "[calculix_everywhere]")
+add_deep_test(calculix_everywhere 600 $<TARGET_FILE:ressort_tests> "[calculix_everywhere]")
 
 # Every bow at every speed and pressure on 24 keys.
 add_deep_test(bows 60 $<TARGET_FILE:ressort_voicing> --bows 8 Violin Cello DoubleBass)

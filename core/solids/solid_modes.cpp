@@ -185,15 +185,18 @@ double SolidDamping::t60_s(double frequency_hz) const {
   return 2.0 * std::log(1000.0) / (a + b * omega * omega + loss * omega);
 }
 
+bool is_clamped(const Point3& point, std::span<const SolidClamp> clamps) {
+  return std::any_of(clamps.begin(), clamps.end(), [&](const SolidClamp& clamp) {
+    return length(point - clamp.centre) <= clamp.radius;
+  });
+}
+
 SolidMatrices solid_matrices(const SolidMesh& mesh, const SolidMaterial& material,
                              std::span<const SolidClamp> clamps, const Progress& progress) {
   std::vector<int> row_of(mesh.points.size(), -1);
   std::vector<int> node;
   for (std::size_t i = 0; i < mesh.points.size(); ++i) {
-    const bool is_held = std::any_of(clamps.begin(), clamps.end(), [&](const SolidClamp& clamp) {
-      return length(mesh.points[i] - clamp.centre) <= clamp.radius;
-    });
-    if (!is_held) {
+    if (!is_clamped(mesh.points[i], clamps)) {
       row_of[i] = static_cast<int>(node.size());
       node.push_back(static_cast<int>(i));
     }
@@ -377,24 +380,31 @@ int nearest_on_surface(const SolidMesh& mesh, const Point3& point) {
   return nearest;
 }
 
-std::vector<int> spread_on_surface(const SolidMesh& mesh, int count) {
+std::vector<int> spread_on_surface(const SolidMesh& mesh, std::span<const SolidClamp> clamps,
+                                   int count) {
   std::vector<int> nodes;
   for (const Triangle& triangle : mesh.surface) {
     nodes.insert(nodes.end(), triangle.begin(), triangle.end());
   }
   std::sort(nodes.begin(), nodes.end());
   nodes.erase(std::unique(nodes.begin(), nodes.end()), nodes.end());
+  std::erase_if(nodes, [&](int node) { return is_clamped(mesh.points[at(node)], clamps); });
   const Box3 box = box_around(mesh.points);
   const Point3 middle = 0.5 * (box.low + box.high);
-  std::vector<double> distance;  // [node] to the nearest that was taken
+  // [node] to the nearest that was taken, or to what is clamped; at first from the middle.
+  std::vector<double> distance;
   for (const int node : nodes) {
-    distance.push_back(length(mesh.points[at(node)] - middle));
+    double nearest = clamps.empty() ? length(mesh.points[at(node)] - middle) : box.diagonal();
+    for (const SolidClamp& clamp : clamps) {
+      nearest = std::min(nearest, length(mesh.points[at(node)] - clamp.centre) - clamp.radius);
+    }
+    distance.push_back(nearest);
   }
   std::vector<int> taken;
   while (static_cast<int>(taken.size()) < count && taken.size() < nodes.size()) {
     const auto next = std::max_element(distance.begin(), distance.end()) - distance.begin();
     const int node = nodes[static_cast<std::size_t>(next)];
-    const bool is_first = taken.empty();
+    const bool is_first = taken.empty() && clamps.empty();
     taken.push_back(node);
     for (std::size_t i = 0; i < nodes.size(); ++i) {
       const double to_it = length(mesh.points[at(nodes[i])] - mesh.points[at(node)]);

@@ -43,6 +43,7 @@ struct SolidClamp {
   Point3 centre{};
   double radius = 0.0;
 };
+bool is_clamped(const Point3& point, std::span<const SolidClamp> clamps);
 
 // K and M of a mesh: consistent mass, quadrature that is exact for straight edges.
 struct SolidMatrices {
@@ -89,8 +90,10 @@ std::vector<Point3> surface_normals(const SolidMesh& mesh);
 // The node of the surface that is nearest to a point. O(nodes)
 int nearest_on_surface(const SolidMesh& mesh, const Point3& point);
 
-// `count` nodes of the surface far from each other, the first farthest from the middle.
-std::vector<int> spread_on_surface(const SolidMesh& mesh, int count);
+// `count` nodes of the surface far from each other, the first farthest from the middle; none that
+// is clamped.
+std::vector<int> spread_on_surface(const SolidMesh& mesh, std::span<const SolidClamp> clamps,
+                                   int count);
 
 // How far a place moves, its way, in a mode. 1/sqrt(kg)
 double shape_at(const SolidModes& modes, const SolidPlace& place, std::size_t mode);

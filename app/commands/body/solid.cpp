@@ -149,12 +149,16 @@ Result<ClosedSurface> read_solid(const SolidBodyOptions& options, const Progress
 }
 
 Result<std::vector<SolidPlace>> choose_places(const SolidBodyOptions& options,
+                                              const std::vector<SolidClamp>& clamps,
                                               const SolidMesh& mesh) {
   const std::vector<Point3> normals = surface_normals(mesh);
   std::vector<SolidPlace> places;
   for (const PickedPlace& picked : options.places) {
     const int node = nearest_on_surface(mesh, options.scale * picked.point);
     const Point3 direction = picked.direction.value_or(normals[static_cast<std::size_t>(node)]);
+    if (is_clamped(mesh.points[static_cast<std::size_t>(node)], clamps)) {
+      return Error{"--place " + picked.name + " is clamped: it never moves"};
+    }
     if (!(length(direction) > 0.0)) {
       return Error{"--place " + picked.name + ": the direction must not be 0"};
     }
@@ -167,7 +171,7 @@ Result<std::vector<SolidPlace>> choose_places(const SolidBodyOptions& options,
     places.push_back({picked.name, node, 1.0 / length(direction) * direction});
   }
   if (places.empty()) {
-    for (const int node : spread_on_surface(mesh, places_of_our_own)) {
+    for (const int node : spread_on_surface(mesh, clamps, places_of_our_own)) {
       places.push_back(
           {"p" + std::to_string(places.size() + 1), node, normals[static_cast<std::size_t>(node)]});
     }
@@ -333,13 +337,13 @@ int solid_body(const SolidBodyOptions& options) {
     if (!mesh) {
       return failed(Error{options.input + ": error: " + mesh.error().message});
     }
-    const auto places = choose_places(options, *mesh);
-    if (!places) {
-      return failed(places.error());
-    }
     std::vector<SolidClamp> clamps;
     for (const SolidClamp& clamp : options.clamps) {
       clamps.push_back({options.scale * clamp.centre, options.scale * clamp.radius});
+    }
+    const auto places = choose_places(options, clamps, *mesh);
+    if (!places) {
+      return failed(places.error());
     }
     const auto modes = find_solid_modes(*mesh, choice->material, clamps, options.modes, progress);
     if (!modes) {
