@@ -1,5 +1,5 @@
-// Masses, places on strings of masses and places on waveguides, held to each other by everything
-// that holds: the books of energy, with potentials written down here.
+// Masses, places on strings of masses, on bodies and on waveguides, held to each other by
+// everything that holds: the books of energy, with potentials written down here.
 #include "core/kernels/direct/direct.h"
 #include "core/laws/laws.h"
 #include "tests/support/passive.h"
@@ -73,6 +73,7 @@ class Books {
     for (const MassRun& run : program.mass_runs) {
       for (std::uint32_t i = run.first; !run.is_junction && i < run.first + run.count; ++i) {
         energy += 0.5 / value(run.inverse_mass) * v[i] * v[i];
+        energy += run.is_oscillator ? 0.5 * value(run.stiffness) * x[i] * (x[i] - v[i]) : 0.0;
       }
     }
     for (const LinkRun& run : program.link_runs) {
@@ -138,6 +139,10 @@ struct End {
 constexpr End ends[] = {
     {"mass", "@m# mass 2. 0. 0.\n", "@m#"},
     {"place", "@c# string 12 0.7 0.3 0. 0.\n", "[@c# 0.43]"},
+    {"body",
+     "@d# body 1.5 a b\n@d#1 mode @d# 310. 1e30 1. 0.3\n@d#2 mode @d# 2750. 1e30 -0.6 0.9\n"
+     "@d#3 mode @d# 9100. 1e30 0.8 0.2\n",
+     "[@d# b]"},
     {"waveguide", "@w# waveguide 0.8 613. 1e30 1. 0.\n", "[@w# 0.31]"},
     {"open waveguide", "@w# openWaveguide 1.7 431. 1e30 1. 0.\n", "[@w# 0.62]"},
 };
