@@ -11,7 +11,8 @@
 namespace ressort {
 
 // Steps one Program, link by link, by the plain scheme of every law, with the coefficients as they
-// are at the start. Without parameters that audio turns. [any thread but audio]
+// are at the start. Without parameters that audio turns
+// and without waveguides. [any thread but audio]
 class ReferenceScheme {
  public:
   explicit ReferenceScheme(const Program& program);

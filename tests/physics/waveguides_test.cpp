@@ -291,4 +291,53 @@ TEST_CASE("a glide arrives at its pitch and makes no noise of its own", "[wavegu
   CHECK(std::fabs(1200.0 * std::log2(found.hz / 330.0)) < 0.02);
 }
 
+TEST_CASE("whatever its numbers become, a waveguide stays within bounds", "[waveguides]") {
+  const std::string text =
+      "@f param 220.\n@t param 3.\n@b param 0.5\n@u param 0.3\n@R param 1.\n"
+      "@s waveguide R f t b 0.\n@h mass 2. 0. 0.\n@m mass 0.5 0. 0.\n@g ground 0.\n"
+      "@k1 contact @h [@s u] 3. 0.01\n@k2 spring [@s 0.3] @m 20.\n@k3 nlPluck @g [@s u*u] 1. 0.1\n"
+      "@k4 nlBow @in2 [@s 1-u] 0.3 0.01\n@k5 spring [@s 0.3001] [@s 0.3] 5.\n"
+      "@in1 frcInput @h\n@in2 posInput 0.\n@out1 posOutput [@s 0.8]\n@out2 frcOutput [@s u]\n";
+  constexpr double infinity = std::numeric_limits<double>::infinity();
+  constexpr double nowhere = std::numeric_limits<double>::quiet_NaN();
+  Random random(8);
+  Bare<double> guide(program_at(text, 44100.0));
+  double most = 0.0;
+  for (int n = 0; n < 100000; ++n) {
+    if (n % 517 == 0) {
+      const double odd[] = {0.0, -1.0, 1e30, infinity, nowhere};
+      const auto number = [&](double lowest, double highest) {
+        return random.below(8) == 0 ? odd[random.below(5)] : random.uniform(lowest, highest);
+      };
+      guide.set_coefficients(0,
+                             {number(20.0, 4000.0), number(0.01, 9.0), number(0.0, 1.0),
+                              number(0.0, 1.0), random.uniform(0.3, 3.0)},
+                             1.0, false);
+    }
+    const double y = guide.step({1e-3 * std::sin(0.01 * n), 1e-2 * std::sin(0.0007 * n)})[0];
+    REQUIRE(std::isfinite(y));
+    most = std::max(most, std::fabs(y));
+  }
+  CHECK(most < 100.0);
+}
+
+TEST_CASE("twenty places on a short waveguide each have a sample of their own", "[waveguides]") {
+  std::string text = "@s waveguide 1. 980. 1e30 1. 0.\n";
+  for (int i = 0; i < 20; ++i) {
+    const std::string n = std::to_string(i);
+    text += "@m" + n + " mass 1. 0. 0.\n@k" + n + " spring @m" + n + " [@s " +
+            number(0.45 + 0.002 * i) + "] 3.\n";
+  }
+  Bare<double> guide(program_at(text + "@in1 frcInput @m0\n@out1 posOutput [@s 0.5]\n", 44100.0));
+  double early = 0.0;
+  double late = 0.0;
+  for (int n = 0; n < 200000; ++n) {
+    const double y = guide.step({n < 50 ? 0.01 : 0.0})[0];
+    double& most = n < 100000 ? early : late;
+    most = std::max(most, std::fabs(y));
+  }
+  CHECK(late < 1.5 * early);
+  CHECK(late > 0.3 * early);
+}
+
 }  // namespace ressort

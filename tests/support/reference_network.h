@@ -81,6 +81,8 @@ class Builder {
       case MacroKind::chain:
       case MacroKind::mesh:
       case MacroKind::body:
+      case MacroKind::waveguide:  // the textbook's simulator has none
+      case MacroKind::open_waveguide:
         return false;
       case MacroKind::string:
       case MacroKind::stiff_string:
@@ -167,6 +169,8 @@ class Builder {
       case MassKind::position:
         hand = &simulator_.add_position_point(x0);
         points_.push_back(hand);
+        break;
+      case MassKind::junction:  // of expanded networks alone
         break;
       case MassKind::point: {
         const Tap& tap = network_.taps[mass.tap];

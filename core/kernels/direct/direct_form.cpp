@@ -31,8 +31,11 @@ double predicted_ns(const Program& program, const Direct&, const Workload& load)
               3.0 * static_cast<double>(program.waveguides.size() + program.junctions.size()));
 }
 
-std::string description(const Program&, const Direct&) {
-  return "mass by mass and link by link, as published, a voice in each lane";
+std::string description(const Program& program, const Direct&) {
+  const std::string words = "mass by mass and link by link, as published, a voice in each lane";
+  return program.waveguides.empty()
+             ? words
+             : words + "; with " + count_of(program.waveguides.size(), "waveguide", "waveguides");
 }
 
 std::uint64_t voice_bytes(const Program& program, const Direct&, std::uint64_t number_bytes) {

@@ -14,8 +14,8 @@ constexpr std::size_t numbers_of_guide = 3;  // frequency, T60, brightness
 }  // namespace
 
 std::uint32_t waveguide_slots(const Program& program) {
-  const double places = static_cast<double>(least_waveguide_samples(
-      static_cast<std::uint32_t>(program.junctions.size())));
+  const double places = static_cast<double>(
+      least_waveguide_samples(static_cast<std::uint32_t>(program.junctions.size())));
   return std::bit_ceil(
       static_cast<std::uint32_t>(program.rate_hz / lowest_waveguide_hz + 2.0 * places));
 }

@@ -64,22 +64,21 @@ TEST_CASE("a waveguide without room for its places is refused with its line", "[
         "have room at this sample rate");
   CHECK(compile(network_of("@s waveguide 1. 9000. 2. 0.5 0.\n" + heard), Preset{},
                 {.rate_hz = 96000.0}));
-  CHECK(refused("@f param 0.\n@s waveguide 1. f*100 2. 0.5 0.\n" + heard).starts_with(
-      "2:1 the waveguide 's' is to sound at 0 Hz, but 15 Hz is the lowest"));
+  CHECK(refused("@f param 0.\n@s waveguide 1. f*100 2. 0.5 0.\n" + heard)
+            .starts_with("2:1 the waveguide 's' is to sound at 0 Hz, but 15 Hz is the lowest"));
   CHECK(refused("@f param 0.\n@s waveguide f 100 2. 0.5 0.\n" + heard) ==
         "2:1 the impedance f of 's' is not above 0 where f = 0");
 }
 
 TEST_CASE("places of one coordinate are one, and a bent spring becomes two", "[waveguide_text]") {
-  const Network whole = expand_macros(network_of(
-      "@s waveguide 1. 220. 2. 0.5 0.\n@m mass 1. 0. 0.\n"
-      "@a nlSpring3 @m [@s 0.2] 0.1 2. 0.01\n@b contact @m [@s 0.2] 1. 0.\n" +
-      heard));
+  const Network whole = expand_macros(
+      network_of("@s waveguide 1. 220. 2. 0.5 0.\n@m mass 1. 0. 0.\n"
+                 "@a nlSpring3 @m [@s 0.2] 0.1 2. 0.01\n@b contact @m [@s 0.2] 1. 0.\n" +
+                 heard));
   CHECK(whole.macros.empty());
   CHECK(whole.waveguides.size() == 1);
-  CHECK(std::count_if(whole.masses.begin(), whole.masses.end(), [](const Mass& mass) {
-          return mass.kind == MassKind::junction;
-        }) == 2);
+  CHECK(std::count_if(whole.masses.begin(), whole.masses.end(),
+                      [](const Mass& mass) { return mass.kind == MassKind::junction; }) == 2);
   CHECK(whole.links[0].b == whole.links[1].b);
   CHECK(whole.links[0].b == whole.inputs[0].mass);
   REQUIRE(whole.links.size() == 3);
