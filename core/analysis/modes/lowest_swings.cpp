@@ -16,6 +16,8 @@ namespace {
 using Complex = std::complex<double>;
 
 constexpr int most_rounds = 20;
+constexpr double rough =
+    1e-8;  // of Lanczos' values; a step more of the inverse smooths their shapes
 
 ComplexVector product_of(const SparseMatrix& lower, const ComplexVector& x) {
   Vector re(x.size());
@@ -74,7 +76,7 @@ class LowestSwings {
       return Error{"the springs cannot be factored: is a stiffness below 0?"};
     }
     // What does not swing is among the lowest too.
-    for (std::size_t asked = count + count / 8 + 8;; asked *= 2) {
+    for (std::size_t asked = count + count / 32 + 4;; asked *= 2) {
       asked = std::min(asked, size_ - 1);
       progress_.stage("finding the lowest modes");
       if (!find_shapes(asked)) {
