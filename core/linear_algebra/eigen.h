@@ -21,10 +21,10 @@ Eigenpairs symmetric_eigenpairs(const Matrix& matrix);
 // Writes (A - shift I)^-1 `from` to `to`.
 using ShiftedInverse = std::function<void(const double* from, double* to)>;
 
-// The `count` eigenpairs of a symmetric A nearest to `shift`, by Lanczos iterations of the inverse,
-// to `tolerance` of its eigenvalues. Nothing where they do not converge.
+// The `count` eigenpairs of a symmetric A nearest to `shift`, by Lanczos iterations of the inverse.
+// Nothing where they do not converge.
 std::optional<Eigenpairs> eigenpairs_near(double shift, int count, int size,
-                                          const ShiftedInverse& inverse, double tolerance = 1e-10);
+                                          const ShiftedInverse& inverse);
 
 // An order of rows, by approximate minimum degree, in which few zeros fill up when a matrix with
 // this pattern is factored: [row] where it goes. Does not look at the values.

@@ -38,7 +38,7 @@ Eigenpairs symmetric_eigenpairs(const Matrix& matrix) {
 }
 
 std::optional<Eigenpairs> eigenpairs_near(double shift, int count, int size,
-                                          const ShiftedInverse& inverse, double tolerance) {
+                                          const ShiftedInverse& inverse) {
   constexpr Eigen::Index most_numbers = 30'000'000;  // of the vectors of all rounds
   const int vectors = std::min(size, std::max(12, count < 20 ? 4 * count : 2 * count + 80));
   const Eigen::Index rounds =
@@ -47,8 +47,7 @@ std::optional<Eigenpairs> eigenpairs_near(double shift, int count, int size,
     Operator shifted{size, inverse};
     Spectra::SymEigsShiftSolver<Operator> solver(shifted, count, vectors, shift);
     solver.init();
-    solver.compute(Spectra::SortRule::LargestMagn, rounds, tolerance,
-                   Spectra::SortRule::SmallestAlge);
+    solver.compute(Spectra::SortRule::LargestMagn, rounds, 1e-10, Spectra::SortRule::SmallestAlge);
     if (solver.info() != Spectra::CompInfo::Successful) {
       return std::nullopt;
     }

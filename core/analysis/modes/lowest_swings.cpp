@@ -16,8 +16,6 @@ namespace {
 using Complex = std::complex<double>;
 
 constexpr int most_rounds = 20;
-constexpr double rough =
-    1e-8;  // of Lanczos' values; a step more of the inverse smooths their shapes
 
 ComplexVector product_of(const SparseMatrix& lower, const ComplexVector& x) {
   Vector re(x.size());
