@@ -40,7 +40,7 @@ Eigenpairs symmetric_eigenpairs(const Matrix& matrix) {
 std::optional<Eigenpairs> eigenpairs_near(double shift, int count, int size,
                                           const ShiftedInverse& inverse) {
   constexpr Eigen::Index most_numbers = 30'000'000;  // of the vectors of all rounds
-  const int vectors = std::min(size, std::max(12, count < 20 ? 4 * count : 2 * count + 40));
+  const int vectors = std::min(size, std::max(12, count < 20 ? 4 * count : 2 * count + 80));
   const Eigen::Index rounds =
       std::clamp<Eigen::Index>(most_numbers / (vectors * Eigen::Index{size}), 10, 200);
   try {  // Spectra tells by exceptions what it cannot iterate

@@ -10,6 +10,8 @@
 #include "app/session/modes/known_modes.h"
 #include "app/text.h"
 #include "core/analysis/modes/tune.h"
+#include "core/analysis/stability.h"
+#include "core/compile/stability_check.h"
 #include "core/model/language/print.h"
 
 namespace ressort {
@@ -45,6 +47,22 @@ Result<Done> tune(Scene& scene, const std::vector<double>& parameters, const Mod
     scene.network = *std::move(tuned);
   }
   return Done{};
+}
+
+// That what is told of modes is not all that it does: what runs away without swinging is no mode.
+void warn_if_unstable(const Scene& scene, const std::vector<double>& parameters,
+                      const ModeOptions& search) {
+  if (search.scheme == ModeScheme::continuous) {
+    return;
+  }
+  Stability stability(scene.network, Network::reference_rate_hz / search.rate_hz,
+                      Stability::most_exact_masses, search.progress);
+  const Certificate certificate = stability.certify({.lowest = parameters, .highest = parameters});
+  if (certificate.verdict == Verdict::unstable) {
+    Finding finding = finding_of(scene.model_path, "", complaint(certificate));
+    finding.diagnostic.severity = Severity::warning;
+    std::fprintf(stderr, "%s\n", to_string(finding).c_str());
+  }
 }
 
 void tell(const Scene& scene, const KnownModes& modes) {
@@ -116,6 +134,7 @@ int modes_command(const ModesOptions& options) {
   if (!modes) {
     return refuse(to_string(finding_of(scene->model_path, "", modes.error())));
   }
+  warn_if_unstable(*scene, parameters, search);
   if (!options.output.empty()) {
     if (const int code = put_text(options.output, file, options.force); code != exit_code::done) {
       return code;

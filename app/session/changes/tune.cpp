@@ -63,7 +63,10 @@ void Session::do_modes(const ModesJob& job) {
   } else if (scene->network.parameters.size() != now.values.size()) {
     job.answer(Error{"the model's file was changed since it was loaded; load it again"});
   } else {
-    job.answer(known_modes(*scene, now.values, options));
+    const auto modes = known_modes(*scene, now.values, options);
+    job.answer(modes || modes.error().message != stopped
+                   ? modes
+                   : Result<KnownModes>(Error{"given up for a load; ask again"}));
   }
 }
 

@@ -74,7 +74,7 @@ class LowestSwings {
       return Error{"the springs cannot be factored: is a stiffness below 0?"};
     }
     // What does not swing is among the lowest too.
-    for (std::size_t asked = count + count / 8 + 8;; asked *= 2) {
+    for (std::size_t asked = count + count / 32 + 4;; asked *= 2) {
       asked = std::min(asked, size_ - 1);
       progress_.stage("finding the lowest modes");
       if (!find_shapes(asked)) {
