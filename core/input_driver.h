@@ -45,6 +45,13 @@ class InputDriver {
     pole_ = pole;
   }
 
+  // What is drawn moves on so many times as fast, as the voice's pitch does.
+  void hasten(double ratio) {
+    if (motion_ == Motion::draw) {
+      speed_ *= ratio;
+    }
+  }
+
   // A force or a displacement on top of whatever else goes on: one sample, or a raised cosine of
   // `frames` samples with the same sum.
   void strike(double force, std::size_t frames = 1) {

@@ -243,6 +243,7 @@ struct Engine::Player {
   void apply_changes(Bank<T>& b) {
     if (voices.has_changed() || parameters.has_changed()) {
       voices.retune(parameters.has_changed_highest_factor(), parameters.highest_factor());
+      gestures.follow_pitches();
       parameters.apply(b, voices, watch);
       voices.forget_changes();
     }

@@ -40,6 +40,9 @@ class Gestures {
   void perform_live(const Event& event);
   // What a key does when it is released, in its voice.
   void release(std::size_t lane);
+  // Voices have another pitch: what is drawn across them moves at the same speed in units of their
+  // own motion, so that a bow that is bent or glides goes on to catch its string.
+  void follow_pitches();
 
   // Where the drivers are in each frame.
   template <class T>
@@ -52,6 +55,7 @@ class Gestures {
   // With what a gesture is to know of the input.
   Stroke on_input(std::size_t input, Stroke stroke) const;
   void play(const GestureRow& gesture, std::size_t input, Stroke stroke, const Scope& scope);
+  void set_pitch(std::size_t lane, double pitch);
   // Where the drivers of new voices on these channels start.
   void set_starts(ChannelMask channels, std::size_t input, double start);
   template <class T>
@@ -62,6 +66,7 @@ class Gestures {
   Voices& voices_;
   Parameters& parameters_;
   std::vector<InputDriver> drivers_;  // [lane][input]
+  std::vector<double> pitches_;       // [lane] to that of the model, for which they move
   std::vector<double> starts_;        // [channel][input] where a new voice's driver is
 };
 

@@ -228,9 +228,6 @@ std::string print_preset(const Preset& preset) {
   text += preset.damper_s != usual.damper_s ? "damper_s = " + in_toml(preset.damper_s) + "\n" : "";
   text += preset.noise ? "noise = true\n" : "";
   text += preset.keyboard ? "" : "tuning = \"fixed\"\n";
-  text += preset.flattening_cents != 0.0
-              ? "flattening_cents = " + in_toml(preset.flattening_cents) + "\n"
-              : "";
   text += preset.transpose != 0 ? "transpose = " + std::to_string(preset.transpose) + "\n" : "";
   if (!preset.parameters.empty()) {
     text += "\n[parameters]\n";

@@ -22,7 +22,7 @@ constexpr PresetKey keys[] = {
     {"", "damper_s", "0 to 60 (0)", "T60 of a note once its key is up: in how many seconds a damper takes 60 dB off it; 0 lets it ring out"},
     {"", "noise", "true or false (false)", "the outputs shape white noise instead of being heard themselves"},
     {"", "tuning", "`keyboard` or `fixed` (`keyboard`)", "whether a key sets the pitch, or every key sounds the model as it is written"},
-    {"", "flattening_cents", "-100 to 100 (0)", "by how much the sound is flat of its lowest mode, as under a bow, which keys make up for"},
+    {"", "flattening_cents", "-100 to 100 (0), or [[48, 8], [96, 6]]", "by how much the sound is flat of its lowest mode, as under a bow, which keys make up for; or points of keys and cents, up to 16, and straight lines between them"},
     {"", "transpose", "-96 to 96 (0)", "semitones between a key and the pitch that it sets"},
     {"", "a4_hz", "220 to 880 (440)", "the pitch of the A above the middle C, to which all keys are tuned"},
     {"", "scale", "text", "a Scala file beside the preset, `NAME.scl`: the steps between keys; `tuning = \"fixed\"` has none"},
@@ -228,33 +228,81 @@ void read_channels(const toml::node& node, TomlTable& reader, Preset& preset) {
   }
 }
 
-// "velocity = [[0, 10], [127, 127]]"
-void read_velocity_points(const toml::array& rows, TomlTable& reader, Preset& preset) {
+// What the points of a curve are made of.
+struct CurveWords {
+  const char* name;
+  const char* example;
+  const char* point;  // what its two numbers are
+  double least[2];
+  double most[2];
+  const char* bounds;
+};
+
+// "velocity = [[0, 10], [127, 127]]": whose first numbers ascend.
+void read_points(const toml::array& rows, TomlTable& reader, const CurveWords& words,
+                 std::vector<CurvePoint>& points) {
   constexpr std::size_t most_points = 16;
-  constexpr double highest = 127.0;
+  const std::string name = std::string("'") + words.name + "'";
   if (rows.size() < 2 || rows.size() > most_points) {
-    reader.fail(rows, "'velocity' has 2 to 16 points: [[0, 0], [127, 127]]");
+    reader.fail(rows, name + " has 2 to 16 points: " + words.example);
     return;
   }
   for (const toml::node& row : rows) {
     const toml::array* const point = row.as_array();
     if (point == nullptr || point->size() != 2 || !(*point)[0].is_number() ||
         !(*point)[1].is_number()) {
-      reader.fail(row, "a point of 'velocity' is two numbers: [velocity, what it becomes]");
+      reader.fail(row, "a point of " + name + " is two numbers: " + words.point);
       return;
     }
-    const std::array<double, 2> read = {*(*point)[0].value<double>() / highest,
-                                        *(*point)[1].value<double>() / highest};
-    if (!(read[0] >= 0.0 && read[0] <= 1.0 && read[1] >= 0.0 && read[1] <= 1.0)) {
-      reader.fail(row, "a velocity lies between 0 and 127");
-      return;
+    const CurvePoint read = {*(*point)[0].value<double>(), *(*point)[1].value<double>()};
+    for (std::size_t i = 0; i < read.size(); ++i) {
+      if (!(read[i] >= words.least[i] && read[i] <= words.most[i])) {
+        reader.fail(row, words.bounds);
+        return;
+      }
     }
-    auto& points = preset.velocity_points;
-    if (!points.empty() && !(read[0] > points.back()[0] && read[1] >= points.back()[1])) {
-      reader.fail(row, "the points of 'velocity' must ascend");
+    if (!points.empty() && !(read[0] > points.back()[0])) {
+      reader.fail(row, "the points of " + name + " must ascend");
       return;
     }
     points.push_back(read);
+  }
+}
+
+void read_velocity_points(const toml::array& rows, TomlTable& reader, Preset& preset) {
+  constexpr double highest = 127.0;
+  std::vector<CurvePoint> points;
+  read_points(rows, reader,
+              {.name = "velocity",
+               .example = "[[0, 0], [127, 127]]",
+               .point = "[velocity, what it becomes]",
+               .least = {0.0, 0.0},
+               .most = {highest, highest},
+               .bounds = "a velocity lies between 0 and 127"},
+              points);
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    if (i > 0 && points[i][1] < points[i - 1][1]) {
+      reader.fail(rows[i], "the points of 'velocity' must ascend");
+      return;
+    }
+    preset.velocity_points.push_back({points[i][0] / highest, points[i][1] / highest});
+  }
+}
+
+void read_flattening(const toml::table& root, TomlTable& reader, Preset& preset) {
+  constexpr double most_cents = 100.0;
+  const char* const name = "flattening_cents";
+  if (const toml::node* node = root.get(name); node != nullptr && node->is_array()) {
+    read_points(*node->as_array(), reader,
+                {.name = name,
+                 .example = "[[48, 8], [96, 6]]",
+                 .point = "[key, cents]",
+                 .least = {0.0, -most_cents},
+                 .most = {127.0, most_cents},
+                 .bounds = "a key lies between 0 and 127, its cents between -100 and 100"},
+                preset.flattening_cents);
+  } else if (double cents = 0.0; reader.number(name, cents, -most_cents, most_cents)) {
+    preset.flattening_cents = {{0.0, cents}};
   }
 }
 
@@ -319,7 +367,7 @@ void read_root(const toml::table& root, Preset& preset, std::vector<Error>& erro
   reader.number("damper_s", preset.damper_s, 0.0, 60.0);
   reader.flag("noise", preset.noise);
   reader.integer("transpose", preset.transpose, -96, 96);
-  reader.number("flattening_cents", preset.flattening_cents, -100.0, 100.0);
+  read_flattening(root, reader, preset);
   read_keys(root, reader, preset);
   if (std::string budget; reader.text("budget", budget)) {
     if (const auto parsed = parse_budget(budget)) {
