@@ -72,6 +72,7 @@ class InputDriver {
   bool is_moving() const {
     return motion_ != Motion::rest || is_struck() || bump_ != 0.0 || held_frames_ > 0;
   }
+  bool is_drawn() const { return motion_ == Motion::draw; }  // on and on
   double value() const { return value_; }
   double target() const { return target_; }
 

@@ -142,6 +142,24 @@ struct Engine::Player {
     }
     release(
         [&](Voice& voice) { return voices.lift_key(voice, event.index, channel, event.value); });
+    damp_keyless();
+  }
+
+  // What a hand has set going by itself ends with the last of the keys, unless its bow or audio goes on.
+  void damp_keyless() {
+    for (std::size_t input = 0; input < machine.inputs.size(); ++input) {
+      if (audio.moves(input)) {
+        return;
+      }
+    }
+    if (voices.is_any_held()) {
+      return;
+    }
+    for (std::size_t lane = 0; lane < voices.size(); ++lane) {
+      if (voices[lane].is_live() && !voices[lane].has_key && !gestures.is_drawn(lane)) {
+        voices.damp_keyless(voices[lane]);
+      }
+    }
   }
 
   // What means the same everywhere; all of it may be in the preset too.

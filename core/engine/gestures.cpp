@@ -89,6 +89,15 @@ bool Gestures::is_moving(std::size_t lane) const {
   return false;
 }
 
+bool Gestures::is_drawn(std::size_t lane) const {
+  for (std::size_t input = 0; input < machine_.inputs.size(); ++input) {
+    if (drivers_[lane * machine_.inputs.size() + input].is_drawn()) {
+      return true;
+    }
+  }
+  return false;
+}
+
 Stroke Gestures::on_input(std::size_t input, Stroke stroke) const {
   stroke.is_force = machine_.inputs[input].is_force;
   stroke.middle = machine_.inputs[input].position;

@@ -29,6 +29,7 @@ class Gestures {
     return drivers_[lane * machine_.inputs.size() + input].is_moving();
   }
   bool is_moving(std::size_t lane) const;
+  bool is_drawn(std::size_t lane) const;
 
   // What the controls of this source, of this key or of this controller's number, do for 0..1. What
   // has a goal moves in all voices that are meant, all else in the last of them; parameters are

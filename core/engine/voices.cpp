@@ -319,6 +319,15 @@ void Voices::damp_earlier(int key, std::uint8_t channel) {
   }
 }
 
+bool Voices::is_any_held() const {
+  return std::any_of(voices_.begin(), voices_.end(), [](const Voice& voice) { return voice.held; });
+}
+
+void Voices::damp_keyless(Voice& voice) const {
+  voice.is_released = true;
+  damp(voice);
+}
+
 void Voices::damp(Voice& voice) const {
   constexpr double decades_of_t60 = 3.0;
   const bool may_lie = voice.is_released && !voice.latched && playing_.damper_s > 0.0;

@@ -154,6 +154,9 @@ class Voices {
   void adopt_channels(const Voices& from);
   // Once in max_block_frames.
   void glide_on();
+  bool is_any_held() const;
+  // Lays the damper on a voice that no key has started, as on those whose keys are up.
+  void damp_keyless(Voice& voice) const;
   // Whether a pedal that went up lets this voice go.
   bool is_let_go(Voice& voice, std::uint8_t channel) const;
   double softness(std::uint8_t channel) const { return channels_.softness(channel); }
