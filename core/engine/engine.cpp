@@ -113,7 +113,10 @@ struct Engine::Player {
     }
   }
 
-  bool listens_to(std::uint8_t channel) const { return has_channel(playing.channels, channel); }
+  // Notes with an ID are for whoever plays.
+  bool listens_to(std::uint8_t channel) const {
+    return channel >= midi_channel_count || has_channel(playing.channels, channel);
+  }
 
   void press_key(const Event& event) {
     const std::uint8_t channel = event.channel % Channels::count;
@@ -122,7 +125,7 @@ struct Engine::Player {
     }
     const double velocity = playing.velocity(event.value) * voices.softness(channel);
     const Press press =
-        voices.press_key(event.index, velocity, channel, parameters.highest_factor());
+        voices.press_key(event.index, velocity, channel, parameters.highest_factor(), event.value2);
     if (press == Press::silent || press == Press::moves) {
       return;
     }
@@ -145,7 +148,8 @@ struct Engine::Player {
     damp_keyless();
   }
 
-  // What a hand has set going by itself ends with the last of the keys, unless its bow or audio goes on.
+  // What a hand has set going by itself ends with the last of the keys, unless its bow or audio
+  // goes on.
   void damp_keyless() {
     for (std::size_t input = 0; input < machine.inputs.size(); ++input) {
       if (audio.moves(input)) {
