@@ -12,6 +12,7 @@ namespace {
 using support::controller;
 using support::note_off;
 using support::note_on;
+using support::peak;
 using support::Player;
 using support::ringing_string;
 using support::struck;
