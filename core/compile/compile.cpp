@@ -46,14 +46,15 @@ Reduced reduce(const Request& request) {
   return {std::move(whole), {}};
 }
 
-// The lowest mode, by which keys find their pitch; nothing where they are not to.
+// The lowest mode, or which the preset names, by which keys find their pitch; nothing where they
+// are not to.
 std::optional<LowestShapes> find_shapes(const Request& request, const Network& network,
                                         std::span<const double> values) {
   if (!request.preset.keyboard || moving_count(network) > most_tuned_masses) {
     return std::nullopt;
   }
   request.options.progress.stage("finding its lowest mode");
-  return lowest_shapes(network, values, request.options.progress);
+  return lowest_shapes(network, values, request.options.progress, request.preset.pitch_mode);
 }
 
 // Where it is stable: at the start, in all ranges, for keys; and what of it comes to rest.

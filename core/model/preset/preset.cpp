@@ -23,6 +23,7 @@ constexpr PresetKey keys[] = {
     {"", "noise", "true or false (false)", "the outputs shape white noise instead of being heard themselves"},
     {"", "tuning", "`keyboard` or `fixed` (`keyboard`)", "whether a key sets the pitch, or every key sounds the model as it is written"},
     {"", "flattening_cents", "-100 to 100 (0), or [[48, 8], [96, 6]]", "by how much the sound is flat of its lowest mode, as under a bow, which keys make up for; or points of keys and cents, up to 16, and straight lines between them"},
+    {"", "pitch_mode", "1 to 16 (1)", "which of the model's modes a key tunes, counted from the lowest: of a bell, say, the one that is heard as its pitch"},
     {"", "transpose", "-96 to 96 (0)", "semitones between a key and the pitch that it sets"},
     {"", "a4_hz", "220 to 880 (440)", "the pitch of the A above the middle C, to which all keys are tuned"},
     {"", "scale", "text", "a Scala file beside the preset, `NAME.scl`: the steps between keys; `tuning = \"fixed\"` has none"},
@@ -367,6 +368,7 @@ void read_root(const toml::table& root, Preset& preset, std::vector<Error>& erro
   reader.number("damper_s", preset.damper_s, 0.0, 60.0);
   reader.flag("noise", preset.noise);
   reader.integer("transpose", preset.transpose, -96, 96);
+  reader.integer("pitch_mode", preset.pitch_mode, 1, most_pitch_mode);
   read_flattening(root, reader, preset);
   read_keys(root, reader, preset);
   if (std::string budget; reader.text("budget", budget)) {

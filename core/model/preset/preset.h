@@ -60,7 +60,8 @@ struct Preset {
   bool noise = false;     // the outputs shape white noise
   bool keyboard = true;   // a key sets the pitch
   int transpose = 0;      // semitones between a key and the pitch that it sets
-  // Of the sound below its lowest mode, to be made up for: keys and cents, ascending; empty: none.
+  int pitch_mode = 1;     // which of its modes a key tunes, from the lowest
+  // Of the sound below that mode, to be made up for: keys and cents, ascending; empty: none.
   std::vector<CurvePoint> flattening_cents;
   double a4_hz = usual_a4_hz;  // to which everything is tuned
   std::string scale;           // a Scala file beside the preset; empty: 12 equal semitones
@@ -82,6 +83,7 @@ struct Preset {
 };
 
 inline constexpr int max_voices = 256;
+inline constexpr int most_pitch_mode = 16;
 inline constexpr std::size_t max_preset_bytes = std::size_t{64} << 10;
 inline constexpr std::size_t most_preset_errors = 100;
 
