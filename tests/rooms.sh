@@ -43,7 +43,7 @@ judge() {
       sees["core/analysis"] = "core core/laws core/linear_algebra core/model core/analysis"
       sees["core/kernels"] = "core/lanes.h core/formula.h core/progress.h core/model/preset/budget.h " \
                              "core/laws core/linear_algebra core/kernels"
-      sees["core/engine"] = "core/lanes.h core/formula.h core/progress.h core/gesture.h " \
+      sees["core/engine"] = "core/lanes.h core/curve.h core/formula.h core/progress.h core/gesture.h " \
                             "core/input_driver.h core/laws core/kernels core/engine"
       sees["core/compile"] = "core core/laws core/linear_algebra core/model core/analysis core/kernels " \
                              "core/engine core/compile"
@@ -77,7 +77,7 @@ judge() {
         target = what
         if (match(target, /^(core|app)\/[^\/]*\//)) {
           target = substr(target, 1, RLENGTH - 1)
-        } else if (target ~ /^core\/(result|formula|progress|lanes|gesture|input_driver)[.]h$/) {
+        } else if (target ~ /^core\/(result|formula|progress|lanes|curve|gesture|input_driver)[.]h$/) {
           target = "core"
         } else if (target ~ /^app\/[^\/]*$/) {
           target = "app"
