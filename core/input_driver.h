@@ -45,6 +45,13 @@ class InputDriver {
     pole_ = pole;
   }
 
+  // What is drawn moves on so many times as fast, as the voice's pitch does.
+  void hasten(double ratio) {
+    if (motion_ == Motion::draw) {
+      speed_ *= ratio;
+    }
+  }
+
   // A force or a displacement on top of whatever else goes on: one sample, or a raised cosine of
   // `frames` samples with the same sum.
   void strike(double force, std::size_t frames = 1) {
@@ -65,6 +72,7 @@ class InputDriver {
   bool is_moving() const {
     return motion_ != Motion::rest || is_struck() || bump_ != 0.0 || held_frames_ > 0;
   }
+  bool is_drawn() const { return motion_ == Motion::draw; }  // on and on
   double value() const { return value_; }
   double target() const { return target_; }
 

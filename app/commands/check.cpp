@@ -266,8 +266,10 @@ void print_report(const Scene& scene, const Compiled& compiled, const Proved& pr
   }
   std::printf("runs as\n  %s", describe(compiled.plan).c_str());
   if (instrument.mode) {
-    std::printf("lowest mode %.3f Hz; keys are in tune up to %.0f Hz, higher ones are silent\n",
-                instrument.mode->frequency_hz, instrument.highest_frequency_hz);
+    const int number = scene.preset.pitch_mode;
+    const std::string mode = number == 1 ? "lowest mode" : "mode " + std::to_string(number);
+    std::printf("%s %.3f Hz; keys are in tune up to %.0f Hz, higher ones are silent\n",
+                mode.c_str(), instrument.mode->frequency_hz, instrument.highest_frequency_hz);
   }
   std::printf("%s\n", conclusion(scene, proved).c_str());
 }

@@ -390,9 +390,9 @@ Result<Done> command::explain(ConsoleContext& console, Words) {
   const Instrument& instrument = current->instrument;
   std::vector<std::vector<std::string>> rows = {
       {"model", current->model_path},
-      {"lowest mode", instrument.mode
-                          ? fixed(instrument.mode->frequency_hz, 2) + " Hz as it is written"
-                          : "none that keys could tune"},
+      {"tuned mode", instrument.mode
+                         ? fixed(instrument.mode->frequency_hz, 2) + " Hz as it is written"
+                         : "none that keys could tune"},
       {"keys", instrument.mode
                    ? "set the pitch" + transposition(instrument.transpose) + ", up to " +
                          fixed(instrument.highest_frequency_hz, 1) + " Hz; higher ones are silent"

@@ -5,9 +5,11 @@
 #include <cmath>
 
 #include "app/control/console_commands.h"
+#include "app/control/note_events.h"
 #include "app/control/osc/answers.h"
 #include "app/control/osc/subscribers.h"
 #include "app/text.h"
+#include "core/engine/midi/channels.h"
 #include "core/model/language/expression.h"
 
 namespace ressort {
@@ -19,22 +21,6 @@ namespace {
 Events one(const Said& said, Event event) {
   event.channel = said.instrument.channel;
   return std::vector{event};
-}
-
-// OSC's floats up to 1 are shares of the loudest; whole numbers, and what is typed, are MIDI's.
-double velocity_of(const Said& said) {
-  const std::string& types = said.message.types;
-  const bool is_share =
-      types.size() > 1 && (types[1] == 'f' || types[1] == 'd') && said.arguments[1] <= 1.0;
-  return is_share ? said.arguments[1] : said.arguments[1] / 127.0;
-}
-
-Events note(const Said& said, bool starts) {
-  const double velocity = velocity_of(said);
-  const bool is_on = starts && velocity > 0.0;
-  return one(said, {.kind = is_on ? EventKind::note_on : EventKind::note_off,
-                    .index = said.whole(0),
-                    .value = is_on || !starts ? velocity : usual_release_velocity});
 }
 
 // Of the parameters that a pattern names.
@@ -88,23 +74,51 @@ Events play_input(const Said& said, const GestureRow& gesture) {
 std::vector<Row> make_rows() {
   const Row first[] = {
       {.address = "/note/on",
-       .arguments = {{"KEY", "the key", 0, 127}, {"VELOCITY", "the velocity", 0, 127, 100}},
+       .arguments = {{"KEY", "the key", 0, 127},
+                     {"VELOCITY", "the velocity", 0, 127, 100},
+                     {"ID", "the ID", 0, most_note_ids, 0}},
        .does =
            "starts a note; key 0-127, velocity 1-127 (100), or as a float up to 1 a share of the "
-           "loudest",
-       .play = [](const Said& said) { return note(said, true); },
+           "loudest; ID 1-16 lets the note be bent, pressed and slid alone",
+       .play = events::note_on,
        .command = "noteon",
        .group = CommandGroup::playing,
+       .words = "KEY [VELOCITY]",
        .command_does = "starts a note; 60 is the middle C",
        .details = "KEY is 0 to 127, VELOCITY is 1 to 127, or 100 if it is left out."},
       {.address = "/note/off",
-       .arguments = {{"KEY", "the key", 0, 127}, {"VELOCITY", "the velocity", 0, 127, 63.5}},
+       .arguments = {{"KEY", "the key", 0, 127},
+                     {"VELOCITY", "the velocity", 0, 127, 63.5},
+                     {"ID", "the ID", 0, most_note_ids, 0}},
        .does = "ends a note; the velocity is that of the release",
-       .play = [](const Said& said) { return note(said, false); },
+       .play = events::note_off,
        .command = "noteoff",
        .group = CommandGroup::playing,
        .words = "KEY",
        .details = "KEY is 0 to 127."},
+      {.address = "/note/hz",
+       .arguments = {{"ID", "the ID", 1, most_note_ids},
+                     {"HZ", "the frequency", 1, 20000},
+                     {"VELOCITY", "the velocity", 0, 127, 100}},
+       .does = "starts a note of this frequency; ID 1-16; velocity as of /note/on",
+       .play = events::note_hz},
+      {.address = "/note/end",
+       .arguments = {{"ID", "the ID", 1, most_note_ids}},
+       .does = "ends the notes of this ID",
+       .play = events::note_end},
+      {.address = "/note/bend",
+       .arguments = {{"ID", "the ID", 1, most_note_ids},
+                     {"SEMITONES", "the bend", -note_bend_semitones, note_bend_semitones}},
+       .does = "bends this note alone; semitones, -48 to 48; it stays for the ID's next note",
+       .play = events::note_bend},
+      {.address = "/note/pressure",
+       .arguments = {{"ID", "the ID", 1, most_note_ids}, {"VALUE", "the pressure", 0, 127}},
+       .does = "presses this note alone, 0-127",
+       .play = events::note_pressure},
+      {.address = "/note/slide",
+       .arguments = {{"ID", "the ID", 1, most_note_ids}, {"VALUE", "the slide", 0, 127}},
+       .does = "slides this note alone, as MPE does: controller 74, 0-127",
+       .play = events::note_slide},
       {.command = "keys",
        .group = CommandGroup::playing,
        .command_does = "plays from the computer's keyboard",
@@ -423,7 +437,7 @@ const Row custom_row{.arguments = {{"VALUE", "the value", 0, 1}}, .play = custom
 
 // Reads the arguments of a message; nothing where they are as the row wants them.
 std::optional<std::string> read_arguments(const Row& row, const Message& message,
-                                          std::array<double, 2>& values) {
+                                          std::array<double, most_arguments>& values) {
   std::size_t count = 0;
   for (const CallArgument& wanted : row.arguments) {
     if (wanted.word.empty()) {
@@ -566,10 +580,8 @@ Events to_events(const Message& message, const Instrument& instrument, std::uint
     }
     said.input = *input;
   }
-  if (const auto wrong = read_arguments(*row, message, said.arguments)) {
-    return Error{message.address + ": " + *wrong};
-  }
-  return row->play(said);
+  const auto wrong = read_arguments(*row, message, said.arguments);
+  return wrong ? Events(Error{message.address + ": " + *wrong}) : row->play(said);
 }
 
 std::string describe_limit(const Message& message, const Event& event,
@@ -579,11 +591,11 @@ std::string describe_limit(const Message& message, const Event& event,
   }
   const double* const wanted = std::get_if<double>(message.arguments.data());
   const ParameterInfo& info = instrument.parameters[event.index];
-  const bool is_beyond = wanted != nullptr && ((event.value < *wanted && info.is_lowered) ||
-                                               (event.value > *wanted && info.is_raised));
-  return is_beyond ? info.name + ": " + print_number(*wanted) +
-                         " is beyond what is stable, set to " + print_number(event.value)
-                   : "";
+  return wanted != nullptr && ((event.value < *wanted && info.is_lowered) ||
+                               (event.value > *wanted && info.is_raised))
+             ? info.name + ": " + print_number(*wanted) + " is beyond what is stable, set to " +
+                   print_number(event.value)
+             : "";
 }
 
 }  // namespace ressort

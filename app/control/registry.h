@@ -23,6 +23,8 @@ class OscClient;
 class Session;
 class Subscribers;
 
+inline constexpr std::size_t most_arguments = 3;
+
 using Words = std::span<const std::string>;
 
 // A playing message whose arguments are there and within their ranges.
@@ -33,7 +35,7 @@ struct Said {
   std::string_view name;                // what stands for NAME in the address: a pattern
   const InputInfo* input = nullptr;     // what stands for N,
   Gesture gesture = Gesture::position;  // and what plays it
-  std::array<double, 2> arguments{};
+  std::array<double, most_arguments> arguments{};
 
   std::uint16_t whole(std::size_t argument) const;  // rounded
 };
@@ -54,8 +56,8 @@ struct Row {
   // In OSC and in scores; N stands for an input's number, NAME for a parameter's name or a pattern
   // of names. Empty: said at the console only.
   std::string address = {};
-  CallArgument arguments[2] = {};  // those that have a word
-  std::string_view does = {};      // one line
+  CallArgument arguments[most_arguments] = {};  // those that have a word
+  std::string_view does = {};                   // one line
   // Gives its events, all at frame 0. Null: it plays nothing, and a score cannot say it.
   Events (*play)(const Said& said) = nullptr;
   Gesture gesture = Gesture::position;  // of an address of an input

@@ -109,6 +109,9 @@ bool MidiReader::finish(Event& event) {
 // A tuning of the MIDI Tuning Standard, for any device and of any number: there is one here.
 //   7f device 08 02 program count (key semitone fraction fraction)...     what sounds, too
 //   7e device 08 01 program name[16] (semitone fraction fraction)[128] sum
+//   7f device 08 08 channels[3] cents[12], 08 09 with 14 bits each   7f: what sounds, too; 7e:
+//   later
+// The last two are for whatever channels: what plays has one tuning.
 void MidiReader::end_exclusive() {
   constexpr std::size_t change_head = 6;
   constexpr std::size_t dump_size = dump_head + std::size_t{3} * 128 + 1;
@@ -119,6 +122,10 @@ void MidiReader::end_exclusive() {
   };
   const bool is_change = begins(0x7f, 0x02);
   is_dump_ = begins(0x7e, 0x01);
+  constexpr std::size_t octave_head = 7;
+  const bool is_octave = size >= octave_head && (bytes[0] == 0x7e || bytes[0] == 0x7f) &&
+                         bytes[2] == 0x08 && (bytes[3] == 0x08 || bytes[3] == 0x09);
+  octave_bytes_ = is_octave ? bytes[3] - 7 : 0;
   bool is_right = size <= longest_exclusive;
   if (is_change) {
     is_right = is_right && size == change_head + std::size_t{4} * bytes[5];
@@ -133,15 +140,24 @@ void MidiReader::end_exclusive() {
     is_right = is_right && size == dump_size && (sum() & 0x7f) == bytes[dump_size - 1];
     tuned_next_ = dump_head;
     tuned_end_ = dump_size - 1;
+  } else if (is_octave) {
+    is_right = size == octave_head + 12 * static_cast<std::size_t>(octave_bytes_);
+    is_dump_ = bytes[0] == 0x7e;
+    tuned_next_ = 0;  // keys
+    tuned_end_ = 128;
   }
-  if (!(is_change || is_dump_) || !is_right) {
-    malformed_ += (is_change || is_dump_) && !is_right ? 1 : 0;
+  const bool is_tuning = is_change || is_dump_ || is_octave;
+  if (!is_tuning || !is_right) {
+    malformed_ += is_tuning && !is_right ? 1 : 0;
     tuned_next_ = tuned_end_ = 0;
   }
 }
 
 // Semitones of equal temperament and 14 bits of one; all ones: as it was.
 bool MidiReader::next_tuned_key(Event& event) {
+  if (octave_bytes_ > 0) {
+    return next_key_of_octave(event);
+  }
   while (tuned_next_ < tuned_end_) {
     const std::size_t row = is_dump_ ? (tuned_next_ - dump_head) / 3 : 0;
     const auto key = static_cast<std::uint16_t>(is_dump_ ? row : exclusive_[tuned_next_++]);
@@ -158,6 +174,23 @@ bool MidiReader::next_tuned_key(Event& event) {
     return true;
   }
   return false;
+}
+
+// Cents beside equal temperament, from C on: 64 is none, or 14 bits of -100 to 100.
+bool MidiReader::next_key_of_octave(Event& event) {
+  if (tuned_next_ >= tuned_end_) {
+    return false;
+  }
+  const auto key = static_cast<int>(tuned_next_++);
+  const std::uint8_t* const row =
+      &exclusive_[7 + static_cast<std::size_t>(key % 12 * octave_bytes_)];
+  const double cents =
+      octave_bytes_ == 1 ? row[0] - 64 : 100.0 * ((row[0] << 7 | row[1]) - 8192) / 8192.0;
+  event = {.kind = EventKind::key_tuning,
+           .index = static_cast<std::uint16_t>(key),
+           .value = 440.0 * std::exp2((key - 69 + cents / 100.0) / 12.0),
+           .value2 = is_dump_ ? 0.0 : 1.0};
+  return true;
 }
 
 void MidiReader::end_packet() {

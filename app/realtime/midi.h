@@ -38,6 +38,7 @@ class MidiReader {
   bool finish(Event& event);
   void end_exclusive();
   bool next_tuned_key(Event& event);
+  bool next_key_of_octave(Event& event);
   void end_packet();
 
   std::uint8_t status_ = 0;  // of the message being read; kept for running status
@@ -53,6 +54,7 @@ class MidiReader {
   std::size_t tuned_next_ = 0;  // where the next key of a whole tuning stands in it,
   std::size_t tuned_end_ = 0;   // and where they end
   bool is_dump_ = false;        // all keys from 0 on, for the notes that come
+  int octave_bytes_ = 0;        // of each of the twelve keys of an octave; 0: it is no such tuning
   std::uint64_t malformed_ = 0;
 };
 

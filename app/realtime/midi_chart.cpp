@@ -42,6 +42,7 @@ constexpr MidiChartRow rows[] = {
     {"MPE", "", true, "a zone's master, channel 1 or 16, bends, turns and holds all of it, on top of what each member says. A note that was let go hears the master alone"},
     {"SysEx tuning change", "F0 7F id 08 02", true, "MIDI Tuning Standard, in real time: keys to a pitch, what sounds too; any device, any number"},
     {"SysEx tuning dump", "F0 7E id 08 01", true, "all 128 keys, for the notes that come"},
+    {"SysEx octave tuning", "F0 7F id 08 08, 08 09", true, "cents of the twelve keys of every octave, in one byte or two; what sounds, too; with 7E for the notes that come; there is one tuning, for whatever channels"},
     {"other SysEx", "", false, ""},
     {"system common, real time", "", false, "neither clock nor song position"},
 };

@@ -283,7 +283,8 @@ class Spectrum {
   bool is_factored_ = false;
 };
 
-// The lowest eigenpairs, and which is the first above what is rounding.
+// The lowest eigenpairs, and which is the wanted one: the first above what is rounding, or so many
+// after it.
 struct Lowest {
   Eigenpairs pairs;
   std::size_t first = 0;
@@ -291,18 +292,19 @@ struct Lowest {
 
 // In so many pairs as are asked for at first it is most often found; else in a few.
 std::optional<Lowest> lowest_pairs(Spectrum& spectrum, const SparseMatrix& lower, double stiffest,
-                                   int wanted) {
+                                   int wanted, int number) {
   const double floor = rigid * stiffest;
-  for (const int count : {wanted, 1, 6}) {
+  for (const int count : {wanted + number - 1, number, number + 5}) {
     const std::optional<Eigenpairs> pairs = spectrum.near_zero(std::min(count, lower.size() - 1));
     if (!pairs) {
       continue;
     }
     const auto above = std::find_if(std::begin(pairs->values), std::end(pairs->values),
                                     [&](double value) { return value > floor; });
-    if (above != std::end(pairs->values)) {
-      const auto first = static_cast<std::size_t>(above - std::begin(pairs->values));
-      return is_pair(lower, *above, pairs->vectors.column(first), tolerance * stiffest)
+    if (std::end(pairs->values) - above >= number) {
+      const auto first = static_cast<std::size_t>(above - std::begin(pairs->values) + number - 1);
+      return is_pair(lower, pairs->values[first], pairs->vectors.column(first),
+                     tolerance * stiffest)
                  ? std::optional(Lowest{*pairs, first})
                  : std::nullopt;
     }
@@ -396,7 +398,7 @@ double scheme_frequency_hz(double stiffness, double damping, double rate_hz) {
 
 std::optional<LowestShapes> lowest_shapes(const Network& network,
                                           std::span<const double> parameters,
-                                          const Progress& progress) {
+                                          const Progress& progress, int number) {
   const Body whole(network, parameters);
   const std::optional<Network> still = fixed_held(network);
   const Body body(still ? *still : network, parameters);
@@ -411,7 +413,7 @@ std::optional<LowestShapes> lowest_shapes(const Network& network,
   // The shift lies a little below 0, so that free networks can be factored too.
   Spectrum spectrum(stiffness, -1e3 * rigid * stiffest, progress);
   const std::optional<Lowest> lowest =
-      lowest_pairs(spectrum, stiffness, stiffest, static_cast<int>(most_shapes));
+      lowest_pairs(spectrum, stiffness, stiffest, static_cast<int>(most_shapes), number);
   if (!lowest) {
     return std::nullopt;
   }

@@ -43,9 +43,10 @@ struct LowestShapes {
   double share_of_modes = 0.0;  // of bodies in the lowest one's motion, 0..1
 };
 
-// The same modes, in the same cases and the same time. [any thread but audio]
+// The same modes, in the same cases and the same time; or of the mode that is so many from the
+// lowest, which is 1. [any thread but audio]
 std::optional<LowestShapes> lowest_shapes(const Network& network,
                                           std::span<const double> parameters,
-                                          const Progress& progress = {});
+                                          const Progress& progress = {}, int number = 1);
 
 }  // namespace ressort

@@ -47,7 +47,8 @@ Reduced reduce(const Request& request) {
   return {std::move(whole), {}};
 }
 
-// The lowest mode, by which keys find their pitch; nothing where they are not to.
+// The lowest mode, or which the preset names, by which keys find their pitch; nothing where they
+// are not to.
 std::optional<LowestShapes> find_shapes(const Request& request, const Network& network,
                                         std::span<const double> values) {
   if (!request.preset.keyboard || moving_count(network) > most_tuned_masses) {
@@ -57,7 +58,7 @@ std::optional<LowestShapes> find_shapes(const Request& request, const Network& n
   if (!network.waveguides.empty()) {
     return waveguide_shapes(network, values);
   }
-  return lowest_shapes(network, values, request.options.progress);
+  return lowest_shapes(network, values, request.options.progress, request.preset.pitch_mode);
 }
 
 // Where it is stable: at the start, in all ranges, for keys; and what of it comes to rest.
@@ -181,6 +182,21 @@ Planned find_forms(const Request& request, Machine machine, const Analysis& anal
                    options.progress, promise);
 }
 
+// With what the sound is flat of its lowest mode made up for.
+Pitches sharpened(const Pitches& pitches, const Preset& preset) {
+  if (preset.flattening_cents.empty()) {
+    return pitches;
+  }
+  Pitches sharp = pitches;
+  for (std::size_t i = 0; i < sharp.factors.size(); ++i) {
+    const double hz = pitches.lowest_hz * std::exp2(static_cast<double>(i) / 12.0);
+    const double key = 69.0 + 12.0 * std::log2(hz / usual_a4_hz) - preset.transpose;
+    sharp.factors[i] =
+        pitches.factor_at(hz * std::exp2(value_at(preset.flattening_cents, key) / 1200.0));
+  }
+  return sharp;
+}
+
 // What keys may use of the stiffness, once it is known what plays them: what rings above 0.456 of
 // the rate is no tone any more.
 void reach(Analysis& analysis, double more, double rate_hz) {
@@ -261,7 +277,7 @@ Result<Compiled> compile_by_stages(const Request& request) {
                                   ? stepping_of_lowest(planned.machine, *shapes)
                                   : Stepping{.scheme = Stepping::Scheme::exact};
     analysis.pitches = make_pitches(*shapes, stepping, options.rate_hz, rate_ratio);
-    analysis.pitches.lowest_hz *= std::exp2(-preset.flattening_cents / 1200.0);
+    analysis.pitches = sharpened(analysis.pitches, preset);
     reach(analysis, planned.more, options.rate_hz);
   }
   if (auto error = shortage(planned.machine, voices, options.precision, options.most_bytes)) {

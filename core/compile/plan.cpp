@@ -5,7 +5,7 @@
 
 #include "core/kernels/direct/fourth_form.h"
 #include "core/kernels/domains/shards.h"
-#include "core/kernels/modal/modal_form.h"
+#include "core/kernels/modal/modal_body.h"
 #include "core/kernels/oversampled/oversampled_form.h"
 
 namespace ressort {

@@ -113,7 +113,10 @@ struct Engine::Player {
     }
   }
 
-  bool listens_to(std::uint8_t channel) const { return has_channel(playing.channels, channel); }
+  // Notes with an ID are for whoever plays.
+  bool listens_to(std::uint8_t channel) const {
+    return channel >= midi_channel_count || has_channel(playing.channels, channel);
+  }
 
   void press_key(const Event& event) {
     const std::uint8_t channel = event.channel % Channels::count;
@@ -122,7 +125,7 @@ struct Engine::Player {
     }
     const double velocity = playing.velocity(event.value) * voices.softness(channel);
     const Press press =
-        voices.press_key(event.index, velocity, channel, parameters.highest_factor());
+        voices.press_key(event.index, velocity, channel, parameters.highest_factor(), event.value2);
     if (press == Press::silent || press == Press::moves) {
       return;
     }
@@ -142,6 +145,25 @@ struct Engine::Player {
     }
     release(
         [&](Voice& voice) { return voices.lift_key(voice, event.index, channel, event.value); });
+    damp_keyless();
+  }
+
+  // What a hand has set going by itself ends with the last of the keys, unless its bow or audio
+  // goes on.
+  void damp_keyless() {
+    for (std::size_t input = 0; input < machine.inputs.size(); ++input) {
+      if (audio.moves(input)) {
+        return;
+      }
+    }
+    if (voices.is_any_held()) {
+      return;
+    }
+    for (std::size_t lane = 0; lane < voices.size(); ++lane) {
+      if (voices[lane].is_live() && !voices[lane].has_key && !gestures.is_drawn(lane)) {
+        voices.damp_keyless(voices[lane]);
+      }
+    }
   }
 
   // What means the same everywhere; all of it may be in the preset too.
@@ -243,6 +265,7 @@ struct Engine::Player {
   void apply_changes(Bank<T>& b) {
     if (voices.has_changed() || parameters.has_changed()) {
       voices.retune(parameters.has_changed_highest_factor(), parameters.highest_factor());
+      gestures.follow_pitches();
       parameters.apply(b, voices, watch);
       voices.forget_changes();
     }

@@ -85,7 +85,7 @@ struct Playing {
   double transpose = 0.0;  // semitones, that the keys' frequencies have already
   KeyFrequencies keys_hz = equal_temperament(440.0, 0.0);
   VelocityCurve velocity;
-  ChannelMask channels = all_channels;  // that it listens to
+  ChannelMask channels = midi_channels;  // that it listens to
   bool mono = false;            // one voice a channel plays the last of the keys that are down
   bool legato = false;          // and is not struck again while one is
   double glide_s = 0.0;         // from the pitch before, in equal steps of cents

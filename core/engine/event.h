@@ -9,7 +9,8 @@
 namespace ressort {
 
 enum class EventKind : std::uint8_t {
-  note_on,       // index: key 0..127, value: velocity 0..1 (above 0), may be fractional
+  note_on,       // index: key 0..127, value: velocity 0..1 (above 0), may be fractional; value2: Hz
+                 // in place of the key's, 0: the key's
   note_off,      // index: key, value: how fast it goes up, 0..1
   controller,    // index: MIDI controller number, value: 0..1
   program,       // index: MIDI program number; for whoever loads, no engine takes it
@@ -31,7 +32,7 @@ struct Event {
   std::uint32_t frame = 0;  // within the block that it is given with
   EventKind kind = EventKind::panic;
   Gesture gesture = Gesture::position;  // of EventKind::gesture
-  std::uint8_t channel = 0;             // MIDI channel 0..15
+  std::uint8_t channel = 0;  // MIDI channel 0..15, or that of a note's ID: note_channel()
   std::uint16_t index = 0;
   std::uint32_t model = 0;  // serial of the model that `index` belongs to; 0: any
   double value = 0.0;

@@ -36,7 +36,8 @@ Gestures::Gestures(const Machine& machine, const Playing& playing, Voices& voice
       playing_(playing),
       voices_(voices),
       parameters_(parameters),
-      drivers_(voices.size() * machine.inputs.size()) {
+      drivers_(voices.size() * machine.inputs.size()),
+      pitches_(voices.size(), 1.0) {
   starts_.resize(Channels::count * machine.inputs.size());
   for (std::size_t input = 0; input < machine.inputs.size(); ++input) {
     set_starts(all_channels, input, machine.inputs[input].position);
@@ -50,6 +51,7 @@ Gestures::Gestures(const Machine& machine, const Playing& playing, Voices& voice
 
 void Gestures::go_on_from(const Gestures& from) {
   drivers_ = from.drivers_;
+  pitches_ = from.pitches_;
   starts_ = from.starts_;
 }
 
@@ -81,6 +83,15 @@ void Gestures::wake(std::size_t lane, std::uint8_t channel) {
 bool Gestures::is_moving(std::size_t lane) const {
   for (std::size_t input = 0; input < machine_.inputs.size(); ++input) {
     if (is_moving(lane, input)) {
+      return true;
+    }
+  }
+  return false;
+}
+
+bool Gestures::is_drawn(std::size_t lane) const {
+  for (std::size_t input = 0; input < machine_.inputs.size(); ++input) {
+    if (drivers_[lane * machine_.inputs.size() + input].is_drawn()) {
       return true;
     }
   }
@@ -119,7 +130,8 @@ void Gestures::play(const GestureRow& gesture, std::size_t input, Stroke stroke,
     return;
   }
   wake(*last, first_channel);
-  stroke.pitch = std::sqrt(voices_.factor_of(*last, parameters_.highest_factor()));
+  set_pitch(*last, std::sqrt(voices_.factor_of(*last, parameters_.highest_factor())));
+  stroke.pitch = pitches_[*last];
   gesture.play(driver(*last, input), stroke);
   if (stroke.has_level && stroke.amount != 0.0) {
     voices_.set_strength(*last, stroke.level());
@@ -179,6 +191,21 @@ void Gestures::release(std::size_t lane) {
     const auto release = row_of(control.gesture).release;
     if (release != nullptr && is_asked(control, Source::note, voices_[lane].key)) {
       release(driver(lane, control.target), on_input(control.target, stroke_of(control)));
+    }
+  }
+}
+
+void Gestures::set_pitch(std::size_t lane, double pitch) {
+  for (std::size_t input = 0; input < machine_.inputs.size(); ++input) {
+    driver(lane, input).hasten(pitch / pitches_[lane]);
+  }
+  pitches_[lane] = pitch;
+}
+
+void Gestures::follow_pitches() {
+  for (std::size_t lane = 0; lane < voices_.size(); ++lane) {
+    if (voices_[lane].awake && voices_[lane].is_retuned) {
+      set_pitch(lane, std::sqrt(voices_[lane].factor));
     }
   }
 }

@@ -29,6 +29,7 @@ class Gestures {
     return drivers_[lane * machine_.inputs.size() + input].is_moving();
   }
   bool is_moving(std::size_t lane) const;
+  bool is_drawn(std::size_t lane) const;
 
   // What the controls of this source, of this key or of this controller's number, do for 0..1. What
   // has a goal moves in all voices that are meant, all else in the last of them; parameters are
@@ -40,6 +41,9 @@ class Gestures {
   void perform_live(const Event& event);
   // What a key does when it is released, in its voice.
   void release(std::size_t lane);
+  // Voices have another pitch: what is drawn across them moves at the same speed in units of their
+  // own motion, so that a bow that is bent or glides goes on to catch its string.
+  void follow_pitches();
 
   // Where the drivers are in each frame.
   template <class T>
@@ -52,6 +56,7 @@ class Gestures {
   // With what a gesture is to know of the input.
   Stroke on_input(std::size_t input, Stroke stroke) const;
   void play(const GestureRow& gesture, std::size_t input, Stroke stroke, const Scope& scope);
+  void set_pitch(std::size_t lane, double pitch);
   // Where the drivers of new voices on these channels start.
   void set_starts(ChannelMask channels, std::size_t input, double start);
   template <class T>
@@ -62,6 +67,7 @@ class Gestures {
   Voices& voices_;
   Parameters& parameters_;
   std::vector<InputDriver> drivers_;  // [lane][input]
+  std::vector<double> pitches_;       // [lane] to that of the model, for which they move
   std::vector<double> starts_;        // [channel][input] where a new voice's driver is
 };
 

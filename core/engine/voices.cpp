@@ -1,5 +1,6 @@
 #include "core/engine/voices.h"
 
+#include <bit>
 #include <cmath>
 #include <numbers>
 
@@ -39,6 +40,8 @@ Voices::Voices(const Playing& playing, double rate_hz, std::size_t outputs)
                                 return control.source == Source::note && control.has_level;
                               })),
       voices_(lane_count(playing.voices)),
+      channels_(static_cast<std::uint8_t>(std::countr_zero(playing.channels) %
+                                          static_cast<int>(midi_channel_count))),
       tuning_(playing.keys_hz, playing.transpose),
       is_stereo_(outputs > 1) {}
 
@@ -81,23 +84,24 @@ bool Voices::wake(std::size_t lane) {
   return starts;
 }
 
-Press Voices::press_key(int key, double velocity, std::uint8_t channel, double highest_factor) {
+Press Voices::press_key(int key, double velocity, std::uint8_t channel, double highest_factor,
+                        double frequency_hz) {
   // As it is written there is one instrument: a key is only a way to excite it.
   const bool is_one = playing_.tuning == Tuning::fixed;
-  const double hz = is_one ? 0.0 : playable_hz(key, highest_factor);
+  const double hz = is_one ? 0.0 : playable_hz(pitch_hz(key, frequency_hz), highest_factor);
   if (!is_one && hz == 0.0) {
     return Press::silent;
   }
   HeldKeys& held = held_keys_[channel % Channels::count];
   const bool overlaps = !held.is_empty();
   const bool glides = overlaps || !is_legato(channel);
-  held.press(key, velocity);
+  held.press(key, velocity, frequency_hz);
   Voice* const alone = channels_.is_mono(channel, playing_.mono) ? voice_on(channel) : nullptr;
   if (alone != nullptr && !is_one && alone->is_whole()) {
     last_ = static_cast<std::size_t>(alone - voices_.data());
     const bool is_struck = !overlaps || !is_legato(channel);
     attach(*alone, key, channel);
-    move_to_key(*alone, key, glides, highest_factor);
+    move_to(*alone, key, frequency_hz, glides, highest_factor);
     return is_struck ? Press::strikes : Press::moves;
   }
   if (!is_one && !restrikes_) {
@@ -109,12 +113,13 @@ Press Voices::press_key(int key, double velocity, std::uint8_t channel, double h
   const bool starts = is_one ? !voice.is_live() : !sounds(voice, key, channel);
   if (starts) {
     start(last_, hz);
-    voice.key_hz = is_one ? 0.0 : tuning_.frequency_hz(static_cast<std::size_t>(key));
+    voice.key_hz = is_one ? 0.0 : pitch_hz(key, frequency_hz);
+    voice.has_own_pitch = frequency_hz > 0.0;
     voice.volume = level_of(channel);
   }
   attach(voice, key, channel);
   if (!starts && !is_one) {
-    move_to_key(voice, key, false, highest_factor);
+    move_to(voice, key, frequency_hz, false, highest_factor);
   }
   double& before_hz = last_hz_[channel % Channels::count];
   if (starts && glides && before_hz > 0.0 && !is_one) {
@@ -152,7 +157,7 @@ std::optional<HeldKey> Voices::go_back(int key, std::uint8_t channel, double hig
   }
   last_ = static_cast<std::size_t>(voice - voices_.data());
   attach(*voice, earlier->key, channel);
-  move_to_key(*voice, earlier->key, true, highest_factor);
+  move_to(*voice, earlier->key, earlier->frequency_hz, true, highest_factor);
   return earlier;
 }
 
@@ -319,6 +324,15 @@ void Voices::damp_earlier(int key, std::uint8_t channel) {
   }
 }
 
+bool Voices::is_any_held() const {
+  return std::any_of(voices_.begin(), voices_.end(), [](const Voice& voice) { return voice.held; });
+}
+
+void Voices::damp_keyless(Voice& voice) const {
+  voice.is_released = true;
+  damp(voice);
+}
+
 void Voices::damp(Voice& voice) const {
   constexpr double decades_of_t60 = 3.0;
   const bool may_lie = voice.is_released && !voice.latched && playing_.damper_s > 0.0;
@@ -334,7 +348,7 @@ SideGains Voices::level_of(std::uint8_t channel) const {
 }
 
 void Voices::adopt_channels(const Voices& from) {
-  channels_ = from.channels_;
+  channels_.adopt(from.channels_);
   tuning_.adopt(from.tuning_);
   for (std::uint8_t channel = 0; channel < Channels::count; ++channel) {
     retune(channel);

@@ -80,13 +80,14 @@ struct Voice {
   bool has_key = false;     // if not, it belongs to every channel
   std::uint8_t key = 0;
   std::uint8_t channel = 0;
-  std::uint64_t turn = 0;     // so many keys went down before its own
-  double frequency_hz = 0.0;  // without bend; 0: as the model is written
-  double key_hz = 0.0;        // the same before it was brought to where the model is stable
-  double semitones = 0.0;     // of its own channel's bend and tuning
-  double glide = 0.0;         // semitones that it is still away from its pitch,
-  double glide_step = 0.0;    // and how many it goes in max_block_frames
-  double factor = 1.0;        // on every stiffness
+  std::uint64_t turn = 0;      // so many keys went down before its own
+  double frequency_hz = 0.0;   // without bend; 0: as the model is written
+  bool has_own_pitch = false;  // which is not its key's
+  double key_hz = 0.0;         // the same before it was brought to where the model is stable
+  double semitones = 0.0;      // of its own channel's bend and tuning
+  double glide = 0.0;          // semitones that it is still away from its pitch,
+  double glide_step = 0.0;     // and how many it goes in max_block_frames
+  double factor = 1.0;         // on every stiffness
   Decay decay;
   bool is_released = false;  // its key has been up since it was pressed
   bool is_replaced = false;  // by another voice of its key
@@ -131,7 +132,9 @@ class Voices {
   void start(std::size_t lane, double frequency_hz);
   // Whether the voice slept, and starts.
   bool wake(std::size_t lane);
-  Press press_key(int key, double velocity, std::uint8_t channel, double highest_factor);
+  // `frequency_hz` above 0 is its pitch in place of the key's.
+  Press press_key(int key, double velocity, std::uint8_t channel, double highest_factor,
+                  double frequency_hz = 0.0);
   // A key goes up. Where one voice plays the last of those that are down, it goes back to the one
   // before: that key, and nothing is to be released.
   std::optional<HeldKey> go_back(int key, std::uint8_t channel, double highest_factor);
@@ -154,6 +157,9 @@ class Voices {
   void adopt_channels(const Voices& from);
   // Once in max_block_frames.
   void glide_on();
+  bool is_any_held() const;
+  // Lays the damper on a voice that no key has started, as on those whose keys are up.
+  void damp_keyless(Voice& voice) const;
   // Whether a pedal that went up lets this voice go.
   bool is_let_go(Voice& voice, std::uint8_t channel) const;
   double softness(std::uint8_t channel) const { return channels_.softness(channel); }
@@ -199,7 +205,9 @@ class Voices {
     return has_channel(channels, voice.channel);
   }
   void attach(Voice& voice, int key, std::uint8_t channel);
-  void move_to_key(Voice& voice, int key, bool glides, double highest_factor);
+  // Of a key, or of its own if it is above 0.
+  double pitch_hz(int key, double own_hz) const;
+  void move_to(Voice& voice, int key, double own_hz, bool glides, double highest_factor);
   void glide_from(Voice& voice, double frequency_hz);
   Voice* voice_on(std::uint8_t channel);
   // The least of the voices for which `may` says so; null where there is none.
@@ -208,7 +216,7 @@ class Voices {
   void end(Voice& voice);
   std::size_t too_many(std::size_t more) const;
   bool sounds(const Voice& voice, int key, std::uint8_t channel) const;
-  double playable_hz(int key, double highest_factor) const;
+  double playable_hz(double hz, double highest_factor) const;
   Voice& voice_for(int key, std::uint8_t channel);
   double factor_for(const Voice& voice, double highest_factor) const;
 

@@ -7,10 +7,15 @@
 
 namespace ressort {
 
-// The pitch of a voice that sounds becomes that of a key, unless it is that already.
-void Voices::move_to_key(Voice& voice, int key, bool glides, double highest_factor) {
-  const double key_hz = tuning_.frequency_hz(static_cast<std::size_t>(key));
-  const double hz = playable_hz(key, highest_factor);
+double Voices::pitch_hz(int key, double own_hz) const {
+  return own_hz > 0.0 ? own_hz : tuning_.frequency_hz(static_cast<std::size_t>(key));
+}
+
+// The pitch of a voice that sounds becomes this one, unless it is that already.
+void Voices::move_to(Voice& voice, int key, double own_hz, bool glides, double highest_factor) {
+  const double key_hz = pitch_hz(key, own_hz);
+  const double hz = playable_hz(key_hz, highest_factor);
+  voice.has_own_pitch = own_hz > 0.0;
   if (key_hz == voice.key_hz || hz == 0.0) {
     return;
   }
@@ -64,9 +69,9 @@ void Voices::retune(std::uint8_t channel) {
 void Voices::retune_key(std::size_t key, double frequency_hz, bool is_now, double highest_factor) {
   tuning_.retune(key, frequency_hz);
   for (Voice& voice : voices_) {
-    if (is_now && voice.awake && voice.has_key && voice.key == key && voice.frequency_hz > 0.0 &&
-        frequency_hz > 0.0) {
-      move_to_key(voice, static_cast<int>(key), false, highest_factor);
+    if (is_now && voice.awake && voice.has_key && voice.key == key && !voice.has_own_pitch &&
+        voice.frequency_hz > 0.0 && frequency_hz > 0.0) {
+      move_to(voice, static_cast<int>(key), 0.0, false, highest_factor);
     }
   }
 }
@@ -74,16 +79,15 @@ void Voices::retune_key(std::size_t key, double frequency_hz, bool is_now, doubl
 void Voices::reset_tuning(double highest_factor) {
   tuning_.reset();
   for (Voice& voice : voices_) {
-    if (voice.awake && voice.has_key && voice.frequency_hz > 0.0 &&
+    if (voice.awake && voice.has_key && !voice.has_own_pitch && voice.frequency_hz > 0.0 &&
         tuning_.frequency_hz(voice.key) > 0.0) {
-      move_to_key(voice, voice.key, false, highest_factor);
+      move_to(voice, voice.key, 0.0, false, highest_factor);
     }
   }
 }
 
-// The key's frequency; 0 where it has none, or none that can be played.
-double Voices::playable_hz(int key, double highest_factor) const {
-  const double hz = tuning_.frequency_hz(static_cast<std::size_t>(key));
+// 0 where it cannot be played.
+double Voices::playable_hz(double hz, double highest_factor) const {
   return hz < 0.5 * rate_hz_ && playing_.pitches.factor_at(hz) <= highest_factor ? hz : 0.0;
 }
 

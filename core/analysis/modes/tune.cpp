@@ -32,8 +32,7 @@ class ModeTuner {
             const ModeOptions& options)
       : options_(options),
         e_(scheme_e(options.scheme)),
-        rate_hz_(Network::reference_rate_hz / scheme_step(options),
-                 options.scheme == ModeScheme::published) {
+        rate_hz_(Network::reference_rate_hz / scheme_step(options)) {
     auto lines = spring_lines(network, part);
     if (!lines) {
       failure_ = lines.error();

@@ -33,6 +33,7 @@ enum Parameter : int { bend_range = 0, fine_tuning = 1, coarse_tuning = 2, mpe_c
 
 constexpr int most_data = 0x3fff;
 constexpr double member_bend_range = 48.0;  // semitones, of MPE
+static_assert(member_bend_range == note_bend_semitones);
 constexpr double usual_bend_range = 2.0;
 
 // From the left, -1, to the right; 64 is the middle, 1 as far to the left as 127 to the right, and
@@ -44,6 +45,18 @@ double pan_of(double value) {
 }
 
 }  // namespace
+
+Channels::Channels(std::uint8_t master) : notes_master_(master) {
+  for (unsigned channel = midi_channel_count; channel < count; ++channel) {
+    channels_[channel].bend_range = note_bend_semitones;
+  }
+}
+
+void Channels::adopt(const Channels& from) {
+  const std::uint8_t master = notes_master_;
+  *this = from;
+  notes_master_ = master;
+}
 
 Channels::Change Channels::turn(std::uint8_t index, int number, double value) {
   Channel& channel = of(index);
@@ -129,7 +142,7 @@ Channels::Change Channels::enter(std::uint8_t index) {
 // What is said to one member holds for all of them.
 Channels::Change Channels::set_bend_range(std::uint8_t index, double semitones) {
   const std::uint8_t master = master_of(index);
-  for (std::uint8_t other = 0; other < count; ++other) {
+  for (std::uint8_t other = 0; other < midi_channel_count; ++other) {
     const bool is_sibling = is_member(index) && is_member(other) && master_of(other) == master;
     if (other == index || is_sibling) {
       of(other).bend_range = semitones;
@@ -149,8 +162,8 @@ Channels::Change Channels::set_zone(std::uint8_t master, int members) {
   if (master != lower_master && master != upper_master) {
     return Change::nothing;
   }
-  std::array<std::uint8_t, count> before{};
-  for (std::uint8_t channel = 0; channel < count; ++channel) {
+  std::array<std::uint8_t, midi_channel_count> before{};
+  for (std::uint8_t channel = 0; channel < midi_channel_count; ++channel) {
     before[channel] = master_of(channel);
   }
   ours = members;
@@ -158,9 +171,9 @@ Channels::Change Channels::set_zone(std::uint8_t master, int members) {
     others = std::clamp(others, 0, std::max(0, most_of_both - members));
   }
   rezoned_ = 0;
-  for (std::uint8_t channel = 0; channel < count; ++channel) {
+  for (std::uint8_t channel = 0; channel < midi_channel_count; ++channel) {
     if (before[channel] == master || master_of(channel) == master) {
-      rezoned_ = static_cast<ChannelMask>(rezoned_ | channel_bit(channel));
+      rezoned_ |= channel_bit(channel);
       of(channel).bend_range = is_member(channel) ? member_bend_range : usual_bend_range;
       reset(channel);
     }
@@ -170,7 +183,8 @@ Channels::Change Channels::set_zone(std::uint8_t master, int members) {
 
 std::uint8_t Channels::master_of(std::uint8_t index) const {
   const int channel = index % static_cast<int>(count);
-  return channel > lower_master && channel <= lower_members_ ? lower_master
+  return channel >= static_cast<int>(midi_channel_count)       ? notes_master_
+         : channel > lower_master && channel <= lower_members_ ? lower_master
          : channel < upper_master && channel >= upper_master - upper_members_
              ? upper_master
              : static_cast<std::uint8_t>(channel);
@@ -178,19 +192,19 @@ std::uint8_t Channels::master_of(std::uint8_t index) const {
 
 ChannelMask Channels::reach(std::uint8_t index) const {
   const auto channel = static_cast<std::uint8_t>(index % count);
-  unsigned mask = channel_bit(channel);
+  ChannelMask mask = channel_bit(channel);
   for (std::uint8_t other = 0; other < count; ++other) {
     mask |= master_of(other) == channel ? channel_bit(other) : 0U;
   }
-  return static_cast<ChannelMask>(mask);
+  return mask;
 }
 
 ChannelMask Channels::members() const {
-  unsigned mask = 0;
+  ChannelMask mask = 0;
   for (std::uint8_t channel = 0; channel < count; ++channel) {
     mask |= is_member(channel) ? channel_bit(channel) : 0U;
   }
-  return static_cast<ChannelMask>(mask);
+  return mask;
 }
 
 void Channels::reset(std::uint8_t index) {

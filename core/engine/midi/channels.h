@@ -11,15 +11,27 @@
 
 namespace ressort {
 
+// MIDI's channels, then one for each note that was given an ID: a member of a zone that is always
+// there, so that it bends, is pressed and slides alone.
+inline constexpr unsigned midi_channel_count = 16;
+inline constexpr unsigned most_note_ids = 16;
+inline constexpr unsigned channel_count = midi_channel_count + most_note_ids;
+
 // Channels, each a bit.
-using ChannelMask = std::uint16_t;
-inline constexpr ChannelMask all_channels = 0xffff;
+using ChannelMask = std::uint32_t;
+inline constexpr ChannelMask all_channels = 0xffffffff;
+inline constexpr ChannelMask midi_channels = 0xffff;
 constexpr ChannelMask channel_bit(unsigned channel) {
-  return static_cast<ChannelMask>(1U << channel % 16);
+  return ChannelMask{1} << channel % channel_count;
 }
 constexpr bool has_channel(ChannelMask channels, unsigned channel) {
-  return (channels >> channel % 16 & 1) != 0;
+  return (channels >> channel % channel_count & 1) != 0;
 }
+// Of a note's ID, from 1.
+constexpr std::uint8_t note_channel(unsigned id) {
+  return static_cast<std::uint8_t>(midi_channel_count + (id - 1) % most_note_ids);
+}
+inline constexpr double note_bend_semitones = 48.0;  // of a bend of 1
 
 // A gain for the outputs with odd numbers, which are heard on the left, and one for the even ones.
 using SideGains = std::array<double, 2>;
@@ -27,7 +39,12 @@ using SideGains = std::array<double, 2>;
 // All functions: [audio] wait-free.
 class Channels {
  public:
-  static constexpr std::size_t count = 16;
+  static constexpr std::size_t count = channel_count;
+
+  // `master` is the channel whose messages are for notes with an ID, too.
+  explicit Channels(std::uint8_t master = 0);
+  // What was said to the channels of another instrument, whose master may be another.
+  void adopt(const Channels& from);
 
   // What a controller has changed.
   enum class Change : std::uint8_t { nothing, pitch, level, sustain, sostenuto, zones };
@@ -112,6 +129,7 @@ class Channels {
   Change set_zone(std::uint8_t master, int members);
 
   std::array<Channel, count> channels_;
+  std::uint8_t notes_master_;
   int lower_members_ = 0;  // channels that follow the first; 0: there is no such zone
   int upper_members_ = 0;  // channels before the last
   ChannelMask rezoned_ = 0;

@@ -13,14 +13,15 @@ namespace ressort {
 struct HeldKey {
   std::uint8_t key = 0;
   double velocity = 0.0;
+  double frequency_hz = 0.0;  // 0: the key's own
 };
 
 // All functions: [audio] wait-free, O(keys).
 class HeldKeys {
  public:
-  void press(int key, double velocity) {
+  void press(int key, double velocity, double frequency_hz = 0.0) {
     lift(key);
-    keys_[count_++] = {static_cast<std::uint8_t>(key), velocity};
+    keys_[count_++] = {static_cast<std::uint8_t>(key), velocity, frequency_hz};
   }
   void lift(int key) {
     const auto end = keys_.begin() + static_cast<std::ptrdiff_t>(count_);

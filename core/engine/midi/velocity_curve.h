@@ -2,17 +2,17 @@
 #pragma once
 
 #include <algorithm>
-#include <array>
 #include <cmath>
-#include <cstddef>
 #include <vector>
+
+#include "core/curve.h"
 
 namespace ressort {
 
 // A power of the velocity, or straight lines between points where there are some.
 struct VelocityCurve {
   // Velocities 0..1 and what they become, both ascending.
-  std::vector<std::array<double, 2>> points;
+  std::vector<CurvePoint> points;
   double exponent = 1.0;
 
   // [audio] wait-free, O(points)
@@ -21,16 +21,7 @@ struct VelocityCurve {
     if (points.empty()) {
       return exponent == 1.0 ? velocity : std::pow(v, exponent);
     }
-    std::size_t next = 0;
-    while (next < points.size() && points[next][0] < v) {
-      ++next;
-    }
-    if (next == 0 || next == points.size()) {
-      return points[std::min(next, points.size() - 1)][1];
-    }
-    const auto& a = points[next - 1];
-    const auto& b = points[next];
-    return a[1] + (b[1] - a[1]) * (v - a[0]) / (b[0] - a[0]);
+    return value_at(points, v);
   }
 };
 

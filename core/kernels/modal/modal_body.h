@@ -76,4 +76,12 @@ FeltForce force_felt(const Program& program, const LinearBody& body, std::uint32
 // exact, else those that the published scheme steps. O(links).
 std::optional<LinearBody> linear_body(const Program& program, bool is_exact);
 
+// How many masses the most hang together that linear links tie: the eigenvectors of so many are to
+// be found. Those of a body are known. O(links) [any thread but audio]
+std::uint32_t most_tied_masses(const Program& program);
+
+// [group] masses. What no linear link ties to each other has modes of its own: those of a body are
+// its modes already. O(masses + bars) [any thread but audio]
+std::vector<std::vector<std::uint32_t>> tied_together(const LinearBody& body);
+
 }  // namespace ressort

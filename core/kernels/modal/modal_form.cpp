@@ -4,7 +4,6 @@
 #include <cmath>
 #include <limits>
 #include <map>
-#include <numeric>
 #include <utility>
 
 #include "core/kernels/modal/modal_body.h"
@@ -31,7 +30,6 @@ double make_exact(double& k, double& z) {
   return gain;
 }
 
-constexpr std::uint32_t nowhere = 0xffffffffu;
 constexpr std::size_t most_passive = 32;  // links: each pulls at all others
 constexpr double left_out_share = 0.02;   // of the budget
 class ModesFinder {
@@ -116,7 +114,7 @@ class ModesFinder {
     }
     shape_.assign(count_, Vector(count_));
     std::uint32_t mode = 0;
-    for (const std::vector<std::uint32_t>& masses : tied_together()) {
+    for (const std::vector<std::uint32_t>& masses : tied_together(body_)) {
       const std::size_t size = masses.size();
       progress_.spend(size * size * size / 8);
       Matrix part(size, size);
@@ -132,37 +130,6 @@ class ModesFinder {
         }
       }
     }
-  }
-
-  // Masses that no linear link ties to each other have modes of their own: those of a body are its
-  // modes already.
-  std::vector<std::vector<std::uint32_t>> tied_together() const {
-    std::vector<std::uint32_t> of(count_);
-    std::iota(of.begin(), of.end(), 0u);
-    const auto find = [&](std::uint32_t i) {
-      while (of[i] != i) {
-        i = of[i] = of[of[i]];
-      }
-      return i;
-    };
-    for (const auto* frames : {&stiffness_, &damping_}) {
-      for (const Frame& frame : *frames) {
-        for (const Bar& bar : frame.bars) {
-          for (const MassShare& share : bar.shares) {
-            of[find(share.mass)] = find(bar.shares[0].mass);
-          }
-        }
-      }
-    }
-    std::map<std::uint32_t, std::vector<std::uint32_t>> groups;
-    for (std::uint32_t mass = 0; mass < count_; ++mass) {
-      groups[find(mass)].push_back(mass);
-    }
-    std::vector<std::vector<std::uint32_t>> parts;
-    for (auto& [root, masses] : groups) {
-      parts.push_back(std::move(masses));
-    }
-    return parts;
   }
 
   void add(Matrix& matrix, const Bar& bar) const {
@@ -601,45 +568,6 @@ class ModesFinder {
 };
 
 }  // namespace
-
-std::uint32_t most_tied_masses(const Program& program) {
-  if (program.modes.empty()) {
-    return program.moving;
-  }
-  std::vector<std::uint32_t> of(program.moving);
-  std::iota(of.begin(), of.end(), 0u);
-  const auto find = [&](std::uint32_t i) {
-    while (of[i] != i) {
-      i = of[i] = of[of[i]];
-    }
-    return i;
-  };
-  for (const LinkRun& run : program.link_runs) {
-    for (std::uint32_t i = run.first; run.law == Law::spring && i < run.first + run.count; ++i) {
-      std::uint32_t first = nowhere;
-      const auto tie = [&](std::uint32_t node) {
-        if (node < program.moving) {
-          first = first == nowhere ? node : first;
-          of[find(node)] = find(first);
-        }
-      };
-      for (const std::uint32_t end : {program.ends[i].a, program.ends[i].b}) {
-        tie(end);
-        for (const TapSlot& tap : program.taps) {
-          for (std::uint32_t k = 0; tap.node == end && k < tap.length * tap.width; ++k) {
-            tie(program.tap_nodes[tap.first + k]);
-          }
-        }
-      }
-    }
-  }
-  std::vector<std::uint32_t> count(program.moving);
-  std::uint32_t most = 0;
-  for (std::uint32_t i = 0; i < program.moving; ++i) {
-    most = std::max(most, ++count[find(i)]);
-  }
-  return most;
-}
 
 std::optional<Modes> modal_form(const Program& program, const Budget& budget,
                                 const Progress& progress, bool is_untuned, bool is_exact) {

@@ -15,10 +15,6 @@ namespace ressort {
 inline constexpr std::size_t most_tied_modes = 1200;
 inline constexpr std::size_t most_modes = 4096;
 
-// How many masses the most hang together that linear links tie: the eigenvectors of so many are to
-// be found. Those of a body are known. O(links)
-std::uint32_t most_tied_masses(const Program& program);
-
 // The modal form, where all linear links share their eigenvectors whatever the parameters become;
 // where they do not, but nothing turns them, crossed modes (modal_crossed.h): `is_untuned` says
 // that no key and no bend will. Nothing for what has neither, where parameters turn the masses one

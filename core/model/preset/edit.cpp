@@ -233,9 +233,6 @@ std::string print_preset(const Preset& preset) {
     fixed += (fixed.empty() ? "" : ", ") + in_quotes(label);
   }
   text += fixed.empty() ? "" : "fixed = [" + fixed + "]\n";
-  text += preset.flattening_cents != 0.0
-              ? "flattening_cents = " + in_toml(preset.flattening_cents) + "\n"
-              : "";
   text += preset.transpose != 0 ? "transpose = " + std::to_string(preset.transpose) + "\n" : "";
   if (!preset.parameters.empty()) {
     text += "\n[parameters]\n";

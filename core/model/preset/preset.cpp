@@ -13,44 +13,6 @@
 namespace ressort {
 namespace {
 
-// clang-format off
-constexpr PresetKey keys[] = {
-    {"", "model", "text", "the model's file, `NAME.mdl`, beside the preset or in the folder of the models; needed"},
-    {"", "with", "[\"NAME.mdl\", ...]", "up to 16 more models that are read as one text with it: a guitar's box behind its string, say"},
-    {"", "description", "text", "one line for the person who loads it"},
-    {"", "voices", "1 to 256 (1)", "how many notes sound at once"},
-    {"", "gain", "0 to 1e9 (1)", "output per unit of position; a forte note should peak near -12 dBFS"},
-    {"", "damper_s", "0 to 60 (0)", "T60 of a note once its key is up: in how many seconds a damper takes 60 dB off it; 0 lets it ring out"},
-    {"", "noise", "true or false (false)", "the outputs shape white noise instead of being heard themselves"},
-    {"", "tuning", "`keyboard` or `fixed` (`keyboard`)", "whether a key sets the pitch, or every key sounds the model as it is written"},
-    {"", "fixed", "[\"LABEL\", ...]", "what keys leave as stiff as it is: a guitar's box, whose modes stay where they are while the string follows the key. Labels of bodies, waveguides, macros, oscillators and links"},
-    {"", "flattening_cents", "-100 to 100 (0)", "by how much the sound is flat of its lowest mode, as under a bow, which keys make up for"},
-    {"", "transpose", "-96 to 96 (0)", "semitones between a key and the pitch that it sets"},
-    {"", "a4_hz", "220 to 880 (440)", "the pitch of the A above the middle C, to which all keys are tuned"},
-    {"", "scale", "text", "a Scala file beside the preset, `NAME.scl`: the steps between keys; `tuning = \"fixed\"` has none"},
-    {"", "keyboard_map", "text", "a Scala keyboard map beside the preset, `NAME.kbm`: which key plays which step, and at what pitch"},
-    {"", "channels", "[1, 2, ...] (all)", "the MIDI channels that it listens to"},
-    {"", "velocity", "-1 to 1 (0), or [[0, 0], [64, 90], [127, 127]]", "how loud a touch is: below 0 softer, above 0 louder, the ends as they are; or points, up to 16, and straight lines between them"},
-    {"", "play", "`poly`, `mono` or `legato` (`poly`)", "mono: one voice on each channel plays the last of the keys that are down; legato: and it is not struck again while one is"},
-    {"", "glide_s", "0 to 60 (0)", "how long it takes from one pitch to the next; with legato only where keys overlap"},
-    {"", "motion", "`velocity` or `delayed`", "what the last argument of a mass means, whatever the model says"},
-    {"", "budget", "text", "how exact, as `--budget` takes it: `cents=3 t60=5 silence=-60 passive=auto`"},
-    {"", "parameters", "a table", "the model's parameters by name"},
-    {"", "control", "tables, one for each `[[control]]`", "what plays the model"},
-    {"parameters", "value", "a number", "what the parameter is at first; needed"},
-    {"parameters", "range", "[low, high]", "between what it may be turned; needed"},
-    {"control", "from", "text", "`note`, `pressure`, `cc0` to `cc119`, `audio1` to `audio64`, or an OSC name such as `/finger`; needed"},
-    {"control", "to", "text", "an input, such as `in1`, or a parameter; needed"},
-    {"control", "how", "see below", "without it an input is moved and a parameter is turned"},
-    {"control", "range", "[low, high] ([0, 1])", "what the softest and the loudest become: positions, forces, a parameter's values, or speeds per sample at 44 100 Hz"},
-    {"control", "curve", "`linear` or `exponential` (`linear`)", "exponential: equal steps are equal ratios"},
-    {"control", "travel", "above 0", "of a pluck, which needs it: how far from the string the finger rests, on either side"},
-    {"control", "level_db", "[low, high]", "how loud the softest and the loudest are beside `gain`; exact for plucks, bows and blows, whose sound does not depend on how large it is. Without it the level is what `range` makes of it"},
-    {"control", "length_ms", "[longest, shortest] (one sample)", "of an impulse or a swing: how long the softest and the hardest blow last at the model's own pitch, on higher keys less; the shorter, the brighter"},
-    {"control", "keys", "[low, high] ([0, 127])", "of notes: which keys"},
-};
-// clang-format on
-
 using IsReserved = bool (*)(std::string_view address);
 
 // "position, pluck, bow, impulse, hold or parameter"
@@ -230,33 +192,81 @@ void read_channels(const toml::node& node, TomlTable& reader, Preset& preset) {
   }
 }
 
-// "velocity = [[0, 10], [127, 127]]"
-void read_velocity_points(const toml::array& rows, TomlTable& reader, Preset& preset) {
+// What the points of a curve are made of.
+struct CurveWords {
+  const char* name;
+  const char* example;
+  const char* point;  // what its two numbers are
+  double least[2];
+  double most[2];
+  const char* bounds;
+};
+
+// "velocity = [[0, 10], [127, 127]]": whose first numbers ascend.
+void read_points(const toml::array& rows, TomlTable& reader, const CurveWords& words,
+                 std::vector<CurvePoint>& points) {
   constexpr std::size_t most_points = 16;
-  constexpr double highest = 127.0;
+  const std::string name = std::string("'") + words.name + "'";
   if (rows.size() < 2 || rows.size() > most_points) {
-    reader.fail(rows, "'velocity' has 2 to 16 points: [[0, 0], [127, 127]]");
+    reader.fail(rows, name + " has 2 to 16 points: " + words.example);
     return;
   }
   for (const toml::node& row : rows) {
     const toml::array* const point = row.as_array();
     if (point == nullptr || point->size() != 2 || !(*point)[0].is_number() ||
         !(*point)[1].is_number()) {
-      reader.fail(row, "a point of 'velocity' is two numbers: [velocity, what it becomes]");
+      reader.fail(row, "a point of " + name + " is two numbers: " + words.point);
       return;
     }
-    const std::array<double, 2> read = {*(*point)[0].value<double>() / highest,
-                                        *(*point)[1].value<double>() / highest};
-    if (!(read[0] >= 0.0 && read[0] <= 1.0 && read[1] >= 0.0 && read[1] <= 1.0)) {
-      reader.fail(row, "a velocity lies between 0 and 127");
-      return;
+    const CurvePoint read = {*(*point)[0].value<double>(), *(*point)[1].value<double>()};
+    for (std::size_t i = 0; i < read.size(); ++i) {
+      if (!(read[i] >= words.least[i] && read[i] <= words.most[i])) {
+        reader.fail(row, words.bounds);
+        return;
+      }
     }
-    auto& points = preset.velocity_points;
-    if (!points.empty() && !(read[0] > points.back()[0] && read[1] >= points.back()[1])) {
-      reader.fail(row, "the points of 'velocity' must ascend");
+    if (!points.empty() && !(read[0] > points.back()[0])) {
+      reader.fail(row, "the points of " + name + " must ascend");
       return;
     }
     points.push_back(read);
+  }
+}
+
+void read_velocity_points(const toml::array& rows, TomlTable& reader, Preset& preset) {
+  constexpr double highest = 127.0;
+  std::vector<CurvePoint> points;
+  read_points(rows, reader,
+              {.name = "velocity",
+               .example = "[[0, 0], [127, 127]]",
+               .point = "[velocity, what it becomes]",
+               .least = {0.0, 0.0},
+               .most = {highest, highest},
+               .bounds = "a velocity lies between 0 and 127"},
+              points);
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    if (i > 0 && points[i][1] < points[i - 1][1]) {
+      reader.fail(rows[i], "the points of 'velocity' must ascend");
+      return;
+    }
+    preset.velocity_points.push_back({points[i][0] / highest, points[i][1] / highest});
+  }
+}
+
+void read_flattening(const toml::table& root, TomlTable& reader, Preset& preset) {
+  constexpr double most_cents = 100.0;
+  const char* const name = "flattening_cents";
+  if (const toml::node* node = root.get(name); node != nullptr && node->is_array()) {
+    read_points(*node->as_array(), reader,
+                {.name = name,
+                 .example = "[[48, 8], [96, 6]]",
+                 .point = "[key, cents]",
+                 .least = {0.0, -most_cents},
+                 .most = {127.0, most_cents},
+                 .bounds = "a key lies between 0 and 127, its cents between -100 and 100"},
+                preset.flattening_cents);
+  } else if (double cents = 0.0; reader.number(name, cents, -most_cents, most_cents)) {
+    preset.flattening_cents = {{0.0, cents}};
   }
 }
 
@@ -296,45 +306,28 @@ void read_keys(const toml::table& root, TomlTable& reader, Preset& preset) {
   }
 }
 
-bool is_model_name(const std::string& name) {
+// ["a", "b"]: texts that are as `is_right` says, up to so many.
+void read_texts(std::string_view key, const toml::node& node, TomlTable& reader,
+                std::vector<std::string>& target, std::size_t most, const std::string& what,
+                bool (*is_right)(std::string_view)) {
+  const toml::array* const texts = node.as_array();
+  bool is_alright = texts != nullptr && texts->size() <= most;
+  for (std::size_t i = 0; is_alright && i < texts->size(); ++i) {
+    target.push_back((*texts)[i].value_or(std::string()));
+    is_alright = is_right(target.back());
+  }
+  if (!is_alright) {
+    reader.fail(node, "'" + std::string(key) + "' must be " + what);
+    target.clear();
+  }
+}
+
+bool is_model_name(std::string_view name) {
   constexpr std::size_t longest_path = 4096;
   return name.size() <= longest_path && name.ends_with(".mdl");
 }
-
-// "with = ["Box.mdl"]"
-void read_with(const toml::node& node, TomlTable& reader, Preset& preset) {
-  constexpr std::size_t most = 16;
-  const toml::array* const names = node.as_array();
-  if (names == nullptr || names->size() > most) {
-    reader.fail(node, "'with' must be up to 16 names of .mdl files: [\"Box.mdl\"]");
-    return;
-  }
-  for (const toml::node& name : *names) {
-    const auto text = name.value<std::string>();
-    if (!text || !is_model_name(*text)) {
-      reader.fail(name, "'with' must be names of .mdl files: [\"Box.mdl\"]");
-      return;
-    }
-    preset.with.push_back(*text);
-  }
-}
-
-// "fixed = ["box"]"
-void read_fixed(const toml::node& node, TomlTable& reader, Preset& preset) {
-  constexpr std::size_t most = 1024;
-  const toml::array* const labels = node.as_array();
-  if (labels == nullptr || labels->size() > most) {
-    reader.fail(node, "'fixed' must be labels of the model without '@': [\"box\"]");
-    return;
-  }
-  for (const toml::node& label : *labels) {
-    const auto text = label.value<std::string>();
-    if (!text || text->empty() || text->front() == '@') {
-      reader.fail(label, "'fixed' must be labels of the model without '@': [\"box\"]");
-      return;
-    }
-    preset.fixed.push_back(*text);
-  }
+bool is_label(std::string_view label) {
+  return !label.empty() && label.front() != '@';
 }
 
 void read_root(const toml::table& root, Preset& preset, std::vector<Error>& errors,
@@ -357,10 +350,12 @@ void read_root(const toml::table& root, Preset& preset, std::vector<Error>& erro
     preset.model.clear();
   }
   if (const toml::node* const fixed = root.get("fixed")) {
-    read_fixed(*fixed, reader, preset);
+    read_texts("fixed", *fixed, reader, preset.fixed, 1024,
+               "labels of the model without '@': [\"box\"]", is_label);
   }
   if (const toml::node* const with = root.get("with")) {
-    read_with(*with, reader, preset);
+    read_texts("with", *with, reader, preset.with, 16,
+               "up to 16 names of .mdl files: [\"Box.mdl\"]", is_model_name);
   }
   reader.text("description", preset.description);
   reader.integer("voices", preset.voices, 1, max_voices);
@@ -368,7 +363,8 @@ void read_root(const toml::table& root, Preset& preset, std::vector<Error>& erro
   reader.number("damper_s", preset.damper_s, 0.0, 60.0);
   reader.flag("noise", preset.noise);
   reader.integer("transpose", preset.transpose, -96, 96);
-  reader.number("flattening_cents", preset.flattening_cents, -100.0, 100.0);
+  reader.integer("pitch_mode", preset.pitch_mode, 1, most_pitch_mode);
+  read_flattening(root, reader, preset);
   read_keys(root, reader, preset);
   if (std::string budget; reader.text("budget", budget)) {
     if (const auto parsed = parse_budget(budget)) {
@@ -499,10 +495,6 @@ std::string something_to_strike(const Network& network) {
 }
 
 }  // namespace
-
-std::span<const PresetKey> preset_keys() {
-  return keys;
-}
 
 ParsedPreset parse_preset(std::string_view text, IsReserved is_reserved) {
   ParsedPreset read;

@@ -2,13 +2,13 @@
 // map: which notes, controllers and OSC names drive which input, and how. Names, not indices.
 #pragma once
 
-#include <array>
 #include <optional>
 #include <span>
 #include <string>
 #include <string_view>
 #include <vector>
 
+#include "core/curve.h"
 #include "core/gesture.h"
 #include "core/model/network.h"
 #include "core/model/preset/budget.h"
@@ -57,32 +57,35 @@ struct Preset {
   std::vector<std::string> fixed;       // labels of what keys leave as stiff as it is
   std::string description;              // one line for a person
   int voices = 1;
-  double gain = 1.0;              // output per unit of position
-  double damper_s = 0.0;          // T60 of a voice whose key is up; 0: it rings out
-  bool noise = false;             // the outputs shape white noise
-  bool keyboard = true;           // a key sets the pitch
-  int transpose = 0;              // semitones between a key and the pitch that it sets
-  double flattening_cents = 0.0;  // of the sound below its lowest mode, to be made up for
-  double a4_hz = usual_a4_hz;     // to which everything is tuned
-  std::string scale;              // a Scala file beside the preset; empty: 12 equal semitones
-  std::string keyboard_map;       // which keys play it
+  double gain = 1.0;      // output per unit of position
+  double damper_s = 0.0;  // T60 of a voice whose key is up; 0: it rings out
+  bool noise = false;     // the outputs shape white noise
+  bool keyboard = true;   // a key sets the pitch
+  int transpose = 0;      // semitones between a key and the pitch that it sets
+  int pitch_mode = 1;     // which of its modes a key tunes, from the lowest
+  // Of the sound below that mode, to be made up for: keys and cents, ascending; empty: none.
+  std::vector<CurvePoint> flattening_cents;
+  double a4_hz = usual_a4_hz;  // to which everything is tuned
+  std::string scale;           // a Scala file beside the preset; empty: 12 equal semitones
+  std::string keyboard_map;    // which keys play it
   SourceLocation scale_location;
   SourceLocation keyboard_map_location;
   std::vector<double> keys_hz;  // [key] of both, as whoever reads files has found; empty: without
   unsigned channels = 0xffff;   // MIDI channels that it listens to, the lowest bit is the first
   double velocity = 0.0;        // the curve of keys: -1 soft, 0 as they come, 1 hard
-  std::vector<std::array<double, 2>> velocity_points;  // 0..1 and what that becomes; or the curve
-  bool mono = false;                   // one voice plays the last of the keys that are down
-  bool legato = false;                 // and is not struck again as long as one is
-  double glide_s = 0.0;                // from one pitch to the next
-  std::optional<ThirdArgument> third;  // of the model's masses, whatever the model shows
-  Budget budget;                       // of errors, for who computes it
+  std::vector<CurvePoint> velocity_points;  // 0..1 and what that becomes; or the curve
+  bool mono = false;                        // one voice plays the last of the keys that are down
+  bool legato = false;                      // and is not struck again as long as one is
+  double glide_s = 0.0;                     // from one pitch to the next
+  std::optional<ThirdArgument> third;       // of the model's masses, whatever the model shows
+  Budget budget;                            // of errors, for who computes it
   std::vector<ParameterSetting> parameters;
   std::vector<ControlSetting> controls;
   bool operator==(const Preset&) const = default;
 };
 
 inline constexpr int max_voices = 256;
+inline constexpr int most_pitch_mode = 16;
 inline constexpr std::size_t max_preset_bytes = std::size_t{64} << 10;
 inline constexpr std::size_t most_preset_errors = 100;
 

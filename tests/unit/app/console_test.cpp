@@ -296,8 +296,8 @@ TEST_CASE("explain tells what is computed and what plays it", "[console]") {
   const std::string told = harness.say("explain");
   CHECK(has(told, "tri: three masses, struck\n"));
   CHECK(has(told, describe(harness.session.current()->plan)));
-  CHECK(has(told, "input 1      a force on m_m1\n"));
-  CHECK(has(told, "outputs      1\n"));
+  CHECK(has(told, "input 1     a force on m_m1\n"));
+  CHECK(has(told, "outputs     1\n"));
 }
 
 TEST_CASE("a script runs line by line and stops at the first error", "[console]") {

@@ -264,4 +264,42 @@ TEST_CASE("random bytes in random packets only ever make events in range", "[mid
   CHECK(read(reader, {0xf7, 0x90, 60, 100}).size() == 1);
 }
 
+TEST_CASE("an octave tuning is twelve numbers of cents for all keys", "[midi]") {
+  Bytes one = {0xf0, 0x7f, 0x7f, 0x08, 0x08, 0x03, 0x7f, 0x7f};
+  Bytes two = {0xf0, 0x7e, 0x7f, 0x08, 0x09, 0x03, 0x7f, 0x7f};
+  for (int step = 0; step < 12; ++step) {
+    one.push_back(static_cast<std::uint8_t>(64 - 5 * step));  // C as it is, C# 5 cents flat
+    two.push_back(static_cast<std::uint8_t>(64 + step));      // 100/64 cents each
+    two.push_back(64);                                        // and half of that
+  }
+  one.push_back(0xf7);
+  two.push_back(0xf7);
+  const auto of_one = read(one);
+  const auto of_two = read(two);
+  REQUIRE((of_one.size() == 128 && of_two.size() == 128));
+  for (int key = 0; key < 128; ++key) {
+    CAPTURE(key);
+    const auto cents = [&](const Event& event) {
+      CHECK((event.kind == EventKind::key_tuning && event.index == key));
+      return 1200.0 * std::log2(event.value / 440.0) - 100.0 * (key - 69);
+    };
+    const Event& now = of_one[static_cast<std::size_t>(key)];
+    const Event& later = of_two[static_cast<std::size_t>(key)];
+    CHECK(cents(now) == Approx(-5.0 * (key % 12)).margin(1e-9));
+    CHECK(cents(later) == Approx(100.0 / 64.0 * (key % 12 + 0.5)).margin(1e-9));
+    CHECK((now.value2 == 1.0 && later.value2 == 0.0));
+  }
+  for (Bytes* const whole : {&one, &two}) {
+    MidiReader reader;
+    Bytes less(*whole);
+    less.erase(less.end() - 2);
+    CHECK(read(reader, less).empty());
+    CHECK(reader.malformed() == 1);
+    Bytes more(*whole);
+    more.insert(more.end() - 1, 0);
+    CHECK(read(reader, more).empty());
+    CHECK(reader.malformed() == 2);
+  }
+}
+
 }  // namespace ressort

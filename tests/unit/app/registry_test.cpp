@@ -85,6 +85,23 @@ TEST_CASE("every playing address becomes its event", "[registry]") {
   check(event("/note/on 60"), EventKind::note_on, 60, 100 / 127.0, 0);
   check(event("/note/on 60 127"), EventKind::note_on, 60, 1.0, 0);
   check(event("/note/on 60 0"), EventKind::note_off, 60, 0.5, 0);
+  const auto of_id = [](const std::string& text, EventKind kind, int index, double value, int id,
+                        double hz = 0.0) {
+    const Event said = event(text);
+    check(said, kind, index, value, 0);
+    CHECK(int{said.channel} == (id == 0 ? 0 : 15 + id));
+    CHECK(said.value2 == hz);
+  };
+  of_id("/note/on 60 127 0", EventKind::note_on, 60, 1.0, 0);
+  of_id("/note/on 60 127 16", EventKind::note_on, 60, 1.0, 16);
+  of_id("/note/off 60 127 2", EventKind::note_off, 60, 1.0, 2);
+  of_id("/note/hz 1 450 127", EventKind::note_on, 69, 1.0, 1, 450.0);  // 69.39 is nearest to 69
+  of_id("/note/hz 1 20000 127", EventKind::note_on, 127, 1.0, 1, 20000.0);
+  of_id("/note/hz 4 450 0", EventKind::controller, 123, 0.0, 4);
+  of_id("/note/end 4", EventKind::controller, 123, 0.0, 4);
+  of_id("/note/bend 4 -12", EventKind::bend, 0, -0.25, 4);
+  of_id("/note/pressure 4 127", EventKind::pressure, 0, 1.0, 4);
+  of_id("/note/slide 4 63.5", EventKind::controller, 74, 0.5, 4);
   check(event("/note/off 127"), EventKind::note_off, 127, 0.5, 0);
   check(event("/note/off 127 0"), EventKind::note_off, 127, 0.0, 0);
   check(event("/cc 1 127"), EventKind::controller, 1, 1.0, 0);
@@ -144,7 +161,11 @@ TEST_CASE("what cannot be played is told, and what was expected", "[registry]") 
   check_error("/note/on 128", "/note/on: the key must lie between 0 and 127, found 128");
   check_error("/note/on 60 128", "/note/on: the velocity must lie between 0 and 127, found 128");
   check_error("/note/on sixty", "/note/on: the key must be a number, found 'sixty'");
-  check_error("/note/on 60 100 1", "/note/on: too many arguments: 3, expected 2");
+  check_error("/note/on 60 100 1 1", "/note/on: too many arguments: 4, expected 3");
+  check_error("/note/on 60 100 17", "/note/on: the ID must lie between 0 and 16, found 17");
+  check_error("/note/hz 1 0", "/note/hz: the frequency must lie between 1 and 20000, found 0");
+  check_error("/note/hz 0 440", "/note/hz: the ID must lie between 1 and 16, found 0");
+  check_error("/note/bend 3", "/note/bend: the bend is missing");
   check_error("/note/off", "/note/off: the key is missing");
   check_error("/cc 1", "/cc: the value is missing");
   check_error("/cc 128 1", "/cc: the number must lie between 0 and 127, found 128");
@@ -213,7 +234,7 @@ TEST_CASE("every row is found by its address and can be said somewhere", "[regis
     CAPTURE(why);
     CHECK((row.play != nullptr || why.starts_with("unknown address")));
     CHECK((row.play == nullptr || events || why.find(": input 1 ") != why.npos));
-    least.arguments.resize(3, 0.0);
+    least.arguments.resize(most_arguments + 1, 0.0);
     CHECK_FALSE(to_events(least, instrument(), 9));
   }
   CHECK(find_row("/nowhere").row == nullptr);

@@ -12,6 +12,7 @@ namespace {
 using support::controller;
 using support::note_off;
 using support::note_on;
+using support::peak;
 using support::Player;
 using support::ringing_string;
 using support::struck;
@@ -86,6 +87,39 @@ TEST_CASE("a key that is damped starts anew beside what is left", "[dampers]") {
   again.run(20000,
             {note_on(0, 60), controller(10, 64, 1.0), note_off(2000, 60), note_on(10000, 60)});
   CHECK(again.engine().meters().voices == 1);
+}
+
+TEST_CASE("what a hand has plucked without a key ends with the last of the keys", "[dampers]") {
+  const std::string plucked = scenes::string("s", 10, "0.1", "0.0005") +
+                              "@in1 posInput 0.\n@p nlPluck @in1 @s_m2 0.1 0.01\n" +
+                              scenes::output(1, "s_m6");
+  Preset preset;
+  preset.voices = 3;
+  preset.damper_s = 0.2;
+  preset.controls.push_back({.source = ControlSource::controller,
+                             .number = 1,
+                             .target = "in1",
+                             .gesture = Gesture::position,
+                             .low = 0.0,
+                             .high = 0.1});
+  const auto left = [&](const std::vector<Event>& events) {
+    Player player(plucked, preset);
+    player.run(44100, events);
+    return peak(std::span(player.y()).last(4000)) / peak(std::span(player.y()).first(9000));
+  };
+  // Keys that play nothing themselves: what is heard is the hand's.
+  const Event swept = controller(0, 1, 1.0);
+  const double rings = left({swept});
+  CHECK(rings > 0.1);
+  CHECK(left({swept, note_on(9000, 60)}) == Approx(rings).epsilon(1e-3));
+  CHECK(left({swept, note_on(9000, 60), note_on(9000, 62), note_off(15000, 60)}) ==
+        Approx(rings).epsilon(1e-3));
+  CHECK(left({swept, controller(0, 64, 1.0), note_on(9000, 60), note_off(15000, 60)}) ==
+        Approx(rings).epsilon(1e-3));
+  // 25 100 frames of a T60 of 8820 are 171 dB; at -120 a voice ends.
+  CHECK(left({swept, note_on(9000, 60), note_off(15000, 60)}) < 1e-5);
+  CHECK(left({swept, note_on(9000, 60), note_on(9000, 62), note_off(15000, 60),
+              note_off(15000, 62)}) < 1e-5);
 }
 
 TEST_CASE("a note that is damped away ends", "[dampers]") {

@@ -162,6 +162,35 @@ TEST_CASE("a bowed note draws until the key is released", "[gesture]") {
   CHECK(player.out[0][19999] == player.out[0][19998]);
 }
 
+TEST_CASE("a bow that is bent or glides keeps its speed in units of the string's motion",
+          "[gesture]") {
+  // Slow against the rate: a key's frequency is proportional to sqrt(K) but for w^2 / 24, which is
+  // 3e-4 at the highest.
+  const std::string slow =
+      "@in1 posInput 0.\n@m mass 1. 0. 0.\n@g ground 0.\n@r springDamper @m @g 0.0001 0.\n"
+      "@b nlBow @in1 @m 0.01 0.001\n@out1 posOutput @in1\n";
+  Preset preset = played({.source = ControlSource::note,
+                          .target = "in1",
+                          .gesture = Gesture::bow,
+                          .low = 1e-4,
+                          .high = 1e-4});
+  preset.keyboard = true;
+  preset.mono = preset.legato = true;
+  Player player(slow, preset);
+  const double written_hz = player.compiled.instrument.mode->frequency_hz;
+  // Of the key that is down, whatever else was said, as soon as the 5 ms of its smoothing are over.
+  const auto speed = [&](const std::vector<Event>& events) {
+    player.run(10000, events);
+    return player.y().back() - player.y()[player.y().size() - 2];
+  };
+  const double at_60 = 1e-4 * 440.0 * std::exp2(-9.0 / 12.0) / written_hz;
+  CHECK(speed({note_on(0, 60)}) == Approx(at_60).epsilon(4e-4));
+  const Event up = {.kind = EventKind::bend, .value = 1.0};
+  CHECK(speed({up}) == Approx(at_60 * std::exp2(2.0 / 12.0)).epsilon(4e-4));
+  CHECK(speed({note_on(0, 72)}) == Approx(at_60 * std::exp2(14.0 / 12.0)).epsilon(4e-4));
+  CHECK(speed({note_off(0, 72)}) == Approx(at_60 * std::exp2(2.0 / 12.0)).epsilon(4e-4));
+}
+
 TEST_CASE("controllers, pressure and OSC names move what the preset says, by its curve",
           "[gesture]") {
   Preset preset = played({.source = ControlSource::controller,

@@ -1,6 +1,7 @@
 // MPE 1.0: zones, and notes that have a channel of their own.
 #include "core/engine/midi/channels.h"
 #include "core/engine/voices.h"
+#include "tests/support/pitch.h"
 #include "tests/support/player.h"
 
 namespace ressort {
@@ -93,6 +94,7 @@ std::size_t first_difference(const std::vector<double>& a, const std::vector<dou
 
 TEST_CASE("a zone has its members, and the newer of two that overlap has the channels", "[mpe]") {
   Channels channels;
+  const auto reach = [&](std::uint8_t c) { return channels.reach(c) & midi_channels; };
   const auto masters = [&] {
     std::vector<int> all;
     for (std::uint8_t c = 0; c < 16; ++c) {
@@ -103,29 +105,29 @@ TEST_CASE("a zone has its members, and the newer of two that overlap has the cha
   make_zone(channels, 0, 5);
   make_zone(channels, 15, 3);
   CHECK(masters() == std::vector<int>{0, 0, 0, 0, 0, 0, 6, 7, 8, 9, 10, 11, 15, 15, 15, 15});
-  CHECK(channels.reach(0) == 0x003f);
-  CHECK(channels.reach(15) == 0xf000);
-  CHECK(channels.reach(3) == 0x0008);
-  CHECK(channels.reach(8) == 0x0100);
+  CHECK(reach(0) == 0x003f);
+  CHECK(reach(15) == 0xf000);
+  CHECK(reach(3) == 0x0008);
+  CHECK(reach(8) == 0x0100);
   make_zone(channels, 15, 12);  // leaves two to the lower one
-  CHECK(channels.reach(0) == 0x0007);
-  CHECK(channels.reach(15) == 0xfff8);
+  CHECK(reach(0) == 0x0007);
+  CHECK(reach(15) == 0xfff8);
   make_zone(channels, 0, 14);  // leaves none
-  CHECK(channels.reach(0) == 0x7fff);
-  CHECK(channels.reach(15) == 0x8000);
+  CHECK(reach(0) == 0x7fff);
+  CHECK(reach(15) == 0x8000);
   make_zone(channels, 0, 15);
-  CHECK(channels.reach(0) == 0xffff);
+  CHECK(reach(0) == 0xffff);
   make_zone(channels, 0, 127);
-  CHECK(channels.reach(0) == 0xffff);
+  CHECK(reach(0) == 0xffff);
   make_zone(channels, 15, 15);
-  CHECK(channels.reach(15) == 0xffff);
-  CHECK(channels.reach(0) == 0x0001);
+  CHECK(reach(15) == 0xffff);
+  CHECK(reach(0) == 0x0001);
   make_zone(channels, 7, 3);  // no master's channel
-  CHECK(channels.reach(15) == 0xffff);
-  CHECK(channels.reach(7) == 0x0080);
+  CHECK(reach(15) == 0xffff);
+  CHECK(reach(7) == 0x0080);
   make_zone(channels, 15, 0);
   for (std::uint8_t c = 0; c < 16; ++c) {
-    CHECK(channels.reach(c) == 1U << c);
+    CHECK(reach(c) == 1U << c);
   }
 }
 
@@ -329,6 +331,58 @@ TEST_CASE("a new zone lets the notes of its channels go, and nobody else's", "[m
   alone.run(20000, {other});
   CHECK(apart(player.y(), alone.y(), 4200) < 1e-12);
   CHECK(apart(player.y(), alone.y()) > 1e-3);
+}
+
+TEST_CASE("a note with an ID is bent, pressed and ended alone, and hears its instrument", "[mpe]") {
+  const int first = note_channel(1);
+  const int second = note_channel(2);
+  // As a member of an MPE zone, to the sample.
+  const auto member = zone(0, 7, {on(1, note_on(100, 60)), bend(1, 4000, 0.125)});
+  CHECK(heard({on(first, note_on(100, 60)), bend(first, 4000, 0.125)}) == heard(member));
+  const auto both = [&](std::vector<Event> then) {
+    std::vector<Event> events = {on(first, note_on(0, 60)), on(second, note_on(0, 67))};
+    events.insert(events.end(), then.begin(), then.end());
+    return ends(events);
+  };
+  CHECK(both({})[0] == Approx(0.0).margin(1e-9));
+  CHECK(both({pressed(first, 100, 0.5)})[0] == Approx(0.5));
+  CHECK(both({pressed(second, 100, 0.25), pressed(first, 100, 0.5)})[0] == Approx(0.75));
+  CHECK(both({turned(second, 100, 74, 127)})[1] == Approx(1.0));
+  // The instrument's channel is for all of them.
+  CHECK(both({pressed(0, 100, 0.5)})[0] == Approx(1.0));
+  CHECK(heard({on(first, note_on(0, 60)), turned(0, 3000, 7, 0)}) ==
+        heard({note_on(0, 60), turned(0, 3000, 7, 0)}));
+  // The other plays on.
+  CHECK(heard({on(first, note_on(0, 60)), turned(second, 3000, 123, 0)}) ==
+        heard({on(first, note_on(0, 60))}));
+  // What a zone is told is not for notes with an ID.
+  Channels channels;
+  make_zone(channels, 0, 15);
+  channels.bend(static_cast<std::uint8_t>(first), 0.25);
+  channels.turn(3, 101, 0.0);
+  channels.turn(3, 100, 0.0);
+  channels.turn(3, 6, 12.0 / 127.0);
+  CHECK(channels.semitones(static_cast<std::uint8_t>(first)) == 12.0);
+}
+
+TEST_CASE("a note has the frequency that it says, and no retuned key moves it", "[mpe]") {
+  constexpr double rate_hz = 44100.0;
+  Preset preset = struck(2);
+  preset.transpose = -12;
+  for (const double hz : {100.0, 261.3, 777.7}) {
+    Event note = on(note_channel(3), note_on(0, 60));
+    note.value2 = hz;
+    Player player(ringing_string(), preset);
+    player.run(
+        60000,
+        {note,
+         {.frame = 9000, .kind = EventKind::key_tuning, .index = 60, .value = 300.0, .value2 = 1.0},
+         {.frame = 9500, .kind = EventKind::tuning_reset}});
+    const double found =
+        measured_hz(std::span<const double>(player.y()).subspan(10000), rate_hz, hz);
+    CAPTURE(hz);
+    CHECK(1200.0 * std::log2(found / hz) == Approx(0.0).margin(0.02));
+  }
 }
 
 }  // namespace ressort

@@ -329,4 +329,40 @@ TEST_CASE("a velocity curve bends the touch and keeps its ends", "[play_modes]")
   CHECK(loudness(0.0, 1.0, points) == Approx(0.8 * full));
 }
 
+TEST_CASE("a preset names the mode that is its pitch", "[play]") {
+  for (const int number : {1, 2, 3, 5, 8}) {
+    Preset preset = struck(1);
+    preset.pitch_mode = number;
+    Player player(ringing_string(), preset);
+    player.run(60000, {note_on(0, 69)});
+    // Of eleven equal springs: mode n at 2 sqrt(K) sin(n pi / 22).
+    const double shape = std::sin(number * std::numbers::pi / 22.0);
+    const double first_hz = 440.0 * std::sin(std::numbers::pi / 22.0) / shape;
+    const std::span<const double> late = std::span(player.y()).subspan(4000);
+    CAPTURE(number);
+    CHECK(1200.0 * std::log2(measured_hz(late, rate_hz, first_hz) / first_hz) ==
+          Approx(0.0).margin(1.0));  // the scheme's own dispersion between both
+    if (number != 8) {               // which is over by then
+      CHECK(1200.0 * std::log2(measured_hz(late, rate_hz, 440.0) / 440.0) ==
+            Approx(0.0).margin(0.05));
+    }
+  }
+}
+
+TEST_CASE("what a sound is flat of its mode is made up for by points of keys", "[play]") {
+  Preset preset = struck(1);
+  preset.transpose = -12;
+  preset.flattening_cents = {{60.0, 10.0}, {72.0, 40.0}};
+  for (const auto& [key, cents] :
+       {std::pair(48, 10.0), {60, 10.0}, {64, 20.0}, {69, 32.5}, {72, 40.0}, {84, 40.0}}) {
+    Player player(ringing_string(), preset);
+    player.run(60000, {note_on(0, key)});
+    const double wanted_hz = 440.0 * std::exp2((key - 81) / 12.0 + cents / 1200.0);
+    const std::span<const double> late = std::span(player.y()).subspan(10000);
+    CAPTURE(key);
+    CHECK(1200.0 * std::log2(measured_hz(late, rate_hz, wanted_hz) / wanted_hz) ==
+          Approx(0.0).margin(0.02));
+  }
+}
+
 }  // namespace ressort

@@ -114,15 +114,38 @@ TEST_CASE("a preset says how its keys are tuned and played", "[preset]") {
   const auto points =
       parse_preset("model = \"x.mdl\"\nvelocity = [[0, 0], [63.5, 127]]\nplay = \"mono\"\n");
   REQUIRE(points.ok());
-  CHECK(points.preset.velocity_points ==
-        std::vector<std::array<double, 2>>{{0.0, 0.0}, {0.5, 1.0}});
+  CHECK(points.preset.velocity_points == std::vector<CurvePoint>{{0.0, 0.0}, {0.5, 1.0}});
   CHECK((points.preset.mono && !points.preset.legato));
-  for (const char* const wrong :
-       {"a4_hz = 100", "scale = \"a.kbm\"", "scale = \"b/a.scl\"", "keyboard_map = 3",
-        "channels = []", "channels = [0]", "channels = [17]", "channels = [1.5]", "channels = 1",
-        "velocity = 2", "velocity = [[0, 0]]", "velocity = [[0, 0], [0, 1]]",
-        "velocity = [[0, 1], [127, 0]]", "velocity = [[0, 0], [128, 1]]", "velocity = [0, 1]",
-        "velocity = [[0, 0], [true, 1]]", "play = \"solo\"", "glide_s = -1"}) {
+  CHECK(parse_preset("model = \"x.mdl\"\nflattening_cents = [[48, 8], [96, -6.5]]\n")
+            .preset.flattening_cents == std::vector<CurvePoint>{{48.0, 8.0}, {96.0, -6.5}});
+  CHECK(parse_preset("model = \"x.mdl\"\nflattening_cents = 4\n").preset.flattening_cents ==
+        std::vector<CurvePoint>{{0.0, 4.0}});
+  for (const char* const wrong : {"a4_hz = 100",
+                                  "scale = \"a.kbm\"",
+                                  "scale = \"b/a.scl\"",
+                                  "keyboard_map = 3",
+                                  "channels = []",
+                                  "channels = [0]",
+                                  "channels = [17]",
+                                  "channels = [1.5]",
+                                  "channels = 1",
+                                  "flattening_cents = 101",
+                                  "pitch_mode = 0",
+                                  "pitch_mode = 17",
+                                  "pitch_mode = 1.5",
+                                  "flattening_cents = [[0, 1]]",
+                                  "flattening_cents = [[9, 1], [9, 1]]",
+                                  "flattening_cents = [[0, 1], [1, 101]]",
+                                  "flattening_cents = [[0, 1], [1]]",
+                                  "velocity = 2",
+                                  "velocity = [[0, 0]]",
+                                  "velocity = [[0, 0], [0, 1]]",
+                                  "velocity = [[0, 1], [127, 0]]",
+                                  "velocity = [[0, 0], [128, 1]]",
+                                  "velocity = [0, 1]",
+                                  "velocity = [[0, 0], [true, 1]]",
+                                  "play = \"solo\"",
+                                  "glide_s = -1"}) {
     CAPTURE(wrong);
     const auto read_wrong = parse_preset("model = \"x.mdl\"\n" + std::string(wrong) + "\n");
     REQUIRE(read_wrong.errors.size() == 1);

@@ -1,0 +1,85 @@
+#include "app/control/note_events.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/engine/midi/channels.h"
+
+namespace ressort {
+namespace {
+
+// OSC's floats up to 1 are shares of the loudest; whole numbers, and what is typed, are MIDI's.
+double velocity_of(const Said& said, std::size_t argument) {
+  const std::string& types = said.message.types;
+  const double velocity = said.arguments[argument];
+  const bool is_share = types.size() > argument &&
+                        (types[argument] == 'f' || types[argument] == 'd') && velocity <= 1.0;
+  return is_share ? velocity : velocity / 127.0;
+}
+
+// On the channel of the ID that is this argument; of 0 on that of the instrument.
+Events on_channel(const Said& said, std::size_t id_argument, Event event) {
+  const unsigned id = said.whole(id_argument);
+  event.channel = id == 0 ? said.instrument.channel : note_channel(id);
+  return std::vector{event};
+}
+
+Events by_key(const Said& said, bool starts) {
+  const double velocity = velocity_of(said, 1);
+  const bool is_on = starts && velocity > 0.0;
+  return on_channel(said, 2,
+                    {.kind = is_on ? EventKind::note_on : EventKind::note_off,
+                     .index = said.whole(0),
+                     .value = is_on || !starts ? velocity : usual_release_velocity});
+}
+
+}  // namespace
+
+Events events::note_on(const Said& said) {
+  return by_key(said, true);
+}
+
+Events events::note_off(const Said& said) {
+  return by_key(said, false);
+}
+
+// What sounds has this frequency, however keys are transposed and tuned; the nearest key says which
+// controls play it.
+Events events::note_hz(const Said& said) {
+  constexpr double highest_key = 127.0;
+  const double velocity = velocity_of(said, 2);
+  if (velocity <= 0.0) {
+    return note_end(said);
+  }
+  const double hz = said.arguments[1];
+  const double key = 69.0 + 12.0 * std::log2(hz / usual_a4_hz) - said.instrument.transpose;
+  return on_channel(
+      said, 0,
+      {.kind = EventKind::note_on,
+       .index = static_cast<std::uint16_t>(std::lround(std::clamp(key, 0.0, highest_key))),
+       .value = velocity,
+       .value2 = hz});
+}
+
+// By the controller that ends all notes of a channel: that of an ID has no others.
+Events events::note_end(const Said& said) {
+  constexpr std::uint16_t all_notes_off = 123;
+  return on_channel(said, 0, {.kind = EventKind::controller, .index = all_notes_off});
+}
+
+Events events::note_bend(const Said& said) {
+  return on_channel(said, 0,
+                    {.kind = EventKind::bend, .value = said.arguments[1] / note_bend_semitones});
+}
+
+Events events::note_pressure(const Said& said) {
+  return on_channel(said, 0, {.kind = EventKind::pressure, .value = said.arguments[1] / 127.0});
+}
+
+Events events::note_slide(const Said& said) {
+  constexpr std::uint16_t slide = 74;
+  return on_channel(
+      said, 0, {.kind = EventKind::controller, .index = slide, .value = said.arguments[1] / 127.0});
+}
+
+}  // namespace ressort
