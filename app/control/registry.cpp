@@ -451,11 +451,11 @@ std::optional<std::string> read_arguments(const Row& row, const Message& message
       values[count++] = *wanted.otherwise;
       continue;
     }
-    const Argument& argument = message.arguments[count];
-    const double* const value = std::get_if<double>(&argument);
+    const double* const value = std::get_if<double>(&message.arguments[count]);
     if (value == nullptr || !std::isfinite(*value)) {
       return meaning + " must be a number" +
-             (value == nullptr ? ", found '" + std::get<std::string>(argument) + "'" : "");
+             (value == nullptr ? ", found '" + std::get<std::string>(message.arguments[count]) + "'"
+                               : "");
     }
     if (*value < wanted.least || *value > wanted.most) {
       return meaning + " must lie between " + print_number(wanted.least) + " and " +
@@ -591,8 +591,8 @@ std::string describe_limit(const Message& message, const Event& event,
   }
   const double* const wanted = std::get_if<double>(message.arguments.data());
   const ParameterInfo& info = instrument.parameters[event.index];
-  return wanted != nullptr && ((event.value < *wanted && info.is_lowered) ||
-                               (event.value > *wanted && info.is_raised))
+  const bool is_changed = wanted != nullptr && event.value != *wanted;
+  return is_changed && (event.value < *wanted ? info.is_lowered : info.is_raised)
              ? info.name + ": " + print_number(*wanted) + " is beyond what is stable, set to " +
                    print_number(event.value)
              : "";

@@ -9,8 +9,8 @@
 #include "app/session/modes/known_modes.h"
 #include "app/text.h"
 #include "core/analysis/modes/body.h"
-#include "core/model/language/expression.h"
 #include "core/model/language/print.h"
+#include "core/model/language/tokens.h"
 
 namespace ressort {
 namespace {
@@ -85,7 +85,7 @@ int network_body(const NetworkBodyOptions& options) {
   }
   if (options.output.empty()) {
     std::fputs(text.c_str(), stdout);
-    return std::fflush(stdout) == 0 ? exit_code::done : exit_code::failed;
+    return std::fflush(stdout) == 0 ? exit_code::done : exit_code::our_failure;
   }
   if (const int code = put_text(options.output, text, options.force); code != exit_code::done) {
     return code;
