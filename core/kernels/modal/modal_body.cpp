@@ -68,7 +68,7 @@ class BodyMaker {
     body_.is_live.assign(program_.coefficients.size(), false);
     for (const auto& depending : program_.depending) {
       for (const std::uint32_t c : depending) {
-        body_.is_live[c] = true;
+        body_.is_live[c] = !is_exact_ || has_parameter(program_.coefficients[c]);
       }
     }
     for (const Coefficient& coefficient : program_.coefficients) {
@@ -81,6 +81,14 @@ class BodyMaker {
         body_.input[program_.inputs[i].node] = i;
       }
     }
+  }
+
+  // What is sampled of a body's mode depends on all of its numbers, what is continuous on its own:
+  // a T60 that turns leaves the mass alone.
+  bool has_parameter(const Coefficient& coefficient) const {
+    const auto first = program_.steps.begin() + coefficient.first;
+    return std::any_of(first, first + coefficient.count,
+                       [](const Step& step) { return step.op == Op::parameter; });
   }
 
   std::size_t first_place() const {
