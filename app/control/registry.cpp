@@ -463,11 +463,10 @@ std::optional<std::string> read_arguments(const Row& row, const Message& message
     }
     values[count++] = *value;
   }
-  if (count < message.arguments.size()) {
-    return "too many arguments: " + std::to_string(message.arguments.size()) + ", expected " +
-           std::to_string(count);
-  }
-  return std::nullopt;
+  const std::size_t said = message.arguments.size();
+  return count == said ? std::nullopt
+                       : std::optional("too many arguments: " + std::to_string(said) +
+                                       ", expected " + std::to_string(count));
 }
 
 }  // namespace

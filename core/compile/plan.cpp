@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/compile/accuracy/springs.h"
 #include "core/kernels/direct/fourth_form.h"
 #include "core/kernels/domains/shards.h"
 #include "core/kernels/modal/modal_body.h"
@@ -84,8 +85,9 @@ class Chooser {
   std::optional<Part> reach(Judge* judge, const Accuracy& spent) {
     spent_ = spent;
     judge_ = judge;
-    if (eigenvectors_of_ <= most_modes_) {
-      consider(Method::modal);
+    if (eigenvectors_of_ <= most_modes_ && !contains_bent_springs(program_)) {
+      consider(
+          Method::modal);  // of a spring that bends the straight part is no mode: it has a limit
     }
     may_gain_ = eigenvectors_of_ > most_modes_ && eigenvectors_of_ <= patient_modes;
     const std::uint32_t times = steps_to_reach();
