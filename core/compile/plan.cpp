@@ -85,9 +85,9 @@ class Chooser {
   std::optional<Part> reach(Judge* judge, const Accuracy& spent) {
     spent_ = spent;
     judge_ = judge;
+    // Of a spring that bends the straight part is no mode, and bears no more than as published.
     if (eigenvectors_of_ <= most_modes_ && !contains_bent_springs(program_)) {
-      consider(
-          Method::modal);  // of a spring that bends the straight part is no mode: it has a limit
+      consider(Method::modal);
     }
     may_gain_ = eigenvectors_of_ > most_modes_ && eigenvectors_of_ <= patient_modes;
     const std::uint32_t times = steps_to_reach();
