@@ -1,4 +1,5 @@
 // A model's own modes as a body, or as a chain.
+#include <algorithm>
 #include <cstdio>
 
 #include "app/commands/body/body.h"
@@ -31,6 +32,37 @@ std::string ports_of(const PlacedModes& body) {
   return text;
 }
 
+// A place of a body, or an input or output as `placed_modes` calls it: there the model gets an
+// input that it need not have. Its name among the places.
+std::string listen_at(Network& network, const std::string& place) {
+  for (std::uint32_t i = 0; i < network.macros.size(); ++i) {
+    const std::vector<std::string>& places = network.macros[i].places;
+    const auto found = std::find(places.begin(), places.end(), place);
+    if (found == places.end()) {
+      continue;
+    }
+    const double last = static_cast<double>(std::max<std::size_t>(places.size(), 2) - 1);
+    const auto u = static_cast<ArgumentId>(network.arguments.size());
+    network.arguments.push_back(
+        {{Op::number, 0, static_cast<double>(found - places.begin()) / last}});
+    const auto mass = static_cast<std::uint32_t>(network.masses.size());
+    network.masses.push_back(
+        {.kind = MassKind::point, .tap = static_cast<std::uint32_t>(network.taps.size())});
+    network.taps.push_back({.macro = i, .u = u});
+    const int number = input_count(network) + 1;
+    network.inputs.push_back({.number = number, .is_force = true, .mass = mass});
+    return "in" + std::to_string(number);
+  }
+  return place;
+}
+
+// The first mass of a chain is struck and heard.
+std::string ports_of(const ModalChain& chain) {
+  const auto first = std::find_if(chain.network.masses.begin(), chain.network.masses.end(), moves);
+  const std::string name = first->name.text();
+  return "@in1 frcInput @" + name + "\n@out1 posOutput @" + name + "\n";
+}
+
 }  // namespace
 
 int network_body(const NetworkBodyOptions& options) {
@@ -48,6 +80,7 @@ int network_body(const NetworkBodyOptions& options) {
   if (auto spared = spare(options.output, read); !spared) {
     return refuse(spared.error().message);
   }
+  const std::string place = options.chain.empty() ? "" : listen_at(scene->network, options.chain);
   const auto modes = find_modes(scene->network, start_values(*scene),
                                 {.count = options.modes, .progress = progress});
   if (!modes) {
@@ -67,13 +100,13 @@ int network_body(const NetworkBodyOptions& options) {
                      " as the published scheme plays them, at its "
                      "inputs and outputs.\n";
   if (!options.chain.empty()) {
-    const auto chain = chain_of(body, options.chain);
+    const auto chain = chain_of(body, place);
     if (!chain) {
       return refuse(options.input + ": " + chain.error().message);
     }
     text = "# A chain that answers as " + scene->name + " does at " + options.chain +
            "; a decay is off by at most " + fixed(chain->worst_t60_percent, 2) + " %.\n" +
-           print_network(chain->network);
+           print_network(chain->network) + ports_of(*chain);
   } else {
     if (body.left_out > 1e-3) {
       std::fprintf(stderr,
