@@ -70,6 +70,34 @@ TEST_CASE("a mode has its frequency and its T60 at every rate", "[bodies]") {
   }
 }
 
+TEST_CASE("a T60 that is turned is a mode's own, by exact modes and at any pitch", "[bodies]") {
+  // two modes, the second of which lasts `ring` times half a second: from 0.5 s at first to 1.5 s;
+  // K = M (w^2 + s^2), s = ln 1000/T60, so a factor of 9 of it is some three times the frequency
+  const std::string text =
+      "@ring param 1.\n@b body 2. p q\n@b1 mode @b 400. 2. 1. 0.\n"
+      "@b2 mode @b 1100. 0.5*ring 0. 1.\n@in1 frcInput [@b q]\n@out1 posOutput [@b q]\n";
+  Program program = make_program(network_of(text), 48000.0, true);
+  const auto modes = modal_form(program, {}, {}, false, true);
+  REQUIRE(modes);
+  program.form = *modes;
+  for (const double factor : {1.0, 9.0}) {
+    for (const double ring : {1.0, 3.0}) {
+      INFO("ring " << ring << ", stiffness times " << factor);
+      Bare<double> bare(program);
+      bare.set_coefficients(0, {ring}, factor, false);
+      std::vector<double> sound;
+      for (std::size_t n = 0; n < 8000; ++n) {
+        sound.push_back(bare.step({n == 0 ? 1.0 : 0.0})[0]);
+      }
+      const std::complex<double> pole = pole_of(sound, 4);
+      const double s = std::log(1000.0) / (0.5 * ring) / (2.0 * pi);
+      CHECK(std::fabs(std::arg(pole)) * 48000.0 / (2.0 * pi) ==
+            Approx(std::sqrt(factor * (1100.0 * 1100.0 + s * s) - s * s)).epsilon(1e-9));
+      CHECK(std::abs(pole) == Approx(std::pow(10.0, -3.0 / (48000.0 * 0.5 * ring))).epsilon(1e-9));
+    }
+  }
+}
+
 TEST_CASE("a mode's first sample is what its weights make of a push", "[bodies]") {
   // a push of 1 at a place of weight 0.5 moves a mode of mass 4 by 0.5/4, and a place of -2 by -2
   // times that
