@@ -90,9 +90,9 @@ TEST_CASE("what is wrong about a body is told", "[body]") {
               "mean 'rim'?");
   check_error(bell + "@out2 posOutput [@bell]\n", 5, 17,
               "'@bell' is a body: a place on it needs its name, [@bell rim]");
-  check_error(
-      "@k param 2.\n@r spring @g @g k\n@g ground 0.\n" + bell + "@b3 mode @bell 100. 1. k 1. 1.\n",
-      8, 24, "found 'k' where a displacement, a number without parameters, was expected");
+  check_error("@k param 2.\n@r spring @g [@bell rim] k\n@g ground 0.\n" + bell +
+                  "@b3 mode @bell 100. 1. k 1. 1.\n",
+              8, 24, "found 'k' where a displacement, a number without parameters, was expected");
   check_error("@b body 1. x x\n@b1 mode @b 1. 1. 1. 1.\n@out1 posOutput [@b x]\n", 1, 14,
               "the body has two places called 'x'");
   check_error("@b body 1. 2x\n@b1 mode @b 1. 1. 1.\n@out1 posOutput [@b 0]\n", 1, 12,
