@@ -329,7 +329,7 @@ TEST_CASE("a velocity curve bends the touch and keeps its ends", "[play_modes]")
   CHECK(loudness(0.0, 1.0, points) == Approx(0.8 * full));
 }
 
-TEST_CASE("a preset names the mode that is its pitch", "[play]") {
+TEST_CASE("a preset names the mode that is its pitch", "[play_modes]") {
   for (const int number : {1, 2, 3, 5, 8}) {
     Preset preset = struck(1);
     preset.pitch_mode = number;
@@ -349,7 +349,7 @@ TEST_CASE("a preset names the mode that is its pitch", "[play]") {
   }
 }
 
-TEST_CASE("what a sound is flat of its mode is made up for by points of keys", "[play]") {
+TEST_CASE("what a sound is flat of its mode is made up for by points of keys", "[play_modes]") {
   Preset preset = struck(1);
   preset.transpose = -12;
   preset.flattening_cents = {{60.0, 10.0}, {72.0, 40.0}};
