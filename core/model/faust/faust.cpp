@@ -424,6 +424,24 @@ class Writer {
     return text;
   }
 
+  // What of a push at one mass or place is felt at another: terms of a sum.
+  std::string felt(std::uint32_t pushed, std::uint32_t at, const std::string& input) const {
+    if (pushed == at && network_.masses[at].kind != MassKind::point) {
+      return " + " + input;
+    }
+    const auto behind = [&](std::uint32_t mass) {
+      return network_.masses[mass].kind == MassKind::point ? shares(mass)
+                                                           : std::vector<Share>{{mass, ""}};
+    };
+    std::string terms;
+    for (const Share& from : behind(pushed)) {
+      for (const Share& to : behind(at)) {
+        terms += from.node == to.node ? " + " + from.factor + to.factor + input : "";
+      }
+    }
+    return terms;
+  }
+
   Words outputs() const {
     Words words(static_cast<std::size_t>(output_count(network_)), "0.0");
     for (const Output& output : network_.outputs) {
@@ -434,8 +452,10 @@ class Writer {
         const bool is_point = network_.masses[output.mass].kind == MassKind::point;
         word =
             (is_point ? "(" + interpolated(output.mass, "F_") + ")" : "F_" + name) + "/push(1.0)";
-        for (const std::string& input : pushes_[output.mass]) {
-          word += " + " + input;
+        for (std::uint32_t pushed = 0; pushed < pushes_.size(); ++pushed) {
+          for (const std::string& input : pushes_[pushed]) {
+            word += felt(pushed, output.mass, input);
+          }
         }
       }
     }
