@@ -259,7 +259,8 @@ TEST_CASE("the modes of 208 networks are those of their sound", "[.][modes_every
 TEST_CASE("a hand that moves and a force that is heard have their levels, too", "[modes]") {
   const std::string text =
       "@in1 posInput 0.\n@g ground 0.\n@m0 mass 1. 0. 0.\n@m1 osc 2. 0.01 0.0003 0. 0.\n"
-      "@m2 mass 1.5 0. 0.\n@a springDamper @in1 @m0 0.05 0.002\n@b springDamper @m0 @m1 0.1 0.0002\n"
+      "@m2 mass 1.5 0. 0.\n@a springDamper @in1 @m0 0.05 0.002\n@b springDamper @m0 @m1 0.1 "
+      "0.0002\n"
       "@c springDamper @m1 @m2 0.07 0.001\n@d springDamper @m2 @g 0.02 0.003\n"
       "@in2 frcInput @m1\n@out1 posOutput @m2\n@out2 frcOutput @m0\n"
       "@out3 frcOutput @g\n@out4 frcOutput @in1\n";

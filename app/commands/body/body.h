@@ -1,5 +1,5 @@
-// app/commands: makes a body, a thing that can be struck, of what a file holds: a recording, a solid,
-// or another model. The exit code comes back.
+// app/commands: makes a body, a thing that can be struck, of what a file holds: a recording, a
+// solid, or another model. The exit code comes back.
 #pragma once
 
 #include <cstddef>

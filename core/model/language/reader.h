@@ -1,4 +1,5 @@
-// core/model: the reader behind parse_network, for mdl.cpp, elements.cpp, macros.cpp and motion.cpp only.
+// core/model: the reader behind parse_network, for mdl.cpp, elements.cpp, macros.cpp and motion.cpp
+// only.
 #pragma once
 
 #include <cstdint>

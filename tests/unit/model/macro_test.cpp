@@ -278,8 +278,7 @@ TEST_CASE("a place behind the arguments is taken off before they are counted", "
   CHECK(coordinate(tapped("@l spring [@s p + 0.1] @a 1"), 0) == std::pair(0.35, 0.0));
   CHECK(coordinate(tapped("@l spring [ @s  0.5 ] @a 1"), 0) == std::pair(0.5, 0.0));
 
-  const std::string one =
-      " is a chain: a place on it needs one coordinate, [@s u], from 0 to 1";
+  const std::string one = " is a chain: a place on it needs one coordinate, [@s u], from 0 to 1";
   const std::string two =
       " is a mesh: a place on it needs two coordinates, [@m u v], each from 0 to 1";
   check_error(macros + "@l spring @a @s 1", 6, 16,
