@@ -107,8 +107,8 @@ std::string shapes_picture(const SolidMesh& mesh, const SolidModes& modes,
       moved[i] = mesh.points[i] - middle + bend * size / most * moved[i];
     }
     const double x0 = cell * (static_cast<double>(k % columns) + 0.5);
-    const double y0 =
-        34.0 + static_cast<double>(k / columns) * (cell_height + caption) + 0.5 * cell_height;
+    const auto row = k / columns;
+    const double y0 = 34.0 + static_cast<double>(row) * (cell_height + caption) + 0.5 * cell_height;
     const auto on_paper = [&](const Point3& point) {
       return std::array<double, 2>{x0 + scale * inner(view.right, point),
                                    y0 - scale * inner(view.up, point)};

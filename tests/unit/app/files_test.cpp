@@ -16,6 +16,7 @@
 #include <sstream>
 #include <thread>
 
+#include "app/session/loader.h"
 #include "app/session/sound_file.h"
 #include "tests/support/catch.h"
 #include "tests/support/data_folder.h"
@@ -318,6 +319,27 @@ TEST_CASE("a sound is read from an ordinary file", "[files]") {
   CHECK(has(error_of(SoundReader::open(folder.file("none.wav"))), "there is no file"));
   CHECK(has(error_of(SoundReader::open(folder.file(""))), "is no ordinary file"));
   CHECK(has(error_of(SoundReader::open(folder.write("text.wav", "no sound"))), "is no sound file"));
+}
+
+TEST_CASE("a preset reads several models as one, and says in which a mistake is", "[files]") {
+  const Folder folder;
+  const std::string box = "@box body 40. bridge\n@box_1 mode @box 100. 0.5 1.\n";
+  folder.write("string.mdl",
+               "# a string\n@s string 8 1. 0.1 0.001 0. 0.\n@in1 frcInput [@s 0.3]\n");
+  folder.write("box.mdl",
+               box + "@tie spring [@s 0.9] [@box bridge] 0.05\n@out1 posOutput [@box bridge]");
+  const std::string preset =
+      folder.write("both.toml", "model = \"string.mdl\"\nwith = [\"box.mdl\"]\n");
+  const auto scene = load_scene(preset, {});
+  REQUIRE(scene);
+  CHECK(scene->network.macros.size() == 2);
+  CHECK(scene->network.links.size() == 1);
+  folder.write("box.mdl", box + "@tie spring [@s 0.9] [@box brigde] 0.05\n");
+  const auto broken = load_scene(preset, {});
+  CHECK(has(error_of(broken), "box.mdl:3:25: error: the body '@box' has no place called 'brigde'"));
+  const std::string missing =
+      folder.write("missing.toml", "model = \"string.mdl\"\nwith = [\"bix.mdl\"]\n");
+  CHECK(has(error_of(load_scene(missing, {})), "the model 'bix.mdl' is neither beside"));
 }
 
 }  // namespace ressort
