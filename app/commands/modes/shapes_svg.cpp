@@ -55,8 +55,9 @@ class PanelDrawer {
     const double height = panel_height - caption - 2.0 * margin;
     const double scale =
         std::min(width / std::max(1.0, right_ - left_), height / std::max(1.0, high_ - low_));
+    const std::size_t too_many = dots_ / most_dots;
     const std::size_t every =
-        1 + static_cast<std::size_t>(std::sqrt(static_cast<double>(dots_ / most_dots)));
+        1 + static_cast<std::size_t>(std::sqrt(static_cast<double>(too_many)));
     const double area = width * height / static_cast<double>(std::min(dots_, most_dots));
     const double largest = std::clamp(0.6 * std::sqrt(area), 2.0, 9.0);
     std::string svg;
@@ -157,7 +158,8 @@ std::string shapes_svg(const NetworkModes& modes, const Network& network,
           modes.displacement(m, static_cast<std::uint32_t>(row));
     }
     const double x = panel_width * static_cast<double>(m % columns);
-    const double y = head + panel_height * static_cast<double>(m / columns);
+    const std::size_t row_of_panels = m / columns;
+    const double y = head + panel_height * static_cast<double>(row_of_panels);
     svg += "<g transform='translate(" + number(x) + " " + number(y) +
            ")'>\n<rect class='frame' x='4' "
            "y='2' width='" +

@@ -336,7 +336,7 @@ TEST_CASE("a preset reads several models as one, and says in which a mistake is"
   CHECK(scene->network.links.size() == 1);
   folder.write("box.mdl", box + "@tie spring [@s 0.9] [@box brigde] 0.05\n");
   const auto broken = load_scene(preset, {});
-  CHECK(has(error_of(broken), "box.mdl:3:25: error: the body '@box' has no place called 'brigde'"));
+  CHECK(has(error_of(broken), "box.mdl:3:28: error: the body '@box' has no place called 'brigde'"));
   const std::string missing =
       folder.write("missing.toml", "model = \"string.mdl\"\nwith = [\"bix.mdl\"]\n");
   CHECK(has(error_of(load_scene(missing, {})), "the model 'bix.mdl' is neither beside"));
