@@ -51,7 +51,7 @@ expect 2 "at most 32 MiB" "$program" check large.mdl
 
 # Recordings.
 expect 2 "there is no file 'nosuch.wav'" "$program" body nosuch.wav
-expect 2 "'binary.mdl': bodies are made of recordings" "$program" body binary.mdl
+expect 2 'found a zero byte' "$program" body binary.mdl
 model text.wav 'no sound at all'
 expect 2 "'text.wav' is no sound file that can be read" "$program" body text.wav
 printf '0 /note/on 60 100\n' > blow.txt
