@@ -26,7 +26,7 @@ std::string in_bytes(std::uint64_t bytes) {
 std::uint64_t engine_bytes(const Machine& machine, int voices, Precision precision) {
   const std::uint64_t number_bytes =
       precision == Precision::float32 ? sizeof(float) : sizeof(double);
-  constexpr std::uint64_t of_any_engine = 128 * 1024;  // MIDI channels, tunings, the mix
+  constexpr std::uint64_t of_any_engine = 131'072;  // MIDI channels, tunings, the mix
   std::uint64_t bytes = 0;
   for (const Program& program : machine.parts) {
     bytes += voice_bytes(program, number_bytes);

@@ -293,7 +293,7 @@ Accuracy Judge::at(std::size_t corner, const Stepping& stepping) {
   for (const Complex& pole : wanted) {
     expected.push_back(stepping.pole(std::norm(pole), -2.0 * pole.real()).value_or(pole));
   }
-  progress_.spend(8 * program.moving * program.moving * program.moving);
+  progress_.spend(std::size_t{8} * program.moving * program.moving * program.moving);
   return compare(wanted, expected,
                  stepping.poles(springs_of(program, numbers.parameters, numbers.stiffness_factor)),
                  rate_hz, 0);
@@ -315,7 +315,7 @@ Accuracy Judge::of_bodies(std::size_t corner, const Stepping& stepping) {
       wanted.push_back(*pole);
     }
   }
-  progress_.spend(8 * program_.moving * program_.moving * program_.moving);
+  progress_.spend(std::size_t{8} * program_.moving * program_.moving * program_.moving);
   return compare(
       wanted, wanted,
       stepping.poles(springs_of(program_, numbers.parameters, numbers.stiffness_factor, true)),
