@@ -156,7 +156,7 @@ void FaustLines::read(std::string_view text, const Progress& progress) {
     text.remove_prefix(std::min(text.size(), end + (pair ? 2 : 1)));
   }
   for (auto& [name, line] : lines_) {
-    if (!line.is_parameter) {
+    if (!line.is_parameter && !line.is_read) {
       named(line.origin, {name, line.origin.column},
             0);  // so that a wrong one that nobody uses is told
     }
@@ -207,7 +207,7 @@ void FaustLines::read_line(std::string_view text, int number) {
     }
     Token inner = trimmed({rest.text.substr(1, last - 1), rest.column + 1});
     // (f,T60,m, ...) may have parentheses of its own.
-    while (inner.text.starts_with('(') && closing(inner.text) == inner.text.size() - 1) {
+    if (inner.text.starts_with('(') && closing(inner.text) == inner.text.size() - 1) {
       inner = trimmed({inner.text.substr(1, inner.text.size() - 2), inner.column + 1});
     }
     if (!inner.text.empty()) {
@@ -279,6 +279,12 @@ void FaustLines::read_definition(const Origin& origin, const Token& rest) {
   }
   FaustLine& line = found->second;
   line.origin = origin;
+  if (lines_.size() > most_parameters) {
+    line.is_read = true;
+    line.text = "0";
+    return error(origin, name,
+                 "a model has at most " + std::to_string(most_parameters) + " definitions");
+  }
   line.expression = trimmed(behind(rest, equals + 1));
   double start = 0.0;
   line.is_parameter =

@@ -391,7 +391,7 @@ void Reader::look_over() {
   }
   for (const Link& link : network.links) {
     const bool is_contact = facts_of(link.law).family == Family::contact;
-    if (is_contact && network.masses[link.a].kind == MassKind::position &&
+    if (is_contact && origins_.empty() && network.masses[link.a].kind == MassKind::position &&
         network.masses[link.b].kind != MassKind::position) {
       say(Severity::warning, link.location.line, {link.name, link.location.column},
           "the contact's ends look swapped: it acts while the second is below the first, here " +

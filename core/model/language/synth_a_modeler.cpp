@@ -10,6 +10,8 @@ namespace {
 // 0.9 K/10 is the most that nlPluck pushes with per scale, where a pluck of theirs has k.
 constexpr double pluck_peak = 0.09;
 
+constexpr std::size_t longest_name = 900;  // bytes
+
 constexpr SamShape shapes[] = {
     {"mass", SamKind::mass, 3, 3, 1, "mass(m,x0,v0),id;"},
     {"ground", SamKind::ground, 1, 1, 1, "ground(x),id;"},
@@ -24,6 +26,12 @@ constexpr SamShape shapes[] = {
     {"junction", SamKind::junction, 1, 1, 1, "junction(height),id;"},
     {"audioout", SamKind::audioout, 1, 1, 1, "audioout,id,what is heard;"},
 };
+
+// As our inputs and outputs are called.
+bool is_channel(std::string_view name) {
+  const std::size_t start = name.starts_with("in") ? 2 : name.starts_with("out") ? 3 : name.size();
+  return start < name.size() && name.find_first_not_of("0123456789", start) == name.npos;
+}
 
 }  // namespace
 
@@ -52,7 +60,7 @@ void SamTeller::declare() {
       continue;
     }
     const Token& name = statement.names[0];
-    if (!is_identifier(name.text)) {
+    if (!is_identifier(name.text) || name.text.size() > longest_name) {
       lines_.error(statement.origin, name,
                    "expected a name of letters, digits and '_', found " + quoted(name.text));
     } else if (lines_.is_number_name(std::string(name.text))) {
@@ -110,10 +118,8 @@ void SamTeller::name_ends() {
     switch (element.shape->kind) {
       case SamKind::mass:
       case SamKind::ground:
-        // Our channels are called in1 and out1.
-        element.end =
-            "@" + label + (label.starts_with("in") || label.starts_with("out") ? "_" : "");
-        while (by_name_.contains(element.end.substr(1)) && element.end.substr(1) != label) {
+        element.end = "@" + label;
+        while (is_channel(label) && by_name_.contains(std::string_view(element.end).substr(1))) {
           element.end += "_";
         }
         break;
