@@ -5,6 +5,7 @@
 
 #include "core/model/language/expression.h"
 #include "core/model/language/reader.h"
+#include "core/model/language/synth_a_modeler.h"
 
 namespace ressort {
 
@@ -40,7 +41,9 @@ ParsedNetwork Reader::read(std::string_view text, const ReadOptions& options) {
     const auto* const last =
         std::find_if(text.begin(), text.end(), [](char c) { return c == '\n' || c == '\r'; });
     const auto end = static_cast<std::size_t>(last - text.begin());
-    read_line(text.substr(0, end), ++number);
+    ++number;
+    read_line(text.substr(0, end),
+              origins_.empty() ? number : origins_[static_cast<std::size_t>(number) - 1].line);
     progress.spend(end / 8 + 1);
     const bool pair = end + 1 < text.size() && text[end] == '\r' && text[end + 1] == '\n';
     text.remove_prefix(std::min(text.size(), end + (pair ? 2 : 1)));
@@ -388,7 +391,7 @@ void Reader::look_over() {
   }
   for (const Link& link : network.links) {
     const bool is_contact = facts_of(link.law).family == Family::contact;
-    if (is_contact && network.masses[link.a].kind == MassKind::position &&
+    if (is_contact && origins_.empty() && network.masses[link.a].kind == MassKind::position &&
         network.masses[link.b].kind != MassKind::position) {
       say(Severity::warning, link.location.line, {link.name, link.location.column},
           "the contact's ends look swapped: it acts while the second is below the first, here " +
@@ -445,8 +448,41 @@ bool ParsedNetwork::ok() const {
                       [](const Diagnostic& d) { return d.severity == Severity::error; });
 }
 
+// What is told of a line in our language is told of the whole line that it comes from.
+static ParsedNetwork read_synth_a_modeler(std::string_view text, ReadOptions options) {
+  ToldText told = tell_synth_a_modeler(text, options.progress);
+  ParsedNetwork parsed{.network = {}, .diagnostics = std::move(told.diagnostics), .motion = {}};
+  if (parsed.ok()) {
+    if (!options.third) {
+      options.third = ThirdArgument::velocity_per_second;
+      options.third_by = "Synth-A-Modeler has it";
+    }
+    ParsedNetwork read = Reader(told.origins).read(told.text, options);
+    std::unordered_map<int, const Origin*> origins;
+    for (const Origin& origin : told.origins) {
+      origins.emplace(origin.line, &origin);
+    }
+    for (Diagnostic& diagnostic : read.diagnostics) {
+      if (const auto found = origins.find(diagnostic.line); found != origins.end()) {
+        diagnostic.column = found->second->column;
+        diagnostic.length = found->second->length;
+      }
+    }
+    read.diagnostics.insert(read.diagnostics.begin(), parsed.diagnostics.begin(),
+                            parsed.diagnostics.end());
+    parsed = std::move(read);
+  }
+  std::stable_sort(parsed.diagnostics.begin(), parsed.diagnostics.end(),
+                   [](const Diagnostic& a, const Diagnostic& b) { return a.line < b.line; });
+  return parsed;
+}
+
 ParsedNetwork parse_network(std::string_view text, const ReadOptions& options) {
   try {
+    if (text.size() <= max_model_bytes && text.find('\0') == std::string_view::npos &&
+        is_synth_a_modeler(text)) {
+      return read_synth_a_modeler(text, options);
+    }
     return Reader().read(text, options);
   } catch (const Stopped&) {
     return {.network = {}, .diagnostics = {{.message = stopped}}, .motion = {}};

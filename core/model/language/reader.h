@@ -13,6 +13,7 @@
 #include "core/model/index_table.h"
 #include "core/model/language/keywords.h"
 #include "core/model/language/mdl.h"
+#include "core/model/language/synth_a_modeler.h"
 #include "core/model/language/tokens.h"
 
 namespace ressort {
@@ -56,6 +57,9 @@ struct Evidence {
 
 class Reader {
  public:
+  // `origins`: where the lines come from, if the text is told from another's.
+  explicit Reader(std::span<const Origin> origins = {}) : origins_(origins) {}
+
   ParsedNetwork read(std::string_view text, const ReadOptions& options);
 
  private:
@@ -161,6 +165,7 @@ class Reader {
     }
   }
 
+  std::span<const Origin> origins_;  // [line - 1]
   ParsedNetwork out_;
   int errors_ = 0;
   int warnings_ = 0;
