@@ -25,7 +25,7 @@ endforeach()
 
 # Every model that there is under the same sanitizers, and more of those that nobody wrote.
 add_deep_test(everything_sanitized 240 ${CMAKE_CURRENT_SOURCE_DIR}/system/sanitized 0.1 200)
-add_deep_test(everything_more 120 $<TARGET_FILE:ressort_play_everything> 1 400 201
+add_deep_test(everything_more 120 $<TARGET_FILE:ressort_play_everything> 1 400 101
   ${CMAKE_SOURCE_DIR}/presets)
 
 # The engine for another kind of machine, as far as a compiler can tell.
