@@ -2,6 +2,7 @@
 
 #include <fcntl.h>
 #include <signal.h>
+#include <sys/prctl.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -102,7 +103,8 @@ Result<Done> run(std::vector<std::string> words, const WorkFolder& folder, doubl
                  std::error_code(errno, std::generic_category()).message()};
   }
   if (child == 0) {
-    setpgid(0, 0);  // Ctrl-C comes to us, and we end it
+    setpgid(0, 0);                     // Ctrl-C comes to us, and we end it
+    prctl(PR_SET_PDEATHSIG, SIGKILL);  // and so does our own end, whatever ends us
     const int out = open(log.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0600);
     const int in = open("/dev/null", O_RDONLY | O_CLOEXEC);
     if (out >= 0 && in >= 0 && chdir(folder.name().c_str()) == 0) {
