@@ -133,10 +133,10 @@ void play(const Network& network, Preset preset, CompileOptions options) {
 std::vector<std::string> fixed_labels(const Network& network) {
   std::vector<std::string> labels;
   for (std::size_t i = 0; i < network.macros.size(); i += 2) {
-    labels.push_back(network.macros[i].label);
+    labels.push_back(network.macros[i].name);
   }
   for (std::size_t i = 0; i < network.links.size(); i += 2) {
-    labels.push_back(network.links[i].label);
+    labels.emplace_back(std::string_view(network.links[i].name));
   }
   return labels;
 }
