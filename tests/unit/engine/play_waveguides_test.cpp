@@ -1,4 +1,7 @@
 // Waveguides as an instrument: keys, bends, damping, many voices, in single precision as well.
+#include "core/analysis/stability.h"
+#include "core/compile/schemes.h"
+#include "core/model/language/expression.h"
 #include "tests/support/pitch.h"
 #include "tests/support/player.h"
 
@@ -78,6 +81,14 @@ TEST_CASE("springs to a waveguide need no proof, those among masses do", "[play_
   CHECK(compile(network_of(held + "1000.\n@l spring @a @b 1.9\n"), struck(1), {}));
   const auto made = compile(network_of(held + "0.1\n@l spring @a @b 2.1\n"), struck(1), {});
   CHECK((!made || made->stability.verdict == Verdict::unstable));
+  const Network pushed = network_of(held + "-0.1\n");
+  const auto forced = compile(pushed, struck(1), {.force = true});
+  REQUIRE(forced);
+  CHECK(forced->stability.verdict == Verdict::unproved);
+  const auto values = parameter_values(pushed);
+  CHECK(Stability(without_passive(pushed, forced->schemes.links), 1.0)
+            .certify({values, values})
+            .verdict == Verdict::unproved);
 }
 
 }  // namespace ressort
