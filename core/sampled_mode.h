@@ -28,11 +28,12 @@ inline SampledMode sampled_mode(double m, double k, double z) {
   const double square = k - half * half;
   const double root = std::sqrt(std::fabs(square));
   const double r = std::exp(-half);
-  // 1 - cos w, or of a mode that creeps 1 - cosh; no difference of equals
-  const double swing = square > 0.0 ? 2.0 * std::sin(0.5 * root) * std::sin(0.5 * root)
-                                    : -2.0 * std::sinh(0.5 * root) * std::sinh(0.5 * root);
   const double lost = -std::expm1(-half);
-  const double stiffness = lost * lost + 2.0 * r * swing;
+  const double sine = std::sin(0.5 * root);
+  // No difference of equals. A mode that creeps has two real poles, each e to one of these sums.
+  const double stiffness = square >= 0.0
+                               ? lost * lost + 4.0 * r * sine * sine
+                               : std::expm1(-k / (half + root)) * std::expm1(-half - root);
   const double damping = -std::expm1(-z);
   const double left_out =
       std::clamp((square - highest_ring) / (nyquist_ring - highest_ring), 0.0, 1.0);

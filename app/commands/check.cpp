@@ -19,6 +19,7 @@
 #include "core/compile/compile.h"
 #include "core/compile/schemes.h"
 #include "core/model/language/print.h"
+#include "core/model/topology.h"
 
 namespace ressort {
 namespace {
@@ -267,7 +268,8 @@ void print_report(const Scene& scene, const Compiled& compiled, const Proved& pr
   std::printf("runs as\n  %s", describe(compiled.plan).c_str());
   if (instrument.mode) {
     const int number = scene.preset.pitch_mode;
-    const std::string mode = number == 1 ? "lowest mode" : "mode " + std::to_string(number);
+    const bool is_lowest = number == 1 || has_waveguide(scene.network);
+    const std::string mode = is_lowest ? "lowest mode" : "mode " + std::to_string(number);
     std::printf("%s %.3f Hz; keys are in tune up to %.0f Hz, higher ones are silent\n",
                 mode.c_str(), instrument.mode->frequency_hz, instrument.highest_frequency_hz);
   }

@@ -37,7 +37,13 @@ class Assembler {
     out_.is_complete = wandering <= most_wandering;
     for (std::uint32_t i = 0; i < network_.links.size() && out_.is_complete; ++i) {
       const Link& link = network_.links[i];
-      if (link.a != link.b && !is_junction(link.a) && !is_junction(link.b)) {
+      if (link.a == link.b) {
+        continue;
+      }
+      if (is_junction(link.a) || is_junction(link.b)) {
+        out_.terms.push_back(
+            {.first = static_cast<std::uint32_t>(first_), .element = i, .is_passive = true});
+      } else {
         place(i);
       }
     }
@@ -233,6 +239,9 @@ Range range_at(std::span<const Range> arguments, ArgumentId argument) {
 
 Load highest_load(const Network& network, const Assembly::Term& term,
                   std::span<const Range> arguments, double rate_ratio) {
+  if (term.is_passive) {
+    return {};
+  }
   const Load load = load_as_keys_have_it(network, term, arguments, rate_ratio);
   const bool is_fixed =
       term.is_link ? network.links[term.element].is_fixed : network.masses[term.element].is_fixed;
@@ -243,7 +252,7 @@ Load lowest_load(const Network& network, const Assembly::Term& term,
                  std::span<const Range> arguments, double rate_ratio) {
   const double r = rate_ratio;
   const auto load = [&](double k, double z) {
-    const double most = term.wanders ? 0.0 : HUGE_VAL;
+    const double most = term.wanders || term.is_passive ? 0.0 : HUGE_VAL;
     return Load{.stiff = term.scale * std::min(most, k) * r * r,
                 .damped = 2.0 * term.scale * std::min(most, z) * r};
   };

@@ -3,8 +3,8 @@
 //   K + 2Z = sum over terms of w g gT
 //
 // A term is what one link, or an oscillator's own spring, adds; g says which masses it joins, and w
-// is its k + 2z where it is steepest. What holds a waveguide is no part of it: such a link takes no
-// more than it gives, whatever its numbers are (core/compile/schemes.h).
+// is its k + 2z where it is steepest. What holds a waveguide joins no masses: such a link takes no
+// more than it gives (core/compile/schemes.h), and is a term only for what it may have below 0.
 #pragma once
 
 #include <cstdint>
@@ -35,8 +35,9 @@ struct Assembly {
     std::uint32_t count = 0;
     std::uint32_t element = 0;  // index into Network::links, or Network::masses
     bool is_link = true;
-    bool wanders = false;  // one of several that together bound a link at a place that moves
-    double scale = 1.0;    // of its w
+    bool is_passive = false;  // holds a waveguide: no entries, no highest load
+    bool wanders = false;     // one of several that together bound a link at a place that moves
+    double scale = 1.0;       // of its w
   };
   std::vector<std::uint32_t> masses;  // [row] index into Network::masses
   std::vector<Term> terms;
@@ -65,7 +66,7 @@ Load highest_load(const Network& network, const Assembly::Term& term,
                   std::span<const Range> arguments, double rate_ratio);
 
 // The least stiffness and damping that a term surely has: at rest plucks, bows and contacts have
-// none, but may still have a negative one.
+// none, but may still have a negative one; what holds a waveguide has at most that.
 Load lowest_load(const Network& network, const Assembly::Term& term,
                  std::span<const Range> arguments, double rate_ratio);
 

@@ -94,6 +94,7 @@ Weights Proofs::weigh(std::span<const Range> arguments, const Instead& instead) 
 }
 
 // Some may be negative as long as the whole is not: a spring that pushes beside one that pulls.
+// What holds a waveguide has no whole to be part of.
 bool Proofs::feeds(std::span<const Range> arguments) {
   if (std::none_of(arguments.begin(), arguments.end(),
                    [](const Range& range) { return range.lowest < 0.0; })) {
@@ -103,9 +104,13 @@ bool Proofs::feeds(std::span<const Range> arguments) {
   std::vector<double> damped;
   double least = 0.0;
   for (const Load& load : lowest_loads(arguments)) {
+    const double less = std::min(load.stiff, load.damped);
+    if (less < 0.0 && assembly_.terms[stiff.size()].is_passive) {
+      return true;
+    }
     stiff.push_back(load.stiff);
     damped.push_back(load.damped);
-    least = std::min({least, load.stiff, load.damped});
+    least = std::min(least, less);
   }
   return least < 0.0 && !(boundary_.is_exact() && is_positive(stiff) && is_positive(damped));
 }

@@ -209,10 +209,22 @@ void reach(Analysis& analysis, double more, double rate_hz) {
   }
 }
 
+// Why keys that are to set the pitch do not; empty where that is no surprise.
+std::string missed_mode(const Network& network, const Preset& preset) {
+  const std::size_t masses = moving_count(network);
+  if (masses > most_quick_masses) {
+    return "the lowest mode of so many masses was not found in time";
+  }
+  if (!network.waveguides.empty()) {
+    return "every waveguide is fixed";
+  }
+  return preset.pitch_mode > 1 ? "there is no mode " + std::to_string(preset.pitch_mode) : "";
+}
+
 // What a person should know of how it is computed, beside how its parts are.
 std::vector<std::string> make_notes(const Schemes& schemes, const Culled& culled,
-                                    const Analysis& analysis, bool misses_mode, bool misses_gain,
-                                    const std::string& merged) {
+                                    const Analysis& analysis, const std::string& missed_mode,
+                                    bool misses_gain, const std::string& merged) {
   std::vector<std::string> notes = schemes.notes;
   if (const std::string left_out = describe(culled); !left_out.empty()) {
     notes.push_back("left out: " + left_out);
@@ -222,9 +234,8 @@ std::vector<std::string> make_notes(const Schemes& schemes, const Culled& culled
         "the limits of so many parameters of so many links were not found one by one: all ranges "
         "were narrowed alike");
   }
-  if (misses_mode) {
-    notes.emplace_back(
-        "keys do not set the pitch: the lowest mode of so many masses was not found in time");
+  if (!missed_mode.empty()) {
+    notes.push_back("keys do not set the pitch: " + missed_mode);
   }
   if (misses_gain) {
     notes.emplace_back(
@@ -293,18 +304,19 @@ Result<Compiled> compile_by_stages(const Request& request) {
         find_gain(planned.machine, played_by(1, 1.0), options.precision, options.isa, progress);
   }
   const double gain = preset.gain * factor.value_or(1.0);
-  const bool misses_mode = preset.keyboard && !mode && moving_count(network) > most_quick_masses;
   progress.stage("making its voices");
-  return Compiled{.engine = make_engine(std::move(planned.machine), played_by(voices, gain),
-                                        options.precision, options.isa, progress),
-                  .instrument = make_instrument(network, preset, analysis, voices, gain),
-                  .plan = {.parts = planned.parts,
-                           .budget = request.budget,
-                           .accuracy = accuracy_of(planned.parts),
-                           .notes = make_notes(schemes, culled, analysis, misses_mode, !factor,
-                                               reduced.merged)},
-                  .stability = analysis.stability,
-                  .schemes = schemes};
+  return Compiled{
+      .engine = make_engine(std::move(planned.machine), played_by(voices, gain), options.precision,
+                            options.isa, progress),
+      .instrument = make_instrument(network, preset, analysis, voices, gain),
+      .plan = {.parts = planned.parts,
+               .budget = request.budget,
+               .accuracy = accuracy_of(planned.parts),
+               .notes = make_notes(schemes, culled, analysis,
+                                   preset.keyboard && !mode ? missed_mode(network, preset) : "",
+                                   !factor, reduced.merged)},
+      .stability = analysis.stability,
+      .schemes = schemes};
 }
 
 }  // namespace

@@ -101,8 +101,12 @@ Network without_passive(const Network& network, std::span<const LinkScheme> sche
   std::vector<Link> links;
   for (std::size_t i = 0; i < felt.links.size(); ++i) {
     const LawFacts& law = facts_of(felt.links[i].law);
-    // Quadratic and cubic springs count with what they are at rest, by their own K and Z.
-    if (i >= schemes.size() || is_plain(schemes[i]) || (law.contains_spring && law.is_curved)) {
+    // Quadratic and cubic springs count with what they are at rest, by their own K and Z; what
+    // holds a waveguide with what it may have below 0.
+    const bool holds_waveguide = felt.masses[felt.links[i].a].kind == MassKind::junction ||
+                                 felt.masses[felt.links[i].b].kind == MassKind::junction;
+    if (i >= schemes.size() || is_plain(schemes[i]) || holds_waveguide ||
+        (law.contains_spring && law.is_curved)) {
       links.push_back(std::move(felt.links[i]));
     }
   }

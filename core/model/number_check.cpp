@@ -16,14 +16,13 @@ namespace {
 class NumberCheck {
  public:
   NumberCheck(const Network& network, std::span<const double> parameters, double rate_ratio)
-      : network_(network), parameters_(parameters) {
-    const double grown = std::max(1.0, rate_ratio * rate_ratio);
+      : network_(network), parameters_(parameters), grown_(std::max(1.0, rate_ratio * rate_ratio)) {
     for (const Formula& formula : network.arguments) {
       const double value = evaluate(formula, parameters);
       const bool is_live = std::any_of(formula.begin(), formula.end(), [&](const Step& step) {
         return step.op == Op::parameter && network.parameters[step.index].audio_input > 0;
       });
-      is_wrong_.push_back(!is_live && !std::isfinite(grown * value));
+      is_wrong_.push_back(!is_live && !std::isfinite(grown_ * value));
       is_nothing_.push_back(!is_live && !std::isfinite(1.0 / value));
     }
   }
@@ -53,6 +52,7 @@ class NumberCheck {
     for (const BodyMode& mode : network_.modes) {
       look(mode, {{"frequency", mode.frequency_hz}, {"T60", mode.t60_s}});
       look_above_zero(mode);
+      look_in_range(mode);
     }
     for (const Link& link : network_.links) {
       for (const ArgumentId argument : link.arguments) {
@@ -94,6 +94,21 @@ class NumberCheck {
     }
   }
 
+  // The stiffness that keeps a mode's frequency and T60 is a number.
+  void look_in_range(const BodyMode& mode) {
+    const double hz = argument_value(network_, mode.frequency_hz, parameters_);
+    const double t60_s = argument_value(network_, mode.t60_s, parameters_);
+    const double mass = argument_value(network_, network_.macros[mode.macro].mass, parameters_);
+    const auto look_at = [&](const Asked& asked, double root, std::string_view what) {
+      if (!error_ && !std::isfinite(grown_ * mass * root * root)) {
+        error_ = {told(asked, std::string(mode.name), what), mode.location.line,
+                  mode.location.column};
+      }
+    };
+    look_at({"frequency", mode.frequency_hz}, hz, " is too high");
+    look_at({"T60", mode.t60_s}, 1.0 / t60_s, " is too short");
+  }
+
   // "the argument 1/P of 'r' is no finite number where P = 0"
   std::string told(const Asked& asked, const std::string& name, std::string_view what) const {
     const Formula& formula = network_.arguments[asked.argument];
@@ -115,7 +130,8 @@ class NumberCheck {
   }
 
   const Network& network_;
-  std::span<const double> parameters_;
+  const std::span<const double> parameters_;
+  const double grown_;            // what the rate makes of a stiffness
   std::vector<bool> is_wrong_;    // [argument]
   std::vector<bool> is_nothing_;  // [argument] if it is a mass
   std::optional<Error> error_;

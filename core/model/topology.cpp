@@ -227,6 +227,12 @@ bool is_waveguide(MacroKind kind) {
   return kind == MacroKind::waveguide || kind == MacroKind::open_waveguide;
 }
 
+bool has_waveguide(const Network& network) {
+  return !network.waveguides.empty() ||
+         std::any_of(network.macros.begin(), network.macros.end(),
+                     [](const Macro& macro) { return is_waveguide(macro.kind); });
+}
+
 bool is_mesh(MacroKind kind) {
   return kind == MacroKind::mesh || kind == MacroKind::closed_mesh ||
          kind == MacroKind::corner_mesh;

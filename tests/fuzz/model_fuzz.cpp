@@ -129,14 +129,28 @@ void play(const Network& network, Preset preset, CompileOptions options) {
   play_blocks(*second->engine, second->instrument, blocks / 2, blocks);
 }
 
+// Every second label that keys can leave as it is.
+std::vector<std::string> fixed_labels(const Network& network) {
+  std::vector<std::string> labels;
+  for (std::size_t i = 0; i < network.macros.size(); i += 2) {
+    labels.push_back(network.macros[i].name);
+  }
+  for (std::size_t i = 0; i < network.links.size(); i += 2) {
+    labels.emplace_back(std::string_view(network.links[i].name));
+  }
+  return labels;
+}
+
 void play(const Network& network) {
-  play(network, default_preset(network, false),
-       {.rate_hz = 48000.0, .most_modes = quick_modes, .find_gain = true});
+  Preset preset = default_preset(network, false);
+  preset.fixed = fixed_labels(network);
+  preset.pitch_mode = 1 + static_cast<int>(network.masses.size() % most_pitch_mode);
+  play(network, preset, {.rate_hz = 48000.0, .most_modes = quick_modes, .find_gain = true});
   play(network, default_preset(network, true), {.rate_hz = 44100.0, .bare = true});
   const std::size_t turn = network.links.size() + 7 * network.masses.size();
-  const auto preset = parse_preset(support::PresetWriter(network, "fuzz.mdl", turn).write());
-  if (preset.ok()) {  // a name may be no TOML, a range too wide
-    play(network, preset.preset, {.rate_hz = 48000.0, .most_modes = quick_modes});
+  const auto written = parse_preset(support::PresetWriter(network, "fuzz.mdl", turn).write());
+  if (written.ok()) {  // a name may be no TOML, a range too wide
+    play(network, written.preset, {.rate_hz = 48000.0, .most_modes = quick_modes});
   }
 }
 

@@ -27,14 +27,18 @@ inline std::string_view text_of(const std::uint8_t* data, std::size_t size) {
 }
 
 // Something of everything: a string that is struck, a mass that is bowed, one that is plucked, one
-// that is turned by sound, and parameters for all of it.
+// that is turned by sound, a body and a waveguide that hold each other, and parameters for all of
+// it.
 inline const char* const model =
     "@K param 0.1\n@Z param 0.001\n@M param 1.\n@u param 0.5\n@a audioParam @in4\n"
     "@g ground 0.\n@s string 8 M K Z 0. 0.\n@m mass M 0. 0.\n@n osc 1. 0.05 0.001 0. 0.\n"
     "@l springDamper [@s 0.3] @m [a + K] Z\n@h springDamper @n @g K Z\n"
+    "@B body 40. p q\n@B1 mode @B 300*K 2. 1. -0.5\n@B2 mode @B 700. 1. 0.4 0.6\n"
+    "@w waveguide 1. 220. 3. 0.4 0.\n@e spring [@B p] [@w u] K Z\n@f contact [@w 0.9] @m 0.1 Z\n"
     "@in1 frcInput [@s u]\n@in2 posInput 0.\n@in3 posInput 0.\n"
     "@b nlBow @in2 @m 0.01 0.01\n@p nlPluck @in3 @n 0.02 0.01\n"
-    "@out1 posOutput [@s 0.7]\n@out2 posOutput @m\n@out3 frcOutput @n\n";
+    "@out1 posOutput [@s 0.7]\n@out2 posOutput @m\n@out3 frcOutput @n\n"
+    "@out4 posOutput [@B q]\n@out5 frcOutput [@w 0.5]\n";
 
 inline const Network& network() {
   static const Network network = parse_network(model).network;

@@ -107,6 +107,21 @@ TEST_CASE("a mode's first sample is what its weights make of a push", "[bodies]"
   CHECK(struck(text, 44100.0, 1)[0] == Approx(-0.25).epsilon(1e-14));
 }
 
+TEST_CASE("a mode that creeps has its two real poles, however soon it ends", "[bodies]") {
+  // x'' + z x' + k x = 0 has e^-(z/2 -+ sqrt(z^2/4 - k)); (1 - p)(1 - q) = K, 1 - p q = Z.
+  for (const double z : {0.1, 3.0, 800.0, 1600.0, 1e4, 1e9}) {
+    for (const double k : {1e-6 * z * z, 0.2 * z * z}) {
+      const double root = std::sqrt(0.25 * z * z - k);
+      const double p = -k / (0.5 * z + root);
+      const SampledMode mode = sampled_mode(2.0, k, z);
+      CHECK(mode.mass == 2.0);
+      CHECK(mode.stiffness ==
+            Approx(2.0 * std::expm1(p) * std::expm1(-0.5 * z - root)).epsilon(1e-12));
+      CHECK(mode.damping == Approx(-2.0 * std::expm1(-z)).epsilon(1e-12));
+    }
+  }
+}
+
 TEST_CASE("what is too high to ring gives way as it would at rest", "[bodies]") {
   // k = (2 pi 30000 / 44100)^2 per sample and unit of mass
   const std::string text =

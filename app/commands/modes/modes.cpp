@@ -13,6 +13,7 @@
 #include "core/analysis/stability.h"
 #include "core/compile/stability_check.h"
 #include "core/model/language/print.h"
+#include "core/model/topology.h"
 
 namespace ressort {
 namespace {
@@ -77,6 +78,9 @@ void tell(const Scene& scene, const KnownModes& modes) {
     std::printf(
         "at rest: what bows, plucks or touches is open, and springs that stiffen are as they "
         "begin\n");
+  }
+  if (has_waveguide(scene.network)) {
+    std::printf("without the waveguides, whose partials are no modes, and what holds on to them\n");
   }
   std::printf("%s\n", to_table(modes).c_str());
 }

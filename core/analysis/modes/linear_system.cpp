@@ -32,6 +32,9 @@ class SystemMaker {
       made_.root.push_back(std::sqrt(mass));
     }
     for (const Assembly::Term& term : assembly.terms) {
+      if (term.is_passive) {
+        continue;
+      }
       const auto [k, z] = numbers_of(term);
       made_.is_sound = made_.is_sound && std::isfinite(k) && std::isfinite(z);
       const auto first = static_cast<std::uint32_t>(made_.shares.size());

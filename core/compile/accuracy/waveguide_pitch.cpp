@@ -31,11 +31,15 @@ std::vector<double> highest_of(const Network& network, double rate_hz) {
 
 }  // namespace
 
-LowestShapes waveguide_shapes(const Network& network, std::span<const double> parameters) {
+std::optional<LowestShapes> waveguide_shapes(const Network& network,
+                                             std::span<const double> parameters) {
   double hz = std::numeric_limits<double>::infinity();
   for (const Macro& guide : network.waveguides) {
     const double own = argument_value(network, guide.frequency_hz, parameters);
     hz = guide.is_fixed ? hz : std::min(hz, own);
+  }
+  if (!std::isfinite(hz)) {
+    return std::nullopt;
   }
   const double angle = 2.0 * std::numbers::pi * hz / Network::reference_rate_hz;
   LowestShapes shapes{

@@ -12,8 +12,9 @@ namespace ressort {
 
 // The lowest partial of the lowest waveguide as if it were a mode without damping, whose stiffness
 // is the square of its angle: by which factor on every stiffness it has the pitch of a key is exact
-// then, with Stepping::Scheme::exact. Of an expanded network that has a waveguide.
-LowestShapes waveguide_shapes(const Network& network, std::span<const double> parameters);
+// then, with Stepping::Scheme::exact. Of an expanded network; nothing if every waveguide is fixed.
+std::optional<LowestShapes> waveguide_shapes(const Network& network,
+                                             std::span<const double> parameters);
 
 // What the first waveguide would need that is too high for its places at this rate, or is no
 // number above 0, with its line.

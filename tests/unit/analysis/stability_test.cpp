@@ -537,6 +537,24 @@ TEST_CASE("negative springs are stable where others make up for them", "[stabili
         "3: may be unstable: the damping -0.1 of 'a' is negative, and motion may grow by itself");
 }
 
+TEST_CASE("what holds a waveguide is stable unless it is negative", "[stability]") {
+  const std::string held =
+      "@K param 0.1\n@w waveguide 1. 220. 3. 0.4 0.\n@m mass 1. 0. 0.\n@g ground 0.\n";
+  CHECK(complaint_of(held + "@a spring @m [@w 0.3] 1e6 1e6\n@b contact @g [@w 0.6] 1e6 1.\n") ==
+        "");
+  CHECK(complaint_of(held + "@a spring @m [@w 0.3] -K 0.1\n") ==
+        "5: may be unstable: the stiffness -K = -0.1 of 'a' is negative, and motion may grow by "
+        "itself");
+  CHECK(complaint_of(held + "@a damper @g [@w 0.3] -1.5\n") ==
+        "5: may be unstable: the damping -1.5 of 'a' is negative, and motion may grow by itself");
+  // No spring beside it makes up for it that is not at the same place.
+  CHECK(complaint_of(held + "@a spring @m [@w 0.3] -0.1\n@b spring @m @g 0.5\n") ==
+        "5: may be unstable: the stiffness -0.1 of 'a' is negative, and motion may grow by itself");
+  const SafeRange range = range_of(held + "@a spring @m [@w 0.3] K\n", "K");
+  CHECK(range.lowest == 0.0);
+  CHECK(std::isinf(range.highest));
+}
+
 TEST_CASE("what is too large to factor is proved by the bound, or not at all", "[stability]") {
   const auto verdict = [](const std::string& stiffness) {
     const Network network = network_of("@d mesh 201 200 1. " + stiffness + " 0. 0. 0.\n");

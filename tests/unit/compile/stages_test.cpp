@@ -52,6 +52,20 @@ TEST_CASE("a formula that is no number is told where it stands", "[stages]") {
   CHECK(no_number(network, std::vector{1e-308}, 2.0));
 }
 
+TEST_CASE("a mode that no number keeps is told", "[stages]") {
+  const auto told = [](const std::string& mass, const std::string& mode) {
+    const Network network =
+        network_of("@b body " + mass + " p\n@b1 mode @b " + mode + " 1.\n@out1 posOutput [@b p]\n");
+    const auto error = no_number(network, std::vector<double>{}, 1.0);
+    return error ? error->message : "";
+  };
+  CHECK(told("1.", "1e150 1.") == "");
+  CHECK(told("1.", "1e160 1.") == "the frequency 1e160 of 'b1' is too high");
+  CHECK(told("1e10", "1e150 1.") == "the frequency 1e150 of 'b1' is too high");
+  CHECK(told("1.", "300. 1e-150") == "");
+  CHECK(told("1.", "300. 1e-160") == "the T60 1e-160 of 'b1' is too short");
+}
+
 TEST_CASE("tables leave out what was culled and start where they are told to", "[stages]") {
   const Network network = network_of(held_mass + "@lost mass 1. 0. 1.\n");
   const Machine machine = tabulate(network, cull(network), {}, std::vector{0.7}, 88200.0, true);

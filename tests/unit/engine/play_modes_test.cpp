@@ -329,6 +329,17 @@ TEST_CASE("a velocity curve bends the touch and keeps its ends", "[play_modes]")
   CHECK(loudness(0.0, 1.0, points) == Approx(0.8 * full));
 }
 
+TEST_CASE("a mode that is not there is no pitch, and that is told", "[play_modes]") {
+  Preset preset = struck(1);
+  preset.pitch_mode = 2;
+  const auto made = compile(
+      network_of("@o osc 1. 0.1 0.001 0. 0.\n@in1 frcInput @o\n@out1 posOutput @o\n"), preset, {});
+  REQUIRE(made);
+  CHECK_FALSE(made->instrument.mode);
+  REQUIRE(made->plan.notes.size() == 1);
+  CHECK(made->plan.notes[0] == "keys do not set the pitch: there is no mode 2");
+}
+
 TEST_CASE("a preset names the mode that is its pitch", "[play_modes]") {
   for (const int number : {1, 2, 3, 5, 8}) {
     Preset preset = struck(1);

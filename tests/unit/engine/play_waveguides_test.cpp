@@ -1,4 +1,7 @@
 // Waveguides as an instrument: keys, bends, damping, many voices, in single precision as well.
+#include "core/analysis/stability.h"
+#include "core/compile/schemes.h"
+#include "core/model/language/expression.h"
 #include "tests/support/pitch.h"
 #include "tests/support/player.h"
 
@@ -58,11 +61,34 @@ TEST_CASE("chords of waveguides are the sum of their notes", "[play_waveguides]"
   }
 }
 
+TEST_CASE("keys leave a model whose waveguides are fixed as it is", "[play_waveguides]") {
+  Preset preset = struck(1);
+  preset.fixed = {"s"};
+  const auto made = compile(network_of(string), preset, {});
+  REQUIRE(made);
+  CHECK_FALSE(made->instrument.mode);
+  REQUIRE(made->plan.notes.size() == 1);
+  CHECK(made->plan.notes[0] == "keys do not set the pitch: every waveguide is fixed");
+  for (const int key : {0, 60, 127}) {
+    Player player(string, preset);
+    player.run(22050, {note_on(0, key)});
+    CHECK(std::fabs(cents(std::span(player.y()).subspan(4410), 220.0)) < 0.1);
+  }
+}
+
 TEST_CASE("springs to a waveguide need no proof, those among masses do", "[play_waveguides]") {
   const std::string held = string + "@a mass 1. 0. 0.\n@b mass 1. 0. 0.\n@k spring [@s 0.5] @a ";
   CHECK(compile(network_of(held + "1000.\n@l spring @a @b 1.9\n"), struck(1), {}));
   const auto made = compile(network_of(held + "0.1\n@l spring @a @b 2.1\n"), struck(1), {});
   CHECK((!made || made->stability.verdict == Verdict::unstable));
+  const Network pushed = network_of(held + "-0.1\n");
+  const auto forced = compile(pushed, struck(1), {.force = true});
+  REQUIRE(forced);
+  CHECK(forced->stability.verdict == Verdict::unproved);
+  const auto values = parameter_values(pushed);
+  CHECK(Stability(without_passive(pushed, forced->schemes.links), 1.0)
+            .certify({values, values})
+            .verdict == Verdict::unproved);
 }
 
 }  // namespace ressort
