@@ -4,6 +4,7 @@
 #include <complex>
 #include <numbers>
 
+#include "core/analysis/modes/tune.h"
 #include "core/analysis/stability.h"
 #include "core/compile/stability_check.h"
 #include "core/engine/energy.h"
@@ -378,6 +379,16 @@ TEST_CASE("masses and bodies are stable just as far as 4M - K - 2Z is positive",
 
 TEST_CASE("20,000 hybrids are judged right", "[.][bodies_everywhere]") {
   CHECK(misjudged(1'000'001, 20'000) == 0);
+}
+
+TEST_CASE("a body is tuned where it is written", "[bodies]") {
+  const Network network = network_of(
+      "@b body 40. p\n@b1 mode @b 300. 1. 1.\n@in1 frcInput [@b p]\n@out1 posOutput [@b p]\n");
+  const std::vector<double> wanted = {500.0};
+  const auto tuned = tune_modes(network, parameter_values(network), wanted, {});
+  REQUIRE_FALSE(tuned);
+  CHECK(tuned.error().message == "'b' has the frequencies that its own lines say: tune them there");
+  CHECK(tuned.error().line == 1);
 }
 
 }  // namespace ressort

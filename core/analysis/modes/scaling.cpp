@@ -127,6 +127,12 @@ Result<std::vector<SpringLine>> spring_lines(const Network& network, std::string
     }
   }
   for (std::uint32_t i = 0; i < network.macros.size(); ++i) {
+    const Macro& macro = network.macros[i];
+    if (is_in(parts.of_macro(i)) && (macro.kind == MacroKind::body || is_waveguide(macro.kind))) {
+      return Error{
+          "'" + macro.name + "' has the frequencies that its own lines say: tune them there",
+          macro.location.line, macro.location.column};
+    }
     if (is_in(parts.of_macro(i))) {
       lines.push_back({Kind::macro, i});
     }
