@@ -61,6 +61,7 @@ class SamTeller {
  private:
   void declare();
   bool declare(const Statement& statement);
+  std::string label_of(const SamElement& element) const;
   void name_ends();
   void join_guides();
   void join_row(std::size_t termination);

@@ -112,19 +112,24 @@ bool SamTeller::declare(const Statement& statement) {
   return true;
 }
 
+std::string SamTeller::label_of(const SamElement& element) const {
+  const std::string_view name = element.statement->names[0].text;
+  std::string label = "@" + std::string(name);
+  while (is_channel(name) && by_name_.contains(std::string_view(label).substr(1))) {
+    label += "_";
+  }
+  return label;
+}
+
 void SamTeller::name_ends() {
   for (SamElement& element : elements_) {
-    std::string label(element.statement->names[0].text);
     switch (element.shape->kind) {
       case SamKind::mass:
       case SamKind::ground:
-        element.end = "@" + label;
-        while (is_channel(label) && by_name_.contains(std::string_view(element.end).substr(1))) {
-          element.end += "_";
-        }
+        element.end = label_of(element);
         break;
       case SamKind::resonators:
-        element.end = "[@" + label + " p]";
+        element.end = "[" + label_of(element) + " p]";
         break;
       case SamKind::port:
         element.end = "@in" + std::to_string(++ports_);
@@ -209,7 +214,7 @@ void SamTeller::write(const SamElement& element) {
 // A mode of mass m_i gives way as one of m_1 whose place moves sqrt(m_1/m_i) as far.
 void SamTeller::write_resonators(const SamElement& element) {
   const Origin& origin = element.statement->origin;
-  const std::string label = "@" + std::string(element.statement->names[0].text);
+  const std::string label = label_of(element);
   emit(origin, label + " body " + scaled(element, 2, "1944810000") + " p");
   const std::string first = number(element, 2);
   for (std::size_t at = 0; at + 2 < element.statement->arguments.size(); at += 3) {
@@ -258,7 +263,7 @@ void SamTeller::write_link(const SamElement& element) {
     }
     ends += " " + elements_[found->second].end;
   }
-  const std::string label = "@" + std::string(statement.names[0].text);
+  const std::string label = label_of(element);
   const std::string damping = scaled(element, 1, "44100");
   switch (element.shape->kind) {
     case SamKind::link:

@@ -252,6 +252,14 @@ TEST_CASE("our own language stays what it is", "[synth_a_modeler]") {
   CHECK(parse_network("mass of a note\n@m osc 1. 0.1 0. 0. 0.\n@out1 posOutput @m\n").ok());
 }
 
+TEST_CASE("an element may be called as a channel of ours is", "[synth_a_modeler]") {
+  const Network network = network_of(
+      "mass(1.0,0.0,0.0),in1;\nmass(1.0,0.0,0.0),in1_;\nport(),q;\nlink(1.0,0.0,0.0),out1,in1,q;\n"
+      "link(1.0,0.0,0.0),l,in1_,in1;\naudioout,a,in1;\n");
+  CHECK(network.masses[network.outputs[0].mass].name.text() == "in1__");
+  CHECK(network.links[0].name.text() == "out1_");
+}
+
 TEST_CASE("no harm done to a text does harm", "[synth_a_modeler]") {
   const std::string pieces[] = {"(",
                                 ")",
