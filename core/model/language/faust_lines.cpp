@@ -130,6 +130,10 @@ bool is_synth_a_modeler(std::string_view text) {
   return false;
 }
 
+bool FaustLines::is_full() const {
+  return errors_ > most_diagnostics;
+}
+
 void FaustLines::say(Severity severity, const Origin& line, const Token& token,
                      std::string message) {
   int& told = severity == Severity::error ? errors_ : warnings_;
@@ -148,7 +152,7 @@ void FaustLines::read(std::string_view text, const Progress& progress) {
     text.remove_prefix(3);
   }
   int number = 0;
-  while (!text.empty() && errors_ <= most_diagnostics) {
+  while (!text.empty() && !is_full()) {
     const std::size_t end = std::min(text.find_first_of("\r\n"), text.size());
     read_line(text.substr(0, end), ++number);
     progress.spend(end / 4 + 1);

@@ -51,6 +51,7 @@ class FaustLines {
   double value(const std::string& text) const;
   bool is_number_name(const std::string& name) const { return lines_.contains(name); }
 
+  bool is_full() const;  // more errors are not told
   void say(Severity severity, const Origin& line, const Token& token, std::string message);
   void error(const Origin& line, const Token& token, std::string message) {
     say(Severity::error, line, token, std::move(message));

@@ -47,6 +47,9 @@ ToldText SamTeller::tell(std::string_view text, const Progress& progress) {
          "@" + lines_.parameters[i] + " param " + print_number(lines_.values[i]));
   }
   for (const SamElement& element : elements_) {
+    if (lines_.is_full()) {
+      break;
+    }
     write(element);
     progress.spend(20);
   }
@@ -237,31 +240,36 @@ void SamTeller::write_resonators(const SamElement& element) {
   }
 }
 
+// The nearest name of what a link may hold.
+std::string SamTeller::like(std::string_view name) const {
+  std::vector<std::string_view> names;
+  for (const SamElement& other : elements_) {
+    if (!other.end.empty() && names.size() < most_suggestions) {
+      names.push_back(other.statement->names[0].text);
+    }
+  }
+  return suggestion(name, names);
+}
+
 void SamTeller::write_link(const SamElement& element) {
   const Statement& statement = *element.statement;
   std::string ends;
   for (std::size_t side = 1; side <= 2; ++side) {
     const Token& name = statement.names[side];
     const auto found = by_name_.find(name.text);
-    const bool is_termination =
-        found != by_name_.end() && elements_[found->second].shape->kind == SamKind::termination;
-    if (found == by_name_.end() || is_termination || elements_[found->second].end.empty()) {
-      std::vector<std::string_view> names;
-      for (const SamElement& other : elements_) {
-        if (!other.end.empty()) {
-          names.push_back(other.statement->names[0].text);
-        }
-      }
-      if (found == by_name_.end() || elements_[found->second].shape->kind != SamKind::junction) {
-        error(element, name,
-              found == by_name_.end()
-                  ? "nothing is called " + quoted(name.text) + suggestion(name.text, names)
-                  : "expected a mass, a ground, a port, resonators or a junction, found " +
-                        quoted(name.text));
-      }
-      return;  // a junction without a row has been told
+    if (found == by_name_.end()) {
+      return error(element, name, "nothing is called " + quoted(name.text) + like(name.text));
     }
-    ends += " " + elements_[found->second].end;
+    const SamElement& end = elements_[found->second];
+    if (end.shape->kind == SamKind::junction && end.end.empty()) {
+      return;  // its row has been told
+    }
+    if (end.shape->kind == SamKind::termination || end.end.empty()) {
+      return error(element, name,
+                   "expected a mass, a ground, a port, resonators or a junction, found " +
+                       quoted(name.text));
+    }
+    ends += " " + end.end;
   }
   const std::string label = label_of(element);
   const std::string damping = scaled(element, 1, "44100");
