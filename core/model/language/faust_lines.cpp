@@ -26,28 +26,6 @@ bool is_letter(char c) {
   return std::isalnum(static_cast<unsigned char>(c)) != 0 || c == '_';
 }
 
-std::size_t word_length(std::string_view text) {
-  return static_cast<std::size_t>(std::find_if_not(text.begin(), text.end(), is_letter) -
-                                  text.begin());
-}
-
-// How long the number at the start of the text is.
-std::size_t number_length(std::string_view text) {
-  std::size_t end = 0;
-  while (end < text.size() &&
-         (std::isdigit(static_cast<unsigned char>(text[end])) != 0 || text[end] == '.')) {
-    ++end;
-  }
-  if (end < text.size() && (text[end] == 'e' || text[end] == 'E')) {
-    ++end;
-    end += end < text.size() && (text[end] == '+' || text[end] == '-') ? 1 : 0;
-    while (end < text.size() && std::isdigit(static_cast<unsigned char>(text[end])) != 0) {
-      ++end;
-    }
-  }
-  return end;
-}
-
 // The line up to its comment, which starts with '#' or '//'.
 std::string_view without_comment(std::string_view line) {
   bool is_quoted = false;
@@ -79,6 +57,27 @@ std::size_t closing(std::string_view text) {
 }
 
 }  // namespace
+
+std::size_t word_length(std::string_view text) {
+  return static_cast<std::size_t>(std::find_if_not(text.begin(), text.end(), is_letter) -
+                                  text.begin());
+}
+
+std::size_t number_length(std::string_view text) {
+  std::size_t end = 0;
+  while (end < text.size() &&
+         (std::isdigit(static_cast<unsigned char>(text[end])) != 0 || text[end] == '.')) {
+    ++end;
+  }
+  if (end < text.size() && (text[end] == 'e' || text[end] == 'E')) {
+    ++end;
+    end += end < text.size() && (text[end] == '+' || text[end] == '-') ? 1 : 0;
+    while (end < text.size() && std::isdigit(static_cast<unsigned char>(text[end])) != 0) {
+      ++end;
+    }
+  }
+  return end;
+}
 
 Token trimmed(Token token) {
   while (!token.text.empty() && is_blank(token.text.front())) {

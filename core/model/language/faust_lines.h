@@ -32,6 +32,10 @@ struct FaustLine {
 inline constexpr std::size_t longest_expression = 10000;  // bytes, all definitions put in
 inline constexpr int deepest_expression = 50;
 
+// How long the word, or the number, at the start of the text is.
+std::size_t word_length(std::string_view text);
+std::size_t number_length(std::string_view text);
+
 // Divided at `mark`, as far as it stands in no parentheses and no quotes.
 std::vector<Token> divided(const Token& token, char mark);
 Token trimmed(Token token);

@@ -230,7 +230,7 @@ TEST_CASE("Synth-A-Modeler's mistakes are told with their lines", "[synth_a_mode
 TEST_CASE("what is read as something else is said", "[synth_a_modeler]") {
   check_warning(
       "port(),p;\nground(0.0),g;\nmass(1.0,0.0,0.0),m;\nlink(1.0,0.0,0.0),l,m,p;\n"
-      "link(1.0,0.0,0.0),k,m,g;\naudioout,a,0.5*m;\n",
+      "link(1.0,0.0,0.0),k,m,g;\naudioout,a,5.0e-1*m;\n",
       6, 1, "'a' loses its gains: outputs are positions; a preset says how loud");
   // What is found in our own language is told of the line that it comes from.
   check_warning(
