@@ -26,28 +26,6 @@ bool is_letter(char c) {
   return std::isalnum(static_cast<unsigned char>(c)) != 0 || c == '_';
 }
 
-std::size_t word_length(std::string_view text) {
-  return static_cast<std::size_t>(std::find_if_not(text.begin(), text.end(), is_letter) -
-                                  text.begin());
-}
-
-// How long the number at the start of the text is.
-std::size_t number_length(std::string_view text) {
-  std::size_t end = 0;
-  while (end < text.size() &&
-         (std::isdigit(static_cast<unsigned char>(text[end])) != 0 || text[end] == '.')) {
-    ++end;
-  }
-  if (end < text.size() && (text[end] == 'e' || text[end] == 'E')) {
-    ++end;
-    end += end < text.size() && (text[end] == '+' || text[end] == '-') ? 1 : 0;
-    while (end < text.size() && std::isdigit(static_cast<unsigned char>(text[end])) != 0) {
-      ++end;
-    }
-  }
-  return end;
-}
-
 // The line up to its comment, which starts with '#' or '//'.
 std::string_view without_comment(std::string_view line) {
   bool is_quoted = false;
@@ -79,6 +57,27 @@ std::size_t closing(std::string_view text) {
 }
 
 }  // namespace
+
+std::size_t word_length(std::string_view text) {
+  return static_cast<std::size_t>(std::find_if_not(text.begin(), text.end(), is_letter) -
+                                  text.begin());
+}
+
+std::size_t number_length(std::string_view text) {
+  std::size_t end = 0;
+  while (end < text.size() &&
+         (std::isdigit(static_cast<unsigned char>(text[end])) != 0 || text[end] == '.')) {
+    ++end;
+  }
+  if (end < text.size() && (text[end] == 'e' || text[end] == 'E')) {
+    ++end;
+    end += end < text.size() && (text[end] == '+' || text[end] == '-') ? 1 : 0;
+    while (end < text.size() && std::isdigit(static_cast<unsigned char>(text[end])) != 0) {
+      ++end;
+    }
+  }
+  return end;
+}
 
 Token trimmed(Token token) {
   while (!token.text.empty() && is_blank(token.text.front())) {
@@ -130,6 +129,10 @@ bool is_synth_a_modeler(std::string_view text) {
   return false;
 }
 
+bool FaustLines::is_full() const {
+  return errors_ > most_diagnostics;
+}
+
 void FaustLines::say(Severity severity, const Origin& line, const Token& token,
                      std::string message) {
   int& told = severity == Severity::error ? errors_ : warnings_;
@@ -148,7 +151,7 @@ void FaustLines::read(std::string_view text, const Progress& progress) {
     text.remove_prefix(3);
   }
   int number = 0;
-  while (!text.empty() && errors_ <= most_diagnostics) {
+  while (!text.empty() && !is_full()) {
     const std::size_t end = std::min(text.find_first_of("\r\n"), text.size());
     read_line(text.substr(0, end), ++number);
     progress.spend(end / 4 + 1);

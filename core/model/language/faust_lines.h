@@ -32,6 +32,10 @@ struct FaustLine {
 inline constexpr std::size_t longest_expression = 10000;  // bytes, all definitions put in
 inline constexpr int deepest_expression = 50;
 
+// How long the word, or the number, at the start of the text is.
+std::size_t word_length(std::string_view text);
+std::size_t number_length(std::string_view text);
+
 // Divided at `mark`, as far as it stands in no parentheses and no quotes.
 std::vector<Token> divided(const Token& token, char mark);
 Token trimmed(Token token);
@@ -51,6 +55,7 @@ class FaustLines {
   double value(const std::string& text) const;
   bool is_number_name(const std::string& name) const { return lines_.contains(name); }
 
+  bool is_full() const;  // more errors are not told
   void say(Severity severity, const Origin& line, const Token& token, std::string message);
   void error(const Origin& line, const Token& token, std::string message) {
     say(Severity::error, line, token, std::move(message));

@@ -36,15 +36,8 @@ std::optional<SamHeard> SamTeller::factor(const SamElement& out, Token& rest, in
     }
     return inner;
   }
-  std::size_t length = 0;
-  while (length < rest.text.size() &&
-         (is_identifier(rest.text.substr(0, length + 1)) ||
-          ((rest.text[0] == '.' || (rest.text[0] >= '0' && rest.text[0] <= '9')) &&
-           (rest.text[length] == '.' || (rest.text[length] >= '0' && rest.text[length] <= '9'))))) {
-    if (++length > 1000) {
-      return refuse("this name is too long");
-    }
-  }
+  const std::size_t length =
+      is_identifier(rest.text.substr(0, 1)) ? word_length(rest.text) : number_length(rest.text);
   const Token word{rest.text.substr(0, length), rest.column};
   if (length == 0) {
     return refuse("expected what is heard, by its name, or a number");

@@ -121,7 +121,7 @@ void SamTeller::join_guides() {
 void SamTeller::join_row(std::size_t termination) {
   const std::size_t first = elements_[termination].guides[0];
   const SamElement& named = elements_[first];
-  const std::string label = "@" + std::string(named.statement->names[0].text);
+  const std::string label = label_of(named);
   const Origin& origin = named.statement->origin;
   const Token& word = named.statement->word;
   const std::string impedance = scaled(named, 0, "44100");

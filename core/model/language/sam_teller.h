@@ -61,6 +61,7 @@ class SamTeller {
  private:
   void declare();
   bool declare(const Statement& statement);
+  std::string label_of(const SamElement& element) const;
   void name_ends();
   void join_guides();
   void join_row(std::size_t termination);
@@ -76,6 +77,7 @@ class SamTeller {
   void add_forces();
   void write(const SamElement& element);
   void write_resonators(const SamElement& element);
+  std::string like(std::string_view name) const;
   void write_link(const SamElement& element);
   void write_output(const SamElement& element);
   std::optional<SamHeard> sum(const SamElement& out, Token& rest, int depth);

@@ -47,6 +47,9 @@ ToldText SamTeller::tell(std::string_view text, const Progress& progress) {
          "@" + lines_.parameters[i] + " param " + print_number(lines_.values[i]));
   }
   for (const SamElement& element : elements_) {
+    if (lines_.is_full()) {
+      break;
+    }
     write(element);
     progress.spend(20);
   }
@@ -112,19 +115,24 @@ bool SamTeller::declare(const Statement& statement) {
   return true;
 }
 
+std::string SamTeller::label_of(const SamElement& element) const {
+  const std::string_view name = element.statement->names[0].text;
+  std::string label = "@" + std::string(name);
+  while (is_channel(name) && by_name_.contains(std::string_view(label).substr(1))) {
+    label += "_";
+  }
+  return label;
+}
+
 void SamTeller::name_ends() {
   for (SamElement& element : elements_) {
-    std::string label(element.statement->names[0].text);
     switch (element.shape->kind) {
       case SamKind::mass:
       case SamKind::ground:
-        element.end = "@" + label;
-        while (is_channel(label) && by_name_.contains(std::string_view(element.end).substr(1))) {
-          element.end += "_";
-        }
+        element.end = label_of(element);
         break;
       case SamKind::resonators:
-        element.end = "[@" + label + " p]";
+        element.end = "[" + label_of(element) + " p]";
         break;
       case SamKind::port:
         element.end = "@in" + std::to_string(++ports_);
@@ -209,7 +217,7 @@ void SamTeller::write(const SamElement& element) {
 // A mode of mass m_i gives way as one of m_1 whose place moves sqrt(m_1/m_i) as far.
 void SamTeller::write_resonators(const SamElement& element) {
   const Origin& origin = element.statement->origin;
-  const std::string label = "@" + std::string(element.statement->names[0].text);
+  const std::string label = label_of(element);
   emit(origin, label + " body " + scaled(element, 2, "1944810000") + " p");
   const std::string first = number(element, 2);
   for (std::size_t at = 0; at + 2 < element.statement->arguments.size(); at += 3) {
@@ -232,33 +240,38 @@ void SamTeller::write_resonators(const SamElement& element) {
   }
 }
 
+// The nearest name of what a link may hold.
+std::string SamTeller::like(std::string_view name) const {
+  std::vector<std::string_view> names;
+  for (const SamElement& other : elements_) {
+    if (!other.end.empty() && names.size() < most_suggestions) {
+      names.push_back(other.statement->names[0].text);
+    }
+  }
+  return suggestion(name, names);
+}
+
 void SamTeller::write_link(const SamElement& element) {
   const Statement& statement = *element.statement;
   std::string ends;
   for (std::size_t side = 1; side <= 2; ++side) {
     const Token& name = statement.names[side];
     const auto found = by_name_.find(name.text);
-    const bool is_termination =
-        found != by_name_.end() && elements_[found->second].shape->kind == SamKind::termination;
-    if (found == by_name_.end() || is_termination || elements_[found->second].end.empty()) {
-      std::vector<std::string_view> names;
-      for (const SamElement& other : elements_) {
-        if (!other.end.empty()) {
-          names.push_back(other.statement->names[0].text);
-        }
-      }
-      if (found == by_name_.end() || elements_[found->second].shape->kind != SamKind::junction) {
-        error(element, name,
-              found == by_name_.end()
-                  ? "nothing is called " + quoted(name.text) + suggestion(name.text, names)
-                  : "expected a mass, a ground, a port, resonators or a junction, found " +
-                        quoted(name.text));
-      }
-      return;  // a junction without a row has been told
+    if (found == by_name_.end()) {
+      return error(element, name, "nothing is called " + quoted(name.text) + like(name.text));
     }
-    ends += " " + elements_[found->second].end;
+    const SamElement& end = elements_[found->second];
+    if (end.shape->kind == SamKind::junction && end.end.empty()) {
+      return;  // its row has been told
+    }
+    if (end.shape->kind == SamKind::termination || end.end.empty()) {
+      return error(element, name,
+                   "expected a mass, a ground, a port, resonators or a junction, found " +
+                       quoted(name.text));
+    }
+    ends += " " + end.end;
   }
-  const std::string label = "@" + std::string(statement.names[0].text);
+  const std::string label = label_of(element);
   const std::string damping = scaled(element, 1, "44100");
   switch (element.shape->kind) {
     case SamKind::link:

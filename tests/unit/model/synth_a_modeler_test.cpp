@@ -230,7 +230,7 @@ TEST_CASE("Synth-A-Modeler's mistakes are told with their lines", "[synth_a_mode
 TEST_CASE("what is read as something else is said", "[synth_a_modeler]") {
   check_warning(
       "port(),p;\nground(0.0),g;\nmass(1.0,0.0,0.0),m;\nlink(1.0,0.0,0.0),l,m,p;\n"
-      "link(1.0,0.0,0.0),k,m,g;\naudioout,a,0.5*m;\n",
+      "link(1.0,0.0,0.0),k,m,g;\naudioout,a,5.0e-1*m;\n",
       6, 1, "'a' loses its gains: outputs are positions; a preset says how loud");
   // What is found in our own language is told of the line that it comes from.
   check_warning(
@@ -250,6 +250,14 @@ TEST_CASE("our own language stays what it is", "[synth_a_modeler]") {
   CHECK(network_of("# mass(1.0,0.0,0.0),m;\n@m osc 1. 0.1 0. 0. 0.\n@out1 posOutput @m\n")
             .masses.size() == 1);
   CHECK(parse_network("mass of a note\n@m osc 1. 0.1 0. 0. 0.\n@out1 posOutput @m\n").ok());
+}
+
+TEST_CASE("an element may be called as a channel of ours is", "[synth_a_modeler]") {
+  const Network network = network_of(
+      "mass(1.0,0.0,0.0),in1;\nmass(1.0,0.0,0.0),in1_;\nport(),q;\nlink(1.0,0.0,0.0),out1,in1,q;\n"
+      "link(1.0,0.0,0.0),l,in1_,in1;\naudioout,a,in1;\n");
+  CHECK(network.masses[network.outputs[0].mass].name.text() == "in1__");
+  CHECK(network.links[0].name.text() == "out1_");
 }
 
 TEST_CASE("no harm done to a text does harm", "[synth_a_modeler]") {
