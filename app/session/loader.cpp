@@ -46,14 +46,14 @@ int lines_of(std::string_view text) {
 }
 
 // Which file a line of the model's whole text comes from.
-const ModelText& text_at(const Scene& scene, int line) {
-  const ModelText* found = &scene.texts.front();
+ModelText text_at(const Scene& scene, int line) {
+  ModelText found{scene.model_path, 1};
   for (const ModelText& text : scene.texts) {
     if (text.first_line <= line) {
-      found = &text;
+      found = text;
     }
   }
-  return *found;
+  return found;
 }
 
 class SceneReader {
@@ -187,7 +187,7 @@ class SceneReader {
     Lines lines(text);
     for (Diagnostic& diagnostic : parsed.diagnostics) {
       const std::string source = lines.at(diagnostic.line);
-      const ModelText& file = text_at(scene_, diagnostic.line);
+      const ModelText file = text_at(scene_, diagnostic.line);
       diagnostic.line -= file.first_line - 1;
       out_.findings.push_back({file.path, diagnostic, source});
       if (diagnostic.severity == Severity::warning) {
@@ -241,7 +241,7 @@ Finding finding_of(const std::string& file, std::string_view text, const Error& 
 }
 
 Finding finding_in_model(const Scene& scene, const Error& error) {
-  const ModelText& file = text_at(scene, error.line);
+  const ModelText file = text_at(scene, error.line);
   Error there = error;
   there.line -= error.line > 0 ? file.first_line - 1 : 0;
   const auto text = read_text(file.path, max_model_bytes);

@@ -212,6 +212,9 @@ Result<Network> tune_modes(const Network& network, std::span<const double> param
                            std::span<const double> frequencies_hz, const ModeOptions& options) {
   const std::size_t count = frequencies_hz.size();
   const auto lines = spring_lines(network);
+  if (!lines) {
+    return lines.error();
+  }
   if (lines->size() < count && !network.macros.empty()) {
     const auto is_place = [&](std::uint32_t mass) {
       return network.masses[mass].kind == MassKind::point;
