@@ -5,6 +5,7 @@
 #include <numbers>
 #include <string>
 
+#include "core/compile/accuracy/loaded_waveguide.h"
 #include "core/compile/accuracy/pitches.h"
 #include "core/compile/accuracy/waveguide_pitch.h"
 #include "core/compile/cull.h"
@@ -182,6 +183,19 @@ Planned find_forms(const Request& request, Machine machine, const Analysis& anal
                    options.progress, promise);
 }
 
+Pitches find_pitches(const Request& request, const Network& network, const Machine& machine,
+                     const LowestShapes& shapes) {
+  if (network.waveguides.empty()) {
+    return make_pitches(shapes, stepping_of_lowest(machine, shapes), request.options.rate_hz,
+                        request.rate_ratio);
+  }
+  if (auto loaded = loaded_waveguide_pitches(machine, machine.parameters)) {
+    return *std::move(loaded);
+  }
+  return make_pitches(shapes, {.scheme = Stepping::Scheme::exact}, request.options.rate_hz,
+                      request.rate_ratio);
+}
+
 // With what the sound is flat of its lowest mode made up for.
 Pitches sharpened(const Pitches& pitches, const Preset& preset) {
   if (preset.flattening_cents.empty()) {
@@ -284,11 +298,7 @@ Result<Compiled> compile_by_stages(const Request& request) {
   const Promise promise = make_promise(request, reduced, machine, analysis, start);
   Planned planned = find_forms(request, std::move(machine), analysis, promise);
   if (shapes) {
-    const Stepping stepping = network.waveguides.empty()
-                                  ? stepping_of_lowest(planned.machine, *shapes)
-                                  : Stepping{.scheme = Stepping::Scheme::exact};
-    analysis.pitches = make_pitches(*shapes, stepping, options.rate_hz, rate_ratio);
-    analysis.pitches = sharpened(analysis.pitches, preset);
+    analysis.pitches = sharpened(find_pitches(request, network, planned.machine, *shapes), preset);
     reach(analysis, planned.more, options.rate_hz);
   }
   if (auto error = shortage(planned.machine, voices, options.precision, options.most_bytes)) {
