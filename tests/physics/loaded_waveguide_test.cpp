@@ -60,7 +60,7 @@ TEST_CASE("masses and springs on a waveguide do not untune it", "[loaded_wavegui
       // a finger that damps and stiffens
       "@g ground 0.\n@h spring [@s 0.45] @g 0.01 0.002\n",
       // a string of masses beside it
-      "@t string 9 1. 0.04 0.0005 0. 0.\n@k spring [@s 0.77] [@t 0.5] 0.4 0.0005\n",
+      "@t string 9 1. 0.02 0.0005 0. 0.\n@k spring [@s 0.77] [@t 0.5] 0.02 0.0005\n",
       // two places, tied to one mass
       "@m mass 30. 0. 0.\n@k spring [@s 0.9] @m 0.7\n@l spring [@s 0.95] @m 0.6 0.01\n",
       // another waveguide, tied by its bridge
