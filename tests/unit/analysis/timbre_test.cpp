@@ -5,8 +5,12 @@
 #include <numbers>
 
 #include "core/analysis/timbre/descriptors.h"
+#include "core/analysis/timbre/envelope.h"
+#include "core/analysis/timbre/frame_analysis.h"
 #include "core/analysis/timbre/modal_spectrum.h"
+#include "core/analysis/timbre/pitch.h"
 #include "core/analysis/timbre/window.h"
+#include "core/linear_algebra/fourier.h"
 #include "tests/support/catch.h"
 #include "tests/support/random.h"
 
@@ -273,4 +277,216 @@ TEST_CASE("Modes in a frame are described without a sound", "[timbre]") {
                         {Window::blackman, 512, 100000}, rate);
   REQUIRE(one.size() == 1);
   CHECK(one[0].amplitude == near(0.5));
+}
+
+namespace {
+
+// Sum of A e^(-6.9078 t/T) sin 2 pi f t at 48 kHz: a bell.
+std::vector<double> bell(std::size_t samples) {
+  const double modes[][3] = {{220.0, 2.0, 1.0},
+                             {441.5, 1.2, 0.6},
+                             {667.0, 0.8, 0.4},
+                             {1210.0, 0.4, 0.3},
+                             {2903.0, 0.15, 0.2}};
+  std::vector<double> sound(samples);
+  for (const auto& [f, t60, a] : modes) {
+    for (std::size_t n = 0; n < samples; ++n) {
+      const double t = static_cast<double>(n) / 48000.0;
+      sound[n] +=
+          a * std::exp(-std::log(1000.0) * t / t60) * std::sin(2.0 * std::numbers::pi * f * t);
+    }
+  }
+  return sound;
+}
+
+FrameTimbre frame_of(std::span<const double> samples, SpectrumKind kind,
+                     std::optional<double> f0_hz = {}) {
+  FrameAnalysis frames({.rate_hz = 48000.0, .size = samples.size(), .kind = kind, .f0_hz = f0_hz});
+  return frames.next(samples);
+}
+
+}  // namespace
+
+TEST_CASE("A frame of harmonics is described as elsewhere", "[timbre]") {
+  std::vector<double> sound(4096);
+  for (std::size_t n = 0; n < sound.size(); ++n) {
+    for (int h = 1; h <= 10; ++h) {
+      sound[n] +=
+          std::cos(2.0 * std::numbers::pi * 40.0 * h * static_cast<double>(n) / 4096.0 + h) / h;
+    }
+  }
+  const auto shape = frame_of(sound, magnitude).shape;
+  REQUIRE(shape);
+  CHECK(shape->centroid_hz == near(1600.3929));
+  CHECK(shape->spread_hz == near(1250.92932));
+  CHECK(*shape->skewness == Approx(0.98432).margin(5e-6));  // as many digits as are known
+  CHECK(*shape->kurtosis == Approx(2.82699).margin(5e-6));
+  CHECK(shape->rolloff95_hz == 2812.5);
+  const auto squared = frame_of(sound, power).shape;
+  CHECK(squared->centroid_hz == near(885.909444));
+  CHECK(squared->spread_hz == near(795.621404));
+  CHECK(*squared->skewness == Approx(2.53698).margin(5e-6));
+  CHECK(*squared->kurtosis == Approx(9.65703).margin(5e-6));
+  CHECK(squared->rolloff95_hz == 2812.5);
+}
+
+TEST_CASE("A bell's frames are described as elsewhere, and as its modes are", "[timbre]") {
+  const auto sound = bell(26048);
+  const struct {
+    std::size_t at;
+    SpectrumKind kind;
+    double centroid_hz;
+    double spread_hz;
+    double centroid_bound;  // of the closed form
+    double spread_bound;
+  } frames[] = {{0, magnitude, 555.519845, 566.711753, 0.01, 0.034},
+                {0, power, 352.572113, 281.340833, 0.0014, 0.052},
+                {24000, magnitude, 262.306912, 103.973251, 0.01, 0.034},
+                {24000, power, 227.319045, 42.6790185, 0.0014, 0.052}};
+  std::vector<DecayingPartial> partials;
+  for (const auto& [f, t60, a] : {std::array{220.0, 2.0, 1.0},
+                                  {441.5, 1.2, 0.6},
+                                  {667.0, 0.8, 0.4},
+                                  {1210.0, 0.4, 0.3},
+                                  {2903.0, 0.15, 0.2}}) {
+    partials.push_back({f, pole_radius(t60, 48000.0), a});
+  }
+  for (const auto& expected : frames) {
+    INFO("at " << expected.at);
+    const auto shape = frame_of(std::span(sound).subspan(expected.at, 2048), expected.kind).shape;
+    REQUIRE(shape);
+    CHECK(shape->centroid_hz == near(expected.centroid_hz));
+    CHECK(shape->spread_hz == near(expected.spread_hz));
+    const auto closed = spectral_shape(
+        partials_in_frame(partials, {Window::hann, 2048, expected.at}, 48000.0), expected.kind);
+    CHECK(closed->centroid_hz == Approx(shape->centroid_hz).epsilon(expected.centroid_bound));
+    CHECK(closed->spread_hz == Approx(shape->spread_hz).epsilon(expected.spread_bound));
+  }
+}
+
+TEST_CASE("Partials are found between bins, and while they decay", "[timbre]") {
+  // Of a lone one the window's derivative gives the frequency itself.
+  for (const double f : {440.0, 445.3, 451.0, 12345.6}) {
+    std::vector<double> sound(2048);
+    for (std::size_t n = 0; n < sound.size(); ++n) {
+      const double t = static_cast<double>(n) / 48000.0;
+      sound[n] =
+          0.5 * std::exp(-std::log(1000.0) * t) * std::sin(2.0 * std::numbers::pi * f * t + 1.0);
+    }
+    FrameAnalysis frames({.rate_hz = 48000.0});
+    static_cast<void>(frames.next(sound));
+    const auto partials = frames.partials();
+    const auto loudest = std::max_element(
+        partials.begin(), partials.end(),
+        [](const Partial& a, const Partial& b) { return a.amplitude < b.amplitude; });
+    REQUIRE(loudest != partials.end());
+    INFO(f);
+    CHECK(loudest->frequency_hz == Approx(f).margin(2e-3));
+    // What it is in the middle of the frame, or nearly: the window is not all there.
+    CHECK(loudest->amplitude ==
+          Approx(0.5 * std::exp(-std::log(1000.0) * 1024.0 / 48000.0)).epsilon(2e-3));
+  }
+}
+
+TEST_CASE("A sound's harmonics are described as its partials are", "[timbre]") {
+  constexpr double b = 1e-3;
+  std::vector<double> sound(4096);
+  std::vector<double> odd(4096);
+  for (std::size_t n = 0; n < sound.size(); ++n) {
+    const double turn = 2.0 * std::numbers::pi * 220.0 * static_cast<double>(n) / 48000.0;
+    for (int k = 1; k <= 10; ++k) {
+      sound[n] += std::sin(turn * k * std::sqrt(1.0 + b * k * k) / std::sqrt(1.0 + b) + k) / k;
+      odd[n] += k % 2 == 1 ? std::sin(turn * k) / k : 0.0;
+    }
+  }
+  const auto stiff = frame_of(sound, magnitude, 220.0);
+  REQUIRE(stiff.harmonics);
+  // Windows of neighbours overlap a little.
+  CHECK(stiff.harmonics->inharmonicity == Approx(0.0331121446).epsilon(5e-3));
+  CHECK(*stiff.harmonics->odd_to_even == Approx(3.23546315).epsilon(1e-3));
+  CHECK(stiff.harmonics->tristimulus[0] == Approx(0.341417).epsilon(1e-3));
+  CHECK(*stiff.noisiness < 1e-3);
+  // Nothing between the odd ones is taken for an even one.
+  CHECK(frame_of(odd, magnitude, 220.0).harmonics->odd_to_even.value_or(1e9) > 1e6);
+  CHECK(*find_f0(sound, 48000.0) == Approx(220.0).epsilon(1e-4));
+  CHECK(*find_f0(odd, 48000.0) == Approx(220.0).epsilon(1e-4));
+
+  Random random(5);
+  std::vector<double> noise(4096);
+  for (double& sample : noise) {
+    sample = random.uniform(-1.0, 1.0);
+  }
+  CHECK(*frame_of(noise, magnitude, 220.0).noisiness > 0.5);
+  CHECK_FALSE(find_f0(noise, 48000.0));
+  CHECK_FALSE(find_f0(std::vector<double>(4096), 48000.0));
+}
+
+TEST_CASE("An envelope is the amplitude of what swings", "[timbre]") {
+  // A carrier that rises in 10 ms and then falls by 60 dB a second; the low-pass rounds the
+  // corners.
+  std::vector<double> sound;
+  for (int n = 0; n < 96000; ++n) {
+    const double a = n < 480 ? n / 480.0 : std::exp(-std::log(1000.0) * (n - 480) / 48000.0);
+    sound.push_back(0.3 * a * std::sin(2.0 * std::numbers::pi * 997.0 * n / 48000.0));
+  }
+  std::vector<double> envelope;
+  Envelope follower(48000.0, [&](double value) { envelope.push_back(value); });
+  for (std::size_t n = 0; n < sound.size(); n += 777) {
+    follower.add(std::span(sound).subspan(n, std::min<std::size_t>(777, sound.size() - n)));
+  }
+  follower.end();
+  REQUIRE(envelope.size() == sound.size());
+  for (const int n : {4000, 20000, 40000}) {
+    INFO(n);
+    CHECK(envelope[static_cast<std::size_t>(n)] ==
+          Approx(0.3 * std::exp(-std::log(1000.0) * (n - 480) / 48000.0)).epsilon(2e-3));
+  }
+  const auto shape = temporal_shape(envelope, 48000.0);
+  CHECK(shape->temporal_centroid_s == Approx(0.1498184).margin(3e-4));
+  CHECK(shape->effective_duration_s == Approx(0.1386458).margin(5e-3));
+  CHECK(*shape->decay_slope == Approx(-std::log(1000.0)).epsilon(2e-2));
+  CHECK(std::pow(10.0, shape->log_attack_time) == Approx(0.009).margin(3e-3));
+}
+
+TEST_CASE("Nothing of a frame is NaN", "[timbre]") {
+  FrameAnalysis frames({.rate_hz = 48000.0, .size = 64, .f0_hz = 1500.0});
+  const auto silence = frames.next(std::vector<double>(64));
+  CHECK(silence.rms == 0.0);
+  CHECK_FALSE(silence.shape);
+  CHECK_FALSE(silence.flux);
+  CHECK_FALSE(silence.harmonics);
+  CHECK_FALSE(frames.next(std::vector<double>(64, std::nan(""))).shape);
+  const auto constant = frames.next(std::vector<double>(64, 1.0));
+  CHECK_FALSE(constant.flux);  // since silence
+  REQUIRE(constant.shape);
+  CHECK(std::isfinite(constant.shape->centroid_hz));
+  CHECK(*frames.next(std::vector<double>(64, 0.5)).flux == Approx(0.0).margin(1e-12));
+}
+
+TEST_CASE("The transform is the sum that it is defined as, of any size", "[timbre]") {
+  Random random(9);
+  for (const std::size_t size : {2u, 3u, 4u, 6u, 17u, 50u, 64u, 1000u}) {
+    std::vector<double> x(size);
+    for (double& sample : x) {
+      sample = random.uniform(-1.0, 1.0);
+    }
+    Fourier fourier(size);
+    std::vector<std::complex<double>> bins(fourier.bins());
+    fourier.forward(x, bins);
+    for (std::size_t k = 0; k < bins.size(); ++k) {
+      std::complex<double> sum;
+      for (std::size_t n = 0; n < size; ++n) {
+        sum += x[n] * std::polar(1.0, -2.0 * std::numbers::pi * static_cast<double>(n * k % size) /
+                                          static_cast<double>(size));
+      }
+      CHECK(std::abs(bins[k] - sum) < 1e-12 * static_cast<double>(size));
+    }
+    if (size % 2 == 0) {
+      std::vector<double> back(size);
+      fourier.inverse(bins, back);
+      for (std::size_t n = 0; n < size; ++n) {
+        CHECK(back[n] == Approx(x[n]).margin(1e-12));
+      }
+    }
+  }
 }
