@@ -10,7 +10,7 @@ double pole_radius(double t60_s, double rate_hz) {
 }
 
 std::vector<Partial> partials_in_frame(std::span<const DecayingPartial> partials,
-                                       const Frame& frame, double rate_hz) {
+                                       const ModalFrame& frame, double rate_hz) {
   std::vector<Partial> lines;
   for (const DecayingPartial& partial : partials) {
     if (partial.frequency_hz > 0.0 && partial.frequency_hz < 0.5 * rate_hz) {

@@ -29,7 +29,7 @@ struct DecayingPartial {
 double pole_radius(double t60_s, double rate_hz);
 
 // Which samples a frame has.
-struct Frame {
+struct ModalFrame {
   Window window = Window::hann;
   std::size_t size = 2048;  // samples
   std::size_t at = 0;       // its first one
@@ -38,7 +38,7 @@ struct Frame {
 // The amplitude that each partial has in a frame: |residue| r^at |sum w[m] r^m| / sum w[m]. Those
 // whose frequency is not above 0 and below half the rate are left out. O(partials)
 std::vector<Partial> partials_in_frame(std::span<const DecayingPartial> partials,
-                                       const Frame& frame, double rate_hz);
+                                       const ModalFrame& frame, double rate_hz);
 
 // The shape of lines in ascending order of frequency; nothing of silence.
 std::optional<SpectralShape> spectral_shape(std::span<const Partial> partials, SpectrumKind kind);
