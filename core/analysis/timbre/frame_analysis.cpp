@@ -3,12 +3,16 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <utility>
 
 namespace ressort {
 namespace {
 
 // How far from its largest bin a partial may be, in bins. What is further is the edge of another.
 constexpr double farthest_bin = 0.75;
+
+// Below the loudest, as amplitude: what is weaker is no partial, but rounding.
+constexpr double quietest_share = 1e-5;
 
 double square(double x) {
   return x * x;
@@ -102,8 +106,9 @@ std::vector<Partial> FrameAnalysis::partials() const {
   for (std::size_t k = 0; k < bins_.size(); ++k) {
     level[k] = std::norm(windowed(k, Window::hann));
   }
+  const double least = square(quietest_share) * *std::max_element(level.begin(), level.end());
   for (std::size_t k = 1; k + 1 < bins_.size(); ++k) {
-    if (!(level[k] > level[k - 1]) || level[k] < level[k + 1]) {
+    if (!(level[k] > level[k - 1]) || level[k] < level[k + 1] || level[k] < least) {
       continue;
     }
     // The frame times the window's derivative, over that times the window: i times the bins between
@@ -117,6 +122,21 @@ std::vector<Partial> FrameAnalysis::partials() const {
     }
   }
   return found;
+}
+
+FrameStream::FrameStream(const FrameOptions& options, std::size_t hop, Sink sink)
+    : size_(options.size), hop_(hop), sink_(std::move(sink)), analysis_(options) {}
+
+void FrameStream::add(std::span<const double> samples) {
+  samples_.insert(samples_.end(), samples.begin(), samples.end());
+  while (next_ + size_ <= first_ + samples_.size()) {
+    const FrameTimbre timbre = analysis_.next(std::span(samples_).subspan(next_ - first_, size_));
+    sink_(next_, timbre, analysis_);
+    next_ += hop_;
+  }
+  const std::size_t done = std::min(next_ - first_, samples_.size());  // a hop may skip samples
+  samples_.erase(samples_.begin(), samples_.begin() + static_cast<std::ptrdiff_t>(done));
+  first_ += done;
 }
 
 }  // namespace ressort

@@ -3,6 +3,7 @@
 
 #include <complex>
 #include <cstddef>
+#include <functional>
 #include <optional>
 #include <span>
 #include <vector>
@@ -43,7 +44,8 @@ class FrameAnalysis {
   const std::vector<double>& frequencies_hz() const { return frequencies_hz_; }  // [bin]
   // Of the last frame: [bin] amplitude of a sinusoid there, or its square.
   const std::vector<double>& spectrum() const { return spectrum_; }
-  // What rises above its neighbours in the last frame, by frequency.
+  // What rises above its neighbours in the last frame, down to 100 dB below the loudest, by
+  // frequency.
   std::vector<Partial> partials() const;
 
  private:
@@ -58,6 +60,26 @@ class FrameAnalysis {
   std::vector<double> spectrum_;
   std::vector<double> before_;  // the spectrum of the frame before
   bool has_before_ = false;
+};
+
+// Cuts what comes, in pieces of any length, into frames that start `hop` samples apart.
+class FrameStream {
+ public:
+  // `sink` gets the first sample's number and the frame; `analysis` still has its spectrum then.
+  using Sink =
+      std::function<void(std::size_t at, const FrameTimbre& timbre, const FrameAnalysis& analysis)>;
+  FrameStream(const FrameOptions& options, std::size_t hop, Sink sink);
+
+  void add(std::span<const double> samples);
+
+ private:
+  std::size_t size_;
+  std::size_t hop_;
+  Sink sink_;
+  FrameAnalysis analysis_;
+  std::vector<double> samples_;  // from `first_` on
+  std::size_t first_ = 0;        // number of samples_[0]
+  std::size_t next_ = 0;         // where the next frame starts
 };
 
 }  // namespace ressort

@@ -15,13 +15,14 @@ constexpr double lowest_hz = 50.0;
 constexpr double highest_share = 0.2;    // of the rate
 constexpr double nearly_as_good = 0.93;  // of the best lag's correlation
 constexpr double good_enough = 0.6;      // 1: the sound repeats itself
+constexpr double least_left = 1e-3;      // of the energy, in the second half
 constexpr double partial_apart = 0.06;   // of f0: a semitone
 constexpr double partial_share = 0.01;   // of the loudest partial's amplitude
 
 }  // namespace
 
 std::size_t pitch_samples(double rate_hz) {
-  return std::bit_ceil(static_cast<std::size_t>(4.0 * rate_hz / lowest_hz));
+  return std::bit_ceil(static_cast<std::size_t>(8.0 * rate_hz / lowest_hz));
 }
 
 std::optional<double> find_f0(std::span<const double> samples, double rate_hz) {
@@ -83,8 +84,11 @@ std::optional<double> find_f0(std::span<const double> samples, double rate_hz) {
   const double top = static_cast<double>(*first) + (bend < 0.0 ? 0.5 * (left - right) / bend : 0.0);
   const double f0_hz = rate_hz / top;
 
-  FrameAnalysis frame({.rate_hz = rate_hz, .size = count});
-  static_cast<void>(frame.next(samples));
+  // In the second half, where an attack is over, unless it is over altogether.
+  const std::size_t half =
+      energy[count] - energy[count / 2] > least_left * energy[count] ? count / 2 : 0;
+  FrameAnalysis frame({.rate_hz = rate_hz, .size = count - half});
+  static_cast<void>(frame.next(samples.subspan(half)));
   const std::vector<Partial> partials = frame.partials();
   double loudest = 0.0;
   for (const Partial& partial : partials) {

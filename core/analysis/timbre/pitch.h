@@ -7,7 +7,7 @@
 
 namespace ressort {
 
-// How many samples are enough for it, at a rate: four periods of 50 Hz, a power of two.
+// How many samples are enough for it, at a rate: eight periods of 50 Hz, a power of two.
 std::size_t pitch_samples(double rate_hz);
 
 // By the normalised autocorrelation of McLeod and Wyvill 2005: the shortest lag that is nearly as
