@@ -9,7 +9,8 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-constexpr std::chrono::milliseconds poll_time{5};  // the ring holds more than half a second
+constexpr std::chrono::milliseconds poll_time{
+    10};  // of blocks of 16 the ring holds a third of a second
 constexpr std::size_t most_frames = 94;
 
 std::size_t recent_samples(double rate_hz) {

@@ -33,6 +33,7 @@ std::optional<SpectralShape> spectral_shape(std::span<const double> frequencies_
   double sum = 0.0;  // of a over the largest, so that no square is too small
   double energy = 0.0;
   double logs = 0.0;
+  double a_logs = 0.0;
   double moment = 0.0;
   double f_sum = 0.0;
   double ff_sum = 0.0;
@@ -42,7 +43,9 @@ std::optional<SpectralShape> spectral_shape(std::span<const double> frequencies_
     const double f = frequencies_hz[k];
     sum += a;
     energy += kind == SpectrumKind::magnitude ? a * a : a;
-    logs += std::log(a);  // -infinity of 0, whose mean is 0
+    const double log_a = std::log(a);
+    logs += log_a;  // -infinity of 0, whose mean is 0
+    a_logs += a > 0.0 ? a * log_a : 0.0;
     moment += f * a;
     f_sum += f;
     ff_sum += f * f;
@@ -55,7 +58,7 @@ std::optional<SpectralShape> spectral_shape(std::span<const double> frequencies_
   double second = 0.0;
   double third = 0.0;
   double fourth = 0.0;
-  double entropy = 0.0;
+  const double entropy = std::log(sum) - a_logs / sum;  // - sum p log p
   double below = 0.0;
   bool has_rolled_off = false;
   for (std::size_t k = 0; k < spectrum.size(); ++k) {
@@ -63,9 +66,8 @@ std::optional<SpectralShape> spectral_shape(std::span<const double> frequencies_
     const double p = a / sum;
     const double away = frequencies_hz[k] - shape.centroid_hz;
     second += away * away * p;
-    third += away * away * away * p;
-    fourth += away * away * away * away * p;
-    entropy -= p > 0.0 ? p * std::log(p) : 0.0;
+    third += away * away * p * away;
+    fourth += away * away * p * (away * away);
     below += kind == SpectrumKind::magnitude ? a * a : a;
     if (!has_rolled_off && below >= rolloff_share * energy) {
       has_rolled_off = true;

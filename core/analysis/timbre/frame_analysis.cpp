@@ -78,7 +78,7 @@ FrameTimbre FrameAnalysis::next(std::span<const double> samples) {
   fourier_.forward(samples, bins_);
   const double scale = 2.0 / (window_cosines(options_.window)[0] * size);
   for (std::size_t k = 0; k < bins_.size(); ++k) {
-    const double amplitude = scale * std::abs(windowed(k, options_.window));
+    const double amplitude = scale * std::sqrt(std::norm(windowed(k, options_.window)));
     spectrum_[k] = options_.kind == SpectrumKind::magnitude ? amplitude : amplitude * amplitude;
   }
   timbre.shape = spectral_shape(frequencies_hz_, spectrum_, options_.kind);
