@@ -6,6 +6,7 @@
 #include <cstdio>
 #include <filesystem>
 
+#include "app/commands/body/recording.h"
 #include "app/commands/offline.h"
 #include "app/commands/progress_bar.h"
 #include "app/commands/timbre/describe_text.h"
@@ -58,6 +59,25 @@ class TemporaryFolder {
   std::string path_;
 };
 
+// Of a sound file, with its modes if they are wanted. That nothing rings in it is only told.
+Result<Description> describe_file(const std::string& path, const DescribeOptions& options,
+                                  const DescriptionProgress& progress) {
+  auto description = describe_sound(path, options.how, progress);
+  if (!description || options.modes == 0) {
+    return description;
+  }
+  const Progress goes_on([&](std::string_view) { return progress(1.0); });
+  const auto found = identify_recording(path, {.most_modes = options.modes}, goes_on);
+  if (!found) {
+    std::fprintf(stderr, "%s: no modes\n", found.error().message.c_str());
+    return description;
+  }
+  for (const IdentifiedMode& mode : found->modes) {
+    description->modes.push_back({mode.frequency_hz.value, mode.t60_s.value});
+  }
+  return description;
+}
+
 Result<Description> describe_note(const DescribeOptions& options, const Progress& loading,
                                   const DescriptionProgress& progress) {
   const auto folder = TemporaryFolder::make();
@@ -92,7 +112,7 @@ Result<Description> describe_note(const DescribeOptions& options, const Progress
                  "; try another --note"};
   }
   auto description =
-      describe_sound(path, options.how, [&](double share) { return progress(0.5 + 0.5 * share); });
+      describe_file(path, options, [&](double share) { return progress(0.5 + 0.5 * share); });
   if (description) {
     description->of = rendered->name + ", key " + std::to_string(options.key) + ", rendered";
   }
@@ -161,7 +181,7 @@ int describe(const DescribeOptions& options, const std::function<bool()>& goes_o
       bar.show(share, options.name);
       return goes_on();
     };
-    description = names_sound(options.name) ? describe_sound(options.name, options.how, progress)
+    description = names_sound(options.name) ? describe_file(options.name, options, progress)
                                             : describe_model(options, progress);
   }
   if (!goes_on()) {

@@ -17,6 +17,7 @@ struct DescribeOptions {
   bool force = false;   // write over a file that is there
   bool as_json = false;
   DescriptionOptions how;
+  std::size_t modes = 0;     // of a sound: as many as are looked for, to tell their T60
   double rate_hz = 44100.0;  // of models and presets, as render has it
   int key = 57;              // of presets: the note that is rendered,
   double seconds = 3.0;      // for so long; it is held for two thirds of that

@@ -70,6 +70,10 @@ void add_describe(CLI::App& app, DescribeOptions& options,
                    "the fundamental in Hz; without it, that of the loudest stretch, or of the\n"
                    "lowest mode")
       ->check(within(1.0, 384000.0));
+  command
+      ->add_option("--modes", options.modes,
+                   "tell the T60 of so many modes of a sound, as 'body' finds them")
+      ->check(whole(1.0, 400.0));
   command->add_option("-r,--rate", options.rate_hz, "the sample rate of a model or a preset, in Hz")
       ->check(within(8000.0, 768000.0))
       ->capture_default_str();

@@ -73,7 +73,7 @@ void print_json(const Description& description, const DescriptionOptions& option
     head[std::string(figure.name)] =
         description.temporal ? number(figure.of(*description.temporal)) : json();
   }
-  if (description.channels == 0) {
+  if (!description.modes.empty()) {
     json modes = json::array();
     for (const DescribedMode& mode : description.modes) {
       modes.push_back({{"frequency_hz", mode.frequency_hz}, {"t60_s", number(mode.t60_s)}});
@@ -131,7 +131,16 @@ std::string to_text(const Description& description, const DescriptionOptions& op
       rows.back().resize(rows.front().size());
     }
   }
-  return text + table(rows);
+  text += table(rows);
+  if (!description.modes.empty()) {
+    rows = {{"mode Hz", "T60 s"}};
+    for (const DescribedMode& mode : description.modes) {
+      rows.push_back({fixed(mode.frequency_hz, 2),
+                      std::isfinite(mode.t60_s) ? fixed(mode.t60_s, 3) : "endless"});
+    }
+    text += "\n" + table(rows);
+  }
+  return text;
 }
 
 }  // namespace ressort

@@ -42,7 +42,7 @@ struct Description {
   std::optional<double> f0_hz;
   std::vector<DescribedFrame> frames;
   std::optional<TemporalShape> temporal;  // nothing of one frame alone
-  std::vector<DescribedMode> modes;       // in closed form
+  std::vector<DescribedMode> modes;       // where it is in closed form, or they were looked for
   // Of the loudest frame: [bin], or of closed forms [line].
   std::vector<double> frequencies_hz;
   std::vector<double> spectrum;  // as `kind` says
