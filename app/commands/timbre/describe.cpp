@@ -113,9 +113,13 @@ Result<Description> describe_note(const DescribeOptions& options, const Progress
   }
   auto description =
       describe_file(path, options, [&](double share) { return progress(0.5 + 0.5 * share); });
-  if (description) {
-    description->of = rendered->name + ", key " + std::to_string(options.key) + ", rendered";
+  const std::string note = rendered->name + ", key " + std::to_string(options.key) + ", rendered";
+  if (!description) {  // nobody knows the file
+    std::string message = description.error().message;
+    const std::size_t at = message.find(path);
+    return Error{at == message.npos ? message : message.replace(at, path.size(), note)};
   }
+  description->of = note;
   return description;
 }
 
@@ -147,9 +151,9 @@ Result<Description> describe_model(const DescribeOptions& options,
     return modes.error().message == stopped ? Error{description_stopped} : at_model(modes.error());
   }
   if (!modes->is_linear() || has_waveguide(scene->network)) {
-    return at_model(
-        {"is not linear, so how it sounds depends on how it is played: render it with a score, "
-         "and describe that file"});
+    return Error{"'" + options.name +
+                 "' is not linear, so how it sounds depends on how it is played: render it with a "
+                 "score, and describe that file"};
   }
   auto description = describe_modes(*modes, options.how);
   if (!description) {

@@ -107,7 +107,8 @@ const Word decay{"", 0.3, 2.0, "short", "neither short nor long", "long",
 
 std::string told(const Word& word, double value) {
   constexpr double most = 1e5;  // nobody hears more
-  return (value > most ? "over " : "") + with_commas(std::min(value, most), word.digits) +
+  return (value > most ? "over " : "") +
+         with_commas(std::min(value, most), value < 1000.0 ? word.digits : 0) +
          std::string(word.unit);
 }
 
