@@ -46,7 +46,7 @@ TEST_CASE("what is told of a sound as it plays is what its samples say", "[timbr
   REQUIRE(comes([&] { return harness.process.is_listening.is_raised(); }));
   harness.say("noteon 60 127");
   std::vector<double> heard;
-  for (const std::size_t frames : {1, 100, 255}) {
+  for (const std::size_t frames : {std::size_t{1}, std::size_t{100}, std::size_t{255}}) {
     for (int i = 0; i < 40; ++i) {
       for (const float sample : harness.play(frames)) {
         heard.push_back(static_cast<double>(sample));  // both channels are the same
