@@ -13,8 +13,9 @@ namespace ressort {
 namespace {
 
 constexpr std::size_t block_frames = 4096;
-constexpr double quietest_share = 1e-3;  // of the loudest frame; what is less is not counted
-constexpr double longest_ring_s = 60.0;  // of modes
+constexpr double quietest_share = 1e-3;       // of the loudest frame; what is less is not counted
+constexpr double longest_ring_s = 60.0;       // of modes
+constexpr long long most_frames = 4'000'000;  // eleven hours at 48 kHz, and 1.4 GB
 constexpr double envelope_rate_hz = 1000.0;
 
 // The mean of all channels, block by block.
@@ -222,6 +223,13 @@ Result<Description> describe_sound(const std::string& path, const DescriptionOpt
   if (description.samples < static_cast<long long>(options.frame)) {
     return too_short(path, description.samples, options);
   }
+  const auto frame_count = (description.samples - static_cast<long long>(options.frame)) /
+                               static_cast<long long>(options.hop) +
+                           1;
+  if (frame_count > most_frames) {
+    return Error{"'" + path + "' has " + std::to_string(frame_count) + " frames, more than " +
+                 std::to_string(most_frames) + "; give a larger --hop"};
+  }
   if (!description.f0_hz) {
     description.f0_hz = find_f0(loudest_stretch.get(), description.rate_hz);
   }
@@ -332,7 +340,8 @@ Result<Description> describe_modes(const NetworkModes& modes, const DescriptionO
       break;
     }
   }
-  description.samples = static_cast<long long>(description.frames.back().at + options.frame);
+  description.samples =
+      static_cast<long long>(description.frames.back().at) + static_cast<long long>(options.frame);
   if (!options.at) {
     std::vector<double> envelope;
     const auto steps = static_cast<std::size_t>(static_cast<double>(description.samples) /
