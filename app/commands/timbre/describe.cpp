@@ -59,6 +59,12 @@ class TemporaryFolder {
   std::string path_;
 };
 
+// What was told of a file that nobody knows, of what is in it.
+std::string renamed(std::string message, const std::string& path, const std::string& name) {
+  const std::size_t at = message.find(path);
+  return at == message.npos ? message : message.replace(at, path.size(), name);
+}
+
 // Of a sound file, with its modes if they are wanted. That nothing rings in it is only told.
 Result<Description> describe_file(const std::string& path, const DescribeOptions& options,
                                   const DescriptionProgress& progress) {
@@ -69,7 +75,8 @@ Result<Description> describe_file(const std::string& path, const DescribeOptions
   const Progress goes_on([&](std::string_view) { return progress(1.0); });
   const auto found = identify_recording(path, {.most_modes = options.modes}, goes_on);
   if (!found) {
-    std::fprintf(stderr, "%s: no modes\n", found.error().message.c_str());
+    const std::string why = renamed(found.error().message, path, options.name);
+    std::fprintf(stderr, "%s: no modes\n", why.c_str());
     return description;
   }
   for (const IdentifiedMode& mode : found->modes) {
@@ -114,10 +121,8 @@ Result<Description> describe_note(const DescribeOptions& options, const Progress
   auto description =
       describe_file(path, options, [&](double share) { return progress(0.5 + 0.5 * share); });
   const std::string note = rendered->name + ", key " + std::to_string(options.key) + ", rendered";
-  if (!description) {  // nobody knows the file
-    std::string message = description.error().message;
-    const std::size_t at = message.find(path);
-    return Error{at == message.npos ? message : message.replace(at, path.size(), note)};
+  if (!description) {
+    return Error{renamed(description.error().message, path, note)};
   }
   description->of = note;
   return description;
