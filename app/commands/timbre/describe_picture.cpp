@@ -70,10 +70,9 @@ class Drawer {
                       (last_s > first_s ? (time_s - first_s) / (last_s - first_s) : 0.5);
   }
   double db_of(double value) const {
-    const double most =
-        std::max(1e-300, *std::max_element(of_.spectrum.begin(), of_.spectrum.end()));
+    const double most = *std::max_element(of_.spectrum.begin(), of_.spectrum.end());
     const double factor = options_.kind == SpectrumKind::magnitude ? 20.0 : 10.0;
-    return std::clamp(factor * std::log10(std::max(value, 1e-300) / most), floor_db, 0.0);
+    return value > 0.0 ? std::clamp(factor * std::log10(value / most), floor_db, 0.0) : floor_db;
   }
   double y_of_db(double db) const {
     return spectrum_panel.top + spectrum_panel.height * db / floor_db;
@@ -88,8 +87,7 @@ class Drawer {
     std::string svg =
         label(left, spectrum_panel.top - 7.0,
               "spectrum of the " + std::string(options_.at ? "" : "loudest ") + "frame, at " +
-                  fixed(static_cast<double>(frame.at) / of_.rate_hz, 3) +
-                  " s, dB below its largest; grey band: centroid and spread",
+                  fixed(static_cast<double>(frame.at) / of_.rate_hz, 3) + " s",
               "start");
     const auto value = [&](const char* figure) { return frame.values[figure_number(figure)]; };
     const auto centroid = value("centroid_hz");
@@ -116,16 +114,18 @@ class Drawer {
     svg += of_.channels == 0 ? lines() : curve();
     if (centroid) {
       const double x = x_of(*centroid);
-      svg += line(x, spectrum_panel.top, x, spectrum_panel.bottom(), ink, "1.6") +
-             label(x - 4.0, spectrum_panel.top + 14.0,
-                   "centroid " + with_commas(*centroid, 0) + " Hz");
+      svg += line(x, spectrum_panel.top, x, spectrum_panel.bottom(), ink, "1.6");
     }
     if (rolloff) {
       const double x = x_of(*rolloff);
       svg += dashed("M" + px(x) + " " + px(spectrum_panel.top) + "V" + px(spectrum_panel.bottom()),
-                    "9 4", 1.2) +
-             label(x + 4.0, spectrum_panel.top + 14.0,
-                   "rolloff 95 % " + with_commas(*rolloff, 0) + " Hz", "start");
+                    "9 4", 1.2);
+    }
+    if (centroid && spread && rolloff) {
+      svg += label(width - right, spectrum_panel.top - 7.0,
+                   "line: centroid " + with_commas(*centroid, 0) + " Hz; band: spread " +
+                       with_commas(*spread, 0) + " Hz around it; dashes: rolloff 95 % " +
+                       with_commas(*rolloff, 0) + " Hz");
     }
     return svg + frame_box(spectrum_panel);
   }
