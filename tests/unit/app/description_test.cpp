@@ -179,7 +179,7 @@ TEST_CASE("a model's modes are described as its render is", "[description]") {
   REQUIRE(modes);
   for (const long long at : {0, 10000, 40000}) {
     for (const auto kind : {SpectrumKind::magnitude, SpectrumKind::power}) {
-      const DescriptionOptions options{.frame = 8192, .kind = kind, .at = at, .f0_hz = 92.2};
+      const DescriptionOptions options{.frame = 8192, .kind = kind, .at = at, .f0_hz = 178.7};
       const auto closed = describe_modes(*modes, options);
       REQUIRE(closed);
       const FigureValues& lines = closed->frames.at(0).values;
