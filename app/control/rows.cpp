@@ -290,6 +290,19 @@ std::vector<Row> make_rows() {
        .details = "Levels are in dB below the loudest. Of the model as its parameters are now, at "
                   "the pitch that it\nis written with.",
        .act = command::modes},
+      {.address = "/timbre",
+       .arguments = {{"SECONDS", "the seconds", 0, Subscribers::longest_lease_s, 10}},
+       .does = "sends /timbre.frame 94 times a second, for so long, at most 60 s (10): what the "
+               "sound is like; again renews it",
+       .answer = answer::timbre,
+       .command = "timbre",
+       .group = CommandGroup::looking,
+       .command_does = "tells what the sound is like: bright or dark, hollow, noisy",
+       .details =
+           "Of the last frame of 2048 samples, the mean of all outputs. Asked again, it says "
+           "what has become\nof it: brighter, hollower, steadier. 'ressort describe' tells "
+           "more of a recording.",
+       .act = command::timbre},
       {.address = "/tune",
        .arguments = {{"MODE", "the mode", 1, 10000},
                      {.word = "NOTE|HZ [T60] [PART]", .is_text = true}},
@@ -308,7 +321,7 @@ std::vector<Row> make_rows() {
            "sends every change, whoever makes it, for so long, at most 60 s (10): first all that "
            "is, then /loaded and /param/NAME; again renews it",
        .answer = answer::subscribe},
-      {.address = "/unsubscribe", .does = "ends that", .answer = answer::unsubscribe},
+      {.address = "/unsubscribe", .does = "ends that, and /timbre", .answer = answer::unsubscribe},
       {.address = "/models",
        .does = "answers the name of each model, then their number",
        .answer = answer::models},
@@ -354,11 +367,11 @@ std::vector<Row> make_rows() {
 }
 
 std::span<const std::string_view> answers() {
-  static constexpr std::string_view all[] = {"/error",        "/done",           "/fail",
-                                             "/status.reply", "/describe.reply", "/describe.end",
-                                             "/models.reply", "/models.end",     "/presets.reply",
-                                             "/presets.end",  "/loaded",         "/subscribe.reply",
-                                             "/modes.reply",  "/modes.end"};
+  static constexpr std::string_view all[] = {
+      "/error",          "/done",         "/fail",         "/status.reply",
+      "/describe.reply", "/describe.end", "/models.reply", "/models.end",
+      "/presets.reply",  "/presets.end",  "/loaded",       "/subscribe.reply",
+      "/modes.reply",    "/modes.end",    "/timbre.reply", "/timbre.frame"};
   return all;
 }
 
