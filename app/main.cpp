@@ -187,8 +187,10 @@ void add_play(CLI::App& app, PlayOptions& options, int& code) {
   CLI::App* command = app.add_subcommand("play", "plays a model or a preset");
   command->footer(play_examples);
   command
-      ->add_option("MODEL", options.name,
-                   "a preset's or a model's name, or a file; or a .mid file, which is played")
+      ->add_option(
+          "MODEL", options.name,
+          "a preset's or a model's name, or a file; or a .mid file, or a .ressort flight,\n"
+          "which is played")
       ->capture_default_str();
   command->add_option("-a,--audio", options.audio, "where the sound goes")
       ->check(CLI::IsMember({"auto", "jack", "alsa", "dummy"}))
@@ -268,6 +270,9 @@ void add_play(CLI::App& app, PlayOptions& options, int& code) {
                       "192.168.1.23,10.0.0.0/24; needed with any -B but this machine's");
   command->add_flag("--exit-on-loss", options.exit_on_loss,
                     "end with 75 when the audio server dies, instead of waiting for it");
+  command->add_flag("--watch", options.watch,
+                    "read the model and the preset again when their files change; numbers go to\n"
+                    "the voices that sound");
   command->callback([&options, &code] { code = play(options); });
 }
 
@@ -284,8 +289,10 @@ void add_render(CLI::App& app, RenderChoice& choice, int& code) {
   RenderOptions& options = choice.options;
   CLI::App* command = app.add_subcommand("render", "renders a model or a preset to a sound file");
   command->footer(render_examples);
-  CLI::Option* model =
-      command->add_option("MODEL", options.name, "a preset's or a model's name, or a file");
+  CLI::Option* model = command->add_option(
+      "MODEL", options.name,
+      "a preset's or a model's name, or a file; or a .ressort flight, of which\n"
+      "the last 30 s are rendered, or the last --seconds");
   std::string endings;
   for (const std::string_view ending : sound_endings()) {
     endings += (endings.empty() ? "" : " ") + std::string(ending);

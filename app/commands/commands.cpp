@@ -15,6 +15,7 @@
 #include <utility>
 #include <vector>
 
+#include "app/commands/flight/flight_sound.h"
 #include "app/commands/progress_bar.h"
 #include "app/commands/smf/midi_player.h"
 #include "app/control/terminal.h"
@@ -133,6 +134,9 @@ class Player {
       song = *std::move(read);
       options_.midi = PlayOptions().midi;
     }
+    if (names_flight(options_.name)) {
+      return play_flight();
+    }
     LoadNews news(options_.name, [this](const std::string& text) { voice_.say(text); });
     const Progress progress([&](std::string_view stage) {
       news.at(stage);
@@ -161,7 +165,9 @@ class Player {
                                                              .budget = options_.budget},
                                                  .gain = std::pow(10.0, options_.gain_db / 20.0),
                                                  .third = options_.third,
-                                                 .keys = options_.keys},
+                                                 .keys = options_.keys,
+                                                 .watch = options_.watch,
+                                                 .saves_flights = true},
                                   [this](const std::string& news) { voice_.say(news); });
     connect_session();
     std::promise<Result<std::shared_ptr<const Loaded>>> promise;
@@ -214,6 +220,45 @@ class Player {
       return exit_code::audio_lost;
     }
     device_ = *std::move(device);
+    return exit_code::done;
+  }
+
+  // The sound of a flight, computed first and then played as it is.
+  int play_flight() {
+    const auto player = FlightPlayer::open(options_.name, flight_heard_s);
+    if (!player) {
+      complain(player.error().message);
+      return exit_code::wrong_use;
+    }
+    for (const std::string& warning : player->warnings()) {
+      voice_.say(warning);
+    }
+    const auto tape = tape_of(*player, [this](double) { return !is_called_off(0ms); });
+    if (has_called_off_) {
+      return exit_code::done;
+    }
+    if (!tape) {
+      complain(tape.error().message);
+      return exit_code::wrong_use;
+    }
+    options_.device.outputs = static_cast<int>(std::max<std::size_t>(2, tape->channels));
+    options_.device.rate_hz = player->rate_hz();
+    if (const int failure = open_device(); failure != exit_code::done) {
+      return failure;
+    }
+    if (device_.rate_hz != player->rate_hz()) {
+      complain("the flight is at " + fixed(player->rate_hz(), 0) + " Hz, " + device_.description +
+               "; -a alsa or -a dummy plays it at its own rate, render makes a file of it");
+      return exit_code::wrong_use;
+    }
+    voice_.say(options_.name + ": the last " +
+               fixed(static_cast<double>(tape->frames()) / player->rate_hz(), 1) + " s on " +
+               device_.description);
+    tape_ = std::make_unique<const Tape>(*tape);
+    process_.tape.set(tape_.get());
+    while (!process_.is_tape_over.is_raised() && !is_called_off(50ms) && !device_.is_lost()) {
+      device_.tick();
+    }
     return exit_code::done;
   }
 
@@ -415,6 +460,7 @@ class Player {
   sigset_t signals_;
   bool has_called_off_ = false;            // by a signal
   std::optional<LastResort> last_resort_;  // from then on; it goes last
+  std::unique_ptr<const Tape> tape_;       // outlives the process that plays it
   Process process_{48000.0, true, monotonic_ns};
   Voice voice_;
   Flag quit_;
@@ -469,7 +515,8 @@ int render_command(const RenderOptions& options, bool is_quiet) {
     return true;  // a signal ends it at once
   });
   bool is_watched = false;
-  const auto rendered = render(watched, [&](double share) {
+  const auto make = names_flight(options.name) ? render_flight : render;
+  const auto rendered = make(watched, [&](double share) {
     if (!std::exchange(is_watched, true)) {
       watch_signals();
     }
@@ -494,15 +541,15 @@ int render_command(const RenderOptions& options, bool is_quiet) {
       complain(warning);
     }
     std::printf("%s: %s, %.2f s, %d %s, %g Hz, peak %s, rms %s%s\n", options.output.c_str(),
-                rendered->name.c_str(), static_cast<double>(rendered->frames) / options.rate_hz,
+                rendered->name.c_str(), static_cast<double>(rendered->frames) / rendered->rate_hz,
                 rendered->channels, rendered->channels == 1 ? "channel" : "channels",
-                options.rate_hz, db(rendered->peak).c_str(), db(rendered->rms).c_str(),
+                rendered->rate_hz, db(rendered->peak).c_str(), db(rendered->rms).c_str(),
                 rendered->was_interrupted ? ", interrupted" : "");
     if (rendered->peak > 1.0) {
       complain("the peak passes full scale; --limit keeps it below");
     }
-    const bool was_asked =
-        !options.score.empty() || !options.input.empty() || !options.midi.empty();
+    const bool was_asked = names_flight(options.name) || !options.score.empty() ||
+                           !options.input.empty() || !options.midi.empty();
     if (rendered->peak == 0.0 && rendered->frames > 0 && !was_asked) {
       complain("nothing excites the model: give it a --score or an --input");
     }

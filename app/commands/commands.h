@@ -32,6 +32,7 @@ struct PlayOptions {
   std::string script;
   OscOptions osc;  // port 0: none
   bool exit_on_loss = false;
+  bool watch = false;  // what sounds is read again when its files change
 };
 
 int play(const PlayOptions& options);

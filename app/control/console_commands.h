@@ -56,6 +56,7 @@ Result<Done> modes(ConsoleContext& console, Words words);
 Result<Done> tune(ConsoleContext& console, Words words);
 Result<Done> tuning(ConsoleContext& console, Words words);
 Result<Done> record(ConsoleContext& console, Words words);
+Result<Done> flight(ConsoleContext& console, Words words);
 Result<Done> help(ConsoleContext& console, Words words);
 Result<Done> quit(ConsoleContext& console, Words words);
 }  // namespace command

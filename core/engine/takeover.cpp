@@ -2,9 +2,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <tuple>
 #include <utility>
 
 #include "core/engine/energy.h"
+#include "core/engine/engine.h"
 
 namespace ressort {
 
@@ -112,7 +114,71 @@ bool share_numbers(const Bank<T>& bank, const Bank<T>& from) {
   return true;
 }
 
+// Whether both lists are as long, and each pair in them is the same by what `of` takes of it.
+template <class List, class Of>
+bool same(const List& a, const List& b, Of&& of) {
+  return std::equal(a.begin(), a.end(), b.begin(), b.end(),
+                    [&](const auto& x, const auto& y) { return of(x) == of(y); });
+}
+
+bool is_alike(const Program& a, const Program& b) {
+  return a.moving == b.moving && a.position == b.position && a.tap_nodes == b.tap_nodes &&
+         a.shapes == b.shapes && a.audio_coefficients == b.audio_coefficients &&
+         same(a.mass_runs, b.mass_runs,
+              [](const MassRun& run) {
+                return std::tuple(run.first, run.count, run.inverse_mass, run.stiffness,
+                                  run.damping, run.gravity, run.is_oscillator, run.has_gravity,
+                                  run.is_junction);
+              }) &&
+         same(a.link_runs, b.link_runs,
+              [](const LinkRun& run) {
+                return std::tuple(run.law, run.scheme, run.first, run.count, run.coefficients);
+              }) &&
+         same(a.ends, b.ends, [](const Ends& ends) { return std::tuple(ends.a, ends.b); }) &&
+         same(a.inputs, b.inputs,
+              [](const InputSlot& input) {
+                return std::tuple(input.input, input.is_force, input.node);
+              }) &&
+         same(a.taps, b.taps,
+              [](const TapSlot& tap) {
+                return std::tuple(tap.node, tap.first, tap.length, tap.width, tap.u, tap.v,
+                                  tap.places, tap.shape);
+              }) &&
+         same(a.modes, b.modes,
+              [](const SampledCoefficients& mode) {
+                return std::tuple(mode.inverse_mass, mode.stiffness, mode.damping);
+              }) &&
+         same(a.waveguides, b.waveguides,
+              [](const WaveguideSlot& guide) {
+                return std::tuple(guide.is_open, guide.inverse_impedance, guide.frequency,
+                                  guide.t60, guide.brightness, guide.first, guide.count);
+              }) &&
+         same(a.junctions, b.junctions,
+              [](const JunctionSlot& place) { return std::tuple(place.node, place.u); }) &&
+         same(a.outputs, b.outputs,
+              [](const OutputSlot& output) {
+                return std::tuple(output.channel, output.node, output.is_force);
+              }) &&
+         same(a.audio_parameters, b.audio_parameters,
+              [](const AudioParameter& audio) {
+                return std::tuple(audio.parameter, audio.channel);
+              }) &&
+         same(a.coefficients, b.coefficients,
+              [](const Coefficient& c) { return std::tuple(c.unit, c.is_fixed, c.mode); });
+}
+
 }  // namespace
+
+bool is_alike(const Machine& a, const Machine& b) {
+  return a.rate_hz == b.rate_hz && a.rate_ratio == b.rate_ratio && a.channels == b.channels &&
+         a.parameters.size() == b.parameters.size() &&
+         same(a.inputs, b.inputs,
+              [](const ModelInput& input) {
+                return std::tuple(input.number, input.is_force, input.position);
+              }) &&
+         std::equal(a.parts.begin(), a.parts.end(), b.parts.begin(), b.parts.end(),
+                    [](const Program& x, const Program& y) { return is_alike(x, y); });
+}
 
 template <class T>
 bool take_over(Bank<T>& bank, const Bank<T>& from, const Voices& voices) {

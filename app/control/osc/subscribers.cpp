@@ -1,6 +1,7 @@
 #include "app/control/osc/subscribers.h"
 
 #include <algorithm>
+#include <utility>
 
 namespace ressort {
 namespace {
@@ -51,7 +52,11 @@ int Subscribers::tell(const Session& session, std::int64_t now_ns) {
     return -1;
   }
   const Session::Present now = session.present();
-  const std::vector<Reply> changed = changes(told_, now);
+  std::vector<Reply> changed = changes(told_, now);
+  if (const Reload reload = session.last_reload();
+      std::exchange(reloads_, reload.count) != reload.count) {
+    changed.push_back(Reply(reload.is_done ? "/done" : "/fail").text("/watch").text(reload.news));
+  }
   for (Subscriber& subscriber : all_) {
     const std::vector<Reply> rows = subscriber.is_new ? changes({}, now) : changed;
     if (!rows.empty() && subscriber.client.may_have_rows("/subscribe")) {

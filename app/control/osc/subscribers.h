@@ -34,6 +34,7 @@ class Subscribers {
   };
   std::vector<Subscriber> all_;
   Session::Present told_;
+  std::uint64_t reloads_ = 0;  // that were told
 };
 
 }  // namespace ressort
