@@ -6,7 +6,7 @@ set(ressort_fuzzers model preset score midi smf scala console osc osc_packet)
 list(TRANSFORM ressort_fuzzers PREPEND fuzz_ OUTPUT_VARIABLE ressort_deep_tests)
 list(APPEND ressort_deep_tests arm everything_sanitized everything_more forms_everywhere
   accuracy_everywhere silence_everywhere modes_everywhere calculix_everywhere bodies_everywhere
-  lint scenes_more abuse_long bows)
+  lint scenes_more abuse_long bows edits_more server_killed soak)
 list(LENGTH ressort_deep_tests ressort_deep_count)
 
 # SECONDS is about what it needs on two cores.
@@ -52,6 +52,10 @@ add_deep_test(silence_everywhere 120 $<TARGET_FILE:ressort_tests> "[silence_ever
 
 # Forty random solids against CalculiX.
 add_deep_test(calculix_everywhere 600 $<TARGET_FILE:ressort_tests> "[calculix_everywhere]")
+
+# A thousand edits of what sounds, broken ones too.
+add_deep_test(edits_more 300 ${CMAKE_COMMAND} -E env RESSORT_EDITS=1000
+  $<TARGET_FILE:ressort_tests> "[reload]")
 
 # Every bow at every speed and pressure on 24 keys.
 add_deep_test(bows 60 $<TARGET_FILE:ressort_voicing> --bows 8 Violin Cello DoubleBass)
