@@ -15,6 +15,7 @@
 #include "app/commands/commands.h"
 #include "app/commands/export.h"
 #include "app/commands/make.h"
+#include "app/commands/manual/manual.h"
 #include "app/commands/modes/modes_line.h"
 #include "app/commands/reference.h"
 #include "app/commands/smf/midi_file.h"
@@ -481,8 +482,15 @@ void add_reference(CLI::App& app, std::string& part, int& code) {
               std::string(known.lists);
   }
   command->footer(footer);
+  // For who installs the program.
+  names.insert(names.end(), {"man", "completion", "names"});
   command->add_option("PART", part, "which")->required()->check(CLI::IsMember(names));
-  command->callback([&part, &code] { code = reference(part); });
+  command->callback([&app, &part, &code] {
+    code = part == "man"          ? print_man(app)
+           : part == "completion" ? print_completion(app)
+           : part == "names"      ? print_names()
+                                  : reference(part);
+  });
 }
 
 int run(int argc, char** argv) {

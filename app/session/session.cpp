@@ -527,7 +527,7 @@ Result<std::shared_ptr<const Loaded>> Session::sound(const Wish& wish, Draft dra
   const std::chrono::duration<double, std::milli> took =
       std::chrono::steady_clock::now() - draft.start;
   made_of.has_new_numbers = draft.goes_on && offered_ != nullptr &&
-                            is_alike(offered_->machine(), compiled->engine->machine());
+                            can_renumber(offered_->machine(), compiled->engine->machine());
   auto loaded = std::make_shared<Loaded>();
   loaded->serial = made_of.has_new_numbers ? serial_ : ++serial_;
   loaded->name = scene->name;

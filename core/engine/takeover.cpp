@@ -167,7 +167,55 @@ bool is_alike(const Program& a, const Program& b) {
               [](const Coefficient& c) { return std::tuple(c.unit, c.is_fixed, c.mode); });
 }
 
-}  // namespace
+// Which way a number has gone: 1 to where a network is less stable (stiffer, more damped, lighter),
+// -1 from there, 0 where neither.
+int way(const Program& a, const Program& b, std::uint32_t c) {
+  switch (a.coefficients[c].unit) {
+    case Unit::stiffness:
+    case Unit::damping:
+    case Unit::friction:
+    case Unit::inverse_mass:
+    case Unit::inverse_impedance: {
+      const double before = coefficient_value(a, a.coefficients[c], a.parameters, 1.0);
+      const double after = coefficient_value(b, b.coefficients[c], b.parameters, 1.0);
+      return before < after ? 1 : before > after ? -1 : 0;
+    }
+    case Unit::plain:
+    case Unit::speed:
+    case Unit::frequency:
+    case Unit::gravity:
+    case Unit::gravity_per_rate:
+      return 0;
+  }
+  return 0;
+}
+
+// Whether all numbers go one way, so that what is between is no less stable than one of the ends;
+// places on macros, of which nobody knows that, stay.
+bool go_one_way(const Machine& a, const Machine& b) {
+  bool any_up = false;
+  bool any_down = false;
+  for (std::size_t p = 0; p < a.parts.size(); ++p) {
+    const Program& from = a.parts[p];
+    const Program& to = b.parts[p];
+    for (std::uint32_t c = 0; c < from.coefficients.size(); ++c) {
+      const int here = way(from, to, c);
+      any_up = any_up || here > 0;
+      any_down = any_down || here < 0;
+    }
+    const auto moves = [&](std::uint32_t c) {
+      return coefficient_value(from, from.coefficients[c], from.parameters, 1.0) !=
+             coefficient_value(to, to.coefficients[c], to.parameters, 1.0);
+    };
+    if (std::any_of(from.taps.begin(), from.taps.end(),
+                    [&](const TapSlot& tap) { return moves(tap.u) || moves(tap.v); }) ||
+        std::any_of(from.junctions.begin(), from.junctions.end(),
+                    [&](const JunctionSlot& place) { return moves(place.u); })) {
+      return false;
+    }
+  }
+  return !(any_up && any_down);
+}
 
 bool is_alike(const Machine& a, const Machine& b) {
   return a.rate_hz == b.rate_hz && a.rate_ratio == b.rate_ratio && a.channels == b.channels &&
@@ -178,6 +226,12 @@ bool is_alike(const Machine& a, const Machine& b) {
               }) &&
          std::equal(a.parts.begin(), a.parts.end(), b.parts.begin(), b.parts.end(),
                     [](const Program& x, const Program& y) { return is_alike(x, y); });
+}
+
+}  // namespace
+
+bool can_renumber(const Machine& from, const Machine& to) {
+  return is_alike(from, to) && go_one_way(from, to);
 }
 
 template <class T>

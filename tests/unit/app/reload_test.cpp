@@ -349,6 +349,7 @@ TEST_CASE("Random edits neither crash nor click", "[reload]") {
   int broken = 0;
   for (int i = 0; i < edits; ++i) {
     const Numbers before = now;
+    const std::uint64_t resets = stage.process.meters().resets;
     switch (random.below(5)) {
       case 0:
         now.stiffness = random.uniform(0.002, 0.02);
@@ -417,7 +418,7 @@ TEST_CASE("Random edits neither crash nor click", "[reload]") {
     CHECK(stage.largest_bend(stage.heard.size()) <
           loudest * (1.02 * w2 + (1.0 + 2.0 * std::sqrt(w2)) * moves + 1e-3));
     REQUIRE(std::isfinite(loudest));
+    CHECK(stage.process.meters().resets == resets);  // what breaks may be a damper below 0
   }
-  CHECK(stage.process.meters().resets == 0);
   CHECK(broken > 0);
 }
