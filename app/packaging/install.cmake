@@ -10,8 +10,9 @@ if(NOT CMAKE_CROSSCOMPILING)
     COMMAND ${CMAKE_COMMAND} -E make_directory ${packaged}
     COMMAND ressort reference man > ${packaged}/ressort.1
     COMMAND ressort reference completion > ${packaged}/ressort.bash
-    COMMAND gzip -9nf ${packaged}/ressort.1)
-  install(FILES ${packaged}/ressort.1.gz DESTINATION ${CMAKE_INSTALL_MANDIR}/man1)
+    COMMAND gzip -9nf ${packaged}/ressort.1
+    COMMAND echo ".so man1/ressort.1" | gzip -9n > ${packaged}/ressort-chart.1.gz)
+  install(FILES ${packaged}/ressort.1.gz ${packaged}/ressort-chart.1.gz DESTINATION ${CMAKE_INSTALL_MANDIR}/man1)
   install(FILES ${packaged}/ressort.bash
     DESTINATION ${CMAKE_INSTALL_DATADIR}/bash-completion/completions RENAME ressort)
 endif()
@@ -45,11 +46,10 @@ set(CPACK_PACKAGE_NAME ressort)
 set(CPACK_PACKAGE_VERSION ${PROJECT_VERSION})
 set(CPACK_PACKAGE_CONTACT "ressort <ressort@users.noreply.github.com>")
 set(CPACK_PACKAGE_DESCRIPTION_SUMMARY "Real-time mass-interaction synthesizer")
-set(CPACK_DEBIAN_PACKAGE_DESCRIPTION "Real-time mass-interaction synthesizer
- Plays networks of masses and springs: strings, meshes, bodies and what
- strikes, plucks and bows them. For JACK, PipeWire and ALSA, by MIDI, MPE
- and OSC, with a console. A model is text, and can be edited while it
- sounds.")
+set(CPACK_DEBIAN_PACKAGE_DESCRIPTION "Plays networks of masses and springs: strings, meshes, bodies and what
+strikes, plucks and bows them. For JACK, PipeWire and ALSA, by MIDI, MPE
+and OSC, with a console. A model is text, and can be edited while it
+sounds.")
 set(CPACK_DEBIAN_PACKAGE_SECTION sound)
 set(CPACK_DEBIAN_PACKAGE_PRIORITY optional)
 set(CPACK_DEBIAN_PACKAGE_SHLIBDEPS ON)
