@@ -4,6 +4,7 @@
 
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "app/commands/gallery/gallery.h"
 #include "app/commands/offline.h"
@@ -36,6 +37,9 @@ struct PlayOptions {
 };
 
 int play(const PlayOptions& options);
+
+// The signals that end the program. nohup's promise is kept.
+std::vector<int> ending_signals();
 int render_command(const RenderOptions& options, bool is_quiet);
 int gallery_command(const GalleryOptions& options);
 

@@ -556,6 +556,7 @@ Result<std::shared_ptr<const Loaded>> Session::sound(const Wish& wish, Draft dra
     const std::lock_guard lock(mutex_);
     const bool is_same = current_->path == loaded->path;
     current_ = loaded;
+    files_ = draft.files;
     values_ = std::move(values);
     pupil_.reset();
     std::erase_if(learned_, [&](const LearnedRow& row) {

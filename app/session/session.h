@@ -153,6 +153,14 @@ class Session {
   // but audio]
   Result<std::string> save(const std::string& name, Existing existing);
 
+  // The same to a folder, with copies of all texts that it is read from; the preset's name there.
+  // Replaces what is there.
+  Result<std::string> save_to(const std::string& folder);
+
+  // The files that all keys were tuned by, whatever the preset says; none: they were not.
+  std::vector<std::string> tuning() const;
+  void set_tuning(std::vector<std::string> paths);
+
   Status status();
 
   // What plays, or what is waited for; set by whoever starts a backend.
@@ -261,6 +269,8 @@ class Session {
   std::function<void(int)> prepare_inputs_;
   Reload reload_;
   FlightLog flight_;
+  std::vector<std::string> tuning_;
+  std::shared_ptr<const std::vector<SceneFile>> files_;  // of what sounds
 
   std::uint32_t serial_ = 0;         // [worker]
   std::optional<Wish> scene_;        // [worker] what was loaded last
