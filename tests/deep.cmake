@@ -6,7 +6,7 @@ set(ressort_fuzzers model preset score midi smf scala console osc osc_packet)
 list(TRANSFORM ressort_fuzzers PREPEND fuzz_ OUTPUT_VARIABLE ressort_deep_tests)
 list(APPEND ressort_deep_tests arm everything_sanitized everything_more forms_everywhere
   accuracy_everywhere silence_everywhere modes_everywhere calculix_everywhere bodies_everywhere
-  lint scenes_more abuse_long bows edits_more server_killed soak)
+  lint scenes_more abuse_long bows edits_more server_killed installed soak)
 list(LENGTH ressort_deep_tests ressort_deep_count)
 
 # SECONDS is about what it needs on two cores.
@@ -52,6 +52,17 @@ add_deep_test(silence_everywhere 120 $<TARGET_FILE:ressort_tests> "[silence_ever
 
 # Forty random solids against CalculiX.
 add_deep_test(calculix_everywhere 600 $<TARGET_FILE:ressort_tests> "[calculix_everywhere]")
+
+# A server that is killed twenty times, and comes back at other rates and periods.
+add_deep_test(server_killed 120 ${CMAKE_COMMAND} -E env RESSORT_KILLS=20
+  $<TARGET_FILE:ressort_server_tests> "[server_loss]")
+
+# Three minutes of random play of all presets; tests/soak is for who has more.
+add_deep_test(soak 220 ${CMAKE_COMMAND} -E env RESSORT_SOAK_MINUTES=3
+  $<TARGET_FILE:ressort_server_tests> "[soak]")
+
+# The Debian package in a clean root.
+add_deep_test(installed 180 ${CMAKE_CURRENT_SOURCE_DIR}/system/installed ${CMAKE_BINARY_DIR})
 
 # A thousand edits of what sounds, broken ones too.
 add_deep_test(edits_more 300 ${CMAKE_COMMAND} -E env RESSORT_EDITS=1000

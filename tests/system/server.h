@@ -141,6 +141,8 @@ inline void use_test_server() {
   setenv("JACK_DEFAULT_SERVER", server_name, 1);
   setenv("JACK_NO_START_SERVER", "1", 1);
   setenv("JACK_NO_AUDIO_RESERVATION", "1", 1);
+  // What a program keeps of its own is not the person's who runs the tests.
+  setenv("XDG_DATA_HOME", ("/tmp/ressort-data-" + std::to_string(getpid())).c_str(), 1);
   jack_set_error_function([](const char*) {});
   jack_set_info_function([](const char*) {});
 }

@@ -378,7 +378,15 @@ TEST_CASE("The death of the server is survived, or told by the exit code", "[ser
       int rate_hz;
       bool is_killed;
     };
-    for (const Next& next : {Next{512, 48000, true}, Next{128, 44100, false}}) {
+    std::vector<Next> nexts{{512, 48000, true}, {128, 44100, false}};
+    // More of them by RESSORT_KILLS, at all rates and periods in turn.
+    const char* const kills = std::getenv("RESSORT_KILLS");
+    for (int i = 0; kills != nullptr && i < std::atoi(kills); ++i) {
+      constexpr int periods[] = {64, 1024, 256, 128, 512};
+      constexpr int rates_hz[] = {44100, 48000, 96000};
+      nexts.push_back({periods[i % 5], rates_hz[i % 3], true});
+    }
+    for (const Next& next : nexts) {
       CAPTURE(next.period_frames, next.is_killed);
       play.forget();
       next.is_killed ? server->kill() : server->end();
@@ -391,7 +399,10 @@ TEST_CASE("The death of the server is survived, or told by the exit code", "[ser
       REQUIRE(play.says("playing again"));
       std::this_thread::sleep_for(300ms);  // it comes later than we
       neighbour = std::make_unique<Neighbour>();
+      const auto came = std::chrono::steady_clock::now();
       CHECK(eventually(all_are_back));
+      const std::chrono::duration<double> took = std::chrono::steady_clock::now() - came;
+      std::printf("all connections are back after %.2f s\n", took.count());
       std::this_thread::sleep_for(1500ms);  // longer than anybody waits before he tries again
       CHECK(all_are_back());
       CHECK_FALSE(neighbour->is_connected(pulled.first, pulled.second));

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <deque>
 #include <memory>
 #include <optional>
 #include <string>
@@ -89,6 +90,7 @@ class FlightLog {
 
  private:
   Flight flight_;
+  std::deque<FlightRecord> records_;  // its records: it grows without moving
   std::size_t text_bytes_ = 0;
   std::string lost_;  // why the beginning is not known; empty: it is
 };

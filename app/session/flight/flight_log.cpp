@@ -81,15 +81,15 @@ void FlightLog::drain(Process& process) {
   for (std::size_t left = process.flight.size(); left > 0 && process.flight.pop(record); --left) {
     if (record.kind == FlightRecord::Kind::gap) {
       lost_ = "a load took so long that events were lost meanwhile";
-    } else if (flight_.records.size() >= most_records) {
+    } else if (records_.size() >= most_records) {
       lost_ = "more than " + std::to_string(most_records) + " events have been played";
     }
     // What is no number says nothing to an engine.
     const bool is_number = std::isfinite(record.event.value) && std::isfinite(record.event.value2);
     if (lost_.empty() && is_number) {
-      flight_.records.push_back(record);
+      records_.push_back(record);
     } else if (!lost_.empty()) {
-      flight_.records = {};
+      records_ = {};
       flight_.engines = {};
     }
   }
@@ -103,15 +103,15 @@ Result<Flight> FlightLog::flight() const {
   const auto is_take = [](const FlightRecord& record) {
     return record.kind == FlightRecord::Kind::take;
   };
-  if (std::none_of(flight_.records.begin(), flight_.records.end(), is_take)) {
+  if (std::none_of(records_.begin(), records_.end(), is_take)) {
     return Error{"nothing has sounded yet"};
   }
   Flight now = flight_;
   now.made_by = std::string(version) + " " + commit;
   now.isa = isa_name(best_isa());
   // What has come since the last look at the time belongs to the next block.
-  std::erase_if(now.records,
-                [&](const FlightRecord& record) { return record.frame >= now.end_frame; });
+  std::copy_if(records_.begin(), records_.end(), std::back_inserter(now.records),
+               [&](const FlightRecord& record) { return record.frame < now.end_frame; });
   return now;
 }
 
