@@ -124,7 +124,7 @@ void Process::run(std::span<const Sample* const> inputs, std::span<Sample* const
     frame_ += static_cast<std::int64_t>(n);
   }
   tell();
-  if (clock_ns_ != nullptr) {
+  if (clock_ns_ != nullptr && !has_time.is_raised()) {
     weigh(1e-9 * static_cast<double>(clock_ns_() - start_ns), frames);
   }
 }
@@ -241,8 +241,9 @@ void Process::forget_after(std::int64_t frame) {
 void Process::collect_due(std::size_t frames) {
   due_.clear();
   const std::int64_t end = frame_ + static_cast<std::int64_t>(frames);
-  const std::size_t most_moments =
-      keeps_every_frame_ ? frames : std::max(least_moments, frames / frames_per_moment);
+  const std::size_t most_moments = keeps_every_frame_ || has_time.is_raised()
+                                       ? frames
+                                       : std::max(least_moments, frames / frames_per_moment);
   std::size_t moments = 0;
   const auto collect = [&](const Pending& next) {
     Event event = next.event;

@@ -180,6 +180,7 @@ struct Process {
   Board<ClockReading> clock;
   Board<Meters> board;    // read by meters()
   Flag meters_were_read;  // raised by a reader: what is since the last reading starts anew
+  Flag has_time;          // nobody waits for the sound: no voice gives way, no event its frame
   Counter dropped;        // as Meters says, counted by whoever sees it
   Counter strangers;
   Counter xruns;
