@@ -6,7 +6,7 @@ set(ressort_fuzzers model preset score midi smf scala console osc osc_packet)
 list(TRANSFORM ressort_fuzzers PREPEND fuzz_ OUTPUT_VARIABLE ressort_deep_tests)
 list(APPEND ressort_deep_tests arm everything_sanitized everything_more forms_everywhere
   accuracy_everywhere silence_everywhere modes_everywhere calculix_everywhere bodies_everywhere
-  lint scenes_more abuse_long bows edits_more server_killed installed soak)
+  lint scenes_more abuse_long bows edits_more flights_everywhere server_killed installed soak)
 list(LENGTH ressort_deep_tests ressort_deep_count)
 
 # SECONDS is about what it needs on two cores.
@@ -63,6 +63,9 @@ add_deep_test(soak 220 ${CMAKE_COMMAND} -E env RESSORT_SOAK_MINUTES=3
 
 # The Debian package in a clean root.
 add_deep_test(installed 180 ${CMAKE_CURRENT_SOURCE_DIR}/system/installed ${CMAKE_BINARY_DIR})
+
+# Every preset's flight, bit by bit.
+add_deep_test(flights_everywhere 60 $<TARGET_FILE:ressort_tests> "[flights_everywhere]")
 
 # A thousand edits of what sounds, broken ones too.
 add_deep_test(edits_more 300 ${CMAKE_COMMAND} -E env RESSORT_EDITS=1000

@@ -180,7 +180,9 @@ void Session::on_audio_inputs(std::function<void(int)> prepare) {
 
 void Session::work() {
   using namespace std::chrono_literals;
-  process_.keeps_flight.raise();
+  if (options_.keeps_flights) {
+    process_.keeps_flight.raise();
+  }
   if (options_.watch) {
     watch_.emplace();
   }
@@ -298,7 +300,7 @@ void Session::offer(std::unique_ptr<Engine> engine, FlightEngine made_of) {
   next->lets_ring = made_of.lets_ring;
   next->has_new_numbers = made_of.has_new_numbers;
   next->number = made_of.number;
-  {
+  if (options_.keeps_flights) {
     const std::lock_guard lock(mutex_);
     flight_.add(std::move(made_of), current_->instrument.audio_inputs > 0);
   }

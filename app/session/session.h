@@ -30,7 +30,7 @@ struct SessionOptions {
   std::optional<ThirdArgument> third;  // of every model, whatever it shows
   KeyOptions keys;                     // instead of every preset's
   bool watch = false;                  // what sounds is read again when its files change
-  bool saves_flights = false;          // by itself, when something goes wrong
+  bool keeps_flights = false;          // of what it plays; saved when something goes wrong
 };
 
 // What sounds now, as people see it. Never changes once published.

@@ -151,9 +151,9 @@ class Server {
  public:
   explicit Server(int period_frames, int rate_hz = 48000) {
     use_test_server();
-    jackd_ = std::make_unique<Child>(
-        std::vector<std::string>{"jackd", "-r", "-n", server_name, "-d", "dummy", "-r",
-                                 std::to_string(rate_hz), "-p", std::to_string(period_frames)});
+    jackd_ = std::make_unique<Child>(std::vector<std::string>{
+        "jackd", "-r", "-t", "10000", "-n", server_name, "-d", "dummy", "-r",
+        std::to_string(rate_hz), "-p", std::to_string(period_frames)});
     REQUIRE(eventually([] {
       jack_client_t* client = jack_client_open("knock", JackNoStartServer, nullptr);
       if (client != nullptr) {

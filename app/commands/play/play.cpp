@@ -100,7 +100,7 @@ class Player {
                                                  .third = options_.third,
                                                  .keys = options_.keys,
                                                  .watch = options_.watch,
-                                                 .saves_flights = true},
+                                                 .keeps_flights = true},
                                   [this](const std::string& news) { voice_.say(news); });
     connect_session();
     std::promise<Result<std::shared_ptr<const Loaded>>> promise;

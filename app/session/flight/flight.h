@@ -78,6 +78,7 @@ class FlightLog {
  public:
   // More, and what was first is not known any more.
   static constexpr std::size_t most_records = std::size_t{1} << 19;
+  static constexpr std::size_t most_engines = 10'000;
   static constexpr std::size_t most_text_bytes = std::size_t{64} << 20;
 
   explicit FlightLog(FlightSetup setup) { flight_.setup = std::move(setup); }
@@ -89,8 +90,11 @@ class FlightLog {
   Result<Flight> flight() const;
 
  private:
+  void forget();
+
   Flight flight_;
   std::deque<FlightRecord> records_;  // its records: it grows without moving
+  std::vector<std::shared_ptr<const std::vector<SceneFile>>> texts_;  // of its engines
   std::size_t text_bytes_ = 0;
   std::string lost_;  // why the beginning is not known; empty: it is
 };

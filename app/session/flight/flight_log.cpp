@@ -61,17 +61,31 @@ Result<std::unique_ptr<Engine>> make_flight_engine(const Flight& flight,
 }
 
 void FlightLog::add(FlightEngine engine, bool has_audio_inputs) {
-  const bool is_known = !flight_.engines.empty() && flight_.engines.back().files == engine.files;
-  for (const SceneFile& file : *engine.files) {
-    text_bytes_ += is_known ? 0 : file.text.size();
+  // Who loads the same again has one text of it.
+  const auto known = std::find_if(texts_.begin(), texts_.end(), [&](const auto& files) {
+    return std::equal(files->begin(), files->end(), engine.files->begin(), engine.files->end(),
+                      [](const SceneFile& a, const SceneFile& b) {
+                        return a.path == b.path && a.text == b.text && a.is_there == b.is_there;
+                      });
+  });
+  if (known != texts_.end()) {
+    engine.files = *known;
+  } else {
+    texts_.push_back(engine.files);
+    for (const SceneFile& file : *engine.files) {
+      text_bytes_ += file.text.size();
+    }
   }
   flight_.has_audio_inputs = flight_.has_audio_inputs || has_audio_inputs;
   if (text_bytes_ > most_text_bytes) {
     lost_ = "the models that were loaded have more text than a flight keeps";
-    flight_.engines.clear();
+  } else if (flight_.engines.size() >= most_engines) {
+    lost_ = "models have been loaded more than " + std::to_string(most_engines) + " times";
   }
   if (lost_.empty()) {
     flight_.engines.push_back(std::move(engine));
+  } else {
+    forget();
   }
 }
 
@@ -89,11 +103,16 @@ void FlightLog::drain(Process& process) {
     if (lost_.empty() && is_number) {
       records_.push_back(record);
     } else if (!lost_.empty()) {
-      records_ = {};
-      flight_.engines = {};
+      forget();
     }
   }
   flight_.end_frame = end;
+}
+
+void FlightLog::forget() {
+  records_ = {};
+  flight_.engines = {};
+  texts_ = {};
 }
 
 Result<Flight> FlightLog::flight() const {

@@ -242,7 +242,7 @@ class FlightReader {
     } else if (key == "keyboard_map") {
       setup.keys.keyboard_map = words.rest();
     } else if (key == "texts") {
-      files_ = std::make_shared<std::vector<SceneFile>>();
+      texts_.push_back(std::make_shared<std::vector<SceneFile>>());
     } else if (key == "text") {
       return read_text(words);
     } else if (key == "engine") {
@@ -271,11 +271,11 @@ class FlightReader {
 
   bool read_text(LineWords& words) {
     const auto bytes = words.whole<std::size_t>(static_cast<double>(max_flight_bytes));
-    if (!words.ok || files_ == nullptr || bytes > rest_.size()) {
+    if (!words.ok || texts_.empty() || bytes > rest_.size()) {
       return false;
     }
     const std::string_view text = rest_.substr(0, bytes);
-    files_->push_back({words.rest(), std::string(text)});
+    texts_.back()->push_back({words.rest(), std::string(text)});
     line_ += static_cast<int>(std::count(text.begin(), text.end(), '\n'));
     rest_.remove_prefix(bytes);
     return next().empty();
@@ -283,6 +283,7 @@ class FlightReader {
 
   bool read_engine(LineWords& words) {
     FlightEngine engine;
+    const auto texts = words.whole<std::size_t>(most_count);
     engine.number = words.whole<std::uint32_t>(most_count);
     engine.serial = words.whole<std::uint32_t>(most_count);
     engine.lets_ring = words.whole<int>(1) != 0;
@@ -293,9 +294,12 @@ class FlightReader {
     engine.force = words.whole<int>(1) != 0;
     engine.gain = words.number(-most_number, most_number);
     engine.path = words.rest();
-    engine.files = files_;
+    if (!words.ok || texts >= texts_.size()) {
+      return false;
+    }
+    engine.files = texts_[texts];
     flight_.engines.push_back(std::move(engine));
-    return words.ok && files_ != nullptr;
+    return true;
   }
 
   bool read_record(LineWords& words) {
@@ -339,7 +343,7 @@ class FlightReader {
   std::string_view rest_;
   int line_ = 0;
   Flight flight_;
-  std::shared_ptr<std::vector<SceneFile>> files_;
+  std::vector<std::shared_ptr<std::vector<SceneFile>>> texts_;  // of models and presets
 };
 
 }  // namespace
@@ -352,18 +356,18 @@ std::string print_flight(const Flight& flight) {
   out.line("end", flight.end_frame);
   out.line("audio_inputs", flight.has_audio_inputs ? 1 : 0);
   print(out, flight.setup);
-  const std::vector<SceneFile>* files = nullptr;
+  std::map<const std::vector<SceneFile>*, std::size_t> texts;  // those that are written, by number
   for (const FlightEngine& engine : flight.engines) {
-    if (engine.files.get() != files) {
-      files = engine.files.get();
+    const auto [written, is_new] = texts.try_emplace(engine.files.get(), texts.size());
+    if (is_new) {
       out.line("texts");
-      for (const SceneFile& file : *files) {
+      for (const SceneFile& file : *engine.files) {
         if (file.is_there) {
           out.text(file);
         }
       }
     }
-    out.line("engine", engine.number, engine.serial, engine.lets_ring ? 1 : 0,
+    out.line("engine", written->second, engine.number, engine.serial, engine.lets_ring ? 1 : 0,
              engine.has_new_numbers ? 1 : 0, engine.rate_hz, engine.most_modes,
              engine.find_gain ? 1 : 0, engine.force ? 1 : 0, engine.gain, engine.path);
     for (const Setting& setting : engine.kept) {

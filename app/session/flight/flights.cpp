@@ -23,6 +23,9 @@ std::string moment() {
 }  // namespace
 
 Result<std::string> Session::write_flight(const std::string& path, Existing existing) {
+  if (!options_.keeps_flights) {
+    return Error{"no flight is kept of what is played here"};
+  }
   std::optional<Flight> flight;
   {
     const std::lock_guard lock(mutex_);
@@ -45,6 +48,9 @@ Result<std::string> Session::save_flight(const std::string& name) {
 // Collects what was played; a burst of xruns, or a voice that ran away, is worth a file.
 void Session::look_out(const Meters& now) {
   using namespace std::chrono_literals;
+  if (!options_.keeps_flights) {
+    return;
+  }
   {
     const std::lock_guard lock(mutex_);
     flight_.drain(process_);
@@ -56,7 +62,7 @@ void Session::look_out(const Meters& now) {
     has_burst = now.xruns - std::exchange(xruns_seen_, now.xruns) >= burst_xruns;
     last_look_ = time;
   }
-  if (!options_.saves_flights || !(has_reset || has_burst) || time - last_flight_ < 60s ||
+  if (!(has_reset || has_burst) || time - last_flight_ < 60s ||
       saved_flights_ == most_saved_flights) {
     return;
   }

@@ -31,7 +31,8 @@ struct Folder {
 
 // A session whose audio thread is this one, and all that it has played.
 struct Stage {
-  explicit Stage(const SessionOptions& options = {.compile = {.rate_hz = rate_hz}},
+  explicit Stage(const SessionOptions& options = {.compile = {.rate_hz = rate_hz},
+                                                  .keeps_flights = true},
                  Process::Clock clock_ns = nullptr)
       : process(rate_hz, true, clock_ns), session(process, options, {}) {}
 
@@ -153,7 +154,7 @@ std::int64_t fake_clock_ns() {
 TEST_CASE("A flight has the voices that gave way for want of time", "[flight]") {
   const Folder folder;
   block_takes_ns = 0;
-  Stage stage({.compile = {.rate_hz = rate_hz}}, fake_clock_ns);
+  Stage stage({.compile = {.rate_hz = rate_hz}, .keeps_flights = true}, fake_clock_ns);
   stage.load("PolyTriangle");
   stage.play(4800);
   std::vector<std::vector<std::uint8_t>> chord;
@@ -214,7 +215,10 @@ TEST_CASE("A flight has the texts as they were when they were played", "[flight]
       "model = \"m.mdl\"\nvoices = 3\ngain = 0.5\n[parameters]\nK = { value = 0.1, range = [0.01, "
       "0.3] }\n[[control]]\nfrom = \"note\"\nto = \"in1\"\nhow = \"impulse\"\nrange = [0.02, "
       "0.1]\n");
-  SessionOptions options{.compile = {.rate_hz = rate_hz}, .keys = {.a4_hz = 430.0}, .watch = true};
+  SessionOptions options{.compile = {.rate_hz = rate_hz},
+                         .keys = {.a4_hz = 430.0},
+                         .watch = true,
+                         .keeps_flights = true};
   Stage stage(options);
   stage.load(preset);
   stage.play(4800, {{0x90, 57, 100}});
@@ -269,7 +273,7 @@ TEST_CASE("Nothing has flown before something sounds", "[flight]") {
   CHECK(written.error().message == "nothing has sounded yet");
 }
 
-TEST_CASE("Every preset flies", "[.flight_everywhere]") {
+TEST_CASE("Every preset flies", "[.][flights_everywhere]") {
   for (const std::string& preset : known_presets()) {
     CAPTURE(preset);
     const Folder folder;
