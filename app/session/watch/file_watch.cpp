@@ -86,8 +86,8 @@ bool FileWatch::has_changed() {
       if (names == names_.end() || event.len == 0 || !names->second.contains(name)) {
         continue;
       }
-      const auto is_here = [&](const auto& folder) {
-        return folder.second == event.wd && is_link(fs::path(folder.first) / name);
+      const auto is_here = [watch = event.wd, name](const auto& folder) {
+        return folder.second == watch && is_link(fs::path(folder.first) / name);
       };
       has_changed = has_changed || (event.mask & IN_CREATE) == 0 ||
                     std::any_of(folders_.begin(), folders_.end(), is_here);
