@@ -329,7 +329,8 @@ class FlightReader {
       }
       event.kind = row->kind;
       event.channel = words.whole<std::uint8_t>(255);
-      event.index = words.whole<std::uint16_t>(65535);
+      const bool is_midi = event.kind != EventKind::parameter && event.kind != EventKind::custom;
+      event.index = words.whole<std::uint16_t>(is_midi ? 127 : 65535);
       event.model = words.whole<std::uint32_t>(most_count);
       event.value = words.number(-most_number, most_number);
       event.value2 = words.number(-most_number, most_number);
