@@ -46,12 +46,21 @@ Result<Rendered> render_flight(const RenderOptions& options,
         }
         const std::size_t frames = samples.size() / player->channels();
         rendered.frames += static_cast<long long>(frames);
-        return file->write(samples.data(), frames);
+        auto wrote = file->write(samples.data(), frames);
+        if (!wrote) {
+          rendered.failure = wrote.error();
+        }
+        return wrote;
       },
-      progress ? progress : [](double) { return true; });
-  if (!played) {
-    rendered.failure = played.error();
+      [&](double share) {
+        rendered.was_interrupted = progress && !progress(share);
+        return !rendered.was_interrupted;
+      });
+  if (rendered.failure) {
     return rendered;
+  }
+  if (!played && !rendered.was_interrupted) {
+    return played.error();
   }
   if (auto closed = file->close(); !closed) {
     rendered.failure = closed.error();
