@@ -110,7 +110,7 @@ void Process::run(std::span<const Sample* const> inputs, std::span<Sample* const
     }
     collect_due(n);
     play_models(input_count, output_count, n);
-    if (const Tape* const played = tape.get()) {
+    if (const SampleTape* const played = tape.get()) {
       play(*played, output_count, n);
     }
     for (std::size_t c = 0; c < output_count; ++c) {

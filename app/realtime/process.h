@@ -84,7 +84,7 @@ struct RecordedChunk {
 };
 
 // Sound that is played as it is.
-struct Tape {
+struct SampleTape {
   std::size_t channels = 2;
   std::vector<float> samples;  // interleaved
   std::size_t frames() const { return samples.size() / channels; }
@@ -173,7 +173,7 @@ struct Process {
   Ring<Report> reports{4096};  // to the session's worker
   Ring<RecordedChunk> recording{8192};
   Flag is_recording;
-  Published<const Tape> tape;  // in place of all that engines play
+  Published<const SampleTape> tape;  // in place of all that engines play
   Flag is_tape_over;
   Ring<FlightRecord> flight{1 << 14};  // to the session's worker, once it wants it
   Flag keeps_flight;
@@ -217,7 +217,7 @@ struct Process {
   void keep(const FlightRecord& record);
   void keep_period(std::size_t frames, std::size_t channels);
   void hurry();
-  void play(const Tape& tape, std::size_t output_count, std::size_t frames);
+  void play(const SampleTape& tape, std::size_t output_count, std::size_t frames);
   Sounding* take();
 
   double rate_hz_;

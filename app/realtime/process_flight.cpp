@@ -42,7 +42,7 @@ Sounding* Process::take() {
   return next;
 }
 
-void Process::play(const Tape& tape, std::size_t output_count, std::size_t frames) {
+void Process::play(const SampleTape& tape, std::size_t output_count, std::size_t frames) {
   for (std::size_t n = 0; n < frames; ++n, ++tape_at_) {
     const bool is_over = tape_at_ >= tape.frames();
     for (std::size_t c = 0; c < output_count; ++c) {

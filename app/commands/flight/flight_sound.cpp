@@ -70,15 +70,16 @@ Result<Rendered> render_flight(const RenderOptions& options,
   return rendered;
 }
 
-Result<Tape> tape_of(const FlightPlayer& player, const std::function<bool(double)>& progress) {
-  Tape tape{.channels = player.channels(), .samples = {}};
+Result<SampleTape> tape_of(const FlightPlayer& player,
+                           const std::function<bool(double)>& progress) {
+  SampleTape tape{.channels = player.channels(), .samples = {}};
   const auto played = player.play(
       [&](std::span<const float> heard) -> Result<Done> {
         tape.samples.insert(tape.samples.end(), heard.begin(), heard.end());
         return Done{};
       },
       progress);
-  return played ? Result<Tape>(std::move(tape)) : played.error();
+  return played ? Result<SampleTape>(std::move(tape)) : played.error();
 }
 
 }  // namespace ressort

@@ -13,6 +13,6 @@ Result<Rendered> render_flight(const RenderOptions& options,
                                const std::function<bool(double)>& progress);
 
 // The same samples, to be played by a Process.
-Result<Tape> tape_of(const FlightPlayer& player, const std::function<bool(double)>& progress);
+Result<SampleTape> tape_of(const FlightPlayer& player, const std::function<bool(double)>& progress);
 
 }  // namespace ressort

@@ -14,8 +14,8 @@
 
 #include "app/commands/commands.h"
 #include "app/commands/flight/flight_sound.h"
+#include "app/commands/play/announcer.h"
 #include "app/commands/play/kept_stage.h"
-#include "app/commands/play/voice.h"
 #include "app/commands/smf/midi_player.h"
 #include "app/control/nsm/nsm_client.h"
 #include "app/control/terminal.h"
@@ -286,7 +286,7 @@ class Player {
     voice_.say(options_.name + ": the last " +
                fixed(static_cast<double>(tape->frames()) / player->rate_hz(), 1) + " s on " +
                device_.description);
-    tape_ = std::make_unique<const Tape>(*tape);
+    tape_ = std::make_unique<const SampleTape>(*tape);
     process_.tape.set(tape_.get());
     while (!process_.is_tape_over.is_raised() && !is_called_off(50ms) && !device_.is_lost()) {
       device_.tick();
@@ -491,11 +491,11 @@ class Player {
 
   PlayOptions options_;
   sigset_t signals_;
-  bool has_called_off_ = false;            // by a signal
-  std::optional<LastResort> last_resort_;  // from then on; it goes last
-  std::unique_ptr<const Tape> tape_;       // outlives the process that plays it
+  bool has_called_off_ = false;             // by a signal
+  std::optional<LastResort> last_resort_;   // from then on; it goes last
+  std::unique_ptr<const SampleTape> tape_;  // outlives the process that plays it
   Process process_{48000.0, true, monotonic_ns};
-  Voice voice_;
+  Announcer voice_;
   Flag quit_;
   MidiDoor door_{process_};
   std::mutex device_mutex_;  // between main and the session's worker

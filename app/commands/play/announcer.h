@@ -15,7 +15,7 @@
 namespace ressort {
 
 // What a person hears of the program while it plays: above the console's prompt if there is one.
-class Voice {
+class Announcer {
  public:
   void say(const std::string& text) {
     const std::lock_guard lock(mutex_);
