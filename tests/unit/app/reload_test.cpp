@@ -9,6 +9,7 @@
 
 #include "app/session/session.h"
 #include "tests/support/catch.h"
+#include "tests/support/heap.h"
 #include "tests/support/random.h"
 
 using namespace ressort;
@@ -61,9 +62,11 @@ struct Stage {
       std::vector<double> right(block);
       std::vector<double*> outputs = {left.data(), right.data()};
       const MidiPacket packet{0, midi};
+      const support::HeapWatch watch;
       process.block(
           std::span<const double* const>(), std::span<double* const>(outputs), block,
           at == 0 && !midi.empty() ? std::span(&packet, 1) : std::span<const MidiPacket>(), 0);
+      heap_calls += watch.calls();
       heard.insert(heard.end(), left.begin(), left.end());
     }
   }
@@ -117,6 +120,7 @@ struct Stage {
 
   Process process;
   Session session;
+  std::size_t heap_calls = 0;  // of the audio thread
   std::vector<double> heard;
 };
 
@@ -170,6 +174,7 @@ TEST_CASE("A number in the midst of the model reaches the voice that sounds", "[
   CHECK(stage.frequency_hz(4096) == Approx(pitch_hz(0.01, 1.3)).epsilon(1e-4));
   CHECK(stage.peak(4096) == Approx(before).epsilon(0.2));
   CHECK(stage.largest_bend(4800) < 1.1 * bend);
+  CHECK(stage.heap_calls == 0);
   SECTION("and the preset's gain goes there without a step") {
     const double loud = stage.peak(2400);
     const double here = stage.largest_bend(2400);
