@@ -2,6 +2,7 @@
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cstdio>
+#include <cstdlib>
 #include <iterator>
 #include <map>
 #include <set>
@@ -15,6 +16,7 @@
 #include "app/commands/commands.h"
 #include "app/commands/export.h"
 #include "app/commands/make.h"
+#include "app/commands/manual/manual.h"
 #include "app/commands/modes/modes_line.h"
 #include "app/commands/reference.h"
 #include "app/commands/smf/midi_file.h"
@@ -188,8 +190,10 @@ void add_play(CLI::App& app, PlayOptions& options, int& code) {
   CLI::App* command = app.add_subcommand("play", "plays a model or a preset");
   command->footer(play_examples);
   command
-      ->add_option("MODEL", options.name,
-                   "a preset's or a model's name, or a file; or a .mid file, which is played")
+      ->add_option(
+          "MODEL", options.name,
+          "a preset's or a model's name, or a file; or a .mid file, or a .ressort flight,\n"
+          "which is played")
       ->capture_default_str();
   command->add_option("-a,--audio", options.audio, "where the sound goes")
       ->check(CLI::IsMember({"auto", "jack", "alsa", "dummy"}))
@@ -269,6 +273,9 @@ void add_play(CLI::App& app, PlayOptions& options, int& code) {
                       "192.168.1.23,10.0.0.0/24; needed with any -B but this machine's");
   command->add_flag("--exit-on-loss", options.exit_on_loss,
                     "end with 75 when the audio server dies, instead of waiting for it");
+  command->add_flag("--watch", options.watch,
+                    "read the model and the preset again when their files change; numbers go to\n"
+                    "the voices that sound");
   command->callback([&options, &code] { code = play(options); });
 }
 
@@ -285,8 +292,10 @@ void add_render(CLI::App& app, RenderChoice& choice, int& code) {
   RenderOptions& options = choice.options;
   CLI::App* command = app.add_subcommand("render", "renders a model or a preset to a sound file");
   command->footer(render_examples);
-  CLI::Option* model =
-      command->add_option("MODEL", options.name, "a preset's or a model's name, or a file");
+  CLI::Option* model = command->add_option(
+      "MODEL", options.name,
+      "a preset's or a model's name, or a file; or a .ressort flight, of which\n"
+      "the last 30 s are rendered, or the last --seconds");
   std::string endings;
   for (const std::string_view ending : sound_endings()) {
     endings += (endings.empty() ? "" : " ") + std::string(ending);
@@ -475,8 +484,15 @@ void add_reference(CLI::App& app, std::string& part, int& code) {
               std::string(known.lists);
   }
   command->footer(footer);
+  // For who installs the program.
+  names.insert(names.end(), {"man", "completion", "names"});
   command->add_option("PART", part, "which")->required()->check(CLI::IsMember(names));
-  command->callback([&part, &code] { code = reference(part); });
+  command->callback([&app, &part, &code] {
+    code = part == "man"          ? print_man(app)
+           : part == "completion" ? print_completion(app)
+           : part == "names"      ? print_names()
+                                  : reference(part);
+  });
 }
 
 int run(int argc, char** argv) {
@@ -514,6 +530,9 @@ int run(int argc, char** argv) {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
     return app.exit(error) == 0 ? exit_code::done : exit_code::wrong_use;
+  }
+  if (app.get_subcommands().empty() && std::getenv("NSM_URL") != nullptr) {
+    return play(play_options);  // a session manager starts programs by their names alone
   }
   if (app.get_subcommands().empty()) {
     std::fprintf(stderr, "%s", app.help().c_str());

@@ -2,11 +2,11 @@
 # is skipped where it does not fit before RESSORT_DEADLINE; for whoever has never the time for all of
 # them, another comes first with each RESSORT_TURN.
 set(RESSORT_TURN 0 CACHE STRING "Which of the deep tests comes first")
-set(ressort_fuzzers model preset score midi smf scala console osc osc_packet)
+set(ressort_fuzzers model preset score midi smf scala console osc osc_packet flight)
 list(TRANSFORM ressort_fuzzers PREPEND fuzz_ OUTPUT_VARIABLE ressort_deep_tests)
 list(APPEND ressort_deep_tests arm everything_sanitized everything_more forms_everywhere
   accuracy_everywhere silence_everywhere modes_everywhere calculix_everywhere bodies_everywhere
-  lint scenes_more abuse_long bows)
+  lint scenes_more abuse_long bows edits_more flights_everywhere server_killed installed soak)
 list(LENGTH ressort_deep_tests ressort_deep_count)
 
 # SECONDS is about what it needs on two cores.
@@ -52,6 +52,24 @@ add_deep_test(silence_everywhere 120 $<TARGET_FILE:ressort_tests> "[silence_ever
 
 # Forty random solids against CalculiX.
 add_deep_test(calculix_everywhere 600 $<TARGET_FILE:ressort_tests> "[calculix_everywhere]")
+
+# A server that is killed twenty times, and comes back at other rates and periods.
+add_deep_test(server_killed 120 ${CMAKE_COMMAND} -E env RESSORT_KILLS=20
+  $<TARGET_FILE:ressort_server_tests> "[server_loss]")
+
+# Three minutes of random play of all presets; tests/soak is for who has more.
+add_deep_test(soak 220 ${CMAKE_COMMAND} -E env RESSORT_SOAK_MINUTES=3
+  $<TARGET_FILE:ressort_server_tests> "[soak]")
+
+# The Debian package in a clean root.
+add_deep_test(installed 180 ${CMAKE_CURRENT_SOURCE_DIR}/system/installed ${CMAKE_BINARY_DIR})
+
+# Every preset's flight, bit by bit.
+add_deep_test(flights_everywhere 60 $<TARGET_FILE:ressort_tests> "[flights_everywhere]")
+
+# A thousand edits of what sounds, broken ones too.
+add_deep_test(edits_more 300 ${CMAKE_COMMAND} -E env RESSORT_EDITS=1000
+  $<TARGET_FILE:ressort_tests> "[reload]")
 
 # Every bow at every speed and pressure on 24 keys.
 add_deep_test(bows 60 $<TARGET_FILE:ressort_voicing> --bows 8 Violin Cello DoubleBass)

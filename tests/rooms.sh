@@ -23,7 +23,7 @@ judge() {
       owner["alsa/"] = "app/devices/alsa.cpp"
       owner["RtMidi.h"] = "app/devices/rtmidi.cpp"
       owner["rtmidi/"] = "app/devices/rtmidi.cpp"
-      owner["lo/"] = "app/control/osc/server.cpp"
+      owner["lo/"] = "app/control/osc/packet.cpp"
       owner["sndfile"] = "app/session/sound_file.cpp"
       owner["histedit.h"] = "app/control/terminal.cpp"
       owner["editline/"] = "app/control/terminal.cpp"

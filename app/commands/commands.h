@@ -4,6 +4,7 @@
 
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "app/commands/gallery/gallery.h"
 #include "app/commands/offline.h"
@@ -33,9 +34,13 @@ struct PlayOptions {
   std::string script;
   OscOptions osc;  // port 0: none
   bool exit_on_loss = false;
+  bool watch = false;  // what sounds is read again when its files change
 };
 
 int play(const PlayOptions& options);
+
+// The signals that end the program. nohup's promise is kept.
+std::vector<int> ending_signals();
 int render_command(const RenderOptions& options, bool is_quiet);
 int gallery_command(const GalleryOptions& options);
 int describe_command(const DescribeOptions& options);

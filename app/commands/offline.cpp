@@ -313,6 +313,7 @@ Result<Rendered> render(const RenderOptions& options, const std::function<bool(d
   process.slot.offer(new Sounding{std::move(compiled->engine), serial});
 
   Rendered rendered{.name = scene->name,
+                    .rate_hz = options.rate_hz,
                     .frames = length_in_frames(options, *score, inputs, *midi),
                     .channels = std::max(is_bare ? 1 : 2, instrument.outputs),
                     .warnings = scene->warnings};

@@ -44,6 +44,7 @@ struct RenderOptions {
 
 struct Rendered {
   std::string name;
+  double rate_hz = 44100.0;
   long long frames = 0;
   int channels = 0;
   double peak = 0.0;

@@ -446,6 +446,9 @@ Result<Done> command::tuning(ConsoleContext& console, Words words) {
   if (!console.process.send(console.process.from_console, events)) {
     return Error{"the audio thread is busy and took nothing; try again"};
   }
+  console.session.set_tuning(words[0] == "off"
+                                 ? std::vector<std::string>()
+                                 : std::vector<std::string>(words.begin(), words.end()));
   return Done{};
 }
 

@@ -58,6 +58,7 @@ Result<Done> tune(ConsoleContext& console, Words words);
 Result<Done> timbre(ConsoleContext& console, Words words);
 Result<Done> tuning(ConsoleContext& console, Words words);
 Result<Done> record(ConsoleContext& console, Words words);
+Result<Done> flight(ConsoleContext& console, Words words);
 Result<Done> help(ConsoleContext& console, Words words);
 Result<Done> quit(ConsoleContext& console, Words words);
 }  // namespace command

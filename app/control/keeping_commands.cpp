@@ -22,6 +22,17 @@ Result<Done> command::save(ConsoleContext& console, Words words) {
   return Done{};
 }
 
+Result<Done> command::flight(ConsoleContext& console, Words words) {
+  const std::string path = names_flight(words[0]) ? words[0] : words[0] + ".ressort";
+  const auto written =
+      console.session.write_flight(path, words.size() > 1 ? Existing::replace : Existing::refuse);
+  if (!written) {
+    return written.error();
+  }
+  console.print("kept in " + path + "; 'ressort play " + path + "' plays it back");
+  return Done{};
+}
+
 Result<Done> command::learn(ConsoleContext& console, Words words) {
   const auto current = loaded(console);
   if (!current) {

@@ -347,6 +347,19 @@ std::vector<Row> make_rows() {
            "bits a\nsample, and the rate of the audio. Over a sound file that is there it is "
            "written by --force\nonly.",
        .act = command::record},
+      {.address = "/flight/save",
+       .arguments = {{.word = "NAME", .is_text = true}},
+       .does = "saves what was played among the user's flights, never over one that is there; "
+               "answers /done or /fail",
+       .answer = answer::flight,
+       .command = "flight",
+       .words = "FILE [--force]",
+       .command_does = "keeps what was played, to be played back bit by bit",
+       .details = "'ressort play FILE.ressort' and 'ressort render FILE.ressort -o out.wav' play "
+                  "the last 30 s of\nit. It has all that was played since ressort was started, and "
+                  "the texts of the models; not what\ncame in by audio. --force writes over a file "
+                  "that is there.",
+       .act = command::flight},
       {.command = "wait",
        .words = "SECONDS",
        .command_does = "waits, for scripts and pipes: noteon 60, wait 0.5, noteoff 60",

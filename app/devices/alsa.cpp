@@ -8,36 +8,57 @@
 #include <vector>
 
 #include "app/devices/audio.h"
+#include "app/say.h"
 
 namespace ressort {
 namespace {
 
 constexpr int periods = 3;
+constexpr int most_captured = 2;  // channels of the device
 constexpr snd_pcm_format_t formats[] = {SND_PCM_FORMAT_FLOAT, SND_PCM_FORMAT_S32,
                                         SND_PCM_FORMAT_S16};
 
-struct Alsa {
-  explicit Alsa(Process& process_in) : process(process_in) {}
-  ~Alsa() {
+// One direction of a device, as it was settled with it.
+struct Stream {
+  ~Stream() {
     if (pcm != nullptr) {
       snd_pcm_close(pcm);
     }
   }
 
-  void run();
-  void interleave();
-  bool write();
-
-  Process& process;
   snd_pcm_t* pcm = nullptr;
   snd_pcm_format_t format = SND_PCM_FORMAT_FLOAT;
   unsigned channels = 2;
   unsigned rate_hz = 48000;
   snd_pcm_uframes_t frames = 256;
+  std::vector<std::byte> packed;  // [frame][channel] in the device's format
+};
+
+// What comes in. It is read a period late, so that a device that is not quite in step has something
+// to give.
+struct Capture {
+  Stream stream;
+  bool is_filled = false;
+  std::vector<float> samples;  // [channel][frame]
+  std::vector<const float*> inputs;
+};
+
+struct Alsa {
+  explicit Alsa(Process& process_in) : process(process_in) {}
+
+  void run();
+  void interleave();
+  bool write();
+  std::span<const float* const> listen();
+
+  Process& process;
+  std::string device;
+  Stream out;
+  std::unique_ptr<Capture> in;  // opened when a model listens; it stays
+  Published<Capture> captured;
   bool is_timed = false;       // the device takes everything at once: we keep the time
   std::vector<float> samples;  // [channel][frame]
   std::vector<float*> outputs;
-  std::vector<std::byte> packed;  // [frame][channel] in the device's format
   Flag stop;
   Flag lost;
   std::thread thread;
@@ -47,14 +68,15 @@ struct Alsa {
 void Alsa::interleave() {
   const auto fill = [&](auto zero, double scale) {
     using Sample = decltype(zero);
-    auto* const target = reinterpret_cast<Sample*>(packed.data());
-    for (std::size_t n = 0; n < frames; ++n) {
-      for (std::size_t c = 0; c < channels; ++c) {
-        target[n * channels + c] = static_cast<Sample>(static_cast<double>(outputs[c][n]) * scale);
+    auto* const target = reinterpret_cast<Sample*>(out.packed.data());
+    for (std::size_t n = 0; n < out.frames; ++n) {
+      for (std::size_t c = 0; c < out.channels; ++c) {
+        target[n * out.channels + c] =
+            static_cast<Sample>(static_cast<double>(outputs[c][n]) * scale);
       }
     }
   };
-  switch (format) {
+  switch (out.format) {
     case SND_PCM_FORMAT_S32:
       fill(std::int32_t{}, 2147483647.0);
       break;
@@ -70,11 +92,11 @@ void Alsa::interleave() {
 // False when the device is gone for good.
 bool Alsa::write() {
   const std::size_t frame_bytes =
-      channels * static_cast<std::size_t>(snd_pcm_format_physical_width(format)) / 8;
+      out.channels * static_cast<std::size_t>(snd_pcm_format_physical_width(out.format)) / 8;
   snd_pcm_uframes_t done = 0;
-  while (done < frames && !stop.is_raised()) {
+  while (done < out.frames && !stop.is_raised()) {
     const snd_pcm_sframes_t wrote =
-        snd_pcm_writei(pcm, packed.data() + done * frame_bytes, frames - done);
+        snd_pcm_writei(out.pcm, out.packed.data() + done * frame_bytes, out.frames - done);
     if (wrote >= 0) {
       done += static_cast<snd_pcm_uframes_t>(wrote);
       continue;
@@ -82,7 +104,7 @@ bool Alsa::write() {
     if (wrote == -EPIPE) {
       process.xruns.add(1);
     }
-    if (snd_pcm_recover(pcm, static_cast<int>(wrote), 1) < 0) {
+    if (snd_pcm_recover(out.pcm, static_cast<int>(wrote), 1) < 0) {
       return false;
     }
   }
@@ -91,7 +113,7 @@ bool Alsa::write() {
 
 void Alsa::run() {
   raise_priority();
-  const double period_ns = 1e9 * static_cast<double>(frames) / rate_hz;
+  const double period_ns = 1e9 * static_cast<double>(out.frames) / out.rate_hz;
   const std::int64_t start = monotonic_ns();
   for (std::uint64_t n = 0; !stop.is_raised(); ++n) {
     if (is_timed) {
@@ -99,8 +121,7 @@ void Alsa::run() {
           start + static_cast<std::int64_t>(std::llround(period_ns * static_cast<double>(n)));
       sleep_until(due);
     }
-    process.block(std::span<const float* const>(), std::span<float* const>(outputs), frames, {},
-                  monotonic_ns());
+    process.block(listen(), std::span<float* const>(outputs), out.frames, {}, monotonic_ns());
     interleave();
     if (!write()) {
       lost.raise();
@@ -109,8 +130,57 @@ void Alsa::run() {
   }
 }
 
+// The inputs' next period: silence where the device has none to give.
+std::span<const float* const> Alsa::listen() {
+  Capture* const capture = captured.get();
+  if (capture == nullptr) {
+    return {};
+  }
+  Stream& stream = capture->stream;
+  const auto wanted = static_cast<snd_pcm_sframes_t>(out.frames);
+  snd_pcm_sframes_t there = snd_pcm_avail_update(stream.pcm);
+  if (there < 0) {
+    process.xruns.add(1);
+    capture->is_filled = false;
+    if (snd_pcm_recover(stream.pcm, static_cast<int>(there), 1) == 0) {
+      snd_pcm_start(stream.pcm);
+    }
+    there = 0;
+  }
+  capture->is_filled = there >= (capture->is_filled ? wanted : 2 * wanted);
+  snd_pcm_sframes_t got = 0;
+  if (capture->is_filled) {
+    got =
+        std::max<snd_pcm_sframes_t>(0, snd_pcm_readi(stream.pcm, stream.packed.data(), out.frames));
+  }
+  const auto fill = [&](auto zero, float scale) {
+    using Sample = decltype(zero);
+    const auto* const source = reinterpret_cast<const Sample*>(stream.packed.data());
+    for (std::size_t c = 0; c < stream.channels; ++c) {
+      for (std::size_t n = 0; n < out.frames; ++n) {
+        capture->samples[c * out.frames + n] =
+            n < static_cast<std::size_t>(got)
+                ? static_cast<float>(source[n * stream.channels + c]) * scale
+                : 0.0f;
+      }
+    }
+  };
+  switch (stream.format) {
+    case SND_PCM_FORMAT_S32:
+      fill(std::int32_t{}, 1.0f / 2147483648.0f);
+      break;
+    case SND_PCM_FORMAT_S16:
+      fill(std::int16_t{}, 1.0f / 32768.0f);
+      break;
+    default:
+      fill(float{}, 1.0f);
+      break;
+  }
+  return capture->inputs;
+}
+
 // Settles format, channels, rate and period with the device; the first call that fails says why.
-int configure(Alsa& alsa, const AudioOptions& options) {
+int configure(Stream& alsa, unsigned channels, double rate_hz, snd_pcm_uframes_t frames) {
   snd_pcm_hw_params_t* hardware = nullptr;
   snd_pcm_hw_params_alloca(&hardware);
   int failure = snd_pcm_hw_params_any(alsa.pcm, hardware);
@@ -121,9 +191,9 @@ int configure(Alsa& alsa, const AudioOptions& options) {
         return snd_pcm_hw_params_test_format(alsa.pcm, hardware, wanted) == 0;
       });
   alsa.format = format != std::end(formats) ? *format : SND_PCM_FORMAT_S16;
-  alsa.channels = static_cast<unsigned>(std::max(2, options.outputs));
-  alsa.rate_hz = static_cast<unsigned>(options.rate_hz);
-  alsa.frames = static_cast<snd_pcm_uframes_t>(options.period_frames);
+  alsa.channels = channels;
+  alsa.rate_hz = static_cast<unsigned>(rate_hz);
+  alsa.frames = frames;
   snd_pcm_uframes_t buffer = alsa.frames * periods;
   step(snd_pcm_hw_params_set_format(alsa.pcm, hardware, alsa.format));
   step(snd_pcm_hw_params_set_channels_near(alsa.pcm, hardware, &alsa.channels));
@@ -131,7 +201,39 @@ int configure(Alsa& alsa, const AudioOptions& options) {
   step(snd_pcm_hw_params_set_period_size_near(alsa.pcm, hardware, &alsa.frames, nullptr));
   step(snd_pcm_hw_params_set_buffer_size_near(alsa.pcm, hardware, &buffer));
   step(snd_pcm_hw_params(alsa.pcm, hardware));
+  alsa.packed.resize(alsa.channels * alsa.frames * 4);
   return failure;
+}
+
+// A model wants to listen. Where the device has nothing to listen with, it hears silence, and that
+// is told.
+void open_capture(Alsa& alsa, int wanted) {
+  if (wanted <= 0 || alsa.in != nullptr) {
+    return;
+  }
+  auto capture = std::make_unique<Capture>();
+  Stream& stream = capture->stream;
+  int failure =
+      snd_pcm_open(&stream.pcm, alsa.device.c_str(), SND_PCM_STREAM_CAPTURE, SND_PCM_NONBLOCK);
+  if (failure >= 0) {
+    failure =
+        configure(stream, static_cast<unsigned>(most_captured), alsa.out.rate_hz, alsa.out.frames);
+  }
+  if (failure >= 0) {
+    failure = snd_pcm_start(stream.pcm);
+  }
+  if (failure < 0 || stream.rate_hz != alsa.out.rate_hz) {
+    say("the ALSA device '" + alsa.device + "' has no inputs for the model: " +
+        (failure < 0 ? snd_strerror(failure) : "they run at another rate"));
+    return;
+  }
+  stream.packed.resize(stream.channels * alsa.out.frames * 4);
+  capture->samples.resize(stream.channels * alsa.out.frames);
+  for (std::size_t c = 0; c < stream.channels; ++c) {
+    capture->inputs.push_back(capture->samples.data() + c * alsa.out.frames);
+  }
+  alsa.in = std::move(capture);
+  alsa.captured.set(alsa.in.get());
 }
 
 void say_nothing(const char*, int, const char*, int, const char*, ...) {}
@@ -141,35 +243,36 @@ void say_nothing(const char*, int, const char*, int, const char*, ...) {}
 Result<AudioDevice> open_alsa(Process& process, const AudioOptions& options) {
   snd_lib_error_set_handler(say_nothing);
   auto alsa = std::make_shared<Alsa>(process);
-  int failure = snd_pcm_open(&alsa->pcm, options.device.c_str(), SND_PCM_STREAM_PLAYBACK, 0);
+  alsa->device = options.device;
+  int failure = snd_pcm_open(&alsa->out.pcm, options.device.c_str(), SND_PCM_STREAM_PLAYBACK, 0);
   if (failure < 0) {
     return Error{"the ALSA device '" + options.device +
                  "' does not open: " + snd_strerror(failure) +
                  "; 'aplay -L' lists the devices, -d NAME chooses one, -a dummy does without"};
   }
-  failure = configure(*alsa, options);
+  failure = configure(alsa->out, static_cast<unsigned>(std::max(2, options.outputs)),
+                      options.rate_hz, static_cast<snd_pcm_uframes_t>(options.period_frames));
   if (failure < 0) {
     return Error{"the ALSA device '" + options.device +
                  "' takes none of our settings: " + snd_strerror(failure)};
   }
-  alsa->is_timed = snd_pcm_type(alsa->pcm) == SND_PCM_TYPE_NULL;
-  alsa->samples.resize(alsa->channels * alsa->frames);
-  alsa->packed.resize(alsa->samples.size() * 4);
-  for (std::size_t c = 0; c < alsa->channels; ++c) {
-    alsa->outputs.push_back(alsa->samples.data() + c * alsa->frames);
+  alsa->is_timed = snd_pcm_type(alsa->out.pcm) == SND_PCM_TYPE_NULL;
+  alsa->samples.resize(alsa->out.channels * alsa->out.frames);
+  for (std::size_t c = 0; c < alsa->out.channels; ++c) {
+    alsa->outputs.push_back(alsa->samples.data() + c * alsa->out.frames);
   }
-  process.set_rate(alsa->rate_hz);
+  process.set_rate(alsa->out.rate_hz);
   alsa->thread = std::thread([alsa = alsa.get()] { alsa->run(); });
   AudioDevice device;
-  device.rate_hz = alsa->rate_hz;
-  device.description = "ALSA '" + options.device + "', " + std::to_string(alsa->rate_hz) + " Hz, " +
-                       std::to_string(alsa->frames) + " frames";
+  device.rate_hz = alsa->out.rate_hz;
+  device.description = "ALSA '" + options.device + "', " + std::to_string(alsa->out.rate_hz) +
+                       " Hz, " + std::to_string(alsa->out.frames) + " frames";
   device.close = [alsa] {
     alsa->stop.raise();
     alsa->thread.join();
   };
   device.is_lost = [alsa] { return alsa->lost.is_raised(); };
-  device.set_audio_inputs = [](int) {};
+  device.set_audio_inputs = [alsa](int wanted) { open_capture(*alsa, wanted); };
   device.tick = [] {};
   device.wiring = [] { return Wiring{}; };
   return device;

@@ -1,5 +1,7 @@
 #include <jack/jack.h>
+#include <jack/metadata.h>
 #include <jack/midiport.h>
+#include <jack/uuid.h>
 
 #include <algorithm>
 #include <array>
@@ -98,6 +100,12 @@ int on_sample_rate(jack_nframes_t rate, void* self) {
   return 0;
 }
 
+// A bounce: there is always time, and every event keeps its frame.
+void on_freewheel(int starts, void* self) {
+  Flag& has_time = static_cast<Jack*>(self)->process.has_time;
+  starts != 0 ? has_time.raise() : static_cast<void>(has_time.lower());
+}
+
 void on_shutdown(jack_status_t, const char*, void* self) {
   static_cast<Jack*>(self)->lost.raise();
 }
@@ -160,6 +168,20 @@ void connect_inputs(Jack& jack) {
   }
 }
 
+// What patchbays show; a server without metadata does without.
+void describe(Jack& jack, jack_port_t* port, const std::string& name, const char* group,
+              int order) {
+  constexpr const char* order_key = "http://jackaudio.org/metadata/order";
+  const jack_uuid_t id = jack_port_uuid(port);
+  if (jack_uuid_empty(id) != 0) {
+    return;
+  }
+  jack_set_property(jack.client, id, JACK_METADATA_PRETTY_NAME, name.c_str(), "text/plain");
+  jack_set_property(jack.client, id, JACK_METADATA_PORT_GROUP, group, "text/plain");
+  jack_set_property(jack.client, id, order_key, std::to_string(order).c_str(),
+                    "http://www.w3.org/2001/XMLSchema#int");
+}
+
 // Ports only ever come: a connection that a person has made outlives a change of model.
 void set_audio_inputs(Jack& jack, int wanted) {
   for (int i = 0; i < std::min(wanted, most_audio_inputs); ++i) {
@@ -167,6 +189,9 @@ void set_audio_inputs(Jack& jack, int wanted) {
     if (input.get() == nullptr) {
       input.set(jack_port_register(jack.client, ("in_" + std::to_string(i + 1)).c_str(),
                                    JACK_DEFAULT_AUDIO_TYPE, JackPortIsInput, 0));
+      if (input.get() != nullptr) {
+        describe(jack, input.get(), "Input " + std::to_string(i + 1), "Inputs", i);
+      }
     }
   }
   jack.rewired.raise();
@@ -218,6 +243,18 @@ void tick(Jack& jack) {
   }
 }
 
+void describe_ports(Jack& jack) {
+  for (std::size_t i = 0; i < jack.outputs.size(); ++i) {
+    const std::string number = std::to_string(i + 1);
+    describe(jack, jack.outputs[i],
+             jack.outputs.size() > 2 ? "Output " + number
+             : i == 0                ? "Left"
+                                     : "Right",
+             "Outputs", static_cast<int>(i));
+  }
+  describe(jack, jack.midi, "MIDI", "Control", static_cast<int>(jack.outputs.size()));
+}
+
 bool register_ports(Jack& jack) {
   const int count = std::max(2, jack.options.outputs);
   for (int i = 0; i < count; ++i) {
@@ -258,11 +295,14 @@ Result<AudioDevice> open_jack(Process& process, const AudioOptions& options) {
   jack_set_sample_rate_callback(jack->client, on_sample_rate, jack.get());
   jack_set_port_connect_callback(jack->client, on_connect, jack.get());
   jack_set_port_registration_callback(jack->client, on_port, jack.get());
+  jack_set_freewheel_callback(jack->client, on_freewheel, jack.get());
+  process.has_time.lower();
   jack_on_info_shutdown(jack->client, on_shutdown, jack.get());
   if (!register_ports(*jack) || jack_activate(jack->client) != 0) {
     close();
     return Error{"the JACK server refused our ports; are there too many clients?"};
   }
+  describe_ports(*jack);
   jack->wiring = options.wiring;
   if (options.connect) {
     connect(*jack);

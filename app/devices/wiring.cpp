@@ -54,4 +54,10 @@ void Wiring::lose_all() {
   }
 }
 
+void Wiring::expect(const Cable& cable) {
+  if (!knows(cable)) {
+    known_.push_back({cable, State::missing});
+  }
+}
+
 }  // namespace ressort

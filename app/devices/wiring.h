@@ -37,6 +37,9 @@ class Wiring {
   // The device is gone, and its cables with it.
   void lose_all();
 
+  // There was one once, and it is to be plugged in again.
+  void expect(const Cable& cable);
+
  private:
   enum class State { plugged, doubtful, missing, pulled };
   struct Known {

@@ -46,8 +46,8 @@ Process::Process(double rate_hz, bool limit, Clock clock_ns)
       sound_(max_channels * chunk_frames),
       fade_sound_(max_channels * chunk_frames),
       mixed_(max_channels * chunk_frames) {
-  now_.reserve(from_osc.capacity() + from_console.capacity() + from_midi.capacity() + max_now +
-               max_endings);
+  now_.reserve(from_osc.capacity() + from_console.capacity() + from_midi.capacity() +
+               from_session.capacity() + max_now + max_endings);
   pending_.reserve(max_ahead);
   due_.reserve(now_.capacity() + max_ahead);
   matching_.reserve(due_.capacity());
@@ -64,6 +64,7 @@ Process::~Process() {
 
 void Process::set_rate(double rate_hz) {
   rate_hz_ = rate_hz;
+  kept_rate_hz_ = 0.0;
   load_.forget();
   dc_blocker_ = DcBlocker(rate_hz);
   limiter_ = Limiter(rate_hz);
@@ -89,11 +90,12 @@ void Process::run(std::span<const Sample* const> inputs, std::span<Sample* const
   const DenormalsFlushed flushed;
   clock.write({frame_, time_ns, rate_hz_, static_cast<std::int64_t>(frames)});
   learn();
-  if (frames > 0) {
-    gather(frames, midi, time_ns);
-  }
   const std::size_t input_count = std::min(inputs.size(), max_channels);
   const std::size_t output_count = std::min(outputs.size(), max_channels);
+  if (frames > 0) {
+    keep_period(frames, output_count);
+    gather(frames, midi, time_ns);
+  }
   for (std::size_t at = 0; at < frames; at += chunk_frames) {
     const std::size_t n = std::min(chunk_frames, frames - at);
     for (std::size_t c = 0; c < input_count; ++c) {
@@ -108,6 +110,9 @@ void Process::run(std::span<const Sample* const> inputs, std::span<Sample* const
     }
     collect_due(n);
     play_models(input_count, output_count, n);
+    if (const SampleTape* const played = tape.get()) {
+      play(*played, output_count, n);
+    }
     for (std::size_t c = 0; c < output_count; ++c) {
       const double* const samples = mixed_.data() + c * chunk_frames;
       std::transform(samples, samples + n, outputs[c] + at,
@@ -120,7 +125,7 @@ void Process::run(std::span<const Sample* const> inputs, std::span<Sample* const
     frame_ += static_cast<std::int64_t>(n);
   }
   tell();
-  if (clock_ns_ != nullptr) {
+  if (clock_ns_ != nullptr && !has_time.is_raised()) {
     weigh(1e-9 * static_cast<double>(clock_ns_() - start_ns), frames);
   }
 }
@@ -167,6 +172,7 @@ void Process::gather(std::size_t frames, std::span<const MidiPacket> midi, std::
   drain(from_osc, frames, time_ns);
   drain(from_console, frames, time_ns);
   drain(from_midi, frames, time_ns);
+  drain(from_session, frames, time_ns);
   const std::size_t before = now_.size();
   const auto last = static_cast<std::int64_t>(frames) - 1;
   for (const MidiPacket& packet : midi) {
@@ -224,7 +230,7 @@ void Process::wait(std::int64_t frame, const Event& event) {
 }
 
 void Process::forget_after(std::int64_t frame) {
-  if (latest_ <= frame) {
+  if (latest_ <= frame || is_repeating_) {
     return;  // a flood of panics has nothing more to forget
   }
   latest_ = frame;
@@ -236,8 +242,9 @@ void Process::forget_after(std::int64_t frame) {
 void Process::collect_due(std::size_t frames) {
   due_.clear();
   const std::int64_t end = frame_ + static_cast<std::int64_t>(frames);
-  const std::size_t most_moments =
-      keeps_every_frame_ ? frames : std::max(least_moments, frames / frames_per_moment);
+  const std::size_t most_moments = keeps_every_frame_ || has_time.is_raised()
+                                       ? frames
+                                       : std::max(least_moments, frames / frames_per_moment);
   std::size_t moments = 0;
   const auto collect = [&](const Pending& next) {
     Event event = next.event;
@@ -249,6 +256,7 @@ void Process::collect_due(std::size_t frames) {
     note(event);
     translate(event);
     due_.push_back(event);
+    keep({.frame = frame_ + event.frame, .event = event});
     follow_program(event);
   };
   const auto is_due = [&](const Pending& next) { return next.frame < end; };
@@ -339,7 +347,7 @@ void Process::swap_models() {
     fading_ = nullptr;
   }
   if (rings_ && slot.is_offered() && slot.has_room()) {
-    Sounding* const next = slot.take();
+    Sounding* const next = take();
     if (goes_on(*next)) {
       slot.retire(std::exchange(current_, next));
       ++meters_.swaps;
@@ -352,7 +360,7 @@ void Process::swap_models() {
   if (fading_ != nullptr) {
     return;
   }
-  Sounding* const next = waiting_ != nullptr ? std::exchange(waiting_, nullptr) : slot.take();
+  Sounding* const next = waiting_ != nullptr ? std::exchange(waiting_, nullptr) : take();
   if (next == nullptr) {
     return;
   }
@@ -378,7 +386,8 @@ bool Process::rings_on() const {
 
 bool Process::goes_on(const Sounding& next) const {
   return next.serial != 0 && next.serial == current_->serial &&
-         next.engine->go_on_from(*current_->engine);
+         (next.has_new_numbers ? next.engine->renumber_from(*current_->engine)
+                               : next.engine->go_on_from(*current_->engine));
 }
 
 void Process::play_models(std::size_t input_count, std::size_t output_count, std::size_t frames) {
@@ -500,15 +509,17 @@ void Process::weigh(double took_s, std::size_t frames) {
     return;
   }
   if (load_.is_over() && (rings_ || fade_left_ > 0)) {
-    fading_->engine->limit_voices(1);
-    fade_left_ = rings_ ? fade_frames_ : fade_left_;
-    rings_ = false;
+    keep({.frame = frame_, .kind = FlightRecord::Kind::hurry});
+    hurry();
     load_.forget();
     return;
   }
   const double load = load_.lasting();
   const int before = load_.limit();
   if (const auto voices = load_.judge(meters_.stepped, current_->engine->voice_count())) {
+    keep({.frame = frame_,
+          .kind = FlightRecord::Kind::limit,
+          .count = static_cast<std::uint32_t>(std::max(0, *voices))});
     current_->engine->limit_voices(*voices);
   }
   const bool gave_way = load_.limit() > 0 && (before == 0 || load_.limit() < before);
@@ -517,6 +528,12 @@ void Process::weigh(double took_s, std::size_t frames) {
     reports.push({Report::Kind::overload, current_->serial,
                   static_cast<std::uint16_t>(load_.limit()), load});
   }
+}
+
+void Process::hurry() {
+  fading_->engine->limit_voices(1);
+  fade_left_ = rings_ ? fade_frames_ : fade_left_;
+  rings_ = false;
 }
 
 void Process::record(std::size_t channels, std::size_t frames, bool records, bool listens) {

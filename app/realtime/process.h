@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "app/realtime/dsp_load.h"
+#include "app/realtime/flight_record.h"
 #include "app/realtime/lockfree.h"
 #include "app/realtime/midi.h"
 #include "core/engine/engine.h"
@@ -21,7 +22,9 @@ namespace ressort {
 struct Sounding {
   std::unique_ptr<Engine> engine;
   std::uint32_t serial = 0;
-  bool lets_ring = false;  // what sounded before it ends by itself, without new notes
+  bool lets_ring = false;        // what sounded before it ends by itself, without new notes
+  bool has_new_numbers = false;  // it goes on as Engine::renumber_from() says
+  std::uint32_t number = 0;      // of this engine among all, for who keeps a flight
 };
 
 // An event on its way to the audio thread, and when it is to act.
@@ -78,6 +81,13 @@ struct RecordedChunk {
   std::uint16_t frames = 0;
   std::uint16_t channels = 0;
   std::array<float, max_samples> samples{};  // interleaved
+};
+
+// Sound that is played as it is.
+struct SampleTape {
+  std::size_t channels = 2;
+  std::vector<float> samples;  // interleaved
+  std::size_t frames() const { return samples.size() / channels; }
 };
 
 // What the audio thread tells of itself after every block, and what other threads count. Resets,
@@ -143,6 +153,10 @@ struct Process {
   // before their time. [OSC's thread] wait-free
   bool send_ahead(std::span<const TimedEvent> events);
 
+  // What a flight says of the next block, before it; then block() plays what was played then. Only
+  // offline, and of one whole flight, chunk by chunk. [audio]
+  void repeat(const FlightRecord& record);
+
   // Between two runs of a backend, when no audio thread is alive. [control]
   void set_rate(double rate_hz);
 
@@ -154,15 +168,21 @@ struct Process {
   Ring<TimedEvent> from_osc{max_now + max_endings + max_ahead};
   Ring<TimedEvent> from_console{max_now + max_endings};
   Ring<TimedEvent> from_midi{max_now + max_endings};  // RtMidi's thread
-  Ring<Lesson> lessons{256};                          // from the session, under its lock
-  Ring<Report> reports{4096};                         // to the session's worker
+  Ring<TimedEvent> from_session{max_now + max_endings};
+  Ring<Lesson> lessons{256};   // from the session, under its lock
+  Ring<Report> reports{4096};  // to the session's worker
   Ring<RecordedChunk> recording{8192};
   Flag is_recording;
   Ring<RecordedChunk> listening{1024};  // to whoever describes what sounds
   Flag is_listening;
+  Published<const SampleTape> tape;  // in place of all that engines play
+  Flag is_tape_over;
+  Ring<FlightRecord> flight{1 << 14};  // to the session's worker, once it wants it
+  Flag keeps_flight;
   Board<ClockReading> clock;
   Board<Meters> board;    // read by meters()
   Flag meters_were_read;  // raised by a reader: what is since the last reading starts anew
+  Flag has_time;          // nobody waits for the sound: no voice gives way, no event its frame
   Counter dropped;        // as Meters says, counted by whoever sees it
   Counter strangers;
   Counter xruns;
@@ -196,6 +216,11 @@ struct Process {
   void tell();
   void weigh(double took_s, std::size_t frames);
   void record(std::size_t channels, std::size_t frames, bool records, bool listens);
+  void keep(const FlightRecord& record);
+  void keep_period(std::size_t frames, std::size_t channels);
+  void hurry();
+  void play(const SampleTape& tape, std::size_t output_count, std::size_t frames);
+  Sounding* take();
 
   double rate_hz_;
   bool limit_;
@@ -225,6 +250,13 @@ struct Process {
   std::int64_t latest_ = 0;       // no frame there is later
   Permits ahead_{max_ahead};      // of it, and of what is on its way there
   bool keeps_every_frame_ = false;
+  bool is_repeating_ = false;
+  std::size_t tape_at_ = 0;  // frame
+  // What the flight was told last.
+  bool has_gap_ = false;
+  double kept_rate_hz_ = 0.0;
+  std::size_t kept_frames_ = 0;
+  std::size_t kept_channels_ = 0;
   std::array<LearnedControl, 128> learned_{};  // [controller]
   std::vector<Event> due_;                     // of this chunk, sorted
   std::vector<Event> matching_;                // those of one engine

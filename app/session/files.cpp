@@ -287,7 +287,10 @@ std::string cache_folder() {
   return folder_of("XDG_CACHE_HOME", ".cache");
 }
 
-Result<std::string> path_to_save(const std::string& name) {
+namespace {
+
+// A file of the user's, NAME and its ending, in a folder of his that is made.
+Result<std::string> users_file(const std::string& name, const char* kind, const char* ending) {
   constexpr std::size_t longest = 64;
   const bool is_name =
       !name.empty() && name.size() <= longest && name[0] != '.' && name[0] != ' ' &&
@@ -296,19 +299,30 @@ Result<std::string> path_to_save(const std::string& name) {
                c == ' ' || c == '.' || c == '_' || c == '-';
       });
   if (!is_name) {
-    return Error{"a preset's name has 1 to 64 letters, digits, blanks and ._-, and no . first"};
+    return Error{"a " + std::string(kind) +
+                 "'s name has 1 to 64 letters, digits, blanks and ._-, and no . first"};
   }
-  const fs::path folder = user_folder();
-  if (folder.empty()) {
+  const fs::path user = user_folder();
+  if (user.empty()) {
     return Error{"there is no folder to save to: neither XDG_DATA_HOME nor HOME is set"};
   }
+  const fs::path folder = user / (kind + std::string("s"));
   std::error_code error;
-  fs::create_directories(folder / "presets", error);
+  fs::create_directories(folder, error);
   if (error) {
-    return Error{"the folder '" + (folder / "presets").string() +
-                 "' cannot be made: " + error.message()};
+    return Error{"the folder '" + folder.string() + "' cannot be made: " + error.message()};
   }
-  return (folder / "presets" / (name + ".toml")).string();
+  return (folder / (name + ending)).string();
+}
+
+}  // namespace
+
+Result<std::string> path_to_save(const std::string& name) {
+  return users_file(name, "preset", ".toml");
+}
+
+Result<std::string> path_of_flight(const std::string& name) {
+  return users_file(name, "flight", ".ressort");
 }
 
 }  // namespace ressort

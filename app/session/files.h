@@ -51,6 +51,10 @@ std::string models_folder();
 // yet: with models and presets in it. Empty: nobody's home is known.
 std::string user_folder();
 
+// Where a flight of this name is to be saved, below the user's folder, which is made; errors as of
+// path_to_save().
+Result<std::string> path_of_flight(const std::string& name);
+
 // What can be computed again: ressort in $XDG_CACHE_HOME or in ~/.cache, which may not be there
 // yet. Empty: nobody's home is known.
 std::string cache_folder();

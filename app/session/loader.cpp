@@ -56,15 +56,99 @@ ModelText text_at(const Scene& scene, int line) {
   return found;
 }
 
+// The texts that a scene is read from: those on the disk, or others by the same paths.
+class SceneFiles {
+ public:
+  explicit SceneFiles(const std::vector<SceneFile>* given) : given_(given) {}
+
+  Result<std::string> find(const std::string& name, Reach reach) const {
+    return given_ != nullptr ? Result<std::string>(name) : find_scene(name, reach);
+  }
+  bool is_there(const std::string& path) {
+    std::error_code error;
+    const bool is_there =
+        given_ != nullptr ? find_given(path) != nullptr : fs::is_regular_file(path, error);
+    if (!is_there) {
+      seen_.push_back({path, "", false});
+    }
+    return is_there;
+  }
+  Result<std::string> read(const std::string& path, std::size_t max_bytes) {
+    if (given_ != nullptr) {
+      const SceneFile* const file = find_given(path);
+      return file != nullptr ? Result<std::string>(file->text)
+                             : Error{"the text of '" + path + "' is missing"};
+    }
+    auto text = read_text(path, max_bytes);
+    seen_.push_back({path, text ? *text : "", static_cast<bool>(text)});
+    return text;
+  }
+  std::vector<SceneFile> take() { return std::move(seen_); }
+
+ private:
+  const SceneFile* find_given(const std::string& path) const {
+    const auto found = std::find_if(given_->begin(), given_->end(),
+                                    [&](const SceneFile& file) { return file.path == path; });
+    return found != given_->end() ? &*found : nullptr;
+  }
+
+  const std::vector<SceneFile>* given_;
+  std::vector<SceneFile> seen_;
+};
+
+// As read_tuning() says.
+TuningReading tuning_of(const std::string& scale_path, const std::string& map_path,
+                        SceneFiles& files) {
+  TuningReading out;
+  const auto read = [&](const std::string& path, auto parse, auto& target) {
+    if (path.empty()) {
+      return true;
+    }
+    const auto text = files.read(path, max_tuning_bytes);
+    if (!text) {
+      out.failure = finding_of("", "", text.error());
+      return false;
+    }
+    auto parsed = parse(*text);
+    if (!parsed) {
+      out.failure = finding_of(path, *text, parsed.error());
+      return false;
+    }
+    target = *std::move(parsed);
+    return true;
+  };
+  Scale scale;
+  for (int step = 1; step <= 12; ++step) {
+    scale.cents.push_back(100.0 * step);
+  }
+  KeyboardMap map;
+  if (read(scale_path, parse_scale, scale) && read(map_path, parse_keyboard_map, map)) {
+    auto keys = key_frequencies(scale, map);
+    if (keys) {
+      out.keys_hz = *std::move(keys);
+    } else {
+      out.failure = finding_of("", "", Error{map_path + ": " + keys.error().message});
+    }
+  }
+  return out;
+}
+
 class SceneReader {
  public:
-  explicit SceneReader(const SceneOptions& options) : options_(options) {}
+  explicit SceneReader(const SceneOptions& options) : options_(options), files_(options.files) {}
 
   Reading read(const std::string& name) {
-    auto path = find_scene(name, options_.reach);
+    read_all(name);
+    out_.files = files_.take();
+    return std::move(out_);
+  }
+
+ private:
+  void read_all(const std::string& name) {
+    auto path = files_.find(name, options_.reach);
     if (!path) {
       fail("", "", path.error());
-      return std::move(out_);
+      return;
     }
     scene_.path = *path;
     scene_.name = fs::path(*path).stem().string();
@@ -75,17 +159,15 @@ class SceneReader {
     if (tune() && is_read) {
       out_.scene = std::move(scene_);
     }
-    return std::move(out_);
   }
 
- private:
   bool fail(const std::string& file, std::string_view text, const Error& error) {
     out_.findings.push_back(finding_of(file, text, error));
     return false;
   }
 
   bool read_preset() {
-    auto text = read_text(scene_.path, max_preset_bytes);
+    auto text = files_.read(scene_.path, max_preset_bytes);
     if (!text) {
       return fail("", "", text.error());
     }
@@ -151,7 +233,7 @@ class SceneReader {
                     Error{"its tuning is none of the program's own, and OSC loads no others"});
       }
     }
-    TuningReading tuning = read_tuning(scale, map);
+    TuningReading tuning = tuning_of(scale, map, files_);
     if (tuning.failure) {
       out_.findings.push_back(*std::move(tuning.failure));
       return false;
@@ -165,7 +247,7 @@ class SceneReader {
     std::string text;
     int line = 1;
     for (const std::string& path : paths) {
-      auto more = read_text(path, max_model_bytes);
+      auto more = files_.read(path, max_model_bytes);
       if (!more) {
         return fail("", "", more.error());
       }
@@ -203,8 +285,7 @@ class SceneReader {
   }
 
   // A preset's model is beside the preset, or among the program's own.
-  std::optional<std::string> find_model(const std::string& model) const {
-    std::error_code error;
+  std::optional<std::string> find_model(const std::string& model) {
     const fs::path folder = fs::path(scene_.path).parent_path();
     std::vector<fs::path> tried = {folder / model, folder / ".." / "models" / model,
                                    fs::path(models_folder()) / model};
@@ -216,14 +297,16 @@ class SceneReader {
         if (const auto own = own_file(path.string())) {
           return own;
         }
-      } else if (fs::is_regular_file(path, error)) {
-        return path.lexically_normal().string();
+      } else if (const std::string normal = path.lexically_normal().string();
+                 files_.is_there(normal)) {
+        return normal;
       }
     }
     return std::nullopt;
   }
 
   const SceneOptions options_;
+  SceneFiles files_;
   Scene scene_;
   Reading out_;
 };
@@ -313,39 +396,9 @@ std::string without_source(std::string_view message) {
   return all.empty() ? std::string(message) : all;
 }
 
-TuningReading read_tuning(const std::string& scale_path, const std::string& map_path) {
-  TuningReading out;
-  const auto read = [&](const std::string& path, auto parse, auto& target) {
-    if (path.empty()) {
-      return true;
-    }
-    const auto text = read_text(path, max_tuning_bytes);
-    if (!text) {
-      out.failure = finding_of("", "", text.error());
-      return false;
-    }
-    auto parsed = parse(*text);
-    if (!parsed) {
-      out.failure = finding_of(path, *text, parsed.error());
-      return false;
-    }
-    target = *std::move(parsed);
-    return true;
-  };
-  Scale scale;
-  for (int step = 1; step <= 12; ++step) {
-    scale.cents.push_back(100.0 * step);
-  }
-  KeyboardMap map;
-  if (read(scale_path, parse_scale, scale) && read(map_path, parse_keyboard_map, map)) {
-    auto keys = key_frequencies(scale, map);
-    if (keys) {
-      out.keys_hz = *std::move(keys);
-    } else {
-      out.failure = finding_of("", "", Error{map_path + ": " + keys.error().message});
-    }
-  }
-  return out;
+TuningReading read_tuning(const std::string& scale, const std::string& keyboard_map) {
+  SceneFiles files(nullptr);
+  return tuning_of(scale, keyboard_map, files);
 }
 
 std::string preset_description(const std::string& name) {
@@ -358,7 +411,10 @@ Reading read_scene(const std::string& name, const SceneOptions& options) {
 }
 
 Result<Scene> load_scene(const std::string& name, const SceneOptions& options) {
-  Reading reading = read_scene(name, options);
+  return scene_of(read_scene(name, options));
+}
+
+Result<Scene> scene_of(Reading&& reading) {
   if (reading.scene) {
     return *std::move(reading.scene);
   }

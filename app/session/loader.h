@@ -24,6 +24,13 @@ struct Finding {
 
 struct Scene;
 
+// A text that a scene was read from, or one that it would be read from if it were there.
+struct SceneFile {
+  std::string path;
+  std::string text;
+  bool is_there = true;
+};
+
 // An error at a place of the text that is all of `file`.
 Finding finding_of(const std::string& file, std::string_view text, const Error& error);
 
@@ -59,7 +66,8 @@ struct SceneOptions {
   std::optional<ThirdArgument> third;  // whatever preset and model say
   Reach reach = Reach::any_file;       // of the name, and of the preset's model
   KeyOptions keys = {};
-  Progress progress = {};  // a reading that it stops fails with `stopped`
+  const std::vector<SceneFile>* files = nullptr;  // instead of those on the disk; by their paths
+  Progress progress = {};                         // a reading that it stops fails with `stopped`
 };
 
 // Where a file's lines stand in the text that its model was read from.
@@ -86,6 +94,7 @@ struct Scene {
 struct Reading {
   std::optional<Scene> scene;
   std::vector<Finding> findings;
+  std::vector<SceneFile> files;
 };
 
 // What was told of files, for who may not read them: of what has a place in one, the file's name,
@@ -100,7 +109,9 @@ std::string preset_description(const std::string& name);
 // playable. Blocks on the disk. [any thread but audio]
 Reading read_scene(const std::string& name, const SceneOptions& options);
 
-// The same for who wants the scene or nothing. The error's message is all findings, one a line.
+// The same for who wants the scene or nothing, of a Reading. The error's message is all findings,
+// one a line.
+Result<Scene> scene_of(Reading&& reading);
 Result<Scene> load_scene(const std::string& name, const SceneOptions& options);
 
 }  // namespace ressort

@@ -52,6 +52,13 @@ Session::Session(Process& process, const SessionOptions& options, Tell tell)
       rate_hz_(options_.compile.rate_hz),
       built_rate_hz_(rate_hz_),
       current_(std::make_shared<Loaded>()),
+      flight_({.rescale = options_.compile.rescale,
+               .voices = options_.compile.voices,
+               .precision = options_.compile.precision,
+               .method = options_.compile.method,
+               .budget = options_.compile.budget,
+               .third = options_.third,
+               .keys = options_.keys}),
       worker_([this] { work(); }) {}
 
 Session::~Session() {
@@ -173,6 +180,12 @@ void Session::on_audio_inputs(std::function<void(int)> prepare) {
 
 void Session::work() {
   using namespace std::chrono_literals;
+  if (options_.keeps_flights) {
+    process_.keeps_flight.raise();
+  }
+  if (options_.watch) {
+    watch_.emplace();
+  }
   while (true) {
     std::deque<Job> jobs;
     std::optional<ModesJob> modes_job;
@@ -212,6 +225,8 @@ void Session::work() {
         do_modes(*modes_job);
       } else if (wants_again) {
         do_again();
+      } else if (watch_ && (std::exchange(is_edited_, false) || watch_->has_changed())) {
+        do_reload();
       } else if (source_) {
         improve();
       }
@@ -260,7 +275,12 @@ void Session::improve() {
     loaded->plan = std::move(compiled->plan);
     current_ = std::move(loaded);
   }
-  offer(std::move(compiled->engine));
+  FlightEngine made_of = source.made_of;
+  made_of.gain = source.preset.gain;
+  made_of.find_gain = false;
+  made_of.most_modes = source.options.most_modes;
+  made_of.lets_ring = made_of.has_new_numbers = false;
+  offer(std::move(compiled->engine), std::move(made_of));
   if (!news.empty() && tell_) {
     tell_(news);
   }
@@ -270,9 +290,21 @@ void Session::improve() {
   time_parts();
 }
 
-void Session::offer(std::unique_ptr<Engine> engine, bool lets_ring) {
+void Session::offer(std::unique_ptr<Engine> engine, FlightEngine made_of) {
   offered_ = engine.get();
-  delete process_.slot.offer(new Sounding{std::move(engine), serial_, lets_ring});
+  made_of.number = ++engines_;
+  made_of.serial = serial_;
+  auto next = std::make_unique<Sounding>();
+  next->engine = std::move(engine);
+  next->serial = serial_;
+  next->lets_ring = made_of.lets_ring;
+  next->has_new_numbers = made_of.has_new_numbers;
+  next->number = made_of.number;
+  if (options_.keeps_flights) {
+    const std::lock_guard lock(mutex_);
+    flight_.add(std::move(made_of), current_->instrument.audio_inputs > 0);
+  }
+  delete process_.slot.offer(next.release());
 }
 
 // Only the worker destroys engines, and not before another one has been offered.
@@ -309,6 +341,7 @@ void Session::listen() {
   }
   const Meters now = process_.meters();
   hear_turns(now);
+  look_out(now);
   if (now.late != late_reported_ && now.late_s > least_lateness_s) {
     lates_.add("an event came " + fixed(now.late_s, 3) + " s after its time",
                now.late - std::exchange(late_reported_, now.late));
@@ -430,9 +463,29 @@ Result<std::shared_ptr<const Loaded>> Session::build(const Wish& wish) {
   }
 }
 
+SceneOptions Session::scene_options(const Wish& wish, const Progress& progress) const {
+  return {.bare = options_.compile.bare,
+          .third = options_.third,
+          .reach = wish.reach,
+          .keys = options_.keys,
+          .progress = progress};
+}
+
 Result<std::shared_ptr<const Loaded>> Session::build_now(const Wish& wish,
                                                          const Progress& progress) {
   const auto start = std::chrono::steady_clock::now();
+  Reading reading = read_scene(wish.name, scene_options(wish, progress));
+  auto files = std::make_shared<const std::vector<SceneFile>>(std::move(reading.files));
+  auto scene = scene_of(std::move(reading));
+  return scene
+             ? sound(wish, {.scene = *std::move(scene), .files = std::move(files), .start = start},
+                     progress)
+             : scene.error();
+}
+
+// Compiles what was read, and lets it sound.
+Result<std::shared_ptr<const Loaded>> Session::sound(const Wish& wish, Draft draft,
+                                                     const Progress& progress) {
   CompileOptions options = options_.compile;
   std::function<void(int)> prepare_inputs;
   {
@@ -440,20 +493,27 @@ Result<std::shared_ptr<const Loaded>> Session::build_now(const Wish& wish,
     options.rate_hz = rate_hz_;
     prepare_inputs = prepare_inputs_;
   }
-  auto scene = load_scene(wish.name, {.bare = options_.compile.bare,
-                                      .third = options_.third,
-                                      .reach = wish.reach,
-                                      .keys = options_.keys,
-                                      .progress = progress});
-  if (!scene) {
-    return scene.error();
+  Scene* const scene = &draft.scene;
+  std::optional<Scene> as_read;
+  if (watch_) {
+    as_read = *scene;
   }
+  const std::vector<Setting> written = keep_values(*scene, draft.kept);
   options.find_gain = !scene->has_preset;
   options.most_modes = quick_modes;
   options.force = wish.force;
   options.progress = progress;
   options.most_bytes = free_memory_bytes();
   scene->preset.gain *= options_.gain;
+  FlightEngine made_of{.lets_ring = wish.lets_ring,
+                       .path = scene->path,
+                       .files = draft.files,
+                       .kept = draft.kept,
+                       .rate_hz = options.rate_hz,
+                       .most_modes = options.most_modes,
+                       .find_gain = options.find_gain,
+                       .force = options.force,
+                       .gain = scene->preset.gain};
   auto compiled = admit(*scene, options, scene->warnings);
   if (!compiled) {
     return compiled.error();
@@ -466,9 +526,12 @@ Result<std::shared_ptr<const Loaded>> Session::build_now(const Wish& wish,
       scene->warnings.push_back(std::move(warning));
     }
   }
-  const std::chrono::duration<double, std::milli> took = std::chrono::steady_clock::now() - start;
+  const std::chrono::duration<double, std::milli> took =
+      std::chrono::steady_clock::now() - draft.start;
+  made_of.has_new_numbers = draft.goes_on && offered_ != nullptr &&
+                            can_renumber(offered_->machine(), compiled->engine->machine());
   auto loaded = std::make_shared<Loaded>();
-  loaded->serial = ++serial_;
+  loaded->serial = made_of.has_new_numbers ? serial_ : ++serial_;
   loaded->name = scene->name;
   loaded->path = scene->path;
   loaded->model_path = scene->model_path;
@@ -486,10 +549,16 @@ Result<std::shared_ptr<const Loaded>> Session::build_now(const Wish& wish,
   for (const ParameterInfo& info : loaded->instrument.parameters) {
     values.push_back(info.value);
   }
+  for (ParameterInfo& info : loaded->instrument.parameters) {
+    const auto as_written = std::find_if(
+        written.begin(), written.end(), [&](const Setting& s) { return s.parameter == info.name; });
+    info.value = as_written != written.end() ? as_written->value : info.value;
+  }
   {
     const std::lock_guard lock(mutex_);
     const bool is_same = current_->path == loaded->path;
     current_ = loaded;
+    files_ = draft.files;
     values_ = std::move(values);
     pupil_.reset();
     std::erase_if(learned_, [&](const LearnedRow& row) {
@@ -500,14 +569,16 @@ Result<std::shared_ptr<const Loaded>> Session::build_now(const Wish& wish,
     }
     built_rate_hz_ = options.rate_hz;
   }
-  offer(std::move(compiled->engine), wish.lets_ring);
+  offer(std::move(compiled->engine), made_of);
+  read_ = std::move(as_read);
+  follow(*draft.files);
   source_.reset();
   if (may_gain(loaded->plan)) {
     options.find_gain = false;
     scene->preset.gain = loaded->instrument.gain;
     options.most_modes = patient_modes;
     options.progress = {};
-    source_ = {std::move(scene->network), std::move(scene->preset), options};
+    source_ = {std::move(scene->network), std::move(scene->preset), options, std::move(made_of)};
   }
   return std::shared_ptr<const Loaded>(std::move(loaded));
 }

@@ -15,9 +15,11 @@
 
 #include "app/realtime/process.h"
 #include "app/realtime/rate_limit.h"
+#include "app/session/flight/flight.h"
 #include "app/session/loader.h"
 #include "app/session/modes/known_modes.h"
 #include "app/session/timbre/timbre_watch.h"
+#include "app/session/watch/file_watch.h"
 #include "core/analysis/modes/tune.h"
 #include "core/compile/compile.h"
 
@@ -28,6 +30,8 @@ struct SessionOptions {
   double gain = 1.0;                   // on top of every preset's
   std::optional<ThirdArgument> third;  // of every model, whatever it shows
   KeyOptions keys;                     // instead of every preset's
+  bool watch = false;                  // what sounds is read again when its files change
+  bool keeps_flights = false;          // of what it plays; saved when something goes wrong
 };
 
 // What sounds now, as people see it. Never changes once published.
@@ -62,6 +66,13 @@ struct Status : Meters {
 struct LearnedRow {
   int controller = 0;
   std::string target;
+};
+
+// What came of the last reading of changed files.
+struct Reload {
+  std::uint64_t count = 0;  // of all of them; 0: there was none
+  bool is_done = true;
+  std::string news;  // what has changed; or what is wrong, with each line and a caret below it
 };
 
 // What can be taken back: parameters as they were before, and before that what was loaded.
@@ -143,6 +154,14 @@ class Session {
   // but audio]
   Result<std::string> save(const std::string& name, Existing existing);
 
+  // The same to a folder, with copies of all texts that it is read from; the preset's name there.
+  // Replaces what is there.
+  Result<std::string> save_to(const std::string& folder);
+
+  // The files that all keys were tuned by, whatever the preset says; none: they were not.
+  std::vector<std::string> tuning() const;
+  void set_tuning(std::vector<std::string> paths);
+
   Status status();
 
   // What it sounds like; it makes promises of its own.
@@ -150,6 +169,14 @@ class Session {
 
   // What plays, or what is waited for; set by whoever starts a backend.
   void set_backend(std::string description, bool runs);
+
+  Reload last_reload() const;  // [any thread but audio]
+
+  // Writes what was played since the program began, to be played back bit by bit; its path. The
+  // error says why it is not known, or what is in the way. [any thread but audio]
+  Result<std::string> write_flight(const std::string& path, Existing existing);
+  // The same to the user's own flights, by a name that is not there yet.
+  Result<std::string> save_flight(const std::string& name);
 
   // Called in the worker before an engine is offered, with the number of its audio inputs.
   void on_audio_inputs(std::function<void(int)> prepare);
@@ -179,6 +206,16 @@ class Session {
     Network network;
     Preset preset;
     CompileOptions options;
+    FlightEngine made_of;
+  };
+
+  // What was read, before it is compiled.
+  struct Draft {
+    Scene scene;
+    std::shared_ptr<const std::vector<SceneFile>> files;
+    std::vector<Setting> kept;  // values that parameters have, in place of the texts'
+    bool goes_on = false;       // as what sounds, if it is alike
+    std::chrono::steady_clock::time_point start = std::chrono::steady_clock::now();
   };
 
   void work();
@@ -190,12 +227,20 @@ class Session {
   Result<std::string> preset_text(const std::string& model) const;
   Result<std::shared_ptr<const Loaded>> build(const Wish& wish);
   Result<std::shared_ptr<const Loaded>> build_now(const Wish& wish, const Progress& progress);
+  SceneOptions scene_options(const Wish& wish, const Progress& progress) const;
+  Result<std::shared_ptr<const Loaded>> sound(const Wish& wish, Draft draft,
+                                              const Progress& progress);
+  void follow(const std::vector<SceneFile>& files);
+  void do_reload();
+  Result<std::string> reload(Draft draft);
+  void turn(const std::vector<Setting>& settings);
+  void look_out(const Meters& now);
   void improve();
   // Whether somebody wants something else of the worker; a load gives way to a newer one only.
   bool is_outdated(bool is_load) const;
   bool has_new_rate() const;  // under the lock
   // Hands the engine over; its parts are timed when nobody waits any more.
-  void offer(std::unique_ptr<Engine> engine, bool lets_ring = false);
+  void offer(std::unique_ptr<Engine> engine, FlightEngine made_of);
   void time_parts();
   void listen();
   void change_program(int number);
@@ -226,13 +271,26 @@ class Session {
   std::string backend_;
   bool runs_ = false;  // the backend
   std::function<void(int)> prepare_inputs_;
+  Reload reload_;
+  FlightLog flight_;
+  std::vector<std::string> tuning_;
+  std::shared_ptr<const std::vector<SceneFile>> files_;  // of what sounds
 
   std::uint32_t serial_ = 0;         // [worker]
   std::optional<Wish> scene_;        // [worker] what was loaded last
   const Engine* offered_ = nullptr;  // [worker] until the next is offered
   std::optional<Source> source_;     // [worker] of what may be improved
   std::set<int> unknown_programs_;   // [worker] that were told
-  RateLimit resets_;                 // [worker] all of these
+  std::optional<FileWatch> watch_;   // [worker]
+  bool is_edited_ = false;           // [worker] whatever the watch says
+  std::optional<Scene> read_;        // [worker] what sounds, as it was read; where it is watched
+  std::uint32_t engines_ = 0;        // [worker] so many were offered
+  std::uint64_t resets_seen_ = 0;    // [worker]
+  std::uint64_t xruns_seen_ = 0;     // [worker] a second ago
+  int saved_flights_ = 0;            // [worker] by itself
+  std::chrono::steady_clock::time_point last_look_;    // [worker] at the xruns
+  std::chrono::steady_clock::time_point last_flight_;  // [worker] that was saved by itself
+  RateLimit resets_;                                   // [worker] all of these
   RateLimit overloads_{std::chrono::seconds(10)};
   RateLimit lates_;
   RateLimit drops_;

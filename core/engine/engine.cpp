@@ -349,6 +349,19 @@ struct Engine::Player {
     return goes_on;
   }
 
+  bool renumber_from(const Player& from) {
+    if (from.voices.size() != voices.size() || !go_on_from(from)) {
+      return false;
+    }
+    voices.renumber(playing.gain != 0.0 ? from.playing.gain / playing.gain : 1.0);
+    for (std::size_t i = 0; i < machine.parameters.size(); ++i) {
+      if (machine.parameters[i] != from.machine.parameters[i]) {
+        parameters.set(i, machine.parameters[i]);
+      }
+    }
+    return true;
+  }
+
   const Machine machine;
   const Playing playing;
   Voices voices;
@@ -389,6 +402,10 @@ void Engine::process(std::span<const Event> events, std::span<const double* cons
 
 bool Engine::go_on_from(const Engine& from) {
   return player_->go_on_from(*from.player_);
+}
+
+bool Engine::renumber_from(const Engine& from) {
+  return player_->renumber_from(*from.player_);
 }
 
 void Engine::adopt_channels(const Engine& from) {

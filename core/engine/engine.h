@@ -127,6 +127,11 @@ struct EngineMeters {
 inline constexpr double runaway_level = 1e3;
 inline constexpr double runaway = 1e9;
 
+// Whether an Engine of one Machine can be renumbered to the other: they differ in the numbers of
+// their coefficients, their velocities at the start and their forms only, and what is between their
+// numbers is stable where both are. [any thread]
+bool can_renumber(const Machine& from, const Machine& to);
+
 // The heap is used by the constructor and never again; it throws what a Progress does.
 class Engine {
  public:
@@ -146,6 +151,11 @@ class Engine {
   // what that of `from` would be. False, and nothing is changed, if a kernel there does not
   // know where all of its masses are. [audio] wait-free, O(awake voices * (nodes + modes * masses))
   bool go_on_from(const Engine& from);
+
+  // The same from one that can_renumber(): its voices sound on, and the new numbers come as
+  // parameters do that are turned, the gain as a channel's level. A parameter that this Machine
+  // starts elsewhere with goes there; the others stay where they are. [audio] wait-free, as above
+  bool renumber_from(const Engine& from);
 
   // Hears from now on what controllers and tuning messages have said to `from`, an engine of
   // another model that sounded until now. [audio] wait-free

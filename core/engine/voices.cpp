@@ -60,6 +60,22 @@ void Voices::go_on_from(const Voices& from) {
   shed_ = from.shed_;
 }
 
+// What is heard of each stays where it was, and goes from there.
+void Voices::renumber(double gain_ratio) {
+  for (Voice& voice : voices_) {
+    if (!voice.awake) {
+      continue;
+    }
+    voice.is_retuned = has_changed_ = true;
+    if (gain_ratio != 1.0) {
+      for (double& volume : voice.volume) {
+        volume *= gain_ratio;
+      }
+      follow_level(voice);
+    }
+  }
+}
+
 // --- life ---------------------------------------------------------------------------------------
 
 void Voices::start(std::size_t lane, double frequency_hz) {

@@ -114,6 +114,8 @@ class Voices {
   Voices(const Playing& playing, double rate_hz, std::size_t outputs);
   // What another engine's voices are in the midst of.
   void go_on_from(const Voices& from);
+  // After it: the model's numbers are others, and its gain is 1/`gain_ratio` of what it was.
+  void renumber(double gain_ratio);
 
   std::size_t size() const { return voices_.size(); }
   Voice& operator[](std::size_t lane) { return voices_[lane]; }

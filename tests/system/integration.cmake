@@ -4,14 +4,16 @@ add_library(rtspy MODULE system/rtspy.cpp)
 target_compile_options(rtspy PRIVATE -Wno-conversion -Wno-nonnull-compare)
 target_link_libraries(rtspy PRIVATE PkgConfig::JACK ${CMAKE_DL_LIBS})
 
-add_ressort_tests(ressort_server_tests system/server_test.cpp)
+add_ressort_tests(ressort_server_tests system/server_test.cpp system/nsm_test.cpp
+  system/soak_test.cpp)
 target_link_libraries(ressort_server_tests PRIVATE PkgConfig::JACK PkgConfig::LIBLO Threads::Threads)
 target_compile_definitions(ressort_server_tests PRIVATE
-  RESSORT_PROGRAM="$<TARGET_FILE:ressort>" RESSORT_SPY="$<TARGET_FILE:rtspy>")
+  RESSORT_PROGRAM="$<TARGET_FILE:ressort>" RESSORT_SPY="$<TARGET_FILE:rtspy>"
+  RESSORT_SOURCE="${CMAKE_SOURCE_DIR}")
 add_dependencies(ressort_server_tests ressort rtspy)
 
 # A sanitizer brings its own malloc, which the spy cannot stand in for.
-set(server_tags jack_midi osc_time flood rtmidi alsa server_loss)
+set(server_tags jack_midi osc_time flood rtmidi alsa server_loss nsm)
 if(NOT RESSORT_ADDRESS_SANITIZER AND NOT RESSORT_THREAD_SANITIZER)
   list(APPEND server_tags callback)
 endif()

@@ -141,6 +141,8 @@ inline void use_test_server() {
   setenv("JACK_DEFAULT_SERVER", server_name, 1);
   setenv("JACK_NO_START_SERVER", "1", 1);
   setenv("JACK_NO_AUDIO_RESERVATION", "1", 1);
+  // What a program keeps of its own is not the person's who runs the tests.
+  setenv("XDG_DATA_HOME", ("/tmp/ressort-data-" + std::to_string(getpid())).c_str(), 1);
   jack_set_error_function([](const char*) {});
   jack_set_info_function([](const char*) {});
 }
@@ -149,9 +151,11 @@ class Server {
  public:
   explicit Server(int period_frames, int rate_hz = 48000) {
     use_test_server();
-    jackd_ = std::make_unique<Child>(
-        std::vector<std::string>{"jackd", "-r", "-n", server_name, "-d", "dummy", "-r",
-                                 std::to_string(rate_hz), "-p", std::to_string(period_frames)});
+    // What it has to say is for nobody: a server that nobody reads would wait for a reader.
+    jackd_ = std::make_unique<Child>(std::vector<std::string>{
+        "sh", "-c",
+        "exec jackd -r -n " + std::string(server_name) + " -d dummy -r " + std::to_string(rate_hz) +
+            " -p " + std::to_string(period_frames) + " > /dev/null 2>&1"});
     REQUIRE(eventually([] {
       jack_client_t* client = jack_client_open("knock", JackNoStartServer, nullptr);
       if (client != nullptr) {

@@ -1,4 +1,5 @@
 // The whole program on a real JACK server: what a musician would notice, measured.
+#include <jack/metadata.h>
 #include <lo/lo.h>
 
 #include <cmath>
@@ -323,6 +324,105 @@ TEST_CASE("The ALSA null device runs, and plays what OSC asks for", "[alsa]") {
   CHECK(play.exit_code() == 0);
 }
 
+TEST_CASE("What an ALSA device hears drives a model's audio inputs", "[alsa]") {
+  // A device whose microphone plays a file: a sine of 440 Hz in floats.
+  namespace fs = std::filesystem;
+  const std::string there =
+      (fs::temp_directory_path() / ("ressort-alsa-" + std::to_string(getpid()))).string();
+  {
+    std::vector<float> sine;
+    for (int n = 0; n < 48000 * 20; ++n) {
+      const auto y = static_cast<float>(0.01 * std::sin(2.0 * M_PI * 440.0 * n / 48000.0));
+      sine.insert(sine.end(), {y, y});
+    }
+    std::ofstream(there + ".raw", std::ios::binary)
+        .write(reinterpret_cast<const char*>(sine.data()),
+               static_cast<std::streamsize>(sine.size() * sizeof(float)));
+    std::ofstream config(there + ".conf");
+    config << std::ifstream("/usr/share/alsa/alsa.conf").rdbuf()
+           << "pcm.mic { type file\n slave.pcm null\n file /dev/null\n format raw\n infile \""
+           << there << ".raw\" }\npcm.duplex { type asym\n playback.pcm null\n capture.pcm mic }\n";
+  }
+  const auto peak = [&](const char* device) {
+    Child play(
+        program({"play", "Resonator", "-a", "alsa", "-d", device, "-m", "none", "-u", "off"}),
+        {{"ALSA_CONFIG_PATH", there + ".conf"}});
+    REQUIRE(play.says("on ALSA"));
+    std::this_thread::sleep_for(500ms);
+    play.write("status\n");
+    REQUIRE(play.says("events"));
+    CHECK(play.said().find("notes   none yet") != std::string::npos);
+    const std::string& said = play.said();
+    const std::size_t at = said.find("peak ");
+    return at == std::string::npos ? -1000.0 : std::atof(said.c_str() + at + 5);
+  };
+  const double heard_db = peak("duplex");
+  CAPTURE(heard_db);
+  CHECK(heard_db > -40.0);
+  CHECK(heard_db <= 0.0);
+  const double null_db = peak("null");
+  CAPTURE(null_db);
+  CHECK((null_db < -100.0 || null_db == 0.0));  // "silent" is no number
+  for (const char* const ending : {".raw", ".conf"}) {
+    fs::remove(there + ending);
+  }
+}
+
+TEST_CASE("A bounce is exact: every note on its frame, however fast it goes", "[jack_midi]") {
+  const Server server(256);
+  Child play(program({"play", click(), "-a", "jack", "-i", "-u", osc_port}));
+  REQUIRE(answers());
+  constexpr std::size_t first = 20000;
+  Listener listener(first + (notes + 1) * spacing);
+  std::vector<Listener::Message> messages;
+  for (std::size_t n = 0; n < notes; ++n) {
+    messages.push_back({first + n * spacing, {0x90, 69, 100}});
+    messages.push_back({first + n * spacing + 9000, {0x80, 69, 0}});
+  }
+  listener.plan(messages);
+  jack_client_t* const bounce = jack_client_open("bounce", JackNoStartServer, nullptr);
+  REQUIRE(bounce != nullptr);
+  listener.start("ressort:out_left", "ressort:midi_in");
+  REQUIRE(jack_set_freewheel(bounce, 1) == 0);
+  const auto start = std::chrono::steady_clock::now();
+  REQUIRE(listener.wait_for(first + notes * spacing));
+  const std::chrono::duration<double> took = std::chrono::steady_clock::now() - start;
+  REQUIRE(jack_set_freewheel(bounce, 0) == 0);
+  jack_client_close(bounce);
+  const std::vector<std::size_t> late = onsets(listener, first);
+  const auto [least, most] = std::minmax_element(late.begin(), late.end());
+  CAPTURE(*least, *most);
+  CHECK(*most < spacing / 2);
+  CHECK(*most - *least == 0);  // frames
+  std::printf("a bounce of %.1f s took %.2f s\n", first / 48e3 + notes * spacing / 48e3,
+              took.count());
+}
+
+TEST_CASE("Ports say what they are, in their order", "[jack_midi]") {
+  const Server server(256);
+  Child play(program({"play", "Resonator", "-a", "jack", "-i", "-u", osc_port}));
+  REQUIRE(answers());
+  jack_client_t* const client = jack_client_open("reader", JackNoStartServer, nullptr);
+  REQUIRE(client != nullptr);
+  const auto property = [&](const char* port, const char* key) {
+    char* value = nullptr;
+    char* type = nullptr;
+    const jack_port_t* const found = jack_port_by_name(client, port);
+    REQUIRE(found != nullptr);
+    const std::string text =
+        jack_get_property(jack_port_uuid(found), key, &value, &type) == 0 ? value : "none";
+    jack_free(value);
+    jack_free(type);
+    return text;
+  };
+  const char* const order = "http://jackaudio.org/metadata/order";
+  CHECK(property("ressort:out_left", JACK_METADATA_PRETTY_NAME) == "Left");
+  CHECK(property("ressort:out_right", order) == "1");
+  CHECK(property("ressort:midi_in", JACK_METADATA_PRETTY_NAME) == "MIDI");
+  CHECK(property("ressort:out_left", JACK_METADATA_PORT_GROUP) == "Outputs");
+  jack_client_close(client);
+}
+
 TEST_CASE("The death of the server is survived, or told by the exit code", "[server_loss]") {
   auto server = std::make_unique<Server>(256);
 
@@ -378,7 +478,15 @@ TEST_CASE("The death of the server is survived, or told by the exit code", "[ser
       int rate_hz;
       bool is_killed;
     };
-    for (const Next& next : {Next{512, 48000, true}, Next{128, 44100, false}}) {
+    std::vector<Next> nexts{{512, 48000, true}, {128, 44100, false}};
+    // More of them by RESSORT_KILLS, at all rates and periods in turn.
+    const char* const kills = std::getenv("RESSORT_KILLS");
+    for (int i = 0; kills != nullptr && i < std::atoi(kills); ++i) {
+      constexpr int periods[] = {64, 1024, 256, 128, 512};
+      constexpr int rates_hz[] = {44100, 48000, 96000};
+      nexts.push_back({periods[i % 5], rates_hz[i % 3], true});
+    }
+    for (const Next& next : nexts) {
       CAPTURE(next.period_frames, next.is_killed);
       play.forget();
       next.is_killed ? server->kill() : server->end();
@@ -391,7 +499,10 @@ TEST_CASE("The death of the server is survived, or told by the exit code", "[ser
       REQUIRE(play.says("playing again"));
       std::this_thread::sleep_for(300ms);  // it comes later than we
       neighbour = std::make_unique<Neighbour>();
+      const auto came = std::chrono::steady_clock::now();
       CHECK(eventually(all_are_back));
+      const std::chrono::duration<double> took = std::chrono::steady_clock::now() - came;
+      std::printf("all connections are back after %.2f s\n", took.count());
       std::this_thread::sleep_for(1500ms);  // longer than anybody waits before he tries again
       CHECK(all_are_back());
       CHECK_FALSE(neighbour->is_connected(pulled.first, pulled.second));

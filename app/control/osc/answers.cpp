@@ -128,6 +128,21 @@ void answer::save(const Question& question) {
       path ? "OSC saved " + *path : "OSC could not save '" + name + "': " + path.error().message);
 }
 
+void answer::flight(const Question& question) {
+  const Message& message = question.message;
+  if (message.arguments.size() != 1 || !std::holds_alternative<std::string>(message.arguments[0])) {
+    question.client.error(message.address, message.address + ": expected NAME");
+    return;
+  }
+  const auto& name = std::get<std::string>(message.arguments[0]);
+  const auto path = question.session.save_flight(name);
+  Reply reply(path ? "/done" : "/fail");
+  reply.text(message.address).text(path ? name : path.error().message);
+  question.client.answer(reply);
+  question.client.outlet().tell(
+      path ? "OSC saved " + *path : "OSC could not save '" + name + "': " + path.error().message);
+}
+
 void answer::status(const Question& question) {
   question.client.answer(status_reply(question.session.status()));
 }

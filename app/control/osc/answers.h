@@ -15,6 +15,7 @@ void ranges(const Question& question);
 // /done s:address [ID], or /fail s:address [ID] s:why; later, on the session's worker
 void load(const Question& question);
 void save(const Question& question);
+void flight(const Question& question);
 
 // /status.reply, as status.h lists it
 void status(const Question& question);

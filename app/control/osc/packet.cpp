@@ -1,5 +1,7 @@
 #include "app/control/osc/packet.h"
 
+#include <lo/lo.h>
+
 #include <algorithm>
 #include <cstring>
 #include <optional>
@@ -7,6 +9,8 @@
 
 namespace ressort {
 namespace {
+
+using LoMessage = std::unique_ptr<void, decltype(&lo_message_free)>;
 
 using Bytes = std::span<const std::uint8_t>;
 using Fault = std::optional<Error>;
@@ -176,6 +180,35 @@ Result<std::vector<OscMessage>> check_packet(std::span<const std::uint8_t> packe
     return *fault;
   }
   return messages;
+}
+
+std::optional<Message> read_message(std::span<const std::uint8_t> bytes) {
+  // liblo copies the bytes before it turns them; it only lacks the const.
+  const LoMessage read(
+      lo_message_deserialise(const_cast<std::uint8_t*>(bytes.data()), bytes.size(), nullptr),
+      lo_message_free);
+  if (read == nullptr) {
+    return std::nullopt;
+  }
+  Message message{reinterpret_cast<const char*>(bytes.data()), {}};
+  const char* const types = lo_message_get_types(read.get());
+  lo_arg** const values = lo_message_get_argv(read.get());
+  const int count = lo_message_get_argc(read.get());
+  for (int i = 0; i < count; ++i) {
+    const auto type = static_cast<lo_type>(types[i]);
+    message.types += types[i];
+    if (lo_is_numerical_type(type)) {
+      // liblo reads it: it keeps nothing aligned to 8 bytes.
+      message.arguments.emplace_back(static_cast<double>(lo_hires_val(type, values[i])));
+    } else if (lo_is_string_type(type)) {
+      message.arguments.emplace_back(std::string(reinterpret_cast<const char*>(values[i])));
+    } else if (type == LO_TRUE || type == LO_FALSE) {
+      message.arguments.emplace_back(type == LO_TRUE ? 1.0 : 0.0);
+    } else {
+      return std::nullopt;
+    }
+  }
+  return message;
 }
 
 }  // namespace ressort

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -25,5 +26,9 @@ inline constexpr int max_osc_bundle_depth = 8;
 // type tags are known and their arguments are all there; bundles do not nest too deeply. Any
 // fault refuses the whole packet. [any thread]
 Result<std::vector<OscMessage>> check_packet(std::span<const std::uint8_t> packet);
+
+// What a message that was checked says; nothing where an argument is neither a number nor a text.
+// [any thread]
+std::optional<Message> read_message(std::span<const std::uint8_t> bytes);
 
 }  // namespace ressort

@@ -28,6 +28,7 @@ class Reply {
   Reply& whole(std::uint64_t count) {
     return word('i', std::min<std::uint64_t>(count, most_whole));
   }
+  Reply& signed_whole(std::int32_t value) { return word('i', static_cast<std::uint32_t>(value)); }
   Reply& real(double value) {
     return word('f', std::bit_cast<std::uint32_t>(static_cast<float>(value)));
   }

@@ -1,6 +1,5 @@
 #include "app/control/osc/server.h"
 
-#include <lo/lo.h>
 #include <poll.h>
 #include <sys/eventfd.h>
 #include <unistd.h>
@@ -35,40 +34,6 @@ constexpr std::size_t max_address_bytes = 255;
 constexpr int max_malformed_answers = 10;  // in a second
 constexpr std::size_t max_bundle_events = std::min(Process::max_now, Process::max_ahead);
 constexpr std::int64_t second_ns = 1'000'000'000;
-
-// --- messages -----------------------------------------------------------------------------------
-
-using LoMessage = std::unique_ptr<void, decltype(&lo_message_free)>;
-
-// What a message says; nothing where an argument is neither a number nor a text.
-std::optional<Message> read_message(std::span<const std::uint8_t> bytes) {
-  // liblo copies the bytes before it turns them; it only lacks the const.
-  const LoMessage read(
-      lo_message_deserialise(const_cast<std::uint8_t*>(bytes.data()), bytes.size(), nullptr),
-      lo_message_free);
-  if (read == nullptr) {
-    return std::nullopt;
-  }
-  Message message{reinterpret_cast<const char*>(bytes.data()), {}};
-  const char* const types = lo_message_get_types(read.get());
-  lo_arg** const values = lo_message_get_argv(read.get());
-  const int count = lo_message_get_argc(read.get());
-  for (int i = 0; i < count; ++i) {
-    const auto type = static_cast<lo_type>(types[i]);
-    message.types += types[i];
-    if (lo_is_numerical_type(type)) {
-      // liblo reads it: it keeps nothing aligned to 8 bytes.
-      message.arguments.emplace_back(static_cast<double>(lo_hires_val(type, values[i])));
-    } else if (lo_is_string_type(type)) {
-      message.arguments.emplace_back(std::string(reinterpret_cast<const char*>(values[i])));
-    } else if (type == LO_TRUE || type == LO_FALSE) {
-      message.arguments.emplace_back(type == LO_TRUE ? 1.0 : 0.0);
-    } else {
-      return std::nullopt;
-    }
-  }
-  return message;
-}
 
 }  // namespace
 

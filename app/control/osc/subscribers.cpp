@@ -1,6 +1,7 @@
 #include "app/control/osc/subscribers.h"
 
 #include <algorithm>
+#include <utility>
 
 namespace ressort {
 namespace {
@@ -63,7 +64,11 @@ int Subscribers::tell(Session& session, std::int64_t now_ns) {
 
 void Subscribers::tell_changes(const Session& session) {
   const Session::Present now = session.present();
-  const std::vector<Reply> changed = changes(told_, now);
+  std::vector<Reply> changed = changes(told_, now);
+  if (const Reload reload = session.last_reload();
+      std::exchange(reloads_, reload.count) != reload.count) {
+    changed.push_back(Reply(reload.is_done ? "/done" : "/fail").text("/watch").text(reload.news));
+  }
   for (Subscriber& subscriber : all_) {
     if (subscriber.news == News::changes) {
       const std::vector<Reply> rows = subscriber.is_new ? changes({}, now) : changed;

@@ -42,6 +42,7 @@ class Subscribers {
   std::vector<Subscriber> all_;
   Session::Present told_;
   std::uint64_t told_frame_ = 0;
+  std::uint64_t reloads_ = 0;  // that were told
 };
 
 }  // namespace ressort

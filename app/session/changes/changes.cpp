@@ -231,4 +231,52 @@ Result<std::string> Session::save(const std::string& name, Existing existing) {
   return written ? Result<std::string>(*path) : written.error();
 }
 
+Result<std::string> Session::save_to(const std::string& folder) {
+  namespace fs = std::filesystem;
+  const auto now = current();
+  std::shared_ptr<const std::vector<SceneFile>> files;
+  {
+    const std::lock_guard lock(mutex_);
+    files = files_;
+  }
+  if (files == nullptr) {
+    return Error{"nothing is loaded that could be saved"};
+  }
+  const std::string name = now->name + ".toml";
+  const auto text = preset_text(fs::path(now->model_path).filename().string());
+  if (!text) {
+    return text.error();
+  }
+  const fs::path from = fs::path(now->path).parent_path();
+  for (const SceneFile& file : *files) {
+    const bool is_preset = file.path == now->path && file.path.ends_with(".toml");
+    if (!file.is_there || is_preset) {
+      continue;
+    }
+    // What is below the preset's own folder keeps its place there; all else is beside it.
+    fs::path place = fs::path(file.path).lexically_relative(from);
+    if (place.empty() || *place.begin() == ".." || file.path == now->model_path) {
+      place = fs::path(file.path).filename();
+    }
+    std::error_code error;
+    fs::create_directories((folder / place).parent_path(), error);
+    if (auto written = write_text((folder / place).string(), file.text, Existing::replace);
+        !written) {
+      return written.error();
+    }
+  }
+  const auto written = write_text((fs::path(folder) / name).string(), *text, Existing::replace);
+  return written ? Result<std::string>(name) : written.error();
+}
+
+std::vector<std::string> Session::tuning() const {
+  const std::lock_guard lock(mutex_);
+  return tuning_;
+}
+
+void Session::set_tuning(std::vector<std::string> paths) {
+  const std::lock_guard lock(mutex_);
+  tuning_ = std::move(paths);
+}
+
 }  // namespace ressort

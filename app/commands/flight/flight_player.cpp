@@ -1,0 +1,161 @@
+#include "app/commands/flight/flight_player.h"
+
+#include <algorithm>
+#include <cmath>
+#include <memory>
+#include <utility>
+
+#include "app/session/files.h"
+#include "app/version.h"
+#include "core/kernels/isa.h"
+
+namespace ressort {
+namespace {
+
+using Kind = FlightRecord::Kind;
+
+Error out_of_order(std::int64_t frame) {
+  return Error{"the flight is out of order at frame " + std::to_string(frame)};
+}
+
+}  // namespace
+
+FlightPlayer::FlightPlayer(Flight flight, double heard_s) : flight_(std::move(flight)) {
+  // What is heard has one rate and one number of channels.
+  for (const FlightRecord& record : flight_.records) {
+    if (record.kind == Kind::rate) {
+      rate_hz_ = record.event.value;
+      heard_from_ = record.frame;
+    } else if (record.kind == Kind::period &&
+               std::exchange(channels_, record.channels) != record.channels) {
+      heard_from_ = record.frame;
+    }
+  }
+  const auto wanted = static_cast<std::int64_t>(std::llround(heard_s * rate_hz_));
+  heard_from_ = std::max(heard_from_, flight_.end_frame - wanted);
+}
+
+Result<FlightPlayer> FlightPlayer::open(const std::string& path, double heard_s) {
+  const auto text = read_text(path, max_flight_bytes);
+  if (!text) {
+    return text.error();
+  }
+  auto flight = parse_flight(*text);
+  if (!flight) {
+    return Error{to_string(finding_of(path, "", flight.error()))};
+  }
+  FlightPlayer player(*std::move(flight), heard_s);
+  if (player.rate_hz_ <= 0.0 || player.channels_ == 0 || player.frames() <= 0) {
+    return Error{"'" + path + "': nothing is heard in this flight"};
+  }
+  return player;
+}
+
+std::vector<std::string> FlightPlayer::warnings() const {
+  std::vector<std::string> all;
+  const std::string ours = std::string(version) + " " + commit;
+  if (flight_.made_by != ours) {
+    all.push_back("the flight was made by ressort " + flight_.made_by + ", this is " + ours +
+                  ": it may sound otherwise");
+  }
+  if (flight_.isa != isa_name(best_isa())) {
+    all.push_back("the flight was made on a machine of level " + flight_.isa + ", this is " +
+                  std::string(isa_name(best_isa())) + ": its last bits may be others");
+  }
+  if (flight_.has_audio_inputs) {
+    all.emplace_back("what came in by the audio inputs is not in the flight");
+  }
+  return all;
+}
+
+Result<Done> FlightPlayer::play(const std::function<Result<Done>(std::span<const float>)>& hear,
+                                const std::function<bool(double)>& progress) const {
+  const std::int64_t base = flight_.records.front().frame;
+  Process process(rate_hz_);
+  std::vector<float> samples;
+  std::vector<float> interleaved;
+  std::vector<float*> outputs;
+  std::size_t channels = 0;
+  std::int64_t period = 0;
+  std::int64_t left = 0;  // of the block
+  std::size_t next = 0;
+  const auto& records = flight_.records;
+  for (std::int64_t frame = base; frame < flight_.end_frame;) {
+    // What was said before the block, and then what acts within the chunk.
+    for (; next < records.size() && records[next].frame <= frame && left == 0 &&
+           records[next].kind != Kind::event && records[next].kind != Kind::take;
+         ++next) {
+      const FlightRecord& record = records[next];
+      if (record.kind == Kind::period) {
+        period = record.count;
+        channels = record.channels;
+        samples.assign(channels * Process::chunk_frames, 0.0f);
+        outputs.clear();
+        for (std::size_t c = 0; c < channels; ++c) {
+          outputs.push_back(samples.data() + c * Process::chunk_frames);
+        }
+      } else {
+        process.repeat(record);
+      }
+    }
+    if (period == 0) {
+      return out_of_order(frame);
+    }
+    left = left == 0 ? period : left;
+    const std::int64_t count =
+        std::min<std::int64_t>(left, static_cast<std::int64_t>(Process::chunk_frames));
+    for (; next < records.size() && records[next].frame < frame + count &&
+           (records[next].kind == Kind::event || records[next].kind == Kind::take);
+         ++next) {
+      FlightRecord record = records[next];
+      record.frame -= base;
+      if (record.kind == Kind::event) {
+        process.repeat(record);
+        continue;
+      }
+      const auto made_of =
+          std::find_if(flight_.engines.begin(), flight_.engines.end(),
+                       [&](const FlightEngine& engine) { return engine.number == record.count; });
+      if (made_of == flight_.engines.end()) {
+        return Error{"the flight has no engine " + std::to_string(record.count)};
+      }
+      auto engine = make_flight_engine(flight_, *made_of);
+      if (!engine) {
+        return engine.error();
+      }
+      auto sounding = std::make_unique<Sounding>();
+      sounding->engine = *std::move(engine);
+      sounding->serial = made_of->serial;
+      sounding->lets_ring = made_of->lets_ring;
+      sounding->has_new_numbers = made_of->has_new_numbers;
+      delete process.slot.offer(sounding.release());
+    }
+    if (next < records.size() && records[next].frame < frame + count && left > count) {
+      return out_of_order(records[next].frame);
+    }
+    process.block(std::span<const float* const>(), std::span<float* const>(outputs),
+                  static_cast<std::size_t>(count), {}, 0);
+    delete process.slot.collect();
+    if (frame + count > heard_from_) {
+      const auto first = static_cast<std::size_t>(std::max<std::int64_t>(0, heard_from_ - frame));
+      interleaved.clear();
+      for (std::size_t n = first; n < static_cast<std::size_t>(count); ++n) {
+        for (std::size_t c = 0; c < channels; ++c) {
+          interleaved.push_back(outputs[c][n]);
+        }
+      }
+      if (auto heard = hear(interleaved); !heard) {
+        return heard;
+      }
+    }
+    frame += count;
+    left -= count;
+    if (!progress(static_cast<double>(frame - base) /
+                  static_cast<double>(flight_.end_frame - base))) {
+      return Error{"interrupted"};
+    }
+  }
+  return Done{};
+}
+
+}  // namespace ressort

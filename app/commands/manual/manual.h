@@ -1,0 +1,17 @@
+// app/commands: what an installed program has beside it, printed from its own tables.
+#pragma once
+
+#include <CLI/CLI.hpp>
+
+namespace ressort {
+
+// The manual page ressort(1), for man; of all commands of `app`, of the console and of OSC.
+int print_man(const CLI::App& app);
+
+// What bash completes after "ressort": commands, options, their words, presets, models and files.
+int print_completion(const CLI::App& app);
+
+// Every preset and model by its name, a line each.
+int print_names();
+
+}  // namespace ressort

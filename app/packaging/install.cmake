@@ -1,0 +1,61 @@
+# What `cmake --install` puts where, and what `cpack` makes a Debian package of. The program looks for
+# its models in share/ressort beside its own folder.
+include(GNUInstallDirs)
+set(packaging ${CMAKE_CURRENT_LIST_DIR})
+set(packaged ${CMAKE_BINARY_DIR}/packaging)
+
+# What the program says of itself; one that is built for another machine cannot.
+if(NOT CMAKE_CROSSCOMPILING)
+  add_custom_command(TARGET ressort POST_BUILD
+    COMMAND ${CMAKE_COMMAND} -E make_directory ${packaged}
+    COMMAND ressort reference man > ${packaged}/ressort.1
+    COMMAND ressort reference completion > ${packaged}/ressort.bash
+    COMMAND gzip -9nf ${packaged}/ressort.1
+    COMMAND echo ".so man1/ressort.1" | gzip -9n > ${packaged}/ressort-chart.1.gz)
+  install(FILES ${packaged}/ressort.1.gz ${packaged}/ressort-chart.1.gz DESTINATION ${CMAKE_INSTALL_MANDIR}/man1)
+  install(FILES ${packaged}/ressort.bash
+    DESTINATION ${CMAKE_INSTALL_DATADIR}/bash-completion/completions RENAME ressort)
+endif()
+
+install(TARGETS ressort)
+if(TARGET ressort-chart)
+  install(TARGETS ressort-chart OPTIONAL)
+endif()
+install(DIRECTORY models presets DESTINATION ${CMAKE_INSTALL_DATADIR}/ressort
+  FILES_MATCHING PATTERN "*.mdl" PATTERN "*.toml" PATTERN "*.scl" PATTERN "*.kbm")
+install(FILES ${packaging}/ressort.desktop DESTINATION ${CMAKE_INSTALL_DATADIR}/applications)
+install(FILES ${packaging}/io.github.ressort.ressort.metainfo.xml
+  DESTINATION ${CMAKE_INSTALL_DATADIR}/metainfo)
+install(FILES ${packaging}/ressort.service DESTINATION lib/systemd/user)
+
+# As Debian wants them: the licence, out of the front page, and what has changed.
+set(documents ${CMAKE_INSTALL_DOCDIR})
+file(READ ${CMAKE_SOURCE_DIR}/README.md front)
+string(REGEX MATCH "Permission is hereby granted.*SOFTWARE\\." licence "${front}")
+string(REGEX REPLACE "\n\n" "\n.\n" licence "${licence}")
+string(REGEX REPLACE "\n" "\n " licence "${licence}")
+configure_file(${packaging}/copyright.in ${packaged}/copyright @ONLY)
+file(WRITE ${packaged}/changelog "ressort (${PROJECT_VERSION}) stable; urgency=medium\n\n"
+  "  * See https://github.com/ressort/ressort/blob/main/.github/CHANGELOG.md\n\n"
+  " -- ressort <ressort@users.noreply.github.com>  Sun, 01 Nov 2026 12:00:00 +0000\n")
+execute_process(COMMAND gzip -9nkf ${packaged}/changelog)
+install(FILES ${packaged}/copyright ${packaged}/changelog.gz DESTINATION ${documents})
+
+set(CPACK_GENERATOR DEB)
+set(CPACK_PACKAGE_NAME ressort)
+set(CPACK_PACKAGE_VERSION ${PROJECT_VERSION})
+set(CPACK_PACKAGE_CONTACT "ressort <ressort@users.noreply.github.com>")
+set(CPACK_PACKAGE_DESCRIPTION_SUMMARY "Real-time mass-interaction synthesizer")
+set(CPACK_DEBIAN_PACKAGE_DESCRIPTION "Plays networks of masses and springs: strings, meshes, bodies and what
+strikes, plucks and bows them. For JACK, PipeWire and ALSA, by MIDI, MPE
+and OSC, with a console. A model is text, and can be edited while it
+sounds.")
+set(CPACK_DEBIAN_PACKAGE_SECTION sound)
+set(CPACK_DEBIAN_PACKAGE_PRIORITY optional)
+set(CPACK_DEBIAN_PACKAGE_SHLIBDEPS ON)
+set(CPACK_DEBIAN_FILE_NAME DEB-DEFAULT)
+set(CPACK_PACKAGING_INSTALL_PREFIX /usr)
+set(CPACK_STRIP_FILES ON)
+set(CPACK_INSTALL_DEFAULT_DIRECTORY_PERMISSIONS OWNER_READ OWNER_WRITE OWNER_EXECUTE GROUP_READ
+  GROUP_EXECUTE WORLD_READ WORLD_EXECUTE)
+include(CPack)
