@@ -11,6 +11,7 @@
 #include "app/control/osc/server.h"
 #include "app/devices/audio.h"
 #include "app/exit_code.h"
+#include "app/panel/panel.h"
 #include "app/session/session.h"
 
 namespace ressort {
@@ -32,6 +33,7 @@ struct PlayOptions {
   bool no_console = false;
   std::string script;
   OscOptions osc;  // port 0: none
+  PanelOptions panel;
   bool exit_on_loss = false;
 };
 

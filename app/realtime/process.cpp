@@ -117,7 +117,13 @@ void Process::run(std::span<const Sample* const> inputs, std::span<Sample* const
         records || listens) {
       record(output_count, n, records, listens);
     }
+    if (frame_ < looked_until_) {
+      hear(output_count, n);
+    }
     frame_ += static_cast<std::int64_t>(n);
+  }
+  if (wants_motion.lower()) {
+    show();
   }
   tell();
   if (clock_ns_ != nullptr) {
@@ -541,6 +547,30 @@ void Process::record(std::size_t channels, std::size_t frames, bool records, boo
       listening.push(piece);  // where there is no room, the reader sees that it is full
     }
   }
+}
+
+void Process::hear(std::size_t channels, std::size_t frames) {
+  const double share = channels > 0 ? 1.0 / static_cast<double>(channels) : 0.0;
+  for (std::size_t n = 0; n < frames; ++n) {
+    double sum = 0.0;
+    for (std::size_t c = 0; c < channels; ++c) {
+      sum += mixed_[c * chunk_frames + n];
+    }
+    heard_[heard_at_] = static_cast<float>(share * sum);
+    heard_at_ = (heard_at_ + 1) % heard_.size();
+  }
+}
+
+// A frame for who looks; from now on the output is remembered for the next, for a while.
+void Process::show() {
+  MotionFrame& out = motion.writing();
+  out.frame = static_cast<std::uint64_t>(frame_);
+  out.picture = current_ != nullptr ? current_->picture : 0;
+  out.count = out.picture != 0 ? current_->engine->look(out.numbers) : 0;
+  const auto at = heard_.begin() + static_cast<std::ptrdiff_t>(heard_at_);
+  std::copy(heard_.begin(), at, std::copy(at, heard_.end(), out.heard.begin()));
+  motion.publish();
+  looked_until_ = frame_ + static_cast<std::int64_t>(looked_for_s * rate_hz_);
 }
 
 }  // namespace ressort

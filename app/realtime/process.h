@@ -10,6 +10,7 @@
 #include "app/realtime/dsp_load.h"
 #include "app/realtime/lockfree.h"
 #include "app/realtime/midi.h"
+#include "app/realtime/motion.h"
 #include "core/engine/engine.h"
 #include "core/engine/mixing/dc_blocker.h"
 #include "core/engine/mixing/limiter.h"
@@ -21,7 +22,8 @@ namespace ressort {
 struct Sounding {
   std::unique_ptr<Engine> engine;
   std::uint32_t serial = 0;
-  bool lets_ring = false;  // what sounded before it ends by itself, without new notes
+  bool lets_ring = false;     // what sounded before it ends by itself, without new notes
+  std::uint32_t picture = 0;  // what is watched of it, to whoever draws it; 0: nothing
 };
 
 // An event on its way to the audio thread, and when it is to act.
@@ -110,6 +112,7 @@ struct Process {
   static constexpr std::size_t max_endings = 1024;  // ...and so many more that end sound
   static constexpr std::size_t max_ahead = 4096;    // events that wait for their frame
   static constexpr double fade_s = 0.05;            // between two models
+  static constexpr double looked_for_s = 1.0;       // the output is kept for a look, after a look
   static constexpr double longest_ring_s = 60.0;    // of what the next model lets ring
 
   // A monotonic clock, in ns, that makes no system call.
@@ -160,6 +163,8 @@ struct Process {
   Flag is_recording;
   Ring<RecordedChunk> listening{1024};  // to whoever describes what sounds
   Flag is_listening;
+  Flag wants_motion;  // raised for each look: one frame is written after the next block
+  TripleBuffer<MotionFrame> motion{MotionFrame{}};
   Board<ClockReading> clock;
   Board<Meters> board;    // read by meters()
   Flag meters_were_read;  // raised by a reader: what is since the last reading starts anew
@@ -196,6 +201,8 @@ struct Process {
   void tell();
   void weigh(double took_s, std::size_t frames);
   void record(std::size_t channels, std::size_t frames, bool records, bool listens);
+  void hear(std::size_t channels, std::size_t frames);
+  void show();
 
   double rate_hz_;
   bool limit_;
@@ -233,6 +240,10 @@ struct Process {
   std::vector<double> sound_;       // [channel][chunk_frames] of the current engine
   std::vector<double> fade_sound_;  // [channel][chunk_frames] of the fading one
   std::vector<double> mixed_;       // [output][chunk_frames]
+  // The output of late, a ring, kept while somebody looks.
+  std::array<float, MotionFrame::heard_samples> heard_{};
+  std::size_t heard_at_ = 0;       // where the next sample goes
+  std::int64_t looked_until_ = 0;  // frame
 };
 
 }  // namespace ressort

@@ -166,6 +166,11 @@ void Session::set_backend(std::string description, bool runs) {
   runs_ = runs;
 }
 
+void Session::on_engine(Watch watch) {
+  const std::lock_guard lock(mutex_);
+  watch_ = std::move(watch);
+}
+
 void Session::on_audio_inputs(std::function<void(int)> prepare) {
   const std::lock_guard lock(mutex_);
   prepare_inputs_ = std::move(prepare);
@@ -260,7 +265,7 @@ void Session::improve() {
     loaded->plan = std::move(compiled->plan);
     current_ = std::move(loaded);
   }
-  offer(std::move(compiled->engine));
+  offer(std::move(compiled->engine), source.network);
   if (!news.empty() && tell_) {
     tell_(news);
   }
@@ -270,9 +275,15 @@ void Session::improve() {
   time_parts();
 }
 
-void Session::offer(std::unique_ptr<Engine> engine, bool lets_ring) {
+void Session::offer(std::unique_ptr<Engine> engine, const Network& network, bool lets_ring) {
+  Watch watch;
+  {
+    const std::lock_guard lock(mutex_);
+    watch = watch_;
+  }
+  const std::uint32_t picture = watch ? watch(*engine, network) : 0;
   offered_ = engine.get();
-  delete process_.slot.offer(new Sounding{std::move(engine), serial_, lets_ring});
+  delete process_.slot.offer(new Sounding{std::move(engine), serial_, lets_ring, picture});
 }
 
 // Only the worker destroys engines, and not before another one has been offered.
@@ -500,7 +511,7 @@ Result<std::shared_ptr<const Loaded>> Session::build_now(const Wish& wish,
     }
     built_rate_hz_ = options.rate_hz;
   }
-  offer(std::move(compiled->engine), wish.lets_ring);
+  offer(std::move(compiled->engine), scene->network, wish.lets_ring);
   source_.reset();
   if (may_gain(loaded->plan)) {
     options.find_gain = false;

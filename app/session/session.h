@@ -151,6 +151,11 @@ class Session {
   // What plays, or what is waited for; set by whoever starts a backend.
   void set_backend(std::string description, bool runs);
 
+  // Called in the worker before an engine is offered, with the network that it was made of: chooses
+  // what is watched of it; its number comes back, Sounding::picture.
+  using Watch = std::function<std::uint32_t(Engine& engine, const Network& network)>;
+  void on_engine(Watch watch);
+
   // Called in the worker before an engine is offered, with the number of its audio inputs.
   void on_audio_inputs(std::function<void(int)> prepare);
 
@@ -195,7 +200,7 @@ class Session {
   bool is_outdated(bool is_load) const;
   bool has_new_rate() const;  // under the lock
   // Hands the engine over; its parts are timed when nobody waits any more.
-  void offer(std::unique_ptr<Engine> engine, bool lets_ring = false);
+  void offer(std::unique_ptr<Engine> engine, const Network& network, bool lets_ring = false);
   void time_parts();
   void listen();
   void change_program(int number);
@@ -226,6 +231,7 @@ class Session {
   std::string backend_;
   bool runs_ = false;  // the backend
   std::function<void(int)> prepare_inputs_;
+  Watch watch_;
 
   std::uint32_t serial_ = 0;         // [worker]
   std::optional<Wish> scene_;        // [worker] what was loaded last

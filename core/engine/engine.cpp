@@ -329,6 +329,28 @@ struct Engine::Player {
     return meters;
   }
 
+  std::size_t look(std::span<double> numbers) const {
+    const std::size_t lane = voices.last();
+    return std::visit(
+        [&](const auto& b) {
+          std::size_t at = 0;
+          for (std::size_t p = 0; p < watched.size(); ++p) {
+            if (watched[p].empty()) {
+              continue;
+            }
+            const auto& part = b.parts[p];
+            const std::size_t more =
+                part.of(lane).look(lane % part.width, watched[p], numbers.subspan(at));
+            if (more == 0) {
+              break;
+            }
+            at += more;
+          }
+          return at;
+        },
+        bank);
+  }
+
   bool go_on_from(const Player& from) {
     const bool goes_on = std::visit(
         [&](auto& b) {
@@ -358,6 +380,7 @@ struct Engine::Player {
   AudioInputs audio;
   EnergyWatch watch;
   Mixing mixing;
+  std::vector<std::vector<std::uint32_t>> watched;  // [part] nodes; may be empty
   std::size_t since_update = 0;  // frames, below max_block_frames between two segments
 };
 
@@ -413,6 +436,15 @@ std::span<const std::uint16_t> Engine::take_changes() {
 
 double Engine::parameter(std::uint16_t index) const {
   return player_->parameters.values()[index];
+}
+
+void Engine::watch(std::vector<std::vector<std::uint32_t>> nodes) {
+  nodes.resize(player_->machine.parts.size());
+  player_->watched = std::move(nodes);
+}
+
+std::size_t Engine::look(std::span<double> numbers) const {
+  return player_->look(numbers);
 }
 
 const Machine& Engine::machine() const {

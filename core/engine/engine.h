@@ -164,6 +164,12 @@ class Engine {
   double parameter(std::uint16_t index) const;  // [audio]
   static constexpr std::size_t max_changes = 64;
 
+  // What look() shows: nodes of each part, [part]. Before it plays. [any thread but audio]
+  void watch(std::vector<std::vector<std::uint32_t>> nodes);
+  // Where these are in the voice that was played last, part by part, as Kernel::look() says; a part
+  // that there is no room for ends it. How many numbers that are. [audio] wait-free, O(numbers)
+  std::size_t look(std::span<double> numbers) const;
+
   const Machine& machine() const;  // [any thread], as long as the engine lives
   int output_count() const;        // [any thread], as long as the engine lives
   EngineMeters meters() const;     // [audio]

@@ -6,7 +6,7 @@
 #include <utility>
 #include <vector>
 
-#include "app/commands/modes/layout.h"
+#include "core/analysis/modes/layout.h"
 #include "app/session/modes/known_modes.h"
 #include "app/text.h"
 
