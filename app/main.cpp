@@ -272,9 +272,9 @@ void add_play(CLI::App& app, PlayOptions& options, int& code) {
   command
       ->add_option("--web", options.panel.port,
                    "show and play it in a browser: the port of its page, " +
-                       std::to_string(Panel::usual_port) + " without a number")
+                       std::to_string(WebPanel::usual_port) + " without a number")
       ->expected(0, 1)
-      ->default_str(std::to_string(Panel::usual_port))
+      ->default_str(std::to_string(WebPanel::usual_port))
       ->check(within(1, 65535));
   command
       ->add_option("--web-bind", options.panel.bind_address,

@@ -287,7 +287,7 @@ class Player {
     if (options_.panel.port == 0 || osc_ == nullptr) {
       return;
     }
-    auto panel = Panel::open(options_.panel, process_, *session_, motion_, *osc_);
+    auto panel = WebPanel::open(options_.panel, process_, *session_, motion_, *osc_);
     if (!panel) {
       voice_.say("playing without the panel: " + panel.error().message);
       return;
@@ -458,7 +458,7 @@ class Player {
   bool has_called_off_ = false;            // by a signal
   std::optional<LastResort> last_resort_;  // from then on; it goes last
   Process process_{48000.0, true, monotonic_ns};
-  Motion motion_{process_};
+  MotionFeed motion_{process_};
   Voice voice_;
   Flag quit_;
   MidiDoor door_{process_};
@@ -468,7 +468,7 @@ class Player {
   std::unique_ptr<Session> session_;
   std::unique_ptr<OscServer> osc_;
   std::mutex panel_mutex_;  // whoever has news, and who opens and closes it
-  std::unique_ptr<Panel> panel_;
+  std::unique_ptr<WebPanel> panel_;
   std::unique_ptr<MidiInput> midi_;
   std::optional<MidiPlayer> player_;
   std::optional<std::chrono::steady_clock::time_point> song_ended_;

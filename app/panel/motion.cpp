@@ -26,7 +26,7 @@ void put(std::string& bytes, std::span<const float> values) {
 
 }  // namespace
 
-std::uint32_t Motion::watch(Engine& engine, const Network& network) {
+std::uint32_t MotionFeed::watch(Engine& engine, const Network& network) {
   std::uint32_t number = 0;
   {
     const std::lock_guard lock(mutex_);
@@ -41,13 +41,13 @@ std::uint32_t Motion::watch(Engine& engine, const Network& network) {
   return number;
 }
 
-std::shared_ptr<const Picture> Motion::picture() const {
+std::shared_ptr<const Picture> MotionFeed::picture() const {
   const std::lock_guard lock(mutex_);
   const auto found = pictures_.find(shown_);
   return found != pictures_.end() ? found->second : nullptr;
 }
 
-std::shared_ptr<const Motion::Frame> Motion::look() {
+std::shared_ptr<const MotionFeed::Frame> MotionFeed::look() {
   const std::lock_guard lock(mutex_);
   if (process_.motion.take()) {
     const MotionFrame& frame = process_.motion.reading();
@@ -58,7 +58,7 @@ std::shared_ptr<const Motion::Frame> Motion::look() {
   return frame_;
 }
 
-std::string Motion::pack(const MotionFrame& frame) {
+std::string MotionFeed::pack(const MotionFrame& frame) {
   const auto found = pictures_.find(frame.picture);
   std::vector<float> positions;
   if (found != pictures_.end()) {

@@ -12,10 +12,10 @@
 
 namespace ressort {
 
-class Motion {
+class MotionFeed {
  public:
   // The process outlives it.
-  explicit Motion(Process& process) : process_(process) {}
+  explicit MotionFeed(Process& process) : process_(process) {}
 
   // Draws an engine that is about to be offered; the picture's number. [session's worker]
   std::uint32_t watch(Engine& engine, const Network& network);

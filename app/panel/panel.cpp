@@ -26,7 +26,7 @@ using Request = httplib::Request;
 using Response = httplib::Response;
 
 // Frames and events keep a thread each for as long as they are watched.
-constexpr std::size_t threads = 2 * Panel::most_viewers + 4;
+constexpr std::size_t threads = 2 * WebPanel::most_viewers + 4;
 constexpr std::size_t most_news = 100;
 constexpr double fastest_hz = 60.0;
 constexpr double usual_hz = 30.0;
@@ -76,10 +76,10 @@ std::string bundle_of(const OscServer::Packets& packets) {
   return bytes;
 }
 
-// What a later answer says, for a person: its texts, but for the address of what was asked.
-std::string said_in(const std::vector<std::uint8_t>& packet) {
+// What a /fail says, for a person: its texts, but for the address of what was asked.
+std::string failure_in(const std::vector<std::uint8_t>& packet) {
   const std::string all(packet.begin(), packet.end());
-  if (!all.starts_with("/fail") && !all.starts_with("/error")) {
+  if (!all.starts_with(std::string_view("/fail\0", 6))) {
     return {};
   }
   std::string said;
@@ -119,9 +119,9 @@ class News {
 
 }  // namespace
 
-struct Panel::Server {
-  Server(const PanelOptions& options, Process& process_in, Session& session_in, Motion& motion_in,
-         OscServer& osc_in)
+struct WebPanel::Server {
+  Server(const PanelOptions& options, Process& process_in, Session& session_in,
+         MotionFeed& motion_in, OscServer& osc_in)
       : bind_address(options.bind_address),
         process(process_in),
         session(session_in),
@@ -210,7 +210,7 @@ struct Panel::Server {
     }
     // Nothing of ours is sent in parts, in pieces or packed.
     if (request.has_header("Range") || request.has_header("Transfer-Encoding") ||
-        request.has_header("Content-Encoding") || request.has_header("Expect")) {
+        request.has_header("Content-Encoding")) {
       return 400;
     }
     if (request.method == "POST") {
@@ -378,22 +378,24 @@ struct Panel::Server {
     return told_status;
   }
 
+  // What could not be loaded or saved is told to all viewers, however long it took to find out.
   void take_packet(const Request& request, Response& response) {
-    const auto answers = osc.ask({request.body.begin(), request.body.end()},
-                                 [box = news](const OscServer::Packets& packets) {
-                                   for (const auto& packet : packets) {
-                                     if (const std::string said = said_in(packet); !said.empty()) {
-                                       box->add(said);
-                                     }
-                                   }
-                                 });
+    const auto tell_failures = [box = news](const OscServer::Packets& packets) {
+      for (const auto& packet : packets) {
+        if (const std::string said = failure_in(packet); !said.empty()) {
+          box->add(said);
+        }
+      }
+    };
+    const auto answers = osc.ask({request.body.begin(), request.body.end()}, tell_failures);
+    tell_failures(answers);
     response.set_content(bundle_of(answers), octets);
   }
 
   const std::string bind_address;
   Process& process;
   Session& session;
-  Motion& motion;
+  MotionFeed& motion;
   OscServer& osc;
   httplib::Server http;
   int port = 0;
@@ -416,21 +418,22 @@ struct Panel::Server {
   std::thread listener;
 };
 
-Panel::Panel(std::unique_ptr<Server> server) : server_(std::move(server)) {}
-Panel::~Panel() = default;
+WebPanel::WebPanel(std::unique_ptr<Server> server) : server_(std::move(server)) {}
+WebPanel::~WebPanel() = default;
 
-Result<std::unique_ptr<Panel>> Panel::open(const PanelOptions& options, Process& process,
-                                           Session& session, Motion& motion, OscServer& osc) {
+Result<std::unique_ptr<WebPanel>> WebPanel::open(const PanelOptions& options, Process& process,
+                                                 Session& session, MotionFeed& motion,
+                                                 OscServer& osc) {
   auto server = std::make_unique<Server>(options, process, session, motion, osc);
   if (!server->bind(options.port)) {
     return Error{"port " + std::to_string(options.port) + " of " + options.bind_address +
                  " is taken, or is not ours to take; --web takes another"};
   }
   server->listen();
-  return std::unique_ptr<Panel>(new Panel(std::move(server)));
+  return std::unique_ptr<WebPanel>(new WebPanel(std::move(server)));
 }
 
-std::string Panel::address() const {
+std::string WebPanel::address() const {
   const std::string& bound = server_->bind_address;
   std::string host = bound == "localhost" ? "127.0.0.1" : bound;
   if (bound == "0.0.0.0") {
@@ -442,11 +445,11 @@ std::string Panel::address() const {
          "/?token=" + server_->access->token();
 }
 
-bool Panel::is_for_all() const {
+bool WebPanel::is_for_all() const {
   return server_->access->needs_token();
 }
 
-void Panel::tell(const std::string& news) {
+void WebPanel::tell(const std::string& news) {
   server_->news->add(news);
 }
 

@@ -25,7 +25,7 @@ struct PanelOptions {
   int port = 0;  // 0: no panel
 };
 
-class Panel {
+class WebPanel {
  public:
   static constexpr int usual_port = 9788;
   static constexpr std::size_t most_body_bytes = 64 << 10;
@@ -34,9 +34,10 @@ class Panel {
 
   // Fails where the port is taken, saying so. All of these outlive it; `port` may be 0 here for any
   // that is free. [control]
-  static Result<std::unique_ptr<Panel>> open(const PanelOptions& options, Process& process,
-                                             Session& session, Motion& motion, OscServer& osc);
-  ~Panel();
+  static Result<std::unique_ptr<WebPanel>> open(const PanelOptions& options, Process& process,
+                                                Session& session, MotionFeed& motion,
+                                                OscServer& osc);
+  ~WebPanel();
 
   std::string address() const;  // to be opened in a browser, with its token
   bool is_for_all() const;      // bound to an address beyond this machine's own
@@ -46,7 +47,7 @@ class Panel {
 
  private:
   struct Server;
-  explicit Panel(std::unique_ptr<Server> server);
+  explicit WebPanel(std::unique_ptr<Server> server);
   std::unique_ptr<Server> server_;
 };
 

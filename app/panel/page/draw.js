@@ -44,7 +44,7 @@ export class NetworkView {
     this.canvas = canvas;
     this.net = null;
     this.positions = null;
-    this.peak = 0;
+    this.peak = 1e-6;
     this.mode = null;
     this.chosen = -1;   // index of an input
     this.pull = null;   // {from, to}: a gesture that is being made
@@ -71,7 +71,7 @@ export class NetworkView {
     }
     this.net = net;
     this.positions = Float32Array.from(net.start);
-    this.peak = 0;
+    this.peak = 1e-6;
     this.mode = null;
     this.trail = [];
     this.sx = new Float32Array(net.x.length);
@@ -89,7 +89,7 @@ export class NetworkView {
     const net = this.net;
     if (!net || !net.x.length) return;
     // A plane is seen from above at an angle, so that there is room for what moves.
-    const turn = net.plane ? 0.5 : 0, tilt = net.plane ? 0.62 : 1;
+    const turn = net.plane ? 0.38 : 0, tilt = net.plane ? 0.58 : 1;
     const c = Math.cos(turn), s = Math.sin(turn);
     let left = 1e9, right = -1e9, top = 1e9, bottom = -1e9;
     this.flat = net.x.map((x, i) => {
@@ -97,10 +97,10 @@ export class NetworkView {
       left = Math.min(left, u); right = Math.max(right, u); top = Math.min(top, v); bottom = Math.max(bottom, v);
       return [u, v];
     });
-    const margin = Math.min(70, this.width * 0.09), wide = right - left || 1, high = bottom - top || 1;
+    const margin = Math.min(56, this.width * 0.08), wide = right - left || 1, high = bottom - top || 1;
     const room = this.height - 2 * margin - 30;
     let k = (this.width - 2 * margin) / wide, kv = k;
-    if (net.plane) k = kv = Math.min(k, room * 0.86 / high);
+    if (net.plane) k = kv = Math.min(k, room / high);
     else kv = Math.min(k, room * 0.6 / high);
     if (!net.plane && net.x.length < 3) k = kv = Math.min(k, 120);
     this.flat = this.flat.map(([u, v]) =>
@@ -113,7 +113,8 @@ export class NetworkView {
     this.positions = positions;
     const start = this.net.start;
     let most = 0;
-    for (let i = 0; i < positions.length; i++) most = Math.max(most, Math.abs(positions[i] - start[i]));
+    for (let i = 0; i < positions.length; i++)
+      if (this.net.kinds[i] !== 'h') most = Math.max(most, Math.abs(positions[i] - start[i]));
     this.peak = Math.max(most, this.peak * 0.992, 1e-6);
   }
 
@@ -203,7 +204,9 @@ export class NetworkView {
       else if (kind !== 'h') { moving.moveTo(sx[i] + size, sy[i]); moving.arc(sx[i], sy[i], size, 0, 7); }
     }
     c.fillStyle = this.colour.held; c.fill(still);
+    c.globalAlpha = n > 300 ? 0.55 : 1;
     c.fillStyle = this.colour.mass; c.fill(moving);
+    c.globalAlpha = 1;
   }
 
   handles(c) {

@@ -97,7 +97,7 @@ async function loadNetwork() {
     picture = net.picture;
     if (isOther || view.named !== model?.name) { view.setNetwork(net); view.named = model?.name; }
     const seen = new Set(net.links.map(l => net.laws[l[2]][1]));
-    const legend = [...seen].map(family => [family, { spring: 'spring', pluck: 'plectrum', bow: 'bow', contact: 'contact, lit while it touches' }[family]]);
+    const legend = ['spring', 'pluck', 'bow', 'contact'].filter(f => seen.has(f)).map(family => [family, { spring: 'spring', pluck: 'plectrum', bow: 'bow', contact: 'contact, lit while it touches' }[family]]);
     if (net.inputs.length) legend.push(['input', 'input: drag to play']);
     $('legend').replaceChildren(...legend.map(([kind, text]) => {
       const item = make('li', text);
@@ -169,7 +169,8 @@ function paint() {
     drawScope($('scope'), heard);
     const found = drawSpectrum($('spectrum'), spectrumOf(heard), status.rate || 48000);
     $('centroid').textContent = found ? hertz(found.centroid) : '–';
-    $('loudest').textContent = found ? `${hertz(found.peak)}  ${noteName(found.peak)}` : '–';
+    $('loudest').textContent = found ? hertz(found.peak) : '–';
+    $('loudest-note').textContent = found ? noteName(found.peak) : '';
     const most = view.peak > 1e-6 ? view.peak.toPrecision(2) : '0';
     $('scale').textContent = view.mode ? 'a mode, slowed down' : `largest swing ${most}`;
   }
@@ -185,7 +186,7 @@ function showStatus() {
   $('load').className = status.cpu > 0.8 ? 'alarm' : '';
   $('xruns').textContent = status.xruns;
   $('xruns').className = status.xruns > 0 ? 'alarm' : '';
-  $('energy').textContent = status.energy ? status.energy.toPrecision(2) : '0';
+  $('energy').textContent = status.energy ? status.energy.toPrecision(2) : status.whole || !status.voices ? '0' : 'in modes';
 }
 
 // --- parameters --------------------------------------------------------------------------------------
@@ -222,8 +223,8 @@ function showSliders() {
     proved.style.left = 100 * low + '%';
     proved.style.width = 100 * Math.max(0, high - low) + '%';
     track.append(proved, input);
-    const limits = info.lowest !== null || info.highest !== null
-      ? 'proved stable ' + [info.lowest !== null ? 'above ' + digits(info.lowest) : '',
+    const limits = info.lowest > 0 || info.highest !== null
+      ? 'proved stable ' + [info.lowest > 0 ? 'above ' + digits(info.lowest) : '',
         info.highest !== null ? 'below ' + digits(info.highest) : ''].filter(Boolean).join(' and ')
       : 'stable anywhere';
     row.append(make('label', info.name, { for: id }), output, track,
@@ -263,8 +264,8 @@ function showLimits() {
       info.lowest > 0 ? info.lowest / info.value : 0);
     if (part > share) { share = part; nearest = info.name; }
   }
-  $('limits').textContent = nearest
-    ? `Nearest to its limit of stability: ${nearest}, at ${(100 * share).toFixed(0)} % of it.` : '';
+  $('limits').textContent = share < 0.05 ? 'All are far from any limit of stability.'
+    : `Nearest to its limit of stability: ${nearest}, at ${(100 * share).toFixed(0)} % of it.`;
 }
 
 // --- modes ---------------------------------------------------------------------------------------------
