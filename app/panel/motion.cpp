@@ -47,14 +47,14 @@ std::shared_ptr<const Picture> MotionFeed::picture() const {
   return found != pictures_.end() ? found->second : nullptr;
 }
 
-std::shared_ptr<const MotionFeed::Frame> MotionFeed::look() {
+std::shared_ptr<const MotionFeed::Frame> MotionFeed::look(bool is_slow) {
   const std::lock_guard lock(mutex_);
   if (process_.motion.take()) {
     const MotionFrame& frame = process_.motion.reading();
     shown_ = frame.picture;
     frame_ = std::make_shared<Frame>(Frame{frame.frame, pack(frame)});
   }
-  process_.wants_motion.raise();
+  (is_slow ? process_.wants_slow_motion : process_.wants_motion).raise();
   return frame_;
 }
 

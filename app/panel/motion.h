@@ -32,7 +32,8 @@ class MotionFeed {
     std::uint64_t frame = 0;
     std::string bytes;
   };
-  std::shared_ptr<const Frame> look();
+  // `is_slow`: as a stroboscope sees it, one for all who watch.
+  std::shared_ptr<const Frame> look(bool is_slow = false);
 
  private:
   std::string pack(const MotionFrame& frame);

@@ -329,10 +329,12 @@ struct WebPanel::Server {
       return say(response, 503, "enough are watching");
     }
     const double hz = number_of(request, "hz", usual_hz, 1.0, fastest_hz);
+    const bool is_slow = number_of(request, "slow", 0.0, 0.0, 1.0) > 0.5;
     response.set_chunked_content_provider(
-        octets, [this, hz, seat, last = std::uint64_t{0}, next = std::chrono::steady_clock::now()](
-                    std::size_t, httplib::DataSink& sink) mutable {
-          const auto frame = motion.look();
+        octets,
+        [this, hz, is_slow, seat, last = std::uint64_t{0}, next = std::chrono::steady_clock::now()](
+            std::size_t, httplib::DataSink& sink) mutable {
+          const auto frame = motion.look(is_slow);
           if (frame->frame != last && !frame->bytes.empty()) {
             last = frame->frame;
             if (!sink.write(frame->bytes.data(), frame->bytes.size())) {

@@ -5,7 +5,7 @@
 //   GET /describe     the registry and what sounds (state.h)
 //   GET /network      what is drawn (picture.h)
 //   GET /modes?count=N    the lowest modes and their shapes (picture.h)
-//   GET /motion?hz=30     frames of positions, chunked, until one side ends it (motion.h)
+//   GET /motion?hz=30&slow=1   frames of positions, chunked, until one side ends it (motion.h)
 //   GET /events       server-sent: loaded, values, status, news
 //   POST /osc         one OSC packet; answers come back as a bundle
 #pragma once

@@ -112,6 +112,7 @@ struct Process {
   static constexpr std::size_t max_endings = 1024;  // ...and so many more that end sound
   static constexpr std::size_t max_ahead = 4096;    // events that wait for their frame
   static constexpr double fade_s = 0.05;            // between two models
+  static constexpr double longest_strobe_s = 0.1;   // that a slow look waits
   static constexpr double looked_for_s = 1.0;       // the output is kept for a look, after a look
   static constexpr double longest_ring_s = 60.0;    // of what the next model lets ring
 
@@ -163,7 +164,8 @@ struct Process {
   Flag is_recording;
   Ring<RecordedChunk> listening{1024};  // to whoever describes what sounds
   Flag is_listening;
-  Flag wants_motion;  // raised for each look: one frame is written after the next block
+  Flag wants_motion;       // raised for each look: one frame is written after the next block
+  Flag wants_slow_motion;  // the same, at the next moment of the stroboscope
   TripleBuffer<MotionFrame> motion{MotionFrame{}};
   Board<ClockReading> clock;
   Board<Meters> board;    // read by meters()
@@ -202,6 +204,7 @@ struct Process {
   void weigh(double took_s, std::size_t frames);
   void record(std::size_t channels, std::size_t frames, bool records, bool listens);
   void hear(std::size_t channels, std::size_t frames);
+  void look();
   void show();
 
   double rate_hz_;
@@ -242,8 +245,10 @@ struct Process {
   std::vector<double> mixed_;       // [output][chunk_frames]
   // The output of late, a ring, kept while somebody looks.
   std::array<float, MotionFrame::heard_samples> heard_{};
-  std::size_t heard_at_ = 0;       // where the next sample goes
-  std::int64_t looked_until_ = 0;  // frame
+  std::size_t heard_at_ = 0;        // where the next sample goes
+  std::int64_t looked_until_ = 0;   // frame
+  Sounding* strobed_ = nullptr;     // is asked for a slow look,
+  std::int64_t strobed_until_ = 0;  // until this frame
 };
 
 }  // namespace ressort

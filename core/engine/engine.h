@@ -170,6 +170,15 @@ class Engine {
   // that there is no room for ends it. How many numbers that are. [audio] wait-free, O(numbers)
   std::size_t look(std::span<double> numbers) const;
 
+  // The same as a stroboscope sees it: process() looks at the first moment, of one in
+  // max_block_frames, at which a motion of the voice's frequency is where it would be if it took
+  // strobe_period_s for a period. What has been asked for before is forgotten, as it is without
+  // room for numbers. False where nothing has a pitch: nothing is looked at. [audio] wait-free
+  static constexpr double strobe_period_s = 2.0;
+  bool look_slowly(std::span<double> numbers);
+  // How many numbers that were, once; 0: the moment has not come. [audio] wait-free
+  std::size_t take_slow_look();
+
   const Machine& machine() const;  // [any thread], as long as the engine lives
   int output_count() const;        // [any thread], as long as the engine lives
   EngineMeters meters() const;     // [audio]

@@ -126,12 +126,12 @@ function listen() {
   events.onopen = () => { if (model) $('description').textContent = model.description; };
 }
 
-let heard = null, motionFrames = 0, watcher = null;
+let isSlow = false, heard = null, motionFrames = 0, watcher = null;
 async function watch() {
   while (!document.hidden) {
     watcher = new AbortController();
     try {
-      const answer = await fetch('/motion?hz=30', { signal: watcher.signal });
+      const answer = await fetch('/motion?hz=30' + (isSlow ? '&slow=1' : ''), { signal: watcher.signal });
       if (!answer.ok) throw new Error(await answer.text());
       const reader = answer.body.getReader();
       let held = new Uint8Array(0);
@@ -160,6 +160,12 @@ function takeFrames(bytes) {
     bytes = bytes.slice(size);
   }
 }
+$('slow').addEventListener('click', () => {
+  isSlow = !isSlow;
+  $('slow').setAttribute('aria-pressed', isSlow);
+  watcher?.abort();
+  watch();
+});
 document.addEventListener('visibilitychange', () => document.hidden ? watcher?.abort() : watch());
 
 let drawn = 0;
@@ -172,7 +178,7 @@ function paint() {
     $('loudest').textContent = found ? hertz(found.peak) : '–';
     $('loudest-note').textContent = found ? noteName(found.peak) : '';
     const most = view.peak > 1e-6 ? view.peak.toPrecision(2) : '0';
-    $('scale').textContent = view.mode ? 'a mode, slowed down' : `largest swing ${most}`;
+    $('scale').textContent = view.mode ? 'a mode, slowed down' : isSlow ? 'two seconds a period' : `largest swing ${most}`;
   }
   requestAnimationFrame(paint);
 }

@@ -126,7 +126,7 @@ TEST_CASE("a look changes no bit of the sound and takes no memory", "[panel]") {
           harness->now(note_on(0, 50 + i / 40));
         }
         if (harness == &watched && i % 3 != 0) {
-          harness->process.wants_motion.raise();
+          (i % 2 == 0 ? harness->process.wants_motion : harness->process.wants_slow_motion).raise();
         }
         harness->run(static_cast<std::size_t>(17 + i % 200), 64);
         if (harness->process.motion.take()) {
@@ -137,11 +137,14 @@ TEST_CASE("a look changes no bit of the sound and takes no memory", "[panel]") {
         }
       }
     }
-    CHECK(looks > 200);
+    CHECK(looks > 20);
     CHECK(plain.out == watched.out);
     CHECK(peak(plain.y()) > 1e-3);
     CHECK(watched.heap_calls == 0);
     // The newest frame brings the sound as it was played.
+    watched.process.wants_motion.raise();
+    watched.run(static_cast<std::size_t>(2.0 * Process::longest_strobe_s * rate), 64);
+    watched.process.motion.take();
     watched.process.wants_motion.raise();
     watched.run(64, 64);
     REQUIRE(watched.process.motion.take());
@@ -151,6 +154,52 @@ TEST_CASE("a look changes no bit of the sound and takes no memory", "[panel]") {
       REQUIRE(heard[i] == static_cast<float>(0.5 * (watched.out[0][at] + watched.out[1][at])));
     }
   }
+}
+
+TEST_CASE("slow motion is a stroboscope at the pitch that sounds", "[panel]") {
+  for (const int key : {45, 57, 69, 76}) {
+    Harness harness(false, 1);
+    const std::string text = ringing_string();
+    auto compiled = compile(network_of(text), struck(2), {});
+    REQUIRE(compiled);
+    const Picture picture = make_picture(*compiled->engine, network_of(text), 1);
+    delete harness.process.slot.offer(
+        new Sounding{std::move(compiled->engine), 1, false, picture.number});
+    harness.now(note_on(0, key));
+    const double hz = 440.0 * std::exp2((key - 69) / 12.0);
+    int frames = 0;
+    int at_their_moment = 0;
+    const auto heard_at = static_cast<std::size_t>(
+        std::find_if(picture.masses.begin(), picture.masses.end(),
+                     [&](std::uint32_t mass) {
+                       return network_of(text).masses[mass].name == Name("s_m6");
+                     }) -
+        picture.masses.begin());
+    for (int block = 0; block < 1500; ++block) {
+      harness.process.wants_slow_motion.raise();
+      harness.run(64, 64);
+      if (!harness.process.motion.take() || block < 40) {
+        continue;
+      }
+      ++frames;
+      const MotionFrame& frame = harness.process.motion.reading();
+      const double seconds = static_cast<double>(frame.frame) / rate;
+      const double apart = seconds * (hz - 1.0 / Engine::strobe_period_s);
+      at_their_moment += std::fabs(apart - std::rint(apart)) < 0.021 ? 1 : 0;
+      std::vector<float> positions(picture.masses.size());
+      find_positions(picture, frame, positions);
+      REQUIRE(std::fabs(positions[heard_at] - harness.y().back()) < 1e-6);
+    }
+    INFO(key << ": " << at_their_moment << " of " << frames);
+    CHECK(frames > 30);
+    CHECK(at_their_moment >= 9 * frames / 10);
+  }
+  // Where nothing has a pitch it shows what there is, at once.
+  Harness silent(false, 1);
+  delete silent.process.slot.offer(constant("0.5"));
+  silent.process.wants_slow_motion.raise();
+  silent.run(64, 64);
+  CHECK(silent.process.motion.take());
 }
 
 // --- who is let in ------------------------------------------------------------------------------
