@@ -15,6 +15,7 @@
 
 #include "app/control/osc/packet.h"
 #include "app/panel/access.h"
+#include "app/panel/osc_query.h"
 #include "app/panel/page.h"
 #include "app/panel/state.h"
 #include "app/text.h"
@@ -171,7 +172,8 @@ struct WebPanel::Server {
         return httplib::Server::HandlerResponse::Handled;
       }
       protect(request, response);
-      return httplib::Server::HandlerResponse::Unhandled;
+      return answer_query(request, response) ? httplib::Server::HandlerResponse::Handled
+                                             : httplib::Server::HandlerResponse::Unhandled;
     });
     http.set_exception_handler([](const Request&, Response& response, std::exception_ptr) {
       response.status = 500;  // and not a word of what it was
@@ -241,6 +243,38 @@ struct WebPanel::Server {
       response.set_header("Set-Cookie",
                           "ressort=" + access->token() + "; HttpOnly; SameSite=Strict; Path=/");
     }
+  }
+
+  // What is no request of the page's asks for the tree of addresses; / does, of all but browsers.
+  bool answer_query(const Request& request, Response& response) const {
+    static const std::set<std::string> ours = {"/describe", "/network", "/modes",
+                                               "/motion",   "/events",  "/osc"};
+    const std::span<const PageFile> files = page_files();
+    const bool is_file = std::any_of(files.begin(), files.end(), [&](const PageFile& file) {
+      return file.path == request.path;
+    });
+    const bool wants_page =
+        request.get_header_value("Accept").find("text/html") != std::string::npos;
+    const bool asks = request.has_param("HOST_INFO") || !(is_file || ours.contains(request.path)) ||
+                      (request.path == "/" && !wants_page);
+    if (!asks || request.method == "POST") {
+      return false;
+    }
+    if (request.has_param("HOST_INFO")) {
+      response.set_content(osc_host_info(osc.is_heard() ? std::optional(osc.port()) : std::nullopt),
+                           "application/json");
+      return true;
+    }
+    std::string attribute;
+    for (const auto& [name, value] : request.params) {
+      attribute = name != "token" ? name : attribute;
+    }
+    const OscQueryAnswer answer = osc_query(session, request.path, attribute);
+    response.status = answer.status;
+    if (!answer.json.empty()) {
+      response.set_content(answer.json, "application/json");
+    }
+    return true;
   }
 
   static void say(Response& response, int status, const std::string& text) {

@@ -8,6 +8,7 @@
 //   GET /motion?hz=30&slow=1   frames of positions, chunked, until one side ends it (motion.h)
 //   GET /events       server-sent: loaded, values, status, news
 //   POST /osc         one OSC packet; answers come back as a bundle
+// Any other path, and / for who does not want HTML, asks for the tree of addresses (osc_query.h).
 #pragma once
 
 #include <functional>

@@ -10,6 +10,7 @@
 #include <chrono>
 #include <cmath>
 #include <cstring>
+#include <functional>
 #include <future>
 #include <nlohmann/json.hpp>
 #include <set>
@@ -323,7 +324,8 @@ struct Stage {
     return said.starts_with("HTTP/1.1 ") ? std::stoi(said.substr(9, 3)) : -1;
   }
   std::string get(const std::string& path, const std::string& more = "") const {
-    return "GET " + path + " HTTP/1.1\r\nHost: " + host + "\r\n" + more + "\r\n";
+    return "GET " + path + " HTTP/1.1\r\nHost: " + host + "\r\nAccept: text/html,*/*\r\n" + more +
+           "\r\n";
   }
   std::string post(const Bytes& packet, const std::string& more = "") const {
     return "POST /osc HTTP/1.1\r\nHost: " + host +
@@ -477,6 +479,49 @@ TEST_CASE("what is drawn comes with its places, and four may watch", "[panel]") 
   for (const int viewer : viewers) {
     close(viewer);
   }
+}
+
+TEST_CASE("the addresses of OSC are a tree that OSCQuery programs read", "[panel]") {
+  Stage stage;
+  const auto ask = [&](const std::string& path) {
+    return stage.ask("GET " + path + " HTTP/1.1\r\nHost: " + stage.host + "\r\n\r\n");
+  };
+  const auto read = [&](const std::string& path) {
+    return nlohmann::json::parse(Stage::body(ask(path)));
+  };
+  const auto root = read("/");
+  CHECK(root["FULL_PATH"] == "/");
+  CHECK(root["CONTENTS"]["note"]["CONTENTS"]["on"]["TYPE"] == "fff");
+  CHECK(root["CONTENTS"]["panic"]["TYPE"] == "N");
+  CHECK(root["CONTENTS"]["in"]["CONTENTS"]["1"]["CONTENTS"].contains("force"));
+  CHECK_FALSE(root["CONTENTS"]["in"]["CONTENTS"]["1"]["CONTENTS"].contains("position"));
+  // Every node says where it is, and where it is it says the same.
+  const std::function<std::size_t(const nlohmann::json&)> visit =
+      [&](const nlohmann::json& node) -> std::size_t {
+    const auto path = node.at("FULL_PATH").get<std::string>();
+    if (path != "/describe" && path != "/modes") {  // these the page asks for
+      CHECK(read(path) == node);
+    }
+    std::size_t count = 1;
+    if (node.contains("CONTENTS")) {
+      for (const auto& child : node["CONTENTS"]) {
+        count += visit(child);
+      }
+    }
+    return count;
+  };
+  CHECK(visit(root) > 30);
+  CHECK(stage.status(stage.post(message("/param/m_K", {0.5f}))) == 200);
+  const auto parameter = read("/param/m_K");
+  CHECK(parameter["TYPE"] == "f");
+  CHECK(parameter["ACCESS"] == 3);
+  CHECK(parameter["VALUE"][0] == stage.session.parameter("m_K"));
+  CHECK(parameter["RANGE"][0]["MAX"] == stage.session.current()->instrument.parameters[0].maximum);
+  CHECK(read("/param/m_K?VALUE") == nlohmann::json{{"VALUE", parameter["VALUE"]}});
+  CHECK(ask("/param?VALUE").starts_with("HTTP/1.1 204"));
+  CHECK(ask("/param/nothing").starts_with("HTTP/1.1 404"));
+  CHECK(read("/?HOST_INFO")["NAME"] == "ressort");
+  CHECK_FALSE(read("/?HOST_INFO").contains("OSC_PORT"));  // this one is not heard by UDP
 }
 
 TEST_CASE("beyond this machine nobody gets in without the token", "[panel]") {
