@@ -6,7 +6,7 @@
 namespace ressort {
 namespace {
 
-constexpr std::size_t most_pictures = 6;  // of engines that are on their way, or on their way out
+constexpr std::size_t most_pictures = 4;  // of engines that are on their way, or on their way out
 
 void put(std::string& bytes, std::uint64_t value, int size) {
   for (int shift = 0; shift < 8 * size; shift += 8) {

@@ -20,7 +20,7 @@ sys.dont_write_bytecode = True
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
 from browser import Browser  # noqa: E402
 
-SERVER = "ressort-test"
+SERVER = "ressort-panel"
 PATIENCE_S = 30  # what only a hang takes
 failures = 0
 
@@ -129,7 +129,7 @@ def frame_rate(program, seconds):
     frames = Frames(program.port)
     rate = 48000
     eventually(lambda: frames.frames and
-               frames.frames[-1][0] - frames.frames[0][0] >= seconds * rate, 20 * seconds)
+               frames.frames[-1][0] - frames.frames[0][0] >= seconds * rate, 6 * seconds)
     frames.close()
     got = [frame for frame in frames.frames if frame[0] - frames.frames[0][0] <= seconds * rate]
     played_s = (got[-1][0] - got[0][0]) / rate
@@ -230,6 +230,30 @@ def shows_modes(browser):
     browser.evaluate("document.querySelector('#modes button').click()")
 
 
+def slows_down(program, browser):
+    """A long note's largest mass, seen for two of the stroboscope's periods: it swings slowly."""
+    program.osc("/note/on", 57, 110)
+    browser.evaluate("document.getElementById('slow').click()")
+    browser.eventually("panel.view.net && panel.status.voices > 0")
+    # How far the picture turns from one frame to the next, against how far it goes in all.
+    jumps = browser.evaluate("""new Promise(done => {
+      const v = panel.view, seen = [];
+      let last = panel.frames;
+      (function look() {
+        if (panel.frames !== last) { last = panel.frames; seen.push(v.positions[300] - v.net.start[300]); }
+        if (seen.length < 90) requestAnimationFrame(look);
+        else done(seen);
+      })();
+    })""")
+    jumps = jumps[10:]
+    most = max(abs(x) for x in jumps)
+    steps = sorted(abs(a - b) / most for a, b in zip(jumps, jumps[1:]))
+    print(f"        of what it swings, {100 * steps[len(steps) // 2]:.0f} % from frame to frame")
+    check(most > 0 and steps[len(steps) // 2] < 0.35, "slow motion is slow")
+    browser.evaluate("document.getElementById('slow').click()")
+    program.osc("/panic")
+
+
 def loads(program, browser):
     browser.evaluate("document.getElementById('choose').click()")
     browser.evaluate("[...document.querySelectorAll('#scenes button')]"
@@ -257,11 +281,14 @@ def test(program_path):
             keys(program, browser)
             slides(program, browser)
             shows_modes(browser)
+            slows_down(program, browser)
             loads(program, browser)
             check(browser.complaints() == [],
                   f"the browser has nothing to complain about {browser.complaints() or ''}")
     finally:
         check(program.close() == 0, "the program ends as it should, with the page still open")
+        if failures:
+            print("the program said:\n" + "".join(program.lines))
 
 
 def pictures(program_path, folder):

@@ -127,6 +127,7 @@ export class NetworkView {
     } else {
       for (let i = 0; i < n; i++) up[i] = (this.positions[i] - net.start[i]) / this.peak;
     }
+    for (let i = 0; i < up.length; i++) up[i] = Math.max(-1.6, Math.min(1.6, up[i]));   // a hand may be far away
     return up;
   }
 
@@ -197,12 +198,14 @@ export class NetworkView {
   nodes(c) {
     const { net, sx, sy } = this, n = net.x.length;
     const size = n > 1200 ? 1.1 : n > 300 ? 1.7 : n > 80 ? 2.4 : n > 20 ? 3.4 : 6;
-    const moving = new Path2D(), still = new Path2D();
+    const moving = new Path2D(), still = new Path2D(), stems = new Path2D();
     for (let i = 0; i < n; i++) {
       const kind = net.kinds[i];
+      if (kind === 'o') { stems.moveTo(sx[i], this.flat[i][1]); stems.lineTo(sx[i], sy[i]); }
       if (kind === 'g') still.rect(sx[i] - size, sy[i] - size, 2 * size, 2 * size);
       else if (kind !== 'h') { moving.moveTo(sx[i] + size, sy[i]); moving.arc(sx[i], sy[i], size, 0, 7); }
     }
+    c.strokeStyle = this.colour.up; c.lineWidth = 3; c.stroke(stems);
     c.fillStyle = this.colour.held; c.fill(still);
     c.globalAlpha = n > 300 ? 0.55 : 1;
     c.fillStyle = this.colour.mass; c.fill(moving);

@@ -98,6 +98,7 @@ async function loadNetwork() {
     if (isOther || view.named !== model?.name) { view.setNetwork(net); view.named = model?.name; }
     const seen = new Set(net.links.map(l => net.laws[l[2]][1]));
     const legend = ['spring', 'pluck', 'bow', 'contact'].filter(f => seen.has(f)).map(family => [family, { spring: 'spring', pluck: 'plectrum', bow: 'bow', contact: 'contact, lit while it touches' }[family]]);
+    if (net.kinds.includes('o')) legend.push(['body', 'modes of a body, the lowest first']);
     if (net.inputs.length) legend.push(['input', 'input: drag to play']);
     $('legend').replaceChildren(...legend.map(([kind, text]) => {
       const item = make('li', text);
