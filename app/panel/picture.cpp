@@ -53,12 +53,20 @@ Picture make_picture(Engine& engine, const Network& network, std::uint32_t numbe
     all += program.moving + program.inputs.size();
   }
   const std::size_t stride = (all + most_dots - 1) / most_dots;
+  // What is played and heard is always drawn.
+  const auto is_port = [](const Program& program, std::size_t node) {
+    const auto is_here = [&](const auto& slot) { return slot.node == node; };
+    return std::any_of(program.inputs.begin(), program.inputs.end(), is_here) ||
+           std::any_of(program.outputs.begin(), program.outputs.end(), is_here);
+  };
   std::size_t room = MotionFrame::most_numbers;
   std::vector<std::vector<std::uint32_t>> watched;
   for (const Program& program : machine.parts) {
     std::vector<std::pair<std::uint32_t, std::uint32_t>> nodes;  // mass, node
     for (std::uint32_t node = 0; node < program.masses.size(); ++node) {
-      if (program.masses[node] % std::max<std::size_t>(1, stride) == 0 && counts(program, node)) {
+      if ((program.masses[node] % std::max<std::size_t>(1, stride) == 0 ||
+           is_port(program, node)) &&
+          counts(program, node)) {
         nodes.emplace_back(program.masses[node], node);
       }
     }

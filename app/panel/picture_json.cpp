@@ -53,7 +53,7 @@ class NetworkTeller {
     }
     const json out{{"picture", picture_.number},
                    {"dots", picture_.masses.size()},
-                   {"masses", moving_count(*picture_.network)},
+                   {"masses", moving_count(network_)},
                    {"plane", is_plane_},
                    {"drawn", is_laid_out_},
                    {"x", x_},
@@ -175,7 +175,18 @@ class NetworkTeller {
       const double at = std::clamp(argument_value(network_, argument, parameters_), 0.0, 1.0);
       return static_cast<std::uint32_t>(std::lround(at * (count - 1)));
     };
-    return node_[tap.first + nearest(tap.u, tap.length) * tap.width + nearest(tap.v, tap.width)];
+    // Of what is drawn: of a large network that is every n-th.
+    const std::uint32_t place = nearest(tap.u, tap.length) * tap.width + nearest(tap.v, tap.width);
+    constexpr std::uint32_t widest_gap = 64;
+    for (std::uint32_t away = 0; away < widest_gap; ++away) {
+      if (away <= place && node_[tap.first + place - away] != nowhere) {
+        return node_[tap.first + place - away];
+      }
+      if (place + away < tap.length * tap.width && node_[tap.first + place + away] != nowhere) {
+        return node_[tap.first + place + away];
+      }
+    }
+    return nowhere;
   }
 
   json line_of(const Link& link, std::uint32_t a, std::uint32_t b) const {
