@@ -37,6 +37,8 @@ const char* const play_examples =
     "  ressort play Resonator --midi song.mid    or, by the triangle: ressort play song.mid\n"
     "  ressort play my.mdl -a alsa -d hw:1       a model of your own on one sound card\n"
     "  ressort play -B 0.0.0.0 --osc-allow 192.168.1.23   played by OSC from a tablet, say\n"
+    "  ressort play Gong --web 9788              seen and played in a browser, at the address it "
+    "prints\n"
     "  oscsend localhost 9777 /note/on ii 69 100 a note by OSC, from another terminal\n";
 
 const char* const render_examples =
@@ -271,6 +273,17 @@ void add_play(CLI::App& app, PlayOptions& options, int& code) {
   command->add_option("--osc-allow", options.osc.allow,
                       "who may send OSC from elsewhere: addresses or networks, divided by commas,\n"
                       "192.168.1.23,10.0.0.0/24; needed with any -B but this machine's");
+  command
+      ->add_option("--web", options.panel.port,
+                   "show and play it in a browser: the port of its page, " +
+                       std::to_string(WebPanel::usual_port) + " without a number")
+      ->expected(0, 1)
+      ->default_str(std::to_string(WebPanel::usual_port))
+      ->check(within(1, 65535));
+  command
+      ->add_option("--web-bind", options.panel.bind_address,
+                   "the address that the page is at; beyond this machine only with its token")
+      ->capture_default_str();
   command->add_flag("--exit-on-loss", options.exit_on_loss,
                     "end with 75 when the audio server dies, instead of waiting for it");
   command->add_flag("--watch", options.watch,

@@ -2,7 +2,7 @@
 # is skipped where it does not fit before RESSORT_DEADLINE; for whoever has never the time for all of
 # them, another comes first with each RESSORT_TURN.
 set(RESSORT_TURN 0 CACHE STRING "Which of the deep tests comes first")
-set(ressort_fuzzers model preset score midi smf scala console osc osc_packet flight)
+set(ressort_fuzzers model preset score midi smf scala console osc osc_packet flight panel)
 list(TRANSFORM ressort_fuzzers PREPEND fuzz_ OUTPUT_VARIABLE ressort_deep_tests)
 list(APPEND ressort_deep_tests arm everything_sanitized everything_more forms_everywhere
   accuracy_everywhere silence_everywhere modes_everywhere calculix_everywhere bodies_everywhere

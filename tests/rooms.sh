@@ -28,6 +28,7 @@ judge() {
       owner["histedit.h"] = "app/control/terminal.cpp"
       owner["editline/"] = "app/control/terminal.cpp"
       owner["ebur128.h"] = "app/commands/gallery/loudness.cpp"
+      owner["httplib.h"] = "app/panel/panel.cpp"
       owner["png.h"] = "app/commands/gallery/png.cpp"
       owner["atomic"] = "app/realtime/lockfree.h"
       owner["toml++/"] = "core/model/"
@@ -54,7 +55,8 @@ judge() {
       sees["app/devices"] = "core/result.h core/engine core/kernels app app/realtime app/devices"
       sees["app/session"] = all " app app/realtime app/session app/control/registry.h"
       sees["app/control"] = all " app app/realtime app/devices app/session app/control"
-      sees["app/commands"] = sees["app/control"] " core/identification core/solids app/commands"
+      sees["app/panel"] = sees["app/control"] " app/panel"
+      sees["app/commands"] = sees["app/panel"] " core/identification core/solids app/commands"
       sees["app"] = sees["app/commands"]
     }
     {
@@ -146,6 +148,9 @@ app/devices/jack.cpp:1:#include <alsa/asoundlib.h>
 app/devices/alsa.cpp:1:#include <jack/jack.h>
 app/control/terminal.cpp:1:#include <lo/lo.h>
 app/control/osc/server.cpp:1:#include <histedit.h>
+app/control/registry.cpp:1:#include "app/panel/panel.h"
+app/panel/panel.cpp:1:#include "app/commands/commands.h"
+app/panel/state.cpp:1:#include <httplib.h>
 app/realtime/midi.cpp:1:#include <RtMidi.h>'
 planted=$(printf '%s\n' "$forbidden" | wc -l)
 caught=$(printf '%s\n' "$forbidden" | judge | wc -l)

@@ -12,6 +12,7 @@
 #include "app/control/osc/server.h"
 #include "app/devices/audio.h"
 #include "app/exit_code.h"
+#include "app/panel/panel.h"
 #include "app/session/session.h"
 
 namespace ressort {
@@ -33,6 +34,7 @@ struct PlayOptions {
   bool no_console = false;
   std::string script;
   OscOptions osc;  // port 0: none
+  PanelOptions panel;
   bool exit_on_loss = false;
   bool watch = false;  // what sounds is read again when its files change
 };

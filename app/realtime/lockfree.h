@@ -173,6 +173,35 @@ class Published {
   std::atomic<T*> value_{nullptr};
 };
 
+// The newest of what one thread writes, for one that reads it when it likes; nobody waits and
+// nothing is copied. One of three values is being written, one is being read, one lies between.
+template <class T>
+class TripleBuffer {
+ public:
+  explicit TripleBuffer(const T& value) : values_{value, value, value} {}
+
+  T& writing() { return values_[writing_]; }  // [its one writer]
+  void publish() {                            // [its one writer] wait-free
+    writing_ = between_.exchange(writing_ | fresh, std::memory_order_acq_rel) & ~fresh;
+  }
+  // Whether there is a newer one, which reading() is from then on. [its one reader] wait-free
+  bool take() {
+    if ((between_.load(std::memory_order_relaxed) & fresh) == 0) {
+      return false;
+    }
+    reading_ = between_.exchange(reading_, std::memory_order_acq_rel) & ~fresh;
+    return true;
+  }
+  const T& reading() const { return values_[reading_]; }  // [its one reader]
+
+ private:
+  static constexpr std::uint32_t fresh = 4;
+  std::array<T, 3> values_;
+  alignas(64) std::atomic<std::uint32_t> between_{1};
+  alignas(64) std::uint32_t writing_ = 0;
+  alignas(64) std::uint32_t reading_ = 2;
+};
+
 // Which frame is heard at which moment.
 struct ClockReading {
   std::int64_t frame = 0;    // first of the newest block

@@ -122,8 +122,12 @@ void Process::run(std::span<const Sample* const> inputs, std::span<Sample* const
         records || listens) {
       record(output_count, n, records, listens);
     }
+    if (frame_ < looked_until_) {
+      hear(output_count, n);
+    }
     frame_ += static_cast<std::int64_t>(n);
   }
+  look();
   tell();
   if (clock_ns_ != nullptr && !has_time.is_raised()) {
     weigh(1e-9 * static_cast<double>(clock_ns_() - start_ns), frames);

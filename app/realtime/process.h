@@ -11,6 +11,7 @@
 #include "app/realtime/flight_record.h"
 #include "app/realtime/lockfree.h"
 #include "app/realtime/midi.h"
+#include "app/realtime/motion.h"
 #include "core/engine/engine.h"
 #include "core/engine/mixing/dc_blocker.h"
 #include "core/engine/mixing/limiter.h"
@@ -25,6 +26,7 @@ struct Sounding {
   bool lets_ring = false;        // what sounded before it ends by itself, without new notes
   bool has_new_numbers = false;  // it goes on as Engine::renumber_from() says
   std::uint32_t number = 0;      // of this engine among all, for who keeps a flight
+  std::uint32_t picture = 0;     // what is watched of it, to whoever draws it; 0: nothing
 };
 
 // An event on its way to the audio thread, and when it is to act.
@@ -120,6 +122,8 @@ struct Process {
   static constexpr std::size_t max_endings = 1024;  // ...and so many more that end sound
   static constexpr std::size_t max_ahead = 4096;    // events that wait for their frame
   static constexpr double fade_s = 0.05;            // between two models
+  static constexpr double longest_strobe_s = 0.1;   // that a slow look waits
+  static constexpr double looked_for_s = 1.0;       // the output is kept for a look, after a look
   static constexpr double longest_ring_s = 60.0;    // of what the next model lets ring
 
   // A monotonic clock, in ns, that makes no system call.
@@ -179,6 +183,9 @@ struct Process {
   Flag is_tape_over;
   Ring<FlightRecord> flight{1 << 14};  // to the session's worker, once it wants it
   Flag keeps_flight;
+  Flag wants_motion;       // raised for each look: one frame is written after the next block
+  Flag wants_slow_motion;  // the same, at the next moment of the stroboscope
+  TripleBuffer<MotionFrame> motion{MotionFrame{}};
   Board<ClockReading> clock;
   Board<Meters> board;    // read by meters()
   Flag meters_were_read;  // raised by a reader: what is since the last reading starts anew
@@ -221,6 +228,9 @@ struct Process {
   void hurry();
   void play(const SampleTape& tape, std::size_t output_count, std::size_t frames);
   Sounding* take();
+  void hear(std::size_t channels, std::size_t frames);
+  void look();
+  void show();
 
   double rate_hz_;
   bool limit_;
@@ -265,6 +275,12 @@ struct Process {
   std::vector<double> sound_;       // [channel][chunk_frames] of the current engine
   std::vector<double> fade_sound_;  // [channel][chunk_frames] of the fading one
   std::vector<double> mixed_;       // [output][chunk_frames]
+  // The output of late, a ring, kept while somebody looks.
+  std::array<float, MotionFrame::heard_samples> heard_{};
+  std::size_t heard_at_ = 0;        // where the next sample goes
+  std::int64_t looked_until_ = 0;   // frame
+  Sounding* strobed_ = nullptr;     // is asked for a slow look,
+  std::int64_t strobed_until_ = 0;  // until this frame
 };
 
 }  // namespace ressort

@@ -173,6 +173,11 @@ void Session::set_backend(std::string description, bool runs) {
   runs_ = runs;
 }
 
+void Session::on_engine(PictureOf picture_of) {
+  const std::lock_guard lock(mutex_);
+  picture_of_ = std::move(picture_of);
+}
+
 void Session::on_audio_inputs(std::function<void(int)> prepare) {
   const std::lock_guard lock(mutex_);
   prepare_inputs_ = std::move(prepare);
@@ -280,7 +285,7 @@ void Session::improve() {
   made_of.find_gain = false;
   made_of.most_modes = source.options.most_modes;
   made_of.lets_ring = made_of.has_new_numbers = false;
-  offer(std::move(compiled->engine), std::move(made_of));
+  offer(std::move(compiled->engine), source.network, std::move(made_of));
   if (!news.empty() && tell_) {
     tell_(news);
   }
@@ -290,11 +295,17 @@ void Session::improve() {
   time_parts();
 }
 
-void Session::offer(std::unique_ptr<Engine> engine, FlightEngine made_of) {
+void Session::offer(std::unique_ptr<Engine> engine, const Network& network, FlightEngine made_of) {
+  PictureOf picture_of;
+  {
+    const std::lock_guard lock(mutex_);
+    picture_of = picture_of_;
+  }
   offered_ = engine.get();
   made_of.number = ++engines_;
   made_of.serial = serial_;
   auto next = std::make_unique<Sounding>();
+  next->picture = picture_of ? picture_of(*engine, network) : 0;
   next->engine = std::move(engine);
   next->serial = serial_;
   next->lets_ring = made_of.lets_ring;
@@ -569,7 +580,7 @@ Result<std::shared_ptr<const Loaded>> Session::sound(const Wish& wish, Draft dra
     }
     built_rate_hz_ = options.rate_hz;
   }
-  offer(std::move(compiled->engine), made_of);
+  offer(std::move(compiled->engine), scene->network, made_of);
   read_ = std::move(as_read);
   follow(*draft.files);
   source_.reset();

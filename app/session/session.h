@@ -177,6 +177,10 @@ class Session {
   Result<std::string> write_flight(const std::string& path, Existing existing);
   // The same to the user's own flights, by a name that is not there yet.
   Result<std::string> save_flight(const std::string& name);
+  // Called in the worker before an engine is offered, with the network that it was made of: chooses
+  // what is watched of it; its number comes back, Sounding::picture.
+  using PictureOf = std::function<std::uint32_t(Engine& engine, const Network& network)>;
+  void on_engine(PictureOf picture_of);
 
   // Called in the worker before an engine is offered, with the number of its audio inputs.
   void on_audio_inputs(std::function<void(int)> prepare);
@@ -240,7 +244,7 @@ class Session {
   bool is_outdated(bool is_load) const;
   bool has_new_rate() const;  // under the lock
   // Hands the engine over; its parts are timed when nobody waits any more.
-  void offer(std::unique_ptr<Engine> engine, FlightEngine made_of);
+  void offer(std::unique_ptr<Engine> engine, const Network& network, FlightEngine made_of);
   void time_parts();
   void listen();
   void change_program(int number);
@@ -275,6 +279,7 @@ class Session {
   FlightLog flight_;
   std::vector<std::string> tuning_;
   std::shared_ptr<const std::vector<SceneFile>> files_;  // of what sounds
+  PictureOf picture_of_;
 
   std::uint32_t serial_ = 0;         // [worker]
   std::optional<Wish> scene_;        // [worker] what was loaded last

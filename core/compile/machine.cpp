@@ -138,6 +138,7 @@ class ProgramMaker {
     };
     std::stable_sort(order.begin(), order.end(),
                      [&](std::uint32_t a, std::uint32_t b) { return rank(a) < rank(b); });
+    program_.masses = order;
     node_.resize(masses.size(), nowhere);
     program_.position.reserve(order.size());
     program_.velocity.reserve(order.size());

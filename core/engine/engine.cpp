@@ -258,6 +258,7 @@ struct Engine::Player {
     if (since_update == max_block_frames) {
       since_update = 0;
       update(b);
+      strobe();
     }
   }
 
@@ -329,6 +330,55 @@ struct Engine::Player {
     return meters;
   }
 
+  std::size_t look(std::span<double> numbers) const {
+    const std::size_t lane = voices.last();
+    return std::visit(
+        [&](const auto& b) {
+          std::size_t at = 0;
+          for (std::size_t p = 0; p < watched.size(); ++p) {
+            if (watched[p].empty()) {
+              continue;
+            }
+            const auto& part = b.parts[p];
+            const std::size_t more =
+                part.of(lane).look(lane % part.width, watched[p], numbers.subspan(at));
+            if (more == 0) {
+              break;
+            }
+            at += more;
+          }
+          return at;
+        },
+        bank);
+  }
+
+  // Whether this is a moment for a slow look; then it is taken. Once in max_block_frames.
+  void strobe() {
+    ++updates;
+    if (slow_numbers.empty()) {
+      return;
+    }
+    constexpr double near = 0.02;  // periods
+    const double seconds = static_cast<double>(updates * max_block_frames) / machine.rate_hz;
+    const double apart = seconds * (slow_hz - 1.0 / Engine::strobe_period_s);
+    if (std::fabs(apart - std::rint(apart)) < near) {
+      slow_count = look(slow_numbers);
+      slow_numbers = {};
+    }
+  }
+
+  bool look_slowly(std::span<double> numbers) {
+    slow_count = 0;
+    slow_numbers = {};
+    const Voice& voice = voices[voices.last()];
+    if (playing.pitches.factors.empty() || !voice.awake) {
+      return false;
+    }
+    slow_hz = playing.pitches.frequency_at(voice.factor);
+    slow_numbers = numbers;
+    return true;
+  }
+
   bool go_on_from(const Player& from) {
     const bool goes_on = std::visit(
         [&](auto& b) {
@@ -371,6 +421,11 @@ struct Engine::Player {
   AudioInputs audio;
   EnergyWatch watch;
   Mixing mixing;
+  std::vector<std::vector<std::uint32_t>> watched;  // [part] nodes; may be empty
+  std::span<double> slow_numbers;                   // where a slow look goes; empty: none is wanted
+  double slow_hz = 0.0;
+  std::size_t slow_count = 0;
+  std::uint64_t updates = 0;
   std::size_t since_update = 0;  // frames, below max_block_frames between two segments
 };
 
@@ -430,6 +485,23 @@ std::span<const std::uint16_t> Engine::take_changes() {
 
 double Engine::parameter(std::uint16_t index) const {
   return player_->parameters.values()[index];
+}
+
+void Engine::watch(std::vector<std::vector<std::uint32_t>> nodes) {
+  nodes.resize(player_->machine.parts.size());
+  player_->watched = std::move(nodes);
+}
+
+std::size_t Engine::look(std::span<double> numbers) const {
+  return player_->look(numbers);
+}
+
+bool Engine::look_slowly(std::span<double> numbers) {
+  return player_->look_slowly(numbers);
+}
+
+std::size_t Engine::take_slow_look() {
+  return std::exchange(player_->slow_count, 0);
 }
 
 const Machine& Engine::machine() const {

@@ -174,6 +174,21 @@ class Engine {
   double parameter(std::uint16_t index) const;  // [audio]
   static constexpr std::size_t max_changes = 64;
 
+  // What look() shows: nodes of each part, [part]. Before it plays. [any thread but audio]
+  void watch(std::vector<std::vector<std::uint32_t>> nodes);
+  // Where these are in the voice that was played last, part by part, as Kernel::look() says; a part
+  // that there is no room for ends it. How many numbers that are. [audio] wait-free, O(numbers)
+  std::size_t look(std::span<double> numbers) const;
+
+  // The same as a stroboscope sees it: process() looks at the first moment, of one in
+  // max_block_frames, at which a motion of the voice's frequency is where it would be if it took
+  // strobe_period_s for a period. What has been asked for before is forgotten, as it is without
+  // room for numbers. False where nothing has a pitch: nothing is looked at. [audio] wait-free
+  static constexpr double strobe_period_s = 2.0;
+  bool look_slowly(std::span<double> numbers);
+  // How many numbers that were, once; 0: the moment has not come. [audio] wait-free
+  std::size_t take_slow_look();
+
   const Machine& machine() const;  // [any thread], as long as the engine lives
   int output_count() const;        // [any thread], as long as the engine lives
   EngineMeters meters() const;     // [audio]

@@ -86,6 +86,19 @@ struct Awake {
   std::size_t of = 0;  // 0: it has no modes
 };
 
+// What look() does where every node has a position.
+template <class Position>
+std::size_t look_at(std::span<const std::uint32_t> nodes, std::span<double> numbers,
+                    Position&& position) {
+  if (numbers.size() < nodes.size()) {
+    return 0;
+  }
+  for (std::size_t i = 0; i < nodes.size(); ++i) {
+    numbers[i] = position(nodes[i]);
+  }
+  return nodes.size();
+}
+
 // The Program outlives its kernels and is shared by them. Nothing here throws or allocates after
 // construction.
 template <class T>
@@ -124,6 +137,10 @@ class Kernel {
   }
   // Whether every mass of a lane is nearer than `bound` to where it starts. [audio]
   virtual bool is_near_start(std::size_t lane, double bound) const = 0;
+  // For a picture: where some nodes are after the last sample, or of modes how far each has moved,
+  // whatever the nodes. How many numbers that are; 0: there is no room. [audio] O(numbers)
+  virtual std::size_t look(std::size_t lane, std::span<const std::uint32_t> nodes,
+                           std::span<double> numbers) const = 0;
   virtual Awake awake() const { return {}; }  // [audio]
 
   Coefficients<T> coefficients;

@@ -134,6 +134,12 @@ bool NodeKernel<T, Number>::is_near_start(std::size_t lane, double bound) const 
   return is_quiet(lane, bound);
 }
 
+template <class T, class Number>
+std::size_t NodeKernel<T, Number>::look(std::size_t lane, std::span<const std::uint32_t> nodes,
+                                        std::span<double> numbers) const {
+  return look_at(nodes, numbers, [&](std::uint32_t node) { return nodes_.position(node, lane); });
+}
+
 template NodeLayout layout_in_rows<float>(std::span<const std::uint32_t>, std::size_t, std::size_t,
                                           std::size_t);
 template NodeLayout layout_in_rows<double>(std::span<const std::uint32_t>, std::size_t, std::size_t,

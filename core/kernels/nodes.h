@@ -65,6 +65,8 @@ class NodeKernel : public Kernel<T> {
   bool save(std::size_t lane, double* x, double* v) const final;
   bool read(std::span<const std::uint32_t> nodes, T* x, T* v) const final;
   bool is_near_start(std::size_t lane, double bound) const final;
+  std::size_t look(std::size_t lane, std::span<const std::uint32_t> nodes,
+                   std::span<double> numbers) const final;
 
  protected:
   NodeKernel(const Program& program, NodeLayout layout)

@@ -130,6 +130,7 @@ struct Program {
   std::vector<LinkRun> link_runs;
   std::vector<Ends> ends;              // [link]
   std::vector<std::uint32_t> origins;  // [link] where the model has it
+  std::vector<std::uint32_t> masses;   // [node] the same
   std::vector<InputSlot> inputs;
   std::vector<TapSlot> taps;
   std::vector<std::uint32_t> tap_nodes;  // nodes

@@ -22,6 +22,11 @@ foreach(tag IN LISTS server_tags)
   set_tests_properties(server_${tag} PROPERTIES TIMEOUT 240 LABELS servers RUN_SERIAL TRUE)
 endforeach()
 
+# The panel's page in a real browser, with keys and pointer.
+add_test(NAME server_panel COMMAND ${CMAKE_CURRENT_SOURCE_DIR}/panel/panel_test.py
+  $<TARGET_FILE:ressort> ${CMAKE_SOURCE_DIR})
+set_tests_properties(server_panel PROPERTIES TIMEOUT 240 LABELS servers RUN_SERIAL TRUE)
+
 add_test(NAME command_line COMMAND ${CMAKE_CURRENT_SOURCE_DIR}/system/command_line.sh
   $<TARGET_FILE:ressort> ${CMAKE_SOURCE_DIR})
 set_tests_properties(command_line PROPERTIES TIMEOUT 240 LABELS servers RUN_SERIAL TRUE)

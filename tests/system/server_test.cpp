@@ -1,12 +1,17 @@
 // The whole program on a real JACK server: what a musician would notice, measured.
+#include <arpa/inet.h>
 #include <jack/metadata.h>
 #include <lo/lo.h>
+#include <netinet/in.h>
+#include <sys/socket.h>
 
+#include <atomic>
 #include <cmath>
 #include <cstdio>
 #include <filesystem>
 #include <fstream>
 #include <map>
+#include <memory>
 
 #include "tests/system/server.h"
 
@@ -209,6 +214,39 @@ TEST_CASE("Notes and panic get through a flood, with the future full", "[flood]"
   CHECK(play.exit_code() == 0);
 }
 
+// Looks at the panel's motion for as long as it lives, sixty times a second.
+class Viewer {
+ public:
+  explicit Viewer(std::uint16_t port) : socket_(socket(AF_INET, SOCK_STREAM, 0)) {
+    sockaddr_in address{};
+    address.sin_family = AF_INET;
+    address.sin_port = htons(port);
+    address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+    REQUIRE(connect(socket_, reinterpret_cast<const sockaddr*>(&address), sizeof address) == 0);
+    const std::string wish =
+        "GET /motion?hz=60 HTTP/1.1\r\nHost: 127.0.0.1:" + std::to_string(port) + "\r\n\r\n";
+    REQUIRE(send(socket_, wish.data(), wish.size(), MSG_NOSIGNAL) ==
+            static_cast<ssize_t>(wish.size()));
+    reader_ = std::thread([this] {
+      std::vector<char> bytes(1 << 16);
+      for (ssize_t got = 0; (got = recv(socket_, bytes.data(), bytes.size(), 0)) > 0;) {
+        seen_ += static_cast<std::size_t>(got);
+      }
+    });
+  }
+  ~Viewer() {
+    shutdown(socket_, SHUT_RDWR);
+    reader_.join();
+    close(socket_);
+  }
+  std::size_t seen() const { return seen_; }  // bytes
+
+ private:
+  int socket_;
+  std::atomic<std::size_t> seen_ = 0;
+  std::thread reader_;
+};
+
 TEST_CASE("The callback allocates, locks, reads, writes and waits never", "[callback]") {
   const std::string report = "/tmp/ressort-spy-" + std::to_string(getpid());
   const auto counts = [&] {
@@ -238,14 +276,19 @@ TEST_CASE("The callback allocates, locks, reads, writes and waits never", "[call
     CHECK(found["releases"] >= found["callbacks"]);
   }
 
-  SECTION("60 s of notes, controllers, floods, sweeps and swaps") {
+  SECTION("60 s of notes, controllers, floods, sweeps and swaps, while four watch") {
     const char* const scenes[] = {"IPlayTheTriangle", "PolyTriangle",     "PluckedHarmonics",
                                   "BowedString",      "PhysicalLFO",      "Resonator",
                                   "20x30mesh",        "LargeTriangleMesh"};
     {
-      Child play(program({"play", "PolyTriangle", "-a", "jack", "-u", osc_port}),
+      Child play(program({"play", "PolyTriangle", "-a", "jack", "-u", osc_port, "--web", "9790"}),
                  {{"LD_PRELOAD", RESSORT_SPY}, {"RTSPY_OUT", report}});
       REQUIRE(answers());
+      REQUIRE(play.says("panel: http://127.0.0.1:9790/?token="));
+      std::vector<std::unique_ptr<Viewer>> viewers;
+      for (int i = 0; i < 4; ++i) {
+        viewers.push_back(std::make_unique<Viewer>(static_cast<std::uint16_t>(9790)));
+      }
       Listener listener(48000 * 70);
       std::vector<Listener::Message> messages;
       unsigned state = 1;
@@ -278,6 +321,9 @@ TEST_CASE("The callback allocates, locks, reads, writes and waits never", "[call
         std::this_thread::sleep_for(100ms);
       }
       CHECK(listener.frames() >= 48000 * 60);
+      for (const auto& viewer : viewers) {
+        CHECK(viewer->seen() > 1'000'000);
+      }
       play.signal(SIGTERM);
       CHECK(play.exit_code() == 0);
     }

@@ -192,7 +192,7 @@ std::optional<double> t60_s(const Sound& sound, Stretch stretch) {
 }
 
 std::optional<StrongPartial> partial_near(const Sound& sound, Stretch stretch, double frequency_hz,
-                                    double cents) {
+                                          double cents) {
   constexpr double least_dbfs = -100.0;
   const double low = frequency_hz * std::exp2(-cents / 1200.0);
   const double high = std::min(frequency_hz * std::exp2(cents / 1200.0), 0.5 * sound.rate_hz);

@@ -58,7 +58,7 @@ struct StrongPartial {
   double dbfs = silence_db;  // of a steady sinusoid
 };
 std::optional<StrongPartial> partial_near(const Sound& sound, Stretch stretch, double frequency_hz,
-                                    double cents);
+                                          double cents);
 
 double cents_between(double from_hz, double to_hz);
 

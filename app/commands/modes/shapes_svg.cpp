@@ -6,9 +6,9 @@
 #include <utility>
 #include <vector>
 
-#include "app/commands/modes/layout.h"
 #include "app/session/modes/known_modes.h"
 #include "app/text.h"
+#include "core/analysis/modes/layout.h"
 
 namespace ressort {
 namespace {

@@ -101,8 +101,13 @@ class Player {
                                                  .keys = options_.keys,
                                                  .watch = options_.watch,
                                                  .keeps_flights = true},
-                                  [this](const std::string& news) { voice_.say(news); });
+                                  [this](const std::string& news) { tell(news); });
     connect_session();
+    if (options_.panel.port != 0) {
+      session_->on_engine([this](Engine& engine, const Network& network) {
+        return motion_.watch(engine, network);
+      });
+    }
     std::promise<Result<std::shared_ptr<const Loaded>>> promise;
     auto answer = promise.get_future();
     session_->load(
@@ -118,6 +123,7 @@ class Player {
     }
     greet(**loaded);
     open_osc();
+    open_panel();
     open_midi();
     if (song) {
       voice_.say("playing " + counted(song->messages.size(), "message", "messages") + " of MIDI, " +
@@ -134,6 +140,10 @@ class Player {
     voice_.set_terminal(nullptr);
     terminal_.reset();
     console_.reset();
+    {
+      const std::lock_guard lock(panel_mutex_);
+      panel_.reset();
+    }
     osc_.reset();
     player_.reset();
     midi_.reset();
@@ -330,18 +340,50 @@ class Player {
 
   // The sound is worth more than a port.
   void open_osc() {
-    if (options_.osc.port == 0) {
+    const auto hear = [this](const std::string& news) { tell(news); };
+    if (options_.osc.port != 0) {
+      auto osc = OscServer::open(options_.osc, process_, *session_, hear);
+      if (osc) {
+        osc_ = *std::move(osc);
+      } else {
+        voice_.say("playing without OSC: " + osc.error().message);
+      }
+    }
+    if (osc_ == nullptr) {
+      if (auto unheard = OscServer::open_unheard(process_, *session_, hear);
+          unheard && options_.panel.port != 0) {
+        osc_ = *std::move(unheard);  // the panel's way in
+      }
       return;
     }
-    auto osc = OscServer::open(options_.osc, process_, *session_,
-                               [this](const std::string& news) { voice_.say(news); });
-    if (!osc) {
-      voice_.say("playing without OSC: " + osc.error().message);
-      return;
-    }
-    osc_ = *std::move(osc);
     voice_.say("OSC on " + options_.osc.bind_address + " port " + std::to_string(osc_->port()) +
                ", " + osc_->access());
+  }
+
+  void open_panel() {
+    if (options_.panel.port == 0 || osc_ == nullptr) {
+      return;
+    }
+    auto panel = WebPanel::open(options_.panel, process_, *session_, motion_, *osc_);
+    if (!panel) {
+      voice_.say("playing without the panel: " + panel.error().message);
+      return;
+    }
+    voice_.say("panel: " + (*panel)->address());
+    if ((*panel)->is_for_all()) {
+      voice_.say("whoever has this address, token and all, can play and load; it is not encrypted");
+    }
+    const std::lock_guard lock(panel_mutex_);
+    panel_ = *std::move(panel);
+  }
+
+  // On any thread.
+  void tell(const std::string& news) {
+    voice_.say(news);
+    const std::lock_guard lock(panel_mutex_);
+    if (panel_) {
+      panel_->tell(news);
+    }
   }
 
   void open_midi() {
@@ -491,8 +533,9 @@ class Player {
 
   PlayOptions options_;
   sigset_t signals_;
-  bool has_called_off_ = false;             // by a signal
-  std::optional<LastResort> last_resort_;   // from then on; it goes last
+  bool has_called_off_ = false;            // by a signal
+  std::optional<LastResort> last_resort_;  // from then on; it goes last
+  MotionFeed motion_{process_};
   std::unique_ptr<const SampleTape> tape_;  // outlives the process that plays it
   Process process_{48000.0, true, monotonic_ns};
   Announcer voice_;
@@ -508,6 +551,8 @@ class Player {
   std::vector<std::string> tuning_;     // that was kept
   std::unique_ptr<Session> session_;
   std::unique_ptr<OscServer> osc_;
+  std::mutex panel_mutex_;  // whoever has news, and who opens and closes it
+  std::unique_ptr<WebPanel> panel_;
   std::unique_ptr<MidiInput> midi_;
   std::optional<MidiPlayer> player_;
   std::optional<std::chrono::steady_clock::time_point> song_ended_;

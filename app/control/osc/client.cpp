@@ -6,8 +6,16 @@
 
 namespace ressort {
 
+void OscClient::send(std::vector<OscOutlet::Bytes> answers) const {
+  if (post_) {
+    post_(std::move(answers));
+  } else {
+    outlet_->answer(sender_, std::move(answers));
+  }
+}
+
 bool OscClient::is_heard() const {
-  if (outlet_->may_answer(sender_)) {
+  if (post_ || outlet_->may_answer(sender_)) {
     return true;
   }
   if (const double pause_s = outlet_->tell_pause_s(sender_); pause_s > 0.0) {
@@ -23,7 +31,7 @@ bool OscClient::is_heard() const {
 
 void OscClient::answer(const Reply& reply) const {
   if (is_heard()) {
-    outlet_->answer(sender_, {reply.bytes()});
+    send({reply.bytes()});
   }
 }
 
@@ -48,7 +56,7 @@ void OscClient::answer_rows(const std::vector<Reply>& rows) const {
   for (const Reply& row : rows) {
     bytes.push_back(row.bytes());
   }
-  outlet_->answer(sender_, std::move(bytes));
+  send(std::move(bytes));
 }
 
 }  // namespace ressort

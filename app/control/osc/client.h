@@ -2,6 +2,7 @@
 // but audio]
 #pragma once
 
+#include <functional>
 #include <memory>
 #include <string>
 #include <vector>
@@ -15,6 +16,10 @@ class OscClient {
  public:
   OscClient(std::shared_ptr<OscOutlet> outlet, const OscSender& sender)
       : outlet_(std::move(outlet)), sender_(sender) {}
+  // Of a packet that came by another way than UDP, and whose answers go back there.
+  using Post = std::function<void(std::vector<OscOutlet::Bytes>)>;
+  OscClient(std::shared_ptr<OscOutlet> outlet, Post post)
+      : outlet_(std::move(outlet)), post_(std::move(post)) {}
 
   void answer(const Reply& reply) const;
   // The person at this machine hears it too, once in a while.
@@ -26,7 +31,8 @@ class OscClient {
   void answer_rows(const std::vector<Reply>& rows) const;
 
   bool is_same(const OscClient& other) const {
-    return sender_.address == other.sender_.address && sender_.port == other.sender_.port;
+    return !post_ && !other.post_ && sender_.address == other.sender_.address &&
+           sender_.port == other.sender_.port;
   }
 
   OscOutlet& outlet() const { return *outlet_; }
@@ -34,9 +40,11 @@ class OscClient {
  private:
   // Whether he is answered now; if not, he is told so once.
   bool is_heard() const;
+  void send(std::vector<OscOutlet::Bytes> answers) const;
 
   std::shared_ptr<OscOutlet> outlet_;
   OscSender sender_;
+  Post post_;  // null: answers go to the sender
 };
 
 }  // namespace ressort

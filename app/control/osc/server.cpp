@@ -10,7 +10,10 @@
 #include <cmath>
 #include <cstdlib>
 #include <cstring>
+#include <future>
+#include <iterator>
 #include <map>
+#include <mutex>
 #include <optional>
 #include <string_view>
 #include <system_error>
@@ -48,6 +51,13 @@ struct OscServer::Server {
   };
   using Groups = std::map<std::uint64_t, Group>;  // by time tag
 
+  // A packet that came another way, and who waits for its answers.
+  struct Asked {
+    std::vector<std::uint8_t> packet;
+    OscClient::Post answer;
+    std::promise<void> done;
+  };
+
   Server(Process& process_in, Session& session_in, int socket_in, int wake_in,
          std::vector<Subnet> allowed_in, OscOutlet::Tell tell)
       : process(process_in),
@@ -59,6 +69,7 @@ struct OscServer::Server {
         thread([this] { run(); }) {}
 
   ~Server() {
+    is_ending.raise();
     eventfd_write(wake, 1);
     thread.join();
     outlet->close();
@@ -77,7 +88,16 @@ struct OscServer::Server {
         continue;  // a signal
       }
       if (waits[1].revents != 0) {
-        return;
+        eventfd_t count = 0;
+        eventfd_read(wake, &count);
+        if (is_ending.is_raised()) {
+          answer_asked();
+          return;
+        }
+      }
+      answer_asked();
+      if (waits[0].revents == 0) {
+        continue;
       }
       if (const auto arrived = receive_packet(socket, buffer)) {
         count_lost(arrived->lost);
@@ -89,6 +109,18 @@ struct OscServer::Server {
           count_stranger(arrived->from);
         }
       }
+    }
+  }
+
+  void answer_asked() {
+    std::vector<Asked> now;
+    {
+      const std::lock_guard lock(asked_mutex);
+      now.swap(asked);
+    }
+    for (Asked& one : now) {
+      receive(one.packet, OscClient(outlet, one.answer));
+      one.done.set_value();
     }
   }
 
@@ -245,7 +277,10 @@ struct OscServer::Server {
   int malformed_answers = 0;
   std::uint32_t lost = 0;  // by the system, as it counts
   RateLimit strangers;
-  std::thread thread;  // last, so that all else is there when it starts
+  Flag is_ending;
+  std::mutex asked_mutex;
+  std::vector<Asked> asked;  // under the mutex
+  std::thread thread;        // last, so that all else is there when it starts
 };
 
 OscServer::OscServer(std::unique_ptr<Server> server) : server_(std::move(server)) {}
@@ -269,6 +304,51 @@ Result<std::unique_ptr<OscServer>> OscServer::open(const OscOptions& options, Pr
   }
   return std::unique_ptr<OscServer>(new OscServer(
       std::make_unique<Server>(process, session, *socket, wake, *allowed, std::move(tell))));
+}
+
+Result<std::unique_ptr<OscServer>> OscServer::open_unheard(Process& process, Session& session,
+                                                           Tell tell) {
+  const int wake = eventfd(0, EFD_CLOEXEC);
+  if (wake < 0) {
+    return Error{"OSC cannot start: " + std::generic_category().message(errno)};
+  }
+  return std::unique_ptr<OscServer>(new OscServer(std::make_unique<Server>(
+      process, session, -1, wake, std::vector<Subnet>(), std::move(tell))));
+}
+
+OscServer::Packets OscServer::ask(std::vector<std::uint8_t> packet,
+                                  std::function<void(Packets)> later) {
+  struct Mailbox {
+    std::mutex mutex;
+    Packets answers;
+    bool is_collected = false;
+  };
+  const auto mailbox = std::make_shared<Mailbox>();
+  Server::Asked asked{.packet = std::move(packet), .answer = [mailbox, later](Packets answers) {
+                        {
+                          const std::lock_guard lock(mailbox->mutex);
+                          if (!mailbox->is_collected) {
+                            std::move(answers.begin(), answers.end(),
+                                      std::back_inserter(mailbox->answers));
+                            return;
+                          }
+                        }
+                        later(std::move(answers));
+                      }};
+  std::future<void> done = asked.done.get_future();
+  {
+    const std::lock_guard lock(server_->asked_mutex);
+    server_->asked.push_back(std::move(asked));
+  }
+  eventfd_write(server_->wake, 1);
+  done.wait();
+  const std::lock_guard lock(mailbox->mutex);
+  mailbox->is_collected = true;
+  return std::move(mailbox->answers);
+}
+
+bool OscServer::is_heard() const {
+  return server_->socket >= 0;
 }
 
 std::string OscServer::access() const {

@@ -282,6 +282,13 @@ bool DenseKernel<T>::save(std::size_t, double* x, double* v) const {
 }
 
 template <class T>
+std::size_t DenseKernel<T>::look(std::size_t, std::span<const std::uint32_t> nodes,
+                                 std::span<double> numbers) const {
+  return look_at(nodes, numbers,
+                 [&](std::uint32_t node) { return static_cast<double>(position_of(node)); });
+}
+
+template <class T>
 DenseDrive<T> DenseKernel<T>::arrange(const Block<T>& block) {
   if (program_.inputs.size() == 1) {
     return {block.value, block.velocity, block.outputs};

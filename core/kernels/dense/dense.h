@@ -182,6 +182,8 @@ class DenseKernel final : public Kernel<T> {
   void set_state(std::size_t lane, const double* x, const double* v) override;
   bool save(std::size_t lane, double* x, double* v) const override;
   bool is_near_start(std::size_t lane, double bound) const override;
+  std::size_t look(std::size_t lane, std::span<const std::uint32_t> nodes,
+                   std::span<double> numbers) const override;
 
  private:
   void play(const Block<T>& block) override;

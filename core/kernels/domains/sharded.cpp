@@ -84,6 +84,25 @@ bool ShardedKernel<T>::is_near_start(std::size_t lane, double bound) const {
                      [&](const auto& kernel) { return kernel->is_near_start(lane, bound); });
 }
 
+// A copy is as good as the node itself; nodes that no shard has are at 0.
+template <class T>
+std::size_t ShardedKernel<T>::look(std::size_t lane, std::span<const std::uint32_t> nodes,
+                                   std::span<double> numbers) const {
+  return look_at(nodes, numbers, [&](std::uint32_t node) {
+    double position = 0.0;
+    for (std::size_t i = 0; i < shards_.size(); ++i) {
+      const std::vector<std::uint32_t>& own = shards_[i].nodes;
+      const auto at = std::lower_bound(own.begin(), own.end(), node);
+      if (at != own.end() && *at == node) {
+        const auto local = static_cast<std::uint32_t>(at - own.begin());
+        kernels_[i]->look(lane, {&local, 1}, {&position, 1});
+        break;
+      }
+    }
+    return position;
+  });
+}
+
 template <class T>
 void ShardedKernel<T>::play(const Block<T>& block) {
   for (std::size_t at = 0; at < block.frames; at += frames_) {

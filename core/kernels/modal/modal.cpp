@@ -342,6 +342,19 @@ void ModalKernel<T>::remember_peaks(const Block<T>& block) {
 }
 
 template <class T>
+std::size_t ModalKernel<T>::look(std::size_t, std::span<const std::uint32_t>,
+                                 std::span<double> numbers) const {
+  if (numbers.size() < modes_.modes || modes_.is_crossed) {
+    return 0;
+  }
+  for (std::size_t i = 0; i < modes_.modes; ++i) {
+    const double root = state_.root != nullptr ? static_cast<double>(state_.root[i]) : 1.0;
+    numbers[i] = root * static_cast<double>(state_.q[i]);
+  }
+  return modes_.modes;
+}
+
+template <class T>
 bool ModalKernel<T>::is_near_start(std::size_t, double bound) const {
   double sum = 0.0;
   for (std::size_t i = 0; i < modes_.modes; ++i) {

@@ -141,6 +141,8 @@ class ModalKernel final : public Kernel<T> {
   bool save(std::size_t lane, double* x, double* v) const override;
   // By the length of the modes' displacement, which no mass exceeds: it may be late, never early.
   bool is_near_start(std::size_t lane, double bound) const override;
+  std::size_t look(std::size_t lane, std::span<const std::uint32_t> nodes,
+                   std::span<double> numbers) const override;
   Awake awake() const override;
   // The most that a listener, a place or then an output, may be off by what sleeps or has slept.
   double owed(std::size_t listener) const;

@@ -54,6 +54,12 @@ bool OversampledKernel<T>::save(std::size_t lane, double* x, double* v) const {
 }
 
 template <class T>
+std::size_t OversampledKernel<T>::look(std::size_t lane, std::span<const std::uint32_t> nodes,
+                                       std::span<double> numbers) const {
+  return fine_->look(lane, nodes, numbers);
+}
+
+template <class T>
 void OversampledKernel<T>::refine_coefficients() {
   const std::size_t width = this->width();
   for (std::size_t c = 0; c < factor_.size(); ++c) {

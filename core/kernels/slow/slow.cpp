@@ -90,6 +90,14 @@ bool SlowKernel<T>::save(std::size_t, double* x, double* v) const {
 }
 
 template <class T>
+std::size_t SlowKernel<T>::look(std::size_t, std::span<const std::uint32_t> nodes,
+                                std::span<double> numbers) const {
+  return is_fine_ ? fine_.kernel->look(0, nodes, numbers)
+                  : look_at(nodes, numbers,
+                            [&](std::uint32_t node) { return interpolated(node, since_); });
+}
+
+template <class T>
 void SlowKernel<T>::step_fine(const T* value, const T* velocity) {
   for (std::size_t i = 0; i < program_.inputs.size(); ++i) {
     fine_.value[i * fine_.kernel->width()] = value[i];

@@ -2,6 +2,8 @@
 // ThreadSanitizer too.
 #include "app/realtime/lockfree.h"
 
+#include <algorithm>
+#include <array>
 #include <atomic>
 #include <memory>
 #include <thread>
@@ -255,6 +257,46 @@ TEST_CASE("a clock board is never read half written", "[lockfree]") {
   writer.join();
   CHECK(whole);
   CHECK(forward);
+}
+
+TEST_CASE("a triple buffer gives the newest, whole, and each once", "[lockfree]") {
+  using Numbers = std::array<std::uint64_t, 64>;
+  TripleBuffer<Numbers> buffer{Numbers{}};
+  CHECK_FALSE(buffer.take());
+  std::atomic<bool> done{false};
+  std::atomic<std::uint64_t> published{0};
+  std::thread writer([&] {
+    for (std::uint64_t i = 1; !done.load(); ++i) {
+      buffer.writing().fill(i);
+      buffer.publish();
+      published.store(i);
+      if (i % 64 == 0) {
+        std::this_thread::yield();
+      }
+    }
+  });
+  bool whole = true;
+  bool newest = true;
+  std::uint64_t last = 0;
+  for (int seen = 0; seen < 20000;) {
+    const std::uint64_t before = published.load();
+    if (!buffer.take()) {
+      std::this_thread::yield();
+      continue;
+    }
+    const Numbers& now = buffer.reading();
+    whole = whole && std::all_of(now.begin(), now.end(), [&](auto n) { return n == now[0]; });
+    newest = newest && now[0] > last && now[0] >= before;
+    last = now[0];
+    ++seen;
+  }
+  done.store(true);
+  writer.join();
+  CHECK(whole);
+  CHECK(newest);
+  buffer.take();
+  CHECK(buffer.reading()[0] == published.load());
+  CHECK_FALSE(buffer.take());  // the last only once
 }
 
 TEST_CASE("counters and flags", "[lockfree]") {

@@ -1,4 +1,4 @@
-// app/commands: where the masses of a network are in a picture.
+// core/analysis/modes: where the masses of a network are in a picture.
 #pragma once
 
 #include <cstdint>

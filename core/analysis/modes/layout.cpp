@@ -1,4 +1,4 @@
-#include "app/commands/modes/layout.h"
+#include "core/analysis/modes/layout.h"
 
 #include <algorithm>
 #include <cmath>

@@ -1,0 +1,41 @@
+# Makes OUTPUT, a source that holds the files of the page in FOLDER; as bytes, as a literal of more
+# than 64 kB is not what every compiler must take.
+set(types "html|text/html" "css|text/css" "js|text/javascript" "svg|image/svg+xml")
+set(arrays "")
+set(rows "")
+foreach(file index.html panel.css panel.js draw.js icon.svg)
+  file(READ ${FOLDER}/${file} bytes HEX)
+  string(REGEX REPLACE "(..)" "0x\\1," bytes "${bytes}")
+  string(MAKE_C_IDENTIFIER ${file} name)
+  string(APPEND arrays "const unsigned char ${name}[] = {${bytes}};\n")
+  foreach(type IN LISTS types)
+    string(REPLACE "|" ";" type "${type}")
+    list(GET type 0 ending)
+    if(file MATCHES "\\.${ending}$")
+      list(GET type 1 mime)
+    endif()
+  endforeach()
+  set(path "/${file}")
+  if(file STREQUAL index.html)
+    set(path "/")
+  endif()
+  string(APPEND rows "    {\"${path}\", \"${mime}; charset=utf-8\",\n"
+    "     {reinterpret_cast<const char*>(${name}), sizeof ${name}}},\n")
+endforeach()
+file(CONFIGURE OUTPUT ${OUTPUT} CONTENT [[
+#include "app/panel/page.h"
+
+namespace ressort {
+namespace {
+
+@arrays@
+}  // namespace
+
+std::span<const PageFile> page_files() {
+  static const PageFile files[] = {
+@rows@  };
+  return files;
+}
+
+}  // namespace ressort
+]] @ONLY)

@@ -1,0 +1,258 @@
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <nlohmann/json.hpp>
+#include <optional>
+
+#include "app/panel/picture.h"
+#include "core/analysis/modes/layout.h"
+#include "core/analysis/modes/modes.h"
+#include "core/laws/laws.h"
+#include "core/model/topology.h"
+
+namespace ressort {
+namespace {
+
+using nlohmann::json;
+
+constexpr std::size_t most_still = 4000;  // nodes that do not move
+constexpr std::size_t most_lines = 12'000;
+constexpr std::uint32_t nowhere = 0xffffffffu;
+
+class NetworkTeller {
+ public:
+  explicit NetworkTeller(const Picture& picture)
+      : picture_(picture),
+        network_(expand_macros(*picture.network)),
+        parameters_(parameter_values(network_)),
+        node_(network_.masses.size(), nowhere) {}
+
+  std::string tell() {
+    lay_out();
+    add_nodes();
+    place_hands();
+    json links = json::array();
+    for (const Link& link : network_.links) {
+      const std::uint32_t a = node_of(link.a);
+      const std::uint32_t b = node_of(link.b);
+      if (a != nowhere && b != nowhere && a != b && links.size() < most_lines) {
+        links.push_back(line_of(link, a, b));
+      }
+    }
+    json laws = json::array();
+    for (const LawFacts& facts : law_table()) {
+      laws.push_back({facts.one, family_name(facts.family)});
+    }
+    json inputs = json::array();
+    for (const Input& input : network_.inputs) {
+      inputs.push_back({input.number, shown(node_of(input.mass)), input.is_force});
+    }
+    json outputs = json::array();
+    for (const Output& output : network_.outputs) {
+      outputs.push_back({output.number, shown(node_of(output.mass))});
+    }
+    const json out{{"picture", picture_.number},
+                   {"dots", picture_.masses.size()},
+                   {"masses", moving_count(network_)},
+                   {"plane", is_plane_},
+                   {"drawn", is_laid_out_},
+                   {"x", x_},
+                   {"y", y_},
+                   {"start", start_},
+                   {"names", names_},
+                   {"kinds", kinds_},
+                   {"links", std::move(links)},
+                   {"laws", std::move(laws)},
+                   {"inputs", std::move(inputs)},
+                   {"outputs", std::move(outputs)}};
+    return out.dump(-1, ' ', false, json::error_handler_t::replace);
+  }
+
+ private:
+  void lay_out() {
+    at_.resize(network_.masses.size());
+    const bool has_row_only = picture_.network->macros.empty();
+    const MassLayout layout =
+        has_waveguide(*picture_.network) ? MassLayout{} : layout_of(*picture_.network);
+    is_plane_ = layout.is_plane;
+    for (const auto& row : layout.rows) {
+      for (const LayoutPoint& point : row) {
+        at_[point.mass] = point;
+      }
+    }
+    is_laid_out_ = is_plane_ || !has_row_only || is_chain(layout);
+  }
+
+  // A single row is one only if its neighbours are linked; else nobody knows where things are.
+  bool is_chain(const MassLayout& layout) const {
+    if (layout.rows.size() != 1) {
+      return false;
+    }
+    std::vector<std::size_t> place(network_.masses.size(), 0);
+    for (std::size_t i = 0; i < layout.rows[0].size(); ++i) {
+      place[layout.rows[0][i].mass] = i;
+    }
+    const auto masses = layout.rows[0].size();
+    std::size_t neighbours = 0;
+    for (const Link& link : network_.links) {
+      const std::size_t a = place[link.a];
+      const std::size_t b = place[link.b];
+      neighbours += a + 1 == b || b + 1 == a ? 1 : 0;
+    }
+    return 10 * neighbours >= 9 * (masses - 1);
+  }
+
+  void add_node(std::uint32_t mass, double start) {
+    const Mass& of = network_.masses[mass];
+    node_[mass] = static_cast<std::uint32_t>(x_.size());
+    const auto& point = at_[mass];
+    x_.push_back(point ? json(rounded(point->x)) : json());
+    y_.push_back(point ? json(rounded(point->y)) : json());
+    start_.push_back(start);
+    names_.push_back(of.name.text());
+    kinds_ += of.kind == MassKind::ground     ? 'g'
+              : of.kind == MassKind::position ? 'h'
+              : of.is_mode                    ? 'o'
+                                              : 'm';
+  }
+
+  void add_nodes() {
+    for (std::size_t i = 0; i < picture_.masses.size(); ++i) {
+      add_node(picture_.masses[i], picture_.start[i]);
+    }
+    std::vector<bool> is_tied(network_.masses.size(), false);
+    for (const Link& link : network_.links) {
+      is_tied[link.a] = is_tied[link.b] = true;
+    }
+    const bool has_all = picture_.masses.size() + most_still >= network_.masses.size();
+    for (std::uint32_t mass = 0; has_all && mass < network_.masses.size(); ++mass) {
+      const Mass& of = network_.masses[mass];
+      if (node_[mass] == nowhere && of.kind != MassKind::point && of.kind != MassKind::junction &&
+          is_tied[mass]) {
+        add_node(mass, of.position);
+      }
+    }
+  }
+
+  // A hand is among what it touches.
+  void place_hands() {
+    std::map<std::uint32_t, std::vector<std::uint32_t>> touched;
+    for (const Link& link : network_.links) {
+      const std::uint32_t a = node_of(link.a);
+      const std::uint32_t b = node_of(link.b);
+      if (a != nowhere && b != nowhere) {
+        (x_[a].is_null() ? touched[a] : touched[b]).push_back(x_[a].is_null() ? b : a);
+      }
+    }
+    for (const auto& [hand, nodes] : touched) {
+      double x = 0.0;
+      double y = 0.0;
+      double count = 0.0;
+      for (const std::uint32_t node : nodes) {
+        if (!x_[node].is_null()) {
+          x += x_[node].get<double>();
+          y += y_[node].get<double>();
+          ++count;
+        }
+      }
+      if (x_[hand].is_null() && count > 0.0) {
+        x_[hand] = x / count;
+        y_[hand] = y / count;
+      }
+    }
+  }
+
+  // Of a place on a macro the node that is nearest.
+  std::uint32_t node_of(std::uint32_t mass) const {
+    if (network_.masses[mass].kind != MassKind::point) {
+      return node_[mass];
+    }
+    const Tap& tap = network_.taps[network_.masses[mass].tap];
+    if (tap.places > 0 || tap.length == 0 || tap.width == 0) {
+      return tap.length > 0 ? node_[tap.first] : nowhere;
+    }
+    const auto nearest = [&](ArgumentId argument, std::uint32_t count) {
+      const double at = std::clamp(argument_value(network_, argument, parameters_), 0.0, 1.0);
+      return static_cast<std::uint32_t>(std::lround(at * (count - 1)));
+    };
+    // Of what is drawn: of a large network that is every n-th.
+    const std::uint32_t place = nearest(tap.u, tap.length) * tap.width + nearest(tap.v, tap.width);
+    constexpr std::uint32_t widest_gap = 64;
+    for (std::uint32_t away = 0; away < widest_gap; ++away) {
+      if (away <= place && node_[tap.first + place - away] != nowhere) {
+        return node_[tap.first + place - away];
+      }
+      if (place + away < tap.length * tap.width && node_[tap.first + place + away] != nowhere) {
+        return node_[tap.first + place + away];
+      }
+    }
+    return nowhere;
+  }
+
+  json line_of(const Link& link, std::uint32_t a, std::uint32_t b) const {
+    const LawFacts& facts = facts_of(link.law);
+    json line = {a, b, static_cast<int>(link.law)};
+    if (facts.lets_go()) {
+      line.push_back(facts.zone == Zone::below ? 1 : 2);
+      line.push_back(
+          argument_value(network_, link.arguments[facts.slot(Role::reach)], parameters_));
+    }
+    return line;
+  }
+
+  static json shown(std::uint32_t node) { return node == nowhere ? json() : json(node); }
+  static double rounded(double x) { return std::round(x * 1e3) / 1e3; }
+
+  const Picture& picture_;
+  const Network network_;
+  const std::vector<double> parameters_;
+  std::vector<std::uint32_t> node_;             // [mass] or nowhere
+  std::vector<std::optional<LayoutPoint>> at_;  // [mass]
+  bool is_plane_ = false;
+  bool is_laid_out_ = true;
+  std::vector<json> x_;  // [node]
+  std::vector<json> y_;
+  std::vector<double> start_;
+  std::vector<std::string> names_;
+  std::string kinds_;
+};
+
+}  // namespace
+
+std::string network_json(const Picture& picture) {
+  return NetworkTeller(picture).tell();
+}
+
+Result<std::string> modes_json(const Picture& picture, std::span<const double> parameters,
+                               double rate_hz, std::size_t count, const Progress& progress) {
+  const auto found = find_modes(*picture.network, parameters,
+                                {.rate_hz = rate_hz, .count = count, .progress = progress});
+  if (!found) {
+    return found.error();
+  }
+  std::map<std::uint32_t, std::size_t> dot;  // of a mass
+  for (std::size_t i = 0; i < picture.masses.size(); ++i) {
+    dot[picture.masses[i]] = i;
+  }
+  json modes = json::array();
+  for (std::size_t m = 0; m < std::min(count, found->modes.size()); ++m) {
+    std::vector<double> shape(picture.masses.size(), 0.0);
+    double most = 0.0;
+    for (std::uint32_t row = 0; row < found->system.masses.size(); ++row) {
+      if (const auto at = dot.find(found->system.masses[row]); at != dot.end()) {
+        shape[at->second] = found->displacement(m, row);
+        most = std::max(most, std::fabs(shape[at->second]));
+      }
+    }
+    for (double& x : shape) {
+      x = most > 0.0 ? std::round(1e3 * x / most) / 1e3 : 0.0;
+    }
+    const NetworkMode& mode = found->modes[m];
+    modes.push_back({{"hz", mode.frequency_hz},
+                     {"t60_s", std::isfinite(mode.t60_s) ? json(mode.t60_s) : json()},
+                     {"shape", shape}});
+  }
+  return json{{"modes", modes}, {"linear", found->is_linear()}}.dump();
+}
+
+}  // namespace ressort

@@ -1,0 +1,335 @@
+#!/usr/bin/python3
+"""The panel as a person has it: the program on a JACK server, its page in a real Chromium.
+
+  panel_test.py PROGRAM FOLDER [pictures FOLDER]
+
+FOLDER is the checkout. With `pictures` it takes screenshots instead.
+"""
+import http.client
+import os
+import re
+import signal
+import socket
+import struct
+import subprocess
+import sys
+import threading
+import time
+
+sys.dont_write_bytecode = True
+sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
+from browser import Browser  # noqa: E402
+
+SERVER = "ressort-panel"
+PATIENCE_S = 30  # what only a hang takes
+failures = 0
+
+
+def check(holds, what):
+    global failures
+    print(("ok      " if holds else "FAILED  ") + what, flush=True)
+    failures += 0 if holds else 1
+    return holds
+
+
+def eventually(holds, seconds=PATIENCE_S):
+    end = time.monotonic() + seconds
+    while time.monotonic() < end:
+        if holds():
+            return True
+        time.sleep(0.05)
+    return False
+
+
+class Program:
+    """`ressort play` and the address that it prints."""
+
+    def __init__(self, program, model, *more, audio="jack"):
+        self.lines = []
+        self.child = subprocess.Popen(
+            [program, "play", model, "-a", audio, "-m", "none", "-u", "off", "--web", "9790", *more],
+            stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
+        threading.Thread(target=self.read, daemon=True).start()
+        if not eventually(lambda: self.said(r"^panel: ")):
+            raise RuntimeError("no panel: " + "".join(self.lines))
+        line = next(line for line in self.lines if line.startswith("panel: "))
+        self.address = line.split()[1]
+        self.port = int(re.search(r":(\d+)/", self.address).group(1))
+
+    def read(self):
+        for line in self.child.stdout:
+            self.lines.append(line)
+
+    def said(self, pattern):
+        return any(re.search(pattern, line) for line in self.lines)
+
+    def type(self, text):
+        self.child.stdin.write(text + "\n")
+        self.child.stdin.flush()
+
+    def request(self, method, path, body=None, headers=None):
+        connection = http.client.HTTPConnection("127.0.0.1", self.port, timeout=PATIENCE_S)
+        connection.request(method, path, body, headers or {})
+        answer = connection.getresponse()
+        text = answer.read()
+        connection.close()
+        return answer.status, text
+
+    def osc(self, address, *values):
+        pad = lambda text: text.encode() + b"\0" * (4 - len(text.encode()) % 4)
+        packet = pad(address) + pad("," + "f" * len(values)) + b"".join(
+            struct.pack(">f", value) for value in values)
+        return self.request("POST", "/osc", packet, {"Content-Type": "application/octet-stream"})
+
+    def parameter(self, name):
+        answer = self.osc("/param/" + name)[1]
+        return struct.unpack(">f", answer[-4:])[0]
+
+    def close(self):
+        self.child.send_signal(signal.SIGTERM)
+        try:
+            return self.child.wait(PATIENCE_S)
+        except subprocess.TimeoutExpired:
+            self.child.kill()
+            return -1
+
+
+class Frames:
+    """What /motion sends, cut into frames; in a thread of its own."""
+
+    def __init__(self, port, hz=30):
+        self.frames = []  # (samples played, picture, positions as bytes)
+        self.socket = socket.create_connection(("127.0.0.1", port), PATIENCE_S)
+        self.socket.sendall(f"GET /motion?hz={hz} HTTP/1.1\r\nHost: 127.0.0.1:{port}\r\n\r\n"
+                            .encode())
+        self.answer = http.client.HTTPResponse(self.socket)
+        self.answer.begin()
+        threading.Thread(target=self.read, daemon=True).start()
+
+    def read(self):
+        try:
+            while head := self.answer.read(24):
+                frame, picture, dots, samples, _ = struct.unpack("<QIIII", head)
+                data = self.answer.read(4 * (dots + samples))
+                self.frames.append((frame, picture, data[:4 * dots]))
+        except (OSError, ValueError, http.client.HTTPException, struct.error):
+            pass
+
+    def close(self):
+        try:
+            self.socket.shutdown(socket.SHUT_RDWR)
+        except OSError:
+            pass
+        self.socket.close()
+
+
+def frame_rate(program, seconds):
+    """25 frames of 598 masses for every second of sound, by the frames' own count of samples."""
+    _, text = program.request("GET", "/describe")
+    frames = Frames(program.port)
+    rate = 48000
+    eventually(lambda: frames.frames and
+               frames.frames[-1][0] - frames.frames[0][0] >= seconds * rate, 6 * seconds)
+    frames.close()
+    got = [frame for frame in frames.frames if frame[0] - frames.frames[0][0] <= seconds * rate]
+    played_s = (got[-1][0] - got[0][0]) / rate
+    hz = (len(got) - 1) / played_s
+    print(f"        {len(got)} frames of {len(got[0][2]) // 4} masses in {played_s:.2f} s of sound,"
+          f" {hz:.1f} a second")
+    check(len(got[0][2]) // 4 == 598 and hz >= 25.0, "25 frames a second of 598 masses")
+    check(all(a[0] < b[0] for a, b in zip(got, got[1:])), "frames come in order, none twice")
+
+
+def doors(program):
+    for headers in ({"Host": "evil.com"}, {"Host": f"127.0.0.1.evil.com:{program.port}"},
+                    {"Origin": "http://evil.com"}, {"Origin": "null"}):
+        check(program.request("GET", "/describe", headers=headers)[0] == 403,
+              f"403 for {headers}")
+
+
+def silence(program, browser):
+    program.osc("/panic")
+    return browser.eventually("(panel.status.peak_db ?? -999) < -80 && panel.status.voices === 0")
+
+
+def centre(browser, selector):
+    return browser.evaluate(
+        f"(() => {{ const b = document.querySelector('{selector}').getBoundingClientRect();"
+        " return [b.x + b.width / 2, b.y + b.height / 2]; })()")
+
+
+def plucks(program, browser):
+    check(silence(program, browser), "it is silent to begin with")
+    x, y = browser.evaluate(
+        "(() => { const v = panel.view, n = v.net.inputs[0][1],"
+        " b = v.canvas.getBoundingClientRect(); return [b.x + v.sx[n], b.y + v.sy[n]]; })()")
+    browser.mouse("mouseMoved", x, y)
+    check(browser.evaluate("document.getElementById('hint').textContent").startswith("input 1"),
+          "the pointer says what it would play")
+    browser.evaluate("globalThis.struck = 0; globalThis.most = 0; (function look() {"
+                     " const v = panel.view, n = v.net.inputs[0][1];"
+                     " for (let i = 0; i < v.net.dots; i++)"
+                     "  if (!struck && Math.abs(v.positions[i] - v.net.start[i]) > 1e-5) struck = 1;"
+                     " requestAnimationFrame(look); })()")
+    browser.mouse("mousePressed", x, y)
+    for step in range(1, 6):
+        browser.mouse("mouseMoved", x, y - 16 * step)
+    browser.mouse("mouseReleased", x, y - 80)
+    check(browser.eventually("panel.status.peak_db > -60"), "a pluck on the picture is heard")
+    check(browser.eventually("struck === 1"), "and seen")
+
+
+def keys(program, browser):
+    check(silence(program, browser), "silence at once")
+    browser.evaluate("document.getElementById('network').focus()")
+    browser.key("ArrowRight", "ArrowRight")
+    browser.key("Enter", "Enter", "\r")
+    check(browser.eventually("panel.status.peak_db > -60"), "an input is played by keys alone")
+    check(silence(program, browser), "silence again")
+    before = browser.evaluate("panel.status.notes")
+    browser.key("a", "KeyA", "a")
+    check(browser.eventually(f"panel.status.notes === {before} + 1"), "a letter plays a note")
+    before = browser.evaluate("panel.status.notes")
+    browser.mouse("mousePressed", *centre(browser, "#keyboard [data-key=\"60\"]"))
+    browser.mouse("mouseReleased", *centre(browser, "#keyboard [data-key=\"60\"]"))
+    check(browser.eventually(f"panel.status.notes === {before} + 1"), "a key of the piano does")
+    # Every control can be reached by Tab, and has a name.
+    names = browser.evaluate(
+        "[...document.querySelectorAll('button, input, canvas[tabindex]')]"
+        ".filter(e => !(e.getAttribute('aria-label') || e.textContent.trim() ||"
+        " document.querySelector(`label[for='${e.id}']`)?.textContent)).map(e => e.outerHTML)")
+    check(names == [], f"everything has a name {names or ''}")
+
+
+def slides(program, browser):
+    start = program.parameter("mesh_Z")
+    browser.evaluate("document.getElementById('p-mesh_Z').focus()")
+    for _ in range(12):
+        browser.key("ArrowRight", "ArrowRight")
+    check(eventually(lambda: program.parameter("mesh_Z") > start * 1.01),
+          "a slider of the page turns the parameter")
+    program.osc("/param/mesh_Z", 0.03)
+    check(browser.eventually(
+        "document.querySelector('label[for=\"p-mesh_Z\"] + output').textContent === '0.03'"),
+        "a parameter that another turns moves the slider")
+    at = float(browser.evaluate("document.getElementById('p-mesh_Z').value"))
+    program.type("set mesh_Z 0.0001")
+    check(browser.eventually(f"+document.getElementById('p-mesh_Z').value < {at}"),
+          "and so does the console")
+
+
+def shows_modes(browser):
+    browser.evaluate("document.getElementById('find-modes').click()")
+    check(browser.eventually("document.querySelectorAll('#modes button').length === 24"),
+          "it lists the modes")
+    browser.evaluate("document.querySelector('#modes button').click()")
+    check(browser.evaluate("panel.view.mode.length === panel.view.net.dots"),
+          "a click shows a mode's shape")
+    check(browser.evaluate("document.querySelector('#modes button').textContent")
+          .startswith("99.29 Hz"), "which is the mode that `ressort check` names, 99.29 Hz")
+    browser.evaluate("document.querySelector('#modes button').click()")
+
+
+def slows_down(program, browser):
+    """A mass in slow motion: how far it goes from one frame to the next is printed."""
+    program.osc("/note/on", 57, 110)
+    browser.evaluate("document.getElementById('slow').click()")
+    browser.eventually("panel.view.net && panel.status.voices > 0")
+    jumps = browser.evaluate("""new Promise(done => {
+      const v = panel.view, seen = [];
+      let last = panel.frames;
+      (function look() {
+        if (panel.frames !== last) { last = panel.frames; seen.push(v.positions[300] - v.net.start[300]); }
+        if (seen.length < 90) requestAnimationFrame(look);
+        else done(seen);
+      })();
+    })""")
+    jumps = jumps[10:]
+    most = max(abs(x) for x in jumps)
+    steps = sorted(abs(a - b) / most for a, b in zip(jumps, jumps[1:]))
+    print(f"        of what it swings, {100 * steps[len(steps) // 2]:.0f} % from frame to frame")
+    # How slow depends on how many frames a busy machine draws: tests/unit/app/panel_test has that.
+    check(most > 0 and browser.evaluate(
+        "document.getElementById('slow').getAttribute('aria-pressed') === 'true'"),
+        "slow motion goes on and moves")
+    browser.evaluate("document.getElementById('slow').click()")
+    program.osc("/panic")
+
+
+def loads(program, browser):
+    browser.evaluate("document.getElementById('choose').click()")
+    browser.evaluate("[...document.querySelectorAll('#scenes button')]"
+                     ".find(b => b.firstChild.textContent === 'BowedString').click()")
+    check(browser.eventually("document.getElementById('name').textContent === 'BowedString' &&"
+                             " panel.view.net.dots < 400 && !!document.getElementById('p-low_K')"),
+          "another instrument is loaded from the list")
+    program.osc("/note/on", 45, 100)
+    check(browser.eventually("panel.status.peak_db > -60"), "and sounds")
+
+
+def test(program_path):
+    program = Program(program_path, "20x30mesh", "-z", "256")
+    try:
+        doors(program)
+        with Browser() as browser:
+            browser.open(program.address)
+            if not check(browser.eventually("globalThis.panel && panel.view.net &&"
+                                            " panel.view.net.dots === 598 && panel.frames > 5"),
+                         "the page draws 598 masses"):
+                print(browser.complaints(), program.lines)
+                return
+            frame_rate(program, float(os.environ.get("RESSORT_PANEL_SECONDS", "10")))
+            plucks(program, browser)
+            keys(program, browser)
+            slides(program, browser)
+            shows_modes(browser)
+            slows_down(program, browser)
+            loads(program, browser)
+            check(browser.complaints() == [],
+                  f"the browser has nothing to complain about {browser.complaints() or ''}")
+    finally:
+        check(program.close() == 0, "the program ends as it should, with the page still open")
+        if failures:
+            print("the program said:\n" + "".join(program.lines))
+
+
+def pictures(program_path, folder):
+    shots = [("mesh-light", "20x30mesh", 1280, 800, False, 45), ("mesh-dark", "20x30mesh", 1280, 800, True, 45),
+             ("bow-light", "BowedString", 1280, 800, False, 45), ("bow-dark", "BowedString", 1280, 800, True, 45),
+             ("mesh-phone", "20x30mesh", 390, 844, False, 45), ("mesh-phone-dark", "20x30mesh", 390, 844, True, 45)]
+    for name, model, width, height, dark, key in shots:
+        program = Program(program_path, model, audio="dummy")
+        with Browser(width, height, dark, width < 500) as browser:
+            browser.open(program.address)
+            browser.eventually("globalThis.panel && panel.view.net && panel.frames > 5")
+            program.osc("/note/on", key, 110)
+            time.sleep(1.2)
+            browser.screenshot(os.path.join(folder, name + ".png"), whole=False)
+        program.close()
+
+
+def main():
+    program = sys.argv[1]
+    os.environ["RESSORT_DATA"] = sys.argv[2]
+    if "pictures" in sys.argv:
+        pictures(program, sys.argv[-1])
+        return 0
+    os.environ["JACK_DEFAULT_SERVER"] = SERVER
+    os.environ["JACK_NO_START_SERVER"] = "1"
+    os.environ["JACK_NO_AUDIO_RESERVATION"] = "1"
+    jack = subprocess.Popen(["jackd", "-r", "-n", SERVER, "-d", "dummy", "-r", "48000", "-p", "256"],
+                            stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    try:
+        time.sleep(0.3)
+        eventually(lambda: subprocess.run(["jack_lsp"], stdout=subprocess.DEVNULL,
+                                          stderr=subprocess.DEVNULL).returncode == 0)
+        test(program)
+    finally:
+        jack.terminate()
+        jack.wait()
+    print(f"{failures} failed" if failures else "all passed")
+    return 1 if failures else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
