@@ -328,6 +328,11 @@ bool Voices::is_any_held() const {
   return std::any_of(voices_.begin(), voices_.end(), [](const Voice& voice) { return voice.held; });
 }
 
+bool Voices::is_any_under_way() const {
+  return std::any_of(voices_.begin(), voices_.end(),
+                     [](const Voice& voice) { return voice.awake && !voice.is_new; });
+}
+
 void Voices::damp_keyless(Voice& voice) const {
   voice.is_released = true;
   damp(voice);

@@ -151,10 +151,18 @@ void Reader::add_input(Line& line) {
 void Reader::add_output(Line& line) {
   const auto number = channel(line, "out");
   const auto mass = reference(line, 0);
+  const bool has_level = line.rest.size() > 1;
+  if (has_level && !line.coordinates.empty()) {
+    return error(line, line.rest[1],
+                 "an output with a level needs its place in brackets: [" +
+                     std::string(line.rest[0].text) + " 0.3]");
+  }
+  const ArgumentId level = has_level ? argument(line, 1) : no_argument;
   if (number && mass) {
     out_.network.outputs.push_back({.number = *number,
                                     .is_force = line.keyword->element == Element::force_output,
                                     .mass = *mass,
+                                    .level = level,
                                     .location = {line.number, line.label.column}});
   }
 }
