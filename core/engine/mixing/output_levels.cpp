@@ -11,7 +11,8 @@ constexpr double ramp_s = 0.025;
 }  // namespace
 
 OutputLevels::OutputLevels(const Machine& machine, const Playing& playing)
-    : ramp_frames_(playing.bare ? 0 : static_cast<std::size_t>(std::ceil(ramp_s * machine.rate_hz))) {
+    : ramp_frames_(playing.bare ? 0
+                                : static_cast<std::size_t>(std::ceil(ramp_s * machine.rate_hz))) {
   for (const Program& program : machine.parts) {
     std::vector<Level>& levels = parts_.emplace_back();
     for (std::uint32_t output = 0; output < program.outputs.size(); ++output) {
