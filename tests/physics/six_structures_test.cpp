@@ -145,6 +145,22 @@ TEST_CASE("six structures sound at one pitch and decay as long, at three keys",
   }
 }
 
+TEST_CASE("T60 is what is asked for, and moves the pitch by less than a tenth of a cent",
+          "[six_structures]") {
+  const int t60 = index_of("t60");
+  for (int i = 0; i < static_cast<int>(structures); ++i) {
+    for (const double asked_s : {1.0, 2.0, 6.0}) {
+      const Partial found =
+          partial_of(played({.only = i}, 2.2, {parameter(0, t60, asked_s), note_on(0, 45)}),
+                     48000.0, 110.0, 0.2, 1.0, 0.9);
+      INFO(names[static_cast<std::size_t>(i)] << ", " << asked_s << " s: " << cents(found.hz, 110.0)
+                                              << " cents, " << found.t60_s << " s");
+      CHECK(std::fabs(cents(found.hz, 110.0)) < 0.1);
+      CHECK(std::fabs(found.t60_s / asked_s - 1.0) < 1e-3);
+    }
+  }
+}
+
 TEST_CASE("a structure a hundredth of a cent and a thousandth of its decay off would be noticed",
           "[six_structures]") {
   std::vector<double> y(96000);
