@@ -19,6 +19,7 @@
 #include "app/commands/reference.h"
 #include "app/commands/smf/midi_file.h"
 #include "app/commands/start_chart.h"
+#include "app/commands/timbre/describe_line.h"
 #include "app/program.h"
 #include "app/version.h"
 #include "core/model/language/expression.h"
@@ -494,6 +495,7 @@ int run(int argc, char** argv) {
   ExportOptions export_options;
   BodyRequest body_request;
   ModesOptions modes_options;
+  DescribeOptions describe_options;
   MakeOptions make_options;
   ChartOptions chart_options;
   std::vector<std::uint32_t> make_sizes;
@@ -504,6 +506,7 @@ int run(int argc, char** argv) {
   add_make(app, make_options, make_sizes, code);
   add_export(app, export_options, code);
   add_modes(app, modes_options, code);
+  add_describe(app, describe_options, describe_command, code);
   add_body(app, body_request, code);
   add_chart(app, chart_options, code);
   add_reference(app, reference_part, code);

@@ -519,4 +519,9 @@ int gallery_command(const GalleryOptions& options) {
   return gallery(options, [] { return !interrupted.is_raised(); });
 }
 
+int describe_command(const DescribeOptions& options) {
+  watch_signals();
+  return describe(options, [] { return !interrupted.is_raised(); });
+}
+
 }  // namespace ressort

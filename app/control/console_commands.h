@@ -17,6 +17,7 @@ struct ConsoleContext {
   Recorder recorder;
   Keyboard keyboard = {};
   bool has_quit = false;
+  FigureValues timbre = {};  // as it was told last
 };
 
 // What sounds; null before anything was loaded.
@@ -54,6 +55,7 @@ Result<Done> status(ConsoleContext& console, Words words);
 Result<Done> explain(ConsoleContext& console, Words words);
 Result<Done> modes(ConsoleContext& console, Words words);
 Result<Done> tune(ConsoleContext& console, Words words);
+Result<Done> timbre(ConsoleContext& console, Words words);
 Result<Done> tuning(ConsoleContext& console, Words words);
 Result<Done> record(ConsoleContext& console, Words words);
 Result<Done> help(ConsoleContext& console, Words words);

@@ -113,8 +113,9 @@ void Process::run(std::span<const Sample* const> inputs, std::span<Sample* const
       std::transform(samples, samples + n, outputs[c] + at,
                      [](double sample) { return static_cast<Sample>(sample); });
     }
-    if (is_recording.is_raised()) {
-      record(output_count, n);
+    if (const bool records = is_recording.is_raised(), listens = is_listening.is_raised();
+        records || listens) {
+      record(output_count, n, records, listens);
     }
     frame_ += static_cast<std::int64_t>(n);
   }
@@ -518,7 +519,7 @@ void Process::weigh(double took_s, std::size_t frames) {
   }
 }
 
-void Process::record(std::size_t channels, std::size_t frames) {
+void Process::record(std::size_t channels, std::size_t frames, bool records, bool listens) {
   if (channels == 0) {
     return;
   }
@@ -533,8 +534,11 @@ void Process::record(std::size_t channels, std::size_t frames) {
         piece.samples[i++] = static_cast<float>(mixed_[c * chunk_frames + at + n]);
       }
     }
-    if (!recording.push(piece)) {
+    if (records && !recording.push(piece)) {
       ++meters_.record_lost;
+    }
+    if (listens) {
+      listening.push(piece);  // where there is no room, the reader sees that it is full
     }
   }
 }

@@ -158,6 +158,8 @@ struct Process {
   Ring<Report> reports{4096};                         // to the session's worker
   Ring<RecordedChunk> recording{8192};
   Flag is_recording;
+  Ring<RecordedChunk> listening{1024};  // to whoever describes what sounds
+  Flag is_listening;
   Board<ClockReading> clock;
   Board<Meters> board;    // read by meters()
   Flag meters_were_read;  // raised by a reader: what is since the last reading starts anew
@@ -193,7 +195,7 @@ struct Process {
   bool goes_on(const Sounding& next) const;
   void tell();
   void weigh(double took_s, std::size_t frames);
-  void record(std::size_t channels, std::size_t frames);
+  void record(std::size_t channels, std::size_t frames, bool records, bool listens);
 
   double rate_hz_;
   bool limit_;

@@ -17,6 +17,7 @@
 #include "app/realtime/rate_limit.h"
 #include "app/session/loader.h"
 #include "app/session/modes/known_modes.h"
+#include "app/session/timbre/timbre_watch.h"
 #include "core/analysis/modes/tune.h"
 #include "core/compile/compile.h"
 
@@ -144,6 +145,9 @@ class Session {
 
   Status status();
 
+  // What it sounds like; it makes promises of its own.
+  TimbreWatch& timbre() { return timbre_; }
+
   // What plays, or what is waited for; set by whoever starts a backend.
   void set_backend(std::string description, bool runs);
 
@@ -234,6 +238,7 @@ class Session {
   RateLimit drops_;
   std::uint64_t late_reported_ = 0;
   std::uint64_t dropped_reported_ = 0;
+  TimbreWatch timbre_{process_};
   std::thread worker_;  // last, so that it ends first
 };
 

@@ -3,45 +3,37 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <numeric>
 
 #include "core/analysis/definite.h"
 #include "core/analysis/places.h"
+#include "core/groups.h"
 
 namespace ressort {
 namespace {
 
 constexpr std::uint32_t held = std::numeric_limits<std::uint32_t>::max();
 
-// Which rows hang on something that does not move, by union-find.
+// Which rows hang on something that does not move.
 class Anchors {
  public:
-  explicit Anchors(const Assembly& assembly) : parent_(assembly.masses.size() + 1) {
-    std::iota(parent_.begin(), parent_.end(), 0u);
-  }
-  // The last one stands for all that does not move.
+  explicit Anchors(const Assembly& assembly)
+      : rows_(assembly.masses.size() + 1),
+        ground_(static_cast<std::uint32_t>(assembly.masses.size())) {}
   void join(std::span<const Assembly::Entry> entries) {
     double sum = 0.0;
     for (const Assembly::Entry& entry : entries) {
       sum += entry.share;
-      parent_[find(entry.row)] = find(entries[0].row);
+      rows_.join(entry.row, entries[0].row);
     }
     if (!entries.empty() && std::fabs(sum) > 1e-9) {
-      parent_[find(entries[0].row)] = find(ground());
+      rows_.join(entries[0].row, ground_);
     }
   }
-  bool holds(std::uint32_t row) { return find(row) == find(ground()); }
+  bool holds(std::uint32_t row) { return rows_.find(row) == rows_.find(ground_); }
 
  private:
-  std::uint32_t ground() const { return static_cast<std::uint32_t>(parent_.size()) - 1; }
-  std::uint32_t find(std::uint32_t i) {
-    while (parent_[i] != i) {
-      i = parent_[i] = parent_[parent_[i]];
-    }
-    return i;
-  }
-
-  std::vector<std::uint32_t> parent_;
+  Groups rows_;
+  std::uint32_t ground_;  // stands for all that does not move
 };
 
 }  // namespace

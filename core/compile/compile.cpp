@@ -5,6 +5,7 @@
 #include <numbers>
 #include <string>
 
+#include "core/compile/accuracy/loaded_waveguide.h"
 #include "core/compile/accuracy/pitches.h"
 #include "core/compile/accuracy/waveguide_pitch.h"
 #include "core/compile/cull.h"
@@ -182,6 +183,22 @@ Planned find_forms(const Request& request, Machine machine, const Analysis& anal
                    options.progress, promise);
 }
 
+Pitches find_pitches(const Request& request, const Network& network, const Machine& machine,
+                     const LowestShapes& shapes, std::vector<std::string>& notes) {
+  if (network.waveguides.empty()) {
+    return make_pitches(shapes, stepping_of_lowest(machine, shapes), request.options.rate_hz,
+                        request.rate_ratio);
+  }
+  if (auto loaded = loaded_waveguide_pitches(machine, machine.parameters)) {
+    return *std::move(loaded);
+  }
+  notes.push_back(
+      "keys tune the waveguide as if nothing held it: it hangs together with more than " +
+      std::to_string(most_loading_springs) + " springs");
+  return make_pitches(shapes, {.scheme = Stepping::Scheme::exact}, request.options.rate_hz,
+                      request.rate_ratio);
+}
+
 // With what the sound is flat of its lowest mode made up for.
 Pitches sharpened(const Pitches& pitches, const Preset& preset) {
   if (preset.flattening_cents.empty()) {
@@ -283,12 +300,10 @@ Result<Compiled> compile_by_stages(const Request& request) {
   Analysis analysis = prove(request, reduced, machine, schemes, asked, start, mode);
   const Promise promise = make_promise(request, reduced, machine, analysis, start);
   Planned planned = find_forms(request, std::move(machine), analysis, promise);
+  std::vector<std::string> pitch_notes;
   if (shapes) {
-    const Stepping stepping = network.waveguides.empty()
-                                  ? stepping_of_lowest(planned.machine, *shapes)
-                                  : Stepping{.scheme = Stepping::Scheme::exact};
-    analysis.pitches = make_pitches(*shapes, stepping, options.rate_hz, rate_ratio);
-    analysis.pitches = sharpened(analysis.pitches, preset);
+    analysis.pitches =
+        sharpened(find_pitches(request, network, planned.machine, *shapes, pitch_notes), preset);
     reach(analysis, planned.more, options.rate_hz);
   }
   if (auto error = shortage(planned.machine, voices, options.precision, options.most_bytes)) {
@@ -304,19 +319,20 @@ Result<Compiled> compile_by_stages(const Request& request) {
         find_gain(planned.machine, played_by(1, 1.0), options.precision, options.isa, progress);
   }
   const double gain = preset.gain * factor.value_or(1.0);
+  std::vector<std::string> notes = make_notes(
+      schemes, culled, analysis, preset.keyboard && !mode ? missed_mode(network, preset) : "",
+      !factor, reduced.merged);
+  notes.insert(notes.end(), pitch_notes.begin(), pitch_notes.end());
   progress.stage("making its voices");
-  return Compiled{
-      .engine = make_engine(std::move(planned.machine), played_by(voices, gain), options.precision,
-                            options.isa, progress),
-      .instrument = make_instrument(network, preset, analysis, voices, gain),
-      .plan = {.parts = planned.parts,
-               .budget = request.budget,
-               .accuracy = accuracy_of(planned.parts),
-               .notes = make_notes(schemes, culled, analysis,
-                                   preset.keyboard && !mode ? missed_mode(network, preset) : "",
-                                   !factor, reduced.merged)},
-      .stability = analysis.stability,
-      .schemes = schemes};
+  return Compiled{.engine = make_engine(std::move(planned.machine), played_by(voices, gain),
+                                        options.precision, options.isa, progress),
+                  .instrument = make_instrument(network, preset, analysis, voices, gain),
+                  .plan = {.parts = planned.parts,
+                           .budget = request.budget,
+                           .accuracy = accuracy_of(planned.parts),
+                           .notes = std::move(notes)},
+                  .stability = analysis.stability,
+                  .schemes = schemes};
 }
 
 }  // namespace

@@ -3,33 +3,14 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <numeric>
 #include <string>
 #include <vector>
 
+#include "core/groups.h"
 #include "core/model/network.h"
 #include "core/progress.h"
 
 namespace ressort {
-
-// Who hangs together, by union-find.
-class Groups {
- public:
-  explicit Groups(std::size_t count) : parent_(count) {
-    std::iota(parent_.begin(), parent_.end(), 0u);
-  }
-  // Who stands for the whole group.
-  std::uint32_t find(std::uint32_t i) {
-    while (parent_[i] != i) {
-      i = parent_[i] = parent_[parent_[i]];
-    }
-    return i;
-  }
-  void join(std::uint32_t a, std::uint32_t b) { parent_[find(a)] = find(b); }
-
- private:
-  std::vector<std::uint32_t> parent_;
-};
 
 // Joins every place on a macro that counts with all of the macro's nodes, and places on a waveguide
 // with each other; `meet` hears of each node once.

@@ -42,6 +42,7 @@ class ProgramMaker {
     }
     place_taps();
     place_junctions();
+    place_filters();
     for (std::uint32_t i = 0; i < network_.outputs.size(); ++i) {
       if (node_[network_.outputs[i].mass] != nowhere) {
         add_output(i);
@@ -261,6 +262,43 @@ class ProgramMaker {
             coefficient(link.arguments[k], facts_of(link.law).arguments[k].unit, link.is_fixed);
       }
       program_.link_runs.push_back(run);
+    }
+  }
+
+  // Where a wave meets no spring for longest: nothing between two springs that hold a string is
+  // shorter or longer than to a sample, but for where the filters are.
+  void place_filters() {
+    std::vector<bool> is_held(program_.moving, false);
+    for (const LinkRun& run : program_.link_runs) {
+      for (std::uint32_t i = run.first; i < run.first + run.count; ++i) {
+        for (const std::uint32_t node : {program_.ends[i].a, program_.ends[i].b}) {
+          if (node < program_.moving && facts_of(run.law).contains_spring) {
+            is_held[node] = true;
+          }
+        }
+      }
+    }
+    for (WaveguideSlot& guide : program_.waveguides) {
+      std::vector<double> ways;  // from the right end
+      for (std::uint32_t i = guide.first; i < guide.first + guide.count; ++i) {
+        const JunctionSlot& place = program_.junctions[i];
+        if (is_held[place.node]) {
+          const double u =
+              coefficient_value(program_, program_.coefficients[place.u], program_.parameters, 1.0);
+          ways.push_back(0.5 * (1.0 - std::clamp(u, 0.0, 1.0)));
+          ways.push_back(1.0 - ways.back());
+        }
+      }
+      std::sort(ways.begin(), ways.end());
+      double widest = 0.0;
+      for (std::size_t i = 0; i < ways.size(); ++i) {
+        const double next = i + 1 < ways.size() ? ways[i + 1] : ways[0] + 1.0;
+        if (next - ways[i] > widest + 1e-9) {
+          widest = next - ways[i];
+          guide.filters_at = {.share = std::fmod(0.5 * (next + ways[i]), 1.0),
+                              .to_held = 0.5 * (next - ways[i])};
+        }
+      }
     }
   }
 

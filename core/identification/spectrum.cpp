@@ -4,50 +4,21 @@
 #include <bit>
 #include <cmath>
 #include <numbers>
-#include <utility>
+
+#include "core/identification/damped.h"
+#include "core/linear_algebra/fourier.h"
 
 namespace ressort {
 
-void transform(std::vector<Complex>& values) {
-  const std::size_t size = values.size();
-  for (std::size_t i = 1, j = 0; i < size; ++i) {  // bits in reverse
-    std::size_t bit = size >> 1;
-    for (; (j & bit) != 0; bit >>= 1) {
-      j ^= bit;
-    }
-    j ^= bit;
-    if (i < j) {
-      std::swap(values[i], values[j]);
-    }
-  }
-  std::vector<Complex> turns(size / 2);
-  for (std::size_t k = 0; k < turns.size(); ++k) {
-    turns[k] = std::polar(
-        1.0, -2.0 * std::numbers::pi * static_cast<double>(k) / static_cast<double>(size));
-  }
-  for (std::size_t half = 1; half < size; half *= 2) {
-    const std::size_t step = size / (2 * half);
-    for (std::size_t from = 0; from < size; from += 2 * half) {
-      for (std::size_t k = 0; k < half; ++k) {
-        Complex& a = values[from + k];
-        Complex& b = values[from + k + half];
-        const Complex t = turns[k * step];
-        const Complex turned(b.real() * t.real() - b.imag() * t.imag(),
-                             b.real() * t.imag() + b.imag() * t.real());
-        b = a - turned;
-        a += turned;
-      }
-    }
-  }
-}
-
 Power::Power(std::span<const std::vector<double>> channels, std::size_t frames) : frames_(frames) {
   const std::size_t size = std::bit_ceil(std::max<std::size_t>(frames, 2));
-  std::vector<double> power(size / 2 + 1);
+  Fourier fourier(size);
+  std::vector<double> power(fourier.bins());
+  std::vector<double> padded(size);
+  std::vector<Complex> bins(fourier.bins());
   for (const std::vector<double>& channel : channels) {
-    std::vector<Complex> bins(size);
-    std::copy_n(channel.begin(), frames, bins.begin());
-    transform(bins);
+    std::copy_n(channel.begin(), frames, padded.begin());
+    fourier.forward(padded, bins);
     for (std::size_t k = 0; k < power.size(); ++k) {
       power[k] += (k == 0 || 2 * k == size ? 1.0 : 2.0) * std::norm(bins[k]) /
                   (static_cast<double>(size) * static_cast<double>(frames));

@@ -5,12 +5,7 @@
 #include <span>
 #include <vector>
 
-#include "core/identification/damped.h"
-
 namespace ressort {
-
-// The discrete Fourier transform in place; the size is a power of two. O(size log size)
-void transform(std::vector<Complex>& values);
 
 // The mean power of a stretch of sound over frequency, all channels added up.
 class Power {

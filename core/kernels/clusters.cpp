@@ -5,6 +5,8 @@
 #include <numeric>
 #include <set>
 
+#include "core/groups.h"
+
 namespace ressort {
 namespace {
 
@@ -38,24 +40,6 @@ std::vector<PassiveLink> links_of(const Program& program) {
   }
   return links;
 }
-
-// Which links move each other, by the masses that they move.
-class Groups {
- public:
-  explicit Groups(std::size_t count) : parent_(count) {
-    std::iota(parent_.begin(), parent_.end(), 0u);
-  }
-  std::uint32_t of(std::uint32_t node) {
-    while (parent_[node] != node) {
-      node = parent_[node] = parent_[parent_[node]];
-    }
-    return node;
-  }
-  void unite(std::uint32_t a, std::uint32_t b) { parent_[of(a)] = of(b); }
-
- private:
-  std::vector<std::uint32_t> parent_;
-};
 
 // Eliminates the mass with the fewest neighbours first, and lets its neighbours know each other.
 class Eliminator {
@@ -216,13 +200,13 @@ std::vector<std::uint32_t> inverse_masses(const Program& program) {
 
 PassiveTables passive_tables(const Program& program, bool by_links) {
   std::vector<PassiveLink> links = links_of(program);
-  Groups groups(program.moving);
+  Groups groups(program.moving);  // which links move each other, by the masses that they move
   std::vector<std::uint32_t> any(links.size(), no_mass);  // [link] a mass that it moves
   for (std::size_t i = 0; i < links.size(); ++i) {
     for (const std::uint32_t end : {links[i].ends.a, links[i].ends.b}) {
       each_moved(program, end, [&](std::uint32_t node) {
         any[i] = any[i] == no_mass ? node : any[i];
-        groups.unite(any[i], node);
+        groups.join(any[i], node);
       });
     }
   }
@@ -234,7 +218,7 @@ PassiveTables passive_tables(const Program& program, bool by_links) {
     } else if (any[i] == no_mass) {
       tables.links.push_back(links[i]);
     } else {
-      of_group[groups.of(any[i])].push_back(i);
+      of_group[groups.find(any[i])].push_back(i);
     }
   }
   for (const auto& [group, members] : of_group) {

@@ -9,6 +9,7 @@
 
 #include "core/formula.h"
 #include "core/kernels/forms.h"
+#include "core/kernels/waveguides/design.h"
 #include "core/laws/law.h"
 
 namespace ressort {
@@ -107,6 +108,7 @@ struct WaveguideSlot {
   std::uint32_t frequency = 0;          // Hz
   std::uint32_t t60 = 0;                // seconds
   std::uint32_t brightness = 0;
+  FiltersAt filters_at;
   std::uint32_t first = 0;  // its places in Program::junctions
   std::uint32_t count = 0;
 };

@@ -61,6 +61,25 @@ std::optional<Matrix> positive_solution(const Matrix& a, const Matrix& b) {
   return solved;
 }
 
+std::complex<double> schur_complement_of_first(ComplexMatrix matrix) {
+  for (std::size_t last = matrix.rows; last-- > 1;) {
+    std::size_t pivot = last;
+    for (std::size_t i = 1; i < last; ++i) {
+      pivot = std::abs(matrix(i, last)) > std::abs(matrix(pivot, last)) ? i : pivot;
+    }
+    for (std::size_t j = 0; j <= last; ++j) {
+      std::swap(matrix(pivot, j), matrix(last, j));
+    }
+    for (std::size_t i = 0; i < last; ++i) {
+      const std::complex<double> share = matrix(i, last) / matrix(last, last);
+      for (std::size_t j = 0; j < last; ++j) {
+        matrix(i, j) -= share * matrix(last, j);
+      }
+    }
+  }
+  return matrix(0, 0);
+}
+
 Matrix transposed_product(const Matrix& a, const Matrix& b) {
   const Eigen::MatrixXd both = map_of(a).transpose() * map_of(b);
   Matrix made(a.columns(), b.columns());

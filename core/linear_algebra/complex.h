@@ -44,6 +44,10 @@ std::vector<std::complex<double>> shift_eigenvalues(const ComplexMatrix& basis);
 // a diagonal of ones. Nothing where A is not positive definite. O(size^3)
 std::optional<Matrix> positive_solution(const Matrix& a, const Matrix& b);
 
+// What is left at the first row and column once all others are eliminated: 0 where the matrix is
+// singular by a motion that the first takes part in. O(size^3)
+std::complex<double> schur_complement_of_first(ComplexMatrix matrix);
+
 // AT B
 Matrix transposed_product(const Matrix& a, const Matrix& b);
 

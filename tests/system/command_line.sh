@@ -69,6 +69,39 @@ expect 2 "ends in .svg" "$program" body blow.flac --picture rings.png
 expect 0 "rings.wav" "$program" render Marimba -s 0 -o rings.wav
 expect 2 "'rings.wav': " "$program" body rings.wav
 
+# Descriptions.
+expect 0 ", the centroid of the spectrum" "$program" describe blow.flac -o timbre.svg
+expect 2 "timbre.svg' is there already" "$program" describe blow.flac -o timbre.svg
+expect 2 "ends in .svg" "$program" describe blow.flac -o timbre.png
+expect 2 "there is no file 'nosuch.wav'" "$program" describe nosuch.wav
+expect 2 "there is no model or preset 'nosuch'" "$program" describe nosuch
+expect 2 "is no sound file that can be read" "$program" describe text.wav
+expect 2 "must be one of hann, hamming, blackman, none" "$program" describe blow.flac --window flat
+expect 2 "must be a whole number, 4 to 65536" "$program" describe blow.flac --frame 2048.5
+expect 2 "at 999999 does not lie within them" "$program" describe blow.flac --at 999999
+expect 2 "is silent at key 127" "$program" describe Celesta --note 127 -s 0.1
+expect 0 '"window":"blackman","spectrum":"power","closed_form":false,"at":512' \
+  "$program" describe blow.flac --json --at 512 --window blackman --spectrum power
+expect 2 "is not linear" "$program" describe "$source/models/BowedString.mdl"
+model bar.mdl '@s string 9 1. 0.1 0.001 0. 0.\n@in1 frcInput [@s 0.3]\n@out1 posOutput [@s 0.7]\n'
+expect 0 '"closed_form":true' "$program" describe bar.mdl --json
+expect 0 "modes, in closed form" "$program" describe bar.mdl
+# Whoever reads it finds one object, with plain numbers at the top.
+if command -v python3 > /dev/null; then
+  "$program" describe blow.flac --json --f0 261.63 > timbre.json
+  python3 - timbre.json << 'END' || failures=$((failures + 1))
+import json, sys
+d = json.load(open(sys.argv[1]))
+plain = ("centroid_hz spread_hz skewness kurtosis slope decrease rolloff95_hz flatness crest flux "
+         "entropy inharmonicity log_attack_time temporal_centroid_s effective_duration_s").split()
+assert all(isinstance(d[key], float) for key in plain), d
+assert "odd_to_even" in d and len(d["tristimulus"]) == 3
+assert len(d["frames"]) == (d["samples"] - 2048) // 512 + 1
+assert all(frame["at"] == 512 * i for i, frame in enumerate(d["frames"]))
+assert d["frames"][0]["flux"] is None and d["frames"][1]["flux"] is not None
+END
+fi
+
 # Texts, with file, line and column.
 model word.mdl '@m mass 1. 0. 0.\n@r sprnig @m @m 0.1 0.1\n'
 expect 2 "word.mdl:2:4: error: unknown keyword 'sprnig'; did you mean 'spring'?" \

@@ -1,3 +1,5 @@
+#include "app/commands/body/recording.h"
+
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
@@ -49,6 +51,24 @@ int complain_of(const std::string& text) {
 
 }  // namespace
 
+Result<Identification> identify_recording(const std::string& path, const IdentifyOptions& options,
+                                          const Progress& progress) {
+  bool was_longer = false;
+  const auto recording = read_recording(path, was_longer);
+  if (!recording) {
+    return recording.error();
+  }
+  auto found = identify(*recording, options, progress);
+  if (!found) {
+    return Error{"'" + path + "': " + found.error().message +
+                 (was_longer ? " in its first " + fixed(longest_read_s, 0) + " s" : "")};
+  }
+  if (was_longer) {
+    found->warnings.push_back("only its first " + fixed(longest_read_s, 0) + " s were read");
+  }
+  return found;
+}
+
 int recording_body(const BodyOptions& options) {
   const std::string read[] = {options.input};
   for (const std::string& written : {options.output, options.picture}) {
@@ -65,19 +85,10 @@ int recording_body(const BodyOptions& options) {
     news.at(stage);
     return true;  // Ctrl-C ends it at once
   });
-  bool was_longer = false;
-  const auto recording = read_recording(options.input, was_longer);
-  if (!recording) {
-    return complain_of(recording.error().message);
-  }
-  auto found = identify(*recording,
-                        {.most_modes = options.most_modes, .floor_db = options.floor_db}, progress);
+  const auto found = identify_recording(
+      options.input, {.most_modes = options.most_modes, .floor_db = options.floor_db}, progress);
   if (!found) {
-    return complain_of("'" + options.input + "': " + found.error().message +
-                       (was_longer ? " in its first " + fixed(longest_read_s, 0) + " s" : ""));
-  }
-  if (was_longer) {
-    found->warnings.push_back("only its first " + fixed(longest_read_s, 0) + " s were read");
+    return complain_of(found.error().message);
   }
   for (const std::string& warning : found->warnings) {
     std::fprintf(stderr, "%s: warning: %s\n", options.input.c_str(), warning.c_str());

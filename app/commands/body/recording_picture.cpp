@@ -3,12 +3,13 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
+#include <complex>
 #include <numbers>
 #include <vector>
 
 #include "app/commands/svg.h"
 #include "app/text.h"
-#include "core/identification/spectrum.h"
+#include "core/linear_algebra/fourier.h"
 
 namespace ressort {
 namespace {
@@ -36,11 +37,13 @@ struct Panel {
 
 // The magnitude of each bin of all channels, the first so many samples, a power of two.
 std::vector<double> magnitudes(const std::vector<std::vector<double>>& channels, std::size_t size) {
+  Fourier fourier(size);
   std::vector<double> power(size / 2);
+  std::vector<double> padded(size);
+  std::vector<std::complex<double>> bins(fourier.bins());
   for (const std::vector<double>& channel : channels) {
-    std::vector<Complex> bins(size);
-    std::copy_n(channel.begin(), std::min(size, channel.size()), bins.begin());
-    transform(bins);
+    std::copy_n(channel.begin(), std::min(size, channel.size()), padded.begin());
+    fourier.forward(padded, bins);
     for (std::size_t k = 0; k < power.size(); ++k) {
       power[k] += std::norm(bins[k]);
     }

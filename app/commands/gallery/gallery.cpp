@@ -126,7 +126,7 @@ Stretch steady_stretch(const Sound& sound) {
 }
 
 // Of the partials from the lowest row on, the loudest between two times.
-std::optional<Partial> loudest_partial(const Sound& sound, Stretch stretch) {
+std::optional<StrongPartial> loudest_partial(const Sound& sound, Stretch stretch) {
   constexpr std::size_t columns = 20;
   const Spectrogram rough = find_spectrogram(sound, stretch, spectrogram_rows, columns);
   std::size_t best = 0;

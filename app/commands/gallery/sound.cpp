@@ -191,12 +191,12 @@ std::optional<double> t60_s(const Sound& sound, Stretch stretch) {
   return falls ? std::optional(-60.0 / slope) : std::nullopt;
 }
 
-std::optional<Partial> partial_near(const Sound& sound, Stretch stretch, double frequency_hz,
+std::optional<StrongPartial> partial_near(const Sound& sound, Stretch stretch, double frequency_hz,
                                     double cents) {
   constexpr double least_dbfs = -100.0;
   const double low = frequency_hz * std::exp2(-cents / 1200.0);
   const double high = std::min(frequency_hz * std::exp2(cents / 1200.0), 0.5 * sound.rate_hz);
-  std::optional<Partial> found;
+  std::optional<StrongPartial> found;
   for (std::size_t c = 0; c < sound.channels.size(); ++c) {
     const auto samples = part_of(sound, c, stretch);
     if (samples.size() < 16) {
@@ -241,7 +241,7 @@ std::optional<Partial> partial_near(const Sound& sound, Stretch stretch, double 
         at_z = spectrum.amplitude(z);
       }
     }
-    const Partial partial{0.5 * (a + b), to_dbfs(spectrum.amplitude(0.5 * (a + b)))};
+    const StrongPartial partial{0.5 * (a + b), to_dbfs(spectrum.amplitude(0.5 * (a + b)))};
     if (partial.dbfs >= least_dbfs && (!found || partial.dbfs > found->dbfs)) {
       found = partial;
     }

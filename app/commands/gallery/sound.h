@@ -53,11 +53,11 @@ std::optional<double> t60_s(const Sound& sound, Stretch stretch);
 // The strongest partial within so many cents of a frequency: where the magnitude of the spectrum of
 // the stretch under a Blackman-Harris window is highest, refined to 1e-7 of itself. From the
 // channel in which it is stronger. Nothing where the highest is at an edge or below -100 dBFS.
-struct Partial {
+struct StrongPartial {
   double frequency_hz = 0.0;
   double dbfs = silence_db;  // of a steady sinusoid
 };
-std::optional<Partial> partial_near(const Sound& sound, Stretch stretch, double frequency_hz,
+std::optional<StrongPartial> partial_near(const Sound& sound, Stretch stretch, double frequency_hz,
                                     double cents);
 
 double cents_between(double from_hz, double to_hz);

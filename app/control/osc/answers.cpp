@@ -37,6 +37,27 @@ void answer_parameters(const Question& question, MakeRow&& make_row) {
   }
 }
 
+// For how many seconds the client hears such news from now on; nothing, and an error, if not.
+std::optional<double> lease(const Question& question, Subscribers::News news,
+                            std::string_view reply) {
+  constexpr double usual_s = 10.0;
+  const auto& arguments = question.message.arguments;
+  const double* const asked = arguments.empty() ? &usual_s : std::get_if<double>(arguments.data());
+  if (asked == nullptr || arguments.size() > 1 ||
+      !(*asked > 0.0 && *asked <= Subscribers::longest_lease_s)) {
+    question.client.error(question.message.address, "expected SECONDS, above 0 and at most " +
+                                                        print_number(Subscribers::longest_lease_s));
+    return std::nullopt;
+  }
+  if (auto added = question.subscribers.add(question.client, news, *asked, monotonic_ns());
+      !added) {
+    question.client.error(question.message.address, added.error().message);
+    return std::nullopt;
+  }
+  question.client.answer(Reply(reply).real(*asked));
+  return *asked;
+}
+
 }  // namespace
 
 void answer::parameters(const Question& question) {
@@ -223,20 +244,13 @@ void answer::tune(const Question& question) {
 }
 
 void answer::subscribe(const Question& question) {
-  constexpr double usual_s = 10.0;
-  const auto& arguments = question.message.arguments;
-  const double* const asked = arguments.empty() ? &usual_s : std::get_if<double>(arguments.data());
-  if (asked == nullptr || arguments.size() > 1 ||
-      !(*asked > 0.0 && *asked <= Subscribers::longest_lease_s)) {
-    question.client.error(question.message.address, "expected SECONDS, above 0 and at most " +
-                                                        print_number(Subscribers::longest_lease_s));
-    return;
+  lease(question, Subscribers::News::changes, "/subscribe.reply");
+}
+
+void answer::timbre(const Question& question) {
+  if (const auto lent_s = lease(question, Subscribers::News::timbre, "/timbre.reply")) {
+    question.session.timbre().listen(std::chrono::duration<double>(*lent_s));
   }
-  if (auto added = question.subscribers.add(question.client, *asked, monotonic_ns()); !added) {
-    question.client.error(question.message.address, added.error().message);
-    return;
-  }
-  question.client.answer(Reply("/subscribe.reply").real(*asked));
 }
 
 void answer::unsubscribe(const Question& question) {

@@ -39,4 +39,7 @@ void tune(const Question& question);
 void subscribe(const Question& question);
 void unsubscribe(const Question& question);
 
+// /timbre.reply f:seconds and, in time, what Subscribers tells
+void timbre(const Question& question);
+
 }  // namespace ressort::answer

@@ -23,10 +23,11 @@ std::vector<Reply> changes(const Session::Present& before, const Session::Presen
 
 }  // namespace
 
-Result<Done> Subscribers::add(const OscClient& client, double lease_s, std::int64_t now_ns) {
+Result<Done> Subscribers::add(const OscClient& client, News news, double lease_s,
+                              std::int64_t now_ns) {
   const auto until_ns = now_ns + static_cast<std::int64_t>(1e9 * lease_s);
   for (Subscriber& subscriber : all_) {
-    if (subscriber.client.is_same(client)) {
+    if (subscriber.news == news && subscriber.client.is_same(client)) {
       subscriber.until_ns = until_ns;
       return Done{};
     }
@@ -35,7 +36,7 @@ Result<Done> Subscribers::add(const OscClient& client, double lease_s, std::int6
   if (all_.size() >= most) {
     return Error{"busy: " + std::to_string(most) + " have subscribed, try again later"};
   }
-  all_.push_back({client, until_ns});
+  all_.push_back({client, news, until_ns});
   return Done{};
 }
 
@@ -45,22 +46,55 @@ bool Subscribers::remove(const OscClient& client) {
          }) > 0;
 }
 
-int Subscribers::tell(const Session& session, std::int64_t now_ns) {
+int Subscribers::tell(Session& session, std::int64_t now_ns) {
   std::erase_if(all_, [&](const Subscriber& subscriber) { return subscriber.until_ns <= now_ns; });
-  if (all_.empty()) {
-    return -1;
+  const auto wants = [&](News news) {
+    return std::any_of(all_.begin(), all_.end(),
+                       [&](const Subscriber& subscriber) { return subscriber.news == news; });
+  };
+  if (wants(News::changes)) {
+    tell_changes(session);
   }
+  if (wants(News::timbre)) {
+    tell_timbre(session.timbre());
+  }
+  return all_.empty() ? -1 : period_ms;
+}
+
+void Subscribers::tell_changes(const Session& session) {
   const Session::Present now = session.present();
   const std::vector<Reply> changed = changes(told_, now);
   for (Subscriber& subscriber : all_) {
-    const std::vector<Reply> rows = subscriber.is_new ? changes({}, now) : changed;
-    if (!rows.empty() && subscriber.client.may_have_rows("/subscribe")) {
-      subscriber.client.answer_rows(rows);
+    if (subscriber.news == News::changes) {
+      const std::vector<Reply> rows = subscriber.is_new ? changes({}, now) : changed;
+      if (!rows.empty() && subscriber.client.may_have_rows("/subscribe")) {
+        subscriber.client.answer_rows(rows);
+      }
+      subscriber.is_new = false;
     }
-    subscriber.is_new = false;
   }
   told_ = now;
-  return period_ms;
+}
+
+void Subscribers::tell_timbre(const TimbreWatch& timbre) {
+  const auto frames = timbre.since(told_frame_);
+  if (frames.empty()) {
+    return;
+  }
+  told_frame_ = frames.back().number;
+  const std::size_t figures = figure_number("inharmonicity");  // those before it are told
+  std::vector<Reply> rows;
+  for (const TimbreWatch::Heard& heard : frames) {
+    Reply& row = rows.emplace_back("/timbre.frame").whole(heard.number);
+    for (std::size_t i = 0; i < figures; ++i) {
+      row.real(timbre_figures()[i].of(heard.timbre).value_or(0.0));
+    }
+  }
+  for (const Subscriber& subscriber : all_) {
+    if (subscriber.news == News::timbre && subscriber.client.may_have_rows("/timbre")) {
+      subscriber.client.answer_rows(rows);
+    }
+  }
 }
 
 }  // namespace ressort

@@ -2,8 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numbers>
 
+#include "core/linear_algebra/complex.h"
 #include "core/linear_algebra/eigen.h"
 
 namespace ressort {
@@ -12,34 +14,81 @@ namespace {
 using Complex = std::complex<double>;
 
 constexpr int most_newton_steps = 20;
+constexpr int most_roundings = 8;
 constexpr double arrived = 1e-12;         // a step, of a logarithm
 constexpr double small_step = 1e-6;       // for a derivative
 constexpr double most_change = 0.5;       // of a logarithm in a step
 constexpr double same_mode = 1e-6;        // two stiffnesses
 constexpr std::size_t most_sought = 320;  // masses of a part
 
-// What is left at the first coordinate of a matrix once all others are eliminated: 0 where the
-// matrix is singular by a motion that this coordinate takes part in.
-Complex first_schur(std::vector<std::vector<Complex>> matrix) {
-  for (std::size_t last = matrix.size(); last-- > 1;) {
-    std::size_t pivot = last;
-    for (std::size_t i = 1; i < last; ++i) {
-      pivot = std::abs(matrix[i][last]) > std::abs(matrix[pivot][last]) ? i : pivot;
+// A motion's logarithm of the factor, and its decay.
+struct Place {
+  double log_factor = 0.0;
+  double decay = 0.0;
+};
+
+// Where the pole's angle is `theta` a sample, by Newton from a place near it.
+std::optional<Place> pole_near(const TunedMotion& motion, double theta, Place at) {
+  for (int i = 0; i < most_newton_steps; ++i) {
+    const Complex here = motion.residual(at.log_factor, at.decay, theta);
+    const Complex by_factor =
+        (motion.residual(at.log_factor + small_step, at.decay, theta) - here) / small_step;
+    const double way = small_step * theta;
+    const Complex by_decay = (motion.residual(at.log_factor, at.decay + way, theta) - here) / way;
+    const double determinant =
+        by_factor.real() * by_decay.imag() - by_factor.imag() * by_decay.real();
+    const double more =
+        -(here.real() * by_decay.imag() - here.imag() * by_decay.real()) / determinant;
+    const double faster =
+        -(by_factor.real() * here.imag() - by_factor.imag() * here.real()) / determinant;
+    if (!std::isfinite(more) || !std::isfinite(faster)) {
+      return std::nullopt;
     }
-    std::swap(matrix[pivot], matrix[last]);
-    for (std::size_t i = 0; i < last; ++i) {
-      const Complex share = matrix[i][last] / matrix[last][last];
-      for (std::size_t j = 0; j < last; ++j) {
-        matrix[i][j] -= share * matrix[last][j];
-      }
+    const double most = std::max(std::fabs(more), std::fabs(faster) / theta);
+    const double share = std::min(1.0, most_change / most);
+    at.log_factor += share * more;
+    at.decay += share * faster;
+    if (most < arrived) {
+      break;
+    }
+    if (i + 1 == most_newton_steps && !(most < 1e-9)) {
+      return std::nullopt;
     }
   }
-  return matrix[0][0];
+  return at;
 }
 
-class Tuner {
+// The factor at which the pole's angle is `theta` a sample; from where it is as if the motion were
+// alone, times `change`. Where whole samples leave no factor that is right, the one that is the
+// least off.
+std::optional<double> factor_at(TunedMotion& motion, double theta, double change) {
+  const double factor = motion.alone_at(theta) * change;
+  Place at{std::log(factor), motion.decay_at(factor)};
+  motion.round_at(at.log_factor);
+  std::optional<double> best;
+  double least = std::numeric_limits<double>::infinity();
+  for (int i = 0; i < most_roundings; ++i) {
+    const std::optional<Place> found = pole_near(motion, theta, at);
+    if (!found) {
+      break;
+    }
+    at = *found;
+    const bool is_new = motion.round_at(at.log_factor);
+    const double off = std::abs(motion.residual(at.log_factor, at.decay, theta));
+    if (off < least) {
+      least = off;
+      best = std::exp(at.log_factor);
+    }
+    if (!is_new) {
+      break;
+    }
+  }
+  return best;
+}
+
+class TunedMode final : public TunedMotion {
  public:
-  Tuner(const LowestShapes& shapes, const Stepping& stepping, double rate_ratio)
+  TunedMode(const LowestShapes& shapes, const Stepping& stepping, double rate_ratio)
       : stepping_(stepping) {
     const std::size_t n = shapes.stiffness.rows();
     springs_ = {shapes.stiffness, shapes.damping, Matrix(n, n), Matrix(n, n)};
@@ -49,42 +98,8 @@ class Tuner {
     fixed_.values *= rate_ratio * rate_ratio;
   }
 
-  // The factor and the decay at which the pole's angle is `theta` a sample; from where they are as
-  // if the mode swung alone, times `change`.
-  std::optional<double> factor_at(double theta, double change) const {
-    double log_factor = std::log(alone_at(theta) * change);
-    double decay = 0.5 * springs_.damping(0, 0);
-    for (int i = 0; i < most_newton_steps; ++i) {
-      const Complex here = residual(log_factor, decay, theta);
-      const Complex by_factor =
-          (residual(log_factor + small_step, decay, theta) - here) / small_step;
-      const double way = small_step * theta;
-      const Complex by_decay = (residual(log_factor, decay + way, theta) - here) / way;
-      const double determinant =
-          by_factor.real() * by_decay.imag() - by_factor.imag() * by_decay.real();
-      const double more =
-          -(here.real() * by_decay.imag() - here.imag() * by_decay.real()) / determinant;
-      const double faster =
-          -(by_factor.real() * here.imag() - by_factor.imag() * here.real()) / determinant;
-      if (!std::isfinite(more) || !std::isfinite(faster)) {
-        return std::nullopt;
-      }
-      const double most = std::max(std::fabs(more), std::fabs(faster) / theta);
-      const double share = std::min(1.0, most_change / most);
-      log_factor += share * more;
-      decay += share * faster;
-      if (most < arrived) {
-        break;
-      }
-      if (i + 1 == most_newton_steps && !(most < 1e-9)) {
-        return std::nullopt;
-      }
-    }
-    return std::exp(log_factor);
-  }
-
-  // The same of a mode that swings alone: exactly for the published scheme and exact modes.
-  double alone_at(double theta) const {
+  // Of a mode that swings alone: exactly for the published scheme and exact modes.
+  double alone_at(double theta) const override {
     const double k = springs_.stiffness(0, 0);
     const double z = springs_.damping(0, 0);
     if (stepping_.scheme == Stepping::Scheme::published) {
@@ -95,10 +110,10 @@ class Tuner {
     }
     return (theta * theta + 0.25 * z * z) / k;
   }
+  double decay_at(double) const override { return 0.5 * springs_.damping(0, 0); }
 
- private:
   // (x - 1)^2 + x K + (x - 1) Z with x = e^(pole step), or pole^2 + K + pole Z.
-  Complex residual(double log_factor, double decay, double theta) const {
+  Complex residual(double log_factor, double decay, double theta) const override {
     const Complex pole(-decay, theta);
     Springs stiffer = springs_;
     stiffer.stiffness.values *= std::exp(log_factor);
@@ -111,16 +126,17 @@ class Tuner {
     const Complex by_stiffness = is_exact ? Complex(1.0) : x;
     const Complex by_damping = is_exact ? x : x - 1.0;
     const std::size_t n = k.rows();
-    std::vector<std::vector<Complex>> matrix(n, std::vector<Complex>(n));
+    ComplexMatrix matrix(n, n);
     for (std::size_t i = 0; i < n; ++i) {
       for (std::size_t j = 0; j < n; ++j) {
-        matrix[i][j] = by_stiffness * k(i, j) + by_damping * z(i, j);
+        matrix(i, j) = by_stiffness * k(i, j) + by_damping * z(i, j);
       }
-      matrix[i][i] += by_mass;
+      matrix(i, i) += by_mass;
     }
-    return first_schur(std::move(matrix)) / (theta * theta);
+    return schur_complement_of_first(std::move(matrix)) / (theta * theta);
   }
 
+ private:
   Springs springs_;
   Matrix fixed_;  // stiffness that no key moves
   Stepping stepping_;
@@ -128,11 +144,9 @@ class Tuner {
 
 }  // namespace
 
-Pitches make_pitches(const LowestShapes& shapes, const Stepping& stepping, double rate_hz,
-                     double rate_ratio) {
-  const Tuner tuner(shapes, stepping, rate_ratio);
+Pitches make_pitches(TunedMotion& motion, double rate_hz) {
   Pitches pitches;
-  double change = 1.0;  // by what swings together, at the semitone above
+  double change = 1.0;  // by what swings along, at the semitone above
   const double nyquist = 0.5 * rate_hz * (1.0 - 1e-9);
   for (double hz = pitches.lowest_hz; hz < nyquist; hz *= std::exp2(1.0 / 12.0)) {
     pitches.factors.push_back(0.0);
@@ -141,12 +155,19 @@ Pitches make_pitches(const LowestShapes& shapes, const Stepping& stepping, doubl
   for (std::size_t i = pitches.factors.size(); i-- > 0;) {
     const double hz = pitches.lowest_hz * std::exp2(static_cast<double>(i) / 12.0);
     const double theta = 2.0 * std::numbers::pi * hz / rate_hz;
-    const double alone = tuner.alone_at(theta);
-    const auto found = tuner.factor_at(theta, change);
+    const double alone = motion.alone_at(theta);
+    auto found = factor_at(motion, theta, change);
+    found = found ? found : factor_at(motion, theta, 1.0);
     pitches.factors[i] = found.value_or(alone * change);
     change = pitches.factors[i] / alone;
   }
   return pitches;
+}
+
+Pitches make_pitches(const LowestShapes& shapes, const Stepping& stepping, double rate_hz,
+                     double rate_ratio) {
+  TunedMode mode(shapes, stepping, rate_ratio);
+  return make_pitches(mode, rate_hz);
 }
 
 Stepping stepping_of_lowest(const Machine& machine, const LowestShapes& shapes) {

@@ -18,58 +18,6 @@ bool is_place(const Program& program, std::uint32_t node) {
   return !program.taps.empty() && node >= program.taps[0].node;
 }
 
-// A spring with its damper, felt by a sum of masses.
-struct Bar {
-  std::vector<std::pair<std::uint32_t, double>> shares;  // node, weight
-  double stiffness = 0.0;
-  double damping = 0.0;
-  bool is_relayed = false;
-};
-
-// Calls use(bar) for every oscillator's own and every link's spring.
-template <class Use>
-void each_bar(const Program& program, const std::vector<double>& value, Use&& use) {
-  for (const MassRun& run : program.mass_runs) {
-    for (std::uint32_t i = run.first; run.is_oscillator && i < run.first + run.count; ++i) {
-      use(Bar{{{i, 1.0}}, value[run.stiffness], value[run.damping], false});
-    }
-  }
-  std::vector<Corners<double>> corners;
-  for (const TapSlot& tap : program.taps) {
-    corners.push_back(corners_at(tap, value[tap.u], value[tap.v]));
-  }
-  for (const LinkRun& run : program.link_runs) {
-    const LawFacts& law = facts_of(run.law);
-    if (!law.contains_spring) {
-      continue;
-    }
-    for (std::uint32_t i = run.first; i < run.first + run.count; ++i) {
-      Bar bar{{},
-              value[run.coefficients[law.slot(Role::stiffness)]],
-              value[run.coefficients[law.slot(Role::damping)]],
-              run.law != Law::spring};
-      const auto hang = [&](std::uint32_t node, double sign) {
-        if (!is_place(program, node)) {
-          if (node < program.moving) {
-            bar.shares.emplace_back(node, sign);
-          }
-          return;
-        }
-        bar.is_relayed = true;
-        const std::size_t tap = node - program.taps[0].node;
-        each_behind(program, program.taps[tap], corners[tap], [&](std::uint32_t at, double weight) {
-          if (at < program.moving && weight != 0.0) {
-            bar.shares.emplace_back(at, sign * weight);
-          }
-        });
-      };
-      hang(program.ends[i].a, 1.0);
-      hang(program.ends[i].b, -1.0);
-      use(bar);
-    }
-  }
-}
-
 std::vector<double> values_of(const Program& program, std::span<const double> parameters,
                               double stiffness_factor, bool is_sampled = false) {
   const auto value = is_sampled ? sampled_value : continuous_value;
@@ -91,25 +39,73 @@ Vector roots_of(const Program& program, const std::vector<double>& value) {
 
 }  // namespace
 
+std::vector<SpringDamper> spring_dampers_of(const Program& program,
+                                            const std::vector<double>& value) {
+  std::vector<SpringDamper> found;
+  for (const MassRun& run : program.mass_runs) {
+    for (std::uint32_t i = run.first; run.is_oscillator && i < run.first + run.count; ++i) {
+      found.push_back({.shares = {{i, 1.0}},
+                       .stiffness = value[run.stiffness],
+                       .damping = value[run.damping],
+                       .is_own = true});
+    }
+  }
+  std::vector<Corners<double>> corners;
+  for (const TapSlot& tap : program.taps) {
+    corners.push_back(corners_at(tap, value[tap.u], value[tap.v]));
+  }
+  for (const LinkRun& run : program.link_runs) {
+    const LawFacts& law = facts_of(run.law);
+    if (!law.contains_spring) {
+      continue;
+    }
+    for (std::uint32_t i = run.first; i < run.first + run.count; ++i) {
+      SpringDamper& one = found.emplace_back(
+          SpringDamper{.stiffness = value[run.coefficients[law.slot(Role::stiffness)]],
+                       .damping = value[run.coefficients[law.slot(Role::damping)]],
+                       .is_relayed = run.law != Law::spring,
+                       .scheme = run.scheme});
+      const auto hang = [&](std::uint32_t node, double sign) {
+        if (!is_place(program, node)) {
+          if (node < program.moving) {
+            one.shares.emplace_back(node, sign);
+          }
+          return;
+        }
+        one.is_relayed = true;
+        const std::size_t tap = node - program.taps[0].node;
+        each_behind(program, program.taps[tap], corners[tap], [&](std::uint32_t at, double weight) {
+          if (at < program.moving && weight != 0.0) {
+            one.shares.emplace_back(at, sign * weight);
+          }
+        });
+      };
+      hang(program.ends[i].a, 1.0);
+      hang(program.ends[i].b, -1.0);
+    }
+  }
+  return found;
+}
+
 Springs springs_of(const Program& program, std::span<const double> parameters,
                    double stiffness_factor, bool is_sampled) {
   const std::size_t n = program.moving;
   Springs springs{Matrix(n, n), Matrix(n, n), Matrix(n, n), Matrix(n, n)};
   const std::vector<double> value = values_of(program, parameters, stiffness_factor, is_sampled);
   const Vector root = roots_of(program, value);
-  each_bar(program, value, [&](const Bar& bar) {
-    for (const auto& [i, a] : bar.shares) {
-      for (const auto& [j, b] : bar.shares) {
+  for (const SpringDamper& one : spring_dampers_of(program, value)) {
+    for (const auto& [i, a] : one.shares) {
+      for (const auto& [j, b] : one.shares) {
         const double share = a * b * root[i] * root[j];
-        springs.stiffness(i, j) += share * bar.stiffness;
-        springs.damping(i, j) += share * bar.damping;
-        if (bar.is_relayed) {
-          springs.relayed_stiffness(i, j) += share * bar.stiffness;
-          springs.relayed_damping(i, j) += share * bar.damping;
+        springs.stiffness(i, j) += share * one.stiffness;
+        springs.damping(i, j) += share * one.damping;
+        if (one.is_relayed) {
+          springs.relayed_stiffness(i, j) += share * one.stiffness;
+          springs.relayed_damping(i, j) += share * one.damping;
         }
       }
     }
-  });
+  }
   springs.is_sound = std::all_of(std::begin(root), std::end(root),
                                  [](double r) { return r > 0.0 && std::isfinite(r); }) &&
                      std::isfinite(springs.stiffness.values.sum()) &&

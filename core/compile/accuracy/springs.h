@@ -11,6 +11,20 @@
 
 namespace ressort {
 
+// A spring with its damper, felt by a sum of masses and of places on waveguides. Its numbers are
+// those of the Program's coefficients.
+struct SpringDamper {
+  std::vector<std::pair<std::uint32_t, double>> shares;  // node that moves, weight
+  double stiffness = 0.0;
+  double damping = 0.0;
+  bool is_own = false;      // of a mass, and no link
+  bool is_relayed = false;  // acts at a place on a macro, or is a part of something bent
+  Scheme scheme = Scheme::plain;
+};
+// `value` as the coefficients are. O(links)
+std::vector<SpringDamper> spring_dampers_of(const Program& program,
+                                            const std::vector<double>& value);
+
 // Of the masses that move, for masses of 1: what each is to x times the root of its mass. Per
 // sample of Program::rate_hz. What is nonlinear is open, but for the spring that it contains.
 struct Springs {

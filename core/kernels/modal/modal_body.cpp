@@ -3,9 +3,9 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
-#include <numeric>
 #include <utility>
 
+#include "core/groups.h"
 #include "core/kernels/taps.h"
 #include "core/laws/laws.h"
 
@@ -27,22 +27,6 @@ void add_share(std::vector<MassShare>& shares, std::uint32_t mass, double weight
 }
 
 constexpr std::uint32_t nowhere = 0xffffffffu;
-
-// Who hangs together, by union-find.
-class Ties {
- public:
-  explicit Ties(std::uint32_t count) : of_(count) { std::iota(of_.begin(), of_.end(), 0u); }
-  std::uint32_t find(std::uint32_t i) {
-    while (of_[i] != i) {
-      i = of_[i] = of_[of_[i]];
-    }
-    return i;
-  }
-  void tie(std::uint32_t a, std::uint32_t b) { of_[find(a)] = find(b); }
-
- private:
-  std::vector<std::uint32_t> of_;
-};
 
 class BodyMaker {
  public:
@@ -303,14 +287,14 @@ std::uint32_t most_tied_masses(const Program& program) {
   if (program.modes.empty()) {
     return program.moving;
   }
-  Ties ties(program.moving);
+  Groups tied(program.moving);
   for (const LinkRun& run : program.link_runs) {
     for (std::uint32_t i = run.first; run.law == Law::spring && i < run.first + run.count; ++i) {
       std::uint32_t first = nowhere;
       const auto tie = [&](std::uint32_t node) {
         if (node < program.moving) {
           first = first == nowhere ? node : first;
-          ties.tie(node, first);
+          tied.join(node, first);
         }
       };
       for (const std::uint32_t end : {program.ends[i].a, program.ends[i].b}) {
@@ -326,25 +310,25 @@ std::uint32_t most_tied_masses(const Program& program) {
   std::vector<std::uint32_t> count(program.moving);
   std::uint32_t most = 0;
   for (std::uint32_t i = 0; i < program.moving; ++i) {
-    most = std::max(most, ++count[ties.find(i)]);
+    most = std::max(most, ++count[tied.find(i)]);
   }
   return most;
 }
 
 std::vector<std::vector<std::uint32_t>> tied_together(const LinearBody& body) {
-  Ties ties(body.count);
+  Groups tied(body.count);
   for (const auto* frames : {&body.stiffness, &body.damping}) {
     for (const Frame& frame : *frames) {
       for (const Bar& bar : frame.bars) {
         for (const MassShare& share : bar.shares) {
-          ties.tie(share.mass, bar.shares[0].mass);
+          tied.join(share.mass, bar.shares[0].mass);
         }
       }
     }
   }
   std::map<std::uint32_t, std::vector<std::uint32_t>> groups;
   for (std::uint32_t mass = 0; mass < body.count; ++mass) {
-    groups[ties.find(mass)].push_back(mass);
+    groups[tied.find(mass)].push_back(mass);
   }
   std::vector<std::vector<std::uint32_t>> parts;
   for (auto& [root, masses] : groups) {

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <complex>
 #include <numbers>
+#include <utility>
 
 namespace ressort {
 namespace {
@@ -151,6 +152,36 @@ WaveguideDesign design_waveguide(const WaveguideNumbers& numbers, std::uint32_t 
   const Loop loop{design.gain, std::polar(std::exp(decay), -theta), double(design.samples)};
   pole > 0.0 ? refine(loop, design) : refine_flat(loop, design);
   return design;
+}
+
+void find_places(const WaveguideDesign& design, const FiltersAt& filters, std::span<const double> u,
+                 std::span<std::uint32_t> order, std::span<std::uint32_t> delays) {
+  const double least_u = 1.0 / design.period;  // half a sample from an end
+  // Of all that goes round, from the filters on.
+  const auto share = [&](std::uint32_t i) {
+    const double right_end = 0.5 * (1.0 - within(u[i / 2], least_u, 1.0 - least_u));
+    const double at = (i % 2 == 0 ? right_end : 1.0 - right_end) - filters.share;
+    return at > 0.0 ? at : at + 1.0;
+  };
+  const auto count = static_cast<std::uint32_t>(2 * u.size());
+  for (std::uint32_t i = 0; i < count; ++i) {
+    order[i] = i;
+    for (std::uint32_t k = i; k > 0 && share(order[k]) < share(order[k - 1]); --k) {
+      std::swap(order[k], order[k - 1]);
+    }
+  }
+  const long held = std::lround(filters.to_held * design.period);
+  std::uint32_t least = 1;
+  for (std::uint32_t k = 0; k < count; ++k) {
+    const long nearest = held + std::lround((share(order[k]) - filters.to_held) * design.period);
+    delays[order[k]] = std::max(static_cast<std::uint32_t>(std::max(nearest, 0l)), least);
+    least = delays[order[k]] + 1;
+  }
+  std::uint32_t most = design.samples;
+  for (std::uint32_t k = count; k-- > 0;) {
+    delays[order[k]] = std::min(delays[order[k]], most);
+    most = delays[order[k]] - 1;
+  }
 }
 
 }  // namespace ressort

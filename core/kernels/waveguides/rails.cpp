@@ -4,7 +4,7 @@
 #include <bit>
 #include <cmath>
 #include <limits>
-#include <numeric>
+#include <span>
 
 namespace ressort {
 namespace {
@@ -48,8 +48,9 @@ Rails<T>::Rails(const Program& program, std::size_t width_in) : width(width_in),
   }
   unforced.resize(places);
   designed_.resize(numbers_of_guide * rows + places);
-  order_.resize(most_places);
-  at_.resize(most_places);
+  u_.resize(most_places);
+  order_.resize(2 * most_places);
+  delays_.resize(2 * most_places);
   for (std::size_t lane = 0; lane < width; ++lane) {
     clear(lane);
   }
@@ -117,31 +118,14 @@ void Rails<T>::design(Guide& guide, std::size_t lane, const T* coefficients) {
   next_allpass[at] = static_cast<T>(found.allpass);
   next_pole[at] = static_cast<T>(found.pole);
   next_gain[at] = static_cast<T>(found.gain);
-  // Places go to the nearest sample that is theirs alone.
-  const std::uint32_t middle = found.samples / 2;  // the left end
-  std::iota(order_.begin(), order_.begin() + slot.count, 0u);
   for (std::uint32_t i = 0; i < slot.count; ++i) {
-    const double u = number(numbers_of_guide * rows + guide.place_row + i * width,
-                            program_.junctions[slot.first + i].u);
-    const double samples = (u > 0.0 ? std::min(u, 1.0) : 0.0) * 0.5 * found.period;
-    at_[i] = static_cast<std::uint32_t>(std::lround(samples));
-    for (std::uint32_t k = i; k > 0 && at_[order_[k]] < at_[order_[k - 1]]; --k) {
-      std::swap(order_[k], order_[k - 1]);
-    }
+    u_[i] = number(numbers_of_guide * rows + guide.place_row + i * width,
+                   program_.junctions[slot.first + i].u);
   }
-  std::uint32_t least = 1;
-  for (std::uint32_t k = 0; k < slot.count; ++k) {
-    at_[order_[k]] = std::max(at_[order_[k]], least);
-    least = at_[order_[k]] + 1;
-  }
-  std::uint32_t most = middle - 1;
-  for (std::uint32_t k = slot.count; k-- > 0;) {
-    at_[order_[k]] = std::min(at_[order_[k]], most);
-    most = at_[order_[k]] - 1;
-  }
+  find_places(found, slot.filters_at, std::span(u_).first(slot.count), order_, delays_);
   for (std::uint32_t i = 0; i < slot.count; ++i) {
-    next_right[guide.place_row + i * width + lane] = middle + at_[i];
-    next_left[guide.place_row + i * width + lane] = middle - at_[i];
+    next_left[guide.place_row + i * width + lane] = delays_[2 * i];
+    next_right[guide.place_row + i * width + lane] = delays_[2 * i + 1];
   }
 }
 

@@ -1,9 +1,11 @@
 // core/kernels: the waves on a Program's waveguides. Both of a waveguide's rails are one ring of
 // velocities, since an end that is held or free gives back what comes, with a sign that the ring
-// leaves out: from where the lossy end writes, past its left end, to where that end reads.
+// leaves out. Once on its way round, a wave passes the allpass and the loss: anywhere, as far as
+// the tone goes; so they are where nothing holds on to the string (core/compile/machine.cpp), and
+// its sounding length is exact there, not just to a sample.
 //
-// A place p samples from the left end sees the wave that runs right, r, and that which runs left,
-// l. With a force f on it, 1/R being the inverse of the impedance,
+// A place sees the wave that runs right, r, and that which runs left, l. With a force f on it, 1/R
+// being the inverse of the impedance,
 //
 //   v = r + l + f/2R,  r and l grow by f/2R,  x[n+1] = x[n-1] + 2 v
 //
@@ -59,7 +61,7 @@ class Rails {
   std::uint32_t now = 0;  // where all rings are written, before the mask
   std::vector<Guide> guides;
   Aligned<T> ring;  // [guide][slot][lane]
-  // [guide][lane]: delays in samples, and the lossy end's filters.
+  // [guide][lane]: the samples in the ring, and the filters.
   std::vector<std::uint32_t> end, next_end;
   Aligned<T> allpass, pole, gain, next_allpass, next_pole, next_gain;
   Aligned<T> allpass_state, pole_state;
@@ -73,9 +75,9 @@ class Rails {
   void settle(Guide& guide, std::size_t lane);
 
   const Program& program_;
-  std::vector<T> designed_;           // [guide: frequency, T60, brightness; then places][lane]
-  std::vector<std::uint32_t> order_;  // of a guide's places by their coordinates
-  std::vector<std::uint32_t> at_;     // samples from the left end
+  std::vector<T> designed_;  // [guide: frequency, T60, brightness; then places][lane]
+  std::vector<double> u_;    // of a guide's places
+  std::vector<std::uint32_t> order_, delays_;  // [place, 2] of them
 };
 
 // The same in packs, for the loops. `s` is a view of the nodes: V* v, force, coefficient, and
@@ -153,7 +155,7 @@ struct RailLoops {
   }
 
  private:
-  // What comes to the lossy end and what goes on from there.
+  // What comes to the filters and what goes on from there.
   static void reflect(Rails<T>& rails, Guide& guide) {
     const std::size_t row = guide.row;
     V wave = read(rails, guide, &rails.end[row]);

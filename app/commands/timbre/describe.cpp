@@ -1,0 +1,217 @@
+#include "app/commands/timbre/describe.h"
+
+#include <stdlib.h>
+
+#include <algorithm>
+#include <cstdio>
+#include <filesystem>
+
+#include "app/commands/body/recording.h"
+#include "app/commands/offline.h"
+#include "app/commands/progress_bar.h"
+#include "app/commands/timbre/describe_text.h"
+#include "app/exit_code.h"
+#include "app/session/files.h"
+#include "app/session/load_news.h"
+#include "app/session/loader.h"
+#include "app/session/modes/known_modes.h"
+#include "app/session/sound_file.h"
+#include "app/text.h"
+#include "core/analysis/modes/modes.h"
+#include "core/model/topology.h"
+
+namespace ressort {
+namespace {
+
+namespace fs = std::filesystem;
+
+bool names_sound(const std::string& name) {
+  std::string ending = fs::path(name).extension().string();
+  std::transform(ending.begin(), ending.end(), ending.begin(),
+                 [](char c) { return c >= 'A' && c <= 'Z' ? static_cast<char>(c + 32) : c; });
+  return std::find(sound_endings().begin(), sound_endings().end(), ending) != sound_endings().end();
+}
+
+// A folder for a sound that is wanted for a moment; it goes with what is in it.
+class TemporaryFolder {
+ public:
+  static Result<TemporaryFolder> make() {
+    std::error_code error;
+    std::string path = (fs::temp_directory_path(error) / "ressort-XXXXXX").string();
+    if (error || mkdtemp(path.data()) == nullptr) {
+      return Error{"no folder can be made in '" + fs::path(path).parent_path().string() +
+                   "' for what is rendered"};
+    }
+    return TemporaryFolder(std::move(path));
+  }
+  TemporaryFolder(TemporaryFolder&& other) noexcept : path_(std::exchange(other.path_, {})) {}
+  TemporaryFolder& operator=(TemporaryFolder&&) = delete;
+  ~TemporaryFolder() {
+    std::error_code error;
+    if (!path_.empty()) {
+      fs::remove_all(path_, error);
+    }
+  }
+  std::string file(const std::string& name) const { return path_ + "/" + name; }
+
+ private:
+  explicit TemporaryFolder(std::string path) : path_(std::move(path)) {}
+  std::string path_;
+};
+
+// What was told of a file that nobody knows, of what is in it.
+std::string renamed(std::string message, const std::string& path, const std::string& name) {
+  const std::size_t at = message.find(path);
+  return at == message.npos ? message : message.replace(at, path.size(), name);
+}
+
+// Of a sound file, with its modes if they are wanted. That nothing rings in it is only told.
+Result<Description> describe_file(const std::string& path, const DescribeOptions& options,
+                                  const DescriptionProgress& progress) {
+  auto description = describe_sound(path, options.how, progress);
+  if (!description || options.modes == 0) {
+    return description;
+  }
+  const Progress goes_on([&](std::string_view) { return progress(1.0); });
+  const auto found = identify_recording(path, {.most_modes = options.modes}, goes_on);
+  if (!found) {
+    const std::string why = renamed(found.error().message, path, options.name);
+    std::fprintf(stderr, "%s: no modes\n", why.c_str());
+    return description;
+  }
+  for (const IdentifiedMode& mode : found->modes) {
+    description->modes.push_back({mode.frequency_hz.value, mode.t60_s.value});
+  }
+  return description;
+}
+
+Result<Description> describe_note(const DescribeOptions& options, const Progress& loading,
+                                  const DescriptionProgress& progress) {
+  const auto folder = TemporaryFolder::make();
+  if (!folder) {
+    return folder.error();
+  }
+  const std::string path = folder->file("note.wav");
+  auto rendered =
+      render({.name = options.name,
+              .output = path,
+              .rate_hz = options.rate_hz,
+              .seconds = options.seconds,
+              .phrase = to_score({{0.0, 2.0 / 3.0 * options.seconds, options.key, 100}}),
+              .format = SampleFormat::float64,
+              .third = options.third,
+              .loading = loading},
+             [&](double share) { return progress(0.5 * share); });
+  if (!rendered) {
+    return rendered.error();
+  }
+  if (rendered->failure) {
+    return *rendered->failure;
+  }
+  if (rendered->was_interrupted) {
+    return Error{description_stopped};
+  }
+  for (const std::string& warning : rendered->warnings) {
+    std::fprintf(stderr, "%s\n", warning.c_str());
+  }
+  if (rendered->peak == 0.0) {
+    return Error{rendered->name + " is silent at key " + std::to_string(options.key) +
+                 "; try another --note"};
+  }
+  auto description =
+      describe_file(path, options, [&](double share) { return progress(0.5 + 0.5 * share); });
+  const std::string note = rendered->name + ", key " + std::to_string(options.key) + ", rendered";
+  if (!description) {
+    return Error{renamed(description.error().message, path, note)};
+  }
+  description->of = note;
+  return description;
+}
+
+Result<Description> describe_model(const DescribeOptions& options,
+                                   const DescriptionProgress& progress) {
+  LoadNews news(options.name,
+                [](const std::string& text) { std::fprintf(stderr, "%s\n", text.c_str()); });
+  const Progress loading([&](std::string_view stage) {
+    news.at(stage);
+    return progress(0.0);
+  });
+  auto scene =
+      load_scene(options.name, {.bare = true, .third = options.third, .progress = loading});
+  if (!scene) {
+    return scene.error();
+  }
+  if (scene->has_preset) {
+    return describe_note(options, loading, progress);
+  }
+  for (const std::string& warning : scene->warnings) {
+    std::fprintf(stderr, "%s\n", warning.c_str());
+  }
+  const auto at_model = [&](const Error& error) {
+    return Error{to_string(finding_of(scene->model_path, "", error))};
+  };
+  const auto modes = find_modes(scene->network, start_values(*scene),
+                                {.rate_hz = options.rate_hz, .progress = loading});
+  if (!modes) {
+    return modes.error().message == stopped ? Error{description_stopped} : at_model(modes.error());
+  }
+  if (!modes->is_linear() || has_waveguide(scene->network)) {
+    return Error{"'" + options.name +
+                 "' is not linear, so how it sounds depends on how it is played: render it with a "
+                 "score, and describe that file"};
+  }
+  auto description = describe_modes(*modes, options.how);
+  if (!description) {
+    return at_model(description.error());
+  }
+  description->of = scene->name + ", from in1 to out1 by its " +
+                    counted(modes->modes.size(), "mode", "modes") + ", in closed form";
+  return description;
+}
+
+}  // namespace
+
+int describe(const DescribeOptions& options, const std::function<bool()>& goes_on) {
+  const auto refuse = [](const std::string& message) {
+    std::fprintf(stderr, "%s\n", message.c_str());
+    return exit_code::wrong_use;
+  };
+  if (!options.picture.empty() && !options.picture.ends_with(".svg")) {
+    return refuse("-o: expected a file that ends in .svg, found '" + options.picture + "'");
+  }
+  const std::string read[] = {options.name};
+  if (auto spared = spare(options.picture, read); !spared) {
+    return refuse(spared.error().message);
+  }
+  Result<Description> description = Error{};
+  {
+    ProgressBar bar(true);
+    const auto progress = [&](double share) {
+      bar.show(share, options.name);
+      return goes_on();
+    };
+    description = names_sound(options.name) ? describe_file(options.name, options, progress)
+                                            : describe_model(options, progress);
+  }
+  if (!goes_on()) {
+    std::fprintf(stderr, "%s: interrupted\n", options.name.c_str());
+    return exit_code::our_failure;
+  }
+  if (!description) {
+    return refuse(description.error().message);
+  }
+  if (!options.picture.empty()) {
+    const std::string picture = description_svg(*description, options.how);
+    if (const int code = put_text(options.picture, picture, options.force)) {
+      return code;
+    }
+  }
+  if (options.as_json) {
+    print_json(*description, options.how);
+  } else {
+    std::printf("%s\n", to_text(*description, options.how).c_str());
+  }
+  return exit_code::done;
+}
+
+}  // namespace ressort

@@ -1,0 +1,35 @@
+// core/analysis/timbre: the windows of a frame: periodic sums of cosines. Pure. [any thread]
+#pragma once
+
+#include <array>
+#include <complex>
+#include <cstddef>
+#include <vector>
+
+namespace ressort {
+
+enum class Window { hann, hamming, blackman, none };
+
+// w[m] = sum of a_j cos(2 pi j m / size): a_0, a_1, a_2.
+constexpr std::array<double, 3> window_cosines(Window window) {
+  switch (window) {
+    case Window::hann:
+      return {0.5, -0.5, 0.0};
+    case Window::hamming:
+      return {0.54, -0.46, 0.0};
+    case Window::blackman:
+      return {0.42, -0.5, 0.08};
+    case Window::none:
+      break;
+  }
+  return {1.0, 0.0, 0.0};
+}
+
+// w[m] for m < size: periodic, so that w[size] would be w[0] again.
+std::vector<double> window_weights(Window window, std::size_t size);
+
+// The sum of w[m] e^(log_z m) over the sum of w[m], in closed form: what a window leaves of a
+// motion that turns and decays so from sample to sample, its first sample being 1. O(1)
+std::complex<double> window_response(Window window, std::size_t size, std::complex<double> log_z);
+
+}  // namespace ressort

@@ -1,0 +1,247 @@
+#include "core/compile/accuracy/loaded_waveguide.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <utility>
+#include <vector>
+
+#include "core/compile/accuracy/springs.h"
+#include "core/kernels/waveguides/rails.h"
+#include "core/linear_algebra/complex.h"
+
+namespace ressort {
+namespace {
+
+using Complex = std::complex<double>;
+
+// By what holds it, a logarithm of the factor: what is further off, at ln 4, is the second partial.
+constexpr double most_detuning = 1.1;
+
+// [place, 2] in samples from the filters, to the left and to the right.
+using Delays = std::vector<std::uint32_t>;
+
+// A waveguide at one pole.
+struct Loop {
+  Complex after(std::uint32_t from, std::uint32_t to) const {
+    return std::pow(back, static_cast<int>(to) - static_cast<int>(from));
+  }
+  // What is left of a wave after one period.
+  Complex round() const { return filters * after(0, samples); }
+  // [place] what it hears of a wave of 1 that the filters send, and what they send of its own.
+  Complex heard(std::size_t place) const {
+    return after(0, right(place)) + sign * after(0, left(place));
+  }
+  Complex sent(std::size_t place) const {
+    return filters * (after(right(place), samples) + sign * after(left(place), samples));
+  }
+  // What a wave of 1 that starts at one place is at another, before it comes to the filters.
+  Complex between(std::size_t from, std::size_t to) const {
+    Complex sum = 0.0;
+    for (const auto& [start, way] : {std::pair(right(from), 1.0), std::pair(left(from), sign)}) {
+      for (const auto& [end, other] : {std::pair(right(to), 1.0), std::pair(left(to), sign)}) {
+        sum += end > start ? way * other * after(start, end) : 0.0;
+      }
+    }
+    return sum;
+  }
+  std::uint32_t left(std::size_t place) const { return (*delays)[2 * place]; }
+  std::uint32_t right(std::size_t place) const { return (*delays)[2 * place + 1]; }
+
+  double inverse_impedance = 0.0;
+  double sign = 1.0;  // of what runs to the left
+  Complex back;       // 1/z
+  Complex filters;
+  std::uint32_t samples = 0;
+  const Delays* delays = nullptr;
+};
+
+class LoadedWaveguide final : public TunedMotion {
+ public:
+  LoadedWaveguide(const Program& program, std::span<const double> parameters, std::size_t tuned)
+      : program_(program), parameters_(parameters), tuned_(tuned) {
+    const std::vector<double> value = values_at(1.0);
+    own_hz_ = value[program.waveguides[tuned].frequency];
+  }
+
+  bool round_at(double log_factor) override;
+  Complex residual(double log_factor, double decay, double theta) const override;
+  double alone_at(double theta) const override {
+    const double hz = theta * program_.rate_hz / (2.0 * std::numbers::pi);
+    return (hz / own_hz_) * (hz / own_hz_);
+  }
+  double decay_at(double factor) const override {
+    const double t60_s = values_at(factor)[program_.waveguides[tuned_].t60];
+    return 3.0 * std::numbers::ln10 / (t60_s * program_.rate_hz);
+  }
+
+ private:
+  std::vector<double> values_at(double factor) const {
+    std::vector<double> values;
+    for (const Coefficient& coefficient : program_.coefficients) {
+      values.push_back(coefficient_value(program_, coefficient, parameters_, factor));
+    }
+    return values;
+  }
+  WaveguideDesign design_of(const WaveguideSlot& slot, const std::vector<double>& value) const {
+    return design_waveguide({.frequency_hz = value[slot.frequency],
+                             .t60_s = value[slot.t60],
+                             .brightness = value[slot.brightness]},
+                            least_waveguide_samples(slot.count), waveguide_slots(program_) - 1,
+                            program_.rate_hz);
+  }
+  Loop loop_of(std::size_t guide, const std::vector<double>& value, Complex z) const;
+
+  const Program& program_;
+  std::span<const double> parameters_;
+  std::size_t tuned_;
+  double own_hz_;
+  std::vector<Delays> delays_;  // [waveguide]
+};
+
+bool LoadedWaveguide::round_at(double log_factor) {
+  const std::vector<double> value = values_at(std::exp(log_factor));
+  std::vector<Delays> rounded;
+  for (const WaveguideSlot& slot : program_.waveguides) {
+    std::vector<double> u;
+    for (std::uint32_t i = 0; i < slot.count; ++i) {
+      u.push_back(value[program_.junctions[slot.first + i].u]);
+    }
+    Delays order(2 * slot.count);
+    rounded.emplace_back(2 * slot.count);
+    find_places(design_of(slot, value), slot.filters_at, u, order, rounded.back());
+  }
+  return std::exchange(delays_, rounded) != rounded;
+}
+
+Loop LoadedWaveguide::loop_of(std::size_t guide, const std::vector<double>& value,
+                              Complex z) const {
+  const WaveguideSlot& slot = program_.waveguides[guide];
+  const WaveguideDesign design = design_of(slot, value);
+  const Complex back = 1.0 / z;
+  return {.inverse_impedance = value[slot.inverse_impedance],
+          .sign = slot.is_open ? 1.0 : -1.0,
+          .back = back,
+          .filters = design.gain * (1.0 - design.pole) / (1.0 - design.pole * back) *
+                     (design.allpass + back) / (1.0 + design.allpass * back),
+          .samples = design.samples,
+          .delays = &delays_[guide]};
+}
+
+Complex LoadedWaveguide::residual(double log_factor, double decay, double theta) const {
+  if (std::fabs(log_factor - std::log(alone_at(theta))) > most_detuning) {
+    return std::nan("");
+  }
+  const std::vector<double> value = values_at(std::exp(log_factor));
+  const Complex z = std::exp(Complex(-decay, theta));
+  const Complex back = 1.0 / z;
+  const Complex both = z - back;  // from a sample before to one after
+  // How far every mass goes for a force of 1; places follow.
+  std::vector<Complex> gives(program_.moving);
+  for (const MassRun& run : program_.mass_runs) {
+    if (run.is_junction) {
+      continue;
+    }
+    const Complex own =
+        run.is_oscillator ? value[run.stiffness] + value[run.damping] * (1.0 - back) : Complex(0.0);
+    const Complex held = (z - 2.0 + back) + value[run.inverse_mass] * own;
+    std::fill_n(gives.begin() + run.first, run.count, value[run.inverse_mass] / held);
+  }
+  std::vector<Loop> loops;
+  struct Place {
+    std::size_t loop = 0;
+    std::size_t number = 0;
+    bool is_one = false;
+  };
+  std::vector<Place> places(program_.moving);
+  for (const WaveguideSlot& slot : program_.waveguides) {
+    for (std::uint32_t i = 0; i < slot.count; ++i) {
+      places[program_.junctions[slot.first + i].node] = {loops.size(), i, true};
+    }
+    loops.push_back(loop_of(loops.size(), value, z));
+  }
+  // How far node i goes for a force of 1 on node k.
+  const auto way = [&](std::uint32_t i, std::uint32_t k) {
+    const Place& a = places[i];
+    const Place& b = places[k];
+    if (!a.is_one || !b.is_one) {
+      return i == k ? gives[i] : Complex(0.0);
+    }
+    if (a.loop != b.loop) {
+      return Complex(0.0);
+    }
+    const Loop& loop = loops[a.loop];
+    const Complex sum = (i == k ? 1.0 : 0.0) + loop.between(b.number, a.number);
+    return loop.inverse_impedance * sum / both;
+  };
+  std::vector<SpringDamper> springs = spring_dampers_of(program_, value);
+  std::erase_if(springs,
+                [](const SpringDamper& spring) { return spring.is_own || spring.shares.empty(); });
+  const std::size_t guides = loops.size();
+  ComplexMatrix rows(guides + springs.size(), guides + springs.size());
+  // The tuned loop is the first.
+  const auto row_of = [&](std::size_t loop) {
+    return loop == tuned_ ? 0 : (loop < tuned_ ? loop + 1 : loop);
+  };
+  for (std::size_t g = 0; g < guides; ++g) {
+    rows(row_of(g), row_of(g)) = 1.0 - loops[g].round();
+  }
+  for (std::size_t i = 0; i < springs.size(); ++i) {
+    const SpringDamper& spring = springs[i];
+    const Complex pull = spring.scheme == Scheme::plain
+                             ? spring.stiffness + spring.damping * (1.0 - back)
+                             : 0.5 * (spring.stiffness * (z + back) + spring.damping * both);
+    const std::size_t row = guides + i;
+    rows(row, row) = 1.0;
+    for (std::size_t k = 0; k < springs.size(); ++k) {
+      Complex sum = 0.0;
+      for (const auto& [a, share] : spring.shares) {
+        for (const auto& [b, other] : springs[k].shares) {
+          sum += share * other * way(a, b);
+        }
+      }
+      rows(row, guides + k) += pull * sum;
+    }
+    for (const auto& [node, share] : spring.shares) {
+      if (places[node].is_one) {
+        const Loop& loop = loops[places[node].loop];
+        const std::size_t column = row_of(places[node].loop);
+        const std::size_t number = places[node].number;
+        rows(row, column) -= pull * share * 2.0 * loop.heard(number) / both;
+        rows(column, row) += 0.5 * loop.inverse_impedance * share * loop.sent(number);
+      }
+    }
+  }
+  return schur_complement_of_first(std::move(rows));
+}
+
+}  // namespace
+
+std::optional<Pitches> loaded_waveguide_pitches(const Machine& machine,
+                                                std::span<const double> parameters) {
+  const Program* part = nullptr;
+  std::size_t tuned = 0;
+  double lowest_hz = 0.0;
+  for (const Program& program : machine.parts) {
+    for (std::size_t i = 0; i < program.waveguides.size(); ++i) {
+      const Coefficient& frequency = program.coefficients[program.waveguides[i].frequency];
+      const double hz = coefficient_value(program, frequency, parameters, 1.0);
+      if (!frequency.is_fixed && (part == nullptr || hz < lowest_hz)) {
+        part = &program;
+        tuned = i;
+        lowest_hz = hz;
+      }
+    }
+  }
+  std::size_t springs = 0;
+  for (const LinkRun& run : part == nullptr ? std::vector<LinkRun>() : part->link_runs) {
+    springs += facts_of(run.law).contains_spring ? run.count : 0;
+  }
+  if (part == nullptr || springs > most_loading_springs) {
+    return std::nullopt;
+  }
+  LoadedWaveguide waveguide(*part, parameters, tuned);
+  return make_pitches(waveguide, part->rate_hz);
+}
+
+}  // namespace ressort
