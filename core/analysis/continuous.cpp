@@ -112,10 +112,10 @@ class Body {
     return {x, v};
   }
 
-  // What a mass's position is, as a sum over rows and a constant.
-  Bar reading(std::uint32_t mass) const {
+  // What an output says, as a sum over rows and a constant.
+  Bar reading(const Output& output) const {
     Bar bar;
-    hang(bar, mass, 1.0);
+    hang(bar, output.mass, level_value(network_, output, parameters_));
     return bar;
   }
 
@@ -156,7 +156,7 @@ class Solver {
  public:
   Solver(const Network& network, const Body& body) : body_(body) {
     for (const Output& output : network.outputs) {
-      reading_.push_back(body.reading(output.mass));
+      reading_.push_back(body.reading(output));
       made_.outputs.push_back({.rest = -reading_.back().offset});
     }
     std::tie(x_, v_) = body.start();

@@ -43,10 +43,9 @@ class ProgramMaker {
     place_taps();
     place_junctions();
     place_filters();
-    for (const Output& output : network_.outputs) {
-      if (node_[output.mass] != nowhere) {
-        program_.outputs.push_back(
-            {static_cast<std::uint32_t>(output.number - 1), node_[output.mass], output.is_force});
+    for (std::uint32_t i = 0; i < network_.outputs.size(); ++i) {
+      if (node_[network_.outputs[i].mass] != nowhere) {
+        add_output(i);
       }
     }
     for (std::uint32_t i = 0; i < network_.parameters.size(); ++i) {
@@ -82,6 +81,21 @@ class ProgramMaker {
     program_.steps.insert(program_.steps.end(), formula.begin(), formula.end());
     depend(next, formula);
     return next;
+  }
+
+  void add_output(std::uint32_t index) {
+    const Output& output = network_.outputs[index];
+    OutputSlot slot{.channel = static_cast<std::uint32_t>(output.number - 1),
+                    .node = node_[output.mass],
+                    .is_force = output.is_force,
+                    .origin = index};
+    if (output.level != no_argument) {
+      const Formula& formula = formula_of(output.level);
+      slot.level.first = static_cast<std::uint32_t>(program_.steps.size());
+      slot.level.count = static_cast<std::uint32_t>(formula.size());
+      program_.steps.insert(program_.steps.end(), formula.begin(), formula.end());
+    }
+    program_.outputs.push_back(slot);
   }
 
   const Formula& formula_of(ArgumentId argument) const {

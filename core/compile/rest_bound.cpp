@@ -50,12 +50,12 @@ std::vector<std::optional<RestBound>> make_rest_bounds(const Network& network,
     RestBound bound{.compliances = {}, .reaches = {}, .box = limits};
     bool is_known = true;
     for (const OutputSlot& slot : program.outputs) {
-      const auto output = std::find_if(
-          network.outputs.begin(), network.outputs.end(), [&](const Output& candidate) {
-            return candidate.number == static_cast<int>(slot.channel) + 1;
-          });
-      const double compliance = given[output->mass];
-      is_known = is_known && !slot.is_force && std::isfinite(compliance);
+      const Output& output = network.outputs[slot.origin];
+      const double level = level_value(network, output, machine.parameters);
+      const double compliance = given[output.mass] * level * level;
+      const bool is_level_fixed =
+          output.level == no_argument || is_constant(network.arguments[output.level]);
+      is_known = is_known && is_level_fixed && !slot.is_force && std::isfinite(compliance);
       bound.compliances.push_back(compliance);
     }
     for (std::uint32_t i = 0; i < program.origins.size(); ++i) {

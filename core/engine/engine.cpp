@@ -12,6 +12,7 @@
 #include "core/engine/gestures.h"
 #include "core/engine/mixing/audio_inputs.h"
 #include "core/engine/mixing/mixing.h"
+#include "core/engine/mixing/output_levels.h"
 #include "core/engine/parameters.h"
 #include "core/engine/takeover.h"
 #include "core/engine/voices.h"
@@ -45,6 +46,7 @@ struct Engine::Player {
         gestures(machine, playing, voices, parameters),
         audio(machine, playing, std::visit([](const auto& b) { return b.mixer.is_silent; }, bank)),
         watch(machine, playing, voices.size()),
+        levels(machine, playing),
         mixing(playing) {
     voices.start(0, 0.0);
     gestures.place(0);
@@ -250,9 +252,11 @@ struct Engine::Player {
                    .velocity = b.velocity.data(),
                    .audio = b.audio.data(),
                    .outputs = b.outputs.data()});
+        levels.apply(b, group, segment.frames);
         mixing.add(b, group, segment, voices, watch);
       }
     });
+    levels.advance(segment.frames);
     voices.advance_gains(segment.frames);
     since_update += segment.frames;
     if (since_update == max_block_frames) {
@@ -267,6 +271,9 @@ struct Engine::Player {
     if (voices.has_changed() || parameters.has_changed()) {
       voices.retune(parameters.has_changed_highest_factor(), parameters.highest_factor());
       gestures.follow_pitches();
+      if (parameters.has_changed()) {
+        levels.follow(machine, parameters.values(), !voices.is_any_under_way());
+      }
       parameters.apply(b, voices, watch);
       voices.forget_changes();
     }
@@ -393,6 +400,7 @@ struct Engine::Player {
       gestures.go_on_from(from.gestures);
       audio.go_on_from(from.audio);
       watch.go_on_from(from.watch);
+      levels.go_on_from(from.levels);
       mixing.go_on_from(from.mixing);
       since_update = from.since_update;
     }
@@ -420,6 +428,7 @@ struct Engine::Player {
   Gestures gestures;
   AudioInputs audio;
   EnergyWatch watch;
+  OutputLevels levels;
   Mixing mixing;
   std::vector<std::vector<std::uint32_t>> watched;  // [part] nodes; may be empty
   std::span<double> slow_numbers;                   // where a slow look goes; empty: none is wanted

@@ -344,6 +344,12 @@ bool Voices::is_any_held() const {
   return std::any_of(voices_.begin(), voices_.end(), [](const Voice& voice) { return voice.held; });
 }
 
+bool Voices::is_any_under_way() const {
+  return std::any_of(voices_.begin(), voices_.end(), [](const Voice& voice) {
+    return voice.awake && !voice.is_new && voice.level > 0.0;
+  });
+}
+
 void Voices::damp_keyless(Voice& voice) const {
   voice.is_released = true;
   damp(voice);

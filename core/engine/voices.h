@@ -160,6 +160,7 @@ class Voices {
   // Once in max_block_frames.
   void glide_on();
   bool is_any_held() const;
+  bool is_any_under_way() const;  // heard already, not about to start
   // Lays the damper on a voice that no key has started, as on those whose keys are up.
   void damp_keyless(Voice& voice) const;
   // Whether a pedal that went up lets this voice go.

@@ -75,6 +75,9 @@ struct OutputSlot {
   std::uint32_t channel = 0;  // from 0
   std::uint32_t node = 0;
   bool is_force = false;  // what the links and this tick's inputs exert, at the reference rate
+  // What the engine multiplies it by: steps of Program::steps; none: 1. Kernels know nothing of it.
+  Coefficient level{};
+  std::uint32_t origin = 0;  // index into Network::outputs
 };
 
 // A parameter that an audio channel gives for every sample.

@@ -69,6 +69,9 @@ class Renumbering {
     }
     new_.links = std::move(old_.links);
     new_.inputs = std::move(old_.inputs);
+    for (Output& output : old_.outputs) {
+      output.level = argument(output.level);
+    }
     new_.outputs = std::move(old_.outputs);
     if (rests_at_zero(new_)) {
       new_.third = ThirdArgument::delayed_position;  // its two meanings are one here
@@ -189,6 +192,11 @@ LinearPart linear_part(const Link& link) {
   return law.family == Family::spring ? LinearPart{link.arguments[law.slot(Role::stiffness)],
                                                    link.arguments[law.slot(Role::damping)]}
                                       : LinearPart{};
+}
+
+double level_value(const Network& network, const Output& output,
+                   std::span<const double> parameters) {
+  return output.level == no_argument ? 1.0 : argument_value(network, output.level, parameters);
 }
 
 std::vector<double> parameter_values(const Network& network) {

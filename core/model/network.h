@@ -177,11 +177,13 @@ struct Input {
   bool operator==(const Input&) const = default;
 };
 
-// Output N of the model: the position of a mass, or the force on it.
+// Output N of the model: the position of a mass, or the force on it, times a level. Outputs of the
+// same number add up.
 struct Output {
   int number = 1;
   bool is_force = false;
   std::uint32_t mass = 0;
+  ArgumentId level = no_argument;  // none: 1
   SourceLocation location;
   bool operator==(const Output&) const = default;
 };
@@ -222,6 +224,10 @@ Network canonical(Network network);
 // The argument's value with the parameters as given; 0 for no_argument.
 double argument_value(const Network& network, ArgumentId argument,
                       std::span<const double> parameters);
+
+// What an output is multiplied by.
+double level_value(const Network& network, const Output& output,
+                   std::span<const double> parameters);
 
 // The parameters' values as the text declares them.
 std::vector<double> parameter_values(const Network& network);

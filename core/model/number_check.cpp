@@ -59,10 +59,18 @@ class NumberCheck {
         look(link, {{"argument", argument}});
       }
     }
+    for (const Output& output : network_.outputs) {
+      look(Outlet{"out" + std::to_string(output.number), output.location},
+           {{"level", output.level}});
+    }
     return std::move(error_);
   }
 
  private:
+  struct Outlet {
+    std::string name;
+    SourceLocation location;
+  };
   struct Asked {
     std::string_view quantity;
     ArgumentId argument;

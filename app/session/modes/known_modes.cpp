@@ -124,7 +124,11 @@ KnownModes known_modes(const NetworkModes& found) {
     modes.inputs.push_back("in" + std::to_string(input.number));
   }
   for (const Output& output : found.network.outputs) {
-    modes.outputs.push_back("out" + std::to_string(output.number));
+    const auto before =
+        std::count_if(found.network.outputs.data(), &output,
+                      [&](const Output& other) { return other.number == output.number; });
+    modes.outputs.push_back("out" + std::to_string(output.number) +
+                            (before > 0 ? "." + std::to_string(before + 1) : ""));
   }
   for (const NetworkMode& mode : found.modes) {
     KnownMode& known = modes.modes.emplace_back(KnownMode{mode.frequency_hz, mode.t60_s, {}});

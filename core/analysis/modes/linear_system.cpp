@@ -118,12 +118,13 @@ class SystemMaker {
     }
     for (const Output& output : network_.outputs) {
       ModalPort& port = made_.outputs.emplace_back();
+      const double level = level_value(network_, output, {});
       if (output.is_force) {
         each_share(network_, output.mass, [&](std::uint32_t node, double share) {
-          feel(port, node, share / (step_ * step_));
+          feel(port, node, level * share / (step_ * step_));
         });
       } else {
-        add(port.direct, output.mass, 1.0);
+        add(port.direct, output.mass, level);
       }
     }
   }

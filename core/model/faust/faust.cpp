@@ -443,11 +443,10 @@ class Writer {
   }
 
   Words outputs() const {
-    Words words(static_cast<std::size_t>(output_count(network_)), "0.0");
+    Words words(static_cast<std::size_t>(output_count(network_)));
     for (const Output& output : network_.outputs) {
       const std::string& name = mass_[output.mass];
-      std::string& word = words[static_cast<std::size_t>(output.number - 1)];
-      word = "x_" + name;
+      std::string word = "x_" + name;
       if (output.is_force) {
         const bool is_point = network_.masses[output.mass].kind == MassKind::point;
         word =
@@ -458,6 +457,15 @@ class Writer {
           }
         }
       }
+      if (output.level != no_argument) {
+        word = "(" + word + ")*" +
+               faust_formula(network_.arguments[output.level], parameter_, Tightness::atom);
+      }
+      std::string& sum = words[static_cast<std::size_t>(output.number - 1)];
+      sum += (sum.empty() ? "" : " + ") + word;
+    }
+    for (std::string& word : words) {
+      word = word.empty() ? "0.0" : word;
     }
     return words;
   }
@@ -513,13 +521,15 @@ class Writer {
     for (int n = 1; n <= inputs; ++n) {
       text += "// input " + std::to_string(n) + ": " + meaning_of_input(n) + "\n";
     }
-    std::vector<std::string> heard(static_cast<std::size_t>(output_count(network_)), "silent");
+    std::vector<std::string> heard(static_cast<std::size_t>(output_count(network_)));
     for (const Output& output : network_.outputs) {
-      heard[static_cast<std::size_t>(output.number - 1)] =
-          (output.is_force ? "force on " : "position of ") + mass_[output.mass];
+      std::string& sum = heard[static_cast<std::size_t>(output.number - 1)];
+      sum += (sum.empty() ? "" : ", ") +
+             ((output.is_force ? "force on " : "position of ") + mass_[output.mass]);
     }
     for (std::size_t n = 0; n < heard.size(); ++n) {
-      text += "// output " + std::to_string(n + 1) + ": " + heard[n] + "\n";
+      text += "// output " + std::to_string(n + 1) + ": " +
+              (heard[n].empty() ? std::string("silent") : heard[n]) + "\n";
     }
     return text + "declare name \"" + plain(options_.name) + "\";\n\n";
   }

@@ -150,11 +150,26 @@ void Reader::add_input(Line& line) {
 
 void Reader::add_output(Line& line) {
   const auto number = channel(line, "out");
+  const bool has_level = line.rest.size() > 1;
+  if (has_level && !line.coordinates.empty()) {
+    return error(line, line.rest[1],
+                 "an output with a level needs its place in brackets: [" +
+                     std::string(line.rest[0].text) + " 0.3]");
+  }
   const auto mass = reference(line, 0);
+  const ArgumentId level = has_level ? argument(line, 1) : no_argument;
+  if (level != no_argument) {
+    for (const Step& step : out_.network.arguments[level]) {
+      if (step.op == Op::parameter && out_.network.parameters[step.index].audio_input > 0) {
+        return error(line, line.rest[1], "an output's level cannot follow an audio input");
+      }
+    }
+  }
   if (number && mass) {
     out_.network.outputs.push_back({.number = *number,
                                     .is_force = line.keyword->element == Element::force_output,
                                     .mass = *mass,
+                                    .level = level,
                                     .location = {line.number, line.label.column}});
   }
 }

@@ -29,8 +29,8 @@ constexpr Keyword fixed[] = {
     {"posInput",           Element::position_input,  0, 1, 1, true,  "POSITION"},
     {"frcInput",           Element::force_input,     1, 0, 0, false, "@MASS"},
     {"forceInput",         Element::force_input,     1, 0, 0, false, "@MASS"},
-    {"posOutput",          Element::position_output, 1, 0, 0, false, "@MASS"},
-    {"frcOutput",          Element::force_output,    1, 0, 0, false, "@MASS"},
+    {"posOutput",          Element::position_output, 1, 0, 1, false, "@MASS [LEVEL]"},
+    {"frcOutput",          Element::force_output,    1, 0, 1, false, "@MASS [LEVEL]"},
 };
 // clang-format on
 

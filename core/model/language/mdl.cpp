@@ -210,7 +210,8 @@ void Reader::declare_all() {
   }
 }
 
-// False if the label is another's, which is an error unless both are links.
+// False if the label is another's, which is an error unless both are links, or outputs, which add
+// up.
 bool Reader::enter_label(std::uint32_t index) {
   const Entry& entry = entries_[index];
   std::uint32_t& place = entry_of(label_of(entry));
@@ -220,6 +221,12 @@ bool Reader::enter_label(std::uint32_t index) {
   }
   const Line line = open(entry);
   const Entry& first = entries_[place];
+  const auto is_output = [](Element element) {
+    return element == Element::position_output || element == Element::force_output;
+  };
+  if (is_output(line.keyword->element) && is_output(keywords()[first.keyword].element)) {
+    return true;
+  }
   const std::string where = quoted("@" + std::string(line.label.text)) +
                             " is already declared in line " + std::to_string(first.number);
   if (line.keyword->element != Element::link ||

@@ -275,7 +275,9 @@ class Printer {
       heading("Outputs");
     }
     for (const Output& output : network_.outputs) {
-      const std::string end = " " + reference(output.mass);
+      const std::string end =
+          " " + reference(output.mass) +
+          (output.level == no_argument ? std::string() : argument(output.level));
       line("out" + std::to_string(output.number), output.is_force ? "frcOutput" : "posOutput", end);
     }
   }

@@ -70,8 +70,8 @@ TEST_CASE("every keyword takes its numbers of arguments and no other", "[mdl]") 
       {"@in1 posInput", "posInput", {1}},
       {"@in1 frcInput @a", "frcInput", {0}, 1},
       {"@in1 forceInput @a", "forceInput", {0}, 1},
-      {"@out1 posOutput @a", "posOutput", {0}, 1},
-      {"@out1 frcOutput @a", "frcOutput", {0}, 1},
+      {"@out1 posOutput @a", "posOutput", {0, 1}, 1},
+      {"@out1 frcOutput @a", "frcOutput", {0, 1}, 1},
       {"@l spring @a @b", "spring", {1, 2}, 2},
       {"@l springDamper @a @b", "springDamper", {1, 2}, 2},
       {"@l springDamperDamper @a @b", "springDamperDamper", {1, 2}, 2},
@@ -115,8 +115,8 @@ TEST_CASE("every keyword takes its numbers of arguments and no other", "[mdl]") 
   // References are counted like arguments.
   check_error({two_masses + "@l spring @a", 3, 13,
                "'spring' takes 3 to 4 arguments (@A @B K [Z]), found 1"});
-  check_error(
-      {two_masses + "@out1 posOutput", 3, 16, "'posOutput' takes 1 argument (@MASS), found 0"});
+  check_error({two_masses + "@out1 posOutput", 3, 16,
+               "'posOutput' takes 1 to 2 arguments (@MASS [LEVEL]), found 0"});
 }
 
 TEST_CASE("masses, grounds and oscillators are what was written", "[mdl]") {
@@ -288,8 +288,8 @@ TEST_CASE("every error tells its line, its column and what was expected", "[mdl]
       {"@a-b param 1\n@m mass 1 0 0", 1, 1, "a parameter's name has letters, digits and '_' only"},
       {"@m mass 1 0 0\n\n@m mass 1 0 0", 3, 1, "'@m' is already declared in line 1"},
       {"@m mass 1 0 0\n@m param 1", 2, 1, "'@m' is already declared in line 1"},
-      {two_masses + "@out1 posOutput @a\n@out1 posOutput @b", 4, 1,
-       "'@out1' is already declared in line 3"},
+      {two_masses + "@in1 frcInput @a\n@in1 frcInput @b", 4, 1,
+       "'@in1' is already declared in line 3"},
       {"@first mass 1 0 0\n@l spring @first @frist 1", 2, 18,
        "no mass is called '@frist'; did you mean '@first'?"},
       {"@first mass 1 0 0\n@out1 posOutput @nothing", 2, 17, "no mass is called '@nothing'"},

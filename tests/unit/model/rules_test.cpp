@@ -318,7 +318,7 @@ TEST_CASE("display triples and blocks are kept as groups", "[rules]") {
 
 // --- R7 ----------------------------------------------------------------------------------------
 
-TEST_CASE("links may share a label, nothing else may", "[rules]") {
+TEST_CASE("links may share a label, outputs a number, nothing else may", "[rules]") {
   check_told(
       two_masses + "@l spring @a @b 1\n@l damper @a @b 1\n@l spring @b @a 2\n" + heard,
       {{Severity::warning, 4, 1, 1, "'@l' is already declared in line 3; both links are kept"},
@@ -338,7 +338,7 @@ TEST_CASE("links may share a label, nothing else may", "[rules]") {
       CHECK(parsed.diagnostics[0].column == 1);
     }
   }
-  check_error(two_masses + "@out1 posOutput @a\n@out1 frcOutput @b", 4, 1,
+  check_error(two_masses + "@out1 posOutput @a\n@out1 mass 1 0 0", 4, 1,
               "'@out1' is already declared in line 3");
   check_error(two_masses + "@in1 frcInput @a\n@in1 posInput 0", 4, 1,
               "'@in1' is already declared in line 3");

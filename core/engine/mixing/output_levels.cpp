@@ -1,0 +1,72 @@
+#include "core/engine/mixing/output_levels.h"
+
+#include <cmath>
+
+namespace ressort {
+namespace {
+
+// From one level to any other each frame changes it by less than 60 dB below full scale.
+constexpr double ramp_s = 0.025;
+
+}  // namespace
+
+OutputLevels::OutputLevels(const Machine& machine, const Playing& playing)
+    : ramp_frames_(playing.bare ? 0
+                                : static_cast<std::size_t>(std::ceil(ramp_s * machine.rate_hz))) {
+  for (const Program& program : machine.parts) {
+    std::vector<Level>& levels = parts_.emplace_back();
+    for (std::uint32_t output = 0; output < program.outputs.size(); ++output) {
+      const Coefficient& level = program.outputs[output].level;
+      if (level.count > 0) {
+        const double value = continuous_value(program, level, machine.parameters, 1.0);
+        levels.push_back({.output = output, .now = value, .target = value});
+      }
+    }
+  }
+}
+
+void OutputLevels::follow(const Machine& machine, std::span<const double> parameters,
+                          bool at_once) {
+  const std::size_t frames = at_once ? 0 : ramp_frames_;
+  for (std::size_t p = 0; p < parts_.size(); ++p) {
+    const Program& program = machine.parts[p];
+    for (Level& level : parts_[p]) {
+      const double target =
+          continuous_value(program, program.outputs[level.output].level, parameters, 1.0);
+      if (target != level.target && std::isfinite(target)) {
+        level.target = target;
+        level.frames = frames;
+        level.now = frames > 0 ? level.now : target;
+        level.step = frames > 0 ? (target - level.now) / static_cast<double>(frames) : 0.0;
+      }
+    }
+  }
+}
+
+template <class T>
+void OutputLevels::apply(Bank<T>& bank, const VoiceGroup& group, std::size_t frames) const {
+  const PartBank<T>& part = bank.parts[group.part];
+  for (const Level& level : parts_[group.part]) {
+    for (std::size_t n = 0; n < frames; ++n) {
+      const T factor = static_cast<T>(level.after(n + 1));
+      T* const row = bank.outputs.data() + n * part.row() + level.output * part.width;
+      for (std::size_t lane = 0; lane < part.width; ++lane) {
+        row[lane] *= factor;
+      }
+    }
+  }
+}
+
+void OutputLevels::advance(std::size_t frames) {
+  for (std::vector<Level>& levels : parts_) {
+    for (Level& level : levels) {
+      level.now = level.after(frames);
+      level.frames -= std::min(frames, level.frames);
+    }
+  }
+}
+
+template void OutputLevels::apply(Bank<float>&, const VoiceGroup&, std::size_t) const;
+template void OutputLevels::apply(Bank<double>&, const VoiceGroup&, std::size_t) const;
+
+}  // namespace ressort
