@@ -120,8 +120,8 @@ TEST_CASE("a look changes no bit of the sound and takes no memory", "[panel]") {
       auto compiled = compile(network_of(ringing_string()), struck(4), {.method = method});
       REQUIRE(compiled);
       const Picture picture = make_picture(*compiled->engine, network_of(ringing_string()), 3);
-      delete harness->process.slot.offer(
-          new Sounding{std::move(compiled->engine), 1, false, picture.number});
+      delete harness->process.slot.offer(new Sounding{
+          .engine = std::move(compiled->engine), .serial = 1, .picture = picture.number});
       for (int i = 0; i < 400; ++i) {
         if (i % 40 == 0) {
           harness->now(note_on(0, 50 + i / 40));
@@ -164,8 +164,8 @@ TEST_CASE("slow motion is a stroboscope at the pitch that sounds", "[panel]") {
     auto compiled = compile(network_of(text), struck(2), {});
     REQUIRE(compiled);
     const Picture picture = make_picture(*compiled->engine, network_of(text), 1);
-    delete harness.process.slot.offer(
-        new Sounding{std::move(compiled->engine), 1, false, picture.number});
+    delete harness.process.slot.offer(new Sounding{
+        .engine = std::move(compiled->engine), .serial = 1, .picture = picture.number});
     harness.now(note_on(0, key));
     const double hz = 440.0 * std::exp2((key - 69) / 12.0);
     int frames = 0;
