@@ -295,8 +295,8 @@ TEST_CASE("a place behind the arguments is taken off before they are counted", "
               "'@a' is one mass, so it has no places on it: write it without '['");
   check_error(macros + "@out1 posOutput [@ss 0.5]", 6, 18,
               "no macro is called '@ss'; did you mean '@s'?");
-  check_error(macros + "@out1 posOutput @a 0.5", 6, 20,
-              "'posOutput' takes 1 argument (@MASS), found 2");
+  check_error(macros + "@out1 posOutput @a 0.5 2", 6, 24,
+              "'posOutput' takes 1 to 2 arguments (@MASS [LEVEL]), found 3");
   check_error(macros + "@out1 posOutput [@s w]", 6, 21,
               "'w' is no parameter of this model; did you mean 'p'?");
 }
