@@ -33,7 +33,7 @@ expect 2 "Subcommands:" "$program"
 expect 2 "nosuch" "$program" nosuch
 expect 0 "play" "$program" --help
 expect 0 ", commit " "$program" --version
-expect 0 '| `posOutput` | `@MASS` |' "$program" reference model
+expect 0 '| `posOutput` | `@MASS [LEVEL]` |' "$program" reference model
 expect 2 "PART" "$program" reference nosuch
 expect 0 "/note/on" "$program" render --help
 expect 2 "--osc-port" "$program" play -u 99999999
