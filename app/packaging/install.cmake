@@ -28,15 +28,15 @@ install(FILES ${packaging}/io.github.ressort.ressort.metainfo.xml
   DESTINATION ${CMAKE_INSTALL_DATADIR}/metainfo)
 install(FILES ${packaging}/ressort.service DESTINATION lib/systemd/user)
 
-# As Debian wants them: the licence, out of the front page, and what has changed.
+# As Debian wants them: the licence, and what has changed.
 set(documents ${CMAKE_INSTALL_DOCDIR})
-file(READ ${CMAKE_SOURCE_DIR}/README.md front)
-string(REGEX MATCH "Permission is hereby granted.*SOFTWARE\\." licence "${front}")
+file(READ ${CMAKE_SOURCE_DIR}/.github/LICENSE.md licence)
+string(REGEX MATCH "Permission is hereby granted.*SOFTWARE\\." licence "${licence}")
 string(REGEX REPLACE "\n\n" "\n.\n" licence "${licence}")
 string(REGEX REPLACE "\n" "\n " licence "${licence}")
 configure_file(${packaging}/copyright.in ${packaged}/copyright @ONLY)
 file(WRITE ${packaged}/changelog "ressort (${PROJECT_VERSION}) stable; urgency=medium\n\n"
-  "  * See https://github.com/ressort/ressort/blob/main/.github/CHANGELOG.md\n\n"
+  "  * The first package.\n\n"
   " -- ressort <ressort@users.noreply.github.com>  Sun, 01 Nov 2026 12:00:00 +0000\n")
 execute_process(COMMAND gzip -9nkf ${packaged}/changelog)
 install(FILES ${packaged}/copyright ${packaged}/changelog.gz DESTINATION ${documents})
