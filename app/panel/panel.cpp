@@ -245,7 +245,8 @@ struct WebPanel::Server {
     }
   }
 
-  // What is no request of the page's asks for the tree of addresses; / does, of all but browsers.
+  // What is no request of the page's asks for the tree of addresses; / does where JSON is asked
+  // for.
   bool answer_query(const Request& request, Response& response) const {
     static const std::set<std::string> ours = {"/describe", "/network", "/modes",
                                                "/motion",   "/events",  "/osc"};
@@ -253,10 +254,9 @@ struct WebPanel::Server {
     const bool is_file = std::any_of(files.begin(), files.end(), [&](const PageFile& file) {
       return file.path == request.path;
     });
-    const bool wants_page =
-        request.get_header_value("Accept").find("text/html") != std::string::npos;
+    const bool wants_tree = request.get_header_value("Accept").find("json") != std::string::npos;
     const bool asks = request.has_param("HOST_INFO") || !(is_file || ours.contains(request.path)) ||
-                      (request.path == "/" && !wants_page);
+                      (request.path == "/" && wants_tree);
     if (!asks || request.method == "POST") {
       return false;
     }

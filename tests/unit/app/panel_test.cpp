@@ -324,8 +324,7 @@ struct Stage {
     return said.starts_with("HTTP/1.1 ") ? std::stoi(said.substr(9, 3)) : -1;
   }
   std::string get(const std::string& path, const std::string& more = "") const {
-    return "GET " + path + " HTTP/1.1\r\nHost: " + host + "\r\nAccept: text/html,*/*\r\n" + more +
-           "\r\n";
+    return "GET " + path + " HTTP/1.1\r\nHost: " + host + "\r\n" + more + "\r\n";
   }
   std::string post(const Bytes& packet, const std::string& more = "") const {
     return "POST /osc HTTP/1.1\r\nHost: " + host +
@@ -484,7 +483,8 @@ TEST_CASE("what is drawn comes with its places, and four may watch", "[panel]") 
 TEST_CASE("the addresses of OSC are a tree that OSCQuery programs read", "[panel]") {
   Stage stage;
   const auto ask = [&](const std::string& path) {
-    return stage.ask("GET " + path + " HTTP/1.1\r\nHost: " + stage.host + "\r\n\r\n");
+    return stage.ask("GET " + path + " HTTP/1.1\r\nHost: " + stage.host +
+                     "\r\nAccept: application/json\r\n\r\n");
   };
   const auto read = [&](const std::string& path) {
     return nlohmann::json::parse(Stage::body(ask(path)));
