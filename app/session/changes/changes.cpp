@@ -7,6 +7,7 @@
 #include "app/session/modes/tuned_files.h"
 #include "app/session/session.h"
 #include "app/text.h"
+#include "core/curve.h"
 #include "core/model/preset/edit.h"
 
 namespace ressort {
@@ -56,7 +57,6 @@ std::optional<LastChange> Session::take_last_change() {
 
 // By its name among the parameters and the preset's OSC names; of no model where there is none.
 LearnedControl Session::control_of(const std::string& target) const {
-  constexpr double wide = 10.0;  // from here on equal turns are equal ratios
   const Instrument& instrument = current_->instrument;
   for (std::size_t i = 0; i < instrument.parameters.size(); ++i) {
     const ParameterInfo& info = instrument.parameters[i];
@@ -66,7 +66,7 @@ LearnedControl Session::control_of(const std::string& target) const {
               .model = current_->serial,
               .low = info.minimum,
               .high = info.maximum,
-              .exponential = info.minimum > 0.0 && info.maximum >= wide * info.minimum};
+              .exponential = is_wide(info.minimum, info.maximum)};
     }
   }
   for (const CustomInfo& info : instrument.custom) {
