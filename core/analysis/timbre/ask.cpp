@@ -16,6 +16,9 @@ constexpr double near_enough = 0.01;  // of what is noticed
 constexpr double little = 1e-5;       // of a range, for differences
 constexpr double still = 1e-9;        // of a range: a step that is none
 constexpr double no_slope = 1e-6;     // what is noticed over a whole range
+constexpr double hopeful = 5.0;       // of what is noticed
+constexpr double farthest_hop = 0.1;  // of a range
+constexpr int most_hops = 4;          // of one start
 constexpr int most_steps = 60;
 constexpr int most_tries = 12;  // of one step, each shorter
 
@@ -43,10 +46,14 @@ class Asker {
       }
       return sum;
     }
-    bool is_there() const {
-      return std::all_of(noticed.begin(), noticed.end(),
-                         [](double one) { return std::fabs(one) <= near_enough; });
+    double worst() const {
+      double most = 0.0;
+      for (const double one : noticed) {
+        most = std::max(most, std::fabs(one));
+      }
+      return most;
     }
+    bool is_there() const { return worst() <= near_enough; }
   };
 
   std::vector<double> values_at(const Place& place) const {
@@ -213,6 +220,11 @@ class Asker {
   const Progress& progress_;
 };
 
+// 0 to 1, alike on every machine.
+double next_share(std::mt19937_64& random) {
+  return 0x1p-53 * static_cast<double>(random() >> 11U);
+}
+
 std::optional<Error> wrong_target(const TimbreTarget& target) {
   const AskedFigureRow& row = row_of(target.figure);
   const bool is_right =
@@ -226,7 +238,9 @@ Result<AskedTimbre> ask(const FiguresAt& figures, std::span<const double> values
                         std::span<const FreeParameter> free, std::span<const TimbreTarget> targets,
                         const AskOptions& options) {
   options.progress.stage("looking for the timbre");
+  const FiguresAt& judge = options.exactly ? *options.exactly : figures;
   Asker asker(figures, values, free, targets, options.progress);
+  Asker judging(judge, values, free, targets, options.progress);
   AskedTimbre asked;
   std::optional<Asker::Trial> best;
   std::optional<Error> first_error;
@@ -235,26 +249,38 @@ Result<AskedTimbre> ask(const FiguresAt& figures, std::span<const double> values
     ++asked.starts;
     Place place = asker.place_of_values();
     for (std::size_t i = 0; start > 0 && i < free.size(); ++i) {
-      place[i] = 0x1p-53 * static_cast<double>(random() >> 11U);  // alike on every machine
+      place[i] = next_share(random);
     }
-    if (const auto first = asker.trial(place)) {
-      const Asker::Trial end = asker.descend(*first);
-      best = best && best->cost() <= end.cost() ? best : end;
-    } else {
-      first_error = first_error ? first_error : asker.error;
+    auto end = asker.trial(place);
+    if (end) {
+      end = asker.descend(*end);
+      end = options.exactly ? judging.trial(end->place) : end;
+    }
+    if (end && options.exactly) {
+      end = judging.descend(*end);
+    }
+    if (end && (!best || end->cost() < best->cost())) {
+      best = end;
+    } else if (!end && !first_error) {
+      first_error = asker.error.message.empty() ? judging.error : asker.error;
+    }
+    // So near, what stops it may be a peak that moved to the next bin: over that from around it.
+    for (int hop = 0; options.exactly && best && hop < most_hops; ++hop) {
+      if (best->is_there() || best->worst() > hopeful) {
+        break;
+      }
+      const double reach = farthest_hop * std::exp2(-hop);
+      place = best->place;
+      for (double& one : place) {
+        one = std::clamp(one + reach * (2.0 * next_share(random) - 1.0), 0.0, 1.0);
+      }
+      auto hopped = judging.trial(place);
+      hopped = hopped ? judging.descend(*hopped) : hopped;
+      best = hopped && hopped->cost() < best->cost() ? hopped : best;
     }
   }
   if (!best) {
     return *first_error;
-  }
-  const FiguresAt& judge = options.exactly ? *options.exactly : figures;
-  Asker judging(judge, values, free, targets, options.progress);
-  if (options.exactly) {
-    const auto first = judging.trial(best->place);
-    if (!first) {
-      return judging.error;
-    }
-    best = judging.descend(*first);
   }
   // It may be silent where it is.
   if (const auto before = judge(values)) {

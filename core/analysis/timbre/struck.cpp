@@ -105,8 +105,8 @@ FrameTimbre StruckModel::analysed(const NetworkModes& modes, double f0_hz) const
     std::complex<double> state = mode.residues[options_.input * modes.outputs + options_.output];
     const std::complex<double> turn = std::exp(pole_of(mode.mu, modes.scheme));
     for (double& sample : samples) {
-      sample += state.imag();
       state *= turn;
+      sample += state.imag();
     }
   }
   FrameAnalysis analysis({.rate_hz = options_.rate_hz, .size = options_.frame, .f0_hz = f0_hz});
