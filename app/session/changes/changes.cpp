@@ -1,8 +1,8 @@
 // What a player changes of what sounds: what can be taken back, learnt and kept.
 #include <algorithm>
-#include <filesystem>
 #include <utility>
 
+#include "app/session/changes/settings.h"
 #include "app/session/files.h"
 #include "app/session/modes/tuned_files.h"
 #include "app/session/session.h"
@@ -158,17 +158,7 @@ Result<std::string> Session::preset_text(const std::string& model) const {
     if (now->serial == 0) {
       return Error{"nothing is loaded that could be saved"};
     }
-    for (std::size_t i = 0; i < values_.size(); ++i) {
-      const ParameterInfo& info = now->instrument.parameters[i];
-      const bool is_in_preset =
-          std::any_of(now->preset.parameters.begin(), now->preset.parameters.end(),
-                      [&](const ParameterSetting& setting) { return setting.name == info.name; });
-      if (info.audio_input == 0 && (is_in_preset || values_[i] != info.value)) {
-        constexpr double most = 1e12;  // that a preset may say
-        changes.parameters.push_back(
-            {info.name, values_[i], std::max(info.minimum, -most), std::min(info.maximum, most)});
-      }
-    }
+    changes.parameters = changed_settings(now->instrument.parameters, now->preset, values_);
     for (const LearnedRow& row : learned_) {
       const LearnedControl control = control_of(row.target);
       for (const ControlSetting& setting : now->preset.controls) {
@@ -202,7 +192,6 @@ Result<std::string> Session::save(const std::string& name, Existing existing) {
   if (!path) {
     return path.error();
   }
-  std::error_code error;
   if (const std::string there = preset_path(name); existing == Existing::refuse && !there.empty()) {
     return Error{there == *path ? "'" + name + "' is there already; --force writes over it"
                                 : "'" + name +
@@ -218,12 +207,7 @@ Result<std::string> Session::save(const std::string& name, Existing existing) {
     }
     model = *kept;
   }
-  // By its name where that leads to it from there too.
-  const std::string known = model_path(std::filesystem::path(model).stem().string());
-  const bool is_known = !known.empty() && std::filesystem::equivalent(known, model, error);
-  const auto text =
-      preset_text(is_known ? std::filesystem::path(model).filename().string()
-                           : std::filesystem::absolute(model, error).lexically_normal().string());
+  const auto text = preset_text(model_name_elsewhere(model));
   if (!text) {
     return text.error();
   }

@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "core/analysis/modes/linear_system.h"
 #include "core/analysis/modes/scaling.h"
 #include "core/model/topology.h"
 
@@ -62,34 +63,38 @@ double noticed_between(AskedFigure figure, double value, double target) {
 StruckModel::StruckModel(const Network& network, const StrikeOptions& options)
     : network_(expand_macros(network)), options_(options) {}
 
-Result<NetworkModes> StruckModel::tuned_modes(std::span<const double> parameters) const {
+Result<StruckModel::TunedModes> StruckModel::tuned_modes(std::span<const double> parameters) const {
   const ModeOptions how{.rate_hz = options_.rate_hz, .progress = options_.progress};
-  auto modes = find_modes(network_, parameters, how);
-  if (!options_.key_hz || !modes) {
-    return modes;
-  }
-  const Network written = modes->network;
-  double factor = 1.0;
+  double factor = options_.key_factor.value_or(1.0);
+  const Network written = settled(network_, parameters);
   for (int i = 0; i < most_tunings; ++i) {
+    auto modes = find_modes(factor == 1.0 ? written : at_key(written, factor), parameters, how);
+    if (!modes) {
+      return modes.error();
+    }
+    if (!options_.key_hz || options_.key_factor) {
+      return TunedModes{*std::move(modes), factor};
+    }
     if (options_.pitch_mode >= modes->modes.size()) {
       return Error{"there is no mode " + std::to_string(options_.pitch_mode + 1) +
                    " that swings, so no key has a pitch"};
     }
     const NetworkMode& mode = modes->modes[options_.pitch_mode];
     if (std::fabs(mode.frequency_hz / *options_.key_hz - 1.0) < in_tune) {
-      return modes;
+      return TunedModes{*std::move(modes), factor};
     }
     factor *= stiffness_of(*options_.key_hz, mode.t60_s, options_.rate_hz) /
               stiffness_of(mode.frequency_hz, mode.t60_s, options_.rate_hz);
     if (!(factor > 0.0 && std::isfinite(factor))) {
       break;
     }
-    modes = find_modes(at_key(written, factor), parameters, how);
-    if (!modes) {
-      return modes;
-    }
   }
-  return Error{"no key can be tuned: what is fixed keeps its pitch where it is"};
+  return Error{"the key has no pitch: stiffness alone does not bring the mode there"};
+}
+
+Result<double> StruckModel::key_factor(std::span<const double> parameters) const {
+  const auto tuned = tuned_modes(parameters);
+  return tuned ? Result<double>(tuned->factor) : tuned.error();
 }
 
 FrameTimbre StruckModel::lines_of(std::span<const DecayingPartial> partials, double f0_hz) const {
@@ -114,10 +119,11 @@ FrameTimbre StruckModel::analysed(const NetworkModes& modes, double f0_hz) const
 }
 
 Result<AskedValues> StruckModel::figures(std::span<const double> parameters) const {
-  const auto modes = tuned_modes(parameters);
-  if (!modes) {
-    return modes.error();
+  const auto tuned = tuned_modes(parameters);
+  if (!tuned) {
+    return tuned.error();
   }
+  const NetworkModes* const modes = &tuned->modes;
   if (!modes->is_linear() || has_waveguide(network_)) {
     return Error{"it is not linear"};
   }
@@ -148,6 +154,9 @@ Result<AskedValues> StruckModel::figures(std::span<const double> parameters) con
         value && std::isfinite(*value) && (*value > 0.0 || !row_of(figure).is_ratio);
     values[static_cast<std::size_t>(figure)] = is_there ? value : std::nullopt;
   };
+  if (pitch >= partials.size()) {
+    return Error{"no mode that swings is left to be the pitch"};
+  }
   const double f0_hz = modes->modes[pitch].frequency_hz;
   set(AskedFigure::f0, f0_hz);
   set(AskedFigure::t60, std::min(modes->modes[pitch].t60_s, longest_t60_s));

@@ -49,8 +49,10 @@ struct StrikeOptions {
   // does it; else the model is as it is written.
   std::optional<double> key_hz;
   std::size_t pitch_mode = 0;  // from the lowest that swings
-  std::size_t frame = 2048;    // samples from the blow on, of which the spectrum is, of amplitudes
-                               // under a Hann window
+  // Instead of what brings the mode there: the factor that a key has got for other parameters.
+  std::optional<double> key_factor;
+  std::size_t frame = 2048;  // samples from the blow on, of which the spectrum is, of amplitudes
+                             // under a Hann window
   // The frame is computed sample by sample and analysed as a recording is: exact, but figures jump
   // where a peak moves to another bin. Else modes are lines, and figures are smooth.
   bool by_samples = false;
@@ -67,10 +69,17 @@ class StruckModel {
   // mode swings or is heard, one grows, a number is none; not linear; or `stopped`. O(masses^3)
   Result<AskedValues> figures(std::span<const double> parameters) const;
 
+  // What `key_hz` multiplies stiffness by. Errors as of figures().
+  Result<double> key_factor(std::span<const double> parameters) const;
+
   static constexpr double longest_t60_s = 1e6;
 
  private:
-  Result<NetworkModes> tuned_modes(std::span<const double> parameters) const;
+  struct TunedModes {
+    NetworkModes modes;
+    double factor = 1.0;
+  };
+  Result<TunedModes> tuned_modes(std::span<const double> parameters) const;
   FrameTimbre lines_of(std::span<const DecayingPartial> partials, double f0_hz) const;
   FrameTimbre analysed(const NetworkModes& modes, double f0_hz) const;
 
