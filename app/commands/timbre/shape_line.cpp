@@ -79,7 +79,20 @@ void add_shape(CLI::App& app, ShapeOptions& options,
                    "the sample rate in Hz (44100, or the sound file's)")
       ->check(within(8000.0, 768000.0));
   add_motion(*command, options.third);
-  command->callback([&options, run, &code] { code = run(options); });
+  command->allow_extras();
+  command->callback([command, &options, run, &code] {
+    for (std::string word : command->remaining()) {
+      if (word.starts_with("--")) {
+        std::replace(word.begin() + 2, word.end(), '-', '_');
+        throw CLI::ValidationError("shape", asked_figure(word.substr(2)).error().message);
+      }
+    }
+    if (!command->remaining().empty()) {
+      throw CLI::ValidationError("shape", "one model alone can be shaped, found '" +
+                                              command->remaining().front() + "' as well");
+    }
+    code = run(options);
+  });
 }
 
 }  // namespace ressort

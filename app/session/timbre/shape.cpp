@@ -60,7 +60,7 @@ std::optional<Error> not_linear(const Scene& scene) {
   }
   for (const Link& link : scene.network.links) {
     if (link.law != Law::spring) {
-      const std::string what = std::string(facts_of(link.law).one);
+      const std::string what = "a " + std::string(facts_of(link.law).one);
       return Error{
           to_string(finding_in_model(scene, {scene.name + " is not linear: here is " + what + so,
                                              link.location.line, link.location.column}))};
