@@ -46,8 +46,8 @@ Process::Process(double rate_hz, bool limit, Clock clock_ns)
       sound_(max_channels * chunk_frames),
       fade_sound_(max_channels * chunk_frames),
       mixed_(max_channels * chunk_frames) {
-  now_.reserve(from_osc.capacity() + from_console.capacity() + from_midi.capacity() + max_now +
-               max_endings);
+  now_.reserve(from_osc.capacity() + from_console.capacity() + from_midi.capacity() +
+               from_worker.capacity() + max_now + max_endings);
   pending_.reserve(max_ahead);
   due_.reserve(now_.capacity() + max_ahead);
   matching_.reserve(due_.capacity());
@@ -167,6 +167,7 @@ void Process::gather(std::size_t frames, std::span<const MidiPacket> midi, std::
   drain(from_osc, frames, time_ns);
   drain(from_console, frames, time_ns);
   drain(from_midi, frames, time_ns);
+  drain(from_worker, frames, time_ns);
   const std::size_t before = now_.size();
   const auto last = static_cast<std::int64_t>(frames) - 1;
   for (const MidiPacket& packet : midi) {

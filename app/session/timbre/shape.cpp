@@ -20,10 +20,12 @@ constexpr double missed_by = 0.1;  // of what is noticed: less is as good as the
 std::string told(AskedFigure figure, double value) {
   const std::string_view name = row_of(figure).name;
   const std::string_view unit = name.ends_with("_hz") ? " Hz" : name.ends_with("_s") ? " s" : "";
-  const int digits = value >= 1000.0 ? 0 : value >= 100.0 ? 1 : value >= 1.0 ? 2 : 4;
-  return value >= 1e9 || (value != 0.0 && value < 1e-3)
-             ? print_number(value) + std::string(unit)
-             : with_commas(value, digits) + std::string(unit);
+  const int digits = value >= 1000.0  ? 0
+                     : value >= 100.0 ? 1
+                     : value >= 1.0   ? 2
+                     : value >= 1e-3  ? 4
+                                      : 7;
+  return (value >= 1e9 ? print_number(value) : with_commas(value, digits)) + std::string(unit);
 }
 
 // The first line that a parameter could take the place of a number in.
