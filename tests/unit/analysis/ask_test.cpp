@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstdio>
 #include <limits>
+#include <numbers>
 
 #include "core/analysis/timbre/ask.h"
 #include "core/analysis/timbre/frame_analysis.h"
@@ -162,14 +163,129 @@ TEST_CASE("hidden parameters' timbre is found again, 20 of 20", "[ask]") {
     }
     found += off <= 0.1 ? 1 : 0;
     worst = std::max(worst, off);
-    if (off > 0.1) for (std::size_t t = 0; t < targets.size(); ++t) std::printf("%s wants %g has %g noticed %g by %g\n", row_of(targets[t].figure).name.data(), targets[t].value, *sound[(std::size_t)targets[t].figure], asked_for->noticed[t], noticed_between(targets[t].figure, *sound[(std::size_t)targets[t].figure], targets[t].value));
-    if (off > 0.1) for (std::size_t i = 0; i < hidden.size(); ++i) std::printf("hidden %g start %g found %g\n", hidden[i], start[i], asked_for->values[i]);
     std::printf("seed %2d: %.4f JND off, %d starts, %zu trials, %.2f s\n", seed, off,
                 asked_for->starts, asked_for->trials, took.count());
   }
   std::printf("%d of %d returned within a tenth of what is noticed, the worst %.4f off\n", found,
               seeds, worst);
   CHECK(found == seeds);
+}
+
+TEST_CASE("what cannot be had is named, with the bound that holds it", "[ask]") {
+  const Played& model = models[0];
+  const std::vector<double> start{0.2, 0.001, 0.3};
+  // f = rate / pi asin(sqrt(K/M) sin(pi / 2 / (N + 1))), by hand: 40 masses, of which 38 move.
+  const double highest_hz =
+      rate_hz / std::numbers::pi * std::asin(std::sqrt(0.9) * std::sin(std::numbers::pi / 78.0));
+  const TimbreTarget high[] = {{AskedFigure::f0, 5000.0}};
+  const auto top = asked(model, start, high);
+  REQUIRE(top);
+  CHECK_FALSE(top->is_reached);
+  CHECK(top->values[0] == 0.9);
+  CHECK(*top->reached[static_cast<std::size_t>(AskedFigure::f0)] ==
+        Approx(highest_hz).epsilon(1e-4));  // Z shifts it a little
+  REQUIRE_FALSE(top->held.empty());
+  CHECK(top->held[0].index == 0);
+  CHECK(top->held[0].is_highest);
+  CHECK(top->noticed[0] < -100.0);
+
+  // T60 = 13.8155 / (rate zeta), zeta = Z/M (2 sin(pi / 2 / (N + 1)))^2: the longest with Z at its
+  // lowest, whatever K is.
+  const double zeta = 1e-4 * std::pow(2.0 * std::sin(std::numbers::pi / 78.0), 2.0);
+  const TimbreTarget long_one[] = {{AskedFigure::t60, 1e300}};
+  const auto longest = asked(model, start, long_one);
+  REQUIRE(longest);
+  CHECK(longest->values[1] == 1e-4);
+  CHECK(*longest->reached[static_cast<std::size_t>(AskedFigure::t60)] ==
+        Approx(-3.0 * std::log(10.0) / (rate_hz * 0.5 * std::log1p(-zeta))).epsilon(1e-6));
+}
+
+TEST_CASE("figures that are none, and models that nothing turns, are refused", "[ask]") {
+  const Played& model = models[0];
+  const std::vector<double> start{0.2, 0.001, 0.3};
+  constexpr double nan = std::numeric_limits<double>::quiet_NaN();
+  constexpr double endless = std::numeric_limits<double>::infinity();
+  for (const AskedFigureRow& row : asked_figure_rows()) {
+    INFO(row.name);
+    for (const double wrong : {-1.0, nan, endless, -endless}) {
+      const TimbreTarget targets[] = {{row.figure, wrong}};
+      CHECK_FALSE(asked(model, start, targets));
+    }
+    for (const double far : {1e-300, 1e300}) {
+      const TimbreTarget targets[] = {{row.figure, far}};
+      const auto nearest = asked(model, start, targets);
+      REQUIRE(nearest);
+      CHECK(std::isfinite(nearest->noticed[0]));
+      for (std::size_t i = 0; i < start.size(); ++i) {
+        CHECK(nearest->values[i] >= model.ranges[i].minimum);
+        CHECK(nearest->values[i] <= model.ranges[i].maximum);
+      }
+    }
+  }
+  const TimbreTarget zero[] = {{AskedFigure::centroid, 0.0}};
+  CHECK_FALSE(asked(model, start, zero));
+  const TimbreTarget harmonic[] = {{AskedFigure::inharmonicity, 0.0}};
+  CHECK(asked(model, start, harmonic));
+  const FiguresAt any = [](std::span<const double>) { return AskedValues{1.0, 1.0, 1.0}; };
+  const TimbreTarget bright[] = {{AskedFigure::centroid, 2.0}};
+  CHECK(ask_timbre(any, start, {}, bright, {}).error().message == "no parameter may be turned");
+  const FreeParameter one[] = {{0, 0.1, 0.3}};
+  CHECK(ask_timbre(any, start, one, {}, {}).error().message == "nothing is asked for");
+  // What has no influence is where it was, and says so.
+  const auto idle = ask_timbre(any, start, one, bright, {});
+  REQUIRE(idle);
+  CHECK_FALSE(idle->has_influence);
+  CHECK(idle->values == start);
+  const TimbreTarget hollow[] = {{AskedFigure::odd_to_even, 2.0}};
+  CHECK(ask_timbre(any, start, one, hollow, {}).error().message == "it has no odd_to_even there");
+}
+
+TEST_CASE("silence, corners that are not stable, and who stops it", "[ask]") {
+  // Heard at a mass that no spring reaches.
+  const Played silent{
+      "@k param 0.1\n@g ground 0.\n@a mass 1. 0. 0.\n@b mass 1. 0. 0.\n"
+      "@s spring @g @a k\n@in1 frcInput @a\n@out1 posOutput @b\n",
+      {{0.01, 0.5}}};
+  const TimbreTarget bright[] = {{AskedFigure::centroid, 500.0}};
+  const auto nothing = asked(silent, std::vector<double>{0.1}, bright);
+  REQUIRE_FALSE(nothing);
+  CHECK(nothing.error().message.find("nothing is heard") != std::string::npos);
+
+  // Above K = 4 M nothing is stable: the search goes around it.
+  const Played corner{
+      "@k param 0.1\n@z param 0.001\n@g ground 0.\n@a mass 1. 0. 0.\n"
+      "@s springDamper @g @a k z\n@in1 frcInput @a\n@out1 posOutput @a\n",
+      {{0.001, 40.0}, {-0.01, 0.01}}};
+  const TimbreTarget tone[] = {{AskedFigure::f0, 3000.0}, {AskedFigure::t60, 0.5}};
+  const auto found = asked(corner, std::vector<double>{20.0, -0.005}, tone);
+  REQUIRE(found);
+  CHECK(found->is_reached);
+  // By hand: T60 = 0.5 s is zeta = 1 - 10^(-6 / (rate T60)), and lambda = 1 + r^2 - 2 r cos theta.
+  const double r = std::pow(10.0, -3.0 / (rate_hz * 0.5));
+  const double theta = 2.0 * std::numbers::pi * 3000.0 / rate_hz;
+  CHECK(found->values[1] == Approx(1.0 - r * r).epsilon(1e-3));
+  CHECK(found->values[0] == Approx(1.0 + r * r - 2.0 * r * std::cos(theta)).epsilon(1e-3));
+
+  const FiguresAt any = [](std::span<const double>) { return AskedValues{1.0, 1.0, 1.0}; };
+  const FreeParameter one[] = {{0, 0.1, 0.3}};
+  const auto stopped_one =
+      ask_timbre(any, std::vector<double>{0.2}, one, bright,
+                 {.progress = Progress([](std::string_view) { return false; })});
+  REQUIRE_FALSE(stopped_one);
+  CHECK(stopped_one.error().message == stopped);
+}
+
+TEST_CASE("a key's pitch stays where it is while the timbre moves", "[ask]") {
+  const Network network = read(models[1]);
+  const FreeParameter free[] = {{0, 0.05, 0.5}, {1, 1e-3, 0.1}, {2, 1e-4, 0.01}};
+  const StruckModel keyed(network, {.key_hz = 220.0});
+  const TimbreTarget targets[] = {{AskedFigure::inharmonicity, 0.01}, {AskedFigure::t60, 3.0}};
+  const auto found = ask_timbre([&](auto parameters) { return keyed.figures(parameters); },
+                                std::vector<double>{0.2, 0.02, 0.001}, free, targets, {});
+  REQUIRE(found);
+  const double cents =
+      1200.0 * std::log2(*found->reached[static_cast<std::size_t>(AskedFigure::f0)] / 220.0);
+  CHECK(std::fabs(cents) < 1e-5);
 }
 
 }  // namespace ressort
