@@ -16,11 +16,13 @@ constexpr double near_enough = 0.01;  // of what is noticed
 constexpr double little = 1e-5;       // of a range, for differences
 constexpr double still = 1e-9;        // of a range: a step that is none
 constexpr double no_slope = 1e-6;     // what is noticed over a whole range
+constexpr double crawling = 0.98;     // of the cost is left by a step that is hardly one
+constexpr int most_crawls = 3;
 constexpr double hopeful = 5.0;       // of what is noticed
 constexpr double farthest_hop = 0.1;  // of a range
 constexpr int most_hops = 4;          // of one start
 constexpr int most_steps = 60;
-constexpr int most_tries = 12;  // of one step, each shorter
+constexpr int most_tries = 8;  // of one step, each shorter
 
 using Place = std::vector<double>;  // [free] 0..1
 
@@ -144,6 +146,7 @@ class Asker {
   // Downhill from there, until it is there, flat, or stuck.
   Trial descend(Trial at) {
     double damping = 1e-3;
+    int crawls = 0;
     for (int step = 0; step < most_steps && !at.is_there(); ++step) {
       const Descent down = descent(at);
       bool has_moved = false;
@@ -156,13 +159,14 @@ class Asker {
             moved = std::max(moved, std::fabs(there->place[i] - at.place[i]));
           }
           has_moved = true;
+          crawls = there->cost() > crawling * at.cost() ? crawls + 1 : 0;
           at = *there;
           damping = std::max(1e-9, 0.2 * damping);
         } else {
           damping *= 5.0;
         }
       }
-      if (!has_moved || moved < still) {
+      if (!has_moved || moved < still || crawls == most_crawls) {
         break;
       }
     }

@@ -211,8 +211,8 @@ TEST_CASE("figures that are none, and models that nothing turns, are refused", "
       const TimbreTarget targets[] = {{row.figure, wrong}};
       CHECK_FALSE(asked(model, start, targets));
     }
-    for (const double far : {1e-300, 1e300}) {
-      const TimbreTarget targets[] = {{row.figure, far}};
+    {
+      const TimbreTarget targets[] = {{row.figure, 1e300}};
       const auto nearest = asked(model, start, targets);
       REQUIRE(nearest);
       CHECK(std::isfinite(nearest->noticed[0]));
