@@ -9,7 +9,7 @@ namespace ressort {
 namespace {
 
 const char* const string_text =
-    "@k param 0.1\n@z param 0.001\n@s string 20 1. k z 0. 0.\n@in1 frcInput [@s 0.3]\n"
+    "@k param 0.1\n@z param 0.002\n@s string 20 1. k z 0. 0.\n@in1 frcInput [@s 0.3]\n"
     "@out1 posOutput [@s 0.71]\n";
 
 // Of 18 masses that move, by hand: lambda = K (2 sin(pi / 2 / 19))^2, zeta = Z times the same;
@@ -38,14 +38,15 @@ TEST_CASE("the console shapes what sounds, and takes it back at once", "[shape_t
   Harness& h = fixture.harness;
   const std::string told = h.say("shape f0 300 t60 2");
   CHECK(has(told, "300.0 Hz"));
-  CHECK(has(told, "0.00 JND"));
+  CHECK(has(told, "300.0 Hz  0.00 JND"));
+  CHECK(has(told, "2.00 s    0.00 JND"));
   CHECK(has(told, "'undo' takes it back"));
   // Within a hundredth of what is noticed: 0.05 cents.
   CHECK(fixture.now("k") == Approx(stiffness_for(300.0, 2.0, 48000.0)).epsilon(1e-4));
   h.play();
   CHECK(has(h.say("undo"), "k = 0.1"));
   CHECK(fixture.now("k") == 0.1);
-  CHECK(fixture.now("z") == 0.001);
+  CHECK(fixture.now("z") == 0.002);
   h.play();
   const std::string high = h.say("shape f0 9000");
   CHECK(has(high, "as high as it gets is"));
