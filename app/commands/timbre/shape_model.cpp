@@ -6,6 +6,7 @@
 #include <nlohmann/json.hpp>
 
 #include "app/commands/body/recording.h"
+#include "app/commands/progress_bar.h"
 #include "app/commands/timbre/description.h"
 #include "app/exit_code.h"
 #include "app/session/admit.h"
@@ -207,6 +208,7 @@ int shape_model(const ShapeOptions& options, const std::function<bool()>& goes_o
   for (const ParameterInfo& info : instrument.parameters) {
     before.push_back(info.value);
   }
+  std::optional<ProgressBar> bar(true);
   const auto shaped = shape_timbre(
       {.scene = *scene,
        .parameters = instrument.parameters,
@@ -214,8 +216,10 @@ int shape_model(const ShapeOptions& options, const std::function<bool()>& goes_o
        .has_keys = has_keys,
        .key = options.key.value_or(like.f0_hz ? key_near(*like.f0_hz, scene->preset) : usual_key),
        .rate_hz = rate_hz,
-       .progress = progress},
+       .progress = Progress([&](std::string_view) { return goes_on(); }),
+       .tell = [&](double share) { bar->show(share, "looking for the timbre of " + scene->name); }},
       targets);
+  bar.reset();
   if (!shaped) {
     return refuse(shaped.error().message);
   }

@@ -171,6 +171,7 @@ Result<Shaped> shape_timbre(const ShapeRequest& request, std::vector<TimbreTarge
       [&](std::span<const double> values) { return lines.figures(values); }, request.values, free,
       targets,
       {.exactly = [&](std::span<const double> values) { return samples.figures(values); },
+       .tell = request.tell,
        .progress = request.progress});
   if (!found) {
     return found.error().message == stopped ? found.error()

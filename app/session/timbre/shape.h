@@ -1,7 +1,7 @@
 // app/session: a model or preset turned to the timbre that somebody asks for.
 #pragma once
 
-#include <optional>
+#include <functional>
 #include <span>
 #include <string>
 #include <vector>
@@ -30,6 +30,7 @@ struct ShapeRequest {
   // Keys were tuned with these values, and stay tuned so; empty: they are tuned anew.
   std::vector<double> tuned_at;
   Progress progress = {};
+  std::function<void(double share)> tell = {};
 };
 
 struct Shaped {

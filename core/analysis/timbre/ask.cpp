@@ -250,6 +250,9 @@ Result<AskedTimbre> ask(const FiguresAt& figures, std::span<const double> values
   std::optional<Error> first_error;
   std::mt19937_64 random(options.seed);
   for (int start = 0; start < options.starts && !(best && best->is_there()); ++start) {
+    if (options.tell) {
+      options.tell(static_cast<double>(start) / options.starts);
+    }
     ++asked.starts;
     Place place = asker.place_of_values();
     for (std::size_t i = 0; start > 0 && i < free.size(); ++i) {

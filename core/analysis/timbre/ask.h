@@ -33,6 +33,7 @@ struct AskOptions {
   int starts = 8;                    // the first where the parameters are, the others at random
   std::optional<FiguresAt> exactly;  // what the best is brought nearer by, and judged by
   std::uint64_t seed = 1;            // of these
+  std::function<void(double share)> tell = {};  // 0..1, as starts are done
   Progress progress = {};
 };
 
