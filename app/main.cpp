@@ -22,6 +22,7 @@
 #include "app/commands/smf/midi_file.h"
 #include "app/commands/start_chart.h"
 #include "app/commands/timbre/describe_line.h"
+#include "app/commands/timbre/shape_model.h"
 #include "app/program.h"
 #include "app/version.h"
 #include "core/model/language/expression.h"
@@ -525,6 +526,7 @@ int run(int argc, char** argv) {
   BodyRequest body_request;
   ModesOptions modes_options;
   DescribeOptions describe_options;
+  ShapeOptions shape_options;
   MakeOptions make_options;
   ChartOptions chart_options;
   std::vector<std::uint32_t> make_sizes;
@@ -536,6 +538,7 @@ int run(int argc, char** argv) {
   add_export(app, export_options, code);
   add_modes(app, modes_options, code);
   add_describe(app, describe_options, describe_command, code);
+  add_shape(app, shape_options, shape_command, code);
   add_body(app, body_request, code);
   add_chart(app, chart_options, code);
   add_reference(app, reference_part, code);

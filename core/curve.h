@@ -25,4 +25,9 @@ inline double value_at(const std::vector<CurvePoint>& points, double where) {
   return a[1] + (b[1] - a[1]) * (where - a[0]) / (b[0] - a[0]);
 }
 
+// Whether a range is so wide that equal turns are equal ratios of it.
+constexpr bool is_wide(double minimum, double maximum) {
+  return minimum > 0.0 && maximum >= 10.0 * minimum;
+}
+
 }  // namespace ressort

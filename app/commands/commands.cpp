@@ -121,4 +121,9 @@ int describe_command(const DescribeOptions& options) {
   return describe(options, [] { return !interrupted.is_raised(); });
 }
 
+int shape_command(const ShapeOptions& options) {
+  watch_signals();
+  return shape_model(options, [] { return !interrupted.is_raised(); });
+}
+
 }  // namespace ressort

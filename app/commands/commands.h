@@ -9,6 +9,7 @@
 #include "app/commands/gallery/gallery.h"
 #include "app/commands/offline.h"
 #include "app/commands/timbre/describe.h"
+#include "app/commands/timbre/shape_model.h"
 #include "app/control/osc/server.h"
 #include "app/devices/audio.h"
 #include "app/exit_code.h"
@@ -46,5 +47,6 @@ std::vector<int> ending_signals();
 int render_command(const RenderOptions& options, bool is_quiet);
 int gallery_command(const GalleryOptions& options);
 int describe_command(const DescribeOptions& options);
+int shape_command(const ShapeOptions& options);
 
 }  // namespace ressort

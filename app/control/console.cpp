@@ -184,7 +184,11 @@ Result<Command> parse_command(std::string_view line) {
   }
   const Row& row = **found;
   words.erase(words.begin());
-  const std::vector<std::string> wanted = split_words(row.words);
+  std::vector<std::string> wanted = split_words(row.words);
+  const bool goes_on = !wanted.empty() && wanted.back() == "...";
+  if (goes_on) {
+    wanted.pop_back();
+  }
   const auto needed = static_cast<std::size_t>(
       std::count_if(wanted.begin(), wanted.end(),
                     [](const std::string& word) { return !word.starts_with('['); }));
@@ -193,13 +197,13 @@ Result<Command> parse_command(std::string_view line) {
   for (std::size_t i = needed; i < std::min(words.size(), wanted.size()); ++i) {
     is_other |= wanted[i].starts_with("[--") && wanted[i] != "[" + words[i] + "]";
   }
-  if (words.size() < needed || words.size() > wanted.size() || is_other) {
-    return Error{"the command is '" + usage(row) + "', found " +
-                 counted(words.size(), "word", "words") + " after '" + std::string(row.command) +
-                 "'" +
-                 ((words.size() > wanted.size() && needed > 0) || is_other
-                      ? "; a word with blanks in it is written in quotes"
-                      : "")};
+  const bool are_more = !goes_on && words.size() > wanted.size();
+  if (words.size() < needed || are_more || is_other) {
+    return Error{
+        "the command is '" + usage(row) + "', found " + counted(words.size(), "word", "words") +
+        " after '" + std::string(row.command) + "'" +
+        ((are_more && needed > 0) || is_other ? "; a word with blanks in it is written in quotes"
+                                              : "")};
   }
   return Command{std::string(row.command), std::move(words)};
 }
@@ -289,6 +293,10 @@ std::vector<std::string> Console::completions(std::string_view line) const {
         context_->session.current();  // kept while the worker puts another in its place
     for (const ParameterInfo& info : loaded->instrument.parameters) {
       words.push_back(info.name);
+    }
+  } else if (kind == "FIGURE") {
+    for (const AskedFigureRow& figure : asked_figure_rows()) {
+      words.push_back(short_name(figure.figure));
     }
   } else if (kind == "MODEL" || kind == "PRESET") {
     add(known_presets());

@@ -37,6 +37,8 @@ Result<Done> act(ConsoleContext& console, const Row& row, Words words);
 // What is said of modes at the console and by OSC: how many; MODE NOTE|HZ [T60] [PART].
 Result<std::size_t> mode_count(const Argument& argument);
 Result<TuneTarget> tune_target(std::span<const Argument> arguments);
+// The same of a timbre that is asked for: FIGURE VALUE, as many as there are.
+Result<std::vector<TimbreTarget>> timbre_targets(std::span<const Argument> arguments);
 
 namespace command {
 Result<Done> keys(ConsoleContext& console, Words words);
@@ -56,6 +58,7 @@ Result<Done> explain(ConsoleContext& console, Words words);
 Result<Done> modes(ConsoleContext& console, Words words);
 Result<Done> tune(ConsoleContext& console, Words words);
 Result<Done> timbre(ConsoleContext& console, Words words);
+Result<Done> shape(ConsoleContext& console, Words words);
 Result<Done> tuning(ConsoleContext& console, Words words);
 Result<Done> record(ConsoleContext& console, Words words);
 Result<Done> flight(ConsoleContext& console, Words words);

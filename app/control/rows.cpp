@@ -315,6 +315,20 @@ std::vector<Row> make_rows() {
                   "in what hangs\ntogether with a mass, string, mesh or link by its name. 'modes' "
                   "lists the modes; 'undo' takes\nit back, 'save NAME' keeps it.",
        .act = command::tune},
+      {.address = "/timbre/target",
+       .arguments = {{.word = "FIGURE VALUE ...", .is_text = true}},
+       .does = "turns parameters until it sounds so: centroid 1800 t60 3; answers /done with the "
+               "figures, or /fail",
+       .answer = answer::shape,
+       .command = "shape",
+       .group = CommandGroup::parameters,
+       .words = "FIGURE VALUE ...",
+       .command_does = "turns parameters until it sounds so: centroid 1800 t60 3",
+       .details = "FIGURE is t60 in s, centroid or spread in Hz, inharmonicity or odd_to_even, and "
+                  "f0 in Hz where keys\ndo not set the pitch, of a blow at the key that was played "
+                  "last. Parameters move within their\nranges. 'undo' takes it back, 'save NAME' "
+                  "keeps it, 'timbre' tells what sounds.",
+       .act = command::shape},
       {.address = "/subscribe",
        .arguments = {{"SECONDS", "the seconds", 0, Subscribers::longest_lease_s, 10}},
        .does =

@@ -173,10 +173,10 @@ Meters Process::meters() const {
 void Process::gather(std::size_t frames, std::span<const MidiPacket> midi, std::int64_t time_ns) {
   now_.clear();
   next_now_ = 0;
+  drain(from_session, frames, time_ns);  // first: who answers it with another value means that
   drain(from_osc, frames, time_ns);
   drain(from_console, frames, time_ns);
   drain(from_midi, frames, time_ns);
-  drain(from_session, frames, time_ns);
   const std::size_t before = now_.size();
   const auto last = static_cast<std::int64_t>(frames) - 1;
   for (const MidiPacket& packet : midi) {

@@ -171,10 +171,10 @@ struct Process {
   // Written through send() and send_ahead().
   Ring<TimedEvent> from_osc{max_now + max_endings + max_ahead};
   Ring<TimedEvent> from_console{max_now + max_endings};
-  Ring<TimedEvent> from_midi{max_now + max_endings};  // RtMidi's thread
-  Ring<TimedEvent> from_session{max_now + max_endings};
-  Ring<Lesson> lessons{256};   // from the session, under its lock
-  Ring<Report> reports{4096};  // to the session's worker
+  Ring<TimedEvent> from_midi{max_now + max_endings};     // RtMidi's thread
+  Ring<TimedEvent> from_session{max_now + max_endings};  // its worker
+  Ring<Lesson> lessons{256};                             // from the session, under its lock
+  Ring<Report> reports{4096};                            // to the session's worker
   Ring<RecordedChunk> recording{8192};
   Flag is_recording;
   Ring<RecordedChunk> listening{1024};  // to whoever describes what sounds

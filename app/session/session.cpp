@@ -193,18 +193,18 @@ void Session::work() {
   }
   while (true) {
     std::deque<Job> jobs;
-    std::optional<ModesJob> modes_job;
+    std::optional<Inquiry> inquiry;
     bool is_ending = false;
     bool wants_again = false;
     {
       std::unique_lock lock(mutex_);
       wake_.wait_for(lock, 20ms, [this] {
-        return stop_ || !jobs_.empty() || !modes_jobs_.empty() || has_new_rate();
+        return stop_ || !jobs_.empty() || !inquiries_.empty() || has_new_rate();
       });
       jobs.swap(jobs_);
-      if (jobs.empty() && !modes_jobs_.empty()) {
-        modes_job = std::move(modes_jobs_.front());
-        modes_jobs_.pop_front();
+      if (jobs.empty() && !inquiries_.empty()) {
+        inquiry = std::move(inquiries_.front());
+        inquiries_.pop_front();
       }
       is_ending = stop_;
       wants_again = has_new_rate();
@@ -217,8 +217,8 @@ void Session::work() {
     }
     if (is_ending) {
       const std::lock_guard lock(mutex_);
-      for (const ModesJob& job : modes_jobs_) {
-        job.answer(Error{ending});
+      for (const Inquiry& one : inquiries_) {
+        one.refuse(Error{ending});
       }
       return;
     }
@@ -226,8 +226,8 @@ void Session::work() {
       listen();
       if (!jobs.empty()) {
         do_load(jobs.front());
-      } else if (modes_job) {
-        do_modes(*modes_job);
+      } else if (inquiry) {
+        inquiry->work();
       } else if (wants_again) {
         do_again();
       } else if (watch_ && (std::exchange(is_edited_, false) || watch_->has_changed())) {

@@ -18,6 +18,7 @@
 #include "app/session/flight/flight.h"
 #include "app/session/loader.h"
 #include "app/session/modes/known_modes.h"
+#include "app/session/timbre/shape.h"
 #include "app/session/timbre/timbre_watch.h"
 #include "app/session/watch/file_watch.h"
 #include "core/analysis/modes/tune.h"
@@ -110,6 +111,12 @@ class Session {
   using ModesAnswer = std::function<void(const Result<KnownModes>&)>;
   void find_modes(std::size_t count, ModesAnswer answer);
 
+  // Turns parameters of what sounds so that it has this timbre, or comes nearest, at the key that
+  // was played last; in the worker, where `answer` is called. One change, that can be taken back.
+  // Gives way to a load. [any thread but audio]
+  using ShapeAnswer = std::function<void(const Result<Shaped>&)>;
+  void shape(std::vector<TimbreTarget> targets, ShapeAnswer answer);
+
   // The backend runs at another rate: what sounds is compiled anew.
   void set_rate(double rate_hz);
 
@@ -200,9 +207,10 @@ class Session {
     Answer answer;
   };
 
-  struct ModesJob {
-    std::size_t count = 0;
-    ModesAnswer answer;
+  // About what sounds; a load goes before it.
+  struct Inquiry {
+    std::function<void()> work;  // answers
+    std::function<void(const Error&)> refuse;
   };
 
   // What sounds, to be compiled once more with more patience.
@@ -225,7 +233,11 @@ class Session {
   void work();
   void do_load(const Job& job);
   void do_again();
-  void do_modes(const ModesJob& job);
+  void inquire(Inquiry inquiry);
+  // What sounds as its files have it, and its numbers as they are.
+  Result<Scene> scene_now(const Present& now, const Progress& progress) const;
+  Result<KnownModes> modes_now(std::size_t count);
+  Result<Shaped> shape_now(const std::vector<TimbreTarget>& targets);
   Result<Wish> write_tuned(const TuneTarget& target);
   // The preset of what sounds as it is now, with its model by another name.
   Result<std::string> preset_text(const std::string& model) const;
@@ -261,7 +273,7 @@ class Session {
   mutable std::mutex mutex_;  // everything below; never near the audio thread
   std::condition_variable wake_;
   std::deque<Job> jobs_;
-  std::deque<ModesJob> modes_jobs_;
+  std::deque<Inquiry> inquiries_;
   bool stop_ = false;
   double rate_hz_;
   double built_rate_hz_;  // what sounds was made for, or was tried to be

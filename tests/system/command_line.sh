@@ -86,6 +86,25 @@ expect 2 "is not linear" "$program" describe "$source/models/BowedString.mdl"
 model bar.mdl '@s string 9 1. 0.1 0.001 0. 0.\n@in1 frcInput [@s 0.3]\n@out1 posOutput [@s 0.7]\n'
 expect 0 '"closed_form":true' "$program" describe bar.mdl --json
 expect 0 "modes, in closed form" "$program" describe bar.mdl
+
+# Timbre that is asked for.
+model free.mdl '@k param 0.1\n@z param 0.001\n@s string 20 1. k z 0. 0.\n@in1 frcInput [@s 0.3]\n@out1 posOutput [@s 0.7]\n'
+expect 0 "0.00 JND" "$program" shape free.mdl --f0 300 --t60 3 -o shaped.toml
+expect 0 "300.000" "$program" modes shaped.toml --modes 1
+expect 2 "shaped.toml' is there already" "$program" shape free.mdl --f0 300 -o shaped.toml
+expect 0 "as high as it gets is" "$program" shape free.mdl --f0 20000
+expect 0 '"k": "highest"' "$program" shape free.mdl --f0 20000 --json
+expect 0 "key 60 (C4 +0)" "$program" shape PolyTriangle --note 60 --centroid 400 --json
+expect 0 "as dark as it gets with the rest is" "$program" shape free.mdl --like blow.flac --t60 3
+expect 2 "keys set the pitch of PolyTriangle" "$program" shape PolyTriangle --f0 100
+expect 2 "bar.mdl:1:1: error: nothing may be turned" "$program" shape bar.mdl --t60 3
+expect 2 "here is a bow" "$program" shape BowedString --t60 3
+expect 2 "did you mean 'centroid'?" "$program" shape free.mdl --centroit 300
+expect 2 "must be a number above 0, found nan" "$program" shape free.mdl --t60 nan
+expect 2 "nothing is asked for" "$program" shape free.mdl
+expect 2 "ends in .toml" "$program" shape free.mdl --t60 3 -o shaped.wav
+expect 2 "it cannot be written too" "$program" shape shaped.toml --t60 3 -o shaped.toml --force
+expect 2 "there is no file 'nosuch.wav'" "$program" shape free.mdl --like nosuch.wav
 # Whoever reads it finds one object, with plain numbers at the top.
 if command -v python3 > /dev/null; then
   "$program" describe blow.flac --json --f0 261.63 > timbre.json

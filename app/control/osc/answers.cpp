@@ -258,6 +258,34 @@ void answer::tune(const Question& question) {
                         });
 }
 
+void answer::shape(const Question& question) {
+  const Message& message = question.message;
+  const OscClient& client = question.client;
+  const auto targets = timbre_targets(message.arguments);
+  if (!targets) {
+    client.error(message.address, targets.error().message);
+    return;
+  }
+  question.session.shape(*targets, [message, client](const Result<Shaped>& shaped) {
+    Reply reply(shaped ? "/done" : "/fail");
+    reply.text(message.address);
+    if (!shaped) {
+      client.answer(reply.text(without_source(shaped.error().message)));
+      return;
+    }
+    for (std::size_t t = 0; t < shaped->targets.size(); ++t) {
+      const AskedFigure figure = shaped->targets[t].figure;
+      reply.text(short_name(figure))
+          .real(*shaped->found.reached[static_cast<std::size_t>(figure)])
+          .real(shaped->found.noticed[t]);
+    }
+    for (const std::string& why : missed(*shaped)) {
+      reply.text(why);
+    }
+    client.answer(reply);
+  });
+}
+
 void answer::subscribe(const Question& question) {
   lease(question, Subscribers::News::changes, "/subscribe.reply");
 }

@@ -36,6 +36,10 @@ void modes(const Question& question);
 // /done s:address, or /fail s:address s:why; later, on the session's worker
 void tune(const Question& question);
 
+// /done s:address [s:figure f:reached f:off]... [s:why]..., off in just noticeable differences, or
+// /fail s:address s:why; later, on the session's worker
+void shape(const Question& question);
+
 // /subscribe.reply f:seconds and, in time, what Subscribers tells; /done s:address or an error
 void subscribe(const Question& question);
 void unsubscribe(const Question& question);

@@ -3,10 +3,12 @@
 #include <filesystem>
 #include <utility>
 
+#include "app/session/changes/settings.h"
 #include "app/session/files.h"
 #include "app/session/modes/tuned_files.h"
 #include "app/session/session.h"
 #include "app/text.h"
+#include "core/curve.h"
 #include "core/model/preset/edit.h"
 
 namespace ressort {
@@ -56,7 +58,6 @@ std::optional<LastChange> Session::take_last_change() {
 
 // By its name among the parameters and the preset's OSC names; of no model where there is none.
 LearnedControl Session::control_of(const std::string& target) const {
-  constexpr double wide = 10.0;  // from here on equal turns are equal ratios
   const Instrument& instrument = current_->instrument;
   for (std::size_t i = 0; i < instrument.parameters.size(); ++i) {
     const ParameterInfo& info = instrument.parameters[i];
@@ -66,7 +67,7 @@ LearnedControl Session::control_of(const std::string& target) const {
               .model = current_->serial,
               .low = info.minimum,
               .high = info.maximum,
-              .exponential = info.minimum > 0.0 && info.maximum >= wide * info.minimum};
+              .exponential = is_wide(info.minimum, info.maximum)};
     }
   }
   for (const CustomInfo& info : instrument.custom) {
@@ -158,17 +159,7 @@ Result<std::string> Session::preset_text(const std::string& model) const {
     if (now->serial == 0) {
       return Error{"nothing is loaded that could be saved"};
     }
-    for (std::size_t i = 0; i < values_.size(); ++i) {
-      const ParameterInfo& info = now->instrument.parameters[i];
-      const bool is_in_preset =
-          std::any_of(now->preset.parameters.begin(), now->preset.parameters.end(),
-                      [&](const ParameterSetting& setting) { return setting.name == info.name; });
-      if (info.audio_input == 0 && (is_in_preset || values_[i] != info.value)) {
-        constexpr double most = 1e12;  // that a preset may say
-        changes.parameters.push_back(
-            {info.name, values_[i], std::max(info.minimum, -most), std::min(info.maximum, most)});
-      }
-    }
+    changes.parameters = changed_settings(now->instrument.parameters, now->preset, values_);
     for (const LearnedRow& row : learned_) {
       const LearnedControl control = control_of(row.target);
       for (const ControlSetting& setting : now->preset.controls) {
@@ -202,7 +193,6 @@ Result<std::string> Session::save(const std::string& name, Existing existing) {
   if (!path) {
     return path.error();
   }
-  std::error_code error;
   if (const std::string there = preset_path(name); existing == Existing::refuse && !there.empty()) {
     return Error{there == *path ? "'" + name + "' is there already; --force writes over it"
                                 : "'" + name +
@@ -218,12 +208,7 @@ Result<std::string> Session::save(const std::string& name, Existing existing) {
     }
     model = *kept;
   }
-  // By its name where that leads to it from there too.
-  const std::string known = model_path(std::filesystem::path(model).stem().string());
-  const bool is_known = !known.empty() && std::filesystem::equivalent(known, model, error);
-  const auto text =
-      preset_text(is_known ? std::filesystem::path(model).filename().string()
-                           : std::filesystem::absolute(model, error).lexically_normal().string());
+  const auto text = preset_text(model_name_elsewhere(model));
   if (!text) {
     return text.error();
   }

@@ -1,4 +1,4 @@
-// What a player asks of the modes of what sounds.
+// What a player asks of the modes and the timbre of what sounds.
 #include <utility>
 
 #include "app/session/files.h"
@@ -10,6 +10,14 @@ namespace ressort {
 namespace {
 
 const char* const ending = "the program is ending";
+
+// What was stopped was stopped for a load.
+template <class T>
+Result<T> told(Result<T> result) {
+  return result || result.error().message != stopped
+             ? std::move(result)
+             : Result<T>(Error{"given up for a load; ask again"});
+}
 
 }  // namespace
 
@@ -26,67 +34,110 @@ void Session::tune(TuneTarget target, Answer answer) {
   answer(Error{ending});
 }
 
-void Session::find_modes(std::size_t count, ModesAnswer answer) {
+void Session::inquire(Inquiry inquiry) {
   constexpr std::size_t most_waiting = 4;
-  const char* reason = "busy: enough modes are looked for, try again";
+  const char* reason = "busy: enough is asked of what sounds, try again";
   {
     const std::lock_guard lock(mutex_);
-    if (!stop_ && modes_jobs_.size() < most_waiting) {
-      modes_jobs_.push_back({count, std::move(answer)});
+    if (!stop_ && inquiries_.size() < most_waiting) {
+      inquiries_.push_back(std::move(inquiry));
       wake_.notify_all();
       return;
     }
     reason = stop_ ? ending : reason;
   }
-  answer(Error{reason});
+  inquiry.refuse(Error{reason});
 }
 
-void Session::do_modes(const ModesJob& job) {
-  const Present now = present();
+void Session::find_modes(std::size_t count, ModesAnswer answer) {
+  inquire({[this, count, answer] { answer(told(modes_now(count))); },
+           [answer](const Error& error) { answer(error); }});
+}
+
+void Session::shape(std::vector<TimbreTarget> targets, ShapeAnswer answer) {
+  inquire({[this, targets = std::move(targets), answer] { answer(told(shape_now(targets))); },
+           [answer](const Error& error) { answer(error); }});
+}
+
+Result<Scene> Session::scene_now(const Present& now, const Progress& progress) const {
   if (now.loaded->serial == 0) {
-    job.answer(Error{"nothing is loaded"});
-    return;
+    return Error{"nothing is loaded"};
   }
-  ModeOptions options{.count = job.count, .progress = Progress([this](std::string_view) {
-                                            return !is_outdated(true);
-                                          })};
+  auto scene = load_scene(now.loaded->path, {.bare = options_.compile.bare,
+                                             .third = options_.third,
+                                             .keys = options_.keys,
+                                             .progress = progress});
+  if (scene && scene->network.parameters.size() != now.values.size()) {
+    return Error{"the model's file was changed since it was loaded; load it again"};
+  }
+  return scene;
+}
+
+Result<KnownModes> Session::modes_now(std::size_t count) {
+  const Present now = present();
+  ModeOptions options{.count = count, .progress = Progress([this](std::string_view) {
+                                        return !is_outdated(true);
+                                      })};
   {
     const std::lock_guard lock(mutex_);
     options.rate_hz = rate_hz_;
   }
-  const auto scene = load_scene(now.loaded->path, {.bare = options_.compile.bare,
-                                                   .third = options_.third,
-                                                   .keys = options_.keys,
-                                                   .progress = options.progress});
+  const auto scene = scene_now(now, options.progress);
+  return scene ? known_modes(*scene, now.values, options) : scene.error();
+}
+
+Result<Shaped> Session::shape_now(const std::vector<TimbreTarget>& targets) {
+  constexpr int usual_key = 57;
+  const Present now = present();
+  const Progress progress([this](std::string_view) { return !is_outdated(true); });
+  const auto scene = scene_now(now, progress);
   if (!scene) {
-    job.answer(scene.error());
-  } else if (scene->network.parameters.size() != now.values.size()) {
-    job.answer(Error{"the model's file was changed since it was loaded; load it again"});
-  } else {
-    const auto modes = known_modes(*scene, now.values, options);
-    job.answer(modes || modes.error().message != stopped
-                   ? modes
-                   : Result<KnownModes>(Error{"given up for a load; ask again"}));
+    return scene.error();
   }
+  const Instrument& instrument = now.loaded->instrument;
+  const Meters meters = process_.meters();
+  ShapeRequest request{
+      .scene = *scene,
+      .parameters = instrument.parameters,
+      .values = now.values,
+      .has_keys = scene->has_preset && instrument.mode.has_value(),
+      .key = meters.notes == 0
+                 ? usual_key
+                 : meters.last_notes[(meters.notes - 1) % meters.last_notes.size()].key,
+      .rate_hz = options_.compile.rescale ? built_rate_hz_ : Network::reference_rate_hz,
+      .tuned_at = {},
+      .progress = progress};
+  for (const ParameterInfo& info : instrument.parameters) {
+    request.tuned_at.push_back(info.value);
+  }
+  auto shaped = shape_timbre(request, targets);
+  if (!shaped) {
+    return shaped;
+  }
+  std::vector<TimedEvent> events;
+  for (std::size_t i = 0; i < now.values.size(); ++i) {
+    if (shaped->found.values[i] != now.values[i]) {
+      events.push_back({.event = {.kind = EventKind::parameter,
+                                  .index = static_cast<std::uint16_t>(i),
+                                  .model = now.loaded->serial,
+                                  .value = shaped->found.values[i]}});
+    }
+  }
+  if (!process_.send(process_.from_session, events)) {
+    return Error{"the audio thread is busy and took nothing; try again"};
+  }
+  remember(events);
+  return shaped;
 }
 
 Result<Session::Wish> Session::write_tuned(const TuneTarget& target) {
   const Present now = present();
-  if (now.loaded->serial == 0) {
-    return Error{"nothing is loaded"};
-  }
   const ModeOptions options{
       .rate_hz = options_.compile.rescale ? built_rate_hz_ : Network::reference_rate_hz,
       .progress = Progress([this](std::string_view) { return !is_outdated(true); })};
-  const auto scene = load_scene(now.loaded->path, {.bare = options_.compile.bare,
-                                                   .third = options_.third,
-                                                   .keys = options_.keys,
-                                                   .progress = options.progress});
+  const auto scene = scene_now(now, options.progress);
   if (!scene) {
     return scene.error();
-  }
-  if (scene->network.parameters.size() != now.values.size()) {
-    return Error{"the model's file was changed since it was loaded; load it again"};
   }
   const auto tuned = tune_mode(scene->network, now.values, target, options);
   if (!tuned) {

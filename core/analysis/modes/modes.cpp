@@ -50,7 +50,8 @@ class ModeTeller {
     for (const ModalPort& port : made_.system.inputs) {
       const Complex pushed = along(port, swing);
       for (const Complex& out : heard) {
-        mode.levels.push_back(std::abs(pushed * out) / swing.mu.imag());
+        mode.residues.push_back(pushed * out / swing.mu.imag());
+        mode.levels.push_back(std::abs(mode.residues.back()));
       }
     }
     mode.mu = swing.mu;

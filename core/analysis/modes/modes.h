@@ -27,6 +27,9 @@ struct NetworkMode {
   // [input * outputs + output] Amplitude of the partial at the output, at the time of an impulse: a
   // force of 1 for one sample at a force input; a position of 1 for one sample at a position input.
   std::vector<double> levels;
+  // [the same] The sound of that impulse is the imaginary part of residue * e^(pole_of(mu) n),
+  // n from 1 for the sample in which it comes.
+  std::vector<std::complex<double>> residues;
   std::complex<double> mu;  // as in quadratic.h
   ComplexVector shape;      // [row of `masses`] displacement, times the root of the mass
 };

@@ -1,0 +1,245 @@
+#include "app/session/timbre/shape.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "app/session/modes/known_modes.h"
+#include "app/session/timbre/timbre_figures.h"
+#include "app/text.h"
+#include "core/analysis/modes/scaling.h"
+#include "core/laws/laws.h"
+#include "core/model/language/expression.h"
+#include "core/model/preset/fit.h"
+#include "core/model/topology.h"
+
+namespace ressort {
+namespace {
+
+constexpr double missed_by = 0.1;  // of what is noticed: less is as good as there
+
+std::string told(AskedFigure figure, double value) {
+  const std::string_view name = row_of(figure).name;
+  const std::string_view unit = name.ends_with("_hz") ? " Hz" : name.ends_with("_s") ? " s" : "";
+  const int digits = value >= 1000.0  ? 0
+                     : value >= 100.0 ? 1
+                     : value >= 1.0   ? 2
+                     : value >= 1e-3  ? 4
+                                      : 7;
+  return (value >= 1e9 ? print_number(value) : with_commas(value, digits)) + std::string(unit);
+}
+
+// The first line that a parameter could take the place of a number in.
+Error nothing_to_turn(const Scene& scene) {
+  const Network& network = scene.network;
+  if (!network.parameters.empty()) {
+    return {
+        "nothing may be turned: each parameter is an input's, or its range has one value; give "
+        "one a wider range in the preset's [parameters]"};
+  }
+  const std::string how =
+      " is a fixed number: put '@K param VALUE' above this line and K in its "
+      "place";
+  const auto lines = spring_lines(network);
+  if (!lines || lines->empty()) {
+    return {"nothing may be turned: the model has no 'param'"};
+  }
+  const SpringLine& line = lines->front();
+  const SourceLocation place =
+      line.kind == SpringLine::Kind::macro  ? network.macros[line.index].location
+      : line.kind == SpringLine::Kind::link ? network.links[line.index].location
+                                            : network.masses[line.index].location;
+  const Finding finding = finding_in_model(
+      scene, {"nothing may be turned: the stiffness here" + how, place.line, place.column});
+  return {to_string(finding)};
+}
+
+std::optional<Error> not_linear(const Scene& scene) {
+  const std::string so =
+      ", so how it sounds depends on how it is played: no figure can be asked "
+      "for";
+  if (has_waveguide(scene.network)) {
+    return Error{scene.name + " has a waveguide, which has no modes of this kind" + so};
+  }
+  for (const Link& link : scene.network.links) {
+    if (link.law != Law::spring) {
+      const std::string what = "a " + std::string(facts_of(link.law).one);
+      return Error{
+          to_string(finding_in_model(scene, {scene.name + " is not linear: here is " + what + so,
+                                             link.location.line, link.location.column}))};
+    }
+  }
+  return std::nullopt;
+}
+
+// The input that a key plays, and else the first.
+std::size_t struck_input(const Scene& scene, bool has_keys, int key) {
+  for (const ControlSetting& control : scene.preset.controls) {
+    const int input = find_input(scene.network, control.target);
+    if (has_keys && control.source == ControlSource::note && input >= 0 &&
+        control.lowest_key <= key && key <= control.highest_key) {
+      return static_cast<std::size_t>(input);
+    }
+  }
+  return 0;
+}
+
+double key_hz(const Preset& preset, int key) {
+  const auto index = static_cast<std::size_t>(key);
+  const double ratio = std::exp2(preset.transpose / 12.0);
+  return index < preset.keys_hz.size() ? preset.a4_hz / usual_a4_hz * ratio * preset.keys_hz[index]
+                                       : preset.a4_hz * ratio * std::exp2((key - 69) / 12.0);
+}
+
+}  // namespace
+
+std::string short_name(AskedFigure figure) {
+  const std::string name(row_of(figure).name);
+  const std::size_t unit = name.ends_with("_hz") ? 3 : name.ends_with("_s") ? 2 : 0;
+  return name.substr(0, name.size() - unit);
+}
+
+Result<AskedFigure> asked_figure(const std::string& word) {
+  std::vector<std::string> known;
+  for (const AskedFigureRow& row : asked_figure_rows()) {
+    known.push_back(short_name(row.figure));
+    if (word == row.name || word == known.back()) {
+      return row.figure;
+    }
+  }
+  return Error{"unknown figure '" + word + "'; there are " + joined(known, ", ") +
+               did_you_mean(word, known)};
+}
+
+Result<Shaped> shape_timbre(const ShapeRequest& request, std::vector<TimbreTarget> targets) {
+  const Scene& scene = request.scene;
+  const Preset& preset = scene.preset;
+  if (auto error = not_linear(scene)) {
+    return *error;
+  }
+  if (scene.network.inputs.empty() || scene.network.outputs.empty()) {
+    return Error{scene.name + " has no " +
+                 (scene.network.inputs.empty() ? "input that could be struck"
+                                               : "output that could be heard")};
+  }
+  for (std::size_t i = 0; i < targets.size(); ++i) {
+    const auto same = [&](const TimbreTarget& other) { return other.figure == targets[i].figure; };
+    if (std::count_if(targets.begin(), targets.end(), same) > 1) {
+      return Error{short_name(targets[i].figure) + " is asked for twice"};
+    }
+    if (request.has_keys && targets[i].figure == AskedFigure::f0) {
+      return Error{"keys set the pitch of " + scene.name + "; ask for another key instead"};
+    }
+  }
+  std::vector<FreeParameter> free;
+  Shaped shaped;
+  for (std::size_t i = 0; i < request.parameters.size(); ++i) {
+    const ParameterInfo& info = request.parameters[i];
+    shaped.names.push_back(info.name);
+    if (info.audio_input == 0 && info.minimum < info.maximum) {
+      free.push_back({i, info.minimum, info.maximum});
+    }
+  }
+  if (free.empty()) {
+    return nothing_to_turn(scene);
+  }
+  StrikeOptions options{.rate_hz = request.rate_hz,
+                        .input = struck_input(scene, request.has_keys, request.key),
+                        .pitch_mode = static_cast<std::size_t>(preset.pitch_mode - 1),
+                        .progress = request.progress};
+  shaped.of = scene.name;
+  if (request.has_keys) {
+    options.key_hz = key_hz(preset, request.key);
+    shaped.of += ", key " + std::to_string(request.key) + " (" + note_name(*options.key_hz) + ")";
+  }
+  shaped.of += ", a blow at in" + std::to_string(scene.network.inputs[options.input].number) +
+               " heard at out" + std::to_string(scene.network.outputs[0].number);
+  const Network network = with_fixed(scene.network, preset);
+  if (request.has_keys && !request.tuned_at.empty()) {
+    const auto factor = StruckModel(network, options).key_factor(request.tuned_at);
+    if (!factor) {
+      return factor.error();
+    }
+    options.key_factor = *factor;
+    // So that what is turned leaves the pitch where keys have it.
+    targets.push_back({AskedFigure::f0, *options.key_hz});
+  }
+  const StruckModel lines(network, options);
+  options.by_samples = true;
+  const StruckModel samples(network, options);
+  shaped.targets = targets;
+  auto found = ask_timbre(
+      [&](std::span<const double> values) { return lines.figures(values); }, request.values, free,
+      targets,
+      {.exactly = [&](std::span<const double> values) { return samples.figures(values); },
+       .tell = request.tell,
+       .progress = request.progress});
+  if (!found) {
+    return found.error().message == stopped ? found.error()
+                                            : Error{scene.name + ": " + found.error().message};
+  }
+  shaped.found = *std::move(found);
+  return shaped;
+}
+
+std::vector<ShapedParameter> changed(const Shaped& shaped, std::span<const double> before) {
+  std::vector<ShapedParameter> all;
+  for (std::size_t i = 0; i < before.size(); ++i) {
+    if (shaped.found.values[i] != before[i]) {
+      all.push_back({shaped.names[i], shaped.found.values[i]});
+    }
+  }
+  return all;
+}
+
+std::vector<std::string> missed(const Shaped& shaped) {
+  std::vector<std::string> held;
+  for (const AskedTimbre::Held& bound : shaped.found.held) {
+    held.push_back(shaped.names[bound.index] + " is at its " +
+                   (bound.is_highest ? "highest" : "lowest"));
+  }
+  const std::string why = !shaped.found.has_influence ? "nothing that may be turned changes it"
+                          : held.empty()              ? shaped.targets.size() > 1
+                                                            ? "more of one is less of another"
+                                                            : "what may be turned leads no further"
+                                                      : joined(held, ", ");
+  std::vector<std::string> lines;
+  for (std::size_t t = 0; t < shaped.targets.size(); ++t) {
+    const double noticed = shaped.found.noticed[t];
+    if (std::fabs(noticed) <= missed_by) {
+      continue;
+    }
+    const AskedFigure figure = shaped.targets[t].figure;
+    const double reached = *shaped.found.reached[static_cast<std::size_t>(figure)];
+    const std::string word(noticed < 0.0 ? row_of(figure).more : row_of(figure).less);
+    lines.push_back("as " + word + " as it gets" +
+                    (shaped.targets.size() > 1 ? " with the rest" : "") + " is " +
+                    told(figure, reached) + ": " + why);
+  }
+  return lines;
+}
+
+std::string to_text(const Shaped& shaped) {
+  std::vector<std::vector<std::string>> rows{{"figure", "before", "asked", "reached", "off"}};
+  const auto value = [](AskedFigure figure, const AskedValues& values) {
+    const auto one = values[static_cast<std::size_t>(figure)];
+    return one ? told(figure, *one) : std::string("-");
+  };
+  for (const AskedFigureRow& row : asked_figure_rows()) {
+    std::vector<std::string> cells{short_name(row.figure), value(row.figure, shaped.found.before),
+                                   "", value(row.figure, shaped.found.reached), ""};
+    for (std::size_t t = 0; t < shaped.targets.size(); ++t) {
+      if (shaped.targets[t].figure == row.figure) {
+        cells[2] = told(row.figure, shaped.targets[t].value);
+        cells[4] = fixed(std::fabs(shaped.found.noticed[t]), 2) + " JND";
+      }
+    }
+    rows.push_back(std::move(cells));
+  }
+  std::string text = shaped.of + "\n" + table(rows);
+  for (const std::string& line : missed(shaped)) {
+    text += "\n" + line;
+  }
+  return text;
+}
+
+}  // namespace ressort

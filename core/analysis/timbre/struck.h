@@ -1,0 +1,90 @@
+// core/analysis/timbre: what a linear model is like when it is struck once, as a function of its
+// parameters, in closed form from its modes. Pure. [any thread but audio]
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <string_view>
+
+#include "core/analysis/modes/modes.h"
+#include "core/analysis/timbre/frame_analysis.h"
+#include "core/analysis/timbre/modal_spectrum.h"
+#include "core/model/network.h"
+#include "core/progress.h"
+#include "core/result.h"
+
+namespace ressort {
+
+// What may be asked of a timbre. Other figures jump while parameters move, or count bins.
+enum class AskedFigure : std::uint8_t { f0, t60, centroid, spread, inharmonicity, odd_to_even };
+inline constexpr std::size_t asked_figures = 6;
+
+struct AskedFigureRow {
+  AskedFigure figure = AskedFigure::f0;
+  std::string_view name;  // with its unit, as descriptions have it
+  // What is just noticed: a share of it; of inharmonicity so much.
+  double noticed = 0.0;
+  bool is_ratio = true;
+  std::string_view more;  // "bright", for people
+  std::string_view less;
+};
+const AskedFigureRow& row_of(AskedFigure figure);
+std::span<const AskedFigureRow> asked_figure_rows();
+
+// [figure] Nothing where the sound has none.
+using AskedValues = std::array<std::optional<double>, asked_figures>;
+
+// How far a figure is from a target, in just noticeable differences: above 0 where it is more.
+// Both above 0 where the figure is a ratio.
+double noticed_between(AskedFigure figure, double value, double target);
+
+struct StrikeOptions {
+  double rate_hz = Network::reference_rate_hz;
+  std::size_t input = 0;   // index into Network::inputs
+  std::size_t output = 0;  // the same of outputs
+  // With it every stiffness that is not fixed gets the factor that brings the mode there, as a key
+  // does it; else the model is as it is written.
+  std::optional<double> key_hz;
+  std::size_t pitch_mode = 0;  // from the lowest that swings
+  // Instead of what brings the mode there: the factor that a key has got for other parameters.
+  std::optional<double> key_factor;
+  std::size_t frame = 2048;  // samples from the blow on, of which the spectrum is, of amplitudes
+                             // under a Hann window
+  // The frame is computed sample by sample and analysed as a recording is: exact, but figures jump
+  // where a peak moves to another bin. Else modes are lines, and figures are smooth.
+  bool by_samples = false;
+  Progress progress = {};
+};
+
+class StruckModel {
+ public:
+  // Of a network with one input and one output at least.
+  StruckModel(const Network& network, const StrikeOptions& options);
+
+  // f0 is the mode that a key tunes, or else the lowest within 60 dB of the loudest; T60 is its.
+  // That of a mode that nothing damps is `longest_t60_s`. The error says why there are none: no
+  // mode swings or is heard, one grows, a number is none; not linear; or `stopped`. O(masses^3)
+  Result<AskedValues> figures(std::span<const double> parameters) const;
+
+  // What `key_hz` multiplies stiffness by. Errors as of figures().
+  Result<double> key_factor(std::span<const double> parameters) const;
+
+  static constexpr double longest_t60_s = 1e6;
+
+ private:
+  struct TunedModes {
+    NetworkModes modes;
+    double factor = 1.0;
+  };
+  Result<TunedModes> tuned_modes(std::span<const double> parameters) const;
+  FrameTimbre lines_of(std::span<const DecayingPartial> partials, double f0_hz) const;
+  FrameTimbre analysed(const NetworkModes& modes, double f0_hz) const;
+
+  Network network_;
+  StrikeOptions options_;
+};
+
+}  // namespace ressort

@@ -1,0 +1,291 @@
+// Timbre that is asked for: hidden parameters are found again, as the textbook simulator renders
+// them; and what cannot be had says so.
+#include <chrono>
+#include <cmath>
+#include <cstdio>
+#include <limits>
+#include <numbers>
+
+#include "core/analysis/timbre/ask.h"
+#include "core/analysis/timbre/frame_analysis.h"
+#include "tests/support/harness.h"
+#include "tests/support/random.h"
+#include "tests/support/reference_network.h"
+
+namespace ressort {
+namespace {
+
+constexpr double rate_hz = 44100.0;
+constexpr std::size_t frame = 2048;
+
+struct Ranged {
+  double minimum;
+  double maximum;
+};
+
+// A linear model, and where its parameters may be.
+struct Played {
+  const char* text;
+  std::vector<Ranged> ranges;
+};
+
+const Played models[] = {
+    {"@k param 0.2\n@z param 0.001\n@at param 0.3\n@s string 40 1. k z 0. 0.\n"
+     "@in1 frcInput [@s at]\n@out1 posOutput [@s 0.71]\n",
+     {{0.02, 0.9}, {1e-4, 0.02}, {0.05, 0.45}}},
+    {"@k param 0.2\n@bend param 0.02\n@z param 0.001\n@s stiffString 30 1. k bend z 0. 0.\n"
+     "@in1 frcInput [@s 0.21]\n@out1 posOutput [@s 0.66]\n",
+     {{0.05, 0.5}, {1e-3, 0.1}, {1e-4, 0.01}}},
+    {"@m param 1\n@k param 0.1\n@z param 0.001\n@at param 0.3\n@s closedMesh 7 9 m k z 0. 0.\n"
+     "@in1 frcInput [@s at 0.3]\n@out1 posOutput [@s 0.7 0.6]\n",
+     {{1.0, 8.0}, {0.02, 0.2}, {1e-4, 0.01}, {0.2, 0.5}}},
+    {"@k param 0.05\n@z param 0.001\n@air param 0.0005\n@a mass 1. 0. 0.\n@b mass 1.5 0. 0.\n"
+     "@c mass 0.8 0. 0.\n@g ground 0.\n@l0 springDamper @g @a k air\n@l1 springDamper @a @b 0.05 "
+     "z\n"
+     "@l2 springDamper @b @c k z\n@in1 frcInput @a\n@out1 posOutput @c\n",
+     {{0.005, 0.3}, {1e-5, 0.01}, {1e-5, 0.01}}},
+};
+
+Network read(const Played& model) {
+  return support::network_of(model.text);
+}
+
+std::vector<FreeParameter> free_of(const Played& model) {
+  std::vector<FreeParameter> free;
+  for (std::size_t i = 0; i < model.ranges.size(); ++i) {
+    free.push_back({i, model.ranges[i].minimum, model.ranges[i].maximum});
+  }
+  return free;
+}
+
+double drawn(support::Random& random, const Ranged& range) {
+  return is_wide(range.minimum, range.maximum)
+             ? range.minimum * std::pow(range.maximum / range.minimum, random.uniform(0.0, 1.0))
+             : random.uniform(range.minimum, range.maximum);
+}
+
+// The first frame after a blow, as the textbook simulator has it.
+std::vector<double> rendered(const Network& network, std::span<const double> parameters) {
+  auto simulation = reference::Builder(network, parameters).build();
+  std::vector<double> samples;
+  for (std::size_t n = 0; n < frame; ++n) {
+    const double force[] = {n == 0 ? 1.0 : 0.0};
+    samples.push_back(simulation.simulator.step(force)[0]);
+  }
+  return samples;
+}
+
+// What that frame is like; f0 and T60 are not to be read off 46 ms, so they are the modes' own.
+AskedValues heard(const Played& model, std::span<const double> parameters) {
+  const Network network = read(model);
+  const auto told = StruckModel(network, {}).figures(parameters);
+  REQUIRE(told);
+  AskedValues values = *told;
+  FrameAnalysis analysis({.rate_hz = rate_hz,
+                          .size = frame,
+                          .f0_hz = values[static_cast<std::size_t>(AskedFigure::f0)]});
+  const FrameTimbre timbre = analysis.next(rendered(network, parameters));
+  const auto set = [&](AskedFigure figure, std::optional<double> value) {
+    values[static_cast<std::size_t>(figure)] = value;
+  };
+  set(AskedFigure::centroid, timbre.shape->centroid_hz);
+  set(AskedFigure::spread, timbre.shape->spread_hz);
+  set(AskedFigure::inharmonicity, timbre.harmonics->inharmonicity);
+  set(AskedFigure::odd_to_even, timbre.harmonics->odd_to_even);
+  return values;
+}
+
+Result<AskedTimbre> asked(const Played& model, std::span<const double> start,
+                          std::span<const TimbreTarget> targets) {
+  const Network network = read(model);
+  const StruckModel lines(network, {});
+  const StruckModel samples(network, {.by_samples = true});
+  const std::vector<FreeParameter> free = free_of(model);
+  return ask_timbre([&](auto parameters) { return lines.figures(parameters); }, start, free,
+                    targets,
+                    {.exactly = [&](auto parameters) { return samples.figures(parameters); }});
+}
+
+}  // namespace
+
+TEST_CASE("figures by samples are those of the sound", "[ask]") {
+  support::Random random(5);
+  for (const Played& model : models) {
+    INFO(model.text);
+    std::vector<double> parameters;
+    for (const Ranged& range : model.ranges) {
+      parameters.push_back(drawn(random, range));
+    }
+    const auto told = StruckModel(read(model), {.by_samples = true}).figures(parameters);
+    REQUIRE(told);
+    const AskedValues sound = heard(model, parameters);
+    for (const AskedFigureRow& row : asked_figure_rows()) {
+      INFO(row.name);
+      const auto index = static_cast<std::size_t>(row.figure);
+      REQUIRE((*told)[index].has_value() == sound[index].has_value());
+      if (sound[index]) {
+        CHECK(*(*told)[index] == Approx(*sound[index]).epsilon(1e-6).margin(1e-9));
+      }
+    }
+  }
+}
+
+TEST_CASE("hidden parameters' timbre is found again, 20 of 20", "[ask]") {
+  constexpr int seeds = 20;
+  int found = 0;
+  double worst = 0.0;
+  for (int seed = 0; seed < seeds; ++seed) {
+    const Played& model = models[static_cast<std::size_t>(seed) % std::size(models)];
+    support::Random random(1000 + static_cast<std::uint64_t>(seed));
+    std::vector<double> hidden;
+    std::vector<double> start;
+    for (const Ranged& range : model.ranges) {
+      hidden.push_back(drawn(random, range));
+      start.push_back(drawn(random, range));
+    }
+    const AskedValues wanted = heard(model, hidden);
+    std::vector<TimbreTarget> targets;
+    for (const AskedFigureRow& row : asked_figure_rows()) {
+      if (const auto value = wanted[static_cast<std::size_t>(row.figure)]) {
+        targets.push_back({row.figure, *value});
+      }
+    }
+    const auto clock = std::chrono::steady_clock::now();
+    const auto asked_for = asked(model, start, targets);
+    const std::chrono::duration<double> took = std::chrono::steady_clock::now() - clock;
+    REQUIRE(asked_for);
+    const AskedValues sound = heard(model, asked_for->values);
+    double off = 0.0;
+    for (const TimbreTarget& target : targets) {
+      const auto value = sound[static_cast<std::size_t>(target.figure)];
+      REQUIRE(value);
+      off = std::max(off, std::fabs(noticed_between(target.figure, *value, target.value)));
+    }
+    found += off <= 0.1 ? 1 : 0;
+    worst = std::max(worst, off);
+    std::printf("seed %2d: %.4f JND off, %d starts, %zu trials, %.2f s\n", seed, off,
+                asked_for->starts, asked_for->trials, took.count());
+  }
+  std::printf("%d of %d returned within a tenth of what is noticed, the worst %.4f off\n", found,
+              seeds, worst);
+  CHECK(found == seeds);
+}
+
+TEST_CASE("what cannot be had is named, with the bound that holds it", "[ask]") {
+  const Played& model = models[0];
+  const std::vector<double> start{0.2, 0.001, 0.3};
+  // f = rate / pi asin(sqrt(K/M) sin(pi / 2 / (N + 1))), by hand: 40 masses, of which 38 move.
+  const double highest_hz =
+      rate_hz / std::numbers::pi * std::asin(std::sqrt(0.9) * std::sin(std::numbers::pi / 78.0));
+  const TimbreTarget high[] = {{AskedFigure::f0, 5000.0}};
+  const auto top = asked(model, start, high);
+  REQUIRE(top);
+  CHECK_FALSE(top->is_reached);
+  CHECK(top->values[0] == 0.9);
+  CHECK(*top->reached[static_cast<std::size_t>(AskedFigure::f0)] ==
+        Approx(highest_hz).epsilon(1e-4));  // Z shifts it a little
+  REQUIRE_FALSE(top->held.empty());
+  CHECK(top->held[0].index == 0);
+  CHECK(top->held[0].is_highest);
+  CHECK(top->noticed[0] < -100.0);
+
+  // T60 = 13.8155 / (rate zeta), zeta = Z/M (2 sin(pi / 2 / (N + 1)))^2: the longest with Z at its
+  // lowest, whatever K is.
+  const double zeta = 1e-4 * std::pow(2.0 * std::sin(std::numbers::pi / 78.0), 2.0);
+  const TimbreTarget long_one[] = {{AskedFigure::t60, 1e300}};
+  const auto longest = asked(model, start, long_one);
+  REQUIRE(longest);
+  CHECK(longest->values[1] == 1e-4);
+  CHECK(*longest->reached[static_cast<std::size_t>(AskedFigure::t60)] ==
+        Approx(-3.0 * std::log(10.0) / (rate_hz * 0.5 * std::log1p(-zeta))).epsilon(1e-6));
+}
+
+TEST_CASE("figures that are none, and models that nothing turns, are refused", "[ask]") {
+  const Played& model = models[0];
+  const std::vector<double> start{0.2, 0.001, 0.3};
+  constexpr double nan = std::numeric_limits<double>::quiet_NaN();
+  constexpr double endless = std::numeric_limits<double>::infinity();
+  for (const AskedFigureRow& row : asked_figure_rows()) {
+    INFO(row.name);
+    for (const double wrong : {-1.0, nan, endless, -endless}) {
+      const TimbreTarget targets[] = {{row.figure, wrong}};
+      CHECK_FALSE(asked(model, start, targets));
+    }
+    {
+      const TimbreTarget targets[] = {{row.figure, 1e300}};
+      const auto nearest = asked(model, start, targets);
+      REQUIRE(nearest);
+      CHECK(std::isfinite(nearest->noticed[0]));
+      for (std::size_t i = 0; i < start.size(); ++i) {
+        CHECK(nearest->values[i] >= model.ranges[i].minimum);
+        CHECK(nearest->values[i] <= model.ranges[i].maximum);
+      }
+    }
+  }
+  const TimbreTarget zero[] = {{AskedFigure::centroid, 0.0}};
+  CHECK_FALSE(asked(model, start, zero));
+  const TimbreTarget harmonic[] = {{AskedFigure::inharmonicity, 0.0}};
+  CHECK(asked(model, start, harmonic));
+  const FiguresAt any = [](std::span<const double>) { return AskedValues{1.0, 1.0, 1.0}; };
+  const TimbreTarget bright[] = {{AskedFigure::centroid, 2.0}};
+  CHECK(ask_timbre(any, start, {}, bright, {}).error().message == "no parameter may be turned");
+  const FreeParameter one[] = {{0, 0.1, 0.3}};
+  CHECK(ask_timbre(any, start, one, {}, {}).error().message == "nothing is asked for");
+  // What has no influence is where it was, and says so.
+  const auto idle = ask_timbre(any, start, one, bright, {});
+  REQUIRE(idle);
+  CHECK_FALSE(idle->has_influence);
+  CHECK(idle->values == start);
+  const TimbreTarget hollow[] = {{AskedFigure::odd_to_even, 2.0}};
+  CHECK(ask_timbre(any, start, one, hollow, {}).error().message == "it has no odd_to_even there");
+}
+
+TEST_CASE("silence, corners that are not stable, and who stops it", "[ask]") {
+  // Heard at a mass that no spring reaches.
+  const Played silent{
+      "@k param 0.1\n@g ground 0.\n@a mass 1. 0. 0.\n@b mass 1. 0. 0.\n"
+      "@s spring @g @a k\n@in1 frcInput @a\n@out1 posOutput @b\n",
+      {{0.01, 0.5}}};
+  const TimbreTarget bright[] = {{AskedFigure::centroid, 500.0}};
+  const auto nothing = asked(silent, std::vector<double>{0.1}, bright);
+  REQUIRE_FALSE(nothing);
+  CHECK(nothing.error().message.find("nothing is heard") != std::string::npos);
+
+  // Above K = 4 M nothing is stable: the search goes around it.
+  const Played corner{
+      "@k param 0.1\n@z param 0.001\n@g ground 0.\n@a mass 1. 0. 0.\n"
+      "@s springDamper @g @a k z\n@in1 frcInput @a\n@out1 posOutput @a\n",
+      {{0.001, 40.0}, {-0.01, 0.01}}};
+  const TimbreTarget tone[] = {{AskedFigure::f0, 3000.0}, {AskedFigure::t60, 0.5}};
+  const auto found = asked(corner, std::vector<double>{20.0, -0.005}, tone);
+  REQUIRE(found);
+  CHECK(found->is_reached);
+  // By hand: T60 = 0.5 s is zeta = 1 - 10^(-6 / (rate T60)), and lambda = 1 + r^2 - 2 r cos theta.
+  const double r = std::pow(10.0, -3.0 / (rate_hz * 0.5));
+  const double theta = 2.0 * std::numbers::pi * 3000.0 / rate_hz;
+  CHECK(found->values[1] == Approx(1.0 - r * r).epsilon(1e-3));
+  CHECK(found->values[0] == Approx(1.0 + r * r - 2.0 * r * std::cos(theta)).epsilon(1e-3));
+
+  const FiguresAt any = [](std::span<const double>) { return AskedValues{1.0, 1.0, 1.0}; };
+  const FreeParameter one[] = {{0, 0.1, 0.3}};
+  const auto stopped_one =
+      ask_timbre(any, std::vector<double>{0.2}, one, bright,
+                 {.progress = Progress([](std::string_view) { return false; })});
+  REQUIRE_FALSE(stopped_one);
+  CHECK(stopped_one.error().message == stopped);
+}
+
+TEST_CASE("a key's pitch stays where it is while the timbre moves", "[ask]") {
+  const Network network = read(models[1]);
+  const FreeParameter free[] = {{0, 0.05, 0.5}, {1, 1e-3, 0.1}, {2, 1e-4, 0.01}};
+  const StruckModel keyed(network, {.key_hz = 220.0});
+  const TimbreTarget targets[] = {{AskedFigure::inharmonicity, 0.01}, {AskedFigure::t60, 3.0}};
+  const auto found = ask_timbre([&](auto parameters) { return keyed.figures(parameters); },
+                                std::vector<double>{0.2, 0.02, 0.001}, free, targets, {});
+  REQUIRE(found);
+  const double cents =
+      1200.0 * std::log2(*found->reached[static_cast<std::size_t>(AskedFigure::f0)] / 220.0);
+  CHECK(std::fabs(cents) < 1e-5);
+}
+
+}  // namespace ressort
