@@ -16,6 +16,7 @@
 #include "app/session/loader.h"
 #include "app/session/memory.h"
 #include "app/session/modes/known_modes.h"
+#include "app/session/new_file.h"
 #include "app/session/timbre/shape.h"
 #include "app/text.h"
 #include "core/model/preset/edit.h"
@@ -166,6 +167,14 @@ int shape_model(const ShapeOptions& options, const std::function<bool()>& goes_o
   if (auto spared = spare(options.output, read); !spared) {
     return refuse(spared.error().message);
   }
+  std::optional<NewFile> output;  // before the search, which may take its time
+  if (!options.output.empty()) {
+    auto file = NewFile::open(options.output, options.force ? Existing::replace : Existing::refuse);
+    if (!file) {
+      return refuse(file.error().message);
+    }
+    output.emplace(*std::move(file));
+  }
   double rate_hz = options.rate_hz.value_or(Network::reference_rate_hz);
   Liked like;
   if (!options.like.empty()) {
@@ -223,13 +232,16 @@ int shape_model(const ShapeOptions& options, const std::function<bool()>& goes_o
   if (!shaped) {
     return refuse(shaped.error().message);
   }
-  if (!options.output.empty()) {
+  if (output) {
     const auto text = preset_of(*scene, instrument, shaped->found.values);
     if (!text) {
       return refuse(text.error().message);
     }
-    if (const int code = put_text(options.output, *text, options.force)) {
-      return code;
+    auto written = output->write(*text);
+    written = written ? output->keep() : written;
+    if (!written) {
+      std::fprintf(stderr, "%s\n", written.error().message.c_str());
+      return exit_code::our_failure;
     }
   }
   if (options.as_json) {
