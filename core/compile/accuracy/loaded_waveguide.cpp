@@ -107,8 +107,8 @@ bool LoadedWaveguide::round_at(double log_factor) {
     for (std::uint32_t i = 0; i < slot.count; ++i) {
       u.push_back(value[program_.junctions[slot.first + i].u]);
     }
-    Delays order(2 * slot.count);
-    rounded.emplace_back(2 * slot.count);
+    Delays order(std::size_t{2} * slot.count);
+    rounded.emplace_back(order.size());
     find_places(design_of(slot, value), slot.filters_at, u, order, rounded.back());
   }
   return std::exchange(delays_, rounded) != rounded;

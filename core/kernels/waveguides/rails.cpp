@@ -124,8 +124,8 @@ void Rails<T>::design(Guide& guide, std::size_t lane, const T* coefficients) {
   }
   find_places(found, slot.filters_at, std::span(u_).first(slot.count), order_, delays_);
   for (std::uint32_t i = 0; i < slot.count; ++i) {
-    next_left[guide.place_row + i * width + lane] = delays_[2 * i];
-    next_right[guide.place_row + i * width + lane] = delays_[2 * i + 1];
+    next_left[guide.place_row + i * width + lane] = delays_[std::size_t{2} * i];
+    next_right[guide.place_row + i * width + lane] = delays_[std::size_t{2} * i + 1];
   }
 }
 
