@@ -189,7 +189,8 @@ Pitches find_pitches(const Request& request, const Network& network, const Machi
     return make_pitches(shapes, stepping_of_lowest(machine, shapes), request.options.rate_hz,
                         request.rate_ratio);
   }
-  if (auto loaded = loaded_waveguide_pitches(machine, machine.parameters)) {
+  if (auto loaded =
+          loaded_waveguide_pitches(machine, machine.parameters, request.options.progress)) {
     return *std::move(loaded);
   }
   notes.push_back(

@@ -63,6 +63,9 @@ TEST_CASE("masses and springs on a waveguide do not untune it", "[loaded_wavegui
       "@t string 9 1. 0.02 0.0005 0. 0.\n@k spring [@s 0.77] [@t 0.5] 0.02 0.0005\n",
       // two places, tied to one mass
       "@m mass 30. 0. 0.\n@k spring [@s 0.9] @m 0.7\n@l spring [@s 0.95] @m 0.6 0.01\n",
+      // a body that two springs hold, one of them within itself
+      "@b body 400. p q\n@b_1 mode @b 310. 2. 1. -0.4\n@b_2 mode @b 701. 1. 0.5 1.\n"
+      "@k spring [@s 0.9] [@b p] 0.2 0.001\n@l spring [@b p] [@b q] 0.05\n",
       // another waveguide, tied by its bridge
       "@t waveguide 1. 370. 3. 0.3 0.\n@k spring [@s 0.93] [@t 0.88] 0.9 0.01\n"};
   for (const std::string& load : loads) {

@@ -17,6 +17,7 @@ using Complex = std::complex<double>;
 
 // By what holds it, a logarithm of the factor: what is further off, at ln 4, is the second partial.
 constexpr double most_detuning = 1.1;
+constexpr double out_of_room = 1.5;  // where it is designed at other frequencies than asked for
 
 // [place, 2] in samples from the filters, to the left and to the right.
 using Delays = std::vector<std::uint32_t>;
@@ -58,10 +59,13 @@ struct Loop {
 
 class LoadedWaveguide final : public TunedMotion {
  public:
-  LoadedWaveguide(const Program& program, std::span<const double> parameters, std::size_t tuned)
-      : program_(program), parameters_(parameters), tuned_(tuned) {
+  LoadedWaveguide(const Program& program, std::span<const double> parameters, std::size_t tuned,
+                  const Progress& progress)
+      : program_(program), parameters_(parameters), tuned_(tuned), progress_(progress) {
     const std::vector<double> value = values_at(1.0);
-    own_hz_ = value[program.waveguides[tuned].frequency];
+    const WaveguideSlot& slot = program.waveguides[tuned];
+    own_hz_ = value[slot.frequency];
+    highest_hz_ = highest_waveguide_hz(least_waveguide_samples(slot.count), program.rate_hz);
   }
 
   bool round_at(double log_factor) override;
@@ -95,7 +99,9 @@ class LoadedWaveguide final : public TunedMotion {
   const Program& program_;
   std::span<const double> parameters_;
   std::size_t tuned_;
+  const Progress& progress_;
   double own_hz_;
+  double highest_hz_;           // that there is room for
   std::vector<Delays> delays_;  // [waveguide]
 };
 
@@ -129,7 +135,9 @@ Loop LoadedWaveguide::loop_of(std::size_t guide, const std::vector<double>& valu
 }
 
 Complex LoadedWaveguide::residual(double log_factor, double decay, double theta) const {
-  if (std::fabs(log_factor - std::log(alone_at(theta))) > most_detuning) {
+  const double hz = own_hz_ * std::exp(0.5 * log_factor);
+  if (std::fabs(log_factor - std::log(alone_at(theta))) > most_detuning ||
+      hz > out_of_room * highest_hz_ || hz * out_of_room < lowest_waveguide_hz) {
     return std::nan("");
   }
   const std::vector<double> value = values_at(std::exp(log_factor));
@@ -160,18 +168,13 @@ Complex LoadedWaveguide::residual(double log_factor, double decay, double theta)
     }
     loops.push_back(loop_of(loops.size(), value, z));
   }
-  // How far node i goes for a force of 1 on node k.
-  const auto way = [&](std::uint32_t i, std::uint32_t k) {
-    const Place& a = places[i];
-    const Place& b = places[k];
-    if (!a.is_one || !b.is_one) {
-      return i == k ? gives[i] : Complex(0.0);
-    }
+  // How far one place goes for a force of 1 on another.
+  const auto way = [&](const Place& a, const Place& b, bool is_same) {
     if (a.loop != b.loop) {
       return Complex(0.0);
     }
     const Loop& loop = loops[a.loop];
-    const Complex sum = (i == k ? 1.0 : 0.0) + loop.between(b.number, a.number);
+    const Complex sum = (is_same ? 1.0 : 0.0) + loop.between(b.number, a.number);
     return loop.inverse_impedance * sum / both;
   };
   std::vector<SpringDamper> springs = spring_dampers_of(program_, value);
@@ -186,22 +189,39 @@ Complex LoadedWaveguide::residual(double log_factor, double decay, double theta)
   for (std::size_t g = 0; g < guides; ++g) {
     rows(row_of(g), row_of(g)) = 1.0 - loops[g].round();
   }
+  // How much each spring is longer for a tension of 1 in each: masses one by one, places by pairs.
+  std::vector<Complex> moved(program_.moving);
+  for (std::size_t k = 0; k < springs.size(); ++k) {
+    for (const auto& [node, share] : springs[k].shares) {
+      moved[node] += share * gives[node];
+    }
+    for (std::size_t i = 0; i < springs.size(); ++i) {
+      Complex& longer = rows(guides + i, guides + k);
+      for (const auto& [node, share] : springs[i].shares) {
+        longer += share * moved[node];
+        for (std::size_t j = 0; places[node].is_one && j < springs[k].shares.size(); ++j) {
+          const auto& [other, weight] = springs[k].shares[j];
+          longer += places[other].is_one
+                        ? share * weight * way(places[node], places[other], node == other)
+                        : Complex(0.0);
+        }
+      }
+      progress_.spend(springs[i].shares.size());
+    }
+    for (const auto& [node, share] : springs[k].shares) {
+      moved[node] = 0.0;
+    }
+  }
   for (std::size_t i = 0; i < springs.size(); ++i) {
     const SpringDamper& spring = springs[i];
     const Complex pull = spring.scheme == Scheme::plain
                              ? spring.stiffness + spring.damping * (1.0 - back)
                              : 0.5 * (spring.stiffness * (z + back) + spring.damping * both);
     const std::size_t row = guides + i;
-    rows(row, row) = 1.0;
     for (std::size_t k = 0; k < springs.size(); ++k) {
-      Complex sum = 0.0;
-      for (const auto& [a, share] : spring.shares) {
-        for (const auto& [b, other] : springs[k].shares) {
-          sum += share * other * way(a, b);
-        }
-      }
-      rows(row, guides + k) += pull * sum;
+      rows(row, guides + k) *= pull;
     }
+    rows(row, row) += 1.0;
     for (const auto& [node, share] : spring.shares) {
       if (places[node].is_one) {
         const Loop& loop = loops[places[node].loop];
@@ -212,13 +232,15 @@ Complex LoadedWaveguide::residual(double log_factor, double decay, double theta)
       }
     }
   }
+  progress_.spend(springs.size() * springs.size() * springs.size() / 3);
   return schur_complement_of_first(std::move(rows));
 }
 
 }  // namespace
 
 std::optional<Pitches> loaded_waveguide_pitches(const Machine& machine,
-                                                std::span<const double> parameters) {
+                                                std::span<const double> parameters,
+                                                const Progress& progress) {
   const Program* part = nullptr;
   std::size_t tuned = 0;
   double lowest_hz = 0.0;
@@ -240,7 +262,8 @@ std::optional<Pitches> loaded_waveguide_pitches(const Machine& machine,
   if (part == nullptr || springs > most_loading_springs) {
     return std::nullopt;
   }
-  LoadedWaveguide waveguide(*part, parameters, tuned);
+  progress.stage("tuning its waveguide");
+  LoadedWaveguide waveguide(*part, parameters, tuned, progress);
   return make_pitches(waveguide, part->rate_hz);
 }
 

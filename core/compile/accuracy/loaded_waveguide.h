@@ -14,6 +14,7 @@
 
 #include "core/compile/accuracy/pitches.h"
 #include "core/kernels/program.h"
+#include "core/progress.h"
 
 namespace ressort {
 
@@ -23,6 +24,7 @@ inline constexpr std::size_t most_loading_springs = 96;  // that a load has the 
 // `parameters` as they are at the start. Nothing where more springs than that are in its part, or
 // no waveguide moves. O(keys springs^3) [any thread but audio]
 std::optional<Pitches> loaded_waveguide_pitches(const Machine& machine,
-                                                std::span<const double> parameters);
+                                                std::span<const double> parameters,
+                                                const Progress& progress = {});
 
 }  // namespace ressort

@@ -22,13 +22,13 @@ constexpr double same_mode = 1e-6;        // two stiffnesses
 constexpr std::size_t most_sought = 320;  // masses of a part
 
 // A motion's logarithm of the factor, and its decay.
-struct Place {
+struct PolePosition {
   double log_factor = 0.0;
   double decay = 0.0;
 };
 
 // Where the pole's angle is `theta` a sample, by Newton from a place near it.
-std::optional<Place> pole_near(const TunedMotion& motion, double theta, Place at) {
+std::optional<PolePosition> pole_near(const TunedMotion& motion, double theta, PolePosition at) {
   for (int i = 0; i < most_newton_steps; ++i) {
     const Complex here = motion.residual(at.log_factor, at.decay, theta);
     const Complex by_factor =
@@ -63,12 +63,12 @@ std::optional<Place> pole_near(const TunedMotion& motion, double theta, Place at
 // least off.
 std::optional<double> factor_at(TunedMotion& motion, double theta, double change) {
   const double factor = motion.alone_at(theta) * change;
-  Place at{std::log(factor), motion.decay_at(factor)};
+  PolePosition at{std::log(factor), motion.decay_at(factor)};
   motion.round_at(at.log_factor);
   std::optional<double> best;
   double least = std::numeric_limits<double>::infinity();
   for (int i = 0; i < most_roundings; ++i) {
-    const std::optional<Place> found = pole_near(motion, theta, at);
+    const std::optional<PolePosition> found = pole_near(motion, theta, at);
     if (!found) {
       break;
     }
@@ -157,7 +157,7 @@ Pitches make_pitches(TunedMotion& motion, double rate_hz) {
     const double theta = 2.0 * std::numbers::pi * hz / rate_hz;
     const double alone = motion.alone_at(theta);
     auto found = factor_at(motion, theta, change);
-    found = found ? found : factor_at(motion, theta, 1.0);
+    found = found || change == 1.0 ? found : factor_at(motion, theta, 1.0);
     pitches.factors[i] = found.value_or(alone * change);
     change = pitches.factors[i] / alone;
   }
