@@ -294,6 +294,11 @@ std::vector<std::string> Console::completions(std::string_view line) const {
     for (const ParameterInfo& info : loaded->instrument.parameters) {
       words.push_back(info.name);
     }
+  } else if (kind == "MASS") {
+    const auto loaded = context_->session.current();
+    for (const StruckInfo& info : loaded->instrument.struck) {
+      words.push_back(info.count == 0 ? info.name : info.name + ":1");
+    }
   } else if (kind == "FIGURE") {
     for (const AskedFigureRow& figure : asked_figure_rows()) {
       words.push_back(short_name(figure.figure));

@@ -304,6 +304,15 @@ Result<Done> command::set(ConsoleContext& console, Words words) {
   return Done{};
 }
 
+Result<Done> command::strike(ConsoleContext& console, Words words) {
+  Message message{"/mass/" + words[0] + "/strike", {}};
+  if (words.size() > 1) {
+    message.arguments.push_back(to_argument(words[1]));
+  }
+  const auto events = play(console, message);
+  return events ? Result<Done>(Done{}) : Result<Done>(events.error());
+}
+
 // --- looking ------------------------------------------------------------------------------------
 
 namespace {

@@ -53,8 +53,8 @@ struct Question {
 enum class CommandGroup : std::uint8_t { models, playing, parameters, looking, other };
 
 struct Row {
-  // In OSC and in scores; N stands for an input's number, NAME for a parameter's name or a pattern
-  // of names. Empty: said at the console only.
+  // In OSC and in scores; N stands for an input's number, NAME for a mass's name, or a parameter's
+  // or a pattern of those. Empty: said at the console only.
   std::string address = {};
   CallArgument arguments[most_arguments] = {};  // those that have a word
   std::string_view does = {};                   // one line
@@ -66,7 +66,7 @@ struct Row {
 
   std::string_view command = {};  // at the console; empty: it is not said there
   CommandGroup group = CommandGroup::other;
-  // [X] may be left out, ... is more of them; MODEL, FIGURE, PRESET, PARAMETER, COMMAND and FILE
+  // [X] may be left out, ... is more of them; MODEL, FIGURE, PRESET, PARAMETER, MASS, COMMAND and FILE
   // say what completes a word. Of a command that only plays, those are the row's arguments, and
   // INPUT.
   std::string words = {};

@@ -1,7 +1,9 @@
 #include "app/control/rows.h"
 
 #include <algorithm>
+#include <charconv>
 #include <iterator>
+#include <optional>
 #include <utility>
 
 #include "app/control/console_commands.h"
@@ -66,6 +68,51 @@ Events play_input(const Said& said, const GestureRow& gesture) {
                     .model = said.serial,
                     .value = said.arguments[0],
                     .value2 = said.arguments[1]});
+}
+
+// Of NAME, or of "NAME:3", the third mass of what NAME stands for.
+std::optional<std::uint32_t> find_mass(std::span<const StruckInfo> known, std::string_view name) {
+  const std::size_t colon = name.find(':');
+  const auto found =
+      std::lower_bound(known.begin(), known.end(), name.substr(0, colon),
+                       [](const StruckInfo& info, std::string_view n) { return info.name < n; });
+  if (found == known.end() || found->name != name.substr(0, colon)) {
+    return std::nullopt;
+  }
+  std::uint32_t at = 1;
+  if (colon != name.npos) {
+    const char* const end = name.data() + name.size();
+    const auto read = std::from_chars(name.data() + colon + 1, end, at);
+    if (read.ec != std::errc{} || read.ptr != end) {
+      return std::nullopt;
+    }
+  }
+  const bool is_macro = found->count > 0;
+  return is_macro == (colon != name.npos) && at >= 1 && at <= std::max(1u, found->count)
+             ? std::optional(found->first + at - 1)
+             : std::nullopt;
+}
+
+Events strike(const Said& said) {
+  const std::vector<StruckInfo>& known = said.instrument.struck;
+  const auto mass = find_mass(known, said.name);
+  if (mass) {
+    return one(said, {.kind = EventKind::strike,
+                      .model = said.serial,
+                      .value = said.arguments[0] * said.instrument.blow,
+                      .value2 = static_cast<double>(*mass)});
+  }
+  constexpr std::size_t most_named = 8;
+  std::vector<std::string> names;
+  for (std::size_t i = 0; i < std::min(known.size(), most_named); ++i) {
+    const StruckInfo& info = known[i];
+    names.push_back(info.count == 0
+                        ? info.name
+                        : info.name + ":1 to " + info.name + ":" + std::to_string(info.count));
+  }
+  return Error{said.message.address + ": the model has no such mass; it has " +
+               (names.empty() ? "none" : joined(names, ", ")) +
+               (known.size() > most_named ? " and others" : "")};
 }
 
 // --- the rows -----------------------------------------------------------------------------------
@@ -211,6 +258,19 @@ std::vector<Row> make_rows() {
     rows.push_back(std::move(row));
   }
   const Row last[] = {
+      {.address = "/mass/NAME/strike",
+       .arguments = {{"STRENGTH", "the strength", -1, 1, 0.8}},
+       .does =
+           "strikes a mass, named as in the model; NAME:3 is the third of a string or a mesh; 1 "
+           "is a hard blow, -1 one from the other side",
+       .play = strike,
+       .command = "strike",
+       .group = CommandGroup::playing,
+       .words = "MASS [STRENGTH]",
+       .command_does = "strikes a mass by its name",
+       .details = "MASS is its name in the model, or of a string or a mesh NAME:3, its third. "
+                  "STRENGTH is -1 to 1,\nor 0.8.",
+       .act = command::strike},
       {.address = "/panic",
        .does = "silence at once",
        .play = [](const Said& said) { return one(said, {.kind = EventKind::panic}); },

@@ -132,6 +132,12 @@ Tree tree_of(const Session::Present& now) {
     tree.add(path, parameter_of(info, path, now.values[i]));
     tree.add(path + "/range", range_of(info, path + "/range"));
   }
+  constexpr std::size_t most_struck = 200;  // a mesh has thousands
+  for (std::size_t i = 0; i < std::min(most_struck, instrument.struck.size()); ++i) {
+    const StruckInfo& info = instrument.struck[i];
+    const std::string path = "/mass/" + info.name + (info.count > 0 ? ":1" : "") + "/strike";
+    tree.add(path, method_of(*find_row(path).row, path));
+  }
   for (const CustomInfo& custom : instrument.custom) {
     json control = node(custom.address, "a control of the preset");
     control["TYPE"] = "f";

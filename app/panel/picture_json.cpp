@@ -109,11 +109,22 @@ class NetworkTeller {
     x_.push_back(point ? json(rounded(point->x)) : json());
     y_.push_back(point ? json(rounded(point->y)) : json());
     start_.push_back(start);
-    names_.push_back(of.name.text());
+    names_.push_back(name_of(mass));
     kinds_ += of.kind == MassKind::ground     ? 'g'
               : of.kind == MassKind::position ? 'h'
               : of.is_mode                    ? 'o'
                                               : 'm';
+  }
+
+  // By which it can be struck: a macro's masses are numbered.
+  std::string name_of(std::uint32_t mass) const {
+    const auto after = std::upper_bound(macro_starts_.begin(), macro_starts_.end(), mass);
+    if (after == macro_starts_.begin()) {
+      return network_.masses[mass].name.text();
+    }
+    const auto macro = static_cast<std::size_t>(after - macro_starts_.begin()) - 1;
+    return picture_.network->macros[macro].name + ":" +
+           std::to_string(mass - macro_starts_[macro] + 1);
   }
 
   void add_nodes() {
@@ -206,6 +217,7 @@ class NetworkTeller {
   const Picture& picture_;
   const Network network_;
   const std::vector<double> parameters_;
+  const std::vector<std::uint32_t> macro_starts_ = macro_starts(*picture_.network);
   std::vector<std::uint32_t> node_;             // [mass] or nowhere
   std::vector<std::optional<LayoutPoint>> at_;  // [mass]
   bool is_plane_ = false;

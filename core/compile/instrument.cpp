@@ -2,8 +2,10 @@
 
 #include <bit>
 #include <cmath>
+#include <numbers>
 
 #include "core/model/preset/fit.h"
+#include "core/model/topology.h"
 
 namespace ressort {
 namespace {
@@ -84,6 +86,62 @@ int audio_input_count(const Network& network, const Preset& preset) {
   return count;
 }
 
+std::vector<StruckInfo> find_struck(const Network& network, const Machine& machine) {
+  const std::vector<std::uint32_t> starts = macro_starts(network);
+  std::vector<bool> is_played(starts.empty() ? network.masses.size()
+                                             : starts.back() + node_count(network.macros.back()));
+  for (const Program& program : machine.parts) {
+    for (std::uint32_t node = 0; node < program.moving; ++node) {
+      is_played[program.masses[node]] = true;
+    }
+  }
+  std::vector<StruckInfo> struck;
+  for (std::uint32_t i = 0; i < network.masses.size(); ++i) {
+    if (is_played[i] && moves(network.masses[i])) {
+      struck.push_back({.name = std::string(network.masses[i].name.text()), .first = i});
+    }
+  }
+  for (std::size_t i = 0; i < network.macros.size(); ++i) {
+    const Macro& macro = network.macros[i];
+    const std::uint64_t count = node_count(macro);
+    const auto first = is_played.begin() + starts[i];
+    const auto end = first + static_cast<std::ptrdiff_t>(count);
+    if (std::find(first, end, true) != end) {
+      struck.push_back({macro.name, starts[i], static_cast<std::uint32_t>(count)});
+    }
+  }
+  std::sort(struck.begin(), struck.end(),
+            [](const StruckInfo& a, const StruckInfo& b) { return a.name < b.name; });
+  return struck;
+}
+
+// As hard as the preset strikes; if it does not, what moves all masses together so far, at the
+// pitch of the lowest mode, that the output is at half its full scale.
+double find_blow(const Network& network, const std::vector<Control>& controls, double frequency_hz,
+                 double gain) {
+  double blow = 0.0;
+  for (const Control& control : controls) {
+    if (control.gesture == Gesture::impulse && network.inputs[control.target].is_force) {
+      blow = std::max({blow, std::fabs(control.low), std::fabs(control.high)});
+    }
+  }
+  if (blow > 0.0) {
+    return blow;
+  }
+  const std::vector<double> parameters = parameter_values(network);
+  double mass = 0.0;
+  for (const Mass& of : network.masses) {
+    mass += moves(of) ? argument_value(network, of.mass, parameters) : 0.0;
+  }
+  for (const Macro& macro : network.macros) {
+    if (const auto count = node_count(macro); count > 0) {
+      mass += static_cast<double>(count) * argument_value(network, macro.mass, parameters);
+    }
+  }
+  const double turn = 2.0 * std::numbers::pi * frequency_hz / Network::reference_rate_hz;
+  return gain > 0.0 ? 0.5 * mass * turn / gain : mass * turn;
+}
+
 }  // namespace
 
 Playing make_playing(const Network& network, const Preset& preset, const Analysis& analysis,
@@ -112,7 +170,7 @@ Playing make_playing(const Network& network, const Preset& preset, const Analysi
 }
 
 Instrument make_instrument(const Network& network, const Preset& preset, const Analysis& analysis,
-                           int voices, double gain) {
+                           const Machine& machine, int voices, double gain) {
   const std::vector<Control> controls = make_controls(network, preset);
   std::vector<InputInfo> inputs;
   for (std::size_t i = 0; i < network.inputs.size(); ++i) {
@@ -132,6 +190,8 @@ Instrument make_instrument(const Network& network, const Preset& preset, const A
   return {.parameters = analysis.stability.parameters,
           .inputs = std::move(inputs),
           .custom = std::move(custom),
+          .struck = find_struck(network, machine),
+          .blow = find_blow(network, controls, mode ? mode->frequency_hz : 220.0, gain),
           .outputs = output_count(network),
           .audio_inputs = audio_input_count(network, preset),
           .voices = voices,

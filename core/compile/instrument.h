@@ -31,11 +31,21 @@ struct CustomInfo {
   int row = 0;  // Event::index of EventKind::custom
 };
 
+// Masses that may be struck by a name: one, or all of a macro, which are named "NAME:1" and so on.
+// What was culled is not among them.
+struct StruckInfo {
+  std::string name;
+  std::uint32_t first = 0;  // Event::value2 of EventKind::strike
+  std::uint32_t count = 0;  // 0: one mass of this name
+};
+
 // What a running engine is called from outside; indices are those of Event.
 struct Instrument {
   std::vector<ParameterInfo> parameters;  // [parameter]
   std::vector<InputInfo> inputs;
   std::vector<CustomInfo> custom;
+  std::vector<StruckInfo> struck;  // by their names
+  double blow = 0.0;  // the force of a hard strike on a mass, for one sample at 44 100 Hz
   int outputs = 0;
   int audio_inputs = 0;  // the highest audio channel that a control listens to
   int voices = 1;
@@ -66,6 +76,6 @@ struct Analysis {
 Playing make_playing(const Network& network, const Preset& preset, const Analysis& analysis,
                      bool bare, int voices, double gain);
 Instrument make_instrument(const Network& network, const Preset& preset, const Analysis& analysis,
-                           int voices, double gain);
+                           const Machine& machine, int voices, double gain);
 
 }  // namespace ressort

@@ -110,9 +110,31 @@ struct Engine::Player {
         return parameters.set(event.index, event.value);
       case EventKind::gesture:
         return gestures.perform_live(event);
+      case EventKind::strike:
+        return std::visit([&](auto& b) { strike(b, event); }, bank);
       case EventKind::panic:
         return voices.panic();
     }
+  }
+
+  // In the voice that was played last, at the same displacement whatever its pitch.
+  template <class T>
+  void strike(Bank<T>& b, const Event& event) {
+    const bool is_known = event.value2 >= 0.0 && event.value2 < static_cast<double>(struck.size());
+    const Struck at = is_known ? struck[static_cast<std::size_t>(event.value2)] : Struck{};
+    if (at.part >= b.parts.size()) {
+      return;  // nobody would hear it
+    }
+    const std::size_t lane = voices.last();
+    gestures.wake(lane);
+    apply_changes(b);
+    PartBank<T>& part = b.parts[at.part];
+    Kernel<T>& kernel = part.of(lane);
+    const double inverse_mass = static_cast<double>(
+        kernel.coefficients.value[at.inverse_mass * part.width + lane % part.width]);
+    const double change = event.value * machine.rate_ratio * inverse_mass;
+    kernel.strike(lane % part.width, at.node, change * std::sqrt(voices[lane].factor));
+    watch.stir(voices[lane], lane, at.part);
   }
 
   // Notes with an ID are for whoever plays.
@@ -420,8 +442,33 @@ struct Engine::Player {
     return true;
   }
 
+  // Where a mass is that may be struck.
+  struct Struck {
+    std::uint32_t part = 0xffffffffu;
+    std::uint32_t node = 0;
+    std::uint32_t inverse_mass = 0;  // coefficient
+  };
+  static std::vector<Struck> find_struck(const Machine& machine) {
+    std::vector<Struck> struck;
+    for (std::uint32_t p = 0; p < machine.parts.size(); ++p) {
+      const Program& program = machine.parts[p];
+      for (const MassRun& run : program.mass_runs) {
+        for (std::uint32_t node = run.first; node < run.first + run.count; ++node) {
+          if (run.is_junction) {
+            continue;
+          }
+          const std::size_t mass = program.masses[node];
+          struck.resize(std::max(struck.size(), mass + 1));
+          struck[mass] = {p, node, run.inverse_mass};
+        }
+      }
+    }
+    return struck;
+  }
+
   const Machine machine;
   const Playing playing;
+  const std::vector<Struck> struck = find_struck(machine);  // [mass]
   Voices voices;
   AnyBank bank;
   Parameters parameters;

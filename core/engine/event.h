@@ -22,6 +22,8 @@ enum class EventKind : std::uint8_t {
   key_tuning,  // index: key, value: Hz before transposition, 0: silent; value2: 1: what sounds, too
   tuning_reset,  // every key as the preset has it, what sounds, too
   gesture,       // index: input number, value and value2: the gesture's arguments
+  strike,        // value: the force on a mass, for one sample at 44 100 Hz; value2: which mass of
+                 // the network with its macros written out
   panic,         // everything fades to silence at once
 };
 

@@ -129,6 +129,9 @@ class Kernel {
   // there by themselves; nothing else is touched, not even the last bit. False where the kernel
   // knows of no single nodes. [audio]
   virtual bool write_nodes(std::span<const std::uint32_t> nodes, const T* x, const T* v);
+  // Makes one mass faster by `change`, per sample, as a force on it in the next sample would.
+  // False where the node is no mass that is stepped: ground, a hand, a place. [audio]
+  virtual bool strike(std::size_t lane, std::uint32_t node, double change) = 0;
   // Plays the block by the published scheme, v += F/M, x += v: masses, then position inputs, then
   // links; the outputs are the new positions. Forces given act in their own sample. [audio]
   void step(const Block<T>& block) {

@@ -124,6 +124,16 @@ void NodeKernel<T, Number>::write(std::span<const std::uint32_t> nodes, const T*
   std::fill(nodes_.passive.awake.begin(), nodes_.passive.awake.end(), Number(1));
 }
 
+// The forces that links exert in the next sample are there already.
+template <class T, class Number>
+bool NodeKernel<T, Number>::strike(std::size_t lane, std::uint32_t node, double change) {
+  if (!is_mass(program_, node)) {
+    return false;
+  }
+  nodes_.put(node, lane, nodes_.position(node, lane), nodes_.velocity(node, lane) + change);
+  return true;
+}
+
 template <class T, class Number>
 bool NodeKernel<T, Number>::is_near_start(std::size_t lane, double bound) const {
   for (std::size_t node = 0; node < program_.moving; ++node) {

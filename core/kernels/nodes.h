@@ -64,6 +64,7 @@ class NodeKernel : public Kernel<T> {
   void let_go(std::size_t lane) final { nodes_.passive.awake[lane] = Number(-1); }
   bool save(std::size_t lane, double* x, double* v) const final;
   bool read(std::span<const std::uint32_t> nodes, T* x, T* v) const final;
+  bool strike(std::size_t lane, std::uint32_t node, double change) final;
   bool is_near_start(std::size_t lane, double bound) const final;
   std::size_t look(std::size_t lane, std::span<const std::uint32_t> nodes,
                    std::span<double> numbers) const final;

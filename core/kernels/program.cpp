@@ -17,6 +17,12 @@ bool is_plain(const Program& program) {
                      [](const LinkRun& run) { return run.scheme == Scheme::plain; });
 }
 
+bool is_mass(const Program& program, std::uint32_t node) {
+  return std::any_of(program.mass_runs.begin(), program.mass_runs.end(), [&](const MassRun& run) {
+    return !run.is_junction && node >= run.first && node - run.first < run.count;
+  });
+}
+
 double rate_factor(Unit unit, double r) {
   switch (unit) {
     case Unit::stiffness:

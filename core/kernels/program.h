@@ -153,6 +153,9 @@ struct Program {
 // Whether every link's force is found as published.
 bool is_plain(const Program& program);
 
+// Whether a node is a mass or a mode, which forces move.
+bool is_mass(const Program& program, std::uint32_t node);
+
 // What drives an input, wherever in the network it is.
 struct ModelInput {
   int number = 1;  // from 1, as in the model

@@ -242,6 +242,16 @@ std::uint64_t node_count(const Macro& macro) {
   return is_waveguide(macro.kind) ? 0 : std::uint64_t{macro.length} * macro.width;
 }
 
+std::vector<std::uint32_t> macro_starts(const Network& network) {
+  std::vector<std::uint32_t> starts;
+  std::uint64_t next = network.masses.size();
+  for (const Macro& macro : network.macros) {
+    starts.push_back(static_cast<std::uint32_t>(next));
+    next += node_count(macro);
+  }
+  return starts;
+}
+
 Network expand_macros(const Network& network, const Progress& progress) {
   Network expanded = network;
   if (network.macros.empty()) {
@@ -258,20 +268,17 @@ Network expand_macros(const Network& network, const Progress& progress) {
   add_junctions(network, expanded);
   expanded.masses.reserve(nodes);
   expanded.links.reserve(links);
-  std::vector<std::uint32_t> first;  // [macro]
+  const std::vector<std::uint32_t> first = macro_starts(network);  // [macro]
   std::vector<std::uint32_t> shape;
-  for (const Macro& macro : network.macros) {
-    first.push_back(static_cast<std::uint32_t>(expanded.masses.size()));
+  for (std::uint32_t i = 0; i < network.macros.size(); ++i) {
+    const Macro& macro = network.macros[i];
     shape.push_back(static_cast<std::uint32_t>(expanded.shapes.size()));
     if (macro.kind == MacroKind::body) {
-      add_modes(network, static_cast<std::uint32_t>(first.size() - 1), progress, expanded);
-      continue;
+      add_modes(network, i, progress, expanded);
+    } else if (!is_waveguide(macro.kind)) {
+      add_nodes(macro, progress, expanded);
+      add_links(macro, first[i], progress, expanded);
     }
-    if (is_waveguide(macro.kind)) {
-      continue;
-    }
-    add_nodes(macro, progress, expanded);
-    add_links(macro, first.back(), progress, expanded);
   }
   for (std::size_t i = 0; i < expanded.taps.size(); ++i) {
     Tap& tap = expanded.taps[i];

@@ -14,6 +14,9 @@ bool is_mesh(MacroKind kind);  // has a length and a width
 
 std::uint64_t node_count(const Macro& macro);
 
+// [macro] where its masses begin in the network with every macro written out.
+std::vector<std::uint32_t> macro_starts(const Network& network);
+
 // The same network with every macro written out as masses and links, which have no names, and its
 // taps told where its nodes are. O(nodes). [any thread but audio]
 Network expand_macros(const Network& network, const Progress& progress = {});

@@ -13,6 +13,7 @@ import socket
 import struct
 import subprocess
 import sys
+import tempfile
 import threading
 import time
 
@@ -179,6 +180,51 @@ def plucks(program, browser):
     check(browser.eventually("struck === 1"), "and seen")
 
 
+# Two pendulums that nothing joins, each of two masses; inputs are at the first ones.
+APART = """@g ground 0.
+@low_a osc 1. 0.0009 0.0001 0. 0.
+@low_b mass 1. 0. 0.
+@low_s springDamper @low_a @low_b 0.02 0.0001
+@high_a osc 1. 0.0081 0.0001 0. 0.
+@high_b mass 1. 0. 0.
+@high_s springDamper @high_a @high_b 0.18 0.0001
+@in1 frcInput @low_a
+@in2 frcInput @high_a
+@out1 posOutput @low_b
+@out1 posOutput @high_b
+"""
+
+
+def strikes(program, browser):
+    """A mass without an input is struck where it is drawn: heard is the pendulum that it hangs on."""
+    tones = {}
+    for name in ("low_b", "high_b"):
+        check(silence(program, browser), "silence before a mass is struck")
+        x, y = browser.evaluate(
+            f"(() => {{ const v = panel.view, n = v.net.names.indexOf('{name}'),"
+            " b = v.canvas.getBoundingClientRect(); return [b.x + v.sx[n], b.y + v.sy[n]]; })()")
+        browser.mouse("mouseMoved", x, y)
+        check(browser.evaluate("document.getElementById('hint').textContent").startswith(name),
+              f"the pointer says that it would strike {name}")
+        browser.mouse("mousePressed", x, y)
+        browser.mouse("mouseMoved", x, y - 60)
+        browser.mouse("mouseReleased", x, y - 60)
+        check(browser.eventually("panel.status.peak_db > -60"), f"{name} is heard")
+        # Both masses together swing at sqrt(K/2) per sample, 44 100 of them a second: 149 and 447 Hz.
+        tones[name] = browser.evaluate("""[148.9, 446.7].map(hz => {
+          const y = panel.heard, w = 2 * Math.PI * hz / 48000;
+          let re = 0, im = 0;
+          y.forEach((v, n) => {
+            const hann = 0.5 - 0.5 * Math.cos(2 * Math.PI * n / y.length);
+            re += hann * v * Math.cos(w * n); im += hann * v * Math.sin(w * n);
+          });
+          return Math.hypot(re, im);
+        })""")
+    print("        " + str(tones))
+    check(tones["low_b"][0] > 10 * tones["low_b"][1], "the low one sounds low")
+    check(tones["high_b"][1] > 10 * tones["high_b"][0], "the high one sounds high")
+
+
 def keys(program, browser):
     check(silence(program, browser), "silence at once")
     browser.evaluate("document.getElementById('network').focus()")
@@ -293,6 +339,23 @@ def test(program_path):
             print("the program said:\n" + "".join(program.lines))
 
 
+def test_strikes(program_path):
+    with tempfile.TemporaryDirectory() as folder:
+        model = os.path.join(folder, "apart.mdl")
+        with open(model, "w", encoding="utf-8") as file:
+            file.write(APART)
+        program = Program(program_path, model)
+        try:
+            with Browser() as browser:
+                browser.open(program.address)
+                if check(browser.eventually("globalThis.panel && panel.view.net &&"
+                                            " panel.view.net.dots === 4 && panel.frames > 5"),
+                         "the page draws two pendulums"):
+                    strikes(program, browser)
+        finally:
+            check(program.close() == 0, "the program ends as it should")
+
+
 def pictures(program_path, folder):
     shots = [("mesh-light", "20x30mesh", 1280, 800, False, 45), ("mesh-dark", "20x30mesh", 1280, 800, True, 45),
              ("bow-light", "BowedString", 1280, 800, False, 45), ("bow-dark", "BowedString", 1280, 800, True, 45),
@@ -324,6 +387,7 @@ def main():
         eventually(lambda: subprocess.run(["jack_lsp"], stdout=subprocess.DEVNULL,
                                           stderr=subprocess.DEVNULL).returncode == 0)
         test(program)
+        test_strikes(program)
     finally:
         jack.terminate()
         jack.wait()

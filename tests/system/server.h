@@ -284,7 +284,7 @@ class Neighbour {
   }
   ~Neighbour() { jack_client_close(client_); }
 
-  bool connect(const std::string& from, const std::string& to) {
+  bool connect(const std::string& from, const std::string& to) const {
     return eventually([&] {
       jack_connect(client_, from.c_str(), to.c_str());
       return is_connected(from, to);

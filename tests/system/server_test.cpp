@@ -72,6 +72,18 @@ bool status_shows(Child& play, const std::string& text) {
   return play.says("events") && play.said().find(text) != std::string::npos;
 }
 
+constexpr std::size_t first_note = 20000;  // frame
+
+// So many clicks, `spacing` apart.
+std::vector<Listener::Message> clicks() {
+  std::vector<Listener::Message> messages;
+  for (std::size_t n = 0; n < notes; ++n) {
+    messages.push_back({first_note + n * spacing, {0x90, 69, 100}});
+    messages.push_back({first_note + n * spacing + 9000, {0x80, 69, 0}});
+  }
+  return messages;
+}
+
 std::vector<std::size_t> onsets(const Listener& listener, std::size_t first) {
   std::vector<std::size_t> found;
   for (int n = 0; n < notes; ++n) {
@@ -81,28 +93,27 @@ std::vector<std::size_t> onsets(const Listener& listener, std::size_t first) {
   return found;
 }
 
+// All clicks() are heard, and as late as each other to the frame; how late.
+std::size_t check_clicks(const Listener& listener) {
+  const std::vector<std::size_t> late = onsets(listener, first_note);
+  const auto [least, most] = std::minmax_element(late.begin(), late.end());
+  CAPTURE(*least, *most);
+  CHECK(*most < spacing / 2);
+  CHECK(*most - *least == 0);  // frames
+  return *most;
+}
+
 }  // namespace
 
 TEST_CASE("MIDI notes start on their frame", "[jack_midi]") {
   const Server server(1024);
   Child play(program({"play", click(), "-a", "jack", "-i", "-u", osc_port}));
   REQUIRE(answers());
-  constexpr std::size_t first = 20000;
-  Listener listener(first + (notes + 1) * spacing);
-  std::vector<Listener::Message> messages;
-  for (std::size_t n = 0; n < notes; ++n) {
-    messages.push_back({first + n * spacing, {0x90, 69, 100}});
-    messages.push_back({first + n * spacing + 9000, {0x80, 69, 0}});
-  }
-  listener.plan(messages);
+  Listener listener(first_note + (notes + 1) * spacing);
+  listener.plan(clicks());
   listener.start("ressort:out_left", "ressort:midi_in");
-  REQUIRE(listener.wait_for(first + notes * spacing));
-  const std::vector<std::size_t> late = onsets(listener, first);
-  const auto [least, most] = std::minmax_element(late.begin(), late.end());
-  CAPTURE(*least, *most);
-  CHECK(*most < spacing / 2);
-  CHECK(*most - *least == 0);  // frames
-  std::printf("MIDI onsets: %zu frames after the event, spread %zu\n", *least, *most - *least);
+  REQUIRE(listener.wait_for(first_note + notes * spacing));
+  std::printf("MIDI onsets: %zu frames after the event\n", check_clicks(listener));
 }
 
 TEST_CASE("The last of two and a half thousand messages in one block is heard", "[jack_midi]") {
@@ -418,30 +429,64 @@ TEST_CASE("A bounce is exact: every note on its frame, however fast it goes", "[
   const Server server(256);
   Child play(program({"play", click(), "-a", "jack", "-i", "-u", osc_port}));
   REQUIRE(answers());
-  constexpr std::size_t first = 20000;
-  Listener listener(first + (notes + 1) * spacing);
-  std::vector<Listener::Message> messages;
-  for (std::size_t n = 0; n < notes; ++n) {
-    messages.push_back({first + n * spacing, {0x90, 69, 100}});
-    messages.push_back({first + n * spacing + 9000, {0x80, 69, 0}});
-  }
-  listener.plan(messages);
+  Listener listener(first_note + (notes + 1) * spacing);
+  listener.plan(clicks());
   jack_client_t* const bounce = jack_client_open("bounce", JackNoStartServer, nullptr);
   REQUIRE(bounce != nullptr);
   listener.start("ressort:out_left", "ressort:midi_in");
   REQUIRE(jack_set_freewheel(bounce, 1) == 0);
   const auto start = std::chrono::steady_clock::now();
-  REQUIRE(listener.wait_for(first + notes * spacing));
+  REQUIRE(listener.wait_for(first_note + notes * spacing));
   const std::chrono::duration<double> took = std::chrono::steady_clock::now() - start;
   REQUIRE(jack_set_freewheel(bounce, 0) == 0);
   jack_client_close(bounce);
-  const std::vector<std::size_t> late = onsets(listener, first);
-  const auto [least, most] = std::minmax_element(late.begin(), late.end());
-  CAPTURE(*least, *most);
-  CHECK(*most < spacing / 2);
-  CHECK(*most - *least == 0);  // frames
-  std::printf("a bounce of %.1f s took %.2f s\n", first / 48e3 + notes * spacing / 48e3,
+  check_clicks(listener);
+  std::printf("a bounce of %.1f s took %.2f s\n", first_note / 48e3 + notes * spacing / 48e3,
               took.count());
+}
+
+// PipeWire changes the period whenever a client comes or goes that wants another.
+TEST_CASE("Notes stay on their frame while the period changes", "[jack_midi]") {
+  const Server server(1024);
+  Child play(program({"play", click(), "-a", "jack", "-i", "-u", osc_port}));
+  REQUIRE(answers());
+  Listener listener(first_note + (notes + 1) * spacing);
+  listener.plan(clicks());
+  jack_client_t* const host = jack_client_open("host", JackNoStartServer, nullptr);
+  REQUIRE(host != nullptr);
+  listener.start("ressort:out_left", "ressort:midi_in");
+  std::vector<std::size_t> periods(3, 1024);  // [note]
+  for (const jack_nframes_t period : {64u, 2048u, 16u, 512u, 8192u, 128u}) {
+    REQUIRE(listener.wait_for(first_note + (periods.size() - 1) * spacing + spacing / 2));
+    REQUIRE(jack_set_buffer_size(host, period) == 0);
+    CHECK(jack_get_buffer_size(host) == period);
+    periods.insert(periods.end(), 3, period);
+  }
+  REQUIRE(listener.wait_for(first_note + notes * spacing));
+  jack_client_close(host);
+  // The listener is before and after the program, so it hears everything a period later.
+  const std::vector<std::size_t> late = onsets(listener, first_note);
+  for (std::size_t n = 0; n < periods.size(); ++n) {
+    CAPTURE(n, periods[n]);
+    CHECK(late[n] - periods[n] == late[0] - periods[0]);  // frames
+  }
+}
+
+TEST_CASE("A keyboard that was unplugged is taken up again by its name", "[jack_midi]") {
+  const Server server(256);
+  Child play(program({"play", click(), "-a", "jack", "-i", "-u", osc_port}));
+  REQUIRE(answers());
+  for (int time = 0; time < 3; ++time) {
+    const Neighbour keyboard;
+    INFO("time " << time);
+    if (time == 0) {
+      REQUIRE(keyboard.connect("neighbour:keys", "ressort:midi_in"));
+    } else {
+      REQUIRE(
+          eventually([&] { return keyboard.is_connected("neighbour:keys", "ressort:midi_in"); }));
+    }
+    std::this_thread::sleep_for(1500ms);  // it is seen to be there, as a person would let it be
+  }
 }
 
 TEST_CASE("Ports say what they are, in their order", "[jack_midi]") {

@@ -46,7 +46,7 @@ export class NetworkView {
     this.positions = null;
     this.peak = 1e-6;
     this.mode = null;
-    this.chosen = -1;   // index of an input
+    this.chosen = -1;   // what is played: an input, or after these a node
     this.pull = null;   // {from, to}: a gesture that is being made
     new ResizeObserver(() => this.fit()).observe(canvas);
     matchMedia('(prefers-color-scheme: dark)').addEventListener('change', () => this.colours());
@@ -224,21 +224,35 @@ export class NetworkView {
       c.textAlign = 'center'; c.textBaseline = 'middle';
       c.fillText(number, sx[node], sy[node] + 0.5);
     });
+    const node = this.chosen - net.inputs.length;
+    if (node >= 0 && node < net.x.length) {
+      c.beginPath(); c.arc(sx[node], sy[node], 9, 0, 7);
+      c.lineWidth = 3; c.strokeStyle = this.colour.accent; c.stroke();
+    }
     if (this.pull) {
       c.beginPath(); c.moveTo(this.pull.from.x, this.pull.from.y); c.lineTo(this.pull.to.x, this.pull.to.y);
       c.strokeStyle = this.colour.accent; c.lineWidth = 2; c.setLineDash([2, 5]); c.stroke(); c.setLineDash([]);
     }
   }
 
-  // The input that is nearest to a point of the canvas, and how far.
-  nearestInput(x, y) {
+  nodeOf(chosen) {
+    const inputs = this.net.inputs;
+    return chosen < inputs.length ? inputs[chosen][1] : chosen - inputs.length;
+  }
+  isMass(node) { return node < this.net.dots && this.net.kinds[node] === 'm' && this.net.names[node] !== ''; }
+
+  // What is played at a point of the canvas: an input that is right there, else the mass, else the
+  // input that is nearest.
+  targetAt(x, y) {
+    if (!this.net) return -1;
     let best = -1, distance = 1e9;
-    this.net?.inputs.forEach(([, node], i) => {
+    this.net.inputs.forEach(([, node], i) => {
       if (node === null) return;
       const d = Math.hypot(this.sx[node] - x, this.sy[node] - y);
       if (d < distance) { best = i; distance = d; }
     });
-    return { input: best, distance };
+    const node = distance > 12 ? this.nearestNode(x, y) : -1;
+    return node >= 0 && this.isMass(node) ? this.net.inputs.length + node : best;
   }
 
   nearestNode(x, y) {

@@ -403,9 +403,11 @@ addEventListener('resize', showKeys);
 
 // --- playing on the picture ------------------------------------------------------------------------------
 
-// What an input does under the pointer: strike, pluck, bow, or be moved.
-function wayOf(input) {
-  const info = model?.inputs.find(i => i.number === view.net.inputs[input][0]);
+// What an input does under the pointer: strike, pluck, bow, or be moved; a mass is struck.
+function wayOf(chosen) {
+  const node = chosen - view.net.inputs.length;
+  if (node >= 0) return view.isMass(node) ? { info: { name: view.net.names[node] }, way: 'hit' } : null;
+  const info = model?.inputs.find(i => i.number === view.net.inputs[chosen][0]);
   if (!info) return null;
   const known = info.gestures;
   return { info, way: info.is_force ? 'strike' : known.includes('pluck') ? 'pluck' : known.includes('bow') ? 'bow' : 'move' };
@@ -414,16 +416,17 @@ const restOf = info => {
   const node = view.net.inputs.find(i => i[0] === info.number)?.[1];
   return node === null || node === undefined ? 0 : view.net.start[node];
 };
-const saidOf = { strike: 'drag and let go to strike', pluck: 'drag and let go to pluck', bow: 'drag to bow', move: 'drag to move' };
+const saidOf = { hit: 'drag and let go to strike', strike: 'drag and let go to strike', pluck: 'drag and let go to pluck', bow: 'drag to bow', move: 'drag to move' };
 let held = null;
 
-function hint(input, node) {
-  if (input < 0) { $('hint').textContent = node >= 0 ? view.net.names[node] : ''; return; }
-  const way = wayOf(input);
-  $('hint').textContent = way ? `input ${way.info.number}${way.info.attached_to ? ' at ' + way.info.attached_to : ''}: ${saidOf[way.way]}` : '';
+function hint(chosen) {
+  const way = chosen < 0 ? null : wayOf(chosen);
+  const what = way?.way === 'hit' ? way.info.name : `input ${way?.info.number}${way?.info.attached_to ? ' at ' + way.info.attached_to : ''}`;
+  $('hint').textContent = way ? `${what}: ${saidOf[way.way]}` : '';
 }
-function release(input, strength) {
-  const { info, way } = wayOf(input) ?? {};
+function release(chosen, strength) {
+  const { info, way } = wayOf(chosen) ?? {};
+  if (way === 'hit') say(`/mass/${info.name}/strike`, strength);
   if (way === 'strike') say(`/in/${info.number}/force`, info.blow * strength, 0);
   if (way === 'pluck') say(`/in/${info.number}/pluck`, strength);
   if (way === 'bow') say(`/in/${info.number}/bow`, 0, 0.5);
@@ -432,24 +435,25 @@ function release(input, strength) {
 const canvas = $('network');
 const point = event => ({ x: event.offsetX, y: event.offsetY });
 canvas.addEventListener('pointerdown', event => {
-  const at = point(event), { input } = view.nearestInput(at.x, at.y);
-  if (input < 0) return;
+  const at = point(event), chosen = view.targetAt(at.x, at.y);
+  if (chosen < 0) return;
   canvas.setPointerCapture(event.pointerId);
-  held = { id: event.pointerId, input, from: at, last: at, time: event.timeStamp };
-  view.chosen = input;
-  view.pull = { from: { x: view.sx[view.net.inputs[input][1]], y: view.sy[view.net.inputs[input][1]] }, to: at };
+  held = { id: event.pointerId, chosen, from: at, last: at, time: event.timeStamp };
+  view.chosen = chosen;
+  const node = view.nodeOf(chosen);
+  view.pull = { from: { x: view.sx[node], y: view.sy[node] }, to: at };
 });
 canvas.addEventListener('pointermove', event => {
   const at = point(event);
   if (!held) {
-    const { input, distance } = view.nearestInput(at.x, at.y), node = view.nearestNode(at.x, at.y);
-    view.chosen = distance < 60 ? input : -1;
-    hint(view.chosen >= 0 ? view.chosen : -1, node);
+    const chosen = view.targetAt(at.x, at.y), node = chosen < 0 ? -1 : view.nodeOf(chosen);
+    view.chosen = node >= 0 && Math.hypot(view.sx[node] - at.x, view.sy[node] - at.y) < 60 ? chosen : -1;
+    hint(view.chosen);
     return;
   }
   if (event.pointerId !== held.id) return;
   view.pull.to = at;
-  const { info, way } = wayOf(held.input) ?? {};
+  const { info, way } = wayOf(held.chosen) ?? {};
   if (way === 'bow') {
     const speed = (at.x - held.last.x) / Math.max(1, event.timeStamp - held.time);
     const drawn = Math.max(-1, Math.min(1, speed * 0.8)) || 0.02;
@@ -463,7 +467,7 @@ canvas.addEventListener('pointermove', event => {
 const letGo = event => {
   if (!held || event.pointerId !== held.id) return;
   const far = Math.hypot(held.last.x - held.from.x, held.last.y - held.from.y);
-  if (event.type === 'pointerup') release(held.input, far < 6 ? 0.6 : Math.min(1, 0.15 + far / 140));
+  if (event.type === 'pointerup') release(held.chosen, far < 6 ? 0.6 : Math.min(1, 0.15 + far / 140));
   held = null;
   view.pull = null;
 };
@@ -471,9 +475,13 @@ canvas.addEventListener('pointerup', letGo);
 canvas.addEventListener('pointercancel', letGo);
 canvas.addEventListener('pointerleave', () => { if (!held) { view.chosen = -1; $('hint').textContent = ''; } });
 canvas.addEventListener('keydown', event => {
-  const count = view.net?.inputs.length ?? 0, step = { ArrowRight: 1, ArrowDown: 1, ArrowLeft: -1, ArrowUp: -1 }[event.key];
+  const count = view.net ? view.net.inputs.length + view.net.dots : 0, step = { ArrowRight: 1, ArrowDown: 1, ArrowLeft: -1, ArrowUp: -1 }[event.key];
   if (!count) return;
-  if (step) { view.chosen = (view.chosen + step + count) % count; hint(view.chosen, -1); event.preventDefault(); }
+  if (step) {
+    do view.chosen = (view.chosen + step + count) % count; while (!wayOf(view.chosen) && view.chosen > 0);
+    hint(view.chosen);
+    event.preventDefault();
+  }
   if ((event.key === 'Enter' || event.key === ' ') && !event.repeat && view.chosen >= 0) {
     const { info, way } = wayOf(view.chosen) ?? {};
     if (way === 'bow') say(`/in/${info.number}/bow`, 0.6, 0.5);

@@ -31,6 +31,7 @@ constexpr KindName event_names[] = {
     {EventKind::key_tuning, "key_tuning"},
     {EventKind::tuning_reset, "tuning_reset"},
     {EventKind::gesture, "gesture"},
+    {EventKind::strike, "strike"},
     {EventKind::panic, "panic"},
 };
 

@@ -427,6 +427,17 @@ void DenseKernel<T>::refresh_force() {
   }
 }
 
+// The force of the next sample is that of the velocity before.
+template <class T>
+bool DenseKernel<T>::strike(std::size_t, std::uint32_t node, double change) {
+  if (node >= body_.masses) {
+    return false;
+  }
+  refresh_force();
+  velocity_of(node) += static_cast<T>(change);
+  return true;
+}
+
 template <class T>
 bool DenseKernel<T>::is_near_start(std::size_t, double bound) const {
   for (std::size_t i = 0; i < body_.masses; ++i) {

@@ -78,6 +78,20 @@ bool ShardedKernel<T>::save(std::size_t lane, double* x, double* v) const {
   return true;
 }
 
+// All that have the mass or a copy of it feel it.
+template <class T>
+bool ShardedKernel<T>::strike(std::size_t lane, std::uint32_t node, double change) {
+  bool is_struck = false;
+  for (std::size_t i = 0; i < shards_.size(); ++i) {
+    const std::vector<std::uint32_t>& own = shards_[i].nodes;
+    const auto at = std::lower_bound(own.begin(), own.end(), node);
+    if (at != own.end() && *at == node) {
+      is_struck |= kernels_[i]->strike(lane, static_cast<std::uint32_t>(at - own.begin()), change);
+    }
+  }
+  return is_struck;
+}
+
 template <class T>
 bool ShardedKernel<T>::is_near_start(std::size_t lane, double bound) const {
   return std::all_of(kernels_.begin(), kernels_.end(),

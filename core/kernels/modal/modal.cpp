@@ -287,12 +287,41 @@ void ModalKernel<T>::set_state(std::size_t, const double* x, const double* v) {
   }
   state_.is_stale = true;
   state_.fresh_frames = 0;
+  wake_all();
+  std::fill_n(state_.debt, state_.modes, T(0));
+  std::fill_n(state_.loudness, places + modes_.outputs.size(), T(0));
+}
+
+// A mode's damping is not to act on what a force in the next sample adds. What sleeps wakes.
+template <class T>
+bool ModalKernel<T>::strike(std::size_t, std::uint32_t node, double change) {
+  if (!is_mass(program_, node)) {
+    return false;
+  }
+  const std::size_t block = std::size_t{modes_.modes} * program_.moving;
+  for (std::size_t i = 0; i < modes_.modes; ++i) {
+    const double* const basis = modes_.basis.data() + i * program_.moving + node;
+    if (modes_.is_crossed) {
+      state_.q[i] += static_cast<T>(basis[2 * block] * change);
+      state_.d[i] += static_cast<T>(basis[3 * block] * change);
+      continue;
+    }
+    const double damping = state_.is_stale ? 0.0 : static_cast<double>(state_.z[i]);
+    const double gain = state_.root != nullptr ? static_cast<double>(state_.root[i]) : 1.0;
+    // What is damped in one sample is not there, as a mode that is left out above half the rate.
+    state_.d[i] +=
+        damping < 1.0 ? static_cast<T>(gain * basis[0] * change / (1.0 - damping)) : T(0);
+  }
+  wake_all();
+  return true;
+}
+
+template <class T>
+void ModalKernel<T>::wake_all() {
   state_.awake = modes_.modes;
   state_.swept = state_.modes;
   state_.until_check = check_frames;
   state_.is_long_check = false;
-  std::fill_n(state_.debt, state_.modes, T(0));
-  std::fill_n(state_.loudness, places + modes_.outputs.size(), T(0));
 }
 
 template <class T>

@@ -54,6 +54,11 @@ bool OversampledKernel<T>::save(std::size_t lane, double* x, double* v) const {
 }
 
 template <class T>
+bool OversampledKernel<T>::strike(std::size_t lane, std::uint32_t node, double change) {
+  return fine_->strike(lane, node, change / static_cast<double>(times_));
+}
+
+template <class T>
 std::size_t OversampledKernel<T>::look(std::size_t lane, std::span<const std::uint32_t> nodes,
                                        std::span<double> numbers) const {
   return fine_->look(lane, nodes, numbers);

@@ -89,6 +89,13 @@ bool SlowKernel<T>::save(std::size_t, double* x, double* v) const {
   return true;
 }
 
+// A coarse step feels it with the forces that are gathered for it.
+template <class T>
+bool SlowKernel<T>::strike(std::size_t, std::uint32_t node, double change) {
+  return is_fine_ ? fine_.kernel->strike(0, node, change)
+                  : coarse_.kernel->strike(0, node, change * static_cast<double>(frames_));
+}
+
 template <class T>
 std::size_t SlowKernel<T>::look(std::size_t, std::span<const std::uint32_t> nodes,
                                 std::span<double> numbers) const {
