@@ -210,6 +210,8 @@ def strikes(program, browser):
         browser.mouse("mouseMoved", x, y - 60)
         browser.mouse("mouseReleased", x, y - 60)
         check(browser.eventually("panel.status.peak_db > -60"), f"{name} is heard")
+        shown = browser.evaluate("panel.frames")  # until the last of them has nothing else
+        browser.eventually(f"panel.frames > {shown} + 5 && panel.heard.some(v => v !== 0)")
         # Both masses together swing at sqrt(K/2) per sample, 44 100 of them a second: 149 and 447 Hz.
         tones[name] = browser.evaluate("""[148.9, 446.7].map(hz => {
           const y = panel.heard, w = 2 * Math.PI * hz / 48000;
