@@ -297,7 +297,7 @@ std::vector<std::string> Console::completions(std::string_view line) const {
   } else if (kind == "MASS") {
     const auto loaded = context_->session.current();
     for (const StruckInfo& info : loaded->instrument.struck) {
-      words.push_back(info.count == 0 ? info.name : info.name + ":1");
+      words.push_back(info.moves.empty() ? info.name : info.name + ":2");
     }
   } else if (kind == "FIGURE") {
     for (const AskedFigureRow& figure : asked_figure_rows()) {

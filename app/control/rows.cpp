@@ -70,49 +70,45 @@ Events play_input(const Said& said, const GestureRow& gesture) {
                     .value2 = said.arguments[1]});
 }
 
-// Of NAME, or of "NAME:3", the third mass of what NAME stands for.
-std::optional<std::uint32_t> find_mass(std::span<const StruckInfo> known, std::string_view name) {
-  const std::size_t colon = name.find(':');
+// Of NAME, or of "NAME:3", the third mass of what NAME stands for; or why there is none.
+Result<std::uint32_t> find_mass(std::span<const StruckInfo> known, std::string_view name) {
+  const std::size_t colon = std::min(name.find(':'), name.size());
   const auto found =
       std::lower_bound(known.begin(), known.end(), name.substr(0, colon),
                        [](const StruckInfo& info, std::string_view n) { return info.name < n; });
-  if (found == known.end() || found->name != name.substr(0, colon)) {
-    return std::nullopt;
-  }
-  std::uint32_t at = 1;
-  if (colon != name.npos) {
+  if (found != known.end() && found->name == name.substr(0, colon)) {
+    const bool is_one = found->moves.empty();
+    std::uint32_t at = 1;
     const char* const end = name.data() + name.size();
-    const auto read = std::from_chars(name.data() + colon + 1, end, at);
-    if (read.ec != std::errc{} || read.ptr != end) {
-      return std::nullopt;
+    const auto read = std::from_chars(std::min(name.data() + colon + 1, end), end, at);
+    const bool is_read = is_one ? colon == name.size() : read.ec == std::errc{} && read.ptr == end;
+    if (is_read && (is_one || (at >= 1 && at <= found->moves.size()))) {
+      return is_one || found->moves[at - 1]
+                 ? Result<std::uint32_t>(found->first + at - 1)
+                 : Error{std::string(name) + " is held, or nobody hears it"};
     }
-  }
-  const bool is_macro = found->count > 0;
-  return is_macro == (colon != name.npos) && at >= 1 && at <= std::max(1u, found->count)
-             ? std::optional(found->first + at - 1)
-             : std::nullopt;
-}
-
-Events strike(const Said& said) {
-  const std::vector<StruckInfo>& known = said.instrument.struck;
-  const auto mass = find_mass(known, said.name);
-  if (mass) {
-    return one(said, {.kind = EventKind::strike,
-                      .model = said.serial,
-                      .value = said.arguments[0] * said.instrument.blow,
-                      .value2 = static_cast<double>(*mass)});
   }
   constexpr std::size_t most_named = 8;
   std::vector<std::string> names;
   for (std::size_t i = 0; i < std::min(known.size(), most_named); ++i) {
-    const StruckInfo& info = known[i];
-    names.push_back(info.count == 0
-                        ? info.name
-                        : info.name + ":1 to " + info.name + ":" + std::to_string(info.count));
+    const auto& [other, first, moves] = known[i];
+    names.push_back(moves.empty() ? other
+                                  : other + ":1 to " + other + ":" + std::to_string(moves.size()));
   }
-  return Error{said.message.address + ": the model has no such mass; it has " +
+  return Error{"the model has no such mass; it has " +
                (names.empty() ? "none" : joined(names, ", ")) +
                (known.size() > most_named ? " and others" : "")};
+}
+
+Events strike(const Said& said) {
+  const auto mass = find_mass(said.instrument.struck, said.name);
+  if (!mass) {
+    return Error{said.message.address + ": " + mass.error().message};
+  }
+  return one(said, {.kind = EventKind::strike,
+                    .model = said.serial,
+                    .value = said.arguments[0] * said.instrument.blow,
+                    .value2 = static_cast<double>(*mass)});
 }
 
 // --- the rows -----------------------------------------------------------------------------------

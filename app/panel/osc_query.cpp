@@ -135,7 +135,7 @@ Tree tree_of(const Session::Present& now) {
   constexpr std::size_t most_struck = 200;  // a mesh has thousands
   for (std::size_t i = 0; i < std::min(most_struck, instrument.struck.size()); ++i) {
     const StruckInfo& info = instrument.struck[i];
-    const std::string path = "/mass/" + info.name + (info.count > 0 ? ":1" : "") + "/strike";
+    const std::string path = "/mass/" + info.name + (info.moves.empty() ? "" : ":2") + "/strike";
     tree.add(path, method_of(*find_row(path).row, path));
   }
   for (const CustomInfo& custom : instrument.custom) {

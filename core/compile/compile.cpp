@@ -325,7 +325,8 @@ Result<Compiled> compile_by_stages(const Request& request) {
       !factor, reduced.merged);
   notes.insert(notes.end(), pitch_notes.begin(), pitch_notes.end());
   progress.stage("making its voices");
-  Instrument instrument = make_instrument(network, preset, analysis, planned.machine, voices, gain);
+  Instrument instrument = make_instrument(network, preset, analysis, voices, gain);
+  instrument.struck = find_struck(request.written, planned.machine);
   return Compiled{.engine = make_engine(std::move(planned.machine), played_by(voices, gain),
                                         options.precision, options.isa, progress),
                   .instrument = std::move(instrument),

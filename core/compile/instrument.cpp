@@ -86,6 +86,34 @@ int audio_input_count(const Network& network, const Preset& preset) {
   return count;
 }
 
+// As hard as the preset strikes; if it does not, what moves all masses together so far, at the
+// pitch of the lowest mode, that the output is at half its full scale.
+double find_blow(const Network& network, const std::vector<Control>& controls, double frequency_hz,
+                 double gain) {
+  double blow = 0.0;
+  for (const Control& control : controls) {
+    if (control.gesture == Gesture::impulse && network.inputs[control.target].is_force) {
+      blow = std::max({blow, std::fabs(control.low), std::fabs(control.high)});
+    }
+  }
+  if (blow > 0.0) {
+    return blow;
+  }
+  const std::vector<double> parameters = parameter_values(network);
+  double mass = 0.0;
+  double modal_mass = 0.0;  // each mode of a body has all of it
+  for (const Mass& of : network.masses) {
+    const double here = moves(of) ? argument_value(network, of.mass, parameters) : 0.0;
+    modal_mass = of.is_mode ? std::max(modal_mass, here) : modal_mass;
+    mass += of.is_mode ? 0.0 : here;
+  }
+  mass += modal_mass;
+  const double turn = 2.0 * std::numbers::pi * frequency_hz / Network::reference_rate_hz;
+  return gain > 0.0 ? 0.5 * mass * turn / gain : mass * turn;
+}
+
+}  // namespace
+
 std::vector<StruckInfo> find_struck(const Network& network, const Machine& machine) {
   const std::vector<std::uint32_t> starts = macro_starts(network);
   std::vector<bool> is_played(starts.empty() ? network.masses.size()
@@ -107,42 +135,13 @@ std::vector<StruckInfo> find_struck(const Network& network, const Machine& machi
     const auto first = is_played.begin() + starts[i];
     const auto end = first + static_cast<std::ptrdiff_t>(count);
     if (std::find(first, end, true) != end) {
-      struck.push_back({macro.name, starts[i], static_cast<std::uint32_t>(count)});
+      struck.push_back({macro.name, starts[i], {first, end}});
     }
   }
   std::sort(struck.begin(), struck.end(),
             [](const StruckInfo& a, const StruckInfo& b) { return a.name < b.name; });
   return struck;
 }
-
-// As hard as the preset strikes; if it does not, what moves all masses together so far, at the
-// pitch of the lowest mode, that the output is at half its full scale.
-double find_blow(const Network& network, const std::vector<Control>& controls, double frequency_hz,
-                 double gain) {
-  double blow = 0.0;
-  for (const Control& control : controls) {
-    if (control.gesture == Gesture::impulse && network.inputs[control.target].is_force) {
-      blow = std::max({blow, std::fabs(control.low), std::fabs(control.high)});
-    }
-  }
-  if (blow > 0.0) {
-    return blow;
-  }
-  const std::vector<double> parameters = parameter_values(network);
-  double mass = 0.0;
-  for (const Mass& of : network.masses) {
-    mass += moves(of) ? argument_value(network, of.mass, parameters) : 0.0;
-  }
-  for (const Macro& macro : network.macros) {
-    if (const auto count = node_count(macro); count > 0) {
-      mass += static_cast<double>(count) * argument_value(network, macro.mass, parameters);
-    }
-  }
-  const double turn = 2.0 * std::numbers::pi * frequency_hz / Network::reference_rate_hz;
-  return gain > 0.0 ? 0.5 * mass * turn / gain : mass * turn;
-}
-
-}  // namespace
 
 Playing make_playing(const Network& network, const Preset& preset, const Analysis& analysis,
                      bool bare, int voices, double gain) {
@@ -170,7 +169,7 @@ Playing make_playing(const Network& network, const Preset& preset, const Analysi
 }
 
 Instrument make_instrument(const Network& network, const Preset& preset, const Analysis& analysis,
-                           const Machine& machine, int voices, double gain) {
+                           int voices, double gain) {
   const std::vector<Control> controls = make_controls(network, preset);
   std::vector<InputInfo> inputs;
   for (std::size_t i = 0; i < network.inputs.size(); ++i) {
@@ -190,7 +189,6 @@ Instrument make_instrument(const Network& network, const Preset& preset, const A
   return {.parameters = analysis.stability.parameters,
           .inputs = std::move(inputs),
           .custom = std::move(custom),
-          .struck = find_struck(network, machine),
           .blow = find_blow(network, controls, mode ? mode->frequency_hz : 220.0, gain),
           .outputs = output_count(network),
           .audio_inputs = audio_input_count(network, preset),

@@ -36,7 +36,7 @@ struct CustomInfo {
 struct StruckInfo {
   std::string name;
   std::uint32_t first = 0;  // Event::value2 of EventKind::strike
-  std::uint32_t count = 0;  // 0: one mass of this name
+  std::vector<bool> moves;  // [mass of the macro], those that are not held; empty: one mass
 };
 
 // What a running engine is called from outside; indices are those of Event.
@@ -76,6 +76,8 @@ struct Analysis {
 Playing make_playing(const Network& network, const Preset& preset, const Analysis& analysis,
                      bool bare, int voices, double gain);
 Instrument make_instrument(const Network& network, const Preset& preset, const Analysis& analysis,
-                           const Machine& machine, int voices, double gain);
+                           int voices, double gain);
+// Of a network as it is written, which the machine was made of.
+std::vector<StruckInfo> find_struck(const Network& network, const Machine& machine);
 
 }  // namespace ressort

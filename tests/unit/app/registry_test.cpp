@@ -127,6 +127,47 @@ TEST_CASE("every playing address becomes its event", "[registry]") {
   check(event("/brightness 1"), EventKind::custom, 3, 1.0, 9);
 }
 
+TEST_CASE("a mass is struck by its name, those of strings and meshes by numbers", "[registry]") {
+  Preset preset;
+  preset.controls = {{.target = "in1", .gesture = Gesture::impulse, .low = 0.1, .high = 0.4}};
+  const auto compiled =
+      compile(network_of("@a mass 1. 0. 0.\n@s string 5 1. 0.1 0.001 0. 0. 0.\n"
+                         "@far mass 1. 0. 0.\n@l springDamper @a [@s 0.5] 0.1 0.\n"
+                         "@in1 frcInput @a\n@out1 posOutput @a\n"),
+              preset, {});
+  REQUIRE(compiled);
+  const auto said = [&](const std::string& text) {
+    return to_events(call(text), compiled->instrument, 9);
+  };
+  const auto struck = [&](const std::string& text) {
+    INFO(text);
+    const auto events = said(text);
+    REQUIRE(events);
+    REQUIRE(events->size() == 1);
+    CHECK((*events)[0].kind == EventKind::strike);
+    CHECK((*events)[0].model == 9);
+    return std::pair{(*events)[0].value, (*events)[0].value2};
+  };
+  // Written out, the string's masses come after the two, and after the place on it.
+  CHECK(struck("/mass/a/strike 1") == std::pair{0.4, 0.0});
+  CHECK(struck("/mass/a/strike -0.5") == std::pair{-0.2, 0.0});
+  CHECK(struck("/mass/s:2/strike 1") == std::pair{0.4, 4.0});
+  CHECK(struck("/mass/s:4/strike") == std::pair{0.8 * 0.4, 6.0});
+  const auto refused = [&](const std::string& text) {
+    INFO(text);
+    const auto events = said(text);
+    REQUIRE_FALSE(events);
+    return events.error().message;
+  };
+  CHECK(refused("/mass/s:1/strike") == "/mass/s:1/strike: s:1 is held, or nobody hears it");
+  const std::string there = ": the model has no such mass; it has a, s:1 to s:5";
+  for (const std::string name : {"s", "s:", "s:0", "s:6", "s:x", "s:2x", "a:1", "b", "", "far"}) {
+    CHECK(refused("/mass/" + name + "/strike") == "/mass/" + name + "/strike" + there);
+  }
+  CHECK(refused("/mass/a/strike 1.1") ==
+        "/mass/a/strike: the strength must lie between -1 and 1, found 1.1");
+}
+
 TEST_CASE("what an input gives cannot be set", "[registry]") {
   const auto compiled =
       compile(network_of("@K audioParam @in2\n@Z param 0.1\n@o osc 1 K Z 0 0\n"), {}, {});
@@ -212,11 +253,11 @@ TEST_CASE("every row is found by its address and can be said somewhere", "[regis
     }
     std::string address = row.address;
     std::string name;
-    for (const auto& [letters, typed] : {std::pair<std::string, std::string>{"/NAME", "/s_K"},
-                                         std::pair<std::string, std::string>{"/N/", "/1/"}}) {
-      if (const auto at = address.find(letters); at != std::string::npos) {
-        address.replace(at, letters.size(), typed);
-        name = letters == "/N/" ? "1" : "s_K";
+    for (const std::string hole : {"NAME", "N"}) {
+      if (const auto at = address.find("/" + hole); at != std::string::npos) {
+        name = hole == "N" ? "1" : address.starts_with("/mass/") ? "s_m0" : "s_K";
+        address.replace(at + 1, hole.size(), name);
+        break;
       }
     }
     CHECK(find_row(address).row == &row);
