@@ -98,7 +98,7 @@ class Abuser {
                  : static_cast<std::uint16_t>(
                        instrument_.inputs[random_.below(instrument_.inputs.size())].number);
     };
-    switch (random_.below(12)) {
+    switch (random_.below(13)) {
       case 0:
       case 1:
         return {.kind = EventKind::note_on, .index = key(), .value = random_.uniform(0.01, 1.0)};
@@ -139,6 +139,10 @@ class Abuser {
                            .index = static_cast<std::uint16_t>(
                                instrument_.custom[random_.below(instrument_.custom.size())].row),
                            .value = random_.uniform(0.0, 1.0)};
+      case 11:
+        return {.kind = EventKind::strike,
+                .value = instrument_.blow * any_size(),
+                .value2 = static_cast<double>(random_.below(2 * instrument_.masses + 2))};
       default:
         return chance(200) ? Event{.kind = EventKind::panic}
                            : Event{.kind = EventKind::note_off, .index = key()};
