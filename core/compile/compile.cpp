@@ -92,7 +92,7 @@ Analysis prove(const Request& request, const Reduced& reduced, const Machine& ma
   auto rest_bounds = !options.bare && margins.keys >= 1.0 && network.waveguides.empty()
                          ? make_rest_bounds(network, machine, box, options.progress)
                          : std::vector<std::optional<RestBound>>();
-  return {mode, {}, std::move(stability), std::move(margins), std::move(rest_bounds)};
+  return {mode, {}, {}, std::move(stability), std::move(margins), std::move(rest_bounds)};
 }
 
 // How far merging has brought partials off: by their poles, or where there are too many masses as
@@ -215,6 +215,58 @@ Pitches sharpened(const Pitches& pitches, const Preset& preset) {
   return sharp;
 }
 
+// Of keys wherever the preset's morph is: in as many steps as cubics need to hit the pitches
+// between them, or the most.
+MorphPitches find_morph_pitches(const Request& request, const Network& network, Machine& machine) {
+  constexpr double in_tune = 1e-5;  // of a logarithm: 0.01 cents
+  constexpr std::size_t most_steps = 64;
+  MorphPitches morph;
+  const int parameter = find_parameter(network, request.preset.morph_parameter);
+  if (request.preset.morph.empty() || parameter < 0 || request.options.bare) {
+    return morph;
+  }
+  request.options.progress.stage("tuning the morph");
+  const std::vector<double> start = machine.parameters;
+  std::vector<std::string> notes;
+  const auto pitches_at = [&](double position) -> std::optional<Pitches> {
+    machine.parameters[morph.parameter] = position;
+    const auto shapes = find_shapes(request, network, machine.parameters);
+    return shapes ? std::optional(sharpened(find_pitches(request, network, machine, *shapes, notes),
+                                            request.preset))
+                  : std::nullopt;
+  };
+  morph.parameter = static_cast<std::size_t>(parameter);
+  const std::size_t legs = request.preset.morph.size() - 1;
+  bool is_found = true;
+  const auto add = [&](std::vector<Pitches>& all, double position) {
+    auto pitches = pitches_at(position);
+    is_found = is_found && pitches;
+    all.push_back(pitches ? *std::move(pitches) : Pitches());
+  };
+  for (std::size_t i = 0; i <= legs * morph.steps; ++i) {
+    add(morph.at, 1.0 + static_cast<double>(i) / static_cast<double>(morph.steps));
+  }
+  for (bool is_near = false; is_found && !is_near && morph.steps < most_steps;) {
+    MorphPitches finer{.parameter = morph.parameter, .steps = 2 * morph.steps};
+    is_near = true;
+    for (std::size_t i = 0; i <= legs * finer.steps; ++i) {
+      if (i % 2 == 0) {
+        finer.at.push_back(morph.at[i / 2]);
+        continue;
+      }
+      const double position = 1.0 + static_cast<double>(i) / static_cast<double>(finer.steps);
+      add(finer.at, position);
+      for (const double hz : {27.5, 261.6, 2093.0}) {
+        const double off = std::log(finer.at.back().factor_at(hz) / morph.factor_at(hz, position));
+        is_near = is_near && std::fabs(off) < in_tune;
+      }
+    }
+    morph = std::move(finer);
+  }
+  machine.parameters = start;
+  return is_found ? morph : MorphPitches();
+}
+
 // What keys may use of the stiffness, once it is known what plays them: what rings above 0.456 of
 // the rate is no tone any more.
 void reach(Analysis& analysis, double more, double rate_hz) {
@@ -305,6 +357,7 @@ Result<Compiled> compile_by_stages(const Request& request) {
   if (shapes) {
     analysis.pitches =
         sharpened(find_pitches(request, network, planned.machine, *shapes, pitch_notes), preset);
+    analysis.morph = find_morph_pitches(request, network, planned.machine);
     reach(analysis, planned.more, options.rate_hz);
   }
   if (auto error = shortage(planned.machine, voices, options.precision, options.most_bytes)) {

@@ -73,6 +73,7 @@ struct Engine::Player {
       return;
     }
     const std::uint8_t channel = event.channel % Channels::count;
+    follow_morph();
     switch (event.kind) {
       case EventKind::note_on:
         return listens_to(channel) ? press_key(event) : void();
@@ -268,6 +269,7 @@ struct Engine::Player {
 
   template <class T>
   void apply_changes(Bank<T>& b) {
+    follow_morph();
     if (voices.has_changed() || parameters.has_changed()) {
       voices.retune(parameters.has_changed_highest_factor(), parameters.highest_factor());
       gestures.follow_pitches();
@@ -276,6 +278,13 @@ struct Engine::Player {
       }
       parameters.apply(b, voices, watch);
       voices.forget_changes();
+    }
+  }
+
+  // Keys are tuned by where the morph is.
+  void follow_morph() {
+    if (!playing.morph.at.empty()) {
+      voices.morph_to(parameters.values()[playing.morph.parameter]);
     }
   }
 
@@ -381,7 +390,7 @@ struct Engine::Player {
     if (playing.pitches.factors.empty() || !voice.awake) {
       return false;
     }
-    slow_hz = playing.pitches.frequency_at(voice.factor);
+    slow_hz = playing.pitches.frequency_at(voices.unmorphed_factor(voice));
     slow_numbers = numbers;
     return true;
   }

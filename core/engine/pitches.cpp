@@ -1,9 +1,19 @@
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "core/engine/engine.h"
 
 namespace ressort {
+namespace {
+
+// Through four values, at 0, 1, 2 and 3.
+double cubic(double t, const std::array<double, 4>& y) {
+  return -(t - 1.0) * (t - 2.0) * (t - 3.0) / 6.0 * y[0] + t * (t - 2.0) * (t - 3.0) / 2.0 * y[1] -
+         t * (t - 1.0) * (t - 3.0) / 2.0 * y[2] + t * (t - 1.0) * (t - 2.0) / 6.0 * y[3];
+}
+
+}  // namespace
 
 double Pitches::factor_at(double frequency_hz) const {
   if (factors.empty()) {
@@ -20,13 +30,23 @@ double Pitches::factor_at(double frequency_hz) const {
   }
   const auto first =
       static_cast<std::size_t>(std::clamp(std::floor(semitone) - 1.0, 0.0, last - 3.0));
-  const double t = semitone - static_cast<double>(first);
   const auto log_of = [&](std::size_t i) { return std::log(factors[first + i]); };
-  const double sum = -(t - 1.0) * (t - 2.0) * (t - 3.0) / 6.0 * log_of(0) +
-                     t * (t - 2.0) * (t - 3.0) / 2.0 * log_of(1) -
-                     t * (t - 1.0) * (t - 3.0) / 2.0 * log_of(2) +
-                     t * (t - 1.0) * (t - 2.0) / 6.0 * log_of(3);
-  return std::max(least, std::exp(sum));
+  return std::max(least, std::exp(cubic(semitone - static_cast<double>(first),
+                                        {log_of(0), log_of(1), log_of(2), log_of(3)})));
+}
+
+double MorphPitches::factor_at(double frequency_hz, double position) const {
+  const double last = static_cast<double>(at.size() - 1) / static_cast<double>(steps);  // leg
+  const double from_first = std::clamp(position - 1.0, 0.0, last);
+  // A morph bends where it passes a stop: the four are of one leg.
+  const double leg = std::min(std::floor(from_first), last - 1.0);
+  const double within = (from_first - leg) * static_cast<double>(steps);
+  const double first = std::clamp(std::floor(within) - 1.0, 0.0, static_cast<double>(steps) - 3.0);
+  const auto index = static_cast<std::size_t>(leg) * steps + static_cast<std::size_t>(first);
+  const auto log_of = [&](std::size_t i) {
+    return std::log(at[index + i].factor_at(frequency_hz));
+  };
+  return std::exp(cubic(within - first, {log_of(0), log_of(1), log_of(2), log_of(3)}));
 }
 
 double Pitches::frequency_at(double factor) const {

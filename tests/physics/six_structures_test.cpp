@@ -2,13 +2,13 @@
 // heard, with the paper's table written down here.
 #include <array>
 #include <cmath>
-#include <complex>
 #include <fstream>
 #include <numbers>
 #include <sstream>
 
 #include "core/compile/compile.h"
 #include "core/model/language/mdl.h"
+#include "tests/support/partial.h"
 #include "tests/support/player.h"
 
 namespace ressort {
@@ -70,42 +70,6 @@ std::vector<double> played(const Heard& heard, double seconds, const std::vector
   return sound;
 }
 
-// A partial's frequency and T60 between two stretches of a second or less: how much further its
-// phase is than a guess, and how much less of it there is. Blackman and Harris' window of four
-// terms keeps others 92 dB away.
-struct Partial {
-  double hz = 0.0;
-  double t60_s = 0.0;
-};
-
-Partial partial_of(const std::vector<double>& y, double rate_hz, double guess_hz, double from_s,
-                   double length_s, double apart_s) {
-  const auto length = static_cast<std::size_t>(length_s * rate_hz);
-  const auto apart = static_cast<std::size_t>(apart_s * rate_hz);
-  const auto at = [&](std::size_t first) {
-    std::complex<double> sum;
-    for (std::size_t n = 0; n < length; ++n) {
-      const double turn =
-          2.0 * std::numbers::pi * static_cast<double>(n) / static_cast<double>(length);
-      const double window = 0.35875 - 0.48829 * std::cos(turn) + 0.14128 * std::cos(2.0 * turn) -
-                            0.01168 * std::cos(3.0 * turn);
-      const double phase =
-          -2.0 * std::numbers::pi * guess_hz * static_cast<double>(first + n) / rate_hz;
-      sum += window * y[first + n] * std::polar(1.0, phase);
-    }
-    return sum;
-  };
-  const auto first = static_cast<std::size_t>(from_s * rate_hz);
-  const std::complex<double> ratio = at(first + apart) / at(first);
-  const double seconds = static_cast<double>(apart) / rate_hz;
-  return {.hz = guess_hz + std::arg(ratio) / (2.0 * std::numbers::pi * seconds),
-          .t60_s = -std::log(1000.0) * seconds / std::log(std::abs(ratio))};
-}
-
-double cents(double hz, double of_hz) {
-  return 1200.0 * std::log2(hz / of_hz);
-}
-
 double peak_of(const std::vector<double>& y) {
   double peak = 0.0;
   for (const double sample : y) {
@@ -133,7 +97,7 @@ TEST_CASE("six structures sound at one pitch and decay as long, at three keys",
     for (int i = 0; i < static_cast<int>(structures); ++i) {
       for (const int key : {45, 57, 69}) {
         const double hz = 440.0 * std::exp2((key - 69) / 12.0);
-        const Partial found =
+        const HeardPartial found =
             partial_of(played({.only = i, .rate_hz = rate_hz}, 2.2, {note_on(0, key)}), rate_hz, hz,
                        0.2, 1.0, 0.9);
         INFO(names[static_cast<std::size_t>(i)] << ", " << hz << " Hz at " << rate_hz << ": "
@@ -151,7 +115,7 @@ TEST_CASE("T60 is what is asked for, and moves the pitch by less than a tenth of
   const int t60 = index_of("t60");
   for (int i = 0; i < static_cast<int>(structures); ++i) {
     for (const double asked_s : {1.0, 2.0, 6.0}) {
-      const Partial found =
+      const HeardPartial found =
           partial_of(played({.only = i}, 2.2, {parameter(0, t60, asked_s), note_on(0, 45)}),
                      48000.0, 110.0, 0.2, 1.0, 0.9);
       INFO(names[static_cast<std::size_t>(i)] << ", " << asked_s << " s: " << cents(found.hz, 110.0)
@@ -170,7 +134,7 @@ TEST_CASE("a structure a hundredth of a cent and a thousandth of its decay off w
     y[n] = std::sin(2.0 * std::numbers::pi * 110.0 * std::exp2(0.012 / 1200.0) * t) *
            std::pow(10.0, -3.0 * t / 3.0036);
   }
-  const Partial found = partial_of(y, 48000.0, 110.0, 0.1, 0.9, 0.9);
+  const HeardPartial found = partial_of(y, 48000.0, 110.0, 0.1, 0.9, 0.9);
   CHECK(cents(found.hz, 110.0) == Approx(0.012).margin(1e-4));
   CHECK(found.t60_s == Approx(3.0036).epsilon(1e-5));
 }
@@ -205,7 +169,7 @@ TEST_CASE("a sweep through the mixes moves neither pitch nor jumps", "[six_struc
   }
   const std::vector<double> all = played({}, 5.5, events);
   for (const double from_s : {0.2, 1.0, 2.0, 3.0, 4.0}) {
-    const Partial found = partial_of(all, rate_hz, 110.0, from_s, 0.6, 0.6);
+    const HeardPartial found = partial_of(all, rate_hz, 110.0, from_s, 0.6, 0.6);
     INFO("from " << from_s << " s: " << cents(found.hz, 110.0) << " cents");
     CHECK(std::fabs(cents(found.hz, 110.0)) < 0.1);
   }

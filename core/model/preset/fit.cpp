@@ -17,10 +17,6 @@ std::string names(const Network& network) {
   return text.empty() ? "none" : text;
 }
 
-std::string no_parameter(const Network& network, const std::string& name) {
-  return "the model has no parameter " + quoted(name) + "; it has " + names(network);
-}
-
 // What is wrong with the control; empty if nothing is.
 std::string misfit(const Network& network, const ControlSetting& control) {
   if (control.gesture == Gesture::parameter) {
@@ -57,6 +53,10 @@ bool fix(Network& network, const std::string& label) {
 }
 
 }  // namespace
+
+std::string no_parameter(const Network& network, const std::string& name) {
+  return "the model has no parameter " + quoted(name) + "; it has " + names(network);
+}
 
 int find_input(const Network& network, std::string_view target) {
   int number = 0;

@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "core/model/language/tokens.h"
+#include "core/model/preset/preset_morph.h"
 #include "core/model/preset/toml_depth.h"
 #include "core/model/preset/toml_table.h"
 #include "core/model/topology.h"
@@ -396,6 +397,9 @@ void read_root(const toml::table& root, Preset& preset, std::vector<Error>& erro
     } else {
       reader.fail(*node, "'parameters' must be a table: [parameters]");
     }
+  }
+  if (const toml::node* node = root.get("morph")) {
+    read_morph(*node, preset, errors);
   }
   if (const toml::node* node = root.get("control")) {
     const toml::array* rows = node->as_array();

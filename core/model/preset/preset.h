@@ -50,6 +50,15 @@ struct ControlSetting {
   bool operator==(const ControlSetting&) const = default;
 };
 
+// Where a morph passes: a preset, or values of the model's parameters.
+struct MorphSetting {
+  std::string preset;                    // its name; empty: the values
+  std::vector<ParameterSetting> values;  // each with no range but itself
+  double gain = 1.0;                     // of the values; a preset has its own
+  SourceLocation location;
+  bool operator==(const MorphSetting&) const = default;
+};
+
 struct Preset {
   std::string model;                    // a file's name, beside the preset or in the models' folder
   SourceLocation model_location{1, 1};  // of that name
@@ -81,10 +90,13 @@ struct Preset {
   Budget budget;                            // of errors, for who computes it
   std::vector<ParameterSetting> parameters;
   std::vector<ControlSetting> controls;
+  std::string morph_parameter;      // which goes through them, from 1 to as many as there are
+  std::vector<MorphSetting> morph;  // empty: the model is played as it is
   bool operator==(const Preset&) const = default;
 };
 
 inline constexpr int max_voices = 256;
+inline constexpr std::size_t most_morph_stops = 16;
 inline constexpr int most_pitch_mode = 16;
 inline constexpr std::size_t max_preset_bytes = std::size_t{64} << 10;
 inline constexpr std::size_t most_preset_errors = 100;

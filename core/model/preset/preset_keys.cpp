@@ -29,6 +29,7 @@ constexpr PresetKey keys[] = {
     {"", "budget", "text", "how exact, as `--budget` takes it: `cents=3 t60=5 silence=-60 passive=auto`"},
     {"", "parameters", "a table", "the model's parameters by name"},
     {"", "control", "tables, one for each `[[control]]`", "what plays the model"},
+    {"", "morph", "a table", "a way through several presets of one structure, on which keys stay in tune"},
     {"parameters", "value", "a number", "what the parameter is at first; needed"},
     {"parameters", "range", "[low, high]", "between what it may be turned; needed"},
     {"control", "from", "text", "`note`, `pressure`, `cc0` to `cc119`, `audio1` to `audio64`, or an OSC name such as `/finger`; needed"},
@@ -40,6 +41,8 @@ constexpr PresetKey keys[] = {
     {"control", "level_db", "[low, high]", "how loud the softest and the loudest are beside `gain`; exact for plucks, bows and blows, whose sound does not depend on how large it is. Without it the level is what `range` makes of it"},
     {"control", "length_ms", "[longest, shortest] (one sample)", "of an impulse or a swing: how long the softest and the hardest blow last at the model's own pitch, on higher keys less; the shorter, the brighter"},
     {"control", "keys", "[low, high] ([0, 127])", "of notes: which keys"},
+    {"morph", "parameter", "text", "the name of the parameter that goes through them: 1 is the first, 2 the second; controls turn it as any other. Needed"},
+    {"morph", "through", "[\"NAME\", { m_K = 0.1, gain = 0.5 }, ...]", "2 to 16 presets of the structure that `model` has, or values of its parameters, each with a `gain` as a preset's. What `[parameters]` names stays a knob of its own; the other parameters are where each stop has them. Needed"},
 };
 // clang-format on
 
