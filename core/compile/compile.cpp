@@ -215,56 +215,74 @@ Pitches sharpened(const Pitches& pitches, const Preset& preset) {
   return sharp;
 }
 
-// Of keys wherever the preset's morph is: in as many steps as cubics need to hit the pitches
-// between them, or the most.
-MorphPitches find_morph_pitches(const Request& request, const Network& network, Machine& machine) {
+// Along which parameter keys are to stay in tune, and how far that goes; without pitches.
+std::optional<PitchesAlong> tuned_along(const Request& request, const Network& network) {
+  const Preset& preset = request.preset;
+  const std::string& name = preset.morph.empty() ? preset.tuned_along : preset.morph_parameter;
+  const int parameter = find_parameter(network, name);
+  if (parameter < 0 || request.options.bare) {
+    return std::nullopt;
+  }
+  PitchesAlong along{.parameter = static_cast<std::size_t>(parameter)};
+  for (const ParameterSetting& setting : preset.parameters) {
+    if (setting.name == name && preset.morph.empty()) {
+      along.lowest = setting.minimum;
+      along.highest = setting.maximum;
+      along.by_ratios = is_wide(setting.minimum, setting.maximum);
+    }
+  }
+  if (!preset.morph.empty()) {
+    along.legs = preset.morph.size() - 1;
+    along.highest = static_cast<double>(preset.morph.size());
+  }
+  return along.lowest < along.highest ? std::optional(along) : std::nullopt;
+}
+
+// In as many steps as cubics need to hit the pitches between them, or the most.
+PitchesAlong find_pitches_along(const Request& request, const Network& network, Machine& machine) {
   constexpr double in_tune = 1e-5;  // of a logarithm: 0.01 cents
   constexpr std::size_t most_steps = 64;
-  MorphPitches morph;
-  const int parameter = find_parameter(network, request.preset.morph_parameter);
-  if (request.preset.morph.empty() || parameter < 0 || request.options.bare) {
-    return morph;
+  std::optional<PitchesAlong> along = tuned_along(request, network);
+  if (!along) {
+    return {};
   }
-  request.options.progress.stage("tuning the morph");
+  request.options.progress.stage("tuning it wherever " + network.parameters[along->parameter].name +
+                                 " is");
   const std::vector<double> start = machine.parameters;
   std::vector<std::string> notes;
-  const auto pitches_at = [&](double position) -> std::optional<Pitches> {
-    machine.parameters[morph.parameter] = position;
-    const auto shapes = find_shapes(request, network, machine.parameters);
-    return shapes ? std::optional(sharpened(find_pitches(request, network, machine, *shapes, notes),
-                                            request.preset))
-                  : std::nullopt;
-  };
-  morph.parameter = static_cast<std::size_t>(parameter);
-  const std::size_t legs = request.preset.morph.size() - 1;
   bool is_found = true;
-  const auto add = [&](std::vector<Pitches>& all, double position) {
-    auto pitches = pitches_at(position);
-    is_found = is_found && pitches;
-    all.push_back(pitches ? *std::move(pitches) : Pitches());
+  const auto add = [&](PitchesAlong& to) {
+    machine.parameters[to.parameter] = to.value_at(to.at.size());
+    const auto shapes = find_shapes(request, network, machine.parameters);
+    is_found = is_found && shapes;
+    to.at.push_back(
+        shapes ? sharpened(find_pitches(request, network, machine, *shapes, notes), request.preset)
+               : Pitches());
   };
-  for (std::size_t i = 0; i <= legs * morph.steps; ++i) {
-    add(morph.at, 1.0 + static_cast<double>(i) / static_cast<double>(morph.steps));
+  while (along->at.size() <= along->legs * along->steps) {
+    add(*along);
   }
-  for (bool is_near = false; is_found && !is_near && morph.steps < most_steps;) {
-    MorphPitches finer{.parameter = morph.parameter, .steps = 2 * morph.steps};
+  for (bool is_near = false; is_found && !is_near && along->steps < most_steps;) {
+    PitchesAlong finer = *along;
+    finer.steps *= 2;
+    finer.at.clear();
     is_near = true;
-    for (std::size_t i = 0; i <= legs * finer.steps; ++i) {
+    for (std::size_t i = 0; i <= finer.legs * finer.steps; ++i) {
       if (i % 2 == 0) {
-        finer.at.push_back(morph.at[i / 2]);
+        finer.at.push_back(along->at[i / 2]);
         continue;
       }
-      const double position = 1.0 + static_cast<double>(i) / static_cast<double>(finer.steps);
-      add(finer.at, position);
+      add(finer);
       for (const double hz : {27.5, 261.6, 2093.0}) {
-        const double off = std::log(finer.at.back().factor_at(hz) / morph.factor_at(hz, position));
+        const double off =
+            std::log(finer.at.back().factor_at(hz) / along->factor_at(hz, finer.value_at(i)));
         is_near = is_near && std::fabs(off) < in_tune;
       }
     }
-    morph = std::move(finer);
+    along = std::move(finer);
   }
   machine.parameters = start;
-  return is_found ? morph : MorphPitches();
+  return is_found ? *std::move(along) : PitchesAlong();
 }
 
 // What keys may use of the stiffness, once it is known what plays them: what rings above 0.456 of
@@ -357,7 +375,7 @@ Result<Compiled> compile_by_stages(const Request& request) {
   if (shapes) {
     analysis.pitches =
         sharpened(find_pitches(request, network, planned.machine, *shapes, pitch_notes), preset);
-    analysis.morph = find_morph_pitches(request, network, planned.machine);
+    analysis.along = find_pitches_along(request, network, planned.machine);
     reach(analysis, planned.more, options.rate_hz);
   }
   if (auto error = shortage(planned.machine, voices, options.precision, options.most_bytes)) {

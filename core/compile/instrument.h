@@ -56,7 +56,7 @@ struct Instrument {
 struct Analysis {
   std::optional<Mode> mode;  // the lowest, where keys set the pitch by it
   Pitches pitches;           // of keys, by that mode as it will be played
-  MorphPitches morph;        // the same wherever the morph is
+  PitchesAlong along;        // the same wherever the parameter is that is to leave keys in tune
   StabilityCheck stability;
   Margins margins;
   std::vector<std::optional<RestBound>> rest_bounds;  // [part]

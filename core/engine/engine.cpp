@@ -73,7 +73,7 @@ struct Engine::Player {
       return;
     }
     const std::uint8_t channel = event.channel % Channels::count;
-    follow_morph();
+    follow_tuning();
     switch (event.kind) {
       case EventKind::note_on:
         return listens_to(channel) ? press_key(event) : void();
@@ -269,7 +269,7 @@ struct Engine::Player {
 
   template <class T>
   void apply_changes(Bank<T>& b) {
-    follow_morph();
+    follow_tuning();
     if (voices.has_changed() || parameters.has_changed()) {
       voices.retune(parameters.has_changed_highest_factor(), parameters.highest_factor());
       gestures.follow_pitches();
@@ -281,10 +281,10 @@ struct Engine::Player {
     }
   }
 
-  // Keys are tuned by where the morph is.
-  void follow_morph() {
-    if (!playing.morph.at.empty()) {
-      voices.morph_to(parameters.values()[playing.morph.parameter]);
+  // Keys are tuned where the parameter is that leaves them in tune.
+  void follow_tuning() {
+    if (!playing.along.at.empty()) {
+      voices.tune_at(parameters.values()[playing.along.parameter]);
     }
   }
 
@@ -390,7 +390,7 @@ struct Engine::Player {
     if (playing.pitches.factors.empty() || !voice.awake) {
       return false;
     }
-    slow_hz = playing.pitches.frequency_at(voices.unmorphed_factor(voice));
+    slow_hz = playing.pitches.frequency_at(voices.first_factor(voice));
     slow_numbers = numbers;
     return true;
   }

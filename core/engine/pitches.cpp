@@ -35,12 +35,19 @@ double Pitches::factor_at(double frequency_hz) const {
                                         {log_of(0), log_of(1), log_of(2), log_of(3)})));
 }
 
-double MorphPitches::factor_at(double frequency_hz, double position) const {
-  const double last = static_cast<double>(at.size() - 1) / static_cast<double>(steps);  // leg
-  const double from_first = std::clamp(position - 1.0, 0.0, last);
-  // A morph bends where it passes a stop: the four are of one leg.
-  const double leg = std::min(std::floor(from_first), last - 1.0);
-  const double within = (from_first - leg) * static_cast<double>(steps);
+double PitchesAlong::value_at(std::size_t index) const {
+  const double way = static_cast<double>(index) / static_cast<double>(legs * steps);
+  return by_ratios ? lowest * std::pow(highest / lowest, way) : lowest + (highest - lowest) * way;
+}
+
+double PitchesAlong::factor_at(double frequency_hz, double value) const {
+  const double inside = std::clamp(value, lowest, highest);
+  const double way = by_ratios ? std::log(inside / lowest) / std::log(highest / lowest)
+                               : (inside - lowest) / (highest - lowest);
+  // The four are of one leg.
+  const double legs_gone = way * static_cast<double>(legs);
+  const double leg = std::min(std::floor(legs_gone), static_cast<double>(legs - 1));
+  const double within = (legs_gone - leg) * static_cast<double>(steps);
   const double first = std::clamp(std::floor(within) - 1.0, 0.0, static_cast<double>(steps) - 3.0);
   const auto index = static_cast<std::size_t>(leg) * steps + static_cast<std::size_t>(first);
   const auto log_of = [&](std::size_t i) {

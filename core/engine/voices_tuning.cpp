@@ -87,23 +87,23 @@ void Voices::reset_tuning(double highest_factor) {
 }
 
 double Voices::factor_at(double frequency_hz) const {
-  return playing_.morph.at.empty() ? playing_.pitches.factor_at(frequency_hz)
-                                   : playing_.morph.factor_at(frequency_hz, morph_position_);
+  return playing_.along.at.empty() ? playing_.pitches.factor_at(frequency_hz)
+                                   : playing_.along.factor_at(frequency_hz, tuned_at_);
 }
 
-void Voices::morph_to(double position) {
-  if (position == morph_position_) {
+void Voices::tune_at(double value) {
+  if (value == tuned_at_) {
     return;
   }
-  morph_position_ = position;
+  tuned_at_ = value;
   for (Voice& voice : voices_) {
     voice.is_retuned |= voice.awake;
   }
   has_changed_ = true;
 }
 
-double Voices::unmorphed_factor(const Voice& voice) const {
-  return playing_.morph.at.empty() || voice.frequency_hz <= 0.0
+double Voices::first_factor(const Voice& voice) const {
+  return playing_.along.at.empty() || voice.frequency_hz <= 0.0
              ? voice.factor
              : voice.factor * playing_.pitches.factor_at(voice.frequency_hz) /
                    factor_at(voice.frequency_hz);

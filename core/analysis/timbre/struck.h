@@ -44,7 +44,7 @@ double noticed_between(AskedFigure figure, double value, double target);
 struct StrikeOptions {
   double rate_hz = Network::reference_rate_hz;
   std::size_t input = 0;   // index into Network::inputs
-  std::size_t output = 0;  // the same of outputs
+  std::size_t output = 0;  // of the numbers of its outputs, those of one number being one
   // With it every stiffness that is not fixed gets the factor that brings the mode there, as a key
   // does it; else the model is as it is written.
   std::optional<double> key_hz;

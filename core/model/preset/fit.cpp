@@ -105,6 +105,17 @@ std::vector<Error> misfits(const Network& network, const Preset& preset) {
           {no_parameter(network, setting.name), setting.location.line, setting.location.column});
     }
   }
+  const auto is_tuned_along = [&](const ParameterSetting& one) {
+    return one.name == preset.tuned_along && one.minimum < one.maximum;
+  };
+  if (!preset.tuned_along.empty() &&
+      (!preset.morph.empty() ||
+       std::none_of(preset.parameters.begin(), preset.parameters.end(), is_tuned_along))) {
+    found.push_back({preset.morph.empty()
+                         ? "'tuned_along' must name one of [parameters] with a range"
+                         : "keys are tuned along the morph; leave 'tuned_along' out",
+                     preset.tuned_along_location.line, preset.tuned_along_location.column});
+  }
   for (const ControlSetting& control : preset.controls) {
     if (std::string message = misfit(network, control); !message.empty()) {
       found.push_back({std::move(message), control.location.line, control.location.column});

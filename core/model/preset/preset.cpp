@@ -365,6 +365,9 @@ void read_root(const toml::table& root, Preset& preset, std::vector<Error>& erro
   reader.flag("noise", preset.noise);
   reader.integer("transpose", preset.transpose, -96, 96);
   reader.integer("pitch_mode", preset.pitch_mode, 1, most_pitch_mode);
+  if (reader.text("tuned_along", preset.tuned_along)) {
+    preset.tuned_along_location = location_of(*root.get("tuned_along"));
+  }
   read_flattening(root, reader, preset);
   read_keys(root, reader, preset);
   if (std::string budget; reader.text("budget", budget)) {

@@ -74,6 +74,8 @@ struct Preset {
   int pitch_mode = 1;     // which of its modes a key tunes, from the lowest
   // Of the sound below that mode, to be made up for: keys and cents, ascending; empty: none.
   std::vector<CurvePoint> flattening_cents;
+  std::string tuned_along;  // a parameter that leaves keys in tune wherever it is; empty: none
+  SourceLocation tuned_along_location;
   double a4_hz = usual_a4_hz;  // to which everything is tuned
   std::string scale;           // a Scala file beside the preset; empty: 12 equal semitones
   std::string keyboard_map;    // which keys play it

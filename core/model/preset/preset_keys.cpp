@@ -17,6 +17,7 @@ constexpr PresetKey keys[] = {
     {"", "fixed", "[\"LABEL\", ...]", "what keys leave as stiff as it is: a guitar's box, whose modes stay where they are while the string follows the key. Labels of bodies, waveguides, macros, oscillators and links"},
     {"", "flattening_cents", "-100 to 100 (0), or [[48, 8], [96, 6]]", "by how much the sound is flat of its lowest mode, as under a bow, which keys make up for; or points of keys and cents, up to 16, and straight lines between them"},
     {"", "pitch_mode", "1 to 16 (1)", "which of the model's modes a key tunes, counted from the lowest: of a bell, say, the one that is heard as its pitch"},
+    {"", "tuned_along", "text", "one of `[parameters]` that leaves keys in tune wherever it is turned to, as a damper's that would flatten them a little; that of a `[morph]` does so by itself"},
     {"", "transpose", "-96 to 96 (0)", "semitones between a key and the pitch that it sets"},
     {"", "a4_hz", "220 to 880 (440)", "the pitch of the A above the middle C, to which all keys are tuned"},
     {"", "scale", "text", "a Scala file beside the preset, `NAME.scl`: the steps between keys; `tuning = \"fixed\"` has none"},
