@@ -81,11 +81,25 @@ struct LawCurve {
   Formula formula;
 };
 
+// What a panel shows: a figure with its laws, or how far one law is off it.
+struct SweepPanel {
+  std::size_t figure = 0;
+  const LawCurve* law = nullptr;
+};
+
 class SweepDrawer {
  public:
   SweepDrawer(const SweepTable& table, const DescribeOptions& options,
               const std::vector<std::size_t>& figures, const std::vector<LawCurve>& laws)
-      : table_(table), options_(options), figures_(figures), laws_(laws) {
+      : table_(table), options_(options), laws_(laws) {
+    for (const std::size_t figure : figures) {
+      panels_.push_back({figure});
+      for (const LawCurve& law : laws) {
+        if (law.figure == figure) {
+          panels_.push_back({figure, &law});
+        }
+      }
+    }
     for (const SweepRow& row : table.rows) {
       const std::vector<double> others(row.at.begin() + 1, row.at.end());
       if (std::find(lines_.begin(), lines_.end(), others) == lines_.end()) {
@@ -95,15 +109,15 @@ class SweepDrawer {
   }
 
   std::string draw() const {
-    const std::size_t columns = figures_.size() > 1 ? 2 : 1;
-    const std::size_t rows = (figures_.size() + columns - 1) / columns;
+    const std::size_t columns = panels_.size() > 1 ? 2 : 1;
+    const std::size_t rows = (panels_.size() + columns - 1) / columns;
     const double width = left + static_cast<double>(columns) * (panel_width + between_x) - 60.0;
     const double height = top + static_cast<double>(rows) * (panel_height + between_y);
     std::string svg = svg_head(width, height, 11.0) +
                       "<rect width=\"100%\" height=\"100%\" fill=\"#fff\"/>\n<text x=\"" +
                       px(left) + "\" y=\"20\" font-size=\"14\">" + escaped(title()) + "</text>\n";
-    for (std::size_t i = 0; i < figures_.size(); ++i) {
-      svg += panel(figures_[i], left + static_cast<double>(i % columns) * (panel_width + between_x),
+    for (std::size_t i = 0; i < panels_.size(); ++i) {
+      svg += panel(panels_[i], left + static_cast<double>(i % columns) * (panel_width + between_x),
                    top + static_cast<double>(i / columns) * (panel_height + between_y));
     }
     return svg + "</svg>\n";
@@ -118,7 +132,17 @@ class SweepDrawer {
     return text + (laws_.empty() ? "" : "; dashed: as it is said to be");
   }
 
-  std::string panel(std::size_t figure, double x, double y) const {
+  // What the panel shows of a row: the figure, or how many percent its law is more.
+  static std::optional<double> value_of(const SweepPanel& panel, const SweepRow& row) {
+    const std::optional<double> found = row.figures[panel.figure];
+    return found && panel.law != nullptr
+               ? std::optional(100.0 * (evaluate(panel.law->formula, row.at) / *found - 1.0))
+               : found;
+  }
+
+  std::string panel(const SweepPanel& shown, double x, double y) const {
+    const std::size_t figure = shown.figure;
+    const bool has_laws = shown.law == nullptr;
     const SweptParameter& swept = options_.swept[0];
     const Axis across(std::min(swept.first, swept.last), std::max(swept.first, swept.last),
                       swept.by_ratios);
@@ -129,11 +153,11 @@ class SweepDrawer {
       high = std::isfinite(value) ? std::max(high, value) : high;
     };
     for (const SweepRow& row : table_.rows) {
-      if (row.figures[figure]) {
-        reach(*row.figures[figure]);
+      if (const auto value = value_of(shown, row)) {
+        reach(*value);
       }
       for (const LawCurve& law : laws_) {
-        if (law.figure == figure) {
+        if (has_laws && law.figure == figure) {
           reach(evaluate(law.formula, row.at));
         }
       }
@@ -141,8 +165,9 @@ class SweepDrawer {
     const std::string& name = table_.names[figure];
     const std::string unit = name.ends_with("_hz") ? " in Hz" : name.ends_with("_s") ? " in s" : "";
     const std::string words = unit.empty() ? name : name.substr(0, name.rfind('_'));
-    std::string svg =
-        label(x, y - 8.0, words + unit, "start") + box(x, y, panel_width, panel_height);
+    const std::string heading =
+        has_laws ? words + unit : words + ": how far what is said is off, in %";
+    std::string svg = label(x, y - 8.0, heading, "start") + box(x, y, panel_width, panel_height);
     if (!(high >= low)) {
       return svg + label(x + panel_width / 2, y + panel_height / 2, "it has none", "middle");
     }
@@ -163,14 +188,14 @@ class SweepDrawer {
     for (std::size_t l = 0; l < lines_.size(); ++l) {
       const double share =
           lines_.size() > 1 ? static_cast<double>(l) / static_cast<double>(lines_.size() - 1) : 1.0;
-      const auto path = [&](auto&& value_of) {
+      const auto path = [&](auto&& of_row) {
         std::string path;
         bool is_on = false;
         for (const SweepRow& row : table_.rows) {
           if (!std::equal(row.at.begin() + 1, row.at.end(), lines_[l].begin(), lines_[l].end())) {
             continue;
           }
-          const std::optional<double> value = value_of(row);
+          const std::optional<double> value = of_row(row);
           const bool is_there = value && std::isfinite(*value) && (!is_wide_figure || *value > 0.0);
           if (is_there) {
             path += (is_on ? "L" : "M") + px(px_of(row.at[0])) + " " + px(py_of(*value));
@@ -183,9 +208,9 @@ class SweepDrawer {
         return "<path d=\"" + points + "\" fill=\"none\" stroke=\"" + grey(share) +
                "\" stroke-width=\"1.5\"" + dashes + "/>\n";
       };
-      svg += drawn(path([&](const SweepRow& row) { return row.figures[figure]; }), "");
+      svg += drawn(path([&](const SweepRow& row) { return value_of(shown, row); }), "");
       for (const LawCurve& law : laws_) {
-        if (law.figure == figure) {
+        if (has_laws && law.figure == figure) {
           svg += drawn(path([&](const SweepRow& row) {
                          return std::optional(evaluate(law.formula, row.at));
                        }),
@@ -198,8 +223,8 @@ class SweepDrawer {
 
   const SweepTable& table_;
   const DescribeOptions& options_;
-  const std::vector<std::size_t>& figures_;
   const std::vector<LawCurve>& laws_;
+  std::vector<SweepPanel> panels_;
   std::vector<std::vector<double>> lines_;  // the values of all but the first that is swept
 };
 
