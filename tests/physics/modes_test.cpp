@@ -364,7 +364,6 @@ TEST_CASE("outputs of one number are one, the sum of what each says", "[modes]")
   REQUIRE(both.outputs == 2);
   REQUIRE(apart.outputs == 3);
   for (std::size_t m = 0; m < both.modes.size(); ++m) {
-    // The shape of a mode may be found with either sign, so its residue is the same in both.
     const auto sum = apart.modes[m].residues[0] + apart.modes[m].residues[2];
     CHECK(std::abs(both.modes[m].residues[0] - sum) < 1e-12);
     CHECK(both.modes[m].levels[0] == Approx(std::abs(sum)).margin(1e-12));
