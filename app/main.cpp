@@ -295,7 +295,6 @@ void add_play(CLI::App& app, PlayOptions& options, int& code) {
 
 struct RenderChoice {
   RenderOptions options;
-  std::vector<std::string> settings;
   bool all_presets = false;
   double seconds = 0.0;
   long long frames = 0;
@@ -330,7 +329,7 @@ void add_render(CLI::App& app, RenderChoice& choice, int& code) {
   command->add_option("--score", options.score, "a file of events");
   command->add_option("--midi", options.midi,
                       "a Standard MIDI File, type 0 or 1; it ends when it has fallen silent");
-  command->add_option("--set", choice.settings, "NAME=VALUE, a parameter from the start");
+  add_settings(*command, options.parameters);
   command
       ->add_option_function<std::string>(
           "--format",
@@ -379,14 +378,6 @@ void add_render(CLI::App& app, RenderChoice& choice, int& code) {
     }
     if (frames->count() > 0) {
       choice.options.frames = choice.frames;
-    }
-    for (const std::string& setting : choice.settings) {
-      const std::size_t equals = setting.find('=');
-      double value = 0.0;
-      if (equals == std::string::npos || !parse_number(setting.substr(equals + 1), value)) {
-        throw CLI::ValidationError("--set", "expected NAME=VALUE, found '" + setting + "'");
-      }
-      choice.options.parameters.push_back({setting.substr(0, equals), value});
     }
     code = render_command(choice.options, choice.is_quiet);
   });

@@ -21,6 +21,18 @@ void add_overwrite(CLI::App& command, bool& force) {
   command.add_flag("--force", force, "write over a file that is there");
 }
 
+Result<Setting> parse_setting(const std::string& text) {
+  const std::size_t equals = text.find('=');
+  Setting setting{text.substr(0, equals), 0.0};
+  return equals != text.npos && equals > 0 && parse_number(text.substr(equals + 1), setting.value)
+             ? Result<Setting>(setting)
+             : Error{"expected NAME=VALUE, found '" + text + "'"};
+}
+
+void add_settings(CLI::App& command, std::vector<Setting>& settings) {
+  add_parsed(command, "--set", settings, parse_setting, "NAME=VALUE, a parameter from the start");
+}
+
 void add_motion(CLI::App& command, std::optional<ThirdArgument>& third) {
   command
       .add_option_function<std::string>(

@@ -7,6 +7,7 @@
 #include <utility>
 #include <vector>
 
+#include "core/compile/stability_check.h"
 #include "core/model/network.h"
 #include "core/result.h"
 
@@ -17,6 +18,10 @@ CLI::Validator within(double least, double most);
 
 // Whether a file that is there is written over.
 void add_overwrite(CLI::App& command, bool& force);
+
+// "NAME=VALUE", what a parameter is from the start.
+Result<Setting> parse_setting(const std::string& text);
+void add_settings(CLI::App& command, std::vector<Setting>& settings);
 
 // What the last argument of a mass means, for every command that reads a model.
 void add_motion(CLI::App& command, std::optional<ThirdArgument>& third);

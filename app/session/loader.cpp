@@ -5,6 +5,9 @@
 #include <filesystem>
 
 #include "app/control/registry.h"
+#include "core/analysis/modes/morph_decay.h"
+#include "core/model/language/tokens.h"
+#include "core/model/morph.h"
 #include "core/model/preset/fit.h"
 #include "core/model/tuning/scala.h"
 
@@ -82,6 +85,9 @@ class SceneFiles {
     auto text = read_text(path, max_bytes);
     seen_.push_back({path, text ? *text : "", static_cast<bool>(text)});
     return text;
+  }
+  void add(const std::vector<SceneFile>& more) {
+    seen_.insert(seen_.end(), more.begin(), more.end());
   }
   std::vector<SceneFile> take() { return std::move(seen_); }
 
@@ -185,7 +191,7 @@ class SceneReader {
     names.insert(names.begin(), scene_.preset.model);
     std::vector<std::string> paths;
     for (const std::string& name : names) {
-      const auto model = find_model(name);
+      const auto model = find_beside("models", name);
       if (!model) {
         const std::string missing =
             options_.reach == Reach::own_folders
@@ -203,7 +209,7 @@ class SceneReader {
                        : read_model(paths, {.third = scene_.preset.third,
                                             .third_by = "the preset says",
                                             .progress = options_.progress});
-    if (!is_read) {
+    if (!is_read || !morph(*text)) {
       return false;
     }
     const std::vector<Error> unfit = misfits(scene_.network, scene_.preset);
@@ -211,6 +217,102 @@ class SceneReader {
       fail(scene_.path, *text, error);
     }
     return read.errors.empty() && unfit.empty();
+  }
+
+  // The network that the preset's morph makes of its model, and a knob for it.
+  bool morph(const std::string& text) {
+    Preset& preset = scene_.preset;
+    if (preset.morph.empty()) {
+      return true;
+    }
+    if (options_.is_stop) {
+      return fail(scene_.path, text, {"a morph cannot go through another morph"});
+    }
+    std::vector<Scene> others(preset.morph.size());
+    std::vector<MorphStop> stops;
+    for (std::size_t i = 0; i < preset.morph.size(); ++i) {
+      const MorphSetting& setting = preset.morph[i];
+      const auto refuse = [&](SourceLocation at, const std::string& message) {
+        return fail(scene_.path, text, {message, at.line, at.column});
+      };
+      if (!setting.preset.empty()) {
+        auto other = read_other(setting.preset);
+        if (!other) {
+          return refuse(setting.location, other.error().message);
+        }
+        others[i] = *std::move(other);
+      }
+      const bool is_preset = !setting.preset.empty();
+      const Network& network = is_preset ? others[i].network : scene_.network;
+      MorphStop stop{.name = is_preset ? setting.preset : "stop " + std::to_string(i + 1),
+                     .network = &network,
+                     .values = parameter_values(network),
+                     .gain = is_preset ? others[i].preset.gain : setting.gain};
+      for (const ParameterSetting& value :
+           is_preset ? others[i].preset.parameters : setting.values) {
+        const int index = find_parameter(network, value.name);
+        if (index < 0) {
+          return refuse(value.location, no_parameter(network, value.name));
+        }
+        stop.values[static_cast<std::size_t>(index)] = value.value;
+      }
+      stops.push_back(std::move(stop));
+    }
+    std::vector<std::string> knobs;
+    for (const ParameterSetting& knob : preset.parameters) {
+      knobs.push_back(knob.name);
+    }
+    auto network = morphed(scene_.network, stops, preset.morph_parameter, knobs);
+    if (!network && network.error().line == 0) {
+      const SourceLocation at = preset.morph.front().location;
+      return fail(scene_.path, text, {network.error().message, at.line, at.column});
+    }
+    if (!network) {
+      out_.findings.push_back(finding_in_model(scene_, network.error()));
+      return false;
+    }
+    std::vector<double> values = parameter_values(*network);
+    for (const ParameterSetting& knob : preset.parameters) {
+      if (const int index = find_parameter(*network, knob.name); index >= 0) {
+        values[static_cast<std::size_t>(index)] = knob.value;
+      }
+    }
+    const int position = find_parameter(*network, preset.morph_parameter);
+    try {
+      scene_.network =
+          with_even_decay(*std::move(network), {.parameter = static_cast<std::size_t>(position),
+                                                .stops = stops.size(),
+                                                .pitch_mode = preset.pitch_mode,
+                                                .values = values,
+                                                .progress = options_.progress});
+    } catch (const Stopped&) {
+      return fail("", "", Error{stopped});
+    }
+    if (std::find(knobs.begin(), knobs.end(), preset.morph_parameter) == knobs.end()) {
+      preset.parameters.push_back({.name = preset.morph_parameter,
+                                   .value = 1.0,
+                                   .minimum = 1.0,
+                                   .maximum = static_cast<double>(stops.size())});
+    }
+    return true;
+  }
+
+  Result<Scene> read_other(const std::string& name) {
+    const auto path = find_beside("presets", name + ".toml");
+    if (!path) {
+      return Error{"the preset " + ressort::quoted(name) +
+                   " is neither beside this one nor among the "
+                   "program's own"};
+    }
+    if (*path == scene_.path) {
+      return Error{"a morph cannot go through itself"};
+    }
+    SceneOptions options = options_;
+    options.is_stop = true;
+    options.bare = false;
+    Reading reading = read_scene(*path, options);
+    files_.add(reading.files);
+    return scene_of(std::move(reading));
   }
 
   // The keys: as the options say, else as the preset does.
@@ -284,13 +386,13 @@ class SceneReader {
     return ok;
   }
 
-  // A preset's model is beside the preset, or among the program's own.
-  std::optional<std::string> find_model(const std::string& model) {
+  // What a preset names is beside it, or among the program's own or the player's `kind`.
+  std::optional<std::string> find_beside(const std::string& kind, const std::string& name) {
     const fs::path folder = fs::path(scene_.path).parent_path();
-    std::vector<fs::path> tried = {folder / model, folder / ".." / "models" / model,
-                                   fs::path(models_folder()) / model};
+    std::vector<fs::path> tried = {folder / name, folder / ".." / kind / name,
+                                   fs::path(models_folder()).parent_path() / kind / name};
     if (const std::string user = user_folder(); !user.empty()) {
-      tried.insert(tried.end() - 1, fs::path(user) / "models" / model);
+      tried.insert(tried.end() - 1, fs::path(user) / kind / name);
     }
     for (const fs::path& path : tried) {
       if (options_.reach == Reach::own_folders) {

@@ -92,7 +92,7 @@ Analysis prove(const Request& request, const Reduced& reduced, const Machine& ma
   auto rest_bounds = !options.bare && margins.keys >= 1.0 && network.waveguides.empty()
                          ? make_rest_bounds(network, machine, box, options.progress)
                          : std::vector<std::optional<RestBound>>();
-  return {mode, {}, std::move(stability), std::move(margins), std::move(rest_bounds)};
+  return {mode, {}, {}, std::move(stability), std::move(margins), std::move(rest_bounds)};
 }
 
 // How far merging has brought partials off: by their poles, or where there are too many masses as
@@ -215,6 +215,76 @@ Pitches sharpened(const Pitches& pitches, const Preset& preset) {
   return sharp;
 }
 
+// Along which parameter keys are to stay in tune, and how far that goes; without pitches.
+std::optional<PitchesAlong> tuned_along(const Request& request, const Network& network) {
+  const Preset& preset = request.preset;
+  const std::string& name = preset.morph.empty() ? preset.tuned_along : preset.morph_parameter;
+  const int parameter = find_parameter(network, name);
+  if (parameter < 0 || request.options.bare) {
+    return std::nullopt;
+  }
+  PitchesAlong along{.parameter = static_cast<std::size_t>(parameter)};
+  for (const ParameterSetting& setting : preset.parameters) {
+    if (setting.name == name && preset.morph.empty()) {
+      along.lowest = setting.minimum;
+      along.highest = setting.maximum;
+      along.by_ratios = is_wide(setting.minimum, setting.maximum);
+    }
+  }
+  if (!preset.morph.empty()) {
+    along.legs = preset.morph.size() - 1;
+    along.highest = static_cast<double>(preset.morph.size());
+  }
+  return along.lowest < along.highest ? std::optional(along) : std::nullopt;
+}
+
+// In as many steps as cubics need to hit the pitches between them, or the most.
+PitchesAlong find_pitches_along(const Request& request, const Network& network, Machine& machine) {
+  constexpr double in_tune = 1e-5;  // of a logarithm: 0.01 cents
+  constexpr std::size_t most_steps = 64;
+  std::optional<PitchesAlong> along = tuned_along(request, network);
+  if (!along) {
+    return {};
+  }
+  request.options.progress.stage("tuning it wherever " + network.parameters[along->parameter].name +
+                                 " is");
+  const std::vector<double> start = machine.parameters;
+  std::vector<std::string> notes;
+  bool is_found = true;
+  const auto add = [&](PitchesAlong& to) {
+    machine.parameters[to.parameter] = to.value_at(to.at.size());
+    const auto shapes = find_shapes(request, network, machine.parameters);
+    is_found = is_found && shapes;
+    to.at.push_back(
+        shapes ? sharpened(find_pitches(request, network, machine, *shapes, notes), request.preset)
+               : Pitches());
+  };
+  while (along->at.size() <= along->legs * along->steps) {
+    add(*along);
+  }
+  for (bool is_near = false; is_found && !is_near && along->steps < most_steps;) {
+    PitchesAlong finer = *along;
+    finer.steps *= 2;
+    finer.at.clear();
+    is_near = true;
+    for (std::size_t i = 0; i <= finer.legs * finer.steps; ++i) {
+      if (i % 2 == 0) {
+        finer.at.push_back(along->at[i / 2]);
+        continue;
+      }
+      add(finer);
+      for (const double hz : {27.5, 261.6, 2093.0}) {
+        const double off =
+            std::log(finer.at.back().factor_at(hz) / along->factor_at(hz, finer.value_at(i)));
+        is_near = is_near && std::fabs(off) < in_tune;
+      }
+    }
+    along = std::move(finer);
+  }
+  machine.parameters = start;
+  return is_found ? *std::move(along) : PitchesAlong();
+}
+
 // What keys may use of the stiffness, once it is known what plays them: what rings above 0.456 of
 // the rate is no tone any more.
 void reach(Analysis& analysis, double more, double rate_hz) {
@@ -305,6 +375,7 @@ Result<Compiled> compile_by_stages(const Request& request) {
   if (shapes) {
     analysis.pitches =
         sharpened(find_pitches(request, network, planned.machine, *shapes, pitch_notes), preset);
+    analysis.along = find_pitches_along(request, network, planned.machine);
     reach(analysis, planned.more, options.rate_hz);
   }
   if (auto error = shortage(planned.machine, voices, options.precision, options.most_bytes)) {

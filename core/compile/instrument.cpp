@@ -160,6 +160,7 @@ Playing make_playing(const Network& network, const Preset& preset, const Analysi
       .legato = preset.legato,
       .glide_s = preset.glide_s,
       .pitches = analysis.pitches,
+      .along = analysis.along,
       .highest_factor = analysis.margins.keys,
       .home = analysis.margins.home,
       .away = analysis.margins.away,

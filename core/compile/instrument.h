@@ -66,6 +66,7 @@ struct Instrument {
 struct Analysis {
   std::optional<Mode> mode;  // the lowest, where keys set the pitch by it
   Pitches pitches;           // of keys, by that mode as it will be played
+  PitchesAlong along;        // the same wherever the parameter is that is to leave keys in tune
   StabilityCheck stability;
   Margins margins;
   std::vector<std::optional<RestBound>> rest_bounds;  // [part]

@@ -73,6 +73,7 @@ struct Engine::Player {
       return;
     }
     const std::uint8_t channel = event.channel % Channels::count;
+    follow_tuning();
     switch (event.kind) {
       case EventKind::note_on:
         return listens_to(channel) ? press_key(event) : void();
@@ -290,6 +291,7 @@ struct Engine::Player {
 
   template <class T>
   void apply_changes(Bank<T>& b) {
+    follow_tuning();
     if (voices.has_changed() || parameters.has_changed()) {
       voices.retune(parameters.has_changed_highest_factor(), parameters.highest_factor());
       gestures.follow_pitches();
@@ -298,6 +300,13 @@ struct Engine::Player {
       }
       parameters.apply(b, voices, watch);
       voices.forget_changes();
+    }
+  }
+
+  // Keys are tuned where the parameter is that leaves them in tune.
+  void follow_tuning() {
+    if (!playing.along.at.empty()) {
+      voices.tune_at(parameters.values()[playing.along.parameter]);
     }
   }
 
@@ -403,7 +412,7 @@ struct Engine::Player {
     if (playing.pitches.factors.empty() || !voice.awake) {
       return false;
     }
-    slow_hz = playing.pitches.frequency_at(voice.factor);
+    slow_hz = playing.pitches.frequency_at(voices.first_factor(voice));
     slow_numbers = numbers;
     return true;
   }

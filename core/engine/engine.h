@@ -74,6 +74,23 @@ struct Pitches {
   std::vector<double> factors;  // ascending; empty: no mode is known
 };
 
+// The same wherever one parameter is: at equal differences or ratios of it, so many in each of a
+// few legs, between which it may bend; cubics of logarithms between those. [any thread]
+struct PitchesAlong {
+  static constexpr std::size_t least_steps = 4;
+
+  double factor_at(double frequency_hz, double value) const;
+  double value_at(std::size_t index) const;
+
+  std::size_t parameter = 0;
+  double lowest = 1.0;
+  double highest = 2.0;
+  bool by_ratios = false;
+  std::size_t legs = 1;
+  std::size_t steps = least_steps;  // in a leg
+  std::vector<Pitches> at;          // empty: keys are tuned where all parameters start
+};
+
 // How a Machine is played. Plain data, made by the compile room.
 struct Playing {
   int voices = 1;
@@ -90,6 +107,7 @@ struct Playing {
   bool legato = false;          // and is not struck again while one is
   double glide_s = 0.0;         // from the pitch before, in equal steps of cents
   Pitches pitches;              // of the lowest mode
+  PitchesAlong along;           // the same, instead, where a parameter is to leave keys in tune
   double highest_factor = 1.0;  // the stiffness factor up to which the model is proved stable
   std::vector<Limits> home;     // [parameter] while they are there; empty: wherever they are
   std::vector<double> away;     // the same factor at equal steps from there to their limits

@@ -1,9 +1,19 @@
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "core/engine/engine.h"
 
 namespace ressort {
+namespace {
+
+// Through four values, at 0, 1, 2 and 3.
+double cubic(double t, const std::array<double, 4>& y) {
+  return -(t - 1.0) * (t - 2.0) * (t - 3.0) / 6.0 * y[0] + t * (t - 2.0) * (t - 3.0) / 2.0 * y[1] -
+         t * (t - 1.0) * (t - 3.0) / 2.0 * y[2] + t * (t - 1.0) * (t - 2.0) / 6.0 * y[3];
+}
+
+}  // namespace
 
 double Pitches::factor_at(double frequency_hz) const {
   if (factors.empty()) {
@@ -20,13 +30,30 @@ double Pitches::factor_at(double frequency_hz) const {
   }
   const auto first =
       static_cast<std::size_t>(std::clamp(std::floor(semitone) - 1.0, 0.0, last - 3.0));
-  const double t = semitone - static_cast<double>(first);
   const auto log_of = [&](std::size_t i) { return std::log(factors[first + i]); };
-  const double sum = -(t - 1.0) * (t - 2.0) * (t - 3.0) / 6.0 * log_of(0) +
-                     t * (t - 2.0) * (t - 3.0) / 2.0 * log_of(1) -
-                     t * (t - 1.0) * (t - 3.0) / 2.0 * log_of(2) +
-                     t * (t - 1.0) * (t - 2.0) / 6.0 * log_of(3);
-  return std::max(least, std::exp(sum));
+  return std::max(least, std::exp(cubic(semitone - static_cast<double>(first),
+                                        {log_of(0), log_of(1), log_of(2), log_of(3)})));
+}
+
+double PitchesAlong::value_at(std::size_t index) const {
+  const double way = static_cast<double>(index) / static_cast<double>(legs * steps);
+  return by_ratios ? lowest * std::pow(highest / lowest, way) : lowest + (highest - lowest) * way;
+}
+
+double PitchesAlong::factor_at(double frequency_hz, double value) const {
+  const double inside = std::clamp(value, lowest, highest);
+  const double way = by_ratios ? std::log(inside / lowest) / std::log(highest / lowest)
+                               : (inside - lowest) / (highest - lowest);
+  // The four are of one leg.
+  const double legs_gone = way * static_cast<double>(legs);
+  const double leg = std::min(std::floor(legs_gone), static_cast<double>(legs - 1));
+  const double within = (legs_gone - leg) * static_cast<double>(steps);
+  const double first = std::clamp(std::floor(within) - 1.0, 0.0, static_cast<double>(steps) - 3.0);
+  const auto index = static_cast<std::size_t>(leg) * steps + static_cast<std::size_t>(first);
+  const auto log_of = [&](std::size_t i) {
+    return std::log(at[index + i].factor_at(frequency_hz));
+  };
+  return std::exp(cubic(within - first, {log_of(0), log_of(1), log_of(2), log_of(3)}));
 }
 
 double Pitches::frequency_at(double factor) const {

@@ -53,6 +53,7 @@ void Voices::go_on_from(const Voices& from) {
   tuning_ = from.tuning_;
   held_keys_ = from.held_keys_;
   last_hz_ = from.last_hz_;
+  tuned_at_ = from.tuned_at_;
   turns_ = from.turns_;
   limit_ = from.limit_;
   resets_ = from.resets_;

@@ -112,6 +112,10 @@ class Voices {
  public:
   // `outputs` are the channels of sound that there are: of one the pan moves nothing.
   Voices(const Playing& playing, double rate_hz, std::size_t outputs);
+  // Where the parameter of Playing::along is from now on: voices that are awake are retuned.
+  void tune_at(double value);
+  // What the voice's factor on every stiffness would be where that parameter started.
+  double first_factor(const Voice& voice) const;
   // What another engine's voices are in the midst of.
   void go_on_from(const Voices& from);
   // After it: the model's numbers are others, and its gain is 1/`gain_ratio` of what it was.
@@ -219,6 +223,7 @@ class Voices {
   void end(Voice& voice);
   std::size_t too_many(std::size_t more) const;
   bool sounds(const Voice& voice, int key, std::uint8_t channel) const;
+  double factor_at(double frequency_hz) const;
   double playable_hz(double hz, double highest_factor) const;
   Voice& voice_for(int key, std::uint8_t channel);
   double factor_for(const Voice& voice, double highest_factor) const;
@@ -235,6 +240,7 @@ class Voices {
   bool is_stereo_;
   std::array<HeldKeys, Channels::count> held_keys_;  // [channel]
   std::array<double, Channels::count> last_hz_{};    // [channel] of its last key; 0: none
+  double tuned_at_ = 0.0;
   std::uint64_t turns_ = 0;
   bool has_changed_ = false;
   std::size_t limit_ = std::numeric_limits<std::size_t>::max();

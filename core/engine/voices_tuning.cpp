@@ -86,17 +86,39 @@ void Voices::reset_tuning(double highest_factor) {
   }
 }
 
+double Voices::factor_at(double frequency_hz) const {
+  return playing_.along.at.empty() ? playing_.pitches.factor_at(frequency_hz)
+                                   : playing_.along.factor_at(frequency_hz, tuned_at_);
+}
+
+void Voices::tune_at(double value) {
+  if (value == tuned_at_) {
+    return;
+  }
+  tuned_at_ = value;
+  for (Voice& voice : voices_) {
+    voice.is_retuned |= voice.awake;
+  }
+  has_changed_ = true;
+}
+
+double Voices::first_factor(const Voice& voice) const {
+  return playing_.along.at.empty() || voice.frequency_hz <= 0.0
+             ? voice.factor
+             : voice.factor * playing_.pitches.factor_at(voice.frequency_hz) /
+                   factor_at(voice.frequency_hz);
+}
+
 // 0 where it cannot be played.
 double Voices::playable_hz(double hz, double highest_factor) const {
-  return hz < 0.5 * rate_hz_ && playing_.pitches.factor_at(hz) <= highest_factor ? hz : 0.0;
+  return hz < 0.5 * rate_hz_ && factor_at(hz) <= highest_factor ? hz : 0.0;
 }
 
 double Voices::factor_for(const Voice& voice, double highest_factor) const {
   const double bent =
       std::exp2((voice.semitones + channels_.zone_semitones(voice.channel) + voice.glide) / 12.0);
-  const double factor = voice.frequency_hz > 0.0
-                            ? playing_.pitches.factor_at(voice.frequency_hz * bent)
-                            : bent * bent;
+  const double factor =
+      voice.frequency_hz > 0.0 ? factor_at(voice.frequency_hz * bent) : bent * bent;
   return std::min(factor, highest_factor);
 }
 

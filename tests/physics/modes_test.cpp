@@ -349,6 +349,28 @@ void check_mesh(std::size_t rows, std::size_t columns, std::size_t count, double
   }
 }
 
+TEST_CASE("outputs of one number are one, the sum of what each says", "[modes]") {
+  const std::string text =
+      "@s string 12 1. 0.2 0.001 0. 0.\n@in1 frcInput [@s 0.3]\n@out1 posOutput [@s 0.9] 0.5\n"
+      "@out2 posOutput [@s 0.5]\n";
+  const auto found = [](const std::string& model) {
+    const Network network = network_of(model);
+    auto modes = find_modes(network, parameter_values(network), {});
+    REQUIRE(modes);
+    return *std::move(modes);
+  };
+  const NetworkModes both = found(text + "@out1 posOutput [@s 0.2] -2.\n");
+  const NetworkModes apart = found(text + "@out3 posOutput [@s 0.2] -2.\n");
+  REQUIRE(both.outputs == 2);
+  REQUIRE(apart.outputs == 3);
+  for (std::size_t m = 0; m < both.modes.size(); ++m) {
+    const auto sum = apart.modes[m].residues[0] + apart.modes[m].residues[2];
+    CHECK(std::abs(both.modes[m].residues[0] - sum) < 1e-12);
+    CHECK(both.modes[m].levels[0] == Approx(std::abs(sum)).margin(1e-12));
+    CHECK(std::abs(both.modes[m].residues[1] - apart.modes[m].residues[1]) < 1e-12);
+  }
+}
+
 }  // namespace
 
 TEST_CASE("the lowest modes of a large mesh, twins too", "[modes]") {

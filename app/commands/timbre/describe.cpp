@@ -10,6 +10,7 @@
 #include "app/commands/offline.h"
 #include "app/commands/progress_bar.h"
 #include "app/commands/timbre/describe_text.h"
+#include "app/commands/timbre/sweep.h"
 #include "app/exit_code.h"
 #include "app/session/files.h"
 #include "app/session/load_news.h"
@@ -18,6 +19,7 @@
 #include "app/session/sound_file.h"
 #include "app/text.h"
 #include "core/analysis/modes/modes.h"
+#include "core/model/preset/fit.h"
 #include "core/model/topology.h"
 
 namespace ressort {
@@ -85,8 +87,10 @@ Result<Description> describe_file(const std::string& path, const DescribeOptions
   return description;
 }
 
+using Warn = std::function<void(const std::string&)>;
+
 Result<Description> describe_note(const DescribeOptions& options, const Progress& loading,
-                                  const DescriptionProgress& progress) {
+                                  const DescriptionProgress& progress, const Warn& warn) {
   const auto folder = TemporaryFolder::make();
   if (!folder) {
     return folder.error();
@@ -98,6 +102,7 @@ Result<Description> describe_note(const DescribeOptions& options, const Progress
               .rate_hz = options.rate_hz,
               .seconds = options.seconds,
               .phrase = to_score({{0.0, 2.0 / 3.0 * options.seconds, options.key, 100}}),
+              .parameters = options.settings,
               .format = SampleFormat::float64,
               .third = options.third,
               .loading = loading},
@@ -112,7 +117,7 @@ Result<Description> describe_note(const DescribeOptions& options, const Progress
     return Error{description_stopped};
   }
   for (const std::string& warning : rendered->warnings) {
-    std::fprintf(stderr, "%s\n", warning.c_str());
+    warn(warning);
   }
   if (rendered->peak == 0.0) {
     return Error{rendered->name + " is silent at key " + std::to_string(options.key) +
@@ -129,7 +134,7 @@ Result<Description> describe_note(const DescribeOptions& options, const Progress
 }
 
 Result<Description> describe_model(const DescribeOptions& options,
-                                   const DescriptionProgress& progress) {
+                                   const DescriptionProgress& progress, const Warn& warn) {
   LoadNews news(options.name,
                 [](const std::string& text) { std::fprintf(stderr, "%s\n", text.c_str()); });
   const Progress loading([&](std::string_view stage) {
@@ -142,16 +147,24 @@ Result<Description> describe_model(const DescribeOptions& options,
     return scene.error();
   }
   if (scene->has_preset) {
-    return describe_note(options, loading, progress);
+    return describe_note(options, loading, progress, warn);
   }
   for (const std::string& warning : scene->warnings) {
-    std::fprintf(stderr, "%s\n", warning.c_str());
+    warn(warning);
+  }
+  std::vector<double> values = start_values(*scene);
+  for (const Setting& setting : options.settings) {
+    const int index = find_parameter(scene->network, setting.parameter);
+    if (index < 0) {
+      return Error{no_parameter(scene->network, setting.parameter)};
+    }
+    values[static_cast<std::size_t>(index)] = setting.value;
   }
   const auto at_model = [&](const Error& error) {
     return Error{to_string(finding_of(scene->model_path, "", error))};
   };
-  const auto modes = find_modes(scene->network, start_values(*scene),
-                                {.rate_hz = options.rate_hz, .progress = loading});
+  const auto modes =
+      find_modes(scene->network, values, {.rate_hz = options.rate_hz, .progress = loading});
   if (!modes) {
     return modes.error().message == stopped ? Error{description_stopped} : at_model(modes.error());
   }
@@ -171,27 +184,46 @@ Result<Description> describe_model(const DescribeOptions& options,
 
 }  // namespace
 
+Result<Description> description_of(const DescribeOptions& options,
+                                   const DescriptionProgress& progress, const Warn& warn) {
+  if (!names_sound(options.name)) {
+    return describe_model(options, progress, warn);
+  }
+  return options.settings.empty()
+             ? describe_file(options.name, options, progress)
+             : Error{"'" + options.name + "' is a sound file, which has no parameters to set"};
+}
+
 int describe(const DescribeOptions& options, const std::function<bool()>& goes_on) {
   const auto refuse = [](const std::string& message) {
     std::fprintf(stderr, "%s\n", message.c_str());
     return exit_code::wrong_use;
   };
-  if (!options.picture.empty() && !options.picture.ends_with(".svg")) {
-    return refuse("-o: expected a file that ends in .svg, found '" + options.picture + "'");
+  for (const std::string& output : options.outputs) {
+    const bool is_table = !options.swept.empty() && output.ends_with(".csv");
+    if (!output.ends_with(".svg") && !is_table) {
+      return refuse("-o: expected a file that ends in .svg" +
+                    std::string(options.swept.empty() ? "" : " or .csv") + ", found '" + output +
+                    "'");
+    }
+    const std::string read[] = {options.name};
+    if (auto spared = spare(output, read); !spared) {
+      return refuse(spared.error().message);
+    }
   }
-  const std::string read[] = {options.name};
-  if (auto spared = spare(options.picture, read); !spared) {
-    return refuse(spared.error().message);
+  if (!options.swept.empty()) {
+    return sweep(options, goes_on);
   }
   Result<Description> description = Error{};
   {
     ProgressBar bar(true);
-    const auto progress = [&](double share) {
-      bar.show(share, options.name);
-      return goes_on();
-    };
-    description = names_sound(options.name) ? describe_file(options.name, options, progress)
-                                            : describe_model(options, progress);
+    description = description_of(
+        options,
+        [&](double share) {
+          bar.show(share, options.name);
+          return goes_on();
+        },
+        [](const std::string& warning) { std::fprintf(stderr, "%s\n", warning.c_str()); });
   }
   if (!goes_on()) {
     std::fprintf(stderr, "%s: interrupted\n", options.name.c_str());
@@ -200,9 +232,9 @@ int describe(const DescribeOptions& options, const std::function<bool()>& goes_o
   if (!description) {
     return refuse(description.error().message);
   }
-  if (!options.picture.empty()) {
+  for (const std::string& output : options.outputs) {
     const std::string picture = description_svg(*description, options.how);
-    if (const int code = put_text(options.picture, picture, options.force)) {
+    if (const int code = put_text(output, picture, options.force)) {
       return code;
     }
   }

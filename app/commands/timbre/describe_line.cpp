@@ -3,6 +3,7 @@
 #include <string>
 
 #include "app/commands/command_line.h"
+#include "app/commands/timbre/sweep.h"
 #include "core/model/language/expression.h"
 
 namespace ressort {
@@ -19,6 +20,7 @@ const char* const describe_examples =
     "  ressort describe bell.wav\n"
     "  ressort describe PolyTriangle -o triangle.svg\n"
     "  ressort describe bell.wav --json --at 24000 --window hann | jq .centroid_hz\n"
+    "  ressort describe SixStructures --sweep timbre=1:6:51 -o mixes.csv -o mixes.svg\n"
     "  ressort describe bell.wav --json --f0 220 | jq '.frames[].inharmonicity'\n";
 
 // A whole number within a range, and nothing else.
@@ -45,8 +47,12 @@ void add_describe(CLI::App& app, DescribeOptions& options,
   command->add_option("FILE", options.name, "a sound file, or a preset's or a model's name or file")
       ->required();
   command->add_flag("--json", options.as_json, "for machines, every frame");
-  command->add_option("-o,--output", options.picture,
-                      "an .svg of the spectrum and of how it goes on");
+  command
+      ->add_option("-o,--output", options.outputs,
+                   "an .svg of the spectrum and of how it goes on; of a sweep one of figures over "
+                   "the\nparameter, and a .csv of all of them (else to stdout)")
+      ->take_all()
+      ->allow_extra_args(false);
   add_overwrite(*command, options.force);
   command->add_option("--frame", options.how.frame, "samples of a frame")
       ->check(whole(4.0, 65536.0))
@@ -83,6 +89,15 @@ void add_describe(CLI::App& app, DescribeOptions& options,
   command->add_option("-s,--seconds", options.seconds, "how long a preset is rendered")
       ->check(within(0.1, 3600.0))
       ->capture_default_str();
+  add_settings(*command, options.settings);
+  add_parsed(*command, "--sweep", options.swept, parse_swept,
+             "NAME=LOW:HIGH[:STEPS][:log|:linear], a parameter that goes through a range; of "
+             "several,\nall values with each other");
+  command->add_option("--figures", options.figures, "those that the picture of a sweep shows")
+      ->delimiter(',')
+      ->allow_extra_args(false);
+  add_parsed(*command, "--law", options.laws, parse_law,
+             "FIGURE=FORMULA of what is swept, drawn beside what is found");
   add_motion(*command, options.third);
   command->callback([&options, run, &code] { code = run(options); });
 }

@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <limits>
 #include <string>
 
 #include "app/commands/command_line.h"
@@ -12,8 +13,8 @@ namespace {
 const char* const shape_examples =
     "Parameters move within their ranges; the pitch stays where keys have it. Figures are those "
     "of\n"
-    "'describe', in the first 2048 samples after one blow of one sample; T60 is that of the "
-    "pitch.\n"
+    "'describe', in the first 2048 samples of a blow, the preset's own at velocity 100 if it has "
+    "one,\nof the mean of all outputs; T60 is that of the pitch.\n"
     "How far each is off is told in just noticeable differences (JND), and where it cannot be\n"
     "reached, what holds it.\n"
     "Examples:\n"
@@ -35,6 +36,14 @@ const char* help_of(AskedFigure figure) {
       return "harmonic or bell-like: the inharmonicity";
     case AskedFigure::odd_to_even:
       return "full or hollow: the energy of odd partials over that of even ones";
+    case AskedFigure::rolloff:
+      return "below what frequency 95 % of the energy is, in Hz";
+    case AskedFigure::skewness:
+      return "how much the spectrum leans upwards";
+    case AskedFigure::kurtosis:
+      return "flat or peaked: the kurtosis of the spectrum, 3 of a bell curve";
+    case AskedFigure::slope:
+      return "of the line through the spectrum, in 1/Hz";
   }
   return "";
 }
@@ -58,12 +67,10 @@ void add_shape(CLI::App& app, ShapeOptions& options,
             name,
             [&options, name, figure = row.figure](const std::string& text) {
               double value = 0.0;
-              const bool is_number = parse_number(text, value);
-              if (!is_number || !(value > 0.0 || (value == 0.0 && !row_of(figure).is_ratio))) {
-                throw CLI::ValidationError(
-                    name, std::string("must be a number ") +
-                              (row_of(figure).is_ratio ? "above 0" : "from 0 on") + ", found " +
-                              text);
+              const double asked =
+                  parse_number(text, value) ? value : std::numeric_limits<double>::quiet_NaN();
+              if (const auto wrong = wrong_with(figure, asked); !wrong.empty()) {
+                throw CLI::ValidationError(name, std::string(wrong) + ", found " + text);
               }
               options.targets.push_back({figure, value});
             },

@@ -124,11 +124,10 @@ KnownModes known_modes(const NetworkModes& found) {
     modes.inputs.push_back("in" + std::to_string(input.number));
   }
   for (const Output& output : found.network.outputs) {
-    const auto before =
-        std::count_if(found.network.outputs.data(), &output,
-                      [&](const Output& other) { return other.number == output.number; });
-    modes.outputs.push_back("out" + std::to_string(output.number) +
-                            (before > 0 ? "." + std::to_string(before + 1) : ""));
+    const std::string name = "out" + std::to_string(output.number);
+    if (modes.outputs.empty() || modes.outputs.back() != name) {
+      modes.outputs.push_back(name);
+    }
   }
   for (const NetworkMode& mode : found.modes) {
     KnownMode& known = modes.modes.emplace_back(KnownMode{mode.frequency_hz, mode.t60_s, {}});

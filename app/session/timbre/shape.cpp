@@ -2,11 +2,14 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
 
 #include "app/session/modes/known_modes.h"
 #include "app/session/timbre/timbre_figures.h"
 #include "app/text.h"
 #include "core/analysis/modes/scaling.h"
+#include "core/engine/midi/velocity_curve.h"
+#include "core/gesture.h"
 #include "core/laws/laws.h"
 #include "core/model/language/expression.h"
 #include "core/model/preset/fit.h"
@@ -20,12 +23,18 @@ constexpr double missed_by = 0.1;  // of what is noticed: less is as good as the
 std::string told(AskedFigure figure, double value) {
   const std::string_view name = row_of(figure).name;
   const std::string_view unit = name.ends_with("_hz") ? " Hz" : name.ends_with("_s") ? " s" : "";
-  const int digits = value >= 1000.0  ? 0
-                     : value >= 100.0 ? 1
-                     : value >= 1.0   ? 2
-                     : value >= 1e-3  ? 4
-                                      : 7;
-  return (value >= 1e9 ? print_number(value) : with_commas(value, digits)) + std::string(unit);
+  const double size = std::fabs(value);
+  const int digits = size >= 1000.0  ? 0
+                     : size >= 100.0 ? 1
+                     : size >= 1.0   ? 2
+                     : size >= 1e-3  ? 4
+                                     : 7;
+  char small[32];
+  std::snprintf(small, sizeof small, "%.4g", value);
+  return (size >= 1e9                 ? print_number(value)
+          : size > 0.0 && size < 1e-5 ? std::string(small)
+                                      : with_commas(value, digits)) +
+         std::string(unit);
 }
 
 // The first line that a parameter could take the place of a number in.
@@ -71,16 +80,45 @@ std::optional<Error> not_linear(const Scene& scene) {
   return std::nullopt;
 }
 
-// The input that a key plays, and else the first.
-std::size_t struck_input(const Scene& scene, bool has_keys, int key) {
-  for (const ControlSetting& control : scene.preset.controls) {
+// The blows that the preset gives at velocity 100 of a key, and else one sample at its first input.
+std::vector<StrikePulse> blows_of(const ShapeRequest& request) {
+  constexpr double usual_velocity = 100.0 / 127.0;
+  const Scene& scene = request.scene;
+  const Preset& preset = scene.preset;
+  const VelocityCurve velocity{.points = preset.velocity_points,
+                               .exponent = std::exp2(-2.0 * preset.velocity)};
+  std::vector<StrikePulse> blows;
+  for (const ControlSetting& control : preset.controls) {
     const int input = find_input(scene.network, control.target);
-    if (has_keys && control.source == ControlSource::note && input >= 0 &&
-        control.lowest_key <= key && key <= control.highest_key) {
-      return static_cast<std::size_t>(input);
+    if (!request.has_keys || control.source != ControlSource::note || input < 0 ||
+        request.key < control.lowest_key || control.highest_key < request.key ||
+        control.gesture != Gesture::impulse) {
+      continue;
     }
+    constexpr double to_a_microsecond = 1e6;
+    const Stroke stroke{.amount = velocity(usual_velocity),
+                        .has_control = true,
+                        .low = control.low,
+                        .high = control.high,
+                        .exponential = control.exponential,
+                        .longest_s = control.longest_ms / 1e3,
+                        .shortest_s = control.shortest_ms / 1e3,
+                        .rate_hz = to_a_microsecond};
+    blows.push_back({.input = static_cast<std::size_t>(input),
+                     .strength = stroke.mapped(),
+                     .length_s = static_cast<double>(stroke.pulse_frames()) / to_a_microsecond});
   }
-  return 0;
+  return blows.empty() ? std::vector<StrikePulse>{{}} : blows;
+}
+
+// "a blow of 0.3 ms at in1", "blows at in1 and 5 more".
+std::string told(const std::vector<StrikePulse>& blows, const Network& network) {
+  const std::string first = " at in" + std::to_string(network.inputs[blows[0].input].number);
+  if (blows.size() > 1) {
+    return "blows" + first + " and " + std::to_string(blows.size() - 1) + " more";
+  }
+  const double ms = 1e3 * blows[0].length_s;
+  return "a blow" + (ms > 0.0 ? " of " + fixed(ms, 2) + " ms" : "") + first;
 }
 
 double key_hz(const Preset& preset, int key) {
@@ -143,7 +181,7 @@ Result<Shaped> shape_timbre(const ShapeRequest& request, std::vector<TimbreTarge
     return nothing_to_turn(scene);
   }
   StrikeOptions options{.rate_hz = request.rate_hz,
-                        .input = struck_input(scene, request.has_keys, request.key),
+                        .blows = blows_of(request),
                         .pitch_mode = static_cast<std::size_t>(preset.pitch_mode - 1),
                         .progress = request.progress};
   shaped.of = scene.name;
@@ -151,8 +189,7 @@ Result<Shaped> shape_timbre(const ShapeRequest& request, std::vector<TimbreTarge
     options.key_hz = key_hz(preset, request.key);
     shaped.of += ", key " + std::to_string(request.key) + " (" + note_name(*options.key_hz) + ")";
   }
-  shaped.of += ", a blow at in" + std::to_string(scene.network.inputs[options.input].number) +
-               " heard at out" + std::to_string(scene.network.outputs[0].number);
+  shaped.of += ", " + told(options.blows, scene.network) + " heard at all outputs";
   const Network network = with_fixed(scene.network, preset);
   if (request.has_keys && !request.tuned_at.empty()) {
     const auto factor = StruckModel(network, options).key_factor(request.tuned_at);

@@ -116,8 +116,13 @@ class SystemMaker {
         feel(port, input.mass, 1.0);  // K between the hand and the rows, which is symmetric
       }
     }
+    const Output* before = nullptr;
     for (const Output& output : network_.outputs) {
-      ModalPort& port = made_.outputs.emplace_back();
+      if (before == nullptr || output.number != before->number) {
+        made_.outputs.emplace_back();
+      }
+      before = &output;
+      ModalPort& port = made_.outputs.back();
       const double level = level_value(network_, output, {});
       if (output.is_force) {
         each_share(network_, output.mass, [&](std::uint32_t node, double share) {

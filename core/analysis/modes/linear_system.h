@@ -46,7 +46,7 @@ struct LinearSystem {
   std::vector<ModalSpring> springs;
   std::vector<std::pair<std::uint32_t, double>> shares;
   std::vector<ModalPort> inputs;   // [input of the network]
-  std::vector<ModalPort> outputs;  // [output of the network]
+  std::vector<ModalPort> outputs;  // [number of an output], as those of one number add up
   bool is_linear = true;  // else bows, plucks and contacts are open, and springs as at rest
   bool is_sound = true;   // every mass is above 0 and every number finite
 };

@@ -161,7 +161,7 @@ Result<NetworkModes> find_modes(const Network& network, std::span<const double> 
   made.system = make_linear_system(made.network, scheme_step(options),
                                    options.scheme == ModeScheme::published);
   made.inputs = network.inputs.size();
-  made.outputs = network.outputs.size();
+  made.outputs = made.system.outputs.size();
   made.scheme = options.scheme;
   made.rate_hz = options.rate_hz;
   if (!made.system.is_sound) {

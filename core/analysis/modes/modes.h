@@ -39,7 +39,7 @@ struct NetworkModes {
   Network network;                 // without macros, every argument a number
   LinearSystem system;             // of it, per step
   std::size_t inputs = 0;
-  std::size_t outputs = 0;
+  std::size_t outputs = 0;  // numbers of them: those of one number are one
   ModeScheme scheme = ModeScheme::published;
   double rate_hz = 0.0;  // of the published scheme
   bool is_all = true;    // else these are the lowest

@@ -230,12 +230,10 @@ double next_share(std::mt19937_64& random) {
 }
 
 std::optional<Error> wrong_target(const TimbreTarget& target) {
-  const AskedFigureRow& row = row_of(target.figure);
-  const bool is_right =
-      std::isfinite(target.value) && (row.is_ratio ? target.value > 0.0 : target.value >= 0.0);
-  return is_right ? std::nullopt
-                  : std::optional(Error{std::string(row.name) + ": expected a number " +
-                                        (row.is_ratio ? "above 0" : "from 0 on")});
+  const std::string_view wrong = wrong_with(target.figure, target.value);
+  return wrong.empty() ? std::nullopt
+                       : std::optional(Error{std::string(row_of(target.figure).name) + " " +
+                                             std::string(wrong)});
 }
 
 Result<AskedTimbre> ask(const FiguresAt& figures, std::span<const double> values,

@@ -16,7 +16,7 @@ namespace ressort {
 
 struct TimbreTarget {
   AskedFigure figure = AskedFigure::centroid;
-  double value = 0.0;  // above 0; an inharmonicity at least 0
+  double value = 0.0;  // as wrong_with() says
 };
 
 // A parameter that may be turned; where its range is wide (is_wide()) by equal ratios.

@@ -8,6 +8,7 @@
 #include <optional>
 #include <span>
 #include <string_view>
+#include <vector>
 
 #include "core/analysis/modes/modes.h"
 #include "core/analysis/timbre/frame_analysis.h"
@@ -19,8 +20,19 @@
 namespace ressort {
 
 // What may be asked of a timbre. Other figures jump while parameters move, or count bins.
-enum class AskedFigure : std::uint8_t { f0, t60, centroid, spread, inharmonicity, odd_to_even };
-inline constexpr std::size_t asked_figures = 6;
+enum class AskedFigure : std::uint8_t {
+  f0,
+  t60,
+  centroid,
+  spread,
+  inharmonicity,
+  odd_to_even,
+  rolloff,
+  skewness,
+  kurtosis,
+  slope
+};
+inline constexpr std::size_t asked_figures = 10;
 
 struct AskedFigureRow {
   AskedFigure figure = AskedFigure::f0;
@@ -30,7 +42,10 @@ struct AskedFigureRow {
   bool is_ratio = true;
   std::string_view more;  // "bright", for people
   std::string_view less;
+  bool is_signed = false;  // it may be below 0; else a ratio is above 0, and others from 0 on
 };
+// What is wrong with asking for a value, "must be a number above 0"; empty: nothing.
+std::string_view wrong_with(AskedFigure figure, double value);
 const AskedFigureRow& row_of(AskedFigure figure);
 std::span<const AskedFigureRow> asked_figure_rows();
 
@@ -41,10 +56,17 @@ using AskedValues = std::array<std::optional<double>, asked_figures>;
 // Both above 0 where the figure is a ratio.
 double noticed_between(AskedFigure figure, double value, double target);
 
+// A pulse of force, or of displacement where the input is a position: one sample, or a raised
+// cosine of the same sum.
+struct StrikePulse {
+  std::size_t input = 0;  // index into Network::inputs
+  double strength = 1.0;
+  double length_s = 0.0;  // at the model's own pitch; on a key as much shorter as its periods are
+};
+
 struct StrikeOptions {
   double rate_hz = Network::reference_rate_hz;
-  std::size_t input = 0;   // index into Network::inputs
-  std::size_t output = 0;  // the same of outputs
+  std::vector<StrikePulse> blows = {{}};  // all at once; heard is the mean of all outputs
   // With it every stiffness that is not fixed gets the factor that brings the mode there, as a key
   // does it; else the model is as it is written.
   std::optional<double> key_hz;
@@ -81,7 +103,8 @@ class StruckModel {
   };
   Result<TunedModes> tuned_modes(std::span<const double> parameters) const;
   FrameTimbre lines_of(std::span<const DecayingPartial> partials, double f0_hz) const;
-  FrameTimbre analysed(const NetworkModes& modes, double f0_hz) const;
+  FrameTimbre analysed(const TunedModes& tuned, double f0_hz) const;
+  double blow_frames(const StrikePulse& blow, double factor) const;
 
   Network network_;
   StrikeOptions options_;

@@ -17,10 +17,6 @@ std::string names(const Network& network) {
   return text.empty() ? "none" : text;
 }
 
-std::string no_parameter(const Network& network, const std::string& name) {
-  return "the model has no parameter " + quoted(name) + "; it has " + names(network);
-}
-
 // What is wrong with the control; empty if nothing is.
 std::string misfit(const Network& network, const ControlSetting& control) {
   if (control.gesture == Gesture::parameter) {
@@ -57,6 +53,10 @@ bool fix(Network& network, const std::string& label) {
 }
 
 }  // namespace
+
+std::string no_parameter(const Network& network, const std::string& name) {
+  return "the model has no parameter " + quoted(name) + "; it has " + names(network);
+}
 
 int find_input(const Network& network, std::string_view target) {
   int number = 0;
@@ -104,6 +104,17 @@ std::vector<Error> misfits(const Network& network, const Preset& preset) {
       found.push_back(
           {no_parameter(network, setting.name), setting.location.line, setting.location.column});
     }
+  }
+  const auto is_tuned_along = [&](const ParameterSetting& one) {
+    return one.name == preset.tuned_along && one.minimum < one.maximum;
+  };
+  if (!preset.tuned_along.empty() &&
+      (!preset.morph.empty() ||
+       std::none_of(preset.parameters.begin(), preset.parameters.end(), is_tuned_along))) {
+    found.push_back({preset.morph.empty()
+                         ? "'tuned_along' must name one of [parameters] with a range"
+                         : "keys are tuned along the morph; leave 'tuned_along' out",
+                     preset.tuned_along_location.line, preset.tuned_along_location.column});
   }
   for (const ControlSetting& control : preset.controls) {
     if (std::string message = misfit(network, control); !message.empty()) {

@@ -1,6 +1,7 @@
 // core/model: whether a preset fits a network.
 #pragma once
 
+#include <string>
 #include <string_view>
 #include <vector>
 
@@ -14,6 +15,8 @@ namespace ressort {
 // Network::parameters; -1 where there is none.
 int find_input(const Network& network, std::string_view target);
 int find_parameter(const Network& network, std::string_view name);
+// What to say of a parameter that there is not.
+std::string no_parameter(const Network& network, const std::string& name);
 
 // All that the preset names and the network does not have or cannot do, in the order of the
 // preset's lines. [any thread but audio]

@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "core/model/language/tokens.h"
+#include "core/model/preset/preset_morph.h"
 #include "core/model/preset/toml_depth.h"
 #include "core/model/preset/toml_table.h"
 #include "core/model/topology.h"
@@ -364,6 +365,9 @@ void read_root(const toml::table& root, Preset& preset, std::vector<Error>& erro
   reader.flag("noise", preset.noise);
   reader.integer("transpose", preset.transpose, -96, 96);
   reader.integer("pitch_mode", preset.pitch_mode, 1, most_pitch_mode);
+  if (reader.text("tuned_along", preset.tuned_along)) {
+    preset.tuned_along_location = location_of(*root.get("tuned_along"));
+  }
   read_flattening(root, reader, preset);
   read_keys(root, reader, preset);
   if (std::string budget; reader.text("budget", budget)) {
@@ -396,6 +400,9 @@ void read_root(const toml::table& root, Preset& preset, std::vector<Error>& erro
     } else {
       reader.fail(*node, "'parameters' must be a table: [parameters]");
     }
+  }
+  if (const toml::node* node = root.get("morph")) {
+    read_morph(*node, preset, errors);
   }
   if (const toml::node* node = root.get("control")) {
     const toml::array* rows = node->as_array();

@@ -50,6 +50,15 @@ struct ControlSetting {
   bool operator==(const ControlSetting&) const = default;
 };
 
+// Where a morph passes: a preset, or values of the model's parameters.
+struct MorphSetting {
+  std::string preset;                    // its name; empty: the values
+  std::vector<ParameterSetting> values;  // each with no range but itself
+  double gain = 1.0;                     // of the values; a preset has its own
+  SourceLocation location;
+  bool operator==(const MorphSetting&) const = default;
+};
+
 struct Preset {
   std::string model;                    // a file's name, beside the preset or in the models' folder
   SourceLocation model_location{1, 1};  // of that name
@@ -65,6 +74,8 @@ struct Preset {
   int pitch_mode = 1;     // which of its modes a key tunes, from the lowest
   // Of the sound below that mode, to be made up for: keys and cents, ascending; empty: none.
   std::vector<CurvePoint> flattening_cents;
+  std::string tuned_along;  // a parameter that leaves keys in tune wherever it is; empty: none
+  SourceLocation tuned_along_location;
   double a4_hz = usual_a4_hz;  // to which everything is tuned
   std::string scale;           // a Scala file beside the preset; empty: 12 equal semitones
   std::string keyboard_map;    // which keys play it
@@ -81,10 +92,13 @@ struct Preset {
   Budget budget;                            // of errors, for who computes it
   std::vector<ParameterSetting> parameters;
   std::vector<ControlSetting> controls;
+  std::string morph_parameter;      // which goes through them, from 1 to as many as there are
+  std::vector<MorphSetting> morph;  // empty: the model is played as it is
   bool operator==(const Preset&) const = default;
 };
 
 inline constexpr int max_voices = 256;
+inline constexpr std::size_t most_morph_stops = 16;
 inline constexpr int most_pitch_mode = 16;
 inline constexpr std::size_t max_preset_bytes = std::size_t{64} << 10;
 inline constexpr std::size_t most_preset_errors = 100;

@@ -17,6 +17,7 @@ constexpr PresetKey keys[] = {
     {"", "fixed", "[\"LABEL\", ...]", "what keys leave as stiff as it is: a guitar's box, whose modes stay where they are while the string follows the key. Labels of bodies, waveguides, macros, oscillators and links"},
     {"", "flattening_cents", "-100 to 100 (0), or [[48, 8], [96, 6]]", "by how much the sound is flat of its lowest mode, as under a bow, which keys make up for; or points of keys and cents, up to 16, and straight lines between them"},
     {"", "pitch_mode", "1 to 16 (1)", "which of the model's modes a key tunes, counted from the lowest: of a bell, say, the one that is heard as its pitch"},
+    {"", "tuned_along", "text", "one of `[parameters]` that leaves keys in tune wherever it is turned to, as a damper's that would flatten them a little; that of a `[morph]` does so by itself"},
     {"", "transpose", "-96 to 96 (0)", "semitones between a key and the pitch that it sets"},
     {"", "a4_hz", "220 to 880 (440)", "the pitch of the A above the middle C, to which all keys are tuned"},
     {"", "scale", "text", "a Scala file beside the preset, `NAME.scl`: the steps between keys; `tuning = \"fixed\"` has none"},
@@ -29,6 +30,7 @@ constexpr PresetKey keys[] = {
     {"", "budget", "text", "how exact, as `--budget` takes it: `cents=3 t60=5 silence=-60 passive=auto`"},
     {"", "parameters", "a table", "the model's parameters by name"},
     {"", "control", "tables, one for each `[[control]]`", "what plays the model"},
+    {"", "morph", "a table", "a way through several presets of one structure, on which keys stay in tune"},
     {"parameters", "value", "a number", "what the parameter is at first; needed"},
     {"parameters", "range", "[low, high]", "between what it may be turned; needed"},
     {"control", "from", "text", "`note`, `pressure`, `cc0` to `cc119`, `audio1` to `audio64`, or an OSC name such as `/finger`; needed"},
@@ -40,6 +42,8 @@ constexpr PresetKey keys[] = {
     {"control", "level_db", "[low, high]", "how loud the softest and the loudest are beside `gain`; exact for plucks, bows and blows, whose sound does not depend on how large it is. Without it the level is what `range` makes of it"},
     {"control", "length_ms", "[longest, shortest] (one sample)", "of an impulse or a swing: how long the softest and the hardest blow last at the model's own pitch, on higher keys less; the shorter, the brighter"},
     {"control", "keys", "[low, high] ([0, 127])", "of notes: which keys"},
+    {"morph", "parameter", "text", "the name of the parameter that goes through them: 1 is the first, 2 the second; controls turn it as any other. Needed"},
+    {"morph", "through", "[\"NAME\", { m_K = 0.1, gain = 0.5 }, ...]", "2 to 16 presets of the structure that `model` has, or values of its parameters, each with a `gain` as a preset's. What `[parameters]` names stays a knob of its own; the other parameters are where each stop has them. Needed"},
 };
 // clang-format on
 

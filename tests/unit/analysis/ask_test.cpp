@@ -90,6 +90,10 @@ AskedValues heard(const Played& model, std::span<const double> parameters) {
   };
   set(AskedFigure::centroid, timbre.shape->centroid_hz);
   set(AskedFigure::spread, timbre.shape->spread_hz);
+  set(AskedFigure::rolloff, timbre.shape->rolloff95_hz);
+  set(AskedFigure::skewness, timbre.shape->skewness);
+  set(AskedFigure::kurtosis, timbre.shape->kurtosis);
+  set(AskedFigure::slope, timbre.shape->slope);
   set(AskedFigure::inharmonicity, timbre.harmonics->inharmonicity);
   set(AskedFigure::odd_to_even, timbre.harmonics->odd_to_even);
   return values;
@@ -208,11 +212,14 @@ TEST_CASE("figures that are none, and models that nothing turns, are refused", "
   for (const AskedFigureRow& row : asked_figure_rows()) {
     INFO(row.name);
     for (const double wrong : {-1.0, nan, endless, -endless}) {
+      if (wrong == -1.0 && row.is_signed) {
+        continue;
+      }
       const TimbreTarget targets[] = {{row.figure, wrong}};
       CHECK_FALSE(asked(model, start, targets));
     }
     {
-      const TimbreTarget targets[] = {{row.figure, 1e300}};
+      const TimbreTarget targets[] = {{row.figure, row.is_signed ? 1e100 : 1e300}};
       const auto nearest = asked(model, start, targets);
       REQUIRE(nearest);
       CHECK(std::isfinite(nearest->noticed[0]));
