@@ -129,9 +129,12 @@ void Parameters::fill_audio(Bank<T>& bank, const VoiceGroup& group, const Segmen
                             const Voices& voices) {
   const PartBank<T>& part = bank.parts[group.part];
   const Program& program = part.program;
+  if (program.audio_coefficients.empty()) {
+    return;
+  }
   T* value = bank.audio.data();
   bool is_beyond = false;
-  for (std::size_t n = segment.at; n < segment.end() && !program.audio_coefficients.empty(); ++n) {
+  for (std::size_t n = segment.at; n < segment.end(); ++n) {
     for (const AudioParameter& audio : program.audio_parameters) {
       const auto channel = static_cast<std::size_t>(audio.channel);
       const bool is_there = channel < segment.inputs.size() && segment.inputs[channel] != nullptr;

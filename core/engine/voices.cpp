@@ -418,11 +418,16 @@ void Voices::lose(Voice& voice) {
 
 void Voices::advance_gains(std::size_t frames) {
   for (Voice& voice : voices_) {
-    const std::size_t follows = std::min(frames, voice.volume_frames);
-    for (std::size_t side = 0; side < voice.volume.size(); ++side) {
-      voice.volume[side] += voice.volume_step[side] * static_cast<double>(follows);
+    if (!voice.awake) {
+      continue;
     }
-    voice.volume_frames -= follows;
+    if (voice.volume_frames > 0) {
+      const std::size_t follows = std::min(frames, voice.volume_frames);
+      for (std::size_t side = 0; side < voice.volume.size(); ++side) {
+        voice.volume[side] += voice.volume_step[side] * static_cast<double>(follows);
+      }
+      voice.volume_frames -= follows;
+    }
     if (!voice.decay.is_steady()) {
       for (std::size_t n = 0; n < frames; ++n) {
         voice.decay.advance();

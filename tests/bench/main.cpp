@@ -8,12 +8,14 @@
 #include <csignal>
 #include <cstdio>
 #include <cstdlib>
+#include <fstream>
 #include <optional>
 #include <utility>
 
 #include "app/realtime/denormals.h"
 #include "core/compile/plan.h"
 #include "core/model/language/mdl.h"
+#include "tests/bench/faust_picture.h"
 #include "tests/bench/limit.h"
 #include "tests/bench/measure.h"
 #include "tests/bench/report.h"
@@ -34,7 +36,7 @@ const char* const usage =
     "  --quick      a glance: less exact\n"
     "  --isa NAME   base, v3 or v4; without it, the best of this machine\n"
     "  --seconds S  to measure each scene for; 4 without it\n"
-    "  -o DIR       where bench.csv, cost.png and cost.svg go; build/bench without it\n"
+    "  -o DIR       where bench.csv, cost.png, cost.svg and faust.svg go; build/bench without it\n"
     "  --list       the scenes' names\n";
 
 struct Options {
@@ -225,7 +227,9 @@ std::vector<Row> measure_scene(const BenchScene& scene, const Network& network,
                     .links = machine.parts[0].ends.size(),
                     .voices = scene.voices,
                     .median_ns = one.median(),
-                    .minimum_ns = one.minimum()});
+                    .minimum_ns = one.minimum(),
+                    .lower_ns = one.quantile(0.25),
+                    .upper_ns = one.quantile(0.75)});
     compare(rows.back(), all, libraries);
     compare(rows.back(), forms, limits);
   }
@@ -305,6 +309,9 @@ int run(const Options& options) {
   if (std::any_of(rows.begin(), rows.end(), [](const Row& row) { return !row.family.empty(); }) &&
       !draw(options.folder, machine_line(isa), rows)) {
     std::fprintf(stderr, "no picture: gnuplot does not run\n");
+  }
+  if (const std::string svg = faust_picture(machine_line(isa), rows); !svg.empty()) {
+    std::ofstream(options.folder / "faust.svg") << svg;
   }
   return stops != 0 ? 130 : is_written ? 0 : 1;
 }

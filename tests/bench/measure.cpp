@@ -59,11 +59,13 @@ void Timed::play_round() {
   took_.push_back(play(blocks_));
 }
 
-double Timed::median() const {
+double Timed::quantile(double share) const {
   std::vector<double> sorted = took_;
   std::sort(sorted.begin(), sorted.end());
-  const std::size_t half = sorted.size() / 2;
-  return sorted.size() % 2 == 1 ? sorted[half] : 0.5 * (sorted[half - 1] + sorted[half]);
+  const double at = share * static_cast<double>(sorted.size() - 1);
+  const auto below = static_cast<std::size_t>(at);
+  const std::size_t above = std::min(below + 1, sorted.size() - 1);
+  return sorted[below] + (at - static_cast<double>(below)) * (sorted[above] - sorted[below]);
 }
 
 double Timed::minimum() const {

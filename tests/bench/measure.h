@@ -22,7 +22,9 @@ class Timed {
   void play_round();
 
   bool has_played() const { return !took_.empty(); }
-  double median() const;  // ns per sample; it has played
+  // ns per sample, which so great a share of the rounds took less than; it has played
+  double quantile(double share) const;
+  double median() const { return quantile(0.5); }
   double minimum() const;
 
   std::string method;

@@ -168,12 +168,14 @@ void print_regrets(const std::vector<Row>& rows) {
 bool write_csv(const std::filesystem::path& path, const std::string& isa,
                const std::vector<Row>& rows) {
   std::ofstream file(path);
-  file << "scene,precision,method,form,isa,masses,links,voices,median_ns,minimum_ns,ns_per_mass,"
+  file << "scene,precision,method,form,isa,masses,links,voices,median_ns,minimum_ns,lower_ns,upper_"
+          "ns,ns_per_mass,"
           "core_share,share_of_limit,times_reference,times_best_faust,times_default_faust\n";
   for (const Row& row : rows) {
     file << row.scene << ',' << precision_of(row) << ',' << row.method << ',' << row.form << ','
          << isa << ',' << row.masses << ',' << row.links << ',' << row.voices << ','
          << number("%.6g", row.median_ns) << ',' << number("%.6g", row.minimum_ns) << ','
+         << number("%.6g", row.lower_ns) << ',' << number("%.6g", row.upper_ns) << ','
          << number("%.6g", ns_per_mass(row)) << ',' << number("%.6g", row.median_ns / budget_ns)
          << ',' << ratio(row.of_limit) << ',' << ratio(row.than_reference) << ','
          << ratio(row.than_best_faust) << ',' << ratio(row.than_default_faust) << '\n';

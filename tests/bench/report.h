@@ -21,6 +21,8 @@ struct Row {
   std::size_t voices = 1;
   double median_ns = 0.0;  // per sample
   double minimum_ns = 0.0;
+  double lower_ns = 0.0;  // the quartiles of the rounds
+  double upper_ns = 0.0;
   // How many times faster it is than others of the same run, by the medians.
   std::optional<double> than_reference;
   std::optional<double> than_best_faust;  // in the same precision

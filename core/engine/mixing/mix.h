@@ -32,7 +32,7 @@ struct Heard {
   const T* outputs = nullptr;
   std::size_t frames = 0;
   std::size_t count = 0;  // outputs
-  std::size_t width = 1;  // lanes
+  std::size_t width = 1;  // lanes; one, or as many as fit into whole packs of 16 bytes
 };
 
 // Sound that moves one input of all lanes, on top of what it does by itself or instead of that.

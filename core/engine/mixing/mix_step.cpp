@@ -1,6 +1,8 @@
 // The loops over the voices of one kernel, compiled for each instruction set.
 #include "core/engine/mixing/mix.h"
 
+#include <limits>
+
 #include "core/kernels/kernel.h"
 
 namespace ressort::RESSORT_ISA {
@@ -8,14 +10,42 @@ namespace {
 
 constexpr std::size_t widest = vector_bytes(Isa::RESSORT_ISA);
 
-template <std::size_t Bytes>
-double sum_of(Pack<double, Bytes> pack) {
-  if constexpr (Bytes == 16) {
-    return pack[0] + pack[1];
+// A pack's numbers as they are stored. Without their signs they are ordered as the numbers are, and
+// infinity and what is no number come after all others: integers are compared in a fraction of the
+// time.
+template <class V>
+using Bits = decltype(V{} < V{});
+
+template <class V>
+Bits<V> magnitude(V y) {
+  return reinterpret_cast<Bits<V>>(y) & std::numeric_limits<Scalar<Bits<V>>>::max();
+}
+
+// The first numbers of a pack, and zeros: what whole packs leave over.
+template <class V>
+[[gnu::noinline]] V load_some(const Scalar<V>* from, std::size_t count) {
+  V pack{};
+  for (std::size_t i = 0; i < count; ++i) {
+    pack[i] = from[i];
+  }
+  return pack;
+}
+
+// The numbers of a pack in one, half by half.
+template <class V, class Both>
+[[gnu::always_inline]] inline auto folded(V pack, Both&& both) {
+  using Number = Scalar<V>;
+  if constexpr (sizeof(V) > 16) {
+    typedef Number Half __attribute__((vector_size(sizeof(V) / 2), may_alias));
+    Half halves[2];
+    __builtin_memcpy(halves, &pack, sizeof pack);
+    return folded(both(halves[0], halves[1]), both);
   } else {
-    Pack<double, Bytes / 2> halves[2];
-    store(reinterpret_cast<double*>(halves), pack);
-    return sum_of<Bytes / 2>(halves[0] + halves[1]);
+    Number all = pack[0];
+    for (std::size_t i = 1; i < sizeof(V) / sizeof(Number); ++i) {
+      all = both(all, pack[i]);
+    }
+    return all;
   }
 }
 
@@ -24,19 +54,15 @@ double sum_of(Pack<double, Bytes> pack) {
 bool is_silent(const double* samples, std::size_t frames) {
   using V = Pack<double, widest>;
   constexpr std::size_t lanes = widest / sizeof(double);
-  auto sounds = V{} != V{};
+  Bits<V> any{};
   std::size_t n = 0;
   for (; n + lanes <= frames; n += lanes) {
-    sounds |= load<V>(samples + n) != V{};
+    any |= magnitude(load<V>(samples + n));
   }
-  bool any = false;
-  for (std::size_t i = 0; i < lanes; ++i) {
-    any |= sounds[i] != 0;
+  if (n < frames) {
+    any |= magnitude(load_some<V>(samples + n, frames - n));
   }
-  for (; n < frames; ++n) {
-    any |= samples[n] != 0.0;
-  }
-  return !any;
+  return folded(any, [](auto a, auto b) { return a | b; }) == 0;
 }
 
 template <class T>
@@ -96,18 +122,26 @@ void add_audio(const AudioInput<T>& input) {
 
 // --- peaks --------------------------------------------------------------------------------------
 
+template <class V>
+Bits<V> larger(Bits<V> a, Bits<V> b) {
+  return a > b ? a : b;
+}
+
+// Of the packs y, y + step and so on.
 template <class V, class T>
-void peaks_of(const T* y, std::size_t count, std::size_t step, double bound, T* peak) {
-  const V most = V{} + static_cast<T>(bound);
-  const V beyond = V{} + static_cast<T>(__builtin_huge_val());
-  V found{};
-  V outside{};
+Bits<V> largest_of(const T* y, std::size_t count, std::size_t step) {
+  Bits<V> found{};
   for (std::size_t i = 0; i < count; ++i) {
-    const V here = absolute(load<V>(y + i * step));
-    found = select(here > found, here, found);
-    outside = select(here < most, outside, beyond);
+    found = larger<V>(found, magnitude(load<V>(y + i * step)));
   }
-  store(peak, select(outside > V{}, beyond, found));
+  return found;
+}
+
+template <class V>
+V within(Bits<V> largest, double bound) {
+  const V peak = reinterpret_cast<V>(largest);
+  const V beyond = V{} + static_cast<Scalar<V>>(__builtin_huge_val());
+  return select(peak < V{} + static_cast<Scalar<V>>(bound), peak, beyond);
 }
 
 // One lane: its samples lie one after the other.
@@ -116,59 +150,87 @@ T peak_of_one(const T* y, std::size_t count, double bound) {
   using V = Pack<T, widest>;
   constexpr std::size_t lanes = widest / sizeof(T);
   const std::size_t whole = count - count % lanes;
-  T peaks[lanes + 1] = {};
-  peaks_of<V>(y, whole / lanes, lanes, bound, peaks);
-  peaks_of<T>(y + whole, count - whole, 1, bound, peaks + lanes);
-  T most = peaks[0];
-  for (const T peak : peaks) {
-    most = peak > most ? peak : most;
+  Bits<V> largest = largest_of<V>(y, whole / lanes, lanes);
+  if (whole < count) {
+    largest = larger<V>(largest, magnitude(load_some<V>(y + whole, count - whole)));
   }
-  return most;
+  const auto most = folded(largest, [](auto a, auto b) { return a > b ? a : b; });
+  using Narrow = Pack<T, 16>;
+  return within<Narrow>(Bits<Narrow>{} + most, bound)[0];
 }
 
 template <class T>
 void find_peaks(const Heard<T>& heard, double bound, T* peak) {
-  constexpr std::size_t lanes = widest / sizeof(T);
   const std::size_t rows = heard.frames * heard.count;
   if (heard.width == 1) {
     *peak = peak_of_one(heard.outputs, rows, bound);
     return;
   }
   std::size_t lane = 0;
-  for (; lane + lanes <= heard.width; lane += lanes) {
-    peaks_of<Pack<T, widest>>(heard.outputs + lane, rows, heard.width, bound, peak + lane);
+  const auto find = [&]<class V>(V) {
+    const Bits<V> largest = largest_of<V>(heard.outputs + lane, rows, heard.width);
+    store<V>(peak + lane, within<V>(largest, bound));
+    lane += sizeof(V) / sizeof(T);
+  };
+  while (lane + widest / sizeof(T) <= heard.width) {
+    find(Pack<T, widest>{});
   }
-  for (; lane + 16 / sizeof(T) <= heard.width; lane += 16 / sizeof(T)) {
-    peaks_of<Pack<T, 16>>(heard.outputs + lane, rows, heard.width, bound, peak + lane);
-  }
-  for (; lane < heard.width; ++lane) {
-    peaks_of<T>(heard.outputs + lane, rows, heard.width, bound, peak + lane);
+  while (lane < heard.width) {
+    find(Pack<T, 16>{});
   }
 }
 
 // --- what comes out -----------------------------------------------------------------------------
 
-template <class T>
-double sum_of_lanes(const T* row, std::size_t width, const double* gain) {
-  using D = Pack<double, widest>;
-  constexpr std::size_t lanes = widest / sizeof(double);
-  D packs{};
+// channel[n] += the sum of gain[lane] * rows[n * step + lane] for some frames at once, so that a
+// gain is looked at once for all of them, and no sum waits for another.
+template <std::size_t Frames, class T>
+void add_lanes(const T* rows, std::size_t step, std::size_t width, const double* gain,
+               double* channel) {
+  double sum[Frames] = {};
   std::size_t lane = 0;
-  for (; lane + lanes <= width; lane += lanes) {
-    const D g = load<D>(gain + lane);
-    const D y = __builtin_convertvector(load<Pack<T, lanes * sizeof(T)>>(row + lane), D);
-    packs += select(g == D{}, D{}, g * y);
+  const auto add = [&]<std::size_t Bytes>() {
+    using D = Pack<double, Bytes>;
+    constexpr std::size_t lanes = Bytes / sizeof(double);
+    D packs[Frames] = {};
+    for (; lane + lanes <= width; lane += lanes) {
+      const D g = load<D>(gain + lane);
+      const auto is_heard = g != D{};
+      for (std::size_t n = 0; n < Frames; ++n) {
+        const auto y = load<Pack<T, lanes * sizeof(T)>>(rows + n * step + lane);
+        packs[n] += g * select(is_heard, __builtin_convertvector(y, D), D{});
+      }
+    }
+    for (std::size_t n = 0; n < Frames; ++n) {
+      sum[n] += folded(packs[n], [](auto a, auto b) { return a + b; });
+    }
+  };
+  add.template operator()<widest>();
+  if (lane < width) {
+    add.template operator()<16>();
   }
-  double sum = sum_of<widest>(packs);
-  for (; lane < width; ++lane) {
-    sum += gain[lane] == 0.0 ? 0.0 : gain[lane] * static_cast<double>(row[lane]);
+  for (std::size_t n = 0; n < Frames; ++n) {
+    channel[n] += sum[n];
   }
-  return sum;
+}
+
+// One lane. Of one output its samples lie one after the other, of two every other is its: the usual
+// cases, and the compiler is to know them.
+template <std::size_t Step, class T>
+void add_one(const T* y, std::size_t frames, double gain, double* __restrict channel) {
+  for (std::size_t n = 0; n < frames; ++n) {
+    channel[n] += gain * static_cast<double>(y[n * Step]);
+  }
 }
 
 template <class T>
-[[gnu::always_inline]] inline void add_one(const T* y, std::size_t frames, std::size_t step,
-                                           double gain, double* channel) {
+void add_one(const T* y, std::size_t frames, std::size_t step, double gain, double* channel) {
+  if (step == 1) {
+    return add_one<1>(y, frames, gain, channel);
+  }
+  if (step == 2) {
+    return add_one<2>(y, frames, gain, channel);
+  }
   for (std::size_t n = 0; n < frames; ++n) {
     channel[n] += gain * static_cast<double>(y[n * step]);
   }
@@ -176,20 +238,20 @@ template <class T>
 
 template <class T>
 void add_voices(const Heard<T>& heard, const double* gain, double* const* channels) {
-  if (heard.width == 1 && *gain == 0.0) {
-    return;
-  }
+  const std::size_t step = heard.count * heard.width;
   for (std::size_t output = 0; output < heard.count; ++output) {
     const T* const y = heard.outputs + output * heard.width;
     double* const channel = channels[output];
     if (heard.width > 1) {
-      for (std::size_t n = 0; n < heard.frames; ++n) {
-        channel[n] += sum_of_lanes(y + n * heard.count * heard.width, heard.width, gain);
+      std::size_t n = 0;
+      for (; n + 4 <= heard.frames; n += 4) {
+        add_lanes<4>(y + n * step, step, heard.width, gain, channel + n);
       }
-    } else if (heard.count > 1) {
-      add_one(y, heard.frames, heard.count, *gain, channel);
-    } else {  // the usual case, and the compiler is to know it
-      add_one(y, heard.frames, 1, *gain, channel);
+      for (; n < heard.frames; ++n) {
+        add_lanes<1>(y + n * step, step, heard.width, gain, channel + n);
+      }
+    } else if (*gain != 0.0) {
+      add_one(y, heard.frames, step, *gain, channel);
     }
   }
 }

@@ -19,7 +19,7 @@ void Mixing::add(Bank<T>& bank, const VoiceGroup& group, const Segment& segment,
                        .count = count,
                        .width = part.width};
   bank.mixer.find_peaks(heard, loudest_, bank.peak.data());
-  std::fill(bank.gain.begin(), bank.gain.end(), 0.0);
+  std::fill_n(bank.gain.begin(), part.width, 0.0);
   for (std::size_t lane = group.first; lane < group.end; ++lane) {
     Voice& voice = voices[lane];
     if (!voice.awake || watch.is_still(lane, group.part)) {

@@ -7,8 +7,7 @@
 namespace ressort {
 namespace {
 
-constexpr std::size_t least_block = 6;    // frames; fewer are stepped
-constexpr std::size_t most_samples = 32;  // frames, before the next block step is tried
+constexpr std::size_t least_block = 6;  // frames; fewer are stepped
 
 std::size_t round_up(std::size_t count, std::size_t to) {
   return (count + to - 1) / to * to;
@@ -411,7 +410,7 @@ void DenseKernel<T>::play(const DenseDrive<T>& drive, std::size_t at, std::size_
       at += stepped;
       continue;
     }
-    const std::size_t stepped = std::min(end - at, is_block ? 1 : most_samples);
+    const std::size_t stepped = is_block ? 1 : end - at;
     steps_.samples(body_, drive, at, stepped, false);
     is_current_ = true;
     at += stepped;

@@ -67,11 +67,10 @@ struct SampleSteps {
       sum.pack[c] += load<V>(column + c * lanes) * by;
     }
   }
-  // sum += columns * by, one number for each column. From register to register, and in two chains:
-  // this is what the next sample waits for.
-  [[gnu::always_inline]] static void add_columns(Vector& sum, const DenseBody<T>& b,
+  // sum + other += columns * by, one number for each column. From register to register, and in two
+  // chains: this is what the next sample waits for.
+  [[gnu::always_inline]] static void add_columns(Vector& sum, Vector& other, const DenseBody<T>& b,
                                                  const T* columns, const Vector& by) {
-    Vector other{};
     for (std::size_t c = 0; c < Count; ++c) {
       if (Count > 4 && c * lanes >= b.masses) {
         break;
@@ -84,8 +83,16 @@ struct SampleSteps {
       }
       (std::make_index_sequence<lanes>());
     }
+  }
+  [[gnu::always_inline]] static void add_columns(Vector& sum, const DenseBody<T>& b,
+                                                 const T* columns, const Vector& by) {
+    Vector other{};
+    add_columns(sum, other, b, columns, by);
+    add(sum, other);
+  }
+  [[gnu::always_inline]] static void add(Vector& sum, const Vector& more) {
     for (std::size_t c = 0; c < Count; ++c) {
-      sum.pack[c] += other.pack[c];
+      sum.pack[c] += more.pack[c];
     }
   }
   [[gnu::always_inline]] static void add_sources(Vector& sum, const DenseBody<T>& b,
@@ -273,18 +280,25 @@ struct SampleSteps {
     finish(body);
   }
 
-  // The velocity after v, where x was one sample before v; but for what pushes. Few columns have
-  // chains of their own: x is known earlier, and v is what everything waits for.
-  [[gnu::always_inline]] static Vector velocity_after(const DenseBody<T>& b, const Vector& x,
-                                                      const Vector& v) {
+  // What the springs and weights do to a velocity, where x was one sample before it.
+  [[gnu::always_inline]] static Vector pull_at(const DenseBody<T>& b, const Vector& x) {
     Vector pull = vector(b.pace + 3 * stride);
-    Vector after = v;
     add_sources(pull, b, b.pace);
     add_columns(pull, b, b.pace + own_vectors * stride, x);
-    add_columns(after, b, b.pace + (own_vectors + stride) * stride, v);
-    for (std::size_t c = 0; c < Count; ++c) {
-      after.pack[c] += pull.pack[c];
-    }
+    return pull;
+  }
+
+  // The velocity after v, where x was one sample before v; but for what pushes, which `late` adds
+  // where the fewest steps follow it. x is known earlier, and v is what everything waits for.
+  template <class Late>
+  [[gnu::always_inline]] static Vector velocity_after(const DenseBody<T>& b, const Vector& x,
+                                                      const Vector& v, Late&& late) {
+    Vector after = v;
+    add(after, pull_at(b, x));
+    Vector other{};
+    add_columns(after, other, b, b.pace + (own_vectors + stride) * stride, v);
+    late(other);
+    add(after, other);
     return after;
   }
 
@@ -312,7 +326,7 @@ struct SampleSteps {
       for (std::size_t c = 0; c < Count; ++c) {
         before.pack[c] -= v.pack[c];
       }
-      next = velocity_after(b, before, v);
+      next = velocity_after(b, before, v, [](Vector&) {});
     }
     const T* const reach = b.reach + b.pushes * stride;
     T pulled = is_one ? b.port_force[0] : T(0);
@@ -321,21 +335,22 @@ struct SampleSteps {
         add(next, b.reach + i * stride, drive.value[b.push[i].input * max_block_frames + n]);
       }
       hold(b, drive, n);
-      Vector after = velocity_after(b, x, next);
+      const Vector after = velocity_after(b, x, next, [&](Vector& sum) {
+        for (std::size_t p = 0; p < (is_one ? 1 : b.ports); ++p) {
+          add(sum, b.echo + p * stride, is_one ? pulled : b.port_force[p]);
+        }
+      });
       v = next;
+      for (std::size_t p = 0; p < (is_one ? 1 : b.ports); ++p) {
+        add(v, reach + p * stride, is_one ? pulled : b.port_force[p]);
+      }
       T force = T(0);
       if constexpr (is_one) {
         const T lead = ports.by * reach[0] * pulled;
-        const T d = ports.by * (x.pack[0][0] + next.pack[0][0] - b.x[ports.other]);
-        const T speed = ports.by * (next.pack[0][0] - b.v[ports.other]);
+        const T free = ports.by * next.pack[0][0];
+        const T d = ports.by * (x.pack[0][0] - b.x[ports.other]) + free;
+        const T speed = free - ports.by * b.v[ports.other];
         force = ports.law.force(d + lead, speed + lead);
-        add(v, reach, pulled);
-        add(after, b.echo, pulled);
-      } else {
-        for (std::size_t p = 0; p < b.ports; ++p) {
-          add(v, reach + p * stride, b.port_force[p]);
-          add(after, b.echo + p * stride, b.port_force[p]);
-        }
       }
       for (std::size_t c = 0; c < Count; ++c) {
         x.pack[c] += v.pack[c];
