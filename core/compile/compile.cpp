@@ -311,7 +311,9 @@ Result<Compiled> compile_by_stages(const Request& request) {
     return *std::move(error);
   }
   const auto played_by = [&](int count, double gain) {
-    return make_playing(network, preset, analysis, options.bare, count, gain);
+    Playing playing = make_playing(network, preset, analysis, options.bare, count, gain);
+    playing.share = options.share;
+    return playing;
   };
   std::optional<double> factor = 1.0;
   if (options.find_gain) {
@@ -326,7 +328,7 @@ Result<Compiled> compile_by_stages(const Request& request) {
   notes.insert(notes.end(), pitch_notes.begin(), pitch_notes.end());
   progress.stage("making its voices");
   return Compiled{.engine = make_engine(std::move(planned.machine), played_by(voices, gain),
-                                        options.precision, options.isa, progress),
+                                        options.precision, options.isa, progress, options.executor),
                   .instrument = make_instrument(network, preset, analysis, voices, gain),
                   .plan = {.parts = planned.parts,
                            .budget = request.budget,

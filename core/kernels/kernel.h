@@ -129,6 +129,9 @@ class Kernel {
   // there by themselves; nothing else is touched, not even the last bit. False where the kernel
   // knows of no single nodes. [audio]
   virtual bool write_nodes(std::span<const std::uint32_t> nodes, const T* x, const T* v);
+  // Becomes what `from` is, another kernel of the same Program, made for as many voices: the same
+  // next samples, to the bit. False where a kernel cannot. [audio]
+  virtual bool become(const Kernel&) { return false; }
   // Plays the block by the published scheme, v += F/M, x += v: masses, then position inputs, then
   // links; the outputs are the new positions. Forces given act in their own sample. [audio]
   void step(const Block<T>& block) {
