@@ -124,10 +124,14 @@ struct Engine::Player {
 
   void press_key(const Event& event) {
     const std::uint8_t channel = event.channel % Channels::count;
-    if (event.index >= key_count || !takes(channel, event.index)) {
+    if (event.index >= key_count) {
       return;
     }
     const double velocity = playing.velocity(event.value) * voices.softness(channel);
+    if (!takes(channel, event.index)) {
+      gestures.perform_elsewhere(event.index, velocity, channel);
+      return;
+    }
     const Press press =
         voices.press_key(event.index, velocity, channel, parameters.highest_factor(), event.value2);
     if (press == Press::silent || press == Press::moves) {
