@@ -36,6 +36,26 @@ class Crew {
   virtual void run(std::span<const std::uint32_t> wanted) = 0;
 };
 
+// Other processes, each of which has one shard of a network and knows what all of them look like.
+// They call these functions in the same order. [any thread but audio]
+class Fellows {
+ public:
+  // One array of one shard's, which lies here or comes from where it does.
+  struct Parcel {
+    std::size_t owner = 0;  // shard
+    void* bytes = nullptr;
+    std::size_t size = 0;
+    std::span<const std::size_t> takers;  // shards that want it; empty: all processes
+  };
+
+  virtual ~Fellows() = default;
+  virtual std::size_t own() const = 0;  // shard of this process
+  // Begins to send and to take parcels, which nobody touches until finish() returns.
+  virtual void begin(std::span<const Parcel> parcels) = 0;
+  virtual void finish() = 0;
+  virtual bool all_agree(bool here) = 0;
+};
+
 // Threads that help.
 class Executor {
  public:
@@ -44,6 +64,8 @@ class Executor {
   virtual bool is_live() const = 0;      // helpers work aside, and are not waited for
   // The tasks outlive the crew. [any thread but audio]
   virtual std::unique_ptr<Crew> gather(std::vector<Task*> tasks) = 0;
+  // Who has the other shards, if these are no threads; null: all shards are here.
+  virtual Fellows* fellows() { return nullptr; }
 };
 
 }  // namespace ressort

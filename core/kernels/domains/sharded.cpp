@@ -14,11 +14,20 @@ void copy_row(const T* from, std::size_t from_row, T* to, std::size_t to_row, st
 template <class T>
 std::vector<std::unique_ptr<Kernel<T>>> kernels_of(const Shards& form, std::size_t voices,
                                                    Isa isa) {
+  const Fellows* const fellows = form.executor->fellows();
   std::vector<std::unique_ptr<Kernel<T>>> kernels;
   for (const Shard& shard : *form.shards) {
-    kernels.push_back(make_kernel<T>(shard.program, voices, isa));
+    const bool is_here = fellows == nullptr || fellows->own() == kernels.size();
+    kernels.push_back(is_here ? make_kernel<T>(shard.program, voices, isa) : nullptr);
   }
   return kernels;
+}
+
+// One at least is here, and all are alike.
+template <class T>
+Kernel<T>& first_of(const std::vector<std::unique_ptr<Kernel<T>>>& kernels) {
+  return **std::find_if(kernels.begin(), kernels.end(),
+                        [](const auto& kernel) { return kernel != nullptr; });
 }
 
 }  // namespace
@@ -31,10 +40,12 @@ ShardedKernel<T>::ShardedKernel(const Program& program, const Shards& form, std:
 template <class T>
 ShardedKernel<T>::ShardedKernel(const Program& program, const Shards& form, Kernels kernels,
                                 std::size_t voices, Isa isa)
-    : Kernel<T>(program, kernels[0]->width()),
+    : Kernel<T>(program, first_of(kernels).width()),
       program_(program),
       shards_(*form.shards),
       frames_(form.frames),
+      fellows_(form.executor->fellows()),
+      takers_(shards_.size()),
       kernels_(std::move(kernels)) {
   const std::size_t width = this->width();
   std::vector<Task*> tasks;
@@ -60,10 +71,18 @@ ShardedKernel<T>::ShardedKernel(const Program& program, const Shards& form, Kern
     }
     tasks_.push_back(
         std::make_unique<KernelTask<T>>(kernels_[i], std::move(buffers), std::move(halo), make));
-    tasks.push_back(tasks_.back().get());
-    all_.push_back(static_cast<std::uint32_t>(i));
+    if (is_here(i)) {
+      all_.push_back(static_cast<std::uint32_t>(tasks.size()));
+      tasks.push_back(tasks_.back().get());
+    }
+    for (const ShardSource& source : shard.sources) {
+      if (takers_[source.shard].empty() || takers_[source.shard].back() != i) {
+        takers_[source.shard].push_back(i);
+      }
+    }
     most_nodes = std::max(most_nodes, shard.nodes.size());
   }
+  parcels_.reserve(3 * shards_.size());
   x_.resize(most_nodes);
   v_.resize(most_nodes);
   crew_ = form.executor->gather(std::move(tasks));
@@ -73,6 +92,9 @@ template <class T>
 void ShardedKernel<T>::set_state(std::size_t lane, const double* x, const double* v) {
   write_copies();
   for (std::size_t i = 0; i < shards_.size(); ++i) {
+    if (!is_here(i)) {
+      continue;
+    }
     const std::vector<std::uint32_t>& nodes = shards_[i].nodes;
     for (std::size_t node = 0; node < nodes.size(); ++node) {
       x_[node] = x[nodes[node]];
@@ -86,6 +108,9 @@ template <class T>
 bool ShardedKernel<T>::save(std::size_t lane, double* x, double* v) const {
   write_copies();
   for (std::size_t i = 0; i < shards_.size(); ++i) {
+    if (!is_here(i)) {
+      return false;
+    }
     const std::vector<std::uint32_t>& nodes = shards_[i].nodes;
     if (!kernels_[i]->save(lane, x_.data(), v_.data())) {
       return false;
@@ -101,8 +126,10 @@ bool ShardedKernel<T>::save(std::size_t lane, double* x, double* v) const {
 template <class T>
 bool ShardedKernel<T>::is_near_start(std::size_t lane, double bound) const {
   write_copies();
-  return std::all_of(kernels_.begin(), kernels_.end(),
-                     [&](const auto& kernel) { return kernel->is_near_start(lane, bound); });
+  const bool is_near = std::all_of(kernels_.begin(), kernels_.end(), [&](const auto& kernel) {
+    return kernel == nullptr || kernel->is_near_start(lane, bound);
+  });
+  return fellows_ != nullptr ? fellows_->all_agree(is_near) : is_near;
 }
 
 // A copy is as good as the node itself; nodes that no shard has are at 0.
@@ -115,7 +142,7 @@ std::size_t ShardedKernel<T>::look(std::size_t lane, std::span<const std::uint32
     for (std::size_t i = 0; i < shards_.size(); ++i) {
       const std::vector<std::uint32_t>& own = shards_[i].nodes;
       const auto at = std::lower_bound(own.begin(), own.end(), node);
-      if (at != own.end() && *at == node) {
+      if (is_here(i) && at != own.end() && *at == node) {
         const auto local = static_cast<std::uint32_t>(at - own.begin());
         kernels_[i]->look(lane, {&local, 1}, {&position, 1});
         break;
@@ -130,15 +157,44 @@ void ShardedKernel<T>::play(const Block<T>& block) {
   for (std::size_t at = 0; at < block.frames; at += frames_) {
     const std::size_t frames = std::min(frames_, block.frames - at);
     for (std::size_t i = 0; i < shards_.size(); ++i) {
-      give_inputs(i, block, at, frames);
+      if (is_here(i)) {
+        give_inputs(i, block, at, frames);
+      }
     }
     crew_->run(all_);
     owes_copies_ = true;
+    if (fellows_ != nullptr) {
+      pass_on(block, at, frames);
+      continue;
+    }
     for (std::size_t i = 0; i < shards_.size(); ++i) {
       take_outputs(i, block, at, frames);
     }
   }
-  this->coefficients = kernels_[0]->coefficients;
+  this->coefficients = first_of(kernels_).coefficients;
+}
+
+// What others copy is on its way while what is heard of this shard is put in its place.
+template <class T>
+void ShardedKernel<T>::pass_on(const Block<T>& block, std::size_t at, std::size_t frames) {
+  parcels_.clear();
+  for (std::size_t i = 0; i < shards_.size(); ++i) {
+    HaloBuffers<T>& halo = tasks_[i]->halo;
+    const auto add = [&](Aligned<T>& numbers, std::size_t count,
+                         std::span<const std::size_t> takers) {
+      if (count > 0) {
+        parcels_.push_back({i, numbers.data(), count * sizeof(T), takers});
+      }
+    };
+    add(halo.given_x, takers_[i].empty() ? 0 : halo.given_x.size(), takers_[i]);
+    add(halo.given_v, takers_[i].empty() ? 0 : halo.given_v.size(), takers_[i]);
+    add(tasks_[i]->buffers.outputs, frames * shards_[i].outputs.size() * this->width(), {});
+  }
+  fellows_->begin(parcels_);
+  fellows_->finish();
+  for (std::size_t i = 0; i < shards_.size(); ++i) {
+    take_outputs(i, block, at, frames);
+  }
 }
 
 template <class T>
@@ -202,6 +258,9 @@ void ShardedKernel<T>::write_copies() const {
     return;
   }
   for (std::size_t i = 0; i < shards_.size(); ++i) {
+    if (!is_here(i)) {
+      continue;
+    }
     gather_copies(i);
     const HaloBuffers<T>& halo = tasks_[i]->halo;
     kernels_[i]->write_nodes(halo.copies, halo.copied_x.data(), halo.copied_v.data());

@@ -53,11 +53,16 @@ class ShardedKernel final : public Kernel<T> {
   void give_inputs(std::size_t i, const Block<T>& block, std::size_t at, std::size_t frames);
   void take_outputs(std::size_t i, const Block<T>& block, std::size_t at, std::size_t frames);
   void gather_copies(std::size_t i) const;
+  void pass_on(const Block<T>& block, std::size_t at, std::size_t frames);
+  bool is_here(std::size_t i) const { return kernels_[i] != nullptr; }
   void write_copies() const;
 
   const Program& program_;
   const std::vector<Shard>& shards_;
   std::size_t frames_;
+  Fellows* const fellows_;
+  std::vector<std::vector<std::size_t>> takers_;  // [shard] those that copy nodes of it
+  std::vector<Fellows::Parcel> parcels_;
   Kernels kernels_;                                    // [shard]
   std::vector<std::unique_ptr<KernelTask<T>>> tasks_;  // [shard]
   std::vector<std::uint32_t> all_;                     // [shard] its index
