@@ -1,6 +1,7 @@
 // app: the command line, turned into one of the commands.
 #include <CLI/CLI.hpp>
 #include <algorithm>
+#include <cmath>
 #include <cstdio>
 #include <cstdlib>
 #include <iterator>
@@ -232,6 +233,33 @@ void add_play(CLI::App& app, PlayOptions& options, int& code) {
       ->check(within(-120.0, 60.0));
   command->add_option("-p,--voices", options.voices, "how many notes sound at once")
       ->check(within(1, max_voices));
+  command
+      ->add_option("--threads", options.threads,
+                   "for voices and large networks: others help the audio thread, which never\n"
+                   "waits for them")
+      ->check(within(1, 64))
+      ->capture_default_str();
+  command
+      ->add_option_function<std::string>(
+          "--share",
+          [&options](const std::string& text) {
+            const std::size_t slash = text.find('/');
+            double number = 0.0;
+            double of = 0.0;
+            const bool is_share = slash != std::string::npos &&
+                                  parse_number(text.substr(0, slash), number) &&
+                                  parse_number(text.substr(slash + 1), of);
+            constexpr double most = 64.0;
+            if (!is_share || number != std::floor(number) || of != std::floor(of) || number < 1.0 ||
+                number > of || of > most) {
+              throw CLI::ValidationError(
+                  "--share", "must be 1/2, the first of two, up to 64/64; found '" + text + "'");
+            }
+            options.share = {static_cast<int>(number), static_cast<int>(of)};
+          },
+          "which of the notes, of several programs that hear the same: 1/2 and 2/2 take keys\n"
+          "in turn, on two cores. All are started before the first note")
+      ->type_name("N/OF");
   add_keys(*command, options.keys);
   command
       ->add_option_function<std::vector<int>>(

@@ -30,6 +30,7 @@ judge() {
       owner["ebur128.h"] = "app/commands/gallery/loudness.cpp"
       owner["httplib.h"] = "app/panel/panel.cpp"
       owner["png.h"] = "app/commands/gallery/png.cpp"
+      owner["mpi.h"] = "app/mpi/ranks.cpp"
       owner["atomic"] = "app/realtime/lockfree.h"
       owner["toml++/"] = "core/model/"
       owner["Eigen/"] = "core/linear_algebra/"
@@ -57,6 +58,7 @@ judge() {
       sees["app/control"] = all " app app/realtime app/devices app/session app/control"
       sees["app/panel"] = sees["app/control"] " app/panel"
       sees["app/commands"] = sees["app/panel"] " core/identification core/solids app/commands"
+      sees["app/mpi"] = sees["app/commands"] " app/mpi"
       sees["app"] = sees["app/commands"]
     }
     {

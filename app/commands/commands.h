@@ -25,6 +25,8 @@ struct PlayOptions {
   AudioOptions device;
   double gain_db = 0.0;
   int voices = 0;
+  int threads = 1;        // with the audio thread
+  NoteShare::Part share;  // of the notes
   Precision precision = Precision::float64;
   bool rescale = true;
   std::optional<Method> method;        // without one, the plan's choice

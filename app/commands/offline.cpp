@@ -261,7 +261,9 @@ Result<Rendered> render(const RenderOptions& options, const std::function<bool(d
     scene->warnings.push_back("--threads " + std::to_string(threads) + ": this machine runs " +
                               std::to_string(core_count()) + " at once, and so many are used");
   }
-  ThreadPool pool(threads > 0 ? std::min(threads, core_count()) : core_count());
+  ThreadPool pool(options.executor != nullptr ? 1
+                  : threads > 0               ? std::min(threads, core_count())
+                                              : core_count());
   auto compiled = admit(*scene,
                         {.rate_hz = options.rate_hz,
                          .rescale = options.rescale,
@@ -270,7 +272,7 @@ Result<Rendered> render(const RenderOptions& options, const std::function<bool(d
                          .precision = options.precision,
                          .method = options.method,
                          .budget = options.budget,
-                         .executor = &pool,
+                         .executor = options.executor != nullptr ? options.executor : &pool,
                          .find_gain = !scene->has_preset && !is_bare,
                          .force = options.force,
                          .settings = options.parameters,
@@ -327,15 +329,19 @@ Result<Rendered> render(const RenderOptions& options, const std::function<bool(d
   const bool ends_by_itself = !options.midi.empty() && !options.frames && !options.seconds;
   const long long may_end = std::llround(midi->length_s * options.rate_hz);
   const auto expected = static_cast<double>(ends_by_itself ? may_end : rendered.frames);
-  auto file =
-      SoundWriter::open(options.output,
-                        {.rate_hz = options.rate_hz,
-                         .channels = rendered.channels,
-                         .samples = options.format,
-                         .frames = ends_by_itself ? std::nullopt : std::optional(rendered.frames)},
-                        Existing::replace);
-  if (!file) {
-    return file.error();
+  std::optional<SoundWriter> file;
+  if (!options.is_silent) {
+    auto opened = SoundWriter::open(
+        options.output,
+        {.rate_hz = options.rate_hz,
+         .channels = rendered.channels,
+         .samples = options.format,
+         .frames = ends_by_itself ? std::nullopt : std::optional(rendered.frames)},
+        Existing::replace);
+    if (!opened) {
+      return opened.error();
+    }
+    file = *std::move(opened);
   }
   std::vector<double> samples(channels * block_frames);
   std::vector<double> interleaved(samples.size());
@@ -377,7 +383,7 @@ Result<Rendered> render(const RenderOptions& options, const std::function<bool(d
     if (peak > silent_peak) {
       loud_until = std::max(loud_until, end);
     }
-    if (auto wrote = file->write(interleaved.data(), count); !wrote) {
+    if (auto wrote = file ? file->write(interleaved.data(), count) : Done{}; !wrote) {
       rendered.failure = wrote.error();
       return rendered;
     }
@@ -390,7 +396,7 @@ Result<Rendered> render(const RenderOptions& options, const std::function<bool(d
       break;
     }
   }
-  if (auto closed = file->close(); !closed) {
+  if (auto closed = file ? file->close() : Done{}; !closed) {
     rendered.failure = closed.error();
     return rendered;
   }

@@ -265,6 +265,7 @@ Result<AudioDevice> open_alsa(Process& process, const AudioOptions& options) {
   alsa->thread = std::thread([alsa = alsa.get()] { alsa->run(); });
   AudioDevice device;
   device.rate_hz = alsa->out.rate_hz;
+  device.priority = audio_priority;
   device.description = "ALSA '" + options.device + "', " + std::to_string(alsa->out.rate_hz) +
                        " Hz, " + std::to_string(alsa->out.frames) + " frames";
   device.close = [alsa] {

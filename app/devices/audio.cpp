@@ -36,7 +36,7 @@ namespace {
 
 bool ask_for_priority() {
   sched_param priority{};
-  priority.sched_priority = 70;  // above desktops, below the kernel's own audio threads
+  priority.sched_priority = audio_priority;
   return pthread_setschedparam(pthread_self(), SCHED_FIFO, &priority) == 0;
 }
 

@@ -28,6 +28,7 @@ struct AudioDevice {
   std::string kind;         // "jack", "alsa" or "dummy"
   std::string description;  // "JACK, 48000 Hz, 256 frames"
   double rate_hz = 48000.0;
+  int priority = 0;  // of its audio thread, if that has one for real time
   std::function<void()> close;
   std::function<bool()> is_lost;              // the server or the device is gone, or runs at
                                               //   another rate: close it and open it anew
@@ -43,6 +44,7 @@ struct AudioDevice {
     std::swap(kind, other.kind);
     std::swap(description, other.description);
     std::swap(rate_hz, other.rate_hz);
+    std::swap(priority, other.priority);
     std::swap(close, other.close);
     std::swap(is_lost, other.is_lost);
     std::swap(set_audio_inputs, other.set_audio_inputs);
@@ -73,6 +75,7 @@ void raise_priority();
 
 // Whether that would be granted. [control]
 bool may_raise_priority();
+inline constexpr int audio_priority = 70;  // above desktops, below the kernel's own audio threads
 
 // Sleeps until the monotonic clock reads this.
 void sleep_until(std::int64_t time_ns);

@@ -51,6 +51,7 @@ Result<AudioDevice> open_dummy(Process& process, const AudioOptions& options) {
   dummy->thread = std::thread([dummy = dummy.get()] { dummy->run(); });
   AudioDevice device;
   device.rate_hz = options.rate_hz;
+  device.priority = audio_priority;
   device.description = "dummy (silent), " + std::to_string(static_cast<int>(options.rate_hz)) +
                        " Hz, " + std::to_string(options.period_frames) + " frames";
   device.close = [dummy] {

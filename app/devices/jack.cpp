@@ -1,6 +1,7 @@
 #include <jack/jack.h>
 #include <jack/metadata.h>
 #include <jack/midiport.h>
+#include <jack/thread.h>
 #include <jack/uuid.h>
 
 #include <algorithm>
@@ -313,6 +314,7 @@ Result<AudioDevice> open_jack(Process& process, const AudioOptions& options) {
   device.description = "JACK client '" + std::string(jack_get_client_name(jack->client)) + "', " +
                        std::to_string(static_cast<int>(jack->rate_hz)) + " Hz, " +
                        std::to_string(jack_get_buffer_size(jack->client)) + " frames";
+  device.priority = jack_client_real_time_priority(jack->client);
   device.has_midi = true;
   device.close = close;
   device.is_lost = [jack] { return jack->lost.is_raised(); };

@@ -133,33 +133,109 @@ class Flag {
   std::atomic<bool> raised_{false};
 };
 
-// Where several threads wait for each other, again and again.
-class Barrier {
+// Whose a task is: its owner's, who offers it round by round, or for a while a helper's. Every
+// offer has a number, so that nobody claims one that has passed.
+class Claim {
  public:
-  explicit Barrier(std::size_t threads) : threads_(threads) {}
-  // Returns when all of them have come. What takes about as long as a block of samples is waited
-  // for awake, as waking up takes about as long, too; what takes longer asleep.
-  void wait() {
-    const std::uint32_t before = held_.load(std::memory_order_acquire);
-    if (here_.fetch_add(1, std::memory_order_acq_rel) + 1 == threads_) {
-      here_.store(0, std::memory_order_relaxed);
-      held_.fetch_add(1, std::memory_order_release);
-      held_.notify_all();
-      return;
+  // Whether no helper is in it. [owner] wait-free
+  bool is_free() const { return state(word_.load(std::memory_order_acquire)) != left; }
+  void offer() {  // [owner, while it is free] wait-free
+    offers_ += states;
+    word_.store(offers_ | open, std::memory_order_release);
+  }
+  // The owner does it himself; false if a helper has it. [owner] wait-free
+  bool take_back() {
+    std::uint64_t word = offers_ | open;
+    return word_.compare_exchange_strong(word, offers_ | closed, std::memory_order_acq_rel);
+  }
+  bool is_done() const {  // [owner]
+    return state(word_.load(std::memory_order_acquire)) == done;
+  }
+  // The helper is late, and keeps it until finish(); false if it is done now. [owner] wait-free
+  bool leave() {
+    std::uint64_t word = offers_ | helped;
+    return word_.compare_exchange_strong(word, offers_ | left, std::memory_order_acq_rel);
+  }
+  bool claim() {  // [helper] wait-free
+    std::uint64_t word = word_.load(std::memory_order_relaxed);
+    return state(word) == open &&
+           word_.compare_exchange_strong(word, word - open + helped, std::memory_order_acq_rel,
+                                         std::memory_order_relaxed);
+  }
+  // Done, in time or not; whoever has claimed it leaves it. [helper] wait-free
+  void finish() {
+    std::uint64_t word = word_.load(std::memory_order_relaxed);
+    while (!word_.compare_exchange_weak(word,
+                                        word - state(word) + (state(word) == left ? closed : done),
+                                        std::memory_order_acq_rel)) {
     }
-    for (int i = 0; i < looks; ++i) {
-      if (held_.load(std::memory_order_acquire) != before) {
-        return;
-      }
-    }
-    held_.wait(before, std::memory_order_acquire);
   }
 
  private:
-  static constexpr int looks = 20'000;  // some ten microseconds
-  const std::size_t threads_;
-  std::atomic<std::size_t> here_{0};
-  std::atomic<std::uint32_t> held_{0};  // so many times
+  static constexpr std::uint64_t states = 8;
+  static constexpr std::uint64_t closed = 0;
+  static constexpr std::uint64_t open = 1;
+  static constexpr std::uint64_t helped = 2;
+  static constexpr std::uint64_t done = 3;
+  static constexpr std::uint64_t left = 4;
+  static std::uint64_t state(std::uint64_t word) { return word % states; }
+
+  std::uint64_t offers_ = 0;  // the owner's
+  alignas(64) std::atomic<std::uint64_t> word_{closed};
+};
+
+// A pointer that is shown for a while. Who uses it says so, and so its owner knows when nobody does
+// any more (a hazard pointer).
+template <class T>
+class Shown {
+ public:
+  explicit Shown(std::size_t users) : users_(users) {}
+  // False where another one is shown. [its owner] wait-free
+  bool show(T* value) {
+    T* nothing = nullptr;
+    return value_.compare_exchange_strong(nothing, value);
+  }
+  void hide() { value_.store(nullptr); }  // [who has shown it] wait-free
+  // What is shown, or null; it stays what it is until leave(). [the user] wait-free
+  T* enter(std::size_t user) {
+    T* const value = value_.load(std::memory_order_relaxed);
+    if (value == nullptr) {
+      return nullptr;
+    }
+    users_[user].value.store(value);
+    if (value_.load() == value) {
+      return value;
+    }
+    leave(user);
+    return nullptr;
+  }
+  void leave(std::size_t user) { users_[user].value.store(nullptr, std::memory_order_release); }
+  // Once it is hidden. [any thread]
+  bool is_used(const T* value) const {
+    for (const User& user : users_) {
+      if (user.value.load() == value) {
+        return true;
+      }
+    }
+    return false;
+  }
+
+ private:
+  struct User {
+    alignas(64) std::atomic<T*> value{nullptr};
+  };
+  alignas(64) std::atomic<T*> value_{nullptr};
+  std::vector<User> users_;
+};
+
+// A moment of the monotonic clock, in ns, that one thread writes and others read.
+class Moment {
+ public:
+  void set(std::int64_t time_ns) { time_ns_.store(time_ns, std::memory_order_relaxed); }
+  std::int64_t get() const { return time_ns_.load(std::memory_order_relaxed); }
+
+ private:
+  std::atomic<std::int64_t> time_ns_{0};
 };
 
 // A pointer that one thread publishes and the audio thread reads; what it points to outlives both.

@@ -1,38 +1,212 @@
 #include "app/realtime/thread_pool.h"
 
+#include <pthread.h>
+
 #include <algorithm>
+#include <chrono>
 
 #include "app/realtime/denormals.h"
 
 namespace ressort {
+namespace {
 
-ThreadPool::ThreadPool(std::size_t count) : start_(count), finish_(count) {
+using std::chrono::nanoseconds;
+using std::chrono::steady_clock;
+
+constexpr std::int64_t awake_ns = 100'000;  // a helper looks for work for so long...
+constexpr std::int64_t lead_ns = 60'000;    // ...and from so long before a period on
+constexpr std::int64_t short_nap_ns = 50'000;
+constexpr std::int64_t long_nap_ns = 5'000'000;  // where nobody has needed help
+constexpr std::int64_t forgotten_ns = 100'000'000;
+
+// Reads shared memory, makes no system call.
+std::int64_t now_ns() {
+  return nanoseconds(steady_clock::now().time_since_epoch()).count();
+}
+
+void sleep_until(std::int64_t time_ns) {
+  std::this_thread::sleep_until(steady_clock::time_point(nanoseconds(time_ns)));
+}
+
+void pause() {
+#if defined(__SSE2__)
+  __builtin_ia32_pause();
+#endif
+}
+
+}  // namespace
+
+class ThreadPool::Team final : public Crew {
+ public:
+  Team(ThreadPool& pool, std::vector<Task*> tasks)
+      : pool_(pool), tasks_(std::move(tasks)), claims_(tasks_.size()), is_offered_(tasks_.size()) {}
+
+  ~Team() override {
+    while (pool_.shown_.is_used(this)) {
+      std::this_thread::sleep_for(nanoseconds(short_nap_ns));
+    }
+  }
+
+  void run(std::span<const std::uint32_t> wanted) override {
+    if (wanted.size() < 2 || pool_.threads_.empty() || !pool_.shown_.show(this)) {
+      for (const std::uint32_t i : wanted) {
+        tasks_[i]->perform();
+      }
+      return;
+    }
+    const std::int64_t start_ns = pool_.is_live() ? begin() : 0;
+    for (const std::uint32_t i : wanted) {
+      is_offered_[i] = claims_[i].is_free();
+      if (is_offered_[i]) {
+        tasks_[i]->offer();
+        claims_[i].offer();
+      }
+    }
+    perform_own(wanted, start_ns);
+    pool_.shown_.hide();
+    finish(wanted);
+  }
+
+  // Whether there was anything to do. [helper]
+  bool help() {
+    bool has_helped = false;
+    for (std::size_t i = tasks_.size(); i-- > 0;) {
+      if (claims_[i].claim()) {
+        pool_.is_live() ? tasks_[i]->perform_aside() : tasks_[i]->perform();
+        claims_[i].finish();
+        has_helped = true;
+      }
+    }
+    return has_helped;
+  }
+
+ private:
+  // The first run of a period says when the next one is to be expected.
+  std::int64_t begin() {
+    const std::int64_t start_ns = now_ns();
+    const ClockReading reading = pool_.clock_->read();
+    if (reading.frame != pool_.frame_ && reading.rate_hz > 0.0) {
+      pool_.frame_ = reading.frame;
+      const auto period_ns =
+          static_cast<std::int64_t>(1e9 * static_cast<double>(reading.period) / reading.rate_hz);
+      pool_.period_ns_.set(period_ns);
+      pool_.next_ns_.set(start_ns + period_ns);
+    }
+    return start_ns;
+  }
+
+  // From the front, where helpers come from the back.
+  void perform_own(std::span<const std::uint32_t> wanted, std::int64_t start_ns) {
+    std::int64_t longest_ns = 0;
+    for (const std::uint32_t i : wanted) {
+      if (is_offered_[i]) {
+        if (!claims_[i].take_back()) {
+          continue;
+        }
+        is_offered_[i] = false;
+      }
+      tasks_[i]->perform();
+      if (pool_.is_live()) {
+        const std::int64_t end_ns = now_ns();
+        longest_ns = std::max(longest_ns, end_ns - start_ns);
+        start_ns = end_ns;
+      }
+    }
+    longest_ns_ = longest_ns > 0 ? longest_ns : longest_ns_;
+  }
+
+  // Whoever has begun in time needs no longer than another took. All of them together are given
+  // that time twice; who has not come back by then is late.
+  void finish(std::span<const std::uint32_t> wanted) {
+    const std::int64_t patience_ns = pool_.is_live() ? now_ns() + 2 * longest_ns_ : 0;
+    for (const std::uint32_t i : wanted) {
+      if (!is_offered_[i]) {
+        continue;
+      }
+      while (!claims_[i].is_done() && !(pool_.is_live() && now_ns() > patience_ns)) {
+        pause();
+      }
+      if (!pool_.is_live()) {
+        continue;
+      }
+      if (claims_[i].leave()) {
+        pool_.taken_over_.add(1);
+        tasks_[i]->take_over();
+      } else {
+        tasks_[i]->accept();
+      }
+    }
+  }
+
+  ThreadPool& pool_;
+  const std::vector<Task*> tasks_;
+  std::vector<Claim> claims_;     // [task]
+  std::vector<bool> is_offered_;  // [task] in this run, and not taken back
+  std::int64_t longest_ns_ = 0;   // what a task of the caller's own took
+};
+
+ThreadPool::ThreadPool(std::size_t count, const Board<ClockReading>* live)
+    : clock_(live), shown_(count) {
   for (std::size_t i = 1; i < count; ++i) {
     threads_.emplace_back([this, i] { serve(i); });
   }
 }
 
 ThreadPool::~ThreadPool() {
-  work_ = nullptr;
-  start_.wait();
+  ends_.raise();
 }
 
-void ThreadPool::run(std::size_t count, const std::function<void(std::size_t)>& work) {
-  work_ = &work;
-  count_ = count;
-  start_.wait();
-  work(0);
-  finish_.wait();
+std::unique_ptr<Crew> ThreadPool::gather(std::vector<Task*> tasks) {
+  return std::make_unique<Team>(*this, std::move(tasks));
 }
 
-void ThreadPool::serve(std::size_t i) {
-  const DenormalsFlushed flushed;
-  for (start_.wait(); work_ != nullptr; start_.wait()) {
-    if (i < count_) {
-      (*work_)(i);
-    }
-    finish_.wait();
+void ThreadPool::set_priority(int priority) {
+  sched_param wanted{};
+  wanted.sched_priority = priority;
+  for (std::jthread& thread : threads_) {
+    pthread_setschedparam(thread.native_handle(), SCHED_FIFO, &wanted);
   }
+}
+
+void ThreadPool::serve(std::size_t helper) {
+  const DenormalsFlushed flushed;
+  std::int64_t awake_until_ns = 0;
+  std::int64_t nap_ns = short_nap_ns;
+  while (!ends_.is_raised()) {
+    if (Team* const team = shown_.enter(helper)) {
+      const bool has_helped = team->help();
+      shown_.leave(helper);
+      if (has_helped) {
+        awake_until_ns = now_ns() + awake_ns;
+        nap_ns = short_nap_ns;
+      }
+    }
+    pause();
+    const std::int64_t time_ns = now_ns();
+    if (time_ns < awake_until_ns) {
+      continue;
+    }
+    // Until shortly before the next period; or for longer and longer, while nobody wants help.
+    if (const std::int64_t next_ns = next_period_ns(time_ns); next_ns > 0) {
+      sleep_until(next_ns - lead_ns);
+      awake_until_ns = next_ns + awake_ns;
+    } else {
+      sleep_until(time_ns + nap_ns);
+      nap_ns = std::min(2 * nap_ns, long_nap_ns);
+    }
+  }
+}
+
+// The first that can be waited for asleep; 0 if none is expected.
+std::int64_t ThreadPool::next_period_ns(std::int64_t time_ns) const {
+  const std::int64_t period_ns = period_ns_.get();
+  const std::int64_t next_ns = next_ns_.get();
+  const std::int64_t soonest_ns = time_ns + lead_ns;
+  if (period_ns <= 0 || time_ns - next_ns > forgotten_ns) {
+    return 0;
+  }
+  return next_ns > soonest_ns ? next_ns
+                              : next_ns + ((soonest_ns - next_ns) / period_ns + 1) * period_ns;
 }
 
 std::size_t core_count() {

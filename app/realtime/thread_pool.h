@@ -1,30 +1,43 @@
-// app/realtime: threads that step the shards of large networks, where time does not matter:
-// rendering.
+// app/realtime: threads that help with what is large: the packs of many voices, the shards of a
+// network. Rendering, they are waited for. Live they never are: see
+// core/kernels/domains/executor.h.
 #pragma once
 
 #include <thread>
 #include <vector>
 
 #include "app/realtime/lockfree.h"
-#include "core/kernels/domains/sharded.h"
+#include "core/kernels/domains/executor.h"
 
 namespace ressort {
 
 class ThreadPool final : public Executor {
  public:
-  // With the thread that calls run(), so many; at least 1.
-  explicit ThreadPool(std::size_t count);
+  // With the thread that calls Crew::run(), so many; at least 1. `live`: the clock of the process
+  // whose audio thread that is; helpers sleep from one of its periods to the next, by themselves.
+  // Null: rendering.
+  explicit ThreadPool(std::size_t count, const Board<ClockReading>* live = nullptr);
   ~ThreadPool() override;
   std::size_t size() const override { return threads_.size() + 1; }
-  void run(std::size_t count, const std::function<void(std::size_t)>& work) override;  // [control]
+  bool is_live() const override { return clock_ != nullptr; }
+  std::unique_ptr<Crew> gather(std::vector<Task*> tasks) override;
+  // Real-time priority for the helpers; without the right to it they stay as they are. [control]
+  void set_priority(int priority);
+  // Tasks that were taken over from a late helper. [any thread]
+  std::uint64_t taken_over() const { return taken_over_.get(); }
 
  private:
-  void serve(std::size_t i);
+  class Team;
+  void serve(std::size_t helper);
+  std::int64_t next_period_ns(std::int64_t time_ns) const;
 
-  Barrier start_;
-  Barrier finish_;
-  const std::function<void(std::size_t)>* work_ = nullptr;  // null: the threads end
-  std::size_t count_ = 0;
+  const Board<ClockReading>* const clock_;
+  Shown<Team> shown_;
+  Moment next_ns_;           // when the next period begins to need help
+  Moment period_ns_;         // 0: not known
+  std::int64_t frame_ = -1;  // of the newest period; of whom has shown a team
+  Counter taken_over_;
+  Flag ends_;
   std::vector<std::jthread> threads_;
 };
 

@@ -382,7 +382,9 @@ Result<Compiled> compile_by_stages(const Request& request) {
     return *std::move(error);
   }
   const auto played_by = [&](int count, double gain) {
-    return make_playing(network, preset, analysis, options.bare, count, gain);
+    Playing playing = make_playing(network, preset, analysis, options.bare, count, gain);
+    playing.share = options.share;
+    return playing;
   };
   std::optional<double> factor = 1.0;
   if (options.find_gain) {
@@ -399,7 +401,7 @@ Result<Compiled> compile_by_stages(const Request& request) {
   Instrument instrument = make_instrument(network, preset, analysis, voices, gain);
   instrument.struck = find_struck(request.written, planned.machine);
   return Compiled{.engine = make_engine(std::move(planned.machine), played_by(voices, gain),
-                                        options.precision, options.isa, progress),
+                                        options.precision, options.isa, progress, options.executor),
                   .instrument = std::move(instrument),
                   .plan = {.parts = planned.parts,
                            .budget = request.budget,

@@ -25,15 +25,16 @@ inline constexpr std::size_t most_tuned_masses = 150'000;
 
 struct CompileOptions {
   double rate_hz = 44100.0;
-  bool rescale = true;  // numbers are meant at 44 100 Hz: keep pitch and decay at other rates
-  bool bare = false;    // no smoothing, no sleep: the network as it is written
-  int voices = 0;       // instead of the preset's; 0: the preset's
+  bool rescale = true;    // numbers are meant at 44 100 Hz: keep pitch and decay at other rates
+  bool bare = false;      // no smoothing, no sleep: the network as it is written
+  int voices = 0;         // instead of the preset's; 0: the preset's
+  NoteShare::Part share;  // of the notes
   Precision precision = Precision::float64;
   std::optional<Method> method;  // instead of the plan's choice, or the bare network's direct form
   std::optional<Budget> budget;  // instead of the preset's
   Isa isa = best_isa();          // no wider than the machine's
   std::uint32_t most_modes = patient_modes;  // of a part, for the plan
-  Executor* executor = nullptr;   // outlives the engine, which it steps large parts of; null: none
+  Executor* executor = nullptr;   // outlives the engine, which it helps to step; null: none
   bool find_gain = false;         // so that a forte note peaks at -6 dBFS, instead of the preset's
   bool force = false;             // no range is narrowed to what is stable
   std::vector<Setting> settings;  // values that the bare network's parameters get at once

@@ -101,8 +101,9 @@ std::optional<double> find_gain(const Machine& machine, const Playing& playing, 
 }
 
 std::unique_ptr<Engine> make_engine(Machine machine, Playing playing, Precision precision, Isa isa,
-                                    const Progress& progress) {
-  return std::make_unique<Engine>(std::move(machine), std::move(playing), precision, isa, progress);
+                                    const Progress& progress, Executor* executor) {
+  return std::make_unique<Engine>(std::move(machine), std::move(playing), precision, isa, progress,
+                                  executor);
 }
 
 }  // namespace ressort

@@ -30,6 +30,6 @@ std::optional<double> find_gain(const Machine& machine, const Playing& playing, 
 // At its gain, what is below -120 dBFS may sleep whatever else sounds. O(voices * elements) in time
 // and memory. [any thread but audio]
 std::unique_ptr<Engine> make_engine(Machine machine, Playing playing, Precision precision, Isa isa,
-                                    const Progress& progress);
+                                    const Progress& progress, Executor* executor);
 
 }  // namespace ressort

@@ -34,20 +34,21 @@ struct Engine::Player {
   using AnyBank = std::variant<Bank<float>, Bank<double>>;
 
   Player(Machine machine_in, Playing playing_in, Precision precision, Isa isa,
-         const Progress& progress)
+         const Progress& progress, Executor* executor)
       : machine(std::move(machine_in)),
         playing(completed(std::move(playing_in), machine)),
         voices(playing, machine.rate_hz, machine.channels),
-        bank(
-            precision == Precision::float32
-                ? AnyBank(std::in_place_type<Bank<float>>, machine, voices.size(), isa, progress)
-                : AnyBank(std::in_place_type<Bank<double>>, machine, voices.size(), isa, progress)),
+        bank(precision == Precision::float32 ? AnyBank(std::in_place_type<Bank<float>>, machine,
+                                                       voices.size(), isa, executor, progress)
+                                             : AnyBank(std::in_place_type<Bank<double>>, machine,
+                                                       voices.size(), isa, executor, progress)),
         parameters(machine, playing),
         gestures(machine, playing, voices, parameters),
         audio(machine, playing, std::visit([](const auto& b) { return b.mixer.is_silent; }, bank)),
         watch(machine, playing, voices.size()),
         levels(machine, playing),
-        mixing(playing) {
+        mixing(playing),
+        share(playing.share) {
     voices.start(0, 0.0);
     gestures.place(0);
     std::visit([&](auto& b) { apply_changes(b); }, bank);
@@ -114,6 +115,7 @@ struct Engine::Player {
       case EventKind::strike:
         return std::visit([&](auto& b) { strike(b, event); }, bank);
       case EventKind::panic:
+        share.begin_anew();
         return voices.panic();
     }
   }
@@ -149,6 +151,10 @@ struct Engine::Player {
       return;
     }
     const double velocity = playing.velocity(event.value) * voices.softness(channel);
+    if (!takes(channel, event.index)) {
+      gestures.perform_elsewhere(event.index, velocity, channel);
+      return;
+    }
     const Press press =
         voices.press_key(event.index, velocity, channel, parameters.highest_factor(), event.value2);
     if (press == Press::silent || press == Press::moves) {
@@ -158,6 +164,12 @@ struct Engine::Player {
       gestures.place(voices.last());
     }
     gestures.perform(Source::note, event.index, velocity, gestures.of_last());
+  }
+
+  // Of several engines that share the notes.
+  bool takes(std::uint8_t channel, std::size_t key) {
+    const bool is_next = share.takes(channel, key);
+    return playing.tuning == Tuning::fixed || voices.is_mono(channel) ? share.is_first() : is_next;
   }
 
   void lift_key(const Event& event) {
@@ -260,25 +272,28 @@ struct Engine::Player {
   template <class T>
   void play(Bank<T>& b, const Segment& segment) {
     apply_changes(b);
-    b.each_group([&](PartBank<T>& part, const VoiceGroup& group) {
+    const auto drive = [&](PartBank<T>& part, const VoiceGroup& group) {
       if (watch.has_still()) {
         stir_moved(part.program, group);
+      }
+      if (!watch.steps(group, voices)) {
+        return false;
+      }
+      gestures.fill(b, group, segment.frames, watch);
+      audio.add(b, group, segment.frames, voices, watch);
+      parameters.fill_audio(b, group, segment, voices);
+      return true;
+    };
+    const auto mix = [&](PartBank<T>& part, const VoiceGroup& group, bool has_stepped) {
+      if (watch.has_still()) {
         mixing.add_still(part.program, group, segment, voices, watch);
       }
-      if (watch.steps(group, voices)) {
-        gestures.fill(b, group, segment.frames, watch);
-        audio.add(b, group, segment.frames, voices, watch);
-        parameters.fill_audio(b, group, segment, voices);
-        part.of(group.first)
-            .step({.frames = segment.frames,
-                   .value = b.value.data(),
-                   .velocity = b.velocity.data(),
-                   .audio = b.audio.data(),
-                   .outputs = b.outputs.data()});
+      if (has_stepped) {
         levels.apply(b, group, segment.frames);
         mixing.add(b, group, segment, voices, watch);
       }
-    });
+    };
+    b.step(segment.frames, drive, mix);
     levels.advance(segment.frames);
     voices.advance_gains(segment.frames);
     since_update += segment.frames;
@@ -433,6 +448,7 @@ struct Engine::Player {
       watch.go_on_from(from.watch);
       levels.go_on_from(from.levels);
       mixing.go_on_from(from.mixing);
+      share.adopt(from.share);
       since_update = from.since_update;
     }
     return goes_on;
@@ -486,6 +502,7 @@ struct Engine::Player {
   EnergyWatch watch;
   OutputLevels levels;
   Mixing mixing;
+  NoteShare share;
   std::vector<std::vector<std::uint32_t>> watched;  // [part] nodes; may be empty
   std::span<double> slow_numbers;                   // where a slow look goes; empty: none is wanted
   double slow_hz = 0.0;
@@ -497,9 +514,9 @@ struct Engine::Player {
 // --- the engine ---------------------------------------------------------------------------------
 
 Engine::Engine(Machine machine, Playing playing, Precision precision, Isa isa,
-               const Progress& progress)
+               const Progress& progress, Executor* executor)
     : player_(std::make_unique<Player>(std::move(machine), std::move(playing), precision, isa,
-                                       progress)) {}
+                                       progress, executor)) {}
 
 Engine::~Engine() = default;
 
@@ -530,6 +547,7 @@ bool Engine::renumber_from(const Engine& from) {
 
 void Engine::adopt_channels(const Engine& from) {
   player_->voices.adopt_channels(from.player_->voices);
+  player_->share.adopt(from.player_->share);
 }
 
 bool Engine::listens_to(std::uint8_t channel) const {

@@ -12,6 +12,7 @@
 #include "core/engine/event.h"
 #include "core/engine/midi/channels.h"
 #include "core/engine/midi/key_tuning.h"
+#include "core/engine/midi/note_share.h"
 #include "core/engine/midi/velocity_curve.h"
 #include "core/kernels/isa.h"
 #include "core/kernels/program.h"
@@ -106,6 +107,7 @@ struct Playing {
   bool mono = false;            // one voice a channel plays the last of the keys that are down
   bool legato = false;          // and is not struck again while one is
   double glide_s = 0.0;         // from the pitch before, in equal steps of cents
+  NoteShare::Part share;        // of the notes, that this engine plays
   Pitches pitches;              // of the lowest mode
   PitchesAlong along;           // the same, instead, where a parameter is to leave keys in tune
   double highest_factor = 1.0;  // the stiffness factor up to which the model is proved stable
@@ -153,8 +155,9 @@ bool can_renumber(const Machine& from, const Machine& to);
 // The heap is used by the constructor and never again; it throws what a Progress does.
 class Engine {
  public:
+  // The executor helps with the voices, and outlives the engine; null: one thread plays them all.
   Engine(Machine machine, Playing playing, Precision precision, Isa isa = best_isa(),
-         const Progress& progress = {});
+         const Progress& progress = {}, Executor* executor = nullptr);
   ~Engine();
   Engine(const Engine&) = delete;
   Engine& operator=(const Engine&) = delete;

@@ -160,6 +160,28 @@ void Gestures::perform(Source source, int number, double amount, const Scope& sc
   }
 }
 
+// Where the next hand starts is as if the voice were a new one here.
+void Gestures::perform_elsewhere(int key, double amount, std::uint8_t channel) {
+  const Scope scope{.channels = channel_bit(channel)};
+  for (const Control& control : playing_.controls) {
+    if (!is_asked(control, Source::note, key)) {
+      continue;
+    }
+    const GestureRow& gesture = row_of(control.gesture);
+    if (control.gesture == Gesture::parameter || gesture.goal != nullptr) {
+      perform(control, amount, scope);
+      continue;
+    }
+    Stroke stroke = on_input(control.target, stroke_of(control, amount));
+    InputDriver elsewhere;
+    elsewhere.place(starts_[channel * machine_.inputs.size() + control.target]);
+    gesture.play(elsewhere, stroke);
+    if (stroke.rest) {
+      set_starts(scope.channels, control.target, *stroke.rest);
+    }
+  }
+}
+
 void Gestures::perform_live(const Event& event) {
   const GestureRow& gesture = row_of(event.gesture);
   const auto play_it = [&](std::size_t input, Stroke stroke) {

@@ -36,6 +36,8 @@ class Gestures {
   // turned for everybody. O(controls * voices)
   void perform(Source source, int number, double amount, const Scope& scope = {});
   void perform(const Control& control, double amount, const Scope& scope = {});
+  // What a note does that another engine plays (NoteShare): to all voices, and to the next.
+  void perform_elsewhere(int key, double amount, std::uint8_t channel);
   Scope of_last() const { return {.channels = channel_bit(voices_[voices_.last()].channel)}; }
   // Of EventKind::gesture.
   void perform_live(const Event& event);

@@ -155,6 +155,7 @@ class Voices {
   void bend(std::uint8_t channel, double amount);
   void reset_controllers(std::uint8_t channel);
   void set_mono(std::uint8_t channel, bool is_mono) { channels_.set_mono(channel, is_mono); }
+  bool is_mono(std::uint8_t channel) const { return channels_.is_mono(channel, playing_.mono); }
   ChannelMask rezoned() const { return channels_.rezoned(); }
   void forget_keys(ChannelMask channels);  // as if none were down
   // Of EventKind::key_tuning and tuning_reset.

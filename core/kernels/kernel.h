@@ -132,6 +132,9 @@ class Kernel {
   // Makes one mass faster by `change`, per sample, as a force on it in the next sample would.
   // False where the node is no mass that is stepped: ground, a hand, a place. [audio]
   virtual bool strike(std::size_t lane, std::uint32_t node, double change) = 0;
+  // Becomes what `from` is, another kernel of the same Program, made for as many voices: the same
+  // next samples, to the bit. False where a kernel cannot. [audio]
+  virtual bool become(const Kernel&) { return false; }
   // Plays the block by the published scheme, v += F/M, x += v: masses, then position inputs, then
   // links; the outputs are the new positions. Forces given act in their own sample. [audio]
   void step(const Block<T>& block) {

@@ -78,6 +78,15 @@ void Nodes<T>::set(std::size_t lane, const double* x, const double* v) {
   passive.awake[lane] = T(0);
 }
 
+template <class T>
+void Nodes<T>::become(const Nodes& from) {
+  numbers = from.numbers;
+  corners = from.corners;
+  passive.memory = from.passive.memory;
+  passive.awake = from.passive.awake;
+  passive.felt = from.passive.felt;
+}
+
 template <class T, class Number>
 void NodeKernel<T, Number>::reset_lanes() {
   for (std::size_t lane = 0; lane < this->width(); ++lane) {

@@ -43,6 +43,8 @@ struct Nodes {
   void put(std::size_t node, std::size_t lane, double x, double v);
   // A lane's nodes, with 0 in all other rows.
   void set(std::size_t lane, const double* x, const double* v);
+  // All that changes, of others in the same layout.
+  void become(const Nodes& from);
 
   NodeLayout layout;
   Aligned<T> numbers;
@@ -76,6 +78,13 @@ class NodeKernel : public Kernel<T> {
         nodes_(program, std::move(layout)) {}
   // All lanes to where the model starts: the last thing that a constructor does.
   void reset_lanes();
+  // What become() does of coefficients and nodes; the rest is the kernel's own.
+  const NodeKernel& become_nodes(const Kernel<T>& from) {
+    const auto& other = static_cast<const NodeKernel&>(from);
+    this->coefficients = other.coefficients;
+    nodes_.become(other.nodes_);
+    return other;
+  }
   // What write_nodes() does where a kernel has it, but for the forces that links exert then.
   void write(std::span<const std::uint32_t> nodes, const T* x, const T* v);
 

@@ -13,7 +13,7 @@ target_compile_definitions(ressort_server_tests PRIVATE
 add_dependencies(ressort_server_tests ressort rtspy)
 
 # A sanitizer brings its own malloc, which the spy cannot stand in for.
-set(server_tags jack_midi osc_time flood rtmidi alsa server_loss nsm)
+set(server_tags jack_midi shared_notes osc_time flood rtmidi alsa server_loss nsm)
 if(NOT RESSORT_ADDRESS_SANITIZER AND NOT RESSORT_THREAD_SANITIZER)
   list(APPEND server_tags callback)
 endif()

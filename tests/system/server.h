@@ -199,7 +199,10 @@ class Listener {
   // Before start(): sorted by frame.
   void plan(std::vector<Message> messages) { messages_ = std::move(messages); }
 
-  void start(const std::string& from, const std::string& midi_to) {
+  // `connect` is called before it rolls.
+  void start(
+      const std::string& from, const std::string& midi_to,
+      const std::function<void()>& connect = [] {}) {
     REQUIRE(jack_activate(client_) == 0);
     if (!from.empty()) {
       REQUIRE(eventually([&] {
@@ -213,6 +216,7 @@ class Listener {
         return jack_port_connected(midi_) > 0;
       }));
     }
+    connect();
     is_rolling_ = true;
   }
 
@@ -290,6 +294,7 @@ class Neighbour {
       return is_connected(from, to);
     });
   }
+  jack_client_t* client() { return client_; }
   void disconnect(const std::string& from, const std::string& to) {
     REQUIRE(jack_disconnect(client_, from.c_str(), to.c_str()) == 0);
   }

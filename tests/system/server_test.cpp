@@ -349,6 +349,99 @@ TEST_CASE("The callback allocates, locks, reads, writes and waits never", "[call
   }
 }
 
+TEST_CASE("Helpers cost the callback no call", "[callback]") {
+  const std::string report = "/tmp/ressort_spy_helpers_" + std::to_string(getpid());
+  const Server server(256);
+  {
+    Child play(program({"play", "LargeTriangleMesh", "-a", "jack", "-i", "-u", osc_port, "-p", "8",
+                        "--threads", "2"}),
+               {{"LD_PRELOAD", RESSORT_SPY}, {"RTSPY_OUT", report}});
+    REQUIRE(answers());
+    Listener listener(48000 * 6);
+    std::vector<Listener::Message> messages;
+    for (unsigned n = 0; n < 40; ++n) {
+      const auto key = static_cast<unsigned char>(40 + n * 5 % 37);
+      messages.push_back({4800 + 6000 * n, {0x90, key, 100}});
+      messages.push_back({4800 + 6000 * n + 3000, {0xb0, 16, static_cast<unsigned char>(n)}});
+    }
+    listener.plan(messages);
+    listener.start("ressort:out_left", "ressort:midi_in");
+    REQUIRE(listener.wait_for(48000 * 6));
+    play.signal(SIGTERM);
+    CHECK(play.exit_code() == 0);
+  }
+  std::ifstream file(report);
+  std::string name;
+  std::map<std::string, unsigned long> found;
+  for (unsigned long n = 0; file >> name >> n;) {
+    found[name] = n;
+  }
+  std::remove(report.c_str());
+  CHECK(found["callbacks"] > 500);
+  for (const char* kind :
+       {"allocations", "releases", "locks", "reads", "writes", "waits", "others"}) {
+    INFO(kind);
+    CHECK(found[kind] == 0);
+  }
+}
+
+TEST_CASE("Two programs that share the notes sound as one", "[shared_notes]") {
+  const auto heard = [](const std::vector<std::vector<std::string>>& shares) {
+    const Server server(1024);
+    std::vector<std::unique_ptr<Child>> programs;
+    for (const auto& share : shares) {
+      auto words = program({"play", "PolyTriangle", "-a", "jack", "-i", "-u", "off", "-p", "24",
+                            "-g", "-20", "-n", share[0]});
+      words.insert(words.end(), share.begin() + 1, share.end());
+      programs.push_back(std::make_unique<Child>(words));
+    }
+    constexpr std::size_t frames = 48000 * 6;
+    auto listener = std::make_unique<Listener>(frames);
+    std::vector<Listener::Message> messages;
+    for (unsigned n = 0; n < 40; ++n) {
+      const auto key = static_cast<unsigned char>(45 + n * 7 % 24);
+      const std::size_t at = 9600 + 6000 * n;
+      messages.push_back({at, {0x90, key, static_cast<unsigned char>(40 + n)}});
+      messages.push_back({at + 2000, {0xe0, 0, static_cast<unsigned char>(60 + n % 9)}});
+      messages.push_back({at + 9000, {0x80, key, 64}});
+    }
+    std::sort(messages.begin(), messages.end(),
+              [](const auto& a, const auto& b) { return a.frame < b.frame; });
+    listener->plan(messages);
+    Neighbour hands;  // connects what the listener does not
+    for (const auto& share : shares) {
+      REQUIRE(eventually([&] { return hands.connect(share[0] + ":out_right", "neighbour:left"); }));
+    }
+    listener->start(shares[0][0] + ":out_left", shares[0][0] + ":midi_in", [&] {
+      for (std::size_t i = 1; i < shares.size(); ++i) {
+        REQUIRE(hands.connect(shares[i][0] + ":out_left", "listener:in"));
+        REQUIRE(hands.connect("listener:out", shares[i][0] + ":midi_in"));
+      }
+      // Whoever is late is waited for.
+      REQUIRE(jack_set_freewheel(hands.client(), 1) == 0);
+    });
+    REQUIRE(listener->wait_for(frames));
+    std::vector<float> sound;
+    for (std::size_t n = 0; n < frames; ++n) {
+      sound.push_back(listener->heard(n));
+    }
+    return sound;
+  };
+  const std::vector<float> whole = heard({{"whole"}});
+  const std::vector<float> both = heard({{"one", "--share", "1/2"}, {"two", "--share", "2/2"}});
+  float peak = 0.0f;
+  float apart = 0.0f;
+  for (std::size_t n = 0; n < whole.size(); ++n) {
+    peak = std::max(peak, std::fabs(whole[n]));
+    apart = std::max(apart, std::fabs(whole[n] - both[n]));
+  }
+  CAPTURE(peak, apart);
+  CHECK(peak > 1e-3f);
+  CHECK(peak < 0.5f);                     // no limiter between them
+  CHECK(apart < 4.0f * 0x1p-24f * peak);  // JACK's samples are floats, rounded one by one
+  std::printf("two programs are %.1e of the peak from one\n", static_cast<double>(apart / peak));
+}
+
 TEST_CASE("RtMidi's messages are heard, through its JACK side", "[rtmidi]") {
   const Server server(256);
   Child play(program({"play", click(), "-a", "dummy", "-m", "jack", "-u", osc_port}));

@@ -20,6 +20,7 @@
 #include "app/control/nsm/nsm_client.h"
 #include "app/control/terminal.h"
 #include "app/devices/midi_input.h"
+#include "app/realtime/thread_pool.h"
 #include "app/say.h"
 #include "app/session/load_news.h"
 #include "app/text.h"
@@ -85,6 +86,14 @@ class Player {
       return exit_code::wrong_use;
     }
     options_.device.outputs = std::max(2, output_count(scene->network));
+    if (options_.threads > 1) {
+      const auto threads = static_cast<std::size_t>(options_.threads);
+      if (threads > core_count()) {
+        voice_.say("--threads " + std::to_string(threads) + ": this machine runs " +
+                   std::to_string(core_count()) + " at once, and so many are used");
+      }
+      helpers_ = std::make_unique<ThreadPool>(std::min(threads, core_count()), &process_.clock);
+    }
     if (const int failure = open_device(); failure != exit_code::done) {
       return failure;
     }
@@ -93,9 +102,11 @@ class Player {
                                   SessionOptions{.compile = {.rate_hz = device_.rate_hz,
                                                              .rescale = options_.rescale,
                                                              .voices = options_.voices,
+                                                             .share = options_.share,
                                                              .precision = options_.precision,
                                                              .method = options_.method,
-                                                             .budget = options_.budget},
+                                                             .budget = options_.budget,
+                                                             .executor = helpers_.get()},
                                                  .gain = std::pow(10.0, options_.gain_db / 20.0),
                                                  .third = options_.third,
                                                  .keys = options_.keys,
@@ -164,7 +175,15 @@ class Player {
     }
     device_ = *std::move(device);
     device_kind_ = device_.kind;
+    raise_helpers();
     return exit_code::done;
+  }
+
+  // Below the audio thread, which takes over what they have not done in time.
+  void raise_helpers() {
+    if (helpers_ && device_.priority > 1) {
+      helpers_->set_priority(device_.priority - 1);
+    }
   }
 
   // The same kind once more; false where that is not there.
@@ -177,6 +196,7 @@ class Player {
       const std::lock_guard lock(device_mutex_);
       device_ = *std::move(device);
       device_.set_audio_inputs(audio_inputs_);
+      raise_helpers();
     }
     session_->set_backend(device_.description, true);
     session_->set_rate(device_.rate_hz);
@@ -537,6 +557,7 @@ class Player {
   std::optional<LastResort> last_resort_;  // from then on; it goes last
   MotionFeed motion_{process_};
   std::unique_ptr<const SampleTape> tape_;  // outlives the process that plays it
+  std::unique_ptr<ThreadPool> helpers_;     // outlives the engines; null: the audio thread is alone
   Process process_{48000.0, true, monotonic_ns};
   Announcer voice_;
   Flag quit_;

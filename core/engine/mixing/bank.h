@@ -9,7 +9,8 @@
 #include <vector>
 
 #include "core/engine/mixing/mix.h"
-#include "core/kernels/kernel.h"
+#include "core/kernels/domains/kernel_task.h"
+#include "core/kernels/registry.h"
 #include "core/progress.h"
 
 namespace ressort {
@@ -37,9 +38,19 @@ struct PartBank {
   Aligned<T> last;                                  // [kernel][output][lane] the last sample's
 };
 
+// The kernels of a part that several threads step. Each has buffers of its own.
 template <class T>
-struct Bank {
-  Bank(const Machine& machine, std::size_t voices_in, Isa isa, const Progress& progress)
+struct SharedPart {
+  std::vector<std::unique_ptr<KernelTask<T>>> tasks;  // [kernel]
+  std::vector<std::uint32_t> wanted;                  // kernels that step in this block
+  double kernel_ns = 0.0;                             // a sample of one of them
+  std::unique_ptr<Crew> crew;                         // the last: it ends first; null: one thread
+};
+
+template <class T>
+struct Bank : BlockBuffers<T> {
+  Bank(const Machine& machine, std::size_t voices_in, Isa isa, Executor* executor,
+       const Progress& progress)
       : voices(voices_in),
         mixer(with_isa(isa, []<Isa level>() { return make_mixer<level, T>(); })) {
     std::size_t inputs = 0;
@@ -57,10 +68,10 @@ struct Bank {
       outputs_of_one = std::max(outputs_of_one, program.outputs.size());
       nodes = std::max(nodes, program.position.size());
     }
-    value.resize(max_block_frames * inputs);
-    velocity.resize(value.size());
-    audio.resize(max_block_frames * audio_coefficients);
-    outputs.resize(max_block_frames * channels);
+    this->value.resize(max_block_frames * inputs);
+    this->velocity.resize(this->value.size());
+    this->audio.resize(max_block_frames * audio_coefficients);
+    this->outputs.resize(max_block_frames * channels);
     row.resize(inputs);
     filled.resize(inputs);
     peak.resize(lanes);
@@ -68,25 +79,52 @@ struct Bank {
     heard.resize(outputs_of_one);
     x.resize(nodes);
     v.resize(nodes);
+    for (std::size_t p = 0; p < parts.size(); ++p) {
+      shared.push_back(executor != nullptr ? share(p, isa, *executor) : SharedPart<T>());
+    }
   }
 
   // Calls `use(part, group)` for every kernel.
   template <class Use>
   void each_group(Use&& use) {
     for (std::size_t p = 0; p < parts.size(); ++p) {
-      for (std::size_t first = 0; first < voices; first += parts[p].width) {
-        use(parts[p], VoiceGroup{p, first, std::min(voices, first + parts[p].width)});
+      for (std::size_t kernel = 0; kernel < parts[p].kernels.size(); ++kernel) {
+        use(parts[p], group_of(p, kernel));
       }
     }
   }
 
+  // Calls drive(part, group) for every kernel, steps those for which it says so, and calls
+  // mix(part, group, whether it has stepped): one after the other, or where a part takes long all
+  // of it at once. Voices do not hear each other, so that this comes to the same bits.
+  template <class Drive, class Mix>
+  void step(std::size_t frames, Drive&& drive, Mix&& mix) {
+    for (std::size_t p = 0; p < parts.size(); ++p) {
+      if (shared[p].crew && shared[p].kernel_ns * static_cast<double>(frames) > least_shared_ns) {
+        step_together(p, frames, drive, mix);
+        continue;
+      }
+      for (std::size_t kernel = 0; kernel < parts[p].kernels.size(); ++kernel) {
+        const VoiceGroup group = group_of(p, kernel);
+        const bool steps = drive(parts[p], group);
+        if (steps) {
+          parts[p].kernels[kernel]->step({.frames = frames,
+                                          .value = this->value.data(),
+                                          .velocity = this->velocity.data(),
+                                          .audio = this->audio.data(),
+                                          .outputs = this->outputs.data()});
+        }
+        mix(parts[p], group, steps);
+      }
+    }
+  }
+
+  static constexpr double least_shared_ns = 5000.0;  // of a kernel in a block
+
   std::size_t voices;
   std::vector<PartBank<T>> parts;
-  // As Block says; each part in turn.
-  Aligned<T> value;
-  Aligned<T> velocity;
-  Aligned<T> audio;
-  Aligned<T> outputs;
+  std::vector<SharedPart<T>> shared;  // [part]
+  // The buffers are as Block says; each part in turn, or each kernel that brings its own.
 
   // Drivers that rest give every frame the same row, [input][lane], and no velocity. Of what the
   // buffers hold, `filled` is in so many frames of `filled_part`, and so many velocities are 0.
@@ -102,6 +140,74 @@ struct Bank {
   std::vector<double> x;  // [node] of a voice that is looked at, or taken over
   std::vector<double> v;
   std::vector<double*> heard;  // [output] where it is to be added
+
+ private:
+  VoiceGroup group_of(std::size_t p, std::size_t kernel) const {
+    const std::size_t first = kernel * parts[p].width;
+    return {p, first, std::min(voices, first + parts[p].width)};
+  }
+
+  SharedPart<T> share(std::size_t p, Isa isa, Executor& executor) {
+    PartBank<T>& part = parts[p];
+    SharedPart<T> together;
+    if (part.kernels.size() < 2 || std::holds_alternative<Shards>(part.program.form)) {
+      return together;
+    }
+    typename KernelTask<T>::Make make;
+    if (executor.is_live()) {
+      make = [&] { return make_kernel<T>(part.program, voices, isa); };
+    }
+    std::vector<Task*> tasks;
+    for (std::unique_ptr<Kernel<T>>& kernel : part.kernels) {
+      together.tasks.push_back(std::make_unique<KernelTask<T>>(
+          kernel, static_cast<const BlockBuffers<T>&>(*this), HaloBuffers<T>(), make));
+      tasks.push_back(together.tasks.back().get());
+      if (executor.is_live() && !together.tasks.back()->can_copy()) {
+        return {};
+      }
+    }
+    together.kernel_ns = predicted_ns(part.program, {.is_double = std::is_same_v<T, double>,
+                                                     .isa = isa,
+                                                     .voices = static_cast<int>(part.width)});
+    together.wanted.reserve(tasks.size());
+    together.crew = executor.gather(std::move(tasks));
+    return together;
+  }
+
+  template <class Drive, class Mix>
+  void step_together(std::size_t p, std::size_t frames, Drive&& drive, Mix&& mix) {
+    SharedPart<T>& together = shared[p];
+    const auto with_buffers_of = [&](KernelTask<T>& task, auto&& use) {
+      std::swap(static_cast<BlockBuffers<T>&>(*this), task.buffers);
+      use();
+      std::swap(static_cast<BlockBuffers<T>&>(*this), task.buffers);
+    };
+    together.wanted.clear();
+    for (std::uint32_t kernel = 0; kernel < together.tasks.size(); ++kernel) {
+      KernelTask<T>& task = *together.tasks[kernel];
+      forget_filled();
+      with_buffers_of(task, [&] {
+        if (drive(parts[p], group_of(p, kernel))) {
+          task.frames = frames;
+          together.wanted.push_back(kernel);
+        }
+      });
+    }
+    forget_filled();
+    together.crew->run(together.wanted);
+    auto next = together.wanted.begin();
+    for (std::uint32_t kernel = 0; kernel < together.tasks.size(); ++kernel) {
+      const bool has_stepped = next != together.wanted.end() && *next == kernel;
+      next += has_stepped ? 1 : 0;
+      with_buffers_of(*together.tasks[kernel],
+                      [&] { mix(parts[p], group_of(p, kernel), has_stepped); });
+    }
+  }
+
+  void forget_filled() {
+    filled_part = nullptr;
+    still = 0;
+  }
 };
 
 }  // namespace ressort

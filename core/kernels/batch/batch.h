@@ -78,6 +78,10 @@ template <class T>
 class BatchKernel final : public NodeKernel<T> {
  public:
   BatchKernel(const Program& program, const Batch& batch, std::size_t voices, Isa isa);
+  bool become(const Kernel<T>& from) override {
+    this->become_nodes(from);
+    return true;
+  }
 
  private:
   // Of packs of so many lanes.

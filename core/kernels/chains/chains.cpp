@@ -322,6 +322,15 @@ bool ChainsKernel<T>::write_nodes(std::span<const std::uint32_t> nodes, const T*
 }
 
 template <class T>
+bool ChainsKernel<T>::become(const Kernel<T>& from) {
+  const auto& other = static_cast<const ChainsKernel&>(this->become_nodes(from));
+  held_ = other.held_;
+  force_ = other.force_;
+  tap_pull_ = other.tap_pull_;
+  return true;
+}
+
+template <class T>
 ChainsState<T> ChainsKernel<T>::state() {
   return {.ramps = ramps_of(this->coefficients),
           .masks = masks_.data(),

@@ -151,6 +151,7 @@ class ChainsKernel final : public NodeKernel<T> {
  public:
   ChainsKernel(const Program& program, const Chains& form, std::size_t voices, Isa isa);
   bool write_nodes(std::span<const std::uint32_t> nodes, const T* x, const T* v) override;
+  bool become(const Kernel<T>& from) override;
 
  private:
   // Of packs of so many lanes.

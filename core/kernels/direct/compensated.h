@@ -12,6 +12,10 @@ template <class T>
 class CompensatedKernel final : public NodeKernel<T, float> {
  public:
   CompensatedKernel(const Program& program, const Compensated& form, std::size_t voices, Isa isa);
+  bool become(const Kernel<T>& from) override {
+    this->become_nodes(from);
+    return true;
+  }
 
  private:
   void play(const Block<T>& block) override;

@@ -87,6 +87,10 @@ class DirectKernel final : public NodeKernel<T> {
   DirectKernel(const Program& program, const Direct& form, std::size_t voices, Isa isa);
   DirectKernel(const Program& program, const Fourth& form, std::size_t voices, Isa isa);
   bool write_nodes(std::span<const std::uint32_t> nodes, const T* x, const T* v) override;
+  bool become(const Kernel<T>& from) override {
+    this->become_nodes(from);
+    return rails_.is_empty();
+  }
   // Of what masses and waves hold: the books of energy of a test.
   const Rails<T>& rails() const { return rails_; }
 

@@ -14,11 +14,20 @@ void copy_row(const T* from, std::size_t from_row, T* to, std::size_t to_row, st
 template <class T>
 std::vector<std::unique_ptr<Kernel<T>>> kernels_of(const Shards& form, std::size_t voices,
                                                    Isa isa) {
+  const Fellows* const fellows = form.executor->fellows();
   std::vector<std::unique_ptr<Kernel<T>>> kernels;
   for (const Shard& shard : *form.shards) {
-    kernels.push_back(make_kernel<T>(shard.program, voices, isa));
+    const bool is_here = fellows == nullptr || fellows->own() == kernels.size();
+    kernels.push_back(is_here ? make_kernel<T>(shard.program, voices, isa) : nullptr);
   }
   return kernels;
+}
+
+// One at least is here, and all are alike.
+template <class T>
+Kernel<T>& first_of(const std::vector<std::unique_ptr<Kernel<T>>>& kernels) {
+  return **std::find_if(kernels.begin(), kernels.end(),
+                        [](const auto& kernel) { return kernel != nullptr; });
 }
 
 }  // namespace
@@ -26,53 +35,89 @@ std::vector<std::unique_ptr<Kernel<T>>> kernels_of(const Shards& form, std::size
 template <class T>
 ShardedKernel<T>::ShardedKernel(const Program& program, const Shards& form, std::size_t voices,
                                 Isa isa)
-    : ShardedKernel(program, form, kernels_of<T>(form, voices, isa)) {}
+    : ShardedKernel(program, form, kernels_of<T>(form, voices, isa), voices, isa) {}
 
 template <class T>
-ShardedKernel<T>::ShardedKernel(const Program& program, const Shards& form, Kernels kernels)
-    : Kernel<T>(program, kernels[0]->width()),
+ShardedKernel<T>::ShardedKernel(const Program& program, const Shards& form, Kernels kernels,
+                                std::size_t voices, Isa isa)
+    : Kernel<T>(program, first_of(kernels).width()),
       program_(program),
       shards_(*form.shards),
-      executor_(*form.executor),
       frames_(form.frames),
+      fellows_(form.executor->fellows()),
+      takers_(shards_.size()),
       kernels_(std::move(kernels)) {
   const std::size_t width = this->width();
-  for (const Shard& shard : shards_) {
-    Buffers& buffers = buffers_.emplace_back();
+  std::vector<Task*> tasks;
+  std::size_t most_nodes = 0;
+  for (std::size_t i = 0; i < shards_.size(); ++i) {
+    const Shard& shard = shards_[i];
+    BlockBuffers<T> buffers;
     buffers.value.resize(frames_ * shard.inputs.size() * width);
     buffers.velocity.resize(buffers.value.size());
+    buffers.audio.resize(frames_ * program.audio_coefficients.size() * width);
     buffers.outputs.resize(frames_ * shard.outputs.size() * width);
-    buffers.given_x.resize(shard.given.size() * width);
-    buffers.given_v.resize(buffers.given_x.size());
-    buffers.copied_x.resize(shard.copies.size() * width);
-    buffers.copied_v.resize(buffers.copied_x.size());
-    buffers.x.resize(shard.nodes.size());
-    buffers.v.resize(shard.nodes.size());
+    HaloBuffers<T> halo;
+    halo.copies = shard.copies;
+    halo.given = shard.given;
+    halo.given_x.resize(shard.given.size() * width);
+    halo.given_v.resize(halo.given_x.size());
+    halo.copied_x.resize(shard.copies.size() * width);
+    halo.copied_v.resize(halo.copied_x.size());
+    halo.coefficients.emplace_back(program, width);
+    typename KernelTask<T>::Make make;
+    if (form.executor->is_live()) {
+      make = [&] { return make_kernel<T>(shard.program, voices, isa); };
+    }
+    tasks_.push_back(
+        std::make_unique<KernelTask<T>>(kernels_[i], std::move(buffers), std::move(halo), make));
+    if (is_here(i)) {
+      all_.push_back(static_cast<std::uint32_t>(tasks.size()));
+      tasks.push_back(tasks_.back().get());
+    }
+    for (const ShardSource& source : shard.sources) {
+      if (takers_[source.shard].empty() || takers_[source.shard].back() != i) {
+        takers_[source.shard].push_back(i);
+      }
+    }
+    most_nodes = std::max(most_nodes, shard.nodes.size());
   }
+  parcels_.reserve(3 * shards_.size());
+  x_.resize(most_nodes);
+  v_.resize(most_nodes);
+  crew_ = form.executor->gather(std::move(tasks));
 }
 
 template <class T>
 void ShardedKernel<T>::set_state(std::size_t lane, const double* x, const double* v) {
+  write_copies();
   for (std::size_t i = 0; i < shards_.size(); ++i) {
-    Buffers& buffers = buffers_[i];
-    for (std::size_t node = 0; node < buffers.x.size(); ++node) {
-      buffers.x[node] = x[shards_[i].nodes[node]];
-      buffers.v[node] = v[shards_[i].nodes[node]];
+    if (!is_here(i)) {
+      continue;
     }
-    kernels_[i]->set_state(lane, buffers.x.data(), buffers.v.data());
+    const std::vector<std::uint32_t>& nodes = shards_[i].nodes;
+    for (std::size_t node = 0; node < nodes.size(); ++node) {
+      x_[node] = x[nodes[node]];
+      v_[node] = v[nodes[node]];
+    }
+    kernels_[i]->set_state(lane, x_.data(), v_.data());
   }
 }
 
 template <class T>
 bool ShardedKernel<T>::save(std::size_t lane, double* x, double* v) const {
+  write_copies();
   for (std::size_t i = 0; i < shards_.size(); ++i) {
-    Buffers& buffers = buffers_[i];
-    if (!kernels_[i]->save(lane, buffers.x.data(), buffers.v.data())) {
+    if (!is_here(i)) {
       return false;
     }
-    for (std::size_t node = 0; node < buffers.x.size(); ++node) {
-      x[shards_[i].nodes[node]] = buffers.x[node];
-      v[shards_[i].nodes[node]] = buffers.v[node];
+    const std::vector<std::uint32_t>& nodes = shards_[i].nodes;
+    if (!kernels_[i]->save(lane, x_.data(), v_.data())) {
+      return false;
+    }
+    for (std::size_t node = 0; node < nodes.size(); ++node) {
+      x[nodes[node]] = x_[node];
+      v[nodes[node]] = v_[node];
     }
   }
   return true;
@@ -94,20 +139,24 @@ bool ShardedKernel<T>::strike(std::size_t lane, std::uint32_t node, double chang
 
 template <class T>
 bool ShardedKernel<T>::is_near_start(std::size_t lane, double bound) const {
-  return std::all_of(kernels_.begin(), kernels_.end(),
-                     [&](const auto& kernel) { return kernel->is_near_start(lane, bound); });
+  write_copies();
+  const bool is_near = std::all_of(kernels_.begin(), kernels_.end(), [&](const auto& kernel) {
+    return kernel == nullptr || kernel->is_near_start(lane, bound);
+  });
+  return fellows_ != nullptr ? fellows_->all_agree(is_near) : is_near;
 }
 
 // A copy is as good as the node itself; nodes that no shard has are at 0.
 template <class T>
 std::size_t ShardedKernel<T>::look(std::size_t lane, std::span<const std::uint32_t> nodes,
                                    std::span<double> numbers) const {
+  write_copies();
   return look_at(nodes, numbers, [&](std::uint32_t node) {
     double position = 0.0;
     for (std::size_t i = 0; i < shards_.size(); ++i) {
       const std::vector<std::uint32_t>& own = shards_[i].nodes;
       const auto at = std::lower_bound(own.begin(), own.end(), node);
-      if (at != own.end() && *at == node) {
+      if (is_here(i) && at != own.end() && *at == node) {
         const auto local = static_cast<std::uint32_t>(at - own.begin());
         kernels_[i]->look(lane, {&local, 1}, {&position, 1});
         break;
@@ -121,61 +170,116 @@ template <class T>
 void ShardedKernel<T>::play(const Block<T>& block) {
   for (std::size_t at = 0; at < block.frames; at += frames_) {
     const std::size_t frames = std::min(frames_, block.frames - at);
-    const auto step = [&](std::size_t i) { step_shard(i, block, at, frames); };
-    executor_.run(shards_.size(), std::ref(step));
-    const auto write = [&](std::size_t i) { write_copies(i); };
-    executor_.run(shards_.size(), std::ref(write));
+    for (std::size_t i = 0; i < shards_.size(); ++i) {
+      if (is_here(i)) {
+        give_inputs(i, block, at, frames);
+      }
+    }
+    crew_->run(all_);
+    owes_copies_ = true;
+    if (fellows_ != nullptr) {
+      pass_on(block, at, frames);
+      continue;
+    }
+    for (std::size_t i = 0; i < shards_.size(); ++i) {
+      take_outputs(i, block, at, frames);
+    }
   }
-  this->coefficients = kernels_[0]->coefficients;
+  this->coefficients = first_of(kernels_).coefficients;
+}
+
+// What others copy is on its way while what is heard of this shard is put in its place.
+template <class T>
+void ShardedKernel<T>::pass_on(const Block<T>& block, std::size_t at, std::size_t frames) {
+  parcels_.clear();
+  for (std::size_t i = 0; i < shards_.size(); ++i) {
+    HaloBuffers<T>& halo = tasks_[i]->halo;
+    const auto add = [&](Aligned<T>& numbers, std::size_t count,
+                         std::span<const std::size_t> takers) {
+      if (count > 0) {
+        parcels_.push_back({i, numbers.data(), count * sizeof(T), takers});
+      }
+    };
+    add(halo.given_x, takers_[i].empty() ? 0 : halo.given_x.size(), takers_[i]);
+    add(halo.given_v, takers_[i].empty() ? 0 : halo.given_v.size(), takers_[i]);
+    add(tasks_[i]->buffers.outputs, frames * shards_[i].outputs.size() * this->width(), {});
+  }
+  fellows_->begin(parcels_);
+  fellows_->finish();
+  for (std::size_t i = 0; i < shards_.size(); ++i) {
+    take_outputs(i, block, at, frames);
+  }
 }
 
 template <class T>
-void ShardedKernel<T>::step_shard(std::size_t i, const Block<T>& block, std::size_t at,
-                                  std::size_t frames) {
+void ShardedKernel<T>::give_inputs(std::size_t i, const Block<T>& block, std::size_t at,
+                                   std::size_t frames) {
   const Shard& shard = shards_[i];
-  Kernel<T>& kernel = *kernels_[i];
-  Buffers& buffers = buffers_[i];
+  KernelTask<T>& task = *tasks_[i];
   const std::size_t width = this->width();
+  task.frames = frames;
+  task.halo.has_coefficients = at == 0;
   if (at == 0) {
-    kernel.coefficients = this->coefficients;
+    task.halo.coefficients[0] = this->coefficients;
+  }
+  task.halo.has_copies = owes_copies_;
+  if (owes_copies_) {
+    gather_copies(i);
   }
   std::size_t row = 0;
   for (std::size_t frame = at; frame < at + frames; ++frame) {
     for (const std::uint32_t input : shard.inputs) {
       const std::size_t from = frame * program_.inputs.size() + input;
-      copy_row(block.value, from, buffers.value.data(), row, width);
-      copy_row(block.velocity, from, buffers.velocity.data(), row++, width);
+      copy_row(block.value, from, task.buffers.value.data(), row, width);
+      copy_row(block.velocity, from, task.buffers.velocity.data(), row++, width);
     }
   }
-  const std::size_t audio = at * program_.audio_coefficients.size() * width;
-  kernel.step({.frames = frames,
-               .value = buffers.value.data(),
-               .velocity = buffers.velocity.data(),
-               .audio = block.audio == nullptr ? nullptr : block.audio + audio,
-               .outputs = buffers.outputs.data()});
-  row = 0;
-  for (std::size_t frame = at; frame < at + frames; ++frame) {
-    for (const std::uint32_t output : shard.outputs) {
-      copy_row(buffers.outputs.data(), row++, block.outputs,
-               frame * program_.outputs.size() + output, width);
-    }
+  const std::size_t audio = program_.audio_coefficients.size() * width;
+  if (audio > 0) {
+    std::copy_n(block.audio + at * audio, frames * audio, task.buffers.audio.data());
   }
-  kernel.read(shard.given, buffers.given_x.data(), buffers.given_v.data());
 }
 
 template <class T>
-void ShardedKernel<T>::write_copies(std::size_t i) {
-  const Shard& shard = shards_[i];
-  Buffers& buffers = buffers_[i];
+void ShardedKernel<T>::take_outputs(std::size_t i, const Block<T>& block, std::size_t at,
+                                    std::size_t frames) {
+  std::size_t row = 0;
+  for (std::size_t frame = at; frame < at + frames; ++frame) {
+    for (const std::uint32_t output : shards_[i].outputs) {
+      copy_row(tasks_[i]->buffers.outputs.data(), row++, block.outputs,
+               frame * program_.outputs.size() + output, this->width());
+    }
+  }
+}
+
+template <class T>
+void ShardedKernel<T>::gather_copies(std::size_t i) const {
   const std::size_t width = this->width();
-  T* x = buffers.copied_x.data();
-  T* v = buffers.copied_v.data();
-  for (const ShardSource& source : shard.sources) {
-    const Buffers& owner = buffers_[source.shard];
+  HaloBuffers<T>& halo = tasks_[i]->halo;
+  T* x = halo.copied_x.data();
+  T* v = halo.copied_v.data();
+  for (const ShardSource& source : shards_[i].sources) {
+    const HaloBuffers<T>& owner = tasks_[source.shard]->halo;
     x = std::copy_n(owner.given_x.data() + source.first * width, source.count * width, x);
     v = std::copy_n(owner.given_v.data() + source.first * width, source.count * width, v);
   }
-  kernels_[i]->write_nodes(shard.copies, buffers.copied_x.data(), buffers.copied_v.data());
+}
+
+// What the next block would begin with, for who looks at the nodes before it.
+template <class T>
+void ShardedKernel<T>::write_copies() const {
+  if (!owes_copies_) {
+    return;
+  }
+  for (std::size_t i = 0; i < shards_.size(); ++i) {
+    if (!is_here(i)) {
+      continue;
+    }
+    gather_copies(i);
+    const HaloBuffers<T>& halo = tasks_[i]->halo;
+    kernels_[i]->write_nodes(halo.copies, halo.copied_x.data(), halo.copied_v.data());
+  }
+  owes_copies_ = false;
 }
 
 template class ShardedKernel<float>;

@@ -5,20 +5,9 @@
 // is never touched, so that a shard computes what the whole would have.
 #pragma once
 
-#include <functional>
-
-#include "core/kernels/kernel.h"
+#include "core/kernels/domains/kernel_task.h"
 
 namespace ressort {
-
-// Does several things at the same time.
-class Executor {
- public:
-  virtual ~Executor() = default;
-  virtual std::size_t size() const = 0;  // how many
-  // Calls work(i) for every i < count, count <= size(), and returns when all are done.
-  virtual void run(std::size_t count, const std::function<void(std::size_t)>& work) = 0;
-};
 
 // Where the reference about copies is, that follow one another as what is given does.
 struct ShardSource {
@@ -58,26 +47,29 @@ class ShardedKernel final : public Kernel<T> {
 
  private:
   using Kernels = std::vector<std::unique_ptr<Kernel<T>>>;
-  // What a shard's kernel is driven by and fills, as Block says; positions and velocities of the
-  // nodes given, and of the copies, [i][lane].
-  struct Buffers {
-    Aligned<T> value, velocity, outputs;
-    Aligned<T> given_x, given_v;
-    Aligned<T> copied_x, copied_v;
-    std::vector<double> x, v;  // [node] of one lane, for set_state() and save()
-  };
 
-  ShardedKernel(const Program& program, const Shards& form, Kernels kernels);
+  ShardedKernel(const Program& program, const Shards& form, Kernels kernels, std::size_t voices,
+                Isa isa);
   void play(const Block<T>& block) override;
-  void step_shard(std::size_t i, const Block<T>& block, std::size_t at, std::size_t frames);
-  void write_copies(std::size_t i);
+  void give_inputs(std::size_t i, const Block<T>& block, std::size_t at, std::size_t frames);
+  void take_outputs(std::size_t i, const Block<T>& block, std::size_t at, std::size_t frames);
+  void gather_copies(std::size_t i) const;
+  void pass_on(const Block<T>& block, std::size_t at, std::size_t frames);
+  bool is_here(std::size_t i) const { return kernels_[i] != nullptr; }
+  void write_copies() const;
 
   const Program& program_;
   const std::vector<Shard>& shards_;
-  Executor& executor_;
   std::size_t frames_;
-  Kernels kernels_;                       // [shard]
-  mutable std::vector<Buffers> buffers_;  // [shard]
+  Fellows* const fellows_;
+  std::vector<std::vector<std::size_t>> takers_;  // [shard] those that copy nodes of it
+  std::vector<Fellows::Parcel> parcels_;
+  Kernels kernels_;                                    // [shard]
+  std::vector<std::unique_ptr<KernelTask<T>>> tasks_;  // [shard]
+  std::vector<std::uint32_t> all_;                     // [shard] its index
+  mutable bool owes_copies_ = false;                   // what others own is as they had it before
+  mutable std::vector<double> x_, v_;                  // [node] of a shard, in one lane
+  std::unique_ptr<Crew> crew_;                         // the last: it ends first
 };
 
 }  // namespace ressort

@@ -464,7 +464,9 @@ std::optional<Shards> share_out(const Program& program, const Workload& load,
   // As it is written first: rows that are alike stay so.
   for (const bool is_breadth_first : {false, true}) {
     Choice choice;
-    for (std::size_t count = load.executor->size(); count > 1; count /= 2) {
+    // Every process has a shard, or all of it.
+    const std::size_t least = load.executor->fellows() != nullptr ? load.executor->size() : 2;
+    for (std::size_t count = load.executor->size(); count >= least; count /= 2) {
       progress.spend(4 * count * program.position.size());
       choose_frames(divider.divide(count, is_breadth_first), whole_ns / program.moving, choice);
     }

@@ -120,6 +120,19 @@ bool GridKernel<T>::write_nodes(std::span<const std::uint32_t> nodes, const T* x
 }
 
 template <class T>
+bool GridKernel<T>::become(const Kernel<T>& from) {
+  const auto& other = static_cast<const GridKernel&>(this->become_nodes(from));
+  y_ = other.y_;
+  link_force_ = other.link_force_;
+  held_ = other.held_;
+  pushed_ = other.pushed_;
+  pushes_ = other.pushes_;
+  is_forward_ = other.is_forward_;
+  is_fresh_ = other.is_fresh_;
+  return true;
+}
+
+template <class T>
 GridState<T> GridKernel<T>::state() {
   Nodes<T>& nodes = this->nodes_;
   return {.ramps = ramps_of(this->coefficients),

@@ -342,6 +342,21 @@ double ModalKernel<T>::owed(std::size_t listener) const {
 }
 
 template <class T>
+bool ModalKernel<T>::become(const Kernel<T>& from) {
+  const auto& other = static_cast<const ModalKernel&>(from);
+  this->coefficients = other.coefficients;
+  numbers_ = other.numbers_;
+  indices_ = other.indices_;
+  held_ends_ = other.held_ends_;
+  active_.links = other.active_.links;
+  active_.alone = other.active_.alone;
+  active_.clusters[0].count = other.active_.clusters[0].count;
+  static_cast<ModalPace<T>&>(state_) = other.state_;
+  state_.bundled_modes = 0;  // the rows are its own
+  return true;
+}
+
+template <class T>
 bool ModalKernel<T>::save(std::size_t, double*, double*) const {
   return false;
 }

@@ -17,17 +17,42 @@ namespace ressort {
 inline constexpr std::uint32_t check_frames = 32;  // from one look at what may sleep to the next...
 inline constexpr std::uint32_t long_check_frames = 128;  // ...while few are awake
 
+// Where a ModalKernel is, beside the numbers in its arrays.
+template <class T>
+struct ModalPace {
+  std::size_t awake = 0;  // the first so many modes are
+  std::size_t swept = 0;  // the same in whole pairs of packs
+  std::size_t saved_awake = 0;
+  std::size_t bundled = 0;
+  std::size_t bundled_modes = 0;
+  std::size_t pushing = 0;
+  std::uint32_t held_places = 0;
+  std::size_t held_links = 0;  // of both kinds
+  std::size_t links = 0;
+  bool is_first = false;  // the first sample of crossed modes
+  bool pulls = false;     // passive links do so from the second sample on
+  bool saved_pulls = false;
+  bool is_pushed = false;  // a passive link has pushed in the last sample
+  bool is_reply_stale = true;
+  std::uint32_t touched_frames = 0;    // so long no block is tried as a free one
+  std::uint32_t surprised_frames = 0;  // so long all links are computed
+  T kick_norm = 0;                     // what the links added to the norm in their last block
+  bool is_stale = true;                // k, z and compliance are not those of `used`
+  std::uint32_t until_check = check_frames;
+  std::uint32_t fresh_frames = 0;  // since they were placed; up to 2
+  bool is_long_check = false;
+  bool has_bounds = false;  // the energy limits the motion
+};
+
 // Everything that one step of ModalKernel touches. Rows of modes are `stride` apart and filled up
 // with zeros to `modes`, whole packs of every kind. Ends: the places, then Modes::ends. Listeners:
 // the places, then the outputs.
 template <class T>
-struct ModalState {
+struct ModalState : ModalPace<T> {
   Ramps<T> ramps;
   std::size_t modes;
   std::size_t stride;
   std::size_t row;      // numbers from one shape to the next: crossed modes have two parts of each
-  std::size_t awake;    // the first so many modes are
-  std::size_t swept;    // the same in whole pairs of packs
   const T* stiffness;   // [share][mode] factors
   const T* damping;     // [share][mode]
   T* pushes;            // [push][mode] shapes, and without a gap
@@ -103,26 +128,6 @@ struct ModalState {
   T* room;              // [listener] what may still be dropped
   T silence;            // share of `loudness` that may be dropped; 0: nothing sleeps
   T lately_kept;        // of `loudness` in check_frames
-  std::size_t saved_awake = 0;
-  std::size_t bundled = 0;
-  std::size_t bundled_modes = 0;
-  std::size_t pushing = 0;
-  std::uint32_t held_places = 0;
-  std::size_t held_links = 0;  // of both kinds
-  std::size_t links = 0;
-  bool is_first = false;  // the first sample of crossed modes
-  bool pulls = false;     // passive links do so from the second sample on
-  bool saved_pulls = false;
-  bool is_pushed = false;  // a passive link has pushed in the last sample
-  bool is_reply_stale = true;
-  std::uint32_t touched_frames = 0;    // so long no block is tried as a free one
-  std::uint32_t surprised_frames = 0;  // so long all links are computed
-  T kick_norm = 0;                     // what the links added to the norm in their last block
-  bool is_stale = true;                // k, z and compliance are not those of `used`
-  std::uint32_t until_check = check_frames;
-  std::uint32_t fresh_frames = 0;  // since they were placed; up to 2
-  bool is_long_check = false;
-  bool has_bounds = false;  // the energy limits the motion
 };
 
 template <class T>
@@ -147,6 +152,7 @@ class ModalKernel final : public Kernel<T> {
   Awake awake() const override;
   // The most that a listener, a place or then an output, may be off by what sleeps or has slept.
   double owed(std::size_t listener) const;
+  bool become(const Kernel<T>& from) override;
 
  private:
   void play(const Block<T>& block) override;

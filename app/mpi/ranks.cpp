@@ -1,0 +1,130 @@
+#include "app/mpi/ranks.h"
+
+#include <mpi.h>
+
+#include <algorithm>
+#include <cstdio>
+#include <cstdlib>
+
+namespace ressort {
+namespace {
+
+// One after the other, in this process.
+class Alone final : public Crew {
+ public:
+  explicit Alone(std::vector<Task*> tasks) : tasks_(std::move(tasks)) {}
+  void run(std::span<const std::uint32_t> wanted) override {
+    for (const std::uint32_t i : wanted) {
+      tasks_[i]->perform();
+    }
+  }
+
+ private:
+  const std::vector<Task*> tasks_;
+};
+
+std::size_t own_number() {
+  int number = 0;
+  MPI_Comm_rank(MPI_COMM_WORLD, &number);
+  return static_cast<std::size_t>(number);
+}
+
+}  // namespace
+
+// MPI's own handler ends all processes at the first error.
+class Ranks::Post final : public Fellows {
+ public:
+  std::size_t own() const override { return own_; }
+
+  void begin(std::span<const Parcel> parcels) override {
+    if (!knows_plan_) {
+      knows_plan_ = true;
+      compare(parcels);
+    }
+    int tag = 0;
+    for (const Parcel& parcel : parcels) {
+      const auto owner = static_cast<int>(parcel.owner);
+      const auto size = static_cast<int>(parcel.size);
+      if (parcel.takers.empty()) {
+        MPI_Ibcast(parcel.bytes, size, MPI_BYTE, owner, MPI_COMM_WORLD, &next());
+      } else if (parcel.owner == own_) {
+        for (const std::size_t taker : parcel.takers) {
+          MPI_Isend(parcel.bytes, size, MPI_BYTE, static_cast<int>(taker), tag, MPI_COMM_WORLD,
+                    &next());
+        }
+      } else if (std::find(parcel.takers.begin(), parcel.takers.end(), own_) !=
+                 parcel.takers.end()) {
+        MPI_Irecv(parcel.bytes, size, MPI_BYTE, owner, tag, MPI_COMM_WORLD, &next());
+      }
+      ++tag;
+    }
+  }
+
+  void finish() override {
+    MPI_Waitall(static_cast<int>(requests_.size()), requests_.data(), MPI_STATUSES_IGNORE);
+    requests_.clear();
+  }
+
+  bool all_agree(bool here) override {
+    int all = here ? 1 : 0;
+    MPI_Allreduce(MPI_IN_PLACE, &all, 1, MPI_INT, MPI_LAND, MPI_COMM_WORLD);
+    return all != 0;
+  }
+
+ private:
+  MPI_Request& next() { return requests_.emplace_back(MPI_REQUEST_NULL); }
+
+  // Each process has found the plan by itself. Machines with other processors might find another.
+  void compare(std::span<const Parcel> parcels) const {
+    long hash = static_cast<long>(parcels.size());
+    for (const Parcel& parcel : parcels) {
+      hash = (31 * hash + static_cast<long>(parcel.size)) % 1'000'000'007L;
+    }
+    long both[] = {hash, -hash};
+    MPI_Allreduce(MPI_IN_PLACE, both, 2, MPI_LONG, MPI_MAX, MPI_COMM_WORLD);
+    if (both[0] != -both[1]) {
+      std::fprintf(stderr,
+                   "ressort-mpi: the machines divide the network in different ways; take machines "
+                   "with the same processors, or say --method direct\n");
+      MPI_Abort(MPI_COMM_WORLD, EXIT_FAILURE);
+    }
+  }
+
+  const std::size_t own_ = own_number();
+  bool knows_plan_ = false;
+  std::vector<MPI_Request> requests_;
+};
+
+Ranks::Ranks(int& argc, char**& argv) {
+  MPI_Init(&argc, &argv);
+  post_ = std::make_unique<Post>();
+}
+
+Ranks::~Ranks() {
+  MPI_Finalize();
+}
+
+std::size_t Ranks::number() const {
+  return post_->own();
+}
+
+std::size_t Ranks::size() const {
+  int size = 1;
+  MPI_Comm_size(MPI_COMM_WORLD, &size);
+  return static_cast<std::size_t>(size);
+}
+
+std::unique_ptr<Crew> Ranks::gather(std::vector<Task*> tasks) {
+  return std::make_unique<Alone>(std::move(tasks));
+}
+
+Fellows* Ranks::fellows() {
+  return post_.get();
+}
+
+void Ranks::abort(int code) {
+  MPI_Abort(MPI_COMM_WORLD, code);
+  std::exit(code);
+}
+
+}  // namespace ressort

@@ -1,0 +1,371 @@
+// Threads that help the audio thread: whatever they do, or do not do in time, what is heard is what
+// one thread alone would have played, to the bit. Run it under ThreadSanitizer too.
+#include <signal.h>
+#include <sys/syscall.h>
+#include <time.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <atomic>
+#include <cmath>
+#include <cstdio>
+#include <filesystem>
+#include <mutex>
+#include <set>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "app/realtime/denormals.h"
+#include "app/realtime/thread_pool.h"
+#include "app/session/loader.h"
+#include "core/compile/compile.h"
+#include "core/kernels/domains/kernel_task.h"
+#include "core/kernels/registry.h"
+#include "tests/support/harness.h"
+#include "tests/support/random.h"
+
+using namespace ressort;
+
+namespace {
+
+const std::string source = RESSORT_SOURCE;
+
+using Threads = std::set<int>;
+
+Threads own_threads() {
+  Threads threads;
+  for (const auto& entry : std::filesystem::directory_iterator("/proc/self/task")) {
+    threads.insert(std::stoi(entry.path().filename().string()));
+  }
+  return threads;
+}
+
+// Stops threads of this process at any instruction, as a scheduler does, for up to `longest_us`.
+class Stalls {
+ public:
+  Stalls(const Threads& threads, int longest_us)
+      : thread_([this, threads, longest_us] { storm(threads, longest_us); }) {}
+  ~Stalls() {
+    ends_ = true;
+    thread_.join();
+  }
+  static std::atomic<int> count;
+
+ private:
+  static void stop(int) {
+    const int before = errno;
+    timespec time{0, 1000L * pause_us};
+    nanosleep(&time, nullptr);
+    ++count;
+    errno = before;
+  }
+  void storm(const Threads& threads, int longest_us) {
+    struct sigaction action {};
+    action.sa_handler = stop;
+    action.sa_flags = SA_RESTART;
+    sigaction(SIGUSR2, &action, nullptr);
+    support::Random random(7);
+    while (!ends_) {
+      pause_us = 1 + static_cast<int>(random.below(static_cast<std::size_t>(longest_us)));
+      for (const int thread : threads) {
+        syscall(SYS_tgkill, getpid(), thread, SIGUSR2);
+      }
+      std::this_thread::sleep_for(std::chrono::microseconds(1 + random.below(700)));
+    }
+    std::this_thread::sleep_for(std::chrono::milliseconds(20));
+  }
+  static std::atomic<int> pause_us;
+  std::atomic<bool> ends_{false};
+  std::thread thread_;
+};
+std::atomic<int> Stalls::count{0};
+std::atomic<int> Stalls::pause_us{1};
+
+// A chord, a bend, parameters on their way, keys up, another chord: in periods of every length.
+std::vector<double> played(Engine& engine, Board<ClockReading>& clock, std::size_t frames,
+                           int period) {
+  const DenormalsFlushed flushed;
+  support::Random random(3);
+  std::vector<double> heard;
+  const auto channels = static_cast<std::size_t>(engine.output_count());
+  std::vector<std::vector<double>> buffers(channels, std::vector<double>(8192));
+  std::vector<double*> outputs;
+  for (auto& buffer : buffers) {
+    outputs.push_back(buffer.data());
+  }
+  std::size_t next_event = 0;
+  for (std::size_t at = 0; at < frames;) {
+    const std::size_t count =
+        period > 0 ? static_cast<std::size_t>(period) : std::size_t{1} << random.below(11);
+    clock.write({static_cast<std::int64_t>(at), 0, 48000.0, static_cast<std::int64_t>(count)});
+    std::vector<Event> events;
+    // At the frames 0, 1000, 2000...: each in whichever block it falls.
+    for (; next_event * 1000 < at + count; ++next_event) {
+      const auto frame = static_cast<std::uint32_t>(next_event * 1000 - at);
+      const auto key = static_cast<std::uint16_t>(40 + next_event * 5 % 37);
+      const auto add = [&](Event event) {
+        event.frame = frame;
+        events.push_back(event);
+      };
+      add({.kind = EventKind::note_on, .index = key, .value = 0.6});
+      add({.kind = EventKind::note_on, .index = static_cast<std::uint16_t>(key + 7), .value = 1.0});
+      add({.kind = EventKind::bend, .value = 0.1 * static_cast<double>(next_event % 5)});
+      if (next_event > 3) {
+        const auto old = static_cast<std::uint16_t>(40 + (next_event - 3) * 5 % 37);
+        add({.kind = EventKind::note_off, .index = old, .value = 0.5});
+      }
+    }
+    engine.process(events, {}, outputs, count);
+    for (std::size_t n = 0; n < count; ++n) {
+      for (const auto& buffer : buffers) {
+        heard.push_back(buffer[n]);
+      }
+    }
+    at += count;
+  }
+  heard.resize(frames * channels);
+  return heard;
+}
+
+std::unique_ptr<Engine> engine_of(const std::string& preset, Executor* executor,
+                                  std::optional<Method> method, int voices = 12) {
+  const auto scene = load_scene(source + "/presets/" + preset + ".toml", {});
+  REQUIRE(scene);
+  auto compiled =
+      compile(scene->network, scene->preset,
+              {.rate_hz = 48000.0, .voices = voices, .method = method, .executor = executor});
+  REQUIRE(compiled);
+  return std::move(compiled->engine);
+}
+
+// A task whose helper is held at a gate.
+struct Gated final : Task {
+  void perform() override { ++performed; }
+  void offer() override { ++offered; }
+  void perform_aside() override {
+    ++inside;
+    while (is_shut) {
+      std::this_thread::sleep_for(std::chrono::microseconds(100));
+    }
+    --inside;
+  }
+  void accept() override { ++accepted; }
+  void take_over() override { ++taken; }
+  std::atomic<bool> is_shut{false};
+  std::atomic<int> inside{0};
+  int performed = 0;
+  int offered = 0;
+  int accepted = 0;
+  int taken = 0;
+};
+
+}  // namespace
+
+TEST_CASE("who is held in the midst of a task is not waited for", "[helpers]") {
+  Board<ClockReading> clock;
+  clock.write({0, 0, 48000.0, 64});
+  ThreadPool pool(2, &clock);
+  Gated first;
+  Gated second;
+  auto crew = pool.gather({&first, &second});
+  const std::uint32_t both[] = {0, 1};
+  second.is_shut = true;
+  int runs = 0;
+  while (second.inside == 0 && runs < 1000000) {  // until the helper has come
+    crew->run(both);
+    ++runs;
+  }
+  REQUIRE(second.inside == 1);
+  // It has it for a hundred rounds: each of them is played, without it.
+  const int before = second.performed;
+  for (int i = 0; i < 100; ++i) {
+    crew->run(both);
+  }
+  runs += 100;
+  CHECK(second.taken == 1);
+  CHECK(second.performed - before >= 99);
+  CHECK(second.performed + second.accepted + second.taken == runs);
+  CHECK(first.performed + first.accepted == runs);
+  const int offered = second.offered;
+  crew->run(both);
+  CHECK(second.offered == offered);  // as long as somebody is in it
+  second.is_shut = false;
+  while (second.inside > 0) {
+    std::this_thread::yield();
+  }
+  const int again = second.offered;
+  for (int i = 0; i < 100000 && second.offered == again; ++i) {
+    crew->run(both);
+  }
+  CHECK(second.offered > again);
+}
+
+TEST_CASE("a crew does not end before its helpers have left it", "[helpers]") {
+  Board<ClockReading> clock;
+  clock.write({0, 0, 48000.0, 64});
+  ThreadPool pool(2, &clock);
+  Gated first;
+  Gated second;
+  auto crew = pool.gather({&first, &second});
+  const std::uint32_t both[] = {0, 1};
+  second.is_shut = true;
+  for (int i = 0; i < 1000000 && second.inside == 0; ++i) {
+    crew->run(both);
+  }
+  REQUIRE(second.inside == 1);
+  std::thread opener([&] {
+    std::this_thread::sleep_for(std::chrono::milliseconds(20));
+    second.is_shut = false;
+  });
+  crew.reset();
+  CHECK(second.inside == 0);
+  opener.join();
+}
+
+TEST_CASE("what is taken over goes on as if nobody had helped", "[helpers]") {
+  struct Case {
+    const char* preset;
+    std::optional<Method> method;
+  };
+  const Case cases[] = {{"LargeTriangleMesh", {}},
+                        {"LargeTriangleMesh", Method::direct},
+                        {"20x30mesh", Method::grid},
+                        {"CoupledStrings", Method::chains},
+                        {"PolyTriangle", Method::batch}};
+  for (const Case& scene : cases) {
+    const auto engine = engine_of(scene.preset, nullptr, scene.method, 2);
+    const Program& program = engine->machine().parts[0];
+    INFO(scene.preset << ", " << description(program));
+    const auto make = [&] { return make_kernel<double>(program, 2, best_isa()); };
+    auto expected = make();
+    auto found = make();
+    const std::size_t row = found->width() * program.inputs.size();
+    BlockBuffers<double> buffers;
+    buffers.value.resize(64 * row);
+    buffers.velocity.resize(64 * row);
+    buffers.audio.resize(64);
+    buffers.outputs.resize(64 * found->width() * program.outputs.size());
+    BlockBuffers<double> alone = buffers;
+    KernelTask<double> task(found, buffers, {}, make);
+    REQUIRE(task.can_copy());
+    for (auto* kernel : {expected.get(), found.get()}) {
+      for (std::uint32_t c = 0; c < program.coefficients.size(); ++c) {
+        for (std::size_t lane = 0; lane < kernel->width(); ++lane) {
+          kernel->coefficients.set(
+              lane, c, coefficient_value(program, program.coefficients[c], program.parameters, 1.0),
+              false);
+        }
+      }
+    }
+    support::Random random(5);
+    int lent = 0;  // blocks that a late helper has been in it for
+    double peak = 0.0;
+    for (int block = 0; block < 300; ++block) {
+      task.frames = 1 + random.below(64);
+      for (std::size_t i = 0; i < task.frames * row; ++i) {
+        const double hand = 0.02 * std::sin(0.003 * (64 * block + static_cast<double>(i / row)));
+        alone.value[i] = task.buffers.value[i] = hand;
+        alone.velocity[i] = task.buffers.velocity[i] = 0.0;
+      }
+      expected->step({task.frames, alone.value.data(), alone.velocity.data(), alone.audio.data(),
+                      alone.outputs.data()});
+      const std::size_t way = random.below(4);
+      if (lent > 0) {
+        task.perform();
+        if (--lent == 0) {
+          task.perform_aside();  // at last, of what is long over
+        }
+      } else if (way == 0) {
+        task.perform();
+      } else if (way == 1) {
+        task.offer();
+        task.perform_aside();
+        task.accept();
+      } else {
+        task.offer();
+        task.take_over();
+        lent = static_cast<int>(way);
+      }
+      const std::size_t count = task.frames * found->width() * program.outputs.size();
+      for (std::size_t i = 0; i < count; ++i) {
+        peak = std::max(peak, std::fabs(alone.outputs[i]));
+        REQUIRE(task.buffers.outputs[i] == alone.outputs[i]);
+      }
+    }
+    CHECK(peak > 1e-9);
+  }
+}
+
+TEST_CASE("helpers play the bits of one thread, whatever stops them", "[helpers]") {
+  struct Case {
+    const char* preset;
+    std::optional<Method> method;
+    std::size_t frames;
+  };
+  const Case cases[] = {
+      {"LargeTriangleMesh", {}, 12000},         {"LargeTriangleMesh", Method::direct, 4000},
+      {"20x30mesh", Method::grid, 6000},        {"Guitar", {}, 8000},
+      {"CoupledStrings", Method::chains, 8000}, {"PolyTriangle", Method::batch, 12000},
+  };
+  std::uint64_t taken_over = 0;
+  for (const Case& scene : cases) {
+    Board<ClockReading> clock;
+    for (const int period : {0, 16, 8192}) {
+      const auto alone = engine_of(scene.preset, nullptr, scene.method);
+      const std::vector<double> expected = played(*alone, clock, scene.frames, period);
+      double peak = 0.0;
+      for (const double sample : expected) {
+        peak = std::max(peak, std::fabs(sample));
+      }
+      CHECK(peak > 1e-3);
+      for (const std::size_t threads : {2u, 4u}) {
+        const Threads before = own_threads();
+        ThreadPool pool(threads, &clock);
+        Threads helpers = own_threads();
+        for (const int thread : before) {
+          helpers.erase(thread);
+        }
+        REQUIRE(helpers.size() == threads - 1);
+        const auto engine = engine_of(scene.preset, &pool, scene.method);
+        const Stalls stalls(helpers, period == 16 ? 3000 : 300);
+        INFO(scene.preset << ", period " << period << ", " << threads << " threads");
+        CHECK(played(*engine, clock, scene.frames, period) == expected);
+        taken_over += pool.taken_over();
+      }
+    }
+  }
+#if !defined(__SANITIZE_THREAD__)  // which puts signals off
+  CHECK(Stalls::count > 100);
+#endif
+  std::printf("%llu tasks were taken over\n", static_cast<unsigned long long>(taken_over));
+}
+
+TEST_CASE("a large network's shards are played by helpers to the bit", "[helpers]") {
+  const std::string text =
+      "@K param 0.2\n@p closedMesh 120 100 1. K 0.003 0. 0.\n@in1 frcInput [@p 0.4 0.3]\n"
+      "@out1 posOutput [@p 0.51 0.7]\n";
+  const auto network = support::network_of(text);
+  const auto preset = default_preset(network, false);
+  const auto made = [&](Executor* executor) {
+    auto compiled =
+        compile(network, preset, {.rate_hz = 48000.0, .voices = 2, .executor = executor});
+    REQUIRE(compiled);
+    return std::move(compiled->engine);
+  };
+  Board<ClockReading> clock;
+  const std::vector<double> expected = played(*made(nullptr), clock, 3000, 0);
+  CHECK(*std::max_element(expected.begin(), expected.end()) > 1e-3);
+  for (const std::size_t threads : {2u, 3u}) {
+    const Threads before = own_threads();
+    ThreadPool pool(threads, &clock);
+    Threads helpers = own_threads();
+    for (const int thread : before) {
+      helpers.erase(thread);
+    }
+    const auto engine = made(&pool);
+    CHECK(std::holds_alternative<Shards>(engine->machine().parts[0].form));
+    const Stalls stalls(helpers, 500);
+    CHECK(played(*engine, clock, 3000, 0) == expected);
+  }
+}
