@@ -41,7 +41,12 @@ class Parts {
  private:
   std::size_t node(std::uint32_t mass) const {
     const Mass& at = network_.masses[mass];
-    return at.kind == MassKind::point ? network_.masses.size() + network_.taps[at.tap].macro : mass;
+    if (at.kind != MassKind::point) {
+      return mass;
+    }
+    // Once macros are expanded, a place hangs together with their first node.
+    const Tap& tap = network_.taps[at.tap];
+    return network_.macros.empty() ? tap.first : network_.masses.size() + tap.macro;
   }
   bool holds(std::uint32_t mass) const {
     return moves(network_.masses[mass]) || network_.masses[mass].kind == MassKind::point;

@@ -96,6 +96,14 @@ class TunedMode final : public TunedMotion {
     springs_.damping.values *= rate_ratio;
     fixed_ = shapes.fixed.rows() == n ? shapes.fixed : Matrix(n, n);
     fixed_.values *= rate_ratio * rate_ratio;
+    if (is_first_alone()) {
+      for (Matrix* const matrix : {&springs_.stiffness, &springs_.damping, &fixed_}) {
+        const double first = (*matrix)(0, 0);
+        *matrix = Matrix(1, 1);
+        (*matrix)(0, 0) = first;
+      }
+      springs_ = {springs_.stiffness, springs_.damping, Matrix(1, 1), Matrix(1, 1)};
+    }
   }
 
   // Of a mode that swings alone: exactly for the published scheme and exact modes.
@@ -137,6 +145,20 @@ class TunedMode final : public TunedMotion {
   }
 
  private:
+  // Whether nothing swings along with it: what rounding leaves there counts by its square.
+  bool is_first_alone() const {
+    constexpr double rounding = 1e-12;
+    const double k = rounding * springs_.stiffness(0, 0);
+    const double z = rounding * springs_.damping(0, 0);
+    for (std::size_t j = 1; j < springs_.stiffness.rows(); ++j) {
+      if (std::fabs(springs_.stiffness(0, j)) > k || std::fabs(fixed_(0, j)) > k ||
+          std::fabs(springs_.damping(0, j)) > z) {
+        return false;
+      }
+    }
+    return true;
+  }
+
   Springs springs_;
   Matrix fixed_;  // stiffness that no key moves
   Stepping stepping_;

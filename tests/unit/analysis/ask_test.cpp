@@ -295,4 +295,43 @@ TEST_CASE("a key's pitch stays where it is while the timbre moves", "[ask]") {
   CHECK(std::fabs(cents) < 1e-5);
 }
 
+TEST_CASE("a key moves what springs hold by places of a string", "[ask]") {
+  const Network network = support::network_of(
+      "@z param 0.001\n@s chain 12 1. 0.2 z 0. 0.\n@g ground 0.\n@foot spring @g [@s 0.3] 0.05\n"
+      "@in1 frcInput [@s 0.3]\n@out1 posOutput [@s 0.9]\n");
+  const StruckModel model(network, {.key_hz = 220.0});
+  const auto told = model.figures(parameter_values(network));
+  REQUIRE(told);
+  CHECK(*(*told)[static_cast<std::size_t>(AskedFigure::f0)] == Approx(220.0).epsilon(1e-8));
+}
+
+// A raised cosine of 2 ms is a filter; and what is heard of two ears is their mean.
+TEST_CASE("a longer blow is darker, as the sound of the same pulse has it", "[ask]") {
+  const Network network = support::network_of(
+      "@k param 0.2\n@s string 40 1. k 0.001 0. 0.\n@in1 frcInput [@s 0.23]\n"
+      "@out1 posOutput [@s 0.71]\n@out2 posOutput [@s 0.4]\n");
+  const std::vector<double> values = parameter_values(network);
+  constexpr int length = 88;
+  auto simulation = reference::Builder(network, values).build();
+  std::vector<double> samples;
+  for (std::size_t n = 0; n < frame; ++n) {
+    const double turn = 2.0 * std::numbers::pi * (static_cast<double>(n) + 0.5) / length;
+    const double force[] = {n < length ? (1.0 - std::cos(turn)) / length : 0.0};
+    const auto heard_there = simulation.simulator.step(force);
+    samples.push_back(0.5 * (heard_there[0] + heard_there[1]));
+  }
+  FrameAnalysis analysis({.rate_hz = rate_hz, .size = frame});
+  const SpectralShape sound = *analysis.next(samples).shape;
+  const auto told = [&](double length_s, bool by_samples) {
+    const auto values_there =
+        StruckModel(network, {.blows = {{.length_s = length_s}}, .by_samples = by_samples})
+            .figures(values);
+    REQUIRE(values_there);
+    return *(*values_there)[static_cast<std::size_t>(AskedFigure::centroid)];
+  };
+  CHECK(told(length / rate_hz, true) == Approx(sound.centroid_hz).epsilon(1e-6));
+  CHECK(told(length / rate_hz, false) == Approx(sound.centroid_hz).epsilon(0.05));
+  CHECK(told(length / rate_hz, true) < 0.7 * told(0.0, true));
+}
+
 }  // namespace ressort
