@@ -19,6 +19,8 @@ Control make_control(const Network& network, const ControlSetting& setting) {
       setting.source == ControlSource::audio ? setting.number - 1 : setting.number);
   control.lowest_key = static_cast<std::uint8_t>(setting.lowest_key);
   control.highest_key = static_cast<std::uint8_t>(setting.highest_key);
+  control.turn = static_cast<std::uint8_t>(setting.turn - 1);
+  control.turns = static_cast<std::uint8_t>(setting.turns);
   control.low = setting.low;
   control.high = setting.high;
   control.exponential = setting.exponential;
@@ -93,6 +95,7 @@ Playing make_playing(const Network& network, const Preset& preset, const Analysi
       .gain = gain,
       .bare = bare,
       .damper_s = preset.damper_s,
+      .decay_s = preset.decay_s,
       .noise = preset.noise,
       .tuning = analysis.mode ? Tuning::keyboard : Tuning::fixed,
       .transpose = static_cast<double>(preset.transpose),

@@ -66,6 +66,10 @@ std::string print_control(const ControlSetting& control) {
     text += "keys = [" + std::to_string(control.lowest_key) + ", " +
             std::to_string(control.highest_key) + "]\n";
   }
+  if (control.turns != usual.turns) {
+    text += "round_robin = [" + std::to_string(control.turn) + ", " +
+            std::to_string(control.turns) + "]\n";
+  }
   return text;
 }
 

@@ -101,6 +101,23 @@ Gesture usual_gesture(std::string_view target) {
              : Gesture::parameter;
 }
 
+// "round_robin = [1, 2]"
+void read_round_robin(TomlTable& reader, ControlSetting& control) {
+  constexpr double most_turns = 16.0;
+  double turn = control.turn;
+  double turns = control.turns;
+  if (!reader.range("round_robin", turn, turns, 1.0, most_turns)) {
+    return;
+  }
+  if (turn != std::floor(turn) || turns != std::floor(turns)) {
+    reader.fail(*reader.get("round_robin"), "'round_robin' must be two whole numbers: [1, 2]");
+  } else if (control.source != ControlSource::note) {
+    reader.fail(*reader.get("round_robin"), "'round_robin' is for notes");
+  }
+  control.turn = static_cast<int>(turn);
+  control.turns = static_cast<int>(turns);
+}
+
 void read_control(const toml::table& table, Preset& preset, std::vector<Error>& errors,
                   IsReserved is_reserved) {
   const std::size_t before = errors.size();
@@ -154,6 +171,7 @@ void read_control(const toml::table& table, Preset& preset, std::vector<Error>& 
     control.lowest_key = static_cast<int>(lowest);
     control.highest_key = static_cast<int>(highest);
   }
+  read_round_robin(reader, control);
   std::string curve = "linear";
   if (reader.text("curve", curve) && curve != "exponential" && curve != "linear") {
     reader.fail(*table.get("curve"), "'curve' must be linear or exponential");
@@ -253,20 +271,13 @@ void read_velocity_points(const toml::array& rows, TomlTable& reader, Preset& pr
   }
 }
 
-void read_flattening(const toml::table& root, TomlTable& reader, Preset& preset) {
-  constexpr double most_cents = 100.0;
-  const char* const name = "flattening_cents";
-  if (const toml::node* node = root.get(name); node != nullptr && node->is_array()) {
-    read_points(*node->as_array(), reader,
-                {.name = name,
-                 .example = "[[48, 8], [96, 6]]",
-                 .point = "[key, cents]",
-                 .least = {0.0, -most_cents},
-                 .most = {127.0, most_cents},
-                 .bounds = "a key lies between 0 and 127, its cents between -100 and 100"},
-                preset.flattening_cents);
-  } else if (double cents = 0.0; reader.number(name, cents, -most_cents, most_cents)) {
-    preset.flattening_cents = {{0.0, cents}};
+// A number, or one for each of some keys.
+void read_by_key(const toml::table& root, TomlTable& reader, const CurveWords& words,
+                 std::vector<CurvePoint>& points) {
+  if (const toml::node* node = root.get(words.name); node != nullptr && node->is_array()) {
+    read_points(*node->as_array(), reader, words, points);
+  } else if (double value = 0.0; reader.number(words.name, value, words.least[1], words.most[1])) {
+    points = {{0.0, value}};
   }
 }
 
@@ -364,7 +375,22 @@ void read_root(const toml::table& root, Preset& preset, std::vector<Error>& erro
   reader.flag("noise", preset.noise);
   reader.integer("transpose", preset.transpose, -96, 96);
   reader.integer("pitch_mode", preset.pitch_mode, 1, most_pitch_mode);
-  read_flattening(root, reader, preset);
+  read_by_key(root, reader,
+              {.name = "decay_s",
+               .example = "[[36, 12], [96, 2]]",
+               .point = "[key, seconds]",
+               .least = {0.0, 0.001},
+               .most = {127.0, 600.0},
+               .bounds = "a key lies between 0 and 127, its seconds between 0.001 and 600"},
+              preset.decay_s);
+  read_by_key(root, reader,
+              {.name = "flattening_cents",
+               .example = "[[48, 8], [96, 6]]",
+               .point = "[key, cents]",
+               .least = {0.0, -100.0},
+               .most = {127.0, 100.0},
+               .bounds = "a key lies between 0 and 127, its cents between -100 and 100"},
+              preset.flattening_cents);
   read_keys(root, reader, preset);
   if (std::string budget; reader.text("budget", budget)) {
     if (const auto parsed = parse_budget(budget)) {

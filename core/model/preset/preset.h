@@ -46,6 +46,8 @@ struct ControlSetting {
   double shortest_ms = 0.0;
   int lowest_key = 0;
   int highest_key = 127;
+  int turn = 1;  // of notes: its place among `turns` controls that take turns
+  int turns = 1;
   SourceLocation location;
   bool operator==(const ControlSetting&) const = default;
 };
@@ -59,10 +61,12 @@ struct Preset {
   int voices = 1;
   double gain = 1.0;      // output per unit of position
   double damper_s = 0.0;  // T60 of a voice whose key is up; 0: it rings out
-  bool noise = false;     // the outputs shape white noise
-  bool keyboard = true;   // a key sets the pitch
-  int transpose = 0;      // semitones between a key and the pitch that it sets
-  int pitch_mode = 1;     // which of its modes a key tunes, from the lowest
+  // T60 of a held note, beside what the model loses: keys and seconds, ascending; empty: nothing.
+  std::vector<CurvePoint> decay_s;
+  bool noise = false;    // the outputs shape white noise
+  bool keyboard = true;  // a key sets the pitch
+  int transpose = 0;     // semitones between a key and the pitch that it sets
+  int pitch_mode = 1;    // which of its modes a key tunes, from the lowest
   // Of the sound below that mode, to be made up for: keys and cents, ascending; empty: none.
   std::vector<CurvePoint> flattening_cents;
   double a4_hz = usual_a4_hz;  // to which everything is tuned

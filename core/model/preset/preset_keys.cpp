@@ -12,6 +12,7 @@ constexpr PresetKey keys[] = {
     {"", "voices", "1 to 256 (1)", "how many notes sound at once"},
     {"", "gain", "0 to 1e9 (1)", "output per unit of position; a forte note should peak near -12 dBFS"},
     {"", "damper_s", "0 to 60 (0)", "T60 of a note once its key is up: in how many seconds a damper takes 60 dB off it; 0 lets it ring out"},
+    {"", "decay_s", "0.001 to 600, or [[36, 12], [96, 2]]", "T60 of a note while its key is down, beside what the model itself loses (1/T60 is the sum of both); or points of keys and seconds, up to 16, and straight lines between them, so that low keys ring longer; for what is struck or plucked"},
     {"", "noise", "true or false (false)", "the outputs shape white noise instead of being heard themselves"},
     {"", "tuning", "`keyboard` or `fixed` (`keyboard`)", "whether a key sets the pitch, or every key sounds the model as it is written"},
     {"", "fixed", "[\"LABEL\", ...]", "what keys leave as stiff as it is: a guitar's box, whose modes stay where they are while the string follows the key. Labels of bodies, waveguides, macros, oscillators and links"},
@@ -39,6 +40,7 @@ constexpr PresetKey keys[] = {
     {"control", "travel", "above 0", "of a pluck, which needs it: how far from the string the finger rests, on either side"},
     {"control", "level_db", "[low, high]", "how loud the softest and the loudest are beside `gain`; exact for plucks, bows and blows, whose sound does not depend on how large it is. Without it the level is what `range` makes of it"},
     {"control", "length_ms", "[longest, shortest] (one sample)", "of an impulse or a swing: how long the softest and the hardest blow last at the model's own pitch, on higher keys less; the shorter, the brighter"},
+    {"control", "round_robin", "[place, of how many]", "of notes: controls of [1, 2] and [2, 2] take turns from note to note, as two hammers do, or strokes up and down"},
     {"control", "keys", "[low, high] ([0, 127])", "of notes: which keys"},
 };
 // clang-format on

@@ -19,8 +19,8 @@
 #include "app/control/registry.h"
 #include "app/session/files.h"
 #include "tests/bench/voicing/player.h"
+#include "tests/bench/voicing/random_settings.h"
 #include "tests/bench/voicing/sound.h"
-#include "tests/support/random.h"
 
 namespace ressort::voicing {
 namespace {
@@ -239,98 +239,6 @@ int print_table(const std::vector<std::string>& names, int step) {
   return failures;
 }
 
-// How much the second difference at a turn stands out of what is around it.
-double step_at(const Stereo& sound, double time_s) {
-  const auto largest = [&](double from_s, double to_s) {
-    const Stereo piece = sound.part(from_s, to_s);
-    double most = 0.0;
-    for (const std::vector<double>& channel : piece.channels) {
-      for (std::size_t n = 2; n < channel.size(); ++n) {
-        most = std::max(most, std::fabs(channel[n] - 2.0 * channel[n - 1] + channel[n - 2]));
-      }
-    }
-    return most;
-  };
-  const double around =
-      std::max(largest(time_s - 0.06, time_s - 0.001), largest(time_s + 0.006, time_s + 0.06));
-  return std::max(0.0, largest(time_s - 0.001, time_s + 0.005) - around);
-}
-
-int play_randomly(const std::string& name, int count, std::uint64_t seed) {
-  Player player(name, 48000.0);
-  support::Random random(seed);
-  std::map<std::string, int> wrong;
-  double quietest_db = 1e9;
-  double loudest_db = -1e9;
-  const std::vector<ControlSetting>& controls = player.scene().preset.controls;
-  for (int turn_number = 0; turn_number < count; ++turn_number) {
-    constexpr double turn_s = 0.5;
-    std::vector<TimedEvent> before;
-    std::vector<TimedEvent> meanwhile;
-    std::string said;
-    int custom = 0;
-    for (std::size_t row = 0; row < controls.size(); ++row) {
-      const ControlSetting& control = controls[row];
-      const auto event = [&](double amount) {
-        return control.source == ControlSource::controller ? turn(control.number, amount)
-               : control.source == ControlSource::pressure
-                   ? press(amount)
-                   : Event{.kind = EventKind::custom,
-                           .index = static_cast<std::uint16_t>(row),
-                           .value = amount};
-      };
-      if (control.source == ControlSource::controller ||
-          control.source == ControlSource::pressure || control.source == ControlSource::osc) {
-        const double amount = random.uniform(0.0, 1.0);
-        before.push_back({0.0, event(amount)});
-        said += " " +
-                (control.source == ControlSource::controller ? "cc" + std::to_string(control.number)
-                                                             : std::string("pressure")) +
-                "=" + number(amount, 2, true);
-        if (meanwhile.empty() && random.below(controls.size()) == 0) {
-          meanwhile.push_back({turn_s, event(random.uniform(0.0, 1.0))});
-        }
-        ++custom;
-      }
-    }
-    const int key = 36 + static_cast<int>(random.below(61));
-    const int velocity = 20 + static_cast<int>(random.below(108));
-    std::vector<TimedEvent> events = before;
-    events.push_back({0.2, note_on(key, velocity)});
-    events.insert(events.end(), meanwhile.begin(), meanwhile.end());
-    events.push_back({1.0, note_off(key)});
-    const Stereo sound = player.play(events, 3.0);
-    const double peak = peak_of(sound.part(0.2, 3.0));
-    quietest_db = std::min(quietest_db, decibels(peak));
-    loudest_db = std::max(loudest_db, decibels(peak));
-    said += " key " + std::to_string(key) + " velocity " + std::to_string(velocity) + " peak " +
-            number(decibels(peak), 1, true);
-    const auto expect = [&](bool holds, const char* what) {
-      if (!holds && ++wrong[what] <= 3) {
-        std::printf("  %s: %s:%s\n", name.c_str(), what, said.c_str());
-      }
-    };
-    expect(is_finite(sound), "not finite");
-    expect(decibels(peak) <= 0.0, "too loud");
-    expect(decibels(peak) >= -40.0, "too soft");
-    expect(decibels(offset_of(sound.part(2.0, 3.0))) <= most_offset_db, "DC");
-    expect(decibels(peak_of(sound.part(2.8, 3.0)) / std::max(peak, 1e-9)) <= -40.0, "does not end");
-    if (!meanwhile.empty() && !player.scene().preset.noise) {  // which is nothing but steps
-      expect(decibels(step_at(sound, turn_s) / std::max(peak, 1e-9)) <= -60.0, "a step");
-    }
-  }
-  std::printf("%s: %d settings, peaks %.1f to %.1f dBFS", name.c_str(), count, quietest_db,
-              loudest_db);
-  int failures = 0;
-  for (const auto& [what, times] : wrong) {
-    std::printf(", %s %d", what.c_str(), times);
-    failures += times;
-  }
-  std::printf("%s\n", failures == 0 ? ", all of it music" : "");
-  std::fflush(stdout);
-  return failures;
-}
-
 // Whether a bow speaks wherever a hand may put it, from 65 Hz on: at its key's pitch, within its
 // time, and the louder the faster.
 int bow(const std::string& name, int count) {
@@ -412,7 +320,12 @@ int run(int argc, char** argv) {
   int failures = 0;
   for (const std::string& name : names) {
     try {
-      failures += bows > 0 ? bow(name, bows) : play_randomly(name, random, seed);
+      if (bows > 0) {
+        failures += bow(name, bows);
+      } else {
+        Player player(name, 48000.0);
+        failures += play_random_settings(player, name, random, seed);
+      }
     } catch (const std::runtime_error& error) {
       std::fprintf(stderr, "%s\n", error.what());
       ++failures;
