@@ -273,7 +273,7 @@ double Channels::damper(std::uint8_t channel) const {
 }
 
 double Channels::softness(std::uint8_t channel) const {
-  constexpr double softest = 0.6;
+  constexpr double softest = 0.75;
   return 1.0 - (1.0 - softest) * std::max(of(channel).soft, zone(channel).soft);
 }
 

@@ -212,6 +212,8 @@ int play_random_settings(Player& player, const std::string& name, int count, std
     if (setting.has_move && !preset.noise) {  // which is nothing but steps
       double step_db = decibels(step_at(sound, move_s) / std::max(peak, 1e-9));
       if (step_db > most_step_db) {
+        // Twice, as strokes from two sides take turns.
+        player.play(setting.unmoved(), move_s + 0.1);
         const Stereo unmoved = player.play(setting.unmoved(), move_s + 0.1);
         step_db = decibels(step_at(sound.part(0.0, move_s + 0.1), unmoved, move_s) /
                            std::max(peak, 1e-9));
