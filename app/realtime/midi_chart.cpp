@@ -22,7 +22,7 @@ constexpr MidiChartRow rows[] = {
     {"sustain pedal", "CC 64", true, "down from 64 on"},
     {"portamento", "CC 65", true, "from 64 on pitches glide, below they do not, whatever the preset says"},
     {"sostenuto pedal", "CC 66", true, "from 64 on holds the keys that are down as it goes down"},
-    {"soft pedal", "CC 67", true, "what is struck while it is down is up to 2.5 dB softer, and darker"},
+    {"soft pedal", "CC 67", true, "what is struck while it is down sounds as at three quarters of its velocity"},
     {"legato switch", "CC 68", true, "from 64 on a channel that plays mono is not struck again while a key is down"},
     {"data increment, decrement", "CC 96, 97", true, "of the registered parameter, by its smallest step"},
     {"NRPN", "CC 98, 99", false, "data after it goes nowhere"},

@@ -88,6 +88,34 @@ int audio_input_count(const Network& network, const Preset& preset) {
 
 }  // namespace
 
+bool has_swings(const Preset& preset) {
+  return std::any_of(preset.controls.begin(), preset.controls.end(),
+                     [](const ControlSetting& control) { return control.in_swings; });
+}
+
+Preset without_swings(Preset preset) {
+  std::erase_if(preset.controls, [](const ControlSetting& control) { return control.in_swings; });
+  for (ControlSetting& control : preset.controls) {
+    control.has_level = false;  // which is of the sound, and moves nothing
+  }
+  preset.gain = 1.0;
+  return preset;
+}
+
+Preset in_positions(Preset preset, const Network& network, double swing) {
+  for (ControlSetting& control : preset.controls) {
+    const int input = control.in_swings ? find_input(network, control.target) : -1;
+    const auto touch =
+        input >= 0 ? touch_of(network, static_cast<std::size_t>(input)) : std::nullopt;
+    if (touch) {
+      control.low = touch->position + touch->inwards * swing * control.low;
+      control.high = touch->position + touch->inwards * swing * control.high;
+      control.in_swings = false;
+    }
+  }
+  return preset;
+}
+
 Playing make_playing(const Network& network, const Preset& preset, const Analysis& analysis,
                      bool bare, int voices, double gain) {
   return {

@@ -102,6 +102,9 @@ Preset default_preset(const Network& network, bool bare) {
   preset.keyboard = !bare;
   preset.voices = bare ? 1 : usual_voices(network);
   preset.damper_s = bare ? 0.0 : 0.3;
+  constexpr int first_general_purpose = 16;
+  constexpr int last_general_purpose = 19;
+  int hand = first_general_purpose;
   bool first = true;
   for (const Input& input : network.inputs) {
     const auto note = played_by_key(network, input);
@@ -118,7 +121,16 @@ Preset default_preset(const Network& network, bool bare) {
                                  .low = middle - note->travel,
                                  .high = middle + note->travel});
     }
-    if (bare || !note || (note->gesture == Gesture::swing && !is_played)) {
+    const bool is_free = note && note->gesture == Gesture::swing && !is_played;
+    if (!bare && is_free && hand <= last_general_purpose) {
+      preset.controls.push_back({.source = ControlSource::controller,
+                                 .number = hand++,
+                                 .target = note->target,
+                                 .gesture = Gesture::touch,
+                                 .low = -2.0,
+                                 .high = 1.0,
+                                 .in_swings = true});
+    } else if (bare || !note || is_free) {
       preset.controls.push_back({.source = ControlSource::audio,
                                  .number = input.number,
                                  .target = "in" + std::to_string(input.number),

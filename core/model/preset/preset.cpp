@@ -172,6 +172,14 @@ void read_control(const toml::table& table, Preset& preset, std::vector<Error>& 
     control.highest_key = static_cast<int>(highest);
   }
   read_round_robin(reader, control);
+  if (std::string unit; reader.text("unit", unit)) {
+    control.in_swings = unit == "swing";
+    if (unit != "swing" && unit != "position") {
+      reader.fail(*table.get("unit"), "'unit' must be position or swing");
+    } else if (control.in_swings && control.gesture != Gesture::touch) {
+      reader.fail(*table.get("unit"), "only a touch is measured in swings");
+    }
+  }
   std::string curve = "linear";
   if (reader.text("curve", curve) && curve != "exponential" && curve != "linear") {
     reader.fail(*table.get("curve"), "'curve' must be linear or exponential");

@@ -38,6 +38,9 @@ struct ControlSetting {
   double low = 0.0;   // what 0 and 1 of the source become: a position, a force, a speed in
   double high = 1.0;  //   units per sample at 44 100 Hz, a parameter's value
   bool exponential = false;
+  // `low` and `high` are how deep a finger lies, in swings: how far a loud note moves what it
+  // touches; below 0 it is off.
+  bool in_swings = false;
   double travel = 0.0;     // how far from its middle the input rests, on either side
   bool has_level = false;  // 0 and 1 of the source are levels of the voice, too
   double low_db = 0.0;
@@ -115,8 +118,9 @@ ParsedPreset parse_preset(std::string_view toml,
                           bool (*is_reserved)(std::string_view address) = nullptr);
 
 // What a model without a preset is played with: notes and the modulation wheel drive its first
-// input by the gesture that its links ask for, audio channels drive the inputs that no hand does.
-// `bare`: gain 1, audio channel n on input n, for rendering the network alone.
+// input by the gesture that its links ask for, controllers 16 to 19 lay fingers on the first
+// contacts that no key plays, and audio channels drive the inputs that no hand does. `bare`: gain
+// 1, audio channel n on input n, for rendering the network alone.
 Preset default_preset(const Network& network, bool bare);
 
 // Why no key plays a network with its default preset, and the line that would let one, at the place

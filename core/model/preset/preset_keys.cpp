@@ -36,6 +36,7 @@ constexpr PresetKey keys[] = {
     {"control", "to", "text", "an input, such as `in1`, or a parameter; needed"},
     {"control", "how", "see below", "without it an input is moved and a parameter is turned"},
     {"control", "range", "[low, high] ([0, 1])", "what the softest and the loudest become: positions, forces, a parameter's values, or speeds per sample at 44 100 Hz"},
+    {"control", "unit", "`position` or `swing` (`position`)", "of a touch: what `range` counts in. A swing is how far a loud note moves what sounds, measured as the model is loaded: at -2 the finger is off, at 0 it lies where what rests would feel it, at 1 it is pressed as deep as that swings, whatever the masses and springs"},
     {"control", "curve", "`linear` or `exponential` (`linear`)", "exponential: equal steps are equal ratios"},
     {"control", "travel", "above 0", "of a pluck, which needs it: how far from the string the finger rests, on either side"},
     {"control", "level_db", "[low, high]", "how loud the softest and the loudest are beside `gain`; exact for plucks, bows and blows, whose sound does not depend on how large it is. Without it the level is what `range` makes of it"},
