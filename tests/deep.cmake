@@ -6,7 +6,7 @@ set(ressort_fuzzers model preset score midi smf scala console osc osc_packet fli
 list(TRANSFORM ressort_fuzzers PREPEND fuzz_ OUTPUT_VARIABLE ressort_deep_tests)
 list(APPEND ressort_deep_tests arm everything_sanitized everything_more forms_everywhere
   accuracy_everywhere silence_everywhere modes_everywhere calculix_everywhere bodies_everywhere
-  lint scenes_more abuse_long bows edits_more flights_everywhere server_killed installed soak)
+  lint scenes_more abuse_long bows settings_more edits_more flights_everywhere server_killed installed soak)
 list(LENGTH ressort_deep_tests ressort_deep_count)
 
 # SECONDS is about what it needs on two cores.
@@ -73,6 +73,10 @@ add_deep_test(edits_more 300 ${CMAKE_COMMAND} -E env RESSORT_EDITS=1000
 
 # Every bow at every speed and pressure on 24 keys.
 add_deep_test(bows 60 $<TARGET_FILE:ressort_voicing> --bows 8 Violin Cello DoubleBass)
+
+# Random settings of all controls of each preset, and a note at each; RESSORT_SETTINGS asks for more.
+add_deep_test(settings_more 600 sh -c
+  "exec $<TARGET_FILE:ressort_voicing> --random \${RESSORT_SETTINGS:-200}")
 
 # A minute of it for each instrument.
 add_deep_test(abuse_long 300 $<TARGET_FILE:ressort_abuse> 60 2)

@@ -416,8 +416,21 @@ Result<Compiled> compile_by_stages(const Request& request) {
 Result<Compiled> compile(const Network& network, const Preset& preset,
                          const CompileOptions& options) {
   try {
-    return preset.fixed.empty() ? compile_by_stages({network, preset, options})
-                                : compile_by_stages({with_fixed(network, preset), preset, options});
+    const Network marked = preset.fixed.empty() ? Network() : with_fixed(network, preset);
+    const Network& written = preset.fixed.empty() ? network : marked;
+    const Network touched = has_swings(preset) ? heard_where_touched(written, preset) : Network();
+    if (touched.outputs.empty()) {
+      return compile_by_stages({written, preset, options});
+    }
+    CompileOptions one = options;
+    one.voices = 1;
+    one.find_gain = true;
+    const auto measured = compile_by_stages({touched, without_swings(preset), one});
+    if (!measured) {
+      return measured.error();
+    }
+    const double swing = found_gain_peak / measured->instrument.gain;
+    return compile_by_stages({written, in_positions(preset, written, swing), options});
   } catch (const Stopped&) {
     return Error{stopped};
   }

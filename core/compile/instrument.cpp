@@ -21,6 +21,8 @@ Control make_control(const Network& network, const ControlSetting& setting) {
       setting.source == ControlSource::audio ? setting.number - 1 : setting.number);
   control.lowest_key = static_cast<std::uint8_t>(setting.lowest_key);
   control.highest_key = static_cast<std::uint8_t>(setting.highest_key);
+  control.turn = static_cast<std::uint8_t>(setting.turn - 1);
+  control.turns = static_cast<std::uint8_t>(setting.turns);
   control.low = setting.low;
   control.high = setting.high;
   control.exponential = setting.exponential;
@@ -143,6 +145,34 @@ std::vector<StruckInfo> find_struck(const Network& network, const Machine& machi
   return struck;
 }
 
+bool has_swings(const Preset& preset) {
+  return std::any_of(preset.controls.begin(), preset.controls.end(),
+                     [](const ControlSetting& control) { return control.in_swings; });
+}
+
+Preset without_swings(Preset preset) {
+  std::erase_if(preset.controls, [](const ControlSetting& control) { return control.in_swings; });
+  for (ControlSetting& control : preset.controls) {
+    control.has_level = false;  // which is of the sound, and moves nothing
+  }
+  preset.gain = 1.0;
+  return preset;
+}
+
+Preset in_positions(Preset preset, const Network& network, double swing) {
+  for (ControlSetting& control : preset.controls) {
+    const int input = control.in_swings ? find_input(network, control.target) : -1;
+    const auto touch =
+        input >= 0 ? touch_of(network, static_cast<std::size_t>(input)) : std::nullopt;
+    if (touch) {
+      control.low = touch->position + touch->inwards * swing * control.low;
+      control.high = touch->position + touch->inwards * swing * control.high;
+      control.in_swings = false;
+    }
+  }
+  return preset;
+}
+
 Playing make_playing(const Network& network, const Preset& preset, const Analysis& analysis,
                      bool bare, int voices, double gain) {
   return {
@@ -150,6 +180,7 @@ Playing make_playing(const Network& network, const Preset& preset, const Analysi
       .gain = gain,
       .bare = bare,
       .damper_s = preset.damper_s,
+      .decay_s = preset.decay_s,
       .noise = preset.noise,
       .tuning = analysis.mode ? Tuning::keyboard : Tuning::fixed,
       .transpose = static_cast<double>(preset.transpose),

@@ -62,6 +62,12 @@ struct Instrument {
   Verdict verdict = Verdict::stable;  // of what is always felt, in all ranges
 };
 
+// Hands whose ranges are in swings wait until it is known how far that is: the preset without them,
+// to measure it by, and with them in positions, once a loud note swings so far.
+bool has_swings(const Preset& preset);
+Preset without_swings(Preset preset);
+Preset in_positions(Preset preset, const Network& network, double swing);
+
 // All that is known of a network before it sounds.
 struct Analysis {
   std::optional<Mode> mode;  // the lowest, where keys set the pitch by it

@@ -58,7 +58,6 @@ std::optional<Error> shortage(const Machine& machine, int voices, Precision prec
 std::optional<double> find_gain(const Machine& machine, const Playing& playing, Precision precision,
                                 Isa isa, const Progress& progress) {
   constexpr double forte = 0.8;
-  constexpr double wanted_peak = 0.5;
   constexpr double most_steps = 4e6;
   constexpr double most_steps_at_worst = 1e9;
   constexpr double most_steps_of_block = 4e6;
@@ -97,7 +96,7 @@ std::optional<double> find_gain(const Machine& machine, const Playing& playing, 
       }
     }
   }
-  return peak > 1e-12 ? wanted_peak / peak : 1.0;
+  return peak > 1e-12 ? found_gain_peak / peak : 1.0;
 }
 
 std::unique_ptr<Engine> make_engine(Machine machine, Playing playing, Precision precision, Isa isa,

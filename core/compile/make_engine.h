@@ -20,6 +20,9 @@ std::uint64_t engine_bytes(const Machine& machine, int voices, Precision precisi
 std::optional<Error> shortage(const Machine& machine, int voices, Precision precision,
                               std::uint64_t most_bytes);
 
+// What a loud note peaks at by the gain that find_gain() finds.
+inline constexpr double found_gain_peak = 0.5;
+
 // The gain at which a forte note peaks at -6 dBFS, found by playing one: what a model that comes
 // without a preset is played with. `playing`: by one voice at gain 1. 1 where notes excite nothing.
 // Bounded to about 4 million steps of a mass; nothing where even the beginning of a note might take

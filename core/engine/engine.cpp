@@ -205,6 +205,7 @@ struct Engine::Player {
 
   // What means the same everywhere; all of it may be in the preset too.
   void turn_controller(const Event& event) {
+    constexpr int modulation_wheel = 1;
     constexpr int all_sound_off = 120;
     constexpr int reset_all_controllers = 121;
     constexpr int all_notes_off = 123;  // and the modes from there on, which imply it
@@ -212,6 +213,7 @@ struct Engine::Player {
     constexpr int poly_on = 127;
     const std::uint8_t channel = event.channel % Channels::count;
     const ChannelMask reached = voices.reach(channel);
+    const double modulation = voices.modulation(channel);
     const auto let_go = [&] {
       release([&](Voice& voice) { return voices.is_let_go(voice, channel); });
     };
@@ -245,7 +247,14 @@ struct Engine::Player {
         }
       }
     }
-    gestures.perform(Source::controller, event.index, event.value, {.channels = reached});
+    if (event.index != modulation_wheel) {
+      gestures.perform(Source::controller, event.index, event.value, {.channels = reached});
+    }
+    // Its depth may have changed, or a reset have put it back.
+    if (event.index == modulation_wheel || voices.modulation(channel) != modulation) {
+      gestures.perform(Source::controller, modulation_wheel, voices.modulation(channel),
+                       {.channels = reached});
+    }
   }
 
   // --- sound ---

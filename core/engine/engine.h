@@ -9,6 +9,7 @@
 #include <span>
 #include <vector>
 
+#include "core/curve.h"
 #include "core/engine/event.h"
 #include "core/engine/midi/channels.h"
 #include "core/engine/midi/key_tuning.h"
@@ -28,6 +29,8 @@ struct Control {
   std::uint16_t number = 0;  // controller 0..127 or audio channel from 0
   std::uint8_t lowest_key = 0;
   std::uint8_t highest_key = 127;
+  std::uint8_t turn = 0;   // of notes: whether it is its turn,
+  std::uint8_t turns = 1;  //   among so many controls
   Gesture gesture = Gesture::position;
   std::uint16_t target = 0;  // index into Machine::inputs or Machine::parameters
   double low = 0.0;          // 0..1 becomes low..high: positions, forces, speeds per sample at
@@ -95,10 +98,11 @@ struct PitchesAlong {
 // How a Machine is played. Plain data, made by the compile room.
 struct Playing {
   int voices = 1;
-  double gain = 1.0;      // output per position unit
-  bool bare = false;      // the network alone: no ramps, no smoothing, no sleep
-  double damper_s = 0.0;  // T60 of a voice whose key is up; 0: it rings out
-  bool noise = false;     // the outputs shape white noise instead of being heard themselves
+  double gain = 1.0;                // output per position unit
+  bool bare = false;                // the network alone: no ramps, no smoothing, no sleep
+  double damper_s = 0.0;            // T60 of a voice whose key is up; 0: it rings out
+  std::vector<CurvePoint> decay_s;  // T60 of any voice with a key, beside its own; empty: none
+  bool noise = false;  // the outputs shape white noise instead of being heard themselves
   Tuning tuning = Tuning::fixed;
   double transpose = 0.0;  // semitones, that the keys' frequencies have already
   KeyFrequencies keys_hz = equal_temperament(440.0, 0.0);

@@ -7,6 +7,10 @@
 namespace ressort {
 namespace {
 
+bool has_turn(const Control& control, std::uint64_t stroke) {
+  return control.turns < 2 || stroke % control.turns == control.turn;
+}
+
 bool is_asked(const Control& control, Source source, int number) {
   const bool is_in_range = number >= control.lowest_key && number <= control.highest_key;
   return control.source == source && (source == Source::note         ? is_in_range
@@ -53,6 +57,7 @@ void Gestures::go_on_from(const Gestures& from) {
   drivers_ = from.drivers_;
   pitches_ = from.pitches_;
   starts_ = from.starts_;
+  strokes_ = from.strokes_;
 }
 
 void Gestures::place(std::size_t lane) {
@@ -154,10 +159,11 @@ void Gestures::perform(const Control& control, double amount, const Scope& scope
 
 void Gestures::perform(Source source, int number, double amount, const Scope& scope) {
   for (const Control& control : playing_.controls) {
-    if (is_asked(control, source, number)) {
+    if (is_asked(control, source, number) && has_turn(control, strokes_)) {
       perform(control, amount, scope);
     }
   }
+  strokes_ += source == Source::note ? 1 : 0;
 }
 
 // Where the next hand starts is as if the voice were a new one here.

@@ -71,6 +71,7 @@ class Gestures {
   std::vector<InputDriver> drivers_;  // [lane][input]
   std::vector<double> pitches_;       // [lane] to that of the model, for which they move
   std::vector<double> starts_;        // [channel][input] where a new voice's driver is
+  std::uint64_t strokes_ = 0;         // notes that were played: whose turn it is
 };
 
 }  // namespace ressort

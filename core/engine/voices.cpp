@@ -114,12 +114,15 @@ Press Voices::press_key(int key, double velocity, std::uint8_t channel, double h
   const bool glides = overlaps || !is_legato(channel);
   held.press(key, velocity, frequency_hz);
   Voice* const alone = channels_.is_mono(channel, playing_.mono) ? voice_on(channel) : nullptr;
-  if (alone != nullptr && !is_one && alone->is_whole()) {
+  const bool is_struck = !overlaps || !is_legato(channel);
+  if (alone != nullptr && !is_one && (alone->is_whole() || (alone->held && !is_struck))) {
     last_ = static_cast<std::size_t>(alone - voices_.data());
-    const bool is_struck = !overlaps || !is_legato(channel);
     attach(*alone, key, channel);
     move_to(*alone, key, frequency_hz, glides, highest_factor);
     return is_struck ? Press::strikes : Press::moves;
+  }
+  if (alone != nullptr && !is_one && alone->held) {
+    replace(*alone);
   }
   if (!is_one && !restrikes_) {
     damp_earlier(key, channel);
@@ -276,6 +279,7 @@ Channels::Change Voices::turn(std::uint8_t channel, int number, double value) {
     case Channels::Change::sustain:
       damp(channel);
       break;
+    case Channels::Change::modulation:
     case Channels::Change::nothing:
       break;
   }
@@ -333,12 +337,17 @@ void Voices::damp(std::uint8_t channel) {
 void Voices::damp_earlier(int key, std::uint8_t channel) {
   for (Voice& voice : voices_) {
     if (voice.is_live() && voice.has_key && voice.key == key && voice.channel == channel) {
-      voice.held = voice.sustained = voice.latched = false;
-      voice.is_released = voice.is_replaced = true;
-      voice.release_s = replaced_s;
-      damp(voice);
+      replace(voice);
     }
   }
+}
+
+// By another voice of its key, or of its channel where one plays alone.
+void Voices::replace(Voice& voice) const {
+  voice.held = voice.sustained = voice.latched = false;
+  voice.is_released = voice.is_replaced = true;
+  voice.release_s = replaced_s;
+  damp(voice);
 }
 
 bool Voices::is_any_held() const {
@@ -360,8 +369,11 @@ void Voices::damp(Voice& voice) const {
   constexpr double decades_of_t60 = 3.0;
   const bool may_lie = voice.is_released && !voice.latched && playing_.damper_s > 0.0;
   const double share = voice.is_replaced ? 1.0 : may_lie ? channels_.damper(voice.channel) : 0.0;
-  voice.decay.kept_goal =
-      std::pow(10.0, -decades_of_t60 * share / (std::max(1e-3, voice.release_s) * rate_hz_));
+  double per_s = share / std::max(1e-3, voice.release_s);  // 60 dB
+  if (voice.has_key && !playing_.decay_s.empty()) {
+    per_s += 1.0 / value_at(playing_.decay_s, voice.key);
+  }
+  voice.decay.kept_goal = std::pow(10.0, -decades_of_t60 * per_s / rate_hz_);
 }
 
 SideGains Voices::level_of(std::uint8_t channel) const {

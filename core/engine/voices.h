@@ -90,7 +90,7 @@ struct Voice {
   double factor = 1.0;         // on every stiffness
   Decay decay;
   bool is_released = false;  // its key has been up since it was pressed
-  bool is_replaced = false;  // by another voice of its key
+  bool is_replaced = false;  // by another voice, of its key or its channel
   double release_s = 0.0;    // T60 that its damper wants, by how fast the key went up
   double strength = 1.0;     // of the output, by how hard the key was pressed
   // Its strength and its channel's level, which it follows in equal steps.
@@ -154,6 +154,7 @@ class Voices {
   Channels::Change turn(std::uint8_t channel, int number, double value);
   void bend(std::uint8_t channel, double amount);
   void reset_controllers(std::uint8_t channel);
+  double modulation(std::uint8_t channel) const { return channels_.modulation(channel); }
   void set_mono(std::uint8_t channel, bool is_mono) { channels_.set_mono(channel, is_mono); }
   bool is_mono(std::uint8_t channel) const { return channels_.is_mono(channel, playing_.mono); }
   ChannelMask rezoned() const { return channels_.rezoned(); }
@@ -204,6 +205,7 @@ class Voices {
   void damp(Voice& voice) const;
   void damp(std::uint8_t channel);
   void damp_earlier(int key, std::uint8_t channel);
+  void replace(Voice& voice) const;
   void retune(std::uint8_t channel);
   void follow_level(Voice& voice) const;
   void follow_level(std::uint8_t channel);

@@ -31,6 +31,10 @@ add_test(NAME command_line COMMAND ${CMAKE_CURRENT_SOURCE_DIR}/system/command_li
   $<TARGET_FILE:ressort> ${CMAKE_SOURCE_DIR})
 set_tests_properties(command_line PROPERTIES TIMEOUT 240 LABELS servers RUN_SERIAL TRUE)
 
+# The front page's examples and those of presets/README.md can be heard.
+add_test(NAME examples COMMAND ${CMAKE_CURRENT_SOURCE_DIR}/system/examples $<TARGET_FILE:ressort>)
+set_tests_properties(examples PROPERTIES TIMEOUT 240 LABELS integration)
+
 # What is exported to FAUST, through the faust compiler and this C++ compiler.
 add_ressort_tests(ressort_export_tests system/export_test.cpp)
 target_link_libraries(ressort_export_tests PRIVATE ressort_app)

@@ -44,6 +44,7 @@ Preset without_numbers(Preset preset) {
   preset.budget = {};
   preset.gain = preset.damper_s = preset.glide_s = preset.velocity = 0.0;
   preset.velocity_points.clear();
+  preset.decay_s.clear();
   for (ControlSetting& control : preset.controls) {
     control = {.source = control.source,
                .number = control.number,
@@ -51,7 +52,9 @@ Preset without_numbers(Preset preset) {
                .target = control.target,
                .gesture = control.gesture,
                .lowest_key = control.lowest_key,
-               .highest_key = control.highest_key};
+               .highest_key = control.highest_key,
+               .turn = control.turn,
+               .turns = control.turns};
   }
   return preset;
 }

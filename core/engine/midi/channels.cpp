@@ -9,6 +9,7 @@ namespace {
 
 // Controllers, by their numbers in MIDI 1.0.
 enum Number : int {
+  modulation_wheel = 1,
   portamento_time = 5,
   data_entry = 6,
   volume = 7,
@@ -29,12 +30,19 @@ enum Number : int {
 };
 
 // Registered parameters.
-enum Parameter : int { bend_range = 0, fine_tuning = 1, coarse_tuning = 2, mpe_configuration = 6 };
+enum Parameter : int {
+  bend_range = 0,
+  fine_tuning = 1,
+  coarse_tuning = 2,
+  modulation_depth_range = 5,
+  mpe_configuration = 6
+};
 
 constexpr int most_data = 0x3fff;
 constexpr double member_bend_range = 48.0;  // semitones, of MPE
 static_assert(member_bend_range == note_bend_semitones);
 constexpr double usual_bend_range = 2.0;
+constexpr double usual_depth_data = 64.0;  // 50 cents, in 128ths of a semitone, of General MIDI 2
 
 // From the left, -1, to the right; 64 is the middle, 1 as far to the left as 127 to the right, and
 // 0 no further, as General MIDI 2 has it (RP-036).
@@ -63,6 +71,9 @@ Channels::Change Channels::turn(std::uint8_t index, int number, double value) {
   const int bits = static_cast<int>(std::lround(127.0 * std::clamp(value, 0.0, 1.0)));
   const bool is_down = value >= 0.5;
   switch (number) {
+    case modulation_wheel:
+      channel.wheel = value;
+      return Change::modulation;
     case volume:
       channel.volume = value;
       return Change::level;
@@ -132,6 +143,9 @@ Channels::Change Channels::enter(std::uint8_t index) {
     case coarse_tuning:
       channel.coarse = coarse - middle;
       return Change::pitch;
+    case modulation_depth_range:
+      channel.wheel_depth = channel.data / usual_depth_data;
+      return Change::modulation;
     case mpe_configuration:
       return set_zone(index, coarse);
     default:
@@ -209,7 +223,7 @@ ChannelMask Channels::members() const {
 
 void Channels::reset(std::uint8_t index) {
   Channel& channel = of(index);
-  channel.bend = 0.0;
+  channel.bend = channel.wheel = 0.0;
   channel.expression = 1.0;
   channel.sustain = 0.0;
   channel.sostenuto = channel.legato = false;
@@ -259,8 +273,12 @@ double Channels::damper(std::uint8_t channel) const {
 }
 
 double Channels::softness(std::uint8_t channel) const {
-  constexpr double softest = 0.6;
+  constexpr double softest = 0.75;
   return 1.0 - (1.0 - softest) * std::max(of(channel).soft, zone(channel).soft);
+}
+
+double Channels::modulation(std::uint8_t channel) const {
+  return std::clamp(of(channel).wheel * of(channel).wheel_depth, 0.0, 1.0);
 }
 
 double Channels::glide_s(std::uint8_t channel, double preset) const {

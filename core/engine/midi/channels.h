@@ -47,7 +47,7 @@ class Channels {
   void adopt(const Channels& from);
 
   // What a controller has changed.
-  enum class Change : std::uint8_t { nothing, pitch, level, sustain, sostenuto, zones };
+  enum class Change : std::uint8_t { nothing, pitch, level, sustain, sostenuto, zones, modulation };
 
   // Of a number 0..127 that means something everywhere, for 0..1; the channel modes from 120 on are
   // the player's.
@@ -94,6 +94,8 @@ class Channels {
   }
   bool is_legato(std::uint8_t channel) const { return of(channel).legato || zone(channel).legato; }
   double glide_s(std::uint8_t channel, double preset) const;
+  // What the modulation wheel says, 0..1 of all that it may do: where it stands, times its depth.
+  double modulation(std::uint8_t channel) const;
 
  private:
   static constexpr int no_parameter = 0x3fff;
@@ -103,7 +105,9 @@ class Channels {
   struct Channel {
     double bend = 0.0;
     double bend_range = 2.0;  // semitones
-    double fine = 0.0;        // semitones
+    double wheel = 0.0;       // of modulation
+    double wheel_depth = 1.0;
+    double fine = 0.0;  // semitones
     double coarse = 0.0;
     double volume = 100.0 / 127.0;
     double expression = 1.0;

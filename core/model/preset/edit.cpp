@@ -56,6 +56,7 @@ std::string print_control(const ControlSetting& control) {
     text += "how = " + in_quotes(row_of(control.gesture).name) + "\n";
   }
   text += "range = " + pair(control.low, control.high) + "\n";
+  text += control.in_swings ? "unit = \"swing\"\n" : "";
   text += control.exponential ? "curve = \"exponential\"\n" : "";
   text += control.travel != usual.travel ? "travel = " + in_toml(control.travel) + "\n" : "";
   text += control.has_level ? "level_db = " + pair(control.low_db, control.high_db) + "\n" : "";
@@ -65,6 +66,10 @@ std::string print_control(const ControlSetting& control) {
   if (control.lowest_key != usual.lowest_key || control.highest_key != usual.highest_key) {
     text += "keys = [" + std::to_string(control.lowest_key) + ", " +
             std::to_string(control.highest_key) + "]\n";
+  }
+  if (control.turns != usual.turns) {
+    text += "round_robin = [" + std::to_string(control.turn) + ", " +
+            std::to_string(control.turns) + "]\n";
   }
   return text;
 }

@@ -2,8 +2,10 @@
 
 #include <algorithm>
 #include <charconv>
+#include <cmath>
 #include <string>
 
+#include "core/laws/laws.h"
 #include "core/model/language/tokens.h"
 
 namespace ressort {
@@ -29,6 +31,9 @@ std::string misfit(const Network& network, const ControlSetting& control) {
   if (input < 0) {
     return "the model has no input " + quoted(control.target) + "; it has " +
            std::to_string(network.inputs.size());
+  }
+  if (control.in_swings && !touch_of(network, static_cast<std::size_t>(input))) {
+    return "'" + control.target + "' touches nothing: a swing needs a contact or a pluck there";
   }
   return network.inputs[static_cast<std::size_t>(input)].is_force &&
                  row_of(control.gesture).needs_position
@@ -81,6 +86,43 @@ int find_parameter(const Network& network, std::string_view name) {
     }
   }
   return -1;
+}
+
+std::optional<Touch> touch_of(const Network& network, std::size_t input) {
+  const std::uint32_t hand = network.inputs[input].mass;
+  for (const Link& link : network.links) {
+    const LawFacts& facts = facts_of(link.law);
+    const bool is_touched = facts.family == Family::contact || facts.family == Family::pluck;
+    if (network.inputs[input].is_force || !is_touched || (link.a != hand && link.b != hand)) {
+      continue;
+    }
+    const double reach =
+        argument_value(network, link.arguments[facts.slot(Role::reach)], parameter_values(network));
+    const std::uint32_t mass = link.a == hand ? link.b : link.a;
+    const double rest = network.masses[mass].position;
+    // Of a contact the first end is the lower one; a finger comes from where the model has it.
+    const bool is_below =
+        facts.family == Family::contact ? link.a == hand : network.masses[hand].position < rest;
+    const double inwards = is_below ? 1.0 : -1.0;
+    return Touch{.mass = mass, .position = rest - inwards * std::fabs(reach), .inwards = inwards};
+  }
+  return std::nullopt;
+}
+
+Network heard_where_touched(Network network, const Preset& preset) {
+  constexpr double far_away = 1e9;
+  network.outputs.clear();
+  for (const ControlSetting& control : preset.controls) {
+    const int input = control.in_swings ? find_input(network, control.target) : -1;
+    if (const auto touch =
+            input < 0 ? std::nullopt : touch_of(network, static_cast<std::size_t>(input))) {
+      network.outputs.push_back(
+          {.number = static_cast<int>(network.outputs.size()) + 1, .mass = touch->mass});
+      Mass& hand = network.masses[network.inputs[static_cast<std::size_t>(input)].mass];
+      hand.position = touch->position - touch->inwards * far_away;
+    }
+  }
+  return network;
 }
 
 Network with_fixed(Network network, const Preset& preset) {

@@ -102,6 +102,23 @@ Gesture usual_gesture(std::string_view target) {
              : Gesture::parameter;
 }
 
+// "round_robin = [1, 2]"
+void read_round_robin(TomlTable& reader, ControlSetting& control) {
+  constexpr double most_turns = 16.0;
+  double turn = control.turn;
+  double turns = control.turns;
+  if (!reader.range("round_robin", turn, turns, 1.0, most_turns)) {
+    return;
+  }
+  if (turn != std::floor(turn) || turns != std::floor(turns)) {
+    reader.fail(*reader.get("round_robin"), "'round_robin' must be two whole numbers: [1, 2]");
+  } else if (control.source != ControlSource::note) {
+    reader.fail(*reader.get("round_robin"), "'round_robin' is for notes");
+  }
+  control.turn = static_cast<int>(turn);
+  control.turns = static_cast<int>(turns);
+}
+
 void read_control(const toml::table& table, Preset& preset, std::vector<Error>& errors,
                   IsReserved is_reserved) {
   const std::size_t before = errors.size();
@@ -154,6 +171,15 @@ void read_control(const toml::table& table, Preset& preset, std::vector<Error>& 
   if (reader.range("keys", lowest, highest, 0.0, 127.0)) {
     control.lowest_key = static_cast<int>(lowest);
     control.highest_key = static_cast<int>(highest);
+  }
+  read_round_robin(reader, control);
+  if (std::string unit; reader.text("unit", unit)) {
+    control.in_swings = unit == "swing";
+    if (unit != "swing" && unit != "position") {
+      reader.fail(*table.get("unit"), "'unit' must be position or swing");
+    } else if (control.in_swings && control.gesture != Gesture::touch) {
+      reader.fail(*table.get("unit"), "only a touch is measured in swings");
+    }
   }
   std::string curve = "linear";
   if (reader.text("curve", curve) && curve != "exponential" && curve != "linear") {
@@ -254,20 +280,13 @@ void read_velocity_points(const toml::array& rows, TomlTable& reader, Preset& pr
   }
 }
 
-void read_flattening(const toml::table& root, TomlTable& reader, Preset& preset) {
-  constexpr double most_cents = 100.0;
-  const char* const name = "flattening_cents";
-  if (const toml::node* node = root.get(name); node != nullptr && node->is_array()) {
-    read_points(*node->as_array(), reader,
-                {.name = name,
-                 .example = "[[48, 8], [96, 6]]",
-                 .point = "[key, cents]",
-                 .least = {0.0, -most_cents},
-                 .most = {127.0, most_cents},
-                 .bounds = "a key lies between 0 and 127, its cents between -100 and 100"},
-                preset.flattening_cents);
-  } else if (double cents = 0.0; reader.number(name, cents, -most_cents, most_cents)) {
-    preset.flattening_cents = {{0.0, cents}};
+// A number, or one for each of some keys.
+void read_by_key(const toml::table& root, TomlTable& reader, const CurveWords& words,
+                 std::vector<CurvePoint>& points) {
+  if (const toml::node* node = root.get(words.name); node != nullptr && node->is_array()) {
+    read_points(*node->as_array(), reader, words, points);
+  } else if (double value = 0.0; reader.number(words.name, value, words.least[1], words.most[1])) {
+    points = {{0.0, value}};
   }
 }
 
@@ -368,7 +387,22 @@ void read_root(const toml::table& root, Preset& preset, std::vector<Error>& erro
   if (reader.text("tuned_along", preset.tuned_along)) {
     preset.tuned_along_location = location_of(*root.get("tuned_along"));
   }
-  read_flattening(root, reader, preset);
+  read_by_key(root, reader,
+              {.name = "decay_s",
+               .example = "[[36, 12], [96, 2]]",
+               .point = "[key, seconds]",
+               .least = {0.0, 0.001},
+               .most = {127.0, 600.0},
+               .bounds = "a key lies between 0 and 127, its seconds between 0.001 and 600"},
+              preset.decay_s);
+  read_by_key(root, reader,
+              {.name = "flattening_cents",
+               .example = "[[48, 8], [96, 6]]",
+               .point = "[key, cents]",
+               .least = {0.0, -100.0},
+               .most = {127.0, 100.0},
+               .bounds = "a key lies between 0 and 127, its cents between -100 and 100"},
+              preset.flattening_cents);
   read_keys(root, reader, preset);
   if (std::string budget; reader.text("budget", budget)) {
     if (const auto parsed = parse_budget(budget)) {
@@ -416,91 +450,6 @@ void read_root(const toml::table& root, Preset& preset, std::vector<Error>& erro
   }
 }
 
-bool never_moves(const Mass& mass) {
-  return mass.kind == MassKind::ground || mass.kind == MassKind::position;
-}
-
-// The first link of a family at a mass; null where there is none.
-const Link* find_link(const Network& network, std::uint32_t mass, Family family) {
-  const auto at_mass = [&](const Link& link) {
-    return facts_of(link.law).family == family && (link.a == mass || link.b == mass);
-  };
-  const auto found = std::find_if(network.links.begin(), network.links.end(), at_mass);
-  return found == network.links.end() ? nullptr : &*found;
-}
-
-double reach_of(const Network& network, const Link& link) {
-  return argument_value(network, link.arguments[facts_of(link.law).slot(Role::reach)],
-                        parameter_values(network));
-}
-
-// How a key plays an input: struck, plucked, bowed or hit as its links ask for; nothing where
-// none does. Loudness is the level's, so that every velocity sounds as the law does best; only
-// blows get brighter as they get harder.
-std::optional<ControlSetting> played_by_key(const Network& network, const Input& input) {
-  constexpr double softest_db = -26.0;
-  ControlSetting note{.target = "in" + std::to_string(input.number)};
-  if (input.is_force) {
-    if (never_moves(network.masses[input.mass])) {
-      return std::nullopt;
-    }
-    note.gesture = Gesture::impulse;
-    note.low = 0.005;
-    note.high = 0.1;
-    note.exponential = true;
-    note.longest_ms = 4.0;
-    note.shortest_ms = 0.5;
-    return note;
-  }
-  note.has_level = true;
-  note.low_db = softest_db;
-  if (const Link* const pluck = find_link(network, input.mass, Family::pluck)) {
-    const double scale = reach_of(network, *pluck);
-    note.gesture = Gesture::pluck;
-    note.travel = 5.0 * scale;
-    // The slower the finger, the more it gives to the string before that slips away.
-    note.low = 0.15 * scale;
-    note.high = 0.05 * scale;
-    note.exponential = true;
-  } else if (const Link* const bow = find_link(network, input.mass, Family::bow)) {
-    const double scale = reach_of(network, *bow);
-    note.gesture = Gesture::bow;
-    note.low = 0.5 * scale;
-    note.high = 0.7 * scale;
-  } else if (const Link* const contact = find_link(network, input.mass, Family::contact)) {
-    // The first end is the lower one: the mallet swings from its own side.
-    const double side = contact->a == input.mass ? 1.0 : -1.0;
-    note.gesture = Gesture::swing;
-    note.travel = 0.1 + std::fabs(reach_of(network, *contact));
-    note.low = side * 0.1;
-    note.high = side * 0.5;
-    note.longest_ms = 12.0;
-    note.shortest_ms = 4.0;
-  } else {
-    return std::nullopt;
-  }
-  return note;
-}
-
-// As many as a core should bear of so many masses.
-int usual_voices(const Network& network) {
-  constexpr std::size_t most_masses = 2000;
-  return std::clamp(static_cast<int>(most_masses / std::max<std::size_t>(1, moving_count(network))),
-                    1, 8);
-}
-
-// What a force could strike, as a line refers to it; empty where nothing moves.
-std::string something_to_strike(const Network& network) {
-  for (const Mass& mass : network.masses) {
-    if (moves(mass)) {
-      return "@" + mass.name.text();
-    }
-  }
-  return network.macros.empty() ? ""
-                                : "[@" + network.macros[0].name +
-                                      (is_mesh(network.macros[0].kind) ? " 0.3 0.4]" : " 0.3]");
-}
-
 }  // namespace
 
 ParsedPreset parse_preset(std::string_view text, IsReserved is_reserved) {
@@ -531,68 +480,6 @@ ParsedPreset parse_preset(std::string_view text, IsReserved is_reserved) {
     read.errors.resize(most_preset_errors + 1);
   }
   return read;
-}
-
-Preset default_preset(const Network& network, bool bare) {
-  Preset preset;
-  preset.keyboard = !bare;
-  preset.voices = bare ? 1 : usual_voices(network);
-  preset.damper_s = bare ? 0.0 : 0.3;
-  bool first = true;
-  for (const Input& input : network.inputs) {
-    const auto note = played_by_key(network, input);
-    const bool is_played = note && (bare ? note->gesture != Gesture::swing : first);
-    if (is_played) {
-      preset.controls.push_back(*note);
-      first = false;
-    }
-    if (note && note->gesture == Gesture::pluck && !bare) {
-      const double middle = network.masses[input.mass].position;
-      preset.controls.push_back({.source = ControlSource::controller,
-                                 .number = 1,
-                                 .target = note->target,
-                                 .low = middle - note->travel,
-                                 .high = middle + note->travel});
-    }
-    if (bare || !note || (note->gesture == Gesture::swing && !is_played)) {
-      preset.controls.push_back({.source = ControlSource::audio,
-                                 .number = input.number,
-                                 .target = "in" + std::to_string(input.number),
-                                 .low = 0.0,
-                                 .high = 1.0});
-    }
-  }
-  return preset;
-}
-
-std::optional<Error> idle_keys(const Network& network, const Preset& preset) {
-  constexpr std::size_t most_told = 3;
-  const std::string target = something_to_strike(network);
-  if (target.empty() || std::any_of(preset.controls.begin(), preset.controls.end(),
-                                    [](const ControlSetting& control) {
-                                      return control.source == ControlSource::note;
-                                    })) {
-    return std::nullopt;
-  }
-  std::string why;
-  for (std::size_t i = 0; i < std::min(most_told, network.inputs.size()); ++i) {
-    const Input& input = network.inputs[i];
-    why +=
-        (i == 0 ? "" : ", ") + ("'@in" + std::to_string(input.number)) +
-        (input.is_force ? "' pushes what never moves" : "' moves no pluck, no bow and no contact");
-  }
-  if (network.inputs.size() > most_told) {
-    why += ", nor do " + std::to_string(network.inputs.size() - most_told) + " more";
-  }
-  int next = input_count(network) + 1;
-  for (const Parameter& parameter : network.parameters) {
-    next = std::max(next, parameter.audio_input + 1);
-  }
-  const SourceLocation location =
-      network.inputs.empty() ? SourceLocation{1, 1} : network.inputs[0].location;
-  return Error{"no key plays this model: " + (why.empty() ? "it has no input" : why) + "; '@in" +
-                   std::to_string(next) + " frcInput " + target + "' would let keys strike it",
-               location.line, location.column};
 }
 
 }  // namespace ressort

@@ -38,6 +38,9 @@ struct ControlSetting {
   double low = 0.0;   // what 0 and 1 of the source become: a position, a force, a speed in
   double high = 1.0;  //   units per sample at 44 100 Hz, a parameter's value
   bool exponential = false;
+  // `low` and `high` are how deep a finger lies, in swings: how far a loud note moves what it
+  // touches; below 0 it is off.
+  bool in_swings = false;
   double travel = 0.0;     // how far from its middle the input rests, on either side
   bool has_level = false;  // 0 and 1 of the source are levels of the voice, too
   double low_db = 0.0;
@@ -46,6 +49,8 @@ struct ControlSetting {
   double shortest_ms = 0.0;
   int lowest_key = 0;
   int highest_key = 127;
+  int turn = 1;  // of notes: its place among `turns` controls that take turns
+  int turns = 1;
   SourceLocation location;
   bool operator==(const ControlSetting&) const = default;
 };
@@ -68,10 +73,12 @@ struct Preset {
   int voices = 1;
   double gain = 1.0;      // output per unit of position
   double damper_s = 0.0;  // T60 of a voice whose key is up; 0: it rings out
-  bool noise = false;     // the outputs shape white noise
-  bool keyboard = true;   // a key sets the pitch
-  int transpose = 0;      // semitones between a key and the pitch that it sets
-  int pitch_mode = 1;     // which of its modes a key tunes, from the lowest
+  // T60 of a held note, beside what the model loses: keys and seconds, ascending; empty: nothing.
+  std::vector<CurvePoint> decay_s;
+  bool noise = false;    // the outputs shape white noise
+  bool keyboard = true;  // a key sets the pitch
+  int transpose = 0;     // semitones between a key and the pitch that it sets
+  int pitch_mode = 1;    // which of its modes a key tunes, from the lowest
   // Of the sound below that mode, to be made up for: keys and cents, ascending; empty: none.
   std::vector<CurvePoint> flattening_cents;
   std::string tuned_along;  // a parameter that leaves keys in tune wherever it is; empty: none
@@ -125,8 +132,9 @@ ParsedPreset parse_preset(std::string_view toml,
                           bool (*is_reserved)(std::string_view address) = nullptr);
 
 // What a model without a preset is played with: notes and the modulation wheel drive its first
-// input by the gesture that its links ask for, audio channels drive the inputs that no hand does.
-// `bare`: gain 1, audio channel n on input n, for rendering the network alone.
+// input by the gesture that its links ask for, controllers 16 to 19 lay fingers on the first
+// contacts that no key plays, and audio channels drive the inputs that no hand does. `bare`: gain
+// 1, audio channel n on input n, for rendering the network alone.
 Preset default_preset(const Network& network, bool bare);
 
 // Why no key plays a network with its default preset, and the line that would let one, at the place

@@ -58,7 +58,10 @@ Player::Player(const std::string& name, double rate_hz)
       blocker_(rate_hz) {}
 
 void Player::reset() {
-  std::vector<TimedEvent> events;
+  std::vector<TimedEvent> events = {{0.0, {.kind = EventKind::bend, .value = 0.0}}};
+  for (const int pedal : {64, 66, 67}) {
+    events.push_back({0.0, turn(pedal, 0.0)});
+  }
   for (const ControlSetting& control : scene_.preset.controls) {
     if (control.source == ControlSource::controller &&
         row_of(control.gesture).extent == Extent::range) {
@@ -73,6 +76,12 @@ void Player::reset() {
   }
   run(events, 0.2, nullptr);
   run({{0.0, {.kind = EventKind::panic}}}, 0.1, nullptr);
+}
+
+Stereo Player::go_on(double seconds) {
+  Stereo sound{.channels = {}, .rate_hz = rate_hz_};
+  run({}, seconds, &sound);
+  return sound;
 }
 
 Stereo Player::play(const std::vector<TimedEvent>& events, double seconds) {

@@ -27,9 +27,9 @@ class Player {
   // Throws std::runtime_error with all that is wrong.
   Player(const std::string& name, double rate_hz);
 
-  // From silence, parameters as the preset has them; events sorted by time. What comes in is a
-  // click a second, where the preset listens.
+  // From silence, parameters as the preset has them; events sorted by time. Nothing comes in.
   Stereo play(const std::vector<TimedEvent>& events, double seconds);
+  Stereo go_on(double seconds);            // with what sounds
   double real_time_share(double seconds);  // of a core, by all voices, one note each
 
   const Scene& scene() const { return scene_; }

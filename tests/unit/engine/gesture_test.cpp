@@ -301,6 +301,43 @@ TEST_CASE("audio moves the hand from where it is; in the bare network it is the 
   CHECK(quiet.out[0][99] == 0.5);
 }
 
+TEST_CASE("controls of a round robin take turns from note to note", "[gesture]") {
+  const std::string two = ringing_string() + "@in2 frcInput @s_m4\n";
+  const auto strike = [](const char* input, double force, int turn, int turns) {
+    return ControlSetting{.target = input,
+                          .gesture = Gesture::impulse,
+                          .low = force,
+                          .high = force,
+                          .turn = turn,
+                          .turns = turns};
+  };
+  const auto heard = [&](const std::vector<ControlSetting>& controls, int notes) {
+    Preset preset = played(controls[0]);
+    preset.controls = controls;
+    Player player(two, preset);
+    std::vector<Event> events;
+    for (int note = 0; note < notes; ++note) {
+      events.push_back(note_on(static_cast<std::uint32_t>(1000 * note), 60 + note % 3));
+    }
+    player.run(5000, events);
+    return player.y();
+  };
+  const ControlSetting down = strike("in1", 0.1, 1, 2);
+  const ControlSetting up = strike("in2", -0.1, 2, 2);
+  // One instrument: what four notes in turn do is the sum of what each hand does by itself.
+  const std::vector<double> both = heard({down, up}, 4);
+  const std::vector<double> first = heard({down}, 4);
+  const std::vector<double> second = heard({up}, 4);
+  for (std::size_t n = 0; n < both.size(); ++n) {
+    REQUIRE(std::fabs(both[n] - first[n] - second[n]) < 1e-12);
+  }
+  CHECK(peak(std::span(second).first(1000)) == 0.0);  // it was the other's turn
+  CHECK(peak(std::span(second).subspan(1000, 500)) > 0.0);
+  // The same stroke in turn is the stroke without turns.
+  CHECK(heard({strike("in1", 0.1, 1, 2), strike("in1", 0.1, 2, 2)}, 4) ==
+        heard({strike("in1", 0.1, 1, 1)}, 4));
+}
+
 TEST_CASE("noise is shaped by the outputs, and the same in every run", "[gesture]") {
   Preset preset = played({.target = "in1"});
   Player plain(puppet, preset);

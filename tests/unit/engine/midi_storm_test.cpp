@@ -90,10 +90,11 @@ TEST_CASE("a million messages leave no note that is stuck", "[midi_storm]") {
   for (const bool mono : {false, true}) {
     Preset preset = struck(6);
     preset.damper_s = 0.01;
+    preset.decay_s = {{36.0, 4.0}, {96.0, 0.5}};
     preset.mono = preset.legato = mono;
     preset.controls.push_back({.source = ControlSource::pressure, .target = "in2"});
     preset.controls.push_back({.source = ControlSource::controller, .number = 74, .target = "in2"});
-    preset.controls.push_back({.target = "in2", .gesture = Gesture::hold});
+    preset.controls.push_back({.target = "in2", .gesture = Gesture::hold, .turn = 2, .turns = 2});
     Player player(
         "@m mass 1. 0. 0.\n@g ground 0.\n@r springDamper @m @g 0.01 0.001\n"
         "@in1 frcInput @m\n@in2 posInput 0.\n@h springDamper @in2 @m 0.0001 0.\n"

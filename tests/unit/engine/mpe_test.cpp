@@ -295,7 +295,7 @@ TEST_CASE("the master's pedals, levels and modes are for the whole zone", "[mpe]
   channels.turn(0, 66, 1.0);
   CHECK(channels.level(2) == Approx(0.25));
   CHECK(channels.level(4) == Approx(1.0));
-  CHECK(channels.softness(2) == Approx(0.6));
+  CHECK(channels.softness(2) == Approx(0.75));
   CHECK((channels.holds(3) && !channels.holds(4)));
   // All of the zone, and nobody else, by modes.
   const std::vector<Event> notes = {on(1, note_on(0, 60)), on(2, note_on(0, 64)),

@@ -120,7 +120,13 @@ TEST_CASE("a preset says how its keys are tuned and played", "[preset]") {
             .preset.flattening_cents == std::vector<CurvePoint>{{48.0, 8.0}, {96.0, -6.5}});
   CHECK(parse_preset("model = \"x.mdl\"\nflattening_cents = 4\n").preset.flattening_cents ==
         std::vector<CurvePoint>{{0.0, 4.0}});
+  CHECK(parse_preset("model = \"x.mdl\"\ndecay_s = [[36, 12], [96, 1.5]]\n").preset.decay_s ==
+        std::vector<CurvePoint>{{36.0, 12.0}, {96.0, 1.5}});
+  CHECK(parse_preset("model = \"x.mdl\"\ndecay_s = 4\n").preset.decay_s ==
+        std::vector<CurvePoint>{{0.0, 4.0}});
   for (const char* const wrong : {"a4_hz = 100",
+                                  "decay_s = 0",
+                                  "decay_s = [[36, 12], [96, 601]]",
                                   "scale = \"a.kbm\"",
                                   "scale = \"b/a.scl\"",
                                   "keyboard_map = 3",
@@ -216,6 +222,17 @@ TEST_CASE("every fault of a preset is told with its line and column", "[preset]"
       {m + "gain = nan", 2, 8, "'gain' must be a number"},
       {m + "gain = inf", 2, 8, "'gain' must be a number"},
       {m + "damper_s = 61", 2, 12, "'damper_s' must lie between 0 and 60"},
+      {m + "decay_s = 601", 2, 11, "'decay_s' must lie between 0.001 and 600"},
+      {m + "decay_s = [[36, 0], [96, 1]]", 2, 12,
+       "a key lies between 0 and 127, its seconds between 0.001 and 600"},
+      {m + "[[control]]\nfrom = \"note\"\n" + to + "round_robin = [1.5, 2]", 5, 15,
+       "'round_robin' must be two whole numbers: [1, 2]"},
+      {m + "[[control]]\nfrom = \"note\"\n" + to + "round_robin = [3, 2]", 5, 15,
+       "'round_robin' is the wrong way round"},
+      {m + "[[control]]\nfrom = \"note\"\n" + to + "round_robin = [0, 2]", 5, 16,
+       "'round_robin' must lie between 1 and 16"},
+      {m + "[[control]]\nfrom = \"cc1\"\n" + to + "round_robin = [1, 2]", 5, 15,
+       "'round_robin' is for notes"},
       {m + "noise = 1", 2, 9, "'noise' must be true or false"},
       {m + "tuning = \"odd\"", 2, 10, "'tuning' must be keyboard or fixed"},
       {m + "transpose = 97", 2, 13, "'transpose' must lie between -96 and 96"},
