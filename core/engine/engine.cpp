@@ -14,6 +14,7 @@
 #include "core/engine/mixing/mixing.h"
 #include "core/engine/mixing/output_levels.h"
 #include "core/engine/parameters.h"
+#include "core/engine/struck.h"
 #include "core/engine/takeover.h"
 #include "core/engine/voices.h"
 
@@ -124,7 +125,7 @@ struct Engine::Player {
   template <class T>
   void strike(Bank<T>& b, const Event& event) {
     const bool is_known = event.value2 >= 0.0 && event.value2 < static_cast<double>(struck.size());
-    const Struck at = is_known ? struck[static_cast<std::size_t>(event.value2)] : Struck{};
+    const StruckMass at = is_known ? struck[static_cast<std::size_t>(event.value2)] : StruckMass{};
     if (at.part >= b.parts.size()) {
       return;  // nobody would hear it
     }
@@ -476,33 +477,9 @@ struct Engine::Player {
     return true;
   }
 
-  // Where a mass is that may be struck.
-  struct Struck {
-    std::uint32_t part = 0xffffffffu;
-    std::uint32_t node = 0;
-    std::uint32_t inverse_mass = 0;  // coefficient
-  };
-  static std::vector<Struck> find_struck(const Machine& machine) {
-    std::vector<Struck> struck;
-    for (std::uint32_t p = 0; p < machine.parts.size(); ++p) {
-      const Program& program = machine.parts[p];
-      for (const MassRun& run : program.mass_runs) {
-        for (std::uint32_t node = run.first; node < run.first + run.count; ++node) {
-          if (run.is_junction) {
-            continue;
-          }
-          const std::size_t mass = program.masses[node];
-          struck.resize(std::max(struck.size(), mass + 1));
-          struck[mass] = {p, node, run.inverse_mass};
-        }
-      }
-    }
-    return struck;
-  }
-
   const Machine machine;
   const Playing playing;
-  const std::vector<Struck> struck = find_struck(machine);  // [mass]
+  const std::vector<StruckMass> struck = find_struck(machine);  // [mass]
   Voices voices;
   AnyBank bank;
   Parameters parameters;

@@ -296,7 +296,7 @@ def slows_down(program, browser):
     most = max(abs(x) for x in jumps)
     steps = sorted(abs(a - b) / most for a, b in zip(jumps, jumps[1:]))
     print(f"        of what it swings, {100 * steps[len(steps) // 2]:.0f} % from frame to frame")
-    # How slow depends on how many frames a busy machine draws: tests/unit/app/panel_test has that.
+    # How slow depends on how many frames a busy machine draws: tests/unit/panel/panel_test has that.
     check(most > 0 and browser.evaluate(
         "document.getElementById('slow').getAttribute('aria-pressed') === 'true'"),
         "slow motion goes on and moves")

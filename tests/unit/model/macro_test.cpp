@@ -3,8 +3,8 @@
 #include <cmath>
 
 #include "core/model/topology.h"
+#include "tests/support/app/messages.h"
 #include "tests/support/harness.h"
-#include "tests/support/messages.h"
 
 namespace ressort {
 namespace {

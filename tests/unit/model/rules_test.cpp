@@ -9,9 +9,9 @@
 #include "core/model/language/keywords.h"
 #include "core/model/language/mdl.h"
 #include "core/model/language/tokens.h"
+#include "tests/support/app/messages.h"
 #include "tests/support/catch.h"
 #include "tests/support/harness.h"
-#include "tests/support/messages.h"
 
 namespace ressort {
 namespace {

@@ -5,8 +5,8 @@
 #include "core/laws/laws.h"
 #include "core/model/language/print.h"
 #include "core/model/topology.h"
+#include "tests/support/app/messages.h"
 #include "tests/support/harness.h"
-#include "tests/support/messages.h"
 #include "tests/support/passive.h"
 #include "tests/support/pitch.h"
 

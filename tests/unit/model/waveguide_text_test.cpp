@@ -3,8 +3,8 @@
 #include "core/model/faust/faust.h"
 #include "core/model/language/print.h"
 #include "core/model/topology.h"
+#include "tests/support/app/messages.h"
 #include "tests/support/harness.h"
-#include "tests/support/messages.h"
 
 namespace ressort {
 namespace {

@@ -1,6 +1,6 @@
 // Tunings from files: beside a preset, from the command line, at the console.
 #include "app/session/loader.h"
-#include "tests/support/console_harness.h"
+#include "tests/support/app/console_harness.h"
 #include "tests/support/pitch.h"
 
 namespace ressort {

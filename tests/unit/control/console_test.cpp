@@ -9,8 +9,8 @@
 
 #include "app/control/registry.h"
 #include "app/control/terminal.h"
+#include "tests/support/app/console_harness.h"
 #include "tests/support/catch.h"
-#include "tests/support/console_harness.h"
 
 namespace ressort {
 namespace {

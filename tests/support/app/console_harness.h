@@ -11,8 +11,8 @@
 #include <vector>
 
 #include "app/control/console.h"
+#include "tests/support/app/data_folder.h"
 #include "tests/support/catch.h"
-#include "tests/support/data_folder.h"
 #include "tests/support/scenes.h"
 
 namespace ressort {

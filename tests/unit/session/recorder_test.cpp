@@ -5,7 +5,7 @@
 #include <chrono>
 
 #include "app/session/sound_file.h"
-#include "tests/support/console_harness.h"
+#include "tests/support/app/console_harness.h"
 
 namespace ressort {
 

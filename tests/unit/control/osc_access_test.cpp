@@ -10,9 +10,9 @@
 #include "app/control/osc/server.h"
 #include "app/control/registry.h"
 #include "app/devices/audio.h"
+#include "tests/support/app/data_folder.h"
+#include "tests/support/app/osc_client.h"
 #include "tests/support/catch.h"
-#include "tests/support/data_folder.h"
-#include "tests/support/osc_client.h"
 
 namespace ressort {
 namespace {

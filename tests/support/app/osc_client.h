@@ -11,8 +11,8 @@
 #include <vector>
 
 #include "app/control/osc/packet.h"
+#include "tests/support/app/osc_bytes.h"
 #include "tests/support/catch.h"
-#include "tests/support/osc_bytes.h"
 
 namespace ressort {
 

@@ -1,7 +1,7 @@
 #include "app/control/osc/packet.h"
 
+#include "tests/support/app/osc_bytes.h"
 #include "tests/support/catch.h"
-#include "tests/support/osc_bytes.h"
 
 namespace ressort {
 namespace {

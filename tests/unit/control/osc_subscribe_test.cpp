@@ -3,8 +3,8 @@
 
 #include "app/control/osc/server.h"
 #include "app/control/registry.h"
-#include "tests/support/console_harness.h"
-#include "tests/support/osc_client.h"
+#include "tests/support/app/console_harness.h"
+#include "tests/support/app/osc_client.h"
 
 namespace ressort {
 namespace {

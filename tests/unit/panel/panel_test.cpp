@@ -19,9 +19,9 @@
 #include "app/panel/page.h"
 #include "app/panel/picture.h"
 #include "core/kernels/registry.h"
-#include "tests/support/data_folder.h"
-#include "tests/support/osc_bytes.h"
-#include "tests/support/process_harness.h"
+#include "tests/support/app/data_folder.h"
+#include "tests/support/app/osc_bytes.h"
+#include "tests/support/app/process_harness.h"
 
 namespace ressort {
 namespace {

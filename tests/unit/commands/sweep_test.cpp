@@ -6,8 +6,8 @@
 #include <numbers>
 #include <sstream>
 
+#include "tests/support/app/data_folder.h"
 #include "tests/support/catch.h"
-#include "tests/support/data_folder.h"
 
 namespace ressort {
 namespace {

@@ -5,7 +5,7 @@
 
 #include "app/commands/offline.h"
 #include "app/session/sound_file.h"
-#include "tests/support/data_folder.h"
+#include "tests/support/app/data_folder.h"
 
 namespace ressort {
 namespace {

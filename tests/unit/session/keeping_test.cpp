@@ -5,7 +5,7 @@
 
 #include "app/session/files.h"
 #include "app/text.h"
-#include "tests/support/console_harness.h"
+#include "tests/support/app/console_harness.h"
 
 namespace ressort {
 namespace {

@@ -2,7 +2,7 @@
 #include <numbers>
 #include <set>
 
-#include "tests/support/process_harness.h"
+#include "tests/support/app/process_harness.h"
 
 namespace ressort {
 namespace {

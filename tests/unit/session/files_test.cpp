@@ -18,8 +18,8 @@
 
 #include "app/session/loader.h"
 #include "app/session/sound_file.h"
+#include "tests/support/app/data_folder.h"
 #include "tests/support/catch.h"
-#include "tests/support/data_folder.h"
 
 namespace ressort {
 namespace {

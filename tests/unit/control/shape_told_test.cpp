@@ -2,8 +2,8 @@
 #include <cmath>
 
 #include "app/control/osc/server.h"
-#include "tests/support/console_harness.h"
-#include "tests/support/osc_client.h"
+#include "tests/support/app/console_harness.h"
+#include "tests/support/app/osc_client.h"
 
 namespace ressort {
 namespace {

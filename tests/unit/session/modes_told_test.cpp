@@ -3,7 +3,7 @@
 
 #include "app/session/files.h"
 #include "app/session/modes/known_modes.h"
-#include "tests/support/console_harness.h"
+#include "tests/support/app/console_harness.h"
 
 using namespace ressort;
 

@@ -1,7 +1,7 @@
 // More events than anybody can play, and a future that is full: what is to be heard is heard in the
 // next block, what is refused is counted, and a block's work is bounded.
 #include "app/devices/midi_input.h"
-#include "tests/support/process_harness.h"
+#include "tests/support/app/process_harness.h"
 
 namespace ressort {
 

@@ -10,8 +10,8 @@
 #include "app/session/loader.h"
 #include "app/session/sound_file.h"
 #include "core/analysis/modes/modes.h"
+#include "tests/support/app/data_folder.h"
 #include "tests/support/catch.h"
-#include "tests/support/data_folder.h"
 
 namespace ressort {
 namespace {

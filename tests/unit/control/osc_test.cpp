@@ -14,9 +14,9 @@
 #include "app/control/registry.h"
 #include "app/control/status.h"
 #include "app/devices/audio.h"
+#include "tests/support/app/data_folder.h"
+#include "tests/support/app/osc_client.h"
 #include "tests/support/catch.h"
-#include "tests/support/data_folder.h"
-#include "tests/support/osc_client.h"
 
 namespace ressort {
 namespace {

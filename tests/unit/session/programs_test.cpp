@@ -5,8 +5,8 @@
 
 #include "app/session/files.h"
 #include "app/session/session.h"
-#include "tests/support/data_folder.h"
-#include "tests/support/process_harness.h"
+#include "tests/support/app/data_folder.h"
+#include "tests/support/app/process_harness.h"
 
 namespace ressort {
 namespace {
