@@ -330,10 +330,10 @@ struct WebPanel::Server {
     const Progress progress([this](std::string_view) { return pause({}); });
     try {
       const Session::Present present = session.present();
-      const auto modes =
-          present.values.size() == now->network->parameters.size()
-              ? modes_json(*now, present.values, session.status().rate_hz, count, progress)
-              : Result<std::string>(Error{"another model is being loaded"});
+      const auto modes = present.values.size() == now->network->parameters.size()
+                             ? modes_json(*now, present.values,
+                                          session.status(Asker::panel).rate_hz, count, progress)
+                             : Result<std::string>(Error{"another model is being loaded"});
       if (modes) {
         response.set_content(*modes, "application/json");
       } else {
@@ -409,7 +409,7 @@ struct WebPanel::Server {
     const auto now = std::chrono::steady_clock::now();
     if (now >= next_status) {
       next_status = now + event_pause / 2;
-      told_status = status_json(session.status());
+      told_status = status_json(session.status(Asker::panel));
     }
     return told_status;
   }

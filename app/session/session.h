@@ -18,6 +18,7 @@
 #include "app/session/flight/flight.h"
 #include "app/session/loader.h"
 #include "app/session/modes/known_modes.h"
+#include "app/session/peaks.h"
 #include "app/session/timbre/shape.h"
 #include "app/session/timbre/timbre_watch.h"
 #include "app/session/watch/file_watch.h"
@@ -59,7 +60,7 @@ struct Status : Meters {
   double load_ms = 0.0;
   int max_voices = 0;
   double cpu = 0.0;         // share of the time there is, over a second; -1: nothing runs
-  double peak_db = 0.0;     // since the last asking; -inf is silence
+  double peak_db = 0.0;     // since the asker's last asking; -inf is silence
   double limited_db = 0.0;  // the limiter's deepest cut since the last asking
 };
 
@@ -169,7 +170,7 @@ class Session {
   std::vector<std::string> tuning() const;
   void set_tuning(std::vector<std::string> paths);
 
-  Status status();
+  Status status(Asker asker = Asker::console);
 
   // What it sounds like; it makes promises of its own.
   TimbreWatch& timbre() { return timbre_; }
@@ -271,6 +272,7 @@ class Session {
   Tell tell_;
 
   mutable std::mutex mutex_;  // everything below; never near the audio thread
+  Peaks peaks_;
   std::condition_variable wake_;
   std::deque<Job> jobs_;
   std::deque<Inquiry> inquiries_;

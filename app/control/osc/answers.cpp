@@ -144,7 +144,7 @@ void answer::flight(const Question& question) {
 }
 
 void answer::status(const Question& question) {
-  question.client.answer(status_reply(question.session.status()));
+  question.client.answer(status_reply(question.session.status(Asker::osc)));
 }
 
 void answer::describe(const Question& question) {

@@ -353,10 +353,19 @@ TEST_CASE("a session warns of a plan that is too much, and tells of an overload"
     Meters meters;
     meters.load = 0.25;
     meters.cpu_peak = 1.5;
+    meters.peak = 0.5;
+    process.meters_were_read.lower();  // as the audio thread does
     process.board.write(meters);
     session.set_backend("a device", true);
-    CHECK(session.status().cpu == 0.25);
-    CHECK(session.status().cpu_peak == 1.5);
+    const Status now = session.status();
+    CHECK(now.cpu == 0.25);
+    CHECK(now.cpu_peak == 1.5);
+    CHECK(now.peak_db == Approx(20.0 * std::log10(0.5)));
+    // Who asks next sees the same peak, once; who has asked sees none.
+    CHECK(session.status(Asker::panel).cpu_peak == 1.5);
+    CHECK(session.status(Asker::panel).cpu_peak == 0.0);
+    CHECK(session.status(Asker::console).cpu_peak == 0.0);
+    CHECK(session.status(Asker::osc).peak == 0.5);
     session.set_backend("none; waiting for a device", false);
     CHECK(session.status().cpu == -1.0);
 
