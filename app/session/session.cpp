@@ -150,22 +150,20 @@ void Session::remember(std::span<const TimedEvent> events) {
 
 Status Session::status(Asker asker) {
   Status status;
-  {
-    const std::lock_guard lock(mutex_);
-    static_cast<Meters&>(status) = process_.meters();
-    if (!process_.meters_were_read.is_raised()) {  // else these are the ones that were read
-      peaks_.add(status);
-      process_.meters_were_read.raise();
-    }
-    peaks_.take(asker, status);
-    status.model = current_->name;
-    status.load_ms = current_->load_ms;
-    status.max_voices = current_->instrument.voices;
-    status.backend = backend_;
-    status.cpu = runs_ ? status.load : -1.0;
-    status.rate_hz = rate_hz_;
-  }
   status.period_frames = process_.clock.read().period;
+  const std::lock_guard lock(mutex_);
+  static_cast<Meters&>(status) = process_.meters();
+  if (!process_.meters_were_read.is_raised()) {  // else these are the ones that were read
+    peaks_.add(status);
+    process_.meters_were_read.raise();
+  }
+  peaks_.take(asker, status);
+  status.model = current_->name;
+  status.load_ms = current_->load_ms;
+  status.max_voices = current_->instrument.voices;
+  status.backend = backend_;
+  status.cpu = runs_ ? status.load : -1.0;
+  status.rate_hz = rate_hz_;
   status.peak_db = to_db(status.peak);
   status.limited_db = to_db(status.limited);
   return status;

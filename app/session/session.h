@@ -13,12 +13,12 @@
 #include <thread>
 #include <vector>
 
+#include "app/realtime/peaks.h"
 #include "app/realtime/process.h"
 #include "app/realtime/rate_limit.h"
 #include "app/session/flight/flight.h"
 #include "app/session/loader.h"
 #include "app/session/modes/known_modes.h"
-#include "app/session/peaks.h"
 #include "app/session/timbre/shape.h"
 #include "app/session/timbre/timbre_watch.h"
 #include "app/session/watch/file_watch.h"

@@ -1,4 +1,4 @@
-// app/session: the highest and lowest that meters have shown, apart for each who asks for them.
+// app/realtime: the highest and lowest that meters have shown, apart for each who asks for them.
 #pragma once
 
 #include <algorithm>
