@@ -409,7 +409,12 @@ struct WebPanel::Server {
     const auto now = std::chrono::steady_clock::now();
     if (now >= next_status) {
       next_status = now + event_pause / 2;
-      told_status = status_json(session.status(Asker::panel));
+      TimbreWatch& timbre = session.timbre();
+      timbre.listen(10 * event_pause);
+      const auto frames = timbre.since(told_frame);
+      told_frame = frames.empty() ? told_frame : frames.back().number;
+      shape = frames.empty() ? shape : frames.back().timbre.shape;
+      told_status = status_json(session.status(Asker::panel), shape);
     }
     return told_status;
   }
@@ -449,6 +454,8 @@ struct WebPanel::Server {
   std::string told_network;
   std::chrono::steady_clock::time_point next_status;
   std::string told_status;
+  std::uint64_t told_frame = 0;        // of the descriptors
+  std::optional<SpectralShape> shape;  // of that frame
 
   std::mutex searching;  // held by who looks for modes
   std::thread listener;

@@ -48,6 +48,7 @@ Picture make_picture(Engine& engine, const Network& network, std::uint32_t numbe
 void find_positions(const Picture& picture, const MotionFrame& frame, std::span<float> positions);
 
 // {"picture", "dots", "plane", "x": [], "y": [], "start": [], "names": [], "kinds": "",
+//  "users": {parameter: [name, count]},
 //  "links": [[a, b, law, zone, reach]], "laws": [[name, family]], "inputs": [[number, node,
 //  force]], "outputs": [[number, node]]}: nodes are the dots and then what stands still. Lays out
 //  the

@@ -1,8 +1,11 @@
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <map>
 #include <nlohmann/json.hpp>
 #include <optional>
+#include <set>
+#include <span>
 
 #include "app/panel/picture.h"
 #include "core/analysis/modes/layout.h"
@@ -63,6 +66,7 @@ class NetworkTeller {
                    {"kinds", kinds_},
                    {"links", std::move(links)},
                    {"laws", std::move(laws)},
+                   {"users", users()},
                    {"inputs", std::move(inputs)},
                    {"outputs", std::move(outputs)}};
     return out.dump(-1, ' ', false, json::error_handler_t::replace);
@@ -114,6 +118,38 @@ class NetworkTeller {
               : of.kind == MassKind::position ? 'h'
               : of.is_mode                    ? 'o'
                                               : 'm';
+  }
+
+  // Of each parameter the first link or macro that has it, and how many there are.
+  json users() const {
+    const Network& network = *picture_.network;
+    std::vector<std::pair<std::string, std::size_t>> users(network.parameters.size());
+    const auto count = [&](const std::string& name, std::span<const ArgumentId> arguments) {
+      std::set<std::size_t> seen;
+      for (const ArgumentId argument : arguments) {
+        for (const Step& step : argument != no_argument ? network.arguments[argument] : Formula()) {
+          if (step.op == Op::parameter && seen.insert(step.index).second) {
+            auto& [first, uses] = users[step.index];
+            first = uses++ == 0 ? name : first;
+          }
+        }
+      }
+    };
+    for (const Link& link : network.links) {
+      count(link.name.text(), link.arguments);
+    }
+    for (const Macro& macro : network.macros) {
+      count(macro.name,
+            std::array{macro.mass, macro.stiffness, macro.second_stiffness, macro.damping,
+                       macro.air_damping, macro.impedance, macro.frequency_hz, macro.t60_s});
+    }
+    json out = json::object();
+    for (std::size_t i = 0; i < users.size(); ++i) {
+      if (users[i].second > 0) {
+        out[network.parameters[i].name] = {users[i].first, users[i].second};
+      }
+    }
+    return out;
   }
 
   // By which it can be struck: a macro's masses are numbered.

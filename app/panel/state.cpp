@@ -109,7 +109,7 @@ std::string describe_json(const Session& session) {
                  {"presets", presets}});
 }
 
-std::string status_json(const Status& status) {
+std::string status_json(const Status& status, const std::optional<SpectralShape>& shape) {
   json out = json::object();
   for (const StatusRow& row : status_rows()) {
     std::visit(
@@ -123,6 +123,9 @@ std::string status_json(const Status& status) {
         },
         row.figure);
   }
+  out["centroid_hz"] = shape ? number(shape->centroid_hz) : json();
+  out["spread_hz"] = shape ? number(shape->spread_hz) : json();
+  out["flatness"] = shape ? number(shape->flatness) : json();
   return dumped(out);
 }
 

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -16,8 +17,9 @@ namespace ressort {
 // [], "warnings": [], ...}; a limit that is none is null. [any thread but audio]
 std::string describe_json(const Session& session);
 
-// Every figure of `status` by its name; numbers that are none are null.
-std::string status_json(const Status& status);
+// Every figure of `status` by its name, and what the sound is like: "centroid_hz", "spread_hz",
+// "flatness"; numbers that are none are null.
+std::string status_json(const Status& status, const std::optional<SpectralShape>& shape);
 
 // What has changed since the last call, as server-sent events: `loaded`, `values`, then `news`.
 class Changes {

@@ -210,6 +210,9 @@ def strikes(program, browser):
         browser.mouse("mouseMoved", x, y - 60)
         browser.mouse("mouseReleased", x, y - 60)
         check(browser.eventually("panel.status.peak_db > -60"), f"{name} is heard")
+        hz = {"low_b": 149, "high_b": 447}[name]
+        check(browser.eventually(f"Math.abs(panel.status.centroid_hz - {hz}) < 30"),
+              f"the centroid is that of {name}")
         shown = browser.evaluate("panel.frames")  # until the last of them has nothing else
         browser.eventually(f"panel.frames > {shown} + 5 && panel.heard.some(v => v !== 0)")
         # Both masses together swing at sqrt(K/2) per sample, 44 100 of them a second: 149 and 447 Hz.

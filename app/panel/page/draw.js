@@ -325,16 +325,16 @@ export function drawSpectrum(canvas, magnitudes, rate) {
     c.fillText(hz < 1000 ? hz + ' Hz' : hz / 1000 + ' kHz', x(hz) + 3, height - 2);
   }
   c.strokeStyle = css('up'); c.fillStyle = css('proved'); c.lineWidth = 1.3; c.beginPath(); c.moveTo(0, height - 12);
-  let sum = 0, weighted = 0, best = 0;
+  let sum = 0, best = 0;
   for (let i = 1; i < magnitudes.length; i++) {
     const db = 20 * Math.log10(magnitudes[i] + 1e-12), p = magnitudes[i] ** 2;
     c.lineTo(Math.max(0, x(i * bin)), (height - 12) * Math.min(1, Math.max(0, db / floor)));
-    sum += p; weighted += p * i * bin;
+    sum += p;
     if (magnitudes[i] > magnitudes[best]) best = i;
   }
   c.stroke(); c.lineTo(width, height - 12); c.closePath(); c.globalAlpha = 0.55; c.fill(); c.globalAlpha = 1;
   if (sum < 1e-10) return null;
   const [a, b, d] = [best - 1, best, best + 1].map(i => Math.log(magnitudes[i] + 1e-12));
   const shift = best > 1 && a - 2 * b + d !== 0 ? 0.5 * (a - d) / (a - 2 * b + d) : 0;
-  return { centroid: weighted / sum, peak: (best + shift) * bin };
+  return { peak: (best + shift) * bin };
 }

@@ -175,7 +175,7 @@ function paint() {
   if (heard && drawn++ % 4 === 0) {
     drawScope($('scope'), heard);
     const found = drawSpectrum($('spectrum'), spectrumOf(heard), status.rate || 48000);
-    $('centroid').textContent = found ? hertz(found.centroid) : '–';
+    $('centroid').textContent = status.centroid_hz ? hertz(status.centroid_hz) : '–';
     $('loudest').textContent = found ? hertz(found.peak) : '–';
     $('loudest-note').textContent = found ? noteName(found.peak) : '';
     const most = view.peak > 1e-6 ? view.peak.toPrecision(2) : '0';
@@ -263,6 +263,12 @@ function showSliders() {
 }
 function showValue(name, value) { sliders.get(name)?.(value); }
 
+// " of 'r1' and 2 more"
+function users(name) {
+  const [first, count] = view.net?.users[name] ?? [];
+  return first ? ` of '${first}'${count > 1 ? ` and ${count - 1} more` : ''}` : '';
+}
+
 // Which parameter has gone the largest part of the way to where it would not be stable.
 function showLimits() {
   let nearest = null, share = 0;
@@ -272,7 +278,7 @@ function showLimits() {
     if (part > share) { share = part; nearest = info.name; }
   }
   $('limits').textContent = share < 0.05 ? 'All are far from any limit of stability.'
-    : `Nearest to its limit of stability: ${nearest}, at ${(100 * share).toFixed(0)} % of it.`;
+    : `Nearest to its limit of stability: ${nearest}${users(nearest)}, at ${(100 * share).toFixed(0)} % of it.`;
 }
 
 // --- modes ---------------------------------------------------------------------------------------------
