@@ -160,35 +160,49 @@ struct Gated final : Task {
   int taken = 0;
 };
 
-}  // namespace
-
-TEST_CASE("who is held in the midst of a task is not waited for", "[helpers]") {
-  Board<ClockReading> clock;
-  clock.write({0, 0, 48000.0, 64});
-  ThreadPool pool(2, &clock);
-  Gated first;
-  Gated second;
-  auto crew = pool.gather({&first, &second});
-  const std::uint32_t both[] = {0, 1};
-  second.is_shut = true;
-  int runs = 0;
-  while (second.inside == 0 && runs < 1000000) {  // until the helper has come
+// Two tasks for two threads, the second of which is shut.
+struct GatedCrew {
+  GatedCrew() { second.is_shut = true; }
+  void run() {
+    static constexpr std::uint32_t both[] = {0, 1};
     crew->run(both);
     ++runs;
   }
-  REQUIRE(second.inside == 1);
+  // Until the helper has come to the gate.
+  void catch_helper() {
+    while (second.inside == 0 && runs < 1000000) {
+      run();
+    }
+    REQUIRE(second.inside == 1);
+  }
+
+  Board<ClockReading> clock;
+  ThreadPool pool{2, &clock};
+  Gated first;
+  Gated second;
+  std::unique_ptr<Crew> crew = pool.gather({&first, &second});
+  int runs = 0;
+};
+
+}  // namespace
+
+TEST_CASE("who is held in the midst of a task is not waited for", "[helpers]") {
+  GatedCrew gated;
+  gated.clock.write({0, 0, 48000.0, 64});
+  gated.catch_helper();
   // It has it for a hundred rounds: each of them is played, without it.
+  const Gated& first = gated.first;
+  Gated& second = gated.second;
   const int before = second.performed;
   for (int i = 0; i < 100; ++i) {
-    crew->run(both);
+    gated.run();
   }
-  runs += 100;
   CHECK(second.taken == 1);
   CHECK(second.performed - before >= 99);
-  CHECK(second.performed + second.accepted + second.taken == runs);
-  CHECK(first.performed + first.accepted == runs);
+  CHECK(second.performed + second.accepted + second.taken == gated.runs);
+  CHECK(first.performed + first.accepted == gated.runs);
   const int offered = second.offered;
-  crew->run(both);
+  gated.run();
   CHECK(second.offered == offered);  // as long as somebody is in it
   second.is_shut = false;
   while (second.inside > 0) {
@@ -196,30 +210,21 @@ TEST_CASE("who is held in the midst of a task is not waited for", "[helpers]") {
   }
   const int again = second.offered;
   for (int i = 0; i < 100000 && second.offered == again; ++i) {
-    crew->run(both);
+    gated.run();
   }
   CHECK(second.offered > again);
 }
 
 TEST_CASE("a crew does not end before its helpers have left it", "[helpers]") {
-  Board<ClockReading> clock;
-  clock.write({0, 0, 48000.0, 64});
-  ThreadPool pool(2, &clock);
-  Gated first;
-  Gated second;
-  auto crew = pool.gather({&first, &second});
-  const std::uint32_t both[] = {0, 1};
-  second.is_shut = true;
-  for (int i = 0; i < 1000000 && second.inside == 0; ++i) {
-    crew->run(both);
-  }
-  REQUIRE(second.inside == 1);
+  GatedCrew gated;
+  gated.clock.write({0, 0, 48000.0, 64});
+  gated.catch_helper();
   std::thread opener([&] {
     std::this_thread::sleep_for(std::chrono::milliseconds(20));
-    second.is_shut = false;
+    gated.second.is_shut = false;
   });
-  crew.reset();
-  CHECK(second.inside == 0);
+  gated.crew.reset();
+  CHECK(gated.second.inside == 0);
   opener.join();
 }
 
