@@ -304,7 +304,7 @@ Result<Done> command::set(ConsoleContext& console, Words words) {
   return Done{};
 }
 
-Result<Done> command::strike(ConsoleContext& console, Words words) {
+Result<Done> command::hit(ConsoleContext& console, Words words) {
   Message message{"/mass/" + words[0] + "/strike", {}};
   if (words.size() > 1) {
     message.arguments.push_back(to_argument(words[1]));

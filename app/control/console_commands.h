@@ -53,7 +53,7 @@ Result<Done> wait(ConsoleContext& console, Words words);
 Result<Done> params(ConsoleContext& console, Words words);
 Result<Done> get(ConsoleContext& console, Words words);
 Result<Done> set(ConsoleContext& console, Words words);
-Result<Done> strike(ConsoleContext& console, Words words);
+Result<Done> hit(ConsoleContext& console, Words words);
 Result<Done> status(ConsoleContext& console, Words words);
 Result<Done> explain(ConsoleContext& console, Words words);
 Result<Done> modes(ConsoleContext& console, Words words);

@@ -260,13 +260,13 @@ std::vector<Row> make_rows() {
            "strikes a mass, named as in the model; NAME:3 is the third of a string or a mesh; 1 "
            "is a hard blow, -1 one from the other side",
        .play = strike,
-       .command = "strike",
+       .command = "hit",
        .group = CommandGroup::playing,
        .words = "MASS [STRENGTH]",
        .command_does = "strikes a mass by its name",
        .details = "MASS is its name in the model, or of a string or a mesh NAME:3, its third. "
                   "STRENGTH is -1 to 1,\nor 0.8.",
-       .act = command::strike},
+       .act = command::hit},
       {.address = "/panic",
        .does = "silence at once",
        .play = [](const Said& said) { return one(said, {.kind = EventKind::panic}); },

@@ -170,7 +170,7 @@ void Gestures::perform(Source source, int number, double amount, const Scope& sc
 void Gestures::perform_elsewhere(int key, double amount, std::uint8_t channel) {
   const Scope scope{.channels = channel_bit(channel)};
   for (const Control& control : playing_.controls) {
-    if (!is_asked(control, Source::note, key)) {
+    if (!is_asked(control, Source::note, key) || !has_turn(control, strokes_)) {
       continue;
     }
     const GestureRow& gesture = row_of(control.gesture);
@@ -186,6 +186,7 @@ void Gestures::perform_elsewhere(int key, double amount, std::uint8_t channel) {
       set_starts(scope.channels, control.target, *stroke.rest);
     }
   }
+  ++strokes_;  // the turn passes on, whoever has it
 }
 
 void Gestures::perform_live(const Event& event) {

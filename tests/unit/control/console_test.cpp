@@ -30,7 +30,7 @@ std::string error_of(std::string_view line) {
 TEST_CASE("a command is named by any unique beginning", "[console]") {
   CHECK(parse_command("noteon 60")->name == "noteon");
   CHECK(parse_command("noteon 60")->words == std::vector<std::string>{"60"});
-  CHECK(parse_command("sta")->name == "status");
+  CHECK(parse_command("st")->name == "status");
   CHECK(parse_command("  he\tlo ")->name == "help");
   CHECK(parse_command("q")->name == "quit");
   for (const Row* const row : commands()) {

@@ -354,7 +354,8 @@ TEST_CASE("a large network's shards are played by helpers to the bit", "[helpers
   const auto preset = default_preset(network, false);
   const auto made = [&](Executor* executor) {
     auto compiled =
-        compile(network, preset, {.rate_hz = 48000.0, .voices = 2, .executor = executor});
+        compile(network, preset,
+                {.rate_hz = 48000.0, .voices = 2, .method = Method::direct, .executor = executor});
     REQUIRE(compiled);
     return std::move(compiled->engine);
   };

@@ -192,7 +192,7 @@ TEST_CASE("A flight has programs that let the last one ring", "[flight]") {
   for (const std::uint8_t program : std::array<std::uint8_t, 3>{3, 9, 5}) {
     const std::uint64_t swaps = stage.process.meters().swaps;
     stage.play(512, {{0xc0, program}});
-    for (int i = 0; i < 400 && stage.process.meters().swaps == swaps; ++i) {
+    for (int i = 0; i < 6000 && stage.process.meters().swaps == swaps; ++i) {
       usleep(5000);
       stage.play(64);
     }
