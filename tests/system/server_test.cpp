@@ -570,15 +570,18 @@ TEST_CASE("A keyboard that was unplugged is taken up again by its name", "[jack_
   Child play(program({"play", click(), "-a", "jack", "-i", "-u", osc_port}));
   REQUIRE(answers());
   for (int time = 0; time < 3; ++time) {
-    const Neighbour keyboard;
-    INFO("time " << time);
-    if (time == 0) {
-      REQUIRE(keyboard.connect("neighbour:keys", "ressort:midi_in"));
-    } else {
-      REQUIRE(
-          eventually([&] { return keyboard.is_connected("neighbour:keys", "ressort:midi_in"); }));
+    {
+      const Neighbour keyboard;
+      INFO("time " << time);
+      if (time == 0) {
+        REQUIRE(keyboard.connect("neighbour:keys", "ressort:midi_in"));
+      } else {
+        REQUIRE(
+            eventually([&] { return keyboard.is_connected("neighbour:keys", "ressort:midi_in"); }));
+      }
+      std::this_thread::sleep_for(1500ms);
     }
-    std::this_thread::sleep_for(1500ms);  // it is seen to be there, as a person would let it be
+    std::this_thread::sleep_for(1500ms);  // as long as a plug takes to be put in again
   }
 }
 
