@@ -90,8 +90,8 @@ std::vector<StrikePulse> blows_of(const ShapeRequest& request) {
   std::vector<StrikePulse> blows;
   for (const ControlSetting& control : preset.controls) {
     const int input = find_input(scene.network, control.target);
-    if (!request.has_keys || control.source != ControlSource::note || input < 0 ||
-        request.key < control.lowest_key || control.highest_key < request.key ||
+    if (!request.has_keys || control.source != ControlSource::note || control.turn != 1 ||
+        input < 0 || request.key < control.lowest_key || control.highest_key < request.key ||
         control.gesture != Gesture::impulse) {
       continue;
     }
