@@ -151,7 +151,8 @@ class SceneReader {
 
  private:
   void read_all(const std::string& name) {
-    auto path = files_.find(name, options_.reach);
+    // Where a stop of a morph is has been found within reach already.
+    auto path = files_.find(name, options_.is_stop ? Reach::any_file : options_.reach);
     if (!path) {
       fail("", "", path.error());
       return;
