@@ -66,9 +66,9 @@ struct Row {
 
   std::string_view command = {};  // at the console; empty: it is not said there
   CommandGroup group = CommandGroup::other;
-  // [X] may be left out, ... is more of them; MODEL, FIGURE, PRESET, PARAMETER, MASS, COMMAND and FILE
-  // say what completes a word. Of a command that only plays, those are the row's arguments, and
-  // INPUT.
+  // [X] may be left out, ... is more of them; MODEL, FIGURE, PRESET, PARAMETER, MASS, COMMAND and
+  // FILE say what completes a word. Of a command that only plays, those are the row's arguments,
+  // and INPUT.
   std::string words = {};
   std::string_view command_does = {};  // one line; empty: as `does`
   std::string_view details = {};       // more lines

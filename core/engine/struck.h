@@ -1,6 +1,7 @@
 // core/engine: masses that are struck by themselves, without an input.
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <vector>
 
@@ -17,6 +18,20 @@ struct StruckMass {
 
 // Where each mass of the network with its macros written out is in the machine; nowhere if it does
 // not move, or was culled. [any thread but audio]
-std::vector<StruckMass> find_struck(const Machine& machine);
+inline std::vector<StruckMass> find_struck(const Machine& machine) {
+  std::vector<StruckMass> struck;
+  for (std::uint32_t p = 0; p < machine.parts.size(); ++p) {
+    const Program& program = machine.parts[p];
+    for (const MassRun& run : program.mass_runs) {
+      for (std::uint32_t i = 0; i < run.count && !run.is_junction; ++i) {
+        const std::uint32_t node = run.first + i;
+        const std::size_t mass = program.masses[node];
+        struck.resize(std::max(struck.size(), mass + 1));
+        struck[mass] = {p, node, run.inverse_mass};
+      }
+    }
+  }
+  return struck;
+}
 
 }  // namespace ressort
