@@ -195,17 +195,32 @@ APART = """@g ground 0.
 """
 
 
+def hint(browser):
+    return browser.evaluate("document.getElementById('hint').textContent")
+
+
+def on_picture(browser, name):
+    """Goes with the pointer to where a mass is drawn, once its picture has found its place."""
+    x = y = None
+    for _ in range(50):
+        x, y = browser.evaluate(
+            f"(() => {{ const v = panel.view, n = v.net.names.indexOf('{name}'),"
+            " b = v.canvas.getBoundingClientRect(); return [b.x + v.sx[n], b.y + v.sy[n]]; })()")
+        if x is not None and y is not None:
+            browser.mouse("mouseMoved", x, y)
+            if hint(browser).startswith(name):
+                break
+        time.sleep(0.1)
+    return x, y
+
+
 def strikes(program, browser):
     """A mass without an input is struck where it is drawn: heard is the pendulum that it hangs on."""
     tones = {}
     for name in ("low_b", "high_b"):
         check(silence(program, browser), "silence before a mass is struck")
-        x, y = browser.evaluate(
-            f"(() => {{ const v = panel.view, n = v.net.names.indexOf('{name}'),"
-            " b = v.canvas.getBoundingClientRect(); return [b.x + v.sx[n], b.y + v.sy[n]]; })()")
-        browser.mouse("mouseMoved", x, y)
-        check(browser.evaluate("document.getElementById('hint').textContent").startswith(name),
-              f"the pointer says that it would strike {name}")
+        x, y = on_picture(browser, name)
+        check(hint(browser).startswith(name), f"the pointer says that it would strike {name}")
         browser.mouse("mousePressed", x, y)
         browser.mouse("mouseMoved", x, y - 60)
         browser.mouse("mouseReleased", x, y - 60)
