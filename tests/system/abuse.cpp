@@ -2,15 +2,20 @@
 // [NAME...]]. Every parameter over its whole range and beyond, at audio rate, once where the
 // program keeps it stable and once where it is forced to do as it is told; strikes, forces and
 // hands of any size; keys, bends and controllers at random; audio inputs with noise, and with what
-// is no number. Not one sample of what comes out may be non-finite or above the limiter's ceiling.
+// is no number. Not one sample of what comes out may be non-finite or above the limiter's ceiling;
+// memory stays where it is; and once hands, pedals and levers are where they were, all notes end.
 // The random numbers are printed by their seed, so that what was found can be found again.
+#include <array>
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
+#include <fstream>
 #include <limits>
 #include <span>
 #include <string>
 #include <vector>
+
+#include <unistd.h>
 
 #include "app/realtime/process.h"
 #include "app/session/loader.h"
@@ -48,6 +53,39 @@ class Abuser {
     }
     if (!instrument_.parameters.empty() && chance(4)) {
       sweep(events, frames);
+    }
+    for (Event& event : events) {
+      event.model = serial;
+    }
+    return events;
+  }
+
+  // Hands, keys, pedals, levers and parameters back to where they were.
+  std::vector<Event> end() const {
+    std::vector<Event> events;
+    for (std::size_t i = 0; i < instrument_.parameters.size(); ++i) {
+      events.push_back({.kind = EventKind::parameter,
+                        .index = static_cast<std::uint16_t>(i),
+                        .value = instrument_.parameters[i].value});
+    }
+    for (const InputInfo& input : instrument_.inputs) {
+      for (const Gesture gesture : {Gesture::position, Gesture::force, Gesture::bow}) {
+        events.push_back({.kind = EventKind::gesture,
+                          .gesture = gesture,
+                          .index = static_cast<std::uint16_t>(input.number)});
+      }
+    }
+    for (const CustomInfo& lever : instrument_.custom) {
+      events.push_back({.kind = EventKind::custom, .index = static_cast<std::uint16_t>(lever.row)});
+    }
+    for (const std::uint16_t number :
+         std::array<std::uint16_t, 5>{64, 66, 67, 69, 121}) {  // pedals, and all controllers
+      events.push_back({.kind = EventKind::controller, .index = number});
+    }
+    events.push_back({.kind = EventKind::pressure});
+    events.push_back({.kind = EventKind::bend});
+    for (std::uint16_t key = 0; key < 128; ++key) {
+      events.push_back({.kind = EventKind::note_off, .index = key, .value = 1.0});
     }
     for (Event& event : events) {
       event.model = serial;
@@ -159,7 +197,19 @@ struct Found {
   std::uint64_t wrong = 0;  // samples
   double peak = 0.0;
   std::uint64_t runaways = 0;
+  double grown_mb = 0.0;  // resident, since the first tenth
+  double ended_s = 0.0;   // after the last event; infinite: something sounds for ever
 };
+
+constexpr double longest_ring_s = 300.0;
+
+double resident_mb() {
+  std::ifstream file("/proc/self/statm");
+  double pages = 0.0;
+  double resident = 0.0;
+  file >> pages >> resident;
+  return resident * static_cast<double>(sysconf(_SC_PAGESIZE)) / 1e6;
+}
 
 Found abuse(Compiled compiled, double seconds, std::uint64_t seed, bool force) {
   const Instrument instrument = compiled.instrument;
@@ -171,21 +221,17 @@ Found abuse(Compiled compiled, double seconds, std::uint64_t seed, bool force) {
   std::vector<std::vector<double>> out(channels);
   std::vector<std::vector<double>> in(static_cast<std::size_t>(instrument.audio_inputs));
   Found found;
-  const auto total = static_cast<std::int64_t>(seconds * rate_hz);
-  for (std::int64_t at = 0; at < total;) {
-    const std::size_t frames = lengths.below(3) == 0 ? 1 + lengths.below(512) : 64;
+  const auto play = [&](std::int64_t at, std::size_t frames, std::span<const Event> events) {
     std::vector<double*> outputs;
     for (std::vector<double>& channel : out) {
       channel.assign(frames, 0.0);
       outputs.push_back(channel.data());
     }
     std::vector<const double*> inputs;
-    for (std::vector<double>& channel : in) {
-      channel.resize(frames);
-      abuser.fill(channel);
+    for (const std::vector<double>& channel : in) {
       inputs.push_back(channel.data());
     }
-    for (const Event& event : abuser.events(frames)) {
+    for (const Event& event : events) {
       process.schedule(at + event.frame, event);
     }
     process.block(std::span<const double* const>(inputs), std::span<double* const>(outputs), frames,
@@ -196,9 +242,36 @@ Found abuse(Compiled compiled, double seconds, std::uint64_t seed, bool force) {
         found.peak = std::max(found.peak, std::fabs(sample));
       }
     }
+  };
+  const auto total = static_cast<std::int64_t>(seconds * rate_hz);
+  std::int64_t at = 0;
+  double start_mb = 0.0;
+  while (at < total) {
+    const std::size_t frames = lengths.below(3) == 0 ? 1 + lengths.below(512) : 64;
+    for (std::vector<double>& channel : in) {
+      channel.resize(frames);
+      abuser.fill(channel);
+    }
+    play(at, frames, abuser.events(frames));
     at += static_cast<std::int64_t>(frames);
+    start_mb = at < total / 10 ? resident_mb() : start_mb;
   }
+  found.grown_mb = resident_mb() - start_mb;
   found.runaways = process.meters().resets;
+  constexpr std::size_t frames = 512;
+  for (std::vector<double>& channel : in) {
+    channel.assign(frames, 0.0);
+  }
+  play(at, frames, abuser.end());
+  const std::int64_t end = at;
+  do {
+    at += frames;
+    play(at, frames, {});
+    found.ended_s = static_cast<double>(at - end) / rate_hz;
+  } while (process.meters().voices > 0 && found.ended_s < longest_ring_s);
+  if (process.meters().voices > 0) {
+    found.ended_s = std::numeric_limits<double>::infinity();
+  }
   return found;
 }
 
@@ -231,13 +304,16 @@ int main(int argc, char** argv) {
         return 2;
       }
       const Found found = abuse(*std::move(compiled), seconds, seed, force);
-      std::printf("%-20s %6g s, seed %llu%s: peak %.3f, %llu voices ran away, %llu samples wrong\n",
-                  name.c_str(), seconds, static_cast<unsigned long long>(seed),
-                  force ? ", forced" : "", found.peak,
-                  static_cast<unsigned long long>(found.runaways),
-                  static_cast<unsigned long long>(found.wrong));
+      std::printf(
+          "%-20s %6g s, seed %llu%s: peak %.3f, %llu voices ran away, %llu samples wrong, "
+          "%.1f MB more, silent after %.1f s\n",
+          name.c_str(), seconds, static_cast<unsigned long long>(seed), force ? ", forced" : "",
+          found.peak, static_cast<unsigned long long>(found.runaways),
+          static_cast<unsigned long long>(found.wrong), found.grown_mb, found.ended_s);
       std::fflush(stdout);
-      failures += found.wrong > 0 ? 1 : 0;
+      // What was forced may be anything by now.
+      failures +=
+          found.wrong > 0 || found.grown_mb > 4.0 || (!force && std::isinf(found.ended_s)) ? 1 : 0;
     }
   }
   return failures == 0 ? 0 : 1;
