@@ -62,9 +62,10 @@ class Assembler {
     // The square of an average is at most the average of squares, and (p - q)^2 <= 2 p^2 + 2 q^2.
     const double scale = is_held(link.a) || is_held(link.b) ? 1.0 : 2.0;
     for (const std::uint32_t end : {link.a, link.b}) {
+      ++out_.wandering_ends;
       if (!is_live_place(network_, end)) {
         add_end(end, 1.0);
-        close(index, true, scale);
+        close(index, true, scale, out_.wandering_ends);
         continue;
       }
       const Tap& tap = network_.taps[network_.masses[end].tap];
@@ -74,7 +75,7 @@ class Assembler {
         } else {
           add_end(tap.first + at, 1.0);
         }
-        close(index, true, scale);
+        close(index, true, scale, out_.wandering_ends);
       }
     }
   }
@@ -133,15 +134,15 @@ class Assembler {
   }
 
   // Ends the term that the entries since the last one are.
-  void close(std::uint32_t element, bool is_link, double wandering = 0.0) {
+  void close(std::uint32_t element, bool is_link, double scale = 1.0, std::uint32_t wanders = 0) {
     const std::size_t count = out_.entries.size() - first_;
     if (count > 0) {
       out_.terms.push_back({.first = static_cast<std::uint32_t>(first_),
                             .count = static_cast<std::uint32_t>(count),
                             .element = element,
                             .is_link = is_link,
-                            .wanders = wandering > 0.0,
-                            .scale = wandering > 0.0 ? wandering : 1.0});
+                            .wanders = wanders,
+                            .scale = scale});
     }
     first_ = out_.entries.size();
   }

@@ -36,12 +36,15 @@ struct Assembly {
     std::uint32_t element = 0;  // index into Network::links, or Network::masses
     bool is_link = true;
     bool is_passive = false;  // holds a waveguide: no entries, no highest load
-    bool wanders = false;     // one of several that together bound a link at a place that moves
-    double scale = 1.0;       // of its w
+    // 1 and on: which of the ends of links at places that move, of which this is one node that it
+    // may be at; the other end of such a link is one, too.
+    std::uint32_t wanders = 0;
+    double scale = 1.0;  // of its w
   };
   std::vector<std::uint32_t> masses;  // [row] index into Network::masses
   std::vector<Term> terms;
   std::vector<Entry> entries;
+  std::uint32_t wandering_ends = 0;  // that is how many
   bool is_complete = true;  // not if live places would take too many terms: then no link is in it
 
   std::span<const Entry> of(const Term& term) const {
@@ -50,7 +53,7 @@ struct Assembly {
 };
 
 // Of a network without macros. A place on a macro counts with the nodes around it; one whose
-// coordinates are live counts at all nodes at once, which is on the safe side.
+// coordinates are live has a term at every node, whose sum is on the safe side.
 // O(masses + links), and a term for every node under a live place, up to 4 million.
 Assembly assemble(const Network& network);
 

@@ -8,13 +8,23 @@ namespace {
 
 constexpr double limit_of_scheme = 4.0;
 constexpr double precision = 1e-13;
-constexpr double bound_precision = 1e-3;  // of what is an estimate anyway
+constexpr double bound_precision = 1e-3;      // of what is an estimate anyway
+constexpr double wandering_precision = 1e-6;  // halved for, twenty times
+constexpr double rounding = 1e-9;
 
 bool is_usable(const Weights& weights) {
   const auto finite = [](double w) { return std::isfinite(w); };
   return !weights.feeds && std::all_of(weights.masses.begin(), weights.masses.end(), [](double m) {
     return m > 0.0 && std::isfinite(m);
   }) && std::all_of(weights.terms.begin(), weights.terms.end(), finite);
+}
+
+std::vector<double> diagonal(const Weights& weights, double limit) {
+  std::vector<double> all;
+  for (const double mass : weights.masses) {
+    all.push_back(limit * mass);
+  }
+  return all;
 }
 
 // Calls `use(term, its bound)`.
@@ -64,6 +74,14 @@ bool BoundaryFinder::holds(const Weights& weights, double limit) {
          (edge_bound(assembly_, weights).value < limit || factors(weights, limit));
 }
 
+bool BoundaryFinder::fails(const Weights& weights) {
+  if (!is_exact() || weights.feeds) {
+    return false;
+  }
+  return assembly_.wandering_ends == 0 || !is_usable(weights) ||
+         definite_.wander(diagonal(weights, limit_of_scheme), weights.terms).alone >= 1.0;
+}
+
 bool BoundaryFinder::is_definite(std::span<const double> diagonal, std::span<const double> terms) {
   return definite_.factor(diagonal, terms);
 }
@@ -72,19 +90,20 @@ bool BoundaryFinder::factors(const Weights& weights, double limit) {
   if (!is_exact_ || !is_usable(weights)) {
     return false;
   }
+  const std::vector<double> diagonal = ressort::diagonal(weights, limit);
   // What the diagonal refuses needs no factorisation.
-  std::vector<double> diagonal;
-  for (const double mass : weights.masses) {
-    diagonal.push_back(limit * mass);
-  }
   std::vector<double> rest = diagonal;
   for (std::size_t t = 0; t < assembly_.terms.size(); ++t) {
     for (const Assembly::Entry& entry : assembly_.of(assembly_.terms[t])) {
       rest[entry.row] -= weights.terms[t] * entry.share * entry.share;
     }
   }
-  return std::all_of(rest.begin(), rest.end(), [](double d) { return d > 0.0; }) && is_exact() &&
-         definite_.factor(diagonal, weights.terms);
+  if (std::all_of(rest.begin(), rest.end(), [](double d) { return d > 0.0; }) && is_exact() &&
+      definite_.factor(diagonal, weights.terms)) {
+    return true;
+  }
+  return assembly_.wandering_ends > 0 && is_exact() &&
+         definite_.wander(diagonal, weights.terms).together < 1.0 - rounding;
 }
 
 // xT (4M - K - 2Z) x, and the larger of what it is the difference of.
@@ -181,7 +200,7 @@ std::optional<double> BoundaryFinder::met(const WeightLine& line, double safe) {
 }
 
 Boundary BoundaryFinder::between(const WeightLine& line, double safe, double bad) {
-  const bool is_exact = this->is_exact();
+  const bool is_exact = this->is_exact() && assembly_.wandering_ends == 0;
   std::vector<double> shape(is_exact ? assembly_.masses.size() : 0);
   for (std::size_t i = 0; i < shape.size(); ++i) {
     shape[i] = std::cos(static_cast<double>(i * i));  // like no mode in particular
@@ -192,7 +211,9 @@ Boundary BoundaryFinder::between(const WeightLine& line, double safe, double bad
   };
   bool has_factor = is_exact && is_safe(safe);  // of the matrix at `safe`
   for (int round = 0; round < 100; ++round) {
-    const double enough = is_exact ? precision : bound_precision;
+    const double enough = is_exact           ? precision
+                          : this->is_exact() ? wandering_precision
+                                             : bound_precision;
     if (std::fabs(bad - safe) <= enough * std::max(std::fabs(bad), std::fabs(safe))) {
       break;
     }

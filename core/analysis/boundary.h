@@ -46,7 +46,8 @@ class BoundaryFinder {
   bool holds(const Weights& weights, double limit);
 
   // The edge between a place that holds and one that does not: to 13 digits, with about eight
-  // factorisations where the line is straight; by the bound to three, on the safe side.
+  // factorisations where the line is straight; to 6 where places move, by the bound to 3, on the
+  // safe side.
   Boundary between(const WeightLine& line, double safe, double bad);
 
   // The first edge beyond `safe`, going away from 0, upwards if `safe` is 0; nothing up to 1e12.
@@ -55,6 +56,9 @@ class BoundaryFinder {
   // The edge by the bound alone, on either side of `safe` and 0 or above; at once, with six looks
   // at the line. Nothing where it has to be searched for.
   std::optional<double> met(const WeightLine& line, double safe);
+
+  // Whether it is surely not, wherever it is that places move. Asked where it does not hold.
+  bool fails(const Weights& weights);
 
   // Is D less the sum over terms positive definite, with D by row?
   bool is_definite(std::span<const double> diagonal, std::span<const double> terms);

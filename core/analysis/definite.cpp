@@ -2,6 +2,9 @@
 
 #include <algorithm>
 #include <cassert>
+#include <limits>
+#include <map>
+#include <numeric>
 
 #include "core/linear_algebra/cholesky.h"
 
@@ -77,6 +80,92 @@ bool Definite::factor(std::span<const double> diagonal, std::span<const double> 
   }
   progress_.spend(weights.size());
   return matrix_->solver.factor(matrix_->sum, Cholesky::Pivots::positive, progress_);
+}
+
+// With A what is left without them, A - sum w g gT is positive definite if the matrix of
+// sqrt(w_i w_j) g_i A^-1 g_j has a norm below 1 (Schur). Where an end is at worst, between two
+// nodes included, g A^-1 g is c; no g_i A^-1 g_j is above sqrt(c_i c_j), and it is 0 between parts:
+// so the norm is at most the largest sum of w c within a part.
+Definite::Wandering Definite::wander(std::span<const double> diagonal,
+                                     std::span<const double> weights) {
+  constexpr double infinity = std::numeric_limits<double>::infinity();
+  std::vector<double> rest(weights.begin(), weights.end());
+  for (std::size_t t = 0; t < rest.size(); ++t) {
+    rest[t] = assembly_.terms[t].wanders > 0 ? 0.0 : rest[t];
+  }
+  if (!factor(diagonal, rest)) {
+    return {infinity, infinity};
+  }
+  if (part_.empty()) {
+    find_parts();
+  }
+  struct End {
+    double share = 0.0;  // w c
+    double scale = 1.0;
+    std::uint32_t part = 0;
+  };
+  std::vector<End> ends(assembly_.wandering_ends);
+  const std::vector<double> gives = matrix_->solver.inverse_diagonal(progress_);
+  std::vector<double> x(diagonal.size());
+  for (std::size_t t = 0; t < rest.size(); ++t) {
+    const Assembly::Term& term = assembly_.terms[t];
+    if (term.wanders == 0) {
+      continue;
+    }
+    const auto entries = assembly_.of(term);
+    double give = entries[0].share * entries[0].share * gives[entries[0].row];
+    if (entries.size() > 1) {
+      std::fill(x.begin(), x.end(), 0.0);
+      for (const Assembly::Entry& entry : entries) {
+        x[entry.row] = entry.share;
+      }
+      solve(x);
+      give = 0.0;
+      for (const Assembly::Entry& entry : entries) {
+        give += entry.share * x[entry.row];
+      }
+      progress_.spend(entries.size());
+    }
+    End& end = ends[term.wanders - 1];
+    end.share = std::max(end.share, weights[t] * give);
+    end.scale = term.scale;
+    end.part = part_[entries[0].row];
+  }
+  Wandering found;
+  std::map<std::uint32_t, double> parts;
+  for (const End& end : ends) {
+    found.together = std::max(found.together, parts[end.part] += end.share);
+    found.alone = std::max(found.alone, end.share / end.scale);
+  }
+  return found;
+}
+
+void Definite::find_parts() {
+  constexpr std::uint32_t no_row = 0xffffffffu;
+  part_.resize(assembly_.masses.size());
+  std::iota(part_.begin(), part_.end(), 0u);
+  const auto find = [&](std::uint32_t row) {
+    while (part_[row] != row) {
+      row = part_[row] = part_[part_[row]];
+    }
+    return row;
+  };
+  // An end that wanders is on one part, whichever nodes it has.
+  std::vector<std::uint32_t> first(assembly_.wandering_ends, no_row);
+  for (const Assembly::Term& term : assembly_.terms) {
+    const auto entries = assembly_.of(term);
+    for (std::size_t i = 1; i < entries.size(); ++i) {
+      part_[find(entries[i].row)] = find(entries[0].row);
+    }
+    if (term.wanders > 0) {
+      std::uint32_t& row = first[term.wanders - 1];
+      row = row == no_row ? entries[0].row : row;
+      part_[find(entries[0].row)] = find(row);
+    }
+  }
+  for (std::uint32_t row = 0; row < part_.size(); ++row) {
+    part_[row] = find(row);
+  }
 }
 
 void Definite::solve(std::vector<double>& x) const {

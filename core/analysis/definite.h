@@ -1,6 +1,7 @@
 // core/analysis: whether a diagonal less a assembly's sum is positive definite.
 #pragma once
 
+#include <cstdint>
 #include <memory>
 #include <span>
 #include <vector>
@@ -24,14 +25,27 @@ class Definite {
   // With D by row and w by term: is the matrix positive definite? [any thread but audio]
   bool factor(std::span<const double> diagonal, std::span<const double> weights);
 
+  // With each end that wanders at one node at a time, wherever that is, instead of at all of them:
+  // positive definite where `together` is below 1, and surely not where `alone` is 1 or more, as
+  // one end is too much by itself. Infinite where the rest is not positive definite. About two
+  // factorisations, and a solution for every place of bodies. [any thread but audio]
+  struct Wandering {
+    double together = 0.0;
+    double alone = 0.0;
+  };
+  Wandering wander(std::span<const double> diagonal, std::span<const double> weights);
+
   // Solves for x in place, with the last matrix that factor() found positive definite.
   void solve(std::vector<double>& x) const;
 
  private:
   struct Matrix;
+  void find_parts();
+
   const Assembly& assembly_;
   Progress progress_;
   std::unique_ptr<Matrix> matrix_;
+  std::vector<std::uint32_t> part_;  // [row] a row of the same part of what does not wander
 };
 
 }  // namespace ressort

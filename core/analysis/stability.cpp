@@ -170,10 +170,9 @@ Proofs::Course Proofs::course_along(std::size_t parameter) const {
 Verdict Proofs::prove(const ParameterBox& box) {
   const std::vector<Range> arguments = argument_ranges(network_, box);
   const Weights weights = weigh(arguments);
-  return boundary_.holds(weights, safe_limit)     ? Verdict::stable
-         : nonsense(arguments)                    ? Verdict::unstable
-         : boundary_.is_exact() && !weights.feeds ? Verdict::unstable
-                                                  : Verdict::unproved;
+  return boundary_.holds(weights, safe_limit)              ? Verdict::stable
+         : nonsense(arguments) || boundary_.fails(weights) ? Verdict::unstable
+                                                           : Verdict::unproved;
 }
 
 Certificate Proofs::certify(const ParameterBox& box) {

@@ -81,8 +81,8 @@ class Proofs;
 
 // Proofs and limits for one network; takes its macros apart once. Exact up to `most_exact` masses
 // that do not hang together at random (Cholesky::most_work), else by the edge bound, on the safe
-// side. Places on macros whose coordinates are live are
-// counted at all nodes at once: safe, not exact. [any thread but audio]
+// side. Where places move, each link on one counts at the worst of its nodes: safe, not exact.
+// [any thread but audio]
 class Stability {
  public:
   static constexpr std::size_t most_exact_masses = 40'000;

@@ -145,6 +145,59 @@ std::size_t Cholesky::negative_pivots() const {
   return static_cast<std::size_t>(std::count(sign_.begin(), sign_.end(), -1.0));
 }
 
+// The inverse Z where L is not 0, from the last column to the first:
+//   Z_ij = -sum over k of Z_ik L_kj / L_jj,  Z_jj = (1 / L_jj - sum over k of L_kj Z_kj) / L_jj
+// with k in L's column j, all of whose pairs are places where L is not 0 either.
+std::vector<double> Cholesky::inverse_diagonal(const Progress& progress) const {
+  const std::size_t size = order_.size();
+  std::vector<double> inverse(value_.size());
+  std::vector<double> sum(size, 0.0);    // [row], of Z_ik L_kj
+  std::vector<double> below(size, 0.0);  // [row], column j of L
+  for (std::size_t j = size; j-- > 0;) {
+    const auto first = static_cast<std::size_t>(first_[j]);
+    const auto end = static_cast<std::size_t>(first_[j + 1]);
+    for (std::size_t p = first + 1; p < end; ++p) {
+      below[static_cast<std::size_t>(row_[p])] = value_[p];
+    }
+    std::size_t steps = 1;
+    for (std::size_t p = first + 1; p < end; ++p) {
+      const auto k = static_cast<std::size_t>(row_[p]);
+      const auto start = static_cast<std::size_t>(first_[k]);
+      const auto stop = static_cast<std::size_t>(first_[k + 1]);
+      double own = inverse[start] * value_[p];
+      for (std::size_t q = start + 1; q < stop; ++q) {
+        const auto i = static_cast<std::size_t>(row_[q]);
+        sum[i] += inverse[q] * value_[p];  // of no use in rows that column j does not have
+        own += inverse[q] * below[i];
+      }
+      sum[k] += own;
+      steps += stop - start;
+    }
+    const double pivot = value_[first];
+    double rest = 1.0 / pivot;
+    for (std::size_t p = first + 1; p < end; ++p) {
+      const auto k = static_cast<std::size_t>(row_[p]);
+      inverse[p] = -sum[k] / pivot;
+      rest -= value_[p] * inverse[p];
+    }
+    inverse[first] = rest / pivot;
+    for (std::size_t p = first + 1; p < end; ++p) {
+      const auto k = static_cast<std::size_t>(row_[p]);
+      below[k] = 0.0;
+      for (auto q = static_cast<std::size_t>(first_[k]);
+           q < static_cast<std::size_t>(first_[k + 1]); ++q) {
+        sum[static_cast<std::size_t>(row_[q])] = 0.0;
+      }
+    }
+    progress.spend(steps / 8 + 1);
+  }
+  std::vector<double> diagonal(size);
+  for (std::size_t i = 0; i < size; ++i) {
+    diagonal[i] = inverse[static_cast<std::size_t>(first_[static_cast<std::size_t>(order_[i])])];
+  }
+  return diagonal;
+}
+
 void Cholesky::solve(double* x) const {
   const std::size_t size = order_.size();
   std::vector<double> y(size);

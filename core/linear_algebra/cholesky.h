@@ -34,6 +34,10 @@ class Cholesky {
   // How many eigenvalues of the last matrix are below 0 (Sylvester). O(rows)
   std::size_t negative_pivots() const;
 
+  // The diagonal of the last matrix's inverse, where all its pivots are positive (Takahashi 1973).
+  // About what a factorisation takes.
+  std::vector<double> inverse_diagonal(const Progress& progress) const;
+
   // Solves A x = b in place, by the last matrix that could be factored.
   void solve(double* x) const;
 
