@@ -250,6 +250,9 @@ class Session {
   void follow(const std::vector<SceneFile>& files);
   void do_reload();
   Result<std::string> reload(Draft draft);
+  // What sounds, read again, with these numbers instead of its own and its keys tuned to them: a
+  // change that can be taken back.
+  Result<Done> retune(std::vector<Setting> values, const Progress& progress);
   void turn(const std::vector<Setting>& settings);
   void look_out(const Meters& now);
   void improve();

@@ -96,7 +96,7 @@ Result<Shaped> Session::shape_now(const std::vector<TimbreTarget>& targets) {
   }
   const Instrument& instrument = now.loaded->instrument;
   const Meters meters = process_.meters();
-  ShapeRequest request{
+  const ShapeRequest request{
       .scene = *scene,
       .parameters = instrument.parameters,
       .values = now.values,
@@ -105,14 +105,20 @@ Result<Shaped> Session::shape_now(const std::vector<TimbreTarget>& targets) {
                  ? usual_key
                  : meters.last_notes[(meters.notes - 1) % meters.last_notes.size()].key,
       .rate_hz = options_.compile.rescale ? built_rate_hz_ : Network::reference_rate_hz,
-      .tuned_at = {},
       .progress = progress};
-  for (const ParameterInfo& info : instrument.parameters) {
-    request.tuned_at.push_back(info.value);
-  }
   auto shaped = shape_timbre(request, targets);
   if (!shaped) {
     return shaped;
+  }
+  if (request.has_keys) {
+    std::vector<Setting> values;
+    for (std::size_t i = 0; i < now.values.size(); ++i) {
+      if (instrument.parameters[i].audio_input == 0) {
+        values.push_back({instrument.parameters[i].name, shaped->found.values[i]});
+      }
+    }
+    const auto done = retune(std::move(values), progress);
+    return done ? std::move(shaped) : Result<Shaped>(done.error());
   }
   std::vector<TimedEvent> events;
   for (std::size_t i = 0; i < now.values.size(); ++i) {

@@ -191,15 +191,6 @@ Result<Shaped> shape_timbre(const ShapeRequest& request, std::vector<TimbreTarge
   }
   shaped.of += ", " + told(options.blows, scene.network) + " heard at all outputs";
   const Network network = with_fixed(scene.network, preset);
-  if (request.has_keys && !request.tuned_at.empty()) {
-    const auto factor = StruckModel(network, options).key_factor(request.tuned_at);
-    if (!factor) {
-      return factor.error();
-    }
-    options.key_factor = *factor;
-    // So that what is turned leaves the pitch where keys have it.
-    targets.push_back({AskedFigure::f0, *options.key_hz});
-  }
   const StruckModel lines(network, options);
   options.by_samples = true;
   const StruckModel samples(network, options);

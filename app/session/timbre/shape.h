@@ -27,8 +27,6 @@ struct ShapeRequest {
   bool has_keys = false;                         // keys set the pitch
   int key = 57;                                  // which is described then
   double rate_hz = Network::reference_rate_hz;
-  // Keys were tuned with these values, and stay tuned so; empty: they are tuned anew.
-  std::vector<double> tuned_at;
   Progress progress = {};
   std::function<void(double share)> tell = {};
 };

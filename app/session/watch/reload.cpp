@@ -218,6 +218,40 @@ Result<std::string> Session::reload(Draft draft) {
   return text;
 }
 
+Result<Done> Session::retune(std::vector<Setting> values, const Progress& progress) {
+  const auto start = std::chrono::steady_clock::now();
+  const Present now = present();
+  Reading reading = read_scene(scene_->name, scene_options(*scene_, progress));
+  auto files = std::make_shared<const std::vector<SceneFile>>(std::move(reading.files));
+  auto scene = scene_of(std::move(reading));
+  if (!scene) {
+    return scene.error();
+  }
+  LastChange change{.scene = now.loaded->path};
+  for (std::size_t i = 0; i < now.values.size(); ++i) {
+    change.values.emplace_back(now.loaded->instrument.parameters[i].name, now.values[i]);
+  }
+  const bool goes_on = without_numbers(now.loaded->preset) == without_numbers(scene->preset);
+  Wish wish = *scene_;
+  wish.lets_ring = false;
+  const auto result = sound(wish,
+                            {.scene = *std::move(scene),
+                             .files = std::move(files),
+                             .kept = std::move(values),
+                             .goes_on = goes_on,
+                             .start = start},
+                            progress);
+  if (!result) {
+    return result.error();
+  }
+  {
+    const std::lock_guard lock(mutex_);
+    last_change_ = std::move(change);
+  }
+  time_parts();
+  return Done{};
+}
+
 // As if a player had.
 void Session::turn(const std::vector<Setting>& settings) {
   const auto now = current();

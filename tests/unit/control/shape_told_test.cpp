@@ -4,6 +4,7 @@
 #include "app/control/osc/server.h"
 #include "tests/support/app/console_harness.h"
 #include "tests/support/app/osc_client.h"
+#include "tests/support/pitch.h"
 
 namespace ressort {
 namespace {
@@ -62,6 +63,35 @@ TEST_CASE("the console shapes what sounds, and takes it back at once", "[shape_t
   const std::string high = h.say("shape f0 9000");
   CHECK(has(high, "as high as it gets is"));
   CHECK(has(high, "k is at its highest"));
+}
+
+TEST_CASE("keys are in tune when what sounds was shaped", "[shape_told]") {
+  const Folder folder;
+  Harness h;
+  h.say("load " + write_triangle(folder));
+  const auto pitch_hz = [&] {
+    h.say("noteon 69 60");
+    std::vector<double> sound;
+    for (int i = 0; i < 400; ++i) {
+      const std::vector<float> block = h.play();
+      sound.insert(sound.end(), block.begin(), block.end());
+    }
+    return support::measured_hz(sound, 48000.0, 440.0);
+  };
+  constexpr double a_tenth_of_a_cent = 440.0 * 5.8e-5;
+  CHECK(pitch_hz() == Approx(440.0).margin(a_tenth_of_a_cent));
+  const double before = *h.session.parameter("m_K");
+  // A note that sounds goes on, and is in tune at once.
+  h.say("noteon 69 60");
+  h.loudest(5);
+  const std::string told = h.say("shape inharmonicity 0.0001");
+  INFO(told);
+  CHECK(std::fabs(*h.session.parameter("m_K") / before - 1.0) > 0.01);
+  CHECK(h.loudest(5) > 1e-3);
+  CHECK(pitch_hz() == Approx(440.0).margin(a_tenth_of_a_cent));
+  h.say("undo");
+  CHECK(*h.session.parameter("m_K") == before);
+  CHECK(pitch_hz() == Approx(440.0).margin(a_tenth_of_a_cent));
 }
 
 TEST_CASE("the console refuses what cannot be asked for", "[shape_told]") {
