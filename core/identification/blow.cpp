@@ -137,7 +137,7 @@ Result<Blow> find_blow(const Recording& recording) {
   if (!(peak > 1e-12 * largest) || peak < 1e-30) {
     return Error{"it is silent: every sample is the same"};
   }
-  Blow blow{.first = find_onset(loudness, peak, recording.rate_hz)};
+  Blow blow{.first = find_onset(loudness, peak, recording.rate_hz), .peak = peak};
   const std::size_t left = frames - blow.first;
   blow.length_s = static_cast<double>(left) / recording.rate_hz;
   if (blow.length_s < shortest_ring_s) {

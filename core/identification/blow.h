@@ -23,6 +23,7 @@ struct Blow {
   std::size_t first = 0;                      // sample of the recording
   std::size_t skipped = 0;                    // after it: they are clipped, or between such
   std::vector<std::vector<double>> channels;  // then, as long as it rings, and some noise
+  double peak = 0.0;                          // largest magnitude, without the channel's mean
   double offset = 0.0;                        // largest mean of a channel, of the peak
   std::size_t clipped = 0;  // samples that stand at the peak beside others, in all
   double length_s = 0.0;    // from the blow to the recording's end

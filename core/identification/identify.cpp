@@ -355,6 +355,14 @@ void go_back(Found& found, double samples) {
   }
 }
 
+// Than it can have been at the blow: it was gone before the first sample that was looked at, and
+// rounding is taken for what is left of it.
+bool is_too_loud(const Found& found, double peak) {
+  constexpr double much_more = 30.0;
+  return std::any_of(found.mode.c.begin(), found.mode.c.end(),
+                     [&](Complex c) { return std::abs(c) > much_more * peak; });
+}
+
 Fate fate_of(const Found& found, double rate_hz, std::size_t frames) {
   const double alpha = -found.mode.log_z.real();
   const double omega = found.mode.log_z.imag();
@@ -425,9 +433,7 @@ IdentifiedMode measured(const Found& found, double rate_hz, double time_zero) {
     const Complex start = found.mode.c[c] * std::exp(found.mode.log_z * time_zero);
     const double size = std::abs(start);
     const double seen = found.deviation.c[c] * std::exp(-alpha * time_zero);
-    const auto deviation = [&](double of_pole) {
-      return std::hypot(seen, size * of_pole * time_zero);
-    };
+    const auto deviation = [&](double pole) { return std::hypot(seen, size * pole * time_zero); };
     mode.amplitude.push_back({size, deviation(found.deviation.alpha)});
     mode.phase_rad.push_back(
         {std::arg(start), size > 0.0 ? std::min(pi, deviation(found.deviation.omega) / size) : pi});
@@ -516,7 +522,6 @@ Result<Identification> identify(const Recording& recording, const IdentifyOption
     search->start(poles);
     search->finish();
   }
-
   std::vector<Found> kept;
   double steady_hz = 0.0;
   double steady_energy = 0.0;
@@ -528,7 +533,7 @@ Result<Identification> identify(const Recording& recording, const IdentifyOption
   for (Found& found : all_found(search->fit())) {
     const Fate fate = fate_of(found, rate_hz, frames);
     go_back(found, skipped);
-    if (fate == Fate::kept) {
+    if (fate == Fate::kept && !is_too_loud(found, blow->peak)) {
       kept.push_back(std::move(found));
     } else if (fate == Fate::steady) {
       ++steady;
@@ -560,7 +565,6 @@ Result<Identification> identify(const Recording& recording, const IdentifyOption
   std::sort(kept.begin(), kept.end(), [](const Found& a, const Found& b) {
     return a.mode.log_z.imag() < b.mode.log_z.imag();
   });
-
   const double time_zero = time_of_impulse(kept, rate_hz);
   made.time_zero_s = made.onset_s + time_zero / rate_hz;
   std::vector<DampedMode> modes;
