@@ -1,5 +1,5 @@
-# The whole program against real servers. These share one JACK server name and one audio clock, so
-# they run one after the other.
+# The whole program against real servers. These share one JACK server name, so they run one after
+# the other; as they mostly wait, they come first, beside all else.
 add_library(rtspy MODULE system/rtspy.cpp)
 target_compile_options(rtspy PRIVATE -Wno-conversion -Wno-nonnull-compare)
 target_link_libraries(rtspy PRIVATE PkgConfig::JACK ${CMAKE_DL_LIBS})
@@ -19,17 +19,20 @@ if(NOT RESSORT_ADDRESS_SANITIZER AND NOT RESSORT_THREAD_SANITIZER)
 endif()
 foreach(tag IN LISTS server_tags)
   add_test(NAME server_${tag} COMMAND ressort_server_tests "[${tag}]")
-  set_tests_properties(server_${tag} PROPERTIES TIMEOUT 240 LABELS servers RUN_SERIAL TRUE)
+  set_tests_properties(server_${tag} PROPERTIES TIMEOUT 240 LABELS servers RESOURCE_LOCK jack
+    COST 1000)
 endforeach()
 
 # The panel's page in a real browser, with keys and pointer.
 add_test(NAME server_panel COMMAND ${CMAKE_CURRENT_SOURCE_DIR}/panel/panel_test.py
   $<TARGET_FILE:ressort> ${CMAKE_SOURCE_DIR})
-set_tests_properties(server_panel PROPERTIES TIMEOUT 240 LABELS servers RUN_SERIAL TRUE)
+set_tests_properties(server_panel PROPERTIES TIMEOUT 240 LABELS servers
+  RESOURCE_LOCK jack COST 1000)
 
 add_test(NAME command_line COMMAND ${CMAKE_CURRENT_SOURCE_DIR}/system/command_line.sh
   $<TARGET_FILE:ressort> ${CMAKE_SOURCE_DIR})
-set_tests_properties(command_line PROPERTIES TIMEOUT 240 LABELS servers RUN_SERIAL TRUE)
+set_tests_properties(command_line PROPERTIES TIMEOUT 240 LABELS servers
+  RESOURCE_LOCK jack COST 1000)
 
 # The front page's examples and those of presets/README.md can be heard.
 add_test(NAME examples COMMAND ${CMAKE_CURRENT_SOURCE_DIR}/system/examples $<TARGET_FILE:ressort>)
