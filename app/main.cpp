@@ -249,9 +249,8 @@ void add_play(CLI::App& app, PlayOptions& options, int& code) {
             const bool is_share = slash != std::string::npos &&
                                   parse_number(text.substr(0, slash), number) &&
                                   parse_number(text.substr(slash + 1), of);
-            constexpr double most = 64.0;
             if (!is_share || number != std::floor(number) || of != std::floor(of) || number < 1.0 ||
-                number > of || of > most) {
+                number > of || of > NoteShare::most_parts) {
               throw CLI::ValidationError(
                   "--share", "must be 1/2, the first of two, up to 64/64; found '" + text + "'");
             }

@@ -70,22 +70,27 @@ Events play_input(const Said& said, const GestureRow& gesture) {
                     .value2 = said.arguments[1]});
 }
 
-// Of NAME, or of "NAME:3", the third mass of what NAME stands for; or why there is none.
+// Of NAME, or of "NAME:3", the third mass of what NAME stands for, or of a place, "NAME:0.3"; or
+// why there is none.
 Result<std::uint32_t> find_mass(std::span<const StruckInfo> known, std::string_view name) {
+  const auto find = [&](std::string_view wanted) {
+    const auto found =
+        std::lower_bound(known.begin(), known.end(), wanted,
+                         [](const StruckInfo& info, std::string_view n) { return info.name < n; });
+    return found != known.end() && found->name == wanted ? found : known.end();
+  };
+  if (const auto one = find(name); one != known.end() && one->moves.empty()) {
+    return one->first;
+  }
   const std::size_t colon = std::min(name.find(':'), name.size());
-  const auto found =
-      std::lower_bound(known.begin(), known.end(), name.substr(0, colon),
-                       [](const StruckInfo& info, std::string_view n) { return info.name < n; });
-  if (found != known.end() && found->name == name.substr(0, colon)) {
-    const bool is_one = found->moves.empty();
-    std::uint32_t at = 1;
+  const auto found = find(name.substr(0, colon));
+  if (found != known.end() && !found->moves.empty()) {
+    std::uint32_t at = 0;
     const char* const end = name.data() + name.size();
     const auto read = std::from_chars(std::min(name.data() + colon + 1, end), end, at);
-    const bool is_read = is_one ? colon == name.size() : read.ec == std::errc{} && read.ptr == end;
-    if (is_read && (is_one || (at >= 1 && at <= found->moves.size()))) {
-      return is_one || found->moves[at - 1]
-                 ? Result<std::uint32_t>(found->first + at - 1)
-                 : Error{std::string(name) + " is held, or nobody hears it"};
+    if (read.ec == std::errc{} && read.ptr == end && at >= 1 && at <= found->moves.size()) {
+      return found->moves[at - 1] ? Result<std::uint32_t>(found->first + at - 1)
+                                  : Error{std::string(name) + " is held, or nobody hears it"};
     }
   }
   constexpr std::size_t most_named = 8;
@@ -256,16 +261,16 @@ std::vector<Row> make_rows() {
   const Row last[] = {
       {.address = "/mass/NAME/strike",
        .arguments = {{"STRENGTH", "the strength", -1, 1, 0.8}},
-       .does =
-           "strikes a mass, named as in the model; NAME:3 is the third of a string or a mesh; 1 "
-           "is a hard blow, -1 one from the other side",
+       .does = "strikes a mass, named as in the model; NAME:3 is the third of a string or a mesh, "
+               "NAME:0.3 a place there or on a waveguide, BELL:rim one of a body, that something "
+               "in the model holds on to; 1 is a hard blow, -1 one from the other side",
        .play = strike,
        .command = "hit",
        .group = CommandGroup::playing,
        .words = "MASS [STRENGTH]",
-       .command_does = "strikes a mass by its name",
-       .details = "MASS is its name in the model, or of a string or a mesh NAME:3, its third. "
-                  "STRENGTH is -1 to 1,\nor 0.8.",
+       .command_does = "strikes a mass or a place by its name",
+       .details = "MASS is its name in the model, of a string or a mesh NAME:3, its third, or of a "
+                  "place NAME:0.3\nor BELL:rim. STRENGTH is -1 to 1, or 0.8.",
        .act = command::hit},
       {.address = "/panic",
        .does = "silence at once",

@@ -7,7 +7,10 @@
 #include <algorithm>
 #include <array>
 #include <cstdlib>
+#include <map>
 #include <memory>
+#include <mutex>
+#include <utility>
 #include <vector>
 
 #include "app/devices/audio.h"
@@ -35,9 +38,14 @@ struct Jack {
   Flag lost;
   Flag rewired;  // ports or connections have changed since the last look
 
+  // Used by JACK's own thread, that tells of ports, and by the control thread.
+  std::mutex mutex;
+  std::vector<const jack_port_t*> gone;  // since the last look
+
   // Used by the control thread only.
   Wiring wiring;
-  std::int64_t next_try_ns = 0;  // to plug in what is missing
+  std::map<const jack_port_t*, std::string> others;  // that were connected at the last look
+  std::int64_t next_try_ns = 0;                      // to plug in what is missing
 
   // Used by the audio thread only.
   std::vector<float*> output_buffers;
@@ -115,8 +123,13 @@ void on_connect(jack_port_id_t, jack_port_id_t, int, void* self) {
   static_cast<Jack*>(self)->rewired.raise();
 }
 
-void on_port(jack_port_id_t, int, void* self) {
-  static_cast<Jack*>(self)->rewired.raise();
+void on_port(jack_port_id_t id, int is_there, void* self) {
+  Jack& jack = *static_cast<Jack*>(self);
+  if (is_there == 0) {
+    const std::lock_guard lock(jack.mutex);
+    jack.gone.push_back(jack_port_by_id(jack.client, id));
+  }
+  jack.rewired.raise();
 }
 
 void say_nothing(const char*) {}
@@ -207,8 +220,23 @@ std::vector<jack_port_t*> own_ports(const Jack& jack) {
   return ports;
 }
 
+// By now another port may be in its place, so that its name is what it was at the last look.
+void lose_ports(Jack& jack) {
+  std::vector<const jack_port_t*> gone;
+  {
+    const std::lock_guard lock(jack.mutex);
+    gone = std::exchange(jack.gone, {});
+  }
+  for (const jack_port_t* const port : gone) {
+    if (const auto known = jack.others.find(port); known != jack.others.end()) {
+      jack.wiring.lose(known->second);
+    }
+  }
+}
+
 // Sees what is connected, and connects what was or is to be.
 void look_at_ports(Jack& jack) {
+  lose_ports(jack);
   const std::vector<jack_port_t*> ports = own_ports(jack);
   std::vector<Cable> present;
   for (jack_port_t* const port : ports) {
@@ -221,6 +249,10 @@ void look_at_ports(Jack& jack) {
     return jack_port_by_name(jack.client, port.c_str()) != nullptr;
   };
   jack.wiring.look(present, exists);
+  jack.others.clear();
+  for (const Cable& cable : present) {
+    jack.others.emplace(jack_port_by_name(jack.client, cable.theirs.c_str()), cable.theirs);
+  }
   for (const Cable& cable : jack.wiring.missing()) {
     for (jack_port_t* const port : ports) {
       if (jack_port_short_name(port) == cable.ours && exists(cable.theirs)) {

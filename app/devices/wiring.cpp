@@ -46,6 +46,14 @@ bool Wiring::knows(const Cable& cable) const {
                      [&](const Known& known) { return known.cable == cable; });
 }
 
+void Wiring::lose(const std::string& theirs) {
+  for (Known& known : known_) {
+    if (known.cable.theirs == theirs && known.state != State::pulled) {
+      known.state = State::missing;
+    }
+  }
+}
+
 void Wiring::lose_all() {
   for (Known& known : known_) {
     if (known.state != State::pulled) {

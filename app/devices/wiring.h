@@ -34,6 +34,8 @@ class Wiring {
   // It was plugged in once, whatever became of it.
   bool knows(const Cable& cable) const;
 
+  // A port of others has gone, and its cables with it, whether or not it has come back meanwhile.
+  void lose(const std::string& theirs);
   // The device is gone, and its cables with it.
   void lose_all();
 

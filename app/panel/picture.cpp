@@ -2,7 +2,12 @@
 
 #include <algorithm>
 #include <cmath>
+#include <set>
+#include <utility>
 #include <variant>
+
+#include "core/compile/instrument.h"
+#include "core/kernels/taps.h"
 
 namespace ressort {
 namespace {
@@ -21,17 +26,97 @@ std::vector<double> inverse_masses(const Program& program, const Modes& modes) {
   return inverse;
 }
 
+// A place on a body moves as its modes do, each by how far it moves that place.
 void take_shapes(const Program& program, const Modes& modes, std::span<const std::uint32_t> nodes,
                  Picture::Group& group) {
   const std::vector<double> inverse = inverse_masses(program, modes);
+  const auto number = [&](std::uint32_t c) {
+    return coefficient_value(program, program.coefficients[c], program.parameters, 1.0);
+  };
+  std::vector<std::vector<std::pair<std::uint32_t, double>>> behind;  // [dot] node, weight
+  for (const std::uint32_t node : nodes) {
+    auto& list = behind.emplace_back();
+    if (node < program.moving) {
+      list.emplace_back(node, 1.0);
+      continue;
+    }
+    const TapSlot& tap = program.taps[node - program.taps[0].node];
+    each_behind(program, tap, corners_at(tap, number(tap.u), number(tap.v)),
+                [&](std::uint32_t at, double weight) { list.emplace_back(at, weight); });
+  }
   group.is_modal = true;
   group.modes = modes.modes;
   group.start_q = modes.q;
   for (std::size_t mode = 0; mode < modes.modes; ++mode) {
-    for (const std::uint32_t node : nodes) {
-      group.shapes.push_back(
-          static_cast<float>(modes.basis[mode * program.moving + node] * inverse[node]));
+    for (const auto& list : behind) {
+      double shape = 0.0;
+      for (const auto& [node, weight] : list) {
+        shape += weight * modes.basis[mode * program.moving + node] * inverse[node];
+      }
+      group.shapes.push_back(static_cast<float>(shape));
     }
+  }
+}
+
+// The waveguides of a part, one after the other, whose places are dots already.
+std::vector<Picture::Waveguide> take_waveguides(const Program& program, const Network& network,
+                                                std::span<const std::uint32_t> nodes,
+                                                std::size_t first_dot) {
+  std::vector<Picture::Waveguide> taken;
+  for (const WaveguideSlot& slot : program.waveguides) {
+    Picture::Waveguide& waveguide = taken.emplace_back();
+    waveguide.is_open = slot.is_open;
+    for (std::uint32_t i = slot.first; i < slot.first + slot.count; ++i) {
+      const JunctionSlot& junction = program.junctions[i];
+      const Mass& point = network.masses[program.masses[junction.node]];
+      waveguide.macro = network.taps[point.tap].macro;
+      const auto dot = std::find(nodes.begin(), nodes.end(), junction.node);
+      if (dot != nodes.end()) {
+        const double u =
+            coefficient_value(program, program.coefficients[junction.u], program.parameters, 1.0);
+        waveguide.places.push_back(
+            {std::clamp(u, 0.0, 1.0), first_dot + static_cast<std::size_t>(dot - nodes.begin())});
+      }
+    }
+    std::sort(waveguide.places.begin(), waveguide.places.end(),
+              [](const auto& a, const auto& b) { return a.u < b.u; });
+  }
+  return taken;
+}
+
+// What the waves say lies between the places, which are where they are: what the waves are off
+// there, as they pass a filter, is shared out between one and the next.
+void place_waveguide(const Picture::Waveguide& waveguide, std::span<const double> numbers,
+                     std::span<const double> start, std::span<float> positions) {
+  const auto pieces = static_cast<double>(numbers.size() - 1);
+  const double rest = start[waveguide.first];
+  const auto by_waves = [&](double u) {
+    const auto below = std::min(static_cast<std::size_t>(u * pieces), numbers.size() - 2);
+    const double beyond = u * pieces - static_cast<double>(below);
+    return rest + numbers[below] + beyond * (numbers[below + 1] - numbers[below]);
+  };
+  double from = 0.0;
+  double off = 0.0;
+  const auto off_at = [&](const Picture::Waveguide::Place& place) {
+    return static_cast<double>(positions[place.dot]) - by_waves(place.u);
+  };
+  if (waveguide.is_open && !waveguide.places.empty()) {
+    off = off_at(waveguide.places.front());
+  }
+  std::size_t next = 0;
+  for (std::size_t i = 0; i < numbers.size(); ++i) {
+    const double u = static_cast<double>(i) / pieces;
+    while (next < waveguide.places.size() && waveguide.places[next].u <= u) {
+      from = waveguide.places[next].u;
+      off = off_at(waveguide.places[next++]);
+    }
+    const bool is_last = next == waveguide.places.size();
+    const double until = is_last ? 1.0 : waveguide.places[next].u;
+    const double then = !is_last            ? off_at(waveguide.places[next])
+                        : waveguide.is_open ? off
+                                            : rest - by_waves(1.0);
+    const double share = until > from ? (u - from) / (until - from) : 1.0;
+    positions[waveguide.first + i] = static_cast<float>(by_waves(u) + off + share * (then - off));
   }
 }
 
@@ -41,18 +126,28 @@ Picture make_picture(Engine& engine, const Network& network, std::uint32_t numbe
   Picture picture{.number = number, .network = std::make_shared<const Network>(network)};
   const Machine& machine = engine.machine();
   std::size_t all = 0;
-  const auto counts = [](const Program& program, std::size_t node) {
+  std::size_t waveguides = 0;
+  std::set<std::string> known;  // places on bodies, which several may hold on to
+  const auto counts = [&](const Program& program, std::uint32_t node) {
     const auto is_hand = [&](const InputSlot& input) {
       return !input.is_force && input.node == node;
     };
+    const auto is_place = [&](const TapSlot& tap) { return tap.is_on_body() && tap.node == node; };
+    if (std::any_of(program.taps.begin(), program.taps.end(), is_place)) {
+      return known.insert(struck_name(network, program.masses[node])).second;
+    }
     return node < program.moving ||
            (!std::holds_alternative<Modes>(program.form) &&
             std::any_of(program.inputs.begin(), program.inputs.end(), is_hand));
   };
   for (const Program& program : machine.parts) {
     all += program.moving + program.inputs.size();
+    waveguides += program.waveguides.size();
   }
-  const std::size_t stride = (all + most_dots - 1) / most_dots;
+  constexpr std::size_t most_waveguides = most_dots / 2 / Engine::waveguide_points;
+  waveguides = std::min(waveguides, most_waveguides);
+  const std::size_t most_nodes = most_dots - waveguides * Engine::waveguide_points;
+  const std::size_t stride = (all + most_nodes - 1) / most_nodes;
   // What is played and heard is always drawn.
   const auto is_port = [](const Program& program, std::size_t node) {
     const auto is_here = [&](const auto& slot) { return slot.node == node; };
@@ -60,7 +155,8 @@ Picture make_picture(Engine& engine, const Network& network, std::uint32_t numbe
            std::any_of(program.outputs.begin(), program.outputs.end(), is_here);
   };
   std::size_t room = MotionFrame::most_numbers;
-  std::vector<std::vector<std::uint32_t>> watched;
+  std::size_t nodes_left = most_nodes;
+  std::vector<Engine::Watched> watched;
   for (const Program& program : machine.parts) {
     std::vector<std::pair<std::uint32_t, std::uint32_t>> nodes;  // mass, node
     for (std::uint32_t node = 0; node < program.masses.size(); ++node) {
@@ -71,23 +167,34 @@ Picture make_picture(Engine& engine, const Network& network, std::uint32_t numbe
       }
     }
     std::sort(nodes.begin(), nodes.end());
-    nodes.resize(std::min(nodes.size(), most_dots - picture.masses.size()));
+    nodes.resize(std::min(nodes.size(), nodes_left));
+    nodes_left -= nodes.size();
     Picture::Group group{.first = picture.masses.size(), .count = nodes.size()};
-    std::vector<std::uint32_t>& chosen = watched.emplace_back();
+    Engine::Watched& chosen = watched.emplace_back();
     for (const auto& [mass, node] : nodes) {
-      chosen.push_back(node);
+      chosen.nodes.push_back(node);
       picture.masses.push_back(mass);
       picture.start.push_back(program.position[node]);
     }
     const auto* const modes = std::get_if<Modes>(&program.form);
     if (modes != nullptr && modes->modes <= room && !modes->is_crossed) {
-      take_shapes(program, *modes, chosen, group);
+      take_shapes(program, *modes, chosen.nodes, group);
     }
+    group.waveguides = take_waveguides(program, network, chosen.nodes, group.first);
+    group.waveguides.resize(std::min(group.waveguides.size(), waveguides));
     if (group.numbers() > room || (modes != nullptr && !group.is_modal) || group.numbers() == 0) {
-      chosen.clear();  // it is drawn as it stands
+      chosen.nodes.clear();  // it is drawn as it stands
       group.count = 0;
       group.is_modal = false;
       group.modes = 0;
+      group.waveguides.clear();
+    }
+    chosen.waveguides = group.waveguides.size();
+    waveguides -= chosen.waveguides;
+    for (Picture::Waveguide& waveguide : group.waveguides) {
+      waveguide.first = picture.masses.size();
+      picture.masses.resize(picture.masses.size() + Engine::waveguide_points, Picture::no_mass);
+      picture.start.resize(picture.masses.size(), network.macros[waveguide.macro].position);
     }
     room -= group.numbers();
     picture.groups.push_back(std::move(group));
@@ -119,7 +226,12 @@ void find_positions(const Picture& picture, const MotionFrame& frame, std::span<
     for (std::size_t i = 0; !group.is_modal && i < group.count; ++i) {
       x[i] = static_cast<float>(numbers[i]);
     }
-    at += group.numbers();
+    at += group.is_modal ? group.modes : group.count;
+    for (const Picture::Waveguide& waveguide : group.waveguides) {
+      place_waveguide(waveguide, std::span(frame.numbers).subspan(at, Engine::waveguide_points),
+                      picture.start, positions);
+      at += Engine::waveguide_points;
+    }
   }
 }
 

@@ -16,25 +16,45 @@ namespace ressort {
 
 inline constexpr std::size_t most_dots = 2000;
 
-// Constant once it is made. Dots are masses that move, hands and places on waveguides; of more than
-// most_dots every n-th, in the order of the model.
+// Constant once it is made. Dots are masses that move, hands, places on waveguides and on bodies;
+// of more than most_dots every n-th, in the order of the model; and points along waveguides,
+// between these places.
 struct Picture {
+  static constexpr std::uint32_t no_mass = 0xffffffffu;
+
+  // Engine::waveguide_points dots, from the left end to the right one.
+  struct Waveguide {
+    std::size_t first = 0;    // of the dots
+    std::uint32_t macro = 0;  // of the network as it is written
+    bool is_open = false;
+    struct Place {
+      double u = 0.0;  // where it starts
+      std::size_t dot = 0;
+    };
+    std::vector<Place> places;  // from left to right
+  };
+
   // A part of the machine: its dots follow each other.
   struct Group {
     std::size_t first = 0;  // of the dots
     std::size_t count = 0;
+    std::vector<Waveguide> waveguides;  // whose dots follow
     // Of modes: position = start + sum over modes of (q - q at the start) * shape.
     bool is_modal = false;
     std::size_t modes = 0;
     std::vector<double> start_q;  // [mode]
     std::vector<float> shapes;    // [mode][dot]
 
-    std::size_t numbers() const { return is_modal ? modes : count; }  // as Engine::look() gives
+    // As Engine::look() gives.
+    std::size_t numbers() const {
+      return (is_modal ? modes : count) + waveguides.size() * Engine::waveguide_points;
+    }
   };
 
   std::uint32_t number = 0;
   std::vector<Group> groups;
-  std::vector<std::uint32_t> masses;       // [dot] of the network with its macros written out
+  std::vector<std::uint32_t> masses;       // [dot] of the network with its macros written out, or
+                                           // no_mass between places
   std::vector<double> start;               // [dot] position
   std::shared_ptr<const Network> network;  // as it is written
 };
@@ -55,8 +75,9 @@ void find_positions(const Picture& picture, const MotionFrame& frame, std::span<
 // network: some ms a thousand masses. [any thread but audio]
 std::string network_json(const Picture& picture);
 
-// {"modes": [{"hz", "t60_s", "shape": [dot]}], "linear": true}: the lowest, of the network as its
-// parameters are. Blocks. [any thread but audio]
+// {"modes": [{"hz", "t60_s", "inputs": [[number, dB]], "shape": [dot]}], "linear": true}: the
+// lowest, of the network as its parameters are; dB below the mode that this input excites most.
+// Blocks. [any thread but audio]
 Result<std::string> modes_json(const Picture& picture, std::span<const double> parameters,
                                double rate_hz, std::size_t count, const Progress& progress);
 

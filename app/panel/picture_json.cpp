@@ -10,6 +10,7 @@
 #include "app/panel/picture.h"
 #include "core/analysis/modes/layout.h"
 #include "core/analysis/modes/modes.h"
+#include "core/compile/instrument.h"
 #include "core/laws/laws.h"
 #include "core/model/topology.h"
 
@@ -35,6 +36,11 @@ class NetworkTeller {
     add_nodes();
     place_hands();
     json links = json::array();
+    for (const Picture::Group& group : picture_.groups) {
+      for (const Picture::Waveguide& waveguide : group.waveguides) {
+        add_waveguide(waveguide, links);
+      }
+    }
     for (const Link& link : network_.links) {
       const std::uint32_t a = node_of(link.a);
       const std::uint32_t b = node_of(link.b);
@@ -76,15 +82,35 @@ class NetworkTeller {
   void lay_out() {
     at_.resize(network_.masses.size());
     const bool has_row_only = picture_.network->macros.empty();
-    const MassLayout layout =
-        has_waveguide(*picture_.network) ? MassLayout{} : layout_of(*picture_.network);
+    const MassLayout layout = layout_of(*picture_.network);
     is_plane_ = layout.is_plane;
     for (const auto& row : layout.rows) {
       for (const LayoutPoint& point : row) {
         at_[point.mass] = point;
+        wide_ = std::max(wide_, point.x);
+      }
+    }
+    tops_ = layout.tops;
+    const std::vector<Mass>& written = picture_.network->masses;
+    for (std::uint32_t i = 0; i < written.size(); ++i) {
+      if (written[i].kind == MassKind::point) {
+        at_[i] = point_of(picture_.network->taps[written[i].tap], i);
       }
     }
     is_laid_out_ = is_plane_ || !has_row_only || is_chain(layout);
+  }
+
+  // A place on a waveguide is on its line, one on a body below its modes.
+  std::optional<LayoutPoint> point_of(const Tap& tap, std::uint32_t mass) const {
+    const Macro& macro = picture_.network->macros[tap.macro];
+    const double u = std::clamp(argument_value(network_, tap.u, parameters_), 0.0, 1.0);
+    if (is_waveguide(macro.kind)) {
+      return LayoutPoint{wide_ * u, tops_[tap.macro], mass};
+    }
+    if (macro.kind == MacroKind::body) {
+      return LayoutPoint{(macro.length - 1.0) * u, tops_[tap.macro] + 1.0, mass};
+    }
+    return std::nullopt;
   }
 
   // A single row is one only if its neighbours are linked; else nobody knows where things are.
@@ -109,15 +135,38 @@ class NetworkTeller {
   void add_node(std::uint32_t mass, double start) {
     const Mass& of = network_.masses[mass];
     node_[mass] = static_cast<std::uint32_t>(x_.size());
-    const auto& point = at_[mass];
+    add_node(at_[mass], start, struck_name(*picture_.network, mass),
+             of.kind == MassKind::ground     ? 'g'
+             : of.kind == MassKind::position ? 'h'
+             : of.is_mode                    ? 'o'
+                                             : 'm');
+    if (of.kind == MassKind::point) {
+      place_on_body_.emplace(names_.back(), node_[mass]);
+    }
+  }
+  void add_node(const std::optional<LayoutPoint>& point, double start, const std::string& name,
+                char kind) {
     x_.push_back(point ? json(rounded(point->x)) : json());
     y_.push_back(point ? json(rounded(point->y)) : json());
     start_.push_back(start);
-    names_.push_back(name_of(mass));
-    kinds_ += of.kind == MassKind::ground     ? 'g'
-              : of.kind == MassKind::position ? 'h'
-              : of.is_mode                    ? 'o'
-                                              : 'm';
+    names_.push_back(name);
+    kinds_ += kind;
+  }
+
+  // The line of a waveguide through its points and the places on it.
+  void add_waveguide(const Picture::Waveguide& waveguide, json& lines) const {
+    std::vector<std::pair<double, std::size_t>> line;  // u, node
+    for (std::size_t i = 0; i < Engine::waveguide_points; ++i) {
+      line.emplace_back(static_cast<double>(i) / (Engine::waveguide_points - 1.0),
+                        waveguide.first + i);
+    }
+    for (const Picture::Waveguide::Place& place : waveguide.places) {
+      line.emplace_back(place.u, place.dot);
+    }
+    std::sort(line.begin(), line.end());
+    for (std::size_t i = 1; i < line.size(); ++i) {
+      lines.push_back({line[i - 1].second, line[i].second, static_cast<int>(Law::spring)});
+    }
   }
 
   // Of each parameter the first link or macro that has it, and how many there are.
@@ -152,20 +201,22 @@ class NetworkTeller {
     return out;
   }
 
-  // By which it can be struck: a macro's masses are numbered.
-  std::string name_of(std::uint32_t mass) const {
-    const auto after = std::upper_bound(macro_starts_.begin(), macro_starts_.end(), mass);
-    if (after == macro_starts_.begin()) {
-      return network_.masses[mass].name.text();
-    }
-    const auto macro = static_cast<std::size_t>(after - macro_starts_.begin()) - 1;
-    return picture_.network->macros[macro].name + ":" +
-           std::to_string(mass - macro_starts_[macro] + 1);
-  }
-
   void add_nodes() {
+    std::map<std::size_t, const Picture::Waveguide*> waveguides;  // by their first dot
+    for (const Picture::Group& group : picture_.groups) {
+      for (const Picture::Waveguide& waveguide : group.waveguides) {
+        waveguides.emplace(waveguide.first, &waveguide);
+      }
+    }
     for (std::size_t i = 0; i < picture_.masses.size(); ++i) {
-      add_node(picture_.masses[i], picture_.start[i]);
+      if (picture_.masses[i] != Picture::no_mass) {
+        add_node(picture_.masses[i], picture_.start[i]);
+        continue;
+      }
+      const auto& [first, waveguide] = *std::prev(waveguides.upper_bound(i));
+      const double u = static_cast<double>(i - first) / (Engine::waveguide_points - 1.0);
+      add_node(LayoutPoint{wide_ * u, tops_[waveguide->macro], Picture::no_mass}, picture_.start[i],
+               "", 'w');
     }
     std::vector<bool> is_tied(network_.masses.size(), false);
     for (const Link& link : network_.links) {
@@ -216,7 +267,8 @@ class NetworkTeller {
     }
     const Tap& tap = network_.taps[network_.masses[mass].tap];
     if (tap.places > 0 || tap.length == 0 || tap.width == 0) {
-      return tap.length > 0 ? node_[tap.first] : nowhere;
+      const auto place = place_on_body_.find(struck_name(*picture_.network, mass));
+      return place != place_on_body_.end() ? place->second : nowhere;
     }
     const auto nearest = [&](ArgumentId argument, std::uint32_t count) {
       const double at = std::clamp(argument_value(network_, argument, parameters_), 0.0, 1.0);
@@ -253,9 +305,11 @@ class NetworkTeller {
   const Picture& picture_;
   const Network network_;
   const std::vector<double> parameters_;
-  const std::vector<std::uint32_t> macro_starts_ = macro_starts(*picture_.network);
-  std::vector<std::uint32_t> node_;             // [mass] or nowhere
-  std::vector<std::optional<LayoutPoint>> at_;  // [mass]
+  std::vector<std::uint32_t> node_;                     // [mass] or nowhere
+  std::map<std::string, std::uint32_t> place_on_body_;  // node, by its name
+  std::vector<std::optional<LayoutPoint>> at_;          // [mass]
+  std::vector<double> tops_;                            // [macro]
+  double wide_ = 20.0;                                  // of a waveguide, as of the longest row
   bool is_plane_ = false;
   bool is_laid_out_ = true;
   std::vector<json> x_;  // [node]
@@ -282,6 +336,35 @@ Result<std::string> modes_json(const Picture& picture, std::span<const double> p
   for (std::size_t i = 0; i < picture.masses.size(); ++i) {
     dot[picture.masses[i]] = i;
   }
+  // How loud a mode is that an input strikes, where it is the loudest.
+  const auto level = [&](const NetworkMode& mode, std::size_t input) {
+    double most = 0.0;
+    for (std::size_t output = 0; output < found->outputs; ++output) {
+      most = std::max(most, std::fabs(mode.levels[input * found->outputs + output]));
+    }
+    return most;
+  };
+  std::vector<double> loudest(found->inputs, 0.0);
+  for (const NetworkMode& mode : found->modes) {
+    for (std::size_t input = 0; input < found->inputs; ++input) {
+      loudest[input] = std::max(loudest[input], level(mode, input));
+    }
+  }
+  std::set<int> numbers;
+  for (const Input& input : found->network.inputs) {
+    numbers.insert(input.number);
+  }
+  const auto inputs_json = [&](const NetworkMode& mode) {
+    json inputs = json::array();
+    std::size_t input = 0;
+    for (const int number : numbers) {
+      const double share = loudest[input] > 0.0 ? level(mode, input) / loudest[input] : 0.0;
+      inputs.push_back(
+          {number, share > 1e-6 ? json(std::round(200.0 * std::log10(share)) / 10.0) : json()});
+      ++input;
+    }
+    return inputs;
+  };
   json modes = json::array();
   for (std::size_t m = 0; m < std::min(count, found->modes.size()); ++m) {
     std::vector<double> shape(picture.masses.size(), 0.0);
@@ -298,6 +381,7 @@ Result<std::string> modes_json(const Picture& picture, std::span<const double> p
     const NetworkMode& mode = found->modes[m];
     modes.push_back({{"hz", mode.frequency_hz},
                      {"t60_s", std::isfinite(mode.t60_s) ? json(mode.t60_s) : json()},
+                     {"inputs", inputs_json(mode)},
                      {"shape", shape}});
   }
   return json{{"modes", modes}, {"linear", found->is_linear()}}.dump();

@@ -54,6 +54,7 @@ Session::Session(Process& process, const SessionOptions& options, Tell tell)
       current_(std::make_shared<Loaded>()),
       flight_({.rescale = options_.compile.rescale,
                .voices = options_.compile.voices,
+               .share = options_.compile.share,
                .precision = options_.compile.precision,
                .method = options_.compile.method,
                .budget = options_.compile.budget,

@@ -12,7 +12,6 @@ class Culler {
         progress_(progress),
         groups_(network.masses.size()),
         is_heard_(network.masses.size()),
-        is_moved_(network.masses.size()),
         is_listened_(network.masses.size()) {}
 
   Culled cull() {
@@ -24,7 +23,6 @@ class Culler {
     }
     join();
     listen();
-    look_for_motion();
     decide();
     return std::move(culled_);
   }
@@ -78,35 +76,6 @@ class Culler {
     });
   }
 
-  void look_for_motion() {
-    for (const Input& input : network_.inputs) {
-      mark(is_moved_, input.mass);
-    }
-    for (std::uint32_t i = 0; i < network_.masses.size(); ++i) {
-      const Mass& mass = network_.masses[i];
-      const bool starts =
-          moves(mass) && (mass.position != 0.0 || initial_velocity(network_, mass) != 0.0 ||
-                          mass.gravity != no_argument);
-      if (starts) {
-        mark(is_moved_, i);
-      }
-    }
-    each_live_link([&](const Link& link) {
-      for (const auto& [end, other] : {std::pair(link.a, link.b), std::pair(link.b, link.a)}) {
-        const Mass& mass = network_.masses[end];
-        if (mass.kind == MassKind::position || mass.position != 0.0 || may_push(link)) {
-          mark(is_moved_, other);
-        }
-      }
-    });
-  }
-
-  // A contact may be closed where both of its ends are at 0.
-  bool may_push(const Link& link) const {
-    const LawFacts& law = facts_of(link.law);
-    return law.zone == Zone::below && !is_zero(link.arguments[law.slot(Role::reach)]);
-  }
-
   void decide() {
     culled_.is_dead.assign(network_.masses.size(), true);
     for (std::uint32_t i = 0; i < network_.masses.size(); ++i) {
@@ -114,10 +83,8 @@ class Culler {
         culled_.is_dead[i] = !is_listened_[i];
         continue;
       }
-      const std::uint32_t group = groups_.find(i);
-      culled_.is_dead[i] = !is_heard_[group] || !is_moved_[group];
-      culled_.unheard += is_heard_[group] || !moves(network_.masses[i]) ? 0 : 1;
-      culled_.unmoved += is_heard_[group] && !is_moved_[group] && moves(network_.masses[i]) ? 1 : 0;
+      culled_.is_dead[i] = !is_heard_[groups_.find(i)];
+      culled_.unheard += culled_.is_dead[i] && moves(network_.masses[i]) ? 1 : 0;
     }
     for (std::size_t l = 0; l < network_.links.size(); ++l) {
       const Link& link = network_.links[l];
@@ -149,8 +116,7 @@ class Culler {
   const Progress& progress_;
   Groups groups_;
   Culled culled_;
-  std::vector<bool> is_heard_;  // [group]
-  std::vector<bool> is_moved_;
+  std::vector<bool> is_heard_;     // [group]
   std::vector<bool> is_listened_;  // [mass] by an output
 };
 
@@ -172,7 +138,6 @@ std::string describe(const Culled& culled) {
     }
   };
   add(culled.unheard, masses(culled.unheard) + " that no output hears");
-  add(culled.unmoved, masses(culled.unmoved) + " that nothing moves");
   add(culled.idle, std::to_string(culled.idle) +
                        (culled.idle == 1 ? " link that exerts" : " links that exert") + " nothing");
   return text;

@@ -1,6 +1,7 @@
 #include "core/compile/instrument.h"
 
 #include <bit>
+#include <charconv>
 #include <cmath>
 #include <numbers>
 
@@ -110,11 +111,48 @@ double find_blow(const Network& network, const std::vector<Control>& controls, d
     mass += of.is_mode ? 0.0 : here;
   }
   mass += modal_mass;
+  for (const Macro& guide : network.waveguides) {  // R of each sample of its length
+    mass += argument_value(network, guide.impedance, parameters) * Network::reference_rate_hz /
+            2.0 / std::max(1.0, argument_value(network, guide.frequency_hz, parameters));
+  }
   const double turn = 2.0 * std::numbers::pi * frequency_hz / Network::reference_rate_hz;
   return gain > 0.0 ? 0.5 * mass * turn / gain : mass * turn;
 }
 
+// With a point, which the number of a mass has not.
+std::string coordinate_text(double value) {
+  char text[32];
+  const auto end = std::to_chars(text, text + sizeof text, value, std::chars_format::general, 4);
+  const std::string digits(text, end.ptr);
+  return digits.find_first_of(".e") == std::string::npos ? digits + ".0" : digits;
+}
+
 }  // namespace
+
+std::string struck_name(const Network& network, std::uint32_t mass) {
+  if (mass >= network.masses.size()) {
+    const std::vector<std::uint32_t> starts = macro_starts(network);
+    const auto macro = std::upper_bound(starts.begin(), starts.end(), mass) - starts.begin() - 1;
+    return network.macros[static_cast<std::size_t>(macro)].name + ":" +
+           std::to_string(mass - starts[static_cast<std::size_t>(macro)] + 1);
+  }
+  if (network.masses[mass].kind != MassKind::point) {
+    return std::string(network.masses[mass].name.text());
+  }
+  const Tap& tap = network.taps[network.masses[mass].tap];
+  const Macro& macro = network.macros[tap.macro];
+  const std::vector<double> parameters = parameter_values(network);
+  const double u = std::clamp(argument_value(network, tap.u, parameters), 0.0, 1.0);
+  const double place = u * (static_cast<double>(macro.places.size()) - 1.0);
+  const double nearest = std::rint(place);
+  if (!macro.places.empty() && std::fabs(place - nearest) < 1e-9) {
+    return macro.name + ":" + macro.places[static_cast<std::size_t>(nearest)];
+  }
+  return macro.name + ":" + coordinate_text(u) +
+         (is_mesh(macro.kind) ? ":" + coordinate_text(std::clamp(
+                                          argument_value(network, tap.v, parameters), 0.0, 1.0))
+                              : "");
+}
 
 std::vector<StruckInfo> find_struck(const Network& network, const Machine& machine) {
   const std::vector<std::uint32_t> starts = macro_starts(network);
@@ -124,11 +162,14 @@ std::vector<StruckInfo> find_struck(const Network& network, const Machine& machi
     for (std::uint32_t node = 0; node < program.moving; ++node) {
       is_played[program.masses[node]] = true;
     }
+    for (const TapSlot& tap : program.taps) {
+      is_played[program.masses[tap.node]] = true;
+    }
   }
   std::vector<StruckInfo> struck;
   for (std::uint32_t i = 0; i < network.masses.size(); ++i) {
-    if (is_played[i] && moves(network.masses[i])) {
-      struck.push_back({.name = std::string(network.masses[i].name.text()), .first = i});
+    if (is_played[i]) {
+      struck.push_back({.name = struck_name(network, i), .first = i});
     }
   }
   for (std::size_t i = 0; i < network.macros.size(); ++i) {
@@ -140,8 +181,11 @@ std::vector<StruckInfo> find_struck(const Network& network, const Machine& machi
       struck.push_back({macro.name, starts[i], {first, end}});
     }
   }
-  std::sort(struck.begin(), struck.end(),
-            [](const StruckInfo& a, const StruckInfo& b) { return a.name < b.name; });
+  const auto is_before = [](const StruckInfo& a, const StruckInfo& b) { return a.name < b.name; };
+  std::stable_sort(struck.begin(), struck.end(), is_before);
+  // Several ends of links may be at one place.
+  const auto same = [](const StruckInfo& a, const StruckInfo& b) { return a.name == b.name; };
+  struck.erase(std::unique(struck.begin(), struck.end(), same), struck.end());
   return struck;
 }
 

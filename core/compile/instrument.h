@@ -31,8 +31,8 @@ struct CustomInfo {
   int row = 0;  // Event::index of EventKind::custom
 };
 
-// Masses that may be struck by a name: one, or all of a macro, which are named "NAME:1" and so on.
-// What was culled is not among them.
+// Masses that may be struck by a name: one, or all of a macro, which are named "NAME:1" and so on;
+// and places on macros. What was culled is not among them.
 struct StruckInfo {
   std::string name;
   std::uint32_t first = 0;  // Event::value2 of EventKind::strike
@@ -86,5 +86,9 @@ Instrument make_instrument(const Network& network, const Preset& preset, const A
                            int voices, double gain);
 // Of a network as it is written, which the machine was made of.
 std::vector<StruckInfo> find_struck(const Network& network, const Machine& machine);
+// By which a mass of the network with its macros written out can be struck: its own, its macro's
+// with its number, "s:3", a place of a body, "bell:rim", or where a place is when parameters are as
+// they start, "s:0.25" and "m:0.5:0.333".
+std::string struck_name(const Network& network, std::uint32_t mass);
 
 }  // namespace ressort

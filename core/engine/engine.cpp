@@ -124,8 +124,7 @@ struct Engine::Player {
   // In the voice that was played last, at the same displacement whatever its pitch.
   template <class T>
   void strike(Bank<T>& b, const Event& event) {
-    const bool is_known = event.value2 >= 0.0 && event.value2 < static_cast<double>(struck.size());
-    const StruckMass at = is_known ? struck[static_cast<std::size_t>(event.value2)] : StruckMass{};
+    const StruckNodes::At at = struck.find(event.value2);
     if (at.part >= b.parts.size()) {
       return;  // nobody would hear it
     }
@@ -134,10 +133,11 @@ struct Engine::Player {
     apply_changes(b);
     PartBank<T>& part = b.parts[at.part];
     Kernel<T>& kernel = part.of(lane);
-    const double inverse_mass = static_cast<double>(
-        kernel.coefficients.value[at.inverse_mass * part.width + lane % part.width]);
-    const double change = event.value * machine.rate_ratio * inverse_mass;
-    kernel.strike(lane % part.width, at.node, change * std::sqrt(voices[lane].factor));
+    const double force = event.value * machine.rate_ratio * std::sqrt(voices[lane].factor);
+    const auto change = struck.change(at, force, [&](std::uint32_t c) {
+      return static_cast<double>(kernel.coefficients.value[c * part.width + lane % part.width]);
+    });
+    kernel.strike(lane % part.width, change.nodes, change.speeds);
     watch.stir(voices[lane], lane, at.part);
   }
 
@@ -395,24 +395,31 @@ struct Engine::Player {
 
   std::size_t look(std::span<double> numbers) const {
     const std::size_t lane = voices.last();
-    return std::visit(
+    std::size_t at = 0;
+    bool is_full = false;
+    const auto add = [&](std::size_t more) {
+      at += more;
+      is_full = is_full || more == 0;
+    };
+    const auto look_at_part = [&](const auto& part, const Watched& wanted) {
+      if (!wanted.nodes.empty()) {
+        add(part.of(lane).look(lane % part.width, wanted.nodes, numbers.subspan(at)));
+      }
+      for (std::size_t i = 0; i < wanted.waveguides && !is_full; ++i) {
+        const std::size_t room = std::min(waveguide_points, numbers.size() - at);
+        add(room < waveguide_points
+                ? 0
+                : part.of(lane).look_along(lane % part.width, i, numbers.subspan(at, room)));
+      }
+    };
+    std::visit(
         [&](const auto& b) {
-          std::size_t at = 0;
-          for (std::size_t p = 0; p < watched.size(); ++p) {
-            if (watched[p].empty()) {
-              continue;
-            }
-            const auto& part = b.parts[p];
-            const std::size_t more =
-                part.of(lane).look(lane % part.width, watched[p], numbers.subspan(at));
-            if (more == 0) {
-              break;
-            }
-            at += more;
+          for (std::size_t p = 0; p < watched.size() && !is_full; ++p) {
+            look_at_part(b.parts[p], watched[p]);
           }
-          return at;
         },
         bank);
+    return at;
   }
 
   // Whether this is a moment for a slow look; then it is taken. Once in max_block_frames.
@@ -479,7 +486,7 @@ struct Engine::Player {
 
   const Machine machine;
   const Playing playing;
-  const std::vector<StruckMass> struck = find_struck(machine);  // [mass]
+  StruckNodes struck{machine};
   Voices voices;
   AnyBank bank;
   Parameters parameters;
@@ -489,8 +496,8 @@ struct Engine::Player {
   OutputLevels levels;
   Mixing mixing;
   NoteShare share;
-  std::vector<std::vector<std::uint32_t>> watched;  // [part] nodes; may be empty
-  std::span<double> slow_numbers;                   // where a slow look goes; empty: none is wanted
+  std::vector<Watched> watched;    // [part] or empty
+  std::span<double> slow_numbers;  // where a slow look goes; empty: none is wanted
   double slow_hz = 0.0;
   std::size_t slow_count = 0;
   std::uint64_t updates = 0;
@@ -556,9 +563,9 @@ double Engine::parameter(std::uint16_t index) const {
   return player_->parameters.values()[index];
 }
 
-void Engine::watch(std::vector<std::vector<std::uint32_t>> nodes) {
-  nodes.resize(player_->machine.parts.size());
-  player_->watched = std::move(nodes);
+void Engine::watch(std::vector<Watched> parts) {
+  parts.resize(player_->machine.parts.size());
+  player_->watched = std::move(parts);
 }
 
 std::size_t Engine::look(std::span<double> numbers) const {

@@ -199,10 +199,17 @@ class Engine {
   double parameter(std::uint16_t index) const;  // [audio]
   static constexpr std::size_t max_changes = 64;
 
-  // What look() shows: nodes of each part, [part]. Before it plays. [any thread but audio]
-  void watch(std::vector<std::vector<std::uint32_t>> nodes);
-  // Where these are in the voice that was played last, part by part, as Kernel::look() says; a part
-  // that there is no room for ends it. How many numbers that are. [audio] wait-free, O(numbers)
+  // What look() shows of a part: some of its nodes, and the first so many of its waveguides.
+  struct Watched {
+    std::vector<std::uint32_t> nodes;
+    std::size_t waveguides = 0;
+  };
+  static constexpr std::size_t waveguide_points = 33;
+  // [part] before it plays. [any thread but audio]
+  void watch(std::vector<Watched> parts);
+  // Where these are in the voice that was played last, part by part, as Kernel::look() says, and of
+  // each waveguide so many points, as look_along() does; what there is no room for ends it. How
+  // many numbers that are. [audio] wait-free, O(numbers + the waveguides' samples)
   std::size_t look(std::span<double> numbers) const;
 
   // The same as a stroboscope sees it: process() looks at the first moment, of one in

@@ -1,37 +1,91 @@
-// core/engine: masses that are struck by themselves, without an input.
+// core/engine: masses and places that are struck by themselves, without an input.
 #pragma once
 
 #include <algorithm>
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "core/kernels/program.h"
+#include "core/kernels/taps.h"
 
 namespace ressort {
 
-struct StruckMass {
+class StruckNodes {
+ public:
   static constexpr std::uint32_t nowhere = 0xffffffffu;
-  std::uint32_t part = nowhere;
-  std::uint32_t node = 0;
-  std::uint32_t inverse_mass = 0;  // coefficient
-};
 
-// Where each mass of the network with its macros written out is in the machine; nowhere if it does
-// not move, or was culled. [any thread but audio]
-inline std::vector<StruckMass> find_struck(const Machine& machine) {
-  std::vector<StruckMass> struck;
-  for (std::uint32_t p = 0; p < machine.parts.size(); ++p) {
-    const Program& program = machine.parts[p];
-    for (const MassRun& run : program.mass_runs) {
-      for (std::uint32_t i = 0; i < run.count && !run.is_junction; ++i) {
-        const std::uint32_t node = run.first + i;
-        const std::size_t mass = program.masses[node];
-        struck.resize(std::max(struck.size(), mass + 1));
-        struck[mass] = {p, node, run.inverse_mass};
+  // Where a mass of the network with its macros written out is in the machine; nowhere if it does
+  // not move, or was culled. A place is where its point is.
+  struct At {
+    std::uint32_t part = nowhere;
+    std::uint32_t node = 0;
+  };
+
+  // The machine outlives it. [any thread but audio]
+  explicit StruckNodes(const Machine& machine) : machine_(machine) {
+    std::size_t most = 1;
+    for (std::uint32_t p = 0; p < machine.parts.size(); ++p) {
+      const Program& program = machine.parts[p];
+      std::vector<std::uint32_t>& inverse_mass = inverse_masses_.emplace_back(program.moving);
+      for (const MassRun& run : program.mass_runs) {
+        for (std::uint32_t node = run.first; node < run.first + run.count; ++node) {
+          inverse_mass[node] = run.inverse_mass;
+          note(program.masses[node], {p, node});
+        }
+      }
+      for (const TapSlot& tap : program.taps) {
+        note(program.masses[tap.node], {p, tap.node});
+        most = std::max<std::size_t>({most, tap_corners, tap.is_on_body() ? tap.length : 0});
       }
     }
+    nodes_.reserve(most);
+    changes_.reserve(most);
   }
-  return struck;
-}
+
+  At find(double mass) const {
+    return mass >= 0.0 && mass < static_cast<double>(at_.size())
+               ? at_[static_cast<std::size_t>(mass)]
+               : At{};
+  }
+
+  // What a force there changes, per sample: at most as many nodes as the place has around it, or
+  // its body modes. `coefficient(c)` is the voice's. Good until the next call. [audio]
+  struct Change {
+    std::span<const std::uint32_t> nodes;
+    std::span<const double> speeds;
+  };
+  template <class Coefficient>
+  Change change(const At& at, double force, Coefficient&& coefficient) {
+    const Program& program = machine_.parts[at.part];
+    nodes_.clear();
+    changes_.clear();
+    const auto push = [&](std::uint32_t node, double weight) {
+      if (node < program.moving) {
+        nodes_.push_back(node);
+        changes_.push_back(weight * force * coefficient(inverse_masses_[at.part][node]));
+      }
+    };
+    if (at.node < program.moving) {
+      push(at.node, 1.0);
+    } else {
+      const TapSlot& tap = program.taps[at.node - program.taps[0].node];
+      each_behind(program, tap, corners_at(tap, coefficient(tap.u), coefficient(tap.v)), push);
+    }
+    return {nodes_, changes_};
+  }
+
+ private:
+  void note(std::size_t mass, At at) {
+    at_.resize(std::max(at_.size(), mass + 1));
+    at_[mass] = at;
+  }
+
+  const Machine& machine_;
+  std::vector<At> at_;                                      // [mass]
+  std::vector<std::vector<std::uint32_t>> inverse_masses_;  // [part][node] coefficients
+  std::vector<std::uint32_t> nodes_;
+  std::vector<double> changes_;
+};
 
 }  // namespace ressort

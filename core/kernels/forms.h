@@ -174,7 +174,7 @@ struct Modes {
   std::vector<double> q;  // [mode] at the start
   std::vector<double> d;
   // [mode][mass] what a mass's displacement or velocity is to a mode's; of crossed modes
-  // [displacement, velocity][part][mode][mass], a sample later
+  // [displacement, velocity, push][part][mode][mass], a sample later
   std::vector<double> basis;
   bool is_crossed = false;
   std::vector<double> pole;  // [part][mode] less 1, of crossed modes

@@ -129,9 +129,10 @@ class Kernel {
   // there by themselves; nothing else is touched, not even the last bit. False where the kernel
   // knows of no single nodes. [audio]
   virtual bool write_nodes(std::span<const std::uint32_t> nodes, const T* x, const T* v);
-  // Makes one mass faster by `change`, per sample, as a force on it in the next sample would.
-  // False where the node is no mass that is stepped: ground, a hand, a place. [audio]
-  virtual bool strike(std::size_t lane, std::uint32_t node, double change) = 0;
+  // Makes nodes faster by `changes`, per sample, as a force on each in the next sample would:
+  // masses, modes that ring, and places on waveguides. [audio] O(nodes * modes)
+  virtual void strike(std::size_t lane, std::span<const std::uint32_t> nodes,
+                      std::span<const double> changes) = 0;
   // Becomes what `from` is, another kernel of the same Program, made for as many voices: the same
   // next samples, to the bit. False where a kernel cannot. [audio]
   virtual bool become(const Kernel&) { return false; }
@@ -147,6 +148,10 @@ class Kernel {
   // whatever the nodes. How many numbers that are; 0: there is no room. [audio] O(numbers)
   virtual std::size_t look(std::size_t lane, std::span<const std::uint32_t> nodes,
                            std::span<double> numbers) const = 0;
+  // The same of a waveguide: its displacement from its left end at as many points as there are
+  // numbers, both ends among them, as its waves have it. 0 where there is none. [audio]
+  // O(samples + numbers)
+  virtual std::size_t look_along(std::size_t, std::size_t, std::span<double>) const { return 0; }
   virtual Awake awake() const { return {}; }  // [audio]
 
   Coefficients<T> coefficients;

@@ -55,6 +55,11 @@ double Nodes<T>::velocity(std::size_t node, std::size_t lane) const {
 }
 
 template <class T>
+void Nodes<T>::push(std::size_t node, std::size_t lane, double force) {
+  numbers[at(node, lane) + 2 * layout.row] += static_cast<T>(force);
+}
+
+template <class T>
 void Nodes<T>::put(std::size_t node, std::size_t lane, double x, double v) {
   if (!is_somewhere(node)) {
     return;
@@ -133,14 +138,22 @@ void NodeKernel<T, Number>::write(std::span<const std::uint32_t> nodes, const T*
   std::fill(nodes_.passive.awake.begin(), nodes_.passive.awake.end(), Number(1));
 }
 
-// The forces that links exert in the next sample are there already.
+// Where forces are found as the masses move, what is new is damped in its own sample: a share of
+// Z/M.
 template <class T, class Number>
-bool NodeKernel<T, Number>::strike(std::size_t lane, std::uint32_t node, double change) {
-  if (!is_mass(program_, node)) {
-    return false;
+void NodeKernel<T, Number>::strike(std::size_t lane, std::span<const std::uint32_t> nodes,
+                                   std::span<const double> changes) {
+  const Coefficients<T>& now = this->coefficients;
+  for (std::size_t i = 0; i < nodes.size(); ++i) {
+    const std::uint32_t node = nodes[i];
+    if (keeps_forces()) {
+      const std::uint32_t inverse_mass = run_of(program_, node).inverse_mass;
+      nodes_.push(node, lane,
+                  changes[i] / static_cast<double>(now.value[inverse_mass * now.width + lane]));
+    } else {
+      nodes_.put(node, lane, nodes_.position(node, lane), nodes_.velocity(node, lane) + changes[i]);
+    }
   }
-  nodes_.put(node, lane, nodes_.position(node, lane), nodes_.velocity(node, lane) + change);
-  return true;
 }
 
 template <class T, class Number>
@@ -156,7 +169,10 @@ bool NodeKernel<T, Number>::is_near_start(std::size_t lane, double bound) const 
 template <class T, class Number>
 std::size_t NodeKernel<T, Number>::look(std::size_t lane, std::span<const std::uint32_t> nodes,
                                         std::span<double> numbers) const {
-  return look_at(nodes, numbers, [&](std::uint32_t node) { return nodes_.position(node, lane); });
+  return look_at(nodes, numbers, [&](std::uint32_t node) {
+    const double x = nodes_.position(node, lane);
+    return is_junction(program_, node) ? x - nodes_.velocity(node, lane) / 2 : x;  // as it is heard
+  });
 }
 
 template NodeLayout layout_in_rows<float>(std::span<const std::uint32_t>, std::size_t, std::size_t,

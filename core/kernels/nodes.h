@@ -40,6 +40,7 @@ struct Nodes {
 
   double position(std::size_t node, std::size_t lane) const;
   double velocity(std::size_t node, std::size_t lane) const;
+  void push(std::size_t node, std::size_t lane, double force);
   void put(std::size_t node, std::size_t lane, double x, double v);
   // A lane's nodes, with 0 in all other rows.
   void set(std::size_t lane, const double* x, const double* v);
@@ -66,7 +67,8 @@ class NodeKernel : public Kernel<T> {
   void let_go(std::size_t lane) final { nodes_.passive.awake[lane] = Number(-1); }
   bool save(std::size_t lane, double* x, double* v) const final;
   bool read(std::span<const std::uint32_t> nodes, T* x, T* v) const final;
-  bool strike(std::size_t lane, std::uint32_t node, double change) final;
+  void strike(std::size_t lane, std::span<const std::uint32_t> nodes,
+              std::span<const double> changes) final;
   bool is_near_start(std::size_t lane, double bound) const final;
   std::size_t look(std::size_t lane, std::span<const std::uint32_t> nodes,
                    std::span<double> numbers) const final;
@@ -92,6 +94,8 @@ class NodeKernel : public Kernel<T> {
   Nodes<Number> nodes_;
 
  private:
+  // Whether the force on any node in the next sample is among its numbers already.
+  virtual bool keeps_forces() const { return false; }
   // Whatever a lane has besides its nodes, as at the start.
   virtual void clear(std::size_t) {}
   // Whether that moves by less than `bound` a sample.

@@ -17,10 +17,11 @@ bool is_plain(const Program& program) {
                      [](const LinkRun& run) { return run.scheme == Scheme::plain; });
 }
 
-bool is_mass(const Program& program, std::uint32_t node) {
-  return std::any_of(program.mass_runs.begin(), program.mass_runs.end(), [&](const MassRun& run) {
-    return !run.is_junction && node >= run.first && node - run.first < run.count;
-  });
+const MassRun& run_of(const Program& program, std::uint32_t node) {
+  const auto after =
+      std::upper_bound(program.mass_runs.begin(), program.mass_runs.end(), node,
+                       [](std::uint32_t n, const MassRun& run) { return n < run.first; });
+  return *(after - 1);
 }
 
 double rate_factor(Unit unit, double r) {

@@ -153,8 +153,12 @@ struct Program {
 // Whether every link's force is found as published.
 bool is_plain(const Program& program);
 
-// Whether a node is a mass or a mode, which forces move.
-bool is_mass(const Program& program, std::uint32_t node);
+// Of a node that moves; places on waveguides have one, too.
+const MassRun& run_of(const Program& program, std::uint32_t node);
+// Whether that is a place on a waveguide: the last of those that move.
+static inline bool is_junction(const Program& program, std::uint32_t node) {
+  return node < program.moving && node >= program.moving - program.junctions.size();
+}
 
 // What drives an input, wherever in the network it is.
 struct ModelInput {

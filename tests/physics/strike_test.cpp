@@ -142,5 +142,122 @@ TEST_CASE("A struck mass of any network moves nearly so", "[strike]") {
   CHECK(compared > 100);
 }
 
+// Which mass a name stands for, as whoever strikes it asks.
+std::uint32_t mass_called(const std::string& text, const std::string& name) {
+  const auto compiled = compile(network_of(text), Preset(), {.rate_hz = 48000.0, .bare = true});
+  REQUIRE(compiled);
+  const auto& struck = compiled->instrument.struck;
+  const auto found = std::find_if(struck.begin(), struck.end(),
+                                  [&](const StruckInfo& info) { return info.name == name; });
+  REQUIRE(found != struck.end());
+  REQUIRE(found->moves.empty());
+  return found->first;
+}
+
+struct StruckPlace {
+  std::string text;
+  std::string place;  // as the model writes it
+  std::string name;   // by which it is struck
+};
+
+// What has dampers is struck as a force input pushes wherever a kernel keeps the forces of the next
+// sample, or knows what a mode loses: so in the direct form and by modes.
+TEST_CASE("A struck place moves as a force input there would move it", "[strike]") {
+  const std::string strings =
+      "@p param 0.6\n@s waveguide 1. 220. 3. 0.4 0.\n@t openWaveguide 0.5 110. 3. 0.6 0.\n"
+      "@bridge spring [@s 0.98] [@t 0.3] 0.2 0.01\n@w mass 8. 0.1 0.1\n"
+      "@felt contact @w [@s 0.12] 0.5 0.01 0.\n@damper springDamper @w [@s p] 0. 0.02\n";
+  const std::string bell =
+      "@bell body 40. rim waist crown\n@b1 mode @bell 310.7 4.2 1. -0.61 0.02\n"
+      "@b2 mode @bell 601.2 0.3 0.8 0.35 0.9\n@b3 mode @bell 1533. 0.05 -0.3 0.5 1.4\n"
+      "@b4 mode @bell 23000. 0.05 0.2 0.3 0.4\n";  // it hardly rings
+  const std::string box =
+      "@m mass 2. 0. 0.\n@c springDamper @m [@bell crown] 0.05 0.003\n" + scenes::output(3, "m");
+  const std::string heard = "@out1 posOutput [@bell crown]\n@out2 posOutput [@bell 0.25]\n";
+  const std::string still = "@k string 20 1. 0.1 0. 0. 0. 0.\n@out1 posOutput [@k 0.31]\n";
+  const std::string skin = "@k mesh 5 6 1. 0.1 0. 0. 0. 0.\n@out1 posOutput [@k 0.31 0.7]\n";
+  const std::vector<StruckPlace> places = {
+      {strings + "@out1 posOutput [@s 0.3]\n@out2 posOutput [@t 1]\n", "[@s 0.3]", "s:0.3"},
+      {strings + "@out1 posOutput [@s 0.3]\n@out2 posOutput [@t 1]\n", "[@s 0.12]", "s:0.12"},
+      {strings + "@out1 posOutput [@s 0.3]\n", "[@t 0.3]", "t:0.3"},
+      {strings + "@out1 posOutput [@t 1]\n", "[@t 1]", "t:1.0"},
+      {strings + "@out1 posOutput [@t 1]\n", "[@s p]", "s:0.6"},
+      {bell + heard, "[@bell crown]", "bell:crown"},
+      {bell + heard, "[@bell 0.25]", "bell:0.25"},
+      {bell + box + heard, "[@bell crown]", "bell:crown"},
+      {still, "[@k 0.31]", "k:0.31"},
+      {skin, "[@k 0.31 0.7]", "k:0.31:0.7"}};
+  std::set<Method> seen;
+  for (const auto& [text, place, name] : places) {
+    const std::string with_input = text + "@in20 frcInput " + place + "\n";
+    CompileOptions options{.rate_hz = 48000.0, .bare = true, .method = Method::direct};
+    const Sound by_input = play(with_input, options, pushed());
+    for (const Method method : methods_for(KernelRow::Use::published)) {
+      INFO(text << name << ", by " << method_name(method));
+      Plan plan;
+      options.method = method;
+      const Event with = struck_at(mass_called(with_input, name));
+      const Event without = struck_at(mass_called(text, name));
+      CHECK(difference(by_input, play(with_input, options, with, &plan)) < 1e-9);
+      CHECK(difference(by_input, play(text, options, without)) < 1e-9);
+      for (const Part& part : plan.parts) {
+        seen.insert(part.method);
+      }
+    }
+  }
+  CHECK(seen.contains(Method::direct));
+  CHECK(seen.contains(Method::modal));
+  CHECK(seen.size() >= 4);
+}
+
+// In a voice as notes play it, in single precision too, at another pitch.
+TEST_CASE("A struck place sounds at the pitch of the last key", "[strike]") {
+  const std::string text =
+      "@s waveguide 1. 220. 3. 0.4 0.\n@in1 frcInput [@s 0.2]\n@out1 posOutput [@s 0.3]\n";
+  const auto by = [&](const Event& event, Precision precision) {
+    Preset preset = support::struck(2);
+    preset.gain = 1.0;
+    Player player(text, preset, {.rate_hz = 48000.0, .precision = precision});
+    player.run(20000, {note_on(0, 64, 1e-9), event});
+    return player.out;
+  };
+  // As hard as moves it as far: a lighter stroke would do for a slower string.
+  const Event push{.frame = blow_frame,
+                   .kind = EventKind::gesture,
+                   .gesture = Gesture::force,
+                   .index = 1,
+                   .value = force * std::exp2((64.0 - 57.0) / 12.0)};
+  for (const Precision precision : {Precision::float64, Precision::float32}) {
+    const double apart =
+        difference(by(push, precision), by(struck_at(mass_called(text, "s:0.2")), precision));
+    CHECK(apart < (precision == Precision::float64 ? 1e-7 : 1e-5));
+  }
+}
+
+TEST_CASE("A model without any input is struck, and costs nothing until then", "[strike]") {
+  const std::string text = scenes::string("s", 20, "0.1", "0.001") + scenes::output(1, "s_m16");
+  const std::string with_input = text + "@in20 frcInput @s_m4\n";
+  const std::uint32_t mass = mass_called(text, "s_m4");
+  const CompileOptions options{.rate_hz = 48000.0, .bare = true, .method = Method::direct};
+  CHECK(difference(play(with_input, options, pushed()), play(text, options, struck_at(mass))) <
+        1e-9);
+  Preset preset;
+  Player player(text, preset, {.rate_hz = 48000.0});
+  CHECK(player.compiled.engine->machine().parts.size() == 1);
+  player.run(24000);
+  CHECK(player.compiled.engine->meters().stepped == 0);
+  CHECK(peak(player.y()) == 0.0);
+  player.run(4410, {struck_at(mass)});
+  CHECK(player.compiled.engine->meters().stepped == 1);
+  CHECK(peak(player.y()) > 0.0);
+  // What nobody hears is left out as before.
+  const auto deaf = compile(network_of(scenes::string("s", 20, "0.1", "0.001")), preset, options);
+  REQUIRE(deaf);
+  CHECK(deaf->instrument.struck.empty());
+  for (const Program& part : deaf->engine->machine().parts) {
+    CHECK(part.moving == 0);
+  }
+}
+
 }  // namespace
 }  // namespace ressort

@@ -585,6 +585,27 @@ TEST_CASE("A keyboard that was unplugged is taken up again by its name", "[jack_
   }
 }
 
+// Between two looks it is gone and there again, which is not the same as being unplugged by hand.
+TEST_CASE("A keyboard that is back in no time is taken up again as well", "[jack_midi]") {
+  const Server server(256);
+  Child play(program({"play", click(), "-a", "jack", "-i", "-u", osc_port}));
+  REQUIRE(answers());
+  auto keyboard = std::make_unique<Neighbour>();
+  REQUIRE(keyboard->connect("neighbour:keys", "ressort:midi_in"));
+  for (int time = 0; time < 10; ++time) {
+    INFO("time " << time);
+    std::this_thread::sleep_for(std::chrono::milliseconds(1500 + 7 * time));  // it is seen
+    keyboard.reset();
+    keyboard = std::make_unique<Neighbour>();
+    REQUIRE(
+        eventually([&] { return keyboard->is_connected("neighbour:keys", "ressort:midi_in"); }));
+  }
+  std::this_thread::sleep_for(1500ms);
+  keyboard->disconnect("neighbour:keys", "ressort:midi_in");
+  std::this_thread::sleep_for(1500ms);
+  CHECK_FALSE(keyboard->is_connected("neighbour:keys", "ressort:midi_in"));
+}
+
 TEST_CASE("Ports say what they are, in their order", "[jack_midi]") {
   const Server server(256);
   Child play(program({"play", "Resonator", "-a", "jack", "-i", "-u", osc_port}));

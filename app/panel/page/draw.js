@@ -203,7 +203,7 @@ export class NetworkView {
       const kind = net.kinds[i];
       if (kind === 'o') { stems.moveTo(sx[i], this.flat[i][1]); stems.lineTo(sx[i], sy[i]); }
       if (kind === 'g') still.rect(sx[i] - size, sy[i] - size, 2 * size, 2 * size);
-      else if (kind !== 'h') { moving.moveTo(sx[i] + size, sy[i]); moving.arc(sx[i], sy[i], size, 0, 7); }
+      else if (kind !== 'h' && kind !== 'w') { moving.moveTo(sx[i] + size, sy[i]); moving.arc(sx[i], sy[i], size, 0, 7); }
     }
     c.strokeStyle = this.colour.up; c.lineWidth = 3; c.stroke(stems);
     c.fillStyle = this.colour.held; c.fill(still);

@@ -176,6 +176,8 @@ function paint() {
     drawScope($('scope'), heard);
     const found = drawSpectrum($('spectrum'), spectrumOf(heard), status.rate || 48000);
     $('centroid').textContent = status.centroid_hz ? hertz(status.centroid_hz) : '–';
+    $('spread').textContent = status.spread_hz ? hertz(status.spread_hz) : '–';
+    $('flatness').textContent = status.flatness ? status.flatness.toPrecision(2) : '–';
     $('loudest').textContent = found ? hertz(found.peak) : '–';
     $('loudest-note').textContent = found ? noteName(found.peak) : '';
     const most = view.peak > 1e-6 ? view.peak.toPrecision(2) : '0';
@@ -294,7 +296,9 @@ $('find-modes').addEventListener('click', async () => {
     $('modes').replaceChildren(...found.modes.map((mode, i) => {
       const button = make('button', hertz(mode.hz), { 'aria-pressed': 'false' });
       button.append(make('small', `${noteName(mode.hz)}, ${mode.t60_s === null ? 'never decays' : 'T60 ' + mode.t60_s.toPrecision(2) + ' s'}`));
-      button.setAttribute('aria-label', `Mode ${i + 1}, ${hertz(mode.hz)}`);
+      const by = mode.inputs.map(([number, db]) => `input ${number} ${db === null ? 'not at all' : db + ' dB'}`).slice(0, 3).join(', ');
+      if (by) button.append(make('small', by, { title: 'How much an input excites it, below the mode that it excites most' }));
+      button.setAttribute('aria-label', `Mode ${i + 1}, ${hertz(mode.hz)}; ${by}`);
       button.addEventListener('click', () => {
         const on = button.getAttribute('aria-pressed') === 'true';
         document.querySelectorAll('#modes button').forEach(b => b.setAttribute('aria-pressed', 'false'));

@@ -36,6 +36,7 @@ struct FlightEngine {
 struct FlightSetup {
   bool rescale = true;
   int voices = 0;
+  NoteShare::Part share;  // of the notes, of which all are recorded
   Precision precision = Precision::float64;
   std::optional<Method> method;
   std::optional<Budget> budget;

@@ -90,6 +90,9 @@ class FlightWriter {
 void print(FlightWriter& out, const FlightSetup& setup) {
   out.line("rescale", setup.rescale ? 1 : 0);
   out.line("voices", setup.voices);
+  if (setup.share.of > 1) {
+    out.line("share", setup.share.number, setup.share.of);
+  }
   out.line("precision", name_in(precisions, setup.precision));
   if (setup.method) {
     out.line("method", method_name(*setup.method));
@@ -220,6 +223,10 @@ class FlightReader {
       setup.rescale = words.whole<int>(1) != 0;
     } else if (key == "voices") {
       setup.voices = words.whole<int>(max_voices);
+    } else if (key == "share") {
+      setup.share.number = words.whole<int>(NoteShare::most_parts);
+      setup.share.of = words.whole<int>(NoteShare::most_parts);
+      words.ok = words.ok && setup.share.number >= 1 && setup.share.number <= setup.share.of;
     } else if (key == "precision") {
       const std::string_view name = words.word();
       const auto* const row = std::find_if(std::begin(precisions), std::end(precisions),

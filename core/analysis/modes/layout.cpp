@@ -63,6 +63,11 @@ class LayoutMaker {
     }
     auto first = static_cast<std::uint32_t>(network_.masses.size());
     for (const Macro& macro : network_.macros) {
+      layout.tops.push_back(top);
+      if (is_waveguide(macro.kind)) {
+        top += 2.0;
+        continue;
+      }
       std::vector<LayoutPoint>& row = layout.rows.emplace_back();
       for (std::uint32_t i = 0; i < macro.length; ++i) {
         for (std::uint32_t j = 0; j < macro.width; ++j) {

@@ -18,6 +18,8 @@ struct LayoutPoint {
 struct MassLayout {
   bool is_plane = false;
   std::vector<std::vector<LayoutPoint>> rows;
+  std::vector<double>
+      tops;  // [macro] y of its first row; a waveguide, which has no masses, is there
 };
 
 // As the model draws its masses, and its meshes as rectangles; where nothing is drawn, as the links

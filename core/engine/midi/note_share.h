@@ -14,6 +14,7 @@ namespace ressort {
 // One of so many. All functions: [audio] wait-free.
 class NoteShare {
  public:
+  static constexpr int most_parts = 64;
   struct Part {
     int number = 1;  // from 1
     int of = 1;

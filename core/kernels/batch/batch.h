@@ -88,6 +88,7 @@ class BatchKernel final : public NodeKernel<T> {
   BatchKernel(const Program& program, const Batch& batch, BatchTable table, std::size_t lanes,
               Isa isa);
   void play(const Block<T>& block) override;
+  bool keeps_forces() const override { return true; }
 
   const Batch& batch_;
   BatchTable table_;

@@ -428,13 +428,12 @@ void DenseKernel<T>::refresh_force() {
 
 // The force of the next sample is that of the velocity before.
 template <class T>
-bool DenseKernel<T>::strike(std::size_t, std::uint32_t node, double change) {
-  if (node >= body_.masses) {
-    return false;
-  }
+void DenseKernel<T>::strike(std::size_t, std::span<const std::uint32_t> nodes,
+                            std::span<const double> changes) {
   refresh_force();
-  velocity_of(node) += static_cast<T>(change);
-  return true;
+  for (std::size_t i = 0; i < nodes.size(); ++i) {
+    velocity_of(nodes[i]) += static_cast<T>(changes[i]);
+  }
 }
 
 template <class T>

@@ -19,6 +19,7 @@ class CompensatedKernel final : public NodeKernel<T, float> {
 
  private:
   void play(const Block<T>& block) override;
+  bool keeps_forces() const override { return true; }
 
   DirectLoops<float> loops_;
   // The coefficients, and what a block says, in single precision.

@@ -91,11 +91,16 @@ class DirectKernel final : public NodeKernel<T> {
     this->become_nodes(from);
     return rails_.is_empty();
   }
+  std::size_t look_along(std::size_t lane, std::size_t guide,
+                         std::span<double> numbers) const override {
+    return rails_.look(lane, guide, numbers);
+  }
   // Of what masses and waves hold: the books of energy of a test.
   const Rails<T>& rails() const { return rails_; }
 
  private:
   void play(const Block<T>& block) override;
+  bool keeps_forces() const override { return true; }
   void clear(std::size_t lane) override { rails_.clear(lane); }
   bool is_quiet(std::size_t lane, double bound) const override {
     return rails_.is_quiet(lane, bound);

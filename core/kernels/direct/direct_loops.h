@@ -173,12 +173,6 @@ void spread_taps(const Program& program, S& s) {
   }
 }
 
-// Whether a node is a place on a waveguide: the last of those that give way.
-bool is_junction(const Program& program, std::uint32_t node) {
-  const std::size_t places = program.junctions.size();
-  return node < program.moving && node >= program.moving - places;
-}
-
 // Whether a node is a place on a macro; it is then taps[node - taps[0].node].
 bool is_place(const Program& program, std::uint32_t node) {
   return !program.taps.empty() && node >= program.taps[0].node;

@@ -125,16 +125,19 @@ bool ShardedKernel<T>::save(std::size_t lane, double* x, double* v) const {
 
 // All that have the mass or a copy of it feel it.
 template <class T>
-bool ShardedKernel<T>::strike(std::size_t lane, std::uint32_t node, double change) {
-  bool is_struck = false;
+void ShardedKernel<T>::strike(std::size_t lane, std::span<const std::uint32_t> nodes,
+                              std::span<const double> changes) {
+  write_copies();
   for (std::size_t i = 0; i < shards_.size(); ++i) {
     const std::vector<std::uint32_t>& own = shards_[i].nodes;
-    const auto at = std::lower_bound(own.begin(), own.end(), node);
-    if (at != own.end() && *at == node) {
-      is_struck |= kernels_[i]->strike(lane, static_cast<std::uint32_t>(at - own.begin()), change);
+    for (std::size_t k = 0; is_here(i) && k < nodes.size(); ++k) {
+      const auto at = std::lower_bound(own.begin(), own.end(), nodes[k]);
+      if (at != own.end() && *at == nodes[k]) {
+        const auto local = static_cast<std::uint32_t>(at - own.begin());
+        kernels_[i]->strike(lane, {&local, 1}, changes.subspan(k, 1));
+      }
     }
   }
-  return is_struck;
 }
 
 template <class T>

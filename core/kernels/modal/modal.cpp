@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <complex>
 
 namespace ressort {
 namespace {
@@ -294,26 +295,31 @@ void ModalKernel<T>::set_state(std::size_t, const double* x, const double* v) {
 
 // A mode's damping is not to act on what a force in the next sample adds. What sleeps wakes.
 template <class T>
-bool ModalKernel<T>::strike(std::size_t, std::uint32_t node, double change) {
-  if (!is_mass(program_, node)) {
-    return false;
-  }
+void ModalKernel<T>::strike(std::size_t, std::span<const std::uint32_t> nodes,
+                            std::span<const double> changes) {
   const std::size_t block = std::size_t{modes_.modes} * program_.moving;
   for (std::size_t i = 0; i < modes_.modes; ++i) {
-    const double* const basis = modes_.basis.data() + i * program_.moving + node;
+    const auto sum = [&](std::size_t of) {
+      const double* const basis = modes_.basis.data() + of * block + i * program_.moving;
+      double felt = 0.0;
+      for (std::size_t k = 0; k < nodes.size(); ++k) {
+        felt += basis[nodes[k]] * changes[k];
+      }
+      return felt;
+    };
     if (modes_.is_crossed) {
-      state_.q[i] += static_cast<T>(basis[2 * block] * change);
-      state_.d[i] += static_cast<T>(basis[3 * block] * change);
+      const std::complex<double> pole(1.0 + modes_.pole[i], modes_.pole[modes_.modes + i]);
+      const std::complex<double> before = std::complex<double>(sum(4), sum(5)) / pole;
+      state_.q[i] += static_cast<T>(before.real());
+      state_.d[i] += static_cast<T>(before.imag());
       continue;
     }
     const double damping = state_.is_stale ? 0.0 : static_cast<double>(state_.z[i]);
     const double gain = state_.root != nullptr ? static_cast<double>(state_.root[i]) : 1.0;
     // What is damped in one sample is not there, as a mode that is left out above half the rate.
-    state_.d[i] +=
-        damping < 1.0 ? static_cast<T>(gain * basis[0] * change / (1.0 - damping)) : T(0);
+    state_.d[i] += damping < 1.0 ? static_cast<T>(gain * sum(0) / (1.0 - damping)) : T(0);
   }
   wake_all();
-  return true;
 }
 
 template <class T>

@@ -144,7 +144,8 @@ class ModalKernel final : public Kernel<T> {
   void set_state(std::size_t lane, const double* x, const double* v) override;
   // Modes that nobody hears are left out: false.
   bool save(std::size_t lane, double* x, double* v) const override;
-  bool strike(std::size_t lane, std::uint32_t node, double change) override;
+  void strike(std::size_t lane, std::span<const std::uint32_t> nodes,
+              std::span<const double> changes) override;
   // By the length of the modes' displacement, which no mass exceeds: it may be late, never early.
   bool is_near_start(std::size_t lane, double bound) const override;
   std::size_t look(std::size_t lane, std::span<const std::uint32_t> nodes,

@@ -290,6 +290,11 @@ class ModesFinder {
         }
       }
     }
+    for (std::size_t i = 0; i < 2 * count; ++i) {
+      for (std::uint32_t mass = 0; mass < count_; ++mass) {
+        modes_.basis.push_back(crossed_.push[mass][i] / (body_.root[mass] * body_.root[mass]));
+      }
+    }
     modes_.reach = 0.0;
     for (const Vector& row : crossed_.shape) {
       modes_.reach = std::max(modes_.reach, std::sqrt(dot(row, row)));
@@ -422,27 +427,24 @@ class ModesFinder {
     return rest;
   }
 
-  // Modes that nothing hears, and modes that nothing sets moving, are as good as not there.
+  // Modes that nothing hears are as good as not there. Any other may be struck.
   void drop_idle_modes() {
     const auto matters = [](const std::vector<Vector>& rows, std::uint32_t i) {
       return std::any_of(rows.begin(), rows.end(), [&](const Vector& row) {
         return std::fabs(row[i]) > zero_tolerance * largest(row);
       });
     };
-    std::vector<Vector> driven = pushed_;
-    driven.insert(driven.end(), heard_.begin(),
-                  heard_.begin() + std::ptrdiff_t(modes_.places.size()));
-    driven.push_back(q_);
-    driven.push_back(d_);
     for (std::uint32_t i = 0; i < count_; ++i) {
-      if ((matters(heard_, i) || matters(felt_, i)) && matters(driven, i)) {
+      if (matters(heard_, i) || matters(felt_, i)) {
         kept_.push_back(i);
       }
     }
     if (has_force_output()) {
       modes_.silence = 0.0;  // there is no bound for what a force swings by
     }
-    if (modes_.silence > 0.0) {
+    const bool is_driven =
+        !pushed_.empty() || !modes_.places.empty() || largest(q_) > 0.0 || largest(d_) > 0.0;
+    if (modes_.silence > 0.0 && is_driven) {
       leave_out();
     }
     modes_.modes = static_cast<std::uint32_t>(kept_.size());

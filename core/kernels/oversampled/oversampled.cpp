@@ -54,8 +54,12 @@ bool OversampledKernel<T>::save(std::size_t lane, double* x, double* v) const {
 }
 
 template <class T>
-bool OversampledKernel<T>::strike(std::size_t lane, std::uint32_t node, double change) {
-  return fine_->strike(lane, node, change / static_cast<double>(times_));
+void OversampledKernel<T>::strike(std::size_t lane, std::span<const std::uint32_t> nodes,
+                                  std::span<const double> changes) {
+  for (std::size_t i = 0; i < nodes.size(); ++i) {
+    const double change = changes[i] / static_cast<double>(times_);
+    fine_->strike(lane, nodes.subspan(i, 1), {&change, 1});
+  }
 }
 
 template <class T>

@@ -91,9 +91,15 @@ bool SlowKernel<T>::save(std::size_t, double* x, double* v) const {
 
 // A coarse step feels it with the forces that are gathered for it.
 template <class T>
-bool SlowKernel<T>::strike(std::size_t, std::uint32_t node, double change) {
-  return is_fine_ ? fine_.kernel->strike(0, node, change)
-                  : coarse_.kernel->strike(0, node, change * static_cast<double>(frames_));
+void SlowKernel<T>::strike(std::size_t, std::span<const std::uint32_t> nodes,
+                           std::span<const double> changes) {
+  if (is_fine_) {
+    return fine_.kernel->strike(0, nodes, changes);
+  }
+  for (std::size_t i = 0; i < nodes.size(); ++i) {
+    const double change = changes[i] * static_cast<double>(frames_);
+    coarse_.kernel->strike(0, nodes.subspan(i, 1), {&change, 1});
+  }
 }
 
 template <class T>

@@ -18,7 +18,8 @@ class SlowKernel final : public Kernel<T> {
   SlowKernel(const Program& program, const Slow& form, std::size_t voices, Isa isa);
   void set_state(std::size_t lane, const double* x, const double* v) override;
   bool save(std::size_t lane, double* x, double* v) const override;
-  bool strike(std::size_t lane, std::uint32_t node, double change) override;
+  void strike(std::size_t lane, std::span<const std::uint32_t> nodes,
+              std::span<const double> changes) override;
   bool is_near_start(std::size_t lane, double bound) const override;
   std::size_t look(std::size_t lane, std::span<const std::uint32_t> nodes,
                    std::span<double> numbers) const override;

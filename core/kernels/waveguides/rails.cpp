@@ -158,6 +158,37 @@ bool Rails<T>::is_quiet(std::size_t lane, double bound) const {
 }
 
 template <class T>
+std::size_t Rails<T>::look(std::size_t lane, std::size_t number, std::span<double> numbers) const {
+  if (number >= guides.size() || numbers.size() < 2) {
+    return 0;
+  }
+  const Guide& guide = guides[number];
+  const double samples = end[guide.row + lane];
+  const double sign = guide.slot->is_open ? 1.0 : -1.0;
+  const auto pieces = static_cast<double>(numbers.size() - 1);
+  std::fill(numbers.begin(), numbers.end(), 0.0);
+  for (std::uint32_t delay = 1; delay <= end[guide.row + lane]; ++delay) {
+    // Half a sample to either side, on the way from the right end and back.
+    const double middle = guide.slot->filters_at.share + (delay - 0.5) / samples;
+    const double way = 2.0 * (middle - std::floor(middle));
+    const double at = way < 1.0 ? 1.0 - way : way - 1.0;
+    const double wave = ring[guide.ring + ((now - delay) & guide.mask) * width + lane];
+    const double rise = way < 1.0 ? sign * wave : -wave;
+    const double first = pieces * std::clamp(at - 1.0 / samples, 0.0, 1.0);
+    const double last = pieces * std::clamp(at + 1.0 / samples, 0.0, 1.0);
+    for (double from = first; from < last;) {
+      const double until = std::min(last, std::floor(from) + 1.0);
+      numbers[static_cast<std::size_t>(from) + 1] += rise * (until - from) / (last - first);
+      from = until;
+    }
+  }
+  for (std::size_t i = 1; i < numbers.size(); ++i) {
+    numbers[i] += numbers[i - 1];
+  }
+  return numbers.size();
+}
+
+template <class T>
 double Rails<T>::energy(std::size_t lane, const T* coefficients) const {
   double sum = 0.0;
   for (const Guide& guide : guides) {

@@ -45,6 +45,10 @@ class Rails {
   void prepare(const T* coefficients);
   // Whether no wave of a lane is faster than that. O(samples) [audio]
   bool is_quiet(std::size_t lane, double bound) const;
+  // Its displacement from the left end, at so many points as there are numbers: of the sum of what
+  // runs left less what runs right, sample by sample. The filters' own delay is spread over all of
+  // it. How many numbers that are. O(samples + numbers) [audio]
+  std::size_t look(std::size_t lane, std::size_t guide, std::span<double> numbers) const;
   // What the waves of a lane hold, with the impedances as they are; fades apart.
   double energy(std::size_t lane, const T* coefficients) const;
 

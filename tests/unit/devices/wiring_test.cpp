@@ -64,4 +64,24 @@ TEST_CASE("a client that leaves takes its cables first, and does not pull them",
   CHECK(wiring.missing().empty());
 }
 
+TEST_CASE("a port that has gone and come back between two looks was not pulled", "[wiring]") {
+  Wiring wiring;
+  look(wiring, {speaker, mixer, keyboard}, all);
+  wiring.lose(keyboard.theirs);
+  look(wiring, {speaker}, all);  // it is back, and the mixer was pulled meanwhile
+  CHECK(wiring.missing() == std::vector<Cable>{keyboard});
+  CHECK(wiring.is_in_doubt());
+  look(wiring, {speaker}, all);
+  CHECK(wiring.missing() == std::vector<Cable>{keyboard});
+  look(wiring, {speaker, keyboard}, all);
+  CHECK(wiring.missing().empty());
+  // Told of only after it was seen to be unplugged.
+  look(wiring, {speaker}, all);
+  wiring.lose(keyboard.theirs);
+  look(wiring, {speaker}, all);
+  CHECK(wiring.missing() == std::vector<Cable>{keyboard});
+  wiring.lose(mixer.theirs);  // which a person has pulled
+  CHECK(wiring.missing() == std::vector<Cable>{keyboard});
+}
+
 }  // namespace ressort

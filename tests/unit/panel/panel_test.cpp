@@ -7,17 +7,20 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <array>
 #include <chrono>
 #include <cmath>
 #include <cstring>
 #include <functional>
 #include <future>
 #include <nlohmann/json.hpp>
+#include <numbers>
 #include <set>
 
 #include "app/panel/access.h"
 #include "app/panel/page.h"
 #include "app/panel/picture.h"
+#include "core/compile/instrument.h"
 #include "core/kernels/registry.h"
 #include "tests/support/app/data_folder.h"
 #include "tests/support/app/osc_bytes.h"
@@ -56,7 +59,20 @@ std::vector<Scene> scenes_with_taps() {
                      scenes::string("s", 12, "0.1", "0.0005") + "@in1 frcInput @s_m2\n",
                      {"s_m1", "s_m2", "s_m6", "s_m9"}}),
           with_taps({"uneven masses", uneven, {"a", "b", "c"}}),
-          with_taps({"contact", beaten, {"s_m1", "s_m4", "s_m8", "w"}})};
+          with_taps({"contact", beaten, {"s_m1", "s_m4", "s_m8", "w"}}),
+          {"places on waveguides and a mass",
+           "@s waveguide 1. 220. 3. 0.4 0.1\n@t openWaveguide 0.5 110. 3. 0.6 0.\n"
+           "@w mass 3. 0. 0.\n@b springDamper [@s 0.9] [@t 0.3] 0.2 0.01\n"
+           "@h springDamper @w [@s 0.6] 0.05 0.001\n@in1 frcInput [@s 0.2]\n"
+           "@out1 posOutput [@s 0.2]\n@out2 posOutput [@s 0.9]\n@out3 posOutput [@t 0.3]\n"
+           "@out4 posOutput @w\n",
+           {"s:0.2", "s:0.9", "t:0.3", "w"}},
+          {"places on a body",
+           "@bell body 40. rim waist crown\n@b1 mode @bell 310.7 4.2 1. -0.61 0.02\n"
+           "@b2 mode @bell 601.2 1.3 0.8 0.35 0.9\n@b3 mode @bell 1533. 0.5 -0.3 0.5 1.4\n"
+           "@in1 frcInput [@bell rim]\n@out1 posOutput [@bell rim]\n"
+           "@out2 posOutput [@bell crown]\n@out3 posOutput [@bell 0.25]\n",
+           {"bell:rim", "bell:crown", "bell:0.25"}}};
 }
 
 TEST_CASE("what is drawn is where the render hears it, whatever computes it", "[panel]") {
@@ -80,7 +96,7 @@ TEST_CASE("what is drawn is where the render hears it, whatever computes it", "[
           for (std::size_t i = 0; i < scene.heard.size(); ++i) {
             const auto dot =
                 std::find_if(picture.masses.begin(), picture.masses.end(), [&](std::uint32_t mass) {
-                  return network.masses[mass].name == Name(scene.heard[i]);
+                  return mass != Picture::no_mass && struck_name(network, mass) == scene.heard[i];
                 });
             REQUIRE(dot != picture.masses.end());
             const double shown = positions[static_cast<std::size_t>(dot - picture.masses.begin())];
@@ -111,15 +127,94 @@ TEST_CASE("of a large network so many masses are drawn as there is room for", "[
   CHECK(frame.count == picture.masses.size());
 }
 
+// A blow as soft as half a period of 80 Hz, on a string whose waves nothing damps: what is drawn
+// between its places is where places would be that hold nothing. A sample to either side is what a
+// place's own rounding is worth, and a straight line has a thirty-second of the string.
+TEST_CASE("a waveguide is drawn where places between its places are heard", "[panel]") {
+  for (const std::string kind : {"waveguide", "openWaveguide"}) {
+    const std::string text = "@s " + kind + " 1. 55. 1000. 1. 0.1\n@out1 posOutput [@s 0.23]\n" +
+                             "@out2 posOutput [@s 0.81]\n";
+    std::string probed = text;
+    for (std::size_t i = 1; i + 1 < Engine::waveguide_points; ++i) {
+      probed +=
+          "@out" + std::to_string(i + 2) + " posOutput [@s " + std::to_string(i / 32.0) + "]\n";
+    }
+    const CompileOptions bare{.rate_hz = 48000.0, .bare = true, .method = Method::direct};
+    Player drawn(text, Preset(), bare);
+    Player heard(probed, Preset(), bare);
+    const Picture picture = make_picture(drawn.engine(), network_of(text), 1);
+    REQUIRE(picture.masses.size() == 2 + Engine::waveguide_points);
+    REQUIRE(picture.groups[0].waveguides.size() == 1);
+    const Picture::Waveguide& waveguide = picture.groups[0].waveguides[0];
+    CHECK(waveguide.first == 2);
+    const auto blow = [&](const Player& player) {
+      const auto& struck = player.compiled.instrument.struck;
+      const auto at = std::find_if(struck.begin(), struck.end(),
+                                   [](const StruckInfo& info) { return info.name == "s:0.23"; });
+      REQUIRE(at != struck.end());
+      std::vector<Event> events;
+      for (std::uint32_t n = 0; n < 300; ++n) {
+        events.push_back({.frame = n,
+                          .kind = EventKind::strike,
+                          .value = 1e-3 * (1.0 - std::cos(2.0 * std::numbers::pi * n / 300.0)),
+                          .value2 = static_cast<double>(at->first)});
+      }
+      return events;
+    };
+    drawn.run(300, blow(drawn));
+    heard.run(300, blow(heard));
+    double most = 0.0;
+    double apart = 0.0;
+    double straight = 0.0;  // as far as a string is off that is drawn at its places alone
+    for (int time = 0; time < 40; ++time) {
+      drawn.run(97);
+      heard.run(97);
+      MotionFrame frame;
+      frame.count = drawn.engine().look(frame.numbers);
+      std::vector<float> positions(picture.masses.size());
+      find_positions(picture, frame, positions);
+      const auto here = [&](double u) {
+        const std::array<std::pair<double, double>, 4> at = {
+            {{0.0, 0.1}, {0.23, positions[0]}, {0.81, positions[1]}, {1.0, 0.1}}};
+        std::size_t k = 0;
+        while (at[k + 1].first < u) {
+          ++k;
+        }
+        return at[k].second + (u - at[k].first) / (at[k + 1].first - at[k].first) *
+                                  (at[k + 1].second - at[k].second);
+      };
+      for (std::size_t i = 1; i + 1 < Engine::waveguide_points; ++i) {
+        const double there = heard.out[i + 1].back();
+        most = std::max(most, std::fabs(there - 0.1));
+        apart = std::max(apart, std::fabs(there - positions[waveguide.first + i]));
+        straight = std::max(straight, std::fabs(there - here(static_cast<double>(i) / 32.0)));
+      }
+    }
+    INFO(kind << ": " << apart / most << " of the greatest swing, straight lines "
+              << straight / most);
+    CHECK(apart < 0.02 * most);
+    CHECK(straight > 0.3 * most);
+  }
+}
+
 TEST_CASE("a look changes no bit of the sound and takes no memory", "[panel]") {
-  for (const Method method : {Method::direct, Method::modal}) {
+  const std::string waveguides =
+      "@s waveguide 1. 220. 3. 0.4 0.\n@t openWaveguide 0.5 110. 3. 0.6 0.\n"
+      "@b springDamper [@s 0.9] [@t 0.3] 0.2 0.01\n@in1 frcInput [@s 0.2]\n"
+      "@out1 posOutput [@s 0.2]\n";
+  const std::pair<std::string, Method> scenes[] = {{ringing_string(), Method::direct},
+                                                   {ringing_string(), Method::modal},
+                                                   {waveguides, Method::direct}};
+  for (const auto& scene : scenes) {
+    const std::string& text = scene.first;
+    const Method method = scene.second;
     Harness plain(true, 2);
     Harness watched(true, 2);
     int looks = 0;
     for (Harness* const harness : {&plain, &watched}) {
-      auto compiled = compile(network_of(ringing_string()), struck(4), {.method = method});
+      auto compiled = compile(network_of(text), struck(4), {.method = method});
       REQUIRE(compiled);
-      const Picture picture = make_picture(*compiled->engine, network_of(ringing_string()), 3);
+      const Picture picture = make_picture(*compiled->engine, network_of(text), 3);
       delete harness->process.slot.offer(new Sounding{
           .engine = std::move(compiled->engine), .serial = 1, .picture = picture.number});
       for (int i = 0; i < 400; ++i) {

@@ -204,6 +204,35 @@ TEST_CASE("A flight has programs that let the last one ring", "[flight]") {
   check_same(stage.heard, played_back(path));
 }
 
+// Each of two that share the notes has recorded all of them, and plays its own: what one leaves out
+// the other one has, from one instrument to the next.
+TEST_CASE("A flight of one that shares the notes plays its own of them", "[flight]") {
+  const Folder folder;
+  std::vector<float> sounds[3];
+  for (int number = 0; number <= 2; ++number) {
+    const NoteShare::Part share = number == 0 ? NoteShare::Part{} : NoteShare::Part{number, 2};
+    Stage stage({.compile = {.rate_hz = rate_hz, .share = share}, .keeps_flights = true});
+    stage.load("PolyTriangle");
+    stage.play(4800, {{0x90, 57, 100}, {0x90, 64, 90}, {0x90, 61, 70}});
+    stage.play(4800, {{0x80, 57, 0}, {0x90, 64, 80}, {0x90, 69, 80}, {0x90, 57, 110}});
+    stage.load("HandBell");
+    stage.play(9600, {{0x90, 60, 100}, {0x90, 57, 100}, {0x90, 62, 100}});
+    const std::string path = (folder.path / ("f" + std::to_string(number) + ".ressort")).string();
+    REQUIRE(stage.session.write_flight(path, Existing::refuse));
+    const auto text = read_text(path, max_flight_bytes);
+    REQUIRE(text);
+    CHECK((text->find("\nshare ") != std::string::npos) == (number > 0));
+    const auto flight = parse_flight(*text);
+    REQUIRE(flight);
+    CHECK(print_flight(*flight) == *text);
+    check_same(stage.heard, played_back(path));
+    sounds[number] = stage.heard;
+  }
+  CHECK(sounds[1] != sounds[0]);
+  CHECK(sounds[2] != sounds[0]);
+  CHECK(sounds[1] != sounds[2]);
+}
+
 TEST_CASE("A flight has the texts as they were when they were played", "[flight]") {
   const Folder folder;
   const std::string model =
@@ -259,6 +288,10 @@ TEST_CASE("What is no flight is refused with its line", "[flight]") {
   CHECK(error_of("ressort flight 1\ntexts\ntext 100 a.mdl\nshort\n") ==
         "3: no line of a flight: 'text 100 a.mdl'");
   CHECK(error_of("ressort flight 1\n0 period 0 2\n") == "2: no line of a flight: '0 period 0 2'");
+  for (const std::string share : {"0 2", "3 2", "1 65", "1.5 2", "1", "1 2 3"}) {
+    CHECK(error_of("ressort flight 1\nshare " + share + "\n") ==
+          "2: no line of a flight: 'share " + share + "'");
+  }
   CHECK(error_of("ressort flight 1\n0 dance 1\n") == "2: no line of a flight: '0 dance 1'");
   CHECK(error_of("ressort flight 1\nend 5\n") ==
         "2: the flight has ended before it began; expected engines and events");
