@@ -91,6 +91,14 @@ class NetworkTeller {
       }
     }
     tops_ = layout.tops;
+    const std::vector<std::uint32_t> starts = macro_starts(*picture_.network);
+    for (std::size_t i = 0; i < starts.size(); ++i) {
+      const Macro& macro = picture_.network->macros[i];
+      const bool is_body = macro.kind == MacroKind::body && !is_plane_;
+      for (std::uint32_t k = 0; is_body && k < macro.length; ++k) {
+        at_[starts[i] + k]->x = along(macro, macro.length > 1 ? k / (macro.length - 1.0) : 0.5);
+      }
+    }
     const std::vector<Mass>& written = picture_.network->masses;
     for (std::uint32_t i = 0; i < written.size(); ++i) {
       if (written[i].kind == MassKind::point) {
@@ -98,6 +106,11 @@ class NetworkTeller {
       }
     }
     is_laid_out_ = is_plane_ || !has_row_only || is_chain(layout);
+  }
+
+  // Modes, which are nowhere, are as far apart as there is room for.
+  double along(const Macro& body, double u) const {
+    return is_plane_ ? (body.length - 1.0) * u : wide_ * u;
   }
 
   // A place on a waveguide is on its line, one on a body below its modes.
@@ -108,7 +121,7 @@ class NetworkTeller {
       return LayoutPoint{wide_ * u, tops_[tap.macro], mass};
     }
     if (macro.kind == MacroKind::body) {
-      return LayoutPoint{(macro.length - 1.0) * u, tops_[tap.macro] + 1.0, mass};
+      return LayoutPoint{along(macro, u), tops_[tap.macro] + 1.0, mass};
     }
     return std::nullopt;
   }

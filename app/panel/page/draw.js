@@ -99,13 +99,13 @@ export class NetworkView {
     });
     const margin = Math.min(56, this.width * 0.08), wide = right - left || 1, high = bottom - top || 1;
     const room = this.height - 2 * margin - 30;
+    this.reach = Math.min(this.height, this.width) * (net.plane ? 0.13 : 0.24);
     let k = (this.width - 2 * margin) / wide, kv = k;
     if (net.plane) k = kv = Math.min(k, room / high);
-    else kv = Math.min(k, room * 0.6 / high);
+    else kv = Math.min(Math.max(k, 1.3 * this.reach), room * 0.6 / high);   // rows are to swing apart
     if (!net.plane && net.x.length < 3) k = kv = Math.min(k, 120);
     this.flat = this.flat.map(([u, v]) =>
       [this.width / 2 + (u - (left + right) / 2) * k, this.height / 2 + (v - (top + bottom) / 2) * kv]);
-    this.reach = Math.min(this.height, this.width) * (net.plane ? 0.13 : 0.24);
   }
 
   // Positions in model units become heights; what was seen of late sets the scale.

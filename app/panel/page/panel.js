@@ -177,7 +177,7 @@ function paint() {
     const found = drawSpectrum($('spectrum'), spectrumOf(heard), status.rate || 48000);
     $('centroid').textContent = status.centroid_hz ? hertz(status.centroid_hz) : '–';
     $('spread').textContent = status.spread_hz ? hertz(status.spread_hz) : '–';
-    $('flatness').textContent = status.flatness ? status.flatness.toPrecision(2) : '–';
+    $('flatness').textContent = status.flatness ? status.flatness < 1e-3 ? 'below 0.001' : status.flatness.toPrecision(2) : '–';
     $('loudest').textContent = found ? hertz(found.peak) : '–';
     $('loudest-note').textContent = found ? noteName(found.peak) : '';
     const most = view.peak > 1e-6 ? view.peak.toPrecision(2) : '0';
