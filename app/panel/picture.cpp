@@ -8,9 +8,12 @@
 
 #include "core/compile/instrument.h"
 #include "core/kernels/taps.h"
+#include "core/kernels/waveguides/rails.h"
 
 namespace ressort {
 namespace {
+
+constexpr std::size_t most_samples = 1 << 16;  // of waves, that the audio thread adds up for a look
 
 // How far a mass moves when a mode's q grows by 1, from how much the mode gets of the mass: the
 // shapes are orthogonal by the masses.
@@ -127,6 +130,7 @@ Picture make_picture(Engine& engine, const Network& network, std::uint32_t numbe
   const Machine& machine = engine.machine();
   std::size_t all = 0;
   std::size_t waveguides = 0;
+  std::size_t most_waveguides = most_dots / 2 / Engine::waveguide_points;
   std::set<std::string> known;  // places on bodies, which several may hold on to
   const auto counts = [&](const Program& program, std::uint32_t node) {
     const auto is_hand = [&](const InputSlot& input) {
@@ -143,8 +147,10 @@ Picture make_picture(Engine& engine, const Network& network, std::uint32_t numbe
   for (const Program& program : machine.parts) {
     all += program.moving + program.inputs.size();
     waveguides += program.waveguides.size();
+    if (!program.waveguides.empty()) {
+      most_waveguides = std::min(most_waveguides, most_samples / waveguide_slots(program));
+    }
   }
-  constexpr std::size_t most_waveguides = most_dots / 2 / Engine::waveguide_points;
   waveguides = std::min(waveguides, most_waveguides);
   const std::size_t most_nodes = most_dots - waveguides * Engine::waveguide_points;
   const std::size_t stride = (all + most_nodes - 1) / most_nodes;

@@ -163,22 +163,27 @@ std::size_t Rails<T>::look(std::size_t lane, std::size_t number, std::span<doubl
     return 0;
   }
   const Guide& guide = guides[number];
-  const double samples = end[guide.row + lane];
+  const std::uint32_t samples = end[guide.row + lane];
   const double sign = guide.slot->is_open ? 1.0 : -1.0;
   const auto pieces = static_cast<double>(numbers.size() - 1);
+  const double half = pieces / samples;  // of a sample, to either side
   std::fill(numbers.begin(), numbers.end(), 0.0);
-  for (std::uint32_t delay = 1; delay <= end[guide.row + lane]; ++delay) {
-    // Half a sample to either side, on the way from the right end and back.
-    const double middle = guide.slot->filters_at.share + (delay - 0.5) / samples;
-    const double way = 2.0 * (middle - std::floor(middle));
-    const double at = way < 1.0 ? 1.0 - way : way - 1.0;
+  for (std::uint32_t delay = 1; delay <= samples; ++delay) {
+    // From the right end to the left one and back.
+    const double round = guide.slot->filters_at.share + (delay - 0.5) / samples;
+    const double way = 2.0 * (round - std::floor(round));
     const double wave = ring[guide.ring + ((now - delay) & guide.mask) * width + lane];
     const double rise = way < 1.0 ? sign * wave : -wave;
-    const double first = pieces * std::clamp(at - 1.0 / samples, 0.0, 1.0);
-    const double last = pieces * std::clamp(at + 1.0 / samples, 0.0, 1.0);
-    for (double from = first; from < last;) {
-      const double until = std::min(last, std::floor(from) + 1.0);
-      numbers[static_cast<std::size_t>(from) + 1] += rise * (until - from) / (last - first);
+    const double first = std::max(pieces * std::fabs(1.0 - way) - half, 0.0);
+    const double last = std::min(pieces * std::fabs(1.0 - way) + half, pieces);
+    auto piece = static_cast<std::size_t>(first);
+    if (last <= static_cast<double>(piece + 1)) {
+      numbers[std::min(piece + 1, numbers.size() - 1)] += rise;
+      continue;
+    }
+    for (double from = first; from < last; ++piece) {
+      const double until = std::min(last, static_cast<double>(piece + 1));
+      numbers[piece + 1] += rise * (until - from) / (last - first);
       from = until;
     }
   }

@@ -136,8 +136,8 @@ TEST_CASE("a waveguide is drawn where places between its places are heard", "[pa
                              "@out2 posOutput [@s 0.81]\n";
     std::string probed = text;
     for (std::size_t i = 1; i + 1 < Engine::waveguide_points; ++i) {
-      probed +=
-          "@out" + std::to_string(i + 2) + " posOutput [@s " + std::to_string(i / 32.0) + "]\n";
+      probed += "@out" + std::to_string(i + 2) + " posOutput [@s " +
+                std::to_string(static_cast<double>(i) / 32.0) + "]\n";
     }
     const CompileOptions bare{.rate_hz = 48000.0, .bare = true, .method = Method::direct};
     Player drawn(text, Preset(), bare);
