@@ -153,6 +153,7 @@ TEST_CASE("a mass is struck by its name, those of strings and meshes by numbers"
   CHECK(struck("/mass/a/strike -0.5") == std::pair{-0.2, 0.0});
   CHECK(struck("/mass/s:2/strike 1") == std::pair{0.4, 4.0});
   CHECK(struck("/mass/s:4/strike") == std::pair{0.8 * 0.4, 6.0});
+  CHECK(struck("/mass/s:0.5/strike 1") == std::pair{0.4, 2.0});
   const auto refused = [&](const std::string& text) {
     INFO(text);
     const auto events = said(text);
@@ -160,8 +161,9 @@ TEST_CASE("a mass is struck by its name, those of strings and meshes by numbers"
     return events.error().message;
   };
   CHECK(refused("/mass/s:1/strike") == "/mass/s:1/strike: s:1 is held, or nobody hears it");
-  const std::string there = ": the model has no such mass; it has a, s:1 to s:5";
-  for (const std::string name : {"s", "s:", "s:0", "s:6", "s:x", "s:2x", "a:1", "b", "", "far"}) {
+  const std::string there = ": the model has no such mass; it has a, s:1 to s:5, s:0.5";
+  for (const std::string name :
+       {"s", "s:", "s:0", "s:6", "s:x", "s:2x", "s:0.50", "a:1", "b", "", "far"}) {
     CHECK(refused("/mass/" + name + "/strike") == "/mass/" + name + "/strike" + there);
   }
   CHECK(refused("/mass/a/strike 1.1") ==
