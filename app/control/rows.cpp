@@ -385,10 +385,11 @@ std::vector<Row> make_rows() {
        .group = CommandGroup::parameters,
        .words = "FIGURE VALUE ...",
        .command_does = "turns parameters until it sounds so: centroid 1800 t60 3",
-       .details = "FIGURE is t60 in s, centroid or spread in Hz, inharmonicity or odd_to_even, and "
-                  "f0 in Hz where keys\ndo not set the pitch, of a blow at the key that was played "
-                  "last. Parameters move within their\nranges. 'undo' takes it back, 'save NAME' "
-                  "keeps it, 'timbre' tells what sounds.",
+       .details =
+           "FIGURE is t60 in s, attack in ms, centroid or spread in Hz, inharmonicity or "
+           "odd_to_even, and f0\nin Hz where keys do not set the pitch, of a blow at the key "
+           "that was played last. Parameters\nmove within their ranges. 'undo' takes it back, "
+           "'save NAME' keeps it, 'timbre' tells what sounds.",
        .act = command::shape},
       {.address = "/subscribe",
        .arguments = {{"SECONDS", "the seconds", 0, Subscribers::longest_lease_s, 10}},

@@ -93,6 +93,8 @@ expect 0 "0.00 JND" "$program" shape free.mdl --f0 300 --t60 3 -o shaped.toml
 expect 0 "300.000" "$program" modes shaped.toml --modes 1
 expect 2 "shaped.toml' is there already" "$program" shape free.mdl --f0 300 -o shaped.toml
 expect 0 "as high as it gets is" "$program" shape free.mdl --f0 20000
+expect 0 '"attack_ms"' "$program" shape free.mdl --attack 8 --json
+expect 2 "must be a number above 0" "$program" shape free.mdl --attack 0
 expect 0 '"k": "highest"' "$program" shape free.mdl --f0 20000 --json
 expect 0 "key 60 (C4 +0)" "$program" shape PolyTriangle --note 60 --centroid 400 --json
 expect 0 "as dark as it gets with the rest is" "$program" shape free.mdl --like blow.flac --t60 3

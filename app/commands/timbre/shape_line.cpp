@@ -14,7 +14,8 @@ const char* const shape_examples =
     "Parameters move within their ranges; the pitch stays where keys have it. Figures are those "
     "of\n"
     "'describe', in the first 2048 samples of a blow, the preset's own at velocity 100 if it has "
-    "one,\nof the mean of all outputs; T60 is that of the pitch.\n"
+    "one,\nof the mean of all outputs; T60 is that of the pitch, the attack that of the whole "
+    "sound.\n"
     "How far each is off is told in just noticeable differences (JND), and where it cannot be\n"
     "reached, what holds it.\n"
     "Examples:\n"
@@ -44,6 +45,8 @@ const char* help_of(AskedFigure figure) {
       return "flat or peaked: the kurtosis of the spectrum, 3 of a bell curve";
     case AskedFigure::slope:
       return "of the line through the spectrum, in 1/Hz";
+    case AskedFigure::attack:
+      return "sudden or slow: the attack in ms, 10 to the log attack time";
   }
   return "";
 }

@@ -51,6 +51,10 @@ Result<Liked> liked(const std::string& path, const Progress& progress,
       like.targets.push_back({row.figure, *values[number]});
     }
   }
+  if (sound->temporal) {
+    like.targets.push_back(
+        {AskedFigure::attack, 1e3 * std::pow(10.0, sound->temporal->log_attack_time)});
+  }
   const auto found = identify_recording(path, {.most_modes = 40}, progress);
   if (!found) {
     std::fprintf(stderr, "%s: no modes, so no T60 is asked for\n", found.error().message.c_str());

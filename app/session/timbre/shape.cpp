@@ -20,9 +20,22 @@ namespace {
 
 constexpr double missed_by = 0.1;  // of what is noticed: less is as good as there
 
-std::string told(AskedFigure figure, double value) {
+// The unit that ends a figure's name, from its '_' on; or nothing.
+std::string_view unit_of(AskedFigure figure) {
   const std::string_view name = row_of(figure).name;
-  const std::string_view unit = name.ends_with("_hz") ? " Hz" : name.ends_with("_s") ? " s" : "";
+  for (const std::string_view unit : {"_hz", "_ms", "_s"}) {
+    if (name.ends_with(unit)) {
+      return unit;
+    }
+  }
+  return {};
+}
+
+std::string told(AskedFigure figure, double value) {
+  const std::string_view ending = unit_of(figure);
+  const std::string unit = ending.empty()    ? ""
+                           : ending == "_hz" ? " Hz"
+                                             : " " + std::string(ending.substr(1));
   const double size = std::fabs(value);
   const int digits = size >= 1000.0  ? 0
                      : size >= 100.0 ? 1
@@ -34,7 +47,7 @@ std::string told(AskedFigure figure, double value) {
   return (size >= 1e9                 ? print_number(value)
           : size > 0.0 && size < 1e-5 ? std::string(small)
                                       : with_commas(value, digits)) +
-         std::string(unit);
+         unit;
 }
 
 // The first line that a parameter could take the place of a number in.
@@ -131,9 +144,8 @@ double key_hz(const Preset& preset, int key) {
 }  // namespace
 
 std::string short_name(AskedFigure figure) {
-  const std::string name(row_of(figure).name);
-  const std::size_t unit = name.ends_with("_hz") ? 3 : name.ends_with("_s") ? 2 : 0;
-  return name.substr(0, name.size() - unit);
+  const std::string_view name = row_of(figure).name;
+  return std::string(name.substr(0, name.size() - unit_of(figure).size()));
 }
 
 Result<AskedFigure> asked_figure(const std::string& word) {
@@ -183,6 +195,10 @@ Result<Shaped> shape_timbre(const ShapeRequest& request, std::vector<TimbreTarge
   StrikeOptions options{.rate_hz = request.rate_hz,
                         .blows = blows_of(request),
                         .pitch_mode = static_cast<std::size_t>(preset.pitch_mode - 1),
+                        .has_attack = std::any_of(targets.begin(), targets.end(),
+                                                  [](const TimbreTarget& target) {
+                                                    return target.figure == AskedFigure::attack;
+                                                  }),
                         .progress = request.progress};
   shaped.of = scene.name;
   if (request.has_keys) {
@@ -191,21 +207,22 @@ Result<Shaped> shape_timbre(const ShapeRequest& request, std::vector<TimbreTarge
   }
   shaped.of += ", " + told(options.blows, scene.network) + " heard at all outputs";
   const Network network = with_fixed(scene.network, preset);
-  const StruckModel lines(network, options);
-  options.by_samples = true;
-  const StruckModel samples(network, options);
+  StruckModel model(network, options);
   shaped.targets = targets;
-  auto found = ask_timbre(
-      [&](std::span<const double> values) { return lines.figures(values); }, request.values, free,
-      targets,
-      {.exactly = [&](std::span<const double> values) { return samples.figures(values); },
-       .tell = request.tell,
-       .progress = request.progress});
+  auto found = ask_timbre(asked_model(model, StruckAs::lines), request.values, free, targets,
+                          {.exactly = asked_model(model, StruckAs::samples),
+                           .tell = request.tell,
+                           .progress = request.progress});
   if (!found) {
     return found.error().message == stopped ? found.error()
                                             : Error{scene.name + ": " + found.error().message};
   }
   shaped.found = *std::move(found);
+  if (!options.has_attack) {  // which is told all the same
+    const auto attack = static_cast<std::size_t>(AskedFigure::attack);
+    shaped.found.before[attack] = model.attack_ms(request.values);
+    shaped.found.reached[attack] = model.attack_ms(shaped.found.values);
+  }
   return shaped;
 }
 

@@ -15,10 +15,11 @@ constexpr std::uint32_t held = 0xffffffffu;
 
 class SystemMaker {
  public:
-  SystemMaker(const Network& network, double step, bool is_sampled)
+  SystemMaker(const Network& network, double step, bool is_sampled, double key_factor)
       : network_(network),
         step_(step),
         is_sampled_(is_sampled),
+        key_factor_(key_factor),
         row_(network.masses.size(), held) {}
 
   LinearSystem make() {
@@ -55,17 +56,20 @@ class SystemMaker {
  private:
   double value(ArgumentId id) const { return argument_value(network_, id, {}); }
 
-  std::pair<double, double> per_step(ArgumentId stiffness, ArgumentId damping) const {
-    return {value(stiffness) * step_ * step_, value(damping) * step_};
+  std::pair<double, double> per_step(ArgumentId stiffness, ArgumentId damping,
+                                     bool is_fixed) const {
+    return {value(stiffness) * (is_fixed ? 1.0 : key_factor_) * step_ * step_,
+            value(damping) * step_};
   }
 
   std::pair<double, double> numbers_of(const Assembly::Term& term) const {
     if (term.is_link) {
-      const LinearPart part = linear_part(network_.links[term.element]);
-      return per_step(part.stiffness, part.damping);
+      const Link& link = network_.links[term.element];
+      const LinearPart part = linear_part(link);
+      return per_step(part.stiffness, part.damping, link.is_fixed);
     }
     const Mass& mass = network_.masses[term.element];
-    const auto [k, z] = per_step(mass.stiffness, mass.damping);
+    const auto [k, z] = per_step(mass.stiffness, mass.damping, mass.is_fixed);
     if (!mass.is_mode || !is_sampled_) {
       return {k, z};
     }
@@ -96,7 +100,7 @@ class SystemMaker {
       const double at = link.a == link.b ? 0.0 : part_of(link.a, node) - part_of(link.b, node);
       if (at != 0.0) {
         const LinearPart part = linear_part(link);
-        const auto [pull, rub] = per_step(part.stiffness, part.damping);
+        const auto [pull, rub] = per_step(part.stiffness, part.damping, link.is_fixed);
         const double k = -weight * at * pull;
         const double z = -weight * at * rub;
         add(port.stiff, link.a, k);
@@ -137,6 +141,7 @@ class SystemMaker {
   const Network& network_;
   double step_;
   bool is_sampled_;
+  double key_factor_;
   std::vector<std::uint32_t> row_;  // [mass]
   LinearSystem made_;
 };
@@ -184,23 +189,30 @@ Network settled(const Network& network, std::span<const double> parameters) {
   return out;
 }
 
-LinearSystem make_linear_system(const Network& network, double step, bool is_sampled) {
-  return SystemMaker(network, step, is_sampled).make();
+LinearSystem make_linear_system(const Network& network, double step, bool is_sampled,
+                                double key_factor) {
+  return SystemMaker(network, step, is_sampled, key_factor).make();
 }
 
 Vector product(const SparseMatrix& lower, const Vector& x) {
   Vector y(x.size());
+  multiply(lower, std::begin(x), std::begin(y));
+  return y;
+}
+
+void multiply(const SparseMatrix& lower, const double* x, double* y) {
+  std::fill_n(y, lower.size(), 0.0);
   for (std::size_t column = 0; column + 1 < lower.first.size(); ++column) {
-    for (auto i = static_cast<std::size_t>(lower.first[column]);
-         i < static_cast<std::size_t>(lower.first[column + 1]); ++i) {
+    auto i = static_cast<std::size_t>(lower.first[column]);
+    const auto end = static_cast<std::size_t>(lower.first[column + 1]);
+    double sum = lower.value[i] * x[column];  // its diagonal comes first
+    for (++i; i < end; ++i) {
       const auto row = static_cast<std::size_t>(lower.row[i]);
       y[row] += lower.value[i] * x[column];
-      if (row != column) {
-        y[column] += lower.value[i] * x[row];
-      }
+      sum += lower.value[i] * x[row];
     }
+    y[column] += sum;
   }
-  return y;
 }
 
 }  // namespace ressort

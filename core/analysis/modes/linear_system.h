@@ -1,6 +1,7 @@
 // core/analysis/modes: a network near rest as matrices, for masses of 1.
 #pragma once
 
+#include <complex>
 #include <cstdint>
 #include <span>
 #include <utility>
@@ -19,6 +20,19 @@ struct ModalPort {
   Shares stiff;
   Shares damped;
 };
+
+// How a port moves with a shape, `speed` being how that changes in a step, of what it is.
+template <class Shape>
+std::complex<double> along(const ModalPort& port, const Shape& shape, std::complex<double> speed) {
+  const auto sum = [&](const ModalPort::Shares& shares) {
+    std::complex<double> total;
+    for (const auto& [row, share] : shares) {
+      total += share * shape[row];
+    }
+    return total;
+  };
+  return sum(port.direct) + sum(port.stiff) + speed * sum(port.damped);
+}
 
 // A spring and damper between rows: it pulls with k d + z d', d being the sum of share * row.
 struct ModalSpring {
@@ -56,10 +70,13 @@ Network settled(const Network& network, std::span<const double> parameters);
 
 // Of a network without macros whose arguments are numbers, for steps that are `step` samples at
 // 44 100 Hz long; bodies' modes as the published scheme steps them if `is_sampled`, else as those
-// of the continuous network. O(masses + links). [any thread but audio]
-LinearSystem make_linear_system(const Network& network, double step, bool is_sampled);
+// of the continuous network. A key's factor is on every stiffness that is not fixed.
+// O(masses + links). [any thread but audio]
+LinearSystem make_linear_system(const Network& network, double step, bool is_sampled,
+                                double key_factor = 1.0);
 
 // y = A x.
 Vector product(const SparseMatrix& lower, const Vector& x);
+void multiply(const SparseMatrix& lower, const double* x, double* y);
 
 }  // namespace ressort

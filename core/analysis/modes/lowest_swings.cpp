@@ -209,6 +209,7 @@ class LowestSwings {
       std::sort(swings->all.begin(), swings->all.end(),
                 [](const Swing& a, const Swing& b) { return a.mu.imag() < b.mu.imag(); });
       swings->all.resize(std::min(swings->all.size(), count));
+      swings->basis = {};  // of the lowest shapes alone
       bool is_right = true;
       const std::size_t rows = basis_.size();
       for (Swing& swing : swings->all) {

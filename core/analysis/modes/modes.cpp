@@ -31,51 +31,25 @@ Matrix dense(const SparseMatrix& lower) {
 }
 
 // What is heard and pushed of swings.
-class ModeTeller {
- public:
-  ModeTeller(const NetworkModes& made, const ModeOptions& options)
-      : made_(made), e_(scheme_e(options.scheme)), step_(scheme_step(options)) {}
-
-  NetworkMode mode_of(Swing swing) const {
-    const Complex at = pole_of(swing.mu, made_.scheme);
-    const double rate_hz = Network::reference_rate_hz / step_;
-    NetworkMode mode;
-    mode.frequency_hz = at.imag() * rate_hz / (2.0 * std::numbers::pi);
-    mode.t60_s = at.real() == 0.0 ? std::numeric_limits<double>::infinity()
-                                  : -3.0 * std::numbers::ln10 / (at.real() * rate_hz);
-    std::vector<Complex> heard;
-    for (const ModalPort& port : made_.system.outputs) {
-      heard.push_back(along(port, swing));
-    }
-    for (const ModalPort& port : made_.system.inputs) {
-      const Complex pushed = along(port, swing);
-      for (const Complex& out : heard) {
-        mode.residues.push_back(pushed * out / swing.mu.imag());
-        mode.levels.push_back(std::abs(mode.residues.back()));
-      }
-    }
-    mode.mu = swing.mu;
-    mode.shape = std::move(swing.shape);
-    return mode;
+NetworkMode mode_of(Swing swing, const LinearSystem& system, const ModeOptions& options) {
+  const ModeTone tone = tone_of(swing.mu, options);
+  const Complex speed = speed_of(swing.mu, options.scheme);
+  NetworkMode mode{.frequency_hz = tone.frequency_hz, .t60_s = tone.t60_s};
+  std::vector<Complex> heard;
+  for (const ModalPort& port : system.outputs) {
+    heard.push_back(along(port, swing.shape, speed));
   }
-
- private:
-  Complex along(const ModalPort& port, const Swing& swing) const {
-    const auto sum = [&](const ModalPort::Shares& shares) {
-      Complex total;
-      for (const auto& [row, share] : shares) {
-        total += share * swing.shape[row];
-      }
-      return total;
-    };
-    const Complex speed = swing.mu / (1.0 + e_ * swing.mu);
-    return sum(port.direct) + sum(port.stiff) + speed * sum(port.damped);
+  for (const ModalPort& port : system.inputs) {
+    const Complex pushed = along(port, swing.shape, speed);
+    for (const Complex& out : heard) {
+      mode.residues.push_back(pushed * out / swing.mu.imag());
+      mode.levels.push_back(std::abs(mode.residues.back()));
+    }
   }
-
-  const NetworkModes& made_;
-  double e_;
-  double step_;
-};
+  mode.mu = swing.mu;
+  mode.shape = std::move(swing.shape);
+  return mode;
+}
 
 }  // namespace
 
@@ -95,19 +69,36 @@ Complex pole_of(Complex mu, ModeScheme scheme) {
                        std::atan2(mu.imag(), 1.0 + mu.real()));
 }
 
+ModeTone tone_of(Complex mu, const ModeOptions& options) {
+  const Complex at = pole_of(mu, options.scheme);
+  const double rate_hz = Network::reference_rate_hz / scheme_step(options);
+  return {.frequency_hz = at.imag() * rate_hz / (2.0 * std::numbers::pi),
+          .t60_s = at.real() == 0.0 ? std::numeric_limits<double>::infinity()
+                                    : -3.0 * std::numbers::ln10 / (at.real() * rate_hz)};
+}
+
+Complex speed_of(Complex mu, ModeScheme scheme) {
+  return mu / (1.0 + scheme_e(scheme) * mu);
+}
+
+double rigid_below(const SparseMatrix& stiffness) {
+  double most = 0.0;
+  for (const double value : stiffness.value) {
+    most = std::max(most, rigid * std::fabs(value));
+  }
+  return most;
+}
+
 namespace {
 
 Result<FoundSwings> find(const LinearSystem& system, const ModeOptions& options,
                          std::span<const double> stiffness_factors,
                          std::span<const double> damping_factors) {
   const double e = scheme_e(options.scheme);
-  FoundSwings found{.swings = {},
+  FoundSwings found{.swings = Swings(),
                     .stiffness = system.stiffness(stiffness_factors),
                     .damping = system.damping(damping_factors)};
-  double least = 0.0;
-  for (const double value : found.stiffness.value) {
-    least = std::max(least, rigid * std::fabs(value));
-  }
+  const double least = rigid_below(found.stiffness);
   const std::size_t size = system.size();
   if (size == 0 || least == 0.0) {
     return found;
@@ -159,7 +150,8 @@ Result<NetworkModes> find_modes(const Network& network, std::span<const double> 
   NetworkModes made;
   made.network = settled(expand_macros(network), parameters);
   made.system = make_linear_system(made.network, scheme_step(options),
-                                   options.scheme == ModeScheme::published);
+                                   options.scheme == ModeScheme::published, options.key_factor);
+  made.key_factor = options.key_factor;
   made.inputs = network.inputs.size();
   made.outputs = made.system.outputs.size();
   made.scheme = options.scheme;
@@ -173,11 +165,11 @@ Result<NetworkModes> find_modes(const Network& network, std::span<const double> 
   }
   made.is_all = found->is_all;
   made.is_proportional = found->swings.is_proportional;
-  const ModeTeller teller(made, options);
+  made.basis = std::move(found->swings.basis);
   for (Swing& swing : found->swings.all) {
     made.residual = std::max(
         made.residual, residual(found->stiffness, found->damping, scheme_e(options.scheme), swing));
-    made.modes.push_back(teller.mode_of(std::move(swing)));
+    made.modes.push_back(mode_of(std::move(swing), made.system, options));
   }
   return made;
 }

@@ -45,6 +45,8 @@ struct NetworkModes {
   bool is_all = true;    // else these are the lowest
   bool is_proportional = true;
   double residual = 0.0;  // the largest share of a mode's own force that is left over
+  double key_factor = 1.0;
+  Matrix basis;  // as of Swings, where all shapes are known
 
   bool is_linear() const { return system.is_linear; }
   // Real displacement of a mass, as a body of M = 1 has it; 0 where it does not move.
@@ -58,7 +60,8 @@ struct ModeOptions {
   ModeScheme scheme = ModeScheme::published;
   std::size_t count =
       0;  // of the lowest; 0: all up to most_listed_modes masses, else default_modes
-  Progress progress = {};  // a search that it stops fails with `stopped`
+  double key_factor = 1.0;  // on every stiffness that is not fixed, as a key has it
+  Progress progress = {};   // a search that it stops fails with `stopped`
 };
 
 inline constexpr std::size_t most_listed_modes = 2000;   // masses whose modes are all found
@@ -84,6 +87,18 @@ double scheme_step(const ModeOptions& options);
 
 // The logarithm of what a motion grows by in a sample.
 std::complex<double> pole_of(std::complex<double> mu, ModeScheme scheme);
+
+// What a motion sounds like.
+struct ModeTone {
+  double frequency_hz = 0.0;
+  double t60_s = 0.0;  // as of NetworkMode
+};
+ModeTone tone_of(std::complex<double> mu, const ModeOptions& options);
+// How a shape changes in a step, of what it is.
+std::complex<double> speed_of(std::complex<double> mu, ModeScheme scheme);
+
+// A k below which nothing is sprung, among such numbers: rounding.
+double rigid_below(const SparseMatrix& stiffness);
 
 // Of springs, dampers and oscillators; what else there is is open, and springs that stiffen are as
 // they are at rest. Motions that do not swing (rigid, or damped beyond swinging) are left out.

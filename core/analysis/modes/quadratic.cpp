@@ -11,7 +11,7 @@ namespace {
 
 using Complex = std::complex<double>;
 
-constexpr double shared = 1e-12;  // of the largest: is it diagonal in the same vectors?
+constexpr double shared = 1e-12;  // of the largest, for each row: are the vectors the same?
 constexpr double alike = 1e-9;    // by how much poles differ that are one
 
 Complex form(const ComplexVector& a, const Matrix& matrix, const ComplexVector& b) {
@@ -34,15 +34,20 @@ double length(const ComplexVector& a) {
   return std::sqrt(sum);
 }
 
-// The largest off the diagonal.
-double astray(const Matrix& matrix) {
-  double most = 0.0;
-  for (std::size_t j = 0; j < matrix.columns(); ++j) {
-    for (std::size_t i = 0; i < matrix.rows(); ++i) {
-      most = i == j ? most : std::max(most, std::fabs(matrix(i, j)));
+// What a matrix makes of the shapes: their eigenvalues, if nothing else is left of each.
+std::optional<Vector> eigenvalues_in(const Matrix& matrix, const Matrix& basis, double most_left) {
+  const Matrix pulled = product(matrix, basis);
+  Vector values(basis.columns());
+  for (std::size_t i = 0; i < basis.columns(); ++i) {
+    const Vector shape = basis.column(i);
+    Vector left = pulled.column(i);
+    values[i] = dot(shape, left);
+    left -= values[i] * shape;
+    if (!(dot(left, left) <= most_left * most_left)) {
+      return std::nullopt;
     }
   }
-  return most;
+  return values;
 }
 
 class Quadratic {
@@ -57,44 +62,37 @@ class Quadratic {
 
   std::optional<Swings> solve(bool may_cross) {
     if (auto found = in_shared_vectors()) {
-      return Swings{*std::move(found), true};
+      return found;
     }
     auto found = may_cross ? crossed() : std::nullopt;
-    return found ? std::optional(Swings{*std::move(found), false}) : std::nullopt;
+    return found ? std::optional(Swings{*std::move(found), false, {}}) : std::nullopt;
   }
 
  private:
-  // mu of k and z alone, if it swings.
-  std::optional<Complex> root(double k, double z) const {
-    const double p = 0.5 * (z + e_ * k);
-    const double rest = k - p * p;
-    return k > rigid_ && rest > 0.0 ? std::optional(Complex(-p, std::sqrt(rest))) : std::nullopt;
-  }
-
   // Where K and Z have the same eigenvectors, those of a sum of both are theirs, whatever else is
   // alike.
-  std::optional<std::vector<Swing>> in_shared_vectors() const {
+  std::optional<Swings> in_shared_vectors() const {
     const double damped = largest(damping_.values);
     Matrix both = stiffness_;
     if (damped > 0.0) {
       both.values += 0.7346 * (stiffest_ > 0.0 ? stiffest_ / damped : 1.0) * damping_.values;
     }
-    const Eigenpairs pairs = symmetric_eigenpairs(both);
-    const Matrix k = in_basis(stiffness_, pairs.vectors);
-    const Matrix z = in_basis(damping_, pairs.vectors);
-    if (astray(k) > shared * stiffest_ || astray(z) > shared * damped) {
+    Swings found{.basis = symmetric_eigenpairs(both).vectors};
+    const double share = shared_tolerance(size_);
+    const auto k = eigenvalues_in(stiffness_, found.basis, share * stiffest_);
+    const auto z = k ? eigenvalues_in(damping_, found.basis, share * damped) : std::nullopt;
+    if (!z) {
       return std::nullopt;
     }
-    std::vector<Swing> swings;
     for (std::size_t i = 0; i < size_; ++i) {
-      if (const auto mu = root(k(i, i), z(i, i))) {
-        Swing& swing = swings.emplace_back(Swing{*mu, ComplexVector(size_)});
+      if (const auto mu = swing_root((*k)[i], (*z)[i], e_, rigid_)) {
+        Swing& swing = found.all.emplace_back(Swing{*mu, ComplexVector(size_)});
         for (std::size_t row = 0; row < size_; ++row) {
-          swing.shape[row] = pairs.vectors(row, i);
+          swing.shape[row] = found.basis(row, i);
         }
       }
     }
-    return swings;
+    return found;
   }
 
   // The motions of (x, v), which cross over into each other.
@@ -207,6 +205,16 @@ class Quadratic {
 };
 
 }  // namespace
+
+std::optional<Complex> swing_root(double k, double z, double e, double rigid) {
+  const double p = 0.5 * (z + e * k);
+  const double rest = k - p * p;
+  return k > rigid && rest > 0.0 ? std::optional(Complex(-p, std::sqrt(rest))) : std::nullopt;
+}
+
+double shared_tolerance(std::size_t rows) {
+  return shared * std::sqrt(static_cast<double>(rows));
+}
 
 std::optional<Swings> swings_of(const Matrix& stiffness, const Matrix& damping, double e,
                                 double rigid, bool may_cross) {

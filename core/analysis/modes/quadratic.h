@@ -24,7 +24,17 @@ struct Swing {
 struct Swings {
   std::vector<Swing> all;
   bool is_proportional = true;
+  // [row, shape] The eigenvectors that K and Z share, those of what does not swing too; empty where
+  // they share none.
+  Matrix basis;
 };
+
+// mu of a lone mass of 1 with k and z, if it swings: `rigid` as below.
+std::optional<std::complex<double>> swing_root(double k, double z, double e, double rigid);
+
+// By how much a shape may be off its own eigenvalue, of the largest number of a matrix with so many
+// rows, where only rounding has made it so.
+double shared_tolerance(std::size_t rows);
 
 // What swings of symmetric K and Z, in no order; `rigid`: a k below which nothing is sprung.
 // Nothing where the eigenvalues cannot be found, or damping is not proportional and nobody wants to

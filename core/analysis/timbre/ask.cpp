@@ -17,21 +17,26 @@ constexpr double little = 1e-5;       // of a range, for differences
 constexpr double still = 1e-9;        // of a range: a step that is none
 constexpr double no_slope = 1e-6;     // what is noticed over a whole range
 constexpr double crawling = 0.98;     // of the cost is left by a step that is hardly one
+constexpr double least_damping = 1e-9;
 constexpr int most_crawls = 3;
 constexpr double hopeful = 5.0;       // of what is noticed
+constexpr double same_end = 1e-3;     // of a range
+constexpr std::size_t most_far = 4;   // ends that are not hopeful
 constexpr double farthest_hop = 0.1;  // of a range
 constexpr int most_hops = 4;          // of one start
 constexpr int most_steps = 60;
-constexpr int most_tries = 8;  // of one step, each shorter
+constexpr int most_tries = 8;        // of one step, each shorter
+constexpr int most_stale_tries = 2;  // with slopes of another place
+constexpr double well_told = 0.25;   // of the cost is left by a step whose slopes were right
 
 using Place = std::vector<double>;  // [free] 0..1
 
 class Asker {
  public:
-  Asker(const FiguresAt& figures, std::span<const double> values,
+  Asker(const AskedModel& model, std::span<const double> values,
         std::span<const FreeParameter> free, std::span<const TimbreTarget> targets,
         const Progress& progress)
-      : figures_(figures),
+      : model_(model),
         values_(values.begin(), values.end()),
         free_(free),
         targets_(targets),
@@ -80,11 +85,20 @@ class Asker {
     return place;
   }
 
+  Result<AskedValues> figures_before() const { return model_.figures(values_); }
+
   // The error stays in `error`.
   std::optional<Trial> trial(const Place& place) {
+    return trial(place, model_.figures(values_at(place)));
+  }
+
+  std::optional<Trial> trial_near(const Place& at, const Place& place) {
+    return model_.near ? trial(place, model_.near(values_at(at), values_at(place))) : trial(place);
+  }
+
+  std::optional<Trial> trial(const Place& place, const Result<AskedValues>& found) {
     ++trials;
     progress_.spend(std::size_t{1} << 17);  // looked at every time
-    const auto found = figures_(values_at(place));
     if (!found) {
       error = found.error();
       return std::nullopt;
@@ -115,7 +129,7 @@ class Asker {
         if (moved == 0.0) {
           continue;
         }
-        if (const auto there = trial(place)) {
+        if (const auto there = trial_near(at.place, place)) {
           for (std::size_t t = 0; t < targets_.size(); ++t) {
             slopes(t, i) = (there->noticed[t] - at.noticed[t]) / moved;
           }
@@ -131,8 +145,8 @@ class Asker {
     std::vector<bool> is_held;  // at a bound, and would go beyond
     Matrix slopes;
   };
-  Descent descent(const Trial& at) {
-    Descent down{Vector(free_.size()), std::vector<bool>(free_.size()), slopes(at)};
+  Descent descent(const Trial& at, Matrix slopes) const {
+    Descent down{Vector(free_.size()), std::vector<bool>(free_.size()), std::move(slopes)};
     for (std::size_t i = 0; i < free_.size(); ++i) {
       for (std::size_t t = 0; t < targets_.size(); ++t) {
         down.gradient[i] += down.slopes(t, i) * at.noticed[t];
@@ -142,41 +156,84 @@ class Asker {
     }
     return down;
   }
+  Descent descent(const Trial& at) { return descent(at, slopes(at)); }
 
-  // Downhill from there, until it is there, flat, or stuck.
+  // Downhill from there, until it is there, flat, or stuck. A step that came about where the slopes
+  // said tells what has become of them (Broyden's rank-one update); another has them found anew.
   Trial descend(Trial at) {
     double damping = 1e-3;
     int crawls = 0;
+    Descent down;
+    bool is_new = false;
+    bool is_wanted = true;
     for (int step = 0; step < most_steps && !at.is_there(); ++step) {
-      const Descent down = descent(at);
-      bool has_moved = false;
-      double moved = 0.0;
-      for (int tries = 0; tries < most_tries && !has_moved; ++tries) {
-        const auto to = stepped(at, down, damping);
-        const auto there = to ? trial(*to) : std::nullopt;
-        if (there && there->cost() < at.cost()) {
-          for (std::size_t i = 0; i < free_.size(); ++i) {
-            moved = std::max(moved, std::fabs(there->place[i] - at.place[i]));
-          }
-          has_moved = true;
-          crawls = there->cost() > crawling * at.cost() ? crawls + 1 : 0;
-          at = *there;
-          damping = std::max(1e-9, 0.2 * damping);
-        } else {
-          damping *= 5.0;
-        }
+      if (is_wanted) {
+        down = descent(at);
+        is_new = true;
       }
-      if (!has_moved || moved < still || crawls == most_crawls) {
+      std::optional<Trial> next;
+      for (int tries = 0; tries < (is_new ? most_tries : most_stale_tries) && !next; ++tries) {
+        const auto to = stepped(at, down, damping);
+        next = to ? trial(*to) : std::nullopt;
+        next = next && next->cost() < at.cost() ? next : std::nullopt;
+        damping = next ? std::max(least_damping, 0.2 * damping) : 5.0 * damping;
+      }
+      if (!next && !is_new) {
+        is_wanted = true;
+        continue;
+      }
+      if (!next) {
         break;
       }
+      double moved = 0.0;
+      for (std::size_t i = 0; i < free_.size(); ++i) {
+        moved = std::max(moved, std::fabs(next->place[i] - at.place[i]));
+      }
+      const double left = next->cost() / at.cost();
+      crawls = left > crawling ? crawls + 1 : 0;
+      if (moved < still || crawls == most_crawls) {
+        return *next;
+      }
+      is_wanted = left > well_told;
+      is_new = false;
+      if (!is_wanted) {
+        down = descent(*next, updated(down.slopes, at, *next));
+      }
+      at = *std::move(next);
     }
     return at;
+  }
+
+  // One step more, with the slopes that are there.
+  Trial polished(const Trial& at) {
+    const auto to = stepped(at, descent(at), least_damping);
+    const auto there = to ? trial(*to) : std::nullopt;
+    return there && there->cost() < at.cost() ? *there : at;
   }
 
   Error error;
   std::size_t trials = 0;
 
  private:
+  // J + (change of what is noticed - J step) step^T / step^T step
+  Matrix updated(Matrix slopes, const Trial& from, const Trial& to) const {
+    Vector step(free_.size());
+    for (std::size_t i = 0; i < free_.size(); ++i) {
+      step[i] = to.place[i] - from.place[i];
+    }
+    const double square = dot(step, step);
+    for (std::size_t t = 0; t < targets_.size(); ++t) {
+      double untold = to.noticed[t] - from.noticed[t];
+      for (std::size_t i = 0; i < free_.size(); ++i) {
+        untold -= slopes(t, i) * step[i];
+      }
+      for (std::size_t i = 0; i < free_.size(); ++i) {
+        slopes(t, i) += untold * step[i] / square;
+      }
+    }
+    return slopes;
+  }
+
   // (J^T J + damping (D + tiny)) step = -gradient, of those that no bound holds.
   std::optional<Place> stepped(const Trial& at, const Descent& down, double damping) const {
     std::vector<std::size_t> moving;
@@ -217,7 +274,7 @@ class Asker {
     return place == at.place ? std::nullopt : std::optional(place);
   }
 
-  const FiguresAt& figures_;
+  const AskedModel& model_;
   std::vector<double> values_;
   std::span<const FreeParameter> free_;
   std::span<const TimbreTarget> targets_;
@@ -236,81 +293,149 @@ std::optional<Error> wrong_target(const TimbreTarget& target) {
                                              std::string(wrong)});
 }
 
-Result<AskedTimbre> ask(const FiguresAt& figures, std::span<const double> values,
-                        std::span<const FreeParameter> free, std::span<const TimbreTarget> targets,
-                        const AskOptions& options) {
-  options.progress.stage("looking for the timbre");
-  const FiguresAt& judge = options.exactly ? *options.exactly : figures;
-  Asker asker(figures, values, free, targets, options.progress);
-  Asker judging(judge, values, free, targets, options.progress);
-  AskedTimbre asked;
-  std::optional<Asker::Trial> best;
-  std::optional<Error> first_error;
-  std::mt19937_64 random(options.seed);
-  for (int start = 0; start < options.starts && !(best && best->is_there()); ++start) {
-    if (options.tell) {
-      options.tell(static_cast<double>(start) / options.starts);
+// Many starts by the smooth model; of where these end, what may be right is brought nearer by the
+// exact one, which takes longer.
+class Search {
+ public:
+  Search(const AskedModel& model, std::span<const double> values,
+         std::span<const FreeParameter> free, std::span<const TimbreTarget> targets,
+         const AskOptions& options)
+      : options_(options),
+        free_(free),
+        asker_(model, values, free, targets, options.progress),
+        judge_(options.exactly ? *options.exactly : model, values, free, targets, options.progress),
+        random_(options.seed) {}
+
+  Result<AskedTimbre> run() {
+    options_.progress.stage("looking for the timbre");
+    std::vector<Asker::Trial> far;
+    int start = 0;
+    for (; start < options_.starts && !is_there(); ++start) {
+      tell(start);
+      Place place = asker_.place_of_values();
+      for (std::size_t i = 0; start > 0 && i < free_.size(); ++i) {
+        place[i] = next_share(random_);
+      }
+      auto end = asker_.trial(place);
+      if (!end) {
+        first_error_ = first_error_ ? first_error_ : asker_.error;
+        continue;
+      }
+      end = asker_.descend(*end);
+      if (options_.exactly && end->worst() > hopeful) {
+        far.push_back(*std::move(end));
+      } else {
+        bring_nearer(*end);
+      }
     }
-    ++asked.starts;
-    Place place = asker.place_of_values();
-    for (std::size_t i = 0; start > 0 && i < free.size(); ++i) {
-      place[i] = next_share(random);
+    std::sort(far.begin(), far.end(),
+              [](const auto& a, const auto& b) { return a.cost() < b.cost(); });
+    for (std::size_t i = 0; i < far.size() && (!best_ || i < most_far) && !is_there(); ++i) {
+      bring_nearer(far[i]);
     }
-    auto end = asker.trial(place);
-    if (end) {
-      end = asker.descend(*end);
-      end = options.exactly ? judging.trial(end->place) : end;
+    if (!best_) {
+      return *first_error_;
     }
-    if (end && options.exactly) {
-      end = judging.descend(*end);
+    if (is_there()) {
+      best_ = judge_.polished(*best_);
     }
-    if (end && (!best || end->cost() < best->cost())) {
-      best = end;
-    } else if (!end && !first_error) {
-      first_error = asker.error.message.empty() ? judging.error : asker.error;
+    return told(start);
+  }
+
+ private:
+  bool is_there() const { return best_ && best_->is_there(); }
+
+  void tell(int start) const {
+    if (options_.tell) {
+      options_.tell(static_cast<double>(start) / options_.starts);
     }
+  }
+
+  // Has another start ended there?
+  bool is_again(const Place& end) const {
+    return std::any_of(ends_.begin(), ends_.end(), [&](const Place& other) {
+      return std::equal(end.begin(), end.end(), other.begin(), other.end(),
+                        [](double a, double b) { return std::fabs(a - b) < same_end; });
+    });
+  }
+
+  void keep(std::optional<Asker::Trial> end) {
+    if (end && (!best_ || end->cost() < best_->cost())) {
+      best_ = std::move(end);
+    }
+  }
+
+  void bring_nearer(const Asker::Trial& end) {
+    if (!options_.exactly) {
+      keep(end);
+      return;
+    }
+    if (is_again(end.place)) {
+      return;
+    }
+    ends_.push_back(end.place);
+    auto judged = judge_.trial(end.place);
+    if (!judged) {
+      first_error_ = first_error_ ? first_error_ : judge_.error;
+      return;
+    }
+    keep(judge_.descend(*std::move(judged)));
     // So near, what stops it may be a peak that moved to the next bin: over that from around it.
-    for (int hop = 0; options.exactly && best && hop < most_hops; ++hop) {
-      if (best->is_there() || best->worst() > hopeful) {
-        break;
-      }
+    for (int hop = 0; hop < most_hops && !is_there() && best_->worst() <= hopeful; ++hop) {
       const double reach = farthest_hop * std::exp2(-hop);
-      place = best->place;
+      Place place = best_->place;
       for (double& one : place) {
-        one = std::clamp(one + reach * (2.0 * next_share(random) - 1.0), 0.0, 1.0);
+        one = std::clamp(one + reach * (2.0 * next_share(random_) - 1.0), 0.0, 1.0);
       }
-      auto hopped = judging.trial(place);
-      hopped = hopped ? judging.descend(*hopped) : hopped;
-      best = hopped && hopped->cost() < best->cost() ? hopped : best;
+      auto hopped = judge_.trial(place);
+      keep(hopped ? judge_.descend(*std::move(hopped)) : hopped);
     }
   }
-  if (!best) {
-    return *first_error;
-  }
-  // It may be silent where it is.
-  if (const auto before = judge(values)) {
-    asked.before = *before;
-  }
-  asked.values = judging.values_at(best->place);
-  asked.reached = best->figures;
-  asked.noticed = best->noticed;
-  asked.is_reached = best->is_there();
-  if (!asked.is_reached) {
-    const auto down = judging.descent(*best);
-    asked.has_influence = largest(down.slopes.values) > no_slope;
-    for (std::size_t i = 0; i < free.size(); ++i) {
-      if (down.is_held[i]) {
-        asked.held.push_back({free[i].index, best->place[i] >= 1.0});
+
+  AskedTimbre told(int starts) {
+    AskedTimbre asked;
+    asked.starts = starts;
+    // It may be silent where it is.
+    if (const auto before = judge_.figures_before()) {
+      asked.before = *before;
+    }
+    asked.values = judge_.values_at(best_->place);
+    asked.reached = best_->figures;
+    asked.noticed = best_->noticed;
+    asked.is_reached = best_->is_there();
+    if (!asked.is_reached) {
+      const auto down = judge_.descent(*best_);
+      asked.has_influence = largest(down.slopes.values) > no_slope;
+      for (std::size_t i = 0; i < free_.size(); ++i) {
+        if (down.is_held[i]) {
+          asked.held.push_back({free_[i].index, best_->place[i] >= 1.0});
+        }
       }
     }
+    asked.trials = asker_.trials + judge_.trials;
+    return asked;
   }
-  asked.trials = asker.trials + judging.trials;
-  return asked;
-}
+
+  const AskOptions& options_;
+  std::span<const FreeParameter> free_;
+  Asker asker_;
+  Asker judge_;
+  std::mt19937_64 random_;
+  std::vector<Place> ends_;  // of the smooth model
+  std::optional<Asker::Trial> best_;
+  std::optional<Error> first_error_;
+};
 
 }  // namespace
 
-Result<AskedTimbre> ask_timbre(const FiguresAt& figures, std::span<const double> values,
+AskedModel asked_model(StruckModel& model, StruckAs how) {
+  return {[&model, how](std::span<const double> at) { return model.figures(at, how); },
+          [&model, how](std::span<const double> place, std::span<const double> at) {
+            return model.figures_near(place, at, how);
+          }};
+}
+
+Result<AskedTimbre> ask_timbre(const AskedModel& model, std::span<const double> values,
                                std::span<const FreeParameter> free,
                                std::span<const TimbreTarget> targets, const AskOptions& options) {
   if (free.empty()) {
@@ -325,7 +450,7 @@ Result<AskedTimbre> ask_timbre(const FiguresAt& figures, std::span<const double>
     }
   }
   try {
-    return ask(figures, values, free, targets, options);
+    return Search(model, values, free, targets, options).run();
   } catch (const Stopped&) {
     return Error{stopped};
   }

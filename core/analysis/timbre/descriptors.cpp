@@ -8,6 +8,7 @@ namespace {
 
 constexpr double rolloff_share = 0.95;
 constexpr double effective_share = 0.4;  // of the largest, in 2011; -20 dB in R2021a
+constexpr double soft_share = 0.1;       // of the most effort: as much beside it counts in part
 
 // The largest, if all are amplitudes and one is above 0.
 std::optional<double> largest_of(std::span<const double> amplitudes) {
@@ -198,9 +199,15 @@ void EnvelopeSums::add(double value) {
 
 void EnvelopeTimes::add(double value) {
   const double share = value / sums_.largest();
-  while (tenths_ < reached_.size() && share >= static_cast<double>(tenths_ + 1) / 10.0) {
-    reached_[tenths_++] = count_;
+  for (; tenths_ < reached_.size(); ++tenths_) {
+    const double threshold = static_cast<double>(tenths_ + 1) / 10.0;
+    if (share < threshold) {
+      break;
+    }
+    const double beyond = count_ == 0 ? 0.0 : (share - threshold) / (share - share_);
+    reached_[tenths_] = static_cast<double>(count_) - beyond;
   }
+  share_ = share;
   if (count_ >= sums_.largest_at() && value > 0.0) {
     const auto t = static_cast<double>(count_ - sums_.largest_at());
     const double y = std::log(share);
@@ -218,28 +225,36 @@ void EnvelopeTimes::add(double value) {
   ++count_;
 }
 
+// A step takes more than the most for sure, or, with some softness, as much as it is beyond.
+double EnvelopeTimes::attack(double softness) const {
+  const auto effort = [&](std::size_t step) {  // from (step + 1) tenths to the next
+    return reached_[step + 1] - reached_[step];
+  };
+  const double most = 3.0 * (reached_[6] - reached_[2]) / 4.0;
+  const auto is_weak = [&](std::size_t step) {
+    const double over = effort(step) - most;
+    return softness > 0.0 && most > 0.0 ? 0.5 + 0.5 * std::tanh(over / (softness * most))
+           : over > 0.0                 ? 1.0
+                                        : 0.0;
+  };
+  double start = reached_.front();
+  for (std::size_t step = 0; step < 3; ++step) {
+    start += is_weak(step) * (reached_[step + 1] - start);
+  }
+  double end = reached_.back();
+  for (std::size_t step = 8; step >= 4; --step) {
+    end += is_weak(step) * (reached_[step] - end);
+  }
+  return end - start;
+}
+
 std::optional<TemporalShape> EnvelopeTimes::shape(double rate_hz) const {
   if (tenths_ < reached_.size() || !first_above_) {
     return std::nullopt;
   }
-  const auto effort = [&](std::size_t step) {  // from (step + 1) tenths to the next
-    return static_cast<double>(reached_[step + 1] - reached_[step]);
-  };
-  double mean = 0.0;
-  for (std::size_t step = 2; step < 6; ++step) {
-    mean += effort(step) / 4.0;
-  }
-  std::size_t start = 0;
-  for (std::size_t step = 0; step < 3; ++step) {
-    start = effort(step) > 3.0 * mean ? step + 1 : start;
-  }
-  std::size_t end = reached_.size() - 1;
-  for (std::size_t step = 8; step >= 4; --step) {
-    end = effort(step) > 3.0 * mean ? step : end;
-  }
   TemporalShape shape;
-  const auto attack = static_cast<double>(reached_[end] - reached_[start]);
-  shape.log_attack_time = std::log10(std::max(attack, 1.0) / rate_hz);
+  shape.log_attack_time = std::log10(std::max(attack(0.0), 1.0) / rate_hz);
+  shape.smooth_attack_s = std::max(attack(soft_share), 1.0) / rate_hz;
   shape.temporal_centroid_s = sums_.centroid() / rate_hz;
   shape.effective_duration_s = static_cast<double>(last_above_ - *first_above_ + 1) / rate_hz;
   const double width = decay_.count * decay_.tt - decay_.t * decay_.t;

@@ -76,8 +76,11 @@ std::optional<double> noisiness(std::span<const Partial> harmonics, double energ
 struct TemporalShape {
   // log10 of the attack in s, by the weakest effort: thresholds of 10 to 100 % of the largest, the
   // mean effort M that of the steps from 30 to 60 %. It starts after the last step below 40 %, and
-  // ends before the first from 50 %, that takes more than 3 M. At least one sample.
+  // ends before the first from 50 %, that takes more than 3 M. Thresholds are crossed between
+  // samples, on a line. At least one sample.
   double log_attack_time = 0.0;
+  // s, the same in a form that has a slope: a step that takes nearly 3 M counts in part.
+  double smooth_attack_s = 0.0;
   double temporal_centroid_s = 0.0;   // sum t e / sum e, of all of it, from its first sample
   double effective_duration_s = 0.0;  // from the first to the last above 40 % of the largest
   // 1/s, of the line through ln e from the largest to the last above 40 %; none of one sample.
@@ -121,8 +124,11 @@ class EnvelopeTimes {
 
   EnvelopeSums sums_;
   std::size_t count_ = 0;
-  std::array<std::size_t, 10> reached_{};  // [tenth] when for the first time
-  std::size_t tenths_ = 0;                 // so many have been
+  double attack(double softness) const;  // in samples
+
+  std::array<double, 10> reached_{};  // [tenth] when for the first time, in samples
+  std::size_t tenths_ = 0;            // so many have been
+  double share_ = 0.0;                // of the largest, the last
   std::optional<std::size_t> first_above_;
   std::size_t last_above_ = 0;
   Line so_far_;

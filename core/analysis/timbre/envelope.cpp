@@ -22,6 +22,21 @@ double step(const std::array<double, 3>& b, const std::array<double, 3>& a,
 
 }  // namespace
 
+EnvelopeFilter::EnvelopeFilter(double rate_hz) {
+  // (s + 1) (s^2 + s + 1), with s = (1 - z^-1)/(1 + z^-1)/k: at 0 Hz it is 1/k samples late.
+  const double k = std::tan(std::numbers::pi * Envelope::cutoff_hz / rate_hz);
+  one_b_ = {k / (1.0 + k), k / (1.0 + k), 0.0};
+  one_a_ = {1.0, (k - 1.0) / (k + 1.0), 0.0};
+  const double scale = 1.0 / (1.0 + k + k * k);
+  two_b_ = {k * k * scale, 2.0 * k * k * scale, k * k * scale};
+  two_a_ = {1.0, 2.0 * (k * k - 1.0) * scale, (1.0 - k + k * k) * scale};
+  delay_ = std::llround(1.0 / k);
+}
+
+double EnvelopeFilter::next(double magnitude) {
+  return std::max(0.0, step(two_b_, two_a_, two_z_, step(one_b_, one_a_, one_z_, magnitude)));
+}
+
 Envelope::Envelope(double rate_hz, std::function<void(double)> sink)
     : block_(block_samples),
       sink_(std::move(sink)),
@@ -31,16 +46,8 @@ Envelope::Envelope(double rate_hz, std::function<void(double)> sink)
       frame_(4 * block_),
       bins_(fourier_.bins()),
       turned_(4 * block_),
-      next_(-2 * static_cast<long long>(block_)) {
-  // (s + 1) (s^2 + s + 1), with s = (1 - z^-1)/(1 + z^-1)/k: at 0 Hz it is 1/k samples late.
-  const double k = std::tan(std::numbers::pi * cutoff_hz / rate_hz);
-  one_b_ = {k / (1.0 + k), k / (1.0 + k), 0.0};
-  one_a_ = {1.0, (k - 1.0) / (k + 1.0), 0.0};
-  const double scale = 1.0 / (1.0 + k + k * k);
-  two_b_ = {k * k * scale, 2.0 * k * k * scale, k * k * scale};
-  two_a_ = {1.0, 2.0 * (k * k - 1.0) * scale, (1.0 - k + k * k) * scale};
-  delay_ = std::llround(1.0 / k);
-}
+      next_(-2 * static_cast<long long>(block_)),
+      filter_(rate_hz) {}
 
 void Envelope::add(std::span<const double> samples) {
   came_ += static_cast<long long>(samples.size());
@@ -90,11 +97,10 @@ void Envelope::transform() {
 }
 
 void Envelope::smooth(double magnitude) {
-  const double x = next_ < came_ ? magnitude : 0.0;
-  const double y = step(two_b_, two_a_, two_z_, step(one_b_, one_a_, one_z_, x));
-  if (next_ >= delay_ && told_ < came_) {
+  const double level = filter_.next(next_ < came_ ? magnitude : 0.0);
+  if (next_ >= filter_.delay() && told_ < came_) {
     ++told_;
-    sink_(std::max(0.0, y));
+    sink_(level);
   }
 }
 

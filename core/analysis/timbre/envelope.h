@@ -11,6 +11,19 @@
 
 namespace ressort {
 
+// The low-pass of an envelope: Butterworth, of the third order.
+class EnvelopeFilter {
+ public:
+  explicit EnvelopeFilter(double rate_hz);
+  double next(double magnitude);
+  long long delay() const { return delay_; }  // samples, at 0 Hz
+
+ private:
+  long long delay_ = 0;
+  // Coefficients and states of its two parts, direct form II transposed.
+  std::array<double, 3> one_b_{}, one_a_{}, two_b_{}, two_a_{}, one_z_{}, two_z_{};
+};
+
 // The magnitude of the analytic signal, |x + i Hilbert x|, through a Butterworth low-pass of the
 // third order whose delay is taken back. Peeters et al. 2011 end it at 5 Hz, which makes of every
 // attack one of 0.1 s; here it ends at 50 Hz. Below 12 Hz the analytic signal is inexact.
@@ -39,10 +52,8 @@ class Envelope {
   std::vector<double> turned_;  // [4 blocks] the Hilbert transform as far as it is added up
   long long came_ = 0;
   long long told_ = 0;
-  long long next_ = 0;   // which sample the next magnitude is of; it starts before the first
-  long long delay_ = 0;  // of the low-pass
-  // Coefficients and states of its two parts, direct form II transposed.
-  std::array<double, 3> one_b_{}, one_a_{}, two_b_{}, two_a_{}, one_z_{}, two_z_{};
+  long long next_ = 0;  // which sample the next magnitude is of; it starts before the first
+  EnvelopeFilter filter_;
 };
 
 }  // namespace ressort

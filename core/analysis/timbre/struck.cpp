@@ -2,12 +2,13 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numbers>
 #include <string>
 #include <vector>
 
 #include "core/analysis/modes/linear_system.h"
-#include "core/analysis/modes/scaling.h"
+#include "core/analysis/timbre/envelope.h"
 #include "core/model/topology.h"
 
 namespace ressort {
@@ -16,6 +17,8 @@ namespace {
 constexpr double quietest_share = 1e-3;  // of the loudest mode: what is less is no pitch
 constexpr double in_tune = 1e-9;         // of a frequency
 constexpr int most_tunings = 12;
+constexpr double longest_attack_s = 3.0;  // what comes later is not waited for
+constexpr std::size_t coarse_step = 8;    // samples
 
 constexpr AskedFigureRow figure_rows[] = {
     {AskedFigure::f0, "f0_hz", 0.0028922, true, "high", "low"},  // 5 cents
@@ -29,6 +32,7 @@ constexpr AskedFigureRow figure_rows[] = {
     {AskedFigure::kurtosis, "kurtosis", 0.05, true, "peaked", "flat"},
     // As much as 3 % of a centroid of 1400 Hz moves it.
     {AskedFigure::slope, "slope", 1e-9, false, "little sloped", "steeply sloped", true},
+    {AskedFigure::attack, "attack_ms", 0.2589254, true, "slow", "sudden"},  // 0.1 of its log10
 };
 
 // How stiff a mode of the published scheme is, k/m in samples, by its pole (other than its decay).
@@ -36,16 +40,6 @@ double stiffness_of(double frequency_hz, double t60_s, double rate_hz) {
   const double r = pole_radius(t60_s, rate_hz);
   const double angle = 2.0 * std::numbers::pi * frequency_hz / rate_hz;
   return (1.0 - r) * (1.0 - r) + 4.0 * r * std::pow(std::sin(0.5 * angle), 2.0);
-}
-
-// The mean over all outputs of what a blow of one sample at an input leaves.
-std::complex<double> mean_residue(const NetworkModes& modes, const NetworkMode& mode,
-                                  std::size_t input) {
-  std::complex<double> sum;
-  for (std::size_t output = 0; output < modes.outputs; ++output) {
-    sum += mode.residues[input * modes.outputs + output];
-  }
-  return sum / static_cast<double>(modes.outputs);
 }
 
 // How much more a raised cosine of so many frames excites a motion of a pole than all of it in its
@@ -100,17 +94,6 @@ double slope_of_bins(double centroid_hz, double rate_hz, std::size_t frame) {
   return (centroid_hz - mean_hz) / (bins * variance);
 }
 
-// With every stiffness that keys move times `factor`. Of a network without macros.
-Network at_key(const Network& network, double factor) {
-  std::vector<SpringLine> lines = *spring_lines(network);
-  std::erase_if(lines, [&](const SpringLine& line) {
-    return line.kind == SpringLine::Kind::link ? network.links[line.index].is_fixed
-                                               : network.masses[line.index].is_fixed;
-  });
-  return scaled(network, lines, std::vector<double>(lines.size(), factor),
-                std::vector<double>(lines.size(), 1.0));
-}
-
 }  // namespace
 
 std::span<const AskedFigureRow> asked_figure_rows() {
@@ -140,38 +123,93 @@ double noticed_between(AskedFigure figure, double value, double target) {
 StruckModel::StruckModel(const Network& network, const StrikeOptions& options)
     : network_(expand_macros(network)), options_(options) {}
 
-Result<StruckModel::TunedModes> StruckModel::tuned_modes(std::span<const double> parameters) const {
-  const ModeOptions how{.rate_hz = options_.rate_hz, .progress = options_.progress};
-  double factor = options_.key_factor.value_or(1.0);
+// With the shapes that are known, if these are right; near a place, with those of the place.
+Result<std::vector<HeardMode>> StruckModel::modes_at(std::span<const double> parameters,
+                                                     double factor, const Place& place) {
   const Network written = settled(network_, parameters);
+  const ModeOptions how = mode_options(factor);
+  const LinearSystem system = make_linear_system(written, scheme_step(how), true, factor);
+  if (known_ && system.is_sound) {
+    if (auto modes = known_->exactly(system)) {
+      return *std::move(modes);
+    }
+  }
+  if (!place) {
+    return found_modes(written, parameters, how);
+  }
+  if (!std::equal(place->begin(), place->end(), known_at_.begin(), known_at_.end())) {
+    if (auto there = found_modes(settled(network_, *place), *place, how); !there) {
+      return there.error();
+    }
+  }
+  auto modes = known_ && system.is_sound ? known_->nearly(system) : std::nullopt;
+  if (modes) {
+    return *std::move(modes);
+  }
+  const auto found = find_modes(written, parameters, how);
+  return found ? Result<std::vector<HeardMode>>(heard_modes(*found, pushed())) : found.error();
+}
+
+// From now on these are known.
+Result<std::vector<HeardMode>> StruckModel::found_modes(const Network& written,
+                                                        std::span<const double> parameters,
+                                                        const ModeOptions& how) {
+  auto found = find_modes(written, parameters, how);
+  if (!found) {
+    return found.error();
+  }
+  if (!found->is_linear() || has_waveguide(network_)) {
+    return Error{"it is not linear"};
+  }
+  std::vector<HeardMode> modes = heard_modes(*found, pushed());
+  known_.reset();
+  known_at_.assign(parameters.begin(), parameters.end());
+  if (found->basis.rows() > 0) {
+    known_.emplace(*std::move(found), pushed(), how);
+  }
+  return modes;
+}
+
+ModeOptions StruckModel::mode_options(double factor) const {
+  return {.rate_hz = options_.rate_hz, .key_factor = factor, .progress = options_.progress};
+}
+
+std::vector<std::size_t> StruckModel::pushed() const {
+  std::vector<std::size_t> inputs;
+  for (const StrikePulse& blow : options_.blows) {
+    inputs.push_back(blow.input);
+  }
+  return inputs;
+}
+
+Result<StruckModel::Tuned> StruckModel::tuned(std::span<const double> parameters,
+                                              const Place& place) {
+  double factor = factor_;
   for (int i = 0; i < most_tunings; ++i) {
-    auto modes = find_modes(factor == 1.0 ? written : at_key(written, factor), parameters, how);
+    auto modes = modes_at(parameters, factor, place);
     if (!modes) {
       return modes.error();
     }
-    if (!options_.key_hz || options_.key_factor) {
-      return TunedModes{*std::move(modes), factor};
+    if (!options_.key_hz) {
+      return Tuned{*std::move(modes), factor};
     }
-    if (options_.pitch_mode >= modes->modes.size()) {
+    if (options_.pitch_mode >= modes->size()) {
       return Error{"there is no mode " + std::to_string(options_.pitch_mode + 1) +
                    " that swings, so no key has a pitch"};
     }
-    const NetworkMode& mode = modes->modes[options_.pitch_mode];
-    if (std::fabs(mode.frequency_hz / *options_.key_hz - 1.0) < in_tune) {
-      return TunedModes{*std::move(modes), factor};
+    const ModeTone tone = (*modes)[options_.pitch_mode].tone;
+    if (std::fabs(tone.frequency_hz / *options_.key_hz - 1.0) < in_tune) {
+      factor_ = factor;
+      return Tuned{*std::move(modes), factor};
     }
-    factor *= stiffness_of(*options_.key_hz, mode.t60_s, options_.rate_hz) /
-              stiffness_of(mode.frequency_hz, mode.t60_s, options_.rate_hz);
+    factor *= stiffness_of(*options_.key_hz, tone.t60_s, options_.rate_hz) /
+              stiffness_of(tone.frequency_hz, tone.t60_s, options_.rate_hz);
     if (!(factor > 0.0 && std::isfinite(factor))) {
       break;
     }
   }
+  factor_ = 1.0;
   return Error{"the key has no pitch: stiffness alone does not bring the mode there"};
-}
-
-Result<double> StruckModel::key_factor(std::span<const double> parameters) const {
-  const auto tuned = tuned_modes(parameters);
-  return tuned ? Result<double>(tuned->factor) : tuned.error();
 }
 
 FrameTimbre StruckModel::lines_of(std::span<const DecayingPartial> partials, double f0_hz) const {
@@ -191,8 +229,7 @@ double StruckModel::blow_frames(const StrikePulse& blow, double factor) const {
   return blow.length_s * options_.rate_hz / std::sqrt(factor);
 }
 
-FrameTimbre StruckModel::analysed(const TunedModes& tuned, double f0_hz) const {
-  const NetworkModes& modes = tuned.modes;
+ModalSound StruckModel::sound_of(const Tuned& tuned) const {
   std::vector<std::vector<double>> pulses;  // [blow] [sample]
   for (const StrikePulse& blow : options_.blows) {
     const double frames = std::rint(blow_frames(blow, tuned.factor));
@@ -205,53 +242,123 @@ FrameTimbre StruckModel::analysed(const TunedModes& tuned, double f0_hz) const {
       pulse = {blow.strength};
     }
   }
-  std::vector<double> samples(options_.frame);
-  for (const NetworkMode& mode : modes.modes) {
-    std::vector<std::complex<double>> drive;
-    for (std::size_t b = 0; b < pulses.size(); ++b) {
-      const auto residue = mean_residue(modes, mode, options_.blows[b].input);
-      drive.resize(std::max(drive.size(), pulses[b].size()));
-      for (std::size_t n = 0; n < pulses[b].size(); ++n) {
-        drive[n] += residue * pulses[b][n];
-      }
-    }
-    const std::complex<double> turn = std::exp(pole_of(mode.mu, modes.scheme));
-    std::complex<double> state;
-    for (std::size_t n = 0; n < samples.size(); ++n) {
-      state = turn * (n < drive.size() ? state + drive[n] : state);
-      samples[n] += state.imag();
-    }
+  std::vector<ModalSound::Motion> motions;
+  for (const HeardMode& mode : tuned.modes) {
+    motions.push_back({pole_of(mode.mu, ModeScheme::published), mode.residues});
   }
+  return {motions, std::move(pulses)};
+}
+
+FrameTimbre StruckModel::analysed(const Tuned& tuned, double f0_hz) const {
+  std::vector<double> samples(options_.frame);
+  sound_of(tuned).next(samples);
   FrameAnalysis analysis({.rate_hz = options_.rate_hz, .size = options_.frame, .f0_hz = f0_hz});
   return analysis.next(samples);
 }
 
-Result<AskedValues> StruckModel::figures(std::span<const double> parameters) const {
-  const auto tuned = tuned_modes(parameters);
-  if (!tuned) {
-    return tuned.error();
+// The envelope until no more than there has been can come: as a recording's, or in fewer steps the
+// magnitude of the modes' sum.
+std::optional<TemporalShape> StruckModel::rising(const Tuned& tuned, StruckAs how) const {
+  constexpr std::size_t block = 1024;
+  constexpr double more = 1.05;  // than the mean of what is left: a filter that overshoots
+  const std::size_t step = how == StruckAs::samples ? 1 : coarse_step;
+  const double rate_hz = options_.rate_hz / static_cast<double>(step);
+  ModalSound sound = sound_of(tuned);
+  EnvelopeSums sums;
+  std::vector<double> levels;
+  const auto take = [&](double level) {
+    sums.add(level);
+    levels.push_back(level);
+  };
+  std::vector<double> samples(block);
+  std::vector<double> left;  // [block] at its end
+  const auto is_over = [&] {
+    const std::size_t told = levels.size() / block;
+    return told > 0 && more * left[told - 1] < sums.largest();
+  };
+  const auto blocks = static_cast<std::size_t>(longest_attack_s * rate_hz) / block;
+  const auto go_on = [&](auto&& compute) {
+    while (!is_over() && left.size() < blocks) {
+      compute();
+      left.push_back(sound.is_pushed()
+                         ? std::numeric_limits<double>::infinity()
+                         : sound.most_left(options_.rate_hz, 1.0 / Envelope::cutoff_hz));
+    }
+  };
+  if (how == StruckAs::samples) {
+    Envelope envelope(rate_hz, take);
+    go_on([&] {
+      sound.next(samples);
+      envelope.add(samples);
+    });
+    if (!is_over()) {
+      envelope.end();
+    }
+  } else {
+    EnvelopeFilter filter(rate_hz);
+    long long late = filter.delay();
+    go_on([&] {
+      sound.next_magnitudes(samples, step);
+      for (const double magnitude : samples) {
+        const double level = filter.next(magnitude);
+        if (late-- <= 0) {
+          take(level);
+        }
+      }
+    });
   }
-  const NetworkModes* const modes = &tuned->modes;
-  if (!modes->is_linear() || has_waveguide(network_)) {
-    return Error{"it is not linear"};
+  EnvelopeTimes times(sums);
+  for (const double level : levels) {
+    times.add(level);
   }
+  return times.shape(rate_hz);
+}
+
+std::optional<double> StruckModel::attack_ms(std::span<const double> parameters) {
+  const auto found = tuned(parameters, {});
+  return found ? attack_of(*found, StruckAs::samples) : std::nullopt;
+}
+
+std::optional<double> StruckModel::attack_of(const Tuned& tuned, StruckAs how) const {
+  const auto shape = rising(tuned, how);
+  if (!shape) {
+    return std::nullopt;
+  }
+  return 1e3 * (how == StruckAs::samples ? std::pow(10.0, shape->log_attack_time)
+                                         : shape->smooth_attack_s);
+}
+
+Result<AskedValues> StruckModel::figures(std::span<const double> parameters, StruckAs how) {
+  const auto found = tuned(parameters, {});
+  return found ? figures_of(*found, how) : found.error();
+}
+
+Result<AskedValues> StruckModel::figures_near(std::span<const double> place,
+                                              std::span<const double> parameters, StruckAs how) {
+  const auto found = tuned(parameters, place);
+  return found ? figures_of(*found, how) : found.error();
+}
+
+Result<AskedValues> StruckModel::figures_of(const Tuned& tuned, StruckAs how) const {
   std::vector<DecayingPartial> partials;
   double loudest = 0.0;
-  for (const NetworkMode& mode : modes->modes) {
+  for (const HeardMode& mode : tuned.modes) {
     std::complex<double> heard;
-    const std::complex<double> pole = pole_of(mode.mu, modes->scheme);
-    for (const StrikePulse& blow : options_.blows) {
-      heard += blow.strength * mean_residue(*modes, mode, blow.input) *
-               pulse_response(blow_frames(blow, tuned->factor), pole);
+    const std::complex<double> pole = pole_of(mode.mu, ModeScheme::published);
+    for (std::size_t b = 0; b < options_.blows.size(); ++b) {
+      const StrikePulse& blow = options_.blows[b];
+      heard +=
+          blow.strength * mode.residues[b] * pulse_response(blow_frames(blow, tuned.factor), pole);
     }
     const double level = std::abs(heard);
-    if (!(mode.t60_s > 0.0)) {
-      return Error{"a mode at " + std::to_string(mode.frequency_hz) + " Hz grows"};
+    if (!(mode.tone.t60_s > 0.0)) {
+      return Error{"a mode at " + std::to_string(mode.tone.frequency_hz) + " Hz grows"};
     }
     if (!std::isfinite(level)) {
       return Error{"a level is no finite number"};
     }
-    partials.push_back({mode.frequency_hz, pole_radius(mode.t60_s, options_.rate_hz), level});
+    partials.push_back(
+        {mode.tone.frequency_hz, pole_radius(mode.tone.t60_s, options_.rate_hz), level});
     loudest = std::max(loudest, level);
   }
   if (!(loudest > 0.0)) {
@@ -271,11 +378,11 @@ Result<AskedValues> StruckModel::figures(std::span<const double> parameters) con
   if (pitch >= partials.size()) {
     return Error{"no mode that swings is left to be the pitch"};
   }
-  const double f0_hz = modes->modes[pitch].frequency_hz;
+  const auto& [f0_hz, t60_s] = tuned.modes[pitch].tone;
   set(AskedFigure::f0, f0_hz);
-  set(AskedFigure::t60, std::min(modes->modes[pitch].t60_s, longest_t60_s));
+  set(AskedFigure::t60, std::min(t60_s, longest_t60_s));
   const FrameTimbre timbre =
-      options_.by_samples ? analysed(*tuned, f0_hz) : lines_of(partials, f0_hz);
+      how == StruckAs::samples ? analysed(tuned, f0_hz) : lines_of(partials, f0_hz);
   if (timbre.shape) {
     set(AskedFigure::centroid, timbre.shape->centroid_hz);
     set(AskedFigure::spread, timbre.shape->spread_hz);
@@ -287,6 +394,9 @@ Result<AskedValues> StruckModel::figures(std::span<const double> parameters) con
   if (timbre.harmonics) {
     set(AskedFigure::inharmonicity, timbre.harmonics->inharmonicity);
     set(AskedFigure::odd_to_even, timbre.harmonics->odd_to_even);
+  }
+  if (options_.has_attack) {
+    set(AskedFigure::attack, attack_of(tuned, how));
   }
   return values;
 }

@@ -1,5 +1,5 @@
 // core/analysis/timbre: what a linear model is like when it is struck once, as a function of its
-// parameters, in closed form from its modes. Pure. [any thread but audio]
+// parameters, from its modes. Pure. [one thread but audio]
 #pragma once
 
 #include <array>
@@ -10,8 +10,10 @@
 #include <string_view>
 #include <vector>
 
-#include "core/analysis/modes/modes.h"
+#include "core/analysis/modes/nearby_modes.h"
+#include "core/analysis/timbre/descriptors.h"
 #include "core/analysis/timbre/frame_analysis.h"
+#include "core/analysis/timbre/modal_sound.h"
 #include "core/analysis/timbre/modal_spectrum.h"
 #include "core/model/network.h"
 #include "core/progress.h"
@@ -30,14 +32,15 @@ enum class AskedFigure : std::uint8_t {
   rolloff,
   skewness,
   kurtosis,
-  slope
+  slope,
+  attack
 };
-inline constexpr std::size_t asked_figures = 10;
+inline constexpr std::size_t asked_figures = 11;
 
 struct AskedFigureRow {
   AskedFigure figure = AskedFigure::f0;
   std::string_view name;  // with its unit, as descriptions have it
-  // What is just noticed: a share of it; of inharmonicity so much.
+  // What is just noticed: a share of it; of some figures so much.
   double noticed = 0.0;
   bool is_ratio = true;
   std::string_view more;  // "bright", for people
@@ -71,15 +74,16 @@ struct StrikeOptions {
   // does it; else the model is as it is written.
   std::optional<double> key_hz;
   std::size_t pitch_mode = 0;  // from the lowest that swings
-  // Instead of what brings the mode there: the factor that a key has got for other parameters.
-  std::optional<double> key_factor;
-  std::size_t frame = 2048;  // samples from the blow on, of which the spectrum is, of amplitudes
-                             // under a Hann window
-  // The frame is computed sample by sample and analysed as a recording is: exact, but figures jump
-  // where a peak moves to another bin. Else modes are lines, and figures are smooth.
-  bool by_samples = false;
+  std::size_t frame = 2048;    // samples from the blow on, of which the spectrum is, of amplitudes
+                               // under a Hann window
+  bool has_attack = false;     // which needs more of the sound than a frame
   Progress progress = {};
 };
+
+// Modes are lines, and figures are smooth. Or the frame is computed sample by sample and analysed
+// as a recording is: exact, but figures jump where a peak moves to another bin, or an attack's
+// threshold to another ripple.
+enum class StruckAs { lines, samples };
 
 class StruckModel {
  public:
@@ -88,26 +92,47 @@ class StruckModel {
 
   // f0 is the mode that a key tunes, or else the lowest within 60 dB of the loudest; T60 is its.
   // That of a mode that nothing damps is `longest_t60_s`. The error says why there are none: no
-  // mode swings or is heard, one grows, a number is none; not linear; or `stopped`. O(masses^3)
-  Result<AskedValues> figures(std::span<const double> parameters) const;
+  // mode swings or is heard, one grows, a number is none; not linear; or `stopped`. O(masses^3),
+  // and O(masses^2) where the last parameters had modes of the same shapes.
+  Result<AskedValues> figures(std::span<const double> parameters, StruckAs how);
 
-  // What `key_hz` multiplies stiffness by. Errors as of figures().
-  Result<double> key_factor(std::span<const double> parameters) const;
+  // The same, to first order in how far the parameters are from a place: for slopes. The first time
+  // at a place O(masses^3), then O(masses^2) where no modes are alike that the way tells apart.
+  Result<AskedValues> figures_near(std::span<const double> place,
+                                   std::span<const double> parameters, StruckAs how);
+
+  // As of figures(), by samples, whether `has_attack` or not; nothing where there are no figures.
+  std::optional<double> attack_ms(std::span<const double> parameters);
 
   static constexpr double longest_t60_s = 1e6;
 
  private:
-  struct TunedModes {
-    NetworkModes modes;
+  struct Tuned {
+    std::vector<HeardMode> modes;  // residues by blow
     double factor = 1.0;
   };
-  Result<TunedModes> tuned_modes(std::span<const double> parameters) const;
+  using Place = std::optional<std::span<const double>>;  // near which modes are wanted
+  Result<Tuned> tuned(std::span<const double> parameters, const Place& place);
+  Result<std::vector<HeardMode>> modes_at(std::span<const double> parameters, double factor,
+                                          const Place& place);
+  Result<std::vector<HeardMode>> found_modes(const Network& written,
+                                             std::span<const double> parameters,
+                                             const ModeOptions& how);
+  ModeOptions mode_options(double factor) const;
+  std::vector<std::size_t> pushed() const;
+  Result<AskedValues> figures_of(const Tuned& tuned, StruckAs how) const;
   FrameTimbre lines_of(std::span<const DecayingPartial> partials, double f0_hz) const;
-  FrameTimbre analysed(const TunedModes& tuned, double f0_hz) const;
+  ModalSound sound_of(const Tuned& tuned) const;
+  FrameTimbre analysed(const Tuned& tuned, double f0_hz) const;
+  std::optional<double> attack_of(const Tuned& tuned, StruckAs how) const;
+  std::optional<TemporalShape> rising(const Tuned& tuned, StruckAs how) const;
   double blow_frames(const StrikePulse& blow, double factor) const;
 
   Network network_;
   StrikeOptions options_;
+  double factor_ = 1.0;               // of a key, the last; 1 without one
+  std::optional<NearbyModes> known_;  // with the shapes that were found last...
+  std::vector<double> known_at_;      // ...for these parameters
 };
 
 }  // namespace ressort

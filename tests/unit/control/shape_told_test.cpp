@@ -94,6 +94,18 @@ TEST_CASE("keys are in tune when what sounds was shaped", "[shape_told]") {
   CHECK(pitch_hz() == Approx(440.0).margin(a_tenth_of_a_cent));
 }
 
+TEST_CASE("an attack is told, and asked for like the rest", "[shape_told]") {
+  StringHarness fixture;
+  Harness& h = fixture.harness;
+  const std::string told = squeezed(h.say("shape t60 2"));
+  // Told though it was not asked for: what strikes a string rises as fast as the low-pass of 50 Hz.
+  CHECK(has(told, "attack "));
+  CHECK_FALSE(has(told, "attack - -"));
+  h.play();
+  CHECK(has(h.say("shape attack_ms 400"), "as slow as it gets is"));
+  CHECK(has(h.say("shape attack 0"), "must be a number above 0"));
+}
+
 TEST_CASE("the console refuses what cannot be asked for", "[shape_told]") {
   Harness idle;
   CHECK(has(idle.say("shape t60 3"), "no model is loaded"));
