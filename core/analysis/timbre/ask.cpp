@@ -322,7 +322,7 @@ class Search {
         continue;
       }
       end = asker_.descend(*end);
-      if (options_.exactly && end->worst() > hopeful) {
+      if (start > 0 && options_.exactly && end->worst() > hopeful) {
         far.push_back(*std::move(end));
       } else {
         bring_nearer(*end);
