@@ -39,6 +39,33 @@ struct Step {
 
 using Formula = std::vector<Step>;
 
+// How many numbers a step takes from the stack, before it leaves one there.
+constexpr std::size_t operands(Op op) {
+  switch (op) {
+    case Op::number:
+    case Op::parameter:
+      return 0;
+    case Op::negate:
+    case Op::sqrt:
+    case Op::abs:
+    case Op::sin:
+    case Op::cos:
+    case Op::exp:
+      return 1;
+    case Op::add:
+    case Op::subtract:
+    case Op::multiply:
+    case Op::divide:
+    case Op::power:
+    case Op::minimum:
+    case Op::maximum:
+      return 2;
+    case Op::clamp:
+      return 3;
+  }
+  return 0;
+}
+
 // The deepest stack that a formula as written may need; the reader refuses a deeper one. What is
 // made of several formulas needs some more.
 inline constexpr std::size_t max_formula_depth = 32;
@@ -109,6 +136,17 @@ inline double evaluate(std::span<const Step> formula, std::span<const double> pa
     }
   }
   return top == 0 ? 0.0 : stack[0];
+}
+
+// How deep the stack gets.
+inline std::size_t stack_depth(std::span<const Step> formula) {
+  std::size_t depth = 0;
+  std::size_t most = 0;
+  for (const Step& step : formula) {
+    depth = depth + 1 - operands(step.op);
+    most = std::max(most, depth);
+  }
+  return most;
 }
 
 // How the value depends on the parameters: not at all?

@@ -129,40 +129,6 @@ std::optional<Error> differs(const Network& base, const MorphStop& stop) {
   return told("something else is held, driven, heard, or starts elsewhere", {});
 }
 
-// How many numbers a formula puts on a stack at most.
-std::size_t depth_of(const Formula& formula) {
-  std::size_t depth = 0;
-  std::size_t most = 0;
-  for (const Step& step : formula) {
-    switch (step.op) {
-      case Op::number:
-      case Op::parameter:
-        most = std::max(most, ++depth);
-        break;
-      case Op::negate:
-      case Op::sqrt:
-      case Op::abs:
-      case Op::sin:
-      case Op::cos:
-      case Op::exp:
-        break;
-      case Op::clamp:
-        depth -= 2;
-        break;
-      case Op::add:
-      case Op::subtract:
-      case Op::multiply:
-      case Op::divide:
-      case Op::power:
-      case Op::minimum:
-      case Op::maximum:
-        --depth;
-        break;
-    }
-  }
-  return most;
-}
-
 Formula folded(Formula formula) {
   return is_constant(formula) ? Formula{{Op::number, 0, evaluate(formula, {})}} : formula;
 }
@@ -418,7 +384,8 @@ class Morphing {
   }
 
   ArgumentId add(Formula formula) {
-    if (!error_ && (depth_of(formula) > max_formula_depth || formula.size() > max_formula_steps)) {
+    if (!error_ &&
+        (stack_depth(formula) > max_formula_depth || formula.size() > max_formula_steps)) {
       error_ = Error{"a number of the model is too long a formula to be morphed"};
     }
     out_.arguments.push_back(std::move(formula));

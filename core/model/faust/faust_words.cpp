@@ -86,25 +86,6 @@ Term joined(Op op, const Term& a, const Term& b) {
   }
 }
 
-int operands(Op op) {
-  switch (op) {
-    case Op::number:
-    case Op::parameter:
-      return 0;
-    case Op::negate:
-    case Op::sqrt:
-    case Op::abs:
-    case Op::sin:
-    case Op::cos:
-    case Op::exp:
-      return 1;
-    case Op::clamp:
-      return 3;
-    default:
-      return 2;
-  }
-}
-
 Term applied(const Step& step, std::span<const Term> taken,
              std::span<const std::string> parameters) {
   switch (step.op) {
@@ -156,7 +137,7 @@ std::string faust_formula(std::span<const Step> formula, std::span<const std::st
                           Tightness tightness) {
   std::vector<Term> stack;
   for (const Step& step : formula) {
-    const auto first = stack.end() - operands(step.op);
+    const auto first = stack.end() - static_cast<std::ptrdiff_t>(operands(step.op));
     Term term = applied(step, std::span<const Term>(first, stack.end()), parameters);
     stack.erase(first, stack.end());
     stack.push_back(std::move(term));

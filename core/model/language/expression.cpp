@@ -12,13 +12,12 @@ namespace {
 struct Function {
   std::string_view name;
   Op op;
-  int arguments;
 };
 
 constexpr Function functions[] = {
-    {"sqrt", Op::sqrt, 1},   {"abs", Op::abs, 1},     {"sin", Op::sin, 1},
-    {"cos", Op::cos, 1},     {"exp", Op::exp, 1},     {"pow", Op::power, 2},
-    {"min", Op::minimum, 2}, {"max", Op::maximum, 2}, {"clamp", Op::clamp, 3},
+    {"sqrt", Op::sqrt},   {"abs", Op::abs},     {"sin", Op::sin},
+    {"cos", Op::cos},     {"exp", Op::exp},     {"pow", Op::power},
+    {"min", Op::minimum}, {"max", Op::maximum}, {"clamp", Op::clamp},
 };
 
 bool is_digit(char c) {
@@ -173,10 +172,11 @@ class Parser {
       if (++nesting_ > static_cast<int>(max_formula_depth)) {
         return fail("the functions are nested too deeply");
       }
-      for (int i = 0; i < function.arguments && !failed_; ++i) {
+      const auto arguments = static_cast<int>(operands(function.op));
+      for (int i = 0; i < arguments && !failed_; ++i) {
         if (i > 0 && !accept(',')) {
-          return fail("expected ',': " + std::string(word) + " takes " +
-                      std::to_string(function.arguments) + " arguments");
+          return fail("expected ',': " + std::string(word) + " takes " + std::to_string(arguments) +
+                      " arguments");
         }
         sum();
       }
@@ -184,7 +184,7 @@ class Parser {
       if (!failed_ && !accept(')')) {
         return fail("expected ')' after the arguments of " + std::string(word));
       }
-      return push({function.op, 0, 0.0}, 1 - function.arguments);
+      return push({function.op, 0, 0.0}, 1 - arguments);
     }
     at_ = start;
     fail("unknown function " + quoted(word) + "; there are sqrt abs sin cos exp pow min max clamp");
@@ -263,13 +263,6 @@ const Function* function_of(Op op) {
   const auto* const found = std::find_if(std::begin(functions), std::end(functions),
                                          [&](const Function& f) { return f.op == op; });
   return found == std::end(functions) ? nullptr : found;
-}
-
-std::size_t operands(Op op) {
-  if (const Function* const function = function_of(op)) {
-    return static_cast<std::size_t>(function->arguments);
-  }
-  return op == Op::number || op == Op::parameter ? 0 : op == Op::negate ? 1 : 2;
 }
 
 Piece piece(const Step& step, std::span<const Piece> of, std::span<const std::string> parameters) {
