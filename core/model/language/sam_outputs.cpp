@@ -1,13 +1,22 @@
 // What an audioout hears.
 #include <algorithm>
-#include <set>
+#include <utility>
 
 #include "core/model/language/sam_teller.h"
 
 namespace ressort {
 namespace {
 
-constexpr int deepest_sum = 50;  // parentheses in what is heard
+constexpr int deepest_sum = 50;  // parentheses and signs in what is heard
+constexpr std::size_t longest_levels = 10 * longest_expression;
+
+std::size_t length_of(const SamHeard& heard) {
+  std::size_t length = heard.number.size();
+  for (const SamHeard::Part& part : heard.parts) {
+    length += part.level.size();
+  }
+  return length;
+}
 
 }  // namespace
 
@@ -19,8 +28,17 @@ std::optional<SamHeard> SamTeller::factor(const SamElement& out, Token& rest, in
   const auto skip = [&](std::size_t count) {
     rest = trimmed({rest.text.substr(count), rest.column + static_cast<int>(count)});
   };
-  while (rest.text.starts_with('-') || rest.text.starts_with('+')) {
+  if (rest.text.starts_with('-') || rest.text.starts_with('+')) {
+    const bool is_negative = rest.text.starts_with('-');
+    if (depth >= deepest_sum) {
+      return refuse("the signs are too many");
+    }
     skip(1);
+    auto heard = factor(out, rest, depth + 1);
+    if (heard && is_negative) {
+      heard->wrap("-(", ")");
+    }
+    return heard;
   }
   if (rest.text.starts_with('(')) {
     if (depth >= deepest_sum) {
@@ -45,8 +63,7 @@ std::optional<SamHeard> SamTeller::factor(const SamElement& out, Token& rest, in
   const auto found = by_name_.find(word.text);
   SamHeard heard;
   if (found == by_name_.end()) {
-    lines_.expression(out.statement->origin, word);  // a number, or told
-    heard.has_gain = true;
+    heard.number = "(" + lines_.expression(out.statement->origin, word) + ")";  // or told
   } else if (is_link(elements_[found->second].shape->kind) ||
              elements_[found->second].shape->kind == SamKind::waveguide ||
              elements_[found->second].shape->kind == SamKind::audioout) {
@@ -55,7 +72,7 @@ std::optional<SamHeard> SamTeller::factor(const SamElement& out, Token& rest, in
               " has no position: expected a mass, resonators, a junction, a termination or a port");
     return std::nullopt;
   } else {
-    heard.elements.push_back(found->second);
+    heard.parts.push_back({found->second, ""});
   }
   skip(length);
   return heard;
@@ -70,34 +87,57 @@ std::optional<SamHeard> SamTeller::product(const SamElement& out, Token& rest, i
     if (!next) {
       return std::nullopt;
     }
-    if (!next->elements.empty() && (!heard->elements.empty() || sign.text == "/")) {
+    if (!next->is_number() && (!heard->is_number() || sign.text == "/")) {
       error(out, sign, "what is heard may be multiplied by numbers, not by what else is heard");
       return std::nullopt;
     }
-    heard->elements.insert(heard->elements.end(), next->elements.begin(), next->elements.end());
-    heard->has_gain = true;
+    if (next->is_number()) {
+      heard->wrap("(", ")" + std::string(sign.text) + next->number);
+    } else {
+      next->wrap(heard->number + "*(", ")");
+      heard = std::move(next);
+    }
+    if (length_of(*heard) > longest_levels) {
+      error(out, sign, "what is heard is multiplied too often to be read");
+      return std::nullopt;
+    }
   }
   return heard;
 }
 
 std::optional<SamHeard> SamTeller::sum(const SamElement& out, Token& rest, int depth) {
-  SamHeard all;
+  std::optional<SamHeard> all;
+  bool is_taken_away = false;
   for (;;) {
-    all.has_gain = all.has_gain || rest.text.starts_with('-');
-    const auto heard = product(out, rest, depth);
+    const Token place = rest;
+    auto heard = product(out, rest, depth);
     if (!heard) {
       return std::nullopt;
     }
-    if (heard->elements.empty() && depth == 0) {
-      error(out, rest, "expected what is heard, found a number alone");
+    if (heard->is_number() && (depth == 0 || (all && !all->is_number()))) {
+      error(out, place, "expected what is heard, found a number alone");
       return std::nullopt;
     }
-    all.elements.insert(all.elements.end(), heard->elements.begin(), heard->elements.end());
-    all.has_gain = all.has_gain || heard->has_gain;
+    if (all && all->is_number() && !heard->is_number()) {
+      error(out, place, "expected a number, as before; a number added to what is heard is silent");
+      return std::nullopt;
+    }
+    if (is_taken_away) {
+      heard->wrap("-(", ")");
+    }
+    if (all) {
+      all->parts.insert(all->parts.end(), heard->parts.begin(), heard->parts.end());
+      all->number += "+" + heard->number;
+    } else {
+      all = std::move(heard);
+    }
     if (!rest.text.starts_with('+') && !rest.text.starts_with('-')) {
+      if (all->is_number()) {
+        all->number = "(" + all->number + ")";
+      }
       return all;
     }
-    all.has_gain = all.has_gain || rest.text.starts_with('-');
+    is_taken_away = rest.text.starts_with('-');
     rest = trimmed({rest.text.substr(1), rest.column + 1});
   }
 }
@@ -105,6 +145,9 @@ std::optional<SamHeard> SamTeller::sum(const SamElement& out, Token& rest, int d
 void SamTeller::write_output(const SamElement& element) {
   const Statement& statement = *element.statement;
   Token rest = statement.arguments[0];
+  if (rest.text.size() > longest_expression) {
+    return error(element, rest, "what is heard is too long to be read");
+  }
   const auto heard = sum(element, rest, 0);
   if (!heard) {
     return;
@@ -114,29 +157,23 @@ void SamTeller::write_output(const SamElement& element) {
                  "found " + quoted(rest.text) +
                      " where the ';' was expected: FAUST code behind what is heard is not read");
   }
-  const int first = outputs_ + 1;
-  std::set<std::size_t> told;
+  const std::string name = quoted(statement.names[0].text);
+  const std::string output = "@out" + std::to_string(outputs_ + 1) + " posOutput ";
+  bool is_heard = false;
   bool has_termination = false;
-  for (const std::size_t index : heard->elements) {
-    if (!told.insert(index).second) {
-      continue;
-    }
-    const SamElement& source = elements_[index];
+  for (const SamHeard::Part& part : heard->parts) {
+    const SamElement& source = elements_[part.element];
     has_termination = has_termination || source.shape->kind == SamKind::termination;
     if (!source.end.empty()) {  // else its row has been told
-      emit(statement.origin, "@out" + std::to_string(++outputs_) + " posOutput " + source.end);
+      const std::string level =
+          part.level.empty()
+              ? ""
+              : " " + lines_.tidy(statement.origin, statement.arguments[0], part.level);
+      emit(statement.origin, output + source.end + level);
+      is_heard = true;
     }
   }
-  const std::string name = quoted(statement.names[0].text);
-  if (told.size() > 1) {
-    lines_.warning(statement.origin, statement.word,
-                   name + " is a sum: what it adds are outputs " + std::to_string(first) + " to " +
-                       std::to_string(outputs_));
-  }
-  if (heard->has_gain) {
-    lines_.warning(statement.origin, statement.word,
-                   name + " loses its gains: outputs are positions; a preset says how loud");
-  }
+  outputs_ += is_heard ? 1 : 0;
   if (has_termination) {
     lines_.warning(statement.origin, statement.word,
                    name +

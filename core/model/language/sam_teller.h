@@ -47,10 +47,24 @@ struct SamElement {
   std::vector<std::size_t> guides;  // that end here; terminations and junctions only
 };
 
-// What an audioout hears.
+// What an audioout adds up: elements, each times an expression of ours ("": 1), or, where there are
+// none, that expression alone.
 struct SamHeard {
-  std::vector<std::size_t> elements;
-  bool has_gain = false;
+  struct Part {
+    std::size_t element = 0;
+    std::string level;
+  };
+  std::vector<Part> parts;
+  std::string number;
+
+  bool is_number() const { return parts.empty(); }
+  // Puts each of its expressions between these.
+  void wrap(const std::string& before, const std::string& behind) {
+    for (Part& part : parts) {
+      part.level = before + (part.level.empty() ? "1" : part.level) + behind;
+    }
+    number = before + number + behind;
+  }
 };
 
 // Tells one text.
