@@ -111,7 +111,7 @@ TEST_CASE("A session manager finds all of it again", "[nsm]") {
     auto play = start(manager);
     std::string said;
     REQUIRE(manager.hears("/nsm/server/announce", "ressort", &said));
-    CHECK(said == "ressort :switch: ressort 1 1 " + std::to_string(play->pid()));
+    CHECK(said == "ressort :switch:dirty: ressort 1 1 " + std::to_string(play->pid()));
     // Nothing before the manager has said what; and then by its name.
     manager.welcome();
     std::this_thread::sleep_for(300ms);
@@ -127,9 +127,11 @@ TEST_CASE("A session manager finds all of it again", "[nsm]") {
     REQUIRE(play->says("loaded in"));
     play->write("load PolyTriangle\nset m_K 0.0625\ntuning \"" + folder.file("two.scl") + "\"\n");
     REQUIRE(play->says("m_K = 0.0625"));
+    CHECK(manager.hears("/nsm/client/is_dirty", ""));
     std::this_thread::sleep_for(1500ms);  // the cable is seen
     manager.save();
     REQUIRE(manager.hears("/reply", "/nsm/client/save"));
+    CHECK(manager.hears("/nsm/client/is_clean", ""));
     // Another project instead, under another name, and the first one's things are not there.
     manager.open(folder.file("second.nDEF"), "ressort.nDEF");
     REQUIRE(manager.hears("/reply", "/nsm/client/open"));

@@ -3,6 +3,7 @@
 #include <filesystem>
 
 #include "app/session/files.h"
+#include "core/model/language/expression.h"
 
 namespace ressort {
 namespace {
@@ -50,6 +51,24 @@ Result<Done> keep_stage(const std::string& folder, Session& session,
   }
   // Last: it is the list that says what belongs to it.
   return write_text((fs::path(folder) / list_name).string(), list, Existing::replace);
+}
+
+std::string stage_state(const Session& session) {
+  const Session::Present now = session.present();
+  if (now.loaded->serial == 0) {
+    return "";
+  }
+  std::string state = now.loaded->path;
+  for (const double value : now.values) {
+    state += " " + print_number(value);
+  }
+  for (const LearnedRow& row : session.learned()) {
+    state += " " + row.target + " " + std::to_string(row.controller);
+  }
+  for (const std::string& path : session.tuning()) {
+    state += " " + path;
+  }
+  return state;
 }
 
 Result<KeptStage> find_stage(const std::string& folder) {

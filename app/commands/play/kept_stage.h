@@ -20,6 +20,9 @@ struct KeptStage {
 Result<Done> keep_stage(const std::string& folder, Session& session,
                         const std::vector<Cable>& cables);
 
+// What it would write now but for the cables, told apart by its text; empty: nothing is loaded.
+std::string stage_state(const Session& session);
+
 // Nothing kept where there is no such folder; an error where there is one that cannot be read.
 Result<KeptStage> find_stage(const std::string& folder);
 

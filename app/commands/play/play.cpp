@@ -212,7 +212,8 @@ class Player {
     }
     auto manager = NsmClient::announce(
         url, [this](const NsmProject& project) { return open_project(project); },
-        [this] { return save_project(); });
+        [this] { return save_project(); },
+        [this] { return session_ ? stage_state(*session_) : std::string(); });
     if (!manager) {
       complain(manager.error().message);
       return exit_code::wrong_use;

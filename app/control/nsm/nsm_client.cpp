@@ -54,15 +54,19 @@ const std::string* text_at(const Message& message, std::size_t i) {
 
 }  // namespace
 
-NsmClient::NsmClient(int socket, OscSender manager, Open open, Save save)
-    : socket_(socket), address_(manager), open_(std::move(open)), save_(std::move(save)) {}
+NsmClient::NsmClient(int socket, OscSender manager, Open open, Save save, State state)
+    : socket_(socket),
+      address_(manager),
+      open_(std::move(open)),
+      save_(std::move(save)),
+      state_(std::move(state)) {}
 
 NsmClient::~NsmClient() {
   close(socket_);
 }
 
-Result<std::unique_ptr<NsmClient>> NsmClient::announce(const std::string& url, Open open,
-                                                       Save save) {
+Result<std::unique_ptr<NsmClient>> NsmClient::announce(const std::string& url, Open open, Save save,
+                                                       State state) {
   const auto manager = address_of(url);
   if (!manager) {
     return manager.error();
@@ -74,10 +78,10 @@ Result<std::unique_ptr<NsmClient>> NsmClient::announce(const std::string& url, O
     return socket.error();
   }
   auto client = std::unique_ptr<NsmClient>(
-      new NsmClient(*socket, *manager, std::move(open), std::move(save)));
+      new NsmClient(*socket, *manager, std::move(open), std::move(save), std::move(state)));
   client->send(Reply("/nsm/server/announce")
                    .text("ressort")
-                   .text(":switch:")
+                   .text(":switch:dirty:")
                    .text("ressort")
                    .whole(1)
                    .whole(1)
@@ -102,6 +106,21 @@ void NsmClient::poll() {
       }
     }
   }
+  tell_state();
+}
+
+void NsmClient::tell_state() {
+  const std::string state = is_open_ ? state_() : "";
+  if (state.empty()) {
+    return;
+  }
+  if (kept_.empty()) {
+    kept_ = state;
+  }
+  if (const bool is_dirty = state != kept_; is_dirty != is_dirty_) {
+    is_dirty_ = is_dirty;
+    send(Reply(is_dirty ? "/nsm/client/is_dirty" : "/nsm/client/is_clean").bytes());
+  }
 }
 
 void NsmClient::handle(const Message& message) {
@@ -119,9 +138,14 @@ void NsmClient::handle(const Message& message) {
       answer(message.address, Error{"expected PATH, NAME and ID"});
       return;
     }
-    answer(message.address, open_({*path, *id}));
+    const auto opened = open_({*path, *id});
+    is_open_ = is_open_ || opened;
+    kept_ = opened ? "" : kept_;
+    answer(message.address, opened);
   } else if (message.address == "/nsm/client/save") {
-    answer(message.address, save_());
+    const auto saved = save_();
+    kept_ = saved ? "" : kept_;
+    answer(message.address, saved);
   }
 }
 
