@@ -378,7 +378,8 @@ Result<Compiled> compile_by_stages(const Request& request) {
     analysis.along = find_pitches_along(request, network, planned.machine);
     reach(analysis, planned.more, options.rate_hz);
   }
-  if (auto error = shortage(planned.machine, voices, options.precision, options.most_bytes)) {
+  if (auto error = shortage(planned.machine, voices, options.precision, options.executor,
+                            options.most_bytes)) {
     return *std::move(error);
   }
   const auto played_by = [&](int count, double gain) {

@@ -8,6 +8,7 @@
 
 #include "core/engine/voices.h"
 #include "core/kernels/clusters.h"
+#include "core/kernels/domains/executor.h"
 #include "core/kernels/registry.h"
 
 namespace ressort {
@@ -23,7 +24,8 @@ std::string in_bytes(std::uint64_t bytes) {
 
 }  // namespace
 
-std::uint64_t engine_bytes(const Machine& machine, int voices, Precision precision) {
+std::uint64_t engine_bytes(const Machine& machine, int voices, Precision precision,
+                           const Executor* executor) {
   const std::uint64_t number_bytes =
       precision == Precision::float32 ? sizeof(float) : sizeof(double);
   constexpr std::uint64_t of_any_engine = 131'072;  // MIDI channels, tunings, the mix
@@ -31,12 +33,16 @@ std::uint64_t engine_bytes(const Machine& machine, int voices, Precision precisi
   for (const Program& program : machine.parts) {
     bytes += voice_bytes(program, number_bytes);
   }
-  return of_any_engine + bytes * lane_count(voices);
+  // What is played, a helper's copy, and where a late one's work is done.
+  const std::uint64_t places = executor != nullptr && executor->is_live() ? 3 : 1;
+  return of_any_engine + places * bytes * lane_count(voices);
 }
 
 std::optional<Error> shortage(const Machine& machine, int voices, Precision precision,
-                              std::uint64_t most_bytes) {
-  const auto bytes_of = [&](int count) { return engine_bytes(machine, count, precision); };
+                              const Executor* executor, std::uint64_t most_bytes) {
+  const auto bytes_of = [&](int count) {
+    return engine_bytes(machine, count, precision, executor);
+  };
   if (bytes_of(voices) <= most_bytes) {
     return std::nullopt;
   }

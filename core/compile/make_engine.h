@@ -12,13 +12,15 @@
 namespace ressort {
 
 // About as many bytes as an engine of this machine, in its forms, takes with so many voices; within
-// a factor of two where that is much. O(parts). [any thread]
-std::uint64_t engine_bytes(const Machine& machine, int voices, Precision precision);
+// a factor of two where that is much. Helpers that nobody waits for have copies. O(parts). [any
+// thread]
+std::uint64_t engine_bytes(const Machine& machine, int voices, Precision precision,
+                           const Executor* executor);
 
 // What to say where they do not fit into `most_bytes`, and how many would. Asked before the memory
 // is taken: afterwards it would be too late. [any thread]
 std::optional<Error> shortage(const Machine& machine, int voices, Precision precision,
-                              std::uint64_t most_bytes);
+                              const Executor* executor, std::uint64_t most_bytes);
 
 // What a loud note peaks at by the gain that find_gain() finds.
 inline constexpr double found_gain_peak = 0.5;

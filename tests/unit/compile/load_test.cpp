@@ -241,7 +241,7 @@ TEST_CASE("What an engine takes is known before it is made", "[load]") {
   { const Machine gone = std::move(copy); }
   const auto of_machine = static_cast<double>(held - support::heap_bytes());
   const double taken = static_cast<double>(held - before) - 2.0 * of_machine;
-  const auto predicted = static_cast<double>(engine_bytes(machine, voices, way.precision));
+  const auto predicted = static_cast<double>(engine_bytes(machine, voices, way.precision, nullptr));
   CAPTURE(method_name(way.method), voices, taken, predicted);
   CHECK(predicted > 0.5 * taken);
   CHECK(predicted < 2.0 * taken);

@@ -20,9 +20,11 @@
 #include "app/realtime/thread_pool.h"
 #include "app/session/loader.h"
 #include "core/compile/compile.h"
+#include "core/compile/make_engine.h"
 #include "core/kernels/domains/kernel_task.h"
 #include "core/kernels/registry.h"
 #include "tests/support/harness.h"
+#include "tests/support/heap.h"
 #include "tests/support/random.h"
 
 using namespace ressort;
@@ -344,6 +346,37 @@ TEST_CASE("helpers play the bits of one thread, whatever stops them", "[helpers]
   CHECK(Stalls::count > 100);
 #endif
   std::printf("%llu tasks were taken over\n", static_cast<unsigned long long>(taken_over));
+}
+
+TEST_CASE("The memory of what helpers work in is known before it is taken", "[helpers]") {
+  if (!support::heap_is_counted) {
+    return;
+  }
+  Board<ClockReading> clock;
+  ThreadPool pool{2, &clock};
+  for (Executor* const executor :
+       {static_cast<Executor*>(nullptr), static_cast<Executor*>(&pool)}) {
+    constexpr int voices = 64;
+    const Network network = support::network_of(
+        "@K param 0.01\n@s mesh 50 50 1. K 0.001 0. 0.\n@in1 frcInput [@s 0.3 0.3]\n"
+        "@out1 posOutput [@s 0.3 0.4]\n");
+    const auto compiled = compile(network, default_preset(network, true),
+                                  {.voices = voices, .method = Method::grid, .executor = executor});
+    REQUIRE(compiled);
+    const Machine& machine = compiled->engine->machine();
+    const std::size_t before = support::heap_bytes();
+    const Engine engine(machine, {.voices = voices}, Precision::float64, best_isa(), {}, executor);
+    Machine copy = machine;
+    const std::size_t held = support::heap_bytes();
+    { const Machine gone = std::move(copy); }
+    const auto of_machine = static_cast<double>(held - support::heap_bytes());
+    const double taken = static_cast<double>(held - before) - 2.0 * of_machine;
+    const auto told =
+        static_cast<double>(engine_bytes(machine, voices, Precision::float64, executor));
+    CAPTURE(executor != nullptr, taken, told);
+    CHECK(told > 0.5 * taken);
+    CHECK(told < 2.0 * taken);
+  }
 }
 
 TEST_CASE("a large network's shards are played by helpers to the bit", "[helpers]") {
