@@ -10,6 +10,8 @@ const make = (name, text, attributes = {}) => {
   return element;
 };
 
+const counted = (count, one, more) => `${count} ${count === 1 ? one : more}`;
+
 // --- OSC ---------------------------------------------------------------------------------------
 
 const encoder = new TextEncoder();
@@ -79,7 +81,7 @@ async function loadModel() {
   document.title = model.name + ' – ressort';
   $('name').textContent = model.name;
   $('description').textContent = model.description ||
-    `${model.masses} masses, ${model.link_count} links`;
+    `${counted(model.masses, 'mass', 'masses')}, ${counted(model.link_count, 'link', 'links')}`;
   showSliders();
   showScenes();
   $('modes').replaceChildren();
