@@ -2,16 +2,18 @@
 // processes.
 #include <CLI/CLI.hpp>
 #include <cstdio>
+#include <exception>
 
 #include "app/commands/command_line.h"
 #include "app/commands/offline.h"
 #include "app/exit_code.h"
 #include "app/mpi/ranks.h"
 
+namespace {
+
 using namespace ressort;
 
-int main(int argc, char** argv) {
-  Ranks ranks(argc, argv);
+int render_by(Ranks& ranks, int argc, char** argv) {
   RenderOptions options{.executor = &ranks};
   options.is_silent = ranks.number() > 0;
   double seconds = 0.0;
@@ -52,4 +54,19 @@ int main(int argc, char** argv) {
                 ranks.size() == 1 ? "process" : "processes");
   }
   return exit_code::done;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) try {
+  Ranks ranks(argc, argv);
+  try {
+    return render_by(ranks, argc, argv);
+  } catch (const std::exception& error) {
+    std::fprintf(stderr, "ressort-mpi: %s\n", error.what());
+    ranks.abort(exit_code::our_failure);
+  }
+} catch (...) {
+  std::fputs("ressort-mpi: MPI does not begin\n", stderr);
+  return exit_code::our_failure;
 }

@@ -124,7 +124,7 @@ Fellows* Ranks::fellows() {
 
 void Ranks::abort(int code) {
   MPI_Abort(MPI_COMM_WORLD, code);
-  std::exit(code);
+  std::_Exit(code);  // should it ever return
 }
 
 }  // namespace ressort
