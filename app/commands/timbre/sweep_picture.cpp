@@ -117,8 +117,9 @@ class SweepDrawer {
                       "<rect width=\"100%\" height=\"100%\" fill=\"#fff\"/>\n<text x=\"" +
                       px(left) + "\" y=\"20\" font-size=\"14\">" + escaped(title()) + "</text>\n";
     for (std::size_t i = 0; i < panels_.size(); ++i) {
+      const std::size_t row = i / columns;
       svg += panel(panels_[i], left + static_cast<double>(i % columns) * (panel_width + between_x),
-                   top + static_cast<double>(i / columns) * (panel_height + between_y));
+                   top + static_cast<double>(row) * (panel_height + between_y));
     }
     return svg + "</svg>\n";
   }
