@@ -87,7 +87,8 @@ double smooth_rolloff_hz(std::span<const Partial> lines) {
 
 // The slope that a frame's bins have where this is their centroid.
 double slope_of_bins(double centroid_hz, double rate_hz, std::size_t frame) {
-  const double bins = static_cast<double>(frame / 2 + 1);
+  const std::size_t count = frame / 2 + 1;
+  const auto bins = static_cast<double>(count);
   const double apart_hz = rate_hz / static_cast<double>(frame);
   const double mean_hz = 0.5 * (bins - 1.0) * apart_hz;
   const double variance = (bins * bins - 1.0) / 12.0 * apart_hz * apart_hz;
