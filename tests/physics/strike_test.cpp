@@ -71,6 +71,32 @@ Event pushed() {
           .value = force};
 }
 
+// The same place in a model without and with an input there.
+struct StruckTwice {
+  std::string text;
+  std::string with_input;
+  Event blow;
+  Event blow_with_input;
+};
+
+// In every published method a strike is what the input does in the direct one, whether there is
+// such an input or not.
+void check_strike(const StruckTwice& struck, std::set<Method>& seen) {
+  CompileOptions options{.rate_hz = 48000.0, .bare = true, .method = Method::direct};
+  const Sound by_input = play(struck.with_input, options, pushed());
+  for (const Method method : methods_for(KernelRow::Use::published)) {
+    INFO(struck.text << "by " << method_name(method));
+    Plan plan;
+    options.method = method;
+    CHECK(difference(by_input, play(struck.with_input, options, struck.blow_with_input, &plan)) <
+          1e-9);
+    CHECK(difference(by_input, play(struck.text, options, struck.blow)) < 1e-9);
+    for (const Part& part : plan.parts) {
+      seen.insert(part.method);
+    }
+  }
+}
+
 // Without damping a blow between two samples is what a force in the second of them does, to
 // rounding: links pull by the places of before.
 TEST_CASE("A struck mass moves as a force input would move it", "[strike]") {
@@ -90,18 +116,8 @@ TEST_CASE("A struck mass moves as a force input would move it", "[strike]") {
   for (const std::string& text : texts) {
     for (const auto& [name, mass] : named_masses(text)) {
       const std::string with_input = text + "\n@in20 frcInput @" + name + "\n";
-      CompileOptions options{.rate_hz = 48000.0, .bare = true, .method = Method::direct};
-      const Sound by_input = play(with_input, options, pushed());
-      for (const Method method : methods_for(KernelRow::Use::published)) {
-        INFO(text << name << ", by " << method_name(method));
-        Plan plan;
-        options.method = method;
-        CHECK(difference(by_input, play(with_input, options, struck_at(mass), &plan)) < 1e-9);
-        CHECK(difference(by_input, play(text, options, struck_at(mass))) < 1e-9);
-        for (const Part& part : plan.parts) {
-          seen.insert(part.method);
-        }
-      }
+      INFO(name);
+      check_strike({text, with_input, struck_at(mass), struck_at(mass)}, seen);
     }
   }
   CHECK(seen.size() == methods_for(KernelRow::Use::published).size());
@@ -190,20 +206,10 @@ TEST_CASE("A struck place moves as a force input there would move it", "[strike]
   std::set<Method> seen;
   for (const auto& [text, place, name] : places) {
     const std::string with_input = text + "@in20 frcInput " + place + "\n";
-    CompileOptions options{.rate_hz = 48000.0, .bare = true, .method = Method::direct};
-    const Sound by_input = play(with_input, options, pushed());
-    for (const Method method : methods_for(KernelRow::Use::published)) {
-      INFO(text << name << ", by " << method_name(method));
-      Plan plan;
-      options.method = method;
-      const Event with = struck_at(mass_called(with_input, name));
-      const Event without = struck_at(mass_called(text, name));
-      CHECK(difference(by_input, play(with_input, options, with, &plan)) < 1e-9);
-      CHECK(difference(by_input, play(text, options, without)) < 1e-9);
-      for (const Part& part : plan.parts) {
-        seen.insert(part.method);
-      }
-    }
+    INFO(name);
+    check_strike({text, with_input, struck_at(mass_called(text, name)),
+                  struck_at(mass_called(with_input, name))},
+                 seen);
   }
   CHECK(seen.contains(Method::direct));
   CHECK(seen.contains(Method::modal));
