@@ -1,5 +1,6 @@
 #include "app/session/load_news.h"
 
+#include <new>
 #include <utility>
 
 namespace ressort {
@@ -14,6 +15,12 @@ void LoadNews::at(std::string_view stage) {
   next_ = now + std::chrono::seconds(2);
   const auto seconds = std::chrono::duration_cast<std::chrono::seconds>(now - start_).count();
   tell_("still loading '" + name_ + "', " + std::to_string(seconds) + " s: " + std::string(stage));
+}
+
+std::string describe(const std::exception& error) {
+  return dynamic_cast<const std::bad_alloc*>(&error) != nullptr
+             ? "there is not enough memory; a smaller model or fewer voices (-p) take less"
+             : error.what();
 }
 
 }  // namespace ressort

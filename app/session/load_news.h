@@ -2,6 +2,7 @@
 #pragma once
 
 #include <chrono>
+#include <exception>
 #include <functional>
 #include <string>
 #include <string_view>
@@ -23,5 +24,8 @@ class LoadNews {
   Clock::time_point start_ = Clock::now();
   Clock::time_point next_ = start_ + std::chrono::seconds(1);
 };
+
+// What went wrong, for people: memory has a sentence of its own.
+std::string describe(const std::exception& error);
 
 }  // namespace ressort

@@ -37,12 +37,6 @@ bool may_gain(const Plan& plan) {
 const char* const ending = "the program is ending";
 const char* const replaced = "replaced by a newer load";
 
-std::string describe(const std::exception& error) {
-  return dynamic_cast<const std::bad_alloc*>(&error) != nullptr
-             ? "there is not enough memory; a smaller model or fewer voices (-p) take less"
-             : error.what();
-}
-
 }  // namespace
 
 Session::Session(Process& process, const SessionOptions& options, Tell tell)
@@ -230,7 +224,7 @@ void Session::work() {
       if (!jobs.empty()) {
         do_load(jobs.front());
       } else if (inquiry) {
-        inquiry->work();
+        answer(*inquiry);
       } else if (wants_again) {
         do_again();
       } else if (watch_ && (std::exchange(is_edited_, false) || watch_->has_changed())) {

@@ -235,6 +235,7 @@ class Session {
   void do_load(const Job& job);
   void do_again();
   void inquire(Inquiry inquiry);
+  void answer(const Inquiry& inquiry);
   // What sounds as its files have it, and its numbers as they are.
   Result<Scene> scene_now(const Present& now, const Progress& progress) const;
   Result<KnownModes> modes_now(std::size_t count);

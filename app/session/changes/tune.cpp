@@ -2,6 +2,7 @@
 #include <utility>
 
 #include "app/session/files.h"
+#include "app/session/load_news.h"
 #include "app/session/modes/tuned_files.h"
 #include "app/session/session.h"
 #include "core/model/language/print.h"
@@ -47,6 +48,15 @@ void Session::inquire(Inquiry inquiry) {
     reason = stop_ ? ending : reason;
   }
   inquiry.refuse(Error{reason});
+}
+
+// Whatever happens, who asked is told.
+void Session::answer(const Inquiry& inquiry) {
+  try {
+    inquiry.work();
+  } catch (const std::exception& error) {
+    inquiry.refuse(Error{describe(error)});
+  }
 }
 
 void Session::find_modes(std::size_t count, ModesAnswer answer) {
