@@ -54,8 +54,6 @@ std::vector<double> struck(const Network& network, double seconds) {
 
 TEST_CASE("a structure brought to a note and a decay is heard with both", "[notes_heard]") {
   constexpr std::uint64_t seeds = 24;
-  double most_cents = 0.0;
-  double most_t60 = 0.0;
   for (std::uint64_t seed = 0; seed < seeds; ++seed) {
     Random random(seed + 1);
     const std::string text = random_structure(random, seed % 6);
@@ -93,13 +91,7 @@ TEST_CASE("a structure brought to a note and a decay is heard with both", "[note
       others += show(found.frequency_hz.value) + " Hz " + show(found.t60_s.value) + " s, ";
     }
     INFO(wanted_hz << " Hz, " << wanted_s << " s; heard: " << others);
-    CHECK(off_cents < 0.05);
-    CHECK(off_t60 < 0.005);
-    most_cents = std::max(most_cents, off_cents);
-    most_t60 = std::max(most_t60, off_t60);
+    CHECK(off_cents < 0.005);
+    CHECK(off_t60 < 0.0005);
   }
-  // And another note would be noticed.
-  CHECK(most_cents < 0.05);
-  std::printf("notes heard: at most %.4f cents and %.3f %% of T60 off\n", most_cents,
-              100.0 * most_t60);
 }
