@@ -155,4 +155,9 @@ inline bool is_constant(std::span<const Step> formula) {
                       [](const Step& step) { return step.op == Op::parameter; });
 }
 
+// A formula that is a number is written as one.
+inline Formula folded(Formula formula) {
+  return is_constant(formula) ? Formula{{Op::number, 0, evaluate(formula, {})}} : formula;
+}
+
 }  // namespace ressort

@@ -15,8 +15,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr int most_links = 40;   // as the kernel has it
-constexpr int most_parts = 100;  // left behind by what was killed
+constexpr int most_links = 40;       // as the kernel has it
+constexpr int most_leftovers = 100;  // left behind by what was killed
 
 Error cannot_write(const std::string& path) {
   return {"'" + path + "' cannot be written: " + std::generic_category().message(errno)};
@@ -86,7 +86,7 @@ Result<NewFile> NewFile::open(const std::string& path, Existing existing, bool i
   if (is_shown && !is_there) {
     file.descriptor_ = open_new(name, 0666);
   } else {
-    for (int number = 1; file.descriptor_ < 0 && number <= most_parts; ++number) {
+    for (int number = 1; file.descriptor_ < 0 && number <= most_leftovers; ++number) {
       name = part_of(file.place_, number);
       file.descriptor_ = open_new(name, 0666);
       if (file.descriptor_ < 0 && errno != EEXIST) {

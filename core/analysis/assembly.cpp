@@ -9,13 +9,12 @@
 namespace ressort {
 namespace {
 
-constexpr std::uint32_t held = 0xffffffffu;
 constexpr std::uint64_t most_wandering = 4'000'000;  // terms
 
 class Assembler {
  public:
   explicit Assembler(const Network& network)
-      : network_(network), row_(network.masses.size(), held) {}
+      : network_(network), row_(network.masses.size(), held_row) {}
 
   Assembly make() {
     for (std::uint32_t i = 0; i < network_.masses.size(); ++i) {
@@ -108,7 +107,7 @@ class Assembler {
   }
 
   bool is_held(std::uint32_t mass) const {
-    return network_.masses[mass].kind != MassKind::point && row_[mass] == held;
+    return network_.masses[mass].kind != MassKind::point && row_[mass] == held_row;
   }
 
   void add_end(std::uint32_t mass, double share) {
@@ -117,14 +116,14 @@ class Assembler {
   }
 
   void add(std::uint32_t row, double share) {
-    if (row == held) {
+    if (row == held_row) {
       return;
     }
     if (entry_.size() <= row) {
-      entry_.resize(row_.size(), held);
+      entry_.resize(row_.size(), held_row);
     }
     std::uint32_t& entry = entry_[row];
-    if (entry != held && entry >= first_ && entry < out_.entries.size() &&
+    if (entry != held_row && entry >= first_ && entry < out_.entries.size() &&
         out_.entries[entry].row == row) {
       out_.entries[entry].share += share;
       return;

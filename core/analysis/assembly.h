@@ -16,6 +16,8 @@
 
 namespace ressort {
 
+inline constexpr std::uint32_t held_row = 0xffffffffu;  // of what does not move
+
 // The w of a term, by how its parts grow with a factor on every stiffness: with the factor itself,
 // not at all, and with its root.
 struct Load {

@@ -25,9 +25,9 @@ struct Sum {
   }
 };
 
-class Bound {
+class NetworkBound {
  public:
-  Bound(const Network& network, const ParameterBox& box, double rate_ratio)
+  NetworkBound(const Network& network, const ParameterBox& box, double rate_ratio)
       : network_(network),
         arguments_(argument_ranges(network, box)),
         rate_ratio_(rate_ratio),
@@ -162,7 +162,7 @@ class Bound {
 
 double highest_stiffness_factor(const Network& network, const ParameterBox& box,
                                 double rate_ratio) {
-  return Bound(network, box, rate_ratio).factor();
+  return NetworkBound(network, box, rate_ratio).factor();
 }
 
 }  // namespace ressort

@@ -11,8 +11,6 @@
 namespace ressort {
 namespace {
 
-constexpr std::uint32_t held = std::numeric_limits<std::uint32_t>::max();
-
 // Which rows hang on something that does not move.
 class Anchors {
  public:
@@ -66,7 +64,7 @@ std::optional<std::vector<double>> compliances(const Network& network, const Par
   }
   // What drifts is given a hold of its own, which touches nobody else.
   std::vector<double> diagonal(assembly.masses.size());
-  std::vector<std::uint32_t> row_of(network.masses.size(), held);
+  std::vector<std::uint32_t> row_of(network.masses.size(), held_row);
   for (std::uint32_t row = 0; row < diagonal.size(); ++row) {
     diagonal[row] = anchors.holds(row) ? 0.0 : 1.0;
     row_of[assembly.masses[row]] = row;
@@ -82,7 +80,7 @@ std::optional<std::vector<double>> compliances(const Network& network, const Par
     bool is_held = !is_live_place(network, mass);
     if (is_held) {
       each_share(network, mass, [&](std::uint32_t at, double share) {
-        if (const std::uint32_t row = row_of[at]; row != held) {
+        if (const std::uint32_t row = row_of[at]; row != held_row) {
           push[row] += share;
           is_held = is_held && diagonal[row] == 0.0;
         }

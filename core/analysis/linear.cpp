@@ -205,13 +205,6 @@ void each_element(const SparseMatrix& lower, Use&& use) {
   }
 }
 
-Matrix dense(const SparseMatrix& lower) {
-  const auto size = static_cast<std::size_t>(lower.size());
-  Matrix matrix(size, size);
-  each_element(lower, [&](std::size_t i, std::size_t j, double value) { matrix(i, j) = value; });
-  return matrix;
-}
-
 // Factored without a better row for a small pivot, a matrix that is not positive definite may have
 // lost its digits: whether A x is value x all the same.
 bool is_pair(const SparseMatrix& lower, double value, const Vector& vector, double most) {

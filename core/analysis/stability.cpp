@@ -11,7 +11,7 @@
 namespace ressort {
 namespace {
 
-constexpr double infinity = std::numeric_limits<double>::infinity();
+constexpr double unbounded = std::numeric_limits<double>::infinity();
 constexpr double safe_limit = 4.0 * (1.0 - 1e-9);  // whatever the rounding
 
 }  // namespace
@@ -224,7 +224,7 @@ std::optional<SafeRange> Proofs::safe_range(const ParameterBox& box, std::size_t
     return std::nullopt;
   }
   if (course == Course::flat) {
-    return SafeRange{-infinity, infinity};
+    return SafeRange{-unbounded, unbounded};
   }
   const WeightLine line = [&](double at) {
     return course == Course::straight ? between(at, at) : between(*anchor, at);
@@ -234,7 +234,7 @@ std::optional<SafeRange> Proofs::safe_range(const ParameterBox& box, std::size_t
 }
 
 SafeRange Proofs::range_around(const WeightLine& line, double anchor) {
-  SafeRange range{0.0, infinity};
+  SafeRange range{0.0, unbounded};
   if (const auto boundary = boundary_.is_exact() ? std::nullopt : boundary_.met(line, anchor)) {
     // Masses from there, stiffness up to there; the other side may have another.
     const bool is_lowest = *boundary < anchor;
@@ -242,7 +242,7 @@ SafeRange Proofs::range_around(const WeightLine& line, double anchor) {
     if (boundary_.holds(line(is_lowest ? 1e12 * anchor : 0.0), 4.0)) {
       return range;
     }
-    range = {0.0, infinity};
+    range = {0.0, unbounded};
   }
   if (const auto boundary = boundary_.outwards(line, anchor)) {
     range.highest = boundary->value;
@@ -278,7 +278,7 @@ double Proofs::stiffness_factor(const ParameterBox& box) {
   };
   if (boundary_.holds(line(1.0), 4.0)) {
     const auto boundary = boundary_.outwards(line, 1.0);
-    return boundary ? boundary->value : infinity;
+    return boundary ? boundary->value : unbounded;
   }
   return boundary_.holds(line(0.0), 4.0) ? boundary_.between(line, 0.0, 1.0).value : 0.0;
 }

@@ -14,7 +14,6 @@
 namespace ressort {
 namespace {
 
-constexpr double pi = std::numbers::pi;
 constexpr double ln_1000 = 6.907755278982137;
 constexpr double band_hz = 690.0;         // the lower rate of the first search
 constexpr double twin = 0.15;             // nearer than this share of the damping is the same pole
@@ -48,8 +47,9 @@ class Noise {
     const double alpha = -log_z.real();
     const double omega = log_z.imag();
     const Power& power = power_of(alpha);
-    const double half_width = std::max(
-        {8.0 * pi / static_cast<double>(power.frames()), 2.0 * alpha, 0.02 * omega, 0.002});
+    const double half_width =
+        std::max({8.0 * std::numbers::pi / static_cast<double>(power.frames()), 2.0 * alpha,
+                  0.02 * omega, 0.002});
     return power.density(omega, half_width) / static_cast<double>(channels_);
   }
   // The same of what is between the peaks of the rest.
@@ -233,7 +233,7 @@ class Search {
     const double least = loudest * std::pow(10.0, deepest_db / 10.0);
     const double wanted = chance + static_cast<double>(sound_.size() - 1);
     std::vector<std::pair<double, std::size_t>> unlikely;  // and which
-    const double resolved = 8.0 * pi / static_cast<double>(frames());
+    const double resolved = 8.0 * std::numbers::pi / static_cast<double>(frames());
     const auto are_neighbours = [&](Complex a, Complex b) {
       return std::fabs(a.imag() - b.imag()) < 4.0 * std::max(-a.real(), -b.real()) + resolved;
     };
@@ -281,7 +281,7 @@ class Search {
 };
 
 void search_all(Search& search, double rate_hz) {
-  const double highest = 2.0 * pi * std::min(0.45, highest_mode_hz / rate_hz);
+  const double highest = 2.0 * std::numbers::pi * std::min(0.45, highest_mode_hz / rate_hz);
   const auto decimation = std::size_t{1} << static_cast<unsigned>(
                               std::max(1.0, std::round(std::log2(rate_hz / band_hz))));
   struct Stage {
@@ -371,9 +371,9 @@ Fate fate_of(const Found& found, double rate_hz, std::size_t frames) {
     return Fate::steady;
   }
   const bool is_known = found.deviation.alpha < alpha;
-  const bool rings = is_known && omega > 2.0 * pi * lowest_hz / rate_hz && omega < 0.999 * pi &&
-                     omega > 2.0 * least_quality * alpha &&
-                     omega <= 2.0 * pi * highest_mode_hz / rate_hz;
+  const bool rings = is_known && omega > 2.0 * std::numbers::pi * lowest_hz / rate_hz &&
+                     omega < 0.999 * std::numbers::pi && omega > 2.0 * least_quality * alpha &&
+                     omega <= 2.0 * std::numbers::pi * highest_mode_hz / rate_hz;
   return rings ? Fate::kept : Fate::unfit;
 }
 
@@ -405,7 +405,7 @@ double time_of_impulse(const std::vector<Found>& all, double rate_hz) {
     for (const Found& found : all) {
       for (const Complex c : found.mode.c) {
         // The amplitude counts, not its square, so that it is not the loudest mode alone.
-        const double sine = std::arg(c) + found.mode.log_z.imag() * t + 0.5 * pi;
+        const double sine = std::arg(c) + found.mode.log_z.imag() * t + 0.5 * std::numbers::pi;
         sum += std::abs(c) * std::cos(sine) * std::cos(sine);
         weight += std::abs(c);
       }
@@ -423,7 +423,7 @@ IdentifiedMode measured(const Found& found, double rate_hz, double time_zero) {
   constexpr double last_digit = 2.3e-16;
   const double alpha = -found.mode.log_z.real();
   const double omega = found.mode.log_z.imag();
-  const double hertz = rate_hz / (2.0 * pi);
+  const double hertz = rate_hz / (2.0 * std::numbers::pi);
   IdentifiedMode mode;
   mode.frequency_hz = {omega * hertz,
                        hertz * std::hypot(found.deviation.omega, last_digit * omega)};
@@ -436,7 +436,9 @@ IdentifiedMode measured(const Found& found, double rate_hz, double time_zero) {
     const auto deviation = [&](double pole) { return std::hypot(seen, size * pole * time_zero); };
     mode.amplitude.push_back({size, deviation(found.deviation.alpha)});
     mode.phase_rad.push_back(
-        {std::arg(start), size > 0.0 ? std::min(pi, deviation(found.deviation.omega) / size) : pi});
+        {std::arg(start), size > 0.0
+                              ? std::min(std::numbers::pi, deviation(found.deviation.omega) / size)
+                              : std::numbers::pi});
   }
   return mode;
 }
@@ -450,14 +452,14 @@ std::vector<OctaveResidual> by_octave(const std::vector<std::vector<double>>& so
                                       double rate_hz) {
   const Power whole(sound, sound[0].size());
   const Power left(residual, sound[0].size());
-  const double all = whole.between(0.0, pi);
+  const double all = whole.between(0.0, std::numbers::pi);
   std::vector<OctaveResidual> octaves;
   for (double centre_hz = 31.25; centre_hz < 0.45 * rate_hz && centre_hz < 20000.0;
        centre_hz *= 2.0) {
     OctaveResidual octave{.low_hz = centre_hz / std::numbers::sqrt2,
                           .high_hz = std::min(centre_hz * std::numbers::sqrt2, 0.5 * rate_hz)};
-    const double low = 2.0 * pi * octave.low_hz / rate_hz;
-    const double high = 2.0 * pi * octave.high_hz / rate_hz;
+    const double low = 2.0 * std::numbers::pi * octave.low_hz / rate_hz;
+    const double high = 2.0 * std::numbers::pi * octave.high_hz / rate_hz;
     const double there = whole.between(low, high);
     octave.level_db = decibels(there / all);
     octave.residual_db = decibels(left.between(low, high) / std::max(there, 1e-300));
@@ -539,7 +541,7 @@ Result<Identification> identify(const Recording& recording, const IdentifyOption
       ++steady;
       if (energy_of(found.mode, frames) > steady_energy) {
         steady_energy = energy_of(found.mode, frames);
-        steady_hz = found.mode.log_z.imag() * rate_hz / (2.0 * pi);
+        steady_hz = found.mode.log_z.imag() * rate_hz / (2.0 * std::numbers::pi);
       }
     }
   }

@@ -10,7 +10,6 @@
 namespace ressort {
 namespace {
 
-constexpr double pi = std::numbers::pi;
 constexpr std::size_t taps_per_step = 14;  // of the filter, for each sample that is kept
 constexpr double kaiser_beta = 12.0;       // 118 dB between pass and stop
 constexpr double cutoff = 0.4;             // of the lower rate; what is kept is within 0.25
@@ -46,7 +45,7 @@ std::vector<double> lowpass(std::size_t decimation) {
   double sum = 0.0;
   for (std::size_t n = 0; n < count; ++n) {
     const double t = static_cast<double>(n) - middle;
-    const double x = 2.0 * pi * cutoff / static_cast<double>(decimation) * t;
+    const double x = 2.0 * std::numbers::pi * cutoff / static_cast<double>(decimation) * t;
     const double share = t / middle;
     taps[n] = (t == 0.0 ? 1.0 : std::sin(x) / x) *
               bessel(kaiser_beta * std::sqrt(std::max(0.0, 1.0 - share * share)));
@@ -89,7 +88,8 @@ std::vector<Complex> band_of(const std::vector<double>& sound, const std::vector
       sum += Complex(sum_re[lane], sum_im[lane]);
     }
     // The filter turned with the sound; back to the band's own zero.
-    band.push_back(sum * std::polar(1.0, -std::fmod(centre * static_cast<double>(from), 2.0 * pi)));
+    band.push_back(sum * std::polar(1.0, -std::fmod(centre * static_cast<double>(from),
+                                                    2.0 * std::numbers::pi)));
   }
   return band;
 }
@@ -219,7 +219,7 @@ void find_in(const Candidate& candidate, double loudest, std::size_t decimation,
   for (const Complex z : shift_eigenvalues(basis)) {
     const Complex log_z = std::log(z) / steps;
     const double omega = candidate.centre + log_z.imag();
-    const bool is_kept = std::fabs(log_z.imag()) * steps <= 1.02 * 0.5 * pi &&
+    const bool is_kept = std::fabs(log_z.imag()) * steps <= 1.02 * 0.5 * std::numbers::pi &&
                          -log_z.real() * steps > -1.0 / static_cast<double>(candidate.frames) &&
                          -log_z.real() * steps < most_lost / static_cast<double>(taps_per_step) &&
                          omega > lowest_omega && omega < highest;
@@ -250,7 +250,7 @@ std::vector<Complex> find_poles(std::span<const std::vector<double>> channels,
   std::vector<Candidate> candidates;
   double loudest_energy = 0.0;
   for (std::size_t b = 0; b < decimation; ++b) {
-    const double spacing = pi / static_cast<double>(decimation);
+    const double spacing = std::numbers::pi / static_cast<double>(decimation);
     const double centre = (static_cast<double>(b) + 0.5) * spacing;
     if (centre - 0.5 * spacing >= search.highest_omega) {
       break;

@@ -30,7 +30,7 @@ bool is_place(const Program& program, std::uint32_t node) {
   return !program.taps.empty() && node >= program.taps[0].node;
 }
 
-std::vector<PassiveLink> links_of(const Program& program) {
+std::vector<PassiveLink> passive_links_of(const Program& program) {
   std::vector<PassiveLink> links;
   for (const LinkRun& run : program.link_runs) {
     for (std::uint32_t i = run.first; run.scheme != Scheme::plain && i < run.first + run.count;
@@ -184,7 +184,7 @@ bool holds_places(const Program& program) {
   if (program.taps.empty()) {
     return false;
   }
-  const std::vector<PassiveLink> links = links_of(program);
+  const std::vector<PassiveLink> links = passive_links_of(program);
   return std::any_of(links.begin(), links.end(), [&](const PassiveLink& link) {
     return is_place(program, link.ends.a) || is_place(program, link.ends.b);
   });
@@ -199,7 +199,7 @@ std::vector<std::uint32_t> inverse_masses(const Program& program) {
 }
 
 PassiveTables passive_tables(const Program& program, bool by_links) {
-  std::vector<PassiveLink> links = links_of(program);
+  std::vector<PassiveLink> links = passive_links_of(program);
   Groups groups(program.moving);  // which links move each other, by the masses that they move
   std::vector<std::uint32_t> any(links.size(), no_mass);  // [link] a mass that it moves
   for (std::size_t i = 0; i < links.size(); ++i) {

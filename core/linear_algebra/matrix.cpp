@@ -47,4 +47,17 @@ std::size_t SparseMatrix::find(int wanted, int column) const {
   return static_cast<std::size_t>(std::lower_bound(begin, end, wanted) - row.begin());
 }
 
+Matrix dense(const SparseMatrix& lower) {
+  const auto size = static_cast<std::size_t>(lower.size());
+  Matrix matrix(size, size);
+  for (std::size_t j = 0; j < size; ++j) {
+    for (auto i = static_cast<std::size_t>(lower.first[j]);
+         i < static_cast<std::size_t>(lower.first[j + 1]); ++i) {
+      const auto row = static_cast<std::size_t>(lower.row[i]);
+      matrix(row, j) = matrix(j, row) = lower.value[i];
+    }
+  }
+  return matrix;
+}
+
 }  // namespace ressort

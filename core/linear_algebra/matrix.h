@@ -1,6 +1,7 @@
 // core/linear_algebra: matrices as plain numbers, so that nobody else needs a library's.
 #pragma once
 
+#include <cmath>
 #include <complex>
 #include <cstddef>
 #include <span>
@@ -14,6 +15,14 @@ using ComplexVector = std::valarray<std::complex<double>>;
 
 inline double dot(const Vector& a, const Vector& b) {
   return (a * b).sum();
+}
+
+inline double length(const ComplexVector& a) {
+  double sum = 0.0;
+  for (const std::complex<double>& value : a) {
+    sum += std::norm(value);
+  }
+  return std::sqrt(sum);
 }
 
 // The largest magnitude, 0 of none.
@@ -66,5 +75,8 @@ struct SparseMatrix {
   std::vector<int> row;    // [element]
   std::vector<double> value;
 };
+
+// All of the symmetric matrix. O(size^2)
+Matrix dense(const SparseMatrix& lower);
 
 }  // namespace ressort

@@ -129,10 +129,6 @@ std::optional<Error> differs(const Network& base, const MorphStop& stop) {
   return told("something else is held, driven, heard, or starts elsewhere", {});
 }
 
-Formula folded(Formula formula) {
-  return is_constant(formula) ? Formula{{Op::number, 0, evaluate(formula, {})}} : formula;
-}
-
 Formula combined(Formula a, const Formula& b, Op op) {
   a.insert(a.end(), b.begin(), b.end());
   a.push_back({op});

@@ -99,11 +99,6 @@ void append(Formula& formula, const Formula& part) {
   formula.insert(formula.end(), part.begin(), part.end());
 }
 
-// A formula that is a number is written as one.
-Formula folded(Formula formula) {
-  return is_constant(formula) ? Formula{{Op::number, 0, evaluate(formula, {})}} : formula;
-}
-
 // M ((2 pi f)^2 + (ln 1000 / T60)^2), per sample.
 Formula mode_stiffness(const Formula& mass, const Formula& frequency_hz, const Formula& t60_s) {
   constexpr double turn = 2.0 * std::numbers::pi / Network::reference_rate_hz;

@@ -12,10 +12,6 @@ namespace {
 
 constexpr std::size_t most_rows = 20'000'000;
 
-std::size_t at(int index) {
-  return static_cast<std::size_t>(index);
-}
-
 // Numbers, one after the other, over lines; '#' begins a comment.
 class Numbers {
  public:

@@ -8,15 +8,9 @@
 namespace ressort {
 namespace {
 
-constexpr std::array<std::array<std::size_t, 2>, 6> edges = {
-    {{0, 1}, {1, 2}, {0, 2}, {0, 3}, {1, 3}, {2, 3}}};
 constexpr std::array<std::array<std::size_t, 3>, 4> faces = {
     {{0, 2, 1}, {0, 1, 3}, {1, 2, 3}, {0, 3, 2}}};  // outwards where the volume is positive
 constexpr double flat = 1e-10;                      // of the cube of the longest edge
-
-std::size_t at(int index) {
-  return static_cast<std::size_t>(index);
-}
 
 double six_volumes(const std::vector<Point3>& points, const Tetrahedron& t) {
   const Point3& a = points[at(t[0])];
@@ -37,7 +31,7 @@ Result<SolidMesh> quadratic(const TetrahedronMesh& mesh) {
       }
     }
     double longest = 0.0;
-    for (const auto& edge : edges) {
+    for (const auto& edge : tetrahedron_edges) {
       longest =
           std::max(longest, length(mesh.points[at(t[edge[0]])] - mesh.points[at(t[edge[1]])]));
     }
@@ -76,9 +70,9 @@ Result<SolidMesh> quadratic(const TetrahedronMesh& mesh) {
     QuadraticTetrahedron element{};
     std::copy(t.begin(), t.end(), element.begin());
     solid.elements.push_back(element);
-    for (std::size_t i = 0; i < edges.size(); ++i) {
-      const int a = t[edges[i][0]];
-      const int b = t[edges[i][1]];
+    for (std::size_t i = 0; i < tetrahedron_edges.size(); ++i) {
+      const int a = t[tetrahedron_edges[i][0]];
+      const int b = t[tetrahedron_edges[i][1]];
       middles.push_back({std::min(a, b), std::max(a, b), 6 * e + i});
     }
     for (const auto& face : faces) {
@@ -123,7 +117,8 @@ TetrahedronMesh box_mesh(const Point3& sides, const std::array<int, 3>& cells) {
       }
     }
   }
-  // Six ways from a corner to the opposite one along three edges (Kuhn): neighbours fit.
+  // Six ways from a corner to the opposite one along three tetrahedron_edges (Kuhn): neighbours
+  // fit.
   constexpr std::array<std::array<int, 3>, 6> ways = {
       {{0, 1, 2}, {1, 2, 0}, {2, 0, 1}, {0, 2, 1}, {2, 1, 0}, {1, 0, 2}}};
   const std::array<int, 3> step = {1, nx, nx * ny};
@@ -297,8 +292,8 @@ TetrahedronMesh lying_box_mesh(const LyingBox& box, double unknowns) {
 }
 
 double edge_length(double volume, double unknowns) {
-  // Tetrahedra of equal edges h have h^3 / 8.5; with their middles there are 1.4 nodes to each of
-  // them inside of a large solid, twice as many in one that is all surface.
+  // Tetrahedra of equal tetrahedron_edges h have h^3 / 8.5; with their middles there are 1.4 nodes
+  // to each of them inside of a large solid, twice as many in one that is all surface.
   constexpr double nodes_per_tetrahedron = 1.7;
   return std::cbrt(8.5 * volume * 3.0 * nodes_per_tetrahedron / unknowns);
 }

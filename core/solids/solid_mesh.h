@@ -15,8 +15,10 @@ namespace ressort {
 
 // Four corners.
 using Tetrahedron = std::array<int, 4>;
+inline constexpr std::array<std::array<std::size_t, 2>, 6> tetrahedron_edges = {
+    {{0, 1}, {1, 2}, {0, 2}, {0, 3}, {1, 3}, {2, 3}}};
 
-// Four corners, then the middles of the edges 01, 12, 02, 03, 13, 23, as CalculiX's C3D10 has them.
+// Four corners, then the middles of the edges in their order, as CalculiX's C3D10 has them.
 using QuadraticTetrahedron = std::array<int, 10>;
 
 struct TetrahedronMesh {

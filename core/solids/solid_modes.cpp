@@ -13,10 +13,6 @@ namespace {
 constexpr int rigid_motions = 6;
 constexpr double rigid_share = 1e-6;  // of the shift: an omega^2 below that is a motion as a whole
 
-std::size_t at(int index) {
-  return static_cast<std::size_t>(index);
-}
-
 // y = M x, on three axes and all columns at once: they lie side by side while it works.
 void times_mass(const SparseMatrix& mass, Matrix& columns) {
   const std::size_t rows = columns.rows();
@@ -81,8 +77,6 @@ void times_stiffness(const SolidMatrices& matrices, Matrix& columns) {
 
 // Of the ten nodes at a point of an element, by the four shares L of its corners.
 using Gradients = std::array<Point3, 10>;
-constexpr std::array<std::array<std::size_t, 2>, 6> edges = {
-    {{0, 1}, {1, 2}, {0, 2}, {0, 3}, {1, 3}, {2, 3}}};
 
 Gradients gradients_at(const std::array<Point3, 4>& corner, const std::array<double, 4>& share) {
   Gradients gradients;
@@ -90,7 +84,7 @@ Gradients gradients_at(const std::array<Point3, 4>& corner, const std::array<dou
     gradients[i] = (4.0 * share[i] - 1.0) * corner[i];
   }
   for (std::size_t e = 0; e < 6; ++e) {
-    const auto [i, j] = edges[e];
+    const auto [i, j] = tetrahedron_edges[e];
     gradients[4 + e] = 4.0 * (share[i] * corner[j] + share[j] * corner[i]);
   }
   return gradients;
@@ -99,7 +93,7 @@ Gradients gradients_at(const std::array<Point3, 4>& corner, const std::array<dou
 // int N_a N_b over an element of volume 1: from int L1^a L2^b L3^c L4^d = 6V a!b!c!d!/(a+b+c+d+3)!
 double mass_share(std::size_t a, std::size_t b) {
   const auto touches = [](std::size_t edge, std::size_t corner) {
-    return edges[edge][0] == corner || edges[edge][1] == corner;
+    return tetrahedron_edges[edge][0] == corner || tetrahedron_edges[edge][1] == corner;
   };
   if (a < 4 && b < 4) {
     return (a == b ? 6.0 : 1.0) / 420.0;
@@ -107,8 +101,8 @@ double mass_share(std::size_t a, std::size_t b) {
   if (a < 4 || b < 4) {
     return (touches(std::max(a, b) - 4, std::min(a, b)) ? -4.0 : -6.0) / 420.0;
   }
-  const int common =
-      (touches(a - 4, edges[b - 4][0]) ? 1 : 0) + (touches(a - 4, edges[b - 4][1]) ? 1 : 0);
+  const int common = (touches(a - 4, tetrahedron_edges[b - 4][0]) ? 1 : 0) +
+                     (touches(a - 4, tetrahedron_edges[b - 4][1]) ? 1 : 0);
   return (common == 2 ? 32.0 : common == 1 ? 16.0 : 8.0) / 420.0;
 }
 

@@ -14,10 +14,6 @@ namespace {
 constexpr double weld_share = 1e-6;      // of the solid's size
 constexpr std::size_t shown_edges = 12;  // of those that are open
 
-std::size_t at(int index) {
-  return static_cast<std::size_t>(index);
-}
-
 // Each point the first one that lies so near, by a grid of cells that wide.
 std::vector<int> weld(const std::vector<Point3>& points, double distance) {
   const auto cell_of = [&](const Point3& point, std::size_t axis) {

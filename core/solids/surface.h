@@ -12,6 +12,11 @@
 
 namespace ressort {
 
+// Indices of points are ints, as files have them.
+inline std::size_t at(int index) {
+  return static_cast<std::size_t>(index);
+}
+
 using Point3 = std::array<double, 3>;
 
 inline Point3 operator+(const Point3& a, const Point3& b) {

@@ -54,7 +54,7 @@ std::vector<double> magnitudes(const std::vector<std::vector<double>>& channels,
   return power;
 }
 
-double decibels(double magnitude) {
+double level_db(double magnitude) {
   return 20.0 * std::log10(std::max(magnitude, 1e-15));
 }
 
@@ -75,7 +75,7 @@ std::string curve(const std::vector<double>& bins, double rate_hz, double refere
     }
     const double most = *std::max_element(bins.begin() + static_cast<std::ptrdiff_t>(from),
                                           bins.begin() + static_cast<std::ptrdiff_t>(to));
-    const double db = std::clamp(decibels(most / reference), floor_db, 0.0);
+    const double db = std::clamp(level_db(most / reference), floor_db, 0.0);
     path += "L" + px(left + 0.5 * column) + " " + px(panel.top + panel.height * db / floor_db);
   }
   return "<path d=\"" + path + "L" + px(width - right) + " " + px(panel.bottom()) + "Z\" fill=\"" +
@@ -126,7 +126,7 @@ std::string marks(const Identification& found, std::size_t frames, double refere
         (found.onset_s + found.skipped_s - found.time_zero_s) * found.rate_hz;  // samples
     const double peak = 0.5 * std::sqrt(square) * std::exp(-alpha * since) *
                         -std::expm1(-alpha * static_cast<double>(frames)) / -std::expm1(-alpha);
-    const double db = std::clamp(decibels(peak / reference), floor_db, 0.0);
+    const double db = std::clamp(level_db(peak / reference), floor_db, 0.0);
     svg += "<circle cx=\"" + px(panel.x_of(mode.frequency_hz.value)) + "\" cy=\"" +
            px(panel.top + panel.height * db / floor_db) + "\" r=\"3.2\" fill=\"none\" stroke=\"" +
            mode_ink + "\" stroke-width=\"1.3\"/>\n";

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstdio>
 
+#include "app/commands/svg.h"
 #include "app/text.h"
 
 namespace ressort {
@@ -17,10 +18,6 @@ constexpr double cell = 240.0;    // of one mode, in pixels
 constexpr double caption = 26.0;  // below it
 constexpr double bend = 0.09;     // of the solid's size: the farthest that it is drawn bent
 constexpr double filled = 0.86;   // of the cell
-
-std::size_t at(int index) {
-  return static_cast<std::size_t>(index);
-}
 
 // From light yellow, which stays, through orange to violet (after "magma", reversed).
 std::string colour(double share) {
@@ -54,14 +51,6 @@ struct Patch {
   std::array<double, 6> corners;  // x, y in pixels
   double share;
 };
-
-std::string escaped(const std::string& text) {
-  std::string safe;
-  for (const char c : text) {
-    safe += c == '<' ? "&lt;" : c == '&' ? "&amp;" : std::string(1, c);
-  }
-  return safe;
-}
 
 }  // namespace
 

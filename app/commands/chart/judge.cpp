@@ -10,8 +10,6 @@
 namespace ressort {
 namespace {
 
-constexpr double rate_hz = Network::reference_rate_hz;
-constexpr double unknown = std::numeric_limits<double>::quiet_NaN();
 constexpr double exact_db = 400.0;         // what cannot be told from exact
 constexpr double trusted_db = 60.0;        // a reference agrees with itself
 constexpr double heard_share = 1e-6;       // of the peak: the sound has begun
@@ -32,7 +30,7 @@ double stress_length_s(const ChartScene& scene) {
 }
 
 std::size_t frames_of(double seconds) {
-  return static_cast<std::size_t>(std::lround(seconds * rate_hz));
+  return static_cast<std::size_t>(std::lround(seconds * scene_rate_hz));
 }
 
 Way direct_at(unsigned times) {
@@ -115,7 +113,7 @@ void play_reference(const Program& program, PartInputs inputs, Waves& waves,
   std::vector<double> x;
   std::vector<double> v;
   for (std::size_t n = 0; n < waves[0].size(); ++n) {
-    inputs.move_to(static_cast<double>(n + 1) / rate_hz);
+    inputs.move_to(static_cast<double>(n + 1) / scene_rate_hz);
     book.step(inputs.value, inputs.velocity);
     const std::vector<double> outputs = book.outputs();
     for (std::size_t i = 0; i < outputs.size(); ++i) {
@@ -136,7 +134,7 @@ void play_reference(const Program& program, PartInputs inputs, Waves& waves,
 }
 
 Reference published(const ChartScene& scene) {
-  const Machine machine = make_machine(scene.network, rate_hz, true);
+  const Machine machine = make_machine(scene.network, scene_rate_hz, true);
   Reference reference{.waves = Waves(machine.channels, std::vector<double>(frames_of(heard_s))),
                       .how = "long double"};
   reference.floor_db.fill(exact_db);
@@ -162,7 +160,7 @@ Reference exact(const ChartScene& scene, const Continuous& continuous) {
     reference.waves[static_cast<std::size_t>(scene.network.outputs[o].number - 1)] =
         continuous.play(o, frames, 1.0);
   }
-  const Machine machine = make_machine(scene.network, rate_hz, true);
+  const Machine machine = make_machine(scene.network, scene_rate_hz, true);
   for (const Program& program : machine.parts) {
     reference.energy +=
         energy_of(program, program.position, program.velocity, program.velocity).total;
@@ -262,7 +260,7 @@ Waves render_way(MadeWay& way, std::size_t frames) {
 }
 
 std::optional<EnergyReading> watch_energy(const ChartScene& scene, MadeWay& way, double seconds) {
-  const Machine machine = make_machine(scene.network, rate_hz, true);
+  const Machine machine = make_machine(scene.network, scene_rate_hz, true);
   std::vector<const Program*> programs;
   for (const Program& program : machine.parts) {
     if (program.moving > 0) {
@@ -341,7 +339,7 @@ Judged judge(const ChartScene& scene, const References& references, const Poles&
     poles = way.way.precision == Precision::float64 ? poles_of(scene, *references.continuous, way)
                                                     : Poles();
     for (const ContinuousMode& mode : references.continuous->modes) {
-      right.push_back(mode.pole * rate_hz);
+      right.push_back(mode.pole * scene_rate_hz);
     }
   }
   judged.identical = beside(scene, references.identical, references, published_poles,

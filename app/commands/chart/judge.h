@@ -6,6 +6,7 @@
 #pragma once
 
 #include <array>
+#include <limits>
 #include <optional>
 #include <string>
 #include <vector>
@@ -18,6 +19,7 @@ namespace ressort {
 inline constexpr std::array<double, 3> chart_windows_s = {0.005, 0.05, 1.0};
 inline constexpr double heard_s = 1.0;    // how long everything is played
 inline constexpr double energy_s = 0.25;  // how long energy is watched
+inline constexpr double unknown = std::numeric_limits<double>::quiet_NaN();
 
 // [channel][sample]
 using Waves = std::vector<std::vector<double>>;

@@ -11,8 +11,6 @@
 namespace ressort {
 namespace {
 
-constexpr double rate_hz = Network::reference_rate_hz;
-constexpr double unknown = std::numeric_limits<double>::quiet_NaN();
 constexpr std::size_t most_mapped = 128;  // states, where partials do not swing alone
 
 // Which mass of the network a node is: the same machine once more, with the masses' numbers for
@@ -213,7 +211,7 @@ Poles poles_of(const ChartScene& scene, const Continuous& continuous, MadeWay& w
   if (!placer.fits_machine()) {
     return {};
   }
-  const double machine_rate_hz = rate_hz * way.way.oversampling;
+  const double machine_rate_hz = scene_rate_hz * way.way.oversampling;
   Poles all;
   if (!continuous.is_proportional && placer.states() <= most_mapped) {
     all = map_states(way, placer);

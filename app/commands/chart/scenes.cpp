@@ -15,7 +15,6 @@
 namespace ressort {
 namespace {
 
-constexpr double rate_hz = Network::reference_rate_hz;
 constexpr double velocity = 0.8;      // of the note
 constexpr double blow = 0.01;         // per sample: x[-1] = x[0] - blow
 constexpr double bow_start_s = 0.01;  // a bow's speed is reached as by a one-pole filter
@@ -106,12 +105,12 @@ InputMotion motion_of(const ControlSetting& control, double middle) {
   const double value = value_of(control);
   switch (control.gesture) {
     case Gesture::pluck:
-      return [=, travel = control.travel, speed = std::fabs(value) * rate_hz](double t) {
+      return [=, travel = control.travel, speed = std::fabs(value) * scene_rate_hz](double t) {
         return middle - travel + std::min(2.0 * travel, speed * t);
       };
     case Gesture::bow:
       return [=](double t) {
-        return middle + value * rate_hz * (t + bow_start_s * std::expm1(-t / bow_start_s));
+        return middle + value * scene_rate_hz * (t + bow_start_s * std::expm1(-t / bow_start_s));
       };
     default: {
       const double there = control.gesture == Gesture::hold ? control.high : value;
@@ -135,7 +134,7 @@ void strike(ChartScene& scene, std::uint32_t mass) {
   Mass& struck = scene.network.masses[mass];
   struck.third = scene.network.third == ThirdArgument::delayed_position
                      ? struck.position - blow
-                     : struck.third + blow * rate_hz;
+                     : struck.third + blow * scene_rate_hz;
   scene.about = "an impulse at one mass, x[-1] = x[0] - 0.01";
 }
 

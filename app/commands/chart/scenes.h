@@ -1,6 +1,5 @@
-// app/commands: what the chart is drawn of. A scene is a network and what drives its inputs,
-// told in seconds, so
-// that it is the same at every rate.
+// app/commands: what the chart is drawn of. A scene is a network and what drives its inputs, told
+// in seconds, so that it is the same at every rate.
 #pragma once
 
 #include <functional>
@@ -12,6 +11,9 @@
 #include "core/result.h"
 
 namespace ressort {
+
+// The rate that scenes' numbers are written for.
+inline constexpr double scene_rate_hz = Network::reference_rate_hz;
 
 // Where an input is at a time in seconds.
 using InputMotion = std::function<double(double)>;

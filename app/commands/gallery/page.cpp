@@ -171,7 +171,7 @@ std::string signed_fixed(double number, int digits) {
   return (is_zero ? "" : number < 0.0 ? "\u2212" : "+") + text;
 }
 
-std::string decibels(double db) {
+std::string level_text(double db) {
   return db <= silence_db ? "silent" : fixed(db, 1);
 }
 
@@ -189,9 +189,9 @@ struct FigureColumn {
 
 constexpr FigureColumn figure_columns[] = {
     {"peak", "dBFS", "of the phrase, before the limiter",
-     [](const PresetFigures& f) { return decibels(f.peak_dbfs); }},
+     [](const PresetFigures& f) { return level_text(f.peak_dbfs); }},
     {"loudness", "LUFS", "of the phrase, integrated, by ITU-R BS.1770",
-     [](const PresetFigures& f) { return decibels(f.loudness_lufs); }},
+     [](const PresetFigures& f) { return level_text(f.loudness_lufs); }},
     {"attack", "ms", "of the note, until its level is within 6 dB of the highest",
      [](const PresetFigures& f) { return or_dash(f.attack_ms, 0); }},
     {"T60 held", "s", "of the note while its key is down; \u2013: it does not fall by 3 dB",
@@ -200,7 +200,7 @@ constexpr FigureColumn figure_columns[] = {
      [](const PresetFigures& f) { return or_dash(f.released_t60_s, 2); }},
     {"DC", "dBFS",
      "mean of the last second of the phrase, under a Hann window, of the worse channel",
-     [](const PresetFigures& f) { return decibels(f.dc_dbfs); }},
+     [](const PresetFigures& f) { return level_text(f.dc_dbfs); }},
     {"stereo", "1", "correlation of both channels; 1: they are the same",
      [](const PresetFigures& f) { return f.stereo ? fixed(f.stereo->correlation, 2) : "\u2013"; }},
     {"mono", "dB", "what is lost where both channels become one",

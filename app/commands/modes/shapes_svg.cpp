@@ -6,6 +6,7 @@
 #include <utility>
 #include <vector>
 
+#include "app/commands/svg.h"
 #include "app/session/modes/known_modes.h"
 #include "app/text.h"
 #include "core/analysis/modes/layout.h"
@@ -15,7 +16,7 @@ namespace {
 
 constexpr double panel_width = 260.0;
 constexpr double panel_height = 190.0;
-constexpr double caption = 26.0;
+constexpr double caption_height = 26.0;
 constexpr double margin = 14.0;
 constexpr std::size_t columns = 4;
 constexpr std::size_t most_dots = 900;  // of a panel
@@ -52,7 +53,7 @@ class PanelDrawer {
 
   std::string plane() const {
     const double width = panel_width - 2.0 * margin;
-    const double height = panel_height - caption - 2.0 * margin;
+    const double height = panel_height - caption_height - 2.0 * margin;
     const double scale =
         std::min(width / std::max(1.0, right_ - left_), height / std::max(1.0, high_ - low_));
     const std::size_t too_many = dots_ / most_dots;
@@ -86,7 +87,7 @@ class PanelDrawer {
   // A row below the other, each over all the width.
   std::string lines() const {
     const auto rows = static_cast<double>(layout_.rows.size());
-    const double height = (panel_height - caption - margin) / rows;
+    const double height = (panel_height - caption_height - margin) / rows;
     std::string svg;
     for (std::size_t r = 0; r < layout_.rows.size(); ++r) {
       const std::vector<LayoutPoint>& row = layout_.rows[r];
@@ -122,14 +123,6 @@ class PanelDrawer {
   double most_ = 0.0;
   std::size_t dots_ = 0;
 };
-
-std::string escaped(const std::string& text) {
-  std::string out;
-  for (const char c : text) {
-    out += c == '&' ? "&amp;" : c == '<' ? "&lt;" : std::string(1, c);
-  }
-  return out;
-}
 
 }  // namespace
 

@@ -14,7 +14,7 @@ namespace {
 
 constexpr std::size_t block_frames = 4096;
 constexpr double quietest_share = 1e-3;       // of the loudest frame; what is less is not counted
-constexpr double longest_ring_s = 60.0;       // of modes
+constexpr double longest_modal_s = 60.0;      // of modes
 constexpr long long most_frames = 4'000'000;  // eleven hours at 48 kHz, and 1.4 GB
 constexpr double envelope_rate_hz = 1000.0;
 
@@ -309,7 +309,7 @@ Result<Description> describe_modes(const NetworkModes& modes, const DescriptionO
     return std::sqrt(sum);
   };
   const auto first_at = static_cast<std::size_t>(options.at.value_or(0));
-  const auto longest = static_cast<std::size_t>(longest_ring_s * modes.rate_hz);
+  const auto longest = static_cast<std::size_t>(longest_modal_s * modes.rate_hz);
   double first_rms = 0.0;
   double loudest = 0.0;
   std::vector<double> before;

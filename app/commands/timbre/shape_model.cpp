@@ -85,7 +85,7 @@ Result<Liked> liked(const std::string& path, const Progress& progress,
   return like;
 }
 
-json number(std::optional<double> value) {
+json figure_json(std::optional<double> value) {
   return value && std::isfinite(*value) ? json(*value) : json();
 }
 
@@ -95,9 +95,9 @@ json to_json(const Shaped& shaped, const std::vector<double>& before, double rat
   for (const AskedFigureRow& row : asked_figure_rows()) {
     const auto index = static_cast<std::size_t>(row.figure);
     json& figure = figures[std::string(row.name)];
-    figure = {{"before", number(shaped.found.before[index])},
+    figure = {{"before", figure_json(shaped.found.before[index])},
               {"asked", json()},
-              {"reached", number(shaped.found.reached[index])},
+              {"reached", figure_json(shaped.found.reached[index])},
               {"off_jnd", json()}};
     for (std::size_t t = 0; t < shaped.targets.size(); ++t) {
       if (shaped.targets[t].figure == row.figure) {

@@ -13,7 +13,7 @@ namespace {
 
 constexpr double panel_width = 380.0;
 constexpr double panel_height = 190.0;
-constexpr double left = 66.0;
+constexpr double left_margin = 66.0;
 constexpr double top = 58.0;
 constexpr double between_x = 84.0;
 constexpr double between_y = 62.0;
@@ -111,14 +111,17 @@ class SweepDrawer {
   std::string draw() const {
     const std::size_t columns = panels_.size() > 1 ? 2 : 1;
     const std::size_t rows = (panels_.size() + columns - 1) / columns;
-    const double width = left + static_cast<double>(columns) * (panel_width + between_x) - 60.0;
+    const double width =
+        left_margin + static_cast<double>(columns) * (panel_width + between_x) - 60.0;
     const double height = top + static_cast<double>(rows) * (panel_height + between_y);
     std::string svg = svg_head(width, height, 11.0) +
                       "<rect width=\"100%\" height=\"100%\" fill=\"#fff\"/>\n<text x=\"" +
-                      px(left) + "\" y=\"20\" font-size=\"14\">" + escaped(title()) + "</text>\n";
+                      px(left_margin) + "\" y=\"20\" font-size=\"14\">" + escaped(title()) +
+                      "</text>\n";
     for (std::size_t i = 0; i < panels_.size(); ++i) {
       const std::size_t row = i / columns;
-      svg += panel(panels_[i], left + static_cast<double>(i % columns) * (panel_width + between_x),
+      svg += panel(panels_[i],
+                   left_margin + static_cast<double>(i % columns) * (panel_width + between_x),
                    top + static_cast<double>(row) * (panel_height + between_y));
     }
     return svg + "</svg>\n";

@@ -12,7 +12,7 @@ namespace {
 
 constexpr double tags_per_second = 4294967296.0;  // an NTP time counts 2^-32 s from 1900 on
 constexpr std::uint64_t ntp_to_unix_s = 2208988800;
-constexpr std::int64_t second_ns = 1'000'000'000;
+constexpr std::int64_t one_second_ns = 1'000'000'000;
 constexpr std::int64_t clock_step_ns = 5'000'000;
 constexpr double max_anchor_error_s = 0.01;
 constexpr double anchor_life_s = 10.0;  // without use
@@ -29,7 +29,7 @@ std::int64_t wall_offset_ns() {
     const std::int64_t took = monotonic_ns() - before;
     if (took < closest) {
       closest = took;
-      offset = wall.tv_sec * second_ns + wall.tv_nsec - (before + took / 2);
+      offset = wall.tv_sec * one_second_ns + wall.tv_nsec - (before + took / 2);
     }
   }
   return offset;
@@ -53,8 +53,8 @@ void TagClock::follow_wall_clock() {
 
 std::uint64_t TagClock::now(const ClockReading& clock) const {
   const auto wall_ns = static_cast<std::uint64_t>(clock.time_ns + offset_ns_);
-  const std::uint64_t fraction_ns = wall_ns % second_ns;
-  return ((wall_ns / second_ns + ntp_to_unix_s) << 32) + (fraction_ns << 32) / second_ns;
+  const std::uint64_t fraction_ns = wall_ns % one_second_ns;
+  return ((wall_ns / one_second_ns + ntp_to_unix_s) << 32) + (fraction_ns << 32) / one_second_ns;
 }
 
 std::int64_t TagClock::frame(std::uint64_t tag, const ClockReading& clock) {

@@ -11,8 +11,6 @@
 namespace ressort {
 namespace {
 
-constexpr std::uint32_t held = 0xffffffffu;
-
 class SystemMaker {
  public:
   SystemMaker(const Network& network, double step, bool is_sampled, double key_factor)
@@ -20,7 +18,7 @@ class SystemMaker {
         step_(step),
         is_sampled_(is_sampled),
         key_factor_(key_factor),
-        row_(network.masses.size(), held) {}
+        row_(network.masses.size(), held_row) {}
 
   LinearSystem make() {
     const Assembly assembly = assemble(network_);
@@ -80,7 +78,7 @@ class SystemMaker {
 
   void add(ModalPort::Shares& shares, std::uint32_t mass, double factor) const {
     each_share(network_, mass, [&](std::uint32_t node, double share) {
-      if (row_[node] != held) {
+      if (row_[node] != held_row) {
         shares.emplace_back(row_[node], factor * share / made_.root[row_[node]]);
       }
     });

@@ -41,14 +41,6 @@ ComplexVector left_of(const SparseMatrix& stiffness, const SparseMatrix& damping
   return left;
 }
 
-double length(const ComplexVector& a) {
-  double sum = 0.0;
-  for (const Complex& value : a) {
-    sum += std::norm(value);
-  }
-  return std::sqrt(sum);
-}
-
 class LowestSwings {
  public:
   LowestSwings(const SparseMatrix& stiffness, const SparseMatrix& damping, double e, double rigid,

@@ -15,20 +15,7 @@ namespace {
 
 using Complex = std::complex<double>;
 
-constexpr double rigid = 1e-13;  // of the largest stiffness: what is below is rounding
-
-Matrix dense(const SparseMatrix& lower) {
-  const auto size = static_cast<std::size_t>(lower.size());
-  Matrix matrix(size, size);
-  for (std::size_t j = 0; j < size; ++j) {
-    for (auto i = static_cast<std::size_t>(lower.first[j]);
-         i < static_cast<std::size_t>(lower.first[j + 1]); ++i) {
-      const auto row = static_cast<std::size_t>(lower.row[i]);
-      matrix(row, j) = matrix(j, row) = lower.value[i];
-    }
-  }
-  return matrix;
-}
+constexpr double rounding = 1e-13;  // of the largest stiffness: what is below is rounding
 
 // What is heard and pushed of swings.
 NetworkMode mode_of(Swing swing, const LinearSystem& system, const ModeOptions& options) {
@@ -84,7 +71,7 @@ Complex speed_of(Complex mu, ModeScheme scheme) {
 double rigid_below(const SparseMatrix& stiffness) {
   double most = 0.0;
   for (const double value : stiffness.value) {
-    most = std::max(most, rigid * std::fabs(value));
+    most = std::max(most, rounding * std::fabs(value));
   }
   return most;
 }

@@ -13,16 +13,16 @@
 namespace ressort {
 namespace {
 
-constexpr std::size_t node_count = 9;  // between two stops
-constexpr double even_enough = 1e-4;   // of a T60
-using Nodes = std::array<double, node_count>;
+constexpr std::size_t chebyshev_count = 9;  // between two stops
+constexpr double even_enough = 1e-4;        // of a T60
+using Nodes = std::array<double, chebyshev_count>;
 
 // Chebyshev's, so that a polynomial does not swing between them.
 Nodes make_nodes() {
   Nodes nodes{};
-  for (std::size_t i = 0; i < node_count; ++i) {
+  for (std::size_t i = 0; i < chebyshev_count; ++i) {
     const double angle =
-        std::numbers::pi * (2.0 * static_cast<double>(i) + 1.0) / (2.0 * node_count);
+        std::numbers::pi * (2.0 * static_cast<double>(i) + 1.0) / (2.0 * chebyshev_count);
     nodes[i] = 0.5 * (1.0 - std::cos(angle));
   }
   return nodes;
@@ -30,8 +30,8 @@ Nodes make_nodes() {
 
 // The coefficients of Newton's form: c0 + (x - x0) (c1 + (x - x1) (c2 + ...)).
 Nodes divided_differences(const Nodes& x, Nodes y) {
-  for (std::size_t order = 1; order < node_count; ++order) {
-    for (std::size_t i = node_count - 1; i >= order; --i) {
+  for (std::size_t order = 1; order < chebyshev_count; ++order) {
+    for (std::size_t i = chebyshev_count - 1; i >= order; --i) {
       y[i] = (y[i] - y[i - 1]) / (x[i] - x[i - order]);
     }
   }
@@ -58,7 +58,7 @@ class DecayEvener {
     for (std::size_t leg = 1; leg < morph_.stops; ++leg) {
       const std::optional<double> after = log_damping(static_cast<double>(leg + 1));
       Nodes missing{};
-      for (std::size_t i = 0; i < node_count; ++i) {
+      for (std::size_t i = 0; i < chebyshev_count; ++i) {
         const double w = nodes[i];
         const auto here = log_damping(static_cast<double>(leg) + w);
         if (!before || !after || !here) {
@@ -94,8 +94,8 @@ class DecayEvener {
                      {Op::number, 0, 1.0},
                      {Op::clamp}});
     };
-    push(sum, {{Op::number, 0, coefficients[node_count - 1]}});
-    for (std::size_t i = node_count - 1; i-- > 0;) {
+    push(sum, {{Op::number, 0, coefficients[chebyshev_count - 1]}});
+    for (std::size_t i = chebyshev_count - 1; i-- > 0;) {
       push_way(sum);
       push(sum, {{Op::number, 0, nodes[i]},
                  {Op::subtract},

@@ -11,10 +11,10 @@ namespace {
 
 using Complex = std::complex<double>;
 
-constexpr double alike = 1e-6;    // by how much squares of poles differ that are nearly one
-constexpr double unheard = 1e-6;  // of the loudest: such a mode keeps its shape
+constexpr double nearly_alike = 1e-6;  // by how much squares of poles differ that are nearly one
+constexpr double unheard = 1e-6;       // of the loudest: such a mode keeps its shape
 
-double dot(const double* a, const double* b, std::size_t size) {
+double inner_product(const double* a, const double* b, std::size_t size) {
   double sum = 0.0;
   for (std::size_t i = 0; i < size; ++i) {
     sum += a[i] * b[i];
@@ -47,8 +47,8 @@ class Pulled {
   void take(const double* shape) {
     multiply(stiffness_, shape, pulled.data());
     multiply(damping_, shape, rubbed.data());
-    k = dot(shape, pulled.data(), pulled.size());
-    z = dot(shape, rubbed.data(), rubbed.size());
+    k = inner_product(shape, pulled.data(), pulled.size());
+    z = inner_product(shape, rubbed.data(), rubbed.size());
   }
 
   // Is the shape one of their eigenvectors, but for rounding?
@@ -212,7 +212,7 @@ Complex NearbyModes::apart(Complex mu, std::size_t other) const {
 }
 
 bool NearbyModes::is_alike(Complex mu, std::size_t other) const {
-  return std::abs(apart(mu, other)) <= alike * std::norm(mu);
+  return std::abs(apart(mu, other)) <= nearly_alike * std::norm(mu);
 }
 
 NearbyModes::Answer NearbyModes::answer_of(const ModalPort& port) const {
@@ -272,8 +272,8 @@ std::optional<std::vector<HeardMode>> NearbyModes::nearly(const LinearSystem& sy
     }
     if (loud < loud_.size() && loud_[loud] == i) {
       const auto force = [&](const double* along_row) {
-        return (1.0 + e_ * *mu) * dot(along_row, pulled.pulled.data(), rows) +
-               *mu * dot(along_row, pulled.rubbed.data(), rows);
+        return (1.0 + e_ * *mu) * inner_product(along_row, pulled.pulled.data(), rows) +
+               *mu * inner_product(along_row, pulled.rubbed.data(), rows);
       };
       for (; next != alike_.end() && next->loud == loud; ++next) {
         if (std::abs(force(shape(next->other))) > pulled.most_pulled + pulled.most_rubbed) {

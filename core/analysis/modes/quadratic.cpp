@@ -26,14 +26,6 @@ Complex form(const ComplexVector& a, const Matrix& matrix, const ComplexVector& 
   return sum;
 }
 
-double length(const ComplexVector& a) {
-  double sum = 0.0;
-  for (const Complex& value : a) {
-    sum += std::norm(value);
-  }
-  return std::sqrt(sum);
-}
-
 // What a matrix makes of the shapes: their eigenvalues, if nothing else is left of each.
 std::optional<Vector> eigenvalues_in(const Matrix& matrix, const Matrix& basis, double most_left) {
   const Matrix pulled = product(matrix, basis);

@@ -12,11 +12,11 @@
 namespace ressort {
 namespace {
 
-constexpr double near_enough = 0.01;  // of what is noticed
-constexpr double little = 1e-5;       // of a range, for differences
-constexpr double still = 1e-9;        // of a range: a step that is none
-constexpr double no_slope = 1e-6;     // what is noticed over a whole range
-constexpr double crawling = 0.98;     // of the cost is left by a step that is hardly one
+constexpr double unnoticed = 0.01;  // of what is noticed
+constexpr double little = 1e-5;     // of a range, for differences
+constexpr double still = 1e-9;      // of a range: a step that is none
+constexpr double no_slope = 1e-6;   // what is noticed over a whole range
+constexpr double crawling = 0.98;   // of the cost is left by a step that is hardly one
 constexpr double least_damping = 1e-9;
 constexpr int most_crawls = 3;
 constexpr double hopeful = 5.0;       // of what is noticed
@@ -24,7 +24,7 @@ constexpr double same_end = 1e-3;     // of a range
 constexpr std::size_t most_far = 4;   // ends that are not hopeful
 constexpr double farthest_hop = 0.1;  // of a range
 constexpr int most_hops = 4;          // of one start
-constexpr int most_steps = 60;
+constexpr int most_turns = 60;
 constexpr int most_tries = 8;        // of one step, each shorter
 constexpr int most_stale_tries = 2;  // with slopes of another place
 constexpr double well_told = 0.25;   // of the cost is left by a step whose slopes were right
@@ -60,7 +60,7 @@ class Asker {
       }
       return most;
     }
-    bool is_there() const { return worst() <= near_enough; }
+    bool is_there() const { return worst() <= unnoticed; }
   };
 
   std::vector<double> values_at(const Place& place) const {
@@ -166,7 +166,7 @@ class Asker {
     Descent down;
     bool is_new = false;
     bool is_wanted = true;
-    for (int step = 0; step < most_steps && !at.is_there(); ++step) {
+    for (int step = 0; step < most_turns && !at.is_there(); ++step) {
       if (is_wanted) {
         down = descent(at);
         is_new = true;

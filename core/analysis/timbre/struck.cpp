@@ -14,8 +14,8 @@
 namespace ressort {
 namespace {
 
-constexpr double quietest_share = 1e-3;  // of the loudest mode: what is less is no pitch
-constexpr double in_tune = 1e-9;         // of a frequency
+constexpr double least_residue = 1e-3;  // of the loudest mode: what is less is no pitch
+constexpr double in_tune = 1e-9;        // of a frequency
 constexpr int most_tunings = 12;
 constexpr double longest_attack_s = 3.0;  // what comes later is not waited for
 constexpr std::size_t coarse_step = 8;    // samples
@@ -367,7 +367,7 @@ Result<AskedValues> StruckModel::figures_of(const Tuned& tuned, StruckAs how) co
   }
   const auto heard = std::find_if(
       partials.begin(), partials.end(),
-      [&](const DecayingPartial& partial) { return partial.residue > quietest_share * loudest; });
+      [&](const DecayingPartial& partial) { return partial.residue > least_residue * loudest; });
   const std::size_t pitch =
       options_.key_hz ? options_.pitch_mode : static_cast<std::size_t>(heard - partials.begin());
   AskedValues values;

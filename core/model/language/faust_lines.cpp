@@ -10,7 +10,8 @@
 namespace ressort {
 namespace {
 
-constexpr std::string_view functions[] = {"sqrt", "abs", "sin", "cos", "exp", "pow", "min", "max"};
+constexpr std::string_view faust_functions[] = {"sqrt", "abs", "sin", "cos",
+                                                "exp",  "pow", "min", "max"};
 constexpr std::string_view elements[] = {
     "mass",           "ground",    "port",         "resonators",        "link",
     "touch",          "pluck",     "waveguide",    "termination",       "junction",
@@ -18,11 +19,11 @@ constexpr std::string_view elements[] = {
     "massCA",         "linkCA",    "BUT",          "display",           "softeninglink",
     "stiffeninglink", "audioout",  "controladjust"};
 
-bool is_blank(char c) {
+bool is_space(char c) {
   return c == ' ' || c == '\t' || c == '\v' || c == '\f';
 }
 
-bool is_letter(char c) {
+bool is_of_a_name(char c) {
   return std::isalnum(static_cast<unsigned char>(c)) != 0 || c == '_';
 }
 
@@ -59,7 +60,7 @@ std::size_t closing(std::string_view text) {
 }  // namespace
 
 std::size_t word_length(std::string_view text) {
-  return static_cast<std::size_t>(std::find_if_not(text.begin(), text.end(), is_letter) -
+  return static_cast<std::size_t>(std::find_if_not(text.begin(), text.end(), is_of_a_name) -
                                   text.begin());
 }
 
@@ -80,10 +81,10 @@ std::size_t number_length(std::string_view text) {
 }
 
 Token trimmed(Token token) {
-  while (!token.text.empty() && is_blank(token.text.front())) {
+  while (!token.text.empty() && is_space(token.text.front())) {
     token = behind(token, 1);
   }
-  while (!token.text.empty() && is_blank(token.text.back())) {
+  while (!token.text.empty() && is_space(token.text.back())) {
     token.text.remove_suffix(1);
   }
   return token;
@@ -271,7 +272,8 @@ void FaustLines::read_definition(const Origin& origin, const Token& rest) {
                  "name=hslider(\"label\",start,least,most,step); or name=number;");
   }
   if (name.text == "fs" || name.text == "PI" || name.text == "clamp" ||
-      std::find(std::begin(functions), std::end(functions), name.text) != std::end(functions)) {
+      std::find(std::begin(faust_functions), std::end(faust_functions), name.text) !=
+          std::end(faust_functions)) {
     return error(origin, name, quoted(name.text) + " has a meaning already");
   }
   const auto [found, is_new] = lines_.try_emplace(std::string(name.text));
@@ -327,7 +329,7 @@ std::string FaustLines::expression(const Origin& line, const Token& token, int d
     if (std::isdigit(static_cast<unsigned char>(c)) != 0 || c == '.') {
       length = number_length(rest.text);
       text += rest.text.substr(0, length);
-    } else if (is_letter(c)) {
+    } else if (is_of_a_name(c)) {
       length = word_length(rest.text);
       const Token word{rest.text.substr(0, length), rest.column};
       const Token next = trimmed(behind(rest, length));
@@ -339,8 +341,8 @@ std::string FaustLines::expression(const Origin& line, const Token& token, int d
         text += "44100";
       } else if (word.text == "PI") {
         text += "3.141592653589793";
-      } else if (std::find(std::begin(functions), std::end(functions), word.text) !=
-                 std::end(functions)) {
+      } else if (std::find(std::begin(faust_functions), std::end(faust_functions), word.text) !=
+                 std::end(faust_functions)) {
         text += word.text;
       } else if (lines_.contains(std::string(word.text))) {
         text += "(" + named(line, word, depth) + ")";
@@ -362,7 +364,7 @@ std::string FaustLines::expression(const Origin& line, const Token& token, int d
       }
     } else if (c == ':' && trimmed(behind(rest, 1)).text.starts_with("float")) {
       length = static_cast<std::size_t>(trimmed(behind(rest, 1)).column - rest.column) + 5;
-    } else if (is_blank(c) || std::string_view("+-*/,").find(c) != std::string_view::npos) {
+    } else if (is_space(c) || std::string_view("+-*/,").find(c) != std::string_view::npos) {
       text += c;
     } else {
       error(line, {rest.text.substr(0, 1), rest.column},
