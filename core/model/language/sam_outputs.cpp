@@ -79,25 +79,29 @@ std::optional<SamHeard> SamTeller::factor(const SamElement& out, Token& rest, in
 }
 
 std::optional<SamHeard> SamTeller::product(const SamElement& out, Token& rest, int depth) {
-  auto heard = factor(out, rest, depth);
-  while (heard && (rest.text.starts_with('*') || rest.text.starts_with('/'))) {
+  auto first = factor(out, rest, depth);
+  if (!first) {
+    return std::nullopt;
+  }
+  SamHeard heard = std::move(*first);
+  while (rest.text.starts_with('*') || rest.text.starts_with('/')) {
     const Token sign{rest.text.substr(0, 1), rest.column};
     rest = trimmed({rest.text.substr(1), rest.column + 1});
     auto next = factor(out, rest, depth);
     if (!next) {
       return std::nullopt;
     }
-    if (!next->is_number() && (!heard->is_number() || sign.text == "/")) {
+    if (!next->is_number() && (!heard.is_number() || sign.text == "/")) {
       error(out, sign, "what is heard may be multiplied by numbers, not by what else is heard");
       return std::nullopt;
     }
     if (next->is_number()) {
-      heard->wrap("(", ")" + std::string(sign.text) + next->number);
+      heard.wrap("(", ")" + std::string(sign.text) + next->number);
     } else {
-      next->wrap(heard->number + "*(", ")");
-      heard = std::move(next);
+      next->wrap(heard.number + "*(", ")");
+      heard = std::move(*next);
     }
-    if (length_of(*heard) > longest_levels) {
+    if (length_of(heard) > longest_levels) {
       error(out, sign, "what is heard is multiplied too often to be read");
       return std::nullopt;
     }
