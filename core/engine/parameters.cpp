@@ -6,12 +6,19 @@
 namespace ressort {
 namespace {
 
-constexpr std::size_t ramp_frames = 128;  // of a parameter; a shorter ramp is heard as a click
+// Steps are heard as clicks. A key's tuning follows its bends and glides from block to block.
+constexpr std::size_t tuning_frames = 128;
+// A lever jumps farther than a hand moves what it turns; a controller's steps, some 10 ms from one
+// to the next, become one slope.
+constexpr double turn_s = 0.02;
 
 }  // namespace
 
 Parameters::Parameters(const Machine& machine, const Playing& playing)
-    : playing_(playing), values_(machine.parameters), is_turned_(values_.size()) {
+    : playing_(playing),
+      turn_frames_(static_cast<std::size_t>(std::lround(turn_s * machine.rate_hz))),
+      values_(machine.parameters),
+      is_turned_(values_.size()) {
   turned_.reserve(values_.size());
   changes_.reserve(Engine::max_changes);
   taken_.reserve(Engine::max_changes);
@@ -88,7 +95,7 @@ void Parameters::apply(Bank<T>& bank, const Voices& voices, EnergyWatch& watch) 
       return !depending[index].empty();
     });
     Kernel<T>& kernel = part.of(group.first);
-    bool ramps = false;
+    std::size_t frames = 0;  // of the ramps that begin
     for (std::size_t lane = group.first; lane < group.end; ++lane) {
       const Voice& voice = voices[lane];
       const bool is_tuned = voice.is_new || voice.is_retuned;
@@ -112,10 +119,12 @@ void Parameters::apply(Bank<T>& bank, const Voices& voices, EnergyWatch& watch) 
       for (std::size_t i = 0; !is_tuned && i < turned_.size(); ++i) {
         std::for_each(depending[turned_[i]].begin(), depending[turned_[i]].end(), set);
       }
-      ramps |= ramped;
+      if (ramped && (frames == 0 || is_tuned)) {
+        frames = is_tuned ? tuning_frames : turn_frames_;
+      }
     }
-    if (ramps) {
-      kernel.coefficients.ramp(ramp_frames);
+    if (frames > 0) {
+      kernel.coefficients.ramp(frames);
     }
   });
   for (const std::uint16_t index : turned_) {

@@ -47,6 +47,7 @@ class Parameters {
   double within_limits(std::size_t index, double value) const;
 
   const Playing& playing_;
+  std::size_t turn_frames_;  // that a turned parameter takes
   std::vector<double> values_;
   std::vector<std::uint16_t> turned_;   // since the last apply()
   std::vector<bool> is_turned_;         // [parameter]

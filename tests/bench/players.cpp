@@ -10,7 +10,7 @@
 namespace ressort::bench {
 namespace {
 
-constexpr std::size_t ramp_frames = 128;  // of a parameter, as the engine's own
+constexpr std::size_t ramp_frames = 882;  // of a parameter, as the engine's own at 44 100 Hz
 static_assert(block_frames <= max_block_frames && ramp_frames > block_frames);
 
 // Of the stiffness, for one voice of many.

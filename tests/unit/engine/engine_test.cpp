@@ -243,7 +243,7 @@ TEST_CASE("panic and all-notes-off end what sounds", "[engine]") {
 // --- parameters
 // -----------------------------------------------------------------------------------
 
-TEST_CASE("a parameter is ramped over 128 samples, as the oracle with a ramped K", "[engine]") {
+TEST_CASE("a parameter is ramped over 20 ms, as the oracle with a ramped K", "[engine]") {
   const Network network = network_of(scenes::poly_triangle());
   Preset preset = struck(1);
   preset.keyboard = false;
@@ -253,7 +253,7 @@ TEST_CASE("a parameter is ramped over 128 samples, as the oracle with a ramped K
   Comparison error;
   for (std::size_t n = 0; n < 4000; ++n) {
     if (n >= 501) {
-      const double part = std::min(1.0, static_cast<double>(n - 500) / 128.0);
+      const double part = std::min(1.0, static_cast<double>(n - 500) / 882.0);
       const double values[] = {0.1 + part * (0.2 - 0.1), 0.001};
       oracle.set_parameters(network, values);
     }
