@@ -19,8 +19,16 @@ enum class Isa {
   v4,    // x86-64-v4: AVX-512
 };
 
+// Of one register.
+constexpr std::size_t vector_bytes(Isa isa) {
+  return isa == Isa::v4 ? 64 : isa == Isa::v3 ? 32 : 16;
+}
+
 Isa best_isa();  // of this machine and this build. [any thread]
 std::string_view isa_name(Isa isa);
+
+// Of the packs that this machine works on whole. [any thread]
+std::size_t whole_pack_bytes(Isa isa);
 
 // Code for narrow registers runs several times slower while the upper halves of wide ones are in
 // use, and compilers do not always clear those on the way out. [audio]
@@ -39,11 +47,6 @@ auto with_isa(Isa isa, const Make& make) {
 #endif
   static_cast<void>(isa);
   return make.template operator()<Isa::RESSORT_LEAST_ISA>();
-}
-
-// Of one register.
-constexpr std::size_t vector_bytes(Isa isa) {
-  return isa == Isa::v4 ? 64 : isa == Isa::v3 ? 32 : 16;
 }
 
 // What `make.operator()<bytes>()` gives, called with the width of packs: one that such a file is

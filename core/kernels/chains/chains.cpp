@@ -2,32 +2,64 @@
 
 #include <algorithm>
 
+#include "core/kernels/chains/chains_form.h"
+
 namespace ressort {
 namespace {
 
-// The widest that the longest chain fills often enough for the passes to be worth more than their
-// ends. Packs of 64 bytes are slower than two of 32 wherever a pack takes two turns, and the ends
-// of a pass cost more of them.
+// Whether there is one chain whose end a ground holds, and nothing that has to see all of it in
+// each sample.
+bool is_simple(const Program& program, const Chains& form) {
+  const Chain& chain = form.chains[0];
+  const MassRun& mass = program.mass_runs[chain.mass_run];
+  const auto is_force = [](const OutputSlot& output) { return output.is_force; };
+  return form.chains.size() == 1 && !chain.is_stiff && !mass.is_oscillator && !mass.has_gravity &&
+         program.taps.empty() && is_plain(program) && stands(program, chain.right) &&
+         std::none_of(program.outputs.begin(), program.outputs.end(), is_force);
+}
+
+// The least number of packs that there is a step for, or 0.
+template <std::size_t... counts>
+std::size_t short_packs(std::size_t least, std::size_t most, std::index_sequence<counts...>) {
+  std::size_t packs = 0;
+  static_cast<void>(((counts >= least && counts <= most && (packs = counts, true)) || ...));
+  return packs;
+}
+
+// A short chain in the widest packs, as many as there are registers for; else the widest that the
+// longest chain fills often enough for the passes to be worth more than their ends.
 template <class T>
-std::size_t lanes_for(const Chains& form, Isa isa) {
-  constexpr std::size_t wide_lanes = 32 / sizeof(T);
+FoldedBy fold_by(const Program& program, const Chains& form, Isa isa) {
+  const std::size_t whole = whole_pack_bytes(isa) / sizeof(T);
   std::uint32_t longest = 0;
-  bool has_two_pairs = true;  // as the next mass but one is in another pair than its own
+  std::uint32_t shortest_stiff = nowhere;
   for (const Chain& chain : form.chains) {
     longest = std::max(longest, chain.count);
-    has_two_pairs = has_two_pairs && (!chain.is_stiff || chain.count > wide_lanes);
+    shortest_stiff = chain.is_stiff ? std::min(shortest_stiff, chain.count) : shortest_stiff;
   }
-  const bool is_wide = vector_bytes(isa) >= 32 && longest >= 3 * wide_lanes && has_two_pairs;
-  return is_wide ? wide_lanes : 16 / sizeof(T);
+  if (is_simple(program, form)) {
+    const std::size_t most = isa == Isa::v4 ? 10 : 5;
+    const std::size_t packs = short_packs((longest + whole - 1) / whole, most, ShortPacks{});
+    if (packs > 0) {
+      return {whole, packs};
+    }
+  }
+  // The next mass but one of a stiff one is in another pair than its own.
+  std::size_t lanes = whole;
+  while (lanes > 16 / sizeof(T) && (longest < 3 * lanes || shortest_stiff <= lanes)) {
+    lanes /= 2;
+  }
+  return {lanes, 0};
 }
 
 // Puts nodes in their places, and everything that names nodes into tables that name places.
 class TablesMaker {
  public:
-  TablesMaker(const Program& program, const Chains& form, std::size_t lanes)
+  TablesMaker(const Program& program, const Chains& form, FoldedBy by)
       : program_(program),
         form_(form),
-        lanes_(static_cast<std::uint32_t>(lanes)),
+        lanes_(static_cast<std::uint32_t>(by.lanes)),
+        short_packs_(static_cast<std::uint32_t>(by.short_packs)),
         place_(tables_.place),
         site_mass_(program.position.size(), nowhere),
         force_(program.position.size(), nowhere) {
@@ -49,6 +81,9 @@ class TablesMaker {
           .push_back({place_[input.node], force_at(input.node), i});
     }
     make_outputs();
+    if (short_packs_ > 0) {
+      shorten();
+    }
     return std::move(tables_);
   }
 
@@ -63,7 +98,8 @@ class TablesMaker {
   void fold_chains() {
     std::uint32_t next = 0;
     for (const Chain& chain : form_.chains) {
-      const std::uint32_t packs = (chain.count + lanes_ - 1) / lanes_;
+      const std::uint32_t packs =
+          short_packs_ > 0 ? short_packs_ : (chain.count + lanes_ - 1) / lanes_;
       for (std::uint32_t i = 0; i < chain.count; ++i) {
         const std::uint32_t node = form_.nodes[chain.first + i];
         place_[node] = place_of(next + i % packs, i / packs);
@@ -257,37 +293,74 @@ class TablesMaker {
     }
   }
 
+  // What the one chain's step needs that stays in registers.
+  void shorten() {
+    for (std::uint32_t i = 0; i < tables_.sites.size(); ++i) {
+      const ChainSite& site = tables_.sites[i];
+      tables_.short_sites.push_back({site.pair / (2 * lanes_), site.unit, i});
+    }
+    std::stable_sort(tables_.short_sites.begin(), tables_.short_sites.end(),
+                     [](const ShortSite& a, const ShortSite& b) { return a.pack < b.pack; });
+    tables_.short_sites.emplace_back();
+    const auto read = [&](ChainPlace place) {
+      const std::uint32_t pair = place / (2 * lanes_);
+      tables_.short_read |= pair < short_packs_ ? 1u << pair : 0u;
+    };
+    for (const PlacedEnds& ends : tables_.ends) {
+      read(ends.a);
+      read(ends.b);
+    }
+    for (const HeardPosition& output : tables_.heard_positions) {
+      read(output.place);
+    }
+    const std::uint32_t count = form_.chains[0].count;
+    if (count < short_packs_ * lanes_) {
+      tables_.short_end = place_of(count % short_packs_, count / short_packs_);
+    }
+  }
+
   const Program& program_;
   const Chains& form_;
   std::uint32_t lanes_;
+  std::uint32_t short_packs_;
   ChainsTables tables_;
   std::vector<ChainPlace>& place_;
   std::vector<std::uint32_t> site_mass_;  // [node] coefficient, if it is in a chain
   std::vector<std::uint32_t> force_;      // [node]
 };
 
+template <Isa isa, class T>
+ChainsLoops<T> loops_for(FoldedBy by) {
+  ChainsLoops<T> loops = chains_loops<isa, T>(by.lanes * sizeof(T));
+  if (by.short_packs > 0) {
+    loops.step = short_chain_step<isa, T>(by.lanes * sizeof(T), by.short_packs);
+  }
+  return loops;
+}
+
 }  // namespace
 
 template <class T>
 ChainsKernel<T>::ChainsKernel(const Program& program, const Chains& form, std::size_t, Isa isa)
-    : ChainsKernel(program, form, TablesMaker(program, form, lanes_for<T>(form, isa)).make(),
-                   lanes_for<T>(form, isa), isa) {}
+    : ChainsKernel(program, form, TablesMaker(program, form, fold_by<T>(program, form, isa)).make(),
+                   fold_by<T>(program, form, isa), isa) {}
 
 template <class T>
 ChainsKernel<T>::ChainsKernel(const Program& program, const Chains& form, ChainsTables tables,
-                              std::size_t lanes, Isa isa)
+                              FoldedBy by, Isa isa)
     : NodeKernel<T>(program, {.node = tables.place,
                               .lane = {0},
-                              .row = lanes,
+                              .row = by.lanes,
                               .rows = 2,
-                              .size = 2 * lanes * tables.pairs}),
+                              .size = 2 * by.lanes * tables.pairs}),
       tables_(std::move(tables)),
-      loops_(with_isa(isa, [&]<Isa level>() { return chains_loops<level, T>(lanes * sizeof(T)); })),
-      masks_(4 * lanes * tables_.chains.size()),
-      units_(lanes * lanes),
+      loops_(with_isa(isa, [&]<Isa level>() { return loops_for<level, T>(by); })),
+      masks_(4 * by.lanes * tables_.chains.size()),
+      units_(by.lanes * by.lanes),
       held_(4 * tables_.chains.size()),
       force_(tables_.force_count),
       tap_pull_(program.taps.size()) {
+  const std::size_t lanes = by.lanes;
   for (std::size_t i = 0; i < form.chains.size(); ++i) {
     const std::uint32_t packs = tables_.chains[i].packs;
     const std::size_t last_lane = (form.chains[i].count - 1) / packs;

@@ -2,9 +2,12 @@
 // the packs before and after its own, and one pass over memory does it all:
 //   y = K x + Z v,  v += (y[i-1] - 2 y[i] + y[i+1])/M,  x += v
 // A stiff one has a second y, from two masses before and behind.
+// One chain that is short enough stays in registers for a block of samples.
 // All other links and masses are stepped number by number; what they do to a chain's mass is added
 // after the pass, to v and to x, which is the same as if it had been in the sum.
 #pragma once
+
+#include <utility>
 
 #include "core/kernels/nodes.h"
 
@@ -34,6 +37,13 @@ struct ChainSite {
   ChainPlace pair = 0;
   std::uint32_t unit = 0;          // of ChainsState::units: its lane's pack
   std::uint32_t inverse_mass = 0;  // coefficient
+};
+
+// The same in a chain that stays in registers.
+struct ShortSite {
+  std::uint32_t pack = nowhere;
+  std::uint32_t unit = 0;
+  std::uint32_t force = 0;  // of ChainsState::force
 };
 
 struct LoosePlaces {
@@ -114,6 +124,16 @@ struct ChainsTables {
   std::vector<PassiveEnd> passive_ends;  // [node], if there are passive links
   std::size_t force_count = 0;           // sites, loose masses, listened, points, those never read
   std::size_t pairs = 0;
+  // If there is one chain that stays in registers:
+  std::vector<ShortSite> short_sites;  // pack by pack, and one that is in none
+  std::uint32_t short_read = 0;        // its pairs that others read: a bit each
+  ChainPlace short_end = nowhere;      // the empty place next to its last mass, if there is one
+};
+
+// How wide packs are, and how many of them a chain takes that stays in registers; 0: none does.
+struct FoldedBy {
+  std::size_t lanes = 0;
+  std::size_t short_packs = 0;
 };
 
 // Everything that one step of ChainsKernel touches.
@@ -135,9 +155,12 @@ struct ChainsState {
 };
 
 template <class T>
+using ChainsStep = void (*)(const Program& program, const ChainsTables& tables,
+                            ChainsState<T>& state, const Block<T>& block);
+
+template <class T>
 struct ChainsLoops {
-  void (*step)(const Program& program, const ChainsTables& tables, ChainsState<T>& state,
-               const Block<T>& block);
+  ChainsStep<T> step;
   // The forces that links exert where all is now, added to those that there are.
   void (*pull)(const ChainsTables& tables, ChainsState<T>& state);
 };
@@ -145,6 +168,12 @@ struct ChainsLoops {
 // The functions for packs of so many bytes.
 template <Isa isa, class T>
 ChainsLoops<T> chains_loops(std::size_t bytes);
+
+// How many packs a chain may have that stays in registers, and its step; null where there are too
+// few registers for it.
+using ShortPacks = std::index_sequence<1, 2, 3, 4, 5, 6, 8, 10>;
+template <Isa isa, class T>
+ChainsStep<T> short_chain_step(std::size_t bytes, std::size_t packs);
 
 template <class T>
 class ChainsKernel final : public NodeKernel<T> {
@@ -154,8 +183,7 @@ class ChainsKernel final : public NodeKernel<T> {
   bool become(const Kernel<T>& from) override;
 
  private:
-  // Of packs of so many lanes.
-  ChainsKernel(const Program& program, const Chains& form, ChainsTables tables, std::size_t lanes,
+  ChainsKernel(const Program& program, const Chains& form, ChainsTables tables, FoldedBy by,
                Isa isa);
   void clear(std::size_t lane) override;
   void play(const Block<T>& block) override;

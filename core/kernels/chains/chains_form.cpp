@@ -170,13 +170,19 @@ class ChainFinder {
     if (row.size() < least_chain_masses) {
       return;
     }
+    std::uint32_t left = held_by(near_[row.front()].holder, row.front(), springs);
+    std::uint32_t right = held_by(near_[row.back()].holder, row.back(), springs);
+    if (stands(program_, left) && !stands(program_, right)) {
+      std::swap(left, right);
+      std::reverse(row.begin(), row.end());
+    }
     Chain chain{.first = static_cast<std::uint32_t>(found.nodes.size()),
                 .count = static_cast<std::uint32_t>(row.size()),
                 .mass_run = mass_run_[row[0]],
                 .stiffness = run.coefficients[0],
                 .damping = run.coefficients[1],
-                .left = held_by(near_[row.front()].holder, row.front(), springs),
-                .right = held_by(near_[row.back()].holder, row.back(), springs)};
+                .left = left,
+                .right = right};
     stiffen(run, row, chain, springs);
     found.chains.push_back(chain);
     found.nodes.insert(found.nodes.end(), row.begin(), row.end());
@@ -259,6 +265,12 @@ class ChainFinder {
 };
 
 }  // namespace
+
+bool stands(const Program& program, std::uint32_t node) {
+  return node != Chain::free &&
+         std::none_of(program.inputs.begin(), program.inputs.end(),
+                      [&](const InputSlot& input) { return input.node == node; });
+}
 
 std::optional<Chains> chains_form(const Program& program, const Progress& progress) {
   const auto is_force = [](const OutputSlot& output) { return output.is_force; };

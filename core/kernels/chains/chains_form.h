@@ -18,6 +18,9 @@ inline constexpr std::uint32_t least_chain_masses = 8;  // below, folding is not
 // O(nodes + links). [any thread but audio]
 std::optional<Chains> chains_form(const Program& program, const Progress& progress = {});
 
+// Whether an end of a chain is held by what stays where it is: a ground. [any thread]
+bool stands(const Program& program, std::uint32_t node);
+
 // What the registry's row of it asks, of one voice in bytes.
 double predicted_ns(const Program& program, const Chains& form, const Workload& load);
 std::string description(const Program& program, const Chains& form);

@@ -314,6 +314,38 @@ TEST_CASE("everything beside a string acts on it", "[chains]") {
   }
 }
 
+// One string between a hand and a ground stays in registers; neighbours share a pack or do not.
+TEST_CASE("everything beside a short string acts on it", "[chains]") {
+  for (const int count : {9, 31, 32, 77, 160}) {
+    CAPTURE(count);
+    const auto at = [&](int part, int of) { return scenes::at("a_m", count * part / of); };
+    const Program program =
+        formed(row("a", count, "mass m", "k z") +
+               "@m param 1.1\n@k param 0.2\n@z param 0.01\n@g ground 0.1\n@in1 posInput 0.\n"
+               "@in2 frcInput " +
+               at(1, 2) + "\n@in3 frcInput " + at(1, 3) +
+               "\n@o osc 1.5 0.01 0.001 0. 0.\n@ga springDamper @g @a_m0 k z\n"
+               "@ge springDamper @in1 " +
+               scenes::at("a_m", count - 1) +
+               " k z\n"
+               "@l1 springDamper @o " +
+               at(1, 2) +
+               " 0.05 0.01\n"
+               "@l2 nlSpring3 @o " +
+               at(1, 3) +
+               " 0.05 0.01 0.01\n"
+               "@l3 springDamper " +
+               at(1, 3) + " " + at(2, 3) +
+               " 0.05 0.01\n"
+               "@l4 damper " +
+               at(1, 2) +
+               " @in1 0.01\n"
+               "@out1 posOutput @a_m0\n@out2 posOutput @o\n@out3 posOutput " +
+               at(2, 3) + "\n");
+    check_both(program, {.frames = 6000, .turns = true, .pitch = 1.1});
+  }
+}
+
 TEST_CASE("what touches a string acts while it does", "[chains]") {
   const Program program =
       formed(row("a", 40, "mass 1.", "0.2 0.01") +

@@ -1,0 +1,162 @@
+// The loop of the chains' kernel for one short chain: its masses stay in registers for a block of
+// samples, and what others read of it is written to memory in each.
+#include "core/kernels/chains/chains_loops.h"
+
+namespace ressort::RESSORT_ISA {
+namespace {
+
+// With each index as a constant: what is indexed by it then stays in registers.
+template <std::size_t count, class Use>
+[[gnu::always_inline]] inline void each_below(Use&& use) {
+  [&]<std::size_t... I>(std::index_sequence<I...>) __attribute__((always_inline)) {
+    (use(std::integral_constant<std::size_t, I>{}), ...);
+  }
+  (std::make_index_sequence<count>{});
+}
+
+template <class V, std::size_t packs>
+struct ShortBody {
+  V x[packs];
+  V v[packs];
+  V inverse_mass[packs];
+};
+
+template <class S, std::size_t packs>
+void weigh(ShortBody<typename S::V, packs>& body, const FoldedChain& chain, const S& s) {
+  using V = typename S::V;
+  const V inverse_mass = all<V>(s.coefficient[chain.mass.inverse_mass]);
+  each_below<packs>([&](auto i) {
+    body.inverse_mass[i] = inverse_mass * pack_at<V>(s.masks + (i <= chain.last ? 0 : S::lanes));
+  });
+}
+
+// By its springs, and by what else acts on its sites.
+template <class S, std::size_t packs>
+void move_short_chain(ShortBody<typename S::V, packs>& body, const FoldedChain& chain,
+                      const ShortSite* site, const S& s) {
+  using V = typename S::V;
+  const auto others = std::make_index_sequence<S::lanes - 1>{};
+  const V k = all<V>(s.held[0]);
+  const V z = all<V>(s.held[1]);
+  V y[packs];
+  each_below<packs>([&](auto i) { y[i] = k * body.x[i] + z * body.v[i]; });
+  const V left = tension_of(chain.left, s.held, y[0], s);
+  const V right = tension_of(chain.right, s.held, y[0], s);
+  V before = y[0] - up(left, y[packs - 1], others);
+  each_below<packs>([&](auto i) {
+    V next = down(y[0], right, others);
+    if constexpr (i + 1 < packs) {
+      next = y[i + 1];
+    }
+    const V after = next - y[i];
+    V force = after - before;
+    before = after;
+    for (; site->pack == i; ++site) {
+      force += all<V>(s.force[site->force]) * pack_at<V>(s.units + site->unit);
+      s.force[site->force] = 0;
+    }
+    body.v[i] += force * body.inverse_mass[i];
+    body.x[i] += body.v[i];
+  });
+}
+
+// Flat: a call would put all that is in registers into memory.
+template <class S, std::size_t packs, class T>
+[[gnu::flatten]] void step_short(const Program& program, const ChainsTables& tables,
+                                 ChainsState<T>& state, const Block<T>& block) {
+  using V = typename S::V;
+  S s(tables, state);
+  Ramps<T> ramps = state.ramps;
+  const Table<std::uint32_t> audio_coefficients(program.audio_coefficients);
+  const FoldedChain chain = *s.chains.first;
+  const ShortSite* const sites = tables.short_sites.data();
+  const std::uint32_t read = tables.short_read;
+  V* const pairs = &pack_at<V>(s.bodies + chain.first);
+  const T* value = block.value;
+  const T* velocity = block.velocity;
+  const T* audio = block.audio;
+  T* outputs = block.outputs;
+  const std::size_t inputs = program.inputs.size();
+  const std::size_t output_count = program.outputs.size();
+  const std::size_t frames = block.frames;
+  // What holds its end stands in the first empty place, too: it is next to the last mass.
+  if (tables.short_end != nowhere) {
+    s.bodies[tables.short_end] = s.bodies[chain.right];
+  }
+  ShortBody<V, packs> body;
+  each_below<packs>([&](auto i) {
+    body.x[i] = pairs[2 * i];
+    body.v[i] = pairs[2 * i + 1];
+  });
+  weigh(body, chain, s);
+  for (std::size_t frame = 0; frame < frames; ++frame) {
+    if (ramps.frames > 0 || audio_coefficients.first != audio_coefficients.last) {
+      advance(ramps);
+      for (const std::uint32_t c : audio_coefficients) {
+        ramps.value[c] = *audio++;
+      }
+      weigh(body, chain, s);
+    }
+    for (const PlacedInput& input : s.forces) {
+      s.force[input.force] += value[input.index];
+    }
+    move_short_chain(body, chain, sites, s);
+    each_below<packs>([&](auto i) {
+      if ((read >> i & 1) != 0) {
+        pairs[2 * i] = body.x[i];
+        pairs[2 * i + 1] = body.v[i];
+      }
+    });
+    step_loose(s);
+    for (const PlacedInput& input : s.positions) {
+      s.bodies[input.place] = value[input.index];
+      s.bodies[input.place + S::lanes] = velocity[input.index];
+    }
+    step_links(s);
+    s.held[0] = s.coefficient[chain.springs[0]];
+    s.held[1] = s.coefficient[chain.springs[1]];
+    for (const HeardPosition& output : s.heard_positions) {
+      outputs[output.index] = s.bodies[output.place];
+    }
+    outputs += output_count;
+    value += inputs;
+    velocity += inputs;
+  }
+  each_below<packs>([&](auto i) {
+    pairs[2 * i] = body.x[i];
+    pairs[2 * i + 1] = body.v[i];
+  });
+}
+
+template <class T, std::size_t bytes, std::size_t... counts>
+ChainsStep<T> step_for(std::size_t packs, std::index_sequence<counts...>) {
+  ChainsStep<T> step = nullptr;
+  static_cast<void>(
+      ((packs == counts && (step = step_short<View<T, bytes>, counts, T>, true)) || ...));
+  return step;
+}
+
+template <class T>
+ChainsStep<T> step_for(std::size_t bytes, std::size_t packs) {
+  constexpr std::size_t widest = vector_bytes(Isa::RESSORT_ISA);
+  return with_bytes<widest, std::min<std::size_t>(32, widest)>(
+      bytes, [=]<std::size_t pack>() { return step_for<T, pack>(packs, ShortPacks{}); });
+}
+
+}  // namespace
+}  // namespace ressort::RESSORT_ISA
+
+namespace ressort {
+
+template <>
+ChainsStep<float> short_chain_step<Isa::RESSORT_ISA, float>(std::size_t bytes, std::size_t packs) {
+  return RESSORT_ISA::step_for<float>(bytes, packs);
+}
+
+template <>
+ChainsStep<double> short_chain_step<Isa::RESSORT_ISA, double>(std::size_t bytes,
+                                                              std::size_t packs) {
+  return RESSORT_ISA::step_for<double>(bytes, packs);
+}
+
+}  // namespace ressort
