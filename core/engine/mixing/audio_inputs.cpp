@@ -1,5 +1,8 @@
 #include "core/engine/mixing/audio_inputs.h"
 
+#include <algorithm>
+#include <bit>
+
 namespace ressort {
 
 AudioInputs::AudioInputs(const Machine& machine, const Playing& playing, IsSilent is_silent)
@@ -50,30 +53,51 @@ void AudioInputs::remember(const Segment& segment) {
   }
 }
 
+// How many inputs of a part from `first` on are moved by sound, all of them positions or all
+// forces: as many as are added in one pass.
+std::size_t AudioInputs::side_by_side(const Program& program, std::size_t first,
+                                      std::size_t most) const {
+  const auto is_alike = [&](std::size_t i) {
+    const InputSlot& slot = program.inputs[i];
+    return inputs_[slot.input].samples != nullptr &&
+           slot.is_force == program.inputs[first].is_force;
+  };
+  std::size_t count = 0;
+  while (count < most && first + count < program.inputs.size() && is_alike(first + count)) {
+    ++count;
+  }
+  return std::bit_floor(count);
+}
+
 template <class T>
 void AudioInputs::add(Bank<T>& bank, const VoiceGroup& group, std::size_t frames,
                       const Voices& voices, EnergyWatch& watch) const {
   const PartBank<T>& part = bank.parts[group.part];
-  for (std::size_t i = 0; i < part.program.inputs.size(); ++i) {
-    const InputSlot& slot = part.program.inputs[i];
-    const Driven& input = inputs_[slot.input];
-    if (input.samples == nullptr) {
+  const std::size_t most = part.width == 1 ? AudioInput<T>::most : 1;
+  std::size_t next = 0;
+  for (std::size_t i = 0; i < part.program.inputs.size(); i = next) {
+    const std::size_t count = side_by_side(part.program, i, most);
+    next = i + std::max<std::size_t>(1, count);
+    if (count == 0) {
       continue;
     }
     for (std::size_t lane = group.first; lane < group.end; ++lane) {
       watch.stir(voices[lane], lane, group.part);
     }
     bank.filled_part = nullptr;
-    AudioInput<T> added{.samples = input.samples,
+    AudioInput<T> added{.count = count,
                         .frames = frames,
-                        .scale = input.scale,
-                        .before = input.before,
                         .replaces = bare_,
                         .value = bank.value.data() + i * part.width,
-                        .velocity = nullptr,
                         .step = part.program.inputs.size() * part.width,
                         .width = part.width};
-    if (!slot.is_force) {
+    for (std::size_t sound = 0; sound < count; ++sound) {
+      const Driven& input = inputs_[part.program.inputs[i + sound].input];
+      added.samples[sound] = input.samples;
+      added.scale[sound] = input.scale;
+      added.before[sound] = input.before;
+    }
+    if (!part.program.inputs[i].is_force) {
       bank.still = 0;
       added.velocity = bank.velocity.data() + i * part.width;
     }

@@ -33,6 +33,7 @@ class AudioInputs {
     double before = 0.0;              // the last scaled sample
     const double* samples = nullptr;  // of this segment; null where all is silent
   };
+  std::size_t side_by_side(const Program& program, std::size_t first, std::size_t most) const;
   static const double* channel_of(const Driven& input, const Segment& segment);
 
   IsSilent is_silent_;

@@ -2,6 +2,7 @@
 // channels.
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <span>
 
@@ -35,18 +36,22 @@ struct Heard {
   std::size_t width = 1;  // lanes; one, or as many as fit into whole packs of 16 bytes
 };
 
-// Sound that moves one input of all lanes, on top of what it does by itself or instead of that.
+// Sounds that move as many inputs, side by side in each row, of all lanes: on top of what they do
+// by themselves or instead of that.
 template <class T>
 struct AudioInput {
-  const double* samples = nullptr;
+  static constexpr std::size_t most = 4;  // sounds
+
+  std::size_t count = 1;  // a power of 2
+  std::array<const double*, most> samples{};
+  std::array<double, most> scale{};   // of the samples
+  std::array<double, most> before{};  // the last scaled samples
   std::size_t frames = 0;
-  double scale = 1.0;     // of the samples
-  double before = 0.0;    // the last scaled sample
   bool replaces = false;  // what is there
-  T* value = nullptr;     // [frame * step + lane]
-  T* velocity = nullptr;  // of a position only
+  T* value = nullptr;     // [frame * step + input * width + lane]
+  T* velocity = nullptr;  // of positions only
   std::size_t step = 1;
-  std::size_t width = 1;  // lanes
+  std::size_t width = 1;  // lanes; 1 where there are several inputs
 };
 
 using IsSilent = bool (*)(const double* samples, std::size_t frames);

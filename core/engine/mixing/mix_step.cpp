@@ -65,6 +65,14 @@ bool is_silent(const double* samples, std::size_t frames) {
   return folded(any, [](auto a, auto b) { return a | b; }) == 0;
 }
 
+template <std::size_t Step, class T>
+void fill_packs(const T* row, std::size_t frames, T* value) {
+  const auto pack = load<Pack<T, Step * sizeof(T)>>(row);
+  for (std::size_t n = 0; n < frames; ++n) {
+    store(value + n * Step, pack);
+  }
+}
+
 template <class T>
 void fill_rows(const T* row, std::size_t step, std::size_t frames, T* value) {
   if (step == 1) {
@@ -72,6 +80,9 @@ void fill_rows(const T* row, std::size_t step, std::size_t frames, T* value) {
       value[n] = *row;
     }
     return;
+  }
+  if (step == 2 || step == 4) {
+    return step == 2 ? fill_packs<2>(row, frames, value) : fill_packs<4>(row, frames, value);
   }
   for (std::size_t n = 0; n < frames; ++n) {
     for (std::size_t i = 0; i < step; ++i) {
@@ -104,11 +115,11 @@ template <class T>
 }
 
 template <class T>
-void add_audio(const AudioInput<T>& input) {
+void add_one_sound(const AudioInput<T>& input) {
   double here[max_block_frames + 1];
-  here[0] = input.before;
+  here[0] = input.before[0];
   for (std::size_t n = 0; n < input.frames; ++n) {
-    here[n + 1] = input.scale * input.samples[n];
+    here[n + 1] = input.scale[0] * input.samples[0][n];
   }
   add_to(input, here + 1, input.value);
   if (input.velocity != nullptr) {
@@ -117,6 +128,47 @@ void add_audio(const AudioInput<T>& input) {
       change[n] = here[n + 1] - here[n];
     }
     add_to(input, change, input.velocity);
+  }
+}
+
+// Of one lane, all in one pass.
+template <std::size_t Sounds, class T>
+void add_sounds(const AudioInput<T>& input) {
+  using D = Pack<double, Sounds * sizeof(double)>;
+  using V = Pack<T, Sounds * sizeof(T)>;
+  const bool replaces = input.replaces;
+  const std::size_t step = input.step;
+  const D scale = load<D>(input.scale.data());
+  D before = load<D>(input.before.data());
+  T* value = input.value;
+  T* velocity = input.velocity;
+  const auto add = [&](T* row, D added) {
+    const V more = __builtin_convertvector(added, V);
+    store<V>(row, replaces ? more : load<V>(row) + more);
+  };
+  for (std::size_t n = 0; n < input.frames; ++n, value += step) {
+    D here;
+    for (std::size_t i = 0; i < Sounds; ++i) {
+      here[i] = input.samples[i][n];
+    }
+    here *= scale;
+    add(value, here);
+    if (velocity != nullptr) {
+      add(velocity, here - before);
+      velocity += step;
+    }
+    before = here;
+  }
+}
+
+template <class T>
+void add_audio(const AudioInput<T>& input) {
+  if (input.count == 1) {
+    add_one_sound(input);
+  } else if (input.count == 2) {
+    add_sounds<2>(input);
+  } else {
+    add_sounds<4>(input);
   }
 }
 

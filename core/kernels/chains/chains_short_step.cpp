@@ -88,6 +88,7 @@ template <class S, std::size_t packs, class T>
     body.x[i] = pairs[2 * i];
     body.v[i] = pairs[2 * i + 1];
   });
+  T inverse_mass = s.coefficient[chain.mass.inverse_mass];
   weigh(body, chain, s);
   for (std::size_t frame = 0; frame < frames; ++frame) {
     if (ramps.frames > 0 || audio_coefficients.first != audio_coefficients.last) {
@@ -95,7 +96,10 @@ template <class S, std::size_t packs, class T>
       for (const std::uint32_t c : audio_coefficients) {
         ramps.value[c] = *audio++;
       }
-      weigh(body, chain, s);
+      if (s.coefficient[chain.mass.inverse_mass] != inverse_mass) {
+        inverse_mass = s.coefficient[chain.mass.inverse_mass];
+        weigh(body, chain, s);
+      }
     }
     for (const PlacedInput& input : s.forces) {
       s.force[input.force] += value[input.index];
