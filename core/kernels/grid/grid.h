@@ -5,12 +5,6 @@
 
 namespace ressort {
 
-// Of one pack: half a cache line at most. Neighbours are not aligned, and every wider load of them
-// would touch two lines.
-constexpr std::size_t grid_bytes(std::size_t vector_bytes) {
-  return vector_bytes < 32 ? vector_bytes : 32;
-}
-
 inline constexpr std::uint32_t grid_fixed = 0xffffffffu;
 inline constexpr std::size_t grid_pushes = 8;  // of a tap: its corners before and after it moved
 
@@ -52,8 +46,9 @@ struct GridLoops {
   void (*pull)(const Program& program, const Grid& grid, GridState<T>& state);
 };
 
+// The functions for packs of so many bytes, which the machine works on whole.
 template <Isa isa, class T>
-GridLoops<T> grid_loops();
+GridLoops<T> grid_loops(std::size_t bytes);
 
 template <class T>
 class GridKernel final : public NodeKernel<T> {

@@ -1,4 +1,5 @@
 // The loops of the grid kernel, compiled for each instruction set.
+#include <algorithm>
 #include <utility>
 
 #include "core/kernels/grid/grid.h"
@@ -8,10 +9,10 @@ namespace ressort::RESSORT_ISA {
 namespace {
 
 // What the loops of one step know.
-template <class T>
+template <class T, std::size_t Bytes>
 struct View {
-  static constexpr std::size_t lanes = grid_bytes(vector_bytes(Isa::RESSORT_ISA)) / sizeof(T);
-  using V = Pack<T, lanes * sizeof(T)>;
+  static constexpr std::size_t lanes = Bytes / sizeof(T);
+  using V = Pack<T, Bytes>;
 
   const Program& program;
   const Grid& grid;
@@ -41,12 +42,30 @@ struct Mover {
   T g;
 };
 
+// Lane i is lane i - 1 of y, and the first the last of `before`; and the other way round.
+template <class V, std::size_t... I>
+V up(V before, V y, std::index_sequence<I...>) {
+  return __builtin_shufflevector(before, y, sizeof...(I), (sizeof...(I) + 1 + I)...);
+}
+template <class V, std::size_t... I>
+V down(V y, V ahead, std::index_sequence<I...>) {
+  return __builtin_shufflevector(y, ahead, (I + 1)..., sizeof...(I) + 1);
+}
+
+// Whether both neighbours in its row are among a slot's offsets.
+inline bool has_row(const GridSegment& segment) {
+  const auto& offsets = segment.offsets;
+  return std::find(offsets.begin(), offsets.end(), -1) != offsets.end() &&
+         std::find(offsets.begin(), offsets.end(), 1) != offsets.end();
+}
+
 // Segments of n offsets: forces from y, then the masses move, then their own y for the next sample.
-template <std::size_t n, bool is_pulled, bool is_forward, class T>
-void move_segments(const View<T>& s, const GridSegment* segment, std::size_t count,
+// What is next to a pack in its row is moved from lane to lane: loads of it would touch two lines.
+template <std::size_t n, bool is_row, bool is_pulled, bool is_forward, class T, std::size_t Bytes>
+void move_segments(const View<T, Bytes>& s, const GridSegment* segment, std::size_t count,
                    const Mover<T>& mover) {
-  using V = typename View<T>::V;
-  constexpr std::ptrdiff_t lanes = View<T>::lanes;
+  using V = typename View<T, Bytes>::V;
+  constexpr std::ptrdiff_t lanes = View<T, Bytes>::lanes;
   const LinkRun& run = s.program.link_runs[s.grid.spring_run];
   const V k = V{} + s.state.ramps.value[run.coefficients[0]];
   const V z = V{} + s.state.ramps.value[run.coefficients[1]];
@@ -55,11 +74,16 @@ void move_segments(const View<T>& s, const GridSegment* segment, std::size_t cou
   const V pull_z = V{} + mover.z;
   const V pull_g = V{} + mover.g;
   constexpr std::ptrdiff_t direction = is_forward ? 1 : -1;
+  constexpr auto other_lanes = std::make_index_sequence<View<T, Bytes>::lanes - 1>{};
   const T* const all_weights = s.state.weights;
   for (std::size_t i = 0; i < count; ++i, segment += direction) {
-    const T* sum_of[n];
-    for (std::size_t j = 0; j < n; ++j) {
-      sum_of[j] = s.state.y + segment->offsets[j];
+    constexpr std::size_t others = is_row ? n - 2 : n;
+    const T* sum_of[n] = {};
+    std::size_t found = 0;
+    for (const std::int32_t offset : segment->offsets) {
+      if (!is_row || (offset != 1 && offset != -1)) {
+        sum_of[found++] = s.state.y + offset;
+      }
     }
     const T* const ys = s.state.y;
     T* const next_ys = s.state.next_y;
@@ -70,13 +94,31 @@ void move_segments(const View<T>& s, const GridSegment* segment, std::size_t cou
     const std::ptrdiff_t end = is_forward ? last + lanes : first - lanes;
     const std::uint32_t* stamp =
         s.state.stamp + ((is_forward ? first : last) - s.grid.first) / lanes;
+    // Of a row: the pack at hand, and the one before.
+    V here{};
+    V passed{};
+    if constexpr (is_row) {
+      here = load<V>(ys + (is_forward ? first : last));
+      passed += ys[is_forward ? first - 1 : last + lanes];
+    }
     for (std::ptrdiff_t at = is_forward ? first : last; at != end; at += direction * lanes) {
       const T* const weights = all_weights + *stamp * (2 * lanes);
       stamp += direction;
       // Differences first: they are exact where a network is far from 0 and moves little.
-      const V y = load<V>(ys + at);
-      V sum = load<V>(sum_of[0] + at) - y;
-      for (std::size_t j = 1; j < n; ++j) {
+      V y;
+      V sum;
+      if constexpr (is_row) {
+        y = here;
+        const std::ptrdiff_t next = at + direction * lanes;
+        here = next == end ? V{} + ys[is_forward ? end : first - 1] : load<V>(ys + next);
+        sum = (up(is_forward ? passed : here, y, other_lanes) - y) +
+              (down(y, is_forward ? here : passed, other_lanes) - y);
+        passed = y;
+      } else {
+        y = load<V>(ys + at);
+        sum = load<V>(sum_of[0] + at) - y;
+      }
+      for (std::size_t j = is_row ? 0 : 1; j < others; ++j) {
         sum += load<V>(sum_of[j] + at) - y;
       }
       V x = load<V>(xs + at);
@@ -94,24 +136,34 @@ void move_segments(const View<T>& s, const GridSegment* segment, std::size_t cou
   }
 }
 
+template <std::size_t n, bool is_row, class T, std::size_t Bytes>
+auto moving(bool is_pulled, bool is_forward) {
+  return is_pulled    ? is_forward ? move_segments<n, is_row, true, true, T, Bytes>
+                                   : move_segments<n, is_row, true, false, T, Bytes>
+            : is_forward ? move_segments<n, is_row, false, true, T, Bytes>
+                      : move_segments<n, is_row, false, false, T, Bytes>;
+}
+
 // In one sample upwards, in the next downwards: what comes last comes first again while it is still
 // in the cache, and next_y may overwrite the y that nobody reads any more.
-template <class T>
-void step_segments(const View<T>& s, const Mover<T>& mover, bool is_pulled) {
+template <class T, std::size_t Bytes>
+void step_segments(const View<T, Bytes>& s, const Mover<T>& mover, bool is_pulled) {
   const auto& segments = s.grid.segments;
   for (std::size_t i = 0; i < segments.size();) {
     const GridSegment* const first = &segments[s.state.is_forward ? i : segments.size() - 1 - i];
     const std::size_t offsets = first->offsets.size();
+    const bool is_row = has_row(*first);
+    const auto is_alike = [&](const GridSegment& segment) {
+      return segment.offsets.size() == offsets && has_row(segment) == is_row;
+    };
     std::size_t count = 1;
     while (i + count < segments.size() &&
-           (s.state.is_forward ? first + count : first - count)->offsets.size() == offsets) {
+           is_alike(*(s.state.is_forward ? first + count : first - count))) {
       ++count;
     }
     with_count<most_grid_offsets>(offsets, [&]<std::size_t n>() {
-      const auto move = is_pulled            ? s.state.is_forward ? move_segments<n, true, true, T>
-                                                                  : move_segments<n, true, false, T>
-                                   : s.state.is_forward ? move_segments<n, false, true, T>
-                                             : move_segments<n, false, false, T>;
+      const auto move = is_row ? moving<n, n >= 2, T, Bytes>(is_pulled, s.state.is_forward)
+                               : moving<n, false, T, Bytes>(is_pulled, s.state.is_forward);
       move(s, first, count, mover);
     });
     i += count;
@@ -125,11 +177,11 @@ void step_segments(const View<T>& s, const Mover<T>& mover, bool is_pulled) {
 
 // The forces of links with n offsets in the packs [begin, end) of the grid, stored offset by
 // offset. Flat, so that no compiler leaves the law a function that is called for every pack.
-template <std::size_t n, class T, class ForceLaw>
-[[gnu::flatten]] void pull_links(const View<T>& s, const GridLinks& links, std::size_t row,
+template <std::size_t n, class T, std::size_t Bytes, class ForceLaw>
+[[gnu::flatten]] void pull_links(const View<T, Bytes>& s, const GridLinks& links, std::size_t row,
                                  std::size_t begin, std::size_t end, ForceLaw law) {
-  using V = typename View<T>::V;
-  constexpr std::size_t lanes = View<T>::lanes;
+  using V = typename View<T, Bytes>::V;
+  constexpr std::size_t lanes = View<T, Bytes>::lanes;
   const T* const xs = s.state.x + s.grid.first;
   const T* const vs = s.state.v + s.grid.first;
   const T* other_x[n];
@@ -155,9 +207,9 @@ template <std::size_t n, class T, class ForceLaw>
   }
 }
 
-template <class T>
-void compute_links(const View<T>& s, std::size_t begin, std::size_t end) {
-  using V = typename View<T>::V;
+template <class T, std::size_t Bytes>
+void compute_links(const View<T, Bytes>& s, std::size_t begin, std::size_t end) {
+  using V = typename View<T, Bytes>::V;
   std::size_t row = 0;
   const T* c = s.state.held;
   for (const GridLinks& links : s.grid.links) {
@@ -179,10 +231,11 @@ void compute_links(const View<T>& s, std::size_t begin, std::size_t end) {
 }
 
 // The masses in the packs [begin, end), by the forces of n offsets.
-template <std::size_t n, bool is_pulled, class T>
-void move_packs(const View<T>& s, const Mover<T>& mover, std::size_t begin, std::size_t end) {
-  using V = typename View<T>::V;
-  constexpr std::size_t lanes = View<T>::lanes;
+template <std::size_t n, bool is_pulled, class T, std::size_t Bytes>
+void move_packs(const View<T, Bytes>& s, const Mover<T>& mover, std::size_t begin,
+                std::size_t end) {
+  using V = typename View<T, Bytes>::V;
+  constexpr std::size_t lanes = View<T, Bytes>::lanes;
   const T* from_here[n];
   const T* from_below[n];
   for (std::size_t i = 0; i < n; ++i) {
@@ -216,8 +269,8 @@ void move_packs(const View<T>& s, const Mover<T>& mover, std::size_t begin, std:
 }
 
 // The links of the grid will be computed in the next sample, with the coefficients of this one.
-template <class T>
-void hold(const View<T>& s) {
+template <class T, std::size_t Bytes>
+void hold(const View<T, Bytes>& s) {
   T* held = s.state.held;
   for (const GridLinks& links : s.grid.links) {
     for (const std::uint32_t c : s.program.link_runs[links.run].coefficients) {
@@ -229,10 +282,10 @@ void hold(const View<T>& s) {
 
 // Links as of the last sample, and the masses moved by them, some packs at a time: far enough
 // apart that no force is read while it is still on its way to memory.
-template <class T>
-void step_links(const View<T>& s, const Mover<T>& mover, bool is_pulled) {
+template <class T, std::size_t Bytes>
+void step_links(const View<T, Bytes>& s, const Mover<T>& mover, bool is_pulled) {
   constexpr std::size_t stride = 32;
-  const std::size_t packs = s.grid.count / View<T>::lanes;
+  const std::size_t packs = s.grid.count / View<T, Bytes>::lanes;
   for (std::size_t begin = 0; begin < packs; begin += stride) {
     const std::size_t end = begin + stride < packs ? begin + stride : packs;
     if (!s.state.is_fresh) {
@@ -247,8 +300,8 @@ void step_links(const View<T>& s, const Mover<T>& mover, bool is_pulled) {
 }
 
 // Masses outside the grid; their links are in `force`.
-template <class T>
-void step_loose(const View<T>& s) {
+template <class T, std::size_t Bytes>
+void step_loose(const View<T, Bytes>& s) {
   for (const GridLoose& loose : s.grid.loose) {
     const MassRun& run = s.program.mass_runs[loose.mass_run];
     const Mover<T> mover(run, s.state.ramps.value);
@@ -260,8 +313,8 @@ void step_loose(const View<T>& s) {
 }
 
 // Moves what moves further, and makes it faster.
-template <class T>
-void move(const View<T>& s, std::uint32_t slot, T further, T faster) {
+template <class T, std::size_t Bytes>
+void move(const View<T, Bytes>& s, std::uint32_t slot, T further, T faster) {
   if (s.state.inverse_mass[slot] == grid_fixed) {
     return;
   }
@@ -277,8 +330,8 @@ void move(const View<T>& s, std::uint32_t slot, T further, T faster) {
 }
 
 // A force f moves a mass by f/M more, which may as well be added when it has moved.
-template <class T>
-void push(const View<T>& s, std::uint32_t slot) {
+template <class T, std::size_t Bytes>
+void push(const View<T, Bytes>& s, std::uint32_t slot) {
   const T* const c = s.state.ramps.value;
   const std::uint32_t inverse_mass = s.state.inverse_mass[slot];
   const T force = s.state.force[slot];
@@ -290,8 +343,8 @@ void push(const View<T>& s, std::uint32_t slot) {
   move(s, slot, more, more);
 }
 
-template <class T>
-void push_ports(const View<T>& s) {
+template <class T, std::size_t Bytes>
+void push_ports(const View<T, Bytes>& s) {
   for (const std::uint32_t slot : s.grid.ports) {
     push(s, slot);
   }
@@ -302,15 +355,15 @@ void push_ports(const View<T>& s) {
 }
 
 // Calls use(slot, weight) for the up to four nodes around a tap's place.
-template <class T, class Use>
-void around(const View<T>& s, std::size_t tap, Use&& use) {
+template <class T, std::size_t Bytes, class Use>
+void around(const View<T, Bytes>& s, std::size_t tap, Use&& use) {
   each_corner(s.state.corners[tap], [&](std::uint32_t node, T weight) {
     use(s.grid.slot[s.program.tap_nodes[node]], weight);
   });
 }
 
-template <class T>
-void place_taps(const View<T>& s) {
+template <class T, std::size_t Bytes>
+void place_taps(const View<T, Bytes>& s) {
   const T* const c = s.state.ramps.value;
   for (std::size_t i = 0; i < s.program.taps.size(); ++i) {
     const TapSlot& tap = s.program.taps[i];
@@ -318,8 +371,8 @@ void place_taps(const View<T>& s) {
   }
 }
 
-template <class T>
-void move_taps(const View<T>& s) {
+template <class T, std::size_t Bytes>
+void move_taps(const View<T, Bytes>& s) {
   for (std::size_t i = 0; i < s.program.taps.size(); ++i) {
     T position = T(0);
     around(s, i, [&](std::uint32_t slot, T weight) { position += weight * s.state.x[slot]; });
@@ -330,8 +383,8 @@ void move_taps(const View<T>& s) {
 }
 
 // What acts on the points goes to the nodes around them.
-template <class T>
-void spread_taps(const View<T>& s) {
+template <class T, std::size_t Bytes>
+void spread_taps(const View<T, Bytes>& s) {
   for (std::size_t i = 0; i < s.program.taps.size(); ++i) {
     const std::uint32_t point = s.grid.slot[s.program.taps[i].node];
     const T force = s.state.force[point];
@@ -343,8 +396,8 @@ void spread_taps(const View<T>& s) {
   }
 }
 
-template <class T>
-[[gnu::flatten]] void step_rest(const View<T>& s) {
+template <class T, std::size_t Bytes>
+[[gnu::flatten]] void step_rest(const View<T, Bytes>& s) {
   const T* const c = s.state.ramps.value;
   for (const GridRest& rest : s.grid.rest) {
     const LinkRun& run = s.program.link_runs[rest.run];
@@ -363,7 +416,7 @@ template <class T>
 }
 
 // Links that are not plain.
-template <class T>
+template <class T, std::size_t Bytes>
 struct Passive {
   T coefficient(std::uint32_t c) const { return s.state.ramps.value[c]; }
   T awake() const { return *s.state.awake; }
@@ -383,32 +436,32 @@ struct Passive {
     return inverse_mass == grid_fixed ? T(0) : coefficient(inverse_mass);
   }
 
-  const View<T>& s;
+  const View<T, Bytes>& s;
 };
 
-template <class T>
-[[gnu::noinline]] void remember_links(const View<T>& s) {
-  remember(s.state.passive, s.state.memory, Passive<T>{s});
+template <class T, std::size_t Bytes>
+[[gnu::noinline]] void remember_links(const View<T, Bytes>& s) {
+  remember(s.state.passive, s.state.memory, Passive<T, Bytes>{s});
 }
 
-template <class T>
-[[gnu::noinline]] void correct_links(const View<T>& s) {
-  Passive<T> body{s};
+template <class T, std::size_t Bytes>
+[[gnu::noinline]] void correct_links(const View<T, Bytes>& s) {
+  Passive<T, Bytes> body{s};
   correct(s.state.passive, s.state.memory, s.state.solver, body);
   *s.state.awake = 1;
 }
 
 // What acts in the next sample, except what the segments and the links of the grid do by
 // themselves.
-template <class T>
-void pull(const View<T>& s) {
+template <class T, std::size_t Bytes>
+void pull(const View<T, Bytes>& s) {
   step_rest(s);
   spread_taps(s);
 }
 
-template <class T>
+template <class T, std::size_t Bytes>
 void step(const Program& program, const Grid& grid, GridState<T>& state, const Block<T>& block) {
-  const View<T> s{program, grid, state};
+  const View<T, Bytes> s{program, grid, state};
   const MassRun& masses = program.mass_runs[grid.mass_run];
   const T* value = block.value;
   const T* velocity = block.velocity;
@@ -458,11 +511,20 @@ void step(const Program& program, const Grid& grid, GridState<T>& state, const B
   }
 }
 
-template <class T>
+template <class T, std::size_t Bytes>
 void pull_alone(const Program& program, const Grid& grid, GridState<T>& state) {
-  const View<T> s{program, grid, state};
+  const View<T, Bytes> s{program, grid, state};
   hold(s);
   pull(s);
+}
+
+template <class T>
+GridLoops<T> loops_for(std::size_t bytes) {
+  constexpr std::size_t widest = vector_bytes(Isa::RESSORT_ISA);
+  return with_bytes < widest,
+         widest == 64 ? 32 : widest > (bytes, []<std::size_t pack>() {
+                               return GridLoops<T>{step<T, pack>, pull_alone<T, pack>};
+                             });
 }
 
 }  // namespace
@@ -471,13 +533,13 @@ void pull_alone(const Program& program, const Grid& grid, GridState<T>& state) {
 namespace ressort {
 
 template <>
-GridLoops<float> grid_loops<Isa::RESSORT_ISA, float>() {
-  return {RESSORT_ISA::step<float>, RESSORT_ISA::pull_alone<float>};
+GridLoops<float> grid_loops<Isa::RESSORT_ISA, float>(std::size_t bytes) {
+  return RESSORT_ISA::loops_for<float>(bytes);
 }
 
 template <>
-GridLoops<double> grid_loops<Isa::RESSORT_ISA, double>() {
-  return {RESSORT_ISA::step<double>, RESSORT_ISA::pull_alone<double>};
+GridLoops<double> grid_loops<Isa::RESSORT_ISA, double>(std::size_t bytes) {
+  return RESSORT_ISA::loops_for<double>(bytes);
 }
 
 }  // namespace ressort
