@@ -4,6 +4,7 @@
 #include <map>
 #include <numeric>
 #include <set>
+#include <span>
 
 #include "core/groups.h"
 
@@ -42,9 +43,11 @@ std::vector<PassiveLink> passive_links_of(const Program& program) {
 }
 
 // Eliminates the mass with the fewest neighbours first, and lets its neighbours know each other.
+// Behind the masses are places, which stay, and know each other from the start.
 class Eliminator {
  public:
-  explicit Eliminator(std::size_t masses) : neighbours_(masses) {}
+  Eliminator(std::size_t masses, std::size_t places)
+      : masses_(masses), neighbours_(masses + places) {}
 
   void meet(std::uint32_t a, std::uint32_t b) {
     if (a != b) {
@@ -53,15 +56,18 @@ class Eliminator {
     }
   }
 
-  // [mass] when it is eliminated; nothing if that fills in more than a sample has time for.
+  // [end] its number, masses as they are eliminated; nothing if that fills in more than a sample
+  // has time for.
   std::vector<std::uint32_t> order() {
     constexpr std::size_t most_products = std::size_t{1} << 21;
-    std::size_t products = 0;
+    const std::size_t places = neighbours_.size() - masses_;
+    std::size_t products = places * places * places;
     std::set<std::pair<std::size_t, std::uint32_t>> waiting;
-    for (std::uint32_t mass = 0; mass < neighbours_.size(); ++mass) {
+    for (std::uint32_t mass = 0; mass < masses_; ++mass) {
       waiting.insert({neighbours_[mass].size(), mass});
     }
     std::vector<std::uint32_t> place(neighbours_.size());
+    std::iota(place.begin(), place.end(), 0u);
     std::vector<std::vector<std::uint32_t>> columns;
     while (!waiting.empty()) {
       const std::uint32_t mass = waiting.begin()->second;
@@ -74,14 +80,16 @@ class Eliminator {
       }
       columns.emplace_back(near.begin(), near.end());
       for (const std::uint32_t one : near) {
-        waiting.erase({neighbours_[one].size(), one});
+        const bool waits = one < masses_ && waiting.erase({neighbours_[one].size(), one}) > 0;
         neighbours_[one].erase(mass);
         for (const std::uint32_t other : near) {
           if (other != one) {
             neighbours_[one].insert(other);
           }
         }
-        waiting.insert({neighbours_[one].size(), one});
+        if (waits) {
+          waiting.insert({neighbours_[one].size(), one});
+        }
       }
     }
     tabulate(columns, place);
@@ -96,20 +104,28 @@ class Eliminator {
  private:
   void tabulate(std::vector<std::vector<std::uint32_t>>& columns,
                 const std::vector<std::uint32_t>& place) {
-    const auto masses = static_cast<std::uint32_t>(columns.size());
-    elimination_.first.push_back(0);
-    for (std::uint32_t column = 0; column < masses; ++column) {
-      for (std::uint32_t& mass : columns[column]) {
-        mass = place[mass];
+    const auto ends = static_cast<std::uint32_t>(place.size());
+    for (std::vector<std::uint32_t>& column : columns) {
+      for (std::uint32_t& end : column) {
+        end = place[end];
       }
-      std::sort(columns[column].begin(), columns[column].end());
+      std::sort(column.begin(), column.end());
+    }
+    while (columns.size() < ends) {
+      columns.emplace_back(ends - columns.size() - 1);
+      std::iota(columns.back().begin(), columns.back().end(),
+                static_cast<std::uint32_t>(columns.size()));
+    }
+    elimination_.first.push_back(0);
+    for (std::uint32_t column = 0; column < ends; ++column) {
       for (const std::uint32_t row : columns[column]) {
-        entries_[{column, row}] = masses + static_cast<std::uint32_t>(elimination_.row.size());
+        entries_[{column, row}] = ends + static_cast<std::uint32_t>(elimination_.row.size());
         elimination_.row.push_back(row);
       }
       elimination_.first.push_back(static_cast<std::uint32_t>(elimination_.row.size()));
     }
-    for (const std::vector<std::uint32_t>& column : columns) {
+    for (std::size_t mass = 0; mass < masses_; ++mass) {
+      const std::vector<std::uint32_t>& column = columns[mass];
       for (std::size_t i = 0; i < column.size(); ++i) {
         for (std::size_t k = 0; k <= i; ++k) {
           elimination_.target.push_back(entry(column[k], column[i]));
@@ -118,57 +134,87 @@ class Eliminator {
     }
   }
 
+  std::size_t masses_;
   std::vector<std::set<std::uint32_t>> neighbours_;
   std::map<std::pair<std::uint32_t, std::uint32_t>, std::uint32_t> entries_;
   Elimination elimination_;
 };
 
-// By its masses, if it has no places.
-void find_elimination(const Program& program, std::vector<PassiveLink>& links, Cluster& cluster) {
-  const auto first = links.begin() + cluster.first;
-  const auto end = first + cluster.count;
-  std::map<std::uint32_t, std::uint32_t> masses;
-  for (auto link = first; link != end; ++link) {
-    for (const std::uint32_t node : {link->ends.a, link->ends.b}) {
-      if (is_place(program, node)) {
-        return;
-      }
+// What links hold that moves, each with its number: masses, and then places. Nobody but places
+// holds the masses of a macro.
+struct Held {
+  std::map<std::uint32_t, std::uint32_t> ends;  // by node
+  std::size_t masses = 0;
+};
+
+Held held_by(const Program& program, std::span<const PassiveLink> links) {
+  std::set<std::uint32_t> places;
+  Held held;
+  const auto count = [&](std::uint32_t node) {
+    held.ends.try_emplace(node, static_cast<std::uint32_t>(held.ends.size()));
+  };
+  for (const PassiveLink& link : links) {
+    for (const std::uint32_t node : {link.ends.a, link.ends.b}) {
       if (node < program.moving) {
-        masses.try_emplace(node, static_cast<std::uint32_t>(masses.size()));
+        count(node);
+      } else if (is_place(program, node)) {
+        places.insert(node);
       }
     }
   }
-  const auto mass_of = [&](std::uint32_t node) {
-    return node < program.moving ? masses.at(node) : no_mass;
+  held.masses = held.ends.size();
+  std::for_each(places.begin(), places.end(), count);
+  return held;
+}
+
+// By what it holds, if its links are not fewer than the places among that.
+void find_elimination(const Program& program, std::vector<PassiveLink>& all, Cluster& cluster) {
+  const std::span<PassiveLink> links = std::span(all).subspan(cluster.first, cluster.count);
+  const Held held = held_by(program, links);
+  const std::size_t places = held.ends.size() - held.masses;
+  if (2 * places > links.size()) {
+    return;
+  }
+  const auto number_of = [&](std::uint32_t node) {
+    const auto end = held.ends.find(node);
+    return end == held.ends.end() ? no_mass : end->second;
   };
-  Eliminator eliminator(masses.size());
-  for (auto link = first; link != end; ++link) {
-    link->mass_a = mass_of(link->ends.a);
-    link->mass_b = mass_of(link->ends.b);
-    if (link->mass_a != no_mass && link->mass_b != no_mass) {
-      eliminator.meet(link->mass_a, link->mass_b);
+  Eliminator eliminator(held.masses, places);
+  for (PassiveLink& link : links) {
+    link.mass_a = number_of(link.ends.a);
+    link.mass_b = number_of(link.ends.b);
+    if (link.mass_a != no_mass && link.mass_b != no_mass) {
+      eliminator.meet(link.mass_a, link.mass_b);
     }
   }
   std::vector<std::uint32_t> place = eliminator.order();
   const bool is_factorised = !place.empty();
+  if (!is_factorised && places > 0) {
+    return;
+  }
   if (!is_factorised) {
-    place.resize(masses.size());
+    place.resize(held.masses);
     std::iota(place.begin(), place.end(), 0u);
   }
-  for (auto link = first; link != end; ++link) {
-    for (std::uint32_t* mass : {&link->mass_a, &link->mass_b}) {
-      *mass = *mass == no_mass ? no_mass : place[*mass];
+  for (PassiveLink& link : links) {
+    for (std::uint32_t* end : {&link.mass_a, &link.mass_b}) {
+      *end = *end == no_mass ? no_mass : place[*end];
     }
-    if (is_factorised && link->mass_a != no_mass && link->mass_b != no_mass &&
-        link->mass_a != link->mass_b) {
-      link->entry = eliminator.entry(link->mass_a, link->mass_b);
+    if (is_factorised && link.mass_a != no_mass && link.mass_b != no_mass &&
+        link.mass_a != link.mass_b) {
+      link.entry = eliminator.entry(link.mass_a, link.mass_b);
     }
   }
   cluster.elimination = eliminator.elimination();
-  cluster.inverse_mass.resize(masses.size());
+  cluster.inverse_mass.resize(held.masses);
+  cluster.places.resize(places);
   const std::vector<std::uint32_t> inverse_mass = inverse_masses(program);
-  for (const auto& [node, mass] : masses) {
-    cluster.inverse_mass[place[mass]] = inverse_mass[node];
+  for (const auto& [node, end] : held.ends) {
+    if (end < held.masses) {
+      cluster.inverse_mass[place[end]] = inverse_mass[node];
+    } else {
+      cluster.places[end - held.masses] = node;
+    }
   }
 }
 
@@ -176,8 +222,8 @@ void find_elimination(const Program& program, std::vector<PassiveLink>& links, C
 
 std::size_t Cluster::numbers() const {
   const std::size_t own = joint_numbers * count;
-  return inverse_mass.empty() ? own + std::size_t{2} * count * count + std::size_t{5} * count
-                              : own + 9 * inverse_mass.size() + elimination.row.size();
+  return ends() == 0 ? own + std::size_t{2} * count * count + std::size_t{5} * count
+                     : own + 9 * ends() + elimination.row.size() + place_numbers(places.size());
 }
 
 bool holds_places(const Program& program) {
@@ -198,7 +244,7 @@ std::vector<std::uint32_t> inverse_masses(const Program& program) {
   return coefficients;
 }
 
-PassiveTables passive_tables(const Program& program, bool by_links) {
+PassiveTables passive_tables(const Program& program) {
   std::vector<PassiveLink> links = passive_links_of(program);
   Groups groups(program.moving);  // which links move each other, by the masses that they move
   std::vector<std::uint32_t> any(links.size(), no_mass);  // [link] a mass that it moves
@@ -213,9 +259,7 @@ PassiveTables passive_tables(const Program& program, bool by_links) {
   std::map<std::uint32_t, std::vector<std::size_t>> of_group;
   PassiveTables tables;
   for (std::size_t i = 0; i < links.size(); ++i) {
-    if (by_links) {
-      of_group[0].push_back(i);
-    } else if (any[i] == no_mass) {
+    if (any[i] == no_mass) {
       tables.links.push_back(links[i]);
     } else {
       of_group[groups.find(any[i])].push_back(i);
@@ -234,9 +278,7 @@ PassiveTables passive_tables(const Program& program, bool by_links) {
       for (const std::size_t i : members) {
         tables.links.push_back(links[i]);
       }
-      if (!by_links) {
-        find_elimination(program, tables.links, tables.clusters.back());
-      }
+      find_elimination(program, tables.links, tables.clusters.back());
     }
   }
   return tables;

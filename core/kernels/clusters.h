@@ -13,21 +13,27 @@ namespace ressort {
 inline constexpr std::uint32_t no_mass = 0xffffffffu;
 inline constexpr std::size_t joint_numbers = 13;  // of a link while it is solved: Joined in joint.h
 
+// Of places while they are solved: Places in joint_places.h.
+constexpr std::size_t place_numbers(std::size_t places) {
+  return 4 * places * places + 2 * places;
+}
+
 struct PassiveLink {
   Law law{};
   std::array<std::uint32_t, most_law_arguments> coefficients{};
   Ends ends;  // nodes; a kernel puts its own places instead
-  // Of its cluster, where that is solved by its masses; or no_mass.
+  // Ends of its cluster, where that is solved by what it holds; or no_mass.
   std::uint32_t mass_a = no_mass;
   std::uint32_t mass_b = no_mass;
   std::uint32_t entry = no_mass;  // where both meet in the matrix
 };
 
-// How a symmetric matrix over masses is factorised, L D L^T, without looking for anything: its
-// numbers are the diagonal, then the entries below it, column by column, fill-in and all.
+// How a symmetric matrix over a cluster's ends is factorised, L D L^T, as far as they are masses,
+// without looking for anything: its numbers are the diagonal, then the entries below it, column by
+// column, fill-in and all.
 struct Elimination {
-  std::vector<std::uint32_t> first;   // [mass + 1] of its column's entries
-  std::vector<std::uint32_t> row;     // [entry] mass
+  std::vector<std::uint32_t> first;   // [end + 1] of its column's entries
+  std::vector<std::uint32_t> row;     // [entry] end
   std::vector<std::uint32_t> target;  // the number that each product is taken from, in order
 };
 
@@ -35,12 +41,15 @@ struct Elimination {
 struct Cluster {
   std::uint32_t first = 0;  // links
   std::uint32_t count = 0;
-  // Of masses in the order of elimination, if they have a factor; none where it is solved by its
-  // links, as places on macros move many masses by shares that change.
-  std::vector<std::uint32_t> inverse_mass;  // coefficients
+  // What its links hold, its ends: masses in the order of elimination, if they have a factor, and
+  // then places on macros. A force on one of those moves the others, by shares that change. None:
+  // it is solved by its links, which are fewer than the places.
+  std::vector<std::uint32_t> inverse_mass;  // [mass] coefficient
+  std::vector<std::uint32_t> places;        // [place] node
   Elimination elimination;
 
   std::size_t numbers() const;  // that solving it needs in each lane
+  std::size_t ends() const { return inverse_mass.size() + places.size(); }
   bool has_factor() const { return !elimination.first.empty(); }
   // Whether that takes so much longer than the links that it is mostly gone without.
   bool is_large() const {
@@ -54,9 +63,8 @@ struct PassiveTables {
   std::vector<Cluster> clusters;
 };
 
-// `by_links`: all links that are not plain as one cluster solved by its links.
 // O(links + fill-in of the clusters)
-PassiveTables passive_tables(const Program& program, bool by_links = false);
+PassiveTables passive_tables(const Program& program);
 
 // Whether any link that is not plain holds a place on a macro.
 bool holds_places(const Program& program);

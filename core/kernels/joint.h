@@ -5,8 +5,7 @@
 //
 // B being which masses a link pulls at. Where every f_l rises, as that of a convex potential does,
 // this is the only minimum of 1/2 |u|^2_M + the sum of what f_l is the slope of. It is found by
-// Newton's method with a line search; his steps are by a sparse factor of M + B S B^T over the
-// masses, or by a dense one of I + S^1/2 C S^1/2 over the links, S >= 0 being the laws' slopes.
+// Newton's method with a line search (joint_space.h).
 //
 // A link makes as much energy as (f_l(s_l) - f_l) s_l, where f_l is what it does exert. Whatever
 // is left of that when time is up is taken out: every link then exerts f_l(0) + c s_l, and c is
@@ -396,9 +395,9 @@ template <class V, class Body>
   auto* const joined = reinterpret_cast<Joined<V>*>(numbers);
   V* const rest = numbers + joint_numbers * cluster.count;
   if constexpr (requires { body.shift(0u, V{}); }) {
-    if (!cluster.inverse_mass.empty()) {
-      ByMasses<V> space(first, cluster, rest, body);
-      Joint<V, Body, ByMasses<V>>(first, cluster.count, memory, joined, space, body).solve();
+    if (cluster.ends() > 0) {
+      ByEnds<V, Body> space(first, cluster, rest, body);
+      Joint<V, Body, ByEnds<V, Body>>(first, cluster.count, memory, joined, space, body).solve();
       return;
     }
   }

@@ -1,11 +1,11 @@
-// core/kernels: Newton's steps for a cluster of passive links (joint.h), by a sparse factor of
-// M + B S B^T over the masses or by a dense one of I + S^1/2 C S^1/2 over the links, S >= 0 being
-// the slopes of what they exert.
+// core/kernels: Newton's steps for a cluster of passive links (joint.h), S >= 0 being the slopes of
+// what they exert: by a sparse factor of M + B S B^T over the masses that they hold and, once these
+// are eliminated, a dense one over the places; or by one of I + S^1/2 C S^1/2 over the links.
 #pragma once
 
 #include <algorithm>
 
-#include "core/kernels/clusters.h"
+#include "core/kernels/joint_places.h"
 #include "core/laws/laws.h"
 
 namespace ressort {
@@ -48,53 +48,54 @@ static inline V coupling_of(const Body& body, Ends one, Ends other) {
   return (body.gamma({a, d}) + body.gamma({b, c}) - body.gamma({a, c}) - body.gamma({b, d})) / 2;
 }
 
-// Steps of a cluster's links, by its masses.
-template <class V>
-class ByMasses {
+// Steps of a cluster's links, by what they hold: masses, and behind them places.
+template <class V, class Body>
+class ByEnds {
  public:
-  template <class Body>
-  ByMasses(const PassiveLink* links, const Cluster& cluster, V* numbers, const Body& body)
+  ByEnds(const PassiveLink* links, const Cluster& cluster, V* numbers, Body& body)
       : links_(links),
         cluster_(cluster),
-        count_(cluster.inverse_mass.size()),
+        masses_(cluster.inverse_mass.size()),
+        count_(cluster.ends()),
         give_(numbers),
         mass_(give_ + count_),
         at_(mass_ + count_),
         way_(at_ + count_),
         x_(way_ + count_),
-        matrix_(x_ + count_) {
+        matrix_(x_ + count_),
+        places_(cluster.places, numbers + 9 * count_ + cluster.elimination.row.size(),
+                at_ + masses_, body) {
     constexpr Scalar<V> least = Scalar<V>(1e-30);
-    for (std::size_t i = 0; i < count_; ++i) {
+    for (std::size_t i = 0; i < masses_; ++i) {
       const V give = body.coefficient(cluster.inverse_mass[i]);
       give_[i] = select(give > least, give, V{} + least);
       mass_[i] = 1 / give_[i];
       at_[i] = V{};
-      way_[i] = V{};
     }
+    std::fill_n(way_, count_, V{});
   }
 
   // From here on, what forces do to the ways of all links.
   template <class Lanes>
   void rest(Lanes live) {
-    for (std::size_t i = 0; i < count_; ++i) {
+    for (std::size_t i = 0; i < masses_; ++i) {
       at_[i] = select(live, V{}, at_[i]);
     }
+    places_.rest(live);
   }
   void pull(std::size_t link, V force) {
     const auto [a, b] = ends(link);
-    if (a != no_mass) {
-      at_[a] -= give_[a] * force;
-    }
-    if (b != no_mass) {
-      at_[b] += give_[b] * force;
-    }
+    pull_mass(a, V{} - force);
+    pull_mass(b, force);
+    press(a, V{} - force);
+    press(b, force);
   }
   V pulled(std::size_t link) const { return between(at_, link); }
 
   // Newton's way from where the masses are, which may be where forces are so large that nothing is
   // left of what they add up to.
   void solve(Joined<V>* joined, bool is_exact) {
-    if (cluster_.has_factor() && (is_exact || !cluster_.is_large())) {
+    if (cluster_.has_factor() && (is_exact || !cluster_.is_large() || has_places())) {
       fill(joined);
       factorise();
       substitute();
@@ -115,10 +116,19 @@ class ByMasses {
       way_[i] = select(keeps, way_[i], x_[i]);
     }
   }
+  // Places to where their forces bring them, lest rounding adds up.
   template <class Lanes>
-  void go(const Joined<V>*, Lanes live, V share) {
-    for (std::size_t i = 0; i < count_; ++i) {
+  void go(const Joined<V>* joined, Lanes live, V share) {
+    for (std::size_t i = 0; i < masses_; ++i) {
       at_[i] = select(live, at_[i] + share * way_[i], at_[i]);
+    }
+    if (has_places()) {
+      places_.rest(live);
+      for (std::size_t i = 0; i < cluster_.count; ++i) {
+        const V force = select(live, joined[i].force, V{});
+        press(ends(i).a, V{} - force);
+        press(ends(i).b, force);
+      }
     }
   }
   // To where their forces bring them.
@@ -131,41 +141,60 @@ class ByMasses {
   }
   // Each mass by all that it has moved, as links that are much harder than it is heavy push it to
   // and fro. Only once.
-  template <class Body>
   void push(const Joined<V>* joined, Body& body) {
-    const auto shift = [&](std::uint32_t node, std::uint32_t mass) {
-      if (mass != no_mass) {
-        body.shift(node, at_[mass]);
-        at_[mass] = V{};
+    const auto shift = [&](std::uint32_t node, std::uint32_t end, V force) {
+      if (is_mass(end)) {
+        body.shift(node, at_[end]);
+        at_[end] = V{};
+      }
+      if (is_mass(end) || end == no_mass) {
+        body.feel(node, force);
       }
     };
     for (std::size_t i = 0; i < cluster_.count; ++i) {
-      shift(links_[i].ends.a, links_[i].mass_a);
-      shift(links_[i].ends.b, links_[i].mass_b);
-      body.feel(links_[i].ends, joined[i].force);
+      shift(links_[i].ends.a, links_[i].mass_a, V{} - joined[i].force);
+      shift(links_[i].ends.b, links_[i].mass_b, joined[i].force);
+    }
+    if constexpr (HasPlaces<Body, V>) {
+      places_.push();
     }
   }
   // How 1/2 |u|^2_M rises along the way.
   V inertia_along(const Joined<V>*) const {
     V sum{};
-    for (std::size_t i = 0; i < count_; ++i) {
+    for (std::size_t i = 0; i < masses_; ++i) {
       sum += way_[i] * mass_[i] * at_[i];
     }
-    return sum;
+    return has_places() ? sum + places_.inertia_along(way_ + masses_) : sum;
   }
 
  private:
+  bool has_places() const { return HasPlaces<Body, V> && masses_ < count_; }
+  bool is_mass(std::uint32_t end) const { return end < masses_; }
   Ends ends(std::size_t link) const { return {links_[link].mass_a, links_[link].mass_b}; }
   V between(const V* x, std::size_t link) const {
     const auto [a, b] = ends(link);
     return (a == no_mass ? V{} : x[a]) - (b == no_mass ? V{} : x[b]);
   }
+  void pull_mass(std::uint32_t end, V force) {
+    if (is_mass(end)) {
+      at_[end] += give_[end] * force;
+    }
+  }
+  void press(std::uint32_t end, V force) {
+    if constexpr (HasPlaces<Body, V>) {
+      if (end != no_mass && !is_mass(end) && any_of(force != V{})) {
+        places_.press(end - masses_, force);
+      }
+    }
+  }
 
+  // Places by what links exert and should not, masses by all that moves them.
   void fill(const Joined<V>* joined) {
     const std::size_t size = count_ + cluster_.elimination.row.size();
     for (std::size_t i = 0; i < count_; ++i) {
-      matrix_[i] = mass_[i];
-      x_[i] = V{} - mass_[i] * at_[i];
+      matrix_[i] = is_mass(static_cast<std::uint32_t>(i)) ? mass_[i] : V{};
+      x_[i] = is_mass(static_cast<std::uint32_t>(i)) ? V{} - mass_[i] * at_[i] : V{};
     }
     for (std::size_t i = count_; i < size; ++i) {
       matrix_[i] = V{};
@@ -175,13 +204,15 @@ class ByMasses {
       if (a == b) {
         continue;
       }
+      const V value = joined[i].value;
+      const V off = value - joined[i].force;
       if (a != no_mass) {
         matrix_[a] += joined[i].slope;
-        x_[a] -= joined[i].value;
+        x_[a] -= is_mass(a) ? value : off;
       }
       if (b != no_mass) {
         matrix_[b] += joined[i].slope;
-        x_[b] += joined[i].value;
+        x_[b] += is_mass(b) ? value : off;
       }
       if (links_[i].entry != no_mass) {
         matrix_[links_[i].entry] -= joined[i].slope;
@@ -256,7 +287,7 @@ class ByMasses {
   void factorise() {
     const Elimination& plan = cluster_.elimination;
     const std::uint32_t* target = plan.target.data();
-    for (std::size_t column = 0; column < count_; ++column) {
+    for (std::size_t column = 0; column < masses_; ++column) {
       V* const below = matrix_ + count_ + plan.first[column];
       const std::size_t entries = plan.first[column + 1] - plan.first[column];
       // What a mass alone has is the least; rounding may have taken it where links are very stiff.
@@ -278,13 +309,18 @@ class ByMasses {
   void substitute() {
     const Elimination& plan = cluster_.elimination;
     const V* const entries = matrix_ + count_;
-    for (std::size_t column = 0; column < count_; ++column) {
+    for (std::size_t column = 0; column < masses_; ++column) {
       for (std::size_t i = plan.first[column]; i < plan.first[column + 1]; ++i) {
         x_[plan.row[i]] -= entries[i] * x_[column];
       }
       x_[column] *= matrix_[column];
     }
-    for (std::size_t column = count_; column-- > 0;) {
+    if constexpr (HasPlaces<Body, V>) {
+      if (has_places()) {
+        places_.solve(matrix_ + masses_, entries + plan.first[masses_], x_ + masses_);
+      }
+    }
+    for (std::size_t column = masses_; column-- > 0;) {
       for (std::size_t i = plan.first[column]; i < plan.first[column + 1]; ++i) {
         x_[column] -= entries[i] * x_[plan.row[i]];
       }
@@ -293,13 +329,15 @@ class ByMasses {
 
   const PassiveLink* links_;
   const Cluster& cluster_;
+  std::size_t masses_;
   std::size_t count_;
   V* give_;
   V* mass_;
-  V* at_;   // how far forces have brought each mass
+  V* at_;   // how far forces have brought each end
   V* way_;  // and where it goes from there
   V* x_;
   V* matrix_;
+  Places<V, Body> places_;
 };
 
 // The same by the links, of those alone that exert anything or may.

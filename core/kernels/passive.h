@@ -14,9 +14,8 @@ namespace ressort {
 // What passive links keep from one sample to the next, and what solving them needs.
 template <class T>
 struct PassiveRoom {
-  // `by_links` as of passive_tables().
-  PassiveRoom(const Program& program, std::size_t width, bool by_links = false)
-      : tables(passive_tables(program, by_links)),
+  PassiveRoom(const Program& program, std::size_t width)
+      : tables(passive_tables(program)),
         memory(tables.links.size() * passive_rows * width),
         awake(width) {
     if (tables.links.empty()) {
@@ -48,11 +47,16 @@ struct PassiveRoom {
 //   V distance(ends), speed(ends)          the same once all has moved, points too
 //   V gamma(ends)                          how far they give way to a force of 1
 //   void push(ends, V force)               a by -force and b by force, times their inverse masses
-//   void shift(node, V way)                the same of one mass, where masses are nodes of their
-//   own void feel(ends, V force)               and what an output of force hears of it V
-//   coefficient(c) V awake()                              0 in the first sample after set_state(),
-//   -1 if it was let
+//   V coefficient(c)
+//   V awake()                              0 in the first sample after set_state(), -1 if it was
+//   let
 //                                          go, else 1
+// Where masses are nodes of their own:
+//   void shift(node, V way)                one of them
+//   void feel(node, V force)               and what an output of force hears of that
+// and where there are places:
+//   V give(from, at)                       how far a node is moved by a force of 1 on another
+//   void push_node(node, V force)          one end alone
 
 // Before anything moves. `memory` is [link][passive_rows] packs.
 template <class V, class Body>

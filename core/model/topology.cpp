@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <map>
 #include <numbers>
+#include <tuple>
 #include <utility>
 
 #include "core/laws/laws.h"
@@ -153,8 +154,8 @@ void add_modes(const Network& network, std::uint32_t body, const Progress& progr
   }
 }
 
-// A place on a waveguide is a node of its own, one for all ends that name the same.
-void add_junctions(const Network& network, Network& expanded) {
+// A place on a macro is one node for all ends that name the same, and on a waveguide a junction.
+void join_places(const Network& network, Network& expanded) {
   std::vector<std::uint32_t> waveguide;  // [macro] which of the waveguides it is
   for (const Macro& macro : network.macros) {
     waveguide.push_back(static_cast<std::uint32_t>(expanded.waveguides.size()));
@@ -162,23 +163,26 @@ void add_junctions(const Network& network, Network& expanded) {
       expanded.waveguides.push_back(macro);
     }
   }
-  std::map<std::pair<std::uint32_t, ArgumentId>, std::uint32_t> known;
+  std::map<std::tuple<std::uint32_t, ArgumentId, ArgumentId>, std::uint32_t> known;
   std::vector<std::uint32_t> same(expanded.masses.size());  // [mass] which one stands for it
   for (std::uint32_t i = 0; i < same.size(); ++i) {
     Mass& mass = expanded.masses[i];
     same[i] = i;
-    if (mass.kind != MassKind::point ||
-        !is_waveguide(network.macros[expanded.taps[mass.tap].macro].kind)) {
+    if (mass.kind != MassKind::point) {
       continue;
     }
     Tap& tap = expanded.taps[mass.tap];
     const Macro& macro = network.macros[tap.macro];
-    same[i] = known.try_emplace({tap.macro, tap.u}, i).first->second;
-    tap.macro = waveguide[tap.macro];
-    mass.kind = same[i] == i ? MassKind::junction : MassKind::ground;  // that nobody holds
-    mass.mass = same[i] == i ? macro.impedance : no_argument;
-    mass.position = macro.position;
-    mass.is_fixed = macro.is_fixed;
+    same[i] = known.try_emplace({tap.macro, tap.u, tap.v}, i).first->second;
+    if (same[i] != i) {
+      mass.kind = MassKind::ground;  // that nobody holds
+    } else if (is_waveguide(macro.kind)) {
+      tap.macro = waveguide[tap.macro];
+      mass.kind = MassKind::junction;
+      mass.mass = macro.impedance;
+      mass.position = macro.position;
+      mass.is_fixed = macro.is_fixed;
+    }
   }
   for (Link& link : expanded.links) {
     link.a = same[link.a];
@@ -260,7 +264,7 @@ Network expand_macros(const Network& network, const Progress& progress) {
     nodes += node_count(macro);
     links += link_count(macro);
   }
-  add_junctions(network, expanded);
+  join_places(network, expanded);
   expanded.masses.reserve(nodes);
   expanded.links.reserve(links);
   const std::vector<std::uint32_t> first = macro_starts(network);  // [macro]

@@ -1,6 +1,7 @@
 // Masses, places on strings of masses, on bodies and on waveguides, held to each other by
 // everything that holds: the books of energy, with potentials written down here.
 #include "core/compile/stability_check.h"
+#include "core/kernels/clusters.h"
 #include "core/kernels/direct/direct.h"
 #include "core/laws/laws.h"
 #include "tests/support/passive.h"
@@ -156,11 +157,11 @@ std::string of(const char* text, char letter) {
 
 // The largest share of all energy that the books are off, once the forces of the first samples are
 // over; K of the link by the softest of what it holds, which is about 1.
-double off_books(const std::string& text) {
+double off_books(const std::string& text, int frames = 6000) {
   Books books(text);
   double off = 0.0;
   double start = 0.0;
-  for (int n = 0; n < 6000; ++n) {
+  for (int n = 0; n < frames; ++n) {
     const double push = n < 40 ? 0.01 * std::sin(std::numbers::pi * n / 20.0) : 0.0;
     books.go({push, -0.7 * push});
     if (n == 45) {
@@ -171,6 +172,33 @@ double off_books(const std::string& text) {
     }
   }
   return off;
+}
+
+// So many contacts with the ground at many heights, and some with a mass each; `place` says where
+// on a string or a body.
+template <class Place>
+std::string crowd(int links, Place&& place) {
+  Random random(20);
+  std::string text =
+      "@s string 40 1. 0.1 0. 0. 0.\n@d body 1.5 a b\n@d1 mode @d 310. 1e30 1. 0.3\n"
+      "@d2 mode @d 2750. 1e30 -0.6 0.9\n";
+  for (int i = 0; i < 12; ++i) {
+    text += "@u" + std::to_string(i) + " param 0.313\n";
+  }
+  for (int i = 0; i < links; ++i) {
+    const std::string one = "@e" + std::to_string(i);
+    const std::string ends = i % 7 == 3 ? place(i) + " " + one : one + " " + place(i);
+    text += one +
+            (i % 7 == 3 ? " mass " + number(2.0 / links) + " 0.001 0.001\n"
+                        : " ground " + number(random.uniform(-0.02, 0.0)) + "\n") +
+            "@k" + std::to_string(i) + " contact " + ends + " " + number((1.0 + i % 5) / links) +
+            " 0. 0.\n";
+  }
+  return text + "@in1 frcInput [@s 0.2]\n@in2 frcInput [@d a]\n@out1 posOutput [@s 0.7]\n";
+}
+
+std::string one_of_three(int i) {
+  return i % 3 == 0 ? "[@s 0.313]" : i % 3 == 1 ? "[@s 0.33]" : "[@d b]";
 }
 
 }  // namespace
@@ -272,6 +300,53 @@ TEST_CASE("a damper between waveguides takes what it rubs, and no more", "[hybri
     last = books.energy;
   }
   CHECK(last < 0.5 * most);
+}
+
+TEST_CASE("links at few places are solved by the places", "[hybrids]") {
+  // By its links a crowd needs 2 N^2 numbers a lane, here 6.4 GB; by three places
+  // and N/7 masses what each link and each mass needs.
+  constexpr int many = 20'000;
+  const std::string text = crowd(many, one_of_three);
+  const Network network = expand_macros(network_of(text));
+  const Program program =
+      make_program(network, Network::reference_rate_hz, true, choose_schemes(network, {}).links);
+  CHECK(program.taps.size() == 6);  // with the inputs' and the output's
+  const PassiveTables tables = passive_tables(program);
+  REQUIRE(tables.clusters.size() == 2);
+  for (const Cluster& cluster : tables.clusters) {
+    CHECK(cluster.ends() > 0);
+    CHECK(cluster.places.size() <= 2);
+    CHECK(cluster.numbers() < 20 * cluster.count);
+  }
+  CHECK(off_books(text, 400) < 1e-12);
+  CHECK(off_books(crowd(60, one_of_three)) < 1e-12);
+  CHECK(off_books(crowd(12, one_of_three)) < 1e-12);
+}
+
+TEST_CASE("by the places they move as by the links", "[hybrids]") {
+  // Places that each are a parameter of their own are many, though all of them are at one.
+  const std::string by_place = crowd(12, [](int) { return std::string("[@s u1]"); });
+  const std::string by_link = crowd(12, [](int i) { return "[@s u" + std::to_string(i) + "]"; });
+  const auto clusters_of = [](const std::string& text) {
+    return passive_tables(program_of(text, Passivity::always)).clusters;
+  };
+  REQUIRE(clusters_of(by_place).size() == 1);
+  CHECK(clusters_of(by_place)[0].places.size() == 1);
+  CHECK(clusters_of(by_link)[0].ends() == 0);
+  Stepper<double> places(by_place, Passivity::always);
+  Stepper<double> links(by_link, Passivity::always);
+  double off = 0.0;
+  double most = 0.0;
+  for (int n = 0; n < 2000; ++n) {
+    const double push = n < 40 ? 0.01 * std::sin(std::numbers::pi * n / 20.0) : 0.0;
+    places.go({push, -0.7 * push});
+    links.go({push, -0.7 * push});
+    for (std::size_t i = 0; i < places.program().moving; ++i) {
+      off = std::max(off, std::fabs(places.x[i] - links.x[i]));
+      most = std::max(most, std::fabs(links.x[i]));
+    }
+  }
+  CHECK(off < 1e-12 * most);
 }
 
 // Beyond it most grow; what holds the heaviest waves may last a little longer.

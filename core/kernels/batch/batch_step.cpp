@@ -187,7 +187,7 @@ struct Passive {
     nodes[node].x += way;
     nodes[node].v += way;
   }
-  void feel(Ends, V) {}
+  void feel(std::uint32_t, V) {}
 
   V give(std::uint32_t node) const { return node < masses ? coefficient(inverse_mass[node]) : V{}; }
   void push_node(std::uint32_t node, V force) {

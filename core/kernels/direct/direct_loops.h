@@ -288,10 +288,40 @@ struct Passive {
     s.shift(node, way);
     s.v[node] += way;
   }
-  void feel(Ends ends, V force) {
+  void feel(std::uint32_t node, V force) {
     if (s.state.felt != nullptr) {
-      reinterpret_cast<V*>(s.state.felt)[ends.a] -= force;
-      reinterpret_cast<V*>(s.state.felt)[ends.b] += force;
+      reinterpret_cast<V*>(s.state.felt)[node] += force;
+    }
+  }
+  // How far one node is moved by a force of 1 at another.
+  V give(std::uint32_t from, std::uint32_t at) const {
+    if (from == at && !is_place(program, at)) {
+      return at < program.moving ? s.coefficient[s.state.inverse_mass[at]] : V{};
+    }
+    V sum{};
+    for (std::size_t lane = 0; lane < S::lanes; ++lane) {
+      shared(program, s, from, at, lane, [&](std::size_t node, T weight, T part) {
+        sum[lane] += weight * part * inverse_mass(node, lane);
+      });
+    }
+    return sum;
+  }
+  void push_node(std::uint32_t node, V force) {
+    if (!is_place(program, node)) {
+      if (node < program.moving) {
+        shift(node, s.coefficient[s.state.inverse_mass[node]] * force);
+      }
+      return feel(node, force);
+    }
+    for (std::size_t lane = 0; lane < S::lanes; ++lane) {
+      behind(program, s, node, lane, [&](std::size_t at, T weight) {
+        const T part = weight * inverse_mass(at, lane);
+        s.state.x[at] += part * force[lane];
+        s.state.v[at] += part * force[lane];
+        if (s.state.felt != nullptr) {
+          s.state.felt[at] += weight * force[lane];
+        }
+      });
     }
   }
 
@@ -312,46 +342,10 @@ struct Passive {
     return is_place(program, node) ? position(node) - s.x[node] : s.v[node];
   }
 
-  // How far one node is moved by a force of 1 at another.
-  V give(std::uint32_t from, std::uint32_t at) const {
-    if (from == at && !is_place(program, at)) {
-      return at < program.moving ? s.coefficient[s.state.inverse_mass[at]] : V{};
-    }
-    V sum{};
-    for (std::size_t lane = 0; lane < S::lanes; ++lane) {
-      shared(program, s, from, at, lane, [&](std::size_t node, T weight, T part) {
-        sum[lane] += weight * part * inverse_mass(node, lane);
-      });
-    }
-    return sum;
-  }
-
   T inverse_mass(std::size_t at, std::size_t lane) const {
     const std::size_t node = at / S::lanes;
     return node < program.moving ? s.state.ramps.value[s.state.inverse_mass[node] * S::lanes + lane]
                                  : T(0);
-  }
-
-  void push_node(std::uint32_t node, V force) {
-    if (!is_place(program, node)) {
-      if (node < program.moving) {
-        shift(node, s.coefficient[s.state.inverse_mass[node]] * force);
-      }
-      if (s.state.felt != nullptr) {
-        reinterpret_cast<V*>(s.state.felt)[node] += force;
-      }
-      return;
-    }
-    for (std::size_t lane = 0; lane < S::lanes; ++lane) {
-      behind(program, s, node, lane, [&](std::size_t at, T weight) {
-        const T part = weight * inverse_mass(at, lane);
-        s.state.x[at] += part * force[lane];
-        s.state.v[at] += part * force[lane];
-        if (s.state.felt != nullptr) {
-          s.state.felt[at] += weight * force[lane];
-        }
-      });
-    }
   }
 
  public:
