@@ -7,6 +7,7 @@
 #include <span>
 
 #include "core/groups.h"
+#include "core/laws/laws.h"
 
 namespace ressort {
 namespace {
@@ -218,7 +219,77 @@ void find_elimination(const Program& program, std::vector<PassiveLink>& all, Clu
   }
 }
 
+// Springs whose straight part is as published, between masses and what stays.
+bool may_be_in_web(const Program& program, const PassiveLink& link) {
+  const LawFacts& law = facts_of(link.law);
+  const auto is_mass = [&](std::uint32_t node) {
+    return !is_place(program, node) && !is_junction(program, node);
+  };
+  return law.contains_spring && law.is_curved && is_mass(link.ends.a) && is_mass(link.ends.b);
+}
+
+// The links from `first` on.
+Web web_of(const Program& program, std::vector<PassiveLink>& links, std::size_t first) {
+  Web web{.first = static_cast<std::uint32_t>(first),
+          .count = static_cast<std::uint32_t>(links.size() - first)};
+  const std::vector<std::uint32_t> inverse_mass = inverse_masses(program);
+  std::map<std::uint32_t, std::uint32_t> ends;  // by node
+  for (std::size_t i = first; i < links.size(); ++i) {
+    PassiveLink& link = links[i];
+    const auto end_of = [&](std::uint32_t node, std::size_t side) {
+      const auto [end, is_new] = ends.try_emplace(node, static_cast<std::uint32_t>(ends.size()));
+      if (is_new) {
+        web.inverse_mass.push_back(node < program.moving ? inverse_mass[node] : no_mass);
+        web.of.push_back(static_cast<std::uint32_t>(2 * (i - first) + side));
+      }
+      return end->second;
+    };
+    link.mass_a = end_of(link.ends.a, 0);
+    link.mass_b = end_of(link.ends.b, 1);
+    const bool is_alike =
+        i > first && link.law == links[i - 1].law && link.coefficients == links[i - 1].coefficients;
+    if (!is_alike) {
+      web.alike.push_back(0);
+    }
+    ++web.alike.back();
+  }
+  for (std::size_t i = 0; i < first; ++i) {
+    const auto end_of = [&](std::uint32_t node) {
+      const auto end = ends.find(node);
+      return end == ends.end() ? no_mass : end->second;
+    };
+    links[i].mass_a = end_of(links[i].ends.a);
+    links[i].mass_b = end_of(links[i].ends.b);
+  }
+  return web;
+}
+
+// Those that bend behind all others.
+PassiveTables tables_with_web(const Program& program, std::vector<PassiveLink> links) {
+  const auto springs =
+      std::stable_partition(links.begin(), links.end(),
+                            [&](const PassiveLink& link) { return !may_be_in_web(program, link); });
+  const auto others = static_cast<std::size_t>(springs - links.begin());
+  PassiveTables tables;
+  tables.web = web_of(program, links, others);
+  tables.links = std::move(links);
+  if (others > 0) {
+    tables.clusters.push_back({.count = static_cast<std::uint32_t>(others)});
+  }
+  return tables;
+}
+
 }  // namespace
+
+std::size_t springs_of_web(const Program& program) {
+  constexpr std::size_t most_solved = 256;
+  constexpr std::size_t most_others = 64;  // their matrix is as large as their square
+  const std::vector<PassiveLink> links = passive_links_of(program);
+  const auto springs = static_cast<std::size_t>(
+      std::count_if(links.begin(), links.end(),
+                    [&](const PassiveLink& link) { return may_be_in_web(program, link); }));
+  return springs > most_solved && links.size() - springs <= most_others ? springs : 0;
+}
 
 std::size_t Cluster::numbers() const {
   const std::size_t own = joint_numbers * count;
@@ -246,6 +317,9 @@ std::vector<std::uint32_t> inverse_masses(const Program& program) {
 
 PassiveTables passive_tables(const Program& program) {
   std::vector<PassiveLink> links = passive_links_of(program);
+  if (springs_of_web(program) > 0) {
+    return tables_with_web(program, std::move(links));
+  }
   Groups groups(program.moving);  // which links move each other, by the masses that they move
   std::vector<std::uint32_t> any(links.size(), no_mass);  // [link] a mass that it moves
   for (std::size_t i = 0; i < links.size(); ++i) {

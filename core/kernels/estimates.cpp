@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/kernels/clusters.h"
 #include "core/laws/laws.h"
 
 namespace ressort {
@@ -29,6 +30,16 @@ LinkCount links_of(const Program& program) {
 
 double passive_ns(const Program& program) {
   constexpr double of_a_shared_link = 120.0;  // measured: some three rounds of Newton's
+  constexpr double of_a_spring_in_web = 4.0;
+  if (const std::size_t springs = springs_of_web(program); springs > 0) {
+    double sum = of_a_spring_in_web * static_cast<double>(springs);
+    for (const LinkRun& run : program.link_runs) {
+      const LawFacts& law = facts_of(run.law);
+      const bool is_solved = run.scheme != Scheme::plain && !(law.contains_spring && law.is_curved);
+      sum += is_solved ? run.count * (law.solve_ns + of_a_shared_link) : 0.0;
+    }
+    return sum;
+  }
   std::vector<std::uint8_t> holders(program.position.size(), 0);
   const auto each = [&](auto&& use) {
     for (const LinkRun& run : program.link_runs) {

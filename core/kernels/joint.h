@@ -386,11 +386,12 @@ class Joint {
 }  // namespace
 
 // Solves one cluster and pushes its links' ends. `memory` is of its links, [link][passive_rows];
-// `numbers` are Cluster::numbers() packs, left as they like.
+// `numbers` are Cluster::numbers() packs, left with what each link exerts first: Joined. `drag` is
+// that of a web, [link], or null.
 template <class V, class Body>
 [[gnu::noinline]] static void solve_cluster(const std::vector<PassiveLink>& links,
                                             const Cluster& cluster, V* memory, V* numbers,
-                                            Body& body) {
+                                            Body& body, const V* drag = nullptr) {
   const PassiveLink* const first = links.data() + cluster.first;
   auto* const joined = reinterpret_cast<Joined<V>*>(numbers);
   V* const rest = numbers + joint_numbers * cluster.count;
@@ -401,7 +402,7 @@ template <class V, class Body>
       return;
     }
   }
-  ByLinks<V, Body> space(first, cluster, rest, body);
+  ByLinks<V, Body> space(first, cluster, rest, body, drag);
   Joint<V, Body, ByLinks<V, Body>>(first, cluster.count, memory, joined, space, body).solve();
 }
 

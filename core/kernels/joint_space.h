@@ -340,12 +340,15 @@ class ByEnds {
   Places<V, Body> places_;
 };
 
-// The same by the links, of those alone that exert anything or may.
+// The same by the links, of those alone that exert anything or may. `drag` is by what a web holds
+// back each of them, and through it all others.
 template <class V, class Body>
 class ByLinks {
  public:
-  ByLinks(const PassiveLink* links, const Cluster& cluster, V* numbers, Body& body)
-      : links_(links),
+  ByLinks(const PassiveLink* links, const Cluster& cluster, V* numbers, Body& body,
+          const V* drag = nullptr)
+      : drag_(drag),
+        links_(links),
         count_(cluster.count),
         coupling_(numbers),
         matrix_(coupling_ + count_ * count_),
@@ -438,7 +441,8 @@ class ByLinks {
   const V* couple(std::size_t k) {
     V* const row = coupling_ + k * count_;
     for (std::size_t i = 0; is_new_ && i < count_; ++i) {
-      row[i] = coupling_of<V>(body_, links_[index_[k]].ends, links_[i].ends);
+      row[i] = coupling_of<V>(body_, links_[index_[k]].ends, links_[i].ends) -
+               (drag_ == nullptr ? V{} : drag_[index_[k]] * drag_[i]);
     }
     is_new_ = false;
     return row;
@@ -496,6 +500,7 @@ class ByLinks {
     }
   }
 
+  const V* drag_;
   const PassiveLink* links_;
   std::size_t count_;
   std::size_t active_ = 0;
