@@ -143,14 +143,14 @@ class Eliminator {
 
 // What links hold that moves, each with its number: masses, and then places. Nobody but places
 // holds the masses of a macro.
-struct Held {
+struct HeldEnds {
   std::map<std::uint32_t, std::uint32_t> ends;  // by node
   std::size_t masses = 0;
 };
 
-Held held_by(const Program& program, std::span<const PassiveLink> links) {
+HeldEnds held_by(const Program& program, std::span<const PassiveLink> links) {
   std::set<std::uint32_t> places;
-  Held held;
+  HeldEnds held;
   const auto count = [&](std::uint32_t node) {
     held.ends.try_emplace(node, static_cast<std::uint32_t>(held.ends.size()));
   };
@@ -171,7 +171,7 @@ Held held_by(const Program& program, std::span<const PassiveLink> links) {
 // By what it holds, if its links are not fewer than the places among that.
 void find_elimination(const Program& program, std::vector<PassiveLink>& all, Cluster& cluster) {
   const std::span<PassiveLink> links = std::span(all).subspan(cluster.first, cluster.count);
-  const Held held = held_by(program, links);
+  const HeldEnds held = held_by(program, links);
   const std::size_t places = held.ends.size() - held.masses;
   if (2 * places > links.size()) {
     return;

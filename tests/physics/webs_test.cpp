@@ -43,7 +43,7 @@ std::string mesh(const std::string& law, const std::string& more = "") {
   return text + more + "@in1 frcInput @m4_5\n@out1 posOutput @m8_7\n";
 }
 
-struct Judged {
+struct Balance {
   double excess = 0.0;  // of what moves and of straight springs over the work put in, of all work
   double drift = 0.0;   // of the same and what all springs hold, once the blow is over
   bool is_finite = true;
@@ -51,10 +51,10 @@ struct Judged {
 
 // `kept` is what the springs that bend hold at a distance.
 template <class Kept>
-Judged judge(const std::string& text, double blow, int frames, double damping, Kept&& kept) {
+Balance judge(const std::string& text, double blow, int frames, double damping, Kept&& kept) {
   Stepper<double> body(text, Passivity::always);
   const Program& program = body.program();
-  Judged judged;
+  Balance judged;
   std::vector<double> last_v(body.v.size());
   std::vector<double> before(body.x.size());
   double work = 0.0;
@@ -138,7 +138,7 @@ TEST_CASE("a web has no more energy than was put in, however hard it is hit", "[
         INFO(law << "\n" << more << "blow " << blow);
         std::string text = mesh(law, more);
         const double damping = law.back() == '3' ? .003 : 0.0;
-        const Judged judged = judge(text, blow, 1500, damping, cubic);
+        const Balance judged = judge(text, blow, 1500, damping, cubic);
         CHECK(judged.is_finite);
         CHECK(judged.excess < 1e-12);
       }
