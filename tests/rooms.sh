@@ -45,7 +45,7 @@ judge() {
       sees["core/analysis"] = "core core/laws core/linear_algebra core/model core/analysis"
       sees["core/identification"] = "core core/linear_algebra core/identification"
       sees["core/solids"] = "core core/linear_algebra core/solids"
-      sees["core/kernels"] = "core/lanes.h core/groups.h core/sampled_mode.h core/formula.h core/progress.h core/model/preset/budget.h " \
+      sees["core/kernels"] = "core/lanes.h core/groups.h core/sampled_mode.h core/waveguide_places.h core/formula.h core/progress.h core/model/preset/budget.h " \
                              "core/laws core/linear_algebra core/kernels"
       sees["core/engine"] = "core/lanes.h core/curve.h core/formula.h core/progress.h core/gesture.h " \
                             "core/input_driver.h core/laws core/kernels core/engine"
@@ -83,7 +83,7 @@ judge() {
         target = what
         if (match(target, /^(core|app)\/[^\/]*\//)) {
           target = substr(target, 1, RLENGTH - 1)
-        } else if (target ~ /^core\/(result|formula|progress|groups|lanes|curve|sampled_mode|gesture|input_driver)[.]h$/) {
+        } else if (target ~ /^core\/(result|formula|progress|groups|lanes|curve|sampled_mode|waveguide_places|gesture|input_driver)[.]h$/) {
           target = "core"
         } else if (target ~ /^app\/[^\/]*$/) {
           target = "app"

@@ -280,26 +280,15 @@ class ProgramMaker {
       }
     }
     for (WaveguideSlot& guide : program_.waveguides) {
-      std::vector<double> ways;  // from the right end
+      std::vector<double> held;
       for (std::uint32_t i = guide.first; i < guide.first + guide.count; ++i) {
         const JunctionSlot& place = program_.junctions[i];
         if (is_held[place.node]) {
-          const double u =
-              coefficient_value(program_, program_.coefficients[place.u], program_.parameters, 1.0);
-          ways.push_back(0.5 * (1.0 - std::clamp(u, 0.0, 1.0)));
-          ways.push_back(1.0 - ways.back());
+          held.push_back(coefficient_value(program_, program_.coefficients[place.u],
+                                           program_.parameters, 1.0));
         }
       }
-      std::sort(ways.begin(), ways.end());
-      double widest = 0.0;
-      for (std::size_t i = 0; i < ways.size(); ++i) {
-        const double next = i + 1 < ways.size() ? ways[i + 1] : ways[0] + 1.0;
-        if (next - ways[i] > widest + 1e-9) {
-          widest = next - ways[i];
-          guide.filters_at = {.share = std::fmod(0.5 * (next + ways[i]), 1.0),
-                              .to_held = 0.5 * (next - ways[i])};
-        }
-      }
+      guide.filters_at = filters_between(held);
     }
   }
 

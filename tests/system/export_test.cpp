@@ -219,7 +219,8 @@ TEST_CASE("what FAUST makes of an exported model sounds as the model does", "[ex
   for (const int rate_hz : {32000, 48000, 96000}) {
     for (const char* name :
          {"newer_start", "older_start", "places", "driven", "clipped_spring", "bow", "smooth_bow",
-          "clipped_contact", "damped_pluck", "wiring", "raised_string", "falling"}) {
+          "clipped_contact", "damped_pluck", "wiring", "raised_string", "falling", "waveguide",
+          "open_waveguide", "held_waveguide", "waveguides_on_a_box"}) {
       const double found = harness.difference(name, rate_hz);
       INFO(name << " at " << rate_hz << " Hz differs by " << support::show(found));
       CHECK(found < tolerance);
@@ -227,6 +228,10 @@ TEST_CASE("what FAUST makes of an exported model sounds as the model does", "[ex
   }
   CHECK(harness.difference("poly_triangle", 44100, "m_K", "0.2") < tolerance);
   CHECK(harness.difference("turned_bow", 44100, "p", "1") < tolerance);
+  for (const auto& [name, value] : {std::pair("f", "441"), std::pair("t", "0.02"),
+                                    std::pair("b", "1"), std::pair("R", "0.4")}) {
+    CHECK(harness.difference("held_waveguide", 44100, name, value) < tolerance);
+  }
 }
 
 TEST_CASE("raw numbers are the same numbers at every rate", "[export]") {

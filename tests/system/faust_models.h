@@ -52,6 +52,28 @@ inline const std::vector<std::pair<std::string, std::string>>& faust_models() {
        "@b4 mode @b 5. 0.002 0.2 0.1 -0.4\n@m mass 1. 0. 0.\n@in1 frcInput [@b x]\n"
        "@in2 posInput 0.\n@l contact [@b y] @in2 0.1 0.01\n@r spring [@b p] @m 0.05 0.01\n"
        "@out1 posOutput [@b z]\n@out2 frcOutput [@b 0.3]\n"},
+      // Waveguides: one alone, open and held, several at one place with everything that may be
+      // there, and with sliders.
+      {"waveguide", played("waveguide 1.3 217. 4. 0.3 0.", "0.37", "0.23")},
+      {"open_waveguide", played("openWaveguide 0.7 583. 0.2 1. 0.3", "0", "1")},
+      {"held_waveguide",
+       "@f param 331.\n@t param 2.\n@R param 1.2\n@b param 0.4\n@s waveguide R f t b 0.\n"
+       "@m mass 3. 0. 0.\n@k spring [@s 0.93] @m 0.3 0.02\n@g ground 0.\n@l spring @g @m 0.02 "
+       "0.01\n"
+       "@in1 frcInput [@s 0.2]\n@in2 posInput 0.\n@h spring @in2 [@s 0.5] 0.05 0.3\n"
+       "@out1 posOutput [@s 0.4]\n@out2 frcOutput @m\n@out3 frcOutput [@s 0.93]\n"},
+      {"waveguides_on_a_box",
+       "@s waveguide 1. 110. 5. 0.3 0.\n@t waveguide 0.8 146.8 5. 0.3 0.\n"
+       "@o openWaveguide 0.5 97. 3. 0.6 0.\n@b body 40. bridge top\n"
+       "@b1 mode @b 104. 0.4 1. 0.3\n@b2 mode @b 211. 0.3 0.8 -0.5\n@b3 mode @b 393. 0.2 -0.6 0.9\n"
+       "@e string 6 2. 0.3 0.001 0. 0.\n@m mass 4. 0. 0.\n@g ground 0.\n"
+       "@ks spring [@s 0.97] [@b bridge] 0.5 0.01\n@kt spring [@t 0.97] [@b bridge] 0.4\n"
+       "@ko spring [@o 1] [@b 0.3] 5. 0.1\n@kst spring [@s 0.97] [@t 0.6] 0.02 0.002\n"
+       "@ke spring [@t 0.3] [@e 0.55] 30. 0.1\n@ke2 damper [@e 0.7] [@s 0.5] 0.2\n"
+       "@kg spring @g [@o 0.2] 0.01\n@km spring [@s 0.5] @m 0.1\n@in1 frcInput [@s 0.21]\n"
+       "@in2 frcInput [@b top]\n@p nlPluck @in3 @m 0.01 0.1\n@in3 posInput 0.\n"
+       "@out1 posOutput [@b top]\n@out2 posOutput [@o 0]\n@out3 frcOutput [@b bridge]\n"
+       "@out4 posOutput [@e 0.2]\n@out5 frcOutput @g\n@out6 posOutput @m\n"},
       // Gravity and what moves at the start, in both dialects.
       {"older_start",
        "@g ground 0.3\n@m massG 1.2 0.002 1. 0.9\n@o osc 2. 0.1 0.01 0.5 0.45\n"

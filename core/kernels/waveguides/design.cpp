@@ -13,7 +13,9 @@ using Complex = std::complex<double>;
 
 constexpr double turn = 2.0 * std::numbers::pi;
 constexpr double most_allpass_delay = 1.5;  // samples; the least is one less
-constexpr int most_halvings = 40;
+constexpr double tie = 1e-9;  // of a delay between two N: the lower, whatever its rounding
+constexpr int halvings = 12;
+constexpr int line_steps = 3;
 constexpr int most_newton_steps = 12;
 
 // What is no number becomes the lowest.
@@ -21,63 +23,82 @@ double within(double value, double lowest, double highest) {
   return value > lowest ? std::min(value, highest) : lowest;
 }
 
-// The loop with a delay of any length in place of N and the allpass, at the pole e^(decay) 1/back.
+// 1 - 1/z at the pole z = e^(theta j - decay), without cancelling.
+Complex rise_at(double decay, double theta) {
+  const double half = std::sin(0.5 * theta);
+  const double size = std::exp(decay);
+  return {2.0 * size * half * half - std::expm1(decay), size * std::sin(theta)};
+}
+
+// ln of the loss's pole alone, (1 - a)/(1 - a/z), with 1 - a = e^room and that rise.
+Complex log_of_loss(double room, Complex rise) {
+  return -std::log(1.0 + std::expm1(-room) * rise);
+}
+
+// How that grows with the room.
+Complex slope_of_loss(double room, Complex rise) {
+  return rise / (std::exp(room) - std::expm1(room) * rise);
+}
+
+// The loop with a delay of any length in place of N and the allpass, at its pole.
 struct Line {
-  double gain;
+  double log_gain;
   double decay;  // per sample
   double theta;  // the pole's angle
+  Complex rise;
 
-  Complex denominator(double pole) const {
-    return 1.0 - pole * std::polar(std::exp(decay), -theta);
-  }
   // So long that the phase is right.
-  double delay(double pole) const { return (turn - std::arg(denominator(pole))) / theta; }
-  // By how much it is then too loud: falls from a pole of 0 on.
-  double over(double pole) const {
-    return std::log(gain * (1.0 - pole) / std::abs(denominator(pole))) + decay * delay(pole);
+  double delay(double room) const { return (turn + log_of_loss(room, rise).imag()) / theta; }
+  // By how much it is then too loud: falls as the room does.
+  double over(double room) const {
+    return log_gain + log_of_loss(room, rise).real() + decay * delay(room);
   }
 };
 
-// Where it is right as well. By halves of the logarithm of 1 - pole, as that may be small.
-double pole_of(const Line& line) {
+// Where it is right as well: by halves, since 1 - a may be small, then by Newton's method.
+double room_of(const Line& line) {
   double low = -60.0;
   double high = 0.0;
   if (!(line.over(0.0) > 0.0)) {
     return 0.0;
   }
-  for (int i = 0; i < most_halvings; ++i) {
+  for (int i = 0; i < halvings; ++i) {
     const double middle = 0.5 * (low + high);
-    (line.over(-std::expm1(middle)) > 0.0 ? high : low) = middle;
+    (line.over(middle) > 0.0 ? high : low) = middle;
   }
-  return -std::expm1(0.5 * (low + high));
+  for (int i = 0; i < line_steps; ++i) {
+    const Complex by_room = slope_of_loss(low, line.rise);
+    low -= line.over(low) / (by_room.real() + line.decay * by_room.imag() / line.theta);
+  }
+  return low;
 }
 
 struct Loop {
-  double gain;
-  Complex back;  // 1/z at the pole
+  double log_gain;
+  double decay;
+  double theta;
+  Complex rise;
   double samples;
+  Complex back = std::polar(std::exp(decay), -theta);  // 1/z at the pole
 
-  // ln L(z), and how it grows with the loss's pole and the allpass.
-  Complex log(double pole, double allpass) const {
-    return std::log(gain * (1.0 - pole)) - std::log(1.0 - pole * back) +
-           std::log((allpass + back) / (1.0 + allpass * back)) + samples * std::log(back);
+  // ln L(z), and how it grows with the logarithm of 1 - a and with the allpass.
+  Complex log(double room, double allpass) const {
+    return log_gain + log_of_loss(room, rise) +
+           std::log((allpass + back) / (1.0 + allpass * back)) + samples * Complex(decay, -theta);
   }
-  // By the logarithm of 1 - pole.
-  Complex by_pole(double pole) const { return (1.0 - back) / (1.0 - pole * back); }
+  Complex by_room(double room) const { return rise / (std::exp(room) - std::expm1(room) * rise); }
   Complex by_allpass(double allpass) const {
     return 1.0 / (allpass + back) - back / (1.0 + allpass * back);
   }
 };
 
 // From a delay of any length to N samples and an allpass.
-void refine(const Loop& loop, WaveguideDesign& design) {
-  double room = std::log1p(-design.pole);
+void refine(const Loop& loop, double room, WaveguideDesign& design) {
   double c = design.allpass;
   for (int i = 0; i < most_newton_steps; ++i) {
-    const double a = -std::expm1(room);
-    const Complex log = loop.log(a, c);
+    const Complex log = loop.log(room, c);
     const Complex off(log.real(), std::remainder(log.imag(), turn));
-    const Complex by_a = loop.by_pole(a);
+    const Complex by_a = slope_of_loss(room, loop.rise);
     const Complex by_c = loop.by_allpass(c);
     const double determinant = by_a.real() * by_c.imag() - by_a.imag() * by_c.real();
     const double step_a = (off.real() * by_c.imag() - off.imag() * by_c.real()) / determinant;
@@ -133,40 +154,42 @@ WaveguideDesign design_waveguide(const WaveguideNumbers& numbers, std::uint32_t 
   const double decay = 3.0 * std::numbers::ln10 / (t60 * rate_hz);  // per sample
   const double loss = decay * rate_hz / hz;                         // per period
 
-  Line line{std::exp(-loss * brightness), decay, theta};
-  double pole = brightness < 1.0 ? pole_of(line) : 0.0;
+  const Complex rise = rise_at(decay, theta);
+  Line line{-loss * brightness, decay, theta, rise};
+  double room = brightness < 1.0 ? room_of(line) : 0.0;
   // The loss takes its time as well; where it would take all that there is, it takes none.
-  if (line.delay(pole) < least_samples + most_allpass_delay - 1.0) {
-    pole = 0.0;
-    line.gain = std::exp(-loss);
+  if (line.delay(room) < least_samples + most_allpass_delay - 1.0) {
+    room = 0.0;
+    line.log_gain = -loss;
   }
-  const double delay = line.delay(pole);
+  const double delay = line.delay(room);
   WaveguideDesign design{.samples = static_cast<std::uint32_t>(
-                             std::clamp(std::floor(delay - most_allpass_delay + 1.0),
+                             std::clamp(std::floor(delay - most_allpass_delay + 1.0 - tie),
                                         double(least_samples), double(most_samples))),
                          .period = rate_hz / hz,
-                         .pole = pole,
-                         .gain = line.gain};
+                         .pole = -std::expm1(room),
+                         .gain = std::exp(line.log_gain)};
   const double rest = (delay - design.samples) * theta;  // for the allpass, an angle
   design.allpass = std::sin(0.5 * (theta - rest)) / std::sin(0.5 * (theta + rest));
-  const Loop loop{design.gain, std::polar(std::exp(decay), -theta), double(design.samples)};
-  pole > 0.0 ? refine(loop, design) : refine_flat(loop, design);
+  const Loop loop{line.log_gain, decay, theta, rise, double(design.samples)};
+  room < 0.0 ? refine(loop, room, design) : refine_flat(loop, design);
   return design;
 }
 
 void find_places(const WaveguideDesign& design, const FiltersAt& filters, std::span<const double> u,
                  std::span<std::uint32_t> order, std::span<std::uint32_t> delays) {
   const double least_u = 1.0 / design.period;  // half a sample from an end
-  // Of all that goes round, from the filters on.
+  const auto runs_right = [](std::uint32_t i) { return i % 2 == 1; };
+  const auto rank = [&](std::uint32_t i) {
+    return order_from_filters(filters, u[i / 2], runs_right(i));
+  };
   const auto share = [&](std::uint32_t i) {
-    const double right_end = 0.5 * (1.0 - within(u[i / 2], least_u, 1.0 - least_u));
-    const double at = (i % 2 == 0 ? right_end : 1.0 - right_end) - filters.share;
-    return at > 0.0 ? at : at + 1.0;
+    return share_from_filters(filters, within(u[i / 2], least_u, 1.0 - least_u), runs_right(i));
   };
   const auto count = static_cast<std::uint32_t>(2 * u.size());
   for (std::uint32_t i = 0; i < count; ++i) {
     order[i] = i;
-    for (std::uint32_t k = i; k > 0 && share(order[k]) < share(order[k - 1]); --k) {
+    for (std::uint32_t k = i; k > 0 && rank(order[k]) < rank(order[k - 1]); --k) {
       std::swap(order[k], order[k - 1]);
     }
   }

@@ -17,6 +17,8 @@
 #include <cstdint>
 #include <span>
 
+#include "core/waveguide_places.h"
+
 namespace ressort {
 
 struct WaveguideNumbers {
@@ -45,15 +47,6 @@ double highest_waveguide_hz(std::uint32_t least_samples, double rate_hz);
 // is no number counts as the least. [any thread] wait-free
 WaveguideDesign design_waveguide(const WaveguideNumbers& numbers, std::uint32_t least_samples,
                                  std::uint32_t most_samples, double rate_hz);
-
-// Where a waveguide's filters are, as shares of what goes round from the right end, where waves
-// turn to the left; and how much further on the next place is that something holds. What lies
-// between held places is rounded from there, so that a string that gets longer does so without
-// leaps.
-struct FiltersAt {
-  double share = 0.0;
-  double to_held = 0.0;
-};
 
 // Where places at coordinates `u`, 0..1 from end to end, are: after how many samples from the
 // filters, 1..N, a wave passes each to the left and to the right, [place, 2]. Every delay is the

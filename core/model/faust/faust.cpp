@@ -7,6 +7,8 @@
 #include <cmath>
 #include <set>
 
+#include "core/model/faust/faust_header.h"
+#include "core/model/faust/faust_waveguides.h"
 #include "core/model/faust/faust_words.h"
 #include "core/model/topology.h"
 
@@ -14,17 +16,12 @@ namespace ressort {
 namespace {
 
 using Words = std::vector<std::string>;
-
-// How much of a node a point is: its weight as a factor, "0.3*" or "hat(2.0, row_p)*".
-struct Share {
-  std::uint32_t node = 0;
-  std::string factor;
-};
+using Share = FaustShare;
 
 class Writer {
  public:
-  Writer(const Network& written, const FaustOptions& options)
-      : written_(written), network_(expand_macros(written)), options_(options) {
+  Writer(const Network& written, Network expanded, const FaustOptions& options)
+      : written_(written), network_(std::move(expanded)), options_(options), waveguides_(network_) {
     name_parameters();
     name_masses();
     name_links();
@@ -33,7 +30,7 @@ class Writer {
   }
 
   std::string text() {
-    const std::string body = masses() + links();  // which tells the laws that are needed
+    const std::string body = masses() + links() + waves();  // which tells the laws that are needed
     const int inputs = count_inputs();
     Words from;
     Words to;
@@ -43,18 +40,25 @@ class Writer {
         to.push_back("to_" + mass_[i]);
       }
     }
+    for (auto [prefix, words] : {std::pair("n", &from), std::pair("to", &to)}) {
+      const Words later = waveguides_.later(terms(), prefix);
+      words->insert(words->end(), later.begin(), later.end());
+    }
     const std::string moving = std::to_string(from.size());
+    const Words numbers = waveguides_.numbers();
+    from.insert(from.end(), numbers.begin(), numbers.end());
     for (int n = 1; n <= inputs; ++n) {
       from.push_back("in" + std::to_string(n));
     }
     const Words heard = outputs();
     to.insert(to.end(), heard.begin(), heard.end());
-    std::string loop = "process = model;\n";
-    if (moving != "0") {
-      loop = "process = model ~ par(i, " + moving + ", _) : par(i, " + moving + ", !), par(i, " +
-             std::to_string(heard.size()) + ", _);\n";
-    }
-    return header(inputs) + faust_prelude(options_.rescale) + laws() + parameters() +
+    const std::string loop = moving == "0"
+                                 ? "process = model;\n"
+                                 : "process = " + waveguides_.feed(inputs) + "model ~ par(i, " +
+                                       moving + ", _) : par(i, " + moving + ", !), par(i, " +
+                                       std::to_string(heard.size()) + ", _);\n";
+    return faust_header(network_, mass_, options_.name, inputs) + faust_prelude(options_.rescale) +
+           faust_laws(used_) + parameters() + waveguides_.guides(terms()) +
            "\n// n_: what to_ was at the tick before; x_, v_, F_: position, velocity and the force "
            "of\n// the links; f_: a link's force, which pulls its first end down.\nmodel" +
            (from.empty() ? "" : "(" + flow(from, ", ", 6) + ")") + " =\n    " + flow(to, ", ", 4) +
@@ -139,14 +143,6 @@ class Writer {
            value(mass.damping) + ") : " + which + ")";
   }
 
-  bool is_audio(ArgumentId argument) const {
-    const auto follows = [&](const Step& step) {
-      return step.op == Op::parameter && network_.parameters[step.index].audio_input > 0;
-    };
-    return argument != no_argument && std::any_of(network_.arguments[argument].begin(),
-                                                  network_.arguments[argument].end(), follows);
-  }
-
   // --- what acts on a mass -------------------------------------------------------------------
 
   void gather_inputs() {
@@ -172,7 +168,10 @@ class Writer {
 
   void gather_forces() {
     forces_.resize(network_.masses.size());
-    for (std::size_t i = 0; i < network_.links.size(); ++i) {
+    for (std::uint32_t i = 0; i < network_.links.size(); ++i) {
+      if (waveguides_.holds(i)) {
+        continue;
+      }
       forces_[network_.links[i].a].push_back("- f_" + link_[i]);
       forces_[network_.links[i].b].push_back("+ f_" + link_[i]);
     }
@@ -260,9 +259,14 @@ class Writer {
 
   std::string masses() {
     std::string text;
-    for (std::size_t i = 0; i < network_.masses.size(); ++i) {
-      text += "  " + mass_line(i);
-      if (network_.masses[i].kind != MassKind::point || !forces_[i].empty()) {
+    for (std::uint32_t i = 0; i < network_.masses.size(); ++i) {
+      const MassKind kind = network_.masses[i].kind;
+      if (kind == MassKind::ground && i < written_.masses.size() &&
+          written_.masses[i].kind == MassKind::point) {
+        continue;  // of a waveguide, as another already is
+      }
+      text += "  " + mass_line(i) + held_before(i);
+      if (kind != MassKind::point || !forces_[i].empty()) {
         text += "  F_" + mass_[i] + " = " + faust_sum(forces_[i]) + ";";
       }
       text += (moves(i) ? leaving(i) : "") + "\n";
@@ -281,8 +285,10 @@ class Writer {
         return "x_" + name + " = " + faust_number(mass.position) + ";  v_" + name + " = 0.0;";
       case MassKind::position:
         return "x_" + name + " = " + channel_of(i) + ";  " + moved(i, mass.position);
+      case MassKind::junction:
+        return inverse_mass(i) +
+               waveguides_.place(terms(), static_cast<std::uint32_t>(i), faust_sum(outside_[i]));
       case MassKind::point:
-      case MassKind::junction:  // refused before
         break;
     }
     const Tap& tap = network_.taps[mass.tap];
@@ -324,7 +330,8 @@ class Writer {
   // the force, not what becomes of it.
   bool drives_itself(const Mass& mass) const {
     return !mass.is_mode &&
-           (is_audio(mass.mass) || is_audio(mass.stiffness) || is_audio(mass.damping));
+           (is_driven(network_, mass.mass) || is_driven(network_, mass.stiffness) ||
+            is_driven(network_, mass.damping));
   }
 
   // Terms of what acts on it besides its links, at once.
@@ -347,8 +354,55 @@ class Writer {
     if (const std::string start = start_velocity(mass); start != "0.0") {
       terms.push_back("+ first(" + start + ")");
     }
+    if (waveguides_.is_held(static_cast<std::uint32_t>(i))) {
+      return inverse_mass(i) + "u_" + name + " = " + faust_sum(terms) + ";  o_" + name + " = nx_" +
+             name + " + first(" + faust_number(mass.position) + ");  y_" + name + " = o_" + name +
+             " + u_" + name + ";  v_" + name + " = u_" + name + " + h_" + name + "*g_" + name +
+             ";  x_" + name + " = o_" + name + " + v_" + name + ";  tox_" + name + " = x_" + name +
+             ";";
+    }
     return "v_" + name + " = " + faust_sum(terms) + ";  x_" + name + " = travel(" +
            faust_number(mass.position) + ", v_" + name + ");";
+  }
+
+  // How far a force of 1 moves what is held by springs that are solved.
+  std::string inverse_mass(std::size_t i) {
+    const Mass& mass = network_.masses[i];
+    return "g_" + mass_[i] + " = 1.0/" +
+           (mass.is_mode ? of_mode(mass, "_, !, !")
+            : mass.kind == MassKind::junction
+                ? "(" + value(mass.mass) + "*r)"
+                : faust_formula(network_.arguments[mass.mass], parameter_, Tightness::atom)) +
+           ";  ";
+  }
+
+  // Where the other ends of such springs are and were.
+  std::string held_before(std::uint32_t i) const {
+    const Mass& mass = network_.masses[i];
+    if (!waveguides_.is_held(i) || moves(i) || mass.kind == MassKind::junction) {
+      return "";
+    }
+    const std::string& name = mass_[i];
+    if (mass.kind == MassKind::point) {
+      return "  y_" + name + " = " + interpolated(i, "y_") + ";  o_" + name + " = " +
+             interpolated(i, "o_") + ";";
+    }
+    return "  y_" + name + " = x_" + name + ";  o_" + name + " = x_" + name + " - v_" + name + ";";
+  }
+
+  FaustTerms terms() const {
+    return {.masses = mass_,
+            .links = link_,
+            .value = [this](ArgumentId argument) { return value(argument); },
+            .shares = [this](std::uint32_t point) { return shares(point); },
+            .inverse_mass = [this](std::uint32_t mass) { return "g_" + mass_[mass]; }};
+  }
+
+  std::string waves() {
+    if (!network_.waveguides.empty()) {
+      used_.insert({"guide", "nearest", "late", "filtered"});
+    }
+    return waveguides_.springs(terms()) + waveguides_.waves(terms());
   }
 
   // What a mass would have fed back at the tick before the first.
@@ -409,7 +463,10 @@ class Writer {
 
   std::string links() {
     std::string text;
-    for (std::size_t i = 0; i < network_.links.size(); ++i) {
+    for (std::uint32_t i = 0; i < network_.links.size(); ++i) {
+      if (waveguides_.holds(i)) {
+        continue;
+      }
       const Link& link = network_.links[i];
       const LawFacts& law = facts_of(link.law);
       used_.emplace(law.name);
@@ -442,15 +499,31 @@ class Writer {
     return terms;
   }
 
+  // All that pulls at a mass or a place: also what was solved for this tick.
+  std::string force_at(std::uint32_t i) const {
+    const auto at = [&](std::uint32_t mass) {
+      const std::string plain = "F_" + mass_[mass];
+      return waveguides_.is_held(mass) ? "(" + plain + " + h_" + mass_[mass] + ")" : plain;
+    };
+    if (network_.masses[i].kind != MassKind::point) {
+      return at(i);
+    }
+    Words terms;
+    for (const Share& share : shares(i)) {
+      terms.push_back("+ " + share.factor + at(share.node));
+    }
+    return "(" + faust_sum(terms) + ")";
+  }
+
   Words outputs() const {
     Words words(static_cast<std::size_t>(output_count(network_)));
     for (const Output& output : network_.outputs) {
       const std::string& name = mass_[output.mass];
-      std::string word = "x_" + name;
+      const MassKind kind = network_.masses[output.mass].kind;
+      std::string word =
+          kind == MassKind::junction ? "(x_" + name + " - 0.5*v_" + name + ")" : "x_" + name;
       if (output.is_force) {
-        const bool is_point = network_.masses[output.mass].kind == MassKind::point;
-        word =
-            (is_point ? "(" + interpolated(output.mass, "F_") + ")" : "F_" + name) + "/push(1.0)";
+        word = force_at(output.mass) + "/push(1.0)";
         for (std::uint32_t pushed = 0; pushed < pushes_.size(); ++pushed) {
           for (const std::string& input : pushes_[pushed]) {
             word += felt(pushed, output.mass, input);
@@ -480,27 +553,6 @@ class Writer {
     return count;
   }
 
-  std::string laws() const {
-    std::string text;
-    for (const FaustDefinition& definition : faust_definitions()) {
-      if (is_used(definition.name)) {
-        text += definition.text;
-      }
-    }
-    return text;
-  }
-
-  // By the model, or by what the model uses; no definition stands on more than one other.
-  bool is_used(std::string_view name) const {
-    const std::string call = " " + std::string(name) + "(";
-    const auto definitions = faust_definitions();
-    return used_.contains(std::string(name)) ||
-           std::any_of(definitions.begin(), definitions.end(), [&](const FaustDefinition& other) {
-             return used_.contains(std::string(other.name)) &&
-                    other.text.find(call) != std::string_view::npos;
-           });
-  }
-
   std::string parameters() const {
     std::string text;
     for (std::size_t i = 0; i < network_.parameters.size(); ++i) {
@@ -510,44 +562,6 @@ class Writer {
       }
     }
     return text.empty() ? text : "\n" + text;
-  }
-
-  std::string header(int inputs) const {
-    const auto moving = std::count_if(network_.masses.begin(), network_.masses.end(),
-                                      [](const Mass& mass) { return ressort::moves(mass); });
-    std::string text = "// " + plain(options_.name) +
-                       ", a network of masses and springs: " + std::to_string(moving) +
-                       " that move, " + std::to_string(network_.links.size()) + " links.\n";
-    for (int n = 1; n <= inputs; ++n) {
-      text += "// input " + std::to_string(n) + ": " + meaning_of_input(n) + "\n";
-    }
-    std::vector<std::string> heard(static_cast<std::size_t>(output_count(network_)));
-    for (const Output& output : network_.outputs) {
-      std::string& sum = heard[static_cast<std::size_t>(output.number - 1)];
-      sum += (sum.empty() ? "" : ", ") +
-             ((output.is_force ? "force on " : "position of ") + mass_[output.mass]);
-    }
-    for (std::size_t n = 0; n < heard.size(); ++n) {
-      text += "// output " + std::to_string(n + 1) + ": " +
-              (heard[n].empty() ? std::string("silent") : heard[n]) + "\n";
-    }
-    return text + "declare name \"" + plain(options_.name) + "\";\n\n";
-  }
-
-  std::string meaning_of_input(int number) const {
-    std::string text;
-    const auto add = [&](const std::string& what) { text += (text.empty() ? "" : ", ") + what; };
-    for (const Input& input : network_.inputs) {
-      if (input.number == number) {
-        add((input.is_force ? "force on " : "position of ") + mass_[input.mass]);
-      }
-    }
-    for (const Parameter& parameter : network_.parameters) {
-      if (parameter.audio_input == number) {
-        add("parameter " + plain(parameter.name));
-      }
-    }
-    return text.empty() ? "not used" : text;
   }
 
   const Network& written_;
@@ -561,6 +575,7 @@ class Writer {
   std::vector<Words> outside_;           // [mass] terms that they give it, points spread out
   std::vector<Words> forces_;            // [mass] terms of its links
   std::set<std::string> used_;           // of faust_definitions()
+  const FaustWaveguides waveguides_;
 };
 
 }  // namespace
@@ -569,15 +584,11 @@ Result<std::string> faust_text(const Network& network, const FaustOptions& optio
   if (network.outputs.empty()) {
     return Error{"the model has no output; FAUST takes no program without one", 1, 1};
   }
-  for (const Macro& macro : network.macros) {
-    if (is_waveguide(macro.kind)) {
-      return Error{"the waveguide '" + macro.name +
-                       "' is not written in FAUST: the links that hold one are solved together, "
-                       "sample by sample; a 'string' is",
-                   macro.location.line, macro.location.column};
-    }
+  Network expanded = expand_macros(network);
+  if (auto refusal = faust_refusal(expanded)) {
+    return *refusal;
   }
-  return Writer(network, options).text();
+  return Writer(network, std::move(expanded), options).text();
 }
 
 std::size_t faust_elements(const Network& network) {

@@ -15,6 +15,11 @@ bool is_word(char c) {
   return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '_';
 }
 
+struct FaustDefinition {
+  std::string_view name;
+  std::string_view text;
+};
+
 // Comparisons only choose, here and in the laws: where FAUST has to compute with them, its types
 // take ten times as long to find.
 constexpr FaustDefinition helpers[] = {
@@ -43,6 +48,81 @@ constexpr FaustDefinition helpers[] = {
      "  lost = 1.0 - decay*decay;\n"
      "  out = max(0.0, min(1.0, (square - 8.2)/1.6));\n"
      "  mass = m*(1.0 + out*(stiff - 1.0));\n"
+     "};\n"},
+    // A waveguide's numbers (core/kernels/waveguides/design.h), at least so many samples long.
+    {"guide",
+     "guide(least, hz, t60, brightness) = samples, rate/f, allpass, pole, gain\n"
+     "with {\n"
+     "  rate = fconstant(int fSamplingFreq, <math.h>);\n"
+     "  f = max(15.0, min(hz, rate/(least + 1.5)));\n"
+     "  bright = max(0.0, min(1.0, brightness));\n"
+     "  turn = 6.283185307179586;\n"
+     "  theta = turn*f/rate;\n"
+     "  decay = 6.907755278982137/(max(t60, 3.0/f)*rate);\n"
+     "  loss = decay*rate/f;\n"
+     "  abs2(a, b) = a*a + b*b;\n"
+     "  over(a, b, x, y) = (a*x + b*y)/abs2(x, y), (b*x - a*y)/abs2(x, y);\n"
+     "  less(a, b, x, y) = a - x, b - y;\n"
+     "  // 1/z at the tone's pole z, and 1 - 1/z\n"
+     "  re = exp(decay)*cos(theta);\n"
+     "  im = 0.0 - exp(decay)*sin(theta);\n"
+     "  rise = 2.0*exp(decay)*sin(0.5*theta)*sin(0.5*theta) - (exp(decay) - 1.0);\n"
+     "  // ln of the loss's pole there, 1 - a being e^room\n"
+     "  size(room) = 0.0 - 0.5*log(abs2(1.0 + x*rise, x*im)) with { x = exp(0.0 - room) - 1.0; };\n"
+     "  angle(room) = atan2(x*im, 1.0 + x*rise) with { x = exp(0.0 - room) - 1.0; };\n"
+     "  delay(room) = (turn + angle(room))/theta;\n"
+     "  loud(room) = 0.0 - loss*bright + size(room) + decay*delay(room);\n"
+     "  half(i, low) = select2(loud(middle) > 0.0, middle, low) with { middle = low + "
+     "30.0/pow(2.0, i); };\n"
+     "  found = 0.0 - 60.0 : seq(i, 12, half(i)) : seq(i, 3, nearer);\n"
+     "  nearer(room) = room - loud(room)/(by_room(room) : _, *(decay/theta) : +);\n"
+     "  wants = (bright < 1.0) & (loud(0.0) > 0.0);\n"
+     "  fits = delay(found) >= least + 0.5;\n"
+     "  is_dark = wants & fits;\n"
+     "  first_room = select2(is_dark, 0.0, found);\n"
+     "  log_gain = 0.0 - loss*select2(wants & (delay(found) < least + 0.5), bright, 1.0);\n"
+     "  samples = max(least, floor(delay(first_room) - 0.500000001));\n"
+     "  rest = (delay(first_room) - samples)*theta;\n"
+     "  first_allpass = sin(0.5*(theta - rest))/sin(0.5*(theta + rest));\n"
+     "  // ln of the loop, and how it grows with both filters\n"
+     "  level(room, c) = log_gain + size(room) + 0.5*log(abs2(c + re, im)/abs2(1.0 + c*re, c*im)) "
+     "+\n"
+     "    samples*decay;\n"
+     "  phase(room, c) = remainder(angle(room) + atan2(im, c + re) - atan2(c*im, 1.0 + c*re) -\n"
+     "    samples*theta, turn);\n"
+     "  by_room(room) = over(rise, 0.0 - im, e + (1.0 - e)*rise, 0.0 - (1.0 - e)*im) with { e = "
+     "exp(room); };\n"
+     "  by_allpass(c) = over(1.0, 0.0, c + re, im), over(re, im, 1.0 + c*re, c*im) : less;\n"
+     "  newton(room, c) = level(room, c), phase(room, c), by_room(room), by_allpass(c) : step with "
+     "{\n"
+     "    step(x, y, a, b, c1, d) = room - (x*d - y*c1)/(a*d - b*c1), c - (a*y - b*x)/(a*d - "
+     "b*c1);\n"
+     "  };\n"
+     "  both = found, first_allpass : seq(i, 3, newton);\n"
+     "  dark_room = both : _, !;\n"
+     "  dark_allpass = both : !, _;\n"
+     "  is_solved = (dark_room <= 0.0) & (abs(dark_allpass) < 1.0);\n"
+     "  alone(c) = c - phase(0.0, c)/(by_allpass(c) : !, _);\n"
+     "  flat = first_allpass : seq(i, 3, alone);\n"
+     "  pole = select2(is_dark, 0.0, 1.0 - exp(select2(is_solved, found, dark_room)));\n"
+     "  allpass = select2(is_dark, flat, select2(is_solved, first_allpass, dark_allpass));\n"
+     "  gain = min(1.0, exp(log_gain - select2(is_dark, level(0.0, flat), 0.0)));\n"
+     "};\n"},
+    // Which sample of the loop is the nearest to a place (core/waveguide_places.h).
+    {"nearest",
+     "nearest(share, to_held, u, right, period) = whole(to_held*period) + "
+     "whole((away - to_held)*period)\n"
+     "with {\n"
+     "  whole(x) = select2(x < 0.0, floor(x + 0.5), ceil(x - 0.5));\n"
+     "  from_end = 0.5*(1.0 - max(1.0/period, min(1.0 - 1.0/period, u)));\n"
+     "  at = select2(right, from_end, 1.0 - from_end) - share;\n"
+     "  away = select2(at > 0.0, at + 1.0, at);\n"
+     "};\n"},
+    {"late", "late(most, n, x) = x @ int(max(0.0, min(most, n)));\n"},
+    {"filtered",
+     "filtered(c, a, g, x) = x*(1.0 - a) : + ~ *(a) : *(g) : straight\n"
+     "with {\n"
+     "  straight(y) = c*y + y' : + ~ *(0.0 - c);\n"
      "};\n"},
     {"hat", "hat(i, p) = max(0.0, 1.0 - abs(p - i));\n"},
     {"along", "along(n, u) = (n - 1.0)*max(0.0, min(1.0, u));\n"},
@@ -202,13 +282,26 @@ std::string faust_slider(const ParameterSetting& setting) {
   return text + ")";
 }
 
-std::vector<FaustDefinition> faust_definitions() {
+std::string faust_laws(const std::set<std::string>& used) {
   std::vector<FaustDefinition> definitions;
   for (const LawFacts& law : law_table()) {
     definitions.push_back({law.name, law.faust});
   }
   definitions.insert(definitions.end(), std::begin(helpers), std::end(helpers));
-  return definitions;
+  // No definition stands on more than one other.
+  const auto is_used = [&](std::string_view name) {
+    const std::string call = " " + std::string(name) + "(";
+    return used.contains(std::string(name)) ||
+           std::any_of(definitions.begin(), definitions.end(), [&](const FaustDefinition& other) {
+             return used.contains(std::string(other.name)) &&
+                    other.text.find(call) != std::string_view::npos;
+           });
+  };
+  std::string text;
+  for (const FaustDefinition& definition : definitions) {
+    text += is_used(definition.name) ? definition.text : "";
+  }
+  return text;
 }
 
 std::string faust_prelude(bool rescale) {

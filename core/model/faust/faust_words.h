@@ -46,13 +46,9 @@ std::string plain(std::string_view text);
 // The slider; a number where the setting leaves it no range.
 std::string faust_slider(const ParameterSetting& setting);
 
-struct FaustDefinition {
-  std::string_view name;
-  std::string_view text;
-};
-
-// What a program holds only if it uses it: the laws, and how a driven mass moves.
-std::vector<FaustDefinition> faust_definitions();
+// What a program holds only if it uses it: the laws, how a driven mass moves, what waveguides need.
+// Of those that are used by name, and of what they stand on.
+std::string faust_laws(const std::set<std::string>& used);
 
 // What every program starts with.
 std::string faust_prelude(bool rescale);

@@ -90,11 +90,23 @@ TEST_CASE("places of one coordinate are one, and a bent spring becomes two", "[w
   CHECK(expand_macros(whole) == whole);
 }
 
-TEST_CASE("FAUST refuses a waveguide with its line", "[waveguide_text]") {
-  const auto text = faust_text(network_of("\n@s waveguide 1. 220. 2. 0.5 0.\n" + heard), {});
-  REQUIRE(!text);
-  CHECK(text.error().line == 2);
-  CHECK(text.error().message.starts_with("the waveguide 's' is not written in FAUST"));
+TEST_CASE("what holds a waveguide and FAUST is not told of is refused by its line",
+          "[waveguide_text]") {
+  const std::string guide = "@p param 0.3\n\n@s waveguide 1. 220. 2. 0.5 0.\n";
+  const auto refused = [&](const std::string& lines, int line, const std::string& why) {
+    const auto text = faust_text(network_of(guide + lines + heard), {});
+    REQUIRE(!text);
+    CHECK(text.error().line == line);
+    INFO(text.error().message);
+    CHECK(text.error().message.find(why) != std::string::npos);
+  };
+  const std::string hammer = "@m mass 1. 0. 0.\n";
+  refused(hammer + "@k contact @m [@s 0.3] 1. 0.\n", 5, "'k' holds a waveguide");
+  refused(hammer + "@k nlPluck @m [@s 0.3] 1. 0.1\n", 5, "only springs and dampers");
+  refused(hammer + "@k nlBow @m [@s 0.3] 1. 0.1\n", 5, "only springs and dampers");
+  refused("@m mass 1. 0.1 0.1\n@k spring @m [@s 0.3] 1.\n", 5, "stretched");
+  refused("@m mass 1. 0. 0.1\n@k spring @m [@s 0.3] 1.\n", 5, "moves at the start");
+  refused("@in2 frcInput [@s p]\n", 3, "moves with a parameter");
 }
 
 }  // namespace ressort
