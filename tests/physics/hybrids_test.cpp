@@ -254,6 +254,52 @@ TEST_CASE("what holds masses, places and waveguides together keeps the books of 
   CAPTURE(worst);
 }
 
+TEST_CASE("what was plucked, bowed or touched keeps its energy once it is let go", "[hybrids]") {
+  // A hand that sweeps past, one that draws and then outruns all friction, one that pushes and
+  // leaves: where it is in sample n. Nothing else takes anything, for ten seconds.
+  static constexpr int let_go = 22050;
+  constexpr int second = 44100;
+  struct Hand {
+    const char* link;
+    double (*at)(int n);
+  };
+  const Hand hands[] = {
+      {"@k nlPluck @in1 # 0.2 0.02\n", [](int n) { return std::min(-0.1 + 1e-4 * n, 2.0); }},
+      {"@k nlBow @in1 # 0.2 0.004\n",
+       [](int n) {
+         return 5e-4 * (n < let_go ? n : let_go) + 0.1 * (n < let_go ? 0 : n - let_go);
+       }},
+      {"@k contact @in1 # 0.3 0.01\n",
+       [](int n) {
+         return n < let_go ? 0.05 - 0.1 * std::cos(n * std::numbers::pi / let_go * 40.0) : -9.0;
+       }},
+  };
+  const std::pair<const char*, const char*> things[] = {
+      {"@o osc 2. 0.003 0. 0. 0.\n", "@o"},
+      {"@d body 1.5 a b\n@d1 mode @d 310. 1e30 1. 0.3\n@d2 mode @d 2750. 1e30 -0.6 0.9\n",
+       "[@d b]"},
+      {"@w waveguide 0.8 613. 1e30 1. 0.\n", "[@w 0.31]"},
+  };
+  for (const auto& hand : hands) {
+    for (const auto& [thing, place] : things) {
+      std::string link = hand.link;
+      link.replace(link.find('#'), 1, place);
+      INFO(thing << link);
+      Books books(std::string(thing) + "@in1 posInput " + number(hand.at(0)) + "\n" + link +
+                  "@out1 posOutput " + place + "\n");
+      double start = 0.0;
+      for (int n = 0; n < 11 * second; ++n) {
+        books.go({hand.at(n)});
+        if (n == second) {
+          start = books.energy;
+        }
+      }
+      CHECK(start > 1e-9);
+      CHECK(std::fabs(10.0 * std::log10(books.energy / start)) / 10.0 < 0.01);
+    }
+  }
+}
+
 TEST_CASE("several links at a place on a waveguide are solved together", "[hybrids]") {
   for (const double k : {0.01, 1.0, 100.0}) {
     const std::string text =
