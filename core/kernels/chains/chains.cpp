@@ -7,51 +7,6 @@
 namespace ressort {
 namespace {
 
-// Whether there is one chain whose end a ground holds, and nothing that has to see all of it in
-// each sample.
-bool is_simple(const Program& program, const Chains& form) {
-  const Chain& chain = form.chains[0];
-  const MassRun& mass = program.mass_runs[chain.mass_run];
-  const auto is_force = [](const OutputSlot& output) { return output.is_force; };
-  return form.chains.size() == 1 && !chain.is_stiff && !mass.is_oscillator && !mass.has_gravity &&
-         program.taps.empty() && is_plain(program) && stands(program, chain.right) &&
-         std::none_of(program.outputs.begin(), program.outputs.end(), is_force);
-}
-
-// The least number of packs that there is a step for, or 0.
-template <std::size_t... counts>
-std::size_t short_packs(std::size_t least, std::size_t most, std::index_sequence<counts...>) {
-  std::size_t packs = 0;
-  static_cast<void>(((counts >= least && counts <= most && (packs = counts, true)) || ...));
-  return packs;
-}
-
-// A short chain in the widest packs, as many as there are registers for; else the widest that the
-// longest chain fills often enough for the passes to be worth more than their ends.
-template <class T>
-FoldedBy fold_by(const Program& program, const Chains& form, Isa isa) {
-  const std::size_t whole = whole_pack_bytes(isa) / sizeof(T);
-  std::uint32_t longest = 0;
-  std::uint32_t shortest_stiff = nowhere;
-  for (const Chain& chain : form.chains) {
-    longest = std::max(longest, chain.count);
-    shortest_stiff = chain.is_stiff ? std::min(shortest_stiff, chain.count) : shortest_stiff;
-  }
-  if (is_simple(program, form)) {
-    const std::size_t most = isa == Isa::v4 ? 10 : 5;
-    const std::size_t packs = short_packs((longest + whole - 1) / whole, most, ShortPacks{});
-    if (packs > 0) {
-      return {whole, packs};
-    }
-  }
-  // The next mass but one of a stiff one is in another pair than its own.
-  std::size_t lanes = whole;
-  while (lanes > 16 / sizeof(T) && (longest < 3 * lanes || shortest_stiff <= lanes)) {
-    lanes /= 2;
-  }
-  return {lanes, 0};
-}
-
 // Puts nodes in their places, and everything that names nodes into tables that name places.
 class TablesMaker {
  public:
@@ -342,8 +297,9 @@ ChainsLoops<T> loops_for(FoldedBy by) {
 
 template <class T>
 ChainsKernel<T>::ChainsKernel(const Program& program, const Chains& form, std::size_t, Isa isa)
-    : ChainsKernel(program, form, TablesMaker(program, form, fold_by<T>(program, form, isa)).make(),
-                   fold_by<T>(program, form, isa), isa) {}
+    : ChainsKernel(program, form,
+                   TablesMaker(program, form, fold_by(program, form, isa, sizeof(T))).make(),
+                   fold_by(program, form, isa, sizeof(T)), isa) {}
 
 template <class T>
 ChainsKernel<T>::ChainsKernel(const Program& program, const Chains& form, ChainsTables tables,

@@ -130,12 +130,6 @@ struct ChainsTables {
   ChainPlace short_end = nowhere;      // the empty place next to its last mass, if there is one
 };
 
-// How wide packs are, and how many of them a chain takes that stays in registers; 0: none does.
-struct FoldedBy {
-  std::size_t lanes = 0;
-  std::size_t short_packs = 0;
-};
-
 // Everything that one step of ChainsKernel touches.
 template <class T>
 struct ChainsState {
@@ -171,10 +165,11 @@ ChainsLoops<T> chains_loops(std::size_t bytes);
 
 // How many packs a chain may have that stays in registers, and its step; null where there are too
 // few registers for it.
-using ShortPacks = std::index_sequence<1, 2, 3, 4, 5, 6, 8, 10>;
+using ShortPacks = std::index_sequence<1, 2, 3, 4, 5, 6, 8, 10, 13>;
 template <Isa isa, class T>
 ChainsStep<T> short_chain_step(std::size_t bytes, std::size_t packs);
 
+struct FoldedBy;
 template <class T>
 class ChainsKernel final : public NodeKernel<T> {
  public:

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 
+#include "core/kernels/chains/chains.h"
 #include "core/kernels/clusters.h"
 #include "core/kernels/taps.h"
 #include "core/laws/laws.h"
@@ -264,12 +265,57 @@ class ChainFinder {
   Chains form_;
 };
 
+// Whether there is one chain whose end a ground holds, and nothing that has to see all of it in
+// each sample.
+bool is_simple(const Program& program, const Chains& form) {
+  const Chain& chain = form.chains[0];
+  const MassRun& mass = program.mass_runs[chain.mass_run];
+  const auto is_force = [](const OutputSlot& output) { return output.is_force; };
+  return form.chains.size() == 1 && !chain.is_stiff && !mass.is_oscillator && !mass.has_gravity &&
+         program.taps.empty() && is_plain(program) && stands(program, chain.right) &&
+         std::none_of(program.outputs.begin(), program.outputs.end(), is_force);
+}
+
+// The least number of packs that there is a step for, or 0.
+template <std::size_t... counts>
+std::size_t short_packs(std::size_t least, std::size_t most, std::index_sequence<counts...>) {
+  std::size_t packs = 0;
+  static_cast<void>(((counts >= least && counts <= most && (packs = counts, true)) || ...));
+  return packs;
+}
+
 }  // namespace
 
 bool stands(const Program& program, std::uint32_t node) {
   return node != Chain::free &&
          std::none_of(program.inputs.begin(), program.inputs.end(),
                       [&](const InputSlot& input) { return input.node == node; });
+}
+
+FoldedBy fold_by(const Program& program, const Chains& form, Isa isa, std::size_t number_bytes) {
+  const std::size_t whole = whole_pack_bytes(isa) / number_bytes;
+  std::uint32_t longest = 0;
+  std::uint32_t shortest_stiff = nowhere;
+  for (const Chain& chain : form.chains) {
+    longest = std::max(longest, chain.count);
+    shortest_stiff = chain.is_stiff ? std::min(shortest_stiff, chain.count) : shortest_stiff;
+  }
+  // In the widest packs where there are registers for all of it.
+  if (is_simple(program, form)) {
+    const std::size_t most = isa == Isa::v4 ? 13 : 8;
+    const std::size_t packs = short_packs((longest + whole - 1) / whole, most, ShortPacks{});
+    if (packs > 0) {
+      return {whole, packs};
+    }
+  }
+  // The widest that the longest fills often enough for passes to be worth more than their ends. The
+  // next mass but one of a stiff one is in another pair
+  // than its own.
+  std::size_t lanes = whole;
+  while (lanes > 16 / number_bytes && (longest < 3 * lanes || shortest_stiff <= lanes)) {
+    lanes /= 2;
+  }
+  return {lanes, 0};
 }
 
 std::optional<Chains> chains_form(const Program& program, const Progress& progress) {
@@ -286,17 +332,26 @@ std::optional<Chains> chains_form(const Program& program, const Progress& progre
 }
 
 double predicted_ns(const Program& program, const Chains& form, const Workload& load) {
-  std::uint32_t longest = 0;
-  for (const Chain& chain : form.chains) {
-    longest = std::max(longest, chain.count);
-  }
-  const bool fills_wide = is_wide(load) && longest >= (load.is_double ? 12u : 24u);
-  const double lanes = (fills_wide ? 32.0 : 16.0) / (load.is_double ? 8.0 : 4.0);
-  double sum = 6.0;
-  for (const Chain& chain : form.chains) {
-    const double stiff = chain.is_stiff ? 2.2 : 1.0;
-    sum += 3.7 + stiff * (is_wide(load) ? 0.62 : 0.9) * std::ceil(chain.count / lanes) +
-           (chain.is_stiff ? 24.0 : 0.0);
+  constexpr double nearest_cache = 32768.0;
+  constexpr double line_ns = 1.2;  // of 64 bytes that come from the next cache
+  const double number_bytes = load.is_double ? 8.0 : 4.0;
+  const FoldedBy by = fold_by(program, form, load.isa, load.is_double ? 8 : 4);
+  double sum = 0.0;
+  if (by.short_packs > 0) {
+    sum += 5.4 + 1.1 * static_cast<double>(by.short_packs);
+  } else {
+    const double lanes = static_cast<double>(by.lanes);
+    const double pair_bytes = 2.0 * lanes * number_bytes;
+    const double at_hand_ns = pair_bytes > 64.0 ? 1.22 : 0.8;
+    const bool is_at_hand =
+        2.0 * static_cast<double>(form.nodes.size()) * number_bytes <= nearest_cache;
+    const double pair_ns =
+        is_at_hand ? at_hand_ns : std::max(at_hand_ns, line_ns * pair_bytes / 64.0);
+    sum += 6.0;
+    for (const Chain& chain : form.chains) {
+      const double stiff = chain.is_stiff ? 2.2 : 1.0;
+      sum += 3.7 + stiff * pair_ns * std::ceil(chain.count / lanes) + (chain.is_stiff ? 24.0 : 0.0);
+    }
   }
   if (!form.links.empty()) {
     sum += 4.0;

@@ -21,6 +21,13 @@ std::optional<Chains> chains_form(const Program& program, const Progress& progre
 // Whether an end of a chain is held by what stays where it is: a ground. [any thread]
 bool stands(const Program& program, std::uint32_t node);
 
+// How wide packs are, and how many of them a chain takes that stays in registers; 0: none does.
+struct FoldedBy {
+  std::size_t lanes = 0;
+  std::size_t short_packs = 0;
+};
+FoldedBy fold_by(const Program& program, const Chains& form, Isa isa, std::size_t number_bytes);
+
 // What the registry's row of it asks, of one voice in bytes.
 double predicted_ns(const Program& program, const Chains& form, const Workload& load);
 std::string description(const Program& program, const Chains& form);

@@ -498,10 +498,16 @@ std::optional<Grid> grid_form(const Program& program, const Progress& progress) 
 }
 
 double predicted_ns(const Program& program, const Grid& form, const Workload& load) {
-  const double slow = is_wide(load) ? 1.0 : 2.3;
+  constexpr double nearest_cache = 32768.0;
   const double d = load.is_double ? 1.0 : 0.0;
+  const bool is_at_hand = 4.0 * form.count * (4.0 + 4.0 * d) <= nearest_cache;
+  const std::size_t bytes = whole_pack_bytes(load.isa);
+  const double slow = bytes == 64   ? (is_at_hand ? 0.8 : 1.0)
+                      : bytes == 32 ? 1.1
+                                    : 3.0 - d;                       // where sums of neighbours are
+  const double bent = bytes == 64 ? 0.7 : bytes == 32 ? 1.0 : 1.75;  // where laws are
   const double rest = static_cast<double>(form.rest_ends.size() + form.ports.size());
-  double sum = passive_ns(program) + (3.5 + 1.5 * d) * rest +
+  double sum = 13.0 - 8.0 * d + passive_ns(program) + (3.5 + 1.5 * d) * rest +
                10.0 * static_cast<double>(program.taps.size());
   for (const GridSegment& segment : form.segments) {
     const double offsets = static_cast<double>(segment.offsets.size());
@@ -509,7 +515,7 @@ double predicted_ns(const Program& program, const Grid& form, const Workload& lo
   }
   for (const GridLinks& links : form.links) {
     const bool is_cheap = program.link_runs[links.run].law == Law::spring;
-    sum += slow * form.count * static_cast<double>(links.offsets.size()) * (0.24 + 0.21 * d) *
+    sum += bent * form.count * static_cast<double>(links.offsets.size()) * (0.24 + 0.21 * d) *
            (is_cheap ? 0.8 : 1.2);
   }
   return load.voices * sum;
