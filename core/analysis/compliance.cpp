@@ -34,6 +34,22 @@ class Anchors {
   std::uint32_t ground_;  // stands for all that does not move
 };
 
+// Without links that may let go, and so hold nothing: many may be at one place that moves, each at
+// every node under it. What may have less stiffness than none is left, and refused.
+Network always_touching(const Network& network, std::span<const Range> arguments,
+                        double rate_ratio) {
+  Network felt = network;
+  felt.links.clear();
+  for (std::uint32_t i = 0; i < network.links.size(); ++i) {
+    const Assembly::Term term{.element = i, .is_link = true};
+    if (!facts_of(network.links[i].law).lets_go() ||
+        !(lowest_load(network, term, arguments, rate_ratio).stiff >= 0.0)) {
+      felt.links.push_back(network.links[i]);
+    }
+  }
+  return felt;
+}
+
 }  // namespace
 
 std::optional<std::vector<double>> compliances(const Network& network, const ParameterBox& box,
@@ -45,15 +61,16 @@ std::optional<std::vector<double>> compliances(const Network& network, const Par
   if (static_cast<std::size_t>(moving) > most_compliant_masses) {
     return std::nullopt;
   }
-  const Assembly assembly = assemble(network);
+  const std::vector<Range> arguments = argument_ranges(network, box);
+  const Network felt = always_touching(network, arguments, rate_ratio);
+  const Assembly assembly = assemble(felt);
   if (!assembly.is_complete) {
     return std::nullopt;
   }
-  const std::vector<Range> arguments = argument_ranges(network, box);
   Anchors anchors(assembly);
   std::vector<double> weights;
   for (const Assembly::Term& term : assembly.terms) {
-    const double stiff = lowest_load(network, term, arguments, rate_ratio).stiff;
+    const double stiff = lowest_load(felt, term, arguments, rate_ratio).stiff;
     if (!(stiff >= 0.0)) {
       return std::nullopt;
     }

@@ -5,6 +5,7 @@
 #include <numeric>
 #include <set>
 #include <span>
+#include <utility>
 
 #include "core/groups.h"
 #include "core/laws/laws.h"
@@ -322,12 +323,20 @@ PassiveTables passive_tables(const Program& program) {
   }
   Groups groups(program.moving);  // which links move each other, by the masses that they move
   std::vector<std::uint32_t> any(links.size(), no_mass);  // [link] a mass that it moves
+  std::vector<std::uint32_t> under(program.position.size(), no_mass);  // [node] one that it moves
+  std::vector<std::uint8_t> is_known(under.size(), 0);
   for (std::size_t i = 0; i < links.size(); ++i) {
     for (const std::uint32_t end : {links[i].ends.a, links[i].ends.b}) {
-      each_moved(program, end, [&](std::uint32_t node) {
-        any[i] = any[i] == no_mass ? node : any[i];
-        groups.join(any[i], node);
-      });
+      if (!std::exchange(is_known[end], 1)) {
+        each_moved(program, end, [&](std::uint32_t node) {
+          under[end] = under[end] == no_mass ? node : under[end];
+          groups.join(under[end], node);
+        });
+      }
+      if (under[end] != no_mass) {
+        any[i] = any[i] == no_mass ? under[end] : any[i];
+        groups.join(any[i], under[end]);
+      }
     }
   }
   std::map<std::uint32_t, std::vector<std::size_t>> of_group;

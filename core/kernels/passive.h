@@ -174,9 +174,13 @@ class WebStep {
         if constexpr (requires { law.curved(V{}); }) {
           for (std::uint32_t i = 0; i < count; ++i, ++link, row += passive_rows) {
             const LinkState<V> state{.now = row[0], .speed = row[1]};
-            const V straight = law.steady(state).force;
-            const V bent = law.gradient(row[0], V{}).value;
-            held += law.curved(row[0]);
+            // What softens holds less than nothing, and pulls as published.
+            const V kept = law.curved(row[0]);
+            const auto holds = kept >= V{};
+            const V slope = law.gradient(row[0], V{}).value;
+            const V bent = select(holds, slope, V{});
+            const V straight = law.steady(state).force + (slope - bent);
+            held += positive(kept);
             way += bent * (row[1] + body_.speed(link->ends));
             straight_[link->mass_a] -= straight;
             straight_[link->mass_b] += straight;
@@ -187,7 +191,7 @@ class WebStep {
         return V{};
       });
     }
-    held_ = positive(held);
+    held_ = held;
     way_ = way;
   }
 

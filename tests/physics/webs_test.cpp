@@ -200,4 +200,40 @@ TEST_CASE("a web sounds as its springs at eight times the rate, as nearly as pub
   CHECK(!(published > 0.0));
 }
 
+TEST_CASE("springs of a web that soften pull as published", "[webs]") {
+  double heard = 0.0;
+  for (const Passivity passive : {Passivity::always, Passivity::never}) {
+    Stepper<double> body(mesh("nlSpring3 .1 -.01 0."), passive);
+    for (int n = 0; n < 1000; ++n) {
+      body.go({n < 40 ? .02 : 0.});
+    }
+    heard = passive == Passivity::always ? body.x[100] : heard;
+    CHECK(body.x[100] == Approx(heard).epsilon(1e-9));
+  }
+}
+
+TEST_CASE("a web in one lane depends on no other lane", "[webs]") {
+  const Program program =
+      program_of(mesh("nlSpring3 .1 10. 0.", "@c contact @w @m6_6 1. 0.\n"), Passivity::always);
+  const auto play = [&](double other) {
+    Bare<double> body(program, 2, Isa::base);
+    for (std::size_t lane = 1; lane < body.lanes(); ++lane) {
+      std::vector<double> x = program.position;
+      x[40] = other;
+      body.kernel().set_state(lane, x.data(), program.velocity.data());
+    }
+    std::vector<double> heard;
+    for (int n = 0; n < 300; ++n) {
+      body.feed(0, 0, n < 40 ? .02 : 0.);
+      for (std::size_t lane = 1; lane < body.lanes(); ++lane) {
+        body.feed(lane, 0, n % 7 == 0 ? other : 0.);
+      }
+      heard.push_back(body.run(0)[0]);
+    }
+    return heard;
+  };
+  CHECK(play(0.5) == play(-300.0));
+  CHECK(play(0.0) == play(-300.0));
+}
+
 }  // namespace ressort

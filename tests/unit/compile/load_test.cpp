@@ -126,8 +126,7 @@ TEST_CASE("Nothing of a load grows much faster than the model", "[load]") {
     std::function<std::string(int)> text;
     int size;
   };
-  // Each of these was quadratic or worse. A tangle is too large for a factorisation at both sizes;
-  // contacts at one place are solved together, by a matrix of as many rows and columns.
+  // Each of these was quadratic or worse. A tangle is too large for a factorisation at both sizes.
   const auto shape =
       GENERATE(Shape{"chain", chain, 2000}, Shape{"star", star, 2000}, Shape{"hub", hub, 1000},
                Shape{"comb", comb, 2000}, Shape{"tangle", tangle, 4000},
