@@ -28,6 +28,15 @@ std::string counted(const LawFacts& law, std::size_t count) {
   return std::to_string(count) + " " + std::string(count == 1 ? law.one : law.many);
 }
 
+// Which law is the first of a name: bows of two profiles are bows.
+std::size_t first_called(std::string_view one) {
+  std::size_t i = 0;
+  while (law_table()[i].one != one) {
+    ++i;
+  }
+  return i;
+}
+
 // All numbers by which it could exert a force are 0, and nobody can turn them.
 bool exerts_nothing(const Network& network, const Link& link) {
   const LawFacts& law = facts_of(link.law);
@@ -49,7 +58,7 @@ bool exerts_nothing(const Network& network, const Link& link) {
 Schemes choose_schemes(const Network& network, const Budget& budget, const Progress& progress) {
   Schemes schemes;
   schemes.links.resize(network.links.size());
-  std::array<std::size_t, law_count> counts{};  // [law] links that are not linear
+  std::array<std::size_t, law_count> counts{};  // [law] links that are not linear, by their name
   const Link* first = nullptr;
   progress.spend(network.links.size());
   for (std::size_t i = 0; i < network.links.size(); ++i) {
@@ -68,7 +77,7 @@ Schemes choose_schemes(const Network& network, const Budget& budget, const Progr
       continue;
     }
     first = first == nullptr ? &link : first;
-    ++counts[static_cast<std::size_t>(link.law)];
+    ++counts[first_called(facts_of(link.law).one)];
     if (budget.passive == Passivity::always) {
       schemes.links[i] = LinkScheme{Scheme::discrete_gradient};
     }

@@ -428,6 +428,14 @@ TEST_CASE("all that no theorem covers is made passive, and told", "[passive]") {
         "played as published, where nothing keeps 1 spring that grows stiffer, 1 bow, 2 contacts "
         "from making energy; --budget passive=auto does");
   CHECK(!usual.hazard);
+  // Bows of two profiles, and springs of two laws, are told together.
+  const std::vector<std::string> notes =
+      choose_schemes(
+          network_of(text + "@b2 nlBow @in1 @m 0.2 0.01 1\n@q2 nlSpring2 @g @n 0. 3. 0.\n"), {})
+          .notes;
+  REQUIRE(notes.size() == 3);
+  CHECK(notes[0].starts_with("2 springs that grow stiffer made passive"));
+  CHECK(notes[1].starts_with("2 bows made passive"));
   // What is passive needs no proof any more, but for what a spring is at rest.
   CHECK(without_passive(network, usual.links).links.size() == 3);
   // The kernel's runs never mix them.
