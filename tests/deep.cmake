@@ -59,6 +59,9 @@ if(RESSORT_MPI)
     $<TARGET_FILE:ressort-mpi>)
 endif()
 
+# The church bells' partials against solids of their profiles.
+add_deep_test(bells_everywhere 300 $<TARGET_FILE:ressort_tests> "[bells_everywhere]")
+
 # A server that is killed twenty times, and comes back at other rates and periods.
 add_deep_test(server_killed 120 ${CMAKE_COMMAND} -E env RESSORT_KILLS=20
   $<TARGET_FILE:ressort_server_tests> "[server_loss]")
