@@ -14,7 +14,6 @@
 namespace ressort {
 namespace {
 
-constexpr double ln_1000 = 6.907755278982137;
 constexpr double band_hz = 690.0;         // the lower rate of the first search
 constexpr double twin = 0.15;             // nearer than this share of the damping is the same pole
 constexpr double chance = 21.0;           // squared amplitude over twice its variance: no accident
@@ -427,7 +426,7 @@ IdentifiedMode measured(const Found& found, double rate_hz, double time_zero) {
   IdentifiedMode mode;
   mode.frequency_hz = {omega * hertz,
                        hertz * std::hypot(found.deviation.omega, last_digit * omega)};
-  mode.t60_s.value = ln_1000 / (alpha * rate_hz);
+  mode.t60_s.value = std::log(1000.0) / (alpha * rate_hz);
   mode.t60_s.deviation = mode.t60_s.value * std::hypot(found.deviation.alpha / alpha, last_digit);
   for (std::size_t c = 0; c < found.mode.c.size(); ++c) {
     const Complex start = found.mode.c[c] * std::exp(found.mode.log_z * time_zero);
