@@ -117,13 +117,16 @@ void TimbreWatch::hear() {
         samples.push_back(sum / static_cast<double>(chunk.channels));
       }
     }
-    stream.add(samples);
     std::unique_lock lock(mutex_);
     recent_.insert(recent_.end(), samples.begin(), samples.end());
     if (const std::size_t enough = rate_hz > 0.0 ? recent_samples(rate_hz) : 0;
         recent_.size() > enough) {
       recent_.erase(recent_.begin(), recent_.end() - static_cast<std::ptrdiff_t>(enough));
     }
+    // Frames after what they were made of: who has seen the last frame finds its samples.
+    lock.unlock();
+    stream.add(samples);
+    lock.lock();
     wake_.wait_for(lock, poll_time, [this] { return stop_; });
     goes_on =
         is_whole && !stop_ && Clock::now() < until_ && process_.clock.read().rate_hz == rate_hz;

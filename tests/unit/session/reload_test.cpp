@@ -150,7 +150,7 @@ TEST_CASE("An edited parameter reaches the voice that sounds", "[reload]") {
   CHECK(news.news == "p: K = 0.012");
   const std::size_t edited = 4800;
   stage.play(edited);
-  CHECK(stage.frequency_hz(edited - 512) == Approx(pitch_hz(0.012, 1.0)).epsilon(1e-4));
+  CHECK(stage.frequency_hz(edited - 1024) == Approx(pitch_hz(0.012, 1.0)).epsilon(1e-4));
   CHECK(stage.process.meters().voices == 1);
   CHECK(stage.process.meters().swaps == swaps);  // the same engine
   CHECK(stage.session.current()->serial == serial);
