@@ -5,6 +5,7 @@
 #include <complex>
 #include <cstdlib>
 #include <map>
+#include <string_view>
 
 #include "app/commands/body/mesher.h"
 #include "app/session/files.h"
@@ -105,9 +106,10 @@ TEST_CASE("the church bells' partials are those of their solids", "[.][bells_eve
       const double of_model = partials[places[i]] / partials[4];
       INFO(name << ", partial " << places[i] << ": " << of_model << ", of the solid "
                 << solid[i] / solid[4]);
-      // Straight edges: where the wall is stretched (the prime) the solid is stiffer by
-      // 1.7 % with so many unknowns, by 3.3 % with a third of them; all else is within 1 %.
-      CHECK(of_model == Approx(solid[i] / solid[4]).epsilon(places[i] == 1 ? 0.02 : 0.01));
+      // The prime, in which the wall is stretched, is the last to converge: that of MajorBell is
+      // 1.7 % off with so many unknowns, 3.3 % with a third of them.
+      const bool is_late = name == std::string_view("MajorBell") && places[i] == 1;
+      CHECK(of_model == Approx(solid[i] / solid[4]).epsilon(is_late ? 0.018 : 0.01));
     }
   }
 }
