@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numeric>
 
 namespace ressort {
@@ -32,10 +33,23 @@ NodeLayout layout_in_rows(const Program& program, std::size_t width, std::size_t
 }
 
 template <class T>
+PlaceRoom<T>::PlaceRoom(const Program& program, std::size_t width)
+    : placed(program.taps.size() * 2 * width) {
+  std::fill(placed.begin(), placed.end(), std::numeric_limits<T>::quiet_NaN());
+  std::size_t rows = 0;
+  for (const TapSlot& tap : program.taps) {
+    weights_at.push_back(rows);
+    rows += tap.is_on_body() ? tap.length : 0;
+  }
+  weights.resize(rows * width);
+}
+
+template <class T>
 Nodes<T>::Nodes(const Program& program, NodeLayout layout_in)
     : layout(std::move(layout_in)),
       numbers(layout.size),
       corners(program.taps.size() * width()),
+      places(program, width()),
       passive(program, width()) {}
 
 template <class T>
@@ -87,6 +101,8 @@ template <class T>
 void Nodes<T>::become(const Nodes& from) {
   numbers = from.numbers;
   corners = from.corners;
+  places.placed = from.places.placed;
+  places.weights = from.places.weights;
   passive.memory = from.passive.memory;
   passive.awake = from.passive.awake;
   passive.felt = from.passive.felt;

@@ -30,6 +30,16 @@ NodeLayout layout_in_rows(std::span<const std::uint32_t> slot, std::size_t slots
 template <class T>
 NodeLayout layout_in_rows(const Program& program, std::size_t width, std::size_t rows);
 
+// What is kept of where the places are, so that it is looked up only where one moves.
+template <class T>
+struct PlaceRoom {
+  PlaceRoom(const Program& program, std::size_t width);
+
+  Aligned<T> placed;   // [tap][u and v][lane] where it was in the last sample; at first nowhere
+  Aligned<T> weights;  // [mode][lane] of the taps on bodies, one after the other
+  std::vector<std::size_t> weights_at;  // [tap] its first, in rows of lanes
+};
+
 template <class T>
 struct Nodes {
   Nodes(const Program& program, NodeLayout layout);
@@ -50,6 +60,7 @@ struct Nodes {
   NodeLayout layout;
   Aligned<T> numbers;
   std::vector<Corners<T>> corners;  // [tap][lane] in the last sample
+  PlaceRoom<T> places;
   PassiveRoom<T> passive;
 
  private:

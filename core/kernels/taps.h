@@ -49,6 +49,16 @@ static inline void each_corner(const Corners<T>& corners, Use&& use) {
   }
 }
 
+// How much a mode moves a place on a body.
+template <class T>
+static inline T weight_of_mode(const Program& program, const TapSlot& slot,
+                               const Corners<T>& corners, std::uint32_t mode) {
+  const double* const near = program.shapes.data() + slot.shape + corners.node[0] * slot.length;
+  const double* const far = corners.weight[1] > 0 ? near + slot.length : near;
+  return corners.weight[0] * static_cast<T>(near[mode]) +
+         corners.weight[1] * static_cast<T>(far[mode]);
+}
+
 // Calls use(node, weight) for every node that a point stands for.
 template <class T, class Use>
 static inline void each_behind(const Program& program, const TapSlot& slot,
@@ -57,11 +67,8 @@ static inline void each_behind(const Program& program, const TapSlot& slot,
     return each_corner(corners,
                        [&](std::uint32_t at, T weight) { use(program.tap_nodes[at], weight); });
   }
-  const double* const near = program.shapes.data() + slot.shape + corners.node[0] * slot.length;
-  const double* const far = corners.weight[1] > 0 ? near + slot.length : near;
   for (std::uint32_t mode = 0; mode < slot.length; ++mode) {
-    use(program.tap_nodes[slot.first + mode], corners.weight[0] * static_cast<T>(near[mode]) +
-                                                  corners.weight[1] * static_cast<T>(far[mode]));
+    use(program.tap_nodes[slot.first + mode], weight_of_mode(program, slot, corners, mode));
   }
 }
 

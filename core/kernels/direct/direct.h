@@ -32,6 +32,9 @@ struct DirectState {
         force(nodes.row(2)),
         row(nodes.layout.row),
         corners(nodes.corners.data()),
+        placed(nodes.places.placed.data()),
+        weights(nodes.places.weights.data()),
+        weights_at(nodes.places.weights_at.data()),
         nodes(nodes.layout.node.size()),
         passive(nodes.passive.tables),
         inverse_mass(nodes.passive.inverse_mass.data()),
@@ -48,6 +51,9 @@ struct DirectState {
   T* force;  // summed by the links, used by the next sample
   std::size_t row;
   Corners<T>* corners;  // [tap][lane] in this sample
+  T* placed;            // PlaceRoom
+  T* weights;
+  const std::size_t* weights_at;
   std::size_t nodes;
   const PassiveTables& passive;
   const std::uint32_t* inverse_mass;  // [moving node] coefficient, if there are passive links

@@ -2,7 +2,7 @@
 // positions, to fourth order. A part of *_step.cpp, which are compiled for each instruction set.
 #pragma once
 
-#include "core/kernels/direct/direct.h"
+#include "core/kernels/direct/direct_places.h"
 #include "core/laws/laws.h"
 
 namespace ressort::RESSORT_ISA {
@@ -27,11 +27,13 @@ struct View {
   V between(std::size_t a, std::size_t b) const { return x[a] - x[b]; }
   void move(std::size_t node) { shift(node, v[node]); }
   void shift(std::size_t node, V way) { x[node] += way; }
-  // One lane's position, `at` being its number in [node][lane].
-  T exact(std::size_t at) const { return state.x[at]; }
-  void move_to(std::size_t at, T position) {
-    state.v[at] = position - state.x[at];
-    state.x[at] = position;
+  // Where a place would be, in whatever numbers move_to() takes.
+  V exact_at(const Program& program, std::size_t tap) const {
+    return seen_at(program, *this, tap, x);
+  }
+  void move_to(std::size_t node, V position) {
+    v[node] = position - x[node];
+    x[node] = position;
   }
   // What the position inputs and the outputs of a frame leave out.
   void take_rests(const Program&) {}
@@ -123,142 +125,6 @@ template <class S>
   }
 }
 
-// Calls `use(at, weight)` for the up to four nodes around a tap's place in one lane, or for all
-// modes of a body; `at` is the node's own number in [node][lane].
-template <class S, class Use>
-void around(const Program& program, const S& s, std::size_t tap, std::size_t lane, Use&& use) {
-  each_behind(program, program.taps[tap], s.state.corners[tap * S::lanes + lane],
-              [&](std::uint32_t node, auto weight) { use(node * S::lanes + lane, weight); });
-}
-
-template <class S>
-void place_taps(const Program& program, S& s) {
-  const auto* const c = s.state.ramps.value;
-  for (std::size_t i = 0; i < program.taps.size(); ++i) {
-    const TapSlot& tap = program.taps[i];
-    for (std::size_t lane = 0; lane < S::lanes; ++lane) {
-      s.state.corners[i * S::lanes + lane] =
-          corners_at(tap, c[tap.u * S::lanes + lane], c[tap.v * S::lanes + lane]);
-    }
-  }
-}
-
-// A point moves with the nodes around it, and along them when its coordinate changes.
-template <class S>
-void move_taps(const Program& program, S& s) {
-  for (std::size_t i = 0; i < program.taps.size(); ++i) {
-    for (std::size_t lane = 0; lane < S::lanes; ++lane) {
-      const std::size_t node = program.taps[i].node * S::lanes + lane;
-      decltype(s.exact(node)) position = 0;
-      around(program, s, i, lane,
-             [&](std::size_t at, auto weight) { position += weight * s.exact(at); });
-      s.move_to(node, position);
-    }
-  }
-}
-
-// What acts on the points goes to the nodes around them.
-template <class S>
-void spread_taps(const Program& program, S& s) {
-  using V = typename S::V;
-  using T = Scalar<V>;
-  for (std::size_t i = 0; i < program.taps.size(); ++i) {
-    const std::uint32_t node = program.taps[i].node;
-    const V force = s.force[node];
-    s.force[node] = V{};
-    for (std::size_t lane = 0; lane < S::lanes; ++lane) {
-      around(program, s, i, lane,
-             [&](std::size_t at, T weight) { s.state.force[at] += weight * force[lane]; });
-    }
-  }
-}
-
-// Whether a node is a place on a macro; it is then taps[node - taps[0].node].
-bool is_place(const Program& program, std::uint32_t node) {
-  return !program.taps.empty() && node >= program.taps[0].node;
-}
-
-// Calls `use(at, weight)` for what a node stands for in one lane: itself, or what is around it.
-template <class S, class Use>
-void behind(const Program& program, const S& s, std::uint32_t node, std::size_t lane, Use&& use) {
-  if (!is_place(program, node)) {
-    return use(node * S::lanes + lane, Scalar<typename S::V>(1));
-  }
-  around(program, s, node - program.taps[0].node, lane, use);
-}
-
-// Calls `use(at, weight, part)` for what two nodes both stand for in one lane.
-template <class S, class Use>
-void shared(const Program& program, const S& s, std::uint32_t from, std::uint32_t at,
-            std::size_t lane, Use&& use) {
-  if (!is_place(program, from) || !is_place(program, at)) {
-    return behind(program, s, from, lane, [&](std::size_t pushed, auto weight) {
-      behind(program, s, at, lane, [&](std::size_t felt, auto part) {
-        if (pushed == felt) {
-          use(felt, weight, part);
-        }
-      });
-    });
-  }
-  const std::uint32_t first = program.taps[0].node;
-  const TapSlot& one = program.taps[from - first];
-  const TapSlot& other = program.taps[at - first];
-  if (one.first != other.first) {
-    return;  // on two macros
-  }
-  const auto& near = s.state.corners[(from - first) * S::lanes + lane];
-  const auto& far = s.state.corners[(at - first) * S::lanes + lane];
-  if (!one.is_on_body()) {
-    return each_corner(near, [&](std::uint32_t pushed, auto weight) {
-      each_corner(far, [&](std::uint32_t felt, auto part) {
-        if (pushed == felt) {
-          use(program.tap_nodes[felt] * S::lanes + lane, weight, part);
-        }
-      });
-    });
-  }
-  using T = Scalar<typename S::V>;
-  const auto weight_at = [&](const TapSlot& slot, const auto& between, std::uint32_t mode) {
-    const double* const shape =
-        program.shapes.data() + slot.shape + between.node[0] * slot.length + mode;
-    return between.weight[0] * static_cast<T>(shape[0]) +
-           (between.weight[1] > 0 ? between.weight[1] * static_cast<T>(shape[slot.length]) : T(0));
-  };
-  for (std::uint32_t mode = 0; mode < one.length; ++mode) {
-    use(program.tap_nodes[one.first + mode] * S::lanes + lane, weight_at(one, near, mode),
-        weight_at(other, far, mode));
-  }
-}
-
-// The links' force at a node; at a place that of the nodes around it, interpolated.
-template <class S>
-typename S::V force_at(const Program& program, const S& s, std::uint32_t node) {
-  using V = typename S::V;
-  using T = Scalar<V>;
-  V force{};
-  for (std::size_t lane = 0; lane < S::lanes; ++lane) {
-    behind(program, s, node, lane, [&](std::size_t at, T weight) {
-      force[lane] += weight * s.state.force[at];
-      force[lane] += s.state.felt == nullptr ? T(0) : weight * s.state.felt[at];
-    });
-  }
-  return force;
-}
-
-// How much of what pushes one node is felt at another: all of it where they are one, and between
-// two places the product of their weights on every node that both have around them.
-template <class S>
-typename S::V share(const Program& program, const S& s, std::uint32_t from, std::uint32_t at) {
-  using V = typename S::V;
-  using T = Scalar<V>;
-  V sum{};
-  for (std::size_t lane = 0; lane < S::lanes; ++lane) {
-    shared(program, s, from, at, lane,
-           [&](std::size_t, T weight, T part) { sum[lane] += weight * part; });
-  }
-  return sum;
-}
-
 // Links that are not plain see nodes and places alike.
 template <class S>
 struct Passive {
@@ -295,57 +161,39 @@ struct Passive {
   }
   // How far one node is moved by a force of 1 at another.
   V give(std::uint32_t from, std::uint32_t at) const {
-    if (from == at && !is_place(program, at)) {
-      return at < program.moving ? s.coefficient[s.state.inverse_mass[at]] : V{};
+    // What has no inertia is not moved, and what waves move is not a part of anything.
+    for (const std::uint32_t node : {from, at}) {
+      if (!is_place(program, node) && (node >= program.moving || is_junction(program, node))) {
+        return from == at ? inverse_mass(node) : V{};
+      }
     }
-    V sum{};
-    for (std::size_t lane = 0; lane < S::lanes; ++lane) {
-      shared(program, s, from, at, lane, [&](std::size_t node, T weight, T part) {
-        sum[lane] += weight * part * inverse_mass(node, lane);
-      });
-    }
-    return sum;
+    return shared(program, s, from, at, [this](std::uint32_t node) { return inverse_mass(node); });
   }
   void push_node(std::uint32_t node, V force) {
     if (!is_place(program, node)) {
-      if (node < program.moving) {
-        shift(node, s.coefficient[s.state.inverse_mass[node]] * force);
-      }
+      shift(node, inverse_mass(node) * force);
       return feel(node, force);
     }
-    for (std::size_t lane = 0; lane < S::lanes; ++lane) {
-      behind(program, s, node, lane, [&](std::size_t at, T weight) {
-        const T part = weight * inverse_mass(at, lane);
-        s.state.x[at] += part * force[lane];
-        s.state.v[at] += part * force[lane];
-        if (s.state.felt != nullptr) {
-          s.state.felt[at] += weight * force[lane];
-        }
-      });
-    }
+    share_out(program, s, node - program.taps[0].node, force, [this](std::uint32_t at, V part) {
+      const V way = inverse_mass(at) * part;
+      s.x[at] += way;
+      s.v[at] += way;
+      feel(at, part);
+    });
   }
 
  private:
   V position(std::uint32_t node) const {
-    if (!is_place(program, node)) {
-      return s.x[node];
-    }
-    V position{};
-    for (std::size_t lane = 0; lane < S::lanes; ++lane) {
-      behind(program, s, node, lane,
-             [&](std::size_t at, T weight) { position[lane] += weight * s.state.x[at]; });
-    }
-    return position;
+    return is_place(program, node) ? seen_at(program, s, node - program.taps[0].node, s.x)
+                                   : s.x[node];
   }
 
   V speed(std::uint32_t node) const {
     return is_place(program, node) ? position(node) - s.x[node] : s.v[node];
   }
 
-  T inverse_mass(std::size_t at, std::size_t lane) const {
-    const std::size_t node = at / S::lanes;
-    return node < program.moving ? s.state.ramps.value[s.state.inverse_mass[node] * S::lanes + lane]
-                                 : T(0);
+  V inverse_mass(std::uint32_t node) const {
+    return node < program.moving ? s.coefficient[s.state.inverse_mass[node]] : V{};
   }
 
  public:
@@ -391,7 +239,9 @@ typename S::V read_output(const Program& program, const S& s, const typename S::
   auto force = force_at(program, s, output.node);
   for (std::size_t i = 0; i < program.inputs.size(); ++i) {
     if (program.inputs[i].is_force) {
-      force += share(program, s, program.inputs[i].node, output.node) * value[i];
+      force += shared(program, s, program.inputs[i].node, output.node,
+                      [](std::uint32_t) { return typename S::V{} + 1; }) *
+               value[i];
     }
   }
   return force / static_cast<Scalar<typename S::V>>(program.rate_ratio * program.rate_ratio);

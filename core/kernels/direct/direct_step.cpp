@@ -28,13 +28,24 @@ struct Summed : View<float, Bytes> {
     rest[node] = y - (sum - this->x[node]);
     this->x[node] = sum;
   }
-  double exact(std::size_t at) const {
-    return static_cast<double>(this->state.x[at]) + static_cast<double>(this->state.own(0)[at]);
+  using Exact = std::array<double, Base::lanes>;
+  Exact exact_at(const Program& program, std::size_t tap) const {
+    Exact position{};
+    const TapSlot& slot = program.taps[tap];
+    for (std::size_t lane = 0; lane < Base::lanes; ++lane) {
+      each_behind(
+          program, slot, this->state.corners[tap * Base::lanes + lane],
+          [&](std::uint32_t node, float weight) { position[lane] += weight * exact(node, lane); });
+    }
+    return position;
   }
-  void move_to(std::size_t at, double position) {
-    this->state.v[at] = static_cast<float>(position - exact(at));
-    this->state.x[at] = static_cast<float>(position);
-    this->state.own(0)[at] = static_cast<float>(position - static_cast<double>(this->state.x[at]));
+  void move_to(std::size_t node, const Exact& position) {
+    for (std::size_t lane = 0; lane < Base::lanes; ++lane) {
+      const auto nearest = static_cast<float>(position[lane]);
+      this->v[node][lane] = static_cast<float>(position[lane] - exact(node, lane));
+      this->x[node][lane] = nearest;
+      rest[node][lane] = static_cast<float>(position[lane] - static_cast<double>(nearest));
+    }
   }
   void take_rests(const Program& program) {
     for (const InputSlot& input : program.inputs) {
@@ -53,6 +64,11 @@ struct Summed : View<float, Bytes> {
   V* rest;
   const V* value_rest;
   V* output_rest;
+
+ private:
+  double exact(std::size_t node, std::size_t lane) const {
+    return static_cast<double>(this->x[node][lane]) + static_cast<double>(rest[node][lane]);
+  }
 };
 
 template <class T>

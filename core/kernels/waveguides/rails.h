@@ -144,6 +144,9 @@ struct RailLoops {
         const std::size_t at = guide.place_row + i * lanes;
         const std::uint32_t node = program.junctions[guide.slot->first + i].node;
         V wave = (s.v[node] - load<V>(&rails.unforced[at])) / 2;
+        if (!any_of(wave != V{})) {
+          continue;  // nothing pulls where it is only heard
+        }
         if (guide.fading > 0) {
           const V later = share_of_next(guide) * wave;
           add(rails, guide, &rails.next_right[at], later);

@@ -1,0 +1,200 @@
+// The loops of the direct form at places: points without inertia that move with what is around
+// them. On a macro these are up to four nodes, other ones in each lane; on a body all of its modes,
+// the same ones in all lanes, so that packs go through them. A part of *_step.cpp.
+#pragma once
+
+#include <utility>
+
+#include "core/kernels/direct/direct.h"
+
+namespace ressort::RESSORT_ISA {
+namespace {
+
+// Whether a node is a place on a macro or a body; it is then taps[node - taps[0].node].
+bool is_place(const Program& program, std::uint32_t node) {
+  return !program.taps.empty() && node >= program.taps[0].node;
+}
+
+// How much each mode moves a place on a body, [mode].
+template <class S>
+typename S::V* weights_of(const S& s, std::size_t tap) {
+  return reinterpret_cast<typename S::V*>(s.state.weights) + s.state.weights_at[tap];
+}
+
+// The sum of what `term(mode)` is, in four sums side by side: on any machine and in any lane in the
+// same order.
+template <class V, class Term>
+[[gnu::always_inline]] inline V sum_of(std::uint32_t modes, Term&& term) {
+  V sums[4] = {};
+  std::uint32_t mode = 0;
+  for (; mode + 4 <= modes; mode += 4) {
+    for (std::uint32_t k = 0; k < 4; ++k) {
+      sums[k] += term(mode + k);
+    }
+  }
+  for (; mode < modes; ++mode) {
+    sums[0] += term(mode);
+  }
+  return (sums[0] + sums[1]) + (sums[2] + sums[3]);
+}
+
+// Calls use(node, weight) for the up to four nodes around a place on a macro in one lane.
+template <class S, class Use>
+void around(const Program& program, const S& s, std::size_t tap, std::size_t lane, Use&& use) {
+  each_corner(s.state.corners[tap * S::lanes + lane],
+              [&](std::uint32_t at, auto weight) { use(program.tap_nodes[at], weight); });
+}
+
+// A row of numbers, [node], as a place sees it.
+template <class S>
+typename S::V seen_at(const Program& program, const S& s, std::size_t tap,
+                      const typename S::V* row) {
+  using V = typename S::V;
+  const TapSlot& slot = program.taps[tap];
+  if (slot.is_on_body()) {
+    const V* const weight = weights_of(s, tap);
+    const std::uint32_t* const node = program.tap_nodes.data() + slot.first;
+    return sum_of<V>(slot.length, [=](std::uint32_t i) { return weight[i] * row[node[i]]; });
+  }
+  V seen{};
+  for (std::size_t lane = 0; lane < S::lanes; ++lane) {
+    around(program, s, tap, lane,
+           [&](std::uint32_t node, auto weight) { seen[lane] += weight * row[node][lane]; });
+  }
+  return seen;
+}
+
+// Calls use(node, share of the amount) for what gets a part of what is done to a place.
+template <class S, class Use>
+[[gnu::always_inline]] inline void share_out(const Program& program, const S& s, std::size_t tap,
+                                             typename S::V amount, Use&& use) {
+  using V = typename S::V;
+  const TapSlot& slot = program.taps[tap];
+  if (slot.is_on_body()) {
+    const V* const weight = weights_of(s, tap);
+    const std::uint32_t* const node = program.tap_nodes.data() + slot.first;
+    for (std::uint32_t i = 0; i < slot.length; ++i) {
+      use(node[i], weight[i] * amount);
+    }
+    return;
+  }
+  for (std::size_t lane = 0; lane < S::lanes; ++lane) {
+    around(program, s, tap, lane, [&](std::uint32_t node, auto weight) {
+      V part{};
+      part[lane] = weight * amount[lane];
+      use(node, part);
+    });
+  }
+}
+
+// Where the places are now: looked up where a coordinate is another than in the last sample.
+template <class S>
+void place_taps(const Program& program, S& s) {
+  using V = typename S::V;
+  const auto* const c = s.state.ramps.value;
+  auto* placed = reinterpret_cast<V*>(s.state.placed);
+  for (std::size_t i = 0; i < program.taps.size(); ++i, placed += 2) {
+    const TapSlot& tap = program.taps[i];
+    const V u = s.coefficient[tap.u];
+    const V v = s.coefficient[tap.v];
+    if (!any_of((u != placed[0]) | (v != placed[1]))) {
+      continue;
+    }
+    placed[0] = u;
+    placed[1] = v;
+    auto* const corners = s.state.corners + i * S::lanes;
+    for (std::size_t lane = 0; lane < S::lanes; ++lane) {
+      corners[lane] = corners_at(tap, c[tap.u * S::lanes + lane], c[tap.v * S::lanes + lane]);
+    }
+    for (std::uint32_t mode = 0; tap.is_on_body() && mode < tap.length; ++mode) {
+      V& weight = weights_of(s, i)[mode];
+      for (std::size_t lane = 0; lane < S::lanes; ++lane) {
+        weight[lane] = weight_of_mode(program, tap, corners[lane], mode);
+      }
+    }
+  }
+}
+
+// A place moves with what is around it, and along that when its coordinate changes.
+template <class S>
+void move_taps(const Program& program, S& s) {
+  for (std::size_t i = 0; i < program.taps.size(); ++i) {
+    s.move_to(program.taps[i].node, s.exact_at(program, i));
+  }
+}
+
+// What acts on the places goes to what is around them.
+template <class S>
+void spread_taps(const Program& program, S& s) {
+  using V = typename S::V;
+  for (std::size_t i = 0; i < program.taps.size(); ++i) {
+    V& on_place = s.force[program.taps[i].node];
+    const V force = std::exchange(on_place, V{});
+    if (any_of(force != V{})) {
+      share_out(program, s, i, force, [&](std::uint32_t node, V part) { s.force[node] += part; });
+    }
+  }
+}
+
+// The links' force at a node; at a place that of what is around it.
+template <class S>
+typename S::V force_at(const Program& program, const S& s, std::uint32_t node) {
+  using V = typename S::V;
+  const auto* const felt = reinterpret_cast<const V*>(s.state.felt);
+  if (!is_place(program, node)) {
+    return felt == nullptr ? s.force[node] : s.force[node] + felt[node];
+  }
+  const std::size_t tap = node - program.taps[0].node;
+  const V force = seen_at(program, s, tap, s.force);
+  return felt == nullptr ? force : force + seen_at(program, s, tap, felt);
+}
+
+// How much of what is done to one node reaches another: the sum over all nodes that both stand for,
+// for a place those around it with its weights, of both weights times `part(node)`, a pack.
+template <class S, class Part>
+typename S::V shared(const Program& program, const S& s, std::uint32_t from, std::uint32_t at,
+                     Part&& part) {
+  using V = typename S::V;
+  const bool is_from_place = is_place(program, from);
+  if (is_from_place != is_place(program, at)) {
+    V sum{};
+    const std::uint32_t alone = is_from_place ? at : from;
+    share_out(program, s, (is_from_place ? from : at) - program.taps[0].node, V{} + 1,
+              [&](std::uint32_t node, V weight) {
+                if (node == alone) {
+                  sum += weight * part(node);
+                }
+              });
+    return sum;
+  }
+  if (!is_from_place) {
+    return from == at ? part(at) : V{};
+  }
+  const std::size_t one = from - program.taps[0].node;
+  const std::size_t other = at - program.taps[0].node;
+  const TapSlot& slot = program.taps[one];
+  if (slot.first != program.taps[other].first) {
+    return V{};  // on two macros
+  }
+  if (slot.is_on_body()) {
+    const V* const near = weights_of(s, one);
+    const V* const far = weights_of(s, other);
+    const std::uint32_t* const node = program.tap_nodes.data() + slot.first;
+    return sum_of<V>(slot.length,
+                     [&](std::uint32_t i) { return near[i] * far[i] * part(node[i]); });
+  }
+  V sum{};
+  for (std::size_t lane = 0; lane < S::lanes; ++lane) {
+    around(program, s, one, lane, [&](std::uint32_t pushed, auto weight) {
+      around(program, s, other, lane, [&](std::uint32_t felt, auto share) {
+        if (pushed == felt) {
+          sum[lane] += weight * share * part(felt)[lane];
+        }
+      });
+    });
+  }
+  return sum;
+}
+
+}  // namespace
+}  // namespace ressort::RESSORT_ISA
