@@ -9,11 +9,11 @@ namespace ressort {
 
 namespace {
 
-// Places are moved and spread lane by lane; on a body by all of its modes.
-double taps_ns(const Program& program) {
+// Places on macros are moved and spread lane by lane, those on bodies by all modes, in packs.
+double taps_ns(const Program& program, double lanes, double packs) {
   double ns = 0.0;
   for (const TapSlot& tap : program.taps) {
-    ns += tap.is_on_body() ? 4.5 * tap.length : 10.0;
+    ns += tap.is_on_body() ? 1.2 * tap.length * packs : 10.0 * lanes;
   }
   return ns;
 }
@@ -23,12 +23,12 @@ double taps_ns(const Program& program) {
 double predicted_ns(const Program& program, const Direct&, const Workload& load) {
   const auto widest = static_cast<double>(vector_bytes(load.isa)) / (load.is_double ? 8.0 : 4.0);
   const LinkCount links = links_of(program);
-  return packs_of(load) *
-             (12.0 + 1.5 * passive_ns(program) +
-              1.6 * (program.moving + links.springs + links.bent) + 5.0 * links.others) +
-         std::ceil(load.voices / widest) * std::min<double>(load.voices, widest) *
-             (taps_ns(program) +
-              3.0 * static_cast<double>(program.waveguides.size() + program.junctions.size()));
+  const double packs = packs_of(load);
+  const double lanes = std::ceil(load.voices / widest) * std::min<double>(load.voices, widest);
+  return packs * (12.0 + 1.5 * passive_ns(program) +
+                  1.6 * (program.moving + links.springs + links.bent) + 5.0 * links.others) +
+         taps_ns(program, lanes, packs) +
+         lanes * 3.0 * static_cast<double>(program.waveguides.size() + program.junctions.size());
 }
 
 std::string description(const Program& program, const Direct&) {
