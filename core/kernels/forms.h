@@ -65,7 +65,8 @@ struct Dense {
 struct ModalShare {
   std::uint32_t coefficient = 0;
   bool is_late = false;
-  std::vector<double> factor;  // [mode]
+  std::uint32_t first = 0;
+  std::vector<double> factor;  // of the modes from `first` on; of all others it is 0
 };
 
 // A mass that is heard or touched: its position is rest + sum of shape * q.

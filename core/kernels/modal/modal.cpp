@@ -69,7 +69,8 @@ class Furnisher {
       : program_(program),
         modes_(modes),
         passives_(passives),
-        padded_(round_up(std::max(modes.modes, 1u), 2 * vector_bytes(isa) / sizeof(T))),
+        lanes_(vector_bytes(isa) / sizeof(T)),
+        padded_(round_up(std::max(modes.modes, 1u), 2 * lanes_)),
         stride_(round_up(padded_, widest_bytes / sizeof(T))),
         row_(modes.is_crossed ? 2 * stride_ : stride_),
         arena_(memory) {}
@@ -89,10 +90,8 @@ class Furnisher {
     state.held_give = arena_.take(link_count(modes_));
     state.loudness = arena_.take(observed);
     state.room = arena_.take(observed);
-    state.stiffness = rows(
-        modes_.stiffness, [](auto& share) -> auto& { return share.factor; });
-    state.damping = rows(
-        modes_.damping, [](auto& share) -> auto& { return share.factor; });
+    state.stiffness = factors(modes_.stiffness);
+    state.damping = factors(modes_.damping);
     state.pushes = rows(
         modes_.pushes, [](auto& push) -> auto& { return push.shape; });
     state.places = rows(
@@ -173,6 +172,26 @@ class Furnisher {
   std::size_t shape_count() const {
     return modes_.pushes.size() + modes_.places.size() + modes_.outputs.size();
   }
+  // Of each share the packs in which it has any, one after the other.
+  const T* factors(const std::vector<ModalShare>& shares) {
+    const auto room = [&](const ModalShare& share) {
+      return round_up(share.first % lanes_ + share.factor.size(), lanes_);
+    };
+    std::size_t count = 0;
+    for (const ModalShare& share : shares) {
+      count += room(share);
+    }
+    T* const first = arena_.take(count);
+    T* row = first;
+    for (const ModalShare& share : shares) {
+      if (first != nullptr) {
+        std::transform(share.factor.begin(), share.factor.end(), row + share.first % lanes_,
+                       [](double factor) { return static_cast<T>(factor); });
+        row += room(share);
+      }
+    }
+    return first;
+  }
   // A shape of crossed modes has two parts.
   template <class Items, class ShapeOf>
   T* rows(const Items& items, ShapeOf&& shape_of) {
@@ -198,6 +217,7 @@ class Furnisher {
   const Program& program_;
   const Modes& modes_;
   std::size_t passives_;
+  std::size_t lanes_;
   std::size_t padded_;
   std::size_t stride_;
   std::size_t row_;

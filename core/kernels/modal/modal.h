@@ -53,8 +53,8 @@ struct ModalState : ModalPace<T> {
   std::size_t modes;
   std::size_t stride;
   std::size_t row;      // numbers from one shape to the next: crossed modes have two parts of each
-  const T* stiffness;   // [share][mode] factors
-  const T* damping;     // [share][mode]
+  const T* stiffness;   // factors, of each share in the packs where it has any
+  const T* damping;     // the same
   T* pushes;            // [push][mode] shapes, and without a gap
   T* places;            // [place][mode]
   T* speeds;            // [place][mode] of crossed modes: how fast it is

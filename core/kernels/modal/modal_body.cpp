@@ -158,7 +158,7 @@ class BodyMaker {
         return frame;
       }
     }
-    frames.push_back({.coefficient = c, .is_late = is_late, .pull = Vector(body_.count)});
+    frames.push_back({.coefficient = c, .is_late = is_late});
     return frames.back();
   }
 
@@ -168,7 +168,9 @@ class BodyMaker {
     }
     Frame& frame = frame_of(frames, c, is_late, bar.weight);
     for (const auto& [mass, weight] : bar.shares) {
-      frame.pull[mass] += bar.weight * weight * bar.position;
+      if (bar.position != 0.0) {
+        add_share(frame.pull, mass, bar.weight * weight * bar.position);
+      }
     }
     frame.bars.push_back(std::move(bar));
   }

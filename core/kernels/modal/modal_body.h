@@ -8,6 +8,7 @@
 
 #include "core/kernels/program.h"
 #include "core/linear_algebra/matrix.h"
+#include "core/progress.h"
 
 namespace ressort {
 
@@ -35,8 +36,16 @@ struct Frame {
   std::uint32_t coefficient = 0;
   bool is_late = false;  // links exert what they computed one tick before
   std::vector<Bar> bars;
-  Vector pull;    // [mass] the force on the masses at 0, for a coefficient of 1
-  Vector factor;  // [mode] where the frame's eigenvectors are known
+  std::vector<MassShare> pull;  // the force on the masses at 0, for a coefficient of 1
+  // Where the frame's eigenvectors are known: of the modes from `first` on; of all others it is 0.
+  std::uint32_t first = 0;
+  Vector factor;
+
+  // These of all modes.
+  Vector part_of(const Vector& modes) const { return modes[std::slice(first, factor.size(), 1)]; }
+  void add_to(Vector& modes, const Vector& part) const {
+    modes[std::slice(first, factor.size(), 1)] += part;
+  }
 };
 
 struct LinearBody {
@@ -83,5 +92,36 @@ std::uint32_t most_tied_masses(const Program& program);
 // [group] masses. What no linear link ties to each other has modes of its own: those of a body are
 // its modes already. O(masses + bars) [any thread but audio]
 std::vector<std::vector<std::uint32_t>> tied_together(const LinearBody& body);
+
+// The eigenvectors of a mixture of all frames in odd shares: where frames share eigenvectors, two
+// eigenvalues of it are the same only if they are so in every frame. Masses that no bar ties have
+// modes apart, and cost nothing to each other. [any thread but audio]
+class Eigenmodes {
+ public:
+  // O(the sum of size^3) over what is tied together.
+  Eigenmodes(const LinearBody& body, const Progress& progress);
+
+  // Fills in each frame's factors. False if an eigenvector is none of a frame's.
+  bool measure(std::vector<Frame>& frames, const Progress& progress) const;
+  // What a frame, once measured, pulls at its modes where all masses are at 0.
+  Vector pull_of(const Frame& frame) const;
+
+  const std::vector<Vector>& shape() const { return shape_; }  // [mass][mode] orthonormal
+
+ private:
+  struct Place {
+    std::uint32_t group = 0;
+    std::uint32_t index = 0;  // within it
+    std::uint32_t first_mode = 0;
+  };
+  // Those that a frame's bars tie.
+  std::vector<std::uint32_t> groups_of(const Frame& frame) const;
+  void add(Matrix& matrix, const Bar& bar) const;
+
+  const LinearBody& body_;
+  std::vector<std::vector<std::uint32_t>> groups_;  // masses
+  std::vector<Place> place_;                        // [mass]
+  std::vector<Vector> shape_;
+};
 
 }  // namespace ressort

@@ -3,6 +3,7 @@
 #include <cstdio>
 
 #include "core/kernels/modal/modal_form.h"
+#include "core/lanes.h"
 
 namespace ressort {
 namespace {
@@ -92,10 +93,17 @@ std::string description(const Program&, const Modes& form) {
 }
 
 std::uint64_t voice_bytes(const Program& program, const Modes& form, std::uint64_t number_bytes) {
-  const std::uint64_t rows = 18 + form.places.size() + form.outputs.size() + form.pushes.size() +
-                             form.stiffness.size() + form.damping.size() + 2 * force_count(form);
+  const std::uint64_t rows =
+      18 + form.places.size() + form.outputs.size() + form.pushes.size() + 2 * force_count(form);
+  std::uint64_t factors = 0;
+  for (const auto* shares : {&form.stiffness, &form.damping}) {
+    for (const ModalShare& share : *shares) {
+      factors += share.factor.size() + widest_bytes / number_bytes;
+    }
+  }
   const std::uint64_t crossed = form.is_crossed ? 6 + rows + 4 * form.places.size() : 0;
-  return node_bytes(program, number_bytes) + number_bytes * (rows + crossed) * form.modes;
+  return node_bytes(program, number_bytes) +
+         number_bytes * ((rows + crossed) * form.modes + factors);
 }
 
 }  // namespace ressort

@@ -60,7 +60,9 @@ class CrossedFinder {
       for (const Frame& frame : *frames) {
         const double value = w * body_.value[frame.coefficient];
         if (frames == &body_.stiffness) {
-          pull += value * body_.root * frame.pull;
+          for (const auto& [mass, force] : frame.pull) {
+            pull[mass] += value * body_.root[mass] * force;
+          }
         }
         for (const Bar& bar : frame.bars) {
           for (const auto& [a, share] : bar.shares) {

@@ -10,14 +10,12 @@
 #include "core/kernels/modal/modal_crossed.h"
 #include "core/kernels/modal/modal_worth.h"
 #include "core/laws/laws.h"
-#include "core/linear_algebra/eigen.h"
 #include "core/sampled_mode.h"
 
 namespace ressort {
 namespace {
 
-constexpr double shared_tolerance = 1e-12;  // of a matrix' largest element: is it diagonal?
-constexpr double zero_tolerance = 1e-13;    // of the largest: is it anything?
+constexpr double zero_tolerance = 1e-13;  // of the largest: is it anything?
 
 // The published scheme's lK and lZ that are the continuous K and Z, sampled; gives the force's gain
 // (core/kernels/modal/modal_exact.h).
@@ -54,10 +52,11 @@ class ModesFinder {
       return std::nullopt;
     }
     progress_.spend(program_.ends.size());
-    solve();
+    const Eigenmodes eigenmodes(body_, progress_);
+    shape_ = eigenmodes.shape();
     progress_.spend(std::size_t{count_} * count_);
-    if (measure(stiffness_) && measure(damping_)) {
-      settle();
+    if (eigenmodes.measure(stiffness_, progress_) && eigenmodes.measure(damping_, progress_)) {
+      settle(eigenmodes);
     } else if (!cross()) {
       return std::nullopt;
     }
@@ -72,7 +71,7 @@ class ModesFinder {
     for (auto* frames : {&stiffness_, &damping_}) {
       for (const Frame& frame : *frames) {
         auto& shares = frames == &stiffness_ ? modes_.stiffness : modes_.damping;
-        shares.push_back({frame.coefficient, frame.is_late, kept(frame.factor)});
+        shares.push_back(share_of(frame));
       }
     }
     return std::move(modes_);
@@ -91,81 +90,6 @@ class ModesFinder {
       count += run.scheme == Scheme::plain ? 0 : run.count;
     }
     return count > most_passive;
-  }
-
-  // The eigenvectors of a mixture of all frames in odd shares: where frames share eigenvectors,
-  // two eigenvalues of it are the same only if they are so in every frame.
-  void solve() {
-    Matrix mixture(count_, count_);
-    double share = 1.0;
-    for (auto* frames : {&stiffness_, &damping_}) {
-      for (const Frame& frame : *frames) {
-        progress_.spend(std::size_t{count_} * count_ / 8);
-        share = std::fmod(share + 0.6180339887498949, 1.0) + 0.1;
-        Matrix matrix(count_, count_);
-        for (const Bar& bar : frame.bars) {
-          add(matrix, bar);
-        }
-        const double most = largest(matrix.values);
-        if (most > 0.0) {
-          mixture.values += share / most * matrix.values;
-        }
-      }
-    }
-    shape_.assign(count_, Vector(count_));
-    std::uint32_t mode = 0;
-    for (const std::vector<std::uint32_t>& masses : tied_together(body_)) {
-      const std::size_t size = masses.size();
-      progress_.spend(size * size * size / 8);
-      Matrix part(size, size);
-      for (std::size_t i = 0; i < size; ++i) {
-        for (std::size_t j = 0; j < size; ++j) {
-          part(i, j) = mixture(masses[i], masses[j]);
-        }
-      }
-      const Eigenpairs pairs = symmetric_eigenpairs(part);
-      for (std::size_t j = 0; j < size; ++j, ++mode) {
-        for (std::size_t i = 0; i < size; ++i) {
-          shape_[masses[i]][mode] = pairs.vectors(i, j);
-        }
-      }
-    }
-  }
-
-  void add(Matrix& matrix, const Bar& bar) const {
-    for (const auto& [a, share] : bar.shares) {
-      for (const auto& [b, other] : bar.shares) {
-        matrix(a, b) += bar.weight * share * body_.root[a] * other * body_.root[b];
-      }
-    }
-  }
-
-  // Each frame's factors, bar by bar: as sums of squares they are exact even where small. False
-  // if an eigenvector is none of a frame's.
-  bool measure(std::vector<Frame>& frames) {
-    for (Frame& frame : frames) {
-      progress_.spend((frame.bars.size() + count_) * count_ / 8);
-      frame.factor.resize(count_);
-      std::vector<Vector> image(count_, Vector(count_));  // [mass][mode]
-      for (const Bar& bar : frame.bars) {
-        const Vector stretch = row_of(bar.shares);
-        for (const auto& [mass, share] : bar.shares) {
-          image[mass] += bar.weight * share * body_.root[mass] * stretch;
-        }
-        frame.factor += bar.weight * stretch * stretch;
-      }
-      const double most = largest(frame.factor);
-      for (std::uint32_t i = 0; i < count_; ++i) {
-        if (!(largest(image[i] - frame.factor * shape_[i]) <= shared_tolerance * most)) {
-          return false;
-        }
-      }
-      // A mode that moves as a whole is not held at all.
-      for (double& factor : frame.factor) {
-        factor = std::fabs(factor) < zero_tolerance * most ? 0.0 : factor;
-      }
-    }
-    return true;
   }
 
   // How the modes move a sum of masses.
@@ -226,7 +150,7 @@ class ModesFinder {
   }
 
   // q is counted from where all springs are at rest, or from the start where none pulls.
-  void settle() {
+  void settle(const Eigenmodes& eigenmodes) {
     Vector position(count_);
     Vector velocity(count_);
     for (std::uint32_t i = 0; i < count_; ++i) {
@@ -237,8 +161,8 @@ class ModesFinder {
     Vector pull = Vector(count_);
     Vector hold = Vector(count_);
     for (const Frame& frame : stiffness_) {
-      pull += body_.value[frame.coefficient] * modal(frame.pull);
-      hold += body_.value[frame.coefficient] * frame.factor;
+      frame.add_to(pull, body_.value[frame.coefficient] * eigenmodes.pull_of(frame));
+      frame.add_to(hold, body_.value[frame.coefficient] * frame.factor);
     }
     const double most = largest(hold);
     rest_ = start;
@@ -250,10 +174,11 @@ class ModesFinder {
     q_ = start - rest_;
     d_ = in_modes(velocity);
     for (const Frame& frame : stiffness_) {
-      const Vector wanted = modal(frame.pull);
-      const Vector left = wanted - frame.factor * rest_;
-      const double all = largest(wanted) + largest(frame.factor * rest_);
-      if (largest(left) > 1e-13 * all) {
+      const Vector wanted = eigenmodes.pull_of(frame);
+      const Vector held = frame.factor * frame.part_of(rest_);
+      if (largest(wanted - held) > 1e-13 * (largest(wanted) + largest(held))) {
+        Vector left(count_);
+        frame.add_to(left, wanted - held);
         add_push({.by = frame.is_late ? ModalPush::By::late : ModalPush::By::constant,
                   .stiffness = frame.coefficient},
                  left);
@@ -478,7 +403,7 @@ class ModesFinder {
     const double w = body_.weight();
     Vector sum = Vector(count_);
     for (const Frame& frame : frames) {
-      sum += w * body_.value[frame.coefficient] * frame.factor;
+      frame.add_to(sum, w * body_.value[frame.coefficient] * frame.factor);
     }
     return sum;
   }
@@ -538,6 +463,19 @@ class ModesFinder {
         hold.give.push_back(give * body_.value[modes_.give_by]);
       }
     }
+  }
+
+  ModalShare share_of(const Frame& frame) const {
+    ModalShare share{.coefficient = frame.coefficient, .is_late = frame.is_late};
+    for (std::uint32_t i = 0; i < kept_.size(); ++i) {
+      const std::uint32_t at = kept_[i] - frame.first;  // or far above
+      if (at < frame.factor.size()) {
+        share.first = share.factor.empty() ? i : share.first;
+        share.factor.resize(i - share.first + 1);
+        share.factor.back() = frame.factor[at];
+      }
+    }
+    return share;
   }
 
   std::vector<double> kept(const Vector& row) const {

@@ -79,8 +79,11 @@ struct Mixer {
                            : ahead > 1        ? coefficient(c, ahead - 1)
                                               : *used);
       *used = coefficient(c, ahead);
-      for (std::size_t i = 0; i < all_packs(s); ++i) {
-        packs(out)[i] += value * packs(factors + j * s.stride)[i];
+      constexpr std::size_t lanes = mode_lanes<T>;
+      const std::size_t first = shares[j].first / lanes;
+      const std::size_t end = (shares[j].first + shares[j].factor.size() + lanes - 1) / lanes;
+      for (std::size_t i = first; i < end; ++i, factors += lanes) {
+        packs(out)[i] += value * *packs(factors);
       }
     }
     return used;

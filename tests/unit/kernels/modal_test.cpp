@@ -54,6 +54,26 @@ TEST_CASE("The modes of a string are those of the textbook", "[modal]") {
   CHECK(modes.stiffness[0].factor == modes.damping[0].factor);
 }
 
+TEST_CASE("Modes of a body cost nothing to each other", "[modal]") {
+  // Each ends by a coefficient of its own, which turns that mode alone: so many numbers are kept as
+  // there are modes, and not their square.
+  std::string text = "@ring param 1.\n@b body 1. p\n";
+  for (int i = 1; i <= 300; ++i) {
+    text += "@m" + std::to_string(i) + " mode @b " + std::to_string(50 * i) + " [ring/" +
+            std::to_string(i) + "] 1.\n";
+  }
+  text += "@in1 frcInput [@b p]\n@out1 posOutput [@b p]\n";
+  const auto modes = modal_form(make_program(network_of(text), 44100.0, true), {}, {}, false, true);
+  REQUIRE(modes);
+  REQUIRE(modes->modes == 300);
+  std::vector<int> turned(300);
+  for (const ModalShare& share : modes->damping) {
+    REQUIRE(share.factor.size() == 1);
+    ++turned[share.first];
+  }
+  CHECK(std::all_of(turned.begin(), turned.end(), [](int times) { return times == 1; }));
+}
+
 TEST_CASE("Modes that no one hears are left out", "[modal]") {
   // The middle of a string of 21 is a node of every even mode. Who strikes elsewhere moves these.
   const std::string string = scenes::string("s", 21, "0.1", "0.01");

@@ -8,6 +8,12 @@
 namespace ressort {
 namespace {
 
+double factor_at(const ModalShare& share, std::size_t mode) {
+  return mode >= share.first && mode < share.first + share.factor.size()
+             ? share.factor[mode - share.first]
+             : 0.0;
+}
+
 using support::Fighter;
 using support::network_of;
 using support::Random;
@@ -34,10 +40,10 @@ Swings swings_of(const Program& program, const Modes& modes) {
     double k = 0.0;
     double z = 0.0;
     for (const ModalShare& share : modes.stiffness) {
-      k += w * value_of(program, share.coefficient) * share.factor[i];
+      k += w * value_of(program, share.coefficient) * factor_at(share, i);
     }
     for (const ModalShare& share : modes.damping) {
-      z += w * value_of(program, share.coefficient) * share.factor[i];
+      z += w * value_of(program, share.coefficient) * factor_at(share, i);
     }
     // The angle of the poles a/2 +- i s.
     const double s = std::sqrt(1.0 - z - 0.25 * (2.0 - k - z) * (2.0 - k - z));
