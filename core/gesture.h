@@ -69,12 +69,12 @@ struct Stroke {
   }
   // How long a blow lasts: from soft to hard in equal ratios; on a higher key as much shorter as
   // its periods are, so that all keys sound alike.
-  std::size_t pulse_frames() const {
+  double pulse_frames() const {
     const double a = std::clamp(amount, 0.0, 1.0);
     const double s = longest_s > 0.0 && shortest_s > 0.0
                          ? longest_s * std::pow(shortest_s / longest_s, a)
                          : longest_s + (shortest_s - longest_s) * a;
-    return static_cast<std::size_t>(std::llround(s * rate_hz / pitch));
+    return s * rate_hz / pitch;
   }
   // A speed or an impulse that gives the same displacement at every rate and pitch.
   double paced(double value) const { return value * rate_ratio * pitch; }
@@ -249,9 +249,9 @@ inline constexpr GestureRow gestures[] = {
      .play =
          [](InputDriver& driver, Stroke& stroke) {
            const double depth = stroke.mapped();
-           const auto frames = std::max<std::size_t>(2, stroke.pulse_frames());
+           const double frames = std::max(2.0, stroke.pulse_frames());
            const double way = depth + std::copysign(stroke.travel, stroke.high);
-           driver.strike(0.5 * way * static_cast<double>(frames), frames);
+           driver.strike(0.5 * way * frames, frames);
          }},
     {.gesture = Gesture::hold,
      .name = "hold",

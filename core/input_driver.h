@@ -5,7 +5,8 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
-#include <numbers>
+
+#include "core/raised_cosine.h"
 
 namespace ressort {
 
@@ -52,14 +53,16 @@ class InputDriver {
     }
   }
 
-  // A force or a displacement on top of whatever else goes on: one sample, or a raised cosine of
+  // A force or a displacement on top of whatever else goes on: one sample, or a raised cosine over
   // `frames` samples with the same sum.
-  void strike(double force, std::size_t frames = 1) {
-    if (frames < 2) {
+  void strike(double force, double frames = 1.0) {
+    const RaisedCosine pulse(frames);
+    if (pulse.count == 1) {
       pulse_ += force;
     } else {
       blow_ = force;
-      blow_frames_ = blow_left_ = frames;
+      blow_pulse_ = pulse;
+      blow_left_ = pulse.count;
     }
   }
 
@@ -122,9 +125,7 @@ class InputDriver {
     double pulse = pulse_;
     pulse_ = 0.0;
     if (blow_left_ > 0) {
-      const double frames = static_cast<double>(blow_frames_);
-      const double turn = (static_cast<double>(blow_left_) - 0.5) / frames;
-      pulse += blow_ / frames * (1.0 - std::cos(2.0 * std::numbers::pi * turn));
+      pulse += blow_ * blow_pulse_.at(blow_pulse_.count - blow_left_);
       --blow_left_;
     }
     return pulse;
@@ -200,7 +201,7 @@ class InputDriver {
   double pulse_ = 0.0;
   double bump_ = 0.0;  // of a position, in this sample
   double blow_ = 0.0;  // the sum of a pulse
-  std::size_t blow_frames_ = 0;
+  RaisedCosine blow_pulse_;
   std::size_t blow_left_ = 0;
   double held_ = 0.0;
   std::size_t held_frames_ = 0;

@@ -83,7 +83,7 @@ judge() {
         target = what
         if (match(target, /^(core|app)\/[^\/]*\//)) {
           target = substr(target, 1, RLENGTH - 1)
-        } else if (target ~ /^core\/(result|formula|progress|groups|lanes|curve|sampled_mode|waveguide_places|gesture|input_driver)[.]h$/) {
+        } else if (target ~ /^core\/(result|formula|progress|groups|lanes|curve|sampled_mode|waveguide_places|raised_cosine|gesture|input_driver)[.]h$/) {
           target = "core"
         } else if (target ~ /^app\/[^\/]*$/) {
           target = "app"

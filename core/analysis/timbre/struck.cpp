@@ -10,6 +10,7 @@
 #include "core/analysis/modes/linear_system.h"
 #include "core/analysis/timbre/envelope.h"
 #include "core/model/topology.h"
+#include "core/raised_cosine.h"
 
 namespace ressort {
 namespace {
@@ -42,26 +43,22 @@ double stiffness_of(double frequency_hz, double t60_s, double rate_hz) {
   return (1.0 - r) * (1.0 - r) + 4.0 * r * std::pow(std::sin(0.5 * angle), 2.0);
 }
 
-// How much more a raised cosine of so many frames excites a motion of a pole than all of it in its
-// first sample does: a sum of three geometric series, and of two such pulses where they are no
-// whole number.
+// How much more a raised cosine over so many frames excites a motion of a pole than all of it in
+// its first sample does: a sum of three geometric series.
 std::complex<double> pulse_response(double frames, std::complex<double> pole) {
-  const auto whole = [&](double count) -> std::complex<double> {
-    if (count < 2.0) {
-      return 1.0;
-    }
-    const double turn = 2.0 * std::numbers::pi / count;
-    const auto series = [&](std::complex<double> a) {
-      return std::abs(a) < 1e-12 ? std::complex<double>(count)
-                                 : (std::exp(a * count) - 1.0) / (std::exp(a) - 1.0);
-    };
-    const std::complex<double> i(0.0, 1.0);
-    return (series(-pole) - 0.5 * std::exp(0.5 * i * turn) * series(-pole + i * turn) -
-            0.5 * std::exp(-0.5 * i * turn) * series(-pole - i * turn)) /
-           count;
+  const RaisedCosine pulse(frames);
+  if (pulse.count == 1) {
+    return 1.0;
+  }
+  const auto count = static_cast<double>(pulse.count);
+  const auto series = [&](std::complex<double> a) {
+    return std::abs(a) < 1e-12 ? std::complex<double>(count)
+                               : (std::exp(a * count) - 1.0) / (std::exp(a) - 1.0);
   };
-  const double below = std::floor(frames);
-  return whole(below) + (frames - below) * (whole(below + 1.0) - whole(below));
+  const std::complex<double> turn(0.0, pulse.turn);
+  return (series(-pole) - 0.5 * std::exp(0.5 * turn) * series(-pole + turn) -
+          0.5 * std::exp(-0.5 * turn) * series(-pole - turn)) /
+         pulse.sum;
 }
 
 // As smooth as the lines move: between the line before the 95 % of energy and the one there.
@@ -233,14 +230,10 @@ double StruckModel::blow_frames(const StrikePulse& blow, double factor) const {
 ModalSound StruckModel::sound_of(const Tuned& tuned) const {
   std::vector<std::vector<double>> pulses;  // [blow] [sample]
   for (const StrikePulse& blow : options_.blows) {
-    const double frames = std::rint(blow_frames(blow, tuned.factor));
+    const RaisedCosine shape(blow_frames(blow, tuned.factor));
     std::vector<double>& pulse = pulses.emplace_back();
-    for (double n = 0.0; n < frames && frames >= 2.0; n += 1.0) {
-      const double turn = 2.0 * std::numbers::pi * (n + 0.5) / frames;
-      pulse.push_back(blow.strength / frames * (1.0 - std::cos(turn)));
-    }
-    if (pulse.empty()) {
-      pulse = {blow.strength};
+    for (std::size_t n = 0; n < shape.count; ++n) {
+      pulse.push_back(blow.strength * shape.at(n));
     }
   }
   std::vector<ModalSound::Motion> motions;

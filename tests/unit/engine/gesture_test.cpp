@@ -97,6 +97,40 @@ TEST_CASE("forces add up: a push, strikes and what is held", "[gesture]") {
   CHECK_FALSE(driver.is_moving());
 }
 
+TEST_CASE("a pulse grows longer without a step, and its sum stays", "[gesture]") {
+  const auto pulse = [](double frames) {
+    InputDriver driver;
+    driver.place(0.0);
+    driver.strike(3.0, frames);
+    std::vector<double> force(14);
+    for (double& sample : force) {
+      sample = driver.next_force().value;
+    }
+    CHECK_FALSE(driver.is_moving());
+    return force;
+  };
+  CHECK(pulse(0.2) == pulse(1.0));
+  std::vector<double> before = pulse(1.0);
+  for (int i = 1; i <= 1200; ++i) {
+    const double frames = 1.0 + 0.01 * i;
+    INFO(frames);
+    const std::vector<double> force = pulse(frames);
+    CHECK(std::accumulate(force.begin(), force.end(), 0.0) == Approx(3.0).epsilon(1e-12));
+    for (std::size_t n = 0; n < force.size(); ++n) {
+      CHECK(force[n] >= 0.0);
+      // Steepest between one sample and two, where 1 of the 3 goes over within half a frame.
+      CHECK(std::fabs(force[n] - before[n]) < 0.08);
+      if (i % 100 == 0) {
+        const double whole =
+            1.0 - std::cos(2.0 * std::numbers::pi * (static_cast<double>(n) + 0.5) / frames);
+        CHECK(force[n] ==
+              Approx(static_cast<double>(n) < frames ? 3.0 * whole / frames : 0.0).margin(1e-12));
+      }
+    }
+    before = force;
+  }
+}
+
 TEST_CASE("a position event moves the hand, smoothed as published", "[gesture]") {
   Player player(puppet, played({.target = "in1"}));
   player.run(3000, {{.frame = 101,
