@@ -225,6 +225,7 @@ Playing make_playing(const Network& network, const Preset& preset, const Analysi
       .bare = bare,
       .damper_s = preset.damper_s,
       .decay_s = preset.decay_s,
+      .keys_db = preset.keys_db,
       .noise = preset.noise,
       .tuning = analysis.mode ? Tuning::keyboard : Tuning::fixed,
       .transpose = static_cast<double>(preset.transpose),

@@ -231,7 +231,7 @@ bool EnergyWatch::may_rest(std::size_t p, LaneValues<T> values, const Bank<T>& b
   const Program& program = machine_.parts[p];
   const double most = 2.0 * energy / voice.factor;
   for (const double compliance : bound.compliances) {
-    if (!(playing_.gain * std::sqrt(most * compliance) < silent_level)) {
+    if (!(playing_.gain_of_loudest_key() * std::sqrt(most * compliance) < silent_level)) {
       return false;
     }
   }

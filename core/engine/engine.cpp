@@ -357,7 +357,7 @@ struct Engine::Player {
     }
     voices.glide_on();
     watch.look_around(b, voices, parameters.values());
-    const double bound = quiet_level / std::max(1e-30, playing.gain);
+    const double bound = quiet_level / std::max(1e-30, playing.gain_of_loudest_key());
     for (std::size_t lane = 0; lane < voices.size(); ++lane) {
       Voice& voice = voices[lane];
       const bool was_awake = voice.awake;

@@ -102,6 +102,7 @@ struct Playing {
   bool bare = false;                // the network alone: no ramps, no smoothing, no sleep
   double damper_s = 0.0;            // T60 of a voice whose key is up; 0: it rings out
   std::vector<CurvePoint> decay_s;  // T60 of any voice with a key, beside its own; empty: none
+  std::vector<CurvePoint> keys_db;  // how much louder a voice with a key is; empty: 0
   bool noise = false;  // the outputs shape white noise instead of being heard themselves
   Tuning tuning = Tuning::fixed;
   double transpose = 0.0;  // semitones, that the keys' frequencies have already
@@ -121,6 +122,14 @@ struct Playing {
   std::vector<Limits> limits;  // [parameter] that no event and no audio leaves; empty: none
   std::vector<std::optional<RestBound>>
       rest_bounds;  // [part]; nothing, or no element: never at rest
+
+  double gain_of_loudest_key() const {
+    double most_db = 0.0;
+    for (const CurvePoint& point : keys_db) {
+      most_db = std::max(most_db, point[1]);
+    }
+    return gain * std::pow(10.0, most_db / 20.0);
+  }
 };
 
 enum class Precision : std::uint8_t {

@@ -135,9 +135,11 @@ Press Voices::press_key(int key, double velocity, std::uint8_t channel, double h
     start(last_, hz);
     voice.key_hz = is_one ? 0.0 : pitch_hz(key, frequency_hz);
     voice.has_own_pitch = frequency_hz > 0.0;
-    voice.volume = level_of(channel);
   }
   attach(voice, key, channel);
+  if (starts) {
+    voice.volume = level_of(voice);
+  }
   if (!starts && !is_one) {
     move_to(voice, key, frequency_hz, false, highest_factor);
   }
@@ -246,7 +248,7 @@ void Voices::set_strength(std::size_t lane, double strength) {
   Voice& voice = voices_[lane];
   voice.strength = strength;
   if (voice.is_new) {
-    const SideGains level = level_of(voice.channel);
+    const SideGains level = level_of(voice);
     voice.volume = {strength * level[0], strength * level[1]};
     voice.volume_frames = 0;
   } else {
@@ -316,7 +318,7 @@ void Voices::follow_level(std::uint8_t channel) {
 
 void Voices::follow_level(Voice& voice) const {
   const auto frames = static_cast<std::size_t>(std::max(1.0, level_s * rate_hz_));
-  const SideGains goal = level_of(voice.channel);
+  const SideGains goal = level_of(voice);
   for (std::size_t side = 0; side < goal.size(); ++side) {
     voice.volume_step[side] =
         (voice.strength * goal[side] - voice.volume[side]) / static_cast<double>(frames);
@@ -376,9 +378,12 @@ void Voices::damp(Voice& voice) const {
   voice.decay.kept_goal = std::pow(10.0, -decades_of_t60 * per_s / rate_hz_);
 }
 
-SideGains Voices::level_of(std::uint8_t channel) const {
-  const double level = channels_.level(channel);
-  const SideGains balance = is_stereo_ ? channels_.balance(channel) : SideGains{1.0, 1.0};
+SideGains Voices::level_of(const Voice& voice) const {
+  double level = channels_.level(voice.channel);
+  if (voice.has_key && !playing_.keys_db.empty()) {
+    level *= std::pow(10.0, value_at(playing_.keys_db, voice.key) / 20.0);
+  }
+  const SideGains balance = is_stereo_ ? channels_.balance(voice.channel) : SideGains{1.0, 1.0};
   return {level * balance[0], level * balance[1]};
 }
 

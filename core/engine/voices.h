@@ -172,7 +172,7 @@ class Voices {
   // Whether a pedal that went up lets this voice go.
   bool is_let_go(Voice& voice, std::uint8_t channel) const;
   double softness(std::uint8_t channel) const { return channels_.softness(channel); }
-  // How loud the voice is, beside its channel's level: at once where it starts, else in 20 ms.
+  // How loud the voice is, beside its channel's level and its key's: at once where it starts, else in 20 ms.
   void set_strength(std::size_t lane, double strength);
   void release(Voice& voice) const;
   void limit(std::size_t most);
@@ -209,7 +209,7 @@ class Voices {
   void retune(std::uint8_t channel);
   void follow_level(Voice& voice) const;
   void follow_level(std::uint8_t channel);
-  SideGains level_of(std::uint8_t channel) const;
+  SideGains level_of(const Voice& voice) const;
   bool is_for_all(const Scope& scope) const;
   static bool is_on(const Voice& voice, ChannelMask channels) {
     return has_channel(channels, voice.channel);

@@ -27,6 +27,9 @@ void Voices::move_to(Voice& voice, int key, double own_hz, bool glides, double h
   if (glides) {
     glide_from(voice, before_hz);
   }
+  if (!playing_.keys_db.empty()) {
+    follow_level(voice);
+  }
   last_hz_[voice.channel % Channels::count] = voice.frequency_hz;
 }
 

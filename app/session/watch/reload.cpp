@@ -45,6 +45,7 @@ Preset without_numbers(Preset preset) {
   preset.gain = preset.damper_s = preset.glide_s = preset.velocity = 0.0;
   preset.velocity_points.clear();
   preset.decay_s.clear();
+  preset.keys_db.clear();
   for (ControlSetting& control : preset.controls) {
     control = {.source = control.source,
                .number = control.number,

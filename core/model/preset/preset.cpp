@@ -396,6 +396,14 @@ void read_root(const toml::table& root, Preset& preset, std::vector<Error>& erro
                .bounds = "a key lies between 0 and 127, its seconds between 0.001 and 600"},
               preset.decay_s);
   read_by_key(root, reader,
+              {.name = "keys_db",
+               .example = "[[36, 7], [60, 0]]",
+               .point = "[key, dB]",
+               .least = {0.0, -40.0},
+               .most = {127.0, 40.0},
+               .bounds = "a key lies between 0 and 127, its dB between -40 and 40"},
+              preset.keys_db);
+  read_by_key(root, reader,
               {.name = "flattening_cents",
                .example = "[[48, 8], [96, 6]]",
                .point = "[key, cents]",
@@ -416,6 +424,12 @@ void read_root(const toml::table& root, Preset& preset, std::vector<Error>& erro
     if (!preset.keyboard && tuning != "fixed") {
       reader.fail(*root.get("tuning"), "'tuning' must be keyboard or fixed");
     }
+  }
+  if (!preset.keyboard && !preset.keys_db.empty()) {
+    reader.fail(
+        *root.get("keys_db"),
+        "'keys_db' is for keys that are notes of their own, and with tuning = \"fixed\" all "
+        "of them play one");
   }
   if (std::string motion; reader.text("motion", motion)) {
     if (motion == "velocity") {

@@ -75,10 +75,11 @@ struct Preset {
   double damper_s = 0.0;  // T60 of a voice whose key is up; 0: it rings out
   // T60 of a held note, beside what the model loses: keys and seconds, ascending; empty: nothing.
   std::vector<CurvePoint> decay_s;
-  bool noise = false;    // the outputs shape white noise
-  bool keyboard = true;  // a key sets the pitch
-  int transpose = 0;     // semitones between a key and the pitch that it sets
-  int pitch_mode = 1;    // which of its modes a key tunes, from the lowest
+  std::vector<CurvePoint> keys_db;  // how much louder keys are: keys and dB, ascending; empty: 0
+  bool noise = false;               // the outputs shape white noise
+  bool keyboard = true;             // a key sets the pitch
+  int transpose = 0;                // semitones between a key and the pitch that it sets
+  int pitch_mode = 1;               // which of its modes a key tunes, from the lowest
   // Of the sound below that mode, to be made up for: keys and cents, ascending; empty: none.
   std::vector<CurvePoint> flattening_cents;
   std::string tuned_along;  // a parameter that leaves keys in tune wherever it is; empty: none

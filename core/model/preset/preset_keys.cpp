@@ -13,6 +13,7 @@ constexpr PresetKey keys[] = {
     {"", "gain", "0 to 1e9 (1)", "output per unit of position; a forte note should peak near -12 dBFS"},
     {"", "damper_s", "0 to 60 (0)", "T60 of a note once its key is up: in how many seconds a damper takes 60 dB off it; 0 lets it ring out"},
     {"", "decay_s", "0.001 to 600, or [[36, 12], [96, 2]]", "T60 of a note while its key is down, beside what the model itself loses (1/T60 is the sum of both); or points of keys and seconds, up to 16, and straight lines between them, so that low keys ring longer; for what is struck or plucked"},
+    {"", "keys_db", "-40 to 40 (0), or [[36, 7], [60, 0]]", "how much louder notes are beside `gain`; or points of keys and dB, up to 16, and straight lines between them, where a model is softer at one end of the keyboard"},
     {"", "noise", "true or false (false)", "the outputs shape white noise instead of being heard themselves"},
     {"", "tuning", "`keyboard` or `fixed` (`keyboard`)", "whether a key sets the pitch, or every key sounds the model as it is written"},
     {"", "fixed", "[\"LABEL\", ...]", "what keys leave as stiff as it is: a guitar's box, whose modes stay where they are while the string follows the key. Labels of bodies, waveguides, macros, oscillators and links"},

@@ -172,6 +172,39 @@ TEST_CASE("a note that is damped away ends", "[dampers]") {
   CHECK(player.engine().meters().stepped == 0);
 }
 
+TEST_CASE("keys_db makes a key louder, at once where it is struck and in 20 ms where it moves on",
+          "[dampers]") {
+  Preset preset = struck(2);
+  const auto played = [&](std::vector<CurvePoint> keys_db, std::vector<Event> events) {
+    preset.keys_db = std::move(keys_db);
+    Player player(ringing_string(), preset);
+    player.run(6000, std::move(events));
+    return player.y();
+  };
+  const std::vector<CurvePoint> scaling = {{48.0, 12.0}, {72.0, -6.0}};
+  for (const auto& [key, db] : {std::pair(36, 12.0), std::pair(48, 12.0), std::pair(60, 3.0),
+                                std::pair(66, -1.5), std::pair(80, -6.0)}) {
+    const std::vector<double> plain = played({}, {note_on(0, key)});
+    const std::vector<double> scaled = played(scaling, {note_on(0, key)});
+    INFO(key);
+    for (std::size_t i = 0; i < plain.size(); ++i) {
+      REQUIRE(scaled[i] == Approx(std::pow(10.0, db / 20.0) * plain[i]).margin(1e-15));
+    }
+  }
+  preset.mono = preset.legato = true;
+  const std::vector<double> plain = played({}, {note_on(0, 48), note_on(2000, 72)});
+  const std::vector<double> scaled = played(scaling, {note_on(0, 48), note_on(2000, 72)});
+  const double low = std::pow(10.0, 12.0 / 20.0);
+  const double high = std::pow(10.0, -6.0 / 20.0);
+  for (std::size_t i = 0; i < plain.size(); ++i) {
+    const double way = std::clamp((static_cast<double>(i) - 2000.0) / 882.0, 0.0, 1.0);
+    const double loudness = low + way * (high - low);
+    // A level is as it is for up to a sample of its way: an 882nd of it.
+    REQUIRE(scaled[i] ==
+            Approx(loudness * plain[i]).margin(1e-15 + (low - high) / 882.0 * std::fabs(plain[i])));
+  }
+}
+
 TEST_CASE("level_db makes a note louder and nothing else", "[dampers]") {
   // 20 dB from the softest to the loudest, in equal steps of dB.
   const auto with_level = [](double velocity) {

@@ -124,7 +124,12 @@ TEST_CASE("a preset says how its keys are tuned and played", "[preset]") {
         std::vector<CurvePoint>{{36.0, 12.0}, {96.0, 1.5}});
   CHECK(parse_preset("model = \"x.mdl\"\ndecay_s = 4\n").preset.decay_s ==
         std::vector<CurvePoint>{{0.0, 4.0}});
+  CHECK(parse_preset("model = \"x.mdl\"\nkeys_db = [[36, 7], [96, -1.5]]\n").preset.keys_db ==
+        std::vector<CurvePoint>{{36.0, 7.0}, {96.0, -1.5}});
   for (const char* const wrong : {"a4_hz = 100",
+                                  "keys_db = 41",
+                                  "keys_db = [[36, 7], [96, -41]]",
+                                  "tuning = \"fixed\"\nkeys_db = 3",
                                   "decay_s = 0",
                                   "decay_s = [[36, 12], [96, 601]]",
                                   "scale = \"a.kbm\"",
