@@ -99,7 +99,8 @@ class Chooser {
       progress_.spend(program_.ends.size() + program_.position.size());
       add(Method::oversampled, oversampled_form(std::move(fine), times));
     }
-    if (candidates_.empty() || candidates_[best_].ns > 0.5e9 / program_.rate_hz) {
+    // How many voices of it a machine can play is found as it plays; one it must.
+    if (candidates_.empty() || candidates_[best_].ns > 0.5e9 / program_.rate_hz * load_.voices) {
       return std::nullopt;
     }
     return take("for its highest keys");
