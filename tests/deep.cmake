@@ -35,7 +35,7 @@ add_deep_test(arm 60 ${CMAKE_CURRENT_SOURCE_DIR}/arm.sh ${CMAKE_SOURCE_DIR})
 # All random networks in all forms on all instruction sets.
 add_deep_test(forms_everywhere 240 $<TARGET_FILE:ressort_tests> "[forms_everywhere]")
 
-# Two thousand random nonlinear scenes; a person may ask for others: FIRST,COUNT,FRAMES.
+# Two thousand random nonlinear scenes; a person may ask for others: FIRST,COUNT,FRAMES[,LINKS].
 add_deep_test(scenes_more 200 ${CMAKE_COMMAND} -E env RESSORT_SCENES=1001,2000,1024
   $<TARGET_FILE:ressort_tests> "[scenes]")
 
