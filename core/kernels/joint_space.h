@@ -43,9 +43,13 @@ static inline V positive(V x) {
 // How far a force of 1 along one link brings the ends of another.
 template <class V, class Body>
 static inline V coupling_of(const Body& body, Ends one, Ends other) {
-  const auto [a, b] = one;
-  const auto [c, d] = other;
-  return (body.gamma({a, d}) + body.gamma({b, c}) - body.gamma({a, c}) - body.gamma({b, d})) / 2;
+  if constexpr (requires { body.coupling(one, other); }) {
+    return body.coupling(one, other);
+  } else {
+    const auto [a, b] = one;
+    const auto [c, d] = other;
+    return (body.gamma({a, d}) + body.gamma({b, c}) - body.gamma({a, c}) - body.gamma({b, d})) / 2;
+  }
 }
 
 // Steps of a cluster's links, by what they hold: masses, and behind them places.

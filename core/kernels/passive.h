@@ -47,6 +47,7 @@ struct PassiveRoom {
 //   V distance_now(ends), speed_now(ends)  x_a - x_b and v_a - v_b at the sample's beginning
 //   V distance(ends), speed(ends)          the same once all has moved, points too
 //   V gamma(ends)                          how far they give way to a force of 1
+//   V coupling(ends, ends)                 and to one along another link, if it is known
 //   void push(ends, V force)               a by -force and b by force, times their inverse masses
 //   V coefficient(c)
 //   V awake()                              0 in the first sample after set_state(), -1 if it was

@@ -32,7 +32,8 @@ struct ModalPace {
   bool is_first = false;  // the first sample of crossed modes
   bool pulls = false;     // passive links do so from the second sample on
   bool saved_pulls = false;
-  bool is_pushed = false;  // a passive link has pushed in the last sample
+  bool is_pushed = false;     // a passive link has pushed in the last sample
+  bool shoves_later = false;  // the next sweep adds `shove`
   bool is_reply_stale = true;
   std::uint32_t touched_frames = 0;    // so long no block is tried as a free one
   std::uint32_t surprised_frames = 0;  // so long all links are computed

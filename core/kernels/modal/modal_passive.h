@@ -54,11 +54,8 @@ struct ModalBody {
   }
   T distance(Ends link) const { return s.opening[link.a]; }
   T speed(Ends link) const { return s.rush[link.a]; }
-  // Of two links, how far both give way less twice what each moves the other.
-  T gamma(Ends links) const {
-    const auto [i, k] = links;
-    return i == k ? T(0) : give(i, i) + give(k, k) - 2 * give(i, k);
-  }
+  T gamma(Ends link) const { return give(link.a, link.a); }
+  T coupling(Ends one, Ends other) const { return give(one.a, other.a); }
   void push(Ends link, T force) {
     s.pushed[link.a] = force;
     for (const PassiveLink& other : s.active->links) {
@@ -69,9 +66,6 @@ struct ModalBody {
   }
 
   T give(std::uint32_t at, std::uint32_t from) const {
-    if (at == nowhere || from == nowhere) {
-      return 0;
-    }
     return w * s.gamma[at * s.passives + from] + (at == from ? s.slack[at] : T(0));
   }
 
@@ -88,6 +82,20 @@ struct Presser : Holder<T, Crossed> {
   using Base::s;
 
   bool presses() const { return !s.active->links.empty(); }
+
+  // Whether what passive links push may wait for the next sample's sweep: where that kicks nothing
+  // else, and nobody looks at the modes before.
+  bool may_shove_later() const {
+    const bool is_all = std::all_of(s.held, s.held + modes.holds.size(),
+                                    [](std::uint32_t plain) { return plain == 0; });
+    return presses() && is_all && s.pushing == 0 && s.forces == 0 && s.held_places <= most_kicked;
+  }
+  // What has waited.
+  void shove_now() {
+    if (std::exchange(s.shoves_later, false)) {
+      shove_rows<Crossed>(s);
+    }
+  }
 
   // As a run of samples begins, or in each whose coefficients move.
   void measure_passive() {
@@ -164,7 +172,9 @@ struct Presser : Holder<T, Crossed> {
         bundle<Crossed>(s, s.bundled);
       }
     }
-    shove_rows<Crossed>(s);
+    if (!s.shoves_later) {
+      shove_rows<Crossed>(s);
+    }
   }
 };
 

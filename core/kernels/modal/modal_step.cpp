@@ -166,6 +166,8 @@ struct Player : Presser<T, Crossed> {
     if (presses()) {
       this->measure_passive();
     }
+    s.shoves_later = !Moving && this->may_shove_later();
+    std::fill_n(s.shove, s.held_places, T(0));
     bool acts = false;
     for (std::size_t n = first; n < first + frames; ++n) {
       if constexpr (Moving) {
@@ -193,6 +195,7 @@ struct Player : Presser<T, Crossed> {
       acts |= act() || s.is_pushed;
       hear(n);
     }
+    this->shove_now();
     s.kick_norm = 0;
     for (std::size_t p = 0; p < places; ++p) {
       s.kick_norm += norm_of_kicks(s.kicked[p], s.place_norm[p]);
@@ -274,7 +277,12 @@ struct Player : Presser<T, Crossed> {
       sweep_rows<Crossed>(s, kicked, outputs);
       return;
     }
-    sweep_sample<Crossed>(s, kicked, heard_along());
+    if (s.shoves_later) {
+      std::copy_n(s.shove, kicked, s.kick);
+      sweep_sample<Crossed, true>(s, kicked, heard_along());
+    } else {
+      sweep_sample<Crossed, false>(s, kicked, heard_along());
+    }
     for (std::size_t o = heard_along(); o < outputs; ++o) {
       s.heard[o] = read<Crossed>(s, s.outputs + o * s.row);
     }
@@ -496,7 +504,7 @@ struct Player : Presser<T, Crossed> {
         s.kick[m * Kicked + r] = s.amplitude[(first + n + m) * pushes + s.push_of[r]];
       }
     }
-    sweep<Samples, Kicked, false, Heard, Crossed>(s);
+    sweep<Samples, Kicked, false, Heard, Crossed, false>(s);
     for (std::size_t m = 0; m < Samples; ++m) {
       for (std::size_t r = 0; r < rows; ++r) {
         s.seen[r * max_block_frames + n + m] = s.heard[m * Heard + r];

@@ -2,6 +2,8 @@
 // alone includes it.
 #pragma once
 
+#include <utility>
+
 #include "core/kernels/modal/modal.h"
 
 namespace ressort::RESSORT_ISA {
@@ -114,9 +116,10 @@ void bundle(ModalState<T>& s, std::size_t rows) {
 
 // All modes through a few samples. Of the bundled rows the first are kicked by s.kick [sample][row]
 // and, if Felt, give their speed to s.speed [row], of one sample; the others give their position
-// to s.heard [sample][row].
+// to s.heard [sample][row]. If Shoved, the kicks are those by which passive links have moved the
+// modes at the end of the sample before.
 template <std::size_t Samples, std::size_t Kicked, bool Felt, std::size_t Heard, bool Crossed,
-          class T>
+          bool Shoved, class T>
 void sweep(ModalState<T>& s) {
   using V = ModePack<T>;
   constexpr std::size_t width = parts<Crossed>;
@@ -161,15 +164,24 @@ void sweep(ModalState<T>& s) {
         }
       }
       if constexpr (Crossed) {
+        if constexpr (Shoved) {
+          qi += std::exchange(f[0], V{});
+          di += std::exchange(f[1], V{});
+        }
         f[0] += ki * qi - zi * di;
         f[1] += ki * di + zi * qi;
         qi += f[0];
         di += f[1];
       } else {
+        const V sum = Kicked > 1 ? f[0] + f[1] : f[0];
+        if constexpr (Shoved) {
+          qi += sum;
+          di += sum;
+        }
         di -= zi * di;
         di -= ki * qi;
-        if constexpr (Kicked > 0) {
-          di += Kicked > 1 ? f[0] + f[1] : f[0];
+        if constexpr (Kicked > 0 && !Shoved) {
+          di += sum;
         }
         qi += di;
       }
@@ -204,38 +216,38 @@ void sweep(ModalState<T>& s) {
 }
 
 // One sample, for up to most_kicked rows that are kicked and felt, and two that are heard.
-template <std::size_t Heard, bool Crossed, class T>
+template <std::size_t Heard, bool Crossed, bool Shoved, class T>
 void sweep_sample(ModalState<T>& s, std::size_t kicked) {
   switch (kicked) {
     case 0:
-      return sweep<1, 0, true, Heard, Crossed>(s);
+      return sweep<1, 0, true, Heard, Crossed, Shoved>(s);
     case 1:
-      return sweep<1, 1, true, Heard, Crossed>(s);
+      return sweep<1, 1, true, Heard, Crossed, Shoved>(s);
     case 2:
-      return sweep<1, 2, true, Heard, Crossed>(s);
+      return sweep<1, 2, true, Heard, Crossed, Shoved>(s);
     case 3:
-      return sweep<1, 3, true, Heard, Crossed>(s);
+      return sweep<1, 3, true, Heard, Crossed, Shoved>(s);
     case 4:
-      return sweep<1, 4, true, Heard, Crossed>(s);
+      return sweep<1, 4, true, Heard, Crossed, Shoved>(s);
     case 5:
-      return sweep<1, 5, true, Heard, Crossed>(s);
+      return sweep<1, 5, true, Heard, Crossed, Shoved>(s);
     case 6:
-      return sweep<1, 6, true, Heard, Crossed>(s);
+      return sweep<1, 6, true, Heard, Crossed, Shoved>(s);
     case 7:
-      return sweep<1, 7, true, Heard, Crossed>(s);
+      return sweep<1, 7, true, Heard, Crossed, Shoved>(s);
     default:
-      return sweep<1, most_kicked, true, Heard, Crossed>(s);
+      return sweep<1, most_kicked, true, Heard, Crossed, Shoved>(s);
   }
 }
-template <bool Crossed, class T>
+template <bool Crossed, bool Shoved, class T>
 void sweep_sample(ModalState<T>& s, std::size_t kicked, std::size_t heard) {
   switch (heard) {
     case 0:
-      return sweep_sample<0, Crossed>(s, kicked);
+      return sweep_sample<0, Crossed, Shoved>(s, kicked);
     case 1:
-      return sweep_sample<1, Crossed>(s, kicked);
+      return sweep_sample<1, Crossed, Shoved>(s, kicked);
     default:
-      return sweep_sample<2, Crossed>(s, kicked);
+      return sweep_sample<2, Crossed, Shoved>(s, kicked);
   }
 }
 
