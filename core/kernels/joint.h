@@ -30,6 +30,10 @@ inline constexpr int most_stiffenings = 24;
 
 namespace {
 
+// Of what goes through a cluster's links, that may be off by rounding.
+template <class V>
+constexpr Scalar<V> share_of_rounding = laws::tiny_share<V>() * 2;
+
 // In a lane's first sample nothing pulls, as nothing is known of where it came from. But what would
 // then stand higher than where it starts, or than a sample before by its speed, whichever is the
 // lower, is held by as much as takes that difference out of its motion. `step` is from the sample
@@ -97,7 +101,6 @@ class Joint {
   }
 
  private:
-  static constexpr Scalar<V> share_of_rounding = tiny_share<V>() * 2;
   // From so near, each link by its own measure, one more step of Newton's is as exact as numbers
   // are, and falls on either side of the solution; what stopped before would make, or take, a
   // little in every sample.
@@ -207,8 +210,8 @@ class Joint {
     }
     along_ += space_.inertia_along(joined_);
     is_lost_ = fails(error <= power / 4);
-    is_far_ = fails(far <= share_of_rounding * scale);
-    return live & fails((error <= share_of_rounding * scale) & (scale < endless));
+    is_far_ = fails(far <= share_of_rounding<V> * scale);
+    return live & fails((error <= share_of_rounding<V> * scale) & (scale < endless));
   }
 
   // Where that leads astray, as a hard blow's force does in the sample after it: from nothing, one
@@ -367,7 +370,7 @@ class Joint {
       scale += (absolute(at) + absolute(value) + absolute(link.force)) *
                (absolute(link.before) + absolute(link.step));
     }
-    return fails((made <= share_of_rounding * scale) & (scale < endless));
+    return fails((made <= share_of_rounding<V> * scale) & (scale < endless));
   }
 
   const PassiveLink* links_;

@@ -36,6 +36,7 @@ struct Contact {
       .zone = Zone::below,
       .is_odd = false,
       .is_curved = false,
+      .is_straight = true,
       .solve_ns = 35.0,
       .faust = "contact(k, z, t, d, v) = select2(d > 0.0 - t, 0.0, spring(k, z, d + t, v));\n",
   };
@@ -99,6 +100,9 @@ struct Contact {
     return {k / 2 * (p + b) * select(is_in, one, x - y),
             k / 2 * select(is_in, one, 2 * x - x * x + y * y)};
   }
+
+  // The same as long as it stays inside, and what it adds for every unit of the way.
+  Slope<V> inside(V before) const { return {k * (before + t), (k + z) / 2}; }
 
   static Slopes steepest(const Contact&, const Contact& most, double) {
     return {.stiffness = most.k, .damping = most.z, .pull = most.k};

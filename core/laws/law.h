@@ -96,10 +96,11 @@ struct LawFacts {
   // published even where the rest is found by its discrete gradient: what is always felt is the
   // matter of the stability proof, and the pitch of small vibrations stays what it was.
   bool contains_spring = false;
-  bool is_curved = true;   // in d; else it is made of straight pieces
-  bool is_convex = true;   // its force never falls; not a hill's, nor friction that slips
-  double solve_ns = 0.0;   // measured: one discrete gradient takes so long
-  std::string_view faust;  // its definition
+  bool is_curved = true;     // in d; else it is made of straight pieces
+  bool is_straight = false;  // a spring and a damper wherever it acts: `inside` has what it exerts
+  bool is_convex = true;     // its force never falls; not a hill's, nor friction that slips
+  double solve_ns = 0.0;     // measured: one discrete gradient takes so long
+  std::string_view faust;    // its definition
 
   // Which argument has a role: the first, or `count` if none has.
   constexpr std::size_t slot(Role role) const {

@@ -145,6 +145,7 @@ class Furnisher {
     state.passives = passives_;
     state.reply = arena_.take(observed * passives_);
     state.gamma = arena_.take(passives_ * passives_);
+    state.straight = arena_.take((2 * most_straight + 1) * most_straight);
     state.memory = arena_.take(passive_rows * passives_);
     const Cluster all{.count = static_cast<std::uint32_t>(passives_)};
     state.numbers = arena_.take(all.numbers());

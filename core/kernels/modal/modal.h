@@ -17,6 +17,9 @@ namespace ressort {
 inline constexpr std::uint32_t check_frames = 32;  // from one look at what may sleep to the next...
 inline constexpr std::uint32_t long_check_frames = 128;  // ...while few are awake
 
+// So many passive links may be solved as modal_straight.h does: a pack of any kind.
+inline constexpr std::size_t most_straight = widest_bytes / sizeof(float);
+
 // Where a ModalKernel is, beside the numbers in its arrays.
 template <class T>
 struct ModalPace {
@@ -35,6 +38,7 @@ struct ModalPace {
   bool is_pushed = false;     // a passive link has pushed in the last sample
   bool shoves_later = false;  // the next sweep adds `shove`
   bool is_reply_stale = true;
+  bool is_straight_stale = true;
   std::uint32_t touched_frames = 0;    // so long no block is tried as a free one
   std::uint32_t surprised_frames = 0;  // so long all links are computed
   T kick_norm = 0;                     // what the links added to the norm in their last block
@@ -116,6 +120,7 @@ struct ModalState : ModalPace<T> {
   T* yield_step;   // [passive link] and in the last sample
   T* saved_yield;  // [passive link]
   T* saved_yield_step;  // [passive link]
+  T* straight;          // what modal_straight.h keeps
   T* shove;             // [row] what passive links add to q and d along the row of a place
   const T* shape;       // [push, place, output][mode] as they are written, if is_exact
   T* root;              // [mode] of the gain that all of these have, if is_exact

@@ -4,6 +4,7 @@
 
 #include "core/kernels/modal/modal_form.h"
 #include "core/lanes.h"
+#include "core/laws/laws.h"
 
 namespace ressort {
 namespace {
@@ -34,12 +35,25 @@ double passive_count(const Program& program) {
   return links;
 }
 
-// Through the modes each passive link pulls at all others: several are solved together, and what
-// they push with is added to all modes, up to four places at a time.
+// Through the modes each passive link pulls at all others: several are solved together, at once if
+// they are straight where they act. What they push with is added to all modes along the next sweep,
+// if that has room, or four places at a time.
 double solving_ns(const Program& program, double modes, double places, const Workload& load) {
+  constexpr double of_a_straight_link = 30.0;
+  constexpr double of_a_link = 110.0;
+  constexpr double rows_of_a_sweep = 8.0;
   const double links = passive_count(program);
-  const double shoves = links > 0.0 ? 0.2 * std::ceil(places / 4.0) : 0.0;
-  return passive_ns(program) * (links > 1.0 ? 2.2 : 1.5) + shoves * mode_ns(load) * modes;
+  double sum = 0.0;
+  for (const LinkRun& run : program.link_runs) {
+    const LawFacts& law = facts_of(run.law);
+    const double each = links == 1.0      ? 1.5 * law.solve_ns
+                        : law.is_straight ? of_a_straight_link
+                                          : of_a_link;
+    sum += run.scheme == Scheme::plain ? 0.0 : run.count * each;
+  }
+  const double shoves =
+      links > 0.0 && places > rows_of_a_sweep ? 0.2 * std::ceil(places / 4.0) : 0.0;
+  return sum + shoves * mode_ns(load) * modes;
 }
 
 std::size_t force_count(const Modes& form) {

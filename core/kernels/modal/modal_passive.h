@@ -9,6 +9,7 @@
 #pragma once
 
 #include "core/kernels/modal/modal_hold.h"
+#include "core/kernels/modal/modal_straight.h"
 
 namespace ressort::RESSORT_ISA {
 namespace {
@@ -103,6 +104,7 @@ struct Presser : Holder<T, Crossed> {
       measure_replies<Crossed>(s, places, outputs);
       s.is_reply_stale = false;
     }
+    s.is_straight_stale = true;
     for (std::size_t i = 0; i < s.passives; ++i) {
       s.slack[i] = s.give[i] > 0 ? s.give[i] / this->coefficient(modes.give_by) : T(0);
     }
@@ -126,7 +128,9 @@ struct Presser : Holder<T, Crossed> {
       row += passive_rows;
     }
     ModalBody<T> body{s, w};
-    ressort::correct(*s.active, s.memory, s.numbers, body);
+    if (!push_straight(s, body)) {
+      ressort::correct(*s.active, s.memory, s.numbers, body);
+    }
     s.pulls = true;
     std::fill_n(s.shove, s.held_places, T(0));
     bool pushes = false;
@@ -135,20 +139,17 @@ struct Presser : Holder<T, Crossed> {
       const T force = s.pushed[i];
       s.yield_step[i] = -s.yield[i] - s.slack[i] * force;
       s.yield[i] = -s.slack[i] * force;
-      if (force == 0) {
-        continue;
-      }
-      pushes = true;
+      pushes |= force != 0;
       shove(s.passive[i].ends.a, -force);
       shove(s.passive[i].ends.b, force);
-      for (std::size_t r = 0; r < s.held_places; ++r) {
-        const std::size_t p = s.place_of[r];
-        s.x[p] -= w * s.reply[p * s.passives + i] * force;
-        s.v[p] -= w * s.reply[p * s.passives + i] * force;
-      }
-      for (std::size_t o = 0; o < outputs; ++o) {
-        s.heard[o] -= w * s.reply[(places + o) * s.passives + i] * force;
-      }
+    }
+    for (std::size_t r = 0; pushes && r < s.held_places; ++r) {
+      const T way = moved(s.place_of[r]);
+      s.x[s.place_of[r]] -= way;
+      s.v[s.place_of[r]] -= way;
+    }
+    for (std::size_t o = 0; pushes && o < outputs; ++o) {
+      s.heard[o] -= moved(places + o);
     }
     if (pushes) {
       move_by_shoves();
@@ -157,6 +158,14 @@ struct Presser : Holder<T, Crossed> {
   }
 
  private:
+  // How far all pushes move a listener.
+  T moved(std::size_t listener) const {
+    T sum = 0;
+    for (const PassiveLink& link : s.active->links) {
+      sum += s.reply[listener * s.passives + link.ends.a] * s.pushed[link.ends.a];
+    }
+    return this->inverse_mass() * sum;
+  }
   void shove(std::uint32_t end, T force) {
     s.exerted[end] += force;
     if (end < places) {
