@@ -147,8 +147,10 @@ struct Passive {
     return give(a, a) + give(b, b) - (may_meet ? 2 * give(a, b) : V{});
   }
   void push(Ends ends, V force) {
-    push_node(ends.a, -force);
-    push_node(ends.b, force);
+    if (any_of(force != V{})) {
+      push_node(ends.a, -force);
+      push_node(ends.b, force);
+    }
   }
   void shift(std::uint32_t node, V way) {
     s.shift(node, way);
@@ -161,19 +163,30 @@ struct Passive {
   }
   // How far one node is moved by a force of 1 at another.
   V give(std::uint32_t from, std::uint32_t at) const {
-    // What has no inertia is not moved, and what waves move is not a part of anything.
-    for (const std::uint32_t node : {from, at}) {
-      if (!is_place(program, node) && (node >= program.moving || is_junction(program, node))) {
-        return from == at ? inverse_mass(node) : V{};
-      }
+    if (from == at && !is_place(program, at)) {
+      return inverse_mass(at);
     }
-    return shared(program, s, from, at, [this](std::uint32_t node) { return inverse_mass(node); });
+    return give_of_places(from, at);
   }
   void push_node(std::uint32_t node, V force) {
     if (!is_place(program, node)) {
       shift(node, inverse_mass(node) * force);
       return feel(node, force);
     }
+    push_place(node, force);
+  }
+
+ private:
+  [[gnu::noinline]] V give_of_places(std::uint32_t from, std::uint32_t at) const {
+    // What has no inertia is not moved, and what waves move is not a part of anything.
+    for (const std::uint32_t node : {from, at}) {
+      if (!is_place(program, node) && (node >= program.moving || is_junction(program, node))) {
+        return V{};
+      }
+    }
+    return shared(program, s, from, at, [this](std::uint32_t node) { return inverse_mass(node); });
+  }
+  [[gnu::noinline]] void push_place(std::uint32_t node, V force) {
     share_out(program, s, node - program.taps[0].node, force, [this](std::uint32_t at, V part) {
       const V way = inverse_mass(at) * part;
       s.x[at] += way;
@@ -182,7 +195,6 @@ struct Passive {
     });
   }
 
- private:
   V position(std::uint32_t node) const {
     return is_place(program, node) ? seen_at(program, s, node - program.taps[0].node, s.x)
                                    : s.x[node];
