@@ -37,18 +37,19 @@ double passive_count(const Program& program) {
 
 // Through the modes each passive link pulls at all others: several are solved together, at once if
 // they are straight where they act. What they push with is added to all modes along the next sweep,
-// if that has room, or four places at a time.
+// if that has room, or four places at a time. A pick passes, so that it counts by half.
 double solving_ns(const Program& program, double modes, double places, const Workload& load) {
-  constexpr double of_a_straight_link = 30.0;
+  constexpr double of_a_straight_link = 28.0;
   constexpr double of_a_link = 110.0;
   constexpr double rows_of_a_sweep = 8.0;
   const double links = passive_count(program);
   double sum = 0.0;
   for (const LinkRun& run : program.link_runs) {
     const LawFacts& law = facts_of(run.law);
-    const double each = links == 1.0      ? 1.5 * law.solve_ns
-                        : law.is_straight ? of_a_straight_link
-                                          : of_a_link;
+    const double each = links == 1.0                  ? 1.5 * law.solve_ns
+                        : law.is_straight             ? of_a_straight_link
+                        : law.family == Family::pluck ? 0.5 * of_a_link
+                                                      : of_a_link;
     sum += run.scheme == Scheme::plain ? 0.0 : run.count * each;
   }
   const double shoves =
