@@ -9,6 +9,7 @@
 #include <cstdlib>
 #include <cstring>
 
+#include "app/realtime/denormals.h"
 #include "tests/support/harness.h"
 #include "tests/support/player.h"
 
@@ -465,6 +466,7 @@ Outcome play(const NonlinearScene& scene, Passivity passive, std::size_t frames)
   Player player(text, default_preset(network_of(text), true),
                 {.bare = true, .budget = Budget{.passive = passive}});
   EnergyJudge judge(scene);
+  const DenormalsFlushed flushed;  // as while anything plays
   constexpr std::size_t block = 256;
   const std::size_t inputs = scene.pushes.size() + 1;
   std::vector<std::vector<double>> in(inputs, std::vector<double>(block));
