@@ -37,6 +37,33 @@ TEST_CASE("Passive links act on the modes as on the masses", "[modes_passive]") 
   }
 }
 
+// Fingers of two places each on a mesh, dampers alone or as hard as asked, that stay inside for
+// most of the time.
+std::string held_mesh(double k, double z) {
+  std::string text = scenes::square_mesh("m", 8, 9, "0.1", "0.001") +
+                     "@in1 posInput -0.01\n@in2 posInput -0.02\n@in3 frcInput @m_m6_2\n";
+  for (const int i : {1, 2, 4, 5}) {
+    text += "@t" + std::to_string(i) + " contact @m_m2_" + std::to_string(i) +
+            (i < 3 ? " @in1 " : " @in2 ") + show(k) + " " + show(z) + " 0.\n";
+  }
+  return text + "@pick nlPluck @in2 @m_m5_5 0.02 0.001\n" + scenes::output(1, "m_m3_3") +
+         scenes::output(2, "m_m7_1");
+}
+
+TEST_CASE("Contacts that stay inside act on the modes as on the masses", "[modes_passive]") {
+  for (const auto& [k, z] : {std::pair{0.0, 0.01}, std::pair{0.05, 0.0}, std::pair{3.0, 0.5}}) {
+    CAPTURE(k, z);
+    const Program program = in_modes(held_mesh(k, z), Passivity::always);
+    for (const bool turns : {false, true}) {
+      for (const Isa isa : isas()) {
+        check_same<double>(
+            program,
+            {.frames = 4410, .reach = 0.02, .highest_hz = 30.0, .turns = turns, .isa = isa}, 1e-9);
+      }
+    }
+  }
+}
+
 // Some links of each law on one string, some on one mass, some between two.
 std::string busy_string() {
   return scenes::string("s", 30, "0.1", "0.005") +
