@@ -53,8 +53,8 @@ struct ClippedSpring {
   static constexpr LawFacts facts = {
       .name = "clipped_spring",
       .family = Family::spring,
-      .one = "spring that grows stiffer",
-      .many = "springs that grow stiffer",
+      .one = "spring that bends",
+      .many = "springs that bend",
       .count = 4,
       .arguments = {{{Role::stiffness, Unit::stiffness},
                      {Role::bend, Unit::stiffness},

@@ -11,8 +11,8 @@ struct CubicSpring {
   static constexpr LawFacts facts = {
       .name = "cubic_spring",
       .family = Family::spring,
-      .one = "spring that grows stiffer",
-      .many = "springs that grow stiffer",
+      .one = "spring that bends",
+      .many = "springs that bend",
       .count = 3,
       .arguments = {{{Role::stiffness, Unit::stiffness},
                      {Role::bend, Unit::stiffness},

@@ -415,7 +415,7 @@ TEST_CASE("all that no theorem covers is made passive, and told", "[passive]") {
   CHECK(found(usual) == std::vector{plain, passive, plain, passive, passive, passive});
   CHECK(usual.notes ==
         std::vector<std::string>{
-            "1 spring that grows stiffer made passive: as published it could blow up where it is "
+            "1 spring that bends made passive: as published it could blow up where it is "
             "the stiffest",
             "1 bow made passive: as published it could grip a sample too late",
             "2 contacts made passive: as published they could gain energy at a touch"});
@@ -425,7 +425,7 @@ TEST_CASE("all that no theorem covers is made passive, and told", "[passive]") {
   REQUIRE(never.hazard);
   CHECK(never.hazard->line == 7);
   CHECK(never.hazard->message ==
-        "played as published, where nothing keeps 1 spring that grows stiffer, 1 bow, 2 contacts "
+        "played as published, where nothing keeps 1 spring that bends, 1 bow, 2 contacts "
         "from making energy; --budget passive=auto does");
   CHECK(!usual.hazard);
   // Bows of two profiles, and springs of two laws, are told together.
@@ -434,7 +434,7 @@ TEST_CASE("all that no theorem covers is made passive, and told", "[passive]") {
           network_of(text + "@b2 nlBow @in1 @m 0.2 0.01 1\n@q2 nlSpring2 @g @n 0. 3. 0.\n"), {})
           .notes;
   REQUIRE(notes.size() == 3);
-  CHECK(notes[0].starts_with("2 springs that grow stiffer made passive"));
+  CHECK(notes[0].starts_with("2 springs that bend made passive"));
   CHECK(notes[1].starts_with("2 bows made passive"));
   // What is passive needs no proof any more, but for what a spring is at rest.
   CHECK(without_passive(network, usual.links).links.size() == 3);
