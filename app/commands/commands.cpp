@@ -12,7 +12,6 @@
 #include "app/commands/progress_bar.h"
 #include "app/say.h"
 #include "app/session/load_news.h"
-#include "app/text.h"
 
 namespace ressort {
 namespace {
@@ -105,8 +104,11 @@ int render_command(const RenderOptions& options, bool is_quiet) {
     }
   }
   if (rendered->resets > 0) {
-    complain(rendered->name + ": " + counted(rendered->resets, "voice", "voices") +
-             " became unstable and faded out; the sound is not to be trusted");
+    const bool is_once = rendered->resets == 1;
+    complain(rendered->name + (is_once ? ": a voice" : ": voices") +
+             " became unstable and faded out" +
+             (is_once ? "" : " " + std::to_string(rendered->resets) + " times") +
+             "; the sound is not to be trusted");
   }
   return rendered->was_interrupted ? exit_code::our_failure : exit_code::done;
 }
