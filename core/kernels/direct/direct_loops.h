@@ -170,7 +170,9 @@ struct Passive {
   }
   void push_node(std::uint32_t node, V force) {
     if (!is_place(program, node)) {
-      shift(node, inverse_mass(node) * force);
+      if (node < program.moving) {
+        shift(node, inverse_mass(node) * force);
+      }
       return feel(node, force);
     }
     push_place(node, force);
