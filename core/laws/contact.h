@@ -3,8 +3,10 @@
 #pragma once
 
 #include <algorithm>
+#include <limits>
 
 #include "core/laws/discrete_gradient.h"
+#include "core/laws/straight.h"
 
 namespace ressort::laws {
 inline namespace RESSORT_ISA {
@@ -47,6 +49,10 @@ struct Contact {
     return select(depth > V{}, Scalar<V>(0.5) * k * depth * depth, V{});
   }
   V secant(V) const { return k; }
+
+  StraightPiece<V> piece(V) const requires std::is_floating_point_v<V> {
+    return {-t, std::numeric_limits<V>::infinity(), k, z, k * t};
+  }
 
   // P = K/2 max(0, d + t)^2, with a damper as far as it touches. With u = before + t, s = after -
   // before, a = free - before, h = gamma K/2 and m = 1 + gamma Z/2 every case is at most a

@@ -8,6 +8,7 @@
 #include <algorithm>
 
 #include "core/laws/discrete_gradient.h"
+#include "core/laws/straight.h"
 
 namespace ressort::laws {
 inline namespace RESSORT_ISA {
@@ -71,6 +72,14 @@ struct Pluck {
     return select(far < outer, fall / 2 * slope * slope + hill, V{});
   }
   V secant(V) const { return fall; }
+
+  StraightPiece<V> piece(V d) const requires std::is_floating_point_v<V> {
+    if (absolute(d) < inner) {
+      return {-inner, inner, -rise, z, V{}};
+    }
+    return d < V{} ? StraightPiece<V>{-outer, -inner, fall, z, top}
+                   : StraightPiece<V>{inner, outer, fall, z, -top};
+  }
 
   // Where it wants to snap, or where what is fast passes it in a sample, several ways s keep the
   // energy, m s^2 - free s + gamma (P(before + s) - P(before)) = 0 with m = 1 + gamma Z/2: it goes

@@ -8,6 +8,8 @@ namespace ressort {
 namespace {
 
 constexpr std::size_t least_block = 6;  // frames; fewer are stepped
+constexpr std::size_t least_held = 8;   // frames on one piece that are worth strides
+constexpr std::size_t most_tries = 2;   // of strides that were not, in a block
 
 std::size_t round_up(std::size_t count, std::size_t to) {
   return (count + to - 1) / to * to;
@@ -239,6 +241,10 @@ void DenseKernel<T>::allocate() {
     }
     unit += b.stride;
   }
+  for (DenseStride<T>& stride : strides_) {
+    stride.table.resize(
+        has_strides() ? (stride_columns(b.columns) + stride_frames) * stride_row(b.outputs) : 0);
+  }
   b.ramps = ramps_of(this->coefficients);
   exact_.resize(b.matrix_vectors * b.stride + dense_build_size(b));
   b.exact = exact_.data();
@@ -353,6 +359,9 @@ void DenseKernel<T>::follow_coefficients() {
              [&](std::uint32_t i) { return static_cast<double>(known_[i]); });
     make_pace();
     has_tables_ = false;
+    for (DenseStride<T>& stride : strides_) {
+      stride.is_known = false;
+    }
   }
   is_current_ = false;
 }
@@ -398,7 +407,19 @@ void DenseKernel<T>::make_pace() {
 
 template <class T>
 void DenseKernel<T>::play(const DenseDrive<T>& drive, std::size_t at, std::size_t end) {
+  std::size_t tries = has_strides() ? most_tries : 0;
   while (at < end) {
+    if (tries > 0 && body_.touches && is_current_ && !body_.has_force) {
+      const std::size_t stepped = stride(drive, at, end - at);
+      tries -= stepped < least_held ? 1 : 0;
+      at += stepped;
+      const std::size_t rest = tries > 0 ? std::min(end - at, least_held) : end - at;
+      if (body_.touches && rest > 0) {
+        steps_.samples(body_, drive, at, rest, false);
+        at += rest;
+      }
+      continue;
+    }
     const bool is_block = can_step_blocks_ && !body_.touches && end - at >= least_block;
     if (is_block && is_current_) {
       if (!has_tables_) {

@@ -6,8 +6,12 @@
 // other law are ports: unless a bound shows that they stay away, their free motion over the block
 // is computed first, and if one of them comes into the zone where its law acts, the block ends
 // there ("block step"). From there on, and while coefficients move, the body goes sample by sample,
-// with the masses in the lanes ("sample steps").
+// with the masses in the lanes ("sample steps"). Where the one link of a small body stays on a
+// straight piece of its law it is a spring there, and the body linear once more: it goes four
+// samples at a time, its state in registers ("strides").
 #pragma once
+
+#include <array>
 
 #include "core/kernels/kernel.h"
 
@@ -130,6 +134,45 @@ std::size_t dense_build_size(const DenseBody<T>& body) {
          body.signals * driven_frames * body.rows;
 }
 
+inline constexpr std::size_t stride_frames = 4;
+inline constexpr std::size_t stride_state = 8;    // numbers of a state that strides, at most
+inline constexpr std::size_t stride_outputs = 3;  // at most
+
+// Numbers that a stride makes: the change of the state; where the port's mass is in each frame, and
+// then the outputs; both in whole packs of eight.
+constexpr std::size_t stride_row(std::size_t outputs) {
+  return stride_state +
+         (stride_frames * (1 + outputs) + stride_state - 1) / stride_state * stride_state;
+}
+constexpr std::size_t stride_columns(std::size_t columns) {
+  return columns <= 6 ? 6 : stride_state;
+}
+
+// A body on one piece of its port's law, of stiffness K and damping Z.
+template <class T>
+struct DenseStride {
+  bool is_known = false;
+  T stiffness = T(0);
+  T damping = T(0);
+  // [column of the state][stride_row()], and the same of a force of 1 on the port's mass in each
+  // of the frames.
+  Aligned<T> table;
+};
+
+// The piece and the port's other end, as strides see them: by the mass that moves.
+template <class T>
+struct DenseHold {
+  T stiffness;
+  T damping;
+  T force;  // beside what these two make
+  T low;    // between these distances of the mass from the other end
+  T high;
+  T start;  // where the other end is, and how fast, a frame before
+  T start_speed;
+  const T* position;  // [frame], or null where it stays
+  const T* velocity;
+};
+
 template <class T>
 struct DenseSteps {
   // Frames [at, at + count) sample by sample; `moves`: coefficients are on their way.
@@ -141,6 +184,9 @@ struct DenseSteps {
   // body touch; fewer if forces act. Gives how many.
   std::size_t (*block)(DenseBody<T>& body, const DenseDrive<T>& drive, std::size_t at,
                        std::size_t count);
+  // Strides of at most `count` frames, as long as the port stays on its piece. Gives how many.
+  std::size_t (*stride)(DenseBody<T>& body, const T* table, const DenseHold<T>& hold, T* outputs,
+                        std::size_t count);
   // The tables of a block step from `exact`. Of the order of (2 masses)^3 dense_powers operations.
   void (*build)(DenseBody<T>& body);
 };
@@ -150,6 +196,9 @@ DenseSteps<T> dense_steps(std::size_t masses);
 template <Isa isa, class T>
 std::size_t dense_block_step(DenseBody<T>& body, const DenseDrive<T>& drive, std::size_t at,
                              std::size_t count);
+template <Isa isa, class T>
+std::size_t dense_stride(DenseBody<T>& body, const T* table, const DenseHold<T>& hold, T* outputs,
+                         std::size_t count);
 template <Isa isa, class T>
 void build_dense(DenseBody<T>& body);
 
@@ -201,6 +250,12 @@ class DenseKernel final : public Kernel<T> {
   void make_pace();
   void play(const DenseDrive<T>& drive, std::size_t at, std::size_t end);
   void refresh_force();
+  // Strides: whether the body has any; so many frames of at most `count`, 0 where the port lies on
+  // no straight piece; and the table of one.
+  bool has_strides() const;
+  std::size_t stride(const DenseDrive<T>& drive, std::size_t at, std::size_t count);
+  const T* stride_table(T stiffness, T damping);
+  void build_stride(DenseStride<T>& stride) const;
 
   const Program& program_;
   const Dense& form_;
@@ -214,11 +269,13 @@ class DenseKernel final : public Kernel<T> {
   std::vector<DenseInput> pushes_;
   std::vector<std::uint32_t> slots_;  // [node]
   std::vector<std::uint32_t> heard_;
-  Aligned<T> numbers_;           // all that body_ points to
-  Aligned<double> exact_;        // and these
-  Aligned<T> known_;             // [coefficient] what the matrices were made of
-  Aligned<T> arranged_;          // [input][value, velocity][max_block_frames]
-  bool can_step_blocks_ = true;  // no port's law acts everywhere
+  Aligned<T> numbers_;                     // all that body_ points to
+  Aligned<double> exact_;                  // and these
+  Aligned<T> known_;                       // [coefficient] what the matrices were made of
+  Aligned<T> arranged_;                    // [input][value, velocity][max_block_frames]
+  std::array<DenseStride<T>, 2> strides_;  // those of the last pieces
+  std::size_t next_stride_ = 0;            // to be made anew
+  bool can_step_blocks_ = true;            // no port's law acts everywhere
   bool has_tables_ = false;
   bool is_current_ = false;  // the next sample's forces are by the coefficients of now
 };

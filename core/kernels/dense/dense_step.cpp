@@ -402,7 +402,7 @@ DenseSteps<T> steps_of(std::size_t packs, std::index_sequence<Counts...>) {
       if (packs == Count) {
         using S = SampleSteps<T, Bytes, Count>;
         steps = {S::step, S::pull, dense_block_step<Isa::RESSORT_ISA, T>,
-                 build_dense<Isa::RESSORT_ISA, T>};
+                 dense_stride<Isa::RESSORT_ISA, T>, build_dense<Isa::RESSORT_ISA, T>};
       }
     }
   };

@@ -190,6 +190,39 @@ TEST_CASE("a contact that lasts sounds as in the direct kernel", "[dense]") {
   }
 }
 
+// One to four masses in a row, with a weight or not, heard at up to three places.
+std::string leaning_row(int masses, const std::string& ends, bool is_heavy, int outputs) {
+  std::string text = "@K param 0.1\n@g ground 0.\n@in1 posInput 0.\n";
+  for (int i = 0; i < masses; ++i) {
+    const std::string m = scenes::at("m", i);
+    text += m + (is_heavy ? " osc 1. 0.001 0.0001 0. 0. 0.00001\n" : " mass 1.3 0. 0.\n");
+    text += "@r" + std::to_string(i) + " springDamper " + m + " " +
+            (i == 0 ? "@g" : scenes::at("m", i - 1)) + " K 0.002\n";
+  }
+  text += "@hold " + ends + "\n";
+  for (int o = 1; o <= outputs; ++o) {
+    text += scenes::output(o, "m" + std::to_string((o - 1) % masses));
+  }
+  return text;
+}
+
+TEST_CASE("a body that leans on a straight piece of a law sounds as in the direct kernel",
+          "[dense]") {
+  for (const char* ends : {"contact @m0 @in1 0.05 0.02 1.", "contact @in1 @m0 0.05 0.02 1.",
+                           "nlPluck @in1 @m0 0.04 1. 0.01", "nlPluck @m0 @in1 0.04 1. 0.01"}) {
+    for (int masses = 1; masses <= 4; ++masses) {
+      for (const bool is_heavy : {false, true}) {
+        CAPTURE(ends, masses, is_heavy);
+        const std::string text = leaning_row(masses, ends, is_heavy, 1 + masses % 3);
+        // Around its corner, and well on the outer piece.
+        agree(dense(text), {.frames = 4096, .reach = 0.02}, {.relative = 1e-12, .snr_db = 80.0});
+        agree(dense(text), {.frames = 4096, .reach = 0.6, .lowest_hz = 20.0, .highest_hz = 200.0},
+              {.relative = 1e-12, .snr_db = 80.0});
+      }
+    }
+  }
+}
+
 TEST_CASE("larger bodies in contact sound as in the direct kernel", "[dense]") {
   for (const int masses : {6, 11, 16}) {
     for (const char* second_link : {"", "@rest contact @in1 @s_m3 0.02 0.001 1.\n"}) {

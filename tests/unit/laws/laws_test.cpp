@@ -316,6 +316,35 @@ TEST_CASE("numbers that are kept instead of arguments make the same law", "[laws
   });
 }
 
+TEST_CASE("a law of straight pieces is a spring with a damper on each of them", "[laws]") {
+  int straight = 0;
+  each_law([&](auto type, Random& random) {
+    using ForceLaw = typename decltype(type)::template With<double>;
+    if constexpr (laws::Straight<ForceLaw, double>) {
+      ++straight;
+      int inside = 0;
+      for (int i = 0; i < draws; ++i) {
+        const auto law = law_with<decltype(type)>(any_arguments(type.facts, random));
+        const double d = random.uniform(-2.0, 2.0);
+        const double v = random.uniform(-2.0, 2.0);
+        const auto piece = law.piece(d);
+        const double force = piece.stiffness * d + piece.damping * v + piece.offset;
+        if (piece.low < d && d < piece.high) {
+          ++inside;
+          // Three roundings of terms that are no greater than this.
+          CHECK(std::fabs(force - law.force(d, v)) <=
+                1e-15 * (std::fabs(piece.stiffness * d) + std::fabs(piece.damping * v) +
+                         std::fabs(piece.offset)));
+        } else {
+          CHECK(law.force(d, v) == 0.0);
+        }
+      }
+      CHECK(inside > 0);
+    }
+  });
+  CHECK(straight == 2);
+}
+
 TEST_CASE("what is printed of a link of any law is read as the same", "[laws]") {
   each_law([&](auto type, Random&) {
     for (const LawWord& word : type.facts.words) {
