@@ -103,22 +103,22 @@ void EnergyWatch::look_around(Bank<T>& bank, Voices& voices, std::span<const dou
     return;
   }
   looks_due_ += parts_.size();
-  for (std::size_t price = price_of(turn_, bank); looks_due_ >= price && looking_.at == none;
-       price = price_of(turn_, bank)) {
+  for (std::size_t price = price_of(turn_part_, bank); looks_due_ >= price && looking_.at == none;
+       price = price_of(turn_part_, bank)) {
     looks_due_ -= price;
     if (steps(turn_, voices)) {
       look(turn_, bank, voices, parameters);
     }
     turn_ = turn_ + 1 < parts_.size() ? turn_ + 1 : 0;
+    turn_part_ = turn_part_ + 1 < elements_.size() ? turn_part_ + 1 : 0;
   }
 }
 
 // Where one kernel steps many voices a step costs each of them less; a look does not.
 template <class T>
-std::size_t EnergyWatch::price_of(std::size_t at, const Bank<T>& bank) const {
-  const std::size_t lanes = parts_.size() / elements_.size();
-  const std::size_t width = bank.parts[at % elements_.size()].width;
-  return updates_per_look * std::clamp<std::size_t>(std::min(width, lanes) / 4, 1, 4);
+std::size_t EnergyWatch::price_of(std::size_t p, const Bank<T>& bank) const {
+  const std::size_t together = std::min(bank.parts[p].width, bank.voices);
+  return updates_per_look * std::clamp<std::size_t>(together / 4, 1, 4);
 }
 
 template <class T>

@@ -94,7 +94,7 @@ class EnergyWatch {
   template <class T>
   void lay_still(const T* row, std::size_t width, std::size_t lane, std::size_t p);
   template <class T>
-  std::size_t price_of(std::size_t at, const Bank<T>& bank) const;
+  std::size_t price_of(std::size_t p, const Bank<T>& bank) const;
   template <class T>
   void look(std::size_t at, Bank<T>& bank, Voices& voices, std::span<const double> parameters);
   template <class T>
@@ -115,7 +115,8 @@ class EnergyWatch {
   std::uint64_t updates_ = 0;  // times that it has looked around
   EngineMeters read_;
   Look looking_;               // the bank's x and v are its own until it is done
-  std::size_t turn_ = 0;       // of the parts_: the next to be looked at
+  std::size_t turn_ = 0;       // of the parts_: the next to be looked at,
+  std::size_t turn_part_ = 0;  // and which part that is
   std::size_t looks_due_ = 0;  // updates, times parts_: what looks are paid with
 };
 

@@ -303,7 +303,7 @@ struct Engine::Player {
         mixing.add(b, group, segment, voices, watch);
       }
     };
-    b.step(segment.frames, drive, mix);
+    b.step(segment.frames, voices.awake_end(), drive, mix);
     levels.advance(segment.frames);
     voices.advance_gains(segment.frames);
     since_update += segment.frames;

@@ -125,6 +125,14 @@ class Voices {
   Voice& operator[](std::size_t lane) { return voices_[lane]; }
   const Voice& operator[](std::size_t lane) const { return voices_[lane]; }
   bool is_idle() const { return awake_ == 0; }  // nobody is awake
+  // The first lane of those behind all that are awake.
+  std::size_t awake_end() const {
+    std::size_t end = voices_.size();
+    while (end > 0 && !voices_[end - 1].awake) {
+      --end;
+    }
+    return end;
+  }
   // The lane that was played last: what names no key acts on it.
   std::size_t last() const { return last_; }
   // The same among those that are meant; nothing where nobody is.

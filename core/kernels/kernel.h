@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <memory>
 #include <span>
 #include <vector>
@@ -23,6 +24,8 @@ struct Block {
   const T* velocity = nullptr;  // [frame][input][lane] of a position, per sample
   const T* audio = nullptr;     // [frame][audio coefficient][lane]
   T* outputs = nullptr;         // [frame][output][lane]
+  // Nobody plays in lanes beyond so many: they may be left where they are.
+  std::size_t lanes = std::numeric_limits<std::size_t>::max();
 };
 
 // The coefficients of a kernel's voices, and how they move: all that are on their way arrive

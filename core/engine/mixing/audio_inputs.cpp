@@ -35,7 +35,8 @@ bool AudioInputs::listen(const Segment& segment) {
   for (Driven& input : inputs_) {
     input.samples = nullptr;
     if (const double* const channel = channel_of(input, segment)) {
-      const bool sounds = !is_silent_(channel + segment.at, segment.frames);
+      const bool sounds =
+          channel[segment.at] != 0.0 || !is_silent_(channel + segment.at, segment.frames);
       any |= sounds;
       if (sounds || input.before != 0.0 || bare_) {
         input.samples = channel + segment.at;

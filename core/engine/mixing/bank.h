@@ -96,23 +96,26 @@ struct Bank : BlockBuffers<T> {
 
   // Calls drive(part, group) for every kernel, steps those for which it says so, and calls
   // mix(part, group, whether it has stepped): one after the other, or where a part takes long all
-  // of it at once. Voices do not hear each other, so that this comes to the same bits.
+  // of it at once. Voices do not hear each other, so that this comes to the same bits. Those from
+  // `end` on sleep.
   template <class Drive, class Mix>
-  void step(std::size_t frames, Drive&& drive, Mix&& mix) {
+  void step(std::size_t frames, std::size_t end, Drive&& drive, Mix&& mix) {
+    awake_end_ = end;
     for (std::size_t p = 0; p < parts.size(); ++p) {
       if (shared[p].crew && shared[p].kernel_ns * static_cast<double>(frames) > least_shared_ns) {
         step_together(p, frames, drive, mix);
         continue;
       }
       for (std::size_t kernel = 0; kernel < parts[p].kernels.size(); ++kernel) {
-        const VoiceGroup group = group_of(p, kernel);
+        const VoiceGroup group = awake_of(p, kernel);
         const bool steps = drive(parts[p], group);
         if (steps) {
           parts[p].kernels[kernel]->step({.frames = frames,
                                           .value = this->value.data(),
                                           .velocity = this->velocity.data(),
                                           .audio = this->audio.data(),
-                                          .outputs = this->outputs.data()});
+                                          .outputs = this->outputs.data(),
+                                          .lanes = group.end - group.first});
         }
         mix(parts[p], group, steps);
       }
@@ -145,6 +148,13 @@ struct Bank : BlockBuffers<T> {
   VoiceGroup group_of(std::size_t p, std::size_t kernel) const {
     const std::size_t first = kernel * parts[p].width;
     return {p, first, std::min(voices, first + parts[p].width)};
+  }
+
+  // Those that may be awake.
+  VoiceGroup awake_of(std::size_t p, std::size_t kernel) const {
+    VoiceGroup group = group_of(p, kernel);
+    group.end = std::max(group.first, std::min(group.end, awake_end_));
+    return group;
   }
 
   SharedPart<T> share(std::size_t p, Isa isa, Executor& executor) {
@@ -187,8 +197,10 @@ struct Bank : BlockBuffers<T> {
       KernelTask<T>& task = *together.tasks[kernel];
       forget_filled();
       with_buffers_of(task, [&] {
-        if (drive(parts[p], group_of(p, kernel))) {
+        const VoiceGroup group = awake_of(p, kernel);
+        if (drive(parts[p], group)) {
           task.frames = frames;
+          task.lanes = group.end - group.first;
           together.wanted.push_back(kernel);
         }
       });
@@ -200,7 +212,7 @@ struct Bank : BlockBuffers<T> {
       const bool has_stepped = next != together.wanted.end() && *next == kernel;
       next += has_stepped ? 1 : 0;
       with_buffers_of(*together.tasks[kernel],
-                      [&] { mix(parts[p], group_of(p, kernel), has_stepped); });
+                      [&] { mix(parts[p], awake_of(p, kernel), has_stepped); });
     }
   }
 
@@ -208,6 +220,8 @@ struct Bank : BlockBuffers<T> {
     filled_part = nullptr;
     still = 0;
   }
+
+  std::size_t awake_end_ = 0;
 };
 
 }  // namespace ressort

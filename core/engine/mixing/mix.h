@@ -34,6 +34,7 @@ struct Heard {
   std::size_t frames = 0;
   std::size_t count = 0;  // outputs
   std::size_t width = 1;  // lanes; one, or as many as fit into whole packs of 16 bytes
+  std::size_t lanes = 1;  // the first of them, in whole packs of 16 bytes, too
 };
 
 // Sounds that move as many inputs, side by side in each row, of all lanes: on top of what they do
@@ -62,10 +63,12 @@ struct Mixer {
   // The same row in every frame, [frame * step + i].
   void (*fill_rows)(const T* row, std::size_t step, std::size_t frames, T* value);
   void (*add_audio)(const AudioInput<T>& input);
-  // The largest |y| of each lane; infinity where one is not below `bound`, or is no number.
-  void (*find_peaks)(const Heard<T>& heard, double bound, T* peak);
   // channels[output][frame] += the sum of gain[lane] * y; what has the gain 0 may be anything.
   void (*add_voices)(const Heard<T>& heard, const double* gain, double* const* channels);
+  // The same if every y that has a gain is below `bound`; whether it was. The largest |y| of each
+  // lane; infinity where one is not below, or is no number.
+  bool (*mix)(const Heard<T>& heard, double bound, const double* gain, double* const* channels,
+              T* peak);
 };
 
 template <Isa isa, class T>

@@ -91,21 +91,20 @@ void fill_rows(const T* row, std::size_t step, std::size_t frames, T* value) {
   }
 }
 
-// rows[n * step + lane] = kept * rows[n * step + lane] + added[n]
-template <class T>
-[[gnu::always_inline]] inline void add_rows(const double* added, T kept, std::size_t frames,
+// rows[n * step + lane] = kept * rows[n * step + lane] + added(n)
+template <class T, class Added>
+[[gnu::always_inline]] inline void add_rows(Added&& added, T kept, std::size_t frames,
                                             std::size_t step, std::size_t width, T* rows) {
   for (std::size_t n = 0; n < frames; ++n) {
-    const T more = static_cast<T>(added[n]);
+    const T more = static_cast<T>(added(n));
     for (std::size_t at = n * step; at < n * step + width; ++at) {
       rows[at] = kept * rows[at] + more;
     }
   }
 }
 
-template <class T>
-[[gnu::always_inline]] inline void add_to(const AudioInput<T>& input, const double* added,
-                                          T* rows) {
+template <class T, class Added>
+[[gnu::always_inline]] inline void add_to(const AudioInput<T>& input, Added&& added, T* rows) {
   const T kept = input.replaces ? T(0) : T(1);
   if (input.step == 1) {  // one voice and one input: the usual case, and the compiler is to know it
     add_rows(added, kept, input.frames, 1, 1, rows);
@@ -121,13 +120,11 @@ void add_one_sound(const AudioInput<T>& input) {
   for (std::size_t n = 0; n < input.frames; ++n) {
     here[n + 1] = input.scale[0] * input.samples[0][n];
   }
-  add_to(input, here + 1, input.value);
+  add_to(
+      input, [&](std::size_t n) { return here[n + 1]; }, input.value);
   if (input.velocity != nullptr) {
-    double change[max_block_frames];
-    for (std::size_t n = 0; n < input.frames; ++n) {
-      change[n] = here[n + 1] - here[n];
-    }
-    add_to(input, change, input.velocity);
+    add_to(
+        input, [&](std::size_t n) { return here[n + 1] - here[n]; }, input.velocity);
   }
 }
 
@@ -224,10 +221,10 @@ void find_peaks(const Heard<T>& heard, double bound, T* peak) {
     store<V>(peak + lane, within<V>(largest, bound));
     lane += sizeof(V) / sizeof(T);
   };
-  while (lane + widest / sizeof(T) <= heard.width) {
+  while (lane + widest / sizeof(T) <= heard.lanes) {
     find(Pack<T, widest>{});
   }
-  while (lane < heard.width) {
+  while (lane < heard.lanes) {
     find(Pack<T, 16>{});
   }
 }
@@ -237,7 +234,7 @@ void find_peaks(const Heard<T>& heard, double bound, T* peak) {
 // channel[n] += the sum of gain[lane] * rows[n * step + lane] for some frames at once, so that a
 // gain is looked at once for all of them, and no sum waits for another.
 template <std::size_t Frames, class T>
-void add_lanes(const T* rows, std::size_t step, std::size_t width, const double* gain,
+void add_lanes(const T* rows, std::size_t step, std::size_t used, const double* gain,
                double* channel) {
   double sum[Frames] = {};
   std::size_t lane = 0;
@@ -245,7 +242,7 @@ void add_lanes(const T* rows, std::size_t step, std::size_t width, const double*
     using D = Pack<double, Bytes>;
     constexpr std::size_t lanes = Bytes / sizeof(double);
     D packs[Frames] = {};
-    for (; lane + lanes <= width; lane += lanes) {
+    for (; lane + lanes <= used; lane += lanes) {
       const D g = load<D>(gain + lane);
       const auto is_heard = g != D{};
       for (std::size_t n = 0; n < Frames; ++n) {
@@ -258,7 +255,7 @@ void add_lanes(const T* rows, std::size_t step, std::size_t width, const double*
     }
   };
   add.template operator()<widest>();
-  if (lane < width) {
+  if (lane < used) {
     add.template operator()<16>();
   }
   for (std::size_t n = 0; n < Frames; ++n) {
@@ -297,10 +294,10 @@ void add_voices(const Heard<T>& heard, const double* gain, double* const* channe
     if (heard.width > 1) {
       std::size_t n = 0;
       for (; n + 4 <= heard.frames; n += 4) {
-        add_lanes<4>(y + n * step, step, heard.width, gain, channel + n);
+        add_lanes<4>(y + n * step, step, heard.lanes, gain, channel + n);
       }
       for (; n < heard.frames; ++n) {
-        add_lanes<1>(y + n * step, step, heard.width, gain, channel + n);
+        add_lanes<1>(y + n * step, step, heard.lanes, gain, channel + n);
       }
     } else if (*gain != 0.0) {
       add_one(y, heard.frames, step, *gain, channel);
@@ -309,8 +306,21 @@ void add_voices(const Heard<T>& heard, const double* gain, double* const* channe
 }
 
 template <class T>
+bool mix(const Heard<T>& heard, double bound, const double* gain, double* const* channels,
+         T* peak) {
+  find_peaks(heard, bound, peak);
+  for (std::size_t lane = 0; lane < heard.lanes; ++lane) {
+    if (gain[lane] != 0.0 && !(static_cast<double>(peak[lane]) < bound)) {
+      return false;
+    }
+  }
+  add_voices(heard, gain, channels);
+  return true;
+}
+
+template <class T>
 Mixer<T> mixer_of() {
-  return {is_silent, fill_rows<T>, add_audio<T>, find_peaks<T>, add_voices<T>};
+  return {is_silent, fill_rows<T>, add_audio<T>, add_voices<T>, mix<T>};
 }
 
 }  // namespace

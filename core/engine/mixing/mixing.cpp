@@ -14,21 +14,37 @@ void Mixing::add(Bank<T>& bank, const VoiceGroup& group, const Segment& segment,
                  EnergyWatch& watch) const {
   PartBank<T>& part = bank.parts[group.part];
   const std::size_t count = part.program.outputs.size();
+  const std::size_t width = part.width;
+  constexpr std::size_t least = 16 / sizeof(T);
+  const std::size_t used = group.end - group.first;
   const Heard<T> heard{.outputs = bank.outputs.data(),
                        .frames = segment.frames,
                        .count = count,
-                       .width = part.width};
-  bank.mixer.find_peaks(heard, loudest_, bank.peak.data());
-  std::fill_n(bank.gain.begin(), part.width, 0.0);
+                       .width = width,
+                       .lanes = width == 1 ? 1 : (used + least - 1) / least * least};
+  const auto is_heard = [&](std::size_t lane) {
+    return voices[lane].awake && !watch.is_still(lane, group.part);
+  };
+  bool is_any_lost = false;
+  for (std::size_t i = 0; i < heard.lanes; ++i) {
+    const std::size_t lane = group.first + i;
+    is_any_lost |= lane < group.end && voices[lane].lost;
+    const bool is_plain = lane < group.end && is_heard(lane) && voices[lane].is_steady();
+    bank.gain[i] = is_plain ? gain_ * voices[lane].decay.gain * voices[lane].volume[0] : 0.0;
+  }
+  for (std::size_t output = 0; output < count; ++output) {
+    bank.heard[output] = segment.outputs[part.program.outputs[output].channel] + segment.at;
+  }
+  const bool is_mixed =
+      bank.mixer.mix(heard, loudest_, bank.gain.data(), bank.heard.data(), bank.peak.data());
   for (std::size_t lane = group.first; lane < group.end; ++lane) {
-    Voice& voice = voices[lane];
-    if (!voice.awake || watch.is_still(lane, group.part)) {
+    if (!is_heard(lane)) {
       continue;
     }
+    Voice& voice = voices[lane];
     const auto peak = static_cast<double>(bank.peak[lane - group.first]);
     const auto sample = [&](std::size_t n, std::size_t output) {
-      return static_cast<double>(
-          bank.outputs[(n * count + output) * part.width + lane - group.first]);
+      return static_cast<double>(bank.outputs[(n * count + output) * width + lane - group.first]);
     };
     if (!(peak < loudest_)) {
       const std::size_t sane = sane_frames(segment.frames, count, sample);
@@ -37,30 +53,36 @@ void Mixing::add(Bank<T>& bank, const VoiceGroup& group, const Segment& segment,
                  sane > 0 ? bank.outputs.data() + (sane - 1) * part.row() : part.last_of(lane),
                  lane, group.part, voices);
       add_held(part.program, voice, segment, sane, watch.held(lane, group.part));
+      bank.gain[lane - group.first] = 0.0;
+      is_any_lost = true;
       continue;
     }
     voice.peak = std::max(voice.peak, peak);
     if (!voice.is_steady()) {
       add_one(part.program, voice, segment, 0, segment.frames, sample);
-    } else {
-      bank.gain[lane - group.first] = gain_ * voice.decay.gain * voice.volume[0];
     }
   }
-  std::copy_n(bank.outputs.data() + (segment.frames - 1) * part.row(), part.row(),
-              part.last_of(group.first));
-  // What has left its bounds is no last sample: the next voice in that lane might stand still on
-  // it.
-  for (std::size_t lane = group.first; lane < group.end; ++lane) {
-    for (std::size_t output = 0; voices[lane].lost && output < count; ++output) {
-      part.last_of(lane)[output * part.width + lane % part.width] =
-          static_cast<T>(watch.held(lane, group.part)[output]);
-    }
+  if (!is_mixed) {
+    bank.mixer.add_voices(heard, bank.gain.data(), bank.heard.data());
   }
-  for (std::size_t output = 0; output < count; ++output) {
-    bank.heard[output] = segment.outputs[part.program.outputs[output].channel] + segment.at;
-  }
-  bank.mixer.add_voices(heard, bank.gain.data(), bank.heard.data());
+  keep_last(bank, group, segment.frames, is_any_lost, voices, watch);
   clear_wide_registers();
+}
+
+// What has left its bounds is no last sample: the next voice in that lane might stand still on it.
+template <class T>
+void Mixing::keep_last(Bank<T>& bank, const VoiceGroup& group, std::size_t frames, bool is_any_lost,
+                       const Voices& voices, const EnergyWatch& watch) {
+  PartBank<T>& part = bank.parts[group.part];
+  for (std::size_t output = 0; output < part.program.outputs.size(); ++output) {
+    const T* const from = bank.outputs.data() + (frames - 1) * part.row() + output * part.width;
+    T* const to = part.last_of(group.first) + output * part.width;
+    for (std::size_t lane = 0; lane < group.end - group.first; ++lane) {
+      to[lane] = is_any_lost && voices[group.first + lane].lost
+                     ? static_cast<T>(watch.held(group.first + lane, group.part)[output])
+                     : from[lane];
+    }
+  }
 }
 
 // How many frames there are before one that is beyond what any output reaches.

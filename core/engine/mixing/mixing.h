@@ -35,6 +35,9 @@ class Mixing {
   template <class Sample>
   void add_one(const Program& program, const Voice& voice, const Segment& segment, std::size_t from,
                std::size_t to, Sample&& sample) const;
+  template <class T>
+  static void keep_last(Bank<T>& bank, const VoiceGroup& group, std::size_t frames,
+                        bool is_any_lost, const Voices& voices, const EnergyWatch& watch);
   void add_held(const Program& program, const Voice& voice, const Segment& segment,
                 std::size_t from, const double* held) const;
 

@@ -1,18 +1,10 @@
 // The loops of the batch kernel, compiled for each instruction set.
 #include <type_traits>
 
-#include "core/kernels/batch/batch.h"
-#include "core/laws/laws.h"
+#include "core/kernels/batch/batch_packs.h"
 
 namespace ressort::RESSORT_ISA {
 namespace {
-
-template <class V>
-struct Node {
-  V x;
-  V v;
-  V force;
-};
 
 // Calls `use` with 0..N-1 as constants: what they are indices of stays in registers.
 template <std::uint32_t N, std::uint32_t I = 0, class Use>
@@ -20,150 +12,6 @@ template <std::uint32_t N, std::uint32_t I = 0, class Use>
   if constexpr (I < N) {
     use(std::integral_constant<std::uint32_t, I>{});
     each<N, I + 1>(use);
-  }
-}
-
-// A law that a kernel may keep as numbers that follow from its arguments.
-template <class ForceLaw, class V>
-concept Kept = requires(const ForceLaw& law, V* row) {
-  law.keep(row);
-};
-
-// The law of a link's slots.
-template <class V, class Type>
-[[gnu::always_inline]] inline auto law_in(const V* slot) {
-  using ForceLaw = typename Type::template With<V>;
-  if constexpr (Kept<ForceLaw, V>) {
-    return ForceLaw(slot);
-  } else {
-    return law_of<Type, V>([&](std::size_t i) { return slot[i]; });
-  }
-}
-
-// All packs, for what is done to each of them in turn.
-template <class V>
-struct Packs {
-  Packs(const BatchTable& table, void* memory)
-      : count(table.packs),
-        stride(table.cells),
-        cells(static_cast<V*>(memory)),
-        slots(cells + batch_node_cells * table.nodes) {}
-
-  Node<V>* nodes(std::size_t pack) const {
-    return reinterpret_cast<Node<V>*>(cells + pack * stride);
-  }
-
-  std::size_t count;
-  std::size_t stride;
-  V* cells;
-  V* slots;
-};
-
-// Where a block is in the rows of all voices.
-template <class V>
-struct Rows {
-  Rows(const Program& program, const BatchTable& table, const auto& block)
-      : value(reinterpret_cast<const V*>(block.value)),
-        velocity(reinterpret_cast<const V*>(block.velocity)),
-        outputs(reinterpret_cast<V*>(block.outputs)),
-        in(program.inputs.size() * table.packs),
-        out(program.outputs.size() * table.packs) {}
-
-  void advance() {
-    value += in;
-    velocity += in;
-    outputs += out;
-  }
-
-  const V* value;
-  const V* velocity;
-  V* outputs;
-  std::size_t in;
-  std::size_t out;
-};
-
-// Returns whether any coefficient moved.
-template <class T>
-bool move_coefficients(const Program& program, Ramps<T>& ramps, const T*& audio) {
-  const bool moves = ramps.frames > 0 || !program.audio_coefficients.empty();
-  advance(ramps);
-  for (const std::uint32_t c : program.audio_coefficients) {
-    for (std::size_t lane = 0; lane < ramps.width; ++lane) {
-      ramps.value[c * ramps.width + lane] = *audio++;
-    }
-  }
-  return moves;
-}
-
-// Copies what the coefficients are now, and what of the laws follows from them alone.
-template <class V>
-void fill_slots(const BatchTable& table, const V* coefficients, const Packs<V>& packs) {
-  for (const BatchTable::Copy copy : table.copies) {
-    const V* const from = coefficients + copy.coefficient * packs.count;
-    V* to = packs.slots + copy.slot;
-    for (std::size_t pack = 0; pack < packs.count; ++pack, to += packs.stride) {
-      *to = from[pack];
-    }
-  }
-  V* slots = packs.slots + table.first_link;
-  for (const Law law : table.laws) {
-    V* slot = slots;
-    for (std::size_t pack = 0; pack < packs.count; ++pack, slot += packs.stride) {
-      with_law_type(law, [&]<class Type>(Type) {
-        if constexpr (Kept<typename Type::template With<V>, V>) {
-          law_of<Type, V>([&](std::size_t i) { return slot[i]; }).keep(slot);
-        }
-      });
-    }
-    slots += batch_link_slots;
-  }
-}
-
-template <class V>
-void take_positions(const Program& program, const Packs<V>& packs, const Rows<V>& rows) {
-  const V* value = rows.value;
-  const V* velocity = rows.velocity;
-  for (const InputSlot& input : program.inputs) {
-    for (std::size_t pack = 0; pack < packs.count && !input.is_force; ++pack) {
-      Node<V>& node = packs.nodes(pack)[input.node];
-      node.x = value[pack];
-      node.v = velocity[pack];
-    }
-    value += packs.count;
-    velocity += packs.count;
-  }
-}
-
-template <class V>
-void take_force(std::uint32_t node, const Packs<V>& packs, const V* value) {
-  for (std::size_t pack = 0; pack < packs.count; ++pack) {
-    packs.nodes(pack)[node].force += value[pack];
-  }
-}
-
-template <class V>
-void give_positions(const Program& program, const Packs<V>& packs, V* outputs) {
-  for (const OutputSlot& output : program.outputs) {
-    for (std::size_t pack = 0; pack < packs.count; ++pack) {
-      outputs[pack] = packs.nodes(pack)[output.node].x;
-    }
-    outputs += packs.count;
-  }
-}
-
-// Adds what a link exerts to the masses' forces.
-template <class V, class Type>
-[[gnu::always_inline]] inline void link(const Packs<V>& packs, const V* slot, std::uint32_t a,
-                                        std::uint32_t b, std::uint32_t masses) {
-  for (std::size_t pack = 0; pack < packs.count; ++pack, slot += packs.stride) {
-    Node<V>* const nodes = packs.nodes(pack);
-    const V force = law_in<V, Type>(slot).force(nodes[a].x - nodes[b].x, nodes[a].v - nodes[b].v);
-    if (a < masses) {
-      nodes[a].force -= force;
-    }
-    if (b < masses) {
-      nodes[b].force += force;
-    }
   }
 }
 
@@ -225,7 +73,7 @@ class PassiveLinks {
   Passive<V> body(std::size_t pack) const {
     return {.nodes = packs_.nodes(pack),
             .coefficients = reinterpret_cast<const V*>(state_.ramps.value) + pack,
-            .packs = packs_.count,
+            .packs = packs_.all,
             .inverse_mass = state_.inverse_mass,
             .masses = program_.moving,
             .is_awake = reinterpret_cast<const V*>(state_.awake)[pack]};
@@ -267,7 +115,7 @@ class Holder {
       : program_(program), batch_(batch), table_(table), packs_(packs) {
     each<N>([&](auto i) {
       anchor_[i] = batch.anchors[i].node;
-      pusher_[i] = table.pusher[i] * packs.count;
+      pusher_[i] = table.pusher[i] * packs.all;
     });
   }
 
@@ -283,6 +131,52 @@ class Holder {
     exert_links();
     push_again(value);
     pass<Half::exert_and_move>(value);
+  }
+
+  // All of `frames` of so many packs, which stay in registers: of masses that nothing but springs
+  // and one force input each touches.
+  template <std::uint32_t P>
+  [[gnu::always_inline]] void stay(Rows<V> rows, std::size_t frames) const {
+    V x[P][N];
+    V v[P][N];
+    V f[P][N];
+    each<P>([&](auto p) {
+      each<N>([&](auto i) {
+        x[p][i] = packs_.nodes(p)[i].x;
+        v[p][i] = packs_.nodes(p)[i].v;
+        f[p][i] = packs_.nodes(p)[i].force;
+      });
+    });
+    const std::uint32_t anchored = table_.anchored;
+    const std::uint32_t linked = table_.linked;
+    const std::uint32_t pushed = table_.pushed;
+    for (std::size_t frame = 0; frame < frames; ++frame) {
+      each<P>([&](auto p) {
+        const V* const slot = packs_.slots + p * packs_.stride;
+        each<N>([&](auto i) {
+          if ((pushed & 1u << i) != 0) {
+            f[p][i] += rows.value[pusher_[i] + p];
+          }
+          v[p][i] += f[p][i] * slot[is_alike ? 0 : i()];
+          x[p][i] += v[p][i];
+          packs_.nodes(p)[i].x = x[p][i];
+          f[p][i] = V{};
+        });
+      });
+      take_positions(program_, packs_, rows);
+      give_positions(program_, packs_, rows.outputs);
+      rows.advance();
+      each<P>([&](auto p) {
+        exert_springs(packs_.nodes(p), packs_.slots + p * packs_.stride, anchored, linked, x[p],
+                      v[p], f[p]);
+      });
+    }
+    each<P>([&](auto p) {
+      each<N>([&](auto i) {
+        packs_.nodes(p)[i].v = v[p][i];
+        packs_.nodes(p)[i].force = f[p][i];
+      });
+    });
   }
 
  private:
@@ -380,7 +274,7 @@ class Holder {
          ++i) {
       const InputSlot& input = program_.inputs[i];
       if (input.is_force && input.node < N && table_.pusher[input.node] != i) {
-        take_force(input.node, packs_, value + i * packs_.count);
+        take_force(input.node, packs_, value + i * packs_.all);
       }
     }
   }
@@ -393,10 +287,29 @@ class Holder {
   std::size_t pusher_[N];
 };
 
+// Two packs hide each other's latency, and what they need fits into 32 registers.
+template <class V, std::uint32_t N, bool is_alike>
+void hold_in_registers(const Program& program, const Batch& batch, const BatchTable& table,
+                       const Packs<V>& packs, const Rows<V>& rows, std::size_t frames) {
+  const auto stay = [&]<std::uint32_t P>(std::size_t first) {
+    const Packs<V> some = packs.some(first, P);
+    Holder<V, N, is_alike>(program, batch, table, some).template stay<P>(rows.from(first), frames);
+  };
+  std::size_t first = 0;
+  for (; first + 4 <= packs.count || first + 2 == packs.count; first += 2) {
+    stay.template operator()<2>(first);
+  }
+  if (first + 3 == packs.count) {
+    stay.template operator()<3>(first);
+  } else if (first + 1 == packs.count) {
+    stay.template operator()<1>(first);
+  }
+}
+
 template <class V, std::uint32_t N, bool is_alike>
 void hold(const Program& program, const Batch& batch, const BatchTable& table,
           BatchState<Scalar<V>>& state, const Block<Scalar<V>>& block) {
-  const Packs<V> packs(table, state.cells);
+  const Packs<V> packs(table, state.cells, block.lanes);
   const Holder<V, N, is_alike> holder(program, batch, table, packs);
   const PassiveLinks passive(program, packs, state);
   Rows<V> rows(program, table, block);
@@ -405,6 +318,11 @@ void hold(const Program& program, const Batch& batch, const BatchTable& table,
     const bool moves = move_coefficients(program, state.ramps, audio);
     fill_slots(table, reinterpret_cast<const V*>(state.ramps.value), packs);
     const std::size_t end = moves ? frame + 1 : block.frames;
+    if constexpr (sizeof(V) == 64) {
+      if (!moves && table.touched == 0 && !table.is_pulled && state.passive.links.empty()) {
+        return hold_in_registers<V, N, is_alike>(program, batch, table, packs, rows, end - frame);
+      }
+    }
     passive.remember();
     holder.move(rows.value);
     for (;;) {
@@ -463,7 +381,7 @@ void step_links(const Program& program, const BatchTable& table, const Packs<V>&
 template <class V>
 void step_in_memory(const Program& program, const Batch&, const BatchTable& table,
                     BatchState<Scalar<V>>& state, const Block<Scalar<V>>& block) {
-  const Packs<V> packs(table, state.cells);
+  const Packs<V> packs(table, state.cells, block.lanes);
   const PassiveLinks passive(program, packs, state);
   Rows<V> rows(program, table, block);
   const auto* audio = block.audio;
@@ -473,7 +391,7 @@ void step_in_memory(const Program& program, const Batch&, const BatchTable& tabl
     }
     for (std::size_t i = 0; i < program.inputs.size(); ++i) {
       if (program.inputs[i].is_force) {
-        take_force(program.inputs[i].node, packs, rows.value + i * packs.count);
+        take_force(program.inputs[i].node, packs, rows.value + i * packs.all);
       }
     }
     passive.remember();

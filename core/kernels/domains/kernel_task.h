@@ -2,6 +2,7 @@
 #pragma once
 
 #include <functional>
+#include <limits>
 #include <memory>
 #include <span>
 
@@ -45,6 +46,7 @@ class KernelTask final : public Task {
 
   // The caller's.
   std::size_t frames = 0;
+  std::size_t lanes = std::numeric_limits<std::size_t>::max();  // of the kernel, that play
   BlockBuffers<T> buffers;
   HaloBuffers<T> halo;
 

@@ -85,8 +85,12 @@ TEMPLATE_TEST_CASE("a peak is the largest of a lane, and infinite beyond its bou
         wanted[i % width] = std::max(wanted[i % width], std::fabs(y[i]));
       }
       std::vector<T> peak(width);
+      const std::vector<double> silent(width, 0.0);
+      std::vector<double> channel(frames, 0.5);
+      const std::vector<double*> channels(outputs, channel.data());
       const auto find = [&](double bound) {
-        mixer.find_peaks({y.data(), frames, outputs, width}, bound, peak.data());
+        CHECK(mixer.mix({y.data(), frames, outputs, width, width}, bound, silent.data(),
+                        channels.data(), peak.data()));
         return peak;
       };
       CHECK(find(2.0) == wanted);
@@ -124,7 +128,7 @@ TEMPLATE_TEST_CASE("channels have the sum of all lanes, each with its gain", "[m
       for (std::vector<double>& channel : channels) {
         pointers.push_back(channel.data());
       }
-      mixer.add_voices({y.data(), frames, outputs, width}, gain.data(), pointers.data());
+      mixer.add_voices({y.data(), frames, outputs, width, width}, gain.data(), pointers.data());
       // So many sums of numbers below 1, each rounded by half of 2^-52 of at most the width.
       const double most = static_cast<double>(width * width + 2) * 0x1p-53;
       std::size_t off = 0;
@@ -139,6 +143,46 @@ TEMPLATE_TEST_CASE("channels have the sum of all lanes, each with its gain", "[m
         }
       }
       CHECK(off == 0);
+    });
+  });
+}
+
+TEMPLATE_TEST_CASE("nothing is mixed where a voice that is heard is beyond its bound", "[mixer]",
+                   double, float) {
+  using T = TestType;
+  constexpr std::size_t least = 16 / sizeof(T);
+  Random random(19);
+  each_mixer<T>([&](const Mixer<T>& mixer) {
+    each_shape<T>([&](std::size_t frames, std::size_t outputs, std::size_t width) {
+      // Lanes behind those that are used may hold anything.
+      const std::size_t used = width > least ? width - least : width;
+      std::vector<T> y = random_rows<T>(random, frames * outputs * width);
+      for (std::size_t i = 0; i < y.size(); ++i) {
+        y[i] = i % width < used ? y[i] : static_cast<T>(no_number);
+      }
+      std::vector<double> gain(width, 0.5);
+      std::vector<T> peak(width);
+      const auto played = [&](auto&& play) {
+        std::vector<std::vector<double>> channels(outputs, std::vector<double>(frames, 0.25));
+        std::vector<double*> pointers;
+        for (std::vector<double>& channel : channels) {
+          pointers.push_back(channel.data());
+        }
+        play(Heard<T>{y.data(), frames, outputs, width, used}, pointers.data());
+        return channels;
+      };
+      const auto added = played([&](const Heard<T>& heard, double* const* channels) {
+        mixer.add_voices(heard, gain.data(), channels);
+      });
+      CHECK(played([&](const Heard<T>& heard, double* const* channels) {
+              CHECK(mixer.mix(heard, 2.0, gain.data(), channels, peak.data()));
+            }) == added);
+      y[(frames * outputs - 1) * width + used - 1] = T(3);
+      const std::vector<std::vector<double>> untouched(outputs, std::vector<double>(frames, 0.25));
+      CHECK(played([&](const Heard<T>& heard, double* const* channels) {
+              CHECK_FALSE(mixer.mix(heard, 2.0, gain.data(), channels, peak.data()));
+            }) == untouched);
+      CHECK(peak[used - 1] == static_cast<T>(infinity));
     });
   });
 }

@@ -1,4 +1,6 @@
 // What is held in registers, and that every voice moves as it does alone.
+#include <limits>
+
 #include "core/kernels/batch/batch_form.h"
 #include "core/laws/laws.h"
 #include "tests/support/passive.h"
@@ -42,6 +44,9 @@ class Choir {
   Kernel<T>& of(std::size_t voice) { return *kernels_[voice / width_]; }
   std::size_t lane(std::size_t voice) const { return voice % width_; }
 
+  // From now on nobody plays in the lanes of later voices.
+  void play_only(std::size_t voices) { playing_ = voices; }
+
   void turn(std::size_t voice, const std::vector<double>& parameters, bool ramped) {
     const double pitch = 1.0 / (1.0 + 0.07 * static_cast<double>(voice));
     auto& coefficients = of(voice).coefficients;
@@ -71,7 +76,8 @@ class Choir {
                       .value = value_.data(),
                       .velocity = velocity_.data(),
                       .audio = nullptr,
-                      .outputs = outputs_.data()});
+                      .outputs = outputs_.data(),
+                      .lanes = playing_ - std::min(playing_, first)});
       const std::size_t count = program_.outputs.size();
       for (std::size_t k = 0; k < std::min(width_, voices_ - first); ++k) {
         for (std::size_t n = 0; n < frames * count; ++n) {
@@ -99,6 +105,7 @@ class Choir {
 
   Program program_;
   std::size_t voices_;
+  std::size_t playing_ = std::numeric_limits<std::size_t>::max();
   std::size_t width_ = 1;
   std::vector<std::unique_ptr<Kernel<T>>> kernels_;
   Aligned<T> value_;
@@ -323,6 +330,37 @@ TEST_CASE("a lane is put back, and the others play on", "[batch]") {
   const auto expected = other.play(64, 64, push);
   for (std::size_t i = 0; i < heard.size(); ++i) {
     CHECK(heard[i] == (i / 64 == 5 ? 0.0 : expected[i]));
+  }
+}
+
+TEST_CASE("voices are the same whether others play behind them or not", "[batch]") {
+  for (const char* const name : {"PolyTriangle", "IPlayTheTriangle", "PhysicalLFO"}) {
+    const Program program = formed(example(name));
+    for (const Isa isa : isas()) {
+      Choir<double> choir(program, 68, isa);
+      Choir<double> other(program, 68, isa);
+      const auto push = [](std::size_t n, std::size_t k, std::size_t) {
+        return n % 50 < k ? 0.01 : 0.0;
+      };
+      std::size_t at = 0;
+      for (const std::size_t playing : {68u, 64u, 3u, 17u, 68u}) {
+        CAPTURE(name, isa_name(isa), playing);
+        choir.play_only(playing);
+        for (std::size_t voice = playing; voice < 68; ++voice) {
+          choir.of(voice).reset(choir.lane(voice));
+          other.of(voice).reset(other.lane(voice));
+        }
+        const auto heard = choir.play(at, 64, push);
+        const auto expected = other.play(at, 64, push);
+        const auto played = static_cast<std::ptrdiff_t>(heard.size() / 68 * playing);
+        CHECK(std::equal(heard.begin(), heard.begin() + played, expected.begin()));
+        for (std::size_t voice = playing; voice < 68; ++voice) {
+          choir.of(voice).reset(choir.lane(voice));
+          other.of(voice).reset(other.lane(voice));
+        }
+        at += 64;
+      }
+    }
   }
 }
 

@@ -1,0 +1,187 @@
+// The packs of the batch kernel, and what is done to all of them in turn. A part of *_step.cpp,
+// which are compiled for each instruction set.
+#pragma once
+
+#include <algorithm>
+
+#include "core/kernels/batch/batch.h"
+#include "core/laws/laws.h"
+
+namespace ressort::RESSORT_ISA {
+namespace {
+
+template <class V>
+struct Node {
+  V x;
+  V v;
+  V force;
+};
+
+// A law that a kernel may keep as numbers that follow from its arguments.
+template <class ForceLaw, class V>
+concept Kept = requires(const ForceLaw& law, V* row) {
+  law.keep(row);
+};
+
+// The law of a link's slots.
+template <class V, class Type>
+[[gnu::always_inline]] inline auto law_in(const V* slot) {
+  using ForceLaw = typename Type::template With<V>;
+  if constexpr (Kept<ForceLaw, V>) {
+    return ForceLaw(slot);
+  } else {
+    return law_of<Type, V>([&](std::size_t i) { return slot[i]; });
+  }
+}
+
+template <class V>
+constexpr std::size_t lanes_of = sizeof(V) / sizeof(Scalar<V>);
+
+// The packs, for what is done to each of them in turn.
+template <class V>
+struct Packs {
+  // Of `all` in each row, those in which so many lanes play.
+  Packs(const BatchTable& table, void* memory, std::size_t lanes)
+      : all(table.packs),
+        count(std::min(all, lanes / lanes_of<V> + (lanes % lanes_of<V> != 0 ? 1 : 0))),
+        stride(table.cells),
+        cells(static_cast<V*>(memory)),
+        slots(cells + batch_node_cells * table.nodes) {}
+
+  Node<V>* nodes(std::size_t pack) const {
+    return reinterpret_cast<Node<V>*>(cells + pack * stride);
+  }
+
+  // So many of them from one on.
+  Packs some(std::size_t first, std::size_t so_many) const {
+    Packs packs = *this;
+    packs.count = so_many;
+    packs.cells += first * stride;
+    packs.slots += first * stride;
+    return packs;
+  }
+
+  std::size_t all;
+  std::size_t count;
+  std::size_t stride;
+  V* cells;
+  V* slots;
+};
+
+// Where a block is in the rows of all voices.
+template <class V>
+struct Rows {
+  Rows(const Program& program, const BatchTable& table, const auto& block)
+      : value(reinterpret_cast<const V*>(block.value)),
+        velocity(reinterpret_cast<const V*>(block.velocity)),
+        outputs(reinterpret_cast<V*>(block.outputs)),
+        in(program.inputs.size() * table.packs),
+        out(program.outputs.size() * table.packs) {}
+
+  Rows from(std::size_t pack) const {
+    Rows rows = *this;
+    rows.value += pack;
+    rows.velocity += pack;
+    rows.outputs += pack;
+    return rows;
+  }
+  void advance() {
+    value += in;
+    velocity += in;
+    outputs += out;
+  }
+
+  const V* value;
+  const V* velocity;
+  V* outputs;
+  std::size_t in;
+  std::size_t out;
+};
+
+// Returns whether any coefficient moved.
+template <class T>
+bool move_coefficients(const Program& program, Ramps<T>& ramps, const T*& audio) {
+  const bool moves = ramps.frames > 0 || !program.audio_coefficients.empty();
+  advance(ramps);
+  for (const std::uint32_t c : program.audio_coefficients) {
+    for (std::size_t lane = 0; lane < ramps.width; ++lane) {
+      ramps.value[c * ramps.width + lane] = *audio++;
+    }
+  }
+  return moves;
+}
+
+// Copies what the coefficients are now, and what of the laws follows from them alone.
+template <class V>
+void fill_slots(const BatchTable& table, const V* coefficients, const Packs<V>& packs) {
+  for (const BatchTable::Copy copy : table.copies) {
+    const V* const from = coefficients + copy.coefficient * packs.all;
+    V* to = packs.slots + copy.slot;
+    for (std::size_t pack = 0; pack < packs.count; ++pack, to += packs.stride) {
+      *to = from[pack];
+    }
+  }
+  V* slots = packs.slots + table.first_link;
+  for (const Law law : table.laws) {
+    V* slot = slots;
+    for (std::size_t pack = 0; pack < packs.count; ++pack, slot += packs.stride) {
+      with_law_type(law, [&]<class Type>(Type) {
+        if constexpr (Kept<typename Type::template With<V>, V>) {
+          law_of<Type, V>([&](std::size_t i) { return slot[i]; }).keep(slot);
+        }
+      });
+    }
+    slots += batch_link_slots;
+  }
+}
+
+template <class V>
+void take_positions(const Program& program, const Packs<V>& packs, const Rows<V>& rows) {
+  const V* value = rows.value;
+  const V* velocity = rows.velocity;
+  for (const InputSlot& input : program.inputs) {
+    for (std::size_t pack = 0; pack < packs.count && !input.is_force; ++pack) {
+      Node<V>& node = packs.nodes(pack)[input.node];
+      node.x = value[pack];
+      node.v = velocity[pack];
+    }
+    value += packs.all;
+    velocity += packs.all;
+  }
+}
+
+template <class V>
+void take_force(std::uint32_t node, const Packs<V>& packs, const V* value) {
+  for (std::size_t pack = 0; pack < packs.count; ++pack) {
+    packs.nodes(pack)[node].force += value[pack];
+  }
+}
+
+template <class V>
+void give_positions(const Program& program, const Packs<V>& packs, V* outputs) {
+  for (const OutputSlot& output : program.outputs) {
+    for (std::size_t pack = 0; pack < packs.count; ++pack) {
+      outputs[pack] = packs.nodes(pack)[output.node].x;
+    }
+    outputs += packs.all;
+  }
+}
+
+// Adds what a link exerts to the masses' forces.
+template <class V, class Type>
+[[gnu::always_inline]] inline void link(const Packs<V>& packs, const V* slot, std::uint32_t a,
+                                        std::uint32_t b, std::uint32_t masses) {
+  for (std::size_t pack = 0; pack < packs.count; ++pack, slot += packs.stride) {
+    Node<V>* const nodes = packs.nodes(pack);
+    const V force = law_in<V, Type>(slot).force(nodes[a].x - nodes[b].x, nodes[a].v - nodes[b].v);
+    if (a < masses) {
+      nodes[a].force -= force;
+    }
+    if (b < masses) {
+      nodes[b].force += force;
+    }
+  }
+}
+
+}  // namespace
+}  // namespace ressort::RESSORT_ISA
