@@ -239,7 +239,8 @@ void Gestures::follow_pitches() {
   }
 }
 
-// Drivers that rest give every frame the same row.
+// Drivers that rest give every frame the same row; those of voices that sleep, too, so that their
+// hands do not come to lie on anything.
 template <class T>
 void Gestures::fill_rest(Bank<T>& bank, const VoiceGroup& group, std::size_t frames) {
   const PartBank<T>& part = bank.parts[group.part];
@@ -247,7 +248,7 @@ void Gestures::fill_rest(Bank<T>& bank, const VoiceGroup& group, std::size_t fra
   T* row = bank.row.data();
   for (const InputSlot& slot : part.program.inputs) {
     for (std::size_t lane = group.first; lane < group.first + part.width; ++lane) {
-      *row++ = lane < group.end ? static_cast<T>(driver(lane, slot.input).value()) : T(0);
+      *row++ = lane < voices_.size() ? static_cast<T>(driver(lane, slot.input).value()) : T(0);
     }
   }
   if (bank.still < frames * step) {
