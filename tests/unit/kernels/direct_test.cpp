@@ -3,6 +3,7 @@
 
 #include "core/laws/laws.h"
 #include "tests/support/harness.h"
+#include "tests/support/passive.h"
 #include "tests/support/reference_network.h"
 
 namespace ressort {
@@ -343,6 +344,58 @@ double impulse(std::size_t n) {
 }
 
 }  // namespace
+
+// Whatever multiply-adds the other kernels' loops are made of.
+TEMPLATE_TEST_CASE("passive links have the same bits with every instruction set", "[direct]",
+                   double, float) {
+  for (const char* link : {"contact @in1 @m 0.9 0.01", "nlContact @in1 @m 0.1 20. 3. 0.01 0.005",
+                           "nlSpring3 @in1 @m 0.01 5. 0.", "nlPluck @in1 @m 0.4 0.01",
+                           "nlBow @in1 @m 0.3 0.01", "nlSpring @in1 @m 0.01 2. 0.001"}) {
+    CAPTURE(link);
+    const Program program = support::program_of(
+        "@g ground 0.\n@m mass 1.1 0. 0.\n@s springDamper @g @m 0.03 0.001\n@in1 posInput 0.\n@l " +
+            std::string(link) + "\n@out1 posOutput @m\n",
+        Passivity::always);
+    // In 16 voices, so that packs are as wide as they may be.
+    const auto played = [&](Isa isa) {
+      const auto kernel = make_kernel<TestType>(program, 16, isa);
+      const std::size_t width = kernel->width();
+      for (std::uint32_t c = 0; c < program.coefficients.size(); ++c) {
+        for (std::size_t lane = 0; lane < width; ++lane) {
+          kernel->coefficients.set(
+              lane, c, coefficient_value(program, program.coefficients[c], program.parameters, 1.0),
+              false);
+        }
+      }
+      Aligned<TestType> value(max_block_frames * width);
+      Aligned<TestType> velocity(value.size());
+      Aligned<TestType> outputs(value.size());
+      for (std::size_t i = 0; i < value.size(); ++i) {
+        const double turn = 0.3 * static_cast<double>(i / width);
+        value[i] = static_cast<TestType>(0.02 * std::sin(turn));
+        velocity[i] = static_cast<TestType>(0.006 * std::cos(turn));
+      }
+      std::vector<TestType> heard;
+      for (int block = 0; block < 20; ++block) {
+        kernel->step({.frames = max_block_frames,
+                      .value = value.data(),
+                      .velocity = velocity.data(),
+                      .audio = nullptr,
+                      .outputs = outputs.data()});
+        for (std::size_t n = 0; n < max_block_frames; ++n) {
+          heard.push_back(outputs[n * width]);
+        }
+      }
+      return heard;
+    };
+    const std::vector<TestType> base = played(Isa::base);
+    CHECK(*std::max_element(base.begin(), base.end()) > 1e-3);
+    for (const Isa isa : support::isas()) {
+      CAPTURE(isa_name(isa));
+      CHECK(played(isa) == base);
+    }
+  }
+}
 
 TEST_CASE("golden values of appendix A, current laws", "[direct]") {
   check_golden(scenes::poly_triangle("0.0001"), 0, 0.5, impulse,
