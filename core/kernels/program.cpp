@@ -10,6 +10,14 @@ namespace {
 
 constexpr double reference_rate_hz = 44100.0;
 
+// Most formulas are one number or one parameter, and need no stack.
+double value_of(std::span<const Step> formula, std::span<const double> parameters) {
+  const bool is_one = formula.size() == 1;
+  return is_one && formula[0].op == Op::parameter ? parameters[formula[0].index]
+         : is_one && formula[0].op == Op::number  ? formula[0].value
+                                                  : evaluate(formula, parameters);
+}
+
 }  // namespace
 
 bool is_plain(const Program& program) {
@@ -48,7 +56,7 @@ double continuous_value(const Program& program, const Coefficient& coefficient,
                         std::span<const double> parameters, double of_key) {
   const double stiffness_factor = coefficient.is_fixed ? 1.0 : of_key;
   const double value =
-      evaluate(std::span(program.steps).subspan(coefficient.first, coefficient.count), parameters);
+      value_of(std::span(program.steps).subspan(coefficient.first, coefficient.count), parameters);
   const double scaled = value * rate_factor(coefficient.unit, program.rate_ratio);
   switch (coefficient.unit) {
     case Unit::stiffness:
