@@ -10,6 +10,7 @@ namespace {
 constexpr std::size_t least_block = 6;  // frames; fewer are stepped
 constexpr std::size_t least_held = 8;   // frames on one piece that are worth strides
 constexpr std::size_t most_tries = 2;   // of strides that were not, in a block
+constexpr std::size_t least_alone = 4;  // blocks without strides after that
 
 std::size_t round_up(std::size_t count, std::size_t to) {
   return (count + to - 1) / to * to;
@@ -407,11 +408,15 @@ void DenseKernel<T>::make_pace() {
 
 template <class T>
 void DenseKernel<T>::play(const DenseDrive<T>& drive, std::size_t at, std::size_t end) {
-  std::size_t tries = has_strides() ? most_tries : 0;
+  // What leaves its pieces all the time is left alone for some blocks.
+  const bool is_left_alone = blocks_alone_ > 0;
+  blocks_alone_ -= is_left_alone ? 1 : 0;
+  std::size_t tries = has_strides() && !is_left_alone ? most_tries : 0;
   while (at < end) {
     if (tries > 0 && body_.touches && is_current_ && !body_.has_force) {
       const std::size_t stepped = stride(drive, at, end - at);
       tries -= stepped < least_held ? 1 : 0;
+      blocks_alone_ = tries > 0 ? 0 : least_alone;
       at += stepped;
       const std::size_t rest = tries > 0 ? std::min(end - at, least_held) : end - at;
       if (body_.touches && rest > 0) {

@@ -275,6 +275,7 @@ class DenseKernel final : public Kernel<T> {
   Aligned<T> arranged_;                    // [input][value, velocity][max_block_frames]
   std::array<DenseStride<T>, 2> strides_;  // those of the last pieces
   std::size_t next_stride_ = 0;            // to be made anew
+  std::size_t blocks_alone_ = 0;           // until strides are tried again
   bool can_step_blocks_ = true;            // no port's law acts everywhere
   bool has_tables_ = false;
   bool is_current_ = false;  // the next sample's forces are by the coefficients of now
