@@ -129,7 +129,6 @@ TEST_CASE("a preset says how its keys are tuned and played", "[preset]") {
   for (const char* const wrong : {"a4_hz = 100",
                                   "keys_db = 41",
                                   "keys_db = [[36, 7], [96, -41]]",
-                                  "tuning = \"fixed\"\nkeys_db = 3",
                                   "decay_s = 0",
                                   "decay_s = [[36, 12], [96, 601]]",
                                   "scale = \"a.kbm\"",
@@ -228,6 +227,9 @@ TEST_CASE("every fault of a preset is told with its line and column", "[preset]"
       {m + "gain = inf", 2, 8, "'gain' must be a number"},
       {m + "damper_s = 61", 2, 12, "'damper_s' must lie between 0 and 60"},
       {m + "decay_s = 601", 2, 11, "'decay_s' must lie between 0.001 and 600"},
+      {m + "tuning = \"fixed\"\nkeys_db = 3", 3, 11,
+       "'keys_db' is for keys that are notes of their own, and with tuning = \"fixed\" all of them "
+       "play one"},
       {m + "decay_s = [[36, 0], [96, 1]]", 2, 12,
        "a key lies between 0 and 127, its seconds between 0.001 and 600"},
       {m + "[[control]]\nfrom = \"note\"\n" + to + "round_robin = [1.5, 2]", 5, 15,
