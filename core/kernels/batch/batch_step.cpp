@@ -108,6 +108,9 @@ class PassiveLinks {
 // the forces never leave the registers; only those of a block's last sample wait for the next.
 enum class Half { move, exert, exert_and_move };
 
+// Of a row a few packs are read at a time, which the processor does not foresee.
+constexpr std::size_t rows_ahead = 12;
+
 template <class V, std::uint32_t N, bool is_alike>
 class Holder {
  public:
@@ -156,6 +159,7 @@ class Holder {
         each<N>([&](auto i) {
           if ((pushed & 1u << i) != 0) {
             f[p][i] += rows.value[pusher_[i] + p];
+            __builtin_prefetch(rows.value + rows_ahead * rows.in + pusher_[i] + p);
           }
           v[p][i] += f[p][i] * slot[is_alike ? 0 : i()];
           x[p][i] += v[p][i];
