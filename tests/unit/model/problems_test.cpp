@@ -21,23 +21,11 @@ using messages::check_told;
 using messages::check_warning;
 using support::network_of;
 
-constexpr auto delayed = ThirdArgument::delayed_position;
-constexpr auto velocity = ThirdArgument::velocity_per_second;
-
 const std::string two_masses = "@a mass 1. 0. 0.\n@b mass 1. 0. 0.\n";
 const std::string heard = "@out1 posOutput @a\n";
 
 double value(const Network& network, ArgumentId id) {
   return argument_value(network, id, parameter_values(network));
-}
-
-// Argument `slot` of the last link.
-double link_value(const Network& network, std::size_t slot) {
-  return value(network, network.links.back().arguments[slot]);
-}
-
-Network linked(const std::string& line) {
-  return network_of("@p param 0.5\n" + two_masses + "@l " + line);
 }
 
 }  // namespace
