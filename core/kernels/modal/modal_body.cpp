@@ -8,6 +8,7 @@
 #include "core/groups.h"
 #include "core/kernels/taps.h"
 #include "core/laws/laws.h"
+#include "core/linear_algebra/eigen.h"
 
 namespace ressort {
 namespace {
