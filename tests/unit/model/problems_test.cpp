@@ -24,10 +24,6 @@ using support::network_of;
 const std::string two_masses = "@a mass 1. 0. 0.\n@b mass 1. 0. 0.\n";
 const std::string heard = "@out1 posOutput @a\n";
 
-double value(const Network& network, ArgumentId id) {
-  return argument_value(network, id, parameter_values(network));
-}
-
 }  // namespace
 
 // --- R14 ---------------------------------------------------------------------------------------
