@@ -38,9 +38,11 @@ PlaceRoom<T>::PlaceRoom(const Program& program, std::size_t width)
   std::fill(placed.begin(), placed.end(), std::numeric_limits<T>::quiet_NaN());
   std::size_t rows = 0;
   for (const TapSlot& tap : program.taps) {
-    weights_at.push_back(rows);
-    rows += tap.is_on_body() ? tap.length : 0;
+    first.push_back(rows);
+    rows += tap.is_on_body() ? tap.length : tap_corners;
   }
+  nodes.resize(rows);
+  count.resize(program.taps.size());
   weights.resize(rows * width);
 }
 
@@ -103,6 +105,8 @@ void Nodes<T>::become(const Nodes& from) {
   corners = from.corners;
   places.placed = from.places.placed;
   places.weights = from.places.weights;
+  places.nodes = from.places.nodes;
+  places.count = from.places.count;
   passive.memory = from.passive.memory;
   passive.awake = from.passive.awake;
   passive.felt = from.passive.felt;

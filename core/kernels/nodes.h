@@ -35,9 +35,13 @@ template <class T>
 struct PlaceRoom {
   PlaceRoom(const Program& program, std::size_t width);
 
-  Aligned<T> placed;   // [tap][u and v][lane] where it was in the last sample; at first nowhere
-  Aligned<T> weights;  // [mode][lane] of the taps on bodies, one after the other
-  std::vector<std::size_t> weights_at;  // [tap] its first, in rows of lanes
+  Aligned<T> placed;  // [tap][u and v][lane] where it was in the last sample; at first nowhere
+  // Of each tap, from `first` on: the nodes that it stands for in all lanes, and how much of each
+  // it is, [node][lane]. A place on a macro that is between other nodes in each lane has none.
+  Aligned<T> weights;
+  std::vector<std::uint32_t> nodes;
+  std::vector<std::size_t> first;    // [tap]
+  std::vector<std::uint32_t> count;  // [tap]
 };
 
 template <class T>

@@ -33,8 +33,10 @@ struct DirectState {
         row(nodes.layout.row),
         corners(nodes.corners.data()),
         placed(nodes.places.placed.data()),
-        weights(nodes.places.weights.data()),
-        weights_at(nodes.places.weights_at.data()),
+        place_weights(nodes.places.weights.data()),
+        place_nodes(nodes.places.nodes.data()),
+        first_of_place(nodes.places.first.data()),
+        count_of_place(nodes.places.count.data()),
         nodes(nodes.layout.node.size()),
         passive(nodes.passive.tables),
         inverse_mass(nodes.passive.inverse_mass.data()),
@@ -52,8 +54,10 @@ struct DirectState {
   std::size_t row;
   Corners<T>* corners;  // [tap][lane] in this sample
   T* placed;            // PlaceRoom
-  T* weights;
-  const std::size_t* weights_at;
+  T* place_weights;
+  std::uint32_t* place_nodes;
+  const std::size_t* first_of_place;
+  std::uint32_t* count_of_place;
   std::size_t nodes;
   const PassiveTables& passive;
   const std::uint32_t* inverse_mass;  // [moving node] coefficient, if there are passive links

@@ -3,6 +3,7 @@
 // the same ones in all lanes, so that packs go through them. A part of *_step.cpp.
 #pragma once
 
+#include <algorithm>
 #include <utility>
 
 #include "core/kernels/direct/direct.h"
@@ -15,27 +16,38 @@ bool is_place(const Program& program, std::uint32_t node) {
   return !program.taps.empty() && node >= program.taps[0].node;
 }
 
-// How much each mode moves a place on a body, [mode].
+// The nodes that a place stands for in all lanes, and how much of each it is; none where these are
+// others in each lane.
+template <class V>
+struct Behind {
+  std::uint32_t* node;
+  V* weight;
+  std::uint32_t count;
+};
+
 template <class S>
-typename S::V* weights_of(const S& s, std::size_t tap) {
-  return reinterpret_cast<typename S::V*>(s.state.weights) + s.state.weights_at[tap];
+Behind<typename S::V> behind(const S& s, std::size_t tap) {
+  using V = typename S::V;
+  const std::size_t first = s.state.first_of_place[tap];
+  return {s.state.place_nodes + first, reinterpret_cast<V*>(s.state.place_weights) + first,
+          s.state.count_of_place[tap]};
 }
 
-// The sum of what `term(mode)` is, in four sums side by side: on any machine and in any lane in the
-// same order.
+// The sum of what `term(i)` is: of many in four sums side by side, on any machine and in any lane
+// in the same order.
 template <class V, class Term>
-[[gnu::always_inline]] inline V sum_of(std::uint32_t modes, Term&& term) {
+[[gnu::always_inline]] inline V sum_of(std::uint32_t count, Term&& term) {
   V sums[4] = {};
-  std::uint32_t mode = 0;
-  for (; mode + 4 <= modes; mode += 4) {
+  std::uint32_t i = 0;
+  for (; i + 4 <= count && count > tap_corners; i += 4) {
     for (std::uint32_t k = 0; k < 4; ++k) {
-      sums[k] += term(mode + k);
+      sums[k] += term(i + k);
     }
   }
-  for (; mode < modes; ++mode) {
-    sums[0] += term(mode);
+  for (; i < count; ++i) {
+    sums[0] += term(i);
   }
-  return (sums[0] + sums[1]) + (sums[2] + sums[3]);
+  return count > tap_corners ? (sums[0] + sums[1]) + (sums[2] + sums[3]) : sums[0];
 }
 
 // Calls use(node, weight) for the up to four nodes around a place on a macro in one lane.
@@ -50,11 +62,8 @@ template <class S>
 typename S::V seen_at(const Program& program, const S& s, std::size_t tap,
                       const typename S::V* row) {
   using V = typename S::V;
-  const TapSlot& slot = program.taps[tap];
-  if (slot.is_on_body()) {
-    const V* const weight = weights_of(s, tap);
-    const std::uint32_t* const node = program.tap_nodes.data() + slot.first;
-    return sum_of<V>(slot.length, [=](std::uint32_t i) { return weight[i] * row[node[i]]; });
+  if (const auto all = behind(s, tap); all.count > 0) {
+    return sum_of<V>(all.count, [&](std::uint32_t i) { return all.weight[i] * row[all.node[i]]; });
   }
   V seen{};
   for (std::size_t lane = 0; lane < S::lanes; ++lane) {
@@ -64,25 +73,29 @@ typename S::V seen_at(const Program& program, const S& s, std::size_t tap,
   return seen;
 }
 
+template <class V>
+V only_in(std::size_t lane, Scalar<V> value) {
+  V number;
+  for (std::size_t i = 0; i < sizeof(V) / sizeof(Scalar<V>); ++i) {
+    number[i] = static_cast<Scalar<V>>(i);
+  }
+  return select(number == V{} + static_cast<Scalar<V>>(lane), V{} + value, V{});
+}
+
 // Calls use(node, share of the amount) for what gets a part of what is done to a place.
 template <class S, class Use>
 [[gnu::always_inline]] inline void share_out(const Program& program, const S& s, std::size_t tap,
                                              typename S::V amount, Use&& use) {
   using V = typename S::V;
-  const TapSlot& slot = program.taps[tap];
-  if (slot.is_on_body()) {
-    const V* const weight = weights_of(s, tap);
-    const std::uint32_t* const node = program.tap_nodes.data() + slot.first;
-    for (std::uint32_t i = 0; i < slot.length; ++i) {
-      use(node[i], weight[i] * amount);
+  if (const auto all = behind(s, tap); all.count > 0) {
+    for (std::uint32_t i = 0; i < all.count; ++i) {
+      use(all.node[i], all.weight[i] * amount);
     }
     return;
   }
   for (std::size_t lane = 0; lane < S::lanes; ++lane) {
     around(program, s, tap, lane, [&](std::uint32_t node, auto weight) {
-      V part{};
-      part[lane] = weight * amount[lane];
-      use(node, part);
+      use(node, only_in<V>(lane, weight * amount[lane]));
     });
   }
 }
@@ -106,12 +119,29 @@ void place_taps(const Program& program, S& s) {
     for (std::size_t lane = 0; lane < S::lanes; ++lane) {
       corners[lane] = corners_at(tap, c[tap.u * S::lanes + lane], c[tap.v * S::lanes + lane]);
     }
-    for (std::uint32_t mode = 0; tap.is_on_body() && mode < tap.length; ++mode) {
-      V& weight = weights_of(s, i)[mode];
-      for (std::size_t lane = 0; lane < S::lanes; ++lane) {
-        weight[lane] = weight_of_mode(program, tap, corners[lane], mode);
+    auto all = behind(s, i);
+    all.count = 0;
+    if (tap.is_on_body()) {
+      for (; all.count < tap.length; ++all.count) {
+        all.node[all.count] = program.tap_nodes[tap.first + all.count];
+        for (std::size_t lane = 0; lane < S::lanes; ++lane) {
+          all.weight[all.count][lane] = weight_of_mode(program, tap, corners[lane], all.count);
+        }
+      }
+    } else if (std::all_of(corners, corners + S::lanes,
+                           [&](const auto& lane) { return lane.node[0] == corners[0].node[0]; })) {
+      for (std::size_t corner = 0; corner < tap_corners; ++corner) {
+        V weight{};
+        for (std::size_t lane = 0; lane < S::lanes; ++lane) {
+          weight[lane] = corners[lane].weight[corner];
+        }
+        if (any_of(weight > V{})) {
+          all.node[all.count] = program.tap_nodes[corners[0].node[corner]];
+          all.weight[all.count++] = weight;
+        }
       }
     }
+    s.state.count_of_place[i] = all.count;
   }
 }
 
@@ -177,11 +207,11 @@ typename S::V shared(const Program& program, const S& s, std::uint32_t from, std
     return V{};  // on two macros
   }
   if (slot.is_on_body()) {
-    const V* const near = weights_of(s, one);
-    const V* const far = weights_of(s, other);
-    const std::uint32_t* const node = program.tap_nodes.data() + slot.first;
-    return sum_of<V>(slot.length,
-                     [&](std::uint32_t i) { return near[i] * far[i] * part(node[i]); });
+    const auto near = behind(s, one);
+    const auto far = behind(s, other);
+    return sum_of<V>(near.count, [&](std::uint32_t i) {
+      return near.weight[i] * far.weight[i] * part(near.node[i]);
+    });
   }
   V sum{};
   for (std::size_t lane = 0; lane < S::lanes; ++lane) {

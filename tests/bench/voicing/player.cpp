@@ -1,8 +1,8 @@
 #include "tests/bench/voicing/player.h"
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
+#include <ctime>
 #include <stdexcept>
 
 #include "app/realtime/denormals.h"
@@ -133,10 +133,10 @@ double Player::real_time_share(double seconds) {
     for (int voice = 0; voice < compiled_.instrument.voices; ++voice) {
       chord.push_back({0.0, note_on(48 + 2 * (voice % 18), 100)});
     }
-    const auto start = std::chrono::steady_clock::now();
+    // The processor's own time: others may want it as well.
+    const std::clock_t start = std::clock();
     run(chord, seconds, nullptr);
-    const std::chrono::duration<double> took = std::chrono::steady_clock::now() - start;
-    least = std::min(least, took.count());
+    least = std::min(least, static_cast<double>(std::clock() - start) / CLOCKS_PER_SEC);
   }
   return least / seconds;
 }
