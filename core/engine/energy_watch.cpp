@@ -230,8 +230,9 @@ bool EnergyWatch::may_rest(std::size_t p, LaneValues<T> values, const Bank<T>& b
   const RestBound& bound = *playing_.rest_bounds[p];
   const Program& program = machine_.parts[p];
   const double most = 2.0 * energy / voice.factor;
+  const double gain = playing_.gain_of_loudest_key();
   for (const double compliance : bound.compliances) {
-    if (!(playing_.gain_of_loudest_key() * std::sqrt(most * compliance) < silent_level)) {
+    if (!(gain * std::sqrt(most * compliance) < silent_level)) {
       return false;
     }
   }
