@@ -1,0 +1,40 @@
+// Whether a network is stable, by kicking it; and how far its bound says that it is.
+#pragma once
+
+#include <cmath>
+#include <string>
+
+#include "core/analysis/stability.h"
+#include "core/model/topology.h"
+#include "tests/support/harness.h"
+
+namespace ressort::support {
+
+inline constexpr double bound_limit = 3.92;  // 4, and two percent to spare
+
+inline const std::string mass_and_ground = "@m mass 2. 0. 0.\n@g ground 0.\n";
+
+inline double factor_of(const std::string& text, double rate_ratio = 1.0) {
+  const Network network = expand_macros(network_of(text));
+  const auto values = parameter_values(network);
+  return highest_stiffness_factor(network, {values, values}, rate_ratio);
+}
+
+// How large a network that was kicked gets when every stiffness is multiplied.
+inline double growth(const Network& network, double factor) {
+  Program program = make_program(network, 44100.0, true);
+  for (std::size_t i = 0; i < program.moving; ++i) {
+    program.velocity[i] = std::cos(3.0 * static_cast<double>(i));
+  }
+  support::Bare<double> bare(program);
+  bare.set_coefficients(0, program.parameters, factor, false);
+  double largest = 0.0;
+  for (int n = 0; n < 20000 && largest < 1e12; ++n) {
+    for (const double y : bare.step({})) {
+      largest = std::max(largest, std::fabs(y));
+    }
+  }
+  return largest;
+}
+
+}  // namespace ressort::support
