@@ -66,6 +66,12 @@ static inline V absolute(V x) {
   return select(x < V{}, -x, x);
 }
 
+// 0 of what is below it.
+template <class V>
+static inline V positive(V x) {
+  return select(x > V{}, x, V{});
+}
+
 // -1, 0 or 1.
 template <class V>
 static inline V sign(V x) {

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "core/kernels/clusters.h"
+#include "core/kernels/passive/clusters.h"
 #include "core/laws/laws.h"
 
 namespace ressort {

@@ -3,7 +3,7 @@
 #pragma once
 
 #include "core/kernels/kernel.h"
-#include "core/kernels/passive.h"
+#include "core/kernels/passive/room.h"
 #include "core/kernels/taps.h"
 
 namespace ressort {

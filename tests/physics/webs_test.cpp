@@ -1,6 +1,6 @@
 // Springs that bend, so many that what they hold is kept in one number: judged by what is heard
 // alone, with potentials written down here.
-#include "core/kernels/clusters.h"
+#include "core/kernels/passive/clusters.h"
 #include "core/laws/laws.h"
 #include "tests/support/passive.h"
 

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "core/kernels/nodes.h"
+#include "core/laws/laws.h"
 
 namespace ressort {
 

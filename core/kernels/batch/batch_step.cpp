@@ -2,6 +2,7 @@
 #include <type_traits>
 
 #include "core/kernels/batch/batch_packs.h"
+#include "core/kernels/passive/passive.h"
 
 namespace ressort::RESSORT_ISA {
 namespace {
@@ -20,7 +21,7 @@ template <std::uint32_t N, std::uint32_t I = 0, class Use>
 // Those of one pack.
 template <class V>
 struct Passive {
-  V coefficient(std::uint32_t c) const { return coefficients[c * packs]; }
+  Coefficients<V> coefficients() const { return all; }
   V awake() const { return is_awake; }
   V distance_now(Ends ends) const { return nodes[ends.a].x - nodes[ends.b].x; }
   V speed_now(Ends ends) const { return nodes[ends.a].v - nodes[ends.b].v; }
@@ -37,7 +38,7 @@ struct Passive {
   }
   void feel(std::uint32_t, V) {}
 
-  V give(std::uint32_t node) const { return node < masses ? coefficient(inverse_mass[node]) : V{}; }
+  V give(std::uint32_t node) const { return node < masses ? all[inverse_mass[node]] : V{}; }
   void push_node(std::uint32_t node, V force) {
     if (node < masses) {
       shift(node, give(node) * force);
@@ -45,8 +46,7 @@ struct Passive {
   }
 
   Node<V>* nodes;
-  const V* coefficients;  // of the pack; the next is as many further as there are packs
-  std::size_t packs;
+  Coefficients<V> all;  // of the pack; the next is as many further as there are packs
   const std::uint32_t* inverse_mass;
   std::uint32_t masses;
   V is_awake;
@@ -72,8 +72,7 @@ class PassiveLinks {
  private:
   Passive<V> body(std::size_t pack) const {
     return {.nodes = packs_.nodes(pack),
-            .coefficients = reinterpret_cast<const V*>(state_.ramps.value) + pack,
-            .packs = packs_.all,
+            .all = {reinterpret_cast<const V*>(state_.ramps.value) + pack, packs_.all},
             .inverse_mass = state_.inverse_mass,
             .masses = program_.moving,
             .is_awake = reinterpret_cast<const V*>(state_.awake)[pack]};
@@ -84,13 +83,13 @@ class PassiveLinks {
 
   [[gnu::noinline]] void remember_all() const {
     for (std::size_t pack = 0; pack < packs_.count; ++pack) {
-      ressort::remember(state_.passive, memory(pack), body(pack));
+      RESSORT_ISA::remember(state_.passive, memory(pack), body(pack));
     }
   }
   [[gnu::noinline]] void correct_all() const {
     for (std::size_t pack = 0; pack < packs_.count; ++pack) {
       Passive<V> own = body(pack);
-      ressort::correct(state_.passive, memory(pack), reinterpret_cast<V*>(state_.solver), own);
+      RESSORT_ISA::correct(state_.passive, memory(pack), reinterpret_cast<V*>(state_.solver), own);
       reinterpret_cast<V*>(state_.awake)[pack] = V{} + 1;
     }
   }
@@ -107,6 +106,21 @@ class PassiveLinks {
 // block the second half of one sample and the first of the one before are taken together, so that
 // the forces never leave the registers; only those of a block's last sample wait for the next.
 enum class Half { move, exert, exert_and_move };
+
+// What is not a spring. However many masses are held, this is one function.
+template <class V>
+[[gnu::noinline]] void exert_links(const Batch& batch, const BatchTable& table,
+                                   const Packs<V>& packs) {
+  const V* slot = packs.slots + table.first_link;
+  const Law* law = table.laws.data();
+  for (const BatchLink& each_link : batch.links) {
+    with_law_type(*law, [&]<class Type>(Type) {
+      link<V, Type>(packs, slot, each_link.a, each_link.b, table.held);
+    });
+    slot += batch_link_slots;
+    ++law;
+  }
+}
 
 // Of a row a few packs are read at a time, which the processor does not foresee.
 constexpr std::size_t rows_ahead = 12;
@@ -127,11 +141,11 @@ class Holder {
     pass<Half::move>(value);
   }
   void exert() const {
-    exert_links();
+    exert_links(batch_, table_, packs_);
     pass<Half::exert>(nullptr);
   }
   void exert_and_move(const V* value) const {
-    exert_links();
+    exert_links(batch_, table_, packs_);
     push_again(value);
     pass<Half::exert_and_move>(value);
   }
@@ -258,18 +272,6 @@ class Holder {
         }
       });
     });
-  }
-
-  void exert_links() const {
-    const V* slot = packs_.slots + table_.first_link;
-    const Law* law = table_.laws.data();
-    for (const BatchLink& each_link : batch_.links) {
-      with_law_type(*law, [&]<class Type>(Type) {
-        link<V, Type>(packs_, slot, each_link.a, each_link.b, N);
-      });
-      slot += batch_link_slots;
-      ++law;
-    }
   }
 
   // The force inputs that are not the first on their mass.

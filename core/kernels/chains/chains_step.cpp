@@ -1,5 +1,6 @@
 // The loops of the chains' kernel in memory, compiled for each instruction set.
 #include "core/kernels/chains/chains_loops.h"
+#include "core/kernels/passive/passive.h"
 
 namespace ressort::RESSORT_ISA {
 namespace {
@@ -250,7 +251,7 @@ struct Passive {
   using T = typename S::Number;
   using V = typename S::V;
 
-  T coefficient(std::uint32_t c) const { return s.coefficient[c]; }
+  Coefficients<T> coefficients() const { return {s.coefficient}; }
   T awake() const { return *state.awake; }
   T distance_now(Ends ends) const { return body(ends.a)[0] - body(ends.b)[0]; }
   T speed_now(Ends ends) const { return body(ends.a)[S::lanes] - body(ends.b)[S::lanes]; }

@@ -3,6 +3,7 @@
 #pragma once
 
 #include "core/kernels/direct/direct_places.h"
+#include "core/kernels/passive/passive.h"
 #include "core/laws/laws.h"
 
 namespace ressort::RESSORT_ISA {
@@ -131,7 +132,7 @@ struct Passive {
   using V = typename S::V;
   using T = Scalar<V>;
 
-  V coefficient(std::uint32_t c) const { return s.coefficient[c]; }
+  Coefficients<V> coefficients() const { return {s.coefficient}; }
   V awake() const { return *reinterpret_cast<const V*>(s.state.awake); }
   V distance_now(Ends ends) const { return s.between(ends.a, ends.b); }
   V speed_now(Ends ends) const { return s.v[ends.a] - s.v[ends.b]; }

@@ -3,6 +3,7 @@
 #include <utility>
 
 #include "core/kernels/grid/grid.h"
+#include "core/kernels/passive/passive.h"
 #include "core/laws/laws.h"
 
 namespace ressort::RESSORT_ISA {
@@ -418,7 +419,7 @@ template <class T, std::size_t Bytes>
 // Links that are not plain.
 template <class T, std::size_t Bytes>
 struct Passive {
-  T coefficient(std::uint32_t c) const { return s.state.ramps.value[c]; }
+  Coefficients<T> coefficients() const { return {s.state.ramps.value}; }
   T awake() const { return *s.state.awake; }
   T distance_now(Ends ends) const { return s.state.x[ends.a] - s.state.x[ends.b]; }
   T speed_now(Ends ends) const { return s.state.v[ends.a] - s.state.v[ends.b]; }
@@ -433,7 +434,7 @@ struct Passive {
   void feel(std::uint32_t, T) {}
   T give(std::uint32_t slot) const {
     const std::uint32_t inverse_mass = s.state.inverse_mass[slot];
-    return inverse_mass == grid_fixed ? T(0) : coefficient(inverse_mass);
+    return inverse_mass == grid_fixed ? T(0) : coefficients()[inverse_mass];
   }
 
   const View<T, Bytes>& s;

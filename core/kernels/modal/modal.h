@@ -10,7 +10,7 @@
 #pragma once
 
 #include "core/kernels/kernel.h"
-#include "core/kernels/passive.h"
+#include "core/kernels/passive/room.h"
 
 namespace ressort {
 

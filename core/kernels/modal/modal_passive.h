@@ -10,6 +10,7 @@
 
 #include "core/kernels/modal/modal_hold.h"
 #include "core/kernels/modal/modal_straight.h"
+#include "core/kernels/passive/passive.h"
 
 namespace ressort::RESSORT_ISA {
 namespace {
@@ -43,7 +44,7 @@ void measure_replies(ModalState<T>& s, std::size_t places, std::size_t outputs) 
 // What passive.h asks: a link is its own first end, and has no other.
 template <class T>
 struct ModalBody {
-  T coefficient(std::uint32_t c) const { return s.ramps.value[c]; }
+  Coefficients<T> coefficients() const { return {s.ramps.value}; }
   T awake() const { return s.pulls ? T(1) : T(0); }
   T distance_now(Ends link) const {
     const auto [a, b] = s.passive[link.a].ends;
@@ -111,7 +112,7 @@ struct Presser : Holder<T, Crossed> {
   }
 
   void remember_passive() {
-    ressort::remember(*s.active, s.memory, ModalBody<T>{s, this->inverse_mass()});
+    remember(*s.active, s.memory, ModalBody<T>{s, this->inverse_mass()});
   }
 
   // Once everything else has moved: finds what the links push with, and moves places, what is heard
@@ -129,7 +130,7 @@ struct Presser : Holder<T, Crossed> {
     }
     ModalBody<T> body{s, w};
     if (!push_straight(s, body)) {
-      ressort::correct(*s.active, s.memory, s.numbers, body);
+      correct(*s.active, s.memory, s.numbers, body);
     }
     s.pulls = true;
     std::fill_n(s.shove, s.held_places, T(0));

@@ -12,7 +12,7 @@
 
 #include <algorithm>
 
-#include "core/kernels/joint.h"
+#include "core/kernels/passive/joint.h"
 #include "core/kernels/modal/modal_sweep.h"
 
 namespace ressort::RESSORT_ISA {

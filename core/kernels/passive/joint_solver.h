@@ -14,25 +14,20 @@
 
 #include <algorithm>
 
-#include "core/kernels/joint_space.h"
+#include "core/kernels/passive/joint_space.h"
 #include "core/laws/laws.h"
 
-namespace ressort {
+namespace ressort::RESSORT_ISA {
 
 using laws::LinkState;
 using laws::Slope;
 using laws::Steady;
 
-inline constexpr std::size_t passive_rows = 3;  // of memory for each link, one number a lane
-inline constexpr int free_newtons = 10;         // without looking whether they go a little too far
+inline constexpr int free_newtons = 10;  // without looking whether they go a little too far
 inline constexpr int most_newtons = 64;
 inline constexpr int most_stiffenings = 24;
 
 namespace {
-
-// Of what goes through a cluster's links, that may be off by rounding.
-template <class V>
-constexpr Scalar<V> share_of_rounding = laws::tiny_share<V>() * 2;
 
 // In a lane's first sample nothing pulls, as nothing is known of where it came from. But what would
 // then stand higher than where it starts, or than a sample before by its speed, whichever is the
@@ -51,20 +46,52 @@ static inline Slope<V> first_gradient(const ForceLaw& law, V before, V speed, V 
   return {select(rises, share, V{}), select(rises, slope, V{})};
 }
 
+// What the laws of a cluster's links say, whatever space these are solved in.
+template <class V>
+class JointLaws {
+ public:
+  JointLaws(const PassiveLink* links, Coefficients<V> coefficients)
+      : links_(links), coefficients_(coefficients) {}
+
+  Steady<V> steady(std::size_t i, const LinkState<V>& state) const {
+    return with(i, [&](const auto& law) { return law.steady(state); });
+  }
+  Slope<V> gradient(std::size_t i, V before, V step) const {
+    return with(i, [&](const auto& law) { return law.gradient(before, step); });
+  }
+  [[gnu::noinline]] Slope<V> first(std::size_t i, V before, V speed, V step) const {
+    return with(i, [&](const auto& law) { return first_gradient(law, before, speed, step); });
+  }
+  [[gnu::noinline]] V alone(std::size_t i, const LinkState<V>& state) const {
+    return with(i, [&](const auto& law) { return law.passive(state); });
+  }
+
+ private:
+  template <class Use>
+  auto with(std::size_t i, Use&& use) const {
+    const auto c = [&](std::size_t k) { return coefficients_[links_[i].coefficients[k]]; };
+    return with_law<V>(links_[i].law, c, use);
+  }
+
+  const PassiveLink* links_;
+  Coefficients<V> coefficients_;
+};
+
 // The links of a cluster in one sample. `memory` is theirs, [link][passive_rows].
-template <class V, class Body, class Space>
+template <class V, class Space>
 class Joint {
  public:
   using Lanes = decltype(V{} == V{});
 
   Joint(const PassiveLink* links, std::size_t count, V* memory, Joined<V>* joined, Space& space,
-        Body& body)
+        JointBody<V>& body)
       : links_(links),
         count_(count),
         memory_(memory),
         joined_(joined),
         space_(space),
         body_(body),
+        laws_(links, body.coefficients()),
         is_first_(body.awake() == V{}) {}
 
   void solve() {
@@ -111,20 +138,15 @@ class Joint {
   // Where a condition does not hold: what is no number fulfils none.
   static Lanes fails(Lanes holds) { return holds == (V{} != V{}); }
 
+  // But for how far it gives way.
   LinkState<V> state_of(std::size_t i) const {
-    const Ends ends = links_[i].ends;
+    const FreeMotion<V> motion = body_.free_motion(links_[i].ends);
     const V* const row = memory_ + i * passive_rows;
     return {.now = row[0],
             .speed = row[1],
-            .free = body_.distance(ends),
-            .fast = body_.speed(ends),
-            .gamma = body_.gamma(ends)};
-  }
-
-  template <class Use>
-  auto with_law_of(std::size_t i, Use&& use) const {
-    const auto c = [&](std::size_t k) { return body_.coefficient(links_[i].coefficients[k]); };
-    return with_law<V>(links_[i].law, c, use);
+            .free = motion.distance,
+            .fast = motion.speed,
+            .gamma = V{}};
   }
 
   // From the forces of the sample before, but for what is known of this one's. What exerted
@@ -137,7 +159,7 @@ class Joint {
       link.speed = state.speed;
       const bool rubs = facts_of(links_[i].law).family == Family::bow;
       link.free = rubs ? state.speed + state.fast : state.free - state.before();
-      const Steady<V> steady = with_law_of(i, [&](const auto& law) { return law.steady(state); });
+      const Steady<V> steady = laws_.steady(i, state);
       link.steady = select(is_first_, V{}, steady.force);
       link.damping = select(is_first_, V{}, positive(steady.damping));
       link.force = V{};
@@ -171,9 +193,10 @@ class Joint {
   // What a link would exert if the others went on exerting what they do.
   V alone(std::size_t i) const {
     LinkState<V> state = state_of(i);
+    state.gamma = body_.gamma(links_[i].ends);
     state.free += space_.pulled(i);
     state.fast += space_.pulled(i);
-    return with_law_of(i, [&](const auto& law) { return law.passive(state); });
+    return laws_.alone(i, state);
   }
 
   // What every link should exert. Gives those of the lanes in which what it does exert makes more
@@ -187,14 +210,11 @@ class Joint {
     bend_ = V{};
     for (std::size_t i = 0; i < count_; ++i) {
       Joined<V>& link = joined_[i];
-      const Slope<V> at =
-          with_law_of(i, [&](const auto& law) { return law.gradient(link.before, link.step); });
+      const Slope<V> at = laws_.gradient(i, link.before, link.step);
       link.value = link.steady + link.damping * link.step + at.value;
       link.slope = positive(link.damping + at.slope);
       if (any_of(is_first_)) {
-        const Slope<V> first = with_law_of(i, [&](const auto& law) {
-          return first_gradient(law, link.before, link.speed, link.step);
-        });
+        const Slope<V> first = laws_.first(i, link.before, link.speed, link.step);
         link.value = select(is_first_, first.value, link.value);
         link.slope = select(is_first_, positive(first.slope), link.slope);
       }
@@ -347,8 +367,7 @@ class Joint {
 
   V exerted(std::size_t i, V step) const {
     const Joined<V>& link = joined_[i];
-    const V at =
-        with_law_of(i, [&](const auto& law) { return law.gradient(link.before, step).value; });
+    const V at = laws_.gradient(i, link.before, step).value;
     return link.steady + link.damping * step + at;
   }
 
@@ -362,9 +381,7 @@ class Joint {
     for (std::size_t i = 0; i < count_; ++i) {
       const Joined<V>& link = joined_[i];
       const V way = from_start(link);
-      const V at = with_law_of(i, [&](const auto& law) {
-        return law.gradient(link.before + (link.step - way), way).value;
-      });
+      const V at = laws_.gradient(i, link.before + (link.step - way), way).value;
       const V value = select(is_first_, V{}, link.steady + link.damping * link.step);
       made += at * way + (value - link.force) * link.step;
       scale += (absolute(at) + absolute(value) + absolute(link.force)) *
@@ -378,7 +395,8 @@ class Joint {
   V* memory_;
   Joined<V>* joined_;
   Space& space_;
-  Body& body_;
+  JointBody<V>& body_;
+  JointLaws<V> laws_;
   Lanes is_first_;
   V along_{};  // how the objective rises, where it is now, along the last way
   V bend_{};   // and how the laws bend it
@@ -387,26 +405,4 @@ class Joint {
 };
 
 }  // namespace
-
-// Solves one cluster and pushes its links' ends. `memory` is of its links, [link][passive_rows];
-// `numbers` are Cluster::numbers() packs, left with what each link exerts first: Joined. `drag` is
-// that of a web, [link], or null.
-template <class V, class Body>
-[[gnu::noinline]] static void solve_cluster(const std::vector<PassiveLink>& links,
-                                            const Cluster& cluster, V* memory, V* numbers,
-                                            Body& body, const V* drag = nullptr) {
-  const PassiveLink* const first = links.data() + cluster.first;
-  auto* const joined = reinterpret_cast<Joined<V>*>(numbers);
-  V* const rest = numbers + joint_numbers * cluster.count;
-  if constexpr (requires { body.shift(0u, V{}); }) {
-    if (cluster.ends() > 0) {
-      ByEnds<V, Body> space(first, cluster, rest, body);
-      Joint<V, Body, ByEnds<V, Body>>(first, cluster.count, memory, joined, space, body).solve();
-      return;
-    }
-  }
-  ByLinks<V, Body> space(first, cluster, rest, body, drag);
-  Joint<V, Body, ByLinks<V, Body>>(first, cluster.count, memory, joined, space, body).solve();
-}
-
-}  // namespace ressort
+}  // namespace ressort::RESSORT_ISA

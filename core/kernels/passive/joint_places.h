@@ -5,24 +5,16 @@
 
 #include <algorithm>
 
-#include "core/kernels/clusters.h"
-#include "core/lanes.h"
+#include "core/kernels/passive/joint.h"
 
-namespace ressort {
+namespace ressort::RESSORT_ISA {
 namespace {
 
-// Whether a kernel's Body (passive.h) knows places.
-template <class Body, class V>
-concept HasPlaces = requires(Body body) {
-  body.give(0u, 0u);
-  body.push_node(0u, V{});
-};
-
-template <class V, class Body>
+template <class V>
 class Places {
  public:
   // `at` is how far forces have brought each.
-  Places(const std::vector<std::uint32_t>& nodes, V* numbers, V* at, Body& body)
+  Places(const std::vector<std::uint32_t>& nodes, V* numbers, V* at, JointBody<V>& body)
       : nodes_(nodes),
         count_(nodes.size()),
         pressed_(numbers),
@@ -191,8 +183,8 @@ class Places {
   V* matrix_;
   V* y_;
   V* at_;
-  Body& body_;
+  JointBody<V>& body_;
 };
 
 }  // namespace
-}  // namespace ressort
+}  // namespace ressort::RESSORT_ISA

@@ -5,58 +5,22 @@
 
 #include <algorithm>
 
-#include "core/kernels/joint_places.h"
+#include "core/kernels/passive/joint_places.h"
 #include "core/laws/laws.h"
 
-namespace ressort {
+namespace ressort::RESSORT_ISA {
 
 using laws::tiny_share;
 
 inline constexpr int most_gradients = 60;
 
-// A link of a cluster in one sample.
-template <class V>
-struct Joined {
-  V before;  // the distance a sample ago
-  V speed;   // from there to now
-  V free;    // and to the next sample if none of the cluster acted
-  V step;    // as they do
-  V force;   // that it exerts
-  V steady;  // the share of it that does not depend on the step
-  V damping;
-  V value;  // what it should exert, after this step
-  V slope;  // and how that grows with it, or is taken to
-  V way;    // which way the solution is sought, and what more the link exerts at its end
-  V push;
-  V newton_way;  // the same as Newton found it last
-  V newton_push;
-};
-static_assert(sizeof(Joined<double>) == joint_numbers * sizeof(double));
-
 namespace {
 
-template <class V>
-static inline V positive(V x) {
-  return select(x > V{}, x, V{});
-}
-
-// How far a force of 1 along one link brings the ends of another.
-template <class V, class Body>
-static inline V coupling_of(const Body& body, Ends one, Ends other) {
-  if constexpr (requires { body.coupling(one, other); }) {
-    return body.coupling(one, other);
-  } else {
-    const auto [a, b] = one;
-    const auto [c, d] = other;
-    return (body.gamma({a, d}) + body.gamma({b, c}) - body.gamma({a, c}) - body.gamma({b, d})) / 2;
-  }
-}
-
 // Steps of a cluster's links, by what they hold: masses, and behind them places.
-template <class V, class Body>
+template <class V>
 class ByEnds {
  public:
-  ByEnds(const PassiveLink* links, const Cluster& cluster, V* numbers, Body& body)
+  ByEnds(const PassiveLink* links, const Cluster& cluster, V* numbers, JointBody<V>& body)
       : links_(links),
         cluster_(cluster),
         masses_(cluster.inverse_mass.size()),
@@ -71,7 +35,7 @@ class ByEnds {
                 at_ + masses_, body) {
     constexpr Scalar<V> least = Scalar<V>(1e-30);
     for (std::size_t i = 0; i < masses_; ++i) {
-      const V give = body.coefficient(cluster.inverse_mass[i]);
+      const V give = body.coefficients()[cluster.inverse_mass[i]];
       give_[i] = select(give > least, give, V{} + least);
       mass_[i] = 1 / give_[i];
       at_[i] = V{};
@@ -145,13 +109,13 @@ class ByEnds {
   }
   // Each mass by all that it has moved, as links that are much harder than it is heavy push it to
   // and fro. Only once.
-  void push(const Joined<V>* joined, Body& body) {
+  void push(const Joined<V>* joined, JointBody<V>& body) {
     const auto shift = [&](std::uint32_t node, std::uint32_t end, V force) {
-      if (is_mass(end)) {
+      if (is_mass(end) && any_of(at_[end] != V{})) {
         body.shift(node, at_[end]);
         at_[end] = V{};
       }
-      if (is_mass(end) || end == no_mass) {
+      if ((is_mass(end) || end == no_mass) && any_of(force != V{})) {
         body.feel(node, force);
       }
     };
@@ -159,9 +123,7 @@ class ByEnds {
       shift(links_[i].ends.a, links_[i].mass_a, V{} - joined[i].force);
       shift(links_[i].ends.b, links_[i].mass_b, joined[i].force);
     }
-    if constexpr (HasPlaces<Body, V>) {
-      places_.push();
-    }
+    places_.push();
   }
   // How 1/2 |u|^2_M rises along the way.
   V inertia_along(const Joined<V>*) const {
@@ -173,7 +135,7 @@ class ByEnds {
   }
 
  private:
-  bool has_places() const { return HasPlaces<Body, V> && masses_ < count_; }
+  bool has_places() const { return masses_ < count_; }
   bool is_mass(std::uint32_t end) const { return end < masses_; }
   Ends ends(std::size_t link) const { return {links_[link].mass_a, links_[link].mass_b}; }
   V between(const V* x, std::size_t link) const {
@@ -186,10 +148,8 @@ class ByEnds {
     }
   }
   void press(std::uint32_t end, V force) {
-    if constexpr (HasPlaces<Body, V>) {
-      if (end != no_mass && !is_mass(end) && any_of(force != V{})) {
-        places_.press(end - masses_, force);
-      }
+    if (end != no_mass && !is_mass(end) && any_of(force != V{})) {
+      places_.press(end - masses_, force);
     }
   }
 
@@ -319,10 +279,8 @@ class ByEnds {
       }
       x_[column] *= matrix_[column];
     }
-    if constexpr (HasPlaces<Body, V>) {
-      if (has_places()) {
-        places_.solve(matrix_ + masses_, entries + plan.first[masses_], x_ + masses_);
-      }
+    if (has_places()) {
+      places_.solve(matrix_ + masses_, entries + plan.first[masses_], x_ + masses_);
     }
     for (std::size_t column = masses_; column-- > 0;) {
       for (std::size_t i = plan.first[column]; i < plan.first[column + 1]; ++i) {
@@ -341,15 +299,15 @@ class ByEnds {
   V* way_;  // and where it goes from there
   V* x_;
   V* matrix_;
-  Places<V, Body> places_;
+  Places<V> places_;
 };
 
 // The same by the links, of those alone that exert anything or may. `drag` is by what a web holds
 // back each of them, and through it all others.
-template <class V, class Body>
+template <class V>
 class ByLinks {
  public:
-  ByLinks(const PassiveLink* links, const Cluster& cluster, V* numbers, Body& body,
+  ByLinks(const PassiveLink* links, const Cluster& cluster, V* numbers, JointBody<V>& body,
           const V* drag = nullptr)
       : drag_(drag),
         links_(links),
@@ -419,7 +377,7 @@ class ByLinks {
       }
     }
   }
-  void push(const Joined<V>* joined, Body& body) {
+  void push(const Joined<V>* joined, JointBody<V>& body) {
     for (std::size_t i = 0; i < count_; ++i) {
       body.push(links_[i].ends, joined[i].force);
     }
@@ -445,7 +403,7 @@ class ByLinks {
   const V* couple(std::size_t k) {
     V* const row = coupling_ + k * count_;
     for (std::size_t i = 0; is_new_ && i < count_; ++i) {
-      row[i] = coupling_of<V>(body_, links_[index_[k]].ends, links_[i].ends) -
+      row[i] = body_.coupling(links_[index_[k]].ends, links_[i].ends) -
                (drag_ == nullptr ? V{} : drag_[index_[k]] * drag_[i]);
     }
     is_new_ = false;
@@ -515,9 +473,8 @@ class ByLinks {
   V* x_;
   V* pulled_;
   std::size_t* index_;  // [active] link
-  Body& body_;
+  JointBody<V>& body_;
 };
 
 }  // namespace
-
-}  // namespace ressort
+}  // namespace ressort::RESSORT_ISA

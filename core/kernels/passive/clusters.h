@@ -11,6 +11,7 @@
 namespace ressort {
 
 inline constexpr std::uint32_t no_mass = 0xffffffffu;
+inline constexpr std::size_t passive_rows = 3;    // of memory for each link, one number a lane
 inline constexpr std::size_t joint_numbers = 13;  // of a link while it is solved: Joined in joint.h
 
 // Of places while they are solved: Places in joint_places.h.

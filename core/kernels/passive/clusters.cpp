@@ -1,4 +1,4 @@
-#include "core/kernels/clusters.h"
+#include "core/kernels/passive/clusters.h"
 
 #include <algorithm>
 #include <map>

@@ -1,0 +1,154 @@
+// core/kernels: the door to what solves passive links that share masses (joint_solver.h). That is a
+// lot of code and the same for all kernels: it is compiled once for each kind of pack and for each
+// instruction set, in joint_step.cpp, without fused multiply-adds as the direct kernel is. A part
+// of
+// *_step.cpp.
+#pragma once
+
+#include "core/kernels/passive/clusters.h"
+#include "core/lanes.h"
+#include "core/laws/discrete_gradient.h"
+
+namespace ressort::RESSORT_ISA {
+
+// A link of a cluster in one sample.
+template <class V>
+struct Joined {
+  V before;  // the distance a sample ago
+  V speed;   // from there to now
+  V free;    // and to the next sample if none of the cluster acted
+  V step;    // as they do
+  V force;   // that it exerts
+  V steady;  // the share of it that does not depend on the step
+  V damping;
+  V value;  // what it should exert, after this step
+  V slope;  // and how that grows with it, or is taken to
+  V way;    // which way the solution is sought, and what more the link exerts at its end
+  V push;
+  V newton_way;  // the same as Newton found it last
+  V newton_push;
+};
+static_assert(sizeof(Joined<double>) == joint_numbers * sizeof(double));
+
+// Where a kernel has its coefficients, in packs: every so many.
+template <class V>
+struct Coefficients {
+  V operator[](std::size_t c) const { return first[c * stride]; }
+
+  const V* first;
+  std::size_t stride = 1;
+};
+
+// How a link's ends go on without it.
+template <class V>
+struct FreeMotion {
+  V distance;
+  V speed;
+};
+
+// A kernel's Body (passive.h), behind that door.
+template <class V>
+class JointBody {
+ public:
+  virtual FreeMotion<V> free_motion(Ends ends) const = 0;
+  virtual V gamma(Ends ends) const = 0;
+  virtual V coupling(Ends one, Ends other) const = 0;
+  virtual void push(Ends ends, V force) = 0;
+  virtual void shift(std::uint32_t node, V way) = 0;
+  virtual void feel(std::uint32_t node, V force) = 0;
+  virtual V give(std::uint32_t from, std::uint32_t at) const = 0;
+  virtual void push_node(std::uint32_t node, V force) = 0;
+
+  Coefficients<V> coefficients() const { return coefficients_; }
+  V awake() const { return awake_; }
+  bool has_masses() const { return has_masses_; }
+
+ protected:
+  JointBody(Coefficients<V> coefficients, V awake, bool has_masses)
+      : coefficients_(coefficients), awake_(awake), has_masses_(has_masses) {}
+  ~JointBody() = default;
+
+ private:
+  Coefficients<V> coefficients_;
+  V awake_;
+  bool has_masses_;
+};
+
+// What is behind the door.
+template <class V>
+struct JointSolver {
+  // Solves one cluster and pushes its links' ends. `memory` is of its links, [link][passive_rows];
+  // `numbers` are Cluster::numbers() packs, left with what each link exerts first: Joined. `drag`
+  // is that of a web, [link], or null. [audio]
+  static void solve(const std::vector<PassiveLink>& links, const Cluster& cluster, V* memory,
+                    V* numbers, JointBody<V>& body, const V* drag = nullptr);
+
+  // What a link that acts alone exerts in a lane's first sample: `before` and `speed` are those of
+  // LinkState, `free` is how far its ends would go in two samples. [audio]
+  static V first_force(const PassiveLink& link, Coefficients<V> coefficients, V before, V speed,
+                       V free, V gamma);
+};
+
+namespace {
+
+// Of what goes through a cluster's links, that may be off by rounding.
+template <class V>
+constexpr Scalar<V> share_of_rounding = laws::tiny_share<V>() * 2;
+
+// Whether a kernel's masses are nodes of their own.
+template <class Body, class V>
+concept HasMasses = requires(Body body) {
+  body.shift(0u, V{});
+};
+
+template <class V, class Body>
+class JointOf final : public JointBody<V> {
+ public:
+  explicit JointOf(Body& body)
+      : JointBody<V>(body.coefficients(), body.awake(), HasMasses<Body, V>), body_(body) {}
+
+  FreeMotion<V> free_motion(Ends ends) const override {
+    return {body_.distance(ends), body_.speed(ends)};
+  }
+  V gamma(Ends ends) const override { return body_.gamma(ends); }
+  V coupling(Ends one, Ends other) const override {
+    if constexpr (requires { body_.coupling(one, other); }) {
+      return body_.coupling(one, other);
+    } else {
+      const auto [a, b] = one;
+      const auto [c, d] = other;
+      return (body_.gamma({a, d}) + body_.gamma({b, c}) - body_.gamma({a, c}) -
+              body_.gamma({b, d})) /
+             2;
+    }
+  }
+  void push(Ends ends, V force) override { body_.push(ends, force); }
+  void shift([[maybe_unused]] std::uint32_t node, [[maybe_unused]] V way) override {
+    if constexpr (HasMasses<Body, V>) {
+      body_.shift(node, way);
+    }
+  }
+  void feel([[maybe_unused]] std::uint32_t node, [[maybe_unused]] V force) override {
+    if constexpr (HasMasses<Body, V>) {
+      body_.feel(node, force);
+    }
+  }
+  V give([[maybe_unused]] std::uint32_t from, [[maybe_unused]] std::uint32_t at) const override {
+    if constexpr (requires { body_.give(from, at); }) {
+      return body_.give(from, at);
+    } else {
+      return V{};
+    }
+  }
+  void push_node([[maybe_unused]] std::uint32_t node, [[maybe_unused]] V force) override {
+    if constexpr (requires { body_.push_node(node, force); }) {
+      body_.push_node(node, force);
+    }
+  }
+
+ private:
+  Body& body_;
+};
+
+}  // namespace
+}  // namespace ressort::RESSORT_ISA
