@@ -1,6 +1,6 @@
 #include "core/linear_algebra/lanczos.h"
 
-#include <Eigen/Eigenvalues>
+#include <Eigen/Core>
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
@@ -20,6 +20,19 @@ Dense times(const Multiply& multiply, const Dense& x) {
   std::copy_n(x.data(), x.size(), std::begin(columns.values));
   multiply(columns);
   return Eigen::Map<const Dense>(std::begin(columns.values), x.rows(), x.cols());
+}
+
+// Of a symmetric matrix, ascending.
+struct Symmetric {
+  Eigen::VectorXd values;
+  Dense vectors;
+};
+Symmetric pairs_of(const Dense& matrix) {
+  Matrix plain(static_cast<std::size_t>(matrix.rows()), static_cast<std::size_t>(matrix.cols()));
+  std::copy_n(matrix.data(), matrix.size(), std::begin(plain.values));
+  const Eigenpairs pairs = symmetric_eigenpairs(plain);
+  return {Eigen::Map<const Eigen::VectorXd>(std::begin(pairs.values), matrix.rows()),
+          Eigen::Map<const Dense>(std::begin(pairs.vectors.values), matrix.rows(), matrix.cols())};
 }
 
 // The same numbers on every machine (splitmix64), between -1 and 1.
@@ -46,11 +59,11 @@ Orthogonal orthogonal(const Dense& w, const Multiply& b) {
   // Twice: columns that were nearly the same come out of the first with what rounding left.
   for (int pass = 0; pass < 2; ++pass) {
     const Dense gram = found.q.transpose() * found.bq;
-    const Eigen::SelfAdjointEigenSolver<Dense> solver(gram);
-    const double most = std::max(solver.eigenvalues().maxCoeff(), 0.0);
-    const Index width = (solver.eigenvalues().array() > lost * most).count();
-    const Dense vectors = solver.eigenvectors().rightCols(width);
-    const Eigen::VectorXd size = solver.eigenvalues().tail(width).cwiseSqrt();
+    const Symmetric pairs = pairs_of(gram);
+    const double most = std::max(pairs.values.maxCoeff(), 0.0);
+    const Index width = (pairs.values.array() > lost * most).count();
+    const Dense vectors = pairs.vectors.rightCols(width);
+    const Eigen::VectorXd size = pairs.values.tail(width).cwiseSqrt();
     found.q = found.q * vectors * size.cwiseInverse().asDiagonal();
     found.bq = times(b, found.q);
     found.r = size.asDiagonal() * vectors.transpose() * found.r;
@@ -93,9 +106,9 @@ std::optional<Eigenpairs> lowest_pairs(double shift, int count, int size, const 
     const bool is_full = used + rest.q.cols() > most;
     if (used >= count && (is_whole || is_full || used >= count + width)) {
       const Dense top = t.topLeftCorner(used, used);
-      const Eigen::SelfAdjointEigenSolver<Dense> solver(top);
-      const Eigen::VectorXd theta = solver.eigenvalues().tail(count);
-      const Dense ritz = solver.eigenvectors().rightCols(count);
+      const Symmetric all = pairs_of(top);
+      const Eigen::VectorXd theta = all.values.tail(count);
+      const Dense ritz = all.vectors.rightCols(count);
       double residual = 0.0;
       for (Index i = 0; i < count && !is_whole; ++i) {
         residual = std::max(residual, (rest.r * ritz.col(i).tail(now)).norm() / std::abs(theta(i)));
