@@ -3,12 +3,12 @@
 // them, tells what a sample makes of every state, and the eigenvalues of that are the poles that
 // sound. Beside them the poles of M s^2 + Z s + K, with the matrices that the text was written
 // from.
-#include <Eigen/Dense>
 #include <complex>
 #include <cstdio>
 #include <functional>
 #include <numeric>
 
+#include "tests/support/dense.h"
 #include "tests/support/player.h"
 
 namespace ressort {
@@ -194,7 +194,7 @@ Poles continuous_poles(const Scene& scene) {
   flow.bottomLeftCorner(n, n) = -(w.asDiagonal() * scene.stiffness);
   flow.bottomRightCorner(n, n) = -(w.asDiagonal() * scene.damping);
   Poles poles;
-  const Eigen::VectorXcd values = flow.eigenvalues();
+  const Eigen::VectorXcd values = support::eigenvalues_of(flow);
   for (const std::complex<double>& s : values) {
     if (s.imag() > 1e-9) {
       poles.push_back(s);
@@ -241,10 +241,11 @@ Poles sounding_poles(Player& player, Eigen::Index masses, std::uint64_t seed) {
       }
     }
   }
-  const Eigen::MatrixXd step =
-      before.transpose().colPivHouseholderQr().solve(after.transpose()).transpose();
+  const Eigen::MatrixXd from = before.transpose();
+  const Eigen::MatrixXd to = after.transpose();
+  const Eigen::MatrixXd step = support::least_squares(from, to).transpose();
   Poles poles;
-  const Eigen::VectorXcd values = step.eigenvalues();
+  const Eigen::VectorXcd values = support::eigenvalues_of(step);
   for (const std::complex<double>& z : values) {
     if (z.imag() > 1e-9) {
       poles.push_back(std::log(z));

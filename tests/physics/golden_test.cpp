@@ -41,10 +41,10 @@ struct Spectrum {
 // Where dampers are in proportion and masses alike; the slowest first.
 Spectrum modes_of(const Program& program) {
   const support::Matrices matrices = support::matrices_of(program);
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> solver(matrices.stiffness);
-  const Eigen::MatrixXd& shapes = solver.eigenvectors();
+  const support::Eigenbasis modes = support::eigenbasis_of(matrices.stiffness);
+  const Eigen::MatrixXd& shapes = modes.vectors;
   return {
-      .stiffness = solver.eigenvalues() / matrices.mass(0),
+      .stiffness = modes.values / matrices.mass(0),
       .damping = (shapes.transpose() * matrices.damping * shapes).diagonal() / matrices.mass(0)};
 }
 

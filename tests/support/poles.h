@@ -2,12 +2,12 @@
 // as matrices: poles of the one and of the other. Needs Eigen.
 #pragma once
 
-#include <Eigen/Dense>
 #include <algorithm>
 #include <complex>
 #include <vector>
 
 #include "core/laws/laws.h"
+#include "tests/support/dense.h"
 #include "tests/support/harness.h"
 
 namespace ressort::support {
@@ -40,7 +40,7 @@ Eigen::MatrixXd transition(const Program& program, Isa isa = best_isa()) {
     bare.step(hands);
     save_to(second.col(i));
   }
-  return second * first.inverse();
+  return second * inverse_of(first);
 }
 
 struct Pole {
@@ -58,7 +58,7 @@ inline Pole pole_of(std::complex<double> z, double rate_hz = Network::reference_
 // Those that oscillate, by pitch.
 inline std::vector<Pole> poles_of(const Eigen::MatrixXd& step) {
   std::vector<Pole> poles;
-  const Eigen::VectorXcd values = step.eigenvalues();
+  const Eigen::VectorXcd values = eigenvalues_of(step);
   for (const std::complex<double>& z : values) {
     if (z.imag() > 0.0) {
       poles.push_back(pole_of(z));
@@ -70,7 +70,7 @@ inline std::vector<Pole> poles_of(const Eigen::MatrixXd& step) {
 }
 
 inline double spectral_radius(const Eigen::MatrixXd& step) {
-  return step.eigenvalues().cwiseAbs().maxCoeff();
+  return eigenvalues_of(step).cwiseAbs().maxCoeff();
 }
 
 // Masses, springs and dampers of a Program of springs alone, at its own rate.
@@ -120,7 +120,7 @@ inline std::vector<Pole> continuous_poles(const Matrices& matrices) {
   motion.bottomLeftCorner(n, n) = -(w.asDiagonal() * matrices.stiffness);
   motion.bottomRightCorner(n, n) = -(w.asDiagonal() * matrices.damping);
   std::vector<Pole> poles;
-  const Eigen::VectorXcd values = motion.eigenvalues();
+  const Eigen::VectorXcd values = eigenvalues_of(motion);
   for (const std::complex<double>& s : values) {
     if (s.imag() > 0.0) {
       poles.push_back(pole_of(std::exp(s)));
@@ -138,9 +138,8 @@ class Continuous {
  public:
   explicit Continuous(const Program& program) {
     const Matrices matrices = matrices_of(program);
-    const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> solver(matrices.stiffness /
-                                                                matrices.mass(0));
-    shapes_ = solver.eigenvectors();
+    const Eigenbasis modes = eigenbasis_of(matrices.stiffness / matrices.mass(0));
+    shapes_ = modes.vectors;
     const Eigen::MatrixXd damping =
         shapes_.transpose() * matrices.damping * shapes_ / matrices.mass(0);
     REQUIRE((damping - Eigen::MatrixXd(damping.diagonal().asDiagonal())).norm() < 1e-12);
@@ -155,7 +154,7 @@ class Continuous {
     const Eigen::VectorXd after = shapes_.transpose() * (x + v);
     for (Eigen::Index j = 0; j < n; ++j) {
       const double sigma = 0.5 * damping(j, j);
-      const double omega = std::sqrt(solver.eigenvalues()(j) - sigma * sigma);
+      const double omega = std::sqrt(modes.values(j) - sigma * sigma);
       step_.emplace_back(std::polar(std::exp(-sigma), omega));
       const double sine =
           (after(j) * std::exp(sigma) - before(j) * std::cos(omega)) / std::sin(omega);

@@ -1,5 +1,4 @@
 // Bodies: modes by frequency and decay, and places on them that move by weights of all modes.
-#include <Eigen/Dense>
 
 #include <complex>
 #include <numbers>
@@ -11,6 +10,7 @@
 #include "core/kernels/modal/modal_form.h"
 #include "core/model/language/expression.h"
 #include "core/sampled_mode.h"
+#include "tests/support/dense.h"
 #include "tests/support/passive.h"
 #include "tests/support/reference_network.h"
 
@@ -35,7 +35,8 @@ std::complex<double> pole_of(const std::vector<double>& x, std::size_t stride) {
     normal += row * row.transpose();
     right += row * x[n];
   }
-  const Eigen::Vector2d found = normal.fullPivLu().solve(right);
+  const Eigen::Vector2d found =
+      support::least_squares(Eigen::MatrixXd(normal), Eigen::MatrixXd(right));
   const std::complex<double> root =
       std::sqrt(std::complex<double>(0.25 * found[0] * found[0] + found[1]));
   return std::pow(0.5 * found[0] + root, 1.0 / static_cast<double>(stride));
@@ -305,9 +306,7 @@ struct Hybrid {
   double slack(double factor) const {
     Eigen::MatrixXd matrix = -factor * (k + 2.0 * z);
     matrix.diagonal() += 4.0 * mass - own_k - 2.0 * own_z;
-    return Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>(matrix, Eigen::EigenvaluesOnly)
-        .eigenvalues()
-        .minCoeff();
+    return support::eigenbasis_of(matrix).values.minCoeff();
   }
   double limit() const {
     double low = 0.0;
@@ -331,7 +330,7 @@ struct Hybrid {
     Eigen::MatrixXd step(2 * size, 2 * size);
     step << one - inverse * stiffness, one - inverse * damping, -(inverse * stiffness),
         one - inverse * damping;
-    return Eigen::EigenSolver<Eigen::MatrixXd>(step, false).eigenvalues().cwiseAbs().maxCoeff();
+    return support::eigenvalues_of(step).cwiseAbs().maxCoeff();
   }
 
   struct Spring {

@@ -1,6 +1,5 @@
 // The modes that are told of a network against those that its sound has: poles and levels found in
 // nothing but the samples that the direct form renders. Needs Eigen.
-#include <Eigen/Dense>
 #include <chrono>
 #include <numbers>
 
@@ -163,8 +162,8 @@ std::vector<Heard> listen(const Program& program, double rate_hz) {
       now = next;
     }
   }
-  const Eigen::MatrixXd step = before.householderQr().solve(after);
-  const Eigen::VectorXcd poles = step.eigenvalues();
+  const Eigen::MatrixXd step = support::least_squares(before, after);
+  const Eigen::VectorXcd poles = support::eigenvalues_of(step);
   Eigen::MatrixXcd partials(frames, poles.size());
   for (Eigen::Index n = 0; n < frames; ++n) {
     for (Eigen::Index i = 0; i < poles.size(); ++i) {
@@ -172,7 +171,7 @@ std::vector<Heard> listen(const Program& program, double rate_hz) {
     }
   }
   const Eigen::MatrixXcd amplitudes =
-      partials.colPivHouseholderQr().solve(sound.cast<std::complex<double>>());
+      support::least_squares(partials, sound.cast<std::complex<double>>());
   std::vector<Heard> heard;
   for (Eigen::Index i = 0; i < poles.size(); ++i) {
     if (poles(i).imag() > 1e-9) {
@@ -294,7 +293,7 @@ TEST_CASE("a hand that moves and a force that is heard have their levels, too", 
       // The first samples hear the hand itself.
       const Eigen::Index rest = frames - 4;
       const Eigen::MatrixXcd there = sound.bottomRows(rest).cast<std::complex<double>>();
-      const Eigen::MatrixXcd shares = partials.bottomRows(rest).colPivHouseholderQr().solve(there);
+      const Eigen::MatrixXcd shares = support::least_squares(partials.bottomRows(rest), there);
       CHECK((partials.bottomRows(rest) * shares - there).norm() < 1e-9 * there.norm());
       for (Eigen::Index m = 0; m < 3; ++m) {
         for (Eigen::Index o = 0; o < 4; ++o) {

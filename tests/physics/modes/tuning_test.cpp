@@ -1,7 +1,6 @@
 // Keys and the pitch that sounds. Every tuned preset at three rates: at the stiffness that a key
 // gets, the published scheme's (z - 1)^2 M + z K + (z - 1) Z is singular next to the key's
 // frequency, found by inverse iterations with Eigen; and a render, by linear prediction.
-#include <Eigen/Dense>
 #include <Eigen/SparseLU>
 #include <complex>
 #include <cstdio>
@@ -10,6 +9,7 @@
 #include "core/compile/accuracy/pitches.h"
 #include "core/laws/laws.h"
 #include "core/model/topology.h"
+#include "tests/support/dense.h"
 #include "tests/support/player.h"
 
 namespace ressort {
@@ -160,9 +160,9 @@ std::vector<Complex> poles_of_sound(const std::vector<double>& y, std::size_t fi
     now(i) = at(i + columns);
   }
   Eigen::MatrixXd companion = Eigen::MatrixXd::Zero(columns, columns);
-  companion.row(0) = past.colPivHouseholderQr().solve(now);
+  companion.row(0) = support::least_squares(past, now).transpose();
   companion.bottomLeftCorner(columns - 1, columns - 1).setIdentity();
-  const Eigen::VectorXcd values = companion.eigenvalues();
+  const Eigen::VectorXcd values = support::eigenvalues_of(companion);
   return {values.begin(), values.end()};
 }
 

@@ -2,10 +2,9 @@
 // by hand: bound_test.cpp.
 #include "core/analysis/stability.h"
 
-#include <Eigen/Dense>
-
 #include "core/model/language/expression.h"
 #include "core/model/topology.h"
+#include "tests/support/dense.h"
 #include "tests/support/growth.h"
 
 namespace ressort {
@@ -88,17 +87,17 @@ Wiring random_wiring(support::Random& random) {
 // The roots of det((z-1)^2 M + z K + (z-1) Z) outside the unit circle, by the companion matrix.
 int unstable_roots(const Eigen::MatrixXd& m, const Eigen::MatrixXd& k, const Eigen::MatrixXd& z) {
   const Eigen::Index n = m.rows();
-  const Eigen::MatrixXd inverse = m.inverse();
+  const Eigen::MatrixXd inverse = support::inverse_of(m);
   Eigen::MatrixXd companion = Eigen::MatrixXd::Zero(2 * n, 2 * n);
   companion.topLeftCorner(n, n) = 2.0 * Eigen::MatrixXd::Identity(n, n) - inverse * (k + z);
   companion.topRightCorner(n, n) = inverse * z - Eigen::MatrixXd::Identity(n, n);
   companion.bottomLeftCorner(n, n).setIdentity();
-  const Eigen::VectorXcd roots = companion.eigenvalues();
+  const Eigen::VectorXcd roots = support::eigenvalues_of(companion);
   return static_cast<int>((roots.array().abs() > 1.0 + 1e-6).count());
 }
 
 Eigen::VectorXd spectrum(const Eigen::MatrixXd& symmetric) {
-  return Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>(symmetric).eigenvalues();
+  return support::eigenbasis_of(symmetric).values;
 }
 
 ParameterBox as_written(const Network& network) {
@@ -170,10 +169,9 @@ TEST_CASE("every unstable root is a negative eigenvalue of 4M - K - 2Z, and the 
     Wiring wiring = random_wiring(random);
     const Eigen::MatrixXd load =
         wiring.sum(&Wiring::Spring::k) + 2.0 * wiring.sum(&Wiring::Spring::z);
-    Eigen::GeneralizedSelfAdjointEigenSolver<Eigen::MatrixXd> modes(load, wiring.mass());
     // Around the limit, and well above, where several roots are outside.
     const double off = i % 2 == 0 ? random.uniform(0.99, 1.01) : random.uniform(0.5, 3.0);
-    const double scale = off * 4.0 / modes.eigenvalues().maxCoeff();
+    const double scale = off * 4.0 / support::pencil_values(load, wiring.mass()).maxCoeff();
     for (Wiring::Spring& spring : wiring.springs) {
       spring.k *= scale;
       spring.z *= scale;
@@ -209,9 +207,8 @@ TEST_CASE("the exact factor on every stiffness is where the lowest eigenvalue is
       REQUIRE(factor == 0.0);
       continue;
     }
-    const Eigen::GeneralizedSelfAdjointEigenSolver<Eigen::MatrixXd> pencil(
-        wiring.sum(&Wiring::Spring::k), rest);
-    REQUIRE(factor == exactly(1.0 / pencil.eigenvalues().maxCoeff()));
+    const Eigen::VectorXd pencil = support::pencil_values(wiring.sum(&Wiring::Spring::k), rest);
+    REQUIRE(factor == exactly(1.0 / pencil.maxCoeff()));
     REQUIRE(factor >= factor_of(wiring.text()));  // what the bound allows is allowed
     ++found;
   }
@@ -336,10 +333,10 @@ TEST_CASE("a place on a string counts with the masses around it", "[stability]")
   // 1/k = gT (4M - K)^-1 g with g = (3/4, 1/4, 0).
   const std::string model =
       "@k param 0.1\n@u param 0.3125\n@d string 5 1. 0.5 0. 0. 0.\n@g ground 0.\n";
-  Eigen::Matrix3d rest;
+  Eigen::MatrixXd rest(3, 3);
   rest << 3.0, 0.5, 0.0, 0.5, 3.0, 0.5, 0.0, 0.5, 3.0;
   const Eigen::Vector3d g(0.75, 0.25, 0.0);
-  const double fixed = 1.0 / g.dot(rest.inverse() * g);
+  const double fixed = 1.0 / g.dot(support::inverse_of(rest) * g);
   CHECK(highest(model + "@l spring @g [@d 0.3125] k\n", "k") == exactly(fixed));
   // The bound: 1.6 and 1.2 at the ends of the worst link; live, the place's 0.8 at every mass.
   CHECK(factor_of(model + "@l spring @g [@d 0.3125] 0.8\n") ==
@@ -348,19 +345,19 @@ TEST_CASE("a place on a string counts with the masses around it", "[stability]")
   // A place that moves may be anywhere: not above what any one mass allows.
   const double live = highest(model + "@l spring @g [@d u] k\n", "k");
   for (int i = 0; i < 3; ++i) {
-    CHECK(live <= 1.0 / rest.inverse()(i, i));
+    CHECK(live <= 1.0 / support::inverse_of(rest)(i, i));
   }
   // The middle one gives way least: exact, as it is held by nothing else that moves.
-  CHECK(live == Approx(1.0 / rest.inverse()(1, 1)).epsilon(2e-6));
+  CHECK(live == Approx(1.0 / support::inverse_of(rest)(1, 1)).epsilon(2e-6));
 }
 
 TEST_CASE("links at places that move count at the worst of them", "[stability]") {
   // Two strings joined wherever it may be: x_a^2 and x_b^2 twice each, at most at one mass.
-  Eigen::Matrix3d a;
+  Eigen::MatrixXd a(3, 3);
   a << 3.0, 0.5, 0.0, 0.5, 3.0, 0.5, 0.0, 0.5, 3.0;
-  Eigen::Matrix2d b;
+  Eigen::MatrixXd b(2, 2);
   b << 3.4, 0.3, 0.3, 3.4;
-  const double most = std::max(a.inverse()(1, 1), b.inverse()(0, 0));
+  const double most = std::max(support::inverse_of(a)(1, 1), support::inverse_of(b)(0, 0));
   CHECK(highest("@k param 0.1\n@u param 0.3\n@v param 0.6\n@a string 5 1. 0.5 0. 0. 0.\n"
                 "@b string 4 1. 0.3 0. 0. 0.\n@l spring [@a u] [@b v] k\n",
                 "k") == Approx(0.5 / most).epsilon(2e-6));

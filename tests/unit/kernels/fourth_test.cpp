@@ -157,10 +157,7 @@ TEST_CASE("what is stable as published is so to fourth order", "[fourth]") {
       const auto matrices = support::matrices_of(program_of(knot(random, scale)));
       const Eigen::VectorXd root = matrices.mass.cwiseSqrt().cwiseInverse();
       const Eigen::MatrixXd both = matrices.stiffness + 2.0 * matrices.damping;
-      return Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>(root.asDiagonal() * both *
-                                                            root.asDiagonal())
-          .eigenvalues()
-          .maxCoeff();
+      return support::eigenbasis_of(root.asDiagonal() * both * root.asDiagonal()).values.maxCoeff();
     };
     support::Random random(seed);
     Program program = program_of(knot(random, 3.999 / steepest(1.0)));
