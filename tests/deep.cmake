@@ -6,7 +6,7 @@ set(ressort_fuzzers model preset score midi smf scala console osc osc_packet fli
 list(TRANSFORM ressort_fuzzers PREPEND fuzz_ OUTPUT_VARIABLE ressort_deep_tests)
 list(APPEND ressort_deep_tests arm everything_sanitized everything_more forms_everywhere
   accuracy_everywhere silence_everywhere modes_everywhere calculix_everywhere bodies_everywhere
-  bells_everywhere lint scenes_more abuse_long bows settings_more edits_more flights_everywhere
+  bells_everywhere heard_pitch_everywhere lint scenes_more abuse_long bows settings_more edits_more flights_everywhere
   server_killed installed mpi soak)
 list(LENGTH ressort_deep_tests ressort_deep_count)
 
@@ -38,6 +38,9 @@ add_deep_test(forms_everywhere 240 $<TARGET_FILE:ressort_tests> "[forms_everywhe
 # Two thousand random nonlinear scenes; a person may ask for others: FIRST,COUNT,FRAMES[,LINKS].
 add_deep_test(scenes_more 200 ${CMAKE_COMMAND} -E env RESSORT_SCENES=1001,2000,1024
   $<TARGET_FILE:ressort_tests> "[scenes]")
+
+# Every tuned preset's pitch from its sound, over the keyboard and at three rates.
+add_deep_test(heard_pitch_everywhere 120 $<TARGET_FILE:ressort_tests> "[heard_pitch_everywhere]")
 
 # Masses and bodies a hundredth this side of the border of stability and beyond.
 add_deep_test(bodies_everywhere 60 $<TARGET_FILE:ressort_tests> "[bodies_everywhere]")

@@ -2,29 +2,35 @@
 #pragma once
 
 #include <cmath>
+#include <complex>
 #include <numbers>
 #include <span>
+#include <vector>
 
 namespace ressort::support {
 
 // The frequency where the spectrum under a Hann window is largest, near a guess. A decaying sine
-// has its peak at its own frequency, and the window keeps the others out of the way.
-inline double measured_hz(std::span<const double> y, double rate_hz, double guess_hz) {
+// has its peak at its own frequency, and the window keeps the others out of the way. `width` is how
+// much of the guess it may be off: not so much that there is a second peak.
+inline double measured_hz(std::span<const double> y, double rate_hz, double guess_hz,
+                          double width = 0.03) {
+  std::vector<double> seen(y.begin(), y.end());
+  for (std::size_t n = 0; n < seen.size(); ++n) {
+    seen[n] *= 1.0 - std::cos(2.0 * std::numbers::pi * static_cast<double>(n) /
+                              static_cast<double>(seen.size()));
+  }
   const auto magnitude = [&](double hz) {
-    const double step = 2.0 * std::numbers::pi * hz / rate_hz;
-    double re = 0.0;
-    double im = 0.0;
-    for (std::size_t n = 0; n < y.size(); ++n) {
-      const auto time = static_cast<double>(n);
-      const double window =
-          1.0 - std::cos(2.0 * std::numbers::pi * time / static_cast<double>(y.size()));
-      re += window * y[n] * std::cos(step * time);
-      im += window * y[n] * std::sin(step * time);
+    const std::complex<double> turn = std::polar(1.0, -2.0 * std::numbers::pi * hz / rate_hz);
+    std::complex<double> wave = 1.0;
+    std::complex<double> sum = 0.0;
+    for (const double sample : seen) {
+      sum += sample * wave;
+      wave *= turn;
     }
-    return re * re + im * im;
+    return std::norm(sum);
   };
-  double low = guess_hz * 0.97;
-  double high = guess_hz * 1.03;
+  double low = guess_hz * (1.0 - width);
+  double high = guess_hz * (1.0 + width);
   for (int i = 0; i < 40; ++i) {  // golden section
     const double a = high - (high - low) * 0.6180339887498949;
     const double b = low + (high - low) * 0.6180339887498949;

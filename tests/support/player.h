@@ -55,6 +55,8 @@ inline std::string ringing_string() {
 // An engine and all that it has played.
 class Player {
  public:
+  explicit Player(Compiled made)
+      : compiled(std::move(made)), out(static_cast<std::size_t>(compiled.instrument.outputs)) {}
   Player(const std::string& text, const Preset& preset, const CompileOptions& options = {}) {
     auto made = compile(network_of(text), preset, options);
     REQUIRE(made);
