@@ -17,7 +17,6 @@
 #include "app/text.h"
 #include "core/analysis/stability.h"
 #include "core/compile/compile.h"
-#include "core/compile/schemes.h"
 #include "core/model/language/print.h"
 #include "core/model/topology.h"
 
@@ -66,9 +65,7 @@ Proved prove(const Scene& scene, const Compiled& compiled, const Progress& progr
     as_written.lowest.push_back(info.value);
     as_written.highest.push_back(info.value);
   }
-  // What is computed passively is stable whatever its numbers are.
-  Stability stability(without_passive(scene.network, compiled.schemes.links), 1.0,
-                      Stability::most_exact_masses, progress);
+  Stability stability(compiled.stability.proved, 1.0, Stability::most_exact_masses, progress);
   progress.stage("proving that it is stable in all ranges");
   Proved proved{.certificate = stability.certify(box),
                 .stiffness_factor = stability.stiffness_factor(box)};

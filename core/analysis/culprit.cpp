@@ -9,16 +9,18 @@
 namespace ressort {
 namespace {
 
-// Where the argument of a link's stiffness or damping stands; of two stiffnesses, the greater.
-std::size_t slot_of(const Link& link, Quantity quantity, std::span<const Range> arguments) {
+// Where the argument of a link's stiffness or damping stands; of two stiffnesses the greater, or
+// the one that is negative.
+std::size_t slot_of(const Link& link, Quantity quantity, bool feeds,
+                    std::span<const Range> arguments) {
   const LawFacts& law = facts_of(link.law);
   if (quantity != Quantity::stiffness || !law.has(Role::stiffness)) {
     return law.slot(Role::damping);
   }
-  const auto highest = [&](Role role) {
-    return range_at(arguments, link.arguments[law.slot(role)]).highest;
-  };
-  const bool is_limit = law.has(Role::limit) && !(highest(Role::stiffness) > highest(Role::limit));
+  const auto range = [&](Role role) { return range_at(arguments, link.arguments[law.slot(role)]); };
+  const bool is_limit = law.has(Role::limit) &&
+                        (feeds ? range(Role::limit).lowest < 0.0
+                               : !(range(Role::stiffness).highest > range(Role::limit).highest));
   return law.slot(is_limit ? Role::limit : Role::stiffness);
 }
 
@@ -59,7 +61,7 @@ Proofs::Suspect Proofs::feeder(std::span<const Range> arguments) const {
     return std::min(a.stiff, a.damped) < std::min(b.stiff, b.damped);
   });
   return {least->stiff < least->damped ? Quantity::stiffness : Quantity::damping,
-          static_cast<std::size_t>(least - all.begin())};
+          static_cast<std::size_t>(least - all.begin()), true};
 }
 
 Proofs::Suspect Proofs::heavier_part(std::size_t term, std::span<const Range> arguments) const {
@@ -106,7 +108,7 @@ ArgumentId Proofs::argument_of(const Suspect& suspect, std::span<const Range> ar
   const Assembly::Term& term = assembly_.terms[suspect.index];
   if (term.is_link) {
     const Link& link = network_.links[term.element];
-    return link.arguments[slot_of(link, suspect.quantity, arguments)];
+    return link.arguments[slot_of(link, suspect.quantity, suspect.feeds, arguments)];
   }
   const Mass& mass = network_.masses[term.element];
   return suspect.quantity == Quantity::stiffness ? mass.stiffness : mass.damping;
@@ -145,7 +147,8 @@ Culprit Proofs::accuse(const Suspect& suspect, std::span<const Range> arguments)
     }
     culprit.argument = print_expression(network_.arguments[argument], names);
     const Range range = arguments[argument];
-    const bool is_lowest = suspect.quantity == Quantity::mass || range.highest <= 0.0;
+    const bool is_lowest =
+        suspect.quantity == Quantity::mass || suspect.feeds || range.highest <= 0.0;
     culprit.value = is_lowest ? range.lowest : range.highest;
   }
   culprit.others = users(suspect, arguments) - 1;
@@ -159,7 +162,7 @@ std::size_t Proofs::users(const Suspect& suspect, std::span<const Range> argumen
       suspect.quantity == Quantity::mass ? assembly_.masses.size() : assembly_.terms.size();
   std::set<std::pair<int, int>> places;
   for (std::size_t i = 0; i < count; ++i) {
-    const Suspect other{suspect.quantity, i};
+    const Suspect other{suspect.quantity, i, suspect.feeds};
     if (argument_of(other, arguments) == argument) {
       places.insert({location_of(other).line, location_of(other).column});
     }

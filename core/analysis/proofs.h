@@ -36,6 +36,7 @@ class Proofs {
   struct Suspect {
     Quantity quantity = Quantity::stiffness;
     std::size_t index = 0;
+    bool feeds = false;  // by being negative, not by its size
   };
   enum class Course { flat, straight, bent };
 

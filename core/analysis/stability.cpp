@@ -16,12 +16,26 @@ constexpr double safe_limit = 4.0 * (1.0 - 1e-9);  // whatever the rounding
 
 }  // namespace
 
+bool pushes(const Network& network, const Link& link, std::span<const double> parameters) {
+  LawNumbers numbers{};
+  for (std::size_t i = 0; i < numbers.size(); ++i) {
+    numbers[i] = argument_value(network, link.arguments[i], parameters);
+  }
+  const Slopes least = gentlest(link.law, numbers);
+  return least.pull < 0.0 || least.damping < 0.0;
+}
+
 Network always_felt(Network network) {
-  std::erase_if(network.links, [](const Link& link) {
+  const std::vector<double> values = parameter_values(network);
+  std::erase_if(network.links, [&](const Link& link) {
     const LinearPart part = linear_part(link);
-    return part.stiffness == no_argument && part.damping == no_argument;
+    return part.stiffness == no_argument && part.damping == no_argument &&
+           !pushes(network, link, values);
   });
   for (Link& link : network.links) {
+    if (pushes(network, link, values)) {
+      continue;
+    }
     const LinearPart part = linear_part(link);
     link.law = Law::spring;
     link.arguments.fill(no_argument);

@@ -70,8 +70,12 @@ struct SafeRange {
   double highest = 0.0;
 };
 
+// Whether its stiffness or damping is below 0 somewhere, with these values of the parameters:
+// motion may grow by itself there, however its force is found.
+bool pushes(const Network& network, const Link& link, std::span<const double> parameters);
+
 // What is always felt: springs, dampers, oscillators, and what nonlinear springs are at rest.
-// Without plucks, bows and contacts, of which nothing may ever touch.
+// Without plucks, bows and contacts, of which nothing may ever touch, but for what pushes.
 Network always_felt(Network network);
 
 // "stable below 1.31568", "stable between 0.1 and 4", "stable anywhere".

@@ -74,6 +74,7 @@ Analysis prove(const Request& request, const Reduced& reduced, const Machine& ma
                        .expanded = network,
                        .preset = request.preset,
                        .parameters = asked,
+                       .schemes = schemes.links,
                        .start = start,
                        .rate_hz = options.rate_hz,
                        .rate_ratio = request.rate_ratio,
@@ -408,7 +409,7 @@ Result<Compiled> compile_by_stages(const Request& request) {
                            .budget = request.budget,
                            .accuracy = accuracy_of(planned.parts),
                            .notes = std::move(notes)},
-                  .stability = analysis.stability,
+                  .stability = std::move(analysis.stability),
                   .schemes = schemes};
 }
 

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 
+#include "core/analysis/stability.h"
 #include "core/laws/laws.h"
 #include "core/model/topology.h"
 
@@ -106,20 +107,19 @@ Network without_passive(const Network& network, std::span<const LinkScheme> sche
   if (std::all_of(schemes.begin(), schemes.end(), is_plain)) {
     return network;
   }
-  Network felt = expand_macros(network);
-  std::vector<Link> links;
-  for (std::size_t i = 0; i < felt.links.size(); ++i) {
-    const LawFacts& law = facts_of(felt.links[i].law);
+  const std::vector<double> values = parameter_values(network);
+  std::size_t i = 0;  // those of macros come after these, and are plain
+  Network felt = network;
+  std::erase_if(felt.links, [&](const Link& link) {
+    const LawFacts& law = facts_of(link.law);
     // Quadratic and cubic springs count with what they are at rest, by their own K and Z; what
     // holds a waveguide with what it may have below 0.
-    const bool holds_waveguide = felt.masses[felt.links[i].a].kind == MassKind::junction ||
-                                 felt.masses[felt.links[i].b].kind == MassKind::junction;
-    if (i >= schemes.size() || is_plain(schemes[i]) || holds_waveguide ||
-        (law.contains_spring && law.is_curved)) {
-      links.push_back(std::move(felt.links[i]));
-    }
-  }
-  felt.links = std::move(links);
+    const bool counts = i >= schemes.size() || is_plain(schemes[i]) ||
+                        (law.contains_spring && law.is_curved) || pushes(network, link, values) ||
+                        is_on_waveguide(network, link.a) || is_on_waveguide(network, link.b);
+    ++i;
+    return !counts;
+  });
   return felt;
 }
 

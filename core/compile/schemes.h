@@ -33,9 +33,10 @@ struct Schemes {
 // For a network without macros. O(links). [any thread but audio]
 Schemes choose_schemes(const Network& network, const Budget& budget, const Progress& progress = {});
 
-// The network without the links that their scheme keeps stable whatever their numbers are: what
-// remains is what a proof of stability has to be about. Springs keep their K and Z. Macros are
-// written out only where a link goes. O(n). [any thread but audio]
+// The network without the links that their scheme keeps stable however strong they are: what
+// remains is what a proof of stability has to be about. Springs keep their K and Z, and so does
+// what pushes instead of pulling. With macros or without, as it is given. O(n).
+// [any thread but audio]
 Network without_passive(const Network& network, std::span<const LinkScheme> schemes);
 
 }  // namespace ressort

@@ -27,8 +27,8 @@ class StabilityChecker {
   explicit StabilityChecker(const StabilityRequest& request)
       : request_(request),
         start_(request.start.begin(), request.start.end()),
-        stability_(always_felt(request.expanded), request.rate_ratio, most_quick_masses,
-                   request.progress) {
+        stability_(felt(), request.rate_ratio, most_quick_masses, request.progress) {
+    result_.proved = without_passive(request.written, request.schemes);
     result_.parameters = request.parameters;
     result_.is_together = start_.size() * stability_.size() > most_quick_work;
   }
@@ -56,6 +56,8 @@ class StabilityChecker {
   }
 
  private:
+  Network felt() const { return always_felt(without_passive(request_.expanded, request_.schemes)); }
+
   bool is_audio(std::size_t i) const { return request_.expanded.parameters[i].audio_input > 0; }
 
   Verdict prove_start() {
@@ -63,14 +65,14 @@ class StabilityChecker {
     if (verdict != Verdict::unproved || request_.expanded.masses.size() <= most_quick_masses) {
       return verdict;
     }
-    stability_ = Stability(always_felt(request_.expanded), request_.rate_ratio,
-                           Stability::most_exact_masses, request_.progress);
+    stability_ =
+        Stability(felt(), request_.rate_ratio, Stability::most_exact_masses, request_.progress);
     return stability_.prove(box_);
   }
 
   // By the network as it is written, where a macro is one element.
   Error complain() const {
-    Error error = complaint(Stability(always_felt(request_.written), request_.rate_ratio,
+    Error error = complaint(Stability(always_felt(result_.proved), request_.rate_ratio,
                                       Stability::most_exact_masses, request_.progress)
                                 .certify(box_));
     if (request_.rate_ratio != 1.0) {

@@ -56,6 +56,7 @@ struct StabilityRequest {
   const Network& expanded;  // the same without macros
   const Preset& preset;
   const std::vector<ParameterInfo>& parameters;  // as asked_ranges() says
+  std::span<const LinkScheme> schemes;           // [link] how forces are found; empty: as published
   std::span<const double> start;                 // [parameter] as start_values() says
   double rate_hz = 44100.0;
   double rate_ratio = 1.0;
@@ -66,7 +67,8 @@ struct StabilityRequest {
 };
 
 struct StabilityCheck {
-  Verdict verdict = Verdict::stable;      // of the start, by what is always felt
+  Network proved;  // as written, without what its scheme keeps stable: what all this is about
+  Verdict verdict = Verdict::stable;      // of the start, by what of it is always felt
   std::optional<Error> complaint;         // unless stable: of the model, with its line
   std::vector<ParameterInfo> parameters;  // in the ranges that are left to them
   std::vector<Error> narrowed;  // ranges that the preset gives and that are too wide; its lines

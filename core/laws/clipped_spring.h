@@ -108,8 +108,10 @@ struct ClippedSpring {
             .stiff_damping = extra,
             .pull = std::max(stiffness, is_bent ? most.k + 2.0 * extra : 0.0)};
   }
+  // From 0 on it may push as long as it pulls further out.
   static Slopes gentlest(const ClippedSpring& least) {
-    return {.damping = std::min(0.0, least.z), .pull = std::min(0.0, least.k)};
+    const double far = least.c <= 0.0 ? std::min(least.s, least.k) : least.k;
+    return {.damping = std::min(0.0, least.z), .pull = std::min(0.0, far)};
   }
 
   V s;

@@ -226,6 +226,13 @@ bool is_waveguide(MacroKind kind) {
   return kind == MacroKind::waveguide || kind == MacroKind::open_waveguide;
 }
 
+bool is_on_waveguide(const Network& network, std::uint32_t mass) {
+  const Mass& place = network.masses[mass];
+  return place.kind == MassKind::junction ||
+         (place.kind == MassKind::point && !network.macros.empty() &&
+          is_waveguide(network.macros[network.taps[place.tap].macro].kind));
+}
+
 bool has_waveguide(const Network& network) {
   return !network.waveguides.empty() ||
          std::any_of(network.macros.begin(), network.macros.end(),

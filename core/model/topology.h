@@ -9,6 +9,7 @@ namespace ressort {
 inline constexpr std::uint64_t max_macro_nodes = 4'000'000;  // of one model
 
 bool is_waveguide(MacroKind kind);
+bool is_on_waveguide(const Network& network, std::uint32_t mass);  // a place, written out or not
 bool has_waveguide(const Network& network);
 bool is_mesh(MacroKind kind);  // has a length and a width
 

@@ -119,7 +119,8 @@ TEST_CASE("what may never touch is no reason to refuse, nor what is not proved",
        {"contact @g @m 50 0.1 0.", "nlContact @g @m 0.1 0.1 50 0.1 0.", "nlPluck @g @m 500 0.1 0.",
         "nlBow @g @m 50 0.1", "nlBow @g @m 50 0.1 1", "nlSpringDamper @g @m 0.1 0.1 50 0.1"}) {
     INFO(link);
-    CHECK(said_to(ground + "@s spring @g @m 0.1 0.1\n@l " + link + "\n") == "");
+    CHECK(said_to(ground + "@s spring @g @m 0.1 0.1\n@l " + link + "\n").find("stable") ==
+          std::string::npos);
   }
   CHECK(
       said_to(ground + "@r spring @g @m -0.1\n") ==
@@ -130,6 +131,42 @@ TEST_CASE("what may never touch is no reason to refuse, nor what is not proved",
   CHECK(said_to(mesh + "0.51 0. 0. 0.\n", {.method = Method::direct}).find(" warning: ") !=
         std::string::npos);
   CHECK(said_to(mesh + "0.49 0. 0. 0.\n", {.method = Method::direct}) == "");
+}
+
+TEST_CASE("what is made passive is judged without it, by whoever asks", "[stability_check]") {
+  // 4M - S - 2Z < 0 as published, and no more than a potential and a damper where it is passive.
+  const std::string strong =
+      "@g ground 0.\n@m mass 0.1 0. 0.\n@x nlSpringDamper @m @g 0.001 1e5 1e4 ";
+  const CompileOptions as_played{.bare = true, .budget = Budget{}};
+  const CompileOptions published{.bare = true};
+  CHECK(said_to(strong + "0.5\n") == "");
+  CHECK(said_to(strong + "0.5\n", as_played) == "");
+  CHECK(
+      said_to(strong + "0.5\n", published).find("the damping 0.5 of 'x' must stay below 0.1995") !=
+      std::string::npos);
+  // A mass that is so light that it is made part of a spring is not judged by itself.
+  const std::string light =
+      ground + "@l mass 0.001 0. 0.\n@a spring @g @l 0.1\n@b spring @l @m 0.1\n";
+  CHECK(said_to(light) == "");
+  // Nothing makes a stiffness or a damping below 0 passive; from the middle a spring may push.
+  const auto is_told = [&](const std::string& link, const std::string& what) {
+    const std::string may = "warning: may be unstable: the " + what + " of 'x' is negative";
+    CAPTURE(link);
+    CHECK(said_to(ground + "@x " + link + "\n").find(may) != std::string::npos);
+    CHECK(said_to(ground + "@x " + link + "\n", as_played).find(may) != std::string::npos);
+  };
+  is_told("contact @m @g -0.1 0.01 0.", "stiffness -0.1");
+  is_told("contact @m @g 0.1 -0.01 0.", "damping -0.01");
+  is_told("nlBow @m @g -0.1 0.1", "damping -0.1");
+  is_told("nlSpringDamper @m @g 0.1 0.1 -0.2 0.01", "stiffness -0.2");
+  is_told("nlSpringDamper @m @g -0.1 0. 0.2 0.01", "stiffness -0.1");
+  CHECK(said_to(ground + "@x nlSpringDamper @m @g -0.1 0.1 0.2 0.01\n") == "");
+  // What the proof is about is what `check` tells limits of.
+  for (const std::string& text : {strong + "0.5\n", light}) {
+    const auto made = compile(network_of(text), {}, {});
+    REQUIRE(made);
+    CHECK(Stability(made->stability.proved, 1.0).certify({{}, {}}).verdict == Verdict::stable);
+  }
 }
 
 TEST_CASE("a range that is too wide is narrowed and told, at its line", "[stability_check]") {
