@@ -157,7 +157,8 @@ void add_strict(CLI::App& command, bool& is_strict) {
   command.add_flag(
       "--strict", is_strict,
       "a budget of cents or t60 that is not kept, or of which nobody knows whether it\n"
-      "is, is an error: exit code 2 instead of a warning");
+      "is, and a bow that is too strong for its steps are errors: exit code 2 instead of\n"
+      "a warning");
 }
 
 // How the network is computed, for every command that computes it.

@@ -17,7 +17,7 @@ struct CheckOptions {
   std::optional<ThirdArgument> third;  // whatever preset and model say
   std::optional<Method> method;        // without one, the plan's choice
   std::optional<Budget> budget;        // instead of the preset's
-  bool is_strict = false;              // a budget that is not kept is an error
+  bool is_strict = false;              // what only warns is an error
 };
 
 // Findings go to stderr, with their lines if that is a terminal; with json all is one object on

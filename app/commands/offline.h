@@ -32,7 +32,7 @@ struct RenderOptions {
   bool rescale = true;
   std::optional<Method> method;        // without one, the plan's choice
   std::optional<Budget> budget;        // instead of the preset's
-  bool is_strict = false;              // a budget that is not kept is an error
+  bool is_strict = false;              // what only warns is an error
   std::optional<ThirdArgument> third;  // whatever the model shows
   KeyOptions keys;                     // instead of the preset's
   bool limit = false;

@@ -51,6 +51,10 @@ Admission ask_to_play(const Scene& scene, const CompileOptions& options, bool is
   if (compiled->schemes.hazard) {
     admission.findings.push_back(in_model(scene, *compiled->schemes.hazard, Severity::warning));
   }
+  if (compiled->strong_bow) {
+    admission.findings.push_back(
+        in_model(scene, *compiled->strong_bow, is_strict ? Severity::error : Severity::warning));
+  }
   const std::vector<Part>& parts = compiled->plan.parts;
   const auto broken = broken_promise(compiled->plan);
   if (broken &&

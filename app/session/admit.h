@@ -19,8 +19,8 @@ struct Admission {
 
 // Refuses, with file, line and column, where compile() fails, and where the model is not stable as
 // it starts unless the options say to force it. Tells what is narrowed, forced or not proved, and
-// what a budget promises and is not kept, which `is_strict` refuses; not while a better form is yet
-// to be looked for. [any thread but audio]
+// what `is_strict` refuses: a bow that is too strong for its steps, and what a budget promises and
+// is not kept, but not while a better form is yet to be looked for. [any thread but audio]
 Admission ask_to_play(const Scene& scene, const CompileOptions& options, bool is_strict = false);
 
 // The same for who wants to play or nothing: warnings are added to `warnings`, an error's message

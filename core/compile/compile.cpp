@@ -5,6 +5,7 @@
 #include <numbers>
 #include <string>
 
+#include "core/compile/accuracy/grip.h"
 #include "core/compile/accuracy/loaded_waveguide.h"
 #include "core/compile/accuracy/pitches.h"
 #include "core/compile/accuracy/waveguide_pitch.h"
@@ -12,6 +13,7 @@
 #include "core/compile/make_engine.h"
 #include "core/compile/merge.h"
 #include "core/compile/rest_bound.h"
+#include "core/model/language/expression.h"
 #include "core/model/number_check.h"
 #include "core/model/preset/fit.h"
 #include "core/model/topology.h"
@@ -310,6 +312,35 @@ std::string missed_mode(const Network& network, const Preset& preset) {
   return preset.pitch_mode > 1 ? "there is no mode " + std::to_string(preset.pitch_mode) : "";
 }
 
+// Which bow is too strong as it starts; and from which pitch on the strongest is, anywhere in its
+// ranges.
+struct Grip {
+  std::optional<Error> strong;
+  std::string note;
+};
+Grip find_grip(const Request& request, const Network& network, const Schemes& schemes,
+               const Machine& machine, const Analysis& analysis, std::span<const double> start) {
+  const std::vector<double> values(start.begin(), start.end());
+  const auto strongest_in = [&](const ParameterBox& box) {
+    return strongest_bow(network, schemes.links, box, start, request.rate_ratio);
+  };
+  Grip grip;
+  const double steps = steps_of_bows(machine);
+  if (const auto bow = strongest_in({values, values})) {
+    grip.strong = too_strong(*bow, steps, request.options.rate_hz);
+  }
+  const auto bow = grip.strong || !analysis.mode
+                       ? std::nullopt
+                       : strongest_in(proved_box(analysis.stability, request.preset));
+  const double factor = bow ? too_strong_from(*bow, steps) : Budget::unlimited;
+  if (factor < analysis.margins.keys) {
+    const double hz = analysis.pitches.frequency_at(factor);
+    grip.note = "at its strongest the bow '" + bow->name + "' lets go a little early in notes " +
+                "above " + print_number(std::floor(hz)) + " Hz";
+  }
+  return grip;
+}
+
 // What a person should know of how it is computed, beside how its parts are.
 std::vector<std::string> make_notes(const Schemes& schemes, const Culled& culled,
                                     const Analysis& analysis, const std::string& missed_mode,
@@ -399,6 +430,10 @@ Result<Compiled> compile_by_stages(const Request& request) {
       schemes, culled, analysis, preset.keyboard && !mode ? missed_mode(network, preset) : "",
       !factor, reduced.merged);
   notes.insert(notes.end(), pitch_notes.begin(), pitch_notes.end());
+  Grip grip = find_grip(request, network, schemes, planned.machine, analysis, start);
+  if (!grip.note.empty()) {
+    notes.push_back(std::move(grip.note));
+  }
   progress.stage("making its voices");
   Instrument instrument = make_instrument(network, preset, analysis, voices, gain);
   instrument.struck = find_struck(request.written, planned.machine);
@@ -410,7 +445,8 @@ Result<Compiled> compile_by_stages(const Request& request) {
                            .accuracy = accuracy_of(planned.parts),
                            .notes = std::move(notes)},
                   .stability = std::move(analysis.stability),
-                  .schemes = schemes};
+                  .schemes = schemes,
+                  .strong_bow = std::move(grip.strong)};
 }
 
 }  // namespace

@@ -49,6 +49,7 @@ struct Compiled {
   Plan plan;
   StabilityCheck stability;  // whoever lets it sound has asked this
   Schemes schemes;
+  std::optional<Error> strong_bow;  // that one is too strong for its steps, at the model's line
 };
 
 // One stage after the other, each a function from what is known to what it finds. Fails, with the

@@ -169,6 +169,49 @@ TEST_CASE("what is made passive is judged without it, by whoever asks", "[stabil
   }
 }
 
+TEST_CASE("a bow that is too strong for its steps is told at its line, or refused",
+          "[stability_check]") {
+  const std::string bowed = "@in1 posInput 0.\n@m osc 2. 0.01 0. 0. 0.\n@b nlBow @in1 @m ";
+  const std::string heard = " 0.01\n@out1 posOutput @m\n";
+  CHECK(said_to(bowed + "5.9" + heard) == "");
+  const std::string told = said_to(bowed + "20" + heard);
+  CHECK(
+      told ==
+      "there.mdl:3:1: warning: the bow 'b' is too strong for its steps: Z is 20 in each and should "
+      "be below 6, three times the mass that it holds; it lets go too early, and one mass alone "
+      "squeaks far above its pitch; --method oversampled or a rate of 147000 Hz plays it "
+      "right");
+  CHECK(said_to(bowed + "20" + heard, {.method = Method::oversampled}) == "");
+  CHECK(said_to(bowed + "20" + heard, {.rate_hz = 148000.0}) == "");
+  CHECK(said_to(bowed + "100" + heard).find("; a rate of 735000 Hz plays it right") !=
+        std::string::npos);
+  std::vector<std::string> warnings;
+  const auto strict = admit(scene_of(bowed + "20" + heard), {}, warnings, true);
+  REQUIRE(!strict);
+  CHECK(strict.error().message.find("there.mdl:3:1: error: the bow 'b'") == 0);
+  // As published it is another matter; halfway between two masses half as much gives way to it.
+  CHECK(said_to(bowed + "20" + heard, {.bare = true, .budget = Budget{.passive = Passivity::never}})
+            .find("is too strong") == std::string::npos);
+  const std::string string =
+      "@s string 9 2. 0.5 0. 0. 0.\n@in1 posInput 0.\n@out1 posOutput [@s 0.5]\n";
+  CHECK(said_to(string + "@b nlBow @in1 [@s 0.4375] 11.9 0.01\n") == "");
+  CHECK(said_to(string + "@b nlBow @in1 [@s 0.4375] 12.1 0.01\n").find("below 12, ") !=
+        std::string::npos);
+  // Keys make bows as strong as they make strings.
+  const auto keyed =
+      compile(network_of(string + "@b nlBow @in1 [@s 0.5] 1.5 0.01\n"), struck(1), {});
+  REQUIRE(keyed);
+  const auto& notes = keyed->plan.notes;
+  // 16 times the stiffness makes the bow four times as strong.
+  const double hz = 4.0 * keyed->instrument.mode->frequency_hz;
+  const std::string from = "at its strongest the bow 'b' lets go a little early in notes above ";
+  const auto note = std::find_if(notes.begin(), notes.end(), [&](const std::string& text) {
+    return text.find(from) == 0 && text.find(" Hz") == text.size() - 3;
+  });
+  REQUIRE(note != notes.end());
+  CHECK(std::stod(note->substr(from.size())) == Approx(hz).epsilon(.002));
+}
+
 TEST_CASE("a range that is too wide is narrowed and told, at its line", "[stability_check]") {
   std::vector<std::string> warnings;
   const auto low = admit(scene_of(oscillator, with_range("K", 0.5, 0.1, 5.0)), {}, warnings);

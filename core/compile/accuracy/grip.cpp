@@ -1,0 +1,116 @@
+#include "core/compile/accuracy/grip.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <map>
+
+#include "core/analysis/assembly.h"
+#include "core/analysis/places.h"
+#include "core/laws/laws.h"
+#include "core/model/language/expression.h"
+
+namespace ressort {
+namespace {
+
+constexpr double most_of_mass = 3.0;
+constexpr double steps_by_name = 4.0;  // of --method oversampled
+constexpr double highest_rate_hz = 768'000.0;
+
+bool is_bow(Law law, Scheme scheme) {
+  return facts_of(law).family == Family::bow && scheme != Scheme::plain;
+}
+
+// How far both ends give way to a force of 1.
+double give_of(const Network& network, const Link& link, std::span<const Range> arguments,
+               std::span<const double> start) {
+  std::map<std::uint32_t, double> shares;
+  const auto add = [&](std::uint32_t end, double sign) {
+    each_share(
+        network, end, [&](std::uint32_t mass, double share) { shares[mass] += sign * share; },
+        start);
+  };
+  add(link.a, 1.0);
+  add(link.b, -1.0);
+  double give = 0.0;
+  for (const auto& [mass, share] : shares) {
+    const Mass& moved = network.masses[mass];
+    if (moves(moved)) {
+      give += share * share / range_at(arguments, moved.mass).lowest;
+    }
+  }
+  return give;
+}
+
+}  // namespace
+
+std::optional<StrongBow> strongest_bow(const Network& network, std::span<const LinkScheme> schemes,
+                                       const ParameterBox& box, std::span<const double> start,
+                                       double rate_ratio) {
+  std::optional<StrongBow> strongest;
+  std::vector<Range> arguments;
+  for (std::size_t i = 0; i < schemes.size(); ++i) {
+    const Link& link = network.links[i];
+    const auto is_junction = [&](std::uint32_t mass) {
+      return network.masses[mass].kind == MassKind::junction;
+    };
+    if (!is_bow(link.law, schemes[i].scheme) || is_junction(link.a) || is_junction(link.b)) {
+      continue;
+    }
+    if (arguments.empty()) {
+      arguments = argument_ranges(network, box);
+    }
+    const double give = give_of(network, link, arguments, start);
+    const ArgumentId z = link.arguments[facts_of(link.law).slot(Role::damping)];
+    const double strength = rate_ratio * range_at(arguments, z).highest;
+    if (give > 0.0 &&
+        (!strongest || strength * give * strongest->most > most_of_mass * strongest->strength)) {
+      strongest = StrongBow{std::string(link.name), link.location, strength, most_of_mass / give};
+    }
+  }
+  return strongest;
+}
+
+double steps_of_bows(const Machine& machine) {
+  double fewest = HUGE_VAL;
+  for (const Program& program : machine.parts) {
+    const bool has_bow =
+        std::any_of(program.link_runs.begin(), program.link_runs.end(),
+                    [](const LinkRun& run) { return is_bow(run.law, run.scheme); });
+    const auto* fine = std::get_if<Oversampled>(&program.form);
+    const auto* slow = std::get_if<Slow>(&program.form);
+    const double steps = fine != nullptr ? fine->times : slow != nullptr ? 1.0 / slow->frames : 1.0;
+    fewest = has_bow ? std::min(fewest, steps) : fewest;
+  }
+  return std::isfinite(fewest) ? fewest : 1.0;
+}
+
+std::optional<Error> too_strong(const StrongBow& bow, double steps, double rate_hz) {
+  const double needed = bow.strength / bow.most;
+  if (!(needed > steps)) {
+    return std::nullopt;
+  }
+  const auto rounded = [](double value) {
+    char text[32];
+    std::snprintf(text, sizeof text, "%.3g", value);
+    return std::string(text);
+  };
+  const double higher_hz = std::ceil(needed / steps * rate_hz / 1000.0) * 1000.0;
+  std::string remedy = steps < steps_by_name && needed < steps_by_name
+                           ? "--method oversampled or a rate of "
+                           : "a rate of ";
+  remedy += print_number(higher_hz) + " Hz plays it right";
+  return Error{"the bow '" + bow.name + "' is too strong for its steps: Z is " +
+                   rounded(bow.strength / steps) + " in each and should be below " +
+                   rounded(bow.most) + ", three times the mass that it holds; it lets go too " +
+                   "early, and one mass alone squeaks far above its pitch; " +
+                   (higher_hz <= highest_rate_hz ? remedy : "with a smaller Z it would be right"),
+               bow.location.line, bow.location.column};
+}
+
+double too_strong_from(const StrongBow& bow, double steps) {
+  const double root = steps * bow.most / bow.strength;
+  return root * root;
+}
+
+}  // namespace ressort
