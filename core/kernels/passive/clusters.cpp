@@ -36,9 +36,14 @@ bool is_place(const Program& program, std::uint32_t node) {
 std::vector<PassiveLink> passive_links_of(const Program& program) {
   std::vector<PassiveLink> links;
   for (const LinkRun& run : program.link_runs) {
+    const LawFacts& law = facts_of(run.law);
     for (std::uint32_t i = run.first; run.scheme != Scheme::plain && i < run.first + run.count;
          ++i) {
-      links.push_back({.law = run.law, .coefficients = run.coefficients, .ends = program.ends[i]});
+      links.push_back({.law = run.law,
+                       .coefficients = run.coefficients,
+                       .ends = program.ends[i],
+                       .zone = law.zone,
+                       .reach = law.lets_go() ? run.coefficients[law.slot(Role::reach)] : 0});
     }
   }
   return links;

@@ -23,6 +23,8 @@ struct PassiveLink {
   Law law{};
   std::array<std::uint32_t, most_law_arguments> coefficients{};
   Ends ends;  // nodes; a kernel puts its own places instead
+  Zone zone = Zone::everywhere;
+  std::uint32_t reach = 0;  // the coefficient that says how large it is, of near and below
   // Ends of its cluster, where that is solved by what it holds; or no_mass.
   std::uint32_t mass_a = no_mass;
   std::uint32_t mass_b = no_mass;
