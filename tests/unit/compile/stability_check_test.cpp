@@ -169,6 +169,49 @@ TEST_CASE("what is made passive is judged without it, by whoever asks", "[stabil
   }
 }
 
+TEST_CASE("random nonlinear scenes are judged alike as they are played and as bare networks",
+          "[stability_check]") {
+  const CompileOptions as_played{.bare = true, .budget = Budget{}};
+  int refused = 0;
+  for (std::uint64_t seed = 1; seed <= 200; ++seed) {
+    Random random(seed);
+    const auto any = [&](double least, double most) {
+      return " " + show(least * std::pow(most / least, random.uniform(0.0, 1.0)));
+    };
+    const std::size_t masses = 1 + random.below(5);
+    std::string text = "@g ground 0.\n";
+    for (std::size_t i = 0; i < masses; ++i) {
+      const std::string name = "@m" + std::to_string(i);
+      text += name + " mass" + any(.1, 5.) + " 0. 0.\n@s" + std::to_string(i) + " spring " + name +
+              (i == 0 ? " @g" : " @m" + std::to_string(random.below(i))) + any(1e-3, 2.) +
+              any(1e-5, .3) + "\n";
+    }
+    for (std::size_t i = 0; i < 4; ++i) {
+      const std::string ends = " @g @m" + std::to_string(random.below(masses));
+      const std::string laws[] = {
+          "nlSpring" + ends + any(1e-3, 3.) + any(1e-3, 1e5) + any(1e-4, .5),
+          "nlSpring3" + ends + any(1e-3, 3.) + any(1e-3, 1e5) + any(1e-4, .5),
+          "nlSpringDamper" + ends + any(1e-3, 30.) + any(1e-3, 1e5) + any(1e-3, 1e5) +
+              any(1e-3, 9.),
+          "contact" + ends + any(1e-3, 1e5) + any(1e-3, 9.) + " 0.01",
+          "nlPluck" + ends + any(1e-3, 1e5) + any(1e-3, .3)};
+      text += "@l" + std::to_string(i) + " " + laws[random.below(std::size(laws))] + "\n";
+    }
+    INFO("seed " << seed << "\n" << text);
+    const auto played = compile(network_of(text), {}, {});
+    REQUIRE(played);
+    const ParameterBox none;
+    const Verdict verdict = Stability(played->stability.proved, 1.0).certify(none).verdict;
+    CHECK(played->stability.verdict == verdict);
+    const std::string said = said_to(text);
+    CHECK(said == said_to(text, as_played));
+    CHECK(said.empty() == (verdict == Verdict::stable));
+    refused += verdict == Verdict::stable ? 0 : 1;
+  }
+  CHECK(refused > 20);
+  CHECK(refused < 180);
+}
+
 TEST_CASE("a bow that is too strong for its steps is told at its line, or refused",
           "[stability_check]") {
   const std::string bowed = "@in1 posInput 0.\n@m osc 2. 0.01 0. 0. 0.\n@b nlBow @in1 @m ";
