@@ -29,8 +29,10 @@ struct Passive {
   V speed(Ends ends) const { return speed_now(ends); }
   V gamma(Ends ends) const { return ends.a == ends.b ? V{} : give(ends.a) + give(ends.b); }
   void push(Ends ends, V force) {
-    push_node(ends.a, -force);
-    push_node(ends.b, force);
+    if (any_of(force != V{})) {
+      push_node(ends.a, -force);
+      push_node(ends.b, force);
+    }
   }
   void shift(std::uint32_t node, V way) {
     nodes[node].x += way;
