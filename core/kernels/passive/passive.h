@@ -35,6 +35,23 @@ static inline void remember(const PassiveTables& tables, V* memory, const Body& 
   }
 }
 
+// Whether a link may exert anything in any lane; what comes and goes with the distance exerts
+// nothing between far ends. So much is told without its law, which would take longer.
+template <class V, class Body>
+static inline bool may_act(const PassiveLink& link, const laws::LinkState<V>& state,
+                           const Body& body) {
+  if (link.zone != Zone::near && link.zone != Zone::below) {
+    return true;
+  }
+  const V reach = body.coefficients()[link.reach];
+  if (link.zone == Zone::below) {
+    return laws::may_touch(state, reach);
+  }
+  const V before = state.before();
+  const V way = absolute(state.free - before) + absolute(state.now - before);
+  return any_of(absolute(state.now) < reach + way);
+}
+
 template <class V, class Body>
 static inline V force_of(const PassiveLink& link, const laws::LinkState<V>& state,
                          const Body& body) {
@@ -53,13 +70,16 @@ static inline void correct(const PassiveTables& tables, V* memory, V* numbers, B
   V* row = memory;
   for (std::size_t i = 0; i < tables.alone; ++i, row += passive_rows) {
     const PassiveLink& link = tables.links[i];
-    const laws::LinkState<V> state{.now = row[0],
-                                   .speed = row[1],
-                                   .free = body.distance(link.ends),
-                                   .fast = body.speed(link.ends),
-                                   .gamma = body.gamma(link.ends)};
+    laws::LinkState<V> state{.now = row[0], .speed = row[1], .free = body.distance(link.ends)};
+    const bool is_first = any_of(awake == V{});
+    if (!is_first && !may_act(link, state, body)) {
+      body.push(link.ends, V{});
+      continue;
+    }
+    state.fast = body.speed(link.ends);
+    state.gamma = body.gamma(link.ends);
     V force = force_of(link, state, body);
-    if (any_of(awake == V{})) {
+    if (is_first) {
       const V first =
           JointSolver<V>::first_force(link, body.coefficients(), state.before(), state.speed,
                                       state.free - state.before(), state.gamma);
