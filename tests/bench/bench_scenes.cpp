@@ -114,6 +114,12 @@ std::string random_graph(int masses, const std::string& law) {
   return text + links + "@in1 frcInput @m_m1\n" + scenes::output(1, "m_m2");
 }
 
+// A C2, struck or plucked.
+std::string waveguide(const std::string& finger) {
+  return "@hz param 65.40639\n@s waveguide 0.5 hz 4. 0.8 0.\n" + finger +
+         "@out1 posOutput [@s 0.8]\n";
+}
+
 // --- scenes -------------------------------------------------------------------------------------
 
 void add_instruments(std::vector<BenchScene>& all) {
@@ -155,6 +161,20 @@ void add_voices(std::vector<BenchScene>& all) {
   }
 }
 
+void add_waveguides(std::vector<BenchScene>& all) {
+  const std::string struck = waveguide("@in1 frcInput [@s 0.25]\n");
+  for (const std::size_t voices : {1u, 8u, 64u}) {
+    all.push_back({.name = "waveguide-" + std::to_string(voices) + "voices",
+                   .text = struck,
+                   .hand = blow(0.1),
+                   .voices = voices,
+                   .tuned_by = "hz"});
+  }
+  all.push_back({"waveguide-plucked",
+                 waveguide("@in1 posInput 0.\n@pick nlPluck @in1 [@s 0.25] 0.1 0.02\n"),
+                 flick(0.02)});
+}
+
 void add_families(std::vector<BenchScene>& all) {
   for (const int masses : {10, 100, 1000, 10'000, 100'000, 1'000'000}) {
     all.push_back({.name = "chain-" + std::to_string(masses),
@@ -182,6 +202,7 @@ std::vector<BenchScene> all_scenes() {
   std::vector<BenchScene> all;
   add_instruments(all);
   add_voices(all);
+  add_waveguides(all);
   add_families(all);
   return all;
 }

@@ -204,7 +204,8 @@ std::vector<Row> measure_scene(const BenchScene& scene, const Network& network,
   for (const bool is_double : {true, false}) {
     add_ours(scene, network, forms, is_double, options.isa, all);
   }
-  if (scene.voices == 1 && scene.elements <= most_reference_elements) {
+  if (scene.voices == 1 && scene.elements <= most_reference_elements &&
+      machine.parts[0].waveguides.empty()) {
     all.emplace_back("reference", true, play_reference(scene, network));
     all.back().calibrate();
   }

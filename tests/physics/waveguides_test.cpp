@@ -340,4 +340,67 @@ TEST_CASE("twenty places on a short waveguide each have a sample of their own", 
   CHECK(late > 0.3 * early);
 }
 
+// A loop of N samples has N(N-1)/2 pairs of places, every one another shortest way between two
+// samples that may not be read together; with pitches, places and lanes at random.
+TEMPLATE_TEST_CASE("waves that are read many samples at once have the bits of one by one",
+                   "[waveguides]", float, double) {
+  const std::string text =
+      "@f param 220.\n@t param 3.\n@b param 0.5\n@u param 0.3\n@w param 0.9\n"
+      "@s waveguide 1.3 f t b 0.\n@o openWaveguide 0.7 1.5*f t b 0.\n@m mass 0.5 0. 0.\n"
+      "@k1 spring [@s w] [@o 0.4] 0.4 0.01\n@k2 contact @m [@s u] 3. 0.01\n"
+      "@k3 nlPluck @in2 [@o u*w] 1. 0.1\n"
+      "@in1 frcInput [@s 0.37]\n@in2 posInput 0.\n@in3 frcInput @m\n"
+      "@out1 posOutput [@s 0.81]\n@out2 posOutput [@o u]\n@out3 frcOutput [@s u]\n";
+  Random random(20);
+  for (const Isa isa : {Isa::base, best_isa()}) {
+    for (const std::size_t voices : {1u, 16u}) {
+      const Program program = program_at(text, 44100.0);
+      const auto at_once = make_kernel<TestType>(program, voices, isa);
+      const auto one_by_one = make_kernel<TestType>(program, voices, isa);
+      const std::size_t width = at_once->width();
+      const std::size_t inputs = program.inputs.size() * width;
+      const std::size_t outputs = program.outputs.size() * width;
+      Aligned<TestType> value(max_block_frames * inputs);
+      Aligned<TestType> velocity(value.size());
+      Aligned<TestType> heard(max_block_frames * outputs);
+      Aligned<TestType> expected(heard.size());
+      bool sounds = false;
+      for (int block = 0; block < 400; ++block) {
+        for (std::size_t lane = 0; block % 9 == 0 && lane < width; ++lane) {
+          const double hz = 40.0 * std::exp2(random.uniform(0.0, 7.0));
+          const std::vector<double> parameters{hz, random.uniform(0.1, 9.0),
+                                               random.uniform(0.0, 1.0), random.uniform(0.0, 1.0),
+                                               random.uniform(0.0, 1.0)};
+          for (std::uint32_t c = 0; c < program.coefficients.size(); ++c) {
+            const double number =
+                coefficient_value(program, program.coefficients[c], parameters, 1.0);
+            at_once->coefficients.set(lane, c, number, false);
+            one_by_one->coefficients.set(lane, c, number, false);
+          }
+        }
+        for (TestType& number : value) {
+          number = static_cast<TestType>(random.uniform(-1e-2, 1e-2));
+        }
+        const std::size_t frames = 1 + random.below(max_block_frames);
+        at_once->step({.frames = frames,
+                       .value = value.data(),
+                       .velocity = velocity.data(),
+                       .outputs = heard.data()});
+        for (std::size_t n = 0; n < frames; ++n) {
+          one_by_one->step({.frames = 1,
+                            .value = value.data() + n * inputs,
+                            .velocity = velocity.data() + n * inputs,
+                            .outputs = expected.data() + n * outputs});
+        }
+        for (std::size_t i = 0; i < frames * outputs; ++i) {
+          INFO("block " << block << ", number " << i << " of " << width << " lanes");
+          REQUIRE(heard[i] == expected[i]);
+          sounds = sounds || std::fabs(heard[i]) > TestType(1e-3);
+        }
+      }
+      CHECK(sounds);
+    }
+  }
+}
+
 }  // namespace ressort

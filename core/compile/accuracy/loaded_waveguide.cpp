@@ -91,7 +91,7 @@ class LoadedWaveguide final : public TunedMotion {
     return design_waveguide({.frequency_hz = value[slot.frequency],
                              .t60_s = value[slot.t60],
                              .brightness = value[slot.brightness]},
-                            least_waveguide_samples(slot.count), waveguide_slots(program_) - 1,
+                            least_waveguide_samples(slot.count), most_waveguide_samples(program_),
                             program_.rate_hz);
   }
   Loop loop_of(std::size_t guide, const std::vector<double>& value, Complex z) const;

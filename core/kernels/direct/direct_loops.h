@@ -4,6 +4,7 @@
 
 #include "core/kernels/direct/direct_places.h"
 #include "core/kernels/passive/passive.h"
+#include "core/kernels/waveguides/rail_loops.h"
 #include "core/laws/laws.h"
 
 namespace ressort::RESSORT_ISA {
@@ -273,7 +274,16 @@ void step(const Program& program, DirectState<T>& state, const Block<T>& block) 
   auto* coefficient = reinterpret_cast<V*>(state.ramps.value);
   auto* outputs = reinterpret_cast<V*>(block.outputs);
   const std::size_t inputs = program.inputs.size();
+  // What there is at all.
   const bool has_passive = !state.passive.links.empty();
+  const bool has_taps = !program.taps.empty();
+  const bool has_rails = state.rails != nullptr;
+  const bool has_masses = state.nodes > program.junctions.size();
+  const bool has_plain =
+      std::any_of(program.link_runs.begin(), program.link_runs.end(),
+                  [](const LinkRun& run) { return run.scheme == Scheme::plain; });
+  const bool has_positions = std::any_of(program.inputs.begin(), program.inputs.end(),
+                                         [](const InputSlot& input) { return !input.is_force; });
   for (std::size_t frame = 0; frame < block.frames; ++frame) {
     advance(state.ramps);
     for (const std::uint32_t c : program.audio_coefficients) {
@@ -289,15 +299,20 @@ void step(const Program& program, DirectState<T>& state, const Block<T>& block) 
         s.force[program.inputs[i].node] += value[i];
       }
     }
-    if (!program.taps.empty()) {
+    if (has_taps) {
       place_taps(program, s);
       spread_taps(program, s);
     }
-    step_masses(program, s);
-    if (state.rails != nullptr) {
+    if (has_masses) {
+      step_masses(program, s);
+    }
+    if (has_rails) {
+      if (state.rails->run == 0) {
+        RailLoops<V, T>::read_run(*state.rails, block.frames - frame);
+      }
       RailLoops<V, T>::move_places(program, *state.rails, s);
     }
-    for (std::size_t i = 0; i < inputs; ++i) {
+    for (std::size_t i = 0; has_positions && i < inputs; ++i) {
       if (!program.inputs[i].is_force) {
         s.x[program.inputs[i].node] = value[i];
         s.v[program.inputs[i].node] = velocity[i];
@@ -309,11 +324,15 @@ void step(const Program& program, DirectState<T>& state, const Block<T>& block) 
         correct_links(program, s);
       }
     }
-    if (state.rails != nullptr) {
+    if (has_rails) {
       RailLoops<V, T>::go_on(program, *state.rails, s);
     }
-    move_taps(program, s);
-    pull(program, s);
+    if (has_taps) {
+      move_taps(program, s);
+    }
+    if (has_plain || has_taps) {
+      pull(program, s);
+    }
     for (const OutputSlot& output : program.outputs) {
       *outputs++ = read_output(program, s, value, output);
     }

@@ -13,29 +13,39 @@ constexpr std::size_t numbers_of_guide = 3;  // frequency, T60, brightness
 
 }  // namespace
 
+std::uint32_t most_waveguide_samples(const Program& program) {
+  return waveguide_slots(program) - 1 - waveguide_run;
+}
+
 std::uint32_t waveguide_slots(const Program& program) {
   const double places = static_cast<double>(
       least_waveguide_samples(static_cast<std::uint32_t>(program.junctions.size())));
   return std::bit_ceil(
-      static_cast<std::uint32_t>(program.rate_hz / lowest_waveguide_hz + 2.0 * places));
+      static_cast<std::uint32_t>(program.rate_hz / lowest_waveguide_hz + 2.0 * places) +
+      waveguide_run);
 }
 
 template <class T>
-Rails<T>::Rails(const Program& program, std::size_t width_in) : width(width_in), program_(program) {
-  const std::uint32_t slots = waveguide_slots(program);
+Rails<T>::Rails(const Program& program, std::size_t width_in)
+    : width(width_in),
+      stride(waveguide_slots(program) + widest_bytes / sizeof(T)),
+      program_(program) {
   std::size_t most_places = 0;
   for (const WaveguideSlot& slot : program.waveguides) {
     guides.push_back({.slot = &slot,
-                      .ring = guides.size() * slots * width,
-                      .mask = slots - 1,
+                      .ring = guides.size() * stride * width,
+                      .mask = waveguide_slots(program) - 1,
                       .row = guides.size() * width,
                       .place_row = slot.first * width,
-                      .fading = 0});
+                      .fading = 0,
+                      .run = 1,
+                      .is_run_known = false});
     most_places = std::max<std::size_t>(most_places, slot.count);
+    gives.insert(gives.end(), slot.count, slot.inverse_impedance);
   }
   const std::size_t rows = guides.size() * width;
   const std::size_t places = program.junctions.size() * width;
-  ring.resize(guides.size() * slots * width);
+  ring.resize(guides.size() * stride * width);
   for (auto* const delays : {&end, &next_end}) {
     delays->resize(rows);
   }
@@ -46,11 +56,13 @@ Rails<T>::Rails(const Program& program, std::size_t width_in) : width(width_in),
   for (auto* const delays : {&right, &left, &next_right, &next_left}) {
     delays->resize(places);
   }
-  unforced.resize(places);
+  comes.resize(places * waveguide_run);
+  goes.resize(places * waveguide_run);
   designed_.resize(numbers_of_guide * rows + places);
   u_.resize(most_places);
   order_.resize(2 * most_places);
   delays_.resize(2 * most_places);
+  all_delays_.reserve(2 * (1 + 2 * most_places));
   for (std::size_t lane = 0; lane < width; ++lane) {
     clear(lane);
   }
@@ -58,10 +70,8 @@ Rails<T>::Rails(const Program& program, std::size_t width_in) : width(width_in),
 
 template <class T>
 void Rails<T>::clear(std::size_t lane) {
-  for (std::size_t i = lane; i < ring.size(); i += width) {
-    ring[i] = T(0);
-  }
   for (const Guide& guide : guides) {
+    std::fill_n(wave(guide, lane, 0), stride, T(0));
     allpass_state[guide.row + lane] = pole_state[guide.row + lane] = T(0);
     designed_[guide.row + lane] = std::numeric_limits<T>::quiet_NaN();
   }
@@ -91,11 +101,50 @@ void Rails<T>::prepare(const T* coefficients) {
       const bool is_silent = std::isnan(designed_[guide.row + lane]);
       if (is_silent || (guide.fading == 0 && is_new(guide, lane, coefficients))) {
         design(guide, lane, coefficients);
+        guide.is_run_known = false;
         is_silent ? settle(guide, lane) : void(fades = true);
       }
     }
     guide.fading = fades ? waveguide_fade_frames : guide.fading;
+    if (!guide.is_run_known) {
+      guide.run = longest_run(guide, coefficients);
+      guide.is_run_known = true;
+    }
   }
+}
+
+// What goes on from the filters is read after the least delay; what forces do to a wave, after what
+// lies between two of them. (Both are written where nothing has been read from for a run.)
+template <class T>
+std::uint32_t Rails<T>::longest_run(const Guide& guide, const T* coefficients) {
+  std::uint32_t longest = waveguide_run;
+  const auto take = [&](const std::vector<std::uint32_t>& delays, std::size_t first,
+                        std::size_t count) {
+    for (std::size_t i = 0; i < count; ++i) {
+      all_delays_.push_back(delays[first + i * width]);
+    }
+  };
+  for (std::size_t lane = 0; lane < width; ++lane) {
+    all_delays_.clear();
+    for (const bool of_next : {false, true}) {
+      if (of_next && guide.fading == 0) {
+        break;
+      }
+      take(of_next ? next_end : end, guide.row + lane, 1);
+      take(of_next ? next_right : right, guide.place_row + lane, guide.slot->count);
+      take(of_next ? next_left : left, guide.place_row + lane, guide.slot->count);
+    }
+    std::sort(all_delays_.begin(), all_delays_.end());
+    longest = std::min(longest, all_delays_.front());
+    if (coefficients[guide.slot->inverse_impedance * width + lane] == T(0)) {
+      continue;  // nobody has played here yet
+    }
+    for (std::size_t i = 1; i < all_delays_.size(); ++i) {
+      const std::uint32_t way = all_delays_[i] - all_delays_[i - 1];
+      longest = way > 0 ? std::min(longest, way) : longest;
+    }
+  }
+  return longest;
 }
 
 template <class T>
@@ -112,7 +161,8 @@ void Rails<T>::design(Guide& guide, std::size_t lane, const T* coefficients) {
                                  .t60_s = number(rows + guide.row, slot.t60),
                                  .brightness = number(2 * rows + guide.row, slot.brightness)};
   const WaveguideDesign found =
-      design_waveguide(numbers, least_waveguide_samples(slot.count), guide.mask, program_.rate_hz);
+      design_waveguide(numbers, least_waveguide_samples(slot.count),
+                       most_waveguide_samples(program_), program_.rate_hz);
   const std::size_t at = guide.row + lane;
   next_end[at] = found.samples;
   next_allpass[at] = static_cast<T>(found.allpass);
@@ -148,8 +198,7 @@ template <class T>
 bool Rails<T>::is_quiet(std::size_t lane, double bound) const {
   for (const Guide& guide : guides) {
     for (std::uint32_t delay = 1; delay <= end[guide.row + lane]; ++delay) {
-      const T wave = ring[guide.ring + ((now - delay) & guide.mask) * width + lane];
-      if (!(std::fabs(wave) < bound)) {
+      if (!(std::fabs(*wave(guide, lane, now - delay)) < bound)) {
         return false;
       }
     }
@@ -172,8 +221,8 @@ std::size_t Rails<T>::look(std::size_t lane, std::size_t number, std::span<doubl
     // From the right end to the left one and back.
     const double round = guide.slot->filters_at.share + (delay - 0.5) / samples;
     const double way = 2.0 * (round - std::floor(round));
-    const double wave = ring[guide.ring + ((now - delay) & guide.mask) * width + lane];
-    const double rise = way < 1.0 ? sign * wave : -wave;
+    const double speed = *wave(guide, lane, now - delay);
+    const double rise = way < 1.0 ? sign * speed : -speed;
     const double first = std::max(pieces * std::fabs(1.0 - way) - half, 0.0);
     const double last = std::min(pieces * std::fabs(1.0 - way) + half, pieces);
     auto piece = static_cast<std::size_t>(first);
@@ -200,8 +249,8 @@ double Rails<T>::energy(std::size_t lane, const T* coefficients) const {
     double waves = 0.0;
     const std::size_t at = guide.row + lane;
     for (std::uint32_t delay = 1; delay <= end[at]; ++delay) {
-      const double wave = ring[guide.ring + ((now - delay) & guide.mask) * width + lane];
-      waves += wave * wave;
+      const double speed = *wave(guide, lane, now - delay);
+      waves += speed * speed;
     }
     const double c = allpass[at];
     waves += static_cast<double>(allpass_state[at]) * allpass_state[at] / (1.0 - c * c);
