@@ -23,8 +23,16 @@ double held(Law law, const LawNumbers& c, double d) {
   switch (law) {
     case Law::spring:
       return c[0] / 2.0 * d * d;
+    case Law::quadratic_spring:
+      return c[1] / 3.0 * far * far * far;
     case Law::cubic_spring:
       return c[1] / 4.0 * d * d * d * d;
+    case Law::clipped_contact: {
+      const double deep = std::max(0.0, d + c[4]);
+      return c[1] * deep * deep <= c[2] - c[0]
+                 ? c[0] / 2.0 * deep * deep + c[1] / 4.0 * deep * deep * deep * deep
+                 : c[2] / 2.0 * deep * deep - (c[2] - c[0]) * (c[2] - c[0]) / (4.0 * c[1]);
+    }
     case Law::contact:
       return d > -c[2] ? c[0] / 2.0 * (d + c[2]) * (d + c[2]) : 0.0;
     case Law::power_contact:
@@ -39,7 +47,10 @@ double held(Law law, const LawNumbers& c, double d) {
   }
 }
 
-double friction(const LawNumbers& c, double v) {
+double friction(Law law, const LawNumbers& c, double v) {
+  if (law == Law::smooth_bow) {
+    return 0.63 * c[0] * v * std::exp(0.5 - 4.0 * (v / c[1]) * (v / c[1]));
+  }
   const double fast = std::fabs(v);
   const double side = v < 0.0 ? -1.0 : 1.0;
   return fast < c[1] / 3.0 ? c[0] * 2.0 / 3.0 * v
@@ -96,7 +107,8 @@ class Books {
           energy += 0.5 * c[0] * d * (d - speed);
         }
         const double mean = (speed + v_[a] - v_[b]) / 2.0;
-        rubbed += run.law == Law::bow ? friction(c, mean) * mean : 0.0;
+        const bool rubs = run.law == Law::bow || run.law == Law::smooth_bow;
+        rubbed += rubs ? friction(run.law, c, mean) * mean : 0.0;
       }
     }
     v_ = v;
@@ -225,16 +237,22 @@ TEST_CASE("what holds masses, places and waveguides together keeps the books of 
   for (const End& a : ends) {
     for (const End& b : ends) {
       const bool has_waveguide = a.text[1] == 'w' || b.text[1] == 'w';
-      for (const std::string law : {"spring", "cubic", "contact", "hertz", "pluck", "bow"}) {
+      for (const std::string law : {"spring", "quadratic", "cubic", "contact", "clipped", "hertz",
+                                    "pluck", "bow", "smooth"}) {
         for (const double k : {0.01, 0.1, 1.0, 10.0, 100.0, 1000.0}) {
-          const bool has_plain = law == "spring" || law == "cubic";
+          const bool has_plain = law == "spring" || law == "quadratic" || law == "cubic";
           if (has_plain && !has_waveguide) {
             continue;  // whose springs are as published, and limited
           }
           const std::string between = of(a.place, 'a') + " " + of(b.place, 'b');
           const std::string link =
-              law == "spring"  ? "@k spring " + between + " " + number(k)
-              : law == "cubic" ? "@k nlSpring3 " + between + " " + number(k / 10.0) + " " +
+              law == "spring"      ? "@k spring " + between + " " + number(k)
+              : law == "quadratic" ? "@k nlSpring2 " + between + " " + number(k / 10.0) + " " +
+                                         number(10.0 * k) + " 0."
+              : law == "clipped" ? "@k nlContact " + between + " " + number(k / 10.0) + " " +
+                                       number(1e4 * k) + " " + number(k) + " 0. 0.01"
+              : law == "smooth" ? "@k nlBow " + between + " " + number(k) + " 0.003 1"
+              : law == "cubic"  ? "@k nlSpring3 " + between + " " + number(k / 10.0) + " " +
                                      number(100.0 * k) + " 0."
               : law == "contact" ? "@k contact " + between + " " + number(k) + " 0. 0.01"
               : law == "hertz"   ? "@k powerContact " + between + " " + number(k) + " 1.5 0. 0.01"
