@@ -28,7 +28,7 @@ class StabilityChecker {
       : request_(request),
         start_(request.start.begin(), request.start.end()),
         stability_(felt(), request.rate_ratio, most_quick_masses, request.progress) {
-    result_.proved = without_passive(request.written, request.schemes);
+    result_.proved = without_passive(starting(request.written), request.schemes);
     result_.parameters = request.parameters;
     result_.is_together = start_.size() * stability_.size() > most_quick_work;
   }
@@ -56,7 +56,16 @@ class StabilityChecker {
   }
 
  private:
-  Network felt() const { return always_felt(without_passive(request_.expanded, request_.schemes)); }
+  // With the start's numbers.
+  Network starting(Network network) const {
+    for (std::size_t i = 0; i < start_.size(); ++i) {
+      network.parameters[i].value = start_[i];
+    }
+    return network;
+  }
+  Network felt() const {
+    return always_felt(without_passive(starting(request_.expanded), request_.schemes));
+  }
 
   bool is_audio(std::size_t i) const { return request_.expanded.parameters[i].audio_input > 0; }
 
@@ -111,6 +120,13 @@ class StabilityChecker {
         }
       }
     }
+    wanted_ = asked_;
+    // What is passive, and so not in the proof, has to pull.
+    for (std::size_t k = 0; k < request_.schemes.size() && !request_.bare; ++k) {
+      if (request_.schemes[k].scheme != Scheme::plain) {
+        keep_pulling(request_.expanded.links[k]);
+      }
+    }
   }
 
   void reach_to(std::size_t i, double value) {
@@ -126,8 +142,8 @@ class StabilityChecker {
     for (std::size_t i = 0; i < start_.size(); ++i) {
       if (wanted(i)) {
         which.push_back(i);
-        wide.lowest[i] = asked_.lowest[i];
-        wide.highest[i] = asked_.highest[i];
+        wide.lowest[i] = wanted_.lowest[i];
+        wide.highest[i] = wanted_.highest[i];
       }
     }
     if (which.empty()) {
@@ -175,10 +191,10 @@ class StabilityChecker {
     bool has_sound = false;
     for (std::size_t i = 0; i < start_.size(); ++i) {
       has_sound |= is_audio(i);
-      if (box_.lowest[i] > asked_.lowest[i]) {
+      if (box_.lowest[i] > wanted_.lowest[i]) {
         back.lowest[i] = towards(start_[i], std::lerp(start_[i], box_.lowest[i], knobs_share));
       }
-      if (box_.highest[i] < asked_.highest[i]) {
+      if (box_.highest[i] < wanted_.highest[i]) {
         back.highest[i] = towards(start_[i], std::lerp(start_[i], box_.highest[i], knobs_share));
       }
     }
@@ -233,25 +249,55 @@ class StabilityChecker {
     if (std::none_of(formula.begin(), formula.end(), uses)) {
       return;
     }
+    keep(i, [&](const ParameterBox& box) { return formula_range(formula, box).lowest >= 0.0; });
+  }
+
+  // Asks of parameters no more than keeps stiffness and damping of a link from falling below 0.
+  void keep_pulling(const Link& link) {
+    const auto& formulas = request_.expanded.arguments;
+    const auto pulls = [&](const ParameterBox& box) {
+      LawNumbers least{};
+      for (std::size_t k = 0; k < least.size(); ++k) {
+        const ArgumentId id = link.arguments[k];
+        least[k] = id == no_argument ? 0.0 : formula_range(formulas[id], box).lowest;
+      }
+      const Slopes slopes = gentlest(link.law, least);
+      return slopes.pull >= 0.0 && slopes.damping >= 0.0;
+    };
+    for (const ArgumentId id : link.arguments) {
+      for (const Step& step : id == no_argument ? Formula() : formulas[id]) {
+        if (step.op == Op::parameter) {
+          keep(step.index, pulls);
+        }
+      }
+    }
+  }
+
+  // Asks of a parameter no more than what `holds` of the box, as it does at the start.
+  template <class Holds>
+  void keep(std::size_t i, Holds&& holds) {
     ParameterBox box = box_;
-    const auto is_positive = [&](double value) {
+    const auto holds_to = [&](double value) {
       box.lowest[i] = std::min(start_[i], value);
       box.highest[i] = std::max(start_[i], value);
-      return formula_range(formula, box).lowest >= 0.0;
+      return holds(box);
     };
-    if (!is_positive(start_[i])) {
+    if (!holds_to(start_[i])) {
       return;
     }
-    for (double* const wanted : {&asked_.lowest[i], &asked_.highest[i]}) {
+    for (double* const wanted : {&wanted_.lowest[i], &wanted_.highest[i]}) {
       double inside = start_[i];
       double outside = *wanted;
-      if (is_positive(outside)) {
+      if (holds_to(outside)) {
         continue;
+      }
+      if (std::min(inside, outside) < 0.0 && std::max(inside, outside) > 0.0 && holds_to(0.0)) {
+        inside = 0.0;
       }
       constexpr int halvings = 120;  // from 1e12 to the last digit of what is small
       for (int n = 0; n < halvings; ++n) {
         const double middle = std::midpoint(inside, outside);
-        (is_positive(middle) ? inside : outside) = middle;
+        (holds_to(middle) ? inside : outside) = middle;
       }
       *wanted = towards(start_[i], inside);
     }
@@ -260,8 +306,8 @@ class StabilityChecker {
   // One parameter as far as it may go alone, with the others in `from`.
   void stretch(std::size_t i, const ParameterBox& from, ParameterBox& box) {
     if (const auto safe = stability_.safe_range(from, i, start_[i])) {
-      box.lowest[i] = std::max(asked_.lowest[i], below(i, safe->lowest));
-      box.highest[i] = std::min(asked_.highest[i], above(i, safe->highest));
+      box.lowest[i] = std::max(wanted_.lowest[i], below(i, safe->lowest));
+      box.highest[i] = std::min(wanted_.highest[i], above(i, safe->highest));
     } else {
       box.lowest[i] = box.highest[i] = start_[i];
     }
@@ -334,6 +380,7 @@ class StabilityChecker {
   Stability stability_;
   StabilityCheck result_;
   ParameterBox asked_;
+  ParameterBox wanted_;                               // of that, what makes nothing push
   ParameterBox box_;                                  // proved
   std::vector<std::optional<SourceLocation>> place_;  // in the preset, of what it has ranges for
 };
@@ -456,7 +503,12 @@ ParameterBox proved_box(const StabilityCheck& check, const Preset& preset) {
 Margins find_margins(const Network& network, std::span<const LinkScheme> schemes,
                      const ParameterBox& box, std::span<const Limits> limits, double rate_ratio,
                      const Progress& progress) {
-  const Network felt = without_passive(network, schemes);
+  Network inside = network;  // with numbers of the box
+  for (std::size_t i = 0; i < inside.parameters.size(); ++i) {
+    double& value = inside.parameters[i].value;
+    value = std::clamp(value, box.lowest[i], box.highest[i]);
+  }
+  const Network felt = without_passive(inside, schemes);
   MarginFinder finder(felt, rate_ratio, progress);
   const auto [whole, keys] = finder.at(box);
   Margins margins{.whole = whole, .keys = keys, .home = {}, .away = {}};

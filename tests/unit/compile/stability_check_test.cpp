@@ -169,6 +169,33 @@ TEST_CASE("what is made passive is judged without it, by whoever asks", "[stabil
   }
 }
 
+TEST_CASE("what is made passive pulls wherever a preset lets it be turned to",
+          "[stability_check]") {
+  const std::string touched =
+      "@K param -0.5\n@g ground 0.\n@m mass 1. 0. 0.\n@s spring @m @g 0.1\n"
+      "@c contact @m @g K 0.01 0.\n@in1 frcInput @m\n";
+  const auto made = [&](double value, double least, double most) {
+    auto compiled = compile(network_of(touched), with_range("K", value, least, most), {});
+    REQUIRE(compiled);
+    return std::move(compiled->stability);
+  };
+  // However it is written, the preset's value counts, and it is no spring.
+  const StabilityCheck usual = made(50., .1, 100.);
+  CHECK(usual.verdict == Verdict::stable);
+  CHECK(usual.parameters[0].maximum == 100.);
+  CHECK(usual.narrowed.empty());
+  const StabilityCheck narrowed = made(.5, -1., 1.);
+  CHECK(narrowed.verdict == Verdict::stable);
+  CHECK(narrowed.parameters[0].minimum == 0.);
+  REQUIRE(narrowed.narrowed.size() == 1);
+  CHECK(narrowed.narrowed[0].message == "'K' is kept above 0; below it the model is not stable");
+  const StabilityCheck pushing = made(-.5, -1., 1.);
+  CHECK(pushing.verdict == Verdict::unproved);
+  REQUIRE(pushing.complaint);
+  CHECK(pushing.complaint->message.find("the stiffness K = -0.5 of 'c' is negative") !=
+        std::string::npos);
+}
+
 TEST_CASE("random nonlinear scenes are judged alike as they are played and as bare networks",
           "[stability_check]") {
   const CompileOptions as_played{.bare = true, .budget = Budget{}};
