@@ -52,6 +52,30 @@ static inline bool may_act(const PassiveLink& link, const laws::LinkState<V>& st
   return any_of(absolute(state.now) < reach + way);
 }
 
+// Whether any of a cluster may: often nothing touches.
+template <class V, class Body>
+static inline bool may_act(const PassiveTables& tables, const Cluster& cluster, const V* memory,
+                           const Body& body) {
+  for (std::size_t i = cluster.first; i < cluster.first + cluster.count; ++i) {
+    const PassiveLink& link = tables.links[i];
+    const V* const row = memory + i * passive_rows;
+    const laws::LinkState<V> state{
+        .now = row[0], .speed = row[1], .free = body.distance(link.ends)};
+    if (may_act(link, state, body)) {
+      return true;
+    }
+  }
+  return false;
+}
+template <class V, class Body>
+static inline void let_go(const PassiveTables& tables, const Cluster& cluster, V* memory,
+                          Body& body) {
+  for (std::size_t i = cluster.first; i < cluster.first + cluster.count; ++i) {
+    memory[i * passive_rows + 2] = V{};
+    body.push(tables.links[i].ends, V{});
+  }
+}
+
 template <class V, class Body>
 static inline V force_of(const PassiveLink& link, const laws::LinkState<V>& state,
                          const Body& body) {
@@ -67,11 +91,11 @@ static inline void correct(const PassiveTables& tables, V* memory, V* numbers, B
   if (any_of(awake < V{})) {
     return;  // nobody hears this sample
   }
+  const bool is_first = any_of(awake == V{});
   V* row = memory;
   for (std::size_t i = 0; i < tables.alone; ++i, row += passive_rows) {
     const PassiveLink& link = tables.links[i];
     laws::LinkState<V> state{.now = row[0], .speed = row[1], .free = body.distance(link.ends)};
-    const bool is_first = any_of(awake == V{});
     if (!is_first && !may_act(link, state, body)) {
       body.push(link.ends, V{});
       continue;
@@ -94,6 +118,10 @@ static inline void correct(const PassiveTables& tables, V* memory, V* numbers, B
   }
   JointOf<V, Body> joint(body);
   for (const Cluster& cluster : tables.clusters) {
+    if (!is_first && !may_act(tables, cluster, memory, body)) {
+      let_go(tables, cluster, memory, body);
+      continue;
+    }
     JointSolver<V>::solve(tables.links, cluster, memory + cluster.first * passive_rows, numbers,
                           joint);
   }
