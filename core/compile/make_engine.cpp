@@ -7,8 +7,8 @@
 #include <vector>
 
 #include "core/engine/voices.h"
-#include "core/kernels/passive/clusters.h"
 #include "core/kernels/domains/executor.h"
+#include "core/kernels/passive/clusters.h"
 #include "core/kernels/registry.h"
 
 namespace ressort {

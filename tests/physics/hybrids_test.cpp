@@ -1,8 +1,8 @@
 // Masses, places on strings of masses, on bodies and on waveguides, held to each other by
 // everything that holds: the books of energy, with potentials written down here.
 #include "core/compile/stability_check.h"
-#include "core/kernels/passive/clusters.h"
 #include "core/kernels/direct/direct.h"
+#include "core/kernels/passive/clusters.h"
 #include "core/laws/laws.h"
 #include "tests/support/passive.h"
 

@@ -7,8 +7,8 @@
 #include <tuple>
 #include <utility>
 
-#include "core/kernels/passive/clusters.h"
 #include "core/kernels/grid/grid_places.h"
+#include "core/kernels/passive/clusters.h"
 #include "core/kernels/taps.h"
 #include "core/laws/laws.h"
 

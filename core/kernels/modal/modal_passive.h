@@ -111,9 +111,7 @@ struct Presser : Holder<T, Crossed> {
     }
   }
 
-  void remember_passive() {
-    remember(*s.active, s.memory, ModalBody<T>{s, this->inverse_mass()});
-  }
+  void remember_passive() { remember(*s.active, s.memory, ModalBody<T>{s, this->inverse_mass()}); }
 
   // Once everything else has moved: finds what the links push with, and moves places, what is heard
   // and the modes. Gives whether any pushes.

@@ -12,8 +12,8 @@
 
 #include <algorithm>
 
-#include "core/kernels/passive/joint.h"
 #include "core/kernels/modal/modal_sweep.h"
+#include "core/kernels/passive/joint.h"
 
 namespace ressort::RESSORT_ISA {
 namespace {
