@@ -23,7 +23,8 @@ double heard_cents(const std::string& name, double rate_hz, int key, double bent
   const int transpose = made->instrument.transpose;
   const double wanted_hz = 440.0 * std::exp2((key + transpose - 69) / 12.0);
   Player player(*std::move(made));
-  const double seconds = 1.0 + 60.0 / wanted_hz;
+  // A Hann window's peak is two bins wide on either side, which shall be more than a few cents.
+  const double seconds = std::min(1.0 + 60.0 / wanted_hz, 800.0 / wanted_hz);
   const auto first = static_cast<std::size_t>(0.1 * rate_hz);
   const double semitones = 2.0;  // the wheel's range
   player.run(first + static_cast<std::size_t>(seconds * rate_hz),
@@ -34,7 +35,6 @@ double heard_cents(const std::string& name, double rate_hz, int key, double bent
   const double left_peak = support::peak(std::span(left).subspan(first));
   const auto& louder = left_peak < support::peak(std::span(right).subspan(first)) ? right : left;
   REQUIRE(support::peak(louder) > 1e-4);
-  // A Hann window's peak is two bins wide on either side.
   const double hz = support::measured_hz(std::span(louder).subspan(first), rate_hz, wanted_hz,
                                          1.5 / (seconds * wanted_hz));
   return 1200.0 * std::log2(hz / wanted_hz);
