@@ -6,8 +6,8 @@ set(ressort_fuzzers model preset score midi smf scala console osc osc_packet fli
 list(TRANSFORM ressort_fuzzers PREPEND fuzz_ OUTPUT_VARIABLE ressort_deep_tests)
 list(APPEND ressort_deep_tests arm everything_sanitized everything_more forms_everywhere
   accuracy_everywhere silence_everywhere modes_everywhere calculix_everywhere bodies_everywhere
-  bells_everywhere heard_pitch_everywhere lint scenes_more abuse_long bows settings_more edits_more flights_everywhere
-  server_killed installed mpi soak)
+  bells_everywhere heard_pitch_everywhere lint scenes_more abuse_long bows settings_more edits_more
+  flights_everywhere server_killed installed mpi soak)
 list(LENGTH ressort_deep_tests ressort_deep_count)
 
 # SECONDS is about what it needs on two cores.

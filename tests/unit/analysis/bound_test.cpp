@@ -5,12 +5,7 @@
 namespace ressort {
 namespace {
 
-using support::bound_limit;
-using support::factor_of;
-using support::growth;
-using support::mass_and_ground;
-using support::network_of;
-using support::show;
+using namespace support;
 
 // The largest eigenvalue of M^-1 K, by power iteration through the network's springs.
 double stiffest(const Network& network) {

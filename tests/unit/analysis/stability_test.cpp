@@ -13,12 +13,7 @@ namespace ressort {
 
 namespace {
 
-using support::bound_limit;
-using support::factor_of;
-using support::growth;
-using support::mass_and_ground;
-using support::network_of;
-using support::show;
+using namespace support;
 
 // All of a number's digits.
 std::string digits(double value) {
