@@ -273,4 +273,43 @@ TEST_CASE("S25: samples that are no numbers are silence, and what comes after is
   }
 }
 
+TEST_CASE("S25: a sound as a force may be of any loudness, and what it leaves dies away",
+          "[stress_linear]") {
+  const std::string pair = "@g ground 0.\n@a mass 1. 0. 0.\n@s spring @g @a 0.05 1e-3\n";
+  const std::string heard = "@in1 frcInput @a\n" + scenes::output(1, "a");
+  constexpr std::size_t second = 44100;
+  std::vector<double> noise(3 * second);
+  Random random(7);
+  std::generate_n(noise.begin(), second, [&] { return random.uniform(-1.0, 1.0); });
+  const std::string texts[] = {
+      pair + "@c nlSpring3 @g @a 0.01 1e4 0.\n" + heard,
+      pair + "@c nlSpring @g @a 0.01 10. 0.01\n" + heard,
+      pair + "@c contact @g @a 500. 0.1 0.01\n" + heard,
+      pair + "@c nlSpringDamper @g @a 0.01 10. 5. 0.01\n" + heard,
+      pair + "@p nlPluck @g @a 30. 0.05\n@b nlBow @g @a 2. 0.01\n" + heard,
+      "@g ground 0.\n@d mesh 5 5 1. 0.1 1e-3 1e-4 0. 0.\n@h spring @g [@d 0. 0.] 0.1 0.01\n"
+      "@w contact @g [@d 0.5 0.5] 50. 0.1 0.01\n@in1 frcInput [@d 0.3 0.7]\n"
+      "@out1 posOutput [@d 0.8 0.2]\n"};
+  for (const std::string& text : texts) {
+    for (const double loudness : {1e-6, 1.0, 1e3, 1e6, 1e12, 1e100, 1e300}) {
+      INFO(text << "loudness " << loudness);
+      std::vector<double> force(noise.size());
+      std::ranges::transform(noise, force.begin(), [&](double x) { return loudness * x; });
+      Player player(text, default_preset(network_of(text), true),
+                    {.bare = true, .budget = Budget{}});
+      const double* const input = force.data();
+      player.run(force.size(), {}, {256}, std::span(&input, 1));
+      const std::span<const double> y = player.y();
+      REQUIRE(std::ranges::all_of(y, [](double sample) { return std::isfinite(sample); }));
+      // By how fast it moves, as contacts push it aside; a tenth is for swings of few samples.
+      const double soon = support::largest_step(y.subspan(second, second / 2));
+      CHECK(support::largest_step(y.subspan(5 * second / 2)) <= 1.1 * soon);
+      if (loudness <= 1e6) {
+        CHECK(player.engine().meters().resets == 0);
+        CHECK(soon > 0.0);
+      }
+    }
+  }
+}
+
 }  // namespace ressort
