@@ -13,6 +13,7 @@
 
 #include "core/model/faust/faust.h"
 #include "core/model/language/mdl.h"
+#include "tests/bench/mi_lib.h"
 
 namespace ressort::bench {
 namespace {
@@ -91,12 +92,20 @@ Outcome outcome_of(const std::string& command) {
   return is_interrupted ? Outcome::interrupted : Outcome::failed;
 }
 
+// A program, as its file without an ending.
+struct Source {
+  const char* prefix;  // of what people are shown
+  bool is_export;
+  fs::path base;
+};
+
 // One option in one precision, for all compilers.
 class Job {
  public:
-  Job(const fs::path& base, const Option& option, bool is_double)
-      : dsp_(base.string() + ".dsp"),
-        stem_(base.string() + "-" + option.name + (is_double ? "-double" : "-single")),
+  Job(const Source& source, const Option& option, bool is_double)
+      : source_(source),
+        dsp_(source.base.string() + ".dsp"),
+        stem_(source.base.string() + "-" + option.name + (is_double ? "-double" : "-single")),
         option_(option),
         is_double_(is_double) {}
 
@@ -132,8 +141,10 @@ class Job {
       if (handle == nullptr) {
         continue;
       }
-      FaustLibrary library{.variant = option_.shown + (" " + compiler), .is_double = is_double_};
-      library.is_default = std::string_view(option_.faust).empty() && compiler == compilers[0];
+      FaustLibrary library{.variant = source_.prefix + (option_.shown + (" " + compiler)),
+                           .is_double = is_double_};
+      library.is_default =
+          source_.is_export && std::string_view(option_.faust).empty() && compiler == compilers[0];
       const auto find = [&](auto& function, const char* name) {
         function =
             reinterpret_cast<std::remove_reference_t<decltype(function)>>(dlsym(handle, name));
@@ -169,14 +180,18 @@ class Job {
     return outcome;
   }
 
+  Source source_;
   std::string dsp_;
   std::string stem_;
   Option option_;
   bool is_double_;
 };
 
-std::string exported(const BenchScene& scene, const Network& network) {
-  const Network peer = parse_network(text_with_channels(scene, network.inputs.size())).network;
+Network peer_of(const BenchScene& scene, const Network& network) {
+  return parse_network(text_with_channels(scene, network.inputs.size())).network;
+}
+
+std::string exported(const Network& peer) {
   std::vector<ParameterSetting> sliders;
   for (const Parameter& parameter : peer.parameters) {
     sliders.push_back({parameter.name, parameter.value, 0.0, 4.0 * parameter.value, {}});
@@ -203,13 +218,19 @@ std::vector<FaustLibrary> faust_libraries(const BenchScene& scene, const Network
     }
   }
   fs::create_directories(folder);
-  const std::string text = exported(scene, network);
-  const fs::path base = base_of(folder, text);
-  std::ofstream(base.string() + ".dsp") << text;
   std::vector<Job> jobs;
-  for (const Option& option : options) {
-    jobs.emplace_back(base, option, true);
-    jobs.emplace_back(base, option, false);
+  const auto add = [&](const std::string& text, const char* prefix, bool is_export) {
+    const fs::path base = base_of(folder, text);
+    std::ofstream(base.string() + ".dsp") << text;
+    for (const Option& option : options) {
+      jobs.emplace_back(Source{prefix, is_export, base}, option, true);
+      jobs.emplace_back(Source{prefix, is_export, base}, option, false);
+    }
+  };
+  const Network peer = peer_of(scene, network);
+  add(exported(peer), "", true);
+  if (const auto text = mi_lib_text(peer)) {
+    add(*text, "mi.lib ", false);
   }
   std::atomic<std::size_t> next = 0;
   const auto work = [&] {

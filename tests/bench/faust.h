@@ -24,8 +24,9 @@ struct FaustLibrary {
   void (*compute)(void* instance, int frames, void* inputs, void* outputs) = nullptr;
 };
 
-// Every variant that compiles: options none, -vec and -mcd 0, in both precisions, by every compiler
-// that is there; several at once, each step for at most two minutes of CPU time. What was made once
+// Every variant that compiles, of ressort's export and of the same network in the words of mi.lib:
+// options none, -vec and -mcd 0, in both precisions, by every compiler that is there; several at
+// once, each step for at most two minutes of CPU time. What was made once
 // lies in `folder` and is taken from there, and so is the knowledge that something does not
 // compile.
 std::vector<FaustLibrary> faust_libraries(const BenchScene& scene, const Network& network,
