@@ -63,7 +63,7 @@ if(RESSORT_MPI)
     $<TARGET_FILE:ressort-mpi>)
 endif()
 
-# The church bells' partials against solids of their profiles.
+# The bells' partials against solids of their profiles.
 add_deep_test(bells_everywhere 300 $<TARGET_FILE:ressort_tests> "[bells_everywhere]")
 
 # A server that is killed twenty times, and comes back at other rates and periods.

@@ -1,7 +1,9 @@
-// tests: the profiles of the church bells among the models, as solids of revolution. They were
-// found by axisymmetric finite elements: from that of a swinging bell a metre wide, radii and walls
-// were changed by Newton's method, as little as needed, until hum, prime, tierce, quint and nominal
-// were 0.5 : 1 : 1.2 : 1.5 : 2 (ChurchBell) and 0.5 : 1 : 1.25 : 1.5 : 2 (MajorBell).
+// tests: the profiles of the bells among the models, as solids of revolution. They were found by
+// axisymmetric finite elements: from that of a swinging bell a metre wide, radii and walls were
+// changed by Newton's method, as little as needed, until hum, prime, tierce, quint and nominal were
+// 0.5 : 1 : 1.2 : 1.5 : 2 (ChurchBell) and 0.5 : 1 : 1.25 : 1.5 : 2 (MajorBell); likewise from a
+// bell three times as wide, its twelfth at 3 and its nominal at 261.6 Hz (Bourdon), and from a thin
+// cup, until its two lowest partials were 1 : 3 at 392 Hz (HandBell).
 #pragma once
 
 #include <algorithm>
@@ -28,6 +30,18 @@ inline const BellProfile major_bell = {{0.0000, 0.4920, 0.0300}, {0.0550, 0.4620
                                        {0.4200, 0.3254, 0.0314}, {0.5700, 0.2664, 0.0305},
                                        {0.7000, 0.2655, 0.0324}, {0.7750, 0.2350, 0.0340},
                                        {0.8000, 0.1550, 0.0340}, {0.8050, 0.0300, 0.0340}};
+
+inline const BellProfile bourdon = {{0.0000, 1.6000, 0.1050}, {0.1800, 1.5065, 0.2500},
+                                    {0.4600, 1.2614, 0.1746}, {0.8800, 1.0706, 0.1208},
+                                    {1.3700, 0.9782, 0.1012}, {1.8500, 0.9154, 0.0966},
+                                    {2.2800, 0.8860, 0.1021}, {2.5300, 0.7750, 0.1120},
+                                    {2.6100, 0.5100, 0.1120}, {2.6300, 0.1000, 0.1120}};
+
+inline const BellProfile hand_bell = {{0.00000, 0.07400, 0.00318}, {0.00700, 0.07120, 0.00431},
+                                      {0.01700, 0.06720, 0.00300}, {0.03400, 0.06025, 0.00223},
+                                      {0.05400, 0.05716, 0.00205}, {0.07400, 0.05523, 0.00205},
+                                      {0.09200, 0.05262, 0.00242}, {0.10500, 0.04538, 0.00335},
+                                      {0.11200, 0.03200, 0.00460}, {0.11400, 0.01000, 0.00500}};
 
 inline std::array<double, 3> along_bell(const BellProfile& profile, double s) {
   const auto last = static_cast<int>(profile.size()) - 1;
@@ -72,7 +86,29 @@ inline Surface bell_surface(const BellProfile& profile, int pieces, int steps) {
   return revolved(around, steps);
 }
 
-inline const std::array<std::pair<const char*, BellProfile>, 2> bells = {
-    {{"ChurchBell", church_bell}, {"MajorBell", major_bell}}};
+// A partial by how many meridians it has, which of those it is from below, and which of the
+// model's it is.
+struct BellPartial {
+  int meridians = 2;
+  std::size_t from_below = 0;
+  std::size_t place = 0;
+};
+
+struct Bell {
+  const char* name;
+  BellProfile profile;
+  std::vector<BellPartial> partials;  // the first is what others are compared to
+};
+
+// Nominal, hum, prime, tierce, quint and twelfth; of the handbell its six lowest.
+inline const std::vector<BellPartial> church_partials = {{4, 0, 4}, {2, 0, 0}, {2, 1, 1},
+                                                         {3, 0, 2}, {3, 1, 3}, {5, 0, 7}};
+inline const std::vector<BellPartial> hand_partials = {{2, 0, 0}, {3, 0, 1}, {4, 0, 2},
+                                                       {3, 1, 3}, {4, 1, 4}, {5, 0, 5}};
+
+inline const std::vector<Bell> bells = {{"ChurchBell", church_bell, church_partials},
+                                        {"MajorBell", major_bell, church_partials},
+                                        {"Bourdon", bourdon, church_partials},
+                                        {"HandBell", hand_bell, hand_partials}};
 
 }  // namespace ressort::support
