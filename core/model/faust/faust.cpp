@@ -8,6 +8,8 @@
 #include <set>
 
 #include "core/model/faust/faust_header.h"
+#include "core/model/faust/faust_joint.h"
+#include "core/model/faust/faust_places.h"
 #include "core/model/faust/faust_waveguides.h"
 #include "core/model/faust/faust_words.h"
 #include "core/model/topology.h"
@@ -21,7 +23,11 @@ using Share = FaustShare;
 class Writer {
  public:
   Writer(const Network& written, Network expanded, const FaustOptions& options)
-      : written_(written), network_(std::move(expanded)), options_(options), waveguides_(network_) {
+      : written_(written),
+        network_(std::move(expanded)),
+        options_(options),
+        joint_(network_),
+        waveguides_(network_, joint_) {
     name_parameters();
     name_masses();
     name_links();
@@ -106,7 +112,7 @@ class Writer {
     std::vector<std::size_t> counts(written_.macros.size());
     for (std::size_t i = 0; i < network_.links.size(); ++i) {
       const Link& link = network_.links[i];
-      if (i < written_.links.size()) {
+      if (!link.name.empty()) {  // that of a macro has none
         link_.push_back(names.add(link.name));
         continue;
       }
@@ -169,7 +175,7 @@ class Writer {
   void gather_forces() {
     forces_.resize(network_.masses.size());
     for (std::uint32_t i = 0; i < network_.links.size(); ++i) {
-      if (waveguides_.holds(i)) {
+      if (joint_.holds(i)) {
         continue;
       }
       forces_[network_.links[i].a].push_back("- f_" + link_[i]);
@@ -184,66 +190,8 @@ class Writer {
     }
   }
 
-  // The nodes along one side of a macro that a coordinate is between; all of them where it varies.
-  Words side(ArgumentId coordinate, std::uint32_t nodes, const std::string& place) const {
-    Words factors(nodes);
-    static const Formula nowhere = {{Op::number, 0, 0.0}};
-    const Formula& formula = coordinate == no_argument ? nowhere : network_.arguments[coordinate];
-    if (!is_constant(formula)) {
-      for (std::uint32_t i = 0; i < nodes; ++i) {
-        factors[i] = "hat(" + faust_number(i) + ", " + place + ")*";
-      }
-      return factors;
-    }
-    const double p = std::clamp(evaluate(formula, {}), 0.0, 1.0) * (nodes - 1);
-    for (std::uint32_t i = 0; i < nodes; ++i) {
-      const double weight = std::max(0.0, 1.0 - std::fabs(p - i));
-      factors[i] = weight == 0.0 ? "0" : weight == 1.0 ? "" : faust_number(weight) + "*";
-    }
-    return factors;
-  }
-
-  // By a body's shapes at its places.
-  std::vector<Share> shares_of_modes(const Tap& tap, const std::string& name) const {
-    const Words places = side(tap.u, tap.places, "row_" + name);
-    std::vector<Share> all;
-    for (std::uint32_t mode = 0; mode < tap.length; ++mode) {
-      Words terms;
-      double sum = 0.0;  // where the place stays
-      for (std::uint32_t place = 0; place < tap.places; ++place) {
-        const double shape = network_.shapes[tap.shape + place * tap.length + mode];
-        if (places[place] == "0" || shape == 0.0) {
-          continue;
-        }
-        terms.push_back("+ " + places[place] + faust_number(shape));
-        if (is_fixed(tap.u)) {
-          sum += shape * (places[place].empty() ? 1.0 : std::stod(places[place]));
-        }
-      }
-      if (!terms.empty() && (!is_fixed(tap.u) || sum != 0.0)) {
-        all.push_back({tap.first + mode,
-                       (is_fixed(tap.u) ? faust_number(sum) : "(" + faust_sum(terms) + ")") + "*"});
-      }
-    }
-    return all;
-  }
-
   std::vector<Share> shares(std::size_t point) const {
-    const Tap& tap = network_.taps[network_.masses[point].tap];
-    if (tap.places > 0) {
-      return shares_of_modes(tap, mass_[point]);
-    }
-    const Words rows = side(tap.u, tap.length, "row_" + mass_[point]);
-    const Words columns = side(tap.v, tap.width, "column_" + mass_[point]);
-    std::vector<Share> all;
-    for (std::uint32_t i = 0; i < tap.length; ++i) {
-      for (std::uint32_t j = 0; j < tap.width; ++j) {
-        if (rows[i] != "0" && columns[j] != "0") {
-          all.push_back({tap.first + i * tap.width + j, rows[i] + columns[j]});
-        }
-      }
-    }
-    return all;
+    return faust_shares(network_, static_cast<std::uint32_t>(point), mass_[point]);
   }
 
   // The same of something that every node has, "x_" or "F_", as one sum.
@@ -308,9 +256,7 @@ class Writer {
            moved(i, network_.masses[tap.first].position);
   }
 
-  bool is_fixed(ArgumentId coordinate) const {
-    return coordinate == no_argument || is_constant(network_.arguments[coordinate]);
-  }
+  bool is_fixed(ArgumentId coordinate) const { return faust_is_fixed(network_, coordinate); }
 
   std::string moved(std::size_t i, double start) const {
     const std::string x = "x_" + mass_[i];
@@ -354,7 +300,7 @@ class Writer {
     if (const std::string start = start_velocity(mass); start != "0.0") {
       terms.push_back("+ first(" + start + ")");
     }
-    if (waveguides_.is_held(static_cast<std::uint32_t>(i))) {
+    if (joint_.is_held(static_cast<std::uint32_t>(i))) {
       return inverse_mass(i) + "u_" + name + " = " + faust_sum(terms) + ";  o_" + name + " = nx_" +
              name + " + first(" + faust_number(mass.position) + ");  y_" + name + " = o_" + name +
              " + u_" + name + ";  v_" + name + " = u_" + name + " + h_" + name + "*g_" + name +
@@ -371,23 +317,38 @@ class Writer {
     return "g_" + mass_[i] + " = 1.0/" +
            (mass.is_mode ? of_mode(mass, "_, !, !")
             : mass.kind == MassKind::junction
-                ? "(" + value(mass.mass) + "*r)"
+                ? "((" + value(mass.mass) + ")*r)"
                 : faust_formula(network_.arguments[mass.mass], parameter_, Tightness::atom)) +
            ";  ";
   }
 
-  // Where the other ends of such springs are and were.
+  // A point's sum with the weights of the sample before.
+  std::string as_before(std::string sum, std::size_t point) const {
+    for (const char* const side : {"row_", "column_"}) {
+      const std::string place = side + mass_[point] + ")";
+      const std::string last = side + mass_[point] + "')";
+      for (std::size_t at = sum.find(place); at != sum.npos;
+           at = sum.find(place, at + last.size())) {
+        sum.replace(at, place.size(), last);
+      }
+    }
+    return sum;
+  }
+
+  // Where the other ends of such links are and were.
   std::string held_before(std::uint32_t i) const {
     const Mass& mass = network_.masses[i];
-    if (!waveguides_.is_held(i) || moves(i) || mass.kind == MassKind::junction) {
+    if (!joint_.is_held(i) || moves(i) || mass.kind == MassKind::junction) {
       return "";
     }
     const std::string& name = mass_[i];
     if (mass.kind == MassKind::point) {
       return "  y_" + name + " = " + interpolated(i, "y_") + ";  o_" + name + " = " +
-             interpolated(i, "o_") + ";";
+             as_before(interpolated(i, "o_"), i) + ";  u_" + name + " = y_" + name + " - o_" +
+             name + ";";
     }
-    return "  y_" + name + " = x_" + name + ";  o_" + name + " = x_" + name + " - v_" + name + ";";
+    return "  y_" + name + " = x_" + name + ";  o_" + name + " = x_" + name + " - v_" + name +
+           ";  u_" + name + " = v_" + name + ";";
   }
 
   FaustTerms terms() const {
@@ -402,7 +363,8 @@ class Writer {
     if (!network_.waveguides.empty()) {
       used_.insert({"guide", "nearest", "late", "filtered"});
     }
-    return waveguides_.springs(terms()) + waveguides_.waves(terms());
+    used_.merge(joint_.definitions());
+    return joint_.text(terms()) + waveguides_.waves(terms());
   }
 
   // What a mass would have fed back at the tick before the first.
@@ -464,7 +426,7 @@ class Writer {
   std::string links() {
     std::string text;
     for (std::uint32_t i = 0; i < network_.links.size(); ++i) {
-      if (waveguides_.holds(i)) {
+      if (joint_.holds(i)) {
         continue;
       }
       const Link& link = network_.links[i];
@@ -503,7 +465,7 @@ class Writer {
   std::string force_at(std::uint32_t i) const {
     const auto at = [&](std::uint32_t mass) {
       const std::string plain = "F_" + mass_[mass];
-      return waveguides_.is_held(mass) ? "(" + plain + " + h_" + mass_[mass] + ")" : plain;
+      return joint_.is_held(mass) ? "(" + plain + " + h_" + mass_[mass] + ")" : plain;
     };
     if (network_.masses[i].kind != MassKind::point) {
       return at(i);
@@ -575,6 +537,7 @@ class Writer {
   std::vector<Words> outside_;           // [mass] terms that they give it, points spread out
   std::vector<Words> forces_;            // [mass] terms of its links
   std::set<std::string> used_;           // of faust_definitions()
+  const FaustJoint joint_;
   const FaustWaveguides waveguides_;
 };
 

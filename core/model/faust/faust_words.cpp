@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 
+#include "core/model/faust/faust_passive.h"
 #include "core/model/language/expression.h"
 
 namespace ressort {
@@ -14,11 +15,6 @@ constexpr std::size_t line_width = 100;
 bool is_word(char c) {
   return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '_';
 }
-
-struct FaustDefinition {
-  std::string_view name;
-  std::string_view text;
-};
 
 // Comparisons only choose, here and in the laws: where FAUST has to compute with them, its types
 // take ten times as long to find.
@@ -288,18 +284,37 @@ std::string faust_laws(const std::set<std::string>& used) {
     definitions.push_back({law.name, law.faust});
   }
   definitions.insert(definitions.end(), std::begin(helpers), std::end(helpers));
-  // No definition stands on more than one other.
-  const auto is_used = [&](std::string_view name) {
-    const std::string call = " " + std::string(name) + "(";
-    return used.contains(std::string(name)) ||
-           std::any_of(definitions.begin(), definitions.end(), [&](const FaustDefinition& other) {
-             return used.contains(std::string(other.name)) &&
-                    other.text.find(call) != std::string_view::npos;
-           });
+  const auto passive = faust_passive_definitions();
+  definitions.insert(definitions.end(), passive.begin(), passive.end());
+  const auto calls = [](std::string_view text, std::string_view name) {
+    for (std::size_t at = text.find(name); at != text.npos; at = text.find(name, at + 1)) {
+      const std::size_t end = at + name.size();
+      if (at > 0 && !is_word(text[at - 1]) && end < text.size() && text[end] == '(') {
+        return true;
+      }
+    }
+    return false;
   };
+  std::vector<bool> is_used(definitions.size());
+  const auto use = [&](const auto& self, std::size_t i) -> void {
+    if (is_used[i]) {
+      return;
+    }
+    is_used[i] = true;
+    for (std::size_t other = 0; other < definitions.size(); ++other) {
+      if (calls(definitions[i].text, definitions[other].name)) {
+        self(self, other);
+      }
+    }
+  };
+  for (std::size_t i = 0; i < definitions.size(); ++i) {
+    if (used.contains(std::string(definitions[i].name))) {
+      use(use, i);
+    }
+  }
   std::string text;
-  for (const FaustDefinition& definition : definitions) {
-    text += is_used(definition.name) ? definition.text : "";
+  for (std::size_t i = 0; i < definitions.size(); ++i) {
+    text += is_used[i] ? definitions[i].text : "";
   }
   return text;
 }
