@@ -274,11 +274,7 @@ class Writer {
 
   // Its own M, K or Z are another number at the next tick, when its force acts: so it feeds back
   // the force, not what becomes of it.
-  bool drives_itself(const Mass& mass) const {
-    return !mass.is_mode &&
-           (is_driven(network_, mass.mass) || is_driven(network_, mass.stiffness) ||
-            is_driven(network_, mass.damping));
-  }
+  bool drives_itself(const Mass& mass) const { return ressort::drives_itself(network_, mass); }
 
   // Terms of what acts on it besides its links, at once.
   Words outside(std::size_t i) const {
@@ -301,14 +297,20 @@ class Writer {
       terms.push_back("+ first(" + start + ")");
     }
     if (joint_.is_held(static_cast<std::uint32_t>(i))) {
-      return inverse_mass(i) + "u_" + name + " = " + faust_sum(terms) + ";  o_" + name + " = nx_" +
-             name + " + first(" + faust_number(mass.position) + ");  y_" + name + " = o_" + name +
-             " + u_" + name + ";  v_" + name + " = u_" + name + " + h_" + name + "*g_" + name +
-             ";  x_" + name + " = o_" + name + " + v_" + name + ";  tox_" + name + " = x_" + name +
-             ";";
+      return held_mass(i, faust_sum(terms));
     }
     return "v_" + name + " = " + faust_sum(terms) + ";  x_" + name + " = travel(" +
            faust_number(mass.position) + ", v_" + name + ");";
+  }
+
+  // One that what holds waveguides moves after all else has: so fast if that did not.
+  std::string held_mass(std::size_t i, const std::string& speed) {
+    const std::string& name = mass_[i];
+    return inverse_mass(i) + "o_" + name + " = nx_" + name + " + first(" +
+           faust_number(network_.masses[i].position) + ");  u_" + name + " = " + speed + ";  y_" +
+           name + " = o_" + name + " + u_" + name + ";  v_" + name + " = u_" + name + " + h_" +
+           name + "*g_" + name + ";  x_" + name + " = o_" + name + " + v_" + name + ";  tox_" +
+           name + " = x_" + name + ";";
   }
 
   // How far a force of 1 moves what is held by springs that are solved.
@@ -384,10 +386,18 @@ class Writer {
 
   std::string driven_mass(std::size_t i) {
     const Mass& mass = network_.masses[i];
-    used_.insert("swing");
-    used_.insert("spring");
+    used_.insert({"swing", "spring"});
     Words force = outside(i);
     force.insert(force.begin(), "+ n_" + mass_[i]);
+    if (joint_.is_held(static_cast<std::uint32_t>(i))) {
+      const std::string& name = mass_[i];
+      const std::string speed =
+          "(nv_" + name + " + first(" + faust_number(initial_velocity(network_, mass)) + "*r))";
+      return held_mass(i, speed + " + (" + faust_sum(force) + " - spring(" + value(mass.stiffness) +
+                              ", " + value(mass.damping) + ", o_" + name + ", " + speed + "))*g_" +
+                              name) +
+             "  tov_" + name + " = v_" + name + ";";
+    }
     const std::string swing = "swing(" + value(mass.mass) + ", " + value(mass.stiffness) + ", " +
                               value(mass.damping) + ", " + faust_number(mass.position) + ", " +
                               faust_number(initial_velocity(network_, mass)) + "*r, " +

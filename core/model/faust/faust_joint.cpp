@@ -120,7 +120,7 @@ FaustJoint::FaustJoint(const Network& network)
     for (const std::uint32_t end : {link.a, link.b}) {
       is_held_[end] = true;
       each_behind(network, end, [&](std::uint32_t mass) {
-        is_held_[mass] = is_held_[mass] || gives(mass);
+        is_held_[mass] = true;  // fixed ends of macros too
         if (gives(mass)) {
           groups.join(masses + i, mass);
         }

@@ -35,14 +35,20 @@ bool is_driven(const Network& network, ArgumentId argument) {
                      });
 }
 
+bool drives_itself(const Network& network, const Mass& mass) {
+  return !mass.is_mode && (is_driven(network, mass.mass) || is_driven(network, mass.stiffness) ||
+                           is_driven(network, mass.damping));
+}
+
 std::optional<Error> faust_refusal(const Network& network) {
   for (const Macro& guide : network.waveguides) {
-    for (const ArgumentId argument :
-         {guide.impedance, guide.frequency_hz, guide.t60_s, guide.brightness}) {
+    for (const ArgumentId argument : {guide.frequency_hz, guide.t60_s, guide.brightness}) {
       if (is_driven(network, argument)) {
-        return refused("the waveguide '" + guide.name +
-                           "' follows an audio input, which is not written in FAUST",
-                       guide.location);
+        return refused(
+            "the waveguide '" + guide.name +
+                "' is tuned or damped by an audio input, which is not written in FAUST: let a "
+                "parameter do it",
+            guide.location);
       }
     }
   }
@@ -50,9 +56,10 @@ std::optional<Error> faust_refusal(const Network& network) {
     const Mass& mass = network.masses[i];
     if (is_junction(network, i) && is_turned(network, network.taps[mass.tap].u)) {
       const Macro& guide = guide_of(network, i);
-      return refused("a place on the waveguide '" + guide.name +
-                         "' moves with a parameter, which is not written in FAUST",
-                     guide.location);
+      return refused(
+          "a place on the waveguide '" + guide.name +
+              "' moves with a parameter, which is not written in FAUST: give it a number",
+          guide.location);
     }
   }
   return FaustJoint(network).refusal();
@@ -106,6 +113,10 @@ std::vector<std::string> FaustWaveguides::later(const FaustTerms& terms,
     }
     if (joint_.is_held(i) && (moves(network_.masses[i]) || is_junction(network_, i))) {
       words.push_back(prefix + "x_" + terms.masses[i]);
+    }
+    if (joint_.is_held(i) && moves(network_.masses[i]) &&
+        drives_itself(network_, network_.masses[i])) {
+      words.push_back(prefix + "v_" + terms.masses[i]);
     }
   }
   for (const Guide& guide : guides_) {

@@ -18,6 +18,8 @@ namespace ressort {
 
 // Whether a number follows an audio input.
 bool is_driven(const Network& network, ArgumentId argument);
+// Whether a mass's own M, K or Z do.
+bool drives_itself(const Network& network, const Mass& mass);
 
 // Why a network's waveguides, or what holds them, cannot be written, with the line. The network is
 // expanded.
@@ -27,7 +29,7 @@ class FaustWaveguides {
  public:
   FaustWaveguides(const Network& network, const FaustJoint& joint);
 
-  // What is known a sample later: "nx_m" and "tox_m".
+  // What is known a sample later: "nx_m" and "tox_m", of driven masses their speeds too, nv_.
   std::vector<std::string> later(const FaustTerms& terms, const std::string& prefix) const;
   // Each waveguide's filters and where its places are, as guide_s and by their names in the model.
   // They come in as signals: where they are written out, FAUST evaluates them wherever they are
