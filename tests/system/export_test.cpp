@@ -217,10 +217,27 @@ TEST_CASE("what FAUST makes of an exported model sounds as the model does", "[ex
     CHECK(found < tolerance);
   }
   for (const int rate_hz : {32000, 48000, 96000}) {
-    for (const char* name :
-         {"newer_start", "older_start", "places", "driven", "clipped_spring", "bow", "smooth_bow",
-          "clipped_contact", "damped_pluck", "wiring", "raised_string", "falling", "waveguide",
-          "open_waveguide", "held_waveguide", "waveguides_on_a_box"}) {
+    for (const char* name : {"newer_start",
+                             "older_start",
+                             "places",
+                             "driven",
+                             "clipped_spring",
+                             "bow",
+                             "smooth_bow",
+                             "clipped_contact",
+                             "damped_pluck",
+                             "wiring",
+                             "raised_string",
+                             "falling",
+                             "waveguide",
+                             "open_waveguide",
+                             "held_waveguide",
+                             "waveguides_on_a_box",
+                             "laws_on_waveguides",
+                             "laws_at_one_place",
+                             "hammer_on_a_waveguide",
+                             "stretched_on_waveguides",
+                             "driven_ends_of_waveguides"}) {
       const double found = harness.difference(name, rate_hz);
       INFO(name << " at " << rate_hz << " Hz differs by " << support::show(found));
       CHECK(found < tolerance);

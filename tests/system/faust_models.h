@@ -74,6 +74,52 @@ inline const std::vector<std::pair<std::string, std::string>>& faust_models() {
        "@in2 frcInput [@b top]\n@p nlPluck @in3 @m 0.01 0.1\n@in3 posInput 0.\n"
        "@out1 posOutput [@b top]\n@out2 posOutput [@o 0]\n@out3 frcOutput [@b bridge]\n"
        "@out4 posOutput [@e 0.2]\n@out5 frcOutput @g\n@out6 posOutput @m\n"},
+      // What plucks, rubs and touches waveguides: each law alone, several at one place, what starts
+      // pressed, what flies there, and ends that channels move.
+      {"laws_on_waveguides",
+       "@p param 0.\n@s1 waveguide 1.1 217. 4. 0.4 0.\n@s2 waveguide 0.9 163. 4. 0.4 0.\n"
+       "@s3 openWaveguide 1.3 191. 1. 0.4 0.\n@in1 frcInput [@s1 0.2]\n@in2 posInput 0.\n"
+       "@in3 posInput 0.\n@in4 frcInput [@s3 0.9]\n@l1 nlPluck @in2 [@s1 0.37] 0.1 0.1 0.01\n"
+       "@l2 nlBow @in2 [@s1 0.61] 0.8 0.02\n@l3 nlBow @in3 [@s1 0.77] 0.8 0.02 1\n"
+       "@l4 nlBow @in3 [@s1 0.91] 0.8 0.02 [1 - p]\n@l5 contact @in2 [@s2 0.2] 0.1 0.01 0.05\n"
+       "@l6 nlContact @in2 [@s2 0.4] 0.02 5. 0.1 0.01 0.05\n"
+       "@l7 powerContact [@s2 0.7] @in3 0.1 2.3 0.05 0.05\n@l8 detent @in3 [@s3 0.1] 0.1 0.01\n"
+       "@l9 nlSpring2 @in2 [@s3 0.3] 0.01 0.5 0.002\n@l10 nlSpring3 [@s3 0.5] @in3 0.01 0.5 0.002\n"
+       "@l11 nlSpringDamper @in2 [@s3 0.7] 0.01 0.5 0.1 0.002\n@out1 posOutput [@s1 0.5]\n"
+       "@out2 posOutput [@s2 0.5]\n@out3 posOutput [@s3 0.6]\n@out4 frcOutput @in2\n"
+       "@out5 frcOutput [@s3 0.5]\n"},
+      {"laws_at_one_place",
+       "@s waveguide 1.1 217. 4. 0.4 0.\n@m mass 2. 0. 0.\n@g ground 0.\n@t spring @g @m 0.02 "
+       "0.01\n"
+       "@k spring [@s 0.37] @m 0.2 0.01\n@in1 frcInput [@s 0.2]\n@in2 posInput 0.\n"
+       "@in3 posInput 0.\n@l nlPluck @in2 [@s 0.37] 0.1 0.1 0.01\n@b nlBow @in3 [@s 0.37] 0.6 "
+       "0.02\n"
+       "@c contact @in2 [@s 0.37] 0.1 0.01 -0.02\n@d powerContact @in3 @m 0.1 1.5 0.02\n"
+       "@e nlSpring3 @in3 [@s 0.37] 0.01 0.3 0.001\n@out1 posOutput [@s 0.37]\n"
+       "@out2 frcOutput [@s 0.37]\n@out3 posOutput @m\n@out4 frcOutput @in2\n"},
+      {"hammer_on_a_waveguide",
+       "@s waveguide 1.1 217. 4. 0.4 0.\n@h mass 3. -0.02 30.\n@b body 5. x\n"
+       "@b1 mode @b 210. 0.8 1.\n@b2 mode @b 900. 0.2 -0.5\n"
+       "@felt powerContact @h [@s 0.12] 0.3 2.5 0.1\n@hand mass 2. 0.01 -10.\n"
+       "@beat contact [@s 0.3] @hand 0.05 0.01\n@stop contact @hand [@b x] 0.1 0.02\n"
+       "@in1 frcInput [@s 0.7]\n@in2 frcInput @hand\n@out1 posOutput [@s 0.4]\n"
+       "@out2 posOutput @h\n@out3 frcOutput @h\n@out4 posOutput [@b x]\n@out5 posOutput @hand\n"},
+      {"stretched_on_waveguides",
+       "@s waveguide 1.1 217. 4. 0.4 0.\n@g ground 0.01\n@m mass 3. 0. -20.\n@n mass 2. 0.02 0.\n"
+       "@a spring @g [@s 0.2] 0.1 0.01\n@b spring @m [@s 0.4] 0.1 0.01\n"
+       "@c contact @n [@s 0.6] 0.1 0.01\n@in1 frcInput [@s 0.7]\n@out1 posOutput [@s 0.4]\n"
+       "@out2 posOutput @m\n@out3 posOutput @n\n"},
+      {"driven_ends_of_waveguides",
+       "@q audioParam @in2\n@w audioParam @in4\n@s waveguide [1.2+0.3*w] 160. 3. 0.4 0.\n"
+       "@t openWaveguide 0.8 217. 3. 0.4 0.\n@b body 5. x y z\n@b1 mode @b 210. 0.8 1. -0.4 0.3\n"
+       "@b2 mode @b 900 0.2 -0.5 0.7 0.2\n@e string 6 2. 0.3 0.001 0. 0.2\n"
+       "@m mass [1.5+w] [10*w] 0.3 50.\n@o osc [1.2+0.3*w] [0.1+0.05*w] [0.01+0.004*w] 0. 0.1 40.\n"
+       "@k1 spring [@s 0.4] [@b q] 0.2 0.01\n@k2 nlPluck [@t 0.3] [@e q] 0.3 0.1\n"
+       "@k3 nlBow [@s 0.8] @m 0.3 0.02\n@k4 contact [@t 0.7] @o 0.1 0.01 -0.5\n"
+       "@k5 spring [@t 0.9] [@e 0.05] 0.01 0.001\n"
+       "@in1 frcInput [@s 0.7]\n@in2 posInput 0.\n@in3 frcInput @m\n@in5 frcInput @o\n"
+       "@out1 posOutput [@s 0.4]\n@out2 posOutput [@b y]\n@out3 frcOutput @m\n"
+       "@out4 posOutput [@e 0.5]\n@out5 posOutput @o\n"},
       // Gravity and what moves at the start, in both dialects.
       {"older_start",
        "@g ground 0.3\n@m massG 1.2 0.002 1. 0.9\n@o osc 2. 0.1 0.01 0.5 0.45\n"
