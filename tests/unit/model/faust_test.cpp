@@ -2,6 +2,10 @@
 // needs a FAUST compiler.
 #include "core/model/faust/faust.h"
 
+#include <algorithm>
+
+#include "core/laws/law.h"
+#include "core/model/faust/faust_passive.h"
 #include "tests/support/catch.h"
 #include "tests/support/harness.h"
 
@@ -91,6 +95,21 @@ TEST_CASE("a law brings the one that it stands on", "[faust]") {
   has(turned, "\nbow(z, s, d, v) =");
   has(turned, "\nsmooth_bow(z, s, d, v) =");
   has(turned, "f_l = either_bow(0.1, 0.2, p_p, ");
+}
+
+TEST_CASE("every law has what solves it at a waveguide", "[faust]") {
+  const auto is_defined = [](const std::string& name) {
+    const auto all = faust_passive_definitions();
+    return std::any_of(all.begin(), all.end(),
+                       [&](const FaustDefinition& one) { return one.name == name; });
+  };
+  for (const LawFacts& law : law_table()) {
+    const std::string name(law.name);
+    INFO(name);
+    CHECK(is_defined("gradient_" + name));
+    CHECK(is_defined("steady_" + name) == (name != "spring"));
+    CHECK(is_defined("alone_" + name) == (name != "spring"));
+  }
 }
 
 TEST_CASE("a mass starts where and as fast as the model says", "[faust]") {

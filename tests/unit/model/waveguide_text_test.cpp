@@ -100,12 +100,17 @@ TEST_CASE("what holds a waveguide and FAUST is not told of is refused by its lin
     INFO(text.error().message);
     CHECK(text.error().message.find(why) != std::string::npos);
   };
-  const std::string hammer = "@m mass 1. 0. 0.\n";
-  refused(hammer + "@k contact @m [@s 0.3] 1. 0.\n", 5, "'k' holds a waveguide");
-  refused(hammer + "@k nlPluck @m [@s 0.3] 1. 0.1\n", 5, "only springs and dampers");
-  refused(hammer + "@k nlBow @m [@s 0.3] 1. 0.1\n", 5, "only springs and dampers");
-  refused("@m mass 1. 0.1 0.1\n@k spring @m [@s 0.3] 1.\n", 5, "stretched");
-  refused("@m mass 1. 0. 0.1\n@k spring @m [@s 0.3] 1.\n", 5, "moves at the start");
+  refused("@m mass 1. 0.1 0.2\n@k spring @m [@s 0.3] 1.\n@l nlPluck @m [@s 0.3] 1. 0.1\n", 5,
+          "is moved at the start while it pulls");
+  std::string crowd;
+  for (int i = 0; i < 7; ++i) {
+    crowd += "@k" + std::to_string(i) + " contact @m [@s 0.3] 1. 0.\n";
+  }
+  refused("@m mass 1. -1. 0.\n" + crowd, 11, "more than 5 others that are no springs");
+  refused(
+      "@in9 frcInput [@s 0.6]\n@f audioParam @in2\n@t waveguide 1. f 2. 0.5 0.\n"
+      "@out2 posOutput [@t 0.3]\n",
+      6, "tuned or damped by an audio input");
   refused("@in2 frcInput [@s p]\n", 3, "moves with a parameter");
 }
 
