@@ -187,7 +187,7 @@ std::set<std::string> FaustJoint::definitions() const {
       if (network_.links[link].law != Law::spring) {
         names.insert({"steady_" + name, "alone_" + name});
       }
-      if (cluster.sets_out_alone() || cluster.links.size() > cluster.springs + 1) {
+      if (cluster.sets_out || cluster.links.size() > cluster.springs + 1) {
         names.insert("gradient_" + name);
       }
       if (cluster.sets_out_alone()) {
@@ -298,12 +298,10 @@ std::string FaustJoint::text(const FaustTerms& terms) const {
       text += known(terms, link);
       links.push_back({.law = network_.links[link].law,
                        .name = terms.links[link],
-                       .arguments = arguments_of(terms, network_.links[link])});
+                       .arguments = arguments_of(terms, network_.links[link]),
+                       .sets_out = exerts_at_start(network_, network_.links[link])});
     }
-    text += faust_solution({.links = links,
-                            .springs = cluster.springs,
-                            .couplings = couplings,
-                            .sets_out = cluster.sets_out});
+    text += faust_solution({.links = links, .springs = cluster.springs, .couplings = couplings});
     for (std::size_t i = 0; i < cluster.links.size(); ++i) {
       const std::uint32_t link = cluster.links[i];
       const std::string force = "f_" + terms.links[link];

@@ -97,8 +97,10 @@ class Solution {
     for (std::size_t i = 0; i < count_; ++i) {
       const FaustLink& link = links.links[i];
       for (std::size_t k = 0; k < link.arguments.size(); ++k) {
-        const bool hill = link.law == Law::pluck && links.sets_out && count_ > 1 && k == 0;
-        hand_over(numbered("p", i, k), (hill ? "1'*" : "") + link.arguments[k]);
+        const bool waits =
+            link.sets_out && count_ > 1 && facts_of(link.law).arguments[k].unit == Unit::stiffness;
+        hand_over(numbered("p", i, k),
+                  (waits ? "wait_" + link.name + "*" : "") + link.arguments[k]);
       }
       if (link.law != Law::spring) {
         hand_over(numbered("x", i) + ", " + numbered("y", i), "rest_" + link.name);
@@ -115,15 +117,27 @@ class Solution {
   }
 
   std::string text() {
-    text_ = "  joint_" + links_.links[0].name + " = " + flow(given_, ", ", 6) +
-            " : held\n  with {\n    held(" + flow(names_, ", ", 6) + ") = ";
-    if (links_.sets_out && count_ == 1) {
+    // In the very first sample nothing pulls that is stretched and does not go further; a hill lets
+    // go.
+    for (const FaustLink& link : links_.links) {
+      if (!link.sets_out || count_ == 1) {
+        continue;
+      }
+      const std::string rises = "(" + flow(link.arguments, ", ", 6) + ", c_" + link.name +
+                                ", 0.0 : gradient_" + std::string(facts_of(link.law).name) +
+                                " : _, !)*s_" + link.name + " > 0.0";
+      text_ += "  wait_" + link.name + " = " +
+               (link.law == Law::pluck ? "1'" : "select2(1', " + rises + ", 1)") + ";\n";
+    }
+    text_ += "  joint_" + links_.links[0].name + " = " + flow(given_, ", ", 6) +
+             " : held\n  with {\n    held(" + flow(names_, ", ", 6) + ") = ";
+    if (links_.links[0].sets_out && count_ == 1) {
       text_ +=
           "select2(1', " + first_alone() + ", " + (springs_ == 1 ? "f1" : alone(0, "s1")) + ")";
     } else if (springs_ == count_) {
-      text_ += all_forces() + gate();
+      text_ += all_forces();
     } else {
-      text_ += reduced() + " : pulled" + gate();
+      text_ += reduced() + " : pulled";
     }
     text_ += "\n    with {\n" + spring_rows();
     if (springs_ < count_) {
@@ -131,7 +145,7 @@ class Solution {
     } else {
       text_ += rows_.substitute(springs_);
     }
-    return text_ + gated() + "    };\n  };\n";
+    return text_ + "    };\n  };\n";
   }
 
  private:
@@ -232,7 +246,7 @@ class Solution {
     return sum;
   }
   std::string alone(std::size_t i, const std::string& way) const {
-    const std::string gamma = links_.sets_out && count_ == 1
+    const std::string gamma = links_.links[0].sets_out && count_ == 1
                                   ? (coupling(0, 0).empty() ? "0.0" : coupling(0, 0))
                                   : numbered("h", i, i);
     return "(" + arguments(i) + ", " + numbered("x", i) + ", " + numbered("y", i) + ", " +
@@ -245,7 +259,7 @@ class Solution {
   }
 
   void pull() {
-    if (links_.sets_out && count_ == 1) {
+    if (links_.links[0].sets_out && count_ == 1) {
       return;
     }
     const std::size_t curved = count_ - springs_;
@@ -336,25 +350,6 @@ class Solution {
     const std::string both = flow(values, ", ", 6) + ", " + ends + " : step : ";
     define("newton(" + ends + ")", both + flow(first, ", ", 6));
     define("exerted(" + ends + ")", both + flow(last, ", ", 6));
-  }
-
-  // In the very first sample nothing pulls that was stretched and would only let go.
-  std::string gate() const { return links_.sets_out && count_ > 1 ? " : gated" : ""; }
-  std::string gated() const {
-    if (gate().empty()) {
-      return "";
-    }
-    Symbols words;
-    for (std::size_t i = 0; i < count_; ++i) {
-      std::string way = numbered("s", i);
-      for (std::size_t j = 0; j < count_; ++j) {
-        way += coupling(i, j).empty() ? "" : " - " + coupling(i, j) + "*" + numbered("f", j);
-      }
-      const std::string force = numbered("f", i);
-      words.push_back("select2(1', select2(" + force + "*(" + way + ") > 0.0, 0.0, " + force +
-                      "), " + force + ")");
-    }
-    return "    gated(" + all_forces() + ") = " + flow(words, ", ", 6) + ";\n";
   }
 
   const FaustLinks& links_;

@@ -14,6 +14,7 @@ struct FaustLink {
   Law law{};
   std::string name;
   std::vector<std::string> arguments;  // of the law, at the rate in use
+  bool sets_out = false;               // it would pull as it starts
 };
 
 // Links that move each other, springs first.
@@ -21,7 +22,6 @@ struct FaustLinks {
   std::span<const FaustLink> links;
   std::size_t springs = 0;
   std::span<const std::string> couplings;  // [link][link] how far a force on one shortens the other
-  bool sets_out = false;                   // they would pull as they start
 };
 
 // The definition joint_NAME, NAME being that of the first: what each of them exerts. Of every link
