@@ -19,8 +19,8 @@ struct FaustOptions {
 // A whole FAUST program without libraries, which computes what the engine computes, tick by tick:
 // process has a channel for each input and output up to the highest number in use, gaps included,
 // and a slider for each parameter that no input gives. Refuses a model without outputs, as FAUST
-// does, and of waveguides what holds them by more than springs and dampers, moves its places or
-// follows an input. [any thread but audio]
+// does, and of waveguides those that an input tunes, places that parameters move, and what holds
+// them too many at once or moved from the start. [any thread but audio]
 Result<std::string> faust_text(const Network& network, const FaustOptions& options);
 
 // Masses and links together, macros written out. FAUST's own time grows with the square and more:
