@@ -1,6 +1,7 @@
 // Which element makes a network unstable, and how to say it.
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 #include <set>
 
 #include "core/analysis/proofs.h"
@@ -69,36 +70,36 @@ Proofs::Suspect Proofs::heavier_part(std::size_t term, std::span<const Range> ar
   return {load.stiff >= load.damped + load.rubbed ? Quantity::stiffness : Quantity::damping, term};
 }
 
-// Who has the largest share of the motion that does not decay. A mass that moves nearly alone,
-// between several links, is too light; else it is the link that is pulled the most.
+// The link that is pulled the most in the motion that does not decay.
 Proofs::Suspect Proofs::weakest(const Weights& weights, std::span<const Range> arguments,
                                 std::span<const double> shape) const {
   if (shape.empty()) {
     return heavier_part(edge_bound(assembly_, weights).term, arguments);
   }
-  double inertia = 0.0;
-  double pull = 0.0;
-  std::size_t row = 0;
-  std::size_t term = 0;
-  std::vector<double> share_of_row;
-  std::vector<double> share_of_term;
-  for (std::size_t i = 0; i < shape.size(); ++i) {
-    share_of_row.push_back(weights.masses[i] * shape[i] * shape[i]);
-    inertia += share_of_row[i];
-    row = share_of_row[i] > share_of_row[row] ? i : row;
-  }
+  std::vector<double> pull;
   for (std::size_t t = 0; t < assembly_.terms.size(); ++t) {
     double stretch = 0.0;
     for (const Assembly::Entry& entry : assembly_.of(assembly_.terms[t])) {
       stretch += entry.share * shape[entry.row];
     }
-    share_of_term.push_back(weights.terms[t] * stretch * stretch);
-    pull += share_of_term[t];
-    term = share_of_term[t] > share_of_term[term] ? t : term;
+    pull.push_back(weights.terms[t] * stretch * stretch);
   }
-  const double alone = share_of_row[row] / inertia;
-  const bool is_light = alone > 0.5 && share_of_term[term] / pull < 2.0 / 3.0 * alone;
-  return is_light ? Suspect{Quantity::mass, row} : heavier_part(term, arguments);
+  return heavier_part(static_cast<std::size_t>(std::ranges::max_element(pull) - pull.begin()),
+                      arguments);
+}
+
+// A mass that moves nearly alone: it may be too light for all links together.
+std::optional<Proofs::Suspect> Proofs::lightest(const Weights& weights,
+                                                std::span<const double> shape) const {
+  std::vector<double> inertia;
+  for (std::size_t i = 0; i < shape.size(); ++i) {
+    inertia.push_back(weights.masses[i] * shape[i] * shape[i]);
+  }
+  const auto most = std::ranges::max_element(inertia);
+  if (most == inertia.end() || *most < 0.5 * std::accumulate(inertia.begin(), inertia.end(), 0.0)) {
+    return std::nullopt;
+  }
+  return Suspect{Quantity::mass, static_cast<std::size_t>(most - inertia.begin())};
 }
 
 ArgumentId Proofs::argument_of(const Suspect& suspect, std::span<const Range> arguments) const {

@@ -54,6 +54,7 @@ class Proofs {
   Suspect feeder(std::span<const Range> arguments) const;
   Suspect weakest(const Weights& weights, std::span<const Range> arguments,
                   std::span<const double> shape) const;
+  std::optional<Suspect> lightest(const Weights& weights, std::span<const double> shape) const;
   Suspect heavier_part(std::size_t term, std::span<const Range> arguments) const;
   Culprit accuse(const Suspect& suspect, std::span<const Range> arguments) const;
   ArgumentId argument_of(const Suspect& suspect, std::span<const Range> arguments) const;

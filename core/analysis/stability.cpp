@@ -210,9 +210,18 @@ Certificate Proofs::certify(const ParameterBox& box) {
     return scaled;
   };
   const Boundary boundary = boundary_.between(all_together, 0.0, 1.0);
-  const Suspect suspect = weakest(weights, arguments, boundary.shape);
+  // What an author would turn: one link, where that is enough; else the one mass between several.
+  Suspect suspect = weakest(weights, arguments, boundary.shape);
+  std::optional<double> enough = limit(suspect, arguments);
+  if (!enough || users(suspect, arguments) > 1) {
+    const auto mass = lightest(weights, boundary.shape);
+    const auto heavier =
+        mass && users(*mass, arguments) == 1 ? limit(*mass, arguments) : std::nullopt;
+    suspect = heavier ? *mass : suspect;
+    enough = heavier ? heavier : enough;
+  }
   Culprit culprit = accuse(suspect, arguments);
-  culprit.limit = limit(suspect, arguments);
+  culprit.limit = enough;
   return {verdict, boundary.value, std::move(culprit)};
 }
 

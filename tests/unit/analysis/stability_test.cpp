@@ -411,6 +411,10 @@ TEST_CASE("who is to blame, by name and line, and what would pass", "[stability]
   CHECK(complaint_of("@g ground 0.\n@m mass 0.01 0. 0.\n@a spring @g @m 0.1\n"
                      "@b spring @g @m 0.1\n@c spring @g @m 0.1\n") ==
         "2: unstable: the mass 0.01 of 'm' must stay above 0.075");
+  // Where one of the springs is enough, it is that one which an author would turn.
+  CHECK(complaint_of("@g ground 0.\n@m mass 0.1 0. 0.\n@a spring @g @m 0.1\n"
+                     "@b spring @g @m 0.15\n@c spring @g @m 0.2\n") ==
+        "5: unstable: the stiffness 0.2 of 'c' must stay below 0.15");
   // What is written once and used often is named once.
   CHECK(complaint_of("@K param 1.5\n" + pair + "@a spring @m0 @m1 2*K\n@b spring @g @m0 2*K\n") ==
         "5: unstable: the stiffness 2*K = 3 of 'a' and 1 more must stay below 1.52786");
