@@ -25,7 +25,7 @@ double cents_of(double mass_ratio) {
 class Merger {
  public:
   Merger(const Network& network, const Budget& budget, const Progress& progress)
-      : source_(network), progress_(progress) {
+      : source_(network), values_(parameter_values(network)), progress_(progress) {
     allowed_cents_ = budget.cents < Budget::unlimited ? budget.cents : 0.0;
   }
 
@@ -130,10 +130,21 @@ class Merger {
     const auto k = sum(now().links[stays].arguments[0], now().links[goes].arguments[0]);
     const auto z = sum(now().links[stays].arguments[1], now().links[goes].arguments[1]);
     if (k && z) {
-      edit().network.links[stays].arguments = {*k, *z, no_argument, no_argument, no_argument};
+      Link& both = edit().network.links[stays];
+      const Link& other = source_.links[goes];
+      if (stiffness(other) >
+          stiffness(both)) {  // whoever is told of both knows them by the stiffer
+        both.name = other.name;
+        both.location = other.location;
+      }
+      both.arguments = {*k, *z, no_argument, no_argument, no_argument};
       silence(goes);
       ++edit().parallel;
     }
+  }
+
+  double stiffness(const Link& link) const {
+    return argument_value(now(), link.arguments[0], values_);
   }
 
   bool is_silent(const Link& link) const {
@@ -255,6 +266,7 @@ class Merger {
   static constexpr std::size_t max_sum_steps = 64;
 
   const Network& source_;
+  std::vector<double> values_;  // [parameter] as the text declares them
   const Progress& progress_;
   std::optional<Merged> merged_;
   double allowed_cents_ = 0.0;

@@ -72,6 +72,9 @@ TEST_CASE("what is unstable as it starts is refused by name and place, or forced
   // The linear part of a cubic spring is always felt.
   CHECK(said_to(ground + "@r nlSpring3 @g @m 5 0.1 0.\n").find("'r' must stay below 4") !=
         std::string::npos);
+  // Of two side by side it is the stiffer.
+  CHECK(said_to(ground + "@d damper @g @m 0.01\n@r spring @g @m 5\n").find("5 of 'r' must stay") !=
+        std::string::npos);
   // At half the rate it is four times as stiff.
   CHECK(said_to(ground + "@r spring @g @m 1.5\n", {.rate_hz = 22050.0})
             .find("'r' must stay below 1, at 22050 Hz") != std::string::npos);
