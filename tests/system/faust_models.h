@@ -112,11 +112,15 @@ inline const std::vector<std::pair<std::string, std::string>>& faust_models() {
       {"driven_ends_of_waveguides",
        "@q audioParam @in2\n@w audioParam @in4\n@s waveguide [1.2+0.3*w] 160. 3. 0.4 0.\n"
        "@t openWaveguide 0.8 217. 3. 0.4 0.\n@b body 5. x y z\n@b1 mode @b 210. 0.8 1. -0.4 0.3\n"
-       "@b2 mode @b 900 0.2 -0.5 0.7 0.2\n@e string 6 2. 0.3 0.001 0. 0.\n"
+       "@b2 mode @b 900 0.2 -0.5 0.7 0.2\n@e string 6 2. 0.3 0.001 0. 0.2\n"
+       "@m mass [1.5+w*w] [10*w] 0.3 50.\n@o osc [1.2+0.3*w*w] [0.1+0.05*w*w] [0.01+0.004*w*w] 0. "
+       "0.1 40.\n"
        "@k1 spring [@s 0.4] [@b q] 0.2 0.01\n@k2 nlSpring3 [@t 0.3] [@e q] 0.1 0.3 0.01\n"
-       "@k5 spring [@t 0.9] [@e 0.05] 0.01 0.001\n@in1 frcInput [@s 0.7]\n@in3 frcInput [@t 0.7]\n"
-       "@out1 posOutput [@s 0.4]\n@out2 posOutput [@b y]\n@out4 posOutput [@e 0.5]\n"
-       "@out5 frcOutput [@t 0.3]\n"},
+       "@k3 nlBow [@s 0.8] @m 0.3 0.02\n@k4 contact [@t 0.7] @o 0.1 0.01 -0.5\n"
+       "@k5 spring [@t 0.9] [@e 0.05] 0.01 0.001\n"
+       "@in1 frcInput [@s 0.7]\n@in2 posInput 0.\n@in3 frcInput @m\n@in5 frcInput @o\n"
+       "@out1 posOutput [@s 0.4]\n@out2 posOutput [@b y]\n@out3 frcOutput @m\n"
+       "@out4 posOutput [@e 0.5]\n@out5 posOutput @o\n"},
       // Gravity and what moves at the start, in both dialects.
       {"older_start",
        "@g ground 0.3\n@m massG 1.2 0.002 1. 0.9\n@o osc 2. 0.1 0.01 0.5 0.45\n"
