@@ -180,7 +180,8 @@ class Voices {
   // Whether a pedal that went up lets this voice go.
   bool is_let_go(Voice& voice, std::uint8_t channel) const;
   double softness(std::uint8_t channel) const { return channels_.softness(channel); }
-  // How loud the voice is, beside its channel's level and its key's: at once where it starts, else in 20 ms.
+  // How loud the voice is, beside its channel's level and its key's: at once where it starts, else
+  // in 20 ms.
   void set_strength(std::size_t lane, double strength);
   void release(Voice& voice) const;
   void limit(std::size_t most);

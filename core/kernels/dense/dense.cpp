@@ -4,6 +4,8 @@
 #include <cmath>
 #include <span>
 
+#include "core/kernels/dense/dense_stride.h"
+
 namespace ressort {
 namespace {
 

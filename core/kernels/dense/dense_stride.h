@@ -1,4 +1,7 @@
-// Strides: the tables of a body that its one link holds, and the way of a block through them.
+// core/kernels: strides of a dense body: the tables of one that its one link holds, and the way of
+// a block through them. Member functions, for dense.cpp, which instantiates them.
+#pragma once
+
 #include <algorithm>
 
 #include "core/kernels/dense/dense.h"
@@ -133,11 +136,5 @@ void DenseKernel<T>::build_stride(DenseStride<T>& stride) const {
     }
   }
 }
-
-template bool DenseKernel<float>::has_strides() const;
-template bool DenseKernel<double>::has_strides() const;
-template std::size_t DenseKernel<float>::stride(const DenseDrive<float>&, std::size_t, std::size_t);
-template std::size_t DenseKernel<double>::stride(const DenseDrive<double>&, std::size_t,
-                                                 std::size_t);
 
 }  // namespace ressort
