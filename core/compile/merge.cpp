@@ -132,8 +132,8 @@ class Merger {
     if (k && z) {
       Link& both = edit().network.links[stays];
       const Link& other = source_.links[goes];
-      if (stiffness(other) >
-          stiffness(both)) {  // whoever is told of both knows them by the stiffer
+      // Whoever is told of both knows them by the stiffer.
+      if (stiffness(other) > stiffness(both)) {
         both.name = other.name;
         both.location = other.location;
       }

@@ -226,7 +226,6 @@ std::string FaustJoint::known(const FaustTerms& terms, std::uint32_t index) cons
   const std::string& b = terms.masses[link.b];
   const std::string now = "o_" + a + " - o_" + b;
   const std::string free = "y_" + a + " - y_" + b;
-  // No damper acts in the very first sample, where 1' is 0.
   std::string text = "  e_" + name + " = " + speed_before(terms, link.a) + " - " +
                      speed_before(terms, link.b) + ";  c_" + name + " = " + now + " - e_" + name +
                      ";  s_" + name + " = " +

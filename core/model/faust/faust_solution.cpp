@@ -217,21 +217,17 @@ class Solution {
       words.push_back(rows_.right(i));
       names.push_back(numbered("u", i));
     }
+    is_coupled_.assign(count_ * count_, false);
     for (std::size_t i = springs_; i < count_; ++i) {
       for (std::size_t j = springs_; j < count_; ++j) {
         if (!rows_.at(i, j).empty()) {
+          is_coupled_[i * count_ + j] = true;
           words.push_back(rows_.at(i, j));
           names.push_back(numbered("h", i, j));
         }
       }
     }
     pulled_ = "pulled(" + flow(names, ", ", 6) + ")";
-    is_coupled_.assign(count_ * count_, false);
-    for (std::size_t i = springs_; i < count_; ++i) {
-      for (std::size_t j = springs_; j < count_; ++j) {
-        is_coupled_[i * count_ + j] = !rows_.at(i, j).empty();
-      }
-    }
     rows_ = Elimination(count_, "f", "");
     return flow(words, ", ", 6);
   }
