@@ -139,7 +139,7 @@ struct Bank : BlockBuffers<T> {
 
   Mixer<T> mixer;
   Aligned<T> peak;        // [lane]
-  Aligned<double> gain;   // [lane]
+  Aligned<T> gain;        // [lane]
   std::vector<double> x;  // [node] of a voice that is looked at, or taken over
   std::vector<double> v;
   std::vector<double*> heard;  // [output] where it is to be added

@@ -64,11 +64,10 @@ struct Mixer {
   void (*fill_rows)(const T* row, std::size_t step, std::size_t frames, T* value);
   void (*add_audio)(const AudioInput<T>& input);
   // channels[output][frame] += the sum of gain[lane] * y; what has the gain 0 may be anything.
-  void (*add_voices)(const Heard<T>& heard, const double* gain, double* const* channels);
+  void (*add_voices)(const Heard<T>& heard, const T* gain, double* const* channels);
   // The same if every y that has a gain is below `bound`; whether it was. The largest |y| of each
   // lane; infinity where one is not below, or is no number.
-  bool (*mix)(const Heard<T>& heard, double bound, const double* gain, double* const* channels,
-              T* peak);
+  bool (*mix)(const Heard<T>& heard, double bound, const T* gain, double* const* channels, T* peak);
 };
 
 template <Isa isa, class T>

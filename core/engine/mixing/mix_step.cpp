@@ -2,6 +2,7 @@
 #include "core/engine/mixing/mix.h"
 
 #include <limits>
+#include <utility>
 
 #include "core/kernels/kernel.h"
 
@@ -176,14 +177,21 @@ Bits<V> larger(Bits<V> a, Bits<V> b) {
   return a > b ? a : b;
 }
 
-// Of the packs y, y + step and so on.
+// Of the packs y, y + step and so on; four at once, so that none waits for the one before.
 template <class V, class T>
 Bits<V> largest_of(const T* y, std::size_t count, std::size_t step) {
-  Bits<V> found{};
-  for (std::size_t i = 0; i < count; ++i) {
-    found = larger<V>(found, magnitude(load<V>(y + i * step)));
+  constexpr std::size_t together = 4;
+  Bits<V> found[together] = {};
+  std::size_t i = 0;
+  for (; i + together <= count; i += together) {
+    for (std::size_t k = 0; k < together; ++k) {
+      found[k] = larger<V>(found[k], magnitude(load<V>(y + (i + k) * step)));
+    }
   }
-  return found;
+  for (; i < count; ++i) {
+    found[0] = larger<V>(found[0], magnitude(load<V>(y + i * step)));
+  }
+  return larger<V>(larger<V>(found[0], found[1]), larger<V>(found[2], found[3]));
 }
 
 template <class V>
@@ -231,36 +239,71 @@ void find_peaks(const Heard<T>& heard, double bound, T* peak) {
 
 // --- what comes out -----------------------------------------------------------------------------
 
-// channel[n] += the sum of gain[lane] * rows[n * step + lane] for some frames at once, so that a
-// gain is looked at once for all of them, and no sum waits for another.
-template <std::size_t Frames, class T>
-void add_lanes(const T* rows, std::size_t step, std::size_t used, const double* gain,
+// Of both packs the even blocks of so many numbers, or the odd ones.
+template <std::size_t Block, std::size_t Odd, class V, std::size_t... I>
+[[gnu::always_inline]] inline V blocks_of(V a, V b, std::index_sequence<I...>) {
+  constexpr std::size_t lanes = sizeof...(I);
+  return __builtin_shufflevector(
+      a, b, (I / Block % 2 * lanes + (I / Block / 2 * 2 + Odd) * Block + I % Block)...);
+}
+
+// The sums of as many packs as each has numbers, side by side.
+template <std::size_t Block = 1, class V>
+[[gnu::always_inline]] inline V sums_of(V* packs) {
+  constexpr std::size_t lanes = sizeof(V) / sizeof(Scalar<V>);
+  constexpr std::make_index_sequence<lanes> all;
+  for (std::size_t i = 0; i < lanes / Block / 2; ++i) {
+    packs[i] = blocks_of<Block, 0>(packs[2 * i], packs[2 * i + 1], all) +
+               blocks_of<Block, 1>(packs[2 * i], packs[2 * i + 1], all);
+  }
+  if constexpr (2 * Block < lanes) {
+    return sums_of<2 * Block>(packs);
+  } else {
+    return packs[0];
+  }
+}
+
+// channel[n] += the sum of gain[lane] * rows[n * step + lane], for as many frames at once as there
+// are numbers in a pack: a gain is looked at once for all of them, and their sums are folded
+// together. Of float, in float: its lanes are as exact.
+template <class V, class T>
+void add_lanes(const T* rows, std::size_t step, std::size_t used, const T* gain, std::size_t frames,
                double* channel) {
-  double sum[Frames] = {};
-  std::size_t lane = 0;
-  const auto add = [&]<std::size_t Bytes>() {
-    using D = Pack<double, Bytes>;
-    constexpr std::size_t lanes = Bytes / sizeof(double);
-    D packs[Frames] = {};
-    for (; lane + lanes <= used; lane += lanes) {
-      const D g = load<D>(gain + lane);
-      const auto is_heard = g != D{};
-      for (std::size_t n = 0; n < Frames; ++n) {
-        const auto y = load<Pack<T, lanes * sizeof(T)>>(rows + n * step + lane);
-        packs[n] += g * select(is_heard, __builtin_convertvector(y, D), D{});
+  constexpr std::size_t lanes = sizeof(V) / sizeof(T);
+  const auto add = [&](std::size_t first, std::size_t count) __attribute__((always_inline)) {
+    V packs[lanes] = {};
+    for (std::size_t lane = 0; lane < used; lane += lanes) {
+      const V g = load<V>(gain + lane);
+      const auto is_heard = g != V{};
+      for (std::size_t n = 0; n < count; ++n) {
+        const V y = load<V>(rows + (first + n) * step + lane);
+        packs[n] += g * select(is_heard, y, V{});
       }
     }
-    for (std::size_t n = 0; n < Frames; ++n) {
-      sum[n] += folded(packs[n], [](auto a, auto b) { return a + b; });
+    const V sums = sums_of(packs);
+    for (std::size_t n = 0; n < count; ++n) {
+      channel[first + n] += static_cast<double>(sums[n]);
     }
   };
-  add.template operator()<widest>();
-  if (lane < used) {
-    add.template operator()<16>();
+  const std::size_t whole = frames - frames % lanes;
+  for (std::size_t first = 0; first < whole; first += lanes) {
+    add(first, lanes);
   }
-  for (std::size_t n = 0; n < Frames; ++n) {
-    channel[n] += sum[n];
+  if (whole < frames) {
+    add(whole, frames - whole);
   }
+}
+
+// The widest packs that the lanes fill.
+template <std::size_t Bytes = widest, class T>
+void add_lanes_of(const T* rows, std::size_t step, std::size_t used, const T* gain,
+                  std::size_t frames, double* channel) {
+  if constexpr (Bytes > 16) {
+    if (used % (Bytes / sizeof(T)) != 0) {
+      return add_lanes_of<Bytes / 2>(rows, step, used, gain, frames, channel);
+    }
+  }
+  add_lanes<Pack<T, Bytes>>(rows, step, used, gain, frames, channel);
 }
 
 // One lane. Of one output its samples lie one after the other, of two every other is its: the usual
@@ -286,31 +329,24 @@ void add_one(const T* y, std::size_t frames, std::size_t step, double gain, doub
 }
 
 template <class T>
-void add_voices(const Heard<T>& heard, const double* gain, double* const* channels) {
+void add_voices(const Heard<T>& heard, const T* gain, double* const* channels) {
   const std::size_t step = heard.count * heard.width;
   for (std::size_t output = 0; output < heard.count; ++output) {
     const T* const y = heard.outputs + output * heard.width;
     double* const channel = channels[output];
     if (heard.width > 1) {
-      std::size_t n = 0;
-      for (; n + 4 <= heard.frames; n += 4) {
-        add_lanes<4>(y + n * step, step, heard.lanes, gain, channel + n);
-      }
-      for (; n < heard.frames; ++n) {
-        add_lanes<1>(y + n * step, step, heard.lanes, gain, channel + n);
-      }
-    } else if (*gain != 0.0) {
-      add_one(y, heard.frames, step, *gain, channel);
+      add_lanes_of(y, step, heard.lanes, gain, heard.frames, channel);
+    } else if (*gain != T(0)) {
+      add_one(y, heard.frames, step, static_cast<double>(*gain), channel);
     }
   }
 }
 
 template <class T>
-bool mix(const Heard<T>& heard, double bound, const double* gain, double* const* channels,
-         T* peak) {
+bool mix(const Heard<T>& heard, double bound, const T* gain, double* const* channels, T* peak) {
   find_peaks(heard, bound, peak);
   for (std::size_t lane = 0; lane < heard.lanes; ++lane) {
-    if (gain[lane] != 0.0 && !(static_cast<double>(peak[lane]) < bound)) {
+    if (gain[lane] != T(0) && !(static_cast<double>(peak[lane]) < bound)) {
       return false;
     }
   }

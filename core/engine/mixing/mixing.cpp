@@ -15,22 +15,30 @@ void Mixing::add(Bank<T>& bank, const VoiceGroup& group, const Segment& segment,
   PartBank<T>& part = bank.parts[group.part];
   const std::size_t count = part.program.outputs.size();
   const std::size_t width = part.width;
-  constexpr std::size_t least = 16 / sizeof(T);
+  constexpr std::size_t pack = 64 / sizeof(T);  // the widest
   const std::size_t used = group.end - group.first;
   const Heard<T> heard{.outputs = bank.outputs.data(),
                        .frames = segment.frames,
                        .count = count,
                        .width = width,
-                       .lanes = width == 1 ? 1 : (used + least - 1) / least * least};
+                       .lanes = std::min(width, (used + pack - 1) / pack * pack)};
   const auto is_heard = [&](std::size_t lane) {
     return voices[lane].awake && !watch.is_still(lane, group.part);
   };
   bool is_any_lost = false;
-  for (std::size_t i = 0; i < heard.lanes; ++i) {
-    const std::size_t lane = group.first + i;
-    is_any_lost |= lane < group.end && voices[lane].lost;
-    const bool is_plain = lane < group.end && is_heard(lane) && voices[lane].is_steady();
-    bank.gain[i] = is_plain ? gain_ * voices[lane].decay.gain * voices[lane].volume[0] : 0.0;
+  bool are_all_steady = true;
+  std::fill_n(bank.gain.begin(), heard.lanes, T(0));
+  for (std::size_t lane = group.first; lane < group.end; ++lane) {
+    const Voice& voice = voices[lane];
+    is_any_lost |= voice.lost;
+    if (!is_heard(lane)) {
+      continue;
+    }
+    if (voice.is_steady()) {
+      bank.gain[lane - group.first] = static_cast<T>(gain_ * voice.decay.gain * voice.volume[0]);
+    } else {
+      are_all_steady = false;
+    }
   }
   for (std::size_t output = 0; output < count; ++output) {
     bank.heard[output] = segment.outputs[part.program.outputs[output].channel] + segment.at;
@@ -53,12 +61,12 @@ void Mixing::add(Bank<T>& bank, const VoiceGroup& group, const Segment& segment,
                  sane > 0 ? bank.outputs.data() + (sane - 1) * part.row() : part.last_of(lane),
                  lane, group.part, voices);
       add_held(part.program, voice, segment, sane, watch.held(lane, group.part));
-      bank.gain[lane - group.first] = 0.0;
+      bank.gain[lane - group.first] = T(0);
       is_any_lost = true;
       continue;
     }
     voice.peak = std::max(voice.peak, peak);
-    if (!voice.is_steady()) {
+    if (!are_all_steady && !voice.is_steady()) {
       add_one(part.program, voice, segment, 0, segment.frames, sample);
     }
   }

@@ -85,7 +85,7 @@ TEMPLATE_TEST_CASE("a peak is the largest of a lane, and infinite beyond its bou
         wanted[i % width] = std::max(wanted[i % width], std::fabs(y[i]));
       }
       std::vector<T> peak(width);
-      const std::vector<double> silent(width, 0.0);
+      const std::vector<T> silent(width, T(0));
       std::vector<double> channel(frames, 0.5);
       const std::vector<double*> channels(outputs, channel.data());
       const auto find = [&](double bound) {
@@ -116,10 +116,10 @@ TEMPLATE_TEST_CASE("channels have the sum of all lanes, each with its gain", "[m
   each_mixer<T>([&](const Mixer<T>& mixer) {
     each_shape<T>([&](std::size_t frames, std::size_t outputs, std::size_t width) {
       std::vector<T> y = random_rows<T>(random, frames * outputs * width);
-      std::vector<double> gain(width);
+      std::vector<T> gain(width);
       for (std::size_t lane = 0; lane < width; ++lane) {
-        gain[lane] = lane % 3 == 1 ? 0.0 : random.uniform(0.1, 1.0);
-        for (std::size_t i = lane; i < y.size() && gain[lane] == 0.0; i += width) {
+        gain[lane] = lane % 3 == 1 ? T(0) : static_cast<T>(random.uniform(0.1, 1.0));
+        for (std::size_t i = lane; i < y.size() && gain[lane] == T(0); i += width) {
           y[i] = static_cast<T>(i % 2 == 0 ? no_number : infinity);  // is not heard
         }
       }
@@ -129,15 +129,16 @@ TEMPLATE_TEST_CASE("channels have the sum of all lanes, each with its gain", "[m
         pointers.push_back(channel.data());
       }
       mixer.add_voices({y.data(), frames, outputs, width, width}, gain.data(), pointers.data());
-      // So many sums of numbers below 1, each rounded by half of 2^-52 of at most the width.
-      const double most = static_cast<double>(width * width + 2) * 0x1p-53;
+      // So many sums of numbers below 1, each rounded by half of epsilon of at most the width.
+      constexpr double epsilon = std::numeric_limits<T>::epsilon();
+      const double most = static_cast<double>(width * width + 2) * 0.5 * epsilon;
       std::size_t off = 0;
       for (std::size_t n = 0; n < frames; ++n) {
         for (std::size_t output = 0; output < outputs; ++output) {
           long double sum = 0.5L;
           for (std::size_t lane = 0; lane < width; ++lane) {
             const auto here = y[(n * outputs + output) * width + lane];
-            sum += gain[lane] == 0.0 ? 0.0L : static_cast<long double>(gain[lane]) * here;
+            sum += gain[lane] == T(0) ? 0.0L : static_cast<long double>(gain[lane]) * here;
           }
           off += std::fabs(channels[output][n] - static_cast<double>(sum)) <= most ? 0 : 1;
         }
@@ -160,7 +161,7 @@ TEMPLATE_TEST_CASE("nothing is mixed where a voice that is heard is beyond its b
       for (std::size_t i = 0; i < y.size(); ++i) {
         y[i] = i % width < used ? y[i] : static_cast<T>(no_number);
       }
-      std::vector<double> gain(width, 0.5);
+      std::vector<T> gain(width, T(0.5));
       std::vector<T> peak(width);
       const auto played = [&](auto&& play) {
         std::vector<std::vector<double>> channels(outputs, std::vector<double>(frames, 0.25));
