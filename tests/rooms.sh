@@ -31,6 +31,7 @@ judge() {
       owner["httplib.h"] = "app/panel/panel.cpp"
       owner["png.h"] = "app/commands/gallery/png.cpp"
       owner["mpi.h"] = "app/mpi/ranks.cpp"
+      owner["CLI/"] = "app/command_line/"
       owner["atomic"] = "app/realtime/lockfree.h"
       owner["toml++/"] = "core/model/"
       owner["Eigen/"] = "core/linear_algebra/"
@@ -58,8 +59,9 @@ judge() {
       sees["app/control"] = all " app app/realtime app/devices app/session app/control"
       sees["app/panel"] = sees["app/control"] " app/panel"
       sees["app/commands"] = sees["app/panel"] " core/identification core/solids app/commands"
-      sees["app/mpi"] = sees["app/commands"] " app/mpi"
-      sees["app"] = sees["app/commands"]
+      sees["app/command_line"] = sees["app/commands"] " app/command_line"
+      sees["app/mpi"] = sees["app/command_line"] " app/mpi"
+      sees["app"] = sees["app/command_line"]
     }
     {
       line = $0
@@ -152,6 +154,8 @@ app/control/terminal.cpp:1:#include <lo/lo.h>
 app/control/osc/server.cpp:1:#include <histedit.h>
 app/control/registry.cpp:1:#include "app/panel/panel.h"
 app/panel/panel.cpp:1:#include "app/commands/commands.h"
+app/commands/make.cpp:1:#include "app/command_line/options.h"
+app/commands/check.cpp:1:#include <CLI/CLI.hpp>
 app/panel/state.cpp:1:#include <httplib.h>
 app/realtime/midi.cpp:1:#include <RtMidi.h>'
 planted=$(printf '%s\n' "$forbidden" | wc -l)

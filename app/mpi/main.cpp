@@ -1,10 +1,9 @@
 // app/mpi: the command line of ressort-mpi, a `render` whose large networks are divided among
 // processes.
-#include <CLI/CLI.hpp>
 #include <cstdio>
 #include <exception>
 
-#include "app/commands/command_line.h"
+#include "app/command_line/options.h"
 #include "app/commands/offline.h"
 #include "app/exit_code.h"
 #include "app/mpi/ranks.h"

@@ -2,7 +2,6 @@
 // back.
 #pragma once
 
-#include <CLI/CLI.hpp>
 #include <functional>
 #include <optional>
 #include <string>
@@ -27,9 +26,5 @@ struct ShapeOptions {
 
 // `goes_on` answers false to stop. [main]
 int shape_model(const ShapeOptions& options, const std::function<bool()>& goes_on);
-
-// The command line of `shape`. `run` does it; its exit code becomes `code`.
-void add_shape(CLI::App& app, ShapeOptions& options,
-               const std::function<int(const ShapeOptions&)>& run, int& code);
 
 }  // namespace ressort

@@ -1,9 +1,8 @@
-#include "app/commands/modes/modes_line.h"
-
 #include <string>
 #include <vector>
 
-#include "app/commands/command_line.h"
+#include "app/command_line/command_lines.h"
+#include "app/command_line/options.h"
 #include "core/model/language/expression.h"
 
 namespace ressort {

@@ -2,8 +2,8 @@
 #include <limits>
 #include <string>
 
-#include "app/commands/command_line.h"
-#include "app/commands/timbre/shape_model.h"
+#include "app/command_line/command_lines.h"
+#include "app/command_line/options.h"
 #include "app/session/timbre/shape.h"
 #include "core/model/language/expression.h"
 
@@ -53,8 +53,7 @@ const char* help_of(AskedFigure figure) {
 
 }  // namespace
 
-void add_shape(CLI::App& app, ShapeOptions& options,
-               const std::function<int(const ShapeOptions&)>& run, int& code) {
+void add_shape(CLI::App& app, ShapeOptions& options, int& code) {
   CLI::App* command = app.add_subcommand(
       "shape", "turns a linear model to a timbre that is asked for: darker, hollower, longer");
   command->footer(shape_examples);
@@ -90,7 +89,7 @@ void add_shape(CLI::App& app, ShapeOptions& options,
       ->check(within(8000.0, 768000.0));
   add_motion(*command, options.third);
   command->allow_extras();
-  command->callback([command, &options, run, &code] {
+  command->callback([command, &options, &code] {
     for (std::string word : command->remaining()) {
       if (word.starts_with("--")) {
         std::replace(word.begin() + 2, word.end(), '-', '_');
@@ -101,7 +100,7 @@ void add_shape(CLI::App& app, ShapeOptions& options,
       throw CLI::ValidationError("shape", "one model alone can be shaped, found '" +
                                               command->remaining().front() + "' as well");
     }
-    code = run(options);
+    code = shape_command(options);
   });
 }
 

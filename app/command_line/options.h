@@ -1,4 +1,4 @@
-// app/commands: options that several commands have.
+// app/command_line: options that several commands have.
 #pragma once
 
 #include <CLI/CLI.hpp>
@@ -7,6 +7,8 @@
 #include <utility>
 #include <vector>
 
+#include "app/session/loader.h"
+#include "core/compile/plan.h"
 #include "core/compile/stability_check.h"
 #include "core/model/network.h"
 #include "core/result.h"
@@ -25,6 +27,17 @@ void add_settings(CLI::App& command, std::vector<Setting>& settings);
 
 // What the last argument of a mass means, for every command that reads a model.
 void add_motion(CLI::App& command, std::optional<ThirdArgument>& third);
+
+void add_method(CLI::App& command, std::optional<Method>& method);
+void add_budget(CLI::App& command, std::optional<Budget>& budget);
+void add_strict(CLI::App& command, bool& is_strict);
+void add_force(CLI::App& command, bool& force);
+
+// How the network is computed, for every command that computes it.
+void add_numbers(CLI::App& command, Precision& precision, bool& rescale);
+
+// What is said of keys, instead of what the preset says.
+void add_keys(CLI::App& command, KeyOptions& keys);
 
 // One of a few words.
 template <class T>

@@ -1,4 +1,4 @@
-// app/commands: what an installed program has beside it, printed from its own tables.
+// app/command_line: what an installed program has beside it, printed from its own tables.
 #pragma once
 
 #include <CLI/CLI.hpp>

@@ -1,8 +1,7 @@
-#include "app/commands/timbre/describe_line.h"
-
 #include <string>
 
-#include "app/commands/command_line.h"
+#include "app/command_line/command_lines.h"
+#include "app/command_line/options.h"
 #include "app/commands/timbre/sweep.h"
 #include "core/model/language/expression.h"
 
@@ -39,8 +38,7 @@ CLI::Validator whole(double least, double most) {
 
 }  // namespace
 
-void add_describe(CLI::App& app, DescribeOptions& options,
-                  const std::function<int(const DescribeOptions&)>& run, int& code) {
+void add_describe(CLI::App& app, DescribeOptions& options, int& code) {
   CLI::App* command = app.add_subcommand(
       "describe", "tells what a sound is like: bright or dark, hollow, noisy, long, in figures");
   command->footer(describe_examples);
@@ -99,7 +97,7 @@ void add_describe(CLI::App& app, DescribeOptions& options,
   add_parsed(*command, "--law", options.laws, parse_law,
              "FIGURE=FORMULA of what is swept, drawn beside what is found");
   add_motion(*command, options.third);
-  command->callback([&options, run, &code] { code = run(options); });
+  command->callback([&options, &code] { code = describe_command(options); });
 }
 
 }  // namespace ressort

@@ -1,8 +1,8 @@
-#include "app/commands/body/body_line.h"
-
 #include <string>
 #include <vector>
 
+#include "app/command_line/command_lines.h"
+#include "app/command_line/options.h"
 #include "app/text.h"
 #include "core/solids/solid_modes.h"
 

@@ -1,4 +1,4 @@
-#include "app/commands/manual/manual.h"
+#include "app/command_line/manual.h"
 
 #include <algorithm>
 #include <cstdio>

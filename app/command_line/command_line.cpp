@@ -1,0 +1,60 @@
+#include "app/command_line/command_line.h"
+
+#include <cstdio>
+#include <cstdlib>
+#include <string>
+
+#include "app/command_line/command_lines.h"
+#include "app/exit_code.h"
+#include "app/version.h"
+
+namespace ressort {
+
+int run_command_line(int argc, char** argv) {
+  CLI::App app{"ressort plays networks of masses and springs, read from .mdl files."};
+  app.footer(
+      "Start with 'ressort play', then type 'help' at its prompt.\n"
+      "'ressort COMMAND --help' tells more of each command.\n"
+      "Exit codes: 0 done, 1 our failure, 2 wrong use or unreadable input, 75 no audio.");
+  app.set_version_flag("-V,--version", std::string("ressort ") + version + ", commit " + commit);
+  app.name("ressort");
+  app.require_subcommand(0, 1);
+  int code = exit_code::done;
+  PlayOptions play_options;
+  RenderChoice render_choice;
+  CheckOptions check_options;
+  ExportOptions export_options;
+  BodyRequest body_request;
+  ModesOptions modes_options;
+  DescribeOptions describe_options;
+  ShapeOptions shape_options;
+  MakeChoice make_choice;
+  ChartOptions chart_options;
+  std::string reference_part;
+  add_play(app, play_options, code);
+  add_render(app, render_choice, code);
+  add_check(app, check_options, code);
+  add_make(app, make_choice, code);
+  add_export(app, export_options, code);
+  add_modes(app, modes_options, code);
+  add_describe(app, describe_options, code);
+  add_shape(app, shape_options, code);
+  add_body(app, body_request, code);
+  add_chart(app, chart_options, code);
+  add_reference(app, reference_part, code);
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    return app.exit(error) == 0 ? exit_code::done : exit_code::wrong_use;
+  }
+  if (app.get_subcommands().empty() && std::getenv("NSM_URL") != nullptr) {
+    return play(play_options);  // a session manager starts programs by their names alone
+  }
+  if (app.get_subcommands().empty()) {
+    std::fprintf(stderr, "%s", app.help().c_str());
+    return exit_code::wrong_use;
+  }
+  return code;
+}
+
+}  // namespace ressort
