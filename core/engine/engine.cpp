@@ -151,7 +151,7 @@ struct Engine::Player {
     if (event.index >= key_count) {
       return;
     }
-    const double velocity = playing.velocity(event.value) * voices.softness(channel);
+    const double velocity = playing.velocity(event.value * voices.softness(channel));
     if (!takes(channel, event.index)) {
       gestures.perform_elsewhere(event.index, velocity, channel);
       return;

@@ -308,12 +308,13 @@ TEST_CASE("channels that a preset does not listen to play nothing", "[play_modes
 
 TEST_CASE("a velocity curve bends the touch and keeps its ends", "[play_modes]") {
   const auto loudness = [](double curve, double velocity,
-                           std::vector<std::array<double, 2>> points = {}) {
+                           std::vector<std::array<double, 2>> points = {}, bool is_soft = false) {
     Preset preset = struck(4);
     preset.velocity = curve;
     preset.velocity_points = std::move(points);
     Player player(ringing_string(), preset);
-    player.run(3000, {note_on(0, 60, velocity)});
+    player.run(3000, {{.kind = EventKind::controller, .index = 67, .value = is_soft ? 1.0 : 0.0},
+                      note_on(0, 60, velocity)});
     return peak(player.y());
   };
   const double full = loudness(0.0, 1.0);
@@ -327,6 +328,9 @@ TEST_CASE("a velocity curve bends the touch and keeps its ends", "[play_modes]")
   CHECK(loudness(0.0, 0.25, points) == Approx(0.3 * full));
   CHECK(loudness(0.0, 0.75, points) == Approx(0.6 * full));
   CHECK(loudness(0.0, 1.0, points) == Approx(0.8 * full));
+  // Three quarters of the touch, not of what the curve gives for it: 0.6^2 and not 0.75 0.8^2.
+  CHECK(loudness(-0.5, 0.8, {}, true) == Approx(0.36 * full));
+  CHECK(loudness(0.0, 1.0, points, true) == Approx(0.6 * full));
 }
 
 TEST_CASE("a mode that is not there is no pitch, and that is told", "[play_modes]") {
