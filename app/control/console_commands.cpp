@@ -371,10 +371,14 @@ std::vector<std::vector<std::string>> control_rows(const ConsoleContext& console
     }
     const bool turns = control.gesture == Gesture::parameter;
     const std::string range = print_number(control.low) + " to " + print_number(control.high);
+    const bool has_all_keys = control.lowest_key == 0 && control.highest_key == 127;
+    const std::string keys = has_all_keys ? ""
+                                          : ", keys " + std::to_string(control.lowest_key) +
+                                                " to " + std::to_string(control.highest_key);
     rows.push_back({source_name(control),
                     (turns ? "turns " + control.target
                            : std::string(row_of(control.gesture).name) + " at " + control.target) +
-                        ", " + range + (control.exponential ? ", exponential" : "") +
+                        ", " + range + (control.exponential ? ", exponential" : "") + keys +
                         (turns ? now(control.target) : "")});
   }
   return rows;
