@@ -66,10 +66,25 @@ double passive_ns(const Program& program) {
 }
 
 double packs_of(const Workload& load) {
-  const double size = load.is_double ? 8.0 : 4.0;
-  const double lanes = static_cast<double>(vector_bytes(load.isa)) / size;
-  const bool is_halved = load.isa == Isa::v4 && load.voices > lanes / 2.0;
-  return std::ceil(load.voices / lanes) * (is_halved ? 2.0 : load.isa == Isa::base ? 1.1 : 1.0);
+  const double lanes = static_cast<double>(vector_bytes(load.isa)) / bytes_of_number(load);
+  return std::ceil(load.voices / lanes);
+}
+
+namespace {
+
+// Of a sweep that does not fit most of it has gone before it comes round again.
+double lines_beyond(double cache, double bytes) {
+  return std::clamp(2.0 * (bytes - cache), 0.0, bytes) / 64.0;
+}
+
+}  // namespace
+
+double lines_of(double bytes) {
+  return lines_beyond(48.0 * 1024.0, bytes);
+}
+
+double far_lines_of(double bytes) {
+  return lines_beyond(1.5 * 1024.0 * 1024.0, bytes);
 }
 
 namespace {

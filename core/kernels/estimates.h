@@ -7,6 +7,7 @@
 #include <string>
 
 #include "core/kernels/isa.h"
+#include "core/kernels/prices/prices.h"
 #include "core/kernels/program.h"
 
 namespace ressort {
@@ -19,6 +20,7 @@ struct Workload {
   int voices = 1;
   double highest_factor = 1.0;   // on every stiffness, that the published scheme bears
   double wanted_factor = 1.0;    // that keys ask for
+  double moving = 0.25;          // share of the samples in which some parameter moves
   bool is_untuned = false;       // no voice ever has another one than 1
   Executor* executor = nullptr;  // that large parts may be shared out to; null: one core for all
   bool reaches_beyond() const { return wanted_factor > highest_factor; }
@@ -37,14 +39,18 @@ LinkCount links_of(const Program& program);
 // O(links + nodes)
 double passive_ns(const Program& program);
 
-// How many packs the voices fill, each counted as often as it is dearer than one of AVX2: the
-// widest are worked on in two halves.
+// How many packs the voices fill.
 double packs_of(const Workload& load);
-
-// The wide registers of v3 and v4, or the base's?
-inline bool is_wide(const Workload& load) {
-  return load.isa != Isa::base;
+inline double bytes_of_number(const Workload& load) {
+  return load.is_double ? 8.0 : 4.0;
 }
+inline double cost(const Work& work, const Workload& load) {
+  return work.cost(load.isa, load.is_double);
+}
+
+// Lines that a sweep over so many bytes brings from the second cache, and from beyond it.
+double lines_of(double bytes);
+double far_lines_of(double bytes);
 
 // A sample of one voice at the very worst, in visits of some nanoseconds, links that are not plain
 // going through each other as long as they may: to know what not to try. O(runs)

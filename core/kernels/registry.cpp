@@ -46,6 +46,23 @@ std::unique_ptr<Kernel<T>> make(const Program& program, std::size_t voices, Isa 
   return std::make_unique<K<T>>(program, std::get<Tables>(program.form), voices, isa);
 }
 
+template <class Tables>
+constexpr bool has_work = requires(const Program& program, const Tables& form,
+                                   const Workload& load) {
+  work(program, form, load);
+};
+
+template <class Tables>
+constexpr auto work_of() -> Work (*)(const Program&, const Workload&) {
+  if constexpr (has_work<Tables>) {
+    return [](const Program& program, const Workload& load) {
+      return work(program, std::get<Tables>(program.form), load);
+    };
+  } else {
+    return nullptr;
+  }
+}
+
 // The kernel K of these tables, which `fits(request)` finds or not.
 template <class Tables, template <class> class K, class Fits>
 constexpr KernelRow row(Method method, std::string_view name, Use use, Fits,
@@ -62,9 +79,14 @@ constexpr KernelRow row(Method method, std::string_view name, Use use, Fits,
             return tables ? std::optional<Form>(std::move(*tables)) : std::nullopt;
           },
           .least_ns = least_ns,
+          .work = work_of<Tables>(),
           .predicted_ns =
               [](const Program& program, const Workload& load) {
-                return predicted_ns(program, std::get<Tables>(program.form), load);
+                if constexpr (has_work<Tables>) {
+                  return cost(work(program, std::get<Tables>(program.form), load), load);
+                } else {
+                  return predicted_ns(program, std::get<Tables>(program.form), load);
+                }
               },
           .description =
               [](const Program& program) {

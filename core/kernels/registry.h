@@ -47,7 +47,8 @@ struct KernelRow {
   std::optional<Form> (*fits)(const KernelRequest&);
   // What it costs at least, where fits() takes long; else null.
   double (*least_ns)(const Program&, const Workload&);
-  // These ask for a Program in the row's own form.
+  // These ask for a Program in the row's own form. Of what it does, where it is not made of others:
+  Work (*work)(const Program&, const Workload&);
   double (*predicted_ns)(const Program&, const Workload&);
   std::string (*description)(const Program&);
   std::uint64_t (*voice_bytes)(const Program&, std::uint64_t number_bytes);
@@ -66,8 +67,8 @@ std::string_view method_name(Method method);
 std::vector<Method> methods_for(KernelRow::Use use);
 
 // Nanoseconds a sample for all voices in the form that the Program has, everything that can touch
-// touching all the time: what a block's budget has to hold. Fitted to measurements on one machine
-// (Zen 4 at 3.7 GHz), to about a quarter; what matters is the order of the forms.
+// touching all the time: what a block's budget has to hold. By the prices of the machine's kind
+// (prices.h): the same on all machines of one instruction set.
 double predicted_ns(const Program& program, const Workload& load);
 
 // What the form is, of this Program, in words.

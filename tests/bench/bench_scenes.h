@@ -29,10 +29,14 @@ struct BenchScene {
   std::string tuned_by = "";  // the parameter that sets a voice's pitch in FAUST
   std::string family = "";    // its curve in the picture; none where it is empty
   std::size_t elements = 0;   // masses and links, about: what it costs FAUST and the reference
+  bool is_worst = false;      // all that can touch or sound does, all the time, as the plan reckons
 };
 
 // In the order in which they are printed.
 std::vector<BenchScene> all_scenes();
+// Each form over sizes, at its worst: what prices are fitted to, beside those of all_scenes() that
+// are at theirs.
+std::vector<BenchScene> fit_scenes();
 
 // The model with the parameters that move taken from channels of their own, after its `inputs`
 // others: FAUST's sliders move once a block.

@@ -9,6 +9,7 @@
 #include <cstdio>
 #include <cstdlib>
 #include <fstream>
+#include <limits>
 #include <optional>
 #include <utility>
 
@@ -16,6 +17,7 @@
 #include "core/compile/plan.h"
 #include "core/model/language/mdl.h"
 #include "tests/bench/faust_picture.h"
+#include "tests/bench/fit.h"
 #include "tests/bench/limit.h"
 #include "tests/bench/measure.h"
 #include "tests/bench/report.h"
@@ -33,6 +35,8 @@ const char* const usage =
     "usage: tests/bench/run [OPTION...] [SCENE...]\n"
     "  SCENE        a name or a pattern such as 'chain-*'; without one, all\n"
     "  --faust      beside the exported model, compiled by faust and g++ and clang++\n"
+    "  --fit        measures what the plan reckons with, over sizes, and writes it as\n"
+    "               core/kernels/prices/*.h for this instruction set; two minutes\n"
     "  --quick      a glance: less exact\n"
     "  --isa NAME   base, v3 or v4; without it, the best of this machine\n"
     "  --seconds S  to measure each scene for; 4 without it\n"
@@ -41,6 +45,7 @@ const char* const usage =
 
 struct Options {
   bool faust = false;
+  bool fits = false;
   bool lists = false;
   Isa isa = best_isa();
   double seconds = 4.0;
@@ -72,6 +77,8 @@ std::optional<Options> read(const std::vector<std::string>& arguments) {
     }
     if (argument == "--faust") {
       options.faust = true;
+    } else if (argument == "--fit") {
+      options.fits = true;
     } else if (argument == "--list") {
       options.lists = true;
     } else if (argument == "--quick") {
@@ -121,9 +128,12 @@ void show_progress(std::size_t done, std::size_t all, const std::string& doing) 
 std::vector<Formed> forms_of(const Machine& machine) {
   std::vector<Formed> forms;
   for (const Method method : methods_for(KernelRow::Use::published)) {
-    Planned planned = make_plan(machine, {}, method);
-    if (planned.parts.size() == 1 && planned.parts[0].method == method) {
-      forms.push_back({std::string(method_name(method)), std::move(planned.machine)});
+    auto form = machine.parts.size() == 1
+                    ? row_of(method).fits({machine.parts[0], Workload{}, Budget{}, Progress{}})
+                    : std::nullopt;
+    if (form) {
+      forms.push_back({std::string(method_name(method)), machine});
+      forms.back().machine.parts[0].form = *std::move(form);
     }
   }
   return forms;
@@ -148,6 +158,13 @@ void add_ours(const BenchScene& scene, const Network& network, const std::vector
   all.back().form = method_name(planned.parts.front().method);
   all.back().calibrate();
   std::move(kernels.begin(), kernels.end(), std::back_inserter(all));
+}
+
+Workload load_of(const BenchScene& scene, bool is_double, Isa isa) {
+  return {.is_double = is_double,
+          .isa = isa,
+          .voices = static_cast<int>(scene.voices),
+          .moving = scene.turns.empty() ? 0.0 : 1.0};
 }
 
 std::string faust_name(const FaustLibrary& library) {
@@ -182,11 +199,15 @@ struct Limits {
   double float_per_ns = 0.0;
 };
 
-void compare(Row& row, const std::vector<Formed>& forms, const Limits& limits) {
+void compare(Row& row, const BenchScene& scene, const std::vector<Formed>& forms,
+             const Limits& limits, Isa isa) {
   const auto form = std::find_if(forms.begin(), forms.end(),
                                  [&](const Formed& formed) { return formed.method == row.method; });
   if (form == forms.end()) {
     return;
+  }
+  if (scene.is_worst) {
+    row.predicted_ns = predicted_ns(form->machine.parts[0], load_of(scene, row.is_double, isa));
   }
   if (const auto work = multiply_adds(form->machine.parts[0])) {
     const double least_ns = *work * static_cast<double>(row.voices) /
@@ -227,12 +248,13 @@ std::vector<Row> measure_scene(const BenchScene& scene, const Network& network,
                     .masses = machine.parts[0].moving,
                     .links = machine.parts[0].ends.size(),
                     .voices = scene.voices,
+                    .is_worst = scene.is_worst,
                     .median_ns = one.median(),
                     .minimum_ns = one.minimum(),
                     .lower_ns = one.quantile(0.25),
                     .upper_ns = one.quantile(0.75)});
     compare(rows.back(), all, libraries);
-    compare(rows.back(), forms, limits);
+    compare(rows.back(), scene, forms, limits, options.isa);
   }
   return rows;
 }
@@ -265,7 +287,11 @@ bool prepare(Prepared& prepared, const Options& options) {
 
 int run(const Options& options) {
   std::vector<Prepared> wanted;
-  for (BenchScene& scene : all_scenes()) {
+  std::vector<BenchScene> scenes = all_scenes();
+  if (!options.patterns.empty()) {
+    std::ranges::move(fit_scenes(), std::back_inserter(scenes));
+  }
+  for (BenchScene& scene : scenes) {
     if (options.lists) {
       std::printf("%s\n", scene.name.c_str());
     } else if (is_wanted(scene, options.patterns)) {
@@ -305,6 +331,7 @@ int run(const Options& options) {
     rows.insert(rows.end(), found.begin(), found.end());
     wanted[i] = {};
   }
+  print_predictions(rows);
   print_regrets(rows);
   const bool is_written = write_csv(options.folder / "bench.csv", isa, rows);
   if (std::any_of(rows.begin(), rows.end(), [](const Row& row) { return !row.family.empty(); }) &&
@@ -317,6 +344,71 @@ int run(const Options& options) {
   return stops != 0 ? 130 : is_written ? 0 : 1;
 }
 
+// --- prices -------------------------------------------------------------------------------------
+
+void add_samples(const BenchScene& scene, const Options& options, std::vector<Sample>& samples) {
+  constexpr double seconds = 0.1;
+  constexpr double most_dear = 100.0;  // times the cheapest: nobody would take it
+  Prepared prepared{scene, {}, {}};
+  if (!prepare(prepared, options)) {
+    return;
+  }
+  const std::vector<Formed> forms = forms_of(make_machine(prepared.network, rate_hz, true));
+  std::vector<Timed> all;
+  std::vector<Sample> found;
+  for (const bool is_double : {true, false}) {
+    const Workload load = load_of(scene, is_double, options.isa);
+    double least_ns = std::numeric_limits<double>::infinity();
+    for (const Formed& formed : forms) {
+      const Program& program = formed.machine.parts[0];
+      const KernelRow& row = row_of(program.form);
+      all.emplace_back(formed.method, is_double,
+                       is_double
+                           ? play_kernels<double>(scene, prepared.network, program, options.isa)
+                           : play_kernels<float>(scene, prepared.network, program, options.isa));
+      const double ns = all.back().calibrate();
+      least_ns = std::min(least_ns, ns);
+      if (ns > most_dear * least_ns) {
+        all.pop_back();
+        continue;
+      }
+      found.push_back({scene.name, row.method, is_double, row.work(program, load), ns});
+    }
+  }
+  measure(all, seconds, stops);
+  for (std::size_t i = 0; i < all.size() && all[i].has_played(); ++i) {
+    found[i].ns = all[i].quantile(0.25);
+    samples.push_back(found[i]);
+  }
+}
+
+int fit(const Options& options) {
+  if (!std::filesystem::exists(path_of(options.isa))) {
+    std::fprintf(stderr, "--fit is for the folder of the source\n");
+    return 2;
+  }
+  stay_on_one_core();
+  const DenormalsFlushed flushed;
+  std::vector<BenchScene> scenes = fit_scenes();
+  for (BenchScene& scene : all_scenes()) {
+    if (scene.is_worst) {
+      scenes.push_back(std::move(scene));
+    }
+  }
+  std::vector<Sample> samples;
+  for (std::size_t i = 0; i < scenes.size() && stops == 0; ++i) {
+    show_progress(i, scenes.size(), scenes[i].name);
+    add_samples(scenes[i], options, samples);
+  }
+  show_progress(scenes.size(), scenes.size(), "");
+  if (stops != 0) {
+    return 130;
+  }
+  const Prices prices = fitted(prices_of(options.isa), samples);
+  print_errors(prices, samples);
+  return write(prices, options.isa, machine_line(std::string(isa_name(options.isa)))) ? 0 : 1;
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
@@ -327,5 +419,5 @@ int main(int argc, char** argv) {
     std::fputs(usage, stderr);
     return 2;
   }
-  return run(*options);
+  return options->fits ? fit(*options) : run(*options);
 }

@@ -53,16 +53,28 @@ std::optional<Batch> batch_form(const Program& program) {
   return batch;
 }
 
-// Beyond most_held_masses everything goes through memory.
-double predicted_ns(const Program& program, const Batch&, const Workload& load) {
+// One pack waits for its own last result. Beyond most_held_masses everything goes through memory.
+Work work(const Program& program, const Batch&, const Workload& load) {
   const LinkCount links = links_of(program);
   const double others = links.bent + links.others;
-  const double passive = 0.8 * packs_of(load) * passive_ns(program);
-  if (program.moving <= most_held_masses) {
-    return 6.0 + 3.0 * others + passive +
-           packs_of(load) * (0.6 * (program.moving + links.springs) + 2.8 * others);
+  const double packs = packs_of(load);
+  Work work;
+  work.add(Item::batch_passive, packs * passive_ns(program));
+  if (program.moving > most_held_masses) {
+    const double steps = program.moving + links.springs + others;
+    return work.add(Item::batch_sample, 1.0)
+        .add(Item::batch_wide_step, steps)
+        .add(Item::batch_wide_pull, packs * steps)
+        .add(Item::batch_wide_link, packs * others);
   }
-  return 6.0 + passive + (0.6 + 1.6 * packs_of(load)) * (program.moving + links.springs + others);
+  if (packs <= 1.0) {
+    return work.add(Item::batch_one, 1.0)
+        .add(Item::batch_one_mass, program.moving)
+        .add(Item::batch_one_link, others);
+  }
+  return work.add(Item::batch_sample, 1.0)
+      .add(Item::batch_pull, packs * (program.moving + links.springs))
+      .add(Item::batch_link, packs * others);
 }
 
 std::string description(const Program& program, const Batch&) {

@@ -15,7 +15,7 @@ inline constexpr std::uint32_t most_batch_masses = 16;  // more do not fit besid
 std::optional<Batch> batch_form(const Program& program);
 
 // What the registry's row of it asks, of one voice in bytes.
-double predicted_ns(const Program& program, const Batch& form, const Workload& load);
+Work work(const Program& program, const Batch& form, const Workload& load);
 std::string description(const Program& program, const Batch& form);
 std::uint64_t voice_bytes(const Program& program, const Batch& form, std::uint64_t number_bytes);
 

@@ -331,44 +331,46 @@ std::optional<Chains> chains_form(const Program& program, const Progress& progre
   return ChainFinder(program, progress).find();
 }
 
-double predicted_ns(const Program& program, const Chains& form, const Workload& load) {
-  constexpr double nearest_cache = 32768.0;
-  constexpr double line_ns = 1.2;  // of 64 bytes that come from the next cache
-  const double number_bytes = load.is_double ? 8.0 : 4.0;
+Work work(const Program& program, const Chains& form, const Workload& load) {
+  const double voices = load.voices;
   const FoldedBy by = fold_by(program, form, load.isa, load.is_double ? 8 : 4);
-  double sum = 0.0;
+  Work work;
   if (by.short_packs > 0) {
-    sum += 5.4 + 1.1 * static_cast<double>(by.short_packs);
+    work.add(Item::chains_short_sample, voices)
+        .add(Item::chains_short_pack, voices * static_cast<double>(by.short_packs))
+        .add(Item::chains_moving_pair, load.moving * voices * static_cast<double>(by.short_packs));
   } else {
-    const double lanes = static_cast<double>(by.lanes);
-    const double pair_bytes = 2.0 * lanes * number_bytes;
-    const double at_hand_ns = pair_bytes > 64.0 ? 1.22 : 0.8;
-    const bool is_at_hand =
-        2.0 * static_cast<double>(form.nodes.size()) * number_bytes <= nearest_cache;
-    const double pair_ns =
-        is_at_hand ? at_hand_ns : std::max(at_hand_ns, line_ns * pair_bytes / 64.0);
-    sum += 6.0;
+    const auto lanes = static_cast<double>(by.lanes);
+    const bool is_wide = 2.0 * lanes * bytes_of_number(load) > 64.0;
+    work.add(Item::chains_sample, voices);
     for (const Chain& chain : form.chains) {
-      const double stiff = chain.is_stiff ? 2.2 : 1.0;
-      sum += 3.7 + stiff * pair_ns * std::ceil(chain.count / lanes) + (chain.is_stiff ? 24.0 : 0.0);
+      const double pairs = voices * std::ceil(chain.count / lanes);
+      work.add(Item::chains_chain, voices)
+          .add(is_wide ? Item::chains_wide_pair : Item::chains_pair, pairs)
+          .add(Item::chains_moving_pair, load.moving * pairs);
+      if (chain.is_stiff) {
+        work.add(Item::chains_stiff_chain, voices).add(Item::chains_stiff_pair, pairs);
+      }
     }
+    const double bytes = 2.0 * bytes_of_number(load) * static_cast<double>(form.nodes.size());
+    work.add(Item::chains_line, voices * lines_of(bytes))
+        .add(Item::chains_far_line, voices * far_lines_of(bytes));
   }
-  if (!form.links.empty()) {
-    sum += 4.0;
-  }
+  work.add(Item::chains_held, form.links.empty() ? 0.0 : voices);
   for (const std::uint32_t link : form.links) {
     const auto run =
         std::find_if(program.link_runs.begin(), program.link_runs.end(),
                      [&](const LinkRun& r) { return link >= r.first && link < r.first + r.count; });
-    if (run->scheme != Scheme::plain) {
-      continue;
+    if (run->scheme == Scheme::plain) {
+      const bool is_cheap = run->law == Law::spring || run->law == Law::contact;
+      work.add(is_cheap ? Item::chains_spring : Item::chains_link, voices);
     }
-    sum += run->law == Law::spring || run->law == Law::contact ? 2.3 : 5.0;
   }
-  sum += 3.2 * static_cast<double>(form.loose.size()) +
-         0.5 * static_cast<double>(program.inputs.size() + program.outputs.size()) +
-         22.0 * static_cast<double>(program.taps.size()) + passive_ns(program);
-  return sum * load.voices;
+  return work.add(Item::chains_loose, voices * static_cast<double>(form.loose.size()))
+      .add(Item::chains_signal,
+           voices * static_cast<double>(program.inputs.size() + program.outputs.size()))
+      .add(Item::chains_place, voices * static_cast<double>(program.taps.size()))
+      .add(Item::chains_passive, voices * passive_ns(program));
 }
 
 std::string description(const Program&, const Chains& form) {

@@ -29,7 +29,7 @@ struct FoldedBy {
 FoldedBy fold_by(const Program& program, const Chains& form, Isa isa, std::size_t number_bytes);
 
 // What the registry's row of it asks, of one voice in bytes.
-double predicted_ns(const Program& program, const Chains& form, const Workload& load);
+Work work(const Program& program, const Chains& form, const Workload& load);
 std::string description(const Program& program, const Chains& form);
 std::uint64_t voice_bytes(const Program& program, const Chains& form, std::uint64_t number_bytes);
 

@@ -56,17 +56,22 @@ std::optional<Dense> dense_form(const Program& program) {
 
 // A force that sounds all the time costs more than the body; a body in contact is stepped sample by
 // sample.
-double predicted_ns(const Program& program, const Dense& form, const Workload& load) {
+Work work(const Program& program, const Dense& form, const Workload& load) {
   const double n = program.moving;
-  const double slow = is_wide(load) ? 1.0 : 1.8;
-  const double half = load.is_double ? 1.0 : 0.6;
-  const double signals = static_cast<double>(program.inputs.size() * program.outputs.size());
+  const double voices = load.voices;
+  Work work;
   if (form.ports.empty()) {
-    return load.voices * slow * (0.95 + half * 0.12 * n + 3.0 * signals);
+    return work.add(Item::dense_voice, voices)
+        .add(Item::dense_mass, voices * n)
+        .add(Item::dense_signal,
+             voices * static_cast<double>(program.inputs.size() * program.outputs.size()));
   }
   const double stride = load.is_double ? 4.0 * std::ceil(n / 4.0) : 2.0 * std::ceil(n / 2.0);
-  const double one = n <= 4.0 ? 8.0 : load.is_double ? 2.8 * stride - 5.7 : 1.3 * stride + 2.0;
-  return load.voices * slow * (one + 5.0 * static_cast<double>(form.ports.size() - 1));
+  n <= 4.0 ? work.add(Item::dense_small_contact, voices)
+           : work.add(Item::dense_contact, voices).add(Item::dense_stride, voices * stride);
+  const double more = voices * static_cast<double>(form.ports.size() - 1);
+  return n <= 4.0 ? work.add(Item::dense_small_link, more)
+                  : work.add(Item::dense_link, more).add(Item::dense_link_mass, more * n);
 }
 
 std::string description(const Program&, const Dense& form) {

@@ -13,7 +13,7 @@ namespace ressort {
 std::optional<Dense> dense_form(const Program& program);
 
 // What the registry's row of it asks, of one voice in bytes.
-double predicted_ns(const Program& program, const Dense& form, const Workload& load);
+Work work(const Program& program, const Dense& form, const Workload& load);
 std::string description(const Program& program, const Dense& form);
 std::uint64_t voice_bytes(const Program& program, const Dense& form, std::uint64_t number_bytes);
 

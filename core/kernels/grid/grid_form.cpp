@@ -497,28 +497,28 @@ std::optional<Grid> grid_form(const Program& program, const Progress& progress) 
   return best;
 }
 
-double predicted_ns(const Program& program, const Grid& form, const Workload& load) {
-  constexpr double nearest_cache = 32768.0;
-  const double d = load.is_double ? 1.0 : 0.0;
-  const bool is_at_hand = 4.0 * form.count * (4.0 + 4.0 * d) <= nearest_cache;
-  const std::size_t bytes = whole_pack_bytes(load.isa);
-  const double slow = bytes == 64   ? (is_at_hand ? 0.8 : 1.0)
-                      : bytes == 32 ? 1.1
-                                    : 3.0 - d;                       // where sums of neighbours are
-  const double bent = bytes == 64 ? 0.7 : bytes == 32 ? 1.0 : 1.75;  // where laws are
-  const double rest = static_cast<double>(form.rest_ends.size() + form.ports.size());
-  double sum = 13.0 - 8.0 * d + passive_ns(program) + (3.5 + 1.5 * d) * rest +
-               10.0 * static_cast<double>(program.taps.size());
+Work work(const Program& program, const Grid& form, const Workload& load) {
+  const double voices = load.voices;
+  const double lanes = static_cast<double>(whole_pack_bytes(load.isa)) / bytes_of_number(load);
+  Work work;
+  work.add(Item::grid_sample, voices)
+      .add(Item::grid_rest, voices * static_cast<double>(form.rest_ends.size() + form.ports.size()))
+      .add(Item::grid_place, voices * static_cast<double>(program.taps.size()))
+      .add(Item::grid_passive, voices * passive_ns(program));
   for (const GridSegment& segment : form.segments) {
-    const double offsets = static_cast<double>(segment.offsets.size());
-    sum += 6.0 + 4.0 * d + slow * segment.count * (0.13 + 0.14 * d + (0.03 + 0.02 * d) * offsets);
+    const double packs = voices * segment.count / lanes;
+    work.add(Item::grid_segment, voices)
+        .add(Item::grid_pack, packs)
+        .add(Item::grid_offset, packs * static_cast<double>(segment.offsets.size()));
   }
   for (const GridLinks& links : form.links) {
-    const bool is_cheap = program.link_runs[links.run].law == Law::spring;
-    sum += bent * form.count * static_cast<double>(links.offsets.size()) * (0.24 + 0.21 * d) *
-           (is_cheap ? 0.8 : 1.2);
+    const bool is_spring = program.link_runs[links.run].law == Law::spring;
+    work.add(is_spring ? Item::grid_spring : Item::grid_link,
+             voices * form.count / lanes * static_cast<double>(links.offsets.size()));
   }
-  return load.voices * sum;
+  const double bytes = 4.0 * bytes_of_number(load) * form.count;
+  return work.add(Item::grid_line, voices * lines_of(bytes))
+      .add(Item::grid_far_line, voices * far_lines_of(bytes));
 }
 
 std::string description(const Program&, const Grid& form) {

@@ -17,7 +17,7 @@ inline constexpr std::uint32_t least_grid_masses = 16;
 std::optional<Grid> grid_form(const Program& program, const Progress& progress = {});
 
 // What the registry's row of it asks, of one voice in bytes.
-double predicted_ns(const Program& program, const Grid& form, const Workload& load);
+Work work(const Program& program, const Grid& form, const Workload& load);
 std::string description(const Program& program, const Grid& form);
 std::uint64_t voice_bytes(const Program& program, const Grid& form, std::uint64_t number_bytes);
 

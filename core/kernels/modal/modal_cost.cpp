@@ -9,22 +9,35 @@
 namespace ressort {
 namespace {
 
-// What most of a mode's sums take.
-double mode_ns(const Workload& load) {
-  const double wide = load.isa == Isa::v4 ? 0.85 : load.isa == Isa::v3 ? 1.0 : 2.4;
-  return wide * (load.is_double ? 1.0 : 0.5);
-}
+// `places` and what else has rows of its own along the modes; how many outputs are heard along
+// them.
+struct Rows {
+  double places = 0.0;
+  double heard = 0.0;
+  double pushed = 0.0;
+};
 
-// Parameters are still most of the time, so that a moving one counts by half; without that no mesh
-// whose stiffness can be turned would ever be stepped by its modes.
-double modal_ns(double modes, double places, double heard, double pushed, const Workload& load) {
-  const double each = mode_ns(load) * modes;
-  const double rows = places + pushed;
-  const double slope = rows > 8.0 ? 0.23 : 0.09;
-  const double bound = 25.0 + 5.0 * places + each * (0.30 + slope * rows);
-  const double moving = 0.5 * (bound + 0.45 * each);
-  const double still = places > 0.0 ? bound : 6.0 + each * (0.11 + 0.04 * heard + 0.045 * pushed);
-  return std::max(still, moving);
+// Of modes that nothing holds a whole block is one sum.
+Work modal_work(double modes, const Rows& rows, const Workload& load) {
+  constexpr double most_rows = 8.0;  // that are summed in one sweep
+  const double held = rows.places + rows.pushed;
+  Work work;
+  work.add(Item::modal_moving_sample, load.moving)
+      .add(Item::modal_moving_mode, load.moving * modes)
+      .add(Item::modal_line, lines_of(bytes_of_number(load) * modes * (6.0 + held + rows.heard)));
+  if (rows.places == 0.0) {
+    return work.add(Item::modal_sample, 1.0)
+        .add(Item::modal_mode, modes)
+        .add(Item::modal_heard, rows.heard)
+        .add(Item::modal_output, modes * rows.heard)
+        .add(Item::modal_push, modes * rows.pushed);
+  }
+  return work.add(Item::modal_held_sample, 1.0)
+      .add(Item::modal_place, rows.places)
+      .add(Item::modal_heard, rows.heard)
+      .add(Item::modal_held_output, modes * rows.heard)
+      .add(held > most_rows ? Item::modal_wide_mode : Item::modal_held_mode, modes)
+      .add(held > most_rows ? Item::modal_wide_row : Item::modal_row, modes * held);
 }
 
 double passive_count(const Program& program) {
@@ -38,7 +51,7 @@ double passive_count(const Program& program) {
 // Through the modes each passive link pulls at all others: several are solved together, at once if
 // they are straight where they act. What they push with is added to all modes along the next sweep,
 // if that has room, or four places at a time. A pick passes, so that it counts by half.
-double solving_ns(const Program& program, double modes, double places, const Workload& load) {
+void add_solving(const Program& program, double modes, double places, Work& work) {
   constexpr double of_a_straight_link = 28.0;
   constexpr double of_a_link = 110.0;
   constexpr double rows_of_a_sweep = 8.0;
@@ -52,9 +65,8 @@ double solving_ns(const Program& program, double modes, double places, const Wor
                                                       : of_a_link;
     sum += run.scheme == Scheme::plain ? 0.0 : run.count * each;
   }
-  const double shoves =
-      links > 0.0 && places > rows_of_a_sweep ? 0.2 * std::ceil(places / 4.0) : 0.0;
-  return sum + shoves * mode_ns(load) * modes;
+  const double shoves = links > 0.0 && places > rows_of_a_sweep ? std::ceil(places / 4.0) : 0.0;
+  work.add(Item::modal_passive, sum).add(Item::modal_passive_mode, shoves * modes);
 }
 
 std::size_t force_count(const Modes& form) {
@@ -71,22 +83,26 @@ std::string in_db(double share) {
 
 }  // namespace
 
-double predicted_ns(const Program& program, const Modes& form, const Workload& load) {
+Work work(const Program& program, const Modes& form, const Workload& load) {
   // A force is heard along two rows of its own, sample by sample, as places are.
-  const auto rows = static_cast<double>(form.places.size() + 2 * force_count(form));
+  const auto places = static_cast<double>(form.places.size());
+  const Rows rows{.places = places + static_cast<double>(2 * force_count(form)),
+                  .heard = static_cast<double>(form.outputs.size()),
+                  .pushed = static_cast<double>(form.pushes.size())};
   const double modes = (form.is_crossed ? 2.0 : 1.0) * form.modes;
-  return load.voices * (solving_ns(program, modes, static_cast<double>(form.places.size()), load) +
-                        modal_ns(modes, rows, static_cast<double>(form.outputs.size()),
-                                 static_cast<double>(form.pushes.size()), load));
+  Work work = modal_work(modes, rows, load);
+  add_solving(program, modes, places, work);
+  return load.voices * work;
 }
 
 double least_modal_ns(const Program& program, const Workload& load) {
   const LinkCount links = links_of(program);
   // Two links at one mass share its place, so each is counted as half of one.
   const double places = 0.5 * (links.bent + links.others + passive_count(program));
-  return load.voices *
-         (solving_ns(program, program.moving, places, load) +
-          modal_ns(program.moving, places, static_cast<double>(program.outputs.size()), 0.0, load));
+  const Rows rows{.places = places, .heard = static_cast<double>(program.outputs.size())};
+  Work work = modal_work(program.moving, rows, load);
+  add_solving(program, program.moving, places, work);
+  return load.voices * cost(work, load);
 }
 
 std::string description(const Program&, const Modes& form) {

@@ -32,7 +32,7 @@ std::optional<Modes> modal_form(const Program& program, const Budget& budget = {
 double least_modal_ns(const Program& program, const Workload& load);
 
 // What the registry's row of it asks, of one voice in bytes.
-double predicted_ns(const Program& program, const Modes& form, const Workload& load);
+Work work(const Program& program, const Modes& form, const Workload& load);
 std::string description(const Program& program, const Modes& form);
 std::uint64_t voice_bytes(const Program& program, const Modes& form, std::uint64_t number_bytes);
 
