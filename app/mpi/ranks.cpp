@@ -6,22 +6,10 @@
 #include <cstdio>
 #include <cstdlib>
 
+#include "core/kernels/domains/one_by_one.h"
+
 namespace ressort {
 namespace {
-
-// One after the other, in this process.
-class Alone final : public Crew {
- public:
-  explicit Alone(std::vector<Task*> tasks) : tasks_(std::move(tasks)) {}
-  void run(std::span<const std::uint32_t> wanted) override {
-    for (const std::uint32_t i : wanted) {
-      tasks_[i]->perform();
-    }
-  }
-
- private:
-  const std::vector<Task*> tasks_;
-};
 
 std::size_t own_number() {
   int number = 0;
@@ -115,7 +103,7 @@ std::size_t Ranks::size() const {
 }
 
 std::unique_ptr<Crew> Ranks::gather(std::vector<Task*> tasks) {
-  return std::make_unique<Alone>(std::move(tasks));
+  return std::make_unique<OneByOne>(std::move(tasks));
 }
 
 Fellows* Ranks::fellows() {

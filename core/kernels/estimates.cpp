@@ -84,7 +84,7 @@ double lines_of(double bytes) {
 }
 
 double far_lines_of(double bytes) {
-  return lines_beyond(1.5 * 1024.0 * 1024.0, bytes);
+  return lines_beyond(2.0 * 1024.0 * 1024.0, bytes);
 }
 
 namespace {

@@ -1,9 +1,12 @@
 #include "core/kernels/domains/shards.h"
 
 #include <algorithm>
+#include <cmath>
+#include <limits>
 #include <numeric>
 
 #include "core/kernels/chains/chains_form.h"
+#include "core/kernels/domains/one_by_one.h"
 #include "core/kernels/domains/sharded_form.h"
 #include "core/kernels/grid/grid_form.h"
 #include "core/kernels/registry.h"
@@ -436,6 +439,63 @@ std::vector<Shard> reformed(std::vector<Shard> shards, const Form& form) {
   return shards;
 }
 
+// Which takes least on one core.
+std::uint32_t frames_for_one(const Division& division, double ns_per_node) {
+  std::uint32_t best = 4;
+  double least_ns = std::numeric_limits<double>::infinity();
+  for (std::uint32_t frames = 4; frames <= max_block_frames; frames *= 2) {
+    double ns = 0.0;
+    for (const auto& at_level : division.at_level) {
+      const auto end = at_level.begin() + frames + spare_levels + 1;
+      const auto nodes = std::accumulate(at_level.begin(), end, std::size_t{0});
+      ns += ns_per_node * static_cast<double>(nodes) * (1.0 + return_share / frames) +
+            copy_ns * static_cast<double>(nodes - at_level[0]) / frames;
+    }
+    if (ns < least_ns) {
+      least_ns = ns;
+      best = frames;
+    }
+  }
+  return best;
+}
+
+// One thread's, which all that it plays may share.
+Executor* own_thread() {
+  static OwnThread thread;
+  return &thread;
+}
+
+std::optional<Shards> share_over_time(const Program& program, const Workload& load,
+                                      const Progress& progress) {
+  constexpr double shard_bytes = 1024.0 * 1024.0;
+  constexpr double least_bytes = 4.0 * shard_bytes;
+  const double whole_ns = predicted_ns(program, load);
+  const double bytes = 4.0 * bytes_of_number(load) * program.moving;
+  if (!is_plain(program) || !program.waveguides.empty() || bytes < least_bytes) {
+    return std::nullopt;
+  }
+  auto corners = corners_of(program);
+  if (!corners) {
+    return std::nullopt;
+  }
+  const Divider divider(program, *std::move(corners));
+  const auto count = static_cast<std::size_t>(std::ceil(bytes / shard_bytes));
+  progress.spend(4 * count * program.position.size());
+  const Division division = divider.divide(count, false);
+  const std::uint32_t frames = frames_for_one(division, whole_ns / program.moving);
+  auto shards = reformed(divider.make(division, frames), program.form);
+  progress.spend(64 * program.ends.size());
+  if (shards.empty()) {
+    return std::nullopt;
+  }
+  Shards found{.shards = std::make_shared<std::vector<Shard>>(std::move(shards)),
+               .executor = own_thread(),
+               .frames = frames};
+  return predicted_ns(program, found, load) * least_gain < whole_ns
+             ? std::optional(std::move(found))
+             : std::nullopt;
+}
+
 }  // namespace
 
 std::vector<Shard> make_shards(const Program& program, std::size_t count, std::uint32_t frames) {
@@ -449,6 +509,9 @@ std::vector<Shard> make_shards(const Program& program, std::size_t count, std::u
 
 std::optional<Shards> share_out(const Program& program, const Workload& load,
                                 const Progress& progress) {
+  if (load.executor == nullptr) {
+    return share_over_time(program, load, progress);
+  }
   const double whole_ns = predicted_ns(program, load);
   if (load.executor == nullptr || !is_plain(program) || !program.waveguides.empty() ||
       load.executor->size() < 2 || whole_ns < least_shared_ns) {

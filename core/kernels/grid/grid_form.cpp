@@ -516,7 +516,7 @@ Work work(const Program& program, const Grid& form, const Workload& load) {
     work.add(is_spring ? Item::grid_spring : Item::grid_link,
              voices * form.count / lanes * static_cast<double>(links.offsets.size()));
   }
-  const double bytes = 4.0 * bytes_of_number(load) * form.count;
+  const double bytes = 3.0 * bytes_of_number(load) * form.count;
   return work.add(Item::grid_line, voices * lines_of(bytes))
       .add(Item::grid_far_line, voices * far_lines_of(bytes));
 }

@@ -310,6 +310,36 @@ TEST_CASE("a network is shared out where that pays", "[halo]") {
   CHECK(planned(string + "@in1 frcInput [@s 0.5]\n", &executor, {}) == 2);
 }
 
+TEST_CASE("one core steps a network in shards where its caches do not hold it", "[halo]") {
+  const std::string text =
+      "@s string 300000 1. 0.1 0.001 0. 0. 0.\n@in1 frcInput [@s 0.2]\n"
+      "@out1 posOutput [@s 0.20001]\n@out2 posOutput [@s 0.2]\n";
+  const Machine machine = make_machine(network_of(text), 44100.0, true);
+  const Planned planned = make_plan(machine, {.isa = best_isa()}, Method::chains);
+  const Program& cut = planned.machine.parts[0];
+  const auto* const shards = std::get_if<Shards>(&cut.form);
+  REQUIRE(shards != nullptr);
+  CHECK(shards->shards->size() == 10);  // of 32 bytes a mass, in shards of at most 2^20
+  CHECK(describe(planned.parts).find("10 shards one after the other") != std::string::npos);
+  Program whole = machine.parts[0];
+  whole.form = *chains_form(whole);
+  Fighter<double> together(whole, 1.0, best_isa());
+  Fighter<double> apart(cut, 1.0, best_isa());
+  Comparison comparison;
+  for (std::size_t block = 0; block < 8; ++block) {
+    std::vector<std::vector<double>> inputs(64, {0.0});
+    inputs[0][0] = block == 0 ? 1.0 : 0.0;
+    const auto expected = together.play(inputs);
+    const auto found = apart.play(inputs);
+    for (std::size_t n = 0; n < 64; ++n) {
+      comparison.add(expected[n], found[n]);
+    }
+  }
+  INFO(show(comparison.relative()));
+  CHECK(comparison.peak > 0.1);
+  CHECK(comparison.relative() < 1e-13);
+}
+
 TEST_CASE("kernels in shards are placed and saved as one", "[halo]") {
   ThreadPool executor(2);
   const Program program = program_of(chain_scene());
