@@ -509,12 +509,11 @@ std::vector<Shard> make_shards(const Program& program, std::size_t count, std::u
 
 std::optional<Shards> share_out(const Program& program, const Workload& load,
                                 const Progress& progress) {
-  if (load.executor == nullptr) {
+  if (load.executor == nullptr || load.executor->size() < 2) {
     return share_over_time(program, load, progress);
   }
   const double whole_ns = predicted_ns(program, load);
-  if (load.executor == nullptr || !is_plain(program) || !program.waveguides.empty() ||
-      load.executor->size() < 2 || whole_ns < least_shared_ns) {
+  if (!is_plain(program) || !program.waveguides.empty() || whole_ns < least_shared_ns) {
     return std::nullopt;
   }
   auto corners = corners_of(program);

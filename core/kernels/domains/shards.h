@@ -13,7 +13,7 @@ namespace ressort {
 // direct form; nothing where a point wanders over a macro, as it may be anywhere. O(nodes + links).
 std::vector<Shard> make_shards(const Program& program, std::size_t count, std::uint32_t frames);
 
-// Without an executor, shards that each fit into the second cache, where the whole does not: they
+// On one core, shards that each fit into the second cache, where the whole does not: they
 // go on for several samples there, one after the other.
 //
 // Shards in the Program's own form for load.executor, if they are predicted to pay: of direct,
