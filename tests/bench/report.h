@@ -19,7 +19,7 @@ struct Row {
   std::size_t masses = 0;  // that move, of one voice
   std::size_t links = 0;
   std::size_t voices = 1;
-  bool is_worst = false;  // the scene
+  bool is_worst = false;   // the scene
   double median_ns = 0.0;  // per sample
   double minimum_ns = 0.0;
   double lower_ns = 0.0;  // the quartiles of the rounds

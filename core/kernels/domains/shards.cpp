@@ -469,6 +469,7 @@ std::optional<Shards> share_over_time(const Program& program, const Workload& lo
                                       const Progress& progress) {
   constexpr double shard_bytes = 1024.0 * 1024.0;
   constexpr double least_bytes = 4.0 * shard_bytes;
+  constexpr double most_shards = 32.0;  // each looks at all nodes once
   const double whole_ns = predicted_ns(program, load);
   const double bytes = 4.0 * bytes_of_number(load) * program.moving;
   if (!is_plain(program) || !program.waveguides.empty() || bytes < least_bytes) {
@@ -479,7 +480,8 @@ std::optional<Shards> share_over_time(const Program& program, const Workload& lo
     return std::nullopt;
   }
   const Divider divider(program, *std::move(corners));
-  const auto count = static_cast<std::size_t>(std::ceil(bytes / shard_bytes));
+  const auto count =
+      static_cast<std::size_t>(std::min(most_shards, std::ceil(bytes / shard_bytes)));
   progress.spend(4 * count * program.position.size());
   const Division division = divider.divide(count, false);
   const std::uint32_t frames = frames_for_one(division, whole_ns / program.moving);
