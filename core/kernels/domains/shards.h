@@ -13,12 +13,10 @@ namespace ressort {
 // direct form; nothing where a point wanders over a macro, as it may be anywhere. O(nodes + links).
 std::vector<Shard> make_shards(const Program& program, std::size_t count, std::uint32_t frames);
 
-// On one core, shards that each fit into the second cache, where the whole does not: they
-// go on for several samples there, one after the other.
-//
 // Shards in the Program's own form for load.executor, if they are predicted to pay: of direct,
-// chains or grid, where a sample takes several microseconds. O(nodes + links), and what the form
-// takes. [any thread but audio]
+// chains or grid, where a sample takes several microseconds. On one core, where the whole does not
+// fit into the second cache: each shard does, and goes on there for several samples before the next
+// one's turn. O(nodes + links), and what the form takes. [any thread but audio]
 std::optional<Shards> share_out(const Program& program, const Workload& load,
                                 const Progress& progress = {});
 
