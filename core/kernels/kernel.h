@@ -74,12 +74,18 @@ static inline void advance(Ramps<T>& ramps) {
   if (ramps.frames == 0) {
     return;
   }
-  const bool arrives = --ramps.frames == 0;
-  for (std::size_t i = 0; i < ramps.count; ++i) {
-    const std::size_t first = ramps.ramping[i] * ramps.width;
-    for (std::size_t c = first; c < first + ramps.width; ++c) {
-      ramps.value[c] = arrives ? ramps.target[c] : ramps.value[c] + ramps.increment[c];
+  const auto set = [&](auto&& value_of) __attribute__((always_inline)) {
+    for (std::size_t i = 0; i < ramps.count; ++i) {
+      const std::size_t first = ramps.ramping[i] * ramps.width;
+      for (std::size_t c = first; c < first + ramps.width; ++c) {
+        ramps.value[c] = value_of(c);
+      }
     }
+  };
+  if (--ramps.frames > 0) {
+    set([&](std::size_t c) { return ramps.value[c] + ramps.increment[c]; });
+  } else {
+    set([&](std::size_t c) { return ramps.target[c]; });
   }
 }
 

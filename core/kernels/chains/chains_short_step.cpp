@@ -31,7 +31,7 @@ void weigh(ShortBody<typename S::V, packs>& body, const FoldedChain& chain, cons
 }
 
 // By its springs, and by what else acts on its sites.
-template <class S, std::size_t packs>
+template <bool has_sites, class S, std::size_t packs>
 void move_short_chain(ShortBody<typename S::V, packs>& body, const FoldedChain& chain,
                       const ShortSite* site, const S& s) {
   using V = typename S::V;
@@ -51,9 +51,11 @@ void move_short_chain(ShortBody<typename S::V, packs>& body, const FoldedChain& 
     const V after = next - y[i];
     V force = after - before;
     before = after;
-    for (; site->pack == i; ++site) {
-      force += all<V>(s.force[site->force]) * pack_at<V>(s.units + site->unit);
-      s.force[site->force] = 0;
+    if constexpr (has_sites) {
+      for (; site->pack == i; ++site) {
+        force += all<V>(s.force[site->force]) * pack_at<V>(s.units + site->unit);
+        s.force[site->force] = 0;
+      }
     }
     body.v[i] += force * body.inverse_mass[i];
     body.x[i] += body.v[i];
@@ -67,6 +69,7 @@ template <class S, std::size_t packs, class T>
   using V = typename S::V;
   S s(tables, state);
   Ramps<T> ramps = state.ramps;
+  ramps.width = 1;
   const Table<std::uint32_t> audio_coefficients(program.audio_coefficients);
   const FoldedChain chain = *s.chains.first;
   const ShortSite* const sites = tables.short_sites.data();
@@ -79,6 +82,10 @@ template <class S, std::size_t packs, class T>
   const std::size_t inputs = program.inputs.size();
   const std::size_t output_count = program.outputs.size();
   const std::size_t frames = block.frames;
+  const bool has_sites = sites->pack != nowhere;
+  const bool has_others = s.loose_runs.first != s.loose_runs.last ||
+                          s.link_runs.first != s.link_runs.last ||
+                          s.forces.first != s.forces.last;
   // What holds its end stands in the first empty place, too: it is next to the last mass.
   if (tables.short_end != nowhere) {
     s.bodies[tables.short_end] = s.bodies[chain.right];
@@ -101,22 +108,32 @@ template <class S, std::size_t packs, class T>
         weigh(body, chain, s);
       }
     }
-    for (const PlacedInput& input : s.forces) {
-      s.force[input.force] += value[input.index];
+    if (has_others) {
+      for (const PlacedInput& input : s.forces) {
+        s.force[input.force] += value[input.index];
+      }
     }
-    move_short_chain(body, chain, sites, s);
+    if (has_sites) {
+      move_short_chain<true>(body, chain, sites, s);
+    } else {
+      move_short_chain<false>(body, chain, sites, s);
+    }
     each_below<packs>([&](auto i) {
       if ((read >> i & 1) != 0) {
         pairs[2 * i] = body.x[i];
         pairs[2 * i + 1] = body.v[i];
       }
     });
-    step_loose(s);
+    if (has_others) {
+      step_loose(s);
+    }
     for (const PlacedInput& input : s.positions) {
       s.bodies[input.place] = value[input.index];
       s.bodies[input.place + S::lanes] = velocity[input.index];
     }
-    step_links(s);
+    if (has_others) {
+      step_links(s);
+    }
     s.held[0] = s.coefficient[chain.springs[0]];
     s.held[1] = s.coefficient[chain.springs[1]];
     for (const HeardPosition& output : s.heard_positions) {
