@@ -17,7 +17,7 @@ struct InputSample {
 };
 
 // Every method is wait-free. [audio]
-class InputDriver {
+class alignas(64) InputDriver {
  public:
   // At rest at `position`; for a force, exerting none.
   void place(double position) {
@@ -193,19 +193,20 @@ class InputDriver {
     }
   }
 
+  // What is asked of each driver in each block lies side by side.
   double value_ = 0.0;
+  double pulse_ = 0.0;
+  double bump_ = 0.0;  // of a position, in this sample
+  std::size_t blow_left_ = 0;
+  std::size_t held_frames_ = 0;
+  Motion motion_ = Motion::rest;
   double velocity_ = 0.0;
   double target_ = 0.0;
   double speed_ = 0.0;
   double pole_ = 0.0;
-  double pulse_ = 0.0;
-  double bump_ = 0.0;  // of a position, in this sample
   double blow_ = 0.0;  // the sum of a pulse
   RaisedCosine blow_pulse_;
-  std::size_t blow_left_ = 0;
   double held_ = 0.0;
-  std::size_t held_frames_ = 0;
-  Motion motion_ = Motion::rest;
 };
 
 }  // namespace ressort

@@ -240,36 +240,46 @@ void Gestures::follow_pitches() {
 }
 
 // Drivers that rest give every frame the same row; those of voices that sleep, too, so that their
-// hands do not come to lie on anything.
+// hands do not come to lie on anything. Whether any driver of a voice that is awake moves.
 template <class T>
-void Gestures::fill_rest(Bank<T>& bank, const VoiceGroup& group, std::size_t frames) {
+bool Gestures::fill_rest(Bank<T>& bank, const VoiceGroup& group, std::size_t frames) {
   const PartBank<T>& part = bank.parts[group.part];
   const std::size_t step = part.program.inputs.size() * part.width;
+  const std::size_t lanes = std::min(part.width, voices_.size() - group.first);
+  bool is_any_moving = false;
+  bool is_new = bank.filled_part != &part || bank.filled_frames < frames;
   T* row = bank.row.data();
+  if (bank.filled_part != &part) {
+    std::fill_n(row, step, T(0));
+  }
   for (const InputSlot& slot : part.program.inputs) {
-    for (std::size_t lane = group.first; lane < group.first + part.width; ++lane) {
-      *row++ = lane < voices_.size() ? static_cast<T>(driver(lane, slot.input).value()) : T(0);
+    for (std::size_t lane = 0; lane < lanes; ++lane) {
+      const InputDriver& mover = driver(group.first + lane, slot.input);
+      const T value = static_cast<T>(mover.value());
+      is_new |= !(value == row[lane]);
+      row[lane] = value;
+      is_any_moving |= mover.is_moving() && voices_[group.first + lane].awake;
     }
+    row += part.width;
   }
   if (bank.still < frames * step) {
     std::fill_n(bank.velocity.begin(), frames * step, T(0));
     bank.still = frames * step;
   }
-  const auto end = bank.row.begin() + static_cast<std::ptrdiff_t>(step);
-  if (bank.filled_part == &part && bank.filled_frames >= frames &&
-      std::equal(bank.row.begin(), end, bank.filled.begin())) {
-    return;
+  if (is_new) {
+    bank.mixer.fill_rows(bank.row.data(), step, frames, bank.value.data());
+    bank.filled_part = &part;
+    bank.filled_frames = frames;
   }
-  bank.mixer.fill_rows(bank.row.data(), step, frames, bank.value.data());
-  std::copy(bank.row.begin(), end, bank.filled.begin());
-  bank.filled_part = &part;
-  bank.filled_frames = frames;
+  return is_any_moving;
 }
 
 template <class T>
 void Gestures::fill(Bank<T>& bank, const VoiceGroup& group, std::size_t frames,
                     EnergyWatch& watch) {
-  fill_rest(bank, group, frames);
+  if (!fill_rest(bank, group, frames)) {
+    return;
+  }
   const PartBank<T>& part = bank.parts[group.part];
   const std::size_t step = part.program.inputs.size() * part.width;  // from frame to frame
   for (std::size_t i = 0; i < part.program.inputs.size(); ++i) {

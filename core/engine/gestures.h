@@ -62,7 +62,7 @@ class Gestures {
   // Where the drivers of new voices on these channels start.
   void set_starts(ChannelMask channels, std::size_t input, double start);
   template <class T>
-  void fill_rest(Bank<T>& bank, const VoiceGroup& group, std::size_t frames);
+  bool fill_rest(Bank<T>& bank, const VoiceGroup& group, std::size_t frames);
 
   const Machine& machine_;
   const Playing& playing_;

@@ -83,11 +83,11 @@ void Voices::start(std::size_t lane, double frequency_hz) {
   awake_ += voices_[lane].awake ? 0 : 1;
   voices_[lane] = {.awake = true,
                    .is_new = true,
+                   .decay = {.pole = std::exp(-1.0 / (damper_on_s * rate_hz_))},
+                   .level = 1.0,  // not yet heard: not yet the quietest
                    .frequency_hz = frequency_hz,
                    .semitones = channels_.semitones(0),
-                   .decay = {.pole = std::exp(-1.0 / (damper_on_s * rate_hz_))},
-                   .release_s = playing_.damper_s,
-                   .level = 1.0};  // not yet heard: not yet the quietest
+                   .release_s = playing_.damper_s};
   has_changed_ = true;
   last_ = lane;
 }

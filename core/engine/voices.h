@@ -64,46 +64,48 @@ enum class Press : std::uint8_t {
   moves,    // it only goes to another pitch
 };
 
-struct Voice {
+struct alignas(64) Voice {
   bool is_live() const { return awake && !fading; }
   // Nothing has taken anything off it yet.
   bool is_whole() const { return decay.gain > 0.99; }
 
-  bool awake = false;       // steps and is heard
-  bool lost = false;        // its stability: it fades from where it was
-  bool fading = false;      // gives way; its lane is free when the fade ends
-  bool held = false;        // by a key
-  bool sustained = false;   // by a pedal, its key being up
-  bool latched = false;     // by the sostenuto pedal, which went down while the key was
-  bool is_new = false;      // its kernels are to be put to the start,
-  bool is_retuned = false;  // or to its factor, before they step
-  bool has_key = false;     // if not, it belongs to every channel
-  std::uint8_t key = 0;
-  std::uint8_t channel = 0;
-  std::uint64_t turn = 0;      // so many keys went down before its own
-  double frequency_hz = 0.0;   // without bend; 0: as the model is written
-  bool has_own_pitch = false;  // which is not its key's
-  double key_hz = 0.0;         // the same before it was brought to where the model is stable
-  double semitones = 0.0;      // of its own channel's bend and tuning
-  double glide = 0.0;          // semitones that it is still away from its pitch,
-  double glide_step = 0.0;     // and how many it goes in max_block_frames
-  double factor = 1.0;         // on every stiffness
-  Decay decay;
-  bool is_released = false;  // its key has been up since it was pressed
-  bool is_replaced = false;  // by another voice, of its key or its channel
-  double release_s = 0.0;    // T60 that its damper wants, by how fast the key went up
-  double strength = 1.0;     // of the output, by how hard the key was pressed
-  // Its strength and its channel's level, which it follows in equal steps.
-  SideGains volume = {1.0, 1.0};
-  SideGains volume_step = {};
-  std::size_t volume_frames = 0;  // until it is there
   // All outputs have the same gain, throughout.
   bool is_steady() const {
     return decay.is_steady() && volume_frames == 0 && volume[0] == volume[1];
   }
-  double peak = 0.0;   // of the network's output since the last update
-  double level = 0.0;  // peak of the output, slowly forgotten
+
+  // What every block asks of each voice lies side by side.
+  bool awake = false;        // steps and is heard
+  bool lost = false;         // its stability: it fades from where it was
+  bool fading = false;       // gives way; its lane is free when the fade ends
+  bool held = false;         // by a key
+  bool sustained = false;    // by a pedal, its key being up
+  bool latched = false;      // by the sostenuto pedal, which went down while the key was
+  bool is_new = false;       // its kernels are to be put to the start,
+  bool is_retuned = false;   // or to its factor, before they step
+  bool has_key = false;      // if not, it belongs to every channel
+  bool is_released = false;  // its key has been up since it was pressed
+  bool is_replaced = false;  // by another voice, of its key or its channel
+  std::uint8_t key = 0;
+  std::uint8_t channel = 0;
+  bool has_own_pitch = false;  // which is not its key's
+  Decay decay;
+  // Its strength and its channel's level, which it follows in equal steps.
+  SideGains volume = {1.0, 1.0};
+  std::size_t volume_frames = 0;  // until it is there
+  double peak = 0.0;              // of the network's output since the last update
+  SideGains volume_step = {};
+  double strength = 1.0;  // of the output, by how hard the key was pressed
+  double level = 0.0;     // peak of the output, slowly forgotten
   std::size_t quiet_frames = 0;
+  std::uint64_t turn = 0;     // so many keys went down before its own
+  double frequency_hz = 0.0;  // without bend; 0: as the model is written
+  double key_hz = 0.0;        // the same before it was brought to where the model is stable
+  double semitones = 0.0;     // of its own channel's bend and tuning
+  double glide = 0.0;         // semitones that it is still away from its pitch,
+  double glide_step = 0.0;    // and how many it goes in max_block_frames
+  double factor = 1.0;        // on every stiffness
+  double release_s = 0.0;     // T60 that its damper wants, by how fast the key went up
 };
 
 // As many as may sound, and some lanes in reserve for those that fade. All functions: [audio]

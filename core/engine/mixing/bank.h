@@ -73,7 +73,6 @@ struct Bank : BlockBuffers<T> {
     this->audio.resize(max_block_frames * audio_coefficients);
     this->outputs.resize(max_block_frames * channels);
     row.resize(inputs);
-    filled.resize(inputs);
     peak.resize(lanes);
     gain.resize(lanes);
     heard.resize(outputs_of_one);
@@ -130,9 +129,8 @@ struct Bank : BlockBuffers<T> {
   // The buffers are as Block says; each part in turn, or each kernel that brings its own.
 
   // Drivers that rest give every frame the same row, [input][lane], and no velocity. Of what the
-  // buffers hold, `filled` is in so many frames of `filled_part`, and so many velocities are 0.
+  // buffers hold, it is in so many frames of `filled_part`, and so many velocities are 0.
   Aligned<T> row;
-  Aligned<T> filled;
   const PartBank<T>* filled_part = nullptr;
   std::size_t filled_frames = 0;
   std::size_t still = 0;

@@ -82,13 +82,13 @@ template <class T>
 void Mixing::keep_last(Bank<T>& bank, const VoiceGroup& group, std::size_t frames, bool is_any_lost,
                        const Voices& voices, const EnergyWatch& watch) {
   PartBank<T>& part = bank.parts[group.part];
-  for (std::size_t output = 0; output < part.program.outputs.size(); ++output) {
-    const T* const from = bank.outputs.data() + (frames - 1) * part.row() + output * part.width;
-    T* const to = part.last_of(group.first) + output * part.width;
-    for (std::size_t lane = 0; lane < group.end - group.first; ++lane) {
-      to[lane] = is_any_lost && voices[group.first + lane].lost
-                     ? static_cast<T>(watch.held(group.first + lane, group.part)[output])
-                     : from[lane];
+  T* const last = part.last_of(group.first);
+  std::copy_n(bank.outputs.data() + (frames - 1) * part.row(), part.row(), last);
+  for (std::size_t lane = group.first; is_any_lost && lane < group.end; ++lane) {
+    for (std::size_t output = 0; voices[lane].lost && output < part.program.outputs.size();
+         ++output) {
+      last[output * part.width + lane - group.first] =
+          static_cast<T>(watch.held(lane, group.part)[output]);
     }
   }
 }

@@ -127,6 +127,10 @@ template <class V>
 // Of a row a few packs are read at a time, which the processor does not foresee.
 constexpr std::size_t rows_ahead = 12;
 
+struct Springs {};  // and no other link
+template <Law law>
+using LawType = std::tuple_element_t<static_cast<std::size_t>(law), Laws>;
+
 template <class V, std::uint32_t N, bool is_alike>
 class Holder {
  public:
@@ -152,9 +156,9 @@ class Holder {
     pass<Half::exert_and_move>(value);
   }
 
-  // All of `frames` of so many packs, which stay in registers: of masses that nothing but springs
-  // and one force input each touches.
-  template <std::uint32_t P>
+  // All of `frames` of so many packs, which stay in registers: of masses that springs touch, and
+  // either links of one type or one force input each.
+  template <std::uint32_t P, class Type>
   [[gnu::always_inline]] void stay(Rows<V> rows, std::size_t frames) const {
     V x[P][N];
     V v[P][N];
@@ -187,8 +191,11 @@ class Holder {
       give_positions(program_, packs_, rows.outputs);
       rows.advance();
       each<P>([&](auto p) {
-        exert_springs(packs_.nodes(p), packs_.slots + p * packs_.stride, anchored, linked, x[p],
-                      v[p], f[p]);
+        const V* const slot = packs_.slots + p * packs_.stride;
+        if constexpr (!std::is_same_v<Type, Springs>) {
+          exert_all<Type>(packs_.nodes(p), slot + table_.first_link, x[p], v[p], f[p]);
+        }
+        exert_springs(packs_.nodes(p), slot, anchored, linked, x[p], v[p], f[p]);
       });
     }
     each<P>([&](auto p) {
@@ -252,6 +259,34 @@ class Holder {
     }
   }
 
+  // Links of one type, to masses that are not in memory.
+  template <class Type>
+  [[gnu::always_inline]] void exert_all(const Node<V>* nodes, const V* slot, const V (&x)[N],
+                                        const V (&v)[N], V (&f)[N]) const {
+    for (const BatchLink& each_link : batch_.links) {
+      V d = nodes[each_link.a].x - nodes[each_link.b].x;
+      V speed = nodes[each_link.a].v - nodes[each_link.b].v;
+      each<N>([&](auto i) {
+        if (each_link.a == i) {
+          d = x[i] - nodes[each_link.b].x;
+          speed = v[i] - nodes[each_link.b].v;
+        } else if (each_link.b == i) {
+          d = nodes[each_link.a].x - x[i];
+          speed = nodes[each_link.a].v - v[i];
+        }
+      });
+      const V force = law_in<V, Type>(slot).force(d, speed);
+      each<N>([&](auto i) {
+        if (each_link.a == i) {
+          f[i] -= force;
+        } else if (each_link.b == i) {
+          f[i] += force;
+        }
+      });
+      slot += batch_link_slots;
+    }
+  }
+
   // Among three masses the springs that there are not are computed too, from zeros.
   [[gnu::always_inline]] void exert_springs(const Node<V>* nodes, const V* slot,
                                             std::uint32_t anchored, std::uint32_t linked,
@@ -296,22 +331,52 @@ class Holder {
 };
 
 // Two packs hide each other's latency, and what they need fits into 32 registers.
-template <class V, std::uint32_t N, bool is_alike>
+template <class V, std::uint32_t N, bool is_alike, class Type>
 void hold_in_registers(const Program& program, const Batch& batch, const BatchTable& table,
                        const Packs<V>& packs, const Rows<V>& rows, std::size_t frames) {
+  constexpr bool has_links = !std::is_same_v<Type, Springs>;
   const auto stay = [&]<std::uint32_t P>(std::size_t first) {
     const Packs<V> some = packs.some(first, P);
-    Holder<V, N, is_alike>(program, batch, table, some).template stay<P>(rows.from(first), frames);
+    Holder<V, N, is_alike>(program, batch, table, some)
+        .template stay<P, Type>(rows.from(first), frames);
   };
-  std::size_t first = 0;
-  for (; first + 4 <= packs.count || first + 2 == packs.count; first += 2) {
+  const std::size_t left = packs.count % 2;
+  const std::size_t pairs = packs.count - (left == 0 || packs.count < 3 || has_links ? left : 3);
+  for (std::size_t first = 0; first < pairs; first += 2) {
     stay.template operator()<2>(first);
   }
-  if (first + 3 == packs.count) {
-    stay.template operator()<3>(first);
-  } else if (first + 1 == packs.count) {
-    stay.template operator()<1>(first);
+  if (pairs + 3 == packs.count) {
+    if constexpr (!has_links) {
+      stay.template operator()<3>(pairs);
+    }
+  } else if (left == 1) {
+    stay.template operator()<1>(pairs);
   }
+}
+
+// The same if its links are none, or of a law that such a body is usually touched by; whether so.
+template <class V, std::uint32_t N, bool is_alike>
+bool could_hold_in_registers(const Program& program, const Batch& batch, const BatchTable& table,
+                             const Packs<V>& packs, const Rows<V>& rows, std::size_t frames) {
+  const auto hold = [&]<class Type>(Type) {
+    hold_in_registers<V, N, is_alike, Type>(program, batch, table, packs, rows, frames);
+    return true;
+  };
+  const auto is_all = [&](Law law) {
+    return std::all_of(table.laws.begin(), table.laws.end(), [=](Law l) { return l == law; });
+  };
+  if (table.laws.empty()) {
+    return hold(Springs{});
+  }
+  if constexpr (is_alike) {
+    if (is_all(Law::pluck)) {
+      return hold(LawType<Law::pluck>{});
+    }
+    if (is_all(Law::contact)) {
+      return hold(LawType<Law::contact>{});
+    }
+  }
+  return false;
 }
 
 template <class V, std::uint32_t N, bool is_alike>
@@ -327,8 +392,11 @@ void hold(const Program& program, const Batch& batch, const BatchTable& table,
     fill_slots(table, reinterpret_cast<const V*>(state.ramps.value), packs);
     const std::size_t end = moves ? frame + 1 : block.frames;
     if constexpr (sizeof(V) == 64) {
-      if (!moves && table.touched == 0 && !table.is_pulled && state.passive.links.empty()) {
-        return hold_in_registers<V, N, is_alike>(program, batch, table, packs, rows, end - frame);
+      if (!moves && (table.touched & table.pushed) == 0 && !table.is_pulled &&
+          state.passive.links.empty() &&
+          could_hold_in_registers<V, N, is_alike>(program, batch, table, packs, rows,
+                                                  end - frame)) {
+        return;
       }
     }
     passive.remember();
