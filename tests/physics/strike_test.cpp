@@ -158,6 +158,23 @@ TEST_CASE("A struck mass of any network moves nearly so", "[strike]") {
   CHECK(compared > 100);
 }
 
+// A kernel that steps by another one has told it nothing before its first step. Several steps a
+// sample feel the blow for a part of one, which the fastest mode moves by a hundredth in.
+TEST_CASE("A voice is struck in the very sample in which it begins", "[strike]") {
+  const std::string text = scenes::string("s", 20, "0.0001", "0.") + scenes::output(1, "s_m16");
+  Event blow = struck_at(named_masses(text)[4].second);
+  blow.frame = 0;
+  CompileOptions options{.rate_hz = 48000.0, .bare = true, .method = Method::direct};
+  const Sound direct = play(text, options, blow);
+  for (const Method method : {Method::batch, Method::modal, Method::oversampled, Method::slow}) {
+    INFO(method_name(method));
+    options.method = method;
+    Plan plan;
+    CHECK(difference(direct, play(text, options, blow, &plan)) < 0.02);
+    CHECK(plan.parts[0].method == method);
+  }
+}
+
 // Which mass a name stands for, as whoever strikes it asks.
 std::uint32_t mass_called(const std::string& text, const std::string& name) {
   const auto compiled = compile(network_of(text), Preset(), {.rate_hz = 48000.0, .bare = true});

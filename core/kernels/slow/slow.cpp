@@ -19,11 +19,17 @@ SlowKernel<T>::Stepper::Stepper(const Program& program_in, Isa isa)
       outputs(program.outputs.size() * kernel->width()) {}
 
 template <class T>
-void SlowKernel<T>::Stepper::step(const Coefficients<T>& coefficients,
+void SlowKernel<T>::Stepper::take(const Coefficients<T>& coefficients,
                                   const std::vector<T>& factor) {
   for (std::size_t c = 0; c < factor.size(); ++c) {
     kernel->coefficients.value[c * kernel->width()] = coefficients.value[c] * factor[c];
   }
+}
+
+template <class T>
+void SlowKernel<T>::Stepper::step(const Coefficients<T>& coefficients,
+                                  const std::vector<T>& factor) {
+  take(coefficients, factor);
   kernel->step({.frames = 1,
                 .value = value.data(),
                 .velocity = velocity.data(),
@@ -94,8 +100,10 @@ template <class T>
 void SlowKernel<T>::strike(std::size_t, std::span<const std::uint32_t> nodes,
                            std::span<const double> changes) {
   if (is_fine_) {
+    fine_.take(this->coefficients, same_);  // a voice may be struck before its first step
     return fine_.kernel->strike(0, nodes, changes);
   }
+  coarse_.take(this->coefficients, factor_);
   for (std::size_t i = 0; i < nodes.size(); ++i) {
     const double change = changes[i] * static_cast<double>(frames_);
     coarse_.kernel->strike(0, nodes.subspan(i, 1), {&change, 1});

@@ -30,6 +30,8 @@ class SlowKernel final : public Kernel<T> {
   // One of the two kernels, and what drives it; its first lane is the voice.
   struct Stepper {
     Stepper(const Program& program, Isa isa);
+    // What the voice's coefficients are in its kernel, each times a factor.
+    void take(const Coefficients<T>& coefficients, const std::vector<T>& factor);
     void step(const Coefficients<T>& coefficients, const std::vector<T>& factor);
 
     const Program& program;
