@@ -129,8 +129,12 @@ void ShardedKernel<T>::strike(std::size_t lane, std::span<const std::uint32_t> n
                               std::span<const double> changes) {
   write_copies();
   for (std::size_t i = 0; i < shards_.size(); ++i) {
+    if (!is_here(i)) {
+      continue;
+    }
+    kernels_[i]->coefficients = this->coefficients;  // a voice may be struck before its first step
     const std::vector<std::uint32_t>& own = shards_[i].nodes;
-    for (std::size_t k = 0; is_here(i) && k < nodes.size(); ++k) {
+    for (std::size_t k = 0; k < nodes.size(); ++k) {
       const auto at = std::lower_bound(own.begin(), own.end(), nodes[k]);
       if (at != own.end() && *at == nodes[k]) {
         const auto local = static_cast<std::uint32_t>(at - own.begin());
