@@ -85,7 +85,8 @@ struct Pluck {
   // energy, m s^2 - free s + gamma (P(before + s) - P(before)) = 0 with m = 1 + gamma Z/2: it goes
   // the first of them, as a motion would come there that goes on without leaps. The hill being made
   // of five pieces that are at most squares, that is the first root of five quadratic equations
-  // that lies on its own piece.
+  // that lies on its own piece. What is in balance goes nowhere: a string at rest under a finger
+  // that rests on it, on the very top of the hill, stays there however steep that is.
   V passive(const LinkState<V>& link) const {
     const V before = link.before();
     const V ahead = link.free - before;
@@ -96,7 +97,9 @@ struct Pluck {
     const V one = V{} + 1;
     const V damping = steady(link).damping;
     const V m = one + link.gamma * damping;
-    const V side = select(ahead < link.gamma * force(before, V{}), -one, one);
+    const V balance = force(before, V{});
+    const auto stays = ahead == link.gamma * balance;
+    const V side = select(ahead < link.gamma * balance, -one, one);
     const V b = side * before;
     const V free = side * ahead;
     const V height = potential(b);
@@ -132,7 +135,7 @@ struct Pluck {
     const V over = m * s - ahead + link.gamma * here.value;
     const V more =
         select(absolute(steep) > Scalar<V>(1e-3), over / select(steep == V{}, one, steep), V{});
-    return here.value + damping * s - (here.slope + damping) * more;
+    return select(stays, balance, here.value + damping * s - (here.slope + damping) * more);
   }
   Steady<V> steady(const LinkState<V>& link) const {
     const V touches = select(absolute(link.now) < outer, V{} + 1, V{});

@@ -509,4 +509,27 @@ TEST_CASE("a bow of either profile is the one or the other, bit for bit", "[pass
   }
 }
 
+// A finger that rests on a string at rest is on the very top of the hill, however steep: nothing
+// moves by itself. What is pushed ever so little goes down.
+TEST_CASE("what rests on the top of a pluck stays there", "[passive]") {
+  const std::string mass = "@g ground 0.\n@b mass 1. 0. 0.\n";
+  for (const double k : {0.1, 1.0, 3.0, 1000.0}) {
+    INFO("K " << k);
+    const std::string one = mass + "@p nlPluck @g @b " + show(k) + " 0.01\n";
+    const std::string other = "@q nlPluck @g @b " + show(k) + " 0.02\n";
+    for (const std::string& text : {one, one + other}) {
+      Stepper<double> finger(text, Passivity::always);
+      for (int n = 0; n < 1000; ++n) {
+        finger.go();
+        REQUIRE(finger.x[0] == 0.0);
+      }
+      finger.set_state(0.0, 1e-6);
+      for (int n = 0; n < 1000; ++n) {
+        finger.go();
+      }
+      CHECK(finger.x[0] > 0.02);
+    }
+  }
+}
+
 }  // namespace ressort
