@@ -109,6 +109,7 @@ struct Inputs {
   std::vector<double> interleaved;
   std::vector<double> samples;  // [channel][block_frames]
   std::vector<const double*> pointers;
+  std::size_t frame = 0;  // how many have been read
 
   explicit Inputs(std::optional<SoundReader> from) : file(std::move(from)) {
     const std::size_t channels = file ? file->channels() : 0;
@@ -119,17 +120,26 @@ struct Inputs {
     }
   }
 
-  // The next block; silence after the end.
-  std::span<const double* const> next(std::size_t count) {
+  // The next block; silence after the end. Its error is a sample that is no number.
+  Result<std::span<const double* const>> next(std::size_t count) {
     if (file) {
       const std::size_t got = file->read(interleaved.data(), count);
+      const auto end = interleaved.begin() + static_cast<std::ptrdiff_t>(got * pointers.size());
+      const auto broken =
+          std::find_if(interleaved.begin(), end, [](double x) { return !std::isfinite(x); });
+      if (broken != end) {
+        const auto at = static_cast<std::size_t>(broken - interleaved.begin());
+        return Error{"sample " + std::to_string(frame + at / pointers.size()) + " of channel " +
+                     std::to_string(1 + at % pointers.size()) + " is not a number"};
+      }
+      frame += got;
       for (std::size_t c = 0; c < pointers.size(); ++c) {
         for (std::size_t n = 0; n < count; ++n) {
           samples[c * block_frames + n] = n < got ? interleaved[n * pointers.size() + c] : 0.0;
         }
       }
     }
-    return pointers;
+    return std::span<const double* const>(pointers);
   }
 };
 
@@ -367,8 +377,11 @@ Result<Rendered> render(const RenderOptions& options, const std::function<bool(d
       ++next;
     }
     const auto heard = inputs.next(count);
+    if (!heard) {
+      return Error{"'" + options.input + "': " + heard.error().message};
+    }
     const double before_s = thread_cpu_s();
-    process.block(heard, std::span<double* const>(outputs), count, packets.next(frame, count), 0);
+    process.block(*heard, std::span<double* const>(outputs), count, packets.next(frame, count), 0);
     rendered.cpu_s += thread_cpu_s() - before_s;
     double peak = 0.0;
     for (std::size_t n = 0; n < count; ++n) {
