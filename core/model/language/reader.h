@@ -156,12 +156,19 @@ class Reader {
         location = channel.location;
       }
     }
-    for (int number = 1; number < last; ++number) {
-      if (std::find(numbers.begin(), numbers.end(), number) == numbers.end()) {
+    const std::string label = "@" + std::string(name);
+    std::sort(numbers.begin(), numbers.end());
+    int next = 1;  // what is to come without a gap
+    for (const int number : numbers) {
+      if (number > next) {
+        const std::string first = label + std::to_string(next);
         say(Severity::warning, location.line, {name, location.column},
-            "there is @" + std::string(name) + std::to_string(last) + ", but no @" +
-                std::string(name) + std::to_string(number));
+            "there is " + label + std::to_string(last) + ", but " +
+                (number == next + 1
+                     ? "no " + first
+                     : "none of " + first + " to " + label + std::to_string(number - 1)));
       }
+      next = number + 1;
     }
   }
 

@@ -424,6 +424,8 @@ TEST_CASE("a channel that is left out is told at the one behind it", "[rules]") 
   check_told(sounding + heard + "@in4 frcInput @a\n@in2 frcInput @b\n",
              {{Severity::warning, 5, 1, 1, "there is @in4, but no @in1"},
               {Severity::warning, 5, 1, 1, "there is @in4, but no @in3"}});
+  check_warning(sounding + heard + "@in64 frcInput @a\n", 5, 1,
+                "there is @in64, but none of @in1 to @in63");
   // An audio parameter's channel is no gap, and may be one that a hand has too.
   check_told(sounding + heard + "@in2 frcInput @a\n@p audioParam @in1\n@k spring @a @b p\n", {});
   check_told(sounding + heard + "@in1 frcInput @a\n@p audioParam @in1\n@k spring @a @b p\n", {});
