@@ -116,9 +116,10 @@ std::optional<std::string> read_arguments(const Row& row, const Message& message
     values[count++] = *value;
   }
   const std::size_t said = message.arguments.size();
-  return count >= said ? std::nullopt
-                       : std::optional("too many arguments: " + std::to_string(said) +
-                                       ", expected " + std::to_string(count));
+  return count >= said || row.ignores_more
+             ? std::nullopt
+             : std::optional("too many arguments: " + std::to_string(said) + ", expected " +
+                             std::to_string(count));
 }
 
 }  // namespace

@@ -61,6 +61,7 @@ struct Row {
   // Gives its events, all at frame 0. Null: it plays nothing, and a score cannot say it.
   Events (*play)(const Said& said) = nullptr;
   Gesture gesture = Gesture::position;  // of an address of an input
+  bool ignores_more = false;            // what comes behind its arguments, as a button's value
   // Answers OSC; where the row plays, too, a message without arguments asks. [OSC's thread]
   void (*answer)(const Question& question) = nullptr;
 
