@@ -87,6 +87,8 @@ class FlightLog {
   void add(FlightEngine engine, bool has_audio_inputs);
   // All that there is by now.
   void drain(Process& process);
+  // Whether an engine has sounded yet.
+  bool has_begun() const;
   // Nothing before the first engine, and once it has become more than is kept.
   Result<Flight> flight() const;
 

@@ -116,14 +116,18 @@ void FlightLog::forget() {
   texts_ = {};
 }
 
+bool FlightLog::has_begun() const {
+  return !lost_.empty() ||
+         std::any_of(records_.begin(), records_.end(), [](const FlightRecord& record) {
+           return record.kind == FlightRecord::Kind::take;
+         });
+}
+
 Result<Flight> FlightLog::flight() const {
   if (!lost_.empty()) {
     return Error{lost_ + "; the next flight begins when ressort is started anew"};
   }
-  const auto is_take = [](const FlightRecord& record) {
-    return record.kind == FlightRecord::Kind::take;
-  };
-  if (std::none_of(records_.begin(), records_.end(), is_take)) {
+  if (!has_begun()) {
     return Error{"nothing has sounded yet"};
   }
   Flight now = flight_;

@@ -51,9 +51,11 @@ void Session::look_out(const Meters& now) {
   if (!options_.keeps_flights) {
     return;
   }
+  bool has_begun = false;
   {
     const std::lock_guard lock(mutex_);
     flight_.drain(process_);
+    has_begun = flight_.has_begun();
   }
   const auto time = std::chrono::steady_clock::now();
   const bool has_reset = std::exchange(resets_seen_, now.resets) != now.resets;
@@ -62,7 +64,8 @@ void Session::look_out(const Meters& now) {
     has_burst = now.xruns - std::exchange(xruns_seen_, now.xruns) >= burst_xruns;
     last_look_ = time;
   }
-  if (!(has_reset || has_burst) || time - last_flight_ < 60s ||
+  // As a server starts, it may miss periods before there is anything to be heard.
+  if (!(has_reset || has_burst) || !has_begun || time - last_flight_ < 60s ||
       saved_flights_ == most_saved_flights) {
     return;
   }

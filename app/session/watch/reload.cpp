@@ -177,7 +177,7 @@ Result<std::string> Session::reload(Draft draft) {
     }
     if (differs_in_starts_only(*read_, draft.scene)) {
       if (changed.empty()) {
-        return name + ": read again, nothing else sounds";
+        return name + ": read again; it sounds as before";
       }
       const auto fits = [&](const Setting& setting) {
         return std::any_of(now.loaded->instrument.parameters.begin(),
