@@ -136,6 +136,28 @@ TEST_CASE("in the direct form shards compute the same bits", "[halo]") {
   check(mesh_scene(), mesh_cuts);
 }
 
+// The shards' kernels have been told nothing by then; masses 295 to 304 have copies, too.
+TEST_CASE("a network in shards is struck before its first step", "[halo]") {
+  ThreadPool executor(2);
+  const Program program =
+      program_of(scenes::string("s", 600, "0.1", "0.001") + "@out1 posOutput @s_m300\n");
+  for (const std::uint32_t struck : {10u, 295u, 299u, 304u}) {
+    Bare<double> whole(program);
+    Bare<double> shards(sharded(program, {2, 16}, executor, as_it_is));
+    const std::vector<std::uint32_t> node = {struck};
+    const std::vector<double> change = {0.01};
+    whole.kernel().strike(0, node, change);
+    shards.kernel().strike(0, node, change);
+    double peak = 0.0;
+    for (std::size_t n = 0; n < 2000; ++n) {
+      const double expected = whole.step({})[0];
+      REQUIRE(shards.step({})[0] == expected);
+      peak = std::max(peak, std::fabs(expected));
+    }
+    CHECK(peak > 0.001);
+  }
+}
+
 TEST_CASE("points on macros and what has no order are divided too", "[halo]") {
   ThreadPool executor(3);
   const std::string macro =

@@ -121,6 +121,21 @@ TEST_CASE("what is slow feels what comes in within two steps", "[slow]") {
   CHECK(best > 60.0);
 }
 
+// The kernels that step it have been told nothing by then.
+TEST_CASE("what is slow is struck before its first step, too", "[slow]") {
+  const std::vector<std::uint32_t> node = {0};
+  const std::vector<double> change = {1e-5};
+  Bare<double> exact(lfo());
+  Bare<double> slow(slowed(lfo(), 64));
+  exact.kernel().strike(0, node, change);
+  slow.kernel().strike(0, node, change);
+  for (std::size_t n = 0; n < 32; ++n) {
+    const double expected = exact.step({0.0})[0];
+    REQUIRE(expected > 0.0);
+    CHECK(std::fabs(slow.step({0.0})[0] - expected) < 1e-6 * expected);
+  }
+}
+
 TEST_CASE("what is slow turns its parameters and goes on elsewhere", "[slow]") {
   const Program program = struck_lfo();
   Bare<double> exact(program);
