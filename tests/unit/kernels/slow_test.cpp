@@ -121,9 +121,10 @@ TEST_CASE("what is slow feels what comes in within two steps", "[slow]") {
   CHECK(best > 60.0);
 }
 
-// The kernels that step it have been told nothing by then.
+// The kernels that step it have been told nothing by then. What is published is damped a sample
+// late, by a share of Z.
 TEST_CASE("what is slow is struck before its first step, too", "[slow]") {
-  const std::vector<std::uint32_t> node = {0};
+  const std::vector<std::uint32_t> node = {1};  // which is heard
   const std::vector<double> change = {1e-5};
   Bare<double> exact(lfo());
   Bare<double> slow(slowed(lfo(), 64));
@@ -132,7 +133,7 @@ TEST_CASE("what is slow is struck before its first step, too", "[slow]") {
   for (std::size_t n = 0; n < 32; ++n) {
     const double expected = exact.step({0.0})[0];
     REQUIRE(expected > 0.0);
-    CHECK(std::fabs(slow.step({0.0})[0] - expected) < 1e-6 * expected);
+    CHECK(std::fabs(slow.step({0.0})[0] - expected) < 2e-4 * expected);
   }
 }
 
