@@ -278,7 +278,7 @@ TEST_CASE("every row is found by its address and can be said somewhere", "[regis
     CHECK((row.play != nullptr || why.starts_with("unknown address")));
     CHECK((row.play == nullptr || events || why.find(": input 1 ") != why.npos));
     least.arguments.resize(most_arguments + 1, 0.0);
-    CHECK_FALSE(to_events(least, instrument(), 9));
+    CHECK(static_cast<bool>(to_events(least, instrument(), 9)) == row.ignores_more);
   }
   CHECK(find_row("/nowhere").row == nullptr);
   CHECK(is_reserved("/done"));
