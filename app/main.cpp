@@ -3,5 +3,5 @@
 #include "app/program.h"
 
 int main(int argc, char** argv) {
-  return ressort::run_program(ressort::run_command_line, argc, argv);
+  return ressort::run_program(ressort::command_line::run_command_line, argc, argv);
 }

@@ -10,7 +10,7 @@
 namespace ressort {
 
 // Thrown by a Progress whose work shall stop. It passes through core's rooms; the outer doors,
-// parse_network() and compile(), catch it and fail with the message `stopped`.
+// parse_network() and compile_network(), catch it and fail with the message `stopped`.
 struct Stopped {};
 inline constexpr const char* stopped = "stopped";
 

@@ -6,7 +6,7 @@
 #include "app/text.h"
 #include "core/solids/solid_modes.h"
 
-namespace ressort {
+namespace ressort::command_line {
 namespace {
 
 const char* const examples =
@@ -108,4 +108,4 @@ void add_body(CLI::App& app, BodyRequest& request, int& code) {
   command->callback([&request, &code] { code = body_command(request); });
 }
 
-}  // namespace ressort
+}  // namespace ressort::command_line

@@ -3,7 +3,7 @@
 #include "app/command_line/command_lines.h"
 #include "app/command_line/options.h"
 
-namespace ressort {
+namespace ressort::command_line {
 namespace {
 
 const char* const chart_examples =
@@ -41,4 +41,4 @@ void add_chart(CLI::App& app, ChartOptions& options, int& code) {
   command->callback([&options, &code] { code = start_chart(options); });
 }
 
-}  // namespace ressort
+}  // namespace ressort::command_line

@@ -3,7 +3,7 @@
 #include "app/command_line/command_lines.h"
 #include "app/command_line/options.h"
 
-namespace ressort {
+namespace ressort::command_line {
 namespace {
 
 const char* const check_examples =
@@ -35,4 +35,4 @@ void add_check(CLI::App& app, CheckOptions& options, int& code) {
   command->callback([&options, &code] { code = check(options); });
 }
 
-}  // namespace ressort
+}  // namespace ressort::command_line

@@ -8,7 +8,7 @@
 #include "app/exit_code.h"
 #include "app/version.h"
 
-namespace ressort {
+namespace ressort::command_line {
 
 int run_command_line(int argc, char** argv) {
   CLI::App app{"ressort plays networks of masses and springs, read from .mdl files."};
@@ -57,4 +57,4 @@ int run_command_line(int argc, char** argv) {
   return code;
 }
 
-}  // namespace ressort
+}  // namespace ressort::command_line

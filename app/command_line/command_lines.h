@@ -17,7 +17,7 @@
 #include "app/commands/timbre/describe.h"
 #include "app/commands/timbre/shape_model.h"
 
-namespace ressort {
+namespace ressort::command_line {
 
 struct RenderChoice {
   RenderOptions options;
@@ -46,4 +46,4 @@ void add_body(CLI::App& app, BodyRequest& request, int& code);
 void add_chart(CLI::App& app, ChartOptions& options, int& code);
 void add_reference(CLI::App& app, std::string& part, int& code);
 
-}  // namespace ressort
+}  // namespace ressort::command_line

@@ -5,7 +5,7 @@
 #include "app/commands/timbre/sweep.h"
 #include "core/model/language/expression.h"
 
-namespace ressort {
+namespace ressort::command_line {
 namespace {
 
 const char* const describe_examples =
@@ -100,4 +100,4 @@ void add_describe(CLI::App& app, DescribeOptions& options, int& code) {
   command->callback([&options, &code] { code = describe_command(options); });
 }
 
-}  // namespace ressort
+}  // namespace ressort::command_line

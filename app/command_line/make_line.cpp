@@ -3,7 +3,7 @@
 #include "app/command_line/command_lines.h"
 #include "app/command_line/options.h"
 
-namespace ressort {
+namespace ressort::command_line {
 namespace {
 
 const char* const make_examples =
@@ -72,4 +72,4 @@ void add_make(CLI::App& app, MakeChoice& choice, int& code) {
   });
 }
 
-}  // namespace ressort
+}  // namespace ressort::command_line

@@ -11,7 +11,7 @@
 #include "app/session/files.h"
 #include "app/version.h"
 
-namespace ressort {
+namespace ressort::command_line {
 namespace {
 
 // As roff reads it: no word of ours is one of its own.
@@ -132,7 +132,7 @@ int print_man(const CLI::App& app) {
     }
   }
   put(".SH CONSOLE\nWhile it plays, it reads commands.");
-  for (const Row* const row : commands()) {
+  for (const Row* const row : command_rows()) {
     put_row(row->command, row->words, row->command_does);
   }
   put(".SH OSC\nUDP port 9777 of this machine, unless options say otherwise.");
@@ -212,4 +212,4 @@ int print_names() {
   return exit_code::done;
 }
 
-}  // namespace ressort
+}  // namespace ressort::command_line

@@ -3,7 +3,9 @@
 
 #include <CLI/CLI.hpp>
 
-namespace ressort {
+#include "app/rooms.h"
+
+namespace ressort::command_line {
 
 // The manual page ressort(1), for man; of all commands of `app`, of the console and of OSC.
 int print_man(const CLI::App& app);
@@ -14,4 +16,4 @@ int print_completion(const CLI::App& app);
 // Every preset and model by its name, a line each.
 int print_names();
 
-}  // namespace ressort
+}  // namespace ressort::command_line

@@ -5,7 +5,7 @@
 #include "app/command_line/options.h"
 #include "core/model/language/expression.h"
 
-namespace ressort {
+namespace ressort::command_line {
 namespace {
 
 const char* const modes_examples =
@@ -73,4 +73,4 @@ void add_modes(CLI::App& app, ModesOptions& options, int& code) {
   command->callback([&options, &code] { code = modes_command(options); });
 }
 
-}  // namespace ressort
+}  // namespace ressort::command_line

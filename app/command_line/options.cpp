@@ -5,7 +5,7 @@
 
 #include "core/model/language/expression.h"
 
-namespace ressort {
+namespace ressort::command_line {
 
 CLI::Validator within(double least, double most) {
   const std::string range = print_number(least) + " to " + print_number(most);
@@ -128,4 +128,4 @@ void add_force(CLI::App& command, bool& force) {
                    "play a model that is not stable all the same; what runs away fades out");
 }
 
-}  // namespace ressort
+}  // namespace ressort::command_line

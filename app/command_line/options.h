@@ -13,7 +13,7 @@
 #include "core/model/network.h"
 #include "core/result.h"
 
-namespace ressort {
+namespace ressort::command_line {
 
 // A number within a range; what is no number is in none.
 CLI::Validator within(double least, double most);
@@ -86,4 +86,4 @@ void add_parsed(CLI::App& command, const std::string& name, std::vector<T>& targ
       ->allow_extra_args(false);
 }
 
-}  // namespace ressort
+}  // namespace ressort::command_line

@@ -6,7 +6,7 @@
 #include "app/commands/smf/midi_file.h"
 #include "core/model/language/expression.h"
 
-namespace ressort {
+namespace ressort::command_line {
 namespace {
 
 const char* const play_examples =
@@ -152,4 +152,4 @@ void add_play(CLI::App& app, PlayOptions& options, int& code) {
   command->callback([&options, &code] { code = play(options); });
 }
 
-}  // namespace ressort
+}  // namespace ressort::command_line

@@ -5,7 +5,7 @@
 #include "app/command_line/manual.h"
 #include "app/commands/reference.h"
 
-namespace ressort {
+namespace ressort::command_line {
 
 void add_reference(CLI::App& app, std::string& part, int& code) {
   CLI::App* command = app.add_subcommand("reference", "prints a table of the manual");
@@ -28,4 +28,4 @@ void add_reference(CLI::App& app, std::string& part, int& code) {
   });
 }
 
-}  // namespace ressort
+}  // namespace ressort::command_line

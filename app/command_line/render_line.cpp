@@ -4,7 +4,7 @@
 #include "app/command_line/command_lines.h"
 #include "app/command_line/options.h"
 
-namespace ressort {
+namespace ressort::command_line {
 namespace {
 
 const char* const render_examples =
@@ -104,4 +104,4 @@ void add_render(CLI::App& app, RenderChoice& choice, int& code) {
   });
 }
 
-}  // namespace ressort
+}  // namespace ressort::command_line

@@ -7,7 +7,7 @@
 #include "app/session/timbre/shape.h"
 #include "core/model/language/expression.h"
 
-namespace ressort {
+namespace ressort::command_line {
 namespace {
 
 const char* const shape_examples =
@@ -104,4 +104,4 @@ void add_shape(CLI::App& app, ShapeOptions& options, int& code) {
   });
 }
 
-}  // namespace ressort
+}  // namespace ressort::command_line

@@ -20,7 +20,7 @@
 #include "core/model/language/print.h"
 #include "core/model/topology.h"
 
-namespace ressort {
+namespace ressort::commands {
 namespace {
 
 using nlohmann::json;
@@ -327,4 +327,4 @@ int check(const CheckOptions& options) {
   return is_ok ? exit_code::done : exit_code::wrong_use;
 }
 
-}  // namespace ressort
+}  // namespace ressort::commands

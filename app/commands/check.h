@@ -4,10 +4,11 @@
 #include <optional>
 #include <string>
 
+#include "app/rooms.h"
 #include "core/compile/plan.h"
 #include "core/model/network.h"
 
-namespace ressort {
+namespace ressort::commands {
 
 enum class CheckAs { report, json, model };
 
@@ -24,4 +25,4 @@ struct CheckOptions {
 // stdout.
 int check(const CheckOptions& options);
 
-}  // namespace ressort
+}  // namespace ressort::commands

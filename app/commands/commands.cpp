@@ -13,7 +13,7 @@
 #include "app/say.h"
 #include "app/session/load_news.h"
 
-namespace ressort {
+namespace ressort::commands {
 namespace {
 
 Flag interrupted;  // by a signal, while rendering
@@ -128,4 +128,4 @@ int shape_command(const ShapeOptions& options) {
   return shape_model(options, [] { return !interrupted.is_raised(); });
 }
 
-}  // namespace ressort
+}  // namespace ressort::commands

@@ -16,7 +16,7 @@
 #include "app/panel/panel.h"
 #include "app/session/session.h"
 
-namespace ressort {
+namespace ressort::commands {
 
 struct PlayOptions {
   std::string name = "IPlayTheTriangle";  // or a MIDI file, which this one plays
@@ -51,4 +51,4 @@ int gallery_command(const GalleryOptions& options);
 int describe_command(const DescribeOptions& options);
 int shape_command(const ShapeOptions& options);
 
-}  // namespace ressort
+}  // namespace ressort::commands

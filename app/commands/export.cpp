@@ -9,12 +9,13 @@
 #include "core/compile/compile.h"
 #include "core/model/faust/faust.h"
 
-namespace ressort {
+namespace ressort::commands {
 namespace {
 
 // The scene's sliders are what its parameters may be turned to when it is played.
 Result<std::string> to_faust(const Scene& scene, bool rescale, const Progress& progress) {
-  const auto compiled = compile(scene.network, scene.preset, {.voices = 1, .progress = progress});
+  const auto compiled =
+      compile_network(scene.network, scene.preset, {.voices = 1, .progress = progress});
   if (!compiled) {
     return Error{to_string(finding_of(scene.path, "", compiled.error()))};
   }
@@ -75,4 +76,4 @@ int export_to_faust(const ExportOptions& options) {
   return put_text(options.output, *text, options.force);
 }
 
-}  // namespace ressort
+}  // namespace ressort::commands

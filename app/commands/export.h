@@ -4,9 +4,10 @@
 #include <optional>
 #include <string>
 
+#include "app/rooms.h"
 #include "core/model/network.h"
 
-namespace ressort {
+namespace ressort::commands {
 
 struct ExportOptions {
   std::string name;    // model or preset
@@ -19,4 +20,4 @@ struct ExportOptions {
 // Writes the model as a FAUST program; the exit code comes back. [main]
 int export_to_faust(const ExportOptions& options);
 
-}  // namespace ressort
+}  // namespace ressort::commands

@@ -8,7 +8,7 @@
 #include "core/model/language/mdl.h"
 #include "core/model/language/print.h"
 
-namespace ressort {
+namespace ressort::commands {
 
 int make(const MakeOptions& options) {
   const auto complain = [](const std::string& text) {
@@ -38,4 +38,4 @@ int make(const MakeOptions& options) {
   return exit_code::done;
 }
 
-}  // namespace ressort
+}  // namespace ressort::commands

@@ -3,9 +3,10 @@
 
 #include <string>
 
+#include "app/rooms.h"
 #include "core/model/generate.h"
 
-namespace ressort {
+namespace ressort::commands {
 
 struct MakeOptions {
   Shape shape;
@@ -15,4 +16,4 @@ struct MakeOptions {
 
 int make(const MakeOptions& options);
 
-}  // namespace ressort
+}  // namespace ressort::commands

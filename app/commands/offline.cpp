@@ -16,7 +16,7 @@
 #include "core/compile/compile.h"
 #include "core/model/language/expression.h"
 
-namespace ressort {
+namespace ressort::commands {
 namespace {
 
 constexpr std::size_t block_frames = 256;
@@ -420,4 +420,4 @@ Result<Rendered> render(const RenderOptions& options, const std::function<bool(d
   return rendered;
 }
 
-}  // namespace ressort
+}  // namespace ressort::commands

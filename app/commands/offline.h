@@ -13,7 +13,7 @@
 #include "core/progress.h"
 #include "core/result.h"
 
-namespace ressort {
+namespace ressort::commands {
 
 struct RenderOptions {
   std::string name;    // model or preset
@@ -74,4 +74,4 @@ struct PhraseNote {
 const std::vector<PhraseNote>& default_phrase();
 std::string to_score(const std::vector<PhraseNote>& notes);
 
-}  // namespace ressort
+}  // namespace ressort::commands

@@ -6,7 +6,7 @@
 #include <algorithm>
 #include <cstdio>
 
-namespace ressort {
+namespace ressort::commands {
 
 ProgressBar::ProgressBar(bool is_wanted) : is_shown_(is_wanted && isatty(STDERR_FILENO) != 0) {}
 
@@ -31,4 +31,4 @@ void ProgressBar::show(double share, const std::string& what) {
   }
 }
 
-}  // namespace ressort
+}  // namespace ressort::commands

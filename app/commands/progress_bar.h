@@ -3,7 +3,9 @@
 
 #include <string>
 
-namespace ressort {
+#include "app/rooms.h"
+
+namespace ressort::commands {
 
 class ProgressBar {
  public:
@@ -21,4 +23,4 @@ class ProgressBar {
   std::string shown_;
 };
 
-}  // namespace ressort
+}  // namespace ressort::commands

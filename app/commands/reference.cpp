@@ -13,7 +13,7 @@
 #include "core/model/language/keywords.h"
 #include "core/model/preset/preset.h"
 
-namespace ressort {
+namespace ressort::commands {
 namespace {
 
 using Cells = std::vector<std::string>;
@@ -72,7 +72,7 @@ void print_addresses() {
 
 void print_commands() {
   print_head({"command", "arguments", "what it does"});
-  for (const Row* const row : commands()) {
+  for (const Row* const row : command_rows()) {
     print_row({code(row->command), code(row->words), std::string(row->command_does)});
   }
 }
@@ -136,4 +136,4 @@ int reference(std::string_view name) {
   return exit_code::done;
 }
 
-}  // namespace ressort
+}  // namespace ressort::commands

@@ -5,7 +5,9 @@
 #include <span>
 #include <string_view>
 
-namespace ressort {
+#include "app/rooms.h"
+
+namespace ressort::commands {
 
 struct ReferencePart {
   std::string_view name;
@@ -17,4 +19,4 @@ std::span<const ReferencePart> reference_parts();
 // `name` is that of a part.
 int reference(std::string_view name);
 
-}  // namespace ressort
+}  // namespace ressort::commands

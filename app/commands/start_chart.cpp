@@ -11,7 +11,7 @@
 #include "app/exit_code.h"
 #include "core/model/language/expression.h"
 
-namespace ressort {
+namespace ressort::commands {
 namespace {
 
 namespace fs = std::filesystem;
@@ -73,4 +73,4 @@ ChartOptions chart_options(const std::vector<std::string>& arguments) {
   return options;
 }
 
-}  // namespace ressort
+}  // namespace ressort::commands

@@ -5,7 +5,9 @@
 #include <string>
 #include <vector>
 
-namespace ressort {
+#include "app/rooms.h"
+
+namespace ressort::commands {
 
 struct ChartOptions {
   std::vector<std::string> scenes;  // none: the reference scenes
@@ -20,4 +22,4 @@ int start_chart(const ChartOptions& options);
 // The options as start_chart() gave them to ressort-chart.
 ChartOptions chart_options(const std::vector<std::string>& arguments);
 
-}  // namespace ressort
+}  // namespace ressort::commands

@@ -2,7 +2,7 @@
 
 #include "app/text.h"
 
-namespace ressort {
+namespace ressort::commands {
 
 std::string px(double pixels) {
   std::string text = fixed(pixels, 1);
@@ -48,4 +48,4 @@ std::string svg_head(double width, double height, double font_px) {
          "\" fill=\"" + ink + "\">\n";
 }
 
-}  // namespace ressort
+}  // namespace ressort::commands

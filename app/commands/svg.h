@@ -4,7 +4,9 @@
 
 #include <string>
 
-namespace ressort {
+#include "app/rooms.h"
+
+namespace ressort::commands {
 
 inline constexpr const char* ink = "#222";
 inline constexpr const char* grid_ink = "#bbb";
@@ -26,4 +28,4 @@ std::string hertz(double frequency_hz);
 // The opening tag; "</svg>" ends it.
 std::string svg_head(double width, double height, double font_px);
 
-}  // namespace ressort
+}  // namespace ressort::commands

@@ -10,7 +10,7 @@
 #include "core/model/language/expression.h"
 #include "core/model/preset/preset.h"
 
-namespace ressort {
+namespace ressort::control {
 namespace {
 
 namespace fs = std::filesystem;
@@ -48,7 +48,7 @@ LineShape shape_of(std::string_view line) {
 Result<const Row*> find_command(std::string_view name) {
   std::vector<std::string> meant;
   const Row* found = nullptr;
-  for (const Row* const row : commands()) {
+  for (const Row* const row : command_rows()) {
     if (same_but_case(row->command, name)) {
       return row;
     }
@@ -68,7 +68,7 @@ Result<const Row*> find_command(std::string_view name) {
   if (meant.size() > 1) {
     return Error{typed + " could be " + joined(meant, " or ")};
   }
-  for (const Row* const row : commands()) {
+  for (const Row* const row : command_rows()) {
     meant.emplace_back(row->command);
   }
   return Error{"there is no command " + typed + "; there are " + joined(meant, ", ") +
@@ -152,12 +152,12 @@ Result<Done> command::help(ConsoleContext& console, Words words) {
     return Done{};
   }
   std::size_t width = 0;
-  for (const Row* const row : commands()) {
+  for (const Row* const row : command_rows()) {
     width = std::max(width, usage(*row).size());
   }
   std::string text;
   const Row* before = nullptr;
-  for (const Row* const row : commands()) {
+  for (const Row* const row : command_rows()) {
     if (before == nullptr || row->group != before->group) {
       text += std::string(heading(row->group)) + "\n";
     }
@@ -285,7 +285,7 @@ std::vector<std::string> Console::completions(std::string_view line) const {
     words.insert(words.end(), more.begin(), more.end());
   };
   if (kind.find("COMMAND") != kind.npos) {
-    for (const Row* const row : commands()) {
+    for (const Row* const row : command_rows()) {
       words.emplace_back(row->command);
     }
   } else if (kind.find("PARAMETER") != kind.npos) {
@@ -323,4 +323,4 @@ std::vector<std::string> Console::completions(std::string_view line) const {
   return words;
 }
 
-}  // namespace ressort
+}  // namespace ressort::control

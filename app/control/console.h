@@ -11,7 +11,7 @@
 #include "app/session/session.h"
 #include "core/result.h"
 
-namespace ressort {
+namespace ressort::control {
 
 // A command as typed, resolved: its full name and its words. Pure.
 struct Command {
@@ -63,4 +63,4 @@ class Console {
   std::unique_ptr<ConsoleContext> context_;
 };
 
-}  // namespace ressort
+}  // namespace ressort::control

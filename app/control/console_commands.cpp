@@ -15,7 +15,7 @@
 #include "core/model/language/expression.h"
 #include "core/model/preset/edit.h"
 
-namespace ressort {
+namespace ressort::control {
 
 namespace fs = std::filesystem;
 
@@ -487,4 +487,4 @@ Result<Done> command::quit(ConsoleContext& console, Words) {
   return Done{};
 }
 
-}  // namespace ressort
+}  // namespace ressort::control

@@ -7,7 +7,7 @@
 #include "app/control/registry.h"
 #include "app/session/recorder.h"
 
-namespace ressort {
+namespace ressort::control {
 
 // What the commands work on; the console's own.
 struct ConsoleContext {
@@ -67,4 +67,4 @@ Result<Done> help(ConsoleContext& console, Words words);
 Result<Done> quit(ConsoleContext& console, Words words);
 }  // namespace command
 
-}  // namespace ressort
+}  // namespace ressort::control

@@ -5,7 +5,7 @@
 #include "app/text.h"
 #include "core/model/language/expression.h"
 
-namespace ressort {
+namespace ressort::control {
 
 Result<Done> command::save(ConsoleContext& console, Words words) {
   if (!loaded(console)) {
@@ -100,4 +100,4 @@ Result<Done> command::wait(ConsoleContext& console, Words words) {
   return Done{};
 }
 
-}  // namespace ressort
+}  // namespace ressort::control

@@ -4,7 +4,7 @@
 
 #include "core/model/language/expression.h"
 
-namespace ressort {
+namespace ressort::control {
 namespace {
 
 // One element of a pattern that is not '*': does it fit `c`? `length` is how much of the pattern
@@ -144,4 +144,4 @@ bool fits(std::string_view pattern, std::string_view address) {
   return p == pattern.size();
 }
 
-}  // namespace ressort
+}  // namespace ressort::control

@@ -7,9 +7,10 @@
 #include <variant>
 #include <vector>
 
+#include "app/rooms.h"
 #include "core/result.h"
 
-namespace ressort {
+namespace ressort::control {
 
 using Argument = std::variant<double, std::string>;
 
@@ -37,4 +38,4 @@ Argument to_argument(const std::string& word);
 // Whether an OSC address pattern (* ? [a-z] {x,y}) fits an address.
 bool fits(std::string_view pattern, std::string_view address);
 
-}  // namespace ressort
+}  // namespace ressort::control

@@ -5,7 +5,7 @@
 #include "app/session/modes/known_modes.h"
 #include "core/model/language/expression.h"
 
-namespace ressort {
+namespace ressort::control {
 
 Result<Done> command::modes(ConsoleContext& console, Words words) {
   if (!loaded(console)) {
@@ -88,4 +88,4 @@ Result<TuneTarget> tune_target(std::span<const Argument> arguments) {
   return target;
 }
 
-}  // namespace ressort
+}  // namespace ressort::control

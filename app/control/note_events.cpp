@@ -5,7 +5,7 @@
 
 #include "core/engine/midi/channels.h"
 
-namespace ressort {
+namespace ressort::control {
 namespace {
 
 // OSC's floats up to 1 are shares of the loudest; whole numbers, and what is typed, are MIDI's.
@@ -82,4 +82,4 @@ Events events::note_slide(const Said& said) {
       said, 0, {.kind = EventKind::controller, .index = slide, .value = said.arguments[1] / 127.0});
 }
 
-}  // namespace ressort
+}  // namespace ressort::control

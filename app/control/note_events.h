@@ -4,7 +4,7 @@
 
 #include "app/control/registry.h"
 
-namespace ressort::events {
+namespace ressort::control::events {
 
 Events note_on(const Said& said);        // KEY VELOCITY ID, which is 0 for none
 Events note_off(const Said& said);       // the same
@@ -14,4 +14,4 @@ Events note_bend(const Said& said);      // ID SEMITONES
 Events note_pressure(const Said& said);  // ID VALUE
 Events note_slide(const Said& said);     // ID VALUE
 
-}  // namespace ressort::events
+}  // namespace ressort::control::events

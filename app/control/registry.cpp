@@ -9,7 +9,7 @@
 #include "core/engine/midi/channels.h"
 #include "core/model/language/expression.h"
 
-namespace ressort {
+namespace ressort::control {
 namespace {
 
 // What stands before and after N or NAME; `hole` is empty where there is none.
@@ -158,7 +158,7 @@ std::vector<const Row*> addresses() {
   return found;
 }
 
-std::vector<const Row*> commands() {
+std::vector<const Row*> command_rows() {
   std::vector<const Row*> found;
   for (const Row& row : rows()) {
     if (!row.command.empty()) {
@@ -251,4 +251,4 @@ std::string describe_limit(const Message& message, const Event& event,
              : "";
 }
 
-}  // namespace ressort
+}  // namespace ressort::control

@@ -16,11 +16,14 @@
 #include "core/engine/event.h"
 #include "core/result.h"
 
-namespace ressort {
+namespace ressort::session {
+class Session;
+}
+
+namespace ressort::control {
 
 struct ConsoleContext;
 class OscClient;
-class Session;
 class Subscribers;
 
 inline constexpr std::size_t most_arguments = 3;
@@ -83,7 +86,7 @@ const std::vector<Row>& rows();
 
 // The rows with an address, in the order of /describe; those with a command, by their groups.
 std::vector<const Row*> addresses();
-std::vector<const Row*> commands();
+std::vector<const Row*> command_rows();
 std::string_view heading(CommandGroup group);
 
 // The row of an address and what stands for its N or NAME; a null row if there is none.
@@ -109,4 +112,4 @@ Events to_events(const Message& message, const Instrument& instrument, std::uint
 std::string describe_limit(const Message& message, const Event& event,
                            const Instrument& instrument);
 
-}  // namespace ressort
+}  // namespace ressort::control

@@ -13,7 +13,7 @@
 #include "app/text.h"
 #include "core/engine/midi/channels.h"
 
-namespace ressort {
+namespace ressort::control {
 namespace {
 
 // --- what plays ---------------------------------------------------------------------------------
@@ -466,4 +466,4 @@ std::span<const std::string_view> answers() {
   return all;
 }
 
-}  // namespace ressort
+}  // namespace ressort::control

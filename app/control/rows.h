@@ -8,11 +8,11 @@
 
 #include "app/control/registry.h"
 
-namespace ressort {
+namespace ressort::control {
 
 std::vector<Row> make_rows();  // in the order of /describe
 
 // The addresses that we send.
 std::span<const std::string_view> answers();
 
-}  // namespace ressort
+}  // namespace ressort::control

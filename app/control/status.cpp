@@ -8,7 +8,7 @@
 #include "app/text.h"
 #include "core/model/language/expression.h"
 
-namespace ressort {
+namespace ressort::control {
 namespace {
 
 // Three digits of it.
@@ -226,4 +226,4 @@ std::vector<std::vector<std::string>> status_lines(const Status& status) {
   return lines;
 }
 
-}  // namespace ressort
+}  // namespace ressort::control

@@ -11,7 +11,7 @@
 #include "app/control/osc/reply.h"
 #include "app/session/session.h"
 
-namespace ressort {
+namespace ressort::control {
 
 inline constexpr int not_in_reply = -1;
 
@@ -35,4 +35,4 @@ Reply status_reply(const Status& status);
 // The console's table: a line's name and what its figures say.
 std::vector<std::vector<std::string>> status_lines(const Status& status);
 
-}  // namespace ressort
+}  // namespace ressort::control

@@ -23,7 +23,7 @@
 
 #include "app/say.h"
 
-namespace ressort {
+namespace ressort::control {
 
 namespace {
 
@@ -466,4 +466,4 @@ void Terminal::say(const std::string& text) {
   input_->say(text);
 }
 
-}  // namespace ressort
+}  // namespace ressort::control

@@ -7,7 +7,7 @@
 
 #include "app/control/console.h"
 
-namespace ressort {
+namespace ressort::control {
 
 // Reads lines from the terminal with editing and history until the end of input or `quit`; then
 // calls `on_quit`, on its own thread, only if it was `quit`. Without a terminal it reads plain
@@ -27,4 +27,4 @@ class Terminal {
   std::unique_ptr<Input> input_;
 };
 
-}  // namespace ressort
+}  // namespace ressort::control

@@ -5,7 +5,7 @@
 #include "app/text.h"
 #include "core/model/language/expression.h"
 
-namespace ressort {
+namespace ressort::control {
 
 Result<Done> command::timbre(ConsoleContext& console, Words) {
   constexpr std::chrono::milliseconds patience{20};
@@ -78,4 +78,4 @@ Result<Done> command::shape(ConsoleContext& console, Words words) {
   return Done{};
 }
 
-}  // namespace ressort
+}  // namespace ressort::control

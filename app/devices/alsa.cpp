@@ -10,7 +10,7 @@
 #include "app/devices/audio.h"
 #include "app/say.h"
 
-namespace ressort {
+namespace ressort::devices {
 namespace {
 
 constexpr int periods = 3;
@@ -279,4 +279,4 @@ Result<AudioDevice> open_alsa(Process& process, const AudioOptions& options) {
   return device;
 }
 
-}  // namespace ressort
+}  // namespace ressort::devices

@@ -7,7 +7,7 @@
 #include <chrono>
 #include <thread>
 
-namespace ressort {
+namespace ressort::devices {
 
 Result<AudioDevice> open_audio(const std::string& wanted, Process& process,
                                const AudioOptions& options) {
@@ -64,4 +64,4 @@ std::int64_t monotonic_ns() {
       .count();
 }
 
-}  // namespace ressort
+}  // namespace ressort::devices

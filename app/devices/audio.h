@@ -10,7 +10,7 @@
 #include "app/realtime/process.h"
 #include "core/result.h"
 
-namespace ressort {
+namespace ressort::devices {
 
 struct AudioOptions {
   std::string client_name = "ressort";
@@ -83,4 +83,4 @@ void sleep_until(std::int64_t time_ns);
 // The monotonic clock, in ns. Reads shared memory, makes no system call. [any thread]
 std::int64_t monotonic_ns();
 
-}  // namespace ressort
+}  // namespace ressort::devices

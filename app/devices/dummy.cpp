@@ -7,7 +7,7 @@
 
 #include "app/devices/audio.h"
 
-namespace ressort {
+namespace ressort::devices {
 namespace {
 
 struct Dummy {
@@ -65,4 +65,4 @@ Result<AudioDevice> open_dummy(Process& process, const AudioOptions& options) {
   return device;
 }
 
-}  // namespace ressort
+}  // namespace ressort::devices

@@ -15,7 +15,7 @@
 
 #include "app/devices/audio.h"
 
-namespace ressort {
+namespace ressort::devices {
 namespace {
 
 constexpr int most_audio_inputs = 16;
@@ -368,4 +368,4 @@ Result<AudioDevice> open_jack(Process& process, const AudioOptions& options) {
   return device;
 }
 
-}  // namespace ressort
+}  // namespace ressort::devices

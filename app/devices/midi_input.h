@@ -10,7 +10,7 @@
 #include "app/realtime/process.h"
 #include "core/result.h"
 
-namespace ressort {
+namespace ressort::devices {
 
 // Where packets with a time of arrival enter. They are played one period later, at constant
 // latency. A test drives it as RtMidi does.
@@ -46,4 +46,4 @@ class MidiInput {
   std::unique_ptr<Sources> sources_;
 };
 
-}  // namespace ressort
+}  // namespace ressort::devices

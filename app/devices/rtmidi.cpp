@@ -7,7 +7,7 @@
 #include "app/devices/audio.h"
 #include "app/devices/midi_input.h"
 
-namespace ressort {
+namespace ressort::devices {
 namespace {
 
 struct Keyboard {
@@ -105,4 +105,4 @@ void MidiInput::tick() {
   }
 }
 
-}  // namespace ressort
+}  // namespace ressort::devices

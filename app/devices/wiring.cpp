@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-namespace ressort {
+namespace ressort::devices {
 
 void Wiring::look(const std::vector<Cable>& present,
                   const std::function<bool(const std::string& port)>& exists) {
@@ -68,4 +68,4 @@ void Wiring::expect(const Cable& cable) {
   }
 }
 
-}  // namespace ressort
+}  // namespace ressort::devices

@@ -5,7 +5,9 @@
 #include <string>
 #include <vector>
 
-namespace ressort {
+#include "app/rooms.h"
+
+namespace ressort::devices {
 
 // A connection of one of our ports, whichever way the sound goes.
 struct Cable {
@@ -51,4 +53,4 @@ class Wiring {
   std::vector<Known> known_;
 };
 
-}  // namespace ressort
+}  // namespace ressort::devices

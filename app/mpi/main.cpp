@@ -8,9 +8,8 @@
 #include "app/exit_code.h"
 #include "app/mpi/ranks.h"
 
+namespace ressort::mpi {
 namespace {
-
-using namespace ressort;
 
 int render_by(Ranks& ranks, int argc, char** argv) {
   RenderOptions options{.executor = &ranks};
@@ -56,16 +55,17 @@ int render_by(Ranks& ranks, int argc, char** argv) {
 }
 
 }  // namespace
+}  // namespace ressort::mpi
 
 int main(int argc, char** argv) try {
-  Ranks ranks(argc, argv);
+  ressort::mpi::Ranks ranks(argc, argv);
   try {
-    return render_by(ranks, argc, argv);
+    return ressort::mpi::render_by(ranks, argc, argv);
   } catch (const std::exception& error) {
     std::fprintf(stderr, "ressort-mpi: %s\n", error.what());
-    ranks.abort(exit_code::our_failure);
+    ranks.abort(ressort::exit_code::our_failure);
   }
 } catch (...) {
   std::fputs("ressort-mpi: MPI does not begin\n", stderr);
-  return exit_code::our_failure;
+  return ressort::exit_code::our_failure;
 }

@@ -8,7 +8,7 @@
 
 #include "core/kernels/domains/one_by_one.h"
 
-namespace ressort {
+namespace ressort::mpi {
 namespace {
 
 std::size_t own_number() {
@@ -115,4 +115,4 @@ void Ranks::abort(int code) {
   std::_Exit(code);  // should it ever return
 }
 
-}  // namespace ressort
+}  // namespace ressort::mpi

@@ -3,9 +3,10 @@
 
 #include <memory>
 
+#include "app/rooms.h"
 #include "core/kernels/domains/executor.h"
 
-namespace ressort {
+namespace ressort::mpi {
 
 // One thread in each process. Made once in a program; all functions by its main thread. Where a
 // process ends otherwise than by ~Ranks(), MPI ends all others.
@@ -26,4 +27,4 @@ class Ranks final : public Executor {
   std::unique_ptr<Post> post_;
 };
 
-}  // namespace ressort
+}  // namespace ressort::mpi

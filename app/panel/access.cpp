@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <random>
 
-namespace ressort {
+namespace ressort::panel {
 
 PanelAccess::PanelAccess(int port, const std::vector<std::string>& hosts, std::string token,
                          bool needs_token)
@@ -62,4 +62,4 @@ bool is_loopback(std::string_view address) {
   return address == "localhost" || address == "127.0.0.1";
 }
 
-}  // namespace ressort
+}  // namespace ressort::panel

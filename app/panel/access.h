@@ -9,7 +9,9 @@
 #include <string_view>
 #include <vector>
 
-namespace ressort {
+#include "app/rooms.h"
+
+namespace ressort::panel {
 
 class PanelAccess {
  public:
@@ -38,4 +40,4 @@ std::string_view cookie_of(std::string_view header, std::string_view name);
 
 bool is_loopback(std::string_view address);  // "127.0.0.1", "localhost"
 
-}  // namespace ressort
+}  // namespace ressort::panel

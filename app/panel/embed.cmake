@@ -25,7 +25,7 @@ endforeach()
 file(CONFIGURE OUTPUT ${OUTPUT} CONTENT [[
 #include "app/panel/page.h"
 
-namespace ressort {
+namespace ressort::panel {
 namespace {
 
 @arrays@
@@ -37,5 +37,5 @@ std::span<const PageFile> page_files() {
   return files;
 }
 
-}  // namespace ressort
+}  // namespace ressort::panel
 ]] @ONLY)

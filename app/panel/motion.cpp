@@ -3,7 +3,7 @@
 #include <bit>
 #include <vector>
 
-namespace ressort {
+namespace ressort::panel {
 namespace {
 
 constexpr std::size_t most_pictures = 4;  // of engines that are on their way, or on their way out
@@ -76,4 +76,4 @@ std::string MotionFeed::pack(const MotionFrame& frame) {
   return bytes;
 }
 
-}  // namespace ressort
+}  // namespace ressort::panel

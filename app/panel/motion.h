@@ -10,7 +10,7 @@
 #include "app/panel/picture.h"
 #include "app/realtime/process.h"
 
-namespace ressort {
+namespace ressort::panel {
 
 class MotionFeed {
  public:
@@ -46,4 +46,4 @@ class MotionFeed {
   std::uint32_t shown_ = 0;  // picture of the newest frame
 };
 
-}  // namespace ressort
+}  // namespace ressort::panel

@@ -6,7 +6,7 @@
 
 #include "app/control/registry.h"
 
-namespace ressort {
+namespace ressort::panel {
 namespace {
 
 using nlohmann::json;
@@ -184,4 +184,4 @@ std::string osc_host_info(std::optional<int> osc_port) {
   return out.dump();
 }
 
-}  // namespace ressort
+}  // namespace ressort::panel

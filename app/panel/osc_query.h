@@ -9,7 +9,7 @@
 
 #include "app/session/session.h"
 
-namespace ressort {
+namespace ressort::panel {
 
 // The node at a path, with all that is below it, or one of its attributes, if that is not empty.
 struct OscQueryAnswer {
@@ -21,4 +21,4 @@ OscQueryAnswer osc_query(const Session& session, std::string_view path, std::str
 // Of HOST_INFO; without a port OSC is not heard by UDP.
 std::string osc_host_info(std::optional<int> osc_port);
 
-}  // namespace ressort
+}  // namespace ressort::panel

@@ -4,7 +4,9 @@
 #include <span>
 #include <string_view>
 
-namespace ressort {
+#include "app/rooms.h"
+
+namespace ressort::panel {
 
 struct PageFile {
   std::string_view path;  // "/panel.js"
@@ -13,4 +15,4 @@ struct PageFile {
 };
 std::span<const PageFile> page_files();
 
-}  // namespace ressort
+}  // namespace ressort::panel

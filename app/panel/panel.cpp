@@ -20,7 +20,7 @@
 #include "app/panel/state.h"
 #include "app/text.h"
 
-namespace ressort {
+namespace ressort::panel {
 namespace {
 
 using Request = httplib::Request;
@@ -496,4 +496,4 @@ void WebPanel::tell(const std::string& news) {
   server_->news->add(news);
 }
 
-}  // namespace ressort
+}  // namespace ressort::panel

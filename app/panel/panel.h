@@ -19,7 +19,7 @@
 #include "app/panel/motion.h"
 #include "app/session/session.h"
 
-namespace ressort {
+namespace ressort::panel {
 
 struct PanelOptions {
   std::string bind_address = "127.0.0.1";
@@ -52,4 +52,4 @@ class WebPanel {
   std::unique_ptr<Server> server_;
 };
 
-}  // namespace ressort
+}  // namespace ressort::panel

@@ -10,7 +10,7 @@
 #include "core/kernels/taps.h"
 #include "core/kernels/waveguides/rails.h"
 
-namespace ressort {
+namespace ressort::panel {
 namespace {
 
 constexpr std::size_t most_samples = 1 << 16;  // of waves, that the audio thread adds up for a look
@@ -241,4 +241,4 @@ void find_positions(const Picture& picture, const MotionFrame& frame, std::span<
   }
 }
 
-}  // namespace ressort
+}  // namespace ressort::panel

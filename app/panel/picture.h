@@ -12,7 +12,7 @@
 #include "core/model/network.h"
 #include "core/result.h"
 
-namespace ressort {
+namespace ressort::panel {
 
 inline constexpr std::size_t most_dots = 2000;
 
@@ -81,4 +81,4 @@ std::string network_json(const Picture& picture);
 Result<std::string> modes_json(const Picture& picture, std::span<const double> parameters,
                                double rate_hz, std::size_t count, const Progress& progress);
 
-}  // namespace ressort
+}  // namespace ressort::panel

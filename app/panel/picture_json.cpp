@@ -14,7 +14,7 @@
 #include "core/laws/laws.h"
 #include "core/model/topology.h"
 
-namespace ressort {
+namespace ressort::panel {
 namespace {
 
 using nlohmann::json;
@@ -400,4 +400,4 @@ Result<std::string> modes_json(const Picture& picture, std::span<const double> p
   return json{{"modes", modes}, {"linear", found->is_linear()}}.dump();
 }
 
-}  // namespace ressort
+}  // namespace ressort::panel

@@ -10,7 +10,7 @@
 #include "app/session/files.h"
 #include "core/gesture.h"
 
-namespace ressort {
+namespace ressort::panel {
 namespace {
 
 using nlohmann::json;
@@ -157,4 +157,4 @@ std::string Changes::since_last(const Session::Present& now) {
   return events;
 }
 
-}  // namespace ressort
+}  // namespace ressort::panel

@@ -9,7 +9,7 @@
 
 #include "app/session/session.h"
 
-namespace ressort {
+namespace ressort::panel {
 
 // As /describe of OSC, and what a page needs besides: {"name", "serial", "addresses": [{"address",
 // "arguments", "does"}], "parameters": [{"name", "value", "minimum", "maximum", "lowest",
@@ -34,4 +34,4 @@ class Changes {
 std::string server_event(std::string_view name, const std::string& data);
 std::string quoted(const std::string& text);  // as JSON
 
-}  // namespace ressort
+}  // namespace ressort::panel

@@ -5,9 +5,11 @@
 
 #if defined(__SSE2__)
 #include <immintrin.h>
+
+#include "app/rooms.h"
 #endif
 
-namespace ressort {
+namespace ressort::realtime {
 
 // Numbers too small to hear can cost a hundred times what others cost; they are taken for 0 while
 // this lives, in this thread.
@@ -37,4 +39,4 @@ class DenormalsFlushed {
 #endif
 };
 
-}  // namespace ressort
+}  // namespace ressort::realtime

@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-namespace ressort {
+namespace ressort::realtime {
 namespace {
 
 // Where voices gave way and the load stayed above this share of what it was, they cost nothing.
@@ -92,4 +92,4 @@ void DspLoad::forget() {
   is_new_ = false;
 }
 
-}  // namespace ressort
+}  // namespace ressort::realtime

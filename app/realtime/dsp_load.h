@@ -5,7 +5,9 @@
 #include <cstddef>
 #include <optional>
 
-namespace ressort {
+#include "app/rooms.h"
+
+namespace ressort::realtime {
 
 // What one block says is not believed: the machine holds up a thread now and then, whatever it
 // plays. What lasts is the median of the last spans, and voices give way to that alone.
@@ -54,4 +56,4 @@ class DspLoad {
   double waits_s_ = 0.0;  // until voices may give way again
 };
 
-}  // namespace ressort
+}  // namespace ressort::realtime

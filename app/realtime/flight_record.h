@@ -4,9 +4,10 @@
 
 #include <cstdint>
 
+#include "app/rooms.h"
 #include "core/engine/event.h"
 
-namespace ressort {
+namespace ressort::realtime {
 
 struct FlightRecord {
   enum class Kind : std::uint8_t {
@@ -25,4 +26,4 @@ struct FlightRecord {
   Event event;
 };
 
-}  // namespace ressort
+}  // namespace ressort::realtime

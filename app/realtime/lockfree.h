@@ -11,7 +11,9 @@
 #include <type_traits>
 #include <vector>
 
-namespace ressort {
+#include "app/rooms.h"
+
+namespace ressort::realtime {
 
 // Hands one heap object at a time to the audio thread and takes it back to be destroyed
 // elsewhere. One offering thread, one audio thread.
@@ -323,4 +325,4 @@ class Board {
   std::array<std::atomic<std::uint64_t>, std::tuple_size_v<Words>> words_{};
 };
 
-}  // namespace ressort
+}  // namespace ressort::realtime

@@ -4,7 +4,7 @@
 #include <functional>
 #include <numeric>
 
-namespace ressort {
+namespace ressort::realtime {
 namespace {
 
 constexpr std::size_t dump_head = 21;  // bytes before the keys of a bulk dump of a tuning
@@ -199,4 +199,4 @@ void MidiReader::end_packet() {
   have_ = 0;
 }
 
-}  // namespace ressort
+}  // namespace ressort::realtime

@@ -5,9 +5,10 @@
 #include <cstdint>
 #include <span>
 
+#include "app/rooms.h"
 #include "core/engine/event.h"
 
-namespace ressort {
+namespace ressort::realtime {
 
 // Turns packets of MIDI bytes into events. Knows running status, several messages in a packet,
 // real-time bytes in between and, of system exclusive, the tunings of the MIDI Tuning Standard,
@@ -58,4 +59,4 @@ class MidiReader {
   std::uint64_t malformed_ = 0;
 };
 
-}  // namespace ressort
+}  // namespace ressort::realtime

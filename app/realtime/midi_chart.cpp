@@ -1,6 +1,6 @@
 #include "app/realtime/midi_chart.h"
 
-namespace ressort {
+namespace ressort::realtime {
 namespace {
 
 // clang-format off
@@ -54,4 +54,4 @@ std::span<const MidiChartRow> midi_chart() {
   return rows;
 }
 
-}  // namespace ressort
+}  // namespace ressort::realtime

@@ -4,7 +4,9 @@
 #include <span>
 #include <string_view>
 
-namespace ressort {
+#include "app/rooms.h"
+
+namespace ressort::realtime {
 
 struct MidiChartRow {
   std::string_view message;
@@ -16,4 +18,4 @@ struct MidiChartRow {
 // What `ressort reference midi` prints. [any thread]
 std::span<const MidiChartRow> midi_chart();
 
-}  // namespace ressort
+}  // namespace ressort::realtime

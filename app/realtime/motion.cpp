@@ -5,7 +5,7 @@
 
 #include "app/realtime/process.h"
 
-namespace ressort {
+namespace ressort::realtime {
 
 void Process::hear(std::size_t channels, std::size_t frames) {
   const double share = channels > 0 ? 1.0 / static_cast<double>(channels) : 0.0;
@@ -62,4 +62,4 @@ void Process::show() {
   looked_until_ = frame_ + static_cast<std::int64_t>(looked_for_s * rate_hz_);
 }
 
-}  // namespace ressort
+}  // namespace ressort::realtime

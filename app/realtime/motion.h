@@ -5,7 +5,9 @@
 #include <cstdint>
 #include <vector>
 
-namespace ressort {
+#include "app/rooms.h"
+
+namespace ressort::realtime {
 
 struct MotionFrame {
   static constexpr std::size_t most_numbers = 8192;
@@ -18,4 +20,4 @@ struct MotionFrame {
   std::array<float, heard_samples> heard{};  // the last of the output, the mean of all channels
 };
 
-}  // namespace ressort
+}  // namespace ressort::realtime

@@ -9,7 +9,7 @@
 
 #include "app/realtime/process.h"
 
-namespace ressort {
+namespace ressort::realtime {
 
 // Whoever asks sees what was since he asked last; OSC's clients, and the panel's, are one.
 enum class Asker : std::uint8_t { console, osc, panel };
@@ -41,4 +41,4 @@ class Peaks {
   std::array<Seen, 3> seen_;
 };
 
-}  // namespace ressort
+}  // namespace ressort::realtime

@@ -6,7 +6,7 @@
 
 #include "app/realtime/denormals.h"
 
-namespace ressort {
+namespace ressort::realtime {
 namespace {
 
 // The earliest on top of the heap; of equals the one that came first.
@@ -564,4 +564,4 @@ void Process::record(std::size_t channels, std::size_t frames, bool records, boo
   }
 }
 
-}  // namespace ressort
+}  // namespace ressort::realtime

@@ -16,7 +16,7 @@
 #include "core/engine/mixing/dc_blocker.h"
 #include "core/engine/mixing/limiter.h"
 
-namespace ressort {
+namespace ressort::realtime {
 
 // An engine and the number that events for it carry. One of the same number, unless it is 0, goes
 // on where the other is, in the same sample.
@@ -283,4 +283,4 @@ struct Process {
   std::int64_t strobed_until_ = 0;  // until this frame
 };
 
-}  // namespace ressort
+}  // namespace ressort::realtime

@@ -4,7 +4,7 @@
 
 #include "app/realtime/process.h"
 
-namespace ressort {
+namespace ressort::realtime {
 
 void Process::keep(const FlightRecord& record) {
   if (!keeps_flight.is_raised()) {
@@ -77,4 +77,4 @@ void Process::repeat(const FlightRecord& record) {
   }
 }
 
-}  // namespace ressort
+}  // namespace ressort::realtime

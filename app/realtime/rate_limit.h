@@ -7,7 +7,9 @@
 #include <string>
 #include <utility>
 
-namespace ressort {
+#include "app/rooms.h"
+
+namespace ressort::realtime {
 
 // The first time is told at once; what follows within the interval is counted, and told at its end.
 class RateLimit {
@@ -38,4 +40,4 @@ class RateLimit {
   std::uint64_t times_ = 0;
 };
 
-}  // namespace ressort
+}  // namespace ressort::realtime

@@ -7,7 +7,7 @@
 
 #include "app/realtime/denormals.h"
 
-namespace ressort {
+namespace ressort::realtime {
 namespace {
 
 using std::chrono::nanoseconds;
@@ -213,4 +213,4 @@ std::size_t core_count() {
   return std::max(1u, std::thread::hardware_concurrency());
 }
 
-}  // namespace ressort
+}  // namespace ressort::realtime

@@ -9,7 +9,7 @@
 #include "app/realtime/lockfree.h"
 #include "core/kernels/domains/executor.h"
 
-namespace ressort {
+namespace ressort::realtime {
 
 class ThreadPool final : public Executor {
  public:
@@ -44,4 +44,4 @@ class ThreadPool final : public Executor {
 // How many threads this machine runs at once.
 std::size_t core_count();
 
-}  // namespace ressort
+}  // namespace ressort::realtime

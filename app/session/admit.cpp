@@ -4,7 +4,7 @@
 
 #include "app/session/files.h"
 
-namespace ressort {
+namespace ressort::session {
 namespace {
 
 Finding in_model(const Scene& scene, const Error& error, Severity severity) {
@@ -30,7 +30,7 @@ bool Admission::is_granted() const {
 
 Admission ask_to_play(const Scene& scene, const CompileOptions& options, bool is_strict) {
   Admission admission;
-  auto compiled = compile(scene.network, scene.preset, options);
+  auto compiled = compile_network(scene.network, scene.preset, options);
   if (!compiled) {
     // What does not fit the preset was not read, so this is the model's.
     admission.findings.push_back(in_model(scene, compiled.error(), Severity::error));
@@ -84,4 +84,4 @@ Result<Compiled> admit(const Scene& scene, const CompileOptions& options,
   return *std::move(admission.compiled);
 }
 
-}  // namespace ressort
+}  // namespace ressort::session

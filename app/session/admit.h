@@ -8,16 +8,16 @@
 #include "app/session/loader.h"
 #include "core/compile/compile.h"
 
-namespace ressort {
+namespace ressort::session {
 
 // What came of a scene, for whoever plays, renders or checks it.
 struct Admission {
-  std::optional<Compiled> compiled;  // whatever the findings say; nothing where compile() fails
+  std::optional<Compiled> compiled;  // whatever the findings say; nothing if it cannot be compiled
   std::vector<Finding> findings;     // an error among them: it shall not sound
   bool is_granted() const;
 };
 
-// Refuses, with file, line and column, where compile() fails, and where the model is not stable as
+// Refuses, with file, line and column, what cannot be compiled, and what is not stable as
 // it starts unless the options say to force it. Tells what is narrowed, forced or not proved, and
 // what `is_strict` refuses: a bow that is too strong for its steps, and what a budget promises and
 // is not kept, but not while a better form is yet to be looked for. [any thread but audio]
@@ -28,4 +28,4 @@ Admission ask_to_play(const Scene& scene, const CompileOptions& options, bool is
 Result<Compiled> admit(const Scene& scene, const CompileOptions& options,
                        std::vector<std::string>& warnings, bool is_strict = false);
 
-}  // namespace ressort
+}  // namespace ressort::session

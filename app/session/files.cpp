@@ -14,7 +14,7 @@
 #include "app/exit_code.h"
 #include "app/text.h"
 
-namespace ressort {
+namespace ressort::session {
 namespace {
 
 namespace fs = std::filesystem;
@@ -325,4 +325,4 @@ Result<std::string> path_of_flight(const std::string& name) {
   return users_file(name, "flight", ".ressort");
 }
 
-}  // namespace ressort
+}  // namespace ressort::session

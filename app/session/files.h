@@ -8,7 +8,7 @@
 #include "app/session/new_file.h"
 #include "core/result.h"
 
-namespace ressort {
+namespace ressort::session {
 
 // A whole text file of at most `max_bytes`, without the byte order mark that it may begin with. The
 // error says what is in the way: missing, a directory, too large, unreadable, UTF-16.
@@ -64,4 +64,4 @@ std::string cache_folder();
 // its beginning, 1 to 64 of them.
 Result<std::string> path_to_save(const std::string& name);
 
-}  // namespace ressort
+}  // namespace ressort::session

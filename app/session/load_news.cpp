@@ -3,7 +3,7 @@
 #include <new>
 #include <utility>
 
-namespace ressort {
+namespace ressort::session {
 
 LoadNews::LoadNews(std::string name, Tell tell) : name_(std::move(name)), tell_(std::move(tell)) {}
 
@@ -23,4 +23,4 @@ std::string describe(const std::exception& error) {
              : error.what();
 }
 
-}  // namespace ressort
+}  // namespace ressort::session

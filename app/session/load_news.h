@@ -7,7 +7,9 @@
 #include <string>
 #include <string_view>
 
-namespace ressort {
+#include "app/rooms.h"
+
+namespace ressort::session {
 
 // Tells what is being done with something, after a second and then every two. [one thread]
 class LoadNews {
@@ -28,4 +30,4 @@ class LoadNews {
 // What went wrong, for people: memory has a sentence of its own.
 std::string describe(const std::exception& error);
 
-}  // namespace ressort
+}  // namespace ressort::session

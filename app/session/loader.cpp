@@ -11,7 +11,7 @@
 #include "core/model/preset/fit.h"
 #include "core/model/tuning/scala.h"
 
-namespace ressort {
+namespace ressort::session {
 namespace {
 
 namespace fs = std::filesystem;
@@ -178,7 +178,7 @@ class SceneReader {
     if (!text) {
       return fail("", "", text.error());
     }
-    ParsedPreset read = parse_preset(*text, is_reserved);
+    ParsedPreset read = parse_preset(*text, control::is_reserved);
     for (const Error& error : read.errors) {
       fail(scene_.path, *text, error);
     }
@@ -301,7 +301,7 @@ class SceneReader {
   Result<Scene> read_other(const std::string& name) {
     const auto path = find_beside("presets", name + ".toml");
     if (!path) {
-      return Error{"the preset " + ressort::quoted(name) +
+      return Error{"the preset " + model::quoted(name) +
                    " is neither beside this one nor among the "
                    "program's own"};
     }
@@ -528,4 +528,4 @@ Result<Scene> scene_of(Reading&& reading) {
   return Error{std::move(all)};
 }
 
-}  // namespace ressort
+}  // namespace ressort::session

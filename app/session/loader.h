@@ -13,7 +13,7 @@
 #include "core/progress.h"
 #include "core/result.h"
 
-namespace ressort {
+namespace ressort::session {
 
 // Something to say about a file.
 struct Finding {
@@ -115,4 +115,4 @@ Reading read_scene(const std::string& name, const SceneOptions& options);
 Result<Scene> scene_of(Reading&& reading);
 Result<Scene> load_scene(const std::string& name, const SceneOptions& options);
 
-}  // namespace ressort
+}  // namespace ressort::session

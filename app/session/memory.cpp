@@ -8,7 +8,7 @@
 #include <limits>
 #include <string>
 
-namespace ressort {
+namespace ressort::session {
 namespace {
 
 constexpr auto unknown = std::numeric_limits<std::uint64_t>::max();
@@ -67,4 +67,4 @@ std::uint64_t free_memory_bytes() {
   return std::min({left_by_machine(), left_by_limit(), left_by_group()});
 }
 
-}  // namespace ressort
+}  // namespace ressort::session

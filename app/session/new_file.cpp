@@ -10,7 +10,7 @@
 #include <system_error>
 #include <utility>
 
-namespace ressort {
+namespace ressort::session {
 namespace {
 
 namespace fs = std::filesystem;
@@ -150,4 +150,4 @@ Result<Done> spare(const std::string& output, std::span<const std::string> read)
   return Done{};
 }
 
-}  // namespace ressort
+}  // namespace ressort::session

@@ -5,9 +5,10 @@
 #include <span>
 #include <string>
 
+#include "app/rooms.h"
 #include "core/result.h"
 
-namespace ressort {
+namespace ressort::session {
 
 enum class Existing { refuse, replace };  // what a file that is already there is for a new one
 
@@ -40,4 +41,4 @@ class NewFile {
 // passed over.
 Result<Done> spare(const std::string& output, std::span<const std::string> read);
 
-}  // namespace ressort
+}  // namespace ressort::session

@@ -10,7 +10,7 @@
 #include "app/session/sound_file.h"
 #include "app/text.h"
 
-namespace ressort {
+namespace ressort::session {
 namespace {
 
 constexpr std::chrono::milliseconds poll_time{10};  // the ring holds seconds
@@ -186,4 +186,4 @@ Result<std::string> Recorder::stop() {
                     : std::to_string(lost) + (lost == 1 ? " piece lost" : " pieces lost"));
 }
 
-}  // namespace ressort
+}  // namespace ressort::session

@@ -9,7 +9,7 @@
 #include "app/session/new_file.h"
 #include "core/result.h"
 
-namespace ressort {
+namespace ressort::session {
 
 class Recorder {
  public:
@@ -32,4 +32,4 @@ class Recorder {
   std::unique_ptr<Work> work_;
 };
 
-}  // namespace ressort
+}  // namespace ressort::session

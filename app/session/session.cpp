@@ -16,7 +16,7 @@
 #include "core/laws/laws.h"
 #include "core/model/topology.h"
 
-namespace ressort {
+namespace ressort::session {
 namespace {
 
 constexpr double least_lateness_s = 0.05;  // to be told of: what is less is hardly heard
@@ -261,7 +261,7 @@ void Session::improve() {
     return !was_outdated;
   });
   options.most_bytes = free_memory_bytes();
-  auto compiled = compile(source.network, source.preset, options);
+  auto compiled = compile_network(source.network, source.preset, options);
   if (!compiled) {
     if (was_outdated) {
       source_ = source;  // another time, if it still sounds
@@ -591,4 +591,4 @@ Result<std::shared_ptr<const Loaded>> Session::sound(const Wish& wish, Draft dra
   return std::shared_ptr<const Loaded>(std::move(loaded));
 }
 
-}  // namespace ressort
+}  // namespace ressort::session

@@ -25,7 +25,7 @@
 #include "core/analysis/modes/tune.h"
 #include "core/compile/compile.h"
 
-namespace ressort {
+namespace ressort::session {
 
 struct SessionOptions {
   CompileOptions compile;              // its rate is the backend's
@@ -323,4 +323,4 @@ class Session {
   std::thread worker_;  // last, so that it ends first
 };
 
-}  // namespace ressort
+}  // namespace ressort::session

@@ -16,7 +16,7 @@
 
 #include "app/text.h"
 
-namespace ressort {
+namespace ressort::session {
 namespace {
 
 namespace fs = std::filesystem;
@@ -307,4 +307,4 @@ Result<Sound> read_sound(const std::string& path) {
   return sound;
 }
 
-}  // namespace ressort
+}  // namespace ressort::session

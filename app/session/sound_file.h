@@ -10,7 +10,7 @@
 #include "app/session/new_file.h"
 #include "core/result.h"
 
-namespace ressort {
+namespace ressort::session {
 
 enum class SampleFormat { float32, float64, pcm24 };
 
@@ -78,4 +78,4 @@ class SoundWriter {
   std::unique_ptr<File> file_;
 };
 
-}  // namespace ressort
+}  // namespace ressort::session

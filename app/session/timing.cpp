@@ -11,7 +11,7 @@
 #include "app/text.h"
 #include "core/kernels/kernel.h"
 
-namespace ressort {
+namespace ressort::session {
 namespace {
 
 using Clock = std::chrono::steady_clock;
@@ -116,4 +116,4 @@ std::string ways_to_make_room(int voices, Precision precision) {
   return joined(ways, ", ");
 }
 
-}  // namespace ressort
+}  // namespace ressort::session

@@ -3,9 +3,10 @@
 
 #include <string>
 
+#include "app/rooms.h"
 #include "core/compile/compile.h"
 
-namespace ressort {
+namespace ressort::session {
 
 // Fills Part::measured_ns: each part's kernels for all voices, at rest and undisturbed, the fastest
 // of a few blocks. Takes a few milliseconds in all. [any thread but audio]
@@ -18,4 +19,4 @@ std::string too_much(const Plan& plan, int voices, double rate_hz, Precision pre
 // What makes room for the sound, fewer voices if so many fit: "-p 3, a lower rate, ...".
 std::string ways_to_make_room(int voices, Precision precision);
 
-}  // namespace ressort
+}  // namespace ressort::session

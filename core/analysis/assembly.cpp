@@ -6,7 +6,7 @@
 #include "core/analysis/places.h"
 #include "core/sampled_mode.h"
 
-namespace ressort {
+namespace ressort::analysis {
 namespace {
 
 constexpr std::uint64_t most_wandering = 4'000'000;  // terms
@@ -269,4 +269,4 @@ Load lowest_load(const Network& network, const Assembly::Term& term,
   return load(slopes.pull, slopes.damping);
 }
 
-}  // namespace ressort
+}  // namespace ressort::analysis

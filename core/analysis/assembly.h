@@ -14,7 +14,7 @@
 #include "core/analysis/interval.h"
 #include "core/model/network.h"
 
-namespace ressort {
+namespace ressort::analysis {
 
 inline constexpr std::uint32_t held_row = 0xffffffffu;  // of what does not move
 
@@ -75,4 +75,4 @@ Load highest_load(const Network& network, const Assembly::Term& term,
 Load lowest_load(const Network& network, const Assembly::Term& term,
                  std::span<const Range> arguments, double rate_ratio);
 
-}  // namespace ressort
+}  // namespace ressort::analysis

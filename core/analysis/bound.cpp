@@ -8,7 +8,7 @@
 #include "core/analysis/places.h"
 #include "core/analysis/stability.h"
 
-namespace ressort {
+namespace ressort::analysis {
 namespace {
 
 // 4 is the limit; a little below it modes near the Nyquist frequency still decay.
@@ -165,4 +165,4 @@ double highest_stiffness_factor(const Network& network, const ParameterBox& box,
   return NetworkBound(network, box, rate_ratio).factor();
 }
 
-}  // namespace ressort
+}  // namespace ressort::analysis

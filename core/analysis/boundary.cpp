@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-namespace ressort {
+namespace ressort::analysis {
 namespace {
 
 constexpr double limit_of_scheme = 4.0;
@@ -90,7 +90,7 @@ bool BoundaryFinder::factors(const Weights& weights, double limit) {
   if (!is_exact_ || !is_usable(weights)) {
     return false;
   }
-  const std::vector<double> diagonal = ressort::diagonal(weights, limit);
+  const std::vector<double> diagonal = analysis::diagonal(weights, limit);
   // What the diagonal refuses needs no factorisation.
   std::vector<double> rest = diagonal;
   for (std::size_t t = 0; t < assembly_.terms.size(); ++t) {
@@ -247,4 +247,4 @@ std::optional<Boundary> BoundaryFinder::outwards(const WeightLine& line, double 
   return between(line, before, safe + step);
 }
 
-}  // namespace ressort
+}  // namespace ressort::analysis

@@ -8,7 +8,7 @@
 #include "core/analysis/assembly.h"
 #include "core/analysis/definite.h"
 
-namespace ressort {
+namespace ressort::analysis {
 
 // What stability depends on, at one point.
 struct Weights {
@@ -80,4 +80,4 @@ class BoundaryFinder {
   Definite definite_;
 };
 
-}  // namespace ressort
+}  // namespace ressort::analysis

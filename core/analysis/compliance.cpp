@@ -8,7 +8,7 @@
 #include "core/analysis/places.h"
 #include "core/groups.h"
 
-namespace ressort {
+namespace ressort::analysis {
 namespace {
 
 // Which rows hang on something that does not move.
@@ -111,4 +111,4 @@ std::optional<std::vector<double>> compliances(const Network& network, const Par
   return found;
 }
 
-}  // namespace ressort
+}  // namespace ressort::analysis

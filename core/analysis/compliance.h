@@ -9,7 +9,7 @@
 #include "core/model/network.h"
 #include "core/progress.h"
 
-namespace ressort {
+namespace ressort::analysis {
 
 inline constexpr std::size_t most_compliant_masses = 20'000;  // beyond, nobody waits for it
 
@@ -24,4 +24,4 @@ std::optional<std::vector<double>> compliances(const Network& network, const Par
                                                std::span<const std::uint32_t> masses,
                                                const Progress& progress = {});
 
-}  // namespace ressort
+}  // namespace ressort::analysis

@@ -11,7 +11,7 @@
 #include "core/linear_algebra/eigen.h"
 #include "core/model/topology.h"
 
-namespace ressort {
+namespace ressort::analysis {
 namespace {
 
 using Complex = std::complex<double>;
@@ -407,4 +407,4 @@ std::vector<std::complex<double>> factors_between(const std::vector<std::vector<
                                                    : std::vector<std::complex<double>>();
 }
 
-}  // namespace ressort
+}  // namespace ressort::analysis

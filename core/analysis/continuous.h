@@ -9,7 +9,7 @@
 
 #include "core/model/network.h"
 
-namespace ressort {
+namespace ressort::analysis {
 
 // A partial: e^(pole t).
 struct ContinuousMode {
@@ -58,4 +58,4 @@ std::optional<Continuous> solve_continuous(const Network& network,
 std::vector<std::complex<double>> factors_between(const std::vector<std::vector<double>>& before,
                                                   const std::vector<std::vector<double>>& after);
 
-}  // namespace ressort
+}  // namespace ressort::analysis

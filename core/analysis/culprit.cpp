@@ -7,7 +7,7 @@
 #include "core/analysis/proofs.h"
 #include "core/model/language/expression.h"
 
-namespace ressort {
+namespace ressort::analysis {
 namespace {
 
 // Where the argument of a link's stiffness or damping stands; of two stiffnesses the greater, or
@@ -260,4 +260,4 @@ Error complaint(const Certificate& certificate) {
   return {std::move(text), culprit.location.line, culprit.location.column};
 }
 
-}  // namespace ressort
+}  // namespace ressort::analysis

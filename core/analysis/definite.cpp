@@ -8,7 +8,7 @@
 
 #include "core/linear_algebra/cholesky.h"
 
-namespace ressort {
+namespace ressort::analysis {
 namespace {
 
 // Calls `use(row, column, share)` for what a term has in the lower triangle.
@@ -173,4 +173,4 @@ void Definite::solve(std::vector<double>& x) const {
   matrix_->solver.solve(x.data());
 }
 
-}  // namespace ressort
+}  // namespace ressort::analysis

@@ -9,7 +9,7 @@
 #include "core/analysis/assembly.h"
 #include "core/progress.h"
 
-namespace ressort {
+namespace ressort::analysis {
 
 // D - sum over terms of w g gT by a sparse Cholesky factorisation. Where the zeros are is found out
 // at the first use and kept. O(rows) for strings, about O(rows^1.5) for meshes. Keeps a reference.
@@ -48,4 +48,4 @@ class Definite {
   std::vector<std::uint32_t> part_;  // [row] a row of the same part of what does not wander
 };
 
-}  // namespace ressort
+}  // namespace ressort::analysis

@@ -7,7 +7,7 @@
 #include <limits>
 #include <numbers>
 
-namespace ressort {
+namespace ressort::analysis {
 namespace {
 
 constexpr double infinity = std::numeric_limits<double>::infinity();
@@ -202,4 +202,4 @@ bool is_affine(std::span<const Step> formula, std::uint32_t parameter) {
   return degree < curved;
 }
 
-}  // namespace ressort
+}  // namespace ressort::analysis

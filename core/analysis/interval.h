@@ -6,8 +6,9 @@
 #include <vector>
 
 #include "core/formula.h"
+#include "core/rooms.h"
 
-namespace ressort {
+namespace ressort::analysis {
 
 struct Range {
   double lowest = 0.0;
@@ -28,4 +29,4 @@ Range formula_range(std::span<const Step> formula, const ParameterBox& box);
 // Is it a straight line along the parameter, whatever the others are?
 bool is_affine(std::span<const Step> formula, std::uint32_t parameter);
 
-}  // namespace ressort
+}  // namespace ressort::analysis

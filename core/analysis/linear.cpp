@@ -10,7 +10,7 @@
 #include "core/linear_algebra/cholesky.h"
 #include "core/linear_algebra/eigen.h"
 
-namespace ressort {
+namespace ressort::analysis {
 namespace {
 
 constexpr int dense_size = 64;      // below this a dense solver is faster and never fails
@@ -437,4 +437,4 @@ std::optional<Mode> lowest_mode(const Network& network, std::span<const double> 
   return found ? std::optional(found->mode) : std::nullopt;
 }
 
-}  // namespace ressort
+}  // namespace ressort::analysis

@@ -8,7 +8,7 @@
 #include "core/model/network.h"
 #include "core/progress.h"
 
-namespace ressort {
+namespace ressort::analysis {
 
 // Springs, dampers and oscillators only, at places that stay.
 bool is_linear(const Network& network);
@@ -49,4 +49,4 @@ std::optional<LowestShapes> lowest_shapes(const Network& network,
                                           std::span<const double> parameters,
                                           const Progress& progress = {}, int number = 1);
 
-}  // namespace ressort
+}  // namespace ressort::analysis

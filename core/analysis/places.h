@@ -6,7 +6,7 @@
 
 #include "core/model/network.h"
 
-namespace ressort {
+namespace ressort::analysis {
 
 // Is it a place whose coordinates may change?
 inline bool is_live_place(const Network& network, std::uint32_t mass) {
@@ -74,4 +74,4 @@ void each_share(const Network& network, std::uint32_t mass, Use&& use,
   }
 }
 
-}  // namespace ressort
+}  // namespace ressort::analysis

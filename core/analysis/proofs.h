@@ -9,7 +9,7 @@
 #include "core/analysis/boundary.h"
 #include "core/analysis/stability.h"
 
-namespace ressort {
+namespace ressort::analysis {
 
 class Proofs {
  public:
@@ -70,4 +70,4 @@ class Proofs {
   BoundaryFinder boundary_;
 };
 
-}  // namespace ressort
+}  // namespace ressort::analysis

@@ -8,7 +8,7 @@
 #include "core/laws/laws.h"
 #include "core/model/topology.h"
 
-namespace ressort {
+namespace ressort::analysis {
 namespace {
 
 constexpr double unbounded = std::numeric_limits<double>::infinity();
@@ -353,4 +353,4 @@ double Stability::stiffness_factor(const ParameterBox& box) {
   return proofs_->stiffness_factor(box);
 }
 
-}  // namespace ressort
+}  // namespace ressort::analysis

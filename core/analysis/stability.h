@@ -20,7 +20,7 @@
 #include "core/progress.h"
 #include "core/result.h"
 
-namespace ressort {
+namespace ressort::analysis {
 
 // The factor on every stiffness up to which the explicit scheme is certainly stable, anywhere in
 // the box: the edge bound max over links of (d_i/m_i + d_j/m_j) < 3.92, with d the sum of k + 2z
@@ -126,4 +126,4 @@ class Stability {
   std::unique_ptr<Proofs> proofs_;
 };
 
-}  // namespace ressort
+}  // namespace ressort::analysis

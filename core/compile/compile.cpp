@@ -18,7 +18,7 @@
 #include "core/model/preset/fit.h"
 #include "core/model/topology.h"
 
-namespace ressort {
+namespace ressort::compile {
 namespace {
 
 // What is asked for, throughout.
@@ -451,8 +451,8 @@ Result<Compiled> compile_by_stages(const Request& request) {
 
 }  // namespace
 
-Result<Compiled> compile(const Network& network, const Preset& preset,
-                         const CompileOptions& options) {
+Result<Compiled> compile_network(const Network& network, const Preset& preset,
+                                 const CompileOptions& options) {
   try {
     const Network marked = preset.fixed.empty() ? Network() : with_fixed(network, preset);
     const Network& written = preset.fixed.empty() ? network : marked;
@@ -474,4 +474,4 @@ Result<Compiled> compile(const Network& network, const Preset& preset,
   }
 }
 
-}  // namespace ressort
+}  // namespace ressort::compile

@@ -18,7 +18,7 @@
 #include "core/progress.h"
 #include "core/result.h"
 
-namespace ressort {
+namespace ressort::compile {
 
 // A larger network is played as it is written: finding its lowest mode would take too long.
 inline constexpr std::size_t most_tuned_masses = 150'000;
@@ -56,7 +56,7 @@ struct Compiled {
 // preset's line, where the preset does not fit (see misfits()); with the model's line where an
 // argument of the model is no finite number as it starts; and where memory is short.
 // [any thread but audio]
-Result<Compiled> compile(const Network& network, const Preset& preset,
-                         const CompileOptions& options);
+Result<Compiled> compile_network(const Network& network, const Preset& preset,
+                                 const CompileOptions& options);
 
-}  // namespace ressort
+}  // namespace ressort::compile

@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-namespace ressort {
+namespace ressort::compile {
 namespace {
 
 class Culler {
@@ -143,4 +143,4 @@ std::string describe(const Culled& culled) {
   return text;
 }
 
-}  // namespace ressort
+}  // namespace ressort::compile

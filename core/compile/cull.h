@@ -10,7 +10,7 @@
 #include "core/model/network.h"
 #include "core/progress.h"
 
-namespace ressort {
+namespace ressort::compile {
 
 // Joins every place on a macro that counts with all of the macro's nodes, and places on a waveguide
 // with each other; `meet` hears of each node once.
@@ -55,4 +55,4 @@ Culled cull(const Network& network, const Progress& progress = {});
 // "12 masses that no output hears, 1 link that exerts nothing"; empty if nothing is left out.
 std::string describe(const Culled& culled);
 
-}  // namespace ressort
+}  // namespace ressort::compile

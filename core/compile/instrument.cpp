@@ -8,7 +8,7 @@
 #include "core/model/preset/fit.h"
 #include "core/model/topology.h"
 
-namespace ressort {
+namespace ressort::compile {
 namespace {
 
 // Of what fits the network.
@@ -282,4 +282,4 @@ Instrument make_instrument(const Network& network, const Preset& preset, const A
           .verdict = analysis.stability.verdict};
 }
 
-}  // namespace ressort
+}  // namespace ressort::compile

@@ -13,7 +13,7 @@
 #include "core/model/network.h"
 #include "core/model/preset/preset.h"
 
-namespace ressort {
+namespace ressort::compile {
 
 struct InputInfo {
   int number = 1;
@@ -91,4 +91,4 @@ std::vector<StruckInfo> find_struck(const Network& network, const Machine& machi
 // they start, "s:0.25" and "m:0.5:0.333".
 std::string struck_name(const Network& network, std::uint32_t mass);
 
-}  // namespace ressort
+}  // namespace ressort::compile

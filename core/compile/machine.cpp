@@ -8,7 +8,7 @@
 
 #include "core/model/topology.h"
 
-namespace ressort {
+namespace ressort::compile {
 namespace {
 
 constexpr std::uint32_t nowhere = 0xffffffffu;
@@ -440,4 +440,4 @@ Program make_program(const Network& network, double rate_hz, bool rescale,
   return ProgramMaker(whole, everything, rate_hz, rescale, schemes).make();
 }
 
-}  // namespace ressort
+}  // namespace ressort::compile

@@ -8,7 +8,7 @@
 #include "core/model/network.h"
 #include "core/progress.h"
 
-namespace ressort {
+namespace ressort::compile {
 
 inline constexpr std::size_t most_parts = 32;        // the smallest ones are lumped together
 inline constexpr std::size_t least_part_masses = 3;  // below, a part is not worth its own kernel
@@ -39,4 +39,4 @@ Machine make_machine(const Network& network, double rate_hz, bool rescale);
 Program make_program(const Network& network, double rate_hz, bool rescale,
                      std::span<const LinkScheme> schemes = {});
 
-}  // namespace ressort
+}  // namespace ressort::compile

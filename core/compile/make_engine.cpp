@@ -11,7 +11,7 @@
 #include "core/kernels/passive/clusters.h"
 #include "core/kernels/registry.h"
 
-namespace ressort {
+namespace ressort::compile {
 namespace {
 
 std::string in_bytes(std::uint64_t bytes) {
@@ -111,4 +111,4 @@ std::unique_ptr<Engine> make_engine(Machine machine, Playing playing, Precision 
                                   executor);
 }
 
-}  // namespace ressort
+}  // namespace ressort::compile

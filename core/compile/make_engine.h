@@ -9,7 +9,7 @@
 #include "core/progress.h"
 #include "core/result.h"
 
-namespace ressort {
+namespace ressort::compile {
 
 // About as many bytes as an engine of this machine, in its forms, takes with so many voices; within
 // a factor of two where that is much. Helpers that nobody waits for have copies. O(parts). [any
@@ -37,4 +37,4 @@ std::optional<double> find_gain(const Machine& machine, const Playing& playing, 
 std::unique_ptr<Engine> make_engine(Machine machine, Playing playing, Precision precision, Isa isa,
                                     const Progress& progress, Executor* executor);
 
-}  // namespace ressort
+}  // namespace ressort::compile

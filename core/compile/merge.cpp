@@ -12,7 +12,7 @@
 
 #include "core/laws/laws.h"
 
-namespace ressort {
+namespace ressort::compile {
 namespace {
 
 constexpr std::uint32_t nobody = 0xffffffffu;
@@ -301,4 +301,4 @@ std::string describe(const Merged& merged) {
   return text;
 }
 
-}  // namespace ressort
+}  // namespace ressort::compile

@@ -9,7 +9,7 @@
 #include "core/model/preset/budget.h"
 #include "core/progress.h"
 
-namespace ressort {
+namespace ressort::compile {
 
 // A network with fewer elements, numbered as before: what was merged into others is a ground that
 // nothing is tied to, or a link that exerts nothing. Of springs side by side stiffness and damping
@@ -36,4 +36,4 @@ std::optional<Merged> merge(const Network& network, const Budget& budget,
 // "4 springs beside others, 1 light mass between springs (0.8 cents at most)"; may be empty.
 std::string describe(const Merged& merged);
 
-}  // namespace ressort
+}  // namespace ressort::compile

@@ -9,7 +9,7 @@
 #include "core/kernels/modal/modal_body.h"
 #include "core/kernels/oversampled/oversampled_form.h"
 
-namespace ressort {
+namespace ressort::compile {
 namespace {
 
 constexpr std::uint32_t most_steps_to_reach = 8;
@@ -434,4 +434,4 @@ std::string describe(const Plan& plan) {
   return text;
 }
 
-}  // namespace ressort
+}  // namespace ressort::compile

@@ -13,7 +13,7 @@
 #include "core/model/preset/budget.h"
 #include "core/progress.h"
 
-namespace ressort {
+namespace ressort::compile {
 
 // For how many masses the eigenvectors may be sought; the time grows with the third power. A method
 // that is asked for by name is not held back by this.
@@ -80,4 +80,4 @@ std::optional<std::string> broken_promise(const Plan& plan);
 std::string describe(const std::vector<Part>& parts);
 std::string describe(const Plan& plan);
 
-}  // namespace ressort
+}  // namespace ressort::compile

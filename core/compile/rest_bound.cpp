@@ -6,7 +6,7 @@
 
 #include "core/analysis/compliance.h"
 
-namespace ressort {
+namespace ressort::compile {
 namespace {
 
 constexpr std::size_t most_places = 64;  // each takes a solution
@@ -72,4 +72,4 @@ std::vector<std::optional<RestBound>> make_rest_bounds(const Network& network,
   return bounds;
 }
 
-}  // namespace ressort
+}  // namespace ressort::compile

@@ -9,7 +9,7 @@
 #include "core/model/network.h"
 #include "core/progress.h"
 
-namespace ressort {
+namespace ressort::compile {
 
 // [part] of the machine made of this network without macros; nothing where forces are heard, where
 // something drifts, and where there is too much of it. The network has to be stable in the box.
@@ -19,4 +19,4 @@ std::vector<std::optional<RestBound>> make_rest_bounds(const Network& network,
                                                        const ParameterBox& box,
                                                        const Progress& progress = {});
 
-}  // namespace ressort
+}  // namespace ressort::compile

@@ -7,7 +7,7 @@
 #include "core/laws/laws.h"
 #include "core/model/topology.h"
 
-namespace ressort {
+namespace ressort::compile {
 namespace {
 
 // What may go wrong as published.
@@ -123,4 +123,4 @@ Network without_passive(const Network& network, std::span<const LinkScheme> sche
   return felt;
 }
 
-}  // namespace ressort
+}  // namespace ressort::compile

@@ -12,7 +12,7 @@
 #include "core/progress.h"
 #include "core/result.h"
 
-namespace ressort {
+namespace ressort::compile {
 
 struct Schemes {
   std::vector<LinkScheme> links;   // [link] of a network without macros
@@ -39,4 +39,4 @@ Schemes choose_schemes(const Network& network, const Budget& budget, const Progr
 // [any thread but audio]
 Network without_passive(const Network& network, std::span<const LinkScheme> schemes);
 
-}  // namespace ressort
+}  // namespace ressort::compile

@@ -10,7 +10,7 @@
 #include "core/model/language/expression.h"
 #include "core/model/preset/fit.h"
 
-namespace ressort {
+namespace ressort::compile {
 namespace {
 
 constexpr double infinity = std::numeric_limits<double>::infinity();
@@ -537,4 +537,4 @@ Margins find_margins(const Network& network, std::span<const LinkScheme> schemes
   return margins;
 }
 
-}  // namespace ressort
+}  // namespace ressort::compile

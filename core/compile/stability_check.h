@@ -16,7 +16,7 @@
 #include "core/progress.h"
 #include "core/result.h"
 
-namespace ressort {
+namespace ressort::compile {
 
 // A network of more masses gets its ranges by the edge bound: the exact ones would be waited for.
 inline constexpr std::size_t most_quick_masses = 256;
@@ -103,4 +103,4 @@ Margins find_margins(const Network& network, std::span<const LinkScheme> schemes
 // The nearest value in six digits that is surely inside the limit.
 double inside_limit(double limit, bool is_upper);
 
-}  // namespace ressort
+}  // namespace ressort::compile

@@ -6,7 +6,7 @@
 
 #include "core/laws/laws.h"
 
-namespace ressort {
+namespace ressort::engine {
 namespace {
 
 template <class T>
@@ -199,4 +199,4 @@ template bool rests_at_zero(const Program&, LaneValues<float>, const double*);
 template bool rests_at_zero(const Program&, LaneValues<double>, const double*);
 template double distance_at_rest(const Program&, LaneValues<float>, const double*, std::uint32_t);
 template double distance_at_rest(const Program&, LaneValues<double>, const double*, std::uint32_t);
-}  // namespace ressort
+}  // namespace ressort::engine

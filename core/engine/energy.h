@@ -14,7 +14,7 @@
 
 #include "core/kernels/program.h"
 
-namespace ressort {
+namespace ressort::engine {
 
 // In units of mass * (position per sample)^2, at the Program's rate.
 struct Energy {
@@ -54,4 +54,4 @@ template <class T>
 double distance_at_rest(const Program& program, LaneValues<T> coefficients, const double* x,
                         std::uint32_t link);
 
-}  // namespace ressort
+}  // namespace ressort::engine

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <utility>
 
-namespace ressort {
+namespace ressort::engine {
 namespace {
 
 constexpr double silent_level = 1e-6;  // -120 dBFS: nothing that stands still was louder
@@ -256,4 +256,4 @@ template void EnergyWatch::lose(PartBank<double>&, const double*, std::size_t, s
 template void EnergyWatch::look_around(Bank<float>&, Voices&, std::span<const double>);
 template void EnergyWatch::look_around(Bank<double>&, Voices&, std::span<const double>);
 
-}  // namespace ressort
+}  // namespace ressort::engine

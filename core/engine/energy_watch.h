@@ -12,7 +12,7 @@
 #include "core/engine/mixing/bank.h"
 #include "core/engine/voices.h"
 
-namespace ressort {
+namespace ressort::engine {
 
 // All functions but the constructor: [audio] wait-free.
 class EnergyWatch {
@@ -120,4 +120,4 @@ class EnergyWatch {
   std::size_t looks_due_ = 0;  // updates, times parts_: what looks are paid with
 };
 
-}  // namespace ressort
+}  // namespace ressort::engine

@@ -18,7 +18,7 @@
 #include "core/engine/takeover.h"
 #include "core/engine/voices.h"
 
-namespace ressort {
+namespace ressort::engine {
 namespace {
 
 // With a row for each parameter and part.
@@ -592,4 +592,4 @@ EngineMeters Engine::meters() const {
   return player_->meters();
 }
 
-}  // namespace ressort
+}  // namespace ressort::engine

@@ -19,7 +19,7 @@
 #include "core/kernels/program.h"
 #include "core/progress.h"
 
-namespace ressort {
+namespace ressort::engine {
 
 enum class Source : std::uint8_t { note, controller, pressure, custom, audio };
 
@@ -239,4 +239,4 @@ class Engine {
   std::unique_ptr<Player> player_;
 };
 
-}  // namespace ressort
+}  // namespace ressort::engine

@@ -5,8 +5,9 @@
 #include <cstdint>
 
 #include "core/gesture.h"
+#include "core/rooms.h"
 
-namespace ressort {
+namespace ressort::engine {
 
 enum class EventKind : std::uint8_t {
   note_on,       // index: key 0..127, value: velocity 0..1 (above 0), may be fractional; value2: Hz
@@ -41,4 +42,4 @@ struct Event {
   double value2 = 0.0;
 };
 
-}  // namespace ressort
+}  // namespace ressort::engine

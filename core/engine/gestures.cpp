@@ -4,7 +4,7 @@
 #include <bit>
 #include <cmath>
 
-namespace ressort {
+namespace ressort::engine {
 namespace {
 
 bool has_turn(const Control& control, std::uint64_t stroke) {
@@ -308,4 +308,4 @@ void Gestures::fill(Bank<T>& bank, const VoiceGroup& group, std::size_t frames,
 template void Gestures::fill(Bank<float>&, const VoiceGroup&, std::size_t, EnergyWatch&);
 template void Gestures::fill(Bank<double>&, const VoiceGroup&, std::size_t, EnergyWatch&);
 
-}  // namespace ressort
+}  // namespace ressort::engine

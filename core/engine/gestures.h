@@ -12,7 +12,7 @@
 #include "core/engine/voices.h"
 #include "core/gesture.h"
 
-namespace ressort {
+namespace ressort::engine {
 
 // A gesture wakes the voices that it plays, and may turn parameters. All functions but the
 // constructor: [audio] wait-free.
@@ -74,4 +74,4 @@ class Gestures {
   std::uint64_t strokes_ = 0;         // notes that were played: whose turn it is
 };
 
-}  // namespace ressort
+}  // namespace ressort::engine

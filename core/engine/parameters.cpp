@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-namespace ressort {
+namespace ressort::engine {
 namespace {
 
 // Steps are heard as clicks. A key's tuning follows its bends and glides from block to block.
@@ -169,4 +169,4 @@ template void Parameters::fill_audio(Bank<float>&, const VoiceGroup&, const Segm
 template void Parameters::fill_audio(Bank<double>&, const VoiceGroup&, const Segment&,
                                      const Voices&);
 
-}  // namespace ressort
+}  // namespace ressort::engine

@@ -11,7 +11,7 @@
 #include "core/engine/mixing/bank.h"
 #include "core/engine/voices.h"
 
-namespace ressort {
+namespace ressort::engine {
 
 // All functions but the constructor: [audio] wait-free.
 class Parameters {
@@ -57,4 +57,4 @@ class Parameters {
   std::uint64_t beyond_ = 0;
 };
 
-}  // namespace ressort
+}  // namespace ressort::engine

@@ -4,7 +4,7 @@
 
 #include "core/engine/engine.h"
 
-namespace ressort {
+namespace ressort::engine {
 namespace {
 
 // Through four values, at 0, 1, 2 and 3.
@@ -66,4 +66,4 @@ double Pitches::frequency_at(double factor) const {
   return low;
 }
 
-}  // namespace ressort
+}  // namespace ressort::engine

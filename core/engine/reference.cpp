@@ -13,6 +13,9 @@ struct ScalarOf<long double> {
   using Type = long double;
 };
 
+}  // namespace ressort
+
+namespace ressort::engine {
 namespace {
 
 std::vector<double> coefficients_of(const Program& program) {
@@ -168,4 +171,4 @@ StoredEnergy energy_of(const Program& program, std::span<const double> x,
   return energy;
 }
 
-}  // namespace ressort
+}  // namespace ressort::engine

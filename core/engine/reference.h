@@ -8,7 +8,7 @@
 #include "core/kernels/program.h"
 #include "core/kernels/taps.h"
 
-namespace ressort {
+namespace ressort::engine {
 
 // Steps one Program, link by link, by the plain scheme of every law, with the coefficients as they
 // are at the start. Without parameters that audio turns
@@ -54,4 +54,4 @@ struct StoredEnergy {
 StoredEnergy energy_of(const Program& program, std::span<const double> x,
                        std::span<const double> v_before, std::span<const double> v_after);
 
-}  // namespace ressort
+}  // namespace ressort::engine

@@ -9,7 +9,7 @@
 #include "core/kernels/program.h"
 #include "core/kernels/taps.h"
 
-namespace ressort {
+namespace ressort::engine {
 
 class StruckNodes {
  public:
@@ -88,4 +88,4 @@ class StruckNodes {
   std::vector<double> changes_;
 };
 
-}  // namespace ressort
+}  // namespace ressort::engine

@@ -8,7 +8,7 @@
 #include "core/engine/energy.h"
 #include "core/engine/engine.h"
 
-namespace ressort {
+namespace ressort::engine {
 
 namespace {
 
@@ -252,4 +252,4 @@ bool take_over(Bank<T>& bank, const Bank<T>& from, const Voices& voices) {
 template bool take_over(Bank<float>&, const Bank<float>&, const Voices&);
 template bool take_over(Bank<double>&, const Bank<double>&, const Voices&);
 
-}  // namespace ressort
+}  // namespace ressort::engine

@@ -4,7 +4,7 @@
 #include "core/engine/mixing/bank.h"
 #include "core/engine/voices.h"
 
-namespace ressort {
+namespace ressort::engine {
 
 // All kernels of `bank`, with the voices that are awake in `from`. False, and no kernel is changed,
 // if one there does not know where all of its masses are. [audio] wait-free,
@@ -12,4 +12,4 @@ namespace ressort {
 template <class T>
 bool take_over(Bank<T>& bank, const Bank<T>& from, const Voices& voices);
 
-}  // namespace ressort
+}  // namespace ressort::engine

@@ -6,7 +6,7 @@
 
 #include "core/kernels/kernel.h"
 
-namespace ressort {
+namespace ressort::engine {
 namespace {
 
 constexpr double steal_fade_s = 0.005;  // a voice that gives way takes this long to vanish
@@ -558,4 +558,4 @@ bool Voices::sounds(const Voice& voice, int key, std::uint8_t channel) const {
          voice.channel == channel;
 }
 
-}  // namespace ressort
+}  // namespace ressort::engine

@@ -16,7 +16,7 @@
 #include "core/engine/midi/held_keys.h"
 #include "core/engine/midi/key_tuning.h"
 
-namespace ressort {
+namespace ressort::engine {
 
 inline constexpr double quiet_level = 1e-5;  // -100 dBFS
 
@@ -263,4 +263,4 @@ class Voices {
   std::uint64_t shed_ = 0;
 };
 
-}  // namespace ressort
+}  // namespace ressort::engine

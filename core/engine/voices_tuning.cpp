@@ -5,7 +5,7 @@
 #include "core/engine/voices.h"
 #include "core/kernels/kernel.h"
 
-namespace ressort {
+namespace ressort::engine {
 
 double Voices::pitch_hz(int key, double own_hz) const {
   return own_hz > 0.0 ? own_hz : tuning_.frequency_hz(static_cast<std::size_t>(key));
@@ -147,4 +147,4 @@ void Voices::forget_changes() {
   has_changed_ = false;
 }
 
-}  // namespace ressort
+}  // namespace ressort::engine

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <cstdio>
 
-namespace ressort {
+namespace ressort::identification {
 namespace {
 
 constexpr std::size_t most_channels = 16;
@@ -160,4 +160,4 @@ Result<Blow> find_blow(const Recording& recording) {
   return blow;
 }
 
-}  // namespace ressort
+}  // namespace ressort::identification

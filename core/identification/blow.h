@@ -7,8 +7,9 @@
 #include <vector>
 
 #include "core/result.h"
+#include "core/rooms.h"
 
-namespace ressort {
+namespace ressort::identification {
 
 // Channels of one length; 1 is full scale.
 struct Recording {
@@ -32,4 +33,4 @@ struct Blow {
 // The error says why there is none: no samples, no numbers, silence, too short.
 Result<Blow> find_blow(const Recording& recording);
 
-}  // namespace ressort
+}  // namespace ressort::identification

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <array>
 
-namespace ressort {
+namespace ressort::identification {
 namespace {
 
 constexpr std::size_t block_frames = 256;
@@ -136,4 +136,4 @@ PowerSums power_sums(const Powers& powers, std::size_t count) {
   return sums;
 }
 
-}  // namespace ressort
+}  // namespace ressort::identification

@@ -8,7 +8,9 @@
 #include <span>
 #include <vector>
 
-namespace ressort {
+#include "core/rooms.h"
+
+namespace ressort::identification {
 
 using Complex = std::complex<double>;
 
@@ -48,4 +50,4 @@ struct PowerSums {
 };
 PowerSums power_sums(const Powers& powers, std::size_t count);
 
-}  // namespace ressort
+}  // namespace ressort::identification

@@ -7,7 +7,7 @@
 #include "core/linear_algebra/complex.h"
 #include "core/linear_algebra/eigen.h"
 
-namespace ressort {
+namespace ressort::identification {
 namespace {
 
 constexpr double ridge = 1e-13;   // of a diagonal: what keeps twins from being infinitely large
@@ -361,4 +361,4 @@ std::vector<DampedDeviation> DampedFit::deviations(bool with_poles) const {
   return all;
 }
 
-}  // namespace ressort
+}  // namespace ressort::identification

@@ -10,7 +10,7 @@
 #include "core/identification/damped.h"
 #include "core/progress.h"
 
-namespace ressort {
+namespace ressort::identification {
 
 // Re(c z^n) in each channel; log z is shared.
 struct DampedMode {
@@ -60,4 +60,4 @@ class DampedFit {
   std::vector<std::vector<double>> rest_;
 };
 
-}  // namespace ressort
+}  // namespace ressort::identification

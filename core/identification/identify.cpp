@@ -11,7 +11,7 @@
 #include "core/identification/poles.h"
 #include "core/identification/spectrum.h"
 
-namespace ressort {
+namespace ressort::identification {
 namespace {
 
 constexpr double band_hz = 690.0;         // the lower rate of the first search
@@ -597,4 +597,4 @@ Result<Identification> identify(const Recording& recording, const IdentifyOption
   return Error{stopped};
 }
 
-}  // namespace ressort
+}  // namespace ressort::identification

@@ -14,7 +14,7 @@
 #include "core/progress.h"
 #include "core/result.h"
 
-namespace ressort {
+namespace ressort::identification {
 
 // A number and its standard deviation, as the noise that is left over says (Cramer-Rao).
 struct Measured {
@@ -63,4 +63,4 @@ inline constexpr double highest_mode_hz = 0.45 * 44100.0;
 Result<Identification> identify(const Recording& recording, const IdentifyOptions& options,
                                 const Progress& progress);
 
-}  // namespace ressort
+}  // namespace ressort::identification

@@ -7,7 +7,7 @@
 
 #include "core/linear_algebra/complex.h"
 
-namespace ressort {
+namespace ressort::identification {
 namespace {
 
 constexpr std::size_t taps_per_step = 14;  // of the filter, for each sample that is kept
@@ -291,4 +291,4 @@ std::vector<Complex> find_poles(std::span<const std::vector<double>> channels,
   return poles;
 }
 
-}  // namespace ressort
+}  // namespace ressort::identification

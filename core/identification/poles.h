@@ -13,7 +13,7 @@
 #include "core/identification/damped.h"
 #include "core/progress.h"
 
-namespace ressort {
+namespace ressort::identification {
 
 struct PoleSearch {
   std::size_t decimation = 64;  // a power of two. The filter costs 14 times so many first samples
@@ -32,4 +32,4 @@ std::size_t shortest_for(const PoleSearch& search);
 std::vector<Complex> find_poles(std::span<const std::vector<double>> channels,
                                 const PoleSearch& search, const Progress& progress);
 
-}  // namespace ressort
+}  // namespace ressort::identification

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <numbers>
 
-namespace ressort {
+namespace ressort::identification {
 
 std::vector<BodyShape> body_shapes(const Identification& found, double mass) {
   constexpr double reference_rate_hz = 44100.0;
@@ -34,4 +34,4 @@ std::vector<BodyShape> body_shapes(const Identification& found, double mass) {
   return shapes;
 }
 
-}  // namespace ressort
+}  // namespace ressort::identification

@@ -13,7 +13,7 @@
 
 #include "core/identification/identify.h"
 
-namespace ressort {
+namespace ressort::identification {
 
 struct BodyShape {
   double hit = 0.0;           // displacement where it is struck
@@ -23,4 +23,4 @@ struct BodyShape {
 // [mode] in their order.
 std::vector<BodyShape> body_shapes(const Identification& found, double mass);
 
-}  // namespace ressort
+}  // namespace ressort::identification

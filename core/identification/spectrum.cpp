@@ -8,7 +8,7 @@
 #include "core/identification/damped.h"
 #include "core/linear_algebra/fourier.h"
 
-namespace ressort {
+namespace ressort::identification {
 
 Power::Power(std::span<const std::vector<double>> channels, std::size_t frames) : frames_(frames) {
   const std::size_t size = std::bit_ceil(std::max<std::size_t>(frames, 2));
@@ -62,4 +62,4 @@ double Power::floor(double omega, double half_width) const {
   return *median / std::numbers::ln2 * static_cast<double>(bins - 1);
 }
 
-}  // namespace ressort
+}  // namespace ressort::identification

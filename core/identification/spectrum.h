@@ -5,7 +5,9 @@
 #include <span>
 #include <vector>
 
-namespace ressort {
+#include "core/rooms.h"
+
+namespace ressort::identification {
 
 // The mean power of a stretch of sound over frequency, all channels added up.
 class Power {
@@ -25,4 +27,4 @@ class Power {
   std::vector<double> sums_;  // [bin] of all below
 };
 
-}  // namespace ressort
+}  // namespace ressort::identification

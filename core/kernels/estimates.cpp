@@ -6,7 +6,7 @@
 #include "core/kernels/passive/clusters.h"
 #include "core/laws/laws.h"
 
-namespace ressort {
+namespace ressort::kernels {
 namespace {
 
 constexpr std::uint64_t numbers_of_node = 5;  // position, velocity, force, and a kernel's own
@@ -132,4 +132,4 @@ std::string count_of(std::size_t count, const char* one, const char* many) {
   return std::to_string(count) + " " + (count == 1 ? one : many);
 }
 
-}  // namespace ressort
+}  // namespace ressort::kernels

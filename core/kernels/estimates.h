@@ -10,7 +10,7 @@
 #include "core/kernels/prices/prices.h"
 #include "core/kernels/program.h"
 
-namespace ressort {
+namespace ressort::kernels {
 
 // What a prediction is for.
 struct Workload {
@@ -66,4 +66,4 @@ std::uint64_t bytes_with_own_links(const Program& program, std::size_t links,
 // "1 link", "2 links"
 std::string count_of(std::size_t count, const char* one, const char* many);
 
-}  // namespace ressort
+}  // namespace ressort::kernels

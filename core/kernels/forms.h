@@ -8,7 +8,9 @@
 #include <variant>
 #include <vector>
 
-namespace ressort {
+#include "core/rooms.h"
+
+namespace ressort::kernels {
 
 // As it is written, mass by mass and link by link; one voice in each lane. Every Program.
 struct Direct {};
@@ -318,4 +320,4 @@ struct Oversampled {
 using Form = std::variant<Direct, Chains, Dense, Modes, Grid, Batch, Shards, Fourth, Compensated,
                           Slow, Oversampled>;
 
-}  // namespace ressort
+}  // namespace ressort::kernels

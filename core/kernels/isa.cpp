@@ -1,6 +1,6 @@
 #include "core/kernels/isa.h"
 
-namespace ressort {
+namespace ressort::kernels {
 
 Isa best_isa() {
 #if RESSORT_X86_LEVELS
@@ -58,4 +58,4 @@ std::string_view isa_name(Isa isa) {
   return "";
 }
 
-}  // namespace ressort
+}  // namespace ressort::kernels

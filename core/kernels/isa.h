@@ -6,7 +6,9 @@
 #include <cstddef>
 #include <string_view>
 
-namespace ressort {
+#include "core/rooms.h"
+
+namespace ressort::kernels {
 
 // What the build offers: RESSORT_LEAST_ISA, and with RESSORT_X86_LEVELS=1 all that are wider.
 #ifndef RESSORT_LEAST_ISA
@@ -71,4 +73,4 @@ constexpr std::size_t lanes_for(std::size_t voices, Isa isa) {
   return bytes / sizeof(T);
 }
 
-}  // namespace ressort
+}  // namespace ressort::kernels

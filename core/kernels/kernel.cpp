@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-namespace ressort {
+namespace ressort::kernels {
 
 template <class T>
 Coefficients<T>::Coefficients(const Program& program, std::size_t width_in)
@@ -83,4 +83,4 @@ template class Coefficients<double>;
 template class Kernel<float>;
 template class Kernel<double>;
 
-}  // namespace ressort
+}  // namespace ressort::kernels

@@ -12,7 +12,7 @@
 #include "core/kernels/program.h"
 #include "core/lanes.h"
 
-namespace ressort {
+namespace ressort::kernels {
 
 inline constexpr std::size_t max_block_frames = 64;
 
@@ -176,4 +176,4 @@ class Kernel {
 template <class T>
 std::unique_ptr<Kernel<T>> make_kernel(const Program& program, std::size_t voices, Isa isa);
 
-}  // namespace ressort
+}  // namespace ressort::kernels

@@ -5,7 +5,7 @@
 #include <limits>
 #include <numeric>
 
-namespace ressort {
+namespace ressort::kernels {
 
 template <class T>
 NodeLayout layout_in_rows(std::span<const std::uint32_t> slot, std::size_t slots, std::size_t width,
@@ -207,4 +207,4 @@ template class NodeKernel<float>;
 template class NodeKernel<double>;
 template class NodeKernel<double, float>;
 
-}  // namespace ressort
+}  // namespace ressort::kernels

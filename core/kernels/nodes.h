@@ -6,7 +6,7 @@
 #include "core/kernels/passive/room.h"
 #include "core/kernels/taps.h"
 
-namespace ressort {
+namespace ressort::kernels {
 
 // Where positions are among a kernel's numbers: node[i] + lane[j]. What else there is of a node
 // follows, `row` numbers further each: its velocity, then its force and the kernel's own.
@@ -117,4 +117,4 @@ class NodeKernel : public Kernel<T> {
   virtual bool is_quiet(std::size_t, double) const { return true; }
 };
 
-}  // namespace ressort
+}  // namespace ressort::kernels

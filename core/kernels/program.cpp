@@ -5,7 +5,7 @@
 
 #include "core/sampled_mode.h"
 
-namespace ressort {
+namespace ressort::kernels {
 namespace {
 
 constexpr double reference_rate_hz = 44100.0;
@@ -109,4 +109,4 @@ bool is_continuous(const Form& form) {
   return modes != nullptr && modes->is_exact;
 }
 
-}  // namespace ressort
+}  // namespace ressort::kernels

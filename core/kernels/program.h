@@ -12,7 +12,7 @@
 #include "core/kernels/waveguides/design.h"
 #include "core/laws/law.h"
 
-namespace ressort {
+namespace ressort::kernels {
 
 inline constexpr std::uint32_t no_mode = 0xffffffffu;
 
@@ -192,4 +192,4 @@ double sampled_value(const Program& program, const Coefficient& coefficient,
 // Whether a form's numbers are those of the continuous network.
 bool is_continuous(const Form& form);
 
-}  // namespace ressort
+}  // namespace ressort::kernels

@@ -26,7 +26,7 @@
 #include "core/kernels/slow/slow.h"
 #include "core/kernels/slow/slow_form.h"
 
-namespace ressort {
+namespace ressort::kernels {
 namespace {
 
 using Request = KernelRequest;
@@ -195,4 +195,4 @@ std::unique_ptr<Kernel<T>> make_kernel(const Program& program, std::size_t voice
 template std::unique_ptr<Kernel<float>> make_kernel(const Program&, std::size_t, Isa);
 template std::unique_ptr<Kernel<double>> make_kernel(const Program&, std::size_t, Isa);
 
-}  // namespace ressort
+}  // namespace ressort::kernels

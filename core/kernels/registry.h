@@ -19,7 +19,7 @@
 #include "core/model/preset/budget.h"
 #include "core/progress.h"
 
-namespace ressort {
+namespace ressort::kernels {
 
 // By which name a kernel is asked for.
 enum class Method { direct, chains, dense, modal, grid, batch, fourth, slow, oversampled };
@@ -28,7 +28,7 @@ enum class Method { direct, chains, dense, modal, grid, batch, fourth, slow, ove
 struct KernelRequest {
   const Program& program;
   const Workload& load;
-  const Budget& budget;
+  const model::Budget& budget;
   const Progress& progress;
 };
 
@@ -77,4 +77,4 @@ std::string description(const Program& program);
 // One voice in this form, in bytes.
 std::uint64_t voice_bytes(const Program& program, std::uint64_t number_bytes);
 
-}  // namespace ressort
+}  // namespace ressort::kernels

@@ -4,7 +4,7 @@
 
 #include "core/kernels/program.h"
 
-namespace ressort {
+namespace ressort::kernels {
 
 inline constexpr std::size_t tap_corners = 4;
 
@@ -82,4 +82,4 @@ static inline bool has_bodies(const Program& program) {
   return false;
 }
 
-}  // namespace ressort
+}  // namespace ressort::kernels

@@ -10,6 +10,7 @@
 
 namespace ressort::laws {
 inline namespace RESSORT_ISA {
+inline namespace RESSORT_ROUNDING {
 
 template <class V>
 struct Bow {
@@ -101,5 +102,6 @@ struct Bow {
   V top;  // where the outer slopes would meet at 0
 };
 
+}  // namespace RESSORT_ROUNDING
 }  // namespace RESSORT_ISA
 }  // namespace ressort::laws

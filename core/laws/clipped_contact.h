@@ -7,6 +7,7 @@
 
 namespace ressort::laws {
 inline namespace RESSORT_ISA {
+inline namespace RESSORT_ROUNDING {
 
 // A clipped spring's potential on one side of 0 only.
 template <class V>
@@ -97,5 +98,6 @@ struct ClippedContact {
   }
 };
 
+}  // namespace RESSORT_ROUNDING
 }  // namespace RESSORT_ISA
 }  // namespace ressort::laws

@@ -13,6 +13,7 @@
 
 namespace ressort::laws {
 inline namespace RESSORT_ISA {
+inline namespace RESSORT_ROUNDING {
 
 // s d^2/2 + c d^4/4 up to b, where the force is that of k, then k d^2/2 and as much less as both
 // differ there, (k - s)^2/4c. A plain spring is one with c = 0 and k = s.
@@ -127,5 +128,6 @@ struct ClippedSpring {
   }
 };
 
+}  // namespace RESSORT_ROUNDING
 }  // namespace RESSORT_ISA
 }  // namespace ressort::laws

@@ -5,6 +5,7 @@
 
 namespace ressort::laws {
 inline namespace RESSORT_ISA {
+inline namespace RESSORT_ROUNDING {
 
 template <class V>
 struct CubicSpring {
@@ -78,5 +79,6 @@ struct CubicSpring {
   V z;
 };
 
+}  // namespace RESSORT_ROUNDING
 }  // namespace RESSORT_ISA
 }  // namespace ressort::laws

@@ -10,7 +10,8 @@
 //
 // Laws and their tools are compiled for every instruction set in a namespace of its own,
 // RESSORT_ISA (elsewhere a namespace of that very name): what is built for a wide machine is never
-// linked into what runs on a narrow one.
+// linked into what runs on a narrow one. Within it is RESSORT_ROUNDING, in the same way: `exact`
+// where a kernel is built without fused multiply-adds, and is not linked with laws that have them.
 #pragma once
 
 #include "core/lanes.h"
@@ -18,6 +19,7 @@
 
 namespace ressort::laws {
 inline namespace RESSORT_ISA {
+inline namespace RESSORT_ROUNDING {
 
 // A link in one sample: distances x_a - x_b, and how they change per sample.
 template <class V>
@@ -153,5 +155,6 @@ static inline Slope<V> rubbing(const Friction& bow, V step) {
   return {friction.value, friction.slope / 2};
 }
 
+}  // namespace RESSORT_ROUNDING
 }  // namespace RESSORT_ISA
 }  // namespace ressort::laws

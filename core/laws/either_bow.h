@@ -6,6 +6,7 @@
 
 namespace ressort::laws {
 inline namespace RESSORT_ISA {
+inline namespace RESSORT_ROUNDING {
 
 template <class V>
 struct EitherBow {
@@ -60,5 +61,6 @@ struct EitherBow {
   V profile;
 };
 
+}  // namespace RESSORT_ROUNDING
 }  // namespace RESSORT_ISA
 }  // namespace ressort::laws

@@ -14,7 +14,9 @@
 #include <span>
 #include <string_view>
 
-namespace ressort {
+#include "core/rooms.h"
+
+namespace ressort::laws {
 
 enum class Law : std::uint8_t;  // its list is in laws.h; the first is the spring
 
@@ -146,4 +148,4 @@ Slopes steepest(Law law, const LawNumbers& least, const LawNumbers& most, double
 // where it may let go.
 Slopes gentlest(Law law, const LawNumbers& least);
 
-}  // namespace ressort
+}  // namespace ressort::laws

@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-namespace ressort {
+namespace ressort::laws {
 namespace {
 
 constexpr auto table = []<std::size_t... i>(std::index_sequence<i...>) {
@@ -61,4 +61,4 @@ Slopes gentlest(Law law, const LawNumbers& least) {
   });
 }
 
-}  // namespace ressort
+}  // namespace ressort::laws

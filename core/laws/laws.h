@@ -17,7 +17,7 @@
 #include "core/laws/smooth_bow.h"
 #include "core/laws/spring.h"
 
-namespace ressort {
+namespace ressort::laws {
 
 enum class Law : std::uint8_t {
   spring,
@@ -94,4 +94,4 @@ template <class V, class Coefficient, class Use>
   return with_law_type(law, [&](auto type) { return use(law_of<decltype(type), V>(c)); });
 }
 
-}  // namespace ressort
+}  // namespace ressort::laws

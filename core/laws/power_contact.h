@@ -12,6 +12,7 @@
 
 namespace ressort::laws {
 inline namespace RESSORT_ISA {
+inline namespace RESSORT_ROUNDING {
 
 // K/(P + 1) D^(P + 1).
 template <class V>
@@ -92,5 +93,6 @@ struct PowerContact {
   PowerWall<V> wall() const { return {k, exponent()}; }
 };
 
+}  // namespace RESSORT_ROUNDING
 }  // namespace RESSORT_ISA
 }  // namespace ressort::laws

@@ -5,6 +5,7 @@
 
 namespace ressort::laws {
 inline namespace RESSORT_ISA {
+inline namespace RESSORT_ROUNDING {
 
 template <class V>
 struct QuadraticSpring {
@@ -67,5 +68,6 @@ struct QuadraticSpring {
   V z;
 };
 
+}  // namespace RESSORT_ROUNDING
 }  // namespace RESSORT_ISA
 }  // namespace ressort::laws

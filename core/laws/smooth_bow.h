@@ -7,6 +7,7 @@
 
 namespace ressort::laws {
 inline namespace RESSORT_ISA {
+inline namespace RESSORT_ROUNDING {
 
 inline constexpr double smooth_bow_stick = 1.0387;  // 0.63 exp(1/2), above it: f/(Z v) at rest
 
@@ -72,5 +73,6 @@ struct SmoothBow {
   V s;
 };
 
+}  // namespace RESSORT_ROUNDING
 }  // namespace RESSORT_ISA
 }  // namespace ressort::laws

@@ -5,6 +5,7 @@
 
 namespace ressort::laws {
 inline namespace RESSORT_ISA {
+inline namespace RESSORT_ROUNDING {
 
 template <class V>
 struct Spring {
@@ -56,5 +57,6 @@ struct Spring {
   V z;
 };
 
+}  // namespace RESSORT_ROUNDING
 }  // namespace RESSORT_ISA
 }  // namespace ressort::laws

@@ -6,6 +6,7 @@
 
 namespace ressort::laws {
 inline namespace RESSORT_ISA {
+inline namespace RESSORT_ROUNDING {
 
 // f = stiffness d + damping v + offset for low < d < high.
 template <class T>
@@ -24,5 +25,6 @@ concept Straight = requires(const ForceLaw& law, T d) {
   StraightPiece<T>{law.piece(d)};
 };
 
+}  // namespace RESSORT_ROUNDING
 }  // namespace RESSORT_ISA
 }  // namespace ressort::laws

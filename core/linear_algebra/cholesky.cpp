@@ -7,7 +7,7 @@
 
 #include "core/linear_algebra/eigen.h"
 
-namespace ressort {
+namespace ressort::linear_algebra {
 namespace {
 
 constexpr int no_parent = -1;
@@ -224,4 +224,4 @@ void Cholesky::solve(double* x) const {
   }
 }
 
-}  // namespace ressort
+}  // namespace ressort::linear_algebra

@@ -9,7 +9,7 @@
 #include "core/linear_algebra/matrix.h"
 #include "core/progress.h"
 
-namespace ressort {
+namespace ressort::linear_algebra {
 
 // A = L S LT with S diagonal, of 1 and -1: all 1 where A is positive definite. The rows are in the
 // order that approximate minimum degree gives. [any thread but audio]
@@ -60,4 +60,4 @@ class Cholesky {
   std::vector<double> sign_;  // [row] of S
 };
 
-}  // namespace ressort
+}  // namespace ressort::linear_algebra

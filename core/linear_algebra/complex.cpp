@@ -4,7 +4,7 @@
 #include <Eigen/Eigenvalues>
 #include <algorithm>
 
-namespace ressort {
+namespace ressort::linear_algebra {
 namespace {
 
 using Map = Eigen::Map<const Eigen::MatrixXcd>;
@@ -87,4 +87,4 @@ Matrix transposed_product(const Matrix& a, const Matrix& b) {
   return made;
 }
 
-}  // namespace ressort
+}  // namespace ressort::linear_algebra

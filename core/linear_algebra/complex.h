@@ -9,7 +9,7 @@
 
 #include "core/linear_algebra/matrix.h"
 
-namespace ressort {
+namespace ressort::linear_algebra {
 
 // Column by column.
 struct ComplexMatrix {
@@ -51,4 +51,4 @@ std::complex<double> schur_complement_of_first(ComplexMatrix matrix);
 // AT B
 Matrix transposed_product(const Matrix& a, const Matrix& b);
 
-}  // namespace ressort
+}  // namespace ressort::linear_algebra

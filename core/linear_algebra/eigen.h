@@ -8,7 +8,7 @@
 
 #include "core/linear_algebra/matrix.h"
 
-namespace ressort {
+namespace ressort::linear_algebra {
 
 struct Eigenpairs {
   Vector values;   // ascending
@@ -58,4 +58,4 @@ std::optional<Vector> solution(const Matrix& matrix, const Vector& b);
 // X of X A = B; nothing where A is singular.
 std::optional<Matrix> quotient(const Matrix& b, const Matrix& a);
 
-}  // namespace ressort
+}  // namespace ressort::linear_algebra

@@ -3,7 +3,7 @@
 #include <cassert>
 #include <unsupported/Eigen/FFT>
 
-namespace ressort {
+namespace ressort::linear_algebra {
 
 struct Fourier::Library {
   Eigen::FFT<double> fft{Eigen::FFT<double>::impl_type(), Eigen::FFT<double>::HalfSpectrum};
@@ -26,4 +26,4 @@ void Fourier::inverse(std::span<const std::complex<double>> bins, std::span<doub
   library_->fft.inv(x.data(), bins.data(), static_cast<Eigen::Index>(size_));
 }
 
-}  // namespace ressort
+}  // namespace ressort::linear_algebra

@@ -7,7 +7,9 @@
 #include <memory>
 #include <span>
 
-namespace ressort {
+#include "core/rooms.h"
+
+namespace ressort::linear_algebra {
 
 // Of one size, for which it keeps its roots of unity. O(size log size) where that has small factors
 // alone, else more, up to size^2 of a prime.
@@ -31,4 +33,4 @@ class Fourier {
   std::unique_ptr<Library> library_;
 };
 
-}  // namespace ressort
+}  // namespace ressort::linear_algebra

@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <utility>
 
-namespace ressort {
+namespace ressort::linear_algebra {
 namespace {
 
 constexpr std::size_t leaf_nodes = 24;  // what is not worth being cut again
@@ -295,4 +295,4 @@ void FrontalCholesky::solve(Matrix& columns) const {
   }
 }
 
-}  // namespace ressort
+}  // namespace ressort::linear_algebra

@@ -11,7 +11,7 @@
 #include "core/linear_algebra/matrix.h"
 #include "core/progress.h"
 
-namespace ressort {
+namespace ressort::linear_algebra {
 
 // How node `row` of an element pulls with node `column`, axis by axis: [row axis + 3 column axis].
 using NodeBlock = std::array<double, 9>;
@@ -56,4 +56,4 @@ class FrontalCholesky {
   double size_ = 0.0;
 };
 
-}  // namespace ressort
+}  // namespace ressort::linear_algebra

@@ -5,7 +5,7 @@
 
 #include "core/linear_algebra/eigen.h"
 
-namespace ressort {
+namespace ressort::linear_algebra {
 namespace {
 
 constexpr double tolerance = 1e-9;  // of what a solution shall give
@@ -90,4 +90,4 @@ std::optional<Matrix> quotient(const Matrix& b, const Matrix& a) {
                                 : std::nullopt;
 }
 
-}  // namespace ressort
+}  // namespace ressort::linear_algebra

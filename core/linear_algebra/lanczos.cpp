@@ -6,7 +6,7 @@
 #include <cstdint>
 #include <utility>
 
-namespace ressort {
+namespace ressort::linear_algebra {
 namespace {
 
 using Dense = Eigen::MatrixXd;
@@ -136,4 +136,4 @@ std::optional<Eigenpairs> lowest_pairs(double shift, int count, int size, const 
   }
 }
 
-}  // namespace ressort
+}  // namespace ressort::linear_algebra

@@ -9,7 +9,7 @@
 #include "core/linear_algebra/matrix.h"
 #include "core/progress.h"
 
-namespace ressort {
+namespace ressort::linear_algebra {
 
 // Overwrites the columns of X with those of a matrix times X.
 using Multiply = std::function<void(Matrix& columns)>;
@@ -23,4 +23,4 @@ inline constexpr int lanczos_block = 8;
 std::optional<Eigenpairs> lowest_pairs(double shift, int count, int size, const Multiply& inverse,
                                        const Multiply& b, const Progress& progress);
 
-}  // namespace ressort
+}  // namespace ressort::linear_algebra

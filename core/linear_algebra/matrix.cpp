@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <numeric>
 
-namespace ressort {
+namespace ressort::linear_algebra {
 
 SparseMatrix::SparseMatrix(int size, std::span<const Element> elements) {
   std::vector<Element> sorted;
@@ -60,4 +60,4 @@ Matrix dense(const SparseMatrix& lower) {
   return matrix;
 }
 
-}  // namespace ressort
+}  // namespace ressort::linear_algebra

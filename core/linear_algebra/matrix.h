@@ -8,7 +8,9 @@
 #include <valarray>
 #include <vector>
 
-namespace ressort {
+#include "core/rooms.h"
+
+namespace ressort::linear_algebra {
 
 using Vector = std::valarray<double>;
 using ComplexVector = std::valarray<std::complex<double>>;
@@ -79,4 +81,4 @@ struct SparseMatrix {
 // All of the symmetric matrix. O(size^2)
 Matrix dense(const SparseMatrix& lower);
 
-}  // namespace ressort
+}  // namespace ressort::linear_algebra

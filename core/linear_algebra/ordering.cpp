@@ -2,7 +2,7 @@
 
 #include "core/linear_algebra/eigen.h"
 
-namespace ressort {
+namespace ressort::linear_algebra {
 
 std::vector<int> order_of_elimination(const SparseMatrix& pattern) {
   // Both triangles: what the algorithm works on, and spoils.
@@ -20,4 +20,4 @@ std::vector<int> order_of_elimination(const SparseMatrix& pattern) {
   return order;
 }
 
-}  // namespace ressort
+}  // namespace ressort::linear_algebra

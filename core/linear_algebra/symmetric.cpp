@@ -5,7 +5,7 @@
 
 #include "core/linear_algebra/eigen.h"
 
-namespace ressort {
+namespace ressort::linear_algebra {
 namespace {
 
 Eigenpairs pairs_of(const Eigen::VectorXd& values, const Eigen::MatrixXd& vectors) {
@@ -59,4 +59,4 @@ std::optional<Eigenpairs> eigenpairs_near(double shift, int count, int size,
   }
 }
 
-}  // namespace ressort
+}  // namespace ressort::linear_algebra

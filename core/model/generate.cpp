@@ -9,7 +9,7 @@
 #include "core/model/language/tokens.h"
 #include "core/model/topology.h"
 
-namespace ressort {
+namespace ressort::model {
 namespace {
 
 struct Point {
@@ -460,4 +460,4 @@ Result<Network> generate(const Shape& shape) {
   return Builder(shape).points(layout);
 }
 
-}  // namespace ressort
+}  // namespace ressort::model

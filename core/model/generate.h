@@ -7,7 +7,7 @@
 #include "core/model/network.h"
 #include "core/result.h"
 
-namespace ressort {
+namespace ressort::model {
 
 enum class ShapeKind : std::uint8_t {
   string,        // a row whose two ends are fixed
@@ -46,4 +46,4 @@ inline constexpr std::uint32_t max_written_points = 100'000;  // one by one, not
 // [any thread but audio]
 Result<Network> generate(const Shape& shape);
 
-}  // namespace ressort
+}  // namespace ressort::model

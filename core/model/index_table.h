@@ -6,7 +6,9 @@
 #include <cstdint>
 #include <vector>
 
-namespace ressort {
+#include "core/rooms.h"
+
+namespace ressort::model {
 
 // Of the elements of somebody else's array it keeps the indices only.
 class IndexTable {
@@ -31,4 +33,4 @@ class IndexTable {
   std::vector<std::uint32_t> places_;
 };
 
-}  // namespace ressort
+}  // namespace ressort::model

@@ -7,7 +7,7 @@
 
 #include "core/model/language/tokens.h"
 
-namespace ressort {
+namespace ressort::model {
 namespace {
 
 // Calls f(argument, is_place) for every number of the network, in one order for all of a structure.
@@ -420,4 +420,4 @@ Result<Network> morphed(const Network& base, std::span<const MorphStop> stops,
   return Morphing(base, stops, parameter, knobs).run();
 }
 
-}  // namespace ressort
+}  // namespace ressort::model

@@ -9,7 +9,7 @@
 #include "core/model/network.h"
 #include "core/result.h"
 
-namespace ressort {
+namespace ressort::model {
 
 // Where a morph passes.
 struct MorphStop {
@@ -29,4 +29,4 @@ struct MorphStop {
 Result<Network> morphed(const Network& base, std::span<const MorphStop> stops,
                         const std::string& parameter, std::span<const std::string> knobs);
 
-}  // namespace ressort
+}  // namespace ressort::model

@@ -2,7 +2,7 @@
 // by the states themselves.
 #include "core/model/language/reader.h"
 
-namespace ressort {
+namespace ressort::model {
 namespace {
 
 constexpr ThirdArgument velocity = ThirdArgument::velocity_per_second;
@@ -123,4 +123,4 @@ void Reader::decide_by_states() {
   }
 }
 
-}  // namespace ressort
+}  // namespace ressort::model

@@ -8,7 +8,9 @@
 #include <string_view>
 #include <utility>
 
-namespace ressort {
+#include "core/rooms.h"
+
+namespace ressort::model {
 
 // Holds up to 15 bytes itself, more on the heap.
 class Name {
@@ -62,4 +64,4 @@ class Name {
   std::array<char, most_held + 1> bytes_{};  // the last one is the length, or `elsewhere`
 };
 
-}  // namespace ressort
+}  // namespace ressort::model

@@ -6,7 +6,7 @@
 
 #include "core/model/index_table.h"
 
-namespace ressort {
+namespace ressort::model {
 namespace {
 
 void append(std::string& key, std::uint64_t bits) {
@@ -247,4 +247,4 @@ int output_count(const Network& network) {
   return count;
 }
 
-}  // namespace ressort
+}  // namespace ressort::model

@@ -11,7 +11,7 @@
 #include "core/laws/law.h"
 #include "core/model/name.h"
 
-namespace ressort {
+namespace ressort::model {
 
 // Where an element stands in its text; both count from 1.
 struct SourceLocation {
@@ -245,4 +245,4 @@ std::size_t moving_count(const Network& network);
 int input_count(const Network& network);
 int output_count(const Network& network);
 
-}  // namespace ressort
+}  // namespace ressort::model

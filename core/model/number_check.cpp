@@ -9,7 +9,7 @@
 
 #include "core/model/language/expression.h"
 
-namespace ressort {
+namespace ressort::model {
 namespace {
 
 // Looks at the arguments of one element after the other, for no_number().
@@ -152,4 +152,4 @@ std::optional<Error> no_number(const Network& network, std::span<const double> p
   return NumberCheck(network, parameters, rate_ratio).run();
 }
 
-}  // namespace ressort
+}  // namespace ressort::model

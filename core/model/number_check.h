@@ -7,7 +7,7 @@
 #include "core/model/network.h"
 #include "core/result.h"
 
-namespace ressort {
+namespace ressort::model {
 
 // The first element, in the order of the network, of which an argument is no finite number with
 // these values of the parameters, or which weighs nothing; with its line. What an audio input gives
@@ -15,4 +15,4 @@ namespace ressort {
 std::optional<Error> no_number(const Network& network, std::span<const double> parameters,
                                double rate_ratio);
 
-}  // namespace ressort
+}  // namespace ressort::model

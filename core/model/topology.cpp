@@ -8,7 +8,7 @@
 
 #include "core/laws/laws.h"
 
-namespace ressort {
+namespace ressort::model {
 namespace {
 
 bool is_fixed(const Macro& macro, std::uint32_t i, std::uint32_t j) {
@@ -302,4 +302,4 @@ Network expand_macros(const Network& network, const Progress& progress) {
   return expanded;
 }
 
-}  // namespace ressort
+}  // namespace ressort::model

@@ -4,7 +4,7 @@
 #include "core/model/network.h"
 #include "core/progress.h"
 
-namespace ressort {
+namespace ressort::model {
 
 inline constexpr std::uint64_t max_macro_nodes = 4'000'000;  // of one model
 
@@ -22,4 +22,4 @@ std::vector<std::uint32_t> macro_starts(const Network& network);
 // taps told where its nodes are. O(nodes). [any thread but audio]
 Network expand_macros(const Network& network, const Progress& progress = {});
 
-}  // namespace ressort
+}  // namespace ressort::model

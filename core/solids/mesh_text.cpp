@@ -7,7 +7,7 @@
 
 #include "core/solids/solid_mesh.h"
 
-namespace ressort {
+namespace ressort::solids {
 namespace {
 
 constexpr std::size_t most_rows = 20'000'000;
@@ -275,4 +275,4 @@ Result<TetrahedronMesh> read_tetgen(std::string_view nodes, std::string_view ele
   return mesh;
 }
 
-}  // namespace ressort
+}  // namespace ressort::solids

@@ -7,7 +7,7 @@
 
 #include "core/solids/surface.h"
 
-namespace ressort {
+namespace ressort::solids {
 namespace {
 
 constexpr std::size_t stl_header_bytes = 84;
@@ -289,4 +289,4 @@ Result<Surface> read_obj(std::string_view text) {
   return surface;
 }
 
-}  // namespace ressort
+}  // namespace ressort::solids

@@ -5,7 +5,7 @@
 #include <numbers>
 #include <utility>
 
-namespace ressort {
+namespace ressort::solids {
 namespace {
 
 constexpr std::array<std::array<std::size_t, 3>, 4> faces = {
@@ -298,4 +298,4 @@ double edge_length(double volume, double unknowns) {
   return std::cbrt(8.5 * volume * 3.0 * nodes_per_tetrahedron / unknowns);
 }
 
-}  // namespace ressort
+}  // namespace ressort::solids

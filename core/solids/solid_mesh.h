@@ -11,7 +11,7 @@
 #include "core/result.h"
 #include "core/solids/surface.h"
 
-namespace ressort {
+namespace ressort::solids {
 
 // Four corners.
 using Tetrahedron = std::array<int, 4>;
@@ -76,4 +76,4 @@ std::string as_smesh(const ClosedSurface& closed);         // TetGen's, with a p
 Result<TetrahedronMesh> read_gmsh(std::string_view text);  // .msh, format 2, ASCII
 Result<TetrahedronMesh> read_tetgen(std::string_view nodes, std::string_view elements);
 
-}  // namespace ressort
+}  // namespace ressort::solids

@@ -7,7 +7,7 @@
 
 #include "core/linear_algebra/lanczos.h"
 
-namespace ressort {
+namespace ressort::solids {
 namespace {
 
 constexpr int rigid_motions = 6;
@@ -416,4 +416,4 @@ double shape_at(const SolidModes& modes, const SolidPlace& place, std::size_t mo
   return sum;
 }
 
-}  // namespace ressort
+}  // namespace ressort::solids

@@ -14,7 +14,7 @@
 #include "core/result.h"
 #include "core/solids/solid_mesh.h"
 
-namespace ressort {
+namespace ressort::solids {
 
 // Isotropic and linearly elastic, and how it loses energy.
 struct SolidMaterial {
@@ -98,4 +98,4 @@ std::vector<int> spread_on_surface(const SolidMesh& mesh, std::span<const SolidC
 // How far a place moves, its way, in a mode. 1/sqrt(kg)
 double shape_at(const SolidModes& modes, const SolidPlace& place, std::size_t mode);
 
-}  // namespace ressort
+}  // namespace ressort::solids

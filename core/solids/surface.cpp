@@ -8,7 +8,7 @@
 #include <unordered_map>
 #include <utility>
 
-namespace ressort {
+namespace ressort::solids {
 namespace {
 
 constexpr double weld_share = 1e-6;      // of the solid's size
@@ -341,4 +341,4 @@ Result<ClosedSurface> close_surface(const Surface& surface, const Progress& prog
   return closed;
 }
 
-}  // namespace ressort
+}  // namespace ressort::solids

@@ -9,8 +9,9 @@
 
 #include "core/progress.h"
 #include "core/result.h"
+#include "core/rooms.h"
 
-namespace ressort {
+namespace ressort::solids {
 
 // Indices of points are ints, as files have them.
 inline std::size_t at(int index) {
@@ -85,4 +86,4 @@ Box3 box_around(const std::vector<Point3>& points);
 // "(0.1, 0, -2)", in four digits.
 std::string to_string(const Point3& point);
 
-}  // namespace ressort
+}  // namespace ressort::solids

@@ -7,6 +7,7 @@
 
 #include "core/model/network.h"
 #include "tests/bench/bench_scenes.h"
+#include "tests/support/rooms.h"
 
 namespace ressort::bench {
 

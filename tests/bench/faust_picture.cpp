@@ -6,6 +6,7 @@
 #include <cstdio>
 
 #include "app/commands/svg.h"
+#include "tests/support/rooms.h"
 
 namespace ressort::bench {
 namespace {

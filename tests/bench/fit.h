@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "core/kernels/registry.h"
+#include "tests/support/rooms.h"
 
 namespace ressort::bench {
 

@@ -5,6 +5,7 @@
 
 #include "core/kernels/isa.h"
 #include "core/kernels/program.h"
+#include "tests/support/rooms.h"
 
 namespace ressort::bench {
 

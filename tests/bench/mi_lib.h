@@ -5,6 +5,7 @@
 #include <string>
 
 #include "core/model/network.h"
+#include "tests/support/rooms.h"
 
 namespace ressort::bench {
 

@@ -5,6 +5,7 @@
 #include <string_view>
 
 #include "app/session/flight/flight.h"
+#include "tests/support/rooms.h"
 
 namespace {
 

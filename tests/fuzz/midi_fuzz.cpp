@@ -10,7 +10,8 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   static const auto preset =
       parse_preset(support::PresetWriter(fuzz::network(), "fuzz.mdl", 0).write());
   require(preset.ok());
-  auto compiled = compile(fuzz::network(), preset.preset, {.rate_hz = fuzz::Harness::rate_hz});
+  auto compiled =
+      compile_network(fuzz::network(), preset.preset, {.rate_hz = fuzz::Harness::rate_hz});
   require(static_cast<bool>(compiled));
   fuzz::Harness harness(*std::move(compiled));
   MidiDoor door(harness.process);

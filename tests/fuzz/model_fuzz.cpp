@@ -108,14 +108,14 @@ void play_blocks(Engine& engine, const Instrument& instrument, std::size_t first
 // As `play` does, and by force what it refuses: a gain that is found if nobody gives one, and
 // halfway the form that more patience finds, which goes on where the other is.
 void play(const Network& network, Preset preset, CompileOptions options) {
-  auto first = compile(network, preset, options);
+  auto first = compile_network(network, preset, options);
   if (!first) {
     return require(!first.error().message.empty());
   }
   if (first->stability.verdict == Verdict::unstable) {
     require(first->stability.complaint.has_value());
     options.force = true;
-    first = compile(network, preset, options);
+    first = compile_network(network, preset, options);
     require(static_cast<bool>(first));
   }
   constexpr std::size_t blocks = frames / block_frames;
@@ -123,7 +123,7 @@ void play(const Network& network, Preset preset, CompileOptions options) {
   preset.gain = first->instrument.gain;
   options.find_gain = false;
   options.most_modes = patient_modes;
-  const auto second = compile(network, preset, options);
+  const auto second = compile_network(network, preset, options);
   require(static_cast<bool>(second));
   second->engine->go_on_from(*first->engine);
   play_blocks(*second->engine, second->instrument, blocks / 2, blocks);

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "app/control/osc/packet.h"
+#include "tests/support/rooms.h"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   const auto messages = ressort::check_packet({data, size});

@@ -13,6 +13,7 @@
 #include "app/realtime/process.h"
 #include "core/compile/compile.h"
 #include "core/model/language/mdl.h"
+#include "tests/support/rooms.h"
 
 namespace ressort::fuzz {
 

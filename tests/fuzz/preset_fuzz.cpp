@@ -18,8 +18,8 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   const Preset& preset = parsed.preset;
   require(preset.voices >= 1 && preset.voices <= max_voices);
   auto compiled =
-      compile(fuzz::network(), preset,
-              {.rate_hz = fuzz::Harness::rate_hz, .voices = std::min(preset.voices, 3)});
+      compile_network(fuzz::network(), preset,
+                      {.rate_hz = fuzz::Harness::rate_hz, .voices = std::min(preset.voices, 3)});
   if (!compiled) {
     require(!compiled.error().message.empty() && compiled.error().line >= 1);
     return 0;

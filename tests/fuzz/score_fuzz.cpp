@@ -11,8 +11,8 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     require(!lines.error().message.empty() && lines.error().line >= 1);
     return 0;
   }
-  auto compiled = compile(fuzz::network(), default_preset(fuzz::network(), false),
-                          {.rate_hz = fuzz::Harness::rate_hz});
+  auto compiled = compile_network(fuzz::network(), default_preset(fuzz::network(), false),
+                                  {.rate_hz = fuzz::Harness::rate_hz});
   require(static_cast<bool>(compiled));
   fuzz::Harness harness(*std::move(compiled));
   for (const ScoreLine& line : *lines) {

@@ -4,6 +4,7 @@
 #include <cstdlib>
 
 #include "app/commands/smf/midi_file.h"
+#include "tests/support/rooms.h"
 
 namespace {
 

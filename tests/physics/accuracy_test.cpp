@@ -374,7 +374,7 @@ TEST_CASE("and so on 300 networks", "[.][accuracy_everywhere]") {
 }
 
 Plan plan_of(const std::string& text, const Preset& preset, const Budget& budget) {
-  auto compiled = compile(support::network_of(text), preset, {.budget = budget});
+  auto compiled = compile_network(support::network_of(text), preset, {.budget = budget});
   REQUIRE(compiled);
   return std::move(compiled->plan);
 }
@@ -498,8 +498,8 @@ TEST_CASE("what nobody knows is not said to be kept", "[accuracy]") {
   Preset preset = support::struck(1);
   preset.keyboard = false;
   const auto plan_for = [&](const std::string& text) {
-    auto compiled = compile(support::network_of(text), preset,
-                            {.budget = Budget{.cents = 3.0}, .most_modes = 100});
+    auto compiled = compile_network(support::network_of(text), preset,
+                                    {.budget = Budget{.cents = 3.0}, .most_modes = 100});
     REQUIRE(compiled);
     return std::move(compiled->plan);
   };

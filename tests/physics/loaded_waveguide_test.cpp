@@ -14,7 +14,7 @@ double cents_of(const std::string& text, const std::string& keys, int key, doubl
       parse_preset("model = \"guide.mdl\"\ngain = 1\n" + keys +
                    "[[control]]\nfrom = \"note\"\nto = \"in1\"\nhow = \"impulse\"\n");
   REQUIRE(parsed.ok());
-  auto compiled = compile(network_of(text), parsed.preset, {.rate_hz = rate_hz});
+  auto compiled = compile_network(network_of(text), parsed.preset, {.rate_hz = rate_hz});
   REQUIRE(compiled);
   const auto frames = static_cast<std::size_t>(1.2 * rate_hz);
   std::vector<double> sound(frames);

@@ -229,8 +229,8 @@ struct Show {
 
   void perform(const Turn& turn, bool directly, std::size_t frames) {
     const Network network = network_of(turn.subject->text);
-    auto made = compile(network, preset_of(network, false, 2),
-                        {.method = directly ? Method::direct : turn.method});
+    auto made = compile_network(network, preset_of(network, false, 2),
+                                {.method = directly ? Method::direct : turn.method});
     REQUIRE(made);
     const Sounding* const refused =
         process.slot.offer(new Sounding{std::move(made->engine), ++serial});

@@ -127,8 +127,8 @@ TEST_CASE("S22: a light mass on a heavy one may be as stiff as it is stable", "[
   // Row by row it would have been twice too careful: k (1/.001 + 1/.001) < 4.
   const auto verdict = [&](double k) {
     const Network network = network_of(text);
-    const auto compiled =
-        compile(network, default_preset(network, true), {.bare = true, .settings = {{"k", k}}});
+    const auto compiled = compile_network(network, default_preset(network, true),
+                                          {.bare = true, .settings = {{"k", k}}});
     REQUIRE(compiled);
     return compiled->stability.verdict;
   };
@@ -173,7 +173,7 @@ TEST_CASE("S25: models that make no sense are told so, or are silent; none says 
         "@a mass 1. 0. 0.\n" + heard,                                                 // no link
         "@g ground 0.\n" + scenes::output(1, "g")}) {                                 // no mass
     INFO(text);
-    auto compiled = compile(network_of(text), default_preset(network_of(text), false), {});
+    auto compiled = compile_network(network_of(text), default_preset(network_of(text), false), {});
     if (!compiled) {
       has(compiled.error().message, "is not above 0");
       continue;
@@ -244,8 +244,8 @@ TEST_CASE("S25: samples that are no numbers are silence, and what comes after is
   preset.controls = {{.source = ControlSource::audio, .number = 1, .target = "in1"}};
   const auto heard = [&](float garbage, bool is_bare) {
     auto compiled =
-        compile(network_of(text), is_bare ? default_preset(network_of(text), true) : preset,
-                {.bare = is_bare});
+        compile_network(network_of(text), is_bare ? default_preset(network_of(text), true) : preset,
+                        {.bare = is_bare});
     REQUIRE(compiled);
     Process process(44100.0, false);
     process.slot.offer(new Sounding{std::move(compiled->engine), 1});

@@ -177,7 +177,8 @@ TEST_CASE("A voice is struck in the very sample in which it begins", "[strike]")
 
 // Which mass a name stands for, as whoever strikes it asks.
 std::uint32_t mass_called(const std::string& text, const std::string& name) {
-  const auto compiled = compile(network_of(text), Preset(), {.rate_hz = 48000.0, .bare = true});
+  const auto compiled =
+      compile_network(network_of(text), Preset(), {.rate_hz = 48000.0, .bare = true});
   REQUIRE(compiled);
   const auto& struck = compiled->instrument.struck;
   const auto found = std::find_if(struck.begin(), struck.end(),
@@ -274,7 +275,8 @@ TEST_CASE("A model without any input is struck, and costs nothing until then", "
   CHECK(player.compiled.engine->meters().stepped == 1);
   CHECK(peak(player.y()) > 0.0);
   // What nobody hears is left out as before.
-  const auto deaf = compile(network_of(scenes::string("s", 20, "0.1", "0.001")), preset, options);
+  const auto deaf =
+      compile_network(network_of(scenes::string("s", 20, "0.1", "0.001")), preset, options);
   REQUIRE(deaf);
   CHECK(deaf->instrument.struck.empty());
   for (const Program& part : deaf->engine->machine().parts) {

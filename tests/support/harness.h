@@ -16,6 +16,7 @@
 #include "core/model/language/mdl.h"
 #include "tests/support/catch.h"
 #include "tests/support/random.h"
+#include "tests/support/rooms.h"
 #include "tests/support/scenes.h"
 
 namespace ressort::support {

@@ -1,4 +1,4 @@
-// tests: an engine as compile() makes it, played and listened to.
+// tests: an engine as compile_network() makes it, played and listened to.
 #pragma once
 
 #include <span>
@@ -58,7 +58,7 @@ class Player {
   explicit Player(Compiled made)
       : compiled(std::move(made)), out(static_cast<std::size_t>(compiled.instrument.outputs)) {}
   Player(const std::string& text, const Preset& preset, const CompileOptions& options = {}) {
-    auto made = compile(network_of(text), preset, options);
+    auto made = compile_network(network_of(text), preset, options);
     REQUIRE(made);
     compiled = *std::move(made);
     out.resize(static_cast<std::size_t>(compiled.instrument.outputs));

@@ -5,6 +5,7 @@
 #include "core/laws/laws.h"
 #include "core/model/network.h"
 #include "tests/support/reference.h"
+#include "tests/support/rooms.h"
 
 namespace ressort::reference {
 

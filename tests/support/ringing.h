@@ -11,6 +11,7 @@
 #include "core/identification/identify.h"
 #include "tests/support/catch.h"
 #include "tests/support/random.h"
+#include "tests/support/rooms.h"
 
 namespace ressort::support {
 

@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "core/solids/surface.h"
+#include "tests/support/rooms.h"
 
 namespace ressort::support {
 

@@ -21,6 +21,7 @@
 #include "app/session/loader.h"
 #include "core/compile/compile.h"
 #include "tests/support/random.h"
+#include "tests/support/rooms.h"
 
 namespace {
 
@@ -298,7 +299,8 @@ int main(int argc, char** argv) {
       return 2;
     }
     for (const bool force : {false, true}) {
-      auto compiled = compile(scene->network, scene->preset, {.rate_hz = rate_hz, .force = force});
+      auto compiled =
+          compile_network(scene->network, scene->preset, {.rate_hz = rate_hz, .force = force});
       if (!compiled) {
         std::fprintf(stderr, "%s: %s\n", name.c_str(), compiled.error().message.c_str());
         return 2;

@@ -10,6 +10,7 @@
 
 #include "core/model/network.h"
 #include "tests/support/random.h"
+#include "tests/support/rooms.h"
 
 namespace ressort::support {
 

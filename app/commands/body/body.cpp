@@ -4,7 +4,7 @@
 
 #include "app/exit_code.h"
 
-namespace ressort {
+namespace ressort::commands {
 
 int body_command(const BodyRequest& request) {
   const bool is_model = request.input.ends_with(".mdl") || request.input.ends_with(".toml");
@@ -36,4 +36,4 @@ int body_command(const BodyRequest& request) {
   return recording_body(options);
 }
 
-}  // namespace ressort
+}  // namespace ressort::commands

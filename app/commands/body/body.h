@@ -8,7 +8,7 @@
 
 #include "app/commands/body/solid.h"
 
-namespace ressort {
+namespace ressort::commands {
 
 // Of recordings.
 struct BodyOptions {
@@ -50,4 +50,4 @@ int body_command(const BodyRequest& request);
 int recording_body(const BodyOptions& options);
 int network_body(const NetworkBodyOptions& options);
 
-}  // namespace ressort
+}  // namespace ressort::commands

@@ -20,7 +20,7 @@
 #include "core/model/language/expression.h"
 #include "core/progress.h"
 
-namespace ressort {
+namespace ressort::commands {
 namespace {
 
 namespace fs = std::filesystem;
@@ -304,4 +304,4 @@ Result<Meshed> fill_with_tetrahedra(const ClosedSurface& closed, const MeshOrder
                 " installed: apt install gmsh; boxes and balls need neither"};
 }
 
-}  // namespace ressort
+}  // namespace ressort::commands

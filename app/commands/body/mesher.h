@@ -5,10 +5,11 @@
 #include <functional>
 #include <string>
 
+#include "app/rooms.h"
 #include "core/result.h"
 #include "core/solids/solid_mesh.h"
 
-namespace ressort {
+namespace ressort::commands {
 
 enum class Mesher {
   automatic,  // what fits of the others, the first first
@@ -33,4 +34,4 @@ struct Meshed {
 Result<Meshed> fill_with_tetrahedra(const ClosedSurface& closed, const MeshOrder& order,
                                     const std::function<bool()>& goes_on);
 
-}  // namespace ressort
+}  // namespace ressort::commands

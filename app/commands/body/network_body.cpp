@@ -13,7 +13,7 @@
 #include "core/model/language/print.h"
 #include "core/model/language/tokens.h"
 
-namespace ressort {
+namespace ressort::commands {
 namespace {
 
 int refuse(const std::string& message) {
@@ -129,4 +129,4 @@ int network_body(const NetworkBodyOptions& options) {
   return exit_code::done;
 }
 
-}  // namespace ressort
+}  // namespace ressort::commands

@@ -14,7 +14,7 @@
 #include "app/text.h"
 #include "core/identification/identify.h"
 
-namespace ressort {
+namespace ressort::commands {
 namespace {
 
 constexpr double longest_read_s = 60.0;
@@ -124,4 +124,4 @@ int recording_body(const BodyOptions& options) {
   return exit_code::done;
 }
 
-}  // namespace ressort
+}  // namespace ressort::commands

@@ -11,7 +11,7 @@
 #include "app/text.h"
 #include "core/linear_algebra/fourier.h"
 
-namespace ressort {
+namespace ressort::commands {
 namespace {
 
 constexpr double width = 900.0;
@@ -197,4 +197,4 @@ std::string recording_picture(const Identification& found, const std::string& ti
          frequency_axis(rest) + "</svg>\n";
 }
 
-}  // namespace ressort
+}  // namespace ressort::commands

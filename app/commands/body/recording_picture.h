@@ -3,12 +3,13 @@
 
 #include <string>
 
+#include "app/rooms.h"
 #include "core/identification/identify.h"
 
-namespace ressort {
+namespace ressort::commands {
 
 // An SVG: the recording's spectrum with a mark for each mode where its own peak is, how long each
 // rings, and the spectrum of what the modes leave.
 std::string recording_picture(const Identification& found, const std::string& title);
 
-}  // namespace ressort
+}  // namespace ressort::commands

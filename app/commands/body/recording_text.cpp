@@ -12,7 +12,7 @@
 #include "core/identification/shapes.h"
 #include "core/model/language/expression.h"
 
-namespace ressort {
+namespace ressort::commands {
 namespace {
 
 using nlohmann::json;
@@ -176,4 +176,4 @@ std::string identification_json(const Identification& found, double mass) {
   return out.dump(2, ' ', false, json::error_handler_t::replace) + "\n";
 }
 
-}  // namespace ressort
+}  // namespace ressort::commands

@@ -3,9 +3,10 @@
 
 #include <string>
 
+#include "app/rooms.h"
 #include "core/identification/identify.h"
 
-namespace ressort {
+namespace ressort::commands {
 
 // A label of the language out of a file's name: letters, digits and _; "body" if none is left.
 std::string label_of_file(const std::string& path);
@@ -19,4 +20,4 @@ std::string body_model(const Identification& found, const std::string& label,
 // One object: modes, residual, warnings.
 std::string identification_json(const Identification& found, double mass);
 
-}  // namespace ressort
+}  // namespace ressort::commands

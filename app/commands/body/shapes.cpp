@@ -8,7 +8,7 @@
 #include "app/commands/svg.h"
 #include "app/text.h"
 
-namespace ressort {
+namespace ressort::commands {
 namespace {
 
 constexpr std::size_t most_modes = 12;
@@ -148,4 +148,4 @@ std::string shapes_picture(const SolidMesh& mesh, const SolidModes& modes,
   return svg + "</svg>\n";
 }
 
-}  // namespace ressort
+}  // namespace ressort::commands

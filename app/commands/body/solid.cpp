@@ -16,7 +16,7 @@
 #include "app/text.h"
 #include "core/model/language/expression.h"
 
-namespace ressort {
+namespace ressort::commands {
 namespace {
 
 constexpr std::size_t max_solid_bytes = std::size_t{256} << 20;
@@ -381,4 +381,4 @@ int solid_body(const SolidBodyOptions& options) {
   }
 }
 
-}  // namespace ressort
+}  // namespace ressort::commands

@@ -9,7 +9,7 @@
 #include "app/commands/body/mesher.h"
 #include "core/solids/solid_modes.h"
 
-namespace ressort {
+namespace ressort::commands {
 
 // A place as a person picks it, in the file's own unit.
 struct PickedPlace {
@@ -51,4 +51,4 @@ Result<SolidClamp> parse_clamp(const std::string& text);
 // Which materials there are, a row each under a head: name, E, nu, rho, eta.
 std::vector<std::vector<std::string>> material_table();
 
-}  // namespace ressort
+}  // namespace ressort::commands

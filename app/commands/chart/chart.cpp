@@ -18,7 +18,7 @@
 #include "app/text.h"
 #include "app/version.h"
 
-namespace ressort {
+namespace ressort::commands {
 namespace {
 
 Flag interrupted;  // by Ctrl-C
@@ -282,4 +282,4 @@ int chart(const ChartOptions& options) {
   return interrupted.is_raised() ? exit_code::our_failure : code;
 }
 
-}  // namespace ressort
+}  // namespace ressort::commands

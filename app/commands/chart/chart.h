@@ -10,7 +10,7 @@
 #include "app/commands/start_chart.h"
 #include "core/result.h"
 
-namespace ressort {
+namespace ressort::commands {
 
 int chart(const ChartOptions& options);
 
@@ -19,4 +19,4 @@ int chart(const ChartOptions& options);
 Result<ChartSheet> make_sheet(const ChartScene& scene, Isa isa, double patience_s,
                               const std::function<bool(const std::string&)>& tells);
 
-}  // namespace ressort
+}  // namespace ressort::commands

@@ -7,7 +7,7 @@
 #include <ctime>
 #include <numeric>
 
-namespace ressort {
+namespace ressort::commands {
 namespace {
 
 constexpr double lengths_s[] = {1.0, 0.3, 0.1, 0.03};
@@ -102,4 +102,4 @@ void stay_on_one_core() {
   sched_setaffinity(0, sizeof cores, &cores);
 }
 
-}  // namespace ressort
+}  // namespace ressort::commands

@@ -6,7 +6,7 @@
 
 #include "app/commands/chart/ways.h"
 
-namespace ressort {
+namespace ressort::commands {
 
 struct Timing {
   std::vector<double> ns;        // [way] per output sample
@@ -24,4 +24,4 @@ Timing time_ways(std::vector<MadeWay>& ways, double patience_s, const std::funct
 // This thread stays on the core that it is on.
 void stay_on_one_core();
 
-}  // namespace ressort
+}  // namespace ressort::commands

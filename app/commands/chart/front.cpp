@@ -4,7 +4,7 @@
 #include <cmath>
 #include <numeric>
 
-namespace ressort {
+namespace ressort::commands {
 namespace {
 
 bool counts(const Trade& trade) {
@@ -58,4 +58,4 @@ double hypervolume(std::span<const Trade> trades) {
   return area;
 }
 
-}  // namespace ressort
+}  // namespace ressort::commands

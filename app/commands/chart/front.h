@@ -5,7 +5,9 @@
 #include <span>
 #include <vector>
 
-namespace ressort {
+#include "app/rooms.h"
+
+namespace ressort::commands {
 
 // What a way costs, and how good it is: smaller x and larger y are better.
 struct Trade {
@@ -27,4 +29,4 @@ std::vector<bool> front_of(std::span<const Trade> trades);
 // with `most_db` as the most. A decade faster at 100 dB adds 100.
 double hypervolume(std::span<const Trade> trades);
 
-}  // namespace ressort
+}  // namespace ressort::commands

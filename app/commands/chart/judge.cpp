@@ -7,7 +7,7 @@
 #include "core/compile/machine.h"
 #include "core/engine/reference.h"
 
-namespace ressort {
+namespace ressort::commands {
 namespace {
 
 constexpr double exact_db = 400.0;         // what cannot be told from exact
@@ -426,4 +426,4 @@ std::string Stress::verdict(const Case& one, const Way& way) const {
   return energy->highest > stress_excess * one.energy ? "has more energy than it got" : "";
 }
 
-}  // namespace ressort
+}  // namespace ressort::commands

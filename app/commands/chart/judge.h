@@ -14,7 +14,7 @@
 #include "app/commands/chart/ways.h"
 #include "core/analysis/continuous.h"
 
-namespace ressort {
+namespace ressort::commands {
 
 inline constexpr std::array<double, 3> chart_windows_s = {0.005, 0.05, 1.0};
 inline constexpr double heard_s = 1.0;    // how long everything is played
@@ -104,4 +104,4 @@ class Stress {
 double signal_to_error_db(const Waves& reference, const Waves& found, std::size_t from,
                           std::size_t to);
 
-}  // namespace ressort
+}  // namespace ressort::commands

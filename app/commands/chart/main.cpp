@@ -13,7 +13,7 @@ int run(int argc, char** argv) {
     std::fputs("this is a part of ressort: start it as `ressort chart`\n", stderr);
     return ressort::exit_code::wrong_use;
   }
-  return ressort::chart(ressort::chart_options({argv + 1, argv + argc}));
+  return ressort::commands::chart(ressort::commands::chart_options({argv + 1, argv + argc}));
 }
 
 }  // namespace

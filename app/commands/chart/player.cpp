@@ -6,7 +6,7 @@
 #include "app/realtime/denormals.h"
 #include "core/kernels/kernel.h"
 
-namespace ressort {
+namespace ressort::commands {
 namespace {
 
 constexpr std::size_t most_kept = std::size_t{1} << 22;  // samples of a motion
@@ -195,4 +195,4 @@ std::unique_ptr<ChartPlayer> make_player(const Machine& machine,
   return std::make_unique<KernelPlayer<float>>(machine, motions, seconds, isa);
 }
 
-}  // namespace ressort
+}  // namespace ressort::commands

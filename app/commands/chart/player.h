@@ -9,7 +9,7 @@
 #include "core/engine/engine.h"
 #include "core/kernels/program.h"
 
-namespace ressort {
+namespace ressort::commands {
 
 // [part][node]
 using States = std::vector<std::vector<double>>;
@@ -35,4 +35,4 @@ std::unique_ptr<ChartPlayer> make_player(const Machine& machine,
                                          const std::vector<InputMotion>& motions, double seconds,
                                          Precision precision, Isa isa);
 
-}  // namespace ressort
+}  // namespace ressort::commands

@@ -8,7 +8,7 @@
 #include "app/commands/chart/judge.h"
 #include "core/compile/machine.h"
 
-namespace ressort {
+namespace ressort::commands {
 namespace {
 
 constexpr std::size_t most_mapped = 128;  // states, where partials do not swing alone
@@ -234,4 +234,4 @@ Poles poles_of(const ChartScene& scene, const Continuous& continuous, MadeWay& w
   return poles;
 }
 
-}  // namespace ressort
+}  // namespace ressort::commands

@@ -12,7 +12,7 @@
 #include "core/model/language/mdl.h"
 #include "core/model/topology.h"
 
-namespace ressort {
+namespace ressort::commands {
 namespace {
 
 constexpr double velocity = 0.8;      // of the note
@@ -336,4 +336,4 @@ ChartScene struck_harder(const ChartScene& scene) {
   return hard;
 }
 
-}  // namespace ressort
+}  // namespace ressort::commands

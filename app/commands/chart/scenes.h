@@ -10,7 +10,7 @@
 #include "core/model/network.h"
 #include "core/result.h"
 
-namespace ressort {
+namespace ressort::commands {
 
 // The rate that scenes' numbers are written for.
 inline constexpr double scene_rate_hz = Network::reference_rate_hz;
@@ -45,4 +45,4 @@ ChartScene struck(const ChartScene& scene);
 // The same, hit ten times harder: start and motions.
 ChartScene struck_harder(const ChartScene& scene);
 
-}  // namespace ressort
+}  // namespace ressort::commands

@@ -4,7 +4,7 @@
 
 #include "core/analysis/continuous.h"
 
-namespace ressort {
+namespace ressort::commands {
 
 Starts::Starts(const ChartScene& scene) {
   scenes_.fill(scene);
@@ -37,4 +37,4 @@ const ChartScene& Starts::at(unsigned steps_a_sample) const {
   return scenes_[static_cast<std::size_t>(std::countr_zero(steps_a_sample))];
 }
 
-}  // namespace ressort
+}  // namespace ressort::commands

@@ -6,7 +6,7 @@
 
 #include "app/commands/chart/scenes.h"
 
-namespace ressort {
+namespace ressort::commands {
 
 // A scheme knows of a mass's speed only by where it comes in its first step. So the one scene is as
 // many as there are lengths of a step: in each, masses start towards where the continuous network
@@ -20,4 +20,4 @@ class Starts {
   std::array<ChartScene, 4> scenes_;
 };
 
-}  // namespace ressort
+}  // namespace ressort::commands

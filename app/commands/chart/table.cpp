@@ -5,7 +5,7 @@
 
 #include "app/text.h"
 
-namespace ressort {
+namespace ressort::commands {
 namespace {
 
 std::string number(double value) {
@@ -153,4 +153,4 @@ std::string chart_csv(const std::vector<ChartSheet>& sheets, const Provenance& p
   return text;
 }
 
-}  // namespace ressort
+}  // namespace ressort::commands

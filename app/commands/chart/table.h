@@ -9,7 +9,7 @@
 #include "app/commands/chart/judge.h"
 #include "app/commands/chart/ways.h"
 
-namespace ressort {
+namespace ressort::commands {
 
 struct ChartRow {
   Way way;
@@ -58,4 +58,4 @@ std::string to_string(const Provenance& provenance);
 // All sheets as one table: what it means, in lines with '#'; names of columns; rows.
 std::string chart_csv(const std::vector<ChartSheet>& sheets, const Provenance& provenance);
 
-}  // namespace ressort
+}  // namespace ressort::commands

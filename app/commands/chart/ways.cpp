@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <span>
 
-namespace ressort {
+namespace ressort::commands {
 namespace {
 
 struct NamedPrecision {
@@ -136,7 +136,7 @@ Result<MadeWay> make_way(const ChartScene& scene, const Way& way, double seconds
     }
     options.budget = *budget;
   }
-  auto compiled = compile(scene.network, Preset{.keyboard = false}, options);
+  auto compiled = compile_network(scene.network, Preset{.keyboard = false}, options);
   if (!compiled) {
     return compiled.error();
   }
@@ -169,4 +169,4 @@ bool same_kind(const Machine& a, const Machine& b) {
          std::equal(a.parts.begin(), a.parts.end(), b.parts.begin(), b.parts.end(), parts);
 }
 
-}  // namespace ressort
+}  // namespace ressort::commands

@@ -10,7 +10,7 @@
 #include "app/commands/chart/player.h"
 #include "core/compile/compile.h"
 
-namespace ressort {
+namespace ressort::commands {
 
 struct Way {
   std::string name;              // "direct 4x", "modal silence=-60"
@@ -45,4 +45,4 @@ Result<MadeWay> make_way(const ChartScene& scene, const Way& way, double seconds
 // Are all parts in forms and schemes of the same kinds?
 bool same_kind(const Machine& a, const Machine& b);
 
-}  // namespace ressort
+}  // namespace ressort::commands

@@ -9,7 +9,7 @@
 #include "app/version.h"
 #include "core/kernels/isa.h"
 
-namespace ressort {
+namespace ressort::commands {
 namespace {
 
 using Kind = FlightRecord::Kind;
@@ -158,4 +158,4 @@ Result<Done> FlightPlayer::play(const std::function<Result<Done>(std::span<const
   return Done{};
 }
 
-}  // namespace ressort
+}  // namespace ressort::commands

@@ -9,7 +9,7 @@
 #include "app/session/flight/flight.h"
 #include "core/result.h"
 
-namespace ressort {
+namespace ressort::commands {
 
 class FlightPlayer {
  public:
@@ -37,4 +37,4 @@ class FlightPlayer {
   std::int64_t heard_from_ = 0;  // frame
 };
 
-}  // namespace ressort
+}  // namespace ressort::commands

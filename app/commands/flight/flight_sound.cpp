@@ -7,7 +7,7 @@
 
 #include "app/session/sound_file.h"
 
-namespace ressort {
+namespace ressort::commands {
 
 Result<Rendered> render_flight(const RenderOptions& options,
                                const std::function<bool(double)>& progress) {
@@ -82,4 +82,4 @@ Result<SampleTape> tape_of(const FlightPlayer& player,
   return played ? Result<SampleTape>(std::move(tape)) : played.error();
 }
 
-}  // namespace ressort
+}  // namespace ressort::commands

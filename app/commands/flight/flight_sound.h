@@ -6,7 +6,7 @@
 #include "app/commands/flight/flight_player.h"
 #include "app/commands/offline.h"
 
-namespace ressort {
+namespace ressort::commands {
 
 // Of a RenderOptions whose name is a flight's: its last `seconds`, or flight_heard_s. As render().
 Result<Rendered> render_flight(const RenderOptions& options,
@@ -15,4 +15,4 @@ Result<Rendered> render_flight(const RenderOptions& options,
 // The same samples, to be played by a Process.
 Result<SampleTape> tape_of(const FlightPlayer& player, const std::function<bool(double)>& progress);
 
-}  // namespace ressort
+}  // namespace ressort::commands

@@ -18,7 +18,7 @@
 #include "app/text.h"
 #include "app/version.h"
 
-namespace ressort {
+namespace ressort::commands {
 namespace {
 
 constexpr std::size_t spectrogram_rows = 217;  // two for each semitone of nine octaves, and one
@@ -310,4 +310,4 @@ int gallery(const GalleryOptions& options, const GoesOn& goes_on) {
   return code;
 }
 
-}  // namespace ressort
+}  // namespace ressort::commands

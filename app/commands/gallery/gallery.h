@@ -4,7 +4,9 @@
 #include <functional>
 #include <string>
 
-namespace ressort {
+#include "app/rooms.h"
+
+namespace ressort::commands {
 
 struct GalleryOptions {
   std::string folder;  // for all of it; made where it is not there
@@ -18,4 +20,4 @@ struct GalleryOptions {
 // says no. The exit code.
 int gallery(const GalleryOptions& options, const std::function<bool()>& goes_on);
 
-}  // namespace ressort
+}  // namespace ressort::commands

@@ -4,7 +4,7 @@
 
 #include "app/commands/gallery/sound.h"
 
-namespace ressort {
+namespace ressort::commands {
 
 Result<double> loudness_lufs(const Sound& sound) {
   const auto close = [](ebur128_state* state) { ebur128_destroy(&state); };
@@ -28,4 +28,4 @@ Result<double> loudness_lufs(const Sound& sound) {
   return std::max(silence_db, lufs);  // of silence it is minus infinity
 }
 
-}  // namespace ressort
+}  // namespace ressort::commands

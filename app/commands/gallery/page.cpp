@@ -6,7 +6,7 @@
 #include "app/commands/svg.h"
 #include "app/text.h"
 
-namespace ressort {
+namespace ressort::commands {
 namespace {
 
 // Levels that a spectrogram shows, from white to black.
@@ -347,4 +347,4 @@ std::vector<std::vector<std::string>> gallery_table(const std::vector<ShownPrese
   return rows;
 }
 
-}  // namespace ressort
+}  // namespace ressort::commands

@@ -9,7 +9,7 @@
 #include "app/commands/gallery/spectrogram.h"
 #include "app/commands/offline.h"
 
-namespace ressort {
+namespace ressort::commands {
 
 // A note of the phrase, and where its fundamental should be; 0: keys do not set the pitch.
 struct ShownNote {
@@ -55,4 +55,4 @@ std::string gallery_picture(const std::vector<ShownPreset>& presets);
 // The figures as people read them, a row for each preset under a head.
 std::vector<std::vector<std::string>> gallery_table(const std::vector<ShownPreset>& presets);
 
-}  // namespace ressort
+}  // namespace ressort::commands

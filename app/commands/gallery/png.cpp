@@ -4,7 +4,7 @@
 
 #include <vector>
 
-namespace ressort {
+namespace ressort::commands {
 namespace {
 
 // RFC 4648.
@@ -40,4 +40,4 @@ std::string png_data_url(std::span<const std::uint8_t> pixels, std::size_t width
   return "data:image/png;base64," + base64(std::span(bytes).first(size));
 }
 
-}  // namespace ressort
+}  // namespace ressort::commands

@@ -6,11 +6,13 @@
 #include <span>
 #include <string>
 
-namespace ressort {
+#include "app/rooms.h"
+
+namespace ressort::commands {
 
 // "data:image/png;base64,...": `pixels` are grey, 0 is black, [row from the top][column]. Empty
 // where there is no memory for it.
 std::string png_data_url(std::span<const std::uint8_t> pixels, std::size_t width,
                          std::size_t height);
 
-}  // namespace ressort
+}  // namespace ressort::commands

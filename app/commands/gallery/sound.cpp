@@ -6,7 +6,7 @@
 #include <numbers>
 #include <span>
 
-namespace ressort {
+namespace ressort::commands {
 namespace {
 
 // The frames of a stretch.
@@ -249,4 +249,4 @@ std::optional<StrongPartial> partial_near(const Sound& sound, Stretch stretch, d
   return found;
 }
 
-}  // namespace ressort
+}  // namespace ressort::commands

@@ -9,7 +9,7 @@
 #include "app/session/sound_file.h"
 #include "core/result.h"
 
-namespace ressort {
+namespace ressort::commands {
 
 // A stretch of a sound; what lies outside of the sound is left out.
 struct Stretch {
@@ -62,4 +62,4 @@ std::optional<StrongPartial> partial_near(const Sound& sound, Stretch stretch, d
 
 double cents_between(double from_hz, double to_hz);
 
-}  // namespace ressort
+}  // namespace ressort::commands

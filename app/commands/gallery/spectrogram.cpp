@@ -6,7 +6,7 @@
 
 #include "app/commands/gallery/png.h"
 
-namespace ressort {
+namespace ressort::commands {
 namespace {
 
 constexpr double periods = 34.0;
@@ -115,4 +115,4 @@ std::string to_data_url(const Spectrogram& spectrogram, double lightest_dbfs, do
   return png_data_url(pixels, spectrogram.columns, spectrogram.rows);
 }
 
-}  // namespace ressort
+}  // namespace ressort::commands

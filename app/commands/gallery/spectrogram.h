@@ -7,7 +7,7 @@
 
 #include "app/commands/gallery/sound.h"
 
-namespace ressort {
+namespace ressort::commands {
 
 struct Spectrogram {
   double lowest_hz = 27.5;
@@ -35,4 +35,4 @@ Spectrogram made_smaller(const Spectrogram& from, std::size_t rows, std::size_t 
 // `darkest_dbfs` and more black, in 48 steps. Low frequencies are below.
 std::string to_data_url(const Spectrogram& spectrogram, double lightest_dbfs, double darkest_dbfs);
 
-}  // namespace ressort
+}  // namespace ressort::commands

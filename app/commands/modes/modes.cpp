@@ -15,7 +15,7 @@
 #include "core/model/language/print.h"
 #include "core/model/topology.h"
 
-namespace ressort {
+namespace ressort::commands {
 namespace {
 
 int refuse(const std::string& message) {
@@ -152,4 +152,4 @@ int modes_command(const ModesOptions& options) {
   return exit_code::done;
 }
 
-}  // namespace ressort
+}  // namespace ressort::commands

@@ -6,10 +6,11 @@
 #include <string>
 #include <vector>
 
+#include "app/rooms.h"
 #include "core/analysis/modes/scaling.h"
 #include "core/model/network.h"
 
-namespace ressort {
+namespace ressort::commands {
 
 struct ModesOptions {
   std::string name;
@@ -27,4 +28,4 @@ struct ModesOptions {
 // Tells the modes on stdout, those of the tuned model where it is to be tuned. [main]
 int modes_command(const ModesOptions& options);
 
-}  // namespace ressort
+}  // namespace ressort::commands

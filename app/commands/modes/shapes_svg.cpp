@@ -11,7 +11,7 @@
 #include "app/text.h"
 #include "core/analysis/modes/layout.h"
 
-namespace ressort {
+namespace ressort::commands {
 namespace {
 
 constexpr double panel_width = 260.0;
@@ -166,4 +166,4 @@ std::string shapes_svg(const NetworkModes& modes, const Network& network,
   return svg + "</svg>\n";
 }
 
-}  // namespace ressort
+}  // namespace ressort::commands

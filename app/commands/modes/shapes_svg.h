@@ -3,9 +3,10 @@
 
 #include <string>
 
+#include "app/rooms.h"
 #include "core/analysis/modes/modes.h"
 
-namespace ressort {
+namespace ressort::commands {
 
 inline constexpr std::size_t most_drawn_modes = 48;
 
@@ -14,4 +15,4 @@ inline constexpr std::size_t most_drawn_modes = 48;
 // line. `network` is what the modes were found of, as it is written. Pure.
 std::string shapes_svg(const NetworkModes& modes, const Network& network, const std::string& title);
 
-}  // namespace ressort
+}  // namespace ressort::commands

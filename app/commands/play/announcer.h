@@ -12,7 +12,7 @@
 #include "app/exit_code.h"
 #include "app/say.h"
 
-namespace ressort {
+namespace ressort::commands {
 
 // What a person hears of the program while it plays: above the console's prompt if there is one.
 class Announcer {
@@ -62,4 +62,4 @@ class LastResort {
   std::thread thread_;
 };
 
-}  // namespace ressort
+}  // namespace ressort::commands

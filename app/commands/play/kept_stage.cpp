@@ -5,7 +5,7 @@
 #include "app/session/files.h"
 #include "core/model/language/expression.h"
 
-namespace ressort {
+namespace ressort::commands {
 namespace {
 
 namespace fs = std::filesystem;
@@ -108,4 +108,4 @@ Result<KeptStage> find_stage(const std::string& folder) {
   return stage;
 }
 
-}  // namespace ressort
+}  // namespace ressort::commands

@@ -8,7 +8,7 @@
 #include "app/devices/wiring.h"
 #include "app/session/session.h"
 
-namespace ressort {
+namespace ressort::commands {
 
 struct KeptStage {
   std::string scene;                // a path; empty: nothing was kept
@@ -26,4 +26,4 @@ std::string stage_state(const Session& session);
 // Nothing kept where there is no such folder; an error where there is one that cannot be read.
 Result<KeptStage> find_stage(const std::string& folder);
 
-}  // namespace ressort
+}  // namespace ressort::commands

@@ -25,7 +25,7 @@
 #include "app/session/load_news.h"
 #include "app/text.h"
 
-namespace ressort {
+namespace ressort::commands {
 namespace {
 
 using namespace std::chrono_literals;
@@ -591,4 +591,4 @@ int play(const PlayOptions& options) {
   return code;
 }
 
-}  // namespace ressort
+}  // namespace ressort::commands

@@ -6,7 +6,7 @@
 
 #include "app/session/files.h"
 
-namespace ressort {
+namespace ressort::commands {
 namespace {
 
 using Bytes = std::span<const std::uint8_t>;
@@ -303,4 +303,4 @@ bool names_midi_file(std::string_view path) {
   return lower.ends_with(".mid") || lower.ends_with(".midi");
 }
 
-}  // namespace ressort
+}  // namespace ressort::commands

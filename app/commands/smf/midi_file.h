@@ -8,9 +8,10 @@
 #include <string_view>
 #include <vector>
 
+#include "app/rooms.h"
 #include "core/result.h"
 
-namespace ressort {
+namespace ressort::commands {
 
 inline constexpr std::size_t max_midi_file_bytes = std::size_t{16} << 20;
 
@@ -42,4 +43,4 @@ Result<MidiFile> read_midi_file(const std::string& path);
 // Whether a person means such a file by a name: it ends in .mid or .midi, in any case.
 bool names_midi_file(std::string_view path);
 
-}  // namespace ressort
+}  // namespace ressort::commands

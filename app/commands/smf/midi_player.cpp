@@ -5,7 +5,7 @@
 
 #include "app/devices/audio.h"
 
-namespace ressort {
+namespace ressort::commands {
 
 MidiPlayer::MidiPlayer(MidiFile file, MidiDoor& door)
     : file_(std::move(file)), door_(door), thread_([this] { work(); }) {}
@@ -43,4 +43,4 @@ void MidiPlayer::work() {
   is_over_ = true;
 }
 
-}  // namespace ressort
+}  // namespace ressort::commands

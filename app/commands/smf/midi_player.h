@@ -8,7 +8,7 @@
 #include "app/commands/smf/midi_file.h"
 #include "app/devices/midi_input.h"
 
-namespace ressort {
+namespace ressort::commands {
 
 class MidiPlayer {
  public:
@@ -33,4 +33,4 @@ class MidiPlayer {
   std::thread thread_;  // last, so that all else is there when it starts
 };
 
-}  // namespace ressort
+}  // namespace ressort::commands

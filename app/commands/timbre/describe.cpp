@@ -22,7 +22,7 @@
 #include "core/model/preset/fit.h"
 #include "core/model/topology.h"
 
-namespace ressort {
+namespace ressort::commands {
 namespace {
 
 namespace fs = std::filesystem;
@@ -246,4 +246,4 @@ int describe(const DescribeOptions& options, const std::function<bool()>& goes_o
   return exit_code::done;
 }
 
-}  // namespace ressort
+}  // namespace ressort::commands

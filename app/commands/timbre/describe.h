@@ -11,7 +11,7 @@
 #include "core/compile/stability_check.h"
 #include "core/model/network.h"
 
-namespace ressort {
+namespace ressort::commands {
 
 // A parameter that goes from one value to another in so many steps, by equal ratios or differences.
 struct SweptParameter {
@@ -55,4 +55,4 @@ Result<Description> description_of(const DescribeOptions& options,
 // from its modes, if it is linear. `goes_on` answers false to stop. [main]
 int describe(const DescribeOptions& options, const std::function<bool()>& goes_on);
 
-}  // namespace ressort
+}  // namespace ressort::commands

@@ -5,7 +5,7 @@
 #include "app/commands/timbre/describe_text.h"
 #include "app/text.h"
 
-namespace ressort {
+namespace ressort::commands {
 namespace {
 
 constexpr double width = 900.0;
@@ -228,4 +228,4 @@ std::string description_svg(const Description& description, const DescriptionOpt
   return Drawer(description, options).draw();
 }
 
-}  // namespace ressort
+}  // namespace ressort::commands

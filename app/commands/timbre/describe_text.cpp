@@ -7,7 +7,7 @@
 
 #include "app/text.h"
 
-namespace ressort {
+namespace ressort::commands {
 namespace {
 
 using json = nlohmann::ordered_json;
@@ -143,4 +143,4 @@ std::string to_text(const Description& description, const DescriptionOptions& op
   return text;
 }
 
-}  // namespace ressort
+}  // namespace ressort::commands

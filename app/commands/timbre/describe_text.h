@@ -5,7 +5,7 @@
 
 #include "app/commands/timbre/description.h"
 
-namespace ressort {
+namespace ressort::commands {
 
 // Writes one object to stdout, as app/README.md lays it out; a frame's row at a time, as there may
 // be hundreds of thousands of them.
@@ -17,4 +17,4 @@ std::string to_text(const Description& description, const DescriptionOptions& op
 // The spectrum of the loudest frame with its centroid, spread and rolloff, and their course.
 std::string description_svg(const Description& description, const DescriptionOptions& options);
 
-}  // namespace ressort
+}  // namespace ressort::commands

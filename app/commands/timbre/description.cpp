@@ -9,7 +9,7 @@
 #include "core/analysis/timbre/modal_spectrum.h"
 #include "core/analysis/timbre/pitch.h"
 
-namespace ressort {
+namespace ressort::commands {
 namespace {
 
 constexpr std::size_t block_frames = 4096;
@@ -385,4 +385,4 @@ FigureStatistics statistics_of(const Description& description) {
   return statistics;
 }
 
-}  // namespace ressort
+}  // namespace ressort::commands

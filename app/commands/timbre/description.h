@@ -13,7 +13,7 @@
 #include "core/analysis/timbre/frame_analysis.h"
 #include "core/result.h"
 
-namespace ressort {
+namespace ressort::commands {
 
 struct DescriptionOptions {
   std::size_t frame = 2048;  // samples
@@ -70,4 +70,4 @@ struct FigureStatistics {
 };
 FigureStatistics statistics_of(const Description& description);
 
-}  // namespace ressort
+}  // namespace ressort::commands

@@ -21,7 +21,7 @@
 #include "app/text.h"
 #include "core/model/preset/edit.h"
 
-namespace ressort {
+namespace ressort::commands {
 namespace {
 
 using json = nlohmann::ordered_json;
@@ -264,4 +264,4 @@ int shape_model(const ShapeOptions& options, const std::function<bool()>& goes_o
   return exit_code::done;
 }
 
-}  // namespace ressort
+}  // namespace ressort::commands

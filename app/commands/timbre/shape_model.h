@@ -7,10 +7,11 @@
 #include <string>
 #include <vector>
 
+#include "app/rooms.h"
 #include "core/analysis/timbre/ask.h"
 #include "core/model/network.h"
 
-namespace ressort {
+namespace ressort::commands {
 
 struct ShapeOptions {
   std::string name;    // a preset or a model
@@ -27,4 +28,4 @@ struct ShapeOptions {
 // `goes_on` answers false to stop. [main]
 int shape_model(const ShapeOptions& options, const std::function<bool()>& goes_on);
 
-}  // namespace ressort
+}  // namespace ressort::commands

@@ -13,7 +13,7 @@
 #include "core/curve.h"
 #include "core/model/language/expression.h"
 
-namespace ressort {
+namespace ressort::commands {
 namespace {
 
 constexpr int most_steps = 10'000;
@@ -236,4 +236,4 @@ int sweep(const DescribeOptions& options, const std::function<bool()>& goes_on) 
   return exit_code::done;
 }
 
-}  // namespace ressort
+}  // namespace ressort::commands

@@ -9,7 +9,7 @@
 #include "app/commands/timbre/describe.h"
 #include "core/result.h"
 
-namespace ressort {
+namespace ressort::commands {
 
 // "NAME=LOW:HIGH", and ":STEPS", ":log" or ":linear" after it; by equal ratios where the range is
 // wide, unless it says how.
@@ -40,4 +40,4 @@ Result<std::string> sweep_svg(const SweepTable& table, const DescribeOptions& op
 // `goes_on` answers false to stop: nothing is written then. The exit code comes back. [main]
 int sweep(const DescribeOptions& options, const std::function<bool()>& goes_on);
 
-}  // namespace ressort
+}  // namespace ressort::commands

@@ -8,7 +8,7 @@
 #include "core/curve.h"
 #include "core/model/language/expression.h"
 
-namespace ressort {
+namespace ressort::commands {
 namespace {
 
 constexpr double panel_width = 380.0;
@@ -276,4 +276,4 @@ Result<std::string> sweep_svg(const SweepTable& table, const DescribeOptions& op
   return SweepDrawer(table, options, figures, laws).draw();
 }
 
-}  // namespace ressort
+}  // namespace ressort::commands

@@ -12,7 +12,7 @@
 #include "app/control/osc/socket.h"
 #include "core/model/language/expression.h"
 
-namespace ressort {
+namespace ressort::control {
 namespace {
 
 constexpr int bad_project = -4;  // as the API numbers what cannot be opened
@@ -168,4 +168,4 @@ void NsmClient::send(const std::vector<std::uint8_t>& bytes) const {
                            reinterpret_cast<const sockaddr*>(&to), sizeof to));
 }
 
-}  // namespace ressort
+}  // namespace ressort::control

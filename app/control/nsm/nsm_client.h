@@ -11,7 +11,7 @@
 #include "app/control/osc/senders.h"
 #include "core/result.h"
 
-namespace ressort {
+namespace ressort::control {
 
 // What the manager wants to be opened.
 struct NsmProject {
@@ -62,4 +62,4 @@ class NsmClient {
   std::string refusal_;
 };
 
-}  // namespace ressort
+}  // namespace ressort::control

@@ -12,7 +12,7 @@
 #include "app/session/session.h"
 #include "core/model/language/expression.h"
 
-namespace ressort {
+namespace ressort::control {
 namespace {
 
 // A row, or none, of every parameter whose name fits.
@@ -304,4 +304,4 @@ void answer::unsubscribe(const Question& question) {
   }
 }
 
-}  // namespace ressort
+}  // namespace ressort::control

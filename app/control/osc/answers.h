@@ -3,7 +3,7 @@
 
 #include "app/control/registry.h"
 
-namespace ressort::answer {
+namespace ressort::control::answer {
 
 // /param/NAME f:value of every parameter that fits
 void parameters(const Question& question);
@@ -47,4 +47,4 @@ void unsubscribe(const Question& question);
 // /timbre.reply f:seconds and, in time, what Subscribers tells
 void timbre(const Question& question);
 
-}  // namespace ressort::answer
+}  // namespace ressort::control::answer

@@ -4,7 +4,7 @@
 
 #include "core/model/language/expression.h"
 
-namespace ressort {
+namespace ressort::control {
 
 void OscClient::send(std::vector<OscOutlet::Bytes> answers) const {
   if (post_) {
@@ -59,4 +59,4 @@ void OscClient::answer_rows(const std::vector<Reply>& rows) const {
   send(std::move(bytes));
 }
 
-}  // namespace ressort
+}  // namespace ressort::control

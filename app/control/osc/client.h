@@ -10,7 +10,7 @@
 #include "app/control/osc/outlet.h"
 #include "app/control/osc/reply.h"
 
-namespace ressort {
+namespace ressort::control {
 
 class OscClient {
  public:
@@ -47,4 +47,4 @@ class OscClient {
   Post post_;  // null: answers go to the sender
 };
 
-}  // namespace ressort
+}  // namespace ressort::control

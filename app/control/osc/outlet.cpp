@@ -9,7 +9,7 @@
 
 #include "app/devices/audio.h"
 
-namespace ressort {
+namespace ressort::control {
 namespace {
 
 constexpr int max_loads_waiting = 16;
@@ -137,4 +137,4 @@ void OscOutlet::end_load() {
   --loads_waiting_;
 }
 
-}  // namespace ressort
+}  // namespace ressort::control

@@ -14,7 +14,7 @@
 #include "app/control/osc/senders.h"
 #include "app/realtime/rate_limit.h"
 
-namespace ressort {
+namespace ressort::control {
 
 class OscOutlet {
  public:
@@ -68,4 +68,4 @@ class OscOutlet {
   RateLimit failures_;
 };
 
-}  // namespace ressort
+}  // namespace ressort::control

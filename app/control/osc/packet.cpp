@@ -8,7 +8,7 @@
 #include <optional>
 #include <string_view>
 
-namespace ressort {
+namespace ressort::control {
 namespace {
 
 using LoMessage = std::unique_ptr<void, decltype(&lo_message_free)>;
@@ -212,4 +212,4 @@ std::optional<Message> read_message(std::span<const std::uint8_t> bytes) {
   return message;
 }
 
-}  // namespace ressort
+}  // namespace ressort::control

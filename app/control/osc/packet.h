@@ -10,7 +10,7 @@
 #include "app/control/message.h"
 #include "core/result.h"
 
-namespace ressort {
+namespace ressort::control {
 
 // A message of a packet and the time tag of the innermost bundle around it.
 struct OscMessage {
@@ -31,4 +31,4 @@ Result<std::vector<OscMessage>> check_packet(std::span<const std::uint8_t> packe
 // [any thread]
 std::optional<Message> read_message(std::span<const std::uint8_t> bytes);
 
-}  // namespace ressort
+}  // namespace ressort::control

@@ -12,7 +12,7 @@
 
 #include "app/control/message.h"
 
-namespace ressort {
+namespace ressort::control {
 
 class Reply {
  public:
@@ -81,4 +81,4 @@ class Reply {
   Bytes values_;
 };
 
-}  // namespace ressort
+}  // namespace ressort::control

@@ -4,7 +4,7 @@
 #include <charconv>
 #include <optional>
 
-namespace ressort {
+namespace ressort::control {
 namespace {
 
 // A whole number up to `most` from the front of `text`.
@@ -135,4 +135,4 @@ double AnswerBudget::tell_pause_s(const OscSender& to, std::int64_t now_ns) {
   return tells ? -account.bytes / bytes_per_s : 0.0;
 }
 
-}  // namespace ressort
+}  // namespace ressort::control

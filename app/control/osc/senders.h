@@ -10,9 +10,10 @@
 #include <unordered_map>
 #include <vector>
 
+#include "app/rooms.h"
 #include "core/result.h"
 
-namespace ressort {
+namespace ressort::control {
 
 // Where a packet comes from: IPv4, in this machine's order of bytes.
 struct OscSender {
@@ -67,4 +68,4 @@ class AnswerBudget {
   std::unordered_map<std::uint64_t, Account> accounts_;  // who is not here has saved up all
 };
 
-}  // namespace ressort
+}  // namespace ressort::control

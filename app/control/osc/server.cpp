@@ -30,7 +30,7 @@
 #include "app/text.h"
 #include "core/model/language/expression.h"
 
-namespace ressort {
+namespace ressort::control {
 namespace {
 
 constexpr std::size_t max_address_bytes = 255;
@@ -363,4 +363,4 @@ int OscServer::port() const {
   return port_of(server_->socket);
 }
 
-}  // namespace ressort
+}  // namespace ressort::control

@@ -12,7 +12,7 @@
 #include "app/control/osc/socket.h"
 #include "app/session/session.h"
 
-namespace ressort {
+namespace ressort::control {
 
 class OscServer {
  public:
@@ -43,4 +43,4 @@ class OscServer {
   std::unique_ptr<Server> server_;
 };
 
-}  // namespace ressort
+}  // namespace ressort::control

@@ -10,7 +10,7 @@
 #include <cstring>
 #include <system_error>
 
-namespace ressort {
+namespace ressort::control {
 
 constexpr int receive_buffer_bytes = 1 << 20;
 
@@ -100,4 +100,4 @@ int port_of(int socket) {
   return ntohs(address.sin_port);
 }
 
-}  // namespace ressort
+}  // namespace ressort::control

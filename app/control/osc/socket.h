@@ -10,7 +10,7 @@
 #include "app/control/osc/senders.h"
 #include "core/result.h"
 
-namespace ressort {
+namespace ressort::control {
 
 struct OscOptions {
   std::string bind_address = "127.0.0.1";
@@ -36,4 +36,4 @@ struct Arrival {
 // Does not wait.
 std::optional<Arrival> receive_packet(int socket, std::span<std::uint8_t> buffer);
 
-}  // namespace ressort
+}  // namespace ressort::control

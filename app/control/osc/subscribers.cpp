@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <utility>
 
-namespace ressort {
+namespace ressort::control {
 namespace {
 
 // What is to be told to who knows `before`; all of it where it is of another scene.
@@ -102,4 +102,4 @@ void Subscribers::tell_timbre(const TimbreWatch& timbre) {
   }
 }
 
-}  // namespace ressort
+}  // namespace ressort::control

@@ -9,7 +9,7 @@
 #include "app/control/osc/client.h"
 #include "app/session/session.h"
 
-namespace ressort {
+namespace ressort::control {
 
 class Subscribers {
  public:
@@ -45,4 +45,4 @@ class Subscribers {
   std::uint64_t reloads_ = 0;  // that were told
 };
 
-}  // namespace ressort
+}  // namespace ressort::control

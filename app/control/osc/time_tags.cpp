@@ -7,7 +7,7 @@
 
 #include "app/devices/audio.h"
 
-namespace ressort {
+namespace ressort::control {
 namespace {
 
 constexpr double tags_per_second = 4294967296.0;  // an NTP time counts 2^-32 s from 1900 on
@@ -78,4 +78,4 @@ std::int64_t TagClock::frame(std::uint64_t tag, const ClockReading& clock) {
   return by_clock;
 }
 
-}  // namespace ressort
+}  // namespace ressort::control

@@ -5,7 +5,7 @@
 
 #include "app/realtime/lockfree.h"
 
-namespace ressort {
+namespace ressort::control {
 
 inline constexpr double tag_horizon_s = 10.0;  // farther ahead nothing is kept
 
@@ -38,4 +38,4 @@ class TagClock {
   std::uint64_t used_ = 0;
 };
 
-}  // namespace ressort
+}  // namespace ressort::control

@@ -11,7 +11,7 @@
 #include "core/curve.h"
 #include "core/model/preset/edit.h"
 
-namespace ressort {
+namespace ressort::session {
 namespace {
 
 // What a keyboard moves besides its knobs, and what MIDI has for its own ends: banks, parameters'
@@ -264,4 +264,4 @@ void Session::set_tuning(std::vector<std::string> paths) {
   tuning_ = std::move(paths);
 }
 
-}  // namespace ressort
+}  // namespace ressort::session

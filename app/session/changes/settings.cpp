@@ -5,7 +5,7 @@
 
 #include "app/session/files.h"
 
-namespace ressort {
+namespace ressort::session {
 
 std::vector<ParameterSetting> changed_settings(const std::vector<ParameterInfo>& parameters,
                                                const Preset& preset,
@@ -28,10 +28,10 @@ std::vector<ParameterSetting> changed_settings(const std::vector<ParameterInfo>&
 std::string model_name_elsewhere(const std::string& model_path) {
   const std::filesystem::path path(model_path);
   std::error_code error;
-  const std::string known = ressort::model_path(path.stem().string());
+  const std::string known = session::model_path(path.stem().string());
   const bool is_known = !known.empty() && std::filesystem::equivalent(known, path, error);
   return is_known ? path.filename().string()
                   : std::filesystem::absolute(path, error).lexically_normal().string();
 }
 
-}  // namespace ressort
+}  // namespace ressort::session

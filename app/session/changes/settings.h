@@ -5,10 +5,11 @@
 #include <string>
 #include <vector>
 
+#include "app/rooms.h"
 #include "core/compile/instrument.h"
 #include "core/model/preset/preset.h"
 
-namespace ressort {
+namespace ressort::session {
 
 // The parameters that the preset has, or that are not as they start, with their ranges. `values`
 // are what they are now. [parameter]
@@ -20,4 +21,4 @@ std::vector<ParameterSetting> changed_settings(const std::vector<ParameterInfo>&
 // too, else by its whole path. Blocks on the disk.
 std::string model_name_elsewhere(const std::string& model_path);
 
-}  // namespace ressort
+}  // namespace ressort::session

@@ -7,7 +7,7 @@
 #include "app/session/session.h"
 #include "core/model/language/print.h"
 
-namespace ressort {
+namespace ressort::session {
 namespace {
 
 const char* const ending = "the program is ending";
@@ -177,4 +177,4 @@ Result<Session::Wish> Session::write_tuned(const TuneTarget& target) {
   return Wish{.name = files->preset};
 }
 
-}  // namespace ressort
+}  // namespace ressort::session

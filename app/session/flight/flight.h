@@ -14,7 +14,7 @@
 #include "app/session/loader.h"
 #include "core/compile/compile.h"
 
-namespace ressort {
+namespace ressort::session {
 
 // What an engine was made of.
 struct FlightEngine {
@@ -102,4 +102,4 @@ class FlightLog {
   std::string lost_;  // why the beginning is not known; empty: it is
 };
 
-}  // namespace ressort
+}  // namespace ressort::session

@@ -5,7 +5,7 @@
 #include "app/session/flight/flight.h"
 #include "app/version.h"
 
-namespace ressort {
+namespace ressort::session {
 
 bool names_flight(std::string_view name) {
   return name.ends_with(".ressort");
@@ -44,17 +44,17 @@ Result<std::unique_ptr<Engine>> make_flight_engine(const Flight& flight,
   }
   keep_values(*scene, engine.kept);
   scene->preset.gain = engine.gain;
-  auto compiled = compile(scene->network, scene->preset,
-                          {.rate_hz = engine.rate_hz,
-                           .rescale = setup.rescale,
-                           .voices = setup.voices,
-                           .share = setup.share,
-                           .precision = setup.precision,
-                           .method = setup.method,
-                           .budget = setup.budget,
-                           .most_modes = engine.most_modes,
-                           .find_gain = engine.find_gain,
-                           .force = engine.force});
+  auto compiled = compile_network(scene->network, scene->preset,
+                                  {.rate_hz = engine.rate_hz,
+                                   .rescale = setup.rescale,
+                                   .voices = setup.voices,
+                                   .share = setup.share,
+                                   .precision = setup.precision,
+                                   .method = setup.method,
+                                   .budget = setup.budget,
+                                   .most_modes = engine.most_modes,
+                                   .find_gain = engine.find_gain,
+                                   .force = engine.force});
   if (!compiled) {
     return compiled.error();
   }
@@ -139,4 +139,4 @@ Result<Flight> FlightLog::flight() const {
   return now;
 }
 
-}  // namespace ressort
+}  // namespace ressort::session

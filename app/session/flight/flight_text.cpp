@@ -9,7 +9,7 @@
 #include "core/kernels/registry.h"
 #include "core/model/language/expression.h"
 
-namespace ressort {
+namespace ressort::session {
 namespace {
 
 constexpr std::string_view first_line = "ressort flight 1";
@@ -393,4 +393,4 @@ Result<Flight> parse_flight(std::string_view text) {
   return FlightReader(text).read();
 }
 
-}  // namespace ressort
+}  // namespace ressort::session

@@ -5,7 +5,7 @@
 #include "app/session/files.h"
 #include "app/session/session.h"
 
-namespace ressort {
+namespace ressort::session {
 namespace {
 
 constexpr std::uint64_t burst_xruns = 3;  // within a second
@@ -78,4 +78,4 @@ void Session::look_out(const Meters& now) {
   }
 }
 
-}  // namespace ressort
+}  // namespace ressort::session

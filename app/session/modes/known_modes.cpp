@@ -15,7 +15,7 @@
 #include "core/model/language/expression.h"
 #include "core/model/language/print.h"
 
-namespace ressort {
+namespace ressort::session {
 namespace {
 
 using nlohmann::json;
@@ -228,4 +228,4 @@ std::string to_table(const KnownModes& modes) {
   return table(rows);
 }
 
-}  // namespace ressort
+}  // namespace ressort::session

@@ -9,7 +9,7 @@
 #include "core/analysis/modes/modes.h"
 #include "core/result.h"
 
-namespace ressort {
+namespace ressort::session {
 
 struct KnownMode {
   double frequency_hz = 0.0;
@@ -55,4 +55,4 @@ std::string note_name(double frequency_hz);
 // Of "A4", "Bb2", "C#5" or a number of Hz above 0; nothing for any other text.
 std::optional<double> frequency_of(const std::string& text);
 
-}  // namespace ressort
+}  // namespace ressort::session

@@ -7,7 +7,7 @@
 
 #include "core/model/language/mdl.h"
 
-namespace ressort {
+namespace ressort::session {
 namespace {
 
 namespace fs = std::filesystem;
@@ -72,4 +72,4 @@ std::string digest(const std::string& text) {
   return out;
 }
 
-}  // namespace ressort
+}  // namespace ressort::session

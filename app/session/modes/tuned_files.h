@@ -6,7 +6,7 @@
 #include "app/session/files.h"
 #include "core/result.h"
 
-namespace ressort {
+namespace ressort::session {
 
 struct TunedFiles {
   std::string model;
@@ -26,4 +26,4 @@ Result<std::string> keep_tuned(const std::string& model, const std::string& name
 // Digits that tell one text from another.
 std::string digest(const std::string& text);
 
-}  // namespace ressort
+}  // namespace ressort::session

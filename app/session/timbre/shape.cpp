@@ -15,7 +15,7 @@
 #include "core/model/preset/fit.h"
 #include "core/model/topology.h"
 
-namespace ressort {
+namespace ressort::session {
 namespace {
 
 constexpr double missed_by = 0.1;  // of what is noticed: less is as good as there
@@ -287,4 +287,4 @@ std::string to_text(const Shaped& shaped) {
   return text;
 }
 
-}  // namespace ressort
+}  // namespace ressort::session

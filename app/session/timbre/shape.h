@@ -12,7 +12,7 @@
 #include "core/progress.h"
 #include "core/result.h"
 
-namespace ressort {
+namespace ressort::session {
 
 // "centroid" or "centroid_hz"; the error lists them all.
 Result<AskedFigure> asked_figure(const std::string& word);
@@ -56,4 +56,4 @@ std::string to_text(const Shaped& shaped);
 // highest".
 std::vector<std::string> missed(const Shaped& shaped);
 
-}  // namespace ressort
+}  // namespace ressort::session

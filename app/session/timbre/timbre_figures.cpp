@@ -5,7 +5,7 @@
 
 #include "app/text.h"
 
-namespace ressort {
+namespace ressort::session {
 namespace {
 
 using Maybe = std::optional<double>;
@@ -185,4 +185,4 @@ std::vector<std::string> timbre_words(const FigureValues& now,
   return lines;
 }
 
-}  // namespace ressort
+}  // namespace ressort::session

@@ -9,10 +9,11 @@
 #include <string_view>
 #include <vector>
 
+#include "app/rooms.h"
 #include "core/analysis/timbre/descriptors.h"
 #include "core/analysis/timbre/frame_analysis.h"
 
-namespace ressort {
+namespace ressort::session {
 
 // Of a frame. Three figures are called tristimulus, one after the other.
 struct TimbreFigure {
@@ -46,4 +47,4 @@ std::vector<std::string> timbre_words(const FigureValues& now,
                                       const std::optional<TemporalShape>& temporal = {},
                                       const FigureValues& before = {});
 
-}  // namespace ressort
+}  // namespace ressort::session

@@ -4,7 +4,7 @@
 
 #include "core/analysis/timbre/pitch.h"
 
-namespace ressort {
+namespace ressort::session {
 namespace {
 
 using Clock = std::chrono::steady_clock;
@@ -134,4 +134,4 @@ void TimbreWatch::hear() {
   process_.is_listening.lower();
 }
 
-}  // namespace ressort
+}  // namespace ressort::session

@@ -14,7 +14,7 @@
 #include "app/realtime/process.h"
 #include "app/session/timbre/timbre_figures.h"
 
-namespace ressort {
+namespace ressort::session {
 
 // Of the mean of all outputs, 2048 samples under a Hann window, 512 from one to the next; of
 // amplitudes. Two channels at 48 kHz take 0.7 % of a core.
@@ -61,4 +61,4 @@ class TimbreWatch {
   std::thread thread_;  // since the first listen()
 };
 
-}  // namespace ressort
+}  // namespace ressort::session

@@ -9,7 +9,7 @@
 #include <cstring>
 #include <filesystem>
 
-namespace ressort {
+namespace ressort::session {
 namespace {
 
 namespace fs = std::filesystem;
@@ -96,4 +96,4 @@ bool FileWatch::has_changed() {
   return has_changed;
 }
 
-}  // namespace ressort
+}  // namespace ressort::session

@@ -6,7 +6,9 @@
 #include <string>
 #include <vector>
 
-namespace ressort {
+#include "app/rooms.h"
+
+namespace ressort::session {
 
 // By inotify, so not on file systems of other machines. Folders are watched, not files: editors put
 // a new file in the old one's place.
@@ -34,4 +36,4 @@ class FileWatch {
   std::map<int, Names> names_;          // [watch descriptor]
 };
 
-}  // namespace ressort
+}  // namespace ressort::session

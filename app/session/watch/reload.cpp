@@ -9,7 +9,7 @@
 #include "app/text.h"
 #include "core/model/language/expression.h"
 
-namespace ressort {
+namespace ressort::session {
 namespace {
 
 // The value that a parameter starts with: as the preset says, else as the model does.
@@ -272,4 +272,4 @@ void Session::turn(const std::vector<Setting>& settings) {
   }
 }
 
-}  // namespace ressort
+}  // namespace ressort::session

@@ -10,7 +10,7 @@
 #include "core/linear_algebra/matrix.h"
 #include "core/model/language/expression.h"
 
-namespace ressort {
+namespace ressort::analysis {
 namespace {
 
 constexpr double highest_share = 0.45;  // of the rate: modes above sound as something else
@@ -291,4 +291,4 @@ Result<ModalChain> chain_of(const PlacedModes& modes, std::string_view place) {
   return chain;
 }
 
-}  // namespace ressort
+}  // namespace ressort::analysis

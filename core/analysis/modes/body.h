@@ -10,7 +10,7 @@
 #include "core/model/network.h"
 #include "core/result.h"
 
-namespace ressort {
+namespace ressort::analysis {
 
 // Modes as a `body` of the language has them: each swings alone as a mass of `mass` that all places
 // push and hear by their displacements.
@@ -52,4 +52,4 @@ struct ModalChain {
 // the scheme's.
 Result<ModalChain> chain_of(const PlacedModes& modes, std::string_view place);
 
-}  // namespace ressort
+}  // namespace ressort::analysis

@@ -10,7 +10,7 @@
 #include "core/linear_algebra/matrix.h"
 #include "core/model/topology.h"
 
-namespace ressort {
+namespace ressort::analysis {
 namespace {
 
 constexpr int most_spread = 20'000;  // masses that are laid out by their links
@@ -166,4 +166,4 @@ MassLayout layout_of(const Network& network) {
   return LayoutMaker(network).make();
 }
 
-}  // namespace ressort
+}  // namespace ressort::analysis

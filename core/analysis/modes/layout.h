@@ -6,7 +6,7 @@
 
 #include "core/model/network.h"
 
-namespace ressort {
+namespace ressort::analysis {
 
 struct LayoutPoint {
   double x = 0.0;
@@ -27,4 +27,4 @@ struct MassLayout {
 // is none of these in the order of its lines. Of a network as it is written. [any thread but audio]
 MassLayout layout_of(const Network& network);
 
-}  // namespace ressort
+}  // namespace ressort::analysis

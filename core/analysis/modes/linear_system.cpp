@@ -8,7 +8,7 @@
 #include "core/analysis/places.h"
 #include "core/sampled_mode.h"
 
-namespace ressort {
+namespace ressort::analysis {
 namespace {
 
 class SystemMaker {
@@ -213,4 +213,4 @@ void multiply(const SparseMatrix& lower, const double* x, double* y) {
   }
 }
 
-}  // namespace ressort
+}  // namespace ressort::analysis

@@ -10,7 +10,7 @@
 #include "core/linear_algebra/matrix.h"
 #include "core/model/network.h"
 
-namespace ressort {
+namespace ressort::analysis {
 
 // What an input pushes, or an output hears: shares of rows. Those of `stiff` act with a position,
 // those of `damped` with its change in a step.
@@ -79,4 +79,4 @@ LinearSystem make_linear_system(const Network& network, double step, bool is_sam
 Vector product(const SparseMatrix& lower, const Vector& x);
 void multiply(const SparseMatrix& lower, const double* x, double* y);
 
-}  // namespace ressort
+}  // namespace ressort::analysis

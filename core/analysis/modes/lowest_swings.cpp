@@ -10,7 +10,7 @@
 #include "core/linear_algebra/cholesky.h"
 #include "core/linear_algebra/eigen.h"
 
-namespace ressort {
+namespace ressort::analysis {
 namespace {
 
 using Complex = std::complex<double>;
@@ -266,4 +266,4 @@ double residual(const SparseMatrix& stiffness, const SparseMatrix& damping, doub
          (std::norm(swing.mu) * length(swing.shape));
 }
 
-}  // namespace ressort
+}  // namespace ressort::analysis

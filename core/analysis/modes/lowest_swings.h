@@ -8,7 +8,7 @@
 #include "core/progress.h"
 #include "core/result.h"
 
-namespace ressort {
+namespace ressort::analysis {
 
 // At least `count` of the lowest that swing, if there are so many, in the terms of quadratic.h:
 // Lanczos' shapes without dampers, counted by Sylvester's inertia so that none of several alike is
@@ -24,4 +24,4 @@ inline constexpr double swing_tolerance = 1e-8;
 double residual(const SparseMatrix& stiffness, const SparseMatrix& damping, double e,
                 const Swing& swing);
 
-}  // namespace ressort
+}  // namespace ressort::analysis

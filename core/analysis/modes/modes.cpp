@@ -10,7 +10,7 @@
 #include "core/analysis/modes/quadratic.h"
 #include "core/model/topology.h"
 
-namespace ressort {
+namespace ressort::analysis {
 namespace {
 
 using Complex = std::complex<double>;
@@ -161,4 +161,4 @@ Result<NetworkModes> find_modes(const Network& network, std::span<const double> 
   return made;
 }
 
-}  // namespace ressort
+}  // namespace ressort::analysis

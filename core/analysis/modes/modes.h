@@ -15,7 +15,7 @@
 #include "core/progress.h"
 #include "core/result.h"
 
-namespace ressort {
+namespace ressort::analysis {
 
 // Whose modes: those of the published scheme at a rate, which is what plays in the direct form, or
 // of the continuous network M x'' + Z x' + K x = f, which plays where modes do.
@@ -107,4 +107,4 @@ double rigid_below(const SparseMatrix& stiffness);
 Result<NetworkModes> find_modes(const Network& network, std::span<const double> parameters,
                                 const ModeOptions& options);
 
-}  // namespace ressort
+}  // namespace ressort::analysis

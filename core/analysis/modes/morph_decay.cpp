@@ -10,7 +10,7 @@
 #include "core/laws/laws.h"
 #include "core/model/topology.h"
 
-namespace ressort {
+namespace ressort::analysis {
 namespace {
 
 constexpr std::size_t chebyshev_count = 9;  // between two stops
@@ -146,4 +146,4 @@ Network with_even_decay(Network network, const MorphedDecay& morph) {
   return canonical(std::move(network));
 }
 
-}  // namespace ressort
+}  // namespace ressort::analysis

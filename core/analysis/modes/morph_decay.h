@@ -7,7 +7,7 @@
 #include "core/model/network.h"
 #include "core/progress.h"
 
-namespace ressort {
+namespace ressort::analysis {
 
 struct MorphedDecay {
   std::size_t parameter = 0;       // of the morph, which goes from 1 to as many as
@@ -24,4 +24,4 @@ struct MorphedDecay {
 // nothing is changed. O(stops) decompositions. Throws what a Progress does. [any thread but audio]
 Network with_even_decay(Network network, const MorphedDecay& morph);
 
-}  // namespace ressort
+}  // namespace ressort::analysis

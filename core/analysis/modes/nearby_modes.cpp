@@ -6,7 +6,7 @@
 
 #include "core/linear_algebra/eigen.h"
 
-namespace ressort {
+namespace ressort::analysis {
 namespace {
 
 using Complex = std::complex<double>;
@@ -292,4 +292,4 @@ std::optional<std::vector<HeardMode>> NearbyModes::nearly(const LinearSystem& sy
   return modes;
 }
 
-}  // namespace ressort
+}  // namespace ressort::analysis

@@ -9,7 +9,7 @@
 
 #include "core/analysis/modes/modes.h"
 
-namespace ressort {
+namespace ressort::analysis {
 
 // One motion, as the mean of all outputs hears it.
 struct HeardMode {
@@ -71,4 +71,4 @@ class NearbyModes {
   std::vector<Alike> alike_;
 };
 
-}  // namespace ressort
+}  // namespace ressort::analysis

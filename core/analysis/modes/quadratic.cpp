@@ -6,7 +6,7 @@
 
 #include "core/linear_algebra/eigen.h"
 
-namespace ressort {
+namespace ressort::analysis {
 namespace {
 
 using Complex = std::complex<double>;
@@ -213,4 +213,4 @@ std::optional<Swings> swings_of(const Matrix& stiffness, const Matrix& damping, 
   return Quadratic(stiffness, damping, e, rigid).solve(may_cross);
 }
 
-}  // namespace ressort
+}  // namespace ressort::analysis

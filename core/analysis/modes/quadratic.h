@@ -11,7 +11,7 @@
 
 #include "core/linear_algebra/matrix.h"
 
-namespace ressort {
+namespace ressort::analysis {
 
 // A motion that swings: its mu has an imaginary part above 0. `shape` is scaled so that
 // shapeT (2 mu + e K + Z) shape is mu less its conjugate, as of a lone mass of 1: of proportional
@@ -42,4 +42,4 @@ double shared_tolerance(std::size_t rows);
 std::optional<Swings> swings_of(const Matrix& stiffness, const Matrix& damping, double e,
                                 double rigid, bool may_cross = true);
 
-}  // namespace ressort
+}  // namespace ressort::analysis

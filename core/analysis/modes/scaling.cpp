@@ -9,7 +9,7 @@
 #include "core/laws/laws.h"
 #include "core/model/topology.h"
 
-namespace ressort {
+namespace ressort::analysis {
 namespace {
 
 constexpr double decay_60_db = 3.0 * std::numbers::ln10;
@@ -300,4 +300,4 @@ Network with_decay(const Network& network, const DecayLaw& law) {
   return canonical(std::move(out));
 }
 
-}  // namespace ressort
+}  // namespace ressort::analysis

@@ -12,7 +12,7 @@
 #include "core/model/network.h"
 #include "core/result.h"
 
-namespace ressort {
+namespace ressort::analysis {
 
 // One line of a model that has springs or dampers.
 struct SpringLine {
@@ -59,4 +59,4 @@ Result<DecayLaw> decay_law(const std::vector<DecayPoint>& points);
 // first ones alone. Plucks, bows and contacts stay. Canonical.
 Network with_decay(const Network& network, const DecayLaw& law);
 
-}  // namespace ressort
+}  // namespace ressort::analysis

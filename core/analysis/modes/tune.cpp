@@ -10,7 +10,7 @@
 #include "core/linear_algebra/eigen.h"
 #include "core/model/topology.h"
 
-namespace ressort {
+namespace ressort::analysis {
 namespace {
 
 using Complex = std::complex<double>;
@@ -327,4 +327,4 @@ Result<Network> tune_modes(const Network& network, std::span<const double> param
                std::to_string(1200.0 / std::numbers::ln2 * largest(*distance)) + " cents off"};
 }
 
-}  // namespace ressort
+}  // namespace ressort::analysis

@@ -11,7 +11,7 @@
 #include "core/model/network.h"
 #include "core/result.h"
 
-namespace ressort {
+namespace ressort::analysis {
 
 struct TuneTarget {
   std::size_t mode = 0;  // from the lowest, 0 first
@@ -42,4 +42,4 @@ Result<Tuned> tune_mode(const Network& network, std::span<const double> paramete
 Result<Network> tune_modes(const Network& network, std::span<const double> parameters,
                            std::span<const double> frequencies_hz, const ModeOptions& options);
 
-}  // namespace ressort
+}  // namespace ressort::analysis

@@ -9,7 +9,7 @@
 #include "core/curve.h"
 #include "core/linear_algebra/eigen.h"
 
-namespace ressort {
+namespace ressort::analysis {
 namespace {
 
 constexpr double unnoticed = 0.01;  // of what is noticed
@@ -456,4 +456,4 @@ Result<AskedTimbre> ask_timbre(const AskedModel& model, std::span<const double> 
   }
 }
 
-}  // namespace ressort
+}  // namespace ressort::analysis

@@ -12,7 +12,7 @@
 #include "core/progress.h"
 #include "core/result.h"
 
-namespace ressort {
+namespace ressort::analysis {
 
 struct TimbreTarget {
   AskedFigure figure = AskedFigure::centroid;
@@ -75,4 +75,4 @@ Result<AskedTimbre> ask_timbre(const AskedModel& model, std::span<const double> 
                                std::span<const FreeParameter> free,
                                std::span<const TimbreTarget> targets, const AskOptions& options);
 
-}  // namespace ressort
+}  // namespace ressort::analysis

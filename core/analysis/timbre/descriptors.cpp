@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-namespace ressort {
+namespace ressort::analysis {
 namespace {
 
 constexpr double rolloff_share = 0.95;
@@ -279,4 +279,4 @@ std::optional<TemporalShape> temporal_shape(std::span<const double> envelope, do
   return times.shape(rate_hz);
 }
 
-}  // namespace ressort
+}  // namespace ressort::analysis

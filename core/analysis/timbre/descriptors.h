@@ -18,7 +18,9 @@
 #include <span>
 #include <vector>
 
-namespace ressort {
+#include "core/rooms.h"
+
+namespace ressort::analysis {
 
 // What the numbers of a spectrum are: amplitudes, or their squares.
 enum class SpectrumKind { magnitude, power };
@@ -138,4 +140,4 @@ class EnvelopeTimes {
 // Both, of an envelope in memory. Nothing of silence, and of numbers below 0 or not finite.
 std::optional<TemporalShape> temporal_shape(std::span<const double> envelope, double rate_hz);
 
-}  // namespace ressort
+}  // namespace ressort::analysis

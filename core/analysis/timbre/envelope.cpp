@@ -7,7 +7,7 @@
 
 #include "core/analysis/timbre/window.h"
 
-namespace ressort {
+namespace ressort::analysis {
 namespace {
 
 constexpr std::size_t block_samples = 4096;  // Hilbert's 1/t reaches about so far
@@ -104,4 +104,4 @@ void Envelope::smooth(double magnitude) {
   }
 }
 
-}  // namespace ressort
+}  // namespace ressort::analysis

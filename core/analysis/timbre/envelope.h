@@ -9,7 +9,7 @@
 
 #include "core/linear_algebra/fourier.h"
 
-namespace ressort {
+namespace ressort::analysis {
 
 // The low-pass of an envelope: Butterworth, of the third order.
 class EnvelopeFilter {
@@ -56,4 +56,4 @@ class Envelope {
   EnvelopeFilter filter_;
 };
 
-}  // namespace ressort
+}  // namespace ressort::analysis

@@ -5,7 +5,7 @@
 #include <numbers>
 #include <utility>
 
-namespace ressort {
+namespace ressort::analysis {
 namespace {
 
 // How far from its largest bin a partial may be, in bins. What is further is the edge of another.
@@ -139,4 +139,4 @@ void FrameStream::add(std::span<const double> samples) {
   first_ += done;
 }
 
-}  // namespace ressort
+}  // namespace ressort::analysis

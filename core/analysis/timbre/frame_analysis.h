@@ -12,7 +12,7 @@
 #include "core/analysis/timbre/window.h"
 #include "core/linear_algebra/fourier.h"
 
-namespace ressort {
+namespace ressort::analysis {
 
 struct FrameOptions {
   double rate_hz = 48000.0;
@@ -82,4 +82,4 @@ class FrameStream {
   std::size_t next_ = 0;         // where the next frame starts
 };
 
-}  // namespace ressort
+}  // namespace ressort::analysis

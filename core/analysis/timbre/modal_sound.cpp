@@ -6,7 +6,7 @@
 #include <numbers>
 #include <utility>
 
-namespace ressort {
+namespace ressort::analysis {
 namespace {
 
 constexpr double gone = 1e-100;  // a state that is none any more, so that none becomes denormal
@@ -163,4 +163,4 @@ double ModalSound::most_left(double rate_hz, double resolution_s) const {
   return std::sqrt(energy + together * together);
 }
 
-}  // namespace ressort
+}  // namespace ressort::analysis

@@ -6,7 +6,9 @@
 #include <span>
 #include <vector>
 
-namespace ressort {
+#include "core/rooms.h"
+
+namespace ressort::analysis {
 
 // A motion is state e^(pole n), n in samples, of which the imaginary part is heard.
 class ModalSound {
@@ -49,4 +51,4 @@ class ModalSound {
   std::vector<double> pushed_real_, pushed_imaginary_;  // [pulse * motions + motion]
 };
 
-}  // namespace ressort
+}  // namespace ressort::analysis

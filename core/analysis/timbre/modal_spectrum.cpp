@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-namespace ressort {
+namespace ressort::analysis {
 
 double pole_radius(double t60_s, double rate_hz) {
   return std::pow(10.0, -3.0 / (rate_hz * t60_s));
@@ -37,4 +37,4 @@ std::optional<SpectralShape> spectral_shape(std::span<const Partial> partials, S
   return spectral_shape(frequencies_hz, spectrum, kind);
 }
 
-}  // namespace ressort
+}  // namespace ressort::analysis

@@ -16,7 +16,7 @@
 #include "core/analysis/timbre/descriptors.h"
 #include "core/analysis/timbre/window.h"
 
-namespace ressort {
+namespace ressort::analysis {
 
 // One motion of a linear model: residue * pole_radius^n at its frequency, n in samples.
 struct DecayingPartial {
@@ -43,4 +43,4 @@ std::vector<Partial> partials_in_frame(std::span<const DecayingPartial> partials
 // The shape of lines in ascending order of frequency; nothing of silence.
 std::optional<SpectralShape> spectral_shape(std::span<const Partial> partials, SpectrumKind kind);
 
-}  // namespace ressort
+}  // namespace ressort::analysis

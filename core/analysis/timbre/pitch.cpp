@@ -8,7 +8,7 @@
 
 #include "core/analysis/timbre/frame_analysis.h"
 
-namespace ressort {
+namespace ressort::analysis {
 namespace {
 
 constexpr double lowest_hz = 50.0;
@@ -104,4 +104,4 @@ std::optional<double> find_f0(std::span<const double> samples, double rate_hz) {
   return nearest.amplitude > 0.0 ? nearest.frequency_hz : f0_hz;
 }
 
-}  // namespace ressort
+}  // namespace ressort::analysis

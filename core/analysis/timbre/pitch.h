@@ -5,7 +5,9 @@
 #include <optional>
 #include <span>
 
-namespace ressort {
+#include "core/rooms.h"
+
+namespace ressort::analysis {
 
 // How many samples are enough for it, at a rate: eight periods of 50 Hz, a power of two.
 std::size_t pitch_samples(double rate_hz);
@@ -16,4 +18,4 @@ std::size_t pitch_samples(double rate_hz);
 // good. O(samples log samples)
 std::optional<double> find_f0(std::span<const double> samples, double rate_hz);
 
-}  // namespace ressort
+}  // namespace ressort::analysis

@@ -12,7 +12,7 @@
 #include "core/model/topology.h"
 #include "core/raised_cosine.h"
 
-namespace ressort {
+namespace ressort::analysis {
 namespace {
 
 constexpr double least_residue = 1e-3;  // of the loudest mode: what is less is no pitch
@@ -395,4 +395,4 @@ Result<AskedValues> StruckModel::figures_of(const Tuned& tuned, StruckAs how) co
   return values;
 }
 
-}  // namespace ressort
+}  // namespace ressort::analysis

@@ -19,7 +19,7 @@
 #include "core/progress.h"
 #include "core/result.h"
 
-namespace ressort {
+namespace ressort::analysis {
 
 // What may be asked of a timbre. Other figures jump while parameters move, or count bins.
 enum class AskedFigure : std::uint8_t {
@@ -135,4 +135,4 @@ class StruckModel {
   std::vector<double> known_at_;      // ...for these parameters
 };
 
-}  // namespace ressort
+}  // namespace ressort::analysis

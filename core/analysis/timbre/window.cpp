@@ -3,7 +3,7 @@
 #include <cmath>
 #include <numbers>
 
-namespace ressort {
+namespace ressort::analysis {
 namespace {
 
 using Complex = std::complex<double>;
@@ -49,4 +49,4 @@ std::complex<double> window_response(Window window, std::size_t size, std::compl
   return sum / (cosines[0] * length);
 }
 
-}  // namespace ressort
+}  // namespace ressort::analysis

@@ -6,7 +6,9 @@
 #include <cstddef>
 #include <vector>
 
-namespace ressort {
+#include "core/rooms.h"
+
+namespace ressort::analysis {
 
 enum class Window { hann, hamming, blackman, none };
 
@@ -32,4 +34,4 @@ std::vector<double> window_weights(Window window, std::size_t size);
 // motion that turns and decays so from sample to sample, its first sample being 1. O(1)
 std::complex<double> window_response(Window window, std::size_t size, std::complex<double> log_z);
 
-}  // namespace ressort
+}  // namespace ressort::analysis

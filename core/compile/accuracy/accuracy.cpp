@@ -9,7 +9,7 @@
 #include "core/kernels/direct/fourth_form.h"
 #include "core/linear_algebra/eigen.h"
 
-namespace ressort {
+namespace ressort::compile {
 namespace {
 
 using Complex = std::complex<double>;
@@ -362,4 +362,4 @@ Accuracy merging_accuracy(const Machine& written, const Machine& merged, std::si
              : unknown();
 }
 
-}  // namespace ressort
+}  // namespace ressort::compile

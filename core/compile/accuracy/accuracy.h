@@ -19,7 +19,7 @@
 #include "core/model/preset/budget.h"
 #include "core/progress.h"
 
-namespace ressort {
+namespace ressort::compile {
 
 // The worst of all partials, without signs.
 struct Accuracy {
@@ -95,4 +95,4 @@ class Judge {
 Accuracy merging_accuracy(const Machine& written, const Machine& merged, std::size_t most_masses,
                           const Progress& progress = {});
 
-}  // namespace ressort
+}  // namespace ressort::compile

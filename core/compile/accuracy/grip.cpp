@@ -10,7 +10,7 @@
 #include "core/laws/laws.h"
 #include "core/model/language/expression.h"
 
-namespace ressort {
+namespace ressort::compile {
 namespace {
 
 constexpr double most_of_mass = 3.0;
@@ -113,4 +113,4 @@ double too_strong_from(const StrongBow& bow, double steps) {
   return root * root;
 }
 
-}  // namespace ressort
+}  // namespace ressort::compile

@@ -14,7 +14,7 @@
 #include "core/model/network.h"
 #include "core/result.h"
 
-namespace ressort {
+namespace ressort::compile {
 
 struct StrongBow {
   std::string name;
@@ -39,4 +39,4 @@ std::optional<Error> too_strong(const StrongBow& bow, double steps, double rate_
 // From which factor on every stiffness on it is too strong, as its Z grows with the root.
 double too_strong_from(const StrongBow& bow, double steps);
 
-}  // namespace ressort
+}  // namespace ressort::compile

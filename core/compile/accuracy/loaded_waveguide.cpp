@@ -10,7 +10,7 @@
 #include "core/kernels/waveguides/rails.h"
 #include "core/linear_algebra/complex.h"
 
-namespace ressort {
+namespace ressort::compile {
 namespace {
 
 using Complex = std::complex<double>;
@@ -267,4 +267,4 @@ std::optional<Pitches> loaded_waveguide_pitches(const Machine& machine,
   return make_pitches(waveguide, part->rate_hz);
 }
 
-}  // namespace ressort
+}  // namespace ressort::compile

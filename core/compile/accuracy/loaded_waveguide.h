@@ -16,7 +16,7 @@
 #include "core/kernels/program.h"
 #include "core/progress.h"
 
-namespace ressort {
+namespace ressort::compile {
 
 inline constexpr std::size_t most_loading_springs = 96;  // that a load has the time for
 
@@ -27,4 +27,4 @@ std::optional<Pitches> loaded_waveguide_pitches(const Machine& machine,
                                                 std::span<const double> parameters,
                                                 const Progress& progress = {});
 
-}  // namespace ressort
+}  // namespace ressort::compile

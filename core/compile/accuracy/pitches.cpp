@@ -8,7 +8,7 @@
 #include "core/linear_algebra/complex.h"
 #include "core/linear_algebra/eigen.h"
 
-namespace ressort {
+namespace ressort::compile {
 namespace {
 
 using Complex = std::complex<double>;
@@ -223,4 +223,4 @@ Stepping stepping_of_lowest(const Machine& machine, const LowestShapes& shapes) 
   return best == nullptr ? Stepping{} : stepping_of(best->form);
 }
 
-}  // namespace ressort
+}  // namespace ressort::compile

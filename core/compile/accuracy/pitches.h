@@ -8,7 +8,7 @@
 #include "core/compile/accuracy/stepping.h"
 #include "core/engine/engine.h"
 
-namespace ressort {
+namespace ressort::compile {
 
 // A motion whose pole a factor on every stiffness moves. Poles are those of a sample at the rate
 // that is played, z = e^(-decay + j theta).
@@ -38,4 +38,4 @@ Pitches make_pitches(const LowestShapes& shapes, const Stepping& stepping, doubl
 // How the part of a machine steps that the lowest mode is in; that of a body is exact everywhere.
 Stepping stepping_of_lowest(const Machine& machine, const LowestShapes& shapes);
 
-}  // namespace ressort
+}  // namespace ressort::compile

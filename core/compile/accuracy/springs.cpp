@@ -7,7 +7,7 @@
 #include "core/laws/laws.h"
 #include "core/linear_algebra/eigen.h"
 
-namespace ressort {
+namespace ressort::compile {
 namespace {
 
 constexpr double shared_tolerance = 1e-9;  // of the largest: is Z diagonal in the modes of K?
@@ -193,4 +193,4 @@ std::optional<Rayleigh> rayleigh_of(const Program& program, std::span<const doub
              : std::nullopt;
 }
 
-}  // namespace ressort
+}  // namespace ressort::compile

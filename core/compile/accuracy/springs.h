@@ -9,7 +9,7 @@
 #include "core/kernels/program.h"
 #include "core/linear_algebra/matrix.h"
 
-namespace ressort {
+namespace ressort::compile {
 
 // A spring with its damper, felt by a sum of masses and of places on waveguides. Its numbers are
 // those of the Program's coefficients.
@@ -62,4 +62,4 @@ struct Rayleigh {
 std::optional<Rayleigh> rayleigh_of(const Program& program, std::span<const double> parameters,
                                     double stiffness_factor);
 
-}  // namespace ressort
+}  // namespace ressort::compile

@@ -5,7 +5,7 @@
 #include "core/kernels/program.h"
 #include "core/linear_algebra/eigen.h"
 
-namespace ressort {
+namespace ressort::compile {
 namespace {
 
 using Complex = std::complex<double>;
@@ -106,4 +106,4 @@ std::vector<Complex> Stepping::poles(const Springs& springs) const {
   return poles;
 }
 
-}  // namespace ressort
+}  // namespace ressort::compile

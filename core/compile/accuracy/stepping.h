@@ -10,7 +10,7 @@
 #include "core/compile/accuracy/springs.h"
 #include "core/kernels/forms.h"
 
-namespace ressort {
+namespace ressort::compile {
 
 // By which scheme, and how many samples at a time.
 struct Stepping {
@@ -34,4 +34,4 @@ Stepping stepping_of(const Form& form);
 // Where a continuous mode swings.
 std::optional<std::complex<double>> continuous_pole(double stiffness, double damping);
 
-}  // namespace ressort
+}  // namespace ressort::compile

@@ -11,7 +11,7 @@
 #include "core/kernels/waveguides/rails.h"
 #include "core/model/language/expression.h"
 
-namespace ressort {
+namespace ressort::compile {
 namespace {
 
 // [waveguide] how high it may be.
@@ -90,4 +90,4 @@ double highest_waveguide_factor(const Network& network, const ParameterBox& box,
   return factor;
 }
 
-}  // namespace ressort
+}  // namespace ressort::compile

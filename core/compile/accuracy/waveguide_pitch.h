@@ -8,7 +8,7 @@
 #include "core/analysis/linear.h"
 #include "core/result.h"
 
-namespace ressort {
+namespace ressort::compile {
 
 // The lowest partial of the lowest waveguide as if it were a mode without damping, whose stiffness
 // is the square of its angle: by which factor on every stiffness it has the pitch of a key is exact
@@ -25,4 +25,4 @@ std::optional<Error> waveguide_too_high(const Network& network, std::span<const 
 // wherever the parameters are; endless without waveguides.
 double highest_waveguide_factor(const Network& network, const ParameterBox& box, double rate_hz);
 
-}  // namespace ressort
+}  // namespace ressort::compile

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <numbers>
 
-namespace ressort {
+namespace ressort::engine {
 namespace {
 
 // Controllers, by their numbers in MIDI 1.0.
@@ -287,4 +287,4 @@ double Channels::glide_s(std::uint8_t channel, double preset) const {
   return glides ? said.glide_s.value_or(preset) : 0.0;
 }
 
-}  // namespace ressort
+}  // namespace ressort::engine

@@ -9,7 +9,9 @@
 #include <cstdint>
 #include <optional>
 
-namespace ressort {
+#include "core/rooms.h"
+
+namespace ressort::engine {
 
 // MIDI's channels, then one for each note that was given an ID: a member of a zone that is always
 // there, so that it bends, is pressed and slides alone.
@@ -139,4 +141,4 @@ class Channels {
   ChannelMask rezoned_ = 0;
 };
 
-}  // namespace ressort
+}  // namespace ressort::engine

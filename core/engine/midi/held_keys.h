@@ -8,7 +8,9 @@
 #include <cstdint>
 #include <optional>
 
-namespace ressort {
+#include "core/rooms.h"
+
+namespace ressort::engine {
 
 struct HeldKey {
   std::uint8_t key = 0;
@@ -40,4 +42,4 @@ class HeldKeys {
   std::size_t count_ = 0;
 };
 
-}  // namespace ressort
+}  // namespace ressort::engine

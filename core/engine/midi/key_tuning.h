@@ -6,7 +6,9 @@
 #include <cmath>
 #include <cstddef>
 
-namespace ressort {
+#include "core/rooms.h"
+
+namespace ressort::engine {
 
 inline constexpr std::size_t key_count = 128;
 
@@ -45,4 +47,4 @@ class KeyTuning {
   KeyFrequencies said_hz_{};
 };
 
-}  // namespace ressort
+}  // namespace ressort::engine

@@ -9,7 +9,7 @@
 
 #include "core/engine/midi/channels.h"
 
-namespace ressort {
+namespace ressort::engine {
 
 // One of so many. All functions: [audio] wait-free.
 class NoteShare {
@@ -53,4 +53,4 @@ class NoteShare {
   int next_ = 0;
 };
 
-}  // namespace ressort
+}  // namespace ressort::engine

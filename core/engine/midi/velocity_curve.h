@@ -6,8 +6,9 @@
 #include <vector>
 
 #include "core/curve.h"
+#include "core/rooms.h"
 
-namespace ressort {
+namespace ressort::engine {
 
 // A power of the velocity, or straight lines between points where there are some.
 struct VelocityCurve {
@@ -25,4 +26,4 @@ struct VelocityCurve {
   }
 };
 
-}  // namespace ressort
+}  // namespace ressort::engine

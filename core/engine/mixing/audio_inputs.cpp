@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <bit>
 
-namespace ressort {
+namespace ressort::engine {
 
 AudioInputs::AudioInputs(const Machine& machine, const Playing& playing, IsSilent is_silent)
     : is_silent_(is_silent), bare_(playing.bare), inputs_(machine.inputs.size()) {
@@ -111,4 +111,4 @@ template void AudioInputs::add(Bank<float>&, const VoiceGroup&, std::size_t, con
 template void AudioInputs::add(Bank<double>&, const VoiceGroup&, std::size_t, const Voices&,
                                EnergyWatch&) const;
 
-}  // namespace ressort
+}  // namespace ressort::engine

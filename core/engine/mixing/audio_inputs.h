@@ -7,7 +7,7 @@
 #include "core/engine/energy_watch.h"
 #include "core/engine/mixing/bank.h"
 
-namespace ressort {
+namespace ressort::engine {
 
 // All functions but the constructor: [audio] wait-free.
 class AudioInputs {
@@ -41,4 +41,4 @@ class AudioInputs {
   std::vector<Driven> inputs_;  // [input]
 };
 
-}  // namespace ressort
+}  // namespace ressort::engine

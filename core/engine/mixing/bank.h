@@ -13,7 +13,7 @@
 #include "core/kernels/registry.h"
 #include "core/progress.h"
 
-namespace ressort {
+namespace ressort::engine {
 
 // One part of the machine, in as many voices as are wanted.
 template <class T>
@@ -222,4 +222,4 @@ struct Bank : BlockBuffers<T> {
   std::size_t awake_end_ = 0;
 };
 
-}  // namespace ressort
+}  // namespace ressort::engine

@@ -8,7 +8,9 @@
 #include <numbers>
 #include <span>
 
-namespace ressort {
+#include "core/rooms.h"
+
+namespace ressort::engine {
 
 // A high-pass filter of first order at 5 Hz for every channel:
 //   y[n] = x[n] - x[n-1] + pole y[n-1]
@@ -49,4 +51,4 @@ class DcBlocker {
   std::array<State, max_channels> states_{};
 };
 
-}  // namespace ressort
+}  // namespace ressort::engine

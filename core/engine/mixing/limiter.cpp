@@ -4,7 +4,7 @@
 #include <cmath>
 #include <numeric>
 
-namespace ressort {
+namespace ressort::engine {
 namespace {
 constexpr double release_s = 0.08;
 }
@@ -62,4 +62,4 @@ double Limiter::take_reduction() {
   return deepest;
 }
 
-}  // namespace ressort
+}  // namespace ressort::engine

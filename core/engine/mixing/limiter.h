@@ -5,7 +5,9 @@
 #include <cstddef>
 #include <span>
 
-namespace ressort {
+#include "core/rooms.h"
+
+namespace ressort::engine {
 
 // A look-ahead limiter: the output never passes `ceiling`, is never non-finite, and is the input,
 // bit for bit and 1 ms later, as long as that stays below. All channels share one gain, so the
@@ -36,4 +38,4 @@ class Limiter {
   std::size_t calm_ = 0;  // samples since the gain was last below 1
 };
 
-}  // namespace ressort
+}  // namespace ressort::engine

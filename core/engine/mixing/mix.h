@@ -8,7 +8,7 @@
 
 #include "core/kernels/isa.h"
 
-namespace ressort {
+namespace ressort::engine {
 
 // What lies between two cuts: nothing happens within it, and all voices can be computed in one go.
 // Frames [at, at + frames) of a block's channels.
@@ -73,4 +73,4 @@ struct Mixer {
 template <Isa isa, class T>
 Mixer<T> make_mixer();
 
-}  // namespace ressort
+}  // namespace ressort::engine

@@ -6,7 +6,7 @@
 
 #include "core/kernels/kernel.h"
 
-namespace ressort::RESSORT_ISA {
+namespace ressort::engine::RESSORT_ISA {
 namespace {
 
 constexpr std::size_t widest = vector_bytes(Isa::RESSORT_ISA);
@@ -360,9 +360,9 @@ Mixer<T> mixer_of() {
 }
 
 }  // namespace
-}  // namespace ressort::RESSORT_ISA
+}  // namespace ressort::engine::RESSORT_ISA
 
-namespace ressort {
+namespace ressort::engine {
 
 template <>
 Mixer<float> make_mixer<Isa::RESSORT_ISA, float>() {
@@ -374,4 +374,4 @@ Mixer<double> make_mixer<Isa::RESSORT_ISA, double>() {
   return RESSORT_ISA::mixer_of<double>();
 }
 
-}  // namespace ressort
+}  // namespace ressort::engine

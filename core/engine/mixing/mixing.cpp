@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-namespace ressort {
+namespace ressort::engine {
 
 Mixing::Mixing(const Playing& playing)
     : gain_(playing.gain),
@@ -159,4 +159,4 @@ template void Mixing::add(Bank<float>&, const VoiceGroup&, const Segment&, Voice
 template void Mixing::add(Bank<double>&, const VoiceGroup&, const Segment&, Voices&,
                           EnergyWatch&) const;
 
-}  // namespace ressort
+}  // namespace ressort::engine

@@ -9,7 +9,7 @@
 #include "core/engine/mixing/bank.h"
 #include "core/engine/voices.h"
 
-namespace ressort {
+namespace ressort::engine {
 
 // All functions: [audio] wait-free.
 class Mixing {
@@ -46,4 +46,4 @@ class Mixing {
   std::uint64_t noise_ = 0x9e3779b97f4a7c15u;
 };
 
-}  // namespace ressort
+}  // namespace ressort::engine

@@ -2,7 +2,7 @@
 
 #include <cmath>
 
-namespace ressort {
+namespace ressort::engine {
 namespace {
 
 // From one level to any other each frame changes it by less than 60 dB below full scale.
@@ -69,4 +69,4 @@ void OutputLevels::advance(std::size_t frames) {
 template void OutputLevels::apply(Bank<float>&, const VoiceGroup&, std::size_t) const;
 template void OutputLevels::apply(Bank<double>&, const VoiceGroup&, std::size_t) const;
 
-}  // namespace ressort
+}  // namespace ressort::engine

@@ -9,7 +9,7 @@
 #include "core/engine/mixing/bank.h"
 #include "core/engine/voices.h"
 
-namespace ressort {
+namespace ressort::engine {
 
 // All functions but the constructor: [audio] wait-free, O(outputs that have a level).
 class OutputLevels {
@@ -41,4 +41,4 @@ class OutputLevels {
   std::size_t ramp_frames_;
 };
 
-}  // namespace ressort
+}  // namespace ressort::engine

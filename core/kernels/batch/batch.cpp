@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <utility>
 
-namespace ressort {
+namespace ressort::kernels {
 namespace {
 
 constexpr std::size_t most_bytes =
@@ -216,4 +216,4 @@ void BatchKernel<T>::play(const Block<T>& block) {
 template class BatchKernel<float>;
 template class BatchKernel<double>;
 
-}  // namespace ressort
+}  // namespace ressort::kernels

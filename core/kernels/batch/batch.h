@@ -9,7 +9,7 @@
 #include "core/kernels/nodes.h"
 #include "core/laws/laws.h"
 
-namespace ressort {
+namespace ressort::kernels {
 
 // Everything that a pack of voices needs lies together, one cell for each number:
 //   of each node its position, its velocity and a force;
@@ -96,4 +96,4 @@ class BatchKernel final : public NodeKernel<T> {
   BatchStep<T> step_;
 };
 
-}  // namespace ressort
+}  // namespace ressort::kernels

@@ -3,7 +3,7 @@
 
 #include <algorithm>
 
-namespace ressort {
+namespace ressort::kernels {
 namespace {
 
 // Whether the link is one of the springs held; it is then put there.
@@ -87,4 +87,4 @@ std::uint64_t voice_bytes(const Program& program, const Batch&, std::uint64_t nu
   return bytes_with_shared_links(program, number_bytes);
 }
 
-}  // namespace ressort
+}  // namespace ressort::kernels

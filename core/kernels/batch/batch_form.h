@@ -6,7 +6,7 @@
 #include "core/kernels/estimates.h"
 #include "core/kernels/program.h"
 
-namespace ressort {
+namespace ressort::kernels {
 
 inline constexpr std::uint32_t most_batch_masses = 16;  // more do not fit beside the voices
 
@@ -19,4 +19,4 @@ Work work(const Program& program, const Batch& form, const Workload& load);
 std::string description(const Program& program, const Batch& form);
 std::uint64_t voice_bytes(const Program& program, const Batch& form, std::uint64_t number_bytes);
 
-}  // namespace ressort
+}  // namespace ressort::kernels

@@ -7,7 +7,7 @@
 #include "core/kernels/batch/batch.h"
 #include "core/laws/laws.h"
 
-namespace ressort::RESSORT_ISA {
+namespace ressort::kernels::RESSORT_ISA {
 namespace {
 
 template <class V>
@@ -184,4 +184,4 @@ template <class V, class Type>
 }
 
 }  // namespace
-}  // namespace ressort::RESSORT_ISA
+}  // namespace ressort::kernels::RESSORT_ISA

@@ -4,7 +4,7 @@
 #include "core/kernels/batch/batch_packs.h"
 #include "core/kernels/passive/passive.h"
 
-namespace ressort::RESSORT_ISA {
+namespace ressort::kernels::RESSORT_ISA {
 namespace {
 
 // Calls `use` with 0..N-1 as constants: what they are indices of stays in registers.
@@ -512,9 +512,9 @@ BatchStep<T> step_in(const BatchTable& table, std::size_t bytes) {
 }
 
 }  // namespace
-}  // namespace ressort::RESSORT_ISA
+}  // namespace ressort::kernels::RESSORT_ISA
 
-namespace ressort {
+namespace ressort::kernels {
 
 template <>
 BatchStep<float> batch_step<Isa::RESSORT_ISA, float>(const BatchTable& table, std::size_t bytes) {
@@ -526,4 +526,4 @@ BatchStep<double> batch_step<Isa::RESSORT_ISA, double>(const BatchTable& table, 
   return RESSORT_ISA::step_in<double>(table, bytes);
 }
 
-}  // namespace ressort
+}  // namespace ressort::kernels

@@ -4,7 +4,7 @@
 
 #include "core/kernels/chains/chains_form.h"
 
-namespace ressort {
+namespace ressort::kernels {
 namespace {
 
 // Puts nodes in their places, and everything that names nodes into tables that name places.
@@ -385,4 +385,4 @@ void ChainsKernel<T>::play(const Block<T>& block) {
 template class ChainsKernel<float>;
 template class ChainsKernel<double>;
 
-}  // namespace ressort
+}  // namespace ressort::kernels

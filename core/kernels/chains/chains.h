@@ -11,7 +11,7 @@
 
 #include "core/kernels/nodes.h"
 
-namespace ressort {
+namespace ressort::kernels {
 
 // Where a node's position is among the numbers of ChainsState::bodies; its velocity is one pack
 // further. Bodies are pairs of packs, positions and velocities.
@@ -193,4 +193,4 @@ class ChainsKernel final : public NodeKernel<T> {
   Aligned<T> tap_pull_;
 };
 
-}  // namespace ressort
+}  // namespace ressort::kernels

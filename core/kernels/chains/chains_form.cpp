@@ -8,7 +8,7 @@
 #include "core/kernels/taps.h"
 #include "core/laws/laws.h"
 
-namespace ressort {
+namespace ressort::kernels {
 namespace {
 
 constexpr std::uint32_t none = 0xffffffffu;
@@ -383,4 +383,4 @@ std::uint64_t voice_bytes(const Program& program, const Chains& form, std::uint6
   return bytes_with_own_links(program, form.links.size(), number_bytes);
 }
 
-}  // namespace ressort
+}  // namespace ressort::kernels

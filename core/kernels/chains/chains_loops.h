@@ -9,7 +9,7 @@
 #include "core/kernels/chains/chains.h"
 #include "core/laws/laws.h"
 
-namespace ressort::RESSORT_ISA {
+namespace ressort::kernels::RESSORT_ISA {
 namespace {
 
 // A vector's numbers, where stores into packs cannot move them as far as the compiler knows.
@@ -202,4 +202,4 @@ T force_at(const Program& program, const ChainsTables& tables, const S& s, const
 }
 
 }  // namespace
-}  // namespace ressort::RESSORT_ISA
+}  // namespace ressort::kernels::RESSORT_ISA

@@ -2,7 +2,7 @@
 // samples, and what others read of it is written to memory in each.
 #include "core/kernels/chains/chains_loops.h"
 
-namespace ressort::RESSORT_ISA {
+namespace ressort::kernels::RESSORT_ISA {
 namespace {
 
 // With each index as a constant: what is indexed by it then stays in registers.
@@ -165,9 +165,9 @@ ChainsStep<T> step_for(std::size_t bytes, std::size_t packs) {
 }
 
 }  // namespace
-}  // namespace ressort::RESSORT_ISA
+}  // namespace ressort::kernels::RESSORT_ISA
 
-namespace ressort {
+namespace ressort::kernels {
 
 template <>
 ChainsStep<float> short_chain_step<Isa::RESSORT_ISA, float>(std::size_t bytes, std::size_t packs) {
@@ -180,4 +180,4 @@ ChainsStep<double> short_chain_step<Isa::RESSORT_ISA, double>(std::size_t bytes,
   return RESSORT_ISA::step_for<double>(bytes, packs);
 }
 
-}  // namespace ressort
+}  // namespace ressort::kernels

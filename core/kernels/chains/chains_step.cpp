@@ -2,7 +2,7 @@
 #include "core/kernels/chains/chains_loops.h"
 #include "core/kernels/passive/passive.h"
 
-namespace ressort::RESSORT_ISA {
+namespace ressort::kernels::RESSORT_ISA {
 namespace {
 
 // What the springs make of one chain's masses; `pull` is what acts on one besides.
@@ -369,9 +369,9 @@ ChainsLoops<T> loops_for(std::size_t bytes) {
 }
 
 }  // namespace
-}  // namespace ressort::RESSORT_ISA
+}  // namespace ressort::kernels::RESSORT_ISA
 
-namespace ressort {
+namespace ressort::kernels {
 
 template <>
 ChainsLoops<float> chains_loops<Isa::RESSORT_ISA, float>(std::size_t bytes) {
@@ -383,4 +383,4 @@ ChainsLoops<double> chains_loops<Isa::RESSORT_ISA, double>(std::size_t bytes) {
   return RESSORT_ISA::loops_for<double>(bytes);
 }
 
-}  // namespace ressort
+}  // namespace ressort::kernels

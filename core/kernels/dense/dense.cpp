@@ -6,7 +6,7 @@
 
 #include "core/kernels/dense/dense_stride.h"
 
-namespace ressort {
+namespace ressort::kernels {
 namespace {
 
 constexpr std::size_t least_block = 6;  // frames; fewer are stepped
@@ -477,4 +477,4 @@ bool DenseKernel<T>::is_near_start(std::size_t, double bound) const {
 template class DenseKernel<float>;
 template class DenseKernel<double>;
 
-}  // namespace ressort
+}  // namespace ressort::kernels

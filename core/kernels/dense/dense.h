@@ -15,7 +15,7 @@
 
 #include "core/kernels/kernel.h"
 
-namespace ressort {
+namespace ressort::kernels {
 
 inline constexpr std::size_t dense_frames = 64;  // of a block step; at most
 inline constexpr std::size_t driven_frames =
@@ -281,4 +281,4 @@ class DenseKernel final : public Kernel<T> {
   bool is_current_ = false;  // the next sample's forces are by the coefficients of now
 };
 
-}  // namespace ressort
+}  // namespace ressort::kernels

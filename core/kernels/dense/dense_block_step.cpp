@@ -2,7 +2,7 @@
 #include "core/kernels/dense/dense.h"
 #include "core/laws/laws.h"
 
-namespace ressort::RESSORT_ISA {
+namespace ressort::kernels::RESSORT_ISA {
 namespace {
 
 constexpr std::size_t widest = vector_bytes(Isa::RESSORT_ISA);
@@ -357,9 +357,9 @@ std::size_t block_step(DenseBody<T>& b, const DenseDrive<T>& drive, std::size_t 
 }
 
 }  // namespace
-}  // namespace ressort::RESSORT_ISA
+}  // namespace ressort::kernels::RESSORT_ISA
 
-namespace ressort {
+namespace ressort::kernels {
 
 template <>
 std::size_t dense_block_step<Isa::RESSORT_ISA, float>(DenseBody<float>& body,
@@ -375,4 +375,4 @@ std::size_t dense_block_step<Isa::RESSORT_ISA, double>(DenseBody<double>& body,
   return RESSORT_ISA::block_step(body, drive, at, count);
 }
 
-}  // namespace ressort
+}  // namespace ressort::kernels

@@ -4,7 +4,7 @@
 // Everything is made by doubling: from A^L and what the first L samples need, the next L.
 #include "core/kernels/dense/dense.h"
 
-namespace ressort::RESSORT_ISA {
+namespace ressort::kernels::RESSORT_ISA {
 namespace {
 
 constexpr std::size_t lanes = vector_bytes(Isa::RESSORT_ISA) / sizeof(double);
@@ -252,9 +252,9 @@ void build_all(DenseBody<T>& body) {
 }
 
 }  // namespace
-}  // namespace ressort::RESSORT_ISA
+}  // namespace ressort::kernels::RESSORT_ISA
 
-namespace ressort {
+namespace ressort::kernels {
 
 template <>
 void build_dense<Isa::RESSORT_ISA, float>(DenseBody<float>& body) {
@@ -266,4 +266,4 @@ void build_dense<Isa::RESSORT_ISA, double>(DenseBody<double>& body) {
   RESSORT_ISA::build_all(body);
 }
 
-}  // namespace ressort
+}  // namespace ressort::kernels

@@ -5,7 +5,7 @@
 #include "core/kernels/dense/dense.h"
 #include "core/laws/laws.h"
 
-namespace ressort {
+namespace ressort::kernels {
 namespace {
 
 bool is_driven(const Program& program, std::uint32_t node) {
@@ -84,4 +84,4 @@ std::uint64_t voice_bytes(const Program& program, const Dense&, std::uint64_t nu
   return bytes_with_own_links(program, program.ends.size(), number_bytes);
 }
 
-}  // namespace ressort
+}  // namespace ressort::kernels

@@ -6,7 +6,7 @@
 #include "core/kernels/estimates.h"
 #include "core/kernels/program.h"
 
-namespace ressort {
+namespace ressort::kernels {
 
 // Nothing where it has more than most_dense_masses masses, or points, force outputs, audio
 // parameters, or outputs of what is no mass. O(links). [any thread but audio]
@@ -17,4 +17,4 @@ Work work(const Program& program, const Dense& form, const Workload& load);
 std::string description(const Program& program, const Dense& form);
 std::uint64_t voice_bytes(const Program& program, const Dense& form, std::uint64_t number_bytes);
 
-}  // namespace ressort
+}  // namespace ressort::kernels

@@ -5,7 +5,7 @@
 #include "core/kernels/dense/dense.h"
 #include "core/laws/laws.h"
 
-namespace ressort::RESSORT_ISA {
+namespace ressort::kernels::RESSORT_ISA {
 namespace {
 
 // The ports' forces of a sample, given to `add(port, force)`.
@@ -428,9 +428,9 @@ DenseSteps<T> steps_for(std::size_t masses) {
 }
 
 }  // namespace
-}  // namespace ressort::RESSORT_ISA
+}  // namespace ressort::kernels::RESSORT_ISA
 
-namespace ressort {
+namespace ressort::kernels {
 
 template <>
 DenseSteps<float> dense_steps<Isa::RESSORT_ISA, float>(std::size_t masses) {
@@ -442,4 +442,4 @@ DenseSteps<double> dense_steps<Isa::RESSORT_ISA, double>(std::size_t masses) {
   return RESSORT_ISA::steps_for<double>(masses);
 }
 
-}  // namespace ressort
+}  // namespace ressort::kernels

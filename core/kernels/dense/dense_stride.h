@@ -7,7 +7,7 @@
 #include "core/kernels/dense/dense.h"
 #include "core/laws/laws.h"
 
-namespace ressort {
+namespace ressort::kernels {
 
 // One link between a mass, which is the state's first, and what does not wait for the masses.
 template <class T>
@@ -137,4 +137,4 @@ void DenseKernel<T>::build_stride(DenseStride<T>& stride) const {
   }
 }
 
-}  // namespace ressort
+}  // namespace ressort::kernels

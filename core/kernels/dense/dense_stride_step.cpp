@@ -3,7 +3,7 @@
 
 #include "core/kernels/dense/dense.h"
 
-namespace ressort::RESSORT_ISA {
+namespace ressort::kernels::RESSORT_ISA {
 namespace {
 
 // Eight numbers, in as many packs as that takes.
@@ -145,9 +145,9 @@ std::size_t stride_of(DenseBody<T>& b, const T* table, const DenseHold<T>& hold,
 }
 
 }  // namespace
-}  // namespace ressort::RESSORT_ISA
+}  // namespace ressort::kernels::RESSORT_ISA
 
-namespace ressort {
+namespace ressort::kernels {
 
 template <>
 std::size_t dense_stride<Isa::RESSORT_ISA, float>(DenseBody<float>& body, const float* table,
@@ -163,4 +163,4 @@ std::size_t dense_stride<Isa::RESSORT_ISA, double>(DenseBody<double>& body, cons
   return RESSORT_ISA::stride_of(body, table, hold, outputs, count);
 }
 
-}  // namespace ressort
+}  // namespace ressort::kernels

@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-namespace ressort {
+namespace ressort::kernels {
 namespace {
 
 constexpr auto narrow = [](auto number) { return static_cast<float>(number); };
@@ -88,4 +88,4 @@ void CompensatedKernel<T>::play(const Block<T>& block) {
 template class CompensatedKernel<float>;
 template class CompensatedKernel<double>;
 
-}  // namespace ressort
+}  // namespace ressort::kernels

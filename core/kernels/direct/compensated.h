@@ -6,7 +6,7 @@
 
 #include "core/kernels/direct/direct.h"
 
-namespace ressort {
+namespace ressort::kernels {
 
 template <class T>
 class CompensatedKernel final : public NodeKernel<T, float> {
@@ -27,4 +27,4 @@ class CompensatedKernel final : public NodeKernel<T, float> {
   Aligned<float> value_, value_rest_, velocity_, audio_, outputs_, output_rest_;
 };
 
-}  // namespace ressort
+}  // namespace ressort::kernels

@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-namespace ressort {
+namespace ressort::kernels {
 
 template <class T>
 DirectKernel<T>::DirectKernel(const Program& program, const Direct&, std::size_t voices, Isa isa)
@@ -56,4 +56,4 @@ void DirectKernel<T>::play(const Block<T>& block) {
 template class DirectKernel<float>;
 template class DirectKernel<double>;
 
-}  // namespace ressort
+}  // namespace ressort::kernels

@@ -20,7 +20,7 @@
 #include "core/kernels/nodes.h"
 #include "core/kernels/waveguides/rails.h"
 
-namespace ressort {
+namespace ressort::kernels {
 
 // Everything that one step touches. Rows are [node][lane].
 template <class T>
@@ -122,4 +122,4 @@ class DirectKernel final : public NodeKernel<T> {
   const Fourth* fourth_ = nullptr;
 };
 
-}  // namespace ressort
+}  // namespace ressort::kernels

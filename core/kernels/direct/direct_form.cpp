@@ -5,7 +5,7 @@
 
 #include "core/kernels/waveguides/rails.h"
 
-namespace ressort {
+namespace ressort::kernels {
 
 // Places on macros are moved and spread lane by lane, those on bodies by all modes, in packs.
 Work work(const Program& program, const Direct&, const Workload& load) {
@@ -61,4 +61,4 @@ std::uint64_t voice_bytes(const Program& program, const Compensated&, std::uint6
   return bytes_with_shared_links(program, number_bytes);
 }
 
-}  // namespace ressort
+}  // namespace ressort::kernels

@@ -4,7 +4,7 @@
 #include "core/kernels/estimates.h"
 #include "core/kernels/program.h"
 
-namespace ressort {
+namespace ressort::kernels {
 
 // What the registry's row of it asks, of one voice in bytes.
 Work work(const Program& program, const Direct& form, const Workload& load);
@@ -17,4 +17,4 @@ std::string description(const Program& program, const Compensated& form);
 std::uint64_t voice_bytes(const Program& program, const Compensated& form,
                           std::uint64_t number_bytes);
 
-}  // namespace ressort
+}  // namespace ressort::kernels

@@ -7,7 +7,7 @@
 #include "core/kernels/waveguides/rail_loops.h"
 #include "core/laws/laws.h"
 
-namespace ressort::RESSORT_ISA {
+namespace ressort::kernels::RESSORT_ISA {
 namespace {
 
 // DirectState, seen in packs.
@@ -349,4 +349,4 @@ void pull_alone(const Program& program, DirectState<T>& state) {
 }
 
 }  // namespace
-}  // namespace ressort::RESSORT_ISA
+}  // namespace ressort::kernels::RESSORT_ISA

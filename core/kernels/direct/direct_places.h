@@ -8,7 +8,7 @@
 
 #include "core/kernels/direct/direct.h"
 
-namespace ressort::RESSORT_ISA {
+namespace ressort::kernels::RESSORT_ISA {
 namespace {
 
 // Whether a node is a place on a macro or a body; it is then taps[node - taps[0].node].
@@ -227,4 +227,4 @@ typename S::V shared(const Program& program, const S& s, std::uint32_t from, std
 }
 
 }  // namespace
-}  // namespace ressort::RESSORT_ISA
+}  // namespace ressort::kernels::RESSORT_ISA

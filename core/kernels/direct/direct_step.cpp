@@ -2,7 +2,7 @@
 // without fused multiply-adds: the same bits on every machine.
 #include "core/kernels/direct/direct_loops.h"
 
-namespace ressort::RESSORT_ISA {
+namespace ressort::kernels::RESSORT_ISA {
 namespace {
 
 // A view with positions that are sums of two numbers, x + rest. A step's rounding is kept in the
@@ -79,9 +79,9 @@ DirectLoops<T> loops_for(std::size_t bytes) {
 }
 
 }  // namespace
-}  // namespace ressort::RESSORT_ISA
+}  // namespace ressort::kernels::RESSORT_ISA
 
-namespace ressort {
+namespace ressort::kernels {
 
 template <>
 DirectLoops<float> direct_loops<Isa::RESSORT_ISA, float>(std::size_t bytes) {
@@ -100,4 +100,4 @@ DirectLoops<float> compensated_loops<Isa::RESSORT_ISA>(std::size_t bytes) {
   });
 }
 
-}  // namespace ressort
+}  // namespace ressort::kernels

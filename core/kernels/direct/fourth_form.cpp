@@ -7,7 +7,7 @@
 
 #include "core/kernels/direct/direct_form.h"
 
-namespace ressort {
+namespace ressort::kernels {
 namespace {
 
 // What a link weighs: so much of its stiffness, and so much of its damping.
@@ -166,4 +166,4 @@ std::uint64_t voice_bytes(const Program& program, const Fourth&, std::uint64_t n
   return bytes_with_own_links(program, program.ends.size(), number_bytes);
 }
 
-}  // namespace ressort
+}  // namespace ressort::kernels

@@ -7,7 +7,7 @@
 #include "core/kernels/estimates.h"
 #include "core/kernels/program.h"
 
-namespace ressort {
+namespace ressort::kernels {
 
 // The largest stiffness and damping that a mode can have, per sample and mass, by the edge bound;
 // every link counts by its spring and damper, with the parameters as they start or as given.
@@ -30,4 +30,4 @@ double predicted_ns(const Program& program, const Fourth& form, const Workload& 
 std::string description(const Program& program, const Fourth& form);
 std::uint64_t voice_bytes(const Program& program, const Fourth& form, std::uint64_t number_bytes);
 
-}  // namespace ressort
+}  // namespace ressort::kernels

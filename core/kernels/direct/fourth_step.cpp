@@ -1,7 +1,7 @@
 // The direct form to fourth order, compiled for each instruction set.
 #include "core/kernels/direct/direct_loops.h"
 
-namespace ressort::RESSORT_ISA {
+namespace ressort::kernels::RESSORT_ISA {
 namespace {
 
 // A view with a second pass over the linear links.
@@ -99,9 +99,9 @@ DirectLoops<T> loops_for(std::size_t bytes) {
 }
 
 }  // namespace
-}  // namespace ressort::RESSORT_ISA
+}  // namespace ressort::kernels::RESSORT_ISA
 
-namespace ressort {
+namespace ressort::kernels {
 
 template <>
 DirectLoops<float> fourth_loops<Isa::RESSORT_ISA, float>(std::size_t bytes) {
@@ -113,4 +113,4 @@ DirectLoops<double> fourth_loops<Isa::RESSORT_ISA, double>(std::size_t bytes) {
   return RESSORT_ISA::loops_for<double>(bytes);
 }
 
-}  // namespace ressort
+}  // namespace ressort::kernels

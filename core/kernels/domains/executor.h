@@ -12,7 +12,9 @@
 #include <span>
 #include <vector>
 
-namespace ressort {
+#include "core/rooms.h"
+
+namespace ressort::kernels {
 
 // A piece of work. The caller is who calls Crew::run().
 class Task {
@@ -68,4 +70,4 @@ class Executor {
   virtual Fellows* fellows() { return nullptr; }
 };
 
-}  // namespace ressort
+}  // namespace ressort::kernels

@@ -2,7 +2,7 @@
 
 #include <utility>
 
-namespace ressort {
+namespace ressort::kernels {
 
 template <class T>
 KernelTask<T>::KernelTask(std::unique_ptr<Kernel<T>>& kernel, BlockBuffers<T> buffers_in,
@@ -106,4 +106,4 @@ void KernelTask<T>::take_over() {
 template class KernelTask<float>;
 template class KernelTask<double>;
 
-}  // namespace ressort
+}  // namespace ressort::kernels

@@ -9,7 +9,7 @@
 #include "core/kernels/domains/executor.h"
 #include "core/kernels/kernel.h"
 
-namespace ressort {
+namespace ressort::kernels {
 
 // What drives a kernel in a block and what it fills, as Block says.
 template <class T>
@@ -86,4 +86,4 @@ class KernelTask final : public Task {
   bool can_copy_ = false;
 };
 
-}  // namespace ressort
+}  // namespace ressort::kernels

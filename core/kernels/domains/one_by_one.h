@@ -5,7 +5,7 @@
 
 #include "core/kernels/domains/executor.h"
 
-namespace ressort {
+namespace ressort::kernels {
 
 class OneByOne final : public Crew {
  public:
@@ -30,4 +30,4 @@ class OwnThread final : public Executor {
   }
 };
 
-}  // namespace ressort
+}  // namespace ressort::kernels

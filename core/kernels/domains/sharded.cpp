@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-namespace ressort {
+namespace ressort::kernels {
 namespace {
 
 // Rows of one table copied to other places in another; a row is a number for each lane.
@@ -292,4 +292,4 @@ void ShardedKernel<T>::write_copies() const {
 template class ShardedKernel<float>;
 template class ShardedKernel<double>;
 
-}  // namespace ressort
+}  // namespace ressort::kernels

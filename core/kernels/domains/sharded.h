@@ -7,7 +7,7 @@
 
 #include "core/kernels/domains/kernel_task.h"
 
-namespace ressort {
+namespace ressort::kernels {
 
 // Where the reference about copies is, that follow one another as what is given does.
 struct ShardSource {
@@ -73,4 +73,4 @@ class ShardedKernel final : public Kernel<T> {
   std::unique_ptr<Crew> crew_;                         // the last: it ends first
 };
 
-}  // namespace ressort
+}  // namespace ressort::kernels

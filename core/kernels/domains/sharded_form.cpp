@@ -5,7 +5,7 @@
 #include "core/kernels/domains/sharded.h"
 #include "core/kernels/registry.h"
 
-namespace ressort {
+namespace ressort::kernels {
 
 double exchange_ns(std::size_t copies) {
   return 3000.0 + copy_ns * static_cast<double>(copies);
@@ -44,4 +44,4 @@ std::uint64_t voice_bytes(const Program&, const Shards& form, std::uint64_t numb
   return bytes;
 }
 
-}  // namespace ressort
+}  // namespace ressort::kernels

@@ -4,7 +4,7 @@
 #include "core/kernels/estimates.h"
 #include "core/kernels/program.h"
 
-namespace ressort {
+namespace ressort::kernels {
 
 // Nanoseconds that shards wait for each other once, and one of them for its copies.
 double exchange_ns(std::size_t copies);
@@ -19,4 +19,4 @@ double predicted_ns(const Program& program, const Shards& form, const Workload& 
 std::string description(const Program& program, const Shards& form);
 std::uint64_t voice_bytes(const Program& program, const Shards& form, std::uint64_t number_bytes);
 
-}  // namespace ressort
+}  // namespace ressort::kernels

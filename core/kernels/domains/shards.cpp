@@ -12,7 +12,7 @@
 #include "core/kernels/registry.h"
 #include "core/kernels/taps.h"
 
-namespace ressort {
+namespace ressort::kernels {
 namespace {
 
 constexpr std::uint32_t none = 0xffffffffu;
@@ -553,4 +553,4 @@ std::optional<Shards> share_out(const Program& program, const Workload& load,
   return best;
 }
 
-}  // namespace ressort
+}  // namespace ressort::kernels

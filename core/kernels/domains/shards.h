@@ -7,7 +7,7 @@
 #include "core/kernels/estimates.h"
 #include "core/progress.h"
 
-namespace ressort {
+namespace ressort::kernels {
 
 // As many shards, each with what is within a little more than `frames` links of its own, in the
 // direct form; nothing where a point wanders over a macro, as it may be anywhere. O(nodes + links).
@@ -20,4 +20,4 @@ std::vector<Shard> make_shards(const Program& program, std::size_t count, std::u
 std::optional<Shards> share_out(const Program& program, const Workload& load,
                                 const Progress& progress = {});
 
-}  // namespace ressort
+}  // namespace ressort::kernels

@@ -4,7 +4,7 @@
 #include <cstdlib>
 #include <map>
 
-namespace ressort {
+namespace ressort::kernels {
 namespace {
 
 std::vector<std::uint32_t> offsets_of(const Grid& grid) {
@@ -174,4 +174,4 @@ void GridKernel<T>::play(const Block<T>& block) {
 template class GridKernel<float>;
 template class GridKernel<double>;
 
-}  // namespace ressort
+}  // namespace ressort::kernels

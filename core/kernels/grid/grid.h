@@ -3,7 +3,7 @@
 
 #include "core/kernels/nodes.h"
 
-namespace ressort {
+namespace ressort::kernels {
 
 inline constexpr std::uint32_t grid_fixed = 0xffffffffu;
 inline constexpr std::size_t grid_pushes = 8;  // of a tap: its corners before and after it moved
@@ -79,4 +79,4 @@ class GridKernel final : public NodeKernel<T> {
   bool is_fresh_ = true;
 };
 
-}  // namespace ressort
+}  // namespace ressort::kernels

@@ -12,7 +12,7 @@
 #include "core/kernels/taps.h"
 #include "core/laws/laws.h"
 
-namespace ressort {
+namespace ressort::kernels {
 namespace {
 
 // Fits a Program's links into places. With a spring run: its links act through the sum over
@@ -531,4 +531,4 @@ std::uint64_t voice_bytes(const Program& program, const Grid& form, std::uint64_
   return bytes_with_own_links(program, form.rest_ends.size(), number_bytes);
 }
 
-}  // namespace ressort
+}  // namespace ressort::kernels

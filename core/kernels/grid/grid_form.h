@@ -7,7 +7,7 @@
 #include "core/kernels/program.h"
 #include "core/progress.h"
 
-namespace ressort {
+namespace ressort::kernels {
 
 inline constexpr std::uint32_t least_grid_masses = 16;
 
@@ -21,4 +21,4 @@ Work work(const Program& program, const Grid& form, const Workload& load);
 std::string description(const Program& program, const Grid& form);
 std::uint64_t voice_bytes(const Program& program, const Grid& form, std::uint64_t number_bytes);
 
-}  // namespace ressort
+}  // namespace ressort::kernels

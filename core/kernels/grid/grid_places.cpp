@@ -5,7 +5,7 @@
 #include <set>
 #include <utility>
 
-namespace ressort {
+namespace ressort::kernels {
 namespace {
 
 constexpr std::uint32_t least_reach = 2 * grid_line;
@@ -189,4 +189,4 @@ std::optional<GridPlaces> places_by_row(const GridGraph& graph, const GridRows& 
   return places;
 }
 
-}  // namespace ressort
+}  // namespace ressort::kernels

@@ -8,7 +8,7 @@
 
 #include "core/kernels/grid/grid_rows.h"
 
-namespace ressort {
+namespace ressort::kernels {
 
 // Slots in a row, with the same offsets to what they are linked to.
 struct GridSpan {
@@ -33,4 +33,4 @@ std::optional<GridPlaces> places_in_lines(const GridGraph& graph, const GridRows
 std::optional<GridPlaces> places_by_row(const GridGraph& graph, const GridRows& rows,
                                         std::size_t most, const Progress& progress);
 
-}  // namespace ressort
+}  // namespace ressort::kernels

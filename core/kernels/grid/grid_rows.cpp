@@ -4,7 +4,7 @@
 #include <numeric>
 #include <span>
 
-namespace ressort {
+namespace ressort::kernels {
 namespace {
 
 std::span<const std::uint32_t> neighbours_of(const GridGraph& graph, std::uint32_t node) {
@@ -214,4 +214,4 @@ GridRows rows_by_walk(const GridGraph& graph, const Progress& progress) {
   return Walk(graph, progress).rows();
 }
 
-}  // namespace ressort
+}  // namespace ressort::kernels

@@ -7,7 +7,7 @@
 #include "core/kernels/program.h"
 #include "core/progress.h"
 
-namespace ressort {
+namespace ressort::kernels {
 
 inline constexpr std::uint32_t nowhere = 0xffffffffu;
 inline constexpr std::uint32_t least_regular_links = 8;  // of one run
@@ -31,4 +31,4 @@ GridRows rows_as_written(const Program& program, const GridGraph& graph, const P
 // One along a side, then what is next to it, and so on. O(n log n)
 GridRows rows_by_walk(const GridGraph& graph, const Progress& progress);
 
-}  // namespace ressort
+}  // namespace ressort::kernels

@@ -6,7 +6,7 @@
 #include "core/kernels/passive/passive.h"
 #include "core/laws/laws.h"
 
-namespace ressort::RESSORT_ISA {
+namespace ressort::kernels::RESSORT_ISA {
 namespace {
 
 // What the loops of one step know.
@@ -529,9 +529,9 @@ GridLoops<T> loops_for(std::size_t bytes) {
 }
 
 }  // namespace
-}  // namespace ressort::RESSORT_ISA
+}  // namespace ressort::kernels::RESSORT_ISA
 
-namespace ressort {
+namespace ressort::kernels {
 
 template <>
 GridLoops<float> grid_loops<Isa::RESSORT_ISA, float>(std::size_t bytes) {
@@ -543,4 +543,4 @@ GridLoops<double> grid_loops<Isa::RESSORT_ISA, double>(std::size_t bytes) {
   return RESSORT_ISA::loops_for<double>(bytes);
 }
 
-}  // namespace ressort
+}  // namespace ressort::kernels

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <complex>
 
-namespace ressort {
+namespace ressort::kernels {
 namespace {
 
 constexpr std::size_t most_rows = 16;  // of one sweep
@@ -440,4 +440,4 @@ bool ModalKernel<T>::is_near_start(std::size_t, double bound) const {
 template class ModalKernel<float>;
 template class ModalKernel<double>;
 
-}  // namespace ressort
+}  // namespace ressort::kernels

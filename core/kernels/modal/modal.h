@@ -12,7 +12,7 @@
 #include "core/kernels/kernel.h"
 #include "core/kernels/passive/room.h"
 
-namespace ressort {
+namespace ressort::kernels {
 
 inline constexpr std::uint32_t check_frames = 32;  // from one look at what may sleep to the next...
 inline constexpr std::uint32_t long_check_frames = 128;  // ...while few are awake
@@ -178,4 +178,4 @@ class ModalKernel final : public Kernel<T> {
   ModalState<T> state_;
 };
 
-}  // namespace ressort
+}  // namespace ressort::kernels

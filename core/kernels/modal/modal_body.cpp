@@ -10,7 +10,10 @@
 #include "core/laws/laws.h"
 #include "core/linear_algebra/eigen.h"
 
-namespace ressort {
+namespace ressort::kernels {
+
+using namespace linear_algebra;
+
 namespace {
 
 // Each takes a matrix of all masses, or a vector; with so many the form is of no use.
@@ -459,4 +462,4 @@ Vector Eigenmodes::pull_of(const Frame& frame) const {
   return pull;
 }
 
-}  // namespace ressort
+}  // namespace ressort::kernels

@@ -10,7 +10,10 @@
 #include "core/linear_algebra/matrix.h"
 #include "core/progress.h"
 
-namespace ressort {
+namespace ressort::kernels {
+
+using linear_algebra::Matrix;
+using linear_algebra::Vector;
 
 // A share of a mass, or of any node, in a sum.
 struct MassShare {
@@ -124,4 +127,4 @@ class Eigenmodes {
   std::vector<Vector> shape_;
 };
 
-}  // namespace ressort
+}  // namespace ressort::kernels

@@ -12,7 +12,7 @@
 #include "core/kernels/modal/modal_sweep.h"
 #include "core/laws/laws.h"
 
-namespace ressort::RESSORT_ISA {
+namespace ressort::kernels::RESSORT_ISA {
 namespace {
 
 constexpr double least_stiffness = 1e-4;  // lK of a mode that is not soft
@@ -108,4 +108,4 @@ T share_of_give(const ForceLaw& law, T d, T give) {
 }
 
 }  // namespace
-}  // namespace ressort::RESSORT_ISA
+}  // namespace ressort::kernels::RESSORT_ISA

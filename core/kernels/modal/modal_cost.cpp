@@ -6,7 +6,7 @@
 #include "core/lanes.h"
 #include "core/laws/laws.h"
 
-namespace ressort {
+namespace ressort::kernels {
 namespace {
 
 // `places` and what else has rows of its own along the modes; how many outputs are heard along
@@ -137,4 +137,4 @@ std::uint64_t voice_bytes(const Program& program, const Modes& form, std::uint64
          number_bytes * ((rows + crossed) * form.modes + factors);
 }
 
-}  // namespace ressort
+}  // namespace ressort::kernels

@@ -6,7 +6,10 @@
 
 #include "core/linear_algebra/eigen.h"
 
-namespace ressort {
+namespace ressort::kernels {
+
+using namespace linear_algebra;
+
 namespace {
 
 using Complex = std::complex<double>;
@@ -375,4 +378,4 @@ std::optional<CrossedModes> crossed_modes(const Program& program, const LinearBo
   return CrossedFinder(program, body, is_exact, is_held_passively).find();
 }
 
-}  // namespace ressort
+}  // namespace ressort::kernels

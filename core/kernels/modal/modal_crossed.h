@@ -13,7 +13,7 @@
 
 #include "core/kernels/modal/modal_body.h"
 
-namespace ressort {
+namespace ressort::kernels {
 
 inline constexpr std::uint32_t most_crossed_masses = 256;  // beyond, finding them takes too long
 
@@ -40,4 +40,4 @@ struct CrossedModes {
 std::optional<CrossedModes> crossed_modes(const Program& program, const LinearBody& body,
                                           bool is_exact, bool is_held_passively);
 
-}  // namespace ressort
+}  // namespace ressort::kernels

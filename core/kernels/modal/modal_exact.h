@@ -11,7 +11,7 @@
 #include "core/kernels/modal/modal_sweep.h"
 #include "core/sampled_mode.h"
 
-namespace ressort::RESSORT_ISA {
+namespace ressort::kernels::RESSORT_ISA {
 namespace {
 
 constexpr double most_damping = 8.0;  // Z beyond which a mode is gone in a sample anyway
@@ -98,4 +98,4 @@ void make_exact(ModalState<T>& s, std::size_t shapes, T* k, T* z) {
 }
 
 }  // namespace
-}  // namespace ressort::RESSORT_ISA
+}  // namespace ressort::kernels::RESSORT_ISA

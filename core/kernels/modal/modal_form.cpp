@@ -12,7 +12,7 @@
 #include "core/laws/laws.h"
 #include "core/sampled_mode.h"
 
-namespace ressort {
+namespace ressort::kernels {
 namespace {
 
 constexpr double zero_tolerance = 1e-13;  // of the largest: is it anything?
@@ -32,7 +32,7 @@ constexpr std::size_t most_passive = 32;  // links: each pulls at all others
 constexpr double left_out_share = 0.02;   // of the budget
 class ModesFinder {
  public:
-  ModesFinder(const Program& program, const LinearBody& body, const Budget& budget,
+  ModesFinder(const Program& program, const LinearBody& body, const model::Budget& budget,
               const Progress& progress, bool is_untuned, bool is_exact)
       : program_(program),
         is_untuned_(is_untuned),
@@ -509,7 +509,7 @@ class ModesFinder {
 
 }  // namespace
 
-std::optional<Modes> modal_form(const Program& program, const Budget& budget,
+std::optional<Modes> modal_form(const Program& program, const model::Budget& budget,
                                 const Progress& progress, bool is_untuned, bool is_exact) {
   if (program.moving > most_modes || most_tied_masses(program) > most_tied_modes) {
     return std::nullopt;
@@ -520,4 +520,4 @@ std::optional<Modes> modal_form(const Program& program, const Budget& budget,
               : std::nullopt;
 }
 
-}  // namespace ressort
+}  // namespace ressort::kernels

@@ -8,7 +8,7 @@
 #include "core/model/preset/budget.h"
 #include "core/progress.h"
 
-namespace ressort {
+namespace ressort::kernels {
 
 // Masses that hang together: beyond, the eigenvectors take too long to find; and all: beyond, the
 // shapes take too much memory.
@@ -24,7 +24,7 @@ inline constexpr std::size_t most_modes = 4096;
 // and without what would ring above 0.45 of the rate; with one of silence without the modes that
 // are never heard, the others sorted and told to sleep, unless they are crossed or a force is
 // heard. [any thread but audio]
-std::optional<Modes> modal_form(const Program& program, const Budget& budget = {},
+std::optional<Modes> modal_form(const Program& program, const model::Budget& budget = {},
                                 const Progress& progress = {}, bool is_untuned = false,
                                 bool is_exact = false);
 
@@ -36,4 +36,4 @@ Work work(const Program& program, const Modes& form, const Workload& load);
 std::string description(const Program& program, const Modes& form);
 std::uint64_t voice_bytes(const Program& program, const Modes& form, std::uint64_t number_bytes);
 
-}  // namespace ressort
+}  // namespace ressort::kernels

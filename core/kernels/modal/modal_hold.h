@@ -7,7 +7,7 @@
 #include "core/kernels/modal/modal_sleep.h"
 #include "core/laws/laws.h"
 
-namespace ressort::RESSORT_ISA {
+namespace ressort::kernels::RESSORT_ISA {
 namespace {
 
 constexpr std::uint32_t frames_after_touch = 256;  // until a free motion is tried again
@@ -185,4 +185,4 @@ struct Holder : Mixer<T, Crossed> {
 };
 
 }  // namespace
-}  // namespace ressort::RESSORT_ISA
+}  // namespace ressort::kernels::RESSORT_ISA

@@ -4,7 +4,7 @@
 
 #include "core/kernels/modal/modal_exact.h"
 
-namespace ressort::RESSORT_ISA {
+namespace ressort::kernels::RESSORT_ISA {
 namespace {
 
 template <class T, bool Crossed>
@@ -136,4 +136,4 @@ struct Mixer {
 };
 
 }  // namespace
-}  // namespace ressort::RESSORT_ISA
+}  // namespace ressort::kernels::RESSORT_ISA

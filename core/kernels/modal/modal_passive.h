@@ -12,7 +12,7 @@
 #include "core/kernels/modal/modal_straight.h"
 #include "core/kernels/passive/passive.h"
 
-namespace ressort::RESSORT_ISA {
+namespace ressort::kernels::RESSORT_ISA {
 namespace {
 
 // How a push moves what: for masses of 1/w of the relative mass of each.
@@ -187,4 +187,4 @@ struct Presser : Holder<T, Crossed> {
 };
 
 }  // namespace
-}  // namespace ressort::RESSORT_ISA
+}  // namespace ressort::kernels::RESSORT_ISA

@@ -17,7 +17,7 @@
 
 #include "core/kernels/modal/modal_sweep.h"
 
-namespace ressort::RESSORT_ISA {
+namespace ressort::kernels::RESSORT_ISA {
 namespace {
 
 // r^2 to this power is r^check_frames.
@@ -152,4 +152,4 @@ void check_sleep(ModalState<T>& s, std::size_t places, std::size_t listeners) {
 }
 
 }  // namespace
-}  // namespace ressort::RESSORT_ISA
+}  // namespace ressort::kernels::RESSORT_ISA

@@ -1,7 +1,7 @@
 // The modal kernel's way through a block, compiled for each instruction set.
 #include "core/kernels/modal/modal_passive.h"
 
-namespace ressort::RESSORT_ISA {
+namespace ressort::kernels::RESSORT_ISA {
 namespace {
 
 template <class T, bool Crossed>
@@ -533,9 +533,9 @@ void step(const Program& program, const Modes& modes, ModalState<T>& state, cons
 }
 
 }  // namespace
-}  // namespace ressort::RESSORT_ISA
+}  // namespace ressort::kernels::RESSORT_ISA
 
-namespace ressort {
+namespace ressort::kernels {
 
 template <>
 ModalStep<float> modal_step<Isa::RESSORT_ISA, float>(bool is_crossed) {
@@ -547,4 +547,4 @@ ModalStep<double> modal_step<Isa::RESSORT_ISA, double>(bool is_crossed) {
   return is_crossed ? RESSORT_ISA::step<double, true> : RESSORT_ISA::step<double, false>;
 }
 
-}  // namespace ressort
+}  // namespace ressort::kernels

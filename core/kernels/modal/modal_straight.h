@@ -15,7 +15,7 @@
 #include "core/kernels/modal/modal_sweep.h"
 #include "core/kernels/passive/joint.h"
 
-namespace ressort::RESSORT_ISA {
+namespace ressort::kernels::RESSORT_ISA {
 namespace {
 
 // How deep inside its zone a link is; positive where it acts.
@@ -84,9 +84,9 @@ struct StraightMatrices {
     for (std::size_t pack = 0; pack < packs; ++pack) {
       ModePack<T> sum{};
       for (std::size_t j = 0; j < count; ++j) {
-        sum += ressort::RESSORT_ISA::packs(columns + j * stride)[pack] * numbers[j];
+        sum += RESSORT_ISA::packs(columns + j * stride)[pack] * numbers[j];
       }
-      ressort::RESSORT_ISA::packs(sums)[pack] = sum;
+      RESSORT_ISA::packs(sums)[pack] = sum;
     }
   }
 
@@ -181,4 +181,4 @@ bool push_straight(ModalState<T>& s, const Body& body) {
 }
 
 }  // namespace
-}  // namespace ressort::RESSORT_ISA
+}  // namespace ressort::kernels::RESSORT_ISA

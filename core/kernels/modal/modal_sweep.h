@@ -6,7 +6,7 @@
 
 #include "core/kernels/modal/modal.h"
 
-namespace ressort::RESSORT_ISA {
+namespace ressort::kernels::RESSORT_ISA {
 namespace {
 
 constexpr std::size_t most_kicked = 8;  // rows that one sweep takes along
@@ -331,4 +331,4 @@ void sweep_rows(ModalState<T>& s, std::size_t kicked, std::size_t heard) {
 }
 
 }  // namespace
-}  // namespace ressort::RESSORT_ISA
+}  // namespace ressort::kernels::RESSORT_ISA

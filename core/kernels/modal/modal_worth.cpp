@@ -5,7 +5,7 @@
 #include <limits>
 #include <numeric>
 
-namespace ressort {
+namespace ressort::kernels {
 namespace {
 
 constexpr double least_ringing = 1e-4;  // share of lK: nearer to the aperiodic limit
@@ -225,4 +225,4 @@ Worth weigh(const Hearing& hearing, double most) {
   return Scales(hearing, most).weigh();
 }
 
-}  // namespace ressort
+}  // namespace ressort::kernels

@@ -4,7 +4,9 @@
 #include <cstdint>
 #include <vector>
 
-namespace ressort {
+#include "core/rooms.h"
+
+namespace ressort::kernels {
 
 // The modes of a part, for masses of 1, as they are at the start.
 struct Hearing {
@@ -30,4 +32,4 @@ struct Worth {
 // some 1e7 for the peaks.
 Worth weigh(const Hearing& hearing, double most);
 
-}  // namespace ressort
+}  // namespace ressort::kernels

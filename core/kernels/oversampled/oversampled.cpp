@@ -4,7 +4,7 @@
 
 #include "core/kernels/oversampled/oversampled_form.h"
 
-namespace ressort {
+namespace ressort::kernels {
 
 static_assert(most_oversampling <= max_block_frames);
 
@@ -135,4 +135,4 @@ bool OversampledKernel<T>::is_near_start(std::size_t lane, double bound) const {
 template class OversampledKernel<float>;
 template class OversampledKernel<double>;
 
-}  // namespace ressort
+}  // namespace ressort::kernels

@@ -5,7 +5,7 @@
 
 #include "core/kernels/kernel.h"
 
-namespace ressort {
+namespace ressort::kernels {
 
 template <class T>
 class OversampledKernel final : public Kernel<T> {
@@ -38,4 +38,4 @@ class OversampledKernel final : public Kernel<T> {
   std::vector<double> speed_;    // [node]
 };
 
-}  // namespace ressort
+}  // namespace ressort::kernels

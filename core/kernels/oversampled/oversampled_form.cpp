@@ -4,7 +4,7 @@
 
 #include "core/kernels/registry.h"
 
-namespace ressort {
+namespace ressort::kernels {
 
 Program oversampled_program(const Program& program, std::uint32_t times) {
   Program fine = program;
@@ -35,4 +35,4 @@ std::uint64_t voice_bytes(const Program& program, const Oversampled& form,
   return voice_bytes(*form.fine, number_bytes) + node_bytes(program, number_bytes);
 }
 
-}  // namespace ressort
+}  // namespace ressort::kernels

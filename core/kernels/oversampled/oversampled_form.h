@@ -6,7 +6,7 @@
 #include "core/kernels/estimates.h"
 #include "core/kernels/program.h"
 
-namespace ressort {
+namespace ressort::kernels {
 
 inline constexpr std::uint32_t most_oversampling = 32;
 
@@ -23,4 +23,4 @@ std::string description(const Program& program, const Oversampled& form);
 std::uint64_t voice_bytes(const Program& program, const Oversampled& form,
                           std::uint64_t number_bytes);
 
-}  // namespace ressort
+}  // namespace ressort::kernels

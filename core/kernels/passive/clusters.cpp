@@ -10,7 +10,7 @@
 #include "core/groups.h"
 #include "core/laws/laws.h"
 
-namespace ressort {
+namespace ressort::kernels {
 namespace {
 
 // Calls `use(node)` for every node that a link's end may move.
@@ -372,4 +372,4 @@ PassiveTables passive_tables(const Program& program) {
   return tables;
 }
 
-}  // namespace ressort
+}  // namespace ressort::kernels

@@ -8,7 +8,7 @@
 
 #include "core/kernels/program.h"
 
-namespace ressort {
+namespace ressort::kernels {
 
 inline constexpr std::uint32_t no_mass = 0xffffffffu;
 inline constexpr std::size_t passive_rows = 3;    // of memory for each link, one number a lane
@@ -92,4 +92,4 @@ bool holds_places(const Program& program);
 // [moving node] the coefficient 1/M.
 std::vector<std::uint32_t> inverse_masses(const Program& program);
 
-}  // namespace ressort
+}  // namespace ressort::kernels

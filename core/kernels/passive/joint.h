@@ -9,7 +9,7 @@
 #include "core/lanes.h"
 #include "core/laws/discrete_gradient.h"
 
-namespace ressort::RESSORT_ISA {
+namespace ressort::kernels::RESSORT_ISA {
 
 // A link of a cluster in one sample.
 template <class V>
@@ -151,4 +151,4 @@ class JointOf final : public JointBody<V> {
 };
 
 }  // namespace
-}  // namespace ressort::RESSORT_ISA
+}  // namespace ressort::kernels::RESSORT_ISA

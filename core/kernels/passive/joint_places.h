@@ -7,7 +7,7 @@
 
 #include "core/kernels/passive/joint.h"
 
-namespace ressort::RESSORT_ISA {
+namespace ressort::kernels::RESSORT_ISA {
 namespace {
 
 template <class V>
@@ -187,4 +187,4 @@ class Places {
 };
 
 }  // namespace
-}  // namespace ressort::RESSORT_ISA
+}  // namespace ressort::kernels::RESSORT_ISA

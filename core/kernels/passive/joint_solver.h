@@ -17,7 +17,7 @@
 #include "core/kernels/passive/joint_space.h"
 #include "core/laws/laws.h"
 
-namespace ressort::RESSORT_ISA {
+namespace ressort::kernels::RESSORT_ISA {
 
 using laws::LinkState;
 using laws::Slope;
@@ -405,4 +405,4 @@ class Joint {
 };
 
 }  // namespace
-}  // namespace ressort::RESSORT_ISA
+}  // namespace ressort::kernels::RESSORT_ISA

@@ -8,7 +8,7 @@
 #include "core/kernels/passive/joint_places.h"
 #include "core/laws/laws.h"
 
-namespace ressort::RESSORT_ISA {
+namespace ressort::kernels::RESSORT_ISA {
 
 using laws::tiny_share;
 
@@ -477,4 +477,4 @@ class ByLinks {
 };
 
 }  // namespace
-}  // namespace ressort::RESSORT_ISA
+}  // namespace ressort::kernels::RESSORT_ISA

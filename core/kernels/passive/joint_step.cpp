@@ -2,7 +2,7 @@
 // a kernel has. Compiled for each instruction set, without fused multiply-adds.
 #include "core/kernels/passive/joint_solver.h"
 
-namespace ressort::RESSORT_ISA {
+namespace ressort::kernels::RESSORT_ISA {
 
 template <class V>
 void JointSolver<V>::solve(const std::vector<PassiveLink>& links, const Cluster& cluster, V* memory,
@@ -44,4 +44,4 @@ template struct JointSolver<Pack<float, 64>>;
 template struct JointSolver<Pack<double, 64>>;
 #endif
 
-}  // namespace ressort::RESSORT_ISA
+}  // namespace ressort::kernels::RESSORT_ISA

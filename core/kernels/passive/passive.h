@@ -6,7 +6,7 @@
 
 #include "core/kernels/passive/web.h"
 
-namespace ressort::RESSORT_ISA {
+namespace ressort::kernels::RESSORT_ISA {
 namespace {
 
 // A kernel's Body says for the functions below, of a link's ends:
@@ -128,4 +128,4 @@ static inline void correct(const PassiveTables& tables, V* memory, V* numbers, B
 }
 
 }  // namespace
-}  // namespace ressort::RESSORT_ISA
+}  // namespace ressort::kernels::RESSORT_ISA

@@ -6,7 +6,7 @@
 #include "core/kernels/passive/clusters.h"
 #include "core/lanes.h"
 
-namespace ressort {
+namespace ressort::kernels {
 
 // What they keep from one sample to the next, and what solving them needs.
 template <class T>
@@ -40,4 +40,4 @@ struct PassiveRoom {
   Aligned<T> felt;
 };
 
-}  // namespace ressort
+}  // namespace ressort::kernels

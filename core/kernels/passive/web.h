@@ -4,7 +4,7 @@
 #include "core/kernels/passive/joint.h"
 #include "core/laws/laws.h"
 
-namespace ressort::RESSORT_ISA {
+namespace ressort::kernels::RESSORT_ISA {
 namespace {
 
 // A web in one sample. Of its springs' potential P >= 0 one number psi is kept, and psi^2/2 is what
@@ -185,4 +185,4 @@ template <class V, class Body>
 }
 
 }  // namespace
-}  // namespace ressort::RESSORT_ISA
+}  // namespace ressort::kernels::RESSORT_ISA

@@ -5,7 +5,7 @@
 
 #include "core/kernels/prices/prices.h"
 
-namespace ressort {
+namespace ressort::kernels {
 
 // clang-format off
 inline constexpr Prices avx2_prices{{
@@ -90,4 +90,4 @@ inline constexpr Prices avx2_prices{{
 }};
 // clang-format on
 
-}  // namespace ressort
+}  // namespace ressort::kernels

@@ -4,7 +4,7 @@
 #include "core/kernels/prices/avx512.h"
 #include "core/kernels/prices/sse2.h"
 
-namespace ressort {
+namespace ressort::kernels {
 namespace {
 
 constexpr bool is_in_order(const Prices& prices) {
@@ -32,4 +32,4 @@ double Work::cost(Isa isa, bool is_double) const {
   return ns;
 }
 
-}  // namespace ressort
+}  // namespace ressort::kernels

@@ -9,7 +9,7 @@
 
 #include "core/kernels/isa.h"
 
-namespace ressort {
+namespace ressort::kernels {
 
 // Named by their form. A pack is a register full of numbers; a line 64 bytes that are not in the
 // nearest cache, a far one not in the second either.
@@ -130,4 +130,4 @@ class Work {
   std::array<double, item_count> times_{};
 };
 
-}  // namespace ressort
+}  // namespace ressort::kernels

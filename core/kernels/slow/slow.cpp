@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-namespace ressort {
+namespace ressort::kernels {
 namespace {
 
 constexpr int most_trials = 6;  // to find the speed at which a mass on its own spring begins
@@ -223,4 +223,4 @@ bool SlowKernel<T>::is_near_start(std::size_t, double bound) const {
 template class SlowKernel<float>;
 template class SlowKernel<double>;
 
-}  // namespace ressort
+}  // namespace ressort::kernels

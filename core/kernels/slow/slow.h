@@ -9,7 +9,7 @@
 
 #include "core/kernels/kernel.h"
 
-namespace ressort {
+namespace ressort::kernels {
 
 template <class T>
 class SlowKernel final : public Kernel<T> {
@@ -60,4 +60,4 @@ class SlowKernel final : public Kernel<T> {
   std::vector<T> pushed_;            // [input] forces summed up, or where the hand is
 };
 
-}  // namespace ressort
+}  // namespace ressort::kernels

@@ -6,7 +6,7 @@
 #include "core/kernels/registry.h"
 #include "core/laws/laws.h"
 
-namespace ressort {
+namespace ressort::kernels {
 namespace {
 
 constexpr std::uint32_t least_frames = 4;
@@ -79,4 +79,4 @@ std::uint64_t voice_bytes(const Program&, const Slow& form, std::uint64_t number
   return voice_bytes(*form.fine, number_bytes) + voice_bytes(*form.coarse, number_bytes);
 }
 
-}  // namespace ressort
+}  // namespace ressort::kernels

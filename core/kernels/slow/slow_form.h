@@ -6,7 +6,7 @@
 #include "core/kernels/estimates.h"
 #include "core/kernels/program.h"
 
-namespace ressort {
+namespace ressort::kernels {
 
 // What the fastest mode may have in a coarse step: the fourth order is then as near to the
 // continuous network as 70 dB after a thousand steps, and the cubic between the steps nearer still.
@@ -26,4 +26,4 @@ double predicted_ns(const Program& program, const Slow& form, const Workload& lo
 std::string description(const Program& program, const Slow& form);
 std::uint64_t voice_bytes(const Program& program, const Slow& form, std::uint64_t number_bytes);
 
-}  // namespace ressort
+}  // namespace ressort::kernels

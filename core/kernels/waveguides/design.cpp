@@ -6,7 +6,7 @@
 #include <numbers>
 #include <utility>
 
-namespace ressort {
+namespace ressort::kernels {
 namespace {
 
 using Complex = std::complex<double>;
@@ -207,4 +207,4 @@ void find_places(const WaveguideDesign& design, const FiltersAt& filters, std::s
   }
 }
 
-}  // namespace ressort
+}  // namespace ressort::kernels

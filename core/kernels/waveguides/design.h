@@ -17,9 +17,10 @@
 #include <cstdint>
 #include <span>
 
+#include "core/rooms.h"
 #include "core/waveguide_places.h"
 
-namespace ressort {
+namespace ressort::kernels {
 
 struct WaveguideNumbers {
   double frequency_hz = 0.0;
@@ -54,4 +55,4 @@ WaveguideDesign design_waveguide(const WaveguideNumbers& numbers, std::uint32_t 
 void find_places(const WaveguideDesign& design, const FiltersAt& filters, std::span<const double> u,
                  std::span<std::uint32_t> order, std::span<std::uint32_t> delays);
 
-}  // namespace ressort
+}  // namespace ressort::kernels

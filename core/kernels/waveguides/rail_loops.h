@@ -7,7 +7,7 @@
 #include "core/kernels/waveguides/rails.h"
 #include "core/kernels/waveguides/transpose.h"
 
-namespace ressort::RESSORT_ISA {
+namespace ressort::kernels::RESSORT_ISA {
 namespace {
 
 // `s` is a view of the nodes: V* v, force, coefficient, and shift(node, way).
@@ -254,4 +254,4 @@ struct RailLoops {
 };
 
 }  // namespace
-}  // namespace ressort::RESSORT_ISA
+}  // namespace ressort::kernels::RESSORT_ISA

@@ -6,7 +6,7 @@
 #include <limits>
 #include <span>
 
-namespace ressort {
+namespace ressort::kernels {
 namespace {
 
 constexpr std::size_t numbers_of_guide = 3;  // frequency, T60, brightness
@@ -262,4 +262,4 @@ double Rails<T>::energy(std::size_t lane, const T* coefficients) const {
 template class Rails<float>;
 template class Rails<double>;
 
-}  // namespace ressort
+}  // namespace ressort::kernels

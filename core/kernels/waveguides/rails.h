@@ -25,7 +25,7 @@
 #include "core/kernels/waveguides/design.h"
 #include "core/lanes.h"
 
-namespace ressort {
+namespace ressort::kernels {
 
 inline constexpr double lowest_waveguide_hz = 15.0;  // that rings have room for
 inline constexpr int waveguide_fade_frames = 64;     // from one length, or place, to another
@@ -110,4 +110,4 @@ class Rails {
   std::vector<std::uint32_t> all_delays_;      // of a lane
 };
 
-}  // namespace ressort
+}  // namespace ressort::kernels

@@ -6,8 +6,9 @@
 #include <utility>
 
 #include "core/lanes.h"
+#include "core/rooms.h"
 
-namespace ressort {
+namespace ressort::kernels {
 
 // What is right of the middle in `upper` changes places with what is left of it in `lower`, in all
 // squares of twice `half` a side.
@@ -37,4 +38,4 @@ template <class V>
   transpose_by<sizeof(V) / sizeof(Scalar<V>) / 2>(rows);
 }
 
-}  // namespace ressort
+}  // namespace ressort::kernels

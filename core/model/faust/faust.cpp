@@ -14,7 +14,7 @@
 #include "core/model/faust/faust_words.h"
 #include "core/model/topology.h"
 
-namespace ressort {
+namespace ressort::model {
 namespace {
 
 using Words = std::vector<std::string>;
@@ -72,7 +72,7 @@ class Writer {
   }
 
  private:
-  bool moves(std::size_t i) const { return ressort::moves(network_.masses[i]); }
+  bool moves(std::size_t i) const { return model::moves(network_.masses[i]); }
 
   // --- names ---------------------------------------------------------------------------------
 
@@ -274,7 +274,7 @@ class Writer {
 
   // Its own M, K or Z are another number at the next tick, when its force acts: so it feeds back
   // the force, not what becomes of it.
-  bool drives_itself(const Mass& mass) const { return ressort::drives_itself(network_, mass); }
+  bool drives_itself(const Mass& mass) const { return model::drives_itself(network_, mass); }
 
   // Terms of what acts on it besides its links, at once.
   Words outside(std::size_t i) const {
@@ -569,4 +569,4 @@ std::size_t faust_elements(const Network& network) {
   return expanded.masses.size() + expanded.links.size();
 }
 
-}  // namespace ressort
+}  // namespace ressort::model

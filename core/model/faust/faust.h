@@ -8,7 +8,7 @@
 #include "core/model/preset/preset.h"
 #include "core/result.h"
 
-namespace ressort {
+namespace ressort::model {
 
 struct FaustOptions {
   std::string name;                           // of the model, for people
@@ -28,4 +28,4 @@ Result<std::string> faust_text(const Network& network, const FaustOptions& optio
 std::size_t faust_elements(const Network& network);
 inline constexpr std::size_t comfortable_faust_elements = 2000;
 
-}  // namespace ressort
+}  // namespace ressort::model

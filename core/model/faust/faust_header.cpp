@@ -5,7 +5,7 @@
 
 #include "core/model/faust/faust_words.h"
 
-namespace ressort {
+namespace ressort::model {
 namespace {
 
 std::string meaning_of_input(const Network& network, std::span<const std::string> masses,
@@ -30,7 +30,7 @@ std::string meaning_of_input(const Network& network, std::span<const std::string
 std::string faust_header(const Network& network, std::span<const std::string> masses,
                          const std::string& name, int inputs) {
   const auto moving = std::count_if(network.masses.begin(), network.masses.end(),
-                                    [](const Mass& mass) { return ressort::moves(mass); });
+                                    [](const Mass& mass) { return model::moves(mass); });
   std::string text = "// " + plain(name) +
                      ", a network of masses and springs: " + std::to_string(moving) +
                      " that move, " + std::to_string(network.links.size()) + " links.\n";
@@ -50,4 +50,4 @@ std::string faust_header(const Network& network, std::span<const std::string> ma
   return text + "declare name \"" + plain(name) + "\";\n\n";
 }
 
-}  // namespace ressort
+}  // namespace ressort::model

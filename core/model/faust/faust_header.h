@@ -7,10 +7,10 @@
 
 #include "core/model/network.h"
 
-namespace ressort {
+namespace ressort::model {
 
 // `masses` are their names in FAUST; the network is expanded.
 std::string faust_header(const Network& network, std::span<const std::string> masses,
                          const std::string& name, int inputs);
 
-}  // namespace ressort
+}  // namespace ressort::model

@@ -8,7 +8,7 @@
 #include "core/model/faust/faust_solution.h"
 #include "core/model/faust/faust_words.h"
 
-namespace ressort {
+namespace ressort::model {
 namespace {
 
 constexpr std::size_t most_together = 32;
@@ -326,4 +326,4 @@ std::string FaustJoint::text(const FaustTerms& terms) const {
   return text;
 }
 
-}  // namespace ressort
+}  // namespace ressort::model

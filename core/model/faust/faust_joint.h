@@ -16,7 +16,7 @@
 #include "core/model/network.h"
 #include "core/result.h"
 
-namespace ressort {
+namespace ressort::model {
 
 // What is known of the network's text already.
 struct FaustTerms {
@@ -76,4 +76,4 @@ class FaustJoint {
   std::vector<Cluster> clusters_;
 };
 
-}  // namespace ressort
+}  // namespace ressort::model

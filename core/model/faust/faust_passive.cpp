@@ -1,6 +1,6 @@
 #include "core/model/faust/faust_passive.h"
 
-namespace ressort {
+namespace ressort::model {
 namespace {
 
 constexpr FaustDefinition definitions[] = {
@@ -334,4 +334,4 @@ std::span<const FaustDefinition> faust_passive_definitions() {
   return definitions;
 }
 
-}  // namespace ressort
+}  // namespace ressort::model

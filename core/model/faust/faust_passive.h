@@ -5,7 +5,9 @@
 #include <span>
 #include <string_view>
 
-namespace ressort {
+#include "core/rooms.h"
+
+namespace ressort::model {
 
 struct FaustDefinition {
   std::string_view name;
@@ -27,4 +29,4 @@ inline constexpr int faust_joint_newtons = 10;
 // and what they stand on.
 std::span<const FaustDefinition> faust_passive_definitions();
 
-}  // namespace ressort
+}  // namespace ressort::model

@@ -5,7 +5,7 @@
 
 #include "core/model/faust/faust_words.h"
 
-namespace ressort {
+namespace ressort::model {
 namespace {
 
 using Words = std::vector<std::string>;
@@ -83,4 +83,4 @@ std::vector<FaustShare> faust_shares(const Network& network, std::uint32_t point
   return all;
 }
 
-}  // namespace ressort
+}  // namespace ressort::model

@@ -6,7 +6,7 @@
 
 #include "core/model/network.h"
 
-namespace ressort {
+namespace ressort::model {
 
 // How much of a node a point is: its weight as a factor, "0.3*" or "hat(2.0, row_p)*".
 struct FaustShare {
@@ -21,4 +21,4 @@ bool faust_is_fixed(const Network& network, ArgumentId coordinate);
 std::vector<FaustShare> faust_shares(const Network& network, std::uint32_t point,
                                      const std::string& name);
 
-}  // namespace ressort
+}  // namespace ressort::model

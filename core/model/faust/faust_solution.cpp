@@ -9,7 +9,7 @@
 #include "core/model/faust/faust_passive.h"
 #include "core/model/faust/faust_words.h"
 
-namespace ressort {
+namespace ressort::model {
 namespace {
 
 using Symbols = std::vector<std::string>;
@@ -365,4 +365,4 @@ std::string faust_solution(const FaustLinks& links) {
   return Solution(links).text();
 }
 
-}  // namespace ressort
+}  // namespace ressort::model

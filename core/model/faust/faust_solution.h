@@ -8,7 +8,7 @@
 
 #include "core/laws/law.h"
 
-namespace ressort {
+namespace ressort::model {
 
 struct FaustLink {
   Law law{};
@@ -29,4 +29,4 @@ struct FaustLinks {
 // in two samples, and for all but springs rest_, what steady_ says of it.
 std::string faust_solution(const FaustLinks& links);
 
-}  // namespace ressort
+}  // namespace ressort::model

@@ -6,7 +6,7 @@
 #include "core/laws/law.h"
 #include "core/model/faust/faust_words.h"
 
-namespace ressort {
+namespace ressort::model {
 namespace {
 
 constexpr double highest_rate_hz = 192000.0;  // that delays have room for
@@ -236,4 +236,4 @@ std::string FaustWaveguides::waves(const FaustTerms& terms) const {
   return text;
 }
 
-}  // namespace ressort
+}  // namespace ressort::model

@@ -14,7 +14,7 @@
 #include "core/result.h"
 #include "core/waveguide_places.h"
 
-namespace ressort {
+namespace ressort::model {
 
 // Whether a number follows an audio input.
 bool is_driven(const Network& network, ArgumentId argument);
@@ -62,4 +62,4 @@ class FaustWaveguides {
   std::vector<Guide> guides_;
 };
 
-}  // namespace ressort
+}  // namespace ressort::model

@@ -7,7 +7,7 @@
 #include "core/model/faust/faust_passive.h"
 #include "core/model/language/expression.h"
 
-namespace ressort {
+namespace ressort::model {
 namespace {
 
 constexpr std::size_t line_width = 100;
@@ -330,4 +330,4 @@ std::string faust_prelude(bool rescale) {
          "push(f) = f*r*r;\n";
 }
 
-}  // namespace ressort
+}  // namespace ressort::model

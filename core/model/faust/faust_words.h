@@ -12,7 +12,7 @@
 #include "core/model/network.h"
 #include "core/model/preset/preset.h"
 
-namespace ressort {
+namespace ressort::model {
 
 // Turns labels into different FAUST identifiers, to be used after a prefix: so no label is a
 // keyword, a primitive or a name of ours.
@@ -53,4 +53,4 @@ std::string faust_laws(const std::set<std::string>& used);
 // What every program starts with.
 std::string faust_prelude(bool rescale);
 
-}  // namespace ressort
+}  // namespace ressort::model

@@ -9,7 +9,7 @@
 #include "core/model/language/reader.h"
 #include "core/model/topology.h"
 
-namespace ressort {
+namespace ressort::model {
 namespace {
 
 constexpr double least_mass = 1e-300;  // a smaller one has no finite inverse
@@ -470,4 +470,4 @@ std::optional<int> Reader::channel(const Line& line, std::string_view prefix) {
   return std::nullopt;
 }
 
-}  // namespace ressort
+}  // namespace ressort::model

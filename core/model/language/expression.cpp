@@ -6,7 +6,7 @@
 
 #include "core/model/language/tokens.h"
 
-namespace ressort {
+namespace ressort::model {
 namespace {
 
 struct Function {
@@ -339,4 +339,4 @@ Result<Formula> parse_expression(std::string_view text, std::span<const std::str
   return Parser(text, parameters).run();
 }
 
-}  // namespace ressort
+}  // namespace ressort::model

@@ -7,8 +7,9 @@
 
 #include "core/formula.h"
 #include "core/result.h"
+#include "core/rooms.h"
 
-namespace ressort {
+namespace ressort::model {
 
 // Numbers are read and written free of the locale.
 // "1.", ".1", "-0.2", "1e-3" are numbers; "", "1x", "nan", "inf" are not. [any thread]
@@ -24,4 +25,4 @@ Result<Formula> parse_expression(std::string_view text, std::span<const std::str
 // Infix without blanks and with the fewest parentheses; parse_expression gives the same steps back.
 std::string print_expression(const Formula& formula, std::span<const std::string> parameters);
 
-}  // namespace ressort
+}  // namespace ressort::model

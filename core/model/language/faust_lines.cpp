@@ -7,7 +7,7 @@
 #include "core/model/language/expression.h"
 #include "core/model/language/reader.h"
 
-namespace ressort {
+namespace ressort::model {
 namespace {
 
 constexpr std::string_view faust_functions[] = {"sqrt", "abs", "sin", "cos",
@@ -407,4 +407,4 @@ double FaustLines::value(const std::string& text) const {
   return formula ? evaluate(*formula, values) : 0.0;
 }
 
-}  // namespace ressort
+}  // namespace ressort::model

@@ -9,7 +9,7 @@
 #include "core/model/language/synth_a_modeler.h"
 #include "core/model/language/tokens.h"
 
-namespace ressort {
+namespace ressort::model {
 
 // `word(arguments),names;`, or `audioout,name,expression;`, whose one argument is the expression.
 struct Statement {
@@ -84,4 +84,4 @@ class FaustLines {
   int warnings_ = 0;
 };
 
-}  // namespace ressort
+}  // namespace ressort::model

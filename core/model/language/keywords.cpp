@@ -4,7 +4,7 @@
 #include <iterator>
 #include <vector>
 
-namespace ressort {
+namespace ressort::model {
 namespace {
 
 // clang-format off
@@ -64,4 +64,4 @@ std::span<const Keyword> keywords() {
   return all;
 }
 
-}  // namespace ressort
+}  // namespace ressort::model

@@ -6,7 +6,7 @@
 
 #include "core/model/network.h"
 
-namespace ressort {
+namespace ressort::model {
 
 enum class Element {
   parameter,
@@ -51,4 +51,4 @@ struct Keyword {
 // All words of the language, those of links from their laws. [any thread]
 std::span<const Keyword> keywords();
 
-}  // namespace ressort
+}  // namespace ressort::model

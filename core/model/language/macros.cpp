@@ -7,7 +7,7 @@
 #include "core/model/language/reader.h"
 #include "core/model/topology.h"
 
-namespace ressort {
+namespace ressort::model {
 
 void Reader::add_macro(const Line& line) {
   if (line.element == undeclared) {
@@ -209,4 +209,4 @@ std::uint32_t Reader::size(const Line& line, std::size_t at, std::uint32_t least
   return static_cast<std::uint32_t>(number);
 }
 
-}  // namespace ressort
+}  // namespace ressort::model

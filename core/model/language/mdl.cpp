@@ -7,7 +7,7 @@
 #include "core/model/language/reader.h"
 #include "core/model/language/synth_a_modeler.h"
 
-namespace ressort {
+namespace ressort::model {
 
 ParsedNetwork Reader::read(std::string_view text, const ReadOptions& options) {
   if (text.size() > max_model_bytes) {
@@ -503,4 +503,4 @@ std::string to_string(const Diagnostic& diagnostic, std::string_view file) {
          diagnostic.message;
 }
 
-}  // namespace ressort
+}  // namespace ressort::model

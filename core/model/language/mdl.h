@@ -9,7 +9,7 @@
 #include "core/model/network.h"
 #include "core/progress.h"
 
-namespace ressort {
+namespace ressort::model {
 
 enum class Severity { warning, error };
 
@@ -49,4 +49,4 @@ inline constexpr int max_channels = 64;  // of inputs, and of outputs
 // "file:line:column: error: message".
 std::string to_string(const Diagnostic& diagnostic, std::string_view file);
 
-}  // namespace ressort
+}  // namespace ressort::model

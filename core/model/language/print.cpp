@@ -9,7 +9,7 @@
 #include "core/model/language/mdl.h"
 #include "core/model/topology.h"
 
-namespace ressort {
+namespace ressort::model {
 namespace {
 
 // A law may have many words: the first that needs no more arguments than the link has.
@@ -372,4 +372,4 @@ std::string print_network(const Network& network) {
   return std::string("~motion ") + (is_velocity ? "velocity" : "delayed") + "\n\n" + text;
 }
 
-}  // namespace ressort
+}  // namespace ressort::model

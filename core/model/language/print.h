@@ -5,7 +5,7 @@
 
 #include "core/model/network.h"
 
-namespace ressort {
+namespace ressort::model {
 
 // The text of a network, in one dialect (MIMS4Max's, and 'massG' for a gravity that is not per
 // rate): `parse_network(print_network(n)).network == n` for every network that was read. A line
@@ -16,4 +16,4 @@ namespace ressort {
 // comment that says so. [any thread but audio]
 std::string print_network(const Network& network);
 
-}  // namespace ressort
+}  // namespace ressort::model

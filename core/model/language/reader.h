@@ -16,7 +16,7 @@
 #include "core/model/language/synth_a_modeler.h"
 #include "core/model/language/tokens.h"
 
-namespace ressort {
+namespace ressort::model {
 
 inline constexpr int most_diagnostics = 100;  // errors, and as many warnings
 inline constexpr std::size_t longest_label = 1000;
@@ -194,4 +194,4 @@ class Reader {
   int said_line_ = 0;
 };
 
-}  // namespace ressort
+}  // namespace ressort::model

@@ -4,7 +4,7 @@
 
 #include "core/model/language/sam_teller.h"
 
-namespace ressort {
+namespace ressort::model {
 namespace {
 
 constexpr int deepest_sum = 50;  // parentheses and signs in what is heard
@@ -186,4 +186,4 @@ void SamTeller::write_output(const SamElement& element) {
   }
 }
 
-}  // namespace ressort
+}  // namespace ressort::model

@@ -4,7 +4,7 @@
 
 #include "core/model/language/sam_teller.h"
 
-namespace ressort {
+namespace ressort::model {
 
 // The seconds that a wave takes to and fro in a guide.
 std::optional<std::string> SamTeller::period_of(const SamElement& guide) {
@@ -208,4 +208,4 @@ void SamTeller::join_row(std::size_t termination) {
   elements_[node].end = "[" + label + " 1]";
 }
 
-}  // namespace ressort
+}  // namespace ressort::model

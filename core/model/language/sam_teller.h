@@ -10,7 +10,7 @@
 #include "core/model/language/expression.h"
 #include "core/model/language/faust_lines.h"
 
-namespace ressort {
+namespace ressort::model {
 
 enum class SamKind {
   mass,
@@ -134,4 +134,4 @@ class SamTeller {
   ToldText out_;
 };
 
-}  // namespace ressort
+}  // namespace ressort::model

@@ -4,7 +4,7 @@
 
 #include "core/model/language/sam_teller.h"
 
-namespace ressort {
+namespace ressort::model {
 namespace {
 
 // 0.9 K/10 is the most that nlPluck pushes with per scale, where a pluck of theirs has k.
@@ -298,4 +298,4 @@ ToldText tell_synth_a_modeler(std::string_view text, const Progress& progress) {
   return SamTeller().tell(text, progress);
 }
 
-}  // namespace ressort
+}  // namespace ressort::model

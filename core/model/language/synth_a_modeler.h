@@ -7,7 +7,7 @@
 
 #include "core/model/language/mdl.h"
 
-namespace ressort {
+namespace ressort::model {
 
 // Where a line of a told text comes from; line and column from 1.
 struct Origin {
@@ -30,4 +30,4 @@ bool is_synth_a_modeler(std::string_view text);
 // throws but what `progress` does; what it takes in memory is bounded. [any thread but audio]
 ToldText tell_synth_a_modeler(std::string_view text, const Progress& progress);
 
-}  // namespace ressort
+}  // namespace ressort::model

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cctype>
 
-namespace ressort {
+namespace ressort::model {
 namespace {
 
 bool is_blank(char c) {
@@ -102,4 +102,4 @@ std::string quoted(std::string_view text) {
   return shown + (text.empty() ? "'" : "...'");
 }
 
-}  // namespace ressort
+}  // namespace ressort::model

@@ -5,7 +5,9 @@
 #include <string_view>
 #include <vector>
 
-namespace ressort {
+#include "core/rooms.h"
+
+namespace ressort::model {
 
 struct Token {
   std::string_view text;
@@ -57,7 +59,7 @@ std::string suggestion(std::string_view word, const Names& names, std::string_vi
     }
   }
   return best.empty() ? ""
-                      : "; did you mean " + ressort::quoted(std::string(prefix).append(best)) + "?";
+                      : "; did you mean " + model::quoted(std::string(prefix).append(best)) + "?";
 }
 
-}  // namespace ressort
+}  // namespace ressort::model

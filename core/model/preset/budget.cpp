@@ -6,7 +6,7 @@
 
 #include "core/model/language/expression.h"
 
-namespace ressort {
+namespace ressort::model {
 namespace {
 
 constexpr std::array<std::pair<Passivity, std::string_view>, 3> passivities{{
@@ -92,4 +92,4 @@ std::string print_budget(const Budget& budget) {
   return text;
 }
 
-}  // namespace ressort
+}  // namespace ressort::model

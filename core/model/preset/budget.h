@@ -7,8 +7,9 @@
 #include <string_view>
 
 #include "core/result.h"
+#include "core/rooms.h"
 
-namespace ressort {
+namespace ressort::model {
 
 // Whether links that could gain energy from the published scheme are computed by one that cannot.
 enum class Passivity {
@@ -38,4 +39,4 @@ Result<Budget> parse_budget(std::string_view text);
 // The same, back; "" for none.
 std::string print_budget(const Budget& budget);
 
-}  // namespace ressort
+}  // namespace ressort::model

@@ -7,7 +7,7 @@
 #include "core/model/preset/preset.h"
 #include "core/model/topology.h"
 
-namespace ressort {
+namespace ressort::model {
 namespace {
 
 bool never_moves(const Mass& mass) {
@@ -171,4 +171,4 @@ std::optional<Error> idle_keys(const Network& network, const Preset& preset) {
                location.line, location.column};
 }
 
-}  // namespace ressort
+}  // namespace ressort::model

@@ -5,7 +5,7 @@
 #include "core/model/language/expression.h"
 #include "core/model/preset/toml.h"
 
-namespace ressort {
+namespace ressort::model {
 
 std::string source_name(const ControlSetting& control) {
   switch (control.source) {
@@ -251,4 +251,4 @@ std::string print_preset(const Preset& preset) {
   return text;
 }
 
-}  // namespace ressort
+}  // namespace ressort::model

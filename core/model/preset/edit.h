@@ -9,7 +9,7 @@
 #include "core/model/preset/preset.h"
 #include "core/result.h"
 
-namespace ressort {
+namespace ressort::model {
 
 struct PresetChanges {
   std::string model;  // its name or path, as a preset at its new place needs it
@@ -29,4 +29,4 @@ std::string print_preset(const Preset& preset);
 // What drives a control, as a preset says it: "note", "cc71", "/finger".
 std::string source_name(const ControlSetting& control);
 
-}  // namespace ressort
+}  // namespace ressort::model

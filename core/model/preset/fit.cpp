@@ -8,7 +8,7 @@
 #include "core/laws/laws.h"
 #include "core/model/language/tokens.h"
 
-namespace ressort {
+namespace ressort::model {
 namespace {
 
 std::string names(const Network& network) {
@@ -168,4 +168,4 @@ std::vector<Error> misfits(const Network& network, const Preset& preset) {
   return found;
 }
 
-}  // namespace ressort
+}  // namespace ressort::model

@@ -12,7 +12,7 @@
 #include "core/model/preset/preset.h"
 #include "core/result.h"
 
-namespace ressort {
+namespace ressort::model {
 
 // The input "inN" as an index into Network::inputs, and the parameter as one into
 // Network::parameters; -1 where there is none.
@@ -41,4 +41,4 @@ std::vector<Error> misfits(const Network& network, const Preset& preset);
 // The network with what the preset says is fixed marked so. O(elements) [any thread but audio]
 Network with_fixed(Network network, const Preset& preset);
 
-}  // namespace ressort
+}  // namespace ressort::model

@@ -11,7 +11,7 @@
 #include "core/model/preset/toml_table.h"
 #include "core/model/topology.h"
 
-namespace ressort {
+namespace ressort::model {
 namespace {
 
 using IsReserved = bool (*)(std::string_view address);
@@ -496,4 +496,4 @@ ParsedPreset parse_preset(std::string_view text, IsReserved is_reserved) {
   return read;
 }
 
-}  // namespace ressort
+}  // namespace ressort::model

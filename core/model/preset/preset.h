@@ -14,7 +14,7 @@
 #include "core/model/preset/budget.h"
 #include "core/result.h"
 
-namespace ressort {
+namespace ressort::model {
 
 inline constexpr double usual_a4_hz = 440.0;
 
@@ -142,4 +142,4 @@ Preset default_preset(const Network& network, bool bare);
 // of the first input; nothing where keys do play, or nothing moves.
 std::optional<Error> idle_keys(const Network& network, const Preset& preset);
 
-}  // namespace ressort
+}  // namespace ressort::model

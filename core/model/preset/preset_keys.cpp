@@ -1,7 +1,7 @@
 // The keys of a preset, which its reader, its messages and its document know from here.
 #include "core/model/preset/preset.h"
 
-namespace ressort {
+namespace ressort::model {
 namespace {
 
 // clang-format off
@@ -57,4 +57,4 @@ std::span<const PresetKey> preset_keys() {
   return keys;
 }
 
-}  // namespace ressort
+}  // namespace ressort::model

@@ -5,7 +5,7 @@
 #include "core/model/language/tokens.h"
 #include "core/model/preset/toml_table.h"
 
-namespace ressort {
+namespace ressort::model {
 namespace {
 
 MorphSetting read_values(const toml::table& table, std::vector<Error>& errors) {
@@ -68,4 +68,4 @@ void read_morph(const toml::node& node, Preset& preset, std::vector<Error>& erro
   }
 }
 
-}  // namespace ressort
+}  // namespace ressort::model

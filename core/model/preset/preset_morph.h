@@ -6,9 +6,9 @@
 #include "core/model/preset/preset.h"
 #include "core/model/preset/toml.h"
 
-namespace ressort {
+namespace ressort::model {
 
 // Adds what is wrong, each with its place.
 void read_morph(const toml::node& node, Preset& preset, std::vector<Error>& errors);
 
-}  // namespace ressort
+}  // namespace ressort::model

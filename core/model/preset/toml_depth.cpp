@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-namespace ressort {
+namespace ressort::model {
 namespace {
 
 // Behind the string that starts at `at`. What is never closed ends with its line, or the text if it
@@ -78,4 +78,4 @@ std::optional<Error> too_deep(std::string_view toml) {
   return std::nullopt;
 }
 
-}  // namespace ressort
+}  // namespace ressort::model

@@ -5,8 +5,9 @@
 #include <string_view>
 
 #include "core/result.h"
+#include "core/rooms.h"
 
-namespace ressort {
+namespace ressort::model {
 
 inline constexpr int deepest_toml = 8;  // brackets in brackets, or dots in a key
 
@@ -14,4 +15,4 @@ inline constexpr int deepest_toml = 8;  // brackets in brackets, or dots in a ke
 // dotted keys; nothing if nowhere. O(n), without recursion. [any thread]
 std::optional<Error> too_deep(std::string_view toml);
 
-}  // namespace ressort
+}  // namespace ressort::model

@@ -12,7 +12,7 @@
 #include "core/model/preset/preset.h"
 #include "core/model/preset/toml.h"
 
-namespace ressort {
+namespace ressort::model {
 
 inline SourceLocation location_of(const toml::node& node) {
   return {static_cast<int>(node.source().begin.line), static_cast<int>(node.source().begin.column)};
@@ -131,4 +131,4 @@ class TomlTable {
   std::vector<Error>& errors_;
 };
 
-}  // namespace ressort
+}  // namespace ressort::model

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <string>
 
-namespace ressort {
+namespace ressort::model {
 namespace {
 
 constexpr std::string_view blanks = " \t\v\f";
@@ -215,4 +215,4 @@ Result<std::vector<double>> key_frequencies(const Scale& scale, const KeyboardMa
   return frequencies;
 }
 
-}  // namespace ressort
+}  // namespace ressort::model

@@ -7,8 +7,9 @@
 #include <vector>
 
 #include "core/result.h"
+#include "core/rooms.h"
 
-namespace ressort {
+namespace ressort::model {
 
 inline constexpr std::size_t max_tuning_bytes = std::size_t{64} << 10;
 inline constexpr int max_scale_notes = 1024;
@@ -39,4 +40,4 @@ Result<KeyboardMap> parse_keyboard_map(std::string_view text);
 // where the reference key is. [any thread but audio]
 Result<std::vector<double>> key_frequencies(const Scale& scale, const KeyboardMap& map);
 
-}  // namespace ressort
+}  // namespace ressort::model

@@ -15,6 +15,7 @@
 #include "core/model/language/mdl.h"
 #include "core/model/topology.h"
 #include "tests/support/partial.h"
+#include "tests/support/rooms.h"
 
 namespace {
 

@@ -9,6 +9,7 @@
 #include "core/compile/compile.h"
 #include "core/engine/mixing/dc_blocker.h"
 #include "tests/bench/voicing/sound.h"
+#include "tests/support/rooms.h"
 
 namespace ressort::voicing {
 

@@ -34,7 +34,7 @@ Preset preset_of(const std::string& fixed) {
 
 // Output 1 and 2 of a note.
 std::vector<std::vector<double>> note(int key, const Preset& preset) {
-  auto compiled = compile(network_of(guitar), preset, {});
+  auto compiled = compile_network(network_of(guitar), preset, {});
   REQUIRE(compiled);
   constexpr std::size_t frames = 60000;
   std::vector<std::vector<double>> sound(2, std::vector<double>(frames));

@@ -78,7 +78,7 @@ struct Played {
 
 Played played(const Scene& scene, double seconds, const std::vector<Event>& events,
               double at_hz = rate_hz) {
-  auto compiled = compile(scene.network, scene.preset, {.rate_hz = at_hz});
+  auto compiled = compile_network(scene.network, scene.preset, {.rate_hz = at_hz});
   REQUIRE(compiled);
   Played out;
   out.sound.resize(static_cast<std::size_t>(compiled->instrument.outputs));

@@ -57,7 +57,7 @@ std::vector<double> played(const Heard& heard, double seconds, const std::vector
   }
   Preset quick = preset();
   quick.tuned_along.clear();  // which takes a while to find, and is not asked for
-  auto compiled = compile(network, quick, {.rate_hz = heard.rate_hz});
+  auto compiled = compile_network(network, quick, {.rate_hz = heard.rate_hz});
   REQUIRE(compiled);
   std::vector<double> sound(static_cast<std::size_t>(seconds * heard.rate_hz));
   std::size_t next = 0;
@@ -128,7 +128,7 @@ TEST_CASE("T60 is what is asked for, and moves the pitch by less than a twentiet
     const double length_s = asked_s < 1.0 ? 0.11 : 1.0;
     const int key = asked_s < 1.0 ? 69 : 57;
     const double hz = 440.0 * std::exp2((key - 69) / 12.0);
-    auto compiled = compile(network, preset(), {.rate_hz = 48000.0});
+    auto compiled = compile_network(network, preset(), {.rate_hz = 48000.0});
     REQUIRE(compiled);
     std::vector<std::vector<double>> sound(structures, std::vector<double>(105600));
     std::vector<double*> to;
@@ -174,7 +174,7 @@ TEST_CASE("a T60 that a structure cannot have is refused with the reason", "[six
       setting.minimum = 0.05;
     }
   }
-  const auto compiled = compile(network_of(text_of("/models/SixStructures.mdl")), wide, {});
+  const auto compiled = compile_network(network_of(text_of("/models/SixStructures.mdl")), wide, {});
   REQUIRE(compiled);
   REQUIRE(compiled->stability.narrowed.size() == 1);
   INFO(compiled->stability.narrowed[0].message);
@@ -245,7 +245,7 @@ TEST_CASE("the mixes 7 to 12 are those at which six figures have their extrema",
       output.number = 1;
       output.level = no_argument;
     }
-    auto compiled = compile(one, preset(), {.rate_hz = rate_hz});
+    auto compiled = compile_network(one, preset(), {.rate_hz = rate_hz});
     REQUIRE(compiled);
     std::vector<double> sound(14400 + size);
     double* const to = sound.data();

@@ -102,8 +102,8 @@ void check_preset(const std::string& name, double rate_hz, int step) {
   REQUIRE(scene);
   const double ratio = Network::reference_rate_hz / rate_hz;
   // By the published scheme, for exact modes have poles of their own.
-  const auto compiled =
-      compile(scene->network, scene->preset, {.rate_hz = rate_hz, .method = Method::direct});
+  const auto compiled = compile_network(scene->network, scene->preset,
+                                        {.rate_hz = rate_hz, .method = Method::direct});
   REQUIRE(compiled);
   if (!compiled->instrument.mode) {
     return;

@@ -6,6 +6,7 @@
 
 #include "core/model/language/mdl.h"
 #include "tests/support/catch.h"
+#include "tests/support/rooms.h"
 
 namespace ressort::messages {
 

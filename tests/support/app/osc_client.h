@@ -13,6 +13,7 @@
 #include "app/control/osc/packet.h"
 #include "tests/support/app/osc_bytes.h"
 #include "tests/support/catch.h"
+#include "tests/support/rooms.h"
 
 namespace ressort {
 

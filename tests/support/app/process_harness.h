@@ -11,7 +11,7 @@ inline constexpr std::size_t fade_frames = 2205;  // 50 ms
 
 inline Sounding* sounding(const std::string& text, const Preset& preset, std::uint32_t serial) {
   // In the direct form, which rounds alike however the time is cut into blocks.
-  auto compiled = compile(network_of(text), preset, {.method = Method::direct});
+  auto compiled = compile_network(network_of(text), preset, {.method = Method::direct});
   REQUIRE(compiled);
   return new Sounding{std::move(compiled->engine), serial};
 }

@@ -6,6 +6,7 @@
 
 #include "tests/support/catch.h"
 #include "tests/support/random.h"
+#include "tests/support/rooms.h"
 
 namespace ressort {
 namespace {

@@ -13,6 +13,7 @@
 #include "core/linear_algebra/fourier.h"
 #include "tests/support/catch.h"
 #include "tests/support/random.h"
+#include "tests/support/rooms.h"
 
 using namespace ressort;
 using namespace ressort::support;

@@ -12,6 +12,7 @@
 #include "core/analysis/modes/modes.h"
 #include "tests/support/app/data_folder.h"
 #include "tests/support/catch.h"
+#include "tests/support/rooms.h"
 
 namespace ressort {
 namespace {

@@ -6,6 +6,7 @@
 #include "app/commands/gallery/sound.h"
 #include "app/commands/gallery/spectrogram.h"
 #include "tests/support/catch.h"
+#include "tests/support/rooms.h"
 
 namespace ressort {
 namespace {

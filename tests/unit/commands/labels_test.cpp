@@ -2,6 +2,7 @@
 #include "app/commands/chart/picture/labels.h"
 #include "tests/support/catch.h"
 #include "tests/support/random.h"
+#include "tests/support/rooms.h"
 
 using namespace ressort;
 

@@ -6,6 +6,7 @@
 #include "app/commands/offline.h"
 #include "app/session/sound_file.h"
 #include "tests/support/app/data_folder.h"
+#include "tests/support/rooms.h"
 
 namespace ressort {
 namespace {

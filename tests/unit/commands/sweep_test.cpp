@@ -8,6 +8,7 @@
 
 #include "tests/support/app/data_folder.h"
 #include "tests/support/catch.h"
+#include "tests/support/rooms.h"
 
 namespace ressort {
 namespace {

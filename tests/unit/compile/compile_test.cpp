@@ -11,7 +11,7 @@ using namespace support;
 Error error_of(const std::string& model, const std::string& toml) {
   const auto preset = parse_preset("model = \"x.mdl\"\n" + toml);
   REQUIRE(preset.ok());
-  auto compiled = compile(network_of(model), preset.preset, {});
+  auto compiled = compile_network(network_of(model), preset.preset, {});
   REQUIRE_FALSE(compiled);
   return compiled.error();
 }

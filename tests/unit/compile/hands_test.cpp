@@ -92,7 +92,7 @@ TEST_CASE("a swing is of a touch that touches something", "[hands]") {
     if (!parsed.ok()) {
       return parsed.errors.front().message;
     }
-    const auto compiled = compile(network_of(model), parsed.preset, {});
+    const auto compiled = compile_network(network_of(model), parsed.preset, {});
     return compiled ? std::string() : compiled.error().message;
   };
   const std::string hand = "to = \"in2\"\nhow = \"touch\"\nrange = [-2, 1]\nunit = \"swing\"\n";

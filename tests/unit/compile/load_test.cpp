@@ -101,8 +101,8 @@ std::uint64_t steps_of(const std::string& text) {
   const Progress progress([](std::string_view) { return true; });
   const ParsedNetwork parsed = parse_network(text, {.progress = progress});
   REQUIRE(parsed.ok());
-  const auto compiled = compile(parsed.network, default_preset(parsed.network, false),
-                                {.most_modes = quick_modes, .progress = progress});
+  const auto compiled = compile_network(parsed.network, default_preset(parsed.network, false),
+                                        {.most_modes = quick_modes, .progress = progress});
   REQUIRE(compiled);
   return progress.steps();
 }
@@ -185,9 +185,9 @@ TEST_CASE("A load can be stopped wherever it is, and nothing of it stays", "[loa
       CHECK(parsed.diagnostics[0].message == stopped);
       return looks;
     }
-    const auto compiled =
-        compile(parsed.network, preset,
-                {.voices = 3, .most_modes = quick_modes, .find_gain = true, .progress = progress});
+    const auto compiled = compile_network(
+        parsed.network, preset,
+        {.voices = 3, .most_modes = quick_modes, .find_gain = true, .progress = progress});
     CHECK(bool(compiled) == (looks <= most));
     if (!compiled) {
       CHECK(compiled.error().message == stopped);
@@ -228,8 +228,8 @@ TEST_CASE("What an engine takes is known before it is made", "[load]") {
   const int voices = GENERATE(1, 16);
   const Network network = support::network_of(way.text);
   const auto compiled =
-      compile(network, default_preset(network, true),
-              {.voices = voices, .precision = way.precision, .method = way.method});
+      compile_network(network, default_preset(network, true),
+                      {.voices = voices, .precision = way.precision, .method = way.method});
   REQUIRE(compiled);
   REQUIRE(compiled->plan.parts.at(0).method == way.method);
   const Machine& machine = compiled->engine->machine();
@@ -250,8 +250,8 @@ TEST_CASE("Voices that do not fit into memory are refused with what would fit", 
   const Network network = support::network_of(chain(8000));
   const Preset preset = default_preset(network, true);
   const auto compiled_in = [&](std::uint64_t most_bytes) {
-    return compile(network, preset,
-                   {.voices = 64, .method = Method::direct, .most_bytes = most_bytes});
+    return compile_network(network, preset,
+                           {.voices = 64, .method = Method::direct, .most_bytes = most_bytes});
   };
   const auto refused = compiled_in(5'000'000);
   REQUIRE_FALSE(refused);
@@ -261,8 +261,8 @@ TEST_CASE("Voices that do not fit into memory are refused with what would fit", 
   CHECK(text.find(" MB of memory, and there are 5 MB; lower the voices to ") != std::string::npos);
   const int fitting = std::stoi(text.substr(text.rfind(' ')));
   CHECK(fitting > 0);
-  CHECK(compile(network, preset,
-                {.voices = fitting, .method = Method::direct, .most_bytes = 5'000'000}));
+  CHECK(compile_network(network, preset,
+                        {.voices = fitting, .method = Method::direct, .most_bytes = 5'000'000}));
   const auto hopeless = compiled_in(1000);
   REQUIRE_FALSE(hopeless);
   CHECK(hopeless.error().message.find("use a smaller model") != std::string::npos);

@@ -103,7 +103,7 @@ TEST_CASE("what is no number is refused by its element, place and parameters",
   CHECK(said_to(ground + "@r spring @g @m 1e308\n", {.rate_hz = 8000.0, .force = true}) ==
         "there.mdl:3:1: error: the argument " + std::string("1e308") +
             " of 'r' is no finite number");
-  CHECK(compile(network_of("@K audioParam @in1\n@o osc 1 1/K 0 0 0\n"), {}, {}));
+  CHECK(compile_network(network_of("@K audioParam @in1\n@o osc 1 1/K 0 0 0\n"), {}, {}));
 }
 
 TEST_CASE("numbers where doubles end are told for what they are", "[stability_check]") {
@@ -167,7 +167,7 @@ TEST_CASE("what is made passive is judged without it, by whoever asks", "[stabil
   CHECK(said_to(ground + "@x nlSpringDamper @m @g -0.1 0.1 0.2 0.01\n") == "");
   // What the proof is about is what `check` tells limits of.
   for (const std::string& text : {strong + "0.5\n", light}) {
-    const auto made = compile(network_of(text), {}, {});
+    const auto made = compile_network(network_of(text), {}, {});
     REQUIRE(made);
     CHECK(Stability(made->stability.proved, 1.0).certify({{}, {}}).verdict == Verdict::stable);
   }
@@ -179,7 +179,7 @@ TEST_CASE("what is made passive pulls wherever a preset lets it be turned to",
       "@K param -0.5\n@g ground 0.\n@m mass 1. 0. 0.\n@s spring @m @g 0.1\n"
       "@c contact @m @g K 0.01 0.\n@in1 frcInput @m\n";
   const auto made = [&](double value, double least, double most) {
-    auto compiled = compile(network_of(touched), with_range("K", value, least, most), {});
+    auto compiled = compile_network(network_of(touched), with_range("K", value, least, most), {});
     REQUIRE(compiled);
     return std::move(compiled->stability);
   };
@@ -234,7 +234,7 @@ TEST_CASE("random nonlinear scenes are judged alike by whoever asks, and refused
       linear += law < 2 ? name + " spring" + ends + k + z + "\n" : "";
     }
     INFO("seed " << seed << "\n" << text);
-    const auto played = compile(network_of(text), {}, {});
+    const auto played = compile_network(network_of(text), {}, {});
     REQUIRE(played);
     const ParameterBox none;
     const Verdict verdict = Stability(played->stability.proved, 1.0).certify(none).verdict;
@@ -279,7 +279,7 @@ TEST_CASE("a bow that is too strong for its steps is told at its line, or refuse
         std::string::npos);
   // Keys make bows as strong as they make strings.
   const auto keyed =
-      compile(network_of(string + "@b nlBow @in1 [@s 0.5] 1.5 0.01\n"), struck(1), {});
+      compile_network(network_of(string + "@b nlBow @in1 [@s 0.5] 1.5 0.01\n"), struck(1), {});
   REQUIRE(keyed);
   const auto& notes = keyed->plan.notes;
   // 16 times the stiffness makes the bow four times as strong.
@@ -366,7 +366,7 @@ TEST_CASE("random presets: their ranges are safe as they come out, and not told 
                                      {}});
       }
     }
-    auto compiled = compile(network, preset, {.method = Method::direct});
+    auto compiled = compile_network(network, preset, {.method = Method::direct});
     INFO(text);
     REQUIRE(compiled);
     const Instrument& instrument = compiled->instrument;
@@ -489,14 +489,14 @@ TEST_CASE("sound that turns a parameter takes no knob's range, and makes no stif
     Random random(seed);
     const std::string text = sounding_network(random);
     const Network network = network_of(text);
-    auto made = compile(network, {}, {});
+    auto made = compile_network(network, {}, {});
     REQUIRE(made);
     INFO("seed " << seed << "\n" << text);
     const std::vector<double> start = parameter_values(network);
     // The same with a knob that stays in place of the sound.
     std::string silent = text;
     silent.replace(silent.find("audioParam @in1"), 15, "param 0.");
-    auto alone = compile(network_of(silent), {}, {});
+    auto alone = compile_network(network_of(silent), {}, {});
     REQUIRE(alone);
     // Where knobs to four times their values and masses to a quarter were unstable together, they
     // leave each other room, and a tenth of that to sound.
@@ -536,8 +536,8 @@ TEST_CASE("the bare network goes where it is told, and no further than is stable
           "[stability_check]") {
   const Network network = network_of(oscillator);
   const auto bare = [&](const std::vector<Setting>& settings, const std::vector<Setting>& reach) {
-    auto compiled = compile(network, default_preset(network, true),
-                            {.bare = true, .settings = settings, .reach = reach});
+    auto compiled = compile_network(network, default_preset(network, true),
+                                    {.bare = true, .settings = settings, .reach = reach});
     REQUIRE(compiled);
     return *std::move(compiled);
   };

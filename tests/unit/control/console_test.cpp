@@ -33,7 +33,7 @@ TEST_CASE("a command is named by any unique beginning", "[console]") {
   CHECK(parse_command("st")->name == "status");
   CHECK(parse_command("  he\tlo ")->name == "help");
   CHECK(parse_command("q")->name == "quit");
-  for (const Row* const row : commands()) {
+  for (const Row* const row : command_rows()) {
     const auto help = parse_command("help " + std::string(row->command));
     REQUIRE(help);
     CHECK(help->words == std::vector<std::string>{std::string(row->command)});
@@ -45,7 +45,7 @@ TEST_CASE("an unclear or unknown command is answered with what there is", "[cons
   CHECK(has(error_of("s"), "status"));
   const std::string unknown = error_of("jump");
   CHECK(has(unknown, "there is no command 'jump'"));
-  for (const Row* const row : commands()) {
+  for (const Row* const row : command_rows()) {
     CHECK(has(unknown, std::string(row->command)));
   }
 }
@@ -106,7 +106,7 @@ TEST_CASE("what is not stable is not loaded, or by force, and no parameter leave
 TEST_CASE("help names every command, and tells more of each", "[console]") {
   Harness harness;
   const std::string all = harness.say("help");
-  for (const Row* const row : commands()) {
+  for (const Row* const row : command_rows()) {
     CHECK(has(all, "  " + std::string(row->command)));
     CHECK(has(all, std::string(row->command_does)));
     const std::string one = harness.say("help " + std::string(row->command));
@@ -141,7 +141,7 @@ TEST_CASE("the last word of a line is completed by what may stand there", "[cons
   Harness harness;
   harness.say("load " + write_triangle(folder));
   using Words = std::vector<std::string>;
-  CHECK(harness.console.completions("").size() == commands().size());
+  CHECK(harness.console.completions("").size() == command_rows().size());
   CHECK(harness.console.completions("note") == Words{"noteoff", "noteon"});
   CHECK(harness.console.completions("help pa") == Words{"panic", "params"});
   CHECK(harness.console.completions("set ") == Words{"m_K", "m_Z"});

@@ -2,6 +2,7 @@
 
 #include "tests/support/app/osc_bytes.h"
 #include "tests/support/catch.h"
+#include "tests/support/rooms.h"
 
 namespace ressort {
 namespace {

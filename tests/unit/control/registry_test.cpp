@@ -26,11 +26,12 @@ const Instrument& instrument() {
                         .high = 0.2},
                        {.source = ControlSource::osc, .address = "/both", .target = "in1"},
                        {.source = ControlSource::osc, .address = "/both", .target = "in2"}};
-    auto compiled = compile(network_of(scenes::string("s", 5, "0.1", "0.001") +
-                                       "@in1 posInput 0.\n@in2 posInput 0.\n@in3 frcInput @s_m0\n"
-                                       "@p nlPluck @in1 @s_m1 .1 .1\n@b nlBow @in2 @s_m2 .1 .1\n" +
-                                       scenes::output(1, "s_m0")),
-                            preset, {});
+    auto compiled =
+        compile_network(network_of(scenes::string("s", 5, "0.1", "0.001") +
+                                   "@in1 posInput 0.\n@in2 posInput 0.\n@in3 frcInput @s_m0\n"
+                                   "@p nlPluck @in1 @s_m1 .1 .1\n@b nlBow @in2 @s_m2 .1 .1\n" +
+                                   scenes::output(1, "s_m0")),
+                        preset, {});
     REQUIRE(compiled);
     return compiled->instrument;
   }();
@@ -132,10 +133,10 @@ TEST_CASE("a mass is struck by its name, those of strings and meshes by numbers"
   Preset preset;
   preset.controls = {{.target = "in1", .gesture = Gesture::impulse, .low = 0.1, .high = 0.4}};
   const auto compiled =
-      compile(network_of("@a mass 1. 0. 0.\n@s string 5 1. 0.1 0.001 0. 0. 0.\n"
-                         "@far mass 1. 0. 0.\n@l springDamper @a [@s 0.5] 0.1 0.\n"
-                         "@in1 frcInput @a\n@out1 posOutput @a\n"),
-              preset, {});
+      compile_network(network_of("@a mass 1. 0. 0.\n@s string 5 1. 0.1 0.001 0. 0. 0.\n"
+                                 "@far mass 1. 0. 0.\n@l springDamper @a [@s 0.5] 0.1 0.\n"
+                                 "@in1 frcInput @a\n@out1 posOutput @a\n"),
+                      preset, {});
   REQUIRE(compiled);
   const auto said = [&](const std::string& text) {
     return to_events(call(text), compiled->instrument, 9);
@@ -173,7 +174,7 @@ TEST_CASE("a mass is struck by its name, those of strings and meshes by numbers"
 
 TEST_CASE("what an input gives cannot be set", "[registry]") {
   const auto compiled =
-      compile(network_of("@K audioParam @in2\n@Z param 0.1\n@o osc 1 K Z 0 0\n"), {}, {});
+      compile_network(network_of("@K audioParam @in2\n@Z param 0.1\n@o osc 1 K Z 0 0\n"), {}, {});
   REQUIRE(compiled);
   const auto one = to_events(call("/param/K 0.1"), compiled->instrument, 9);
   REQUIRE_FALSE(one);

@@ -4,6 +4,7 @@
 #include <set>
 
 #include "tests/support/catch.h"
+#include "tests/support/rooms.h"
 
 namespace ressort {
 namespace {

@@ -1,4 +1,5 @@
-// The engine as it is played: voices, pitch, parameters, the guard, sleep; through compile().
+// The engine as it is played: voices, pitch, parameters, the guard, sleep; through
+// compile_network().
 #include "core/engine/engine.h"
 
 #include "tests/support/pitch.h"
@@ -34,7 +35,7 @@ TEST_CASE("a parameter that audio gives acts sample by sample, through expressio
       "@s springDamper @a @g [0.05+0.04*k] 0.001\n@t springDamper @a @b k 0.001\n"
       "@in1 frcInput @a\n@out1 posOutput @b\n";
   const Network network = network_of(text);
-  auto compiled = compile(network, default_preset(network, true), {.bare = true});
+  auto compiled = compile_network(network, default_preset(network, true), {.bare = true});
   REQUIRE(compiled);
   CHECK(compiled->instrument.audio_inputs == 2);
   auto oracle = reference::make_simulation(network, parameter_values(network));

@@ -336,7 +336,7 @@ TEST_CASE("a velocity curve bends the touch and keeps its ends", "[play_modes]")
 TEST_CASE("a mode that is not there is no pitch, and that is told", "[play_modes]") {
   Preset preset = struck(1);
   preset.pitch_mode = 2;
-  const auto made = compile(
+  const auto made = compile_network(
       network_of("@o osc 1. 0.1 0.001 0. 0.\n@in1 frcInput @o\n@out1 posOutput @o\n"), preset, {});
   REQUIRE(made);
   CHECK_FALSE(made->instrument.mode);

@@ -64,7 +64,7 @@ TEST_CASE("chords of waveguides are the sum of their notes", "[play_waveguides]"
 TEST_CASE("keys leave a model whose waveguides are fixed as it is", "[play_waveguides]") {
   Preset preset = struck(1);
   preset.fixed = {"s"};
-  const auto made = compile(network_of(string), preset, {});
+  const auto made = compile_network(network_of(string), preset, {});
   REQUIRE(made);
   CHECK_FALSE(made->instrument.mode);
   REQUIRE(made->plan.notes.size() == 1);
@@ -78,11 +78,11 @@ TEST_CASE("keys leave a model whose waveguides are fixed as it is", "[play_waveg
 
 TEST_CASE("springs to a waveguide need no proof, those among masses do", "[play_waveguides]") {
   const std::string held = string + "@a mass 1. 0. 0.\n@b mass 1. 0. 0.\n@k spring [@s 0.5] @a ";
-  CHECK(compile(network_of(held + "1000.\n@l spring @a @b 1.9\n"), struck(1), {}));
-  const auto made = compile(network_of(held + "0.1\n@l spring @a @b 2.1\n"), struck(1), {});
+  CHECK(compile_network(network_of(held + "1000.\n@l spring @a @b 1.9\n"), struck(1), {}));
+  const auto made = compile_network(network_of(held + "0.1\n@l spring @a @b 2.1\n"), struck(1), {});
   CHECK((!made || made->stability.verdict == Verdict::unstable));
   const Network pushed = network_of(held + "-0.1\n");
-  const auto forced = compile(pushed, struck(1), {.force = true});
+  const auto forced = compile_network(pushed, struck(1), {.force = true});
   REQUIRE(forced);
   CHECK(forced->stability.verdict == Verdict::unproved);
   const auto values = parameter_values(pushed);

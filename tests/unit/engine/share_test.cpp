@@ -14,8 +14,8 @@ namespace {
 // 60 notes, two at a time. Bodies that are plucked tell from which side: they get each key once.
 std::vector<double> played(const Scene& scene, NoteShare::Part share, bool with_panic,
                            bool is_plucked) {
-  auto compiled =
-      compile(scene.network, scene.preset, {.rate_hz = 48000.0, .voices = 64, .share = share});
+  auto compiled = compile_network(scene.network, scene.preset,
+                                  {.rate_hz = 48000.0, .voices = 64, .share = share});
   REQUIRE(compiled);
   Engine& engine = *compiled->engine;
   std::vector<std::vector<double>> buffers(static_cast<std::size_t>(engine.output_count()),

@@ -153,8 +153,8 @@ TEST_CASE("A large mesh sounds at once, and by its modes when they are found", "
   std::filesystem::remove(path + ".toml");
   REQUIRE((*quick)->plan.parts[0].method != Method::modal);
   const Preset preset = parse_preset(text).preset;
-  auto compiled = compile(support::network_of(scenes::mesh_20x30()), preset,
-                          {.rate_hz = 48000.0, .most_modes = quick_modes});
+  auto compiled = compile_network(support::network_of(scenes::mesh_20x30()), preset,
+                                  {.rate_hz = 48000.0, .most_modes = quick_modes});
   REQUIRE(compiled);
   Process stays(48000.0);
   stays.slot.offer(new Sounding{std::move(compiled->engine), 1});

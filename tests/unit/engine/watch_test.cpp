@@ -214,7 +214,7 @@ TEST_CASE("Nobody in the instruments runs away", "[watch]") {
     for (const Precision precision : {Precision::float32, Precision::float64}) {
       const auto scene = load_scene(folder + name + ".toml", {});
       REQUIRE(scene);
-      auto compiled = compile(scene->network, scene->preset, {.precision = precision});
+      auto compiled = compile_network(scene->network, scene->preset, {.precision = precision});
       REQUIRE(compiled);
       Engine& engine = *compiled->engine;
       std::vector<std::vector<double>> sound(static_cast<std::size_t>(engine.output_count()),

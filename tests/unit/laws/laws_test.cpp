@@ -9,6 +9,7 @@
 #include "core/model/language/mdl.h"
 #include "core/model/language/print.h"
 #include "tests/support/random.h"
+#include "tests/support/rooms.h"
 
 namespace ressort {
 namespace {

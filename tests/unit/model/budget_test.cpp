@@ -2,6 +2,7 @@
 #include "core/model/preset/budget.h"
 #include "core/model/preset/preset.h"
 #include "tests/support/catch.h"
+#include "tests/support/rooms.h"
 
 using namespace ressort;
 

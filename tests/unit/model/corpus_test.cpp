@@ -178,7 +178,7 @@ ChannelSamples by_kernel(const Network& network, const ChannelSamples& driven) {
 }
 
 ChannelSamples by_engine(const Network& network, const ChannelSamples& driven) {
-  auto compiled = compile(network, default_preset(network, true), {.bare = true});
+  auto compiled = compile_network(network, default_preset(network, true), {.bare = true});
   REQUIRE(compiled);
   ChannelSamples outputs(static_cast<std::size_t>(output_count(network)),
                          std::vector<double>(frames));

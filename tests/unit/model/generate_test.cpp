@@ -217,7 +217,7 @@ TEST_CASE("a shape is a model that sounds, is stable and has nothing to complain
         CHECK(network.inputs.size() == 1);
         CHECK(network.outputs.size() == 1);
         CHECK((as_macro || network.inputs[0].mass != network.outputs[0].mass));
-        auto compiled = compile(network, default_preset(network, true), {.bare = true});
+        auto compiled = compile_network(network, default_preset(network, true), {.bare = true});
         REQUIRE(compiled);
         CHECK(compiled->instrument.stiffness_margin >= 1.0);
         // It rests at 0.25 until it is pushed; then it swings around that, for a second at least.

@@ -131,7 +131,7 @@ TEST_CASE("a place that moves at audio rate follows the published array algorith
   const Network network = network_of(
       "@u audioParam @in2\n@s chain 12 1.3 0.2 0.003 0. 0.\n@in1 posInput 0.\n"
       "@h springDamper @in1 [@s u] 0.05 0.02\n@out1 posOutput [@s u]\n@out2 frcOutput @in1\n");
-  auto compiled = compile(network, default_preset(network, true), {.bare = true});
+  auto compiled = compile_network(network, default_preset(network, true), {.bare = true});
   REQUIRE(compiled);
   constexpr std::size_t frames = 8000;
   const Motion hand(71, 0.5, 40.0);

@@ -78,7 +78,7 @@ TEST_CASE("every preset has two ears, a forte between -22 and -1 dBFS, and 14 to
     REQUIRE(scene->has_preset);
     std::vector<double> levels_db;
     for (const double velocity : {20.0, 64.0, 100.0, 127.0}) {
-      auto compiled = compile(scene->network, scene->preset, {});
+      auto compiled = compile_network(scene->network, scene->preset, {});
       REQUIRE(compiled);
       CHECK(compiled->instrument.stiffness_margin >= 1.0);  // in every corner of the ranges
       CHECK(compiled->instrument.outputs == 2);

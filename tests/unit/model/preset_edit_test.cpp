@@ -2,6 +2,7 @@
 #include "core/model/preset/edit.h"
 
 #include "tests/support/catch.h"
+#include "tests/support/rooms.h"
 
 namespace ressort {
 namespace {

@@ -480,7 +480,7 @@ TEST_CASE("without a preset a model is played by what its links ask for", "[pres
   for (const scenes::Example& example : scenes::nine_instruments()) {
     CAPTURE(example.name);
     const Network network = network_of(example.text);
-    CHECK(compile(network, default_preset(network, false), {}));
+    CHECK(compile_network(network, default_preset(network, false), {}));
     const Preset bare = default_preset(network, true);
     CHECK_FALSE(bare.keyboard);
     for (const Input& input : network.inputs) {

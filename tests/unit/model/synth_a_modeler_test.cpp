@@ -349,7 +349,7 @@ TEST_CASE("no harm done to a text does harm", "[synth_a_modeler]") {
     }
     read += parsed.ok() ? 1 : 0;
     if (parsed.ok()) {
-      (void)compile(parsed.network, Preset{}, {.rate_hz = fs});
+      (void)compile_network(parsed.network, Preset{}, {.rate_hz = fs});
     }
   }
   CHECK(read > 20);

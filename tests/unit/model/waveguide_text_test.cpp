@@ -15,7 +15,7 @@ using messages::check_error;
 const std::string heard = "@in1 frcInput [@s 0.2]\n@out1 posOutput [@s 0.7]\n";
 
 std::string refused(const std::string& text, double rate_hz = 44100.0) {
-  const auto made = compile(network_of(text), Preset{}, {.rate_hz = rate_hz});
+  const auto made = compile_network(network_of(text), Preset{}, {.rate_hz = rate_hz});
   REQUIRE(!made);
   return std::to_string(made.error().line) + ":" + std::to_string(made.error().column) + " " +
          made.error().message;
@@ -62,8 +62,8 @@ TEST_CASE("a waveguide without room for its places is refused with its line", "[
   CHECK(refused("@s waveguide 1. 9000. 2. 0.5 0.\n" + heard) ==
         "1:1 the waveguide 's' is to sound at 9000 Hz: with so many places on it, at most 5880 Hz "
         "have room at this sample rate");
-  CHECK(compile(network_of("@s waveguide 1. 9000. 2. 0.5 0.\n" + heard), Preset{},
-                {.rate_hz = 96000.0}));
+  CHECK(compile_network(network_of("@s waveguide 1. 9000. 2. 0.5 0.\n" + heard), Preset{},
+                        {.rate_hz = 96000.0}));
   CHECK(refused("@f param 0.\n@s waveguide 1. f*100 2. 0.5 0.\n" + heard)
             .starts_with("2:1 the waveguide 's' is to sound at 0 Hz, but 15 Hz is the lowest"));
   CHECK(refused("@f param 0.\n@s waveguide f 100 2. 0.5 0.\n" + heard) ==

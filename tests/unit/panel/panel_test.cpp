@@ -212,7 +212,7 @@ TEST_CASE("a look changes no bit of the sound and takes no memory", "[panel]") {
     Harness watched(true, 2);
     int looks = 0;
     for (Harness* const harness : {&plain, &watched}) {
-      auto compiled = compile(network_of(text), struck(4), {.method = method});
+      auto compiled = compile_network(network_of(text), struck(4), {.method = method});
       REQUIRE(compiled);
       const Picture picture = make_picture(*compiled->engine, network_of(text), 3);
       delete harness->process.slot.offer(new Sounding{
@@ -256,7 +256,7 @@ TEST_CASE("slow motion is a stroboscope at the pitch that sounds", "[panel]") {
   for (const int key : {45, 57, 69, 76}) {
     Harness harness(false, 1);
     const std::string text = ringing_string();
-    auto compiled = compile(network_of(text), struck(2), {});
+    auto compiled = compile_network(network_of(text), struck(2), {});
     REQUIRE(compiled);
     const Picture picture = make_picture(*compiled->engine, network_of(text), 1);
     delete harness.process.slot.offer(new Sounding{

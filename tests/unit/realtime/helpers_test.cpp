@@ -134,9 +134,9 @@ std::unique_ptr<Engine> engine_of(const std::string& preset, Executor* executor,
                                   std::optional<Method> method, int voices = 12) {
   const auto scene = load_scene(source + "/presets/" + preset + ".toml", {});
   REQUIRE(scene);
-  auto compiled =
-      compile(scene->network, scene->preset,
-              {.rate_hz = 48000.0, .voices = voices, .method = method, .executor = executor});
+  auto compiled = compile_network(
+      scene->network, scene->preset,
+      {.rate_hz = 48000.0, .voices = voices, .method = method, .executor = executor});
   REQUIRE(compiled);
   return std::move(compiled->engine);
 }
@@ -360,8 +360,9 @@ TEST_CASE("The memory of what helpers work in is known before it is taken", "[he
     const Network network = support::network_of(
         "@K param 0.01\n@s mesh 50 50 1. K 0.001 0. 0.\n@in1 frcInput [@s 0.3 0.3]\n"
         "@out1 posOutput [@s 0.3 0.4]\n");
-    const auto compiled = compile(network, default_preset(network, true),
-                                  {.voices = voices, .method = Method::grid, .executor = executor});
+    const auto compiled =
+        compile_network(network, default_preset(network, true),
+                        {.voices = voices, .method = Method::grid, .executor = executor});
     REQUIRE(compiled);
     const Machine& machine = compiled->engine->machine();
     const std::size_t before = support::heap_bytes();
@@ -386,9 +387,9 @@ TEST_CASE("a large network's shards are played by helpers to the bit", "[helpers
   const auto network = support::network_of(text);
   const auto preset = default_preset(network, false);
   const auto made = [&](Executor* executor) {
-    auto compiled =
-        compile(network, preset,
-                {.rate_hz = 48000.0, .voices = 2, .method = Method::direct, .executor = executor});
+    auto compiled = compile_network(
+        network, preset,
+        {.rate_hz = 48000.0, .voices = 2, .method = Method::direct, .executor = executor});
     REQUIRE(compiled);
     return std::move(compiled->engine);
   };

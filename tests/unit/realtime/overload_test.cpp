@@ -43,7 +43,8 @@ struct Harness {
     run(1, 0.0);
   }
   void offer(std::uint32_t serial) {
-    auto compiled = compile(network_of(ringing_string()), struck(keys), {.method = Method::direct});
+    auto compiled =
+        compile_network(network_of(ringing_string()), struck(keys), {.method = Method::direct});
     REQUIRE(compiled);
     delete process.slot.offer(new Sounding{std::move(compiled->engine), serial});
   }

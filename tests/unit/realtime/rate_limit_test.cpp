@@ -2,6 +2,7 @@
 #include "app/realtime/rate_limit.h"
 
 #include "tests/support/catch.h"
+#include "tests/support/rooms.h"
 
 namespace ressort {
 

@@ -20,6 +20,7 @@
 #include "app/session/sound_file.h"
 #include "tests/support/app/data_folder.h"
 #include "tests/support/catch.h"
+#include "tests/support/rooms.h"
 
 namespace ressort {
 namespace {

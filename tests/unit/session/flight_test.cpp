@@ -10,6 +10,7 @@
 #include "app/session/session.h"
 #include "tests/support/catch.h"
 #include "tests/support/random.h"
+#include "tests/support/rooms.h"
 
 using namespace ressort;
 

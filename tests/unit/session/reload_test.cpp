@@ -11,6 +11,7 @@
 #include "tests/support/catch.h"
 #include "tests/support/heap.h"
 #include "tests/support/random.h"
+#include "tests/support/rooms.h"
 
 using namespace ressort;
 using namespace std::chrono_literals;

@@ -16,6 +16,7 @@
 
 #include "tests/support/catch.h"
 #include "tests/support/heap.h"
+#include "tests/support/rooms.h"
 
 using namespace ressort;
 

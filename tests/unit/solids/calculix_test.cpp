@@ -13,6 +13,7 @@
 #include "core/solids/solid_modes.h"
 #include "tests/support/catch.h"
 #include "tests/support/random.h"
+#include "tests/support/rooms.h"
 
 namespace ressort {
 namespace {

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <numbers>
 
-namespace ressort {
+namespace ressort::commands {
 namespace {
 
 constexpr double letter_width = 5.6;  // of an 8 point sans, as gnuplot draws it
@@ -64,4 +64,4 @@ std::vector<PlacedLabel> place_labels(const std::vector<LabelRequest>& requests,
   return placed;
 }
 
-}  // namespace ressort
+}  // namespace ressort::commands

@@ -4,7 +4,9 @@
 #include <string>
 #include <vector>
 
-namespace ressort {
+#include "app/rooms.h"
+
+namespace ressort::commands {
 
 // In pixels, y upwards.
 struct Box {
@@ -41,4 +43,4 @@ struct PlacedLabel {
 std::vector<PlacedLabel> place_labels(const std::vector<LabelRequest>& requests,
                                       const std::vector<LabelRequest>& marks, const Box& frame);
 
-}  // namespace ressort
+}  // namespace ressort::commands

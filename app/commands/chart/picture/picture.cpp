@@ -9,7 +9,7 @@
 #include "app/commands/chart/picture/labels.h"
 #include "app/text.h"
 
-namespace ressort {
+namespace ressort::commands {
 namespace {
 
 constexpr double deepest_db = -320.0;
@@ -527,4 +527,4 @@ std::string chart_script(const std::vector<ChartSheet>& sheets, const Provenance
   return script + overview_of(sheets, provenance);
 }
 
-}  // namespace ressort
+}  // namespace ressort::commands

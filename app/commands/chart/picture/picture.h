@@ -6,10 +6,10 @@
 
 #include "app/commands/chart/table.h"
 
-namespace ressort {
+namespace ressort::commands {
 
 // A script that draws, into the folder it is run in, SCENE.svg and SCENE.png for every sheet and
 // overview.svg and overview.png for all; with its data.
 std::string chart_script(const std::vector<ChartSheet>& sheets, const Provenance& provenance);
 
-}  // namespace ressort
+}  // namespace ressort::commands
