@@ -1,5 +1,4 @@
-// app: whose names each room uses as its own, as core/rooms.h says it of core. Each takes what the
-// one before it has: `using namespace` passes on what that namespace uses.
+// app: whose names each room finds without saying where they are, as core/rooms.h says it of core.
 #pragma once
 
 #include "core/rooms.h"
@@ -7,9 +6,8 @@
 namespace ressort {
 
 namespace realtime {
-using namespace kernels;
 using namespace engine;
-}  // namespace realtime
+}
 
 namespace devices {
 using namespace realtime;

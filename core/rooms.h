@@ -1,6 +1,7 @@
-// core: whose names each room uses as its own: those of the rooms that it may see, and no others'.
-// Each room is a namespace; what stands beside the rooms is in ressort itself. tests/rooms.sh holds
-// this against its table. Every header finds it: one that includes no other room's includes this.
+// core: whose names each room finds without saying where they are. A room is a namespace; what
+// stands beside the rooms is in ressort itself. A room finds the names of those that it may see and
+// of no others: tests/rooms.sh holds this against its table. A directive passes on what the room
+// that it names finds. Every header of a room includes this, or one that does.
 #pragma once
 
 namespace ressort {
@@ -13,7 +14,6 @@ using namespace laws;
 }
 
 namespace analysis {
-using namespace laws;
 using namespace linear_algebra;
 using namespace model;
 }  // namespace analysis
@@ -26,23 +26,17 @@ namespace solids {
 using namespace linear_algebra;
 }
 
-// One form of the modal kernel sees linear_algebra, and says so: else the engine, which may not,
-// would find its names here.
+// The one form that sees linear_algebra says so itself: what stands here, the engine has too.
 namespace kernels {
 using namespace laws;
 }
 
 namespace engine {
-using namespace laws;
 using namespace kernels;
-}  // namespace engine
+}
 
 namespace compile {
-using namespace laws;
-using namespace linear_algebra;
-using namespace model;
 using namespace analysis;
-using namespace kernels;
 using namespace engine;
 }  // namespace compile
 

@@ -1,18 +1,26 @@
 #!/bin/sh
 # The rooms of the code and which way they look: fails on every #include that the table of the
-# design does not have, and prints it. Before it looks at the code it looks at itself: a list of
-# forbidden includes must all be found.
+# design does not have, and on every room whose namespace finds more or fewer rooms' names, and
+# prints it. Before it looks at the code it looks at itself: a list of offences must all be found.
 #
 #   rooms.sh [ROOT]      ROOT is where core/ and app/ are; without it, the folder above this one.
 set -eu
 root=${1:-$(dirname -- "$0")/..}
 cd -- "$root"
 
-# Reads "file:line:#include <what>"; prints the lines that break a rule.
+# Reads "file:line:#include <what>", "file:line:namespace ressort::room" and, of the directives in
+# rooms.h, "file:line:room finds room"; prints the lines that break a rule. With complete=1 it has
+# all directives, and prints what is missing, too.
 judge() {
-  awk '
+  awk -v complete="${1:-0}" '
     function starts(text, prefix) { return index(text, prefix) == 1 }
     function refuse(reason) { if (why == "") why = reason }
+    function may_see(room, target, what,    i, count, rooms) {
+      count = split(sees[room], rooms, " ")
+      for (i = 1; i <= count; ++i) if (rooms[i] == target || rooms[i] == what) return 1
+      return 0
+    }
+    function folder(room) { return (("core/" room) in sees ? "core/" : "app/") room }
     BEGIN {
       # What core may never see: streams, files, threads, clocks.
       split("iostream fstream ostream istream thread atomic mutex shared_mutex condition_variable " \
@@ -46,9 +54,9 @@ judge() {
       sees["core/analysis"] = "core core/laws core/linear_algebra core/model core/analysis"
       sees["core/identification"] = "core core/linear_algebra core/identification"
       sees["core/solids"] = "core core/linear_algebra core/solids"
-      sees["core/kernels"] = "core/lanes.h core/groups.h core/sampled_mode.h core/waveguide_places.h core/formula.h core/progress.h core/model/preset/budget.h " \
+      sees["core/kernels"] = "core/rooms.h core/lanes.h core/groups.h core/sampled_mode.h core/waveguide_places.h core/formula.h core/progress.h core/model/preset/budget.h " \
                              "core/laws core/linear_algebra core/kernels"
-      sees["core/engine"] = "core/lanes.h core/curve.h core/formula.h core/progress.h core/gesture.h " \
+      sees["core/engine"] = "core/rooms.h core/lanes.h core/curve.h core/formula.h core/progress.h core/gesture.h " \
                             "core/input_driver.h core/laws core/kernels core/engine"
       sees["core/compile"] = "core core/laws core/linear_algebra core/model core/analysis core/kernels " \
                              "core/engine core/compile"
@@ -75,6 +83,20 @@ judge() {
       room = file
       if (!match(room, /^(core|app)\/[^\/]*\//)) match(room, /^[^\/]*\//)
       room = substr(room, 1, RLENGTH - 1)
+      if (match(line, /:[a-z_]+ finds [a-z_]+$/)) {
+        split(substr(line, RSTART + 1), words, " ")
+        finds[folder(words[1]), folder(words[3])] = line
+        next
+      }
+      if (match(line, /:namespace ressort[a-z_:]*/)) {
+        target = substr(line, RSTART, RLENGTH)
+        if (room ~ /\// && !sub(/^:namespace ressort::/, "", target)) target = "nothing"
+        sub(/:.*/, "", target)
+        if (room ~ /\// && !may_see(room, folder(target), "")) {
+          print line ": " room " is in ressort::" substr(room, index(room, "/") + 1)
+        }
+        next
+      }
       for (prefix in owner) {
         if (!ours && (prefix == "atomic" ? what == prefix : starts(what, prefix)) &&
             !starts(file, owner[prefix])) {
@@ -85,15 +107,12 @@ judge() {
         target = what
         if (match(target, /^(core|app)\/[^\/]*\//)) {
           target = substr(target, 1, RLENGTH - 1)
-        } else if (target ~ /^core\/(result|formula|progress|groups|lanes|curve|sampled_mode|waveguide_places|raised_cosine|gesture|input_driver)[.]h$/) {
+        } else if (target ~ /^core\/(rooms|result|formula|progress|groups|lanes|curve|sampled_mode|waveguide_places|raised_cosine|gesture|input_driver)[.]h$/) {
           target = "core"
         } else if (target ~ /^app\/[^\/]*$/) {
           target = "app"
         }
-        count = split(sees[room], rooms, " ")
-        seen = 0
-        for (i = 1; i <= count; ++i) seen = seen || rooms[i] == target || rooms[i] == what
-        if (!seen) refuse(room " may not see " what)
+        if (!may_see(room, target, what)) refuse(room " may not see " what)
       } else if (starts(file, "core/")) {
         if (what in impure) refuse("core knows no streams, files, threads or clocks")
         if (what !~ /^[a-z_0-9]+$/ && !starts(what, "toml++/") && !starts(what, "Eigen/") &&
@@ -105,12 +124,58 @@ judge() {
         refuse("the audio thread knows no streams, files, locks or clocks")
       }
       if (why != "") print line ": " why
+    }
+    END {
+      # What a room finds by what it finds.
+      do {
+        grown = 0
+        for (one in finds) {
+          split(one, a, SUBSEP)
+          for (other in finds) {
+            split(other, b, SUBSEP)
+            if (b[1] == a[2] && !((a[1], b[2]) in finds)) {
+              finds[a[1], b[2]] = finds[one]
+              grown = 1
+            }
+          }
+        }
+      } while (grown)
+      for (one in finds) {
+        split(one, a, SUBSEP)
+        # Whoever may see a kernel is told by which laws.
+        if (a[2] != "core/laws" && !may_see(a[1], a[2], "")) {
+          print finds[one] ": " a[1] " may not see " a[2]
+        }
+      }
+      for (room in sees) {
+        count = complete ? split(sees[room], rooms, " ") : 0
+        for (i = 1; i <= count; ++i) {
+          if (room ~ /\// && (rooms[i] in sees) && rooms[i] ~ /\// && rooms[i] != room &&
+              !((room, rooms[i]) in finds) &&
+              !(room == "core/kernels" && rooms[i] == "core/linear_algebra")) {
+            print "rooms.h: " room " does not find " rooms[i]
+          }
+        }
+      }
     }'
 }
 
 includes() {
   find core app -name '*.h' -o -name '*.cpp' | LC_ALL=C sort |
     xargs grep -n '^[[:space:]]*#[[:space:]]*include' /dev/null
+}
+
+# Where files say which room they are of.
+namespaces() {
+  find core app -name '*.h' -o -name '*.cpp' | LC_ALL=C sort |
+    xargs grep -n '^namespace ressort' /dev/null
+}
+
+# Whose names each room finds.
+directives() {
+  awk '/^namespace [a-z_]+ \{/ { room = $2 }
+    /^using namespace/ { sub(/;/, "", $3); print FILENAME ":" FNR ":" room " finds " $3 }' \
+    core/rooms.h app/rooms.h
 }
 
 forbidden='core/result.h:1:#include "core/model/network.h"
@@ -157,7 +222,14 @@ app/panel/panel.cpp:1:#include "app/commands/commands.h"
 app/commands/make.cpp:1:#include "app/command_line/options.h"
 app/commands/check.cpp:1:#include <CLI/CLI.hpp>
 app/panel/state.cpp:1:#include <httplib.h>
-app/realtime/midi.cpp:1:#include <RtMidi.h>'
+app/realtime/midi.cpp:1:#include <RtMidi.h>
+core/model/network.h:1:namespace ressort {
+core/model/network.h:1:namespace ressort::analysis {
+app/realtime/midi.h:1:namespace ressort::session {
+core/rooms.h:1:solids finds model
+core/rooms.h:1:identification finds kernels
+core/rooms.h:1:engine finds compile
+app/rooms.h:1:realtime finds engine'
 planted=$(printf '%s\n' "$forbidden" | wc -l)
 caught=$(printf '%s\n' "$forbidden" | judge | wc -l)
 if [ "$planted" -ne "$caught" ]; then
@@ -165,6 +237,12 @@ if [ "$planted" -ne "$caught" ]; then
   printf '%s\n' "$forbidden" | judge
   exit 1
 fi
+for missing in 'core/rooms.h:.*:model finds laws' 'app/rooms.h:.*:session finds realtime'; do
+  if ! directives | grep -v "$missing" | judge 1 | grep -q 'does not find'; then
+    echo "rooms.sh does not miss $missing"
+    exit 1
+  fi
+done
 
 # What stands beside the rooms, in a checkout; elsewhere nobody knows what else is there.
 if git rev-parse --is-inside-work-tree >/dev/null 2>&1; then
@@ -182,9 +260,9 @@ if [ "$looked_at" -lt 50 ]; then
   echo "rooms.sh: found only $looked_at includes under $(pwd)/core and app"
   exit 1
 fi
-offences=$(includes | judge)
+offences=$(includes | judge && namespaces | judge && directives | judge 1)
 if [ -n "$offences" ]; then
   printf '%s\n' "$offences"
   exit 1
 fi
-echo "$looked_at includes, every one allowed"
+echo "$looked_at includes and $(directives | wc -l) namespaces, every one allowed"

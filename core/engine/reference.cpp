@@ -6,14 +6,10 @@
 
 #include "core/laws/laws.h"
 
-namespace ressort {
-
 template <>
-struct ScalarOf<long double> {
+struct ressort::ScalarOf<long double> {
   using Type = long double;
 };
-
-}  // namespace ressort
 
 namespace ressort::engine {
 namespace {
