@@ -10,8 +10,8 @@
 namespace ressort::devices {
 namespace {
 
-struct Keyboard {
-  Keyboard(RtMidi::Api api, const std::string& client, MidiDoor& door_in)
+struct MidiPort {
+  MidiPort(RtMidi::Api api, const std::string& client, MidiDoor& door_in)
       : door(door_in), input(api, client) {
     input.setCallback(arrived, this);
     input.ignoreTypes(false, true, true);  // tunings are system exclusive
@@ -20,8 +20,8 @@ struct Keyboard {
   // RtMidi's thread: it notes the time and passes on, no more. RtMidi's own time is that between
   // messages; what we need is the clock that the audio thread reads.
   static void arrived(double, std::vector<unsigned char>* bytes, void* self) {
-    Keyboard& keyboard = *static_cast<Keyboard*>(self);
-    keyboard.door.arrive(keyboard.reader, *bytes, monotonic_ns());
+    MidiPort& port = *static_cast<MidiPort*>(self);
+    port.door.arrive(port.reader, *bytes, monotonic_ns());
   }
 
   MidiDoor& door;
@@ -47,8 +47,8 @@ struct MidiInput::Sources {
   std::string client;
   bool connect;
   MidiDoor& door;
-  std::unique_ptr<Keyboard> own;                             // the port that others connect to
-  std::map<std::string, std::unique_ptr<Keyboard>> sources;  // by name
+  std::unique_ptr<MidiPort> own;                             // the port that others connect to
+  std::map<std::string, std::unique_ptr<MidiPort>> sources;  // by name
 };
 
 MidiInput::MidiInput(std::unique_ptr<Sources> sources) : sources_(std::move(sources)) {}
@@ -66,7 +66,7 @@ Result<std::unique_ptr<MidiInput>> MidiInput::open(MidiApi api, const std::strin
   const RtMidi::Api rt_api = api == MidiApi::alsa ? RtMidi::LINUX_ALSA : RtMidi::UNIX_JACK;
   try {
     auto sources = std::make_unique<Sources>(Sources{rt_api, client_name, connect, door, {}, {}});
-    sources->own = std::make_unique<Keyboard>(rt_api, client_name, door);
+    sources->own = std::make_unique<MidiPort>(rt_api, client_name, door);
     sources->own->input.openVirtualPort("midi_in");
     sources->own->input.setErrorCallback(say_nothing);
     auto input = std::unique_ptr<MidiInput>(new MidiInput(std::move(sources)));
@@ -92,7 +92,7 @@ void MidiInput::tick() {
       }
       present.push_back(name);
       if (!s.sources.contains(name)) {
-        auto source = std::make_unique<Keyboard>(s.api, s.client, s.door);
+        auto source = std::make_unique<MidiPort>(s.api, s.client, s.door);
         source->input.openPort(i, "from " + name);
         s.sources.emplace(name, std::move(source));
       }

@@ -21,7 +21,7 @@ template <std::uint32_t N, std::uint32_t I = 0, class Use>
 // Those of one pack.
 template <class V>
 struct Passive {
-  Coefficients<V> coefficients() const { return all; }
+  CoefficientView<V> coefficients() const { return all; }
   V awake() const { return is_awake; }
   V distance_now(Ends ends) const { return nodes[ends.a].x - nodes[ends.b].x; }
   V speed_now(Ends ends) const { return nodes[ends.a].v - nodes[ends.b].v; }
@@ -48,7 +48,7 @@ struct Passive {
   }
 
   Node<V>* nodes;
-  Coefficients<V> all;  // of the pack; the next is as many further as there are packs
+  CoefficientView<V> all;  // of the pack; the next is as many further as there are packs
   const std::uint32_t* inverse_mass;
   std::uint32_t masses;
   V is_awake;
@@ -127,9 +127,9 @@ template <class V>
 // Of a row a few packs are read at a time, which the processor does not foresee.
 constexpr std::size_t rows_ahead = 12;
 
-struct Springs {};  // and no other link
+struct SpringsAlone {};  // and no other link
 template <Law law>
-using LawType = std::tuple_element_t<static_cast<std::size_t>(law), Laws>;
+using TypeOf = std::tuple_element_t<static_cast<std::size_t>(law), Laws>;
 
 template <class V, std::uint32_t N, bool is_alike>
 class Holder {
@@ -192,7 +192,7 @@ class Holder {
       rows.advance();
       each<P>([&](auto p) {
         const V* const slot = packs_.slots + p * packs_.stride;
-        if constexpr (!std::is_same_v<Type, Springs>) {
+        if constexpr (!std::is_same_v<Type, SpringsAlone>) {
           exert_all<Type>(packs_.nodes(p), slot + table_.first_link, x[p], v[p], f[p]);
         }
         exert_springs(packs_.nodes(p), slot, anchored, linked, x[p], v[p], f[p]);
@@ -334,7 +334,7 @@ class Holder {
 template <class V, std::uint32_t N, bool is_alike, class Type>
 void hold_in_registers(const Program& program, const Batch& batch, const BatchTable& table,
                        const Packs<V>& packs, const Rows<V>& rows, std::size_t frames) {
-  constexpr bool has_links = !std::is_same_v<Type, Springs>;
+  constexpr bool has_links = !std::is_same_v<Type, SpringsAlone>;
   const auto stay = [&]<std::uint32_t P>(std::size_t first) {
     const Packs<V> some = packs.some(first, P);
     Holder<V, N, is_alike>(program, batch, table, some)
@@ -366,14 +366,14 @@ bool could_hold_in_registers(const Program& program, const Batch& batch, const B
     return std::all_of(table.laws.begin(), table.laws.end(), [=](Law l) { return l == law; });
   };
   if (table.laws.empty()) {
-    return hold(Springs{});
+    return hold(SpringsAlone{});
   }
   if constexpr (is_alike) {
     if (is_all(Law::pluck)) {
-      return hold(LawType<Law::pluck>{});
+      return hold(TypeOf<Law::pluck>{});
     }
     if (is_all(Law::contact)) {
-      return hold(LawType<Law::contact>{});
+      return hold(TypeOf<Law::contact>{});
     }
   }
   return false;

@@ -251,7 +251,7 @@ struct Passive {
   using T = typename S::Number;
   using V = typename S::V;
 
-  Coefficients<T> coefficients() const { return {s.coefficient}; }
+  CoefficientView<T> coefficients() const { return {s.coefficient}; }
   T awake() const { return *state.awake; }
   T distance_now(Ends ends) const { return body(ends.a)[0] - body(ends.b)[0]; }
   T speed_now(Ends ends) const { return body(ends.a)[S::lanes] - body(ends.b)[S::lanes]; }

@@ -133,7 +133,7 @@ struct Passive {
   using V = typename S::V;
   using T = Scalar<V>;
 
-  Coefficients<V> coefficients() const { return {s.coefficient}; }
+  CoefficientView<V> coefficients() const { return {s.coefficient}; }
   V awake() const { return *reinterpret_cast<const V*>(s.state.awake); }
   V distance_now(Ends ends) const { return s.between(ends.a, ends.b); }
   V speed_now(Ends ends) const { return s.v[ends.a] - s.v[ends.b]; }

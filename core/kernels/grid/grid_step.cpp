@@ -419,7 +419,7 @@ template <class T, std::size_t Bytes>
 // Links that are not plain.
 template <class T, std::size_t Bytes>
 struct Passive {
-  Coefficients<T> coefficients() const { return {s.state.ramps.value}; }
+  CoefficientView<T> coefficients() const { return {s.state.ramps.value}; }
   T awake() const { return *s.state.awake; }
   T distance_now(Ends ends) const { return s.state.x[ends.a] - s.state.x[ends.b]; }
   T speed_now(Ends ends) const { return s.state.v[ends.a] - s.state.v[ends.b]; }

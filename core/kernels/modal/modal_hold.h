@@ -14,9 +14,9 @@ constexpr std::uint32_t frames_after_touch = 256;  // until a free motion is tri
 constexpr std::uint32_t nowhere = 0xffffffffu;
 
 template <class T, bool Crossed>
-struct Holder : Mixer<T, Crossed> {
-  using Mixer<T, Crossed>::modes;
-  using Mixer<T, Crossed>::s;
+struct Holder : ModeMixer<T, Crossed> {
+  using ModeMixer<T, Crossed>::modes;
+  using ModeMixer<T, Crossed>::s;
   const Program& program;
   const Block<T>& block;
   const std::size_t places = modes.places.size();

@@ -8,7 +8,7 @@ namespace ressort::kernels::RESSORT_ISA {
 namespace {
 
 template <class T, bool Crossed>
-struct Mixer {
+struct ModeMixer {
   static constexpr bool is_crossed = Crossed;
   const Modes& modes;
   ModalState<T>& s;

@@ -44,7 +44,7 @@ void measure_replies(ModalState<T>& s, std::size_t places, std::size_t outputs) 
 // What passive.h asks: a link is its own first end, and has no other.
 template <class T>
 struct ModalBody {
-  Coefficients<T> coefficients() const { return {s.ramps.value}; }
+  CoefficientView<T> coefficients() const { return {s.ramps.value}; }
   T awake() const { return s.pulls ? T(1) : T(0); }
   T distance_now(Ends link) const {
     const auto [a, b] = s.passive[link.a].ends;

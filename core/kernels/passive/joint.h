@@ -32,7 +32,7 @@ static_assert(sizeof(Joined<double>) == joint_numbers * sizeof(double));
 
 // Where a kernel has its coefficients, in packs: every so many.
 template <class V>
-struct Coefficients {
+struct CoefficientView {
   V operator[](std::size_t c) const { return first[c * stride]; }
 
   const V* first;
@@ -59,17 +59,17 @@ class JointBody {
   virtual V give(std::uint32_t from, std::uint32_t at) const = 0;
   virtual void push_node(std::uint32_t node, V force) = 0;
 
-  Coefficients<V> coefficients() const { return coefficients_; }
+  CoefficientView<V> coefficients() const { return coefficients_; }
   V awake() const { return awake_; }
   bool has_masses() const { return has_masses_; }
 
  protected:
-  JointBody(Coefficients<V> coefficients, V awake, bool has_masses)
+  JointBody(CoefficientView<V> coefficients, V awake, bool has_masses)
       : coefficients_(coefficients), awake_(awake), has_masses_(has_masses) {}
   ~JointBody() = default;
 
  private:
-  Coefficients<V> coefficients_;
+  CoefficientView<V> coefficients_;
   V awake_;
   bool has_masses_;
 };
@@ -85,7 +85,7 @@ struct JointSolver {
 
   // What a link that acts alone exerts in a lane's first sample: `before` and `speed` are those of
   // LinkState, `free` is how far its ends would go in two samples. [audio]
-  static V first_force(const PassiveLink& link, Coefficients<V> coefficients, V before, V speed,
+  static V first_force(const PassiveLink& link, CoefficientView<V> coefficients, V before, V speed,
                        V free, V gamma);
 };
 

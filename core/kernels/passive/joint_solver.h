@@ -50,7 +50,7 @@ static inline Slope<V> first_gradient(const ForceLaw& law, V before, V speed, V 
 template <class V>
 class JointLaws {
  public:
-  JointLaws(const PassiveLink* links, Coefficients<V> coefficients)
+  JointLaws(const PassiveLink* links, CoefficientView<V> coefficients)
       : links_(links), coefficients_(coefficients) {}
 
   Steady<V> steady(std::size_t i, const LinkState<V>& state) const {
@@ -74,7 +74,7 @@ class JointLaws {
   }
 
   const PassiveLink* links_;
-  Coefficients<V> coefficients_;
+  CoefficientView<V> coefficients_;
 };
 
 // The links of a cluster in one sample. `memory` is theirs, [link][passive_rows].

@@ -20,7 +20,7 @@ void JointSolver<V>::solve(const std::vector<PassiveLink>& links, const Cluster&
 }
 
 template <class V>
-V JointSolver<V>::first_force(const PassiveLink& link, Coefficients<V> coefficients, V before,
+V JointSolver<V>::first_force(const PassiveLink& link, CoefficientView<V> coefficients, V before,
                               V speed, V free, V gamma) {
   const JointLaws<V> own(&link, coefficients);
   const V force = laws::force_between(V{}, free, free, gamma,

@@ -15,7 +15,7 @@ namespace {
 //   V gamma(ends)                          how far they give way to a force of 1
 //   V coupling(ends, ends)                 and to one along another link, if it is known
 //   void push(ends, V force)               a by -force and b by force, times their inverse masses
-//   Coefficients<V> coefficients()
+//   CoefficientView<V> coefficients()
 //   V awake()                              0 in the first sample after set_state(), -1 if it was
 //                                          let go, else 1
 // Where masses are nodes of their own:
@@ -79,7 +79,7 @@ static inline void let_go(const PassiveTables& tables, const Cluster& cluster, V
 template <class V, class Body>
 static inline V force_of(const PassiveLink& link, const laws::LinkState<V>& state,
                          const Body& body) {
-  const Coefficients<V> all = body.coefficients();
+  const CoefficientView<V> all = body.coefficients();
   const auto c = [&](std::size_t i) { return all[link.coefficients[i]]; };
   return with_law<V>(link.law, c, [&](const auto& law) { return law.passive(state); });
 }

@@ -150,7 +150,7 @@ class WebStep {
   V* give_;      // [end]
   V* straight_;  // what pulls it, in proportion to distances and speeds
   V* bent_;      // and what bends: -grad P
-  Coefficients<V> coefficients_;
+  CoefficientView<V> coefficients_;
   Body& body_;
   V held_{};   // P
   V way_{};    // grad P (x+ - x-), but for what the springs themselves do
