@@ -29,12 +29,12 @@ void check_error(const Complaint& complaint) {
 }
 
 // A preset whose only control is this; the control's keys stand in line 3.
-std::string control(const std::string& keys) {
+std::string with_control(const std::string& keys) {
   return "model = \"x.mdl\"\n[[control]]\n" + keys + "\n";
 }
 
 ControlSetting control_of(const std::string& keys) {
-  const auto preset = parse_preset(control(keys), is_reserved);
+  const auto preset = parse_preset(with_control(keys), is_reserved);
   INFO(keys << (preset.ok() ? "" : ": " + preset.errors[0].message));
   REQUIRE(preset.ok());
   REQUIRE(preset.preset.controls.size() == 1);
@@ -200,7 +200,7 @@ TEST_CASE("no control has an address that the program takes for itself", "[prese
     if (const std::size_t at = address.find("/N/"); at != std::string::npos) {
       address.replace(at, 3, "/1/");
     }
-    check_error({control("to = \"in1\"\nfrom = \"" + address + "\""), 4, 8,
+    check_error({with_control("to = \"in1\"\nfrom = \"" + address + "\""), 4, 8,
                  "'" + address + "' is an address of the program's own"});
   }
   for (const std::string address : {"/a", "/note/onset", "/params/x", "/inner/1", "/a-b_c.d/2!"}) {
@@ -261,36 +261,39 @@ TEST_CASE("every fault of a preset is told with its line and column", "[preset]"
       {m + "[parameters]\nK = { value = 1, range = [0, \"x\"] }", 3, 30,
        "'range' must be a number"},
       {m + "control = 1", 2, 11, "controls are written one by one: [[control]]"},
-      {control(to + "from = \"note\"\nform = 1"), 5, 8,
+      {with_control(to + "from = \"note\"\nform = 1"), 5, 8,
        "unknown key 'form' in a control; there are from, to"},
-      {control(to), 2, 1, "'from' must be \"note\""},
-      {control(to + "from = \"cc120\""), 4, 8, "'from' must be \"note\""},
-      {control(to + "from = \"cc-1\""), 4, 8, "'from' must be \"note\""},
-      {control(to + "from = \"audio0\""), 4, 8, "'from' must be \"note\""},
-      {control(to + "from = \"/\""), 4, 8, "an OSC name has 2 to 255 characters"},
-      {control(to + "from = \"/my finger\""), 4, 8, "an OSC name has 2 to 255 characters: '/', "},
-      {control(to + "from = \"/finger#1\""), 4, 8, "an OSC name has"},
-      {control(to + "from = \"/f[ab]\""), 4, 8, "an OSC name has"},
-      {control(to + "from = \"/f*\""), 4, 8, "an OSC name has"},
-      {control(to + "from = \"/{a,b}\""), 4, 8, "an OSC name has"},
-      {control(to + "from = \"/a,b\""), 4, 8, "an OSC name has"},
-      {control(to + "from = \"/d\u00e9\""), 4, 8, "an OSC name has"},
-      {control(to + "from = \"/" + std::string(255, 'a') + "\""), 4, 8, "an OSC name has"},
-      {control(to + "from = \"/in/1/x\""), 4, 8, "'/in/1/x' is an address of the program's own"},
-      {control(to + "from = \"/error\""), 4, 8, "'/error' is an address of the program's own"},
+      {with_control(to), 2, 1, "'from' must be \"note\""},
+      {with_control(to + "from = \"cc120\""), 4, 8, "'from' must be \"note\""},
+      {with_control(to + "from = \"cc-1\""), 4, 8, "'from' must be \"note\""},
+      {with_control(to + "from = \"audio0\""), 4, 8, "'from' must be \"note\""},
+      {with_control(to + "from = \"/\""), 4, 8, "an OSC name has 2 to 255 characters"},
+      {with_control(to + "from = \"/my finger\""), 4, 8,
+       "an OSC name has 2 to 255 characters: '/', "},
+      {with_control(to + "from = \"/finger#1\""), 4, 8, "an OSC name has"},
+      {with_control(to + "from = \"/f[ab]\""), 4, 8, "an OSC name has"},
+      {with_control(to + "from = \"/f*\""), 4, 8, "an OSC name has"},
+      {with_control(to + "from = \"/{a,b}\""), 4, 8, "an OSC name has"},
+      {with_control(to + "from = \"/a,b\""), 4, 8, "an OSC name has"},
+      {with_control(to + "from = \"/d\u00e9\""), 4, 8, "an OSC name has"},
+      {with_control(to + "from = \"/" + std::string(255, 'a') + "\""), 4, 8, "an OSC name has"},
+      {with_control(to + "from = \"/in/1/x\""), 4, 8,
+       "'/in/1/x' is an address of the program's own"},
+      {with_control(to + "from = \"/error\""), 4, 8, "'/error' is an address of the program's own"},
       {"model = \"x\"", 1, 9, "'model' must be the name of a .mdl file"},
       {"model = \"/etc/passwd\"", 1, 9, "'model' must be the name of a .mdl file"},
-      {control("from = \"note\""), 2, 1, "a control needs 'to'"},
-      {control(to + "from = \"note\"\nhow = \"slap\""), 5, 7,
+      {with_control("from = \"note\""), 2, 1, "a control needs 'to'"},
+      {with_control(to + "from = \"note\"\nhow = \"slap\""), 5, 7,
        "'how' must be position, pluck, bow, impulse, swing, hold, touch or parameter"},
-      {control(to + "from = \"note\"\nhow = \"pluck\""), 2, 1, "a pluck needs 'travel'"},
-      {control(to + "from = \"note\"\ncurve = \"round\""), 5, 9,
+      {with_control(to + "from = \"note\"\nhow = \"pluck\""), 2, 1, "a pluck needs 'travel'"},
+      {with_control(to + "from = \"note\"\ncurve = \"round\""), 5, 9,
        "'curve' must be linear or exponential"},
-      {control(to + "from = \"note\"\ncurve = \"exponential\""), 2, 1,
+      {with_control(to + "from = \"note\"\ncurve = \"exponential\""), 2, 1,
        "an exponential curve needs a range on one side of 0"},
-      {control(to + "from = \"note\"\ntravel = -1"), 5, 10, "'travel' must lie between 0 and"},
-      {control(to + "from = \"note\"\nkeys = [60, 36]"), 5, 8, "'keys' is the wrong way round"},
-      {control(to + "from = \"note\"\nkeys = [60, 128]"), 5, 13,
+      {with_control(to + "from = \"note\"\ntravel = -1"), 5, 10, "'travel' must lie between 0 and"},
+      {with_control(to + "from = \"note\"\nkeys = [60, 36]"), 5, 8,
+       "'keys' is the wrong way round"},
+      {with_control(to + "from = \"note\"\nkeys = [60, 128]"), 5, 13,
        "'keys' must lie between 0 and 127"},
   };
   for (const Complaint& complaint : complaints) {
@@ -389,7 +392,8 @@ TEST_CASE("what is no TOML is told with its place, and nothing throws", "[preset
   CHECK(second.errors[0].line == 2);
   // Text that no person wrote.
   support::Random random(12);
-  const std::string good = control("from = \"note\"\nto = \"in1\"\nrange = [0, 1]\nhow = \"hold\"");
+  const std::string good =
+      with_control("from = \"note\"\nto = \"in1\"\nrange = [0, 1]\nhow = \"hold\"");
   for (int i = 0; i < 3000; ++i) {
     std::string text = good;
     for (std::size_t k = 1 + random.below(4); k-- > 0;) {

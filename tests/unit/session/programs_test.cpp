@@ -14,7 +14,7 @@ namespace {
 using namespace support;
 using namespace std::chrono_literals;
 
-const std::string model =
+const std::string model_text =
     "@s ground 0.\n@m mass 1. 0. 0.\n@r0 springDamper @s @m 0.01 0.0001\n"
     "@in1 frcInput @m\n@out1 posOutput @m\n";
 
@@ -146,7 +146,7 @@ TEST_CASE("a note that is held ends by its key in the model that it began in", "
 TEST_CASE("a program change loads the preset of its place, and unknown ones are told once",
           "[programs]") {
   DataFolder data;
-  data.write("models/m.mdl", model);
+  data.write("models/m.mdl", model_text);
   for (const char* const name : {"Alpha", "Beta", "Gamma"}) {
     data.write("presets/" + std::string(name) + ".toml", preset(name));
   }

@@ -34,8 +34,8 @@ struct Folder {
 };
 
 // A mass on a spring that swings at 7 kHz sqrt(K/M), struck by a key and heard where it is.
-std::string model(const std::string& stiffness = "0.01", const std::string& mass = "1.",
-                  const std::string& more = "") {
+std::string model_text(const std::string& stiffness = "0.01", const std::string& mass = "1.",
+                       const std::string& more = "") {
   return "@K param " + stiffness + "\n@s ground 0.\n@m mass " + mass +
          " 0. 0.\n@r springDamper @s @m K 0.00001\n@in1 frcInput @m\n@out1 posOutput @m\n" + more;
 }
@@ -139,14 +139,14 @@ bool has(const std::string& text, const std::string& part) {
 
 TEST_CASE("An edited parameter reaches the voice that sounds", "[reload]") {
   const Folder folder;
-  folder.write("m.mdl", model("0.01"));
+  folder.write("m.mdl", model_text("0.01"));
   Stage stage(folder.write("p.toml", preset()));
   stage.strike();
   stage.play(9600);
   CHECK(stage.frequency_hz(4800) == Approx(pitch_hz(0.01, 1.0)).epsilon(1e-4));
   const std::uint32_t serial = stage.session.current()->serial;
   const auto swaps = stage.process.meters().swaps;
-  const Reload news = stage.after([&] { folder.write("m.mdl", model("0.012")); });
+  const Reload news = stage.after([&] { folder.write("m.mdl", model_text("0.012")); });
   CHECK(news.is_done);
   CHECK(news.news == "p: K = 0.012");
   const std::size_t edited = 4800;
@@ -160,14 +160,14 @@ TEST_CASE("An edited parameter reaches the voice that sounds", "[reload]") {
 
 TEST_CASE("A number in the midst of the model reaches the voice that sounds", "[reload]") {
   const Folder folder;
-  folder.write("m.mdl", model("0.01", "1."));
+  folder.write("m.mdl", model_text("0.01", "1."));
   Stage stage(folder.write("p.toml", preset()));
   stage.strike();
   stage.play(9600);
   const double before = stage.peak(2400);
   const double bend = stage.largest_bend(2400);
   const std::uint32_t serial = stage.session.current()->serial;
-  const Reload news = stage.after([&] { folder.write("m.mdl", model("0.01", "1.3")); });
+  const Reload news = stage.after([&] { folder.write("m.mdl", model_text("0.01", "1.3")); });
   CHECK(has(news.news, "p: new numbers in "));
   stage.play(4800);
   CHECK(stage.process.meters().voices == 1);
@@ -188,7 +188,7 @@ TEST_CASE("A number in the midst of the model reaches the voice that sounds", "[
 
 TEST_CASE("What a player has turned stays turned", "[reload]") {
   const Folder folder;
-  folder.write("m.mdl", model("0.01") + "@Z param 0.00001\n@t damper @s @m Z\n");
+  folder.write("m.mdl", model_text("0.01") + "@Z param 0.00001\n@t damper @s @m Z\n");
   Stage stage(folder.write("p.toml", preset()));
   const auto now = stage.session.current();
   const TimedEvent turn{
@@ -199,7 +199,7 @@ TEST_CASE("What a player has turned stays turned", "[reload]") {
   stage.play(64);
   CHECK(stage
             .after([&] {
-              folder.write("m.mdl", model("0.01") +
+              folder.write("m.mdl", model_text("0.01") +
                                         "@Z param 0.00001\n@t damper @s @m Z\n@n mass 1. 0. 0.\n"
                                         "@u springDamper @m @n K 0.00001\n");
             })
@@ -210,11 +210,12 @@ TEST_CASE("What a player has turned stays turned", "[reload]") {
 
 TEST_CASE("Another structure comes as a load does", "[reload]") {
   const Folder folder;
-  folder.write("m.mdl", model());
+  folder.write("m.mdl", model_text());
   Stage stage(folder.write("p.toml", preset()));
   const std::uint32_t serial = stage.session.current()->serial;
   const Reload news = stage.after([&] {
-    folder.write("m.mdl", model("0.01", "1.", "@n mass 1. 0. 0.\n@t springDamper @m @n K 0.\n"));
+    folder.write("m.mdl",
+                 model_text("0.01", "1.", "@n mass 1. 0. 0.\n@t springDamper @m @n K 0.\n"));
   });
   CHECK(has(news.news, "p: loaded again in "));
   CHECK(stage.session.current()->serial != serial);
@@ -227,14 +228,15 @@ TEST_CASE("Another structure comes as a load does", "[reload]") {
 
 TEST_CASE("An error leaves the sound and is told with its line and a caret", "[reload]") {
   const Folder folder;
-  folder.write("m.mdl", model());
+  folder.write("m.mdl", model_text());
   Stage stage(folder.write("p.toml", preset()));
   Stage other(folder.file("p.toml"), {.compile = {.rate_hz = rate_hz}});
   for (Stage* const each : {&stage, &other}) {
     each->strike();
     each->play(4800);
   }
-  Reload news = stage.after([&] { folder.write("m.mdl", model() + "@x spingDamper @s @m 1 0\n"); });
+  Reload news =
+      stage.after([&] { folder.write("m.mdl", model_text() + "@x spingDamper @s @m 1 0\n"); });
   CHECK(!news.is_done);
   CHECK(has(news.news, folder.file("m.mdl") + ":7:4: error: "));
   CHECK(has(news.news, "\n    @x spingDamper @s @m 1 0\n       ^"));
@@ -243,7 +245,7 @@ TEST_CASE("An error leaves the sound and is told with its line and a caret", "[r
   CHECK(has(news.news, folder.file("p.toml") + ":"));
   news = stage.after([&] {
     folder.write("p.toml", preset());
-    folder.write("m.mdl", model("40."));  // not stable
+    folder.write("m.mdl", model_text("40."));  // not stable
   });
   for (int i = 0; i < 100 && stage.session.last_reload().is_done; ++i) {
     std::this_thread::sleep_for(20ms);
@@ -254,13 +256,13 @@ TEST_CASE("An error leaves the sound and is told with its line and a caret", "[r
   }
   CHECK(stage.heard == other.heard);
   // And what is mended is as if nothing had been.
-  news = stage.after([&] { folder.write("m.mdl", model()); });
+  news = stage.after([&] { folder.write("m.mdl", model_text()); });
   CHECK(news.is_done);
 }
 
 TEST_CASE("A file is followed however it is written", "[reload]") {
   const Folder folder;
-  folder.write("m.mdl", model());
+  folder.write("m.mdl", model_text());
   Stage stage(folder.write("p.toml", preset()));
   const auto told = [&](const std::function<void()>& change, const std::string& stiffness) {
     CHECK(stage.after(change).news == "p: K = " + stiffness);
@@ -268,7 +270,7 @@ TEST_CASE("A file is followed however it is written", "[reload]") {
   // As vim and most others do: another file takes its name.
   told(
       [&] {
-        folder.write("m.mdl.new", model("0.011"));
+        folder.write("m.mdl.new", model_text("0.011"));
         fs::rename(folder.file("m.mdl.new"), folder.file("m.mdl"));
       },
       "0.011");
@@ -276,28 +278,28 @@ TEST_CASE("A file is followed however it is written", "[reload]") {
   told(
       [&] {
         fs::rename(folder.file("m.mdl"), folder.file("m.mdl~"));
-        folder.write("m.mdl", model("0.012"));
+        folder.write("m.mdl", model_text("0.012"));
       },
       "0.012");
   // In two halves: what is not closed yet is not read.
   told(
       [&] {
         std::ofstream out(folder.file("m.mdl"));
-        const std::string text = model("0.013");
+        const std::string text = model_text("0.013");
         out << text.substr(0, 60) << std::flush;
         std::this_thread::sleep_for(100ms);
         out << text.substr(60);
       },
       "0.013");
   // A link takes its place, and then what it leads to changes.
-  folder.write("far.mdl", model("0.014"));
+  folder.write("far.mdl", model_text("0.014"));
   told(
       [&] {
         fs::create_symlink("far.mdl", folder.file("link"));
         fs::rename(folder.file("link"), folder.file("m.mdl"));
       },
       "0.014");
-  told([&] { folder.write("far.mdl", model("0.015")); }, "0.015");
+  told([&] { folder.write("far.mdl", model_text("0.015")); }, "0.015");
   // Hundreds of others in the same folder are nothing to it.
   const std::uint64_t count = stage.session.last_reload().count;
   for (int i = 0; i < 300; ++i) {
@@ -309,7 +311,7 @@ TEST_CASE("A file is followed however it is written", "[reload]") {
 
 TEST_CASE("What a preset joins is followed, and what is missing waited for", "[reload]") {
   const Folder folder;
-  folder.write("m.mdl", model());
+  folder.write("m.mdl", model_text());
   folder.write("with.mdl", "@n mass 1. 0. 0.\n@t springDamper @m @n K 0.\n");
   folder.write("two.scl", "two\n1\n2/1\n");
   const std::string joins = preset() + "";
@@ -341,7 +343,7 @@ TEST_CASE("Random edits neither crash nor click", "[reload]") {
   const char* const asked = std::getenv("RESSORT_EDITS");
   const int edits = asked != nullptr ? std::atoi(asked) : 20;
   const Folder folder;
-  folder.write("m.mdl", model());
+  folder.write("m.mdl", model_text());
   Stage stage(folder.write("p.toml", preset()));
   support::Random random(7);
   struct Numbers {
@@ -378,7 +380,7 @@ TEST_CASE("Random edits neither crash nor click", "[reload]") {
       more += "@" + name + " mass 1. 0. 0.\n@l" + name + " springDamper @m @" + name +
               " 0.0001 0.00001\n";
     }
-    std::string text = model(std::to_string(now.stiffness), std::to_string(now.mass), more);
+    std::string text = model_text(std::to_string(now.stiffness), std::to_string(now.mass), more);
     const bool breaks = random.below(4) == 0;
     if (breaks) {
       const std::size_t at = random.below(text.size());
@@ -408,7 +410,7 @@ TEST_CASE("Random edits neither crash nor click", "[reload]") {
       stage.after([&] {
         now = Numbers{};
         folder.write("p.toml", preset());
-        folder.write("m.mdl", model());
+        folder.write("m.mdl", model_text());
       });
       std::this_thread::sleep_for(60ms);
       stage.play(9600);

@@ -34,7 +34,7 @@ struct Folder {
   }
 };
 
-const char* const model =
+const char* const model_text =
     "@K param 0.1\n@s ground 0.\n@m mass 1. 0. 0.\n@n mass 1. 0. 0.\n"
     "@r0 springDamper @s @m K 0.0005\n@r1 springDamper @m @n K 0.0005\n"
     "@in1 frcInput @m\n@out1 posOutput @n\n";
@@ -147,7 +147,7 @@ float largest_step_of(const std::string& path) {
 
 TEST_CASE("A thousand swaps while notes sound neither click, leak nor break", "[session]") {
   const Folder folder;
-  folder.write("m.mdl", model);
+  folder.write("m.mdl", model_text);
   const std::string soft = folder.write("soft.toml", preset(0.05));
   const std::string hard = folder.write("hard.toml", preset(0.25));
   const float own = std::max(largest_step_of(soft), largest_step_of(hard));
@@ -185,7 +185,7 @@ TEST_CASE("A thousand swaps while notes sound neither click, leak nor break", "[
 
 TEST_CASE("What cannot be loaded is told in full, and what sounds goes on", "[session]") {
   const Folder folder;
-  folder.write("m.mdl", model);
+  folder.write("m.mdl", model_text);
   const std::string good = folder.write("good.toml", preset(0.1));
   const std::string bad = folder.write("bad.mdl", "@m mass 1. 0. 0.\n@r sprong @m @m 1\n@x\n");
   Process process(48000.0);
@@ -207,7 +207,7 @@ TEST_CASE("A newer load replaces an older one, and the end replaces all", "[sess
   const std::string large = folder.write(
       "large.mdl",
       "@K param 0.01\n@s mesh 600 600 1. K 0.001 0. 0.\n@out1 posOutput [@s 0.3 0.3]\n");
-  const std::string quick = folder.write("quick.mdl", model);
+  const std::string quick = folder.write("quick.mdl", model_text);
   Process process(48000.0);
   std::mutex mutex;
   std::vector<std::string> answers;
@@ -243,7 +243,7 @@ TEST_CASE("A newer load replaces an older one, and the end replaces all", "[sess
 
 TEST_CASE("What sounds is made anew for another rate, once", "[session]") {
   const Folder folder;
-  const std::string file = folder.write("quick.mdl", model);
+  const std::string file = folder.write("quick.mdl", model_text);
   Process process(48000.0);
   Session session(process, at_48k(), {});
   session.set_rate(44100.0);  // before there is anything
@@ -261,7 +261,7 @@ TEST_CASE("What sounds is made anew for another rate, once", "[session]") {
 TEST_CASE("Parameters are remembered, clamped, and followed when a controller turns them",
           "[session]") {
   const Folder folder;
-  folder.write("m.mdl", model);
+  folder.write("m.mdl", model_text);
   const std::string file = folder.write(
       "p.toml", preset(0.1) + "[[control]]\nfrom = \"cc74\"\nto = \"K\"\nrange = [0.02, 0.2]\n");
   Process process(48000.0);
@@ -290,7 +290,7 @@ TEST_CASE("Parameters are remembered, clamped, and followed when a controller tu
 
 TEST_CASE("What happens again and again is told once, with how often it was", "[session]") {
   const Folder folder;
-  const std::string file = folder.write("m.mdl", model);
+  const std::string file = folder.write("m.mdl", model_text);
   Process process(48000.0);
   std::mutex mutex;
   std::vector<std::string> told;

@@ -6,7 +6,7 @@
 namespace ressort {
 namespace {
 
-const std::string model =
+const std::string model_text =
     "@s ground 0.\n@m mass 1. 0. 0.\n@r0 spring @s @m 0.01\n"
     "@in1 frcInput @m\n@out1 posOutput @m\n";
 
@@ -28,7 +28,7 @@ std::string error_of(const std::string& name, const SceneOptions& options = {}) 
 
 TEST_CASE("a preset's scale stands beside it", "[tunings]") {
   const Folder folder;
-  folder.write("m.mdl", model);
+  folder.write("m.mdl", model_text);
   folder.write("two.scl", two_steps);
   folder.write("map.kbm", "0\n0\n127\n60\n60\n300.0\n0\n");
   const std::string plain = folder.write("plain.toml", preset(""));
@@ -53,7 +53,7 @@ TEST_CASE("a preset's scale stands beside it", "[tunings]") {
 
 TEST_CASE("a tuning that is missing or wrong is told with its file and line", "[tunings]") {
   const Folder folder;
-  folder.write("m.mdl", model);
+  folder.write("m.mdl", model_text);
   const std::string bad = folder.write("bad.scl", "bad\n2\n600.0\nx\n");
   folder.write("map.kbm", "2\n0\n127\n60\n61\n300.0\n0\n0\nx\n");
   CHECK(has(error_of(folder.write("a.toml", preset("scale = \"none.scl\""))), "none.scl"));
@@ -68,7 +68,7 @@ TEST_CASE("a tuning that is missing or wrong is told with its file and line", "[
 
 TEST_CASE("the console tunes what sounds", "[tunings]") {
   const Folder folder;
-  folder.write("m.mdl", model);
+  folder.write("m.mdl", model_text);
   const std::string plain = folder.write("plain.toml", preset("a4_hz = 441"));
   const std::string scale = folder.write("two.scl", two_steps);
   const std::string bad = folder.write("bad.scl", "bad\nx\n");
