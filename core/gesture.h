@@ -97,6 +97,7 @@ struct CallArgument {
   std::optional<double> console_value = {};  // the same at the console
   std::string_view unit = {};
   bool is_text = false;
+  bool is_whole = false;  // nothing lies between two of them: a key, a controller, an ID
 };
 
 enum class Live : std::uint8_t {

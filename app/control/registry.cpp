@@ -113,6 +113,10 @@ std::optional<std::string> read_arguments(const Row& row, const Message& message
       return meaning + " must lie between " + print_number(wanted.least) + " and " +
              print_number(wanted.most) + ", found " + print_number(*value);
     }
+    // What was computed in single precision may be off by its rounding.
+    if (wanted.is_whole && std::abs(*value - std::round(*value)) > 1e-3) {
+      return meaning + " must be a whole number, found " + print_number(*value);
+    }
     values[count++] = *value;
   }
   const std::size_t said = message.arguments.size();

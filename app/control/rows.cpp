@@ -116,6 +116,20 @@ Events strike(const Said& said) {
                     .value2 = static_cast<double>(*mass)});
 }
 
+constexpr CallArgument key{
+    .word = "KEY", .meaning = "the key", .least = 0, .most = 127, .is_whole = true};
+constexpr CallArgument number{
+    .word = "NUMBER", .meaning = "the number", .least = 0, .most = 127, .is_whole = true};
+constexpr CallArgument id{
+    .word = "ID", .meaning = "the ID", .least = 1, .most = most_note_ids, .is_whole = true};
+// Of a note that need not have one.
+constexpr CallArgument own_id{.word = "ID",
+                              .meaning = "the ID",
+                              .least = 0,
+                              .most = most_note_ids,
+                              .otherwise = 0,
+                              .is_whole = true};
+
 // --- the rows -----------------------------------------------------------------------------------
 
 }  // namespace
@@ -123,9 +137,7 @@ Events strike(const Said& said) {
 std::vector<Row> make_rows() {
   const Row first[] = {
       {.address = "/note/on",
-       .arguments = {{"KEY", "the key", 0, 127},
-                     {"VELOCITY", "the velocity", 0, 127, 100},
-                     {"ID", "the ID", 0, most_note_ids, 0}},
+       .arguments = {key, {"VELOCITY", "the velocity", 0, 127, 100}, own_id},
        .does =
            "starts a note; key 0-127, velocity 1-127 (100), or as a float up to 1 a share of the "
            "loudest; ID 1-16 lets the note be bent, pressed and slid alone",
@@ -136,9 +148,7 @@ std::vector<Row> make_rows() {
        .command_does = "starts a note; 60 is the middle C",
        .details = "KEY is 0 to 127, VELOCITY is 1 to 127, or 100 if it is left out."},
       {.address = "/note/off",
-       .arguments = {{"KEY", "the key", 0, 127},
-                     {"VELOCITY", "the velocity", 0, 127, 63.5},
-                     {"ID", "the ID", 0, most_note_ids, 0}},
+       .arguments = {key, {"VELOCITY", "the velocity", 0, 127, 63.5}, own_id},
        .does = "ends a note; the velocity is that of the release",
        .play = events::note_off,
        .command = "noteoff",
@@ -146,26 +156,25 @@ std::vector<Row> make_rows() {
        .words = "KEY",
        .details = "KEY is 0 to 127."},
       {.address = "/note/hz",
-       .arguments = {{"ID", "the ID", 1, most_note_ids},
+       .arguments = {id,
                      {"HZ", "the frequency", 1, 20000},
                      {"VELOCITY", "the velocity", 0, 127, 100}},
        .does = "starts a note of this frequency; ID 1-16; velocity as of /note/on",
        .play = events::note_hz},
       {.address = "/note/end",
-       .arguments = {{"ID", "the ID", 1, most_note_ids}},
+       .arguments = {id},
        .does = "ends the notes of this ID",
        .play = events::note_end},
       {.address = "/note/bend",
-       .arguments = {{"ID", "the ID", 1, most_note_ids},
-                     {"SEMITONES", "the bend", -note_bend_semitones, note_bend_semitones}},
+       .arguments = {id, {"SEMITONES", "the bend", -note_bend_semitones, note_bend_semitones}},
        .does = "bends this note alone; semitones, -48 to 48; it stays for the ID's next note",
        .play = events::note_bend},
       {.address = "/note/pressure",
-       .arguments = {{"ID", "the ID", 1, most_note_ids}, {"VALUE", "the pressure", 0, 127}},
+       .arguments = {id, {"VALUE", "the pressure", 0, 127}},
        .does = "presses this note alone, 0-127",
        .play = events::note_pressure},
       {.address = "/note/slide",
-       .arguments = {{"ID", "the ID", 1, most_note_ids}, {"VALUE", "the slide", 0, 127}},
+       .arguments = {id, {"VALUE", "the slide", 0, 127}},
        .does = "slides this note alone, as MPE does: controller 74, 0-127",
        .play = events::note_slide},
       {.command = "keys",
@@ -175,7 +184,7 @@ std::vector<Row> make_rows() {
            "The letters are laid out as on a piano. A note lasts until the next, or a second.",
        .act = command::keys},
       {.address = "/cc",
-       .arguments = {{"NUMBER", "the number", 0, 127}, {"VALUE", "the value", 0, 127}},
+       .arguments = {number, {"VALUE", "the value", 0, 127}},
        .does = "a controller, as from a keyboard; value 0-127",
        .play =
            [](const Said& said) {

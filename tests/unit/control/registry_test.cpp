@@ -204,6 +204,9 @@ TEST_CASE("what cannot be played is told, and what was expected", "[registry]") 
   check_error("/nowhere 1", "unknown address '/nowhere'; /describe lists what there is");
   check_error("/note/on", "/note/on: the key is missing");
   check_error("/note/on 128", "/note/on: the key must lie between 0 and 127, found 128");
+  check_error("/note/on 60.5", "/note/on: the key must be a whole number, found 60.5");
+  check_error("/note/off 60 64 1.5", "/note/off: the ID must be a whole number, found 1.5");
+  check_error("/cc 16.5 1", "/cc: the number must be a whole number, found 16.5");
   check_error("/note/on 60 128", "/note/on: the velocity must lie between 0 and 127, found 128");
   check_error("/note/on sixty", "/note/on: the key must be a number, found 'sixty'");
   check_error("/note/on 60 100 1 1", "/note/on: too many arguments: 4, expected 3");
