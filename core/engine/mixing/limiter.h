@@ -27,6 +27,9 @@ class Limiter {
   double take_reduction();
 
  private:
+  void delay(std::span<double* const> channels, std::size_t frames);
+  void limit(std::span<double* const> channels, std::size_t frames);
+
   std::array<std::array<double, lookahead_frames>, max_channels> delayed_{};
   std::array<double, lookahead_frames> wanted_{};    // gain that each sample in flight needs
   std::array<double, lookahead_frames> smoothed_{};  // the last gains, for their mean
@@ -35,7 +38,7 @@ class Limiter {
   double release_ = 0.0;
   double deepest_ = 1.0;
   std::size_t at_ = 0;
-  std::size_t calm_ = 0;  // samples since the gain was last below 1
+  std::size_t calm_ = 0;  // samples since the last above the ceiling
 };
 
 }  // namespace ressort::engine

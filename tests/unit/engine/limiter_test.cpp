@@ -80,6 +80,21 @@ TEST_CASE("nothing passes the ceiling, whatever comes", "[limiter]") {
   }
 }
 
+TEST_CASE("how the time is cut into blocks makes no difference", "[limiter]") {
+  Random random(3);
+  std::vector<double> y(20000);
+  double loudness = 0.5;
+  for (std::size_t n = 0; n < y.size(); ++n) {
+    loudness = n % 500 == 0 ? random.uniform(0.5, 1.2) : loudness;
+    y[n] = random.below(900) == 0 ? nan : random.uniform(-loudness, loudness);
+  }
+  const auto expected = limited(y, 1);
+  CHECK(peak(expected) == Limiter::ceiling);
+  for (const std::size_t block : {5u, 48u, 64u, 1000u}) {
+    CHECK(limited(y, block) == expected);
+  }
+}
+
 TEST_CASE("what is no number becomes silence, its neighbours stay", "[limiter]") {
   std::vector<double> y(500, 0.25);
   y[100] = nan;
