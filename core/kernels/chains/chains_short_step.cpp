@@ -62,6 +62,78 @@ void move_short_chain(ShortBody<typename S::V, packs>& body, const FoldedChain& 
   });
 }
 
+template <class T>
+bool are_springs_all_that_ramps(const FoldedChain& chain, const Ramps<T>& ramps) {
+  bool are_all = true;
+  for (std::size_t i = 0; i < ramps.count && ramps.frames > 0; ++i) {
+    const std::uint32_t c = ramps.ramping[i];
+    are_all &= c == chain.springs[0] || c == chain.springs[1];
+  }
+  return are_all;
+}
+
+// One coefficient, as advance() moves it.
+template <class T>
+struct Ramp {
+  Ramp(const Ramps<T>& ramps, std::uint32_t c) : value(ramps.value[c]), target(value) {
+    for (std::size_t i = 0; i < ramps.count && ramps.frames > 0; ++i) {
+      if (ramps.ramping[i] == c) {
+        increment = ramps.increment[c];
+        target = ramps.target[c];
+      }
+    }
+  }
+  void advance(bool arrives) {
+    value = arrives ? target : value + increment;
+    increment = arrives ? T(0) : increment;
+  }
+
+  T value;
+  T target;
+  T increment = 0;
+};
+
+// A block of a chain beside which there is nothing but what holds its ends. So little is to be
+// looked at in each sample that all of it is in registers, which takes a quarter off.
+template <class S, std::size_t packs, class T>
+[[gnu::flatten]] void step_alone(const Program& program, const FoldedChain& chain,
+                                 std::uint32_t read, ShortBody<typename S::V, packs>& body,
+                                 typename S::V* pairs, const Ramps<T>& ramps, const Block<T>& block,
+                                 S& s) {
+  Ramp<T> k(ramps, chain.springs[0]);
+  Ramp<T> z(ramps, chain.springs[1]);
+  const T* value = block.value;
+  const T* velocity = block.velocity;
+  T* outputs = block.outputs;
+  ShortBody<typename S::V, packs> here = body;
+  for (std::size_t left = block.frames, arrives = block.frames + 1 - ramps.frames; left > 0;
+       --left) {
+    k.advance(left == arrives);
+    z.advance(left == arrives);
+    move_short_chain<false>(here, chain, nullptr, s);
+    each_below<packs>([&](auto i) {
+      if ((read >> i & 1) != 0) {
+        pairs[2 * i] = here.x[i];
+      }
+    });
+    for (const PlacedInput& input : s.positions) {
+      s.bodies[input.place] = value[input.index];
+      s.bodies[input.place + S::lanes] = velocity[input.index];
+    }
+    s.held[0] = k.value;
+    s.held[1] = z.value;
+    for (const HeardPosition& output : s.heard_positions) {
+      outputs[output.index] = s.bodies[output.place];
+    }
+    outputs += program.outputs.size();
+    value += program.inputs.size();
+    velocity += program.inputs.size();
+  }
+  ramps.value[chain.springs[0]] = k.value;
+  ramps.value[chain.springs[1]] = z.value;
+  body = here;
+}
+
 // Flat: a call would put all that is in registers into memory.
 template <class S, std::size_t packs, class T>
 [[gnu::flatten]] void step_short(const Program& program, const ChainsTables& tables,
@@ -84,8 +156,7 @@ template <class S, std::size_t packs, class T>
   const std::size_t frames = block.frames;
   const bool has_sites = sites->pack != nowhere;
   const bool has_others = s.loose_runs.first != s.loose_runs.last ||
-                          s.link_runs.first != s.link_runs.last ||
-                          s.forces.first != s.forces.last;
+                          s.link_runs.first != s.link_runs.last || s.forces.first != s.forces.last;
   // What holds its end stands in the first empty place, too: it is next to the last mass.
   if (tables.short_end != nowhere) {
     s.bodies[tables.short_end] = s.bodies[chain.right];
@@ -97,7 +168,13 @@ template <class S, std::size_t packs, class T>
   });
   T inverse_mass = s.coefficient[chain.mass.inverse_mass];
   weigh(body, chain, s);
-  for (std::size_t frame = 0; frame < frames; ++frame) {
+  std::size_t frame = 0;
+  if (!has_sites && !has_others && program.audio_coefficients.empty() &&
+      are_springs_all_that_ramps(chain, ramps)) {
+    step_alone(program, chain, read, body, pairs, ramps, block, s);
+    frame = frames;
+  }
+  for (; frame < frames; ++frame) {
     if (ramps.frames > 0 || audio_coefficients.first != audio_coefficients.last) {
       advance(ramps);
       for (const std::uint32_t c : audio_coefficients) {
