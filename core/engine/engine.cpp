@@ -289,8 +289,13 @@ struct Engine::Player {
       if (!watch.steps(group, voices)) {
         return false;
       }
-      gestures.fill(b, group, segment.frames, watch);
-      audio.add(b, group, segment.frames, voices, watch);
+      const Gestures::Rest rest = gestures.rest(b, group);
+      const bool is_all_sound = rest.is_alike && audio.move_all(part.program);
+      b.is_common = rest.is_alike && b.may_be_common(group.part);
+      if (!is_all_sound) {
+        gestures.fill(b, group, segment.frames, rest, watch);
+      }
+      audio.add(b, group, segment.frames, is_all_sound, voices, watch);
       parameters.fill_audio(b, group, segment, voices);
       return true;
     };
@@ -357,14 +362,13 @@ struct Engine::Player {
     }
     voices.glide_on();
     watch.look_around(b, voices, parameters.values());
-    const double bound = quiet_level / std::max(1e-30, playing.gain_of_loudest_key());
     for (std::size_t lane = 0; lane < voices.size(); ++lane) {
       Voice& voice = voices[lane];
       const bool was_awake = voice.awake;
       // Where nothing moves anywhere: a slow wave may still be on its way to the output.
       if (was_awake && voices.update(voice) && !gestures.is_moving(lane) &&
           std::all_of(b.parts.begin(), b.parts.end(), [&](const PartBank<T>& part) {
-            return part.of(lane).is_near_start(lane % part.width, bound);
+            return part.of(lane).is_near_start(lane % part.width, quiet_position);
           })) {
         voices.sleep(voice);
       }
@@ -486,6 +490,7 @@ struct Engine::Player {
 
   const Machine machine;
   const Playing playing;
+  const double quiet_position = quiet_level / std::max(1e-30, playing.gain_of_loudest_key());
   StruckNodes struck{machine};
   Voices voices;
   AnyBank bank;

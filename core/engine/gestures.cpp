@@ -239,48 +239,65 @@ void Gestures::follow_pitches() {
   }
 }
 
-// Drivers that rest give every frame the same row; those of voices that sleep, too, so that their
-// hands do not come to lie on anything. Whether any driver of a voice that is awake moves.
+// Those of voices that sleep, too, so that their hands do not come to lie on anything.
 template <class T>
-bool Gestures::fill_rest(Bank<T>& bank, const VoiceGroup& group, std::size_t frames) {
+Gestures::Rest Gestures::rest(Bank<T>& bank, const VoiceGroup& group) const {
   const PartBank<T>& part = bank.parts[group.part];
-  const std::size_t step = part.program.inputs.size() * part.width;
   const std::size_t lanes = std::min(part.width, voices_.size() - group.first);
-  bool is_any_moving = false;
-  bool is_new = bank.filled_part != &part || bank.filled_frames < frames;
+  Rest rest;
+  bool is_new = false;
   T* row = bank.row.data();
-  if (bank.filled_part != &part) {
-    std::fill_n(row, step, T(0));
-  }
   for (const InputSlot& slot : part.program.inputs) {
+    std::fill(row + lanes, row + part.width, T(0));
     for (std::size_t lane = 0; lane < lanes; ++lane) {
       const InputDriver& mover = driver(group.first + lane, slot.input);
       const T value = static_cast<T>(mover.value());
       is_new |= !(value == row[lane]);
       row[lane] = value;
-      is_any_moving |= mover.is_moving() && voices_[group.first + lane].awake;
+      rest.is_any_moving |= mover.is_moving() && voices_[group.first + lane].awake;
+      rest.is_alike &= value == row[0];
     }
     row += part.width;
   }
+  rest.is_alike &= !rest.is_any_moving;
+  bank.filled_part = is_new ? nullptr : bank.filled_part;
+  return rest;
+}
+
+// Drivers that rest give every frame the same row.
+template <class T>
+void Gestures::fill_rest(Bank<T>& bank, const PartBank<T>& part, std::size_t frames) {
+  const std::size_t inputs = part.program.inputs.size();
+  const std::size_t step = inputs * bank.lanes_of_rows(part);
   if (bank.still < frames * step) {
     std::fill_n(bank.velocity.begin(), frames * step, T(0));
     bank.still = frames * step;
   }
-  if (is_new) {
-    bank.mixer.fill_rows(bank.row.data(), step, frames, bank.value.data());
-    bank.filled_part = &part;
-    bank.filled_frames = frames;
+  if (bank.filled_part == &part && bank.filled_frames >= frames &&
+      bank.filled_common == bank.is_common) {
+    return;
   }
-  return is_any_moving;
+  const T* row = bank.row.data();
+  if (bank.is_common) {
+    for (std::size_t i = 0; i < inputs; ++i) {
+      bank.common_row[i] = row[i * part.width];
+    }
+    row = bank.common_row.data();
+  }
+  bank.mixer.fill_rows(row, step, frames, bank.value.data());
+  bank.filled_part = &part;
+  bank.filled_frames = frames;
+  bank.filled_common = bank.is_common;
 }
 
 template <class T>
-void Gestures::fill(Bank<T>& bank, const VoiceGroup& group, std::size_t frames,
+void Gestures::fill(Bank<T>& bank, const VoiceGroup& group, std::size_t frames, const Rest& rest,
                     EnergyWatch& watch) {
-  if (!fill_rest(bank, group, frames)) {
+  const PartBank<T>& part = bank.parts[group.part];
+  fill_rest(bank, part, frames);
+  if (!rest.is_any_moving) {
     return;
   }
-  const PartBank<T>& part = bank.parts[group.part];
   const std::size_t step = part.program.inputs.size() * part.width;  // from frame to frame
   for (std::size_t i = 0; i < part.program.inputs.size(); ++i) {
     const InputSlot& slot = part.program.inputs[i];
@@ -305,7 +322,11 @@ void Gestures::fill(Bank<T>& bank, const VoiceGroup& group, std::size_t frames,
   }
 }
 
-template void Gestures::fill(Bank<float>&, const VoiceGroup&, std::size_t, EnergyWatch&);
-template void Gestures::fill(Bank<double>&, const VoiceGroup&, std::size_t, EnergyWatch&);
+template Gestures::Rest Gestures::rest(Bank<float>&, const VoiceGroup&) const;
+template Gestures::Rest Gestures::rest(Bank<double>&, const VoiceGroup&) const;
+template void Gestures::fill(Bank<float>&, const VoiceGroup&, std::size_t, const Rest&,
+                             EnergyWatch&);
+template void Gestures::fill(Bank<double>&, const VoiceGroup&, std::size_t, const Rest&,
+                             EnergyWatch&);
 
 }  // namespace ressort::engine

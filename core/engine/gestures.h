@@ -47,12 +47,23 @@ class Gestures {
   // own motion, so that a bow that is bent or glides goes on to catch its string.
   void follow_pitches();
 
-  // Where the drivers are in each frame.
+  // Where the drivers are before a segment, in the bank's row.
+  struct Rest {
+    bool is_any_moving = false;  // of a voice that is awake
+    bool is_alike = true;        // none of these, and all lanes are in the same place
+  };
   template <class T>
-  void fill(Bank<T>& bank, const VoiceGroup& group, std::size_t frames, EnergyWatch& watch);
+  Rest rest(Bank<T>& bank, const VoiceGroup& group) const;
+  // After it: where they are in each frame.
+  template <class T>
+  void fill(Bank<T>& bank, const VoiceGroup& group, std::size_t frames, const Rest& rest,
+            EnergyWatch& watch);
 
  private:
   InputDriver& driver(std::size_t lane, std::size_t input) {
+    return drivers_[lane * machine_.inputs.size() + input];
+  }
+  const InputDriver& driver(std::size_t lane, std::size_t input) const {
     return drivers_[lane * machine_.inputs.size() + input];
   }
   // With what a gesture is to know of the input.
@@ -62,7 +73,7 @@ class Gestures {
   // Where the drivers of new voices on these channels start.
   void set_starts(ChannelMask channels, std::size_t input, double start);
   template <class T>
-  bool fill_rest(Bank<T>& bank, const VoiceGroup& group, std::size_t frames);
+  static void fill_rest(Bank<T>& bank, const PartBank<T>& part, std::size_t frames);
 
   const Machine& machine_;
   const Playing& playing_;

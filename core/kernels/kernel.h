@@ -22,6 +22,7 @@ struct Block {
   std::size_t frames = 0;
   const T* value = nullptr;     // [frame][input][lane] position, or force
   const T* velocity = nullptr;  // [frame][input][lane] of a position, per sample
+  bool is_common = false;       // both are [frame][input], for all lanes
   const T* audio = nullptr;     // [frame][audio coefficient][lane]
   T* outputs = nullptr;         // [frame][output][lane]
   // Nobody plays in lanes beyond so many: they may be left where they are.
@@ -120,6 +121,8 @@ class Kernel {
   Kernel& operator=(const Kernel&) = delete;
 
   std::size_t width() const { return coefficients.width; }
+  // Whether Block::is_common may be set where there are several lanes.
+  virtual bool takes_common_inputs() const { return false; }
 
   // Puts one lane to positions and velocities, [node]; its coefficients stay. Nothing pulls in the
   // next sample. [audio]

@@ -70,11 +70,18 @@ std::size_t AudioInputs::side_by_side(const Program& program, std::size_t first,
   return std::bit_floor(count);
 }
 
+bool AudioInputs::move_all(const Program& program) const {
+  return !program.inputs.empty() &&
+         std::all_of(program.inputs.begin(), program.inputs.end(),
+                     [&](const InputSlot& slot) { return moves(slot.input); });
+}
+
 template <class T>
-void AudioInputs::add(Bank<T>& bank, const VoiceGroup& group, std::size_t frames,
+void AudioInputs::add(Bank<T>& bank, const VoiceGroup& group, std::size_t frames, bool rests,
                       const Voices& voices, EnergyWatch& watch) const {
   const PartBank<T>& part = bank.parts[group.part];
-  const std::size_t most = part.width == 1 ? AudioInput<T>::most : 1;
+  const std::size_t width = bank.lanes_of_rows(part);
+  const std::size_t most = width == 1 ? AudioInput<T>::most : 1;
   std::size_t next = 0;
   for (std::size_t i = 0; i < part.program.inputs.size(); i = next) {
     const std::size_t count = side_by_side(part.program, i, most);
@@ -86,29 +93,32 @@ void AudioInputs::add(Bank<T>& bank, const VoiceGroup& group, std::size_t frames
       watch.stir(voices[lane], lane, group.part);
     }
     bank.filled_part = nullptr;
-    AudioInput<T> added{.count = count,
-                        .frames = frames,
-                        .replaces = bare_,
-                        .value = bank.value.data() + i * part.width,
-                        .step = part.program.inputs.size() * part.width,
-                        .width = part.width};
+    AudioInput<T> added;
+    added.count = count;
+    added.frames = frames;
+    added.rests = rests || bare_;
+    added.value = bank.value.data() + i * width;
+    added.velocity = nullptr;
+    added.step = part.program.inputs.size() * width;
+    added.width = width;
     for (std::size_t sound = 0; sound < count; ++sound) {
       const Driven& input = inputs_[part.program.inputs[i + sound].input];
       added.samples[sound] = input.samples;
       added.scale[sound] = input.scale;
       added.before[sound] = input.before;
+      added.rest[sound] = bare_ ? T(0) : bank.row[(i + sound) * part.width];
     }
     if (!part.program.inputs[i].is_force) {
       bank.still = 0;
-      added.velocity = bank.velocity.data() + i * part.width;
+      added.velocity = bank.velocity.data() + i * width;
     }
     bank.mixer.add_audio(added);
   }
 }
 
-template void AudioInputs::add(Bank<float>&, const VoiceGroup&, std::size_t, const Voices&,
+template void AudioInputs::add(Bank<float>&, const VoiceGroup&, std::size_t, bool, const Voices&,
                                EnergyWatch&) const;
-template void AudioInputs::add(Bank<double>&, const VoiceGroup&, std::size_t, const Voices&,
+template void AudioInputs::add(Bank<double>&, const VoiceGroup&, std::size_t, bool, const Voices&,
                                EnergyWatch&) const;
 
 }  // namespace ressort::engine

@@ -21,10 +21,12 @@ class AudioInputs {
   void remember(const Segment& segment);
 
   bool moves(std::size_t input) const { return inputs_[input].samples != nullptr; }
-  // On top of where the drivers are; in the bare network instead of that.
+  bool move_all(const Program& program) const;
+  // On top of where the drivers are; in the bare network instead of that. Where sound moves all
+  // inputs, and drivers rest in the same place in every lane, the buffers need not be filled.
   template <class T>
-  void add(Bank<T>& bank, const VoiceGroup& group, std::size_t frames, const Voices& voices,
-           EnergyWatch& watch) const;
+  void add(Bank<T>& bank, const VoiceGroup& group, std::size_t frames, bool rests,
+           const Voices& voices, EnergyWatch& watch) const;
 
  private:
   struct Driven {

@@ -54,6 +54,7 @@ struct Bank : BlockBuffers<T> {
       : voices(voices_in),
         mixer(with_isa(isa, []<Isa level>() { return make_mixer<level, T>(); })) {
     std::size_t inputs = 0;
+    std::size_t most_inputs = 0;
     std::size_t audio_coefficients = 0;
     std::size_t channels = 0;
     std::size_t lanes = 0;
@@ -62,6 +63,7 @@ struct Bank : BlockBuffers<T> {
     for (const Program& program : machine.parts) {
       const std::size_t width = parts.emplace_back(program, voices, isa, progress).width;
       inputs = std::max(inputs, width * program.inputs.size());
+      most_inputs = std::max(most_inputs, program.inputs.size());
       audio_coefficients = std::max(audio_coefficients, width * program.audio_coefficients.size());
       channels = std::max(channels, width * program.outputs.size());
       lanes = std::max(lanes, width);
@@ -73,6 +75,7 @@ struct Bank : BlockBuffers<T> {
     this->audio.resize(max_block_frames * audio_coefficients);
     this->outputs.resize(max_block_frames * channels);
     row.resize(inputs);
+    common_row.resize(most_inputs);
     peak.resize(lanes);
     gain.resize(lanes);
     heard.resize(outputs_of_one);
@@ -107,11 +110,13 @@ struct Bank : BlockBuffers<T> {
       }
       for (std::size_t kernel = 0; kernel < parts[p].kernels.size(); ++kernel) {
         const VoiceGroup group = awake_of(p, kernel);
+        is_common = false;
         const bool steps = drive(parts[p], group);
         if (steps) {
           parts[p].kernels[kernel]->step({.frames = frames,
                                           .value = this->value.data(),
                                           .velocity = this->velocity.data(),
+                                          .is_common = is_common,
                                           .audio = this->audio.data(),
                                           .outputs = this->outputs.data(),
                                           .lanes = group.end - group.first});
@@ -121,18 +126,27 @@ struct Bank : BlockBuffers<T> {
     }
   }
 
+  // Whether one row may be for all lanes of a kernel; it is where `is_common` says so.
+  bool may_be_common(std::size_t p) const {
+    return !shared[p].crew && parts[p].kernels[0]->takes_common_inputs();
+  }
+  std::size_t lanes_of_rows(const PartBank<T>& part) const { return is_common ? 1 : part.width; }
+
   static constexpr double least_shared_ns = 5000.0;  // of a kernel in a block
 
   std::size_t voices;
   std::vector<PartBank<T>> parts;
   std::vector<SharedPart<T>> shared;  // [part]
   // The buffers are as Block says; each part in turn, or each kernel that brings its own.
+  bool is_common = false;
 
   // Drivers that rest give every frame the same row, [input][lane], and no velocity. Of what the
   // buffers hold, it is in so many frames of `filled_part`, and so many velocities are 0.
   Aligned<T> row;
+  Aligned<T> common_row;  // [input] the same of one lane, which is that of all
   const PartBank<T>* filled_part = nullptr;
   std::size_t filled_frames = 0;
+  bool filled_common = false;
   std::size_t still = 0;
 
   Mixer<T> mixer;

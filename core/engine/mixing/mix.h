@@ -37,22 +37,23 @@ struct Heard {
   std::size_t lanes = 1;  // the first of them, in whole packs of 16 bytes, too
 };
 
-// Sounds that move as many inputs, side by side in each row, of all lanes: on top of what they do
-// by themselves or instead of that.
+// Sounds that move as many inputs, side by side in each row, of all lanes: on top of where these
+// rest, or of what is there.
 template <class T>
 struct AudioInput {
   static constexpr std::size_t most = 4;  // sounds
 
-  std::size_t count = 1;  // a power of 2
-  std::array<const double*, most> samples{};
-  std::array<double, most> scale{};   // of the samples
-  std::array<double, most> before{};  // the last scaled samples
-  std::size_t frames = 0;
-  bool replaces = false;  // what is there
-  T* value = nullptr;     // [frame * step + input * width + lane]
-  T* velocity = nullptr;  // of positions only
-  std::size_t step = 1;
-  std::size_t width = 1;  // lanes; 1 where there are several inputs
+  std::size_t count;  // a power of 2
+  std::array<const double*, most> samples;
+  std::array<double, most> scale;   // of the samples
+  std::array<double, most> before;  // the last scaled samples
+  std::size_t frames;
+  std::array<T, most> rest;  // where the inputs are without them,
+  bool rests;                // and stay; if not, the rows say where
+  T* value;                  // [frame * step + input * width + lane]
+  T* velocity;               // of positions; null: these are forces
+  std::size_t step;
+  std::size_t width;  // lanes; 1 where there are several inputs
 };
 
 using IsSilent = bool (*)(const double* samples, std::size_t frames);

@@ -92,25 +92,28 @@ void fill_rows(const T* row, std::size_t step, std::size_t frames, T* value) {
   }
 }
 
-// rows[n * step + lane] = kept * rows[n * step + lane] + added(n)
+// rows[n * step + lane] = (rest or rows[n * step + lane]) + added(n)
 template <class T, class Added>
-[[gnu::always_inline]] inline void add_rows(Added&& added, T kept, std::size_t frames,
+[[gnu::always_inline]] inline void add_rows(Added&& added, const T* rest, std::size_t frames,
                                             std::size_t step, std::size_t width, T* rows) {
   for (std::size_t n = 0; n < frames; ++n) {
     const T more = static_cast<T>(added(n));
     for (std::size_t at = n * step; at < n * step + width; ++at) {
-      rows[at] = kept * rows[at] + more;
+      rows[at] = (rest != nullptr ? *rest : rows[at]) + more;
     }
   }
 }
 
 template <class T, class Added>
-[[gnu::always_inline]] inline void add_to(const AudioInput<T>& input, Added&& added, T* rows) {
-  const T kept = input.replaces ? T(0) : T(1);
-  if (input.step == 1) {  // one voice and one input: the usual case, and the compiler is to know it
-    add_rows(added, kept, input.frames, 1, 1, rows);
+[[gnu::always_inline]] inline void add_to(const AudioInput<T>& input, Added&& added, T rest,
+                                          T* rows) {
+  const std::size_t frames = input.frames;
+  if (!input.rests) {
+    add_rows<T>(added, nullptr, frames, input.step, input.width, rows);
+  } else if (input.step == 1) {  // the usual case, and the compiler is to know it
+    add_rows<T>(added, &rest, frames, 1, 1, rows);
   } else {
-    add_rows(added, kept, input.frames, input.step, input.width, rows);
+    add_rows<T>(added, &rest, frames, input.step, input.width, rows);
   }
 }
 
@@ -122,10 +125,10 @@ void add_one_sound(const AudioInput<T>& input) {
     here[n + 1] = input.scale[0] * input.samples[0][n];
   }
   add_to(
-      input, [&](std::size_t n) { return here[n + 1]; }, input.value);
+      input, [&](std::size_t n) { return here[n + 1]; }, input.rest[0], input.value);
   if (input.velocity != nullptr) {
     add_to(
-        input, [&](std::size_t n) { return here[n + 1] - here[n]; }, input.velocity);
+        input, [&](std::size_t n) { return here[n + 1] - here[n]; }, T(0), input.velocity);
   }
 }
 
@@ -134,25 +137,26 @@ template <std::size_t Sounds, class T>
 void add_sounds(const AudioInput<T>& input) {
   using D = Pack<double, Sounds * sizeof(double)>;
   using V = Pack<T, Sounds * sizeof(T)>;
-  const bool replaces = input.replaces;
+  const bool rests = input.rests;
   const std::size_t step = input.step;
   const D scale = load<D>(input.scale.data());
   D before = load<D>(input.before.data());
   T* value = input.value;
   T* velocity = input.velocity;
-  const auto add = [&](T* row, D added) {
+  const auto add = [&](T* row, V rest, D added) {
     const V more = __builtin_convertvector(added, V);
-    store<V>(row, replaces ? more : load<V>(row) + more);
+    store<V>(row, (rests ? rest : load<V>(row)) + more);
   };
+  const V rest = load<V>(input.rest.data());
   for (std::size_t n = 0; n < input.frames; ++n, value += step) {
     D here;
     for (std::size_t i = 0; i < Sounds; ++i) {
       here[i] = input.samples[i][n];
     }
     here *= scale;
-    add(value, here);
+    add(value, rest, here);
     if (velocity != nullptr) {
-      add(velocity, here - before);
+      add(velocity, V{}, here - before);
       velocity += step;
     }
     before = here;

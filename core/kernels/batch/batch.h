@@ -83,6 +83,7 @@ class BatchKernel final : public NodeKernel<T> {
     this->become_nodes(from);
     return true;
   }
+  bool takes_common_inputs() const override { return true; }
 
  private:
   // Of packs of so many lanes.

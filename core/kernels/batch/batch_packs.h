@@ -71,17 +71,21 @@ struct Packs {
 // Where a block is in the rows of all voices.
 template <class V>
 struct Rows {
+  using T = Scalar<V>;
+
   Rows(const Program& program, const BatchTable& table, const auto& block)
-      : value(reinterpret_cast<const V*>(block.value)),
-        velocity(reinterpret_cast<const V*>(block.velocity)),
+      : value(block.value),
+        velocity(block.velocity),
         outputs(reinterpret_cast<V*>(block.outputs)),
-        in(program.inputs.size() * table.packs),
+        is_common(block.is_common),
+        input(is_common ? 1 : table.packs * lanes_of<V>),
+        in(program.inputs.size() * input),
         out(program.outputs.size() * table.packs) {}
 
   Rows from(std::size_t pack) const {
     Rows rows = *this;
-    rows.value += pack;
-    rows.velocity += pack;
+    rows.value += is_common ? 0 : pack * lanes_of<V>;
+    rows.velocity += is_common ? 0 : pack * lanes_of<V>;
     rows.outputs += pack;
     return rows;
   }
@@ -90,10 +94,16 @@ struct Rows {
     velocity += in;
     outputs += out;
   }
+  // Of an input, at its first pack.
+  [[gnu::always_inline]] V take(const T* first, std::size_t pack) const {
+    return is_common ? *first - V{} : load<V>(first + pack * lanes_of<V>);
+  }
 
-  const V* value;
-  const V* velocity;
+  const T* value;
+  const T* velocity;
   V* outputs;
+  bool is_common;
+  std::size_t input;  // numbers of each
   std::size_t in;
   std::size_t out;
 };
@@ -136,24 +146,25 @@ void fill_slots(const BatchTable& table, const V* coefficients, const Packs<V>& 
 }
 
 template <class V>
-void take_positions(const Program& program, const Packs<V>& packs, const Rows<V>& rows) {
-  const V* value = rows.value;
-  const V* velocity = rows.velocity;
+[[gnu::always_inline]] inline void take_positions(const Program& program, const Packs<V>& packs,
+                                                  const Rows<V>& rows) {
+  const auto* value = rows.value;
+  const auto* velocity = rows.velocity;
   for (const InputSlot& input : program.inputs) {
     for (std::size_t pack = 0; pack < packs.count && !input.is_force; ++pack) {
       Node<V>& node = packs.nodes(pack)[input.node];
-      node.x = value[pack];
-      node.v = velocity[pack];
+      node.x = rows.take(value, pack);
+      node.v = rows.take(velocity, pack);
     }
-    value += packs.all;
-    velocity += packs.all;
+    value += rows.input;
+    velocity += rows.input;
   }
 }
 
 template <class V>
-void take_force(std::uint32_t node, const Packs<V>& packs, const V* value) {
+void take_force(const InputSlot& input, std::size_t i, const Packs<V>& packs, const Rows<V>& rows) {
   for (std::size_t pack = 0; pack < packs.count; ++pack) {
-    packs.nodes(pack)[node].force += value[pack];
+    packs.nodes(pack)[input.node].force += rows.take(rows.value + i * rows.input, pack);
   }
 }
 

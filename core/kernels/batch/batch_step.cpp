@@ -138,22 +138,22 @@ class Holder {
       : program_(program), batch_(batch), table_(table), packs_(packs) {
     each<N>([&](auto i) {
       anchor_[i] = batch.anchors[i].node;
-      pusher_[i] = table.pusher[i] * packs.all;
+      pusher_[i] = table.pusher[i];
     });
   }
 
-  void move(const V* value) const {
-    push_again(value);
-    pass<Half::move>(value);
+  void move(const Rows<V>& rows) const {
+    push_again(rows);
+    pass<Half::move>(rows);
   }
-  void exert() const {
+  void exert(const Rows<V>& rows) const {
     exert_links(batch_, table_, packs_);
-    pass<Half::exert>(nullptr);
+    pass<Half::exert>(rows);
   }
-  void exert_and_move(const V* value) const {
+  void exert_and_move(const Rows<V>& rows) const {
     exert_links(batch_, table_, packs_);
-    push_again(value);
-    pass<Half::exert_and_move>(value);
+    push_again(rows);
+    pass<Half::exert_and_move>(rows);
   }
 
   // All of `frames` of so many packs, which stay in registers: of masses that springs touch, and
@@ -178,8 +178,9 @@ class Holder {
         const V* const slot = packs_.slots + p * packs_.stride;
         each<N>([&](auto i) {
           if ((pushed & 1u << i) != 0) {
-            f[p][i] += rows.value[pusher_[i] + p];
-            __builtin_prefetch(rows.value + rows_ahead * rows.in + pusher_[i] + p);
+            const auto* const value = rows.value + pusher_[i] * rows.input;
+            f[p][i] += rows.take(value, p);
+            __builtin_prefetch(value + rows_ahead * rows.in + p * lanes_of<V>);
           }
           v[p][i] += f[p][i] * slot[is_alike ? 0 : i()];
           x[p][i] += v[p][i];
@@ -212,7 +213,7 @@ class Holder {
   static constexpr std::uint32_t pulls = anchors + 2 * N;
 
   template <Half half>
-  [[gnu::always_inline]] void pass(const V* value) const {
+  [[gnu::always_inline]] void pass(const Rows<V>& rows) const {
     const std::uint32_t touched = table_.touched;
     const std::uint32_t anchored = table_.anchored;
     const std::uint32_t linked = table_.linked;
@@ -242,7 +243,7 @@ class Holder {
       }
       each<N>([&](auto i) {
         if ((pushed & 1u << i) != 0) {
-          f[i] += value[pusher_[i] + pack];
+          f[i] += rows.take(rows.value + pusher_[i] * rows.input, pack);
         }
       });
       if (is_pulled) {
@@ -312,12 +313,12 @@ class Holder {
   }
 
   // The force inputs that are not the first on their mass.
-  void push_again(const V* value) const {
+  void push_again(const Rows<V>& rows) const {
     for (std::size_t i = 0; i < program_.inputs.size() && (table_.touched & table_.pushed) != 0;
          ++i) {
       const InputSlot& input = program_.inputs[i];
       if (input.is_force && input.node < N && table_.pusher[input.node] != i) {
-        take_force(input.node, packs_, value + i * packs_.all);
+        take_force(input, i, packs_, rows);
       }
     }
   }
@@ -400,7 +401,7 @@ void hold(const Program& program, const Batch& batch, const BatchTable& table,
       }
     }
     passive.remember();
-    holder.move(rows.value);
+    holder.move(rows);
     for (;;) {
       take_positions(program, packs, rows);
       passive.correct();
@@ -410,9 +411,9 @@ void hold(const Program& program, const Batch& batch, const BatchTable& table,
         break;
       }
       passive.remember();
-      holder.exert_and_move(rows.value);
+      holder.exert_and_move(rows);
     }
-    holder.exert();
+    holder.exert(rows);
   }
 }
 
@@ -467,7 +468,7 @@ void step_in_memory(const Program& program, const Batch&, const BatchTable& tabl
     }
     for (std::size_t i = 0; i < program.inputs.size(); ++i) {
       if (program.inputs[i].is_force) {
-        take_force(program.inputs[i].node, packs, rows.value + i * packs.all);
+        take_force(program.inputs[i], i, packs, rows);
       }
     }
     passive.remember();

@@ -335,6 +335,51 @@ TEST_CASE("audio moves the hand from where it is; in the bare network it is the 
   CHECK(quiet.out[0][99] == 0.5);
 }
 
+TEST_CASE("audio moves the hands of one voice of many as it moves those of one alone",
+          "[gesture]") {
+  // Two forces and a hand: all moved by sound, or not the last of them; at rest, or on its way.
+  const std::string text = scenes::triangle("0.1", "0.001") +
+                           "@in1 frcInput @m_m1\n@in2 frcInput @m_m2\n@in3 posInput 0.3\n"
+                           "@h springDamper @in3 @m_m0 0.01 0.001\n" +
+                           scenes::output(1, "m_m2");
+  std::vector<double> audio(3000);
+  const Motion motion(7, 1.0, 500.0);
+  for (std::size_t n = 0; n < audio.size(); ++n) {
+    audio[n] = 0.1 * motion(n);
+  }
+  const double* const channels[] = {audio.data(), audio.data() + 500, audio.data() + 1000};
+  for (const int moved : {2, 3}) {
+    Preset preset = default_preset(network_of(text), false);
+    preset.keyboard = false;
+    preset.controls.clear();
+    for (int i = 1; i <= moved; ++i) {
+      preset.controls.push_back({.source = ControlSource::audio,
+                                 .number = i,
+                                 .target = "in" + std::to_string(i),
+                                 .low = 0.0,
+                                 .high = i < 3 ? 0.01 : 0.5});
+    }
+    const std::vector<Event> events = {{.frame = 1000,
+                                        .kind = EventKind::gesture,
+                                        .gesture = Gesture::position,
+                                        .index = 3,
+                                        .value = 0.4}};
+    preset.voices = 1;
+    Player alone(text, preset, {.method = Method::direct});
+    preset.voices = 6;
+    Player among(text, preset, {.method = Method::batch});
+    alone.run(2000, events, {97, 64, 1}, channels);
+    among.run(2000, events, {97, 64, 1}, channels);
+    Comparison error;
+    for (std::size_t n = 0; n < alone.y().size(); ++n) {
+      error.add(alone.y()[n], among.y()[n]);
+    }
+    INFO(moved << ": " << show(error.relative()));
+    CHECK(peak(alone.y()) > 0.01);
+    CHECK(error.relative() < 1e-12);
+  }
+}
+
 TEST_CASE("controls of a round robin take turns from note to note", "[gesture]") {
   const std::string two = ringing_string() + "@in2 frcInput @s_m4\n";
   const auto strike = [](const char* input, double force, int turn, int turns) {

@@ -44,6 +44,9 @@ class Choir {
   Kernel<T>& of(std::size_t voice) { return *kernels_[voice / width_]; }
   std::size_t lane(std::size_t voice) const { return voice % width_; }
 
+  // From now on one row is for all voices, that of the first.
+  void play_as_one() { is_common_ = true; }
+
   // From now on nobody plays in the lanes of later voices.
   void play_only(std::size_t voices) { playing_ = voices; }
 
@@ -75,6 +78,7 @@ class Choir {
       of(first).step({.frames = frames,
                       .value = value_.data(),
                       .velocity = velocity_.data(),
+                      .is_common = is_common_,
                       .audio = nullptr,
                       .outputs = outputs_.data(),
                       .lanes = playing_ - std::min(playing_, first)});
@@ -90,7 +94,7 @@ class Choir {
 
  private:
   std::size_t place(std::size_t n, std::size_t i, std::size_t k, std::size_t count) const {
-    return (n * count + i) * width_ + k;
+    return is_common_ ? n * count + i : (n * count + i) * width_ + k;
   }
   template <class Use>
   void each_value(std::size_t frames, std::size_t count, Use&& use) const {
@@ -106,6 +110,7 @@ class Choir {
   Program program_;
   std::size_t voices_;
   std::size_t playing_ = std::numeric_limits<std::size_t>::max();
+  bool is_common_ = false;
   std::size_t width_ = 1;
   std::vector<std::unique_ptr<Kernel<T>>> kernels_;
   Aligned<T> value_;
@@ -330,6 +335,37 @@ TEST_CASE("a lane is put back, and the others play on", "[batch]") {
   const auto expected = other.play(64, 64, push);
   for (std::size_t i = 0; i < heard.size(); ++i) {
     CHECK(heard[i] == (i / 64 == 5 ? 0.0 : expected[i]));
+  }
+}
+
+TEST_CASE("one row for all voices is that row in each of them", "[batch]") {
+  std::vector<Program> programs;
+  for (const char* const name : {"PolyTriangle", "IPlayTheTriangle", "PhysicalLFO"}) {
+    programs.push_back(formed(example(name)));
+  }
+  for (std::uint64_t seed = 0; seed < 20; ++seed) {
+    programs.push_back(formed(random_body(seed, 2 + seed % 5)));
+  }
+  for (std::size_t i = 0; i < programs.size(); ++i) {
+    for (const Isa isa : isas()) {
+      for (const std::size_t voices : {3u, 20u, 68u}) {
+        Choir<double> choir(programs[i], voices, isa);
+        Choir<double> one(programs[i], voices, isa);
+        REQUIRE(one.of(0).takes_common_inputs());
+        one.play_as_one();
+        const auto hands = [](std::size_t n, std::size_t, std::size_t input) {
+          return 0.01 * std::sin(0.02 * static_cast<double>((input + 1) * n));
+        };
+        std::size_t at = 0;
+        for (const std::size_t frames : {64u, 64u, 5u, 64u}) {
+          CAPTURE(i, isa_name(isa), voices, at);
+          const auto expected = choir.play(at, frames, hands);
+          CHECK(one.play(at, frames, hands) == expected);
+          CHECK(std::any_of(expected.begin(), expected.end(), [](double y) { return y != 0.0; }));
+          at += frames;
+        }
+      }
+    }
   }
 }
 
