@@ -15,6 +15,7 @@
 #include "app/session/memory.h"
 #include "core/compile/compile.h"
 #include "core/model/language/expression.h"
+#include "core/model/topology.h"
 
 namespace ressort::commands {
 namespace {
@@ -26,6 +27,10 @@ constexpr double longest_ring_s = 60.0;  // after a MIDI file: by then it is sil
 constexpr double silent_for_s = 0.5;
 constexpr double silent_peak = 1e-4;  // -80 dBFS
 constexpr double longest_s = 24.0 * 3600.0;
+
+// A macro's node with all that is known of it until its kernel is made, and how many may be.
+constexpr std::uint64_t bytes_of_node = 600;
+constexpr std::uint64_t most_nodes = 1'000'000'000;
 
 struct ScoredEvent {
   int line = 0;
@@ -73,6 +78,16 @@ std::vector<Setting> reach_of(const std::vector<ScoreLine>& lines, const Network
     }
   }
   return reach;
+}
+
+// Whether a score strikes a macro's node, as in /mass/NAME:3/strike.
+bool strikes_nodes(const std::vector<ScoreLine>& lines) {
+  return std::any_of(lines.begin(), lines.end(), [](const ScoreLine& line) {
+    const std::string_view address = line.message.address;
+    const std::size_t at = address.find(':');
+    return address.starts_with("/mass/") && at != std::string_view::npos &&
+           address.find('.', at) == std::string_view::npos;
+  });
 }
 
 // The calls of a score as events; an error has the score's line. What a parameter could not take is
@@ -245,10 +260,13 @@ std::string to_score(const std::vector<PhraseNote>& notes) {
 
 Result<Rendered> render(const RenderOptions& options, const std::function<bool(double)>& progress) {
   // Keys play a model with its default preset; what is bare has none.
-  auto scene = load_scene(options.name, {.bare = options.midi.empty(),
-                                         .third = options.third,
-                                         .keys = options.keys,
-                                         .progress = options.loading});
+  auto scene = load_scene(
+      options.name,
+      {.bare = options.midi.empty(),
+       .third = options.third,
+       .keys = options.keys,
+       .most_nodes = std::clamp(free_memory_bytes() / bytes_of_node, max_macro_nodes, most_nodes),
+       .progress = options.loading});
   if (!scene) {
     return scene.error();
   }
@@ -287,6 +305,7 @@ Result<Rendered> render(const RenderOptions& options, const std::function<bool(d
                          .force = options.force,
                          .settings = options.parameters,
                          .reach = reach_of(*lines, scene->network),
+                         .strikes_nodes = strikes_nodes(*lines),
                          .progress = options.loading,
                          .most_bytes = free_memory_bytes()},
                         scene->warnings, options.is_strict);

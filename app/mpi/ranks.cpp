@@ -2,7 +2,6 @@
 
 #include <mpi.h>
 
-#include <algorithm>
 #include <cstdio>
 #include <cstdlib>
 
@@ -25,14 +24,10 @@ class Ranks::Post final : public Fellows {
   std::size_t own() const override { return own_; }
 
   void begin(std::span<const Parcel> parcels) override {
-    if (!knows_plan_) {
-      knows_plan_ = true;
-      compare(parcels);
-    }
-    int tag = 0;
     for (const Parcel& parcel : parcels) {
       const auto owner = static_cast<int>(parcel.owner);
       const auto size = static_cast<int>(parcel.size);
+      const auto tag = static_cast<int>(parcel.number);
       if (parcel.takers.empty()) {
         MPI_Ibcast(parcel.bytes, size, MPI_BYTE, owner, MPI_COMM_WORLD, &next());
       } else if (parcel.owner == own_) {
@@ -40,11 +35,9 @@ class Ranks::Post final : public Fellows {
           MPI_Isend(parcel.bytes, size, MPI_BYTE, static_cast<int>(taker), tag, MPI_COMM_WORLD,
                     &next());
         }
-      } else if (std::find(parcel.takers.begin(), parcel.takers.end(), own_) !=
-                 parcel.takers.end()) {
+      } else {
         MPI_Irecv(parcel.bytes, size, MPI_BYTE, owner, tag, MPI_COMM_WORLD, &next());
       }
-      ++tag;
     }
   }
 
@@ -59,27 +52,22 @@ class Ranks::Post final : public Fellows {
     return all != 0;
   }
 
- private:
-  MPI_Request& next() { return requests_.emplace_back(MPI_REQUEST_NULL); }
-
-  // Each process has found the plan by itself. Machines with other processors might find another.
-  void compare(std::span<const Parcel> parcels) const {
-    long hash = static_cast<long>(parcels.size());
-    for (const Parcel& parcel : parcels) {
-      hash = (31 * hash + static_cast<long>(parcel.size)) % 1'000'000'007L;
-    }
-    long both[] = {hash, -hash};
-    MPI_Allreduce(MPI_IN_PLACE, both, 2, MPI_LONG, MPI_MAX, MPI_COMM_WORLD);
-    if (both[0] != -both[1]) {
+  // Machines with other processors might find another plan.
+  void follow_first(std::span<std::uint32_t> numbers) override {
+    const std::uint32_t here = numbers[0];
+    MPI_Bcast(numbers.data(), static_cast<int>(numbers.size_bytes()), MPI_BYTE, 0, MPI_COMM_WORLD);
+    if (!all_agree(here == numbers[0])) {
       std::fprintf(stderr,
-                   "ressort-mpi: the machines divide the network in different ways; take machines "
-                   "with the same processors, or say --method direct\n");
+                   "ressort-mpi: the machines step the network in different ways; take machines "
+                   "with the same processors\n");
       MPI_Abort(MPI_COMM_WORLD, EXIT_FAILURE);
     }
   }
 
+ private:
+  MPI_Request& next() { return requests_.emplace_back(MPI_REQUEST_NULL); }
+
   const std::size_t own_ = own_number();
-  bool knows_plan_ = false;
   std::vector<MPI_Request> requests_;
 };
 

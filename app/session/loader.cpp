@@ -346,7 +346,8 @@ class SceneReader {
   }
 
   // Several files are one text, one behind the other.
-  bool read_model(const std::vector<std::string>& paths, const ReadOptions& options) {
+  bool read_model(const std::vector<std::string>& paths, ReadOptions options) {
+    options.most_nodes = options_.most_nodes;
     std::string text;
     int line = 1;
     for (const std::string& path : paths) {

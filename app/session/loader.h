@@ -67,6 +67,7 @@ struct SceneOptions {
   Reach reach = Reach::any_file;       // of the name, and of the preset's model
   KeyOptions keys = {};
   const std::vector<SceneFile>* files = nullptr;  // instead of those on the disk; by their paths
+  std::uint64_t most_nodes = max_macro_nodes;     // that a model's macros may have
   bool is_stop = false;                           // of a preset's morph, which has none itself
   Progress progress = {};                         // a reading that it stops fails with `stopped`
 };

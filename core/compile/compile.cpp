@@ -10,9 +10,11 @@
 #include "core/compile/accuracy/pitches.h"
 #include "core/compile/accuracy/waveguide_pitch.h"
 #include "core/compile/cull.h"
+#include "core/compile/excerpts.h"
 #include "core/compile/make_engine.h"
 #include "core/compile/merge.h"
 #include "core/compile/rest_bound.h"
+#include "core/kernels/domains/executor.h"
 #include "core/model/language/expression.h"
 #include "core/model/number_check.h"
 #include "core/model/preset/fit.h"
@@ -32,14 +34,38 @@ struct Request {
 };
 
 struct Reduced {
-  Network network;     // without macros
-  std::string merged;  // what was merged, in words; empty: nothing
-  double cents = 0.0;  // that partials are off for that, at most
+  Network network;                        // without macros
+  std::string merged;                     // what was merged, in words; empty: nothing
+  double cents = 0.0;                     // that partials are off for that, at most
+  std::optional<Excerpts> excerpts = {};  // of which `network` is the one that stands for all
 };
+
+// Unless something is asked for, the bare network is the published scheme to the bit.
+bool is_published(const Request& request) {
+  const CompileOptions& options = request.options;
+  return options.bare && (!options.method || *options.method == Method::direct) &&
+         !request.budget.is_physical() && request.budget.silence_db == -Budget::unlimited;
+}
+
+// Where only what is heard of it is asked for, it need not be there as a whole.
+std::optional<Excerpts> find_excerpts(const Request& request) {
+  const CompileOptions& options = request.options;
+  if (!is_published(request) || options.budget || options.executor == nullptr ||
+      options.executor->is_live() || options.strikes_nodes ||
+      options.precision == Precision::compensated32) {
+    return std::nullopt;
+  }
+  const auto start = start_values(asked_ranges(request.written, request.preset, options.bare),
+                                  options.settings, options.bare);
+  return Excerpts::of(request.written, start, request.rate_ratio);
+}
 
 // The bare network is computed as it is written, unless somebody says how far off it may be. O(n).
 Reduced reduce(const Request& request) {
   const CompileOptions& options = request.options;
+  if (auto excerpts = find_excerpts(request)) {
+    return {.network = excerpts->network(), .merged = {}, .excerpts = std::move(excerpts)};
+  }
   Network whole = expand_macros(request.written, options.progress);
   options.progress.spend(8 * whole.links.size());
   if (!options.bare || request.budget != Budget{}) {
@@ -162,28 +188,39 @@ double wanted_factor(const Request& request, const Analysis& analysis, bool has_
   return swing * swing / stiffness <= borne ? borne : angle * angle / stiffness;
 }
 
-// Unless something is asked for, the bare network is the published scheme to the bit.
-Planned find_forms(const Request& request, Machine machine, const Analysis& analysis,
-                   const Promise& promise) {
+Workload workload_of(const Request& request) {
   const CompileOptions& options = request.options;
-  const Budget& budget = request.budget;
-  const bool is_published = options.bare && !options.method && !budget.is_physical() &&
-                            budget.silence_db == -Budget::unlimited;
+  return {.is_double = options.precision == Precision::float64,
+          .is_compensated = options.precision == Precision::compensated32,
+          .isa = options.isa,
+          .voices = request.voices,
+          .is_untuned = options.bare,
+          .executor = options.executor};
+}
+
+// An excerpt's forms come with shards of the whole.
+Planned find_forms(const Request& request, const Reduced& reduced, Machine machine,
+                   const Analysis& analysis, const Promise& promise) {
+  const CompileOptions& options = request.options;
   const bool has_waveguides =
       std::any_of(machine.parts.begin(), machine.parts.end(),
                   [](const Program& program) { return !program.waveguides.empty(); });
   options.progress.stage("finding the fastest way to compute it");
-  return make_plan(std::move(machine),
-                   {.is_double = options.precision == Precision::float64,
-                    .is_compensated = options.precision == Precision::compensated32,
-                    .isa = options.isa,
-                    .voices = request.voices,
-                    .highest_factor = analysis.mode ? std::max(1.0, analysis.margins.keys) : 1.0,
-                    .wanted_factor = wanted_factor(request, analysis, has_waveguides),
-                    .is_untuned = options.bare,
-                    .executor = options.executor},
-                   is_published ? Method::direct : options.method, options.most_modes, budget,
-                   options.progress, promise);
+  Workload load = workload_of(request);
+  load.highest_factor = analysis.mode ? std::max(1.0, analysis.margins.keys) : 1.0;
+  load.wanted_factor = wanted_factor(request, analysis, has_waveguides);
+  if (reduced.excerpts) {
+    Program& program = machine.parts.front();
+    program.form = reduced.excerpts->share_out(program, load, options.rescale, options.progress);
+    Part part{.masses = reduced.excerpts->masses(),
+              .links = reduced.excerpts->links(),
+              .predicted_ns = predicted_ns(program, load),
+              .reason = description(program)};
+    return {std::move(machine), {std::move(part)}};
+  }
+  return make_plan(std::move(machine), load,
+                   is_published(request) ? Method::direct : options.method, options.most_modes,
+                   request.budget, options.progress, promise);
 }
 
 Pitches find_pitches(const Request& request, const Network& network, const Machine& machine,
@@ -394,15 +431,15 @@ Result<Compiled> compile_by_stages(const Request& request) {
   const std::optional<Mode> mode = shapes ? std::optional(shapes->mode) : std::nullopt;
   progress.stage("dividing it into parts");
   // The bare network is the published scheme, unless somebody asks.
-  const bool is_published = options.bare && !options.budget;
+  const bool is_as_published = options.bare && !options.budget;
   const Schemes schemes = choose_schemes(
-      network, is_published ? Budget{.passive = Passivity::never} : request.budget, progress);
+      network, is_as_published ? Budget{.passive = Passivity::never} : request.budget, progress);
   const Culled culled = cull(network, progress);
   Machine machine =
       tabulate(network, culled, schemes.links, values, options.rate_hz, options.rescale, progress);
   Analysis analysis = prove(request, reduced, machine, schemes, asked, start, mode);
   const Promise promise = make_promise(request, reduced, machine, analysis, start);
-  Planned planned = find_forms(request, std::move(machine), analysis, promise);
+  Planned planned = find_forms(request, reduced, std::move(machine), analysis, promise);
   std::vector<std::string> pitch_notes;
   if (shapes) {
     analysis.pitches =

@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <map>
 #include <string>
 #include <vector>
 
@@ -19,6 +20,7 @@ void join_places(const Network& network, Groups& groups, const Progress& progres
                  Meet&& meet) {
   std::vector<bool> is_joined(network.masses.size(), false);  // [first node] of a macro
   std::vector<std::uint32_t> first(network.waveguides.size(), no_argument);  // of their places
+  std::map<std::uint32_t, std::uint32_t> macros;                             // and of macros
   for (std::uint32_t i = 0; i < network.masses.size(); ++i) {
     if (network.masses[i].kind == MassKind::junction && counts(i)) {
       std::uint32_t& other = first[network.taps[network.masses[i].tap].macro];
@@ -30,8 +32,9 @@ void join_places(const Network& network, Groups& groups, const Progress& progres
     }
     const Tap& tap = network.taps[network.masses[i].tap];
     groups.join(i, tap.first);
-    progress.spend(is_joined[tap.first] ? 1 : tap.length * tap.width);
-    for (std::uint32_t k = 0; !is_joined[tap.first] && k < tap.length * tap.width; ++k) {
+    groups.join(i, macros.try_emplace(tap.macro, i).first->second);  // which are not all there
+    progress.spend(is_joined[tap.first] ? 1 : tap.count);
+    for (std::uint32_t k = 0; !is_joined[tap.first] && k < tap.count; ++k) {
       meet(tap.first + k);
       groups.join(i, tap.first + k);
     }

@@ -13,12 +13,6 @@ namespace {
 
 constexpr std::uint32_t nowhere = 0xffffffffu;
 
-// What of a network goes into one Program, in the network's order.
-struct Share {
-  std::vector<std::uint32_t> masses;
-  std::vector<std::uint32_t> links;
-};
-
 class ProgramMaker {
  public:
   ProgramMaker(const Network& network, const Share& share, double rate_hz, bool rescale,
@@ -28,6 +22,21 @@ class ProgramMaker {
     program_.rate_ratio = rate_ratio_of(rate_hz, rescale);
     program_.parameters = parameter_values(network);
     program_.depending.resize(network.parameters.size());
+  }
+
+  // Coefficients that come before all others.
+  void begin_with(std::span<const CoefficientKey> keys) {
+    for (const CoefficientKey& key : keys) {
+      coefficient(key.argument, key.unit, key.is_fixed);
+    }
+  }
+
+  std::vector<CoefficientKey> keys() const {
+    std::vector<CoefficientKey> keys(known_.size());
+    for (const auto& [key, coefficient] : known_) {
+      keys[coefficient] = key;
+    }
+    return keys;
   }
 
   Program make() {
@@ -67,7 +76,7 @@ class ProgramMaker {
   // One coefficient for every distinct pair of argument and unit.
   std::uint32_t coefficient(ArgumentId argument, Unit unit, bool is_fixed = false) {
     const auto next = static_cast<std::uint32_t>(program_.coefficients.size());
-    const auto [entry, is_new] = known_.try_emplace({argument, unit, is_fixed}, next);
+    const auto [entry, is_new] = known_.try_emplace(CoefficientKey{argument, unit, is_fixed}, next);
     return is_new ? add_coefficient(argument, unit, is_fixed) : entry->second;
   }
 
@@ -199,11 +208,11 @@ class ProgramMaker {
       const Tap& tap = network_.taps[network_.masses[i].tap];
       const auto next = static_cast<std::uint32_t>(program_.tap_nodes.size());
       const auto [entry, is_new] = known.try_emplace(tap.first, next);
-      for (std::uint32_t k = 0; is_new && k < tap.length * tap.width; ++k) {
+      for (std::uint32_t k = 0; is_new && k < tap.count; ++k) {
         program_.tap_nodes.push_back(node_[tap.first + k]);
       }
       program_.taps.push_back({.node = node_[i],
-                               .first = entry->second,
+                               .first = entry->second - tap.from,
                                .length = tap.length,
                                .width = tap.width,
                                .u = coefficient(tap.u, Unit::plain),
@@ -301,7 +310,7 @@ class ProgramMaker {
   std::span<const LinkScheme> schemes_;  // [link of the network]
   Program program_;
   std::vector<std::uint32_t> node_;  // [mass of the network] node, or nowhere
-  std::map<std::tuple<ArgumentId, Unit, bool>, std::uint32_t> known_;
+  std::map<CoefficientKey, std::uint32_t> known_;
 };
 
 // Divides what is left of a network without macros. What is held by a ground alone holds nothing
@@ -404,6 +413,18 @@ class Divider {
 
 }  // namespace
 
+std::vector<Share> divide(const Network& network, const Culled& culled, const Progress& progress) {
+  return Divider(network, culled, progress).divide();
+}
+
+Tabulated tabulate_part(const Network& network, const Share& share,
+                        std::span<const CoefficientKey> first, double rate_hz, bool rescale) {
+  ProgramMaker maker(network, share, rate_hz, rescale, {});
+  maker.begin_with(first);
+  Program program = maker.make();
+  return {std::move(program), maker.keys()};
+}
+
 Machine tabulate(const Network& network, const Culled& culled, std::span<const LinkScheme> schemes,
                  std::span<const double> start, double rate_hz, bool rescale,
                  const Progress& progress) {
@@ -417,7 +438,7 @@ Machine tabulate(const Network& network, const Culled& culled, std::span<const L
          .is_force = input.is_force,
          .position = input.is_force ? 0.0 : network.masses[input.mass].position});
   }
-  for (const Share& share : Divider(network, culled, progress).divide()) {
+  for (const Share& share : divide(network, culled, progress)) {
     progress.spend(16 * (share.masses.size() + share.links.size()));
     machine.parts.push_back(ProgramMaker(network, share, rate_hz, rescale, schemes).make());
   }

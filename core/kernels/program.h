@@ -91,7 +91,9 @@ struct AudioParameter {
 // between two of `places`, at each of which all of its modes, the nodes, have a weight.
 struct TapSlot {
   std::uint32_t node = 0;   // its own
-  std::uint32_t first = 0;  // of its nodes in Program::tap_nodes, row by row
+  // Its nodes in Program::tap_nodes from here on, row by row; where only those around it are there,
+  // from where the first one would be, modulo 2^32.
+  std::uint32_t first = 0;
   std::uint32_t length = 1;
   std::uint32_t width = 1;
   std::uint32_t u = 0;  // coefficients

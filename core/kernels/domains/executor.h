@@ -38,24 +38,29 @@ class Crew {
   virtual void run(std::span<const std::uint32_t> wanted) = 0;
 };
 
-// Other processes, each of which has one shard of a network and knows what all of them look like.
-// They call these functions in the same order. [any thread but audio]
+// Other processes, each of which has as many shards of a network as the others. They call these
+// functions in the same order. [any thread but audio]
 class Fellows {
  public:
-  // One array of one shard's, which lies here or comes from where it does.
+  // One array, which lies here or comes from where it does.
   struct Parcel {
-    std::size_t owner = 0;  // shard
+    std::uint32_t number = 0;  // by which those who get it know it
+    std::size_t owner = 0;     // process
     void* bytes = nullptr;
     std::size_t size = 0;
-    std::span<const std::size_t> takers;  // shards that want it; empty: all processes
+    std::span<const std::size_t> takers;  // processes that want it; empty: all of them
   };
 
   virtual ~Fellows() = default;
-  virtual std::size_t own() const = 0;  // shard of this process
-  // Begins to send and to take parcels, which nobody touches until finish() returns.
+  virtual std::size_t own() const = 0;  // number of this process
+  // Begins to send and to take parcels, which nobody touches until finish() returns. What is for
+  // all is begun by all in the same order.
   virtual void begin(std::span<const Parcel> parcels) = 0;
   virtual void finish() = 0;
   virtual bool all_agree(bool here) = 0;
+  // Puts the first process's numbers in the place of every other's. Where the first of them differ
+  // all processes end: they are not of one kind.
+  virtual void follow_first(std::span<std::uint32_t> numbers) = 0;
 };
 
 // Threads that help.

@@ -1,14 +1,33 @@
 #include "core/kernels/domains/sharded.h"
 
 #include <algorithm>
+#include <optional>
+
+#include "core/kernels/domains/sharded_form.h"
 
 namespace ressort::kernels {
 namespace {
+
+// Where a node of the whole is in a shard.
+std::optional<std::uint32_t> find(const Shard& shard, std::uint32_t node) {
+  const auto at = std::lower_bound(shard.nodes.begin(), shard.nodes.end(), node);
+  if (at == shard.nodes.end() || *at != node) {
+    return std::nullopt;
+  }
+  const auto i = static_cast<std::uint32_t>(at - shard.nodes.begin());
+  return shard.local.empty() ? i : shard.local[i];
+}
 
 // Rows of one table copied to other places in another; a row is a number for each lane.
 template <class T>
 void copy_row(const T* from, std::size_t from_row, T* to, std::size_t to_row, std::size_t width) {
   std::copy_n(from + from_row * width, width, to + to_row * width);
+}
+
+std::size_t process_of(const Shards& form, std::size_t shard) {
+  return form.executor->fellows() == nullptr
+             ? 0
+             : worker_of(shard, form.shards->size(), form.executor->size());
 }
 
 template <class T>
@@ -17,7 +36,7 @@ std::vector<std::unique_ptr<Kernel<T>>> kernels_of(const Shards& form, std::size
   const Fellows* const fellows = form.executor->fellows();
   std::vector<std::unique_ptr<Kernel<T>>> kernels;
   for (const Shard& shard : *form.shards) {
-    const bool is_here = fellows == nullptr || fellows->own() == kernels.size();
+    const bool is_here = fellows == nullptr || fellows->own() == process_of(form, kernels.size());
     kernels.push_back(is_here ? make_kernel<T>(shard.program, voices, isa) : nullptr);
   }
   return kernels;
@@ -44,48 +63,105 @@ ShardedKernel<T>::ShardedKernel(const Program& program, const Shards& form, Kern
       program_(program),
       shards_(*form.shards),
       frames_(form.frames),
+      is_excerpt_(form.is_excerpt),
       fellows_(form.executor->fellows()),
-      takers_(shards_.size()),
       kernels_(std::move(kernels)) {
-  const std::size_t width = this->width();
+  find_takers(form);
+  place_taps();
   std::vector<Task*> tasks;
   std::size_t most_nodes = 0;
   for (std::size_t i = 0; i < shards_.size(); ++i) {
-    const Shard& shard = shards_[i];
-    BlockBuffers<T> buffers;
-    buffers.value.resize(frames_ * shard.inputs.size() * width);
-    buffers.velocity.resize(buffers.value.size());
-    buffers.audio.resize(frames_ * program.audio_coefficients.size() * width);
-    buffers.outputs.resize(frames_ * shard.outputs.size() * width);
-    HaloBuffers<T> halo;
-    halo.copies = shard.copies;
-    halo.given = shard.given;
-    halo.given_x.resize(shard.given.size() * width);
-    halo.given_v.resize(halo.given_x.size());
-    halo.copied_x.resize(shard.copies.size() * width);
-    halo.copied_v.resize(halo.copied_x.size());
-    halo.coefficients.emplace_back(program, width);
     typename KernelTask<T>::Make make;
     if (form.executor->is_live()) {
-      make = [&] { return make_kernel<T>(shard.program, voices, isa); };
+      make = [&, i] { return make_kernel<T>(shards_[i].program, voices, isa); };
     }
     tasks_.push_back(
-        std::make_unique<KernelTask<T>>(kernels_[i], std::move(buffers), std::move(halo), make));
-    if (is_here(i)) {
-      all_.push_back(static_cast<std::uint32_t>(tasks.size()));
-      tasks.push_back(tasks_.back().get());
+        std::make_unique<KernelTask<T>>(kernels_[i], block_buffers(i), halo_buffers(i), make));
+    if (!is_here(i)) {
+      continue;
     }
-    for (const ShardSource& source : shard.sources) {
-      if (takers_[source.shard].empty() || takers_[source.shard].back() != i) {
-        takers_[source.shard].push_back(i);
-      }
-    }
-    most_nodes = std::max(most_nodes, shard.nodes.size());
+    const auto number = static_cast<std::uint32_t>(tasks.size());
+    (takers_[i].empty() ? inner_ : outer_).push_back(number);
+    tasks.push_back(tasks_.back().get());
+    most_nodes = std::max(most_nodes, shards_[i].nodes.size());
   }
-  parcels_.reserve(3 * shards_.size());
+  parcels_.reserve(2 * shards_.size());
   x_.resize(most_nodes);
   v_.resize(most_nodes);
   crew_ = form.executor->gather(std::move(tasks));
+}
+
+// Places stay where they are: in lanes that nobody plays, too, as shards have the nodes around
+// these places alone.
+template <class T>
+void ShardedKernel<T>::place_taps() {
+  for (const TapSlot& tap : program_.taps) {
+    for (const std::uint32_t c : {tap.u, tap.v}) {
+      const double value =
+          coefficient_value(program_, program_.coefficients[c], program_.parameters, 1.0);
+      for (std::size_t lane = 0; lane < this->width(); ++lane) {
+        this->coefficients.set(lane, c, value, false);
+      }
+    }
+  }
+}
+
+// Which other processes copy nodes of which shard.
+template <class T>
+void ShardedKernel<T>::find_takers(const Shards& form) {
+  takers_.resize(shards_.size());
+  for (std::size_t i = 0; i < shards_.size(); ++i) {
+    owners_.push_back(process_of(form, i));
+  }
+  for (std::size_t i = 0; i < shards_.size(); ++i) {
+    for (const ShardSource& source : shards_[i].sources) {
+      auto& takers = takers_[source.shard];
+      if (owners_[source.shard] != owners_[i] && (takers.empty() || takers.back() != owners_[i])) {
+        takers.push_back(owners_[i]);
+      }
+    }
+  }
+}
+
+// Of another process's shard only what is heard comes here.
+template <class T>
+BlockBuffers<T> ShardedKernel<T>::block_buffers(std::size_t i) const {
+  const Shard& shard = shards_[i];
+  const std::size_t width = this->width();
+  BlockBuffers<T> buffers;
+  buffers.outputs.resize(frames_ * shard.outputs.size() * width);
+  if (is_here(i)) {
+    buffers.value.resize(frames_ * shard.inputs.size() * width);
+    buffers.velocity.resize(buffers.value.size());
+    buffers.audio.resize(frames_ * program_.audio_coefficients.size() * width);
+  }
+  return buffers;
+}
+
+// And what it gives, where somebody here takes it.
+template <class T>
+HaloBuffers<T> ShardedKernel<T>::halo_buffers(std::size_t i) const {
+  const Shard& shard = shards_[i];
+  const std::size_t width = this->width();
+  HaloBuffers<T> halo;
+  if (is_here(i)) {
+    halo.copies = shard.copies;
+    halo.given = shard.given;
+    halo.copied_x.resize(shard.copies.size() * width);
+    halo.copied_v.resize(halo.copied_x.size());
+    halo.coefficients.emplace_back(program_, width);
+  }
+  if (is_here(i) || takes(i)) {
+    halo.given_x.resize(shard.given.size() * width);
+    halo.given_v.resize(halo.given_x.size());
+  }
+  return halo;
+}
+
+template <class T>
+bool ShardedKernel<T>::takes(std::size_t i) const {
+  return fellows_ != nullptr &&
+         std::find(takers_[i].begin(), takers_[i].end(), fellows_->own()) != takers_[i].end();
 }
 
 template <class T>
@@ -93,6 +169,10 @@ void ShardedKernel<T>::set_state(std::size_t lane, const double* x, const double
   write_copies();
   for (std::size_t i = 0; i < shards_.size(); ++i) {
     if (!is_here(i)) {
+      continue;
+    }
+    if (is_excerpt_) {
+      kernels_[i]->reset(lane);
       continue;
     }
     const std::vector<std::uint32_t>& nodes = shards_[i].nodes;
@@ -106,6 +186,9 @@ void ShardedKernel<T>::set_state(std::size_t lane, const double* x, const double
 
 template <class T>
 bool ShardedKernel<T>::save(std::size_t lane, double* x, double* v) const {
+  if (is_excerpt_) {
+    return false;
+  }
   write_copies();
   for (std::size_t i = 0; i < shards_.size(); ++i) {
     if (!is_here(i)) {
@@ -133,12 +216,9 @@ void ShardedKernel<T>::strike(std::size_t lane, std::span<const std::uint32_t> n
       continue;
     }
     kernels_[i]->coefficients = this->coefficients;  // a voice may be struck before its first step
-    const std::vector<std::uint32_t>& own = shards_[i].nodes;
     for (std::size_t k = 0; k < nodes.size(); ++k) {
-      const auto at = std::lower_bound(own.begin(), own.end(), nodes[k]);
-      if (at != own.end() && *at == nodes[k]) {
-        const auto local = static_cast<std::uint32_t>(at - own.begin());
-        kernels_[i]->strike(lane, {&local, 1}, changes.subspan(k, 1));
+      if (const auto local = find(shards_[i], nodes[k])) {
+        kernels_[i]->strike(lane, {&*local, 1}, changes.subspan(k, 1));
       }
     }
   }
@@ -161,11 +241,9 @@ std::size_t ShardedKernel<T>::look(std::size_t lane, std::span<const std::uint32
   return look_at(nodes, numbers, [&](std::uint32_t node) {
     double position = 0.0;
     for (std::size_t i = 0; i < shards_.size(); ++i) {
-      const std::vector<std::uint32_t>& own = shards_[i].nodes;
-      const auto at = std::lower_bound(own.begin(), own.end(), node);
-      if (is_here(i) && at != own.end() && *at == node) {
-        const auto local = static_cast<std::uint32_t>(at - own.begin());
-        kernels_[i]->look(lane, {&local, 1}, {&position, 1});
+      const auto local = is_here(i) ? find(shards_[i], node) : std::nullopt;
+      if (local) {
+        kernels_[i]->look(lane, {&*local, 1}, {&position, 1});
         break;
       }
     }
@@ -182,12 +260,14 @@ void ShardedKernel<T>::play(const Block<T>& block) {
         give_inputs(i, block, at, frames);
       }
     }
-    crew_->run(all_);
-    owes_copies_ = true;
-    if (fellows_ != nullptr) {
-      pass_on(block, at, frames);
-      continue;
+    // What other processes copy is on its way while the shards are stepped that they do not need.
+    if (!outer_.empty()) {
+      crew_->run(outer_);
     }
+    send_halos();
+    crew_->run(inner_);
+    owes_copies_ = true;
+    send_outputs(frames);
     for (std::size_t i = 0; i < shards_.size(); ++i) {
       take_outputs(i, block, at, frames);
     }
@@ -195,27 +275,38 @@ void ShardedKernel<T>::play(const Block<T>& block) {
   this->coefficients = first_of(kernels_).coefficients;
 }
 
-// What others copy is on its way while what is heard of this shard is put in its place.
 template <class T>
-void ShardedKernel<T>::pass_on(const Block<T>& block, std::size_t at, std::size_t frames) {
+void ShardedKernel<T>::send_halos() {
+  if (fellows_ == nullptr) {
+    return;
+  }
   parcels_.clear();
   for (std::size_t i = 0; i < shards_.size(); ++i) {
-    HaloBuffers<T>& halo = tasks_[i]->halo;
-    const auto add = [&](Aligned<T>& numbers, std::size_t count,
-                         std::span<const std::size_t> takers) {
-      if (count > 0) {
-        parcels_.push_back({i, numbers.data(), count * sizeof(T), takers});
-      }
-    };
-    add(halo.given_x, takers_[i].empty() ? 0 : halo.given_x.size(), takers_[i]);
-    add(halo.given_v, takers_[i].empty() ? 0 : halo.given_v.size(), takers_[i]);
-    add(tasks_[i]->buffers.outputs, frames * shards_[i].outputs.size() * this->width(), {});
+    if (takers_[i].empty() || !(is_here(i) || takes(i))) {
+      continue;
+    }
+    auto number = static_cast<std::uint32_t>(2 * i);
+    for (Aligned<T>* const numbers : {&tasks_[i]->halo.given_x, &tasks_[i]->halo.given_v}) {
+      parcels_.push_back(
+          {number++, owners_[i], numbers->data(), numbers->size() * sizeof(T), takers_[i]});
+    }
+  }
+  fellows_->begin(parcels_);
+}
+
+template <class T>
+void ShardedKernel<T>::send_outputs(std::size_t frames) {
+  if (fellows_ == nullptr) {
+    return;
+  }
+  parcels_.clear();
+  for (std::size_t i = 0; i < shards_.size(); ++i) {
+    if (const std::size_t count = frames * shards_[i].outputs.size() * this->width(); count > 0) {
+      parcels_.push_back({0, owners_[i], tasks_[i]->buffers.outputs.data(), count * sizeof(T), {}});
+    }
   }
   fellows_->begin(parcels_);
   fellows_->finish();
-  for (std::size_t i = 0; i < shards_.size(); ++i) {
-    take_outputs(i, block, at, frames);
-  }
 }
 
 template <class T>

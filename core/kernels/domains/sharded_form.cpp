@@ -1,7 +1,11 @@
 #include "core/kernels/domains/sharded_form.h"
 
 #include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numeric>
 
+#include "core/kernels/domains/executor.h"
 #include "core/kernels/domains/sharded.h"
 #include "core/kernels/registry.h"
 
@@ -11,28 +15,71 @@ double exchange_ns(std::size_t copies) {
   return 3000.0 + copy_ns * static_cast<double>(copies);
 }
 
-// Of the slowest shard, and what it waits; on one core of all, and what it takes to come back to
-// each.
-double predicted_ns(const Program&, const Shards& form, const Workload& load) {
-  if (form.executor->size() == 1) {
-    double sum = 0.0;
-    for (const Shard& shard : *form.shards) {
-      sum += (1.0 + return_share / form.frames) * predicted_ns(shard.program, load) +
-             copy_ns * static_cast<double>(shard.copies.size()) / form.frames;
+std::size_t shards_in_cache(std::size_t nodes, const Workload& load, std::size_t most) {
+  constexpr double shard_bytes = 1024.0 * 1024.0;
+  constexpr double least_bytes = 4.0 * shard_bytes;
+  const std::size_t workers = load.executor != nullptr ? load.executor->size() : 1;
+  const double bytes =
+      4.0 * bytes_of_number(load) * static_cast<double>(nodes) / static_cast<double>(workers);
+  if ((workers > 1 && load.executor->is_live()) || bytes < least_bytes) {
+    return 1;
+  }
+  const auto wanted = static_cast<std::size_t>(std::ceil(bytes / shard_bytes));
+  return workers * std::clamp<std::size_t>(most / workers, 1, wanted);
+}
+
+namespace {
+
+// What shards take that worker for worker come one after the other: `own(shard)` of one, but for
+// what all of them wait for.
+template <class Own>
+double slowest_worker_ns(std::size_t shards, std::size_t workers, double frames, Own&& own) {
+  std::vector<double> sums(workers);
+  for (std::size_t i = 0; i < shards; ++i) {
+    sums[worker_of(i, shards, workers)] += own(i);
+  }
+  return *std::max_element(sums.begin(), sums.end()) +
+         (workers > 1 ? exchange_ns(0) / frames : 0.0);
+}
+
+}  // namespace
+
+Meeting best_meeting(std::span<const std::vector<std::size_t>> at_level, double ns_per_node,
+                     std::size_t workers) {
+  const double first_share = at_level.size() > workers ? return_share : 1.0;
+  Meeting best{.ns = std::numeric_limits<double>::infinity()};
+  for (std::uint32_t frames = 4; frames <= max_block_frames; frames *= 2) {
+    const double ns = slowest_worker_ns(at_level.size(), workers, frames, [&](std::size_t i) {
+      const auto end = at_level[i].begin() + frames + spare_levels + 1;
+      const auto nodes = std::accumulate(at_level[i].begin(), end, std::size_t{0});
+      return ns_per_node * static_cast<double>(nodes) * (1.0 + first_share / frames) +
+             copy_ns * static_cast<double>(nodes - at_level[i][0]) / frames;
+    });
+    if (ns < best.ns) {
+      best = {frames, ns};
     }
-    return sum;
   }
-  double slowest = 0.0;
-  for (const Shard& shard : *form.shards) {
-    slowest = std::max(slowest, predicted_ns(shard.program, load) +
-                                    exchange_ns(shard.copies.size()) / form.frames);
-  }
-  return slowest;
+  return best;
+}
+
+// Of the slowest worker; with several shards to each also what it takes to come back to them.
+double predicted_ns(const Program&, const Shards& form, const Workload& load) {
+  const std::vector<Shard>& shards = *form.shards;
+  const std::size_t workers = std::min(form.executor->size(), shards.size());
+  const double first_share = shards.size() > workers ? return_share : 0.0;
+  return slowest_worker_ns(shards.size(), workers, form.frames, [&](std::size_t i) {
+    return (1.0 + first_share / form.frames) * predicted_ns(shards[i].program, load) +
+           copy_ns * static_cast<double>(shards[i].copies.size()) / form.frames;
+  });
 }
 
 std::string description(const Program&, const Shards& form) {
-  return "in " + std::to_string(form.shards->size()) +
-         (form.executor->size() > 1 ? " shards at once" : " shards one after the other") +
+  const std::size_t workers = form.executor->size();
+  const std::size_t shards = form.shards->size();
+  return "in " + std::to_string(shards) +
+         (workers == 1       ? " shards one after the other"
+          : workers < shards ? " shards, " + std::to_string(workers) + " at once"
+                             : " shards at once") +
          ", which meet every " + count_of(form.frames, "sample", "samples");
 }
 

@@ -1,10 +1,19 @@
 // core/kernels: what shards cost that wait for each other.
 #pragma once
 
+#include <span>
+#include <vector>
+
 #include "core/kernels/estimates.h"
+#include "core/kernels/kernel.h"
 #include "core/kernels/program.h"
 
 namespace ressort::kernels {
+
+// So many links farther than samples: the last sample's forces are heard, too, and those at a point
+// are those at the nodes around it, of which the shard owns one.
+inline constexpr std::uint32_t spare_levels = 2;
+inline constexpr std::uint32_t most_levels = max_block_frames + spare_levels;
 
 // Nanoseconds that shards wait for each other once, and one of them for its copies.
 double exchange_ns(std::size_t copies);
@@ -13,6 +22,26 @@ double exchange_ns(std::size_t copies);
 // than any other.
 inline constexpr double return_share = 1.5;
 inline constexpr double copy_ns = 7.0;  // of a node's
+
+// Shards are dealt out to threads or processes in a row, as many to each.
+inline std::size_t worker_of(std::size_t shard, std::size_t shards, std::size_t workers) {
+  return shard * workers / shards;
+}
+
+// How many shards of a network of so many nodes stay in the second cache, each while it is
+// stepped: as many for each worker, and no more than `most` in all; 1 where the network is too
+// small for that, or where helpers work live.
+std::size_t shards_in_cache(std::size_t nodes, const Workload& load, std::size_t most);
+
+// After how many samples shards had best meet, and what a sample of the slowest worker takes then.
+// Farther from each other they wait less often, and have more in common to compute. `at_level`:
+// [shard][level to most_levels] nodes that are so many links away from its own, which are at 0.
+struct Meeting {
+  std::uint32_t frames = 0;
+  double ns = 0.0;
+};
+Meeting best_meeting(std::span<const std::vector<std::size_t>> at_level, double ns_per_node,
+                     std::size_t workers);
 
 // What the registry's row of it asks, of one voice in bytes.
 double predicted_ns(const Program& program, const Shards& form, const Workload& load);

@@ -6,6 +6,7 @@
 #include <numeric>
 
 #include "core/kernels/chains/chains_form.h"
+#include "core/kernels/domains/halos.h"
 #include "core/kernels/domains/one_by_one.h"
 #include "core/kernels/domains/sharded_form.h"
 #include "core/kernels/grid/grid_form.h"
@@ -15,13 +16,21 @@
 namespace ressort::kernels {
 namespace {
 
-constexpr std::uint32_t none = 0xffffffffu;
-// So many links farther than samples: the last sample's forces are heard, too, and those at a point
-// are those at the nodes around it, of which the shard owns one.
-constexpr std::uint32_t spare_levels = 2;
-constexpr std::uint32_t most_levels = max_block_frames + spare_levels;
 constexpr double least_shared_ns = 700.0;  // below, shards would wait more than compute
+constexpr std::size_t most_shards = 32;    // each looks at all nodes once
 constexpr double least_gain = 1.2;         // below, a core is better left to somebody else
+
+// Calls use(place in tap_nodes) for the nodes around a point, in single precision and in double.
+template <class Use>
+void each_corner_of(const Program& program, const TapSlot& tap, Use&& use) {
+  const auto value = [&](std::uint32_t c) {
+    return coefficient_value(program, program.coefficients[c], program.parameters, 1.0);
+  };
+  const auto add = [&](std::uint32_t at, auto) { use(at); };
+  each_corner(corners_at(tap, value(tap.u), value(tap.v)), add);
+  each_corner(corners_at(tap, static_cast<float>(value(tap.u)), static_cast<float>(value(tap.v))),
+              add);
+}
 
 // The nodes around every point, in single precision or in double; nothing where one may wander.
 std::optional<std::vector<std::vector<std::uint32_t>>> corners_of(const Program& program) {
@@ -37,13 +46,7 @@ std::optional<std::vector<std::vector<std::uint32_t>>> corners_of(const Program&
       return std::nullopt;
     }
     auto& nodes = corners.emplace_back();
-    const auto add = [&](std::uint32_t node, auto) { nodes.push_back(program.tap_nodes[node]); };
-    const auto value = [&](std::uint32_t c) {
-      return coefficient_value(program, program.coefficients[c], program.parameters, 1.0);
-    };
-    each_corner(corners_at(tap, value(tap.u), value(tap.v)), add);
-    each_corner(corners_at(tap, static_cast<float>(value(tap.u)), static_cast<float>(value(tap.v))),
-                add);
+    each_corner_of(program, tap, [&](std::uint32_t at) { nodes.push_back(program.tap_nodes[at]); });
     std::sort(nodes.begin(), nodes.end());
     nodes.erase(std::unique(nodes.begin(), nodes.end()), nodes.end());
   }
@@ -52,7 +55,7 @@ std::optional<std::vector<std::vector<std::uint32_t>>> corners_of(const Program&
 
 // Who owns which node, and how many nodes are so many links away from a shard's own.
 struct Division {
-  std::vector<std::uint32_t> owner;                // [node] shard; none: it binds nobody
+  std::vector<std::uint32_t> owner;                // [node] shard; nobody: it binds nobody
   std::vector<std::vector<std::size_t>> at_level;  // [shard][level], its own are at level 0
 };
 
@@ -61,7 +64,7 @@ class Divider {
   Divider(const Program& program, std::vector<std::vector<std::uint32_t>> corners)
       : program_(program),
         corners_(std::move(corners)),
-        first_point_(program.taps.empty() ? none : program.taps[0].node),
+        first_point_(program.taps.empty() ? nobody : program.taps[0].node),
         binds_(program.position.size(), false),
         is_tied_(program.position.size(), false),
         first_(program.position.size() + 1, 0) {
@@ -79,7 +82,7 @@ class Divider {
   // Along the order in which the nodes are written, or breadth first from the first one.
   Division divide(std::size_t count, bool is_breadth_first) const {
     std::vector<std::uint32_t> order = is_breadth_first ? breadth_first() : as_written();
-    Division division{.owner = std::vector<std::uint32_t>(binds_.size(), none), .at_level = {}};
+    Division division{.owner = std::vector<std::uint32_t>(binds_.size(), nobody), .at_level = {}};
     for (std::size_t i = 0; i < order.size(); ++i) {
       division.owner[order[i]] = static_cast<std::uint32_t>(i * count / order.size());
     }
@@ -94,7 +97,7 @@ class Divider {
       find_levels(division.owner, shard, level);
       auto& at_level = division.at_level.emplace_back(most_levels + 1);
       for (const std::uint32_t here : level) {
-        if (here != none) {
+        if (here != nobody) {
           ++at_level[here];
         }
       }
@@ -103,35 +106,23 @@ class Divider {
   }
 
   std::vector<Shard> make(const Division& division, std::uint32_t frames) const {
-    const std::size_t count = division.at_level.size();
-    std::vector<Shard> shards(count);
-    std::vector<std::uint32_t> place(binds_.size(), none);  // [node] in its owner's `given`
-    for (std::uint32_t s = 0; s < count; ++s) {
+    std::vector<Shard> shards(division.at_level.size());
+    for (std::uint32_t s = 0; s < shards.size(); ++s) {
       make_program(division.owner, s, frames, shards[s]);
     }
-    for (std::uint32_t s = 0; s < count; ++s) {
-      for (std::uint32_t i = 0; i < shards[s].nodes.size(); ++i) {
-        const std::uint32_t node = shards[s].nodes[i];
-        const std::uint32_t owner = division.owner[node];
-        if (owner == s || owner == none) {
-          continue;
-        }
-        if (place[node] == none) {
-          place[node] = static_cast<std::uint32_t>(shards[owner].given.size());
-          const auto& nodes = shards[owner].nodes;
-          const auto there = std::lower_bound(nodes.begin(), nodes.end(), node);
-          shards[owner].given.push_back(static_cast<std::uint32_t>(there - nodes.begin()));
-        }
-        shards[s].copies.push_back(i);
-        auto& sources = shards[s].sources;
-        if (sources.empty() || sources.back().shard != owner ||
-            sources.back().first + sources.back().count != place[node]) {
-          sources.push_back({owner, place[node], 0});
-        }
-        ++sources.back().count;
-      }
-    }
+    join_halos(shards, [&](std::uint32_t node) { return division.owner[node]; });
     return shards;
+  }
+
+  // One of them, of nodes whose owners are known but for what binds nobody.
+  Shard make_one(std::vector<std::uint32_t> owner, std::uint32_t shard,
+                 std::uint32_t frames) const {
+    for (std::uint32_t node = 0; node < owner.size(); ++node) {
+      owner[node] = binds_[node] ? owner[node] : nobody;
+    }
+    Shard made;
+    make_program(owner, shard, frames, made);
+    return made;
   }
 
  private:
@@ -217,10 +208,10 @@ class Divider {
     return order;
   }
 
-  // level[node]: how many links it is away from the shard's own; none: farther than needed.
+  // level[node]: how many links it is away from the shard's own; nobody: farther than needed.
   void find_levels(const std::vector<std::uint32_t>& owner, std::uint32_t shard,
                    std::vector<std::uint32_t>& level) const {
-    level.assign(owner.size(), none);
+    level.assign(owner.size(), nobody);
     std::vector<std::uint32_t> now;
     std::vector<std::uint32_t> next;
     for (std::uint32_t node = 0; node < owner.size(); ++node) {
@@ -232,7 +223,7 @@ class Divider {
     for (std::uint32_t reached = 1; reached <= most_levels; ++reached) {
       for (const std::uint32_t node : now) {
         each_neighbour(node, [&](std::uint32_t neighbour) {
-          if (level[neighbour] == none) {
+          if (level[neighbour] == nobody) {
             level[neighbour] = reached;
             next.push_back(neighbour);
           }
@@ -295,7 +286,7 @@ class Divider {
     program.steps = program_.steps;
     program.coefficients = program_.coefficients;
     program.depending = program_.depending;
-    std::vector<std::uint32_t> local(is_here.size(), none);
+    std::vector<std::uint32_t> local(is_here.size(), nobody);
     for (std::uint32_t node = 0; node < is_here.size(); ++node) {
       if (is_here[node]) {
         local[node] = static_cast<std::uint32_t>(shard.nodes.size());
@@ -317,7 +308,7 @@ class Divider {
     }
     for (std::uint32_t i = 0; i < program_.outputs.size(); ++i) {
       OutputSlot output = program_.outputs[i];
-      if (owner[output.node] == s || (s == 0 && owner[output.node] == none)) {
+      if (owner[output.node] == s || (s == 0 && owner[output.node] == nobody)) {
         output.node = local[output.node];
         program.outputs.push_back(output);
         shard.outputs.push_back(i);
@@ -330,7 +321,7 @@ class Divider {
     for (MassRun run : program_.mass_runs) {
       const auto begin = local.begin() + run.first;
       const auto end = begin + run.count;
-      const auto is_here = [](std::uint32_t node) { return node != none; };
+      const auto is_here = [](std::uint32_t node) { return node != nobody; };
       run.count = static_cast<std::uint32_t>(std::count_if(begin, end, is_here));
       if (run.count > 0) {
         run.first = *std::find_if(begin, end, is_here);
@@ -341,7 +332,7 @@ class Divider {
       const auto first = static_cast<std::uint32_t>(program.ends.size());
       for (std::uint32_t link = run.first; link < run.first + run.count; ++link) {
         const auto [a, b] = program_.ends[link];
-        if (local[a] != none && local[b] != none && (binds_[a] || binds_[b])) {
+        if (local[a] != nobody && local[b] != nobody && (binds_[a] || binds_[b])) {
           program.ends.push_back({local[a], local[b]});
         }
       }
@@ -353,20 +344,33 @@ class Divider {
     }
   }
 
-  // Points stay where they are, so that of a macro's nodes only those around them are looked at.
+  // Points stay where they are, so that of a macro's nodes only those around them are kept.
   void take_taps(const std::vector<std::uint32_t>& local, Program& program) const {
     for (TapSlot tap : program_.taps) {
-      if (local[tap.node] != none) {
-        tap.node = local[tap.node];
-        program.taps.push_back(tap);
+      if (local[tap.node] == nobody) {
+        continue;
       }
+      tap.node = local[tap.node];
+      const auto [first, end] = nodes_around(tap);
+      const auto kept = static_cast<std::uint32_t>(program.tap_nodes.size());
+      for (std::uint32_t i = first; i != end; ++i) {
+        const std::uint32_t node = local[program_.tap_nodes[i]];
+        program.tap_nodes.push_back(node != nobody ? node : 0);
+      }
+      tap.first += kept - first;
+      program.taps.push_back(tap);
     }
-    if (program.taps.empty()) {
-      return;
-    }
-    for (const std::uint32_t node : program_.tap_nodes) {
-      program.tap_nodes.push_back(local[node] != none ? local[node] : 0);
-    }
+  }
+
+  // Of tap_nodes, in either precision.
+  std::pair<std::uint32_t, std::uint32_t> nodes_around(const TapSlot& tap) const {
+    std::uint32_t first = nobody;
+    std::uint32_t last = 0;
+    each_corner_of(program_, tap, [&](std::uint32_t at) {
+      first = std::min(first, at);
+      last = std::max(last, at);
+    });
+    return {first, last + 1};
   }
 
   const Program& program_;
@@ -377,35 +381,6 @@ class Divider {
   std::vector<std::size_t> first_;         // [node] of neighbours_
   std::vector<std::uint32_t> neighbours_;  // who feels whom after one sample
 };
-
-// A way to divide, and what it should cost.
-struct Choice {
-  Division division;
-  std::uint32_t frames = 0;
-  double ns = 0.0;  // a sample
-};
-
-// Farther from each other shards wait less often, and have more in common to compute.
-void choose_frames(Division division, double ns_per_node, Choice& best) {
-  std::uint32_t best_frames = 0;
-  for (std::uint32_t frames = 4; frames <= max_block_frames; frames *= 2) {
-    double slowest = 0.0;
-    for (const auto& at_level : division.at_level) {
-      const auto end = at_level.begin() + frames + spare_levels + 1;
-      const auto nodes = std::accumulate(at_level.begin(), end, std::size_t{0});
-      const double alone = ns_per_node * static_cast<double>(nodes);
-      slowest = std::max(slowest, alone + (alone + exchange_ns(nodes - at_level[0])) / frames);
-    }
-    if (best.frames + best_frames == 0 || slowest < best.ns) {
-      best.ns = slowest;
-      best_frames = frames;
-    }
-  }
-  if (best_frames > 0) {
-    best.division = std::move(division);
-    best.frames = best_frames;
-  }
-}
 
 struct Reformer {
   Program& program;
@@ -439,25 +414,23 @@ std::vector<Shard> reformed(std::vector<Shard> shards, const Form& form) {
   return shards;
 }
 
-// Which takes least on one core.
-std::uint32_t frames_for_one(const Division& division, double ns_per_node) {
-  std::uint32_t best = 4;
-  double least_ns = std::numeric_limits<double>::infinity();
-  for (std::uint32_t frames = 4; frames <= max_block_frames; frames *= 2) {
-    double ns = 0.0;
-    for (const auto& at_level : division.at_level) {
-      const auto end = at_level.begin() + frames + spare_levels + 1;
-      const auto nodes = std::accumulate(at_level.begin(), end, std::size_t{0});
-      ns += ns_per_node * static_cast<double>(nodes) * (1.0 + return_share / frames) +
-            copy_ns * static_cast<double>(nodes - at_level[0]) / frames;
-    }
-    if (ns < least_ns) {
-      least_ns = ns;
-      best = frames;
-    }
+// A way to divide.
+struct Way {
+  std::size_t count = 1;  // shards
+  bool is_breadth_first = false;
+  std::uint32_t frames = 0;
+
+  // Those of the first of several processes.
+  void follow_first(Fellows& fellows, std::size_t form) {
+    std::uint32_t numbers[] = {static_cast<std::uint32_t>(form), static_cast<std::uint32_t>(count),
+                               is_breadth_first ? 1u : 0u, frames};
+    fellows.follow_first(numbers);
+    count = numbers[1];
+    is_breadth_first = numbers[2] != 0;
+    frames = numbers[3];
   }
-  return best;
-}
+  bool operator==(const Way&) const = default;
+};
 
 // One thread's, which all that it plays may share.
 Executor* own_thread() {
@@ -465,37 +438,14 @@ Executor* own_thread() {
   return &thread;
 }
 
-std::optional<Shards> share_over_time(const Program& program, const Workload& load,
-                                      const Progress& progress) {
-  constexpr double shard_bytes = 1024.0 * 1024.0;
-  constexpr double least_bytes = 4.0 * shard_bytes;
-  constexpr double most_shards = 32.0;  // each looks at all nodes once
-  const double whole_ns = predicted_ns(program, load);
-  const double bytes = 4.0 * bytes_of_number(load) * program.moving;
-  if (!is_plain(program) || !program.waveguides.empty() || bytes < least_bytes) {
-    return std::nullopt;
-  }
-  auto corners = corners_of(program);
-  if (!corners) {
-    return std::nullopt;
-  }
-  const Divider divider(program, *std::move(corners));
-  const auto count =
-      static_cast<std::size_t>(std::min(most_shards, std::ceil(bytes / shard_bytes)));
-  progress.spend(4 * count * program.position.size());
-  const Division division = divider.divide(count, false);
-  const std::uint32_t frames = frames_for_one(division, whole_ns / program.moving);
+std::optional<Shards> made(const Program& program, const Divider& divider, const Division& division,
+                           std::uint32_t frames, Executor* executor) {
   auto shards = reformed(divider.make(division, frames), program.form);
-  progress.spend(64 * program.ends.size());
-  if (shards.empty()) {
-    return std::nullopt;
-  }
-  Shards found{.shards = std::make_shared<std::vector<Shard>>(std::move(shards)),
-               .executor = own_thread(),
-               .frames = frames};
-  return predicted_ns(program, found, load) * least_gain < whole_ns
-             ? std::optional(std::move(found))
-             : std::nullopt;
+  return shards.empty() ? std::nullopt
+                        : std::optional(Shards{
+                              .shards = std::make_shared<std::vector<Shard>>(std::move(shards)),
+                              .executor = executor,
+                              .frames = frames});
 }
 
 }  // namespace
@@ -509,13 +459,28 @@ std::vector<Shard> make_shards(const Program& program, std::size_t count, std::u
   return divider.make(divider.divide(count, false), frames);
 }
 
+Executor* executor_of(const Workload& load) {
+  return load.executor != nullptr && load.executor->size() > 1 ? load.executor : own_thread();
+}
+
+std::optional<Shard> make_shard(const Program& program, std::vector<std::uint32_t> owner,
+                                std::uint32_t shard, std::uint32_t frames) {
+  auto corners = corners_of(program);
+  if (!corners) {
+    return std::nullopt;
+  }
+  return Divider(program, *std::move(corners)).make_one(std::move(owner), shard, frames);
+}
+
 std::optional<Shards> share_out(const Program& program, const Workload& load,
                                 const Progress& progress) {
-  if (load.executor == nullptr || load.executor->size() < 2) {
-    return share_over_time(program, load, progress);
-  }
+  Executor* const executor = executor_of(load);
+  const std::size_t workers = executor->size();
+  Fellows* const fellows = executor->fellows();
   const double whole_ns = predicted_ns(program, load);
-  if (!is_plain(program) || !program.waveguides.empty() || whole_ns < least_shared_ns) {
+  const std::size_t many = shards_in_cache(program.moving, load, most_shards);
+  const bool is_small = many == 1 && (workers == 1 || whole_ns < least_shared_ns);
+  if (!is_plain(program) || !program.waveguides.empty() || (is_small && fellows == nullptr)) {
     return std::nullopt;
   }
   auto corners = corners_of(program);
@@ -523,31 +488,61 @@ std::optional<Shards> share_out(const Program& program, const Workload& load,
     return std::nullopt;
   }
   const Divider divider(program, *std::move(corners));
+  std::vector<std::size_t> counts = {many};
+  // Every process has a shard, or all of it.
+  for (std::size_t count = workers; many == 1 && count > 1 && (count == workers || !fellows);
+       count /= 2) {
+    counts.push_back(count);
+  }
   std::optional<Shards> best;
+  Way best_way;
   double best_ns = whole_ns / least_gain;
   // As it is written first: rows that are alike stay so.
   for (const bool is_breadth_first : {false, true}) {
-    Choice choice;
-    // Every process has a shard, or all of it.
-    const std::size_t least = load.executor->fellows() != nullptr ? load.executor->size() : 2;
-    for (std::size_t count = load.executor->size(); count >= least; count /= 2) {
+    if (is_small || (is_breadth_first && many > 1)) {
+      continue;
+    }
+    Way way{.count = 1, .is_breadth_first = is_breadth_first};
+    Division division;
+    double least_ns = std::numeric_limits<double>::infinity();
+    for (const std::size_t count : counts) {
+      if (count == 1) {
+        continue;
+      }
       progress.spend(4 * count * program.position.size());
-      choose_frames(divider.divide(count, is_breadth_first), whole_ns / program.moving, choice);
+      Division tried = divider.divide(count, is_breadth_first);
+      const auto [frames, ns] =
+          best_meeting(tried.at_level, whole_ns / program.moving, std::min(workers, count));
+      if (ns < least_ns) {
+        least_ns = ns;
+        way.count = count;
+        way.frames = frames;
+        division = std::move(tried);
+      }
     }
-    if (choice.ns >= best_ns) {
+    if (least_ns >= best_ns && many == 1) {
       continue;
     }
-    auto shards = reformed(divider.make(choice.division, choice.frames), program.form);
+    auto found = made(program, divider, division, way.frames, executor);
     progress.spend(64 * program.ends.size());
-    if (shards.empty()) {
+    if (!found) {
       continue;
     }
-    Shards found{.shards = std::make_shared<std::vector<Shard>>(std::move(shards)),
-                 .executor = load.executor,
-                 .frames = choice.frames};
-    if (const double ns = predicted_ns(program, found, load); ns < best_ns) {
+    if (const double ns = predicted_ns(program, *found, load); ns < best_ns) {
       best_ns = ns;
       best = std::move(found);
+      best_way = way;
+    }
+  }
+  if (fellows != nullptr) {
+    const Way own = best_way;
+    best_way.follow_first(*fellows, program.form.index());
+    if (best_way.count == 1) {
+      return std::nullopt;
+    }
+    if (best_way != own) {
+      best = made(program, divider, divider.divide(best_way.count, best_way.is_breadth_first),
+                  best_way.frames, executor);
     }
   }
   return best;

@@ -1,7 +1,9 @@
 // core/kernels: divides a large Program among several cores.
 #pragma once
 
+#include <cstdint>
 #include <optional>
+#include <vector>
 
 #include "core/kernels/domains/sharded.h"
 #include "core/kernels/estimates.h"
@@ -13,11 +15,21 @@ namespace ressort::kernels {
 // direct form; nothing where a point wanders over a macro, as it may be anywhere. O(nodes + links).
 std::vector<Shard> make_shards(const Program& program, std::size_t count, std::uint32_t frames);
 
+// One of them, in the direct form: of a Program of which only what is near enough to the shard's
+// own nodes is there. `owner`: [node] shard, or nobody. What it copies is left open; nothing where
+// a point wanders. [any thread but audio]
+std::optional<Shard> make_shard(const Program& program, std::vector<std::uint32_t> owner,
+                                std::uint32_t shard, std::uint32_t frames);
+
 // Shards in the Program's own form for load.executor, if they are predicted to pay: of direct,
-// chains or grid, where a sample takes several microseconds. On one core, where the whole does not
-// fit into the second cache: each shard does, and goes on there for several samples before the next
-// one's turn. O(nodes + links), and what the form takes. [any thread but audio]
+// chains or grid, where a sample takes several microseconds. Where what a thread or process has
+// would not fit into the second cache, it has several shards: each does, and goes on there for
+// several samples before the next one's turn. Processes do as the first of them.
+// O(nodes + links), and what the form takes. [any thread but audio]
 std::optional<Shards> share_out(const Program& program, const Workload& load,
                                 const Progress& progress = {});
+
+// The own thread where a workload has no executor, or one of a single thread.
+Executor* executor_of(const Workload& load);
 
 }  // namespace ressort::kernels

@@ -27,10 +27,10 @@ void Reader::add_macro(const Line& line) {
   macro.length = size(line, at++, macro.kind == MacroKind::stiff_string ? 3 : 2);
   macro.width = is_mesh(macro.kind) ? size(line, at++, 2) : 1;
   nodes_ += node_count(macro);
-  if (nodes_ > max_macro_nodes) {
+  if (nodes_ > most_nodes_) {
     macro.length = macro.width = 2;
     error(line, line.rest[0],
-          "the macros have more than " + std::to_string(max_macro_nodes) + " nodes together");
+          "the macros have more than " + std::to_string(most_nodes_) + " nodes together");
   }
   macro.mass = argument(line, at);
   check_mass(line, at++, macro.mass);
@@ -141,10 +141,9 @@ void Reader::add_mode(const Line& line) {
                      (body.places.size() == 1 ? " place (" : " places (") + places +
                      "), so a mode has as many displacements; found " + std::to_string(given));
   }
-  if (++nodes_ > max_macro_nodes) {
-    return error(
-        line, line.label,
-        "the macros have more than " + std::to_string(max_macro_nodes) + " nodes together");
+  if (++nodes_ > most_nodes_) {
+    return error(line, line.label,
+                 "the macros have more than " + std::to_string(most_nodes_) + " nodes together");
   }
   BodyMode mode{.name = std::string(line.label.text), .macro = *index};
   mode.location = {line.number, line.label.column};
@@ -200,10 +199,10 @@ std::uint32_t Reader::size(const Line& line, std::size_t at, std::uint32_t least
   std::uint64_t number = 0;
   const char* const end = text.data() + text.size();
   const auto [last, failure] = std::from_chars(text.data(), end, number);
-  if (failure != std::errc{} || last != end || number < least || number > max_macro_nodes) {
+  if (failure != std::errc{} || last != end || number < least || number > most_nodes_) {
     error(line, line.rest[at],
           "found " + quoted(text) + " where a number of nodes from " + std::to_string(least) +
-              " to " + std::to_string(max_macro_nodes) + " was expected");
+              " to " + std::to_string(most_nodes_) + " was expected");
     return least;
   }
   return static_cast<std::uint32_t>(number);

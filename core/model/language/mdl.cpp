@@ -34,6 +34,7 @@ ParsedNetwork Reader::read(std::string_view text, const ReadOptions& options) {
     return std::move(out_);
   }
   const Progress& progress = options.progress;
+  most_nodes_ = options.most_nodes;
   progress.stage("reading it");
   text_ = text;
   int number = 0;

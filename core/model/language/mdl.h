@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "core/model/network.h"
+#include "core/model/topology.h"
 #include "core/progress.h"
 
 namespace ressort::model {
@@ -27,6 +28,7 @@ struct ReadOptions {
   // What the third state argument means, whatever the text says or shows.
   std::optional<ThirdArgument> third;
   std::string_view third_by = "was asked for";  // how ParsedNetwork::motion says who chose it
+  std::uint64_t most_nodes = max_macro_nodes;   // of all macros; no more than a billion
   Progress progress = {};  // of what it stops, the only diagnostic is `stopped`, without a line
 };
 

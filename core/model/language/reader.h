@@ -184,6 +184,7 @@ class Reader {
   std::vector<std::string> parameter_names_;
   std::vector<const Keyword*> macro_keywords_;                  // [macro]
   std::vector<std::uint32_t> resting_;                          // macros without a velocity
+  std::uint64_t most_nodes_ = max_macro_nodes;                  // of all macros
   std::uint64_t nodes_ = 0;                                     // of all macros
   std::unordered_map<std::string_view, ArgumentId> arguments_;  // text -> index
   std::vector<std::string_view> group_names_ = {""};            // of all display blocks
