@@ -10,7 +10,7 @@
 #include "core/compile/accuracy/pitches.h"
 #include "core/compile/accuracy/waveguide_pitch.h"
 #include "core/compile/cull.h"
-#include "core/compile/excerpts.h"
+#include "core/compile/large/excerpts.h"
 #include "core/compile/make_engine.h"
 #include "core/compile/merge.h"
 #include "core/compile/rest_bound.h"

@@ -1,15 +1,15 @@
 // Networks whose macros are never written out at once: the same bits as those that are.
-#include "core/compile/excerpts.h"
+#include "core/compile/large/excerpts.h"
 
 #include "app/realtime/denormals.h"
 #include "core/kernels/domains/one_by_one.h"
 #include "core/kernels/domains/sharded.h"
 #include "tests/support/player.h"
 
-using namespace ressort;
-using namespace ressort::support;
-
+namespace ressort {
 namespace {
+
+using namespace support;
 
 // Who has a part of the machine in one place, and in a test plays as several.
 class Workers final : public Executor {
@@ -100,3 +100,5 @@ TEST_CASE("what is not alike everywhere is written out", "[excerpts]") {
   CHECK(is_excerpted(string + "@m mass 1. 0. 0.\n@l spring @m [@s 0.3] 0.1\n"));
   CHECK_FALSE(is_excerpted("@s string 100000 1. 1.001 0. 0. 0.\n@out1 posOutput [@s 0.5]\n"));
 }
+
+}  // namespace ressort

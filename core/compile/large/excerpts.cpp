@@ -1,4 +1,4 @@
-#include "core/compile/excerpts.h"
+#include "core/compile/large/excerpts.h"
 
 #include <algorithm>
 #include <limits>
