@@ -275,8 +275,11 @@ TEST_CASE("what is taken over goes on as if nobody had helped", "[helpers]") {
         alone.value[i] = task.buffers.value[i] = hand;
         alone.velocity[i] = task.buffers.velocity[i] = 0.0;
       }
-      expected->step({task.frames, alone.value.data(), alone.velocity.data(), alone.audio.data(),
-                      alone.outputs.data()});
+      expected->step({.frames = task.frames,
+                      .value = alone.value.data(),
+                      .velocity = alone.velocity.data(),
+                      .audio = alone.audio.data(),
+                      .outputs = alone.outputs.data()});
       const std::size_t way = random.below(4);
       if (lent > 0) {
         task.perform();
