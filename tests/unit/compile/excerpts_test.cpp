@@ -36,7 +36,7 @@ std::string scene() {
          "@s string 120000 1. k 0.001 0.0001 0. 0.\n"
          "@t stiffString 30000 1.5 0.1 0.05 0.001 0. 0.\n"
          "@m cornerMesh 250 200 2. 0.1 0.002 0. 0.\n"
-         "@w mass 3. 0.01 0.\n@o osc 2. 0.01 0.001 0. 0.\n"
+         "@w mass 3. 0.01 0.\n@o osc 2. 0.01 0.001 0.1 0.\n"
          "@ws springDamper @w [@s 0.5] 0.1 0.001\n@wt springDamper @w [@t 0.31] 0.07 0.\n"
          "@tm springDamper [@t 0.7] [@m 0.499 0.52] 0.03 0.001\n"
          "@os springDamper @o [@s 0.00002] 0.05 0.\n@og springDamper @o @g 0.02 0.\n"
