@@ -342,6 +342,13 @@ def slides(program, browser):
         browser.key("ArrowRight", "ArrowRight")
     check(eventually(lambda: program.parameter("mesh_Z") > start * 1.01),
           "a slider of the page turns the parameter")
+
+    # The page sends what was turned when it gets to it: all of it is to be there before another turns.
+    def has_settled():
+        before = program.parameter("mesh_Z")
+        time.sleep(0.5)
+        return program.parameter("mesh_Z") == before
+    eventually(has_settled)
     program.osc("/param/mesh_Z", 0.03)
     check(browser.eventually(
         "document.querySelector('label[for=\"p-mesh_Z\"] + output').textContent === '0.03'"),
