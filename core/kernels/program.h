@@ -90,7 +90,7 @@ struct AudioParameter {
 // position is interpolated, and what acts on it acts on the nodes around it. On a body it is
 // between two of `places`, at each of which all of its modes, the nodes, have a weight.
 struct TapSlot {
-  std::uint32_t node = 0;   // its own
+  std::uint32_t node = 0;  // its own
   // Its nodes in Program::tap_nodes from here on, row by row; where only those around it are there,
   // from where the first one would be, modulo 2^32.
   std::uint32_t first = 0;
