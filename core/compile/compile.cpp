@@ -64,7 +64,9 @@ std::optional<Excerpts> find_excerpts(const Request& request) {
 Reduced reduce(const Request& request) {
   const CompileOptions& options = request.options;
   if (auto excerpts = find_excerpts(request)) {
-    return {.network = excerpts->network(), .merged = {}, .excerpts = std::move(excerpts)};
+    Reduced reduced{.network = excerpts->network(), .merged = {}};
+    reduced.excerpts = std::move(excerpts);
+    return reduced;
   }
   Network whole = expand_macros(request.written, options.progress);
   options.progress.spend(8 * whole.links.size());

@@ -91,7 +91,7 @@ Ranges ranges_for_all(const Network& network) {
   for (std::size_t i = 0; i < ranges.size(); ++i) {
     const Macro& macro = network.macros[i];
     const std::uint64_t least =
-        std::max<std::uint64_t>(excerpt_nodes, 2 * rows_around * std::uint64_t{macro.width});
+        std::max<std::uint64_t>(excerpt_nodes, std::uint64_t{2} * rows_around * macro.width);
     if (ranges[i].empty()) {
       ranges[i].push_back({});
     }
