@@ -13,6 +13,9 @@
 #include "core/sampled_mode.h"
 
 namespace ressort::kernels {
+
+using namespace linear_algebra;
+
 namespace {
 
 constexpr double zero_tolerance = 1e-13;  // of the largest: is it anything?
