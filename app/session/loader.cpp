@@ -173,6 +173,12 @@ class SceneReader {
     return false;
   }
 
+  void warn(Finding finding) {
+    finding.diagnostic.severity = Severity::warning;
+    scene_.warnings.push_back(to_string(finding));
+    out_.findings.push_back(std::move(finding));
+  }
+
   bool read_preset() {
     auto text = files_.read(scene_.path, max_preset_bytes);
     if (!text) {
@@ -216,6 +222,12 @@ class SceneReader {
     const std::vector<Error> unfit = misfits(scene_.network, scene_.preset);
     for (const Error& error : unfit) {
       fail(scene_.path, *text, error);
+    }
+    if (scene_.preset.controls.empty() && !scene_.network.inputs.empty()) {
+      const SourceLocation at = scene_.preset.model_location;
+      warn(finding_of(scene_.path, *text,
+                      {"no [[control]] follows, so neither keys nor sound play this model", at.line,
+                       at.column}));
     }
     return read.errors.empty() && unfit.empty();
   }

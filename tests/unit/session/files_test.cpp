@@ -335,6 +335,16 @@ TEST_CASE("a preset reads several models as one, and says in which a mistake is"
   REQUIRE(scene);
   CHECK(scene->network.macros.size() == 2);
   CHECK(scene->network.links.size() == 1);
+  REQUIRE(scene->warnings.size() == 1);
+  CHECK(has(scene->warnings[0],
+            "both.toml:1:9: warning: no [[control]] follows, so neither keys nor sound"));
+  const auto played = load_scene(
+      folder.write("played.toml",
+                   "model = \"string.mdl\"\nwith = [\"box.mdl\"]\n[[control]]\nfrom = \"note\"\n"
+                   "to = \"in1\"\nhow = \"impulse\"\nrange = [1.0, 1.0]\n"),
+      {});
+  REQUIRE(played);
+  CHECK(played->warnings.empty());
   folder.write("box.mdl", box + "@tie spring [@s 0.9] [@box brigde] 0.05\n");
   const auto broken = load_scene(preset, {});
   CHECK(has(error_of(broken), "box.mdl:3:28: error: the body '@box' has no place called 'brigde'"));
