@@ -198,7 +198,7 @@ core/engine/engine.cpp:1:#include <atomic>
 core/engine/engine.cpp:1:#include <jack/jack.h>
 core/compile/compile.cpp:1:#include <Spectra/SymEigsSolver.h>
 core/compile/compile.cpp:1:#include <chrono>
-core/compile/compile.cpp:1:#include "tests/support/scenes.h"
+core/compile/compile.cpp:1:#include "tests/support/networks/scenes.h"
 core/laws/laws.h:1:#include LAWS
 core/laws/spring.h:1:#include "core/model/network.h"
 core/laws/laws.h:1:#include "core/kernels/program.h"

@@ -3,7 +3,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "tests/support/scenes.h"
+#include "tests/support/networks/scenes.h"
 
 namespace ressort::bench {
 namespace {

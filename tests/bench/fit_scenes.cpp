@@ -2,7 +2,7 @@
 #include <numbers>
 
 #include "tests/bench/bench_scenes.h"
-#include "tests/support/scenes.h"
+#include "tests/support/networks/scenes.h"
 
 namespace ressort::bench {
 namespace {

@@ -5,7 +5,7 @@
 
 #include "core/analysis/linear.h"
 #include "core/compile/accuracy/pitches.h"
-#include "tests/support/reference_network.h"
+#include "tests/support/networks/reference_network.h"
 
 namespace ressort::bench {
 namespace {

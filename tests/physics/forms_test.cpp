@@ -10,8 +10,8 @@
 #include "core/kernels/modal/modal_form.h"
 #include "tests/support/agreement.h"
 #include "tests/support/comparison.h"
-#include "tests/support/random_network.h"
-#include "tests/support/reference_network.h"
+#include "tests/support/networks/random_network.h"
+#include "tests/support/networks/reference_network.h"
 
 namespace ressort {
 namespace {

@@ -2,8 +2,8 @@
 // not the model has such an input.
 #include <set>
 
+#include "tests/support/networks/random_network.h"
 #include "tests/support/player.h"
-#include "tests/support/random_network.h"
 
 namespace ressort {
 namespace {

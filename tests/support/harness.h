@@ -15,9 +15,9 @@
 #include "core/kernels/kernel.h"
 #include "core/model/language/mdl.h"
 #include "tests/support/catch.h"
+#include "tests/support/networks/scenes.h"
 #include "tests/support/random.h"
 #include "tests/support/rooms.h"
-#include "tests/support/scenes.h"
 
 namespace ressort::support {
 

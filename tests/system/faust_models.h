@@ -5,7 +5,7 @@
 #include <utility>
 #include <vector>
 
-#include "tests/support/scenes.h"
+#include "tests/support/networks/scenes.h"
 
 namespace ressort::scenes {
 

@@ -30,8 +30,8 @@
 #include "app/realtime/process.h"
 #include "app/session/session.h"
 #include "core/model/language/mdl.h"
+#include "tests/support/networks/random_network.h"
 #include "tests/support/random.h"
-#include "tests/support/random_network.h"
 #include "tests/system/every_control.h"
 
 namespace {

@@ -11,8 +11,8 @@
 #include "core/model/language/expression.h"
 #include "core/sampled_mode.h"
 #include "tests/support/dense.h"
+#include "tests/support/networks/reference_network.h"
 #include "tests/support/passive.h"
-#include "tests/support/reference_network.h"
 
 namespace ressort {
 namespace {

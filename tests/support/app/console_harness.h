@@ -13,8 +13,8 @@
 #include "app/control/console.h"
 #include "tests/support/app/data_folder.h"
 #include "tests/support/catch.h"
+#include "tests/support/networks/scenes.h"
 #include "tests/support/rooms.h"
-#include "tests/support/scenes.h"
 
 namespace ressort {
 

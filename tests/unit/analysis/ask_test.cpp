@@ -10,8 +10,8 @@
 #include "core/analysis/timbre/envelope.h"
 #include "core/analysis/timbre/frame_analysis.h"
 #include "tests/support/harness.h"
+#include "tests/support/networks/reference_network.h"
 #include "tests/support/random.h"
-#include "tests/support/reference_network.h"
 
 namespace ressort {
 namespace {

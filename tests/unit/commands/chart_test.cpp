@@ -11,7 +11,7 @@
 #include "core/model/language/mdl.h"
 #include "tests/support/catch.h"
 #include "tests/support/harness.h"
-#include "tests/support/reference_network.h"
+#include "tests/support/networks/reference_network.h"
 
 namespace ressort {
 namespace {

@@ -4,8 +4,8 @@
 #include "core/compile/merge.h"
 #include "core/model/topology.h"
 #include "tests/support/comparison.h"
+#include "tests/support/networks/random_network.h"
 #include "tests/support/player.h"
-#include "tests/support/random_network.h"
 
 namespace ressort {
 namespace {

@@ -2,8 +2,8 @@
 #include "core/engine/energy.h"
 
 #include "core/compile/plan.h"
+#include "tests/support/networks/random_network.h"
 #include "tests/support/player.h"
-#include "tests/support/random_network.h"
 
 namespace ressort {
 namespace {

@@ -2,9 +2,9 @@
 // compile_network().
 #include "core/engine/engine.h"
 
+#include "tests/support/networks/reference_network.h"
 #include "tests/support/pitch.h"
 #include "tests/support/player.h"
-#include "tests/support/reference_network.h"
 
 namespace ressort {
 namespace {

@@ -1,8 +1,8 @@
 // Hands: what moves an input, by the closed forms of each gesture; alone and through the engine.
 #include "core/gesture.h"
 
+#include "tests/support/networks/reference_network.h"
 #include "tests/support/player.h"
-#include "tests/support/reference_network.h"
 
 namespace ressort {
 namespace {

@@ -3,8 +3,8 @@
 
 #include "core/laws/laws.h"
 #include "tests/support/harness.h"
+#include "tests/support/networks/reference_network.h"
 #include "tests/support/passive.h"
-#include "tests/support/reference_network.h"
 
 namespace ressort {
 namespace {

@@ -3,7 +3,7 @@
 #include "core/kernels/modal/modal.h"
 #include "core/kernels/modal/modal_form.h"
 #include "tests/support/comparison.h"
-#include "tests/support/random_network.h"
+#include "tests/support/networks/random_network.h"
 
 namespace ressort {
 namespace {

@@ -10,7 +10,7 @@
 #include "core/model/language/tokens.h"
 #include "core/model/topology.h"
 #include "tests/support/harness.h"
-#include "tests/support/reference_network.h"
+#include "tests/support/networks/reference_network.h"
 
 namespace ressort {
 namespace {

@@ -9,7 +9,7 @@
 #include "core/compile/compile.h"
 #include "tests/support/catch.h"
 #include "tests/support/harness.h"
-#include "tests/support/scenes.h"
+#include "tests/support/networks/scenes.h"
 
 using namespace ressort;
 

@@ -4,7 +4,7 @@
 
 #include "core/laws/laws.h"
 #include "core/model/network.h"
-#include "tests/support/reference.h"
+#include "tests/support/networks/reference.h"
 #include "tests/support/rooms.h"
 
 namespace ressort::reference {
