@@ -335,7 +335,9 @@ TEST_CASE("a session warns of a plan that is too much, and tells of an overload"
   // Too many masses for modes, and a law in every link: 256 of them are some seconds a second.
   std::ofstream(folder / "m.mdl") << "@s string 1500 1. 0.1 0.0001 0. 0.\n"
                                      "@in1 frcInput [@s 0.3]\n@out1 posOutput [@s 0.6]\n";
-  std::ofstream(folder / "m.toml") << "model = \"m.mdl\"\nvoices = 256\n";
+  std::ofstream(folder / "m.toml")
+      << "model = \"m.mdl\"\nvoices = 256\n[[control]]\nfrom = \"note\"\nto = \"in1\"\n"
+         "how = \"impulse\"\nrange = [1.0, 1.0]\n";
   Process process(48000.0);
   std::mutex mutex;
   std::string told;
