@@ -9,4 +9,4 @@ compiler=aarch64-linux-gnu-g++
 command -v $compiler >/dev/null || exit 77
 printf '%s\n' $(find core/kernels core/engine -name "*.cpp") |
   xargs -P 2 -I FILE $compiler -std=c++20 -fsyntax-only -Wall -Wextra -Wconversion \
-    -Wno-missing-field-initializers -Wno-psabi -Werror -DRESSORT_ISA=base -DRESSORT_X86_LEVELS=0 -I. FILE
+    -Wno-missing-field-initializers -Wno-psabi -Werror -DRESSORT_ISA=base -I. FILE

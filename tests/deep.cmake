@@ -6,7 +6,7 @@ set(ressort_fuzzers model preset score midi smf scala console osc osc_packet fli
 list(TRANSFORM ressort_fuzzers PREPEND fuzz_ OUTPUT_VARIABLE ressort_deep_tests)
 list(APPEND ressort_deep_tests arm everything_sanitized everything_more forms_everywhere
   accuracy_everywhere silence_everywhere modes_everywhere calculix_everywhere bodies_everywhere
-  bells_everywhere heard_pitch_everywhere lint scenes_more abuse_long bows settings_more edits_more
+  bells_everywhere heard_pitch_everywhere bench lint scenes_more abuse_long bows settings_more edits_more
   flights_everywhere server_killed installed mpi soak)
 list(LENGTH ressort_deep_tests ressort_deep_count)
 
@@ -90,6 +90,10 @@ add_deep_test(bows 60 $<TARGET_FILE:ressort_voicing> --bows 8 Violin Cello Doubl
 # Random settings of all controls of each preset, and a note at each; RESSORT_SETTINGS asks for more.
 add_deep_test(settings_more 600 sh -c
   "exec $<TARGET_FILE:ressort_voicing> --random \${RESSORT_SETTINGS:-200}")
+
+# That the benchmark still runs: no time is asserted. Only tests/run --deep builds it.
+add_custom_target(ressort_deep DEPENDS ressort_bench)
+add_deep_test(bench 15 ${CMAKE_CURRENT_SOURCE_DIR}/bench/check $<TARGET_FILE:ressort_bench>)
 
 # A minute of it for each instrument.
 add_deep_test(abuse_long 300 $<TARGET_FILE:ressort_abuse> 60 2)

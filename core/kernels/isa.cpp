@@ -2,19 +2,25 @@
 
 namespace ressort::kernels {
 
-Isa best_isa() {
-#if RESSORT_X86_LEVELS
-  if (__builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512bw") &&
-      __builtin_cpu_supports("avx512cd") && __builtin_cpu_supports("avx512dq") &&
-      __builtin_cpu_supports("avx512vl")) {
-    return Isa::v4;
-  }
-  if (__builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma") &&
-      __builtin_cpu_supports("bmi2")) {
-    return Isa::v3;
+bool has_isa(Isa isa) {
+#ifdef RESSORT_HAS_v4
+  if (isa == Isa::v4) {
+    return __builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512bw") &&
+           __builtin_cpu_supports("avx512cd") && __builtin_cpu_supports("avx512dq") &&
+           __builtin_cpu_supports("avx512vl");
   }
 #endif
-  return Isa::RESSORT_LEAST_ISA;
+#ifdef RESSORT_HAS_v3
+  if (isa == Isa::v3) {
+    return __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma") &&
+           __builtin_cpu_supports("bmi2");
+  }
+#endif
+  return isa == Isa::RESSORT_LEAST_ISA;
+}
+
+Isa best_isa() {
+  return has_isa(Isa::v4) ? Isa::v4 : has_isa(Isa::v3) ? Isa::v3 : Isa::RESSORT_LEAST_ISA;
 }
 
 #if defined(__x86_64__)

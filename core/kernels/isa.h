@@ -10,7 +10,7 @@
 
 namespace ressort::kernels {
 
-// What the build offers: RESSORT_LEAST_ISA, and with RESSORT_X86_LEVELS=1 all that are wider.
+// What the build offers: RESSORT_LEAST_ISA, and wider ones with RESSORT_HAS_v3 and RESSORT_HAS_v4.
 #ifndef RESSORT_LEAST_ISA
 #define RESSORT_LEAST_ISA base
 #endif
@@ -26,7 +26,8 @@ constexpr std::size_t vector_bytes(Isa isa) {
   return isa == Isa::v4 ? 64 : isa == Isa::v3 ? 32 : 16;
 }
 
-Isa best_isa();  // of this machine and this build. [any thread]
+bool has_isa(Isa isa);  // this machine and this build. [any thread]
+Isa best_isa();         // the widest that they have. [any thread]
 std::string_view isa_name(Isa isa);
 
 // Of the packs that this machine works on whole. [any thread]
@@ -36,13 +37,16 @@ std::size_t whole_pack_bytes(Isa isa);
 // use, and compilers do not always clear those on the way out. [audio]
 void clear_wide_registers();
 
-// What `make.operator()<Isa>()` gives, called with the instruction set. [any thread]
+// What `make.operator()<Isa>()` gives, called with the instruction set, if the build has it.
+// [any thread]
 template <class Make>
 auto with_isa(Isa isa, const Make& make) {
-#if RESSORT_X86_LEVELS
+#ifdef RESSORT_HAS_v4
   if (isa == Isa::v4) {
     return make.template operator()<Isa::v4>();
   }
+#endif
+#ifdef RESSORT_HAS_v3
   if (isa == Isa::v3) {
     return make.template operator()<Isa::v3>();
   }

@@ -5,7 +5,7 @@
 
 #include "core/lanes.h"
 
-#if RESSORT_X86_LEVELS
+#ifdef __x86_64__
 #define RESSORT_TARGET(levels) __attribute__((target(levels)))
 #else
 #define RESSORT_TARGET(levels)

@@ -60,7 +60,7 @@ std::optional<Isa> isa_of(const std::string& name) {
   constexpr std::array<std::pair<const char*, Isa>, 3> all{
       {{"base", Isa::base}, {"v3", Isa::v3}, {"v4", Isa::v4}}};
   for (const auto& [known, isa] : all) {
-    if (known == name && isa <= best_isa()) {
+    if (known == name && has_isa(isa)) {
       return isa;
     }
   }

@@ -39,11 +39,11 @@ inline Program program_of(const std::string& text) {
   return make_program(network_of(text), Network::reference_rate_hz, true);
 }
 
-// All that this machine has.
+// All that this machine and this build have.
 inline std::vector<Isa> isas() {
-  std::vector<Isa> all = {Isa::base};
-  for (const Isa isa : {Isa::v3, Isa::v4}) {
-    if (isa <= best_isa()) {
+  std::vector<Isa> all;
+  for (const Isa isa : {Isa::base, Isa::v3, Isa::v4}) {
+    if (has_isa(isa)) {
       all.push_back(isa);
     }
   }

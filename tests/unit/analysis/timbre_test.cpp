@@ -21,7 +21,7 @@ using namespace ressort::support;
 namespace {
 
 constexpr auto magnitude = SpectrumKind::magnitude;
-constexpr auto power = SpectrumKind::power;
+constexpr auto of_power = SpectrumKind::power;
 
 Approx near(double number) {
   return Approx(number).epsilon(1e-6).margin(1e-12);
@@ -55,7 +55,7 @@ TEST_CASE("Four lines are described as by hand", "[timbre]") {
   CHECK(shape->entropy == near(0.923219672));
 
   // The same energy rolls off at the same place, whether it is told as amplitudes or powers.
-  const auto squared = spectral_shape(f, std::vector{1.0, 4.0, 9.0, 16.0}, power);
+  const auto squared = spectral_shape(f, std::vector{1.0, 4.0, 9.0, 16.0}, of_power);
   CHECK(squared->rolloff95_hz == 400.0);
   CHECK(squared->centroid_hz == near(1000.0 / 3.0));  // (1 + 8 + 27 + 64) / 30 * 100
 }
@@ -263,8 +263,8 @@ TEST_CASE("Modes in a frame are described without a sound", "[timbre]") {
     double centroid_hz;
   } expected[] = {{0, magnitude, 550.24},
                   {24000, magnitude, 263.29},
-                  {0, power, 352.09},
-                  {24000, power, 227.316}};
+                  {0, of_power, 352.09},
+                  {24000, of_power, 227.316}};
   for (const auto& frame : expected) {
     const auto lines = partials_in_frame(partials, {Window::hann, 2048, frame.at}, rate);
     REQUIRE(lines.size() == 5);
@@ -323,7 +323,7 @@ TEST_CASE("A frame of harmonics is described as elsewhere", "[timbre]") {
   CHECK(*shape->skewness == Approx(0.98432).margin(5e-6));  // as many digits as are known
   CHECK(*shape->kurtosis == Approx(2.82699).margin(5e-6));
   CHECK(shape->rolloff95_hz == 2812.5);
-  const auto squared = frame_of(sound, power).shape;
+  const auto squared = frame_of(sound, of_power).shape;
   CHECK(squared->centroid_hz == near(885.909444));
   CHECK(squared->spread_hz == near(795.621404));
   CHECK(*squared->skewness == Approx(2.53698).margin(5e-6));
@@ -341,9 +341,9 @@ TEST_CASE("A bell's frames are described as elsewhere, and as its modes are", "[
     double centroid_bound;  // of the closed form
     double spread_bound;
   } frames[] = {{0, magnitude, 555.519845, 566.711753, 0.01, 0.034},
-                {0, power, 352.572113, 281.340833, 0.0014, 0.052},
+                {0, of_power, 352.572113, 281.340833, 0.0014, 0.052},
                 {24000, magnitude, 262.306912, 103.973251, 0.01, 0.034},
-                {24000, power, 227.319045, 42.6790185, 0.0014, 0.052}};
+                {24000, of_power, 227.319045, 42.6790185, 0.0014, 0.052}};
   std::vector<DecayingPartial> partials;
   for (const auto& [f, t60, a] : {std::array{220.0, 2.0, 1.0},
                                   {441.5, 1.2, 0.6},
