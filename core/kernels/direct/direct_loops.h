@@ -16,6 +16,7 @@ struct View {
   using V = Pack<T, Bytes>;
   static constexpr std::size_t lanes = Bytes / sizeof(T);
   static constexpr bool takes_passive = true;  // links that are not plain
+  static constexpr bool takes_rails = true;    // waveguides
 
   explicit View(DirectState<T>& state_in)
       : state(state_in),
@@ -277,7 +278,7 @@ void step(const Program& program, DirectState<T>& state, const Block<T>& block) 
   // What there is at all.
   const bool has_passive = !state.passive.links.empty();
   const bool has_taps = !program.taps.empty();
-  const bool has_rails = state.rails != nullptr;
+  [[maybe_unused]] const bool has_rails = state.rails != nullptr;
   const bool has_masses = state.nodes > program.junctions.size();
   const bool has_plain =
       std::any_of(program.link_runs.begin(), program.link_runs.end(),
@@ -306,11 +307,13 @@ void step(const Program& program, DirectState<T>& state, const Block<T>& block) 
     if (has_masses) {
       step_masses(program, s);
     }
-    if (has_rails) {
-      if (state.rails->run == 0) {
-        RailLoops<V, T>::read_run(*state.rails, block.frames - frame);
+    if constexpr (S::takes_rails) {
+      if (has_rails) {
+        if (state.rails->run == 0) {
+          RailLoops<V, T>::read_run(*state.rails, block.frames - frame);
+        }
+        RailLoops<V, T>::move_places(program, *state.rails, s);
       }
-      RailLoops<V, T>::move_places(program, *state.rails, s);
     }
     for (std::size_t i = 0; has_positions && i < inputs; ++i) {
       if (!program.inputs[i].is_force) {
@@ -324,8 +327,10 @@ void step(const Program& program, DirectState<T>& state, const Block<T>& block) 
         correct_links(program, s);
       }
     }
-    if (has_rails) {
-      RailLoops<V, T>::go_on(program, *state.rails, s);
+    if constexpr (S::takes_rails) {
+      if (has_rails) {
+        RailLoops<V, T>::go_on(program, *state.rails, s);
+      }
     }
     if (has_taps) {
       move_taps(program, s);

@@ -11,6 +11,7 @@ template <std::size_t Bytes>
 struct Summed : View<float, Bytes> {
   using Base = View<float, Bytes>;
   using V = typename Base::V;
+  static constexpr bool takes_rails = false;
 
   explicit Summed(DirectState<float>& state_in)
       : Base(state_in),

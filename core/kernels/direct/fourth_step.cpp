@@ -9,6 +9,7 @@ template <class T, std::size_t Bytes>
 struct Ahead : View<T, Bytes> {
   using V = typename View<T, Bytes>::V;
   static constexpr bool takes_passive = false;
+  static constexpr bool takes_rails = false;
 
   explicit Ahead(DirectState<T>& state)
       : View<T, Bytes>(state),
