@@ -1,5 +1,4 @@
 #include <Eigen/Eigenvalues>
-#include <Eigen/LU>
 #include <Eigen/QR>
 #include <algorithm>
 
@@ -53,18 +52,30 @@ std::optional<ComplexEigenpairs> eigenpairs_of_state(const Matrix& matrix, const
   if (!pairs) {
     return std::nullopt;
   }
-  const auto size = static_cast<Eigen::Index>(matrix.rows());
-  Eigen::MatrixXcd vectors(size, size);
-  for (Eigen::Index j = 0; j < size; ++j) {
-    std::copy_n(std::begin(pairs->vectors[static_cast<std::size_t>(j)]), size,
-                vectors.col(j).data());
+  // Two conjugate ones together are as much of the real part of one, and of its imaginary part.
+  const std::size_t size = matrix.rows();
+  Matrix parts(size, size);
+  for (std::size_t j = 0; j < size; ++j) {
+    const bool is_second = pairs->values[j].imag() < 0.0;
+    for (std::size_t i = 0; i < size; ++i) {
+      const std::complex<double> number = pairs->vectors[j][i];
+      parts(i, j) = is_second ? -number.imag() : number.real();
+    }
   }
-  const Eigen::VectorXcd wanted = map_of(state).cast<std::complex<double>>();
-  const Eigen::VectorXcd shares = Eigen::PartialPivLU<Eigen::MatrixXcd>(vectors).solve(wanted);
-  if (!((vectors * shares - wanted).norm() <= tolerance * (1e-300 + wanted.norm()))) {
+  const std::optional<Vector> shares = solution(parts, state);
+  if (!shares) {
     return std::nullopt;
   }
-  pairs->shares = ComplexVector(shares.data(), matrix.rows());
+  pairs->shares = ComplexVector(size);
+  for (std::size_t j = 0; j < size; ++j) {
+    if (pairs->values[j].imag() > 0.0) {
+      pairs->shares[j] = {(*shares)[j] / 2.0, -(*shares)[j + 1] / 2.0};
+      pairs->shares[j + 1] = std::conj(pairs->shares[j]);
+      ++j;
+    } else {
+      pairs->shares[j] = (*shares)[j];
+    }
+  }
   return pairs;
 }
 
@@ -85,9 +96,10 @@ std::optional<Vector> solution(const Matrix& matrix, const Vector& b) {
 }
 
 std::optional<Matrix> quotient(const Matrix& b, const Matrix& a) {
-  const Eigen::FullPivLU<Eigen::MatrixXd> inverse(map_of(a));
-  return inverse.isInvertible() ? std::optional(matrix_of(map_of(b) * inverse.inverse()))
-                                : std::nullopt;
+  const Eigen::ColPivHouseholderQR<Eigen::MatrixXd> factor(map_of(a).transpose());
+  return factor.isInvertible()
+             ? std::optional(matrix_of(factor.solve(map_of(b).transpose()).transpose()))
+             : std::nullopt;
 }
 
 }  // namespace ressort::linear_algebra
