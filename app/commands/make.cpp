@@ -5,10 +5,23 @@
 #include "app/exit_code.h"
 #include "app/session/files.h"
 #include "app/text.h"
+#include "core/analysis/stability.h"
 #include "core/model/language/mdl.h"
 #include "core/model/language/print.h"
 
 namespace ressort::commands {
+namespace {
+
+// It is written all the same: whoever made it may turn its numbers down in the file.
+void warn_if_unstable(const Network& network) {
+  const std::vector<double> values = parameter_values(network);
+  const Certificate found = Stability(network, 1.0).certify({values, values});
+  if (found.verdict == Verdict::unstable) {
+    std::fprintf(stderr, "warning: %s\n", complaint(found).message.c_str());
+  }
+}
+
+}  // namespace
 
 int make(const MakeOptions& options) {
   const auto complain = [](const std::string& text) {
@@ -24,6 +37,7 @@ int make(const MakeOptions& options) {
     return complain("the model would be longer than what is read, " +
                     std::to_string(max_model_bytes >> 20) + " MiB; a shorter name helps");
   }
+  warn_if_unstable(*network);
   if (options.output.empty()) {
     std::fwrite(text.data(), 1, text.size(), stdout);
     return exit_code::done;

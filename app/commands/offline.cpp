@@ -13,6 +13,7 @@
 #include "app/session/admit.h"
 #include "app/session/files.h"
 #include "app/session/memory.h"
+#include "app/text.h"
 #include "core/compile/compile.h"
 #include "core/model/language/expression.h"
 #include "core/model/topology.h"
@@ -283,6 +284,16 @@ Result<Rendered> render(const RenderOptions& options, const std::function<bool(d
   auto midi = options.midi.empty() ? Result<MidiFile>(MidiFile()) : read_midi_file(options.midi);
   if (!midi) {
     return midi.error();
+  }
+  const auto changes = std::count_if(midi->messages.begin(), midi->messages.end(),
+                                     [&](const MidiFile::Message& message) {
+                                       return (midi->bytes_of(message)[0] & 0xf0) == 0xc0;
+                                     });
+  if (changes > 0) {
+    scene->warnings.push_back(
+        options.midi + ": " +
+        counted(static_cast<std::size_t>(changes), "program change", "program changes") +
+        " passed over; one preset is rendered");
   }
   const auto threads = static_cast<std::size_t>(options.threads);
   if (threads > core_count()) {

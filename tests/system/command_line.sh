@@ -168,6 +168,7 @@ expect 2 "no mass is called '@m1'" "$program" check name.mdl --print
 expect 2 "excludes" "$program" check other.mdl --print --json
 expect 0 "NAME_m0" "$program" make --help
 expect 0 "@out1 posOutput" "$program" make string 50
+expect 0 "warning: " "$program" make string 10 -K 5
 expect 0 "hex.mdl: 92 masses, 241 links" "$program" make hexagon 5 --fixed none -K 0.2 -o hex.mdl
 expect 0 "stable" "$program" check hex.mdl
 expect 0 "@d closedMesh 150 150 d_M d_K d_Z 0 0" "$program" make closedMesh 150 150 --name d --macro
@@ -254,6 +255,9 @@ expect 2 "cannot be written" "$program" render PolyTriangle -o no/such/folder/ou
 model bad.score '0.0 /note/on 60 100\nsoon /note/off 60\n'
 expect 2 "bad.score:2:1: error: found 'soon' where a time" \
   "$program" render PolyTriangle -o out.wav --score bad.score
+printf 'MThd\0\0\0\6\0\0\0\1\0\140MTrk\0\0\0\17\0\300\5\0\220\74\100\140\200\74\0\0\377\57\0' > change.mid
+expect 0 "change.mid: 1 program change passed over" \
+  "$program" render PolyTriangle -o out.wav --midi change.mid
 model infinite.mdl '@g ground 0.\n@m mass 1. 0. 0.\n@r spring @g @m [0/0]\n'
 model late.score '1e300 /note/on 60\n'
 expect 2 "where a time in seconds was expected, at most a day" \
