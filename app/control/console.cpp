@@ -174,9 +174,13 @@ Result<Done> command::help(ConsoleContext& console, Words words) {
 }
 
 Result<Command> parse_command(std::string_view line) {
-  std::vector<std::string> words = split_words(line.substr(0, shape_of(line).comment));
+  bool is_open = false;
+  std::vector<std::string> words = split_words(line.substr(0, shape_of(line).comment), &is_open);
   if (words.empty()) {
     return Command{};
+  }
+  if (is_open) {
+    return Error{open_quote};
   }
   const auto found = find_command(words[0]);
   if (!found) {

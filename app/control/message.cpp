@@ -36,7 +36,7 @@ bool fits_one(std::string_view pattern, char c, std::size_t& length) {
 
 }  // namespace
 
-std::vector<std::string> split_words(std::string_view text) {
+std::vector<std::string> split_words(std::string_view text, bool* is_open) {
   std::vector<std::string> words;
   std::size_t at = 0;
   while (at < text.size()) {
@@ -51,6 +51,9 @@ std::vector<std::string> split_words(std::string_view text) {
         std::min(text.find_first_of(is_quoted ? "\"" : " \t\r", start), text.size());
     words.emplace_back(text.substr(start, end - start));
     at = end + (is_quoted ? 1 : 0);
+  }
+  if (is_open != nullptr) {
+    *is_open = at > text.size();
   }
   return words;
 }
@@ -72,9 +75,13 @@ Result<std::vector<ScoreLine>> parse_score(std::string_view text) {
     std::string_view line = text.substr(0, end);
     text.remove_prefix(std::min(text.size(), end + 1));
     line = line.substr(0, line.find('#'));
-    const std::vector<std::string> words = split_words(line);
+    bool is_open = false;
+    const std::vector<std::string> words = split_words(line, &is_open);
     if (words.empty()) {
       continue;
+    }
+    if (is_open) {
+      return Error{open_quote, number, static_cast<int>(line.rfind('"')) + 1};
     }
     const std::size_t first = line.find_first_not_of(" \t\r");
     const std::size_t second =

@@ -29,8 +29,10 @@ struct ScoreLine {
 };
 Result<std::vector<ScoreLine>> parse_score(std::string_view text);
 
-// Words divided by blanks, "..." for a word with blanks in it.
-std::vector<std::string> split_words(std::string_view text);
+// Words divided by blanks, "..." for a word with blanks in it; says whether the last one's quote is
+// open, if it is asked.
+std::vector<std::string> split_words(std::string_view text, bool* is_open = nullptr);
+inline constexpr const char* open_quote = "this quote is not closed; expected another \" behind it";
 
 // A number where the word is one, else the word.
 Argument to_argument(const std::string& word);

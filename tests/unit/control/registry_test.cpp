@@ -311,6 +311,16 @@ TEST_CASE("words are divided by blanks, and quotes hold them together", "[regist
   CHECK(split_words("a  b\tc\r") == Words{"a", "b", "c"});
   CHECK(split_words("load \"my model\" x") == Words{"load", "my model", "x"});
   CHECK(split_words("\"\" \"open") == Words{"", "open"});
+  bool is_open = true;
+  split_words("load \"my model\"", &is_open);
+  CHECK(!is_open);
+  split_words("load \"", &is_open);
+  CHECK(is_open);
+  const auto score = parse_score("0 /note/on 60\n1 /model/load \"my model\n");
+  REQUIRE(!score);
+  CHECK(score.error().line == 2);
+  CHECK(score.error().column == 15);
+  CHECK(score.error().message.find("quote") != std::string::npos);
   CHECK(to_argument("1e-3") == Argument{0.001});
   CHECK(to_argument("1x") == Argument{std::string("1x")});
   CHECK(to_argument("nan") == Argument{std::string("nan")});
