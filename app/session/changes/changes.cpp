@@ -194,10 +194,10 @@ Result<std::string> Session::save(const std::string& name, Existing existing) {
     return path.error();
   }
   if (const std::string there = preset_path(name); existing == Existing::refuse && !there.empty()) {
-    return Error{there == *path ? "'" + name + "' is there already; --force writes over it"
-                                : "'" + name +
-                                      "' is a preset that came with the program; --force saves one "
-                                      "of yours that is loaded instead"};
+    const std::string forced = "; 'save " + name + " --force' at the console ";
+    return Error{there == *path ? "'" + name + "' is there already" + forced + "writes over it"
+                                : "'" + name + "' is a preset that came with the program" + forced +
+                                      "saves one of yours that is loaded instead"};
   }
   const std::shared_ptr<const Loaded> now = current();
   std::string model = now->model_path;

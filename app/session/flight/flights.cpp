@@ -1,5 +1,7 @@
 // Flights of what a session plays: on command, and by themselves when something goes wrong.
 #include <ctime>
+#include <filesystem>
+#include <system_error>
 #include <utility>
 
 #include "app/session/files.h"
@@ -42,6 +44,10 @@ Result<std::string> Session::write_flight(const std::string& path, Existing exis
 
 Result<std::string> Session::save_flight(const std::string& name) {
   const auto path = path_of_flight(name);
+  if (std::error_code error; path && std::filesystem::exists(*path, error)) {
+    return Error{"'" + name + "' is there already; 'flight " + *path +
+                 " --force' at the console writes over it"};
+  }
   return path ? write_flight(*path, Existing::refuse) : path;
 }
 

@@ -52,7 +52,8 @@ Result<std::string> keep_tuned(const std::string& model, const std::string& name
   fs::create_directories(folder, error);
   const std::string path = (folder / (name + ".mdl")).string();
   if (existing == Existing::refuse && fs::exists(path, error)) {
-    return Error{"'" + path + "' is there already; --force writes over it"};
+    return Error{"'" + path + "' is there already; 'save " + name +
+                 " --force' at the console writes over it"};
   }
   const auto written = write_text(path, *text, existing);
   return written ? Result<std::string>(path) : written.error();
