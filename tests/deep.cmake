@@ -6,7 +6,7 @@ set(ressort_fuzzers model preset score midi smf scala console osc osc_packet fli
 list(TRANSFORM ressort_fuzzers PREPEND fuzz_ OUTPUT_VARIABLE ressort_deep_tests)
 list(APPEND ressort_deep_tests arm everything_sanitized everything_more forms_everywhere
   accuracy_everywhere silence_everywhere modes_everywhere calculix_everywhere bodies_everywhere
-  bells_everywhere heard_pitch_everywhere bench lint scenes_more abuse_long bows settings_more edits_more
+  bells_everywhere heard_pitch_everywhere bench lint scenes_more abuse_long callback_minute bows settings_more edits_more
   flights_everywhere server_killed installed mpi soak)
 list(LENGTH ressort_deep_tests ressort_deep_count)
 
@@ -69,6 +69,12 @@ add_deep_test(bells_everywhere 300 $<TARGET_FILE:ressort_tests> "[bells_everywhe
 # A server that is killed twenty times, and comes back at other rates and periods.
 add_deep_test(server_killed 120 ${CMAKE_COMMAND} -E env RESSORT_KILLS=20
   $<TARGET_FILE:ressort_server_tests> "[server_loss]")
+
+# A minute of all that is done to the callback.
+if(callback IN_LIST server_tags)
+  add_deep_test(callback_minute 70 ${CMAKE_COMMAND} -E env RESSORT_CALLBACK_SECONDS=60
+    $<TARGET_FILE:ressort_server_tests> "[callback]")
+endif()
 
 # Three minutes of random play of all presets; tests/soak is for who has more.
 add_deep_test(soak 220 ${CMAKE_COMMAND} -E env RESSORT_SOAK_MINUTES=3

@@ -31,8 +31,7 @@ set_tests_properties(server_panel PROPERTIES TIMEOUT 240 LABELS servers
 
 add_test(NAME command_line COMMAND ${CMAKE_CURRENT_SOURCE_DIR}/system/command_line.sh
   $<TARGET_FILE:ressort> ${CMAKE_SOURCE_DIR})
-set_tests_properties(command_line PROPERTIES TIMEOUT 240 LABELS servers
-  RESOURCE_LOCK jack COST 1000)
+set_tests_properties(command_line PROPERTIES TIMEOUT 240 LABELS integration COST 900)
 
 # The front page's examples and those of presets/README.md can be heard.
 add_test(NAME examples COMMAND ${CMAKE_CURRENT_SOURCE_DIR}/system/examples $<TARGET_FILE:ressort>)

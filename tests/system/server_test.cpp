@@ -19,8 +19,8 @@ using namespace ressort::servers;
 
 namespace {
 
-constexpr std::size_t spacing = 31007;  // frames; a prime, so that every place in a block occurs
-constexpr int notes = 22;
+constexpr std::size_t spacing = 21001;  // frames; a prime, so that every place in a block occurs
+constexpr int notes = 14;
 constexpr const char* osc_port = "19777";
 
 lo_address osc() {
@@ -155,7 +155,7 @@ TEST_CASE("OSC bundles start on the frame of their time tag", "[osc_time]") {
       lo_bundle_add_message(bundle, "/note/on", message);
       lo_send_bundle(osc(), bundle);
       lo_bundle_free_recursive(bundle);
-      std::this_thread::sleep_for(600ms);  // less than the spacing, and never a multiple of it
+      std::this_thread::sleep_for(400ms);  // less than the spacing, and never a multiple of it
     }
   });
   const std::size_t begin = listener.frames();
@@ -287,7 +287,10 @@ TEST_CASE("The callback allocates, locks, reads, writes and waits never", "[call
     CHECK(found["releases"] >= found["callbacks"]);
   }
 
-  SECTION("60 s of notes, controllers, floods, sweeps and swaps, while four watch") {
+  SECTION("notes, controllers, floods, sweeps and swaps, while four watch") {
+    const char* const asked = std::getenv("RESSORT_CALLBACK_SECONDS");
+    const std::size_t frames =
+        48000 * static_cast<std::size_t>(asked != nullptr ? atoi(asked) : 15);
     const char* const scenes[] = {"IPlayTheTriangle", "PolyTriangle",     "PluckedHarmonics",
                                   "BowedString",      "PhysicalLFO",      "Resonator",
                                   "20x30mesh",        "LargeTriangleMesh"};
@@ -300,14 +303,14 @@ TEST_CASE("The callback allocates, locks, reads, writes and waits never", "[call
       for (int i = 0; i < 4; ++i) {
         viewers.push_back(std::make_unique<Viewer>(static_cast<std::uint16_t>(9790)));
       }
-      Listener listener(48000 * 70);
+      Listener listener(frames + 48000 * 10);
       std::vector<Listener::Message> messages;
       unsigned state = 1;
       const auto random = [&](unsigned below) {
         state = state * 1664525u + 1013904223u;
         return static_cast<unsigned char>((state >> 16) % below);
       };
-      for (std::size_t frame = 4800; frame < 48000 * 60; frame += 600 + random(255) * 4u) {
+      for (std::size_t frame = 4800; frame < frames; frame += 600 + random(255) * 4u) {
         const unsigned char key = static_cast<unsigned char>(40 + random(50));
         messages.push_back({frame, {0x90, key, static_cast<unsigned char>(1 + random(127))}});
         messages.push_back({frame + 100, {0xb0, random(120), random(128)}});
@@ -317,8 +320,9 @@ TEST_CASE("The callback allocates, locks, reads, writes and waits never", "[call
       }
       listener.plan(messages);
       listener.start("ressort:out_left", "ressort:midi_in");
-      constexpr int most_rounds = 1500;  // a server that is too busy drops its listener for good
-      for (int round = 0; listener.frames() < 48000 * 60 && round < most_rounds; ++round) {
+      const auto most_rounds =
+          static_cast<int>(frames / 1920);  // one that is too busy drops its listener for good
+      for (int round = 0; listener.frames() < frames && round < most_rounds; ++round) {
         for (int i = 0; i < 200; ++i) {
           lo_send(osc(), "/param/*", "f", 0.05f + 0.0005f * static_cast<float>(i));
           lo_send(osc(), "/in/1/position", "f", 0.01f * static_cast<float>(i % 10));
@@ -331,15 +335,15 @@ TEST_CASE("The callback allocates, locks, reads, writes and waits never", "[call
         play.forget();
         std::this_thread::sleep_for(100ms);
       }
-      CHECK(listener.frames() >= 48000 * 60);
+      CHECK(listener.frames() >= frames);
       for (const auto& viewer : viewers) {
-        CHECK(viewer->seen() > 1'000'000);
+        CHECK(viewer->seen() > frames / 3);  // bytes
       }
       play.signal(SIGTERM);
       CHECK(play.exit_code() == 0);
     }
     auto found = counts();
-    CHECK(found["callbacks"] > 10000);
+    CHECK(found["callbacks"] > frames / 300);
     for (const char* kind :
          {"allocations", "releases", "locks", "reads", "writes", "waits", "others"}) {
       INFO(kind);
@@ -548,12 +552,12 @@ TEST_CASE("Notes stay on their frame while the period changes", "[jack_midi]") {
   jack_client_t* const host = jack_client_open("host", JackNoStartServer, nullptr);
   REQUIRE(host != nullptr);
   listener.start("ressort:out_left", "ressort:midi_in");
-  std::vector<std::size_t> periods(3, 1024);  // [note]
+  std::vector<std::size_t> periods(2, 1024);  // [note]
   for (const jack_nframes_t period : {64u, 2048u, 16u, 512u, 8192u, 128u}) {
     REQUIRE(listener.wait_for(first_note + (periods.size() - 1) * spacing + spacing / 2));
     REQUIRE(jack_set_buffer_size(host, period) == 0);
     CHECK(jack_get_buffer_size(host) == period);
-    periods.insert(periods.end(), 3, period);
+    periods.insert(periods.end(), 2, period);
   }
   REQUIRE(listener.wait_for(first_note + notes * spacing));
   jack_client_close(host);
@@ -569,7 +573,7 @@ TEST_CASE("A keyboard that was unplugged is taken up again by its name", "[jack_
   const Server server(256);
   Child play(program({"play", click(), "-a", "jack", "-i", "-u", osc_port}));
   REQUIRE(answers());
-  for (int time = 0; time < 3; ++time) {
+  for (int time = 0; time < 2; ++time) {
     {
       const Neighbour keyboard;
       INFO("time " << time);
@@ -592,9 +596,9 @@ TEST_CASE("A keyboard that is back in no time is taken up again as well", "[jack
   REQUIRE(answers());
   auto keyboard = std::make_unique<Neighbour>();
   REQUIRE(keyboard->connect("neighbour:keys", "ressort:midi_in"));
-  for (int time = 0; time < 10; ++time) {
+  for (int time = 0; time < 4; ++time) {
     INFO("time " << time);
-    std::this_thread::sleep_for(std::chrono::milliseconds(1500 + 7 * time));  // it is seen
+    std::this_thread::sleep_for(std::chrono::milliseconds(1500 + 17 * time));  // it is seen
     keyboard.reset();
     keyboard = std::make_unique<Neighbour>();
     REQUIRE(
