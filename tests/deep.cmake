@@ -6,7 +6,7 @@ set(ressort_fuzzers model preset score midi smf scala console osc osc_packet fli
 list(TRANSFORM ressort_fuzzers PREPEND fuzz_ OUTPUT_VARIABLE ressort_deep_tests)
 list(APPEND ressort_deep_tests arm everything_sanitized everything_more forms_everywhere
   accuracy_everywhere silence_everywhere modes_everywhere calculix_everywhere bodies_everywhere
-  bells_everywhere heard_pitch_everywhere bench lint scenes_more abuse_long callback_minute bows settings_more edits_more
+  bells_everywhere heard_pitch_everywhere thorough bench lint scenes_more abuse_long callback_minute bows settings_more edits_more
   flights_everywhere server_killed installed mpi soak)
 list(LENGTH ressort_deep_tests ressort_deep_count)
 
@@ -96,6 +96,10 @@ add_deep_test(bows 60 $<TARGET_FILE:ressort_voicing> --bows 8 Violin Cello Doubl
 # Random settings of all controls of each preset, and a note at each; RESSORT_SETTINGS asks for more.
 add_deep_test(settings_more 600 sh -c
   "exec $<TARGET_FILE:ressort_voicing> --random \${RESSORT_SETTINGS:-200}")
+
+# All of what the first tier looks at a part of (tests/support/thorough.h).
+add_deep_test(thorough 120 ${CMAKE_COMMAND} -E env RESSORT_THOROUGH=1 $<TARGET_FILE:ressort_tests>
+  "[ask],[watch],[notes_heard],[modes_passive],[session],[solid_body]")
 
 # That the benchmark still runs: no time is asserted. Only tests/run --deep builds it.
 add_custom_target(ressort_deep DEPENDS ressort_bench)

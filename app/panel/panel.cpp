@@ -130,6 +130,7 @@ struct WebPanel::Server {
         osc(osc_in) {
     http.new_task_queue = [] { return new httplib::ThreadPool(threads); };
     http.set_keep_alive_max_count(1);
+    http.set_keep_alive_timeout(1);  // browsers open connections ahead and say nothing
     http.set_read_timeout(idle_s);
     http.set_write_timeout(idle_s);
     http.set_payload_max_length(most_body_bytes);

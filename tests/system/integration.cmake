@@ -31,7 +31,7 @@ set_tests_properties(server_panel PROPERTIES TIMEOUT 240 LABELS servers
 
 add_test(NAME command_line COMMAND ${CMAKE_CURRENT_SOURCE_DIR}/system/command_line.sh
   $<TARGET_FILE:ressort> ${CMAKE_SOURCE_DIR})
-set_tests_properties(command_line PROPERTIES TIMEOUT 240 LABELS integration COST 900)
+set_tests_properties(command_line PROPERTIES TIMEOUT 240 LABELS integration COST 800)
 
 # The front page's examples and those of presets/README.md can be heard.
 add_test(NAME examples COMMAND ${CMAKE_CURRENT_SOURCE_DIR}/system/examples $<TARGET_FILE:ressort>)
@@ -44,4 +44,4 @@ target_compile_definitions(ressort_export_tests PRIVATE
   RESSORT_PROGRAM="$<TARGET_FILE:ressort>" RESSORT_CXX="${CMAKE_CXX_COMPILER}")
 add_dependencies(ressort_export_tests ressort)
 add_test(NAME export COMMAND ressort_export_tests)
-set_tests_properties(export PROPERTIES TIMEOUT 300 LABELS integration)
+set_tests_properties(export PROPERTIES TIMEOUT 300 LABELS integration COST 800)

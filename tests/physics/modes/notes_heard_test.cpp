@@ -8,6 +8,7 @@
 #include "core/model/language/expression.h"
 #include "core/model/topology.h"
 #include "tests/support/harness.h"
+#include "tests/support/thorough.h"
 
 using namespace ressort;
 using namespace ressort::support;
@@ -53,7 +54,7 @@ std::vector<double> struck(const Network& network, double seconds) {
 }  // namespace
 
 TEST_CASE("a structure brought to a note and a decay is heard with both", "[notes_heard]") {
-  constexpr std::uint64_t seeds = 24;
+  const auto seeds = of_all<std::uint64_t>(6, 24);
   for (std::uint64_t seed = 0; seed < seeds; ++seed) {
     Random random(seed + 1);
     const std::string text = random_structure(random, seed % 6);
