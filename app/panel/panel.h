@@ -31,7 +31,7 @@ class WebPanel {
   static constexpr int usual_port = 9788;
   static constexpr std::size_t most_body_bytes = 64 << 10;
   static constexpr int most_viewers = 4;  // of /motion, and of /events
-  static constexpr int idle_s = 3;  // of one who asks or listens; so long may the end take
+  static constexpr int idle_s = 3;        // of one who asks or listens; so long may the end take
 
   // Fails where the port is taken, saying so. All of these outlive it; `port` may be 0 here for any
   // that is free. [control]
