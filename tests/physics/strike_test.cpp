@@ -128,7 +128,7 @@ TEST_CASE("A struck mass moves as a force input would move it", "[strike]") {
 TEST_CASE("A struck mass of any network moves nearly so", "[strike]") {
   std::size_t compared = 0;
   for (std::uint64_t seed = 0; seed < 60; ++seed) {
-    const RandomNetwork random = NetworkWriter(seed).write();
+    const RandomNetwork random = random_network(seed);
     const auto masses = named_masses(random.text);
     // A force output is told of the input's force, and of no blow.
     if (masses.empty() || !random.is_linear || random.text.find("frcOutput") != std::string::npos) {

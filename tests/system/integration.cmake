@@ -39,7 +39,7 @@ set_tests_properties(examples PROPERTIES TIMEOUT 240 LABELS integration)
 
 # What is exported to FAUST, through the faust compiler and this C++ compiler.
 add_ressort_tests(ressort_export_tests system/export_test.cpp)
-target_link_libraries(ressort_export_tests PRIVATE ressort_app)
+target_link_libraries(ressort_export_tests PRIVATE ressort_test_networks ressort_app)
 target_compile_definitions(ressort_export_tests PRIVATE
   RESSORT_PROGRAM="$<TARGET_FILE:ressort>" RESSORT_CXX="${CMAKE_CXX_COMPILER}")
 add_dependencies(ressort_export_tests ressort)

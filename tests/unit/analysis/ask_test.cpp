@@ -70,7 +70,7 @@ double drawn(support::Random& random, const Ranged& range) {
 // What comes after a blow, as the textbook simulator has it.
 std::vector<double> rendered(const Network& network, std::span<const double> parameters,
                              std::size_t count) {
-  auto simulation = reference::Builder(network, parameters).build();
+  auto simulation = reference::make_simulation(network, parameters);
   std::vector<double> samples;
   for (std::size_t n = 0; n < count; ++n) {
     const double force[] = {n == 0 ? 1.0 : 0.0};
@@ -363,7 +363,7 @@ TEST_CASE("a longer blow is darker, as the sound of the same pulse has it", "[as
       "@out1 posOutput [@s 0.71]\n@out2 posOutput [@s 0.4]\n");
   const std::vector<double> values = parameter_values(network);
   constexpr int length = 88;
-  auto simulation = reference::Builder(network, values).build();
+  auto simulation = reference::make_simulation(network, values);
   std::vector<double> samples;
   for (std::size_t n = 0; n < frame; ++n) {
     const double turn = 2.0 * std::numbers::pi * (static_cast<double>(n) + 0.5) / length;

@@ -63,7 +63,7 @@ TEST_CASE("what is left out changes no bit of any output, on 200 random networks
   for (std::uint64_t seed = 1; seed <= 200; ++seed) {
     INFO("seed " << seed);
     Random random(seed);
-    const std::string text = support::NetworkWriter(seed).write().text + unheard(random);
+    const std::string text = support::random_network(seed).text + unheard(random);
     const Network network = network_of(text);
     const Program whole = make_program(network, Network::reference_rate_hz, true);
     const Score score = support::score_of(whole, {.frames = 400, .seed = seed, .turns = true});
