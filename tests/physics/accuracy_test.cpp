@@ -11,7 +11,7 @@
 #include "tests/support/dense.h"
 #include "tests/support/player.h"
 
-namespace ressort {
+namespace ressort::accuracy_test {
 namespace {
 
 using support::Player;
@@ -516,4 +516,4 @@ TEST_CASE("what nobody knows is not said to be kept", "[accuracy]") {
 }
 
 }  // namespace
-}  // namespace ressort
+}  // namespace ressort::accuracy_test

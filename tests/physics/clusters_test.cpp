@@ -5,7 +5,7 @@
 #include "core/laws/laws.h"
 #include "tests/support/passive.h"
 
-namespace ressort {
+namespace ressort::clusters_test {
 namespace {
 
 using namespace support;
@@ -353,4 +353,4 @@ TEST_CASE("a cluster in one lane depends on no other lane", "[clusters]") {
   CHECK(play(2, 0.5) == play(2, -30.0));
 }
 
-}  // namespace ressort
+}  // namespace ressort::clusters_test

@@ -13,7 +13,7 @@
 #include "tests/support/networks/random_network.h"
 #include "tests/support/networks/reference_network.h"
 
-namespace ressort {
+namespace ressort::forms_test {
 namespace {
 
 using support::Comparison;
@@ -196,4 +196,4 @@ TEST_CASE("a bow's profile is turned while it sounds, in every form that can hol
                           Method::grid, Method::batch});
 }
 
-}  // namespace ressort
+}  // namespace ressort::forms_test

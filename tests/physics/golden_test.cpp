@@ -3,7 +3,7 @@
 #include "core/analysis/linear.h"
 #include "tests/support/poles.h"
 
-namespace ressort {
+namespace ressort::golden_test {
 namespace {
 
 using support::Bare;
@@ -222,4 +222,4 @@ TEST_CASE("golden: a string's pitch by its mass is a power law", "[golden]") {
   check(at_one, 113.4, 1e-3);
 }
 
-}  // namespace ressort
+}  // namespace ressort::golden_test

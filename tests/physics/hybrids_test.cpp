@@ -6,7 +6,7 @@
 #include "core/laws/laws.h"
 #include "tests/support/passive.h"
 
-namespace ressort {
+namespace ressort::hybrids_test {
 namespace {
 
 using namespace support;
@@ -516,4 +516,4 @@ TEST_CASE("random hybrids are stable below the limit of their masses", "[hybrids
   CHECK(grown > 200);
 }
 
-}  // namespace ressort
+}  // namespace ressort::hybrids_test

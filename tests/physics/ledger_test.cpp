@@ -3,7 +3,7 @@
 #include "core/laws/laws.h"
 #include "tests/support/passive.h"
 
-namespace ressort {
+namespace ressort::ledger_test {
 namespace {
 
 using namespace support;
@@ -222,4 +222,4 @@ TEST_CASE("one contact as published is enough to gain energy", "[ledger]") {
   CHECK(published.excess() > 1.0);
 }
 
-}  // namespace ressort
+}  // namespace ressort::ledger_test

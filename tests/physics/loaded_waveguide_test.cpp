@@ -3,7 +3,7 @@
 #include "tests/support/harness.h"
 #include "tests/support/pitch.h"
 
-namespace ressort {
+namespace ressort::loaded_waveguide_test {
 namespace {
 
 using namespace support;
@@ -79,4 +79,4 @@ TEST_CASE("masses and springs on a waveguide do not untune it", "[loaded_wavegui
   }
 }
 
-}  // namespace ressort
+}  // namespace ressort::loaded_waveguide_test

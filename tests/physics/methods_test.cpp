@@ -6,7 +6,7 @@
 #include "tests/support/agreement.h"
 #include "tests/support/player.h"
 
-namespace ressort {
+namespace ressort::methods_test {
 namespace {
 
 using namespace support;
@@ -298,4 +298,4 @@ TEST_CASE("every method plays an instrument as the direct one does", "[methods]"
   }
 }
 
-}  // namespace ressort
+}  // namespace ressort::methods_test

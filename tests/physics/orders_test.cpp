@@ -3,7 +3,7 @@
 #include "tests/support/passive.h"
 #include "tests/support/poles.h"
 
-namespace ressort {
+namespace ressort::orders_test {
 namespace {
 
 using namespace support;
@@ -99,4 +99,4 @@ TEST_CASE("what bends, touches and rubs is of the order that is said", "[orders]
   }
 }
 
-}  // namespace ressort
+}  // namespace ressort::orders_test

@@ -3,7 +3,7 @@
 #include "tests/support/passive.h"
 #include "core/laws/laws.h"
 
-namespace ressort {
+namespace ressort::passive_test {
 namespace {
 
 using namespace support;
@@ -532,4 +532,4 @@ TEST_CASE("what rests on the top of a pluck stays there", "[passive]") {
   }
 }
 
-}  // namespace ressort
+}  // namespace ressort::passive_test

@@ -4,7 +4,7 @@
 #include "core/laws/laws.h"
 #include "tests/support/passive.h"
 
-namespace ressort {
+namespace ressort::published_test {
 namespace {
 
 using namespace support;
@@ -373,4 +373,4 @@ TEST_CASE("what a bow does is what the string gets and what is rubbed off", "[pu
   }
 }
 
-}  // namespace ressort
+}  // namespace ressort::published_test

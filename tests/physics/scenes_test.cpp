@@ -13,7 +13,7 @@
 #include "tests/support/harness.h"
 #include "tests/support/player.h"
 
-namespace ressort {
+namespace ressort::scenes_test {
 namespace {
 
 using namespace support;
@@ -556,4 +556,4 @@ TEST_CASE("as published, many of the same scenes do", "[scenes]") {
   CHECK(failed > 40);
 }
 
-}  // namespace ressort
+}  // namespace ressort::scenes_test

@@ -5,7 +5,7 @@
 
 #include "tests/support/player.h"
 
-namespace ressort {
+namespace ressort::silence_test {
 namespace {
 
 using support::network_of;
@@ -134,4 +134,4 @@ TEST_CASE("and so in 200 networks", "[.][silence_everywhere]") {
 }
 
 }  // namespace
-}  // namespace ressort
+}  // namespace ressort::silence_test

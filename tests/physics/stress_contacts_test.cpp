@@ -7,7 +7,7 @@
 #include "core/laws/laws.h"
 #include "tests/support/passive.h"
 
-namespace ressort {
+namespace ressort::stress_contacts_test {
 namespace {
 
 using namespace support;
@@ -446,4 +446,4 @@ TEST_CASE("chains and grids step passive links as the direct kernel does", "[str
   }
 }
 
-}  // namespace ressort
+}  // namespace ressort::stress_contacts_test

@@ -6,7 +6,7 @@
 #include "core/engine/energy.h"
 #include "tests/support/harness.h"
 
-namespace ressort {
+namespace ressort::stress_energy_test {
 namespace {
 
 using support::show;
@@ -279,4 +279,4 @@ TEST_CASE("S10: a ball that bounces on a plain contact gains without end", "[str
   }
 }
 
-}  // namespace ressort
+}  // namespace ressort::stress_energy_test

@@ -5,7 +5,7 @@
 #include "core/analysis/stability.h"
 #include "tests/support/player.h"
 
-namespace ressort {
+namespace ressort::stress_linear_test {
 namespace {
 
 using namespace support;
@@ -312,4 +312,4 @@ TEST_CASE("S25: a sound as a force may be of any loudness, and what it leaves di
   }
 }
 
-}  // namespace ressort
+}  // namespace ressort::stress_linear_test

@@ -5,7 +5,7 @@
 #include "tests/support/networks/random_network.h"
 #include "tests/support/player.h"
 
-namespace ressort {
+namespace ressort::strike_test {
 namespace {
 
 using namespace support;
@@ -285,4 +285,4 @@ TEST_CASE("A model without any input is struck, and costs nothing until then", "
 }
 
 }  // namespace
-}  // namespace ressort
+}  // namespace ressort::strike_test

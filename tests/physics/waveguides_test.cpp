@@ -5,7 +5,7 @@
 #include "core/kernels/waveguides/design.h"
 #include "tests/support/passive.h"
 
-namespace ressort {
+namespace ressort::waveguides_test {
 namespace {
 
 using namespace support;
@@ -403,4 +403,4 @@ TEMPLATE_TEST_CASE("waves that are read many samples at once have the bits of on
   }
 }
 
-}  // namespace ressort
+}  // namespace ressort::waveguides_test

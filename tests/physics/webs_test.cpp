@@ -4,7 +4,7 @@
 #include "core/laws/laws.h"
 #include "tests/support/passive.h"
 
-namespace ressort {
+namespace ressort::webs_test {
 namespace {
 
 using namespace support;
@@ -236,4 +236,4 @@ TEST_CASE("a web in one lane depends on no other lane", "[webs]") {
   CHECK(play(0.0) == play(-300.0));
 }
 
-}  // namespace ressort
+}  // namespace ressort::webs_test

@@ -14,7 +14,7 @@
 #include "tests/support/networks/reference_network.h"
 #include "tests/support/passive.h"
 
-namespace ressort {
+namespace ressort::bodies_test {
 namespace {
 
 using namespace support;
@@ -390,4 +390,4 @@ TEST_CASE("a body is tuned where it is written", "[bodies]") {
   CHECK(tuned.error().line == 1);
 }
 
-}  // namespace ressort
+}  // namespace ressort::bodies_test

@@ -4,7 +4,7 @@
 #include "tests/support/harness.h"
 #include "tests/support/pitch.h"
 
-namespace ressort {
+namespace ressort::fixed_test {
 namespace {
 
 using namespace support;
@@ -87,4 +87,4 @@ TEST_CASE("a label that the model does not have cannot be fixed", "[fixed]") {
   CHECK(found[0].message == "the model has nothing labelled 'bix' that keys could leave");
 }
 
-}  // namespace ressort
+}  // namespace ressort::fixed_test

@@ -6,7 +6,7 @@
 #include "tests/support/pitch.h"
 #include "tests/support/player.h"
 
-namespace ressort {
+namespace ressort::heard_pitch_test {
 namespace {
 
 using support::note_on;
@@ -79,4 +79,4 @@ TEST_CASE("all of them, over the keyboard at three rates", "[.][heard_pitch_ever
 }
 
 }  // namespace
-}  // namespace ressort
+}  // namespace ressort::heard_pitch_test

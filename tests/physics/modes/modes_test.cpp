@@ -8,8 +8,9 @@
 #include "tests/support/harness.h"
 #include "tests/support/poles.h"
 
-using namespace ressort;
-using namespace ressort::support;
+namespace ressort::modes_test {
+
+using namespace support;
 
 namespace {
 
@@ -427,3 +428,5 @@ TEST_CASE("what does not swing is no mode", "[modes]") {
   CHECK(!find_modes(network_of("@p param 0.\n@m0 mass p 0. 0.\n@out1 posOutput @m0\n"),
                     std::vector<double>{0.0}, {}));
 }
+
+}  // namespace ressort::modes_test

@@ -12,7 +12,7 @@
 #include "tests/support/partial.h"
 #include "tests/support/player.h"
 
-namespace ressort {
+namespace ressort::morph_test {
 namespace {
 
 using namespace support;
@@ -304,4 +304,4 @@ TEST_CASE("what cannot be morphed is refused with what to do", "[morph]") {
             .find("a link has another law") != std::string::npos);
 }
 
-}  // namespace ressort
+}  // namespace ressort::morph_test

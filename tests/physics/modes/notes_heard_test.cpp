@@ -10,8 +10,9 @@
 #include "tests/support/harness.h"
 #include "tests/support/thorough.h"
 
-using namespace ressort;
-using namespace ressort::support;
+namespace ressort::notes_heard_test {
+
+using namespace support;
 
 namespace {
 
@@ -96,3 +97,5 @@ TEST_CASE("a structure brought to a note and a decay is heard with both", "[note
     CHECK(off_t60 < 0.0005);
   }
 }
+
+}  // namespace ressort::notes_heard_test

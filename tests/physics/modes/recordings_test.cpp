@@ -3,8 +3,9 @@
 #include "tests/support/harness.h"
 #include "tests/support/ringing.h"
 
-using namespace ressort;
-using namespace ressort::support;
+namespace ressort::recordings_test {
+
+using namespace support;
 
 namespace {
 
@@ -64,3 +65,5 @@ TEST_CASE("IR-T8: the modes of a string's sound are those of the string", "[reco
     CHECK(miss.t60_percent < 1e-5);
   }
 }
+
+}  // namespace ressort::recordings_test

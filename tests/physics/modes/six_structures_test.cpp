@@ -13,7 +13,7 @@
 #include "tests/support/player.h"
 #include "tests/support/random.h"
 
-namespace ressort {
+namespace ressort::six_structures_test {
 namespace {
 
 using namespace support;
@@ -386,4 +386,4 @@ TEST_CASE("a level that cannot be is told with its place", "[six_structures]") {
   CHECK(told("@out1 posOutput [@s 0.9] 1 2").find("takes 1 to 2 arguments") != std::string::npos);
 }
 
-}  // namespace ressort
+}  // namespace ressort::six_structures_test

@@ -9,8 +9,9 @@
 #include "core/model/language/print.h"
 #include "tests/support/harness.h"
 
-using namespace ressort;
-using namespace ressort::support;
+namespace ressort::tune_modes_test {
+
+using namespace support;
 
 namespace {
 
@@ -274,3 +275,5 @@ TEST_CASE("what no chain can be says why", "[tune_modes]") {
   CHECK(chain_of(body, "crown").error().message == "no mode moves the place 'crown'");
   CHECK(chain_of(body, "rim").error().message.find("the same frequency") != std::string::npos);
 }
+
+}  // namespace ressort::tune_modes_test

@@ -12,7 +12,7 @@
 #include "tests/support/dense.h"
 #include "tests/support/player.h"
 
-namespace ressort {
+namespace ressort::tuning_test {
 namespace {
 
 using support::note_on;
@@ -198,4 +198,4 @@ TEST_CASE("a key is in tune in the sound of the engine", "[tuning]") {
 }
 
 }  // namespace
-}  // namespace ressort
+}  // namespace ressort::tuning_test

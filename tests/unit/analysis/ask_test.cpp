@@ -14,7 +14,7 @@
 #include "tests/support/random.h"
 #include "tests/support/thorough.h"
 
-namespace ressort {
+namespace ressort::ask_test {
 namespace {
 
 constexpr double rate_hz = 44100.0;
@@ -384,4 +384,4 @@ TEST_CASE("a longer blow is darker, as the sound of the same pulse has it", "[as
   CHECK(told(length / rate_hz, StruckAs::samples) < 0.7 * told(0.0, StruckAs::samples));
 }
 
-}  // namespace ressort
+}  // namespace ressort::ask_test

@@ -2,7 +2,7 @@
 #include "tests/support/growth.h"
 #include "tests/support/random.h"
 
-namespace ressort {
+namespace ressort::bound_test {
 namespace {
 
 using namespace support;
@@ -130,4 +130,4 @@ TEST_CASE("on random networks the bound is safe, and within a factor of two of t
 }
 
 }  // namespace
-}  // namespace ressort
+}  // namespace ressort::bound_test

@@ -8,7 +8,7 @@
 #include "tests/support/random.h"
 #include "tests/support/rooms.h"
 
-namespace ressort {
+namespace ressort::cholesky_test {
 namespace {
 
 // Gauss and Jordan, of a matrix row by row.
@@ -74,4 +74,4 @@ TEST_CASE("The diagonal of the inverse is that of the inverse", "[cholesky]") {
 }
 
 }  // namespace
-}  // namespace ressort
+}  // namespace ressort::cholesky_test

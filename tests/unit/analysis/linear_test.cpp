@@ -4,7 +4,7 @@
 
 #include "tests/support/harness.h"
 
-namespace ressort {
+namespace ressort::linear_test {
 namespace {
 
 using support::network_of;
@@ -134,4 +134,4 @@ TEST_CASE("a matrix that cannot be factored has no lowest mode", "[linear]") {
   CHECK_FALSE(lowest_mode(expand_macros(network), parameter_values(network)));
 }
 
-}  // namespace ressort
+}  // namespace ressort::linear_test

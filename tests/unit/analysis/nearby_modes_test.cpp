@@ -9,7 +9,7 @@
 #include "tests/support/harness.h"
 #include "tests/support/networks/reference_network.h"
 
-namespace ressort {
+namespace ressort::nearby_modes_test {
 namespace {
 
 using Complex = std::complex<double>;
@@ -182,4 +182,4 @@ TEST_CASE("modes of one frequency that a change tells apart are found anew", "[n
   }
 }
 
-}  // namespace ressort
+}  // namespace ressort::nearby_modes_test

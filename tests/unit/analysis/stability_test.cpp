@@ -7,7 +7,7 @@
 #include "tests/support/dense.h"
 #include "tests/support/growth.h"
 
-namespace ressort {
+namespace ressort::stability_test {
 
 // --- the exact proof ----------------------------------------------------------------------------
 
@@ -518,4 +518,4 @@ TEST_CASE("a formula's range holds all its values", "[stability]") {
   }
 }
 
-}  // namespace ressort
+}  // namespace ressort::stability_test

@@ -15,8 +15,9 @@
 #include "tests/support/random.h"
 #include "tests/support/rooms.h"
 
-using namespace ressort;
-using namespace ressort::support;
+namespace ressort::timbre_test {
+
+using namespace support;
 
 namespace {
 
@@ -491,3 +492,5 @@ TEST_CASE("The transform is the sum that it is defined as, of any size", "[timbr
     }
   }
 }
+
+}  // namespace ressort::timbre_test

@@ -12,7 +12,7 @@
 #include "core/solids/solid_modes.h"
 #include "tests/support/harness.h"
 
-namespace ressort {
+namespace ressort::bells_test {
 namespace {
 
 using namespace support;
@@ -122,4 +122,4 @@ TEST_CASE("the bells' partials are those of their solids", "[.][bells_everywhere
   }
 }
 
-}  // namespace ressort
+}  // namespace ressort::bells_test

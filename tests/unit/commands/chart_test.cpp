@@ -13,7 +13,7 @@
 #include "tests/support/harness.h"
 #include "tests/support/networks/reference_network.h"
 
-namespace ressort {
+namespace ressort::chart_test {
 namespace {
 
 ChartScene scene_called(const std::string& name) {
@@ -234,4 +234,4 @@ TEST_CASE("the ways cover no less than they did", "[chart]") {
   }
 }
 
-}  // namespace ressort
+}  // namespace ressort::chart_test

@@ -14,7 +14,7 @@
 #include "tests/support/catch.h"
 #include "tests/support/rooms.h"
 
-namespace ressort {
+namespace ressort::description_test {
 namespace {
 
 constexpr double rate = 48000.0;
@@ -198,4 +198,4 @@ TEST_CASE("a model's modes are described as its render is", "[description]") {
   }
 }
 
-}  // namespace ressort
+}  // namespace ressort::description_test

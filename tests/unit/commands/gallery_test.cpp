@@ -8,7 +8,7 @@
 #include "tests/support/catch.h"
 #include "tests/support/rooms.h"
 
-namespace ressort {
+namespace ressort::gallery_test {
 namespace {
 
 constexpr double rate_hz = 48000.0;
@@ -142,4 +142,4 @@ TEST_CASE("a page escapes what people wrote", "[gallery]") {
   CHECK(page.find("<no>") == page.npos);
 }
 
-}  // namespace ressort
+}  // namespace ressort::gallery_test

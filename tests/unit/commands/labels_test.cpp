@@ -4,7 +4,7 @@
 #include "tests/support/random.h"
 #include "tests/support/rooms.h"
 
-using namespace ressort;
+namespace ressort::labels_test {
 
 namespace {
 
@@ -52,3 +52,5 @@ TEST_CASE("In a corner a label turns inwards", "[labels]") {
 }
 
 }  // namespace
+
+}  // namespace ressort::labels_test

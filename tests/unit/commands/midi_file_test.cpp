@@ -8,7 +8,7 @@
 #include "tests/support/app/data_folder.h"
 #include "tests/support/rooms.h"
 
-namespace ressort {
+namespace ressort::midi_file_test {
 namespace {
 
 using Bytes = std::vector<std::uint8_t>;
@@ -177,4 +177,4 @@ TEST_CASE("a rendered song begins at its frame and ends when it is silent", "[mi
   CHECK(static_cast<double>(rendered->frames) < 20.0 * 48000.0);
 }
 
-}  // namespace ressort
+}  // namespace ressort::midi_file_test

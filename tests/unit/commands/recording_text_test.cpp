@@ -9,8 +9,9 @@
 #include "tests/support/harness.h"
 #include "tests/support/ringing.h"
 
-using namespace ressort;
-using namespace ressort::support;
+namespace ressort::recording_text_test {
+
+using namespace support;
 
 namespace {
 
@@ -88,3 +89,5 @@ TEST_CASE("The picture has a mark and a bar for each mode", "[recording_text]") 
   CHECK(svg.find("nan") == std::string::npos);
   CHECK(svg.find("inf") == std::string::npos);
 }
+
+}  // namespace ressort::recording_text_test

@@ -15,7 +15,7 @@
 #include "tests/support/solids.h"
 #include "tests/support/thorough.h"
 
-namespace ressort {
+namespace ressort::solid_body_test {
 namespace {
 
 using namespace support;
@@ -352,4 +352,4 @@ TEST_CASE("the picture shows what is in front, coloured by how far it moves", "[
 }
 
 }  // namespace
-}  // namespace ressort
+}  // namespace ressort::solid_body_test

@@ -10,7 +10,7 @@
 #include "tests/support/catch.h"
 #include "tests/support/rooms.h"
 
-namespace ressort {
+namespace ressort::sweep_test {
 namespace {
 
 std::string told(const std::string& text) {
@@ -111,4 +111,4 @@ TEST_CASE("a sweep that cannot be, or is stopped, writes nothing", "[sweep]") {
   CHECK(text_of(folder.file("out.svg")).empty());
 }
 
-}  // namespace ressort
+}  // namespace ressort::sweep_test

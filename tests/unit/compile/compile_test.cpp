@@ -3,7 +3,7 @@
 
 #include "tests/support/player.h"
 
-namespace ressort {
+namespace ressort::compile_test {
 namespace {
 
 using namespace support;
@@ -179,4 +179,4 @@ TEST_CASE("at another rate a network keeps its pitch and decay, unless told not 
   CHECK(ring(88200.0, false).first == Approx(2.0 * hz).margin(4.1));
 }
 
-}  // namespace ressort
+}  // namespace ressort::compile_test

@@ -6,7 +6,7 @@
 #include "core/kernels/domains/sharded.h"
 #include "tests/support/player.h"
 
-namespace ressort {
+namespace ressort::excerpts_test {
 namespace {
 
 using namespace support;
@@ -101,4 +101,4 @@ TEST_CASE("what is not alike everywhere is written out", "[excerpts]") {
   CHECK_FALSE(is_excerpted("@s string 100000 1. 1.001 0. 0. 0.\n@out1 posOutput [@s 0.5]\n"));
 }
 
-}  // namespace ressort
+}  // namespace ressort::excerpts_test

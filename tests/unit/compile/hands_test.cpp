@@ -3,7 +3,7 @@
 
 #include "tests/support/player.h"
 
-namespace ressort {
+namespace ressort::hands_test {
 namespace {
 
 using namespace support;
@@ -106,4 +106,4 @@ TEST_CASE("a swing is of a touch that touches something", "[hands]") {
                   hand) == "'in2' touches nothing: a swing needs a contact or a pluck there");
 }
 
-}  // namespace ressort
+}  // namespace ressort::hands_test

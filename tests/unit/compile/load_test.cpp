@@ -17,7 +17,7 @@
 #include "tests/support/heap.h"
 #include "tests/support/random.h"
 
-using namespace ressort;
+namespace ressort::load_test {
 
 namespace {
 
@@ -267,3 +267,5 @@ TEST_CASE("Voices that do not fit into memory are refused with what would fit", 
   REQUIRE_FALSE(hopeless);
   CHECK(hopeless.error().message.find("use a smaller model") != std::string::npos);
 }
+
+}  // namespace ressort::load_test

@@ -7,7 +7,7 @@
 #include "tests/support/networks/random_network.h"
 #include "tests/support/player.h"
 
-namespace ressort {
+namespace ressort::reduce_test {
 namespace {
 
 using support::network_of;
@@ -188,4 +188,4 @@ TEST_CASE("a mass too light for its springs is merged before it explodes", "[red
   CHECK(lowest_mode(merged->network, {})->stiffness == Approx(.004 * .005 / .009).epsilon(1e-12));
 }
 
-}  // namespace ressort
+}  // namespace ressort::reduce_test

@@ -7,7 +7,7 @@
 #include "tests/support/player.h"
 #include "tests/support/poles.h"
 
-namespace ressort {
+namespace ressort::stability_check_test {
 namespace {
 
 using namespace support;
@@ -560,4 +560,4 @@ TEST_CASE("a limit is told in six digits, on its inner side", "[stability_check]
   CHECK(std::isinf(inside_limit(std::numeric_limits<double>::infinity(), true)));
 }
 
-}  // namespace ressort
+}  // namespace ressort::stability_check_test

@@ -8,7 +8,7 @@
 #include "core/model/number_check.h"
 #include "tests/support/player.h"
 
-namespace ressort {
+namespace ressort::stages_test {
 namespace {
 
 using namespace support;
@@ -188,4 +188,4 @@ TEST_CASE("the gain of a blow on one mass is what its height asks for", "[stages
   CHECK(*gain == Approx(0.5 / 0.08).epsilon(1e-12));
 }
 
-}  // namespace ressort
+}  // namespace ressort::stages_test

@@ -12,7 +12,7 @@
 #include "tests/support/app/console_harness.h"
 #include "tests/support/catch.h"
 
-namespace ressort {
+namespace ressort::console_test {
 namespace {
 
 bool contains(const std::vector<std::string>& words, const std::string& word) {
@@ -435,4 +435,4 @@ TEST_CASE("a terminal that waits for a line is interrupted", "[console]") {
   CHECK(harness.said.empty());
 }
 
-}  // namespace ressort
+}  // namespace ressort::console_test

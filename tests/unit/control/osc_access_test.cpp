@@ -14,7 +14,7 @@
 #include "tests/support/app/osc_client.h"
 #include "tests/support/catch.h"
 
-namespace ressort {
+namespace ressort::osc_access_test {
 namespace {
 
 constexpr std::int64_t ms = 1'000'000;
@@ -496,4 +496,4 @@ TEST_CASE("no word of a file is in an answer", "[osc_access]") {
         "there is no model 'x'; there are y, z");
 }
 
-}  // namespace ressort
+}  // namespace ressort::osc_access_test

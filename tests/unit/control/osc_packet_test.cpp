@@ -4,7 +4,7 @@
 #include "tests/support/catch.h"
 #include "tests/support/rooms.h"
 
-namespace ressort {
+namespace ressort::osc_packet_test {
 namespace {
 
 TEST_CASE("check_packet gives the messages of good packets", "[osc_packet]") {
@@ -87,4 +87,4 @@ TEST_CASE("check_packet refuses every kind of bad packet", "[osc_packet]") {
 }
 
 }  // namespace
-}  // namespace ressort
+}  // namespace ressort::osc_packet_test

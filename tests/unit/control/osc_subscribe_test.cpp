@@ -6,7 +6,7 @@
 #include "tests/support/app/console_harness.h"
 #include "tests/support/app/osc_client.h"
 
-namespace ressort {
+namespace ressort::osc_subscribe_test {
 namespace {
 
 struct OscHarness {
@@ -160,4 +160,4 @@ TEST_CASE("a velocity is MIDI's as a whole number, a share as a float", "[osc_su
   CHECK(velocity(1.0, "") == 1.0 / 127.0);        // of a score
 }
 
-}  // namespace ressort
+}  // namespace ressort::osc_subscribe_test

@@ -18,7 +18,7 @@
 #include "tests/support/app/osc_client.h"
 #include "tests/support/catch.h"
 
-namespace ressort {
+namespace ressort::osc_test {
 namespace {
 
 constexpr double rate_hz = 48000.0;
@@ -505,4 +505,4 @@ TEST_CASE("ten thousand broken packets leave the server and the sound whole", "[
 }
 
 }  // namespace
-}  // namespace ressort
+}  // namespace ressort::osc_test

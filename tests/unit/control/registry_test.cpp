@@ -5,7 +5,7 @@
 
 #include "tests/support/player.h"
 
-namespace ressort {
+namespace ressort::registry_test {
 namespace {
 
 using namespace support;
@@ -416,4 +416,4 @@ TEST_CASE("no pattern takes long or leaves its text", "[registry]") {
   }
 }
 
-}  // namespace ressort
+}  // namespace ressort::registry_test

@@ -6,7 +6,7 @@
 #include "tests/support/app/osc_client.h"
 #include "tests/support/pitch.h"
 
-namespace ressort {
+namespace ressort::shape_told_test {
 namespace {
 
 const char* const string_text =
@@ -150,4 +150,4 @@ TEST_CASE("OSC shapes what sounds and answers with figures", "[shape_told]") {
   CHECK(has(client.ask(message("/timbre/target", {"centroit", 3.0F})).text(1), "did you mean"));
 }
 
-}  // namespace ressort
+}  // namespace ressort::shape_told_test

@@ -3,7 +3,7 @@
 #include "app/devices/midi_input.h"
 #include "tests/support/app/process_harness.h"
 
-namespace ressort {
+namespace ressort::flood_test {
 
 using namespace support;
 
@@ -248,4 +248,4 @@ TEST_CASE("the audio thread allocates nothing in a flood", "[flood]") {
   CHECK(harness.heap_calls == 0);
 }
 
-}  // namespace ressort
+}  // namespace ressort::flood_test

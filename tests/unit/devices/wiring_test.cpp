@@ -6,7 +6,7 @@
 #include "tests/support/catch.h"
 #include "tests/support/rooms.h"
 
-namespace ressort {
+namespace ressort::wiring_test {
 namespace {
 
 const Cable speaker{"out_left", "system:playback_1"};
@@ -85,4 +85,4 @@ TEST_CASE("a port that has gone and come back between two looks was not pulled",
   CHECK(wiring.missing() == std::vector<Cable>{keyboard});
 }
 
-}  // namespace ressort
+}  // namespace ressort::wiring_test

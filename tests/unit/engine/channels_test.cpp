@@ -4,7 +4,7 @@
 #include "tests/support/pitch.h"
 #include "tests/support/player.h"
 
-namespace ressort {
+namespace ressort::channels_test {
 namespace {
 
 using namespace support;
@@ -294,4 +294,4 @@ TEST_CASE("the soft pedal softens what is struck while it is down", "[channels]"
   CHECK(heard({turned(4, 0, 67, 127), note_on(0, 60)}) == plain);
 }
 
-}  // namespace ressort
+}  // namespace ressort::channels_test

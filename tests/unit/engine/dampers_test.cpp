@@ -6,7 +6,7 @@
 #include "tests/support/catch.h"
 #include "tests/support/player.h"
 
-namespace ressort {
+namespace ressort::dampers_test {
 namespace {
 
 using support::controller;
@@ -324,4 +324,4 @@ TEST_CASE("DC is blocked at 5 Hz, and nothing above 60 Hz is touched", "[dampers
 }
 
 }  // namespace
-}  // namespace ressort
+}  // namespace ressort::dampers_test

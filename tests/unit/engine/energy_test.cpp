@@ -5,7 +5,7 @@
 #include "tests/support/networks/random_network.h"
 #include "tests/support/player.h"
 
-namespace ressort {
+namespace ressort::energy_test {
 namespace {
 
 using support::show;
@@ -348,4 +348,4 @@ TEST_CASE("What could still touch something, or drift, is not put to sleep", "[e
   CHECK(saved(string + "@w ground 1.\n@l springDamper @w @s_m5 0.001 0.\n") < 1.0);
 }
 
-}  // namespace ressort
+}  // namespace ressort::energy_test

@@ -6,7 +6,7 @@
 #include "tests/support/pitch.h"
 #include "tests/support/player.h"
 
-namespace ressort {
+namespace ressort::engine_test {
 namespace {
 
 using namespace support;
@@ -488,4 +488,4 @@ TEST_CASE("process() never calls the heap", "[engine]") {
   CHECK((watch.calls() >= 1) == heap_is_counted);
 }
 
-}  // namespace ressort
+}  // namespace ressort::engine_test

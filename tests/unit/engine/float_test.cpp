@@ -2,7 +2,7 @@
 #include "app/realtime/denormals.h"
 #include "tests/support/player.h"
 
-namespace ressort {
+namespace ressort::float_test {
 namespace {
 
 using support::Bare;
@@ -245,4 +245,4 @@ TEST_CASE("an engine plays compensated, hands and all", "[float]") {
   CHECK(found.heap_calls == 0);
 }
 
-}  // namespace ressort
+}  // namespace ressort::float_test

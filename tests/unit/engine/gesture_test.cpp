@@ -4,7 +4,7 @@
 #include "tests/support/networks/reference_network.h"
 #include "tests/support/player.h"
 
-namespace ressort {
+namespace ressort::gesture_test {
 namespace {
 
 using namespace support;
@@ -439,4 +439,4 @@ TEST_CASE("noise is shaped by the outputs, and the same in every run", "[gesture
   CHECK(std::fabs(power - 1.0 / 3.0) < 0.011);  // and of its square
 }
 
-}  // namespace ressort
+}  // namespace ressort::gesture_test

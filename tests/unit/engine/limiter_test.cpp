@@ -3,7 +3,7 @@
 
 #include "tests/support/player.h"
 
-namespace ressort {
+namespace ressort::limiter_test {
 namespace {
 
 using namespace support;
@@ -166,4 +166,4 @@ TEST_CASE("all channels share one gain", "[limiter]") {
   CHECK(limiter.take_reduction() == 1.0);
 }
 
-}  // namespace ressort
+}  // namespace ressort::limiter_test

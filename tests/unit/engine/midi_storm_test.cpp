@@ -3,7 +3,7 @@
 #include "app/realtime/midi.h"
 #include "tests/support/player.h"
 
-namespace ressort {
+namespace ressort::midi_storm_test {
 namespace {
 
 using namespace support;
@@ -147,4 +147,4 @@ TEST_CASE("a million messages leave no note that is stuck", "[midi_storm]") {
   }
 }
 
-}  // namespace ressort
+}  // namespace ressort::midi_storm_test

@@ -9,7 +9,7 @@
 #include "tests/support/comparison.h"
 #include "tests/support/random.h"
 
-namespace ressort {
+namespace ressort::mixer_test {
 namespace {
 
 using support::Random;
@@ -188,4 +188,4 @@ TEMPLATE_TEST_CASE("nothing is mixed where a voice that is heard is beyond its b
   });
 }
 
-}  // namespace ressort
+}  // namespace ressort::mixer_test

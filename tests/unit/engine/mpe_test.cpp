@@ -4,7 +4,7 @@
 #include "tests/support/pitch.h"
 #include "tests/support/player.h"
 
-namespace ressort {
+namespace ressort::mpe_test {
 namespace {
 
 using namespace support;
@@ -385,4 +385,4 @@ TEST_CASE("a note has the frequency that it says, and no retuned key moves it", 
   }
 }
 
-}  // namespace ressort
+}  // namespace ressort::mpe_test

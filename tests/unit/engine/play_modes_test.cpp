@@ -4,7 +4,7 @@
 #include "tests/support/pitch.h"
 #include "tests/support/player.h"
 
-namespace ressort {
+namespace ressort::play_modes_test {
 namespace {
 
 using namespace support;
@@ -380,4 +380,4 @@ TEST_CASE("what a sound is flat of its mode is made up for by points of keys", "
   }
 }
 
-}  // namespace ressort
+}  // namespace ressort::play_modes_test

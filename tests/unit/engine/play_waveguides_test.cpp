@@ -5,7 +5,7 @@
 #include "tests/support/pitch.h"
 #include "tests/support/player.h"
 
-namespace ressort {
+namespace ressort::play_waveguides_test {
 namespace {
 
 using namespace support;
@@ -91,4 +91,4 @@ TEST_CASE("springs to a waveguide need no proof, those among masses do", "[play_
             .verdict == Verdict::unproved);
 }
 
-}  // namespace ressort
+}  // namespace ressort::play_waveguides_test

@@ -9,7 +9,7 @@
 #include "core/model/language/expression.h"
 #include "tests/support/player.h"
 
-namespace ressort {
+namespace ressort::rate_test {
 namespace {
 
 using namespace support;
@@ -191,4 +191,4 @@ TEST_CASE("numbers that are taken raw give the same samples at every rate", "[ra
   }
 }
 
-}  // namespace ressort
+}  // namespace ressort::rate_test

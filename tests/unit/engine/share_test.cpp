@@ -7,7 +7,7 @@
 #include "core/engine/midi/note_share.h"
 #include "tests/support/harness.h"
 
-using namespace ressort;
+namespace ressort::share_test {
 
 namespace {
 
@@ -115,3 +115,5 @@ TEST_CASE("new keys go round, and a key stays where it was", "[share]") {
   second.begin_anew();
   CHECK(takers(0, 64) == std::pair(true, false));
 }
+
+}  // namespace ressort::share_test

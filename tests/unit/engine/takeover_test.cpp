@@ -8,7 +8,7 @@
 #include "app/session/session.h"
 #include "tests/support/player.h"
 
-namespace ressort {
+namespace ressort::takeover_test {
 namespace {
 
 using support::Player;
@@ -182,4 +182,4 @@ TEST_CASE("A large mesh sounds at once, and by its modes when they are found", "
 }
 
 }  // namespace
-}  // namespace ressort
+}  // namespace ressort::takeover_test

@@ -7,7 +7,7 @@
 #include "tests/support/player.h"
 #include "tests/support/thorough.h"
 
-namespace ressort {
+namespace ressort::watch_test {
 namespace {
 
 using support::Player;
@@ -305,4 +305,4 @@ TEST_CASE("Who sleeps is taken over asleep, and wakes the same", "[watch]") {
 }
 
 }  // namespace
-}  // namespace ressort
+}  // namespace ressort::watch_test

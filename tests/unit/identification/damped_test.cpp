@@ -5,8 +5,9 @@
 #include "core/identification/spectrum.h"
 #include "tests/support/ringing.h"
 
-using namespace ressort;
-using namespace ressort::support;
+namespace ressort::damped_test {
+
+using namespace support;
 
 TEST_CASE("Power sums are the sums, near 1 and far from it", "[damped]") {
   Random random(1);
@@ -96,3 +97,5 @@ TEST_CASE("A fit finds the modes from wrong starts, and never gets worse", "[dam
     CHECK(fit.rest_energy() < 1e-12);
   }
 }
+
+}  // namespace ressort::damped_test

@@ -5,8 +5,9 @@
 #include "core/identification/shapes.h"
 #include "tests/support/ringing.h"
 
-using namespace ressort;
-using namespace ressort::support;
+namespace ressort::identify_test {
+
+using namespace support;
 
 namespace {
 
@@ -411,3 +412,5 @@ TEST_CASE("A body of what was found answers one impulse with the recording", "[i
   }
   CHECK(most == Approx(1.0));
 }
+
+}  // namespace ressort::identify_test

@@ -5,7 +5,7 @@
 #include "core/laws/laws.h"
 #include "tests/support/passive.h"
 
-namespace ressort {
+namespace ressort::batch_test {
 namespace {
 
 using support::Comparison;
@@ -400,4 +400,4 @@ TEST_CASE("voices are the same whether others play behind them or not", "[batch]
   }
 }
 
-}  // namespace ressort
+}  // namespace ressort::batch_test

@@ -4,7 +4,7 @@
 #include "core/kernels/chains/chains_form.h"
 #include "tests/support/comparison.h"
 
-namespace ressort {
+namespace ressort::chains_test {
 namespace {
 
 using support::Comparison;
@@ -430,4 +430,4 @@ TEST_CASE("a reset string starts over, whatever became of it", "[chains]") {
   }
 }
 
-}  // namespace ressort
+}  // namespace ressort::chains_test

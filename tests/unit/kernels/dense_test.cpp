@@ -5,7 +5,7 @@
 #include "core/kernels/dense/dense_form.h"
 #include "tests/support/comparison.h"
 
-namespace ressort {
+namespace ressort::dense_test {
 namespace {
 
 using support::compare_kernels;
@@ -306,4 +306,4 @@ TEST_CASE("a dense body starts again as it started", "[dense]") {
   CHECK(play() == first);
 }
 
-}  // namespace ressort
+}  // namespace ressort::dense_test

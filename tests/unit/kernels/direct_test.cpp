@@ -6,7 +6,7 @@
 #include "tests/support/networks/reference_network.h"
 #include "tests/support/passive.h"
 
-namespace ressort {
+namespace ressort::direct_test {
 namespace {
 
 using scenes::Example;
@@ -502,4 +502,4 @@ TEST_CASE("impulse values of the triangle and of the string of 50", "[direct]") 
        {44100, 0, -1.721404002942093605e-2}});
 }
 
-}  // namespace ressort
+}  // namespace ressort::direct_test

@@ -6,7 +6,7 @@
 #include "tests/support/comparison.h"
 #include "tests/support/poles.h"
 
-namespace ressort {
+namespace ressort::fourth_test {
 namespace {
 
 using support::Bare;
@@ -327,4 +327,4 @@ TEST_CASE("a budget for pitch or decay gets the fourth-order form where it is ne
   CHECK(method_for(heavy, {.cents = 3.0}) != Method::fourth);  // K + 6Z > 12M
 }
 
-}  // namespace ressort
+}  // namespace ressort::fourth_test

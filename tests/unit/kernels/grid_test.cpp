@@ -6,7 +6,7 @@
 #include "core/kernels/grid/grid_form.h"
 #include "tests/support/comparison.h"
 
-namespace ressort {
+namespace ressort::grid_test {
 namespace {
 
 using support::Comparison;
@@ -305,4 +305,4 @@ TEST_CASE("What is not regular is no grid", "[grid]") {
   CHECK(!grid_form(program_of(scenes::mesh_20x30() + "@out3 frcOutput @mesh_m2_6\n")));
 }
 
-}  // namespace ressort
+}  // namespace ressort::grid_test

@@ -7,8 +7,9 @@
 #include "core/laws/laws.h"
 #include "tests/support/comparison.h"
 
-using namespace ressort;
-using namespace ressort::support;
+namespace ressort::halo_test {
+
+using namespace support;
 
 namespace {
 
@@ -382,3 +383,5 @@ TEST_CASE("kernels in shards are placed and saved as one", "[halo]") {
   CHECK(saved_x == x);
   CHECK(saved_v == v);
 }
+
+}  // namespace ressort::halo_test

@@ -2,7 +2,7 @@
 #include "core/kernels/modal/modal_form.h"
 #include "tests/support/comparison.h"
 
-namespace ressort {
+namespace ressort::modal_test {
 namespace {
 
 using support::compare_kernels;
@@ -241,4 +241,4 @@ TEST_CASE("The large mesh is plucked and touched in its modes", "[modal]") {
 }
 
 }  // namespace
-}  // namespace ressort
+}  // namespace ressort::modal_test

@@ -6,7 +6,7 @@
 #include "core/kernels/modal/modal_form.h"
 #include "tests/support/comparison.h"
 
-namespace ressort {
+namespace ressort::modes_asleep_test {
 namespace {
 
 using support::Fighter;
@@ -289,4 +289,4 @@ TEST_CASE("A voice that starts again has forgotten who slept", "[modes_asleep]")
 }
 
 }  // namespace
-}  // namespace ressort
+}  // namespace ressort::modes_asleep_test

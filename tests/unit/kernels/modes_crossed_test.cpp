@@ -3,7 +3,7 @@
 
 #include "tests/support/modes.h"
 
-namespace ressort {
+namespace ressort::modes_crossed_test {
 namespace {
 
 using support::check_same;
@@ -412,4 +412,4 @@ TEST_CASE("Where crossed modes are of no use", "[modes_crossed]") {
 }
 
 }  // namespace
-}  // namespace ressort
+}  // namespace ressort::modes_crossed_test

@@ -5,7 +5,7 @@
 #include "core/kernels/modal/modal_form.h"
 #include "tests/support/comparison.h"
 
-namespace ressort {
+namespace ressort::modes_exact_test {
 namespace {
 
 using support::Comparison;
@@ -272,4 +272,4 @@ TEST_CASE("How far off the published scheme is", "[modes_exact]") {
 }
 
 }  // namespace
-}  // namespace ressort
+}  // namespace ressort::modes_exact_test

@@ -5,7 +5,7 @@
 #include "tests/support/comparison.h"
 #include "tests/support/networks/random_network.h"
 
-namespace ressort {
+namespace ressort::modes_left_out_test {
 namespace {
 
 double factor_at(const ModalShare& share, std::size_t mode) {
@@ -291,4 +291,4 @@ TEST_CASE("Without a budget every mode that is heard is there", "[modes_left_out
 }
 
 }  // namespace
-}  // namespace ressort
+}  // namespace ressort::modes_left_out_test

@@ -3,7 +3,7 @@
 #include "tests/support/modes.h"
 #include "tests/support/thorough.h"
 
-namespace ressort {
+namespace ressort::modes_passive_test {
 namespace {
 
 using support::check_same;
@@ -298,4 +298,4 @@ TEST_CASE("Modes that are left out give way to passive links as well", "[modes_p
 }
 
 }  // namespace
-}  // namespace ressort
+}  // namespace ressort::modes_passive_test

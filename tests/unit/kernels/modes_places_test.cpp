@@ -1,7 +1,7 @@
 // Places on macros in the modes: sums of masses, as the direct kernel has them.
 #include "tests/support/modes.h"
 
-namespace ressort {
+namespace ressort::modes_places_test {
 namespace {
 
 using support::check_same;
@@ -119,4 +119,4 @@ TEST_CASE("A place that a parameter moves is left to the direct kernel", "[modes
 }
 
 }  // namespace
-}  // namespace ressort
+}  // namespace ressort::modes_places_test

@@ -2,7 +2,7 @@
 #include "core/kernels/oversampled/oversampled_form.h"
 #include "tests/support/harness.h"
 
-namespace ressort {
+namespace ressort::oversampled_test {
 namespace {
 
 using support::Bare;
@@ -90,4 +90,4 @@ TEST_CASE("coefficients on their way and states go through to the finer steps", 
 }
 
 }  // namespace
-}  // namespace ressort
+}  // namespace ressort::oversampled_test

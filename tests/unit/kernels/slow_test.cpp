@@ -4,7 +4,7 @@
 #include "tests/support/player.h"
 #include "tests/support/poles.h"
 
-namespace ressort {
+namespace ressort::slow_test {
 namespace {
 
 using support::Bare;
@@ -219,4 +219,4 @@ TEST_CASE("only a budget makes a part slow", "[slow]") {
   CHECK(slow.heap_calls == 0);
 }
 
-}  // namespace ressort
+}  // namespace ressort::slow_test

@@ -11,7 +11,7 @@
 #include "tests/support/random.h"
 #include "tests/support/rooms.h"
 
-namespace ressort {
+namespace ressort::laws_test {
 namespace {
 
 using support::Random;
@@ -368,4 +368,4 @@ TEST_CASE("what is printed of a link of any law is read as the same", "[laws]") 
   });
 }
 
-}  // namespace ressort
+}  // namespace ressort::laws_test

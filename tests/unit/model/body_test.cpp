@@ -7,7 +7,7 @@
 #include "tests/support/app/messages.h"
 #include "tests/support/harness.h"
 
-namespace ressort {
+namespace ressort::body_test {
 namespace {
 
 using namespace support;
@@ -113,4 +113,4 @@ TEST_CASE("bodies are printed as they are read", "[body]") {
   CHECK(network_of(printed) == network);
 }
 
-}  // namespace ressort
+}  // namespace ressort::body_test

@@ -4,7 +4,7 @@
 #include "tests/support/catch.h"
 #include "tests/support/rooms.h"
 
-using namespace ressort;
+namespace ressort::budget_test {
 
 TEST_CASE("a budget is read, and printed back", "[budget]") {
   const auto budget = parse_budget("  silence=-60 cents=3  t60=2.5 passive=always ");
@@ -47,3 +47,5 @@ TEST_CASE("what is wrong with a budget is told with its place", "[budget]") {
   CHECK(preset.errors[0].line == 2);
   CHECK(preset.errors[0].message == "'budget': 'cents' must be above 0, up to 1200, found '-1'");
 }
+
+}  // namespace ressort::budget_test

@@ -12,7 +12,7 @@
 #include "tests/support/harness.h"
 #include "tests/support/networks/reference_network.h"
 
-namespace ressort {
+namespace ressort::corpus_test {
 namespace {
 
 using support::show;
@@ -295,4 +295,4 @@ TEST_CASE("the corpus uses every keyword, and the table every file", "[corpus]")
   }
 }
 
-}  // namespace ressort
+}  // namespace ressort::corpus_test

@@ -6,7 +6,7 @@
 
 #include "tests/support/harness.h"
 
-namespace ressort {
+namespace ressort::expression_test {
 namespace {
 
 const std::vector<std::string> names = {"p", "q2", "a_K"};
@@ -190,4 +190,4 @@ TEST_CASE("a formula as text and its value agree with the same sum written here"
   }
 }
 
-}  // namespace ressort
+}  // namespace ressort::expression_test

@@ -9,7 +9,7 @@
 #include "tests/support/catch.h"
 #include "tests/support/harness.h"
 
-using namespace ressort;
+namespace ressort::faust_test {
 
 namespace {
 
@@ -185,3 +185,5 @@ TEST_CASE("FAUST has no program without an output", "[faust]") {
 TEST_CASE("macros count as what they stand for", "[faust]") {
   CHECK(faust_elements(support::network_of("@s string 5 1. 0.1 0.01 0. 0.\n")) == 5 + 4);
 }
+
+}  // namespace ressort::faust_test

@@ -12,7 +12,7 @@
 #include "tests/support/harness.h"
 #include "tests/support/networks/reference_network.h"
 
-namespace ressort {
+namespace ressort::generate_test {
 namespace {
 
 Network made(const Shape& shape) {
@@ -309,4 +309,4 @@ TEST_CASE("what makes no model is refused with a reason", "[generate]") {
   CHECK(generate({.kind = ShapeKind::mesh, .length = 2000, .width = 2000, .as_macro = true}));
 }
 
-}  // namespace ressort
+}  // namespace ressort::generate_test

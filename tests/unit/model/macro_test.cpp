@@ -6,7 +6,7 @@
 #include "tests/support/app/messages.h"
 #include "tests/support/harness.h"
 
-namespace ressort {
+namespace ressort::macro_test {
 namespace {
 
 using namespace support;
@@ -346,4 +346,4 @@ TEST_CASE("the force at a place is that of the nodes around it, inputs included"
   CHECK(bare.step({0.0}) == std::vector{0.0, 0.0, 0.0, 1.0});
 }
 
-}  // namespace ressort
+}  // namespace ressort::macro_test

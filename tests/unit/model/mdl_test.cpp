@@ -9,7 +9,7 @@
 #include "tests/support/catch.h"
 #include "tests/support/harness.h"
 
-namespace ressort {
+namespace ressort::mdl_test {
 namespace {
 
 using support::network_of;
@@ -444,4 +444,4 @@ TEST_CASE("labels of any length are kept, and copied with their network", "[mdl]
   }
 }
 
-}  // namespace ressort
+}  // namespace ressort::mdl_test

@@ -11,7 +11,7 @@
 #include "tests/support/harness.h"
 #include "tests/support/networks/scenes.h"
 
-using namespace ressort;
+namespace ressort::models_test {
 
 namespace {
 
@@ -109,3 +109,5 @@ TEST_CASE("every preset has two ears, a forte between -22 and -1 dBFS, and 14 to
     CHECK(levels_db[3] - levels_db[0] < 34.0);
   }
 }
+
+}  // namespace ressort::models_test

@@ -5,7 +5,7 @@
 #include "tests/support/catch.h"
 #include "tests/support/harness.h"
 
-namespace ressort {
+namespace ressort::motion_test {
 namespace {
 
 constexpr ThirdArgument delayed = ThirdArgument::delayed_position;
@@ -171,4 +171,4 @@ TEST_CASE("a meaning that is none, and two that differ, are errors", "[motion]")
   CHECK(parse_network("~motion velocity\n~motion velocity # again\n@a mass 1 0 0").ok());
 }
 
-}  // namespace ressort
+}  // namespace ressort::motion_test

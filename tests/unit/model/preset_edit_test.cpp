@@ -4,7 +4,7 @@
 #include "tests/support/catch.h"
 #include "tests/support/rooms.h"
 
-namespace ressort {
+namespace ressort::preset_edit_test {
 namespace {
 
 const std::string text =
@@ -134,4 +134,4 @@ TEST_CASE("a printed preset reads as what it is", "[preset_edit]") {
   CHECK(read.preset == preset);
 }
 
-}  // namespace ressort
+}  // namespace ressort::preset_edit_test

@@ -5,7 +5,7 @@
 #include "core/model/preset/fit.h"
 #include "tests/support/harness.h"
 
-namespace ressort {
+namespace ressort::preset_test {
 namespace {
 
 using support::network_of;
@@ -496,4 +496,4 @@ TEST_CASE("without a preset a model is played by what its links ask for", "[pres
   }
 }
 
-}  // namespace ressort
+}  // namespace ressort::preset_test

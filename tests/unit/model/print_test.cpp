@@ -10,7 +10,7 @@
 #include "tests/support/catch.h"
 #include "tests/support/harness.h"
 
-namespace ressort {
+namespace ressort::print_test {
 namespace {
 
 using support::network_of;
@@ -508,4 +508,4 @@ TEST_CASE("two thousand networks come back from their texts as they were", "[pri
   }
 }
 
-}  // namespace ressort
+}  // namespace ressort::print_test

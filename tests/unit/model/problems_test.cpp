@@ -13,7 +13,7 @@
 #include "tests/support/catch.h"
 #include "tests/support/harness.h"
 
-namespace ressort {
+namespace ressort::problems_test {
 namespace {
 
 using messages::check_error;
@@ -156,4 +156,4 @@ TEST_CASE("arithmetic that goes wrong is told where it does", "[problems]") {
   told(sum, 266, "the expression is too long");
 }
 
-}  // namespace ressort
+}  // namespace ressort::problems_test

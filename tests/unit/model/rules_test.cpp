@@ -14,7 +14,7 @@
 #include "tests/support/catch.h"
 #include "tests/support/harness.h"
 
-namespace ressort {
+namespace ressort::rules_test {
 namespace {
 
 using messages::check_error;
@@ -492,4 +492,4 @@ TEST_CASE("a force and a hand act in the tick in which they come", "[rules]") {
   CHECK(pulled.step({1.0}) == std::vector{1.0, 0.25, -0.375, 0.375});
 }
 
-}  // namespace ressort
+}  // namespace ressort::rules_test

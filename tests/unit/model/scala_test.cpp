@@ -7,7 +7,7 @@
 #include "tests/support/pitch.h"
 #include "tests/support/player.h"
 
-namespace ressort {
+namespace ressort::scala_test {
 namespace {
 
 using namespace support;
@@ -231,4 +231,4 @@ TEST_CASE("a key without a pitch is silent", "[scala]") {
   CHECK(peak(player.y()) > 1e-3);
 }
 
-}  // namespace ressort
+}  // namespace ressort::scala_test

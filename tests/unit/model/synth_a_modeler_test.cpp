@@ -10,7 +10,7 @@
 #include "tests/support/passive.h"
 #include "tests/support/pitch.h"
 
-namespace ressort {
+namespace ressort::synth_a_modeler_test {
 namespace {
 
 using namespace support;
@@ -374,4 +374,4 @@ TEST_CASE("no harm done to a text does harm", "[synth_a_modeler]") {
   CHECK_FALSE(parse_network(doubling).ok());
 }
 
-}  // namespace ressort
+}  // namespace ressort::synth_a_modeler_test

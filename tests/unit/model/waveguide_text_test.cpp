@@ -6,7 +6,7 @@
 #include "tests/support/app/messages.h"
 #include "tests/support/harness.h"
 
-namespace ressort {
+namespace ressort::waveguide_text_test {
 namespace {
 
 using namespace support;
@@ -114,4 +114,4 @@ TEST_CASE("what holds a waveguide and FAUST is not told of is refused by its lin
   refused("@in2 frcInput [@s p]\n", 3, "moves with a parameter");
 }
 
-}  // namespace ressort
+}  // namespace ressort::waveguide_text_test

@@ -26,7 +26,7 @@
 #include "tests/support/app/osc_bytes.h"
 #include "tests/support/app/process_harness.h"
 
-namespace ressort {
+namespace ressort::panel_http_test {
 namespace {
 
 using namespace support;
@@ -403,4 +403,4 @@ TEST_CASE("the page is small, whole and asks nobody else", "[panel_http]") {
 }
 
 }  // namespace
-}  // namespace ressort
+}  // namespace ressort::panel_http_test

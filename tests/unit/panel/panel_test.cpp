@@ -26,7 +26,7 @@
 #include "tests/support/app/osc_bytes.h"
 #include "tests/support/app/process_harness.h"
 
-namespace ressort {
+namespace ressort::panel_test {
 namespace {
 
 using namespace support;
@@ -299,4 +299,4 @@ TEST_CASE("slow motion is a stroboscope at the pitch that sounds", "[panel]") {
 }
 
 }  // namespace
-}  // namespace ressort
+}  // namespace ressort::panel_test

@@ -27,7 +27,7 @@
 #include "tests/support/heap.h"
 #include "tests/support/random.h"
 
-using namespace ressort;
+namespace ressort::helpers_test {
 
 namespace {
 
@@ -412,3 +412,5 @@ TEST_CASE("a large network's shards are played by helpers to the bit", "[helpers
     CHECK(played(*engine, clock, 3000, 0) == expected);
   }
 }
+
+}  // namespace ressort::helpers_test

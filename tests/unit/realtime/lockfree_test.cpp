@@ -11,7 +11,7 @@
 
 #include "tests/support/harness.h"
 
-namespace ressort {
+namespace ressort::lockfree_test {
 namespace {
 
 struct Counted {
@@ -321,4 +321,4 @@ TEST_CASE("counters and flags", "[lockfree]") {
   }
 }
 
-}  // namespace ressort
+}  // namespace ressort::lockfree_test

@@ -10,7 +10,7 @@
 #include "core/engine/midi/channels.h"
 #include "tests/support/harness.h"
 
-namespace ressort {
+namespace ressort::midi_test {
 namespace {
 
 using Bytes = std::vector<std::uint8_t>;
@@ -302,4 +302,4 @@ TEST_CASE("an octave tuning is twelve numbers of cents for all keys", "[midi]") 
   }
 }
 
-}  // namespace ressort
+}  // namespace ressort::midi_test

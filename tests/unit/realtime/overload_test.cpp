@@ -12,7 +12,7 @@
 #include "app/session/timing.h"
 #include "tests/support/player.h"
 
-namespace ressort {
+namespace ressort::overload_test {
 namespace {
 
 using namespace support;
@@ -388,4 +388,4 @@ TEST_CASE("a session warns of a plan that is too much, and tells of an overload"
         "--precision float\n");
 }
 
-}  // namespace ressort
+}  // namespace ressort::overload_test

@@ -4,7 +4,7 @@
 
 #include "tests/support/app/process_harness.h"
 
-namespace ressort {
+namespace ressort::process_test {
 namespace {
 
 using namespace support;
@@ -342,4 +342,4 @@ TEST_CASE("a recording is what was heard; a reset is told once", "[process]") {
   CHECK(harness.process.meters().resets == 1);
 }
 
-}  // namespace ressort
+}  // namespace ressort::process_test

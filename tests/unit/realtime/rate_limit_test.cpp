@@ -4,7 +4,7 @@
 #include "tests/support/catch.h"
 #include "tests/support/rooms.h"
 
-namespace ressort {
+namespace ressort::rate_limit_test {
 
 using namespace std::chrono_literals;
 
@@ -27,4 +27,4 @@ TEST_CASE("the first is told at once, the rest once an interval, and all are cou
   CHECK(limit.take(start + 20s) == "much later");
 }
 
-}  // namespace ressort
+}  // namespace ressort::rate_limit_test

@@ -22,7 +22,7 @@
 #include "tests/support/catch.h"
 #include "tests/support/rooms.h"
 
-namespace ressort {
+namespace ressort::files_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -353,4 +353,4 @@ TEST_CASE("a preset reads several models as one, and says in which a mistake is"
   CHECK(has(error_of(load_scene(missing, {})), "the model 'bix.mdl' is neither beside"));
 }
 
-}  // namespace ressort
+}  // namespace ressort::files_test

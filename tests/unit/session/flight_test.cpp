@@ -12,7 +12,7 @@
 #include "tests/support/random.h"
 #include "tests/support/rooms.h"
 
-using namespace ressort;
+namespace ressort::flight_test {
 
 namespace {
 
@@ -323,3 +323,5 @@ TEST_CASE("Every preset flies", "[.][flights_everywhere]") {
     CHECK(std::memcmp(stage.heard.data(), again.data(), again.size() * sizeof(float)) == 0);
   }
 }
+
+}  // namespace ressort::flight_test

@@ -7,7 +7,7 @@
 #include "app/text.h"
 #include "tests/support/app/console_harness.h"
 
-namespace ressort {
+namespace ressort::keeping_test {
 namespace {
 
 // Until it is so, or two seconds have passed.
@@ -180,4 +180,4 @@ TEST_CASE("lines are broken at blanks, under their column", "[keeping]") {
   CHECK(wrapped("", 4).empty());
 }
 
-}  // namespace ressort
+}  // namespace ressort::keeping_test

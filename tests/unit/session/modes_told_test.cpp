@@ -5,7 +5,7 @@
 #include "app/session/modes/known_modes.h"
 #include "tests/support/app/console_harness.h"
 
-using namespace ressort;
+namespace ressort::modes_told_test {
 
 namespace {
 
@@ -107,3 +107,5 @@ TEST_CASE("modes that took a while are kept for the same text, numbers and versi
   REQUIRE(other);
   CHECK(other->modes[3].frequency_hz > first->modes[3].frequency_hz);
 }
+
+}  // namespace ressort::modes_told_test

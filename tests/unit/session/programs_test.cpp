@@ -8,7 +8,7 @@
 #include "tests/support/app/data_folder.h"
 #include "tests/support/app/process_harness.h"
 
-namespace ressort {
+namespace ressort::programs_test {
 namespace {
 
 using namespace support;
@@ -195,4 +195,4 @@ TEST_CASE("a program change loads the preset of its place, and unknown ones are 
   CHECK(session.current()->name == "Beta");
 }
 
-}  // namespace ressort
+}  // namespace ressort::programs_test

@@ -7,7 +7,7 @@
 #include "app/session/sound_file.h"
 #include "tests/support/app/console_harness.h"
 
-namespace ressort {
+namespace ressort::recorder_test {
 
 TEST_CASE("rec writes what is heard, frame by frame", "[recorder]") {
   const Folder folder;
@@ -164,4 +164,4 @@ TEST_CASE("a recording that is left alone ends with the console", "[recorder]") 
   CHECK(sound->channels[0].size() == 100);
 }
 
-}  // namespace ressort
+}  // namespace ressort::recorder_test

@@ -13,7 +13,8 @@
 #include "tests/support/random.h"
 #include "tests/support/rooms.h"
 
-using namespace ressort;
+namespace ressort::reload_test {
+
 using namespace std::chrono_literals;
 
 namespace {
@@ -430,3 +431,5 @@ TEST_CASE("Random edits neither crash nor click", "[reload]") {
   }
   CHECK(broken > 0);
 }
+
+}  // namespace ressort::reload_test

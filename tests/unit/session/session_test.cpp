@@ -19,7 +19,7 @@
 #include "tests/support/rooms.h"
 #include "tests/support/thorough.h"
 
-using namespace ressort;
+namespace ressort::session_test {
 
 namespace {
 
@@ -337,3 +337,5 @@ TEST_CASE("What happens again and again is told once, with how often it was", "[
   CAPTURE(told);
   CHECK(told.size() <= 4);
 }
+
+}  // namespace ressort::session_test

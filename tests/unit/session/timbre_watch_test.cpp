@@ -10,7 +10,7 @@
 #include "tests/support/app/console_harness.h"
 #include "tests/support/app/osc_client.h"
 
-namespace ressort {
+namespace ressort::timbre_watch_test {
 namespace {
 
 using namespace std::chrono_literals;
@@ -158,4 +158,4 @@ TEST_CASE("figures have words, thousands commas", "[timbre_watch]") {
   CHECK(timbre_words(now, {}, now)[0] == words[0]);
 }
 
-}  // namespace ressort
+}  // namespace ressort::timbre_watch_test

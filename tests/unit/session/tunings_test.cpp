@@ -3,7 +3,7 @@
 #include "tests/support/app/console_harness.h"
 #include "tests/support/pitch.h"
 
-namespace ressort {
+namespace ressort::tunings_test {
 namespace {
 
 const std::string model_text =
@@ -102,4 +102,4 @@ TEST_CASE("the console tunes what sounds", "[tunings]") {
   CHECK(cents(heard_hz(equal_hz), equal_hz) < 0.05);
 }
 
-}  // namespace ressort
+}  // namespace ressort::tunings_test

@@ -15,7 +15,7 @@
 #include "tests/support/random.h"
 #include "tests/support/rooms.h"
 
-namespace ressort {
+namespace ressort::calculix_test {
 namespace {
 
 using namespace support;
@@ -238,4 +238,4 @@ TEST_CASE("twenty solids' modes are those that CalculiX finds", "[calculix_every
 }
 
 }  // namespace
-}  // namespace ressort
+}  // namespace ressort::calculix_test

@@ -7,7 +7,7 @@
 #include "tests/support/random.h"
 #include "tests/support/solids.h"
 
-namespace ressort {
+namespace ressort::solid_mesh_test {
 namespace {
 
 using namespace support;
@@ -178,4 +178,4 @@ TEST_CASE("what meshing programs write is read, and what they do not is told", "
 }
 
 }  // namespace
-}  // namespace ressort
+}  // namespace ressort::solid_mesh_test

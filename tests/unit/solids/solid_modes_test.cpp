@@ -9,7 +9,7 @@
 #include "tests/support/random.h"
 #include "tests/support/solids.h"
 
-namespace ressort {
+namespace ressort::solid_modes_test {
 namespace {
 
 using namespace support;
@@ -390,4 +390,4 @@ TEST_CASE("what is clamped all over and what is asked for too much are told", "[
 }
 
 }  // namespace
-}  // namespace ressort
+}  // namespace ressort::solid_modes_test

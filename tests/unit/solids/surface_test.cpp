@@ -4,7 +4,7 @@
 #include "tests/support/random.h"
 #include "tests/support/solids.h"
 
-namespace ressort {
+namespace ressort::surface_test {
 namespace {
 
 using namespace support;
@@ -247,4 +247,4 @@ TEST_CASE("no bytes break the readers", "[surface]") {
 }
 
 }  // namespace
-}  // namespace ressort
+}  // namespace ressort::surface_test
