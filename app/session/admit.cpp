@@ -3,6 +3,8 @@
 #include <algorithm>
 
 #include "app/session/files.h"
+#include "core/analysis/stability.h"
+#include "core/compile/stability_check.h"
 
 namespace ressort::session {
 namespace {
@@ -41,7 +43,7 @@ Admission ask_to_play(const Scene& scene, const CompileOptions& options, bool is
     const bool is_refused = stability.verdict == Verdict::unstable && !options.force;
     Error complaint = *stability.complaint;
     complaint.message +=
-        is_refused ? "; --force plays it all the same, fading out what runs away" : "";
+        is_refused ? "; play, render and load take --force, which fades out what runs away" : "";
     admission.findings.push_back(
         in_model(scene, complaint, is_refused ? Severity::error : Severity::warning));
   }
@@ -82,6 +84,16 @@ Result<Compiled> admit(const Scene& scene, const CompileOptions& options,
     return Error{std::move(errors)};
   }
   return *std::move(admission.compiled);
+}
+
+std::optional<Finding> instability(const Scene& scene, const std::vector<double>& parameters,
+                                   double rate_hz, const Progress& progress) {
+  Stability stability(scene.network, Network::reference_rate_hz / rate_hz,
+                      Stability::most_exact_masses, progress);
+  const Certificate certificate = stability.certify({.lowest = parameters, .highest = parameters});
+  return certificate.verdict == Verdict::unstable
+             ? std::optional(in_model(scene, complaint(certificate), Severity::warning))
+             : std::nullopt;
 }
 
 }  // namespace ressort::session

@@ -28,4 +28,9 @@ Admission ask_to_play(const Scene& scene, const CompileOptions& options, bool is
 Result<Compiled> admit(const Scene& scene, const CompileOptions& options,
                        std::vector<std::string>& warnings, bool is_strict = false);
 
+// A warning, where the scene runs away at these parameters, for who looks at it without playing it.
+// [any thread but audio]
+std::optional<Finding> instability(const Scene& scene, const std::vector<double>& parameters,
+                                   double rate_hz, const Progress& progress);
+
 }  // namespace ressort::session

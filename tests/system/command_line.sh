@@ -203,9 +203,14 @@ model stiff.mdl '@K param 1.5\n@g ground 0.\n@m osc 1. K 0. 1. 1.\n@out1 posOutp
 expect 0 "stable: every stiffness may grow 2.66666 times" "$program" check stiff.mdl
 expect 0 "K            1.5        from 0 to 3.99999; stable below 4" "$program" check stiff.mdl
 model wild.mdl '@s ground 0.\n@m mass 1. 1. 1.\n@r spring @s @m 5.\n@out1 posOutput @m\n'
-expect 2 "wild.mdl:3:1: error: unstable: the stiffness 5 of 'r' must stay below 4; --force plays" \
+expect 2 "wild.mdl:3:1: error: unstable: the stiffness 5 of 'r' must stay below 4; play, render and load take --force" \
   "$program" check wild.mdl
 expect 2 '"verdict": "unstable"' "$program" check wild.mdl --json
+model wild-in.mdl '@s ground 0.\n@m mass 1. 0. 0.\n@r spring @s @m 5.\n@in1 frcInput @m\n@out1 posOutput @m\n'
+for command in "0 modes" "2 describe"; do
+  expect "${command% *}" "wild-in.mdl:3:1: warning: unstable: the stiffness 5 of 'r' must stay below 4" \
+    "$program" "${command#* }" wild-in.mdl
+done
 expect 2 '"limit": 4.0' "$program" check wild.mdl --json
 expect 2 '"ok": false' "$program" check wild.mdl --json
 expect 0 '"ok": true' "$program" check stiff.mdl --json
@@ -390,7 +395,7 @@ rm -f killed.part.wav
 [ -z "$(find . -name '*.part*')" ] || fail "left behind: $(find . -name '*.part*')"
 
 # The gate.
-expect 2 "wild.mdl:3:1: error: unstable: the stiffness 5 of 'r' must stay below 4; --force plays" \
+expect 2 "wild.mdl:3:1: error: unstable: the stiffness 5 of 'r' must stay below 4; play, render and load take --force" \
   "$program" render wild.mdl -o wild.wav --seconds 1
 expect 0 "became unstable" "$program" render wild.mdl -o wild.wav --seconds 1 --force
 expect 0 "wild.mdl:3:1: warning: unstable: the stiffness 5 of 'r'" \

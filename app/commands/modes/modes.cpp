@@ -4,14 +4,13 @@
 
 #include "app/commands/modes/shapes_svg.h"
 #include "app/exit_code.h"
+#include "app/session/admit.h"
 #include "app/session/files.h"
 #include "app/session/load_news.h"
 #include "app/session/loader.h"
 #include "app/session/modes/known_modes.h"
 #include "app/text.h"
 #include "core/analysis/modes/tune.h"
-#include "core/analysis/stability.h"
-#include "core/compile/stability_check.h"
 #include "core/model/language/print.h"
 #include "core/model/topology.h"
 
@@ -48,22 +47,6 @@ Result<Done> tune(Scene& scene, const std::vector<double>& parameters, const Mod
     scene.network = *std::move(tuned);
   }
   return Done{};
-}
-
-// That what is told of modes is not all that it does: what runs away without swinging is no mode.
-void warn_if_unstable(const Scene& scene, const std::vector<double>& parameters,
-                      const ModeOptions& search) {
-  if (search.scheme == ModeScheme::continuous) {
-    return;
-  }
-  Stability stability(scene.network, Network::reference_rate_hz / search.rate_hz,
-                      Stability::most_exact_masses, search.progress);
-  const Certificate certificate = stability.certify({.lowest = parameters, .highest = parameters});
-  if (certificate.verdict == Verdict::unstable) {
-    Finding finding = finding_of(scene.model_path, "", complaint(certificate));
-    finding.diagnostic.severity = Severity::warning;
-    std::fprintf(stderr, "%s\n", to_string(finding).c_str());
-  }
 }
 
 void tell(const Scene& scene, const KnownModes& modes) {
@@ -138,7 +121,12 @@ int modes_command(const ModesOptions& options) {
   if (!modes) {
     return refuse(to_string(finding_of(scene->model_path, "", modes.error())));
   }
-  warn_if_unstable(*scene, parameters, search);
+  // What is told of modes is not all that it does: what runs away without swinging is no mode.
+  if (search.scheme == ModeScheme::published) {
+    if (const auto warning = instability(*scene, parameters, search.rate_hz, progress)) {
+      std::fprintf(stderr, "%s\n", to_string(*warning).c_str());
+    }
+  }
   if (!options.output.empty()) {
     if (const int code = put_text(options.output, file, options.force); code != exit_code::done) {
       return code;

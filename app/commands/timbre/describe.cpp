@@ -12,6 +12,7 @@
 #include "app/commands/timbre/describe_text.h"
 #include "app/commands/timbre/sweep.h"
 #include "app/exit_code.h"
+#include "app/session/admit.h"
 #include "app/session/files.h"
 #include "app/session/load_news.h"
 #include "app/session/loader.h"
@@ -172,6 +173,9 @@ Result<Description> describe_model(const DescribeOptions& options,
     return Error{"'" + options.name +
                  "' is not linear, so how it sounds depends on how it is played: render it with a "
                  "score, and describe that file"};
+  }
+  if (const auto warning = instability(*scene, values, options.rate_hz, loading)) {
+    warn(to_string(*warning));
   }
   auto description = describe_modes(*modes, options.how);
   if (!description) {
