@@ -7,7 +7,7 @@
 
 #include "tests/system/server.h"
 
-using namespace ressort::servers;
+namespace ressort::servers::nsm_test {
 
 namespace {
 
@@ -202,3 +202,5 @@ TEST_CASE("Without an answer it plays by itself", "[nsm]") {
   CHECK(wrong.says("NSM_URL is no address"));
   CHECK(wrong.exit_code() == 2);
 }
+
+}  // namespace ressort::servers::nsm_test

@@ -15,7 +15,7 @@
 
 #include "tests/system/server.h"
 
-using namespace ressort::servers;
+namespace ressort::servers::server_test {
 
 namespace {
 
@@ -732,3 +732,5 @@ TEST_CASE("The death of the server is survived, or told by the exit code", "[ser
     CHECK(play.exit_code() == 75);
   }
 }
+
+}  // namespace ressort::servers::server_test

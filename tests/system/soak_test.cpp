@@ -12,8 +12,8 @@
 #include "tests/support/random.h"
 #include "tests/system/server.h"
 
-using namespace ressort::servers;
-using ressort::support::Random;
+namespace ressort::servers::soak_test {
+using support::Random;
 
 namespace {
 
@@ -179,3 +179,5 @@ TEST_CASE("Random play for minutes leaves everything as it was", "[soak]") {
     CHECK(found[kind] == 0);
   }
 }
+
+}  // namespace ressort::servers::soak_test

@@ -15,7 +15,8 @@ namespace {
 
 using Complex = std::complex<double>;
 
-constexpr double rounding = 1e-13;  // of the largest stiffness: what is below is rounding
+// Of the largest stiffness, and of a pole's angle beside its decay: what is below is rounding.
+constexpr double rounding = 1e-13;
 
 // What is heard and pushed of swings.
 NetworkMode mode_of(Swing swing, const LinearSystem& system, const ModeOptions& options) {
@@ -60,8 +61,9 @@ ModeTone tone_of(Complex mu, const ModeOptions& options) {
   const Complex at = pole_of(mu, options.scheme);
   const double rate_hz = Network::reference_rate_hz / scheme_step(options);
   return {.frequency_hz = at.imag() * rate_hz / (2.0 * std::numbers::pi),
-          .t60_s = at.real() == 0.0 ? std::numeric_limits<double>::infinity()
-                                    : -3.0 * std::numbers::ln10 / (at.real() * rate_hz)};
+          .t60_s = std::fabs(at.real()) <= rounding * std::fabs(at.imag())
+                       ? std::numeric_limits<double>::infinity()
+                       : -3.0 * std::numbers::ln10 / (at.real() * rate_hz)};
 }
 
 Complex speed_of(Complex mu, ModeScheme scheme) {

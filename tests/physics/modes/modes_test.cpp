@@ -429,4 +429,27 @@ TEST_CASE("what does not swing is no mode", "[modes]") {
                     std::vector<double>{0.0}, {}));
 }
 
+TEST_CASE("what nothing damps rings without end, whatever is rounded", "[modes]") {
+  constexpr int masses = 58;
+  constexpr double stiffness = 0.1;
+  std::string text = "@m0 ground 0.\n";
+  for (int i = 1; i <= masses + 1; ++i) {
+    const std::string mass = "@m" + std::to_string(i);
+    text += mass + (i <= masses ? " mass 1. 0. 0.\n" : " ground 0.\n") + "@l" + std::to_string(i) +
+            " spring @m" + std::to_string(i - 1) + " " + mass + " 0.1 0.\n";
+  }
+  const auto found = find_modes(network_of(text + "@out1 posOutput @m7\n"), {}, {});
+  REQUIRE(found);
+  REQUIRE(found->modes.size() == masses);
+  for (int k = 1; k <= masses; ++k) {
+    // sin(theta / 2) = sqrt(K/M) sin(k pi / (2 (n + 1)))
+    const double angle = 2.0 * std::asin(std::sqrt(stiffness) *
+                                         std::sin(k * std::numbers::pi / (2.0 * (masses + 1))));
+    const NetworkMode& mode = found->modes[static_cast<std::size_t>(k - 1)];
+    const double frequency_hz = angle * Network::reference_rate_hz / (2.0 * std::numbers::pi);
+    CHECK(std::fabs(mode.frequency_hz / frequency_hz - 1.0) < 1e-11);
+    CHECK(std::isinf(mode.t60_s));
+  }
+}
+
 }  // namespace ressort::modes_test
