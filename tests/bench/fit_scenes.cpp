@@ -42,13 +42,22 @@ std::string string_of(int masses, std::size_t plucks, std::size_t outputs = 1) {
                  [](std::size_t i) { return "s_m" + std::to_string(i); });
 }
 
+// The same with other words in some places.
+std::string replaced(const std::string& text, const std::string& word, const std::string& by) {
+  std::string all;
+  std::size_t from = 0;
+  for (std::size_t at = text.find(word); at != text.npos; at = text.find(word, from)) {
+    all.append(text, from, at - from).append(by);
+    from = at + word.size();
+  }
+  return all.append(text, from);
+}
+
 std::string mesh_of(int side, std::size_t plucks, std::size_t outputs, bool is_cubic = false) {
   std::string text = scenes::square_mesh("m", side, side, "0.1", "0.01");
-  const std::string spring = " springDamper ";
-  const std::string arguments = " m_K m_Z\n";
-  for (std::size_t i = text.find(spring); is_cubic && i != text.npos; i = text.find(spring, i)) {
-    text.replace(i, spring.size(), " nlSpring3 ");
-    text.replace(text.find(arguments, i), arguments.size(), " m_K 0.5 m_Z\n");
+  if (is_cubic) {
+    text =
+        replaced(replaced(text, " springDamper ", " nlSpring3 "), " m_K m_Z\n", " m_K 0.5 m_Z\n");
   }
   // The corners hold.
   const auto inner = static_cast<std::size_t>(side - 2);
