@@ -116,17 +116,34 @@ static inline V square_root(V x) {
   }
 }
 
+// The numbers of a pack in one, half by half: nothing waits for one number after the other.
+template <class V, class Both>
+[[gnu::always_inline]] static inline auto folded(V pack, Both both) {
+  using Number = Scalar<V>;
+  if constexpr (sizeof(V) > 16) {
+    typedef Number Half __attribute__((vector_size(sizeof(V) / 2), may_alias));
+    Half halves[2];
+    __builtin_memcpy(halves, &pack, sizeof pack);
+    return folded(both(halves[0], halves[1]), both);
+  } else {
+    Number all = pack[0];
+    for (std::size_t i = 1; i < sizeof(V) / sizeof(Number); ++i) {
+      all = both(all, pack[i]);
+    }
+    return all;
+  }
+}
+
 // Whether a mask, as comparisons give it, holds in any lane.
 template <class Mask>
 static inline bool any_of(Mask mask) {
   if constexpr (std::is_integral_v<Mask>) {
     return mask != 0;
   } else {
-    bool any = false;
-    for (std::size_t i = 0; i < sizeof mask / sizeof mask[0]; ++i) {
-      any = any || mask[i] != 0;
-    }
-    return any;
+    typedef long long Bits __attribute__((vector_size(sizeof(Mask)), may_alias));
+    Bits bits;
+    __builtin_memcpy(&bits, &mask, sizeof mask);
+    return folded(bits, [](auto a, auto b) { return a | b; }) != 0;
   }
 }
 

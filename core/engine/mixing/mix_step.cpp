@@ -32,24 +32,6 @@ template <class V>
   return pack;
 }
 
-// The numbers of a pack in one, half by half.
-template <class V, class Both>
-[[gnu::always_inline]] inline auto folded(V pack, Both&& both) {
-  using Number = Scalar<V>;
-  if constexpr (sizeof(V) > 16) {
-    typedef Number Half __attribute__((vector_size(sizeof(V) / 2), may_alias));
-    Half halves[2];
-    __builtin_memcpy(halves, &pack, sizeof pack);
-    return folded(both(halves[0], halves[1]), both);
-  } else {
-    Number all = pack[0];
-    for (std::size_t i = 1; i < sizeof(V) / sizeof(Number); ++i) {
-      all = both(all, pack[i]);
-    }
-    return all;
-  }
-}
-
 // --- what goes in -------------------------------------------------------------------------------
 
 bool is_silent(const double* samples, std::size_t frames) {

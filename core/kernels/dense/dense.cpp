@@ -2,12 +2,19 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 #include <span>
 
 #include "core/kernels/dense/dense_stride.h"
 
 namespace ressort::kernels {
 namespace {
+
+// To the bit, which is asked for in every block.
+template <class T>
+bool is_same(const Aligned<T>& a, const Aligned<T>& b) {
+  return std::memcmp(a.data(), b.data(), a.size() * sizeof(T)) == 0;
+}
 
 constexpr std::size_t least_block = 6;  // frames; fewer are stepped
 constexpr std::size_t least_held = 8;   // frames on one piece that are worth strides
@@ -351,12 +358,12 @@ template <class T>
 void DenseKernel<T>::follow_coefficients() {
   const Layout layout{body_.stride, sources_, slots_};
   const Aligned<T>& value = this->coefficients.value;
-  if (is_current_ && std::equal(value.begin(), value.end(), known_.begin())) {
+  if (is_current_ && is_same(value, known_)) {
     return;
   }
   refresh_force();
   assemble(program_, form_, layout, body_.matrix, true, [&](std::uint32_t i) { return value[i]; });
-  if (!std::equal(value.begin(), value.end(), known_.begin())) {
+  if (!is_same(value, known_)) {
     std::copy(value.begin(), value.end(), known_.begin());
     assemble(program_, form_, layout, body_.exact, true,
              [&](std::uint32_t i) { return static_cast<double>(known_[i]); });

@@ -113,11 +113,7 @@ void respond(const T* middle, const T* u, std::size_t count, std::size_t rows, s
 // The least number in a pack.
 template <class T>
 T least_of(const Wide<T>& pack) {
-  T least = pack[0];
-  for (std::size_t i = 1; i < wide_lanes<T>; ++i) {
-    least = pack[i] < least ? pack[i] : least;
-  }
-  return least;
+  return folded(pack, [](auto a, auto b) { return select(a < b, a, b); });
 }
 
 // How far d (or a velocity) is from where the law acts, on both sides or beyond; it acts below 0.
@@ -260,11 +256,7 @@ struct BlockStep {
     for (std::size_t i = 0; i < b.rows; i += lanes) {
       sum += absolute(load<V>(b.state + i)) * load<V>(b.port_bound + p * b.rows + i);
     }
-    T most = T(0);
-    for (std::size_t i = 0; i < lanes; ++i) {
-      most += sum[i];
-    }
-    return most;
+    return folded(sum, [](auto a, auto b) { return a + b; });
   }
 
   // The first frame in which `motion`, with the ends a and c, is within the zone.

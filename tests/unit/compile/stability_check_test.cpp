@@ -56,10 +56,10 @@ TEST_CASE("what is unstable as it starts is refused by name and place, or forced
           "[stability_check]") {
   CHECK(said_to(ground + "@r spring @g @m 3.9\n") == "");
   const std::string stiff = ground + "@r spring @g @m 5\n";
-  CHECK(
-      said_to(stiff) ==
-      "there.mdl:3:1: error: unstable: the stiffness 5 of 'r' must stay below 4; --force plays it "
-      "all the same, fading out what runs away");
+  CHECK(said_to(stiff) ==
+        "there.mdl:3:1: error: unstable: the stiffness 5 of 'r' must stay below 4; play, render "
+        "and load "
+        "take --force, which fades out what runs away");
   CHECK(said_to(stiff, {.force = true}) ==
         "there.mdl:3:1: warning: unstable: the stiffness 5 of 'r' must stay below 4");
   CHECK(
