@@ -122,7 +122,8 @@ bool write(const Prices& prices, Isa isa, const std::string& machine) {
   file << "// core/kernels: what things take on a machine with these instructions. Written by\n"
           "// `tests/bench/run --fit`, on\n// " +
               machine +
-              "\n#pragma once\n\n#include \"core/kernels/prices/prices.h\"\n\nnamespace ressort "
+              "\n#pragma once\n\n#include \"core/kernels/prices/prices.h\"\n\nnamespace "
+              "ressort::kernels "
               "{\n\n// clang-format off\ninline constexpr Prices " +
               name + "_prices{{\n";
   for (const Price& price : prices) {
@@ -130,7 +131,7 @@ bool write(const Prices& prices, Isa isa, const std::string& machine) {
     std::snprintf(numbers, sizeof numbers, "%.4g, %.4g", price.float64, price.float32);
     file << "    {Item::" << price.name << ", \"" << price.name << "\", " << numbers << "},\n";
   }
-  file << "}};\n// clang-format on\n\n}  // namespace ressort\n";
+  file << "}};\n// clang-format on\n\n}  // namespace ressort::kernels\n";
   file.close();
   return file.good();
 }

@@ -163,8 +163,12 @@ class EnginePlayer : public Player {
     return playing;
   }
 
-  // A held voice never sleeps.
+  // A held voice never sleeps. The one that an engine starts with, the model as it is written,
+  // falls asleep first where it is at rest: as many are stepped as keys are held.
   void hold_keys(std::size_t voices) {
+    for (std::size_t block = 0; block < 1000 && engine_.meters().stepped > 0; ++block) {
+      engine_.process({}, {}, output_pointers_, block_frames);
+    }
     std::vector<Event> keys;
     for (std::size_t voice = 0; voice < voices; ++voice) {
       keys.push_back({.kind = EventKind::note_on,
