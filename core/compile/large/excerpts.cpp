@@ -469,7 +469,7 @@ Dealer::Way best_way(const Network& written, const Program& excerpt, std::uint64
   const std::size_t few = workers * ((nodes / workers + most_at_once - 1) / most_at_once);
   Dealer::Way best;
   double least_ns = std::numeric_limits<double>::infinity();
-  for (const std::size_t count : {few, shards_in_cache(nodes, load, most_shards)}) {
+  for (const std::size_t count : {few, shards_in(second_cache, nodes, load, most_shards)}) {
     if (count < few) {
       continue;
     }

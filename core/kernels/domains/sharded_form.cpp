@@ -15,16 +15,15 @@ double exchange_ns(std::size_t copies) {
   return 3000.0 + copy_ns * static_cast<double>(copies);
 }
 
-std::size_t shards_in_cache(std::size_t nodes, const Workload& load, std::size_t most) {
-  constexpr double shard_bytes = 1024.0 * 1024.0;
-  constexpr double least_bytes = 4.0 * shard_bytes;
+std::size_t shards_in(const Cache& cache, std::size_t nodes, const Workload& load,
+                      std::size_t most) {
   const std::size_t workers = load.executor != nullptr ? load.executor->size() : 1;
   const double bytes =
       4.0 * bytes_of_number(load) * static_cast<double>(nodes) / static_cast<double>(workers);
-  if ((workers > 1 && load.executor->is_live()) || bytes < least_bytes) {
+  if ((workers > 1 && load.executor->is_live()) || bytes < cache.least_bytes) {
     return 1;
   }
-  const auto wanted = static_cast<std::size_t>(std::ceil(bytes / shard_bytes));
+  const auto wanted = static_cast<std::size_t>(std::ceil(bytes / cache.shard_bytes));
   return workers * std::clamp<std::size_t>(most / workers, 1, wanted);
 }
 

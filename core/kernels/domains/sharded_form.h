@@ -28,10 +28,20 @@ inline std::size_t worker_of(std::size_t shard, std::size_t shards, std::size_t 
   return shard * workers / shards;
 }
 
-// How many shards of a network of so many nodes stay in the second cache, each while it is
-// stepped: as many for each worker, and no more than `most` in all; 1 where the network is too
-// small for that, or where helpers work live.
-std::size_t shards_in_cache(std::size_t nodes, const Workload& load, std::size_t most);
+// What a shard may take of a cache, its coefficients and what it copies among it, and what a
+// network takes for which it pays to come back to its shards.
+struct Cache {
+  double shard_bytes;
+  double least_bytes;
+};
+inline constexpr Cache first_cache{48.0 * 1024.0, 128.0 * 1024.0};
+inline constexpr Cache second_cache{1024.0 * 1024.0, 4.0 * 1024.0 * 1024.0};
+
+// How many shards of a network of so many nodes stay in that cache, each while it is stepped: as
+// many for each worker, and no more than `most` in all; 1 where the network is too small for that,
+// or where helpers work live.
+std::size_t shards_in(const Cache& cache, std::size_t nodes, const Workload& load,
+                      std::size_t most);
 
 // After how many samples shards had best meet, and what a sample of the slowest worker takes then.
 // Farther from each other they wait less often, and have more in common to compute. `at_level`:

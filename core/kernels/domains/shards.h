@@ -23,8 +23,9 @@ std::optional<Shard> make_shard(const Program& program, std::vector<std::uint32_
 
 // Shards in the Program's own form for load.executor, if they are predicted to pay: of direct,
 // chains or grid, where a sample takes several microseconds. Where what a thread or process has
-// would not fit into the second cache, it has several shards: each does, and goes on there for
-// several samples before the next one's turn. Processes do as the first of them.
+// would not fit into a cache, the first of chains and the second of all others, it has several
+// shards: each does, and goes on there for several samples before the next one's turn. Processes
+// do as the first of them.
 // O(nodes + links), and what the form takes. [any thread but audio]
 std::optional<Shards> share_out(const Program& program, const Workload& load,
                                 const Progress& progress = {});

@@ -316,11 +316,12 @@ TEST_CASE("a network is shared out where that pays", "[halo]") {
     INFO(describe(parts));
     const auto* const shards = std::get_if<Shards>(&machine.parts[0].form);
     if (shards != nullptr) {
-      CHECK(describe(parts).find("2 shards") != std::string::npos);
+      const std::string count = std::to_string(shards->shards->size());
+      CHECK(describe(parts).find(" " + count + " shards") != std::string::npos);
     }
     return shards == nullptr ? 0 : static_cast<int>(shards->shards->size());
   };
-  const std::string string = "@s string 30000 1. 0.1 0.001 0. 1.\n@out1 posOutput [@s 0.3]\n";
+  const std::string string = "@s string 4000 1. 0.1 0.001 0. 1.\n@out1 posOutput [@s 0.3]\n";
   const std::string mesh = "@s mesh 200 200 1. 0.1 0.001 0. 1.\n@out1 posOutput [@s 0.3 0.3]\n";
   CHECK(planned(string, &executor, {}) == 2);
   CHECK(planned(mesh, &executor, {}) == 2);
@@ -328,6 +329,11 @@ TEST_CASE("a network is shared out where that pays", "[halo]") {
   CHECK(planned(string, nullptr, {}) == 0);
   CHECK(planned("@s string 1000 1. 0.1 0.001 0. 1.\n@out1 posOutput [@s 0.3]\n", &executor, {}) ==
         0);
+  // Of 32 bytes a mass, in as many shards for each core, of at most 48 KiB.
+  const std::string long_string = "@s string 30000 1. 0.1 0.001 0. 1.\n@out1 posOutput [@s 0.3]\n";
+  CHECK(planned(long_string, &executor, {}) == 20);
+  CHECK(planned(long_string, nullptr, {}) == 20);
+  CHECK(planned(long_string, &executor, Method::direct) == 2);
   // A finger that may be put anywhere ties everything together.
   CHECK(planned(string + "@u param 0.5\n@in1 frcInput [@s u]\n", &executor, {}) == 0);
   CHECK(planned(string + "@in1 frcInput [@s 0.5]\n", &executor, {}) == 2);
@@ -342,8 +348,12 @@ TEST_CASE("one core steps a network in shards where its caches do not hold it", 
   const Program& cut = planned.machine.parts[0];
   const auto* const shards = std::get_if<Shards>(&cut.form);
   REQUIRE(shards != nullptr);
-  CHECK(shards->shards->size() == 10);  // of 32 bytes a mass, in shards of at most 2^20
-  CHECK(describe(planned.parts).find("10 shards one after the other") != std::string::npos);
+  CHECK(shards->shards->size() == 196);  // of 32 bytes a mass, in shards of at most 48 KiB
+  CHECK(describe(planned.parts).find("196 shards one after the other") != std::string::npos);
+  const Planned grid = make_plan(machine, {.isa = best_isa()}, Method::grid);
+  const auto* const wide = std::get_if<Shards>(&grid.machine.parts[0].form);
+  REQUIRE(wide != nullptr);
+  CHECK(wide->shards->size() == 10);  // of at most 1 MiB
   Program whole = machine.parts[0];
   whole.form = *chains_form(whole);
   Fighter<double> together(whole, 1.0, best_isa());
