@@ -337,14 +337,15 @@ Executor* own_thread() {
   return &thread;
 }
 
-// Numbers of shards of which the one is taken that costs least.
+// Numbers of shards, of which the one is taken that costs least.
 struct Attempt {
   std::vector<std::size_t> counts;
   bool is_breadth_first = false;
   bool is_in_cache = false;  // costs less than as many masses of the whole
 };
 
-// Those that stay in a cache, or else one for each worker; none where that would not pay.
+// Those that stay in a cache, the first of which that pays is taken, or else one for each worker;
+// none where that would not pay.
 std::vector<Attempt> attempts_at(const Program& program, const Workload& load, double whole_ns) {
   std::vector<Attempt> attempts;
   const auto add_in = [&](const Cache& cache) {
@@ -358,7 +359,7 @@ std::vector<Attempt> attempts_at(const Program& program, const Workload& load, d
   }
   add_in(second_cache);
   const std::size_t workers = executor_of(load)->size();
-  if (!attempts.empty() || workers == 1 || whole_ns < least_shared_ns) {
+  if (workers == 1 || whole_ns < least_shared_ns) {
     return attempts;
   }
   // Every process has a shard, or all of it.
@@ -368,7 +369,9 @@ std::vector<Attempt> attempts_at(const Program& program, const Workload& load, d
     counts.push_back(count);
   }
   // As it is written first: rows that are alike stay so.
-  return {{.counts = counts}, {.counts = counts, .is_breadth_first = true}};
+  attempts.push_back({.counts = counts});
+  attempts.push_back({.counts = counts, .is_breadth_first = true});
+  return attempts;
 }
 
 std::optional<Shards> made(const Program& program, const Bonds& bonds, const Division& division,
@@ -429,9 +432,6 @@ std::optional<Shards> share_out(const Program& program, const Workload& load,
   Way best_way;
   double best_ns = whole_ns / least_gain;
   for (const Attempt& attempt : attempts) {
-    if (best && attempt.is_in_cache) {
-      continue;
-    }
     Way way{.count = 1, .is_breadth_first = attempt.is_breadth_first};
     Division division;
     double least_ns = std::numeric_limits<double>::infinity();
@@ -459,6 +459,9 @@ std::optional<Shards> share_out(const Program& program, const Workload& load,
       best_ns = ns;
       best = std::move(found);
       best_way = way;
+      if (attempt.is_in_cache) {
+        break;
+      }
     }
   }
   if (fellows != nullptr) {
