@@ -44,7 +44,7 @@ struct Jack {
 
   // Used by the control thread only.
   Wiring wiring;
-  std::map<const jack_port_t*, std::string> others;  // that were connected at the last look
+  std::map<const jack_port_t*, std::string> others;  // that were connected at a look before
   std::int64_t next_try_ns = 0;                      // to plug in what is missing
 
   // Used by the audio thread only.
@@ -235,7 +235,7 @@ void lose_ports(Jack& jack) {
 }
 
 // Sees what is connected, and connects what was or is to be.
-void look_at_ports(Jack& jack) {
+void look_at_ports(Jack& jack, bool is_quiet) {
   lose_ports(jack);
   const std::vector<jack_port_t*> ports = own_ports(jack);
   std::vector<Cable> present;
@@ -248,10 +248,14 @@ void look_at_ports(Jack& jack) {
   const auto exists = [&](const std::string& port) {
     return jack_port_by_name(jack.client, port.c_str()) != nullptr;
   };
-  jack.wiring.look(present, exists);
-  jack.others.clear();
+  jack.wiring.look(present, exists, is_quiet);
+  // Of a cable in doubt the port may be about to go, and we have yet to be told.
+  if (!jack.wiring.is_in_doubt()) {
+    jack.others.clear();
+  }
   for (const Cable& cable : present) {
-    jack.others.emplace(jack_port_by_name(jack.client, cable.theirs.c_str()), cable.theirs);
+    jack.others.insert_or_assign(jack_port_by_name(jack.client, cable.theirs.c_str()),
+                                 cable.theirs);
   }
   for (const Cable& cable : jack.wiring.missing()) {
     for (jack_port_t* const port : ports) {
@@ -268,11 +272,13 @@ void look_at_ports(Jack& jack) {
 
 void tick(Jack& jack) {
   constexpr std::int64_t patience_ns = 1'000'000'000;
+  constexpr std::int64_t doubt_ns =
+      250'000'000;  // by then a busy server has told of its ports, too
   const std::int64_t now_ns = monotonic_ns();
   const bool has_changed = jack.rewired.lower();
-  if (has_changed || jack.wiring.is_in_doubt() || now_ns >= jack.next_try_ns) {
-    jack.next_try_ns = now_ns + patience_ns;
-    look_at_ports(jack);
+  if (has_changed || now_ns >= jack.next_try_ns) {
+    look_at_ports(jack, !has_changed);
+    jack.next_try_ns = now_ns + (jack.wiring.is_in_doubt() ? doubt_ns : patience_ns);
   }
 }
 
@@ -340,7 +346,7 @@ Result<AudioDevice> open_jack(Process& process, const AudioOptions& options) {
   if (options.connect) {
     connect(*jack);
   }
-  look_at_ports(*jack);
+  look_at_ports(*jack, true);
   AudioDevice device;
   device.rate_hz = jack->rate_hz;
   device.description = "JACK client '" + std::string(jack_get_client_name(jack->client)) + "', " +

@@ -5,14 +5,14 @@
 namespace ressort::devices {
 
 void Wiring::look(const std::vector<Cable>& present,
-                  const std::function<bool(const std::string& port)>& exists) {
+                  const std::function<bool(const std::string& port)>& exists, bool is_quiet) {
   for (Known& known : known_) {
     const bool is_there = std::find(present.begin(), present.end(), known.cable) != present.end();
     if (is_there) {
       known.state = State::plugged;
     } else if (known.state == State::plugged) {
       known.state = State::doubtful;
-    } else if (known.state == State::doubtful) {
+    } else if (known.state == State::doubtful && is_quiet) {
       known.state = exists(known.cable.theirs) ? State::pulled : State::missing;
     }
   }

@@ -23,11 +23,11 @@ class Wiring {
   static constexpr std::size_t most_cables = 1024;  // then the oldest are forgotten
 
   // All cables that there are now. One that is gone was pulled if its other port is still there at
-  // the next look, too: a client that leaves takes its cables first, its ports then.
+  // a later look, when all `is_quiet`: a client that leaves takes its cables first, its ports then.
   void look(const std::vector<Cable>& present,
-            const std::function<bool(const std::string& port)>& exists);
+            const std::function<bool(const std::string& port)>& exists, bool is_quiet);
 
-  // One has gone, and whether it was pulled the next look will tell.
+  // One has gone, and whether it was pulled a later look will tell.
   bool is_in_doubt() const;
 
   // To be plugged in once both ports are there.

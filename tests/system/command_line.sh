@@ -504,17 +504,17 @@ case $got:$said in
 esac
 expect 2 "there is not enough memory" sh -c "ulimit -v 700000; $program check huge.mdl"
 
-"$program" play PolyTriangle -a dummy -m none -i -u 19778 > first.log 2>&1 &
+"$program" play PolyTriangle -a dummy -m none -i -u 19783 > first.log 2>&1 &
 first=$!
 for _ in 1 2 3 4 5 6 7 8 9 10; do
   grep -q "OSC on" first.log && break
   sleep 0.2
 done
 printf 'quit\n' > quit.script
-expect 0 "playing without OSC: port 19778 of 127.0.0.1 is taken, perhaps by another ressort; choose another with -u 19779" \
-  "$program" play -a dummy -m none -i -u 19778 -e quit.script
-expect 0 "port 19779, open to this machine and 10.0.0.0/8" "$program" play -a dummy -m none -i \
-  -u 19779 -B 0.0.0.0 --osc-allow 10.0.0.0/8 -e quit.script
+expect 0 "playing without OSC: port 19783 of 127.0.0.1 is taken, perhaps by another ressort; choose another with -u 19784" \
+  "$program" play -a dummy -m none -i -u 19783 -e quit.script
+expect 0 "port 19784, open to this machine and 10.0.0.0/8" "$program" play -a dummy -m none -i \
+  -u 19784 -B 0.0.0.0 --osc-allow 10.0.0.0/8 -e quit.script
 expect 2 "say who may send with --osc-allow" "$program" play -a dummy -m none -i -B 0.0.0.0
 expect 2 "--osc-allow 10.0.0.5 needs -B too" "$program" play -a dummy -i --osc-allow 10.0.0.5
 kill -TERM "$first"
