@@ -272,8 +272,7 @@ void look_at_ports(Jack& jack, bool is_quiet) {
 
 void tick(Jack& jack) {
   constexpr std::int64_t patience_ns = 1'000'000'000;
-  constexpr std::int64_t doubt_ns =
-      250'000'000;  // by then a busy server has told of its ports, too
+  constexpr std::int64_t doubt_ns = 250'000'000;  // in which a busy server tells of its ports, too
   const std::int64_t now_ns = monotonic_ns();
   const bool has_changed = jack.rewired.lower();
   if (has_changed || now_ns >= jack.next_try_ns) {

@@ -122,9 +122,8 @@ bool write(const Prices& prices, Isa isa, const std::string& machine) {
   file << "// core/kernels: what things take on a machine with these instructions. Written by\n"
           "// `tests/bench/run --fit`, on\n// " +
               machine +
-              "\n#pragma once\n\n#include \"core/kernels/prices/prices.h\"\n\nnamespace "
-              "ressort::kernels "
-              "{\n\n// clang-format off\ninline constexpr Prices " +
+              "\n#pragma once\n\n#include \"core/kernels/prices/prices.h\"\n\n"
+              "namespace ressort::kernels {\n\n// clang-format off\ninline constexpr Prices " +
               name + "_prices{{\n";
   for (const Price& price : prices) {
     char numbers[64];

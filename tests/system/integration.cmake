@@ -4,8 +4,8 @@ add_library(rtspy MODULE system/rtspy.cpp)
 target_compile_options(rtspy PRIVATE -Wno-conversion -Wno-nonnull-compare)
 target_link_libraries(rtspy PRIVATE PkgConfig::JACK ${CMAKE_DL_LIBS})
 
-add_ressort_tests(ressort_server_tests system/server_test.cpp system/nsm_test.cpp
-  system/soak_test.cpp)
+add_ressort_tests(ressort_server_tests system/server_test.cpp system/callback_test.cpp
+  system/connections_test.cpp system/nsm_test.cpp system/soak_test.cpp)
 target_link_libraries(ressort_server_tests PRIVATE PkgConfig::JACK PkgConfig::LIBLO Threads::Threads)
 target_compile_definitions(ressort_server_tests PRIVATE
   RESSORT_PROGRAM="$<TARGET_FILE:ressort>" RESSORT_SPY="$<TARGET_FILE:rtspy>"

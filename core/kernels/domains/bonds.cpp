@@ -50,25 +50,6 @@ std::optional<Bonds> Bonds::of(const Program& program) {
   return corners ? std::optional(Bonds(program, *std::move(corners))) : std::nullopt;
 }
 
-Bonds::Bonds(const Program& program, std::vector<std::vector<std::uint32_t>> corners)
-    : program_(program),
-      corners_(std::move(corners)),
-      first_point_(program.taps.empty() ? nobody : program.taps[0].node),
-      binds_(program.position.size(), false),
-      is_tied_(program.position.size(), false),
-      first_(program.position.size() + 1, 0) {
-  std::fill_n(binds_.begin(), program.moving, true);
-  // The force on what does not move is the sum of all its links, wherever they lead.
-  for (const OutputSlot& output : program.outputs) {
-    binds_[output.node] = binds_[output.node] || output.is_force;
-  }
-  for (const TapSlot& tap : program.taps) {
-    binds_[tap.node] = true;
-  }
-  find_neighbours();
-  find_links();
-}
-
 // Calls use(a, b), in either order, for all who feel each other after one sample.
 template <class Use>
 void Bonds::each_bond(Use&& use) const {
@@ -83,38 +64,48 @@ void Bonds::each_bond(Use&& use) const {
   }
 }
 
-void Bonds::find_neighbours() {
-  for (const auto& [a, b] : program_.ends) {
+// Calls each_pair(add) twice, which calls add(node, item) for all items, in the same order.
+template <class EachPair>
+Bonds::Lists Bonds::lists_of(EachPair&& each_pair) const {
+  Lists lists{.first = std::vector<std::size_t>(binds_.size() + 1, 0), .items = {}};
+  each_pair([&](std::uint32_t node, std::uint32_t) { ++lists.first[node + 1]; });
+  std::partial_sum(lists.first.begin(), lists.first.end(), lists.first.begin());
+  lists.items.resize(lists.first.back());
+  std::vector<std::size_t> next(lists.first.begin(), lists.first.end() - 1);
+  each_pair([&](std::uint32_t node, std::uint32_t item) { lists.items[next[node]++] = item; });
+  return lists;
+}
+
+Bonds::Bonds(const Program& program, std::vector<std::vector<std::uint32_t>> corners)
+    : program_(program),
+      corners_(std::move(corners)),
+      first_point_(program.taps.empty() ? nobody : program.taps[0].node),
+      binds_(program.position.size(), false),
+      is_tied_(program.position.size(), false) {
+  std::fill_n(binds_.begin(), program.moving, true);
+  // The force on what does not move is the sum of all its links, wherever they lead.
+  for (const OutputSlot& output : program.outputs) {
+    binds_[output.node] = binds_[output.node] || output.is_force;
+  }
+  for (const TapSlot& tap : program.taps) {
+    binds_[tap.node] = true;
+  }
+  for (const auto& [a, b] : program.ends) {
     is_tied_[a] = is_tied_[a] || binds_[b];
     is_tied_[b] = is_tied_[b] || binds_[a];
   }
-  each_bond([&](std::uint32_t a, std::uint32_t b) {
-    ++first_[a + 1];
-    ++first_[b + 1];
+  neighbours_ = lists_of([&](const auto& add) {
+    each_bond([&](std::uint32_t a, std::uint32_t b) {
+      add(a, b);
+      add(b, a);
+    });
   });
-  std::partial_sum(first_.begin(), first_.end(), first_.begin());
-  neighbours_.resize(first_.back());
-  std::vector<std::size_t> next(first_.begin(), first_.end() - 1);
-  each_bond([&](std::uint32_t a, std::uint32_t b) {
-    neighbours_[next[a]++] = b;
-    neighbours_[next[b]++] = a;
+  links_ = lists_of([&](const auto& add) {
+    for (std::uint32_t link = 0; link < program_.ends.size(); ++link) {
+      add(program_.ends[link].a, link);
+      add(program_.ends[link].b, link);
+    }
   });
-}
-
-// Where the links of every node are.
-void Bonds::find_links() {
-  first_link_.assign(binds_.size() + 1, 0);
-  for (const auto& [a, b] : program_.ends) {
-    ++first_link_[a + 1];
-    ++first_link_[b + 1];
-  }
-  std::partial_sum(first_link_.begin(), first_link_.end(), first_link_.begin());
-  links_.resize(first_link_.back());
-  std::vector<std::size_t> next(first_link_.begin(), first_link_.end() - 1);
-  for (std::uint32_t link = 0; link < program_.ends.size(); ++link) {
-    links_[next[program_.ends[link].a]++] = link;
-    links_[next[program_.ends[link].b]++] = link;
-  }
 }
 
 std::vector<std::uint32_t> Bonds::as_written() const {

@@ -54,17 +54,13 @@ class Bonds {
 
   template <class Use>
   void each_neighbour(std::uint32_t node, Use&& use) const {
-    for (std::size_t i = first_[node]; i < first_[node + 1]; ++i) {
-      use(neighbours_[i]);
-    }
+    neighbours_.each(node, use);
   }
 
   // Calls use(link) for the links that it is an end of.
   template <class Use>
   void each_link(std::uint32_t node, Use&& use) const {
-    for (std::size_t i = first_link_[node]; i < first_link_[node + 1]; ++i) {
-      use(links_[i]);
-    }
+    links_.each(node, use);
   }
 
   // Of what binds and is no point: as it is written, or breadth first from the first one.
@@ -76,21 +72,31 @@ class Bonds {
                             std::vector<bool>& is_seen) const;
 
  private:
+  // A list for every node, one after the other.
+  struct Lists {
+    template <class Use>
+    void each(std::uint32_t node, Use&& use) const {
+      for (std::size_t i = first[node]; i < first[node + 1]; ++i) {
+        use(items[i]);
+      }
+    }
+    std::vector<std::size_t> first;  // [node] of items
+    std::vector<std::uint32_t> items;
+  };
+
   Bonds(const Program& program, std::vector<std::vector<std::uint32_t>> corners);
   template <class Use>
   void each_bond(Use&& use) const;
-  void find_neighbours();
-  void find_links();
+  template <class EachPair>
+  Lists lists_of(EachPair&& each_pair) const;
 
   const Program& program_;
   std::vector<std::vector<std::uint32_t>> corners_;  // [tap] nodes
   std::uint32_t first_point_;                        // points are the last nodes
   std::vector<bool> binds_;                          // [node]
   std::vector<bool> is_tied_;                        // [node]
-  std::vector<std::size_t> first_;                   // [node] of neighbours_
-  std::vector<std::uint32_t> neighbours_;            // who feels whom after one sample
-  std::vector<std::size_t> first_link_;              // [node] of links_
-  std::vector<std::uint32_t> links_;
+  Lists neighbours_;                                 // who feels whom after one sample
+  Lists links_;                                      // of which each is an end
 };
 
 }  // namespace ressort::kernels

@@ -92,7 +92,7 @@ class Maker {
       program.velocity.push_back(program_.velocity[node]);
       program.moving += node < program_.moving ? 1 : 0;
     }
-    take_mass_runs(program_.mass_runs, shard.nodes, program);
+    take_mass_runs(shard.nodes, program);
     take_link_runs(shard.nodes, program);
     take_taps(program);
     take_inputs(shard);
@@ -134,18 +134,18 @@ class Maker {
         add(node, nodes);
       }
     }
+    std::vector<std::uint32_t> points;
     for (const TapSlot& tap : program_.taps) {
       if (has_corners(tap.node)) {
-        points_.push_back(tap.node);
+        points.push_back(tap.node);
       }
     }
-    for (const std::uint32_t point : points_) {
+    for (const std::uint32_t point : points) {
       add(point, nodes);
       for (const std::uint32_t corner : bonds_.corners(point)) {
         add(corner, nodes);
       }
     }
-    points_.clear();
     for (std::size_t i = 0, reached = nodes.size(); i < reached; ++i) {
       if (bonds_.binds(nodes[i])) {
         bonds_.each_link(nodes[i], [&](std::uint32_t link) {
@@ -185,9 +185,8 @@ class Maker {
     }
   }
 
-  static void take_mass_runs(const std::vector<MassRun>& runs,
-                             const std::vector<std::uint32_t>& nodes, Program& program) {
-    each_run(runs, nodes, [&](MassRun run, std::uint32_t first, std::uint32_t end) {
+  void take_mass_runs(const std::vector<std::uint32_t>& nodes, Program& program) const {
+    each_run(program_.mass_runs, nodes, [&](MassRun run, std::uint32_t first, std::uint32_t end) {
       run.first = first;
       run.count = end - first;
       program.mass_runs.push_back(run);
@@ -266,9 +265,8 @@ class Maker {
   const Program& program_;
   const std::vector<std::uint32_t>& owner_;
   const std::uint32_t frames_;
-  std::vector<bool> is_here_;          // [node]
-  std::vector<std::uint32_t> local_;   // [node] where it is in the shard that is made
-  std::vector<std::uint32_t> points_;  // that have all that is around them
+  std::vector<bool> is_here_;         // [node]
+  std::vector<std::uint32_t> local_;  // [node] where it is in the shard that is made
 };
 
 std::vector<Shard> make_all(const Bonds& bonds, const Division& division, std::uint32_t frames) {

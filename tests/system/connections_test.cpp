@@ -1,0 +1,176 @@
+// Cables, ports and servers that come and go while the program plays.
+#include <jack/metadata.h>
+
+#include <algorithm>
+#include <cstdio>
+#include <memory>
+
+#include "tests/system/played.h"
+
+namespace ressort::servers::connections_test {
+
+TEST_CASE("A keyboard that was unplugged is taken up again by its name", "[jack_midi]") {
+  const Server server(256);
+  Child play(program({"play", click(), "-a", "jack", "-i", "-u", osc_port}));
+  REQUIRE(answers());
+  for (int time = 0; time < 2; ++time) {
+    {
+      const Neighbour keyboard;
+      INFO("time " << time);
+      if (time == 0) {
+        REQUIRE(keyboard.connect("neighbour:keys", "ressort:midi_in"));
+      } else {
+        REQUIRE(
+            eventually([&] { return keyboard.is_connected("neighbour:keys", "ressort:midi_in"); }));
+      }
+      std::this_thread::sleep_for(1500ms);
+    }
+    std::this_thread::sleep_for(1500ms);  // as long as a plug takes to be put in again
+  }
+}
+
+// Between two looks it is gone and there again, which is not the same as being unplugged by hand.
+TEST_CASE("A keyboard that is back in no time is taken up again as well", "[jack_midi]") {
+  const Server server(256);
+  Child play(program({"play", click(), "-a", "jack", "-i", "-u", osc_port}));
+  REQUIRE(answers());
+  auto keyboard = std::make_unique<Neighbour>();
+  REQUIRE(keyboard->connect("neighbour:keys", "ressort:midi_in"));
+  for (int time = 0; time < 4; ++time) {
+    INFO("time " << time);
+    std::this_thread::sleep_for(std::chrono::milliseconds(1500 + 17 * time));  // it is seen
+    keyboard.reset();
+    keyboard = std::make_unique<Neighbour>();
+    REQUIRE(
+        eventually([&] { return keyboard->is_connected("neighbour:keys", "ressort:midi_in"); }));
+  }
+  std::this_thread::sleep_for(1500ms);
+  keyboard->disconnect("neighbour:keys", "ressort:midi_in");
+  std::this_thread::sleep_for(1500ms);
+  CHECK_FALSE(keyboard->is_connected("neighbour:keys", "ressort:midi_in"));
+}
+
+TEST_CASE("Ports say what they are, in their order", "[jack_midi]") {
+  const Server server(256);
+  Child play(program({"play", "Resonator", "-a", "jack", "-i", "-u", osc_port}));
+  REQUIRE(answers());
+  jack_client_t* const client = jack_client_open("reader", JackNoStartServer, nullptr);
+  REQUIRE(client != nullptr);
+  const auto property = [&](const char* port, const char* key) {
+    char* value = nullptr;
+    char* type = nullptr;
+    const jack_port_t* const found = jack_port_by_name(client, port);
+    REQUIRE(found != nullptr);
+    const std::string text =
+        jack_get_property(jack_port_uuid(found), key, &value, &type) == 0 ? value : "none";
+    jack_free(value);
+    jack_free(type);
+    return text;
+  };
+  const char* const order = "http://jackaudio.org/metadata/order";
+  CHECK(property("ressort:out_left", JACK_METADATA_PRETTY_NAME) == "Left");
+  CHECK(property("ressort:out_right", order) == "1");
+  CHECK(property("ressort:midi_in", JACK_METADATA_PRETTY_NAME) == "MIDI");
+  CHECK(property("ressort:out_left", JACK_METADATA_PORT_GROUP) == "Outputs");
+  jack_client_close(client);
+}
+
+TEST_CASE("The death of the server is survived, or told by the exit code", "[server_loss]") {
+  auto server = std::make_unique<Server>(256);
+
+  SECTION("waits, and plays again on the next server") {
+    Child play(program({"play", "PolyTriangle", "-a", "jack", "-i", "-u", osc_port}));
+    REQUIRE(answers());
+    server->kill();
+    REQUIRE(play.says("is gone"));
+    server.reset();
+    server = std::make_unique<Server>(512);
+    REQUIRE(play.says("playing again"));
+    Listener listener(48000 * 20);
+    listener.plan({{9600, {0x90, 60, 110}}});
+    listener.start("ressort:out_left", "ressort:midi_in");
+    REQUIRE(listener.wait_for(24000));
+    CHECK(listener.onset(9600, 24000, 0.01f) < 24000);
+    play.signal(SIGTERM);
+    CHECK(play.exit_code() == 0);
+  }
+
+  SECTION("what a person has connected is connected again, on servers of any kind") {
+    using Cable = std::pair<std::string, std::string>;
+    const std::vector<Cable> kept{{"ressort:out_left", "neighbour:left"},
+                                  {"ressort:out_right", "neighbour:left"},
+                                  {"ressort:out_right", "system:playback_2"},
+                                  {"neighbour:keys", "ressort:midi_in"},
+                                  {"neighbour:sound", "ressort:in_1"}};
+    const Cable pulled{"ressort:out_left", "neighbour:right"};
+    const Cable pulled_from_speaker{"ressort:out_left", "system:playback_1"};
+    // -j connects the speakers by itself, and has to respect what was pulled.
+    Child play(program({"play", "Resonator", "-a", "jack", "-j", "-u", osc_port}));
+    REQUIRE(answers());
+    auto neighbour = std::make_unique<Neighbour>();
+    const auto all_are_back = [&] {
+      return std::all_of(kept.begin(), kept.end(), [&](const Cable& cable) {
+        return neighbour->is_connected(cable.first, cable.second);
+      });
+    };
+    for (const auto& [from, to] : kept) {
+      REQUIRE(neighbour->connect(from, to));
+    }
+    REQUIRE(neighbour->connect(pulled.first, pulled.second));
+    REQUIRE(eventually([&] {
+      return neighbour->is_connected(pulled_from_speaker.first, pulled_from_speaker.second);
+    }));
+    std::this_thread::sleep_for(500ms);  // seen
+    neighbour->disconnect(pulled.first, pulled.second);
+    neighbour->disconnect(pulled_from_speaker.first, pulled_from_speaker.second);
+    std::this_thread::sleep_for(1s);  // judged: it was no client that leaves
+
+    struct Next {
+      int period_frames;
+      int rate_hz;
+      bool is_killed;
+    };
+    std::vector<Next> nexts{{512, 48000, true}, {128, 44100, false}};
+    // More of them by RESSORT_KILLS, at all rates and periods in turn.
+    const char* const kills = std::getenv("RESSORT_KILLS");
+    for (int i = 0; kills != nullptr && i < std::atoi(kills); ++i) {
+      constexpr int periods[] = {64, 1024, 256, 128, 512};
+      constexpr int rates_hz[] = {44100, 48000, 96000};
+      nexts.push_back({periods[i % 5], rates_hz[i % 3], true});
+    }
+    for (const Next& next : nexts) {
+      CAPTURE(next.period_frames, next.is_killed);
+      play.forget();
+      next.is_killed ? server->kill() : server->end();
+      REQUIRE(play.says("is gone"));
+      CHECK(eventually([&] { return status_shows(play, "audio   none; waiting for JACK"); }));
+      CHECK(play.said().find("cpu     nothing runs") != std::string::npos);
+      neighbour.reset();
+      server.reset();
+      server = std::make_unique<Server>(next.period_frames, next.rate_hz);
+      REQUIRE(play.says("playing again"));
+      std::this_thread::sleep_for(300ms);  // it comes later than we
+      neighbour = std::make_unique<Neighbour>();
+      const auto came = std::chrono::steady_clock::now();
+      CHECK(eventually(all_are_back));
+      const std::chrono::duration<double> took = std::chrono::steady_clock::now() - came;
+      std::printf("all connections are back after %.2f s\n", took.count());
+      std::this_thread::sleep_for(1500ms);  // longer than anybody waits before he tries again
+      CHECK(all_are_back());
+      CHECK_FALSE(neighbour->is_connected(pulled.first, pulled.second));
+      CHECK_FALSE(neighbour->is_connected(pulled_from_speaker.first, pulled_from_speaker.second));
+    }
+    play.signal(SIGTERM);
+    CHECK(play.exit_code() == 0);
+  }
+
+  SECTION("--exit-on-loss ends with 75") {
+    Child play(
+        program({"play", "PolyTriangle", "-a", "jack", "-i", "--exit-on-loss", "-u", osc_port}));
+    REQUIRE(answers());
+    server->kill();
+    CHECK(play.exit_code() == 75);
+  }
+}
+
+}  // namespace ressort::servers::connections_test
