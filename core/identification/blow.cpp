@@ -9,14 +9,17 @@ namespace {
 
 constexpr std::size_t most_channels = 16;
 constexpr double lowest_rate_hz = 4000.0;
-constexpr double loud = 0.02;         // of the peak: the blow has begun
-constexpr double audible = 1e-5;      // of the peak: where nothing was before
-constexpr double noise_factor = 5.0;  // above what was before
-constexpr double gap_s = 0.001;       // nothing for so long, and the blow has not begun
+constexpr double loud = 0.02;  // Share of the peak above which the blow has begun.
+// Share of the peak that counts as sound when the recording starts in digital silence.
+constexpr double audible = 1e-5;
+constexpr double noise_factor = 5.0;  // Ratio to the noise before the blow.
+constexpr double gap_s = 0.001;       // A pause this long means that the blow has not begun yet.
 constexpr double frame_s = 0.01;
-constexpr double least_s = 0.3;         // of what is looked at, where there is so much
-constexpr std::size_t clipped_run = 3;  // so many samples in a row at the peak
-constexpr double most_skipped = 0.25;   // of what follows the blow, because of that
+constexpr double least_s = 0.3;  // Shortest analysed length, if the recording is that long.
+// Number of consecutive samples at the peak that count as clipping.
+constexpr std::size_t clipped_run = 3;
+// Largest share of the sound after the blow that may be skipped because of clipping.
+constexpr double most_skipped = 0.25;
 
 std::string seconds(double s) {
   char text[32];
@@ -24,7 +27,7 @@ std::string seconds(double s) {
   return text;
 }
 
-// How loud each sample is, in the channel where it is loudest, without the channels' means.
+// Returns the magnitude of each sample in the loudest channel, with the channel means removed.
 std::vector<double> magnitudes(const Recording& recording, const std::vector<double>& means) {
   std::vector<double> all(recording.channels[0].size());
   for (std::size_t c = 0; c < means.size(); ++c) {
@@ -54,7 +57,8 @@ std::size_t find_onset(const std::vector<double>& loudness, double peak, double 
   return onset;
 }
 
-// How many samples from the onset on are worth it: twice as many as are above the end's noise.
+// Returns the number of samples to analyse from the onset: twice as many as exceed the noise at the
+// end of the recording.
 std::size_t find_length(const std::vector<double>& loudness, std::size_t onset, double rate_hz) {
   const std::size_t all = loudness.size() - onset;
   const auto frame = static_cast<std::size_t>(frame_s * rate_hz);
@@ -83,7 +87,7 @@ std::size_t find_length(const std::vector<double>& loudness, std::size_t onset, 
 
 struct Clipped {
   std::size_t count = 0;
-  std::size_t end = 0;  // behind the last of them
+  std::size_t end = 0;  // One past the last clipped sample.
 };
 
 Clipped find_clipped(const Recording& recording, double peak) {

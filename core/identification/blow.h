@@ -1,5 +1,5 @@
-// core/identification: the one blow of a recording: where it begins, and how much of what follows
-// is worth looking at. [any thread but audio]
+// core/identification: finds the single blow of a recording: its onset, and how much of the sound
+// after it is worth analysing. [any thread but audio]
 #pragma once
 
 #include <cstddef>
@@ -11,26 +11,29 @@
 
 namespace ressort::identification {
 
-// Channels of one length; 1 is full scale.
+// Channels of equal length; 1 is full scale.
 struct Recording {
   double rate_hz = 44100.0;
   std::vector<std::vector<double>> channels;
 };
 
-inline constexpr double longest_ring_s = 10.0;   // of what follows a blow
-inline constexpr double shortest_ring_s = 0.02;  // with less there is nothing to go by
+inline constexpr double longest_ring_s = 10.0;   // Longest analysed sound after a blow.
+inline constexpr double shortest_ring_s = 0.02;  // A shorter sound cannot be analysed.
 
 struct Blow {
-  std::size_t first = 0;                      // sample of the recording
-  std::size_t skipped = 0;                    // after it: they are clipped, or between such
-  std::vector<std::vector<double>> channels;  // then, as long as it rings, and some noise
-  double peak = 0.0;                          // largest magnitude, without the channel's mean
-  double offset = 0.0;                        // largest mean of a channel, of the peak
-  std::size_t clipped = 0;  // samples that stand at the peak beside others, in all
-  double length_s = 0.0;    // from the blow to the recording's end
+  std::size_t first = 0;  // Sample of the recording where the blow begins.
+  // Samples skipped after `first`, because they or their neighbours are clipped.
+  std::size_t skipped = 0;
+  // The sound that follows: the ringing, then some noise.
+  std::vector<std::vector<double>> channels;
+  double peak = 0.0;        // Largest magnitude after the channel's mean is removed.
+  double offset = 0.0;      // Largest mean of a channel, relative to the peak.
+  std::size_t clipped = 0;  // Total number of clipped samples (runs at the peak).
+  double length_s = 0.0;    // Time from the blow to the end of the recording.
 };
 
-// The error says why there is none: no samples, no numbers, silence, too short.
+// Finds the blow. The error gives the reason if there is none: no samples, samples that are not
+// finite, silence, or a sound that is too short.
 Result<Blow> find_blow(const Recording& recording);
 
 }  // namespace ressort::identification

@@ -7,9 +7,9 @@ namespace ressort::identification {
 namespace {
 
 constexpr std::size_t block_frames = 256;
-constexpr double gone = 34.0;  // nepers, 295 dB
+constexpr double gone = 34.0;  // Decay in nepers (295 dB) after which a mode is treated as silent.
 
-// z^n for n below a block's length, by doubling.
+// Powers z^n for n below the block length, computed by doubling.
 struct PowerTable {
   explicit PowerTable(Complex log_z) {
     re[0] = 1.0;
@@ -52,7 +52,8 @@ void add_damped(std::span<double> samples, Complex c, Complex log_z) {
 }
 
 Moments moments_of(std::span<const double> samples, Complex log_z) {
-  constexpr std::size_t lanes = 4;  // sums that the compiler may keep in vectors
+  // Number of independent sums, so that the compiler can keep them in vector registers.
+  constexpr std::size_t lanes = 4;
   const PowerTable table(log_z);
   std::array<double, block_frames> place_re;
   std::array<double, block_frames> place_im;
@@ -96,7 +97,8 @@ Moments moments_of(std::span<const double> samples, Complex log_z) {
 }
 
 PowerSums power_sums(const Powers& powers, std::size_t count) {
-  constexpr double far = 20.0;  // the closed form loses 1e4 of 1e16 here
+  // At this distance from z = 1 the closed form still has 12 of 16 digits.
+  constexpr double far = 20.0;
   const auto all = static_cast<double>(count);
   const Complex z = powers.z;
   const Complex away = 1.0 - z;
@@ -105,7 +107,7 @@ PowerSums power_sums(const Powers& powers, std::size_t count) {
     const Complex end = powers.last;
     const Complex s0 = times(1.0 - end, inverse);
     const Complex s1 = times(times(z, s0) - all * end, inverse);
-    // From (1 - z) S2 = z S0 + 2 z S1 - N^2 z^N.
+    // Solves (1 - z) S2 = z S0 + 2 z S1 - N^2 z^N for S2.
     const Complex s2 = times(times(z, s0 + 2.0 * s1) - all * all * end, inverse);
     return {s0, s1, s2};
   }

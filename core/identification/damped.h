@@ -1,6 +1,6 @@
-// core/identification: sums of damped sinusoids, Re(c z^n), and the few things that a fit asks of
-// them. Everything is per sample: log z = -alpha + i omega, with alpha = ln(1000) / (rate T60) and
-// omega = 2 pi f / rate. [any thread but audio]
+// core/identification: sums of damped sinusoids Re(c z^n), and the moments that a fit needs of
+// them. All quantities are per sample: log z = -alpha + i omega, with alpha = ln(1000) / (rate T60)
+// and omega = 2 pi f / rate. [any thread but audio]
 #pragma once
 
 #include <complex>
@@ -14,22 +14,22 @@ namespace ressort::identification {
 
 using Complex = std::complex<double>;
 
-// a b, without the library's care for what is infinite.
+// Returns a b without the standard library's handling of infinities.
 inline Complex times(Complex a, Complex b) {
   return {a.real() * b.real() - a.imag() * b.imag(), a.real() * b.imag() + a.imag() * b.real()};
 }
 
-// Adds Re(c z^n) to sample n. O(samples until it has died away)
+// Adds Re(c z^n) to sample n. O(samples until the mode has decayed)
 void add_damped(std::span<double> samples, Complex c, Complex log_z);
 
-// The sums over all n of x[n] z^n and of n x[n] z^n.
+// Sums over all n of x[n] z^n and of n x[n] z^n.
 struct Moments {
   Complex zeroth;
   Complex first;
 };
 Moments moments_of(std::span<const double> samples, Complex log_z);
 
-// z, and z^count.
+// The pole z and z^count.
 struct Powers {
   Powers(Complex log_z, std::size_t count)
       : z(std::exp(log_z)), last(std::exp(log_z * static_cast<double>(count))) {}
@@ -43,8 +43,8 @@ struct Powers {
   Complex last;
 };
 
-// The sums over n < count of n^p z^n for p = 0, 1, 2. In closed form, or where z is so near to 1
-// that this would lose digits, by doubling: O(log count).
+// Sums over n < count of n^p z^n for p = 0, 1, 2. Uses the closed form, or doubling in O(log count)
+// if z is so near 1 that the closed form would lose digits.
 struct PowerSums {
   Complex of_power[3];
 };

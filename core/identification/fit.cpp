@@ -10,12 +10,14 @@
 namespace ressort::identification {
 namespace {
 
-constexpr double ridge = 1e-13;   // of a diagonal: what keeps twins from being infinitely large
-constexpr double settled = 1e-7;  // of the rest's energy: steps that gain less are none
+// Added to the diagonal, relative to it, so that nearly equal poles keep finite amplitudes.
+constexpr double ridge = 1e-13;
+// A step that reduces the residual's energy by a smaller share ends the iteration.
+constexpr double settled = 1e-7;
 constexpr Complex i_unit{0.0, 1.0};
 
-// The sums over all samples of products of two columns Re(f n^p z^n), Re(g n^q w^n): what the pair
-// of poles has to say to all of them.
+// Inner products, over all samples, of two columns Re(f n^p z^n) and Re(g n^q w^n). The sums of the
+// two poles are computed once and serve all factors f, g and powers p, q.
 struct PairSums {
   PairSums(const Powers& z, const Powers& w, std::size_t frames)
       : straight(power_sums(z * w, frames)), turned(power_sums(z * w.conjugate(), frames)) {}
@@ -29,9 +31,9 @@ struct PairSums {
   PowerSums turned;
 };
 
-// The normal equations. Linear columns: of each mode Re(z^n) and Re(i z^n), then the constant.
-// Those of the poles, per channel: of each mode Re(n c z^n), by -alpha, and Re(i n c z^n), by
-// omega.
+// The normal equations of one Gauss-Newton step. The linear columns are, for each mode, Re(z^n) and
+// Re(i z^n), and then the constant. The columns of the poles are, for each channel and mode, Re(n c
+// z^n), the derivative by -alpha, and Re(i n c z^n), the derivative by omega.
 struct Normal {
   Normal(const std::vector<DampedMode>& modes, std::size_t channels, std::size_t frames,
          bool with_poles)
@@ -46,7 +48,7 @@ struct Normal {
     for (const DampedMode& mode : modes) {
       powers.emplace_back(mode.log_z, frames);
     }
-    powers.emplace_back(Complex(), frames);  // the constant's
+    powers.emplace_back(Complex(), frames);  // The constant is a mode with log z = 0.
     for (std::size_t j = 0; j <= count; ++j) {
       for (std::size_t k = j; k <= count; ++k) {
         const PairSums sums(powers[j], powers[k], frames);
@@ -80,11 +82,11 @@ struct Normal {
   }
 
   Matrix linear;
-  Matrix poles;               // all channels together
+  Matrix poles;               // Sum over all channels.
   std::vector<Matrix> mixed;  // [channel][linear column, pole's column]
 };
 
-// Of one channel's rest: its products with all columns.
+// Products of one channel's residual with all columns.
 struct Gradient {
   Gradient(const std::vector<double>& rest, const std::vector<DampedMode>& modes,
            std::size_t channel)
@@ -149,7 +151,9 @@ bool DampedFit::set_poles(const std::vector<Complex>& log_z) {
   constant_.assign(channels, 0.0);
   find_rest();
   const Normal normal(modes_, channels, sound_[0].size(), false);
-  for (int round = 0; round < 2; ++round) {  // the second mends what rounding has left
+  // The second round is one step of iterative refinement: it removes the rounding error of the
+  // first.
+  for (int round = 0; round < 2; ++round) {
     for (std::size_t c = 0; c < channels; ++c) {
       const auto step = positive_solution(normal.linear, Gradient(rest_[c], modes_, c).linear);
       if (!step) {
@@ -166,9 +170,10 @@ bool DampedFit::set_poles(const std::vector<Complex>& log_z) {
 }
 
 void DampedFit::remove(const std::vector<bool>& is_removed) {
-  constexpr double unmoved = 1e-7;  // of an amplitude: not worth going through all samples
+  // Smallest relative change of an amplitude for which the residual is updated.
+  constexpr double unmoved = 1e-7;
   const Normal normal(modes_, 0, sound_[0].size(), false);
-  std::vector<std::size_t> kept;  // columns
+  std::vector<std::size_t> kept;  // Columns of the modes that stay.
   std::vector<std::size_t> gone;
   for (std::size_t k = 0; k < modes_.size(); ++k) {
     std::vector<std::size_t>& where = is_removed[k] ? gone : kept;
@@ -235,7 +240,7 @@ void DampedFit::refine(int steps, const Progress& progress) {
     Matrix schur = normal.poles;
     Matrix wanted(2 * count, 1);
     std::vector<Matrix>
-        solved;  // [channel] by linear: what each pole's column brings, and the rest
+        solved;  // [channel][linear column, pole column], with the residual as the last column.
     for (std::size_t c = 0; c < channels; ++c) {
       const Gradient gradient(rest_[c], modes_, c);
       auto both = positive_solution(normal.linear, beside(normal.mixed[c], gradient.linear));
@@ -331,7 +336,7 @@ std::vector<DampedDeviation> DampedFit::deviations(bool with_poles) const {
     return all;
   }
   Matrix schur = normal.poles;
-  std::vector<Matrix> moved;  // [channel] how the amplitudes follow the poles
+  std::vector<Matrix> moved;  // [channel] Change of the amplitudes caused by a change of the poles.
   for (std::size_t c = 0; c < channels; ++c) {
     moved.push_back(product(*inverse, normal.mixed[c]));
     schur.values -= transposed_product(normal.mixed[c], moved[c]).values;

@@ -1,6 +1,7 @@
-// core/identification: the damped sinusoids whose sum is nearest to a sound, all of their numbers
-// at once (Gauss-Newton with Levenberg's damping), and how uncertain each number is (the Cramer-Rao
-// bound at the noise that is left over). [any thread but audio]
+// core/identification: fits a sum of damped sinusoids to a sound in the least-squares sense.
+// Gauss-Newton with Levenberg-Marquardt damping moves all poles and amplitudes at once; the
+// Cramer-Rao bound at the level of the residual gives the uncertainty of each number. [any thread
+// but audio]
 #pragma once
 
 #include <cstddef>
@@ -12,14 +13,14 @@
 
 namespace ressort::identification {
 
-// Re(c z^n) in each channel; log z is shared.
+// Re(c z^n) in each channel. All channels share log z.
 struct DampedMode {
   Complex log_z;
   std::vector<Complex> c;  // [channel]
 };
 
-// Standard deviations for noise of variance 1, and that of each complex amplitude: the root of the
-// mean of its two parts' variances.
+// Standard deviations for noise of variance 1. The deviation of a complex amplitude is the root
+// mean square of the deviations of its two parts.
 struct DampedDeviation {
   double alpha = 0.0;
   double omega = 0.0;
@@ -28,19 +29,20 @@ struct DampedDeviation {
 
 class DampedFit {
  public:
-  // Channels of one length, in which a constant is fitted as well.
+  // Takes channels of equal length. A constant offset is fitted as well.
   explicit DampedFit(std::span<const std::vector<double>> sound);
 
-  // The amplitudes that suit these poles best; false where they cannot be told apart.
+  // Sets the poles and solves for the best amplitudes. Returns false if the poles cannot be
+  // distinguished.
   bool set_poles(const std::vector<Complex>& log_z);
-  // Without these modes; the amplitudes of the others move so that the rest is least again, which
-  // it has to be before. O(modes^3 + samples of those that move)
+  // Removes these modes. The other amplitudes are adjusted so that the residual is minimal again;
+  // it must be minimal before the call. O(modes^3 + samples of the modes that change)
   void remove(const std::vector<bool>& is_removed);
-  // Takes these modes as they are.
+  // Sets all modes without fitting.
   void set_modes(std::vector<DampedMode> modes);
 
-  // Moves poles and amplitudes until the rest is least, at most so many steps; never to a larger
-  // rest. O(steps * (modes * samples * channels + modes^3))
+  // Moves poles and amplitudes for at most `steps` Gauss-Newton steps. The residual never grows.
+  // O(steps * (modes * samples * channels + modes^3))
   void refine(int steps, const Progress& progress);
 
   const std::vector<DampedMode>& modes() const { return modes_; }
@@ -48,7 +50,8 @@ class DampedFit {
   const std::vector<std::vector<double>>& rest() const { return rest_; }  // [channel][sample]
   double rest_energy() const;
 
-  // Of all modes as they are now. `with_poles`: the poles are as uncertain as the amplitudes.
+  // Returns the deviations of all current modes. With `with_poles` the poles are treated as
+  // unknown, too, which makes the amplitudes less certain.
   std::vector<DampedDeviation> deviations(bool with_poles) const;
 
  private:

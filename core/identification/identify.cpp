@@ -14,15 +14,18 @@
 namespace ressort::identification {
 namespace {
 
-constexpr double band_hz = 690.0;         // the lower rate of the first search
-constexpr double twin = 0.15;             // nearer than this share of the damping is the same pole
-constexpr double chance = 21.0;           // squared amplitude over twice its variance: no accident
-constexpr double deepest_db = -110.0;     // below the mode with most energy
-constexpr std::size_t most_fitted = 450;  // at once
-constexpr double rounding = 1e-24;        // of the sound's energy: nothing is left to find
+constexpr double band_hz = 690.0;  // Rate of the bands in the first search.
+constexpr double twin = 0.15;  // Poles closer than this share of their damping are the same pole.
+// Least squared amplitude over twice its variance; noise reaches this with a probability of e^-21.
+constexpr double chance = 21.0;
+constexpr double deepest_db = -110.0;     // Modes this far below the strongest one are dropped.
+constexpr std::size_t most_fitted = 450;  // Largest number of modes fitted at once.
+// A residual below this share of the sound's energy is rounding error.
+constexpr double rounding = 1e-24;
 constexpr double lowest_hz = 15.0;
 constexpr double least_quality = 0.5;
-constexpr double sure = 3.0;  // standard deviations
+// Number of standard deviations that a mode must stand above the noise.
+constexpr double sure = 3.0;
 
 std::string number(const char* form, double value) {
   char text[48];
@@ -30,7 +33,7 @@ std::string number(const char* form, double value) {
   return text;
 }
 
-// How noisy the rest is around a mode while it rings.
+// The noise level of the residual around a mode, over the time that the mode rings.
 class Noise {
  public:
   explicit Noise(const std::vector<std::vector<double>>& rest) : channels_(rest.size()) {
@@ -41,7 +44,7 @@ class Noise {
       powers_.emplace_back(rest, rest[0].size());
     }
   }
-  // The variance of white noise that would be as loud there, of one channel.
+  // Returns the variance per channel of white noise with the same power density at this frequency.
   double variance(Complex log_z) const {
     const double alpha = -log_z.real();
     const double omega = log_z.imag();
@@ -51,7 +54,7 @@ class Noise {
                   0.02 * omega, 0.002});
     return power.density(omega, half_width) / static_cast<double>(channels_);
   }
-  // The same of what is between the peaks of the rest.
+  // Returns the same between the peaks of the residual (by the median of the density).
   double floor(Complex log_z) const {
     const Power& power = power_of(-log_z.real());
     return power.floor(log_z.imag(), std::max({-4.0 * log_z.real(), 0.05 * log_z.imag(), 0.01})) /
@@ -67,7 +70,7 @@ class Noise {
     return powers_[i];
   }
 
-  std::vector<Power> powers_;  // of ever shorter beginnings
+  std::vector<Power> powers_;  // Spectra of ever shorter beginnings of the residual.
   std::size_t channels_;
 };
 
@@ -81,7 +84,7 @@ double energy_in(const std::vector<std::vector<double>>& channels) {
   return sum;
 }
 
-// The sum of the squares of all samples of the mode, if it rang for ever, nearly.
+// Returns the sum of squares of the mode, approximated as if it rang forever.
 double energy_of(const DampedMode& mode, std::size_t frames) {
   double square = 0.0;
   for (const Complex c : mode.c) {
@@ -102,14 +105,14 @@ class Search {
  public:
   Search(const std::vector<std::vector<double>>& sound, const Progress& progress)
       : sound_(sound), progress_(progress), fit_(sound) {
-    fit_.set_poles({});  // the constant alone
+    fit_.set_poles({});  // Starts with the constant alone.
     sound_energy_ = fit_.rest_energy();
   }
 
   DampedFit& fit() { return fit_; }
 
-  // What this search finds in the first so many samples of the rest joins the others. Those that
-  // are damped more than `most_alpha` were not for the searches before: they are looked for anew.
+  // Searches the first `frames` samples of the residual and adds the poles found. Poles damped more
+  // than `most_alpha` were out of reach of earlier searches, so they are searched again.
   void look(const PoleSearch& search, std::size_t frames, double most_alpha) {
     if (frames < shortest_for(search) || fit_.rest_energy() < rounding * sound_energy_) {
       return;
@@ -134,7 +137,7 @@ class Search {
     settle(2, 3);
   }
 
-  // Begins with these instead of a search.
+  // Starts from these poles instead of a search.
   void start(const std::vector<Complex>& poles) { fit_.set_poles(poles); }
 
   void finish() {
@@ -145,7 +148,7 @@ class Search {
   std::size_t frames() const { return sound_[0].size(); }
 
  private:
-  // Of many poles those that alone would explain most.
+  // Returns the poles that would each explain the most energy on their own.
   std::vector<Complex> strongest(std::vector<Complex> found,
                                  const std::vector<std::vector<double>>& start) const {
     const std::size_t room = most_fitted - std::min(most_fitted, fit_.modes().size());
@@ -189,7 +192,8 @@ class Search {
     fit_.set_poles(known);
   }
 
-  // Refines until every mode is more than noise, and more than a part of its neighbour.
+  // Alternates between fitting and removing until every mode stands above the noise and is distinct
+  // from its neighbours.
   void settle(int steps, int rounds) {
     fit_.refine(steps, progress_);
     int dropped = 0;
@@ -202,7 +206,7 @@ class Search {
     }
   }
 
-  // Takes back what noise would do as well, the least likely modes first.
+  // Removes modes that noise could explain, the least likely first.
   void drop_accidents() {
     for (int round = 0; round < 12; ++round) {
       const Noise noise(fit_.rest());
@@ -216,9 +220,9 @@ class Search {
     }
   }
 
-  // Drops some of the modes that are unlikely where the poles are certain or, `with_poles`, are
-  // not, but of neighbours, which may all be unlikely beside each other, one. Whether there were
-  // any.
+  // Removes some of the insignificant modes and returns whether there were any. `with_poles` treats
+  // the poles as uncertain, too. Of a group of close neighbours, which can all look insignificant
+  // beside each other, only one is removed at a time.
   bool drop_unlikely(bool with_poles, const Noise& noise) {
     const std::vector<DampedMode>& modes = fit_.modes();
     if (modes.empty()) {
@@ -231,14 +235,15 @@ class Search {
     }
     const double least = loudest * std::pow(10.0, deepest_db / 10.0);
     const double wanted = chance + static_cast<double>(sound_.size() - 1);
-    std::vector<std::pair<double, std::size_t>> unlikely;  // and which
+    // Significance and index of each candidate.
+    std::vector<std::pair<double, std::size_t>> unlikely;
     const double resolved = 8.0 * std::numbers::pi / static_cast<double>(frames());
     const auto are_neighbours = [&](Complex a, Complex b) {
       return std::fabs(a.imag() - b.imag()) < 4.0 * std::max(-a.real(), -b.real()) + resolved;
     };
     for (std::size_t k = 0; k < modes.size(); ++k) {
-      // A peak may be no damped sinusoid and leave much, but a peak it is. What else is beside it
-      // has to be more than what it leaves.
+      // A peak that is not exactly a damped sinusoid leaves a large residual around it, but it is
+      // still a peak. Any other mode near it must exceed that residual.
       const bool is_peak = std::none_of(modes.begin(), modes.end(), [&](const DampedMode& other) {
         return are_neighbours(other.log_z, modes[k].log_z) &&
                energy_of(other, frames()) > energy_of(modes[k], frames());
@@ -286,7 +291,8 @@ void search_all(Search& search, double rate_hz) {
   struct Stage {
     std::size_t decimation;
     double length_s;
-    double most_alpha;  // times the samples that the search before has lost
+    // Unit: 1 / (samples that the previous search lost while its filter filled).
+    double most_alpha;
   };
   const Stage stages[] = {{decimation, longest_ring_s, HUGE_VAL},
                           {std::max<std::size_t>(2, decimation / 4), 0.7, 1.5},
@@ -303,8 +309,8 @@ void search_all(Search& search, double rate_hz) {
   search.finish();
 }
 
-// How many samples of the beginning are no free ringing but the blow itself: so much more is left
-// of them than of what follows.
+// Returns the number of leading samples that belong to the contact itself rather than to free
+// ringing: their residual exceeds that of the following samples.
 std::size_t blow_frames(const std::vector<std::vector<double>>& rest, double rate_hz) {
   constexpr double frame_s = 0.001;
   constexpr double longest_s = 0.03;
@@ -335,27 +341,27 @@ std::size_t blow_frames(const std::vector<std::vector<double>>& rest, double rat
   return frames * frame;
 }
 
-// A mode of the fit with what is known of how uncertain it is.
+// A fitted mode and its uncertainty.
 struct Found {
   DampedMode mode;
-  DampedDeviation deviation;  // with the noise around it
+  DampedDeviation deviation;  // For the noise around this mode.
 };
 
 enum class Fate { kept, steady, unfit };
 
-// The same at an earlier time.
+// Extrapolates the mode back in time.
 void go_back(Found& found, double samples) {
   for (std::size_t c = 0; c < found.mode.c.size(); ++c) {
     found.mode.c[c] *= std::exp(-found.mode.log_z * samples);
-    // Where its start was not seen, the pole's deviation adds to it.
+    // The start was not observed, so the uncertainty of the pole adds to that of the amplitude.
     found.deviation.c[c] =
         std::hypot(found.deviation.c[c] * std::exp(-found.mode.log_z.real() * samples),
                    std::abs(found.mode.c[c]) * found.deviation.alpha * samples);
   }
 }
 
-// Than it can have been at the blow: it was gone before the first sample that was looked at, and
-// rounding is taken for what is left of it.
+// Returns whether the mode, extrapolated to the blow, would be louder than it can have been. Such a
+// mode had decayed before the first analysed sample, and what was fitted is rounding error.
 bool is_too_loud(const Found& found, double peak) {
   constexpr double much_more = 30.0;
   return std::any_of(found.mode.c.begin(), found.mode.c.end(),
@@ -392,8 +398,8 @@ std::vector<Found> all_found(const DampedFit& fit) {
   return all;
 }
 
-// When, in samples from the onset, a body that one impulse sets going from rest would have been
-// struck to swing most like this: there every mode passes 0.
+// Returns the time, in samples from the onset, at which one impulse would best explain all phases:
+// there every mode of a body that starts at rest passes through 0.
 double time_of_impulse(const std::vector<Found>& all, double rate_hz) {
   const double reach = 0.001 * rate_hz;
   double best = 0.0;
@@ -403,7 +409,7 @@ double time_of_impulse(const std::vector<Found>& all, double rate_hz) {
     double weight = 1e-300;
     for (const Found& found : all) {
       for (const Complex c : found.mode.c) {
-        // The amplitude counts, not its square, so that it is not the loudest mode alone.
+        // Weights by amplitude instead of power, so that the loudest mode does not decide alone.
         const double sine = std::arg(c) + found.mode.log_z.imag() * t + 0.5 * std::numbers::pi;
         sum += std::abs(c) * std::cos(sine) * std::cos(sine);
         weight += std::abs(c);
@@ -507,7 +513,7 @@ Result<Identification> identify(const Recording& recording, const IdentifyOption
   made.sound = std::move(blow->channels);
   std::optional<Search> search(std::in_place, made.sound, progress);
   search_all(*search, rate_hz);
-  // Rounding is no blow.
+  // A residual at the level of rounding errors contains no blow.
   const double rest_share = search->fit().rest_energy() / std::max(energy_in(made.sound), 1e-300);
   if (const std::size_t head = blow_frames(search->fit().rest(), rate_hz);
       head > 0 && rest_share > rounding) {

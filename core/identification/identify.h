@@ -1,9 +1,9 @@
-// core/identification: the modes of a thing that was struck once, from a recording of how it rings.
+// core/identification: finds the modes of an object from a recording of one blow.
 //
-// Poles by ESPRIT in sub-bands, first for what rings long, then in what is left of the first
-// moments for what is damped strongly, and once more in what is left of all; after each search
-// every number is fitted anew to the whole sound. What does not rise out of the noise around it is
-// taken back.
+// ESPRIT in sub-bands finds the poles in three passes: first the long-ringing ones, then the
+// strongly damped ones in the residual of the first moments, then once more in the residual of the
+// whole sound. After each pass all numbers are fitted again to the whole sound. Modes that do not
+// stand above the surrounding noise are removed.
 #pragma once
 
 #include <cstddef>
@@ -16,16 +16,16 @@
 
 namespace ressort::identification {
 
-// A number and its standard deviation, as the noise that is left over says (Cramer-Rao).
+// A value and its standard deviation, from the Cramer-Rao bound at the residual's noise level.
 struct Measured {
   double value = 0.0;
   double deviation = 0.0;
 };
 
 struct IdentifiedMode {
-  Measured frequency_hz;  // of the damped swing
+  Measured frequency_hz;  // Frequency of the damped oscillation.
   Measured t60_s;
-  // Of each channel: amplitude e^(-alpha t) cos(2 pi f t + phase) from the time 0 on.
+  // [channel] The mode is amplitude e^(-alpha t) cos(2 pi f t + phase) from time 0 on.
   std::vector<Measured> amplitude;
   std::vector<Measured> phase_rad;  // -pi to pi
 };
@@ -33,33 +33,36 @@ struct IdentifiedMode {
 struct OctaveResidual {
   double low_hz = 0.0;
   double high_hz = 0.0;
-  double level_db = 0.0;     // of the sound there, below all of it
-  double residual_db = 0.0;  // of what the modes leave of that
+  double level_db = 0.0;  // Level of the sound in this band, relative to the whole sound.
+  // Level of the band after subtraction of the modes, relative to `level_db`.
+  double residual_db = 0.0;
 };
 
 struct IdentifyOptions {
-  std::size_t most_modes = 400;  // of those with most energy
-  double floor_db = -70.0;       // of a mode's energy, below that of the one with most
+  std::size_t most_modes = 400;  // Keeps this many modes, those with the most energy.
+  double floor_db = -70.0;       // Lowest energy of a mode, relative to the strongest one.
 };
 
 struct Identification {
   double rate_hz = 0.0;
-  double onset_s = 0.0;      // the blow, from the recording's start
-  double time_zero_s = 0.0;  // when one impulse would have had to come, so that all swing from 0
-  double skipped_s = 0.0;    // after the onset: what is clipped, and the blow itself
-  double analysed_s = 0.0;   // then
-  std::vector<IdentifiedMode> modes;  // by frequency
-  double residual_db = 0.0;           // of what the modes leave of the whole sound, constants aside
+  double onset_s = 0.0;      // Time of the blow, from the start of the recording.
+  double time_zero_s = 0.0;  // Time of the single impulse that would set all modes going from 0.
+  double skipped_s = 0.0;   // Time skipped after the onset: clipped samples and the contact itself.
+  double analysed_s = 0.0;  // Length of the analysed sound after that.
+  std::vector<IdentifiedMode> modes;  // Sorted by ascending frequency.
+  // Energy that the modes leave unexplained, relative to the sound, constants excluded.
+  double residual_db = 0.0;
   std::vector<OctaveResidual> octaves;
-  std::vector<std::string> warnings;          // of the recording, and of what was found
-  std::vector<std::vector<double>> sound;     // what was looked at: from there on
-  std::vector<std::vector<double>> residual;  // that, without the modes
+  std::vector<std::string> warnings;          // Warnings about the recording and the result.
+  std::vector<std::vector<double>> sound;     // The analysed sound.
+  std::vector<std::vector<double>> residual;  // The analysed sound minus the modes.
 };
 
-// Above this a body has no modes at 44100 Hz, so nobody looks there.
+// A body cannot have modes above this frequency at 44,100 Hz, so the search ends here.
 inline constexpr double highest_mode_hz = 0.45 * 44100.0;
 
-// An error where nothing can be found, or nothing rings. [any thread but audio]
+// Identifies the modes. Returns an error if no blow is found or nothing rings. [any thread but
+// audio]
 Result<Identification> identify(const Recording& recording, const IdentifyOptions& options,
                                 const Progress& progress);
 

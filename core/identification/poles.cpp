@@ -10,23 +10,27 @@
 namespace ressort::identification {
 namespace {
 
-constexpr std::size_t taps_per_step = 14;  // of the filter, for each sample that is kept
-constexpr double kaiser_beta = 12.0;       // 118 dB between pass and stop
-constexpr double cutoff = 0.4;             // of the lower rate; what is kept is within 0.25
+constexpr std::size_t taps_per_step = 14;  // Filter taps per step of decimation.
+constexpr double kaiser_beta = 12.0;  // Kaiser window with 118 dB between passband and stopband.
+constexpr double cutoff = 0.4;  // Cutoff as a share of the lower rate; poles are kept within 0.25.
 constexpr std::size_t longest_window = 128;
 constexpr std::size_t least_window = 32;
-constexpr std::size_t least_frames = 96;   // of a band
-constexpr std::size_t energy_frames = 16;  // whose energy says whether it still rings
-constexpr std::size_t most_poles = 40;     // of a band
-constexpr double above_median = 25.0;      // the eigenvalue of what is no noise
-constexpr double leak = 3e-12;     // of the loudest band's largest: what filters let through
-constexpr double most_lost = 4.0;  // nepers of a pole while the filter fills
+constexpr std::size_t least_frames = 96;  // Shortest usable band signal.
+// Frames per energy measurement, which decides how long a band rings.
+constexpr std::size_t energy_frames = 16;
+constexpr std::size_t most_poles = 40;  // Most poles per band.
+// Smallest ratio of a signal eigenvalue to the median (noise) eigenvalue.
+constexpr double above_median = 25.0;
+// Stopband leakage, relative to the largest eigenvalue of the loudest band.
+constexpr double leak = 3e-12;
+constexpr double most_lost = 4.0;  // Most decay of a pole, in nepers, while the filter fills.
 constexpr double lowest_omega = 0.0005;
-constexpr double peaked = 8.0;  // largest eigenvalue over the mean: else it is noise
+// Smallest ratio of the largest eigenvalue to the mean; below it the band holds only noise.
+constexpr double peaked = 8.0;
 
-using Band = std::vector<std::vector<Complex>>;  // [channel][frame] at the lower rate
+using Band = std::vector<std::vector<Complex>>;  // [channel][frame] at the lower rate.
 
-// I0, the modified Bessel function.
+// Returns I0, the modified Bessel function of the first kind.
 double bessel(double x) {
   double term = 1.0;
   double sum = 1.0;
@@ -37,7 +41,7 @@ double bessel(double x) {
   return sum;
 }
 
-// A windowed sinc, its sum 1.
+// Returns a Kaiser-windowed sinc, normalised to a sum of 1.
 std::vector<double> lowpass(std::size_t decimation) {
   const std::size_t count = taps_per_step * decimation + 1;
   const double middle = 0.5 * static_cast<double>(count - 1);
@@ -57,7 +61,8 @@ std::vector<double> lowpass(std::size_t decimation) {
   return taps;
 }
 
-// The band around `centre`, where the whole filter lies within the sound.
+// Returns the band around `centre`, decimated, for all positions where the whole filter lies within
+// the sound.
 std::vector<Complex> band_of(const std::vector<double>& sound, const std::vector<double>& taps,
                              std::size_t decimation, double centre) {
   constexpr std::size_t lanes = 8;
@@ -87,7 +92,7 @@ std::vector<Complex> band_of(const std::vector<double>& sound, const std::vector
     for (std::size_t lane = 0; lane < lanes; ++lane) {
       sum += Complex(sum_re[lane], sum_im[lane]);
     }
-    // The filter turned with the sound; back to the band's own zero.
+    // The filter was modulated to `centre`; this shifts the result back to frequency 0.
     band.push_back(sum * std::polar(1.0, -std::fmod(centre * static_cast<double>(from),
                                                     2.0 * std::numbers::pi)));
   }
@@ -104,7 +109,7 @@ double energy_of(const Band& band, std::size_t from, std::size_t to) {
   return sum;
 }
 
-// How many frames there are until only the noise of the end is left.
+// Returns the number of frames until only the noise floor of the end is left.
 std::size_t ringing_frames(const Band& band) {
   const std::size_t all = band[0].size();
   std::vector<double> energies;
@@ -120,13 +125,13 @@ std::size_t ringing_frames(const Band& band) {
   while (last > 0 && energies[last - 1] < 4.0 * noise) {
     --last;
   }
-  // Where nothing stands out, what is weak and long may still be in all of it.
+  // If no frame stands out, a weak and long mode may still ring through all frames.
   return last == 0 ? all
                    : std::clamp(last * energy_frames * 5 / 4, std::min(all, least_window * 3), all);
 }
 
-// The mean over all windows of x[i] conj(x[j]), i and j within a window: each diagonal from its
-// first element on.
+// Returns the covariance matrix: the mean over all windows of x[i] conj(x[j]). Each diagonal is
+// updated recursively from its first element.
 ComplexMatrix covariance(const Band& band, std::size_t frames, std::size_t window) {
   ComplexMatrix made(window, window);
   const std::size_t windows = frames - window + 1;
@@ -149,7 +154,7 @@ ComplexMatrix covariance(const Band& band, std::size_t frames, std::size_t windo
   return made;
 }
 
-// Nearly, by a few powers.
+// Approximates the largest eigenvalue by a few power iterations.
 double largest_eigenvalue(const ComplexMatrix& lower) {
   const std::size_t size = lower.rows;
   ComplexMatrix whole = lower;
@@ -160,7 +165,8 @@ double largest_eigenvalue(const ComplexMatrix& lower) {
   }
   std::vector<Complex> from(size);
   for (std::size_t i = 0; i < size; ++i) {
-    from[i] = std::polar(1.0, static_cast<double>(i * i));  // no direction is left out
+    // A start vector with a component in every direction.
+    from[i] = std::polar(1.0, static_cast<double>(i * i));
   }
   double length = 0.0;
   for (int round = 0; round < 12; ++round) {
@@ -187,7 +193,7 @@ double largest_eigenvalue(const ComplexMatrix& lower) {
 
 struct Candidate {
   Band band;
-  double centre = 0.0;  // omega at the full rate
+  double centre = 0.0;  // Centre omega at the full rate.
   double energy = 0.0;
   std::size_t frames = 0;
   std::size_t window = 0;

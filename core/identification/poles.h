@@ -1,9 +1,10 @@
-// core/identification: where the poles of a sound are that rings freely: ESPRIT in sub-bands.
+// core/identification: finds the poles of a freely ringing sound by ESPRIT in sub-bands.
 //
-// Each band is shifted to 0, filtered and taken at a lower rate, so that few poles are in it and
-// the noise within it is flat. What follows one another by a sample in a sum of damped sinusoids
-// spans one subspace; how that subspace turns is a small matrix, and its eigenvalues are the poles.
-// Roy and Kailath 1989, "ESPRIT"; Laroche 1993, in sub-bands. [any thread but audio]
+// Each band is shifted to frequency 0, filtered and decimated, so that it contains few poles and
+// its noise is flat. Consecutive windows of a sum of damped sinusoids span one signal subspace. A
+// small matrix maps the subspace to the one that starts a sample later; its eigenvalues are the
+// poles. Sources: Roy and Kailath 1989, "ESPRIT"; Laroche 1993 for sub-bands. [any thread but
+// audio]
 #pragma once
 
 #include <cstddef>
@@ -16,19 +17,20 @@
 namespace ressort::identification {
 
 struct PoleSearch {
-  std::size_t decimation = 64;  // a power of two. The filter costs 14 times so many first samples
-  double highest_omega = 3.0;   // per sample
+  // Power of two. The filter discards the first 14 times as many samples.
+  std::size_t decimation = 64;
+  double highest_omega = 3.0;  // Radians per sample.
 };
 
-// How many samples pass before its filter is full.
+// Returns the number of samples that pass before the filter is full.
 std::size_t frames_lost(const PoleSearch& search);
 
-// The shortest sound that such a search can do anything with, in samples.
+// Returns the shortest sound that this search accepts, in samples.
 std::size_t shortest_for(const PoleSearch& search);
 
-// log z of what rises out of the noise of its band, per sample, omega above 0; channels of one
-// length share their poles. Some may be spurious: a fit tells. None in noise alone.
-// O(samples * 28 * channels + bands * 128^3)
+// Returns log z per sample, omega above 0, of the poles that stand above the noise of their band.
+// The channels have equal length and share their poles. Some poles may be spurious; a fit decides.
+// Noise alone yields none. O(samples * 28 * channels + bands * 128^3)
 std::vector<Complex> find_poles(std::span<const std::vector<double>> channels,
                                 const PoleSearch& search, const Progress& progress);
 

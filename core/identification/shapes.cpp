@@ -9,7 +9,7 @@ namespace ressort::identification {
 std::vector<BodyShape> body_shapes(const Identification& found, double mass) {
   constexpr double reference_rate_hz = 44100.0;
   std::vector<BodyShape> shapes;
-  std::vector<double> moved;  // [mode] p q / M, of all channels
+  std::vector<double> moved;  // [mode] p q / M, summed over the channels.
   for (const IdentifiedMode& mode : found.modes) {
     const double r = std::pow(10.0, -3.0 / (reference_rate_hz * mode.t60_s.value));
     const double theta = 2.0 * std::numbers::pi * mode.frequency_hz.value / reference_rate_hz;

@@ -1,12 +1,13 @@
-// core/identification: identified modes as those of a body. [any thread but audio]
+// core/identification: converts identified modes into modes of a playable body. [any thread but
+// audio]
 //
-// One mode of a body, mass M, shape p where a force of 1 acts for one sample and q where it is
-// heard, swings as p q / M r^(n-1) sin(n theta) / sin(theta), with r and theta of its T60 and
-// frequency at 44100 Hz: as if from an amplitude p q / (M r sin theta) at the time 0. So p q = M A
-// r sin(theta), negative where the recording begins with half a turn more than a sine. How p q is
-// shared among p and q no single recording tells: here the mode that the blow moves most has p = 1,
-// and any other p is the root of how much less it moves. M is how heavy the body is where it is
-// struck.
+// One mode of a body with mass M, shape p at the struck place and q at the place of the output
+// responds to a unit force of one sample with p q / M r^(n-1) sin(n theta) / sin(theta), where r
+// and theta follow from its T60 and its frequency at 44,100 Hz. That equals a free oscillation of
+// amplitude p q / (M r sin theta) from time 0. Hence p q = M A r sin(theta), with a negative sign
+// if the recording starts in antiphase to a sine. A single recording cannot separate p from q: the
+// mode that the blow moves most gets p = 1, and every other p is the square root of its relative
+// motion. M is the effective mass at the struck place.
 #pragma once
 
 #include <vector>
@@ -16,11 +17,11 @@
 namespace ressort::identification {
 
 struct BodyShape {
-  double hit = 0.0;           // displacement where it is struck
+  double hit = 0.0;           // Displacement at the struck place.
   std::vector<double> heard;  // [channel]
 };
 
-// [mode] in their order.
+// Returns the shapes in the order of the identified modes.
 std::vector<BodyShape> body_shapes(const Identification& found, double mass);
 
 }  // namespace ressort::identification

@@ -1,4 +1,4 @@
-// core/identification: how much of a sound lies where. [any thread but audio]
+// core/identification: power spectrum of a sound. [any thread but audio]
 #pragma once
 
 #include <cstddef>
@@ -9,22 +9,22 @@
 
 namespace ressort::identification {
 
-// The mean power of a stretch of sound over frequency, all channels added up.
+// Mean power of a stretch of sound over frequency, summed over all channels.
 class Power {
  public:
   Power(std::span<const std::vector<double>> channels, std::size_t frames);
 
-  // Of one sample, between two omegas: all of them from 0 to pi give the mean square.
+  // Returns the power per sample between two omegas; 0 to pi gives the mean square.
   double between(double low_omega, double high_omega) const;
-  // Of one sample and bin, so that white noise gives its variance; over a few bins around.
+  // Returns the power per sample and bin around omega; for white noise this is its variance.
   double density(double omega, double half_width) const;
-  // The same, not of what stands out there but of what is between: by the median.
+  // Returns the same without peaks, by the median over the bins.
   double floor(double omega, double half_width) const;
   std::size_t frames() const { return frames_; }
 
  private:
   std::size_t frames_;
-  std::vector<double> sums_;  // [bin] of all below
+  std::vector<double> sums_;  // [bin] Cumulative sums.
 };
 
 }  // namespace ressort::identification

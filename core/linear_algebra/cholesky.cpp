@@ -11,7 +11,8 @@ namespace ressort::linear_algebra {
 namespace {
 
 constexpr int no_parent = -1;
-constexpr std::size_t most_elements = 500'000;  // whose order is found within a second
+// The ordering of so many elements takes about a second.
+constexpr std::size_t most_elements = 500'000;
 
 }  // namespace
 
@@ -20,7 +21,8 @@ double Cholesky::most_work(std::size_t rows) {
   return std::max(2e8, 1000.0 * n * std::log2(n + 1.0));
 }
 
-// What of A is above the diagonal once its rows are in order, column by column, each in any order.
+// Collects the part of A above the diagonal in the new order, column by column; the elements of a
+// column may have any order.
 void Cholesky::sort_elements(const SparseMatrix& lower) {
   const auto place = [&](std::size_t i) { return order_[i]; };
   const std::size_t size = order_.size();
@@ -48,7 +50,8 @@ std::span<const Cholesky::Upper> Cholesky::column(std::size_t k) const {
   return {upper_.data() + upper_first_[k], upper_.data() + upper_first_[k + 1]};
 }
 
-// Row by row, up the elimination tree from every element of A.
+// Computes the pattern of L row by row, by walking up the elimination tree from every element of A
+// (Davis 2006, "Direct Methods for Sparse Linear Systems").
 bool Cholesky::analyze(const SparseMatrix& lower, const Progress& progress) {
   if (lower.value.size() > most_elements) {
     return false;
@@ -93,8 +96,8 @@ bool Cholesky::factor(const SparseMatrix& lower, Pivots pivots, const Progress& 
   std::vector<double> y(size, 0.0);
   std::vector<int> seen(size);
   std::vector<int> path(size);
-  std::vector<int> pattern(size);  // columns of row k, in the order of the tree
-  std::vector<int> next = first_;  // [column] where its next element goes
+  std::vector<int> pattern(size);  // Columns of row k, in topological order of the tree.
+  std::vector<int> next = first_;  // [column] Position of its next element.
   sign_.assign(size, 1.0);
   for (int k = 0; k < lower.size(); ++k) {
     const auto row = static_cast<std::size_t>(k);
@@ -136,7 +139,7 @@ bool Cholesky::factor(const SparseMatrix& lower, Pivots pivots, const Progress& 
     }
     row_[static_cast<std::size_t>(next[row])] = k;
     value_[static_cast<std::size_t>(next[row]++)] = std::sqrt(diagonal);
-    progress.spend(steps / 8 + 1);  // of the cheapest kind
+    progress.spend(steps / 8 + 1);  // Counts multiplications as an eighth of a step each.
   }
   return true;
 }
@@ -145,14 +148,14 @@ std::size_t Cholesky::negative_pivots() const {
   return static_cast<std::size_t>(std::count(sign_.begin(), sign_.end(), -1.0));
 }
 
-// The inverse Z where L is not 0, from the last column to the first:
-//   Z_ij = -sum over k of Z_ik L_kj / L_jj,  Z_jj = (1 / L_jj - sum over k of L_kj Z_kj) / L_jj
-// with k in L's column j, all of whose pairs are places where L is not 0 either.
+// Computes the inverse Z where L is not 0, from the last column to the first (Takahashi):
+//  Z_ij = -sum over k of Z_ik L_kj / L_jj,  Z_jj = (1 / L_jj - sum over k of L_kj Z_kj) / L_jj
+// with k over the rows of column j of L. All pairs of such rows are nonzero places of L, too.
 std::vector<double> Cholesky::inverse_diagonal(const Progress& progress) const {
   const std::size_t size = order_.size();
   std::vector<double> inverse(value_.size());
-  std::vector<double> sum(size, 0.0);    // [row], of Z_ik L_kj
-  std::vector<double> below(size, 0.0);  // [row], column j of L
+  std::vector<double> sum(size, 0.0);    // [row] Sum of Z_ik L_kj.
+  std::vector<double> below(size, 0.0);  // [row] Column j of L.
   for (std::size_t j = size; j-- > 0;) {
     const auto first = static_cast<std::size_t>(first_[j]);
     const auto end = static_cast<std::size_t>(first_[j + 1]);
@@ -167,7 +170,8 @@ std::vector<double> Cholesky::inverse_diagonal(const Progress& progress) const {
       double own = inverse[start] * value_[p];
       for (std::size_t q = start + 1; q < stop; ++q) {
         const auto i = static_cast<std::size_t>(row_[q]);
-        sum[i] += inverse[q] * value_[p];  // of no use in rows that column j does not have
+        // Rows outside column j are computed, too, but never read.
+        sum[i] += inverse[q] * value_[p];
         own += inverse[q] * below[i];
       }
       sum[k] += own;

@@ -1,5 +1,5 @@
-// core/linear_algebra: dense matrices of complex numbers, and what is asked of them; complex.cpp
-// alone includes the library. [any thread but audio]
+// core/linear_algebra: dense complex matrices and the operations that the project needs of them.
+// Only complex.cpp includes Eigen for this. [any thread but audio]
 #pragma once
 
 #include <complex>
@@ -11,7 +11,7 @@
 
 namespace ressort::linear_algebra {
 
-// Column by column.
+// A matrix in column-major order.
 struct ComplexMatrix {
   ComplexMatrix(std::size_t row_count, std::size_t column_count)
       : rows(row_count), columns(column_count), values(row_count * column_count) {}
@@ -29,26 +29,27 @@ struct ComplexMatrix {
 
 struct HermitianEigenpairs {
   Vector values;          // ascending
-  ComplexMatrix vectors;  // [row, pair] each of length 1, orthogonal
+  ComplexMatrix vectors;  // [row, pair] Orthonormal.
 };
 
-// Of a Hermitian matrix, whose lower half is read. O(size^3)
+// Returns the eigenpairs of a Hermitian matrix; only its lower half is read. O(size^3)
 HermitianEigenpairs hermitian_eigenpairs(const ComplexMatrix& matrix);
 
-// The eigenvalues of the square X that makes U_up X nearest to U_down, where U_up is U without its
-// last row and U_down is U without its first (least squares). None where they cannot be found.
-// O(rows columns^2)
+// Returns the eigenvalues of the square matrix X that minimises |U_up X - U_down| (least squares),
+// where U_up is U without its last row and U_down is U without its first. Empty if they cannot be
+// found. O(rows columns^2)
 std::vector<std::complex<double>> shift_eigenvalues(const ComplexMatrix& basis);
 
-// X of A X = B for a symmetric and positive definite A, whose lower half is read; first brought to
-// a diagonal of ones. Nothing where A is not positive definite. O(size^3)
+// Solves A X = B for a symmetric positive definite A, whose lower half is read. A is first scaled
+// to a unit diagonal. Empty if A is not positive definite. O(size^3)
 std::optional<Matrix> positive_solution(const Matrix& a, const Matrix& b);
 
-// What is left at the first row and column once all others are eliminated: 0 where the matrix is
-// singular by a motion that the first takes part in. O(size^3)
+// Returns the Schur complement of the first row and column: the scalar that remains after all
+// others are eliminated. It is 0 if the matrix is singular with a null vector that involves the
+// first row. O(size^3)
 std::complex<double> schur_complement_of_first(ComplexMatrix matrix);
 
-// AT B
+// Returns A^T B.
 Matrix transposed_product(const Matrix& a, const Matrix& b);
 
 }  // namespace ressort::linear_algebra

@@ -1,5 +1,5 @@
-// core/linear_algebra: the discrete Fourier transform of real numbers; fourier.cpp alone includes
-// the library, Eigen's kissfft. [any thread but audio]
+// core/linear_algebra: discrete Fourier transform of real signals. Only fourier.cpp includes the
+// library, Eigen's kissfft. [any thread but audio]
 #pragma once
 
 #include <complex>
@@ -11,20 +11,21 @@
 
 namespace ressort::linear_algebra {
 
-// Of one size, for which it keeps its roots of unity. O(size log size) where that has small factors
-// alone, else more, up to size^2 of a prime.
+// A transform of one size that keeps its twiddle factors. O(size log size) for sizes with small
+// prime factors, up to O(size^2) for a prime.
 class Fourier {
  public:
-  explicit Fourier(std::size_t size);  // from 2 on
+  explicit Fourier(std::size_t size);  // At least 2.
   Fourier(Fourier&&) noexcept;
   Fourier& operator=(Fourier&&) noexcept;
   ~Fourier();
 
   std::size_t size() const { return size_; }
   std::size_t bins() const { return size_ / 2 + 1; }
-  // X[k] = sum of x[n] e^(-2 pi i k n / size), for k < bins(): the others are their conjugates.
+  // Computes X[k] = sum of x[n] e^(-2 pi i k n / size) for k < bins(); the other bins are
+  // conjugates.
   void forward(std::span<const double> x, std::span<std::complex<double>> bins);
-  // The x that has these bins, an even number of samples.
+  // Computes the signal with these bins. Its number of samples is even.
   void inverse(std::span<const std::complex<double>> bins, std::span<double> x);
 
  private:

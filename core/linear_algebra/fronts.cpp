@@ -7,7 +7,7 @@
 namespace ressort::linear_algebra {
 namespace {
 
-constexpr std::size_t leaf_nodes = 24;  // what is not worth being cut again
+constexpr std::size_t leaf_nodes = 24;  // Smaller sets of nodes are not dissected further.
 
 using Dense = Eigen::MatrixXd;
 
@@ -43,11 +43,11 @@ FrontalCholesky::FrontalCholesky(const SparseMatrix& pattern,
   progress.spend(8 * pattern.row.size());
 }
 
-// Halves them by a plane across their longest side, and takes out of one half what touches the
-// other: both halves are eliminated before that.
+// Nested dissection: halves the nodes by a plane across their longest extent. The nodes of one half
+// that touch the other form the separator, which is eliminated after both halves.
 void FrontalCholesky::dissect(std::span<int> nodes) {
   std::size_t parted =
-      0;  // the first so many are of one half, then the other, then what parts them
+      0;  // Sizes of the three consecutive ranges: first half, second half, separator.
   std::size_t parting = 0;
   if (nodes.size() > leaf_nodes) {
     std::array<double, 3> low = places_[at(nodes[0])];
@@ -81,7 +81,7 @@ void FrontalCholesky::dissect(std::span<int> nodes) {
       count[at(side)] += touches(node, side == 1 ? 2 : 1) ? 1 : 0;
     }
     const char thinner = count[1] <= count[2] ? 1 : 2;
-    for (const int node : nodes) {  // what has been marked is beside its own half only
+    for (const int node : nodes) {  // A marked node is adjacent to its own half only.
       if (side_[at(node)] == thinner && touches(node, thinner == 1 ? 2 : 1)) {
         side_[at(node)] = 3;
       }
@@ -172,14 +172,15 @@ bool FrontalCholesky::factor(const SparseMatrix& pattern, std::span<const NodeBl
       column_of[at(i)] = column;
     }
   }
-  std::vector<Dense> left(fronts_.size());  // [front] what its own nodes leave to its border
+  // [front] The Schur complement that its own nodes leave for its border.
+  std::vector<Dense> left(fronts_.size());
   std::vector<std::vector<std::size_t>> children(fronts_.size());
   for (std::size_t f = 0; f < fronts_.size(); ++f) {
     if (fronts_[f].parent >= 0) {
       children[at(fronts_[f].parent)].push_back(f);
     }
   }
-  std::vector<int> place(order_.size());  // [node] its place in the front at hand
+  std::vector<int> place(order_.size());  // [node] Its row in the current front.
   for (std::size_t f = 0; f < fronts_.size(); ++f) {
     Front& front = fronts_[f];
     const Eigen::Index all = eigen(3 * front.nodes.size());
@@ -188,7 +189,7 @@ bool FrontalCholesky::factor(const SparseMatrix& pattern, std::span<const NodeBl
       place[at(front.nodes[i])] = static_cast<int>(3 * i);
     }
     front.values.assign(3 * front.nodes.size() * 3 * front.own, 0.0);
-    Eigen::Map<Dense> mine(front.values.data(), all, own);  // its lower triangle counts
+    Eigen::Map<Dense> mine(front.values.data(), all, own);  // Only the lower triangle is used.
     Dense rest = Dense::Zero(all - own, all - own);
     const auto add = [&](int row, int column, double value) {
       if (row < column) {
@@ -213,7 +214,7 @@ bool FrontalCholesky::factor(const SparseMatrix& pattern, std::span<const NodeBl
       Dense& given = left[child];
       const std::span<const int> border =
           std::span(fronts_[child].nodes).subspan(fronts_[child].own);
-      for (std::size_t c = 0; c < border.size(); ++c) {  // both in the order of elimination
+      for (std::size_t c = 0; c < border.size(); ++c) {  // Both are in elimination order.
         for (int b = 0; b < 3; ++b) {
           const int column = place[at(border[c])] + b;
           double* to = column < own ? &mine(0, column) : nullptr;
@@ -232,9 +233,9 @@ bool FrontalCholesky::factor(const SparseMatrix& pattern, std::span<const NodeBl
       }
       given.resize(0, 0);
     }
-    if (own > 0) {  // halves that do not touch have nothing between them
+    if (own > 0) {  // Empty for a separator of two halves that do not touch.
       Eigen::Ref<Dense> corner = mine.topRows(own);
-      const Eigen::LLT<Eigen::Ref<Dense>> llt(corner);  // in place
+      const Eigen::LLT<Eigen::Ref<Dense>> llt(corner);  // Factors in place.
       if (llt.info() != Eigen::Success) {
         return false;
       }
@@ -254,7 +255,7 @@ void FrontalCholesky::solve(Matrix& columns) const {
   const Eigen::Index count = eigen(columns.columns());
   const auto rows = eigen(columns.rows());
   Eigen::Map<Dense> x(std::begin(columns.values), rows, count);
-  // Own rows, then border's, of the front at hand.
+  // Rows of the current front: its own nodes, then its border.
   Dense part;
   const auto gather = [&](const Front& front) {
     part.resize(eigen(3 * front.nodes.size()), count);

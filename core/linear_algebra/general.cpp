@@ -7,7 +7,7 @@
 namespace ressort::linear_algebra {
 namespace {
 
-constexpr double tolerance = 1e-9;  // of what a solution shall give
+constexpr double tolerance = 1e-9;  // Largest relative residual of a solution.
 
 Eigen::Map<const Eigen::MatrixXd> map_of(const Matrix& matrix) {
   return {std::begin(matrix.values), static_cast<Eigen::Index>(matrix.rows()),
@@ -52,7 +52,7 @@ std::optional<ComplexEigenpairs> eigenpairs_of_state(const Matrix& matrix, const
   if (!pairs) {
     return std::nullopt;
   }
-  // Two conjugate ones together are as much of the real part of one, and of its imaginary part.
+  // A conjugate pair contributes through its real part and its imaginary part.
   const std::size_t size = matrix.rows();
   Matrix parts(size, size);
   for (std::size_t j = 0; j < size; ++j) {

@@ -12,8 +12,9 @@ namespace {
 using Dense = Eigen::MatrixXd;
 using Index = Eigen::Index;
 
-constexpr double tolerance = 1e-9;  // of a pair's residual, against its own size
-constexpr double lost = 1e-13;      // what a direction may be left with and still be one
+constexpr double tolerance = 1e-9;  // Largest residual of a pair, relative to the pair.
+// A direction whose norm shrinks below this in the orthogonalisation is dropped.
+constexpr double lost = 1e-13;
 
 Dense times(const Multiply& multiply, const Dense& x) {
   Matrix columns(static_cast<std::size_t>(x.rows()), static_cast<std::size_t>(x.cols()));
@@ -22,7 +23,7 @@ Dense times(const Multiply& multiply, const Dense& x) {
   return Eigen::Map<const Dense>(std::begin(columns.values), x.rows(), x.cols());
 }
 
-// Of a symmetric matrix, ascending.
+// Eigenpairs of a symmetric matrix, ascending.
 struct Symmetric {
   Eigen::VectorXd values;
   Dense vectors;
@@ -35,7 +36,8 @@ Symmetric pairs_of(const Dense& matrix) {
           Eigen::Map<const Dense>(std::begin(pairs.vectors.values), matrix.rows(), matrix.cols())};
 }
 
-// The same numbers on every machine (splitmix64), between -1 and 1.
+// Returns a matrix of pseudo-random numbers between -1 and 1, the same on every machine
+// (splitmix64).
 Dense scattered(Index rows, Index columns) {
   Dense x(rows, columns);
   std::uint64_t state = 0;

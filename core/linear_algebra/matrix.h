@@ -27,7 +27,7 @@ inline double length(const ComplexVector& a) {
   return std::sqrt(sum);
 }
 
-// The largest magnitude, 0 of none.
+// Returns the largest magnitude, or 0 for an empty vector.
 inline double largest(const Vector& values) {
   double most = 0.0;
   for (const double value : values) {
@@ -36,11 +36,11 @@ inline double largest(const Vector& values) {
   return most;
 }
 
-// Dense, column by column.
+// A dense matrix in column-major order.
 class Matrix {
  public:
   Matrix() = default;
-  // All 0.
+  // Makes a matrix of zeros.
   Matrix(std::size_t rows, std::size_t columns) : values(rows * columns), rows_(rows) {}
 
   std::size_t rows() const { return rows_; }
@@ -57,28 +57,28 @@ class Matrix {
   std::size_t rows_ = 0;
 };
 
-// Symmetric and sparse: its lower triangle, column by column with ascending rows. A column's first
-// element is its diagonal, which is there even where it is 0.
+// A symmetric sparse matrix: its lower triangle, column by column with ascending rows. The first
+// element of each column is its diagonal, which is stored even if it is 0.
 struct SparseMatrix {
   struct Element {
     int row = 0;
-    int column = 0;  // at most `row`
+    int column = 0;  // Not above `row`.
     double value = 0.0;
   };
 
-  // Elements of the same place are added up, in their order. O(elements)
+  // Adds up elements at the same place in the order given. O(elements)
   SparseMatrix(int size, std::span<const Element> elements);
 
   int size() const { return static_cast<int>(first.size()) - 1; }
-  // Index into `value`, of an element that is there. O(log)
+  // Returns the index into `value` of an existing element. O(log elements)
   std::size_t find(int row, int column) const;
 
-  std::vector<int> first;  // [column] of its elements; then their number
+  std::vector<int> first;  // [column] Index of its first element; then the number of elements.
   std::vector<int> row;    // [element]
   std::vector<double> value;
 };
 
-// All of the symmetric matrix. O(size^2)
+// Returns the full symmetric matrix. O(size^2)
 Matrix dense(const SparseMatrix& lower);
 
 }  // namespace ressort::linear_algebra

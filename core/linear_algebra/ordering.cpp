@@ -5,7 +5,7 @@
 namespace ressort::linear_algebra {
 
 std::vector<int> order_of_elimination(const SparseMatrix& pattern) {
-  // Both triangles: what the algorithm works on, and spoils.
+  // The algorithm needs both triangles and destroys its input.
   using Pattern = Eigen::SparseMatrix<double>;
   const int size = pattern.size();
   const Eigen::Map<const Pattern> lower(size, size, pattern.first.back(), pattern.first.data(),

@@ -16,12 +16,12 @@ Eigenpairs pairs_of(const Eigen::VectorXd& values, const Eigen::MatrixXd& vector
   return pairs;
 }
 
-// As Spectra wants it.
+// The operator interface that Spectra expects.
 struct Operator {
   using Scalar = double;
   Eigen::Index rows() const { return size; }
   Eigen::Index cols() const { return size; }
-  void set_shift(double) const {}  // the inverse has it
+  void set_shift(double) const {}  // The inverse already contains the shift.
   void perform_op(const double* from, double* to) const { inverse(from, to); }
 
   Eigen::Index size;
@@ -39,11 +39,11 @@ Eigenpairs symmetric_eigenpairs(const Matrix& matrix) {
 
 std::optional<Eigenpairs> eigenpairs_near(double shift, int count, int size,
                                           const ShiftedInverse& inverse) {
-  constexpr Eigen::Index most_numbers = 30'000'000;  // of the vectors of all rounds
+  constexpr Eigen::Index most_numbers = 30'000'000;  // Limit on the numbers in the Krylov basis.
   const int vectors = std::min(size, std::max(12, count < 20 ? 4 * count : 2 * count + 80));
   const Eigen::Index rounds =
       std::clamp<Eigen::Index>(most_numbers / (vectors * Eigen::Index{size}), 10, 200);
-  try {  // Spectra tells by exceptions what it cannot iterate
+  try {  // Spectra reports a failed iteration by an exception.
     Operator shifted{size, inverse};
     Spectra::SymEigsShiftSolver<Operator> solver(shifted, count, vectors, shift);
     solver.init();

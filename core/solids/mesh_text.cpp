@@ -12,7 +12,7 @@ namespace {
 
 constexpr std::size_t most_rows = 20'000'000;
 
-// Numbers, one after the other, over lines; '#' begins a comment.
+// Reads numbers one after another across lines; '#' begins a comment.
 class Numbers {
  public:
   explicit Numbers(std::string_view text) : text_(text) {}
@@ -37,7 +37,7 @@ class Numbers {
     return static_cast<std::size_t>(*number);
   }
 
-  // Goes on behind a line that is this very word.
+  // Moves behind the next line that equals `line`.
   bool find(std::string_view line) {
     for (std::size_t from = at_; from < text_.size();) {
       const std::size_t found = text_.find(line, from);
@@ -77,7 +77,7 @@ class Numbers {
   std::size_t at_ = 0;
 };
 
-// Numbers of points as a file has them to their places.
+// Maps the point numbers of a file to indices.
 struct Numbering {
   std::vector<int> place;
 
@@ -99,7 +99,7 @@ void append_point(std::string& text, const Point3& point) {
   text += line;
 }
 
-// A point within the shell: a little behind the middle of its largest triangle.
+// Returns a point inside the shell, slightly behind the centre of its largest triangle.
 Point3 within(const ClosedSurface& closed, int shell) {
   Point3 found{};
   double most = 0.0;
@@ -111,7 +111,7 @@ Point3 within(const ClosedSurface& closed, int shell) {
     const Point3 normal = cross(b - a, c - a);
     if (closed.shell[t] == shell && length(normal) > most) {
       most = length(normal);
-      // Hollows look inwards: along the normal is within them.
+      // Cavities face inwards, so the point along the normal lies within them.
       found = 1.0 / 3.0 * (a + b + c) + 1e-4 / std::sqrt(most) * normal;
     }
   }
@@ -187,8 +187,8 @@ Result<TetrahedronMesh> read_gmsh(std::string_view text) {
     return numbers.error("the number of elements");
   }
   for (std::size_t i = 0; i < *elements; ++i) {
-    // Its number, its kind, how many tags it has, these, its points. 15: point, 1: line,
-    // 2: triangle, 4: tetrahedron.
+    // A row has the element's number, its type, the number of tags, the tags, and the points.
+    // Types: 15 point, 1 line, 2 triangle, 4 tetrahedron.
     const auto number = numbers.count(most_rows);
     const auto kind = numbers.count(100);
     const auto tags = numbers.count(100);

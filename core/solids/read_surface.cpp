@@ -22,7 +22,7 @@ class Words {
  public:
   explicit Words(std::string_view text) : text_(text) {}
 
-  // The next line that has words; false at the end.
+  // Moves to the next line that has words. Returns false at the end.
   bool next_line() {
     rest_ = {};
     while (at_ < text_.size()) {
@@ -49,7 +49,7 @@ class Words {
     return rest_.substr(0, end);
   }
 
-  // Empty at the end of the line.
+  // Returns the next word, or an empty one at the end of the line.
   std::string_view word() {
     const std::string_view found = peek();
     rest_.remove_prefix(found.size());
@@ -139,7 +139,7 @@ Result<Surface> read_ascii_stl(std::string_view text) {
     if (surface.triangles.size() == max_triangles) {
       return too_many();
     }
-    // Normals are made anew from the corners: what stands there is often wrong.
+    // Normals in files are often wrong, so they are computed from the corners.
     const auto wants = [&](std::string_view first,
                            std::string_view second) -> std::optional<Error> {
       if (!words.next_line()) {
@@ -221,7 +221,7 @@ Result<Surface> read_stl(std::string_view bytes) {
   const std::size_t count = may_be_binary ? little_endian(bytes.substr(80)) : 0;
   const bool has_binary_size =
       may_be_binary && bytes.size() == stl_header_bytes + stl_triangle_bytes * count;
-  if (has_binary_size && count > 0) {  // also where its header begins with "solid"
+  if (has_binary_size && count > 0) {  // A binary file, even if its header begins with "solid".
     return read_binary_stl(bytes);
   }
   Words words(bytes.substr(0, 4096));
@@ -259,7 +259,8 @@ Result<Surface> read_obj(std::string_view text) {
       Triangle fan{-1, -1, -1};
       std::size_t corners = 0;
       for (std::string_view word = words.word(); !word.empty(); word = words.word()) {
-        // "POINT/TEXTURE/NORMAL", of which the first counts; from 1, or from -1 backwards.
+        // A corner is "POINT/TEXTURE/NORMAL"; only the first number is used. Points count from 1,
+        // or backwards from -1.
         const std::string_view index = word.substr(0, word.find('/'));
         long long number = 0;
         const auto [end, failure] =

@@ -9,8 +9,9 @@ namespace ressort::solids {
 namespace {
 
 constexpr std::array<std::array<std::size_t, 3>, 4> faces = {
-    {{0, 2, 1}, {0, 1, 3}, {1, 2, 3}, {0, 3, 2}}};  // outwards where the volume is positive
-constexpr double flat = 1e-10;                      // of the cube of the longest edge
+    // The faces of a tetrahedron of positive volume, seen from outside.
+    {{0, 2, 1}, {0, 1, 3}, {1, 2, 3}, {0, 3, 2}}};
+constexpr double flat = 1e-10;  // Smallest volume, relative to the cube of the longest edge.
 
 double six_volumes(const std::vector<Point3>& points, const Tetrahedron& t) {
   const Point3& a = points[at(t[0])];
@@ -117,8 +118,8 @@ TetrahedronMesh box_mesh(const Point3& sides, const std::array<int, 3>& cells) {
       }
     }
   }
-  // Six ways from a corner to the opposite one along three tetrahedron_edges (Kuhn): neighbours
-  // fit.
+  // The Kuhn subdivision: six paths from one corner of the cell to the opposite one along three
+  // edges. Neighbouring cells match.
   constexpr std::array<std::array<int, 3>, 6> ways = {
       {{0, 1, 2}, {1, 2, 0}, {2, 0, 1}, {0, 2, 1}, {2, 1, 0}, {1, 0, 2}}};
   const std::array<int, 3> step = {1, nx, nx * ny};
@@ -144,7 +145,7 @@ TetrahedronMesh ball_mesh(double radius, int shells) {
   for (Point3& point : mesh.points) {
     point = point - Point3{1.0, 1.0, 1.0};
     const double reach = std::max({std::abs(point[0]), std::abs(point[1]), std::abs(point[2])});
-    // Equal angles on the cube's faces, so that cells are of one size.
+    // Equal angles on the faces of the cube keep the cells of equal size.
     Point3 direction{};
     for (std::size_t axis = 0; axis < 3; ++axis) {
       direction[axis] = reach > 0.0 ? std::tan(point[axis] / reach * std::atan(1.0)) : 0.0;
@@ -155,13 +156,13 @@ TetrahedronMesh ball_mesh(double radius, int shells) {
 }
 
 std::optional<LyingBox> as_box(const ClosedSurface& closed) {
-  constexpr double tolerance = 1e-5;  // of its size
+  constexpr double tolerance = 1e-5;  // Relative to the size.
   const auto& points = closed.surface.points;
   if (closed.shells != 1 || points.size() < 8) {
     return std::nullopt;
   }
-  // The corner that is farthest from the middle, and its three neighbours along the sides: of all
-  // other corners the three that are nearest. Then every point has to lie on a face.
+  // Takes the corner farthest from the centre and its three neighbours along the sides, which are
+  // the nearest of the other corners. Every point must then lie on a face.
   Point3 middle{};
   for (const Point3& point : points) {
     middle = middle + 1.0 / static_cast<double>(points.size()) * point;
@@ -183,8 +184,8 @@ std::optional<LyingBox> as_box(const ClosedSurface& closed) {
   }
   std::sort(corners.begin(), corners.end(),
             [](const Point3& a, const Point3& b) { return length(a) < length(b); });
-  // Corner, then sides and diagonals of faces, the diagonal of all last: three that are square to
-  // each other are the sides.
+  // From one corner: sides and face diagonals first, the space diagonal last. Three mutually
+  // perpendicular ones are the sides.
   for (std::size_t i = 1; i < 7; ++i) {
     for (std::size_t j = i + 1; j < 7; ++j) {
       for (std::size_t k = j + 1; k < 7; ++k) {
@@ -200,8 +201,8 @@ std::optional<LyingBox> as_box(const ClosedSurface& closed) {
         if (std::abs(std::abs(volume) - closed.volume) > 1e-4 * closed.volume) {
           continue;
         }
-        // Closed and of the box's volume between its corners: it is the box where no point is off
-        // its faces.
+        // A closed surface with the volume of the box between its corners is that box if no point
+        // lies off its faces.
         for (const Point3& point : points) {
           double off = size;
           for (const Point3* side : {&a, &b, &c}) {
@@ -223,13 +224,13 @@ std::optional<LyingBox> as_box(const ClosedSurface& closed) {
 }
 
 std::optional<LyingBall> as_ball(const ClosedSurface& closed) {
-  constexpr double tolerance = 1e-5;  // of its radius
-  constexpr double round = 0.9;       // of the ball's volume
+  constexpr double tolerance = 1e-5;  // Relative to the radius.
+  constexpr double round = 0.9;       // Least share of the ball's volume.
   if (closed.shells != 1 || closed.surface.points.size() < 42) {
     return std::nullopt;
   }
-  // The middle of a box along the axes would be that of the ball only where it has points there:
-  // through four points goes one sphere.
+  // The bounding box gives the centre only if the ball has points on the axes, so the sphere
+  // through four points is used.
   const auto& points = closed.surface.points;
   const Point3& first = points.front();
   const auto farthest = [&](auto&& measure) {
@@ -257,7 +258,7 @@ std::optional<LyingBall> as_ball(const ClosedSurface& closed) {
 }
 
 TetrahedronMesh lying_ball_mesh(const LyingBall& ball, double unknowns) {
-  // (4 shells + 1)^3 nodes.
+  // The mesh has (4 shells + 1)^3 nodes.
   const int shells = std::max(2, static_cast<int>((std::cbrt(unknowns / 3.0) - 1.0) / 4.0));
   TetrahedronMesh mesh = ball_mesh(ball.radius, shells);
   for (Point3& point : mesh.points) {
@@ -268,7 +269,7 @@ TetrahedronMesh lying_ball_mesh(const LyingBall& ball, double unknowns) {
 
 TetrahedronMesh lying_box_mesh(const LyingBox& box, double unknowns) {
   const Point3 sides{length(box.sides[0]), length(box.sides[1]), length(box.sides[2])};
-  // Nodes lie half a cell apart: (2 nx + 1)(2 ny + 1)(2 nz + 1) of them.
+  // Nodes are half a cell apart: there are (2 nx + 1)(2 ny + 1)(2 nz + 1).
   const auto cells_of = [&](double cell) {
     std::array<int, 3> cells{};
     for (std::size_t axis = 0; axis < 3; ++axis) {
@@ -292,8 +293,8 @@ TetrahedronMesh lying_box_mesh(const LyingBox& box, double unknowns) {
 }
 
 double edge_length(double volume, double unknowns) {
-  // Tetrahedra of equal tetrahedron_edges h have h^3 / 8.5; with their middles there are 1.4 nodes
-  // to each of them inside of a large solid, twice as many in one that is all surface.
+  // A tetrahedron with equal edges h has the volume h^3 / 8.5. With mid-edge nodes there are 1.4
+  // nodes per tetrahedron inside a large solid, and twice as many if the solid is mostly surface.
   constexpr double nodes_per_tetrahedron = 1.7;
   return std::cbrt(8.5 * volume * 3.0 * nodes_per_tetrahedron / unknowns);
 }

@@ -1,4 +1,4 @@
-// core/solids: a solid cut into tetrahedra of ten nodes, and where they come from. Pure.
+// core/solids: a solid divided into tetrahedra with ten nodes, and the ways to make one. Pure.
 #pragma once
 
 #include <array>
@@ -18,7 +18,7 @@ using Tetrahedron = std::array<int, 4>;
 inline constexpr std::array<std::array<std::size_t, 2>, 6> tetrahedron_edges = {
     {{0, 1}, {1, 2}, {0, 2}, {0, 3}, {1, 3}, {2, 3}}};
 
-// Four corners, then the middles of the edges in their order, as CalculiX's C3D10 has them.
+// Four corners, then the midpoints of the edges, in the order of CalculiX's C3D10.
 using QuadraticTetrahedron = std::array<int, 10>;
 
 struct TetrahedronMesh {
@@ -26,54 +26,54 @@ struct TetrahedronMesh {
   std::vector<Tetrahedron> tetrahedra;
 };
 
-// Straight edges: a round solid is as round as its surface was.
+// The edges are straight, so curvature is only as fine as the surface's triangles.
 struct SolidMesh {
   std::vector<Point3> points;  // m
   std::vector<QuadraticTetrahedron> elements;
-  std::vector<Triangle> surface;  // corners, counter-clockwise from outside
+  std::vector<Triangle> surface;  // Corners, counter-clockwise seen from outside.
 
   std::size_t unknowns() const { return 3 * points.size(); }
 };
 
-// With middles. Tetrahedra are turned the right way; the error is for one that is flat, has a node
-// that is not there, or where nothing is left. Points that belong to none are left out. O(n log n)
+// Adds the mid-edge nodes, orients the tetrahedra and drops unused points. Returns an error for a
+// flat tetrahedron, a missing node, or an empty mesh. O(n log n)
 Result<SolidMesh> quadratic(const TetrahedronMesh& mesh);
 
-// A box from (0, 0, 0), six tetrahedra to each of so many cells along x, y, z.
+// Meshes a box from (0, 0, 0) with `cells` along x, y and z, six tetrahedra per cell.
 TetrahedronMesh box_mesh(const Point3& sides, const std::array<int, 3>& cells);
 
-// A ball around (0, 0, 0): a box of 2 cells * `shells` a side, drawn round shell by shell.
+// Meshes a ball around (0, 0, 0): a cube of 2 `shells` cells a side, rounded shell by shell.
 TetrahedronMesh ball_mesh(double radius, int shells);
 
-// The box that the surface is, if it is one, however it lies.
+// The box that a surface describes, in any orientation.
 struct LyingBox {
   Point3 corner{};
-  std::array<Point3, 3> sides{};  // right-handed
+  std::array<Point3, 3> sides{};  // Right-handed.
 };
 std::optional<LyingBox> as_box(const ClosedSurface& closed);
 
-// The ball that the surface is drawn onto, if all of its points lie on one and it is round: its
-// volume is at least nine tenths of the ball's.
+// The ball that a surface describes: all its points lie on one sphere, and its volume is at least
+// nine tenths of the ball's.
 struct LyingBall {
   Point3 middle{};
   double radius = 0.0;
 };
 std::optional<LyingBall> as_ball(const ClosedSurface& closed);
 
-// A mesh of this ball with about so many unknowns.
+// Meshes this ball with about so many unknowns.
 TetrahedronMesh lying_ball_mesh(const LyingBall& ball, double unknowns);
 
-// A mesh of this box with about so many unknowns, its cells as near to cubes as whole numbers
-// allow.
+// Meshes this box with about so many unknowns and cells as close to cubes as whole numbers allow.
 TetrahedronMesh lying_box_mesh(const LyingBox& box, double unknowns);
 
-// How far apart nodes are to be so that a solid of this volume has about so many unknowns. m
+// Returns the node spacing, in m, that gives a solid of this volume about so many unknowns.
 double edge_length(double volume, double unknowns);
 
-// What meshing programs read and write. Errors with the line where there is one.
-std::string as_stl(const ClosedSurface& closed);           // ASCII, a solid for each shell
-std::string as_smesh(const ClosedSurface& closed);         // TetGen's, with a point in every hollow
-Result<TetrahedronMesh> read_gmsh(std::string_view text);  // .msh, format 2, ASCII
+// Formats of meshing programs. Errors give the line if there is one.
+std::string as_stl(const ClosedSurface& closed);  // ASCII STL with one solid per shell.
+// TetGen's format, with a point in every cavity.
+std::string as_smesh(const ClosedSurface& closed);
+Result<TetrahedronMesh> read_gmsh(std::string_view text);  // Gmsh's .msh format 2, ASCII.
 Result<TetrahedronMesh> read_tetgen(std::string_view nodes, std::string_view elements);
 
 }  // namespace ressort::solids

@@ -11,9 +11,11 @@ namespace ressort::solids {
 namespace {
 
 constexpr int rigid_motions = 6;
-constexpr double rigid_share = 1e-6;  // of the shift: an omega^2 below that is a motion as a whole
+// Share of the shift below which omega^2 belongs to a rigid-body motion.
+constexpr double rigid_share = 1e-6;
 
-// y = M x, on three axes and all columns at once: they lie side by side while it works.
+// Computes y = M x for three axes and all columns at once. The columns are interleaved while it
+// works.
 void times_mass(const SparseMatrix& mass, Matrix& columns) {
   const std::size_t rows = columns.rows();
   const std::size_t count = columns.columns();
@@ -75,7 +77,7 @@ void times_stiffness(const SolidMatrices& matrices, Matrix& columns) {
   columns.values = std::move(y);
 }
 
-// Of the ten nodes at a point of an element, by the four shares L of its corners.
+// Gradients of the ten shape functions at a point with barycentric coordinates L.
 using Gradients = std::array<Point3, 10>;
 
 Gradients gradients_at(const std::array<Point3, 4>& corner, const std::array<double, 4>& share) {
@@ -90,7 +92,8 @@ Gradients gradients_at(const std::array<Point3, 4>& corner, const std::array<dou
   return gradients;
 }
 
-// int N_a N_b over an element of volume 1: from int L1^a L2^b L3^c L4^d = 6V a!b!c!d!/(a+b+c+d+3)!
+// Integral of N_a N_b over an element of volume 1, from int L1^a L2^b L3^c L4^d = 6 V a! b! c! d! /
+// (a+b+c+d+3)!.
 double mass_share(std::size_t a, std::size_t b) {
   const auto touches = [](std::size_t edge, std::size_t corner) {
     return tetrahedron_edges[edge][0] == corner || tetrahedron_edges[edge][1] == corner;
@@ -106,7 +109,7 @@ double mass_share(std::size_t a, std::size_t b) {
   return (common == 2 ? 32.0 : common == 1 ? 16.0 : 8.0) / 420.0;
 }
 
-// The pattern of what hangs together, by rows of free nodes; all values 0.
+// Returns the coupling pattern of the free nodes, all values 0.
 SparseMatrix pattern_of(const SolidMesh& mesh, const std::vector<int>& row_of, int rows) {
   std::vector<std::vector<int>> below(at(rows));
   for (const QuadraticTetrahedron& element : mesh.elements) {
@@ -137,7 +140,8 @@ SparseMatrix pattern_of(const SolidMesh& mesh, const std::vector<int>& row_of, i
   return pattern;
 }
 
-// Below all modes of a solid of this size: a twentieth of the time that sound takes through it.
+// Returns a shift below all modes of a solid of this size: (omega of a twentieth of the travel time
+// of sound through it)^2.
 double shift_of(const SolidMesh& mesh, const SolidMaterial& material) {
   const double omega =
       0.05 * std::sqrt(material.young / material.density) / box_around(mesh.points).diagonal();
@@ -147,7 +151,7 @@ double shift_of(const SolidMesh& mesh, const SolidMaterial& material) {
 }  // namespace
 
 std::span<const SolidMaterial> solid_materials() {
-  // Moduli and densities as handbooks have them; loss factors vary by ten from piece to piece.
+  // Moduli and densities from handbooks. Loss factors vary by a factor of ten between specimens.
   static constexpr SolidMaterial table[] = {
       {"steel", 200e9, 0.29, 7850.0, 2.5e-4},
       {"iron", 210e9, 0.28, 8000.0, 5e-4},
@@ -207,13 +211,14 @@ SolidMatrices solid_matrices(const SolidMesh& mesh, const SolidMaterial& materia
                                         mesh.points[at(element[2])] - origin,
                                         mesh.points[at(element[3])] - origin};
     const double six = inner(side[0], cross(side[1], side[2]));
-    std::array<Point3, 4> slope;  // of the corners' shares
+    std::array<Point3, 4> slope;  // Gradients of the barycentric coordinates.
     for (std::size_t i = 0; i < 3; ++i) {
       slope[i + 1] = 1.0 / six * cross(side[(i + 1) % 3], side[(i + 2) % 3]);
     }
     slope[0] = -1.0 * (slope[1] + slope[2] + slope[3]);
     const double volume = six / 6.0;
-    // Exact for polynomials of second degree, which products of gradients are.
+    // Four-point quadrature, exact for polynomials of second degree, such as products of the
+    // gradients.
     constexpr double high = 0.58541019662496845446;
     constexpr double low = 0.13819660112501051518;
     std::array<Gradients, 4> gradients;
@@ -296,7 +301,7 @@ Result<SolidModes> find_solid_modes(const SolidMesh& mesh, const SolidMaterial& 
   const SolidMatrices matrices = solid_matrices(mesh, material, clamps, progress);
   const double shift = shift_of(mesh, material);
   const bool is_free = matrices.node.size() == mesh.points.size();
-  // What is clamped at a point or along a line can turn as a whole, too.
+  // A solid clamped at a point or along a line can still rotate, so rigid motions are sought, too.
   const auto pairs = lowest_solid_pairs(mesh, matrices, shift, count + rigid_motions, progress);
   if (!pairs) {
     return pairs.error();
@@ -385,7 +390,7 @@ std::vector<int> spread_on_surface(const SolidMesh& mesh, std::span<const SolidC
   std::erase_if(nodes, [&](int node) { return is_clamped(mesh.points[at(node)], clamps); });
   const Box3 box = box_around(mesh.points);
   const Point3 middle = 0.5 * (box.low + box.high);
-  // [node] to the nearest that was taken, or to what is clamped; at first from the middle.
+  // [node] Distance to the nearest chosen or clamped node; at the start, to the centre.
   std::vector<double> distance;
   for (const int node : nodes) {
     double nearest = clamps.empty() ? length(mesh.points[at(node)] - middle) : box.diagonal();

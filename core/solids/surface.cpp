@@ -11,10 +11,10 @@
 namespace ressort::solids {
 namespace {
 
-constexpr double weld_share = 1e-6;      // of the solid's size
-constexpr std::size_t shown_edges = 12;  // of those that are open
+constexpr double weld_share = 1e-6;      // Welding distance, relative to the solid's size.
+constexpr std::size_t shown_edges = 12;  // Most open edges named in an error.
 
-// Each point the first one that lies so near, by a grid of cells that wide.
+// Maps each point to the first point within `distance`, by a grid of cells of that width.
 std::vector<int> weld(const std::vector<Point3>& points, double distance) {
   const auto cell_of = [&](const Point3& point, std::size_t axis) {
     return static_cast<std::int64_t>(std::floor(point[axis] / distance));
@@ -57,7 +57,7 @@ struct EdgeUse {
   int low = 0;
   int high = 0;
   int triangle = 0;
-  bool is_forward = true;  // from low to high
+  bool is_forward = true;  // From the lower to the higher index.
 
   bool is_of(const EdgeUse& other) const { return low == other.low && high == other.high; }
 };
@@ -79,7 +79,7 @@ std::vector<EdgeUse> edges_of(const std::vector<Triangle>& triangles) {
   return edges;
 }
 
-// Empty where every edge belongs to two triangles.
+// Returns a description of the open edges; empty if every edge belongs to two triangles.
 std::string open_edges(const Surface& surface, const std::vector<EdgeUse>& edges) {
   std::string open;
   std::string crowded;
@@ -114,7 +114,8 @@ std::string open_edges(const Surface& surface, const std::vector<EdgeUse>& edges
   return first + (first.empty() || second.empty() ? "" : "\n") + second;
 }
 
-// Numbers the shells and turns the triangles of each one way. False where that cannot be.
+// Numbers the shells and orients the triangles of each consistently. Returns false for a surface
+// that cannot be oriented.
 bool turn_alike(std::vector<Triangle>& triangles, const std::vector<EdgeUse>& edges,
                 ClosedSurface& closed) {
   struct Neighbour {
@@ -161,7 +162,8 @@ bool turn_alike(std::vector<Triangle>& triangles, const std::vector<EdgeUse>& ed
   return true;
 }
 
-// How often a shell goes around a point: its solid angle over 4 pi (van Oosterom and Strackee).
+// Returns the winding number of a shell around a point: its solid angle over 4 pi (van Oosterom and
+// Strackee 1983).
 double windings(const ClosedSurface& closed, int shell, const Point3& point) {
   double sum = 0.0;
   for (std::size_t t = 0; t < closed.surface.triangles.size(); ++t) {
@@ -189,7 +191,8 @@ void turn_shell(ClosedSurface& closed, int shell) {
   }
 }
 
-// The outer shell first and outwards, hollows inwards; the error where there are several bodies.
+// Puts the outer shell first, facing outwards, and cavities after it, facing inwards. Returns an
+// error if there are several bodies.
 Result<Done> sort_shells(ClosedSurface& closed, const Progress& progress) {
   constexpr int most_shells = 64;
   if (closed.shells > most_shells) {

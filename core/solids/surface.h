@@ -1,4 +1,4 @@
-// core/solids: a solid as its surface, read from STL and OBJ, and whether it is one. Pure.
+// core/solids: reads the surface of a solid from STL or OBJ and checks that it is closed. Pure.
 #pragma once
 
 #include <array>
@@ -13,7 +13,7 @@
 
 namespace ressort::solids {
 
-// Indices of points are ints, as files have them.
+// Converts a point index, which is an int in files, to an index of a vector.
 inline std::size_t at(int index) {
   return static_cast<std::size_t>(index);
 }
@@ -37,44 +37,45 @@ inline Point3 cross(const Point3& a, const Point3& b) {
 }
 double length(const Point3& a);
 
-using Triangle = std::array<int, 3>;  // of points, counter-clockwise from outside
+using Triangle = std::array<int, 3>;  // Point indices, counter-clockwise seen from outside.
 
 struct Surface {
   std::vector<Point3> points;  // m
   std::vector<Triangle> triangles;
 };
 
-inline constexpr std::size_t max_triangles = 2'000'000;  // of a file; what has more is refused
-inline constexpr double largest_coordinate = 1e9;        // in the file's own unit
+inline constexpr std::size_t max_triangles = 2'000'000;  // Files with more triangles are rejected.
+inline constexpr double largest_coordinate = 1e9;        // Unit of the file.
 
-// The triangles as they stand in the file. STL in ASCII or binary; OBJ, of which `v` and `f` are
-// read and faces with more corners are cut into triangles. Errors say the line of a text, or the
-// byte, and what was expected there. O(bytes)
+// Read the triangles of a file. STL may be ASCII or binary. Of OBJ files `v` and `f` are read, and
+// faces with more than three corners are triangulated. Errors give the line of a text, or the byte,
+// and what was expected there. O(bytes)
 Result<Surface> read_stl(std::string_view bytes);
 Result<Surface> read_obj(std::string_view text);
 
-// What holds a body in: its shells, each closed.
+// A surface whose shells are all closed.
 struct ClosedSurface {
   Surface surface;
-  std::vector<int> shell;  // [triangle] from 0; 0 is the outer one, the others are hollows
+  // [triangle] Shell number; 0 is the outer shell, the others are cavities.
+  std::vector<int> shell;
   int shells = 1;
-  std::size_t welded = 0;    // points that were one with another
-  std::size_t turned = 0;    // triangles that looked inwards
-  std::size_t left_out = 0;  // triangles without an area
+  std::size_t welded = 0;    // Points merged with another one.
+  std::size_t turned = 0;    // Triangles that faced inwards and were flipped.
+  std::size_t left_out = 0;  // Triangles without area.
   double volume = 0.0;       // m^3
 };
 
-// Welds points that lie within 1e-6 of the solid's size, and turns triangles outwards. The error
-// names the edges that do not belong to two triangles, by their ends in metres; or says that the
-// surface cannot be turned one way, is flat, or has several bodies. O(n log n)
+// Welds points within 1e-6 of the solid's size and orients the triangles outwards. Returns an error
+// for edges that do not belong to two triangles (named by their ends in metres), for a surface that
+// cannot be oriented, that is flat, or that holds several bodies. O(n log n)
 Result<ClosedSurface> close_surface(const Surface& surface, const Progress& progress);
 
 Surface scaled(Surface surface, double metres_per_unit);
 
-// 6 times the volume that triangles hold in, negative where they look inwards.
+// Returns six times the enclosed volume; negative if the triangles face inwards.
 double six_volumes(const Surface& surface);
 
-// The corners of the smallest box along the axes.
+// The axis-aligned bounding box.
 struct Box3 {
   Point3 low{};
   Point3 high{};
@@ -83,7 +84,7 @@ struct Box3 {
 };
 Box3 box_around(const std::vector<Point3>& points);
 
-// "(0.1, 0, -2)", in four digits.
+// Formats a point as "(0.1, 0, -2)" with four digits.
 std::string to_string(const Point3& point);
 
 }  // namespace ressort::solids
