@@ -9,7 +9,8 @@
 namespace ressort::analysis {
 namespace {
 
-constexpr std::uint64_t most_wandering = 4'000'000;  // terms
+// Largest number of terms for places that move.
+constexpr std::uint64_t most_wandering = 4'000'000;
 
 class Assembler {
  public:
@@ -58,7 +59,8 @@ class Assembler {
       close(index, true);
       return;
     }
-    // The square of an average is at most the average of squares, and (p - q)^2 <= 2 p^2 + 2 q^2.
+    // Bounds: the square of an average is at most the average of the squares, and (p - q)^2 <= 2
+    // p^2 + 2 q^2.
     const double scale = is_held(link.a) || is_held(link.b) ? 1.0 : 2.0;
     for (const std::uint32_t end : {link.a, link.b}) {
       ++out_.wandering_ends;
@@ -79,7 +81,7 @@ class Assembler {
     }
   }
 
-  // How many entries an end at a place that moves takes.
+  // Returns the number of entries that an end at a moving place adds.
   std::uint64_t nodes_under(std::uint32_t mass) const {
     if (!is_live_place(network_, mass)) {
       return 0;
@@ -88,7 +90,7 @@ class Assembler {
     return std::uint64_t{tap.length} * (tap.places > 0 ? tap.places : tap.width);
   }
 
-  // A place that moves is between nodes, or on a body between places.
+  // A moving place lies between nodes, or between the places of a body.
   static std::uint32_t terms_under(const Tap& tap) {
     return tap.places > 0 ? tap.places : tap.length * tap.width;
   }
@@ -132,7 +134,7 @@ class Assembler {
     out_.entries.push_back({row, share});
   }
 
-  // Ends the term that the entries since the last one are.
+  // Makes one term of the entries since the last one.
   void close(std::uint32_t element, bool is_link, double scale = 1.0, std::uint32_t wanders = 0) {
     const std::size_t count = out_.entries.size() - first_;
     if (count > 0) {
@@ -149,11 +151,11 @@ class Assembler {
   const Network& network_;
   Assembly out_;
   std::vector<std::uint32_t> row_;    // [mass of the network]
-  std::vector<std::uint32_t> entry_;  // [row] where it was entered last
-  std::size_t first_ = 0;             // of the entries of the term at hand
+  std::vector<std::uint32_t> entry_;  // [row] Its last entry.
+  std::size_t first_ = 0;             // First entry of the current term.
 };
 
-// One end of each argument's range.
+// Returns one end of each argument's range.
 LawNumbers numbers(const Link& link, std::span<const Range> arguments, double Range::*end) {
   LawNumbers values{};
   for (std::size_t i = 0; i < values.size(); ++i) {
@@ -162,19 +164,19 @@ LawNumbers numbers(const Link& link, std::span<const Range> arguments, double Ra
   return values;
 }
 
-// The largest or the smallest load of a body's mode, for its smallest mass. With a parameter in
-// the T60 its stiffness turns with both: between so many samples of the damping it changes by no
-// more than its steepest slope allows.
+// Returns the largest or smallest load of a body's mode, for its smallest mass. If a parameter
+// changes the T60, it changes stiffness and damping together. The damping is sampled, and between
+// two samples the load changes by at most its steepest slope.
 Load load_of_mode(const Mass& mass, std::span<const Range> arguments, double rate_ratio,
                   bool is_highest) {
   constexpr int samples = 64;
-  constexpr double steepest = 2.4;  // of 1 + r^2 - 2 r cos w over Z/M
+  constexpr double steepest = 2.4;  // Steepest slope of 1 + r^2 - 2 r cos w over Z/M.
   const Range m = range_at(arguments, mass.mass);
   const Range stiffness = range_at(arguments, mass.stiffness);
   const Range damping = range_at(arguments, mass.damping);
   const double least = std::max(m.lowest, 1e-300);
   const double most = std::max(m.highest, least);
-  // K and Z hold M as a factor: their share of it is sure where M is one number.
+  // K and Z are proportional to M, so the bound is exact if M is a single number.
   const double r = rate_ratio;
   const double k = r * r * (is_highest ? stiffness.highest / least : stiffness.lowest / most);
   const double z_low = r * std::max(0.0, damping.lowest / most);
@@ -245,7 +247,8 @@ Load highest_load(const Network& network, const Assembly::Term& term,
   const Load load = load_as_keys_have_it(network, term, arguments, rate_ratio);
   const bool is_fixed =
       term.is_link ? network.links[term.element].is_fixed : network.masses[term.element].is_fixed;
-  return is_fixed ? Load{.damped = load.total()} : load;  // no key makes it stiffer
+  // A fixed element is not stiffened by keys.
+  return is_fixed ? Load{.damped = load.total()} : load;
 }
 
 Load lowest_load(const Network& network, const Assembly::Term& term,

@@ -1,4 +1,4 @@
-// The edge bound on the stiffness factor: linear in time and memory whatever the network.
+// The edge bound on the stiffness factor, linear in time and memory for every network.
 #include <algorithm>
 #include <cmath>
 #include <map>
@@ -11,11 +11,11 @@
 namespace ressort::analysis {
 namespace {
 
-// 4 is the limit; a little below it modes near the Nyquist frequency still decay.
+// The stability limit is 4; at slightly less, modes near the Nyquist frequency still decay.
 constexpr double limit = 4.0 * 0.98;
 
-// What of d_i/m_i grows with the factor, and what does not. Friction grows with its root; with the
-// factor itself it is on the safe side above 1.
+// The parts of d_i/m_i that scale with the factor, and the constant rest. Bow friction scales with
+// the square root of the factor; scaling it with the factor itself is conservative above 1.
 struct Sum {
   double stiff = 0.0;
   double damped = 0.0;
@@ -77,9 +77,8 @@ class NetworkBound {
     });
   }
 
-  // How far a place goes if no node around it goes farther than 1: on a body more than that, or
-  // less. A link on such a place is at most as stiff as one that much more on a place that is
-  // between its nodes.
+  // Returns the displacement of a place when no node around it moves farther than 1. On a body it
+  // may exceed 1. A link at such a place counts as a link at a node, scaled by that displacement.
   double way_of(std::uint32_t end) const {
     const Mass& mass = network_.masses[end];
     if (mass.kind != MassKind::point || network_.taps[mass.tap].places == 0) {
@@ -97,9 +96,10 @@ class NetworkBound {
     return most;
   }
 
-  // What holds on to a live place may hold on to any of its nodes, all of one macro's at once.
+  // A link at a live place may hold any node of the macro, and all such links may hold the same
+  // node.
   void settle_live_places() {
-    std::map<std::uint32_t, Sum> macros;  // by their first node
+    std::map<std::uint32_t, Sum> macros;  // Keyed by first node.
     for (const auto& [tap, sum] : live_) {
       macros[network_.taps[tap].first].add(sum, 1.0);
       size_[network_.taps[tap].first] = network_.taps[tap].count;
@@ -151,10 +151,11 @@ class NetworkBound {
   const Network& network_;
   std::vector<Range> arguments_;
   double rate_ratio_;
-  std::vector<Sum> sums_;                        // [mass] d_i, then d_i/m_i
-  std::map<std::uint32_t, Sum> live_;            // by tap
-  std::map<std::uint32_t, std::uint32_t> size_;  // nodes, by a macro's first one
-  std::map<std::uint32_t, Sum> worst_;           // by the same
+  std::vector<Sum> sums_;              // [mass] d_i, later d_i/m_i.
+  std::map<std::uint32_t, Sum> live_;  // Keyed by tap.
+  // Number of nodes, keyed by the macro's first node.
+  std::map<std::uint32_t, std::uint32_t> size_;
+  std::map<std::uint32_t, Sum> worst_;  // Same key.
   double factor_ = most_bounded;
 };
 

@@ -8,8 +8,10 @@ namespace {
 
 constexpr double limit_of_scheme = 4.0;
 constexpr double precision = 1e-13;
-constexpr double bound_precision = 1e-3;      // of what is an estimate anyway
-constexpr double wandering_precision = 1e-6;  // halved for, twenty times
+// Relative precision of the edge bound, which is an estimate anyway.
+constexpr double bound_precision = 1e-3;
+// Relative precision of the bisection with moving places (twenty halvings).
+constexpr double wandering_precision = 1e-6;
 constexpr double rounding = 1e-9;
 
 bool is_usable(const Weights& weights) {
@@ -91,7 +93,7 @@ bool BoundaryFinder::factors(const Weights& weights, double limit) {
     return false;
   }
   const std::vector<double> diagonal = analysis::diagonal(weights, limit);
-  // What the diagonal refuses needs no factorisation.
+  // A diagonal element that is not positive decides without a factorisation.
   std::vector<double> rest = diagonal;
   for (std::size_t t = 0; t < assembly_.terms.size(); ++t) {
     for (const Assembly::Entry& entry : assembly_.of(assembly_.terms[t])) {
@@ -106,7 +108,7 @@ bool BoundaryFinder::factors(const Weights& weights, double limit) {
          definite_.wander(diagonal, weights.terms).together < 1.0 - rounding;
 }
 
-// xT (4M - K - 2Z) x, and the larger of what it is the difference of.
+// Returns x^T (4M - K - 2Z) x, and the larger of the two terms of that difference.
 BoundaryFinder::Margin BoundaryFinder::margin(const Weights& weights,
                                               std::span<const double> shape) const {
   double inertia = 0.0;
@@ -124,7 +126,7 @@ BoundaryFinder::Margin BoundaryFinder::margin(const Weights& weights,
   return {inertia - pull, std::max(inertia, pull)};
 }
 
-// Where the shape's margin is 0: at once if the line is straight, else by halves.
+// Finds where the margin of this shape is 0: directly if the line is straight, else by bisection.
 double BoundaryFinder::crossing(const WeightLine& line, std::span<const double> shape, double safe,
                                 double bad) const {
   constexpr double rounding = 1e-14;
@@ -145,7 +147,8 @@ double BoundaryFinder::crossing(const WeightLine& line, std::span<const double> 
   return bad;
 }
 
-// Towards the motion that the last factored matrix holds back least, by inverse iteration.
+// Moves the shape towards the eigenvector of the smallest eigenvalue of the last factored matrix,
+// by inverse iteration.
 void BoundaryFinder::refine(const Weights& weights, std::vector<double>& shape) const {
   for (int i = 0; i < 3; ++i) {
     double largest = 0.0;
@@ -162,8 +165,8 @@ void BoundaryFinder::refine(const Weights& weights, std::vector<double>& shape) 
   }
 }
 
-// The bound of every term is a straight line in what the weights are straight in, or in its
-// inverse if that is a mass: two places say where the first of them meets the limit.
+// Each term's bound is affine in the weights, or in their inverse if the weight is a mass. Two
+// points therefore give the place where the first bound reaches the limit.
 std::optional<double> BoundaryFinder::met(const WeightLine& line, double safe) {
   const double other = safe > 0.0 ? 0.5 * safe : 1.0;
   const auto bounds_at = [&](double at) {
@@ -203,13 +206,14 @@ Boundary BoundaryFinder::between(const WeightLine& line, double safe, double bad
   const bool is_exact = this->is_exact() && assembly_.wandering_ends == 0;
   std::vector<double> shape(is_exact ? assembly_.masses.size() : 0);
   for (std::size_t i = 0; i < shape.size(); ++i) {
-    shape[i] = std::cos(static_cast<double>(i * i));  // like no mode in particular
+    shape[i] = std::cos(static_cast<double>(i * i));  // A start vector that favours no mode.
   }
   const auto is_safe = [&](double at) {
     const Weights weights = line(at);
     return is_exact ? factors(weights, limit_of_scheme) : holds(weights, limit_of_scheme);
   };
-  bool has_factor = is_exact && is_safe(safe);  // of the matrix at `safe`
+  // Whether the factor of the matrix at `safe` is available.
+  bool has_factor = is_exact && is_safe(safe);
   for (int round = 0; round < 100; ++round) {
     const double enough = is_exact           ? precision
                           : this->is_exact() ? wandering_precision
@@ -220,8 +224,8 @@ Boundary BoundaryFinder::between(const WeightLine& line, double safe, double bad
     double next = safe + 0.5 * (bad - safe);
     if (has_factor) {
       refine(line(safe), shape);
-      // The shape grows at the crossing, so the edge is no further; and most of the way to it is
-      // safe, the more surely the better the shape is.
+      // This shape is unstable beyond the crossing, so the boundary is not farther. Most of the way
+      // to it is safe; the better the shape, the more of it.
       bad = crossing(line, shape, safe, bad);
       next = bad - 0.01 * (bad - safe);
     }

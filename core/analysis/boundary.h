@@ -1,4 +1,4 @@
-// core/analysis: where stability ends on a line through what a assembly's weights may be.
+// core/analysis: finds where stability ends along a line through the weights of an assembly.
 #pragma once
 
 #include <functional>
@@ -10,57 +10,61 @@
 
 namespace ressort::analysis {
 
-// What stability depends on, at one point.
+// The numbers that stability depends on, at one point of the parameter space.
 struct Weights {
   std::vector<double> masses;  // [row]
-  std::vector<double> terms;   // [term] w
-  bool feeds = false;          // negative stiffness or damping makes motion grow by itself
+  std::vector<double> terms;   // [term] Its w.
+  bool feeds = false;          // A negative stiffness or damping makes the motion grow.
 };
 
-// The weights along a line: where one parameter goes, for instance.
+// The weights along a line, for example while one parameter moves.
 using WeightLine = std::function<Weights(double)>;
 
 struct Boundary {
   double value = 0.0;
-  std::vector<double> shape;  // of the motion that does not decay there; [row], empty where unknown
+  // [row] Shape of the motion that does not decay there; empty if unknown.
+  std::vector<double> shape;
 };
 
-// The largest of sum |g_i| d_i / m_i over the terms, and whose it is; d is the sum of |g| w at a
-// mass, so for a link it is d_a/m_a + d_b/m_b. Never below the largest eigenvalue of
-// M^-1 (K + 2Z): Gershgorin's bound on the terms' own matrix, which has the same spectrum.
+// The largest of sum |g_i| d_i / m_i over the terms, and its term, where d is the sum of |g| w at a
+// mass; for a link this is d_a/m_a + d_b/m_b. It is Gershgorin's bound for the matrix of the terms,
+// which has the spectrum of M^-1 (K + 2Z), so it is never below the largest eigenvalue.
 struct Bound {
   double value = 0.0;
   std::size_t term = 0;
 };
 Bound edge_bound(const Assembly& assembly, const Weights& weights);
 
-// Looks for where 4M - K - 2Z stops being positive definite. Keeps a reference to the assembly, and
-// the factorisation's pattern. [any thread but audio]
+// Finds where 4M - K - 2Z stops being positive definite. Keeps a reference to the assembly and the
+// pattern of the factorisation. [any thread but audio]
 class BoundaryFinder {
  public:
-  // Not exact, as wanted or because factorisations would take too long: by the edge bound alone.
+  // With `is_exact` false, or if factorisations would take too long, only the edge bound is used.
   BoundaryFinder(const Assembly& assembly, bool is_exact, Progress progress = {});
   bool is_exact();
 
-  // Is it stable there? At once where the edge bound says so. A `limit` below 4 is for rounding.
+  // Returns whether the weights are stable. The edge bound often decides at once. A `limit` below 4
+  // leaves room for rounding.
   bool holds(const Weights& weights, double limit);
 
-  // The edge between a place that holds and one that does not: to 13 digits, with about eight
-  // factorisations where the line is straight; to 6 where places move, by the bound to 3, on the
-  // safe side.
+  // Finds the boundary between a safe and an unsafe point: to 13 digits with about eight
+  // factorisations if the line is straight, to 6 digits if places move, to 3 digits and on the safe
+  // side by the edge bound.
   Boundary between(const WeightLine& line, double safe, double bad);
 
-  // The first edge beyond `safe`, going away from 0, upwards if `safe` is 0; nothing up to 1e12.
+  // Finds the first boundary beyond `safe`, away from 0 (upwards if `safe` is 0). Empty if there is
+  // none up to 1e12.
   std::optional<Boundary> outwards(const WeightLine& line, double safe);
 
-  // The edge by the bound alone, on either side of `safe` and 0 or above; at once, with six looks
-  // at the line. Nothing where it has to be searched for.
+  // Finds the boundary by the edge bound alone, at or above 0 on either side of `safe`, with six
+  // evaluations of the line. Empty if it would have to be searched for.
   std::optional<double> met(const WeightLine& line, double safe);
 
-  // Whether it is surely not, wherever it is that places move. Asked where it does not hold.
+  // Returns whether the weights are unstable wherever the moving places are. Call it only where
+  // holds() is false.
   bool fails(const Weights& weights);
 
-  // Is D less the sum over terms positive definite, with D by row?
+  // Returns whether D minus the sum over terms is positive definite, with D by row.
   bool is_definite(std::span<const double> diagonal, std::span<const double> terms);
 
  private:
@@ -75,7 +79,7 @@ class BoundaryFinder {
   void refine(const Weights& weights, std::vector<double>& shape) const;
 
   const Assembly& assembly_;
-  bool is_exact_;  // as far as is known yet
+  bool is_exact_;  // Whether exact, as far as is known so far.
   Progress progress_;
   Definite definite_;
 };

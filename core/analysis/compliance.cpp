@@ -11,7 +11,7 @@
 namespace ressort::analysis {
 namespace {
 
-// Which rows hang on something that does not move.
+// Finds the rows that are connected to something that does not move.
 class Anchors {
  public:
   explicit Anchors(const Assembly& assembly)
@@ -31,11 +31,12 @@ class Anchors {
 
  private:
   Groups rows_;
-  std::uint32_t ground_;  // stands for all that does not move
+  std::uint32_t ground_;  // Stands for everything that does not move.
 };
 
-// Without links that may let go, and so hold nothing: many may be at one place that moves, each at
-// every node under it. What may have less stiffness than none is left, and refused.
+// Returns the network without links that can let go, since these hold nothing; many of them may be
+// at one moving place, each with a term at every node under it. Links whose stiffness can be
+// negative stay, and make the caller refuse.
 Network always_touching(const Network& network, std::span<const Range> arguments,
                         double rate_ratio) {
   Network felt = network;
@@ -79,7 +80,7 @@ std::optional<std::vector<double>> compliances(const Network& network, const Par
     }
     weights.push_back(-stiff);
   }
-  // What drifts is given a hold of its own, which touches nobody else.
+  // A drifting part gets a separate unit stiffness, so that the matrix can be factored.
   std::vector<double> diagonal(assembly.masses.size());
   std::vector<std::uint32_t> row_of(network.masses.size(), held_row);
   for (std::uint32_t row = 0; row < diagonal.size(); ++row) {

@@ -1,4 +1,4 @@
-// core/analysis: how far a network gives way.
+// core/analysis: compliance of a network at given masses.
 #pragma once
 
 #include <optional>
@@ -11,14 +11,16 @@
 
 namespace ressort::analysis {
 
-inline constexpr std::size_t most_compliant_masses = 20'000;  // beyond, nobody waits for it
+// Larger networks would take too long.
+inline constexpr std::size_t most_compliant_masses = 20'000;
 
-// How far each of `masses` gives way to a force of 1 on it, with every stiffness as small as it can
-// be in the box: c^T K^-1 c at this rate. Springs and oscillators only; what touches, plucks or
-// bows helps nobody. A place on a macro gives way with the nodes around it. Infinity where nothing
-// holds the mass, or its place may slide; 0 for what does not move. Nothing where a stiffness may
-// be negative, for more than most_compliant_masses, or where they hang together at random. One
-// sparse Cholesky, and a solution for each. Of networks without macros. [any thread but audio]
+// Returns the displacement of each of `masses` under a unit force on it, c^T K^-1 c, with every
+// stiffness at its smallest in the box, at this rate. Only springs and oscillators count; contacts,
+// plucks and bows do not. A place on a macro moves with the nodes around it. Infinite if nothing
+// holds the mass or its place may move; 0 for a mass that does not move. Empty if a stiffness may
+// be negative, for more than most_compliant_masses, or if the links are so random that a
+// factorisation would take too long. One sparse Cholesky factorisation, and one solution per mass.
+// For networks without macros. [any thread but audio]
 std::optional<std::vector<double>> compliances(const Network& network, const ParameterBox& box,
                                                double rate_ratio,
                                                std::span<const std::uint32_t> masses,

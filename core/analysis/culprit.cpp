@@ -1,4 +1,4 @@
-// Which element makes a network unstable, and how to say it.
+// Finds the element that makes a network unstable, and words the message.
 #include <algorithm>
 #include <cmath>
 #include <numeric>
@@ -10,8 +10,8 @@
 namespace ressort::analysis {
 namespace {
 
-// Where the argument of a link's stiffness or damping stands; of two stiffnesses the greater, or
-// the one that is negative.
+// Returns the argument slot of a link's stiffness or damping. Of two stiffnesses, the larger one or
+// the negative one.
 std::size_t slot_of(const Link& link, Quantity quantity, bool feeds,
                     std::span<const Range> arguments) {
   const LawFacts& law = facts_of(link.law);
@@ -25,7 +25,7 @@ std::size_t slot_of(const Link& link, Quantity quantity, bool feeds,
   return law.slot(is_limit ? Role::limit : Role::stiffness);
 }
 
-// "the stiffness m_K = 5 of 'r1' and 2 more"
+// Returns for example "the stiffness m_K = 5 of 'r1' and 2 more".
 std::string described(const Culprit& culprit) {
   const std::string number = print_number(culprit.value);
   std::string text = std::string("the ") + quantity_name(culprit.quantity) + " " + culprit.argument;
@@ -38,7 +38,7 @@ std::string described(const Culprit& culprit) {
 
 }  // namespace
 
-// A mass that weighs nothing, or what is no number.
+// Finds a mass that is not above 0, or an argument that is not finite.
 std::optional<Proofs::Suspect> Proofs::nonsense(std::span<const Range> arguments) const {
   for (std::size_t row = 0; row < assembly_.masses.size(); ++row) {
     const Range mass = range_at(arguments, network_.masses[assembly_.masses[row]].mass);
@@ -70,7 +70,7 @@ Proofs::Suspect Proofs::heavier_part(std::size_t term, std::span<const Range> ar
   return {load.stiff >= load.damped + load.rubbed ? Quantity::stiffness : Quantity::damping, term};
 }
 
-// The link that is pulled the most in the motion that does not decay.
+// Finds the link with the most energy in the unstable motion.
 Proofs::Suspect Proofs::weakest(const Weights& weights, std::span<const Range> arguments,
                                 std::span<const double> shape) const {
   if (shape.empty()) {
@@ -88,7 +88,7 @@ Proofs::Suspect Proofs::weakest(const Weights& weights, std::span<const Range> a
                       arguments);
 }
 
-// A mass that moves nearly alone: it may be too light for all links together.
+// Finds a mass that moves almost alone: it may be too light for its links together.
 std::optional<Proofs::Suspect> Proofs::lightest(const Weights& weights,
                                                 std::span<const double> shape) const {
   std::vector<double> inertia;
@@ -156,7 +156,8 @@ Culprit Proofs::accuse(const Suspect& suspect, std::span<const Range> arguments)
   return culprit;
 }
 
-// Elements whose same quantity is written with the same argument; a macro is one of them.
+// Returns the number of elements whose quantity is written with the same argument; a macro counts
+// as one.
 std::size_t Proofs::users(const Suspect& suspect, std::span<const Range> arguments) const {
   const ArgumentId argument = argument_of(suspect, arguments);
   const std::size_t count =
@@ -171,7 +172,7 @@ std::size_t Proofs::users(const Suspect& suspect, std::span<const Range> argumen
   return places.size();
 }
 
-// How far the one argument may go with everything else as it is.
+// Returns how far one argument may go with all others unchanged.
 std::optional<double> Proofs::limit(const Suspect& suspect, std::span<const Range> arguments) {
   const ArgumentId argument = argument_of(suspect, arguments);
   if (argument == no_argument) {
@@ -184,7 +185,7 @@ std::optional<double> Proofs::limit(const Suspect& suspect, std::span<const Rang
     if (!boundary_.holds(line(0.0), 4.0)) {
       return std::nullopt;
     }
-    // No nearer to where doubles end than need be: there nothing can be halved often enough.
+    // Starts well below the largest double, where bisection would take too many steps.
     double bad = arguments[argument].highest;
     while (bad > 1e6 && !boundary_.holds(line(std::sqrt(bad)), 4.0)) {
       bad = std::sqrt(bad);

@@ -11,7 +11,7 @@
 namespace ressort::analysis {
 namespace {
 
-// Calls `use(row, column, share)` for what a term has in the lower triangle.
+// Calls `use(row, column, share)` for the elements of a term in the lower triangle.
 template <class Use>
 void each_pair(std::span<const Assembly::Entry> entries, Use&& use) {
   for (std::size_t i = 0; i < entries.size(); ++i) {
@@ -49,7 +49,7 @@ struct Definite::Matrix {
   }
 
   SparseMatrix sum;
-  std::vector<std::size_t> slots;  // [pair of a term] among its elements
+  std::vector<std::size_t> slots;  // [pair of a term] Its index among the elements.
   Cholesky solver;
   bool is_feasible = false;
 };
@@ -82,10 +82,11 @@ bool Definite::factor(std::span<const double> diagonal, std::span<const double> 
   return matrix_->solver.factor(matrix_->sum, Cholesky::Pivots::positive, progress_);
 }
 
-// With A what is left without them, A - sum w g gT is positive definite if the matrix of
-// sqrt(w_i w_j) g_i A^-1 g_j has a norm below 1 (Schur). Where an end is at worst, between two
-// nodes included, g A^-1 g is c; no g_i A^-1 g_j is above sqrt(c_i c_j), and it is 0 between parts:
-// so the norm is at most the largest sum of w c within a part.
+// With A the matrix without the moving terms, A - sum w g g^T is positive definite if the matrix of
+// sqrt(w_i w_j) g_i^T A^-1 g_j has a norm below 1 (Schur complement). Let c be the largest g^T A^-1
+// g over all positions of an end, those between two nodes included. Then
+// g_i^T A^-1 g_j| <= sqrt(c_i c_j), and it is 0 between parts, so the norm is at most the largest
+// sum of w c within a part.
 Definite::Wandering Definite::wander(std::span<const double> diagonal,
                                      std::span<const double> weights) {
   constexpr double infinity = std::numeric_limits<double>::infinity();
@@ -100,7 +101,7 @@ Definite::Wandering Definite::wander(std::span<const double> diagonal,
     find_parts();
   }
   struct End {
-    double share = 0.0;  // w c
+    double share = 0.0;  // w c.
     double scale = 1.0;
     std::uint32_t part = 0;
   };
@@ -150,7 +151,7 @@ void Definite::find_parts() {
     }
     return row;
   };
-  // An end that wanders is on one part, whichever nodes it has.
+  // A moving end stays on one part, at whichever of its nodes it is.
   std::vector<std::uint32_t> first(assembly_.wandering_ends, no_row);
   for (const Assembly::Term& term : assembly_.terms) {
     const auto entries = assembly_.of(term);

@@ -1,4 +1,4 @@
-// core/analysis: whether a diagonal less a assembly's sum is positive definite.
+// core/analysis: tests whether a diagonal minus the sum of an assembly is positive definite.
 #pragma once
 
 #include <cstdint>
@@ -11,31 +11,33 @@
 
 namespace ressort::analysis {
 
-// D - sum over terms of w g gT by a sparse Cholesky factorisation. Where the zeros are is found out
-// at the first use and kept. O(rows) for strings, about O(rows^1.5) for meshes. Keeps a reference.
+// Tests D - sum over terms of w g g^T by sparse Cholesky factorisation. The pattern is analysed at
+// the first use and kept. O(rows) for strings, about O(rows^1.5) for meshes. Keeps a reference to
+// the assembly.
 class Definite {
  public:
   explicit Definite(const Assembly& assembly, Progress progress = {});
   ~Definite();
 
-  // Whether a factorisation takes no more than Cholesky::most_work: not where rows hang together
-  // at random. Else nothing else may be asked.
+  // Returns whether a factorisation stays within Cholesky::most_work, which it does not for
+  // randomly connected rows. If false, no other member may be called.
   bool is_feasible();
 
-  // With D by row and w by term: is the matrix positive definite? [any thread but audio]
+  // Returns whether the matrix with D by row and w by term is positive definite. [any thread but
+  // audio]
   bool factor(std::span<const double> diagonal, std::span<const double> weights);
 
-  // With each end that wanders at one node at a time, wherever that is, instead of at all of them:
-  // positive definite where `together` is below 1, and surely not where `alone` is 1 or more, as
-  // one end is too much by itself. Infinite where the rest is not positive definite. About two
-  // factorisations, and a solution for every place of bodies. [any thread but audio]
+  // Tests the matrix with each moving end at one node at a time instead of at all of them. It is
+  // positive definite if `together` is below 1, and not positive definite if `alone` is 1 or more,
+  // since then a single end is too much. Infinite if the rest is not positive definite. Takes about
+  // two factorisations, and one solution for every place of a body. [any thread but audio]
   struct Wandering {
     double together = 0.0;
     double alone = 0.0;
   };
   Wandering wander(std::span<const double> diagonal, std::span<const double> weights);
 
-  // Solves for x in place, with the last matrix that factor() found positive definite.
+  // Solves for x in place with the last matrix that factor() found positive definite.
   void solve(std::vector<double>& x) const;
 
  private:
@@ -45,7 +47,8 @@ class Definite {
   const Assembly& assembly_;
   Progress progress_;
   std::unique_ptr<Matrix> matrix_;
-  std::vector<std::uint32_t> part_;  // [row] a row of the same part of what does not wander
+  // [row] A representative row of the connected part, moving terms excluded.
+  std::vector<std::uint32_t> part_;
 };
 
 }  // namespace ressort::analysis

@@ -12,8 +12,9 @@ namespace {
 
 constexpr double infinity = std::numeric_limits<double>::infinity();
 constexpr Range everything{-infinity, infinity};
-constexpr int curved = 2;   // the degree of what is no straight line
-constexpr int pieces = 64;  // into which a parameter's range is cut that occurs more than once
+constexpr int curved = 2;  // Stands for any degree above 1.
+// Number of pieces that a range is divided into when its parameter occurs more than once.
+constexpr int pieces = 64;
 
 bool is_point(Range range) {
   return range.lowest == range.highest;
@@ -31,7 +32,7 @@ Range hull(std::initializer_list<double> values) {
   return range;
 }
 
-// sin over x + shift, by whether a crest or a trough lies within.
+// Returns the range of a sine: its ends, and 1 or -1 if a crest or trough lies within.
 Range sine(Range x, double (*function)(double), double first_crest) {
   if (!(std::isfinite(x.lowest) && std::isfinite(x.highest))) {
     return {-1.0, 1.0};
@@ -48,7 +49,7 @@ Range sine(Range x, double (*function)(double), double first_crest) {
   return range;
 }
 
-// x^y is monotone in both where x is positive; of other x only whole powers are numbers.
+// x^y is monotone in both for positive x; for other x only integer powers are defined.
 Range power(Range x, Range y) {
   const Range corners = hull({std::pow(x.lowest, y.lowest), std::pow(x.lowest, y.highest),
                               std::pow(x.highest, y.lowest), std::pow(x.highest, y.highest)});
@@ -109,7 +110,7 @@ bool is_unary(Op op) {
          op == Op::exp;
 }
 
-// Runs the formula on a stack of anything, as evaluate() does on numbers.
+// Evaluates the formula on a stack of any type, as evaluate() does on numbers.
 template <class Value, class Number, class Parameter, class One, class Two>
 Value run(std::span<const Step> formula, Number number, Parameter parameter, One one, Two two) {
   std::array<Value, formula_stack> stack{};
@@ -147,7 +148,8 @@ Range range_of(std::span<const Step> formula, std::span<const double> lowest,
       [](Op op, Range x, Range y) { return apply(op, x, y); });
 }
 
-// The parameter that widens the range because it occurs more than once; -1 for none.
+// Returns a parameter that occurs more than once, which makes interval arithmetic too wide; -1 for
+// none.
 int repeated(std::span<const Step> formula, const ParameterBox& box) {
   for (std::size_t i = 0; i < formula.size(); ++i) {
     const std::uint32_t index = formula[i].index;

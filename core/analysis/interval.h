@@ -1,4 +1,4 @@
-// core/analysis: what a formula can amount to while its parameters are turned.
+// core/analysis: interval arithmetic for formulas.
 #pragma once
 
 #include <cstdint>
@@ -15,18 +15,18 @@ struct Range {
   double highest = 0.0;
 };
 
-// Parameter values at both ends of where they may be turned to; [parameter].
+// Lowest and highest values of the parameters: [parameter].
 struct ParameterBox {
   std::vector<double> lowest;
   std::vector<double> highest;
 };
 
-// A range that holds every value of the formula in the box: the exact one where each parameter
-// occurs once, or where the box is a point; elsewhere a little wide. What may be no number is
-// everything. O(steps). [any thread but audio]
+// Returns a range that contains every value of the formula in the box. It is exact if each
+// parameter occurs once or the box is a point, and slightly too wide otherwise. A formula that may
+// be undefined gives the whole line. O(steps). [any thread but audio]
 Range formula_range(std::span<const Step> formula, const ParameterBox& box);
 
-// Is it a straight line along the parameter, whatever the others are?
+// Returns whether the formula is affine in the parameter for all values of the others.
 bool is_affine(std::span<const Step> formula, std::uint32_t parameter);
 
 }  // namespace ressort::analysis

@@ -13,15 +13,17 @@
 namespace ressort::analysis {
 namespace {
 
-constexpr int dense_size = 64;      // below this a dense solver is faster and never fails
-constexpr double rigid = 1e-12;     // a smaller share of the largest stiffness is rounding
-constexpr double tolerance = 1e-8;  // of the largest stiffness, that a mode's force is off
-constexpr double same = 1e-9;       // by how much modes may differ that are as low
+constexpr int dense_size = 64;  // Below this size a dense solver is faster and never fails.
+// An eigenvalue below this share of the largest stiffness is rounding error: a rigid motion.
+constexpr double rigid = 1e-12;
+// Largest residual force of a mode, relative to the largest stiffness.
+constexpr double tolerance = 1e-8;
+constexpr double same = 1e-9;  // Modes that differ by less count as degenerate.
 constexpr std::size_t most_shapes = 12;
 constexpr std::size_t most_given = 3;
 constexpr std::size_t most_fixed_shapes = 64;
 
-// The linear part of a network: what moves, numbered anew, and what pulls at it.
+// The linear part of a network: the moving masses, numbered consecutively, and their springs.
 class Body {
  public:
   Body(const Network& network, std::span<const double> parameters)
@@ -40,7 +42,7 @@ class Body {
 
   int size() const { return static_cast<int>(scale_.size()); }
 
-  // A shape of what moves while all that is fixed is held, as one of the whole.
+  // Extends a shape of the network whose fixed masses are held to a shape of the whole.
   Vector lifted(const Body& held, const Vector& shape) const {
     Vector all(scale_.size());
     for (std::size_t i = 0; i < index_.size(); ++i) {
@@ -50,7 +52,7 @@ class Body {
     }
     return all;
   }
-  // The masses that are fixed, each as a shape of its own; so many at most.
+  // Returns the fixed masses as unit shapes, at most `most` of them.
   std::vector<Vector> fixed_shapes(std::size_t most) const {
     std::vector<Vector> shapes;
     for (std::size_t i = 0; i < index_.size() && shapes.size() < most; ++i) {
@@ -62,7 +64,7 @@ class Body {
     return shapes;
   }
 
-  // How much of a shape's motion is that of bodies' modes, 0..1.
+  // Returns the share of a shape's motion that belongs to modes of bodies, 0 to 1.
   double share_of_modes(const Vector& shape) const {
     double sum = 0.0;
     for (std::size_t i = 0; i < index_.size(); ++i) {
@@ -74,7 +76,7 @@ class Body {
     return sum / dot(shape, shape);
   }
 
-  // M^(-1/2) K M^(-1/2), its lower half.
+  // Returns M^(-1/2) K M^(-1/2), its lower triangle.
   SparseMatrix stiffness() const {
     std::vector<double> diagonal(scale_.size());
     std::vector<SparseMatrix::Element> elements;
@@ -98,7 +100,7 @@ class Body {
     return {size(), elements};
   }
 
-  // M^(-1/2) Z M^(-1/2) of a vector.
+  // Returns M^(-1/2) Z M^(-1/2) times a vector.
   Vector damped(const Vector& vector) const {
     Vector sum(vector.size());
     each_spring([&](const Shares& shares, double, double z, bool) {
@@ -110,7 +112,7 @@ class Body {
     return sum;
   }
 
-  // K that keys move, Z, and K that they do not, between some vectors.
+  // Projections on some vectors: the part of K that keys scale, Z, and the fixed part of K.
   struct Between {
     Matrix stiffness;
     Matrix damping;
@@ -137,7 +139,8 @@ class Body {
  private:
   static constexpr int held = -1;
 
-  // What a link's distance is, as a sum over rows: two masses, those around a place, or a body's.
+  // A link's elongation as a sum over rows: two masses, the masses around a place, or the modes of
+  // a body.
   struct Shares {
     double along(const Vector& vector) const {
       double sum = 0.0;
@@ -190,8 +193,8 @@ class Body {
   const Network& network_;
   std::span<const double> parameters_;
   std::vector<double> values_;  // [argument]
-  std::vector<int> index_;      // [mass] among those that move, or held
-  std::vector<double> scale_;   // [moving mass] M^(-1/2)
+  std::vector<int> index_;      // [mass] Index among the moving masses, or held.
+  std::vector<double> scale_;   // [moving mass] M^(-1/2).
 };
 
 // Calls use(row, column, value) for every element on and below the diagonal.
@@ -205,8 +208,8 @@ void each_element(const SparseMatrix& lower, Use&& use) {
   }
 }
 
-// Factored without a better row for a small pivot, a matrix that is not positive definite may have
-// lost its digits: whether A x is value x all the same.
+// The factorisation does not pivot, so an indefinite matrix may lose digits. Returns whether A x is
+// value x nevertheless.
 bool is_pair(const SparseMatrix& lower, double value, const Vector& vector, double most) {
   Vector left = -value * vector;
   each_element(lower, [&](std::size_t i, std::size_t j, double element) {
@@ -216,7 +219,7 @@ bool is_pair(const SparseMatrix& lower, double value, const Vector& vector, doub
   return largest(left) <= most;
 }
 
-// Eigenpairs from 0 on, as many as asked for; all where the matrix is small.
+// Computes eigenpairs from 0 upwards, as many as requested; all of them for a small matrix.
 class Spectrum {
  public:
   Spectrum(const SparseMatrix& lower, double shift, const Progress& progress)
@@ -240,7 +243,7 @@ class Spectrum {
     });
   }
 
-  // (A - shift)^-1 of a vector, once pairs were found.
+  // Applies (A - shift)^-1 to a vector, after eigenpairs were found.
   std::optional<Vector> inverse(Vector vector) {
     if (all_) {
       Vector sum(vector.size());
@@ -271,19 +274,18 @@ class Spectrum {
   const SparseMatrix& lower_;
   double shift_;
   const Progress& progress_;
-  std::optional<Eigenpairs> all_;  // of a small matrix
+  std::optional<Eigenpairs> all_;  // All pairs of a small matrix.
   Cholesky factor_;
   bool is_factored_ = false;
 };
 
-// The lowest eigenpairs, and which is the wanted one: the first above what is rounding, or so many
-// after it.
+// The lowest eigenpairs and the index of the requested one: the `number`th above the rigid motions.
 struct Lowest {
   Eigenpairs pairs;
   std::size_t first = 0;
 };
 
-// In so many pairs as are asked for at first it is most often found; else in a few.
+// Tries with `wanted` pairs, which usually suffice, then with more.
 std::optional<Lowest> lowest_pairs(Spectrum& spectrum, const SparseMatrix& lower, double stiffest,
                                    int wanted, int number) {
   const double floor = rigid * stiffest;
@@ -305,10 +307,11 @@ std::optional<Lowest> lowest_pairs(Spectrum& spectrum, const SparseMatrix& lower
   return std::nullopt;
 }
 
-// Without what others have of a vector, and of length 1; nothing where nothing is left.
+// Orthogonalises a vector against others and normalises it; empty if nothing is left.
 std::optional<Vector> apart_from(const std::vector<Vector>& others, Vector vector) {
   const double before = std::sqrt(dot(vector, vector));
-  for (int round = 0; round < 2; ++round) {  // the second takes what rounding left
+  // The second round removes the rounding error of the first (reorthogonalisation).
+  for (int round = 0; round < 2; ++round) {
     for (const Vector& other : others) {
       vector -= dot(other, vector) * other;
     }
@@ -317,8 +320,8 @@ std::optional<Vector> apart_from(const std::vector<Vector>& others, Vector vecto
   return length > 1e-9 * before ? std::optional<Vector>(vector / length) : std::nullopt;
 }
 
-// The lowest modes, of those that are as low as the first that which is damped the least first; and
-// how the network gives way to the first one's dampers.
+// Returns the lowest shapes, the least damped of degenerate ones first, and the static response of
+// the network to the first one's dampers.
 std::vector<Vector> shapes_of(const Body& body, const Lowest& lowest, Spectrum& spectrum) {
   const auto& [pairs, first] = lowest;
   const std::size_t count = std::min(pairs.vectors.columns(), most_shapes);
@@ -350,8 +353,8 @@ std::vector<Vector> shapes_of(const Body& body, const Lowest& lowest, Spectrum& 
   return shapes;
 }
 
-// The network with everything that keys leave as it is held where it is: what is left has the mode
-// that keys tune. Nothing where nothing is fixed.
+// Returns the network with all fixed elements held in place; the rest has the mode that keys tune.
+// Empty if nothing is fixed.
 std::optional<Network> fixed_held(const Network& network) {
   if (std::none_of(network.masses.begin(), network.masses.end(),
                    [](const Mass& mass) { return mass.is_fixed && moves(mass); })) {
@@ -403,7 +406,7 @@ std::optional<LowestShapes> lowest_shapes(const Network& network,
   if (!std::isfinite(stiffest) || stiffest == 0.0) {
     return std::nullopt;
   }
-  // The shift lies a little below 0, so that free networks can be factored too.
+  // The shift is slightly below 0, so that networks with rigid motions can be factored, too.
   Spectrum spectrum(stiffness, -1e3 * rigid * stiffest, progress);
   const std::optional<Lowest> lowest =
       lowest_pairs(spectrum, stiffness, stiffest, static_cast<int>(most_shapes), number);

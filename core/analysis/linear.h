@@ -1,4 +1,4 @@
-// core/analysis: the linear part of a network, as matrices and modes.
+// core/analysis: the linear part of a network as matrices and modes.
 #pragma once
 
 #include <optional>
@@ -10,41 +10,43 @@
 
 namespace ressort::analysis {
 
-// Springs, dampers and oscillators only, at places that stay.
+// Returns whether the network has only springs, dampers and oscillators, at places that do not
+// move.
 bool is_linear(const Network& network);
 
-// One mode, in the network's own numbers: per sample at 44 100 Hz.
+// One mode, in the network's own units: per sample at 44,100 Hz.
 struct Mode {
   double stiffness = 0.0;     // k/m
   double damping = 0.0;       // z/m
-  double frequency_hz = 0.0;  // as the explicit scheme sounds it at 44 100 Hz
+  double frequency_hz = 0.0;  // Frequency at which the explicit scheme plays it at 44,100 Hz.
 };
 
-// At what frequency the explicit scheme sounds a mode of k/m and z/m per sample at rate_hz:
-// cos(theta) = (2 - k - z) / (2 sqrt(1 - z)). [any thread]
+// Returns the frequency at which the explicit scheme plays a mode of k/m and z/m per sample at
+// rate_hz: cos(theta) = (2 - k - z) / (2 sqrt(1 - z)). [any thread]
 double scheme_frequency_hz(double stiffness, double damping, double rate_hz);
 
-// The slowest mode that is no rigid motion, with springs, dampers and oscillators only: plucks,
-// bows and contacts are open, position inputs are held. Its damping is the modal share of Z.
-// Nothing where no mass is sprung, and where it would take too long: where masses hang together at
-// random (Cholesky::most_work), or nearly alone. Sparse shift and invert: milliseconds for 1000
-// masses. [any thread but audio]
+// Returns the lowest mode that is not a rigid motion. Only springs, dampers and oscillators count:
+// plucks, bows and contacts are open, position inputs are held. Its damping is the modal share of
+// Z. Empty if no mass has a spring, or if the links are so random or so dense that a factorisation
+// would take too long (Cholesky::most_work). Sparse shift-and-invert: milliseconds for 1000 masses.
+// [any thread but audio]
 std::optional<Mode> lowest_mode(const Network& network, std::span<const double> parameters,
                                 const Progress& progress = {});
 
-// The network, reduced to the shapes that its lowest mode is made of, whatever the dampers make of
-// it: that mode without dampers first, some more of the lowest, and how the others give way to its
-// dampers. M is 1.
+// The network reduced to a small basis from which its lowest damped mode can be computed: the
+// lowest undamped mode first, a few more of the lowest, and the static response of the others to
+// its dampers. M is the identity.
 struct LowestShapes {
   Mode mode;
-  Matrix stiffness;  // [shape, shape] what keys move
+  Matrix stiffness;  // [shape, shape] The stiffness that keys scale.
   Matrix damping;
-  Matrix fixed;                 // the stiffness that keys leave as it is, which the first has not
-  double share_of_modes = 0.0;  // of bodies in the lowest one's motion, 0..1
+  // [shape, shape] The stiffness that keys leave unchanged, and that `stiffness` does not contain.
+  Matrix fixed;
+  double share_of_modes = 0.0;  // Share of bodies in the lowest mode's motion, 0 to 1.
 };
 
-// The same modes, in the same cases and the same time; or of the mode that is so many from the
-// lowest, which is 1. [any thread but audio]
+// Returns the reduced network for the same networks and in the same time as lowest_mode(), for the
+// lowest mode or for mode number `number` (1 is the lowest). [any thread but audio]
 std::optional<LowestShapes> lowest_shapes(const Network& network,
                                           std::span<const double> parameters,
                                           const Progress& progress = {}, int number = 1);

@@ -1,4 +1,4 @@
-// core/analysis: what a place on a macro stands for. Of networks without macros.
+// core/analysis: resolves places on macros. For networks without macros.
 #pragma once
 
 #include <algorithm>
@@ -8,7 +8,7 @@
 
 namespace ressort::analysis {
 
-// Is it a place whose coordinates may change?
+// Returns whether the mass is a place whose coordinates may change.
 inline bool is_live_place(const Network& network, std::uint32_t mass) {
   if (network.masses[mass].kind != MassKind::point) {
     return false;
@@ -20,7 +20,8 @@ inline bool is_live_place(const Network& network, std::uint32_t mass) {
   return is_live(tap.u) || is_live(tap.v);
 }
 
-// Where between which two of so many nodes, or of a body's places, a coordinate is.
+// The two neighbouring nodes, or places of a body, around a coordinate, and the weight between
+// them.
 struct Between {
   std::uint32_t below = 0;
   double beyond = 0.0;
@@ -32,14 +33,15 @@ inline Between between(double coordinate, std::uint32_t count) {
   return {below, p - below};
 }
 
-// How far one of a body's places moves by its modes: one of Network::shapes for each.
+// Returns the displacements of a place of a body in its modes: one of Network::shapes per mode.
 inline std::span<const double> shape_at(const Network& network, const Tap& tap,
                                         std::uint32_t place) {
   return std::span(network.shapes).subspan(tap.shape + std::size_t{place} * tap.length, tap.length);
 }
 
-// Calls `use(mass, share)` for the mass itself, or for those around a place, by the kernels'
-// weights. A place that is not live asks for no parameters. Shares add up to 1, but on a body.
+// Calls `use(mass, share)` for the mass itself, or for the masses around a place with the kernels'
+// interpolation weights. A place that is not live does not read parameters. The shares add up to 1,
+// except on a body.
 template <class Use>
 void each_share(const Network& network, std::uint32_t mass, Use&& use,
                 std::span<const double> parameters = {}) {

@@ -1,4 +1,4 @@
-// core/analysis: inside Stability. One network taken apart, and what is asked of it.
+// core/analysis: internals of Stability: one network, assembled, and the queries on it.
 #pragma once
 
 #include <optional>
@@ -25,18 +25,18 @@ class Proofs {
   double stiffness_factor(const ParameterBox& box);
 
  private:
-  // Instead of what one quantity's argument amounts to. One text may be a stiffness here and a
-  // damping there; only the one is changed.
+  // Replaces the range of an argument for one quantity. The same text may be a stiffness in one
+  // place and a damping in another; only the one quantity changes.
   struct Instead {
     Quantity quantity = Quantity::stiffness;
     ArgumentId argument = no_argument;
     double value = 0.0;
   };
-  // A term's stiffness or damping, or the mass of a row.
+  // The stiffness or damping of a term, or the mass of a row.
   struct Suspect {
     Quantity quantity = Quantity::stiffness;
     std::size_t index = 0;
-    bool feeds = false;  // by being negative, not by its size
+    bool feeds = false;  // Unstable because it is negative, not because it is too large.
   };
   enum class Course { flat, straight, bent };
 
@@ -49,7 +49,7 @@ class Proofs {
   Course course_along(std::size_t parameter) const;
   SafeRange range_around(const WeightLine& line, double anchor);
 
-  // culprit.cpp
+  // Defined in culprit.cpp.
   std::optional<Suspect> nonsense(std::span<const Range> arguments) const;
   Suspect feeder(std::span<const Range> arguments) const;
   Suspect weakest(const Weights& weights, std::span<const Range> arguments,
@@ -63,7 +63,7 @@ class Proofs {
   const SourceLocation& location_of(const Suspect& suspect) const;
 
   std::vector<Macro> macros_;
-  Network network_;  // without macros
+  Network network_;  // Without macros.
   double rate_ratio_;
   Progress progress_;
   Assembly assembly_;

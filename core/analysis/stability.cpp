@@ -12,7 +12,7 @@ namespace ressort::analysis {
 namespace {
 
 constexpr double unbounded = std::numeric_limits<double>::infinity();
-constexpr double safe_limit = 4.0 * (1.0 - 1e-9);  // whatever the rounding
+constexpr double safe_limit = 4.0 * (1.0 - 1e-9);  // The limit 4 less a margin for rounding.
 
 }  // namespace
 
@@ -107,8 +107,8 @@ Weights Proofs::weigh(std::span<const Range> arguments, const Instead& instead) 
   return weights;
 }
 
-// Some may be negative as long as the whole is not: a spring that pushes beside one that pulls.
-// What holds a waveguide has no whole to be part of.
+// Single terms may be negative as long as their sum is not: a spring that pushes beside one that
+// pulls. A link on a waveguide is not part of a sum.
 bool Proofs::feeds(std::span<const Range> arguments) {
   if (std::none_of(arguments.begin(), arguments.end(),
                    [](const Range& range) { return range.lowest < 0.0; })) {
@@ -143,7 +143,7 @@ bool Proofs::is_positive(std::span<const double> terms) {
   return largest == 0.0 || boundary_.is_definite(rounding, negated);
 }
 
-// How what counts for stability goes when one parameter moves.
+// Returns how the stability-relevant numbers depend on one parameter.
 Proofs::Course Proofs::course_along(std::size_t parameter) const {
   const auto index = static_cast<std::uint32_t>(parameter);
   std::vector<bool> is_used(network_.arguments.size(), false);
@@ -179,7 +179,7 @@ Proofs::Course Proofs::course_along(std::size_t parameter) const {
   return course;
 }
 
-// --- what is asked ------------------------------------------------------------------------------
+// --- queries ------------------------------------------------------------------------------------
 
 Verdict Proofs::prove(const ParameterBox& box) {
   const std::vector<Range> arguments = argument_ranges(network_, box);
@@ -210,7 +210,7 @@ Certificate Proofs::certify(const ParameterBox& box) {
     return scaled;
   };
   const Boundary boundary = boundary_.between(all_together, 0.0, 1.0);
-  // What an author would turn: one link, where that is enough; else the one mass between several.
+  // Prefers what an author would change: one link if that is enough, else the mass between several.
   Suspect suspect = weakest(weights, arguments, boundary.shape);
   std::optional<double> enough = limit(suspect, arguments);
   if (!enough || users(suspect, arguments) > 1) {
@@ -229,7 +229,7 @@ std::optional<SafeRange> Proofs::safe_range(const ParameterBox& box, std::size_t
                                             double start) {
   const Course course = course_along(parameter);
   const double side = start < 0.0 ? -1.0 : 1.0;
-  // All values from `from` to `to` at once; if the course is straight, the ends say it all.
+  // Tests all values from `from` to `to` at once; for a straight course the ends are enough.
   const auto between = [&](double from, double to) {
     ParameterBox moved = box;
     moved.lowest[parameter] = std::min(side * from, side * to);
@@ -259,7 +259,7 @@ std::optional<SafeRange> Proofs::safe_range(const ParameterBox& box, std::size_t
 SafeRange Proofs::range_around(const WeightLine& line, double anchor) {
   SafeRange range{0.0, unbounded};
   if (const auto boundary = boundary_.is_exact() ? std::nullopt : boundary_.met(line, anchor)) {
-    // Masses from there, stiffness up to there; the other side may have another.
+    // Masses have a lower limit, stiffnesses an upper one; the search continues on the other side.
     const bool is_lowest = *boundary < anchor;
     (is_lowest ? range.lowest : range.highest) = *boundary;
     if (boundary_.holds(line(is_lowest ? 1e12 * anchor : 0.0), 4.0)) {
@@ -306,7 +306,7 @@ double Proofs::stiffness_factor(const ParameterBox& box) {
   return boundary_.holds(line(0.0), 4.0) ? boundary_.between(line, 0.0, 1.0).value : 0.0;
 }
 
-// --- the door -----------------------------------------------------------------------------------
+// --- public interface ---------------------------------------------------------------------------
 
 Stability::Stability(Network network, double rate_ratio, std::size_t most_exact, Progress progress)
     : proofs_(std::make_unique<Proofs>(std::move(network), rate_ratio, most_exact,
@@ -335,7 +335,7 @@ std::optional<SafeRange> Stability::safe_range(const ParameterBox& box, std::siz
                                                double start) {
   auto safe = proofs_->safe_range(box, parameter, start);
   if (start == 0.0 && safe && safe->lowest == 0.0) {
-    // On the other side as well, unless that feeds at once, as a stiffness below 0 does.
+    // Searches the other side of 0, too, unless it is unstable at once, as a negative stiffness is.
     constexpr double beside = 1e-6;
     const auto below = proofs_->safe_range(box, parameter, -beside);
     if (below && below->highest > -beside && below->lowest < -beside) {

@@ -1,14 +1,14 @@
-// core/analysis: what can be said of a network's stability before it sounds.
+// core/analysis: proves the stability of a network before it is played.
 //
-// With symmetric M > 0 and K, Z >= 0 the explicit scheme is stable if, and only if, 4M - K - 2Z is
-// positive definite (on what is no rigid motion), whether or not the damping is proportional. That
-// matrix falls with every stiffness and every damping and grows with every mass. So one Cholesky
-// factorisation at the worst corner of a box proves the whole box, and whatever is safe is one
-// interval of each parameter.
+// With symmetric M > 0 and K, Z >= 0 the explicit scheme is stable if and only if 4M - K - 2Z is
+// positive definite (apart from rigid motions), whether or not the damping is proportional. The
+// matrix decreases with every stiffness and damping and increases with every mass. One Cholesky
+// factorisation at the worst corner of a box therefore proves the whole box, and the safe values of
+// each parameter form one interval.
 //
-// Stiffness and damping of plucks, bows and contacts count as if always felt, with their steepest
-// slopes; quadratic and cubic springs as they are at rest. So this is about what a network does
-// numerically, not about the energy that a hard contact may gain.
+// Stiffness and damping of plucks, bows and contacts count as if they always acted, with their
+// steepest slopes; quadratic and cubic springs with their slope at rest. So this proves numerical
+// stability, and does not bound the energy that a hard contact may gain.
 #pragma once
 
 #include <memory>
@@ -22,71 +22,74 @@
 
 namespace ressort::analysis {
 
-// The factor on every stiffness up to which the explicit scheme is certainly stable, anywhere in
-// the box: the edge bound max over links of (d_i/m_i + d_j/m_j) < 3.92, with d the sum of k + 2z
-// at a mass; a place counts with the masses around it, a live one with whichever is the worst.
-// `rate_ratio` is 44100 / rate. At most 0 where the dampers alone are too strong; that much where
-// there is nothing to bound. No more than two times too careful where no place is live. For a
-// network without macros. O(masses + links). [any thread but audio]
+// Returns a factor on every stiffness up to which the explicit scheme is stable anywhere in the
+// box, from the edge bound: max over links of (d_i/m_i + d_j/m_j) < 3.92, where d is the sum of k +
+// 2z at a mass. A place counts with the masses around it, a live one with the worst of them.
+// `rate_ratio` is 44100 / rate. Not above 0 if the dampers alone are too strong; most_bounded if
+// nothing limits it. At most two times too small if no place is live. For a network without macros.
+// O(masses + links). [any thread but audio]
 inline constexpr double most_bounded = 1e9;
 double highest_stiffness_factor(const Network& network, const ParameterBox& box, double rate_ratio);
 
 enum class Quantity { mass, stiffness, damping };
 const char* quantity_name(Quantity quantity);
 
-// The element to blame, and which of its arguments.
+// The element that causes the instability, and which of its arguments.
 struct Culprit {
-  std::string name;  // of the mass, link or macro
+  std::string name;  // Name of the mass, link or macro.
   SourceLocation location;
   Quantity quantity = Quantity::stiffness;
-  std::string argument;  // as written: "m_K", "2*p", "5"
-  double value = 0.0;    // what it amounts to at worst
+  std::string argument;  // As written: "m_K", "2*p", "5".
+  double value = 0.0;    // Worst value in the box.
   std::optional<double>
-      limit;               // below it, for a mass above it, all is well; nothing: not by itself
-  std::size_t others = 0;  // elements with the same argument, which the limit is for too
+      limit;  // Stable below it (for a mass: above it); empty if no value of it alone is enough.
+  // Number of other elements with the same argument, to which the limit applies, too.
+  std::size_t others = 0;
 };
 
 enum class Verdict {
-  stable,    // proved
-  unstable,  // somewhere in the box, each element being at its worst
-  unproved,  // too large for a factorisation, or something is negative
+  stable,    // Proved stable.
+  unstable,  // Unstable somewhere in the box, with each element at its worst.
+  unproved,  // Too large for a factorisation, or something is negative.
 };
 
 struct Certificate {
   Verdict verdict = Verdict::stable;
-  double factor = 1.0;  // on all stiffness and damping, up to which it is stable; if it is not
+  // Factor on all stiffness and damping up to which it is stable, if it is not stable.
+  double factor = 1.0;
   std::optional<Culprit> culprit;
 };
 
-// A limit in six digits, rounded towards the safe side.
+// Formats a limit with six digits, rounded to the safe side.
 std::string print_limit(double value, bool is_upper);
 
-// What to tell of a network that is not stable, with the culprit's place.
+// Returns the error message for an unstable network, at the culprit's place in the file.
 Error complaint(const Certificate& certificate);
 
-// An open interval, but for ends that are 0; infinite where nothing limits.
+// An interval, open except for ends that are 0; infinite if unlimited.
 struct SafeRange {
   double lowest = 0.0;
   double highest = 0.0;
 };
 
-// Whether its stiffness or damping is below 0 somewhere, with these values of the parameters:
-// motion may grow by itself there, however its force is found.
+// Returns whether the link's stiffness or damping is below 0 somewhere, for these parameter values.
+// Such a link can make motion grow with any scheme.
 bool pushes(const Network& network, const Link& link, std::span<const double> parameters);
 
-// What is always felt: springs, dampers, oscillators, and what nonlinear springs are at rest.
-// Without plucks, bows and contacts, of which nothing may ever touch, but for what pushes.
+// Returns the network with the links that always act: springs, dampers, oscillators, and nonlinear
+// springs with their slope at rest. Plucks, bows and contacts, which may never touch, are left out
+// unless their stiffness or damping is negative.
 Network always_felt(Network network);
 
-// "stable below 1.31568", "stable between 0.1 and 4", "stable anywhere".
+// Returns "stable below 1.31568", "stable between 0.1 and 4" or "stable anywhere".
 std::string describe(const SafeRange& safe);
 
 class Proofs;
 
-// Proofs and limits for one network; takes its macros apart once. Exact up to `most_exact` masses
-// that do not hang together at random (Cholesky::most_work), else by the edge bound, on the safe
-// side. Where places move, each link on one counts at the worst of its nodes: safe, not exact.
-// [any thread but audio]
+// Proofs and limits for one network, whose macros are expanded once. Exact up to `most_exact`
+// masses unless their links are too random for a factorisation (Cholesky::most_work); otherwise by
+// the edge bound, on the safe side. A link at a moving place counts at the worst of its nodes:
+// safe, but not exact. [any thread but audio]
 class Stability {
  public:
   static constexpr std::size_t most_exact_masses = 40'000;
@@ -97,29 +100,31 @@ class Stability {
   Stability(Stability&&) noexcept;
   Stability& operator=(Stability&&) noexcept;
 
-  // Whether it is; else by the bound.
+  // Returns whether results are exact; otherwise they come from the edge bound.
   bool is_exact();
-  // How many links and oscillators it has to do with.
+  // Returns the number of links and oscillators.
   std::size_t size() const;
 
-  // Is it stable with the parameters anywhere in the box? O(links) where the edge bound says yes,
-  // one factorisation otherwise.
+  // Returns whether the network is stable with the parameters anywhere in the box. O(links) if the
+  // edge bound proves it, else one factorisation.
   Verdict prove(const ParameterBox& box);
 
-  // The same, and who is to blame if not: some twenty factorisations more.
+  // Does the same and finds the culprit if it is unstable: about twenty more factorisations.
   Certificate certify(const ParameterBox& box);
 
-  // Where one parameter keeps the network stable with the others anywhere in the box, around
-  // `start` if that is stable: exact if every argument is a straight line along it, else what is
-  // proved by intervals. On the side of 0 on which `start` is, on both from 0. Nothing where no
-  // value was found.
+  // Returns the range of one parameter, around `start`, in which the network is stable with the
+  // others anywhere in the box. Exact if every argument is affine in it, else proved by interval
+  // arithmetic. The range stays on the side of 0 on which `start` lies, and covers both sides if
+  // `start` is 0. Empty if no stable value was found.
   std::optional<SafeRange> safe_range(const ParameterBox& box, std::size_t parameter, double start);
 
-  // How far of the way from one box, where it is stable, to one that holds it: 0..1.
+  // Returns the largest share, 0 to 1, of the way from a stable box to a wider one that contains
+  // it.
   double share(const ParameterBox& safe, const ParameterBox& wide);
 
-  // The exact factor on every stiffness up to which it is stable anywhere in the box; bows count
-  // with its root. 0 where the dampers alone are too strong, infinite where nothing bounds.
+  // Returns the exact factor on every stiffness up to which the network is stable anywhere in the
+  // box; bows scale with its square root. 0 if the dampers alone are too strong, infinite if
+  // unlimited.
   double stiffness_factor(const ParameterBox& box);
 
  private:

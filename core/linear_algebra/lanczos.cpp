@@ -50,7 +50,7 @@ Dense scattered(Index rows, Index columns) {
   return x;
 }
 
-// W = Q R with Q'BQ = I; Q has fewer columns where those of W depend on each other.
+// W = Q R with Q^T B Q = I; Q has fewer columns if those of W are linearly dependent.
 struct Orthogonal {
   Dense q;
   Dense bq;
@@ -58,7 +58,7 @@ struct Orthogonal {
 };
 Orthogonal orthogonal(const Dense& w, const Multiply& b) {
   Orthogonal found{w, times(b, w), Dense::Identity(w.cols(), w.cols())};
-  // Twice: columns that were nearly the same come out of the first with what rounding left.
+  // Two passes: after the first, nearly equal columns consist of rounding error.
   for (int pass = 0; pass < 2; ++pass) {
     const Dense gram = found.q.transpose() * found.bq;
     const Symmetric pairs = pairs_of(gram);
@@ -116,13 +116,13 @@ std::optional<Eigenpairs> lowest_pairs(double shift, int count, int size, const 
         residual = std::max(residual, (rest.r * ritz.col(i).tail(now)).norm() / std::abs(theta(i)));
       }
       if (residual <= tolerance && theta(0) > 0.0) {
-        // One more inverse takes out what is left of the highest eigenvectors.
+        // One more application of the inverse damps the remaining components of high eigenvectors.
         const Dense cleaned = times(inverse, bv.leftCols(used) * ritz);
         Eigenpairs pairs{Vector(static_cast<std::size_t>(count)),
                          Matrix(static_cast<std::size_t>(n), static_cast<std::size_t>(count))};
         const Eigen::VectorXd length =
             (cleaned.cwiseProduct(times(b, cleaned))).colwise().sum().cwiseSqrt();
-        for (Index i = 0; i < count; ++i) {  // the largest theta is the lowest eigenvalue
+        for (Index i = 0; i < count; ++i) {  // The largest theta belongs to the lowest eigenvalue.
           const Index from = count - 1 - i;
           pairs.values[static_cast<std::size_t>(i)] = shift + 1.0 / theta(from);
           const Eigen::VectorXd vector = cleaned.col(from) / length(from);

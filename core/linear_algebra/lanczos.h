@@ -1,5 +1,5 @@
-// core/linear_algebra: the lowest eigenpairs of A x = lambda B x, many at once and of any
-// multiplicity up to the width of a block. [any thread but audio]
+// core/linear_algebra: the lowest eigenpairs of A x = lambda B x, many at once, of any multiplicity
+// up to the block size. [any thread but audio]
 #pragma once
 
 #include <functional>
@@ -11,15 +11,15 @@
 
 namespace ressort::linear_algebra {
 
-// Overwrites the columns of X with those of a matrix times X.
+// Overwrites the columns of X with the product of a matrix and X.
 using Multiply = std::function<void(Matrix& columns)>;
 
-// Equal eigenvalues of which a block of vectors finds all at once.
+// Block size: the largest multiplicity that is found at once.
 inline constexpr int lanczos_block = 8;
 
-// The `count` pairs with the lowest eigenvalues, x'Bx = 1: block Lanczos on (A - shift B)^-1 B with
-// every vector kept orthogonal to all others (Grimes, Lewis and Simon 1994). `inverse` multiplies
-// with (A - shift B)^-1, and `shift` lies below all of them. Nothing where they do not converge.
+// Returns the `count` pairs with the lowest eigenvalues, normalised to x'Bx = 1, by block Lanczos
+// on (A - shift B)^-1 B with full reorthogonalisation (Grimes, Lewis and Simon 1994). `inverse`
+// applies (A - shift B)^-1; `shift` lies below all eigenvalues. Empty without convergence.
 std::optional<Eigenpairs> lowest_pairs(double shift, int count, int size, const Multiply& inverse,
                                        const Multiply& b, const Progress& progress);
 

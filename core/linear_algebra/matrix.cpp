@@ -12,7 +12,7 @@ SparseMatrix::SparseMatrix(int size, std::span<const Element> elements) {
     sorted.push_back({i, i, 0.0});
   }
   sorted.insert(sorted.end(), elements.begin(), elements.end());
-  // By row, then by column, each keeping the order before it: a radix sort.
+  // Stable radix sort: by row, then by column.
   std::vector<Element> from(sorted.size());
   std::vector<std::size_t> next(static_cast<std::size_t>(size) + 1);
   for (int Element::*key : {&Element::row, &Element::column}) {

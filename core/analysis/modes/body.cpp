@@ -13,15 +13,16 @@
 namespace ressort::analysis {
 namespace {
 
-constexpr double highest_share = 0.45;  // of the rate: modes above sound as something else
-constexpr double endless_t60_s = 1e9;   // what a body's mode has that nothing damps
-constexpr double faint = 1e-12;         // of the largest displacement: none
+// Highest frequency of a mode, relative to the rate; higher modes would alias.
+constexpr double highest_share = 0.45;
+constexpr double endless_t60_s = 1e9;  // T60 written for an undamped mode of a body.
+constexpr double faint = 1e-12;        // Displacements below this share of the largest count as 0.
 
 double rate_of(const NetworkModes& modes) {
   return modes.scheme == ModeScheme::published ? modes.rate_hz : Network::reference_rate_hz;
 }
 
-// Springs and dampers in a mode that swings alone, so that it has its pole in the published scheme.
+// Stiffness and damping of a single oscillator that has the mode's pole in the published scheme.
 struct PolePair {
   double k = 0.0;
   double z = 0.0;
@@ -31,8 +32,8 @@ double damping_of(double t60_s, double rate_hz) {
   return std::isfinite(t60_s) ? -std::expm1(-6.0 * std::numbers::ln10 / (rate_hz * t60_s)) : 0.0;
 }
 
-// k with which z and an angle per sample go together; of small angles without a difference of
-// equals.
+// Returns the k that gives, with z, this angle per sample, computed without cancellation for small
+// angles.
 double stiffness_of(double angle, double z) {
   const double r = std::sqrt(1.0 - z);
   const double half = std::sin(0.5 * angle);
@@ -40,7 +41,7 @@ double stiffness_of(double angle, double z) {
   return lost * lost + 4.0 * r * half * half;
 }
 
-// The line z = a + b k nearest to all, by the share that each is off; neither below 0.
+// Returns the line z = a + b k that fits best in relative error, with a and b not below 0.
 PolePair nearest_line(const std::vector<PolePair>& pairs) {
   double ww = 0.0;
   double wk = 0.0;
@@ -71,11 +72,11 @@ PolePair nearest_line(const std::vector<PolePair>& pairs) {
   return line;
 }
 
-// diag(values) seen from `start`, of length 1: a tridiagonal matrix, by Lanczos with every vector
-// made orthogonal to all before it twice.
+// Tridiagonalises diag(values) by Lanczos from the unit vector `start`, with each vector
+// orthogonalised twice against all before it.
 struct Tridiagonal {
   std::vector<double> diagonal;
-  std::vector<double> beside;  // [row] between it and the next
+  std::vector<double> beside;  // [row] Element between this row and the next.
 };
 
 Tridiagonal tridiagonal_of(const Vector& values, const Vector& start) {
@@ -99,10 +100,10 @@ Tridiagonal tridiagonal_of(const Vector& values, const Vector& start) {
   return out;
 }
 
-// u of T u = (1, 0, 0...), T with -beside off its diagonal.
+// Returns u of T u = (1, 0, 0, ...), where T has -beside off its diagonal.
 std::vector<double> solve_first(const Tridiagonal& t) {
   const std::size_t size = t.diagonal.size();
-  std::vector<double> pivot = t.diagonal;  // from the end on
+  std::vector<double> pivot = t.diagonal;  // From the end upwards.
   for (std::size_t i = size - 1; i-- > 0;) {
     pivot[i] -= t.beside[i] * t.beside[i] / pivot[i + 1];
   }
@@ -248,7 +249,7 @@ Result<ModalChain> chain_of(const PlacedModes& modes, std::string_view place) {
     pairs.push_back({stiffness_of(angle(*mode), z), z});
   }
   const PolePair line = nearest_line(pairs);
-  // The stiffness with which the damper that there will be gives the frequency that there was.
+  // Chooses the stiffness that keeps the frequency with the damper that the chain will have.
   Vector values(heard.size());
   Vector start(heard.size());
   ModalChain chain;
@@ -279,7 +280,7 @@ Result<ModalChain> chain_of(const PlacedModes& modes, std::string_view place) {
   ChainWriter writer(modes.name);
   for (std::size_t i = 0; i < u.size(); ++i) {
     const double mass = scale * u[i] * u[i];
-    // Each row of K adds up to u T u: only the first is held.
+    // Each row of K sums to u T u, so only the first mass is held by the ground.
     const double held = i == 0 ? scale * u[0] : 0.0;
     writer.add_mass(mass, held, line.z * mass + line.k * held);
   }

@@ -13,11 +13,11 @@
 namespace ressort::analysis {
 namespace {
 
-constexpr int most_spread = 20'000;  // masses that are laid out by their links
-constexpr int vectors = 6;           // that are looked at
+constexpr int most_spread = 20'000;  // Largest network that is laid out by its links.
+constexpr int vectors = 6;           // Number of eigenvectors examined.
 
-// How much of one vector is no parabola of another, both of length 1: a long strip bends before it
-// spreads to its sides.
+// Returns the part of a unit vector that is not a quadratic function of another unit vector. The
+// second eigenvector of a long string is such a parabola, and does not span the plane.
 double apart(const Vector& vector, const Vector& along) {
   const Vector one(1.0 / std::sqrt(static_cast<double>(along.size())), along.size());
   Vector square = along * along;
@@ -82,7 +82,7 @@ class LayoutMaker {
   }
 
  private:
-  // Whether the points are in the plane now; a chain is put in its order.
+  // Lays out the points and returns whether they span the plane; a chain is put in order.
   bool spread(std::vector<LayoutPoint>& points) const {
     const auto size = static_cast<int>(points.size());
     if (size < 3 || size > most_spread) {
@@ -110,7 +110,7 @@ class LayoutMaker {
     const auto pairs = lowest({size, elements});
     constexpr double joined = 1e-9;
     if (!pairs || pairs->values[1] < joined) {
-      return false;  // several things, each for itself
+      return false;  // Several unconnected components.
     }
     const Vector along = pairs->vectors.column(1);
     if (is_chain) {
@@ -132,7 +132,7 @@ class LayoutMaker {
     const double unit = std::sqrt(static_cast<double>(size));
     for (LayoutPoint& point : points) {
       const auto at = static_cast<std::size_t>(row[point.mass]);
-      // Of a mesh the vectors are cosines; its masses are as far apart everywhere.
+      // The eigenvectors of a mesh are cosines; the arcsine makes the distances equal.
       point.x = unit * std::asin(along[at] / largest(along));
       point.y = unit * scale * std::asin(beside[at] / largest(beside));
     }

@@ -1,4 +1,4 @@
-// core/analysis/modes: where the masses of a network are in a picture.
+// core/analysis/modes: positions of the masses of a network in a picture.
 #pragma once
 
 #include <cstdint>
@@ -11,20 +11,19 @@ namespace ressort::analysis {
 struct LayoutPoint {
   double x = 0.0;
   double y = 0.0;
-  std::uint32_t mass = 0;  // of the network with its macros written out
+  std::uint32_t mass = 0;  // Index in the network with macros expanded.
 };
 
-// In the plane, or in rows that follow each other.
+// A layout in the plane, or in consecutive rows.
 struct MassLayout {
   bool is_plane = false;
   std::vector<std::vector<LayoutPoint>> rows;
-  std::vector<double>
-      tops;  // [macro] y of its first row; a waveguide, which has no masses, is there
+  std::vector<double> tops;  // [macro] y of its first row. A waveguide has no masses but has a row.
 };
 
-// As the model draws its masses, and its meshes as rectangles; where nothing is drawn, as the links
-// pull them apart: by the two lowest vectors of the graph's Laplacian; a chain as a row, and what
-// is none of these in the order of its lines. Of a network as it is written. [any thread but audio]
+// Returns the layout of a network with macros. The model's own drawing comes first, and meshes are
+// rectangles. Without either, the two lowest eigenvectors of the graph Laplacian spread the masses;
+// a chain becomes a row, and anything else keeps the order of its lines. [any thread but audio]
 MassLayout layout_of(const Network& network);
 
 }  // namespace ressort::analysis

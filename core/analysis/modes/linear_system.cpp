@@ -84,7 +84,7 @@ class SystemMaker {
     });
   }
 
-  // How much of a link's end is at a node: all of it, or by the weights of a place.
+  // Returns the weight of a link's end at a node: 1, or the weights of a place.
   double part_of(std::uint32_t end, std::uint32_t node) const {
     double part = 0.0;
     each_share(network_, end,
@@ -92,7 +92,8 @@ class SystemMaker {
     return part;
   }
 
-  // The force of every link at a node, by what its ends do: also what a hand there does to them.
+  // Collects the force of every link at a node as a function of the motion of its ends, including
+  // the force of a driven input there.
   void feel(ModalPort& port, std::uint32_t node, double weight) const {
     for (const Link& link : network_.links) {
       const double at = link.a == link.b ? 0.0 : part_of(link.a, node) - part_of(link.b, node);
@@ -113,9 +114,9 @@ class SystemMaker {
     for (const Input& input : network_.inputs) {
       ModalPort& port = made_.inputs.emplace_back();
       if (input.is_force) {
-        add(port.direct, input.mass, step_);  // the same momentum at every rate
+        add(port.direct, input.mass, step_);  // Gives the same momentum at every rate.
       } else {
-        feel(port, input.mass, 1.0);  // K between the hand and the rows, which is symmetric
+        feel(port, input.mass, 1.0);  // K between the driven input and the rows is symmetric.
       }
     }
     const Output* before = nullptr;
@@ -203,7 +204,7 @@ void multiply(const SparseMatrix& lower, const double* x, double* y) {
   for (std::size_t column = 0; column + 1 < lower.first.size(); ++column) {
     auto i = static_cast<std::size_t>(lower.first[column]);
     const auto end = static_cast<std::size_t>(lower.first[column + 1]);
-    double sum = lower.value[i] * x[column];  // its diagonal comes first
+    double sum = lower.value[i] * x[column];  // The diagonal element comes first.
     for (++i; i < end; ++i) {
       const auto row = static_cast<std::size_t>(lower.row[i]);
       y[row] += lower.value[i] * x[column];

@@ -1,4 +1,4 @@
-// core/analysis/modes: a network near rest as matrices, for masses of 1.
+// core/analysis/modes: a network linearised at rest as matrices, for unit masses.
 #pragma once
 
 #include <complex>
@@ -12,16 +12,17 @@
 
 namespace ressort::analysis {
 
-// What an input pushes, or an output hears: shares of rows. Those of `stiff` act with a position,
-// those of `damped` with its change in a step.
+// The weights of an input or output on the rows. `stiff` weights apply to positions, `damped`
+// weights to their change per step.
 struct ModalPort {
-  using Shares = std::vector<std::pair<std::uint32_t, double>>;  // row, share
+  using Shares = std::vector<std::pair<std::uint32_t, double>>;  // Pairs of row and weight.
   Shares direct;
   Shares stiff;
   Shares damped;
 };
 
-// How a port moves with a shape, `speed` being how that changes in a step, of what it is.
+// Returns the motion of a port in a shape, where `speed` is the ratio of the shape's change per
+// step to the shape.
 template <class Shape>
 std::complex<double> along(const ModalPort& port, const Shape& shape, std::complex<double> speed) {
   const auto sum = [&](const ModalPort::Shares& shares) {
@@ -34,7 +35,7 @@ std::complex<double> along(const ModalPort& port, const Shape& shape, std::compl
   return sum(port.direct) + sum(port.stiff) + speed * sum(port.damped);
 }
 
-// A spring and damper between rows: it pulls with k d + z d', d being the sum of share * row.
+// A spring and damper between rows: its force is k d + z d', where d is the sum of share * row.
 struct ModalSpring {
   std::uint32_t first = 0;  // of LinearSystem::shares
   std::uint32_t count = 0;

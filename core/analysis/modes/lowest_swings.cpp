@@ -113,8 +113,8 @@ class LowestSwings {
     return true;
   }
 
-  // The lowest shapes without dampers; those that Lanczos missed, as it sees one of several alike,
-  // are looked for among what is apart from all that are there.
+  // Finds the lowest undamped shapes. Lanczos finds only one of several degenerate shapes, so
+  // missing ones are searched for in the orthogonal complement of those found.
   bool find_shapes(std::size_t count) {
     basis_.clear();
     std::size_t missing = count;
@@ -137,7 +137,8 @@ class LowestSwings {
         return false;
       }
       for (std::size_t i = 0; i < pairs->vectors.columns(); ++i) {
-        add(given(pairs->vectors.column(i)));  // once more: what is rough in them is smoothed
+        // One more inverse iteration removes the high-frequency error.
+        add(given(pairs->vectors.column(i)));
       }
       const std::vector<double> values = sort_basis();
       missing = missing_below(values, count);
@@ -145,7 +146,7 @@ class LowestSwings {
     return missing == 0;
   }
 
-  // Turns the basis into shapes by their stiffness; those.
+  // Rotates the basis into shapes (Rayleigh-Ritz) and returns their stiffnesses.
   std::vector<double> sort_basis() {
     const Eigenpairs pairs = symmetric_eigenpairs(between(stiffness_));
     std::vector<Vector> turned;
@@ -159,7 +160,8 @@ class LowestSwings {
     return {std::begin(pairs.values), std::end(pairs.values)};
   }
 
-  // How many stiffnesses there are, by the inertia of K - k, below the highest gap of those found.
+  // Counts the eigenvalues below the largest gap by the inertia of K - k, and returns how many are
+  // missing.
   std::size_t missing_below(const std::vector<double>& values, std::size_t count) {
     std::size_t place = std::min(count, values.size()) - 1;
     const double least_gap = 1e-7;
@@ -190,7 +192,8 @@ class LowestSwings {
     return out;
   }
 
-  // What swings among the shapes, and what the dampers add to these until they are right.
+  // Solves the damped problem in the basis and extends the basis by the residuals until they are
+  // small enough.
   Result<Swings> add_damping(std::size_t count) {
     for (int round = 0;; ++round) {
       progress_.stage("finding what dampers do to the modes");
@@ -201,7 +204,7 @@ class LowestSwings {
       std::sort(swings->all.begin(), swings->all.end(),
                 [](const Swing& a, const Swing& b) { return a.mu.imag() < b.mu.imag(); });
       swings->all.resize(std::min(swings->all.size(), count));
-      swings->basis = {};  // of the lowest shapes alone
+      swings->basis = {};  // The basis of the lowest shapes alone is not the full basis.
       bool is_right = true;
       const std::size_t rows = basis_.size();
       for (Swing& swing : swings->all) {
@@ -250,7 +253,7 @@ class LowestSwings {
   double stiffest_ = 0.0;
   double shift_ = 0.0;
   Cholesky factor_;
-  std::vector<Vector> basis_;  // orthogonal, of length 1
+  std::vector<Vector> basis_;  // Orthonormal.
 };
 
 }  // namespace

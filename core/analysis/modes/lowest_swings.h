@@ -1,4 +1,4 @@
-// core/analysis/modes: the lowest motions of a large sparse system, by shift and invert.
+// core/analysis/modes: the lowest oscillating modes of a large sparse system, by shift-and-invert.
 #pragma once
 
 #include <cstddef>
@@ -10,17 +10,17 @@
 
 namespace ressort::analysis {
 
-// At least `count` of the lowest that swing, if there are so many, in the terms of quadratic.h:
-// Lanczos' shapes without dampers, counted by Sylvester's inertia so that none of several alike is
-// missed, and what dampers add to them until mu^2 + (1 + e mu) K + mu Z leaves no more than
-// `tolerance` |mu|^2 of a shape. Fails where the rows hang together at random, or nothing
-// converges. [any thread but audio]
+// Returns at least `count` of the lowest oscillating modes, if there are that many, in the terms of
+// quadratic.h. Lanczos finds the undamped shapes, and Sylvester's law of inertia counts them, so
+// that no degenerate one is missed. The basis is then extended until the residual of mu^2 + (1 + e
+// mu) K + mu Z is at most `tolerance` |mu|^2 for each shape. Fails if the rows are randomly
+// connected, or without convergence. [any thread but audio]
 Result<Swings> lowest_swings(const SparseMatrix& stiffness, const SparseMatrix& damping, double e,
                              double rigid, std::size_t count, const Progress& progress);
 
 inline constexpr double swing_tolerance = 1e-8;
 
-// What is left of a shape, in its own |mu|^2.
+// Returns the residual of a mode, relative to its |mu|^2.
 double residual(const SparseMatrix& stiffness, const SparseMatrix& damping, double e,
                 const Swing& swing);
 

@@ -15,10 +15,10 @@ namespace {
 
 using Complex = std::complex<double>;
 
-// Of the largest stiffness, and of a pole's angle beside its decay: what is below is rounding.
+// Rounding error, relative to the largest stiffness, and of a pole's angle relative to its decay.
 constexpr double rounding = 1e-13;
 
-// What is heard and pushed of swings.
+// Returns how strongly a mode is excited and heard.
 NetworkMode mode_of(Swing swing, const LinearSystem& system, const ModeOptions& options) {
   const ModeTone tone = tone_of(swing.mu, options);
   const Complex speed = speed_of(swing.mu, options.scheme);

@@ -1,5 +1,5 @@
-// core/analysis/modes: all that a linear network can sound: its modes, and how loud each is from
-// every input at every output.
+// core/analysis/modes: the modes of a linear network and their level from every input to every
+// output.
 #pragma once
 
 #include <complex>
@@ -17,39 +17,40 @@
 
 namespace ressort::analysis {
 
-// Whose modes: those of the published scheme at a rate, which is what plays in the direct form, or
-// of the continuous network M x'' + Z x' + K x = f, which plays where modes do.
+// Whether the modes are those of the published scheme at a rate, which the direct form plays, or
+// those of the continuous network M x'' + Z x' + K x = f, which the exact modal form plays.
 enum class ModeScheme { published, continuous };
 
 struct NetworkMode {
-  double frequency_hz = 0.0;  // of the damped pole
-  double t60_s = 0.0;         // infinity where nothing damps it; below 0 where it grows
+  double frequency_hz = 0.0;  // Frequency of the damped pole.
+  double t60_s = 0.0;         // Infinite if undamped; negative if the mode grows.
   // [input * outputs + output] Amplitude of the partial at the output, at the time of an impulse: a
-  // force of 1 for one sample at a force input; a position of 1 for one sample at a position input.
+  // unit force for one sample at a force input, or a unit position for one sample at a position
+  // input.
   std::vector<double> levels;
-  // [the same] The sound of that impulse is the imaginary part of residue * e^(pole_of(mu) n),
-  // n from 1 for the sample in which it comes.
+  // [input * outputs + output] The response to that impulse is the imaginary part of residue *
+  // e^(pole_of(mu) n), with n = 1 in the sample of the impulse.
   std::vector<std::complex<double>> residues;
-  std::complex<double> mu;  // as in quadratic.h
-  ComplexVector shape;      // [row of `masses`] displacement, times the root of the mass
+  std::complex<double> mu;  // Defined in quadratic.h.
+  ComplexVector shape;      // [row of `masses`] Displacement times the square root of the mass.
 };
 
 struct NetworkModes {
-  std::vector<NetworkMode> modes;  // by their frequency
-  Network network;                 // without macros, every argument a number
-  LinearSystem system;             // of it, per step
+  std::vector<NetworkMode> modes;  // Sorted by frequency.
+  Network network;                 // The network without macros, every argument a number.
+  LinearSystem system;             // The linear system of `network`, per step.
   std::size_t inputs = 0;
-  std::size_t outputs = 0;  // numbers of them: those of one number are one
+  std::size_t outputs = 0;  // Counted by number: outputs of equal number are one.
   ModeScheme scheme = ModeScheme::published;
-  double rate_hz = 0.0;  // of the published scheme
-  bool is_all = true;    // else these are the lowest
+  double rate_hz = 0.0;  // Rate of the published scheme.
+  bool is_all = true;    // False if only the lowest modes were found.
   bool is_proportional = true;
-  double residual = 0.0;  // the largest share of a mode's own force that is left over
+  double residual = 0.0;  // Largest residual of a mode, relative to its force.
   double key_factor = 1.0;
-  Matrix basis;  // as of Swings, where all shapes are known
+  Matrix basis;  // The basis of Swings, if all shapes are known.
 
   bool is_linear() const { return system.is_linear; }
-  // Real displacement of a mass, as a body of M = 1 has it; 0 where it does not move.
+  // Returns the real displacement of a mass, as in a body with M = 1; 0 if it does not move.
   double displacement(std::size_t mode, std::uint32_t row) const {
     return modes[mode].shape[row].real() / system.root[row];
   }
@@ -59,17 +60,18 @@ struct ModeOptions {
   double rate_hz = Network::reference_rate_hz;
   ModeScheme scheme = ModeScheme::published;
   std::size_t count =
-      0;  // of the lowest; 0: all up to most_listed_modes masses, else default_modes
-  double key_factor = 1.0;  // on every stiffness that is not fixed, as a key has it
-  Progress progress = {};   // a search that it stops fails with `stopped`
+      0;  // Number of lowest modes; 0: all of up to most_listed_modes masses, else default_modes.
+  double key_factor = 1.0;  // Factor of a key on every stiffness that is not fixed.
+  Progress progress = {};   // A search that it stops fails with `stopped`.
 };
 
-inline constexpr std::size_t most_listed_modes = 2000;   // masses whose modes are all found
-inline constexpr std::size_t most_crossing_modes = 300;  // where damping is not proportional
-inline constexpr std::size_t default_modes = 100;        // of larger networks
+// Largest number of masses for which all modes are found.
+inline constexpr std::size_t most_listed_modes = 2000;
+inline constexpr std::size_t most_crossing_modes = 300;  // The same for non-proportional damping.
+inline constexpr std::size_t default_modes = 100;  // Number of modes found for larger networks.
 
-// What swings in a system, made for the scheme's step, whose springs have these factors on their K
-// and Z, by frequency.
+// The oscillating modes of a system, made for the scheme's step, with these factors on the K and Z
+// of its springs; sorted by frequency.
 struct FoundSwings {
   Swings swings;
   SparseMatrix stiffness;
@@ -80,30 +82,30 @@ Result<FoundSwings> find_swings(const LinearSystem& system, const ModeOptions& o
                                 std::span<const double> stiffness_factors = {},
                                 std::span<const double> damping_factors = {});
 
-// 1 for the published scheme, 0 for the continuous network: the e of quadratic.h; and how many
-// times longer a step is than a sample at 44 100 Hz.
+// scheme_e() returns the e of quadratic.h, 1 for the published scheme and 0 for the continuous
+// network. scheme_step() returns the length of a step in samples at 44,100 Hz.
 double scheme_e(ModeScheme scheme);
 double scheme_step(const ModeOptions& options);
 
-// The logarithm of what a motion grows by in a sample.
+// Returns the logarithm of the growth of a motion per sample.
 std::complex<double> pole_of(std::complex<double> mu, ModeScheme scheme);
 
-// What a motion sounds like.
+// Frequency and decay of a motion.
 struct ModeTone {
   double frequency_hz = 0.0;
-  double t60_s = 0.0;  // as of NetworkMode
+  double t60_s = 0.0;  // Same conventions as NetworkMode.
 };
 ModeTone tone_of(std::complex<double> mu, const ModeOptions& options);
-// How a shape changes in a step, of what it is.
+// Returns the ratio of a shape's change per step to the shape.
 std::complex<double> speed_of(std::complex<double> mu, ModeScheme scheme);
 
-// A k below which nothing is sprung, among such numbers: rounding.
+// Returns the k below which an eigenvalue of such a matrix is rounding error.
 double rigid_below(const SparseMatrix& stiffness);
 
-// Of springs, dampers and oscillators; what else there is is open, and springs that stiffen are as
-// they are at rest. Motions that do not swing (rigid, or damped beyond swinging) are left out.
-// Dense: O(masses^3); the lowest of many: sparse, with shift and invert. Fails where a mass is not
-// above 0, a number is not finite, or masses hang together in too many ways. [any thread but audio]
+// Finds the modes of springs, dampers and oscillators. All other links are open, and stiffening
+// springs have their stiffness at rest. Motions that do not oscillate (rigid or overdamped) are
+// left out. Dense: O(masses^3); for the lowest of many: sparse, by shift-and-invert. Fails if a
+// mass is not above 0, a number is not finite, or the links are too dense. [any thread but audio]
 Result<NetworkModes> find_modes(const Network& network, std::span<const double> parameters,
                                 const ModeOptions& options);
 

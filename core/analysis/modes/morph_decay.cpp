@@ -13,11 +13,11 @@
 namespace ressort::analysis {
 namespace {
 
-constexpr std::size_t chebyshev_count = 9;  // between two stops
-constexpr double even_enough = 1e-4;        // of a T60
+constexpr std::size_t chebyshev_count = 9;  // Chebyshev nodes between two stops.
+constexpr double even_enough = 1e-4;        // Relative deviation of a T60 that needs no correction.
 using Nodes = std::array<double, chebyshev_count>;
 
-// Chebyshev's, so that a polynomial does not swing between them.
+// Chebyshev nodes keep the interpolating polynomial from oscillating between them.
 Nodes make_nodes() {
   Nodes nodes{};
   for (std::size_t i = 0; i < chebyshev_count; ++i) {
@@ -28,7 +28,7 @@ Nodes make_nodes() {
   return nodes;
 }
 
-// The coefficients of Newton's form: c0 + (x - x0) (c1 + (x - x1) (c2 + ...)).
+// Returns the coefficients of Newton's form: c0 + (x - x0) (c1 + (x - x1) (c2 + ...)).
 Nodes divided_differences(const Nodes& x, Nodes y) {
   for (std::size_t order = 1; order < chebyshev_count; ++order) {
     for (std::size_t i = chebyshev_count - 1; i >= order; --i) {
@@ -49,7 +49,7 @@ class DecayEvener {
         expanded_(expand_macros(network, morph.progress)),
         values_(morph.values.begin(), morph.values.end()) {}
 
-  // The factor on dampers; nothing where none is needed.
+  // Returns the factor on dampers; empty if none is needed.
   std::optional<Formula> factor() {
     const Nodes nodes = make_nodes();
     Formula sum = {{Op::number, 0, 0.0}};
@@ -76,7 +76,7 @@ class DecayEvener {
   }
 
  private:
-  // Of the damping of the mode, of 1/T60.
+  // Returns the logarithm of the mode's damping, which is proportional to 1/T60.
   std::optional<double> log_damping(double position) {
     values_[morph_.parameter] = position;
     const auto shapes = lowest_shapes(expanded_, values_, morph_.progress, morph_.pitch_mode);
@@ -84,7 +84,7 @@ class DecayEvener {
                                                 : std::nullopt;
   }
 
-  // + w (1 - w) times the polynomial, w being how far the leg is gone.
+  // Adds w (1 - w) times the polynomial, where w is the position on the leg.
   void add_leg(Formula& sum, std::size_t leg, const Nodes& nodes, const Nodes& coefficients) const {
     const auto push_way = [&](Formula& formula) {
       push(formula, {{Op::parameter, static_cast<std::uint32_t>(morph_.parameter)},

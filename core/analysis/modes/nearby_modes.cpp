@@ -11,8 +11,9 @@ namespace {
 
 using Complex = std::complex<double>;
 
-constexpr double nearly_alike = 1e-6;  // by how much squares of poles differ that are nearly one
-constexpr double unheard = 1e-6;       // of the loudest: such a mode keeps its shape
+// Relative difference of squared poles below which they count as nearly degenerate.
+constexpr double nearly_alike = 1e-6;
+constexpr double unheard = 1e-6;  // Modes below this share of the loudest keep their shape.
 
 double inner_product(const double* a, const double* b, std::size_t size) {
   double sum = 0.0;
@@ -30,7 +31,7 @@ double largest_of(const SparseMatrix& matrix) {
   return most;
 }
 
-// What stiffness and damping make of one shape after the other.
+// Applies stiffness and damping to one shape after the other.
 class Pulled {
  public:
   explicit Pulled(const LinearSystem& system)
@@ -51,7 +52,7 @@ class Pulled {
     z = inner_product(shape, rubbed.data(), rubbed.size());
   }
 
-  // Is the shape one of their eigenvectors, but for rounding?
+  // Returns whether the shape is an eigenvector of both, up to rounding.
   bool is_kept(const double* shape) const {
     double left_pulled = 0.0;
     double left_rubbed = 0.0;
@@ -71,10 +72,10 @@ class Pulled {
  public:
   std::vector<double> pulled;  // [row]
   std::vector<double> rubbed;
-  double k = 0.0;  // of the shape
+  double k = 0.0;  // Rayleigh quotients of the shape.
   double z = 0.0;
   double rigid = 0.0;
-  double most_pulled = 0.0;  // by rounding
+  double most_pulled = 0.0;  // Bound on the rounding error.
   double most_rubbed = 0.0;
 };
 
@@ -122,7 +123,7 @@ bool NearbyModes::has_rows_of(const LinearSystem& system) const {
   return system.masses == system_.masses;
 }
 
-// The inputs that are pushed, and the mean of all outputs.
+// Returns the excited inputs, then the mean of all outputs.
 std::vector<ModalPort> NearbyModes::ports_of(const LinearSystem& system) const {
   std::vector<ModalPort> ports;
   for (const std::size_t input : pushed_) {
@@ -174,9 +175,10 @@ std::optional<std::vector<HeardMode>> NearbyModes::exactly(const LinearSystem& s
   return modes;
 }
 
-// A force f on the rows moves the shape of a mode, of whose mu and vector v
-// (mu^2 + (1 + e mu) K + mu Z) v = 0, by w of (mu^2 + (1 + e mu) K + mu Z) w = -f: in the basis, by
-// -f_j over Q_j = mu^2 + mu (z_j + e k_j) + k_j in every other vector j.
+// First-order perturbation. For a mode mu with vector v, (mu^2 + (1 + e mu) K + mu Z) v = 0, a
+// force f on the rows changes the shape by w, where (mu^2 + (1 + e mu) K + mu Z) w = -f. In the
+// basis of all shapes this is -f_j / Q_j with Q_j = mu^2 + mu (z_j + e k_j) + k_j for every other
+// vector j.
 void NearbyModes::prepare() {
   const std::vector<ModalPort> ports = ports_of(system_);
   std::vector<double> level(basis_.columns());
@@ -256,8 +258,8 @@ std::optional<std::vector<HeardMode>> NearbyModes::nearly(const LinearSystem& sy
   Pulled pulled(system);
   std::vector<Complex> moved(ports.size());
   std::vector<HeardMode> modes;
-  std::size_t loud = 0;        // index into `loud_`, which ascends
-  auto next = alike_.begin();  // so do these
+  std::size_t loud = 0;        // Index into `loud_`, which is ascending.
+  auto next = alike_.begin();  // Also ascending.
   for (std::size_t i = 0; i < basis_.columns(); ++i) {
     pulled.take(shape(i));
     const auto mu = swing_root(pulled.k, pulled.z, e_, pulled.rigid);

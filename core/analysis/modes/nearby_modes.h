@@ -1,5 +1,5 @@
-// core/analysis/modes: how a network swings whose numbers are not those of the modes that are
-// known, without finding these anew. Pure. [one thread but audio]
+// core/analysis/modes: estimates the modes of a network whose parameters are close to those of
+// known modes, without solving the eigenproblem again. Pure. [one thread but audio]
 #pragma once
 
 #include <complex>
@@ -11,35 +11,35 @@
 
 namespace ressort::analysis {
 
-// One motion, as the mean of all outputs hears it.
+// One mode as heard in the mean of all outputs.
 struct HeardMode {
-  std::complex<double> mu;  // as of NetworkMode
+  std::complex<double> mu;  // Same as in NetworkMode.
   ModeTone tone;
-  std::vector<std::complex<double>> residues;  // [pushed input] as of NetworkMode
+  std::vector<std::complex<double>> residues;  // [excited input] Same as in NetworkMode.
 };
 
-// Of modes that are known, when these inputs are pushed.
+// Returns the known modes as heard when these inputs are excited.
 std::vector<HeardMode> heard_modes(const NetworkModes& modes, std::span<const std::size_t> pushed);
 
 class NearbyModes {
  public:
-  // Of all modes of a network, with a basis, as `options` found them. O(shapes * springs)
+  // Takes all modes of a network, with a basis, as found with `options`. O(shapes * springs)
   NearbyModes(NetworkModes modes, std::vector<std::size_t> pushed, ModeOptions options);
 
-  // By frequency, where the system's stiffness and damping have the eigenvectors that are known,
-  // whatever their eigenvalues are; else nothing. O(shapes * springs)
+  // Returns the modes by frequency if the system's stiffness and damping have the known
+  // eigenvectors, whatever their eigenvalues; else nothing. O(shapes * springs)
   std::optional<std::vector<HeardMode>> exactly(const LinearSystem& system) const;
 
-  // Of any system of these rows, right to first order in how far its numbers are from those of the
-  // modes: eigenvalues by the shapes that are known, shapes by what all others add. Nothing where
-  // shapes of one frequency cross over into each other, or one begins or ends to swing.
-  // O(shapes * springs); the first time O(rows^3)
+  // Returns the modes of any system with these rows, correct to first order in the distance of its
+  // coefficients: eigenvalues from the known shapes, shapes from the contributions of all others.
+  // Empty if degenerate shapes mix, or if a mode starts or stops oscillating. O(shapes * springs);
+  // the first call takes O(rows^3).
   std::optional<std::vector<HeardMode>> nearly(const LinearSystem& system);
 
  private:
   using Complex = std::complex<double>;
 
-  // What a force on a row does to how a port moves in a mode.
+  // The effect of a force on a row on the motion of a port in a mode.
   struct Answer {
     Matrix real;  // [row, loud shape]
     Matrix imaginary;
@@ -55,7 +55,8 @@ class NearbyModes {
   HeardMode mode_of(Complex mu, std::span<const Complex> moved) const;
   void prepare();
   Answer answer_of(const ModalPort& port) const;
-  Complex apart(Complex mu, std::size_t other) const;  // what a force on another shape meets there
+  // Returns the denominator Q_j for a force on another shape.
+  Complex apart(Complex mu, std::size_t other) const;
   bool is_alike(Complex mu, std::size_t other) const;
 
   ModeOptions options_;
@@ -65,9 +66,9 @@ class NearbyModes {
   std::vector<std::size_t> pushed_;
   std::vector<double> stiffness_;           // [shape]
   std::vector<double> damping_;             // [shape]
-  std::vector<std::optional<Complex>> mu_;  // [shape] of what swings
-  std::vector<std::size_t> loud_;           // shapes
-  std::vector<Answer> answers_;             // [port] of which the last is what is heard
+  std::vector<std::optional<Complex>> mu_;  // [shape] Set for shapes that oscillate.
+  std::vector<std::size_t> loud_;           // Indices of shapes.
+  std::vector<Answer> answers_;             // [port] The last one is the output.
   std::vector<Alike> alike_;
 };
 

@@ -11,8 +11,9 @@ namespace {
 
 using Complex = std::complex<double>;
 
-constexpr double shared = 1e-12;  // of the largest, for each row: are the vectors the same?
-constexpr double alike = 1e-9;    // by how much poles differ that are one
+// Tolerance per row, relative to the largest element, for shared eigenvectors.
+constexpr double shared = 1e-12;
+constexpr double alike = 1e-9;  // Poles that differ by less count as degenerate.
 
 Complex form(const ComplexVector& a, const Matrix& matrix, const ComplexVector& b) {
   Complex sum;
@@ -26,7 +27,7 @@ Complex form(const ComplexVector& a, const Matrix& matrix, const ComplexVector& 
   return sum;
 }
 
-// What a matrix makes of the shapes: their eigenvalues, if nothing else is left of each.
+// Returns the eigenvalues of the matrix in this basis, if its vectors are eigenvectors.
 std::optional<Vector> eigenvalues_in(const Matrix& matrix, const Matrix& basis, double most_left) {
   const Matrix pulled = product(matrix, basis);
   Vector values(basis.columns());
@@ -61,8 +62,8 @@ class Quadratic {
   }
 
  private:
-  // Where K and Z have the same eigenvectors, those of a sum of both are theirs, whatever else is
-  // alike.
+  // Solves the case in which K and Z share their eigenvectors. The eigenvectors of a weighted sum
+  // of both are then eigenvectors of each, even if one of them is degenerate.
   std::optional<Swings> in_shared_vectors() const {
     const double damped = largest(damping_.values);
     Matrix both = stiffness_;
@@ -87,7 +88,7 @@ class Quadratic {
     return found;
   }
 
-  // The motions of (x, v), which cross over into each other.
+  // Solves the general case as a first-order system in (x, v).
   std::optional<std::vector<Swing>> crossed() const {
     Matrix step(2 * size_, 2 * size_);
     for (std::size_t j = 0; j < size_; ++j) {
@@ -115,13 +116,13 @@ class Quadratic {
     return swings;
   }
 
-  // shapeT (2 mu + e K + Z) shape between two.
+  // Returns a^T (2 mu + e K + Z) b.
   Complex product(Complex mu, const ComplexVector& a, const ComplexVector& b) const {
     return 2.0 * mu * Complex((a * b).sum()) + e_ * form(a, stiffness_, b) + form(a, damping_, b);
   }
 
-  // Of shapes that swing alike any mixture does too: those which have nothing of each other. Then
-  // each is scaled, and its mu made better by what the shape says.
+  // Modes with equal poles may be mixed arbitrarily. This orthogonalises them, scales each, and
+  // improves its mu from its shape.
   void part_alike(std::vector<Swing>& swings) const {
     std::sort(swings.begin(), swings.end(),
               [](const Swing& a, const Swing& b) { return a.mu.imag() < b.mu.imag(); });
@@ -145,7 +146,8 @@ class Quadratic {
     }
   }
 
-  // The shape that is the least at odds with itself; a sum of two where every one is.
+  // Moves the shape with the largest product with itself to the front; a sum of two if all are
+  // self-orthogonal.
   void bring_forward(std::vector<Swing>& swings, std::size_t i, std::size_t end) const {
     if (i + 1 == end) {
       return;
@@ -167,7 +169,8 @@ class Quadratic {
     }
   }
 
-  // mu^2 a + mu (z + e k) + k = 0 in the shape itself, of which it is an extreme.
+  // Solves mu^2 a + mu (z + e k) + k = 0 for the shape (Rayleigh quotient, stationary at an
+  // eigenvector).
   void refine(Swing& swing) const {
     const Complex a = (swing.shape * swing.shape).sum();
     const Complex k = form(swing.shape, stiffness_, swing.shape);
@@ -177,7 +180,7 @@ class Quadratic {
       const Complex off = swing.mu * swing.mu * a + swing.mu * (z + e_ * k) + k;
       const Complex better = swing.mu - off / slope;
       if (!(std::abs(better - swing.mu) < 1e-6 * std::abs(swing.mu))) {
-        return;  // nearly critical: the shape says too little
+        return;  // Nearly critically damped: the quotient is too inaccurate.
       }
       swing.mu = better;
     }

@@ -1,8 +1,8 @@
-// core/analysis/modes: how a linear system of few rows swings: mu^2 + (1 + e mu) K + mu Z,
-// singular.
+// core/analysis/modes: solves the quadratic eigenproblem of a small linear system: the mu for which
+// mu^2 + (1 + e mu) K + mu Z is singular.
 //
-// e is 1 for what the published scheme plays, where a motion grows by 1 + mu in a sample, and 0 for
-// the continuous network, where it goes as e^(mu t).
+// e is 1 for the published scheme, where a motion grows by 1 + mu per sample, and 0 for the
+// continuous network, where it evolves as e^(mu t).
 #pragma once
 
 #include <complex>
@@ -13,9 +13,9 @@
 
 namespace ressort::analysis {
 
-// A motion that swings: its mu has an imaginary part above 0. `shape` is scaled so that
-// shapeT (2 mu + e K + Z) shape is mu less its conjugate, as of a lone mass of 1: of proportional
-// damping it is real and of length 1.
+// An oscillating mode: the imaginary part of its mu is above 0. `shape` is scaled so that shape^T
+// (2 mu + e K + Z) shape is mu minus its conjugate, as for a single unit mass. For proportional
+// damping the shape is real and of length 1.
 struct Swing {
   std::complex<double> mu;
   ComplexVector shape;
@@ -24,21 +24,21 @@ struct Swing {
 struct Swings {
   std::vector<Swing> all;
   bool is_proportional = true;
-  // [row, shape] The eigenvectors that K and Z share, those of what does not swing too; empty where
-  // they share none.
+  // [row, shape] Shared eigenvectors of K and Z, including those of motions that do not oscillate;
+  // empty if they share none.
   Matrix basis;
 };
 
-// mu of a lone mass of 1 with k and z, if it swings: `rigid` as below.
+// Returns the mu of a single unit mass with k and z, if it oscillates; `rigid` as below.
 std::optional<std::complex<double>> swing_root(double k, double z, double e, double rigid);
 
-// By how much a shape may be off its own eigenvalue, of the largest number of a matrix with so many
-// rows, where only rounding has made it so.
+// Returns the error of a shape's eigenvalue that rounding alone explains, relative to the largest
+// element, for so many rows.
 double shared_tolerance(std::size_t rows);
 
-// What swings of symmetric K and Z, in no order; `rigid`: a k below which nothing is sprung.
-// Nothing where the eigenvalues cannot be found, or damping is not proportional and nobody wants to
-// wait for what `may_cross`. O(rows^3)
+// Returns the oscillating modes of symmetric K and Z, unsorted; a k below `rigid` counts as 0.
+// Empty if the eigenvalues cannot be found, or if damping is not proportional and `may_cross` is
+// false. O(rows^3)
 std::optional<Swings> swings_of(const Matrix& stiffness, const Matrix& damping, double e,
                                 double rigid, bool may_cross = true);
 

@@ -20,7 +20,7 @@ bool is_spring(const Link& link) {
   return facts_of(link.law).family == Family::spring;
 }
 
-// Who hangs together with whom: masses, then macros.
+// Connected components of masses and macros.
 class Parts {
  public:
   explicit Parts(const Network& network)
@@ -35,7 +35,7 @@ class Parts {
 
   std::size_t of_macro(std::size_t macro) { return root(network_.masses.size() + macro); }
   std::size_t of_mass(std::uint32_t mass) { return root(node(mass)); }
-  // What never moves belongs to nothing: a link is of what it holds there.
+  // A mass that never moves belongs to no component, so a link belongs to the component it holds.
   std::size_t of_link(const Link& link) { return of_mass(holds(link.a) ? link.a : link.b); }
 
  private:
@@ -44,7 +44,7 @@ class Parts {
     if (at.kind != MassKind::point) {
       return mass;
     }
-    // Once macros are expanded, a place hangs together with their first node.
+    // After macros are expanded, a place is connected to their first node.
     const Tap& tap = network_.taps[at.tap];
     return network_.macros.empty() ? tap.first : network_.masses.size() + tap.macro;
   }
@@ -62,7 +62,7 @@ class Parts {
   std::vector<std::size_t> of_;
 };
 
-// New arguments of a network, made of those that it has.
+// Builds new arguments of a network from its existing ones.
 class Arguments {
  public:
   explicit Arguments(Network& network) : network_(network) {}
@@ -77,7 +77,8 @@ class Arguments {
     }
     const std::size_t size = formula.size();
     if (size > 2 && formula[size - 1].op == Op::multiply && formula[size - 2].op == Op::number) {
-      formula[size - 2].value *= factor;  // what was tuned before
+      // The argument already has a factor from an earlier tuning.
+      formula[size - 2].value *= factor;
     } else {
       formula.push_back({.op = Op::number, .value = factor});
       formula.push_back({.op = Op::multiply});
@@ -157,7 +158,7 @@ std::vector<std::size_t> lines_of(const Network& network, const Network& expande
                                              : of_macro;
     of[lines[i].index] = i;
   }
-  std::vector<std::size_t> macro_end;  // [macro] where its nodes end among the masses
+  std::vector<std::size_t> macro_end;  // [macro] One past its last node among the masses.
   std::size_t end = network.masses.size();
   for (const Macro& macro : network.macros) {
     macro_end.push_back(end += node_count(macro));

@@ -1,4 +1,5 @@
-// core/analysis/modes: a network with other springs and dampers, written as it was.
+// core/analysis/modes: scales the springs and dampers of a network and keeps the form in which it
+// was written.
 #pragma once
 
 #include <cstdint>
@@ -18,25 +19,25 @@ namespace ressort::analysis {
 struct SpringLine {
   enum class Kind : std::uint8_t { mass, link, macro };
   Kind kind = Kind::link;
-  std::uint32_t index = 0;  // into Network::masses, links or macros
+  std::uint32_t index = 0;  // Index into Network::masses, links or macros.
   bool operator==(const SpringLine&) const = default;
 };
 
-// All lines of a network with springs or dampers, or those that hang together with the mass, macro
-// or link of this name. The error says what was expected. O(masses + links)
+// Returns all lines with springs or dampers, or those connected to the mass, macro or link with
+// this name. The error names what was expected. O(masses + links)
 Result<std::vector<SpringLine>> spring_lines(const Network& network, std::string_view part = "");
 
-// Which of the lines a spring of the system is of, the system being that of the same network with
-// its macros written out; [spring], lines.size() for none.
+// Returns for each spring of the system the index of its line; lines.size() for none. The system is
+// that of the same network with macros expanded.
 std::vector<std::size_t> lines_of(const Network& network, const Network& expanded,
                                   const LinearSystem& system, const std::vector<SpringLine>& lines);
 
-// Every stiffness and damping of lines[i] times stiffness[i] and damping[i]: numbers are numbers
-// again, and formulas get a factor. Plucks, bows and contacts stay. Canonical.
+// Multiplies the stiffness and damping of lines[i] by stiffness[i] and damping[i]. Numbers stay
+// numbers, formulas get a factor. Plucks, bows and contacts are unchanged. Canonical.
 Network scaled(const Network& network, const std::vector<SpringLine>& lines,
                const std::vector<double>& stiffness, const std::vector<double>& damping);
 
-// How fast motions decay: by a + b f^2 each second, so that T60 = 6.91 s / (a + b f^2).
+// A decay rate of a + b f^2 per second, so that T60 = 6.91 s / (a + b f^2).
 struct DecayLaw {
   double a = 0.0;  // 1/s
   double b = 0.0;  // s
@@ -48,15 +49,15 @@ struct DecayPoint {
   double t60_s = 0.0;
 };
 
-// The law through one or two points, or nearest to more of them in 1/T60; a and b are never below
-// 0. The error says what a point lacks.
+// Fits the law through one or two points, or to more points in 1/T60; a and b are never below 0.
+// The error names what a point lacks.
 Result<DecayLaw> decay_law(const std::vector<DecayPoint>& points);
 
-// The network with dampers that make every mode of it decay by the law, whatever its shape: each
-// spring gets Z in proportion to its K, each mass a damper to 0 in proportion to its M, instead of
-// those that were there. Exact for the continuous network; the published scheme is off where f
-// comes near the rate. A stiffString's second springs cannot be damped: there b counts for the
-// first ones alone. Plucks, bows and contacts stay. Canonical.
+// Returns the network with dampers that make every mode decay by the law (Rayleigh damping): each
+// spring gets a Z proportional to its K, each mass a damper to 0 proportional to its M; existing
+// dampers are replaced. Exact for the continuous network; the published scheme deviates when f
+// approaches the rate. The second springs of a stiffString cannot be damped, so b applies to its
+// first springs only. Plucks, bows and contacts are unchanged. Canonical.
 Network with_decay(const Network& network, const DecayLaw& law);
 
 }  // namespace ressort::analysis

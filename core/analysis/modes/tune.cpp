@@ -15,7 +15,8 @@ namespace {
 
 using Complex = std::complex<double>;
 
-constexpr double near_enough = 1e-9;  // of a frequency, and of a decay
+// Relative error of a frequency or decay that ends the iteration.
+constexpr double near_enough = 1e-9;
 constexpr int most_steps = 300;
 constexpr int most_stalls = 12;
 
@@ -25,7 +26,7 @@ std::string hertz(double frequency_hz) {
   return text;
 }
 
-// The modes of one network while its lines' factors change.
+// Computes the modes of one network while the factors of its lines change.
 class ModeTuner {
  public:
   ModeTuner(const Network& network, std::span<const double> parameters, std::string_view part,
@@ -77,13 +78,13 @@ class ModeTuner {
   }
   Complex pole(const Swing& swing) const { return pole_of(swing.mu, options_.scheme); }
 
-  // The pole that a frequency and a decay are.
+  // Converts a frequency and a decay to a pole.
   double angle(double frequency_hz) const {
     return 2.0 * std::numbers::pi * frequency_hz / rate_hz_;
   }
   double growth(double t60_s) const { return -3.0 * std::numbers::ln10 / (t60_s * rate_hz_); }
 
-  // How the pole moves with the logarithm of each line's factor.
+  // Derivatives of the pole by the logarithm of each line's factor.
   struct Slopes {
     std::vector<Complex> stiffness;  // [line]
     std::vector<Complex> damping;
@@ -110,7 +111,7 @@ class ModeTuner {
   }
 
   std::vector<Swing> swings;
-  std::vector<double> stiffness;  // [line] factors
+  std::vector<double> stiffness;  // [line] Factors.
   std::vector<double> damping;
 
  private:
@@ -119,11 +120,11 @@ class ModeTuner {
   double rate_hz_;
   std::vector<SpringLine> lines_;
   LinearSystem system_;
-  std::vector<std::size_t> of_;  // [spring of the system] which line's
+  std::vector<std::size_t> of_;  // [spring of the system] Its line.
   std::optional<Error> failure_;
 };
 
-// How alike two shapes are, 0 to 1.
+// Returns the similarity of two shapes, 0 to 1 (modal assurance criterion).
 double likeness(const ComplexVector& a, const ComplexVector& b) {
   Complex both;
   double aa = 0.0;
@@ -144,7 +145,7 @@ Result<Tuned> tune_mode(const Network& network, std::span<const double> paramete
   if (tuner.failure()) {
     return *tuner.failure();
   }
-  const std::size_t count = target.mode + 12;  // its neighbours too: they may change places
+  const std::size_t count = target.mode + 12;  // Includes neighbours, which may change places.
   if (auto found = tuner.find(count); !found) {
     return found.error();
   }
@@ -154,7 +155,7 @@ Result<Tuned> tune_mode(const Network& network, std::span<const double> paramete
   }
   Swing swing = tuner.swings[target.mode];
   const std::string what = "mode " + std::to_string(target.mode + 1) + " cannot be brought to ";
-  double k = 0.0;  // logarithms of the factors
+  double k = 0.0;  // Logarithms of the factors.
   double z = 0.0;
   for (int step = 0; step < most_steps; ++step) {
     const Complex pole = tuner.pole(swing);
@@ -188,7 +189,7 @@ Result<Tuned> tune_mode(const Network& network, std::span<const double> paramete
       step_k = (high * by_z.real() - loud * by_z.imag()) / area;
       step_z = (loud * by_k.imag() - high * by_k.real()) / area;
     }
-    // A fifth of an octave at once, so that the shape can be followed.
+    // Limits a step to a fifth of an octave, so that the shape can be followed.
     k += std::clamp(step_k, -0.3, 0.3);
     z += std::clamp(step_z, -0.7, 0.7);
     tuner.stiffness.assign(tuner.lines().size(), std::exp(k));
@@ -238,8 +239,8 @@ Result<Network> tune_modes(const Network& network, std::span<const double> param
     return *tuner.failure();
   }
   const std::size_t springs = tuner.lines().size();
-  Vector logarithms(springs);  // of the factors
-  // How far off each mode is, as a logarithm.
+  Vector logarithms(springs);  // Logarithms of the factors.
+  // Returns the error of each mode as a logarithm.
   const auto off = [&]() -> std::optional<Vector> {
     for (std::size_t i = 0; i < springs; ++i) {
       tuner.stiffness[i] = std::exp(logarithms[i]);
@@ -283,7 +284,7 @@ Result<Network> tune_modes(const Network& network, std::span<const double> param
     const Vector before = logarithms;
     const double was = std::sqrt(dot(*distance, *distance));
     std::optional<Vector> better;
-    // Shorter, and nearer to the steepest way, until it is a gain.
+    // Levenberg-Marquardt: increases the damping until the step is an improvement.
     double stay = 1e-12 * size;
     for (int attempt = 0; attempt < 30 && !better; ++attempt) {
       Matrix held = square;
@@ -308,7 +309,7 @@ Result<Network> tune_modes(const Network& network, std::span<const double> param
       }
     }
     if (!better) {
-      // Two modes that are nearly one turn into each other: from a little aside they do not.
+      // Nearly degenerate modes mix; a small displacement of the factors separates them.
       if (++stalls > most_stalls) {
         break;
       }

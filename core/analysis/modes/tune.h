@@ -1,4 +1,4 @@
-// core/analysis/modes: modes brought to where somebody wants them, by springs and dampers.
+// core/analysis/modes: tunes modes to target frequencies and decays by scaling springs and dampers.
 #pragma once
 
 #include <optional>
@@ -14,31 +14,31 @@
 namespace ressort::analysis {
 
 struct TuneTarget {
-  std::size_t mode = 0;  // from the lowest, 0 first
+  std::size_t mode = 0;  // 0 is the lowest mode.
   double frequency_hz = 0.0;
-  std::optional<double> t60_s;  // without it dampers stay as they are
-  std::string part;             // the name of a mass, a link or a macro; empty: all
+  std::optional<double> t60_s;  // Without it the dampers stay unchanged.
+  std::string part;             // Name of a mass, link or macro; empty: everything.
 };
 
 struct Tuned {
   Network network;
-  double stiffness = 1.0;  // the factors that did it
+  double stiffness = 1.0;  // Factors that were found.
   double damping = 1.0;
 };
 
-// The network with one factor on every stiffness of a part (what hangs together with the name), and
-// one on its dampers, with which the mode's damped pole has this frequency and decay. The mode is
-// followed by its shape. Fails where the part does not move the mode that far. Newton on the pole's
-// derivatives; each step finds the modes anew. [any thread but audio]
+// Returns the network with one factor on every stiffness of a part (everything connected to the
+// name) and one on its dampers, such that the mode's damped pole has this frequency and decay. The
+// mode is followed by its shape. Fails if the part cannot move the mode that far. Newton's method
+// on the derivatives of the pole; each step solves for the modes again. [any thread but audio]
 Result<Tuned> tune_mode(const Network& network, std::span<const double> parameters,
                         const TuneTarget& target, const ModeOptions& options);
 
-// The network with other springs, so that its lowest modes have these frequencies in Hz, ascending:
-// each line's springs get a factor of their own, those nearest to 1 that do it. Where a model has
-// fewer lines than frequencies its macros are written out first, where no link
-// holds them by a place. Gauss-Newton: a frequency grows
-// with a spring's stiffness as the square of what the mode stretches it by. Dampers stay. Fails
-// where that does not lead there. [any thread but audio]
+// Returns the network with other springs, such that its lowest modes have these frequencies in Hz,
+// ascending. The springs of each line get a factor of their own; of all solutions the factors
+// nearest to 1 are taken. If a model has fewer lines than frequencies, its macros are expanded
+// first, unless a link is attached to one by a place. Gauss-Newton: the derivative of a squared
+// frequency by a spring's stiffness is the squared elongation of that spring in the mode. Dampers
+// stay unchanged. Fails without convergence. [any thread but audio]
 Result<Network> tune_modes(const Network& network, std::span<const double> parameters,
                            std::span<const double> frequencies_hz, const ModeOptions& options);
 

@@ -12,24 +12,27 @@
 namespace ressort::analysis {
 namespace {
 
-constexpr double unnoticed = 0.01;  // of what is noticed
-constexpr double little = 1e-5;     // of a range, for differences
-constexpr double still = 1e-9;      // of a range: a step that is none
-constexpr double no_slope = 1e-6;   // what is noticed over a whole range
-constexpr double crawling = 0.98;   // of the cost is left by a step that is hardly one
+constexpr double unnoticed = 0.01;  // Accepted error, in just noticeable differences (JND).
+constexpr double little = 1e-5;     // Step of the finite differences, as a share of a range.
+constexpr double still = 1e-9;      // A shorter step, as a share of a range, ends the descent.
+// A smaller change over a whole range, in JND, counts as no influence.
+constexpr double no_slope = 1e-6;
+// A step that leaves more of the cost than this counts as stalled.
+constexpr double crawling = 0.98;
 constexpr double least_damping = 1e-9;
 constexpr int most_crawls = 3;
-constexpr double hopeful = 5.0;       // of what is noticed
-constexpr double same_end = 1e-3;     // of a range
-constexpr std::size_t most_far = 4;   // ends that are not hopeful
-constexpr double farthest_hop = 0.1;  // of a range
-constexpr int most_hops = 4;          // of one start
+constexpr double hopeful = 5.0;       // Worst error, in JND, of an end point worth refining.
+constexpr double same_end = 1e-3;     // End points closer than this share of a range are the same.
+constexpr std::size_t most_far = 4;   // Number of poor end points that are kept.
+constexpr double farthest_hop = 0.1;  // Length of a hop, as a share of a range.
+constexpr int most_hops = 4;          // Hops per start.
 constexpr int most_turns = 60;
-constexpr int most_tries = 8;        // of one step, each shorter
-constexpr int most_stale_tries = 2;  // with slopes of another place
-constexpr double well_told = 0.25;   // of the cost is left by a step whose slopes were right
+constexpr int most_tries = 8;        // Attempts per step, each shorter than the one before.
+constexpr int most_stale_tries = 2;  // Attempts with outdated slopes.
+// A step that leaves at most this share of the cost confirms its slopes.
+constexpr double well_told = 0.25;
 
-using Place = std::vector<double>;  // [free] 0..1
+using Place = std::vector<double>;  // [free parameter] 0 to 1.
 
 class Asker {
  public:
@@ -45,7 +48,7 @@ class Asker {
   struct Trial {
     Place place;
     AskedValues figures;
-    std::vector<double> noticed;  // [target]
+    std::vector<double> noticed;  // [target] In JND.
     double cost() const {
       double sum = 0.0;
       for (const double one : noticed) {
@@ -87,7 +90,7 @@ class Asker {
 
   Result<AskedValues> figures_before() const { return model_.figures(values_); }
 
-  // The error stays in `error`.
+  // Stores an error in `error`.
   std::optional<Trial> trial(const Place& place) {
     return trial(place, model_.figures(values_at(place)));
   }
@@ -98,7 +101,7 @@ class Asker {
 
   std::optional<Trial> trial(const Place& place, const Result<AskedValues>& found) {
     ++trials;
-    progress_.spend(std::size_t{1} << 17);  // looked at every time
+    progress_.spend(std::size_t{1} << 17);  // Counts the cost of one evaluation.
     if (!found) {
       error = found.error();
       return std::nullopt;
@@ -117,7 +120,7 @@ class Asker {
     return trial;
   }
 
-  // [target, free] by differences, into the range.
+  // [target, free parameter] Computed by finite differences towards the inside of the range.
   Matrix slopes(const Trial& at) {
     Matrix slopes(targets_.size(), free_.size());
     for (std::size_t i = 0; i < free_.size(); ++i) {
@@ -141,8 +144,8 @@ class Asker {
   }
 
   struct Descent {
-    Vector gradient;            // [free] of half the cost
-    std::vector<bool> is_held;  // at a bound, and would go beyond
+    Vector gradient;            // [free parameter] Gradient of half the cost.
+    std::vector<bool> is_held;  // At a bound, with the descent direction pointing outwards.
     Matrix slopes;
   };
   Descent descent(const Trial& at, Matrix slopes) const {
@@ -158,8 +161,9 @@ class Asker {
   }
   Descent descent(const Trial& at) { return descent(at, slopes(at)); }
 
-  // Downhill from there, until it is there, flat, or stuck. A step that came about where the slopes
-  // said tells what has become of them (Broyden's rank-one update); another has them found anew.
+  // Levenberg-Marquardt descent until the target is reached, the cost is flat, or no step helps. A
+  // step that did what the slopes predicted updates them (Broyden's rank-one update); otherwise
+  // they are computed again.
   Trial descend(Trial at) {
     double damping = 1e-3;
     int crawls = 0;
@@ -204,7 +208,7 @@ class Asker {
     return at;
   }
 
-  // One step more, with the slopes that are there.
+  // Takes one more step with the current slopes.
   Trial polished(const Trial& at) {
     const auto to = stepped(at, descent(at), least_damping);
     const auto there = to ? trial(*to) : std::nullopt;
@@ -215,7 +219,7 @@ class Asker {
   std::size_t trials = 0;
 
  private:
-  // J + (change of what is noticed - J step) step^T / step^T step
+  // J + (change of the error - J step) step^T / step^T step.
   Matrix updated(Matrix slopes, const Trial& from, const Trial& to) const {
     Vector step(free_.size());
     for (std::size_t i = 0; i < free_.size(); ++i) {
@@ -234,7 +238,7 @@ class Asker {
     return slopes;
   }
 
-  // (J^T J + damping (D + tiny)) step = -gradient, of those that no bound holds.
+  // Solves (J^T J + damping (D + tiny)) step = -gradient for the parameters that no bound holds.
   std::optional<Place> stepped(const Trial& at, const Descent& down, double damping) const {
     std::vector<std::size_t> moving;
     for (std::size_t i = 0; i < free_.size(); ++i) {
@@ -281,7 +285,7 @@ class Asker {
   const Progress& progress_;
 };
 
-// 0 to 1, alike on every machine.
+// Returns a number from 0 to 1, the same on every machine.
 double next_share(std::mt19937_64& random) {
   return 0x1p-53 * static_cast<double>(random() >> 11U);
 }
@@ -293,8 +297,8 @@ std::optional<Error> wrong_target(const TimbreTarget& target) {
                                              std::string(wrong)});
 }
 
-// Many starts by the smooth model; of where these end, what may be right is brought nearer by the
-// exact one, which takes longer.
+// Descends from many starts with the smooth model, then refines the promising end points with the
+// exact model, which is slower.
 class Search {
  public:
   Search(const AskedModel& model, std::span<const double> values,
@@ -351,7 +355,7 @@ class Search {
     }
   }
 
-  // Has another start ended there?
+  // Returns whether another start ended at the same place.
   bool is_again(const Place& end) const {
     return std::any_of(ends_.begin(), ends_.end(), [&](const Place& other) {
       return std::equal(end.begin(), end.end(), other.begin(), other.end(),
@@ -380,7 +384,8 @@ class Search {
       return;
     }
     keep(judge_.descend(*std::move(judged)));
-    // So near, what stops it may be a peak that moved to the next bin: over that from around it.
+    // Near the target, a spectral peak that moves to the next bin can stop the descent. A small
+    // random hop gets past it.
     for (int hop = 0; hop < most_hops && !is_there() && best_->worst() <= hopeful; ++hop) {
       const double reach = farthest_hop * std::exp2(-hop);
       Place place = best_->place;
@@ -395,7 +400,7 @@ class Search {
   AskedTimbre told(int starts) {
     AskedTimbre asked;
     asked.starts = starts;
-    // It may be silent where it is.
+    // The model may be silent at its current parameters.
     if (const auto before = judge_.figures_before()) {
       asked.before = *before;
     }
@@ -421,7 +426,7 @@ class Search {
   Asker asker_;
   Asker judge_;
   std::mt19937_64 random_;
-  std::vector<Place> ends_;  // of the smooth model
+  std::vector<Place> ends_;  // End points of the smooth model.
   std::optional<Asker::Trial> best_;
   std::optional<Error> first_error_;
 };

@@ -1,4 +1,4 @@
-// core/analysis/timbre: parameters with which a model has the timbre that somebody asks for.
+// core/analysis/timbre: finds parameters with which a model has a target timbre.
 #pragma once
 
 #include <cstdint>
@@ -16,61 +16,61 @@ namespace ressort::analysis {
 
 struct TimbreTarget {
   AskedFigure figure = AskedFigure::centroid;
-  double value = 0.0;  // as wrong_with() says
+  double value = 0.0;  // wrong_with() defines the valid values.
 };
 
-// A parameter that may be turned; where its range is wide (is_wide()) by equal ratios.
+// A parameter that may change; by equal ratios if its range is wide (is_wide()).
 struct FreeParameter {
   std::size_t index = 0;  // [parameter]
   double minimum = 0.0;
   double maximum = 0.0;
 };
 
-// What a model is like with these parameters. An error: it cannot be told there.
+// Computes the figures of a model for these parameters, or an error.
 using FiguresAt = std::function<Result<AskedValues>(std::span<const double> parameters)>;
 
-// The same, where that is near a place, to first order in how far it is from there.
+// Computes the same to first order around `place`.
 using FiguresNear = std::function<Result<AskedValues>(std::span<const double> place,
                                                       std::span<const double> parameters)>;
 
 struct AskedModel {
   FiguresAt figures;
-  FiguresNear near = {};  // for slopes; without it `figures`
+  FiguresNear near = {};  // Used for slopes; without it `figures` is used.
 };
 
-// Of a struck model, which has to stay where it is.
+// Wraps a struck model, which must outlive the result.
 AskedModel asked_model(StruckModel& model, StruckAs how);
 
 struct AskOptions {
-  int starts = 8;                     // the first where the parameters are, the others at random
-  std::optional<AskedModel> exactly;  // what the best is brought nearer by, and judged by
-  std::uint64_t seed = 1;             // of these
-  std::function<void(double share)> tell = {};  // 0..1, as starts are done
+  int starts = 8;  // The first start is the current parameters, the others are random.
+  std::optional<AskedModel> exactly;            // Refines and judges the best result, if given.
+  std::uint64_t seed = 1;                       // Seed of the random starts.
+  std::function<void(double share)> tell = {};  // Reports progress from 0 to 1 as starts finish.
   Progress progress = {};
 };
 
 struct AskedTimbre {
   std::vector<double> values;  // [parameter]
-  AskedValues before;          // where the parameters were
+  AskedValues before;          // Figures at the original parameters.
   AskedValues reached;
-  std::vector<double> noticed;  // [target] just noticeable differences, above 0: more than asked
-  // Those of the free parameters that a bound holds where more of them would come nearer.
+  std::vector<double> noticed;  // [target] Error in JND; above 0: more than the target.
+  // Free parameters held by a bound although a value beyond it would be nearer to the target.
   struct Held {
     std::size_t index = 0;  // [parameter]
     bool is_highest = false;
   };
   std::vector<Held> held;
-  bool is_reached = false;    // each to a hundredth of what is noticed
-  bool has_influence = true;  // of any free parameter on any target
-  int starts = 0;             // that were needed
-  std::size_t trials = 0;     // evaluations of the model, those for slopes too
+  bool is_reached = false;    // All targets are met to a hundredth of a JND.
+  bool has_influence = true;  // Some free parameter influences some target.
+  int starts = 0;             // Number of starts used.
+  std::size_t trials = 0;     // Evaluations of the model, including those for slopes.
 };
 
-// Least squares of just noticeable differences by Levenberg and Marquardt, in parameters from 0 to
-// 1 that stay there, until a start gets there; else the best of all, from where `exactly` goes on.
-// `values` are where the parameters are. Fails where nothing may be turned, a target is none, the
-// model has no such figure where it is, or a search is stopped (`stopped`). O(starts * steps *
-// parameters) trials
+// Minimises the sum of squared errors in JND by Levenberg-Marquardt, in parameters scaled to 0..1
+// and kept there, until a start reaches the target; otherwise refines the best end point with
+// `exactly`. `values` are the current parameters. Fails if nothing is free, a target is invalid,
+// the model lacks a figure at its current parameters, or the search is stopped (`stopped`).
+// O(starts * steps * parameters) evaluations.
 Result<AskedTimbre> ask_timbre(const AskedModel& model, std::span<const double> values,
                                std::span<const FreeParameter> free,
                                std::span<const TimbreTarget> targets, const AskOptions& options);

@@ -7,10 +7,12 @@ namespace ressort::analysis {
 namespace {
 
 constexpr double rolloff_share = 0.95;
-constexpr double effective_share = 0.4;  // of the largest, in 2011; -20 dB in R2021a
-constexpr double soft_share = 0.1;       // of the most effort: as much beside it counts in part
+// Share of the largest value: 2011 paper; Toolbox R2021a uses -20 dB.
+constexpr double effective_share = 0.4;
+// Width of the soft threshold, as a share of the largest effort.
+constexpr double soft_share = 0.1;
 
-// The largest, if all are amplitudes and one is above 0.
+// Returns the largest, if all are valid amplitudes and one is above 0.
 std::optional<double> largest_of(std::span<const double> amplitudes) {
   double largest = 0.0;
   for (const double amplitude : amplitudes) {
@@ -31,21 +33,21 @@ std::optional<SpectralShape> spectral_shape(std::span<const double> frequencies_
     return std::nullopt;
   }
   const auto count = static_cast<double>(spectrum.size());
-  double sum = 0.0;  // of a over the largest, so that no square is too small
+  double sum = 0.0;  // Sum of squares relative to the largest, to avoid underflow.
   double energy = 0.0;
   double logs = 0.0;
   double a_logs = 0.0;
   double moment = 0.0;
   double f_sum = 0.0;
   double ff_sum = 0.0;
-  double rest = 0.0;  // of decrease
+  double rest = 0.0;  // Numerator of decrease.
   for (std::size_t k = 0; k < spectrum.size(); ++k) {
     const double a = spectrum[k] / *largest;
     const double f = frequencies_hz[k];
     sum += a;
     energy += kind == SpectrumKind::magnitude ? a * a : a;
     const double log_a = std::log(a);
-    logs += log_a;  // -infinity of 0, whose mean is 0
+    logs += log_a;  // -infinity for 0, whose geometric mean is 0.
     a_logs += a > 0.0 ? a * log_a : 0.0;
     moment += f * a;
     f_sum += f;
@@ -59,7 +61,7 @@ std::optional<SpectralShape> spectral_shape(std::span<const double> frequencies_
   double second = 0.0;
   double third = 0.0;
   double fourth = 0.0;
-  const double entropy = std::log(sum) - a_logs / sum;  // - sum p log p
+  const double entropy = std::log(sum) - a_logs / sum;  // -sum p log p.
   double below = 0.0;
   bool has_rolled_off = false;
   for (std::size_t k = 0; k < spectrum.size(); ++k) {
@@ -76,7 +78,8 @@ std::optional<SpectralShape> spectral_shape(std::span<const double> frequencies_
     }
   }
   shape.spread_hz = std::sqrt(second);
-  if (shape.spread_hz <= 1e-12 * std::fabs(shape.centroid_hz)) {  // rounding, of one frequency
+  // A single frequency, up to rounding.
+  if (shape.spread_hz <= 1e-12 * std::fabs(shape.centroid_hz)) {
     shape.spread_hz = 0.0;
   } else {
     shape.skewness = third / (second * shape.spread_hz);
@@ -225,9 +228,10 @@ void EnvelopeTimes::add(double value) {
   ++count_;
 }
 
-// A step takes more than the most for sure, or, with some softness, as much as it is beyond.
+// A step counts if its effort exceeds the threshold; with softness above 0, in part as it
+// approaches the threshold.
 double EnvelopeTimes::attack(double softness) const {
-  const auto effort = [&](std::size_t step) {  // from (step + 1) tenths to the next
+  const auto effort = [&](std::size_t step) {  // From (step + 1) tenths to the next.
     return reached_[step + 1] - reached_[step];
   };
   const double most = 3.0 * (reached_[6] - reached_[2]) / 4.0;

@@ -10,7 +10,7 @@
 namespace ressort::analysis {
 namespace {
 
-constexpr std::size_t block_samples = 4096;  // Hilbert's 1/t reaches about so far
+constexpr std::size_t block_samples = 4096;  // Effective length of the Hilbert kernel 1/t.
 
 double step(const std::array<double, 3>& b, const std::array<double, 3>& a,
             std::array<double, 3>& z, double x) {
@@ -23,7 +23,8 @@ double step(const std::array<double, 3>& b, const std::array<double, 3>& a,
 }  // namespace
 
 EnvelopeFilter::EnvelopeFilter(double rate_hz) {
-  // (s + 1) (s^2 + s + 1), with s = (1 - z^-1)/(1 + z^-1)/k: at 0 Hz it is 1/k samples late.
+  // Bilinear transform of (s + 1) (s^2 + s + 1), with s = (1 - z^-1)/(1 + z^-1)/k. Its group delay
+  // at 0 Hz is 1/k samples.
   const double k = std::tan(std::numbers::pi * Envelope::cutoff_hz / rate_hz);
   one_b_ = {k / (1.0 + k), k / (1.0 + k), 0.0};
   one_a_ = {1.0, (k - 1.0) / (k + 1.0), 0.0};
@@ -70,8 +71,8 @@ void Envelope::take(double sample) {
   }
 }
 
-// The two newest blocks, through the window, add their Hilbert transform; what is then two blocks
-// old is complete.
+// Adds the Hilbert transform of the two newest blocks, windowed (overlap-add). The block two blocks
+// back is then complete.
 void Envelope::transform() {
   std::fill(frame_.begin(), frame_.end(), 0.0);
   for (std::size_t n = 0; n < 2 * block_; ++n) {

@@ -8,17 +8,17 @@
 namespace ressort::analysis {
 namespace {
 
-// How far from its largest bin a partial may be, in bins. What is further is the edge of another.
+// Largest distance of a partial from its peak bin; farther peaks are side lobes of another partial.
 constexpr double farthest_bin = 0.75;
 
-// Below the loudest, as amplitude: what is weaker is no partial, but rounding.
+// Smallest amplitude of a partial, relative to the loudest; smaller peaks are rounding errors.
 constexpr double quietest_share = 1e-5;
 
 double square(double x) {
   return x * x;
 }
 
-// What a Hann window leaves of a sinusoid that is so many bins away, over what it leaves at 0.
+// Returns the spectrum of a Hann window at this distance in bins, relative to 0 bins.
 double hann_lobe(double bins) {
   const double turn = std::numbers::pi * bins;
   const double sinc = std::fabs(turn) < 1e-9 ? 1.0 : std::sin(turn) / turn;
@@ -47,7 +47,7 @@ FrameAnalysis::Complex FrameAnalysis::raw(std::ptrdiff_t bin) const {
                       : bins_[static_cast<std::size_t>(bin)];
 }
 
-// A window that is a sum of cosines adds up neighbours.
+// A cosine-sum window is a convolution with neighbouring bins.
 FrameAnalysis::Complex FrameAnalysis::windowed(std::size_t bin, Window window) const {
   const auto cosines = window_cosines(window);
   const auto k = static_cast<std::ptrdiff_t>(bin);
@@ -92,7 +92,8 @@ FrameTimbre FrameAnalysis::next(std::span<const double> samples) {
     double energy = 0.0;
     for (std::size_t k = 1; k < bins_.size(); ++k) {
       energy +=
-          square(4.0 / size * std::abs(windowed(k, Window::hann))) / 1.5;  // its noise's width
+          // Equivalent noise bandwidth of the window.
+          square(4.0 / size * std::abs(windowed(k, Window::hann))) / 1.5;
     }
     timbre.noisiness = noisiness(harmonics, energy);
   }
@@ -111,8 +112,8 @@ std::vector<Partial> FrameAnalysis::partials() const {
     if (!(level[k] > level[k - 1]) || level[k] < level[k + 1] || level[k] < least) {
       continue;
     }
-    // The frame times the window's derivative, over that times the window: i times the bins between
-    // here and the partial, and its decay.
+    // Reassignment: the spectrum with the window's derivative over that with the window is i times
+    // the distance in bins between here and the partial, plus its decay.
     const auto bin = static_cast<std::ptrdiff_t>(k);
     const Complex slope = 0.25 * (raw(bin - 1) - raw(bin + 1)) / Complex(0.0, 1.0);
     const double away = -(slope / windowed(k, Window::hann)).imag();
@@ -134,7 +135,8 @@ void FrameStream::add(std::span<const double> samples) {
     sink_(next_, timbre, analysis_);
     next_ += hop_;
   }
-  const std::size_t done = std::min(next_ - first_, samples_.size());  // a hop may skip samples
+  // A hop longer than a frame skips samples.
+  const std::size_t done = std::min(next_ - first_, samples_.size());
   samples_.erase(samples_.begin(), samples_.begin() + static_cast<std::ptrdiff_t>(done));
   first_ += done;
 }

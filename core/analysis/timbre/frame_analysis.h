@@ -1,4 +1,4 @@
-// core/analysis/timbre: what a frame of sound is like. [one thread but audio]
+// core/analysis/timbre: descriptors of the frames of a sound. [one thread but audio]
 #pragma once
 
 #include <complex>
@@ -16,41 +16,39 @@ namespace ressort::analysis {
 
 struct FrameOptions {
   double rate_hz = 48000.0;
-  std::size_t size = 2048;  // samples, from 4 on; nothing is padded
+  std::size_t size = 2048;  // Samples, at least 4; no zero padding.
   Window window = Window::hann;
   SpectrumKind kind = SpectrumKind::magnitude;
-  std::optional<double> f0_hz = {};  // without it nothing is harmonic
+  std::optional<double> f0_hz = {};  // Without it no harmonics are computed.
 };
 
 struct FrameTimbre {
-  double rms = 0.0;                        // of the samples, without a window
-  std::optional<SpectralShape> shape;      // nothing of silence
-  std::optional<double> flux;              // since the frame before; nothing of the first
-  std::optional<HarmonicShape> harmonics;  // of the first 20
+  double rms = 0.0;                        // RMS of the samples, unwindowed.
+  std::optional<SpectralShape> shape;      // Absent for silence.
+  std::optional<double> flux;              // Change since the previous frame; absent for the first.
+  std::optional<HarmonicShape> harmonics;  // Descriptors of the first 20 harmonics.
   std::optional<double> noisiness;
 };
 
-// Frames in the order of their time. From 0 Hz to half the rate every bin counts. Harmonics are
-// looked for with a Hann window, whatever the other is: each at the largest bin of a partial, and
-// from there by the window's derivative, which is exact for a lone one that decays by itself
-// (Auger and Flandrin 1995).
+// Analyses frames in order of time. Every bin from 0 Hz to half the rate counts. Harmonics always
+// use a Hann window: the peak bin of each partial is refined by the window's derivative, which is
+// exact for a single exponentially decaying partial (Auger and Flandrin 1995).
 class FrameAnalysis {
  public:
   explicit FrameAnalysis(const FrameOptions& options);
 
-  // Of `size` samples. Those that are no finite numbers make it silent.
+  // Analyses `size` samples. A frame with samples that are not finite counts as silent.
   FrameTimbre next(std::span<const double> samples);
 
   const std::vector<double>& frequencies_hz() const { return frequencies_hz_; }  // [bin]
-  // Of the last frame: [bin] amplitude of a sinusoid there, or its square.
+  // Spectrum of the last frame: [bin] amplitude of a sinusoid there, or its square.
   const std::vector<double>& spectrum() const { return spectrum_; }
-  // What rises above its neighbours in the last frame, down to 100 dB below the loudest, by
-  // frequency.
+  // Returns the spectral peaks of the last frame, down to 100 dB below the loudest, by frequency.
   std::vector<Partial> partials() const;
 
  private:
   using Complex = std::complex<double>;
-  Complex raw(std::ptrdiff_t bin) const;  // of the frame without a window, on both sides of 0
+  Complex raw(std::ptrdiff_t bin) const;  // Spectrum of the unwindowed frame, two-sided.
   Complex windowed(std::size_t bin, Window window) const;
 
   FrameOptions options_;
@@ -58,14 +56,14 @@ class FrameAnalysis {
   std::vector<double> frequencies_hz_;
   std::vector<Complex> bins_;
   std::vector<double> spectrum_;
-  std::vector<double> before_;  // the spectrum of the frame before
+  std::vector<double> before_;  // Spectrum of the previous frame.
   bool has_before_ = false;
 };
 
-// Cuts what comes, in pieces of any length, into frames that start `hop` samples apart.
+// Cuts a stream of chunks of any length into frames that start `hop` samples apart.
 class FrameStream {
  public:
-  // `sink` gets the first sample's number and the frame; `analysis` still has its spectrum then.
+  // Receives the index of the first sample and the frame; `analysis` still holds its spectrum.
   using Sink =
       std::function<void(std::size_t at, const FrameTimbre& timbre, const FrameAnalysis& analysis)>;
   FrameStream(const FrameOptions& options, std::size_t hop, Sink sink);
@@ -77,9 +75,9 @@ class FrameStream {
   std::size_t hop_;
   Sink sink_;
   FrameAnalysis analysis_;
-  std::vector<double> samples_;  // from `first_` on
-  std::size_t first_ = 0;        // number of samples_[0]
-  std::size_t next_ = 0;         // where the next frame starts
+  std::vector<double> samples_;  // Samples from `first_` on.
+  std::size_t first_ = 0;        // Index of samples_[0] in the stream.
+  std::size_t next_ = 0;         // Start of the next frame.
 };
 
 }  // namespace ressort::analysis

@@ -9,7 +9,7 @@
 namespace ressort::analysis {
 namespace {
 
-constexpr double gone = 1e-100;  // a state that is none any more, so that none becomes denormal
+constexpr double gone = 1e-100;  // States below this are set to 0, so that none becomes denormal.
 
 }  // namespace
 
@@ -48,8 +48,8 @@ std::size_t ModalSound::pulse_end() const {
 
 struct ModalSound::Group {
   using Numbers = std::array<double, group>;
-  Numbers x{}, y{};  // states
-  Numbers c{}, s{};  // turns
+  Numbers x{}, y{};  // States.
+  Numbers c{}, s{};  // Rotations per sample.
   void turn() {
     for (std::size_t i = 0; i < group; ++i) {
       const double turned = c[i] * x[i] - s[i] * y[i];
@@ -81,7 +81,7 @@ void ModalSound::keep(const Group& all, std::size_t first) {
   }
 }
 
-// One sample further, with what pushes then.
+// Advances one sample and adds the pulses of that sample.
 void ModalSound::push(Group& all, std::size_t first, std::size_t sample) const {
   for (std::size_t p = 0; p < pulses_.size(); ++p) {
     const double push = sample < pulses_[p].size() ? pulses_[p][sample] : 0.0;

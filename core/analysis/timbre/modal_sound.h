@@ -1,4 +1,4 @@
-// core/analysis/timbre: what decaying motions sound like, sample by sample. [one thread but audio]
+// core/analysis/timbre: synthesises decaying modes sample by sample. [one thread but audio]
 #pragma once
 
 #include <complex>
@@ -10,32 +10,32 @@
 
 namespace ressort::analysis {
 
-// A motion is state e^(pole n), n in samples, of which the imaginary part is heard.
+// A mode is state e^(pole n), n in samples; its imaginary part is the output.
 class ModalSound {
  public:
   struct Motion {
-    std::complex<double> pole;                 // the logarithm of what it grows by in a sample
-    std::vector<std::complex<double>> pushed;  // [pulse] what a pulse of 1 adds to its state
+    std::complex<double> pole;                 // Logarithm of its growth per sample.
+    std::vector<std::complex<double>> pushed;  // [pulse] Change of its state by a unit pulse.
   };
-  // Pulses are of force, sample by sample from the first on, all at once.
+  // Pulses are force sequences that all start at the first sample.
   ModalSound(std::span<const Motion> motions, std::vector<std::vector<double>> pulses);
 
-  // The next samples. O(motions * samples)
+  // Computes the next samples. O(motions * samples)
   void next(std::span<double> samples);
 
-  // What the analytic signal is like after every `step` more samples: the magnitude of the sum of
-  // all states. While something pushes, O(step) each.
+  // Computes the magnitude of the analytic signal (the sum of all states) after every `step`
+  // samples. While a pulse lasts, O(step) each.
   void next_magnitudes(std::span<double> magnitudes, std::size_t step);
 
-  bool is_pushed() const { return at_ < pulse_end(); }  // still
+  bool is_pushed() const { return at_ < pulse_end(); }  // Whether a pulse still acts.
 
-  // The largest that the envelope, over a time of `resolution_s`, may still become without another
-  // push: motions as near as that may come to be in phase, others add up as their energies do.
+  // Returns an upper estimate of the future envelope without further pulses, over a time of
+  // `resolution_s`: amplitudes of modes that can come into phase add up, others add up as energies.
   double most_left(double rate_hz, double resolution_s) const;
 
  private:
   static constexpr std::size_t group =
-      4;  // motions side by side, as each sample waits for the last
+      4;  // Number of modes stepped side by side, because each sample waits for the one before.
 
   struct Group;
   Group group_at(std::size_t first) const;
@@ -45,7 +45,7 @@ class ModalSound {
 
   std::vector<std::vector<double>> pulses_;
   std::size_t at_ = 0;
-  // [motion], by frequency, filled up to a whole group.
+  // [motion] Sorted by frequency, padded to whole groups.
   std::vector<double> turn_real_, turn_imaginary_;
   std::vector<double> real_, imaginary_;
   std::vector<double> pushed_real_, pushed_imaginary_;  // [pulse * motions + motion]

@@ -12,12 +12,13 @@ namespace ressort::analysis {
 namespace {
 
 constexpr double lowest_hz = 50.0;
-constexpr double highest_share = 0.2;    // of the rate
-constexpr double nearly_as_good = 0.93;  // of the best lag's correlation
-constexpr double good_enough = 0.6;      // 1: the sound repeats itself
-constexpr double least_left = 1e-3;      // of the energy, in the second half
-constexpr double partial_apart = 0.06;   // of f0: a semitone
-constexpr double partial_share = 0.01;   // of the loudest partial's amplitude
+constexpr double highest_share = 0.2;  // Highest f0, relative to the rate.
+// A shorter lag wins if its correlation is at least this share of the best.
+constexpr double nearly_as_good = 0.93;
+constexpr double good_enough = 0.6;     // Least normalised correlation; 1 is perfectly periodic.
+constexpr double least_left = 1e-3;     // Least share of the energy that the second half must have.
+constexpr double partial_apart = 0.06;  // Largest distance of a partial from f0: a semitone.
+constexpr double partial_share = 0.01;  // Least amplitude of that partial, relative to the loudest.
 
 }  // namespace
 
@@ -37,7 +38,7 @@ std::optional<double> find_f0(std::span<const double> samples, double rate_hz) {
   std::vector<double> padded(2 * std::bit_ceil(count));
   std::transform(samples.begin(), samples.end(), padded.begin(),
                  [&](double sample) { return sample - mean; });
-  std::vector<double> energy(count + 1);  // [n] of the first n
+  std::vector<double> energy(count + 1);  // [n] Energy of the first n samples.
   for (std::size_t n = 0; n < count; ++n) {
     energy[n + 1] = energy[n] + padded[n] * padded[n];
   }
@@ -59,7 +60,7 @@ std::optional<double> find_f0(std::span<const double> samples, double rate_hz) {
     const double both = energy[count - lag] + energy[count] - energy[lag];
     likeness[lag] = both > 0.0 ? 2.0 * padded[lag] / both : 0.0;
   }
-  // Peaks after the first time that it is below 0; until then a sound is like itself.
+  // Skips the peak at lag 0: peaks count after the first negative value.
   std::size_t lag = 1;
   while (lag < longest && likeness[lag] > 0.0) {
     ++lag;
@@ -84,7 +85,7 @@ std::optional<double> find_f0(std::span<const double> samples, double rate_hz) {
   const double top = static_cast<double>(*first) + (bend < 0.0 ? 0.5 * (left - right) / bend : 0.0);
   const double f0_hz = rate_hz / top;
 
-  // In the second half, where an attack is over, unless it is over altogether.
+  // Uses the second half, after the attack, unless the sound has ended by then.
   const std::size_t half =
       energy[count] - energy[count / 2] > least_left * energy[count] ? count / 2 : 0;
   FrameAnalysis frame({.rate_hz = rate_hz, .size = count - half});

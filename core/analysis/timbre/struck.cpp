@@ -15,11 +15,12 @@
 namespace ressort::analysis {
 namespace {
 
-constexpr double least_residue = 1e-3;  // of the loudest mode: what is less is no pitch
-constexpr double in_tune = 1e-9;        // of a frequency
+// Smallest residue, relative to the loudest mode, that can be the pitch.
+constexpr double least_residue = 1e-3;
+constexpr double in_tune = 1e-9;  // Relative error of a frequency.
 constexpr int most_tunings = 12;
-constexpr double longest_attack_s = 3.0;  // what comes later is not waited for
-constexpr std::size_t coarse_step = 8;    // samples
+constexpr double longest_attack_s = 3.0;  // Later peaks are ignored.
+constexpr std::size_t coarse_step = 8;    // Samples.
 
 constexpr AskedFigureRow figure_rows[] = {
     {AskedFigure::f0, "f0_hz", 0.0028922, true, "high", "low"},  // 5 cents
@@ -31,20 +32,20 @@ constexpr AskedFigureRow figure_rows[] = {
     {AskedFigure::rolloff, "rolloff95_hz", 0.05, true, "high in rolloff", "low in rolloff"},
     {AskedFigure::skewness, "skewness", 0.1, false, "skewed", "little skewed", true},
     {AskedFigure::kurtosis, "kurtosis", 0.05, true, "peaked", "flat"},
-    // As much as 3 % of a centroid of 1400 Hz moves it.
+    // Equals a change of 3 % in a centroid of 1400 Hz.
     {AskedFigure::slope, "slope", 1e-9, false, "little sloped", "steeply sloped", true},
-    {AskedFigure::attack, "attack_ms", 0.2589254, true, "slow", "sudden"},  // 0.1 of its log10
+    {AskedFigure::attack, "attack_ms", 0.2589254, true, "slow", "sudden"},  // 0.1 of its log10.
 };
 
-// How stiff a mode of the published scheme is, k/m in samples, by its pole (other than its decay).
+// Returns the stiffness k/m, in samples, of a mode of the published scheme from its pole.
 double stiffness_of(double frequency_hz, double t60_s, double rate_hz) {
   const double r = pole_radius(t60_s, rate_hz);
   const double angle = 2.0 * std::numbers::pi * frequency_hz / rate_hz;
   return (1.0 - r) * (1.0 - r) + 4.0 * r * std::pow(std::sin(0.5 * angle), 2.0);
 }
 
-// How much more a raised cosine over so many frames excites a motion of a pole than all of it in
-// its first sample does: a sum of three geometric series.
+// Returns how much more a raised cosine over so many frames excites a mode than a single-sample
+// impulse of the same sum does: a sum of three geometric series.
 std::complex<double> pulse_response(double frames, std::complex<double> pole) {
   const RaisedCosine pulse(frames);
   if (pulse.count == 1) {
@@ -61,7 +62,8 @@ std::complex<double> pulse_response(double frames, std::complex<double> pole) {
          pulse.sum;
 }
 
-// As smooth as the lines move: between the line before the 95 % of energy and the one there.
+// Interpolates the rolloff between the line before 95 % of the energy and the line that reaches it,
+// so that it changes smoothly with the lines.
 double smooth_rolloff_hz(std::span<const Partial> lines) {
   double energy = 0.0;
   for (const Partial& line : lines) {
@@ -82,7 +84,7 @@ double smooth_rolloff_hz(std::span<const Partial> lines) {
   return before_hz;
 }
 
-// The slope that a frame's bins have where this is their centroid.
+// Returns the slope of a frame's bins that have this centroid.
 double slope_of_bins(double centroid_hz, double rate_hz, std::size_t frame) {
   const std::size_t count = frame / 2 + 1;
   const auto bins = static_cast<double>(count);
@@ -121,7 +123,7 @@ double noticed_between(AskedFigure figure, double value, double target) {
 StruckModel::StruckModel(const Network& network, const StrikeOptions& options)
     : network_(expand_macros(network)), options_(options) {}
 
-// With the shapes that are known, if these are right; near a place, with those of the place.
+// Uses the known shapes if they are exact; near a place, first-order perturbation of the place.
 Result<std::vector<HeardMode>> StruckModel::modes_at(std::span<const double> parameters,
                                                      double factor, const Place& place) {
   const Network written = settled(network_, parameters);
@@ -148,7 +150,7 @@ Result<std::vector<HeardMode>> StruckModel::modes_at(std::span<const double> par
   return found ? Result<std::vector<HeardMode>>(heard_modes(*found, pushed())) : found.error();
 }
 
-// From now on these are known.
+// Solves for the modes and keeps them as the known ones.
 Result<std::vector<HeardMode>> StruckModel::found_modes(const Network& written,
                                                         std::span<const double> parameters,
                                                         const ModeOptions& how) {
@@ -228,7 +230,7 @@ double StruckModel::blow_frames(const StrikePulse& blow, double factor) const {
 }
 
 ModalSound StruckModel::sound_of(const Tuned& tuned) const {
-  std::vector<std::vector<double>> pulses;  // [blow] [sample]
+  std::vector<std::vector<double>> pulses;  // [strike][sample]
   for (const StrikePulse& blow : options_.blows) {
     const RaisedCosine shape(blow_frames(blow, tuned.factor));
     std::vector<double>& pulse = pulses.emplace_back();
@@ -250,11 +252,11 @@ FrameTimbre StruckModel::analysed(const Tuned& tuned, double f0_hz) const {
   return analysis.next(samples);
 }
 
-// The envelope until no more than there has been can come: as a recording's, or in fewer steps the
-// magnitude of the modes' sum.
+// Computes the envelope until it can no longer exceed its maximum: as for a recording, or in
+// coarser steps as the magnitude of the modal sum.
 std::optional<TemporalShape> StruckModel::rising(const Tuned& tuned, StruckAs how) const {
   constexpr std::size_t block = 1024;
-  constexpr double more = 1.05;  // than the mean of what is left: a filter that overshoots
+  constexpr double more = 1.05;  // Allowance for the overshoot of the filter.
   const std::size_t step = how == StruckAs::samples ? 1 : coarse_step;
   const double rate_hz = options_.rate_hz / static_cast<double>(step);
   ModalSound sound = sound_of(tuned);
@@ -265,7 +267,7 @@ std::optional<TemporalShape> StruckModel::rising(const Tuned& tuned, StruckAs ho
     levels.push_back(level);
   };
   std::vector<double> samples(block);
-  std::vector<double> left;  // [block] at its end
+  std::vector<double> left;  // [block] Bound at its end.
   const auto is_over = [&] {
     const std::size_t told = levels.size() / block;
     return told > 0 && more * left[told - 1] < sums.largest();

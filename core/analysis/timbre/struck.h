@@ -1,5 +1,5 @@
-// core/analysis/timbre: what a linear model is like when it is struck once, as a function of its
-// parameters, from its modes. Pure. [one thread but audio]
+// core/analysis/timbre: the timbre of a linear model after one strike, as a function of its
+// parameters, computed from its modes. Pure. [one thread but audio]
 #pragma once
 
 #include <array>
@@ -21,7 +21,8 @@
 
 namespace ressort::analysis {
 
-// What may be asked of a timbre. Other figures jump while parameters move, or count bins.
+// Figures that can be targets. Other figures are discontinuous in the parameters, or depend on the
+// number of bins.
 enum class AskedFigure : std::uint8_t {
   f0,
   t60,
@@ -39,79 +40,84 @@ inline constexpr std::size_t asked_figures = 11;
 
 struct AskedFigureRow {
   AskedFigure figure = AskedFigure::f0;
-  std::string_view name;  // with its unit, as descriptions have it
-  // What is just noticed: a share of it; of some figures so much.
+  std::string_view name;  // Name with its unit, as in descriptions.
+  // Just noticeable difference: relative, or absolute if `is_ratio` is false.
   double noticed = 0.0;
   bool is_ratio = true;
-  std::string_view more;  // "bright", for people
+  std::string_view more;  // Adjective for a higher value, such as "bright".
   std::string_view less;
-  bool is_signed = false;  // it may be below 0; else a ratio is above 0, and others from 0 on
+  // May be below 0. Otherwise a ratio must be above 0, and other figures at least 0.
+  bool is_signed = false;
 };
-// What is wrong with asking for a value, "must be a number above 0"; empty: nothing.
+// Returns what is wrong with a target value, such as "must be a number above 0"; empty if valid.
 std::string_view wrong_with(AskedFigure figure, double value);
 const AskedFigureRow& row_of(AskedFigure figure);
 std::span<const AskedFigureRow> asked_figure_rows();
 
-// [figure] Nothing where the sound has none.
+// [figure] Absent if the sound does not have it.
 using AskedValues = std::array<std::optional<double>, asked_figures>;
 
-// How far a figure is from a target, in just noticeable differences: above 0 where it is more.
-// Both above 0 where the figure is a ratio.
+// Returns the difference of a figure from its target in JND; above 0 if it is more. Both must be
+// above 0 if the figure is a ratio.
 double noticed_between(AskedFigure figure, double value, double target);
 
-// A pulse of force, or of displacement where the input is a position: one sample, or a raised
-// cosine of the same sum.
+// A pulse of force, or of displacement if the input is a position: one sample, or a raised cosine
+// of the same sum.
 struct StrikePulse {
-  std::size_t input = 0;  // index into Network::inputs
+  std::size_t input = 0;  // Index into Network::inputs.
   double strength = 1.0;
-  double length_s = 0.0;  // at the model's own pitch; on a key as much shorter as its periods are
+  // Length at the model's own pitch; a key shortens it in proportion to its period.
+  double length_s = 0.0;
 };
 
 struct StrikeOptions {
   double rate_hz = Network::reference_rate_hz;
-  std::vector<StrikePulse> blows = {{}};  // all at once; heard is the mean of all outputs
-  // With it every stiffness that is not fixed gets the factor that brings the mode there, as a key
-  // does it; else the model is as it is written.
+  // Simultaneous strikes; the output is the mean of all outputs.
+  std::vector<StrikePulse> blows = {{}};
+  // If set, every stiffness that is not fixed is scaled so that the mode has this frequency, as a
+  // key does. Otherwise the model is used as written.
   std::optional<double> key_hz;
-  std::size_t pitch_mode = 0;  // from the lowest that swings
-  std::size_t frame = 2048;    // samples from the blow on, of which the spectrum is, of amplitudes
-                               // under a Hann window
-  bool has_attack = false;     // which needs more of the sound than a frame
+  std::size_t pitch_mode = 0;  // Counted from the lowest oscillating mode.
+  // Samples from the strike on, analysed as amplitudes under a Hann window.
+  std::size_t frame = 2048;
+  bool has_attack = false;  // The attack needs more of the sound than one frame.
   Progress progress = {};
 };
 
-// Modes are lines, and figures are smooth. Or the frame is computed sample by sample and analysed
-// as a recording is: exact, but figures jump where a peak moves to another bin, or an attack's
-// threshold to another ripple.
+// `lines`: modes are spectral lines and figures are smooth. `samples`: the frame is synthesised and
+// analysed like a recording, which is exact, but figures jump when a peak moves to another bin or
+// the attack's threshold to another ripple.
 enum class StruckAs { lines, samples };
 
 class StruckModel {
  public:
-  // Of a network with one input and one output at least.
+  // Takes a network with at least one input and one output.
   StruckModel(const Network& network, const StrikeOptions& options);
 
-  // f0 is the mode that a key tunes, or else the lowest within 60 dB of the loudest; T60 is its.
-  // That of a mode that nothing damps is `longest_t60_s`. The error says why there are none: no
-  // mode swings or is heard, one grows, a number is none; not linear; or `stopped`. O(masses^3),
-  // and O(masses^2) where the last parameters had modes of the same shapes.
+  // Returns the figures. f0 is the mode that a key tunes, or else the lowest mode within 60 dB of
+  // the loudest; T60 belongs to the same mode, `longest_t60_s` if it is undamped. The error gives
+  // the reason if there are none: no mode oscillates or is heard, a mode grows, a value is not
+  // finite, the model is not linear, or `stopped`. O(masses^3), and O(masses^2) if the last
+  // parameters had modes of the same shapes.
   Result<AskedValues> figures(std::span<const double> parameters, StruckAs how);
 
-  // The same, to first order in how far the parameters are from a place: for slopes. The first time
-  // at a place O(masses^3), then O(masses^2) where no modes are alike that the way tells apart.
+  // Returns the same to first order around `place`, for slopes. The first call for a place takes
+  // O(masses^3), later ones O(masses^2) unless the change splits degenerate modes.
   Result<AskedValues> figures_near(std::span<const double> place,
                                    std::span<const double> parameters, StruckAs how);
 
-  // As of figures(), by samples, whether `has_attack` or not; nothing where there are no figures.
+  // Returns the attack of figures() by samples, whether or not `has_attack` is set; empty if there
+  // are no figures.
   std::optional<double> attack_ms(std::span<const double> parameters);
 
   static constexpr double longest_t60_s = 1e6;
 
  private:
   struct Tuned {
-    std::vector<HeardMode> modes;  // residues by blow
+    std::vector<HeardMode> modes;  // Residues by strike.
     double factor = 1.0;
   };
-  using Place = std::optional<std::span<const double>>;  // near which modes are wanted
+  using Place = std::optional<std::span<const double>>;  // The place near which modes are wanted.
   Result<Tuned> tuned(std::span<const double> parameters, const Place& place);
   Result<std::vector<HeardMode>> modes_at(std::span<const double> parameters, double factor,
                                           const Place& place);
@@ -130,9 +136,9 @@ class StruckModel {
 
   Network network_;
   StrikeOptions options_;
-  double factor_ = 1.0;               // of a key, the last; 1 without one
-  std::optional<NearbyModes> known_;  // with the shapes that were found last...
-  std::vector<double> known_at_;      // ...for these parameters
+  double factor_ = 1.0;               // Stiffness factor of the last key; 1 without a key.
+  std::optional<NearbyModes> known_;  // The shapes that were found last.
+  std::vector<double> known_at_;      // Their parameters.
 };
 
 }  // namespace ressort::analysis

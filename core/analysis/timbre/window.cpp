@@ -8,16 +8,16 @@ namespace {
 
 using Complex = std::complex<double>;
 
-// e^z - 1, without losing digits near 0.
+// Returns e^z - 1 without cancellation near 0.
 Complex expm1(Complex z) {
   const double half = std::sin(0.5 * z.imag());
   return {std::expm1(z.real()) * std::cos(z.imag()) - 2.0 * half * half,
           std::exp(z.real()) * std::sin(z.imag())};
 }
 
-// The sum of e^(log_z m) over m < size.
+// Returns the sum of e^(log_z m) over m < size.
 Complex geometric_sum(Complex log_z, double size) {
-  // Turns beyond half a circle are the same turns, and near 0 again for whole ones.
+  // Reduces the angle to half a turn, so that whole turns are near 0.
   const Complex near(log_z.real(), std::remainder(log_z.imag(), 2.0 * std::numbers::pi));
   const Complex step = expm1(near);
   return std::abs(step) * size < 1e-12 ? Complex(size) : expm1(size * near) / step;

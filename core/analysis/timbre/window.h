@@ -1,4 +1,4 @@
-// core/analysis/timbre: the windows of a frame: periodic sums of cosines. Pure. [any thread]
+// core/analysis/timbre: windows of a frame, as periodic sums of cosines. Pure. [any thread]
 #pragma once
 
 #include <array>
@@ -12,7 +12,7 @@ namespace ressort::analysis {
 
 enum class Window { hann, hamming, blackman, none };
 
-// w[m] = sum of a_j cos(2 pi j m / size): a_0, a_1, a_2.
+// Coefficients a_0, a_1, a_2 of w[m] = sum of a_j cos(2 pi j m / size).
 constexpr std::array<double, 3> window_cosines(Window window) {
   switch (window) {
     case Window::hann:
@@ -27,7 +27,7 @@ constexpr std::array<double, 3> window_cosines(Window window) {
   return {1.0, 0.0, 0.0};
 }
 
-// w[m] for m < size: periodic, so that w[size] would be w[0] again.
+// Returns w[m] for m < size; periodic, so that w[size] would equal w[0].
 std::vector<double> window_weights(Window window, std::size_t size);
 
 // The sum of w[m] e^(log_z m) over the sum of w[m], in closed form: what a window leaves of a
