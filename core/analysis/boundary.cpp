@@ -212,7 +212,7 @@ Boundary BoundaryFinder::between(const WeightLine& line, double safe, double bad
     const Weights weights = line(at);
     return is_exact ? factors(weights, limit_of_scheme) : holds(weights, limit_of_scheme);
   };
-  // Whether the factor of the matrix at `safe` is available.
+  // True while the factor of the matrix at `safe` is available.
   bool has_factor = is_exact && is_safe(safe);
   for (int round = 0; round < 100; ++round) {
     const double enough = is_exact           ? precision

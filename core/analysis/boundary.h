@@ -39,7 +39,7 @@ Bound edge_bound(const Assembly& assembly, const Weights& weights);
 // pattern of the factorisation. [any thread but audio]
 class BoundaryFinder {
  public:
-  // With `is_exact` false, or if factorisations would take too long, only the edge bound is used.
+  // If `is_exact` is false, or if factorisations would take too long, only the edge bound is used.
   BoundaryFinder(const Assembly& assembly, bool is_exact, Progress progress = {});
   bool is_exact();
 
@@ -79,7 +79,7 @@ class BoundaryFinder {
   void refine(const Weights& weights, std::vector<double>& shape) const;
 
   const Assembly& assembly_;
-  bool is_exact_;  // Whether exact, as far as is known so far.
+  bool is_exact_;  // True until a factorisation proves too expensive.
   Progress progress_;
   Definite definite_;
 };

@@ -16,10 +16,13 @@ namespace {
 
 using Complex = std::complex<double>;
 
-constexpr double shared_tolerance = 1e-9;  // of the largest: is Z diagonal in the modes of K?
-constexpr double zero = 1e-13;             // of the largest stiffness or damping: none
+// Largest off-diagonal element of Z in the modes of K, relative to the largest element.
+constexpr double shared_tolerance = 1e-9;
+// A stiffness or damping below this share of the largest counts as 0.
+constexpr double zero = 1e-13;
 
-// A spring and damper between two sums of masses: it pulls by k (sum of share x - offset).
+// A spring and damper between two weighted sums of masses; its force is k (sum of share x -
+// offset).
 struct Bar {
   std::vector<std::pair<std::size_t, double>> shares;
   double offset = 0.0;
@@ -27,7 +30,7 @@ struct Bar {
   double z = 0.0;
 };
 
-// The network for masses of 1: row i is mass i times the root of its M.
+// The network for unit masses: row i is mass i times the square root of its M.
 class Body {
  public:
   Body(const Network& network, std::span<const double> parameters)
@@ -86,7 +89,8 @@ class Body {
     return sum;
   }
 
-  // A shape's stiffness or damping as a sum of squares: exact even where small.
+  // Returns the stiffness or damping of a shape as a sum of squares, which is accurate for small
+  // values, too.
   double along(double Bar::*of, const Vector& shape) const {
     double sum = 0.0;
     for (const Bar& bar : bars_) {
@@ -112,7 +116,7 @@ class Body {
     return {x, v};
   }
 
-  // What an output says, as a sum over rows and a constant.
+  // Returns the value of an output as a weighted sum of rows and a constant.
   Bar reading(const Output& output) const {
     Bar bar;
     hang(bar, output.mass, level_value(network_, output, parameters_));
@@ -147,9 +151,9 @@ class Body {
   const Network& network_;
   std::span<const double> parameters_;
   std::vector<std::size_t> row_;  // [mass]
-  std::vector<double> root_;      // [row] of its M
+  std::vector<double> root_;      // [row] Square root of its M.
   std::vector<Bar> bars_;
-  Vector force_;  // [row] with every mass at 0
+  Vector force_;  // [row] Force with every mass at 0.
 };
 
 class Solver {
@@ -168,7 +172,8 @@ class Solver {
     const Matrix z = body_.matrix(&Bar::z);
     const double k_scale = std::max(largest(k.values), 1e-300);
     const double z_scale = std::max(largest(z.values), 1e-300);
-    // Of a mixture in odd shares: modes that K alone cannot tell apart, Z may.
+    // Diagonalises a combination with an irrational ratio, because Z can separate modes that are
+    // degenerate in K.
     Matrix mixture = k;
     mixture.values = k.values / k_scale + 0.6180339887498949 / z_scale * z.values;
     const Matrix shapes = symmetric_eigenpairs(mixture).vectors;
@@ -202,7 +207,7 @@ class Solver {
     return sum;
   }
 
-  // q'' + damping q' + stiffness q = force, for a shape that swings alone.
+  // Solves q'' + damping q' + stiffness q = force for an independent mode.
   void add_mode(const Vector& shape, double k_scale, double z_scale, Vector& rest) {
     double stiffness = body_.along(&Bar::k, shape);
     double damping = body_.along(&Bar::z, shape);
@@ -223,7 +228,7 @@ class Solver {
     }
     double inner = stiffness - 0.25 * damping * damping;
     if (std::fabs(inner) < 1e-12 * stiffness) {
-      inner = 1e-12 * stiffness;  // critical: two partials that can be told apart
+      inner = 1e-12 * stiffness;  // Critical damping is perturbed, which gives two distinct poles.
     }
     const Complex omega = std::sqrt(Complex(inner));
     const Complex pole(Complex(-0.5 * damping) + Complex(0.0, 1.0) * omega);
@@ -234,7 +239,7 @@ class Solver {
       keep_amplitude(shape, amplitude);
       return;
     }
-    const double slow = -stiffness / (0.5 * damping + omega.imag());  // no difference of equals
+    const double slow = -stiffness / (0.5 * damping + omega.imag());  // Avoids cancellation.
     const double fast = -0.5 * damping - omega.imag();
     const double a = (v - fast * (q - still)) / (slow - fast);
     add_terms(shape, {{a, slow}, {q - still - a, fast}});
@@ -249,7 +254,7 @@ class Solver {
         output.drift += share * v;
         output.fall += share * force;
       } else {
-        const double final = force / damping;  // velocity
+        const double final = force / damping;  // Terminal velocity.
         output.rest += share * (q + (v - final) / damping);
         output.drift += share * final;
         output.terms.push_back({-share * (v - final) / damping, -damping});
@@ -272,7 +277,7 @@ class Solver {
     }
   }
 
-  // The eigenvectors of (x, v)' = (v, f - K x - Z v).
+  // Uses the eigenvectors of the first-order system (x, v)' = (v, f - K x - Z v).
   bool add_crossed_modes(const Matrix& k, const Matrix& z) {
     const std::size_t n = body_.size();
     Matrix flow(2 * n, 2 * n);
@@ -301,7 +306,7 @@ class Solver {
     for (std::size_t j = 0; j < 2 * n; ++j) {
       const Complex pole = pairs->values[j];
       if (pole.imag() < 0.0) {
-        continue;  // counted with its conjugate
+        continue;  // Included with its conjugate.
       }
       const bool swings = pole.imag() > 0.0;
       std::vector<double> loud;
@@ -321,7 +326,7 @@ class Solver {
     return true;
   }
 
-  // Loudness against the loudest at each output; by frequency.
+  // Computes the loudness relative to the loudest at each output, and sorts by frequency.
   void rank() {
     for (std::size_t o = 0; o < reading_.size(); ++o) {
       double loudest = 0.0;
@@ -340,7 +345,7 @@ class Solver {
 
   const Body& body_;
   std::vector<Bar> reading_;  // [output]
-  Vector x_;                  // [row] at the start
+  Vector x_;                  // [row] Position at the start.
   Vector v_;
   Continuous made_;
   std::vector<std::vector<double>> amplitudes_;  // [mode][output]
@@ -357,7 +362,8 @@ double ContinuousMode::t60_s() const {
 }
 
 std::vector<double> Continuous::play(std::size_t output, std::size_t frames, double step) const {
-  constexpr std::size_t anew = 256;  // after so many products e^(pole t) is computed again
+  // Number of products after which e^(pole t) is computed again, to limit rounding errors.
+  constexpr std::size_t anew = 256;
   const ContinuousOutput& heard = outputs[output];
   std::vector<double> sound(frames);
   for (std::size_t n = 0; n < frames; ++n) {

@@ -1,5 +1,6 @@
-// core/analysis: what a linear network means, whatever steps it: M x'' + Z x' + K x = f, solved
-// exactly by its modes. Time is counted in samples at 44 100 Hz, as the network's numbers are.
+// core/analysis: the continuous network M x'' + Z x' + K x = f that a linear model describes,
+// solved exactly by its modes: the reference solution for every discretisation. Time is in samples
+// at 44,100 Hz, as in the network's coefficients.
 #pragma once
 
 #include <complex>
@@ -11,50 +12,52 @@
 
 namespace ressort::analysis {
 
-// A partial: e^(pole t).
+// A partial e^(pole t).
 struct ContinuousMode {
-  std::complex<double> pole;  // its imaginary part is not below 0
-  double loudness = 0.0;      // as the network starts, against the loudest at the same output
-  std::vector<double> shape;  // [mass] a displacement that swings in this mode alone; empty where
-                              // the damping is not proportional
+  std::complex<double> pole;  // The imaginary part is at least 0.
+  // Amplitude from the initial state, relative to the loudest at the same output.
+  double loudness = 0.0;
+  // [mass] Displacement in this mode; empty if the damping is not proportional.
+  std::vector<double> shape;
   double frequency_hz() const;
   double t60_s() const;
 };
 
-// How loud a partial is at an output, and where that output rests.
+// The amplitudes of the partials at an output, and its rest position.
 struct ContinuousOutput {
   struct Term {
     std::complex<double> amplitude;
     std::complex<double> pole;
   };
-  std::vector<Term> terms;  // the real parts of amplitude e^(pole t)
-  double rest = 0.0;        // what else it does: rest + drift t + fall t^2 / 2
+  std::vector<Term> terms;  // The real parts of amplitude e^(pole t).
+  double rest = 0.0;        // Non-oscillating part: rest + drift t + fall t^2 / 2.
   double drift = 0.0;
   double fall = 0.0;
 };
 
 struct Continuous {
   bool is_proportional = true;
-  std::vector<ContinuousMode> modes;      // by their frequency; what does not swing is left out
+  std::vector<ContinuousMode> modes;  // Sorted by frequency; non-oscillating motions are left out.
   std::vector<ContinuousOutput> outputs;  // [output of the network]
-  std::vector<double> rest;               // [mass] where it comes to rest, if it does
-  double energy = 0.0;                    // kinetic, at the start
+  std::vector<double> rest;               // [mass] Rest position, if it comes to rest.
+  double energy = 0.0;                    // Kinetic energy at the start.
 
-  // One output, at `step` samples and every `step` on.
+  // Returns one output at samples `step`, 2 `step`, ...
   std::vector<double> play(std::size_t output, std::size_t frames, double step) const;
 };
 
-inline constexpr std::size_t most_exact_modes = 1200;   // masses, where the damping is proportional
-inline constexpr std::size_t most_crossed_modes = 400;  // where it is not
+// Largest number of masses with proportional damping.
+inline constexpr std::size_t most_exact_modes = 1200;
+inline constexpr std::size_t most_crossed_modes = 400;  // The same for non-proportional damping.
 
-// Of a linear network with no parameter that audio turns, inputs held where they start. Nothing
-// where it has too many masses, a mass is not above 0, or its modes do not span all motions: when
-// damping is not proportional and exactly critical. O(masses^3). [any thread but audio]
+// Solves a linear network without parameters at audio rate, with its inputs held at their start.
+// Empty if it has too many masses, if a mass is not above 0, or if its modes do not span all
+// motions (non-proportional and exactly critical damping). O(masses^3). [any thread but audio]
 std::optional<Continuous> solve_continuous(const Network& network,
                                            std::span<const double> parameters);
 
-// The factors by which a linear map that takes each column of `before` to that of `after` stretches
-// its own vectors: [column][row], both n by n. Nothing where `before` does not span all.
+// Returns the eigenvalues of the linear map that takes each column of `before` to the same column
+// of `after`: [column][row], both n by n. Empty if `before` is singular.
 std::vector<std::complex<double>> factors_between(const std::vector<std::vector<double>>& before,
                                                   const std::vector<std::vector<double>>& after);
 

@@ -39,7 +39,7 @@ struct Culprit {
   std::string name;  // Name of the mass, link or macro.
   SourceLocation location;
   Quantity quantity = Quantity::stiffness;
-  std::string argument;  // As written: "m_K", "2*p", "5".
+  std::string argument;  // The argument as written: "m_K", "2*p", "5".
   double value = 0.0;    // Worst value in the box.
   std::optional<double>
       limit;  // Stable below it (for a mass: above it); empty if no value of it alone is enough.

@@ -37,46 +37,46 @@ std::complex<double> along(const ModalPort& port, const Shape& shape, std::compl
 
 // A spring and damper between rows: its force is k d + z d', where d is the sum of share * row.
 struct ModalSpring {
-  std::uint32_t first = 0;  // of LinearSystem::shares
+  std::uint32_t first = 0;  // First of LinearSystem::shares.
   std::uint32_t count = 0;
-  std::uint32_t element = 0;  // index into Network::links, or Network::masses
+  std::uint32_t element = 0;  // Index into Network::links or Network::masses.
   bool is_link = true;
   double stiffness = 0.0;
   double damping = 0.0;
 };
 
-// Row i is a mass that moves, times the root of its M. K and Z are per step.
+// Row i is a moving mass times the square root of its M. K and Z are per step.
 struct LinearSystem {
   std::size_t size() const { return masses.size(); }
   std::span<const std::pair<std::uint32_t, double>> of(const ModalSpring& spring) const {
     return std::span(shares).subspan(spring.first, spring.count);
   }
-  // K and Z of springs that are changed: those of `springs` times these factors; [spring], empty
-  // for 1.
+  // Return K and Z with each of `springs` multiplied by its factor: [spring], empty for 1.
   SparseMatrix stiffness(std::span<const double> factors = {}) const;
   SparseMatrix damping(std::span<const double> factors = {}) const;
 
-  std::vector<std::uint32_t> masses;  // [row] index into Network::masses
-  std::vector<double> root;           // [row] of M
+  std::vector<std::uint32_t> masses;  // [row] Index into Network::masses.
+  std::vector<double> root;           // [row] Square root of M.
   std::vector<ModalSpring> springs;
   std::vector<std::pair<std::uint32_t, double>> shares;
   std::vector<ModalPort> inputs;   // [input of the network]
-  std::vector<ModalPort> outputs;  // [number of an output], as those of one number add up
-  bool is_linear = true;  // else bows, plucks and contacts are open, and springs as at rest
-  bool is_sound = true;   // every mass is above 0 and every number finite
+  std::vector<ModalPort> outputs;  // [output number] Outputs of equal number add up.
+  // If false, bows, plucks and contacts were left open and springs linearised at rest.
+  bool is_linear = true;
+  bool is_sound = true;  // Every mass is above 0 and every number is finite.
 };
 
-// The same network with every argument a number, as these parameters make it: places stay.
+// Returns the network with every argument evaluated for these parameters. Places stay.
 Network settled(const Network& network, std::span<const double> parameters);
 
-// Of a network without macros whose arguments are numbers, for steps that are `step` samples at
-// 44 100 Hz long; bodies' modes as the published scheme steps them if `is_sampled`, else as those
-// of the continuous network. A key's factor is on every stiffness that is not fixed.
+// Makes the system of a network without macros whose arguments are numbers, for steps of `step`
+// samples at 44,100 Hz. Modes of bodies are those of the published scheme if `is_sampled`, else
+// those of the continuous network. A key's factor scales every stiffness that is not fixed.
 // O(masses + links). [any thread but audio]
 LinearSystem make_linear_system(const Network& network, double step, bool is_sampled,
                                 double key_factor = 1.0);
 
-// y = A x.
+// Compute y = A x.
 Vector product(const SparseMatrix& lower, const Vector& x);
 void multiply(const SparseMatrix& lower, const double* x, double* y);
 

@@ -54,7 +54,8 @@ class LowestSwings {
     for (const double value : stiffness.value) {
       stiffest_ = std::max(stiffest_, std::fabs(value));
     }
-    shift_ = -1e-9 * stiffest_;  // below 0, so that free networks can be factored too
+    // Below 0, so that networks with rigid motions can be factored, too.
+    shift_ = -1e-9 * stiffest_;
   }
 
   Result<Swings> find(std::size_t count) {
@@ -65,7 +66,7 @@ class LowestSwings {
     if (!factored(factor_, shift_)) {
       return Error{"the springs cannot be factored: is a stiffness below 0?"};
     }
-    // What does not swing is among the lowest too.
+    // Asks for more, because overdamped motions are among the lowest, too.
     for (std::size_t asked = count + count / 32 + 4;; asked *= 2) {
       asked = std::min(asked, size_ - 1);
       progress_.stage("finding the lowest modes");

@@ -17,8 +17,8 @@
 
 namespace ressort::analysis {
 
-// Whether the modes are those of the published scheme at a rate, which the direct form plays, or
-// those of the continuous network M x'' + Z x' + K x = f, which the exact modal form plays.
+// The scheme whose modes are meant: the published scheme at a rate, which the direct form plays, or
+// the continuous network M x'' + Z x' + K x = f, which the exact modal form plays.
 enum class ModeScheme { published, continuous };
 
 struct NetworkMode {

@@ -23,7 +23,7 @@
 
 namespace ressort::analysis {
 
-// Whether a spectrum holds amplitudes or their squares.
+// The kind of values in a spectrum: amplitudes, or their squares.
 enum class SpectrumKind { magnitude, power };
 
 struct SpectralShape {

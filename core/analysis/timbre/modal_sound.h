@@ -27,7 +27,7 @@ class ModalSound {
   // samples. While a pulse lasts, O(step) each.
   void next_magnitudes(std::span<double> magnitudes, std::size_t step);
 
-  bool is_pushed() const { return at_ < pulse_end(); }  // Whether a pulse still acts.
+  bool is_pushed() const { return at_ < pulse_end(); }  // True while a pulse acts.
 
   // Returns an upper estimate of the future envelope without further pulses, over a time of
   // `resolution_s`: amplitudes of modes that can come into phase add up, others add up as energies.

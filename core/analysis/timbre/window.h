@@ -30,8 +30,8 @@ constexpr std::array<double, 3> window_cosines(Window window) {
 // Returns w[m] for m < size; periodic, so that w[size] would equal w[0].
 std::vector<double> window_weights(Window window, std::size_t size);
 
-// The sum of w[m] e^(log_z m) over the sum of w[m], in closed form: what a window leaves of a
-// motion that turns and decays so from sample to sample, its first sample being 1. O(1)
+// Returns the sum of w[m] e^(log_z m) over the sum of w[m] in closed form: the windowed amplitude
+// of an exponentially decaying partial whose first sample is 1. O(1)
 std::complex<double> window_response(Window window, std::size_t size, std::complex<double> log_z);
 
 }  // namespace ressort::analysis
