@@ -37,8 +37,4 @@ namespace command_line {
 using namespace commands;
 }
 
-namespace mpi {
-using namespace command_line;
-}
-
 }  // namespace ressort

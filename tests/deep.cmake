@@ -7,7 +7,7 @@ list(TRANSFORM ressort_fuzzers PREPEND fuzz_ OUTPUT_VARIABLE ressort_deep_tests)
 list(APPEND ressort_deep_tests arm everything_sanitized everything_more forms_everywhere
   accuracy_everywhere silence_everywhere modes_everywhere calculix_everywhere bodies_everywhere
   bells_everywhere heard_pitch_everywhere thorough bench lint scenes_more abuse_long callback_minute bows settings_more edits_more
-  flights_everywhere server_killed installed mpi soak)
+  flights_everywhere server_killed installed soak)
 list(LENGTH ressort_deep_tests ressort_deep_count)
 
 # SECONDS is about what it needs on two cores.
@@ -56,12 +56,6 @@ add_deep_test(silence_everywhere 120 $<TARGET_FILE:ressort_tests> "[silence_ever
 
 # Forty random solids against CalculiX.
 add_deep_test(calculix_everywhere 600 $<TARGET_FILE:ressort_tests> "[calculix_everywhere]")
-
-# Large networks on one, two and four processes; tests/run --deep builds the program for it.
-if(RESSORT_MPI)
-  add_deep_test(mpi 60 ${CMAKE_CURRENT_SOURCE_DIR}/system/mpi $<TARGET_FILE:ressort>
-    $<TARGET_FILE:ressort-mpi>)
-endif()
 
 # The bells' partials against solids of their profiles.
 add_deep_test(bells_everywhere 300 $<TARGET_FILE:ressort_tests> "[bells_everywhere]")

@@ -38,7 +38,6 @@ judge() {
       owner["ebur128.h"] = "app/commands/gallery/loudness.cpp"
       owner["httplib.h"] = "app/panel/panel.cpp"
       owner["png.h"] = "app/commands/gallery/png.cpp"
-      owner["mpi.h"] = "app/mpi/ranks.cpp"
       owner["CLI/"] = "app/command_line/"
       owner["atomic"] = "app/realtime/lockfree.h"
       owner["toml++/"] = "core/model/"
@@ -68,7 +67,6 @@ judge() {
       sees["app/panel"] = sees["app/control"] " app/panel"
       sees["app/commands"] = sees["app/panel"] " core/identification core/solids app/commands"
       sees["app/command_line"] = sees["app/commands"] " app/command_line"
-      sees["app/mpi"] = sees["app/command_line"] " app/mpi"
       sees["app"] = sees["app/command_line"]
     }
     {

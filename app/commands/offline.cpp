@@ -81,16 +81,6 @@ std::vector<Setting> reach_of(const std::vector<ScoreLine>& lines, const Network
   return reach;
 }
 
-// Whether a score strikes a macro's node, as in /mass/NAME:3/strike.
-bool strikes_nodes(const std::vector<ScoreLine>& lines) {
-  return std::any_of(lines.begin(), lines.end(), [](const ScoreLine& line) {
-    const std::string_view address = line.message.address;
-    const std::size_t at = address.find(':');
-    return address.starts_with("/mass/") && at != std::string_view::npos &&
-           address.find('.', at) == std::string_view::npos;
-  });
-}
-
 // The calls of a score as events; an error has the score's line. What a parameter could not take is
 // told, once for each.
 Result<std::vector<ScoredEvent>> score_events(const RenderOptions& options,
@@ -300,9 +290,7 @@ Result<Rendered> render(const RenderOptions& options, const std::function<bool(d
     scene->warnings.push_back("--threads " + std::to_string(threads) + ": this machine runs " +
                               std::to_string(core_count()) + " at once, and so many are used");
   }
-  ThreadPool pool(options.executor != nullptr ? 1
-                  : threads > 0               ? std::min(threads, core_count())
-                                              : core_count());
+  ThreadPool pool(threads > 0 ? std::min(threads, core_count()) : core_count());
   auto compiled = admit(*scene,
                         {.rate_hz = options.rate_hz,
                          .rescale = options.rescale,
@@ -311,12 +299,11 @@ Result<Rendered> render(const RenderOptions& options, const std::function<bool(d
                          .precision = options.precision,
                          .method = options.method,
                          .budget = options.budget,
-                         .executor = options.executor != nullptr ? options.executor : &pool,
+                         .executor = &pool,
                          .find_gain = !scene->has_preset && !is_bare,
                          .force = options.force,
                          .settings = options.parameters,
                          .reach = reach_of(*lines, scene->network),
-                         .strikes_nodes = strikes_nodes(*lines),
                          .progress = options.loading,
                          .most_bytes = free_memory_bytes()},
                         scene->warnings, options.is_strict);
@@ -369,19 +356,15 @@ Result<Rendered> render(const RenderOptions& options, const std::function<bool(d
   const bool ends_by_itself = !options.midi.empty() && !options.frames && !options.seconds;
   const long long may_end = std::llround(midi->length_s * options.rate_hz);
   const auto expected = static_cast<double>(ends_by_itself ? may_end : rendered.frames);
-  std::optional<SoundWriter> file;
-  if (!options.is_silent) {
-    auto opened = SoundWriter::open(
-        options.output,
-        {.rate_hz = options.rate_hz,
-         .channels = rendered.channels,
-         .samples = options.format,
-         .frames = ends_by_itself ? std::nullopt : std::optional(rendered.frames)},
-        Existing::replace);
-    if (!opened) {
-      return opened.error();
-    }
-    file = *std::move(opened);
+  auto file =
+      SoundWriter::open(options.output,
+                        {.rate_hz = options.rate_hz,
+                         .channels = rendered.channels,
+                         .samples = options.format,
+                         .frames = ends_by_itself ? std::nullopt : std::optional(rendered.frames)},
+                        Existing::replace);
+  if (!file) {
+    return file.error();
   }
   std::vector<double> samples(channels * block_frames);
   std::vector<double> interleaved(samples.size());
@@ -426,7 +409,7 @@ Result<Rendered> render(const RenderOptions& options, const std::function<bool(d
     if (peak > silent_peak) {
       loud_until = std::max(loud_until, end);
     }
-    if (auto wrote = file ? file->write(interleaved.data(), count) : Done{}; !wrote) {
+    if (auto wrote = file->write(interleaved.data(), count); !wrote) {
       rendered.failure = wrote.error();
       return rendered;
     }
@@ -439,7 +422,7 @@ Result<Rendered> render(const RenderOptions& options, const std::function<bool(d
       break;
     }
   }
-  if (auto closed = file ? file->close() : Done{}; !closed) {
+  if (auto closed = file->close(); !closed) {
     rendered.failure = closed.error();
     return rendered;
   }

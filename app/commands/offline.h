@@ -38,10 +38,8 @@ struct RenderOptions {
   bool limit = false;
   bool force = false;  // even if it is not stable
   int voices = 0;
-  int threads = 0;               // for large networks; 0: as many as the machine runs at once
-  Executor* executor = nullptr;  // instead of these threads
-  bool is_silent = false;        // nothing is written: another process does
-  Progress loading = {};         // until the first sample; what it stops fails with `stopped`
+  int threads = 0;        // for large networks; 0: as many as the machine runs at once
+  Progress loading = {};  // until the first sample; what it stops fails with `stopped`
 };
 
 struct Rendered {

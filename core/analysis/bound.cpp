@@ -102,7 +102,7 @@ class NetworkBound {
     std::map<std::uint32_t, Sum> macros;  // Keyed by first node.
     for (const auto& [tap, sum] : live_) {
       macros[network_.taps[tap].first].add(sum, 1.0);
-      size_[network_.taps[tap].first] = network_.taps[tap].count;
+      size_[network_.taps[tap].first] = network_.taps[tap].length * network_.taps[tap].width;
     }
     for (const auto& [first, sum] : macros) {
       for (std::uint32_t node = first; node < first + size_[first]; ++node) {

@@ -70,7 +70,7 @@ void each_share(const Network& network, std::uint32_t mass, Use&& use,
       const double share =
           (i == 0 ? 1.0 - u.beyond : u.beyond) * (j == 0 ? 1.0 - v.beyond : v.beyond);
       if (share > 0.0) {
-        use(tap.first + (u.below + i) * tap.width + v.below + j - tap.from, share);
+        use(tap.first + (u.below + i) * tap.width + v.below + j, share);
       }
     }
   }

@@ -10,7 +10,6 @@
 #include "core/compile/accuracy/pitches.h"
 #include "core/compile/accuracy/waveguide_pitch.h"
 #include "core/compile/cull.h"
-#include "core/compile/large/excerpts.h"
 #include "core/compile/make_engine.h"
 #include "core/compile/merge.h"
 #include "core/compile/rest_bound.h"
@@ -34,10 +33,9 @@ struct Request {
 };
 
 struct Reduced {
-  Network network;                        // without macros
-  std::string merged;                     // what was merged, in words; empty: nothing
-  double cents = 0.0;                     // that partials are off for that, at most
-  std::optional<Excerpts> excerpts = {};  // of which `network` is the one that stands for all
+  Network network;     // without macros
+  std::string merged;  // what was merged, in words; empty: nothing
+  double cents = 0.0;  // that partials are off for that, at most
 };
 
 // Unless something is asked for, the bare network is the published scheme to the bit.
@@ -47,27 +45,9 @@ bool is_published(const Request& request) {
          !request.budget.is_physical() && request.budget.silence_db == -Budget::unlimited;
 }
 
-// Where only what is heard of it is asked for, it need not be there as a whole.
-std::optional<Excerpts> find_excerpts(const Request& request) {
-  const CompileOptions& options = request.options;
-  if (!is_published(request) || options.budget || options.executor == nullptr ||
-      options.executor->is_live() || options.strikes_nodes ||
-      options.precision == Precision::compensated32) {
-    return std::nullopt;
-  }
-  const auto start = start_values(asked_ranges(request.written, request.preset, options.bare),
-                                  options.settings, options.bare);
-  return Excerpts::of(request.written, start, request.rate_ratio);
-}
-
 // The bare network is computed as it is written, unless somebody says how far off it may be. O(n).
 Reduced reduce(const Request& request) {
   const CompileOptions& options = request.options;
-  if (auto excerpts = find_excerpts(request)) {
-    Reduced reduced{.network = excerpts->network(), .merged = {}};
-    reduced.excerpts = std::move(excerpts);
-    return reduced;
-  }
   Network whole = expand_macros(request.written, options.progress);
   options.progress.spend(8 * whole.links.size());
   if (!options.bare || request.budget != Budget{}) {
@@ -200,9 +180,8 @@ Workload workload_of(const Request& request) {
           .executor = options.executor};
 }
 
-// An excerpt's forms come with shards of the whole.
-Planned find_forms(const Request& request, const Reduced& reduced, Machine machine,
-                   const Analysis& analysis, const Promise& promise) {
+Planned find_forms(const Request& request, Machine machine, const Analysis& analysis,
+                   const Promise& promise) {
   const CompileOptions& options = request.options;
   const bool has_waveguides =
       std::any_of(machine.parts.begin(), machine.parts.end(),
@@ -211,15 +190,6 @@ Planned find_forms(const Request& request, const Reduced& reduced, Machine machi
   Workload load = workload_of(request);
   load.highest_factor = analysis.mode ? std::max(1.0, analysis.margins.keys) : 1.0;
   load.wanted_factor = wanted_factor(request, analysis, has_waveguides);
-  if (reduced.excerpts) {
-    Program& program = machine.parts.front();
-    program.form = reduced.excerpts->share_out(program, load, options.rescale, options.progress);
-    Part part{.masses = reduced.excerpts->masses(),
-              .links = reduced.excerpts->links(),
-              .predicted_ns = predicted_ns(program, load),
-              .reason = description(program)};
-    return {std::move(machine), {std::move(part)}};
-  }
   return make_plan(std::move(machine), load,
                    is_published(request) ? Method::direct : options.method, options.most_modes,
                    request.budget, options.progress, promise);
@@ -441,7 +411,7 @@ Result<Compiled> compile_by_stages(const Request& request) {
       tabulate(network, culled, schemes.links, values, options.rate_hz, options.rescale, progress);
   Analysis analysis = prove(request, reduced, machine, schemes, asked, start, mode);
   const Promise promise = make_promise(request, reduced, machine, analysis, start);
-  Planned planned = find_forms(request, reduced, std::move(machine), analysis, promise);
+  Planned planned = find_forms(request, std::move(machine), analysis, promise);
   std::vector<std::string> pitch_notes;
   if (shapes) {
     analysis.pitches =

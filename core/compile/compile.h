@@ -39,7 +39,6 @@ struct CompileOptions {
   bool force = false;             // no range is narrowed to what is stable
   std::vector<Setting> settings;  // values that the bare network's parameters get at once
   std::vector<Setting> reach;     // and those that they will get later: the bare network's ranges
-  bool strikes_nodes = false;     // nodes of macros will be struck by their numbers
   Progress progress = {};         // a load that it stops fails with `stopped`
   std::uint64_t most_bytes = std::numeric_limits<std::uint64_t>::max();  // that the engine may take
 };

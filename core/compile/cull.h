@@ -32,9 +32,10 @@ void join_places(const Network& network, Groups& groups, const Progress& progres
     }
     const Tap& tap = network.taps[network.masses[i].tap];
     groups.join(i, tap.first);
-    groups.join(i, macros.try_emplace(tap.macro, i).first->second);  // which are not all there
-    progress.spend(is_joined[tap.first] ? 1 : tap.count);
-    for (std::uint32_t k = 0; !is_joined[tap.first] && k < tap.count; ++k) {
+    groups.join(i, macros.try_emplace(tap.macro, i).first->second);
+    const std::uint32_t count = tap.length * tap.width;
+    progress.spend(is_joined[tap.first] ? 1 : count);
+    for (std::uint32_t k = 0; !is_joined[tap.first] && k < count; ++k) {
       meet(tap.first + k);
       groups.join(i, tap.first + k);
     }

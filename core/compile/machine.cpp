@@ -13,6 +13,20 @@ namespace {
 
 constexpr std::uint32_t nowhere = 0xffffffffu;
 
+// The elements of a network that go into one Program, in the network's order.
+struct Share {
+  std::vector<std::uint32_t> masses;
+  std::vector<std::uint32_t> links;
+};
+
+// The source of a coefficient.
+struct CoefficientKey {
+  ArgumentId argument = no_argument;
+  Unit unit = Unit::plain;
+  bool is_fixed = false;
+  auto operator<=>(const CoefficientKey&) const = default;
+};
+
 class ProgramMaker {
  public:
   ProgramMaker(const Network& network, const Share& share, double rate_hz, bool rescale,
@@ -22,21 +36,6 @@ class ProgramMaker {
     program_.rate_ratio = rate_ratio_of(rate_hz, rescale);
     program_.parameters = parameter_values(network);
     program_.depending.resize(network.parameters.size());
-  }
-
-  // Coefficients that come before all others.
-  void begin_with(std::span<const CoefficientKey> keys) {
-    for (const CoefficientKey& key : keys) {
-      coefficient(key.argument, key.unit, key.is_fixed);
-    }
-  }
-
-  std::vector<CoefficientKey> keys() const {
-    std::vector<CoefficientKey> keys(known_.size());
-    for (const auto& [key, coefficient] : known_) {
-      keys[coefficient] = key;
-    }
-    return keys;
   }
 
   Program make() {
@@ -208,11 +207,11 @@ class ProgramMaker {
       const Tap& tap = network_.taps[network_.masses[i].tap];
       const auto next = static_cast<std::uint32_t>(program_.tap_nodes.size());
       const auto [entry, is_new] = known.try_emplace(tap.first, next);
-      for (std::uint32_t k = 0; is_new && k < tap.count; ++k) {
+      for (std::uint32_t k = 0; is_new && k < tap.length * tap.width; ++k) {
         program_.tap_nodes.push_back(node_[tap.first + k]);
       }
       program_.taps.push_back({.node = node_[i],
-                               .first = entry->second - tap.from,
+                               .first = entry->second,
                                .length = tap.length,
                                .width = tap.width,
                                .u = coefficient(tap.u, Unit::plain),
@@ -413,18 +412,6 @@ class Divider {
 
 }  // namespace
 
-std::vector<Share> divide(const Network& network, const Culled& culled, const Progress& progress) {
-  return Divider(network, culled, progress).divide();
-}
-
-Tabulated tabulate_part(const Network& network, const Share& share,
-                        std::span<const CoefficientKey> first, double rate_hz, bool rescale) {
-  ProgramMaker maker(network, share, rate_hz, rescale, {});
-  maker.begin_with(first);
-  Program program = maker.make();
-  return {std::move(program), maker.keys()};
-}
-
 Machine tabulate(const Network& network, const Culled& culled, std::span<const LinkScheme> schemes,
                  std::span<const double> start, double rate_hz, bool rescale,
                  const Progress& progress) {
@@ -438,7 +425,7 @@ Machine tabulate(const Network& network, const Culled& culled, std::span<const L
          .is_force = input.is_force,
          .position = input.is_force ? 0.0 : network.masses[input.mass].position});
   }
-  for (const Share& share : divide(network, culled, progress)) {
+  for (const Share& share : Divider(network, culled, progress).divide()) {
     progress.spend(16 * (share.masses.size() + share.links.size()));
     machine.parts.push_back(ProgramMaker(network, share, rate_hz, rescale, schemes).make());
   }

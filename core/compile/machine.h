@@ -32,33 +32,6 @@ Machine tabulate(const Network& network, const Culled& culled, std::span<const L
                  std::span<const double> start, double rate_hz, bool rescale,
                  const Progress& progress = {});
 
-// What of a network goes into one Program, in the network's order.
-struct Share {
-  std::vector<std::uint32_t> masses;
-  std::vector<std::uint32_t> links;
-};
-
-// The parts that tabulate() makes, the largest first.
-std::vector<Share> divide(const Network& network, const Culled& culled,
-                          const Progress& progress = {});
-
-// Where a coefficient is from.
-struct CoefficientKey {
-  ArgumentId argument = no_argument;
-  Unit unit = Unit::plain;
-  bool is_fixed = false;
-  auto operator<=>(const CoefficientKey&) const = default;
-};
-
-// One part as tabulate() makes it, and where its coefficients are from. Those of `first` it has in
-// any case, before all others. Of a network without bodies.
-struct Tabulated {
-  Program program;
-  std::vector<CoefficientKey> keys;  // [coefficient]
-};
-Tabulated tabulate_part(const Network& network, const Share& share,
-                        std::span<const CoefficientKey> first, double rate_hz, bool rescale);
-
 // The same of a network as it is written, with nothing but its numbers.
 Machine make_machine(const Network& network, double rate_hz, bool rescale);
 

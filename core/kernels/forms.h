@@ -285,8 +285,6 @@ struct Shards {
   std::shared_ptr<const std::vector<Shard>> shards;
   Executor* executor = nullptr;  // outlives the kernels
   std::uint32_t frames = 1;      // samples that they go on without each other
-  // The whole is an excerpt of what they are shards of: each starts as its own Program says.
-  bool is_excerpt = false;
 };
 
 // Links that follow each other.

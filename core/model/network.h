@@ -134,9 +134,6 @@ struct Tap {
   std::uint32_t first = 0;
   std::uint32_t length = 0;
   std::uint32_t width = 0;
-  // Where it is expanded in part, only `count` nodes from this one on, which is mass `first`.
-  std::uint32_t from = 0;
-  std::uint32_t count = 0;
   // And the shapes of a body's places: Network::shapes from here on, [place][mode].
   std::uint32_t places = 0;  // 0: no body
   std::uint32_t shape = 0;

@@ -1,7 +1,6 @@
 #include "core/model/topology.h"
 
 #include <algorithm>
-#include <array>
 #include <map>
 #include <numbers>
 #include <tuple>
@@ -12,106 +11,62 @@
 namespace ressort::model {
 namespace {
 
-constexpr std::uint32_t no_mass = 0xffffffffu;
-
 constexpr std::uint32_t nodes_at_once = 4096;  // between two looks at whether to go on
 
-void add_nodes(const Macro& macro, std::span<const NodeRange> ranges, const Progress& progress,
-               Network& network) {
-  for (const NodeRange& range : ranges) {
-    for (std::uint32_t k = range.first; k < range.end; ++k) {
-      progress.spend(k % nodes_at_once == 0 ? 4 * std::size_t{nodes_at_once} : 0);
-      Mass node{.position = macro.position,
-                .third = macro.third,
-                .is_fixed = macro.is_fixed,
-                .location = macro.location};
-      if (is_fixed(macro, k)) {
-        node.kind = MassKind::ground;
-      } else {
-        node.mass = macro.mass;
-        if (macro.air_damping != no_argument) {
-          node.kind = MassKind::oscillator;
-          node.damping = macro.air_damping;
-        }
+// Appends the masses of one macro.
+void add_nodes(const Macro& macro, const Progress& progress, Network& network) {
+  const auto count = static_cast<std::uint32_t>(node_count(macro));
+  for (std::uint32_t k = 0; k < count; ++k) {
+    progress.spend(k % nodes_at_once == 0 ? 4 * std::size_t{nodes_at_once} : 0);
+    Mass node{.position = macro.position,
+              .third = macro.third,
+              .is_fixed = macro.is_fixed,
+              .location = macro.location};
+    if (is_fixed(macro, k)) {
+      node.kind = MassKind::ground;
+    } else {
+      node.mass = macro.mass;
+      if (macro.air_damping != no_argument) {
+        node.kind = MassKind::oscillator;
+        node.damping = macro.air_damping;
       }
-      network.masses.push_back(std::move(node));
     }
+    network.masses.push_back(std::move(node));
   }
 }
 
-// Those between nodes in the ranges, of which the first is mass `first`.
-void add_links(const Macro& macro, std::span<const NodeRange> ranges, std::uint32_t first,
-               const Progress& progress, Network& network) {
-  const auto add = [&](std::uint32_t a, std::uint32_t b, ArgumentId stiffness, ArgumentId damping) {
-    Link link{.a = a, .b = b, .is_fixed = macro.is_fixed, .location = macro.location};
-    link.arguments[0] = stiffness;
-    link.arguments[1] = damping;
-    network.links.push_back(std::move(link));
-  };
-  // Calls use(k, a) for every node and its mass.
-  const auto each = [&](auto&& use) {
-    std::uint32_t mass = first;
-    for (const NodeRange& range : ranges) {
-      for (std::uint32_t k = range.first; k < range.end; ++k) {
-        progress.spend(k % nodes_at_once == 0 ? 4 * std::size_t{nodes_at_once} : 0);
-        use(k, mass++);
-      }
-    }
-  };
-  const auto mass_of = [&](std::uint64_t k) {
-    std::uint32_t mass = first;
-    for (const NodeRange& range : ranges) {
-      if (k < range.end) {
-        return k >= range.first ? mass + static_cast<std::uint32_t>(k - range.first) : no_mass;
-      }
-      mass += range.end - range.first;
-    }
-    return no_mass;
-  };
-  const auto join = [&](std::uint32_t a, std::uint64_t k, ArgumentId stiffness,
+// Appends the links of one macro, whose first node is mass `first`.
+void add_links(const Macro& macro, std::uint32_t first, const Progress& progress,
+               Network& network) {
+  const auto count = static_cast<std::uint32_t>(node_count(macro));
+  const auto join = [&](std::uint32_t a, std::uint32_t b, ArgumentId stiffness,
                         ArgumentId damping) {
-    if (const std::uint32_t b = mass_of(k); a != no_mass && b != no_mass) {
-      add(a, b, stiffness, damping);
+    if (b < count) {
+      Link link{
+          .a = first + a, .b = first + b, .is_fixed = macro.is_fixed, .location = macro.location};
+      link.arguments[0] = stiffness;
+      link.arguments[1] = damping;
+      network.links.push_back(std::move(link));
+    }
+  };
+  const auto each_node = [&](auto&& use) {
+    for (std::uint32_t k = 0; k < count; ++k) {
+      progress.spend(k % nodes_at_once == 0 ? 4 * std::size_t{nodes_at_once} : 0);
+      use(k);
     }
   };
   if (macro.width > 1) {
-    each([&](std::uint32_t k, std::uint32_t a) {
+    each_node([&](std::uint32_t k) {
       if (k % macro.width + 1 < macro.width) {
-        join(a, std::uint64_t{k} + 1, macro.stiffness, macro.damping);
+        join(k, k + 1, macro.stiffness, macro.damping);
       }
     });
   }
-  each([&](std::uint32_t k, std::uint32_t a) {
-    join(a, std::uint64_t{k} + macro.width, macro.stiffness, macro.damping);
-  });
+  each_node([&](std::uint32_t k) { join(k, k + macro.width, macro.stiffness, macro.damping); });
   if (macro.kind == MacroKind::stiff_string) {
-    each([&](std::uint32_t k, std::uint32_t a) {
-      join(a, std::uint64_t{k} + 2, macro.second_stiffness, no_argument);
-    });
-    join(mass_of(0), 1, macro.second_stiffness, no_argument);
-    join(mass_of(macro.length - 2), macro.length - 1, macro.second_stiffness, no_argument);
-  }
-}
-
-// Tells a tap where its macro's nodes are, of which the first is mass `first`.
-void place_tap(const Network& network, std::span<const NodeRange> ranges, std::uint32_t first,
-               Tap& tap) {
-  std::uint32_t node = 0;
-  if (ranges.size() > 1) {
-    const auto below = [&](ArgumentId id, std::uint32_t count) {
-      const double at = std::clamp(argument_value(network, id, {}), 0.0, 1.0);
-      return static_cast<std::uint32_t>(at * static_cast<double>(count - 1));
-    };
-    node = below(tap.u, tap.length) * tap.width + below(tap.v, tap.width);
-  }
-  for (const NodeRange& range : ranges) {
-    if (ranges.size() == 1 || node < range.end) {
-      tap.first = first;
-      tap.from = range.first;
-      tap.count = range.end - range.first;
-      return;
-    }
-    first += range.end - range.first;
+    each_node([&](std::uint32_t k) { join(k, k + 2, macro.second_stiffness, no_argument); });
+    join(0, 1, macro.second_stiffness, no_argument);
+    join(macro.length - 2, macro.length - 1, macro.second_stiffness, no_argument);
   }
 }
 
@@ -311,9 +266,6 @@ std::vector<std::uint32_t> macro_starts(const Network& network) {
 }
 
 Network expand_macros(const Network& network, const Progress& progress) {
-  const auto whole = [](const Macro& macro) {
-    return std::array{NodeRange{0, static_cast<std::uint32_t>(node_count(macro))}};
-  };
   Network expanded = network;
   if (network.macros.empty()) {
     return expanded;
@@ -337,8 +289,8 @@ Network expand_macros(const Network& network, const Progress& progress) {
     if (macro.kind == MacroKind::body) {
       add_modes(network, i, progress, expanded);
     } else if (!is_waveguide(macro.kind)) {
-      add_nodes(macro, whole(macro), progress, expanded);
-      add_links(macro, whole(macro), first[i], progress, expanded);
+      add_nodes(macro, progress, expanded);
+      add_links(macro, first[i], progress, expanded);
     }
   }
   for (std::size_t i = 0; i < expanded.taps.size(); ++i) {
@@ -349,29 +301,11 @@ Network expand_macros(const Network& network, const Progress& progress) {
     }
     tap.length = macro.length;
     tap.width = macro.width;
-    place_tap(network, whole(macro), first[tap.macro], tap);
+    tap.first = first[tap.macro];
     tap.places = static_cast<std::uint32_t>(macro.places.size());
     tap.shape = shape[tap.macro];
   }
   split_springs(expanded);
-  return expanded;
-}
-
-Network expand_excerpt(const Network& network, std::span<const std::vector<NodeRange>> ranges) {
-  Network expanded = network;
-  expanded.macros.clear();
-  join_places(network, expanded);
-  std::vector<std::uint32_t> first;  // [macro]
-  for (std::size_t i = 0; i < network.macros.size(); ++i) {
-    first.push_back(static_cast<std::uint32_t>(expanded.masses.size()));
-    add_nodes(network.macros[i], ranges[i], {}, expanded);
-    add_links(network.macros[i], ranges[i], first[i], {}, expanded);
-  }
-  for (Tap& tap : expanded.taps) {
-    tap.length = network.macros[tap.macro].length;
-    tap.width = network.macros[tap.macro].width;
-    place_tap(network, ranges[tap.macro], first[tap.macro], tap);
-  }
   return expanded;
 }
 

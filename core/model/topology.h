@@ -29,15 +29,4 @@ bool is_fixed(const Macro& macro, std::uint32_t node);  // by its own number
 // taps told where its nodes are. O(nodes). [any thread but audio]
 Network expand_macros(const Network& network, const Progress& progress = {});
 
-// Nodes of a macro, [first, end) by its own numbers.
-struct NodeRange {
-  std::uint32_t first = 0;
-  std::uint32_t end = 0;
-};
-
-// The same with these nodes of macros alone, and the links between them: [macro] ranges, ascending
-// and apart from each other. A tap knows those around its place, if all of them are in one range.
-// Of a network without bodies, waveguides and places that move.
-Network expand_excerpt(const Network& network, std::span<const std::vector<NodeRange>> ranges);
-
 }  // namespace ressort::model

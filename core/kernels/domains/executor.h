@@ -38,31 +38,6 @@ class Crew {
   virtual void run(std::span<const std::uint32_t> wanted) = 0;
 };
 
-// Other processes, each of which has as many shards of a network as the others. They call these
-// functions in the same order. [any thread but audio]
-class Fellows {
- public:
-  // One array, which lies here or comes from where it does.
-  struct Parcel {
-    std::uint32_t number = 0;  // by which those who get it know it
-    std::size_t owner = 0;     // process
-    void* bytes = nullptr;
-    std::size_t size = 0;
-    std::span<const std::size_t> takers;  // processes that want it; empty: all of them
-  };
-
-  virtual ~Fellows() = default;
-  virtual std::size_t own() const = 0;  // number of this process
-  // Begins to send and to take parcels, which nobody touches until finish() returns. What is for
-  // all is begun by all in the same order.
-  virtual void begin(std::span<const Parcel> parcels) = 0;
-  virtual void finish() = 0;
-  virtual bool all_agree(bool here) = 0;
-  // Puts the first process's numbers in the place of every other's. Where the first of them differ
-  // all processes end: they are not of one kind.
-  virtual void follow_first(std::span<std::uint32_t> numbers) = 0;
-};
-
 // Threads that help.
 class Executor {
  public:
@@ -71,8 +46,6 @@ class Executor {
   virtual bool is_live() const = 0;      // helpers work aside, and are not waited for
   // The tasks outlive the crew. [any thread but audio]
   virtual std::unique_ptr<Crew> gather(std::vector<Task*> tasks) = 0;
-  // Who has the other shards, if these are no threads; null: all shards are here.
-  virtual Fellows* fellows() { return nullptr; }
 };
 
 }  // namespace ressort::kernels

@@ -4,13 +4,12 @@
 
 namespace ressort::kernels {
 
-void join_halos(std::span<Shard> shards,
-                const std::function<std::uint32_t(std::uint32_t)>& owner_of) {
+void join_halos(std::span<Shard> shards, std::span<const std::uint32_t> owner_of) {
   std::vector<std::vector<std::uint32_t>> owners(shards.size());  // [shard][copy]
   std::vector<std::vector<std::uint32_t>> wanted(shards.size());  // [owner] nodes, ascending
   for (std::uint32_t s = 0; s < shards.size(); ++s) {
     for (std::uint32_t i = 0; i < shards[s].nodes.size(); ++i) {
-      const std::uint32_t owner = owner_of(shards[s].nodes[i]);
+      const std::uint32_t owner = owner_of[shards[s].nodes[i]];
       if (owner != s && owner != nobody) {
         shards[s].copies.push_back(i);
         owners[s].push_back(owner);
@@ -25,7 +24,7 @@ void join_halos(std::span<Shard> shards,
   for (std::uint32_t s = 0; s < shards.size(); ++s) {
     std::sort(wanted[s].begin(), wanted[s].end());
     wanted[s].erase(std::unique(wanted[s].begin(), wanted[s].end()), wanted[s].end());
-    shards[s].given.resize(shards[s].nodes.empty() ? 0 : wanted[s].size());
+    shards[s].given.resize(wanted[s].size());
     for (std::uint32_t i = 0; !wanted[s].empty() && i < shards[s].nodes.size(); ++i) {
       const std::uint32_t node = shards[s].nodes[i];
       const std::uint32_t at = place(wanted[s], node);

@@ -14,8 +14,7 @@ std::optional<std::uint32_t> find(const Shard& shard, std::uint32_t node) {
   if (at == shard.nodes.end() || *at != node) {
     return std::nullopt;
   }
-  const auto i = static_cast<std::uint32_t>(at - shard.nodes.begin());
-  return shard.local.empty() ? i : shard.local[i];
+  return static_cast<std::uint32_t>(at - shard.nodes.begin());
 }
 
 // Rows of one table copied to other places in another; a row is a number for each lane.
@@ -24,29 +23,14 @@ void copy_row(const T* from, std::size_t from_row, T* to, std::size_t to_row, st
   std::copy_n(from + from_row * width, width, to + to_row * width);
 }
 
-std::size_t process_of(const Shards& form, std::size_t shard) {
-  return form.executor->fellows() == nullptr
-             ? 0
-             : worker_of(shard, form.shards->size(), form.executor->size());
-}
-
 template <class T>
 std::vector<std::unique_ptr<Kernel<T>>> kernels_of(const Shards& form, std::size_t voices,
                                                    Isa isa) {
-  const Fellows* const fellows = form.executor->fellows();
   std::vector<std::unique_ptr<Kernel<T>>> kernels;
   for (const Shard& shard : *form.shards) {
-    const bool is_here = fellows == nullptr || fellows->own() == process_of(form, kernels.size());
-    kernels.push_back(is_here ? make_kernel<T>(shard.program, voices, isa) : nullptr);
+    kernels.push_back(make_kernel<T>(shard.program, voices, isa));
   }
   return kernels;
-}
-
-// One at least is here, and all are alike.
-template <class T>
-Kernel<T>& first_of(const std::vector<std::unique_ptr<Kernel<T>>>& kernels) {
-  return **std::find_if(kernels.begin(), kernels.end(),
-                        [](const auto& kernel) { return kernel != nullptr; });
 }
 
 }  // namespace
@@ -59,14 +43,11 @@ ShardedKernel<T>::ShardedKernel(const Program& program, const Shards& form, std:
 template <class T>
 ShardedKernel<T>::ShardedKernel(const Program& program, const Shards& form, Kernels kernels,
                                 std::size_t voices, Isa isa)
-    : Kernel<T>(program, first_of(kernels).width()),
+    : Kernel<T>(program, kernels.front()->width()),
       program_(program),
       shards_(*form.shards),
       frames_(form.frames),
-      is_excerpt_(form.is_excerpt),
-      fellows_(form.executor->fellows()),
       kernels_(std::move(kernels)) {
-  find_takers(form);
   place_taps();
   std::vector<Task*> tasks;
   std::size_t most_nodes = 0;
@@ -77,15 +58,10 @@ ShardedKernel<T>::ShardedKernel(const Program& program, const Shards& form, Kern
     }
     tasks_.push_back(
         std::make_unique<KernelTask<T>>(kernels_[i], block_buffers(i), halo_buffers(i), make));
-    if (!is_here(i)) {
-      continue;
-    }
-    const auto number = static_cast<std::uint32_t>(tasks.size());
-    (takers_[i].empty() ? inner_ : outer_).push_back(number);
+    all_.push_back(static_cast<std::uint32_t>(i));
     tasks.push_back(tasks_.back().get());
     most_nodes = std::max(most_nodes, shards_[i].nodes.size());
   }
-  parcels_.reserve(2 * shards_.size());
   x_.resize(most_nodes);
   v_.resize(most_nodes);
   crew_ = form.executor->gather(std::move(tasks));
@@ -106,75 +82,37 @@ void ShardedKernel<T>::place_taps() {
   }
 }
 
-// Which other processes copy nodes of which shard.
-template <class T>
-void ShardedKernel<T>::find_takers(const Shards& form) {
-  takers_.resize(shards_.size());
-  for (std::size_t i = 0; i < shards_.size(); ++i) {
-    owners_.push_back(process_of(form, i));
-  }
-  for (std::size_t i = 0; i < shards_.size(); ++i) {
-    for (const ShardSource& source : shards_[i].sources) {
-      auto& takers = takers_[source.shard];
-      if (owners_[source.shard] != owners_[i] && (takers.empty() || takers.back() != owners_[i])) {
-        takers.push_back(owners_[i]);
-      }
-    }
-  }
-}
-
-// Of another process's shard only what is heard comes here.
 template <class T>
 BlockBuffers<T> ShardedKernel<T>::block_buffers(std::size_t i) const {
   const Shard& shard = shards_[i];
   const std::size_t width = this->width();
   BlockBuffers<T> buffers;
   buffers.outputs.resize(frames_ * shard.outputs.size() * width);
-  if (is_here(i)) {
-    buffers.value.resize(frames_ * shard.inputs.size() * width);
-    buffers.velocity.resize(buffers.value.size());
-    buffers.audio.resize(frames_ * program_.audio_coefficients.size() * width);
-  }
+  buffers.value.resize(frames_ * shard.inputs.size() * width);
+  buffers.velocity.resize(buffers.value.size());
+  buffers.audio.resize(frames_ * program_.audio_coefficients.size() * width);
   return buffers;
 }
 
-// And what it gives, where somebody here takes it.
 template <class T>
 HaloBuffers<T> ShardedKernel<T>::halo_buffers(std::size_t i) const {
   const Shard& shard = shards_[i];
   const std::size_t width = this->width();
   HaloBuffers<T> halo;
-  if (is_here(i)) {
-    halo.copies = shard.copies;
-    halo.given = shard.given;
-    halo.copied_x.resize(shard.copies.size() * width);
-    halo.copied_v.resize(halo.copied_x.size());
-    halo.coefficients.emplace_back(program_, width);
-  }
-  if (is_here(i) || takes(i)) {
-    halo.given_x.resize(shard.given.size() * width);
-    halo.given_v.resize(halo.given_x.size());
-  }
+  halo.copies = shard.copies;
+  halo.given = shard.given;
+  halo.copied_x.resize(shard.copies.size() * width);
+  halo.copied_v.resize(halo.copied_x.size());
+  halo.coefficients.emplace_back(program_, width);
+  halo.given_x.resize(shard.given.size() * width);
+  halo.given_v.resize(halo.given_x.size());
   return halo;
-}
-
-template <class T>
-bool ShardedKernel<T>::takes(std::size_t i) const {
-  return fellows_ != nullptr &&
-         std::find(takers_[i].begin(), takers_[i].end(), fellows_->own()) != takers_[i].end();
 }
 
 template <class T>
 void ShardedKernel<T>::set_state(std::size_t lane, const double* x, const double* v) {
   write_copies();
   for (std::size_t i = 0; i < shards_.size(); ++i) {
-    if (!is_here(i)) {
-      continue;
-    }
-    if (is_excerpt_) {
-      kernels_[i]->reset(lane);
-      continue;
-    }
     const std::vector<std::uint32_t>& nodes = shards_[i].nodes;
     for (std::size_t node = 0; node < nodes.size(); ++node) {
       x_[node] = x[nodes[node]];
@@ -186,14 +124,8 @@ void ShardedKernel<T>::set_state(std::size_t lane, const double* x, const double
 
 template <class T>
 bool ShardedKernel<T>::save(std::size_t lane, double* x, double* v) const {
-  if (is_excerpt_) {
-    return false;
-  }
   write_copies();
   for (std::size_t i = 0; i < shards_.size(); ++i) {
-    if (!is_here(i)) {
-      return false;
-    }
     const std::vector<std::uint32_t>& nodes = shards_[i].nodes;
     if (!kernels_[i]->save(lane, x_.data(), v_.data())) {
       return false;
@@ -212,9 +144,6 @@ void ShardedKernel<T>::strike(std::size_t lane, std::span<const std::uint32_t> n
                               std::span<const double> changes) {
   write_copies();
   for (std::size_t i = 0; i < shards_.size(); ++i) {
-    if (!is_here(i)) {
-      continue;
-    }
     kernels_[i]->coefficients = this->coefficients;  // a voice may be struck before its first step
     for (std::size_t k = 0; k < nodes.size(); ++k) {
       if (const auto local = find(shards_[i], nodes[k])) {
@@ -227,10 +156,8 @@ void ShardedKernel<T>::strike(std::size_t lane, std::span<const std::uint32_t> n
 template <class T>
 bool ShardedKernel<T>::is_near_start(std::size_t lane, double bound) const {
   write_copies();
-  const bool is_near = std::all_of(kernels_.begin(), kernels_.end(), [&](const auto& kernel) {
-    return kernel == nullptr || kernel->is_near_start(lane, bound);
-  });
-  return fellows_ != nullptr ? fellows_->all_agree(is_near) : is_near;
+  return std::all_of(kernels_.begin(), kernels_.end(),
+                     [&](const auto& kernel) { return kernel->is_near_start(lane, bound); });
 }
 
 // A copy is as good as the node itself; nodes that no shard has are at 0.
@@ -241,8 +168,7 @@ std::size_t ShardedKernel<T>::look(std::size_t lane, std::span<const std::uint32
   return look_at(nodes, numbers, [&](std::uint32_t node) {
     double position = 0.0;
     for (std::size_t i = 0; i < shards_.size(); ++i) {
-      const auto local = is_here(i) ? find(shards_[i], node) : std::nullopt;
-      if (local) {
+      if (const auto local = find(shards_[i], node)) {
         kernels_[i]->look(lane, {&*local, 1}, {&position, 1});
         break;
       }
@@ -256,57 +182,15 @@ void ShardedKernel<T>::play(const Block<T>& block) {
   for (std::size_t at = 0; at < block.frames; at += frames_) {
     const std::size_t frames = std::min(frames_, block.frames - at);
     for (std::size_t i = 0; i < shards_.size(); ++i) {
-      if (is_here(i)) {
-        give_inputs(i, block, at, frames);
-      }
+      give_inputs(i, block, at, frames);
     }
-    // What other processes copy is on its way while the shards are stepped that they do not need.
-    if (!outer_.empty()) {
-      crew_->run(outer_);
-    }
-    send_halos();
-    crew_->run(inner_);
+    crew_->run(all_);
     owes_copies_ = true;
-    send_outputs(frames);
     for (std::size_t i = 0; i < shards_.size(); ++i) {
       take_outputs(i, block, at, frames);
     }
   }
-  this->coefficients = first_of(kernels_).coefficients;
-}
-
-template <class T>
-void ShardedKernel<T>::send_halos() {
-  if (fellows_ == nullptr) {
-    return;
-  }
-  parcels_.clear();
-  for (std::size_t i = 0; i < shards_.size(); ++i) {
-    if (takers_[i].empty() || !(is_here(i) || takes(i))) {
-      continue;
-    }
-    auto number = static_cast<std::uint32_t>(2 * i);
-    for (Aligned<T>* const numbers : {&tasks_[i]->halo.given_x, &tasks_[i]->halo.given_v}) {
-      parcels_.push_back(
-          {number++, owners_[i], numbers->data(), numbers->size() * sizeof(T), takers_[i]});
-    }
-  }
-  fellows_->begin(parcels_);
-}
-
-template <class T>
-void ShardedKernel<T>::send_outputs(std::size_t frames) {
-  if (fellows_ == nullptr) {
-    return;
-  }
-  parcels_.clear();
-  for (std::size_t i = 0; i < shards_.size(); ++i) {
-    if (const std::size_t count = frames * shards_[i].outputs.size() * this->width(); count > 0) {
-      parcels_.push_back({0, owners_[i], tasks_[i]->buffers.outputs.data(), count * sizeof(T), {}});
-    }
-  }
-  fellows_->begin(parcels_);
-  fellows_->finish();
+  this->coefficients = kernels_.front()->coefficients;
 }
 
 template <class T>
@@ -370,9 +254,6 @@ void ShardedKernel<T>::write_copies() const {
     return;
   }
   for (std::size_t i = 0; i < shards_.size(); ++i) {
-    if (!is_here(i)) {
-      continue;
-    }
     gather_copies(i);
     const HaloBuffers<T>& halo = tasks_[i]->halo;
     kernels_[i]->write_nodes(halo.copies, halo.copied_x.data(), halo.copied_v.data());

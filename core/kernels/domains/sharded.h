@@ -20,8 +20,7 @@ struct ShardSource {
 // that it touches; of an input or output each shard has its own row, where it has any.
 struct Shard {
   Program program;
-  std::vector<std::uint32_t> nodes;    // [i] of the whole, ascending...
-  std::vector<std::uint32_t> local;    // ...and where each is here; empty: at i
+  std::vector<std::uint32_t> nodes;    // [i] of the whole, ascending
   std::vector<std::uint32_t> inputs;   // [input] of the whole
   std::vector<std::uint32_t> outputs;  // [output] of the whole
   std::vector<std::uint32_t> given;    // own nodes that others have copies of
@@ -57,27 +56,16 @@ class ShardedKernel final : public Kernel<T> {
   void take_outputs(std::size_t i, const Block<T>& block, std::size_t at, std::size_t frames);
   void gather_copies(std::size_t i) const;
   void place_taps();
-  void find_takers(const Shards& form);
   BlockBuffers<T> block_buffers(std::size_t i) const;
   HaloBuffers<T> halo_buffers(std::size_t i) const;
-  bool takes(std::size_t i) const;
-  void send_halos();
-  void send_outputs(std::size_t frames);
-  bool is_here(std::size_t i) const { return kernels_[i] != nullptr; }
   void write_copies() const;
 
   const Program& program_;
   const std::vector<Shard>& shards_;
   std::size_t frames_;
-  const bool is_excerpt_;
-  Fellows* const fellows_;
-  std::vector<std::size_t> owners_;               // [shard] its process
-  std::vector<std::vector<std::size_t>> takers_;  // [shard] other processes that copy nodes of it
-  std::vector<Fellows::Parcel> parcels_;
   Kernels kernels_;                                    // [shard]
   std::vector<std::unique_ptr<KernelTask<T>>> tasks_;  // [shard]
-  std::vector<std::uint32_t> outer_;                   // tasks that other processes wait for
-  std::vector<std::uint32_t> inner_;                   // and all others
+  std::vector<std::uint32_t> all_;                     // numbers of all tasks
   mutable bool owes_copies_ = false;                   // what others own is as they had it before
   mutable std::vector<double> x_, v_;                  // [node] of a shard, in one lane
   std::unique_ptr<Crew> crew_;                         // the last: it ends first

@@ -23,7 +23,7 @@ double exchange_ns(std::size_t copies);
 inline constexpr double return_share = 1.5;
 inline constexpr double copy_ns = 7.0;  // of a node's
 
-// Shards are dealt out to threads or processes in a row, as many to each.
+// Shards are dealt out to threads in a row, as many to each.
 inline std::size_t worker_of(std::size_t shard, std::size_t shards, std::size_t workers) {
   return shard * workers / shards;
 }

@@ -275,7 +275,7 @@ std::vector<Shard> make_all(const Bonds& bonds, const Division& division, std::u
   for (std::uint32_t s = 0; s < shards.size(); ++s) {
     maker.make(s, division.own[s], shards[s]);
   }
-  join_halos(shards, [&](std::uint32_t node) { return division.owner[node]; });
+  join_halos(shards, division.owner);
   return shards;
 }
 
@@ -311,24 +311,6 @@ std::vector<Shard> reformed(std::vector<Shard> shards, const Form& form) {
   return shards;
 }
 
-// A way to divide.
-struct Way {
-  std::size_t count = 1;  // shards
-  bool is_breadth_first = false;
-  std::uint32_t frames = 0;
-
-  // Those of the first of several processes.
-  void follow_first(Fellows& fellows, std::size_t form) {
-    std::uint32_t numbers[] = {static_cast<std::uint32_t>(form), static_cast<std::uint32_t>(count),
-                               is_breadth_first ? 1u : 0u, frames};
-    fellows.follow_first(numbers);
-    count = numbers[1];
-    is_breadth_first = numbers[2] != 0;
-    frames = numbers[3];
-  }
-  bool operator==(const Way&) const = default;
-};
-
 // One thread's, which all that it plays may share.
 Executor* own_thread() {
   static OwnThread thread;
@@ -360,10 +342,8 @@ std::vector<Attempt> attempts_at(const Program& program, const Workload& load, d
   if (workers == 1 || whole_ns < least_shared_ns) {
     return attempts;
   }
-  // Every process has a shard, or all of it.
-  const bool are_processes = executor_of(load)->fellows() != nullptr;
   std::vector<std::size_t> counts;
-  for (std::size_t count = workers; count > 1 && (count == workers || !are_processes); count /= 2) {
+  for (std::size_t count = workers; count > 1; count /= 2) {
     counts.push_back(count);
   }
   // As it is written first: rows that are alike stay so.
@@ -393,33 +373,13 @@ Executor* executor_of(const Workload& load) {
   return load.executor != nullptr && load.executor->size() > 1 ? load.executor : own_thread();
 }
 
-std::optional<Shard> make_shard(const Program& program, std::vector<std::uint32_t> owner,
-                                std::uint32_t shard, std::uint32_t frames) {
-  const auto bonds = Bonds::of(program);
-  if (!bonds) {
-    return std::nullopt;
-  }
-  std::vector<std::uint32_t> own;
-  for (std::uint32_t node = 0; node < owner.size(); ++node) {
-    owner[node] = bonds->binds(node) ? owner[node] : nobody;
-    if (owner[node] == shard) {
-      own.push_back(node);
-    }
-  }
-  Shard made;
-  Maker(*bonds, owner, frames).make(shard, own, made);
-  return made;
-}
-
 std::optional<Shards> share_out(const Program& program, const Workload& load,
                                 const Progress& progress) {
   Executor* const executor = executor_of(load);
   const std::size_t workers = executor->size();
-  Fellows* const fellows = executor->fellows();
   const double whole_ns = predicted_ns(program, load);
   const std::vector<Attempt> attempts = attempts_at(program, load, whole_ns);
-  if (!is_plain(program) || !program.waveguides.empty() ||
-      (attempts.empty() && fellows == nullptr)) {
+  if (!is_plain(program) || !program.waveguides.empty() || attempts.empty()) {
     return std::nullopt;
   }
   const auto bonds = Bonds::of(program);
@@ -427,10 +387,9 @@ std::optional<Shards> share_out(const Program& program, const Workload& load,
     return std::nullopt;
   }
   std::optional<Shards> best;
-  Way best_way;
   double best_ns = whole_ns / least_gain;
   for (const Attempt& attempt : attempts) {
-    Way way{.count = 1, .is_breadth_first = attempt.is_breadth_first};
+    std::uint32_t best_frames = 0;
     Division division;
     double least_ns = std::numeric_limits<double>::infinity();
     for (const std::size_t count : attempt.counts) {
@@ -440,15 +399,14 @@ std::optional<Shards> share_out(const Program& program, const Workload& load,
           best_meeting(tried.at_level, whole_ns / program.moving, std::min(workers, count));
       if (ns < least_ns) {
         least_ns = ns;
-        way.count = count;
-        way.frames = frames;
+        best_frames = frames;
         division = std::move(tried);
       }
     }
     if (least_ns >= best_ns && !attempt.is_in_cache) {
       continue;
     }
-    auto found = made(program, *bonds, division, way.frames, executor);
+    auto found = made(program, *bonds, division, best_frames, executor);
     progress.spend(64 * program.ends.size());
     if (!found) {
       continue;
@@ -456,21 +414,9 @@ std::optional<Shards> share_out(const Program& program, const Workload& load,
     if (const double ns = predicted_ns(program, *found, load); ns < best_ns) {
       best_ns = ns;
       best = std::move(found);
-      best_way = way;
       if (attempt.is_in_cache) {
         break;
       }
-    }
-  }
-  if (fellows != nullptr) {
-    const Way own = best_way;
-    best_way.follow_first(*fellows, program.form.index());
-    if (best_way.count == 1) {
-      return std::nullopt;
-    }
-    if (best_way != own) {
-      best = made(program, *bonds, divide(*bonds, best_way.count, best_way.is_breadth_first),
-                  best_way.frames, executor);
     }
   }
   return best;

@@ -15,17 +15,10 @@ namespace ressort::kernels {
 // direct form; nothing where a point wanders over a macro, as it may be anywhere. O(nodes + links).
 std::vector<Shard> make_shards(const Program& program, std::size_t count, std::uint32_t frames);
 
-// One of them, in the direct form: of a Program of which only what is near enough to the shard's
-// own nodes is there. `owner`: [node] shard, or nobody. What it copies is left open; nothing where
-// a point wanders. [any thread but audio]
-std::optional<Shard> make_shard(const Program& program, std::vector<std::uint32_t> owner,
-                                std::uint32_t shard, std::uint32_t frames);
-
 // Shards in the Program's own form for load.executor, if they are predicted to pay: of direct,
-// chains or grid, where a sample takes several microseconds. Where what a thread or process has
-// would not fit into a cache, the first of chains and the second of all others, it has several
-// shards: each does, and goes on there for several samples before the next one's turn. Processes
-// do as the first of them.
+// chains or grid, where a sample takes several microseconds. Where what a thread has would not
+// fit into a cache, the first of chains and the second of all others, it has several shards: each
+// does, and goes on there for several samples before the next one's turn.
 // O(nodes + links), and what the form takes. [any thread but audio]
 std::optional<Shards> share_out(const Program& program, const Workload& load,
                                 const Progress& progress = {});
