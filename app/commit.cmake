@@ -1,5 +1,5 @@
-# Writes version.cpp anew where the version or the commit has changed; every build runs it. Outside
-# a checkout of its own the program does not know its commit.
+# Rewrites version.cpp if the version or the commit has changed. Every build runs this. Outside a git
+# checkout the commit is unknown.
 #
 #   cmake -DSOURCE=... -DVERSION=... -DOUTPUT=... -P commit.cmake
 set(COMMIT unknown)

@@ -1,6 +1,6 @@
 #!/bin/sh
-# The engine compiles for 64-bit ARM, whose only vectors are as wide as those of the base; what runs
-# there has not been heard here. Skipped (77) where the compiler is not there.
+# Checks that the engine compiles for 64-bit ARM, whose vectors are as wide as those of the base level. It
+# is not run. Skipped (77) without the cross compiler.
 #
 #   tests/arm.sh SOURCE
 set -eu

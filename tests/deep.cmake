@@ -1,6 +1,6 @@
-# The second tier of the tests: parts that take minutes, one after the other behind all others. Each
-# is skipped where it does not fit before RESSORT_DEADLINE; for whoever has never the time for all of
-# them, another comes first with each RESSORT_TURN.
+# The second tier: tests that take minutes. They run one after the other after all other tests. A test
+# that does not fit before RESSORT_DEADLINE is skipped. RESSORT_TURN rotates the order, so that all are
+# reached in turn.
 set(RESSORT_TURN 0 CACHE STRING "Which of the deep tests comes first")
 set(ressort_fuzzers model preset score midi smf scala console osc osc_packet flight panel)
 list(TRANSFORM ressort_fuzzers PREPEND fuzz_ OUTPUT_VARIABLE ressort_deep_tests)
@@ -10,7 +10,7 @@ list(APPEND ressort_deep_tests arm everything_sanitized everything_more forms_ev
   flights_everywhere server_killed installed soak)
 list(LENGTH ressort_deep_tests ressort_deep_count)
 
-# SECONDS is about what it needs on two cores.
+# Adds a deep test that takes about SECONDS on two cores.
 function(add_deep_test name seconds)
   add_test(NAME ${name} COMMAND ${CMAKE_CURRENT_SOURCE_DIR}/part ${seconds} ${ARGN})
   list(FIND ressort_deep_tests ${name} place)
@@ -19,89 +19,89 @@ function(add_deep_test name seconds)
     SKIP_RETURN_CODE 77)
 endfunction()
 
-# Bytes that no person wrote, for some seconds each; clang builds the fuzzers beside everything else.
+# Fuzzers, built by clang, for some seconds each.
 foreach(fuzzer IN LISTS ressort_fuzzers)
   add_deep_test(fuzz_${fuzzer} 90 ${CMAKE_CURRENT_SOURCE_DIR}/fuzz/run 40 ${fuzzer})
 endforeach()
 
-# Every model that there is under the same sanitizers, and more of those that nobody wrote.
+# Every model with the same sanitizers, and more generated models.
 add_deep_test(everything_sanitized 240 ${CMAKE_CURRENT_SOURCE_DIR}/system/sanitized 0.1 200)
 add_deep_test(everything_more 120 $<TARGET_FILE:ressort_play_everything> 1 400 101
   ${CMAKE_SOURCE_DIR}/presets)
 
-# The engine for another kind of machine, as far as a compiler can tell.
+# Compiles the engine for 64-bit ARM.
 add_deep_test(arm 60 ${CMAKE_CURRENT_SOURCE_DIR}/arm.sh ${CMAKE_SOURCE_DIR})
 
 # All random networks in all forms on all instruction sets.
 add_deep_test(forms_everywhere 240 $<TARGET_FILE:ressort_tests> "[forms_everywhere]")
 
-# Two thousand random nonlinear scenes; a person may ask for others: FIRST,COUNT,FRAMES[,LINKS].
+# Two thousand random nonlinear scenes. RESSORT_SCENES selects others: FIRST,COUNT,FRAMES[,LINKS].
 add_deep_test(scenes_more 200 ${CMAKE_COMMAND} -E env RESSORT_SCENES=1001,2000,1024
   $<TARGET_FILE:ressort_tests> "[scenes]")
 
-# Every tuned preset's pitch from its sound, over the keyboard and at three rates.
+# The pitch of every tuned preset, measured on the sound over the keyboard at three rates.
 add_deep_test(heard_pitch_everywhere 120 $<TARGET_FILE:ressort_tests> "[heard_pitch_everywhere]")
 
-# Masses and bodies a hundredth this side of the border of stability and beyond.
+# Masses and bodies one per cent below and above the stability limit.
 add_deep_test(bodies_everywhere 60 $<TARGET_FILE:ressort_tests> "[bodies_everywhere]")
 
-# The modes of 208 random networks against their sound, and the lowest of a hundred thousand masses.
+# The modes of 208 random networks compared with their sound, and the lowest of 100,000 masses.
 add_deep_test(modes_everywhere 60 $<TARGET_FILE:ressort_tests> "[modes_everywhere]")
 
-# Budgets of pitch and decay on 300 random networks.
+# Pitch and decay budgets on 300 random networks.
 add_deep_test(accuracy_everywhere 120 $<TARGET_FILE:ressort_tests> "[accuracy_everywhere]")
 
-# What silence= leaves out of 200 of them.
+# The silence budget on 200 random networks.
 add_deep_test(silence_everywhere 120 $<TARGET_FILE:ressort_tests> "[silence_everywhere]")
 
-# Forty random solids against CalculiX.
+# Forty random solids compared with CalculiX.
 add_deep_test(calculix_everywhere 600 $<TARGET_FILE:ressort_tests> "[calculix_everywhere]")
 
-# The bells' partials against solids of their profiles.
+# The partials of the bells compared with solids of the same profile.
 add_deep_test(bells_everywhere 300 $<TARGET_FILE:ressort_tests> "[bells_everywhere]")
 
-# A server that is killed twenty times, and comes back at other rates and periods.
+# A JACK server that is killed twenty times and returns with other rates and periods.
 add_deep_test(server_killed 120 ${CMAKE_COMMAND} -E env RESSORT_KILLS=20
   $<TARGET_FILE:ressort_server_tests> "[server_loss]")
 
-# A minute of all that is done to the callback.
+# A minute of every operation that reaches the callback.
 if(callback IN_LIST server_tags)
   add_deep_test(callback_minute 70 ${CMAKE_COMMAND} -E env RESSORT_CALLBACK_SECONDS=60
     $<TARGET_FILE:ressort_server_tests> "[callback]")
 endif()
 
-# Three minutes of random play of all presets; tests/soak is for who has more.
+# Three minutes of random playing on all presets. tests/soak runs longer.
 add_deep_test(soak 220 ${CMAKE_COMMAND} -E env RESSORT_SOAK_MINUTES=3
   $<TARGET_FILE:ressort_server_tests> "[soak]")
 
-# The Debian package in a clean root.
+# Installs the Debian package in a clean root.
 add_deep_test(installed 180 ${CMAKE_CURRENT_SOURCE_DIR}/system/installed ${CMAKE_BINARY_DIR})
 
-# Every preset's flight, bit by bit.
+# Compares the flight of every preset bit by bit.
 add_deep_test(flights_everywhere 60 $<TARGET_FILE:ressort_tests> "[flights_everywhere]")
 
-# A thousand edits of what sounds, broken ones too.
+# A thousand edits of playing models, some of them invalid.
 add_deep_test(edits_more 300 ${CMAKE_COMMAND} -E env RESSORT_EDITS=1000
   $<TARGET_FILE:ressort_tests> "[reload]")
 
 # Every bow at every speed and pressure on 24 keys.
 add_deep_test(bows 60 $<TARGET_FILE:ressort_voicing> --bows 8 Violin Cello DoubleBass)
 
-# Random settings of all controls of each preset, and a note at each; RESSORT_SETTINGS asks for more.
+# A note at random settings of all controls of each preset. RESSORT_SETTINGS sets the number.
 add_deep_test(settings_more 600 sh -c
   "exec $<TARGET_FILE:ressort_voicing> --random \${RESSORT_SETTINGS:-200}")
 
-# All of what the first tier looks at a part of (tests/support/thorough.h).
+# The complete version of tests that the first tier shortens (tests/support/thorough.h).
 add_deep_test(thorough 120 ${CMAKE_COMMAND} -E env RESSORT_THOROUGH=1 $<TARGET_FILE:ressort_tests>
   "[ask],[watch],[notes_heard],[modes_passive],[session],[solid_body]")
 
-# That the benchmark still runs: no time is asserted. Only tests/run --deep builds it.
+# Checks that the benchmark runs. No time is asserted. Only tests/run --deep builds it.
 add_custom_target(ressort_deep DEPENDS ressort_bench)
 add_deep_test(bench 15 ${CMAKE_CURRENT_SOURCE_DIR}/bench/check $<TARGET_FILE:ressort_bench>)
 
-# A minute of it for each instrument.
+# A minute of unreasonable use of each instrument.
 add_deep_test(abuse_long 300 $<TARGET_FILE:ressort_abuse> 60 2)
 
-# Format, clang-tidy and types of one name: of what has changed last, or of all where there is time.
+# Format, clang-tidy and duplicate type names, in the last change, or everywhere if there is time.
 add_deep_test(lint 240 sh -c
   "exec ${CMAKE_CURRENT_SOURCE_DIR}/lint $([ -n \"$RESSORT_DEADLINE\" ] || echo --all)")

@@ -1,16 +1,16 @@
 #!/bin/sh
-# The rooms of the code and which way they look: fails on every #include that the table of the
-# design does not have, and on every room whose namespace finds more or fewer rooms' names, and
-# prints it. Before it looks at the code it looks at itself: a list of offences must all be found.
+# Checks the dependencies between the rooms (folders) of the code. Prints and fails on every #include
+# that the table below does not allow, and on every room whose namespace can use the names of more or
+# fewer rooms than the table says. First tests itself on a list of violations.
 #
-#   rooms.sh [ROOT]      ROOT is where core/ and app/ are; without it, the folder above this one.
+#   rooms.sh [ROOT]      ROOT contains core/ and app/ (default: the folder above this one).
 set -eu
 root=${1:-$(dirname -- "$0")/..}
 cd -- "$root"
 
 # Reads "file:line:#include <what>", "file:line:namespace ressort::room" and, of the directives in
-# rooms.h, "file:line:room finds room"; prints the lines that break a rule. With complete=1 it has
-# all directives, and prints what is missing, too.
+# rooms.h, "file:line:room finds room", and prints the lines that break a rule. With complete=1 the
+# input has all directives, and missing ones are printed too.
 judge() {
   awk -v complete="${1:-0}" '
     function starts(text, prefix) { return index(text, prefix) == 1 }
@@ -22,11 +22,11 @@ judge() {
     }
     function folder(room) { return (("core/" room) in sees ? "core/" : "app/") room }
     BEGIN {
-      # What core may never see: streams, files, threads, clocks.
+      # Standard headers forbidden in core: streams, files, threads, clocks.
       split("iostream fstream ostream istream thread atomic mutex shared_mutex condition_variable " \
             "future stop_token semaphore latch barrier filesystem chrono ctime", words, " ")
       for (i in words) impure[words[i]] = 1
-      # Libraries of others, each with the one place that may see it.
+      # Libraries, each with the only place that may include it.
       owner["jack/"] = "app/devices/jack.cpp"
       owner["alsa/"] = "app/devices/alsa.cpp"
       owner["RtMidi.h"] = "app/devices/rtmidi.cpp"
@@ -44,8 +44,8 @@ judge() {
       owner["Eigen/"] = "core/linear_algebra/"
       owner["unsupported/Eigen/"] = "core/linear_algebra/"
       owner["Spectra/"] = "core/linear_algebra/"
-      # Which rooms a room may see; the folders of core and app and, as "core" and "app", what is in
-      # none of them.
+      # The rooms that each room may include: the folders of core and app, and "core" and "app" for files
+      # outside of them.
       sees["core"] = "core"
       sees["core/laws"] = "core core/laws"
       sees["core/linear_algebra"] = "core core/linear_algebra"
@@ -124,7 +124,7 @@ judge() {
       if (why != "") print line ": " why
     }
     END {
-      # What a room finds by what it finds.
+      # Transitive closure of the names that a room can use.
       do {
         grown = 0
         for (one in finds) {
@@ -140,7 +140,7 @@ judge() {
       } while (grown)
       for (one in finds) {
         split(one, a, SUBSEP)
-        # Whoever may see a kernel is told by which laws.
+        # A room that may include kernels may include laws.
         if (a[2] != "core/laws" && !may_see(a[1], a[2], "")) {
           print finds[one] ": " a[1] " may not see " a[2]
         }
@@ -163,13 +163,13 @@ includes() {
     xargs grep -n '^[[:space:]]*#[[:space:]]*include' /dev/null
 }
 
-# Where files say which room they are of.
+# The namespace declarations of files.
 namespaces() {
   find core app -name '*.h' -o -name '*.cpp' | LC_ALL=C sort |
     xargs grep -n '^namespace ressort' /dev/null
 }
 
-# Whose names each room finds.
+# The using directives of each room.
 directives() {
   awk '/^namespace [a-z_]+ \{/ { room = $2 }
     /^using namespace/ { sub(/;/, "", $3); print FILENAME ":" FNR ":" room " finds " $3 }' \

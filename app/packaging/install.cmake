@@ -1,10 +1,10 @@
-# What `cmake --install` puts where, and what `cpack` makes a Debian package of. The program looks for
-# its models in share/ressort beside its own folder.
+# Files for `cmake --install` and the Debian package. The program looks for its models in share/ressort
+# beside its own folder.
 include(GNUInstallDirs)
 set(packaging ${CMAKE_CURRENT_LIST_DIR})
 set(packaged ${CMAKE_BINARY_DIR}/packaging)
 
-# What the program says of itself; one that is built for another machine cannot.
+# Manual page and completion, printed by the program. Not possible in cross builds.
 if(NOT CMAKE_CROSSCOMPILING)
   add_custom_command(TARGET ressort POST_BUILD
     COMMAND ${CMAKE_COMMAND} -E make_directory ${packaged}
@@ -28,7 +28,7 @@ install(FILES ${packaging}/io.github.ressort.ressort.metainfo.xml
   DESTINATION ${CMAKE_INSTALL_DATADIR}/metainfo)
 install(FILES ${packaging}/ressort.service DESTINATION lib/systemd/user)
 
-# As Debian wants them: the licence, and what has changed.
+# Licence and changelog, as Debian requires.
 set(documents ${CMAKE_INSTALL_DOCDIR})
 file(READ ${CMAKE_SOURCE_DIR}/.github/LICENSE.md licence)
 string(REGEX MATCH "Permission is hereby granted.*SOFTWARE\\." licence "${licence}")

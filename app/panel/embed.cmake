@@ -1,5 +1,5 @@
-# Makes OUTPUT, a source that holds the files of the page in FOLDER; as bytes, as a literal of more
-# than 64 kB is not what every compiler must take.
+# Writes OUTPUT, a source with the files of the page in FOLDER as byte arrays, because compilers need not
+# accept string literals above 64 kB.
 set(types "html|text/html" "css|text/css" "js|text/javascript" "svg|image/svg+xml")
 set(arrays "")
 set(rows "")

@@ -1,6 +1,6 @@
 #!/bin/sh
-# Bad input, as a person would give it: a clear sentence, the right exit code. And good input: the
-# same file from the same render. command_line.sh PROGRAM SOURCE_FOLDER
+# Tests the command line. Bad input must give a clear message and the right exit code. Rendering twice
+# must give the same file. command_line.sh PROGRAM SOURCE_FOLDER
 set -u
 program=$1
 source=$2
@@ -10,7 +10,7 @@ cd "$folder" || exit 1
 export RESSORT_DATA="$source" JACK_DEFAULT_SERVER=ressort-nobody JACK_NO_START_SERVER=1
 failures=0
 
-# expect CODE TEXT COMMAND...: the exit code, and a text that must be in what is said.
+# expect CODE TEXT COMMAND...: checks the exit code, and that the output contains TEXT.
 expect() {
   code=$1
   text=$2
@@ -87,7 +87,7 @@ model bar.mdl '@s string 9 1. 0.1 0.001 0. 0.\n@in1 frcInput [@s 0.3]\n@out1 pos
 expect 0 '"closed_form":true' "$program" describe bar.mdl --json
 expect 0 "modes, in closed form" "$program" describe bar.mdl
 
-# Timbre that is asked for.
+# Matching a timbre.
 model free.mdl '@k param 0.1\n@z param 0.001\n@s string 20 1. k z 0. 0.\n@in1 frcInput [@s 0.3]\n@out1 posOutput [@s 0.7]\n'
 expect 0 "0.00 JND" "$program" shape free.mdl --f0 300 --t60 3 -o shaped.toml
 expect 0 "300.000" "$program" modes shaped.toml --modes 1
@@ -107,7 +107,7 @@ expect 2 "nothing is asked for" "$program" shape free.mdl
 expect 2 "ends in .toml" "$program" shape free.mdl --t60 3 -o shaped.wav
 expect 2 "it cannot be written too" "$program" shape shaped.toml --t60 3 -o shaped.toml --force
 expect 2 "there is no file 'nosuch.wav'" "$program" shape free.mdl --like nosuch.wav
-# Whoever reads it finds one object, with plain numbers at the top.
+# The JSON is one object with plain numbers at the top level.
 if command -v python3 > /dev/null; then
   "$program" describe blow.flac --json --f0 261.63 > timbre.json
   python3 - timbre.json << 'END' || failures=$((failures + 1))
@@ -123,7 +123,7 @@ assert d["frames"][0]["flux"] is None and d["frames"][1]["flux"] is not None
 END
 fi
 
-# Texts, with file, line and column.
+# Error messages with file, line and column.
 model word.mdl '@m mass 1. 0. 0.\n@r sprnig @m @m 0.1 0.1\n'
 expect 2 "word.mdl:2:4: error: unknown keyword 'sprnig'; did you mean 'spring'?" \
   "$program" check word.mdl
@@ -158,7 +158,7 @@ model heard.mdl '@K audioParam @in2\n@o osc 1. K 0. 0. 0.\n@out1 posOutput @o\n'
 expect 0 "K            is input 2, sample by sample" "$program" check heard.mdl
 expect 0 '"input": 2,' "$program" check heard.mdl --json
 
-# Models as text again: what is printed is read, and printed the same.
+# Printing models: the printed text can be read and prints the same.
 model other.mdl '@g ground 0.\n@a cel 1. .1 0.01 0. 0.\n@r spring @g @a 0.1 .001\n@out1 posOutput @a\n'
 expect 0 "@r springDamper @g @a 0.1 0.001" "$program" check other.mdl --print
 "$program" check other.mdl --print > once.mdl
@@ -178,7 +178,7 @@ expect 2 "at most 100000 points" "$program" make string 100001
 expect 2 "a mass must be above 0" "$program" make string 5 -M 0
 expect 2 "cannot be written" "$program" make string 5 -o no/such/folder/s.mdl
 
-# The chart: all its columns, a row for each way, and what to do without gnuplot.
+# The chart: all columns, a row for each method, and the message without gnuplot.
 expect 0 "grey stairs" "$program" chart --help
 expect 2 "there is no model or preset 'nosuch'" "$program" chart nosuch -o drawn
 expect 0 "no pictures: gnuplot is not installed" \
@@ -198,7 +198,7 @@ grep -qx "$columns,energy,front_t1,front_t2,failure,also" drawn/chart.csv &&
 grep -q 'set output "triangle.svg"' drawn/chart.gp ||
   { echo "FAILED: the chart's script draws no triangle"; failures=$((failures + 1)); }
 
-# Stability: what breaks it, by name and line, and how far each parameter may go.
+# Stability: the unstable element with name and line, and the limits of parameters.
 model stiff.mdl '@K param 1.5\n@g ground 0.\n@m osc 1. K 0. 1. 1.\n@out1 posOutput @m\n'
 expect 0 "stable: every stiffness may grow 2.66666 times" "$program" check stiff.mdl
 expect 0 "K            1.5        from 0 to 3.99999; stable below 4" "$program" check stiff.mdl
@@ -291,7 +291,7 @@ expect 0 "at once, and so many are used" \
 mkfifo pipe
 expect 2 "pipe' is no ordinary file" "$program" render PolyTriangle -o out.wav --input pipe
 
-# Files: nothing that is read is lost, under no name; nor what was there before.
+# Files: input files and existing files are never lost, under any name.
 fail() {
   echo "FAILED: $*"
   failures=$((failures + 1))
@@ -333,7 +333,7 @@ for command in "make string 5" "export own.mdl --to faust"; do
   [ "$(cat there.txt)" = mine ] && fail "$command --force did not write"
 done
 
-# Every ending, and no other.
+# File name endings.
 for ending in wav w64 flac ogg aiff aif au caf WAV; do
   expect 0 "peak" "$program" render own.mdl -o "all.$ending" --score own.score --seconds 0.5
   expect 0 "0.50 s" "$program" render own.mdl -o out.wav --input "all.$ending" --seconds 0.5
@@ -364,7 +364,7 @@ expect 1 "failed: File too large" \
   sh -c 'ulimit -f 64; exec "$@"' - "$program" render own.mdl -o again.wav --seconds 10
 cmp -s in.wav again.wav || fail "what was there is lost on a full disk"
 
-# Signals while it renders: what there is is kept, whole.
+# Signals during a render: the rendered part is kept as a valid file.
 for signal in TERM HUP INT; do
   "$program" render own.mdl -q -o "cut$signal.wav" --seconds 86000 &
   rendering=$!
@@ -401,7 +401,7 @@ expect 0 "became unstable" "$program" render wild.mdl -o wild.wav --seconds 1 --
 expect 0 "wild.mdl:3:1: warning: unstable: the stiffness 5 of 'r'" \
   "$program" render wild.mdl -o wild.wav --seconds 1 --force
 expect 2 "wild.mdl:3:1: error: unstable" "$program" play wild.mdl -a dummy -i
-# Whoever is asked says the same.
+# All commands give the same answer.
 model zero.mdl '@P param 0\n@g ground 0.\n@m mass 1. 0. 0.\n@r spring @g @m 1/P\n@out1 posOutput @m\n'
 expect 2 "zero.mdl:4:1: error: the argument 1/P of 'r' is no finite number where P = 0" \
   "$program" check zero.mdl
@@ -415,7 +415,7 @@ for refused in wild.mdl zero.mdl light.mdl two.toml target.toml; do
     failures=$((failures + 1))
   fi
 done
-# What nobody hears may be played, rendered and checked; each warns.
+# Inaudible models can be played, rendered and checked, with a warning.
 silent="mute.mdl:1:1: warning: the model has no output, so it will be silent"
 expect 0 "$silent" "$program" check mute.mdl
 expect 0 "$silent" "$program" render mute.mdl -o mute.wav --seconds 0.1
@@ -432,15 +432,15 @@ expect 0 "peak" "$program" render stiff.mdl -o stiff.wav --seconds 1 --set K=3.9
 model steep.score '0.1 /param/K 4.5\n0.2 /param/K 9\n'
 expect 0 "steep.score:1:5: warning: K: 4.5 is beyond what is stable, set to 3.99999" \
   "$program" render stiff.mdl -o stiff.wav --score steep.score
-# The same numbers at half the rate are four times as stiff.
+# At half the rate the same numbers are four times as stiff.
 expect 2 "the stiffness K = 1.5 of 'm' must stay below 1, at 22050 Hz" \
   "$program" render stiff.mdl -o stiff.wav --seconds 1 --rate 22050
 expect 0 "peak" "$program" render stiff.mdl -o stiff.wav --seconds 1 --rate 22050 --no-rescale
-# What may never touch is no reason to refuse; the report warns of it.
+# A contact that may never touch is accepted with a warning.
 model hard.mdl '@g ground 0.\n@m osc 1. 0.1 0.001 0. 0.\n@c contact @m @g 9 0.1 0.\n@in1 frcInput @m\n@out1 posOutput @m\n'
 expect 0 "the stiffness 9 of 'c' must stay below" "$program" check hard.mdl --budget passive=never
 
-# A budget of pitch and decay is kept, or it is said that it is not: a warning, with --strict an error.
+# A pitch or decay budget that is not kept gives a warning, with --strict an error.
 model damped.mdl '@g ground 0.\n@a mass 1. 0. 0.\n@b mass 1. 0. 0.\n@l springDamper @g @a 0.9 0.3
 @k springDamper @a @b 0.6 0.25\n@in1 frcInput @a\n@out1 posOutput @b\n'
 expect 0 '"kept": true' "$program" check damped.mdl --budget cents=3 --json --strict
@@ -448,7 +448,7 @@ expect 0 '"kept": false' "$program" check damped.mdl --budget cents=0.0001 --jso
 expect 0 "the budget cents=0.0001 is not kept" "$program" check damped.mdl --budget cents=0.0001
 expect 2 "the budget cents=0.0001 is not kept" \
   "$program" check damped.mdl --budget cents=0.0001 --strict
-# A bare one has exact modes, unless sound turns it.
+# A bare model has exact modes, unless audio changes its parameters.
 expect 0 "peak" "$program" render damped.mdl -o damped.wav --budget cents=1e-6 --seconds 1 --strict
 model turned.mdl '@w audioParam @in2\n@g ground 0.\n@a mass 1. 0. 0.\n@r springDamper @g @a [0.3+0.01*w] 0.02\n@b mass 1. 0. 0.
 @s springDamper @a @b 0.3 0.\n@in1 frcInput @a\n@out1 posOutput @b\n'
@@ -461,12 +461,12 @@ expect 0 "peak" "$program" render hard.mdl -o hard.wav --seconds 1
 model push.score '0 /in/1/force nan\n'
 expect 2 "must be a number" "$program" render PolyTriangle -o out.wav --score push.score
 
-# Playing without what it needs.
+# Playing without audio devices.
 expect 75 "no JACK server answers to the name 'ressort-nobody'" "$program" play -a jack -i
 expect 75 "does not open" "$program" play -a alsa -d nosuchdevice -i
 expect 2 "there is no model or preset 'nosuch'" "$program" play nosuch -a dummy -i
 
-# Loads that take long. A signal ends them wherever they are, with what a program ends with.
+# Long loads. A signal ends them at any point, with the usual exit status.
 play="play -a dummy -m none -u off"
 model large.mdl '@K param 0.01\n@s mesh 700 700 1. K 0.001 0. 0.\n@in1 frcInput [@s 0.2 0.2]
 @out1 posOutput [@s 0.3 0.3]\n'
@@ -477,7 +477,7 @@ ends() {
   shift 2
   timeout -s "$signal" -k 30 --preserve-status "$delay" "$@" > ends.log 2>&1
   got=$?
-  # Before it is up a signal ends it as it does any program.
+  # During start-up a signal ends the program as usual.
   case $got in
     0 | 129 | 130 | 143) ;;
     *)
@@ -491,7 +491,7 @@ for delay in 0.1 0.3 0.6 1 1.5 2.5; do
   ends INT "$delay" "$program" $play < load.txt
   ends HUP "$delay" "$program" $play -i -e load.txt < /dev/null
 done
-# What takes more memory than there is is refused, and the console goes on.
+# Models that need too much memory are rejected, and the console continues.
 model huge.mdl '@s string 3900000 1. 0.1 0. 0. 0.\n@out1 posOutput [@s 0.3]\n'
 said=$(ulimit -v 700000; printf 'load huge\nparams\nquit\n' | timeout 60 "$program" $play 2>&1)
 got=$?
@@ -521,7 +521,7 @@ kill -TERM "$first"
 wait "$first"
 [ $? = 0 ] || { echo "FAILED: SIGTERM did not end the program with 0"; failures=$((failures + 1)); }
 
-# Nobody reads what it says: it goes through its script, records, and ends when it is told to.
+# Closed output: ressort runs its script, records, and ends on request.
 mkfifo stalled
 sleep 60 < stalled &
 reader=$!
@@ -547,7 +547,7 @@ size=$(stat -c %s stage.wav)
 [ "$size" -gt 100000 ] && [ "$(($(od -An -tu4 -j4 -N4 stage.wav) + 8))" = "$size" ] ||
   fail "a recording that SIGHUP ended has $size bytes"
 
-# A terminal that shows nothing any more: the same.
+# The same for a terminal that no longer shows output.
 awk 'BEGIN {
   print "@g ground 0.\n@m osc 1. .1 .001 0. 0.\n@in1 frcInput @m\n@out1 posOutput @m"
   for (i = 0; i < 1000; i++) print "@parameter_" i " param 1"
@@ -578,7 +578,7 @@ size=$(stat -c %s screen.wav)
 [ "$size" -gt 50000 ] && [ "$(($(od -An -tu4 -j4 -N4 screen.wav) + 8))" = "$size" ] ||
   fail "a recording that SIGTERM ended has $size bytes"
 
-# The same render gives the same file, and a phrase that can be heard.
+# Rendering twice gives the same file, with an audible phrase.
 expect 0 "peak" "$program" render IPlayTheTriangle -o one.wav
 expect 0 "peak" "$program" render IPlayTheTriangle -o two.wav
 cmp -s one.wav two.wav || { echo "FAILED: two renders differ"; failures=$((failures + 1)); }

@@ -1,5 +1,5 @@
-# The whole program against real servers. These share one JACK server name, so they run one after
-# the other; as they mostly wait, they come first, beside all else.
+# System tests with real servers. They share one JACK server name, so they run one after the other.
+# They start first, beside the other tests, because they mostly wait.
 add_library(rtspy MODULE system/rtspy.cpp)
 target_compile_options(rtspy PRIVATE -Wno-conversion -Wno-nonnull-compare)
 target_link_libraries(rtspy PRIVATE PkgConfig::JACK ${CMAKE_DL_LIBS})
@@ -12,7 +12,7 @@ target_compile_definitions(ressort_server_tests PRIVATE
   RESSORT_SOURCE="${CMAKE_SOURCE_DIR}")
 add_dependencies(ressort_server_tests ressort rtspy)
 
-# A sanitizer brings its own malloc, which the spy cannot stand in for.
+# A sanitizer has its own malloc, which the spy library cannot replace.
 set(server_tags jack_midi shared_notes osc_time flood rtmidi alsa server_loss nsm)
 if(NOT RESSORT_ADDRESS_SANITIZER AND NOT RESSORT_THREAD_SANITIZER)
   list(APPEND server_tags callback)
@@ -23,7 +23,7 @@ foreach(tag IN LISTS server_tags)
     COST 1000)
 endforeach()
 
-# The panel's page in a real browser, with keys and pointer.
+# Tests the panel's page in a real browser, with keys and pointer.
 add_test(NAME server_panel COMMAND ${CMAKE_CURRENT_SOURCE_DIR}/panel/panel_test.py
   $<TARGET_FILE:ressort> ${CMAKE_SOURCE_DIR})
 set_tests_properties(server_panel PROPERTIES TIMEOUT 240 LABELS servers
@@ -33,11 +33,11 @@ add_test(NAME command_line COMMAND ${CMAKE_CURRENT_SOURCE_DIR}/system/command_li
   $<TARGET_FILE:ressort> ${CMAKE_SOURCE_DIR})
 set_tests_properties(command_line PROPERTIES TIMEOUT 240 LABELS integration COST 800)
 
-# The front page's examples and those of presets/README.md can be heard.
+# Checks that the examples of README.md and presets/README.md are audible.
 add_test(NAME examples COMMAND ${CMAKE_CURRENT_SOURCE_DIR}/system/examples $<TARGET_FILE:ressort>)
 set_tests_properties(examples PROPERTIES TIMEOUT 240 LABELS integration)
 
-# What is exported to FAUST, through the faust compiler and this C++ compiler.
+# Compiles exported FAUST programs with faust and this C++ compiler.
 add_ressort_tests(ressort_export_tests system/export_test.cpp)
 target_link_libraries(ressort_export_tests PRIVATE ressort_test_networks ressort_app)
 target_compile_definitions(ressort_export_tests PRIVATE
