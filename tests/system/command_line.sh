@@ -394,7 +394,7 @@ wait "$rendering" 2> /dev/null
 rm -f killed.part.wav
 [ -z "$(find . -name '*.part*')" ] || fail "left behind: $(find . -name '*.part*')"
 
-# The gate.
+# The stability check.
 expect 2 "wild.mdl:3:1: error: unstable: the stiffness 5 of 'r' must stay below 4; play, render and load take --force" \
   "$program" render wild.mdl -o wild.wav --seconds 1
 expect 0 "became unstable" "$program" render wild.mdl -o wild.wav --seconds 1 --force
