@@ -60,8 +60,9 @@ add_deep_test(calculix_everywhere 600 $<TARGET_FILE:ressort_tests> "[calculix_ev
 # The partials of the bells compared with solids of the same profile.
 add_deep_test(bells_everywhere 300 $<TARGET_FILE:ressort_tests> "[bells_everywhere]")
 
-# A JACK server that is killed twenty times and returns with other rates and periods.
-add_deep_test(server_killed 120 ${CMAKE_COMMAND} -E env RESSORT_KILLS=20
+# A JACK server that ends twenty times, under connections and under an overloaded program, and
+# returns with other rates and periods.
+add_deep_test(server_killed 210 ${CMAKE_COMMAND} -E env RESSORT_KILLS=20
   $<TARGET_FILE:ressort_server_tests> "[server_loss]")
 
 # A minute of every operation that reaches the callback.

@@ -14,12 +14,13 @@
 #include <vector>
 
 #include "app/devices/audio.h"
+#include "app/devices/cancellation.h"
 
 namespace ressort::devices {
 namespace {
 
 constexpr int most_audio_inputs = 16;
-constexpr std::size_t most_midi_packets = 4096;  // in one block: more than a port's buffer holds
+constexpr std::size_t most_midi_packets = 4096;  // in one block; more than a port's buffer holds
 
 using Ports = std::unique_ptr<const char*, decltype(&jack_free)>;
 
@@ -32,20 +33,20 @@ struct Jack {
   jack_client_t* client = nullptr;
   std::vector<jack_port_t*> outputs;
   jack_port_t* midi = nullptr;
-  std::array<Published<jack_port_t>, most_audio_inputs> inputs;  // registered as models want them
-  std::int64_t clock_offset_ns = 0;                              // monotonic clock less JACK's
+  std::array<Published<jack_port_t>, most_audio_inputs> inputs;  // registered when needed
+  std::int64_t clock_offset_ns = 0;                              // monotonic clock minus JACK's
   double rate_hz = 48000.0;
   Flag lost;
-  Flag rewired;  // ports or connections have changed since the last look
+  Flag rewired;  // ports or connections have changed since the last update_wiring()
 
-  // Used by JACK's own thread, that tells of ports, and by the control thread.
+  // Used by JACK's notification thread and the control thread.
   std::mutex mutex;
-  std::vector<const jack_port_t*> gone;  // since the last look
+  std::vector<const jack_port_t*> gone;  // ports unregistered since the last update_wiring()
 
   // Used by the control thread only.
   Wiring wiring;
-  std::map<const jack_port_t*, std::string> others;  // that were connected at a look before
-  std::int64_t next_try_ns = 0;                      // to plug in what is missing
+  std::map<const jack_port_t*, std::string> others;  // ports that were connected to us, by name
+  std::int64_t next_try_ns = 0;  // time of the next attempt to restore connections
 
   // Used by the audio thread only.
   std::vector<float*> output_buffers;
@@ -53,7 +54,10 @@ struct Jack {
   std::array<MidiPacket, most_midi_packets> packets;
 };
 
+// libjack may cancel the thread of any callback when the server ends, so each callback begins with
+// a guard.
 int on_process(jack_nframes_t frames, void* self) {
+  const CancellationDisabled guard;
   Jack& jack = *static_cast<Jack*>(self);
   const auto buffer = [&](jack_port_t* port) { return jack_port_get_buffer(port, frames); };
   for (std::size_t i = 0; i < jack.outputs.size(); ++i) {
@@ -91,17 +95,19 @@ int on_process(jack_nframes_t frames, void* self) {
 }
 
 int on_xrun(void* self) {
+  const CancellationDisabled guard;
   static_cast<Jack*>(self)->process.xruns.add(1);
   return 0;
 }
 
-// The engine takes any number of frames, so that nothing has to be made ready for a new one.
+// The engine accepts any number of frames, so a new period needs no preparation.
 int on_buffer_size(jack_nframes_t, void*) {
   return 0;
 }
 
-// A new rate needs a new engine: the control side opens the client again.
+// A new rate needs a new engine: the control thread reopens the client.
 int on_sample_rate(jack_nframes_t rate, void* self) {
+  const CancellationDisabled guard;
   Jack& jack = *static_cast<Jack*>(self);
   if (static_cast<double>(rate) != jack.rate_hz) {
     jack.lost.raise();
@@ -109,21 +115,25 @@ int on_sample_rate(jack_nframes_t rate, void* self) {
   return 0;
 }
 
-// A bounce: there is always time, and every event keeps its frame.
+// In freewheel mode (a bounce) there is no deadline, and every event keeps its frame.
 void on_freewheel(int starts, void* self) {
+  const CancellationDisabled guard;
   Flag& has_time = static_cast<Jack*>(self)->process.has_time;
   starts != 0 ? has_time.raise() : static_cast<void>(has_time.lower());
 }
 
 void on_shutdown(jack_status_t, const char*, void* self) {
+  const CancellationDisabled guard;
   static_cast<Jack*>(self)->lost.raise();
 }
 
 void on_connect(jack_port_id_t, jack_port_id_t, int, void* self) {
+  const CancellationDisabled guard;
   static_cast<Jack*>(self)->rewired.raise();
 }
 
 void on_port(jack_port_id_t id, int is_there, void* self) {
+  const CancellationDisabled guard;
   Jack& jack = *static_cast<Jack*>(self);
   if (is_there == 0) {
     const std::lock_guard lock(jack.mutex);
@@ -140,14 +150,14 @@ bool plug(Jack& jack, jack_port_t* ours, const char* theirs) {
   return jack_connect(jack.client, is_output ? name : theirs, is_output ? theirs : name) == 0;
 }
 
-// The same for -j: not where a person has pulled it.
+// Connects ports for -j, unless a person has removed this connection.
 void plug_anew(Jack& jack, jack_port_t* ours, const char* theirs) {
   if (!jack.wiring.knows({jack_port_short_name(ours), theirs})) {
     plug(jack, ours, theirs);
   }
 }
 
-// Our outputs to the physical ones in their order, every physical MIDI source to us.
+// Connects our outputs to the physical outputs in order.
 void connect(Jack& jack) {
   const Ports speakers(jack_get_ports(jack.client, nullptr, JACK_DEFAULT_AUDIO_TYPE,
                                       JackPortIsPhysical | JackPortIsInput),
@@ -182,7 +192,7 @@ void connect_inputs(Jack& jack) {
   }
 }
 
-// What patchbays show; a server without metadata does without.
+// Sets the metadata that patchbays show. Servers without metadata ignore it.
 void describe(Jack& jack, jack_port_t* port, const std::string& name, const char* group,
               int order) {
   constexpr const char* order_key = "http://jackaudio.org/metadata/order";
@@ -196,7 +206,8 @@ void describe(Jack& jack, jack_port_t* port, const std::string& name, const char
                     "http://www.w3.org/2001/XMLSchema#int");
 }
 
-// Ports only ever come: a connection that a person has made outlives a change of model.
+// Adds input ports. They are never removed, so that connections made by hand survive a change of
+// model.
 void set_audio_inputs(Jack& jack, int wanted) {
   for (int i = 0; i < std::min(wanted, most_audio_inputs); ++i) {
     Published<jack_port_t>& input = jack.inputs[static_cast<std::size_t>(i)];
@@ -220,7 +231,8 @@ std::vector<jack_port_t*> own_ports(const Jack& jack) {
   return ports;
 }
 
-// By now another port may be in its place, so that its name is what it was at the last look.
+// Marks the connections of unregistered ports as lost. JACK may have reused the port objects, so
+// their names are the ones seen at the last update.
 void lose_ports(Jack& jack) {
   std::vector<const jack_port_t*> gone;
   {
@@ -234,7 +246,7 @@ void lose_ports(Jack& jack) {
   }
 }
 
-// Sees what is connected, and connects what was or is to be.
+// Reads the current connections and restores the missing ones.
 void look_at_ports(Jack& jack, bool is_quiet) {
   lose_ports(jack);
   const std::vector<jack_port_t*> ports = own_ports(jack);
@@ -249,7 +261,7 @@ void look_at_ports(Jack& jack, bool is_quiet) {
     return jack_port_by_name(jack.client, port.c_str()) != nullptr;
   };
   jack.wiring.look(present, exists, is_quiet);
-  // Of a cable in doubt the port may be about to go, and we have yet to be told.
+  // Keep the names while a cable is doubtful: the notification that its port is gone may follow.
   if (!jack.wiring.is_in_doubt()) {
     jack.others.clear();
   }
@@ -272,7 +284,8 @@ void look_at_ports(Jack& jack, bool is_quiet) {
 
 void tick(Jack& jack) {
   constexpr std::int64_t patience_ns = 1'000'000'000;
-  constexpr std::int64_t doubt_ns = 250'000'000;  // in which a busy server tells of its ports, too
+  // A busy server reports unregistered ports within this time.
+  constexpr std::int64_t doubt_ns = 250'000'000;
   const std::int64_t now_ns = monotonic_ns();
   const bool has_changed = jack.rewired.lower();
   if (has_changed || now_ns >= jack.next_try_ns) {

@@ -5,6 +5,7 @@
 #include <map>
 
 #include "app/devices/audio.h"
+#include "app/devices/cancellation.h"
 #include "app/devices/midi_input.h"
 
 namespace ressort::devices {
@@ -14,12 +15,13 @@ struct MidiPort {
   MidiPort(RtMidi::Api api, const std::string& client, MidiDoor& door_in)
       : door(door_in), input(api, client) {
     input.setCallback(arrived, this);
-    input.ignoreTypes(false, true, true);  // tunings are system exclusive
+    input.ignoreTypes(false, true, true);  // false: receive system exclusive messages, for tunings
   }
 
-  // RtMidi's thread: it notes the time and passes on, no more. RtMidi's own time is that between
-  // messages; what we need is the clock that the audio thread reads.
+  // Passes a packet on with its time of arrival, on the clock that the audio thread reads. RtMidi's
+  // own time is relative to the previous message. [RtMidi's thread]
   static void arrived(double, std::vector<unsigned char>* bytes, void* self) {
+    const CancellationDisabled guard;  // with -m jack this is a thread of libjack
     MidiPort& port = *static_cast<MidiPort*>(self);
     port.door.arrive(port.reader, *bytes, monotonic_ns());
   }
@@ -61,7 +63,7 @@ Result<std::unique_ptr<MidiInput>> MidiInput::open(MidiApi api, const std::strin
                             "heard through ALSA; play by OSC or from the console"
                           : "no JACK server answers, so no keyboard can be heard through JACK"};
   if (api == MidiApi::alsa && access("/dev/snd/seq", R_OK | W_OK) != 0) {
-    return missing;  // RtMidi would find out too, but not without printing
+    return missing;  // checked here because RtMidi would print an error
   }
   const RtMidi::Api rt_api = api == MidiApi::alsa ? RtMidi::LINUX_ALSA : RtMidi::UNIX_JACK;
   try {
@@ -101,7 +103,7 @@ void MidiInput::tick() {
       return std::find(present.begin(), present.end(), source.first) == present.end();
     });
   } catch (const RtMidiError&) {
-    return;  // a source that vanished while we looked; the next tick sees it
+    return;  // a source vanished meanwhile; the next tick handles it
   }
 }
 

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cstdio>
 #include <memory>
+#include <thread>
 
 #include "tests/system/played.h"
 
@@ -171,6 +172,43 @@ TEST_CASE("The death of the server is survived, or told by the exit code", "[ser
     server->kill();
     CHECK(play.exit_code() == 75);
   }
+}
+
+// libjack cancels the callback's thread when the server ends, wherever the callback is just then.
+// Without CancellationDisabled the program terminated at the second, third and sixth end.
+TEST_CASE("An overloaded program survives every end of its server", "[server_loss]") {
+  const char* const kills = std::getenv("RESSORT_KILLS");
+  const int ends = kills != nullptr ? std::atoi(kills) : 8;
+  auto server = std::make_unique<Server>(128);
+  Child play(program({"play", "Gong", "-a", "jack", "-j", "-p", "8", "-u", osc_port}));
+  REQUIRE(answers());
+  std::atomic<int> loads{0};
+  std::jthread player([&](const std::stop_token& is_over) {
+    for (int i = 0; !is_over.stop_requested(); ++i) {
+      if (i % 60 == 0) {
+        lo_send(osc(), "/model/load", "s", loads++ % 2 == 0 ? "ThunderSheet" : "Gong");
+      }
+      lo_send(osc(), "/note/on", "ii", 40 + i % 40, 127);
+      lo_send(osc(), "/param/*", "f", 0.1f + 0.001f * static_cast<float>(i % 100));
+      std::this_thread::sleep_for(5ms);
+    }
+  });
+  for (int i = 0; i < ends && !play.has_ended(); ++i) {
+    CAPTURE(i);
+    std::this_thread::sleep_for(1s);
+    play.forget();
+    i % 2 == 0 ? server->end() : server->kill();
+    CHECK(play.says("is gone"));
+    server.reset();
+    server = std::make_unique<Server>(128);
+    CHECK(play.says("playing again"));
+  }
+  player.request_stop();
+  player.join();
+  CHECK(answers());
+  play.signal(SIGTERM);
+  CHECK(play.exit_code() == 0);
+  std::printf("%d ends of the server and %d loads\n", ends, loads.load());
 }
 
 }  // namespace ressort::servers::connections_test
