@@ -1,11 +1,11 @@
-// app: what the program's end says to who started it.
+// app: the program's exit codes.
 #pragma once
 
 namespace ressort::exit_code {
 
 inline constexpr int done = 0;
 inline constexpr int our_failure = 1;
-inline constexpr int wrong_use = 2;    // or input that cannot be read
-inline constexpr int audio_lost = 75;  // there is no audio, or none any more
+inline constexpr int wrong_use = 2;    // or unreadable input
+inline constexpr int audio_lost = 75;  // no audio device, or it was lost
 
 }  // namespace ressort::exit_code

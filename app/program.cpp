@@ -14,7 +14,7 @@
 namespace ressort {
 namespace {
 
-// What was to be said and could not be is a failure, however well the rest went.
+// Turns an output error into a failure, even if everything else succeeded.
 int said(int code) {
   if (std::fflush(stdout) == 0 && std::ferror(stdout) == 0) {
     return code;
@@ -26,14 +26,14 @@ int said(int code) {
 }  // namespace
 
 int run_program(int (*work)(int argc, char** argv), int argc, char** argv) {
-  // Without these, a file that is opened would take their place, and what is said go into it. What
-  // can only be read refuses what is said, as a closed one does.
+  // A closed standard descriptor would be reused by the next opened file, and messages would be
+  // written into that file. A read-only descriptor makes such writes fail.
   for (const int descriptor : {STDIN_FILENO, STDOUT_FILENO, STDERR_FILENO}) {
     if (fcntl(descriptor, F_GETFD) < 0) {
       static_cast<void>(open("/dev/null", O_RDONLY));
     }
   }
-  signal(SIGXFSZ, SIG_IGN);  // a file that may not grow is an error like a full disk
+  signal(SIGXFSZ, SIG_IGN);  // so that a file size limit is an error like a full disk
   try {
     return said(work(argc, argv));
   } catch (const std::bad_alloc&) {

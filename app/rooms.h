@@ -1,4 +1,4 @@
-// app: whose names each room finds without saying where they are, as core/rooms.h says it of core.
+// app: the namespaces that each room sees, like core/rooms.h.
 #pragma once
 
 #include "core/rooms.h"

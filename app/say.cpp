@@ -23,7 +23,7 @@ namespace {
 constexpr std::size_t most_bytes = std::size_t{1} << 20;
 constexpr std::chrono::milliseconds patience{200};
 
-// Returns when all of it is written, or nothing can be any more.
+// Returns when everything is written, or nothing can be written any more.
 void write_all(int descriptor, const std::string& text) {
   for (std::size_t at = 0; at < text.size();) {
     const ssize_t count = write(descriptor, text.data() + at, text.size() - at);
@@ -38,7 +38,8 @@ void write_all(int descriptor, const std::string& text) {
   }
 }
 
-// Its thread may wait for a reader for ever, so that it is never joined and this never ends.
+// Writes the lines on a thread of its own. The thread may block for ever, so it is never joined and
+// this object is never destroyed.
 class Mouth {
  public:
   Mouth() {
@@ -80,7 +81,7 @@ class Mouth {
     std::unique_lock lock(mutex_);
     while (true) {
       wake_.wait(lock, [this] { return !lines_.empty(); });
-      const auto& [descriptor, text] = lines_.front();  // stays where it is as others are added
+      const auto& [descriptor, text] = lines_.front();  // push_back does not move it
       lock.unlock();
       write_all(descriptor, text);
       lock.lock();
@@ -100,7 +101,7 @@ class Mouth {
   std::condition_variable wake_;
   std::condition_variable idle_;
   std::deque<std::pair<int, std::string>> lines_;
-  std::size_t bytes_ = 0;  // of them
+  std::size_t bytes_ = 0;  // of `lines_`
   std::size_t left_out_ = 0;
   bool is_silent_ = false;
 };
@@ -110,7 +111,7 @@ Mouth& mouth() {
   return *one;
 }
 
-// A descriptor's columns; 0: it is no terminal, or nobody knows.
+// Returns the terminal's columns; 0: no terminal or unknown.
 std::size_t columns_of(int descriptor) {
   winsize size{};
   return isatty(descriptor) != 0 && ioctl(descriptor, TIOCGWINSZ, &size) == 0 ? size.ws_col : 0;
@@ -124,7 +125,7 @@ bool has_colour(int descriptor) {
          std::string_view(kind) != "dumb";
 }
 
-// The word, where it stands at the beginning of a line or after a place in a file.
+// Colours a word at the start of a line or after "FILE:LINE:COLUMN: ".
 void colour(std::string& text, std::string_view word, std::string_view code) {
   for (std::size_t at = 0; (at = text.find(word, at)) != text.npos;) {
     const bool is_first = at == 0 || text[at - 1] == '\n';

@@ -1,23 +1,23 @@
-// app: what the program says while it plays. Nobody waits for who reads it.
+// app: prints messages while the program plays, without waiting for the reader.
 #pragma once
 
 #include <string>
 
 namespace ressort {
 
-// A line to stdout, to stderr. Lines keep their order. Where nobody has read the last megabyte, a
-// line is left out, and how many were is said when somebody reads again. [any thread but audio]
+// Print a line to stdout or stderr, in order. If a megabyte is unread, lines are dropped, and their
+// number is printed when somebody reads again. [any thread but audio]
 void say(const std::string& line);
 void complain(const std::string& line);
 
-// The text as `say` puts it on a terminal: lines broken at its width, and the words error and
-// warning in colour unless NO_COLOR is set; elsewhere as it is.
+// Returns the text as `say` prints it to a terminal: wrapped to its width, with the words error and
+// warning in colour unless NO_COLOR is set. Elsewhere returns it unchanged.
 std::string for_terminal(const std::string& text);
 
-// Until all of it is out: true; or false, a fifth of a second later, if nobody reads it.
+// Waits until everything is printed; returns false after 0.2 s if nobody reads.
 bool wait_until_said();
 
-// At the end, when nobody reads: what is not out never will be, and nothing more is said.
+// Drops all unprinted lines and prints nothing more: the program ends.
 void fall_silent();
 
 }  // namespace ressort

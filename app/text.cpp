@@ -26,7 +26,7 @@ std::string joined(const std::vector<std::string>& words, std::string_view betwe
 
 namespace {
 
-// How many characters of UTF-8 there are.
+// Returns the number of characters of a UTF-8 text.
 std::size_t width_of(const std::string& text) {
   return static_cast<std::size_t>(std::count_if(text.begin(), text.end(), [](char byte) {
     return (static_cast<unsigned char>(byte) & 0xC0U) != 0x80U;
@@ -61,7 +61,8 @@ char lower(char c) {
   return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
 }
 
-// By optimal string alignment (Damerau and Levenshtein, no letter edited twice), whatever the case.
+// Returns the optimal string alignment distance (Damerau-Levenshtein without repeated edits of one
+// letter), ignoring case.
 std::size_t distance(std::string_view a, std::string_view b) {
   std::vector<std::vector<std::size_t>> d(a.size() + 1, std::vector<std::size_t>(b.size() + 1));
   for (std::size_t i = 0; i <= a.size(); ++i) {
@@ -81,7 +82,7 @@ std::size_t distance(std::string_view a, std::string_view b) {
   return d[a.size()][b.size()];
 }
 
-// Where the second of a line's columns begins, else where its first word does.
+// Returns the start of a line's second column, or of its first word if it has one column.
 std::size_t hanging_indent(std::string_view line) {
   const std::size_t first = std::min(line.find_first_not_of(' '), line.size());
   const std::size_t gap = line.find("  ", first);
@@ -97,7 +98,7 @@ bool same_but_case(std::string_view a, std::string_view b) {
 }
 
 std::optional<std::string> nearest_word(std::string_view word, std::span<const std::string> known) {
-  constexpr std::size_t longest = 64;  // nobody types so much of a name
+  constexpr std::size_t longest = 64;  // names are shorter
   std::optional<std::string> nearest;
   std::size_t least = word.size() > longest ? 0 : std::max<std::size_t>(1, word.size() / 3) + 1;
   for (const std::string& candidate : known) {
@@ -125,7 +126,7 @@ std::string wrapped(const std::string& text, std::size_t width) {
     at = end + 1;
     const std::size_t indent = hanging_indent(line);
     while (width_of(line) > width && 2 * indent < width) {
-      std::size_t cut = 0;  // the last blank before which there is room
+      std::size_t cut = 0;  // last space that fits
       std::size_t columns = 0;
       for (std::size_t i = 0; i < line.size() && columns <= width; ++i) {
         if (line[i] == ' ' && i > indent) {

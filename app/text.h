@@ -1,4 +1,4 @@
-// app: numbers and tables as people read them. Pure.
+// app: text functions: numbers, tables, line breaks. Pure.
 #pragma once
 
 #include <optional>
@@ -16,21 +16,21 @@ std::string counted(std::size_t count, std::string_view one, std::string_view ma
 
 std::string joined(const std::vector<std::string>& words, std::string_view between);
 
-// Rows in aligned columns, without a line end after the last.
+// Returns the rows in aligned columns, without a final newline.
 std::string table(const std::vector<std::vector<std::string>>& rows, std::size_t indent = 0);
 
-// Whether two words differ in the case of their ASCII letters at most.
+// Returns true if the words differ at most in the case of ASCII letters.
 bool same_but_case(std::string_view a, std::string_view b);
 
-// The one of `known` that a person who typed `word` may have meant: it differs by the case of its
-// letters, or by at most a third of them put in, left out, changed or swapped with the next.
+// Returns the word of `known` that a person probably meant: it differs only in case, or by
+// inserted, deleted, replaced or swapped letters, at most a third of them.
 std::optional<std::string> nearest_word(std::string_view word, std::span<const std::string> known);
 
-// "; did you mean 'X'?", or nothing.
+// Returns "; did you mean 'X'?" or an empty string.
 std::string did_you_mean(std::string_view word, std::span<const std::string> known);
 
-// Lines no longer than `width` characters, broken at blanks; what follows a break is indented as
-// the line's first word after two blanks is, or as the line.
+// Breaks lines at spaces to at most `width` characters. Continuation lines are indented like the
+// line's second column, if it has one, or like the line.
 std::string wrapped(const std::string& text, std::size_t width);
 
 }  // namespace ressort

@@ -1,10 +1,9 @@
-// app: which ressort this is. Filled in by commit.cmake when the program is built.
+// app: version of the program. commit.cmake fills it in at build time.
 #pragma once
 
 namespace ressort {
 
 extern const char* const version;  // "0.1.0"
-extern const char* const commit;   // ten digits, with a '+' where files had been changed since;
-                                   //   "unknown" outside a checkout
+extern const char* const commit;   // ten digits, with '+' for a modified checkout, or "unknown"
 
 }  // namespace ressort

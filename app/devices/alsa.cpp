@@ -14,11 +14,11 @@ namespace ressort::devices {
 namespace {
 
 constexpr int periods = 3;
-constexpr int most_captured = 2;  // channels of the device
+constexpr int most_captured = 2;  // channels
 constexpr snd_pcm_format_t formats[] = {SND_PCM_FORMAT_FLOAT, SND_PCM_FORMAT_S32,
                                         SND_PCM_FORMAT_S16};
 
-// One direction of a device, as it was settled with it.
+// One direction of a device, with the settings that the device accepted.
 struct Stream {
   ~Stream() {
     if (pcm != nullptr) {
@@ -34,8 +34,8 @@ struct Stream {
   std::vector<std::byte> packed;  // [frame][channel] in the device's format
 };
 
-// What comes in. It is read a period late, so that a device that is not quite in step has something
-// to give.
+// The audio inputs. They are read one period late, so that a device that is slightly out of step
+// always has data.
 struct Capture {
   Stream stream;
   bool is_filled = false;
@@ -54,9 +54,9 @@ struct Alsa {
   Process& process;
   std::string device;
   Stream out;
-  std::unique_ptr<Capture> in;  // opened when a model listens; it stays
+  std::unique_ptr<Capture> in;  // opened when a model needs audio inputs; stays open
   Published<Capture> captured;
-  bool is_timed = false;       // the device takes everything at once: we keep the time
+  bool is_timed = false;       // the device accepts any amount at once: this thread keeps the time
   std::vector<float> samples;  // [channel][frame]
   std::vector<float*> outputs;
   Flag stop;
@@ -64,7 +64,8 @@ struct Alsa {
   std::thread thread;
 };
 
-// The process never passes full scale, so that nothing has to be clipped here.
+// Converts the output to the device's format. The process limits it to full scale, so nothing
+// clips.
 void Alsa::interleave() {
   const auto fill = [&](auto zero, double scale) {
     using Sample = decltype(zero);
@@ -89,7 +90,7 @@ void Alsa::interleave() {
   }
 }
 
-// False when the device is gone for good.
+// Writes a period to the device; false if the device is lost.
 bool Alsa::write() {
   const std::size_t frame_bytes =
       out.channels * static_cast<std::size_t>(snd_pcm_format_physical_width(out.format)) / 8;
@@ -130,7 +131,7 @@ void Alsa::run() {
   }
 }
 
-// The inputs' next period: silence where the device has none to give.
+// Returns the next period of the inputs, or silence if the device has no data.
 std::span<const float* const> Alsa::listen() {
   Capture* const capture = captured.get();
   if (capture == nullptr) {
@@ -179,7 +180,7 @@ std::span<const float* const> Alsa::listen() {
   return capture->inputs;
 }
 
-// Settles format, channels, rate and period with the device; the first call that fails says why.
+// Negotiates format, channels, rate and period with the device. Returns the first error.
 int configure(Stream& alsa, unsigned channels, double rate_hz, snd_pcm_uframes_t frames) {
   snd_pcm_hw_params_t* hardware = nullptr;
   snd_pcm_hw_params_alloca(&hardware);
@@ -205,8 +206,7 @@ int configure(Stream& alsa, unsigned channels, double rate_hz, snd_pcm_uframes_t
   return failure;
 }
 
-// A model wants to listen. Where the device has nothing to listen with, it hears silence, and that
-// is told.
+// Opens the device's inputs for a model. If that fails, reports it; the model gets silence.
 void open_capture(Alsa& alsa, int wanted) {
   if (wanted <= 0 || alsa.in != nullptr) {
     return;

@@ -1,5 +1,5 @@
-// app/devices: what the program needs from an audio backend: a list of functions. jack.cpp,
-// alsa.cpp and dummy.cpp each open one; the process is all that they know of the rest.
+// app/devices: the interface of an audio backend. jack.cpp, alsa.cpp and dummy.cpp implement it; a
+// backend knows nothing of the rest of the program but the process.
 #pragma once
 
 #include <functional>
@@ -14,29 +14,28 @@ namespace ressort::devices {
 
 struct AudioOptions {
   std::string client_name = "ressort";
-  bool connect = false;            // to the physical outputs and to every MIDI source
-  int outputs = 2;                 // ports: out_left and out_right, or out_1...
-  double rate_hz = 48000.0;        // a wish; JACK has its own
-  int period_frames = 256;         // a wish; JACK has its own
-  std::string device = "default";  // ALSA's
-  Wiring wiring;                   // of the device that was lost, to be made again
+  bool connect = false;            // connect to the physical outputs and all MIDI sources
+  int outputs = 2;                 // ports: out_left and out_right, or out_1 and so on
+  double rate_hz = 48000.0;        // ignored by JACK, which has its own
+  int period_frames = 256;         // ignored by JACK, which has its own
+  std::string device = "default";  // ALSA only
+  Wiring wiring;                   // connections of the lost device, to be restored
 };
 
-// A running backend. Closing it, or letting it go, ends its audio thread; the process may then be
-// used by another. All functions: [control].
+// A running backend. Closing or destroying it ends its audio thread; another backend may then use
+// the process. All functions: [control].
 struct AudioDevice {
   std::string kind;         // "jack", "alsa" or "dummy"
   std::string description;  // "JACK, 48000 Hz, 256 frames"
   double rate_hz = 48000.0;
-  int priority = 0;  // of its audio thread, if that has one for real time
+  int priority = 0;  // real-time priority of its audio thread; 0: none
   std::function<void()> close;
-  std::function<bool()> is_lost;              // the server or the device is gone, or runs at
-                                              //   another rate: close it and open it anew
-  std::function<void(int)> set_audio_inputs;  // the model wants so many
-  std::function<void()> tick;                 // often: connects what was plugged in
-  std::function<Wiring()> wiring;             // what to make again on the next device
-  bool has_midi = false;                      // brings its own MIDI, with exact frames
-  std::string note;                           // what was tried before it, and why it failed
+  std::function<bool()> is_lost;              // gone or at another rate: close and reopen it
+  std::function<void(int)> set_audio_inputs;  // adds inputs until there are this many
+  std::function<void()> tick;                 // call it often: connects ports that were plugged in
+  std::function<Wiring()> wiring;             // connections to restore on the next device
+  bool has_midi = false;                      // delivers MIDI itself, with exact frames
+  std::string note;  // backends that were tried before it, and their errors
 
   AudioDevice() = default;
   AudioDevice(AudioDevice&& other) noexcept { *this = std::move(other); }
@@ -61,26 +60,26 @@ struct AudioDevice {
   }
 };
 
-// Errors say what is missing and what to do.
+// Each opens a backend. Errors say what is missing and what to do.
 Result<AudioDevice> open_jack(Process& process, const AudioOptions& options);
 Result<AudioDevice> open_alsa(Process& process, const AudioOptions& options);
 Result<AudioDevice> open_dummy(Process& process, const AudioOptions& options);
 
-// The first that opens of "jack", "alsa" and "dummy", or the one that `wanted` names.
+// Opens the backend `wanted`, or for "auto" the first of "jack", "alsa" and "dummy" that opens.
 Result<AudioDevice> open_audio(const std::string& wanted, Process& process,
                                const AudioOptions& options);
 
-// Asks for real-time priority for the calling thread; without the right to it, it stays as it is.
+// Requests real-time priority for the calling thread. Does nothing without the permission.
 void raise_priority();
 
-// Whether that would be granted. [control]
+// Returns true if the program may use real-time priority. [control]
 bool may_raise_priority();
-inline constexpr int audio_priority = 70;  // above desktops, below the kernel's own audio threads
+inline constexpr int audio_priority = 70;  // below the kernel's audio threads
 
-// Sleeps until the monotonic clock reads this.
+// Sleeps until the monotonic clock reaches this time.
 void sleep_until(std::int64_t time_ns);
 
-// The monotonic clock, in ns. Reads shared memory, makes no system call. [any thread]
+// Returns the monotonic clock in ns. Reads shared memory, makes no system call. [any thread]
 std::int64_t monotonic_ns();
 
 }  // namespace ressort::devices

@@ -1,4 +1,4 @@
-// A timer instead of a sound card: everything runs as it would, nothing is heard.
+// app/devices: a silent backend driven by a timer.
 
 #include <cmath>
 #include <memory>

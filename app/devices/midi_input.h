@@ -1,4 +1,4 @@
-// app/devices: MIDI from outside JACK. A door that any thread may knock at, and RtMidi behind it.
+// app/devices: MIDI from outside JACK, through RtMidi.
 #pragma once
 
 #include <memory>
@@ -12,14 +12,14 @@
 
 namespace ressort::devices {
 
-// Where packets with a time of arrival enter. They are played one period later, at constant
-// latency. A test drives it as RtMidi does.
+// The entry for MIDI packets with a time of arrival. They are played one period later, at constant
+// latency. Tests call it as RtMidi does.
 class MidiDoor {
  public:
   explicit MidiDoor(Process& process) : process_(process) {}
 
-  // `reader` keeps one source's running status. [any thread but audio] The lock is between
-  // sources; the audio thread never sees it.
+  // Plays a packet. `reader` keeps the running status of one source. The lock is shared by the
+  // sources only, never by the audio thread. [any thread but audio]
   void arrive(MidiReader& reader, std::span<const std::uint8_t> bytes, std::int64_t time_ns);
 
  private:
@@ -29,15 +29,15 @@ class MidiDoor {
 
 enum class MidiApi { alsa, jack };
 
-// Listens to every source there is and to those that are plugged in later; offers a port of its
-// own that others can be connected to.
+// Listens to all MIDI sources, including ones plugged in later, and opens a port that others can
+// connect to.
 class MidiInput {
  public:
   static Result<std::unique_ptr<MidiInput>> open(MidiApi api, const std::string& client_name,
                                                  bool connect, MidiDoor& door);
   ~MidiInput();
 
-  // About every second: connects new sources, forgets those that are gone. [control]
+  // Connects new sources and drops unplugged ones. Call it about once a second. [control]
   void tick();
 
  private:

@@ -1,4 +1,4 @@
-// app/devices: what a device's ports are connected to, by name, so that it can be connected again.
+// app/devices: remembers the connections of a device's ports by name, to restore them.
 #pragma once
 
 #include <functional>
@@ -9,39 +9,40 @@
 
 namespace ressort::devices {
 
-// A connection of one of our ports, whichever way the sound goes.
+// A connection of one of our ports, in either direction.
 struct Cable {
-  std::string ours;    // the port, without its client: that may be called differently next time
+  std::string ours;    // short name, because the client's name may change
   std::string theirs;  // "client:port"
   bool operator==(const Cable&) const = default;
 };
 
-// Remembers every cable that there was until a person pulls it. What goes with its port, or with
-// the whole server, is missing until it can be plugged in again. [control]
+// Remembers every connection until a person removes it. Connections lost with their port or server
+// are missing until they can be restored. [control]
 class Wiring {
  public:
   static constexpr std::size_t most_cables = 1024;  // then the oldest are forgotten
 
-  // All cables that there are now. One that is gone was pulled if its other port is still there at
-  // a later look, when all `is_quiet`: a client that leaves takes its cables first, its ports then.
+  // Updates the states from all present connections. A connection that is gone was removed by a
+  // person if its other port still exists at a later update without changes (`is_quiet`): a closing
+  // client loses its connections first and its ports afterwards.
   void look(const std::vector<Cable>& present,
             const std::function<bool(const std::string& port)>& exists, bool is_quiet);
 
-  // One has gone, and whether it was pulled a later look will tell.
+  // Returns true if a connection is gone and a later update will tell why.
   bool is_in_doubt() const;
 
-  // To be plugged in once both ports are there.
+  // Returns the connections to restore once both ports exist.
   std::vector<Cable> missing() const;
 
-  // It was plugged in once, whatever became of it.
+  // Returns true if this connection has ever been made.
   bool knows(const Cable& cable) const;
 
-  // A port of others has gone, and its cables with it, whether or not it has come back meanwhile.
+  // Marks all connections of this port as missing, even if the port has come back meanwhile.
   void lose(const std::string& theirs);
-  // The device is gone, and its cables with it.
+  // Marks all connections as missing, because the device is gone.
   void lose_all();
 
-  // There was one once, and it is to be plugged in again.
+  // Adds a connection to restore.
   void expect(const Cable& cable);
 
  private:

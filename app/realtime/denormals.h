@@ -1,4 +1,4 @@
-// app/realtime: what a thread that computes sound does about numbers too small to hear.
+// app/realtime: denormal numbers in the threads that compute sound.
 #pragma once
 
 #include <cstdint>
@@ -11,8 +11,8 @@
 
 namespace ressort::realtime {
 
-// Numbers too small to hear can cost a hundred times what others cost; they are taken for 0 while
-// this lives, in this thread.
+// Sets the processor to treat denormal numbers as zero in this thread, as long as this object
+// lives. They are inaudible, and one operation on them can cost a hundred times the usual.
 class DenormalsFlushed {
  public:
 #if defined(__SSE2__)

@@ -5,10 +5,10 @@
 namespace ressort::realtime {
 namespace {
 
-// Where voices gave way and the load stayed above this share of what it was, they cost nothing.
+// Stealing voices did not help if the load stays above this share of what it was.
 constexpr double unmoved = 0.9;
 
-// So many of these voices there is time for, if each costs the same.
+// Returns how many of `sounding` equally expensive voices there is time for.
 int affordable(int sounding, double load) {
   const double voices = DspLoad::wanted / std::max(load, 1e-3) * sounding;
   return static_cast<int>(std::min(voices, 1e6));
@@ -65,13 +65,13 @@ std::optional<int> DspLoad::give_way(int sounding, int all) {
     if (limit_ == 0 || lasting_ < unmoved * first_) {
       return {};
     }
-    // It is not the voices that cost.
+    // Something else than the voices is expensive.
     begin_anew();
     waits_s_ = patience_s;
     return all;
   }
   if (lasting_ < 1.0 && lasting_ > unmoved * before_ && before_ > 0.0) {
-    return {};  // it fits, and more of them would not help either
+    return {};  // it fits, and stealing more would not help
   }
   before_ = lasting_;
   limit_ = std::clamp(affordable(sounding, lasting_), 1, sounding - 1);

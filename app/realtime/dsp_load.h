@@ -1,4 +1,4 @@
-// app/realtime: what share of its time the callback takes, and how many voices there is time for.
+// app/realtime: the callback's load, and the number of voices that it leaves time for.
 #pragma once
 
 #include <array>
@@ -9,33 +9,34 @@
 
 namespace ressort::realtime {
 
-// What one block says is not believed: the machine holds up a thread now and then, whatever it
-// plays. What lasts is the median of the last spans, and voices give way to that alone.
-// All functions: [audio], wait-free.
+// Measures the load of the callback and limits the number of voices. One slow block does not count,
+// because the machine holds up any thread now and then: voices are stolen only when the median of
+// the last `spans` spans is too high. All functions: [audio], wait-free.
 class DspLoad {
  public:
   static constexpr std::size_t spans = 5;
-  static constexpr double span_s = 0.005;  // of sound, or a block that is longer
-  static constexpr double most = 0.9;      // of the time there is: above it voices give way
-  static constexpr double wanted = 0.75;   // of it, when they have
-  static constexpr double low = 0.6;       // of it: below it for so long more may sound again
+  static constexpr double span_s = 0.005;  // of sound; a longer block is a span
+  static constexpr double most = 0.9;      // load above which voices are stolen
+  static constexpr double wanted = 0.75;   // load that the remaining voices should have
+  static constexpr double low = 0.6;  // load below which more voices may sound, after low_s seconds
   static constexpr double low_s = 1.0;
-  static constexpr double patience_s = 10;  // until voices give way again, where it did not help
+  static constexpr double patience_s = 10;  // until the next stealing, after one that did not help
 
-  // A block of `sound_s` seconds took `took_s`.
+  // Records that a block of `sound_s` seconds took `took_s` seconds to compute.
   void add(double took_s, double sound_s);
 
-  double mean() const { return mean_; }        // over about a second
-  double lasting() const { return lasting_; }  // 0 while nothing is known
+  double mean() const { return mean_; }        // mean load of about the last second
+  double lasting() const { return lasting_; }  // median load of the last spans; 0: not known yet
   bool is_over() const { return lasting_ > most; }
 
-  // How many voices may sound, if that changes now, where so many do; `all` is no limit at all.
+  // Returns the new limit on the number of voices if it changes now. `sounding` voices sound of
+  // `all`; a limit of `all` is none.
   std::optional<int> judge(int sounding, int all);
-  int limit() const { return limit_; }  // 0: none
+  int limit() const { return limit_; }  // voices; 0: no limit
 
-  // Something else sounds from now on: no limit holds, and nothing is known.
+  // Removes the limit and forgets the measurements: another model plays from now on.
   void begin_anew();
-  // What was measured holds no more: voices have been taken away.
+  // Forgets the measurements, because voices were just stolen.
   void forget();
 
  private:
@@ -43,17 +44,17 @@ class DspLoad {
 
   double mean_ = 0.0;
   double lasting_ = 0.0;
-  double took_s_ = 0.0;  // of the span that is not yet whole
+  double took_s_ = 0.0;  // of the current span
   double sound_s_ = 0.0;
-  bool skips_ = false;   // this span: what gives way still fades in it
-  bool is_new_ = false;  // `lasting_`, since the last judgement
+  bool skips_ = false;   // ignore this span: stolen voices still fade in it
+  bool is_new_ = false;  // `lasting_` has changed since the last judge()
   std::array<double, spans> loads_{};
   std::size_t next_ = 0;
-  int limit_ = 0;         // of voices; 0: none
-  double first_ = 0.0;    // load when voices began to give way
-  double before_ = 0.0;   // load when some gave way last
-  double quiet_s_ = 0.0;  // for so long the load has been low
-  double waits_s_ = 0.0;  // until voices may give way again
+  int limit_ = 0;         // voices; 0: no limit
+  double first_ = 0.0;    // load when stealing began
+  double before_ = 0.0;   // load at the last stealing
+  double quiet_s_ = 0.0;  // seconds of low load
+  double waits_s_ = 0.0;  // seconds until voices may be stolen again
 };
 
 }  // namespace ressort::realtime

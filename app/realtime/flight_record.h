@@ -1,5 +1,5 @@
-// app/realtime: what moved the engines, in the order in which it did: all that a Process needs to
-// play the same samples once more.
+// app/realtime: a log of everything that changed the engines, in order. A Process can reproduce the
+// same samples from it.
 #pragma once
 
 #include <cstdint>
@@ -11,13 +11,13 @@ namespace ressort::realtime {
 
 struct FlightRecord {
   enum class Kind : std::uint8_t {
-    event,   // acted
-    rate,    // what follows is played at `event.value` Hz
-    period,  // from here on blocks have `count` frames and `channels` outputs
-    take,    // the engine whose number is `count` was taken to be the next
-    limit,   // after the block before, `count` voices may sound at once
-    hurry,   // the same: what fades goes at once
-    gap,     // what was before is not known: nobody read in time
+    event,   // an event acted
+    rate,    // the sample rate is `event.value` Hz from here on
+    period,  // blocks have `count` frames and `channels` outputs from here on
+    take,    // the engine with the number `count` became the next one
+    limit,   // after this block, at most `count` voices sound
+    hurry,   // after this block, the fading engine ends at once
+    gap,     // records before this one were lost: the reader was too slow
   };
   std::int64_t frame = 0;  // of the process's own count
   Kind kind = Kind::event;

@@ -1,5 +1,5 @@
-// app/realtime: every atomic of the program, and nothing else. What passes between the audio thread
-// and the others, and the promise that each side makes.
+// app/realtime: all atomics of the program, and nothing else: the objects that pass data between
+// the audio thread and the others. Each function names the thread that may call it.
 #pragma once
 
 #include <array>
@@ -15,16 +15,16 @@
 
 namespace ressort::realtime {
 
-// Hands one heap object at a time to the audio thread and takes it back to be destroyed
-// elsewhere. One offering thread, one audio thread.
+// Hands one heap object at a time to the audio thread and takes it back, so that another thread
+// deletes it. One offering thread, one audio thread.
 template <class T>
 class Slot {
  public:
-  // Makes `next` the one to take. What was offered before and not yet taken comes back; it is
-  // the caller's to delete. [offering thread] wait-free
+  // Offers `next`. Returns the previous offer if the audio thread has not taken it; the caller
+  // deletes it. [offering thread] wait-free
   T* offer(T* next) { return offered_.exchange(next, std::memory_order_acq_rel); }
 
-  // The newest offer, once; null if there is none. [audio] wait-free
+  // Returns the newest offer, once; null if there is none. [audio] wait-free
   T* take() {
     return offered_.load(std::memory_order_relaxed) == nullptr
                ? nullptr
@@ -35,18 +35,18 @@ class Slot {
     return offered_.load(std::memory_order_relaxed) != nullptr;
   }
 
-  // Whether retire() will succeed: nobody else gives any back. [audio] wait-free
+  // Returns true if retire() will succeed. [audio] wait-free
   bool has_room() const { return retired_.load(std::memory_order_acquire) == nullptr; }
 
-  // Gives one back. False when the other side is behind: keep it and try in the next block.
-  // [audio] wait-free
+  // Returns an object to the offering thread. False if the previous one was not collected yet: try
+  // again in the next block. [audio] wait-free
   bool retire(T* old) {
     T* empty = nullptr;
     return retired_.compare_exchange_strong(empty, old, std::memory_order_release,
                                             std::memory_order_relaxed);
   }
 
-  // One to delete, or null. [offering thread] wait-free
+  // Returns an object to delete, or null. [offering thread] wait-free
   T* collect() { return retired_.exchange(nullptr, std::memory_order_acq_rel); }
 
  private:
@@ -54,13 +54,14 @@ class Slot {
   std::atomic<T*> retired_{nullptr};
 };
 
-// A ring from one thread to one other. A full ring refuses; nobody waits.
+// A ring buffer with one writer and one reader. A push into a full ring fails; neither side waits.
 template <class T>
 class Ring {
  public:
   explicit Ring(std::size_t capacity) : items_(capacity) {}
   bool push(const T& item) { return push_all({&item, 1}); }  // [its one writer] wait-free
-  // All or none, and as much as `spare` stays free; the reader finds all of them or none.
+  // Pushes all items, or none if fewer than `spare` places would stay free. The reader sees all of
+  // them at once.
   bool push_all(std::span<const T> items, std::size_t spare = 0) {  // [its one writer] wait-free
     const std::size_t end = end_.load(std::memory_order_relaxed);
     const std::size_t held = end - begin_.load(std::memory_order_acquire);
@@ -89,12 +90,12 @@ class Ring {
 
  private:
   std::vector<T> items_;
-  alignas(64) std::atomic<std::size_t> begin_{0};  // what has ever been taken...
-  alignas(64) std::atomic<std::size_t> end_{0};    // ...and put; apart, as two threads write them
+  alignas(64) std::atomic<std::size_t> begin_{0};  // items ever popped
+  alignas(64) std::atomic<std::size_t> end_{0};    // items ever pushed; on a cache line of its own
 };
 
-// A semaphore that nobody waits at: permits are taken before something is handed over, and given
-// back when it is done with; who finds too few knows at once.
+// A semaphore without waiting. A thread takes permits before it hands over items and gives them
+// back when the items are done; take() fails if there are too few.
 class Permits {
  public:
   explicit Permits(std::size_t count) : free_(count) {}
@@ -114,7 +115,7 @@ class Permits {
   std::atomic<std::size_t> free_;
 };
 
-// A count that any thread adds to and any may read.
+// A counter that any thread may increase and read.
 class Counter {
  public:
   void add(std::uint64_t amount) { count_.fetch_add(amount, std::memory_order_relaxed); }
@@ -124,7 +125,7 @@ class Counter {
   std::atomic<std::uint64_t> count_{0};
 };
 
-// A flag that any thread may raise and any may look at.
+// A flag that any thread may raise and read.
 class Flag {
  public:
   void raise() { raised_.store(true, std::memory_order_release); }
@@ -135,17 +136,17 @@ class Flag {
   std::atomic<bool> raised_{false};
 };
 
-// Whose a task is: its owner's, who offers it round by round, or for a while a helper's. Every
-// offer has a number, so that nobody claims one that has passed.
+// The ownership of a task that a helper may perform in the owner's place. The owner offers the task
+// once a round. Every offer has a number (ABA counter), so that a helper cannot claim an old one.
 class Claim {
  public:
-  // Whether no helper is in it. [owner] wait-free
+  // Returns true if no late helper holds the task. [owner] wait-free
   bool is_free() const { return state(word_.load(std::memory_order_acquire)) != left; }
   void offer() {  // [owner, while it is free] wait-free
     offers_ += states;
     word_.store(offers_ | open, std::memory_order_release);
   }
-  // The owner does it himself; false if a helper has it. [owner] wait-free
+  // Takes the task back to perform it. False if a helper has claimed it. [owner] wait-free
   bool take_back() {
     std::uint64_t word = offers_ | open;
     return word_.compare_exchange_strong(word, offers_ | closed, std::memory_order_acq_rel);
@@ -153,7 +154,8 @@ class Claim {
   bool is_done() const {  // [owner]
     return state(word_.load(std::memory_order_acquire)) == done;
   }
-  // The helper is late, and keeps it until finish(); false if it is done now. [owner] wait-free
+  // Gives up on a late helper, which keeps its data until finish(). False if the helper is done by
+  // now. [owner] wait-free
   bool leave() {
     std::uint64_t word = offers_ | helped;
     return word_.compare_exchange_strong(word, offers_ | left, std::memory_order_acq_rel);
@@ -164,7 +166,7 @@ class Claim {
            word_.compare_exchange_strong(word, word - open + helped, std::memory_order_acq_rel,
                                          std::memory_order_relaxed);
   }
-  // Done, in time or not; whoever has claimed it leaves it. [helper] wait-free
+  // Ends the helper's work, in time or late. [helper] wait-free
   void finish() {
     std::uint64_t word = word_.load(std::memory_order_relaxed);
     while (!word_.compare_exchange_weak(word,
@@ -182,23 +184,23 @@ class Claim {
   static constexpr std::uint64_t left = 4;
   static std::uint64_t state(std::uint64_t word) { return word % states; }
 
-  std::uint64_t offers_ = 0;  // the owner's
+  std::uint64_t offers_ = 0;  // owner only
   alignas(64) std::atomic<std::uint64_t> word_{closed};
 };
 
-// A pointer that is shown for a while. Who uses it says so, and so its owner knows when nobody does
-// any more (a hazard pointer).
+// A hazard pointer (Michael, 2004): a pointer that its owner shows for a while. Each user announces
+// that it uses the pointer, so the owner knows when it may delete the object.
 template <class T>
 class Shown {
  public:
   explicit Shown(std::size_t users) : users_(users) {}
-  // False where another one is shown. [its owner] wait-free
+  // Returns false if another pointer is shown. [its owner] wait-free
   bool show(T* value) {
     T* nothing = nullptr;
     return value_.compare_exchange_strong(nothing, value);
   }
-  void hide() { value_.store(nullptr); }  // [who has shown it] wait-free
-  // What is shown, or null; it stays what it is until leave(). [the user] wait-free
+  void hide() { value_.store(nullptr); }  // [the thread that showed it] wait-free
+  // Returns the shown pointer or null. It stays valid until leave(). [the user] wait-free
   T* enter(std::size_t user) {
     T* const value = value_.load(std::memory_order_relaxed);
     if (value == nullptr) {
@@ -212,7 +214,7 @@ class Shown {
     return nullptr;
   }
   void leave(std::size_t user) { users_[user].value.store(nullptr, std::memory_order_release); }
-  // Once it is hidden. [any thread]
+  // Returns true if a user still uses `value`. Call it after hide(). [any thread]
   bool is_used(const T* value) const {
     for (const User& user : users_) {
       if (user.value.load() == value) {
@@ -230,7 +232,7 @@ class Shown {
   std::vector<User> users_;
 };
 
-// A moment of the monotonic clock, in ns, that one thread writes and others read.
+// A time of the monotonic clock in ns, written by one thread and read by others.
 class Moment {
  public:
   void set(std::int64_t time_ns) { time_ns_.store(time_ns, std::memory_order_relaxed); }
@@ -240,7 +242,7 @@ class Moment {
   std::atomic<std::int64_t> time_ns_{0};
 };
 
-// A pointer that one thread publishes and the audio thread reads; what it points to outlives both.
+// A pointer that one thread sets and the audio thread reads. The object outlives both.
 template <class T>
 class Published {
  public:
@@ -251,8 +253,8 @@ class Published {
   std::atomic<T*> value_{nullptr};
 };
 
-// The newest of what one thread writes, for one that reads it when it likes; nobody waits and
-// nothing is copied. One of three values is being written, one is being read, one lies between.
+// A triple buffer: the newest value of one writer for one reader, without waiting or copying. One
+// of the three values is written, one is read, and one lies between.
 template <class T>
 class TripleBuffer {
  public:
@@ -262,7 +264,7 @@ class TripleBuffer {
   void publish() {                            // [its one writer] wait-free
     writing_ = between_.exchange(writing_ | fresh, std::memory_order_acq_rel) & ~fresh;
   }
-  // Whether there is a newer one, which reading() is from then on. [its one reader] wait-free
+  // Switches reading() to a newer value; false if there is none. [its one reader] wait-free
   bool take() {
     if ((between_.load(std::memory_order_relaxed) & fresh) == 0) {
       return false;
@@ -280,16 +282,16 @@ class TripleBuffer {
   alignas(64) std::uint32_t reading_ = 2;
 };
 
-// Which frame is heard at which moment.
+// The relation between the frame count and the monotonic clock.
 struct ClockReading {
-  std::int64_t frame = 0;    // first of the newest block
-  std::int64_t time_ns = 0;  // monotonic clock at its start
-  double rate_hz = 0.0;      // 0: no block yet
+  std::int64_t frame = 0;    // first frame of the newest block
+  std::int64_t time_ns = 0;  // monotonic clock at that frame
+  double rate_hz = 0.0;      // 0: no block was played yet
   std::int64_t period = 0;   // frames of the block
 };
 
-// A value that one thread writes and any may read, always whole: a sequence lock. The writer never
-// waits; a reader tries again while it is being written.
+// A sequence lock: a value that one thread writes and any thread reads as a whole. The writer never
+// waits; a reader retries while the value is being written.
 template <class T>
 class Board {
  public:

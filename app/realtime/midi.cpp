@@ -7,9 +7,9 @@
 namespace ressort::realtime {
 namespace {
 
-constexpr std::size_t dump_head = 21;  // bytes before the keys of a bulk dump of a tuning
+constexpr std::size_t dump_head = 21;  // bytes before the keys of a bulk dump
 
-// Data bytes after a status byte; 0 for those that carry none or are passed over.
+// Returns the number of data bytes after a status byte; 0 for ignored messages.
 int data_bytes(std::uint8_t status) {
   switch (status & 0xf0) {
     case 0xc0:
@@ -26,7 +26,7 @@ int data_bytes(std::uint8_t status) {
 
 bool MidiReader::take(std::uint8_t byte, Event& event) {
   if (byte >= 0xf8) {
-    return false;  // clock, active sensing, reset: not for us, and no part of any message
+    return false;  // real-time messages (clock, active sensing, reset) may interrupt any message
   }
   if (byte >= 0x80) {
     if (in_exclusive_ && byte == 0xf7) {
@@ -35,7 +35,7 @@ bool MidiReader::take(std::uint8_t byte, Event& event) {
     exclusive_size_ = 0;
     malformed_ += is_begun_ ? 1 : 0;
     in_exclusive_ = byte == 0xf0;
-    // 0xf4, 0xf5 are not defined; 0xf7 ends an exclusive.
+    // 0xf4 and 0xf5 are undefined; 0xf7 ends a system exclusive message.
     malformed_ += byte == 0xf4 || byte == 0xf5 ? 1 : 0;
     status_ = byte;
     need_ = data_bytes(byte);
@@ -51,7 +51,7 @@ bool MidiReader::take(std::uint8_t byte, Event& event) {
     return false;
   }
   if (status_ == 0 || need_ == 0) {
-    ++malformed_;  // data without a status that wants it
+    ++malformed_;  // data without a status byte that wants it
     return false;
   }
   data_[have_++] = byte;
@@ -106,12 +106,12 @@ bool MidiReader::finish(Event& event) {
   }
 }
 
-// A tuning of the MIDI Tuning Standard, for any device and of any number: there is one here.
-//   7f device 08 02 program count (key semitone fraction fraction)...     what sounds, too
-//   7e device 08 01 program name[16] (semitone fraction fraction)[128] sum
-//   7f device 08 08 channels[3] cents[12], 08 09 with 14 bits each   7f: what sounds, too; 7e:
-//   later
-// The last two are for whatever channels: what plays has one tuning.
+// Reads a message of the MIDI Tuning Standard. Any device and tuning number is accepted, and the
+// channels of an octave tuning are ignored, because there is only one tuning.
+//   7f device 08 02 program count (key semitone fraction fraction)...     sounding notes too
+//   7e device 08 01 program name[16] (semitone fraction fraction)[128] checksum
+//   7f device 08 08 channels[3] cents[12], or 08 09 with 14 bits each     sounding notes too;
+//   7e: new notes only
 void MidiReader::end_exclusive() {
   constexpr std::size_t change_head = 6;
   constexpr std::size_t dump_size = dump_head + std::size_t{3} * 128 + 1;
@@ -132,7 +132,7 @@ void MidiReader::end_exclusive() {
     tuned_next_ = change_head;
     tuned_end_ = size;
   } else if (is_dump_) {
-    // Of all that comes before it, as the standard says.
+    // XOR of all bytes before it, as the standard says.
     const auto sum = [&] {
       return std::accumulate(bytes.begin(), bytes.begin() + dump_size - 1, std::uint8_t{0},
                              std::bit_xor<>());
@@ -153,7 +153,7 @@ void MidiReader::end_exclusive() {
   }
 }
 
-// Semitones of equal temperament and 14 bits of one; all ones: as it was.
+// A key is a semitone of equal temperament and a 14-bit fraction; all ones mean no change.
 bool MidiReader::next_tuned_key(Event& event) {
   if (octave_bytes_ > 0) {
     return next_key_of_octave(event);
@@ -176,7 +176,7 @@ bool MidiReader::next_tuned_key(Event& event) {
   return false;
 }
 
-// Cents beside equal temperament, from C on: 64 is none, or 14 bits of -100 to 100.
+// Cents from equal temperament for C to B: one byte with 64 as zero, or 14 bits for -100 to 100.
 bool MidiReader::next_key_of_octave(Event& event) {
   if (tuned_next_ >= tuned_end_) {
     return false;

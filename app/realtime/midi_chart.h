@@ -1,4 +1,4 @@
-// app/realtime: the MIDI implementation chart: every message, and what it does.
+// app/realtime: the MIDI implementation chart, with the effect of every message.
 #pragma once
 
 #include <span>
@@ -10,12 +10,12 @@ namespace ressort::realtime {
 
 struct MidiChartRow {
   std::string_view message;
-  std::string_view number;  // or values; empty where there is none
+  std::string_view number;  // or values; empty if there is none
   bool is_received = true;
   std::string_view does;
 };
 
-// What `ressort reference midi` prints. [any thread]
+// Returns the rows that `ressort reference midi` prints. [any thread]
 std::span<const MidiChartRow> midi_chart();
 
 }  // namespace ressort::realtime

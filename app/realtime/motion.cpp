@@ -1,4 +1,4 @@
-// The looks of those who watch, at the end of a block.
+// Motion frames for the panel, made at the end of a block.
 #include "app/realtime/motion.h"
 
 #include <algorithm>
@@ -19,8 +19,8 @@ void Process::hear(std::size_t channels, std::size_t frames) {
   }
 }
 
-// What is wanted of what moves. A slow look waits for its moment, though not for long; an engine
-// that is on its way out is not to write any more where the next one will.
+// Writes the motion frame that was requested. A stroboscope frame waits for its phase, up to
+// longest_strobe_s. An engine that fades out must not write any more where the next one will.
 void Process::look() {
   MotionFrame& out = motion.writing();
   if (strobed_ != nullptr) {
@@ -51,7 +51,8 @@ void Process::look() {
   }
 }
 
-// The frame for who looks; from now on the output is remembered for the next, for a while.
+// Publishes the motion frame with the latest output. From now on the output is kept for the next
+// frame, for looked_for_s.
 void Process::show() {
   MotionFrame& out = motion.writing();
   out.frame = static_cast<std::uint64_t>(frame_);

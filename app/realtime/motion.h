@@ -1,4 +1,4 @@
-// app/realtime: a look at what sounds, on its way out of the audio thread.
+// app/realtime: a snapshot of the moving model, sent from the audio thread to the panel.
 #pragma once
 
 #include <array>
@@ -13,11 +13,11 @@ struct MotionFrame {
   static constexpr std::size_t most_numbers = 8192;
   static constexpr std::size_t heard_samples = 2048;
 
-  std::uint64_t frame = 0;    // samples that had been played
-  std::uint32_t picture = 0;  // as Sounding says; 0: nothing to look at
-  std::size_t count = 0;      // of the numbers, as Engine::look() gives them
+  std::uint64_t frame = 0;    // samples played so far
+  std::uint32_t picture = 0;  // PlayingEngine::picture; 0: nothing to draw
+  std::size_t count = 0;      // numbers in use, as Engine::look() returns them
   std::vector<double> numbers = std::vector<double>(most_numbers);
-  std::array<float, heard_samples> heard{};  // the last of the output, the mean of all channels
+  std::array<float, heard_samples> heard{};  // the latest output, mean of all channels
 };
 
 }  // namespace ressort::realtime

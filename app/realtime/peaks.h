@@ -1,4 +1,4 @@
-// app/realtime: the highest and lowest that meters have shown, apart for each who asks for them.
+// app/realtime: peak values of the meters, kept separately for each reader.
 #pragma once
 
 #include <algorithm>
@@ -11,12 +11,13 @@
 
 namespace ressort::realtime {
 
-// Whoever asks sees what was since he asked last; OSC's clients, and the panel's, are one.
+// A reader of the meters. Each one sees the peaks since its own last reading; all OSC clients are
+// one reader, and so are all panels.
 enum class Asker : std::uint8_t { console, osc, panel };
 
 class Peaks {
  public:
-  // What the audio thread has told since the last call.
+  // Adds the meters since the last call.
   void add(const Meters& meters) {
     for (Seen& seen : seen_) {
       seen.cpu = std::max(seen.cpu, meters.cpu_peak);
@@ -24,7 +25,7 @@ class Peaks {
       seen.limited = std::min(seen.limited, meters.limited);
     }
   }
-  // In place of what `meters` says; then it starts anew for this one.
+  // Replaces the peaks in `meters` by those since this reader's last call.
   void take(Asker asker, Meters& meters) {
     const Seen seen = std::exchange(seen_[static_cast<std::size_t>(asker)], {});
     meters.cpu_peak = seen.cpu;

@@ -9,16 +9,16 @@
 namespace ressort::realtime {
 namespace {
 
-// The earliest on top of the heap; of equals the one that came first.
+// Heap order: the earliest event on top; of two events at one frame, the one that arrived first.
 template <class Pending>
 bool later(const Pending& a, const Pending& b) {
   return a.frame != b.frame ? a.frame > b.frame : a.order > b.order;
 }
 
-// Each moment at which something acts cuts a chunk in two and may retune every voice on both sides.
-// On average they may be so many frames apart...
+// Every frame with an event cuts a chunk in two, and each cut may retune all voices. On average,
+// cuts are at least this many frames apart.
 constexpr std::size_t frames_per_moment = 8;
-// ...but in the shortest chunk a chord may be strummed.
+// The shortest chunk still has room for a strummed chord.
 constexpr std::size_t least_moments = 16;
 
 bool is_controller(const Event& event, int number) {
@@ -102,7 +102,7 @@ void Process::run(std::span<const Sample* const> inputs, std::span<Sample* const
       double* const samples = input_.data() + c * chunk_frames;
       input_pointers_[c] = inputs[c] != nullptr ? samples : nullptr;
       if (inputs[c] != nullptr) {
-        // What is no number would never leave the network again.
+        // A NaN or infinity would stay in the network forever.
         std::transform(inputs[c] + at, inputs[c] + at + n, samples, [](Sample sample) {
           return std::isfinite(sample) ? static_cast<double>(sample) : 0.0;
         });
@@ -145,14 +145,14 @@ bool Process::send(Ring<TimedEvent>& ring, std::span<const TimedEvent> events) {
 }
 
 bool Process::send_ahead(std::span<const TimedEvent> events) {
-  // Nobody else has taken as much of the ring as there are places ahead.
+  // Only this thread takes permits, so the ring has the places.
   const bool has_room = ahead_.take(events.size()) && from_osc.push_all(events);
   dropped.add(has_room ? 0 : events.size());
   return has_room;
 }
 
 bool Process::schedule(std::int64_t frame, const Event& event) {
-  keeps_every_frame_ = true;  // nobody is waiting for the sound
+  keeps_every_frame_ = true;  // nobody waits for the sound
   if (!ahead_.take(1)) {
     dropped.add(1);
     return false;
@@ -169,11 +169,11 @@ Meters Process::meters() const {
   return now;
 }
 
-// Everything that has arrived becomes an event at a frame.
+// Converts everything that has arrived into events at frames.
 void Process::gather(std::size_t frames, std::span<const MidiPacket> midi, std::int64_t time_ns) {
   now_.clear();
   next_now_ = 0;
-  drain(from_session, frames, time_ns);  // first: who answers it with another value means that
+  drain(from_session, frames, time_ns);  // first, so that an answer to it from another source wins
   drain(from_osc, frames, time_ns);
   drain(from_console, frames, time_ns);
   drain(from_midi, frames, time_ns);
@@ -197,7 +197,7 @@ void Process::gather(std::size_t frames, std::span<const MidiPacket> midi, std::
 
 void Process::drain(Ring<TimedEvent>& ring, std::size_t frames, std::int64_t time_ns) {
   TimedEvent timed;
-  // What comes meanwhile is the next block's.
+  // Later arrivals belong to the next block.
   for (std::size_t left = ring.size(); left > 0 && ring.pop(timed); --left) {
     if (timed.timing == TimedEvent::When::at_frame && timed.when >= frame_) {
       wait(timed.when, timed.event);
@@ -207,7 +207,7 @@ void Process::drain(Ring<TimedEvent>& ring, std::size_t frames, std::int64_t tim
       ahead_.give_back(1);
       enter(frame_, timed.event);
     } else if (timed.timing == TimedEvent::When::at_time) {
-      // Constant latency: what happened during the last period is played during this one.
+      // Constant latency: an event of the last period plays at the same offset in this one.
       const double since = static_cast<double>(timed.when - time_ns) * 1e-9 * rate_hz_;
       const auto block = static_cast<std::int64_t>(frames);
       enter(frame_ + std::clamp<std::int64_t>(block + std::llround(since), 0, block - 1),
@@ -218,7 +218,7 @@ void Process::drain(Ring<TimedEvent>& ring, std::size_t frames, std::int64_t tim
   }
 }
 
-// Acts in this block.
+// Adds an event of this block.
 void Process::enter(std::int64_t frame, const Event& event) {
   now_.push_back({frame, order_++, event});
   if (is_panic(event)) {
@@ -226,7 +226,7 @@ void Process::enter(std::int64_t frame, const Event& event) {
   }
 }
 
-// Acts when its frame comes; it has its place already.
+// Adds an event for a later frame. Its permit was taken already.
 void Process::wait(std::int64_t frame, const Event& event) {
   latest_ = std::max(latest_, frame);
   pending_.push_back({frame, order_++, event});
@@ -235,7 +235,7 @@ void Process::wait(std::int64_t frame, const Event& event) {
 
 void Process::forget_after(std::int64_t frame) {
   if (latest_ <= frame || is_repeating_) {
-    return;  // a flood of panics has nothing more to forget
+    return;  // nothing is left to discard, as in a flood of panics
   }
   latest_ = frame;
   ahead_.give_back(
@@ -254,7 +254,7 @@ void Process::collect_due(std::size_t frames) {
     Event event = next.event;
     event.frame = static_cast<std::uint32_t>(std::max<std::int64_t>(0, next.frame - frame_));
     if (due_.empty() || event.frame != due_.back().frame) {
-      // The rest of a flood acts with its last moment: early, but all of it and in its order.
+      // The rest of a flood acts at the last cut: early, but complete and in order.
       event.frame = ++moments <= most_moments ? event.frame : due_.back().frame;
     }
     note(event);
@@ -284,7 +284,8 @@ void Process::collect_due(std::size_t frames) {
   }
 }
 
-// Banks are counted here, as models come and go; who loads is told which program is wanted.
+// Follows bank changes here, because models come and go. A program change is reported to the
+// worker, which loads the preset.
 void Process::follow_program(const Event& event) {
   constexpr int bank_coarse = 0;
   constexpr int bank_fine = 32;
@@ -300,7 +301,7 @@ void Process::follow_program(const Event& event) {
   }
 }
 
-// For who looks at what is played.
+// Counts notes and controllers for the meters.
 void Process::note(const Event& event) {
   if (event.kind == EventKind::note_on) {
     meters_.last_notes[meters_.notes++ % meters_.last_notes.size()] = {
@@ -319,7 +320,7 @@ void Process::learn() {
   }
 }
 
-// A controller becomes what it has learnt, where that is of the model that sounds.
+// Replaces a learned controller by its target, if that belongs to the current model.
 void Process::translate(Event& event) {
   if (event.kind != EventKind::controller || current_ == nullptr) {
     return;
@@ -340,8 +341,9 @@ void Process::translate(Event& event) {
   }
 }
 
-// A new model is taken at the edge of a chunk, once the last fade is over and its engine is on its
-// way out. What rings gives way to the next model but one, though not to other forms of this one.
+// Takes a new engine at the start of a chunk, once the last crossfade is over and its engine is
+// retired. A ringing engine fades when yet another model comes, but not for a new form of the
+// current model.
 void Process::swap_models() {
   if (rings_ && !rings_on()) {
     rings_ = false;
@@ -402,7 +404,7 @@ void Process::play_models(std::size_t input_count, std::size_t output_count, std
     std::fill(channels[c], channels[c] + frames, 0.0);
   }
   const std::span<double* const> out(channels.data(), output_count);
-  // A model with one output is heard on both sides; one with more than the device has is folded.
+  // A mono model plays on all outputs. A model with more outputs than the device is folded.
   const auto add = [&](const std::vector<double>& samples, int count, auto&& gain) {
     if (output_count == 0) {
       return;
@@ -455,8 +457,8 @@ void Process::play_models(std::size_t input_count, std::size_t output_count, std
   meters_.limited = std::min(meters_.limited, limiter_.take_reduction());
 }
 
-// Events that name a model act in that model only; notes and controllers act in both, so that a
-// note that began before a swap ends where it began.
+// An event with a serial acts only in that model. Notes and controllers without one act in both
+// models, so a note that began before a swap ends where it began. The old model gets no new notes.
 void Process::play(Sounding& sounding, std::size_t input_count, std::vector<double>& samples,
                    std::size_t frames) {
   matching_.clear();
@@ -476,7 +478,7 @@ void Process::play(Sounding& sounding, std::size_t input_count, std::vector<doub
                            {outputs.data(), count}, frames);
 }
 
-// What others may want to know, after the sound is done.
+// Publishes the meters and reports changed parameters, after the sound is done.
 void Process::tell() {
   meters_.frames = static_cast<std::uint64_t>(frame_);
   if (current_ == nullptr) {
@@ -494,14 +496,15 @@ void Process::tell() {
   static_cast<EngineMeters&>(meters_) = now;
   board.write(meters_);
   if (reports.size() + Engine::max_changes > reports.capacity()) {
-    return;  // nobody is listening just now: the engine keeps them
+    return;  // the worker is behind: the engine keeps the changes
   }
   for (const std::uint16_t index : engine.take_changes()) {
     reports.push({Report::Kind::parameter, current_->serial, index, engine.parameter(index)});
   }
 }
 
-// What the block took, and what follows from it: a model on its way out goes first, then voices.
+// Compares the time that the block took with its duration. If the load is too high, ends a fading
+// model first and steals voices then.
 void Process::weigh(double took_s, std::size_t frames) {
   const double sound_s = static_cast<double>(frames) / rate_hz_;
   load_.add(took_s, sound_s);
@@ -559,7 +562,7 @@ void Process::record(std::size_t channels, std::size_t frames, bool records, boo
       ++meters_.record_lost;
     }
     if (listens) {
-      listening.push(piece);  // where there is no room, the reader sees that it is full
+      listening.push(piece);  // a reader that finds the ring full knows that it lost some
     }
   }
 }

@@ -1,4 +1,4 @@
-// app/realtime: the audio thread, whole. Everything that it touches is in this struct.
+// app/realtime: everything that the audio thread touches.
 #pragma once
 
 #include <array>
@@ -18,55 +18,56 @@
 
 namespace ressort::realtime {
 
-// An engine and the number that events for it carry. One of the same number, unless it is 0, goes
-// on where the other is, in the same sample.
+// An engine and the serial that its events carry. An engine with the serial of the current one,
+// unless that is 0, continues the current one's state in the same sample.
 struct Sounding {
   std::unique_ptr<Engine> engine;
   std::uint32_t serial = 0;
-  bool lets_ring = false;        // what sounded before it ends by itself, without new notes
-  bool has_new_numbers = false;  // it goes on as Engine::renumber_from() says
-  std::uint32_t number = 0;      // of this engine among all, for who keeps a flight
-  std::uint32_t picture = 0;     // what is watched of it, to whoever draws it; 0: nothing
+  bool lets_ring = false;        // the previous engine gets no new notes and rings out
+  bool has_new_numbers = false;  // state is continued by Engine::renumber_from()
+  std::uint32_t number = 0;      // number of the engine in the flight
+  std::uint32_t picture = 0;     // identifies the picture that the panel draws; 0: none
 };
 
-// An event on its way to the audio thread, and when it is to act.
+// An event on its way to the audio thread, with its time.
 struct TimedEvent {
   enum class When : std::uint8_t {
     now,       // at the start of the next block
     at_frame,  // `when` is a frame of the process's own count
-    at_time,   // `when` is a time of the monotonic clock, ns; it acts one period later
+    at_time,   // `when` is a time of the monotonic clock in ns; the event acts one period later
   };
   Event event;
   When timing = When::now;
   std::int64_t when = 0;
 };
 
-// A MIDI packet of this block, from a backend that has exact frames.
+// A MIDI packet of the current block, from a backend with exact frames.
 struct MidiPacket {
   std::uint32_t frame = 0;
   std::span<const std::uint8_t> bytes;
 };
 
-// What the audio thread has to tell.
+// A message from the audio thread to the worker.
 struct Report {
   enum class Kind : std::uint8_t { parameter, reset, overload, program };
   Kind kind = Kind::reset;
-  std::uint32_t model = 0;  // serial
-  std::uint16_t index = 0;  // parameter; the most voices there is time for, or 0
-  double value = 0.0;       // of the parameter; the load; 128 * bank + program
+  std::uint32_t model = 0;  // serial of the model
+  std::uint16_t index = 0;  // parameter, or number of voices that there is time for; 0: unlimited
+  double value = 0.0;       // of the parameter, or the load, or 128 * bank + program
 };
 
-// What a controller turns instead of what the preset says, while the model of this serial plays.
+// The target of a learned controller. It overrides the preset while the model with this serial
+// plays.
 struct LearnedControl {
-  EventKind kind = EventKind::parameter;  // or custom
+  EventKind kind = EventKind::parameter;  // or EventKind::custom
   std::uint16_t index = 0;
-  std::uint32_t model = 0;  // 0: nothing is learnt
-  double low = 0.0;         // what 0 and 1 of the controller become
+  std::uint32_t model = 0;  // serial; 0: nothing is learned
+  double low = 0.0;         // value at controller value 0
   double high = 1.0;
-  bool exponential = false;  // equal turns are equal ratios
+  bool exponential = false;  // equal steps of the controller are equal ratios
 };
 
-// On its way to the audio thread.
+// A change of the learned controllers, on its way to the audio thread.
 struct Lesson {
   std::uint8_t controller = 0;
   LearnedControl control;
@@ -85,119 +86,119 @@ struct RecordedChunk {
   std::array<float, max_samples> samples{};  // interleaved
 };
 
-// Sound that is played as it is.
+// Recorded sound, played back unchanged.
 struct SampleTape {
   std::size_t channels = 2;
   std::vector<float> samples;  // interleaved
   std::size_t frames() const { return samples.size() / channels; }
 };
 
-// What the audio thread tells of itself after every block, and what other threads count. Resets,
-// shed voices and kept parameters are those of all engines that there were.
+// The state of the audio thread after each block, and the counters of other threads. Resets, stolen
+// voices and changed parameters are sums over all engines so far.
 struct Meters : EngineMeters {
   std::uint64_t frames = 0;       // since the start
-  double load = 0.0;              // share of the time that blocks take, over about a second
-  double cpu_peak = 0.0;          // of one block since the last reading
-  std::uint64_t overruns = 0;     // blocks that took longer than they sound
+  double load = 0.0;              // mean load of about the last second; 1 is all of the time
+  double cpu_peak = 0.0;          // highest load of one block since the last reading
+  std::uint64_t overruns = 0;     // blocks that took longer than their duration
   std::uint64_t late = 0;         // events that came after their time
-  double late_s = 0.0;            // the last of them, by so much
-  std::uint64_t malformed = 0;    // MIDI that could not be read
-  std::uint64_t swaps = 0;        // of models
-  std::uint64_t record_lost = 0;  // chunks that the recording missed
-  double peak = 0.0;              // of the output since the last reading
-  double limited = 1.0;           // the limiter's deepest gain since the last reading
-  std::uint64_t dropped = 0;      // events that found no room
-  std::uint64_t strangers = 0;    // packets of who may not send OSC
-  std::uint64_t xruns = 0;        // as the backend says
-  std::uint64_t notes = 0;        // that began, from any side
-  std::array<PlayedNote, 4> last_notes{};  // of them; the next takes the place `notes` modulo 4
-  std::uint64_t turns = 0;                 // controllers that came
-  std::uint8_t last_controller = 0;        // the last of them
+  double late_s = 0.0;            // delay of the last late event
+  std::uint64_t malformed = 0;    // unreadable MIDI messages
+  std::uint64_t swaps = 0;        // changes of the engine
+  std::uint64_t record_lost = 0;  // chunks that the recording lost
+  double peak = 0.0;              // of the output since the last reading, linear
+  double limited = 1.0;           // lowest gain of the limiter since the last reading, linear
+  std::uint64_t dropped = 0;      // events that found a queue full
+  std::uint64_t strangers = 0;    // OSC packets from senders that are not allowed
+  std::uint64_t xruns = 0;        // reported by the backend
+  std::uint64_t notes = 0;        // note-ons so far, from any source
+  std::array<PlayedNote, 4> last_notes{};  // the latest notes; note n is at n modulo 4
+  std::uint64_t turns = 0;                 // controller events so far
+  std::uint8_t last_controller = 0;        // controller number of the latest
 };
 
 struct Process {
-  static constexpr std::size_t chunk_frames = 512;  // engines see no longer block
+  static constexpr std::size_t chunk_frames = 512;  // longest block that an engine gets
   static constexpr std::size_t max_channels = 64;   // of a model
-  static constexpr std::size_t max_now = 4096;      // events of one source in one block...
-  static constexpr std::size_t max_endings = 1024;  // ...and so many more that end sound
+  static constexpr std::size_t max_now = 4096;      // events of one source in one block
+  static constexpr std::size_t max_endings = 1024;  // places kept free for events that end sound
   static constexpr std::size_t max_ahead = 4096;    // events that wait for their frame
-  static constexpr double fade_s = 0.05;            // between two models
-  static constexpr double longest_strobe_s = 0.1;   // that a slow look waits
-  static constexpr double looked_for_s = 1.0;       // the output is kept for a look, after a look
-  static constexpr double longest_ring_s = 60.0;    // of what the next model lets ring
+  static constexpr double fade_s = 0.05;            // crossfade between two models
+  static constexpr double longest_strobe_s = 0.1;   // longest wait for a frame of the stroboscope
+  static constexpr double looked_for_s = 1.0;     // the output is kept so long after a motion frame
+  static constexpr double longest_ring_s = 60.0;  // of the model before a program change
 
-  // A monotonic clock, in ns, that makes no system call.
+  // A monotonic clock in ns that makes no system call.
   using Clock = std::int64_t (*)();
 
-  // Without a clock nothing is measured, and no voice gives way: offline there is always time.
+  // Without a clock, the load is not measured and no voice is stolen, as in offline rendering.
   explicit Process(double rate_hz, bool limit = true, Clock clock_ns = nullptr);
   ~Process();
   Process(const Process&) = delete;
   Process& operator=(const Process&) = delete;
 
-  // One callback of any backend: `frames` of any number. `inputs` may hold null channels.
-  // `time_ns`: the monotonic clock at the first frame. [audio] wait-free
+  // Plays one block of any number of frames. `inputs` may contain null channels. `time_ns` is the
+  // monotonic clock at the first frame. [audio] wait-free
   void block(std::span<const float* const> inputs, std::span<float* const> outputs,
              std::size_t frames, std::span<const MidiPacket> midi, std::int64_t time_ns) noexcept;
 
-  // The same for buffers in double precision, as the offline renderer has them. [audio]
+  // The same for buffers in double precision, which the offline renderer uses. [audio]
   void block(std::span<const double* const> inputs, std::span<double* const> outputs,
              std::size_t frames, std::span<const MidiPacket> midi, std::int64_t time_ns) noexcept;
 
-  // Schedules an event for a frame of the process's own count; false if there is no room. Only
-  // where no other thread runs block(): offline. [audio]
+  // Schedules an event for a frame of the process's own count; false if the queue is full. Offline
+  // only, when no other thread calls block(). [audio]
   bool schedule(std::int64_t frame, const Event& event);
 
-  // Hands over what is to act in the next block, all of it or nothing; it acts in one block. What
-  // ends sound finds room where other events do not. What is refused is counted. [the ring's one
-  // writer] wait-free
+  // Sends events that act together in the next block, all or none. Events that end sound find room
+  // when the queue is full for others. Rejected events are counted. [the ring's one writer]
+  // wait-free
   bool send(Ring<TimedEvent>& ring, std::span<const TimedEvent> events);
 
-  // The same for events at frames, which wait in a room of their own until the panic that comes
-  // before their time. [OSC's thread] wait-free
+  // Sends events for given frames. They wait in a queue of their own; a panic before their time
+  // discards them. [OSC's thread] wait-free
   bool send_ahead(std::span<const TimedEvent> events);
 
-  // What a flight says of the next block, before it; then block() plays what was played then. Only
-  // offline, and of one whole flight, chunk by chunk. [audio]
+  // Applies a record of a flight before the block that it belongs to; block() then reproduces the
+  // original samples. Offline only, for one whole flight, chunk by chunk. [audio]
   void repeat(const FlightRecord& record);
 
-  // Between two runs of a backend, when no audio thread is alive. [control]
+  // Call it when no audio thread runs. [control]
   void set_rate(double rate_hz);
 
   Meters meters() const;  // [any thread but audio]
 
   // --- shared with other threads --------------------------------------------------------------
   Slot<Sounding> slot;  // offered by the session's worker
-  // Written through send() and send_ahead().
+  // Written by send() and send_ahead().
   Ring<TimedEvent> from_osc{max_now + max_endings + max_ahead};
   Ring<TimedEvent> from_console{max_now + max_endings};
-  Ring<TimedEvent> from_midi{max_now + max_endings};     // RtMidi's thread
-  Ring<TimedEvent> from_session{max_now + max_endings};  // its worker
-  Ring<Lesson> lessons{256};                             // from the session, under its lock
-  Ring<Report> reports{4096};                            // to the session's worker
+  Ring<TimedEvent> from_midi{max_now + max_endings};     // written by RtMidi's thread
+  Ring<TimedEvent> from_session{max_now + max_endings};  // written by the session's worker
+  Ring<Lesson> lessons{256};                             // written by the session, under its lock
+  Ring<Report> reports{4096};                            // read by the session's worker
   Ring<RecordedChunk> recording{8192};
   Flag is_recording;
-  Ring<RecordedChunk> listening{1024};  // to whoever describes what sounds
+  Ring<RecordedChunk> listening{1024};  // read by the timbre analysis
   Flag is_listening;
-  Published<const SampleTape> tape;  // in place of all that engines play
+  Published<const SampleTape> tape;  // replaces the output of the engines
   Flag is_tape_over;
-  Ring<FlightRecord> flight{1 << 14};  // to the session's worker, once it wants it
+  Ring<FlightRecord> flight{1 << 14};  // read by the session's worker
   Flag keeps_flight;
-  Flag wants_motion;       // raised for each look: one frame is written after the next block
-  Flag wants_slow_motion;  // the same, at the next moment of the stroboscope
+  Flag wants_motion;       // requests one motion frame after the next block
+  Flag wants_slow_motion;  // the same, at the next phase of the stroboscope
   TripleBuffer<MotionFrame> motion{MotionFrame{}};
   Board<ClockReading> clock;
   Board<Meters> board;    // read by meters()
-  Flag meters_were_read;  // raised by a reader: what is since the last reading starts anew
-  Flag has_time;          // nobody waits for the sound: no voice gives way, no event its frame
-  Counter dropped;        // as Meters says, counted by whoever sees it
+  Flag meters_were_read;  // raised by a reader; the peaks start again at the next block
+  Flag has_time;          // offline or freewheel: no voice is stolen, every event acts at its frame
+  Counter dropped;        // counters of Meters, increased by any thread
   Counter strangers;
   Counter xruns;
 
  private:
   struct Pending {
     std::int64_t frame = 0;
-    std::uint64_t order = 0;  // what came first acts first
+    std::uint64_t order = 0;  // order of arrival, for events of the same frame
     Event event;
   };
 
@@ -241,46 +242,46 @@ struct Process {
   MidiReader midi_;
   Sounding* current_ = nullptr;
   Sounding* fading_ = nullptr;
-  Sounding* waiting_ = nullptr;  // until what rings has faded
+  Sounding* waiting_ = nullptr;  // follows when the ringing engine has faded out
   std::size_t fade_left_ = 0;
-  bool rings_ = false;            // the fading one does not fade yet
+  bool rings_ = false;            // `fading_` rings on and does not fade yet
   std::int64_t rings_until_ = 0;  // frame
-  bool is_alone_ = false;         // the current one came in at its full level
+  bool is_alone_ = false;         // the current engine started at full level
   std::size_t fade_frames_ = 0;
   Meters meters_;
-  std::array<int, 16> banks_{};          // [MIDI channel] as 14 bits
-  EngineMeters ended_;                   // what engines before the current one counted
+  std::array<int, 16> banks_{};          // [MIDI channel] 14 bits
+  EngineMeters ended_;                   // counters of the engines before the current one
   std::int64_t next_overload_news_ = 0;  // frame
   DcBlocker dc_blocker_;
   Limiter limiter_;
-  // None of these grows.
-  std::vector<Pending> now_;      // of this block, sorted
-  std::size_t next_now_ = 0;      // the first of them that has not acted
-  std::vector<Pending> pending_;  // what waits for its frame: a heap, the earliest on top
-  std::int64_t latest_ = 0;       // no frame there is later
-  Permits ahead_{max_ahead};      // of it, and of what is on its way there
+  // No vector below ever grows.
+  std::vector<Pending> now_;      // events of this block, sorted
+  std::size_t next_now_ = 0;      // first of them that has not acted yet
+  std::vector<Pending> pending_;  // events for later frames: a heap, the earliest on top
+  std::int64_t latest_ = 0;       // no pending frame is later
+  Permits ahead_{max_ahead};  // free places in `pending_`, counting the events on their way to it
   bool keeps_every_frame_ = false;
   bool is_repeating_ = false;
   std::size_t tape_at_ = 0;  // frame
-  // What the flight was told last.
+  // State of the flight log: what it was told last.
   bool has_gap_ = false;
   double kept_rate_hz_ = 0.0;
   std::size_t kept_frames_ = 0;
   std::size_t kept_channels_ = 0;
   std::array<LearnedControl, 128> learned_{};  // [controller]
-  std::vector<Event> due_;                     // of this chunk, sorted
-  std::vector<Event> matching_;                // those of one engine
+  std::vector<Event> due_;                     // events of this chunk, sorted
+  std::vector<Event> matching_;                // the ones that concern one engine
   std::array<const double*, max_channels> input_pointers_{};
   std::vector<double> input_;       // [channel][chunk_frames]
-  std::vector<double> sound_;       // [channel][chunk_frames] of the current engine
-  std::vector<double> fade_sound_;  // [channel][chunk_frames] of the fading one
+  std::vector<double> sound_;       // [channel][chunk_frames] output of the current engine
+  std::vector<double> fade_sound_;  // [channel][chunk_frames] output of the fading engine
   std::vector<double> mixed_;       // [output][chunk_frames]
-  // The output of late, a ring, kept while somebody looks.
+  // Ring of the latest output, filled while somebody watches the motion.
   std::array<float, MotionFrame::heard_samples> heard_{};
-  std::size_t heard_at_ = 0;        // where the next sample goes
+  std::size_t heard_at_ = 0;        // position of the next sample
   std::int64_t looked_until_ = 0;   // frame
-  Sounding* strobed_ = nullptr;     // is asked for a slow look,
-  std::int64_t strobed_until_ = 0;  // until this frame
+  Sounding* strobed_ = nullptr;     // engine that was asked for a stroboscope frame
+  std::int64_t strobed_until_ = 0;  // frame
 };
 
 }  // namespace ressort::realtime

@@ -1,4 +1,4 @@
-// What a Process keeps of what moves its engines, and how it does so once more.
+// Process: writing the flight log and reproducing a flight.
 #include <algorithm>
 #include <utility>
 
@@ -33,7 +33,7 @@ void Process::keep_period(std::size_t frames, std::size_t channels) {
   }
 }
 
-// The next engine, if there is one.
+// Takes the next engine, if there is one.
 Sounding* Process::take() {
   Sounding* const next = slot.take();
   if (next != nullptr) {
@@ -73,7 +73,7 @@ void Process::repeat(const FlightRecord& record) {
     case FlightRecord::Kind::period:
     case FlightRecord::Kind::take:
     case FlightRecord::Kind::gap:
-      return;  // for who calls block()
+      return;  // the caller of block() handles these
   }
 }
 

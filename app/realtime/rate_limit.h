@@ -1,4 +1,4 @@
-// app/realtime: what happens again and again is told once in a while, and how often it was.
+// app/realtime: limits how often a repeated message is printed.
 #pragma once
 
 #include <chrono>
@@ -11,19 +11,20 @@
 
 namespace ressort::realtime {
 
-// The first time is told at once; what follows within the interval is counted, and told at its end.
+// Passes the first message at once. Messages within the interval after it are counted, and the
+// newest is passed at the end of the interval.
 class RateLimit {
  public:
   using Clock = std::chrono::steady_clock;
   explicit RateLimit(Clock::duration interval = std::chrono::seconds(5)) : interval_(interval) {}
 
-  // It happened, so many times more.
+  // Records `times` occurrences.
   void add(std::string text, std::uint64_t times = 1) {
     text_ = std::move(text);
     times_ += times;
   }
 
-  // What there is to say by now: the newest text, "(and 412 more)" behind it.
+  // Returns the message that is due: the newest text, followed by "(and 412 more)".
   std::optional<std::string> take(Clock::time_point now = Clock::now()) {
     if (times_ == 0 || now < next_) {
       return std::nullopt;

@@ -13,13 +13,13 @@ namespace {
 using std::chrono::nanoseconds;
 using std::chrono::steady_clock;
 
-constexpr std::int64_t awake_ns = 100'000;  // a helper looks for work for so long...
-constexpr std::int64_t lead_ns = 60'000;    // ...and from so long before a period on
+constexpr std::int64_t awake_ns = 100'000;  // a helper polls for work this long after its last task
+constexpr std::int64_t lead_ns = 60'000;    // and before the expected start of a period
 constexpr std::int64_t short_nap_ns = 50'000;
-constexpr std::int64_t long_nap_ns = 5'000'000;  // where nobody has needed help
+constexpr std::int64_t long_nap_ns = 5'000'000;  // for helpers that nobody has needed
 constexpr std::int64_t forgotten_ns = 100'000'000;
 
-// Reads shared memory, makes no system call.
+// Returns the monotonic clock. Reads shared memory, makes no system call.
 std::int64_t now_ns() {
   return nanoseconds(steady_clock::now().time_since_epoch()).count();
 }
@@ -67,7 +67,7 @@ class ThreadPool::Team final : public Crew {
     finish(wanted);
   }
 
-  // Whether there was anything to do. [helper]
+  // Performs the tasks it can claim; false if there were none. [helper]
   bool help() {
     bool has_helped = false;
     for (std::size_t i = tasks_.size(); i-- > 0;) {
@@ -81,7 +81,7 @@ class ThreadPool::Team final : public Crew {
   }
 
  private:
-  // The first run of a period says when the next one is to be expected.
+  // The first run of a period predicts the start of the next one.
   std::int64_t begin() {
     const std::int64_t start_ns = now_ns();
     const ClockReading reading = pool_.clock_->read();
@@ -95,7 +95,7 @@ class ThreadPool::Team final : public Crew {
     return start_ns;
   }
 
-  // From the front, where helpers come from the back.
+  // Performs tasks from the front; helpers start from the back.
   void perform_own(std::span<const std::uint32_t> wanted, std::int64_t start_ns) {
     std::int64_t longest_ns = 0;
     for (const std::uint32_t i : wanted) {
@@ -115,8 +115,9 @@ class ThreadPool::Team final : public Crew {
     longest_ns_ = longest_ns > 0 ? longest_ns : longest_ns_;
   }
 
-  // Whoever has begun in time needs no longer than another took. All of them together are given
-  // that time twice; who has not come back by then is late.
+  // Waits for the helpers. A helper that started in time needs no longer than the longest task of
+  // this thread, so all of them together get twice that time. Tasks still unfinished then are taken
+  // over.
   void finish(std::span<const std::uint32_t> wanted) {
     const std::int64_t patience_ns = pool_.is_live() ? now_ns() + 2 * longest_ns_ : 0;
     for (const std::uint32_t i : wanted) {
@@ -142,7 +143,7 @@ class ThreadPool::Team final : public Crew {
   const std::vector<Task*> tasks_;
   std::vector<Claim> claims_;     // [task]
   std::vector<bool> is_offered_;  // [task] in this run, and not taken back
-  std::int64_t longest_ns_ = 0;   // what a task of the caller's own took
+  std::int64_t longest_ns_ = 0;   // longest own task of the last run
 };
 
 ThreadPool::ThreadPool(std::size_t count, const Board<ClockReading>* live)
@@ -186,7 +187,8 @@ void ThreadPool::serve(std::size_t helper) {
     if (time_ns < awake_until_ns) {
       continue;
     }
-    // Until shortly before the next period; or for longer and longer, while nobody wants help.
+    // Sleeps until shortly before the next period, or for longer and longer naps while nobody needs
+    // help.
     if (const std::int64_t next_ns = next_period_ns(time_ns); next_ns > 0) {
       sleep_until(next_ns - lead_ns);
       awake_until_ns = next_ns + awake_ns;
@@ -197,7 +199,7 @@ void ThreadPool::serve(std::size_t helper) {
   }
 }
 
-// The first that can be waited for asleep; 0 if none is expected.
+// Returns the start of the first period that is far enough away to sleep; 0 if none is expected.
 std::int64_t ThreadPool::next_period_ns(std::int64_t time_ns) const {
   const std::int64_t period_ns = period_ns_.get();
   const std::int64_t next_ns = next_ns_.get();
