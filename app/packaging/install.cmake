@@ -46,10 +46,10 @@ set(CPACK_PACKAGE_NAME ressort)
 set(CPACK_PACKAGE_VERSION ${PROJECT_VERSION})
 set(CPACK_PACKAGE_CONTACT "ressort <ressort@users.noreply.github.com>")
 set(CPACK_PACKAGE_DESCRIPTION_SUMMARY "Real-time mass-interaction synthesizer")
-set(CPACK_DEBIAN_PACKAGE_DESCRIPTION "Plays networks of masses and springs: strings, meshes, bodies and what
-strikes, plucks and bows them. For JACK, PipeWire and ALSA, by MIDI, MPE
-and OSC, with a console. A model is text, and can be edited while it
-sounds.")
+set(CPACK_DEBIAN_PACKAGE_DESCRIPTION "Simulates networks of masses and springs in real time: strings, meshes,
+bells and other bodies, struck, plucked or bowed. Plays on JACK, PipeWire
+and ALSA, controlled by MIDI, MPE, OSC and a console. A model is a text
+file that you can edit while it sounds.")
 set(CPACK_DEBIAN_PACKAGE_SECTION sound)
 set(CPACK_DEBIAN_PACKAGE_PRIORITY optional)
 set(CPACK_DEBIAN_PACKAGE_SHLIBDEPS ON)
