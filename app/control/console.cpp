@@ -15,8 +15,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// Where the last word of a line starts, at its end after a blank; and where its comment does.
-// Words are divided as by split_words().
+// Positions in a line: start of the last word (the end of the line after a blank) and of the
+// comment. Words are divided as in split_words().
 struct LineShape {
   std::size_t last_word = 0;
   std::size_t comment = 0;
@@ -60,7 +60,7 @@ Result<const Row*> find_command(std::string_view name) {
   if (meant.size() == 1) {
     return found;
   }
-  std::string typed = "'";  // shown without what could command the terminal
+  std::string typed = "'";  // Printed without control characters.
   for (const char c : name.substr(0, 40)) {
     typed += static_cast<unsigned char>(c) < 0x20 || c == 0x7f ? '?' : c;
   }
@@ -79,7 +79,7 @@ std::string usage(const Row& row) {
   return std::string(row.command) + (row.words.empty() ? "" : " ") + row.words;
 }
 
-// Lines that work when pasted, with what there is.
+// Returns lines that work when pasted, made from what is installed.
 std::string examples(const ConsoleContext& console) {
   std::vector<std::string> known = known_presets();
   if (known.empty()) {
@@ -113,14 +113,14 @@ Result<Done> carry_out(ConsoleContext& console, const Command& command) {
   return act(console, **row, command.words);
 }
 
-// Files with one of the endings whose names go on from `typed`, and folders.
+// Returns files with one of the endings whose names start with `typed`, and folders.
 std::vector<std::string> files(const std::string& typed,
                                std::span<const std::string_view> endings) {
   const std::size_t slash = typed.rfind('/');
   const std::string folder = slash == typed.npos ? "" : typed.substr(0, slash + 1);
   const std::string begun = typed.substr(folder.size());
   std::vector<std::string> found;
-  std::error_code stop;  // an unreadable folder has nothing to offer
+  std::error_code stop;  // An unreadable folder offers nothing.
   for (fs::directory_iterator at(folder.empty() ? "." : folder, stop); !stop && at != end(at);
        at.increment(stop)) {
     const std::string name = at->path().filename().string();
@@ -196,7 +196,7 @@ Result<Command> parse_command(std::string_view line) {
   const auto needed = static_cast<std::size_t>(
       std::count_if(wanted.begin(), wanted.end(),
                     [](const std::string& word) { return !word.starts_with('['); }));
-  // What is written as [--WORD] may be left out, but is nothing else.
+  // A word written as [--WORD] may be omitted but not replaced.
   bool is_other = false;
   for (std::size_t i = needed; i < std::min(words.size(), wanted.size()); ++i) {
     is_other |= wanted[i].starts_with("[--") && wanted[i] != "[" + words[i] + "]";
@@ -294,7 +294,7 @@ std::vector<std::string> Console::completions(std::string_view line) const {
     }
   } else if (kind.find("PARAMETER") != kind.npos) {
     const auto loaded =
-        context_->session.current();  // kept while the worker puts another in its place
+        context_->session.current();  // Keeps the current scene alive while the worker replaces it.
     for (const ParameterInfo& info : loaded->instrument.parameters) {
       words.push_back(info.name);
     }

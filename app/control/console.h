@@ -1,5 +1,5 @@
-// app/control: the small console: reads, completes and carries out the commands of registry.h.
-// Where they are typed is terminal.h's.
+// app/control: the console: parses, completes and executes the commands of registry.h. terminal.h
+// reads the lines.
 #pragma once
 
 #include <functional>
@@ -13,7 +13,7 @@
 
 namespace ressort::control {
 
-// A command as typed, resolved: its full name and its words. Pure.
+// A parsed command: its full name and its words. Pure.
 struct Command {
   std::string name;
   std::vector<std::string> words;
@@ -21,41 +21,41 @@ struct Command {
 
 struct ConsoleContext;
 
-// Accepts unique beginnings of command names, "..." for a word with blanks in it, and # comments.
-// An empty line gives a command without a name. The error names what could have been meant, or
-// which words the command takes.
+// Parses a line. Accepts unique abbreviations of command names, "..." for a word with blanks, and #
+// comments. An empty line gives a command without a name. The error suggests a command, or lists
+// the words that the command takes.
 Result<Command> parse_command(std::string_view line);
 
-// Where the last word of a line starts, quote and all; empty at the end and after a blank.
+// Returns the last word of a line with its quote; empty at the end and after a blank.
 std::string_view last_word(std::string_view line);
 
-// A keyboard without lines: calls `on_key` for each key, and with 0 when none has come for a
-// second, until `on_key` answers false or the input ends.
+// A keyboard in raw mode: calls `on_key` for each key, and with 0 when none has come for a second,
+// until `on_key` returns false or the input ends.
 using Keyboard = std::function<void(const std::function<bool(char key)>& on_key)>;
 
-// Carries out commands. What it has to say goes to `print`, a line or more at a time, without the
-// last line end. Errors go there too. Process and session must outlive it.
+// Executes commands. Output and errors go to `print`, one or more lines at a time, without the last
+// line end. Process and session must outlive it.
 class Console {
  public:
   using Print = std::function<void(const std::string&)>;
   Console(Process& process, Session& session, Print print, Print tell);
   ~Console();
 
-  // False: the command was to quit. [console thread]
+  // Return false if the command was `quit`. [console thread]
   bool run(const Command& command);
   bool run_line(std::string_view line);
 
-  // Runs a file of commands; stops at `quit` and at the first that fails, whose error has the
-  // file, the line and the column. [console thread]
+  // Runs a file of commands; stops at `quit` and at the first command that fails, whose error has
+  // the file, the line and the column. [console thread]
   Result<Done> run_script(const std::string& path);
 
-  // Whether there was a command to quit. [console thread]
+  // Returns whether `quit` was executed. [console thread]
   bool has_quit() const;
 
-  // The command `keys` plays from this keyboard; without one it fails.
+  // Sets the keyboard that the command `keys` plays from; without one it fails.
   void lend_keyboard(Keyboard keyboard);
 
-  // Words that could stand where the last one of `line` does: commands, parameters, presets,
+  // Returns the words that could complete the last word of `line`: commands, parameters, presets,
   // models, files. A folder ends in '/'. [console thread]
   std::vector<std::string> completions(std::string_view line) const;
 

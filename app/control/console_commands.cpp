@@ -67,7 +67,7 @@ std::string meant_parameter(const Instrument& instrument, const std::string& wor
 
 namespace {
 
-// The number of the input that a gesture goes to: as typed, or the first that knows it.
+// Returns the number of the input for a gesture: the number typed, or the first input that has it.
 Result<std::string> input_for(const ConsoleContext& console, const GestureRow& gesture,
                               const std::string* word) {
   const auto current = loaded(console);
@@ -90,9 +90,9 @@ Result<std::string> input_for(const ConsoleContext& console, const GestureRow& g
                "; 'explain' tells what it has, 'noteon 60' plays it"};
 }
 
-// A command that only plays: its words are the arguments of its address, and INPUT.
+// Executes a command that only plays: its words are the arguments of its address, and INPUT.
 Result<Done> play_words(ConsoleContext& console, const Row& row, Words words) {
-  std::map<std::string, const std::string*> typed;  // by what the help calls them
+  std::map<std::string, const std::string*> typed;  // Keyed by their names in the help.
   const std::vector<std::string> names = split_words(row.words);
   for (std::size_t i = 0; i < std::min(words.size(), names.size()); ++i) {
     typed[names[i].front() == '[' ? names[i].substr(1, names[i].size() - 2) : names[i]] = &words[i];
@@ -128,7 +128,7 @@ Result<Done> act(ConsoleContext& console, const Row& row, Words words) {
 
 namespace {
 
-// Semitone by semitone from a C; the upper row of letters has the black keys.
+// Semitones upwards from C; the upper row of letters has the black keys.
 constexpr std::string_view piano = "awsedftgyhujkolp;'";
 
 constexpr std::string_view piano_picture =
@@ -148,7 +148,7 @@ Result<Done> command::keys(ConsoleContext& console, Words) {
   }
   console.print(std::string(piano_picture));
   int octave = 4;
-  double sounding = -1.0;  // a key; none below 0
+  double sounding = -1.0;  // The sounding key; below 0: none.
   std::optional<Error> failure;
   const auto send = [&](const char* address, double key) {
     if (auto played = play(console, {address, {key}}); !played) {
@@ -186,7 +186,7 @@ Result<Done> command::keys(ConsoleContext& console, Words) {
   return Done{};
 }
 
-// --- models -------------------------------------------------------------------------------------
+// --- models and presets --------------------------------------------------------------------------
 
 Result<Done> command::load(ConsoleContext& console, Words words) {
   const auto result = console.session.load_and_wait(words[0], words.size() > 1);
@@ -288,7 +288,7 @@ Result<Done> command::set(ConsoleContext& console, Words words) {
   parse_number(words[1], wanted);
   std::vector<std::string> lines;
   for (const Event& event : *events) {
-    // A model that was loaded by another thread meanwhile has other parameters.
+    // A model loaded by another thread in the meantime has other parameters.
     if (event.model != current->serial) {
       continue;
     }
@@ -313,11 +313,11 @@ Result<Done> command::hit(ConsoleContext& console, Words words) {
   return events ? Result<Done>(Done{}) : Result<Done>(events.error());
 }
 
-// --- looking ------------------------------------------------------------------------------------
+// --- information ---------------------------------------------------------------------------------
 
 namespace {
 
-// ", 24 semitones lower", or nothing.
+// Returns ", 24 semitones lower", or an empty text.
 std::string transposition(int semitones) {
   return semitones == 0 ? ""
                         : ", " + std::to_string(std::abs(semitones)) +
@@ -348,7 +348,7 @@ std::string describe_stability(const Instrument& instrument) {
                                fixed(std::max(0.0, margin), 2) + " of the stiffness";
 }
 
-// "cc71 (learnt)" and what it does, for every control and controller.
+// Returns a row such as "cc71 (learnt)" with its effect for every control and controller.
 std::vector<std::vector<std::string>> control_rows(const ConsoleContext& console,
                                                    const Loaded& current) {
   std::vector<std::vector<std::string>> rows;

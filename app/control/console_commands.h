@@ -1,4 +1,5 @@
-// app/control: what the console's commands do; the rows of registry.h name them. [console thread]
+// app/control: the functions behind the console's commands; the rows of registry.h refer to them.
+// [console thread]
 #pragma once
 
 #include <memory>
@@ -9,7 +10,7 @@
 
 namespace ressort::control {
 
-// What the commands work on; the console's own.
+// The objects that the commands work on.
 struct ConsoleContext {
   Process& process;
   Session& session;
@@ -17,10 +18,10 @@ struct ConsoleContext {
   Recorder recorder;
   Keyboard keyboard = {};
   bool has_quit = false;
-  FigureValues timbre = {};  // as it was told last
+  FigureValues timbre = {};  // Values of the last `timbre` command.
 };
 
-// What sounds; null before anything was loaded.
+// Returns the current scene; null before anything was loaded.
 std::shared_ptr<const Loaded> loaded(const ConsoleContext& console);
 
 extern const Error nothing_loaded;
@@ -28,16 +29,16 @@ extern const Error nothing_loaded;
 // Sends a playing message to the audio thread; all of its events act together.
 Result<std::vector<Event>> play(ConsoleContext& console, const Message& message);
 
-// The name of the parameter that a person means by a word: as it is, or in another case.
+// Returns the name of the parameter that a word means: an exact match, or one in another case.
 std::string meant_parameter(const Instrument& instrument, const std::string& word);
 
-// Carries out a command; the words have been counted.
+// Executes a command. The number of words has been checked.
 Result<Done> act(ConsoleContext& console, const Row& row, Words words);
 
-// What is said of modes at the console and by OSC: how many; MODE NOTE|HZ [T60] [PART].
+// Parse the arguments about modes that console and OSC share: a count; MODE NOTE|HZ [T60] [PART].
 Result<std::size_t> mode_count(const Argument& argument);
 Result<TuneTarget> tune_target(std::span<const Argument> arguments);
-// The same of a timbre that is asked for: FIGURE VALUE, as many as there are.
+// Parses the pairs FIGURE VALUE of a target timbre.
 Result<std::vector<TimbreTarget>> timbre_targets(std::span<const Argument> arguments);
 
 namespace command {

@@ -1,4 +1,4 @@
-// The console's commands that keep, teach and take back what a player changes, and that wait.
+// Console commands that save, undo, assign controllers and wait.
 #include <filesystem>
 
 #include "app/control/console_commands.h"
@@ -61,7 +61,7 @@ Result<Done> command::unlearn(ConsoleContext& console, Words words) {
   return Done{};
 }
 
-// Loads and sets as anybody does, so that it can be taken back too.
+// Loads and sets like any other client, so that an undo can be undone.
 Result<Done> command::undo(ConsoleContext& console, Words) {
   const auto change = console.session.take_last_change();
   if (!change) {

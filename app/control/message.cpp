@@ -7,8 +7,8 @@
 namespace ressort::control {
 namespace {
 
-// One element of a pattern that is not '*': does it fit `c`? `length` is how much of the pattern
-// it takes, 0 if it fits no single character.
+// Matches `c` with one element of a pattern other than '*'. `length` is the length of that element,
+// 0 if it matches no single character.
 bool fits_one(std::string_view pattern, char c, std::size_t& length) {
   length = 1;
   if (pattern[0] == '?') {
@@ -104,8 +104,9 @@ Result<std::vector<ScoreLine>> parse_score(std::string_view text) {
   return lines;
 }
 
-// Iterative, with one point to go back to for '*': linear for patterns with one star, and never
-// worse than their product in length. {a,b} is tried alternative by alternative, not nested.
+// Iterative matching that backtracks to the last '*': linear for patterns with one star, and at
+// worst the product of both lengths. Alternatives {a,b} are tried one after the other and cannot
+// nest.
 bool fits(std::string_view pattern, std::string_view address) {
   const std::size_t open = pattern.find('{');
   const std::size_t close = pattern.find('}', open == std::string_view::npos ? 0 : open);

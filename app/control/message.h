@@ -1,5 +1,5 @@
-// app/control: a message as people write it: an address and its arguments, in OSC, in a line of a
-// score or in words. Pure text; what a message does stands in registry.h.
+// app/control: a message as people write it: an address and its arguments, from OSC, from a line of
+// a score or from words. Pure text; registry.h defines what a message does.
 #pragma once
 
 #include <string>
@@ -15,29 +15,29 @@ namespace ressort::control {
 using Argument = std::variant<double, std::string>;
 
 struct Message {
-  std::string address;  // "/note/on"
+  std::string address;  // Such as "/note/on".
   std::vector<Argument> arguments;
-  std::string types = {};  // of the arguments, as OSC has them; empty: of a line of text
+  std::string types = {};  // OSC type tags of the arguments; empty for a line of text.
 };
 
-// One line of a score: TIME_SECONDS ADDRESS ARG... ; blank lines and # comments have no message.
+// One line of a score: TIME_SECONDS ADDRESS ARG... Blank lines and # comments have no message.
 struct ScoreLine {
-  int line = 0;    // from 1
-  int column = 1;  // of its address
+  int line = 0;    // Counted from 1.
+  int column = 1;  // Column of its address.
   double time_s = 0.0;
   Message message;
 };
 Result<std::vector<ScoreLine>> parse_score(std::string_view text);
 
-// Words divided by blanks, "..." for a word with blanks in it; says whether the last one's quote is
-// open, if it is asked.
+// Splits a text at blanks; "..." is one word. Sets `is_open`, if given, to whether the last quote
+// is not closed.
 std::vector<std::string> split_words(std::string_view text, bool* is_open = nullptr);
 inline constexpr const char* open_quote = "this quote is not closed; expected another \" behind it";
 
-// A number where the word is one, else the word.
+// Returns a number if the word is one, else the word.
 Argument to_argument(const std::string& word);
 
-// Whether an OSC address pattern (* ? [a-z] {x,y}) fits an address.
+// Returns whether an OSC address pattern (* ? [a-z] {x,y}) matches an address.
 bool fits(std::string_view pattern, std::string_view address);
 
 }  // namespace ressort::control

@@ -1,4 +1,4 @@
-// The console's commands about the modes of what sounds.
+// Console commands about the modes of the current model.
 #include <future>
 
 #include "app/control/console_commands.h"

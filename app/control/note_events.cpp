@@ -8,7 +8,7 @@
 namespace ressort::control {
 namespace {
 
-// OSC's floats up to 1 are shares of the loudest; whole numbers, and what is typed, are MIDI's.
+// OSC floats up to 1 are a share of full velocity; integers and typed numbers are MIDI velocities.
 double velocity_of(const Said& said, std::size_t argument) {
   const std::string& types = said.message.types;
   const double velocity = said.arguments[argument];
@@ -17,7 +17,7 @@ double velocity_of(const Said& said, std::size_t argument) {
   return is_share ? velocity : velocity / 127.0;
 }
 
-// On the channel of the ID that is this argument; of 0 on that of the instrument.
+// Puts the event on the channel of the ID in this argument; ID 0 means the instrument's channel.
 Events on_channel(const Said& said, std::size_t id_argument, Event event) {
   const unsigned id = said.whole(id_argument);
   event.channel = id == 0 ? said.instrument.channel : note_channel(id);
@@ -43,8 +43,8 @@ Events events::note_off(const Said& said) {
   return by_key(said, false);
 }
 
-// What sounds has this frequency, however keys are transposed and tuned; the nearest key says which
-// controls play it.
+// The note sounds at this frequency, independent of transposition and tuning. The nearest key
+// selects the controls that play it.
 Events events::note_hz(const Said& said) {
   constexpr double highest_key = 127.0;
   const double velocity = velocity_of(said, 2);
@@ -61,7 +61,7 @@ Events events::note_hz(const Said& said) {
        .value2 = hz});
 }
 
-// By the controller that ends all notes of a channel: that of an ID has no others.
+// Uses the controller that ends all notes of a channel, because an ID's channel has no others.
 Events events::note_end(const Said& said) {
   constexpr std::uint16_t all_notes_off = 123;
   return on_channel(said, 0, {.kind = EventKind::controller, .index = all_notes_off});

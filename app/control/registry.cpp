@@ -12,7 +12,7 @@
 namespace ressort::control {
 namespace {
 
-// What stands before and after N or NAME; `hole` is empty where there is none.
+// The text before and after N or NAME in an address; `hole` is empty if there is none.
 struct Pattern {
   std::string_view before;
   std::string_view hole;
@@ -29,7 +29,8 @@ Pattern pattern_of(const Row& row) {
   return {address, "", ""};
 }
 
-// Of an address that begins as those of inputs do: the input, or why there is none.
+// Returns the input of an address that starts like those of inputs, or the reason why there is
+// none.
 Result<const InputInfo*> find_input(const Message& message, const Instrument& instrument,
                                     std::string_view number_text) {
   int number = 0;
@@ -84,10 +85,10 @@ Events custom_events(const Said& said) {
   return events;
 }
 
-// What a preset gives to one of its controls.
+// The row of the addresses that a preset gives to its controls.
 const Row custom_row{.arguments = {{"VALUE", "the value", 0, 1}}, .play = custom_events};
 
-// Reads the arguments of a message; nothing where they are as the row wants them.
+// Reads the arguments of a message. Returns an error text, or nothing if they match the row.
 std::optional<std::string> read_arguments(const Row& row, const Message& message,
                                           std::array<double, most_arguments>& values) {
   std::size_t count = 0;
@@ -113,7 +114,7 @@ std::optional<std::string> read_arguments(const Row& row, const Message& message
       return meaning + " must lie between " + print_number(wanted.least) + " and " +
              print_number(wanted.most) + ", found " + print_number(*value);
     }
-    // What was computed in single precision may be off by its rounding.
+    // Numbers computed in single precision have rounding errors.
     if (wanted.is_whole && std::abs(*value - std::round(*value)) > 1e-3) {
       return meaning + " must be a whole number, found " + print_number(*value);
     }
@@ -181,7 +182,8 @@ std::string_view heading(CommandGroup group) {
 
 FoundRow find_row(std::string_view address) {
   FoundRow found;
-  std::size_t longest = 0;  // what follows NAME; of two that fit, that of the longer is meant
+  // Length of the text after NAME; of two matching rows the longer text wins.
+  std::size_t longest = 0;
   for (const Row& row : rows()) {
     const auto [before, hole, after] = pattern_of(row);
     if (row.address.empty() || (hole.empty() && address != before)) {

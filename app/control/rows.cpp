@@ -16,15 +16,15 @@
 namespace ressort::control {
 namespace {
 
-// --- what plays ---------------------------------------------------------------------------------
+// --- playing -------------------------------------------------------------------------------------
 
-// On the channel that the instrument listens to.
+// Puts the event on the instrument's channel.
 Events one(const Said& said, Event event) {
   event.channel = said.instrument.channel;
   return std::vector{event};
 }
 
-// Of the parameters that a pattern names.
+// Sets the parameters that a pattern matches.
 Events set_parameters(const Said& said) {
   std::vector<Event> events;
   std::vector<std::string> names;
@@ -70,8 +70,8 @@ Events play_input(const Said& said, const GestureRow& gesture) {
                     .value2 = said.arguments[1]});
 }
 
-// Of NAME, or of "NAME:3", the third mass of what NAME stands for, or of a place, "NAME:0.3"; or
-// why there is none.
+// Finds the mass NAME, or "NAME:3", the third mass of a macro, or the place "NAME:0.3"; else
+// returns the reason why there is none.
 Result<std::uint32_t> find_mass(std::span<const StruckInfo> known, std::string_view name) {
   const auto find = [&](std::string_view wanted) {
     const auto found =
@@ -122,7 +122,7 @@ constexpr CallArgument number{
     .word = "NUMBER", .meaning = "the number", .least = 0, .most = 127, .is_whole = true};
 constexpr CallArgument id{
     .word = "ID", .meaning = "the ID", .least = 1, .most = most_note_ids, .is_whole = true};
-// Of a note that need not have one.
+// The optional ID of a note.
 constexpr CallArgument own_id{.word = "ID",
                               .meaning = "the ID",
                               .least = 0,
@@ -130,7 +130,7 @@ constexpr CallArgument own_id{.word = "ID",
                               .otherwise = 0,
                               .is_whole = true};
 
-// --- the rows -----------------------------------------------------------------------------------
+// --- the table -----------------------------------------------------------------------------------
 
 }  // namespace
 

@@ -1,5 +1,5 @@
-// app/control: the rows of the registry, as they are written down. Only registry.cpp asks for them;
-// whoever wants to find or read one asks the registry.
+// app/control: the table of the registry. Only registry.cpp uses it; everyone else asks the
+// registry.
 #pragma once
 
 #include <span>
@@ -10,9 +10,9 @@
 
 namespace ressort::control {
 
-std::vector<Row> make_rows();  // in the order of /describe
+std::vector<Row> make_rows();  // Returns the rows in the order of /describe.
 
-// The addresses that we send.
+// The addresses that the program sends.
 std::span<const std::string_view> answers();
 
 }  // namespace ressort::control

@@ -11,7 +11,7 @@
 namespace ressort::control {
 namespace {
 
-// Three digits of it.
+// Formats a number with three digits.
 std::string about(double number) {
   std::array<char, 32> text{};
   std::snprintf(text.data(), text.size(), "%.3g", number);
@@ -22,7 +22,7 @@ std::string percent(double share, int digits) {
   return fixed(100.0 * share, digits) + " %";
 }
 
-// What modes hold is not known, nor, while an input is driven, what is lost.
+// The energy in modes is unknown, as is the loss while an input is driven.
 std::string tell_energy(const Status& now) {
   if (now.voices == 0) {
     return "none";
@@ -49,16 +49,16 @@ std::string tell_modes(const Status& now) {
                                       0);
 }
 
-// A bar of 3 dB a step, from -60 dBFS to full scale.
+// Returns a bar from -60 dBFS to full scale, 3 dB per step.
 std::string level_meter(double peak_db) {
   constexpr std::size_t steps = 20;
-  // Silence is minus infinity of them.
+  // Silence is minus infinity.
   const double step = std::clamp(std::ceil((peak_db + 60.0) / 3.0), 0.0, double{steps});
   const auto filled = static_cast<std::size_t>(step);
   return "[" + std::string(filled, '#') + std::string(steps - filled, '-') + "]";
 }
 
-// "A3 (100)": the middle C is C4.
+// Returns for example "A3 (100)"; middle C is C4.
 std::string tell_notes(const Status& now) {
   constexpr const char* names[] = {"C", "C#", "D", "D#", "E", "F", "F#", "G", "G#", "A", "A#", "B"};
   std::string text;
@@ -71,7 +71,8 @@ std::string tell_notes(const Status& now) {
   return text.empty() ? "none yet" : "last " + text;
 }
 
-// In the order of the console's lines; the places are those of OSC, which nobody may move.
+// Rows are in the order of the console's lines. The positions in /status.reply are part of the OSC
+// interface and must not change.
 constexpr StatusRow status_table[] = {
     {"model", "", "what sounds", &Status::model, 0, "model",
      [](const Status& now) { return now.model.empty() ? "none" : now.model; }},
@@ -155,7 +156,7 @@ constexpr StatusRow status_table[] = {
     {"modes_awake", "", "of these", &Status::modes_awake},
 };
 
-// Null behind the last place.
+// Null after the last position.
 const StatusRow* row_at(int place) {
   const auto* const row = std::find_if(std::begin(status_table), std::end(status_table),
                                        [&](const StatusRow& r) { return r.place == place; });

@@ -1,5 +1,5 @@
-// app/control: what is told of the program while it plays. One row a figure: the console's
-// `status`, /status.reply and the documents read these rows.
+// app/control: the figures of the running program, one row each. The console's `status`,
+// /status.reply and the documents read these rows.
 #pragma once
 
 #include <span>
@@ -18,21 +18,22 @@ inline constexpr int not_in_reply = -1;
 struct StatusRow {
   std::string_view name;
   std::string_view unit;
-  std::string_view does;  // what it says, in a line
+  std::string_view does;  // Meaning in one line.
   std::variant<double Status::*, int Status::*, std::int64_t Status::*, std::uint64_t Status::*,
                bool Status::*, std::string Status::*>
       figure;
-  int place = not_in_reply;  // in /status.reply, from 0
-  std::string_view line;     // of the console's `status`; empty: it is told with another figure
-  // What the line says of it, nothing at times; null: name, figure and unit.
+  int place = not_in_reply;  // Position in /status.reply, from 0.
+  std::string_view line;     // Line of the console's `status`; empty: shown with another figure.
+  // Returns the text of the line, empty at times; null: name, figure and unit.
   std::string (*tell)(const Status& status) = nullptr;
 };
 std::span<const StatusRow> status_rows();
 
-// "/status.reply" and the figures that have a place in it: of doubles a float, but for the rate.
+// Builds "/status.reply" with the figures that have a position; doubles are sent as floats, except
+// the rate.
 Reply status_reply(const Status& status);
 
-// The console's table: a line's name and what its figures say.
+// Returns the console's table: each line's name and text.
 std::vector<std::vector<std::string>> status_lines(const Status& status);
 
 }  // namespace ressort::control

@@ -29,7 +29,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// The terminal gives every key at once and shows none, while this lives.
+// Puts the terminal into raw mode without echo for its lifetime.
 class RawMode {
  public:
   RawMode() {
@@ -48,8 +48,8 @@ class RawMode {
   termios before_{};
 };
 
-// Characters beyond ASCII are understood, by this thread alone: numbers stay free of the locale,
-// and so do the other threads.
+// Sets a UTF-8 locale for this thread only, so that number formats stay independent of the locale
+// everywhere else.
 class Utf8Thread {
  public:
   Utf8Thread()
@@ -72,7 +72,7 @@ bool is_inside_character(char byte) {
   return (static_cast<unsigned char>(byte) & 0xC0u) == 0x80u;
 }
 
-// What all the words begin with, in whole characters.
+// Returns the common prefix of all the words, in whole characters.
 std::string common_beginning(const std::vector<std::string>& words) {
   std::size_t length = words[0].size();
   for (const std::string& word : words) {
@@ -102,7 +102,7 @@ std::string in_columns(const std::vector<std::string>& words) {
   return text;
 }
 
-// The file of the typed lines; empty where there is no home for it.
+// Returns the path of the history file; empty without a home folder.
 std::string history_path() {
   fs::path folder;
   if (const char* given = std::getenv("XDG_STATE_HOME"); given != nullptr && *given == '/') {
@@ -118,17 +118,17 @@ std::string history_path() {
   return error ? "" : (folder / "history").string();
 }
 
-// Between the keys of a line that is being edited; waits for the terminal.
+// Prints between the keystrokes of a line that is being edited; waits for the terminal.
 void put(const std::string& text) {
   std::fputs(text.c_str(), stdout);
   std::fflush(stdout);
 }
 
-// Lets a terminal that was stopped, or that nobody reads, go on: what it has not shown is gone.
+// Releases a terminal that is stopped or not read; unread output is lost.
 void release_terminal() {
   if (isatty(STDOUT_FILENO) != 0 && tcgetpgrp(STDOUT_FILENO) == getpgrp()) {
     tcflush(STDOUT_FILENO, TCOFLUSH);
-    // The two together wake who waits to write.
+    // The two calls together wake a blocked writer.
     tcflow(STDOUT_FILENO, TCOOFF);  // NOLINT(concurrency-mt-unsafe): a system call, no more
     tcflow(STDOUT_FILENO, TCOON);   // NOLINT(concurrency-mt-unsafe)
   }
@@ -168,20 +168,20 @@ struct Terminal::Input {
 
   Console& console;
   std::function<void()> on_quit;
-  std::array<int, 2> wake{-1, -1};  // a pipe: what is written to [1] ends a wait
-  std::mutex mutex;                 // of the next three
+  std::array<int, 2> wake{-1, -1};  // A pipe: a byte written to [1] ends a wait.
+  std::mutex mutex;                 // Protects the next three.
   bool is_over = false;
-  bool is_editing = false;     // libedit has the terminal
-  std::string unsaid;          // waits for the thread to put it above the line being typed
-  EditLine* editor = nullptr;  // [the thread]
+  bool is_editing = false;     // libedit controls the terminal.
+  std::string unsaid;          // Text waiting to be printed above the line being typed.
+  EditLine* editor = nullptr;  // Used by the thread only.
   std::thread thread;
-  std::future<void> over;  // the thread's work
+  std::future<void> over;  // Result of the thread.
 
   enum class Woken { key, nothing, over };
 
   void rouse() {
     const char byte = 0;
-    // A full pipe wakes as well.
+    // A full pipe wakes the reader as well.
     static_cast<void>(!write(wake[1], &byte, 1));
   }
 
@@ -192,7 +192,7 @@ struct Terminal::Input {
         ressort::say(text);
         return;
       }
-      constexpr std::size_t most_bytes = std::size_t{1} << 20;  // of a terminal that is stopped
+      constexpr std::size_t most_bytes = std::size_t{1} << 20;  // Limit for a stopped terminal.
       if (unsaid.size() < most_bytes) {
         unsaid += text + "\n";
       }
@@ -200,7 +200,7 @@ struct Terminal::Input {
     rouse();
   }
 
-  // Waits for a key, or the end of the input. Negative: as long as it takes.
+  // Waits for a key or the end of the input. Negative: without a limit.
   Woken wait(int timeout_ms) {
     std::string news;
     while (true) {
@@ -237,7 +237,7 @@ struct Terminal::Input {
       read_lines();
       return;
     }
-    // In the background, touching the terminal would stop the whole program, sound and all.
+    // In the background, access to the terminal would stop the whole program, sound included.
     if (tcgetpgrp(STDIN_FILENO) != getpgrp()) {
       return;
     }
@@ -252,7 +252,7 @@ struct Terminal::Input {
     el_end(editor);
   }
 
-  // False: there will be no more.
+  // Returns false after the last line.
   bool run_line(std::string_view line) {
     if (console.run_line(line)) {
       return true;
@@ -264,7 +264,7 @@ struct Terminal::Input {
   void read_lines() {
     constexpr std::size_t max_line = 65536;
     std::string text;
-    bool is_skipping = false;  // the rest of a line that is too long
+    bool is_skipping = false;  // Skips the rest of a line that is too long.
     while (wait(-1) == Woken::key) {
       char bytes[4096];
       const ssize_t got = read(STDIN_FILENO, bytes, sizeof bytes);
@@ -313,14 +313,14 @@ struct Terminal::Input {
     el_set(editor, EL_SIGNAL, 0);
     el_set(editor, EL_GETCFN, next_character);
     el_set(editor, EL_HIST, history, lines);
-    // The narrow form of this one would leak its copies.
+    // The narrow-character variant of this call leaks its copies.
     el_wset(editor, EL_ADDFN, L"ressort-complete", L"Completes a word", complete);
     el_set(editor, EL_BIND, "^I", "ressort-complete", nullptr);
     el_set(editor, EL_BIND, "^R", "em-inc-search-prev", nullptr);
     bool goes_on = true;
     while (goes_on) {
       el_resize(editor);
-      wait_until_said();  // the prompt comes after it
+      wait_until_said();  // The prompt is printed after it.
       set_editing(true);
       int count = 0;
       const char* const typed = el_gets(editor, &count);
@@ -353,14 +353,14 @@ struct Terminal::Input {
     const std::lock_guard lock(mutex);
     is_editing = now;
     if (!unsaid.empty()) {
-      unsaid.pop_back();  // a line's end comes by itself
+      unsaid.pop_back();  // The last line end is added by the editor.
       ressort::say(std::exchange(unsaid, {}));
     }
   }
 
   void read_keys(const std::function<bool(char)>& on_key) {
     using Clock = std::chrono::steady_clock;
-    // Sooner than a finger can: the keyboard repeats a key that is held down.
+    // Shorter than a second keystroke can be: the keyboard repeats a key that is held down.
     constexpr std::chrono::milliseconds repetition{60};
     const RawMode raw;
     char last = 0;
@@ -382,7 +382,7 @@ struct Terminal::Input {
         return;
       }
       constexpr char escape = 27;
-      if (got > 1 && bytes[0] == escape) {  // an arrow or a function key
+      if (got > 1 && bytes[0] == escape) {  // An arrow or a function key.
         continue;
       }
       const Clock::time_point now = Clock::now();
@@ -407,7 +407,7 @@ struct Terminal::Input {
     return *static_cast<Input*>(input);
   }
 
-  // Reads one character; 0 ends the line and the reading.
+  // Reads one character; 0 ends the line and the input.
   static int next_character(EditLine* editor, wchar_t* character) {
     std::mbstate_t state{};
     while (of(editor).wait(-1) == Woken::key) {
@@ -422,7 +422,7 @@ struct Terminal::Input {
       // NOLINTNEXTLINE(concurrency-mt-unsafe): it has a state of its own
       const std::size_t used = std::mbrtowc(character, &byte, 1, &state);
       if (used == static_cast<std::size_t>(-1)) {
-        state = {};  // no UTF-8; passed over
+        state = {};  // Skips bytes that are not UTF-8.
       } else if (used != static_cast<std::size_t>(-2)) {
         return 1;
       }

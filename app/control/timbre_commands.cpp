@@ -1,4 +1,4 @@
-// The console's commands about what the sound is like, and shall be like.
+// Console commands that describe and change the timbre.
 #include <future>
 
 #include "app/control/console_commands.h"
@@ -9,12 +9,13 @@ namespace ressort::control {
 
 Result<Done> command::timbre(ConsoleContext& console, Words) {
   constexpr std::chrono::milliseconds patience{20};
-  constexpr int rounds = 60;  // a second and a bit: what is listened to takes 0.2 s
+  constexpr int rounds = 60;  // A little over a second; the analysis needs 0.2 s.
   if (!loaded(console)) {
     return nothing_loaded;
   }
   TimbreWatch& watch = console.session.timbre();
-  watch.listen(std::chrono::seconds(10));  // whoever asks once asks again
+  // Keeps listening for a while, because users ask repeatedly.
+  watch.listen(std::chrono::seconds(10));
   auto moment = watch.now();
   for (int round = 0; !moment && round < rounds && console.session.wait(patience); ++round) {
     moment = watch.now();

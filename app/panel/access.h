@@ -1,8 +1,8 @@
-// app/panel: who may see the panel. Pure: what a browser says goes in, yes or no comes out.
+// app/panel: access control of the panel. Pure: takes request headers, returns yes or no.
 //
-// A page from elsewhere, open in the same browser, can send requests to this machine and, by
-// rebinding its own name to 127.0.0.1, read the answers. What it cannot do is send another Host and
-// Origin than its own: so both are compared, whole, with a list of ours.
+// A page from elsewhere in the same browser can send requests to this machine and, by rebinding its
+// own name to 127.0.0.1 (DNS rebinding), read the replies. It cannot forge Host and Origin, so both
+// are compared, whole, with a list of allowed values.
 #pragma once
 
 #include <string>
@@ -15,13 +15,14 @@ namespace ressort::panel {
 
 class PanelAccess {
  public:
-  // `hosts`: names and addresses that the panel is called by, besides this machine's own.
-  // `needs_token`: whoever does not know it is refused.
+  // `hosts`: names and addresses of the panel besides those of this machine. `needs_token`:
+  // requests without the token are refused.
   PanelAccess(int port, const std::vector<std::string>& hosts, std::string token, bool needs_token);
 
-  bool is_host(std::string_view host) const;      // "127.0.0.1:9788", as it stands in Host
-  bool is_origin(std::string_view origin) const;  // "http://127.0.0.1:9788"
-  // Takes as long whatever is wrong with it.
+  bool is_host(std::string_view host) const;  // Value of the Host header: "127.0.0.1:9788".
+  // Value of the Origin header: "http://127.0.0.1:9788".
+  bool is_origin(std::string_view origin) const;
+  // Compares in constant time.
   bool is_token(std::string_view token) const;
   bool needs_token() const { return needs_token_; }
   const std::string& token() const { return token_; }
@@ -32,12 +33,12 @@ class PanelAccess {
   bool needs_token_;
 };
 
-// 128 random bits as 32 digits.
+// Returns 128 random bits as 32 hexadecimal digits.
 std::string make_token();
 
-// What a cookie of this name says, in a Cookie header; empty if it is not there.
+// Returns the value of this cookie in a Cookie header; empty if it is missing.
 std::string_view cookie_of(std::string_view header, std::string_view name);
 
-bool is_loopback(std::string_view address);  // "127.0.0.1", "localhost"
+bool is_loopback(std::string_view address);  // True for 127.0.0.1 and localhost.
 
 }  // namespace ressort::panel

@@ -6,7 +6,8 @@
 namespace ressort::panel {
 namespace {
 
-constexpr std::size_t most_pictures = 4;  // of engines that are on their way, or on their way out
+// Pictures of engines that are about to play or fading out.
+constexpr std::size_t most_pictures = 4;
 
 void put(std::string& bytes, std::uint64_t value, int size) {
   for (int shift = 0; shift < 8 * size; shift += 8) {

@@ -21,7 +21,7 @@ json node(const std::string& path, std::string_view description) {
   return {{"FULL_PATH", path}, {"DESCRIPTION", description}};
 }
 
-// Of an address: what it takes, and between what.
+// Describes an address: its arguments and their ranges.
 json method_of(const Row& row, const std::string& path) {
   json out = node(path, row.does);
   std::string types;
@@ -84,7 +84,7 @@ class Tree {
     }
     at->update(method);
   }
-  // Null where there is none.
+  // Null if there is none.
   const json* find(std::string_view path) const {
     const json* at = &root_;
     while (path.size() > 1) {
@@ -132,7 +132,7 @@ Tree tree_of(const Session::Present& now) {
     tree.add(path, parameter_of(info, path, now.values[i]));
     tree.add(path + "/range", range_of(info, path + "/range"));
   }
-  constexpr std::size_t most_struck = 200;  // a mesh has thousands
+  constexpr std::size_t most_struck = 200;  // A mesh has thousands of masses.
   for (std::size_t i = 0; i < std::min(most_struck, instrument.struck.size()); ++i) {
     const StruckInfo& info = instrument.struck[i];
     const std::string path = "/mass/" + info.name + (info.moves.empty() ? "" : ":2") + "/strike";

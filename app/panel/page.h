@@ -1,4 +1,4 @@
-// app/panel: the page, compiled in. app/panel/page has its files; CMake makes page.cpp of them.
+// app/panel: the web page, compiled in. CMake generates page.cpp from app/panel/page.
 #pragma once
 
 #include <span>
@@ -9,8 +9,8 @@
 namespace ressort::panel {
 
 struct PageFile {
-  std::string_view path;  // "/panel.js"
-  std::string_view type;  // "text/javascript; charset=utf-8"
+  std::string_view path;  // Such as "/panel.js".
+  std::string_view type;  // Such as "text/javascript; charset=utf-8".
   std::string_view text;
 };
 std::span<const PageFile> page_files();

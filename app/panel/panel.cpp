@@ -26,7 +26,7 @@ namespace {
 using Request = httplib::Request;
 using Response = httplib::Response;
 
-// Frames and events keep a thread each for as long as they are watched.
+// Each motion or event stream occupies a thread for as long as it is open.
 constexpr std::size_t threads = 2 * WebPanel::most_viewers + 4;
 constexpr std::size_t most_news = 100;
 constexpr double fastest_hz = 60.0;
@@ -35,7 +35,7 @@ constexpr std::size_t most_modes_shown = 64;
 constexpr auto event_pause = std::chrono::milliseconds(100);
 constexpr const char* octets = "application/octet-stream";
 
-// What others may call this machine by: its addresses.
+// Returns the addresses under which other machines reach this one.
 std::vector<std::string> own_addresses() {
   std::vector<std::string> addresses;
   ifaddrs* first = nullptr;
@@ -51,7 +51,7 @@ std::vector<std::string> own_addresses() {
   return addresses;
 }
 
-// A number of the address's query, between two bounds.
+// Returns a number from the query string, limited to a range.
 double number_of(const Request& request, const std::string& name, double otherwise, double least,
                  double most) {
   double value = otherwise;
@@ -65,7 +65,7 @@ double number_of(const Request& request, const std::string& name, double otherwi
   return std::clamp(value, least, most);
 }
 
-// Packets as elements of one bundle that acts at once.
+// Puts packets as elements into one bundle with the time tag "immediately".
 std::string bundle_of(const OscServer::Packets& packets) {
   std::string bytes("#bundle\0\0\0\0\0\0\0\0\1", 16);
   for (const auto& packet : packets) {
@@ -77,7 +77,7 @@ std::string bundle_of(const OscServer::Packets& packets) {
   return bytes;
 }
 
-// What a /fail says, for a person: its texts, but for the address of what was asked.
+// Returns the text of a /fail message without the address of the request.
 std::string failure_in(const std::vector<std::uint8_t>& packet) {
   const std::string all(packet.begin(), packet.end());
   if (!all.starts_with(std::string_view("/fail\0", 6))) {
@@ -93,7 +93,7 @@ std::string failure_in(const std::vector<std::uint8_t>& packet) {
   return said;
 }
 
-// The last of what went wrong; loads may end when the panel has gone.
+// The latest error messages. Loads may end after the panel has gone.
 class News {
  public:
   void add(const std::string& text) {
@@ -104,7 +104,7 @@ class News {
       texts_.pop_front();
     }
   }
-  // Those that came after so many, which are counted on.
+  // Returns the messages after the first `heard` ones, and updates that count.
   std::vector<std::string> after(std::uint64_t& heard) {
     const std::lock_guard lock(mutex_);
     const auto more = std::min<std::uint64_t>(count_ - heard, texts_.size());
@@ -115,7 +115,7 @@ class News {
  private:
   std::mutex mutex_;
   std::deque<std::string> texts_;
-  std::uint64_t count_ = 0;  // that there ever were
+  std::uint64_t count_ = 0;  // Number of messages so far.
 };
 
 }  // namespace
@@ -130,12 +130,12 @@ struct WebPanel::Server {
         osc(osc_in) {
     http.new_task_queue = [] { return new httplib::ThreadPool(threads); };
     http.set_keep_alive_max_count(1);
-    http.set_keep_alive_timeout(1);  // browsers open connections ahead and say nothing
+    http.set_keep_alive_timeout(1);  // Browsers open connections ahead of time and leave them idle.
     http.set_read_timeout(idle_s);
     http.set_write_timeout(idle_s);
     http.set_payload_max_length(most_body_bytes);
     http.set_tcp_nodelay(true);
-    // Whoever takes the port must be us: no two at once.
+    // Exclusive: two instances cannot share a port.
     http.set_socket_options([](int socket) {
       const int yes = 1;
       setsockopt(socket, SOL_SOCKET, SO_REUSEADDR, &yes, sizeof yes);
@@ -177,7 +177,7 @@ struct WebPanel::Server {
                                              : httplib::Server::HandlerResponse::Unhandled;
     });
     http.set_exception_handler([](const Request&, Response& response, std::exception_ptr) {
-      response.status = 500;  // and not a word of what it was
+      response.status = 500;  // The cause is not revealed.
     });
     for (const PageFile& file : page_files()) {
       http.Get(std::string(file.path), [file](const Request&, Response& response) {
@@ -195,7 +195,7 @@ struct WebPanel::Server {
     listener = std::thread([this] { http.listen_after_bind(); });
   }
 
-  // The status with which a request is refused before anything of it is read; 0: it is not.
+  // Returns the HTTP status with which a request is refused before its body is read; 0: accepted.
   int refused(const Request& request) const {
     const auto one = [&](const char* name) {
       return request.get_header_value_count(name) == 1 ? request.get_header_value(name)
@@ -211,7 +211,7 @@ struct WebPanel::Server {
         !access->is_token(cookie_of(one("Cookie"), "ressort"))) {
       return 403;
     }
-    // Nothing of ours is sent in parts, in pieces or packed.
+    // The page never uses ranges, chunked requests or compression.
     if (request.has_header("Range") || request.has_header("Transfer-Encoding") ||
         request.has_header("Content-Encoding")) {
       return 400;
@@ -246,8 +246,7 @@ struct WebPanel::Server {
     }
   }
 
-  // What is no request of the page's asks for the tree of addresses; / does where JSON is asked
-  // for.
+  // Paths that are not the page's own query the tree of addresses; so does / if JSON is requested.
   bool answer_query(const Request& request, Response& response) const {
     static const std::set<std::string> ours = {"/describe", "/network", "/modes",
                                                "/motion",   "/events",  "/osc"};
@@ -283,13 +282,13 @@ struct WebPanel::Server {
     response.set_content(text + "\n", "text/plain; charset=utf-8");
   }
 
-  // Nobody is sent what he does not take for longer than idle_s.
+  // Waits between messages of a stream; a client that reads nothing for idle_s is dropped.
   bool pause(std::chrono::duration<double> time) {
     std::unique_lock lock(mutex);
     return !ending.wait_for(lock, time, [this] { return is_ending; });
   }
 
-  // The picture of what sounds: where nobody has looked yet, after a look.
+  // Returns the current picture; before the first viewer, requests a frame to get it.
   std::shared_ptr<const Picture> picture() {
     for (int looks = 0; looks < 20; ++looks) {
       motion.look();
@@ -316,7 +315,7 @@ struct WebPanel::Server {
     response.set_content(told_network, "application/json");
   }
 
-  // One search at a time: they take long.
+  // One search at a time, because a search takes long.
   void send_modes(const Request& request, Response& response) {
     const auto now = picture();
     if (now == nullptr) {
@@ -345,7 +344,7 @@ struct WebPanel::Server {
     }
   }
 
-  // Counts a viewer for as long as its stream lives; null where there are enough.
+  // Counts a viewer for the lifetime of its stream; null if there are too many.
   std::shared_ptr<void> enter(std::size_t& viewers) {
     const std::lock_guard lock(mutex);
     if (viewers >= static_cast<std::size_t>(most_viewers)) {
@@ -378,7 +377,7 @@ struct WebPanel::Server {
           } else if (!sink.is_writable()) {
             return false;
           }
-          // By a clock, not by how long it took; who has fallen behind does not catch up.
+          // Timed by a clock, not by duration; a late stream skips frames.
           const auto now = std::chrono::steady_clock::now();
           next = std::max(next, now - std::chrono::milliseconds(100)) +
                  std::chrono::duration_cast<std::chrono::nanoseconds>(
@@ -404,7 +403,7 @@ struct WebPanel::Server {
         });
   }
 
-  // All viewers get the same: peaks are since the last asking.
+  // All viewers share one status, because reading it resets the peaks.
   std::string status_now() {
     const std::lock_guard lock(telling);
     const auto now = std::chrono::steady_clock::now();
@@ -420,7 +419,7 @@ struct WebPanel::Server {
     return told_status;
   }
 
-  // What could not be loaded or saved is told to all viewers, however long it took to find out.
+  // Failed loads and saves are reported to all viewers, even if they end later.
   void take_packet(const Request& request, Response& response) {
     const auto tell_failures = [box = news](const OscServer::Packets& packets) {
       for (const auto& packet : packets) {
@@ -443,22 +442,22 @@ struct WebPanel::Server {
   int port = 0;
   std::unique_ptr<PanelAccess> access;
 
-  std::mutex mutex;  // of these
+  std::mutex mutex;  // Protects the members below.
   std::condition_variable ending;
   bool is_ending = false;
   std::size_t watching = 0;
   std::size_t listening = 0;
   const std::shared_ptr<News> news = std::make_shared<News>();
 
-  std::mutex telling;  // of these
+  std::mutex telling;  // Protects the members below.
   std::uint32_t told_picture = 0;
   std::string told_network;
   std::chrono::steady_clock::time_point next_status;
   std::string told_status;
-  std::uint64_t told_frame = 0;        // of the descriptors
-  std::optional<SpectralShape> shape;  // of that frame
+  std::uint64_t told_frame = 0;        // Frame of the descriptors that were sent.
+  std::optional<SpectralShape> shape;  // Descriptors of that frame.
 
-  std::mutex searching;  // held by who looks for modes
+  std::mutex searching;  // Held while modes are computed.
   std::thread listener;
 };
 

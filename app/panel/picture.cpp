@@ -13,10 +13,11 @@
 namespace ressort::panel {
 namespace {
 
-constexpr std::size_t most_samples = 1 << 16;  // of waves, that the audio thread adds up for a look
+// Number of wave samples that the audio thread sums for one frame.
+constexpr std::size_t most_samples = 1 << 16;
 
-// How far a mass moves when a mode's q grows by 1, from how much the mode gets of the mass: the
-// shapes are orthogonal by the masses.
+// Returns the displacement of each mass per unit of a mode's q, divided by its component: the
+// shapes are orthogonal with respect to the masses.
 std::vector<double> inverse_masses(const Program& program, const Modes& modes) {
   std::vector<double> inverse(program.moving, 1.0);
   if (modes.inverse_mass == Modes::own_mass) {
@@ -29,14 +30,15 @@ std::vector<double> inverse_masses(const Program& program, const Modes& modes) {
   return inverse;
 }
 
-// A place on a body moves as its modes do, each by how far it moves that place.
+// A place on a body moves with its modes, each weighted by its displacement there.
 void take_shapes(const Program& program, const Modes& modes, std::span<const std::uint32_t> nodes,
                  Picture::Group& group) {
   const std::vector<double> inverse = inverse_masses(program, modes);
   const auto number = [&](std::uint32_t c) {
     return coefficient_value(program, program.coefficients[c], program.parameters, 1.0);
   };
-  std::vector<std::vector<std::pair<std::uint32_t, double>>> behind;  // [dot] node, weight
+  // [dot] Pairs of node and weight.
+  std::vector<std::vector<std::pair<std::uint32_t, double>>> behind;
   for (const std::uint32_t node : nodes) {
     auto& list = behind.emplace_back();
     if (node < program.moving) {
@@ -61,7 +63,7 @@ void take_shapes(const Program& program, const Modes& modes, std::span<const std
   }
 }
 
-// The waveguides of a part, one after the other, whose places are dots already.
+// Returns the waveguides of a part in order. Their places are dots already.
 std::vector<Picture::Waveguide> take_waveguides(const Program& program, const Network& network,
                                                 std::span<const std::uint32_t> nodes,
                                                 std::size_t first_dot) {
@@ -87,8 +89,8 @@ std::vector<Picture::Waveguide> take_waveguides(const Program& program, const Ne
   return taken;
 }
 
-// What the waves say lies between the places, which are where they are: what the waves are off
-// there, as they pass a filter, is shared out between one and the next.
+// Draws the waves between the places, whose positions are exact. The error of the waves at a place,
+// caused by the loop filter, is distributed linearly up to the next place.
 void place_waveguide(const Picture::Waveguide& waveguide, std::span<const double> numbers,
                      std::span<const double> start, std::span<float> positions) {
   const auto pieces = static_cast<double>(numbers.size() - 1);
@@ -131,7 +133,7 @@ Picture make_picture(Engine& engine, const Network& network, std::uint32_t numbe
   std::size_t all = 0;
   std::size_t waveguides = 0;
   std::size_t most_waveguides = most_dots / 2 / Engine::waveguide_points;
-  std::set<std::string> known;  // places on bodies, which several may hold on to
+  std::set<std::string> known;  // Places on bodies; several links may share one.
   const auto counts = [&](const Program& program, std::uint32_t node) {
     const auto is_hand = [&](const InputSlot& input) {
       return !input.is_force && input.node == node;
@@ -154,7 +156,7 @@ Picture make_picture(Engine& engine, const Network& network, std::uint32_t numbe
   waveguides = std::min(waveguides, most_waveguides);
   const std::size_t most_nodes = most_dots - waveguides * Engine::waveguide_points;
   const std::size_t stride = (all + most_nodes - 1) / most_nodes;
-  // What is played and heard is always drawn.
+  // Inputs and outputs are always drawn.
   const auto is_port = [](const Program& program, std::size_t node) {
     const auto is_here = [&](const auto& slot) { return slot.node == node; };
     return std::any_of(program.inputs.begin(), program.inputs.end(), is_here) ||
@@ -164,7 +166,7 @@ Picture make_picture(Engine& engine, const Network& network, std::uint32_t numbe
   std::size_t nodes_left = most_nodes;
   std::vector<Engine::Watched> watched;
   for (const Program& program : machine.parts) {
-    std::vector<std::pair<std::uint32_t, std::uint32_t>> nodes;  // mass, node
+    std::vector<std::pair<std::uint32_t, std::uint32_t>> nodes;  // Pairs of mass and node.
     for (std::uint32_t node = 0; node < program.masses.size(); ++node) {
       if ((program.masses[node] % std::max<std::size_t>(1, stride) == 0 ||
            is_port(program, node)) &&
@@ -189,7 +191,7 @@ Picture make_picture(Engine& engine, const Network& network, std::uint32_t numbe
     group.waveguides = take_waveguides(program, network, chosen.nodes, group.first);
     group.waveguides.resize(std::min(group.waveguides.size(), waveguides));
     if (group.numbers() > room || (modes != nullptr && !group.is_modal) || group.numbers() == 0) {
-      chosen.nodes.clear();  // it is drawn as it stands
+      chosen.nodes.clear();  // It is drawn at rest.
       group.count = 0;
       group.is_modal = false;
       group.modes = 0;
@@ -220,7 +222,7 @@ void find_positions(const Picture& picture, const MotionFrame& frame, std::span<
     const double* const numbers = frame.numbers.data() + at;
     float* const x = positions.data() + group.first;
     for (std::size_t mode = 0; mode < group.modes; ++mode) {
-      // What is 160 dB below 1 is not seen.
+      // Less than 160 dB below 1 is invisible.
       const auto q = static_cast<float>(numbers[mode] - group.start_q[mode]);
       if (std::fabs(q) > 1e-8f) {
         const float* const shape = group.shapes.data() + mode * group.count;

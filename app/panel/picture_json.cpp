@@ -19,7 +19,7 @@ namespace {
 
 using nlohmann::json;
 
-constexpr std::size_t most_still = 4000;  // nodes that do not move
+constexpr std::size_t most_still = 4000;  // Limit on fixed nodes.
 constexpr std::size_t most_lines = 12'000;
 constexpr std::uint32_t nowhere = 0xffffffffu;
 
@@ -108,12 +108,12 @@ class NetworkTeller {
     is_laid_out_ = is_plane_ || !has_row_only || is_chain(layout);
   }
 
-  // Modes, which are nowhere, are as far apart as there is room for.
+  // Modes have no position, so they are spread over the available width.
   double along(const Macro& body, double u) const {
     return is_plane_ ? (body.length - 1.0) * u : wide_ * u;
   }
 
-  // A place on a waveguide is on its line, one on a body below its modes.
+  // A place on a waveguide lies on its line, a place on a body below its modes.
   std::optional<LayoutPoint> point_of(const Tap& tap, std::uint32_t mass) const {
     const Macro& macro = picture_.network->macros[tap.macro];
     const double u = std::clamp(argument_value(network_, tap.u, parameters_), 0.0, 1.0);
@@ -126,7 +126,7 @@ class NetworkTeller {
     return std::nullopt;
   }
 
-  // A single row is one only if its neighbours are linked; else nobody knows where things are.
+  // A single row is a chain only if neighbours are linked; otherwise the positions are unknown.
   bool is_chain(const MassLayout& layout) const {
     if (layout.rows.size() != 1) {
       return false;
@@ -166,9 +166,9 @@ class NetworkTeller {
     kinds_ += kind;
   }
 
-  // The line of a waveguide through its points and the places on it.
+  // Returns the line of a waveguide through its points and places.
   void add_waveguide(const Picture::Waveguide& waveguide, json& lines) const {
-    std::vector<std::pair<double, std::size_t>> line;  // u, node
+    std::vector<std::pair<double, std::size_t>> line;  // Pairs of u and node.
     for (std::size_t i = 0; i < Engine::waveguide_points; ++i) {
       line.emplace_back(static_cast<double>(i) / (Engine::waveguide_points - 1.0),
                         waveguide.first + i);
@@ -182,7 +182,7 @@ class NetworkTeller {
     }
   }
 
-  // Of each parameter the first link or macro that has it, and how many there are.
+  // Returns for each parameter the first link or macro that uses it, and the number of users.
   json users() const {
     const Network& network = *picture_.network;
     std::vector<std::pair<std::string, std::size_t>> users(network.parameters.size());
@@ -215,7 +215,7 @@ class NetworkTeller {
   }
 
   void add_nodes() {
-    std::map<std::size_t, const Picture::Waveguide*> waveguides;  // by their first dot
+    std::map<std::size_t, const Picture::Waveguide*> waveguides;  // Keyed by their first dot.
     for (const Picture::Group& group : picture_.groups) {
       for (const Picture::Waveguide& waveguide : group.waveguides) {
         waveguides.emplace(waveguide.first, &waveguide);
@@ -245,7 +245,7 @@ class NetworkTeller {
     }
   }
 
-  // A hand is among what it touches.
+  // Puts a driven input in the middle of the nodes that it touches.
   void place_hands() {
     std::map<std::uint32_t, std::vector<std::uint32_t>> touched;
     for (const Link& link : network_.links) {
@@ -273,7 +273,7 @@ class NetworkTeller {
     }
   }
 
-  // Of a place on a macro the node that is nearest.
+  // Returns the node nearest to a place on a macro.
   std::uint32_t node_of(std::uint32_t mass) const {
     if (network_.masses[mass].kind != MassKind::point) {
       return node_[mass];
@@ -287,7 +287,7 @@ class NetworkTeller {
       const double at = std::clamp(argument_value(network_, argument, parameters_), 0.0, 1.0);
       return static_cast<std::uint32_t>(std::lround(at * (count - 1)));
     };
-    // Of what is drawn: of a large network that is every n-th.
+    // Only drawn nodes count; of a large network that is every n-th.
     const std::uint32_t place = nearest(tap.u, tap.length) * tap.width + nearest(tap.v, tap.width);
     constexpr std::uint32_t widest_gap = 64;
     for (std::uint32_t away = 0; away < widest_gap; ++away) {
@@ -318,11 +318,11 @@ class NetworkTeller {
   const Picture& picture_;
   const Network network_;
   const std::vector<double> parameters_;
-  std::vector<std::uint32_t> node_;                     // [mass] or nowhere
-  std::map<std::string, std::uint32_t> place_on_body_;  // node, by its name
+  std::vector<std::uint32_t> node_;                     // [mass] Node, or nowhere.
+  std::map<std::string, std::uint32_t> place_on_body_;  // Node by name.
   std::vector<std::optional<LayoutPoint>> at_;          // [mass]
   std::vector<double> tops_;                            // [macro]
-  double wide_ = 20.0;                                  // of a waveguide, as of the longest row
+  double wide_ = 20.0;  // Width of a waveguide: that of the longest row.
   bool is_plane_ = false;
   bool is_laid_out_ = true;
   std::vector<json> x_;  // [node]
@@ -345,11 +345,11 @@ Result<std::string> modes_json(const Picture& picture, std::span<const double> p
   if (!found) {
     return found.error();
   }
-  std::map<std::uint32_t, std::size_t> dot;  // of a mass
+  std::map<std::uint32_t, std::size_t> dot;  // Dot of a mass.
   for (std::size_t i = 0; i < picture.masses.size(); ++i) {
     dot[picture.masses[i]] = i;
   }
-  // How loud a mode is that an input strikes, where it is the loudest.
+  // Returns the level of a mode at the output where it is loudest, for one input.
   const auto level = [&](const NetworkMode& mode, std::size_t input) {
     double most = 0.0;
     for (std::size_t output = 0; output < found->outputs; ++output) {

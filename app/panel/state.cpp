@@ -33,7 +33,7 @@ json parameter_json(const ParameterInfo& info, double value) {
           {"audio_input", info.audio_input}};
 }
 
-// The largest force or way that the preset plays an input with; 1 where it has no say.
+// Returns the largest force or displacement that the preset applies to an input; 1 if it has none.
 double blow_of(const InputInfo& info, const Preset& preset) {
   double blow = 0.0;
   for (const ControlSetting& control : preset.controls) {

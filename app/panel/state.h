@@ -1,4 +1,4 @@
-// app/panel: what the page is told, as JSON: the registry's rows and what sounds.
+// app/panel: the data of the page as JSON: the registry's rows and the current scene.
 #pragma once
 
 #include <cstdint>
@@ -11,17 +11,17 @@
 
 namespace ressort::panel {
 
-// As /describe of OSC, and what a page needs besides: {"name", "serial", "addresses": [{"address",
-// "arguments", "does"}], "parameters": [{"name", "value", "minimum", "maximum", "lowest",
-// "highest", "audio_input"}], "controls": ["/finger"], "inputs": [...], "models": [], "presets":
-// [], "warnings": [], ...}; a limit that is none is null. [any thread but audio]
+// Returns the same as OSC's /describe and what else the page needs: {"name", "serial", "addresses":
+// [{"address", "arguments", "does"}], "parameters": [{"name", "value", "minimum", "maximum",
+// "lowest", "highest", "audio_input"}], "controls": ["/finger"], "inputs": [...], "models": [],
+// "presets": [], "warnings": [], ...}. A missing limit is null. [any thread but audio]
 std::string describe_json(const Session& session);
 
-// Every figure of `status` by its name, and what the sound is like: "centroid_hz", "spread_hz",
-// "flatness"; numbers that are none are null.
+// Returns every figure of `status` by its name, and the timbre: "centroid_hz", "spread_hz",
+// "flatness". Numbers that are not finite are null.
 std::string status_json(const Status& status, const std::optional<SpectralShape>& shape);
 
-// What has changed since the last call, as server-sent events: `loaded`, `values`, then `news`.
+// Collects the changes since the last call as server-sent events: `loaded`, `values`, then `news`.
 class Changes {
  public:
   std::string since_last(const Session::Present& now);
@@ -30,8 +30,8 @@ class Changes {
   Session::Present told_;
 };
 
-// "event: NAME\ndata: ...\n\n"; the data has no line breaks.
+// Returns "event: NAME\ndata: ...\n\n"; the data has no line breaks.
 std::string server_event(std::string_view name, const std::string& data);
-std::string quoted(const std::string& text);  // as JSON
+std::string quoted(const std::string& text);  // Quotes as JSON.
 
 }  // namespace ressort::panel

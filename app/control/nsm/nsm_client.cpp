@@ -15,10 +15,10 @@
 namespace ressort::control {
 namespace {
 
-constexpr int bad_project = -4;  // as the API numbers what cannot be opened
+constexpr int bad_project = -4;  // Error code of the NSM API for a project that cannot be opened.
 constexpr int save_failed = -11;
 
-// The host and the port of "osc.udp://HOST:PORT/".
+// Parses host and port of "osc.udp://HOST:PORT/".
 Result<OscSender> address_of(const std::string& url) {
   const Error no_address{"NSM_URL is no address of a session manager: '" + url +
                          "'; expected osc.udp://HOST:PORT/"};
@@ -94,7 +94,7 @@ void NsmClient::poll() {
   std::vector<std::uint8_t> buffer(max_osc_packet_bytes + 1);
   while (const auto arrived = receive_packet(socket_, buffer)) {
     if (arrived->from.address != address_.address || arrived->from.port != address_.port) {
-      continue;  // nobody else has a say
+      continue;  // Ignores senders other than the manager.
     }
     const auto messages = check_packet({buffer.data(), arrived->bytes});
     if (!messages) {
@@ -163,7 +163,7 @@ void NsmClient::send(const std::vector<std::uint8_t>& bytes) const {
   to.sin_family = AF_INET;
   to.sin_addr.s_addr = htonl(address_.address);
   to.sin_port = htons(address_.port);
-  // A manager that is gone does not hear it, and need not.
+  // A failed send means that the manager is gone, which needs no action.
   static_cast<void>(sendto(socket_, bytes.data(), bytes.size(), MSG_DONTWAIT,
                            reinterpret_cast<const sockaddr*>(&to), sizeof to));
 }

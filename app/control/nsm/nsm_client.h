@@ -13,33 +13,33 @@
 
 namespace ressort::control {
 
-// What the manager wants to be opened.
+// A project that the manager asks to open.
 struct NsmProject {
-  std::string path;       // where all of it is to be kept: a name that is ours, in a folder
-  std::string client_id;  // the name that our JACK client has to have
+  std::string path;       // Path prefix for all files of the project: a folder and our name.
+  std::string client_id;  // Required name of the JACK client.
 };
 
 class NsmClient {
  public:
-  // Both answer for the manager: an error is told there.
+  // Their results are sent to the manager; errors are reported there.
   using Open = std::function<Result<Done>(const NsmProject&)>;
   using Save = std::function<Result<Done>()>;
-  // What save would keep, told apart by its text; empty: nothing yet.
+  // Returns the state that save would write, as a text for comparison; empty: nothing yet.
   using State = std::function<std::string()>;
 
-  // Says to the manager at `url`, "osc.udp://HOST:PORT/", that we are there. The error: that is no
-  // address. Whether anybody answers, poll() will tell.
+  // Announces the program to the manager at `url`, "osc.udp://HOST:PORT/". The error: not an
+  // address. poll() finds out whether the manager answers.
   static Result<std::unique_ptr<NsmClient>> announce(const std::string& url, Open open, Save save,
                                                      State state);
   ~NsmClient();
   NsmClient(const NsmClient&) = delete;
   NsmClient& operator=(const NsmClient&) = delete;
 
-  // Does what the manager has asked for since the last call, and tells it whether there is anything
-  // to save; does not wait.
+  // Handles the manager's requests since the last call, and reports whether there are unsaved
+  // changes. Does not wait.
   void poll();
 
-  // The manager's answer to the announcement, once there is one: its name, or its error.
+  // The manager's reply to the announcement, once there is one: its name, or its error.
   const std::string& manager() const { return manager_; }
   const std::string& refusal() const { return refusal_; }
 
@@ -57,7 +57,7 @@ class NsmClient {
   State state_;
   bool is_open_ = false;
   bool is_dirty_ = false;
-  std::string kept_;  // the state; empty: that which comes first
+  std::string kept_;  // The last saved state; empty: the first state counts as saved.
   std::string manager_;
   std::string refusal_;
 };

@@ -15,7 +15,7 @@
 namespace ressort::control {
 namespace {
 
-// A row, or none, of every parameter whose name fits.
+// Adds a row, or none, for every parameter whose name matches.
 template <class MakeRow>
 void answer_parameters(const Question& question, MakeRow&& make_row) {
   const std::string& address = question.message.address;
@@ -37,7 +37,8 @@ void answer_parameters(const Question& question, MakeRow&& make_row) {
   }
 }
 
-// For how many seconds the client hears such news from now on; nothing, and an error, if not.
+// Returns the length of a subscription in seconds, from now; sends an error and returns nothing if
+// it is invalid.
 std::optional<double> lease(const Question& question, Subscribers::News news,
                             std::string_view reply) {
   constexpr double usual_s = 10.0;
@@ -62,7 +63,7 @@ std::optional<double> lease(const Question& question, Subscribers::News news,
 
 void answer::parameters(const Question& question) {
   answer_parameters(question, [&](const ParameterInfo& info, std::vector<Reply>& rows) {
-    // Nothing if another model came in between.
+    // Empty if another model was loaded in between.
     if (const auto value = question.session.parameter(info.name)) {
       rows.push_back(Reply("/param/" + info.name).real(*value));
     }
@@ -112,7 +113,7 @@ void answer::load(const Question& question) {
                         Reach::own_folders);
 }
 
-// Never over what is there: whoever sends a packet has not seen it.
+// Never overwrites: the sender of a packet has not seen what is there.
 void answer::save(const Question& question) {
   const Message& message = question.message;
   if (message.arguments.size() != 1 || !std::holds_alternative<std::string>(message.arguments[0])) {
@@ -169,7 +170,7 @@ void answer::describe(const Question& question) {
         .real(info.safe.lowest)
         .real(info.safe.highest);
   }
-  std::set<std::string_view> customs;  // one may drive several things
+  std::set<std::string_view> customs;  // One address may drive several things.
   for (const CustomInfo& custom : loaded->instrument.custom) {
     if (customs.insert(custom.address).second) {
       row(custom.address, "f", "a control of the preset, 0-1");

@@ -1,50 +1,51 @@
-// app/control: what the questions of the registry are answered by OSC. [OSC's thread]
+// app/control: OSC replies to the queries of the registry. [OSC's thread]
 #pragma once
 
 #include "app/control/registry.h"
 
 namespace ressort::control::answer {
 
-// /param/NAME f:value of every parameter that fits
+// Replies /param/NAME f:value for every parameter that matches.
 void parameters(const Question& question);
 
-// /param/NAME/range f:minimum f:maximum f:lowest f:highest that is stable, infinite where nothing
-// limits
+// Replies /param/NAME/range f:minimum f:maximum f:lowest f:highest; the last two are the stable
+// range, infinite if unlimited.
 void ranges(const Question& question);
 
-// /done s:address [ID], or /fail s:address [ID] s:why; later, on the session's worker
+// Reply /done s:address [ID], or /fail s:address [ID] s:reason, later from the session's worker.
 void load(const Question& question);
 void save(const Question& question);
 void flight(const Question& question);
 
-// /status.reply, as status.h lists it
+// Replies /status.reply with the figures of status.h.
 void status(const Question& question);
 
-// A row /describe.reply s:address s:arguments s:meaning for everything, then /describe.end i:rows,
-// so that whoever counts knows if one was lost on the way. A parameter's row has floats after its
-// meaning: its value, minimum and maximum, and between what it is stable.
+// Replies a row /describe.reply s:address s:arguments s:meaning for everything, then /describe.end
+// i:rows, so that the client can detect lost rows. A parameter's row adds floats: its value,
+// minimum, maximum, and its stable range.
 void describe(const Question& question);
 
-// A row /models.reply s:name or /presets.reply s:name s:line for each, then /models.end i:rows or
-// /presets.end i:rows
+// Reply a row /models.reply s:name, or /presets.reply s:name s:description, for each, then
+// /models.end i:rows or /presets.end i:rows.
 void models(const Question& question);
 void presets(const Question& question);
 
-// A row /modes.reply i:number f:frequency f:t60 f:level... for each, levels input by input, then
-// /modes.end i:rows; later, on the session's worker
+// Replies a row /modes.reply i:number f:frequency f:t60 f:level... for each mode, levels input by
+// input, then /modes.end i:rows, later from the session's worker.
 void modes(const Question& question);
-// /done s:address, or /fail s:address s:why; later, on the session's worker
+// Replies /done s:address, or /fail s:address s:reason, later from the session's worker.
 void tune(const Question& question);
 
-// /done s:address [s:figure f:reached f:off]... [s:why]..., off in just noticeable differences, or
-// /fail s:address s:why; later, on the session's worker
+// Replies /done s:address [s:figure f:reached f:error]... [s:reason]..., errors in just noticeable
+// differences, or /fail s:address s:reason, later from the session's worker.
 void shape(const Question& question);
 
-// /subscribe.reply f:seconds and, in time, what Subscribers tells; /done s:address or an error
+// Reply /subscribe.reply f:seconds, and then the messages of Subscribers; /done s:address or an
+// error.
 void subscribe(const Question& question);
 void unsubscribe(const Question& question);
 
-// /timbre.reply f:seconds and, in time, what Subscribers tells
+// Replies /timbre.reply f:seconds, and then the messages of Subscribers.
 void timbre(const Question& question);
 
 }  // namespace ressort::control::answer

@@ -1,5 +1,4 @@
-// app/control: who has sent an OSC packet, and is answered now or, by a copy, later. [any thread
-// but audio]
+// app/control: the sender of an OSC packet, who gets replies now or later. [any thread but audio]
 #pragma once
 
 #include <functional>
@@ -16,17 +15,17 @@ class OscClient {
  public:
   OscClient(std::shared_ptr<OscOutlet> outlet, const OscSender& sender)
       : outlet_(std::move(outlet)), sender_(sender) {}
-  // Of a packet that came by another way than UDP, and whose answers go back there.
+  // Delivers the replies to a packet that did not come by UDP.
   using Post = std::function<void(std::vector<OscOutlet::Bytes>)>;
   OscClient(std::shared_ptr<OscOutlet> outlet, Post post)
       : outlet_(std::move(outlet)), post_(std::move(post)) {}
 
   void answer(const Reply& reply) const;
-  // The person at this machine hears it too, once in a while.
+  // Sends an error. It is also logged for the local user, rate-limited.
   void error(const std::string& about, const std::string& message) const;
 
-  // Whether an answer of many rows may begin, before anything is gathered; if not, the client has
-  // been told why. The rows are all sent or none.
+  // Returns whether a reply of many rows may begin, before the rows are collected; if not, the
+  // client has got an error. All rows are sent, or none.
   bool may_have_rows(const std::string& about) const;
   void answer_rows(const std::vector<Reply>& rows) const;
 
@@ -38,13 +37,14 @@ class OscClient {
   OscOutlet& outlet() const { return *outlet_; }
 
  private:
-  // Whether he is answered now; if not, he is told so once.
+  // Returns whether replies to this client are within the limit; if not, the client gets one
+  // message.
   bool is_heard() const;
   void send(std::vector<OscOutlet::Bytes> answers) const;
 
   std::shared_ptr<OscOutlet> outlet_;
   OscSender sender_;
-  Post post_;  // null: answers go to the sender
+  Post post_;  // Null: replies go to the sender.
 };
 
 }  // namespace ressort::control

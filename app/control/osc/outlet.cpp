@@ -14,7 +14,7 @@ namespace {
 
 constexpr int max_loads_waiting = 16;
 constexpr std::size_t max_waiting_bytes = std::size_t{8} << 20;
-// A socket that nobody has set up otherwise holds some 270 small packets.
+// A socket with default settings holds about 270 small packets.
 constexpr std::size_t portion = 16;
 constexpr std::int64_t portion_ns = 5'000'000;
 
@@ -92,7 +92,7 @@ void OscOutlet::send(const OscSender& to, const Bytes& bytes) {
   address.sin_family = AF_INET;
   address.sin_addr.s_addr = htonl(to.address);
   address.sin_port = htons(to.port);
-  // Whoever cannot be reached has gone; UDP promises nothing.
+  // Errors are ignored: the client is gone, and UDP guarantees nothing.
   sendto(socket_, bytes.data(), bytes.size(), 0, reinterpret_cast<const sockaddr*>(&address),
          sizeof address);
 }

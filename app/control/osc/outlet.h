@@ -1,5 +1,5 @@
-// app/control: the way back of OSC. Lives as long as somebody may have something to answer: a load
-// may end after the server has.
+// app/control: sends OSC replies. It lives as long as somebody may have to reply, since a load may
+// end after the server has.
 #pragma once
 
 #include <cstdint>
@@ -21,32 +21,33 @@ class OscOutlet {
   using Bytes = std::vector<std::uint8_t>;
   using Tell = std::function<void(const std::string&)>;
 
-  // Takes the socket. `tell` gets what the person at this machine should know, on any thread; it
+  // Takes ownership of the socket. `tell` receives messages for the local user, on any thread; it
   // must outlive the session.
   OscOutlet(int socket, Tell tell);
   ~OscOutlet();
   OscOutlet(const OscOutlet&) = delete;
   OscOutlet& operator=(const OscOutlet&) = delete;
 
-  // All of this: [any thread but audio]
+  // All of these: [any thread but audio]
   void received(const OscSender& from, std::size_t bytes);
-  bool may_answer(const OscSender& to);      // as AnswerBudget says
-  double tell_pause_s(const OscSender& to);  // the same
-  // Whether there is room for answers of many rows.
+  bool may_answer(const OscSender& to);      // Applies AnswerBudget.
+  double tell_pause_s(const OscSender& to);  // Applies AnswerBudget.
+  // Returns whether there is room for a reply of many rows.
   bool has_room();
-  // Sends the answers in this order. Many go in portions: a receiver holds only so many.
+  // Queues replies in this order. Long ones are sent in portions, because a receiver's buffer is
+  // limited.
   void answer(const OscSender& to, std::vector<Bytes> answers);
-  // Sends the portions that are due, the first of an answer at once; gives back in how many ms the
-  // next one is, -1 for never.
+  // Sends the portions that are due, the first one of a reply immediately. Returns the time until
+  // the next one in ms, or -1 for none.
   int send_due();
 
   void tell(const std::string& news) const;
-  // What failed, in more words than the asker may read; once in a while.
+  // Logs a failure in more detail than the client may see; rate-limited.
   void tell_failure(const std::string& news);
-  // Nothing is sent any more.
+  // Stops sending.
   void close();
 
-  // False when enough loads wait for their answer already.
+  // Returns false if too many loads are waiting for their reply.
   bool begin_load();
   void end_load();
 
@@ -62,7 +63,8 @@ class OscOutlet {
   int socket_;
   const Tell tell_;
   AnswerBudget budget_;
-  std::map<std::pair<std::uint32_t, std::uint16_t>, Waiting> waiting_;  // by address and port
+  // Keyed by address and port.
+  std::map<std::pair<std::uint32_t, std::uint16_t>, Waiting> waiting_;
   std::size_t waiting_bytes_ = 0;
   int loads_waiting_ = 0;
   RateLimit failures_;

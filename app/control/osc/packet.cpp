@@ -17,7 +17,7 @@ using Bytes = std::span<const std::uint8_t>;
 using Fault = std::optional<Error>;
 
 constexpr std::string_view bundle_head("#bundle\0", 8);
-constexpr std::size_t bundle_start = 16;  // the head and the time tag
+constexpr std::size_t bundle_start = 16;  // Length of the header and the time tag.
 
 std::uint32_t read_u32(Bytes bytes) {
   return std::uint32_t{bytes[0]} << 24 | std::uint32_t{bytes[1]} << 16 |
@@ -32,7 +32,7 @@ std::size_t padded(std::size_t size) {
   return (size + 3) / 4 * 4;
 }
 
-// Takes a string with its zeros from the front of `left`.
+// Takes a padded string from the front of `left`.
 Fault take_string(Bytes& left, const char* what, std::string_view& text) {
   const auto end = std::find(left.begin(), left.end(), std::uint8_t{0});
   if (end == left.end()) {
@@ -53,7 +53,7 @@ Fault take_blob(Bytes& left) {
   if (left.size() < 4) {
     return Error{"a blob's size is missing"};
   }
-  // A negative size is a huge one here.
+  // A negative size reads as a huge one.
   const std::size_t size = read_u32(left);
   left = left.subspan(4);
   if (size > left.size() || padded(size) > left.size()) {
@@ -134,7 +134,7 @@ Fault check_message(Bytes left) {
   return std::nullopt;
 }
 
-// A message or a bundle with all that is in it; `depth` is the number of bundles around it.
+// Checks a message or a bundle with its contents; `depth` is the number of bundles around it.
 Fault check_element(Bytes bytes, int depth, std::uint64_t time_tag,
                     std::vector<OscMessage>& messages) {
   if (bytes.empty() || bytes.size() % 4 != 0) {
@@ -156,7 +156,7 @@ Fault check_element(Bytes bytes, int depth, std::uint64_t time_tag,
   const std::uint64_t inner_tag = read_u64(bytes.subspan(bundle_head.size()));
   Bytes left = bytes.subspan(bundle_start);
   while (!left.empty()) {
-    // All sizes are multiples of 4, so that there is room for this one.
+    // All sizes are multiples of 4, so this one fits.
     const std::size_t size = read_u32(left);
     left = left.subspan(4);
     if (size > left.size()) {
@@ -184,7 +184,7 @@ Result<std::vector<OscMessage>> check_packet(std::span<const std::uint8_t> packe
 }
 
 std::optional<Message> read_message(std::span<const std::uint8_t> bytes) {
-  // liblo copies the bytes before it turns them; it only lacks the const.
+  // liblo copies the bytes before it swaps them; its parameter only lacks the const.
   const LoMessage read(
       lo_message_deserialise(const_cast<std::uint8_t*>(bytes.data()), bytes.size(), nullptr),
       lo_message_free);
@@ -199,7 +199,7 @@ std::optional<Message> read_message(std::span<const std::uint8_t> bytes) {
     const auto type = static_cast<lo_type>(types[i]);
     message.types += types[i];
     if (lo_is_numerical_type(type)) {
-      // liblo reads it: it keeps nothing aligned to 8 bytes.
+      // liblo reads it, because the bytes are not aligned to 8.
       message.arguments.emplace_back(static_cast<double>(lo_hires_val(type, values[i])));
     } else if (lo_is_string_type(type)) {
       message.arguments.emplace_back(std::string(reinterpret_cast<const char*>(values[i])));

@@ -1,4 +1,4 @@
-// app/control: an OSC message as it is written: big-endian, everything padded to four bytes. Pure.
+// app/control: builds an OSC message: big-endian, padded to four bytes. Pure.
 #pragma once
 
 #include <algorithm>
@@ -36,7 +36,7 @@ class Reply {
     put(values_, std::bit_cast<std::uint64_t>(value), 8);
     return typed('d');
   }
-  // As it came.
+  // Adds an argument in its original type.
   Reply& argument(const Argument& argument) {
     if (const std::string* const word = std::get_if<std::string>(&argument)) {
       return text(*word);
@@ -62,7 +62,7 @@ class Reply {
       bytes.push_back(static_cast<std::uint8_t>(value >> shift));
     }
   }
-  // With one to four zeros after it.
+  // Adds one to four zeros after the text.
   static void put(Bytes& bytes, std::string_view text) {
     bytes.insert(bytes.end(), text.begin(), text.end());
     bytes.resize(bytes.size() / 4 * 4 + 4);

@@ -7,7 +7,7 @@
 namespace ressort::control {
 namespace {
 
-// A whole number up to `most` from the front of `text`.
+// Takes a whole number up to `most` from the front of `text`.
 std::optional<std::uint32_t> take_number(std::string_view& text, std::uint32_t most) {
   std::uint32_t number = 0;
   const auto [end, failure] = std::from_chars(text.data(), text.data() + text.size(), number);
@@ -53,7 +53,8 @@ bool contains(const Subnet& subnet, std::uint32_t address) {
 
 constexpr std::uint64_t all_others = ~std::uint64_t{0};
 
-// On this machine nobody else can receive what is sent to a port; beyond it, a liar may name any.
+// On this machine the port identifies the receiver. Remote ports are ignored, because a client with
+// a forged address could name any port.
 std::uint64_t key_of(const OscSender& sender) {
   return std::uint64_t{sender.address} << 16 | (is_this_machine(sender.address) ? sender.port : 0u);
 }

@@ -1,5 +1,5 @@
-// app/control: who may send OSC, and how much is answered to whom. Pure: addresses, sizes and times
-// in.
+// app/control: decides who may send OSC and how much is sent in reply. Pure: works on addresses,
+// sizes and times.
 #pragma once
 
 #include <cstddef>
@@ -15,43 +15,43 @@
 
 namespace ressort::control {
 
-// Where a packet comes from: IPv4, in this machine's order of bytes.
+// IPv4 sender of a packet, in host byte order.
 struct OscSender {
   std::uint32_t address = 0;
   std::uint16_t port = 0;
 };
 
-// The addresses that have their first bits in common.
+// A range of addresses with a common prefix.
 struct Subnet {
   std::uint32_t address = 0;
   int prefix_bits = 32;
 };
 
-// "192.168.1.0/24,10.0.0.5"; an empty text has none.
+// Parses "192.168.1.0/24,10.0.0.5"; an empty text gives none.
 Result<std::vector<Subnet>> parse_subnets(std::string_view text);
 
-bool is_this_machine(std::uint32_t address);  // 127.x.x.x
+bool is_this_machine(std::uint32_t address);  // Returns true for 127.x.x.x.
 
-// This machine and the subnets.
+// Returns true for this machine and the subnets.
 bool may_send(std::span<const Subnet> allowed, std::uint32_t address);
 
-std::string print_address(std::uint32_t address);  // "192.168.1.5"
-std::string print_subnet(const Subnet& subnet);    // "192.168.1.0/24"
+std::string print_address(std::uint32_t address);  // Returns for example "192.168.1.5".
+std::string print_subnet(const Subnet& subnet);    // Returns for example "192.168.1.0/24".
 
-// A small question may have a large answer, and who asks may give another's address for his own. So
-// nobody is sent more than he has sent and `bytes_per_s` on top, of which a second's worth may be
-// saved up. What has begun is sent whole and owed: nothing more is answered until it is made up
-// for.
+// Limits replies, because a small query can have a large reply, and its sender address can be
+// forged (amplification). Each address gets at most the bytes it has sent plus `bytes_per_s`, of
+// which one second's worth can accumulate. A reply that has begun is sent whole; the excess is a
+// debt, and no further reply is sent until it is paid.
 class AnswerBudget {
  public:
   static constexpr double bytes_per_s = 65536.0;
-  static constexpr std::size_t max_senders = 256;  // the others have one budget together
+  static constexpr std::size_t max_senders = 256;  // Further senders share one budget.
 
   void received(const OscSender& from, std::size_t bytes, std::int64_t now_ns);
   bool may_answer(const OscSender& to, std::int64_t now_ns);
   void answered(const OscSender& to, std::size_t bytes, std::int64_t now_ns);
 
-  // How long it takes until there is an answer again; 0 if it was told since there was one.
+  // Returns the time until replies resume; 0 if the client was told so already.
   double tell_pause_s(const OscSender& to, std::int64_t now_ns);
 
   std::size_t senders() const { return accounts_.size(); }
@@ -65,7 +65,8 @@ class AnswerBudget {
 
   Account& account(const OscSender& sender, std::int64_t now_ns);
 
-  std::unordered_map<std::uint64_t, Account> accounts_;  // who is not here has saved up all
+  // A sender without an entry has its full budget.
+  std::unordered_map<std::uint64_t, Account> accounts_;
 };
 
 }  // namespace ressort::control

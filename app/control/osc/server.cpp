@@ -34,7 +34,7 @@ namespace ressort::control {
 namespace {
 
 constexpr std::size_t max_address_bytes = 255;
-constexpr int max_malformed_answers = 10;  // in a second
+constexpr int max_malformed_answers = 10;  // Per second.
 constexpr std::size_t max_bundle_events = std::min(Process::max_now, Process::max_ahead);
 constexpr std::int64_t second_ns = 1'000'000'000;
 
@@ -43,15 +43,16 @@ constexpr std::int64_t second_ns = 1'000'000'000;
 // --- the server ---------------------------------------------------------------------------------
 
 struct OscServer::Server {
-  // Playing messages with one time tag.
+  // The playing messages with one time tag.
   struct Group {
-    std::string address;  // of the first
+    std::string address;  // Address of the first.
     std::vector<TimedEvent> events;
-    std::vector<std::pair<std::string, std::string>> news;  // for when they act: address, message
+    // Pairs of address and message, sent when the group acts.
+    std::vector<std::pair<std::string, std::string>> news;
   };
-  using Groups = std::map<std::uint64_t, Group>;  // by time tag
+  using Groups = std::map<std::uint64_t, Group>;  // Keyed by time tag.
 
-  // A packet that came another way, and who waits for its answers.
+  // A packet that did not come by UDP, and the receiver of its replies.
   struct Asked {
     std::vector<std::uint8_t> packet;
     OscClient::Post answer;
@@ -85,7 +86,7 @@ struct OscServer::Server {
       const int wait_ms =
           due_ms < 0 || (changes_ms >= 0 && changes_ms < due_ms) ? changes_ms : due_ms;
       if (poll(waits.data(), waits.size(), wait_ms) < 0) {
-        continue;  // a signal
+        continue;  // Interrupted by a signal.
       }
       if (waits[1].revents != 0) {
         eventfd_t count = 0;
@@ -125,7 +126,7 @@ struct OscServer::Server {
   }
 
   void count_lost(std::uint32_t lost_in_all) {
-    // It goes around; a packet that had come before the last loss does not know of it.
+    // The counter wraps around, and a packet received before the last loss has an older count.
     if (const std::uint32_t more = lost_in_all - lost; more < 1u << 31) {
       lost = lost_in_all;
       process.dropped.add(more);
@@ -159,7 +160,7 @@ struct OscServer::Server {
       } else if (is_answer(address)) {
         continue;
       } else if (const auto said = read_message(message.bytes)) {
-        // 0 is not in the standard, but some send it for "at once".
+        // 0 is not in the standard, but some programs send it for "immediately".
         handle(*said, std::max<std::uint64_t>(1, message.time_tag), groups, client);
       } else {
         client.error(address, "arguments are numbers (i f d h T F) or texts (s S)");
@@ -170,7 +171,7 @@ struct OscServer::Server {
     }
   }
 
-  // Whoever sends rubbish under another's name shall not have him flooded.
+  // Limits replies to malformed packets, whose sender address may be forged.
   bool may_answer_malformed() {
     const std::int64_t second = monotonic_ns() / second_ns;
     if (second != malformed_second) {
@@ -180,7 +181,7 @@ struct OscServer::Server {
     return ++malformed_answers <= max_malformed_answers;
   }
 
-  // Playing messages join their group; the others are answered at once, whatever their time tag.
+  // Playing messages join their group; queries are answered immediately, whatever their time tag.
   void handle(const Message& message, std::uint64_t time_tag, Groups& groups,
               const OscClient& client) {
     const auto [row, name] = find_row(message.address);
@@ -215,7 +216,7 @@ struct OscServer::Server {
     TimedEvent timed;
     if (time_tag > 1) {
       const ClockReading clock = process.clock.read();
-      // Blocks that ended long ago tell nothing of when the next will begin.
+      // A block that ended long ago does not predict the next one.
       if (clock.rate_hz <= 0.0 || monotonic_ns() - clock.time_ns > second_ns) {
         client.error(group.address, "no audio is running: a time tag cannot be kept");
         return;
@@ -230,7 +231,8 @@ struct OscServer::Server {
       }
       timed.timing = TimedEvent::When::at_frame;
       timed.when = tags.frame(time_tag, clock);
-      // The newest block has its events already; a late one begins the next, and is counted there.
+      // The newest block already has its events, so a late one starts with the next block and
+      // counts as late.
       late_s = static_cast<double>(clock.frame + clock.period - timed.when) / clock.rate_hz;
     }
     for (TimedEvent& event : group.events) {
@@ -266,7 +268,7 @@ struct OscServer::Server {
 
   Process& process;
   Session& session;
-  const int socket;  // the outlet's, which closes it after the thread has ended
+  const int socket;  // Owned by the outlet, which closes it after the thread has ended.
   const int wake;
   const std::vector<Subnet> allowed;
   std::shared_ptr<OscOutlet> outlet;
@@ -275,12 +277,12 @@ struct OscServer::Server {
   RateLimit lates{std::chrono::seconds(1)};
   std::int64_t malformed_second = 0;
   int malformed_answers = 0;
-  std::uint32_t lost = 0;  // by the system, as it counts
+  std::uint32_t lost = 0;  // Packets lost, as counted by the system.
   RateLimit strangers;
   Flag is_ending;
   std::mutex asked_mutex;
-  std::vector<Asked> asked;  // under the mutex
-  std::thread thread;        // last, so that all else is there when it starts
+  std::vector<Asked> asked;  // Protected by the mutex.
+  std::thread thread;        // Last member: everything else exists when it starts.
 };
 
 OscServer::OscServer(std::unique_ptr<Server> server) : server_(std::move(server)) {}

@@ -61,7 +61,8 @@ Result<int> open_osc_socket(const OscOptions& options) {
                        std::to_string(options.port % 65535 + 1)}
                : Error{"OSC cannot use " + place + ": " + std::generic_category().message(failure)};
   }
-  // Bursts shall not be lost; the system may grant less, and is to count what it loses.
+  // Enlarges the buffer for bursts. The system may grant less, so it is asked to count lost
+  // packets.
   constexpr int counts = 1;
   setsockopt(socket, SOL_SOCKET, SO_RCVBUF, &receive_buffer_bytes, sizeof receive_buffer_bytes);
   setsockopt(socket, SOL_SOCKET, SO_RXQ_OVFL, &counts, sizeof counts);

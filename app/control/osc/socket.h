@@ -1,4 +1,4 @@
-// app/control: the UDP socket of OSC, and who may send to it.
+// app/control: the UDP socket of OSC and its access list.
 #pragma once
 
 #include <cstdint>
@@ -14,26 +14,27 @@ namespace ressort::control {
 
 struct OscOptions {
   std::string bind_address = "127.0.0.1";
-  int port = 9777;    // 0: any that is free
-  std::string allow;  // who may send from elsewhere: "192.168.1.0/24,10.0.0.5"
+  int port = 9777;    // 0: any free port.
+  std::string allow;  // Remote senders that are allowed: "192.168.1.0/24,10.0.0.5".
 };
 
-// Who may send besides this machine. Where others can, somebody has to be named: else it is an
-// error that says how.
+// Returns the allowed senders besides this machine. If the socket is reachable from other machines
+// and none is named, returns an error that explains how.
 Result<std::vector<Subnet>> allowed_senders(const OscOptions& options);
 
-// Fails where the port is taken, or the address is none of this machine's.
+// open_osc_socket() fails if the port is in use or the address does not belong to this machine.
 Result<int> open_osc_socket(const OscOptions& options);
 int port_of(int socket);
 
-// A packet that has come.
+// A received packet.
 struct Arrival {
   OscSender from;
-  std::size_t bytes = 0;   // of the buffer
-  std::uint32_t lost = 0;  // so many the system had lost for want of room, in all
+  std::size_t bytes = 0;  // Number of bytes in the buffer.
+  // Packets that the system has dropped so far because its buffer was full.
+  std::uint32_t lost = 0;
 };
 
-// Does not wait.
+// Receives a packet without waiting.
 std::optional<Arrival> receive_packet(int socket, std::span<std::uint8_t> buffer);
 
 }  // namespace ressort::control

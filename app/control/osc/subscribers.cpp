@@ -6,7 +6,8 @@
 namespace ressort::control {
 namespace {
 
-// What is to be told to who knows `before`; all of it where it is of another scene.
+// Returns the messages that bring a client from the state `before` to `now`: everything if the
+// scene has changed.
 std::vector<Reply> changes(const Session::Present& before, const Session::Present& now) {
   const bool is_other = before.loaded == nullptr || before.loaded->serial != now.loaded->serial;
   std::vector<Reply> rows;
@@ -87,7 +88,7 @@ void Subscribers::tell_timbre(const TimbreWatch& timbre) {
     return;
   }
   told_frame_ = frames.back().number;
-  const std::size_t figures = figure_number("inharmonicity");  // those before it are told
+  const std::size_t figures = figure_number("inharmonicity");  // Sends the figures before this one.
   std::vector<Reply> rows;
   for (const TimbreWatch::Heard& heard : frames) {
     Reply& row = rows.emplace_back("/timbre.frame").whole(heard.number);

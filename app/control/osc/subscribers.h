@@ -1,4 +1,4 @@
-// app/control: who wants to hear of every change, whoever makes it, and until when. [OSC's thread]
+// app/control: clients that subscribe to all changes, and until when. [OSC's thread]
 #pragma once
 
 #include <cstdint>
@@ -15,19 +15,18 @@ class Subscribers {
  public:
   static constexpr double longest_lease_s = 60.0;
   static constexpr std::size_t most = 16;
-  static constexpr int period_ms = 20;  // changes of one parameter within it are told as one
+  static constexpr int period_ms = 20;  // Changes of a parameter within this time are sent as one.
 
   enum class News : std::uint8_t { changes, timbre };
 
-  // For so long, from now; a subscription of the same sender is renewed. The error: too many.
+  // Adds or renews a subscription from now on. The error: too many clients.
   Result<Done> add(const OscClient& client, News news, double lease_s, std::int64_t now_ns);
-  bool remove(const OscClient& client);  // from all news
+  bool remove(const OscClient& client);  // Removes the client from all kinds of news.
 
-  // Tells what has changed since the last call: "/loaded NAME", if a scene was, and all parameters
-  // then, else those that differ, as "/param/NAME VALUE". Whoever has just come is told all. And
-  // every frame of timbre that there was, as "/timbre.frame NUMBER FIGURE...", the figures being
-  // those before the harmonic ones; one that is absent is 0. Gives back in how many ms it is to be
-  // called again, -1 for never.
+  // Sends the changes since the last call: "/loaded NAME" and then all parameters after a load,
+  // else the changed ones as "/param/NAME VALUE". A new subscriber gets everything. Every new
+  // timbre frame is sent as "/timbre.frame NUMBER FIGURE...", with the figures before the harmonic
+  // ones; an absent figure is 0. Returns the time until the next call in ms, or -1 for never.
   int tell(Session& session, std::int64_t now_ns);
 
  private:
@@ -42,7 +41,7 @@ class Subscribers {
   std::vector<Subscriber> all_;
   Session::Present told_;
   std::uint64_t told_frame_ = 0;
-  std::uint64_t reloads_ = 0;  // that were told
+  std::uint64_t reloads_ = 0;  // Number of reloads already sent.
 };
 
 }  // namespace ressort::control

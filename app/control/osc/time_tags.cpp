@@ -10,15 +10,15 @@
 namespace ressort::control {
 namespace {
 
-constexpr double tags_per_second = 4294967296.0;  // an NTP time counts 2^-32 s from 1900 on
+constexpr double tags_per_second = 4294967296.0;  // NTP time counts units of 2^-32 s since 1900.
 constexpr std::uint64_t ntp_to_unix_s = 2208988800;
 constexpr std::int64_t one_second_ns = 1'000'000'000;
 constexpr std::int64_t clock_step_ns = 5'000'000;
 constexpr double max_anchor_error_s = 0.01;
-constexpr double anchor_life_s = 10.0;  // without use
+constexpr double anchor_life_s = 10.0;  // Lifetime without use.
 
-// How far the wall clock is before the monotonic one. The closest of a few readings counts: the
-// others were interrupted.
+// Returns the offset of the wall clock to the monotonic clock. Takes the smallest interval of
+// several readings, since the others were interrupted.
 std::int64_t wall_offset_ns() {
   std::int64_t closest = std::numeric_limits<std::int64_t>::max();
   std::int64_t offset = 0;

@@ -1,4 +1,4 @@
-// The network on its canvas: where its nodes are, how they move, what the pointer is over.
+// Draws the network on its canvas: positions of the nodes, their motion, and hit-testing.
 const families = ['spring', 'pluck', 'bow', 'contact'];
 const css = name => getComputedStyle(document.documentElement).getPropertyValue('--' + name).trim();
 
@@ -8,7 +8,8 @@ function mixed(a, b, share) {
   return `rgb(${from.map((v, i) => Math.round(v + (to[i] - v) * share)).join(' ')})`;
 }
 
-// Where nobody has said where things are: linked ones attract, all repel; the same every time.
+// Force-directed layout for models without positions: links attract, all nodes repel;
+// deterministic.
 function forceLayout(net) {
   const n = net.x.length;
   const golden = 2.399963;
@@ -46,8 +47,8 @@ export class NetworkView {
     this.positions = null;
     this.peak = 1e-6;
     this.mode = null;
-    this.chosen = -1;   // what is played: an input, or after these a node
-    this.pull = null;   // {from, to}: a gesture that is being made
+    this.chosen = -1;  // The played target: an input, or a node (numbered after the inputs).
+    this.pull = null;  // {from, to}: the gesture in progress.
     new ResizeObserver(() => this.fit()).observe(canvas);
     matchMedia('(prefers-color-scheme: dark)').addEventListener('change', () => this.colours());
     this.colours();
@@ -66,7 +67,7 @@ export class NetworkView {
   setNetwork(net) {
     if (!net.drawn && net.x.length <= 1500) forceLayout(net);
     const last = { x: 0, y: 0 };
-    for (let i = 0; i < net.x.length; i++) {   // what hangs nowhere stands at the side
+    for (let i = 0; i < net.x.length; i++) {  // Unconnected nodes are drawn at the side.
       if (net.x[i] === null) { net.x[i] = last.x - 1; net.y[i] = last.y; }
     }
     this.net = net;
@@ -88,7 +89,7 @@ export class NetworkView {
     this.context.setTransform(ratio, 0, 0, ratio, 0, 0);
     const net = this.net;
     if (!net || !net.x.length) return;
-    // A plane is seen from above at an angle, so that there is room for what moves.
+    // A planar network is seen from above at an angle, so that motion has room.
     const turn = net.plane ? 0.38 : 0, tilt = net.plane ? 0.58 : 1;
     const c = Math.cos(turn), s = Math.sin(turn);
     let left = 1e9, right = -1e9, top = 1e9, bottom = -1e9;
@@ -102,13 +103,14 @@ export class NetworkView {
     this.reach = Math.min(this.height, this.width) * (net.plane ? 0.13 : 0.24);
     let k = (this.width - 2 * margin) / wide, kv = k;
     if (net.plane) k = kv = Math.min(k, room / high);
-    else kv = Math.min(Math.max(k, 1.3 * this.reach), room * 0.6 / high);   // rows are to swing apart
+    // Rows need room to vibrate.
+    else kv = Math.min(Math.max(k, 1.3 * this.reach), room * 0.6 / high);
     if (!net.plane && net.x.length < 3) k = kv = Math.min(k, 120);
     this.flat = this.flat.map(([u, v]) =>
       [this.width / 2 + (u - (left + right) / 2) * k, this.height / 2 + (v - (top + bottom) / 2) * kv]);
   }
 
-  // Positions in model units become heights; what was seen of late sets the scale.
+  // Converts positions in model units to heights; the recent maximum sets the scale.
   move(positions) {
     this.positions = positions;
     const start = this.net.start;
@@ -121,13 +123,14 @@ export class NetworkView {
   heights() {
     const net = this.net, n = net.dots, up = new Float32Array(net.x.length);
     if (this.mode) {
-      // A mode's own shape, slowed down to a swing a second and a half.
+      // Shows the mode's shape, slowed down to one period in 1.5 seconds.
       const swing = Math.sin(performance.now() / 240);
       for (let i = 0; i < n; i++) up[i] = this.mode[i] * swing;
     } else {
       for (let i = 0; i < n; i++) up[i] = (this.positions[i] - net.start[i]) / this.peak;
     }
-    for (let i = 0; i < up.length; i++) up[i] = Math.max(-1.6, Math.min(1.6, up[i]));   // a hand may be far away
+    // A driven input may be far away.
+    for (let i = 0; i < up.length; i++) up[i] = Math.max(-1.6, Math.min(1.6, up[i]));
     return up;
   }
 
@@ -144,7 +147,7 @@ export class NetworkView {
     this.handles(c);
   }
 
-  // Where it has just been: a string that sounds is a blur to the eye as well.
+  // Draws recent positions as an afterglow, like the blur of a sounding string.
   afterglow(c) {
     if (this.net.dots > 700 || this.mode) { this.trail.length = 0; return; }
     c.strokeStyle = this.colour.up; c.lineWidth = 1;
@@ -241,8 +244,8 @@ export class NetworkView {
   }
   isMass(node) { return node < this.net.dots && this.net.kinds[node] === 'm' && this.net.names[node] !== ''; }
 
-  // What is played at a point of the canvas: an input that is right there, else the mass, else the
-  // input that is nearest.
+  // Returns the target at a point of the canvas: an input under the pointer, else the mass under
+  // it, else the nearest input.
   targetAt(x, y) {
     if (!this.net) return -1;
     let best = -1, distance = 1e9;
@@ -294,7 +297,7 @@ export function drawScope(canvas, heard) {
   c.stroke();
 }
 
-// Magnitudes by frequency of what was heard, under a Hann window.
+// Returns the magnitude spectrum of the recent output, under a Hann window.
 export function spectrumOf(heard) {
   const n = heard.length, re = new Float64Array(n), im = new Float64Array(n);
   for (let i = 0, j = 0; i < n; i++) {

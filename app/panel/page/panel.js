@@ -1,5 +1,5 @@
-// The page of a program that plays. What it says goes out as OSC; what it shows comes in three
-// streams: /describe and /network once a model, /events ten times a second, /motion thirty.
+// The page of the running program. It sends OSC, and receives three streams: /describe and /network
+// once per model, /events ten times a second, /motion thirty times a second.
 import { NetworkView, drawScope, drawSpectrum, hertz, noteName, spectrumOf } from '/draw.js';
 
 const $ = id => document.getElementById(id);
@@ -31,7 +31,7 @@ function packet(address, ...values) {
   return new Blob(parts);
 }
 
-// One at a time and in order; of a slider only the last that waits.
+// Sends one packet at a time, in order; of a slider only the latest waiting value.
 const waiting = [];
 let isSending = false;
 export function say(address, ...values) {
@@ -65,7 +65,8 @@ function complain(text) {
   while (list.children.length > 30) list.lastChild.remove();
 }
 
-// --- what sounds -----------------------------------------------------------------------------------
+// --- the current model
+// -----------------------------------------------------------------------------
 
 const view = new NetworkView($('network'));
 let model = null, status = {}, picture = 0, isFetching = false;
@@ -267,13 +268,13 @@ function showSliders() {
 }
 function showValue(name, value) { sliders.get(name)?.(value); }
 
-// " of 'r1' and 2 more"
+// Returns for example " of 'r1' and 2 more".
 function users(name) {
   const [first, count] = view.net?.users[name] ?? [];
   return first ? ` of '${first}'${count > 1 ? ` and ${count - 1} more` : ''}` : '';
 }
 
-// Which parameter has gone the largest part of the way to where it would not be stable.
+// Shows the parameter that is closest to its stability limit.
 function showLimits() {
   let nearest = null, share = 0;
   for (const info of model.parameters) {
@@ -343,7 +344,7 @@ $('panic').addEventListener('click', () => say('/panic'));
 // --- keys ------------------------------------------------------------------------------------------------
 
 const letters = 'awsedftgyhujkolp';
-const down = new Map();   // what holds a key down: key
+const down = new Map();  // Maps each pressed letter or pointer to its key.
 const keyButtons = new Map();
 let octave = 48;
 function press(by, key, velocity = 96) {
@@ -415,7 +416,7 @@ addEventListener('resize', showKeys);
 
 // --- playing on the picture ------------------------------------------------------------------------------
 
-// What an input does under the pointer: strike, pluck, bow, or be moved; a mass is struck.
+// Returns the gesture of an input under the pointer: strike, pluck, bow or move; a mass is struck.
 function wayOf(chosen) {
   const node = chosen - view.net.inputs.length;
   if (node >= 0) return view.isMass(node) ? { info: { name: view.net.names[node] }, way: 'hit' } : null;
@@ -506,7 +507,7 @@ canvas.addEventListener('keyup', event => {
   if ((event.key === 'Enter' || event.key === ' ') && view.chosen >= 0 && wayOf(view.chosen)?.way === 'bow') release(view.chosen, 0);
 });
 
-// For tests: what has arrived.
+// Exposes received data to the tests.
 globalThis.panel = { view, say, get frames() { return motionFrames; }, get status() { return status; }, get heard() { return heard; } };
 
 showKeys();
