@@ -102,7 +102,7 @@ void add_play(CLI::App& app, PlayOptions& options, int& code) {
             }
             options.keys.channels = mask;
           },
-          "the MIDI channels to listen to, divided by commas, whatever the preset says")
+          "the MIDI channels to listen to, separated by commas, whatever the preset says")
       ->delimiter(',')
       ->check(within(1, 16));
   command->add_option("-r,--rate", options.device.rate_hz, "Hz; JACK has its own")

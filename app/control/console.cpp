@@ -71,7 +71,7 @@ Result<const Row*> find_command(std::string_view name) {
   for (const Row* const row : command_rows()) {
     meant.emplace_back(row->command);
   }
-  return Error{"there is no command " + typed + "; there are " + joined(meant, ", ") +
+  return Error{"there is no command " + typed + "; the commands are " + joined(meant, ", ") +
                did_you_mean(name, meant)};
 }
 
@@ -88,16 +88,16 @@ std::string examples(const ConsoleContext& console) {
   const auto current = loaded(console);
   std::vector<std::vector<std::string>> lines;
   if (!known.empty()) {
-    lines.push_back({"load " + known.front(), "# or any name that 'models' lists"});
+    lines.push_back({"load " + known.front(), "# or any name listed by 'models'"});
   }
-  lines.push_back({"noteon 60 100", "# the middle C, loud"});
+  lines.push_back({"noteon 60 100", "# middle C, loud"});
   lines.push_back({"noteoff 60"});
   if (current && !current->instrument.parameters.empty()) {
     const ParameterInfo& info = current->instrument.parameters.front();
     lines.push_back({"set " + info.name + " " + print_number(info.value),
                      "# " + print_number(info.minimum) + " to " + print_number(info.maximum)});
   }
-  lines.push_back({"rec take.wav", "# what is heard from now on"});
+  lines.push_back({"rec take.wav", "# records the output"});
   lines.push_back({"rec stop"});
   return table(lines, 2);
 }
@@ -166,10 +166,9 @@ Result<Done> command::help(ConsoleContext& console, Words words) {
     text += "  " + shown + std::string(width - shown.size() + 2, ' ') +
             std::string(row->command_does) + "\n";
   }
-  console.print(
-      text + "Examples\n" + examples(console) +
-      "\nThe beginning of a command is enough: 'st' is 'status'. 'help load' tells more of "
-      "'load'.");
+  console.print(text + "Examples\n" + examples(console) +
+                "\nCommands can be abbreviated: 'st' is 'status'. 'help load' explains "
+                "'load'.");
   return Done{};
 }
 
@@ -206,8 +205,7 @@ Result<Command> parse_command(std::string_view line) {
     return Error{
         "the command is '" + usage(row) + "', found " + counted(words.size(), "word", "words") +
         " after '" + std::string(row.command) + "'" +
-        ((are_more && needed > 0) || is_other ? "; a word with blanks in it is written in quotes"
-                                              : "")};
+        ((are_more && needed > 0) || is_other ? "; put a word with blanks in quotes" : "")};
   }
   return Command{std::string(row.command), std::move(words)};
 }

@@ -27,7 +27,7 @@ std::shared_ptr<const Loaded> loaded(const ConsoleContext& console) {
 // --- playing ------------------------------------------------------------------------------------
 
 const Error nothing_loaded{
-    "no model is loaded yet; 'models' lists what there is, 'load NAME' "
+    "no model is loaded yet; 'models' lists them, 'load NAME' "
     "loads one"};
 
 Result<std::vector<Event>> play(ConsoleContext& console, const Message& message) {
@@ -48,7 +48,7 @@ Result<std::vector<Event>> play(ConsoleContext& console, const Message& message)
     timed.push_back({.event = event});
   }
   if (!console.process.send(console.process.from_console, timed)) {
-    return Error{"the audio thread is busy and took nothing; try again"};
+    return Error{"the audio thread is busy and accepted no events; try again"};
   }
   console.session.remember(timed);
   return events;
@@ -87,7 +87,7 @@ Result<std::string> input_for(const ConsoleContext& console, const GestureRow& g
     }
   }
   return Error{current->name + " has no input with a " + std::string(gesture.name) +
-               "; 'explain' tells what it has, 'noteon 60' plays it"};
+               "; 'explain' lists its inputs, 'noteon 60' plays it"};
 }
 
 // Executes a command that only plays: its words are the arguments of its address, and INPUT.
@@ -222,14 +222,15 @@ Result<Done> command::models(ConsoleContext& console, Words) {
   const std::string presets = preset_table();
   const std::string bare = joined(known_models(), ", ");
   console.print(presets.empty() && bare.empty()
-                    ? "nothing in '" + models_folder() + "'; 'load FILE.mdl' loads a file of yours"
-                    : "Presets\n" + presets + "\nModels as they are written\n  " + bare);
+                    ? "nothing in '" + models_folder() + "'; 'load FILE.mdl' loads your own file"
+                    : "Presets\n" + presets + "\nModels\n  " + bare);
   return Done{};
 }
 
 Result<Done> command::presets(ConsoleContext& console, Words) {
   const std::string all = preset_table();
-  console.print(all.empty() ? "there are no presets; 'save NAME' makes one of what sounds" : all);
+  console.print(all.empty() ? "there are no presets; 'save NAME' makes one of the current sound"
+                            : all);
   return Done{};
 }
 
@@ -295,7 +296,7 @@ Result<Done> command::set(ConsoleContext& console, Words words) {
     const ParameterInfo& info = current->instrument.parameters[event.index];
     std::string line = info.name + " = " + print_number(event.value);
     if (event.value != wanted) {
-      line += ", the " + std::string(event.value < wanted ? "highest" : "lowest") + " it may be";
+      line += ", the " + std::string(event.value < wanted ? "highest" : "lowest") + " stable value";
     }
     const std::string limited = describe_limit(message, event, current->instrument);
     lines.push_back(limited.empty() ? std::move(line) : limited);
@@ -338,13 +339,13 @@ std::string describe(const InputInfo& input) {
 
 std::string describe_stability(const Instrument& instrument) {
   if (instrument.verdict == Verdict::unstable) {
-    return "none: it plays by force, and what runs away fades out";
+    return "none: played with --force; voices that diverge fade out";
   }
   const std::string proved = instrument.verdict == Verdict::stable ? "proved" : "not proved";
   const double margin = instrument.stiffness_margin;
-  return margin >= most_bounded ? "nothing to bound"
-         : margin >= 1.0 ? proved + "; every stiffness may grow " + fixed(margin, 2) + " times"
-                         : proved + " while nothing touches; with what may, up to " +
+  return margin >= most_bounded ? "no limit"
+         : margin >= 1.0 ? proved + "; every stiffness can grow by a factor of " + fixed(margin, 2)
+                         : proved + " without contacts; with all contacts closed, up to " +
                                fixed(std::max(0.0, margin), 2) + " of the stiffness";
 }
 
@@ -403,13 +404,12 @@ Result<Done> command::explain(ConsoleContext& console, Words) {
   const Instrument& instrument = current->instrument;
   std::vector<std::vector<std::string>> rows = {
       {"model", current->model_path},
-      {"tuned mode", instrument.mode
-                         ? fixed(instrument.mode->frequency_hz, 2) + " Hz as it is written"
-                         : "none that keys could tune"},
+      {"tuned mode", instrument.mode ? fixed(instrument.mode->frequency_hz, 2) + " Hz as written"
+                                     : "none that keys can tune"},
       {"keys", instrument.mode
                    ? "set the pitch" + transposition(instrument.transpose) + ", up to " +
-                         fixed(instrument.highest_frequency_hz, 1) + " Hz; higher ones are silent"
-                   : "all sound as the model is written"},
+                         fixed(instrument.highest_frequency_hz, 1) + " Hz; higher keys are silent"
+                   : "all play the pitch written in the model"},
       {"stability", describe_stability(instrument)},
   };
   for (const InputInfo& input : instrument.inputs) {
@@ -457,7 +457,7 @@ Result<Done> command::tuning(ConsoleContext& console, Words words) {
     }
   }
   if (!console.process.send(console.process.from_console, events)) {
-    return Error{"the audio thread is busy and took nothing; try again"};
+    return Error{"the audio thread is busy and accepted no events; try again"};
   }
   console.session.set_tuning(words[0] == "off"
                                  ? std::vector<std::string>()

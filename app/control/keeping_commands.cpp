@@ -42,7 +42,7 @@ Result<Done> command::learn(ConsoleContext& console, Words words) {
   if (auto begun = console.session.learn(target); !begun) {
     return begun.error();
   }
-  console.print("move the knob that shall turn " + target);
+  console.print("move the knob that is to control " + target);
   return Done{};
 }
 
@@ -54,10 +54,10 @@ Result<Done> command::unlearn(ConsoleContext& console, Words words) {
   const std::string target = words.empty() ? "" : meant_parameter(current->instrument, words[0]);
   const std::size_t count = console.session.unlearn(target);
   if (count == 0 && !target.empty()) {
-    return Error{"no controller has learnt to turn '" + target + "'"};
+    return Error{"no controller is assigned to '" + target + "'"};
   }
   console.print(counted(count, "controller does", "controllers do") +
-                " again what the preset says");
+                " again its function in the preset");
   return Done{};
 }
 
@@ -65,14 +65,14 @@ Result<Done> command::unlearn(ConsoleContext& console, Words words) {
 Result<Done> command::undo(ConsoleContext& console, Words) {
   const auto change = console.session.take_last_change();
   if (!change) {
-    return Error{"there is nothing to take back"};
+    return Error{"there is nothing to undo"};
   }
   if (change->scene) {
     if (auto back = console.session.load_and_wait(*change->scene); !back) {
       return back.error();
     }
     const std::string stem = std::filesystem::path(*change->scene).stem().string();
-    console.print(stem + " is back" + (change->values.empty() ? "" : ", as it was"));
+    console.print(stem + " is restored" + (change->values.empty() ? "" : " with its values"));
   }
   std::vector<std::string> lines;
   for (const auto& [name, value] : change->values) {

@@ -45,7 +45,7 @@ Result<Done> command::tune(ConsoleContext& console, Words words) {
   }
   console.print("mode " + std::to_string(target->mode + 1) + " is at " +
                 print_number(target->frequency_hz) + " Hz, " + note_name(target->frequency_hz) +
-                "; 'undo' takes it back, 'save NAME' keeps it");
+                "; 'undo' reverts it, 'save NAME' saves it");
   return Done{};
 }
 
@@ -53,7 +53,7 @@ Result<std::size_t> mode_count(const Argument& argument) {
   constexpr double most = 10000.0;
   const double* const number = std::get_if<double>(&argument);
   if (number == nullptr || !(*number >= 1.0 && *number <= most)) {
-    return Error{"expected how many modes, 1 to 10000"};
+    return Error{"expected the number of modes, 1 to 10000"};
   }
   return static_cast<std::size_t>(*number);
 }
@@ -65,7 +65,7 @@ Result<TuneTarget> tune_target(std::span<const Argument> arguments) {
   }
   const double* const mode = std::get_if<double>(arguments.data());
   if (mode == nullptr || !(*mode >= 1.0 && *mode <= 10000.0)) {
-    return Error{"expected the number of a mode, 1 the lowest; 'modes' lists them"};
+    return Error{"expected the number of a mode (1 is the lowest); 'modes' lists them"};
   }
   TuneTarget target{.mode = static_cast<std::size_t>(*mode) - 1};
   const double* const hertz = std::get_if<double>(&arguments[1]);
@@ -73,7 +73,7 @@ Result<TuneTarget> tune_target(std::span<const Argument> arguments) {
                          : *hertz > 0.0   ? std::optional(*hertz)
                                           : std::nullopt;
   if (!frequency) {
-    return Error{"expected a note, as A4 or Bb2, or a frequency above 0 in Hz"};
+    return Error{"expected a note such as A4 or Bb2, or a frequency above 0 in Hz"};
   }
   target.frequency_hz = *frequency;
   for (const Argument& argument : arguments.subspan(2)) {

@@ -66,9 +66,9 @@ Error unknown(const Message& message, const Instrument& instrument) {
     }
     const std::string last = known.back();
     known.pop_back();
-    return Error{message.address + ": an input knows " + joined(known, ", ") + " and " + last};
+    return Error{message.address + ": an input accepts " + joined(known, ", ") + " and " + last};
   }
-  return Error{"unknown address '" + message.address + "'; /describe lists what there is"};
+  return Error{"unknown address '" + message.address + "'; /describe lists all addresses"};
 }
 
 // One address may drive several inputs and parameters.
@@ -252,7 +252,7 @@ std::string describe_limit(const Message& message, const Event& event,
   const ParameterInfo& info = instrument.parameters[event.index];
   const bool is_changed = wanted != nullptr && event.value != *wanted;
   return is_changed && (event.value < *wanted ? info.is_lowered : info.is_raised)
-             ? info.name + ": " + print_number(*wanted) + " is beyond what is stable, set to " +
+             ? info.name + ": " + print_number(*wanted) + " is beyond the stable range, set to " +
                    print_number(event.value)
              : "";
 }

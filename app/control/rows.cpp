@@ -139,17 +139,17 @@ std::vector<Row> make_rows() {
       {.address = "/note/on",
        .arguments = {key, {"VELOCITY", "the velocity", 0, 127, 100}, own_id},
        .does =
-           "starts a note; key 0-127, velocity 1-127 (100), or as a float up to 1 a share of the "
-           "loudest; ID 1-16 lets the note be bent, pressed and slid alone",
+           "starts a note; key 0-127, velocity 1-127 (100), or a float up to 1 as a share of full "
+           "velocity; an ID of 1-16 gives the note its own bend, pressure and slide",
        .play = events::note_on,
        .command = "noteon",
        .group = CommandGroup::playing,
        .words = "KEY [VELOCITY]",
-       .command_does = "starts a note; 60 is the middle C",
-       .details = "KEY is 0 to 127, VELOCITY is 1 to 127, or 100 if it is left out."},
+       .command_does = "starts a note; 60 is middle C",
+       .details = "KEY is 0 to 127. VELOCITY is 1 to 127, or 100 if omitted."},
       {.address = "/note/off",
        .arguments = {key, {"VELOCITY", "the velocity", 0, 127, 63.5}, own_id},
-       .does = "ends a note; the velocity is that of the release",
+       .does = "ends a note; VELOCITY is the release velocity",
        .play = events::note_off,
        .command = "noteoff",
        .group = CommandGroup::playing,
@@ -159,33 +159,33 @@ std::vector<Row> make_rows() {
        .arguments = {id,
                      {"HZ", "the frequency", 1, 20000},
                      {"VELOCITY", "the velocity", 0, 127, 100}},
-       .does = "starts a note of this frequency; ID 1-16; velocity as of /note/on",
+       .does = "starts a note at this frequency; ID 1-16; velocity as for /note/on",
        .play = events::note_hz},
       {.address = "/note/end",
        .arguments = {id},
-       .does = "ends the notes of this ID",
+       .does = "ends the notes with this ID",
        .play = events::note_end},
       {.address = "/note/bend",
        .arguments = {id, {"SEMITONES", "the bend", -note_bend_semitones, note_bend_semitones}},
-       .does = "bends this note alone; semitones, -48 to 48; it stays for the ID's next note",
+       .does = "bends this note only, -48 to 48 semitones; the bend stays for the ID's next note",
        .play = events::note_bend},
       {.address = "/note/pressure",
        .arguments = {id, {"VALUE", "the pressure", 0, 127}},
-       .does = "presses this note alone, 0-127",
+       .does = "sets the pressure of this note only, 0-127",
        .play = events::note_pressure},
       {.address = "/note/slide",
        .arguments = {id, {"VALUE", "the slide", 0, 127}},
-       .does = "slides this note alone, as MPE does: controller 74, 0-127",
+       .does = "sets the slide of this note only, 0-127 (controller 74, as in MPE)",
        .play = events::note_slide},
       {.command = "keys",
        .group = CommandGroup::playing,
        .command_does = "plays from the computer's keyboard",
-       .details =
-           "The letters are laid out as on a piano. A note lasts until the next, or a second.",
+       .details = "The letters are laid out like a piano. A note lasts until the next one, at most "
+                  "a second.",
        .act = command::keys},
       {.address = "/cc",
        .arguments = {number, {"VALUE", "the value", 0, 127}},
-       .does = "a controller, as from a keyboard; value 0-127",
+       .does = "sends a MIDI controller; value 0-127",
        .play =
            [](const Said& said) {
              return one(said, {.kind = EventKind::controller,
@@ -194,14 +194,14 @@ std::vector<Row> make_rows() {
            }},
       {.address = "/pressure",
        .arguments = {{"VALUE", "the pressure", 0, 127}},
-       .does = "channel pressure, 0-127",
+       .does = "sets the channel pressure, 0-127",
        .play =
            [](const Said& said) {
              return one(said, {.kind = EventKind::pressure, .value = said.arguments[0] / 127.0});
            }},
       {.address = "/bend",
        .arguments = {{"VALUE", "the bend", -1, 1}},
-       .does = "pitch bend, -1 to 1 (two semitones)",
+       .does = "bends the pitch, -1 to 1 (two semitones)",
        .play =
            [](const Said& said) {
              return one(said, {.kind = EventKind::bend, .value = said.arguments[0]});
@@ -213,41 +213,42 @@ std::vector<Row> make_rows() {
       {.command = "get",
        .group = CommandGroup::parameters,
        .words = "PARAMETER",
-       .command_does = "tells a parameter's value",
-       .details = "PARAMETER may be a pattern: 'get m_*' tells all that begin so.",
+       .command_does = "prints a parameter's value",
+       .details = "PARAMETER may be a pattern: 'get m_*' prints all that begin with m_.",
        .act = command::get},
       {.address = "/param/NAME",
        .arguments = {{"VALUE", "the value"}},
-       .does = "a parameter: sets it, or answers its value",
+       .does = "sets a parameter; without VALUE, replies with its value",
        .play = set_parameters,
        .answer = answer::parameters,
        .command = "set",
        .group = CommandGroup::parameters,
        .words = "PARAMETER VALUE",
-       .command_does = "turns a parameter; it stays within its range",
-       .details = "PARAMETER may be a pattern: 'set *_Z 0.001' sets all that end so.",
+       .command_does = "sets a parameter, limited to its range",
+       .details = "PARAMETER may be a pattern: 'set *_Z 0.001' sets all that end with _Z.",
        .act = command::set},
       {.command = "learn",
        .group = CommandGroup::parameters,
        .words = "PARAMETER",
-       .command_does = "lets the knob that you move next turn a parameter",
-       .details =
-           "PARAMETER may be an OSC name of the preset's, such as /finger, too. The knob does "
-           "nothing else\nmeanwhile. 'save NAME' keeps it.",
+       .command_does = "assigns the next knob that you move to a parameter",
+       .details = "PARAMETER may also be an OSC address of the preset, such as /finger. The knob "
+                  "loses its "
+                  "other\nfunction until 'unlearn'. 'save NAME' saves the assignment.",
        .act = command::learn},
       {.command = "unlearn",
        .group = CommandGroup::parameters,
        .words = "[PARAMETER]",
-       .command_does = "lets a knob, or all, do again what the preset says",
+       .command_does = "restores the preset's assignment of a knob, or of all knobs",
        .act = command::unlearn},
       {.command = "undo",
        .group = CommandGroup::parameters,
-       .command_does = "takes back the last change of a parameter, or the last load",
-       .details = "Whoever made it: knob, OSC or console. Turns within a second are one change. A "
-                  "second 'undo'\ntakes back the first.",
+       .command_does = "undoes the last change of a parameter, or the last load",
+       .details =
+           "Changes by knob, OSC and console count alike. Changes within a second are one. A "
+           "second 'undo'\nreverts the first.",
        .act = command::undo},
       {.address = "/param/NAME/range",
-       .does = "answers its minimum and maximum, and between what it is stable",
+       .does = "replies with its minimum, maximum and stable range",
        .answer = answer::ranges},
   };
   std::vector<Row> rows(std::begin(first), std::end(first));
@@ -270,188 +271,194 @@ std::vector<Row> make_rows() {
   const Row last[] = {
       {.address = "/mass/NAME/strike",
        .arguments = {{"STRENGTH", "the strength", -1, 1, 0.8}},
-       .does = "strikes a mass, named as in the model; NAME:3 is the third of a string or a mesh, "
-               "NAME:0.3 a place there or on a waveguide, BELL:rim one of a body, that something "
-               "in the model holds on to; 1 is a hard blow, -1 one from the other side",
+       .does = "strikes a mass by its name in the model; NAME:3 is the third mass of a string or "
+               "mesh, NAME:0.3 a place on it or on a waveguide, BELL:rim a place of a body (a "
+               "place needs a link in the model); 1 is a hard strike, -1 one from the other side",
        .play = strike,
        .command = "hit",
        .group = CommandGroup::playing,
        .words = "MASS [STRENGTH]",
-       .command_does = "strikes a mass or a place by its name",
-       .details = "MASS is its name in the model, of a string or a mesh NAME:3, its third, or of a "
-                  "place NAME:0.3\nor BELL:rim. STRENGTH is -1 to 1, or 0.8.",
+       .command_does = "strikes a mass or a place by name",
+       .details =
+           "MASS is a name in the model, NAME:3 for the third mass of a string or mesh, or a "
+           "place NAME:0.3\nor BELL:rim. STRENGTH is -1 to 1, or 0.8 if omitted.",
        .act = command::hit},
       {.address = "/panic",
-       .does = "silence at once, whatever a button sends along",
+       .does = "silences everything immediately; ignores a button's value",
        .play = [](const Said& said) { return one(said, {.kind = EventKind::panic}); },
        .ignores_more = true,
        .command = "panic",
        .group = CommandGroup::playing,
-       .command_does = "silence at once",
+       .command_does = "silences everything immediately",
        .details = "Every voice fades out."},
       {.address = "/model/load",
        .arguments = {{.word = "NAME", .is_text = true},
                      {.word = "ID", .otherwise = 0, .is_text = true}},
-       .does = "loads a model or preset; answers /done or /fail",
+       .does = "loads a model or preset; replies /done or /fail",
        .answer = answer::load,
        .command = "load",
        .group = CommandGroup::models,
        .words = "MODEL [--force]",
        .command_does = "loads a model or a preset",
        .details =
-           "MODEL is the name of a preset or a model that came with the program, or the path of a "
-           ".mdl\nor .toml file. What sounds goes on until the new model is ready and then fades "
-           "into it; if\nthere is an error in the file, it simply goes on. A model that is not "
-           "stable is such an\nerror; --force plays it all the same, fading out what runs away.",
+           "MODEL is the name of an installed preset or model, or the path of a .mdl or .toml "
+           "file. The\ncurrent sound continues until the new model is ready and then fades into "
+           "it; after an error in\nthe file it continues unchanged. An unstable model is an "
+           "error; --force plays it anyway and fades\nout voices that diverge.",
        .act = command::load},
       {.address = "/preset/load",
        .arguments = {{.word = "NAME", .is_text = true},
                      {.word = "ID", .otherwise = 0, .is_text = true}},
-       .does = "the same for a preset",
+       .does = "loads a preset; replies /done or /fail",
        .answer = answer::load,
        .command = "preset",
        .group = CommandGroup::models,
        .words = "PRESET [--force]",
-       .command_does = "the same; Tab offers the presets only",
-       .details = "A preset is a model with ranges for its parameters and a plan of what plays it.",
+       .command_does = "loads a preset; Tab completes presets only",
+       .details = "A preset is a model with parameter ranges and controls.",
        .act = command::load},
       {.address = "/preset/save",
        .arguments = {{.word = "NAME", .is_text = true}},
-       .does = "saves what sounds, as it is now, among the user's presets, never over one that is "
-               "there; answers /done or /fail",
+       .does = "saves the current sound as a user preset; never overwrites; replies /done or /fail",
        .answer = answer::save,
        .command = "save",
        .group = CommandGroup::models,
        .words = "NAME [--force]",
-       .command_does = "keeps what sounds, as it is now, as a preset of yours",
+       .command_does = "saves the current sound as your own preset",
        .details =
-           "The values of the parameters, and what controllers have learnt, go to NAME.toml among "
-           "your own\npresets, in $XDG_DATA_HOME/ressort/presets or "
-           "~/.local/share/ressort/presets; "
-           "'load NAME'\nbrings it back. --force writes over one that is there.",
+           "Writes parameter values and assigned controllers to NAME.toml in your preset folder, "
+           "\n$XDG_DATA_HOME/ressort/presets or ~/.local/share/ressort/presets. 'load NAME' loads "
+           "it. --force\noverwrites an existing preset.",
        .act = command::save},
       {.command = "presets",
        .group = CommandGroup::models,
-       .command_does = "lists the presets, yours among them, each with a line",
+       .command_does = "lists all presets, yours included, with their descriptions",
        .act = command::presets},
       {.command = "models",
        .group = CommandGroup::models,
-       .command_does = "lists the presets and the models, yours among them",
-       .details = "Presets go first, each with what it is; then the models that they are made of.",
+       .command_does = "lists all presets and models, yours included",
+       .details = "Lists presets with their descriptions, then the models they are made of.",
        .act = command::models},
       {.address = "/status",
-       .does = "answers voices, cpu load, xruns, resets, rate and more",
+       .does = "replies with voices, CPU load, xruns, resets, rate and more",
        .answer = answer::status,
        .command = "status",
        .group = CommandGroup::looking,
-       .command_does = "tells what sounds, how loud, at what cost",
-       .details = "The peak and the limiter's deepest cut are those since the last status.",
+       .command_does = "shows the current sound, its level and its cost",
+       .details = "The peak and the limiter's largest reduction count from the previous 'status'.",
        .act = command::status},
       {.command = "explain",
        .group = CommandGroup::looking,
-       .command_does = "tells how the model is computed and what plays it",
+       .command_does = "shows how the model is computed and which controls it has",
        .act = command::explain},
       {.address = "/modes",
        .arguments = {{"COUNT", "how many modes", 1, 10000, 32}},
-       .does = "answers number, frequency, T60 and levels of the lowest modes, then their number",
+       .does = "replies with number, frequency, T60 and levels of each of the lowest modes, then "
+               "their count",
        .answer = answer::modes,
        .command = "modes",
        .group = CommandGroup::looking,
        .words = "[COUNT]",
        .command_does = "lists the lowest modes: frequency, note, T60 and level",
-       .details = "Levels are in dB below the loudest. Of the model as its parameters are now, at "
-                  "the pitch that it\nis written with.",
+       .details = "Levels are in dB below the loudest mode. The modes are those of the current "
+                  "parameters at the pitch\nwritten in the model.",
        .act = command::modes},
       {.address = "/timbre",
        .arguments = {{"SECONDS", "the seconds", 0, Subscribers::longest_lease_s, 10}},
-       .does = "sends /timbre.frame 94 times a second, for so long, at most 60 s (10): what the "
-               "sound is like; again renews it",
+       .does =
+           "sends descriptors of the sound as /timbre.frame, 94 times a second, for SECONDS, at "
+           "most 60 (10); repeat it to renew",
        .answer = answer::timbre,
        .command = "timbre",
        .group = CommandGroup::looking,
-       .command_does = "tells what the sound is like: bright or dark, hollow, noisy",
+       .command_does = "describes the sound: bright or dark, hollow, noisy",
        .details =
-           "Of the last frame of 2048 samples, the mean of all outputs. Asked again, it says "
-           "what has become\nof it: brighter, hollower, steadier. 'ressort describe' tells "
-           "more of a recording.",
+           "Analyses the last frame of 2048 samples, the mean of all outputs. Repeated, it also "
+           "prints what\nhas changed: brighter, hollower, steadier. 'ressort describe' analyses "
+           "recordings.",
        .act = command::timbre},
       {.address = "/tune",
        .arguments = {{"MODE", "the mode", 1, 10000},
                      {.word = "NOTE|HZ [T60] [PART]", .is_text = true}},
-       .does = "brings a mode to a pitch and a decay; answers /done or /fail",
+       .does = "tunes a mode to a pitch and a decay; replies /done or /fail",
        .answer = answer::tune,
        .command = "tune",
        .group = CommandGroup::parameters,
        .words = "MODE NOTE|HZ [T60] [PART]",
-       .details = "Stiffness, and with a T60 in seconds damping, is scaled in all of the model, or "
-                  "in what hangs\ntogether with a mass, string, mesh or link by its name. 'modes' "
-                  "lists the modes; 'undo' takes\nit back, 'save NAME' keeps it.",
+       .details =
+           "Scales the stiffness, and with a T60 in seconds the damping, of the whole model, or "
+           "of the part\nconnected to the mass, string, mesh or link PART. 'modes' lists "
+           "the modes, 'undo' reverts the\nchange, 'save NAME' saves it.",
        .act = command::tune},
       {.address = "/timbre/target",
        .arguments = {{.word = "FIGURE VALUE ...", .is_text = true}},
-       .does = "turns parameters until it sounds so: centroid 1800 t60 3; answers /done with the "
-               "figures, or /fail",
+       .does = "adjusts parameters to reach a timbre, such as centroid 1800 t60 3; replies /done "
+               "with the figures reached, or /fail",
        .answer = answer::shape,
        .command = "shape",
        .group = CommandGroup::parameters,
        .words = "FIGURE VALUE ...",
-       .command_does = "turns parameters until it sounds so: centroid 1800 t60 3",
+       .command_does = "adjusts parameters to reach a timbre: centroid 1800 t60 3",
        .details =
-           "FIGURE is t60 in s, attack in ms, centroid or spread in Hz, inharmonicity or "
-           "odd_to_even, and f0\nin Hz where keys do not set the pitch, of a blow at the key "
-           "that was played last. Parameters\nmove within their ranges. 'undo' takes it back, "
-           "'save NAME' keeps it, 'timbre' tells what sounds.",
+           "FIGURE is t60 in s, attack in ms, centroid or spread in Hz, inharmonicity, "
+           "odd_to_even, or f0\nin Hz if keys do not set the pitch, for a strike at the last "
+           "key played. Parameters stay within\ntheir ranges. 'undo' reverts the change, 'save "
+           "NAME' saves it, 'timbre' describes the sound.",
        .act = command::shape},
       {.address = "/subscribe",
        .arguments = {{"SECONDS", "the seconds", 0, Subscribers::longest_lease_s, 10}},
        .does =
-           "sends every change, whoever makes it, for so long, at most 60 s (10): first all that "
-           "is, then /loaded and /param/NAME; again renews it",
+           "sends the current state, then every change as /loaded and /param/NAME, for SECONDS, "
+           "at most 60 (10); repeat it to renew",
        .answer = answer::subscribe},
-      {.address = "/unsubscribe", .does = "ends that, and /timbre", .answer = answer::unsubscribe},
+      {.address = "/unsubscribe",
+       .does = "ends the subscriptions of /subscribe and /timbre",
+       .answer = answer::unsubscribe},
       {.address = "/models",
-       .does = "answers the name of each model, then their number",
+       .does = "replies with the name of each model, then their count",
        .answer = answer::models},
       {.address = "/presets",
-       .does = "answers the name and the line of each preset, then their number",
+       .does = "replies with the name and description of each preset, then their count",
        .answer = answer::presets},
       {.address = "/describe",
-       .does = "answers a row for everything that can be set or asked",
+       .does = "replies with a row for everything that can be set or queried",
        .answer = answer::describe},
       {.command = "tuning",
        .group = CommandGroup::playing,
        .words = "TUNING|off [TUNING]",
-       .command_does = "tunes all keys by Scala files, or as the preset has them",
+       .command_does = "tunes all keys by Scala files; 'off' restores the preset's tuning",
        .details =
-           "TUNING is a scale, NAME.scl, or a keyboard map, NAME.kbm, or both. What sounds is "
-           "tuned at once;\nmodels that are loaded later keep it.",
+           "TUNING is a scale, NAME.scl, a keyboard map, NAME.kbm, or both. Sounding notes change "
+           "at once;\nmodels loaded later keep the tuning.",
        .act = command::tuning},
       {.command = "rec",
        .words = "FILE|stop [--force]",
-       .command_does = "records what is heard to a file, or ends that",
+       .command_does = "records the output to a file; 'rec stop' ends it",
        .details =
-           "The file's ending says what it is: .wav, .w64, .flac, .ogg, .aiff, .au or .caf; 24 "
-           "bits a\nsample, and the rate of the audio. Over a sound file that is there it is "
-           "written by --force\nonly.",
+           "The extension selects the format: .wav, .w64, .flac, .ogg, .aiff, .au or .caf, with 24 "
+           "bits per\nsample at the current rate. --force overwrites an existing file.",
        .act = command::record},
       {.address = "/flight/save",
        .arguments = {{.word = "NAME", .is_text = true}},
-       .does = "saves what was played among the user's flights, never over one that is there; "
-               "answers /done or /fail",
+       .does =
+           "saves the performance in the user's folder; never overwrites; replies /done or /fail",
        .answer = answer::flight,
        .command = "flight",
        .words = "FILE [--force]",
-       .command_does = "keeps what was played, to be played back bit by bit",
-       .details = "'ressort play FILE.ressort' and 'ressort render FILE.ressort -o out.wav' play "
-                  "the last 30 s of\nit. It has all that was played since ressort was started, and "
-                  "the texts of the models; not what\ncame in by audio. --force writes over a file "
-                  "that is there.",
+       .command_does = "saves the performance, for bit-exact playback",
+       .details =
+           "'ressort play FILE.ressort' and 'ressort render FILE.ressort -o out.wav' play its "
+           "last 30 s.\nThe file holds everything played since ressort was started and the "
+           "texts of the models, but no\naudio input. --force overwrites an existing file.",
        .act = command::flight},
       {.command = "wait",
        .words = "SECONDS",
-       .command_does = "waits, for scripts and pipes: noteon 60, wait 0.5, noteoff 60",
+       .command_does = "pauses a script: noteon 60, wait 0.5, noteoff 60",
        .act = command::wait},
-      {.command = "help", .words = "[COMMAND]", .command_does = "tells more", .act = command::help},
+      {.command = "help",
+       .words = "[COMMAND]",
+       .command_does = "explains a command",
+       .act = command::help},
       {.command = "quit", .command_does = "ends the program", .act = command::quit},
   };
   rows.insert(rows.end(), std::begin(last), std::end(last));

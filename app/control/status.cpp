@@ -30,7 +30,7 @@ std::string tell_energy(const Status& now) {
   const std::string voices = "; " + std::to_string(now.voices) + " of " +
                              counted(static_cast<std::size_t>(now.max_voices), "voice", "voices");
   if (!now.is_whole) {
-    return (now.energy > 0.0 ? about(now.energy) + " and that of modes" : "not known of modes") +
+    return (now.energy > 0.0 ? about(now.energy) + " plus that of modes" : "unknown for modes") +
            voices;
   }
   const std::string change = now.is_driven     ? "driven from outside"
@@ -74,50 +74,50 @@ std::string tell_notes(const Status& now) {
 // Rows are in the order of the console's lines. The positions in /status.reply are part of the OSC
 // interface and must not change.
 constexpr StatusRow status_table[] = {
-    {"model", "", "what sounds", &Status::model, 0, "model",
+    {"model", "", "current model or preset", &Status::model, 0, "model",
      [](const Status& now) { return now.model.empty() ? "none" : now.model; }},
-    {"load_ms", "ms", "what reading, proving and compiling it took", &Status::load_ms, 8, "model",
+    {"load_ms", "ms", "time to read, prove and compile it", &Status::load_ms, 8, "model",
      [](const Status& now) {
        return now.model.empty() ? "" : "loaded in " + fixed(now.load_ms, 1) + " ms";
      }},
-    {"backend", "", "what plays it", &Status::backend, 12, "audio",
+    {"backend", "", "audio backend", &Status::backend, 12, "audio",
      [](const Status& now) { return now.backend.empty() ? "no backend" : now.backend; }},
-    {"rate", "Hz", "frames in a second", &Status::rate_hz, 6, "rate",
+    {"rate", "Hz", "frames per second", &Status::rate_hz, 6, "rate",
      [](const Status& now) { return print_number(now.rate_hz) + " Hz"; }},
-    {"period", "frames", "what the backend asks for at once", &Status::period_frames, 7, "rate",
-     [](const Status& now) { return std::to_string(now.period_frames) + " frames a period"; }},
-    {"cpu", "1", "share of the time there is, over a second; -1: nothing runs", &Status::cpu, 1,
-     "cpu",
+    {"period", "frames", "frames per callback", &Status::period_frames, 7, "rate",
+     [](const Status& now) { return std::to_string(now.period_frames) + " frames per period"; }},
+    {"cpu", "1", "share of the available time, averaged over a second; -1: no audio is running",
+     &Status::cpu, 1, "cpu",
      [](const Status& now) {
-       return now.cpu < 0.0 ? "nothing runs" : percent(now.cpu, 1) + " of the time there is";
+       return now.cpu < 0.0 ? "no audio is running"
+                            : percent(now.cpu, 1) + " of the available time";
      }},
-    {"cpu_peak", "1", "the highest of one period since the last status", &Status::cpu_peak, 14,
-     "cpu",
+    {"cpu_peak", "1", "maximum of one period since the last status", &Status::cpu_peak, 14, "cpu",
      [](const Status& now) {
        return now.cpu < 0.0
                   ? ""
                   : "at most " + fixed(100.0 * now.cpu_peak, 1) + " since the last status";
      }},
-    {"voices", "", "how many sound", &Status::voices, 2, "voices",
+    {"voices", "", "sounding voices", &Status::voices, 2, "voices",
      [](const Status& now) {
        return std::to_string(now.voices) + " of " + std::to_string(now.max_voices);
      }},
-    {"max_voices", "", "how many may", &Status::max_voices, 3},
-    {"stolen", "", "voices that gave way to a new note", &Status::stolen, not_in_reply, "voices",
+    {"max_voices", "", "most voices", &Status::max_voices, 3},
+    {"stolen", "", "voices stolen by new notes", &Status::stolen, not_in_reply, "voices",
      [](const Status& now) { return std::to_string(now.stolen) + " stolen"; }},
-    {"shed", "", "voices that there was no time for", &Status::shed, not_in_reply, "voices",
-     [](const Status& now) { return std::to_string(now.shed) + " shed for want of time"; }},
-    {"notes", "", "that began, and the last of them with their velocities", &Status::notes,
+    {"shed", "", "voices faded out for lack of CPU time", &Status::shed, not_in_reply, "voices",
+     [](const Status& now) { return std::to_string(now.shed) + " dropped for lack of time"; }},
+    {"notes", "", "notes started, and the latest with their velocities", &Status::notes,
      not_in_reply, "notes", tell_notes},
-    {"asleep", "1", "share of the computing that sleep saves", &Status::saved, not_in_reply,
-     "asleep",
-     [](const Status& now) { return percent(now.saved, 0) + " of what all voices would take"; }},
-    {"energy", "mass * (position / sample)^2", "of what sounds", &Status::energy, not_in_reply,
-     "energy", tell_energy},
-    {"loss", "energy / s", "how much of it is lost", &Status::loss},
-    {"driven", "", "something comes in: the loss is not all known", &Status::is_driven},
+    {"asleep", "1", "share of the computation saved by sleeping voices", &Status::saved,
+     not_in_reply, "asleep",
+     [](const Status& now) { return percent(now.saved, 0) + " of the cost of all voices"; }},
+    {"energy", "mass * (position / sample)^2", "energy of the sounding voices", &Status::energy,
+     not_in_reply, "energy", tell_energy},
+    {"loss", "energy / s", "energy lost per second", &Status::loss},
+    {"driven", "", "an input is driven, so the loss is only partly known", &Status::is_driven},
     {"whole", "", "all of the energy is known", &Status::is_whole},
-    {"peak_db", "dBFS", "since the last status; -999 is silence", &Status::peak_db, 9, "output",
+    {"peak_db", "dBFS", "peak since the last status; -999: silence", &Status::peak_db, 9, "output",
      [](const Status& now) {
        return level_meter(now.peak_db) + " " +
               (now.peak_db > -120.0
@@ -125,35 +125,37 @@ constexpr StatusRow status_table[] = {
                    : "silence") +
               " since the last status";
      }},
-    {"limited_db", "dB", "the limiter's deepest cut since the last status", &Status::limited_db,
+    {"limited_db", "dB", "largest gain reduction since the last status", &Status::limited_db,
      not_in_reply, "output",
      [](const Status& now) {
        return now.limited_db > -0.05 ? "limiter idle"
                                      : "limiter down to " + fixed(now.limited_db, 1) + " dB";
      }},
-    {"xruns", "", "gaps in the sound that the backend counted", &Status::xruns, 4, "xruns",
+    {"xruns", "", "dropouts counted by the backend", &Status::xruns, 4, "xruns",
      [](const Status& now) {
        return std::to_string(now.xruns) + "; " + counted(now.overruns, "period", "periods") +
               " took too long to compute";
      }},
-    {"overruns", "", "periods that took longer to compute than they sound", &Status::overruns},
+    {"overruns", "", "periods computed too slowly for real time", &Status::overruns},
     {"resets", "", "voices that became unstable", &Status::resets, 5, "resets",
      [](const Status& now) { return std::to_string(now.resets) + " voices that became unstable"; }},
-    {"beyond", "", "times that a parameter was kept where it is stable", &Status::beyond, 13,
+    {"beyond", "", "times that a parameter was limited for stability", &Status::beyond, 13,
      "limits",
      [](const Status& now) {
-       return std::to_string(now.beyond) + " times a parameter was kept where it is stable";
+       return std::to_string(now.beyond) + " times a parameter was limited for stability";
      }},
-    {"late", "", "events that came after their time", &Status::late, 10, "events",
+    {"late", "", "events that arrived late", &Status::late, 10, "events",
      [](const Status& now) { return std::to_string(now.late) + " late"; }},
-    {"dropped", "", "events that found no room", &Status::dropped, 11, "events",
+    {"dropped", "", "events lost because a queue was full", &Status::dropped, 11, "events",
      [](const Status& now) { return std::to_string(now.dropped) + " dropped"; }},
-    {"malformed", "", "MIDI that could not be read", &Status::malformed, not_in_reply, "events",
+    {"malformed", "", "malformed MIDI messages", &Status::malformed, not_in_reply, "events",
      [](const Status& now) { return std::to_string(now.malformed) + " malformed"; }},
-    {"strangers", "", "packets of who may not send OSC", &Status::strangers, not_in_reply, "events",
+    {"strangers", "", "OSC packets from senders that are not allowed", &Status::strangers,
+     not_in_reply, "events",
      [](const Status& now) { return std::to_string(now.strangers) + " ignored"; }},
-    {"modes", "", "of the voices that sound", &Status::modes, not_in_reply, "modes", tell_modes},
-    {"modes_awake", "", "of these", &Status::modes_awake},
+    {"modes", "", "modes of the sounding voices", &Status::modes, not_in_reply, "modes",
+     tell_modes},
+    {"modes_awake", "", "modes that are awake", &Status::modes_awake},
 };
 
 // Null after the last position.

@@ -21,10 +21,10 @@ Result<Done> command::timbre(ConsoleContext& console, Words) {
     moment = watch.now();
   }
   if (!moment) {
-    return Error{"nothing plays, so nothing is heard"};
+    return Error{"no audio is running, so there is no sound"};
   }
   if (!moment->figures[figure_number("centroid_hz")]) {
-    return Error{"it is silent; play a note, and ask while it sounds"};
+    return Error{"the output is silent; play a note and repeat the command while it sounds"};
   }
   console.print(joined(timbre_words(moment->figures, {}, console.timbre), "\n") +
                 (moment->f0_hz ? "\nf0: " + with_commas(*moment->f0_hz, 2) + " Hz" : ""));
@@ -75,7 +75,7 @@ Result<Done> command::shape(ConsoleContext& console, Words words) {
   for (const ShapedParameter& one : changed(*shaped, before.values)) {
     text += "\n" + one.name + " = " + print_number(one.value);
   }
-  console.print(text + "\n'undo' takes it back, 'save NAME' keeps it");
+  console.print(text + "\n'undo' reverts it, 'save NAME' saves it");
   return Done{};
 }
 

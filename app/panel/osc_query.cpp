@@ -49,7 +49,7 @@ json method_of(const Row& row, const std::string& path) {
 }
 
 json parameter_of(const ParameterInfo& info, const std::string& path, double value) {
-  json out = node(path, "a parameter of the model");
+  json out = node(path, "parameter of the model");
   out["TYPE"] = "f";
   out["ACCESS"] = info.audio_input > 0 ? readable : readable | writable;
   out["VALUE"] = {bound(value)};
@@ -58,7 +58,7 @@ json parameter_of(const ParameterInfo& info, const std::string& path, double val
 }
 
 json range_of(const ParameterInfo& info, const std::string& path) {
-  json out = node(path, "its minimum and maximum, and between what it is stable");
+  json out = node(path, "its minimum, maximum and stable range");
   out["TYPE"] = "ffff";
   out["ACCESS"] = readable;
   out["VALUE"] = {bound(info.minimum), bound(info.maximum), bound(info.safe.lowest),
@@ -139,7 +139,7 @@ Tree tree_of(const Session::Present& now) {
     tree.add(path, method_of(*find_row(path).row, path));
   }
   for (const CustomInfo& custom : instrument.custom) {
-    json control = node(custom.address, "a control of the preset");
+    json control = node(custom.address, "control of the preset");
     control["TYPE"] = "f";
     control["ACCESS"] = writable;
     control["RANGE"] = {{{"MIN", 0.0}, {"MAX", 1.0}}};

@@ -305,7 +305,7 @@ struct WebPanel::Server {
   void send_network(Response& response) {
     const auto now = picture();
     if (now == nullptr) {
-      return say(response, 503, "nothing sounds that could be drawn");
+      return say(response, 503, "there is no sounding model to draw");
     }
     const std::lock_guard lock(telling);
     if (told_picture != now->number) {
@@ -319,7 +319,7 @@ struct WebPanel::Server {
   void send_modes(const Request& request, Response& response) {
     const auto now = picture();
     if (now == nullptr) {
-      return say(response, 503, "nothing sounds that could be drawn");
+      return say(response, 503, "there is no sounding model to draw");
     }
     const auto count =
         static_cast<std::size_t>(number_of(request, "count", 24, 1, most_modes_shown));

@@ -424,13 +424,13 @@ expect 0 "$silent" "$program" play mute.mdl -a dummy -u off -m none -e quit.scri
 expect 0 "would let keys strike it" "$program" play mute.mdl -a dummy -u off -m none -e quit.script
 expect 0 "wide.toml:3:5: warning: 'K' is kept below 3.99999; above it the model is not stable" \
   "$program" render wide.toml -o wide.wav --seconds 1
-expect 0 "K: 4.5 is beyond what is stable, set to 3.99999" \
+expect 0 "K: 4.5 is beyond the stable range, set to 3.99999" \
   "$program" render wide.toml -o wide.wav --seconds 1 --set K=4.5
 expect 2 "the stiffness K = 4.5 of 'm' must stay below 4" \
   "$program" render stiff.mdl -o stiff.wav --seconds 1 --set K=4.5
 expect 0 "peak" "$program" render stiff.mdl -o stiff.wav --seconds 1 --set K=3.9
 model steep.score '0.1 /param/K 4.5\n0.2 /param/K 9\n'
-expect 0 "steep.score:1:5: warning: K: 4.5 is beyond what is stable, set to 3.99999" \
+expect 0 "steep.score:1:5: warning: K: 4.5 is beyond the stable range, set to 3.99999" \
   "$program" render stiff.mdl -o stiff.wav --score steep.score
 # At half the rate the same numbers are four times as stiff.
 expect 2 "the stiffness K = 1.5 of 'm' must stay below 1, at 22050 Hz" \

@@ -145,7 +145,7 @@ TEST_CASE("The death of the server is survived, or told by the exit code", "[ser
       next.is_killed ? server->kill() : server->end();
       REQUIRE(play.says("is gone"));
       CHECK(eventually([&] { return status_shows(play, "audio   none; waiting for JACK"); }));
-      CHECK(play.said().find("cpu     nothing runs") != std::string::npos);
+      CHECK(play.said().find("cpu     no audio is running") != std::string::npos);
       neighbour.reset();
       server.reset();
       server = std::make_unique<Server>(next.period_frames, next.rate_hz);

@@ -20,7 +20,7 @@ constexpr int save_failed = -11;
 
 // Parses host and port of "osc.udp://HOST:PORT/".
 Result<OscSender> address_of(const std::string& url) {
-  const Error no_address{"NSM_URL is no address of a session manager: '" + url +
+  const Error no_address{"NSM_URL is not the address of a session manager: '" + url +
                          "'; expected osc.udp://HOST:PORT/"};
   constexpr std::string_view scheme = "osc.udp://";
   if (!url.starts_with(scheme)) {

@@ -33,7 +33,8 @@ void answer_parameters(const Question& question, MakeRow&& make_row) {
   }
   question.client.answer_rows(rows);
   if (!has_any) {
-    question.client.error(address, "the model has no such parameter; /param/* lists what it has");
+    question.client.error(address,
+                          "the model has no such parameter; /param/* lists its parameters");
   }
 }
 
@@ -89,7 +90,7 @@ void answer::load(const Question& question) {
     return;
   }
   if (!client.outlet().begin_load()) {
-    client.error(message.address, "busy: enough loads are waiting, try again");
+    client.error(message.address, "busy: too many loads are waiting; try again");
     return;
   }
   const auto answer = [message, client](const Result<std::shared_ptr<const Loaded>>& result) {
@@ -162,7 +163,7 @@ void answer::describe(const Question& question) {
     row(known->address, known->arguments_text(), known->does);
   }
   for (const ParameterInfo& info : loaded->instrument.parameters) {
-    row("/param/" + info.name, "f", "a parameter of the model");
+    row("/param/" + info.name, "f", "parameter of the model");
     rows.back()
         .real(question.session.parameter(info.name).value_or(info.value))
         .real(info.minimum)
@@ -173,7 +174,7 @@ void answer::describe(const Question& question) {
   std::set<std::string_view> customs;  // One address may drive several things.
   for (const CustomInfo& custom : loaded->instrument.custom) {
     if (customs.insert(custom.address).second) {
-      row(custom.address, "f", "a control of the preset, 0-1");
+      row(custom.address, "f", "control of the preset, 0-1");
     }
   }
   rows.push_back(Reply("/describe.end").whole(rows.size()));
@@ -209,7 +210,7 @@ void answer::modes(const Question& question) {
   const OscClient& client = question.client;
   const auto count = mode_count(message.arguments.empty() ? Argument(32.0) : message.arguments[0]);
   if (!count || message.arguments.size() > 1) {
-    client.error(message.address, "expected how many modes, 1 to 10000");
+    client.error(message.address, "expected the number of modes, 1 to 10000");
     return;
   }
   if (!client.may_have_rows(message.address)) {
@@ -244,7 +245,7 @@ void answer::tune(const Question& question) {
     return;
   }
   if (!client.outlet().begin_load()) {
-    client.error(message.address, "busy: enough loads are waiting, try again");
+    client.error(message.address, "busy: too many loads are waiting; try again");
     return;
   }
   question.session.tune(*target,

@@ -22,8 +22,8 @@ bool OscClient::is_heard() const {
     const double ms = std::ceil(1e3 * pause_s);
     outlet_->answer(sender_, {Reply("/error")
                                   .text("")
-                                  .text("too much was asked: nothing is answered for " +
-                                        print_number(ms) + " ms; what is played is played")
+                                  .text("too many queries: no replies for " + print_number(ms) +
+                                        " ms; notes are still played")
                                   .bytes()});
   }
   return false;
@@ -45,7 +45,7 @@ bool OscClient::may_have_rows(const std::string& about) const {
     return false;
   }
   if (!outlet_->has_room()) {
-    error(about, "busy: too many answers are on their way, try again");
+    error(about, "busy: too many replies are pending; try again");
     return false;
   }
   return true;

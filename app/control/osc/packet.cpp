@@ -95,10 +95,10 @@ Fault take_argument(Bytes& left, char tag) {
     case 'b':
       return take_blob(left);
     default:
-      return Error{"an argument's type is none of i f d h T F N I s S b t c r m"};
+      return Error{"an argument's type is not one of i f d h T F N I s S b t c r m"};
   }
   if (size > left.size()) {
-    return Error{"a message has fewer arguments than its type tags promise"};
+    return Error{"a message has fewer arguments than type tags"};
   }
   left = left.subspan(size);
   return std::nullopt;
@@ -129,7 +129,7 @@ Fault check_message(Bytes left) {
     }
   }
   if (!left.empty()) {
-    return Error{"a message has more bytes than its type tags promise"};
+    return Error{"a message is longer than its type tags say"};
   }
   return std::nullopt;
 }
@@ -150,8 +150,7 @@ Fault check_element(Bytes bytes, int depth, std::uint64_t time_tag,
     return Error{"a bundle must begin with #bundle and a time tag"};
   }
   if (depth == max_osc_bundle_depth) {
-    return Error{"bundles within bundles are read to a depth of " +
-                 std::to_string(max_osc_bundle_depth)};
+    return Error{"bundles can be nested to a depth of " + std::to_string(max_osc_bundle_depth)};
   }
   const std::uint64_t inner_tag = read_u64(bytes.subspan(bundle_head.size()));
   Bytes left = bytes.subspan(bundle_start);

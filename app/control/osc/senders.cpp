@@ -68,7 +68,7 @@ Result<std::vector<Subnet>> parse_subnets(std::string_view text) {
     const auto subnet = parse_subnet(word);
     if (!subnet) {
       return Error{
-          "expected addresses such as 192.168.1.23 or 192.168.1.0/24, divided by commas, "
+          "expected addresses such as 192.168.1.23 or 192.168.1.0/24, separated by commas, "
           "found '" +
           std::string(word) + "'"};
     }

@@ -218,7 +218,7 @@ struct OscServer::Server {
       const ClockReading clock = process.clock.read();
       // A block that ended long ago does not predict the next one.
       if (clock.rate_hz <= 0.0 || monotonic_ns() - clock.time_ns > second_ns) {
-        client.error(group.address, "no audio is running: a time tag cannot be kept");
+        client.error(group.address, "no audio is running: time tags cannot be converted to frames");
         return;
       }
       tags.follow_wall_clock();
@@ -245,7 +245,7 @@ struct OscServer::Server {
       const std::string events = counted(group.events.size(), "event", "events");
       client.error(group.address,
                    is_ahead ? "refused whole: " + std::to_string(Process::max_ahead) +
-                                  " events may wait for their time, and there is no room for " +
+                                  " events can wait for their time; there is no room for " +
                                   events + " more; try again later"
                             : "busy: no room for " + events + ", try again");
       return;
@@ -255,7 +255,7 @@ struct OscServer::Server {
       client.error(address, news);
     }
     if (late_s > 0.0) {
-      lates.add("late by " + seconds_text(late_s) + " s, acts now");
+      lates.add("late by " + seconds_text(late_s) + " s, executed now");
       if (const auto news = lates.take()) {
         client.error(group.address, *news);
       }
@@ -358,7 +358,8 @@ std::string OscServer::access() const {
   for (const Subnet& subnet : server_->allowed) {
     others += (others.empty() ? "" : ", ") + print_subnet(subnet);
   }
-  return others.empty() ? "for this machine alone" : "open to this machine and " + others;
+  return others.empty() ? "accessible from this machine only"
+                        : "accessible from this machine and " + others;
 }
 
 int OscServer::port() const {

@@ -17,9 +17,10 @@ constexpr int receive_buffer_bytes = 1 << 20;
 Result<std::vector<Subnet>> allowed_senders(const OscOptions& options) {
   const auto address = parse_subnets(options.bind_address);
   if (!address || address->size() != 1 || (*address)[0].prefix_bits != 32) {
-    return Error{"'" + options.bind_address +
-                 "' is no address to bind OSC to; use 127.0.0.1 for this machine alone, 0.0.0.0 "
-                 "for every network"};
+    return Error{
+        "'" + options.bind_address +
+        "' is not an address that OSC can listen on; use 127.0.0.1 for this machine only, 0.0.0.0 "
+        "for every network"};
   }
   auto allowed = parse_subnets(options.allow);
   if (!allowed) {
@@ -28,12 +29,13 @@ Result<std::vector<Subnet>> allowed_senders(const OscOptions& options) {
   const bool is_open = !is_this_machine((*address)[0].address);
   if (is_open && allowed->empty()) {
     return Error{"-B " + options.bind_address +
-                 " lets the network in: say who may send with --osc-allow, such as --osc-allow "
-                 "192.168.1.23 for one machine or 192.168.1.0/24 for all of its network"};
+                 " accepts packets from the network: name the allowed senders with --osc-allow, "
+                 "such as --osc-allow "
+                 "192.168.1.23 for one machine or 192.168.1.0/24 for a network"};
   }
   if (!is_open && !allowed->empty()) {
     return Error{"--osc-allow " + options.allow + " needs -B too: at " + options.bind_address +
-                 " only this machine is heard; -B 0.0.0.0 listens to every network"};
+                 " only this machine can send; -B 0.0.0.0 listens on every network"};
   }
   return allowed;
 }

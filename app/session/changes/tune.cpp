@@ -140,7 +140,7 @@ Result<Shaped> Session::shape_now(const std::vector<TimbreTarget>& targets) {
     }
   }
   if (!process_.send(process_.from_session, events)) {
-    return Error{"the audio thread is busy and took nothing; try again"};
+    return Error{"the audio thread is busy and accepted no events; try again"};
   }
   remember(events);
   return shaped;

@@ -86,7 +86,7 @@ TEST_CASE("what is not stable is not loaded, or by force, and no parameter leave
   CHECK(has(harness.say("load " + wide),
             "wide.toml:3:5: warning: 'K' is kept below 4.73876; above it the model is not stable"));
   CHECK(harness.say("set K 2") == "K = 2\n");
-  CHECK(harness.say("set K 6") == "K: 6 is beyond what is stable, set to 4.73876\n");
+  CHECK(harness.say("set K 6") == "K: 6 is beyond the stable range, set to 4.73876\n");
   CHECK(harness.say("set K -1") == "K = 0, the lowest it may be\n");
   const std::string params = harness.say("params");
   INFO(params);

@@ -109,7 +109,7 @@ TEST_CASE("the network is let in for those who are named, and no others", "[osc_
   CHECK(contains(refusal({.bind_address = "0.0.0.0", .allow = "everybody"}), "'everybody'"));
   CHECK(contains(refusal({.bind_address = "0.0.0.0/0"}), "no address to bind OSC to"));
   Harness harness;
-  CHECK(harness.server->access() == "for this machine alone");
+  CHECK(harness.server->access() == "accessible from this machine only");
   CHECK(harness.open({.bind_address = "0.0.0.0", .port = 0, .allow = "10.0.0.0/8,10.1.2.3"})
             ->access() == "open to this machine and 10.0.0.0/8, 10.1.2.3");
 }

@@ -153,7 +153,7 @@ TEST_CASE("what is beyond what is stable is told over OSC, and where that ends",
   CHECK(std::get<float>(range.values[2]) == 0.0f);
   CHECK(std::get<float>(range.values[3]) == 4.0f);
   CHECK(has(client.ask(message("/param/K", {4.5})), "/error", "/param/K",
-            "K: 4.5 is beyond what is stable, set to 3.99999"));
+            "K: 4.5 is beyond the stable range, set to 3.99999"));
   CHECK(session.parameter("K") == 3.99999);
   CHECK(has(client.ask(message("/param/L/range")), "/error", "/param/L/range", "no such"));
 }
@@ -380,7 +380,7 @@ TEST_CASE("a bundle that finds no room ahead is refused whole; what is to act no
   CHECK(harness.client.sync().empty());
   for (int i = 0; i < 2; ++i) {
     CHECK(has(harness.client.ask(bundle(ahead(), pushes)), "/error", "/in/1/force",
-              "refused whole: 4096 events may wait for their time, and there is no room for 1500 "
+              "refused whole: 4096 events can wait for their time; there is no room for 1500 "
               "events more; try again later"));
     CHECK(harness.process.meters().dropped == 1500u * (static_cast<unsigned>(i) + 1));
     harness.drive(4);  // the audio thread has taken them all, and they still wait

@@ -196,12 +196,12 @@ TEST_CASE("a parameter keeps to its range, and a pattern reaches several", "[reg
   CHECK((*events)[1].value == 0.01);
   // What only asks plays nothing.
   check_error("/param/s_K", "/param/s_K: the value is missing");
-  check_error("/status", "unknown address '/status'; /describe lists what there is");
-  check_error("/model/load x", "unknown address '/model/load'; /describe lists what there is");
+  check_error("/status", "unknown address '/status'; /describe lists all addresses");
+  check_error("/model/load x", "unknown address '/model/load'; /describe lists all addresses");
 }
 
 TEST_CASE("what cannot be played is told, and what was expected", "[registry]") {
-  check_error("/nowhere 1", "unknown address '/nowhere'; /describe lists what there is");
+  check_error("/nowhere 1", "unknown address '/nowhere'; /describe lists all addresses");
   check_error("/note/on", "/note/on: the key is missing");
   check_error("/note/on 128", "/note/on: the key must lie between 0 and 127, found 128");
   check_error("/note/on 60.5", "/note/on: the key must be a whole number, found 60.5");
