@@ -1,6 +1,5 @@
 #include "app/command_line/options.h"
 
-#include <map>
 #include <string>
 
 #include "core/model/language/expression.h"
@@ -49,25 +48,18 @@ void add_motion(CLI::App& command, std::optional<ThirdArgument>& third) {
 }
 
 void add_method(CLI::App& command, std::optional<Method>& method) {
-  std::map<std::string, Method> methods;
   std::vector<std::string> words = {"auto"};
   for (const auto use : {KernelRow::Use::published, KernelRow::Use::physical}) {
     for (const Method known : methods_for(use)) {
       words.emplace_back(method_name(known));
-      methods[words.back()] = known;
     }
   }
   command
       .add_option_function<std::string>(
-          "--method",
-          [&method, methods](const std::string& word) {
-            if (const auto known = methods.find(word); known != methods.end()) {
-              method = known->second;
-            }
-          },
+          "--method", [&method](const std::string& word) { method = method_called(word); },
           "how each part is computed, where it can be: auto takes what is fastest, but for a\n"
-          "bare model direct, which is the published scheme bit for bit on every machine; fourth\n"
-          "is true to the continuous network instead")
+          "bare model direct, which is the published scheme bit for bit on every machine")
+      ->check([](const std::string& word) { return removed_method_advice(word); })
       ->check(CLI::IsMember(words))
       ->type_name("WORD");
 }
@@ -102,11 +94,8 @@ void add_strict(CLI::App& command, bool& is_strict) {
 
 void add_numbers(CLI::App& command, Precision& precision, bool& rescale) {
   add_choice<Precision>(command, "--precision", precision,
-                        {{"double", Precision::float64},
-                         {"float", Precision::float32},
-                         {"compensated", Precision::compensated32}},
-                        "of the computation; compensated is float with twice the digits where\n"
-                        "positions are added up, for what moves little and far from 0");
+                        {{"double", Precision::float64}, {"float", Precision::float32}},
+                        "of the computation");
   command.add_flag_callback(
       "--no-rescale", [&rescale] { rescale = false; },
       "take the model's numbers raw at rates other than 44100 Hz");

@@ -173,7 +173,6 @@ double wanted_factor(const Request& request, const Analysis& analysis, bool has_
 Workload workload_of(const Request& request) {
   const CompileOptions& options = request.options;
   return {.is_double = options.precision == Precision::float64,
-          .is_compensated = options.precision == Precision::compensated32,
           .isa = options.isa,
           .voices = request.voices,
           .is_untuned = options.bare,

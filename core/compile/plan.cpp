@@ -4,7 +4,6 @@
 #include <cmath>
 
 #include "core/compile/accuracy/springs.h"
-#include "core/kernels/direct/fourth_form.h"
 #include "core/kernels/domains/shards.h"
 #include "core/kernels/modal/modal_body.h"
 #include "core/kernels/oversampled/oversampled_form.h"
@@ -66,10 +65,6 @@ class Chooser {
   }
 
   Part choose() {
-    // What comes in acts later in it, which is silent in no sense.
-    if (is_asked_ && budget_.silence_db == -Budget::unlimited) {
-      consider(Method::slow);
-    }
     if (judge_ != nullptr) {
       consider_physical();
     } else {
@@ -106,13 +101,6 @@ class Chooser {
     return take("for its highest keys");
   }
   bool may_gain() const { return may_gain_; }
-
-  // In single precision with compensated positions there is one form for all.
-  Part compensate() {
-    program_.waveguides.empty() ? add(Method::direct, Compensated{})
-                                : add(Method::direct, Direct{});
-    return take("in the precision asked for");
-  }
 
   Part obey(Method method) {
     consider(Method::direct);
@@ -153,59 +141,33 @@ class Chooser {
     }
   }
 
-  // What is nearer to the continuous network than the published scheme: modes, which are exact, the
-  // fourth order, or either scheme several times a sample; of more steps than are needed none.
+  // Considers exact modes, the published scheme, and more steps per sample until the budget is met.
   void consider_physical() {
     if (eigenvectors_of_ <= most_modes_) {
       consider(Method::modal);
     } else {
       may_gain_ = eigenvectors_of_ <= patient_modes;
     }
-    consider(Method::fourth);
     consider(Method::direct);
     if (program_.moving == 0 || !program_.modes.empty()) {
       return;  // more steps bring a body's modes nowhere nearer
     }
-    bool is_fourth_enough = has_fitting(Method::fourth);
-    bool is_published_enough = false;
     for (std::uint32_t times = 2; times <= most_oversampling; times *= 2) {
-      if (!is_fourth_enough) {
-        is_fourth_enough = consider_steps(times, true);
-      }
-      if (!is_published_enough && !is_fourth_enough) {
-        is_published_enough = consider_steps(times, false);
-      }
-      if (is_published_enough || is_fourth_enough) {
+      if (consider_steps(times)) {
         return;
       }
     }
   }
 
-  bool has_fitting(Method method) const {
-    return std::any_of(candidates_.begin(), candidates_.end(), [&](const Candidate& candidate) {
-      return candidate.method == method && candidate.accuracy.meets(budget_);
-    });
-  }
-
-  // Whether so many steps a sample are enough, to fourth order or in the cheapest of the published
-  // forms. What is not known to be is not tried.
-  bool consider_steps(std::uint32_t times, bool is_fourth) {
+  // Adds the cheapest published form at `times` steps per sample, if its accuracy is known. Returns
+  // whether it meets the budget.
+  bool consider_steps(std::uint32_t times) {
     Program fine = oversampled_program(program_, times);
-    if (is_fourth) {
-      auto form = fourth_form(fine);
-      if (!form) {
-        return false;
-      }
-      fine.form = *std::move(form);
-    }
-    const Accuracy accuracy = judge_->of(oversampled_form(fine, times));
-    if (!accuracy.is_known) {
+    if (!judge_->of(oversampled_form(fine, times)).is_known) {
       return false;
     }
-    if (!is_fourth) {
-      Chooser chooser(fine, load_, 0, {}, progress_);
-      chooser.choose();
-    }
+    Chooser chooser(fine, load_, 0, {}, progress_);
+    chooser.choose();
     progress_.spend(program_.ends.size() + program_.position.size());
     add(Method::oversampled, oversampled_form(std::move(fine), times));
     return candidates_.back().accuracy.meets(budget_);
@@ -343,7 +305,7 @@ Planned make_plan(Machine machine, const Workload& load, std::optional<Method> m
                   const Promise& promise) {
   std::vector<Part> parts;
   bool may_gain = false;
-  if (load.reaches_beyond() && !method && !load.is_compensated) {
+  if (load.reaches_beyond() && !method) {
     if (auto planned = reach(machine, load, most_modes, budget, progress, promise, may_gain)) {
       return *std::move(planned);
     }
@@ -359,10 +321,9 @@ Planned make_plan(Machine machine, const Workload& load, std::optional<Method> m
                                promise.highest_factor),
                     most_modes, progress);
     }
-    Part part = load.is_compensated ? chooser.compensate()
-                : method            ? chooser.obey(*method)
-                : judge             ? chooser.choose(*judge, promise.merged)
-                                    : chooser.choose();
+    Part part = method  ? chooser.obey(*method)
+                : judge ? chooser.choose(*judge, promise.merged)
+                        : chooser.choose();
     if (judge && !part.accuracy) {
       part.accuracy = sum_of(judge->of(program.form), promise.merged);
     }

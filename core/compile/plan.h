@@ -60,7 +60,7 @@ struct Promise {
 // Gives every part of the machine the form that the cost model says is the cheapest at its worst,
 // or the one of `method` where a part has it; divided among load.executor where that pays. With a
 // budget for pitch or decay, the cheapest whose poles keep it at all corners (accuracy.h), of the
-// published scheme, exact modes, fourth order and several steps a sample; where none does or
+// published scheme, exact modes and several steps a sample; where none does or
 // nobody knows, the nearest. Where keys ask for more stiffness than the published scheme bears
 // (load.wanted_factor) all parts get exact modes or several steps a sample, if each can and half a
 // core is enough; else none does. O(elements), the eigenvectors of a part of up to `most_modes`

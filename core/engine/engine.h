@@ -132,11 +132,7 @@ struct Playing {
   }
 };
 
-enum class Precision : std::uint8_t {
-  float32,
-  float64,
-  compensated32,  // float32, but each position is the sum of two numbers
-};
+enum class Precision : std::uint8_t { float32, float64 };
 
 struct EngineMeters {
   int voices = 0;            // that sound

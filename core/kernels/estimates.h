@@ -15,7 +15,6 @@ namespace ressort::kernels {
 // What a prediction is for.
 struct Workload {
   bool is_double = true;
-  bool is_compensated = false;  // which only one form is
   Isa isa = Isa::base;
   int voices = 1;
   double highest_factor = 1.0;   // on every stiffness, that the published scheme bears

@@ -43,24 +43,6 @@ struct Chains {
   std::vector<std::uint32_t> links;  // those that are no chain's springs, ascending
 };
 
-// A small body for one voice: between contacts a whole block of samples is one product of a dense
-// matrix with the state. The matrices depend on a voice's coefficients: they are the kernel's own.
-struct DenseSpring {
-  std::uint32_t a = 0;  // nodes
-  std::uint32_t b = 0;
-  std::uint32_t stiffness = 0;  // coefficients
-  std::uint32_t damping = 0;
-};
-struct DensePort {
-  std::uint32_t run = 0;   // of Program::link_runs
-  std::uint32_t link = 0;  // of Program::ends
-};
-struct Dense {
-  std::vector<DenseSpring> springs;  // every linear link that moves a mass
-  std::vector<DensePort> ports;      // every other link that moves a mass
-  bool has_constant = false;         // gravity, or a spring to what stands elsewhere than at 0
-};
-
 // A stiffness or damping in the eigenvectors: what one coefficient gives to each mode, for masses
 // of 1. Links exert what they computed one tick before, with the coefficient of then; oscillators
 // pull with the coefficient of now.
@@ -287,37 +269,13 @@ struct Shards {
   std::uint32_t frames = 1;      // samples that they go on without each other
 };
 
-// Links that follow each other.
-struct FourthLinks {
-  std::uint32_t run = 0;    // of Program::link_runs: the law and its coefficients
-  std::uint32_t first = 0;  // of Program::ends
-  std::uint32_t count = 0;
-};
-
-// The continuous network to fourth order in time (direct.h), link by link; one voice in each lane.
-struct Fourth {
-  std::vector<FourthLinks> springs;  // linear, between nodes that are no points
-  std::vector<FourthLinks> others;   // all others, each added as it is written
-};
-
-// As Direct, in single precision, each position as the sum of two numbers.
-struct Compensated {};
-
-// What is slow, stepped once in `frames` samples and interpolated (slow.h); one voice.
 struct Program;
-struct Slow {
-  std::shared_ptr<const Program> fine;    // the same, for the first `frames` samples
-  std::shared_ptr<const Program> coarse;  // the same at 1/frames of the rate
-  std::uint32_t frames = 1;
-};
-
 // Stepped `times` times a sample at a finer rate (oversampled.h), in the form that it has there.
 struct Oversampled {
   std::shared_ptr<const Program> fine;  // the same at `times` the rate
   std::uint32_t times = 1;
 };
 
-using Form = std::variant<Direct, Chains, Dense, Modes, Grid, Batch, Shards, Fourth, Compensated,
-                          Slow, Oversampled>;
+using Form = std::variant<Direct, Chains, Modes, Grid, Batch, Shards, Oversampled>;
 
 }  // namespace ressort::kernels

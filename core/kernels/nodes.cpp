@@ -56,13 +56,7 @@ Nodes<T>::Nodes(const Program& program, NodeLayout layout_in)
 
 template <class T>
 double Nodes<T>::position(std::size_t node, std::size_t lane) const {
-  if (!is_somewhere(node)) {
-    return 0.0;
-  }
-  const auto x = static_cast<double>(numbers[at(node, lane)]);
-  return layout.rest == 0
-             ? x
-             : x + static_cast<double>(numbers[at(node, lane) + layout.rest * layout.row]);
+  return is_somewhere(node) ? static_cast<double>(numbers[at(node, lane)]) : 0.0;
 }
 
 template <class T>
@@ -83,9 +77,6 @@ void Nodes<T>::put(std::size_t node, std::size_t lane, double x, double v) {
   T* const number = numbers.data() + at(node, lane);
   *number = static_cast<T>(x);
   number[layout.row] = static_cast<T>(v);
-  if (layout.rest > 0) {
-    number[layout.rest * layout.row] = static_cast<T>(x - static_cast<double>(*number));
-  }
 }
 
 template <class T>
@@ -112,21 +103,21 @@ void Nodes<T>::become(const Nodes& from) {
   passive.felt = from.passive.felt;
 }
 
-template <class T, class Number>
-void NodeKernel<T, Number>::reset_lanes() {
+template <class T>
+void NodeKernel<T>::reset_lanes() {
   for (std::size_t lane = 0; lane < this->width(); ++lane) {
     this->reset(lane);
   }
 }
 
-template <class T, class Number>
-void NodeKernel<T, Number>::set_state(std::size_t lane, const double* x, const double* v) {
+template <class T>
+void NodeKernel<T>::set_state(std::size_t lane, const double* x, const double* v) {
   clear(lane);
   nodes_.set(lane, x, v);
 }
 
-template <class T, class Number>
-bool NodeKernel<T, Number>::save(std::size_t lane, double* x, double* v) const {
+template <class T>
+bool NodeKernel<T>::save(std::size_t lane, double* x, double* v) const {
   if (!program_.waveguides.empty()) {
     return false;  // nodes are not all that there is
   }
@@ -137,8 +128,8 @@ bool NodeKernel<T, Number>::save(std::size_t lane, double* x, double* v) const {
   return true;
 }
 
-template <class T, class Number>
-bool NodeKernel<T, Number>::read(std::span<const std::uint32_t> nodes, T* x, T* v) const {
+template <class T>
+bool NodeKernel<T>::read(std::span<const std::uint32_t> nodes, T* x, T* v) const {
   for (const std::uint32_t node : nodes) {
     for (std::size_t lane = 0; lane < this->width(); ++lane) {
       *x++ = static_cast<T>(nodes_.position(node, lane));
@@ -148,21 +139,21 @@ bool NodeKernel<T, Number>::read(std::span<const std::uint32_t> nodes, T* x, T* 
   return true;
 }
 
-template <class T, class Number>
-void NodeKernel<T, Number>::write(std::span<const std::uint32_t> nodes, const T* x, const T* v) {
+template <class T>
+void NodeKernel<T>::write(std::span<const std::uint32_t> nodes, const T* x, const T* v) {
   for (const std::uint32_t node : nodes) {
     for (std::size_t lane = 0; lane < this->width(); ++lane) {
       nodes_.put(node, lane, static_cast<double>(*x++), static_cast<double>(*v++));
     }
   }
-  std::fill(nodes_.passive.awake.begin(), nodes_.passive.awake.end(), Number(1));
+  std::fill(nodes_.passive.awake.begin(), nodes_.passive.awake.end(), T(1));
 }
 
 // Where forces are found as the masses move, what is new is damped in its own sample: a share of
 // Z/M.
-template <class T, class Number>
-void NodeKernel<T, Number>::strike(std::size_t lane, std::span<const std::uint32_t> nodes,
-                                   std::span<const double> changes) {
+template <class T>
+void NodeKernel<T>::strike(std::size_t lane, std::span<const std::uint32_t> nodes,
+                           std::span<const double> changes) {
   const Coefficients<T>& now = this->coefficients;
   for (std::size_t i = 0; i < nodes.size(); ++i) {
     const std::uint32_t node = nodes[i];
@@ -176,8 +167,8 @@ void NodeKernel<T, Number>::strike(std::size_t lane, std::span<const std::uint32
   }
 }
 
-template <class T, class Number>
-bool NodeKernel<T, Number>::is_near_start(std::size_t lane, double bound) const {
+template <class T>
+bool NodeKernel<T>::is_near_start(std::size_t lane, double bound) const {
   for (std::size_t node = 0; node < program_.moving; ++node) {
     if (!(std::fabs(nodes_.position(node, lane) - program_.position[node]) < bound)) {
       return false;
@@ -186,9 +177,9 @@ bool NodeKernel<T, Number>::is_near_start(std::size_t lane, double bound) const 
   return is_quiet(lane, bound);
 }
 
-template <class T, class Number>
-std::size_t NodeKernel<T, Number>::look(std::size_t lane, std::span<const std::uint32_t> nodes,
-                                        std::span<double> numbers) const {
+template <class T>
+std::size_t NodeKernel<T>::look(std::size_t lane, std::span<const std::uint32_t> nodes,
+                                std::span<double> numbers) const {
   return look_at(nodes, numbers, [&](std::uint32_t node) {
     const double x = nodes_.position(node, lane);
     return is_junction(program_, node) ? x - nodes_.velocity(node, lane) / 2 : x;  // as it is heard
@@ -205,6 +196,5 @@ template struct Nodes<float>;
 template struct Nodes<double>;
 template class NodeKernel<float>;
 template class NodeKernel<double>;
-template class NodeKernel<double, float>;
 
 }  // namespace ressort::kernels

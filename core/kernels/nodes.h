@@ -18,7 +18,6 @@ struct NodeLayout {
   std::size_t row = 0;              // numbers
   std::size_t rows = 3;
   std::size_t size = 0;  // of all numbers
-  std::size_t rest = 0;  // which row holds what a position is more than one number; 0: none does
 };
 
 // One row after the other: [slot][lane], `slot` being where each node is in a row of `slots`.
@@ -74,12 +73,12 @@ struct Nodes {
   }
 };
 
-// What such a kernel says of its nodes. T is what it is driven by, Number what it computes with.
-template <class T, class Number = T>
+// The part of such a kernel that handles its nodes.
+template <class T>
 class NodeKernel : public Kernel<T> {
  public:
   void set_state(std::size_t lane, const double* x, const double* v) final;
-  void let_go(std::size_t lane) final { nodes_.passive.awake[lane] = Number(-1); }
+  void let_go(std::size_t lane) final { nodes_.passive.awake[lane] = T(-1); }
   bool save(std::size_t lane, double* x, double* v) const final;
   bool read(std::span<const std::uint32_t> nodes, T* x, T* v) const final;
   void strike(std::size_t lane, std::span<const std::uint32_t> nodes,
@@ -106,7 +105,7 @@ class NodeKernel : public Kernel<T> {
   void write(std::span<const std::uint32_t> nodes, const T* x, const T* v);
 
   const Program& program_;
-  Nodes<Number> nodes_;
+  Nodes<T> nodes_;
 
  private:
   // Whether the force on any node in the next sample is among its numbers already.

@@ -9,12 +9,8 @@
 #include "core/kernels/batch/batch_form.h"
 #include "core/kernels/chains/chains.h"
 #include "core/kernels/chains/chains_form.h"
-#include "core/kernels/dense/dense.h"
-#include "core/kernels/dense/dense_form.h"
-#include "core/kernels/direct/compensated.h"
 #include "core/kernels/direct/direct.h"
 #include "core/kernels/direct/direct_form.h"
-#include "core/kernels/direct/fourth_form.h"
 #include "core/kernels/domains/sharded.h"
 #include "core/kernels/domains/sharded_form.h"
 #include "core/kernels/grid/grid.h"
@@ -23,8 +19,6 @@
 #include "core/kernels/modal/modal_form.h"
 #include "core/kernels/oversampled/oversampled.h"
 #include "core/kernels/oversampled/oversampled_form.h"
-#include "core/kernels/slow/slow.h"
-#include "core/kernels/slow/slow_form.h"
 
 namespace ressort::kernels {
 namespace {
@@ -103,8 +97,6 @@ constexpr KernelRow row(Method method, std::string_view name, Use use, Fits,
 constexpr KernelRow rows[] = {
     row<Chains, ChainsKernel>(Method::chains, "chains", Use::published,
                               [](const Request& r) { return chains_form(r.program, r.progress); }),
-    row<Dense, DenseKernel>(Method::dense, "dense", Use::published,
-                            [](const Request& r) { return dense_form(r.program); }),
     row<Grid, GridKernel>(Method::grid, "grid", Use::published,
                           [](const Request& r) { return grid_form(r.program, r.progress); }),
     row<Batch, BatchKernel>(Method::batch, "batch", Use::published,
@@ -116,11 +108,6 @@ constexpr KernelRow rows[] = {
                             r.load.reaches_beyond());
         },
         least_modal_ns),
-    row<Fourth, DirectKernel>(Method::fourth, "fourth", Use::physical,
-                              [](const Request& r) { return fourth_form(r.program); }),
-    row<Slow, SlowKernel>(
-        Method::slow, "slow", Use::physical,
-        [](const Request& r) { return slow_form(r.program, r.load.highest_factor); }),
     row<Oversampled, OversampledKernel>(
         Method::oversampled, "oversampled", Use::physical,
         [](const Request& r) {
@@ -131,8 +118,6 @@ constexpr KernelRow rows[] = {
         }),
     row<Shards, ShardedKernel>(Method::direct, "shards", Use::given,
                                [](const Request&) { return std::optional<Shards>(); }),
-    row<Compensated, CompensatedKernel>(Method::direct, "compensated", Use::given,
-                                        [](const Request&) { return Compensated(); }),
     row<Direct, DirectKernel>(Method::direct, "direct", Use::published,
                               [](const Request&) { return Direct(); }),
 };
@@ -156,6 +141,22 @@ const KernelRow& row_of(Method method) {
 
 std::string_view method_name(Method method) {
   return row_of(method).name;
+}
+
+std::optional<Method> method_called(std::string_view name) {
+  const auto row = std::find_if(std::begin(rows), std::end(rows), [&](const KernelRow& row) {
+    return row.name == name && row.use != Use::given;
+  });
+  return row == std::end(rows) ? std::nullopt : std::optional(row->method);
+}
+
+std::string removed_method_advice(std::string_view name) {
+  if (name == "dense" || name == "slow") {
+    return "method '" + std::string(name) + "' no longer exists; use auto";
+  }
+  return name == "fourth" ? "method 'fourth' no longer exists; use oversampled, or a budget of "
+                            "cents such as 'cents=3'"
+                          : "";
 }
 
 std::vector<Method> methods_for(KernelRow::Use use) {

@@ -22,7 +22,7 @@
 namespace ressort::kernels {
 
 // By which name a kernel is asked for.
-enum class Method { direct, chains, dense, modal, grid, batch, fourth, slow, oversampled };
+enum class Method { direct, chains, modal, grid, batch, oversampled };
 
 // Whom a kernel is wanted for.
 struct KernelRequest {
@@ -36,7 +36,7 @@ struct KernelRow {
   enum class Use {
     published,  // the published scheme, in other coordinates at most
     physical,   // true to the continuous network instead: where a budget asks for it, or by name
-    given,      // comes with a precision or with several cores, never by its own name
+    given,      // comes with several cores, never by its own name
   };
 
   std::size_t form;  // which alternative of Form
@@ -62,6 +62,10 @@ std::span<const KernelRow> kernel_rows();
 const KernelRow& row_of(const Form& form);
 const KernelRow& row_of(Method method);
 std::string_view method_name(Method method);
+// Returns nothing if no method has that name.
+std::optional<Method> method_called(std::string_view name);
+// Returns what to use instead of a method that earlier versions had; empty for any other name.
+std::string removed_method_advice(std::string_view name);
 
 // All of one use, the reference first.
 std::vector<Method> methods_for(KernelRow::Use use);

@@ -78,9 +78,8 @@ std::vector<Curve> curves_of(const std::string& family, const std::vector<Row>& 
 // The same in every panel.
 std::string style_of(const Curve& curve) {
   static const std::map<std::string, std::string> colours{
-      {"ressort", "black"}, {"direct", "red"},       {"chains", "blue"},
-      {"dense", "orange"},  {"modal", "#008040"},    {"grid", "purple"},
-      {"batch", "#c0a000"}, {"reference", "gray50"}, {"best FAUST", "brown"}};
+      {"ressort", "black"}, {"direct", "red"},    {"chains", "blue"},      {"modal", "#008040"},
+      {"grid", "purple"},   {"batch", "#c0a000"}, {"reference", "gray50"}, {"best FAUST", "brown"}};
   return " with linespoints linecolor rgb \"" + colours.at(curve.method) + "\" linewidth " +
          (curve.method == "ressort" ? "2.5" : "1.2") + " dashtype " + (curve.is_double ? "1" : "2");
 }

@@ -5,7 +5,6 @@
 
 #include "core/kernels/batch/batch_form.h"
 #include "core/kernels/chains/chains_form.h"
-#include "core/kernels/dense/dense_form.h"
 #include "core/kernels/grid/grid_form.h"
 #include "core/kernels/modal/modal_form.h"
 #include "tests/support/agreement.h"
@@ -36,7 +35,6 @@ std::vector<std::pair<Method, Form>> forms_of(const Program& program) {
   std::vector<std::pair<Method, Form>> forms;
   forms.emplace_back(Method::direct, Direct{});
   add_form(forms, Method::chains, chains_form(program));
-  add_form(forms, Method::dense, dense_form(program));
   add_form(forms, Method::modal, modal_form(program));
   add_form(forms, Method::grid, grid_form(program));
   add_form(forms, Method::batch, batch_form(program));
@@ -192,8 +190,8 @@ TEST_CASE("a bow's profile is turned while it sounds, in every form that can hol
     CHECK(turned.relative() < 1e-11);
     CHECK(left.relative() > 0.01);
   }
-  CHECK(taken == std::set{Method::direct, Method::chains, Method::dense, Method::modal,
-                          Method::grid, Method::batch});
+  CHECK(taken ==
+        std::set{Method::direct, Method::chains, Method::modal, Method::grid, Method::batch});
 }
 
 }  // namespace ressort::forms_test

@@ -26,14 +26,14 @@ std::vector<Subject> subjects() {
   return {
       {"triangle",
        scenes::poly_triangle() + "@in2 posInput 0.\n@h springDamper @in2 @m_m0 m_K 0.002\n",
-       {Method::dense, Method::batch}},
+       {Method::batch}},
       {"body",
        scenes::string("s", 12, "0.1", "0.002") +
            "@in1 frcInput @s_m3\n@in2 posInput 0.\n"
            "@touch nlContact @s_m8 @in2 0.002 0.05 0.01 0. 0.01\n"
            "@b nlSpring3 @s_m2 @s_m9 0.01 0.05 0.001\n" +
            scenes::output(1, "s_m5") + scenes::output(2, "s_m10"),
-       {Method::dense, Method::batch, Method::chains, Method::modal},
+       {Method::batch, Method::chains, Method::modal},
        false},
       {"string",
        scenes::string("s", 60, "0.2", "0.005") +
@@ -72,7 +72,7 @@ std::vector<Subject> subjects() {
            "@in1 frcInput @s_m7\n@in2 posInput 0.\n@h springDamper @in2 @m_m1 0.02 0.001\n"
            "@in3 frcInput @q_m2_2\n" +
            scenes::output(1, "s_m12") + scenes::output(2, "m_m2") + scenes::output(3, "q_m4_1"),
-       {Method::chains, Method::dense, Method::batch, Method::modal, Method::grid}}};
+       {Method::chains, Method::batch, Method::modal, Method::grid}}};
 }
 
 // Notes strike input 1, audio channels drive every input, and every parameter may be swept.

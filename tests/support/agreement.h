@@ -8,11 +8,10 @@
 
 namespace ressort::support {
 
-// Of the peak, in double. Direct forms (direct, chains, grid, batch) add up the forces
-// that are written, sample by sample, if in another order. A dense body leaps over whole blocks by
-// a matrix, and modes are another basis.
+// Returns the largest error in double, as a share of the peak. direct, chains, grid and batch add
+// the same forces in every sample, in different orders. modal works in another basis.
 inline double tolerance_of(Method method) {
-  return method == Method::dense || method == Method::modal ? 1e-9 : 1e-12;
+  return method == Method::modal ? 1e-9 : 1e-12;
 }
 
 // What float keeps at least, unless the direct kernel keeps hardly more: of a force beside

@@ -189,7 +189,7 @@ class KernelPlayer final : public ChartPlayer {
 std::unique_ptr<ChartPlayer> make_player(const Machine& machine,
                                          const std::vector<InputMotion>& motions, double seconds,
                                          Precision precision, Isa isa) {
-  if (precision != Precision::float32) {  // compensated positions are heard in double
+  if (precision == Precision::float64) {
     return std::make_unique<KernelPlayer<double>>(machine, motions, seconds, isa);
   }
   return std::make_unique<KernelPlayer<float>>(machine, motions, seconds, isa);

@@ -11,8 +11,7 @@ struct NamedPrecision {
   const char* name;
 };
 constexpr NamedPrecision precisions[] = {{Precision::float64, "double"},
-                                         {Precision::float32, "float"},
-                                         {Precision::compensated32, "compensated"}};
+                                         {Precision::float32, "float"}};
 
 constexpr unsigned oversamplings[] = {2, 4, 8};
 constexpr const char* silences[] = {"-120", "-100", "-80", "-60", "-40"};
@@ -27,11 +26,6 @@ const Asked every_method[] = {{"", ""}, {"passive", "passive=always"}};
 const Asked plans_choice[] = {
     {"auto", ""}, {"auto cents=1", "cents=1"}, {"auto passive", "passive=always"}};
 
-// Methods whose error falls with the rate.
-bool pays_to_oversample(std::string_view method) {
-  return method == "direct" || method == "fourth";
-}
-
 std::string together(const std::string& a, const std::string& b) {
   return a + (a.empty() || b.empty() ? "" : " ") + b;
 }
@@ -42,7 +36,7 @@ void add_method(std::vector<Way>& ways, Method method) {
     const std::string line = together(name, asked.name);
     ways.push_back({.name = line, .line = line, .method = method, .budget = asked.budget});
     for (const unsigned times : oversamplings) {
-      if (pays_to_oversample(name)) {
+      if (method == Method::direct) {  // the others have the same error at every rate
         const std::string label = std::to_string(times) + "x";
         ways.push_back({.name = line + " " + label,
                         .line = line,
@@ -102,11 +96,6 @@ std::vector<Way> all_ways() {
   std::vector<Way> all;
   for (const auto& [precision, name] : precisions) {
     for (Way way : ways) {
-      // With compensated positions there is but one form.
-      if (precision == Precision::compensated32 &&
-          (way.method != Method::direct || way.oversampling > 1)) {
-        continue;
-      }
       way.precision = precision;
       all.push_back(std::move(way));
     }

@@ -31,7 +31,7 @@ struct MadeWay {
   Way way;
   std::unique_ptr<Engine> engine;  // keeps the machine
   Plan plan;
-  std::string methods;             // of its parts, "dense" or "grid+direct"
+  std::string methods;             // of its parts, "modal" or "grid+direct"
   std::vector<std::string> twins;  // ways that turned out to be the same
   std::unique_ptr<ChartPlayer> player;
 

@@ -35,10 +35,8 @@ constexpr KindName event_names[] = {
     {EventKind::panic, "panic"},
 };
 
-constexpr std::pair<Precision, std::string_view> precisions[] = {
-    {Precision::float32, "float"},
-    {Precision::float64, "double"},
-    {Precision::compensated32, "compensated"}};
+constexpr std::pair<Precision, std::string_view> precisions[] = {{Precision::float32, "float"},
+                                                                 {Precision::float64, "double"}};
 
 template <class Rows, class Value>
 std::string name_in(const Rows& rows, Value value) {
@@ -190,7 +188,10 @@ class FlightReader {
       LineWords words(line);
       const bool is_record = !line.empty() && line[0] >= '0' && line[0] <= '9';
       if (!(is_record ? read_record(words) : read_line(words)) || !words.ok) {
-        return Error{"no line of a flight: '" + std::string(line.substr(0, 80)) + "'", line_, 1};
+        return Error{!advice_.empty()
+                         ? advice_
+                         : "no line of a flight: '" + std::string(line.substr(0, 80)) + "'",
+                     line_, 1};
       }
     }
     if (flight_.engines.empty() || flight_.records.empty()) {
@@ -233,6 +234,7 @@ class FlightReader {
                                            [&](const auto& known) { return known.second == name; });
       words.ok = words.ok && row != std::end(precisions);
       setup.precision = words.ok ? row->first : setup.precision;
+      advice_ = name == "compensated" ? "precision 'compensated' no longer exists; use double" : "";
     } else if (key == "method") {
       read_method(words);
     } else if (key == "budget") {
@@ -266,15 +268,9 @@ class FlightReader {
 
   void read_method(LineWords& words) {
     const std::string_view name = words.word();
-    words.ok = false;
-    for (const auto use : {KernelRow::Use::published, KernelRow::Use::physical}) {
-      for (const Method known : methods_for(use)) {
-        if (method_name(known) == name) {
-          flight_.setup.method = known;
-          words.ok = true;
-        }
-      }
-    }
+    flight_.setup.method = method_called(name);
+    words.ok = flight_.setup.method.has_value();
+    advice_ = removed_method_advice(name);
   }
 
   bool read_text(LineWords& words) {
@@ -351,6 +347,7 @@ class FlightReader {
 
   std::string_view rest_;
   int line_ = 0;
+  std::string advice_;  // what to use instead of a word that is no longer known
   Flight flight_;
   std::vector<std::shared_ptr<std::vector<SceneFile>>> texts_;  // of models and presets
 };

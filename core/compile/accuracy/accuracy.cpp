@@ -5,8 +5,8 @@
 #include <numbers>
 
 #include "core/compile/accuracy/springs.h"
+#include "core/compile/accuracy/steepness.h"
 #include "core/compile/accuracy/stepping.h"
-#include "core/kernels/direct/fourth_form.h"
 #include "core/linear_algebra/eigen.h"
 
 namespace ressort::compile {
@@ -254,12 +254,10 @@ Accuracy Judge::at(std::size_t corner, const Stepping& stepping) {
   if (!program.modes.empty()) {
     return of_bodies(corner, stepping);
   }
-  const bool has_relayed =
-      stepping.scheme == Stepping::Scheme::fourth && has_relayed_springs(program);
   if (program.moving > most_masses_ && program.moving > most_coupled_masses) {
     // Of dampers in proportion no modes are needed: none is stiffer than the edge bound.
     const auto proportion = rayleigh_of(program, numbers.parameters, numbers.stiffness_factor);
-    if (!proportion || has_relayed) {
+    if (!proportion) {
       return unknown();
     }
     const double most =
@@ -277,7 +275,7 @@ Accuracy Judge::at(std::size_t corner, const Stepping& stepping) {
   if (!course.is_known) {
     return unknown();
   }
-  if (course.is_proportional && !has_relayed) {
+  if (course.is_proportional) {
     return compare_modes(course.modes);
   }
   Poles wanted = course.poles;

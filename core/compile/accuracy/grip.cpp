@@ -78,8 +78,7 @@ double steps_of_bows(const Machine& machine) {
         std::any_of(program.link_runs.begin(), program.link_runs.end(),
                     [](const LinkRun& run) { return is_bow(run.law, run.scheme); });
     const auto* fine = std::get_if<Oversampled>(&program.form);
-    const auto* slow = std::get_if<Slow>(&program.form);
-    const double steps = fine != nullptr ? fine->times : slow != nullptr ? 1.0 / slow->frames : 1.0;
+    const double steps = fine != nullptr ? fine->times : 1.0;
     fewest = has_bow ? std::min(fewest, steps) : fewest;
   }
   return std::isfinite(fewest) ? fewest : 1.0;

@@ -91,7 +91,7 @@ class TunedMode final : public TunedMotion {
   TunedMode(const LowestShapes& shapes, const Stepping& stepping, double rate_ratio)
       : stepping_(stepping) {
     const std::size_t n = shapes.stiffness.rows();
-    springs_ = {shapes.stiffness, shapes.damping, Matrix(n, n), Matrix(n, n)};
+    springs_ = {shapes.stiffness, shapes.damping};
     springs_.stiffness.values *= rate_ratio * rate_ratio;
     springs_.damping.values *= rate_ratio;
     fixed_ = shapes.fixed.rows() == n ? shapes.fixed : Matrix(n, n);
@@ -102,7 +102,6 @@ class TunedMode final : public TunedMotion {
         *matrix = Matrix(1, 1);
         (*matrix)(0, 0) = first;
       }
-      springs_ = {springs_.stiffness, springs_.damping, Matrix(1, 1), Matrix(1, 1)};
     }
   }
 

@@ -63,7 +63,6 @@ std::vector<SpringDamper> spring_dampers_of(const Program& program,
       SpringDamper& one = found.emplace_back(
           SpringDamper{.stiffness = value[run.coefficients[law.slot(Role::stiffness)]],
                        .damping = value[run.coefficients[law.slot(Role::damping)]],
-                       .is_relayed = run.law != Law::spring,
                        .scheme = run.scheme});
       const auto hang = [&](std::uint32_t node, double sign) {
         if (!is_place(program, node)) {
@@ -72,7 +71,6 @@ std::vector<SpringDamper> spring_dampers_of(const Program& program,
           }
           return;
         }
-        one.is_relayed = true;
         const std::size_t tap = node - program.taps[0].node;
         each_behind(program, program.taps[tap], corners[tap], [&](std::uint32_t at, double weight) {
           if (at < program.moving && weight != 0.0) {
@@ -90,7 +88,7 @@ std::vector<SpringDamper> spring_dampers_of(const Program& program,
 Springs springs_of(const Program& program, std::span<const double> parameters,
                    double stiffness_factor, bool is_sampled) {
   const std::size_t n = program.moving;
-  Springs springs{Matrix(n, n), Matrix(n, n), Matrix(n, n), Matrix(n, n)};
+  Springs springs{Matrix(n, n), Matrix(n, n)};
   const std::vector<double> value = values_of(program, parameters, stiffness_factor, is_sampled);
   const Vector root = roots_of(program, value);
   for (const SpringDamper& one : spring_dampers_of(program, value)) {
@@ -99,10 +97,6 @@ Springs springs_of(const Program& program, std::span<const double> parameters,
         const double share = a * b * root[i] * root[j];
         springs.stiffness(i, j) += share * one.stiffness;
         springs.damping(i, j) += share * one.damping;
-        if (one.is_relayed) {
-          springs.relayed_stiffness(i, j) += share * one.stiffness;
-          springs.relayed_damping(i, j) += share * one.damping;
-        }
       }
     }
   }
@@ -116,18 +110,6 @@ Springs springs_of(const Program& program, std::span<const double> parameters,
 bool has_linear_springs(const Program& program) {
   return std::any_of(program.link_runs.begin(), program.link_runs.end(),
                      [](const LinkRun& run) { return facts_of(run.law).contains_spring; });
-}
-
-bool has_relayed_springs(const Program& program) {
-  const auto touches_place = [&](const LinkRun& run) {
-    return std::any_of(
-        program.ends.begin() + run.first, program.ends.begin() + run.first + run.count,
-        [&](Ends ends) { return is_place(program, ends.a) || is_place(program, ends.b); });
-  };
-  return contains_bent_springs(program) ||
-         std::any_of(program.link_runs.begin(), program.link_runs.end(), [&](const LinkRun& run) {
-           return run.law == Law::spring && touches_place(run);
-         });
 }
 
 bool contains_bent_springs(const Program& program) {

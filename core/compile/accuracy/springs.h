@@ -17,8 +17,7 @@ struct SpringDamper {
   std::vector<std::pair<std::uint32_t, double>> shares;  // node that moves, weight
   double stiffness = 0.0;
   double damping = 0.0;
-  bool is_own = false;      // of a mass, and no link
-  bool is_relayed = false;  // acts at a place on a macro, or is a part of something bent
+  bool is_own = false;  // of a mass, and no link
   Scheme scheme = Scheme::plain;
 };
 // `value` as the coefficients are. O(links)
@@ -32,8 +31,6 @@ struct Springs {
 
   Matrix stiffness;
   Matrix damping;
-  Matrix relayed_stiffness;  // the share of what acts at places, or is a part of something bent
-  Matrix relayed_damping;
   bool is_sound = true;  // every mass is above 0 and every number finite
 };
 
@@ -44,9 +41,7 @@ Springs springs_of(const Program& program, std::span<const double> parameters,
 
 // Whether any link is a spring, or contains one.
 bool has_linear_springs(const Program& program);
-// Whether there is anything in the relayed matrices.
-bool has_relayed_springs(const Program& program);
-// The same of what is a part of something bent.
+// Whether any link is nonlinear and contains a spring.
 bool contains_bent_springs(const Program& program);
 
 // [mode] stiffness and damping; nothing where damping is not proportional: where Z is not diagonal

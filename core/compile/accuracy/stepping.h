@@ -14,7 +14,7 @@ namespace ressort::compile {
 
 // By which scheme, and how many samples at a time.
 struct Stepping {
-  enum class Scheme { published, fourth, exact };
+  enum class Scheme { published, exact };
 
   // What a mode that swings alone becomes; nothing where it swings no more.
   std::optional<std::complex<double>> pole(double stiffness, double damping) const;

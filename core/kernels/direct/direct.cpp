@@ -14,20 +14,8 @@ DirectKernel<T>::DirectKernel(const Program& program, const Direct&, std::size_t
 }
 
 template <class T>
-DirectKernel<T>::DirectKernel(const Program& program, const Fourth& form, std::size_t voices,
-                              Isa isa)
-    : NodeKernel<T>(program, layout_in_rows<T>(program, lanes_for<T>(voices, isa), fourth_rows)),
-      loops_(with_isa(
-          isa, [&]<Isa level>() { return fourth_loops<level, T>(this->width() * sizeof(T)); })),
-      rails_(program, this->width()),
-      fourth_(&form) {
-  this->reset_lanes();
-}
-
-template <class T>
 DirectState<T> DirectKernel<T>::state() {
   DirectState<T> state(ramps_of(this->coefficients), this->nodes_);
-  state.fourth = fourth_;
   state.rails = rails_.is_empty() ? nullptr : &rails_;
   return state;
 }

@@ -4,17 +4,6 @@
 // In (position, velocity) form it is the same maths as 2x[n] - x[n-1], and keeps 10 to 80 dB more
 // in single precision: the velocity is a small number of its own instead of the difference of two
 // large ones.
-//
-// To fourth order in time it follows the continuous network, where the published scheme has second
-// order, and first in the dampers. Between two samples a mass is not where it was and not as fast.
-// With a = F/M, all that acts on it by the published laws, springs and dampers pull as if it were
-// at x + a_s/12 with velocity v + a/2,
-//   F = -K (x + a_s/12) - Z (v + a/2),  v += F/M, x += v,
-// a_s being without the dampers' share: v is the velocity half a sample ago, and 1/12 is what the
-// second difference of a motion has too much. So there is a second pass over the linear links.
-// What other links and force inputs exert is as published itself, and counts in a: a force f that
-// lasts moves the network as far as (I - K/12M) f moves the scheme, which is where the continuous
-// network goes. Position inputs count as they are given.
 #pragma once
 
 #include "core/kernels/nodes.h"
@@ -30,7 +19,6 @@ struct DirectState {
         x(nodes.row(0)),
         v(nodes.row(1)),
         force(nodes.row(2)),
-        row(nodes.layout.row),
         corners(nodes.corners.data()),
         placed(nodes.places.placed.data()),
         place_weights(nodes.places.weights.data()),
@@ -44,14 +32,11 @@ struct DirectState {
         solver(nodes.passive.numbers.data()),
         awake(nodes.passive.awake.data()),
         felt(nodes.passive.felt_or_null()) {}
-  // A row of a view's own, the first being 0.
-  T* own(std::size_t i) const { return force + (1 + i) * row; }
 
   Ramps<T> ramps;
-  T* x;      // position
-  T* v;      // change of position per sample
-  T* force;  // summed by the links, used by the next sample
-  std::size_t row;
+  T* x;                 // position
+  T* v;                 // change of position per sample
+  T* force;             // summed by the links, used by the next sample
   Corners<T>* corners;  // [tap][lane] in this sample
   T* placed;            // PlaceRoom
   T* place_weights;
@@ -65,11 +50,7 @@ struct DirectState {
   T* solver;                          // PassiveRoom::numbers
   T* awake;                           // [lane] 0 in the first sample after set_state(), else 1
   T* felt;  // [node][lane] what passive links did in this sample; null: nobody listens
-  const Fourth* fourth = nullptr;
   Rails<T>* rails = nullptr;  // only if there are waveguides
-  // Only where positions are compensated, what they are more than one number:
-  const T* value_rest = nullptr;  // [frame][input][lane]
-  T* output_rest = nullptr;       // [frame][output][lane]
 };
 
 template <class T>
@@ -79,23 +60,14 @@ struct DirectLoops {
   void (*pull)(const Program& program, DirectState<T>& state);
 };
 
-// The functions for lanes that fill so many bytes: as published, and to fourth order.
+// Returns the loops for lanes that fill `bytes` bytes.
 template <Isa isa, class T>
 DirectLoops<T> direct_loops(std::size_t bytes);
-template <Isa isa, class T>
-DirectLoops<T> fourth_loops(std::size_t bytes);
-// As published with compensated positions.
-template <Isa isa>
-DirectLoops<float> compensated_loops(std::size_t bytes);
-
-inline constexpr std::size_t compensated_rows = 4;  // of the nodes: the last is a position's rest
-inline constexpr std::size_t fourth_rows = 6;  // ...the dampers' share of the force, a_s/12 and a/2
 
 template <class T>
 class DirectKernel final : public NodeKernel<T> {
  public:
   DirectKernel(const Program& program, const Direct& form, std::size_t voices, Isa isa);
-  DirectKernel(const Program& program, const Fourth& form, std::size_t voices, Isa isa);
   bool write_nodes(std::span<const std::uint32_t> nodes, const T* x, const T* v) override;
   bool become(const Kernel<T>& from) override {
     this->become_nodes(from);
@@ -119,7 +91,6 @@ class DirectKernel final : public NodeKernel<T> {
 
   DirectLoops<T> loops_;
   Rails<T> rails_;
-  const Fourth* fourth_ = nullptr;
 };
 
 }  // namespace ressort::kernels

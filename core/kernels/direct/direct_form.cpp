@@ -48,17 +48,4 @@ std::uint64_t voice_bytes(const Program& program, const Direct&, std::uint64_t n
          number_bytes * waveguide_slots(program) * program.waveguides.size();
 }
 
-// A third more than without; SSE2 has no multiply-add to find what rounding loses.
-double predicted_ns(const Program& program, const Compensated&, const Workload& load) {
-  return (load.isa == Isa::base ? 4.0 : 1.3) * cost(work(program, Direct{}, load), load);
-}
-
-std::string description(const Program&, const Compensated&) {
-  return "mass by mass and link by link, as published, each position in two numbers";
-}
-
-std::uint64_t voice_bytes(const Program& program, const Compensated&, std::uint64_t number_bytes) {
-  return bytes_with_shared_links(program, number_bytes);
-}
-
 }  // namespace ressort::kernels

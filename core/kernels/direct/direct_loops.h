@@ -1,5 +1,5 @@
-// The loops of the direct form, for views of DirectState in packs: as published, with compensated
-// positions, to fourth order. A part of *_step.cpp, which are compiled for each instruction set.
+// The loops of the direct form. A part of direct_step.cpp, which is compiled once for each
+// instruction set.
 #pragma once
 
 #include "core/kernels/direct/direct_places.h"
@@ -15,8 +15,6 @@ template <class T, std::size_t Bytes>
 struct View {
   using V = Pack<T, Bytes>;
   static constexpr std::size_t lanes = Bytes / sizeof(T);
-  static constexpr bool takes_passive = true;  // links that are not plain
-  static constexpr bool takes_rails = true;    // waveguides
 
   explicit View(DirectState<T>& state_in)
       : state(state_in),
@@ -30,17 +28,10 @@ struct View {
   V between(std::size_t a, std::size_t b) const { return x[a] - x[b]; }
   void move(std::size_t node) { shift(node, v[node]); }
   void shift(std::size_t node, V way) { x[node] += way; }
-  // Where a place would be, in whatever numbers move_to() takes.
-  V exact_at(const Program& program, std::size_t tap) const {
-    return seen_at(program, *this, tap, x);
-  }
   void move_to(std::size_t node, V position) {
     v[node] = position - x[node];
     x[node] = position;
   }
-  // What the position inputs and the outputs of a frame leave out.
-  void take_rests(const Program&) {}
-  void give_rests(const Program&) {}
 
   V* x;
   V* v;
@@ -264,7 +255,6 @@ typename S::V read_output(const Program& program, const S& s, const typename S::
   return force / static_cast<Scalar<typename S::V>>(program.rate_ratio * program.rate_ratio);
 }
 
-// A view may have a step_masses() and a pull() of its own.
 template <class S, class T>
 void step(const Program& program, DirectState<T>& state, const Block<T>& block) {
   using V = typename S::V;
@@ -278,7 +268,7 @@ void step(const Program& program, DirectState<T>& state, const Block<T>& block) 
   // What there is at all.
   const bool has_passive = !state.passive.links.empty();
   const bool has_taps = !program.taps.empty();
-  [[maybe_unused]] const bool has_rails = state.rails != nullptr;
+  const bool has_rails = state.rails != nullptr;
   const bool has_masses = state.nodes > program.junctions.size();
   const bool has_plain =
       std::any_of(program.link_runs.begin(), program.link_runs.end(),
@@ -290,10 +280,8 @@ void step(const Program& program, DirectState<T>& state, const Block<T>& block) 
     for (const std::uint32_t c : program.audio_coefficients) {
       coefficient[c] = *audio++;
     }
-    if constexpr (S::takes_passive) {
-      if (has_passive) {
-        remember_links(program, s);
-      }
+    if (has_passive) {
+      remember_links(program, s);
     }
     for (std::size_t i = 0; i < inputs; ++i) {
       if (program.inputs[i].is_force) {
@@ -307,13 +295,11 @@ void step(const Program& program, DirectState<T>& state, const Block<T>& block) 
     if (has_masses) {
       step_masses(program, s);
     }
-    if constexpr (S::takes_rails) {
-      if (has_rails) {
-        if (state.rails->run == 0) {
-          RailLoops<V, T>::read_run(*state.rails, block.frames - frame);
-        }
-        RailLoops<V, T>::move_places(program, *state.rails, s);
+    if (has_rails) {
+      if (state.rails->run == 0) {
+        RailLoops<V, T>::read_run(*state.rails, block.frames - frame);
       }
+      RailLoops<V, T>::move_places(program, *state.rails, s);
     }
     for (std::size_t i = 0; has_positions && i < inputs; ++i) {
       if (!program.inputs[i].is_force) {
@@ -321,16 +307,11 @@ void step(const Program& program, DirectState<T>& state, const Block<T>& block) 
         s.v[program.inputs[i].node] = velocity[i];
       }
     }
-    s.take_rests(program);
-    if constexpr (S::takes_passive) {
-      if (has_passive) {
-        correct_links(program, s);
-      }
+    if (has_passive) {
+      correct_links(program, s);
     }
-    if constexpr (S::takes_rails) {
-      if (has_rails) {
-        RailLoops<V, T>::go_on(program, *state.rails, s);
-      }
+    if (has_rails) {
+      RailLoops<V, T>::go_on(program, *state.rails, s);
     }
     if (has_taps) {
       move_taps(program, s);
@@ -341,7 +322,6 @@ void step(const Program& program, DirectState<T>& state, const Block<T>& block) 
     for (const OutputSlot& output : program.outputs) {
       *outputs++ = read_output(program, s, value, output);
     }
-    s.give_rests(program);
     value += inputs;
     velocity += inputs;
   }
@@ -351,6 +331,13 @@ template <class S, class T>
 void pull_alone(const Program& program, DirectState<T>& state) {
   S s(state);
   pull(program, s);
+}
+
+template <class T>
+DirectLoops<T> loops_for(std::size_t bytes) {
+  return with_bytes<vector_bytes(Isa::RESSORT_ISA)>(bytes, []<std::size_t pack>() {
+    return DirectLoops<T>{step<View<T, pack>, T>, pull_alone<View<T, pack>, T>};
+  });
 }
 
 }  // namespace

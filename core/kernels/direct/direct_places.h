@@ -149,7 +149,7 @@ void place_taps(const Program& program, S& s) {
 template <class S>
 void move_taps(const Program& program, S& s) {
   for (std::size_t i = 0; i < program.taps.size(); ++i) {
-    s.move_to(program.taps[i].node, s.exact_at(program, i));
+    s.move_to(program.taps[i].node, seen_at(program, s, i, s.x));
   }
 }
 

@@ -13,8 +13,7 @@ inline constexpr std::uint32_t most_oversampling = 32;
 // The same numbers at `times` the rate, in the direct form.
 Program oversampled_program(const Program& program, std::uint32_t times);
 
-// Stepped so many times a sample in the form that the finer Program has: published, in any
-// coordinates, or to fourth order.
+// Stepped so many times a sample in the form that the finer Program has.
 Oversampled oversampled_form(Program fine, std::uint32_t times);
 
 // What the registry's row of it asks, of one voice in bytes.

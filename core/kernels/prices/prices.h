@@ -45,15 +45,6 @@ enum class Item : std::uint8_t {
   chains_passive,
   chains_line,
   chains_far_line,
-  dense_voice,
-  dense_mass,
-  dense_signal,  // a way from an input to an output
-  dense_small_contact,
-  dense_contact,
-  dense_stride,
-  dense_small_link,  // beside the first
-  dense_link,
-  dense_link_mass,  // of every link beside the first
   grid_sample,
   grid_segment,
   grid_pack,

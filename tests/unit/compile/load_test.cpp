@@ -224,7 +224,7 @@ TEST_CASE("What an engine takes is known before it is made", "[load]") {
                                  Way{chain(8000), Method::chains, Precision::float64},
                                  Way{mesh, Method::grid, Precision::float64},
                                  Way{chain(300), Method::modal, Precision::float64},
-                                 Way{chain(8000), Method::fourth, Precision::float64});
+                                 Way{chain(8000), Method::oversampled, Precision::float64});
   const int voices = GENERATE(1, 16);
   const Network network = support::network_of(way.text);
   const auto compiled =

@@ -42,9 +42,8 @@ std::string number(double value) {
 
 // Open where the network is played as it is written, filled where a budget asked for more.
 int glyph_of(const std::string& method, bool has_budget) {
-  static const std::map<std::string, int> open = {{"direct", 6}, {"chains", 4}, {"dense", 8},
-                                                  {"modal", 12}, {"grid", 10},  {"fourth", 14},
-                                                  {"slow", 1}};
+  static const std::map<std::string, int> open = {
+      {"direct", 6}, {"chains", 4}, {"modal", 12}, {"grid", 10}};
   const auto known = open.find(method);
   const int glyph = known == open.end() ? 3 : known->second;
   return glyph >= 4 && has_budget ? glyph + 1 : glyph;

@@ -1,16 +1,15 @@
-#include "core/kernels/direct/fourth_form.h"
-#include "core/laws/laws.h"
+#include "core/compile/accuracy/steepness.h"
 
 #include <algorithm>
 #include <cmath>
 #include <map>
 
-#include "core/kernels/direct/direct_form.h"
+#include "core/laws/laws.h"
 
-namespace ressort::kernels {
+namespace ressort::compile {
 namespace {
 
-// What a link weighs: so much of its stiffness, and so much of its damping.
+// The weight of a link: a combination of its stiffness and its damping.
 struct Weighing {
   double stiffness = 0.0;
   double damping = 0.0;
@@ -24,8 +23,8 @@ class Bounder {
     }
   }
 
-  // The edge bound: the largest d_a/m_a + d_b/m_b over the links, and d_a/m_a over the masses that
-  // hold themselves; d is the sum of the weights at a mass.
+  // Returns the edge bound on the largest eigenvalue: the maximum of d_a/m_a + d_b/m_b over all
+  // links and of d_a/m_a over all oscillators, where d is the sum of the weights at a mass.
   double operator()(const Weighing& weighing) const {
     std::vector<double> sum(program_.position.size(), 0.0);
     std::map<std::uint32_t, double> at_macro;  // by its first place in tap_nodes
@@ -76,7 +75,7 @@ class Bounder {
                : &program_.taps[end - program_.taps[0].node];
   }
 
-  // All that a point of this macro may be between.
+  // Calls use(node) for every node of the macro whose first tap node is `first`.
   template <class Use>
   void each_node(std::uint32_t first, Use&& use) const {
     const auto tap = std::find_if(program_.taps.begin(), program_.taps.end(),
@@ -86,7 +85,7 @@ class Bounder {
     }
   }
 
-  // What always pulls.
+  // Calls use(ends, weight) for every link that contains a spring.
   template <class Use>
   void each_link(const Weighing& weighing, Use&& use) const {
     for (const LinkRun& run : program_.link_runs) {
@@ -106,64 +105,11 @@ class Bounder {
   std::vector<double> value_;  // [coefficient]
 };
 
-bool touches_point(const Program& program, Ends ends) {
-  return !program.taps.empty() && std::max(ends.a, ends.b) >= program.taps[0].node;
-}
-
-void add(std::vector<FourthLinks>& all, std::uint32_t run, std::uint32_t link) {
-  if (!all.empty() && all.back().run == run && all.back().first + all.back().count == link) {
-    ++all.back().count;
-  } else {
-    all.push_back({run, link, 1});
-  }
-}
-
 }  // namespace
-
-Steepness steepness_of(const Program& program) {
-  return steepness_of(program, program.parameters);
-}
 
 Steepness steepness_of(const Program& program, std::span<const double> parameters) {
   const Bounder bound(program, parameters);
-  return {.stiffness = bound({1.0, 0.0}), .damping = bound({0.0, 1.0}), .both = bound({1.0, 6.0})};
+  return {.stiffness = bound({1.0, 0.0}), .both = bound({1.0, 6.0})};
 }
 
-std::optional<Fourth> fourth_form(const Program& program) {
-  const auto is_force = [](const OutputSlot& output) { return output.is_force; };
-  if (program.moving == 0 || !program.modes.empty() ||
-      (!program.taps.empty() &&
-       std::any_of(program.outputs.begin(), program.outputs.end(), is_force)) ||
-      !is_plain(program) || !(steepness_of(program).both < 12.0)) {
-    return std::nullopt;
-  }
-  Fourth form;
-  for (std::uint32_t run = 0; run < program.link_runs.size(); ++run) {
-    const LinkRun& links = program.link_runs[run];
-    for (std::uint32_t i = links.first; i < links.first + links.count; ++i) {
-      const bool is_spring = links.law == Law::spring && !touches_point(program, program.ends[i]);
-      add(is_spring ? form.springs : form.others, run, i);
-    }
-  }
-  return form;
-}
-
-// Twice through the springs, and two loops over the masses.
-double predicted_ns(const Program& program, const Fourth&, const Workload& load) {
-  return 2.5 * cost(work(program, Direct{}, load), load);
-}
-
-std::string description(const Program& program, const Fourth& form) {
-  std::size_t springs = 0;
-  for (const FourthLinks& links : form.springs) {
-    springs += links.count;
-  }
-  return "to fourth order, springs and dampers twice, " +
-         count_of(program.ends.size() - springs, "link", "links") + " as published";
-}
-
-std::uint64_t voice_bytes(const Program& program, const Fourth&, std::uint64_t number_bytes) {
-  return bytes_with_own_links(program, program.ends.size(), number_bytes);
-}
-
-}  // namespace ressort::kernels
+}  // namespace ressort::compile
