@@ -7,7 +7,7 @@ namespace ressort::kernels {
 namespace {
 
 constexpr std::size_t most_bytes =
-    std::size_t{16} * 1024;  // of a kernel's cells: half of what is nearest
+    std::size_t{16} * 1024;  // Memory of one kernel's cells: half of the first-level cache.
 
 constexpr std::size_t parts_of(std::size_t whole, std::size_t part) {
   return (whole + part - 1) / part;
@@ -74,7 +74,7 @@ class Filler {
            std::none_of(batch_.pairs.begin(), batch_.pairs.begin() + pairs(), differs);
   }
 
-  // Slots that nobody looks at, where all are alike and these are not the first.
+  // Slots that are never read: if all elements are alike, only the first has slots.
   template <class Add>
   void add_alike(Add&& add, std::size_t slots, bool is_first) {
     if (is_first || !table_.is_alike) {
@@ -157,7 +157,7 @@ class Filler {
   std::size_t slots_ = 0;
 };
 
-// Pack by pack, a node's numbers in cells that follow each other.
+// Pack by pack; the cells of a node are consecutive.
 NodeLayout layout_of(const BatchTable& table, std::size_t lanes) {
   NodeLayout layout{
       .row = lanes, .rows = batch_node_cells, .size = table.cells * table.packs * lanes};
@@ -180,7 +180,7 @@ BatchKernel<T>::BatchKernel(const Program& program, const Batch& batch, std::siz
           [&] {
             const std::size_t bytes = batch_lanes<T>(voices, isa) * sizeof(T);
             BatchTable table = Filler(program, batch).table();
-            // Shared evenly by as many kernels as it takes.
+            // Divides the voices evenly among as many kernels as needed.
             const std::size_t wanted = parts_of(voices * sizeof(T), bytes);
             const std::size_t most = std::max<std::size_t>(1, most_bytes / (table.cells * bytes));
             table.packs = parts_of(wanted, parts_of(wanted, most));

@@ -6,7 +6,7 @@
 namespace ressort::kernels {
 namespace {
 
-// Whether the link is one of the springs held; it is then put there.
+// Stores the link in `batch` if it is a spring between masses in registers; returns whether it is.
 bool hold_spring(const Program& program, const LinkRun& run, Ends ends, Batch& batch) {
   const auto [a, b] = std::minmax(ends.a, ends.b);
   if (run.law != Law::spring || a >= program.moving || a == b) {
@@ -53,7 +53,8 @@ std::optional<Batch> batch_form(const Program& program) {
   return batch;
 }
 
-// One pack waits for its own last result. Beyond most_held_masses everything goes through memory.
+// A single pack is bound by latency. With more than most_held_masses everything goes through
+// memory.
 Work work(const Program& program, const Batch&, const Workload& load) {
   const LinkCount links = links_of(program);
   const double others = links.bent + links.others;

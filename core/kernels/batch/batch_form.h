@@ -1,4 +1,4 @@
-// core/kernels: whether a Program is a small body for many voices, and its tables.
+// core/kernels: decides whether a Program is a small body for many voices, and makes its tables.
 #pragma once
 
 #include <optional>
@@ -8,13 +8,14 @@
 
 namespace ressort::kernels {
 
-inline constexpr std::uint32_t most_batch_masses = 16;  // more do not fit beside the voices
+// Larger bodies do not fit into the cache together with their voices.
+inline constexpr std::uint32_t most_batch_masses = 16;
 
-// Nothing where nothing moves, or where it has more than most_batch_masses masses, or points or
-// force outputs. O(links). [any thread but audio]
+// Empty if nothing moves, or if the Program has more than most_batch_masses masses, points or force
+// outputs. O(links). [any thread but audio]
 std::optional<Batch> batch_form(const Program& program);
 
-// What the registry's row of it asks, of one voice in bytes.
+// Functions for the registry's row; memory is per voice, in bytes.
 Work work(const Program& program, const Batch& form, const Workload& load);
 std::string description(const Program& program, const Batch& form);
 std::uint64_t voice_bytes(const Program& program, const Batch& form, std::uint64_t number_bytes);

@@ -1,4 +1,4 @@
-// The packs of the batch kernel, and what is done to all of them in turn. A part of *_step.cpp,
+// The packs of the batch kernel and the operations on all of them in turn. Included by *_step.cpp,
 // which are compiled for each instruction set.
 #pragma once
 
@@ -17,13 +17,13 @@ struct Node {
   V force;
 };
 
-// A law that a kernel may keep as numbers that follow from its arguments.
+// A law that can be stored as numbers derived from its arguments.
 template <class ForceLaw, class V>
 concept Kept = requires(const ForceLaw& law, V* row) {
   law.keep(row);
 };
 
-// The law of a link's slots.
+// Returns the law in a link's slots.
 template <class V, class Type>
 [[gnu::always_inline]] inline auto law_in(const V* slot) {
   using ForceLaw = typename Type::template With<V>;
@@ -37,10 +37,10 @@ template <class V, class Type>
 template <class V>
 constexpr std::size_t lanes_of = sizeof(V) / sizeof(Scalar<V>);
 
-// The packs, for what is done to each of them in turn.
+// A range of packs that take each operation in turn.
 template <class V>
 struct Packs {
-  // Of `all` in each row, those in which so many lanes play.
+  // Of the `all` packs in each row, selects those with playing lanes.
   Packs(const BatchTable& table, void* memory, std::size_t lanes)
       : all(table.packs),
         count(std::min(all, lanes / lanes_of<V> + (lanes % lanes_of<V> != 0 ? 1 : 0))),
@@ -52,7 +52,7 @@ struct Packs {
     return reinterpret_cast<Node<V>*>(cells + pack * stride);
   }
 
-  // So many of them from one on.
+  // Returns a subrange.
   Packs some(std::size_t first, std::size_t so_many) const {
     Packs packs = *this;
     packs.count = so_many;
@@ -68,7 +68,7 @@ struct Packs {
   V* slots;
 };
 
-// Where a block is in the rows of all voices.
+// Position of a block in the input and output rows of all voices.
 template <class V>
 struct Rows {
   using T = Scalar<V>;
@@ -94,7 +94,7 @@ struct Rows {
     velocity += in;
     outputs += out;
   }
-  // Of an input, at its first pack.
+  // Reads an input, starting at its first pack.
   [[gnu::always_inline]] V take(const T* first, std::size_t pack) const {
     return is_common ? *first - V{} : load<V>(first + pack * lanes_of<V>);
   }
@@ -103,12 +103,12 @@ struct Rows {
   const T* velocity;
   V* outputs;
   bool is_common;
-  std::size_t input;  // numbers of each
+  std::size_t input;  // Numbers per sample of an input and an output.
   std::size_t in;
   std::size_t out;
 };
 
-// Returns whether any coefficient moved.
+// Advances the ramps; returns whether any coefficient moved.
 template <class T>
 bool move_coefficients(const Program& program, Ramps<T>& ramps, const T*& audio) {
   const bool moves = ramps.frames > 0 || !program.audio_coefficients.empty();
@@ -121,7 +121,7 @@ bool move_coefficients(const Program& program, Ramps<T>& ramps, const T*& audio)
   return moves;
 }
 
-// Copies what the coefficients are now, and what of the laws follows from them alone.
+// Copies the current coefficients to the slots, and computes the numbers derived from them.
 template <class V>
 void fill_slots(const BatchTable& table, const V* coefficients, const Packs<V>& packs) {
   for (const BatchTable::Copy copy : table.copies) {
@@ -178,7 +178,7 @@ void give_positions(const Program& program, const Packs<V>& packs, V* outputs) {
   }
 }
 
-// Adds what a link exerts to the masses' forces.
+// Adds a link's force to its masses.
 template <class V, class Type>
 [[gnu::always_inline]] inline void link(const Packs<V>& packs, const V* slot, std::uint32_t a,
                                         std::uint32_t b, std::uint32_t masses) {

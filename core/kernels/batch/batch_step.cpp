@@ -7,7 +7,7 @@
 namespace ressort::kernels::RESSORT_ISA {
 namespace {
 
-// Calls `use` with 0..N-1 as constants: what they are indices of stays in registers.
+// Calls `use` with the constants 0 to N-1, so that the compiler keeps indexed values in registers.
 template <std::uint32_t N, std::uint32_t I = 0, class Use>
 [[gnu::always_inline]] inline void each(Use&& use) {
   if constexpr (I < N) {
@@ -16,9 +16,9 @@ template <std::uint32_t N, std::uint32_t I = 0, class Use>
   }
 }
 
-// --- links that are not plain --------------------------------------------------------------------
+// --- passive links -------------------------------------------------------------------------------
 
-// Those of one pack.
+// The passive links of one pack.
 template <class V>
 struct Passive {
   CoefficientView<V> coefficients() const { return all; }
@@ -48,7 +48,7 @@ struct Passive {
   }
 
   Node<V>* nodes;
-  CoefficientView<V> all;  // of the pack; the next is as many further as there are packs
+  CoefficientView<V> all;  // Coefficients of the pack; the next coefficient is `packs` further.
   const std::uint32_t* inverse_mass;
   std::uint32_t masses;
   V is_awake;
@@ -104,12 +104,13 @@ class PassiveLinks {
 
 // --- masses in registers -------------------------------------------------------------------------
 
-// A sample's step in two halves: the springs exert their forces, and the masses move by them. In a
-// block the second half of one sample and the first of the one before are taken together, so that
-// the forces never leave the registers; only those of a block's last sample wait for the next.
+// A sample's step has two halves: the springs exert their forces, and the forces move the masses
+// (symplectic Euler). Within a block, the second half of one sample and the first half of the next
+// are fused, so that forces never leave the registers. Only those of a block's last sample are
+// stored.
 enum class Half { move, exert, exert_and_move };
 
-// What is not a spring. However many masses are held, this is one function.
+// Exerts all links that are not springs in registers. One function for any number of masses.
 template <class V>
 [[gnu::noinline]] void exert_links(const Batch& batch, const BatchTable& table,
                                    const Packs<V>& packs) {
@@ -124,10 +125,11 @@ template <class V>
   }
 }
 
-// Of a row a few packs are read at a time, which the processor does not foresee.
+// Prefetch distance in packs: only a few packs of a row are read at a time, which the hardware
+// prefetcher does not predict.
 constexpr std::size_t rows_ahead = 12;
 
-struct SpringsAlone {};  // and no other link
+struct SpringsAlone {};  // Stands for: no other links.
 template <Law law>
 using TypeOf = std::tuple_element_t<static_cast<std::size_t>(law), Laws>;
 
@@ -156,8 +158,8 @@ class Holder {
     pass<Half::exert_and_move>(rows);
   }
 
-  // All of `frames` of so many packs, which stay in registers: of masses that springs touch, and
-  // either links of one type or one force input each.
+  // Steps P packs for all `frames` samples without leaving the registers. The masses are joined by
+  // springs, and have either links of one type or one force input each.
   template <std::uint32_t P, class Type>
   [[gnu::always_inline]] void stay(Rows<V> rows, std::size_t frames) const {
     V x[P][N];
@@ -208,7 +210,7 @@ class Holder {
   }
 
  private:
-  static constexpr std::uint32_t pairs = N;  // slots
+  static constexpr std::uint32_t pairs = N;  // Slots.
   static constexpr std::uint32_t anchors = pairs + N * (N - 1);
   static constexpr std::uint32_t pulls = anchors + 2 * N;
 
@@ -260,7 +262,7 @@ class Holder {
     }
   }
 
-  // Links of one type, to masses that are not in memory.
+  // Exerts the links of one type on masses in registers.
   template <class Type>
   [[gnu::always_inline]] void exert_all(const Node<V>* nodes, const V* slot, const V (&x)[N],
                                         const V (&v)[N], V (&f)[N]) const {
@@ -288,7 +290,7 @@ class Holder {
     }
   }
 
-  // Among three masses the springs that there are not are computed too, from zeros.
+  // For three masses, missing springs are computed with coefficients of 0, which avoids branches.
   [[gnu::always_inline]] void exert_springs(const Node<V>* nodes, const V* slot,
                                             std::uint32_t anchored, std::uint32_t linked,
                                             const V (&x)[N], const V (&v)[N], V (&f)[N]) const {
@@ -312,7 +314,7 @@ class Holder {
     });
   }
 
-  // The force inputs that are not the first on their mass.
+  // Adds the second and later force inputs of a mass.
   void push_again(const Rows<V>& rows) const {
     for (std::size_t i = 0; i < program_.inputs.size() && (table_.touched & table_.pushed) != 0;
          ++i) {
@@ -331,7 +333,7 @@ class Holder {
   std::size_t pusher_[N];
 };
 
-// Two packs hide each other's latency, and what they need fits into 32 registers.
+// Two packs hide each other's latency, and their data fits into 32 registers.
 template <class V, std::uint32_t N, bool is_alike, class Type>
 void hold_in_registers(const Program& program, const Batch& batch, const BatchTable& table,
                        const Packs<V>& packs, const Rows<V>& rows, std::size_t frames) {
@@ -355,7 +357,8 @@ void hold_in_registers(const Program& program, const Batch& batch, const BatchTa
   }
 }
 
-// The same if its links are none, or of a law that such a body is usually touched by; whether so.
+// Does the same if there are no other links, or only links of one common law; returns whether it
+// did.
 template <class V, std::uint32_t N, bool is_alike>
 bool could_hold_in_registers(const Program& program, const Batch& batch, const BatchTable& table,
                              const Packs<V>& packs, const Rows<V>& rows, std::size_t frames) {
@@ -481,7 +484,7 @@ void step_in_memory(const Program& program, const Batch&, const BatchTable& tabl
   }
 }
 
-// --- which ---------------------------------------------------------------------------------------
+// --- dispatch ------------------------------------------------------------------------------------
 
 template <class V, bool is_alike>
 BatchStep<Scalar<V>> hold_for(std::uint32_t held) {

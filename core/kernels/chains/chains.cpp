@@ -7,7 +7,7 @@
 namespace ressort::kernels {
 namespace {
 
-// Puts nodes in their places, and everything that names nodes into tables that name places.
+// Assigns places to nodes and translates the tables from nodes to places.
 class TablesMaker {
  public:
   TablesMaker(const Program& program, const Chains& form, FoldedBy by)
@@ -45,7 +45,7 @@ class TablesMaker {
  private:
   std::uint32_t next_force() { return static_cast<std::uint32_t>(tables_.force_count++); }
 
-  // Position `lane` of a pair.
+  // Returns the place of the position in this lane of a pair.
   ChainPlace place_of(std::uint32_t pair, std::uint32_t lane) const {
     return 2 * lanes_ * pair + lane;
   }
@@ -102,7 +102,7 @@ class TablesMaker {
     return {place_[node] - lane, lane * lanes_, site_mass_[node]};
   }
 
-  // Masses of chains that something else acts on, or whose force is listened to.
+  // Finds the masses of chains that have other links, or whose force is an output.
   void find_sites() {
     const auto touch = [&](std::uint32_t node) {
       if (site_mass_[node] != nowhere && force_[node] == nowhere) {
@@ -140,7 +140,7 @@ class TablesMaker {
     }
   }
 
-  // What acts on a node that does not move is of interest only to an output.
+  // The force on a fixed node matters only to an output.
   void find_listened() {
     for (const OutputSlot& output : program_.outputs) {
       if (output.is_force && force_[output.node] == nowhere) {
@@ -150,8 +150,8 @@ class TablesMaker {
     }
   }
 
-  // Where nobody reads it each end of a link has a force of its own, so that no sum waits for
-  // another.
+  // If nobody reads the sum, each end of a link has a force slot of its own, so that no addition
+  // waits for another.
   std::uint32_t force_at(std::uint32_t node) {
     return force_[node] == nowhere ? next_force() : force_[node];
   }
@@ -220,7 +220,7 @@ class TablesMaker {
     }
   }
 
-  // The springs of chains at a node.
+  // Adds the springs of chains at a node.
   void add_probes(std::uint32_t node) {
     for (const Chain& chain : form_.chains) {
       const std::uint32_t* const nodes = form_.nodes.data() + chain.first;
@@ -248,7 +248,7 @@ class TablesMaker {
     }
   }
 
-  // What the one chain's step needs that stays in registers.
+  // Prepares the step of a single chain that stays in registers.
   void shorten() {
     for (std::uint32_t i = 0; i < tables_.sites.size(); ++i) {
       const ChainSite& site = tables_.sites[i];
@@ -280,7 +280,7 @@ class TablesMaker {
   std::uint32_t short_packs_;
   ChainsTables tables_;
   std::vector<ChainPlace>& place_;
-  std::vector<std::uint32_t> site_mass_;  // [node] coefficient, if it is in a chain
+  std::vector<std::uint32_t> site_mass_;  // [node] Coefficient, if the node is in a chain.
   std::vector<std::uint32_t> force_;      // [node]
 };
 
@@ -334,7 +334,7 @@ ChainsKernel<T>::ChainsKernel(const Program& program, const Chains& form, Chains
 
 template <class T>
 void ChainsKernel<T>::clear(std::size_t) {
-  // Empty places of packs too, should they be no numbers.
+  // Clears empty places of packs, too, in case they hold NaN.
   for (auto* zero : {&this->nodes_.numbers, &held_, &force_, &tap_pull_}) {
     std::fill(zero->begin(), zero->end(), T(0));
   }

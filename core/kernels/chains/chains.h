@@ -1,10 +1,10 @@
-// core/kernels: strings. The masses of a chain lie in lanes so that each one's neighbours are in
-// the packs before and after its own, and one pass over memory does it all:
-//   y = K x + Z v,  v += (y[i-1] - 2 y[i] + y[i+1])/M,  x += v
-// A stiff one has a second y, from two masses before and behind.
-// One chain that is short enough stays in registers for a block of samples.
-// All other links and masses are stepped number by number; what they do to a chain's mass is added
-// after the pass, to v and to x, which is the same as if it had been in the sum.
+// core/kernels: strings and chains. The masses of a chain are folded into lanes, such that each
+// mass's neighbours lie in the packs before and after its own. One pass over memory then computes
+//  y = K x + Z v,  v += (y[i-1] - 2 y[i] + y[i+1])/M,  x += v
+// (symplectic Euler, the 1-D wave equation). A stiff chain has a second y over the masses two
+// places away. One chain that is short enough stays in registers for a block of samples. All other
+// links and masses are stepped one by one. Their forces on a chain's mass are added to v and x
+// after the pass, which is equivalent to adding them to the sum.
 #pragma once
 
 #include <utility>
@@ -13,8 +13,8 @@
 
 namespace ressort::kernels {
 
-// Where a node's position is among the numbers of ChainsState::bodies; its velocity is one pack
-// further. Bodies are pairs of packs, positions and velocities.
+// Index of a node's position in ChainsState::bodies; its velocity is one pack further. Bodies are
+// pairs of packs: positions and velocities.
 using ChainPlace = std::uint32_t;
 inline constexpr std::uint32_t nowhere = 0xffffffffu;
 
@@ -22,69 +22,70 @@ inline constexpr std::uint32_t nowhere = 0xffffffffu;
 struct FoldedChain {
   ChainPlace first = 0;
   std::uint32_t packs = 0;
-  std::uint32_t last = 0;     // the pair that its last mass is in
-  ChainPlace left = nowhere;  // of what holds the ends, nowhere: free
+  std::uint32_t last = 0;     // Pair of its last mass.
+  ChainPlace left = nowhere;  // Place of the node that holds the end; nowhere: free.
   ChainPlace right = nowhere;
   bool is_stiff = false;
-  std::array<ChainPlace, 2> second_left{nowhere, nowhere};  // as in Chain
+  std::array<ChainPlace, 2> second_left{nowhere, nowhere};  // Same meaning as in Chain.
   std::array<ChainPlace, 2> second_right{nowhere, nowhere};
-  std::array<std::uint32_t, 4> springs{};  // coefficients: K and Z, those of the second springs
+  // Coefficients K and Z, then those of the second springs.
+  std::array<std::uint32_t, 4> springs{};
   MassRun mass;
 };
 
-// A mass of a chain that more than its chain acts on.
+// A mass of a chain with other links or inputs.
 struct ChainSite {
   ChainPlace pair = 0;
-  std::uint32_t unit = 0;          // of ChainsState::units: its lane's pack
-  std::uint32_t inverse_mass = 0;  // coefficient
+  std::uint32_t unit = 0;          // Pack of ChainsState::units for its lane.
+  std::uint32_t inverse_mass = 0;  // Coefficient.
 };
 
-// The same in a chain that stays in registers.
+// The same for a chain in registers.
 struct ShortSite {
   std::uint32_t pack = nowhere;
   std::uint32_t unit = 0;
-  std::uint32_t force = 0;  // of ChainsState::force
+  std::uint32_t force = 0;  // Index into ChainsState::force.
 };
 
 struct LoosePlaces {
-  MassRun mass;             // coefficients
-  std::uint32_t count = 0;  // of the next of ChainsTables::loose
+  MassRun mass;             // Coefficients.
+  std::uint32_t count = 0;  // Length of the run in ChainsTables::loose.
 };
 
 struct PlacedEnds {
   ChainPlace a = 0;
   ChainPlace b = 0;
-  std::uint32_t force_a = 0;  // of ChainsState::force
+  std::uint32_t force_a = 0;  // Index into ChainsState::force.
   std::uint32_t force_b = 0;
 };
 
 struct PlacedInput {
   ChainPlace place = 0;
   std::uint32_t force = 0;
-  std::uint32_t index = 0;  // of Program::inputs
+  std::uint32_t index = 0;  // Index into Program::inputs.
 };
 
-// A spring of a chain, seen from a node whose force somebody listens to.
+// A spring of a chain at a node whose force is an output.
 struct Probe {
   ChainPlace neighbour = 0;
-  std::uint32_t stiffness = 0;  // coefficients
+  std::uint32_t stiffness = 0;  // Coefficients.
   std::uint32_t damping = 0;
 };
 
 struct HeardPosition {
   ChainPlace place = 0;
-  std::uint32_t index = 0;  // of Program::outputs
+  std::uint32_t index = 0;  // Index into Program::outputs.
 };
 
 struct HeardForce {
   ChainPlace place = 0;
   std::uint32_t index = 0;
   std::uint32_t force = 0;
-  std::uint32_t first = 0;  // of ChainsTables::probes
+  std::uint32_t first = 0;  // First of ChainsTables::probes.
   std::uint32_t count = 0;
 };
 
-// A node under a point: what acts on it is added to a force, or to a chain's mass itself.
+// A node under a point: its forces go to a force slot, or directly to a chain's mass.
 struct PlacedNode {
   ChainPlace place = 0;
   std::uint32_t force = nowhere;
@@ -97,55 +98,57 @@ struct PlacedTap {
   std::uint32_t force = 0;
 };
 
-// A node, for links whose force is not the plain one.
+// A node, for passive links.
 struct PassiveEnd {
   ChainPlace place = 0;
-  std::uint32_t unit = nowhere;          // if it is in a chain, as ChainSite says
-  std::uint32_t inverse_mass = nowhere;  // coefficient, if it moves
+  std::uint32_t unit = nowhere;          // Same meaning as in ChainSite, if the node is in a chain.
+  std::uint32_t inverse_mass = nowhere;  // Coefficient, if the node moves.
 };
 
-// What a kernel makes of a Program and its lanes, once.
+// Tables derived once from a Program and the number of lanes.
 struct ChainsTables {
   std::vector<ChainPlace> place;  // [node]
   std::vector<FoldedChain> chains;
-  std::vector<ChainSite> sites;  // [force], the first of them
+  std::vector<ChainSite> sites;  // [force] The first force slots.
   std::vector<LoosePlaces> loose_runs;
   std::vector<ChainPlace> loose;  // [force - sites]
   std::vector<LinkRun> link_runs;
   std::vector<PlacedEnds> ends;         // [link]
-  std::vector<std::uint32_t> listened;  // forces on what does not move, for outputs
+  std::vector<std::uint32_t> listened;  // Force slots of fixed nodes, for outputs.
   std::vector<PlacedInput> positions;
   std::vector<PlacedInput> forces;
   std::vector<HeardPosition> heard_positions;
   std::vector<HeardForce> heard_forces;
   std::vector<Probe> probes;
   std::vector<PlacedTap> taps;
-  std::vector<PlacedNode> tap_nodes;     // those of the Program
-  std::vector<PassiveEnd> passive_ends;  // [node], if there are passive links
-  std::size_t force_count = 0;           // sites, loose masses, listened, points, those never read
+  std::vector<PlacedNode> tap_nodes;     // Parallel to those of the Program.
+  std::vector<PassiveEnd> passive_ends;  // [node] Only with passive links.
+  // Slots of sites, loose masses, listened nodes and points, then those that are never read.
+  std::size_t force_count = 0;
   std::size_t pairs = 0;
-  // If there is one chain that stays in registers:
-  std::vector<ShortSite> short_sites;  // pack by pack, and one that is in none
-  std::uint32_t short_read = 0;        // its pairs that others read: a bit each
-  ChainPlace short_end = nowhere;      // the empty place next to its last mass, if there is one
+  // Used if one chain stays in registers:
+  std::vector<ShortSite> short_sites;  // Sorted by pack; the last one is in none.
+  std::uint32_t short_read = 0;        // Bit mask of its pairs that others read.
+  ChainPlace short_end = nowhere;      // The empty place after its last mass, if there is one.
 };
 
-// Everything that one step of ChainsKernel touches.
+// All data that one step of ChainsKernel reads and writes.
 template <class T>
 struct ChainsState {
   Ramps<T> ramps;
-  const T* masks;  // [chain][4][lane] 1 or 0: is a mass here, up to the last one's pair; is one
-                   // beyond it; is it the last, in its pair; is it the last but one
-  const T* units;  // [lane][lane] 1 where both are the same
-  T* bodies;       // [pair][position or velocity][lane]
-  T* held;         // [chain][4] the springs that forces of the last sample had: 0 at the start
-  T* force;        // [force] summed by the links, used by the next sample
-  Corners<T>* corners;  // [tap] in this sample
-  T* tap_pull;          // [tap] what the links of this sample do to it, for the next one
+  // [chain][4][lane] 1 or 0: the place holds a mass, in the last mass's pair; the place is beyond
+  // it; the place is the last mass, in its pair; the place is the last mass but one.
+  const T* masks;
+  const T* units;       // [lane][lane] Identity matrix.
+  T* bodies;            // [pair][position or velocity][lane]
+  T* held;              // [chain][4] Spring coefficients of the last sample: 0 at the start.
+  T* force;             // [force] Summed by the links, applied in the next sample.
+  Corners<T>* corners;  // [tap] Of this sample.
+  T* tap_pull;          // [tap] Force of this sample's links, applied in the next one.
   const PassiveTables& passive;
   T* memory;  // [passive link][passive_rows]
-  T* solver;  // PassiveRoom::numbers
-  T* awake;   // 0 in the first sample after set_state(), else 1
+  T* solver;  // Size: PassiveRoom::numbers.
+  T* awake;   // 0 in the first sample after set_state(), else 1.
 };
 
 template <class T>
@@ -155,16 +158,16 @@ using ChainsStep = void (*)(const Program& program, const ChainsTables& tables,
 template <class T>
 struct ChainsLoops {
   ChainsStep<T> step;
-  // The forces that links exert where all is now, added to those that there are.
+  // Adds the links' forces at the current positions.
   void (*pull)(const ChainsTables& tables, ChainsState<T>& state);
 };
 
-// The functions for packs of so many bytes.
+// Returns the functions for packs of this size.
 template <Isa isa, class T>
 ChainsLoops<T> chains_loops(std::size_t bytes);
 
-// How many packs a chain may have that stays in registers, and its step; null where there are too
-// few registers for it.
+// Numbers of packs for which a step in registers exists, and that step; null if the instruction set
+// has too few registers.
 using ShortPacks = std::index_sequence<1, 2, 3, 4, 5, 6, 8, 10, 13>;
 template <Isa isa, class T>
 ChainsStep<T> short_chain_step(std::size_t bytes, std::size_t packs);

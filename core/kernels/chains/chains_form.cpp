@@ -35,7 +35,7 @@ class ChainFinder {
       std::fill_n(can_hold_.begin() + masses.first, masses.count, false);
     }
     for (const TapSlot& tap : program.taps) {
-      can_hold_[tap.node] = false;  // what acts on it does not end there
+      can_hold_[tap.node] = false;  // Its forces act on the nodes around it, too.
     }
     for (const LinkRun& run : program.link_runs) {
       for (std::uint32_t link = run.first; is_spring(run) && link < run.first + run.count; ++link) {
@@ -79,15 +79,15 @@ class ChainFinder {
   }
 
  private:
-  // What one run of springs ties a node to.
+  // The springs of one run at a node.
   struct Near {
     std::uint32_t degree = 0;
-    std::array<std::uint32_t, 2> springs{none, none};  // that may be a chain's
-    std::uint32_t holder = none;                       // a spring to what does not move
+    std::array<std::uint32_t, 2> springs{none, none};  // Springs that may be part of a chain.
+    std::uint32_t holder = none;                       // A spring to a fixed node.
     bool is_seen = false;
   };
 
-  // The chains of one kind of spring, and all that they would make superfluous.
+  // The chains of one kind of spring, and the links that they would replace.
   struct Found {
     std::vector<Chain> chains;
     std::vector<std::uint32_t> nodes;
@@ -125,7 +125,7 @@ class ChainFinder {
         b.springs[b.springs[0] == none ? 0 : 1] = link;
       }
     });
-    // From their ends; what is left then are rings, that may be cut anywhere.
+    // Starts at chain ends. The rest are rings, which may be cut anywhere.
     for (const bool from_end : {true, false}) {
       each_spring([&](std::uint32_t, const Ends& ends) {
         for (const std::uint32_t node : {ends.a, ends.b}) {
@@ -190,7 +190,7 @@ class ChainFinder {
     found.springs.insert(found.springs.end(), springs.begin(), springs.end());
   }
 
-  // What holds a chain's end, by a spring that is then used.
+  // Returns the node that holds a chain's end, and adds its spring to `springs`.
   std::uint32_t held_by(std::uint32_t spring, std::uint32_t node,
                         std::vector<std::uint32_t>& springs) const {
     if (spring == none) {
@@ -200,7 +200,7 @@ class ChainFinder {
     return other(spring, node);
   }
 
-  // Second springs from each mass of a row to the next but one, if there are any everywhere.
+  // Adds the second springs, from each mass of a row to the next but one, if all of them exist.
   void stiffen(const LinkRun& run, const std::vector<std::uint32_t>& row, Chain& chain,
                std::vector<std::uint32_t>& springs) const {
     constexpr int most_tries = 8;
@@ -236,7 +236,7 @@ class ChainFinder {
     }
   }
 
-  // A spring of one run from a node to one that is asked for.
+  // Returns a spring of one run from a node to a node that satisfies the predicate.
   template <class IsAskedFor>
   std::uint32_t spring_at(std::uint32_t node, const LinkRun& run, IsAskedFor&& is_asked_for) const {
     progress_.spend(springs_at_[node].size());
@@ -255,18 +255,18 @@ class ChainFinder {
 
   const Program& program_;
   const Progress& progress_;
-  std::vector<std::uint32_t> mass_run_;                 // [node], none: it does not move
-  std::vector<bool> can_hold_;                          // [node] grounds and position inputs
-  std::vector<const LinkRun*> run_of_;                  // [link] if it is a spring
-  std::vector<std::vector<std::uint32_t>> springs_at_;  // [node] links
+  std::vector<std::uint32_t> mass_run_;  // [node] none: it does not move.
+  std::vector<bool> can_hold_;           // [node] True for grounds and position inputs.
+  std::vector<const LinkRun*> run_of_;   // [link] Set for springs.
+  std::vector<std::vector<std::uint32_t>> springs_at_;  // [node] Links.
   std::vector<Near> near_;                              // [node]
   std::vector<bool> is_chained_;                        // [moving node]
   std::vector<bool> is_used_;                           // [link]
   Chains form_;
 };
 
-// Whether there is one chain whose end a ground holds, and nothing that has to see all of it in
-// each sample.
+// Returns whether the form is a single chain with an end on a ground, and nothing needs to see all
+// of it in each sample.
 bool is_simple(const Program& program, const Chains& form) {
   const Chain& chain = form.chains[0];
   const MassRun& mass = program.mass_runs[chain.mass_run];
@@ -276,7 +276,7 @@ bool is_simple(const Program& program, const Chains& form) {
          std::none_of(program.outputs.begin(), program.outputs.end(), is_force);
 }
 
-// The least number of packs that there is a step for, or 0.
+// Returns the smallest number of packs that has a step in registers, or 0.
 template <std::size_t... counts>
 std::size_t short_packs(std::size_t least, std::size_t most, std::index_sequence<counts...>) {
   std::size_t packs = 0;
@@ -300,7 +300,7 @@ FoldedBy fold_by(const Program& program, const Chains& form, Isa isa, std::size_
     longest = std::max(longest, chain.count);
     shortest_stiff = chain.is_stiff ? std::min(shortest_stiff, chain.count) : shortest_stiff;
   }
-  // In the widest packs where there are registers for all of it.
+  // Uses the widest packs if there are enough registers for the whole chain.
   if (is_simple(program, form)) {
     const std::size_t most = isa == Isa::v4 ? 13 : 8;
     const std::size_t packs = short_packs((longest + whole - 1) / whole, most, ShortPacks{});
@@ -308,9 +308,8 @@ FoldedBy fold_by(const Program& program, const Chains& form, Isa isa, std::size_
       return {whole, packs};
     }
   }
-  // The widest that the longest fills often enough for passes to be worth more than their ends. The
-  // next mass but one of a stiff one is in another pair
-  // than its own.
+  // Uses the widest packs for which the longest chain has enough passes to outweigh the cost at its
+  // ends. In a stiff chain a mass and the next but one must be in different pairs.
   std::size_t lanes = whole;
   while (lanes > 16 / number_bytes && (longest < 3 * lanes || shortest_stiff <= lanes)) {
     lanes /= 2;
@@ -322,7 +321,7 @@ std::optional<Chains> chains_form(const Program& program, const Progress& progre
   const auto is_force = [](const OutputSlot& output) { return output.is_force; };
   if ((!program.taps.empty() || !is_plain(program)) &&
       std::any_of(program.outputs.begin(), program.outputs.end(), is_force)) {
-    return std::nullopt;  // what a point or a passive link does to a node is never summed
+    return std::nullopt;  // The force of a point or a passive link on a node is never summed.
   }
   if (holds_places(program) || has_bodies(program)) {
     return std::nullopt;

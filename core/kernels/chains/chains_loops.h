@@ -1,5 +1,5 @@
-// The loops of the chains' kernel that its ways of stepping a chain share. A part of *_step.cpp,
-// which are compiled for each instruction set.
+// Loops shared by the steps of the chains kernel. Included by *_step.cpp, which are compiled for
+// each instruction set.
 #pragma once
 
 #include <algorithm>
@@ -12,7 +12,8 @@
 namespace ressort::kernels::RESSORT_ISA {
 namespace {
 
-// A vector's numbers, where stores into packs cannot move them as far as the compiler knows.
+// A copy of a vector's pointer and size. The compiler can assume that stores into packs do not
+// change it.
 template <class Row>
 struct Table {
   explicit Table(const std::vector<Row>& rows)
@@ -76,7 +77,7 @@ struct View {
   const T* coefficient;
 };
 
-// The same number in every lane. Not V{} + x, which is not x if x is -0.
+// Returns x in every lane. V{} + x would turn -0 into 0.
 template <class V>
 V all(Scalar<V> x) {
   return x - V{};
@@ -91,18 +92,18 @@ const V& pack_at(const Scalar<V>* numbers) {
   return *reinterpret_cast<const V*>(numbers);
 }
 
-// Lane i is lane i - 1 of y; the first is that of `first`.
+// Returns y shifted by one lane upwards; lane 0 is that of `first`.
 template <class V, std::size_t... I>
 V up(V first, V y, std::index_sequence<I...>) {
   return __builtin_shufflevector(first, y, 0, (sizeof...(I) + 1 + I)...);
 }
-// Lane i is lane i + 1 of y; the last is the first of `last`.
+// Returns y shifted by one lane downwards; the last lane is lane 0 of `last`.
 template <class V, std::size_t... I>
 V down(V y, V last, std::index_sequence<I...>) {
   return __builtin_shufflevector(y, last, (I + 1)..., sizeof...(I) + 1);
 }
 
-// What holds an end of a chain by springs of K and Z; a free end is next to one that moves with it.
+// Returns K x + Z v of the node that holds an end; a free end has a neighbour that moves with it.
 template <class S>
 typename S::V tension_of(ChainPlace place, const typename S::Number* held, typename S::V itself,
                          const S& s) {
@@ -132,7 +133,7 @@ void step_loose(S& s) {
   }
 }
 
-// The distances between which a law gives anything at all.
+// The range of distances in which a law has a force.
 template <class T>
 struct Reach {
   T low;
@@ -152,9 +153,9 @@ Reach<typename S::Number> reach_of(const LinkRun& run, const S& s) {
   }
 }
 
-// In the first lane of a pack: laws have no branches there that could be guessed wrongly. Whether
-// bodies are near enough to touch is guessed, as it seldom changes: the next sample then waits for
-// no force.
+// Adds the forces of links in the first lane of a pack, without branches inside a law. One branch
+// per link tests whether the bodies are near enough to touch. It is predicted well, because contact
+// seldom changes, and the next sample then does not wait for a force.
 template <class S, class ForceLaw>
 void add_forces(const LinkRun& run, S& s, const ForceLaw& law) {
   using P = Pack<typename S::Number, 16>;

@@ -1,11 +1,11 @@
-// The loop of the chains' kernel for one short chain: its masses stay in registers for a block of
-// samples, and what others read of it is written to memory in each.
+// The step for a single short chain: its masses stay in registers for a block of samples. Values
+// that others read are written to memory in each sample.
 #include "core/kernels/chains/chains_loops.h"
 
 namespace ressort::kernels::RESSORT_ISA {
 namespace {
 
-// With each index as a constant: what is indexed by it then stays in registers.
+// Calls `use` with each index as a constant, so that indexed values stay in registers.
 template <std::size_t count, class Use>
 [[gnu::always_inline]] inline void each_below(Use&& use) {
   [&]<std::size_t... I>(std::index_sequence<I...>) __attribute__((always_inline)) {
@@ -30,7 +30,7 @@ void weigh(ShortBody<typename S::V, packs>& body, const FoldedChain& chain, cons
   });
 }
 
-// By its springs, and by what else acts on its sites.
+// Moves the masses by the chain's springs and the forces on its sites.
 template <bool has_sites, class S, std::size_t packs>
 void move_short_chain(ShortBody<typename S::V, packs>& body, const FoldedChain& chain,
                       const ShortSite* site, const S& s) {
@@ -72,7 +72,7 @@ bool are_springs_all_that_ramps(const FoldedChain& chain, const Ramps<T>& ramps)
   return are_all;
 }
 
-// One coefficient, as advance() moves it.
+// One coefficient that moves as in advance().
 template <class T>
 struct Ramp {
   Ramp(const Ramps<T>& ramps, std::uint32_t c) : value(ramps.value[c]), target(value) {
@@ -93,8 +93,8 @@ struct Ramp {
   T increment = 0;
 };
 
-// A block of a chain beside which there is nothing but what holds its ends. So little is to be
-// looked at in each sample that all of it is in registers, which takes a quarter off.
+// Steps a block of a chain with no other links than those that hold its ends. All of its data is in
+// registers, which saves a quarter of the time.
 template <class S, std::size_t packs, class T>
 [[gnu::flatten]] void step_alone(const Program& program, const FoldedChain& chain,
                                  std::uint32_t read, ShortBody<typename S::V, packs>& body,
@@ -134,7 +134,7 @@ template <class S, std::size_t packs, class T>
   body = here;
 }
 
-// Flat: a call would put all that is in registers into memory.
+// Flattened, because a call would spill the registers to memory.
 template <class S, std::size_t packs, class T>
 [[gnu::flatten]] void step_short(const Program& program, const ChainsTables& tables,
                                  ChainsState<T>& state, const Block<T>& block) {
@@ -157,7 +157,7 @@ template <class S, std::size_t packs, class T>
   const bool has_sites = sites->pack != nowhere;
   const bool has_others = s.loose_runs.first != s.loose_runs.last ||
                           s.link_runs.first != s.link_runs.last || s.forces.first != s.forces.last;
-  // What holds its end stands in the first empty place, too: it is next to the last mass.
+  // The first empty place after the last mass repeats the node that holds the end.
   if (tables.short_end != nowhere) {
     s.bodies[tables.short_end] = s.bodies[chain.right];
   }

@@ -1,11 +1,12 @@
-// The loops of the chains' kernel in memory, compiled for each instruction set.
+// The steps of the chains kernel in memory, compiled for each instruction set.
 #include "core/kernels/chains/chains_loops.h"
 #include "core/kernels/passive/passive.h"
 
 namespace ressort::kernels::RESSORT_ISA {
 namespace {
 
-// What the springs make of one chain's masses; `pull` is what acts on one besides.
+// Moves one chain's masses by their springs (symplectic Euler); `pull` adds the masses' own springs
+// and gravity.
 template <class S, class Pull>
 void move_chain(const FoldedChain& chain, const typename S::Number* masks,
                 const typename S::Number* held, S& s, Pull&& pull) {
@@ -40,7 +41,7 @@ void move_chain(const FoldedChain& chain, const typename S::Number* masks,
       move(pair, tension(pair + 2), inverse_mass);
     }
   };
-  // Lanes behind the last mass are empty and stay so: their mass is infinite.
+  // Lanes after the last mass stay empty: their inverse mass is 0.
   const V inverse_mass = all<V>(s.coefficient[chain.mass.inverse_mass]);
   const V within = inverse_mass * pack_at<V>(masks);
   const V beyond = inverse_mass * pack_at<V>(masks + S::lanes);
@@ -54,7 +55,7 @@ void move_chain(const FoldedChain& chain, const typename S::Number* masks,
   }
 }
 
-// The same for a stiff one. Not inlined, with a copy of the view: the one of everything else then
+// Does the same for a stiff chain. Not inlined, with a copy of the view, so that the caller's view
 // stays in registers, where stores into packs cannot change it.
 template <class S, class Pull>
 [[gnu::noinline]] void move_stiff_chain(const FoldedChain& chain, const typename S::Number* masks,
@@ -159,7 +160,8 @@ void step_chains(S& s) {
   }
 }
 
-// In whole packs: the next pass could not load a pack soon of which a part has just been written.
+// Writes a whole pack: a partial store would delay the next pass, which loads the pack (store
+// forwarding).
 template <class S>
 void push(const ChainSite& site, typename S::Number force, S& s) {
   using V = typename S::V;
@@ -182,7 +184,7 @@ void push_sites(S& s) {
   }
 }
 
-// What acts on a point goes to the nodes around it.
+// Distributes the force on a point to the nodes around it.
 template <class S, class T>
 void spread(const Corners<T>& corners, T force, S s) {
   each_corner(corners, [&](std::uint32_t corner, T weight) {
@@ -195,7 +197,7 @@ void spread(const Corners<T>& corners, T force, S s) {
   });
 }
 
-// Links pull where a point was in the last sample, this sample's inputs where it is in this one.
+// Links act where a point was in the last sample, inputs where it is in this one.
 template <class S>
 void push_taps(S& s) {
   auto* corners = s.corners;
@@ -232,7 +234,7 @@ void pull_taps(S& s) {
   }
 }
 
-// What acts in the next sample.
+// Computes the forces that act in the next sample.
 template <class S>
 void pull(S& s) {
   step_links(s);
@@ -245,7 +247,7 @@ void pull(S& s) {
   }
 }
 
-// Links that are not plain, number by number.
+// Passive links, one by one.
 template <class S>
 struct Passive {
   using T = typename S::Number;
@@ -269,7 +271,7 @@ struct Passive {
     const std::uint32_t mass = tables.passive_ends[end].inverse_mass;
     return mass == nowhere ? T(0) : s.coefficient[mass];
   }
-  // In whole packs where a chain is, as push() above.
+  // Writes whole packs in a chain, as push() does.
   void shift(std::uint32_t index, T way) {
     const PassiveEnd& end = tables.passive_ends[index];
     if (end.unit == nowhere) {
@@ -288,7 +290,7 @@ struct Passive {
   S s;
 };
 
-// With a view of their own, as they cost step() registers.
+// Uses a view of its own, because it would cost step() registers.
 template <class S, class T>
 [[gnu::noinline]] void remember_links(const ChainsTables& tables, ChainsState<T>& state) {
   remember(state.passive, state.memory, Passive<S>{tables, state, S(tables, state)});
@@ -353,8 +355,8 @@ void step(const Program& program, const ChainsTables& tables, ChainsState<T>& st
   }
 }
 
-// Flat, so that for step() the loops over links remain the only ones of their kind and are put in
-// their place.
+// Flattened, so that the link loops in step() are the only instances of their kind and get inlined
+// there.
 template <class S, class T>
 [[gnu::flatten]] void pull_alone(const ChainsTables& tables, ChainsState<T>& state) {
   S s(tables, state);

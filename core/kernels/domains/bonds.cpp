@@ -10,7 +10,7 @@
 namespace ressort::kernels {
 namespace {
 
-// Calls use(place in tap_nodes) for the nodes around a point, in single precision and in double.
+// Calls use(place in tap_nodes) for the nodes around a point, in single and in double precision.
 template <class Use>
 void each_corner_of(const Program& program, const TapSlot& tap, Use&& use) {
   const auto value = [&](std::uint32_t c) {
@@ -22,7 +22,7 @@ void each_corner_of(const Program& program, const TapSlot& tap, Use&& use) {
               add);
 }
 
-// The nodes around every point, in single precision or in double; nothing where one may wander.
+// Returns the nodes around every point, in single or double precision; empty if a point may move.
 std::optional<std::vector<std::vector<std::uint32_t>>> corners_of(const Program& program) {
   std::vector<bool> wanders(program.coefficients.size(), false);
   for (const auto& coefficients : program.depending) {
@@ -50,7 +50,7 @@ std::optional<Bonds> Bonds::of(const Program& program) {
   return corners ? std::optional(Bonds(program, *std::move(corners))) : std::nullopt;
 }
 
-// Calls use(a, b), in either order, for all who feel each other after one sample.
+// Calls use(a, b), in either order, for all nodes that influence each other within one sample.
 template <class Use>
 void Bonds::each_bond(Use&& use) const {
   const auto join = [&](std::uint32_t a, std::uint32_t b) {
@@ -64,7 +64,8 @@ void Bonds::each_bond(Use&& use) const {
   }
 }
 
-// Calls each_pair(add) twice, which calls add(node, item) for all items, in the same order.
+// Builds the lists in two passes. Each pass calls each_pair(add), which calls add(node, item) for
+// all items, in the same order.
 template <class EachPair>
 Bonds::Lists Bonds::lists_of(EachPair&& each_pair) const {
   Lists lists{.first = std::vector<std::size_t>(binds_.size() + 1, 0), .items = {}};
@@ -83,7 +84,7 @@ Bonds::Bonds(const Program& program, std::vector<std::vector<std::uint32_t>> cor
       binds_(program.position.size(), false),
       is_tied_(program.position.size(), false) {
   std::fill_n(binds_.begin(), program.moving, true);
-  // The force on what does not move is the sum of all its links, wherever they lead.
+  // The force on a fixed node is the sum over all its links, wherever they lead.
   for (const OutputSlot& output : program.outputs) {
     binds_[output.node] = binds_[output.node] || output.is_force;
   }

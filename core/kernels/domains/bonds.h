@@ -1,4 +1,4 @@
-// core/kernels: who feels whom in a Program, from one sample to the next.
+// core/kernels: the dependencies between the nodes of a Program from one sample to the next.
 #pragma once
 
 #include <cstdint>
@@ -10,7 +10,7 @@
 
 namespace ressort::kernels {
 
-// The nodes around some, those that are so many links away one after the other: level by level from
+// The nodes around some others, sorted by their distance in links: those of a level are
 // begin[level] to begin[level + 1].
 struct Surroundings {
   std::vector<std::uint32_t> nodes;
@@ -19,27 +19,28 @@ struct Surroundings {
   std::size_t count_at(std::size_t level) const { return begin[level + 1] - begin[level]; }
 };
 
-// What moves, what is heard by its force, and points on macros bind: whoever steps them needs what
-// they are tied to. Of everything else there may be one in every shard. The Program outlives it.
-// [any thread but audio]
+// Moving nodes, nodes whose force is an output, and points on macros are binding: the shard that
+// steps them needs their neighbours. All other nodes may be duplicated in every shard. The Program
+// must outlive it. [any thread but audio]
 class Bonds {
  public:
-  // Nothing where a point wanders over a macro, as it may be anywhere. O(nodes + links).
+  // Empty if a point moves over a macro, because it may be anywhere. O(nodes + links).
   static std::optional<Bonds> of(const Program& program);
 
   const Program& program() const { return program_; }
   std::size_t node_count() const { return binds_.size(); }
   bool binds(std::uint32_t node) const { return binds_[node]; }
-  bool is_tied(std::uint32_t node) const { return is_tied_[node]; }  // to one that binds
+  // Whether it has a binding neighbour.
+  bool is_tied(std::uint32_t node) const { return is_tied_[node]; }
   bool is_point(std::uint32_t node) const { return node >= first_point_; }
-  // The nodes around it, in single precision or in double.
+  // Returns the nodes around the point, in single or double precision.
   const std::vector<std::uint32_t>& corners(std::uint32_t point) const {
     return corners_[point - first_point_];
   }
-  // From first to end in tap_nodes.
+  // Returns the range of tap_nodes around the point.
   std::pair<std::uint32_t, std::uint32_t> nodes_around(const TapSlot& tap) const;
 
-  // Calls use(node) for who acts where a node is: itself, the nodes around a point, or nobody.
+  // Calls use(node) for the nodes that act at a node: itself, the nodes around a point, or none.
   template <class Use>
   void each_behind(std::uint32_t node, Use&& use) const {
     if (!is_point(node)) {
@@ -57,22 +58,23 @@ class Bonds {
     neighbours_.each(node, use);
   }
 
-  // Calls use(link) for the links that it is an end of.
+  // Calls use(link) for the links at the node.
   template <class Use>
   void each_link(std::uint32_t node, Use&& use) const {
     links_.each(node, use);
   }
 
-  // Of what binds and is no point: as it is written, or breadth first from the first one.
+  // Return the binding nodes that are not points: as numbered, or breadth first from the first.
   std::vector<std::uint32_t> as_written() const;
   std::vector<std::uint32_t> breadth_first() const;
 
-  // What is so many links away from `own` or less. `is_seen`: [node] false, before and after.
+  // Returns the nodes at most `levels` links away from `own`. `is_seen`: [node] false before and
+  // after.
   Surroundings surroundings(const std::vector<std::uint32_t>& own, std::uint32_t levels,
                             std::vector<bool>& is_seen) const;
 
  private:
-  // A list for every node, one after the other.
+  // One list per node, stored consecutively.
   struct Lists {
     template <class Use>
     void each(std::uint32_t node, Use&& use) const {
@@ -80,7 +82,7 @@ class Bonds {
         use(items[i]);
       }
     }
-    std::vector<std::size_t> first;  // [node] of items
+    std::vector<std::size_t> first;  // [node] Index of its first item.
     std::vector<std::uint32_t> items;
   };
 
@@ -91,12 +93,12 @@ class Bonds {
   Lists lists_of(EachPair&& each_pair) const;
 
   const Program& program_;
-  std::vector<std::vector<std::uint32_t>> corners_;  // [tap] nodes
-  std::uint32_t first_point_;                        // points are the last nodes
+  std::vector<std::vector<std::uint32_t>> corners_;  // [tap] Nodes.
+  std::uint32_t first_point_;                        // Points are the last nodes.
   std::vector<bool> binds_;                          // [node]
   std::vector<bool> is_tied_;                        // [node]
-  Lists neighbours_;                                 // who feels whom after one sample
-  Lists links_;                                      // of which each is an end
+  Lists neighbours_;  // [node] Nodes that influence it within one sample.
+  Lists links_;       // [node] Its links.
 };
 
 }  // namespace ressort::kernels

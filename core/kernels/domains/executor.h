@@ -1,9 +1,9 @@
-// core/kernels: work that several threads share.
+// core/kernels: work shared by several threads.
 //
-// Live, the thread that wants it done must never wait for a thread that helps: who helps may be
-// stopped by the system at any moment, for any time. So a helper does a task aside, in a copy of
-// what it starts from. If that is not done in time, whoever wants it does the task himself in a
-// third place, and leaves to the late one all that it reads or writes, until it has come back.
+// In real time the audio thread must never wait for a helper thread, because the system may suspend
+// a helper at any moment for any time. So a helper performs a task on a copy of its input. If it is
+// not done in time, the audio thread performs the task itself on a third copy, and does not touch
+// the data of the late helper until that has returned.
 #pragma once
 
 #include <cstddef>
@@ -16,35 +16,35 @@
 
 namespace ressort::kernels {
 
-// A piece of work. The caller is who calls Crew::run().
+// A unit of work. The caller is the thread that calls Crew::run().
 class Task {
  public:
   virtual ~Task() = default;
-  virtual void perform() = 0;        // where it is [caller, or a helper that is waited for]
-  virtual void offer() = 0;          // writes down what perform_aside() needs [caller]
-  virtual void perform_aside() = 0;  // in the copy [helper]
-  virtual void accept() = 0;         // the copy counts [caller]
-  virtual void take_over() = 0;      // a helper is in it: performs it in a third place [caller]
+  virtual void perform() = 0;        // Works in place [caller, or a helper that is waited for].
+  virtual void offer() = 0;          // Copies the input of perform_aside() [caller].
+  virtual void perform_aside() = 0;  // Works on the copy [helper].
+  virtual void accept() = 0;         // Adopts the result of the copy [caller].
+  virtual void take_over() = 0;      // Works on a third copy while a helper is late [caller].
 };
 
-// Tasks that are done at the same time, again and again.
+// A set of tasks that run at the same time, repeatedly.
 class Crew {
  public:
   // Returns when no helper is in any of the tasks. [any thread but audio]
   virtual ~Crew() = default;
-  // Does those that are wanted, each once, and returns when they are done.
-  // [audio] wait-free if Executor::is_live(): longer than by one thread alone by at most twice what
-  // the longest of them takes, and what a copy takes.
+  // Performs the tasks in `wanted` once each and returns when all are done. [audio] wait-free if
+  // Executor::is_live(). Compared with one thread it takes at most twice the longest task plus the
+  // copies longer.
   virtual void run(std::span<const std::uint32_t> wanted) = 0;
 };
 
-// Threads that help.
+// A pool of helper threads.
 class Executor {
  public:
   virtual ~Executor() = default;
-  virtual std::size_t size() const = 0;  // with the caller's thread
-  virtual bool is_live() const = 0;      // helpers work aside, and are not waited for
-  // The tasks outlive the crew. [any thread but audio]
+  virtual std::size_t size() const = 0;  // Number of threads, including the caller's.
+  virtual bool is_live() const = 0;      // True if helpers work on copies and are never waited for.
+  // Makes a crew; the tasks must outlive it. [any thread but audio]
   virtual std::unique_ptr<Crew> gather(std::vector<Task*> tasks) = 0;
 };
 

@@ -6,7 +6,7 @@ namespace ressort::kernels {
 
 void join_halos(std::span<Shard> shards, std::span<const std::uint32_t> owner_of) {
   std::vector<std::vector<std::uint32_t>> owners(shards.size());  // [shard][copy]
-  std::vector<std::vector<std::uint32_t>> wanted(shards.size());  // [owner] nodes, ascending
+  std::vector<std::vector<std::uint32_t>> wanted(shards.size());  // [owner] Nodes, ascending.
   for (std::uint32_t s = 0; s < shards.size(); ++s) {
     for (std::uint32_t i = 0; i < shards[s].nodes.size(); ++i) {
       const std::uint32_t owner = owner_of[shards[s].nodes[i]];

@@ -1,4 +1,4 @@
-// core/kernels: what shards copy of each other.
+// core/kernels: the halos of shards: copies of the neighbours' nodes.
 #pragma once
 
 #include <cstdint>
@@ -10,7 +10,7 @@ namespace ressort::kernels {
 
 inline constexpr std::uint32_t nobody = 0xffffffffu;
 
-// Finds `copies`, `sources` and `given` of shards whose nodes are known. `owner_of`: [node of the
+// Sets `copies`, `sources` and `given` of shards whose nodes are known. `owner_of`: [node of the
 // whole] its shard, or nobody. O(n log n).
 void join_halos(std::span<Shard> shards, std::span<const std::uint32_t> owner_of);
 

@@ -84,8 +84,8 @@ void KernelTask<T>::accept() {
   swap_results(aside_);
 }
 
-// The late one goes on reading what it was given, which nobody writes until it has come back: what
-// there is from now on is the spare place, with the same inputs.
+// The late helper keeps reading its input, so nobody writes that until it returns. The spare copy
+// becomes the current one, with the same inputs.
 template <class T>
 void KernelTask<T>::take_over() {
   perform(job_in(*spare_.kernel, spare_.buffers, spare_.halo));

@@ -1,4 +1,4 @@
-// core/kernels: a block of one kernel as a Task.
+// core/kernels: one block of a kernel as a Task.
 #pragma once
 
 #include <functional>
@@ -11,7 +11,7 @@
 
 namespace ressort::kernels {
 
-// What drives a kernel in a block and what it fills, as Block says.
+// Inputs and outputs of a kernel for one block, as in Block.
 template <class T>
 struct BlockBuffers {
   Aligned<T> value;
@@ -20,14 +20,14 @@ struct BlockBuffers {
   Aligned<T> outputs;
 };
 
-// What else a shard's kernel is given and gives.
+// Additional inputs and outputs of a shard's kernel.
 template <class T>
 struct HaloBuffers {
-  std::span<const std::uint32_t> copies;      // nodes that are written before the block...
-  std::span<const std::uint32_t> given;       // ...and those that are read after it
+  std::span<const std::uint32_t> copies;      // Nodes that are written before the block.
+  std::span<const std::uint32_t> given;       // Nodes that are read after the block.
   Aligned<T> copied_x, copied_v;              // [i][lane]
   Aligned<T> given_x, given_v;                // [i][lane]
-  std::vector<Coefficients<T>> coefficients;  // that it has from this block on, or none
+  std::vector<Coefficients<T>> coefficients;  // New coefficients for this block, or none.
   bool has_copies = false;
   bool has_coefficients = false;
 };
@@ -37,16 +37,16 @@ class KernelTask final : public Task {
  public:
   using Make = std::function<std::unique_ptr<Kernel<T>>()>;
 
-  // `kernel`: where its owner keeps it, who finds another one there after run(). `make`: two more
-  // of the same for work aside; null: helpers work where it is.
+  // `kernel`: the owner's pointer, which may point to another kernel after run(). `make` makes two
+  // spare kernels for work on copies; null: helpers work in place.
   KernelTask(std::unique_ptr<Kernel<T>>& kernel, BlockBuffers<T> buffers, HaloBuffers<T> halo,
              const Make& make);
-  // Whether kernels of this form can do it aside. [any thread but audio]
+  // Returns whether kernels of this form can work on copies. [any thread but audio]
   bool can_copy() const { return can_copy_; }
 
-  // The caller's.
+  // Set by the caller.
   std::size_t frames = 0;
-  std::size_t lanes = std::numeric_limits<std::size_t>::max();  // of the kernel, that play
+  std::size_t lanes = std::numeric_limits<std::size_t>::max();  // Playing lanes of the kernel.
   BlockBuffers<T> buffers;
   HaloBuffers<T> halo;
 
@@ -62,7 +62,7 @@ class KernelTask final : public Task {
     BlockBuffers<T> buffers;
     HaloBuffers<T> halo;
   };
-  // What one performance reads and writes: nobody else moves it meanwhile.
+  // Data of one execution; nobody else accesses it meanwhile.
   struct Job {
     const Kernel<T>* from = nullptr;
     Kernel<T>* kernel = nullptr;
@@ -82,7 +82,7 @@ class KernelTask final : public Task {
   std::unique_ptr<Kernel<T>>& kernel_;
   Place aside_;
   Place spare_;
-  Job job_;  // the helper's, while it is in it
+  Job job_;  // Owned by the helper while it works.
   bool can_copy_ = false;
 };
 

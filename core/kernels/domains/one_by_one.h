@@ -1,4 +1,4 @@
-// core/kernels: tasks one after the other, in the thread that wants them.
+// core/kernels: runs tasks one after the other in the caller's thread.
 #pragma once
 
 #include <utility>
@@ -20,7 +20,7 @@ class OneByOne final : public Crew {
   const std::vector<Task*> tasks_;
 };
 
-// The caller's thread, which nobody helps.
+// The caller's thread without helpers.
 class OwnThread final : public Executor {
  public:
   std::size_t size() const override { return 1; }

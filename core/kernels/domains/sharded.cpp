@@ -8,7 +8,7 @@
 namespace ressort::kernels {
 namespace {
 
-// Where a node of the whole is in a shard.
+// Returns the index of a node of the whole in a shard.
 std::optional<std::uint32_t> find(const Shard& shard, std::uint32_t node) {
   const auto at = std::lower_bound(shard.nodes.begin(), shard.nodes.end(), node);
   if (at == shard.nodes.end() || *at != node) {
@@ -17,7 +17,7 @@ std::optional<std::uint32_t> find(const Shard& shard, std::uint32_t node) {
   return static_cast<std::uint32_t>(at - shard.nodes.begin());
 }
 
-// Rows of one table copied to other places in another; a row is a number for each lane.
+// Copies a row, one number per lane, between tables.
 template <class T>
 void copy_row(const T* from, std::size_t from_row, T* to, std::size_t to_row, std::size_t width) {
   std::copy_n(from + from_row * width, width, to + to_row * width);
@@ -67,8 +67,8 @@ ShardedKernel<T>::ShardedKernel(const Program& program, const Shards& form, Kern
   crew_ = form.executor->gather(std::move(tasks));
 }
 
-// Places stay where they are: in lanes that nobody plays, too, as shards have the nodes around
-// these places alone.
+// Sets the points, which do not move. Lanes without a voice need them, too, because shards contain
+// only the nodes around these points.
 template <class T>
 void ShardedKernel<T>::place_taps() {
   for (const TapSlot& tap : program_.taps) {
@@ -138,13 +138,13 @@ bool ShardedKernel<T>::save(std::size_t lane, double* x, double* v) const {
   return true;
 }
 
-// All that have the mass or a copy of it feel it.
+// Every shard with the mass or a copy of it takes part.
 template <class T>
 void ShardedKernel<T>::strike(std::size_t lane, std::span<const std::uint32_t> nodes,
                               std::span<const double> changes) {
   write_copies();
   for (std::size_t i = 0; i < shards_.size(); ++i) {
-    kernels_[i]->coefficients = this->coefficients;  // a voice may be struck before its first step
+    kernels_[i]->coefficients = this->coefficients;  // A voice may be struck before its first step.
     for (std::size_t k = 0; k < nodes.size(); ++k) {
       if (const auto local = find(shards_[i], nodes[k])) {
         kernels_[i]->strike(lane, {&*local, 1}, changes.subspan(k, 1));
@@ -160,7 +160,7 @@ bool ShardedKernel<T>::is_near_start(std::size_t lane, double bound) const {
                      [&](const auto& kernel) { return kernel->is_near_start(lane, bound); });
 }
 
-// A copy is as good as the node itself; nodes that no shard has are at 0.
+// A copy is as good as the node itself. Nodes that are in no shard are at 0.
 template <class T>
 std::size_t ShardedKernel<T>::look(std::size_t lane, std::span<const std::uint32_t> nodes,
                                    std::span<double> numbers) const {
@@ -247,7 +247,7 @@ void ShardedKernel<T>::gather_copies(std::size_t i) const {
   }
 }
 
-// What the next block would begin with, for who looks at the nodes before it.
+// Writes the copies that the next block would start with, for readers between blocks.
 template <class T>
 void ShardedKernel<T>::write_copies() const {
   if (!owes_copies_) {

@@ -1,37 +1,37 @@
-// core/kernels: a large network stepped by several cores, a shard each. In the explicit scheme
-// nothing travels farther than one link in a sample: a shard that has a copy of every node within
-// a little more than n links of its own goes on by itself for n samples, after which only the
-// copies are wrong. They are written anew from the shards whose own they are; what is a shard's own
-// is never touched, so that a shard computes what the whole would have.
+// core/kernels: a large network stepped by several cores, one shard each (domain decomposition). In
+// the explicit scheme nothing travels farther than one link per sample. A shard with copies of all
+// nodes within slightly more than n links of its own can therefore take n samples alone, after
+// which only the copies are wrong. They are then refreshed from their owners. A shard's own nodes
+// are always exact, so the result equals that of the whole network.
 #pragma once
 
 #include "core/kernels/domains/kernel_task.h"
 
 namespace ressort::kernels {
 
-// Where the reference about copies is, that follow one another as what is given does.
+// The source of a consecutive range of copies in the owner's `given` list.
 struct ShardSource {
   std::uint32_t shard = 0;
-  std::uint32_t first = 0;  // of its `given`
+  std::uint32_t first = 0;  // Index into its `given`.
   std::uint32_t count = 0;
 };
 
-// A Program of its own, with the coefficients of the whole. What does not move is in every shard
-// that it touches; of an input or output each shard has its own row, where it has any.
+// A Program with the coefficients of the whole. Fixed nodes are in every shard that touches them.
+// Inputs and outputs have a row in each shard that uses them.
 struct Shard {
   Program program;
-  std::vector<std::uint32_t> nodes;    // [i] of the whole, ascending
-  std::vector<std::uint32_t> inputs;   // [input] of the whole
-  std::vector<std::uint32_t> outputs;  // [output] of the whole
-  std::vector<std::uint32_t> given;    // own nodes that others have copies of
-  std::vector<std::uint32_t> copies;   // nodes that are others' own
-  std::vector<ShardSource> sources;    // of all copies, one after the other
+  std::vector<std::uint32_t> nodes;    // [i] Nodes of the whole, ascending.
+  std::vector<std::uint32_t> inputs;   // Inputs of the whole.
+  std::vector<std::uint32_t> outputs;  // Outputs of the whole.
+  std::vector<std::uint32_t> given;    // Own nodes that others copy.
+  std::vector<std::uint32_t> copies;   // Nodes owned by others.
+  std::vector<ShardSource> sources;    // Sources of all copies, in order.
 };
 
 template <class T>
 class ShardedKernel final : public Kernel<T> {
  public:
-  // The executor outlives it; every shard's kernel has the same width.
+  // The executor must outlive it. All shards' kernels have the same width.
   ShardedKernel(const Program& program, const Shards& form, std::size_t voices, Isa isa);
   void set_state(std::size_t lane, const double* x, const double* v) override;
   void let_go(std::size_t lane) override {
@@ -65,10 +65,10 @@ class ShardedKernel final : public Kernel<T> {
   std::size_t frames_;
   Kernels kernels_;                                    // [shard]
   std::vector<std::unique_ptr<KernelTask<T>>> tasks_;  // [shard]
-  std::vector<std::uint32_t> all_;                     // numbers of all tasks
-  mutable bool owes_copies_ = false;                   // what others own is as they had it before
-  mutable std::vector<double> x_, v_;                  // [node] of a shard, in one lane
-  std::unique_ptr<Crew> crew_;                         // the last: it ends first
+  std::vector<std::uint32_t> all_;                     // Indices of all tasks.
+  mutable bool owes_copies_ = false;   // The copies are those of before the last block.
+  mutable std::vector<double> x_, v_;  // [node] of a shard, in one lane.
+  std::unique_ptr<Crew> crew_;         // Last member: it is destroyed first.
 };
 
 }  // namespace ressort::kernels

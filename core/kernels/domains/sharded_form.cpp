@@ -29,8 +29,8 @@ std::size_t shards_in(const Cache& cache, std::size_t nodes, const Workload& loa
 
 namespace {
 
-// What shards take that worker for worker come one after the other: `own(shard)` of one, but for
-// what all of them wait for.
+// Returns the time of the slowest worker if each works through its shards; `own(shard)` is the time
+// of one, without waiting.
 template <class Own>
 double slowest_worker_ns(std::size_t shards, std::size_t workers, double frames, Own&& own) {
   std::vector<double> sums(workers);
@@ -61,7 +61,8 @@ Meeting best_meeting(std::span<const std::vector<std::size_t>> at_level, double 
   return best;
 }
 
-// Of the slowest worker; with several shards to each also what it takes to come back to them.
+// The time of the slowest worker; with several shards each, plus the cost of cache misses when it
+// returns to a shard.
 double predicted_ns(const Program&, const Shards& form, const Workload& load) {
   const std::vector<Shard>& shards = *form.shards;
   const std::size_t workers = std::min(form.executor->size(), shards.size());

@@ -15,15 +15,15 @@
 namespace ressort::kernels {
 namespace {
 
-constexpr double least_shared_ns = 700.0;  // below, shards would wait more than compute
+constexpr double least_shared_ns = 700.0;  // Smaller networks would wait longer than they compute.
 constexpr std::size_t most_shards = 1024;
-constexpr double least_gain = 1.2;  // below, a core is better left to somebody else
+constexpr double least_gain = 1.2;  // Least speed-up that justifies another core.
 
-// Who owns which node, and how many nodes are so many links away from a shard's own.
+// The owner of each node, and the number of nodes at each distance from a shard's own.
 struct Division {
-  std::vector<std::uint32_t> owner;                // [node] shard; nobody: it binds nobody
-  std::vector<std::vector<std::uint32_t>> own;     // [shard] its nodes, ascending
-  std::vector<std::vector<std::size_t>> at_level;  // [shard][level], its own are at level 0
+  std::vector<std::uint32_t> owner;  // [node] Shard; nobody for nodes that are not binding.
+  std::vector<std::vector<std::uint32_t>> own;     // [shard] Its nodes, ascending.
+  std::vector<std::vector<std::size_t>> at_level;  // [shard][level] Own nodes are at level 0.
 };
 
 std::vector<std::vector<std::uint32_t>> owned(const std::vector<std::uint32_t>& owner,
@@ -37,7 +37,7 @@ std::vector<std::vector<std::uint32_t>> owned(const std::vector<std::uint32_t>& 
   return own;
 }
 
-// Along the order in which the nodes are written, or breadth first from the first one.
+// Divides the nodes in their numbered order, or breadth first from the first one.
 Division divide(const Bonds& bonds, std::size_t count, bool is_breadth_first) {
   std::vector<std::uint32_t> order = is_breadth_first ? bonds.breadth_first() : bonds.as_written();
   Division division{
@@ -63,7 +63,7 @@ Division divide(const Bonds& bonds, std::size_t count, bool is_breadth_first) {
   return division;
 }
 
-// Makes shards one after the other, each in as much time as it has nodes and links.
+// Makes one shard after the other in time proportional to its nodes and links.
 class Maker {
  public:
   Maker(const Bonds& bonds, const std::vector<std::uint32_t>& owner, std::uint32_t frames)
@@ -111,18 +111,18 @@ class Maker {
     }
   }
 
-  // A point needs all that is around it; what is around an own one is near enough.
+  // A point needs all nodes around it. If one of them is owned, the others are within the halo.
   bool has_corners(std::uint32_t point) const {
     bool has_all = true;
     bonds_.each_behind(point, [&](std::uint32_t corner) { has_all = has_all && is_here_[corner]; });
     return has_all;
   }
 
-  // What does not move goes to whoever it is tied to. The first shard has what nobody has, and
-  // listens to all of it.
+  // Fixed nodes go to every shard that touches them. The first shard takes those that no shard
+  // touches, and their outputs.
   void find_nodes(std::uint32_t s, const std::vector<std::uint32_t>& own,
                   std::vector<std::uint32_t>& nodes) {
-    // Marks of its own: what is seen from afar need not be here.
+    // Uses marks of its own, because distant nodes seen by outputs need not be in the shard.
     const Surroundings around = bonds_.surroundings(own, frames_ + spare_levels, is_here_);
     for (const std::uint32_t node : around.nodes) {
       if (!bonds_.is_point(node)) {
@@ -165,7 +165,8 @@ class Maker {
     std::sort(nodes.begin(), nodes.end());
   }
 
-  // Calls use(run, first, end) for the runs that these are of, ascending, and where in `places`.
+  // Calls use(run, first, end) for the runs of these places, ascending, with their range in
+  // `places`.
   template <class Run, class Use>
   static void each_run(const std::vector<Run>& runs, const std::vector<std::uint32_t>& places,
                        Use&& use) {
@@ -174,7 +175,7 @@ class Maker {
           std::upper_bound(runs.begin(), runs.end(), *first,
                            [](std::uint32_t place, const Run& run) { return place < run.first; });
       if (after == runs.begin() || *first >= std::prev(after)->first + std::prev(after)->count) {
-        ++first;  // of none
+        ++first;  // Belongs to no run.
         continue;
       }
       const Run& run = *std::prev(after);
@@ -193,7 +194,7 @@ class Maker {
     });
   }
 
-  // In the order of the whole, so that every sum is added up in the same order.
+  // Keeps the order of the whole, so that every sum is added in the same order.
   void take_link_runs(const std::vector<std::uint32_t>& nodes, Program& program) const {
     std::vector<std::uint32_t> links;
     for (const std::uint32_t node : nodes) {
@@ -202,14 +203,15 @@ class Maker {
       }
       bonds_.each_link(node, [&](std::uint32_t link) {
         const auto [a, b] = program_.ends[link];
-        const bool is_first = node == (bonds_.binds(a) ? a : b);  // of its ends that bind
+        const bool is_first = node == (bonds_.binds(a) ? a : b);  // The first binding end.
         if (is_first && local_[a] != nobody && local_[b] != nobody) {
           links.push_back(link);
         }
       });
     }
     std::sort(links.begin(), links.end());
-    links.erase(std::unique(links.begin(), links.end()), links.end());  // those that lead back
+    // Removes links found from both ends.
+    links.erase(std::unique(links.begin(), links.end()), links.end());
     each_run(program_.link_runs, links, [&](LinkRun run, std::uint32_t first, std::uint32_t end) {
       run.first = first;
       run.count = end - first;
@@ -221,7 +223,7 @@ class Maker {
     }
   }
 
-  // Points stay where they are, so that of a macro's nodes only those around them are kept.
+  // Points do not move, so only the macro's nodes around them are kept.
   void take_taps(Program& program) const {
     for (TapSlot tap : program_.taps) {
       if (local_[tap.node] == nobody) {
@@ -266,7 +268,7 @@ class Maker {
   const std::vector<std::uint32_t>& owner_;
   const std::uint32_t frames_;
   std::vector<bool> is_here_;         // [node]
-  std::vector<std::uint32_t> local_;  // [node] where it is in the shard that is made
+  std::vector<std::uint32_t> local_;  // [node] Its index in the current shard.
 };
 
 std::vector<Shard> make_all(const Bonds& bonds, const Division& division, std::uint32_t frames) {
@@ -301,7 +303,7 @@ struct Reformer {
   }
 };
 
-// The same in the form of the whole; nothing if one of them does not have it.
+// Converts all shards to the form of the whole; empty if one of them does not fit it.
 std::vector<Shard> reformed(std::vector<Shard> shards, const Form& form) {
   for (Shard& shard : shards) {
     if (!std::visit(Reformer{shard.program}, form)) {
@@ -311,21 +313,21 @@ std::vector<Shard> reformed(std::vector<Shard> shards, const Form& form) {
   return shards;
 }
 
-// One thread's, which all that it plays may share.
+// Returns the single-thread executor, shared by everything on this thread.
 Executor* own_thread() {
   static OwnThread thread;
   return &thread;
 }
 
-// Numbers of shards, of which the one is taken that costs least.
+// Candidate numbers of shards, of which the cheapest is taken.
 struct Attempt {
   std::vector<std::size_t> counts;
   bool is_breadth_first = false;
-  bool is_in_cache = false;  // costs less than as many masses of the whole
+  bool is_in_cache = false;  // Cheaper per mass than the whole.
 };
 
-// Those that stay in a cache, the first of which that pays is taken, or else one for each worker;
-// none where that would not pay.
+// Returns the candidates: shards that stay in a cache, of which the first that pays is taken, then
+// one shard per worker. Empty if neither can pay.
 std::vector<Attempt> attempts_at(const Program& program, const Workload& load, double whole_ns) {
   std::vector<Attempt> attempts;
   const auto add_in = [&](const Cache& cache) {
@@ -333,7 +335,7 @@ std::vector<Attempt> attempts_at(const Program& program, const Workload& load, d
       attempts.push_back({.counts = {count}, .is_in_cache = true});
     }
   };
-  // Of a chain a shard is little more than its own masses, however short it is.
+  // A short shard of a chain has little overhead: 2n copied masses.
   if (std::holds_alternative<Chains>(program.form)) {
     add_in(first_cache);
   }
@@ -346,7 +348,7 @@ std::vector<Attempt> attempts_at(const Program& program, const Workload& load, d
   for (std::size_t count = workers; count > 1; count /= 2) {
     counts.push_back(count);
   }
-  // As it is written first: rows that are alike stay so.
+  // The numbered order comes first, because it keeps equal rows together.
   attempts.push_back({.counts = counts});
   attempts.push_back({.counts = counts, .is_breadth_first = true});
   return attempts;

@@ -11,19 +11,19 @@
 
 namespace ressort::kernels {
 
-// As many shards, each with what is within a little more than `frames` links of its own, in the
-// direct form; nothing where a point wanders over a macro, as it may be anywhere. O(nodes + links).
+// Makes `count` shards with halos slightly deeper than `frames` links, in the direct form. Empty if
+// a point moves over a macro, because it may be anywhere. O(nodes + links).
 std::vector<Shard> make_shards(const Program& program, std::size_t count, std::uint32_t frames);
 
-// Shards in the Program's own form for load.executor, if they are predicted to pay: of direct,
-// chains or grid, where a sample takes several microseconds. Where what a thread has would not
-// fit into a cache, the first of chains and the second of all others, it has several shards: each
-// does, and goes on there for several samples before the next one's turn.
-// O(nodes + links), and what the form takes. [any thread but audio]
+// Divides the Program, in its own form, for load.executor if that is predicted to pay: for direct,
+// chains or grid, and samples of several microseconds. If a thread's part exceeds a cache (the
+// first level for chains, the second for others), it gets several shards that each fit, and steps
+// each for several samples before the next. O(nodes + links), plus making the forms. [any thread
+// but audio]
 std::optional<Shards> share_out(const Program& program, const Workload& load,
                                 const Progress& progress = {});
 
-// The own thread where a workload has no executor, or one of a single thread.
+// Returns the caller's own thread if a workload has no executor, or one with a single thread.
 Executor* executor_of(const Workload& load);
 
 }  // namespace ressort::kernels

@@ -52,7 +52,7 @@ GridKernel<T>::GridKernel(const Program& program, const Grid& grid, std::size_t,
   this->reset_lanes();
 }
 
-// Packs that have the same weights share them: in a large grid they stay in the nearest cache.
+// Packs with equal weights share them, so that those of a large grid stay in the first-level cache.
 template <class T>
 void GridKernel<T>::make_stamps(std::size_t lanes) {
   std::map<std::vector<T>, std::uint32_t> known;
@@ -84,7 +84,8 @@ void GridKernel<T>::make_stamps(std::size_t lanes) {
 template <class T>
 void GridKernel<T>::clear(std::size_t) {
   Nodes<T>& nodes = this->nodes_;
-  for (std::size_t slot = 0; slot < grid_.slots; ++slot) {  // empty ones and all of a ground's too
+  // Includes empty slots and all copies of a ground.
+  for (std::size_t slot = 0; slot < grid_.slots; ++slot) {
     nodes.row(0)[slot] = static_cast<T>(grid_.position[slot]);
     nodes.row(1)[slot] = static_cast<T>(grid_.velocity[slot]);
   }

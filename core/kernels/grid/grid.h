@@ -1,4 +1,4 @@
-// core/kernels: a regular network (Grid), its slots side by side in the lanes. One voice.
+// core/kernels: a regular network (Grid) whose slots lie side by side in the lanes. One voice.
 #pragma once
 
 #include "core/kernels/nodes.h"
@@ -6,47 +6,48 @@
 namespace ressort::kernels {
 
 inline constexpr std::uint32_t grid_fixed = 0xffffffffu;
-inline constexpr std::size_t grid_pushes = 8;  // of a tap: its corners before and after it moved
+// Slots written per tap: its corners before and after it moved.
+inline constexpr std::size_t grid_pushes = 8;
 
-// Everything that one step of GridKernel touches.
+// All data that one step of GridKernel reads and writes.
 template <class T>
 struct GridState {
   Ramps<T> ramps;
-  T* x;                        // [slot] position
-  T* v;                        // [slot] change of position per sample
-  T* force;                    // [slot] of what is not the grid's, used by the next sample
-  T* y;                        // [slot] K x + Z v, if there are segments
-  T* next_y;                   // [slot] the same of the next sample: `shift` below y, or above it
-  std::ptrdiff_t shift;        // as far as any offset
-  bool is_forward;             // below, and the slots are to be stepped upwards
-  T* link_force;               // [row][slot] if there are no segments: a row for each offset
-  T* held;                     // [links][5] coefficients with which those are still to be computed
-  const std::uint32_t* stamp;  // [pack of the grid] which weights it has
-  // [stamp][row][lane] With segments: where a mass is, and what it misses; else where a mass is,
-  // and for each offset where a link is.
+  T* x;                  // [slot] Position.
+  T* v;                  // [slot] Change of position per sample.
+  T* force;              // [slot] Force of links outside the grid, applied in the next sample.
+  T* y;                  // [slot] K x + Z v, if there are segments.
+  T* next_y;             // [slot] The same for the next sample, stored `shift` below y or above it.
+  std::ptrdiff_t shift;  // At least the largest offset.
+  bool is_forward;       // True: below y, and the slots are stepped upwards.
+  T* link_force;         // [row][slot] Without segments: one row per offset.
+  T* held;               // [links][5] Coefficients for link forces not computed yet.
+  const std::uint32_t* stamp;  // [pack of the grid] Index of its weights.
+  // [stamp][row][lane] With segments: 1 where a mass is, and the number of missing neighbours.
+  // Without: 1 where a mass is, and for each offset 1 where a link is.
   const T* weights;
-  const std::uint32_t* offset;  // [row] of all links
+  const std::uint32_t* offset;  // [row] Of all links.
   std::size_t rows;
-  bool is_fresh;                      // no sample yet: nothing pulls
-  const std::uint32_t* inverse_mass;  // [slot] coefficient, or grid_fixed
-  std::uint32_t* pushed;              // slots that points push in the next sample
+  bool is_fresh;                      // True before the first sample: no forces yet.
+  const std::uint32_t* inverse_mass;  // [slot] Coefficient, or grid_fixed.
+  std::uint32_t* pushed;              // Slots pushed by points in the next sample.
   std::size_t pushes;
-  Corners<T>* corners;           // [tap] in this sample
-  const PassiveTables& passive;  // ends: slots
+  Corners<T>* corners;           // [tap] Of this sample.
+  const PassiveTables& passive;  // Their ends are slots.
   T* memory;                     // [passive link][passive_rows]
-  T* solver;                     // PassiveRoom::numbers
-  T* awake;                      // 0 in the first sample after set_state(), else 1
+  T* solver;                     // Size: PassiveRoom::numbers.
+  T* awake;                      // 0 in the first sample after set_state(), else 1.
 };
 
 template <class T>
 struct GridLoops {
   void (*step)(const Program& program, const Grid& grid, GridState<T>& state,
                const Block<T>& block);
-  // The forces that links exert where all is now, added to those that there are.
+  // Adds the links' forces at the current positions.
   void (*pull)(const Program& program, const Grid& grid, GridState<T>& state);
 };
 
-// The functions for packs of so many bytes, which the machine works on whole.
+// Returns the functions for packs of this size, which must be a full register.
 template <Isa isa, class T>
 GridLoops<T> grid_loops(std::size_t bytes);
 

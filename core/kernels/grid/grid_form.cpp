@@ -15,8 +15,9 @@
 namespace ressort::kernels {
 namespace {
 
-// Fits a Program's links into places. With a spring run: its links act through the sum over
-// neighbours, all others are rest. Without: the links of every run that has many, offset by offset.
+// Fits a Program's links into slots. With a spring run, its links act through the sum over
+// neighbours and all others are one-by-one links. Without one, the links of every large run are
+// computed offset by offset.
 class Fit {
  public:
   Fit(const Program& program, std::uint32_t mass_run, GridPlaces places, std::uint32_t spring_run,
@@ -55,23 +56,24 @@ class Fit {
   }
 
  private:
-  static constexpr std::uint8_t most_held = 100;  // times that a slot is held at 0: fits in int8_t
+  // Most times that a slot may be held at 0; fits into int8_t.
+  static constexpr std::uint8_t most_held = 100;
 
-  // The links of a run from a slot of one span to the one `offset` above.
+  // The links of a run from a slot of one span to the slot `offset` above.
   struct Family {
     std::uint32_t run = 0;
     std::uint32_t offset = 0;
-    bool is_reversed = false;  // the first end above the second
+    bool is_reversed = false;  // The first end is above the second.
     auto operator<=>(const Family&) const = default;
   };
   struct Chosen {
     Family family;
-    std::uint32_t row = 0;  // of linked_
+    std::uint32_t row = 0;  // Row of linked_.
   };
   struct Left {
     bool is_excess = false;
     std::uint32_t run = 0;
-    std::uint32_t a = 0;  // slots
+    std::uint32_t a = 0;  // Slots.
     std::uint32_t b = 0;
     auto operator<=>(const Left&) const = default;
   };
@@ -90,7 +92,7 @@ class Fit {
     return node != nowhere && node < program_.moving;
   }
 
-  // Those that are not plain are the kernel's own matter.
+  // Passive links are handled by the kernel itself.
   template <class Use>
   void each_link(Use&& use) const {
     for (std::uint32_t run = 0; run < program_.link_runs.size(); ++run) {
@@ -108,8 +110,8 @@ class Fit {
             a > b && !facts_of(program_.link_runs[run].law).is_odd};
   }
 
-  // The offsets that many links of a span have. Where an offset leads to nobody, the sum over
-  // neighbours loses what makes it exact: a few links are not worth that.
+  // Chooses the offsets that many links of a span share. An offset without a neighbour costs the
+  // sum its exactness, so rare offsets are left out.
   void choose_families() {
     std::vector<std::map<Family, std::uint32_t>> counts(families_.size());
     each_link([&](std::uint32_t run, Ends ends) {
@@ -158,7 +160,7 @@ class Fit {
     }
   }
 
-  // Where it says whether the link of a family from one of these slots to the other is there.
+  // Returns the flag for the link of a family between two slots.
   std::uint8_t* linked(const Family& family, std::uint32_t low) {
     if (span_at_[low] != nowhere) {
       for (const Chosen& chosen : families_[span_at_[low]]) {
@@ -170,7 +172,7 @@ class Fit {
     return nullptr;
   }
 
-  // Makes a link one of its family, unless there is no such family or the place is taken.
+  // Adds a link to its family. Returns false if there is no such family or the place is taken.
   bool add(std::uint32_t run, std::uint32_t a, std::uint32_t b) {
     std::uint8_t* const is_linked = linked(family_of(run, a, b), std::min(a, b));
     return is_linked != nullptr && std::exchange(*is_linked, std::uint8_t{1}) == 0;
@@ -192,7 +194,7 @@ class Fit {
     });
   }
 
-  // A ground may be wherever it is needed: first where it is already, then in empty slots.
+  // Places copies of grounds where links need them: first at existing copies, then in empty slots.
   void join_grounds() {
     for (const auto& [run, ends] : held_) {
       if (!hold(run, ends, true) && !hold(run, ends, false)) {
@@ -229,8 +231,8 @@ class Fit {
     return false;
   }
 
-  // How many neighbours the sum over a slot's offsets has; those it should not have are taken away
-  // by the rest, which only works where both ends see each other.
+  // Counts the neighbours in each slot's sum. Surplus neighbours are subtracted by one-by-one
+  // links, which requires that both ends see each other.
   bool count_neighbours() {
     std::vector<std::set<std::int32_t>> offsets(families_.size());
     for (std::uint32_t low = 0; low < places_.slots; ++low) {
@@ -247,7 +249,7 @@ class Fit {
     for (const auto& span : offsets) {
       grid_.segments.push_back({.offsets = {span.begin(), span.end()}});
       if (span.empty() || span.size() > most_grid_offsets) {
-        return false;  // masses move by their segment's sum, which is made of one offset at least
+        return false;  // A segment needs at least one offset, because its sum moves the masses.
       }
     }
     for (std::uint32_t slot = 0; slot < places_.slots; ++slot) {
@@ -280,7 +282,7 @@ class Fit {
     return true;
   }
 
-  // Lets a single span reach as far as there are grounds and links.
+  // Extends a single span to cover grounds and links.
   bool extend() {
     GridSpan& first = places_.spans.front();
     std::uint32_t begin = first.first;
@@ -401,23 +403,23 @@ class Fit {
   const Program& program_;
   const Progress& progress_;
   std::uint32_t mass_run_;
-  std::uint32_t spring_run_;  // or nowhere
+  std::uint32_t spring_run_;  // The run, or nowhere.
   GridPlaces places_;
-  std::vector<std::uint32_t> slot_;  // [node]; those outside the grid come after it
+  std::vector<std::uint32_t> slot_;  // [node] Nodes outside the grid come last.
   std::uint32_t slots_;
-  std::vector<bool> is_driven_;                    // [node]
-  std::vector<std::uint32_t> copy_;                // [slot] a ground that is here too, or nowhere
-  std::vector<std::uint32_t> span_at_;             // [slot]
-  std::vector<std::vector<Chosen>> families_;      // [span]
-  std::vector<std::uint32_t> offsets_;             // of them all, up to most_grid_offsets
-  std::vector<std::vector<std::uint8_t>> linked_;  // [row][slot] at the lower end
-  std::vector<std::uint8_t> degree_;               // [slot]
-  std::vector<std::pair<std::uint32_t, Ends>> held_;  // run and ends of links to grounds
+  std::vector<bool> is_driven_;                       // [node]
+  std::vector<std::uint32_t> copy_;                   // [slot] A ground copied here, or nowhere.
+  std::vector<std::uint32_t> span_at_;                // [slot]
+  std::vector<std::vector<Chosen>> families_;         // [span]
+  std::vector<std::uint32_t> offsets_;                // All offsets, at most most_grid_offsets.
+  std::vector<std::vector<std::uint8_t>> linked_;     // [row][slot] Flag at the lower end.
+  std::vector<std::uint8_t> degree_;                  // [slot]
+  std::vector<std::pair<std::uint32_t, Ends>> held_;  // Run and ends of links to grounds.
   std::vector<Left> left_;
   Grid grid_;
 };
 
-// What a sample costs, roughly, in slots of the cheaper kind.
+// Returns a rough cost per sample, in units of the cheaper slot.
 double cost(const Grid& grid) {
   const double slot = grid.segments.empty() ? 2.5 : 1.0;
   return slot * grid.count + 20.0 * static_cast<double>(grid.segments.size()) +
@@ -429,13 +431,13 @@ std::size_t most_slots(const Program& program) {
   return 64 + 4 * std::size_t{program.moving};
 }
 
-// Whether the rest is little.
+// Returns whether few links are left over.
 bool is_worth_it(const Program& program, const Grid& grid) {
   return grid.rest_ends.size() <= 24 + program.ends.size() / 16 &&
          grid.loose.size() <= 8 + program.moving / 16 && grid.count <= most_slots(program);
 }
 
-// Where most masses, or most springs, are alike.
+// Returns the run with the most masses.
 std::uint32_t largest_mass_run(const Program& program) {
   const auto largest =
       std::max_element(program.mass_runs.begin(), program.mass_runs.end(),

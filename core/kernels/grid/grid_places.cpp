@@ -14,7 +14,7 @@ std::uint32_t whole_lines(std::uint32_t slots) {
   return (slots + grid_line - 1) / grid_line * grid_line;
 }
 
-// Where each node is: its row, and its column from where the row begins.
+// The position of a node: its row and its column, counted from the start of the row.
 struct Address {
   std::uint32_t row = nowhere;
   std::int64_t column = 0;
@@ -41,7 +41,7 @@ void each_link(const GridGraph& graph, const std::vector<Address>& all,
   }
 }
 
-// How many empty slots a row needs before the next: as many as its own links reach.
+// Returns the number of empty slots between rows: the largest reach of links within a row.
 std::uint32_t gap_of(const GridGraph& graph, const std::vector<Address>& all,
                      const GridRows& rows) {
   constexpr std::int64_t longest = 8;
@@ -57,14 +57,14 @@ std::uint32_t gap_of(const GridGraph& graph, const std::vector<Address>& all,
   return static_cast<std::uint32_t>(gap);
 }
 
-// By how much each row is shifted, so that the most links to the row before have an offset that is
-// already there.
+// Returns the shift of each row for which most links to the previous row have an offset that
+// already occurs.
 std::vector<std::int64_t> shifts(const GridGraph& graph, const std::vector<Address>& all,
                                  const GridRows& rows, const Progress& progress) {
   std::vector<std::int64_t> shift(rows.size(), 0);
-  std::set<std::int64_t> known;  // column differences to the row before
+  std::set<std::int64_t> known;  // Column differences to the previous row.
   for (std::uint32_t row = 1; row < rows.size(); ++row) {
-    std::map<std::int64_t, std::size_t> differences;  // with this row unshifted
+    std::map<std::int64_t, std::size_t> differences;  // With this row unshifted.
     each_link(graph, all, rows[row], [&](const Address& here, const Address& there) {
       if (there.row == row - 1) {
         ++differences[here.column - there.column - shift[row - 1]];
@@ -97,7 +97,7 @@ std::vector<std::int64_t> shifts(const GridGraph& graph, const std::vector<Addre
   return shift;
 }
 
-// A little longer, if then what is a row away is as well aligned as what is here.
+// Returns a slightly larger pitch if that aligns the slots of the next row with those of this one.
 std::int64_t aligned(std::int64_t pitch) {
   constexpr std::int64_t dear = 24;
   for (const std::int64_t lanes : {16, 8, 4}) {
@@ -145,7 +145,7 @@ std::optional<GridPlaces> places_in_lines(const GridGraph& graph, const GridRows
     highest = std::max(highest, begin + static_cast<std::int64_t>(rows[row].size()));
   }
   if (static_cast<std::size_t>(highest - lowest) > most) {
-    return std::nullopt;  // rows so unlike that most places would be empty
+    return std::nullopt;  // The rows differ so much that most slots would be empty.
   }
   const auto count = whole_lines(static_cast<std::uint32_t>(highest - lowest));
   const std::uint32_t reach =

@@ -39,7 +39,8 @@ class Walk {
  private:
   std::size_t degree(std::uint32_t node) const { return neighbours_of(graph_, node).size(); }
 
-  // From a corner along a side, where nodes have fewer neighbours than inside, to the next corner.
+  // Returns the side from a corner to the next corner, along nodes with fewer neighbours than
+  // inside.
   std::vector<std::uint32_t> side_from(std::uint32_t node) {
     std::vector<std::uint32_t> row = {node};
     is_seen_[node] = true;
@@ -72,7 +73,7 @@ class Walk {
     }
   }
 
-  // What is next to the last row, as a path that begins where that one does.
+  // Adds the neighbours of the last row as a path that starts at the same side.
   bool add_next() {
     std::vector<std::uint32_t> next;
     for (const std::uint32_t node : rows_.back()) {
@@ -123,8 +124,8 @@ class Walk {
   const GridGraph& graph_;
   const Progress& progress_;
   std::vector<bool> is_seen_;
-  std::vector<std::uint32_t> rank_;       // [node] in the row that is being made, while it waits
-  std::vector<std::uint32_t> linked_to_;  // [node] the last of those that were asked for
+  std::vector<std::uint32_t> rank_;       // [node] Rank in the row being made, while it waits.
+  std::vector<std::uint32_t> linked_to_;  // [node] The last node that it was found to be linked to.
   GridRows rows_;
 };
 
@@ -160,7 +161,7 @@ GridGraph grid_graph(const Program& program, std::uint32_t mass_run) {
       }
     }
   };
-  // A ground with one link only would hide a corner, one with many is no place.
+  // A ground with one link would hide a corner, and one with many links has no single place.
   std::vector<std::uint32_t> degree(nodes);
   each_link([&](std::uint32_t a, std::uint32_t b) {
     ++degree[a];
@@ -195,7 +196,7 @@ GridGraph grid_graph(const Program& program, std::uint32_t mass_run) {
 
 GridRows rows_as_written(const Program& program, const GridGraph& graph, const Progress& progress) {
   GridRows rows;
-  bool follows = false;  // whether the node is linked to the one before
+  bool follows = false;  // True if the node is linked to the one before.
   for (std::uint32_t node = 0; node < program.moving; ++node) {
     const auto all = neighbours_of(graph, node);
     progress.spend(all.size() + 1);

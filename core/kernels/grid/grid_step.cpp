@@ -9,7 +9,7 @@
 namespace ressort::kernels::RESSORT_ISA {
 namespace {
 
-// What the loops of one step know.
+// Constants of one step.
 template <class T, std::size_t Bytes>
 struct View {
   static constexpr std::size_t lanes = Bytes / sizeof(T);
@@ -20,7 +20,7 @@ struct View {
   GridState<T>& state;
 };
 
-// Calls use.operator()<n>() for a count 1 <= n <= most that is known only now.
+// Calls use.operator()<n>() for a run-time count 1 <= n <= most.
 template <std::size_t most, class Use>
 void with_count(std::size_t count, Use&& use) {
   [&]<std::size_t... n>(std::index_sequence<n...>) {
@@ -29,7 +29,7 @@ void with_count(std::size_t count, Use&& use) {
   (std::make_index_sequence<most>{});
 }
 
-// What pulls a mass of the grid besides its links, and how it moves.
+// The own spring and gravity of the grid's masses, and their motion.
 template <class T>
 struct Mover {
   Mover(const MassRun& run, const T* coefficient)
@@ -43,7 +43,7 @@ struct Mover {
   T g;
 };
 
-// Lane i is lane i - 1 of y, and the first the last of `before`; and the other way round.
+// Shift the lanes of y by one, taking the missing lane from the adjacent pack.
 template <class V, std::size_t... I>
 V up(V before, V y, std::index_sequence<I...>) {
   return __builtin_shufflevector(before, y, sizeof...(I), (sizeof...(I) + 1 + I)...);
@@ -53,15 +53,16 @@ V down(V y, V ahead, std::index_sequence<I...>) {
   return __builtin_shufflevector(y, ahead, (I + 1)..., sizeof...(I) + 1);
 }
 
-// Whether both neighbours in its row are among a slot's offsets.
+// Returns whether both neighbours in the row are among a slot's offsets.
 inline bool has_row(const GridSegment& segment) {
   const auto& offsets = segment.offsets;
   return std::find(offsets.begin(), offsets.end(), -1) != offsets.end() &&
          std::find(offsets.begin(), offsets.end(), 1) != offsets.end();
 }
 
-// Segments of n offsets: forces from y, then the masses move, then their own y for the next sample.
-// What is next to a pack in its row is moved from lane to lane: loads of it would touch two lines.
+// Steps segments with n offsets (symplectic Euler): computes forces from y, moves the masses, and
+// stores their new y. Neighbours within the row come from lane shifts, because loads of them would
+// straddle two cache lines.
 template <std::size_t n, bool is_row, bool is_pulled, bool is_forward, class T, std::size_t Bytes>
 void move_segments(const View<T, Bytes>& s, const GridSegment* segment, std::size_t count,
                    const Mover<T>& mover) {
@@ -95,7 +96,7 @@ void move_segments(const View<T, Bytes>& s, const GridSegment* segment, std::siz
     const std::ptrdiff_t end = is_forward ? last + lanes : first - lanes;
     const std::uint32_t* stamp =
         s.state.stamp + ((is_forward ? first : last) - s.grid.first) / lanes;
-    // Of a row: the pack at hand, and the one before.
+    // The current pack of a row and the one before.
     V here{};
     V passed{};
     if constexpr (is_row) {
@@ -105,7 +106,7 @@ void move_segments(const View<T, Bytes>& s, const GridSegment* segment, std::siz
     for (std::ptrdiff_t at = is_forward ? first : last; at != end; at += direction * lanes) {
       const T* const weights = all_weights + *stamp * (2 * lanes);
       stamp += direction;
-      // Differences first: they are exact where a network is far from 0 and moves little.
+      // Takes differences first: they are exact when the network is far from 0 and moves little.
       V y;
       V sum;
       if constexpr (is_row) {
@@ -145,8 +146,8 @@ auto moving(bool is_pulled, bool is_forward) {
                       : move_segments<n, is_row, false, false, T, Bytes>;
 }
 
-// In one sample upwards, in the next downwards: what comes last comes first again while it is still
-// in the cache, and next_y may overwrite the y that nobody reads any more.
+// Alternates direction between samples. The slots stepped last are first in the next sample, while
+// they are still in the cache, and next_y can overwrite values of y that are no longer needed.
 template <class T, std::size_t Bytes>
 void step_segments(const View<T, Bytes>& s, const Mover<T>& mover, bool is_pulled) {
   const auto& segments = s.grid.segments;
@@ -176,8 +177,8 @@ void step_segments(const View<T, Bytes>& s, const Mover<T>& mover, bool is_pulle
   }
 }
 
-// The forces of links with n offsets in the packs [begin, end) of the grid, stored offset by
-// offset. Flat, so that no compiler leaves the law a function that is called for every pack.
+// Computes the forces of links with n offsets in the packs [begin, end), stored offset by offset.
+// Flattened, so that the compiler inlines the law.
 template <std::size_t n, class T, std::size_t Bytes, class ForceLaw>
 [[gnu::flatten]] void pull_links(const View<T, Bytes>& s, const GridLinks& links, std::size_t row,
                                  std::size_t begin, std::size_t end, ForceLaw law) {
@@ -231,7 +232,7 @@ void compute_links(const View<T, Bytes>& s, std::size_t begin, std::size_t end) 
   }
 }
 
-// The masses in the packs [begin, end), by the forces of n offsets.
+// Moves the masses in the packs [begin, end) by the forces of n offsets.
 template <std::size_t n, bool is_pulled, class T, std::size_t Bytes>
 void move_packs(const View<T, Bytes>& s, const Mover<T>& mover, std::size_t begin,
                 std::size_t end) {
@@ -269,7 +270,7 @@ void move_packs(const View<T, Bytes>& s, const Mover<T>& mover, std::size_t begi
   }
 }
 
-// The links of the grid will be computed in the next sample, with the coefficients of this one.
+// Keeps the current coefficients, with which the next sample computes the grid's links.
 template <class T, std::size_t Bytes>
 void hold(const View<T, Bytes>& s) {
   T* held = s.state.held;
@@ -281,8 +282,8 @@ void hold(const View<T, Bytes>& s) {
   s.state.is_fresh = false;
 }
 
-// Links as of the last sample, and the masses moved by them, some packs at a time: far enough
-// apart that no force is read while it is still on its way to memory.
+// Computes the link forces of the last sample and moves the masses, some packs at a time, far
+// enough apart that no force is read while its store is still pending.
 template <class T, std::size_t Bytes>
 void step_links(const View<T, Bytes>& s, const Mover<T>& mover, bool is_pulled) {
   constexpr std::size_t stride = 32;
@@ -300,7 +301,7 @@ void step_links(const View<T, Bytes>& s, const Mover<T>& mover, bool is_pulled) 
   hold(s);
 }
 
-// Masses outside the grid; their links are in `force`.
+// Steps masses outside the grid; their link forces are in `force`.
 template <class T, std::size_t Bytes>
 void step_loose(const View<T, Bytes>& s) {
   for (const GridLoose& loose : s.grid.loose) {
@@ -313,7 +314,7 @@ void step_loose(const View<T, Bytes>& s) {
   }
 }
 
-// Moves what moves further, and makes it faster.
+// Changes position and velocity of a slot.
 template <class T, std::size_t Bytes>
 void move(const View<T, Bytes>& s, std::uint32_t slot, T further, T faster) {
   if (s.state.inverse_mass[slot] == grid_fixed) {
@@ -330,7 +331,7 @@ void move(const View<T, Bytes>& s, std::uint32_t slot, T further, T faster) {
   }
 }
 
-// A force f moves a mass by f/M more, which may as well be added when it has moved.
+// A force f adds f/M to a mass's velocity and position, which may be done after it has moved.
 template <class T, std::size_t Bytes>
 void push(const View<T, Bytes>& s, std::uint32_t slot) {
   const T* const c = s.state.ramps.value;
@@ -383,7 +384,7 @@ void move_taps(const View<T, Bytes>& s) {
   }
 }
 
-// What acts on the points goes to the nodes around them.
+// Distributes the forces on points to the nodes around them.
 template <class T, std::size_t Bytes>
 void spread_taps(const View<T, Bytes>& s) {
   for (std::size_t i = 0; i < s.program.taps.size(); ++i) {
@@ -416,7 +417,7 @@ template <class T, std::size_t Bytes>
   }
 }
 
-// Links that are not plain.
+// Passive links.
 template <class T, std::size_t Bytes>
 struct Passive {
   CoefficientView<T> coefficients() const { return {s.state.ramps.value}; }
@@ -452,8 +453,7 @@ template <class T, std::size_t Bytes>
   *s.state.awake = 1;
 }
 
-// What acts in the next sample, except what the segments and the links of the grid do by
-// themselves.
+// Computes the forces that act in the next sample, except those of segments and grid links.
 template <class T, std::size_t Bytes>
 void pull(const View<T, Bytes>& s) {
   step_rest(s);
