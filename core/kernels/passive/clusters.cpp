@@ -49,8 +49,9 @@ std::vector<PassiveLink> passive_links_of(const Program& program) {
   return links;
 }
 
-// Eliminates the mass with the fewest neighbours first, and lets its neighbours know each other.
-// Behind the masses are places, which stay, and know each other from the start.
+// Symbolic elimination in minimum-degree order: eliminates the mass with the fewest neighbours and
+// makes its neighbours adjacent. Places on macros come after the masses; they are not eliminated
+// and are all adjacent.
 class Eliminator {
  public:
   Eliminator(std::size_t masses, std::size_t places)
@@ -63,8 +64,8 @@ class Eliminator {
     }
   }
 
-  // [end] its number, masses as they are eliminated; nothing if that fills in more than a sample
-  // has time for.
+  // Returns [end] its number, masses in elimination order; empty if the fill-in is too large to
+  // factor in every sample.
   std::vector<std::uint32_t> order() {
     constexpr std::size_t most_products = std::size_t{1} << 21;
     const std::size_t places = neighbours_.size() - masses_;
@@ -147,10 +148,10 @@ class Eliminator {
   Elimination elimination_;
 };
 
-// What links hold that moves, each with its number: masses, and then places. Nobody but places
-// holds the masses of a macro.
+// The moving ends of links and their numbers: masses, then places. Masses of a macro are reached
+// only through places.
 struct HeldEnds {
-  std::map<std::uint32_t, std::uint32_t> ends;  // by node
+  std::map<std::uint32_t, std::uint32_t> ends;  // Keyed by node.
   std::size_t masses = 0;
 };
 
@@ -174,7 +175,7 @@ HeldEnds held_by(const Program& program, std::span<const PassiveLink> links) {
   return held;
 }
 
-// By what it holds, if its links are not fewer than the places among that.
+// Chooses the solution by ends unless the cluster has fewer links than places.
 void find_elimination(const Program& program, std::vector<PassiveLink>& all, Cluster& cluster) {
   const std::span<PassiveLink> links = std::span(all).subspan(cluster.first, cluster.count);
   const HeldEnds held = held_by(program, links);
@@ -225,7 +226,8 @@ void find_elimination(const Program& program, std::vector<PassiveLink>& all, Clu
   }
 }
 
-// Springs whose straight part is as published, between masses and what stays.
+// Returns whether the link is a nonlinear spring with the published linear part, between masses and
+// fixed nodes.
 bool may_be_in_web(const Program& program, const PassiveLink& link) {
   const LawFacts& law = facts_of(link.law);
   const auto is_mass = [&](std::uint32_t node) {
@@ -234,12 +236,12 @@ bool may_be_in_web(const Program& program, const PassiveLink& link) {
   return law.contains_spring && law.is_curved && is_mass(link.ends.a) && is_mass(link.ends.b);
 }
 
-// The links from `first` on.
+// Makes a web of the links from `first` on.
 Web web_of(const Program& program, std::vector<PassiveLink>& links, std::size_t first) {
   Web web{.first = static_cast<std::uint32_t>(first),
           .count = static_cast<std::uint32_t>(links.size() - first)};
   const std::vector<std::uint32_t> inverse_mass = inverse_masses(program);
-  std::map<std::uint32_t, std::uint32_t> ends;  // by node
+  std::map<std::uint32_t, std::uint32_t> ends;  // Keyed by node.
   for (std::size_t i = first; i < links.size(); ++i) {
     PassiveLink& link = links[i];
     const auto end_of = [&](std::uint32_t node, std::size_t side) {
@@ -270,7 +272,7 @@ Web web_of(const Program& program, std::vector<PassiveLink>& links, std::size_t 
   return web;
 }
 
-// Those that bend behind all others.
+// Puts nonlinear springs after all other links.
 PassiveTables tables_with_web(const Program& program, std::vector<PassiveLink> links) {
   const auto springs =
       std::stable_partition(links.begin(), links.end(),
@@ -289,7 +291,8 @@ PassiveTables tables_with_web(const Program& program, std::vector<PassiveLink> l
 
 std::size_t springs_of_web(const Program& program) {
   constexpr std::size_t most_solved = 256;
-  constexpr std::size_t most_others = 64;  // their matrix is as large as their square
+  // Limit on other links, whose matrix grows with the square of their number.
+  constexpr std::size_t most_others = 64;
   const std::vector<PassiveLink> links = passive_links_of(program);
   const auto springs = static_cast<std::size_t>(
       std::count_if(links.begin(), links.end(),
@@ -326,9 +329,11 @@ PassiveTables passive_tables(const Program& program) {
   if (springs_of_web(program) > 0) {
     return tables_with_web(program, std::move(links));
   }
-  Groups groups(program.moving);  // which links move each other, by the masses that they move
-  std::vector<std::uint32_t> any(links.size(), no_mass);  // [link] a mass that it moves
-  std::vector<std::uint32_t> under(program.position.size(), no_mass);  // [node] one that it moves
+  // Connected components of masses, joined by the links that move them.
+  Groups groups(program.moving);
+  std::vector<std::uint32_t> any(links.size(), no_mass);  // [link] A mass that it moves.
+  // [node] A mass that it moves.
+  std::vector<std::uint32_t> under(program.position.size(), no_mass);
   std::vector<std::uint8_t> is_known(under.size(), 0);
   for (std::size_t i = 0; i < links.size(); ++i) {
     for (const std::uint32_t end : {links[i].ends.a, links[i].ends.b}) {

@@ -1,5 +1,5 @@
-// core/kernels: passive links that share masses, as tables for solving them at once. Made when a
-// model is loaded; nothing of it changes while it sounds.
+// core/kernels: tables for solving passive links that share masses simultaneously. Made when a
+// model is loaded; constant while it plays.
 #pragma once
 
 #include <array>
@@ -11,10 +11,10 @@
 namespace ressort::kernels {
 
 inline constexpr std::uint32_t no_mass = 0xffffffffu;
-inline constexpr std::size_t passive_rows = 3;    // of memory for each link, one number a lane
-inline constexpr std::size_t joint_numbers = 13;  // of a link while it is solved: Joined in joint.h
+inline constexpr std::size_t passive_rows = 3;    // State of each link, in numbers per lane.
+inline constexpr std::size_t joint_numbers = 13;  // Work memory of each link: Joined in joint.h.
 
-// Of places while they are solved: Places in joint_places.h.
+// Work memory of places: Places in joint_places.h.
 constexpr std::size_t place_numbers(std::size_t places) {
   return 4 * places * places + 2 * places;
 }
@@ -22,74 +22,78 @@ constexpr std::size_t place_numbers(std::size_t places) {
 struct PassiveLink {
   Law law{};
   std::array<std::uint32_t, most_law_arguments> coefficients{};
-  Ends ends;  // nodes; a kernel puts its own places instead
+  Ends ends;  // Nodes; a kernel replaces them by its own places.
   Zone zone = Zone::everywhere;
-  std::uint32_t reach = 0;  // the coefficient that says how large it is, of near and below
-  // Ends of its cluster, where that is solved by what it holds; or no_mass.
+  // Coefficient of the size of the zone, for laws that act only near or below it.
+  std::uint32_t reach = 0;
+  // Ends in its cluster, if that is solved by ends; else no_mass.
   std::uint32_t mass_a = no_mass;
   std::uint32_t mass_b = no_mass;
-  std::uint32_t entry = no_mass;  // where both meet in the matrix
+  std::uint32_t entry = no_mass;  // Matrix entry of both ends.
 };
 
-// How a symmetric matrix over a cluster's ends is factorised, L D L^T, as far as they are masses,
-// without looking for anything: its numbers are the diagonal, then the entries below it, column by
-// column, fill-in and all.
+// The precomputed L D L^T factorisation of a symmetric matrix over the masses of a cluster: the
+// numeric phase needs no search. Numbers are the diagonal, then the entries below it, column by
+// column, including fill-in.
 struct Elimination {
-  std::vector<std::uint32_t> first;   // [end + 1] of its column's entries
-  std::vector<std::uint32_t> row;     // [entry] end
-  std::vector<std::uint32_t> target;  // the number that each product is taken from, in order
+  std::vector<std::uint32_t> first;   // [end + 1] First entry of its column.
+  std::vector<std::uint32_t> row;     // [entry] Its end.
+  std::vector<std::uint32_t> target;  // The number from which each product is subtracted, in order.
 };
 
-// Links that move each other, and no others.
+// A connected component of passive links: they move each other and no others.
 struct Cluster {
-  std::uint32_t first = 0;  // links
+  std::uint32_t first = 0;  // Range of links.
   std::uint32_t count = 0;
-  // What its links hold, its ends: masses in the order of elimination, if they have a factor, and
-  // then places on macros. A force on one of those moves the others, by shares that change. None:
-  // it is solved by its links, which are fewer than the places.
-  std::vector<std::uint32_t> inverse_mass;  // [mass] coefficient
-  std::vector<std::uint32_t> places;        // [place] node
+  // The ends of its links: masses in elimination order, if they have a factor, then places on
+  // macros. A force on one place moves the others with weights that change. Empty: the cluster is
+  // solved by links, of which there are fewer than places.
+  std::vector<std::uint32_t> inverse_mass;  // [mass] Coefficient.
+  std::vector<std::uint32_t> places;        // [place] Node.
   Elimination elimination;
 
-  std::size_t numbers() const;  // that solving it needs in each lane
+  std::size_t numbers() const;  // Returns the work memory in numbers per lane.
   std::size_t ends() const { return inverse_mass.size() + places.size(); }
   bool has_factor() const { return !elimination.first.empty(); }
-  // Whether that takes so much longer than the links that it is mostly gone without.
+  // Returns whether factoring costs so much more than the links that it is mostly avoided.
   bool is_large() const {
     return !has_factor() || elimination.target.size() > 16 * (count + std::size_t{32});
   }
 };
 
-// Springs that bend, so many that what they hold together is kept in one number. All other passive
-// links are then one cluster, solved by its links, as each moves whatever the springs hold.
+// Nonlinear springs, so many that their potential is represented by one auxiliary variable (web.h).
+// All other passive links then form one cluster, solved by links, because each of them moves the
+// whole web.
 struct Web {
-  std::uint32_t first = 0;                  // links; their mass_a and mass_b are ends of the web
-  std::uint32_t count = 0;                  // 0: there is none
-  std::vector<std::uint32_t> alike;         // how many links in a row share law and coefficients
-  std::vector<std::uint32_t> inverse_mass;  // [end] coefficient; no_mass: it stays
-  std::vector<std::uint32_t> of;            // [end] twice a link that holds it, + 1 if as its b
+  std::uint32_t first = 0;           // Range of links; their mass_a and mass_b are ends of the web.
+  std::uint32_t count = 0;           // 0: no web.
+  std::vector<std::uint32_t> alike;  // Lengths of runs of links with equal law and coefficients.
+  std::vector<std::uint32_t> inverse_mass;  // [end] Coefficient; no_mass: it does not move.
+  // [end] Twice the index of a link at it, + 1 if it is the link's end b.
+  std::vector<std::uint32_t> of;
 
-  std::size_t numbers() const { return 3 * inverse_mass.size(); }  // in each lane
+  std::size_t numbers() const { return 3 * inverse_mass.size(); }  // Numbers per lane.
 };
 
 struct PassiveTables {
-  std::vector<PassiveLink> links;  // first those that share nothing, then cluster by cluster, web
-  std::size_t alone = 0;           // so many of them
+  // Links that share no mass, then cluster by cluster, then the web.
+  std::vector<PassiveLink> links;
+  std::size_t alone = 0;  // Number of links that share no mass.
   std::vector<Cluster> clusters;
   Web web;
 };
 
-// How many springs a web would have; 0: they are solved. In double precision a spring takes some
-// 90 ns a sample to solve, and 5 in a web.
+// Returns the number of springs in the web; 0: they are solved simultaneously instead. In double
+// precision a spring costs about 90 ns per sample to solve, and 5 ns in a web.
 std::size_t springs_of_web(const Program& program);
 
-// O(links + fill-in of the clusters)
+// Makes the tables. O(links + fill-in of the clusters)
 PassiveTables passive_tables(const Program& program);
 
-// Whether any link that is not plain holds a place on a macro.
+// Returns whether a passive link is attached to a place on a macro.
 bool holds_places(const Program& program);
 
-// [moving node] the coefficient 1/M.
+// Returns [moving node] the coefficient 1/M.
 std::vector<std::uint32_t> inverse_masses(const Program& program);
 
 }  // namespace ressort::kernels

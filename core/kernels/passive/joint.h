@@ -1,8 +1,7 @@
-// core/kernels: the door to what solves passive links that share masses (joint_solver.h). That is a
-// lot of code and the same for all kernels: it is compiled once for each kind of pack and for each
-// instruction set, in joint_step.cpp, without fused multiply-adds as the direct kernel is. A part
-// of
-// *_step.cpp.
+// core/kernels: the interface of the simultaneous solver for passive links (joint_solver.h). The
+// solver is large and independent of the kernel, so it is compiled once per pack type and
+// instruction set, in joint_step.cpp, without fused multiply-adds like the direct kernel. Included
+// by *_step.cpp.
 #pragma once
 
 #include "core/kernels/passive/clusters.h"
@@ -14,23 +13,23 @@ namespace ressort::kernels::RESSORT_ISA {
 // A link of a cluster in one sample.
 template <class V>
 struct Joined {
-  V before;  // the distance a sample ago
-  V speed;   // from there to now
-  V free;    // and to the next sample if none of the cluster acted
-  V step;    // as they do
-  V force;   // that it exerts
-  V steady;  // the share of it that does not depend on the step
+  V before;  // Distance one sample ago.
+  V speed;   // Change from then to now.
+  V free;    // Further change to the next sample without the cluster's forces.
+  V step;    // Change over both samples with the forces.
+  V force;   // Force that it exerts.
+  V steady;  // Part of the force that does not depend on the step.
   V damping;
-  V value;  // what it should exert, after this step
-  V slope;  // and how that grows with it, or is taken to
-  V way;    // which way the solution is sought, and what more the link exerts at its end
+  V value;  // Force of its law for this step.
+  V slope;  // Derivative of that by the step, or its substitute.
+  V way;    // Search direction, and the change of force at its end.
   V push;
-  V newton_way;  // the same as Newton found it last
+  V newton_way;  // The last search direction of Newton's method.
   V newton_push;
 };
 static_assert(sizeof(Joined<double>) == joint_numbers * sizeof(double));
 
-// Where a kernel has its coefficients, in packs: every so many.
+// A strided view of a kernel's coefficients, in packs.
 template <class V>
 struct CoefficientView {
   V operator[](std::size_t c) const { return first[c * stride]; }
@@ -39,14 +38,14 @@ struct CoefficientView {
   std::size_t stride = 1;
 };
 
-// How a link's ends go on without it.
+// The motion of a link's ends without the link.
 template <class V>
 struct FreeMotion {
   V distance;
   V speed;
 };
 
-// A kernel's Body (passive.h), behind that door.
+// Type-erased access to a kernel's Body (passive.h).
 template <class V>
 class JointBody {
  public:
@@ -74,24 +73,24 @@ class JointBody {
   bool has_masses_;
 };
 
-// What is behind the door.
+// The functions compiled in joint_step.cpp.
 template <class V>
 struct JointSolver {
-  // Solves one cluster and pushes its links' ends. `memory` is of its links, [link][passive_rows];
-  // `numbers` are Cluster::numbers() packs, left with what each link exerts first: Joined. `drag`
-  // is that of a web, [link], or null. [audio]
+  // Solves one cluster and moves its links' ends. `memory` belongs to its links:
+  // [link][passive_rows]. `numbers` are Cluster::numbers() packs; afterwards they begin with the
+  // links' Joined. `drag` is that of a web, [link], or null. [audio]
   static void solve(const std::vector<PassiveLink>& links, const Cluster& cluster, V* memory,
                     V* numbers, JointBody<V>& body, const V* drag = nullptr);
 
-  // What a link that acts alone exerts in a lane's first sample: `before` and `speed` are those of
-  // LinkState, `free` is how far its ends would go in two samples. [audio]
+  // Returns the force of a single link in a lane's first sample. `before` and `speed` are those of
+  // LinkState; `free` is the change of distance over two samples without the link. [audio]
   static V first_force(const PassiveLink& link, CoefficientView<V> coefficients, V before, V speed,
                        V free, V gamma);
 };
 
 namespace {
 
-// Of what goes through a cluster's links, that may be off by rounding.
+// Relative energy error that rounding can cause.
 template <class V>
 constexpr Scalar<V> share_of_rounding = laws::tiny_share<V>() * 2;
 

@@ -1,6 +1,6 @@
-// core/kernels: what places on macros, and the masses under them, give way to the links of a
-// cluster (joint.h): G, how far a force of 1 on one of them moves another. It may be singular, as
-// two places may be one and a body may have fewer modes than places.
+// core/kernels: the response G of places on macros and of the masses under them to the links of a
+// cluster (joint.h): the displacement of one place under a unit force on another. G may be
+// singular, since two places may coincide and a body may have fewer modes than places.
 #pragma once
 
 #include <algorithm>
@@ -13,7 +13,7 @@ namespace {
 template <class V>
 class Places {
  public:
-  // `at` is how far forces have brought each.
+  // `at`: displacement of each place by the forces so far.
   Places(const std::vector<std::uint32_t>& nodes, V* numbers, V* at, JointBody<V>& body)
       : nodes_(nodes),
         count_(nodes.size()),
@@ -46,7 +46,7 @@ class Places {
       at_[p] += row[p] * force;
     }
   }
-  // Each by all that presses it.
+  // Moves each place by the sum of its forces.
   void push() {
     for (std::size_t p = 0; p < count_; ++p) {
       if (any_of(pressed_[p] != V{})) {
@@ -62,8 +62,8 @@ class Places {
     return sum;
   }
 
-  // The w of w + G A w = G b, in place of b; `diagonal` and `below` are those of A >= 0. With
-  // G = L L^T and w = L y: (I + L^T A L) y = L^T b.
+  // Solves w + G A w = G b for w, in place of b; `diagonal` and `below` are those of A >= 0. With G
+  // = L L^T and w = L y this becomes (I + L^T A L) y = L^T b, which is positive definite.
   void solve(const V* diagonal, const V* below, V* b) {
     measure();
     if (!is_factorised_) {
@@ -93,7 +93,7 @@ class Places {
   }
 
  private:
-  // Once a sample, and not if nothing touches.
+  // Computes G once per sample, and not at all if nothing touches.
   void measure() {
     for (std::size_t p = 0; !is_measured_ && p < count_; ++p) {
       for (std::size_t q = 0; q <= p; ++q) {
@@ -103,7 +103,7 @@ class Places {
     is_measured_ = true;
   }
 
-  // L: what is left of a place that moves as others do is nothing.
+  // Cholesky factor L of G; columns of places that depend on others are set to 0.
   void find_root() {
     constexpr auto nothing = static_cast<Scalar<V>>(sizeof(Scalar<V>) == 4 ? 1e-5 : 1e-13);
     for (std::size_t i = 0; i < count_; ++i) {
@@ -125,7 +125,7 @@ class Places {
     is_factorised_ = true;
   }
 
-  // A L.
+  // Computes A L.
   void multiply(const V* diagonal, const V* below) {
     for (std::size_t i = 0; i < count_; ++i) {
       for (std::size_t j = 0; j <= i; ++j) {
@@ -150,7 +150,7 @@ class Places {
 
   void substitute() {
     for (std::size_t k = 0; k < count_; ++k) {
-      // Never less than 1, but for rounding.
+      // In exact arithmetic the pivot is at least 1.
       const V pivot = matrix_[k * count_ + k];
       const V inverse = 1 / select(pivot > V{} + 1, pivot, V{} + 1);
       for (std::size_t i = k + 1; i < count_; ++i) {
@@ -176,10 +176,10 @@ class Places {
   std::size_t count_;
   bool is_measured_ = false;
   bool is_factorised_ = false;
-  V* pressed_;  // what pushes each
+  V* pressed_;  // [place] Sum of its forces.
   V* give_;
-  V* root_;     // L, below the diagonal
-  V* product_;  // A L
+  V* root_;     // L, below the diagonal.
+  V* product_;  // A L.
   V* matrix_;
   V* y_;
   V* at_;

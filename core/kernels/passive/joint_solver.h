@@ -1,15 +1,16 @@
-// core/kernels: passive links that share masses, all at once. With s_l being how far a link's ends
-// go from the sample before to the one after, and f_l(s_l) what its law then exerts (core/laws),
+// core/kernels: solves passive links that share masses simultaneously. Let s_l be the change of a
+// link's distance from the previous sample to the next one, and f_l(s_l) its discrete-gradient
+// force (core/laws):
 //
-//   s = free - C f,  f_l = f_l(s_l),  C = B^T M^-1 B
+//  s = free - C f,  f_l = f_l(s_l),  C = B^T M^-1 B
 //
-// B being which masses a link pulls at. Where every f_l rises, as that of a convex potential does,
-// this is the only minimum of 1/2 |u|^2_M + the sum of what f_l is the slope of. It is found by
-// Newton's method with a line search (joint_space.h).
+// where B is the incidence matrix of links and masses. If every f_l is increasing, as for a convex
+// potential, the solution is the unique minimum of 1/2 |u|^2_M plus the sum of the potentials of
+// f_l. Newton's method with a line search finds it (joint_space.h).
 //
-// A link makes as much energy as (f_l(s_l) - f_l) s_l, where f_l is what it does exert. Whatever
-// is left of that when time is up is taken out: every link then exerts f_l(0) + c s_l, and c is
-// raised until nothing is made. With c endless nothing moves, so that this ends.
+// A link that exerts f_l instead of f_l(s_l) produces the energy (f_l(s_l) - f_l) s_l. If the
+// iteration limit leaves such an error, it is removed: every link then exerts f_l(0) + c s_l, and c
+// is raised until no energy is produced. For c to infinity nothing moves, so this terminates.
 #pragma once
 
 #include <algorithm>
@@ -23,16 +24,17 @@ using laws::LinkState;
 using laws::Slope;
 using laws::Steady;
 
-inline constexpr int free_newtons = 10;  // without looking whether they go a little too far
+// Full Newton steps before the line search checks for overshoot.
+inline constexpr int free_newtons = 10;
 inline constexpr int most_newtons = 64;
 inline constexpr int most_stiffenings = 24;
 
 namespace {
 
-// In a lane's first sample nothing pulls, as nothing is known of where it came from. But what would
-// then stand higher than where it starts, or than a sample before by its speed, whichever is the
-// lower, is held by as much as takes that difference out of its motion. `step` is from the sample
-// before as it would have been.
+// In a lane's first sample links exert no force, since the previous motion is unknown. But the
+// potential energy must not exceed the lower of its values at the start and one sample earlier (by
+// the initial speed). The difference is taken out of the motion. `step` is from that earlier
+// sample.
 template <class V, class ForceLaw>
 static inline Slope<V> first_gradient(const ForceLaw& law, V before, V speed, V step) {
   const auto falls = law.gradient(before, speed).value * speed < V{};
@@ -46,7 +48,7 @@ static inline Slope<V> first_gradient(const ForceLaw& law, V before, V speed, V 
   return {select(rises, share, V{}), select(rises, slope, V{})};
 }
 
-// What the laws of a cluster's links say, whatever space these are solved in.
+// Evaluates the laws of a cluster's links, independent of the solution space.
 template <class V>
 class JointLaws {
  public:
@@ -77,7 +79,7 @@ class JointLaws {
   CoefficientView<V> coefficients_;
 };
 
-// The links of a cluster in one sample. `memory` is theirs, [link][passive_rows].
+// The links of a cluster in one sample. `memory` belongs to them: [link][passive_rows].
 template <class V, class Space>
 class Joint {
  public:
@@ -109,7 +111,8 @@ class Joint {
     if (any_of(astray)) {
       set_out_from_rest(astray);
       evaluate(astray);
-      is_far_ = is_far_ | astray;  // though what does not move makes no energy
+      // Includes lanes where nothing moves and so no energy is produced.
+      is_far_ = is_far_ | astray;
       live = (live & is_first_) | go_by_newton(astray);
     }
     if (any_of(is_first_)) {
@@ -128,17 +131,16 @@ class Joint {
   }
 
  private:
-  // From so near, each link by its own measure, one more step of Newton's is as exact as numbers
-  // are, and falls on either side of the solution; what stopped before would make, or take, a
-  // little in every sample.
+  // At this relative distance one more Newton step reaches rounding precision, with errors of
+  // either sign. Stopping earlier would add or remove a little energy in every sample.
   static constexpr auto nearness =
       static_cast<Scalar<V>>(sizeof(Scalar<V>) == 4 ? 0x1p-14 : 0x1p-34);
   static constexpr Scalar<V> endless = sizeof(Scalar<V>) == 4 ? Scalar<V>(1e30) : Scalar<V>(1e150);
 
-  // Where a condition does not hold: what is no number fulfils none.
+  // Negates a condition such that NaN counts as a failure.
   static Lanes fails(Lanes holds) { return holds == (V{} != V{}); }
 
-  // But for how far it gives way.
+  // Returns the state without the response to the link's own force.
   LinkState<V> state_of(std::size_t i) const {
     const FreeMotion<V> motion = body_.free_motion(links_[i].ends);
     const V* const row = memory_ + i * passive_rows;
@@ -149,8 +151,8 @@ class Joint {
             .gamma = V{}};
   }
 
-  // From the forces of the sample before, but for what is known of this one's. What exerted
-  // nothing, or may hold in several ways, starts as it would go on alone.
+  // Starting point: the forces of the previous sample, plus known changes. Links without a force,
+  // and those whose law has several solutions, start from their solution alone.
   void set_out() {
     for (std::size_t i = 0; i < count_; ++i) {
       const LinkState<V> state = state_of(i);
@@ -190,7 +192,7 @@ class Joint {
       joined_[i].step = joined_[i].free + space_.pulled(i);
     }
   }
-  // What a link would exert if the others went on exerting what they do.
+  // Returns the force of a link if all others keep their current forces.
   V alone(std::size_t i) const {
     LinkState<V> state = state_of(i);
     state.gamma = body_.gamma(links_[i].ends);
@@ -199,8 +201,8 @@ class Joint {
     return laws_.alone(i, state);
   }
 
-  // What every link should exert. Gives those of the lanes in which what it does exert makes more
-  // energy than rounding may.
+  // Evaluates all laws. Returns the lanes in which the error of the forces produces more energy
+  // than rounding can.
   Lanes evaluate(Lanes live) {
     V error{};
     V scale{};
@@ -234,8 +236,9 @@ class Joint {
     return live & fails((error <= share_of_rounding<V> * scale) & (scale < endless));
   }
 
-  // Where that leads astray, as a hard blow's force does in the sample after it: from nothing, one
-  // link after the other doing what it would alone, which leads downhill at every step.
+  // Second starting point, for lanes where Newton's method fails, for example in the sample after a
+  // hard impact: from zero forces, one link after the other takes its solution alone (nonlinear
+  // Gauss-Seidel), which decreases the objective at every step.
   void set_out_one_by_one(Lanes lost) {
     space_.rest(lost);
     for (std::size_t i = 0; i < count_; ++i) {
@@ -246,9 +249,9 @@ class Joint {
     find_steps();
   }
 
-  // Where no way leads on from there, as after a blow that is too hard: from where hardly
-  // anything moves, every link being held alike. What they exert there is not so large that nothing
-  // would be left of the masses beside it.
+  // Third starting point, after an impact too hard for the second: from a state where hardly
+  // anything moves, with every link held equally. The forces there are limited so that the masses'
+  // inertia is not lost to rounding.
   void set_out_from_rest(Lanes lost) {
     constexpr auto hold = static_cast<Scalar<V>>(sizeof(Scalar<V>) == 4 ? 0x1p10 : 0x1p24);
     for (std::size_t i = 0; i < count_; ++i) {
@@ -263,12 +266,12 @@ class Joint {
     }
     go_at_once(lost);
   }
-  // That of a link which gives way by what its ends do.
+  // Returns the stiffness that holds a link, relative to the response of its ends.
   V stiffness_to_hold(std::size_t i) const {
     const V give = body_.gamma(links_[i].ends);
     return 1 / select(give > V{}, give, V{} + 1);
   }
-  // To where links are that exert `value` and `slope` more for all of the way.
+  // Takes one full step with the current `value` and `slope`.
   void go_at_once(Lanes live) {
     space_.solve(joined_, true);
     for (std::size_t i = 0; i < count_; ++i) {
@@ -279,23 +282,23 @@ class Joint {
     move(live);
   }
 
-  // To where the forces bring it: not by what they change, lest rounding adds up.
+  // Recomputes positions from forces instead of accumulating changes, so that rounding errors do
+  // not add up.
   void move(Lanes live) {
     space_.follow(joined_, live);
     find_steps();
   }
 
-  // Gives the lanes that have not arrived.
+  // Iterates Newton's method; returns the lanes that have not converged.
   Lanes go_by_newton(Lanes live) {
     const V one = V{} + 1;
     const V steepest = V{} - Scalar<V>(1e30);
-    V last = steepest;  // how the objective fell at first along the way
-    V share = one;      // of the way that has been gone
-    V inertia{};        // how the objective bends along the way, but for the laws
+    V last = steepest;  // Initial slope of the objective along the direction.
+    V share = one;      // Step length taken so far.
+    V inertia{};        // Curvature of the objective along the direction, laws excluded.
     for (int round = 0; round < most_newtons && any_of(live); ++round) {
-      // Mostly that does it. If not, as much is taken back of the last way as brings the end of it
-      // near to where the objective is the lowest on it: by Newton, or as far as where what rises
-      // with the fourth power of the way would be.
+      // Usually the full step is right. If not, part of it is taken back so that it ends near the
+      // minimum along the direction: by a scalar Newton step, limited to the minimum of a quartic.
       const Scalar<V> most_rise = round > free_newtons ? Scalar<V>(0.5) : Scalar<V>(16);
       const auto is_beyond = fails(along_ <= V{} - most_rise * last);
       const V rise = select(along_ > V{} - last, along_, V{} - last);
@@ -335,15 +338,16 @@ class Joint {
     return live;
   }
 
-  // Goes a share of its way. Gives the lanes in which that changes more than the last digit.
+  // Moves by a share of the direction. Returns the lanes in which that changes more than the last
+  // digit.
   Lanes go_on(Joined<V>& link, Lanes live, V share) {
     link.force = select(live, link.force + share * link.push, link.force);
     return absolute(link.way) > tiny_share<V>() / 2 * (absolute(link.before) + absolute(link.step));
   }
 
-  // Every link then exerts what it would where it was, in proportion to its step what brought it to
-  // where it is, and the more against its step the longer energy is made: that is solved at once.
-  // Held without end nothing moves; in the first sample, from where it starts.
+  // Replaces the laws by linear ones: each link exerts its force at the previous position, minus a
+  // multiple of its step that grows while energy is produced. This system is solved directly. In
+  // the limit nothing moves; in the first sample, from its start.
   void stiffen(Lanes live) {
     for (std::size_t i = 0; i < count_; ++i) {
       memory_[i * passive_rows + 2] = joined_[i].force;
@@ -371,7 +375,7 @@ class Joint {
     return link.steady + link.damping * step + at;
   }
 
-  // In the first sample a potential has risen only from where it starts.
+  // In the first sample the potential counts from the start position only.
   V from_start(const Joined<V>& link) const {
     return link.step - select(is_first_, link.speed, V{});
   }
@@ -398,10 +402,10 @@ class Joint {
   JointBody<V>& body_;
   JointLaws<V> laws_;
   Lanes is_first_;
-  V along_{};  // how the objective rises, where it is now, along the last way
-  V bend_{};   // and how the laws bend it
+  V along_{};  // Slope of the objective at the current point along the last direction.
+  V bend_{};   // Contribution of the laws to the curvature.
   Lanes is_far_{};
-  Lanes is_lost_{};  // where most of what links exert is not what they should
+  Lanes is_lost_{};  // Lanes in which most forces are far from their laws.
 };
 
 }  // namespace

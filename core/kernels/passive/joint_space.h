@@ -1,6 +1,7 @@
-// core/kernels: Newton's steps for a cluster of passive links (joint.h), S >= 0 being the slopes of
-// what they exert: by a sparse factor of M + B S B^T over the masses that they hold and, once these
-// are eliminated, a dense one over the places; or by one of I + S^1/2 C S^1/2 over the links.
+// core/kernels: linear algebra of Newton's steps for a cluster of passive links (joint.h). With S
+// >= 0 the slopes of their forces, it uses either a sparse factor of M + B S B^T over the masses,
+// followed by a dense Schur complement over the places, or a dense factor of I + S^1/2 C S^1/2 over
+// the links.
 #pragma once
 
 #include <algorithm>
@@ -16,7 +17,7 @@ inline constexpr int most_gradients = 60;
 
 namespace {
 
-// Steps of a cluster's links, by what they hold: masses, and behind them places.
+// Solution by the ends of the links: masses, then places.
 template <class V>
 class ByEnds {
  public:
@@ -43,7 +44,7 @@ class ByEnds {
     std::fill_n(way_, count_, V{});
   }
 
-  // From here on, what forces do to the ways of all links.
+  // Starts from no forces.
   template <class Lanes>
   void rest(Lanes live) {
     for (std::size_t i = 0; i < masses_; ++i) {
@@ -60,8 +61,8 @@ class ByEnds {
   }
   V pulled(std::size_t link) const { return between(at_, link); }
 
-  // Newton's way from where the masses are, which may be where forces are so large that nothing is
-  // left of what they add up to.
+  // Computes Newton's direction from the current positions, which is accurate even if the forces
+  // are so large that their sum is lost to rounding.
   void solve(Joined<V>* joined, bool is_exact) {
     if (cluster_.has_factor() && (is_exact || !cluster_.is_large() || has_places())) {
       fill(joined);
@@ -77,14 +78,15 @@ class ByEnds {
     }
   }
 
-  // That is the way from now on, but for lanes that keep theirs.
+  // Adopts the new direction, except in lanes that keep theirs.
   template <class Lanes>
   void turn(Lanes keeps) {
     for (std::size_t i = 0; i < count_; ++i) {
       way_[i] = select(keeps, way_[i], x_[i]);
     }
   }
-  // Places to where their forces bring them, lest rounding adds up.
+  // Moves along the direction. Places are recomputed from their forces, so that rounding errors do
+  // not add up.
   template <class Lanes>
   void go(const Joined<V>* joined, Lanes live, V share) {
     for (std::size_t i = 0; i < masses_; ++i) {
@@ -99,7 +101,7 @@ class ByEnds {
       }
     }
   }
-  // To where their forces bring them.
+  // Recomputes positions from forces.
   template <class Lanes>
   void follow(const Joined<V>* joined, Lanes live) {
     rest(live);
@@ -107,8 +109,8 @@ class ByEnds {
       pull(i, select(live, joined[i].force, V{}));
     }
   }
-  // Each mass by all that it has moved, as links that are much harder than it is heavy push it to
-  // and fro. Only once.
+  // Moves each mass once, by the total displacement found. Applying the forces instead would lose
+  // precision when links are much stiffer than their masses are heavy.
   void push(const Joined<V>* joined, JointBody<V>& body) {
     const auto shift = [&](std::uint32_t node, std::uint32_t end, V force) {
       if (is_mass(end) && any_of(at_[end] != V{})) {
@@ -125,7 +127,7 @@ class ByEnds {
     }
     places_.push();
   }
-  // How 1/2 |u|^2_M rises along the way.
+  // Returns the derivative of 1/2 |u|^2_M along the direction.
   V inertia_along(const Joined<V>*) const {
     V sum{};
     for (std::size_t i = 0; i < masses_; ++i) {
@@ -153,7 +155,7 @@ class ByEnds {
     }
   }
 
-  // Places by what links exert and should not, masses by all that moves them.
+  // Fills the matrix and the right-hand side: residual forces for places, displacements for masses.
   void fill(const Joined<V>* joined) {
     const std::size_t size = count_ + cluster_.elimination.row.size();
     for (std::size_t i = 0; i < count_; ++i) {
@@ -184,9 +186,9 @@ class ByEnds {
     }
   }
 
-  // The same by conjugate gradients, with the diagonal taken out: O(links) a round, and few rounds
-  // where links are not far harder than what they move is heavy. As near as Newton's next step,
-  // which starts from there, can make use of.
+  // Solves the same system by Jacobi-preconditioned conjugate gradients: O(links) per iteration,
+  // with few iterations unless links are much stiffer than their masses are heavy. Stops at the
+  // accuracy that the next Newton step can use.
   void approach(const Joined<V>* joined) {
     V* const rest = matrix_;
     V* const to = rest + count_;
@@ -254,7 +256,7 @@ class ByEnds {
     for (std::size_t column = 0; column < masses_; ++column) {
       V* const below = matrix_ + count_ + plan.first[column];
       const std::size_t entries = plan.first[column + 1] - plan.first[column];
-      // What a mass alone has is the least; rounding may have taken it where links are very stiff.
+      // The pivot is at least the mass; for very stiff links rounding can violate that.
       const V pivot = matrix_[column];
       const V inverse = 1 / select(pivot > mass_[column], pivot, mass_[column]);
       matrix_[column] = inverse;
@@ -295,15 +297,15 @@ class ByEnds {
   std::size_t count_;
   V* give_;
   V* mass_;
-  V* at_;   // how far forces have brought each end
-  V* way_;  // and where it goes from there
+  V* at_;   // Displacement of each end.
+  V* way_;  // Direction of each end.
   V* x_;
   V* matrix_;
   Places<V> places_;
 };
 
-// The same by the links, of those alone that exert anything or may. `drag` is by what a web holds
-// back each of them, and through it all others.
+// Solution by links, restricted to the active ones. `drag`: coupling of each link with the web, and
+// through it with all others.
 template <class V>
 class ByLinks {
  public:
@@ -334,8 +336,8 @@ class ByLinks {
   }
   V pulled(std::size_t link) const { return pulled_[link]; }
 
-  // With h = C (value - force) and T = S^1/2, and T z = y: (I + T C T) y = T h, push = off - T y,
-  // way = -C push.
+  // With h = C (value - force), T = S^1/2 and T z = y: solves (I + T C T) y = T h; then push = off
+  // - T y and way = -C push.
   void solve(Joined<V>* joined, bool) {
     for (std::size_t i = 0; i < count_; ++i) {
       const Joined<V>& link = joined[i];
@@ -362,7 +364,7 @@ class ByLinks {
 
   template <class Lanes>
   void turn(Lanes) {}
-  // Not by what the forces change, lest rounding adds up.
+  // Recomputes instead of accumulating, so that rounding errors do not add up.
   template <class Lanes>
   void go(const Joined<V>* joined, Lanes live, V) {
     follow(joined, live);
@@ -391,7 +393,7 @@ class ByLinks {
   }
 
  private:
-  // Which of the active links it is, from now on.
+  // Returns the index of a link among the active ones, adding it if necessary.
   std::size_t find(std::size_t link) {
     std::size_t k = 0;
     while (k < active_ && index_[k] != link) {
@@ -399,7 +401,7 @@ class ByLinks {
     }
     return k < active_ ? k : (index_[active_] = link, is_new_ = true, active_++);
   }
-  // [link] of an active one.
+  // Returns the coupling of an active link with all links: [link].
   const V* couple(std::size_t k) {
     V* const row = coupling_ + k * count_;
     for (std::size_t i = 0; is_new_ && i < count_; ++i) {
@@ -468,11 +470,11 @@ class ByLinks {
   std::size_t active_ = 0;
   bool is_new_ = false;
   V* coupling_;  // [active][link]
-  V* matrix_;    // [active][active], below the diagonal
+  V* matrix_;    // [active][active] Below the diagonal.
   V* root_;
   V* x_;
   V* pulled_;
-  std::size_t* index_;  // [active] link
+  std::size_t* index_;  // [active] Link.
   JointBody<V>& body_;
 };
 

@@ -1,5 +1,5 @@
-// Passive links that share masses, and what is alone in a first sample: for every kind of pack that
-// a kernel has. Compiled for each instruction set, without fused multiply-adds.
+// The simultaneous solver and the first sample of a single link, for every pack type. Compiled for
+// each instruction set, without fused multiply-adds.
 #include "core/kernels/passive/joint_solver.h"
 
 namespace ressort::kernels::RESSORT_ISA {
@@ -25,8 +25,8 @@ V JointSolver<V>::first_force(const PassiveLink& link, CoefficientView<V> coeffi
   const JointLaws<V> own(&link, coefficients);
   const V force = laws::force_between(V{}, free, free, gamma,
                                       [&](V step) { return own.first(0, before, speed, step); });
-  // What starts on a slope may be held by less than all that would pull there: it stays where it
-  // was, and is not thrown back.
+  // A link that starts with energy is held by at most the force that keeps it at its start, so that
+  // it is not thrown back.
   const auto is_thrown = absolute(force) * gamma > absolute(free);
   return select(is_thrown, free / select(is_thrown, gamma, V{} + 1), force);
 }

@@ -1,7 +1,7 @@
-// core/kernels: links whose force is not the plain one. A kernel moves everything without them;
-// then each looks where its ends would be, finds its force (core/laws), and both ends are moved by
-// it, which is the same as if it had been among the others. Those that share masses are solved at
-// once (joint.h). A part of *_step.cpp.
+// core/kernels: links with a passive (energy-conserving) force. A kernel first moves everything
+// without them. Each passive link then sees where its ends would be and computes its force
+// (core/laws); both ends are moved by it, which equals including it in the sum of forces. Links
+// that share masses are solved simultaneously (joint.h). Included by *_step.cpp.
 #pragma once
 
 #include "core/kernels/passive/web.h"
@@ -9,23 +9,23 @@
 namespace ressort::kernels::RESSORT_ISA {
 namespace {
 
-// A kernel's Body says for the functions below, of a link's ends:
-//   V distance_now(ends), speed_now(ends)  x_a - x_b and v_a - v_b at the sample's beginning
-//   V distance(ends), speed(ends)          the same once all has moved, points too
-//   V gamma(ends)                          how far they give way to a force of 1
-//   V coupling(ends, ends)                 and to one along another link, if it is known
-//   void push(ends, V force)               a by -force and b by force, times their inverse masses
-//   CoefficientView<V> coefficients()
-//   V awake()                              0 in the first sample after set_state(), -1 if it was
-//                                          let go, else 1
-// Where masses are nodes of their own:
-//   void shift(node, V way)                one of them
-//   void feel(node, V force)               and what an output of force hears of that
-// and where there are places:
-//   V give(from, at)                       how far a node is moved by a force of 1 on another
-//   void push_node(node, V force)          one end alone
+// A kernel's Body provides, for a link's ends:
+//  V distance_now(ends), speed_now(ends)  x_a - x_b and v_a - v_b at the start of the sample
+//  V distance(ends), speed(ends)          the same after everything has moved, points included
+//  V gamma(ends)                          their response to a unit force
+//  V coupling(ends, ends)                 and to a unit force along another link, if known
+//  void push(ends, V force)               moves a by -force and b by force, times inverse masses
+//  CoefficientView<V> coefficients()
+//  V awake()                              0 in the first sample after set_state(), -1 if it was
+//                                         released, else 1
+// If masses are nodes of their own:
+//  void shift(node, V way)                moves one of them
+//  void feel(node, V force)               adds a force to an output of the node's force
+// And if there are places:
+//  V give(from, at)                       displacement of a node by a unit force on another
+//  void push_node(node, V force)          moves one end only
 
-// Before anything moves. `memory` is [link][passive_rows] packs.
+// Stores the distances before anything moves. `memory` is [link][passive_rows] packs.
 template <class V, class Body>
 static inline void remember(const PassiveTables& tables, V* memory, const Body& body) {
   for (const PassiveLink& link : tables.links) {
@@ -35,8 +35,8 @@ static inline void remember(const PassiveTables& tables, V* memory, const Body& 
   }
 }
 
-// Whether a link may exert anything in any lane; what comes and goes with the distance exerts
-// nothing between far ends. So much is told without its law, which would take longer.
+// Returns whether a link can exert a force in any lane. Laws with a limited zone are tested by
+// distance, which is faster than evaluating them.
 template <class V, class Body>
 static inline bool may_act(const PassiveLink& link, const laws::LinkState<V>& state,
                            const Body& body) {
@@ -52,7 +52,7 @@ static inline bool may_act(const PassiveLink& link, const laws::LinkState<V>& st
   return any_of(absolute(state.now) < reach + way);
 }
 
-// Whether any of a cluster may: often nothing touches.
+// Returns whether any link of a cluster can act; often nothing touches.
 template <class V, class Body>
 static inline bool may_act(const PassiveTables& tables, const Cluster& cluster, const V* memory,
                            const Body& body) {
@@ -84,12 +84,13 @@ static inline V force_of(const PassiveLink& link, const laws::LinkState<V>& stat
   return with_law<V>(link.law, c, [&](const auto& law) { return law.passive(state); });
 }
 
-// After masses and position inputs have moved, before points do. `numbers` are the room's.
+// Applies all passive links, after masses and position inputs have moved and before points do.
+// `numbers` are those of the room.
 template <class V, class Body>
 static inline void correct(const PassiveTables& tables, V* memory, V* numbers, Body& body) {
   const V awake = body.awake();
   if (any_of(awake < V{})) {
-    return;  // nobody hears this sample
+    return;  // The first sample is not an output.
   }
   const bool is_first = any_of(awake == V{});
   V* row = memory;

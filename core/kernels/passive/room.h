@@ -1,4 +1,4 @@
-// core/kernels: what a kernel keeps for its passive links.
+// core/kernels: memory of a kernel for its passive links.
 #pragma once
 
 #include <algorithm>
@@ -8,7 +8,7 @@
 
 namespace ressort::kernels {
 
-// What they keep from one sample to the next, and what solving them needs.
+// State kept between samples, and work memory of the solver.
 template <class T>
 struct PassiveRoom {
   PassiveRoom(const Program& program, std::size_t width)
@@ -35,7 +35,7 @@ struct PassiveRoom {
   PassiveTables tables;
   std::vector<std::uint32_t> inverse_mass;
   Aligned<T> memory;   // [pack][link][passive_rows][lane]
-  Aligned<T> numbers;  // of one cluster of one pack, while it is solved
+  Aligned<T> numbers;  // Work memory for one cluster of one pack.
   Aligned<T> awake;
   Aligned<T> felt;
 };

@@ -1,4 +1,5 @@
-// core/kernels: webs of springs that bend (clusters.h), in one number each. A part of *_step.cpp.
+// core/kernels: webs of nonlinear springs (clusters.h), with one auxiliary variable each. Included
+// by *_step.cpp.
 #pragma once
 
 #include "core/kernels/passive/joint.h"
@@ -7,14 +8,14 @@
 namespace ressort::kernels::RESSORT_ISA {
 namespace {
 
-// A web in one sample. Of its springs' potential P >= 0 one number psi is kept, and psi^2/2 is what
-// they hold: with g = grad P/sqrt(2 P) where the ends are,
+// One sample of a web by the scalar auxiliary variable method (Bilbao, Ducceschi and Zama 2023).
+// The springs' potential P >= 0 is represented by one number psi with the energy psi^2/2. With g =
+// grad P / sqrt(2 P) at the current positions,
 //
-//   they pull with g (psi+ + psi)/2,  psi+ - psi = g (x+ - x-)/2,
+//  the force is g (psi+ + psi)/2,  psi+ - psi = g (x+ - x-)/2,
 //
-// which is linear in x+, so that it takes no iteration and no matrix: a scalar auxiliary variable
-// (Bilbao, Ducceschi and Zama 2023). psi drifts from sqrt(2 P); what is too much of it is kept, and
-// given back where it is too little, so that it is brought back without making energy.
+// which is linear in x+ and needs neither iteration nor matrix. psi drifts from sqrt(2 P). An
+// excess is stored and given back when psi is too small, so that the correction produces no energy.
 template <class V, class Body>
 class WebStep {
  public:
@@ -31,7 +32,7 @@ class WebStep {
         coefficients_(body.coefficients()),
         body_(body) {}
 
-  // As if nothing else acted.
+  // Applies the web's force as if nothing else acted.
   void pull() {
     const Lanes is_first = body_.awake() == V{};
     for (std::size_t i = 0; i < ends_; ++i) {
@@ -62,7 +63,7 @@ class WebStep {
     shift([&](std::size_t i) { return straight_[i] + pull_ * root_ * bent_[i]; });
   }
 
-  // How much of a force along another link the web feels, and of what it feels others do.
+  // Returns the coupling between the web and a force along another link.
   V drag(const PassiveLink& link) const {
     const auto moved = [&](std::uint32_t end) {
       return end == no_mass ? V{} : give_[end] * bent_[end];
@@ -70,7 +71,7 @@ class WebStep {
     const V root = select(body_.awake() == V{}, V{}, root_);
     return (moved(link.mass_a) - moved(link.mass_b)) * root / square_root(stiff_);
   }
-  // What the web does of what other links did: `felt` is the sum of each drag times its force.
+  // Corrects the web for the other links: `felt` is the sum of each drag times its force.
   void follow(V felt) {
     const V more = felt / square_root(stiff_);
     psi() += 2 * more;
@@ -78,7 +79,7 @@ class WebStep {
   }
 
  private:
-  // Those of all springs on their ends, what they hold, and how it would rise by where these go.
+  // Computes the springs' forces on their ends, their energy, and its derivative along the motion.
   void find_forces() {
     const PassiveLink* link = links_;
     V* row = rows_;
@@ -90,7 +91,7 @@ class WebStep {
         if constexpr (requires { law.curved(V{}); }) {
           for (std::uint32_t i = 0; i < count; ++i, ++link, row += passive_rows) {
             const laws::LinkState<V> state{.now = row[0], .speed = row[1]};
-            // What softens holds less than nothing, and pulls as published.
+            // A softening spring has negative energy, and uses the published force instead.
             const V kept = law.curved(row[0]);
             const auto holds = kept >= V{};
             const V slope = law.gradient(row[0], V{}).value;
@@ -111,8 +112,8 @@ class WebStep {
     way_ = way;
   }
 
-  // What psi has too much, or too little as far as there is a store. In a lane's first sample
-  // nothing is known of it; in the second it holds what the springs do.
+  // Corrects the drift of psi: removes an excess, or adds what the store holds. In a lane's first
+  // sample psi is unknown; in the second it gets the springs' energy.
   void set_right(Lanes is_first) {
     const V wanted = (last() + held_) / 2;
     const auto is_new = store() < V{};
@@ -138,34 +139,34 @@ class WebStep {
     }
   }
 
-  // What is kept from sample to sample: of a spring its third number is free.
+  // State kept between samples, in the unused third number of the springs' rows.
   V& psi() { return rows_[2]; }
-  V& last() { return rows_[passive_rows + 2]; }       // what the springs held
-  V& store() { return rows_[2 * passive_rows + 2]; }  // what psi had too much; -1: it is new
+  V& last() { return rows_[passive_rows + 2]; }       // Energy of the springs.
+  V& store() { return rows_[2 * passive_rows + 2]; }  // Stored excess of psi; -1: new.
 
   const Web& web_;
   const PassiveLink* links_;
   std::size_t ends_;
   V* rows_;
   V* give_;      // [end]
-  V* straight_;  // what pulls it, in proportion to distances and speeds
-  V* bent_;      // and what bends: -grad P
+  V* straight_;  // Linear force on each end, proportional to distances and speeds.
+  V* bent_;      // Nonlinear force -grad P.
   CoefficientView<V> coefficients_;
   Body& body_;
   V held_{};   // P
-  V way_{};    // grad P (x+ - x-), but for what the springs themselves do
-  V root_{};   // 1/sqrt(2 P)
-  V stiff_{};  // 4 + g M^-1 g
-  V pull_{};   // (psi+ + psi)/2
+  V way_{};    // grad P (x+ - x-) without the springs' own response.
+  V root_{};   // 1 / sqrt(2 P).
+  V stiff_{};  // 4 + g M^-1 g.
+  V pull_{};   // (psi+ + psi) / 2.
 };
 
-// The web, and what else is passive, as it drags on that.
+// Solves the web together with the other passive links.
 template <class V, class Body>
 [[gnu::noinline]] static void solve_web(const PassiveTables& tables, V* memory, V* numbers,
                                         Body& body) {
   WebStep<V, Body> web(tables, memory, numbers, body);
   web.pull();
-  for (const Cluster& cluster : tables.clusters) {  // one, or none
+  for (const Cluster& cluster : tables.clusters) {  // At most one.
     V* const drag = numbers + tables.web.numbers();
     V* const rest = drag + cluster.count;
     for (std::size_t i = 0; i < cluster.count; ++i) {

@@ -12,30 +12,32 @@ namespace {
 using Complex = std::complex<double>;
 
 constexpr double turn = 2.0 * std::numbers::pi;
-constexpr double most_allpass_delay = 1.5;  // samples; the least is one less
-constexpr double tie = 1e-9;  // of a delay between two N: the lower, whatever its rounding
+// Longest delay of the allpass in samples; the shortest is one less.
+constexpr double most_allpass_delay = 1.5;
+// Tolerance for a delay halfway between two N: the lower N is taken, whatever the rounding.
+constexpr double tie = 1e-9;
 constexpr int halvings = 12;
 constexpr int line_steps = 3;
 constexpr int most_newton_steps = 12;
 
-// What is no number becomes the lowest.
+// NaN becomes the lowest value.
 double within(double value, double lowest, double highest) {
   return value > lowest ? std::min(value, highest) : lowest;
 }
 
-// 1 - 1/z at the pole z = e^(theta j - decay), without cancelling.
+// Returns 1 - 1/z at the pole z = e^(theta j - decay) without cancellation.
 Complex rise_at(double decay, double theta) {
   const double half = std::sin(0.5 * theta);
   const double size = std::exp(decay);
   return {2.0 * size * half * half - std::expm1(decay), size * std::sin(theta)};
 }
 
-// ln of the loss's pole alone, (1 - a)/(1 - a/z), with 1 - a = e^room and that rise.
+// Returns ln((1 - a)/(1 - a/z)), the loss filter without its gain, where 1 - a = e^room.
 Complex log_of_loss(double room, Complex rise) {
   return -std::log(1.0 + std::expm1(-room) * rise);
 }
 
-// How that grows with the room.
+// Returns its derivative by `room`.
 Complex slope_of_loss(double room, Complex rise) {
   return rise / (std::exp(room) - std::expm1(room) * rise);
 }
@@ -81,7 +83,7 @@ struct Loop {
   double samples;
   Complex back = std::polar(std::exp(decay), -theta);  // 1/z at the pole
 
-  // ln L(z), and how it grows with the logarithm of 1 - a and with the allpass.
+  // Returns ln L(z); the next functions return its derivatives by ln(1 - a) and by the allpass.
   Complex log(double room, double allpass) const {
     return log_gain + log_of_loss(room, rise) +
            std::log((allpass + back) / (1.0 + allpass * back)) + samples * Complex(decay, -theta);
@@ -92,7 +94,7 @@ struct Loop {
   }
 };
 
-// From a delay of any length to N samples and an allpass.
+// Newton's method for the allpass and the loss, with N samples fixed.
 void refine(const Loop& loop, double room, WaveguideDesign& design) {
   double c = design.allpass;
   for (int i = 0; i < most_newton_steps; ++i) {
@@ -115,13 +117,13 @@ void refine(const Loop& loop, double room, WaveguideDesign& design) {
       break;
     }
   }
-  if (room <= 0.0) {  // else it would raise the highest frequencies
+  if (room <= 0.0) {  // A negative pole would amplify the highest frequencies.
     design.pole = -std::expm1(room);
     design.allpass = c;
   }
 }
 
-// The same where all partials decay alike, so that the gain is what is sought.
+// The same if all partials decay alike: the gain is the unknown.
 void refine_flat(const Loop& loop, WaveguideDesign& design) {
   for (int i = 0; i < most_newton_steps; ++i) {
     const double off = std::remainder(loop.log(0.0, design.allpass).imag(), turn);
@@ -151,13 +153,13 @@ WaveguideDesign design_waveguide(const WaveguideNumbers& numbers, std::uint32_t 
   const double t60 = std::max(within(numbers.t60_s, 0.0, HUGE_VAL), least_t60_periods / hz);
   const double brightness = within(numbers.brightness, 0.0, 1.0);
   const double theta = turn * hz / rate_hz;
-  const double decay = 3.0 * std::numbers::ln10 / (t60 * rate_hz);  // per sample
-  const double loss = decay * rate_hz / hz;                         // per period
+  const double decay = 3.0 * std::numbers::ln10 / (t60 * rate_hz);  // Per sample.
+  const double loss = decay * rate_hz / hz;                         // Per period.
 
   const Complex rise = rise_at(decay, theta);
   Line line{-loss * brightness, decay, theta, rise};
   double room = brightness < 1.0 ? room_of(line) : 0.0;
-  // The loss takes its time as well; where it would take all that there is, it takes none.
+  // The loss filter has a delay, too. If it would exceed the loop's, the filter is left out.
   if (line.delay(room) < least_samples + most_allpass_delay - 1.0) {
     room = 0.0;
     line.log_gain = -loss;
@@ -169,7 +171,7 @@ WaveguideDesign design_waveguide(const WaveguideNumbers& numbers, std::uint32_t 
                          .period = rate_hz / hz,
                          .pole = -std::expm1(room),
                          .gain = std::exp(line.log_gain)};
-  const double rest = (delay - design.samples) * theta;  // for the allpass, an angle
+  const double rest = (delay - design.samples) * theta;  // Phase left for the allpass, in radians.
   design.allpass = std::sin(0.5 * (theta - rest)) / std::sin(0.5 * (theta + rest));
   const Loop loop{line.log_gain, decay, theta, rise, double(design.samples)};
   room < 0.0 ? refine(loop, room, design) : refine_flat(loop, design);
@@ -178,7 +180,7 @@ WaveguideDesign design_waveguide(const WaveguideNumbers& numbers, std::uint32_t 
 
 void find_places(const WaveguideDesign& design, const FiltersAt& filters, std::span<const double> u,
                  std::span<std::uint32_t> order, std::span<std::uint32_t> delays) {
-  const double least_u = 1.0 / design.period;  // half a sample from an end
+  const double least_u = 1.0 / design.period;  // Half a sample from an end.
   const auto runs_right = [](std::uint32_t i) { return i % 2 == 1; };
   const auto rank = [&](std::uint32_t i) {
     return order_from_filters(filters, u[i / 2], runs_right(i));

@@ -1,5 +1,5 @@
-// core/kernels: waves on waveguides, in packs: a run of samples is read, played and written. A part
-// of *_step.cpp, which are compiled for each instruction set.
+// core/kernels: processes waves on waveguides in packs: a run of samples is read, played and
+// written. Included by *_step.cpp, which are compiled for each instruction set.
 #pragma once
 
 #include <algorithm>
@@ -17,7 +17,7 @@ struct RailLoops {
   using Guide = typename Rails<T>::Guide;
   using Run = V[waveguide_run];
 
-  // What comes to the places in the next samples, at most so many as are left of the block.
+  // Reads the waves that reach the places in the next samples, at most `left`.
   static void read_run(Rails<T>& rails, std::size_t left) {
     rails.run = static_cast<std::uint32_t>(std::min<std::size_t>(left, waveguide_run));
     for (const Guide& guide : rails.guides) {
@@ -49,7 +49,7 @@ struct RailLoops {
     }
   }
 
-  // Where every place would be at the sample's end, with what already pulls at it.
+  // Computes where every place would be at the end of the sample, with the known forces.
   template <class S>
   static void move_places(const Program& program, Rails<T>& rails, S& s) {
     const JunctionSlot* const place = program.junctions.data();
@@ -69,7 +69,7 @@ struct RailLoops {
     }
   }
 
-  // Once all forces are known: what they did to the places goes into the waves, and all goes on.
+  // Adds the effect of all forces to the waves and advances by one sample.
   template <class S>
   static void go_on(const Program& program, Rails<T>& rails, const S& s) {
     const JunctionSlot* const place = program.junctions.data();
@@ -87,16 +87,15 @@ struct RailLoops {
   static V* row(Aligned<T>& numbers, std::size_t place_row) {
     return reinterpret_cast<V*>(numbers.data() + place_row * waveguide_run);
   }
-  // How much of the next numbers counts already, n samples on in the run.
+  // Returns the cross-fade weight of the new delays, n samples into the run.
   static T share_of_next(const Guide& guide, std::uint32_t n) {
     return T(1) - static_cast<T>(guide.fading - static_cast<int>(n)) /
                       static_cast<T>(waveguide_fade_frames);
   }
   static V sign_of_left(const Guide& guide) { return V{} + (guide.slot->is_open ? T(1) : T(-1)); }
 
-  // Calls with as many samples of each lane as there are lanes, where none of them wraps, and with
-  // one sample of one lane for what is left: `packs(first sample, its wave in each lane)`,
-  // `one(sample, lane, wave)`.
+  // Calls `packs(first sample, its wave in each lane)` for squares of samples and lanes in which no
+  // lane wraps around, and `one(sample, lane, wave)` for the remaining samples.
   template <class R, class Packs, class One>
   [[gnu::always_inline]] static void each(R& rails, const Guide& guide, const std::uint32_t* delay,
                                           Packs&& packs, One&& one) {
@@ -138,7 +137,7 @@ struct RailLoops {
         },
         [&](std::uint32_t n, std::size_t lane, const T* wave) { run[n][lane] = *wave; });
   }
-  // Added to what there is, or instead of it.
+  // Adds to the ring, or overwrites it.
   template <bool adds>
   static void write(Rails<T>& rails, const Guide& guide, const std::uint32_t* delay, const V* run) {
     each(
@@ -158,8 +157,8 @@ struct RailLoops {
         });
   }
 
-  // What was done to the waves, and then what goes on from the filters: the last place may be where
-  // these are.
+  // Writes the changes of the waves, then the output of the filters, since the last place may be at
+  // the filters.
   static void write_run(Rails<T>& rails) {
     for (Guide& guide : rails.guides) {
       const V sign = sign_of_left(guide);
@@ -171,7 +170,7 @@ struct RailLoops {
           pushed |= wave[n] != V{};
         }
         if (!any_of(pushed)) {
-          continue;  // nothing pulls where it is only heard
+          continue;  // A place that is only an output has no force.
         }
         multiply(wave, V{} + T(0.5), rails.run);
         if (guide.fading > 0) {
@@ -205,7 +204,7 @@ struct RailLoops {
     }
   }
 
-  // What comes to the filters and what goes on from there.
+  // Applies the filters to the waves that reach them.
   static void reflect(Rails<T>& rails, const Guide& guide) {
     const std::size_t at = guide.row;
     Run wave, next;

@@ -9,7 +9,7 @@
 namespace ressort::kernels {
 namespace {
 
-constexpr std::size_t numbers_of_guide = 3;  // frequency, T60, brightness
+constexpr std::size_t numbers_of_guide = 3;  // Frequency, T60, brightness.
 
 }  // namespace
 
@@ -96,7 +96,7 @@ bool Rails<T>::is_new(const Guide& guide, std::size_t lane, const T* coefficient
 template <class T>
 void Rails<T>::prepare(const T* coefficients) {
   for (Guide& guide : guides) {
-    bool fades = false;  // all lanes together, those that stay to where they are
+    bool fades = false;  // All lanes fade together; unchanged ones fade to themselves.
     for (std::size_t lane = 0; lane < width; ++lane) {
       const bool is_silent = std::isnan(designed_[guide.row + lane]);
       if (is_silent || (guide.fading == 0 && is_new(guide, lane, coefficients))) {
@@ -113,8 +113,8 @@ void Rails<T>::prepare(const T* coefficients) {
   }
 }
 
-// What goes on from the filters is read after the least delay; what forces do to a wave, after what
-// lies between two of them. (Both are written where nothing has been read from for a run.)
+// A run may be as long as the shortest delay from the filters, and as the shortest delay between
+// two places: within that time nothing is read that has not been written yet.
 template <class T>
 std::uint32_t Rails<T>::longest_run(const Guide& guide, const T* coefficients) {
   std::uint32_t longest = waveguide_run;
@@ -137,7 +137,7 @@ std::uint32_t Rails<T>::longest_run(const Guide& guide, const T* coefficients) {
     std::sort(all_delays_.begin(), all_delays_.end());
     longest = std::min(longest, all_delays_.front());
     if (coefficients[guide.slot->inverse_impedance * width + lane] == T(0)) {
-      continue;  // nobody has played here yet
+      continue;  // No note has played here yet.
     }
     for (std::size_t i = 1; i < all_delays_.size(); ++i) {
       const std::uint32_t way = all_delays_[i] - all_delays_[i - 1];
@@ -153,7 +153,7 @@ void Rails<T>::design(Guide& guide, std::size_t lane, const T* coefficients) {
   const std::size_t rows = guides.size() * width;
   const auto number = [&](std::size_t row, std::uint32_t c) {
     designed_[row + lane] = coefficients[c * width + lane];
-    // What is no number is not designed again and again.
+    // NaN is replaced, so that it does not trigger a new design in every block.
     designed_[row + lane] = std::isnan(designed_[row + lane]) ? T(0) : designed_[row + lane];
     return static_cast<double>(designed_[row + lane]);
   };
@@ -179,7 +179,7 @@ void Rails<T>::design(Guide& guide, std::size_t lane, const T* coefficients) {
   }
 }
 
-// At once, as nothing sounds yet.
+// Without a fade, because the lane is silent.
 template <class T>
 void Rails<T>::settle(Guide& guide, std::size_t lane) {
   const std::size_t at = guide.row + lane;
@@ -215,10 +215,10 @@ std::size_t Rails<T>::look(std::size_t lane, std::size_t number, std::span<doubl
   const std::uint32_t samples = end[guide.row + lane];
   const double sign = guide.slot->is_open ? 1.0 : -1.0;
   const auto pieces = static_cast<double>(numbers.size() - 1);
-  const double half = pieces / samples;  // of a sample, to either side
+  const double half = pieces / samples;  // Half a sample to either side.
   std::fill(numbers.begin(), numbers.end(), 0.0);
   for (std::uint32_t delay = 1; delay <= samples; ++delay) {
-    // From the right end to the left one and back.
+    // Position on the loop, from the right end to the left one and back.
     const double round = guide.slot->filters_at.share + (delay - 0.5) / samples;
     const double way = 2.0 * (round - std::floor(round));
     const double speed = *wave(guide, lane, now - delay);

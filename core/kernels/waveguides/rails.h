@@ -1,22 +1,22 @@
-// core/kernels: the waves on a Program's waveguides. Both of a waveguide's rails are one ring of
-// velocities, since an end that is held or free gives back what comes, with a sign that the ring
-// leaves out. Once on its way round, a wave passes the allpass and the loss: anywhere, as far as
-// the tone goes; so they are where nothing holds on to the string (core/compile/machine.cpp), and
-// its sounding length is exact there, not just to a sample.
+// core/kernels: the waves on a Program's digital waveguides. Both rails of a waveguide share one
+// ring of velocity waves, because a fixed or free end reflects the wave with a sign that the ring
+// leaves out. Once per period a wave passes the allpass and the loss filter. Their position does
+// not affect the tone, so they are placed where nothing is attached (core/compile/machine.cpp); the
+// sounding length is exact there and not rounded to a sample.
 //
-// What comes to a place within fewer samples than lie between it and the nearest other one does not
-// hang on what happens meanwhile. So a run of samples is read at once, the filters' too; what
-// forces did to the waves is added to them at the run's end. The bits are those of sample by
-// sample.
+// A wave that reaches a place sooner than one from the nearest other place cannot depend on what
+// happens in between. So a run of samples, filters included, is read at once, and the effect of
+// forces is added at the end of the run. The result has the same bits as sample-by-sample
+// processing.
 //
-// A place sees the wave that runs right, r, and that which runs left, l. With a force f on it, 1/R
-// being the inverse of the impedance,
+// A place sees the right-going wave r and the left-going wave l. With a force f on it and 1/R the
+// inverse of the wave impedance,
 //
-//   v = r + l + f/2R,  r and l grow by f/2R,  x[n+1] = x[n-1] + 2 v
+//  v = r + l + f/2R,  r and l grow by f/2R,  x[n+1] = x[n-1] + 2 v
 //
-// That is a node that was at x[n-1], would go to x[n-1] + 2 (r + l) and gives way by 1/R to a force
-// of 1: a link sees it as it sees a mass (core/laws/discrete_gradient.h). The waves gain f v then,
-// which is exactly the force's work f (x[n+1] - x[n-1])/2.
+// This equals a node that was at x[n-1], would move to x[n-1] + 2 (r + l), and responds with 1/R to
+// a unit force, so a link treats it like a mass (core/laws/discrete_gradient.h). The waves gain the
+// energy f v, which is exactly the work of the force, f (x[n+1] - x[n-1])/2.
 #pragma once
 
 #include <vector>
@@ -27,18 +27,18 @@
 
 namespace ressort::kernels {
 
-inline constexpr double lowest_waveguide_hz = 15.0;  // that rings have room for
-inline constexpr int waveguide_fade_frames = 64;     // from one length, or place, to another
-inline constexpr std::uint32_t waveguide_run = 16;   // samples that are read at once, at most
+inline constexpr double lowest_waveguide_hz = 15.0;  // Lowest frequency that fits into a ring.
+inline constexpr int waveguide_fade_frames = 64;     // Cross-fade between two lengths or places.
+inline constexpr std::uint32_t waveguide_run = 16;   // Most samples read at once.
 
-// How many samples a loop needs at least, if there are so many places: each has one of its own.
+// Returns the least number of samples in a loop with so many places: each needs one of its own.
 constexpr std::uint32_t least_waveguide_samples(std::uint32_t places) {
   return 2 * (places + 1);
 }
 
-// Of each ring: a power of two.
+// Returns the size of each ring, a power of two.
 std::uint32_t waveguide_slots(const Program& program);
-// ...and how many of them a loop may have: a run of samples is written ahead.
+// Returns the most samples of a loop: a run is written ahead.
 std::uint32_t most_waveguide_samples(const Program& program);
 
 template <class T>
@@ -47,31 +47,32 @@ class Rails {
   Rails(const Program& program, std::size_t width);
 
   bool is_empty() const { return guides.empty(); }
-  // No waves; the lane is designed anew before it sounds. [audio]
+  // Clears the waves; the lane is designed again before it sounds. [audio]
   void clear(std::size_t lane);
-  // Before a block: what has changed its numbers since is designed anew, and faded to. [audio]
+  // Before a block: redesigns waveguides whose numbers have changed, and starts a cross-fade.
+  // [audio]
   void prepare(const T* coefficients);
-  // Whether no wave of a lane is faster than that. O(samples) [audio]
+  // Returns whether no wave of a lane exceeds the bound. O(samples) [audio]
   bool is_quiet(std::size_t lane, double bound) const;
-  // Its displacement from the left end, at so many points as there are numbers: of the sum of what
-  // runs left less what runs right, sample by sample. The filters' own delay is spread over all of
-  // it. How many numbers that are. O(samples + numbers) [audio]
+  // Computes the displacement from the left end at equidistant points, by summing the left-going
+  // minus the right-going waves. The filters' delay is distributed over the length. Returns the
+  // number of points. O(samples + numbers) [audio]
   std::size_t look(std::size_t lane, std::size_t guide, std::span<double> numbers) const;
-  // What the waves of a lane hold, with the impedances as they are; fades apart.
+  // Returns the energy of the waves in a lane for the current impedances, cross-fades excluded.
   double energy(std::size_t lane, const T* coefficients) const;
 
   struct Guide {
     const WaveguideSlot* slot;
-    std::size_t ring;       // of its first number in `ring`
-    std::uint32_t mask;     // slots - 1
-    std::size_t row;        // of its numbers in those below, [guide][lane]
-    std::size_t place_row;  // the same of its places, [place][lane]
-    int fading;             // frames left
-    std::uint32_t run;      // how many samples may be read at once
-    bool is_run_known;      // ...and are no longer held down by a fade that has ended
+    std::size_t ring;       // First number in `ring`.
+    std::uint32_t mask;     // Number of slots - 1.
+    std::size_t row;        // First number in the tables below: [guide][lane].
+    std::size_t place_row;  // First number of its places: [place][lane].
+    int fading;             // Frames left of a cross-fade.
+    std::uint32_t run;      // Samples that may be read at once.
+    bool is_run_known;      // True once a finished cross-fade no longer limits the run.
   };
 
-  // Where a lane has the wave of a slot, before the mask.
+  // Returns the address of a slot's wave in a lane; the mask is applied here.
   T* wave(const Guide& guide, std::size_t lane, std::uint32_t slot) {
     return ring.data() + guide.ring + lane * stride + (slot & guide.mask);
   }
@@ -80,21 +81,22 @@ class Rails {
   }
 
   std::size_t width;
-  std::size_t stride;     // of a lane in a ring: slots, and a cache line that keeps lanes apart
-  std::uint32_t now = 0;  // where all rings are written, before the mask; of the run's first sample
-  std::uint32_t run = 0;  // samples that are read, of which `done` are played
+  // Distance between lanes in a ring: the slots, plus a cache line that keeps lanes apart.
+  std::size_t stride;
+  std::uint32_t now = 0;  // Write position of all rings, unmasked, at the run's first sample.
+  std::uint32_t run = 0;  // Samples read in this run, of which `done` have been played.
   std::uint32_t done = 0;
   std::vector<Guide> guides;
   Aligned<T> ring;  // [guide][lane][slot]
-  // [guide][lane]: the samples in the ring, and the filters.
+  // [guide][lane] Samples in the ring, and the filter coefficients.
   std::vector<std::uint32_t> end, next_end;
   Aligned<T> allpass, pole, gain, next_allpass, next_pole, next_gain;
   Aligned<T> allpass_state, pole_state;
-  // [place][lane]: delays at which the waves pass it.
+  // [place][lane] Delays at which the waves pass it.
   std::vector<std::uint32_t> right, left, next_right, next_left;
-  std::vector<std::uint32_t> gives;  // [place] coefficient: 1/R
-  // [place][sample of the run][lane]: the waves that come, the right one and the left; what forces
-  // do to them, and until that is known how far the place would move without.
+  std::vector<std::uint32_t> gives;  // [place] Coefficient 1/R.
+  // [place][sample of the run][lane] `comes`: the arriving waves, right and left. `goes`: the
+  // effect of forces, and before that is known, the motion without forces.
   Aligned<T> comes, goes;
 
  private:
@@ -105,9 +107,9 @@ class Rails {
 
   const Program& program_;
   std::vector<T> designed_;  // [guide: frequency, T60, brightness; then places][lane]
-  std::vector<double> u_;    // of a guide's places
-  std::vector<std::uint32_t> order_, delays_;  // [place, 2] of them
-  std::vector<std::uint32_t> all_delays_;      // of a lane
+  std::vector<double> u_;    // Coordinates of a guide's places.
+  std::vector<std::uint32_t> order_, delays_;  // [place, 2] Order and delays.
+  std::vector<std::uint32_t> all_delays_;      // Delays of one lane.
 };
 
 }  // namespace ressort::kernels

@@ -1,5 +1,5 @@
-// core/kernels: samples of each lane, turned into lanes of each sample and back. A part of
-// *_step.cpp, which are compiled for each instruction set.
+// core/kernels: transposes squares of samples and lanes. Included by *_step.cpp, which are compiled
+// for each instruction set.
 #pragma once
 
 #include <cstddef>
@@ -10,8 +10,8 @@
 
 namespace ressort::kernels {
 
-// What is right of the middle in `upper` changes places with what is left of it in `lower`, in all
-// squares of twice `half` a side.
+// Exchanges the right halves of `upper` with the left halves of `lower`, in all squares of size 2
+// `half`.
 template <std::size_t half, class V, std::size_t... i>
 [[gnu::always_inline]] static inline void exchange(V& upper, V& lower, std::index_sequence<i...>) {
   constexpr std::size_t lanes = sizeof...(i);
@@ -20,7 +20,7 @@ template <std::size_t half, class V, std::size_t... i>
   upper = above;
 }
 
-// A square of as many packs as one has lanes.
+// Transposes a square of as many packs as a pack has lanes.
 template <std::size_t half, class V>
 [[gnu::always_inline]] static inline void transpose_by(V* rows) {
   constexpr std::size_t lanes = sizeof(V) / sizeof(Scalar<V>);
